@@ -1,0 +1,284 @@
+//! Reading a blob: check everything once, then borrow.
+
+use super::error::DecodeError;
+use super::format::{
+    BlockLengths, CRC, CRC_BYTES, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection,
+    PREFIX_BYTES, Prefix, RbfHeader, ShapeField, TAG_METADATA, TAG_RBF_F32,
+};
+use super::{Metadata, ModelShape};
+use crate::rbf::{Network, NetworkError, Parameters, Shape};
+
+/// Names or units of columns, one a line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Columns<'a>(pub &'a str);
+
+impl<'a> Columns<'a> {
+    /// The entries in their order.
+    pub fn iter(self) -> impl Iterator<Item = &'a str> {
+        self.0.split('\n')
+    }
+}
+
+/// Little-endian `f32` at any address.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Floats<'a>(pub &'a [u8]);
+
+impl<'a> Floats<'a> {
+    /// The numbers in their order.
+    pub fn iter(self) -> impl Iterator<Item = f32> + 'a {
+        self.0.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes))
+    }
+}
+
+/// A sound blob, borrowed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Model<'a> {
+    shape: ModelShape,
+    crc: u32,
+    row_network: &'a [u8],
+    metadata: Metadata<'a>,
+    networks: u8,
+    network_sections: &'a [u8],
+}
+
+impl<'a> Model<'a> {
+    /// Checks `blob` from end to end and borrows from it.
+    ///
+    /// # Errors
+    /// Every variant of [`DecodeError`] but `ShapeMismatch`, in the order in which they are
+    /// declared: address, magic, version, length, CRC, then the sections.
+    pub fn decode(blob: &'a [u8]) -> Result<Self, DecodeError> {
+        if !(blob.as_ptr() as usize).is_multiple_of(FLOAT_ALIGNMENT) {
+            return Err(DecodeError::Misaligned);
+        }
+        let (body, crc) = checked_body(blob)?;
+        let (shape_field, rest) = take::<ShapeField>(body, "shape")?;
+        let ShapeField { rows, inputs, outputs, networks, row_network } = shape_field;
+        let shape =
+            ModelShape { rows: rows.into(), inputs: inputs.into(), outputs: outputs.into() };
+        check_count("row-to-network entries", shape.rows, row_network.len())?;
+        for (row, &network) in row_network.iter().enumerate() {
+            if network >= networks {
+                return Err(DecodeError::UnknownNetwork { row, network, networks });
+            }
+        }
+        if shape.rows == 0 || shape.inputs == 0 || shape.outputs == 0 {
+            return Err(DecodeError::Malformed { section: "shape" });
+        }
+
+        let (section, network_sections) = take::<MetadataSection>(rest, "metadata")?;
+        let metadata = checked_metadata(section, shape)?;
+
+        let model = Self { shape, crc, row_network, metadata, networks, network_sections };
+        let mut rest = network_sections;
+        for index in 0..networks {
+            let (network, after) = take_network(rest, shape, index)?;
+            // Every value is looked at once, here; later reads only cut slices.
+            Network::try_new(network.shape(), *network.parameters())
+                .map_err(|cause| DecodeError::Network { index, cause })?;
+            rest = after;
+        }
+        if !rest.is_empty() {
+            return Err(DecodeError::LeftOver { bytes: rest.len() });
+        }
+        Ok(model)
+    }
+
+    /// The length in bytes that a blob declares, for one that lies in a larger flash slot;
+    /// `None` if `slot` does not start with a blob of this version.
+    #[must_use]
+    pub fn declared_length(slot: &[u8]) -> Option<usize> {
+        let prefix = checked_prefix(slot).ok()?;
+        Some(u32::from_le_bytes(prefix.length) as usize)
+    }
+
+    /// Rows, inputs and outputs.
+    #[must_use]
+    pub fn shape(&self) -> ModelShape {
+        self.shape
+    }
+
+    /// The blob's CRC-32: a short fingerprint of the whole model.
+    #[must_use]
+    pub fn crc(&self) -> u32 {
+        self.crc
+    }
+
+    /// What is known of the model beyond its weights.
+    #[must_use]
+    pub fn metadata(&self) -> &Metadata<'a> {
+        &self.metadata
+    }
+
+    /// How many networks the blob holds; rows may share them.
+    #[must_use]
+    pub fn network_count(&self) -> usize {
+        self.networks.into()
+    }
+
+    /// The networks in their order.
+    pub fn networks(&self) -> impl Iterator<Item = Network<'a>> {
+        let (shape, mut rest) = (self.shape, self.network_sections);
+        (0..self.networks).map_while(move |index| {
+            let (network, after) = take_network(rest, shape, index).ok()?;
+            rest = after;
+            Some(network)
+        })
+    }
+
+    /// Index of the network that serves `row` (from 0), or `None` for a row outside the sensor.
+    #[must_use]
+    pub fn network_of_row(&self, row: usize) -> Option<usize> {
+        self.row_network.get(row).copied().map(usize::from)
+    }
+}
+
+fn checked_prefix(blob: &[u8]) -> Result<Prefix, DecodeError> {
+    if blob.len() < PREFIX_BYTES {
+        // Too short to tell its own length: what is there decides between the two causes.
+        let is_start = MAGIC.iter().zip(blob).all(|(a, b)| a == b);
+        return Err(if is_start {
+            DecodeError::Truncated { expected: PREFIX_BYTES + CRC_BYTES, found: blob.len() }
+        } else {
+            DecodeError::BadMagic
+        });
+    }
+    let (prefix, _) = take::<Prefix>(blob, "prefix")?;
+    if prefix.magic != MAGIC {
+        return Err(DecodeError::BadMagic);
+    }
+    if prefix.version != FORMAT_VERSION {
+        return Err(DecodeError::UnsupportedVersion {
+            found: prefix.version,
+            supported: FORMAT_VERSION,
+        });
+    }
+    Ok(prefix)
+}
+
+/// Checks prefix, length and CRC; returns what lies between prefix and CRC, and the CRC.
+fn checked_body(blob: &[u8]) -> Result<(&[u8], u32), DecodeError> {
+    let prefix = checked_prefix(blob)?;
+    let (expected, found) = (u32::from_le_bytes(prefix.length) as usize, blob.len());
+    if found < expected {
+        return Err(DecodeError::Truncated { expected, found });
+    }
+    if found > expected {
+        return Err(DecodeError::TrailingBytes { extra: found - expected });
+    }
+    let Some((covered, stored)) = blob.split_last_chunk::<CRC_BYTES>() else {
+        return Err(DecodeError::Malformed { section: "prefix" });
+    };
+    let (stored, computed) = (u32::from_le_bytes(*stored), CRC.checksum(covered));
+    if stored != computed {
+        return Err(DecodeError::Corrupt { expected: computed, found: stored });
+    }
+    match covered.split_at_checked(PREFIX_BYTES) {
+        Some((_, body)) => Ok((body, stored)),
+        None => Err(DecodeError::Malformed { section: "prefix" }),
+    }
+}
+
+fn take<'a, T: serde::Deserialize<'a>>(
+    bytes: &'a [u8],
+    section: &'static str,
+) -> Result<(T, &'a [u8]), DecodeError> {
+    postcard::take_from_bytes(bytes).map_err(|_| DecodeError::Malformed { section })
+}
+
+fn check_tag(expected: u8, found: u8) -> Result<(), DecodeError> {
+    if expected == found { Ok(()) } else { Err(DecodeError::SectionOrder { expected, found }) }
+}
+
+fn check_count(what: &'static str, expected: usize, found: usize) -> Result<(), DecodeError> {
+    if expected == found {
+        Ok(())
+    } else {
+        Err(DecodeError::CountMismatch { what, expected, found })
+    }
+}
+
+fn checked_metadata(
+    section: MetadataSection<'_>,
+    shape: ModelShape,
+) -> Result<Metadata<'_>, DecodeError> {
+    check_tag(TAG_METADATA, section.tag)?;
+    let metadata = Metadata {
+        name: section.name,
+        scene_digest: section.scene_digest,
+        noise_kind: section.noise_kind,
+        noise_level: section.noise_level,
+        seed: section.seed,
+        training_frames: section.training_frames,
+        thickness_mm: section.thickness_mm,
+        input_names: Columns(section.input_names),
+        input_units: Columns(section.input_units),
+        output_names: Columns(section.output_names),
+        output_units: Columns(section.output_units),
+        training_rmse: Floats(section.training_rmse),
+        full_scale: Floats(section.full_scale),
+    };
+    let (inputs, outputs) = (shape.rows * shape.inputs, shape.rows * shape.outputs);
+    check_count("input names", inputs, metadata.input_names.iter().count())?;
+    check_count("input units", inputs, metadata.input_units.iter().count())?;
+    check_count("output names", outputs, metadata.output_names.iter().count())?;
+    check_count("output units", outputs, metadata.output_units.iter().count())?;
+    check_count("bytes of training errors", outputs * 4, section.training_rmse.len())?;
+    check_count("bytes of full scales", outputs * 4, section.full_scale.len())?;
+    let in_range = |v: f32| v.is_finite() && v >= 0.0;
+    for (field, ok) in [
+        ("noise level", in_range(metadata.noise_level)),
+        ("thickness", in_range(metadata.thickness_mm)),
+        ("training error", metadata.training_rmse.iter().all(in_range)),
+        ("full scale", metadata.full_scale.iter().all(in_range)),
+    ] {
+        if !ok {
+            return Err(DecodeError::InvalidMetadata { field });
+        }
+    }
+    Ok(metadata)
+}
+
+/// Cuts one network section from the front of `bytes`; lengths are checked, values are not.
+fn take_network(
+    bytes: &[u8],
+    shape: ModelShape,
+    index: u8,
+) -> Result<(Network<'_>, &[u8]), DecodeError> {
+    const SECTION: &str = "network section";
+    let (header, rest) = take::<RbfHeader>(bytes, SECTION)?;
+    check_tag(TAG_RBF_F32, header.tag)?;
+    if header.index != index {
+        return Err(DecodeError::NetworkOrder { expected: index, found: header.index });
+    }
+    let (padding, rest) = take::<&[u8]>(rest, SECTION)?;
+    if padding.len() >= FLOAT_ALIGNMENT || padding.iter().any(|&byte| byte != 0) {
+        return Err(DecodeError::Malformed { section: "padding" });
+    }
+    let (block, rest) = take::<&[u8]>(rest, SECTION)?;
+    let lengths = BlockLengths::new(&header, shape.inputs, shape.outputs);
+    check_count("bytes of weights", lengths.total() * 4, block.len())?;
+    let floats = bytemuck::try_cast_slice::<u8, f32>(block)
+        .map_err(|_| DecodeError::Malformed { section: "padding" })?;
+
+    let network_shape =
+        Shape { inputs: shape.inputs, centres: header.centres.into(), outputs: shape.outputs };
+    let mut rest_of_floats = floats;
+    let mut cut = |length: usize| -> &[f32] {
+        let (head, tail) = rest_of_floats.split_at_checked(length).unwrap_or_default();
+        rest_of_floats = tail;
+        head
+    };
+    let parameters = Parameters {
+        input_minimum: cut(lengths.inputs),
+        input_per_span: cut(lengths.inputs),
+        centres: cut(lengths.centres),
+        decay: cut(lengths.decay),
+        output_weights: cut(lengths.output_weights),
+        bias: cut(lengths.bias),
+        affine: cut(lengths.affine),
+    };
+    let network = Network::with_lengths_checked(network_shape, parameters)
+        .map_err(|cause: NetworkError| DecodeError::Network { index, cause })?;
+    Ok((network, rest))
+}

@@ -1,0 +1,189 @@
+//! Writing a blob, into memory the caller owns.
+
+use serde::Serialize;
+
+use super::error::EncodeError;
+use super::format::{
+    BlockLengths, CRC, CRC_BYTES, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection,
+    Prefix, RbfHeader, ShapeField, TAG_METADATA, TAG_RBF_F32,
+};
+use super::{Metadata, Model};
+use crate::rbf::Network;
+
+/// All that goes into a blob.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ModelParts<'a> {
+    /// The networks; all have the same inputs and outputs.
+    pub networks: &'a [Network<'a>],
+    /// Which network serves each row.
+    pub row_network: &'a [u8],
+    /// What is known beyond the weights.
+    pub metadata: Metadata<'a>,
+}
+
+/// A buffer of this many bytes holds the blob of `parts`.
+#[must_use]
+pub fn encoded_length_bound(parts: &ModelParts<'_>) -> usize {
+    // Fixed fields, and the largest varint of every field that has one.
+    const FIXED_FIELDS: usize = 128;
+    const SECTION_FIELDS: usize = 32;
+    let m = &parts.metadata;
+    let text = m.name.len()
+        + m.input_names.0.len()
+        + m.input_units.0.len()
+        + m.output_names.0.len()
+        + m.output_units.0.len();
+    let numbers = m.training_rmse.0.len() + m.full_scale.0.len() + parts.row_network.len();
+    let weights: usize = parts.networks.iter().map(|n| SECTION_FIELDS + 4 * float_count(n)).sum();
+    FIXED_FIELDS + text + numbers + weights
+}
+
+fn float_count(network: &Network<'_>) -> usize {
+    let p = network.parameters();
+    p.input_minimum.len()
+        + p.input_per_span.len()
+        + p.centres.len()
+        + p.decay.len()
+        + p.output_weights.len()
+        + p.bias.len()
+        + p.affine.len()
+}
+
+/// Writes `parts` at the start of `buffer` and returns the bytes used.
+///
+/// `buffer` must lie at a multiple of four ([`Aligned`](super::Aligned)), since the result is read
+/// back before it is returned: a blob that leaves this function decodes.
+///
+/// # Errors
+/// See [`EncodeError`].
+pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u8], EncodeError> {
+    let first = parts.networks.first().map(Network::shape);
+    let (inputs, outputs) = first.map_or((0, 0), |s| (s.inputs, s.outputs));
+    for (index, network) in parts.networks.iter().enumerate() {
+        if (network.shape().inputs, network.shape().outputs) != (inputs, outputs) {
+            return Err(EncodeError::UnequalNetworks { index });
+        }
+    }
+
+    let mut writer = Writer { buffer, at: 0 };
+    writer.put(&Prefix { magic: MAGIC, version: FORMAT_VERSION, length: [0; 4] })?;
+    writer.put(&ShapeField {
+        rows: fit("number of rows", parts.row_network.len(), u8::MAX)?,
+        inputs: fit("number of inputs", inputs, u16::MAX)?,
+        outputs: fit("number of outputs", outputs, u16::MAX)?,
+        networks: fit("number of networks", parts.networks.len(), u8::MAX)?,
+        row_network: parts.row_network,
+    })?;
+    let m = &parts.metadata;
+    writer.put(&MetadataSection {
+        tag: TAG_METADATA,
+        name: m.name,
+        scene_digest: m.scene_digest,
+        noise_kind: m.noise_kind,
+        noise_level: m.noise_level,
+        seed: m.seed,
+        training_frames: m.training_frames,
+        thickness_mm: m.thickness_mm,
+        input_names: m.input_names.0,
+        input_units: m.input_units.0,
+        output_names: m.output_names.0,
+        output_units: m.output_units.0,
+        training_rmse: m.training_rmse.0,
+        full_scale: m.full_scale.0,
+    })?;
+    for (index, network) in parts.networks.iter().enumerate() {
+        writer.put_network(fit("network index", index, u8::MAX)?, network)?;
+    }
+    let length = writer.finish()?;
+
+    let blob = buffer.get(..length).ok_or(EncodeError::BufferTooSmall)?;
+    Model::decode(blob)?;
+    Ok(blob)
+}
+
+fn fit<T: TryFrom<usize> + Into<usize> + Copy>(
+    what: &'static str,
+    value: usize,
+    most: T,
+) -> Result<T, EncodeError> {
+    T::try_from(value).map_err(|_| EncodeError::TooLarge { what, value, most: most.into() })
+}
+
+struct Writer<'b> {
+    buffer: &'b mut [u8],
+    at: usize,
+}
+
+impl Writer<'_> {
+    fn put<T: Serialize>(&mut self, field: &T) -> Result<(), EncodeError> {
+        let free = self.buffer.get_mut(self.at..).ok_or(EncodeError::BufferTooSmall)?;
+        let used = postcard::to_slice(field, free).map_err(|_| EncodeError::BufferTooSmall)?;
+        self.at += used.len();
+        Ok(())
+    }
+
+    fn put_raw(&mut self, bytes: &[u8]) -> Result<(), EncodeError> {
+        let end = self.at + bytes.len();
+        let free = self.buffer.get_mut(self.at..end).ok_or(EncodeError::BufferTooSmall)?;
+        free.copy_from_slice(bytes);
+        self.at = end;
+        Ok(())
+    }
+
+    fn put_network(&mut self, index: u8, network: &Network<'_>) -> Result<(), EncodeError> {
+        let (shape, p) = (network.shape(), network.parameters());
+        let header = RbfHeader {
+            tag: TAG_RBF_F32,
+            index,
+            centres: fit("number of centres", shape.centres, u16::MAX)?,
+            common_width: p.decay.len() == 1,
+            affine: !p.affine.is_empty(),
+        };
+        let bytes = 4 * BlockLengths::new(&header, shape.inputs, shape.outputs).total();
+        self.put(&header)?;
+        let length = u32::try_from(bytes).map_err(|_| EncodeError::TooLarge {
+            what: "bytes of one network",
+            value: bytes,
+            most: u32::MAX as usize,
+        })?;
+        // One byte for the padding's own length, then the padding, then the block's length.
+        let start = self.at + 1 + varint_bytes(length);
+        let padding = start.next_multiple_of(FLOAT_ALIGNMENT) - start;
+        self.put(&[0_u8; FLOAT_ALIGNMENT].get(..padding).unwrap_or_default())?;
+        self.put(&length)?;
+        for values in [
+            p.input_minimum,
+            p.input_per_span,
+            p.centres,
+            p.decay,
+            p.output_weights,
+            p.bias,
+            p.affine,
+        ] {
+            self.put_raw(bytemuck::cast_slice(values))?;
+        }
+        Ok(())
+    }
+
+    /// Enters the length, appends the CRC, and returns the length.
+    fn finish(self) -> Result<usize, EncodeError> {
+        let end = self.at + CRC_BYTES;
+        let length = u32::try_from(end).map_err(|_| EncodeError::TooLarge {
+            what: "bytes of the blob",
+            value: end,
+            most: u32::MAX as usize,
+        })?;
+        let blob = self.buffer.get_mut(..end).ok_or(EncodeError::BufferTooSmall)?;
+        let (covered, crc) =
+            blob.split_last_chunk_mut::<CRC_BYTES>().ok_or(EncodeError::BufferTooSmall)?;
+        let field = covered.get_mut(5..9).ok_or(EncodeError::BufferTooSmall)?;
+        field.copy_from_slice(&length.to_le_bytes());
+        *crc = CRC.checksum(covered).to_le_bytes();
+        Ok(end)
+    }
+}
+
+/// Bytes that postcard's varint takes: seven bits a byte.
+fn varint_bytes(value: u32) -> usize {
+    (32 - value.leading_zeros()).max(1).div_ceil(7) as usize
+}

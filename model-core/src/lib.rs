@@ -1,0 +1,29 @@
+//! Inference for resistive tactile sensors: from row–column resistances to deformation.
+//!
+//! Readings travel one way: [`Frame`] (Ω) → [`scale`] → [`rbf`] (and its affine tail) →
+//! [`Estimate`]. The network's weights are read where the [`blob`] lies, in flash or in a
+//! file's buffer: nothing is copied, nothing is allocated, and no release code path of
+//! [`Decoder`] panics. [`rls`] updates output weights sample by sample.
+//!
+//! The crate knows no pin and no file. The same code serves host, emulator and board, so that
+//! their answers agree bit for bit where the same [`exp`] kernel is chosen.
+//!
+//! The network and its training follow Wang et al., "Decoupling research of flexible tactile
+//! sensors interfered by white Gaussian noise using improved RBFNN", Sensors & Transducers, 2014
+//! ("the paper").
+#![cfg_attr(not(test), no_std)]
+
+#[cfg(target_endian = "big")]
+compile_error!("the weight blob holds little-endian floats that are borrowed in place");
+
+pub mod blob;
+mod decoder;
+pub mod exp;
+mod frame;
+pub mod rbf;
+pub mod rls;
+pub mod scale;
+
+pub use blob::Aligned;
+pub use decoder::{Decoder, Estimate, RowStatus};
+pub use frame::{ColumnWire, Frame, RowWire};
