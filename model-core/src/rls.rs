@@ -112,11 +112,8 @@ pub fn update<T: Real>(
         let (Some(&pivot), Some(&entry)) = (r.first(), h.first()) else { return };
         let pivot = pivot * root_forgetting;
         let length = (pivot * pivot + entry * entry).sqrt();
-        let (cosine, sine) = if length > T::ZERO {
-            (pivot / length, entry / length)
-        } else {
-            (T::ONE, T::ZERO)
-        };
+        let (cosine, sine) =
+            if length > T::ZERO { (pivot / length, entry / length) } else { (T::ONE, T::ZERO) };
         // √λ belongs to the old row only; fold it into the two factors that meet that row.
         let (old_cosine, old_sine) = (cosine * root_forgetting, sine * root_forgetting);
         for (r, h) in r.iter_mut().zip(h.iter_mut()) {

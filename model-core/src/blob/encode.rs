@@ -4,8 +4,8 @@ use serde::Serialize;
 
 use super::error::EncodeError;
 use super::format::{
-    BlockLengths, CRC, CRC_BYTES, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection,
-    Prefix, RbfHeader, ShapeField, TAG_METADATA, TAG_RBF_F32,
+    BlockLengths, CRC, CRC_BYTES, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection, Prefix,
+    RbfHeader, ShapeField, TAG_METADATA, TAG_RBF_F32,
 };
 use super::{Metadata, Model};
 use crate::rbf::Network;

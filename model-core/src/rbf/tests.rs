@@ -17,7 +17,8 @@ struct Sample {
 
 impl Sample {
     fn new() -> Self {
-        let ramp = |n: usize, from: f32, step: f32| (0..n).map(|i| from + step * i as f32).collect();
+        let ramp =
+            |n: usize, from: f32, step: f32| (0..n).map(|i| from + step * i as f32).collect();
         Self {
             input_minimum: ramp(5, 50.0, 1.0),
             input_per_span: ramp(5, 0.05, 0.01),

@@ -122,7 +122,9 @@ fn f32_stays_within_a_tenth_of_f64_after_a_million_updates() {
         let (narrow, wide) = errors_after(1_000_000, 0.3, delta, forgetting);
         assert!(wide < 0.2, "the fit itself must work: {wide}");
         let ratio = narrow / wide;
-        println!("δ = {delta:e}, λ = {forgetting}: f32 {narrow:.5}, f64 {wide:.5}, ratio {ratio:.5}");
+        println!(
+            "δ = {delta:e}, λ = {forgetting}: f32 {narrow:.5}, f64 {wide:.5}, ratio {ratio:.5}"
+        );
         assert!(ratio <= 1.1, "δ = {delta}, λ = {forgetting}: {ratio}");
     }
 }

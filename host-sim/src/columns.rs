@@ -1,0 +1,168 @@
+//! Columns of data files: names, units, and what the project's own names mean.
+
+use serde::{Deserialize, Serialize};
+
+use crate::scene::{Quantity, Scene};
+
+/// Direction in the sensor's frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Axis {
+    /// Along the row-wires.
+    X,
+    /// Across the row-wires.
+    Y,
+    /// Along the outward normal.
+    Z,
+}
+
+impl Axis {
+    /// Place in a vector.
+    #[must_use]
+    pub fn index(self) -> usize {
+        self as usize
+    }
+
+    /// Name in column names.
+    #[must_use]
+    pub fn letter(self) -> char {
+        ['x', 'y', 'z'][self.index()]
+    }
+}
+
+/// Units that a column's name may end in, and how they are written.
+const UNITS: [(&str, &str); 7] = [
+    ("_ohm", "Ω"),
+    ("_mm", "mm"),
+    ("_n", "N"),
+    ("_pa", "Pa"),
+    ("_s", "s"),
+    ("_hz", "Hz"),
+    ("_v", "V"),
+];
+
+/// The unit that a column's name states, or "".
+#[must_use]
+pub fn unit_of(name: &str) -> &'static str {
+    UNITS.iter().find(|(suffix, _)| name.ends_with(suffix)).map_or("", |(_, unit)| unit)
+}
+
+/// The row-wire (from 1) that a name like `r4c17_ohm` or `r4e2_dz_mm` begins with.
+#[must_use]
+pub fn row_of(name: &str) -> Option<usize> {
+    let rest = name.strip_prefix('r')?;
+    let digits = rest.find(|c: char| !c.is_ascii_digit())?;
+    let (row, rest) = rest.split_at(digits);
+    let place = rest.strip_prefix(['c', 'e'])?;
+    place.starts_with(|c: char| c.is_ascii_digit()).then(|| row.parse().ok())?
+}
+
+/// What errors of an output are reported under: the axis of an electrode's deformation or force
+/// (`dz_mm` for `r4e2_dz_mm`), or the column itself for any other name.
+#[must_use]
+pub fn group_of(name: &str) -> &str {
+    match (row_of(name), name.split_once('_')) {
+        (Some(_), Some((_, component))) => component,
+        _ => name,
+    }
+}
+
+/// Whether `group` is compression in mm, for which the positional error is defined.
+#[must_use]
+pub fn is_compression(group: &str) -> bool {
+    group == "dz_mm"
+}
+
+/// Names of the readings that a scene asks for, row after row.
+#[must_use]
+pub fn reading_names(scene: &Scene) -> Vec<String> {
+    let columns = 1..=scene.sensor.column_wires;
+    let rows = scene.read_rows.iter().map(|row| row + 1);
+    rows.flat_map(|m| columns.clone().map(move |k| format!("r{m}c{k}_ohm"))).collect()
+}
+
+/// Names of the outputs that a scene asks for, row after row.
+#[must_use]
+pub fn output_names(scene: &Scene) -> Vec<String> {
+    let (symbol, unit) = match scene.outputs.quantity {
+        Quantity::Deformation => ('d', "mm"),
+        Quantity::Force => ('f', "n"),
+    };
+    let mut names = Vec::new();
+    for row in &scene.read_rows {
+        for electrode in 1..=scene.sensor.electrodes_per_row_wire {
+            for axis in &scene.outputs.axes {
+                let axis = axis.letter();
+                names.push(format!("r{}e{electrode}_{symbol}{axis}_{unit}", row + 1));
+            }
+        }
+    }
+    names
+}
+
+/// Names of the full deformation of one row (from 0), electrode after electrode.
+#[must_use]
+pub fn deformation_names(row: usize, electrodes: usize) -> Vec<String> {
+    let electrodes = 1..=electrodes;
+    electrodes
+        .flat_map(|i| ['x', 'y', 'z'].map(|axis| format!("r{}e{i}_d{axis}_mm", row + 1)))
+        .collect()
+}
+
+/// Columns of `header` that match `pattern`, in the header's order: comma-separated names in which
+/// `*` stands for any characters and `?` for one.
+#[must_use]
+pub fn select(header: &[String], pattern: &str) -> Vec<usize> {
+    let globs: Vec<&str> = pattern.split(',').map(str::trim).collect();
+    (0..header.len()).filter(|i| globs.iter().any(|g| matches(g, &header[*i]))).collect()
+}
+
+/// The first part of a comma-separated `pattern` that no column of `header` matches.
+#[must_use]
+pub fn unmatched<'p>(header: &[String], pattern: &'p str) -> Option<&'p str> {
+    pattern.split(',').map(str::trim).find(|glob| !header.iter().any(|name| matches(glob, name)))
+}
+
+fn matches(glob: &str, name: &str) -> bool {
+    match glob.chars().next() {
+        None => name.is_empty(),
+        Some('*') => {
+            let rest = &glob[1..];
+            let mut ends = name.char_indices().map(|(i, _)| i).chain([name.len()]);
+            ends.any(|i| matches(rest, &name[i..]))
+        }
+        Some(wanted) => name.chars().next().is_some_and(|c| {
+            (wanted == '?' || wanted == c)
+                && matches(&glob[wanted.len_utf8()..], &name[c.len_utf8()..])
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_tell_row_group_and_unit() {
+        assert_eq!(row_of("r12c3_ohm"), Some(12));
+        assert_eq!(row_of("r4e2_dz_mm"), Some(4));
+        for other in ["fx_n", "r_x", "row1", "r3", "r3x1", "rc1", ""] {
+            assert_eq!(row_of(other), None, "{other}");
+        }
+        assert_eq!(group_of("r4e2_dz_mm"), "dz_mm");
+        assert_eq!(group_of("fx_n"), "fx_n");
+        assert_eq!(unit_of("r12c3_ohm"), "Ω");
+        assert_eq!(unit_of("fx_n"), "N");
+        assert_eq!(unit_of("ch1"), "");
+    }
+
+    #[test]
+    fn globs_select_columns_in_file_order() {
+        let header = ["ch1", "fx_n", "ch12", "x_mm", "fz_n"].map(String::from);
+        assert_eq!(select(&header, "ch*"), [0, 2]);
+        assert_eq!(select(&header, "x_mm, f?_n"), [1, 3, 4]);
+        assert_eq!(select(&header, "ch?"), [0]);
+        assert_eq!(unmatched(&header, "ch*,fy_n"), Some("fy_n"));
+        assert_eq!(unmatched(&header, "ch*"), None);
+    }
+}

@@ -1,0 +1,81 @@
+//! `decode`: readings to estimates, with a trained model.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use host_sim::data_file::{self, DataFile};
+use host_sim::dataset::Table;
+use host_sim::model::{Kernel, LoadedModel};
+use host_sim::{Result, output};
+use serde::Serialize;
+
+use super::print;
+
+/// Decode readings from a CSV file; one line of estimates for every line of readings.
+///
+/// Where a reading is missing, the outputs of its row-wire are left empty.
+#[derive(Args)]
+#[command(after_help = "Example: host-sim decode press.bin readings.csv -o estimate.csv")]
+pub struct Arguments {
+    /// Weight blob.
+    model: PathBuf,
+    /// CSV file with the model's reading columns, in any order, among others.
+    readings: PathBuf,
+    /// CSV file to write, with the model's output columns.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Exponential of the activations.
+    #[arg(long, value_enum, default_value_t)]
+    kernel: Kernel,
+    /// Print a summary as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Summary {
+    frames: usize,
+    frames_with_missing_readings: usize,
+    kernel: Kernel,
+    file: PathBuf,
+}
+
+pub fn execute(arguments: &Arguments) -> Result<()> {
+    let loaded = LoadedModel::read(&arguments.model)?;
+    let file = DataFile::read(&arguments.readings)?;
+    output::check_writable(&arguments.output)?;
+    let readings = model_inputs(&loaded, &file)?;
+    let estimate = loaded.decode(arguments.kernel, &readings);
+    let names = estimate.names.iter().map(String::as_str);
+    data_file::write(&arguments.output, names, estimate.lines().map(|l| l.iter().copied()))?;
+    let incomplete = readings.lines().filter(|line| line.iter().any(|v| v.is_nan())).count();
+    let summary = Summary {
+        frames: estimate.len(),
+        frames_with_missing_readings: incomplete,
+        kernel: arguments.kernel,
+        file: arguments.output.clone(),
+    };
+    if arguments.json {
+        return print::json(&summary);
+    }
+    println!("{} frames decoded into {}", summary.frames, summary.file.display());
+    if incomplete > 0 {
+        println!("{incomplete} of them miss a reading: the outputs of its row-wire are empty");
+    }
+    Ok(())
+}
+
+/// The model's reading columns of `file`.
+pub fn model_inputs(loaded: &LoadedModel, file: &DataFile) -> Result<Table> {
+    let model = loaded.model();
+    table_of(file, model.metadata().input_names.iter())
+}
+
+/// The columns of `file` called `names`.
+pub fn table_of<'n>(file: &DataFile, names: impl Iterator<Item = &'n str>) -> Result<Table> {
+    let names: Vec<&str> = names.collect();
+    let columns = file.columns(names.iter().copied())?;
+    let lines = 0..file.lines();
+    let values = lines.flat_map(|line| columns.iter().map(move |c| file.value(line, *c)));
+    Ok(Table { values: values.collect(), names: names.into_iter().map(String::from).collect() })
+}

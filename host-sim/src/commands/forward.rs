@@ -1,0 +1,56 @@
+//! `forward`: the ideal sensor's readings for given deformations.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use host_sim::data_file::{self, DataFile};
+use host_sim::{Result, columns, output, synth};
+use serde::Serialize;
+
+use super::print;
+use super::scene_argument::SceneArgument;
+
+/// Compute the ideal readings for deformations from a CSV file.
+#[derive(Args)]
+#[command(after_help = "Example: host-sim forward paper deformation.csv -o readings.csv")]
+pub struct Arguments {
+    #[command(flatten)]
+    scene: SceneArgument,
+    /// CSV file with columns r{m}e{i}_d{x|y|z}_mm.
+    deformation: PathBuf,
+    /// CSV file to write, with columns r{m}c{k}_ohm.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Print a summary as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Summary {
+    frames: usize,
+    readings: usize,
+    file: PathBuf,
+}
+
+pub fn execute(arguments: &Arguments) -> Result<()> {
+    let scene = arguments.scene.load()?;
+    let file = DataFile::read(&arguments.deformation)?;
+    output::check_writable(&arguments.output)?;
+    let readings = synth::forward(&scene, &file)?;
+    let names = columns::reading_names(&scene);
+    let lines = readings.chunks_exact(names.len()).map(|line| line.iter().copied());
+    data_file::write(&arguments.output, names.iter().map(String::as_str), lines)?;
+    let summary =
+        Summary { frames: file.lines(), readings: names.len(), file: arguments.output.clone() };
+    if arguments.json {
+        return print::json(&summary);
+    }
+    println!(
+        "{} frames of {} readings in {}",
+        summary.frames,
+        summary.readings,
+        summary.file.display()
+    );
+    Ok(())
+}

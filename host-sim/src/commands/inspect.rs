@@ -1,0 +1,174 @@
+//! `inspect`: what a weight blob holds and costs.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use host_sim::Result;
+use host_sim::model::LoadedModel;
+use serde::Serialize;
+
+use super::print;
+
+/// Show a blob's shape, origin, training errors, and what it needs on a device.
+#[derive(Args)]
+#[command(after_help = "Example: host-sim inspect press.bin")]
+pub struct Arguments {
+    /// Weight blob.
+    model: PathBuf,
+    /// Print as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Summary {
+    format_version: u8,
+    name: String,
+    crc_32: String,
+    scene_digest: String,
+    rows: usize,
+    inputs_per_row: usize,
+    outputs_per_row: usize,
+    networks: Vec<NetworkSummary>,
+    noise_kind: String,
+    noise_level: f32,
+    seed: u64,
+    training_frames: u32,
+    flash_bytes: usize,
+    ram_bytes: RamBytes,
+    inputs: Vec<ColumnSummary>,
+    outputs: Vec<OutputSummary>,
+}
+
+#[derive(Serialize)]
+struct NetworkSummary {
+    centres: usize,
+    width: Vec<f32>,
+    affine_tail: bool,
+}
+
+/// RAM that the device needs for this shape, apart from its stack frames.
+#[derive(Serialize)]
+struct RamBytes {
+    frame: usize,
+    estimate: usize,
+    scaled_readings: usize,
+}
+
+#[derive(Serialize)]
+struct ColumnSummary {
+    name: String,
+    unit: String,
+}
+
+#[derive(Serialize)]
+struct OutputSummary {
+    name: String,
+    unit: String,
+    training_rmse: f32,
+    full_scale: f32,
+}
+
+pub fn execute(arguments: &Arguments) -> Result<()> {
+    let loaded = LoadedModel::read(&arguments.model)?;
+    let summary = summarise(&loaded);
+    if arguments.json { print::json(&summary) } else { print_summary(&summary) }
+}
+
+fn summarise(loaded: &LoadedModel) -> Summary {
+    let model = loaded.model();
+    let (shape, metadata) = (model.shape(), model.metadata());
+    let networks = model.networks().map(|network| {
+        let p = network.parameters();
+        NetworkSummary {
+            centres: network.shape().centres,
+            width: p.decay.iter().map(|decay| (0.5 / decay).sqrt()).collect(),
+            affine_tail: !p.affine.is_empty(),
+        }
+    });
+    let column =
+        |(name, unit): (&str, &str)| ColumnSummary { name: name.into(), unit: unit.into() };
+    let errors = metadata.training_rmse.iter().zip(metadata.full_scale.iter());
+    let outputs = metadata.output_names.iter().zip(metadata.output_units.iter()).zip(errors);
+    let float = size_of::<f32>();
+    Summary {
+        format_version: model_core::blob::FORMAT_VERSION,
+        name: metadata.name.into(),
+        crc_32: format!("{:08x}", model.crc()),
+        scene_digest: format!("{:016x}", metadata.scene_digest),
+        rows: shape.rows,
+        inputs_per_row: shape.inputs,
+        outputs_per_row: shape.outputs,
+        networks: networks.collect(),
+        noise_kind: format!("{:?}", metadata.noise_kind).to_lowercase(),
+        noise_level: metadata.noise_level,
+        seed: metadata.seed,
+        training_frames: metadata.training_frames,
+        flash_bytes: loaded.bytes().len(),
+        ram_bytes: RamBytes {
+            frame: shape.rows * shape.inputs * float,
+            estimate: shape.rows * (shape.outputs * float + 1),
+            scaled_readings: shape.inputs * float,
+        },
+        inputs: metadata.input_names.iter().zip(metadata.input_units.iter()).map(column).collect(),
+        outputs: outputs
+            .map(|((name, unit), (training_rmse, full_scale))| OutputSummary {
+                name: name.into(),
+                unit: unit.into(),
+                training_rmse,
+                full_scale,
+            })
+            .collect(),
+    }
+}
+
+fn print_summary(s: &Summary) -> Result<()> {
+    let line = |label: &str, value: String| println!("{label:<17} {value}");
+    line("model", format!("{:?}, format {}, CRC-32 {}", s.name, s.format_version, s.crc_32));
+    line("trained on", format!("{} frames, digest {}", s.training_frames, s.scene_digest));
+    let noise = format!("{} {}", s.noise_kind, s.noise_level);
+    line("noise and seed", format!("{noise}, seed {}", s.seed));
+    line(
+        "shape",
+        format!("{} rows × {} readings → {} outputs", s.rows, s.inputs_per_row, s.outputs_per_row),
+    );
+    for (index, network) in s.networks.iter().enumerate() {
+        let (low, high) = network
+            .width
+            .iter()
+            .fold((f32::INFINITY, 0.0_f32), |(low, high), w| (low.min(*w), high.max(*w)));
+        let width = if low == high { format!("{low}") } else { format!("{low}…{high}") };
+        let tail = if network.affine_tail { ", affine tail" } else { "" };
+        line(&format!("network {index}"), format!("K = {}, width {width}{tail}", network.centres));
+    }
+    line("flash", format!("{} bytes", s.flash_bytes));
+    let ram = &s.ram_bytes;
+    line(
+        "RAM",
+        format!(
+            "{} bytes: frame {}, estimate {}, scaled readings {} (weights stay in flash)",
+            ram.frame + ram.estimate + ram.scaled_readings,
+            ram.frame,
+            ram.estimate,
+            ram.scaled_readings
+        ),
+    );
+    line("inputs", ends(&s.inputs.iter().map(|c| c.name.as_str()).collect::<Vec<_>>()));
+    println!("{:<17} {:>13} {:>11}", "output", "training RMSE", "full scale");
+    const SHOWN: usize = 24;
+    for output in s.outputs.iter().take(SHOWN) {
+        let OutputSummary { name, unit, training_rmse, full_scale } = output;
+        println!("{name:<17} {training_rmse:>13.4} {full_scale:>11.4} {unit}");
+    }
+    if s.outputs.len() > SHOWN {
+        println!("… {} more: --json lists them all", s.outputs.len() - SHOWN);
+    }
+    Ok(())
+}
+
+fn ends(names: &[&str]) -> String {
+    match names {
+        [first, .., last] if names.len() > 6 => format!("{first} … {last} ({})", names.len()),
+        _ => names.join(", "),
+    }
+}

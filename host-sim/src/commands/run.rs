@@ -1,0 +1,101 @@
+//! `run`: the main job, from scene to blob to report.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use host_sim::progress::Progress;
+use host_sim::run::{self, RunResult};
+use host_sim::{Error, Result, output};
+
+use super::print;
+use super::scene_argument::SceneArgument;
+
+/// Run a scene: synthesise, train, write the blob, read it back, decode, evaluate, report.
+///
+/// Writes model.bin, metrics.json, table1.csv and report.html to out/<scene>/.
+#[derive(Args)]
+#[command(after_help = "Example: host-sim run press --noise 0.01")]
+pub struct Arguments {
+    #[command(flatten)]
+    scene: SceneArgument,
+    /// Folder that receives a folder named after the scene.
+    #[arg(short, long, value_name = "DIR", default_value = "out")]
+    output: PathBuf,
+    /// Print all results as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn execute(arguments: &Arguments) -> Result<()> {
+    let scene = arguments.scene.load()?;
+    let folder = arguments.output.join(&scene.name);
+    std::fs::create_dir_all(&folder)
+        .map_err(|cause| Error::Write { path: folder.clone(), cause })?;
+    output::check_writable(&folder.join("model.bin"))?;
+    let started = std::time::Instant::now();
+    let (result, blob) = run::run(&scene, &Progress::on_terminal())?;
+    let files = write_files(&folder, &result, &blob)?;
+    if arguments.json {
+        return print::json(&result);
+    }
+    print_summary(&result, &folder, &files);
+    eprintln!("done in {:.1} s", started.elapsed().as_secs_f64());
+    Ok(())
+}
+
+fn write_files(folder: &Path, result: &RunResult, blob: &[u8]) -> Result<Vec<&'static str>> {
+    let mut files = vec!["model.bin", "metrics.json"];
+    output::write_bytes(&folder.join("model.bin"), blob)?;
+    let metrics = serde_json::to_vec_pretty(result)
+        .map_err(|cause| Error::Failed(format!("cannot write JSON: {cause}")))?;
+    output::write_bytes(&folder.join("metrics.json"), &metrics)?;
+    if let Some(table) = &result.table1 {
+        table.write_csv(&folder.join("table1.csv"))?;
+        files.push("table1.csv");
+    }
+    Ok(files)
+}
+
+fn print_summary(result: &RunResult, folder: &Path, files: &[&str]) {
+    let (scene, model) = (&result.scene, &result.model);
+    println!(
+        "{}: {} noise {} %, seed {}, {} training and {} test frames",
+        scene.name,
+        scene.noise_kind,
+        scene.noise_level * 100.0,
+        scene.seed,
+        model.training_frames,
+        model.test_frames
+    );
+    println!(
+        "model: {} networks, {} readings -> K = {} -> {} outputs, spread {}, {} bytes, CRC-32 {}",
+        model.networks,
+        model.inputs,
+        model.centres,
+        model.outputs,
+        model.spread,
+        model.blob_bytes,
+        model.blob_crc
+    );
+    println!();
+    let decoders: Vec<_> =
+        result.decoders.iter().map(|d| (d.decoder.as_str(), d.errors.as_slice())).collect();
+    print::errors(&decoders);
+    print::errors_legend();
+    println!("\nnetwork RMSE by row-wire:");
+    for group in result.rows.first().map_or(&[][..], |row| &row.errors) {
+        let of_row = |errors: &run::RowErrors| {
+            let found = errors.errors.iter().find(|e| e.group == group.group);
+            found.map_or(String::new(), |e| format!(" {:.4}", e.rmse))
+        };
+        let rows: String = result.rows.iter().map(of_row).collect();
+        println!("  {:<7}{rows} {}", group.group, group.unit);
+    }
+    if let Some(table) = &result.table1 {
+        for group in table.groups() {
+            let ratio = table.worst_ratio_to_mean(group).unwrap_or(f64::NAN);
+            println!("table 1, {group}: worst cell {ratio:.3} × the RMSE of the mean");
+        }
+    }
+    println!("\nwritten to {}: {}", folder.display(), files.join(", "));
+}

@@ -1,0 +1,69 @@
+//! `synth`: frames of a scene as CSV.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use host_sim::random::Stream;
+use host_sim::{Error, Result, data_file, output, synth};
+use serde::Serialize;
+
+use super::print;
+use super::scene_argument::SceneArgument;
+
+/// Synthesise frames of a scene: noisy readings and true outputs, as CSV.
+#[derive(Args)]
+#[command(after_help = "Example: host-sim synth press -n 20000 -o press.csv")]
+pub struct Arguments {
+    #[command(flatten)]
+    scene: SceneArgument,
+    /// Frames to synthesise.
+    #[arg(short = 'n', long, value_name = "N", default_value_t = 1000)]
+    frames: usize,
+    /// CSV file to write: readings, then outputs, one frame a line.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Print a summary as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Summary {
+    frames: usize,
+    readings: usize,
+    outputs: usize,
+    seed: u64,
+    file: PathBuf,
+}
+
+pub fn execute(arguments: &Arguments) -> Result<()> {
+    let scene = arguments.scene.load()?;
+    if !(1..=100_000_000).contains(&arguments.frames) {
+        let message = format!("-n {}: give from 1 to 100000000 frames", arguments.frames);
+        return Err(Error::Usage(message));
+    }
+    output::check_writable(&arguments.output)?;
+    let dataset = synth::synthesise(&scene, Stream::Training, arguments.frames);
+    let names = dataset.inputs.names.iter().chain(&dataset.outputs.names).map(String::as_str);
+    let lines = dataset.inputs.lines().zip(dataset.outputs.lines());
+    let lines = lines.map(|(readings, outputs)| readings.iter().chain(outputs).copied());
+    data_file::write(&arguments.output, names, lines)?;
+    let summary = Summary {
+        frames: dataset.frames(),
+        readings: dataset.inputs.names.len(),
+        outputs: dataset.outputs.names.len(),
+        seed: scene.seed,
+        file: arguments.output.clone(),
+    };
+    if arguments.json {
+        return print::json(&summary);
+    }
+    println!(
+        "{} frames of {} readings and {} outputs in {}",
+        summary.frames,
+        summary.readings,
+        summary.outputs,
+        summary.file.display()
+    );
+    Ok(())
+}

@@ -1,0 +1,116 @@
+//! `table1`: the paper's Table 1, by every definition of error.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use host_sim::evaluate::metrics::{Definition, Errors};
+use host_sim::evaluate::table1::{self, PAPER_PRINTED_PERCENT, Table1};
+use host_sim::progress::Progress;
+use host_sim::{Result, output};
+
+use super::print;
+use super::scene_argument::SceneArgument;
+
+/// Compute the paper's Table 1: error against spread and noise, by every definition of error.
+///
+/// Beside the K-centre network stand the training mean, the best linear decoder and the paper's
+/// standard network (K = N).
+#[derive(Args)]
+#[command(after_help = "Example: host-sim table1 paper -o table1.csv")]
+pub struct Arguments {
+    #[command(flatten)]
+    scene: SceneArgument,
+    /// CSV file to write, with all axes, decoders and definitions.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Outputs to print, such as dz_mm or dx_mm.
+    #[arg(long, value_name = "GROUP", default_value = "dz_mm")]
+    group: String,
+    /// Print everything as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn execute(arguments: &Arguments) -> Result<()> {
+    let scene = arguments.scene.load()?;
+    if let Some(path) = &arguments.output {
+        output::check_writable(path)?;
+    }
+    let table = table1::compute(&scene, &Progress::on_terminal())?;
+    if let Some(path) = &arguments.output {
+        table.write_csv(path)?;
+    }
+    if arguments.json {
+        return print::json(&table);
+    }
+    print_table(&table, &arguments.group)
+}
+
+fn print_table(table: &Table1, group: &str) -> Result<()> {
+    if !table.groups().contains(&group) {
+        let message = format!("--group {group}: the scene has {}", table.groups().join(", "));
+        return Err(host_sim::Error::Usage(message));
+    }
+    println!(
+        "{group}: K = {}, affine tail: {}, {} training and {} test frames; standard: K = N = {}",
+        table.centres,
+        if table.affine_tail { "yes" } else { "no" },
+        table.training_frames,
+        table.test_frames,
+        table.standard_frames
+    );
+    for definition in Definition::ALL {
+        let of = |errors: &[Errors]| {
+            errors.iter().find(|e| e.group == group).and_then(|e| definition.of(e))
+        };
+        if table.columns.iter().all(|column| of(&column.mean).is_none()) {
+            continue;
+        }
+        println!("\n{}", definition.formula());
+        let levels = table.columns.iter().map(|c| format!("{:>20}", percent(c.noise_level)));
+        println!("{:<16}{}", "noise", levels.collect::<String>());
+        for (s, cell) in table.columns[0].cells.iter().enumerate() {
+            let cells = table.columns.iter().map(|column| {
+                let standard = column.cells[s].standard.as_deref().and_then(of);
+                format!("{:>9} {:>10}", number(of(&column.cells[s].network)), bracket(standard))
+            });
+            println!("spread {:<9}{}", cell.spread, cells.collect::<String>());
+        }
+        for (name, errors) in [
+            ("linear", (|c| &c.linear) as fn(&table1::Column) -> &Vec<Errors>),
+            ("mean", |c| &c.mean),
+        ] {
+            let cells =
+                table.columns.iter().map(|c| format!("{:>9}{:11}", number(of(errors(c))), ""));
+            println!("{name:<16}{}", cells.collect::<String>().trim_end());
+        }
+    }
+    let [low, high] = PAPER_PRINTED_PERCENT;
+    println!(
+        "\n(in brackets: the standard network, K = N.) The paper prints {low} to {high} % for z and \
+         does not state its definition; docs/paper.md compares."
+    );
+    for group in table.groups() {
+        if let Some(ratio) = table.worst_ratio_to_mean(group) {
+            println!("{group}: the worst cell's RMSE is {ratio:.3} × that of the mean");
+        }
+    }
+    Ok(())
+}
+
+fn percent(level: f64) -> String {
+    format!("{} %", (level * 1e6).round() / 1e4)
+}
+
+fn number(value: Option<f64>) -> String {
+    match value {
+        None => "-".into(),
+        Some(v) if v.abs() >= 1e4 => format!("{v:.1e}"),
+        Some(v) if v.abs() >= 100.0 => format!("{v:.0}"),
+        Some(v) => format!("{v:.4}"),
+    }
+}
+
+fn bracket(value: Option<f64>) -> String {
+    format!("({})", number(value))
+}

@@ -1,0 +1,267 @@
+//! `train`: from a scene or any CSV file to a weight blob.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use host_sim::data_file::DataFile;
+use host_sim::dataset::{Dataset, some_names};
+use host_sim::model::{self, LoadedModel, Origin};
+use host_sim::random::Stream;
+use host_sim::scene::{EMBEDDED, Scene};
+use host_sim::train::select::{self, Selection};
+use host_sim::train::{self, Options};
+use host_sim::{Error, Result, output, synth};
+use serde::Serialize;
+
+use super::print;
+
+/// Train a model on a scene or on a CSV file, and write its weight blob.
+///
+/// A CSV file trains one network for all its chosen columns, or one a row-wire where the columns
+/// carry the project's own names (r4c17_ohm, r4e2_dz_mm).
+#[derive(Args)]
+#[command(after_help = "Examples:
+  host-sim train press -o press.bin
+  host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --centres 200 --spread 0.5 -o m.bin
+  host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --select --fold-column fold -o m.bin")]
+pub struct Arguments {
+    /// A built-in scene (paper, press), a scene file (.toml) or a CSV file.
+    source: String,
+    /// Blob to write.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Reading columns of a CSV file: names with * and ?, comma-separated [default: r*c*_ohm].
+    #[arg(long, value_name = "GLOB")]
+    inputs: Option<String>,
+    /// Output columns of a CSV file [default: r*e*_d?_mm and r*e*_f?_n].
+    #[arg(long, value_name = "GLOB")]
+    outputs: Option<String>,
+    /// Centres K; with --select, candidates [default: the scene's, or 64].
+    #[arg(long, value_name = "K", value_delimiter = ',')]
+    centres: Vec<usize>,
+    /// Width σ on scaled inputs; with --select, candidates [default: the scene's, or 0.8].
+    #[arg(long, value_name = "S", value_delimiter = ',')]
+    spread: Vec<f64>,
+    /// Leave out the affine tail A·x.
+    #[arg(long)]
+    no_affine: bool,
+    /// Choose K and spread among the candidates by cross-validation, and print every score.
+    #[arg(long)]
+    select: bool,
+    /// Folds of the cross-validation, drawn at random.
+    #[arg(long, value_name = "N", default_value_t = 5, requires = "select")]
+    folds: usize,
+    /// Column of a CSV file that gives each line's fold (any numbers), instead of random folds.
+    #[arg(long, value_name = "NAME", requires = "select", conflicts_with = "folds")]
+    fold_column: Option<String>,
+    /// Frames to synthesise from a scene, instead of the scene's number.
+    #[arg(short = 'n', long, value_name = "N")]
+    frames: Option<usize>,
+    /// Seed of every random draw [default: the scene's, or 1].
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Print the results as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What a model is trained on.
+struct Source {
+    dataset: Dataset,
+    origin: Origin,
+    defaults: Options,
+    /// Fold of each frame, where the data says.
+    fold_of: Option<Vec<usize>>,
+}
+
+#[derive(Serialize)]
+struct Summary {
+    file: PathBuf,
+    blob_bytes: usize,
+    blob_crc: String,
+    training_frames: usize,
+    centres: usize,
+    spread: f64,
+    affine_tail: bool,
+    outputs: Vec<String>,
+    training_rmse: Vec<f64>,
+    selection: Option<Selection>,
+}
+
+pub fn execute(arguments: &Arguments) -> Result<()> {
+    output::check_writable(&arguments.output)?;
+    let is_scene = EMBEDDED.iter().any(|(name, _)| *name == arguments.source)
+        || Path::new(&arguments.source).extension().is_some_and(|e| e == "toml");
+    let source = if is_scene { from_scene(arguments)? } else { from_data(arguments)? };
+
+    let mut options = source.defaults;
+    options.affine_tail &= !arguments.no_affine;
+    let selection = if arguments.select {
+        Some(choose(arguments, &source, &mut options)?)
+    } else {
+        options.centres = one("--centres", &arguments.centres, options.centres)?;
+        options.spread = one("--spread", &arguments.spread, options.spread)?;
+        None
+    };
+
+    let networks = train::train(&source.dataset, &options)?;
+    let blob = model::encode(&networks, &source.dataset, &source.origin)?;
+    let loaded = LoadedModel::from_bytes(&arguments.output, &blob)?;
+    output::write_bytes(&arguments.output, &blob)?;
+
+    let model = loaded.model();
+    let summary = Summary {
+        file: arguments.output.clone(),
+        blob_bytes: blob.len(),
+        blob_crc: format!("{:08x}", model.crc()),
+        training_frames: source.dataset.frames(),
+        centres: model.networks().map(|n| n.shape().centres).max().unwrap_or(0),
+        spread: options.spread,
+        affine_tail: options.affine_tail,
+        outputs: source.dataset.outputs.names.clone(),
+        training_rmse: model.metadata().training_rmse.iter().map(f64::from).collect(),
+        selection,
+    };
+    if arguments.json { print::json(&summary) } else { print_summary(&summary, options.centres) }
+}
+
+fn from_scene(arguments: &Arguments) -> Result<Source> {
+    for (option, given) in [
+        ("--inputs", arguments.inputs.is_some()),
+        ("--outputs", arguments.outputs.is_some()),
+        ("--fold-column", arguments.fold_column.is_some()),
+    ] {
+        if given {
+            let message = format!("{option} picks columns of a CSV file; a scene has its own");
+            return Err(Error::Usage(message));
+        }
+    }
+    let mut scene = Scene::load(&arguments.source)?;
+    scene.seed = arguments.seed.unwrap_or(scene.seed);
+    let frames = arguments.frames.unwrap_or(scene.training.frames);
+    if !(2..=100_000_000).contains(&frames) {
+        return Err(Error::Usage(format!("-n {frames}: give from 2 to 100000000 frames")));
+    }
+    let t = &scene.training;
+    Ok(Source {
+        dataset: synth::synthesise(&scene, Stream::Training, frames),
+        origin: Origin::of_scene(&scene),
+        defaults: Options::new(t.centres, t.spread, t.affine_tail, scene.seed),
+        fold_of: None,
+    })
+}
+
+fn from_data(arguments: &Arguments) -> Result<Source> {
+    if arguments.frames.is_some() {
+        return Err(Error::Usage("-n sets a scene's frames; a CSV file has its own".into()));
+    }
+    let path = Path::new(&arguments.source);
+    let file = DataFile::read(path)?;
+    let (dataset, kept) =
+        Dataset::from_file(&file, arguments.inputs.as_deref(), arguments.outputs.as_deref())?;
+    if kept.lines.len() < kept.of {
+        let left_out = kept.of - kept.lines.len();
+        eprintln!("note: {left_out} of {} lines have a missing value and are left out", kept.of);
+    }
+    let fold_of = match &arguments.fold_column {
+        Some(name) => Some(folds_from(&file, name, &kept.lines)?),
+        None => None,
+    };
+    let seed = arguments.seed.unwrap_or(1);
+    let name = path.file_stem().map_or("data".into(), |stem| stem.to_string_lossy());
+    Ok(Source {
+        origin: Origin::of_data(&name, file.digest, seed, &dataset),
+        defaults: Options::new(64, 0.8, true, seed),
+        dataset,
+        fold_of,
+    })
+}
+
+/// Numbers the distinct values of column `name` from 0, in ascending order.
+fn folds_from(file: &DataFile, name: &str, lines: &[usize]) -> Result<Vec<usize>> {
+    let column = file.column(name)?;
+    let values: Vec<f64> = lines.iter().map(|line| file.value(*line, column)).collect();
+    if let Some(place) = values.iter().position(|value| value.is_nan()) {
+        return Err(Error::Data {
+            path: file.path.clone(),
+            message: format!(
+                "line {}, column {name:?}: every line needs a fold; fill it in",
+                lines[place] + 2
+            ),
+        });
+    }
+    let order = |value: &f64| {
+        let bits = value.to_bits();
+        if bits >> 63 == 1 { !bits } else { bits | 1 << 63 }
+    };
+    let mut number: BTreeMap<u64, usize> = values.iter().map(|v| (order(v), 0)).collect();
+    number.values_mut().enumerate().for_each(|(i, fold)| *fold = i);
+    Ok(values.iter().map(|value| number[&order(value)]).collect())
+}
+
+fn one<T: Copy + std::fmt::Debug>(option: &str, given: &[T], default: T) -> Result<T> {
+    match given {
+        [] => Ok(default),
+        [value] => Ok(*value),
+        _ => Err(Error::Usage(format!("{option} {given:?}: give one value, or add --select"))),
+    }
+}
+
+fn choose(arguments: &Arguments, source: &Source, options: &mut Options) -> Result<Selection> {
+    let frames = source.dataset.frames();
+    let fold_of = match &source.fold_of {
+        Some(folds) => folds.clone(),
+        None if (2..=frames).contains(&arguments.folds) => {
+            select::random_folds(frames, arguments.folds, options.seed)
+        }
+        None => {
+            let message = format!("--folds {}: give from 2 to {frames}", arguments.folds);
+            return Err(Error::Usage(message));
+        }
+    };
+    let or = |given: &[usize], usual: usize| {
+        if given.is_empty() { vec![usual / 2, usual, usual * 2] } else { given.to_vec() }
+    };
+    let centres = or(&arguments.centres, options.centres);
+    let spreads = if arguments.spread.is_empty() {
+        vec![0.2, 0.3, 0.5, 0.8, 1.2, 2.0]
+    } else {
+        arguments.spread.clone()
+    };
+    let selection = select::cross_validate(&source.dataset, &fold_of, &centres, &spreads, options)?;
+    options.centres = selection.best().centres;
+    options.spread = selection.best().spread;
+    Ok(selection)
+}
+
+fn print_summary(summary: &Summary, asked: usize) -> Result<()> {
+    if let Some(selection) = &summary.selection {
+        println!("cross-validated RMSE of {}:", some_names(&summary.outputs));
+        for (i, scored) in selection.scored.iter().enumerate() {
+            let rmse: Vec<String> = scored.rmse.iter().take(8).map(|v| format!("{v:.4}")).collect();
+            let mark = if i == selection.best { "  <- chosen" } else { "" };
+            println!(
+                "  K = {:<4} spread = {:<5} score {:.4}: {}{mark}",
+                scored.centres,
+                scored.spread,
+                scored.score,
+                rmse.join(" ")
+            );
+        }
+    }
+    println!(
+        "{}: {} bytes, CRC-32 {}, K = {}, spread = {}, affine tail: {}, {} frames",
+        summary.file.display(),
+        summary.blob_bytes,
+        summary.blob_crc,
+        summary.centres,
+        summary.spread,
+        if summary.affine_tail { "yes" } else { "no" },
+        summary.training_frames
+    );
+    if summary.centres < asked {
+        println!("  ({asked} centres were asked for; the data has fewer distinct samples)");
+    }
+    Ok(())
+}

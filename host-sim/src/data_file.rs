@@ -1,0 +1,167 @@
+//! CSV files: a header of names, then one frame a line.
+
+use std::collections::HashSet;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+use crate::output;
+
+/// A CSV file, read whole. Empty fields and NaN are missing values, held as NaN.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DataFile {
+    /// Where it came from.
+    pub path: PathBuf,
+    /// Column names.
+    pub header: Vec<String>,
+    /// CRC-64/XZ of the file.
+    pub digest: u64,
+    values: Vec<f64>,
+}
+
+impl DataFile {
+    /// Reads `path`.
+    ///
+    /// # Errors
+    /// [`Error::Read`], or [`Error::Data`] for an empty file, a name that is missing or stands
+    /// twice, a line with too few or too many fields, or a field that is no number.
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).map_err(|cause| Error::read(path, cause))?;
+        Self::parse(path, &bytes)
+    }
+
+    /// Reads the file's content; `path` names it in messages.
+    ///
+    /// # Errors
+    /// [`Error::Data`], as [`read`](Self::read).
+    pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self> {
+        let error = |message: String| Error::data(path, message);
+        let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(bytes);
+        let header = reader.headers().map_err(|e| error(format!("line 1: {e}; save as UTF-8")))?;
+        let header: Vec<String> = header.iter().map(|name| name.trim().to_owned()).collect();
+        if header.is_empty() {
+            return Err(error("the file is empty: line 1 must name the columns".into()));
+        }
+        let mut seen = HashSet::new();
+        for (index, name) in header.iter().enumerate() {
+            let column = index + 1;
+            if name.is_empty() || name.contains('\n') {
+                let message = format!("line 1: column {column} has no usable name {name:?}");
+                return Err(error(message));
+            }
+            if !seen.insert(name) {
+                let message = format!("line 1: column {name:?} stands twice; rename one");
+                return Err(error(message));
+            }
+        }
+        let mut values = Vec::with_capacity(bytes.len() / 8);
+        let mut record = csv::ByteRecord::new();
+        let read_error = |e: csv::Error| error(format!("{e}; check quotes and line ends"));
+        while reader.read_byte_record(&mut record).map_err(read_error)? {
+            let line = record.position().map_or(0, csv::Position::line);
+            if record.len() != header.len() {
+                let message = format!(
+                    "line {line} has {} fields; the header names {}; mend or remove the line",
+                    record.len(),
+                    header.len()
+                );
+                return Err(error(message));
+            }
+            for (field, name) in record.iter().zip(&header) {
+                let value = number(field).ok_or_else(|| {
+                    let field = String::from_utf8_lossy(field);
+                    error(format!(
+                        "line {line}, column {name:?}: {field:?} is not a number; leave the field \
+                         empty if the value is missing"
+                    ))
+                })?;
+                values.push(value);
+            }
+        }
+        if values.is_empty() {
+            return Err(error("the file has a header but no line of data".into()));
+        }
+        let digest = crate::digest::digest(bytes);
+        Ok(Self { path: path.into(), header, digest, values })
+    }
+
+    /// Lines of data.
+    #[must_use]
+    pub fn lines(&self) -> usize {
+        self.values.len() / self.header.len()
+    }
+
+    /// The value at `line` (from 0, header not counted) and `column`; NaN if missing.
+    #[must_use]
+    pub fn value(&self, line: usize, column: usize) -> f64 {
+        self.values[line * self.header.len() + column]
+    }
+
+    /// The place of the column called `name`.
+    ///
+    /// # Errors
+    /// [`Error::Data`] if there is none.
+    pub fn column(&self, name: &str) -> Result<usize> {
+        self.header.iter().position(|n| n == name).ok_or_else(|| {
+            let message = format!(
+                "column {name:?} is missing; the file has: {}",
+                crate::dataset::some_names(&self.header)
+            );
+            Error::data(&self.path, message)
+        })
+    }
+
+    /// The places of the columns called `names`.
+    ///
+    /// # Errors
+    /// [`Error::Data`] for the first that is missing.
+    pub fn columns<'n>(&self, names: impl IntoIterator<Item = &'n str>) -> Result<Vec<usize>> {
+        names.into_iter().map(|name| self.column(name)).collect()
+    }
+}
+
+/// A field's number: infinities and text are none; empty and NaN are missing.
+fn number(field: &[u8]) -> Option<f64> {
+    let text = std::str::from_utf8(field).ok()?.trim();
+    if text.is_empty() {
+        return Some(f64::NAN);
+    }
+    text.parse::<f64>().ok().filter(|value| !value.is_infinite())
+}
+
+/// Writes a CSV file: `names`, then `lines`. Every number reads back as the same f64; NaN becomes
+/// an empty field.
+///
+/// # Errors
+/// [`Error::Write`]; `path` is then as it was before.
+pub fn write<'n, L: IntoIterator<Item = f64>>(
+    path: &Path,
+    names: impl IntoIterator<Item = &'n str>,
+    lines: impl IntoIterator<Item = L>,
+) -> Result<()> {
+    output::write_whole(path, |file| {
+        let mut header = csv::Writer::from_writer(&mut *file);
+        let header_written = header.write_record(names).and_then(|()| Ok(header.flush()?));
+        drop(header);
+        header_written.map_err(|e| Error::write(path, e.into()))?;
+        let mut text = String::new();
+        for line in lines {
+            text.clear();
+            for value in line {
+                if !value.is_nan() {
+                    use std::fmt::Write as _;
+                    // Shortest digits that read back as the same number.
+                    let _ = write!(text, "{value}");
+                }
+                text.push(',');
+            }
+            text.pop();
+            if text.is_empty() {
+                text.push_str("NaN"); // a blank line would be no line
+            }
+            text.push('\n');
+            file.write_all(text.as_bytes()).map_err(|cause| Error::write(path, cause))?;
+        }
+        Ok(())
+    })
+}

@@ -1,0 +1,4 @@
+//! Evaluation: errors by every definition, and the tables made of them.
+
+pub mod metrics;
+pub mod table1;

@@ -1,0 +1,60 @@
+//! `host-sim`: from a scene or a CSV file to a trained, checked weight blob.
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use host_sim::Result;
+
+mod commands;
+
+use commands::{decode, eval, forward, inspect, run, synth, table1, train};
+
+/// Simulate, train and evaluate resistive tactile sensors; write weight blobs for the device.
+///
+/// Without a command: `run paper`. Results go to stdout, progress and remarks to stderr.
+/// Exit status: 0 done, 1 failed, 2 bad usage or input.
+#[derive(Parser)]
+#[command(version, args_conflicts_with_subcommands = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    run: run::Arguments,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Run(run::Arguments),
+    Synth(synth::Arguments),
+    Forward(forward::Arguments),
+    Train(train::Arguments),
+    Decode(decode::Arguments),
+    Eval(eval::Arguments),
+    Inspect(inspect::Arguments),
+    Table1(table1::Arguments),
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let outcome = match cli.command.unwrap_or(Command::Run(cli.run)) {
+        Command::Run(arguments) => run::execute(&arguments),
+        Command::Synth(arguments) => synth::execute(&arguments),
+        Command::Forward(arguments) => forward::execute(&arguments),
+        Command::Train(arguments) => train::execute(&arguments),
+        Command::Decode(arguments) => decode::execute(&arguments),
+        Command::Eval(arguments) => eval::execute(&arguments),
+        Command::Inspect(arguments) => inspect::execute(&arguments),
+        Command::Table1(arguments) => table1::execute(&arguments),
+    };
+    report(outcome)
+}
+
+fn report(outcome: Result<()>) -> ExitCode {
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(error.exit_code())
+        }
+    }
+}

@@ -1,0 +1,270 @@
+//! Trained models: to a blob and back, and inference over whole tables.
+
+use std::path::Path;
+
+use clap::ValueEnum;
+use model_core::blob::{
+    self, Columns, Floats, Metadata, Model, ModelParts, NoiseKind as BlobNoiseKind,
+};
+use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
+use model_core::rbf::Network;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::columns;
+use crate::dataset::{Dataset, Table};
+use crate::error::{Error, Result};
+use crate::scene::{NoiseKind, Scene};
+use crate::train::FittedNetwork;
+
+/// The exponential that activations are computed with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kernel {
+    /// Within 2 ulp and fast: the device's default.
+    #[default]
+    Polynomial,
+    /// Within 1 ulp.
+    Libm,
+    /// Up to 2.4e-3 relative error; to see what that costs.
+    Micromath,
+}
+
+/// Where a model's training data came from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Origin {
+    /// Name of the scene or data set.
+    pub name: String,
+    /// Digest of the scene's or data's file.
+    pub digest: u64,
+    /// How noise was added, and its level.
+    pub noise: Option<(NoiseKind, f64)>,
+    /// Seed of every draw.
+    pub seed: u64,
+    /// Sensor thickness H; `None` where it has no meaning.
+    pub thickness_mm: Option<f64>,
+    /// Full scale of each output, in its unit.
+    pub full_scale: Vec<f64>,
+}
+
+impl Origin {
+    /// The origin of a scene's frames.
+    #[must_use]
+    pub fn of_scene(scene: &Scene) -> Self {
+        let electrodes = scene.read_rows.len() * scene.sensor.electrodes_per_row_wire;
+        let of_one = scene.outputs.axes.iter().map(|axis| scene.full_scale(*axis));
+        let full_scale = of_one.collect::<Vec<_>>().repeat(electrodes);
+        Self {
+            name: scene.name.clone(),
+            digest: scene.digest,
+            noise: Some((scene.noise.kind, scene.noise.level)),
+            seed: scene.seed,
+            thickness_mm: Some(scene.sensor.size_mm[2]),
+            full_scale,
+        }
+    }
+
+    /// The origin of measured data: full scale is each output's range.
+    #[must_use]
+    pub fn of_data(name: &str, digest: u64, seed: u64, dataset: &Dataset) -> Self {
+        let full_scale = dataset.outputs.ranges().into_iter().map(|[low, high]| high - low);
+        Self {
+            name: name.into(),
+            digest,
+            noise: None,
+            seed,
+            thickness_mm: None,
+            full_scale: full_scale.collect(),
+        }
+    }
+}
+
+/// Writes `networks`, one a row-wire of the `dataset` that trained them, as a blob.
+///
+/// # Errors
+/// [`Error::Failed`] for a model beyond what the format holds.
+pub fn encode(networks: &[FittedNetwork], dataset: &Dataset, origin: &Origin) -> Result<Vec<u8>> {
+    let views: Vec<Network<'_>> = networks.iter().map(FittedNetwork::network).collect();
+    let row_network: Vec<u8> = (0..networks.len()).map(|row| row as u8).collect();
+    let lines = |names: &[String]| names.join("\n");
+    let units = |names: &[String]| {
+        names.iter().map(|name| columns::unit_of(name)).collect::<Vec<_>>().join("\n")
+    };
+    let floats = |values: &[f64]| -> Vec<u8> {
+        values.iter().flat_map(|value| (*value as f32).to_le_bytes()).collect()
+    };
+    let (input_names, output_names) = (lines(&dataset.inputs.names), lines(&dataset.outputs.names));
+    let (input_units, output_units) = (units(&dataset.inputs.names), units(&dataset.outputs.names));
+    let training_rmse = floats(&training_rmse(&views, dataset));
+    let full_scale = floats(&origin.full_scale);
+    let parts = ModelParts {
+        networks: &views,
+        row_network: &row_network,
+        metadata: Metadata {
+            name: &origin.name,
+            scene_digest: origin.digest,
+            noise_kind: match origin.noise {
+                Some((_, 0.0)) | None => BlobNoiseKind::None,
+                Some((NoiseKind::Relative, _)) => BlobNoiseKind::Relative,
+                Some((NoiseKind::Span, _)) => BlobNoiseKind::Span,
+            },
+            noise_level: origin.noise.map_or(0.0, |(_, level)| level as f32),
+            seed: origin.seed,
+            training_frames: u32::try_from(dataset.frames()).unwrap_or(u32::MAX),
+            thickness_mm: origin.thickness_mm.map_or(0.0, |h| h as f32),
+            input_names: Columns(&input_names),
+            input_units: Columns(&input_units),
+            output_names: Columns(&output_names),
+            output_units: Columns(&output_units),
+            training_rmse: Floats(&training_rmse),
+            full_scale: Floats(&full_scale),
+        },
+    };
+    let mut buffer = AlignedBytes::zeroed(blob::encoded_length_bound(&parts));
+    let encoded = blob::encode(&parts, buffer.as_mut_slice())
+        .map_err(|cause| Error::Failed(format!("the model cannot be written: {cause}")))?;
+    Ok(encoded.to_vec())
+}
+
+fn training_rmse(networks: &[Network<'_>], dataset: &Dataset) -> Vec<f64> {
+    let mut rmse = Vec::new();
+    for (row, network) in networks.iter().enumerate() {
+        let block = dataset.block(row);
+        let predicted = infer(network, Kernel::default(), &block.inputs);
+        let outputs = block.outputs.names.len();
+        let mut squares = vec![0.0; outputs];
+        for (predicted, truth) in predicted.chunks_exact(outputs).zip(block.outputs.lines()) {
+            for (square, (p, t)) in squares.iter_mut().zip(predicted.iter().zip(truth)) {
+                *square += (p - t) * (p - t);
+            }
+        }
+        rmse.extend(squares.iter().map(|s| (s / dataset.frames() as f64).sqrt()));
+    }
+    rmse
+}
+
+/// A blob read from a file, checked.
+#[derive(Debug)]
+pub struct LoadedModel {
+    bytes: AlignedBytes,
+}
+
+impl LoadedModel {
+    /// Reads and checks the blob at `path`.
+    ///
+    /// # Errors
+    /// [`Error::Read`] or [`Error::Blob`].
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).map_err(|cause| Error::read(path, cause))?;
+        Self::from_bytes(path, &bytes)
+    }
+
+    /// Checks a blob; `path` names it in messages.
+    ///
+    /// # Errors
+    /// [`Error::Blob`].
+    pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self> {
+        let bytes = AlignedBytes::copy_of(bytes);
+        match Model::decode(bytes.as_slice()) {
+            Ok(_) => Ok(Self { bytes }),
+            Err(cause) => Err(Error::Blob { path: path.into(), cause }),
+        }
+    }
+
+    /// The model.
+    ///
+    /// # Panics
+    /// Never: the bytes were checked when they were read and have not changed since.
+    #[must_use]
+    pub fn model(&self) -> Model<'_> {
+        Model::decode(self.bytes.as_slice()).expect("checked when read")
+    }
+
+    /// The blob's bytes.
+    #[must_use]
+    pub fn bytes(&self) -> &[u8] {
+        self.bytes.as_slice()
+    }
+
+    /// Decodes a table of readings whose columns are the model's inputs; NaN readings make the
+    /// outputs of their row-wire NaN.
+    #[must_use]
+    pub fn decode(&self, kernel: Kernel, readings: &Table) -> Table {
+        let model = self.model();
+        let shape = model.shape();
+        let networks: Vec<Network<'_>> = model.networks().collect();
+        let of_row = |row: usize| &networks[model.network_of_row(row).expect("row of the model")];
+        let names = model.metadata().output_names.iter().map(String::from).collect::<Vec<_>>();
+        let mut values = vec![0.0; readings.len() * names.len()];
+        let places = values.par_chunks_exact_mut(names.len());
+        places.zip(readings.values.par_chunks_exact(readings.names.len())).for_each(
+            |(outputs, line)| {
+                let blocks =
+                    line.chunks_exact(shape.inputs).zip(outputs.chunks_exact_mut(shape.outputs));
+                for (row, (readings, outputs)) in blocks.enumerate() {
+                    infer_line(of_row(row), kernel, readings, outputs);
+                }
+            },
+        );
+        Table { names, values }
+    }
+}
+
+/// Infers the outputs for every line of `inputs`.
+#[must_use]
+pub fn infer(network: &Network<'_>, kernel: Kernel, inputs: &Table) -> Vec<f64> {
+    let outputs = network.shape().outputs;
+    let mut values = vec![0.0; inputs.len() * outputs];
+    values
+        .par_chunks_exact_mut(outputs)
+        .zip(inputs.values.par_chunks_exact(inputs.names.len()))
+        .for_each(|(outputs, line)| infer_line(network, kernel, line, outputs));
+    values
+}
+
+fn infer_line(network: &Network<'_>, kernel: Kernel, readings: &[f64], outputs: &mut [f64]) {
+    if readings.iter().any(|reading| !(*reading as f32).is_finite()) {
+        outputs.fill(f64::NAN);
+        return;
+    }
+    match kernel {
+        Kernel::Polynomial => infer_with::<Polynomial>(network, readings, outputs),
+        Kernel::Libm => infer_with::<Libm>(network, readings, outputs),
+        Kernel::Micromath => infer_with::<Micromath>(network, readings, outputs),
+    }
+}
+
+fn infer_with<E: ExpKernel>(network: &Network<'_>, readings: &[f64], outputs: &mut [f64]) {
+    let readings: Vec<f32> = readings.iter().map(|reading| *reading as f32).collect();
+    let mut scaled = vec![0.0; readings.len()];
+    let mut inferred = vec![0.0; outputs.len()];
+    network.infer::<E>(&readings, &mut scaled, &mut inferred).expect("lengths of the network");
+    outputs.iter_mut().zip(inferred).for_each(|(place, value)| *place = f64::from(value));
+}
+
+/// Bytes that start at a multiple of four, as a blob must.
+#[derive(Debug)]
+struct AlignedBytes {
+    words: Vec<u32>,
+    length: usize,
+}
+
+impl AlignedBytes {
+    fn zeroed(length: usize) -> Self {
+        Self { words: vec![0; length.div_ceil(4)], length }
+    }
+
+    fn copy_of(bytes: &[u8]) -> Self {
+        let mut this = Self::zeroed(bytes.len());
+        this.as_mut_slice().copy_from_slice(bytes);
+        this
+    }
+
+    fn as_slice(&self) -> &[u8] {
+        &bytemuck::cast_slice(&self.words)[..self.length]
+    }
+
+    fn as_mut_slice(&mut self) -> &mut [u8] {
+        &mut bytemuck::cast_slice_mut(&mut self.words)[..self.length]
+    }
+}

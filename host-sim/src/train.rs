@@ -1,0 +1,201 @@
+//! Training: K-means centres, recursive-least-squares output weights.
+//!
+//! Everything here is f64 and gives the same result on any number of threads: work is cut into
+//! pieces by the number of samples alone, and pieces are put together in their order. The result is
+//! rounded once to f32, into a [`FittedNetwork`].
+
+use rayon::prelude::*;
+
+use crate::dataset::{Block, Dataset};
+use crate::error::{Error, Result};
+use crate::random::{Purpose, Random, Stream};
+
+pub mod kmeans;
+pub mod least_squares;
+pub mod linear;
+mod network;
+pub mod select;
+pub mod standard;
+
+pub use network::FittedNetwork;
+
+/// Default of [`Options::initial_covariance`].
+pub const INITIAL_COVARIANCE: f64 = 1e6;
+
+/// How a network is trained.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Centres, K. Fewer are used where there are fewer distinct samples.
+    pub centres: usize,
+    /// Width σ of all centres, on scaled inputs.
+    pub spread: f64,
+    /// Whether A·x is added.
+    pub affine_tail: bool,
+    /// δ of the recursive least squares: the penalty on squared weights is 1/δ.
+    pub initial_covariance: f64,
+    /// Seed of the K-means starts.
+    pub seed: u64,
+    /// How centres are sought.
+    pub search: kmeans::Search,
+}
+
+impl Options {
+    /// Options with the defaults for everything but the shape.
+    #[must_use]
+    pub fn new(centres: usize, spread: f64, affine_tail: bool, seed: u64) -> Self {
+        Self {
+            centres,
+            spread,
+            affine_tail,
+            initial_covariance: INITIAL_COVARIANCE,
+            seed,
+            search: kmeans::Search::default(),
+        }
+    }
+
+    /// Checks the options against the number of training `frames`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`], naming the option, its value and the fix.
+    pub fn check(&self, frames: usize) -> Result<()> {
+        let error = |message: String| Err(Error::Usage(message));
+        if self.centres == 0 || self.centres > 65_535 {
+            return error(format!("centres = {}: give from 1 to 65535", self.centres));
+        }
+        if self.centres > frames {
+            return error(format!(
+                "centres = {}: more than the {frames} training frames; lower it or add data",
+                self.centres
+            ));
+        }
+        if !(self.spread.is_finite() && self.spread > 0.0) {
+            return error(format!("spread = {}: give a positive number", self.spread));
+        }
+        let decay = 1.0 / (2.0 * self.spread * self.spread);
+        if !(decay as f32).is_normal() {
+            return error(format!("spread = {}: 1/(2σ²) does not fit an f32", self.spread));
+        }
+        Ok(())
+    }
+}
+
+/// Minimum and span of every input: what scales readings to [0, 1].
+#[derive(Debug, Clone, PartialEq)]
+pub struct InputScale {
+    minimum: Vec<f64>,
+    /// 0 for an input that never changes.
+    per_span: Vec<f64>,
+}
+
+impl InputScale {
+    /// The scale of a block's inputs, rounded to what the blob holds.
+    #[must_use]
+    pub fn of(block: &Block) -> Self {
+        let ranges = block.inputs.ranges();
+        let per_span = |[low, high]: &[f64; 2]| {
+            let per_span = (1.0 / (high - low)) as f32;
+            if per_span.is_finite() { f64::from(per_span) } else { 0.0 }
+        };
+        Self {
+            minimum: ranges.iter().map(|[low, _]| f64::from(*low as f32)).collect(),
+            per_span: ranges.iter().map(per_span).collect(),
+        }
+    }
+
+    /// All inputs of `block` scaled, line after line.
+    #[must_use]
+    pub fn apply(&self, block: &Block) -> Vec<f64> {
+        let limits = || self.minimum.iter().zip(&self.per_span);
+        let scaled = |line: &[f64]| -> Vec<f64> {
+            let scale = |(value, (minimum, per_span)): (&f64, (&f64, &f64))| {
+                ((value - minimum) * per_span).clamp(0.0, 1.0)
+            };
+            line.iter().zip(limits()).map(scale).collect()
+        };
+        block.inputs.lines().flat_map(scaled).collect()
+    }
+}
+
+/// Samples of one network, with their inputs scaled.
+#[derive(Debug, Clone)]
+pub struct Samples<'b> {
+    pub(crate) scale: InputScale,
+    /// Scaled inputs, sample after sample.
+    pub(crate) scaled: Vec<f64>,
+    pub(crate) block: &'b Block,
+}
+
+impl<'b> Samples<'b> {
+    /// Scales the inputs of `block` to [0, 1].
+    #[must_use]
+    pub fn new(block: &'b Block) -> Self {
+        let scale = InputScale::of(block);
+        Self { scaled: scale.apply(block), scale, block }
+    }
+
+    pub(crate) fn inputs(&self) -> usize {
+        self.block.inputs.names.len()
+    }
+
+    /// K-means centres of these samples, rounded to what the blob holds.
+    #[must_use]
+    pub fn centres(&self, options: &Options, part: usize) -> Vec<f64> {
+        let mut random =
+            Random::new(options.seed, Stream::Training, Purpose::Centres, 0, part as u64);
+        let found =
+            kmeans::fit(&self.scaled, self.inputs(), options.centres, &options.search, &mut random);
+        found.centres.into_iter().map(|c| f64::from(c as f32)).collect()
+    }
+
+    /// Output weights for given `centres`, by recursive least squares over the samples.
+    #[must_use]
+    pub fn fit(&self, centres: &[f64], options: &Options) -> FittedNetwork {
+        let regressors = least_squares::Regressors {
+            centres,
+            inputs: self.inputs(),
+            // The decay that the device will use, so that weights fit its activations.
+            decay: f64::from((1.0 / (2.0 * options.spread * options.spread)) as f32),
+            affine_tail: options.affine_tail,
+        };
+        let weights = least_squares::fit(
+            &regressors,
+            &self.scaled,
+            &self.block.outputs,
+            options.initial_covariance,
+        );
+        FittedNetwork::new(&self.scale, &regressors, &weights, self.block.outputs.names.len())
+    }
+}
+
+/// Trains one network a row-wire of `dataset`.
+///
+/// # Errors
+/// [`Error::Usage`] for options that do not fit the data.
+pub fn train(dataset: &Dataset, options: &Options) -> Result<Vec<FittedNetwork>> {
+    options.check(dataset.frames())?;
+    Ok((0..dataset.rows)
+        .into_par_iter()
+        .map(|row| {
+            let block = dataset.block(row);
+            let samples = Samples::new(&block);
+            let centres = samples.centres(options, row);
+            samples.fit(&centres, options)
+        })
+        .collect())
+}
+
+/// ‖a − b‖².
+pub(crate) fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
+    let ((a4, a_rest), (b4, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
+    let mut sum = [0.0; 4];
+    for (a, b) in a4.iter().zip(b4) {
+        for ((s, a), b) in sum.iter_mut().zip(a).zip(b) {
+            *s += (a - b) * (a - b);
+        }
+    }
+    let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| (a - b) * (a - b)).sum();
+    (sum[0] + sum[1]) + (sum[2] + sum[3]) + rest
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,62 @@
+//! A trained network as the blob will hold it.
+
+use model_core::rbf::{Network, Parameters, Shape};
+
+use super::InputScale;
+use super::least_squares::Regressors;
+
+/// Parameters of one trained network in f32, owned.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FittedNetwork {
+    shape: Shape,
+    input_minimum: Vec<f32>,
+    input_per_span: Vec<f32>,
+    centres: Vec<f32>,
+    decay: f32,
+    output_weights: Vec<f32>,
+    bias: Vec<f32>,
+    affine: Vec<f32>,
+}
+
+impl FittedNetwork {
+    /// Rounds a fit of `weights` (`regressors × outputs`) to f32.
+    pub(super) fn new(
+        scale: &InputScale,
+        regressors: &Regressors<'_>,
+        weights: &[f64],
+        outputs: usize,
+    ) -> Self {
+        let round = |values: &[f64]| values.iter().map(|v| *v as f32).collect::<Vec<_>>();
+        let centres = regressors.centres.len() / regressors.inputs;
+        let (output_weights, rest) = weights.split_at(centres * outputs);
+        let (affine, bias) = rest.split_at(rest.len() - outputs);
+        Self {
+            shape: Shape { inputs: regressors.inputs, centres, outputs },
+            input_minimum: round(&scale.minimum),
+            input_per_span: round(&scale.per_span),
+            centres: round(regressors.centres),
+            decay: regressors.decay as f32,
+            output_weights: round(output_weights),
+            bias: round(bias),
+            affine: round(affine),
+        }
+    }
+
+    /// The network, ready to infer.
+    ///
+    /// # Panics
+    /// If training produced a number that is not finite, which data of finite numbers cannot.
+    #[must_use]
+    pub fn network(&self) -> Network<'_> {
+        let parameters = Parameters {
+            input_minimum: &self.input_minimum,
+            input_per_span: &self.input_per_span,
+            centres: &self.centres,
+            decay: std::slice::from_ref(&self.decay),
+            output_weights: &self.output_weights,
+            bias: &self.bias,
+            affine: &self.affine,
+        };
+        Network::try_new(self.shape, parameters).expect("training ends in a usable network")
+    }
+}
