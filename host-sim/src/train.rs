@@ -4,6 +4,7 @@
 //! pieces by the number of samples alone, and pieces are put together in their order. The result is
 //! rounded once to f32, into a [`FittedNetwork`].
 
+use model_core::scale::CLAMP;
 use rayon::prelude::*;
 
 use crate::dataset::{Block, Dataset};
@@ -102,13 +103,14 @@ impl InputScale {
         }
     }
 
-    /// All inputs of `block` scaled, line after line.
+    /// All inputs of `block` scaled (and clamped as on the device), line after line.
     #[must_use]
     pub fn apply(&self, block: &Block) -> Vec<f64> {
         let limits = || self.minimum.iter().zip(&self.per_span);
+        let [low, high] = CLAMP.map(f64::from);
         let scaled = |line: &[f64]| -> Vec<f64> {
             let scale = |(value, (minimum, per_span)): (&f64, (&f64, &f64))| {
-                ((value - minimum) * per_span).clamp(0.0, 1.0)
+                ((value - minimum) * per_span).clamp(low, high)
             };
             line.iter().zip(limits()).map(scale).collect()
         };

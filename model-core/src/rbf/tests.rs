@@ -1,5 +1,6 @@
 use super::*;
 use crate::exp::{Libm, Micromath, Polynomial};
+use crate::scale::CLAMP;
 use proptest::prelude::*;
 
 const SHAPE: Shape = Shape { inputs: 5, centres: 3, outputs: 2 };
@@ -48,7 +49,7 @@ fn reference(p: &Parameters<'_>, shape: Shape, reading: &[f32]) -> Vec<f64> {
     let x: Vec<f64> = (0..shape.inputs)
         .map(|i| {
             let span = f64::from(reading[i] - p.input_minimum[i]) * f64::from(p.input_per_span[i]);
-            span.clamp(0.0, 1.0)
+            span.clamp(f64::from(CLAMP[0]), f64::from(CLAMP[1]))
         })
         .collect();
     (0..shape.outputs)
@@ -153,7 +154,9 @@ proptest! {
         let sample = Sample::new();
         let network = Network::try_new(SHAPE, sample.parameters()).unwrap();
         let sum = |values: &[f32]| values.iter().map(|v| v.abs()).sum::<f32>();
-        let bound = sum(&sample.output_weights) + sum(&sample.bias) + sum(&sample.affine);
+        let bound = sum(&sample.output_weights)
+            + sum(&sample.bias)
+            + CLAMP[1] * sum(&sample.affine);
         for y in network.infer_array::<Polynomial, 5, 2>(&reading).unwrap() {
             prop_assert!(y.abs() <= bound, "{} exceeds {}", y, bound);
         }
