@@ -11,3 +11,14 @@ pub mod train;
 
 mod print;
 mod scene_argument;
+
+/// Options of every command.
+#[derive(clap::Args)]
+pub struct Common {
+    /// Seed of every random draw, instead of the scene's or 1 (no effect where nothing is drawn).
+    #[arg(long, global = true)]
+    pub seed: Option<u64>,
+    /// Print the results as JSON.
+    #[arg(long, global = true)]
+    pub json: bool,
+}

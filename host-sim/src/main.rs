@@ -7,19 +7,19 @@ use host_sim::Result;
 
 mod commands;
 
-use commands::{decode, eval, forward, inspect, run, synth, table1, train};
+use commands::{Common, decode, eval, forward, inspect, run, synth, table1, train};
 
 /// Simulate, train and evaluate resistive tactile sensors; write weight blobs for the device.
 ///
 /// Without a command: `run paper`. Results go to stdout, progress and remarks to stderr.
 /// Exit status: 0 done, 1 failed, 2 bad usage or input.
 #[derive(Parser)]
-#[command(version, args_conflicts_with_subcommands = true)]
+#[command(version)]
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
     #[command(flatten)]
-    run: run::Arguments,
+    common: Common,
 }
 
 #[derive(Subcommand)]
@@ -36,15 +36,16 @@ enum Command {
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    let outcome = match cli.command.unwrap_or(Command::Run(cli.run)) {
-        Command::Run(arguments) => run::execute(&arguments),
-        Command::Synth(arguments) => synth::execute(&arguments),
-        Command::Forward(arguments) => forward::execute(&arguments),
-        Command::Train(arguments) => train::execute(&arguments),
-        Command::Decode(arguments) => decode::execute(&arguments),
-        Command::Eval(arguments) => eval::execute(&arguments),
-        Command::Inspect(arguments) => inspect::execute(&arguments),
-        Command::Table1(arguments) => table1::execute(&arguments),
+    let command = cli.command.unwrap_or_else(|| Command::Run(run::Arguments::default()));
+    let outcome = match command {
+        Command::Run(arguments) => run::execute(&arguments, &cli.common),
+        Command::Synth(arguments) => synth::execute(&arguments, &cli.common),
+        Command::Forward(arguments) => forward::execute(&arguments, &cli.common),
+        Command::Train(arguments) => train::execute(&arguments, &cli.common),
+        Command::Decode(arguments) => decode::execute(&arguments, &cli.common),
+        Command::Eval(arguments) => eval::execute(&arguments, &cli.common),
+        Command::Inspect(arguments) => inspect::execute(&arguments, &cli.common),
+        Command::Table1(arguments) => table1::execute(&arguments, &cli.common),
     };
     report(outcome)
 }

@@ -9,7 +9,7 @@ use host_sim::model::{Kernel, LoadedModel};
 use host_sim::{Result, output};
 use serde::Serialize;
 
-use super::print;
+use super::{Common, print};
 
 /// Decode readings from a CSV file; one line of estimates for every line of readings.
 ///
@@ -27,9 +27,6 @@ pub struct Arguments {
     /// Exponential of the activations.
     #[arg(long, value_enum, default_value_t)]
     kernel: Kernel,
-    /// Print a summary as JSON.
-    #[arg(long)]
-    json: bool,
 }
 
 #[derive(Serialize)]
@@ -40,7 +37,7 @@ struct Summary {
     file: PathBuf,
 }
 
-pub fn execute(arguments: &Arguments) -> Result<()> {
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let loaded = LoadedModel::read(&arguments.model)?;
     let file = DataFile::read(&arguments.readings)?;
     output::check_writable(&arguments.output)?;
@@ -55,7 +52,7 @@ pub fn execute(arguments: &Arguments) -> Result<()> {
         kernel: arguments.kernel,
         file: arguments.output.clone(),
     };
-    if arguments.json {
+    if common.json {
         return print::json(&summary);
     }
     println!("{} frames decoded into {}", summary.frames, summary.file.display());

@@ -9,7 +9,7 @@ use host_sim::evaluate::metrics::{self, Errors, Measure};
 use host_sim::model::{Kernel, LoadedModel};
 use serde::Serialize;
 
-use super::{decode, print};
+use super::{Common, decode, print};
 
 /// Evaluate a model on a CSV file that holds readings and true outputs.
 #[derive(Args)]
@@ -22,9 +22,6 @@ pub struct Arguments {
     /// Exponential of the activations.
     #[arg(long, value_enum, default_value_t)]
     kernel: Kernel,
-    /// Print the results as JSON.
-    #[arg(long)]
-    json: bool,
 }
 
 #[derive(Serialize)]
@@ -36,7 +33,7 @@ struct Summary {
     mean_errors: Vec<Errors>,
 }
 
-pub fn execute(arguments: &Arguments) -> Result<()> {
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let loaded = LoadedModel::read(&arguments.model)?;
     let file = DataFile::read(&arguments.data)?;
     let readings = decode::model_inputs(&loaded, &file)?;
@@ -55,7 +52,7 @@ pub fn execute(arguments: &Arguments) -> Result<()> {
         errors: metrics::by_group(&truth, &estimate.values, &measure),
         mean_errors: metrics::by_group(&truth, &truth.column_means(), &measure),
     };
-    if arguments.json {
+    if common.json {
         return print::json(&summary);
     }
     println!("{} frames of {}", summary.frames, arguments.data.display());

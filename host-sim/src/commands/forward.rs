@@ -4,26 +4,23 @@ use std::path::PathBuf;
 
 use clap::Args;
 use host_sim::data_file::{self, DataFile};
+use host_sim::scene::Scene;
 use host_sim::{Result, columns, output, synth};
 use serde::Serialize;
 
-use super::print;
-use super::scene_argument::SceneArgument;
+use super::{Common, print};
 
 /// Compute the ideal readings for deformations from a CSV file.
 #[derive(Args)]
 #[command(after_help = "Example: host-sim forward paper deformation.csv -o readings.csv")]
 pub struct Arguments {
-    #[command(flatten)]
-    scene: SceneArgument,
+    /// A built-in scene (paper, press) or the path of a scene file.
+    scene: String,
     /// CSV file with columns r{m}e{i}_d{x|y|z}_mm.
     deformation: PathBuf,
     /// CSV file to write, with columns r{m}c{k}_ohm.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Print a summary as JSON.
-    #[arg(long)]
-    json: bool,
 }
 
 #[derive(Serialize)]
@@ -33,8 +30,8 @@ struct Summary {
     file: PathBuf,
 }
 
-pub fn execute(arguments: &Arguments) -> Result<()> {
-    let scene = arguments.scene.load()?;
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+    let scene = Scene::load(&arguments.scene)?;
     let file = DataFile::read(&arguments.deformation)?;
     output::check_writable(&arguments.output)?;
     let readings = synth::forward(&scene, &file)?;
@@ -43,7 +40,7 @@ pub fn execute(arguments: &Arguments) -> Result<()> {
     data_file::write(&arguments.output, names.iter().map(String::as_str), lines)?;
     let summary =
         Summary { frames: file.lines(), readings: names.len(), file: arguments.output.clone() };
-    if arguments.json {
+    if common.json {
         return print::json(&summary);
     }
     println!(

@@ -7,7 +7,7 @@ use host_sim::Result;
 use host_sim::model::LoadedModel;
 use serde::Serialize;
 
-use super::print;
+use super::{Common, print};
 
 /// Show a blob's shape, origin, training errors, and what it needs on a device.
 #[derive(Args)]
@@ -15,9 +15,6 @@ use super::print;
 pub struct Arguments {
     /// Weight blob.
     model: PathBuf,
-    /// Print as JSON.
-    #[arg(long)]
-    json: bool,
 }
 
 #[derive(Serialize)]
@@ -69,10 +66,10 @@ struct OutputSummary {
     full_scale: f32,
 }
 
-pub fn execute(arguments: &Arguments) -> Result<()> {
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let loaded = LoadedModel::read(&arguments.model)?;
     let summary = summarise(&loaded);
-    if arguments.json { print::json(&summary) } else { print_summary(&summary) }
+    if common.json { print::json(&summary) } else { print_summary(&summary) }
 }
 
 fn summarise(loaded: &LoadedModel) -> Summary {

@@ -7,8 +7,10 @@ use host_sim::progress::Progress;
 use host_sim::run::{self, RunResult};
 use host_sim::{Error, Result, output};
 
-use super::print;
 use super::scene_argument::SceneArgument;
+use super::{Common, print};
+
+const DEFAULT_OUTPUT: &str = "out";
 
 /// Run a scene: synthesise, train, write the blob, read it back, decode, evaluate, report.
 ///
@@ -19,15 +21,18 @@ pub struct Arguments {
     #[command(flatten)]
     scene: SceneArgument,
     /// Folder that receives a folder named after the scene.
-    #[arg(short, long, value_name = "DIR", default_value = "out")]
+    #[arg(short, long, value_name = "DIR", default_value = DEFAULT_OUTPUT)]
     output: PathBuf,
-    /// Print all results as JSON.
-    #[arg(long)]
-    json: bool,
 }
 
-pub fn execute(arguments: &Arguments) -> Result<()> {
-    let scene = arguments.scene.load()?;
+impl Default for Arguments {
+    fn default() -> Self {
+        Self { scene: SceneArgument::default(), output: DEFAULT_OUTPUT.into() }
+    }
+}
+
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+    let scene = arguments.scene.load(common)?;
     let folder = arguments.output.join(&scene.name);
     std::fs::create_dir_all(&folder)
         .map_err(|cause| Error::Write { path: folder.clone(), cause })?;
@@ -35,7 +40,7 @@ pub fn execute(arguments: &Arguments) -> Result<()> {
     let started = std::time::Instant::now();
     let (result, blob) = run::run(&scene, &Progress::on_terminal())?;
     let files = write_files(&folder, &result, &blob)?;
-    if arguments.json {
+    if common.json {
         return print::json(&result);
     }
     print_summary(&result, &folder, &files);

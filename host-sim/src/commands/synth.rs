@@ -7,8 +7,8 @@ use host_sim::random::Stream;
 use host_sim::{Error, Result, data_file, output, synth};
 use serde::Serialize;
 
-use super::print;
 use super::scene_argument::SceneArgument;
+use super::{Common, print};
 
 /// Synthesise frames of a scene: noisy readings and true outputs, as CSV.
 #[derive(Args)]
@@ -22,9 +22,6 @@ pub struct Arguments {
     /// CSV file to write: readings, then outputs, one frame a line.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Print a summary as JSON.
-    #[arg(long)]
-    json: bool,
 }
 
 #[derive(Serialize)]
@@ -36,8 +33,8 @@ struct Summary {
     file: PathBuf,
 }
 
-pub fn execute(arguments: &Arguments) -> Result<()> {
-    let scene = arguments.scene.load()?;
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+    let scene = arguments.scene.load(common)?;
     if !(1..=100_000_000).contains(&arguments.frames) {
         let message = format!("-n {}: give from 1 to 100000000 frames", arguments.frames);
         return Err(Error::Usage(message));
@@ -55,7 +52,7 @@ pub fn execute(arguments: &Arguments) -> Result<()> {
         seed: scene.seed,
         file: arguments.output.clone(),
     };
-    if arguments.json {
+    if common.json {
         return print::json(&summary);
     }
     println!(

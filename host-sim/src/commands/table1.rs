@@ -8,8 +8,8 @@ use host_sim::evaluate::table1::{self, PAPER_PRINTED_PERCENT, Table1};
 use host_sim::progress::Progress;
 use host_sim::{Result, output};
 
-use super::print;
 use super::scene_argument::SceneArgument;
+use super::{Common, print};
 
 /// Compute the paper's Table 1: error against spread and noise, by every definition of error.
 ///
@@ -26,13 +26,10 @@ pub struct Arguments {
     /// Outputs to print, such as dz_mm or dx_mm.
     #[arg(long, value_name = "GROUP", default_value = "dz_mm")]
     group: String,
-    /// Print everything as JSON.
-    #[arg(long)]
-    json: bool,
 }
 
-pub fn execute(arguments: &Arguments) -> Result<()> {
-    let scene = arguments.scene.load()?;
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+    let scene = arguments.scene.load(common)?;
     if let Some(path) = &arguments.output {
         output::check_writable(path)?;
     }
@@ -40,7 +37,7 @@ pub fn execute(arguments: &Arguments) -> Result<()> {
     if let Some(path) = &arguments.output {
         table.write_csv(path)?;
     }
-    if arguments.json {
+    if common.json {
         return print::json(&table);
     }
     print_table(&table, &arguments.group)

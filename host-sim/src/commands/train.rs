@@ -14,7 +14,7 @@ use host_sim::train::{self, Options};
 use host_sim::{Error, Result, output, synth};
 use serde::Serialize;
 
-use super::print;
+use super::{Common, print};
 
 /// Train a model on a scene or on a CSV file, and write its weight blob.
 ///
@@ -58,12 +58,6 @@ pub struct Arguments {
     /// Frames to synthesise from a scene, instead of the scene's number.
     #[arg(short = 'n', long, value_name = "N")]
     frames: Option<usize>,
-    /// Seed of every random draw [default: the scene's, or 1].
-    #[arg(long)]
-    seed: Option<u64>,
-    /// Print the results as JSON.
-    #[arg(long)]
-    json: bool,
 }
 
 /// What a model is trained on.
@@ -89,11 +83,12 @@ struct Summary {
     selection: Option<Selection>,
 }
 
-pub fn execute(arguments: &Arguments) -> Result<()> {
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     output::check_writable(&arguments.output)?;
     let is_scene = EMBEDDED.iter().any(|(name, _)| *name == arguments.source)
         || Path::new(&arguments.source).extension().is_some_and(|e| e == "toml");
-    let source = if is_scene { from_scene(arguments)? } else { from_data(arguments)? };
+    let source =
+        if is_scene { from_scene(arguments, common)? } else { from_data(arguments, common)? };
 
     let mut options = source.defaults;
     options.affine_tail &= !arguments.no_affine;
@@ -123,10 +118,10 @@ pub fn execute(arguments: &Arguments) -> Result<()> {
         training_rmse: model.metadata().training_rmse.iter().map(f64::from).collect(),
         selection,
     };
-    if arguments.json { print::json(&summary) } else { print_summary(&summary, options.centres) }
+    if common.json { print::json(&summary) } else { print_summary(&summary, options.centres) }
 }
 
-fn from_scene(arguments: &Arguments) -> Result<Source> {
+fn from_scene(arguments: &Arguments, common: &Common) -> Result<Source> {
     for (option, given) in [
         ("--inputs", arguments.inputs.is_some()),
         ("--outputs", arguments.outputs.is_some()),
@@ -138,7 +133,7 @@ fn from_scene(arguments: &Arguments) -> Result<Source> {
         }
     }
     let mut scene = Scene::load(&arguments.source)?;
-    scene.seed = arguments.seed.unwrap_or(scene.seed);
+    scene.seed = common.seed.unwrap_or(scene.seed);
     let frames = arguments.frames.unwrap_or(scene.training.frames);
     if !(2..=100_000_000).contains(&frames) {
         return Err(Error::Usage(format!("-n {frames}: give from 2 to 100000000 frames")));
@@ -152,7 +147,7 @@ fn from_scene(arguments: &Arguments) -> Result<Source> {
     })
 }
 
-fn from_data(arguments: &Arguments) -> Result<Source> {
+fn from_data(arguments: &Arguments, common: &Common) -> Result<Source> {
     if arguments.frames.is_some() {
         return Err(Error::Usage("-n sets a scene's frames; a CSV file has its own".into()));
     }
@@ -168,7 +163,7 @@ fn from_data(arguments: &Arguments) -> Result<Source> {
         Some(name) => Some(folds_from(&file, name, &kept.lines)?),
         None => None,
     };
-    let seed = arguments.seed.unwrap_or(1);
+    let seed = common.seed.unwrap_or(1);
     let name = path.file_stem().map_or("data".into(), |stem| stem.to_string_lossy());
     Ok(Source {
         origin: Origin::of_data(&name, file.digest, seed, &dataset),

@@ -1,0 +1,160 @@
+//! The blob format, held to its specification in `docs/blob.md`.
+
+use model_core::blob::{
+    Columns, DecodeError, EncodeError, Floats, Metadata, Model, ModelParts, NoiseKind, encode,
+    encoded_length_bound,
+};
+use model_core::exp::Libm;
+use model_core::rbf::{Network, Parameters, Shape};
+use model_core::{Aligned, Decoder, Frame, RowStatus};
+use proptest::prelude::*;
+
+const SPECIFICATION: &str = include_str!("../../docs/blob.md");
+
+fn network() -> Network<'static> {
+    let parameters = Parameters {
+        input_minimum: &[50.0, 60.0],
+        input_per_span: &[0.125, 0.0625],
+        centres: &[0.5, 0.25],
+        decay: &[2.0],
+        output_weights: &[1.5],
+        bias: &[-0.5],
+        affine: &[],
+    };
+    Network::try_new(Shape { inputs: 2, centres: 1, outputs: 1 }, parameters).unwrap()
+}
+
+fn metadata() -> Metadata<'static> {
+    Metadata {
+        name: "pair",
+        scene_digest: 300,
+        noise_kind: NoiseKind::Relative,
+        noise_level: 0.0078125,
+        seed: 7,
+        training_frames: 1000,
+        thickness_mm: 5.0,
+        input_names: Columns("r1c1_ohm\nr1c2_ohm\nr2c1_ohm\nr2c2_ohm"),
+        input_units: Columns("Ω\nΩ\nΩ\nΩ"),
+        output_names: Columns("r1e1_dz_mm\nr2e1_dz_mm"),
+        output_units: Columns("mm\nmm"),
+        training_rmse: Floats(&[0, 0, 0x80, 0x3d, 0, 0, 0x80, 0x3d]), // 0.0625 twice
+        full_scale: Floats(&[0, 0, 0x80, 0x3f, 0, 0, 0x80, 0x3f]),    // 1 twice
+    }
+}
+
+/// Two mirror rows that share one network.
+fn small_model(buffer: &mut [u8]) -> &[u8] {
+    let networks = [network()];
+    encode(&ModelParts { networks: &networks, row_network: &[0, 0], metadata: metadata() }, buffer)
+        .unwrap()
+}
+
+/// Hexadecimal bytes of the specification's worked example: lines like `| 0 | 54 41 … | … |`.
+fn worked_bytes() -> Vec<u8> {
+    let table = SPECIFICATION.split("<!-- worked example -->").nth(1).expect("the marked table");
+    let mut bytes = Vec::new();
+    for line in table.lines().filter(|line| line.starts_with('|')) {
+        let mut cells = line.split('|').map(str::trim).skip(1);
+        let (Some(offset), Some(hex)) = (cells.next(), cells.next()) else { continue };
+        let Ok(offset) = offset.parse::<usize>() else { continue };
+        assert_eq!(offset, bytes.len(), "offset of the line {line:?}");
+        bytes.extend(hex.split_whitespace().map(|byte| u8::from_str_radix(byte, 16).unwrap()));
+    }
+    bytes
+}
+
+#[test]
+fn encoding_gives_the_specifications_worked_bytes() {
+    let mut buffer = Aligned([0; 512]);
+    let encoded = small_model(&mut buffer.0);
+    let hex = |bytes: &[u8]| bytes.iter().map(|b| format!("{b:02x} ")).collect::<String>();
+    assert_eq!(hex(encoded), hex(&worked_bytes()));
+}
+
+#[test]
+fn decoding_gives_back_what_was_encoded() {
+    let mut buffer = Aligned([0; 512]);
+    let model = Model::decode(small_model(&mut buffer.0)).unwrap();
+    assert_eq!(*model.metadata(), metadata());
+    assert_eq!(model.networks().collect::<Vec<_>>(), [network()]);
+    assert_eq!((model.network_of_row(1), model.network_of_row(2)), (Some(0), None));
+}
+
+#[test]
+fn weights_are_borrowed_where_the_blob_lies() {
+    let mut buffer = Aligned([0; 512]);
+    let blob = small_model(&mut buffer.0);
+    let range = blob.as_ptr_range();
+    let model = Model::decode(blob).unwrap();
+    let network = model.networks().next().unwrap();
+    let start = network.parameters().centres.as_ptr().cast::<u8>();
+    assert!(range.contains(&start));
+}
+
+#[test]
+fn a_decoder_marks_rows_with_missing_readings_and_leaves_the_others() {
+    let mut buffer = Aligned([0; 512]);
+    let decoder = Decoder::<2, 2, 1, Libm>::load(small_model(&mut buffer.0)).unwrap();
+    let frame = Frame { row_column_resistance_ohm: [[54.0, f32::NAN], [54.0, 64.0]] };
+    let estimate = decoder.decode(&frame);
+    assert_eq!(estimate.status, [RowStatus::MissingReading, RowStatus::Decoded]);
+    assert!(estimate.outputs[0][0].is_nan());
+    assert_eq!(estimate.outputs[1][0], 1.0); // at the centre: 1.5·1 − 0.5
+}
+
+#[test]
+fn a_slot_larger_than_its_blob_tells_the_blobs_length() {
+    let mut buffer = Aligned([0xff; 512]);
+    let length = small_model(&mut buffer.0).len();
+    assert_eq!(Model::declared_length(&buffer.0), Some(length));
+    assert_eq!(Model::declared_length(&[0xff; 512]), None);
+    assert_eq!(Model::declared_length(&buffer.0[..8]), None);
+}
+
+#[test]
+fn what_does_not_fit_the_format_is_refused_when_written() {
+    let networks = [network()];
+    let parts = ModelParts { networks: &networks, row_network: &[0, 0], metadata: metadata() };
+    let mut buffer = Aligned([0; 512]);
+    let length = encode(&parts, &mut buffer.0).unwrap().len();
+    assert!(length <= encoded_length_bound(&parts));
+    for short in 0..length {
+        assert_eq!(encode(&parts, &mut buffer.0[..short]), Err(EncodeError::BufferTooSmall));
+    }
+    let no_such = ModelParts { row_network: &[0, 1], ..parts };
+    assert_eq!(
+        encode(&no_such, &mut buffer.0),
+        Err(EncodeError::Refused(DecodeError::UnknownNetwork { row: 1, network: 1, networks: 1 }))
+    );
+    let many_rows = [0; 256];
+    let too_many = ModelParts { row_network: &many_rows, ..parts };
+    assert_eq!(
+        encode(&too_many, &mut buffer.0),
+        Err(EncodeError::TooLarge { what: "number of rows", value: 256, most: 255 })
+    );
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(20_000))]
+    /// Whatever is written under a valid CRC, decoding ends, and what it accepts is usable.
+    #[test]
+    fn hostile_bytes_under_a_valid_crc_never_panic(
+        changes in prop::collection::vec((9_usize..500, any::<u8>()), 1..6),
+    ) {
+        const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+        let mut buffer = Aligned([0; 512]);
+        let length = small_model(&mut buffer.0).len();
+        let body = length - 4;
+        for (offset, byte) in changes {
+            buffer.0[9 + offset % (body - 9)] = byte;
+        }
+        let crc = CRC.checksum(&buffer.0[..body]);
+        buffer.0[body..length].copy_from_slice(&crc.to_le_bytes());
+        if let Ok(model) = Model::decode(&buffer.0[..length]) {
+            prop_assert_eq!(model.networks().count(), model.network_count());
+            for network in model.networks() {
+                prop_assert!(network.parameters().centres.iter().all(|c| c.is_finite()));
+            }
+        }
+    }
+}
