@@ -188,6 +188,9 @@ impl LoadedModel {
 
     /// Decodes a table of readings whose columns are the model's inputs; NaN readings make the
     /// outputs of their row-wire NaN.
+    ///
+    /// # Panics
+    /// If `readings` has other columns than the model's inputs.
     #[must_use]
     pub fn decode(&self, kernel: Kernel, readings: &Table) -> Table {
         let model = self.model();

@@ -62,7 +62,7 @@ fn ideal_frame(
     for ((readings, outputs), &row) in places {
         match (&contact, &scene.deformation) {
             (Some(contact), _) => {
-                contact.deform(sensor.row_electrodes_mm(row), &mut deformation_mm)
+                contact.deform(sensor.row_electrodes_mm(row), &mut deformation_mm);
             }
             (None, Deformation::Independent { dx_mm, dy_mm, dz_mm }) => {
                 let mut random = source(scene, stream, Purpose::Deformation, frame, row);

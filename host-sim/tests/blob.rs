@@ -57,6 +57,8 @@ fn offset_of(blob: &[u8], pick: impl for<'a> Fn(&Model<'a>) -> &'a [u8]) -> usiz
     })
 }
 
+type Pick = for<'a> fn(&model_core::rbf::Parameters<'a>) -> &'a [f32];
+
 fn parameter_offset(
     blob: &[u8],
     network: usize,
@@ -147,7 +149,6 @@ fn bad_numbers_under_a_valid_crc_are_refused() {
             assert_eq!(refused, Some(DecodeError::Network { index: 1, cause }));
         }
     }
-    type Pick = for<'a> fn(&model_core::rbf::Parameters<'a>) -> &'a [f32];
     let arrays: [(&str, Pick); 6] = [
         ("input_minimum", |p| p.input_minimum),
         ("input_per_span", |p| p.input_per_span),

@@ -149,7 +149,7 @@ fn bad_models_and_data_that_does_not_fit_them() {
     folder.write("other.bin", "name = \"a scene\"");
     folder.write("short.csv", "r4c1_ohm\n60\n");
     let decode = |model, data, says: &[&str]| {
-        refused(&folder, &["decode", model, data, "-o", "e.csv"], says)
+        refused(&folder, &["decode", model, data, "-o", "e.csv"], says);
     };
     decode("corrupt.bin", "data.csv", &["corrupt.bin", "CRC-32"]);
     decode("other.bin", "data.csv", &["other.bin", "not a weight blob"]);

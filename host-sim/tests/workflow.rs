@@ -165,7 +165,10 @@ fn same_seed_same_bytes_on_one_thread_and_on_two() {
         let mut written: Vec<_> = std::fs::read_dir(&small).unwrap().map(|e| e.unwrap()).collect();
         written.sort_by_key(std::fs::DirEntry::file_name);
         let files = [csv, scene_blob, csv_blob, table].into_iter().map(|f| folder.path(&f));
-        files.chain(written.iter().map(|e| e.path())).map(|f| std::fs::read(f).unwrap()).collect()
+        files
+            .chain(written.iter().map(std::fs::DirEntry::path))
+            .map(|f| std::fs::read(f).unwrap())
+            .collect()
     };
     let two = all(2);
     let one = all(1);

@@ -138,7 +138,7 @@ pub fn solve<T: Real>(information_root: &[T], projection: &[T], n: usize, weight
         let Some((_, w_row)) = head.split_at_mut_checked(i * outputs) else { return };
         let Some((_, r)) = r_row.split_at_checked(i) else { return };
         let Some((&pivot, r_rest)) = r.split_first() else { return };
-        if !(pivot > T::NEGLIGIBLE) {
+        if pivot <= T::NEGLIGIBLE {
             w_row.fill(T::ZERO);
             continue;
         }

@@ -29,7 +29,7 @@ fn metadata() -> Metadata<'static> {
         name: "pair",
         scene_digest: 300,
         noise_kind: NoiseKind::Relative,
-        noise_level: 0.0078125,
+        noise_level: 1.0 / 128.0,
         seed: 7,
         training_frames: 1000,
         thickness_mm: 5.0,
@@ -67,7 +67,7 @@ fn worked_bytes() -> Vec<u8> {
 fn encoding_gives_the_specifications_worked_bytes() {
     let mut buffer = Aligned([0; 512]);
     let encoded = small_model(&mut buffer.0);
-    let hex = |bytes: &[u8]| bytes.iter().map(|b| format!("{b:02x} ")).collect::<String>();
+    let hex = |bytes: &[u8]| bytes.iter().map(|b| format!("{b:02x}")).collect::<Vec<_>>().join(" ");
     assert_eq!(hex(encoded), hex(&worked_bytes()));
 }
 

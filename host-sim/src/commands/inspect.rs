@@ -69,7 +69,11 @@ struct OutputSummary {
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let loaded = LoadedModel::read(&arguments.model)?;
     let summary = summarise(&loaded);
-    if common.json { print::json(&summary) } else { print_summary(&summary) }
+    if common.json {
+        return print::json(&summary);
+    }
+    print_summary(&summary);
+    Ok(())
 }
 
 fn summarise(loaded: &LoadedModel) -> Summary {
@@ -119,7 +123,10 @@ fn summarise(loaded: &LoadedModel) -> Summary {
     }
 }
 
-fn print_summary(s: &Summary) -> Result<()> {
+/// Outputs that are listed for people.
+const SHOWN: usize = 24;
+
+fn print_summary(s: &Summary) {
     let line = |label: &str, value: String| println!("{label:<17} {value}");
     line("model", format!("{:?}, format {}, CRC-32 {}", s.name, s.format_version, s.crc_32));
     line("trained on", format!("{} frames, digest {}", s.training_frames, s.scene_digest));
@@ -152,7 +159,6 @@ fn print_summary(s: &Summary) -> Result<()> {
     );
     line("inputs", ends(&s.inputs.iter().map(|c| c.name.as_str()).collect::<Vec<_>>()));
     println!("{:<17} {:>13} {:>11}", "output", "training RMSE", "full scale");
-    const SHOWN: usize = 24;
     for output in s.outputs.iter().take(SHOWN) {
         let OutputSummary { name, unit, training_rmse, full_scale } = output;
         println!("{name:<17} {training_rmse:>13.4} {full_scale:>11.4} {unit}");
@@ -160,7 +166,6 @@ fn print_summary(s: &Summary) -> Result<()> {
     if s.outputs.len() > SHOWN {
         println!("… {} more: --json lists them all", s.outputs.len() - SHOWN);
     }
-    Ok(())
 }
 
 fn ends(names: &[&str]) -> String {

@@ -118,7 +118,11 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         training_rmse: model.metadata().training_rmse.iter().map(f64::from).collect(),
         selection,
     };
-    if common.json { print::json(&summary) } else { print_summary(&summary, options.centres) }
+    if common.json {
+        return print::json(&summary);
+    }
+    print_summary(&summary, options.centres);
+    Ok(())
 }
 
 fn from_scene(arguments: &Arguments, common: &Common) -> Result<Source> {
@@ -230,7 +234,7 @@ fn choose(arguments: &Arguments, source: &Source, options: &mut Options) -> Resu
     Ok(selection)
 }
 
-fn print_summary(summary: &Summary, asked: usize) -> Result<()> {
+fn print_summary(summary: &Summary, asked: usize) {
     if let Some(selection) = &summary.selection {
         println!("cross-validated RMSE of {}:", some_names(&summary.outputs));
         for (i, scored) in selection.scored.iter().enumerate() {
@@ -258,5 +262,4 @@ fn print_summary(summary: &Summary, asked: usize) -> Result<()> {
     if summary.centres < asked {
         println!("  ({asked} centres were asked for; the data has fewer distinct samples)");
     }
-    Ok(())
 }

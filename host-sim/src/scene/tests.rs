@@ -1,1 +1,52 @@
+use super::*;
 
+#[test]
+fn embedded_scenes_are_sound_and_named_as_they_are_called() {
+    for (name, _) in EMBEDDED {
+        let scene = Scene::load(name).unwrap();
+        assert_eq!(scene.name, name);
+        assert_eq!(scene.read_rows, (0..8).collect::<Vec<_>>());
+        assert_eq!(scene.full_scale(Axis::Z), 1.0);
+        assert_eq!(scene.sensor, crate::sensor::tests::paper_sensor());
+    }
+}
+
+#[test]
+fn listed_positions_replace_the_cells() {
+    let upper = (0..48).map(|i| format!("[{i}.5, 1.0, 6.0]")).collect::<Vec<_>>().join(", ");
+    let listed = format!(
+        "resistance_ohm_per_mm = 250.0\nstiffness_n_per_mm = [0.5, 0.6, 3.0]\n\
+         upper_electrodes_mm = [{upper}]"
+    );
+    let text = EMBEDDED[1].1.replace("resistance_ohm_per_mm = 100.0", &listed);
+    let scene = Scene::parse("test", &text).unwrap();
+    assert_eq!(scene.sensor.upper_electrodes_mm[47], [47.5, 1.0, 6.0]);
+    assert_eq!(scene.sensor.force_n([1.0, 1.0, 0.5]), [0.5, 0.6, 1.5]);
+    let default = Scene::load("press").unwrap();
+    assert_eq!(scene.sensor.lower_electrodes_mm, default.sensor.lower_electrodes_mm);
+    assert_ne!(scene.digest, default.digest);
+}
+
+#[test]
+fn electrodes_that_would_touch_are_refused() {
+    let upper = (0..48).map(|i| format!("[{i}.5, 1.0, 0.5]")).collect::<Vec<_>>().join(", ");
+    let text = EMBEDDED[0].1.replace(
+        "resistance_ohm_per_mm = 100.0",
+        &format!("resistance_ohm_per_mm = 100.0\nupper_electrodes_mm = [{upper}]"),
+    );
+    let refused = Scene::parse("test", &text).unwrap_err().to_string();
+    assert!(refused.contains("they would touch"), "{refused}");
+}
+
+#[test]
+fn forces_have_their_own_full_scale_and_values() {
+    let text = EMBEDDED[0]
+        .1
+        .replace("quantity = \"deformation\"", "quantity = \"force\"")
+        .replace("axes = [\"x\", \"y\", \"z\"]", "axes = [\"x\", \"z\"]");
+    let scene = Scene::parse("test", &text).unwrap();
+    assert_eq!((scene.full_scale(Axis::X), scene.full_scale(Axis::Z)), (1.0, 2.0));
+    let outputs: Vec<f64> = scene.electrode_outputs([0.25, 9.0, 0.5]).collect();
+    assert_eq!(outputs, [0.25, 1.0]);
+    assert_eq!(crate::columns::output_names(&scene)[1], "r1e1_fz_n");
+}

@@ -138,6 +138,9 @@ pub fn fit(
 
 /// The batch oracle: ridge regression with penalty 1/δ through a QR decomposition of all samples
 /// at once. Needs memory for all of them; for tests and comparisons.
+///
+/// # Panics
+/// If `initial_covariance` is so large that the ridge no longer keeps R regular.
 #[must_use]
 pub fn fit_batch(
     regressors: &Regressors<'_>,

@@ -67,7 +67,7 @@ impl<'a> Model<'a> {
         }
 
         let (section, network_sections) = take::<MetadataSection>(rest, "metadata")?;
-        let metadata = checked_metadata(section, shape)?;
+        let metadata = checked_metadata(&section, shape)?;
 
         let model = Self { shape, crc, row_network, metadata, networks, network_sections };
         let mut rest = network_sections;
@@ -198,10 +198,10 @@ fn check_count(what: &'static str, expected: usize, found: usize) -> Result<(), 
     }
 }
 
-fn checked_metadata(
-    section: MetadataSection<'_>,
+fn checked_metadata<'a>(
+    section: &MetadataSection<'a>,
     shape: ModelShape,
-) -> Result<Metadata<'_>, DecodeError> {
+) -> Result<Metadata<'a>, DecodeError> {
     check_tag(TAG_METADATA, section.tag)?;
     let metadata = Metadata {
         name: section.name,

@@ -55,8 +55,8 @@ fn reference(p: &Parameters<'_>, shape: Shape, reading: &[f32]) -> Vec<f64> {
     (0..shape.outputs)
         .map(|o| {
             let mut y = f64::from(p.bias[o]);
-            for i in 0..shape.inputs {
-                y += p.affine.get(i * shape.outputs + o).map_or(0.0, |a| f64::from(*a) * x[i]);
+            for (i, x) in x.iter().enumerate() {
+                y += p.affine.get(i * shape.outputs + o).map_or(0.0, |a| f64::from(*a) * x);
             }
             for k in 0..shape.centres {
                 let d2: f64 = (0..shape.inputs)
