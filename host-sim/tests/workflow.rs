@@ -209,3 +209,15 @@ fn every_command_has_help_with_an_example() {
         assert!(help.contains("--json"), "{help}");
     }
 }
+
+#[test]
+fn table1_shows_printed_values_beside_and_keeps_them() {
+    let folder = Folder::new("printed");
+    folder.write("scene.toml", small_scene());
+    folder.write("p.csv", "spread,noise_level,percent\n0.5,0.01,7.25\n");
+    let table = ["table1", "scene.toml", "--printed", "p.csv", "-o", "t.csv"];
+    let page = folder.succeed(&table);
+    assert!(page.contains("positional") && page.contains("7.25"), "{page}");
+    let csv = std::fs::read_to_string(folder.path("t.csv")).unwrap();
+    assert!(csv.ends_with("\n0.01,paper,0.5,dz_mm,as_printed,7.25\n"));
+}

@@ -55,11 +55,14 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if common.json {
         return print::json(&summary);
     }
-    println!("{} frames decoded into {}", summary.frames, summary.file.display());
+    let mut page = print::Page::default();
+    page.line(format_args!("{} frames decoded into {}", summary.frames, summary.file.display()));
     if incomplete > 0 {
-        println!("{incomplete} of them miss a reading: the outputs of its row-wire are empty");
+        page.line(format_args!(
+            "{incomplete} of them miss a reading: the outputs of its row-wire are empty"
+        ));
     }
-    Ok(())
+    page.print()
 }
 
 /// The model's reading columns of `file`.

@@ -55,8 +55,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if common.json {
         return print::json(&summary);
     }
-    println!("{} frames of {}", summary.frames, arguments.data.display());
-    print::errors(&[("model", &summary.errors), ("mean", &summary.mean_errors)]);
-    print::errors_legend();
-    Ok(())
+    let mut page = print::Page::default();
+    page.line(format_args!("{} frames of {}", summary.frames, arguments.data.display()));
+    print::errors(&mut page, &[("model", &summary.errors), ("mean", &summary.mean_errors)]);
+    print::errors_legend(&mut page);
+    page.print()
 }

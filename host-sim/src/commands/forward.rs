@@ -43,11 +43,12 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if common.json {
         return print::json(&summary);
     }
-    println!(
+    let mut page = print::Page::default();
+    page.line(format_args!(
         "{} frames of {} readings in {}",
         summary.frames,
         summary.readings,
         summary.file.display()
-    );
-    Ok(())
+    ));
+    page.print()
 }

@@ -72,8 +72,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if common.json {
         return print::json(&summary);
     }
-    print_summary(&summary);
-    Ok(())
+    page_of(&summary).print()
 }
 
 fn summarise(loaded: &LoadedModel) -> Summary {
@@ -126,8 +125,9 @@ fn summarise(loaded: &LoadedModel) -> Summary {
 /// Outputs that are listed for people.
 const SHOWN: usize = 24;
 
-fn print_summary(s: &Summary) {
-    let line = |label: &str, value: String| println!("{label:<17} {value}");
+fn page_of(s: &Summary) -> print::Page {
+    let mut page = print::Page::default();
+    let mut line = |label: &str, value: String| page.line(format_args!("{label:<17} {value}"));
     line("model", format!("{:?}, format {}, CRC-32 {}", s.name, s.format_version, s.crc_32));
     line("trained on", format!("{} frames, digest {}", s.training_frames, s.scene_digest));
     let noise = format!("{} {}", s.noise_kind, s.noise_level);
@@ -158,14 +158,15 @@ fn print_summary(s: &Summary) {
         ),
     );
     line("inputs", ends(&s.inputs.iter().map(|c| c.name.as_str()).collect::<Vec<_>>()));
-    println!("{:<17} {:>13} {:>11}", "output", "training RMSE", "full scale");
+    page.line(format_args!("{:<17} {:>13} {:>11}", "output", "training RMSE", "full scale"));
     for output in s.outputs.iter().take(SHOWN) {
         let OutputSummary { name, unit, training_rmse, full_scale } = output;
-        println!("{name:<17} {training_rmse:>13.4} {full_scale:>11.4} {unit}");
+        page.line(format_args!("{name:<17} {training_rmse:>13.4} {full_scale:>11.4} {unit}"));
     }
     if s.outputs.len() > SHOWN {
-        println!("… {} more: --json lists them all", s.outputs.len() - SHOWN);
+        page.line(format_args!("… {} more: --json lists them all", s.outputs.len() - SHOWN));
     }
+    page
 }
 
 fn ends(names: &[&str]) -> String {

@@ -1,29 +1,58 @@
 //! Results on stdout: aligned tables for people, JSON for programs.
 
+use std::fmt::{Display, Write as _};
+use std::io::Write as _;
+
 use host_sim::evaluate::metrics::{Definition, Errors};
 use host_sim::{Error, Result};
 use serde::Serialize;
+
+/// Text for people, printed as a whole.
+#[derive(Default)]
+pub struct Page(String);
+
+impl Page {
+    /// Adds a line.
+    pub fn line(&mut self, line: impl Display) {
+        // Writing to a string cannot fail.
+        let _ = writeln!(self.0, "{line}");
+    }
+
+    /// Prints the page.
+    pub fn print(self) -> Result<()> {
+        to_stdout(&self.0)
+    }
+}
+
+/// A reader who has seen enough (`| head`) is no failure.
+fn to_stdout(text: &str) -> Result<()> {
+    match std::io::stdout().write_all(text.as_bytes()) {
+        Err(cause) if cause.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Error::Failed(format!("cannot write to stdout: {cause}")))
+        }
+        _ => Ok(()),
+    }
+}
 
 /// Prints `value` as JSON.
 pub fn json(value: &impl Serialize) -> Result<()> {
     let text = serde_json::to_string_pretty(value)
         .map_err(|cause| Error::Failed(format!("cannot write JSON: {cause}")))?;
-    println!("{text}");
-    Ok(())
+    to_stdout(&(text + "\n"))
 }
 
-/// Prints one line a decoder and group, under a header of definitions.
-pub fn errors(decoders: &[(&str, &[Errors])]) {
-    println!(
+/// Adds one line a decoder and group, under a header of definitions.
+pub fn errors(page: &mut Page, decoders: &[(&str, &[Errors])]) {
+    page.line(format_args!(
         "{:<8} {:<10} {:>9}    {:>8} {:>7} {:>9} {:>8} {:>9}",
         "decoder", "output", "RMSE", "rel. L2", "%FS", "position", "R²", "mean rel"
-    );
+    ));
     for (decoder, groups) in decoders {
         for group in *groups {
             let percent = |definition: Definition| {
                 definition.of(group).map_or("-".into(), |value| format!("{value:.2} %"))
             };
-            println!(
+            page.line(format_args!(
                 "{:<8} {:<10} {:>9.4} {:<2} {:>8} {:>7} {:>9} {:>8} {:>9}",
                 decoder,
                 group.group,
@@ -33,16 +62,16 @@ pub fn errors(decoders: &[(&str, &[Errors])]) {
                 percent(Definition::FullScalePercent),
                 percent(Definition::PositionalPercent),
                 group.r_squared.map_or("-".into(), |value| format!("{value:.4}")),
-                percent(Definition::MeanRelativePercent),
-            );
+                percent(Definition::MeanRelativePercent)
+            ));
         }
     }
 }
 
 /// Explains the columns of [`errors`] in one line.
-pub fn errors_legend() {
-    println!(
+pub fn errors_legend(page: &mut Page) {
+    page.line(format_args!(
         "rel. L2 = ‖e‖/‖Δ‖; %FS = mean|e|/full scale; position = mean|e|/(H − Δz); \
          mean rel = mean(|e|/|Δ|) where |Δ| > 10 % FS"
-    );
+    ));
 }

@@ -43,7 +43,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if common.json {
         return print::json(&result);
     }
-    print_summary(&result, &folder, &files);
+    page_of(&result, &folder, &files).print()?;
     eprintln!("done in {:.1} s", started.elapsed().as_secs_f64());
     Ok(())
 }
@@ -61,9 +61,10 @@ fn write_files(folder: &Path, result: &RunResult, blob: &[u8]) -> Result<Vec<&'s
     Ok(files)
 }
 
-fn print_summary(result: &RunResult, folder: &Path, files: &[&str]) {
+fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
+    let mut page = print::Page::default();
     let (scene, model) = (&result.scene, &result.model);
-    println!(
+    page.line(format_args!(
         "{}: {} noise {} %, seed {}, {} training and {} test frames",
         scene.name,
         scene.noise_kind,
@@ -71,8 +72,8 @@ fn print_summary(result: &RunResult, folder: &Path, files: &[&str]) {
         scene.seed,
         model.training_frames,
         model.test_frames
-    );
-    println!(
+    ));
+    page.line(format_args!(
         "model: {} networks, {} readings -> K = {} -> {} outputs, spread {}, {} bytes, CRC-32 {}",
         model.networks,
         model.inputs,
@@ -81,26 +82,29 @@ fn print_summary(result: &RunResult, folder: &Path, files: &[&str]) {
         model.spread,
         model.blob_bytes,
         model.blob_crc
-    );
-    println!();
+    ));
+    page.line("");
     let decoders: Vec<_> =
         result.decoders.iter().map(|d| (d.decoder.as_str(), d.errors.as_slice())).collect();
-    print::errors(&decoders);
-    print::errors_legend();
-    println!("\nnetwork RMSE by row-wire:");
+    print::errors(&mut page, &decoders);
+    print::errors_legend(&mut page);
+    page.line(format_args!("\nnetwork RMSE by row-wire:"));
     for group in result.rows.first().map_or(&[][..], |row| &row.errors) {
         let of_row = |errors: &run::RowErrors| {
             let found = errors.errors.iter().find(|e| e.group == group.group);
             found.map_or(String::new(), |e| format!(" {:.4}", e.rmse))
         };
         let rows: String = result.rows.iter().map(of_row).collect();
-        println!("  {:<7}{rows} {}", group.group, group.unit);
+        page.line(format_args!("  {:<7}{rows} {}", group.group, group.unit));
     }
     if let Some(table) = &result.table1 {
         for group in table.groups() {
             let ratio = table.worst_ratio_to_mean(group).unwrap_or(f64::NAN);
-            println!("table 1, {group}: worst cell {ratio:.3} × the RMSE of the mean");
+            page.line(format_args!(
+                "table 1, {group}: worst cell {ratio:.3} × the RMSE of the mean"
+            ));
         }
     }
-    println!("\nwritten to {}: {}", folder.display(), files.join(", "));
+    page.line(format_args!("\nwritten to {}: {}", folder.display(), files.join(", ")));
+    page
 }

@@ -55,12 +55,13 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if common.json {
         return print::json(&summary);
     }
-    println!(
+    let mut page = print::Page::default();
+    page.line(format_args!(
         "{} frames of {} readings and {} outputs in {}",
         summary.frames,
         summary.readings,
         summary.outputs,
         summary.file.display()
-    );
-    Ok(())
+    ));
+    page.print()
 }

@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use host_sim::data_file::DataFile;
 use host_sim::evaluate::metrics::{Definition, Errors};
-use host_sim::evaluate::table1::{self, PAPER_PRINTED_PERCENT, Table1};
+use host_sim::evaluate::table1::{self, PAPER_PRINTED_PERCENT, Printed, Table1};
 use host_sim::progress::Progress;
 use host_sim::{Result, output};
 
@@ -23,6 +24,10 @@ pub struct Arguments {
     /// CSV file to write, with all axes, decoders and definitions.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
+    /// CSV file of the paper's printed cells, to show them beside (columns spread, noise_level as a
+    /// fraction, percent).
+    #[arg(long, value_name = "FILE")]
+    printed: Option<PathBuf>,
     /// Outputs to print, such as dz_mm or dx_mm.
     #[arg(long, value_name = "GROUP", default_value = "dz_mm")]
     group: String,
@@ -33,29 +38,35 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if let Some(path) = &arguments.output {
         output::check_writable(path)?;
     }
-    let table = table1::compute(&scene, &Progress::on_terminal())?;
+    let printed = match &arguments.printed {
+        Some(path) => Printed::from_file(&DataFile::read(path)?)?,
+        None => Vec::new(),
+    };
+    let mut table = table1::compute(&scene, &Progress::on_terminal())?;
+    table.printed = printed;
     if let Some(path) = &arguments.output {
         table.write_csv(path)?;
     }
     if common.json {
         return print::json(&table);
     }
-    print_table(&table, &arguments.group)
+    page_of(&table, &arguments.group)?.print()
 }
 
-fn print_table(table: &Table1, group: &str) -> Result<()> {
+fn page_of(table: &Table1, group: &str) -> Result<print::Page> {
     if !table.groups().contains(&group) {
         let message = format!("--group {group}: the scene has {}", table.groups().join(", "));
         return Err(host_sim::Error::Usage(message));
     }
-    println!(
+    let mut page = print::Page::default();
+    page.line(format_args!(
         "{group}: K = {}, affine tail: {}, {} training and {} test frames; standard: K = N = {}",
         table.centres,
         if table.affine_tail { "yes" } else { "no" },
         table.training_frames,
         table.test_frames,
         table.standard_frames
-    );
+    ));
     for definition in Definition::ALL {
         let of = |errors: &[Errors]| {
             errors.iter().find(|e| e.group == group).and_then(|e| definition.of(e))
@@ -63,15 +74,15 @@ fn print_table(table: &Table1, group: &str) -> Result<()> {
         if table.columns.iter().all(|column| of(&column.mean).is_none()) {
             continue;
         }
-        println!("\n{}", definition.formula());
+        page.line(format_args!("\n{}", definition.formula()));
         let levels = table.columns.iter().map(|c| format!("{:>20}", percent(c.noise_level)));
-        println!("{:<16}{}", "noise", levels.collect::<String>());
+        page.line(format_args!("{:<16}{}", "noise", levels.collect::<String>()));
         for (s, cell) in table.columns[0].cells.iter().enumerate() {
             let cells = table.columns.iter().map(|column| {
                 let standard = column.cells[s].standard.as_deref().and_then(of);
                 format!("{:>9} {:>10}", number(of(&column.cells[s].network)), bracket(standard))
             });
-            println!("spread {:<9}{}", cell.spread, cells.collect::<String>());
+            page.line(format_args!("spread {:<9}{}", cell.spread, cells.collect::<String>()));
         }
         for (name, errors) in [
             ("linear", (|c| &c.linear) as fn(&table1::Column) -> &Vec<Errors>),
@@ -79,20 +90,27 @@ fn print_table(table: &Table1, group: &str) -> Result<()> {
         ] {
             let cells =
                 table.columns.iter().map(|c| format!("{:>9}{:11}", number(of(errors(c))), ""));
-            println!("{name:<16}{}", cells.collect::<String>().trim_end());
+            page.line(format_args!("{name:<16}{}", cells.collect::<String>().trim_end()));
+        }
+    }
+    if !table.printed.is_empty() {
+        page.line("\nas the paper prints it, for z, %");
+        for Printed { spread, noise_level, percent: printed } in &table.printed {
+            let noise = percent(*noise_level);
+            page.line(format_args!("spread {spread:<9} noise {noise:<8} {printed}"));
         }
     }
     let [low, high] = PAPER_PRINTED_PERCENT;
-    println!(
-        "\n(in brackets: the standard network, K = N.) The paper prints {low} to {high} % for z and \
-         does not state its definition; docs/paper.md compares."
-    );
+    page.line(format_args!("\n(in brackets: the standard network, K = N.) The paper prints {low} to {high} % for z and \
+         does not state its definition; docs/paper.md compares."));
     for group in table.groups() {
         if let Some(ratio) = table.worst_ratio_to_mean(group) {
-            println!("{group}: the worst cell's RMSE is {ratio:.3} × that of the mean");
+            page.line(format_args!(
+                "{group}: the worst cell's RMSE is {ratio:.3} × that of the mean"
+            ));
         }
     }
-    Ok(())
+    Ok(page)
 }
 
 fn percent(level: f64) -> String {

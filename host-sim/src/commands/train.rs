@@ -121,8 +121,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if common.json {
         return print::json(&summary);
     }
-    print_summary(&summary, options.centres);
-    Ok(())
+    page_of(&summary, options.centres).print()
 }
 
 fn from_scene(arguments: &Arguments, common: &Common) -> Result<Source> {
@@ -234,22 +233,23 @@ fn choose(arguments: &Arguments, source: &Source, options: &mut Options) -> Resu
     Ok(selection)
 }
 
-fn print_summary(summary: &Summary, asked: usize) {
+fn page_of(summary: &Summary, asked: usize) -> print::Page {
+    let mut page = print::Page::default();
     if let Some(selection) = &summary.selection {
-        println!("cross-validated RMSE of {}:", some_names(&summary.outputs));
+        page.line(format_args!("cross-validated RMSE of {}:", some_names(&summary.outputs)));
         for (i, scored) in selection.scored.iter().enumerate() {
             let rmse: Vec<String> = scored.rmse.iter().take(8).map(|v| format!("{v:.4}")).collect();
             let mark = if i == selection.best { "  <- chosen" } else { "" };
-            println!(
+            page.line(format_args!(
                 "  K = {:<4} spread = {:<5} score {:.4}: {}{mark}",
                 scored.centres,
                 scored.spread,
                 scored.score,
                 rmse.join(" ")
-            );
+            ));
         }
     }
-    println!(
+    page.line(format_args!(
         "{}: {} bytes, CRC-32 {}, K = {}, spread = {}, affine tail: {}, {} frames",
         summary.file.display(),
         summary.blob_bytes,
@@ -258,8 +258,11 @@ fn print_summary(summary: &Summary, asked: usize) {
         summary.spread,
         if summary.affine_tail { "yes" } else { "no" },
         summary.training_frames
-    );
+    ));
     if summary.centres < asked {
-        println!("  ({asked} centres were asked for; the data has fewer distinct samples)");
+        page.line(format_args!(
+            "  ({asked} centres were asked for; the data has fewer distinct samples)"
+        ));
     }
+    page
 }

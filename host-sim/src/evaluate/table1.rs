@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::metrics::{self, Definition, Errors, Measure};
+use crate::data_file::DataFile;
 use crate::dataset::{Block, Dataset};
 use crate::error::{Error, Result};
 use crate::model::{Kernel, Origin, infer};
@@ -37,6 +38,39 @@ pub struct Table1 {
     pub standard_frames: usize,
     /// One entry a noise level.
     pub columns: Vec<Column>,
+    /// What the paper prints, where the reader supplied it.
+    pub printed: Vec<Printed>,
+}
+
+/// One cell as the paper prints it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Printed {
+    /// Spread of its line.
+    pub spread: f64,
+    /// Noise level of its column, as a fraction.
+    pub noise_level: f64,
+    /// The number, in per cent.
+    pub percent: f64,
+}
+
+impl Printed {
+    /// Reads printed cells from a file with the columns `spread`, `noise_level` and `percent`.
+    ///
+    /// # Errors
+    /// [`Error::Data`] for a column or a value that is missing.
+    pub fn from_file(file: &DataFile) -> Result<Vec<Self>> {
+        let columns = file.columns(["spread", "noise_level", "percent"])?;
+        let cell = |line: usize| {
+            let value = |column: usize| file.value(line, columns[column]);
+            let cell = Self { spread: value(0), noise_level: value(1), percent: value(2) };
+            if [cell.spread, cell.noise_level, cell.percent].iter().any(|v| v.is_nan()) {
+                let message = format!("line {}: every cell needs three numbers", line + 2);
+                return Err(Error::data(&file.path, message));
+            }
+            Ok(cell)
+        };
+        (0..file.lines()).map(cell).collect()
+    }
 }
 
 /// All that was measured at one noise level.
@@ -96,6 +130,7 @@ pub fn compute(scene: &Scene, progress: &Progress) -> Result<Table1> {
         test_frames: settings.test_frames,
         standard_frames: settings.standard_frames,
         columns: columns.collect(),
+        printed: Vec::new(),
     })
 }
 
@@ -211,6 +246,9 @@ impl Table1 {
                     add("standard", Some(cell.spread), standard);
                 }
             }
+        }
+        for Printed { spread, noise_level, percent } in &self.printed {
+            let _ = writeln!(csv, "{noise_level},paper,{spread},dz_mm,as_printed,{percent}");
         }
         csv
     }
