@@ -27,3 +27,8 @@ pub mod scale;
 pub use blob::Aligned;
 pub use decoder::{Decoder, Estimate, RowStatus};
 pub use frame::{ColumnWire, Frame, RowWire};
+
+/// The README's example is a test.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+struct Readme;
