@@ -1,34 +1,6 @@
 //! Columns of data files: names, units, and what the project's own names mean.
 
-use serde::{Deserialize, Serialize};
-
 use crate::scene::{Quantity, Scene};
-
-/// Direction in the sensor's frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Axis {
-    /// Along the row-wires.
-    X,
-    /// Across the row-wires.
-    Y,
-    /// Along the outward normal.
-    Z,
-}
-
-impl Axis {
-    /// Place in a vector.
-    #[must_use]
-    pub fn index(self) -> usize {
-        self as usize
-    }
-
-    /// Name in column names.
-    #[must_use]
-    pub fn letter(self) -> char {
-        ['x', 'y', 'z'][self.index()]
-    }
-}
 
 /// Units that a column's name may end in, and how they are written.
 const UNITS: [(&str, &str); 7] = [
@@ -121,6 +93,14 @@ pub fn select(header: &[String], pattern: &str) -> Vec<usize> {
 #[must_use]
 pub fn unmatched<'p>(header: &[String], pattern: &'p str) -> Option<&'p str> {
     pattern.split(',').map(str::trim).find(|glob| !header.iter().any(|name| matches(glob, name)))
+}
+
+/// The first names of a header, for messages.
+#[must_use]
+pub fn some_names(header: &[String]) -> String {
+    const SHOWN: usize = 8;
+    let shown = header.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join(", ");
+    if header.len() > SHOWN { format!("{shown}, … ({} columns)", header.len()) } else { shown }
 }
 
 fn matches(glob: &str, name: &str) -> bool {

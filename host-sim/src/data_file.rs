@@ -4,6 +4,7 @@ use std::collections::HashSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use crate::columns;
 use crate::error::{Error, Result};
 use crate::output;
 
@@ -105,7 +106,7 @@ impl DataFile {
         self.header.iter().position(|n| n == name).ok_or_else(|| {
             let message = format!(
                 "column {name:?} is missing; the file has: {}",
-                crate::dataset::some_names(&self.header)
+                columns::some_names(&self.header)
             );
             Error::data(&self.path, message)
         })

@@ -193,26 +193,18 @@ fn chosen(
     if let (Some(glob), Some(pattern)) = (missing, pattern) {
         let message = format!(
             "no column matches {glob:?} of {option} {pattern:?}; the file has: {}",
-            some_names(&file.header)
+            columns::some_names(&file.header)
         );
         return Err(Error::data(&file.path, message));
     }
     if selected.is_empty() {
         let message = format!(
             "no column is named like {default}; choose columns with {option}; the file has: {}",
-            some_names(&file.header)
+            columns::some_names(&file.header)
         );
         return Err(Error::data(&file.path, message));
     }
     Ok(selected)
-}
-
-/// The first names of a header, for messages.
-#[must_use]
-pub fn some_names(header: &[String]) -> String {
-    const SHOWN: usize = 8;
-    let shown = header.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join(", ");
-    if header.len() > SHOWN { format!("{shown}, … ({} columns)", header.len()) } else { shown }
 }
 
 /// Orders columns by row-wire and counts the rows, if every column names one and the rows are

@@ -3,6 +3,29 @@
 //! Data flows one way: [`scene`] → [`synth`] → [`dataset`] → [`train`] → [`model`] (the blob) →
 //! [`evaluate`] → [`report`]. Only this crate opens files; the `host-sim` binary is a thin shell
 //! over it. Inference is [`model_core`]'s, the same code that runs on the device.
+//!
+//! ```
+//! use host_sim::infer::Kernel;
+//! use host_sim::model::{LoadedModel, Origin, encode};
+//! use host_sim::random::Stream;
+//! use host_sim::scene::Scene;
+//! use host_sim::synth::synthesise;
+//! use host_sim::train::{Options, train};
+//!
+//! let mut scene = Scene::load("press")?;
+//! scene.read_rows = vec![3]; // one row-wire: 18 readings, 18 outputs
+//! let frames = synthesise(&scene, Stream::Training, 2000);
+//! let networks = train(&frames, &Options::new(32, 0.8, true, scene.seed))?;
+//! let blob = encode(&networks, &frames, &Origin::of_scene(&scene))?;
+//!
+//! let model = LoadedModel::from_bytes("press.bin".as_ref(), &blob)?;
+//! let fresh = synthesise(&scene, Stream::Test, 1000);
+//! let estimate = model.decode(Kernel::default(), &fresh.inputs);
+//! let squares = fresh.outputs.values.iter().zip(&estimate.values).map(|(t, e)| (t - e).powi(2));
+//! let rmse_mm = (squares.sum::<f64>() / estimate.values.len() as f64).sqrt();
+//! assert!(rmse_mm < 0.05, "{rmse_mm} mm");
+//! # Ok::<(), host_sim::Error>(())
+//! ```
 
 pub mod columns;
 pub mod data_file;
@@ -10,6 +33,7 @@ pub mod dataset;
 pub mod digest;
 pub mod error;
 pub mod evaluate;
+pub mod infer;
 pub mod model;
 pub mod output;
 pub mod progress;

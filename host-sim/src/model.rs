@@ -1,34 +1,19 @@
-//! Trained models: to a blob and back, and inference over whole tables.
+//! Trained models: to a blob and back.
 
 use std::path::Path;
 
-use clap::ValueEnum;
 use model_core::blob::{
     self, Columns, Floats, Metadata, Model, ModelParts, NoiseKind as BlobNoiseKind,
 };
-use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
 use model_core::rbf::Network;
 use rayon::prelude::*;
-use serde::Serialize;
 
 use crate::columns;
 use crate::dataset::{Dataset, Table};
 use crate::error::{Error, Result};
+use crate::infer::{Kernel, infer, infer_line};
 use crate::scene::{NoiseKind, Scene};
 use crate::train::FittedNetwork;
-
-/// The exponential that activations are computed with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Kernel {
-    /// Within 2 ulp and fast: the device's default.
-    #[default]
-    Polynomial,
-    /// Within 1 ulp.
-    Libm,
-    /// Up to 2.4e-3 relative error; to see what that costs.
-    Micromath,
-}
 
 /// Where a model's training data came from.
 #[derive(Debug, Clone, PartialEq)]
@@ -211,38 +196,6 @@ impl LoadedModel {
         );
         Table { names, values }
     }
-}
-
-/// Infers the outputs for every line of `inputs`.
-#[must_use]
-pub fn infer(network: &Network<'_>, kernel: Kernel, inputs: &Table) -> Vec<f64> {
-    let outputs = network.shape().outputs;
-    let mut values = vec![0.0; inputs.len() * outputs];
-    values
-        .par_chunks_exact_mut(outputs)
-        .zip(inputs.values.par_chunks_exact(inputs.names.len()))
-        .for_each(|(outputs, line)| infer_line(network, kernel, line, outputs));
-    values
-}
-
-fn infer_line(network: &Network<'_>, kernel: Kernel, readings: &[f64], outputs: &mut [f64]) {
-    if readings.iter().any(|reading| !(*reading as f32).is_finite()) {
-        outputs.fill(f64::NAN);
-        return;
-    }
-    match kernel {
-        Kernel::Polynomial => infer_with::<Polynomial>(network, readings, outputs),
-        Kernel::Libm => infer_with::<Libm>(network, readings, outputs),
-        Kernel::Micromath => infer_with::<Micromath>(network, readings, outputs),
-    }
-}
-
-fn infer_with<E: ExpKernel>(network: &Network<'_>, readings: &[f64], outputs: &mut [f64]) {
-    let readings: Vec<f32> = readings.iter().map(|reading| *reading as f32).collect();
-    let mut scaled = vec![0.0; readings.len()];
-    let mut inferred = vec![0.0; outputs.len()];
-    network.infer::<E>(&readings, &mut scaled, &mut inferred).expect("lengths of the network");
-    outputs.iter_mut().zip(inferred).for_each(|(place, value)| *place = f64::from(value));
 }
 
 /// Bytes that start at a multiple of four, as a blob must.

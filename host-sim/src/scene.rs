@@ -7,9 +7,8 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use crate::columns::Axis;
 use crate::error::{Error, Result};
-use crate::sensor::{self, Sensor, Vector3};
+use crate::sensor::{self, Axis, Sensor, Vector3};
 
 mod file;
 mod validate;

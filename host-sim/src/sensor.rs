@@ -5,6 +5,34 @@
 //! column-wire k is that of all nodes of the two wires in parallel. Force follows the generalised
 //! Hooke law F = diag(kx, ky, kz)·Δ.
 
+use serde::{Deserialize, Serialize};
+
+/// Direction in the sensor's frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Axis {
+    /// Along the row-wires.
+    X,
+    /// Across the row-wires.
+    Y,
+    /// Along the outward normal.
+    Z,
+}
+
+impl Axis {
+    /// Place in a vector.
+    #[must_use]
+    pub fn index(self) -> usize {
+        self as usize
+    }
+
+    /// Name in column names.
+    #[must_use]
+    pub fn letter(self) -> char {
+        ['x', 'y', 'z'][self.index()]
+    }
+}
+
 /// Position or deformation in mm: x along the row-wires, y across them, z along the outward normal.
 pub type Vector3 = [f64; 3];
 

@@ -2,7 +2,7 @@
 
 use host_sim::dataset::{Block, Dataset};
 use host_sim::evaluate::metrics::{self, Errors, Measure};
-use host_sim::model::{Kernel, infer};
+use host_sim::infer::{Kernel, infer};
 use host_sim::random::Stream;
 use host_sim::scene::Scene;
 use host_sim::synth;

@@ -1,6 +1,7 @@
 //! A real, trained blob, harmed in every way there is: each is refused with its own error.
 
-use host_sim::model::{self, Kernel, LoadedModel, Origin};
+use host_sim::infer::Kernel;
+use host_sim::model::{self, LoadedModel, Origin};
 use host_sim::random::Stream;
 use host_sim::scene::Scene;
 use host_sim::synth;

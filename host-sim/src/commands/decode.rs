@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use host_sim::data_file::{self, DataFile};
 use host_sim::dataset::Table;
-use host_sim::model::{Kernel, LoadedModel};
+use host_sim::infer::Kernel;
+use host_sim::model::LoadedModel;
 use host_sim::{Result, output};
 use serde::Serialize;
 

@@ -6,7 +6,8 @@ use clap::Args;
 use host_sim::Result;
 use host_sim::data_file::DataFile;
 use host_sim::evaluate::metrics::{self, Errors, Measure};
-use host_sim::model::{Kernel, LoadedModel};
+use host_sim::infer::Kernel;
+use host_sim::model::LoadedModel;
 use serde::Serialize;
 
 use super::{Common, decode, print};

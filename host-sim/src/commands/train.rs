@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use host_sim::columns::some_names;
 use host_sim::data_file::DataFile;
-use host_sim::dataset::{Dataset, some_names};
+use host_sim::dataset::Dataset;
 use host_sim::model::{self, LoadedModel, Origin};
 use host_sim::random::Stream;
 use host_sim::scene::{EMBEDDED, Scene};

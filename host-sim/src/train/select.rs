@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::{Options, Samples};
 use crate::dataset::Dataset;
 use crate::error::{Error, Result};
-use crate::model::{Kernel, infer};
+use crate::infer::{Kernel, infer};
 use crate::random::{Purpose, Random, Stream};
 
 /// What one candidate scored on the folds that it was not trained on.

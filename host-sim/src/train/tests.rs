@@ -2,7 +2,7 @@ use super::least_squares::{Recursion, Regressors, fit, fit_batch};
 use super::standard::StandardNetwork;
 use super::*;
 use crate::dataset::Table;
-use crate::model::{Kernel, infer};
+use crate::infer::{Kernel, infer};
 
 /// `frames` of a smooth function of two inputs, with a little noise.
 fn block(frames: usize, noise: f64) -> Block {

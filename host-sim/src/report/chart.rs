@@ -1,0 +1,380 @@
+//! One chart: two axes, some series, a legend or labels at the end of the lines.
+
+use super::format::significant;
+use super::svg::{Anchor, Px, Shape, Svg, TEXT_PX, text_width};
+use super::ticks::Ticks;
+
+/// How a series is drawn.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Mark {
+    /// A line through the points; a missing value is a gap.
+    Line,
+    /// A line with a shape at every point.
+    LineAnd(Shape),
+    /// A dashed line.
+    Dashed,
+    /// A shape at every point.
+    Points(Shape),
+    /// Bars from zero, this wide on the x axis.
+    Bars(f64),
+    /// Thin vertical lines from these values to the points.
+    From(Vec<f64>),
+}
+
+/// One series of values.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// Name in the legend; none if empty.
+    pub name: String,
+    /// CSS class, which decides on the colour.
+    pub class: &'static str,
+    /// Opacity, for series that are graded.
+    pub opacity: f64,
+    /// How it is drawn.
+    pub mark: Mark,
+    /// x and y; a y that is not finite is missing.
+    pub points: Vec<[f64; 2]>,
+}
+
+impl Series {
+    /// A series in full colour.
+    pub fn new(name: &str, class: &'static str, mark: Mark, points: Vec<[f64; 2]>) -> Self {
+        Self { name: name.into(), class, opacity: 1.0, mark, points }
+    }
+}
+
+/// One axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Axis {
+    /// What it measures, with its unit.
+    pub label: String,
+    /// Its range and ticks.
+    pub ticks: Ticks,
+    /// Whether it is logarithmic.
+    pub logarithmic: bool,
+}
+
+impl Axis {
+    /// A linear axis.
+    pub fn linear(label: impl Into<String>, ticks: Ticks) -> Self {
+        Self { label: label.into(), ticks, logarithmic: false }
+    }
+
+    /// Place of `value` along the axis: 0 at its low end, 1 at its high end.
+    fn place(&self, value: f64) -> f64 {
+        let Ticks { low, high, .. } = self.ticks;
+        if self.logarithmic {
+            (value / low).ln() / (high / low).ln()
+        } else {
+            (value - low) / (high - low)
+        }
+    }
+}
+
+/// One chart.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chart {
+    /// What it is read out as.
+    pub title: String,
+    /// The axis along the bottom.
+    pub x: Axis,
+    /// The axis up the left side; its label stands above it, to be read level.
+    pub y: Axis,
+    /// What is drawn, in order.
+    pub series: Vec<Series>,
+    /// Ranges of x that are shaded, to tell neighbours apart.
+    pub bands: Vec<[f64; 2]>,
+    /// Whether names stand at the right end of the lines instead of in a legend.
+    pub end_labels: bool,
+}
+
+/// Where things are, in px.
+struct Frame<'c> {
+    chart: &'c Chart,
+    left: f64,
+    right: f64,
+    top: f64,
+    bottom: f64,
+}
+
+const LINE_PX: f64 = TEXT_PX + 7.0;
+const SWATCH_PX: f64 = 24.0;
+
+impl Chart {
+    /// The chart at this size.
+    pub fn draw(&self, [width, height]: [f64; 2]) -> String {
+        let mut svg = Svg::new(width, height, &self.title);
+        let tick_width = |ticks: &Ticks| {
+            ticks.at.iter().map(|(_, label)| text_width(label)).fold(0.0, f64::max)
+        };
+        let named = self.series.iter().filter(|series| !series.name.is_empty());
+        let end_width = named.map(|s| text_width(&s.name)).fold(0.0, f64::max) + 12.0;
+        let left = tick_width(&self.y.ticks) + 10.0;
+        let mut frame = Frame {
+            chart: self,
+            left,
+            right: width - if self.end_labels { end_width } else { 10.0 },
+            top: LINE_PX + 6.0,
+            bottom: height - 2.0 * LINE_PX - 4.0,
+        };
+        svg.text(0.0, TEXT_PX, Anchor::Start, "label", &self.y.label);
+        if !self.end_labels {
+            frame.top = legend(&mut svg, &self.series, width, text_width(&self.y.label)) + 12.0;
+        }
+        frame.draw_axes(&mut svg, height);
+        for series in &self.series {
+            svg.open(&opacity(series));
+            frame.draw_series(&mut svg, series);
+            svg.close();
+        }
+        if self.end_labels {
+            frame.draw_end_labels(&mut svg);
+        }
+        svg.finish()
+    }
+
+    /// The chart twice, for wide and for narrow windows: text keeps its size on both.
+    pub fn draw_responsive(&self, wide: [f64; 2], narrow: [f64; 2]) -> String {
+        format!(
+            "<div class=\"wide\">{}</div><div class=\"narrow\">{}</div>\n",
+            self.draw(wide),
+            self.draw(narrow)
+        )
+    }
+}
+
+fn opacity(series: &Series) -> String {
+    if series.opacity < 1.0 { format!(r#" opacity="{:.2}""#, series.opacity) } else { String::new() }
+}
+
+/// Draws names and marks: beside the label of the y axis where there is room, else below it.
+/// Returns where the legend ends.
+fn legend(svg: &mut Svg, series: &[Series], width: f64, label_width: f64) -> f64 {
+    let named: Vec<_> = series.iter().filter(|series| !series.name.is_empty()).collect();
+    let entry = |series: &Series| SWATCH_PX + text_width(&series.name) + 14.0;
+    let total: f64 = named.iter().map(|series| entry(series)).sum();
+    let beside = label_width + 24.0 + total <= width;
+    let (mut x, mut y) = if beside || named.is_empty() {
+        (width - total, TEXT_PX)
+    } else {
+        (0.0, TEXT_PX + LINE_PX)
+    };
+    for series in named {
+        if x > 0.0 && x + entry(series) > width + 14.0 {
+            (x, y) = (0.0, y + LINE_PX);
+        }
+        svg.open(&opacity(series));
+        swatch(svg, series, [x, y - TEXT_PX * 0.35]);
+        svg.close();
+        svg.text(x + SWATCH_PX, y, Anchor::Start, "tick", &series.name);
+        x += entry(series);
+    }
+    y
+}
+
+fn swatch(svg: &mut Svg, series: &Series, [x, y]: [f64; 2]) {
+    let middle = [x + SWATCH_PX / 2.0 - 3.0, y];
+    let line = |svg: &mut Svg, style: &str| {
+        svg.line([x, y], [x + SWATCH_PX - 6.0, y], &format!("{} {style}", series.class));
+    };
+    match &series.mark {
+        Mark::Line => line(svg, "line"),
+        Mark::Dashed => line(svg, "line dashed"),
+        Mark::LineAnd(shape) => {
+            line(svg, "line");
+            svg.path(&shape.path(middle), &format!("{} mark", series.class));
+        }
+        Mark::Points(shape) => svg.path(&shape.path(middle), &format!("{} mark", series.class)),
+        Mark::Bars(_) | Mark::From(_) => {
+            let class = format!("{} mark", series.class);
+            svg.rect([x + 3.0, y - 5.0], [11.0, 10.0], &class, "");
+        }
+    }
+}
+
+impl Frame<'_> {
+    fn x(&self, value: f64) -> f64 {
+        self.left + self.chart.x.place(value) * (self.right - self.left)
+    }
+
+    fn y(&self, value: f64) -> f64 {
+        self.bottom - self.chart.y.place(value) * (self.bottom - self.top)
+    }
+
+    fn draw_axes(&self, svg: &mut Svg, height: f64) {
+        let Self { left, right, top, bottom, chart } = *self;
+        for [from, to] in &chart.bands {
+            let x = self.x(*from);
+            svg.rect([x, top], [self.x(*to) - x, bottom - top], "band", "");
+        }
+        for (value, label) in &chart.y.ticks.at {
+            let y = self.y(*value);
+            let zero = if *value == 0.0 { "axis" } else { "grid" };
+            svg.line([left, y], [right, y], zero);
+            svg.text(left - 7.0, y + TEXT_PX * 0.35, Anchor::End, "tick", label);
+        }
+        svg.line([left, bottom], [right, bottom], "axis");
+        let mut free = f64::NEG_INFINITY;
+        for (value, label) in &chart.x.ticks.at {
+            let x = self.x(*value);
+            svg.line([x, bottom], [x, bottom + 4.0], "axis");
+            // Where labels are dense, some are left out; their ticks stay.
+            let half = text_width(label) / 2.0;
+            if x - half >= free {
+                svg.text(x, bottom + LINE_PX, Anchor::Middle, "tick", label);
+                free = x + half + 4.0;
+            }
+        }
+        svg.text((left + right) / 2.0, height - 4.0, Anchor::Middle, "label", &chart.x.label);
+    }
+
+    fn draw_series(&self, svg: &mut Svg, series: &Series) {
+        let class = |style: &str| format!("{} {style}", series.class);
+        let present = |[_, y]: &&[f64; 2]| y.is_finite();
+        match &series.mark {
+            Mark::Line => self.draw_line(svg, series, &class("line")),
+            Mark::Dashed => self.draw_line(svg, series, &class("line dashed")),
+            Mark::LineAnd(shape) => {
+                self.draw_line(svg, series, &class("line"));
+                self.draw_points(svg, series, *shape, &class("mark"));
+            }
+            Mark::Points(shape) => self.draw_points(svg, series, *shape, &class("mark")),
+            Mark::Bars(width) => {
+                for [x, y] in series.points.iter().filter(present) {
+                    let (from, to) = (self.x(x - width / 2.0), self.x(x + width / 2.0));
+                    let (a, b) = (self.y(*y), self.y(0.0));
+                    svg.rect([from, a.min(b)], [to - from, (a - b).abs()], &class("mark"), "");
+                }
+            }
+            Mark::From(others) => {
+                let pairs = series.points.iter().zip(others);
+                for ([x, y], other) in pairs.filter(|(p, other)| present(p) && other.is_finite()) {
+                    let x = self.x(*x);
+                    svg.line([x, self.y(*other)], [x, self.y(*y)], &class("thin"));
+                }
+            }
+        }
+    }
+
+    /// Missing values and values off the scale break the line.
+    fn draw_line(&self, svg: &mut Svg, series: &Series, class: &str) {
+        let mut d = String::new();
+        let mut pen = 'M';
+        for [x, y] in &series.points {
+            if self.is_drawn(*y) {
+                d += &format!("{pen}{} {}", Px(self.x(*x)), Px(self.y(*y)));
+                pen = 'L';
+            } else {
+                pen = 'M';
+            }
+        }
+        if !d.is_empty() {
+            svg.path(&d, class);
+        }
+    }
+
+    fn draw_points(&self, svg: &mut Svg, series: &Series, shape: Shape, class: &str) {
+        for [x, y] in &series.points {
+            let place = [self.x(*x), self.y(*y)];
+            if self.is_drawn(*y) {
+                svg.path(&shape.path(place), class);
+            } else if *y > self.chart.y.ticks.high {
+                // Off the scale: an arrow at its edge, with the value beside it.
+                let x = place[0];
+                svg.path(&Shape::Triangle.path([x, self.top + 5.0]), class);
+                let label = significant(*y, 2);
+                svg.text(x + 8.0, self.top + 11.0, Anchor::Start, "tick", &label);
+            }
+        }
+    }
+
+    fn is_drawn(&self, y: f64) -> bool {
+        (self.chart.y.ticks.low..=self.chart.y.ticks.high).contains(&y)
+    }
+
+    /// Names at the last point of their lines, moved apart where they would overlap.
+    fn draw_end_labels(&self, svg: &mut Svg) {
+        const GAP: f64 = TEXT_PX + 3.0;
+        let named = self.chart.series.iter().filter(|series| !series.name.is_empty());
+        let mut labels: Vec<(f64, &Series)> = named
+            .filter_map(|series| {
+                let [_, y] = series.points.iter().rev().find(|[_, y]| y.is_finite())?;
+                Some((self.y(y.min(self.chart.y.ticks.high)), series))
+            })
+            .collect();
+        labels.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut free = f64::NEG_INFINITY;
+        for (y, _) in &mut labels {
+            *y = y.max(free);
+            free = *y + GAP;
+        }
+        let mut limit = self.bottom;
+        for (y, _) in labels.iter_mut().rev() {
+            *y = y.min(limit);
+            limit = *y - GAP;
+        }
+        for (y, series) in labels {
+            let class = format!("{} name", series.class);
+            svg.text(self.right + 8.0, y + TEXT_PX * 0.35, Anchor::Start, &class, &series.name);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::ticks;
+
+    fn chart(mark: Mark, values: &[f64]) -> Chart {
+        let points = values.iter().enumerate().map(|(i, y)| [i as f64, *y]).collect();
+        Chart {
+            title: "a chart".into(),
+            x: Axis::linear("x", ticks::linear([0.0, 4.0], 4)),
+            y: Axis::linear("y", ticks::linear([-1.0, 1.0], 4)),
+            series: vec![Series::new("", "c1", mark, points)],
+            bands: vec![],
+            end_labels: false,
+        }
+    }
+
+    #[test]
+    fn a_missing_value_is_a_gap_and_never_zero() {
+        let values = [0.5, f64::NAN, 0.5, 1.0, f64::INFINITY];
+        let line = chart(Mark::Line, &values).draw([400.0, 200.0]);
+        let path = line.split("<path d=\"").nth(1).unwrap().split('"').next().unwrap();
+        assert_eq!(path.matches('M').count(), 2, "{path}");
+        assert_eq!(path.matches('L').count(), 1, "{path}");
+        let bars = chart(Mark::Bars(0.8), &values).draw([400.0, 200.0]);
+        assert_eq!(bars.matches("<rect").count(), 3);
+        let from = chart(Mark::From(vec![0.0, 0.0, f64::NAN, 0.0, 0.0]), &values);
+        assert_eq!(from.draw([400.0, 200.0]).matches("c1 thin").count(), 2);
+        let points = chart(Mark::Points(Shape::Square), &values[..4]).draw([400.0, 200.0]);
+        assert_eq!(points.matches("c1 mark").count(), 3);
+    }
+
+    #[test]
+    fn a_value_off_the_scale_is_marked_with_its_number() {
+        let svg = chart(Mark::LineAnd(Shape::Circle), &[0.5, 37.0]).draw([400.0, 200.0]);
+        assert!(svg.contains(">37</text>"), "{svg}");
+    }
+
+    #[test]
+    fn labels_at_line_ends_do_not_overlap() {
+        let mut chart = chart(Mark::Line, &[]);
+        chart.end_labels = true;
+        chart.series = ["a", "b", "c", "d"]
+            .map(|name| Series::new(name, "c1", Mark::Line, vec![[4.0, -1.0]]))
+            .to_vec();
+        let svg = chart.draw([400.0, 200.0]);
+        let mut heights: Vec<f64> = svg
+            .lines()
+            .filter(|line| line.contains("c1 name"))
+            .map(|line| line.split("y=\"").nth(1).unwrap().split('"').next().unwrap())
+            .map(|y| y.parse().unwrap())
+            .collect();
+        heights.sort_by(f64::total_cmp);
+        assert_eq!(heights.len(), 4);
+        assert!(heights.windows(2).all(|pair| pair[1] - pair[0] >= TEXT_PX), "{heights:?}");
+        assert!(heights[3] < 200.0 - 2.0 * LINE_PX);
+    }
+}

@@ -1,0 +1,109 @@
+//! Numbers and names as people read them.
+
+/// What stands for a value that is not defined.
+pub const UNDEFINED: &str = "–";
+
+/// `value` with so many decimals and a true minus sign.
+pub fn fixed(value: f64, decimals: usize) -> String {
+    if !value.is_finite() {
+        return UNDEFINED.into();
+    }
+    let text = format!("{:.decimals$}", value.abs());
+    let zero = text.chars().all(|c| matches!(c, '0' | '.'));
+    if value < 0.0 && !zero { format!("\u{2212}{text}") } else { text }
+}
+
+/// `value` with so many significant digits.
+pub fn significant(value: f64, digits: usize) -> String {
+    let magnitude = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
+    if !magnitude.is_finite() {
+        return UNDEFINED.into();
+    }
+    let decimals = (digits as f64 - 1.0 - magnitude).clamp(0.0, 9.0);
+    fixed(value, decimals as usize)
+}
+
+/// `count` in groups of three digits.
+pub fn grouped(count: usize) -> String {
+    let digits = count.to_string();
+    let mut text = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            text.push('\u{202f}');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// A fraction in per cent, without needless digits.
+pub fn percent(fraction: f64) -> String {
+    if !fraction.is_finite() {
+        return UNDEFINED.into();
+    }
+    // Rounded, as 0.07 · 100 is not 7.
+    format!("{}\u{a0}%", (fraction * 1e8).round() / 1e6)
+}
+
+/// How the group of outputs `dz_mm` is written: its symbol Δz.
+pub fn symbol(group: &str) -> String {
+    match axis(group) {
+        Some(axis) if group.starts_with('d') => format!("Δ{axis}"),
+        Some(axis) => format!("F{axis}"),
+        None => group.into(),
+    }
+}
+
+/// The quantity that the group of outputs `dz_mm` measures.
+pub fn quantity(group: &str) -> &'static str {
+    match axis(group) {
+        Some(_) if group.starts_with('d') => "deformation",
+        Some(_) => "force",
+        None => "output",
+    }
+}
+
+/// `symbol (unit)`, for axes and headers.
+pub fn with_unit(symbol: &str, unit: &str) -> String {
+    if unit.is_empty() { symbol.into() } else { format!("{symbol} ({unit})") }
+}
+
+/// x, y or z of the project's own groups (`dz_mm`, `fz_n`).
+pub fn axis(group: &str) -> Option<char> {
+    let component = group.strip_suffix("_mm").and_then(|g| g.strip_prefix('d'));
+    let component = component.or(group.strip_suffix("_n").and_then(|g| g.strip_prefix('f')));
+    match component {
+        Some("x") => Some('x'),
+        Some("y") => Some('y'),
+        Some("z") => Some('z'),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_well() {
+        assert_eq!(fixed(-1.25, 1), "\u{2212}1.2");
+        assert_eq!(fixed(-0.001, 2), "0.00");
+        assert_eq!(fixed(f64::NAN, 2), "–");
+        assert_eq!(significant(0.048_12, 3), "0.0481");
+        assert_eq!(significant(12.34, 3), "12.3");
+        assert_eq!(significant(1234.6, 3), "1235");
+        assert_eq!(significant(0.0, 3), "0.00");
+        assert_eq!(significant(f64::INFINITY, 3), "–");
+        assert_eq!(grouped(999), "999");
+        assert_eq!(grouped(1_234_567), "1\u{202f}234\u{202f}567");
+        assert_eq!(percent(0.07), "7\u{a0}%");
+        assert_eq!(percent(0.005), "0.5\u{a0}%");
+    }
+
+    #[test]
+    fn groups_are_written_by_their_symbols() {
+        assert_eq!((symbol("dz_mm").as_str(), quantity("dz_mm")), ("Δz", "deformation"));
+        assert_eq!((symbol("fx_n").as_str(), quantity("fx_n")), ("Fx", "force"));
+        assert_eq!((symbol("depth_mm").as_str(), quantity("depth_mm")), ("depth_mm", "output"));
+    }
+}

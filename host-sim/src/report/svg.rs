@@ -1,0 +1,182 @@
+//! SVG elements. Colours are left to CSS classes, so that a drawing follows the page's theme.
+
+use std::fmt::{self, Display, Write as _};
+
+/// Text made safe for HTML and SVG.
+pub fn escape(text: &str) -> String {
+    let mut safe = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => safe.push_str("&amp;"),
+            '<' => safe.push_str("&lt;"),
+            '>' => safe.push_str("&gt;"),
+            '"' => safe.push_str("&quot;"),
+            '\'' => safe.push_str("&#39;"),
+            _ => safe.push(c),
+        }
+    }
+    safe
+}
+
+/// A coordinate: one decimal is finer than any screen.
+#[derive(Debug, Clone, Copy)]
+pub struct Px(pub f64);
+
+impl Display for Px {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let tenths = (self.0 * 10.0).round();
+        // Plus zero, so that −0 is written 0.
+        write!(f, "{}", tenths / 10.0 + 0.0)
+    }
+}
+
+/// Where text stands relative to its point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Anchor {
+    /// To the right of it.
+    Start,
+    /// Around it.
+    Middle,
+    /// To the left of it.
+    End,
+}
+
+/// Height of text, as the page's style has it.
+pub const TEXT_PX: f64 = 13.0;
+
+/// A generous estimate of the width of text: fonts differ, and nothing may overlap.
+pub fn text_width(text: &str) -> f64 {
+    text.chars().count() as f64 * TEXT_PX * 0.56
+}
+
+/// A drawing in the making.
+#[derive(Debug, Clone)]
+pub struct Svg {
+    width: f64,
+    height: f64,
+    title: String,
+    body: String,
+}
+
+impl Svg {
+    /// An empty drawing; `title` is what it is read out as.
+    pub fn new(width: f64, height: f64, title: &str) -> Self {
+        Self { width, height, title: title.into(), body: String::new() }
+    }
+
+    /// Adds text whose baseline is at y.
+    pub fn text(&mut self, x: f64, y: f64, anchor: Anchor, class: &str, text: &str) {
+        let anchor = match anchor {
+            Anchor::Start => "start",
+            Anchor::Middle => "middle",
+            Anchor::End => "end",
+        };
+        let (x, y, text) = (Px(x), Px(y), escape(text));
+        self.add(format_args!(
+            r#"<text x="{x}" y="{y}" text-anchor="{anchor}" class="{class}">{text}</text>"#
+        ));
+    }
+
+    /// Adds a line.
+    pub fn line(&mut self, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2], class: &str) {
+        let (x1, y1, x2, y2) = (Px(x1), Px(y1), Px(x2), Px(y2));
+        self.add(format_args!(
+            r#"<line x1="{x1}" y1="{y1}" x2="{x2}" y2="{y2}" class="{class}"/>"#
+        ));
+    }
+
+    /// Adds a rectangle; `attributes` may add to it.
+    pub fn rect(
+        &mut self,
+        [x, y]: [f64; 2],
+        [width, height]: [f64; 2],
+        class: &str,
+        attributes: &str,
+    ) {
+        let (x, y, width, height) = (Px(x), Px(y), Px(width), Px(height));
+        self.add(format_args!(
+            r#"<rect x="{x}" y="{y}" width="{width}" height="{height}" class="{class}"{attributes}/>"#
+        ));
+    }
+
+    /// Adds a path.
+    pub fn path(&mut self, d: &str, class: &str) {
+        self.add(format_args!(r#"<path d="{d}" class="{class}"/>"#));
+    }
+
+    /// Opens a group; `attributes` begin with a space.
+    pub fn open(&mut self, attributes: &str) {
+        self.add(format_args!("<g{attributes}>"));
+    }
+
+    /// Closes the group.
+    pub fn close(&mut self) {
+        self.add("</g>");
+    }
+
+    /// Adds an element as it is.
+    pub fn add(&mut self, element: impl Display) {
+        // Writing to a string cannot fail.
+        let _ = writeln!(self.body, "{element}");
+    }
+
+    /// The whole element.
+    pub fn finish(self) -> String {
+        format!(
+            "<svg role=\"img\" viewBox=\"0 0 {} {}\"><title>{}</title>\n{}</svg>\n",
+            Px(self.width),
+            Px(self.height),
+            escape(&self.title),
+            self.body
+        )
+    }
+}
+
+/// Shapes that tell series apart without colour.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shape {
+    /// A disc.
+    Circle,
+    /// A square.
+    Square,
+    /// A triangle that points up.
+    Triangle,
+    /// A square on its corner.
+    Diamond,
+    /// A short level bar.
+    Dash,
+}
+
+impl Shape {
+    /// Path of the shape around a point.
+    pub fn path(self, [x, y]: [f64; 2]) -> String {
+        let at = |dx: f64, dy: f64| format!("{} {}", Px(x + dx), Px(y + dy));
+        match self {
+            Self::Circle => {
+                format!("M{}a3.6 3.6 0 1 0 7.2 0a3.6 3.6 0 1 0 -7.2 0Z", at(-3.6, 0.0))
+            }
+            Self::Square => format!("M{}h6.4v6.4h-6.4Z", at(-3.2, -3.2)),
+            Self::Triangle => format!("M{}l4.4 7.8h-8.8Z", at(0.0, -5.0)),
+            Self::Diamond => format!("M{}l4.6 4.6l-4.6 4.6l-4.6 -4.6Z", at(0.0, -4.6)),
+            Self::Dash => format!("M{}h9v2.4h-9Z", at(-4.5, -1.2)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_is_escaped_and_coordinates_are_short() {
+        let mut svg = Svg::new(100.0, 50.0, "a < b & \"c\"");
+        svg.text(1.234, -0.01, Anchor::End, "tick", "<script>");
+        assert_eq!(
+            svg.finish(),
+            "<svg role=\"img\" viewBox=\"0 0 100 50\">\
+             <title>a &lt; b &amp; &quot;c&quot;</title>\n\
+             <text x=\"1.2\" y=\"0\" text-anchor=\"end\" class=\"tick\">&lt;script&gt;</text>\n\
+             </svg>\n"
+        );
+    }
+}

@@ -1,0 +1,104 @@
+//! Ticks in steps of 1, 2 and 5.
+
+use super::format::fixed;
+
+/// A range with ticks on it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ticks {
+    /// Least value of the range.
+    pub low: f64,
+    /// Greatest value of the range.
+    pub high: f64,
+    /// Ticks with their labels.
+    pub at: Vec<(f64, String)>,
+}
+
+/// About `wanted` intervals that cover all finite `values`; the range ends on ticks.
+pub fn linear(values: impl IntoIterator<Item = f64>, wanted: usize) -> Ticks {
+    let (low, high) = extent(values).unwrap_or((0.0, 1.0));
+    let (low, high) = if high > low {
+        (low, high)
+    } else {
+        let room = if low == 0.0 { 1.0 } else { low.abs() / 10.0 };
+        (low - room, high + room)
+    };
+    let rough = (high - low) / wanted as f64;
+    let exponent = rough.log10().floor();
+    let mantissa = rough / 10_f64.powf(exponent);
+    // Changes over at the geometric means of 1, 2, 5 and 10.
+    let (mantissa, exponent) = match mantissa {
+        m if m < 1.41 => (1.0, exponent),
+        m if m < 3.16 => (2.0, exponent),
+        m if m < 7.07 => (5.0, exponent),
+        _ => (1.0, exponent + 1.0),
+    };
+    let step = mantissa * 10_f64.powf(exponent);
+    // The slack keeps an end that is a tick, but for rounding, from adding an interval.
+    let first = (low / step + 1e-9).floor() as i64;
+    let last = (high / step - 1e-9).ceil() as i64;
+    let decimals = (-exponent).max(0.0) as usize;
+    let at: Vec<_> = (first..=last)
+        .map(|i| i as f64 * step)
+        .map(|value| (value, fixed(value, decimals)))
+        .collect();
+    Ticks { low: first as f64 * step, high: last as f64 * step, at }
+}
+
+/// 1-2-5 ticks inside a logarithmic range that leaves some room around all positive `values`.
+/// Labels are in per cent: the only logarithmic quantity is the noise level.
+pub fn logarithmic_percent(values: impl IntoIterator<Item = f64>) -> Ticks {
+    let positive = values.into_iter().filter(|value| *value > 0.0);
+    let (low, high) = extent(positive).unwrap_or((0.01, 0.1));
+    let room = (high / low).powf(0.08).max(1.2);
+    let (low, high) = (low / room, high * room);
+    let decades = low.log10().floor() as i32..=high.log10().ceil() as i32;
+    let at = decades
+        .flat_map(|decade| [1.0, 2.0, 5.0].map(|mantissa| mantissa * 10_f64.powi(decade)))
+        .filter(|value| (low..=high).contains(value))
+        .map(|value| (value, super::format::percent(value)));
+    Ticks { low, high, at: at.collect() }
+}
+
+/// Least and greatest of all finite values.
+pub fn extent(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
+    values.into_iter().filter(|value| value.is_finite()).fold(None, |extent, value| {
+        let (low, high) = extent.unwrap_or((value, value));
+        Some((value.min(low), value.max(high)))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn labels(ticks: &Ticks) -> Vec<&str> {
+        ticks.at.iter().map(|(_, label)| label.as_str()).collect()
+    }
+
+    #[test]
+    fn linear_ticks_are_round_and_cover_the_values() {
+        assert_eq!(labels(&linear([0.0, 1.0], 5)), ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]);
+        assert_eq!(labels(&linear([48.2, 66.0], 4)), ["45", "50", "55", "60", "65", "70"]);
+        let ticks = linear([-0.013, f64::NAN, 0.26], 5);
+        assert_eq!((ticks.low, ticks.high), (-0.05, 0.3));
+        assert_eq!(labels(&ticks)[..2], ["\u{2212}0.05", "0.00"]);
+        assert_eq!(labels(&linear([0.0, 30_000.0], 3)), ["0", "10000", "20000", "30000"]);
+    }
+
+    #[test]
+    fn no_range_still_has_ticks() {
+        for values in [vec![], vec![f64::NAN], vec![0.0], vec![3.0, 3.0], vec![-2e-9]] {
+            let ticks = linear(values.clone(), 4);
+            assert!(ticks.high > ticks.low && ticks.at.len() >= 2, "{values:?}: {ticks:?}");
+        }
+    }
+
+    #[test]
+    fn logarithmic_ticks_lie_inside() {
+        let ticks = logarithmic_percent([0.0, 0.005, 0.1]);
+        assert_eq!(labels(&ticks), ["0.5\u{a0}%", "1\u{a0}%", "2\u{a0}%", "5\u{a0}%", "10\u{a0}%"]);
+        assert!(ticks.low < 0.005 && ticks.high > 0.1);
+        assert!(!logarithmic_percent([0.01]).at.is_empty());
+        assert!(logarithmic_percent([]).low > 0.0);
+    }
+}
