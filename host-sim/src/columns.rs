@@ -39,6 +39,20 @@ pub fn group_of(name: &str) -> &str {
     }
 }
 
+/// The groups of `names` in the order in which they first appear, each with its columns' places.
+#[must_use]
+pub fn groups(names: &[String]) -> Vec<(&str, Vec<usize>)> {
+    let mut groups: Vec<(&str, Vec<usize>)> = Vec::new();
+    for (column, name) in names.iter().enumerate() {
+        let group = group_of(name);
+        match groups.iter_mut().find(|(known, _)| *known == group) {
+            Some((_, members)) => members.push(column),
+            None => groups.push((group, vec![column])),
+        }
+    }
+    groups
+}
+
 /// Whether `group` is compression in mm, for which the positional error is defined.
 #[must_use]
 pub fn is_compression(group: &str) -> bool {

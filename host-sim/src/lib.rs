@@ -7,6 +7,7 @@
 //! ```
 //! use host_sim::infer::Kernel;
 //! use host_sim::model::{LoadedModel, Origin, encode};
+//! use host_sim::progress::Progress;
 //! use host_sim::random::Stream;
 //! use host_sim::scene::Scene;
 //! use host_sim::synth::synthesise;
@@ -15,7 +16,7 @@
 //! let mut scene = Scene::load("press")?;
 //! scene.read_rows = vec![3]; // one row-wire: 18 readings, 18 outputs
 //! let frames = synthesise(&scene, Stream::Training, 2000);
-//! let networks = train(&frames, &Options::new(32, 0.8, true, scene.seed))?;
+//! let networks = train(&frames, &Options::new(32, 0.8, true, scene.seed), &Progress::silent())?;
 //! let blob = encode(&networks, &frames, &Origin::of_scene(&scene))?;
 //!
 //! let model = LoadedModel::from_bytes("press.bin".as_ref(), &blob)?;
@@ -38,6 +39,7 @@ pub mod model;
 pub mod output;
 pub mod progress;
 pub mod random;
+pub mod report;
 pub mod run;
 pub mod scene;
 pub mod sensor;

@@ -1,5 +1,7 @@
 //! Progress on stderr, on a terminal only.
 
+use std::time::Duration;
+
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// Shows which stage runs and how far it is. Silent where stderr is no terminal.
@@ -15,6 +17,7 @@ impl Progress {
         if let Ok(style) = style {
             bar.set_style(style);
         }
+        bar.enable_steady_tick(Duration::from_millis(100));
         Self(bar)
     }
 

@@ -48,6 +48,8 @@ pub struct SceneSummary {
     pub noise_level: f64,
     /// Extent of the sensor in mm.
     pub size_mm: [f64; 3],
+    /// Row-wires of the sensor, read or not.
+    pub row_wires: usize,
 }
 
 /// What was trained.
@@ -137,10 +139,8 @@ pub fn run(scene: &Scene, progress: &Progress) -> Result<(RunResult, Vec<u8>)> {
     let test = synth::synthesise(scene, Stream::Test, t.test_frames);
     progress.step();
 
-    progress.stage("train", 1);
     let options = Options::new(t.centres, t.spread, t.affine_tail, scene.seed);
-    let networks = train::train(&training, &options)?;
-    progress.step();
+    let networks = train::train(&training, &options, progress)?;
 
     let origin = Origin::of_scene(scene);
     let blob = model::encode(&networks, &training, &origin)?;
@@ -170,6 +170,7 @@ pub fn run(scene: &Scene, progress: &Progress) -> Result<(RunResult, Vec<u8>)> {
             noise_kind: format!("{:?}", scene.noise.kind).to_lowercase(),
             noise_level: scene.noise.level,
             size_mm: scene.sensor.size_mm,
+            row_wires: scene.sensor.row_wires,
         },
         model: ModelSummary {
             training_frames: t.frames,

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use crate::dataset::{Block, Dataset};
 use crate::error::{Error, Result};
+use crate::progress::Progress;
 use crate::random::{Purpose, Random, Stream};
 
 pub mod kmeans;
@@ -173,15 +174,22 @@ impl<'b> Samples<'b> {
 ///
 /// # Errors
 /// [`Error::Usage`] for options that do not fit the data.
-pub fn train(dataset: &Dataset, options: &Options) -> Result<Vec<FittedNetwork>> {
+pub fn train(
+    dataset: &Dataset,
+    options: &Options,
+    progress: &Progress,
+) -> Result<Vec<FittedNetwork>> {
     options.check(dataset.frames())?;
+    progress.stage("train", dataset.rows);
     Ok((0..dataset.rows)
         .into_par_iter()
         .map(|row| {
             let block = dataset.block(row);
             let samples = Samples::new(&block);
             let centres = samples.centres(options, row);
-            samples.fit(&centres, options)
+            let fitted = samples.fit(&centres, options);
+            progress.step();
+            fitted
         })
         .collect())
 }

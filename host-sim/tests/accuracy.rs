@@ -3,6 +3,7 @@
 use host_sim::dataset::{Block, Dataset};
 use host_sim::evaluate::metrics::{self, Errors, Measure};
 use host_sim::infer::{Kernel, infer};
+use host_sim::progress::Progress;
 use host_sim::random::Stream;
 use host_sim::scene::Scene;
 use host_sim::synth;
@@ -29,7 +30,7 @@ fn network_and_linear(scene: &str, noise_level: f64) -> (Vec<Errors>, Vec<Errors
     let t = &scene.training;
     assert!(t.centres <= 128 && t.affine_tail);
     let options = Options::new(t.centres, t.spread, t.affine_tail, scene.seed);
-    let network = &train::train(&training, &options).unwrap()[0];
+    let network = &train::train(&training, &options, &Progress::silent()).unwrap()[0];
     let (training, test) = (training.block(0), test.block(0));
     let estimate = infer(&network.network(), Kernel::default(), &test.inputs);
     let linear = LinearDecoder::fit(&training).predict(&test);

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use host_sim::progress::Progress;
 use host_sim::run::{self, RunResult};
-use host_sim::{Error, Result, output};
+use host_sim::{Error, Result, output, report};
 
 use super::scene_argument::SceneArgument;
 use super::{Common, print};
@@ -58,6 +58,8 @@ fn write_files(folder: &Path, result: &RunResult, blob: &[u8]) -> Result<Vec<&'s
         table.write_csv(&folder.join("table1.csv"))?;
         files.push("table1.csv");
     }
+    output::write_bytes(&folder.join("report.html"), report::html(result).as_bytes())?;
+    files.push("report.html");
     Ok(files)
 }
 

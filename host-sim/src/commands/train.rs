@@ -4,15 +4,15 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use host_sim::columns::some_names;
 use host_sim::data_file::DataFile;
 use host_sim::dataset::Dataset;
 use host_sim::model::{self, LoadedModel, Origin};
+use host_sim::progress::Progress;
 use host_sim::random::Stream;
 use host_sim::scene::{EMBEDDED, Scene};
 use host_sim::train::select::{self, Selection};
 use host_sim::train::{self, Options};
-use host_sim::{Error, Result, output, synth};
+use host_sim::{Error, Result, columns, output, synth};
 use serde::Serialize;
 
 use super::{Common, print};
@@ -101,7 +101,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         None
     };
 
-    let networks = train::train(&source.dataset, &options)?;
+    let networks = train::train(&source.dataset, &options, &Progress::on_terminal())?;
     let blob = model::encode(&networks, &source.dataset, &source.origin)?;
     let loaded = LoadedModel::from_bytes(&arguments.output, &blob)?;
     output::write_bytes(&arguments.output, &blob)?;
@@ -237,9 +237,15 @@ fn choose(arguments: &Arguments, source: &Source, options: &mut Options) -> Resu
 fn page_of(summary: &Summary, asked: usize) -> print::Page {
     let mut page = print::Page::default();
     if let Some(selection) = &summary.selection {
-        page.line(format_args!("cross-validated RMSE of {}:", some_names(&summary.outputs)));
+        let groups = columns::groups(&summary.outputs);
+        let names: Vec<&str> = groups.iter().map(|(group, _)| *group).collect();
+        page.line(format_args!("cross-validated RMSE of {}:", names.join(", ")));
         for (i, scored) in selection.scored.iter().enumerate() {
-            let rmse: Vec<String> = scored.rmse.iter().take(8).map(|v| format!("{v:.4}")).collect();
+            let pooled = |members: &[usize]| {
+                let squares: f64 = members.iter().map(|column| scored.rmse[*column].powi(2)).sum();
+                format!("{:.4}", (squares / members.len() as f64).sqrt())
+            };
+            let rmse: Vec<String> = groups.iter().map(|(_, members)| pooled(members)).collect();
             let mark = if i == selection.best { "  <- chosen" } else { "" };
             page.line(format_args!(
                 "  K = {:<4} spread = {:<5} score {:.4}: {}{mark}",

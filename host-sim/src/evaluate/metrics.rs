@@ -117,15 +117,7 @@ impl Definition {
 /// If `estimate` is not as long as `truth`, or `measure` does not have one full scale a column.
 #[must_use]
 pub fn by_group(truth: &Table, estimate: &[f64], measure: &Measure) -> Vec<Errors> {
-    let mut groups: Vec<(&str, Vec<usize>)> = Vec::new();
-    for (column, name) in truth.names.iter().enumerate() {
-        let group = columns::group_of(name);
-        match groups.iter_mut().find(|(known, _)| *known == group) {
-            Some((_, members)) => members.push(column),
-            None => groups.push((group, vec![column])),
-        }
-    }
-    groups
+    columns::groups(&truth.names)
         .iter()
         .map(|(group, members)| of_columns(group, members, truth, estimate, measure))
         .collect()

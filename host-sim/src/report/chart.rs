@@ -1,5 +1,7 @@
 //! One chart: two axes, some series, a legend or labels at the end of the lines.
 
+use std::fmt::Write as _;
+
 use super::format::significant;
 use super::svg::{Anchor, Px, Shape, Svg, TEXT_PX, text_width};
 use super::ticks::Ticks;
@@ -95,28 +97,36 @@ struct Frame<'c> {
     right: f64,
     top: f64,
     bottom: f64,
+    /// Marks shrink where they would cover each other.
+    mark_size: f64,
 }
 
 const LINE_PX: f64 = TEXT_PX + 7.0;
 const SWATCH_PX: f64 = 24.0;
+/// Bars are no wider, however few they are.
+const BAR_PX: f64 = 30.0;
 
 impl Chart {
     /// The chart at this size.
     pub fn draw(&self, [width, height]: [f64; 2]) -> String {
         let mut svg = Svg::new(width, height, &self.title);
-        let tick_width = |ticks: &Ticks| {
-            ticks.at.iter().map(|(_, label)| text_width(label)).fold(0.0, f64::max)
-        };
+        let tick_width =
+            |ticks: &Ticks| ticks.at.iter().map(|(_, label)| text_width(label)).fold(0.0, f64::max);
         let named = self.series.iter().filter(|series| !series.name.is_empty());
         let end_width = named.map(|s| text_width(&s.name)).fold(0.0, f64::max) + 12.0;
-        let left = tick_width(&self.y.ticks) + 10.0;
+        // Charts that stand above each other are flush unless a label is long.
+        let left = tick_width(&self.y.ticks).max(5.0 * text_width("0")) + 10.0;
         let mut frame = Frame {
             chart: self,
             left,
             right: width - if self.end_labels { end_width } else { 10.0 },
             top: LINE_PX + 6.0,
             bottom: height - 2.0 * LINE_PX - 4.0,
+            mark_size: 1.0,
         };
+        let most = self.series.iter().map(|series| series.points.len()).max().unwrap_or(0);
+        let spacing = (frame.right - frame.left) / most.max(1) as f64;
+        frame.mark_size = (spacing / 9.0).clamp(0.6, 1.0);
         svg.text(0.0, TEXT_PX, Anchor::Start, "label", &self.y.label);
         if !self.end_labels {
             frame.top = legend(&mut svg, &self.series, width, text_width(&self.y.label)) + 12.0;
@@ -144,7 +154,11 @@ impl Chart {
 }
 
 fn opacity(series: &Series) -> String {
-    if series.opacity < 1.0 { format!(r#" opacity="{:.2}""#, series.opacity) } else { String::new() }
+    if series.opacity < 1.0 {
+        format!(r#" opacity="{:.2}""#, series.opacity)
+    } else {
+        String::new()
+    }
 }
 
 /// Draws names and marks: beside the label of the y axis where there is room, else below it.
@@ -182,9 +196,11 @@ fn swatch(svg: &mut Svg, series: &Series, [x, y]: [f64; 2]) {
         Mark::Dashed => line(svg, "line dashed"),
         Mark::LineAnd(shape) => {
             line(svg, "line");
-            svg.path(&shape.path(middle), &format!("{} mark", series.class));
+            svg.path(&shape.path(middle, 1.0), &format!("{} mark", series.class));
         }
-        Mark::Points(shape) => svg.path(&shape.path(middle), &format!("{} mark", series.class)),
+        Mark::Points(shape) => {
+            svg.path(&shape.path(middle, 1.0), &format!("{} mark", series.class));
+        }
         Mark::Bars(_) | Mark::From(_) => {
             let class = format!("{} mark", series.class);
             svg.rect([x + 3.0, y - 5.0], [11.0, 10.0], &class, "");
@@ -202,7 +218,7 @@ impl Frame<'_> {
     }
 
     fn draw_axes(&self, svg: &mut Svg, height: f64) {
-        let Self { left, right, top, bottom, chart } = *self;
+        let Self { left, right, top, bottom, chart, .. } = *self;
         for [from, to] in &chart.bands {
             let x = self.x(*from);
             svg.rect([x, top], [self.x(*to) - x, bottom - top], "band", "");
@@ -214,18 +230,24 @@ impl Frame<'_> {
             svg.text(left - 7.0, y + TEXT_PX * 0.35, Anchor::End, "tick", label);
         }
         svg.line([left, bottom], [right, bottom], "axis");
-        let mut free = f64::NEG_INFINITY;
-        for (value, label) in &chart.x.ticks.at {
+        // Where labels are dense, only every so many are written; their ticks stay.
+        let ticks = &chart.x.ticks.at;
+        let fits = |every: &usize| {
+            let written: Vec<_> = ticks.iter().step_by(*every).collect();
+            written.windows(2).all(|pair| {
+                let room = f64::midpoint(text_width(&pair[0].1), text_width(&pair[1].1)) + 4.0;
+                self.x(pair[1].0) - self.x(pair[0].0) >= room
+            })
+        };
+        let every = (1..=ticks.len()).find(fits).unwrap_or(1);
+        for (i, (value, label)) in ticks.iter().enumerate() {
             let x = self.x(*value);
             svg.line([x, bottom], [x, bottom + 4.0], "axis");
-            // Where labels are dense, some are left out; their ticks stay.
-            let half = text_width(label) / 2.0;
-            if x - half >= free {
+            if i % every == 0 {
                 svg.text(x, bottom + LINE_PX, Anchor::Middle, "tick", label);
-                free = x + half + 4.0;
             }
         }
-        svg.text((left + right) / 2.0, height - 4.0, Anchor::Middle, "label", &chart.x.label);
+        svg.text(f64::midpoint(left, right), height - 4.0, Anchor::Middle, "label", &chart.x.label);
     }
 
     fn draw_series(&self, svg: &mut Svg, series: &Series) {
@@ -241,9 +263,10 @@ impl Frame<'_> {
             Mark::Points(shape) => self.draw_points(svg, series, *shape, &class("mark")),
             Mark::Bars(width) => {
                 for [x, y] in series.points.iter().filter(present) {
-                    let (from, to) = (self.x(x - width / 2.0), self.x(x + width / 2.0));
+                    let px = (self.x(width / 2.0) - self.x(-width / 2.0)).min(BAR_PX);
                     let (a, b) = (self.y(*y), self.y(0.0));
-                    svg.rect([from, a.min(b)], [to - from, (a - b).abs()], &class("mark"), "");
+                    let corner = [self.x(*x) - px / 2.0, a.min(b)];
+                    svg.rect(corner, [px, (a - b).abs()], &class("mark"), "");
                 }
             }
             Mark::From(others) => {
@@ -262,7 +285,8 @@ impl Frame<'_> {
         let mut pen = 'M';
         for [x, y] in &series.points {
             if self.is_drawn(*y) {
-                d += &format!("{pen}{} {}", Px(self.x(*x)), Px(self.y(*y)));
+                // Writing to a string cannot fail.
+                let _ = write!(d, "{pen}{} {}", Px(self.x(*x)), Px(self.y(*y)));
                 pen = 'L';
             } else {
                 pen = 'M';
@@ -277,11 +301,11 @@ impl Frame<'_> {
         for [x, y] in &series.points {
             let place = [self.x(*x), self.y(*y)];
             if self.is_drawn(*y) {
-                svg.path(&shape.path(place), class);
+                svg.path(&shape.path(place, self.mark_size), class);
             } else if *y > self.chart.y.ticks.high {
                 // Off the scale: an arrow at its edge, with the value beside it.
                 let x = place[0];
-                svg.path(&Shape::Triangle.path([x, self.top + 5.0]), class);
+                svg.path(&Shape::Triangle.path([x, self.top + 5.0], 1.0), class);
                 let label = significant(*y, 2);
                 svg.text(x + 8.0, self.top + 11.0, Anchor::Start, "tick", &label);
             }
@@ -375,6 +399,6 @@ mod tests {
         heights.sort_by(f64::total_cmp);
         assert_eq!(heights.len(), 4);
         assert!(heights.windows(2).all(|pair| pair[1] - pair[0] >= TEXT_PX), "{heights:?}");
-        assert!(heights[3] < 200.0 - 2.0 * LINE_PX);
+        assert!(heights[3] < 200.0 - 1.5 * LINE_PX, "{heights:?}");
     }
 }

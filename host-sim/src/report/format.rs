@@ -13,14 +13,16 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     if value < 0.0 && !zero { format!("\u{2212}{text}") } else { text }
 }
 
+/// Decimals that give `value` so many significant digits.
+pub fn decimals(value: f64, digits: usize) -> usize {
+    let magnitude = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
+    // A value that is not finite has none: casts saturate, and NaN becomes 0.
+    (digits as f64 - 1.0 - magnitude).clamp(0.0, 9.0) as usize
+}
+
 /// `value` with so many significant digits.
 pub fn significant(value: f64, digits: usize) -> String {
-    let magnitude = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
-    if !magnitude.is_finite() {
-        return UNDEFINED.into();
-    }
-    let decimals = (digits as f64 - 1.0 - magnitude).clamp(0.0, 9.0);
-    fixed(value, decimals as usize)
+    fixed(value, decimals(value, digits))
 }
 
 /// `count` in groups of three digits.

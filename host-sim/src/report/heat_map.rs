@@ -25,12 +25,12 @@ pub struct HeatMap {
 #[derive(Debug, Clone, PartialEq)]
 pub struct ColourScale(Ticks);
 
-const WIDTH: f64 = 340.0;
+const WIDTH: f64 = 310.0;
 
 impl ColourScale {
     /// A scale that covers zero and all of `values`.
     pub fn new(values: impl IntoIterator<Item = f64>) -> Self {
-        Self(ticks::linear(values.into_iter().chain([0.0]), 5))
+        Self(ticks::linear(values.into_iter().chain([0.0]), 4))
     }
 
     /// CSS class and opacity for `value`.
@@ -69,7 +69,7 @@ impl ColourScale {
             svg.line([x, top + height], [x, top + height + 4.0], "axis");
             svg.text(x, top + height + 17.0, Anchor::Middle, "tick", tick);
         }
-        svg.text((left + right) / 2.0, 56.0, Anchor::Middle, "label", label);
+        svg.text(f64::midpoint(left, right), 56.0, Anchor::Middle, "label", label);
         svg.finish()
     }
 }
@@ -80,9 +80,10 @@ impl HeatMap {
         let half = [self.cell_mm[0] / 2.0, self.cell_mm[1] / 2.0];
         // Electrodes may be listed outside the face.
         let extent = |axis: usize| {
-            let ends = self.cells.iter().flat_map(|(centre, _)| {
-                [centre[axis] - half[axis], centre[axis] + half[axis]]
-            });
+            let ends = self
+                .cells
+                .iter()
+                .flat_map(|(centre, _)| [centre[axis] - half[axis], centre[axis] + half[axis]]);
             ticks::extent(ends.chain([0.0, self.face_mm[axis]])).unwrap_or((0.0, 1.0))
         };
         let ((x_low, x_high), (y_low, y_high)) = (extent(0), extent(1));
@@ -110,7 +111,7 @@ impl HeatMap {
             let (class, opacity) = scale.colour(*value);
             svg.rect(corner, size, class, &format!(r#" fill-opacity="{opacity:.3}""#));
             if numbers_fit {
-                let class = if opacity > 0.55 { "cell full" } else { "cell" };
+                let class = if opacity > 0.68 { "cell full" } else { "cell" };
                 svg.text(middle[0], middle[1], Anchor::Middle, class, &fixed(*value, 2));
             }
         }
@@ -128,7 +129,7 @@ impl HeatMap {
             let y = y(*height_mm) + TEXT_PX * 0.35;
             svg.text(right + 8.0, y, Anchor::Start, "tick", &number.to_string());
         }
-        svg.text((left + right) / 2.0, bottom + 38.0, Anchor::Middle, "tick", "x (mm)");
+        svg.text(f64::midpoint(left, right), bottom + 38.0, Anchor::Middle, "tick", "x (mm)");
         svg.finish()
     }
 }

@@ -46,7 +46,7 @@ pub const TEXT_PX: f64 = 13.0;
 
 /// A generous estimate of the width of text: fonts differ, and nothing may overlap.
 pub fn text_width(text: &str) -> f64 {
-    text.chars().count() as f64 * TEXT_PX * 0.56
+    text.chars().count() as f64 * TEXT_PX * 0.62
 }
 
 /// A drawing in the making.
@@ -148,17 +148,27 @@ pub enum Shape {
 }
 
 impl Shape {
-    /// Path of the shape around a point.
-    pub fn path(self, [x, y]: [f64; 2]) -> String {
-        let at = |dx: f64, dy: f64| format!("{} {}", Px(x + dx), Px(y + dy));
+    /// Path of the shape around a point; `size` is 1 unless marks are crowded.
+    pub fn path(self, [x, y]: [f64; 2], size: f64) -> String {
+        let px = |value: f64| Px(value * size);
+        let start = |dx: f64, dy: f64| format!("M{} {}", Px(x + dx * size), Px(y + dy * size));
         match self {
             Self::Circle => {
-                format!("M{}a3.6 3.6 0 1 0 7.2 0a3.6 3.6 0 1 0 -7.2 0Z", at(-3.6, 0.0))
+                let (r, d) = (px(3.6), px(7.2));
+                format!("{}a{r} {r} 0 1 0 {d} 0a{r} {r} 0 1 0 -{d} 0Z", start(-3.6, 0.0))
             }
-            Self::Square => format!("M{}h6.4v6.4h-6.4Z", at(-3.2, -3.2)),
-            Self::Triangle => format!("M{}l4.4 7.8h-8.8Z", at(0.0, -5.0)),
-            Self::Diamond => format!("M{}l4.6 4.6l-4.6 4.6l-4.6 -4.6Z", at(0.0, -4.6)),
-            Self::Dash => format!("M{}h9v2.4h-9Z", at(-4.5, -1.2)),
+            Self::Square => {
+                let side = px(6.4);
+                format!("{}h{side}v{side}h-{side}Z", start(-3.2, -3.2))
+            }
+            Self::Triangle => {
+                format!("{}l{} {}h-{}Z", start(0.0, -5.0), px(4.4), px(7.8), px(8.8))
+            }
+            Self::Diamond => {
+                let r = px(4.6);
+                format!("{}l{r} {r}l-{r} {r}l-{r} -{r}Z", start(0.0, -4.6))
+            }
+            Self::Dash => format!("{}h{}v2.4h-{}Z", start(-4.5, -1.2 / size), px(9.0), px(9.0)),
         }
     }
 }

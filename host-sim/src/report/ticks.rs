@@ -33,15 +33,15 @@ pub fn linear(values: impl IntoIterator<Item = f64>, wanted: usize) -> Ticks {
         _ => (1.0, exponent + 1.0),
     };
     let step = mantissa * 10_f64.powf(exponent);
+    // A division of whole numbers, so that 0.3 is 0.3.
+    let scale = 10_f64.powf(-exponent);
+    let tick = |i: i64| i as f64 * mantissa / scale;
     // The slack keeps an end that is a tick, but for rounding, from adding an interval.
     let first = (low / step + 1e-9).floor() as i64;
     let last = (high / step - 1e-9).ceil() as i64;
     let decimals = (-exponent).max(0.0) as usize;
-    let at: Vec<_> = (first..=last)
-        .map(|i| i as f64 * step)
-        .map(|value| (value, fixed(value, decimals)))
-        .collect();
-    Ticks { low: first as f64 * step, high: last as f64 * step, at }
+    let at = (first..=last).map(|i| (tick(i), fixed(tick(i), decimals)));
+    Ticks { low: tick(first), high: tick(last), at: at.collect() }
 }
 
 /// 1-2-5 ticks inside a logarithmic range that leaves some room around all positive `values`.

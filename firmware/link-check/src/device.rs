@@ -1,0 +1,87 @@
+//! Calls everything that a device calls, on inputs of which the optimiser knows nothing.
+
+use core::panic::PanicInfo;
+use core::{ptr, slice};
+
+use firmware::PaperSensor;
+use firmware::store::blob_in_slot;
+use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
+use model_core::rls::{self, Rls};
+use model_core::{ColumnWire, Frame, RowWire};
+
+unsafe extern "C" {
+    /// Defined nowhere: whatever reaches it does not link.
+    fn taxel_reachable_panic() -> !;
+}
+
+#[panic_handler]
+fn panic(_: &PanicInfo<'_>) -> ! {
+    // SAFETY: never runs, since it never links.
+    unsafe { taxel_reachable_panic() }
+}
+
+/// `value`, after which the optimiser neither knows what it is nor may leave out computing it.
+#[inline(never)]
+fn opaque<T: Copy>(value: T) -> T {
+    // SAFETY: a reference is valid for reads.
+    unsafe { ptr::read_volatile(&raw const value) }
+}
+
+/// A flash slot of unknown address, length and content.
+fn slot() -> &'static [u8] {
+    let (address, length) = opaque((0x0806_0000_usize, 0x2_0000_usize));
+    // SAFETY: the numbers are those of the last sector of a board's flash.
+    unsafe { slice::from_raw_parts(ptr::with_exposed_provenance(address), length) }
+}
+
+fn exercise_decoding<E: ExpKernel>() {
+    let Ok(mut sensor) = PaperSensor::<E>::load(slot()) else { return };
+    opaque(sensor.replace(blob_in_slot(slot())).is_ok());
+
+    let mut frame = opaque(Frame::missing());
+    opaque(frame.set_ohm(RowWire(opaque(0)), ColumnWire(opaque(0)), opaque(60.0)));
+    opaque(frame.ohm(RowWire(opaque(0)), ColumnWire(opaque(0))));
+    let estimate = opaque(sensor.decode(&frame));
+
+    let metadata = sensor.metadata();
+    metadata.output_names.iter().for_each(|name| _ = opaque(name));
+    metadata.training_rmse.iter().for_each(|rmse| _ = opaque(rmse));
+    opaque(sensor.model_crc());
+
+    if cfg!(feature = "must-fail") {
+        opaque(estimate.outputs[opaque(0)]);
+    }
+}
+
+fn exercise_recalibration() {
+    let Ok(mut rls) = Rls::<f32, 17, 3>::try_new(opaque(1e3), opaque(0.999)) else { return };
+    rls.update(opaque([0.5; 17]), opaque([0.25; 3]));
+    opaque(rls.output_weights());
+}
+
+/// Recursive least squares again, of sizes known only when it runs.
+fn exercise_recalibration_on_slices() {
+    let mut numbers = [0.0_f32; 512];
+    let (root, rest) = numbers.split_at_mut(256);
+    let (projection, rest) = rest.split_at_mut(128);
+    let (regressor, target) = rest.split_at_mut(64);
+    let n = opaque(16);
+    opaque(rls::start(root, projection, n, opaque(1e3)).is_ok());
+    let (Some(h), Some(y)) = (regressor.get_mut(..n), target.get_mut(..opaque(3))) else { return };
+    rls::update(root, projection, h, y, opaque(0.999));
+    rls::solve(root, projection, n, target);
+    opaque(numbers);
+}
+
+/// Where a linker begins that is given no script: what this does not reach is left out.
+#[unsafe(no_mangle)]
+extern "C" fn _start() -> ! {
+    exercise_decoding::<Polynomial>();
+    exercise_decoding::<Libm>();
+    exercise_decoding::<Micromath>();
+    exercise_recalibration();
+    exercise_recalibration_on_slices();
+    loop {
+        core::hint::spin_loop();
+    }
+}

@@ -1,0 +1,179 @@
+//! Tables of errors.
+
+use std::fmt::Write as _;
+
+use super::format::{UNDEFINED, decimals, fixed, percent, symbol, with_unit};
+use super::svg::escape;
+use super::ticks;
+use crate::evaluate::metrics::{Definition, Errors};
+use crate::evaluate::table1::{PAPER_PRINTED_PERCENT, Table1};
+use crate::run::{DecoderErrors, RunResult};
+
+/// The errors of one group, if it is among `errors`.
+pub fn of_group<'e>(errors: &'e [Errors], group: &str) -> Option<&'e Errors> {
+    errors.iter().find(|errors| errors.group == group)
+}
+
+/// RMSE of one group; NaN if it is not among `errors`.
+pub fn rmse(errors: &[Errors], group: &str) -> f64 {
+    of_group(errors, group).map_or(f64::NAN, |errors| errors.rmse)
+}
+
+/// What a decoder is called on the page.
+pub fn decoder_name(decoder: &DecoderErrors) -> &str {
+    match decoder.decoder.as_str() {
+        "network" => "Network",
+        "linear" => "Best linear decoder",
+        "mean" => "Training mean",
+        other => other,
+    }
+}
+
+fn heading(definition: Definition) -> &'static str {
+    match definition {
+        Definition::Rmse => "RMSE",
+        Definition::RelativeL2Percent => "Relative L2",
+        Definition::FullScalePercent => "% FS",
+        Definition::PositionalPercent => "Positional",
+        Definition::RSquared => "R²",
+        Definition::MeanRelativePercent => "Mean relative",
+    }
+}
+
+/// The value of a definition; RMSE with `rmse_decimals`, so that decimal points are in line.
+fn value(definition: Definition, errors: &Errors, rmse_decimals: usize) -> String {
+    let Some(value) = definition.of(errors).filter(|value| value.is_finite()) else {
+        return UNDEFINED.into();
+    };
+    match definition {
+        Definition::Rmse => {
+            format!("{}\u{a0}{}", fixed(value, rmse_decimals), escape(&errors.unit))
+        }
+        Definition::RSquared => fixed(value, 3),
+        Definition::RelativeL2Percent | Definition::MeanRelativePercent => {
+            format!("{}\u{a0}%", fixed(value, 1))
+        }
+        Definition::FullScalePercent | Definition::PositionalPercent => {
+            format!("{}\u{a0}%", fixed(value, 2))
+        }
+    }
+}
+
+/// Errors by axis, decoder and definition.
+pub fn errors(result: &RunResult) -> String {
+    let mut html = String::from("<table>\n<thead><tr><th>Output</th><th>Decoder</th>");
+    for definition in Definition::ALL {
+        let _ = write!(html, "<th class=\"number\">{}</th>", heading(definition));
+    }
+    html += "</tr></thead>\n";
+    let groups = result.decoders.first().map_or(&[][..], |decoder| &decoder.errors);
+    for group in groups {
+        html += "<tbody>\n";
+        let all = result.decoders.iter().map(|decoder| rmse(&decoder.errors, &group.group));
+        let rmse_decimals = ticks::extent(all).map_or(0, |(least, _)| decimals(least, 3));
+        for (i, decoder) in result.decoders.iter().enumerate() {
+            let Some(errors) = of_group(&decoder.errors, &group.group) else { continue };
+            html += "<tr>";
+            if i == 0 {
+                let name = escape(&with_unit(&symbol(&group.group), &group.unit));
+                let rows = result.decoders.len();
+                let _ = write!(html, "<th scope=\"rowgroup\" rowspan=\"{rows}\">{name}</th>");
+            }
+            let _ = write!(html, "<td>{}</td>", escape(decoder_name(decoder)));
+            for definition in Definition::ALL {
+                let value = value(definition, errors, rmse_decimals);
+                let _ = write!(html, "<td class=\"number\">{value}</td>");
+            }
+            html += "</tr>\n";
+        }
+        html += "</tbody>\n";
+    }
+    html + "</table>\n"
+}
+
+/// The formulas of all definitions.
+pub fn legend() -> String {
+    let formulas =
+        Definition::ALL.map(|definition| format!("<li>{}</li>", escape(definition.formula())));
+    format!(
+        "<ul class=\"formulas\">{}</ul>\n<p class=\"note\">e = decoded − true; Δ stands for the \
+         true output; H is the thickness of the sensor. “{UNDEFINED}”: not defined.</p>\n",
+        formulas.concat()
+    )
+}
+
+/// The definition that the paper's table is shown by: positional where it is defined.
+pub fn printed_definition(table: &Table1, group: &str) -> Definition {
+    let mean = table.columns.first().and_then(|column| of_group(&column.mean, group));
+    match mean.and_then(|errors| errors.positional_percent) {
+        Some(_) => Definition::PositionalPercent,
+        None => Definition::FullScalePercent,
+    }
+}
+
+/// Caption of [`table1`].
+pub fn table1_caption(table: &Table1, group: &str) -> String {
+    let definition = printed_definition(table, group);
+    let [low, high] = PAPER_PRINTED_PERCENT;
+    format!(
+        "Error of {} by spread and noise level, arranged as Table 1 of the paper: {}. Network with \
+         K = {}. The paper prints {low}–{high} % and does not state its definition. Cells marked † \
+         are no better than always answering the training mean.",
+        escape(&symbol(group)),
+        escape(definition.formula()),
+        table.centres
+    )
+}
+
+/// Error by spread (lines) and noise level (columns).
+pub fn table1(table: &Table1, group: &str) -> String {
+    let definition = printed_definition(table, group);
+    let of = |errors: &[Errors]| {
+        of_group(errors, group).and_then(|e| definition.of(e)).filter(|v| v.is_finite())
+    };
+    let cell = |value: Option<f64>| value.map_or(UNDEFINED.into(), |v| format!("{v:.2}\u{a0}%"));
+    let mut html = format!(
+        "<table class=\"compact\">\n<thead><tr><th rowspan=\"2\">Spread</th>\
+         <th class=\"span\" colspan=\"{}\">Noise level</th></tr>\n<tr>",
+        table.columns.len()
+    );
+    for column in &table.columns {
+        let _ = write!(html, "<th class=\"number\">{}</th>", percent(column.noise_level));
+    }
+    html += "</tr></thead>\n<tbody>\n";
+    let spreads = table.columns.first().map_or(&[][..], |column| &column.cells);
+    for (i, first) in spreads.iter().enumerate() {
+        let _ = write!(html, "<tr><th scope=\"row\">{:?}</th>", first.spread);
+        for column in &table.columns {
+            let value = column.cells.get(i).and_then(|cell| of(&cell.network));
+            let poor = value.zip(of(&column.mean)).is_some_and(|(value, mean)| value >= mean);
+            let (class, mark) =
+                if poor { (" poor", "<span class=\"dagger\">†</span>") } else { ("", "") };
+            let text = cell(value);
+            let _ = write!(html, "<td class=\"number{class}\">{text}{mark}");
+            let printed = table.printed.iter().find(|printed| {
+                same(printed.spread, first.spread) && same(printed.noise_level, column.noise_level)
+            });
+            if let Some(printed) = printed {
+                let _ = write!(html, "<small>paper {}\u{a0}%</small>", printed.percent);
+            }
+            html += "</td>";
+        }
+        html += "</tr>\n";
+    }
+    html += "</tbody>\n<tbody class=\"reference\">\n";
+    for (name, errors) in [("Linear", 0), ("Mean", 1)] {
+        let _ = write!(html, "<tr><th scope=\"row\">{name}</th>");
+        for column in &table.columns {
+            let text = cell(of([&column.linear, &column.mean][errors]));
+            let _ = write!(html, "<td class=\"number\">{text}</td>");
+        }
+        html += "</tr>\n";
+    }
+    html + "</tbody>\n</table>\n"
+}
+
+/// Whether two settings that people typed are the same.
+fn same(a: f64, b: f64) -> bool {
+    (a - b).abs() < 1e-9
+}

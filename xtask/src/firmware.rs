@@ -1,0 +1,66 @@
+//! The firmware for its target, and the proof that it cannot panic.
+
+use crate::process::{Outcome, Watched, watch};
+use crate::toolchain::Toolchain;
+
+/// What the link check's panic handler calls, and nobody defines.
+const SYMBOL: &str = "taxel_reachable_panic";
+
+/// Builds model-core and firmware, links the check, and links it once more with a panic in it.
+pub fn run() -> Outcome {
+    let toolchain = Toolchain::find()?;
+    println!("toolchain: {toolchain}");
+
+    let as_it_stands = build(&toolchain, &[], true)?;
+    if names_symbol(&as_it_stands.messages) {
+        return Err("a panic is reachable on the device; firmware/link-check/src/main.rs tells \
+                    how to find it"
+            .into());
+    }
+    if !as_it_stands.success {
+        return Err("the firmware does not build".into());
+    }
+
+    let with_panic = build(&toolchain, &["--features", "link-check/must-fail"], false)?;
+    if with_panic.success {
+        return Err("the link check proves nothing: it links with a reachable panic too".into());
+    }
+    if !names_symbol(&with_panic.messages) {
+        eprint!("{}", with_panic.messages);
+        return Err("the link check with a panic failed for another reason than that".into());
+    }
+    println!("no panic is reachable on the device; with one put in, the check does not link");
+    Ok(())
+}
+
+/// All in one command: built apart, the libraries would be compiled twice.
+fn build(toolchain: &Toolchain, more: &[&str], echo: bool) -> Outcome<Watched> {
+    let mut command = toolchain.build();
+    command.args(["--profile", "firmware"]);
+    command.args(["--package", "model-core", "--package", "firmware", "--package", "link-check"]);
+    watch(command.args(more), echo)
+}
+
+/// Whether a linker complained that the symbol is undefined.
+fn names_symbol(messages: &str) -> bool {
+    messages.lines().any(|line| line.contains("undefined") && line.contains(SYMBOL))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_complaint_of_each_linker_is_recognised() {
+        assert!(names_symbol(
+            "  = note: rust-lld: error: undefined symbol: taxel_reachable_panic\n  >>> referenced by"
+        ));
+        assert!(names_symbol("a.o: undefined reference to `taxel_reachable_panic'"));
+    }
+
+    #[test]
+    fn another_failure_is_not_taken_for_a_panic() {
+        assert!(!names_symbol("error: undefined symbol: memcpy"));
+        assert!(!names_symbol("warning: function `taxel_reachable_panic` is never used"));
+    }
+}

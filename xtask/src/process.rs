@@ -1,0 +1,87 @@
+//! Running other programs.
+
+use std::env;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// What a step ends with: nothing to say, or why it failed.
+pub type Outcome<T = ()> = Result<T, String>;
+
+/// The workspace's root.
+pub fn root() -> &'static Path {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    here.parent().unwrap_or(here)
+}
+
+/// Where cargo puts what it builds for the host.
+pub fn target_dir() -> PathBuf {
+    root().join(env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into()))
+}
+
+/// The cargo that runs this program.
+pub fn cargo(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    command.args(arguments).current_dir(root());
+    command
+}
+
+/// Shows and runs `command`, its output passed through.
+pub fn run(command: &mut Command) -> Outcome {
+    show(command);
+    let status = command.status().map_err(|cause| not_started(command, &cause))?;
+    if status.success() { Ok(()) } else { Err(format!("{} ended with {status}", name(command))) }
+}
+
+/// What became of a command whose messages were looked at.
+pub struct Watched {
+    pub success: bool,
+    /// Everything it wrote to stderr.
+    pub messages: String,
+}
+
+/// Shows and runs `command`, and keeps what it writes to stderr; with `echo`, passes it through too.
+pub fn watch(command: &mut Command, echo: bool) -> Outcome<Watched> {
+    show(command);
+    let mut child =
+        command.stderr(Stdio::piped()).spawn().map_err(|cause| not_started(command, &cause))?;
+    let mut messages = String::new();
+    if let Some(stderr) = child.stderr.take() {
+        for line in BufReader::new(stderr).split(b'\n') {
+            let line =
+                line.map_err(|cause| format!("cannot read from {}: {cause}", name(command)))?;
+            let line = String::from_utf8_lossy(&line);
+            if echo {
+                eprintln!("{line}");
+            }
+            messages.push_str(&line);
+            messages.push('\n');
+        }
+    }
+    let status = child.wait().map_err(|cause| format!("{}: {cause}", name(command)))?;
+    Ok(Watched { success: status.success(), messages })
+}
+
+/// The first line that `program` prints, if it can be run.
+pub fn first_line(program: impl AsRef<Path>, arguments: &[&str]) -> Option<String> {
+    let output =
+        Command::new(program.as_ref()).args(arguments).current_dir(root()).output().ok()?;
+    if !output.status.success() {
+        return None;
+    }
+    Some(String::from_utf8(output.stdout).ok()?.lines().next()?.to_owned())
+}
+
+fn name(command: &Command) -> String {
+    let program = Path::new(command.get_program());
+    program.file_name().unwrap_or(program.as_os_str()).to_string_lossy().into_owned()
+}
+
+fn show(command: &Command) {
+    let arguments: Vec<_> = command.get_args().map(|a| a.to_string_lossy()).collect();
+    eprintln!("$ {} {}", name(command), arguments.join(" "));
+}
+
+fn not_started(command: &Command, cause: &std::io::Error) -> String {
+    format!("cannot start {}: {cause}", command.get_program().display())
+}

@@ -1,0 +1,142 @@
+//! A toolchain that can build for the device.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::{env, fs};
+
+use crate::process::{Outcome, cargo, first_line, root, target_dir};
+
+const TARGET: &str = "thumbv7em-none-eabihf";
+
+const DEBIAN_CARGO: &str = "/usr/bin/cargo";
+const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
+
+/// Variables that steer cargo and rustc, and that another toolchain must not inherit from the one
+/// that runs this program.
+const OF_THE_HOST_TOOLCHAIN: [&str; 7] = [
+    "CARGO",
+    "LD_LIBRARY_PATH",
+    "RUSTC",
+    "RUSTC_WORKSPACE_WRAPPER",
+    "RUSTC_WRAPPER",
+    "RUSTDOC",
+    "RUSTUP_TOOLCHAIN",
+];
+
+/// Where the target's `core` comes from.
+pub enum Toolchain {
+    /// The active toolchain has the target.
+    Active,
+    /// Debian's has the library's source instead, but no linker for the target.
+    Debian { linker: PathBuf },
+}
+
+impl fmt::Display for Toolchain {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Active => write!(f, "the active one, which has {TARGET}"),
+            Self::Debian { linker } => {
+                write!(f, "{DEBIAN_CARGO} with core built from source, and {}", linker.display())
+            }
+        }
+    }
+}
+
+impl Toolchain {
+    /// The active toolchain if it has the target, else Debian's.
+    ///
+    /// # Errors
+    /// Neither will do: how to get either.
+    pub fn find() -> Outcome<Self> {
+        let library = first_line("rustc", &["--print", "target-libdir", "--target", TARGET]);
+        if library.is_some_and(|path| Path::new(&path).is_dir()) {
+            return Ok(Self::Active);
+        }
+        debian().map_err(|cause| {
+            format!(
+                "no toolchain for {TARGET}: the active one lacks it, and {cause}. Either\n  \
+                 rustup target add {TARGET}\nor, on Debian,\n  \
+                 apt-get install rustc-web cargo-web rust-web-src"
+            )
+        })
+    }
+
+    /// `cargo build` for the target, in a directory of its own.
+    pub fn build(&self) -> Command {
+        let mut command = match self {
+            Self::Active => cargo(&["build"]),
+            Self::Debian { linker } => {
+                let mut command = Command::new(DEBIAN_CARGO);
+                for variable in OF_THE_HOST_TOOLCHAIN {
+                    command.env_remove(variable);
+                }
+                // Building core is an unstable feature, which a stable compiler grants on this word.
+                command.env("RUSTC", DEBIAN_RUSTC).env("RUSTC_BOOTSTRAP", "1");
+                command.env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", linker);
+                command.current_dir(root()).args(["build", "-Zbuild-std=core"]);
+                command
+            }
+        };
+        // Flags given for the host, such as target-cpu=native, would break the target's build.
+        command.env_remove("RUSTFLAGS").env_remove("CARGO_ENCODED_RUSTFLAGS");
+        command.args(["--target", TARGET, "--target-dir"]).arg(target_dir().join("thumb"));
+        command
+    }
+}
+
+fn debian() -> Outcome<Toolchain> {
+    let version = first_line(DEBIAN_RUSTC, &["--version"])
+        .filter(|_| Path::new(DEBIAN_CARGO).is_file())
+        .ok_or(format!("{DEBIAN_RUSTC} and {DEBIAN_CARGO} are not there"))?;
+    let needed = env!("CARGO_PKG_RUST_VERSION");
+    if release(&version) < release(needed) {
+        return Err(format!("{DEBIAN_RUSTC} is {version}, older than {needed}"));
+    }
+    let sysroot = sysroot(DEBIAN_RUSTC).ok_or(format!("{DEBIAN_RUSTC} names no sysroot"))?;
+    if !sysroot.join("lib/rustlib/src/rust/library/core").is_dir() {
+        return Err(format!("{DEBIAN_RUSTC} comes without its library's source"));
+    }
+    let linker = linker(&sysroot).ok_or("there is no linker for it (rust-lld or ld.lld)")?;
+    Ok(Toolchain::Debian { linker })
+}
+
+fn sysroot(rustc: &str) -> Option<PathBuf> {
+    first_line(rustc, &["--print", "sysroot"]).map(PathBuf::from)
+}
+
+/// Debian's compiler comes without `rust-lld`; rustup's has it.
+fn linker(debian_sysroot: &Path) -> Option<PathBuf> {
+    let of_rust = [sysroot("rustc"), Some(debian_sysroot.to_owned())]
+        .into_iter()
+        .flatten()
+        .filter_map(|sysroot| fs::read_dir(sysroot.join("lib/rustlib")).ok())
+        .flat_map(|targets| targets.flatten().map(|target| target.path().join("bin/rust-lld")));
+    let path = env::var_os("PATH").unwrap_or_default();
+    let of_system = env::split_paths(&path).map(|directory| directory.join("ld.lld"));
+    of_rust.chain(of_system).find(|linker| linker.is_file())
+}
+
+/// Major and minor number of the first version that `text` names.
+fn release(text: &str) -> Option<(u32, u32)> {
+    text.split_whitespace().find_map(|word| {
+        let mut numbers = word.split('.').map(|number| number.parse().ok());
+        Some((numbers.next()??, numbers.next()??))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_release_is_found_in_what_rustc_prints() {
+        assert_eq!(
+            release("rustc 1.96.0 (ac68faa20 2026-05-25) (built from source)"),
+            Some((1, 96))
+        );
+        assert_eq!(release("1.95"), Some((1, 95)));
+        assert!(release("rustc 1.63.0") < release("1.95"));
+        assert!(release("unknown") < release("1.95"));
+    }
+}
