@@ -18,6 +18,8 @@ pub struct DataFile {
     /// CRC-64/XZ of the file.
     pub digest: u64,
     values: Vec<f64>,
+    /// Where each line of data stands in the file, from 1.
+    line_numbers: Vec<u64>,
 }
 
 impl DataFile {
@@ -56,6 +58,7 @@ impl DataFile {
             }
         }
         let mut values = Vec::with_capacity(bytes.len() / 8);
+        let mut line_numbers = Vec::new();
         let mut record = csv::ByteRecord::new();
         let read_error = |e: csv::Error| error(format!("{e}; check quotes and line ends"));
         while reader.read_byte_record(&mut record).map_err(read_error)? {
@@ -78,12 +81,13 @@ impl DataFile {
                 })?;
                 values.push(value);
             }
+            line_numbers.push(line);
         }
         if values.is_empty() {
             return Err(error("the file has a header but no line of data".into()));
         }
         let digest = crate::digest::digest(bytes);
-        Ok(Self { path: path.into(), header, digest, values })
+        Ok(Self { path: path.into(), header, digest, values, line_numbers })
     }
 
     /// Lines of data.
@@ -96,6 +100,12 @@ impl DataFile {
     #[must_use]
     pub fn value(&self, line: usize, column: usize) -> f64 {
         self.values[line * self.header.len() + column]
+    }
+
+    /// Where `line` (from 0) stands in the file, from 1 and with the header, for messages.
+    #[must_use]
+    pub fn line_number(&self, line: usize) -> u64 {
+        self.line_numbers[line]
     }
 
     /// The place of the column called `name`.

@@ -4,6 +4,10 @@ use crate::columns;
 use crate::data_file::DataFile;
 use crate::error::{Error, Result};
 
+/// Largest magnitude that is trained on: its square, and sums of it, stay far inside f64, and
+/// spans stay inside f32.
+const LARGEST: f64 = 1e30;
+
 /// Named columns of numbers, one line a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
@@ -122,6 +126,18 @@ impl Dataset {
         }
         let (input_columns, output_columns, rows) =
             by_rows(&file.header, input_columns, output_columns);
+        for &column in input_columns.iter().chain(&output_columns) {
+            if let Some(line) = (0..file.lines()).find(|l| file.value(*l, column).abs() > LARGEST) {
+                let message = format!(
+                    "line {}, column {:?}: {} is beyond {LARGEST:e}, the largest number that a \
+                     decoder in f32 is trained on; give the column another unit",
+                    file.line_number(line),
+                    file.header[column],
+                    file.value(line, column)
+                );
+                return Err(Error::data(&file.path, message));
+            }
+        }
         let kept: Vec<usize> = (0..file.lines())
             .filter(|line| {
                 let complete = |c: &usize| !file.value(*line, *c).is_nan();

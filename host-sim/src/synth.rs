@@ -100,9 +100,9 @@ pub fn forward(scene: &Scene, file: &DataFile) -> Result<Vec<f64>> {
             let value = file.value(line, column);
             if value.abs() > most_mm * (1.0 + 1e-12) {
                 let message = format!(
-                    "frame {}, column {:?}: {value} mm is beyond what the sensor model holds for, \
+                    "line {}, column {:?}: {value} mm is beyond what the sensor model holds for, \
                      20 % of the thickness ({most_mm} mm)",
-                    line + 1,
+                    file.line_number(line),
                     file.header[column]
                 );
                 return Err(Error::data(&file.path, message));

@@ -151,8 +151,10 @@ impl<'b> Samples<'b> {
     }
 
     /// Output weights for given `centres`, by recursive least squares over the samples.
-    #[must_use]
-    pub fn fit(&self, centres: &[f64], options: &Options) -> FittedNetwork {
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if the fit does not hold in f32.
+    pub fn fit(&self, centres: &[f64], options: &Options) -> Result<FittedNetwork> {
         let regressors = least_squares::Regressors {
             centres,
             inputs: self.inputs(),
@@ -166,14 +168,14 @@ impl<'b> Samples<'b> {
             &self.block.outputs,
             options.initial_covariance,
         );
-        FittedNetwork::new(&self.scale, &regressors, &weights, self.block.outputs.names.len())
+        FittedNetwork::try_new(&self.scale, &regressors, &weights, self.block.outputs.names.len())
     }
 }
 
 /// Trains one network a row-wire of `dataset`.
 ///
 /// # Errors
-/// [`Error::Usage`] for options that do not fit the data.
+/// [`Error::Usage`] for options that do not fit the data, and data that does not fit f32.
 pub fn train(
     dataset: &Dataset,
     options: &Options,
@@ -181,7 +183,7 @@ pub fn train(
 ) -> Result<Vec<FittedNetwork>> {
     options.check(dataset.frames())?;
     progress.stage("train", dataset.rows);
-    Ok((0..dataset.rows)
+    (0..dataset.rows)
         .into_par_iter()
         .map(|row| {
             let block = dataset.block(row);
@@ -191,7 +193,7 @@ pub fn train(
             progress.step();
             fitted
         })
-        .collect())
+        .collect()
 }
 
 /// ‖a − b‖².

@@ -80,6 +80,7 @@ fn bad_csv_files() {
         (b"ch1,f_n\n1,2,3\n", &["line 2 has 3 fields"]),
         (b"ch1,g_n\n1,2\n3,4\n", &["no column matches \"f_n\"", "ch1, g_n"]),
         (b"ch1,f_n\n1,\n,2\n", &["no line has a value in every chosen column"]),
+        (b"ch1,f_n\n1,2\n-1e31,4\n", &["line 3", "\"ch1\"", "beyond 1e30"]),
     ] {
         folder.write("data.csv", content);
         let train = ["train", "data.csv", "--inputs", "ch*", "--outputs", "f_n", "-o", "m.bin"];

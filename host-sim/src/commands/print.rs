@@ -53,10 +53,10 @@ pub fn errors(page: &mut Page, decoders: &[(&str, &[Errors])]) {
                 definition.of(group).map_or("-".into(), |value| format!("{value:.2} %"))
             };
             page.line(format_args!(
-                "{:<8} {:<10} {:>9.4} {:<2} {:>8} {:>7} {:>9} {:>8} {:>9}",
+                "{:<8} {:<10} {:>9} {:<2} {:>8} {:>7} {:>9} {:>8} {:>9}",
                 decoder,
                 group.group,
-                group.rmse,
+                number(group.rmse),
                 group.unit,
                 percent(Definition::RelativeL2Percent),
                 percent(Definition::FullScalePercent),
@@ -65,6 +65,15 @@ pub fn errors(page: &mut Page, decoders: &[(&str, &[Errors])]) {
                 percent(Definition::MeanRelativePercent)
             ));
         }
+    }
+}
+
+/// Four decimals, or powers of ten where these would say nothing.
+fn number(value: f64) -> String {
+    if value == 0.0 || (1e-3..1e5).contains(&value) {
+        format!("{value:.4}")
+    } else {
+        format!("{value:.3e}")
     }
 }
 

@@ -186,7 +186,7 @@ fn folds_from(file: &DataFile, name: &str, lines: &[usize]) -> Result<Vec<usize>
             path: file.path.clone(),
             message: format!(
                 "line {}, column {name:?}: every line needs a fold; fill it in",
-                lines[place] + 2
+                file.line_number(lines[place])
             ),
         });
     }

@@ -65,7 +65,8 @@ impl Printed {
             let value = |column: usize| file.value(line, columns[column]);
             let cell = Self { spread: value(0), noise_level: value(1), percent: value(2) };
             if [cell.spread, cell.noise_level, cell.percent].iter().any(|v| v.is_nan()) {
-                let message = format!("line {}: every cell needs three numbers", line + 2);
+                let message =
+                    format!("line {}: every cell needs three numbers", file.line_number(line));
                 return Err(Error::data(&file.path, message));
             }
             Ok(cell)
@@ -111,7 +112,7 @@ struct RowAnswers {
 /// Computes the table that `scene` asks for.
 ///
 /// # Errors
-/// [`Error::Scene`] if the scene has no `[table1]`.
+/// [`Error::Scene`] if the scene has no `[table1]`; else as [`train`](crate::train::train).
 pub fn compute(scene: &Scene, progress: &Progress) -> Result<Table1> {
     let settings = scene.table1.as_ref().ok_or_else(|| Error::Scene {
         scene: scene.name.clone(),
@@ -130,7 +131,7 @@ pub fn compute(scene: &Scene, progress: &Progress) -> Result<Table1> {
         training_frames: settings.frames,
         test_frames: settings.test_frames,
         standard_frames: settings.standard_frames,
-        columns: columns.collect(),
+        columns: columns.collect::<Result<_>>()?,
         printed: Vec::new(),
     })
 }
@@ -141,12 +142,12 @@ fn column(
     noise_level: f64,
     measure: &Measure,
     progress: &Progress,
-) -> Column {
+) -> Result<Column> {
     let mut scene = scene.clone();
     scene.noise.level = noise_level;
     let training = synth::synthesise(&scene, Stream::Training, settings.frames);
     let test = synth::synthesise(&scene, Stream::Test, settings.test_frames);
-    let rows: Vec<RowAnswers> = (0..training.rows)
+    let rows = (0..training.rows)
         .into_par_iter()
         .map(|row| {
             let (block, test) = (training.block(row), test.block(row));
@@ -154,7 +155,7 @@ fn column(
             progress.step();
             answers
         })
-        .collect();
+        .collect::<Result<Vec<RowAnswers>>>()?;
     let errors = |of_row: &dyn Fn(&RowAnswers) -> &[f64]| {
         let parts: Vec<&[f64]> = rows.iter().map(of_row).collect();
         metrics::by_group(&test.outputs, &side_by_side(&parts, &test), measure)
@@ -167,12 +168,12 @@ fn column(
             .all(|row| row.standard[s].is_some())
             .then(|| errors(&|row| row.standard[s].as_deref().unwrap_or_default())),
     });
-    Column {
+    Ok(Column {
         noise_level,
         mean: errors(&|row| &row.mean),
         linear: errors(&|row| &row.linear),
         cells: cells.collect(),
-    }
+    })
 }
 
 fn row_answers(
@@ -181,7 +182,7 @@ fn row_answers(
     row: usize,
     block: &Block,
     test: &Block,
-) -> RowAnswers {
+) -> Result<RowAnswers> {
     let samples = Samples::new(block);
     let options = |spread| {
         let mut options = Options::new(settings.centres, spread, settings.affine_tail, scene.seed);
@@ -193,17 +194,17 @@ fn row_answers(
     let centres = samples.centres(&options(1.0), row);
     let few = block.first(settings.standard_frames);
     let each = settings.spreads.par_iter().map(|&spread| {
-        let fitted = samples.fit(&centres, &options(spread));
+        let fitted = samples.fit(&centres, &options(spread))?;
         let network = infer(&fitted.network(), Kernel::default(), &test.inputs);
-        (network, StandardNetwork::fit(&few, spread).map(|standard| standard.predict(test)))
+        Ok((network, StandardNetwork::fit(&few, spread).map(|standard| standard.predict(test))))
     });
-    let (network, standard) = each.unzip();
-    RowAnswers {
+    let (network, standard) = each.collect::<Result<Vec<_>>>()?.into_iter().unzip();
+    Ok(RowAnswers {
         mean: LinearDecoder::mean(block).predict(test),
         linear: LinearDecoder::fit(block).predict(test),
         network,
         standard,
-    }
+    })
 }
 
 /// Joins the answers of all row-wires into lines of the test set's output table.

@@ -4,6 +4,7 @@ use model_core::rbf::{Network, Parameters, Shape};
 
 use super::InputScale;
 use super::least_squares::Regressors;
+use crate::error::{Error, Result};
 
 /// Parameters of one trained network in f32, owned.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,17 +21,20 @@ pub struct FittedNetwork {
 
 impl FittedNetwork {
     /// Rounds a fit of `weights` (`regressors × outputs`) to f32.
-    pub(super) fn new(
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if a parameter does not fit an f32.
+    pub(super) fn try_new(
         scale: &InputScale,
         regressors: &Regressors<'_>,
         weights: &[f64],
         outputs: usize,
-    ) -> Self {
+    ) -> Result<Self> {
         let round = |values: &[f64]| values.iter().map(|v| *v as f32).collect::<Vec<_>>();
         let centres = regressors.centres.len() / regressors.inputs;
         let (output_weights, rest) = weights.split_at(centres * outputs);
         let (affine, bias) = rest.split_at(rest.len() - outputs);
-        Self {
+        let fitted = Self {
             shape: Shape { inputs: regressors.inputs, centres, outputs },
             input_minimum: round(&scale.minimum),
             input_per_span: round(&scale.per_span),
@@ -39,16 +43,18 @@ impl FittedNetwork {
             output_weights: round(output_weights),
             bias: round(bias),
             affine: round(affine),
+        };
+        match Network::try_new(fitted.shape, fitted.parameters()) {
+            Ok(_) => Ok(fitted),
+            Err(cause) => Err(Error::Usage(format!(
+                "training ends in numbers that an f32 does not hold ({cause}); bring the columns \
+                 to a moderate scale, say by another unit"
+            ))),
         }
     }
 
-    /// The network, ready to infer.
-    ///
-    /// # Panics
-    /// If training produced a number that is not finite, which data of finite numbers cannot.
-    #[must_use]
-    pub fn network(&self) -> Network<'_> {
-        let parameters = Parameters {
+    fn parameters(&self) -> Parameters<'_> {
+        Parameters {
             input_minimum: &self.input_minimum,
             input_per_span: &self.input_per_span,
             centres: &self.centres,
@@ -56,7 +62,15 @@ impl FittedNetwork {
             output_weights: &self.output_weights,
             bias: &self.bias,
             affine: &self.affine,
-        };
-        Network::try_new(self.shape, parameters).expect("training ends in a usable network")
+        }
+    }
+
+    /// The network, ready to infer.
+    ///
+    /// # Panics
+    /// Never: the parameters were checked when they were fitted.
+    #[must_use]
+    pub fn network(&self) -> Network<'_> {
+        Network::try_new(self.shape, self.parameters()).expect("checked when fitted")
     }
 }

@@ -84,7 +84,7 @@ pub fn cross_validate(
         .map(|(k, fold)| {
             held_out_squares(dataset, fold_of, fold, spreads, &Options { centres: k, ..*options })
         })
-        .collect();
+        .collect::<Result<_>>()?;
 
     let deviations = standard_deviations(dataset);
     let mut scored = Vec::new();
@@ -118,7 +118,7 @@ fn held_out_squares(
     fold: usize,
     spreads: &[f64],
     options: &Options,
-) -> Vec<Vec<f64>> {
+) -> Result<Vec<Vec<f64>>> {
     let (held, kept): (Vec<usize>, Vec<usize>) =
         (0..dataset.frames()).partition(|i| fold_of[*i] == fold);
     let (training, test) = (dataset.subset(&kept), dataset.subset(&held));
@@ -128,7 +128,7 @@ fn held_out_squares(
         let samples = Samples::new(&block);
         let centres = samples.centres(options, row);
         for (squares, &spread) in squares.iter_mut().zip(spreads) {
-            let fitted = samples.fit(&centres, &Options { spread, ..*options });
+            let fitted = samples.fit(&centres, &Options { spread, ..*options })?;
             let predicted = infer(&fitted.network(), Kernel::Polynomial, &test.inputs);
             let outputs = test.outputs.names.len();
             let mut sums = vec![0.0; outputs];
@@ -140,7 +140,7 @@ fn held_out_squares(
             squares.extend(sums);
         }
     }
-    squares
+    Ok(squares)
 }
 
 fn standard_deviations(dataset: &Dataset) -> Vec<f64> {

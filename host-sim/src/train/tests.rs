@@ -105,7 +105,7 @@ fn a_trained_network_learns_a_smooth_function() {
     let block = block(4000, 0.0);
     let samples = Samples::new(&block);
     let options = Options::new(40, 0.3, true, 1);
-    let fitted = samples.fit(&samples.centres(&options, 0), &options);
+    let fitted = samples.fit(&samples.centres(&options, 0), &options).unwrap();
     let predicted = infer(&fitted.network(), Kernel::Libm, &block.inputs);
     let relative = relative_difference(&predicted, &block.outputs.values);
     assert!(relative < 2e-3, "{relative}");
@@ -117,7 +117,7 @@ fn an_input_that_never_changes_is_no_obstacle() {
     block.inputs.values.iter_mut().skip(1).step_by(2).for_each(|v| *v = 77.0);
     let samples = Samples::new(&block);
     let options = Options::new(10, 0.3, true, 1);
-    let fitted = samples.fit(&samples.centres(&options, 0), &options);
+    let fitted = samples.fit(&samples.centres(&options, 0), &options).unwrap();
     assert_eq!(fitted.network().parameters().input_per_span[1], 0.0);
     let predicted = infer(&fitted.network(), Kernel::Libm, &block.inputs);
     assert!(predicted.iter().all(|y| y.is_finite()));
