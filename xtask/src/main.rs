@@ -33,6 +33,10 @@ fn main() -> ExitCode {
         ["ci"] => ci::run(ci::Tests::All),
         ["ci", "--after-cargo-test"] => ci::run(ci::Tests::LeftOutByCargoTest),
         ["firmware"] => firmware::run(),
+        [] => {
+            eprint!("cargo xtask needs a command\n\n{HELP}");
+            return ExitCode::from(2);
+        }
         _ => {
             eprint!("cargo xtask does not know `{}`\n\n{HELP}", arguments.join(" "));
             return ExitCode::from(2);
