@@ -1,7 +1,5 @@
 //! Columns of data files: names, units, and what the project's own names mean.
 
-use crate::scene::{Quantity, Scene};
-
 /// Units that a column's name may end in, and how they are written.
 const UNITS: [(&str, &str); 7] = [
     ("_ohm", "Ω"),
@@ -57,42 +55,6 @@ pub fn groups(names: &[String]) -> Vec<(&str, Vec<usize>)> {
 #[must_use]
 pub fn is_compression(group: &str) -> bool {
     group == "dz_mm"
-}
-
-/// Names of the readings that a scene asks for, row after row.
-#[must_use]
-pub fn reading_names(scene: &Scene) -> Vec<String> {
-    let columns = 1..=scene.sensor.column_wires;
-    let rows = scene.read_rows.iter().map(|row| row + 1);
-    rows.flat_map(|m| columns.clone().map(move |k| format!("r{m}c{k}_ohm"))).collect()
-}
-
-/// Names of the outputs that a scene asks for, row after row.
-#[must_use]
-pub fn output_names(scene: &Scene) -> Vec<String> {
-    let (symbol, unit) = match scene.outputs.quantity {
-        Quantity::Deformation => ('d', "mm"),
-        Quantity::Force => ('f', "n"),
-    };
-    let mut names = Vec::new();
-    for row in &scene.read_rows {
-        for electrode in 1..=scene.sensor.electrodes_per_row_wire {
-            for axis in &scene.outputs.axes {
-                let axis = axis.letter();
-                names.push(format!("r{}e{electrode}_{symbol}{axis}_{unit}", row + 1));
-            }
-        }
-    }
-    names
-}
-
-/// Names of the full deformation of one row (from 0), electrode after electrode.
-#[must_use]
-pub fn deformation_names(row: usize, electrodes: usize) -> Vec<String> {
-    let electrodes = 1..=electrodes;
-    electrodes
-        .flat_map(|i| ['x', 'y', 'z'].map(|axis| format!("r{}e{i}_d{axis}_mm", row + 1)))
-        .collect()
 }
 
 /// Columns of `header` that match `pattern`, in the header's order: comma-separated names in which

@@ -45,10 +45,16 @@ impl DataFile {
         if header.is_empty() {
             return Err(error("the file is empty: line 1 must name the columns".into()));
         }
+        if let (1, Some(line)) = (header.len(), blank_line(bytes)) {
+            let message = format!(
+                "line {line} is blank; in a file of one column write NaN for a missing value"
+            );
+            return Err(error(message));
+        }
         let mut seen = HashSet::new();
         for (index, name) in header.iter().enumerate() {
             let column = index + 1;
-            if name.is_empty() || name.contains('\n') {
+            if name.is_empty() || name.contains(char::is_control) {
                 let message = format!("line 1: column {column} has no usable name {name:?}");
                 return Err(error(message));
             }
@@ -129,6 +135,14 @@ impl DataFile {
     pub fn columns<'n>(&self, names: impl IntoIterator<Item = &'n str>) -> Result<Vec<usize>> {
         names.into_iter().map(|name| self.column(name)).collect()
     }
+}
+
+/// The first blank line (from 1) that is followed by another that is not.
+fn blank_line(bytes: &[u8]) -> Option<usize> {
+    let is_blank = |line: &[u8]| line.iter().all(u8::is_ascii_whitespace);
+    let lines: Vec<&[u8]> = bytes.split(|byte| *byte == b'\n').collect();
+    let last = lines.iter().rposition(|line| !is_blank(line))?;
+    lines[..last].iter().position(|line| is_blank(line)).map(|index| index + 1)
 }
 
 /// A field's number: infinities and text are none; empty and NaN are missing.

@@ -47,17 +47,16 @@ impl Table {
         ranges
     }
 
-    /// A table's worth of values in which every line is the mean of each column (NaN left out).
+    /// Mean of every column, NaN left out.
     #[must_use]
-    pub fn column_means(&self) -> Vec<f64> {
+    pub fn means(&self) -> Vec<f64> {
         let mut sums = vec![(0.0, 0.0); self.names.len()];
         for line in self.lines() {
             for ((sum, count), value) in sums.iter_mut().zip(line).filter(|(_, v)| !v.is_nan()) {
                 (*sum, *count) = (*sum + value, *count + 1.0);
             }
         }
-        let means: Vec<f64> = sums.iter().map(|(sum, count)| sum / count).collect();
-        means.repeat(self.len())
+        sums.iter().map(|(sum, count)| sum / count).collect()
     }
 
     fn columns(&self, from: usize, count: usize) -> Self {

@@ -33,6 +33,12 @@ pub fn infer(network: &Network<'_>, kernel: Kernel, inputs: &Table) -> Vec<f64> 
     values
 }
 
+/// Whether the device would take `reading` for missing: NaN, or beyond f32.
+#[must_use]
+pub fn is_missing(reading: f64) -> bool {
+    !(reading as f32).is_finite()
+}
+
 /// Infers the outputs for one line of readings; all NaN if a reading is missing.
 pub(crate) fn infer_line(
     network: &Network<'_>,
@@ -40,7 +46,7 @@ pub(crate) fn infer_line(
     readings: &[f64],
     outputs: &mut [f64],
 ) {
-    if readings.iter().any(|reading| !(*reading as f32).is_finite()) {
+    if readings.iter().any(|reading| is_missing(*reading)) {
         outputs.fill(f64::NAN);
         return;
     }
@@ -56,5 +62,7 @@ fn infer_with<E: ExpKernel>(network: &Network<'_>, readings: &[f64], outputs: &m
     let mut scaled = vec![0.0; readings.len()];
     let mut inferred = vec![0.0; outputs.len()];
     network.infer::<E>(&readings, &mut scaled, &mut inferred).expect("lengths of the network");
-    outputs.iter_mut().zip(inferred).for_each(|(place, value)| *place = f64::from(value));
+    let overflow = inferred.iter().any(|value| !value.is_finite());
+    let values = inferred.into_iter().map(|value| if overflow { f32::NAN } else { value });
+    outputs.iter_mut().zip(values).for_each(|(place, value)| *place = f64::from(value));
 }

@@ -43,6 +43,7 @@ pub mod report;
 pub mod run;
 pub mod scene;
 pub mod sensor;
+pub mod spread;
 pub mod synth;
 pub mod train;
 

@@ -1,6 +1,9 @@
 //! Files that are either whole or not there.
+//!
+//! Only a kill in the middle of a write leaves something behind: the temporary,
+//! `.<name>.<process>.tmp`, which may be removed.
 
-use std::fs::{self, File};
+use std::fs::{self, File, OpenOptions};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
@@ -9,24 +12,36 @@ use crate::error::{Error, Result};
 /// Writes `path` through a temporary file beside it, renamed only once all is written. On failure
 /// the temporary goes and whatever stood at `path` stays.
 ///
+/// A link is followed, an existing file's permissions are kept, and what is no file (a device or a
+/// pipe, such as `/dev/stdout`) is written to directly.
+///
 /// # Errors
 /// [`Error::Write`], or what `write` returns.
 pub fn write_whole(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> Result<()>,
 ) -> Result<()> {
-    if path.is_dir() {
-        let cause = std::io::Error::from(std::io::ErrorKind::IsADirectory);
-        return Err(Error::write(path, cause));
+    let error = |cause| Error::write(path, cause);
+    match Place::of(path)? {
+        Place::Stream => {
+            let file = OpenOptions::new().write(true).open(path).map_err(error)?;
+            let mut writer = BufWriter::new(file);
+            write(&mut writer)?;
+            writer.flush().map_err(error)
+        }
+        Place::File { real, permissions } => {
+            let temporary = Temporary::beside(&real);
+            let mut writer = BufWriter::new(File::create(&temporary.0).map_err(error)?);
+            write(&mut writer)?;
+            let file = writer.into_inner().map_err(|e| error(e.into_error()))?;
+            if let Some(permissions) = permissions {
+                file.set_permissions(permissions).map_err(error)?;
+            }
+            file.sync_all().map_err(error)?;
+            drop(file);
+            fs::rename(&temporary.0, &real).map_err(error)
+        }
     }
-    let temporary = Temporary::beside(path);
-    let file = File::create(&temporary.0).map_err(|cause| Error::write(path, cause))?;
-    let mut writer = BufWriter::new(file);
-    write(&mut writer)?;
-    let file = writer.into_inner().map_err(|e| Error::write(path, e.into_error()))?;
-    file.sync_all().map_err(|cause| Error::write(path, cause))?;
-    drop(file);
-    fs::rename(&temporary.0, path).map_err(|cause| Error::write(path, cause))
 }
 
 /// As [`write_whole`], for content at hand.
@@ -37,17 +52,48 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
     write_whole(path, |file| file.write_all(bytes).map_err(|cause| Error::write(path, cause)))
 }
 
-/// Fails early, before long work, where [`write_whole`] could not write later.
+/// Fails early, before long work, where [`write_whole`] could not write later, or would write over
+/// one of the command's own `inputs`.
 ///
 /// # Errors
-/// [`Error::Write`].
-pub fn check_writable(path: &Path) -> Result<()> {
-    if path.is_dir() {
-        let cause = std::io::Error::from(std::io::ErrorKind::IsADirectory);
-        return Err(Error::write(path, cause));
+/// [`Error::Write`], or [`Error::Usage`] for an output that is an input.
+pub fn check_writable(path: &Path, inputs: &[&Path]) -> Result<()> {
+    let Place::File { real, .. } = Place::of(path)? else { return Ok(()) };
+    let same = |input: &&&Path| fs::canonicalize(input).is_ok_and(|input| input == real);
+    if let Some(input) = inputs.iter().find(same) {
+        return Err(Error::Usage(format!(
+            "{} would be written over {}, which is read; choose another output with -o",
+            path.display(),
+            input.display()
+        )));
     }
-    let temporary = Temporary::beside(path);
+    let temporary = Temporary::beside(&real);
     File::create(&temporary.0).map(drop).map_err(|cause| Error::write(path, cause))
+}
+
+/// What stands at an output's path.
+enum Place {
+    /// A file, or nothing yet; links are resolved.
+    File { real: PathBuf, permissions: Option<fs::Permissions> },
+    /// A device or a pipe.
+    Stream,
+}
+
+impl Place {
+    fn of(path: &Path) -> Result<Self> {
+        match fs::metadata(path) {
+            Ok(found) if found.is_dir() => {
+                let cause = std::io::Error::from(std::io::ErrorKind::IsADirectory);
+                Err(Error::write(path, cause))
+            }
+            Ok(found) if found.is_file() => {
+                let real = fs::canonicalize(path).map_err(|cause| Error::write(path, cause))?;
+                Ok(Self::File { real, permissions: Some(found.permissions()) })
+            }
+            Ok(_) => Ok(Self::Stream),
+            Err(_) => Ok(Self::File { real: path.into(), permissions: None }),
+        }
+    }
 }
 
 /// A temporary file's name; the file is removed when this goes (after a rename: no longer there).

@@ -11,7 +11,10 @@ use crate::error::{Error, Result};
 use crate::sensor::{self, Axis, Sensor, Vector3};
 
 mod file;
+mod names;
 mod validate;
+
+pub use names::deformation_names;
 
 /// Scenes that are part of the program, by name.
 pub const EMBEDDED: [(&str, &str); 2] = [
@@ -185,6 +188,14 @@ impl Scene {
         validate::noise_level("noise level", level).map_err(Error::Usage)?;
         self.noise.level = level;
         Ok(())
+    }
+
+    /// Checks that so many `frames` fit in memory; `option` names them in the message.
+    ///
+    /// # Errors
+    /// [`Error::Usage`].
+    pub fn check_frames(&self, option: &str, frames: usize) -> Result<()> {
+        validate::size(self, option, frames).map_err(Error::Usage)
     }
 
     /// Extreme deformation of any electrode along each axis, in mm: `[axis][low, high]`.

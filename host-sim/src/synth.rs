@@ -2,12 +2,11 @@
 
 use rayon::prelude::*;
 
-use crate::columns;
 use crate::data_file::DataFile;
 use crate::dataset::Dataset;
 use crate::error::{Error, Result};
 use crate::random::{Purpose, Random, Stream};
-use crate::scene::{Deformation, NoiseKind, Scene};
+use crate::scene::{Deformation, NoiseKind, Scene, deformation_names};
 use crate::sensor::Vector3;
 
 /// Frames that measure a channel's maximum and minimum over the scene, for `span` noise.
@@ -20,12 +19,8 @@ const SPAN_FRAMES: usize = 4096;
 #[must_use]
 pub fn synthesise(scene: &Scene, stream: Stream, frames: usize) -> Dataset {
     let noise = NoiseSource::new(scene);
-    let mut dataset = Dataset::empty(
-        columns::reading_names(scene),
-        columns::output_names(scene),
-        scene.read_rows.len(),
-        frames,
-    );
+    let mut dataset =
+        Dataset::empty(scene.reading_names(), scene.output_names(), scene.read_rows.len(), frames);
     let (n, o) = (dataset.inputs.names.len(), dataset.outputs.names.len());
     let (inputs, outputs) = (&mut dataset.inputs.values, &mut dataset.outputs.values);
     let places = inputs.par_chunks_exact_mut(n).zip(outputs.par_chunks_exact_mut(o));
@@ -91,7 +86,7 @@ pub fn forward(scene: &Scene, file: &DataFile) -> Result<Vec<f64>> {
     let electrodes = sensor.electrodes_per_row_wire;
     let mut columns = Vec::new();
     for row in &scene.read_rows {
-        let names = columns::deformation_names(*row, electrodes);
+        let names = deformation_names(*row, electrodes);
         columns.push(file.columns(names.iter().map(String::as_str))?);
     }
     let most_mm = 0.2 * sensor.size_mm[2];

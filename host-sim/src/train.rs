@@ -11,6 +11,7 @@ use crate::dataset::{Block, Dataset};
 use crate::error::{Error, Result};
 use crate::progress::Progress;
 use crate::random::{Purpose, Random, Stream};
+use crate::spread::check_spread;
 
 pub mod kmeans;
 pub mod least_squares;
@@ -64,20 +65,14 @@ impl Options {
         if self.centres == 0 || self.centres > 65_535 {
             return error(format!("centres = {}: give from 1 to 65535", self.centres));
         }
-        if self.centres > frames {
+        if self.centres >= frames {
             return error(format!(
-                "centres = {}: more than the {frames} training frames; lower it or add data",
+                "centres = {}: there must be fewer than the {frames} training frames; lower it or \
+                 add data",
                 self.centres
             ));
         }
-        if !(self.spread.is_finite() && self.spread > 0.0) {
-            return error(format!("spread = {}: give a positive number", self.spread));
-        }
-        let decay = 1.0 / (2.0 * self.spread * self.spread);
-        if !(decay as f32).is_normal() {
-            return error(format!("spread = {}: 1/(2σ²) does not fit an f32", self.spread));
-        }
-        Ok(())
+        check_spread("spread", self.spread).map_err(Error::Usage)
     }
 }
 
@@ -93,13 +88,15 @@ impl InputScale {
     /// The scale of a block's inputs, rounded to what the blob holds.
     #[must_use]
     pub fn of(block: &Block) -> Self {
-        let ranges = block.inputs.ranges();
-        let per_span = |[low, high]: &[f64; 2]| {
-            let per_span = (1.0 / (high - low)) as f32;
+        // Of the readings as the device has them, in f32.
+        let ranges: Vec<[f32; 2]> =
+            block.inputs.ranges().iter().map(|range| range.map(|v| v as f32)).collect();
+        let per_span = |[low, high]: &[f32; 2]| {
+            let per_span = 1.0 / (high - low);
             if per_span.is_finite() { f64::from(per_span) } else { 0.0 }
         };
         Self {
-            minimum: ranges.iter().map(|[low, _]| f64::from(*low as f32)).collect(),
+            minimum: ranges.iter().map(|[low, _]| f64::from(*low)).collect(),
             per_span: ranges.iter().map(per_span).collect(),
         }
     }
@@ -111,7 +108,7 @@ impl InputScale {
         let [low, high] = CLAMP.map(f64::from);
         let scaled = |line: &[f64]| -> Vec<f64> {
             let scale = |(value, (minimum, per_span)): (&f64, (&f64, &f64))| {
-                ((value - minimum) * per_span).clamp(low, high)
+                ((f64::from(*value as f32) - minimum) * per_span).clamp(low, high)
             };
             line.iter().zip(limits()).map(scale).collect()
         };
@@ -162,12 +159,17 @@ impl<'b> Samples<'b> {
             decay: f64::from((1.0 / (2.0 * options.spread * options.spread)) as f32),
             affine_tail: options.affine_tail,
         };
-        let weights = least_squares::fit(
-            &regressors,
-            &self.scaled,
-            &self.block.outputs,
-            options.initial_covariance,
-        );
+        // Deviations from the mean are fitted, and the mean goes into the bias: an offset would
+        // otherwise be spread over large weights that cancel, and cost digits in f32.
+        let means = self.block.outputs.means();
+        let mut deviations = self.block.outputs.clone();
+        for line in deviations.values.chunks_exact_mut(means.len()) {
+            line.iter_mut().zip(&means).for_each(|(value, mean)| *value -= mean);
+        }
+        let mut weights =
+            least_squares::fit(&regressors, &self.scaled, &deviations, options.initial_covariance);
+        let bias = weights.iter_mut().rev().zip(means.iter().rev());
+        bias.for_each(|(bias, mean)| *bias += mean);
         FittedNetwork::try_new(&self.scale, &regressors, &weights, self.block.outputs.names.len())
     }
 }

@@ -53,6 +53,9 @@ fn bad_scenes() {
         ("spread = 0.8", "spread = 0.0", &["training.spread = 0", "positive"]),
         ("frames = 3000", "frames = 1", &["training.frames = 1"]),
         ("spreads = [0.1,", "spreads = [0.0,", &["table1.spreads = 0"]),
+        ("spreads = [0.1,", "spreads = [1e300,", &["table1.spreads = 1e300", "f32"]),
+        ("spread = 0.8", "spread = 1e-30", &["training.spread = 1e-30", "f32"]),
+        ("frames = 3000", "frames = 100000000", &["training.frames", "does not fit in memory"]),
         ("standard_frames = 40", "standard_frames = 4000", &["table1.standard_frames = 4000"]),
         ("name = \"small\"", "name = \"../up\"", &["name = \"../up\"", "letters"]),
         ("name = \"small\"", "name = small", &["TOML parse error", "line 3"]),
@@ -80,6 +83,8 @@ fn bad_csv_files() {
         (b"ch1,f_n\n1,2,3\n", &["line 2 has 3 fields"]),
         (b"ch1,g_n\n1,2\n3,4\n", &["no column matches \"f_n\"", "ch1, g_n"]),
         (b"ch1,f_n\n1,\n,2\n", &["no line has a value in every chosen column"]),
+        (b"ch1,f\x07n\n1,2\n", &["column 2 has no usable name"]),
+        (b"ch1\n1\n\n2\n", &["line 3 is blank", "NaN"]),
         (b"ch1,f_n\n1,2\n-1e31,4\n", &["line 3", "\"ch1\"", "beyond 1e30"]),
     ] {
         folder.write("data.csv", content);
@@ -102,22 +107,23 @@ fn bad_training_options() {
     };
     train(&["--centres", "0"], &["centres = 0"]);
     train(&["--centres", "5"], &["centres = 5", "4 training frames"]);
+    train(&["--centres", "4"], &["centres = 4", "fewer than"]);
     train(&["--centres", "two"], &["two", "--centres"]);
     train(&["--centres", "2", "--spread", "0"], &["spread = 0"]);
     train(&["--centres", "2", "--spread", "nan"], &["spread = NaN"]);
-    train(&["--centres", "2", "--spread", "1e-30"], &["spread = 0.", "f32"]);
+    train(&["--centres", "2", "--spread", "1e-30"], &["spread = 1e-30", "f32"]);
     train(&["--centres", "1,2"], &["--centres [1, 2]", "--select"]);
     train(&["--fast"], &["unexpected argument '--fast'"]);
     train(&["-n", "10"], &["-n sets a scene's frames"]);
     train(&["--select", "--folds", "9", "--centres", "1"], &["--folds 9", "from 2 to 4"]);
     train(&["--select", "--fold-column", "day"], &["\"day\" is missing", "ch1, f_n, fold"]);
-    train(&["--select", "--fold-column", "fold", "--centres", "3"], &["centres = 3", "2 training"]);
+    train(&["--select", "--fold-column", "fold", "--centres", "2"], &["centres = 2", "2 training"]);
     refused(
         &folder,
         &["train", "press", "--inputs", "ch*", "-o", "m.bin"],
         &["--inputs picks columns of a CSV file"],
     );
-    refused(&folder, &["synth", "press", "-n", "0", "-o", "x.csv"], &["-n 0"]);
+    refused(&folder, &["synth", "press", "-n", "0", "-o", "x.csv"], &["-n = 0"]);
     refused(&folder, &["synth", "press", "--noise", "2", "-o", "x.csv"], &["noise level = 2"]);
     refused(&folder, &["fly"], &["fly"]);
     refused(&folder, &["table1", "press", "--grouping", "z"], &["--grouping"]);
@@ -175,4 +181,72 @@ fn a_failure_keeps_the_file_that_was_there() {
     let train = ["train", "data.csv", "--inputs", "ch*", "--outputs", "f_n", "-o", "m.bin"];
     refused(&folder, &train, &["line 3"]);
     assert_eq!(std::fs::read(folder.path("m.bin")).unwrap(), b"the old model");
+}
+
+#[test]
+fn an_input_is_never_written_over() {
+    let folder = Folder::new("own-input");
+    folder.write("scene.toml", small_scene());
+    folder.succeed(&["train", "scene.toml", "-n", "100", "-o", "m.bin"]);
+    folder.succeed(&["synth", "scene.toml", "-n", "20", "-o", "d.csv"]);
+    let whole = |name: &str| std::fs::read(folder.path(name)).unwrap();
+    let before = [whole("scene.toml"), whole("m.bin"), whole("d.csv")];
+    let says = &["would be written over"][..];
+    refused(&folder, &["synth", "scene.toml", "-o", "scene.toml"], says);
+    refused(&folder, &["train", "d.csv", "--centres", "4", "-o", "./d.csv"], says);
+    refused(&folder, &["decode", "m.bin", "d.csv", "-o", "m.bin"], says);
+    refused(&folder, &["decode", "m.bin", "d.csv", "-o", "d.csv"], says);
+    refused(&folder, &["forward", "scene.toml", "d.csv", "-o", "d.csv"], says);
+    assert_eq!([whole("scene.toml"), whole("m.bin"), whole("d.csv")], before);
+}
+
+#[test]
+fn what_cannot_be_done_is_found_before_anything_is_written() {
+    let folder = Folder::new("before");
+    folder.write("scene.toml", small_scene());
+    let groups = &["--group dq_mm", "dx_mm, dy_mm, dz_mm"][..];
+    refused(&folder, &["table1", "scene.toml", "--group", "dq_mm", "-o", "t.csv"], groups);
+    refused(&folder, &["table1", "scene.toml", "--noise", "0.1"], &["--noise"]);
+    let enormous = &["100000000", "does not fit in memory"][..];
+    refused(&folder, &["synth", "press", "-n", "100000000", "-o", "d.csv"], enormous);
+    std::fs::create_dir_all(folder.path("out/small/report.html")).unwrap();
+    refused(&folder, &["run", "scene.toml"], &["cannot write", "report.html"]);
+    assert_eq!(std::fs::read_dir(folder.path("out/small")).unwrap().count(), 1);
+}
+
+#[test]
+fn nothing_to_evaluate_is_an_error_and_less_is_said() {
+    let folder = Folder::new("evaluate");
+    folder.write("scene.toml", small_scene());
+    folder.succeed(&["train", "scene.toml", "-n", "200", "-o", "m.bin"]);
+    folder.succeed(&["synth", "scene.toml", "-n", "2", "-o", "d.csv"]);
+    let data = std::fs::read_to_string(folder.path("d.csv")).unwrap();
+    let mut lines: Vec<Vec<&str>> = data.lines().map(|line| line.split(',').collect()).collect();
+    lines[1][0] = "1e39"; // beyond f32: missing to the device
+    let text = |lines: &[Vec<&str>]| lines.iter().map(|l| l.join(",") + "\n").collect::<String>();
+    folder.write("less.csv", text(&lines));
+    let page = folder.succeed(&["eval", "m.bin", "less.csv"]);
+    assert!(page.contains("54 of 72 values count"), "{page}");
+    let page = folder.succeed(&["decode", "m.bin", "less.csv", "-o", "e.csv"]);
+    assert!(page.contains("1 of them"), "{page}");
+    lines.truncate(2);
+    lines[1][20] = "";
+    folder.write("none.csv", text(&lines));
+    refused(&folder, &["eval", "m.bin", "none.csv"], &["none.csv", "no line has both"]);
+}
+
+#[test]
+fn a_link_is_followed_and_permissions_stay() {
+    use std::os::unix::fs::{PermissionsExt, symlink};
+    let folder = Folder::new("links");
+    folder.write("scene.toml", small_scene());
+    let real = folder.write("real.csv", "old");
+    std::fs::set_permissions(&real, std::fs::Permissions::from_mode(0o600)).unwrap();
+    symlink("real.csv", folder.path("link.csv")).unwrap();
+    folder.succeed(&["synth", "scene.toml", "-n", "3", "-o", "link.csv"]);
+    assert!(folder.path("link.csv").is_symlink());
+    assert_eq!(std::fs::read_to_string(&real).unwrap().lines().count(), 4);
+    assert_eq!(std::fs::metadata(&real).unwrap().permissions().mode() & 0o777, 0o600);
+    let printed = folder.succeed(&["synth", "scene.toml", "-n", "3", "-o", "/dev/stdout"]);
+    assert!(printed.starts_with("r4c1_ohm,"), "{printed}");
 }

@@ -14,6 +14,8 @@ pub enum RowStatus {
     Decoded,
     /// At least one reading was missing (not a finite number); the outputs are NaN.
     MissingReading,
+    /// Readings or weights so large that an output overflowed; the outputs are NaN.
+    Overflow,
 }
 
 /// The outputs of every row, in the units of the model's output columns.
@@ -95,8 +97,12 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKerne
             }
             // The shape was checked when the blob was loaded.
             if let Ok(inferred) = network.infer_array::<E, COLS, OUTPUTS>(readings) {
-                *outputs = inferred;
-                *status = RowStatus::Decoded;
+                if inferred.iter().all(|y| y.is_finite()) {
+                    *outputs = inferred;
+                    *status = RowStatus::Decoded;
+                } else {
+                    *status = RowStatus::Overflow;
+                }
             }
         }
         estimate

@@ -5,8 +5,8 @@
 //! borrowed, and the shape is part of the value, so that one firmware serves any K.
 //!
 //! The order of the floating-point operations is part of the contract: ‖x − c‖² accumulates in
-//! four interleaved partial sums, added pairwise, and the outputs take bias, affine tail, then one
-//! centre after the other. Host and device thus agree bit for bit, with or without SIMD.
+//! four interleaved partial sums, added pairwise, and the outputs take the affine tail, one centre
+//! after the other, and last the bias, so that a large offset costs no digits of the rest. Host and device thus agree bit for bit, with or without SIMD.
 
 use crate::exp::ExpKernel;
 use crate::scale::scale;
@@ -234,9 +234,7 @@ fn evaluate<E: ExpKernel>(
     for ((x, &r), (&minimum, &per_span)) in scaled.iter_mut().zip(reading).zip(limits) {
         *x = scale(r, minimum, per_span);
     }
-    for (y, &b) in output.iter_mut().zip(p.bias) {
-        *y = b;
-    }
+    output.fill(0.0);
     // `max(1)`: a checked network has no empty dimension; this tells the compiler.
     let inputs = scaled.len().max(1);
     let outputs = output.len().max(1);
@@ -249,6 +247,9 @@ fn evaluate<E: ExpKernel>(
         let decay = p.decay.get(k).copied().unwrap_or(common);
         let activation = E::exp(-decay * squared_distance(scaled, centre));
         accumulate(output, activation, weights);
+    }
+    for (y, &b) in output.iter_mut().zip(p.bias) {
+        *y += b;
     }
 }
 

@@ -27,7 +27,7 @@ pub trait Real:
     const ZERO: Self;
     /// 1.
     const ONE: Self;
-    /// Diagonals below this carry no digit any more (smallest normal number / epsilon).
+    /// √(smallest normal number): a diagonal or an entry below it squares to nothing.
     const NEGLIGIBLE: Self;
     /// Square root.
     #[must_use]
@@ -37,11 +37,11 @@ pub trait Real:
 }
 
 macro_rules! real {
-    ($float:ident, $sqrt:path) => {
+    ($float:ident, $sqrt:path, $negligible:expr) => {
         impl Real for $float {
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
-            const NEGLIGIBLE: Self = $float::MIN_POSITIVE / $float::EPSILON;
+            const NEGLIGIBLE: Self = $negligible;
             #[inline]
             fn sqrt(self) -> Self {
                 $sqrt(self)
@@ -53,8 +53,8 @@ macro_rules! real {
         }
     };
 }
-real!(f32, libm::sqrtf);
-real!(f64, libm::sqrt);
+real!(f32, libm::sqrtf, 1.084_202_2e-19);
+real!(f64, libm::sqrt, 1.491_668_146_240_041_3e-154);
 
 /// Why a recursion cannot be started.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

@@ -103,6 +103,24 @@ fn a_decoder_marks_rows_with_missing_readings_and_leaves_the_others() {
 }
 
 #[test]
+fn readings_that_overflow_are_told_from_missing_ones() {
+    let mut buffer = Aligned([0; 512]);
+    let parameters = Parameters {
+        input_minimum: &[-3e38, 60.0],
+        input_per_span: &[0.0, 0.0625],
+        ..*network().parameters()
+    };
+    let networks = [Network::try_new(network().shape(), parameters).unwrap()];
+    let parts = ModelParts { networks: &networks, row_network: &[0, 0], metadata: metadata() };
+    let blob = encode(&parts, &mut buffer.0).unwrap();
+    let decoder = Decoder::<2, 2, 1, Libm>::load(blob).unwrap();
+    let frame = Frame { row_column_resistance_ohm: [[3e38, 64.0], [54.0, 64.0]] };
+    let estimate = decoder.decode(&frame);
+    assert_eq!(estimate.status, [RowStatus::Overflow, RowStatus::Decoded]);
+    assert!(estimate.outputs[0][0].is_nan() && estimate.outputs[1][0].is_finite());
+}
+
+#[test]
 fn a_slot_larger_than_its_blob_tells_the_blobs_length() {
     let mut buffer = Aligned([0xff; 512]);
     let length = small_model(&mut buffer.0).len();

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use host_sim::data_file::{self, DataFile};
 use host_sim::dataset::Table;
-use host_sim::infer::Kernel;
+use host_sim::infer::{Kernel, is_missing};
 use host_sim::model::LoadedModel;
 use host_sim::{Result, output};
 use serde::Serialize;
@@ -41,12 +41,12 @@ struct Summary {
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let loaded = LoadedModel::read(&arguments.model)?;
     let file = DataFile::read(&arguments.readings)?;
-    output::check_writable(&arguments.output)?;
+    output::check_writable(&arguments.output, &[&arguments.model, &arguments.readings])?;
     let readings = model_inputs(&loaded, &file)?;
     let estimate = loaded.decode(arguments.kernel, &readings);
     let names = estimate.names.iter().map(String::as_str);
     data_file::write(&arguments.output, names, estimate.lines().map(|l| l.iter().copied()))?;
-    let incomplete = readings.lines().filter(|line| line.iter().any(|v| v.is_nan())).count();
+    let incomplete = readings.lines().filter(|line| line.iter().any(|v| is_missing(*v))).count();
     let summary = Summary {
         frames: estimate.len(),
         frames_with_missing_readings: incomplete,

@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use host_sim::Result;
 use host_sim::data_file::DataFile;
 use host_sim::evaluate::metrics::{self, Errors, Measure};
 use host_sim::infer::Kernel;
 use host_sim::model::LoadedModel;
+use host_sim::{Error, Result};
 use serde::Serialize;
 
 use super::{Common, decode, print};
@@ -28,6 +28,10 @@ pub struct Arguments {
 #[derive(Serialize)]
 struct Summary {
     frames: usize,
+    /// True outputs in the file.
+    values: usize,
+    /// Those that count: neither they nor a reading they need is missing.
+    values_evaluated: usize,
     kernel: Kernel,
     errors: Vec<Errors>,
     /// Errors of answering the mean of these very outputs.
@@ -47,17 +51,37 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         full_scale: metadata.full_scale.iter().map(f64::from).collect(),
         thickness_mm: (thickness_mm > 0.0).then_some(thickness_mm),
     };
+    // The mean is judged on the same pairs as the model.
+    let mut means = truth.means().repeat(truth.len());
+    for (mean, estimate) in means.iter_mut().zip(&estimate.values) {
+        *mean += if estimate.is_nan() { f64::NAN } else { 0.0 };
+    }
+    let errors = metrics::by_group(&truth, &estimate.values, &measure);
+    if errors.iter().all(|group| group.count == 0) {
+        return Err(Error::Data {
+            path: arguments.data.clone(),
+            message: "no line has both the model's readings and a true output; fill them in".into(),
+        });
+    }
     let summary = Summary {
         frames: readings.len(),
+        values: truth.values.len(),
+        values_evaluated: errors.iter().map(|group| group.count).sum(),
         kernel: arguments.kernel,
-        errors: metrics::by_group(&truth, &estimate.values, &measure),
-        mean_errors: metrics::by_group(&truth, &truth.column_means(), &measure),
+        errors,
+        mean_errors: metrics::by_group(&truth, &means, &measure),
     };
     if common.json {
         return print::json(&summary);
     }
     let mut page = print::Page::default();
     page.line(format_args!("{} frames of {}", summary.frames, arguments.data.display()));
+    if summary.values_evaluated < summary.values {
+        page.line(format_args!(
+            "{} of {} values count; the others, or readings they need, are missing",
+            summary.values_evaluated, summary.values
+        ));
+    }
     print::errors(&mut page, &[("model", &summary.errors), ("mean", &summary.mean_errors)]);
     print::errors_legend(&mut page);
     page.print()

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use host_sim::data_file::{self, DataFile};
 use host_sim::scene::Scene;
-use host_sim::{Result, columns, output, synth};
+use host_sim::{Result, output, synth};
 use serde::Serialize;
 
 use super::{Common, print};
@@ -33,9 +33,9 @@ struct Summary {
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let scene = Scene::load(&arguments.scene)?;
     let file = DataFile::read(&arguments.deformation)?;
-    output::check_writable(&arguments.output)?;
+    output::check_writable(&arguments.output, &[&arguments.deformation, arguments.scene.as_ref()])?;
     let readings = synth::forward(&scene, &file)?;
-    let names = columns::reading_names(&scene);
+    let names = scene.reading_names();
     let lines = readings.chunks_exact(names.len()).map(|line| line.iter().copied());
     data_file::write(&arguments.output, names.iter().map(String::as_str), lines)?;
     let summary =

@@ -5,12 +5,15 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use host_sim::progress::Progress;
 use host_sim::run::{self, RunResult};
+use host_sim::scene::Scene;
 use host_sim::{Error, Result, output, report};
 
-use super::scene_argument::SceneArgument;
+use super::scene_argument::{NoiseArgument, SceneArgument};
 use super::{Common, print};
 
 const DEFAULT_OUTPUT: &str = "out";
+/// All files that a run may write.
+const FILES: [&str; 4] = ["model.bin", "metrics.json", "table1.csv", "report.html"];
 
 /// Run a scene: synthesise, train, write the blob, read it back, decode, evaluate, report.
 ///
@@ -20,6 +23,8 @@ const DEFAULT_OUTPUT: &str = "out";
 pub struct Arguments {
     #[command(flatten)]
     scene: SceneArgument,
+    #[command(flatten)]
+    noise: NoiseArgument,
     /// Folder that receives a folder named after the scene.
     #[arg(short, long, value_name = "DIR", default_value = DEFAULT_OUTPUT)]
     output: PathBuf,
@@ -27,23 +32,39 @@ pub struct Arguments {
 
 impl Default for Arguments {
     fn default() -> Self {
-        Self { scene: SceneArgument::default(), output: DEFAULT_OUTPUT.into() }
+        Self {
+            scene: SceneArgument::default(),
+            noise: NoiseArgument::default(),
+            output: DEFAULT_OUTPUT.into(),
+        }
     }
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let scene = arguments.scene.load(common)?;
+    let mut scene = arguments.scene.load(common)?;
+    arguments.noise.apply(&mut scene)?;
     let folder = arguments.output.join(&scene.name);
-    std::fs::create_dir_all(&folder)
-        .map_err(|cause| Error::Write { path: folder.clone(), cause })?;
-    output::check_writable(&folder.join("model.bin"))?;
+    let folder_is_new = !folder.exists();
+    let outcome = run_into(&folder, &scene, arguments.scene.path(), common);
+    if outcome.is_err() && folder_is_new {
+        // Removes it only if it is empty: what was written stays.
+        let _ = std::fs::remove_dir(&folder);
+    }
+    outcome
+}
+
+fn run_into(folder: &Path, scene: &Scene, scene_path: &Path, common: &Common) -> Result<()> {
+    std::fs::create_dir_all(folder).map_err(|cause| Error::Write { path: folder.into(), cause })?;
+    for file in FILES {
+        output::check_writable(&folder.join(file), &[scene_path])?;
+    }
     let started = std::time::Instant::now();
-    let (result, blob) = run::run(&scene, &Progress::on_terminal())?;
-    let files = write_files(&folder, &result, &blob)?;
+    let (result, blob) = run::run(scene, &Progress::on_terminal())?;
+    let files = write_files(folder, &result, &blob)?;
     if common.json {
         return print::json(&result);
     }
-    page_of(&result, &folder, &files).print()?;
+    page_of(&result, folder, &files).print()?;
     eprintln!("done in {:.1} s", started.elapsed().as_secs_f64());
     Ok(())
 }

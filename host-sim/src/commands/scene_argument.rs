@@ -1,5 +1,7 @@
 //! The scene argument, and the overrides that commands share.
 
+use std::path::Path;
+
 use clap::Args;
 use host_sim::Result;
 use host_sim::scene::Scene;
@@ -14,14 +16,11 @@ pub struct SceneArgument {
     /// A built-in scene (paper, press) or the path of a scene file.
     #[arg(default_value = DEFAULT_SCENE)]
     scene: String,
-    /// Noise level as a fraction (0.01 is 1 %), instead of the scene's.
-    #[arg(long, value_name = "LEVEL")]
-    noise: Option<f64>,
 }
 
 impl Default for SceneArgument {
     fn default() -> Self {
-        Self { scene: DEFAULT_SCENE.into(), noise: None }
+        Self { scene: DEFAULT_SCENE.into() }
     }
 }
 
@@ -30,9 +29,31 @@ impl SceneArgument {
     pub fn load(&self, common: &Common) -> Result<Scene> {
         let mut scene = Scene::load(&self.scene)?;
         scene.seed = common.seed.unwrap_or(scene.seed);
-        if let Some(level) = self.noise {
-            scene.set_noise_level(level)?;
-        }
         Ok(scene)
+    }
+
+    /// The scene's path, as an input that must not be written over.
+    pub fn path(&self) -> &Path {
+        Path::new(&self.scene)
+    }
+}
+
+/// Another noise level than the scene's.
+#[derive(Args, Default)]
+pub struct NoiseArgument {
+    /// Noise level as a fraction (0.01 is 1 %), instead of the scene's.
+    #[arg(long, value_name = "LEVEL", allow_negative_numbers = true)]
+    noise: Option<f64>,
+}
+
+impl NoiseArgument {
+    /// Applies the level, if one was given.
+    pub fn apply(&self, scene: &mut Scene) -> Result<()> {
+        self.noise.map_or(Ok(()), |level| scene.set_noise_level(level))
+    }
+
+    /// Whether a level was given.
+    pub fn is_given(&self) -> bool {
+        self.noise.is_some()
     }
 }

@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 use host_sim::random::Stream;
-use host_sim::{Error, Result, data_file, output, synth};
+use host_sim::{Result, data_file, output, synth};
 use serde::Serialize;
 
-use super::scene_argument::SceneArgument;
+use super::scene_argument::{NoiseArgument, SceneArgument};
 use super::{Common, print};
 
 /// Synthesise frames of a scene: noisy readings and true outputs, as CSV.
@@ -16,6 +16,8 @@ use super::{Common, print};
 pub struct Arguments {
     #[command(flatten)]
     scene: SceneArgument,
+    #[command(flatten)]
+    noise: NoiseArgument,
     /// Frames to synthesise.
     #[arg(short = 'n', long, value_name = "N", default_value_t = 1000)]
     frames: usize,
@@ -34,12 +36,10 @@ struct Summary {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let scene = arguments.scene.load(common)?;
-    if !(1..=100_000_000).contains(&arguments.frames) {
-        let message = format!("-n {}: give from 1 to 100000000 frames", arguments.frames);
-        return Err(Error::Usage(message));
-    }
-    output::check_writable(&arguments.output)?;
+    let mut scene = arguments.scene.load(common)?;
+    arguments.noise.apply(&mut scene)?;
+    scene.check_frames("-n", arguments.frames)?;
+    output::check_writable(&arguments.output, &[arguments.scene.path()])?;
     let dataset = synth::synthesise(&scene, Stream::Training, arguments.frames);
     let names = dataset.inputs.names.iter().chain(&dataset.outputs.names).map(String::as_str);
     let lines = dataset.inputs.lines().zip(dataset.outputs.lines());

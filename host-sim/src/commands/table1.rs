@@ -7,7 +7,7 @@ use host_sim::data_file::DataFile;
 use host_sim::evaluate::metrics::{Definition, Errors};
 use host_sim::evaluate::table1::{self, PAPER_PRINTED_PERCENT, Printed, Table1};
 use host_sim::progress::Progress;
-use host_sim::{Result, output};
+use host_sim::{Error, Result, columns, output};
 
 use super::scene_argument::SceneArgument;
 use super::{Common, print};
@@ -35,8 +35,15 @@ pub struct Arguments {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let scene = arguments.scene.load(common)?;
+    let names = scene.output_names();
+    let groups: Vec<&str> = columns::groups(&names).into_iter().map(|(group, _)| group).collect();
+    if !groups.contains(&arguments.group.as_str()) {
+        let message = format!("--group {}: the scene has {}", arguments.group, groups.join(", "));
+        return Err(Error::Usage(message));
+    }
     if let Some(path) = &arguments.output {
-        output::check_writable(path)?;
+        let printed = arguments.printed.as_deref().unwrap_or(arguments.scene.path());
+        output::check_writable(path, &[arguments.scene.path(), printed])?;
     }
     let printed = match &arguments.printed {
         Some(path) => Printed::from_file(&DataFile::read(path)?)?,
@@ -50,14 +57,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if common.json {
         return print::json(&table);
     }
-    page_of(&table, &arguments.group)?.print()
+    page_of(&table, &arguments.group).print()
 }
 
-fn page_of(table: &Table1, group: &str) -> Result<print::Page> {
-    if !table.groups().contains(&group) {
-        let message = format!("--group {group}: the scene has {}", table.groups().join(", "));
-        return Err(host_sim::Error::Usage(message));
-    }
+fn page_of(table: &Table1, group: &str) -> print::Page {
     let mut page = print::Page::default();
     page.line(format_args!(
         "{group}: K = {}, affine tail: {}, {} training and {} test frames; standard: K = N = {}",
@@ -110,7 +113,7 @@ fn page_of(table: &Table1, group: &str) -> Result<print::Page> {
             ));
         }
     }
-    Ok(page)
+    page
 }
 
 fn percent(level: f64) -> String {

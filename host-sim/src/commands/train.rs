@@ -1,6 +1,5 @@
 //! `train`: from a scene or any CSV file to a weight blob.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -15,6 +14,7 @@ use host_sim::train::{self, Options};
 use host_sim::{Error, Result, columns, output, synth};
 use serde::Serialize;
 
+use super::scene_argument::NoiseArgument;
 use super::{Common, print};
 
 /// Train a model on a scene or on a CSV file, and write its weight blob.
@@ -56,6 +56,8 @@ pub struct Arguments {
     /// Column of a CSV file that gives each line's fold (any numbers), instead of random folds.
     #[arg(long, value_name = "NAME", requires = "select", conflicts_with = "folds")]
     fold_column: Option<String>,
+    #[command(flatten)]
+    noise: NoiseArgument,
     /// Frames to synthesise from a scene, instead of the scene's number.
     #[arg(short = 'n', long, value_name = "N")]
     frames: Option<usize>,
@@ -85,7 +87,7 @@ struct Summary {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    output::check_writable(&arguments.output)?;
+    output::check_writable(&arguments.output, &[Path::new(&arguments.source)])?;
     let is_scene = EMBEDDED.iter().any(|(name, _)| *name == arguments.source)
         || Path::new(&arguments.source).extension().is_some_and(|e| e == "toml");
     let source =
@@ -138,10 +140,9 @@ fn from_scene(arguments: &Arguments, common: &Common) -> Result<Source> {
     }
     let mut scene = Scene::load(&arguments.source)?;
     scene.seed = common.seed.unwrap_or(scene.seed);
+    arguments.noise.apply(&mut scene)?;
     let frames = arguments.frames.unwrap_or(scene.training.frames);
-    if !(2..=100_000_000).contains(&frames) {
-        return Err(Error::Usage(format!("-n {frames}: give from 2 to 100000000 frames")));
-    }
+    scene.check_frames("-n", frames)?;
     let t = &scene.training;
     Ok(Source {
         dataset: synth::synthesise(&scene, Stream::Training, frames),
@@ -154,6 +155,9 @@ fn from_scene(arguments: &Arguments, common: &Common) -> Result<Source> {
 fn from_data(arguments: &Arguments, common: &Common) -> Result<Source> {
     if arguments.frames.is_some() {
         return Err(Error::Usage("-n sets a scene's frames; a CSV file has its own".into()));
+    }
+    if arguments.noise.is_given() {
+        return Err(Error::Usage("--noise adds noise to a scene; a CSV file has its own".into()));
     }
     let path = Path::new(&arguments.source);
     let file = DataFile::read(path)?;
@@ -177,7 +181,7 @@ fn from_data(arguments: &Arguments, common: &Common) -> Result<Source> {
     })
 }
 
-/// Numbers the distinct values of column `name` from 0, in ascending order.
+/// Folds as column `name` gives them.
 fn folds_from(file: &DataFile, name: &str, lines: &[usize]) -> Result<Vec<usize>> {
     let column = file.column(name)?;
     let values: Vec<f64> = lines.iter().map(|line| file.value(*line, column)).collect();
@@ -190,13 +194,7 @@ fn folds_from(file: &DataFile, name: &str, lines: &[usize]) -> Result<Vec<usize>
             ),
         });
     }
-    let order = |value: &f64| {
-        let bits = value.to_bits();
-        if bits >> 63 == 1 { !bits } else { bits | 1 << 63 }
-    };
-    let mut number: BTreeMap<u64, usize> = values.iter().map(|v| (order(v), 0)).collect();
-    number.values_mut().enumerate().for_each(|(i, fold)| *fold = i);
-    Ok(values.iter().map(|value| number[&order(value)]).collect())
+    Ok(select::number_folds(&values))
 }
 
 fn one<T: Copy + std::fmt::Debug>(option: &str, given: &[T], default: T) -> Result<T> {
@@ -219,16 +217,29 @@ fn choose(arguments: &Arguments, source: &Source, options: &mut Options) -> Resu
             return Err(Error::Usage(message));
         }
     };
-    let or = |given: &[usize], usual: usize| {
-        if given.is_empty() { vec![usual / 2, usual, usual * 2] } else { given.to_vec() }
+    let centres = if arguments.centres.is_empty() {
+        // Around the usual K, as far as the smallest training part allows.
+        let largest = select::smallest_training_part(&fold_of).saturating_sub(1).max(1);
+        let usual = [options.centres / 2, options.centres, options.centres * 2];
+        let mut candidates = usual.map(|k| k.clamp(1, largest)).to_vec();
+        candidates.dedup();
+        candidates
+    } else {
+        arguments.centres.clone()
     };
-    let centres = or(&arguments.centres, options.centres);
     let spreads = if arguments.spread.is_empty() {
         vec![0.2, 0.3, 0.5, 0.8, 1.2, 2.0]
     } else {
         arguments.spread.clone()
     };
-    let selection = select::cross_validate(&source.dataset, &fold_of, &centres, &spreads, options)?;
+    let selection = select::cross_validate(
+        &source.dataset,
+        &fold_of,
+        &centres,
+        &spreads,
+        options,
+        &Progress::on_terminal(),
+    )?;
     options.centres = selection.best().centres;
     options.spread = selection.best().spread;
     Ok(selection)
@@ -240,6 +251,7 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         let groups = columns::groups(&summary.outputs);
         let names: Vec<&str> = groups.iter().map(|(group, _)| *group).collect();
         page.line(format_args!("cross-validated RMSE of {}:", names.join(", ")));
+        page.line("(score: mean over the outputs of RMSE/standard deviation; 1 is the mean's)");
         for (i, scored) in selection.scored.iter().enumerate() {
             let pooled = |members: &[usize]| {
                 let squares: f64 = members.iter().map(|column| scored.rmse[*column].powi(2)).sum();

@@ -146,7 +146,7 @@ fn of_columns(
     assert_eq!(measure.full_scale.len(), truth.names.len(), "a full scale for every column");
     let thickness_mm = measure.thickness_mm.filter(|_| columns::is_compression(group));
     let mut total = Sums::default();
-    let mut spread_squares = 0.0; // Σ(truth − its column's mean)²
+    let mut deviation_squares = 0.0; // Σ(truth − its column's mean)²
     for &column in members {
         let full_scale = measure.full_scale[column];
         let mut sums = Sums::default();
@@ -168,9 +168,12 @@ fn of_columns(
                 sums.relative_count += 1;
             }
         }
-        if sums.count > 0 {
-            let mean = sums.truth / sums.count as f64;
-            spread_squares += sums.truth_squares - mean * sums.truth;
+        // A second pass: Σtruth² − n·mean² would cancel for outputs with an offset.
+        let mean = sums.truth / sums.count as f64;
+        for (truth, estimate) in truth.lines().zip(estimate.chunks_exact(truth.names.len())) {
+            if !(estimate[column] - truth[column]).is_nan() {
+                deviation_squares += (truth[column] - mean) * (truth[column] - mean);
+            }
         }
         total.count += sums.count;
         total.error_squares += sums.error_squares;
@@ -190,7 +193,7 @@ fn of_columns(
         relative_l2_percent: finite(100.0 * (total.error_squares / total.truth_squares).sqrt()),
         full_scale_percent: finite(100.0 * total.full_scale / count),
         positional_percent: thickness_mm.and_then(|_| finite(100.0 * total.positional / count)),
-        r_squared: finite(1.0 - total.error_squares / spread_squares),
+        r_squared: finite(1.0 - total.error_squares / deviation_squares),
         mean_relative_percent: finite(100.0 * total.relative / total.relative_count as f64),
     }
 }
@@ -217,5 +220,17 @@ mod tests {
         close(z.r_squared, 1.0 - 0.25 / 0.5); // means are 0.5 and 1
         close(z.mean_relative_percent, 0.0); // the wrong one has truth 0
         assert_eq!((x.rmse, x.positional_percent), (0.0, None));
+    }
+
+    #[test]
+    fn the_mean_explains_nothing_whatever_the_offset() {
+        for offset in [0.0, 1e3, 1e6, 1e9] {
+            let values: Vec<f64> = (0..1000).map(|i| offset + f64::from(i % 37)).collect();
+            let truth = Table { names: vec!["b".into()], values };
+            let means = truth.means().repeat(truth.len());
+            let measure = Measure { full_scale: vec![1.0], thickness_mm: None };
+            let r_squared = by_group(&truth, &means, &measure)[0].r_squared.unwrap();
+            assert!(r_squared.abs() < 1e-9, "offset {offset}: {r_squared}");
+        }
     }
 }

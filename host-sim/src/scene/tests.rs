@@ -48,5 +48,5 @@ fn forces_have_their_own_full_scale_and_values() {
     assert_eq!((scene.full_scale(Axis::X), scene.full_scale(Axis::Z)), (1.0, 2.0));
     let outputs: Vec<f64> = scene.electrode_outputs([0.25, 9.0, 0.5]).collect();
     assert_eq!(outputs, [0.25, 1.0]);
-    assert_eq!(crate::columns::output_names(&scene)[1], "r1e1_fz_n");
+    assert_eq!(scene.output_names()[1], "r1e1_fz_n");
 }

@@ -1,6 +1,7 @@
 //! What a scene must satisfy. Every message names the field, its value and the fix.
 
 use super::{Deformation, Scene, Sensor, Table1, Training};
+use crate::spread::check_spread;
 
 type Check = Result<(), String>;
 
@@ -16,7 +17,30 @@ pub(super) fn validate(scene: &Scene) -> Check {
     readout(scene)?;
     outputs(scene)?;
     training(&scene.training)?;
-    scene.table1.as_ref().map_or(Ok(()), table1)
+    scene.table1.as_ref().map_or(Ok(()), table1)?;
+    let t = &scene.training;
+    let mut counts = vec![("training.frames", t.frames), ("training.test_frames", t.test_frames)];
+    if let Some(t) = &scene.table1 {
+        counts.extend([("table1.frames", t.frames), ("table1.test_frames", t.test_frames)]);
+    }
+    counts.into_iter().try_for_each(|(field, frames)| size(scene, field, frames))
+}
+
+/// Most numbers that one data set may hold: 4 GB.
+const MOST_VALUES: usize = 500_000_000;
+
+/// Checks that `frames` of `scene` fit in memory.
+pub(super) fn size(scene: &Scene, field: &str, frames: usize) -> Check {
+    let of_a_frame = scene.read_rows.len()
+        * (scene.sensor.column_wires
+            + scene.sensor.electrodes_per_row_wire * scene.outputs.axes.len());
+    let most = MOST_VALUES / of_a_frame;
+    require((1..=most).contains(&frames), || {
+        format!(
+            "{field} = {frames}: give from 1 to {most} frames; a frame has {of_a_frame} numbers, \
+             and a data set of more than {MOST_VALUES} does not fit in memory"
+        )
+    })
 }
 
 fn require(holds: bool, message: impl FnOnce() -> String) -> Check {
@@ -25,7 +49,7 @@ fn require(holds: bool, message: impl FnOnce() -> String) -> Check {
 
 fn positive(field: &str, value: f64) -> Check {
     require(value.is_finite() && value > 0.0, || {
-        format!("{field} = {value}: it must be a positive number")
+        format!("{field} = {value:?}: it must be a positive number")
     })
 }
 
@@ -151,7 +175,7 @@ fn outputs(scene: &Scene) -> Check {
 
 fn training(t: &Training) -> Check {
     frames("training", t.frames, t.test_frames, t.centres)?;
-    positive("training.spread", t.spread)
+    check_spread("training.spread", t.spread)
 }
 
 fn table1(t: &Table1) -> Check {
@@ -161,7 +185,7 @@ fn table1(t: &Table1) -> Check {
         "table1.noise_levels is empty: list at least one".to_owned()
     })?;
     for spread in &t.spreads {
-        positive("table1.spreads", *spread)?;
+        check_spread("table1.spreads", *spread)?;
     }
     for level in &t.noise_levels {
         noise_level("table1.noise_levels", *level)?;
@@ -177,10 +201,8 @@ fn table1(t: &Table1) -> Check {
 
 fn frames(section: &str, frames: usize, test_frames: usize, centres: usize) -> Check {
     count(&format!("{section}.centres"), centres, 65_535)?;
-    require((2..=100_000_000).contains(&frames), || {
-        format!("{section}.frames = {frames}: it must be from 2 to 100000000")
-    })?;
-    count(&format!("{section}.test_frames"), test_frames, 100_000_000)?;
+    require(frames >= 2, || format!("{section}.frames = {frames}: it must be at least 2"))?;
+    require(test_frames > 0, || format!("{section}.test_frames = 0: it must be at least 1"))?;
     require(centres < frames, || {
         format!(
             "{section}.centres = {centres}: there must be fewer centres than training frames \

@@ -29,12 +29,7 @@ impl LinearDecoder {
     /// Always answers the mean of `block`'s outputs.
     #[must_use]
     pub fn mean(block: &Block) -> Self {
-        let mut bias = vec![0.0; block.outputs.names.len()];
-        for line in block.outputs.lines() {
-            bias.iter_mut().zip(line).for_each(|(b, value)| *b += value);
-        }
-        bias.iter_mut().for_each(|b| *b /= block.outputs.len() as f64);
-        Self { scale: InputScale::of(block), slope: Vec::new(), bias }
+        Self { scale: InputScale::of(block), slope: Vec::new(), bias: block.outputs.means() }
     }
 
     /// Outputs for every line of `block`'s inputs.

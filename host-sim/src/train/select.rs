@@ -7,6 +7,7 @@ use super::{Options, Samples};
 use crate::dataset::Dataset;
 use crate::error::{Error, Result};
 use crate::infer::{Kernel, infer};
+use crate::progress::Progress;
 use crate::random::{Purpose, Random, Stream};
 
 /// What one candidate scored on the folds that it was not trained on.
@@ -18,7 +19,8 @@ pub struct Scored {
     pub spread: f64,
     /// RMSE of each output over all held-out samples, in the output's unit.
     pub rmse: Vec<f64>,
-    /// Mean over the outputs of RMSE/standard deviation: what is minimised.
+    /// Mean over the outputs of RMSE/standard deviation: what is minimised. Outputs that never
+    /// change do not count.
     pub score: f64,
 }
 
@@ -50,6 +52,26 @@ pub fn random_folds(frames: usize, folds: usize, seed: u64) -> Vec<usize> {
     assigned
 }
 
+/// Folds by `values`: equal values share one; folds are numbered from 0 by ascending value.
+#[must_use]
+pub fn number_folds(values: &[f64]) -> Vec<usize> {
+    let mut distinct = values.to_vec();
+    distinct.sort_by(f64::total_cmp);
+    distinct.dedup();
+    values.iter().map(|value| distinct.partition_point(|d| d.total_cmp(value).is_lt())).collect()
+}
+
+fn training_part(fold_of: &[usize], fold: usize) -> usize {
+    fold_of.iter().filter(|f| **f != fold).count()
+}
+
+/// Frames that the fold which leaves fewest is trained on.
+#[must_use]
+pub fn smallest_training_part(fold_of: &[usize]) -> usize {
+    let folds = fold_of.iter().max().map_or(0, |last| last + 1);
+    (0..folds).map(|fold| training_part(fold_of, fold)).min().unwrap_or(0)
+}
+
 /// Scores every pair of `centres` and `spreads` by cross-validation; `fold_of` gives each frame's
 /// fold, numbered from 0. Everything else comes from `options`.
 ///
@@ -61,6 +83,7 @@ pub fn cross_validate(
     centres: &[usize],
     spreads: &[f64],
     options: &Options,
+    progress: &Progress,
 ) -> Result<Selection> {
     let folds = fold_of.iter().max().map_or(0, |last| last + 1);
     if folds < 2 {
@@ -69,20 +92,24 @@ pub fn cross_validate(
         )));
     }
     for fold in 0..folds {
-        let training = fold_of.iter().filter(|f| **f != fold).count();
+        let training = training_part(fold_of, fold);
         for (&centres, &spread) in centres.iter().zip(spreads.iter().cycle()) {
             Options { centres, spread, ..*options }.check(training)?;
         }
     }
     for &spread in spreads {
-        Options { centres: 1, spread, ..*options }.check(1)?;
+        crate::spread::check_spread("spread", spread).map_err(Error::Usage)?;
     }
     let tasks: Vec<(usize, usize)> =
         centres.iter().flat_map(|k| (0..folds).map(move |fold| (*k, fold))).collect();
+    progress.stage("cross-validate", tasks.len());
     let squares: Vec<Vec<Vec<f64>>> = tasks
         .into_par_iter()
         .map(|(k, fold)| {
-            held_out_squares(dataset, fold_of, fold, spreads, &Options { centres: k, ..*options })
+            let options = Options { centres: k, ..*options };
+            let squares = held_out_squares(dataset, fold_of, fold, spreads, &options);
+            progress.step();
+            squares
         })
         .collect::<Result<_>>()?;
 
@@ -143,17 +170,79 @@ fn held_out_squares(
     Ok(squares)
 }
 
+/// Standard deviation of every output; 0 for one that does not change as far as f32 can tell.
 fn standard_deviations(dataset: &Dataset) -> Vec<f64> {
-    let (n, count) = (dataset.outputs.names.len(), dataset.frames() as f64);
-    let mut means = vec![0.0; n];
+    let means = dataset.outputs.means();
+    let mut squares = vec![0.0; means.len()];
     for line in dataset.outputs.lines() {
-        means.iter_mut().zip(line).for_each(|(m, v)| *m += v / count);
-    }
-    let mut variances = vec![0.0; n];
-    for line in dataset.outputs.lines() {
-        for (variance, (value, mean)) in variances.iter_mut().zip(line.iter().zip(&means)) {
-            *variance += (value - mean) * (value - mean) / count;
+        for (square, (value, mean)) in squares.iter_mut().zip(line.iter().zip(&means)) {
+            *square += (value - mean) * (value - mean);
         }
     }
-    variances.into_iter().map(f64::sqrt).collect()
+    let resolved = |deviation: f64, [low, high]: [f64; 2]| {
+        let smallest = f64::from(f32::EPSILON) * low.abs().max(high.abs());
+        if deviation > smallest { deviation } else { 0.0 }
+    };
+    let ranges = dataset.outputs.ranges();
+    let deviations = squares.into_iter().map(|square| (square / dataset.frames() as f64).sqrt());
+    deviations.zip(ranges).map(|(deviation, range)| resolved(deviation, range)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::Table;
+
+    /// y follows two inputs; `constant` says nothing.
+    fn dataset(outputs: &[&str]) -> Dataset {
+        let mut random = Random::new(3, Stream::Training, Purpose::Noise, 0, 0);
+        let (mut inputs, mut values) = (Vec::new(), Vec::new());
+        for _ in 0..400 {
+            let (a, b) = (random.unit(), random.unit());
+            inputs.extend([a, b]);
+            let of = |name: &&str| if *name == "y" { (9.0 * a).sin() * b } else { 5.0 };
+            values.extend(outputs.iter().map(of));
+        }
+        let names = |list: &[&str]| list.iter().map(|n| (*n).to_owned()).collect();
+        Dataset {
+            inputs: Table { names: names(&["a", "b"]), values: inputs },
+            outputs: Table { names: names(outputs), values },
+            rows: 1,
+        }
+    }
+
+    fn best_spread(outputs: &[&str]) -> f64 {
+        let dataset = dataset(outputs);
+        let folds = random_folds(dataset.frames(), 4, 1);
+        let options = Options::new(1, 1.0, true, 1);
+        let spreads = [0.05, 0.2, 3.0];
+        let progress = Progress::silent();
+        let selection =
+            cross_validate(&dataset, &folds, &[20], &spreads, &options, &progress).unwrap();
+        assert_eq!(selection.scored.len(), 3);
+        selection.best().spread
+    }
+
+    #[test]
+    fn the_better_spread_is_chosen_whatever_stands_beside() {
+        assert_eq!(best_spread(&["y"]), 0.2);
+        assert_eq!(best_spread(&["y", "constant"]), 0.2);
+    }
+
+    #[test]
+    fn equal_values_share_a_fold() {
+        assert_eq!(number_folds(&[7.0, -1.0, 7.0, 0.5]), [2, 0, 2, 1]);
+        assert_eq!(smallest_training_part(&[2, 0, 2, 1]), 2);
+    }
+
+    #[test]
+    fn random_folds_are_equal_in_number_and_seeded() {
+        let folds = random_folds(103, 5, 7);
+        for fold in 0..5 {
+            let count = folds.iter().filter(|f| **f == fold).count();
+            assert!((20..=21).contains(&count));
+        }
+        assert_eq!(folds, random_folds(103, 5, 7));
+        assert_ne!(folds, random_folds(103, 5, 8));
+    }
 }

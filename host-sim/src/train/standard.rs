@@ -20,7 +20,8 @@ pub struct StandardNetwork {
 
 impl StandardNetwork {
     /// Interpolates all samples of `block` with width `spread`; `None` where the interpolation
-    /// matrix is singular to working precision (duplicates, or a spread far above the distances).
+    /// matrix is singular (duplicates), or so nearly that the solution misses the samples by more
+    /// than a thousandth (a spread far above the distances).
     #[must_use]
     pub fn fit(block: &Block, spread: f64) -> Option<Self> {
         let samples = Samples::new(block);
@@ -40,8 +41,12 @@ impl StandardNetwork {
             (0..count).for_each(|j| interpolation[(i, j)] = row[j]);
         }
         let targets = DMatrix::from_row_slice(count, outputs, &block.outputs.values);
-        let solved = interpolation.lu().solve(&targets)?;
+        let solved = interpolation.clone().lu().solve(&targets)?;
         if !solved.iter().all(|w| w.is_finite()) {
+            return None;
+        }
+        let residual = (&interpolation * &solved - &targets).norm();
+        if residual > 1e-3 * targets.norm() {
             return None;
         }
         let weights = solved.transpose().as_slice().to_vec();

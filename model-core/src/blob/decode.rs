@@ -47,8 +47,8 @@ impl<'a> Model<'a> {
     /// Checks `blob` from end to end and borrows from it.
     ///
     /// # Errors
-    /// Every variant of [`DecodeError`] but `ShapeMismatch`, in the order in which they are
-    /// declared: address, magic, version, length, CRC, then the sections.
+    /// Every variant of [`DecodeError`] but `ShapeMismatch`. Checked in this order: address, magic,
+    /// version, length, CRC, shape, then the sections.
     pub fn decode(blob: &'a [u8]) -> Result<Self, DecodeError> {
         if !(blob.as_ptr() as usize).is_multiple_of(FLOAT_ALIGNMENT) {
             return Err(DecodeError::Misaligned);
@@ -259,7 +259,7 @@ fn take_network(
     }
     let (block, rest) = take::<&[u8]>(rest, SECTION)?;
     let lengths = BlockLengths::new(&header, shape.inputs, shape.outputs);
-    check_count("bytes of weights", lengths.total() * 4, block.len())?;
+    check_count("bytes of weights", lengths.bytes(), block.len())?;
     let floats = bytemuck::try_cast_slice::<u8, f32>(block)
         .map_err(|_| DecodeError::Malformed { section: "padding" })?;
 

@@ -139,7 +139,7 @@ impl Writer<'_> {
             common_width: p.decay.len() == 1,
             affine: !p.affine.is_empty(),
         };
-        let bytes = 4 * BlockLengths::new(&header, shape.inputs, shape.outputs).total();
+        let bytes = BlockLengths::new(&header, shape.inputs, shape.outputs).bytes();
         self.put(&header)?;
         let length = u32::try_from(bytes).map_err(|_| EncodeError::TooLarge {
             what: "bytes of one network",

@@ -99,15 +99,26 @@ impl BlockLengths {
         let centres = usize::from(header.centres);
         Self {
             inputs,
-            centres: centres * inputs,
+            centres: centres.saturating_mul(inputs),
             decay: if header.common_width { 1 } else { centres },
-            output_weights: centres * outputs,
+            output_weights: centres.saturating_mul(outputs),
             bias: outputs,
-            affine: if header.affine { inputs * outputs } else { 0 },
+            affine: if header.affine { inputs.saturating_mul(outputs) } else { 0 },
         }
     }
 
-    pub fn total(&self) -> usize {
-        2 * self.inputs + self.centres + self.decay + self.output_weights + self.bias + self.affine
+    /// Bytes of the whole block; the largest `usize` where that does not hold it (no block is so long).
+    pub fn bytes(&self) -> usize {
+        [
+            self.inputs,
+            self.inputs,
+            self.centres,
+            self.decay,
+            self.output_weights,
+            self.bias,
+            self.affine,
+        ]
+        .into_iter()
+        .fold(0_usize, |sum, floats| sum.saturating_add(floats.saturating_mul(4)))
     }
 }
