@@ -12,8 +12,8 @@ pub type PaperSensor<'a, E = Polynomial> = Tactile<'a, 8, 18, 18, E>;
 /// quantities a row.
 ///
 /// There is no state without a model: one that cannot be loaded makes no sensor, and one that
-/// cannot be exchanged leaves the one before. `E` is the [exp kernel](model_core::exp). RAM: about
-/// 70 bytes a row on a 32-bit target; the weights stay where the blob lies.
+/// cannot be exchanged leaves the one before. `E` is the [exp kernel](model_core::exp). RAM: see
+/// [`decoder_ram_bytes`](model_core::decoder_ram_bytes); the weights stay where the blob lies.
 ///
 /// ```
 /// use firmware::Tactile;

@@ -27,6 +27,13 @@ pub struct Estimate<const ROWS: usize, const OUTPUTS: usize> {
     pub status: [RowStatus; ROWS],
 }
 
+/// RAM in bytes that a [`Decoder`] of so many `rows` takes on a 32-bit target, whatever its K: slices
+/// into the blob, a network a row. The link check of the firmware holds it to the compiler.
+#[must_use]
+pub const fn decoder_ram_bytes(rows: usize) -> usize {
+    128 + 68 * rows
+}
+
 /// A model ready to decode frames of a sensor whose sizes are known when compiled.
 ///
 /// Any number of centres K is served: it comes with the blob. RAM: a few slices a row; the

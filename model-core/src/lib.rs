@@ -25,7 +25,7 @@ pub mod rls;
 pub mod scale;
 
 pub use blob::Aligned;
-pub use decoder::{Decoder, Estimate, RowStatus};
+pub use decoder::{Decoder, Estimate, RowStatus, decoder_ram_bytes};
 pub use frame::{ColumnWire, Frame, RowWire};
 
 /// The README's example is a test.

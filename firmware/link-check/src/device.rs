@@ -9,6 +9,9 @@ use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
 use model_core::rls::{self, Rls};
 use model_core::{ColumnWire, Frame, RowWire};
 
+/// What `host-sim inspect` tells users of RAM must hold here.
+const _: () = assert!(size_of::<PaperSensor<'static>>() <= model_core::decoder_ram_bytes(8));
+
 unsafe extern "C" {
     /// Defined nowhere: whatever reaches it does not link.
     fn taxel_reachable_panic() -> !;

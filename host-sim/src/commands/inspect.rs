@@ -44,9 +44,10 @@ struct NetworkSummary {
     affine_tail: bool,
 }
 
-/// RAM that the device needs for this shape, apart from its stack frames.
+/// RAM that a 32-bit device needs for this shape, apart from what its calls keep on the stack.
 #[derive(Serialize)]
 struct RamBytes {
+    decoder: usize,
     frame: usize,
     estimate: usize,
     scaled_readings: usize,
@@ -106,6 +107,7 @@ fn summarise(loaded: &LoadedModel) -> Summary {
         training_frames: metadata.training_frames,
         flash_bytes: loaded.bytes().len(),
         ram_bytes: RamBytes {
+            decoder: model_core::decoder_ram_bytes(shape.rows),
             frame: shape.rows * shape.inputs * float,
             estimate: shape.rows * (shape.outputs * float + 1),
             scaled_readings: shape.inputs * float,
@@ -150,8 +152,9 @@ fn page_of(s: &Summary) -> print::Page {
     line(
         "RAM",
         format!(
-            "{} bytes: frame {}, estimate {}, scaled readings {} (weights stay in flash)",
-            ram.frame + ram.estimate + ram.scaled_readings,
+            "{} bytes: decoder {}, frame {}, estimate {}, scaled readings {} (weights stay in flash)",
+            ram.decoder + ram.frame + ram.estimate + ram.scaled_readings,
+            ram.decoder,
             ram.frame,
             ram.estimate,
             ram.scaled_readings

@@ -143,3 +143,24 @@ fn the_standard_network_interpolates_its_samples_exactly() {
     twice.outputs.values.extend(block.outputs.values);
     assert!(StandardNetwork::fit(&twice, 0.05).is_none(), "duplicates cannot be interpolated");
 }
+
+/// A large offset, as of an absolute pressure, must not cost the network its digits.
+#[test]
+fn an_offset_of_the_outputs_costs_no_more_than_f32_itself() {
+    let rmse_at = |offset: f64| {
+        let mut block = block(500, 0.0);
+        block.outputs.values.iter_mut().for_each(|value| *value += offset);
+        let samples = Samples::new(&block);
+        let options = Options::new(30, 0.5, true, 1);
+        let fitted = samples.fit(&samples.centres(&options, 0), &options).unwrap();
+        let predicted = infer(&fitted.network(), Kernel::Polynomial, &block.inputs);
+        let squares = predicted.iter().zip(&block.outputs.values).map(|(p, t)| (p - t).powi(2));
+        (squares.sum::<f64>() / predicted.len() as f64).sqrt()
+    };
+    let without = rmse_at(0.0);
+    for offset in [1e3, 1e5, 1e6] {
+        let rmse = rmse_at(offset);
+        let half_an_ulp = offset * f64::from(f32::EPSILON) / 2.0;
+        assert!(rmse <= 1.01 * without + half_an_ulp, "offset {offset}: {rmse} and {without}");
+    }
+}
