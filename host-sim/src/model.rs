@@ -6,6 +6,7 @@ use model_core::blob::{
     self, Columns, Floats, Metadata, Model, ModelParts, NoiseKind as BlobNoiseKind,
 };
 use model_core::rbf::Network;
+use model_core::scale::CLAMP;
 use rayon::prelude::*;
 
 use crate::columns;
@@ -169,6 +170,33 @@ impl LoadedModel {
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
         self.bytes.as_slice()
+    }
+
+    /// Share of `readings` that inference clamps: outside the training range by more than an eighth
+    /// of it.
+    ///
+    /// # Panics
+    /// If `readings` has other columns than the model's inputs.
+    #[must_use]
+    pub fn share_out_of_range(&self, readings: &Table) -> f64 {
+        let model = self.model();
+        let networks: Vec<Network<'_>> = model.networks().collect();
+        let (mut clamped, mut present) = (0_usize, 0_usize);
+        for line in readings.lines() {
+            for (row, readings) in line.chunks_exact(model.shape().inputs).enumerate() {
+                let network = &networks[model.network_of_row(row).expect("row of the model")];
+                let p = network.parameters();
+                let limits = p.input_minimum.iter().zip(p.input_per_span);
+                for (reading, (minimum, per_span)) in readings.iter().zip(limits) {
+                    let place = (*reading as f32 - minimum) * per_span;
+                    if !place.is_nan() {
+                        present += 1;
+                        clamped += usize::from(!(CLAMP[0]..=CLAMP[1]).contains(&place));
+                    }
+                }
+            }
+        }
+        clamped as f64 / present.max(1) as f64
     }
 
     /// Decodes a table of readings whose columns are the model's inputs; NaN readings make the

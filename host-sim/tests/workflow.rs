@@ -65,6 +65,8 @@ fn columns_with_any_names_train_one_network() {
     ]);
     let chosen = json(&chosen);
     assert_eq!(chosen["selection"]["scored"].as_array().unwrap().len(), 4);
+    // The load is the sum of the two readings, so a linear decoder is exact.
+    assert!(chosen["selection"]["linear_rmse"][0].as_f64().unwrap() < 1e-6, "{chosen}");
     assert_eq!(chosen["outputs"], serde_json::json!(["load_n"]));
     assert!(chosen["training_rmse"][0].as_f64().unwrap() < 0.01, "{chosen}");
     folder.succeed(&["decode", "m.bin", "d.csv", "-o", "e.csv"]);
@@ -220,4 +222,21 @@ fn table1_shows_printed_values_beside_and_keeps_them() {
     assert!(page.contains("positional") && page.contains("7.25"), "{page}");
     let csv = std::fs::read_to_string(folder.path("t.csv")).unwrap();
     assert!(csv.ends_with("\n0.01,paper,0.5,dz_mm,as_printed,7.25\n"));
+}
+
+#[test]
+fn readings_of_another_sensor_are_remarked_upon() {
+    let folder = Folder::new("another");
+    folder.write("scene.toml", small_scene());
+    let thicker = small_scene().replace("[20.0, 18.0, 5.0]", "[20.0, 18.0, 7.0]");
+    folder.write("thicker.toml", thicker);
+    folder.succeed(&["train", "scene.toml", "-n", "500", "-o", "m.bin"]);
+    let remark = |scene: &str| {
+        folder.succeed(&["synth", scene, "-n", "100", "--seed", "2", "-o", "d.csv"]);
+        let output = folder.run(&["decode", "m.bin", "d.csv", "-o", "e.csv"]);
+        assert!(output.status.success());
+        String::from_utf8(output.stderr).unwrap()
+    };
+    assert_eq!(remark("scene.toml"), "");
+    assert!(remark("thicker.toml").contains("outside the range that the model was trained on"));
 }

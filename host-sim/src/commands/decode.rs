@@ -43,6 +43,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let file = DataFile::read(&arguments.readings)?;
     output::check_writable(&arguments.output, &[&arguments.model, &arguments.readings])?;
     let readings = model_inputs(&loaded, &file)?;
+    remark_on_range(&loaded, &readings);
     let estimate = loaded.decode(arguments.kernel, &readings);
     let names = estimate.names.iter().map(String::as_str);
     data_file::write(&arguments.output, names, estimate.lines().map(|l| l.iter().copied()))?;
@@ -64,6 +65,21 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         ));
     }
     page.print()
+}
+
+/// Share of clamped readings above which the model is likely to be another sensor's.
+const SUSPICIOUS: f64 = 0.01;
+
+/// Says on stderr if many readings lie outside what the model was trained on.
+pub fn remark_on_range(loaded: &LoadedModel, readings: &Table) {
+    let share = loaded.share_out_of_range(readings);
+    if share > SUSPICIOUS {
+        eprintln!(
+            "note: {:.1} % of the readings lie outside the range that the model was trained on, and \
+             are clamped; is it the right model for this sensor?",
+            100.0 * share
+        );
+    }
 }
 
 /// The model's reading columns of `file`.

@@ -10,11 +10,12 @@ use host_sim::model::LoadedModel;
 use host_sim::{Error, Result};
 use serde::Serialize;
 
+use super::decode::remark_on_range;
 use super::{Common, decode, print};
 
 /// Evaluate a model on a CSV file that holds readings and true outputs.
 #[derive(Args)]
-#[command(after_help = "Example: host-sim eval press.bin press.csv")]
+#[command(after_help = "Example: host-sim eval press.bin test.csv")]
 pub struct Arguments {
     /// Weight blob.
     model: PathBuf,
@@ -56,6 +57,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     for (mean, estimate) in means.iter_mut().zip(&estimate.values) {
         *mean += if estimate.is_nan() { f64::NAN } else { 0.0 };
     }
+    remark_on_range(&loaded, &readings);
     let errors = metrics::by_group(&truth, &estimate.values, &measure);
     if errors.iter().all(|group| group.count == 0) {
         return Err(Error::Data {

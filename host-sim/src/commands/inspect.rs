@@ -132,11 +132,14 @@ fn page_of(s: &Summary) -> print::Page {
     let mut line = |label: &str, value: String| page.line(format_args!("{label:<17} {value}"));
     line("model", format!("{:?}, format {}, CRC-32 {}", s.name, s.format_version, s.crc_32));
     line("trained on", format!("{} frames, digest {}", s.training_frames, s.scene_digest));
-    let noise = format!("{} {}", s.noise_kind, s.noise_level);
+    let noise = match s.noise_kind.as_str() {
+        "none" => "none added".to_owned(),
+        kind => format!("{kind} {}", s.noise_level),
+    };
     line("noise and seed", format!("{noise}, seed {}", s.seed));
     line(
         "shape",
-        format!("{} rows × {} readings → {} outputs", s.rows, s.inputs_per_row, s.outputs_per_row),
+        format!("{} × ({} readings → {} outputs)", s.rows, s.inputs_per_row, s.outputs_per_row),
     );
     for (index, network) in s.networks.iter().enumerate() {
         let (low, high) = network

@@ -61,7 +61,10 @@ pub fn errors(page: &mut Page, decoders: &[(&str, &[Errors])]) {
                 percent(Definition::RelativeL2Percent),
                 percent(Definition::FullScalePercent),
                 percent(Definition::PositionalPercent),
-                group.r_squared.map_or("-".into(), |value| format!("{value:.4}")),
+                // Adding 0 after rounding turns −0 into 0.
+                group
+                    .r_squared
+                    .map_or("-".into(), |r| format!("{:.4}", (r * 1e4).round() / 1e4 + 0.0)),
                 percent(Definition::MeanRelativePercent)
             ));
         }
@@ -81,6 +84,6 @@ fn number(value: f64) -> String {
 pub fn errors_legend(page: &mut Page) {
     page.line(format_args!(
         "rel. L2 = ‖e‖/‖Δ‖; %FS = mean|e|/full scale; position = mean|e|/(H − Δz); \
-         mean rel = mean(|e|/|Δ|) where |Δ| > 10 % FS"
+         mean rel = mean(|e|/|Δ|) where |Δ| > 10 % FS;\nfull scale (FS): the largest deformation that the scene allows, or a measured column's range"
     ));
 }

@@ -19,7 +19,7 @@ const FILES: [&str; 4] = ["model.bin", "metrics.json", "table1.csv", "report.htm
 ///
 /// Writes model.bin, metrics.json, table1.csv and report.html to out/<scene>/.
 #[derive(Args)]
-#[command(after_help = "Example: host-sim run press --noise 0.01")]
+#[command(after_help = "Example: host-sim run press --noise 0.01 -o out/noise-1")]
 pub struct Arguments {
     #[command(flatten)]
     scene: SceneArgument,
@@ -111,7 +111,8 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
         result.decoders.iter().map(|d| (d.decoder.as_str(), d.errors.as_slice())).collect();
     print::errors(&mut page, &decoders);
     print::errors_legend(&mut page);
-    page.line(format_args!("\nnetwork RMSE by row-wire:"));
+    let wires: Vec<String> = result.rows.iter().map(|row| row.row_wire.to_string()).collect();
+    page.line(format_args!("\nnetwork RMSE by row-wire ({}):", wires.join(", ")));
     for group in result.rows.first().map_or(&[][..], |row| &row.errors) {
         let of_row = |errors: &run::RowErrors| {
             let found = errors.errors.iter().find(|e| e.group == group.group);

@@ -12,7 +12,9 @@ use super::{Common, print};
 
 /// Synthesise frames of a scene: noisy readings and true outputs, as CSV.
 #[derive(Args)]
-#[command(after_help = "Example: host-sim synth press -n 20000 -o press.csv")]
+#[command(
+    after_help = "Example: host-sim synth press -n 5000 --seed 2 -o test.csv\n\nA scene's own seed gives the very frames that `train` and `run` train on: evaluate on another."
+)]
 pub struct Arguments {
     #[command(flatten)]
     scene: SceneArgument,

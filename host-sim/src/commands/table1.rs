@@ -24,8 +24,8 @@ pub struct Arguments {
     /// CSV file to write, with all axes, decoders and definitions.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// CSV file of the paper's printed cells, to show them beside (columns spread, noise_level as a
-    /// fraction, percent).
+    /// CSV file of the paper's printed cells, to list and store them with the computed ones (columns
+    /// spread, noise_level as a fraction, percent).
     #[arg(long, value_name = "FILE")]
     printed: Option<PathBuf>,
     /// Outputs to print, such as dz_mm or dx_mm.
@@ -63,7 +63,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 fn page_of(table: &Table1, group: &str) -> print::Page {
     let mut page = print::Page::default();
     page.line(format_args!(
-        "{group}: K = {}, affine tail: {}, {} training and {} test frames; standard: K = N = {}",
+        "{group}: K = {}, affine tail: {}, {} training and {} test frames\n\
+         (in brackets: the standard network, K = N = {})",
         table.centres,
         if table.affine_tail { "yes" } else { "no" },
         table.training_frames,
@@ -83,16 +84,22 @@ fn page_of(table: &Table1, group: &str) -> print::Page {
         for (s, cell) in table.columns[0].cells.iter().enumerate() {
             let cells = table.columns.iter().map(|column| {
                 let standard = column.cells[s].standard.as_deref().and_then(of);
-                format!("{:>9} {:>10}", number(of(&column.cells[s].network)), bracket(standard))
+                format!(
+                    "{:>9} {:>10}",
+                    number(definition, of(&column.cells[s].network)),
+                    format!("({})", number(definition, standard))
+                )
             });
-            page.line(format_args!("spread {:<9}{}", cell.spread, cells.collect::<String>()));
+            page.line(format_args!("spread {:<9?}{}", cell.spread, cells.collect::<String>()));
         }
         for (name, errors) in [
             ("linear", (|c| &c.linear) as fn(&table1::Column) -> &Vec<Errors>),
             ("mean", |c| &c.mean),
         ] {
-            let cells =
-                table.columns.iter().map(|c| format!("{:>9}{:11}", number(of(errors(c))), ""));
+            let cells = table
+                .columns
+                .iter()
+                .map(|c| format!("{:>9}{:11}", number(definition, of(errors(c))), ""));
             page.line(format_args!("{name:<16}{}", cells.collect::<String>().trim_end()));
         }
     }
@@ -104,8 +111,10 @@ fn page_of(table: &Table1, group: &str) -> print::Page {
         }
     }
     let [low, high] = PAPER_PRINTED_PERCENT;
-    page.line(format_args!("\n(in brackets: the standard network, K = N.) The paper prints {low} to {high} % for z and \
-         does not state its definition; docs/paper.md compares."));
+    page.line(format_args!(
+        "\nThe paper prints {low} to {high} % for z and \
+         does not state its definition; docs/paper.md compares."
+    ));
     for group in table.groups() {
         if let Some(ratio) = table.worst_ratio_to_mean(group) {
             page.line(format_args!(
@@ -120,15 +129,11 @@ fn percent(level: f64) -> String {
     format!("{} %", (level * 1e6).round() / 1e4)
 }
 
-fn number(value: Option<f64>) -> String {
-    match value {
-        None => "-".into(),
-        Some(v) if v.abs() >= 1e4 => format!("{v:.1e}"),
-        Some(v) if v.abs() >= 100.0 => format!("{v:.0}"),
-        Some(v) => format!("{v:.4}"),
+fn number(definition: Definition, value: Option<f64>) -> String {
+    match (value, definition) {
+        (None, _) => "-".into(),
+        (Some(v), _) if v.abs() >= 1e4 => format!("{v:.1e}"),
+        (Some(v), Definition::Rmse | Definition::RSquared) => format!("{v:.4}"),
+        (Some(v), _) => format!("{v:.2}"),
     }
-}
-
-fn bracket(value: Option<f64>) -> String {
-    format!("({})", number(value))
 }

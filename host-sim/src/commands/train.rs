@@ -252,21 +252,25 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         let names: Vec<&str> = groups.iter().map(|(group, _)| *group).collect();
         page.line(format_args!("cross-validated RMSE of {}:", names.join(", ")));
         page.line("(score: mean over the outputs of RMSE/standard deviation; 1 is the mean's)");
-        for (i, scored) in selection.scored.iter().enumerate() {
-            let pooled = |members: &[usize]| {
-                let squares: f64 = members.iter().map(|column| scored.rmse[*column].powi(2)).sum();
+        let pooled = |rmse: &[f64]| {
+            let of_group = |members: &[usize]| {
+                let squares: f64 = members.iter().map(|column| rmse[*column].powi(2)).sum();
                 format!("{:.4}", (squares / members.len() as f64).sqrt())
             };
-            let rmse: Vec<String> = groups.iter().map(|(_, members)| pooled(members)).collect();
+            groups.iter().map(|(_, members)| of_group(members)).collect::<Vec<_>>().join(" ")
+        };
+        for (i, scored) in selection.scored.iter().enumerate() {
             let mark = if i == selection.best { "  <- chosen" } else { "" };
             page.line(format_args!(
                 "  K = {:<4} spread = {:<5} score {:.4}: {}{mark}",
                 scored.centres,
                 scored.spread,
                 scored.score,
-                rmse.join(" ")
+                pooled(&scored.rmse)
             ));
         }
+        let linear = pooled(&selection.linear_rmse);
+        page.line(format_args!("  {:<36} {linear}", "best linear decoder:"));
     }
     page.line(format_args!(
         "{}: {} bytes, CRC-32 {}, K = {}, spread = {}, affine tail: {}, {} frames",

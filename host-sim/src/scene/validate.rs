@@ -169,7 +169,11 @@ fn outputs(scene: &Scene) -> Check {
     let axes = &scene.outputs.axes;
     let ascending = axes.windows(2).all(|pair| pair[0].index() < pair[1].index());
     require(!axes.is_empty() && ascending, || {
-        "outputs.axes: list some of \"x\", \"y\", \"z\", each once and in this order".to_owned()
+        let letters: Vec<char> = axes.iter().map(|axis| axis.letter()).collect();
+        format!(
+            "outputs.axes = {letters:?}: list at least one of \"x\", \"y\", \"z\", each once, always in \
+             the order x, y, z"
+        )
     })
 }
 

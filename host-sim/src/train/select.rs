@@ -3,8 +3,9 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::linear::LinearDecoder;
 use super::{Options, Samples};
-use crate::dataset::Dataset;
+use crate::dataset::{Dataset, Table};
 use crate::error::{Error, Result};
 use crate::infer::{Kernel, infer};
 use crate::progress::Progress;
@@ -31,6 +32,8 @@ pub struct Selection {
     pub scored: Vec<Scored>,
     /// Place of the one with the lowest score (the first among equals).
     pub best: usize,
+    /// RMSE of each output on the same folds by the best linear decoder, for comparison.
+    pub linear_rmse: Vec<f64>,
 }
 
 impl Selection {
@@ -115,13 +118,17 @@ pub fn cross_validate(
 
     let deviations = standard_deviations(dataset);
     let mut scored = Vec::new();
+    let linear: Vec<Vec<f64>> =
+        (0..folds).into_par_iter().map(|fold| linear_squares(dataset, fold_of, fold)).collect();
+    let root_mean = |squares: f64| (squares / dataset.frames() as f64).sqrt();
+    let linear_rmse = (0..deviations.len())
+        .map(|output| root_mean(linear.iter().map(|fold| fold[output]).sum()))
+        .collect();
     for (k, of_folds) in centres.iter().zip(squares.chunks_exact(folds)) {
         for (s, spread) in spreads.iter().enumerate() {
-            let mean_square = |output: usize| {
-                let sum: f64 = of_folds.iter().map(|fold| fold[s][output]).sum();
-                sum / dataset.frames() as f64
-            };
-            let rmse: Vec<f64> = (0..deviations.len()).map(|o| mean_square(o).sqrt()).collect();
+            let rmse: Vec<f64> = (0..deviations.len())
+                .map(|output| root_mean(of_folds.iter().map(|fold| fold[s][output]).sum()))
+                .collect();
             let relative: Vec<f64> = rmse
                 .iter()
                 .zip(&deviations)
@@ -135,7 +142,7 @@ pub fn cross_validate(
     let best = (0..scored.len())
         .min_by(|a, b| scored[*a].score.total_cmp(&scored[*b].score))
         .ok_or_else(|| Error::Usage("give at least one value of K and of spread".into()))?;
-    Ok(Selection { scored, best })
+    Ok(Selection { scored, best, linear_rmse })
 }
 
 /// Sums of squared errors on one fold, `[spread][output]`, after training on the others.
@@ -146,9 +153,7 @@ fn held_out_squares(
     spreads: &[f64],
     options: &Options,
 ) -> Result<Vec<Vec<f64>>> {
-    let (held, kept): (Vec<usize>, Vec<usize>) =
-        (0..dataset.frames()).partition(|i| fold_of[*i] == fold);
-    let (training, test) = (dataset.subset(&kept), dataset.subset(&held));
+    let (training, test) = split(dataset, fold_of, fold);
     let mut squares = vec![Vec::new(); spreads.len()];
     for row in 0..dataset.rows {
         let (block, test) = (training.block(row), test.block(row));
@@ -157,17 +162,39 @@ fn held_out_squares(
         for (squares, &spread) in squares.iter_mut().zip(spreads) {
             let fitted = samples.fit(&centres, &Options { spread, ..*options })?;
             let predicted = infer(&fitted.network(), Kernel::Polynomial, &test.inputs);
-            let outputs = test.outputs.names.len();
-            let mut sums = vec![0.0; outputs];
-            for (predicted, truth) in predicted.chunks_exact(outputs).zip(test.outputs.lines()) {
-                for (sum, (p, t)) in sums.iter_mut().zip(predicted.iter().zip(truth)) {
-                    *sum += (p - t) * (p - t);
-                }
-            }
-            squares.extend(sums);
+            squares.extend(square_sums(&predicted, &test.outputs));
         }
     }
     Ok(squares)
+}
+
+/// As [`held_out_squares`], of the best linear decoder: `[output]`.
+fn linear_squares(dataset: &Dataset, fold_of: &[usize], fold: usize) -> Vec<f64> {
+    let (training, test) = split(dataset, fold_of, fold);
+    let of_row = |row: usize| {
+        let test = test.block(row);
+        let predicted = LinearDecoder::fit(&training.block(row)).predict(&test);
+        square_sums(&predicted, &test.outputs)
+    };
+    (0..dataset.rows).flat_map(of_row).collect()
+}
+
+/// What is trained on and what is held out.
+fn split(dataset: &Dataset, fold_of: &[usize], fold: usize) -> (Dataset, Dataset) {
+    let (held, kept): (Vec<usize>, Vec<usize>) =
+        (0..dataset.frames()).partition(|i| fold_of[*i] == fold);
+    (dataset.subset(&kept), dataset.subset(&held))
+}
+
+/// Σe² of each output.
+fn square_sums(predicted: &[f64], truth: &Table) -> Vec<f64> {
+    let mut sums = vec![0.0; truth.names.len()];
+    for (predicted, truth) in predicted.chunks_exact(sums.len()).zip(truth.lines()) {
+        for (sum, (p, t)) in sums.iter_mut().zip(predicted.iter().zip(truth)) {
+            *sum += (p - t) * (p - t);
+        }
+    }
+    sums
 }
 
 /// Standard deviation of every output; 0 for one that does not change as far as f32 can tell.
@@ -191,7 +218,6 @@ fn standard_deviations(dataset: &Dataset) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dataset::Table;
 
     /// y follows two inputs; `constant` says nothing.
     fn dataset(outputs: &[&str]) -> Dataset {
