@@ -59,6 +59,18 @@ impl Table {
         sums.iter().map(|(sum, count)| sum / count).collect()
     }
 
+    /// Σ(estimate − value)² of every column, for `estimates` laid out as the values are.
+    #[must_use]
+    pub fn squared_errors(&self, estimates: &[f64]) -> Vec<f64> {
+        let mut sums = vec![0.0; self.names.len()];
+        for (line, estimates) in self.lines().zip(estimates.chunks_exact(sums.len().max(1))) {
+            for (sum, (value, estimate)) in sums.iter_mut().zip(line.iter().zip(estimates)) {
+                *sum += (estimate - value) * (estimate - value);
+            }
+        }
+        sums
+    }
+
     fn columns(&self, from: usize, count: usize) -> Self {
         let names = self.names[from..from + count].to_vec();
         let values = self.lines().flat_map(|line| line[from..from + count].to_vec()).collect();

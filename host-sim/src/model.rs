@@ -117,13 +117,7 @@ fn training_rmse(networks: &[Network<'_>], dataset: &Dataset) -> Vec<f64> {
     for (row, network) in networks.iter().enumerate() {
         let block = dataset.block(row);
         let predicted = infer(network, Kernel::default(), &block.inputs);
-        let outputs = block.outputs.names.len();
-        let mut squares = vec![0.0; outputs];
-        for (predicted, truth) in predicted.chunks_exact(outputs).zip(block.outputs.lines()) {
-            for (square, (p, t)) in squares.iter_mut().zip(predicted.iter().zip(truth)) {
-                *square += (p - t) * (p - t);
-            }
-        }
+        let squares = block.outputs.squared_errors(&predicted);
         rmse.extend(squares.iter().map(|s| (s / dataset.frames() as f64).sqrt()));
     }
     rmse

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::linear::LinearDecoder;
 use super::{Options, Samples};
-use crate::dataset::{Dataset, Table};
+use crate::dataset::Dataset;
 use crate::error::{Error, Result};
 use crate::infer::{Kernel, infer};
 use crate::progress::Progress;
@@ -162,7 +162,7 @@ fn held_out_squares(
         for (squares, &spread) in squares.iter_mut().zip(spreads) {
             let fitted = samples.fit(&centres, &Options { spread, ..*options })?;
             let predicted = infer(&fitted.network(), Kernel::Polynomial, &test.inputs);
-            squares.extend(square_sums(&predicted, &test.outputs));
+            squares.extend(test.outputs.squared_errors(&predicted));
         }
     }
     Ok(squares)
@@ -174,7 +174,7 @@ fn linear_squares(dataset: &Dataset, fold_of: &[usize], fold: usize) -> Vec<f64>
     let of_row = |row: usize| {
         let test = test.block(row);
         let predicted = LinearDecoder::fit(&training.block(row)).predict(&test);
-        square_sums(&predicted, &test.outputs)
+        test.outputs.squared_errors(&predicted)
     };
     (0..dataset.rows).flat_map(of_row).collect()
 }
@@ -184,17 +184,6 @@ fn split(dataset: &Dataset, fold_of: &[usize], fold: usize) -> (Dataset, Dataset
     let (held, kept): (Vec<usize>, Vec<usize>) =
         (0..dataset.frames()).partition(|i| fold_of[*i] == fold);
     (dataset.subset(&kept), dataset.subset(&held))
-}
-
-/// Σe² of each output.
-fn square_sums(predicted: &[f64], truth: &Table) -> Vec<f64> {
-    let mut sums = vec![0.0; truth.names.len()];
-    for (predicted, truth) in predicted.chunks_exact(sums.len()).zip(truth.lines()) {
-        for (sum, (p, t)) in sums.iter_mut().zip(predicted.iter().zip(truth)) {
-            *sum += (p - t) * (p - t);
-        }
-    }
-    sums
 }
 
 /// Standard deviation of every output; 0 for one that does not change as far as f32 can tell.
@@ -218,6 +207,7 @@ fn standard_deviations(dataset: &Dataset) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dataset::Table;
 
     /// y follows two inputs; `constant` says nothing.
     fn dataset(outputs: &[&str]) -> Dataset {
