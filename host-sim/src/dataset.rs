@@ -71,7 +71,12 @@ impl Table {
         sums
     }
 
-    fn columns(&self, from: usize, count: usize) -> Self {
+    /// The `count` columns from the one at `from` on.
+    ///
+    /// # Panics
+    /// If there are not so many.
+    #[must_use]
+    pub fn columns(&self, from: usize, count: usize) -> Self {
         let names = self.names[from..from + count].to_vec();
         let values = self.lines().flat_map(|line| line[from..from + count].to_vec()).collect();
         Self { names, values }

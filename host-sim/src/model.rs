@@ -166,6 +166,14 @@ impl LoadedModel {
         self.bytes.as_slice()
     }
 
+    /// The network that serves each row-wire.
+    fn row_networks(&self) -> Vec<Network<'_>> {
+        let model = self.model();
+        let networks: Vec<Network<'_>> = model.networks().collect();
+        let rows = 0..model.shape().rows;
+        rows.map(|row| networks[model.network_of_row(row).expect("a row of the model")]).collect()
+    }
+
     /// Share of `readings` that inference clamps: outside the training range by more than an eighth
     /// of it.
     ///
@@ -173,12 +181,11 @@ impl LoadedModel {
     /// If `readings` has other columns than the model's inputs.
     #[must_use]
     pub fn share_out_of_range(&self, readings: &Table) -> f64 {
-        let model = self.model();
-        let networks: Vec<Network<'_>> = model.networks().collect();
+        let networks = self.row_networks();
+        let inputs = self.model().shape().inputs;
         let (mut clamped, mut present) = (0_usize, 0_usize);
         for line in readings.lines() {
-            for (row, readings) in line.chunks_exact(model.shape().inputs).enumerate() {
-                let network = &networks[model.network_of_row(row).expect("row of the model")];
+            for (network, readings) in networks.iter().zip(line.chunks_exact(inputs)) {
                 let p = network.parameters();
                 let limits = p.input_minimum.iter().zip(p.input_per_span);
                 for (reading, (minimum, per_span)) in readings.iter().zip(limits) {
@@ -202,8 +209,7 @@ impl LoadedModel {
     pub fn decode(&self, kernel: Kernel, readings: &Table) -> Table {
         let model = self.model();
         let shape = model.shape();
-        let networks: Vec<Network<'_>> = model.networks().collect();
-        let of_row = |row: usize| &networks[model.network_of_row(row).expect("row of the model")];
+        let networks = self.row_networks();
         let names = model.metadata().output_names.iter().map(String::from).collect::<Vec<_>>();
         let mut values = vec![0.0; readings.len() * names.len()];
         let places = values.par_chunks_exact_mut(names.len());
@@ -211,8 +217,8 @@ impl LoadedModel {
             |(outputs, line)| {
                 let blocks =
                     line.chunks_exact(shape.inputs).zip(outputs.chunks_exact_mut(shape.outputs));
-                for (row, (readings, outputs)) in blocks.enumerate() {
-                    infer_line(of_row(row), kernel, readings, outputs);
+                for (network, (readings, outputs)) in networks.iter().zip(blocks) {
+                    infer_line(network, kernel, readings, outputs);
                 }
             },
         );

@@ -161,7 +161,8 @@ pub fn run(scene: &Scene, progress: &Progress) -> Result<(RunResult, Vec<u8>)> {
     }
     progress.step();
 
-    let shape = loaded.model().shape();
+    let model = loaded.model();
+    let shape = model.shape();
     let result = RunResult {
         scene: SceneSummary {
             name: scene.name.clone(),
@@ -177,12 +178,12 @@ pub fn run(scene: &Scene, progress: &Progress) -> Result<(RunResult, Vec<u8>)> {
             test_frames: t.test_frames,
             networks: networks.len(),
             inputs: shape.inputs,
-            centres: loaded.model().networks().map(|n| n.shape().centres).max().unwrap_or(0),
+            centres: model.networks().map(|n| n.shape().centres).max().unwrap_or(0),
             outputs: shape.outputs,
             spread: t.spread,
             affine_tail: t.affine_tail,
             blob_bytes: blob.len(),
-            blob_crc: format!("{:08x}", loaded.model().crc()),
+            blob_crc: format!("{:08x}", model.crc()),
         },
         decoders,
         rows: by_row(scene, &test, &estimate, &measure),
@@ -205,14 +206,14 @@ fn baseline(
 
 fn by_row(scene: &Scene, test: &Dataset, estimate: &Table, measure: &Measure) -> Vec<RowErrors> {
     let width = test.outputs.names.len() / test.rows;
-    let estimates = Dataset { outputs: estimate.clone(), ..test.clone() };
     let errors = |row: usize| {
+        let from = row * width;
         let measure = Measure {
-            full_scale: measure.full_scale[row * width..(row + 1) * width].to_vec(),
+            full_scale: measure.full_scale[from..from + width].to_vec(),
             ..measure.clone()
         };
-        let estimate = estimates.block(row).outputs.values;
-        metrics::by_group(&test.block(row).outputs, &estimate, &measure)
+        let estimate = estimate.columns(from, width).values;
+        metrics::by_group(&test.outputs.columns(from, width), &estimate, &measure)
     };
     let rows = scene.read_rows.iter().enumerate();
     rows.map(|(row, wire)| RowErrors { row_wire: wire + 1, errors: errors(row) }).collect()
@@ -228,28 +229,18 @@ fn example(scene: &Scene, test: &Dataset, estimate: &Table) -> Example {
         .unwrap_or(0);
     let truth = test.outputs.lines().nth(frame).unwrap_or_default();
     let decoded = estimate.lines().nth(frame).unwrap_or_default();
-    let mut outputs: Vec<ExampleOutput> = Vec::new();
-    for (name, (truth, estimate)) in test.outputs.names.iter().zip(truth.iter().zip(decoded)) {
-        let group = columns::group_of(name);
-        if !outputs.iter().any(|o| o.group == group) {
-            outputs.push(ExampleOutput {
-                group: group.into(),
-                unit: columns::unit_of(name).into(),
-                truth: Vec::new(),
-                estimate: Vec::new(),
-            });
-        }
-        for output in outputs.iter_mut().filter(|o| o.group == group) {
-            output.truth.push(*truth);
-            output.estimate.push(*estimate);
-        }
-    }
-
-    let ideal = synth::synthesise_ideal(scene, Stream::Test, frame + 1);
-    let columns = scene.sensor.column_wires;
-    let readings = |table: &Table, row: usize| {
-        table.lines().nth(frame).unwrap_or_default()[row * columns..(row + 1) * columns].to_vec()
-    };
+    let groups = columns::groups(&test.outputs.names).into_iter();
+    let outputs = groups.map(|(group, members)| ExampleOutput {
+        group: group.into(),
+        unit: columns::unit_of(group).into(),
+        truth: members.iter().map(|column| truth[*column]).collect(),
+        estimate: members.iter().map(|column| decoded[*column]).collect(),
+    });
+    let ideal = synth::ideal_readings(scene, Stream::Test, frame);
+    let noisy = test.inputs.lines().nth(frame).unwrap_or_default();
+    let column_wires = scene.sensor.column_wires;
+    let of_row =
+        |line: &[f64], row: usize| line[row * column_wires..(row + 1) * column_wires].to_vec();
     let width = truth.len() / scene.read_rows.len();
     let row = (0..scene.read_rows.len())
         .max_by(|a, b| {
@@ -266,9 +257,9 @@ fn example(scene: &Scene, test: &Dataset, estimate: &Table) -> Example {
             .map(|[x, y, _]| [*x, *y])
             .collect(),
         row_wires: scene.read_rows.len(),
-        outputs,
+        outputs: outputs.collect(),
         reading_row_wire: scene.read_rows[row] + 1,
-        ideal_ohm: readings(&ideal.inputs, row),
-        noisy_ohm: readings(&test.inputs, row),
+        ideal_ohm: of_row(&ideal, row),
+        noisy_ohm: of_row(noisy, row),
     }
 }

@@ -125,6 +125,18 @@ impl Sensor {
         }
     }
 
+    /// Deformation up to which the model holds along any axis: 20 % of the thickness.
+    #[must_use]
+    pub fn largest_deformation_mm(&self) -> f64 {
+        0.2 * self.size_mm[2]
+    }
+
+    /// Whether the model holds for a deformation along any axis; a rounding error more is let pass.
+    #[must_use]
+    pub fn holds_for(&self, deformation_mm: f64) -> bool {
+        deformation_mm.abs() <= self.largest_deformation_mm() * (1.0 + 1e-12)
+    }
+
     /// Force on an electrode for its deformation.
     #[must_use]
     pub fn force_n(&self, deformation_mm: Vector3) -> Vector3 {

@@ -39,6 +39,16 @@ pub fn synthesise_ideal(scene: &Scene, stream: Stream, frames: usize) -> Dataset
     synthesise(&ideal, stream, frames)
 }
 
+/// The ideal readings of one `frame`, by row-wire that is read and column-wire.
+#[must_use]
+pub fn ideal_readings(scene: &Scene, stream: Stream, frame: usize) -> Vec<f64> {
+    let rows = scene.read_rows.len();
+    let outputs = rows * scene.sensor.electrodes_per_row_wire * scene.outputs.axes.len();
+    let mut readings = vec![0.0; rows * scene.sensor.column_wires];
+    ideal_frame(scene, stream, frame, &mut readings, &mut vec![0.0; outputs]);
+    readings
+}
+
 fn ideal_frame(
     scene: &Scene,
     stream: Stream,
@@ -89,11 +99,12 @@ pub fn forward(scene: &Scene, file: &DataFile) -> Result<Vec<f64>> {
         let names = deformation_names(*row, electrodes);
         columns.push(file.columns(names.iter().map(String::as_str))?);
     }
-    let most_mm = 0.2 * sensor.size_mm[2];
+    let most_mm = sensor.largest_deformation_mm();
     for line in 0..file.lines() {
         for &column in columns.iter().flatten() {
             let value = file.value(line, column);
-            if value.abs() > most_mm * (1.0 + 1e-12) {
+            // A missing one is let pass: its row's readings will be missing.
+            if !value.is_nan() && !sensor.holds_for(value) {
                 let message = format!(
                     "line {}, column {:?}: {value} mm is beyond what the sensor model holds for, \
                      20 % of the thickness ({most_mm} mm)",

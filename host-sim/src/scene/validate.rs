@@ -124,12 +124,10 @@ fn deformation(scene: &Scene) -> Check {
     require(moves.as_flattened().iter().any(|v| *v != 0.0), || {
         "deformation: nothing can move; widen a range".to_owned()
     })?;
-    let thickness = scene.sensor.size_mm[2];
-    // The model holds for small deformations only (DESIGN: |Δ| per axis ≤ 20 % of H).
-    let most = 0.2 * thickness;
+    let most = scene.sensor.largest_deformation_mm();
     for (axis, range) in ["x", "y", "z"].iter().zip(moves) {
         let largest = range[0].abs().max(range[1].abs());
-        require(largest <= most * (1.0 + 1e-12), || {
+        require(scene.sensor.holds_for(largest), || {
             format!(
                 "deformation reaches {largest} mm along {axis}: the sensor model holds up to 20 % \
                  of the thickness, {most} mm; narrow the range"
