@@ -1,13 +1,18 @@
 //! What a board runs, as a library that is tested on the host.
 //!
-//! One purpose so far: keep a model in force and decode frames with it. [`store`] finds the
-//! model's blob in flash, [`Tactile`] holds it, decodes with it, and exchanges it for another
-//! without ever being left with none. Nothing here allocates, waits or panics; the weights stay
-//! in flash.
+//! [`readout`] scans frames, [`Tactile`] decodes them with the model in force, [`store`] keeps models in
+//! two slots of flash, [`link`] carries messages to and from the host, and [`App`](app::App) is the loop
+//! that joins them. A board gives what [`platform`] asks for. Nothing here allocates, and nothing
+//! panics; the weights stay in flash.
 //!
 //! All arithmetic is [`model_core`]'s, so that board and host agree bit for bit.
 #![cfg_attr(not(test), no_std)]
 
+pub mod app;
+pub mod link;
+mod log;
+pub mod platform;
+pub mod readout;
 pub mod store;
 mod tactile;
 

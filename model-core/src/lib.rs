@@ -1,6 +1,6 @@
 //! Inference for resistive tactile sensors: from row–column resistances to deformation.
 //!
-//! Readings travel one way: [`Frame`] (Ω) → [`scale`] → [`rbf`] (and its affine tail) →
+//! Readings travel one way: [`Frame`] (Ω) → [`health`] → [`scale`] → [`rbf`] (and its affine tail) →
 //! [`Estimate`]. The network's weights are read where the [`blob`] lies, in flash or in a
 //! file's buffer: nothing is copied, nothing is allocated, and no release code path of
 //! [`Decoder`] panics. [`rls`] updates output weights sample by sample.
@@ -17,9 +17,11 @@
 compile_error!("the weight blob holds little-endian floats that are borrowed in place");
 
 pub mod blob;
+pub mod checksum;
 mod decoder;
 pub mod exp;
 mod frame;
+pub mod health;
 pub mod rbf;
 pub mod rls;
 pub mod scale;

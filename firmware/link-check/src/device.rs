@@ -25,13 +25,13 @@ fn panic(_: &PanicInfo<'_>) -> ! {
 
 /// `value`, after which the optimiser neither knows what it is nor may leave out computing it.
 #[inline(never)]
-fn opaque<T: Copy>(value: T) -> T {
+pub fn opaque<T: Copy>(value: T) -> T {
     // SAFETY: a reference is valid for reads.
     unsafe { ptr::read_volatile(&raw const value) }
 }
 
 /// A flash slot of unknown address, length and content.
-fn slot() -> &'static [u8] {
+pub fn slot() -> &'static [u8] {
     let (address, length) = opaque((0x0806_0000_usize, 0x2_0000_usize));
     // SAFETY: the numbers are those of the last sector of a board's flash.
     unsafe { slice::from_raw_parts(ptr::with_exposed_provenance(address), length) }
@@ -84,6 +84,7 @@ extern "C" fn _start() -> ! {
     exercise_decoding::<Micromath>();
     exercise_recalibration();
     exercise_recalibration_on_slices();
+    crate::application::exercise();
     loop {
         core::hint::spin_loop();
     }

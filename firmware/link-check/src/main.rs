@@ -9,6 +9,8 @@
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
+mod application;
+#[cfg(target_os = "none")]
 mod device;
 
 #[cfg(not(target_os = "none"))]

@@ -1,11 +1,14 @@
 //! Reading a blob: check everything once, then borrow.
 
+use serde::{Deserialize, Serialize};
+
 use super::error::DecodeError;
 use super::format::{
-    BlockLengths, CRC, CRC_BYTES, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection,
-    PREFIX_BYTES, Prefix, RbfHeader, ShapeField, TAG_METADATA, TAG_RBF_F32,
+    BlockLengths, CRC_BYTES, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection, PREFIX_BYTES,
+    Prefix, RbfHeader, ShapeField, TAG_METADATA, TAG_RBF_F32,
 };
 use super::{Metadata, ModelShape};
+use crate::checksum::CRC_32;
 use crate::rbf::{Network, NetworkError, Parameters, Shape};
 
 /// Names or units of columns, one a line.
@@ -22,10 +25,16 @@ impl<'a> Columns<'a> {
 }
 
 /// Little-endian `f32` at any address.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Floats<'a>(pub &'a [u8]);
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Floats<'a>(#[serde(borrow)] pub &'a [u8]);
 
 impl<'a> Floats<'a> {
+    /// The bytes of `numbers`, where they lie.
+    #[must_use]
+    pub fn of(numbers: &'a [f32]) -> Self {
+        Self(bytemuck::cast_slice(numbers))
+    }
+
     /// The numbers in their order.
     pub fn iter(self) -> impl Iterator<Item = f32> + 'a {
         self.0.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes))
@@ -171,7 +180,7 @@ fn checked_body(blob: &[u8]) -> Result<(&[u8], u32), DecodeError> {
     let Some((covered, stored)) = blob.split_last_chunk::<CRC_BYTES>() else {
         return Err(DecodeError::Malformed { section: "prefix" });
     };
-    let (stored, computed) = (u32::from_le_bytes(*stored), CRC.checksum(covered));
+    let (stored, computed) = (u32::from_le_bytes(*stored), CRC_32.checksum(covered));
     if stored != computed {
         return Err(DecodeError::Corrupt { expected: computed, found: stored });
     }

@@ -4,10 +4,11 @@ use serde::Serialize;
 
 use super::error::EncodeError;
 use super::format::{
-    BlockLengths, CRC, CRC_BYTES, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection, Prefix,
+    BlockLengths, CRC_BYTES, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection, Prefix,
     RbfHeader, ShapeField, TAG_METADATA, TAG_RBF_F32,
 };
 use super::{Metadata, Model};
+use crate::checksum::CRC_32;
 use crate::rbf::Network;
 
 /// All that goes into a blob.
@@ -178,7 +179,7 @@ impl Writer<'_> {
             blob.split_last_chunk_mut::<CRC_BYTES>().ok_or(EncodeError::BufferTooSmall)?;
         let field = covered.get_mut(5..9).ok_or(EncodeError::BufferTooSmall)?;
         field.copy_from_slice(&length.to_le_bytes());
-        *crc = CRC.checksum(covered).to_le_bytes();
+        *crc = CRC_32.checksum(covered).to_le_bytes();
         Ok(end)
     }
 }

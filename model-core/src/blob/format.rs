@@ -18,8 +18,6 @@ pub(super) const FLOAT_ALIGNMENT: usize = 4;
 pub(super) const TAG_METADATA: u8 = 0;
 pub(super) const TAG_RBF_F32: u8 = 1;
 
-pub(super) const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
-
 /// Bytes 0..9, at fixed places, so that a blob can be measured before it is trusted.
 #[derive(Serialize, Deserialize)]
 pub(super) struct Prefix {

@@ -1,0 +1,69 @@
+//! The application on a board of which the optimiser knows nothing.
+
+use firmware::app::PaperApp;
+use firmware::link::message::{Configuration, Memory};
+use firmware::platform::Platform;
+use firmware::readout::{FrameSource, ScanReport, ScanSettings};
+use firmware::store::{FlashError, Slot};
+use model_core::Frame;
+
+use crate::device::{opaque, slot};
+
+struct Board;
+
+impl Platform for Board {
+    const BOARD: &'static str = "link-check";
+
+    fn now_us(&mut self) -> u32 {
+        opaque(0)
+    }
+
+    fn receive(&mut self) -> Option<u8> {
+        opaque(Some(0))
+    }
+
+    fn send(&mut self, byte: u8) -> bool {
+        opaque(byte);
+        opaque(true)
+    }
+
+    fn feed_watchdog(&mut self) {
+        opaque(());
+    }
+
+    fn memory(&self) -> Memory {
+        opaque(Memory::default())
+    }
+}
+
+struct Sensor;
+
+impl FrameSource<8, 18> for Sensor {
+    fn scan(&mut self, settings: ScanSettings, frame: &mut Frame<8, 18>) -> ScanReport {
+        opaque(settings);
+        *frame = opaque(Frame::missing());
+        opaque(ScanReport::default())
+    }
+}
+
+struct Flash;
+
+impl Slot for Flash {
+    fn bytes(&self) -> &[u8] {
+        slot()
+    }
+
+    fn erase(&mut self) -> Result<(), FlashError> {
+        opaque(Ok(()))
+    }
+
+    fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), FlashError> {
+        opaque((offset, bytes));
+        opaque(Ok(()))
+    }
+}
+
+pub fn exercise() {
+    let mut app = PaperApp::<_, _>::new(Board, Sensor, opaque(Configuration::DEFAULT));
+    app.run(&mut [Flash, Flash]);
+}

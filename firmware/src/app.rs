@@ -1,0 +1,136 @@
+//! The application: scan → health → decode → report, and the link, in one loop without waits.
+//!
+//! A board's program makes an [`App`] of its parts and calls [`App::run`], which returns only to be
+//! restarted. Its memory is all here: nothing grows, nothing is allocated.
+
+use core::marker::PhantomData;
+
+use model_core::exp::{ExpKernel, Polynomial};
+use model_core::{Estimate, Frame, RowStatus};
+
+use crate::link::message::{Configuration, Statistics};
+use crate::link::receive::Receiver;
+use crate::log::info;
+use crate::platform::Platform;
+use crate::readout::{Baseline, FrameSource};
+use crate::store::{Slot, Upload, blob_in_slot, generation};
+use crate::tactile::Tactile;
+
+mod answer;
+mod configuration;
+mod frame_clock;
+mod line;
+mod session;
+
+use frame_clock::FrameClock;
+use line::Line;
+pub use session::{Leave, Session};
+
+/// Bytes of the longest message of the paper's sensor, 8 × 18 floats and what belongs to them.
+pub const PAPER_MESSAGE_BYTES: usize = 608;
+
+/// The application of the paper's sensor.
+pub type PaperApp<P, F, E = Polynomial> = App<P, F, 8, 18, 18, PAPER_MESSAGE_BYTES, E>;
+
+/// All that the application keeps, apart from the sensor with its model.
+///
+/// `BYTES` is that of the longest message: `4 · ROWS · max(COLS, OUTPUTS) + ROWS + 24`.
+pub struct App<
+    P: Platform,
+    F,
+    const ROWS: usize,
+    const COLS: usize,
+    const OUTPUTS: usize,
+    const BYTES: usize,
+    E: ExpKernel = Polynomial,
+> {
+    receiver: Receiver<BYTES>,
+    core: Core<P, F, ROWS, COLS, OUTPUTS, BYTES>,
+    kernel: PhantomData<E>,
+}
+
+/// The application without the receiver, whose bytes a request borrows while it is answered.
+struct Core<P, F, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, const BYTES: usize> {
+    line: Line<P, BYTES>,
+    source: F,
+    configuration: Configuration,
+    statistics: Statistics,
+    clock: FrameClock,
+    frame: Frame<ROWS, COLS>,
+    estimate: Estimate<ROWS, OUTPUTS>,
+    baseline: Baseline<ROWS, COLS>,
+    /// Request that waits for the baseline, and how many frames are still to be scanned for it.
+    capture: Option<(u16, u16)>,
+    upload: Upload,
+}
+
+impl<
+    P: Platform,
+    F: FrameSource<ROWS, COLS>,
+    const ROWS: usize,
+    const COLS: usize,
+    const OUTPUTS: usize,
+    const BYTES: usize,
+    E: ExpKernel,
+> App<P, F, ROWS, COLS, OUTPUTS, BYTES, E>
+{
+    /// An application that starts with `configuration`.
+    pub fn new(mut platform: P, source: F, configuration: Configuration) -> Self {
+        const {
+            let widest = if COLS > OUTPUTS { COLS } else { OUTPUTS };
+            assert!(BYTES >= 4 * ROWS * widest + ROWS + 24, "the longest message must fit");
+            assert!(ROWS > 0 && ROWS < 256 && COLS > 0 && OUTPUTS > 0 && OUTPUTS < 256);
+        }
+        let clock = FrameClock::starting_at(platform.now_us());
+        let core = Core {
+            line: Line::new(platform),
+            source,
+            configuration,
+            statistics: Statistics::default(),
+            clock,
+            frame: Frame::missing(),
+            estimate: Estimate {
+                outputs: [[f32::NAN; OUTPUTS]; ROWS],
+                status: [RowStatus::MissingReading; ROWS],
+            },
+            baseline: Baseline::new(),
+            capture: None,
+            upload: Upload::new(),
+        };
+        Self { receiver: Receiver::new(), core, kernel: PhantomData }
+    }
+
+    /// Runs until the host asks for a restart, exchanging the model when another is committed.
+    pub fn run<S: Slot>(&mut self, slots: &mut [S; 2]) {
+        loop {
+            let mut session = Session::start(self, slots);
+            let leave = loop {
+                if let Some(leave) = session.step() {
+                    break leave;
+                }
+            };
+            match leave {
+                Leave::NewModel => info!("model exchanged"),
+                Leave::Restart => return,
+            }
+        }
+    }
+
+    /// What the board is made of, for tests that look behind it.
+    pub fn platform(&mut self) -> &mut P {
+        self.core.line.platform()
+    }
+
+    /// The most recent slot whose model is sound: its number and generation.
+    fn choose<S: Slot>(slots: &[S; 2]) -> Option<(usize, u32)> {
+        let [a, b] = slots.each_ref().map(Slot::bytes);
+        let mut candidates = [(0, generation(0, a), a), (1, generation(1, b), b)];
+        if candidates[1].1 > candidates[0].1 {
+            candidates.swap(0, 1);
+        }
+        candidates.into_iter().find_map(|(index, generation, bytes)| {
+            let sound = Tactile::<ROWS, COLS, OUTPUTS, E>::load(blob_in_slot(bytes)).is_ok();
+            generation.filter(|_| sound).map(|generation| (index, generation))
+        })
+    }
+}

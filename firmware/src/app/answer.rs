@@ -1,0 +1,224 @@
+//! Requests and their answers.
+
+use model_core::blob::{DecodeError, Floats};
+use model_core::exp::ExpKernel;
+
+use super::session::InForce;
+use super::{Core, Leave, Session};
+use crate::link::message::{
+    Configuration, Identity, ModelFault, Refusal, Report, Request, UploadStep,
+};
+use crate::link::packet::{self, PROTOCOL_VERSION, PacketError};
+use crate::link::receive::Received;
+use crate::log::{info, warning};
+use crate::platform::Platform;
+use crate::readout::{Baseline, FrameSource};
+use crate::store::{Slot, capacity};
+use crate::tactile::Tactile;
+
+/// Most bytes of one chunk of an upload: as many as leave room for the rest of the message, and no
+/// more than a board surely keeps while it writes the chunk before.
+const LARGEST_CHUNK_BYTES: usize = 512;
+
+const fn chunk_bytes(message_bytes: usize) -> usize {
+    let room = message_bytes.saturating_sub(24) / 4 * 4;
+    if room < LARGEST_CHUNK_BYTES { room } else { LARGEST_CHUNK_BYTES }
+}
+
+impl<
+    P: Platform,
+    F: FrameSource<ROWS, COLS>,
+    S: Slot,
+    const ROWS: usize,
+    const COLS: usize,
+    const OUTPUTS: usize,
+    const BYTES: usize,
+    E: ExpKernel,
+> Session<'_, P, F, S, ROWS, COLS, OUTPUTS, BYTES, E>
+{
+    /// Receives until a frame is whole or nothing more is there, and answers it.
+    pub(super) fn serve_link(&mut self) -> Option<Leave> {
+        let app = &mut *self.app;
+        // Bounded, so that a host that never pauses does not keep the sensor from being scanned.
+        for _ in 0..BYTES {
+            let byte = app.core.line.platform().receive()?;
+            if let Some(received) = app.receiver.push(byte) {
+                return app.core.answer(received, &self.model, self.spare);
+            }
+        }
+        None
+    }
+}
+
+impl<
+    P: Platform,
+    F: FrameSource<ROWS, COLS>,
+    const ROWS: usize,
+    const COLS: usize,
+    const OUTPUTS: usize,
+    const BYTES: usize,
+> Core<P, F, ROWS, COLS, OUTPUTS, BYTES>
+{
+    fn answer<E: ExpKernel, S: Slot>(
+        &mut self,
+        received: Received<'_>,
+        model: &InForce<'_, ROWS, COLS, OUTPUTS, E>,
+        spare: &mut S,
+    ) -> Option<Leave> {
+        let packet = match received {
+            Received::Frame(bytes) => packet::decode::<Request<'_>>(bytes),
+            Received::Broken | Received::TooLong => Err(PacketError::Damaged),
+        };
+        let (number, request) = match packet {
+            Ok(packet) => (packet.number, packet.body),
+            Err(error) => {
+                self.reject(error);
+                return None;
+            }
+        };
+        self.statistics.requests = self.statistics.requests.saturating_add(1);
+        let mut leave = None;
+        let report = match request {
+            Request::Identify => Ok(Report::Identity(self.identity(model, spare))),
+            Request::Statistics => Ok(Report::Statistics(self.statistics)),
+            Request::Configuration => Ok(Report::Configuration(self.configuration)),
+            Request::Configure(configuration) => self.configure(configuration),
+            Request::CaptureBaseline { frames } => match self.capture_baseline(number, frames) {
+                Ok(()) => return None,
+                Err(refusal) => Err(refusal),
+            },
+            Request::Decode { frame, readings_ohm } => {
+                match self.decode_readings(number, frame, readings_ohm, model) {
+                    Ok(()) => return None,
+                    Err(refusal) => Err(refusal),
+                }
+            }
+            Request::Upload(step) => self
+                .upload_step::<E, S>(step, model, spare, &mut leave)
+                .map(|()| Report::Upload(self.upload.state())),
+            Request::Restart => {
+                info!("restart asked for");
+                leave = Some(Leave::Restart);
+                Ok(Report::Restarting)
+            }
+        };
+        let sent = self.line.send(number, &report.unwrap_or_else(Report::Refused));
+        self.count_lost(sent);
+        leave
+    }
+
+    /// Counts bytes that are no request, and answers those that are whole.
+    fn reject(&mut self, error: PacketError) {
+        self.statistics.bad_packets = self.statistics.bad_packets.saturating_add(1);
+        let (number, refusal) = match error {
+            PacketError::Damaged => return,
+            PacketError::OtherVersion { number } => (number, Refusal::Version(PROTOCOL_VERSION)),
+            PacketError::NotAMessage { number } => (number, Refusal::Unknown),
+        };
+        let sent = self.line.send(number, &Report::Refused(refusal));
+        self.count_lost(sent);
+    }
+
+    fn identity<E: ExpKernel, S: Slot>(
+        &mut self,
+        model: &InForce<'_, ROWS, COLS, OUTPUTS, E>,
+        spare: &S,
+    ) -> Identity<'static> {
+        Identity {
+            board: P::BOARD,
+            firmware: env!("CARGO_PKG_VERSION"),
+            rows: ROWS as u8,
+            columns: COLS as u8,
+            outputs: OUTPUTS as u8,
+            kernel: E::NAME,
+            model: model.identity,
+            slot_bytes: capacity(spare.bytes()) as u32,
+            chunk_bytes: chunk_bytes(BYTES) as u16,
+            memory: self.line.platform().memory(),
+        }
+    }
+
+    fn configure(&mut self, configuration: Configuration) -> Result<Report<'static>, Refusal> {
+        configuration.check().map_err(Refusal::Configuration)?;
+        self.configuration = configuration;
+        self.clock.restart(self.line.platform().now_us());
+        info!("configured: a frame every {=u32} us", configuration.frame_period_us);
+        Ok(Report::Configuration(configuration))
+    }
+
+    fn capture_baseline(&mut self, number: u16, frames: u16) -> Result<(), Refusal> {
+        if frames == 0 || self.configuration.frame_period_us == 0 {
+            return Err(Refusal::Baseline);
+        }
+        self.baseline = Baseline::new();
+        self.capture = Some((number, frames));
+        Ok(())
+    }
+
+    fn decode_readings<E: ExpKernel>(
+        &mut self,
+        number: u16,
+        frame: u32,
+        readings_ohm: Floats<'_>,
+        model: &InForce<'_, ROWS, COLS, OUTPUTS, E>,
+    ) -> Result<(), Refusal> {
+        if readings_ohm.0.len() != 4 * ROWS * COLS {
+            return Err(Refusal::FrameLength { expected: (ROWS * COLS) as u16 });
+        }
+        self.set_frame(readings_ohm.iter());
+        let (flags, _) = self.decode(model.sensor.as_ref());
+        self.send_estimate(number, frame, flags);
+        Ok(())
+    }
+
+    fn upload_step<E: ExpKernel, S: Slot>(
+        &mut self,
+        step: UploadStep<'_>,
+        model: &InForce<'_, ROWS, COLS, OUTPUTS, E>,
+        spare: &mut S,
+        leave: &mut Option<Leave>,
+    ) -> Result<(), Refusal> {
+        match step {
+            UploadStep::Begin { length } => {
+                info!("upload of {=u32} bytes begins", length);
+                self.upload.begin(spare, length)
+            }
+            UploadStep::Chunk { offset, bytes } => self.upload.chunk(spare, offset, bytes),
+            UploadStep::Abort => {
+                self.upload.abort();
+                Ok(())
+            }
+            UploadStep::Commit => {
+                if self.upload.is_committed() {
+                    return Ok(()); // asked again, since the answer was lost
+                }
+                let blob = self.upload.complete(spare)?;
+                match Tactile::<ROWS, COLS, OUTPUTS, E>::load(blob) {
+                    Ok(sensor) => {
+                        let crc_32 = sensor.model_crc();
+                        let before = model.identity.map_or(0, |identity| identity.generation);
+                        self.upload.commit(spare, before.saturating_add(1), crc_32)?;
+                        *leave = Some(Leave::NewModel);
+                        Ok(())
+                    }
+                    Err(error) => {
+                        warning!("uploaded model refused");
+                        self.upload.abort();
+                        Err(Refusal::BadModel(fault(&error)))
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The kind of a fault, small enough for the link.
+fn fault(error: &DecodeError) -> ModelFault {
+    match error {
+        DecodeError::BadMagic | DecodeError::UnsupportedVersion { .. } => ModelFault::NotABlob,
+        DecodeError::Truncated { .. } | DecodeError::TrailingBytes { .. } => ModelFault::Length,
+        DecodeError::Corrupt { .. } => ModelFault::Corrupt,
+        DecodeError::ShapeMismatch { .. } => ModelFault::Shape,
+        _ => ModelFault::Invalid,
+    }
+}

@@ -1,0 +1,79 @@
+//! What a configuration may be.
+
+use crate::link::message::{Configuration, ConfigurationField};
+use crate::readout::ScanSettings;
+
+/// Frame periods in µs, from the shortest to the longest.
+const FRAME_PERIOD_US: core::ops::RangeInclusive<u32> = 100..=1_000_000_000;
+/// Longest settling time in µs, lest a scan outlast the watchdog.
+const SETTLING_US: u32 = 10_000;
+/// Most samples of one reading, likewise.
+const OVERSAMPLING: u16 = 256;
+
+impl Configuration {
+    /// 100 frames a second, of which estimates are sent; limits for rubber of some 60 Ω.
+    pub const DEFAULT: Self = Self {
+        frame_period_us: 10_000,
+        scan: ScanSettings { settling_us: 100, oversampling: 1 },
+        send_readings: false,
+        send_estimates: true,
+        shorted_below_ohm: 5.0,
+        open_above_ohm: 1000.0,
+        contact_threshold: 0.02,
+    };
+
+    /// Whether every field is in its range.
+    ///
+    /// # Errors
+    /// The first field that is not.
+    pub fn check(&self) -> Result<(), ConfigurationField> {
+        let positive = |value: f32| value.is_finite() && value > 0.0;
+        let limits = [self.shorted_below_ohm, self.open_above_ohm];
+        let checks = [
+            (
+                self.frame_period_us == 0 || FRAME_PERIOD_US.contains(&self.frame_period_us),
+                ConfigurationField::FramePeriod,
+            ),
+            (self.scan.settling_us <= SETTLING_US, ConfigurationField::Settling),
+            (
+                (1..=OVERSAMPLING).contains(&self.scan.oversampling),
+                ConfigurationField::Oversampling,
+            ),
+            (
+                limits.iter().all(|limit| positive(*limit)) && limits[0] < limits[1],
+                ConfigurationField::Limits,
+            ),
+            (positive(self.contact_threshold), ConfigurationField::ContactThreshold),
+        ];
+        checks.into_iter().find(|(good, _)| !good).map_or(Ok(()), |(_, field)| Err(field))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_field_is_checked() {
+        let good = Configuration::DEFAULT;
+        assert_eq!(good.check(), Ok(()));
+        assert_eq!(Configuration { frame_period_us: 0, ..good }.check(), Ok(()));
+        let scan = |settling_us, oversampling| ScanSettings { settling_us, oversampling };
+        for (bad, field) in [
+            (Configuration { frame_period_us: 99, ..good }, ConfigurationField::FramePeriod),
+            (Configuration { frame_period_us: u32::MAX, ..good }, ConfigurationField::FramePeriod),
+            (Configuration { scan: scan(10_001, 1), ..good }, ConfigurationField::Settling),
+            (Configuration { scan: scan(0, 0), ..good }, ConfigurationField::Oversampling),
+            (Configuration { scan: scan(0, 257), ..good }, ConfigurationField::Oversampling),
+            (Configuration { open_above_ohm: 5.0, ..good }, ConfigurationField::Limits),
+            (Configuration { open_above_ohm: f32::INFINITY, ..good }, ConfigurationField::Limits),
+            (Configuration { shorted_below_ohm: f32::NAN, ..good }, ConfigurationField::Limits),
+            (
+                Configuration { contact_threshold: 0.0, ..good },
+                ConfigurationField::ContactThreshold,
+            ),
+        ] {
+            assert_eq!(bad.check(), Err(field), "{bad:?}");
+        }
+    }
+}

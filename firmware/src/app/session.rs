@@ -1,0 +1,238 @@
+//! The loop while one model is in force.
+
+use model_core::blob::Floats;
+use model_core::exp::ExpKernel;
+use model_core::health::{Health, Limits};
+use model_core::{Frame, RowStatus};
+
+use super::{App, Core};
+use crate::link::message::{EstimateReport, HealthReport, ModelIdentity, Report};
+use crate::link::packet::UNASKED;
+use crate::log::{info, warning};
+use crate::platform::Platform;
+use crate::readout::FrameSource;
+use crate::store::{Slot, blob_in_slot};
+use crate::tactile::Tactile;
+
+/// Why a session ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Leave {
+    /// Another model was committed.
+    NewModel,
+    /// The host asked for a restart.
+    Restart,
+}
+
+/// The application with the model that is in force, whose slot it borrows, and the slot to spare.
+pub struct Session<
+    'a,
+    P: Platform,
+    F,
+    S,
+    const ROWS: usize,
+    const COLS: usize,
+    const OUTPUTS: usize,
+    const BYTES: usize,
+    E: ExpKernel,
+> {
+    pub(super) app: &'a mut App<P, F, ROWS, COLS, OUTPUTS, BYTES, E>,
+    pub(super) model: InForce<'a, ROWS, COLS, OUTPUTS, E>,
+    pub(super) spare: &'a mut S,
+}
+
+/// The model that is in force, if there is one.
+pub(super) struct InForce<
+    'a,
+    const ROWS: usize,
+    const COLS: usize,
+    const OUTPUTS: usize,
+    E: ExpKernel,
+> {
+    pub sensor: Option<Tactile<'a, ROWS, COLS, OUTPUTS, E>>,
+    pub identity: Option<ModelIdentity>,
+}
+
+impl<
+    'a,
+    P: Platform,
+    F: FrameSource<ROWS, COLS>,
+    S: Slot,
+    const ROWS: usize,
+    const COLS: usize,
+    const OUTPUTS: usize,
+    const BYTES: usize,
+    E: ExpKernel,
+> Session<'a, P, F, S, ROWS, COLS, OUTPUTS, BYTES, E>
+{
+    /// Puts the most recent sound model in force.
+    pub fn start(
+        app: &'a mut App<P, F, ROWS, COLS, OUTPUTS, BYTES, E>,
+        slots: &'a mut [S; 2],
+    ) -> Self {
+        let chosen = App::<P, F, ROWS, COLS, OUTPUTS, BYTES, E>::choose(slots);
+        let [first, second] = slots;
+        let (active, spare) = match chosen {
+            Some((1, _)) => (&*second, first),
+            _ => (&*first, second),
+        };
+        let sensor = chosen.and_then(|_| Tactile::load(blob_in_slot(active.bytes())).ok());
+        let identity = chosen.zip(sensor.as_ref()).map(|((slot, generation), sensor)| {
+            ModelIdentity { crc_32: sensor.model_crc(), slot: slot as u8, generation }
+        });
+        if let Some(model) = &identity {
+            info!(
+                "model {=u32:08x} in force, slot {=u8}, generation {=u32}",
+                model.crc_32, model.slot, model.generation
+            );
+        } else {
+            warning!("no model in either slot: readings only, until one is uploaded");
+        }
+        Self { app, model: InForce { sensor, identity }, spare }
+    }
+
+    /// One turn of the loop: at most one request is answered, and a frame is scanned if it is due.
+    ///
+    /// The watchdog is fed at the end, unless the scan gave not a single reading.
+    pub fn step(&mut self) -> Option<Leave> {
+        let leave = self.serve_link();
+        let core = &mut self.app.core;
+        let now_us = core.line.platform().now_us();
+        let good = match core.clock.due(now_us, core.configuration.frame_period_us) {
+            Some(missed) => core.scan(missed, self.model.sensor.as_ref()),
+            None => true,
+        };
+        if good {
+            core.line.platform().feed_watchdog();
+        } else {
+            core.statistics.bad_loops = core.statistics.bad_loops.saturating_add(1);
+        }
+        leave
+    }
+}
+
+impl<
+    P: Platform,
+    F: FrameSource<ROWS, COLS>,
+    const ROWS: usize,
+    const COLS: usize,
+    const OUTPUTS: usize,
+    const BYTES: usize,
+> Core<P, F, ROWS, COLS, OUTPUTS, BYTES>
+{
+    /// Scans a frame and reports on it; tells whether it has any reading at all.
+    fn scan<E: ExpKernel>(
+        &mut self,
+        missed: u32,
+        sensor: Option<&Tactile<'_, ROWS, COLS, OUTPUTS, E>>,
+    ) -> bool {
+        let start_us = self.line.platform().now_us();
+        let report = self.source.scan(self.configuration.scan, &mut self.frame);
+        let scan_us = self.line.platform().now_us().wrapping_sub(start_us);
+
+        let s = &mut self.statistics;
+        s.frames_scanned = s.frames_scanned.saturating_add(1);
+        s.frames_missed = s.frames_missed.saturating_add(missed);
+        s.failed_samples = s.failed_samples.saturating_add(u32::from(report.failed_samples));
+        s.longest_scan_us = s.longest_scan_us.max(scan_us);
+        let frame = s.frames_scanned;
+        let overrun = if missed > 0 { EstimateReport::OVERRUN } else { 0 };
+
+        let readings = self.frame.row_column_resistance_ohm.as_flattened();
+        let any = readings.iter().any(|reading| !reading.is_nan());
+        if self.configuration.send_readings {
+            let readings_ohm = Floats::of(readings);
+            let sent = self.line.send(UNASKED, &Report::Readings { frame, readings_ohm });
+            self.count_lost(sent);
+        }
+        let (flags, health) = self.decode(sensor);
+        self.feed_baseline();
+        if !health.is_good() {
+            let faulty = health.faulty_columns.map(u32::to_le_bytes);
+            let report = HealthReport {
+                frame,
+                missing: health.missing,
+                shorted: health.shorted,
+                open: health.open,
+                faulty_columns: faulty.as_flattened(),
+            };
+            let sent = self.line.send(UNASKED, &Report::Health(report));
+            self.count_lost(sent);
+        }
+        if self.configuration.send_estimates {
+            self.send_estimate(UNASKED, frame, flags | overrun);
+        }
+        any
+    }
+
+    /// Decodes the frame, without what cannot be believed of it.
+    pub(super) fn decode<E: ExpKernel>(
+        &mut self,
+        sensor: Option<&Tactile<'_, ROWS, COLS, OUTPUTS, E>>,
+    ) -> (u8, Health<ROWS>) {
+        let start_us = self.line.platform().now_us();
+        let limits = Limits {
+            shorted_below_ohm: self.configuration.shorted_below_ohm,
+            open_above_ohm: self.configuration.open_above_ohm,
+        };
+        let health = Health::of(&mut self.frame, limits);
+        let mut flags = if health.is_good() { 0 } else { EstimateReport::FAULTY_READING };
+        if let Some(sensor) = sensor {
+            self.estimate = sensor.decode(&self.frame);
+            if self.estimate.status.contains(&RowStatus::Overflow) {
+                flags |= EstimateReport::OVERFLOW;
+            }
+        } else {
+            self.estimate.outputs = [[f32::NAN; OUTPUTS]; ROWS];
+            self.estimate.status = [RowStatus::MissingReading; ROWS];
+            flags |= EstimateReport::NO_MODEL;
+        }
+        let change = self.baseline.largest_relative_deviation(&self.frame);
+        let contact = change.is_some_and(|change| change > self.configuration.contact_threshold);
+        if contact && self.capture.is_none() {
+            flags |= EstimateReport::CONTACT;
+        }
+        let decode_us = self.line.platform().now_us().wrapping_sub(start_us);
+        let s = &mut self.statistics;
+        s.frames_decoded = s.frames_decoded.saturating_add(1);
+        s.longest_decode_us = s.longest_decode_us.max(decode_us);
+        (flags, health)
+    }
+
+    /// Sends the estimate, as the answer to request `number` or unasked.
+    pub(super) fn send_estimate(&mut self, number: u16, frame: u32, flags: u8) {
+        let row_status = self.estimate.status.map(|status| match status {
+            RowStatus::Decoded => 0,
+            RowStatus::MissingReading => 1,
+            RowStatus::Overflow => 2,
+        });
+        let outputs = Floats::of(self.estimate.outputs.as_flattened());
+        let report = EstimateReport { frame, flags, row_status: &row_status, outputs };
+        let sent = self.line.send(number, &Report::Estimate(report));
+        self.count_lost(sent);
+    }
+
+    /// Takes the frame into the baseline that is being captured, and answers when it is whole.
+    fn feed_baseline(&mut self) {
+        let Some((number, left)) = self.capture else { return };
+        self.baseline.add(&self.frame);
+        self.capture = left.checked_sub(1).filter(|left| *left > 0).map(|left| (number, left));
+        if self.capture.is_none() {
+            let mean = self.baseline.mean().row_column_resistance_ohm.as_flattened();
+            let sent = self.line.send(number, &Report::Baseline { readings_ohm: Floats::of(mean) });
+            self.count_lost(sent);
+        }
+    }
+
+    pub(super) fn count_lost(&mut self, sent: bool) {
+        if !sent {
+            self.statistics.lost_reports = self.statistics.lost_reports.saturating_add(1);
+        }
+    }
+
+    /// Puts `readings` of a request in the frame's place.
+    pub(super) fn set_frame(&mut self, readings: impl Iterator<Item = f32>) {
+        self.frame = Frame::missing();
+        let places = self.frame.row_column_resistance_ohm.as_flattened_mut();
+        places.iter_mut().zip(readings).for_each(|(place, reading)| *place = reading);
+    }
+}

@@ -1,0 +1,180 @@
+//! Consistent overhead byte stuffing (Cheshire & Baker, IEEE/ACM Transactions on Networking 1999).
+//!
+//! Own code, for two reasons: it needs no second buffer in either direction, and no panic is
+//! reachable in it, which the link check proves. Tests hold it to the `cobs` crate.
+
+/// Longest run of bytes that one code byte can open.
+const LONGEST_RUN: usize = 254;
+
+/// Ends every frame, and stands nowhere within.
+pub const END: u8 = 0;
+
+/// Calls `send` with every byte of the frame of `message`, [`END`] included, until it answers `false`;
+/// tells whether all was sent.
+pub fn encode(message: &[u8], mut send: impl FnMut(u8) -> bool) -> bool {
+    let mut rest = message;
+    loop {
+        let window = rest.get(..LONGEST_RUN).unwrap_or(rest);
+        let zero = window.iter().position(|byte| *byte == END);
+        let run = zero.and_then(|length| window.get(..length)).unwrap_or(window);
+        // At most 254 + 1.
+        if !send(run.len() as u8 + 1) || !run.iter().all(|byte| send(*byte)) {
+            return false;
+        }
+        let used = run.len() + usize::from(zero.is_some());
+        rest = rest.get(used..).unwrap_or_default();
+        if rest.is_empty() && zero.is_none() {
+            return send(END);
+        }
+    }
+}
+
+/// What one received byte meant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Decoded {
+    /// A byte of the message.
+    Byte(u8),
+    /// Nothing by itself.
+    Nothing,
+    /// The frame ended where it had to.
+    End,
+    /// The frame ended in the middle of a run: bytes are lost.
+    BrokenEnd,
+}
+
+/// Decodes a stream byte by byte.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Decoder {
+    /// Bytes until the next code byte.
+    left: u8,
+    /// Whether a zero of the message stands before that code byte, unless the frame ends there.
+    zero_follows: bool,
+    /// Whether anything came since the last end.
+    started: bool,
+}
+
+impl Default for Decoder {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Decoder {
+    /// A decoder at the start of a frame.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { left: 0, zero_follows: false, started: false }
+    }
+
+    /// Takes one byte of the stream.
+    pub fn push(&mut self, byte: u8) -> Decoded {
+        if byte == END {
+            let broken = self.left != 0 || !self.started;
+            *self = Self::new();
+            return if broken { Decoded::BrokenEnd } else { Decoded::End };
+        }
+        self.started = true;
+        if let Some(left) = self.left.checked_sub(1) {
+            self.left = left;
+            return Decoded::Byte(byte);
+        }
+        let zero = self.zero_follows;
+        self.left = byte - 1; // not zero: that is END
+        self.zero_follows = byte != u8::MAX;
+        if zero { Decoded::Byte(0) } else { Decoded::Nothing }
+    }
+
+    /// Whether nothing came since the last end.
+    #[must_use]
+    pub fn is_idle(&self) -> bool {
+        !self.started
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn frame_of(message: &[u8]) -> Vec<u8> {
+        let mut frame = Vec::new();
+        assert!(encode(message, |byte| {
+            frame.push(byte);
+            true
+        }));
+        frame
+    }
+
+    fn message_of(frame: &[u8]) -> Option<Vec<u8>> {
+        let mut decoder = Decoder::new();
+        let mut message = Vec::new();
+        for byte in frame {
+            match decoder.push(*byte) {
+                Decoded::Byte(byte) => message.push(byte),
+                Decoded::Nothing => {}
+                Decoded::End => return Some(message),
+                Decoded::BrokenEnd => return None,
+            }
+        }
+        None
+    }
+
+    /// Bytes with many zeros, or hardly any, so that all lengths of runs occur.
+    fn messages() -> impl Strategy<Value = Vec<u8>> {
+        let some_zeros = prop::collection::vec(0_u8..4, 0..600);
+        let few_zeros = prop::collection::vec(any::<u8>(), 0..1200);
+        let no_zeros = prop::collection::vec(1_u8.., 0..1200);
+        prop_oneof![some_zeros, few_zeros, no_zeros]
+    }
+
+    #[test]
+    fn known_frames() {
+        // From the paper and the usual corner cases at a run's longest length.
+        assert_eq!(frame_of(&[]), [1, 0]);
+        assert_eq!(frame_of(&[0]), [1, 1, 0]);
+        assert_eq!(frame_of(&[1, 2, 0, 3]), [3, 1, 2, 2, 3, 0]);
+        let longest: Vec<u8> = (1..=254).collect();
+        let mut frame = vec![255];
+        frame.extend(&longest);
+        frame.push(0);
+        assert_eq!(frame_of(&longest), frame);
+    }
+
+    #[test]
+    fn sending_stops_where_it_is_refused() {
+        let mut sent = 0;
+        assert!(!encode(&[1, 2, 3], |_| {
+            sent += 1;
+            sent < 3
+        }));
+        assert_eq!(sent, 3);
+    }
+
+    proptest! {
+        #[test]
+        fn frames_are_those_of_the_cobs_crate_and_decode_to_the_message(message in messages()) {
+            let frame = frame_of(&message);
+            prop_assert!(!frame[..frame.len() - 1].contains(&0));
+            let (body, end) = frame.split_at(frame.len() - 1);
+            prop_assert_eq!(end, &[END]);
+            prop_assert_eq!(message_of(&frame), Some(message.clone()));
+            // The crate's decoder reads our frames, and we read the crate's.
+            prop_assert_eq!(::cobs::decode_vec(body).unwrap_or_default(), message.clone());
+            let mut theirs = ::cobs::encode_vec(&message);
+            theirs.push(END);
+            prop_assert_eq!(message_of(&theirs), Some(message));
+        }
+
+        #[test]
+        fn a_frame_that_is_cut_short_within_a_run_is_broken(message in messages(), cut in 1..1000_usize) {
+            let frame = frame_of(&message);
+            prop_assume!(cut < frame.len() - 1);
+            let mut shorter = frame[..frame.len() - 1 - cut].to_vec();
+            shorter.push(END);
+            // A cut between two runs looks whole here; the CRC finds it.
+            if let Some(found) = message_of(&shorter) {
+                prop_assert!(found.len() < message.len());
+            }
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! From bytes to packets, whatever the bytes.
+
+use super::cobs::{Decoded, Decoder};
+
+/// What a receiver made of the bytes up to the end of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Received<'a> {
+    /// A frame, decoded: the bytes of a packet, unless they are damaged.
+    Frame(&'a [u8]),
+    /// A frame with bytes missing.
+    Broken,
+    /// A frame longer than `BYTES`; it was skipped.
+    TooLong,
+}
+
+/// Gathers frames of up to `BYTES` bytes, CRC included.
+#[derive(Debug, Clone)]
+pub struct Receiver<const BYTES: usize> {
+    cobs: Decoder,
+    bytes: [u8; BYTES],
+    length: usize,
+    too_long: bool,
+}
+
+impl<const BYTES: usize> Default for Receiver<BYTES> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const BYTES: usize> Receiver<BYTES> {
+    /// A receiver that has received nothing.
+    #[must_use]
+    pub const fn new() -> Self {
+        let cobs = Decoder::new();
+        Self { cobs, bytes: [0; BYTES], length: 0, too_long: false }
+    }
+
+    /// Takes one byte; at the end of a frame tells what became of it. Zeros between frames are
+    /// nothing.
+    pub fn push(&mut self, byte: u8) -> Option<Received<'_>> {
+        let idle = self.cobs.is_idle();
+        match self.cobs.push(byte) {
+            Decoded::Nothing => None,
+            Decoded::Byte(byte) => {
+                match self.bytes.get_mut(self.length) {
+                    Some(place) => {
+                        *place = byte;
+                        self.length += 1;
+                    }
+                    None => self.too_long = true,
+                }
+                None
+            }
+            Decoded::BrokenEnd if idle => None,
+            end => {
+                let length = core::mem::take(&mut self.length);
+                if core::mem::take(&mut self.too_long) {
+                    Some(Received::TooLong)
+                } else if end == Decoded::BrokenEnd {
+                    Some(Received::Broken)
+                } else {
+                    Some(Received::Frame(self.bytes.get(..length).unwrap_or_default()))
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::link::cobs;
+
+    fn frame(message: &[u8]) -> Vec<u8> {
+        let mut frame = Vec::new();
+        cobs::encode(message, |byte| {
+            frame.push(byte);
+            true
+        });
+        frame
+    }
+
+    /// What a receiver of four bytes makes of `stream`.
+    fn received(stream: &[u8]) -> Vec<Result<Vec<u8>, &'static str>> {
+        let mut receiver = Receiver::<4>::new();
+        let mut all = Vec::new();
+        for byte in stream {
+            all.extend(receiver.push(*byte).map(|received| match received {
+                Received::Frame(bytes) => Ok(bytes.to_vec()),
+                Received::Broken => Err("broken"),
+                Received::TooLong => Err("too long"),
+            }));
+        }
+        all
+    }
+
+    #[test]
+    fn frames_arrive_one_by_one_with_any_number_of_zeros_between() {
+        let stream = [frame(&[1, 2]), vec![0, 0], frame(&[0, 0, 0, 4]), frame(&[])].concat();
+        assert_eq!(received(&stream), [Ok(vec![1, 2]), Ok(vec![0, 0, 0, 4]), Ok(vec![])]);
+    }
+
+    #[test]
+    fn after_anything_the_next_frame_but_one_arrives() {
+        for rubbish in [&[9, 9][..], &[255; 300], &[1, 1, 1, 1, 1, 1, 1, 1], &[4, 4, 4, 4, 4]] {
+            let stream = [rubbish, &frame(&[1])[..], &frame(&[2, 3])[..]].concat();
+            let found = received(&stream);
+            assert_eq!(found.last(), Some(&Ok(vec![2, 3])), "{rubbish:?}");
+            assert!(found.len() <= 2, "{rubbish:?}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_too_long_or_cut_is_told() {
+        let stream = [frame(&[1; 5]), vec![3, 1, 0], frame(&[7; 4])].concat();
+        assert_eq!(received(&stream), [Err("too long"), Err("broken"), Ok(vec![7; 4])]);
+    }
+}

@@ -1,0 +1,26 @@
+//! Logging through defmt where the feature is on, and nothing where it is not.
+
+/// As `defmt::info!`.
+macro_rules! info {
+    ($($argument:expr),+) => {
+        $crate::log::log!(info, $($argument),+)
+    };
+}
+
+/// As `defmt::warn!`.
+macro_rules! warning {
+    ($($argument:expr),+) => {
+        $crate::log::log!(warn, $($argument),+)
+    };
+}
+
+macro_rules! log {
+    ($level:ident, $format:expr $(, $argument:expr)*) => {{
+        #[cfg(feature = "defmt")]
+        ::defmt::$level!($format $(, $argument)*);
+        #[cfg(not(feature = "defmt"))]
+        { $(let _ = &$argument;)* }
+    }};
+}
+
+pub(crate) use {info, log, warning};

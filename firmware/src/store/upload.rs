@@ -1,0 +1,130 @@
+//! A blob that arrives in pieces.
+
+use super::{FlashError, Slot, capacity, record};
+use crate::link::message::{Refusal, UploadState};
+
+/// How far the exchange of the model is. The bytes are in the spare slot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Upload {
+    state: UploadState,
+    /// Announced length of the blob.
+    length: usize,
+}
+
+impl Default for Upload {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Upload {
+    /// None going on.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { state: UploadState::Idle, length: 0 }
+    }
+
+    /// How far it is.
+    #[must_use]
+    pub fn state(&self) -> UploadState {
+        self.state
+    }
+
+    /// Whether the last upload was committed, and none has begun since.
+    #[must_use]
+    pub fn is_committed(&self) -> bool {
+        matches!(self.state, UploadState::Committed { .. })
+    }
+
+    /// Erases `spare` for a blob of `length` bytes.
+    ///
+    /// # Errors
+    /// [`Refusal::TooLarge`], [`Refusal::Flash`].
+    pub fn begin<S: Slot>(&mut self, spare: &mut S, length: u32) -> Result<(), Refusal> {
+        let capacity = capacity(spare.bytes());
+        let length = length as usize;
+        if length > capacity {
+            return Err(Refusal::TooLarge { slot_bytes: capacity as u32 });
+        }
+        self.state = UploadState::Idle;
+        self.flash(spare.erase())?;
+        *self = Self { state: UploadState::Receiving { received: 0 }, length };
+        Ok(())
+    }
+
+    /// Writes the next bytes to `spare`. Bytes that were received before are passed over.
+    ///
+    /// # Errors
+    /// [`Refusal::NoUpload`], [`Refusal::OutOfPlace`], [`Refusal::Flash`].
+    pub fn chunk<S: Slot>(
+        &mut self,
+        spare: &mut S,
+        offset: u32,
+        bytes: &[u8],
+    ) -> Result<(), Refusal> {
+        let UploadState::Receiving { received } = self.state else {
+            return Err(Refusal::NoUpload);
+        };
+        let (offset, here) = (offset as usize, received as usize);
+        let end = offset.saturating_add(bytes.len());
+        if end <= here {
+            return Ok(());
+        }
+        let whole_words = end.is_multiple_of(4) || end == self.length;
+        if offset != here || end > self.length || !whole_words {
+            return Err(Refusal::OutOfPlace { received });
+        }
+        let (words, last) = bytes.as_chunks::<4>();
+        let mut written = spare.write(offset, words.as_flattened());
+        if !last.is_empty() {
+            let mut padded = [0xFF; 4];
+            padded.iter_mut().zip(last).for_each(|(place, byte)| *place = *byte);
+            let place = offset.saturating_add(bytes.len() - last.len());
+            written = written.and_then(|()| spare.write(place, &padded));
+        }
+        self.flash(written)?;
+        self.state = UploadState::Receiving { received: end as u32 };
+        Ok(())
+    }
+
+    /// The blob in `spare`, once all of it is there.
+    ///
+    /// # Errors
+    /// [`Refusal::NoUpload`], [`Refusal::OutOfPlace`].
+    pub fn complete<'s, S: Slot>(&self, spare: &'s S) -> Result<&'s [u8], Refusal> {
+        let UploadState::Receiving { received } = self.state else {
+            return Err(Refusal::NoUpload);
+        };
+        let whole = (received as usize == self.length).then(|| spare.bytes().get(..self.length));
+        whole.flatten().ok_or(Refusal::OutOfPlace { received })
+    }
+
+    /// Writes the record that makes the blob in `spare`, found sound, the one to start with.
+    ///
+    /// # Errors
+    /// [`Refusal::Flash`].
+    pub fn commit<S: Slot>(
+        &mut self,
+        spare: &mut S,
+        generation: u32,
+        crc_32: u32,
+    ) -> Result<(), Refusal> {
+        let place = capacity(spare.bytes());
+        self.flash(spare.write(place, &record(generation, crc_32)))?;
+        self.state = UploadState::Committed { crc_32 };
+        Ok(())
+    }
+
+    /// Forgets what was received.
+    pub fn abort(&mut self) {
+        *self = Self::new();
+    }
+
+    /// A failure of the flash ends the upload.
+    fn flash(&mut self, outcome: Result<(), FlashError>) -> Result<(), Refusal> {
+        outcome.map_err(|FlashError| {
+            self.abort();
+            Refusal::Flash
+        })
+    }
+}

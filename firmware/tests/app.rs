@@ -1,0 +1,260 @@
+//! The application loop on a virtual board.
+
+mod common;
+
+use common::*;
+use firmware::app::{Leave, Session};
+use firmware::link::message::{
+    Configuration, ConfigurationField, EstimateReport, Refusal, Report, Request, Statistics,
+};
+use model_core::blob::Floats;
+use model_core::{Aligned, Decoder, Frame};
+
+fn statistics(session: &mut TestSession<'_>, board: &Board) -> Statistics {
+    ask(session, board, &Request::Statistics, |report| match report {
+        Report::Statistics(statistics) => statistics,
+        other => panic!("{other:?}"),
+    })
+    .0
+}
+
+/// What model-core itself answers.
+fn expected(blob: &[u8], frame: &Frame<ROWS, COLS>) -> [[f32; OUTPUTS]; ROWS] {
+    let mut aligned = Aligned([0; 2048]);
+    aligned.0[..blob.len()].copy_from_slice(blob);
+    let decoder = Decoder::<ROWS, COLS, OUTPUTS>::load(&aligned.0[..blob.len()]).unwrap();
+    decoder.decode(frame).outputs
+}
+
+fn bits(values: impl Iterator<Item = f32>) -> Vec<u32> {
+    values.map(f32::to_bits).collect()
+}
+
+/// Asks for an estimate of `frame`: its flags, row status and bits.
+fn decode(
+    session: &mut TestSession<'_>,
+    board: &Board,
+    frame: &Frame<ROWS, COLS>,
+) -> (u8, Vec<u8>, Vec<u32>) {
+    let readings_ohm = Floats::of(frame.row_column_resistance_ohm.as_flattened());
+    let request = Request::Decode { frame: 5, readings_ohm };
+    ask(session, board, &request, |report| match report {
+        Report::Estimate(e) => {
+            assert_eq!(e.frame, 5);
+            (e.flags, e.row_status.to_vec(), bits(e.outputs.iter()))
+        }
+        other => panic!("{other:?}"),
+    })
+    .0
+}
+
+#[test]
+fn readings_from_the_host_are_decoded_as_model_core_does() {
+    let blob = blob(3, 4);
+    let mut slots = MockSlot::pair_with(&blob);
+    let mut bench = Bench::new(quiet());
+    let mut session = Session::start(&mut bench.app, &mut slots);
+    let frame = frame_at_rest();
+    let (flags, status, found) = decode(&mut session, &bench.board, &frame);
+    assert_eq!((flags, &status[..]), (0, &[0, 0][..]));
+    assert_eq!(found, bits(expected(&blob, &frame).into_iter().flatten()));
+}
+
+#[test]
+fn a_faulty_reading_spoils_its_row_alone_and_is_told() {
+    let blob = blob(3, 4);
+    let mut slots = MockSlot::pair_with(&blob);
+    let mut bench = Bench::new(quiet());
+    let mut session = Session::start(&mut bench.app, &mut slots);
+    let good = frame_at_rest();
+    for bad in [f32::NAN, 0.0, f32::INFINITY, 1.0, 2000.0, -60.0] {
+        let mut frame = good;
+        frame.row_column_resistance_ohm[0][2] = bad;
+        let (flags, status, found) = decode(&mut session, &bench.board, &frame);
+        assert_eq!((flags, &status[..]), (EstimateReport::FAULTY_READING, &[1, 0][..]), "{bad}");
+        assert!(found[..OUTPUTS].iter().all(|value| f32::from_bits(*value).is_nan()));
+        assert_eq!(found[OUTPUTS..], bits(expected(&blob, &good)[1].into_iter()));
+    }
+}
+
+#[test]
+fn without_a_model_the_answer_says_so() {
+    let mut slots = MockSlot::pair();
+    let mut bench = Bench::new(quiet());
+    let mut session = Session::start(&mut bench.app, &mut slots);
+    let (flags, status, found) = decode(&mut session, &bench.board, &frame_at_rest());
+    assert_eq!((flags, &status[..]), (EstimateReport::NO_MODEL, &[1, 1][..]));
+    assert!(found.iter().all(|value| f32::from_bits(*value).is_nan()));
+}
+
+#[test]
+fn a_frame_of_another_length_is_refused() {
+    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut bench = Bench::new(quiet());
+    let mut session = Session::start(&mut bench.app, &mut slots);
+    for readings in [&[60.0; 5][..], &[60.0; 7], &[]] {
+        let request = Request::Decode { frame: 0, readings_ohm: Floats::of(readings) };
+        let (refused, _) = ask(&mut session, &bench.board, &request, |report| {
+            report == Report::Refused(Refusal::FrameLength { expected: 6 })
+        });
+        assert!(refused);
+    }
+}
+
+#[test]
+fn frames_are_scanned_on_time_numbered_and_reported() {
+    let blob = blob(3, 4);
+    let mut slots = MockSlot::pair_with(&blob);
+    let configuration = Configuration { frame_period_us: 1000, send_readings: true, ..quiet() };
+    let mut bench = Bench::new(configuration);
+    let mut session = Session::start(&mut bench.app, &mut slots);
+    while bench.board.0.borrow().now_us < 5500 {
+        assert_eq!(session.step(), None);
+    }
+    let reports = reports(&bench.board.0.borrow().to_host);
+    assert_eq!(reports.len(), 10, "{reports:?}"); // readings and estimate, five times
+    for (i, (number, text)) in reports.iter().enumerate() {
+        assert_eq!(*number, 0);
+        let kind = if i % 2 == 0 { "Readings { " } else { "Estimate(EstimateReport { " };
+        let start = format!("{kind}frame: {},", i / 2 + 1);
+        assert!(text.starts_with(&start), "{text} instead of {start}");
+    }
+    let s = statistics(&mut session, &bench.board);
+    assert_eq!((s.frames_scanned, s.frames_decoded, s.frames_missed), (5, 5, 0));
+    assert!(s.longest_scan_us >= 10 && s.longest_scan_us < 20);
+}
+
+#[test]
+fn a_scan_longer_than_the_period_is_an_overrun() {
+    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut bench = Bench::new(Configuration { frame_period_us: 100, ..quiet() });
+    let board = bench.board.clone();
+    let frame = bench.frame.clone();
+    let source = Source { frame, board: board.clone(), scan_us: 250 };
+    bench.app =
+        TestApp::new(board.clone(), source, Configuration { frame_period_us: 100, ..quiet() });
+    let mut session = Session::start(&mut bench.app, &mut slots);
+    while board.0.borrow().now_us < 2000 {
+        session.step();
+    }
+    let all = reports(&board.0.borrow().to_host);
+    let flagged =
+        |flag: u8| all.iter().filter(|(_, t)| t.contains(&format!("flags: {flag},"))).count();
+    assert_eq!(flagged(0), 1, "{all:?}"); // the first was on time
+    assert_eq!(flagged(EstimateReport::OVERRUN), all.len() - 1);
+    let s = statistics(&mut session, &board);
+    assert!(s.frames_missed >= s.frames_scanned - 1, "{s:?}");
+}
+
+#[test]
+fn the_watchdog_is_fed_by_good_loops_only() {
+    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut bench = Bench::new(Configuration { frame_period_us: 100, ..quiet() });
+    let mut session = Session::start(&mut bench.app, &mut slots);
+    let board = bench.board.clone();
+    let feeds = || board.0.borrow().feeds;
+    for _ in 0..50 {
+        let before = feeds();
+        session.step();
+        assert_eq!(feeds(), before + 1);
+    }
+    // A converter that gives nothing: each loop that scans is a bad one.
+    *bench.frame.borrow_mut() = Frame::missing();
+    let before = statistics(&mut session, &board);
+    let (mut steps, fed) = (0, feeds());
+    for _ in 0..2000 {
+        session.step();
+        steps += 1;
+    }
+    let after = statistics(&mut session, &board);
+    assert!(after.bad_loops > before.bad_loops + 10);
+    assert!(feeds() - fed < steps);
+    // One reading is enough.
+    bench.frame.borrow_mut().row_column_resistance_ohm[1][1] = 60.0;
+    let bad = statistics(&mut session, &board).bad_loops;
+    for _ in 0..2000 {
+        session.step();
+    }
+    assert!(statistics(&mut session, &board).bad_loops <= bad + 1);
+}
+
+#[test]
+fn a_baseline_is_captured_and_contact_is_told_against_it() {
+    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut bench = Bench::new(Configuration { frame_period_us: 100, ..quiet() });
+    let mut session = Session::start(&mut bench.app, &mut slots);
+    let board = bench.board.clone();
+    board
+        .0
+        .borrow_mut()
+        .to_device
+        .extend(request_bytes(9, &Request::CaptureBaseline { frames: 4 }));
+    while !reports(&board.0.borrow().to_host).iter().any(|(number, _)| *number == 9) {
+        session.step();
+        assert!(board.0.borrow().now_us < 10_000, "no answer");
+    }
+    let all = reports(&board.0.borrow().to_host);
+    let baseline = &all.iter().find(|(number, _)| *number == 9).unwrap().1;
+    let rest = Floats::of(&[60.0, 61.0, 62.0, 63.0, 64.0, 65.0]);
+    assert_eq!(*baseline, format!("{:?}", Report::Baseline { readings_ohm: rest }));
+
+    let rest = frame_at_rest();
+    assert_eq!(decode(&mut session, &board, &rest).0 & EstimateReport::CONTACT, 0);
+    let mut pressed = rest;
+    pressed.row_column_resistance_ohm[1][0] *= 0.97;
+    assert_ne!(decode(&mut session, &board, &pressed).0 & EstimateReport::CONTACT, 0);
+    let mut nearly = rest;
+    nearly.row_column_resistance_ohm[1][0] *= 0.985;
+    assert_eq!(decode(&mut session, &board, &nearly).0 & EstimateReport::CONTACT, 0);
+}
+
+#[test]
+fn configurations_are_checked_and_a_bad_one_changes_nothing() {
+    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut bench = Bench::new(quiet());
+    let mut session = Session::start(&mut bench.app, &mut slots);
+    let mut configure = |configuration| {
+        ask(&mut session, &bench.board, &Request::Configure(configuration), |report| match report {
+            Report::Configuration(configuration) => Ok(configuration),
+            Report::Refused(refusal) => Err(refusal),
+            other => panic!("{other:?}"),
+        })
+        .0
+    };
+    let good = Configuration { frame_period_us: 20_000, send_readings: true, ..quiet() };
+    assert_eq!(configure(good), Ok(good));
+    let bad = Configuration { frame_period_us: 1, ..good };
+    let refusal = Refusal::Configuration(ConfigurationField::FramePeriod);
+    assert_eq!(configure(bad), Err(refusal));
+    let (in_force, _) = ask(&mut session, &bench.board, &Request::Configuration, |r| match r {
+        Report::Configuration(configuration) => configuration,
+        other => panic!("{other:?}"),
+    });
+    assert_eq!(in_force, good);
+}
+
+#[test]
+fn a_host_that_takes_no_bytes_costs_a_report_but_not_the_device() {
+    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut bench = Bench::new(Configuration { frame_period_us: 1000, ..quiet() });
+    let mut session = Session::start(&mut bench.app, &mut slots);
+    let board = bench.board.clone();
+    board.0.borrow_mut().room = Some(10);
+    while board.0.borrow().now_us < 500_000 {
+        session.step();
+    }
+    board.0.borrow_mut().room = None;
+    // The report that was cut does not hide the next answer.
+    let s = statistics(&mut session, &board);
+    assert!(s.lost_reports >= 5 && s.frames_missed > 0, "{s:?}");
+}
+
+#[test]
+fn a_restart_is_answered_and_ends_the_session() {
+    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut bench = Bench::new(quiet());
+    let mut session = Session::start(&mut bench.app, &mut slots);
+    let (answer, leave) =
+        ask(&mut session, &bench.board, &Request::Restart, |r| r == Report::Restarting);
+    assert_eq!((answer, leave), (true, Some(Leave::Restart)));
+}

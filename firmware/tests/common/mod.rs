@@ -1,0 +1,364 @@
+//! A board, slots and a host for tests: all stricter than the real ones.
+#![allow(dead_code, reason = "every test file uses its part")]
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::rc::Rc;
+
+use firmware::app::{App, Leave, Session};
+use firmware::link::message::{Configuration, Memory, Report, Request, UploadStep};
+use firmware::link::receive::{Received, Receiver};
+use firmware::link::{cobs, packet};
+use firmware::platform::Platform;
+use firmware::readout::{FrameSource, ScanReport, ScanSettings};
+use firmware::store::{FlashError, Slot};
+use model_core::Frame;
+use model_core::blob::{
+    Columns, Floats, Metadata, ModelParts, NoiseKind, encode, encoded_length_bound,
+};
+use model_core::rbf::{Network, Parameters, Shape};
+
+pub const ROWS: usize = 2;
+pub const COLS: usize = 3;
+pub const OUTPUTS: usize = 2;
+pub const MESSAGE_BYTES: usize = 128;
+
+pub type TestApp = App<Board, Source, ROWS, COLS, OUTPUTS, MESSAGE_BYTES>;
+pub type TestSession<'a> = Session<
+    'a,
+    Board,
+    Source,
+    MockSlot,
+    ROWS,
+    COLS,
+    OUTPUTS,
+    MESSAGE_BYTES,
+    model_core::exp::Polynomial,
+>;
+
+/// What a test sees of the board, whoever owns it.
+#[derive(Default)]
+pub struct Pins {
+    pub to_device: VecDeque<u8>,
+    pub to_host: Vec<u8>,
+    pub now_us: u32,
+    pub feeds: u32,
+    /// Bytes that the host's side still takes; `None` takes all.
+    pub room: Option<usize>,
+}
+
+#[derive(Clone, Default)]
+pub struct Board(pub Rc<RefCell<Pins>>);
+
+impl Platform for Board {
+    const BOARD: &'static str = "test";
+
+    fn now_us(&mut self) -> u32 {
+        let mut pins = self.0.borrow_mut();
+        pins.now_us = pins.now_us.wrapping_add(1);
+        pins.now_us
+    }
+
+    fn receive(&mut self) -> Option<u8> {
+        self.0.borrow_mut().to_device.pop_front()
+    }
+
+    fn send(&mut self, byte: u8) -> bool {
+        let mut pins = self.0.borrow_mut();
+        match &mut pins.room {
+            Some(0) => return false,
+            Some(room) => *room -= 1,
+            None => {}
+        }
+        pins.to_host.push(byte);
+        true
+    }
+
+    fn feed_watchdog(&mut self) {
+        self.0.borrow_mut().feeds += 1;
+    }
+
+    fn memory(&self) -> Memory {
+        Memory { stack_reserved: 1024, ..Memory::default() }
+    }
+}
+
+/// A sensor that shows the same frame until it is given another.
+#[derive(Clone)]
+pub struct Source {
+    pub frame: Rc<RefCell<Frame<ROWS, COLS>>>,
+    pub board: Board,
+    pub scan_us: u32,
+}
+
+impl FrameSource<ROWS, COLS> for Source {
+    fn scan(&mut self, settings: ScanSettings, frame: &mut Frame<ROWS, COLS>) -> ScanReport {
+        assert!(settings.oversampling > 0, "a scan without samples");
+        *frame = *self.frame.borrow();
+        let mut pins = self.board.0.borrow_mut();
+        pins.now_us = pins.now_us.wrapping_add(self.scan_us);
+        let missing = frame.row_column_resistance_ohm.as_flattened().iter();
+        ScanReport { failed_samples: missing.filter(|reading| reading.is_nan()).count() as u16 }
+    }
+}
+
+/// The power went; nothing more happens until [`MockSlot::power_on`].
+struct PowerCut;
+
+/// When the power goes.
+#[derive(Default)]
+struct Power {
+    /// Operations on words until then.
+    left: Option<usize>,
+    gone: bool,
+}
+
+/// A slot of NOR flash: writes in whole words, only where it is erased, and can lose its power in
+/// the middle of any operation.
+pub struct MockSlot {
+    words: Vec<u32>,
+    /// Shared by both slots.
+    power: Rc<RefCell<Power>>,
+    pub erases: usize,
+    pub writes: usize,
+}
+
+impl MockSlot {
+    pub const BYTES: usize = 2048;
+
+    pub fn pair() -> [Self; 2] {
+        let power = Rc::new(RefCell::new(Power::default()));
+        [0, 1].map(|_| Self {
+            words: vec![u32::MAX; Self::BYTES / 4],
+            power: power.clone(),
+            erases: 0,
+            writes: 0,
+        })
+    }
+
+    /// A pair with `blob` in the first, as flashed together with the firmware.
+    pub fn pair_with(blob: &[u8]) -> [Self; 2] {
+        let mut slots = Self::pair();
+        bytemuck::cast_slice_mut(&mut slots[0].words)[..blob.len()].copy_from_slice(blob);
+        slots
+    }
+
+    pub fn cut_power_after(&self, operations: usize) {
+        *self.power.borrow_mut() = Power { left: Some(operations), gone: false };
+    }
+
+    /// Whether the power had gone.
+    pub fn power_on(&self) -> bool {
+        std::mem::take(&mut *self.power.borrow_mut()).gone
+    }
+
+    fn operate(&self) -> Result<(), PowerCut> {
+        let mut power = self.power.borrow_mut();
+        match power.left {
+            Some(0) => {
+                power.gone = true;
+                return Err(PowerCut);
+            }
+            Some(left) => power.left = Some(left - 1),
+            None => {}
+        }
+        Ok(())
+    }
+}
+
+impl Slot for MockSlot {
+    fn bytes(&self) -> &[u8] {
+        bytemuck::cast_slice(&self.words)
+    }
+
+    fn erase(&mut self) -> Result<(), FlashError> {
+        self.erases += 1;
+        for place in 0..self.words.len() {
+            if self.operate().is_err() {
+                // Half erased: bits of no meaning.
+                self.words[place] ^= 0x5555_5555;
+                return Err(FlashError);
+            }
+            self.words[place] = u32::MAX;
+        }
+        Ok(())
+    }
+
+    fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), FlashError> {
+        self.writes += 1;
+        assert!(offset.is_multiple_of(4) && bytes.len().is_multiple_of(4), "whole words");
+        for (place, word) in bytes.as_chunks::<4>().0.iter().enumerate() {
+            let place = offset / 4 + place;
+            assert_eq!(self.words[place], u32::MAX, "word {place} is not erased");
+            let word = u32::from_le_bytes(*word);
+            if self.operate().is_err() {
+                self.words[place] = word | 0x0F0F_0F0F; // half written
+                return Err(FlashError);
+            }
+            self.words[place] = word;
+        }
+        Ok(())
+    }
+}
+
+/// A blob for this sensor, of `centres` centres and with numbers that depend on `seed`.
+pub fn blob(seed: usize, centres: usize) -> Vec<u8> {
+    let number = |i: usize| ((i * 37 + seed * 11) % 101) as f32 / 50.0 - 1.0;
+    let list = |from: usize, count: usize| (from..from + count).map(number).collect::<Vec<_>>();
+    let (centre, weights) = (list(1, centres * COLS), list(2, centres * OUTPUTS));
+    let (bias, affine) = (list(3, OUTPUTS), list(4, COLS * OUTPUTS));
+    let network = Network::try_new(
+        Shape { inputs: COLS, centres, outputs: OUTPUTS },
+        Parameters {
+            input_minimum: &[50.0; COLS],
+            input_per_span: &[0.05; COLS],
+            centres: &centre,
+            decay: &[1.5],
+            output_weights: &weights,
+            bias: &bias,
+            affine: &affine,
+        },
+    )
+    .unwrap();
+    blob_of(network)
+}
+
+/// `network` for both rows, as a blob.
+pub fn blob_of(network: Network<'_>) -> Vec<u8> {
+    let shape = network.shape();
+    let names = |count: usize| vec!["x"; ROWS * count].join("\n");
+    let (inputs, outputs) = (names(shape.inputs), names(shape.outputs));
+    let zeros = vec![0; ROWS * shape.outputs * 4];
+    let metadata = Metadata {
+        name: "hand-made",
+        scene_digest: 0,
+        noise_kind: NoiseKind::None,
+        noise_level: 0.0,
+        seed: 0,
+        training_frames: 0,
+        thickness_mm: 5.0,
+        input_names: Columns(&inputs),
+        input_units: Columns(&inputs),
+        output_names: Columns(&outputs),
+        output_units: Columns(&outputs),
+        training_rmse: Floats(&zeros),
+        full_scale: Floats(&zeros),
+    };
+    let parts = ModelParts { networks: &[network], row_network: &[0; ROWS], metadata };
+    let mut words = vec![0_u32; encoded_length_bound(&parts).div_ceil(4)];
+    encode(&parts, bytemuck::cast_slice_mut(&mut words)).unwrap().to_vec()
+}
+
+/// The CRC-32 that closes a blob.
+pub fn crc_of(blob: &[u8]) -> u32 {
+    u32::from_le_bytes(*blob.last_chunk().unwrap())
+}
+
+pub fn frame_at_rest() -> Frame<ROWS, COLS> {
+    Frame { row_column_resistance_ohm: [[60.0, 61.0, 62.0], [63.0, 64.0, 65.0]] }
+}
+
+/// A configuration that scans only when asked to.
+pub fn quiet() -> Configuration {
+    Configuration { frame_period_us: 0, ..Configuration::DEFAULT }
+}
+
+/// An application, and the host's end of everything it is connected to.
+pub struct Bench {
+    pub app: TestApp,
+    pub board: Board,
+    pub frame: Rc<RefCell<Frame<ROWS, COLS>>>,
+}
+
+impl Bench {
+    pub fn new(configuration: Configuration) -> Self {
+        let board = Board::default();
+        let frame = Rc::new(RefCell::new(frame_at_rest()));
+        let source = Source { frame: frame.clone(), board: board.clone(), scan_us: 10 };
+        Self { app: App::new(board.clone(), source, configuration), board, frame }
+    }
+}
+
+/// The bytes of one request.
+pub fn request_bytes(number: u16, request: &Request<'_>) -> Vec<u8> {
+    let mut buffer = [0; 1024];
+    let packet = packet::encode(number, request, &mut buffer).unwrap();
+    let mut bytes = Vec::new();
+    assert!(cobs::encode(packet, |byte| {
+        bytes.push(byte);
+        true
+    }));
+    bytes
+}
+
+/// What the host reads of a device's bytes: the number and debug text of each report, and whether
+/// each was whole.
+pub fn reports(bytes: &[u8]) -> Vec<(u16, String)> {
+    let mut receiver = Receiver::<1024>::new();
+    let mut reports = Vec::new();
+    for byte in bytes {
+        match receiver.push(*byte) {
+            Some(Received::Frame(bytes)) => {
+                let packet = packet::decode::<Report<'_>>(bytes).expect("a whole report");
+                reports.push((packet.number, format!("{:?}", packet.body)));
+            }
+            Some(other) => panic!("the device sent {other:?}"),
+            None => {}
+        }
+    }
+    reports
+}
+
+/// Runs turns of the loop until everything sent is read, or the session ends.
+pub fn settle(session: &mut TestSession<'_>, board: &Board) -> Option<Leave> {
+    while !board.0.borrow().to_device.is_empty() {
+        if let Some(leave) = session.step() {
+            return Some(leave);
+        }
+    }
+    None
+}
+
+/// Sends `request` and passes the answer to `read`.
+pub fn ask<T>(
+    session: &mut TestSession<'_>,
+    board: &Board,
+    request: &Request<'_>,
+    read: impl FnOnce(Report<'_>) -> T,
+) -> (T, Option<Leave>) {
+    board.0.borrow_mut().to_host.clear();
+    board.0.borrow_mut().to_device.extend(request_bytes(77, request));
+    let leave = settle(session, board);
+    let answer = std::mem::take(&mut board.0.borrow_mut().to_host);
+    let mut receiver = Receiver::<1024>::new();
+    for byte in &answer {
+        if let Some(Received::Frame(bytes)) = receiver.push(*byte) {
+            let packet = packet::decode::<Report<'_>>(bytes).expect("a whole report");
+            if packet.number == 77 {
+                return (read(packet.body), leave);
+            }
+        }
+    }
+    panic!("no answer to {request:?} in {:?}", reports(&answer));
+}
+
+/// The CRC-32 of the model in force.
+pub fn model_crc(session: &mut TestSession<'_>, board: &Board) -> Option<u32> {
+    let read = |report: Report<'_>| match report {
+        Report::Identity(identity) => identity.model.map(|model| model.crc_32),
+        other => panic!("{other:?}"),
+    };
+    ask(session, board, &Request::Identify, read).0
+}
+
+/// The steps of an upload of `blob` in chunks of `chunk` bytes.
+pub fn upload_steps(blob: &[u8], chunk: usize) -> Vec<UploadStep<'_>> {
+    let mut steps = vec![UploadStep::Begin { length: blob.len() as u32 }];
+    steps.extend(
+        blob.chunks(chunk)
+            .enumerate()
+            .map(|(i, bytes)| UploadStep::Chunk { offset: (i * chunk) as u32, bytes }),
+    );
+    steps.push(UploadStep::Commit);
+    steps
+}
