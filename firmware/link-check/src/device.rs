@@ -25,7 +25,7 @@ fn panic(_: &PanicInfo<'_>) -> ! {
 
 /// `value`, after which the optimiser neither knows what it is nor may leave out computing it.
 #[inline(never)]
-fn opaque<T: Copy>(value: T) -> T {
+pub fn opaque<T: Copy>(value: T) -> T {
     // SAFETY: a reference is valid for reads.
     unsafe { ptr::read_volatile(&raw const value) }
 }
@@ -84,6 +84,7 @@ extern "C" fn _start() -> ! {
     exercise_decoding::<Micromath>();
     exercise_recalibration();
     exercise_recalibration_on_slices();
+    crate::readout::exercise();
     loop {
         core::hint::spin_loop();
     }

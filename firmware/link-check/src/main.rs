@@ -10,6 +10,8 @@
 
 #[cfg(target_os = "none")]
 mod device;
+#[cfg(target_os = "none")]
+mod readout;
 
 #[cfg(not(target_os = "none"))]
 fn main() {
