@@ -1,30 +1,110 @@
-//! How a frame is scanned.
+//! Reading a frame: rows are driven one after the other, and every column is sampled.
+//!
+//! A board picks one [`RowDrive`], one [`ColumnSampler`] and one [`Circuit`](crate::circuit::Circuit);
+//! [`Scanner`] makes a [`FrameSource`] of them. Everything is generic over embedded-hal 1.0, whose
+//! version lacks an ADC trait: [`OnChipAdc`] stands in. A scan never fails as a whole: a reading
+//! that could not be taken is NaN, and counted.
+//!
+//! `docs/readout.md` has the circuits, their parts and the timing.
 
-use model_core::Frame;
+use model_core::{ColumnWire, Frame, RowWire};
 use serde::{Deserialize, Serialize};
 
 mod baseline;
+mod columns;
+mod rows;
+mod scanner;
+#[cfg(test)]
+mod tests;
 
 pub use baseline::Baseline;
+pub use columns::{Mcp3208s, MultiplexedAdc, OnChipAdc, SampleError};
+pub use rows::{DirectPins, DriveError, Multiplexer4051, ShiftRegister595};
+pub use scanner::Scanner;
 
-/// How each scan is made.
+/// Selects the row-wire that is active; all others idle.
+pub trait RowDrive {
+    /// What a pin or bus may fail with.
+    type Error;
+
+    /// Makes `row` the only active row.
+    ///
+    /// # Errors
+    /// The row is not wired, or a pin or bus failed; which row is active is then unknown.
+    fn drive(&mut self, row: RowWire) -> Result<(), Self::Error>;
+
+    /// Lets all rows idle.
+    ///
+    /// # Errors
+    /// A pin or bus failed; which row is active is then unknown.
+    fn release(&mut self) -> Result<(), Self::Error>;
+}
+
+/// Samples the voltage of one column.
+pub trait ColumnSampler {
+    /// What a pin or bus may fail with.
+    type Error;
+
+    /// The converter's largest count.
+    const FULL_SCALE_COUNTS: u16;
+
+    /// One sample of `column`, in counts.
+    ///
+    /// # Errors
+    /// The column is not wired, or a pin, bus or converter failed.
+    fn sample(&mut self, column: ColumnWire) -> Result<u16, Self::Error>;
+}
+
+/// How a frame is scanned. May come from the host: what is out of range is taken for the nearest
+/// that is not.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ScanSettings {
-    /// Wait after a row is driven, in µs.
+    /// Wait after every change of the rows, up to [`MOST_SETTLING_US`](Self::MOST_SETTLING_US); see
+    /// [`settling_us`](crate::timing::settling_us).
     pub settling_us: u32,
-    /// Samples that are averaged to one reading.
+    /// Samples averaged for a reading, from 1 to [`MOST_OVERSAMPLING`](Self::MOST_OVERSAMPLING).
     pub oversampling: u16,
+}
+
+impl ScanSettings {
+    /// Longest wait for a row: no scan may hang.
+    pub const MOST_SETTLING_US: u32 = 10_000;
+    /// Most samples of a reading.
+    pub const MOST_OVERSAMPLING: u16 = 256;
+
+    /// Settings within their ranges, or `None`.
+    ///
+    /// ```
+    /// use firmware::readout::ScanSettings;
+    /// assert!(ScanSettings::try_new(46, 2).is_some());
+    /// assert!(ScanSettings::try_new(46, 0).is_none());
+    /// ```
+    #[must_use]
+    pub fn try_new(settling_us: u32, oversampling: u16) -> Option<Self> {
+        let settings = Self { settling_us, oversampling };
+        (settings == settings.clamped()).then_some(settings)
+    }
+
+    /// The nearest settings within their ranges.
+    #[must_use]
+    pub fn clamped(self) -> Self {
+        Self {
+            settling_us: self.settling_us.min(Self::MOST_SETTLING_US),
+            oversampling: self.oversampling.clamp(1, Self::MOST_OVERSAMPLING),
+        }
+    }
 }
 
 /// What became of a scan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ScanReport {
-    /// Samples that could not be taken; their readings are missing.
+    /// Samples that could not be taken, those of idle rows included; a failed release of the rows
+    /// counts as one.
     pub failed_samples: u16,
 }
 
-/// Gives frames, one at a time.
+/// Where frames come from: a scanned sensor, or whatever stands in for one.
 pub trait FrameSource<const ROWS: usize, const COLS: usize> {
-    /// Scans one frame. Readings that cannot be taken are NaN.
+    /// Takes a whole frame into `frame`; readings that could not be taken become NaN.
     fn scan(&mut self, settings: ScanSettings, frame: &mut Frame<ROWS, COLS>) -> ScanReport;
 }

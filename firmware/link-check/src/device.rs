@@ -85,6 +85,7 @@ extern "C" fn _start() -> ! {
     exercise_recalibration();
     exercise_recalibration_on_slices();
     crate::application::exercise();
+    crate::readout::exercise();
     loop {
         core::hint::spin_loop();
     }

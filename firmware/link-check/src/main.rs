@@ -12,6 +12,8 @@
 mod application;
 #[cfg(target_os = "none")]
 mod device;
+#[cfg(target_os = "none")]
+mod readout;
 
 #[cfg(not(target_os = "none"))]
 fn main() {

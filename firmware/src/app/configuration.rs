@@ -5,11 +5,6 @@ use crate::readout::ScanSettings;
 
 /// Frame periods in µs, from the shortest to the longest.
 const FRAME_PERIOD_US: core::ops::RangeInclusive<u32> = 100..=1_000_000_000;
-/// Longest settling time in µs, lest a scan outlast the watchdog.
-const SETTLING_US: u32 = 10_000;
-/// Most samples of one reading, likewise.
-const OVERSAMPLING: u16 = 256;
-
 impl Configuration {
     /// 100 frames a second, of which estimates are sent; limits for rubber of some 60 Ω.
     pub const DEFAULT: Self = Self {
@@ -34,9 +29,9 @@ impl Configuration {
                 self.frame_period_us == 0 || FRAME_PERIOD_US.contains(&self.frame_period_us),
                 ConfigurationField::FramePeriod,
             ),
-            (self.scan.settling_us <= SETTLING_US, ConfigurationField::Settling),
+            (self.scan.settling_us <= ScanSettings::MOST_SETTLING_US, ConfigurationField::Settling),
             (
-                (1..=OVERSAMPLING).contains(&self.scan.oversampling),
+                (1..=ScanSettings::MOST_OVERSAMPLING).contains(&self.scan.oversampling),
                 ConfigurationField::Oversampling,
             ),
             (

@@ -1,0 +1,115 @@
+//! Calls every way of reading a frame, with pins and buses of which the optimiser knows nothing.
+
+use core::array;
+use core::convert::Infallible;
+
+use embedded_hal::delay::DelayNs;
+use embedded_hal::digital::{self, OutputPin};
+use embedded_hal::spi::{self, Operation, SpiDevice};
+use firmware::circuit::{Circuit, Divider, ZeroPotential};
+use firmware::readout::{
+    Baseline, ColumnSampler, DirectPins, FrameSource, Mcp3208s, MultiplexedAdc, Multiplexer4051,
+    OnChipAdc, RowDrive, ScanSettings, Scanner, ShiftRegister595,
+};
+use firmware::timing;
+use model_core::Frame;
+
+use crate::device::opaque;
+
+/// Pin, bus, clock and converter in one: may fail or answer anything.
+#[derive(Clone, Copy)]
+struct Part;
+
+impl digital::ErrorType for Part {
+    type Error = digital::ErrorKind;
+}
+
+impl OutputPin for Part {
+    fn set_low(&mut self) -> Result<(), Self::Error> {
+        opaque(Ok(()))
+    }
+
+    fn set_high(&mut self) -> Result<(), Self::Error> {
+        opaque(Ok(()))
+    }
+}
+
+impl spi::ErrorType for Part {
+    type Error = spi::ErrorKind;
+}
+
+impl SpiDevice for Part {
+    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Self::Error> {
+        for operation in operations {
+            if let Operation::TransferInPlace(bytes) = operation {
+                bytes.iter_mut().for_each(|byte| *byte = opaque(*byte));
+            }
+        }
+        opaque(Ok(()))
+    }
+}
+
+impl DelayNs for Part {
+    fn delay_ns(&mut self, ns: u32) {
+        opaque(ns);
+    }
+}
+
+impl OnChipAdc for Part {
+    type Error = Infallible;
+    const FULL_SCALE_COUNTS: u16 = 4095;
+
+    fn start(&mut self) -> Result<(), Infallible> {
+        Ok(())
+    }
+
+    fn poll(&mut self) -> Result<Option<u16>, Infallible> {
+        Ok(opaque(Some(2048)))
+    }
+}
+
+fn scan<D: RowDrive, S: ColumnSampler, C: Circuit<18>>(drive: D, sampler: S, circuit: C) {
+    let mut scanner = Scanner { drive, sampler, delay: Part, circuit };
+    let settings = ScanSettings { settling_us: opaque(46), oversampling: opaque(2) };
+    let mut frame = Frame::<8, 18>::missing();
+    opaque(scanner.scan(settings, &mut frame).failed_samples);
+
+    let mut baseline = Baseline::<8, 18>::new();
+    baseline.add(&opaque(frame));
+    baseline.add(&opaque(frame));
+    opaque(baseline.frames());
+    opaque(baseline.largest_relative_deviation(&opaque(frame)));
+}
+
+fn scan_with_every_sampler<D: RowDrive>(drive: impl Fn() -> D) {
+    scan(drive(), Mcp3208s { chips: [Part; 3] }, opaque(ZeroPotential::TYPICAL));
+    let adc = || MultiplexedAdc { adc: Part, address: [Part; 3], enable: [Part; 3] };
+    scan(drive(), adc(), opaque(Divider::TYPICAL));
+    let adc = MultiplexedAdc { adc: Part, address: [Part; 4], enable: [Part; 2] };
+    scan(
+        drive(),
+        adc,
+        opaque(ZeroPotential {
+            feedback_ohm: array::from_fn(|_| opaque(560.0)),
+            ..ZeroPotential::TYPICAL
+        }),
+    );
+}
+
+pub fn exercise() {
+    scan_with_every_sampler(|| DirectPins { rows: [Part; 8] });
+    scan_with_every_sampler(|| Multiplexer4051 { address: [Part; 3], enable: Part });
+    scan_with_every_sampler(|| ShiftRegister595::<_, 8> { data: Part, clock: Part, latch: Part });
+
+    let time_constant_ns = timing::time_constant_ns(opaque(560.0), opaque(1000.0));
+    let plan = timing::ScanPlan {
+        rows: opaque(8),
+        columns: opaque(18),
+        idle_samples: opaque(true),
+        settling_us: timing::settling_us(time_constant_ns, opaque(12)),
+        oversampling: opaque(2),
+        sample_ns: timing::spi_transfer_ns(opaque(3), opaque(1_000_000)),
+    };
+    opaque(plan.scan_us());
+    opaque(plan.most_oversampling(opaque(10_000)));
+}

@@ -1,0 +1,290 @@
+//! From ADC counts to Ω: the two circuits that a sensor can be read with, as pure arithmetic.
+//!
+//! `docs/readout.md` draws both, derives the equations, and tells how to measure the constants.
+//! Readings of the paper's sensor are near 60 Ω, and its 18 columns together load a row with 3.3 Ω:
+//! what lies in series with a row is never small, so both circuits correct for it.
+
+/// Currents below so many counts are none: the reading is open.
+pub const NO_CURRENT_COUNTS: f32 = 4.0;
+
+/// Turns the samples of one row into readings.
+///
+/// What becomes of a reading: NaN if its sample (or its idle sample) could not be taken;
+/// [`f32::INFINITY`] if no current flows (open); 0 if the sample is saturated or the reading below
+/// what can be measured (short).
+pub trait Circuit<const COLS: usize> {
+    /// Whether the circuit needs a sample of every column while all rows idle.
+    const IDLE_SAMPLES: bool;
+
+    /// Readings in Ω of one row. `sampled` and `idle` are counts of every column, averaged, NaN
+    /// where none could be taken (`idle` is not looked at unless
+    /// [`IDLE_SAMPLES`](Self::IDLE_SAMPLES)); `full_scale_counts` is the converter's largest count.
+    fn row_ohm(
+        &self,
+        sampled: &[f32; COLS],
+        idle: &[f32; COLS],
+        full_scale_counts: u16,
+    ) -> [f32; COLS];
+}
+
+/// The divider: the active row at the reference voltage, idle rows floating, every column to
+/// ground through a resistor of its own.
+///
+/// V = V_row·R_ref/(R_ref + R). The converter shares the reference, so no voltage is needed.
+/// The floating rows connect all columns with each other: this circuit reads a sensor of many rows
+/// wrongly, whatever its calibration (`docs/readout.md` measures it).
+///
+/// ```
+/// use firmware::circuit::{Circuit, Divider};
+/// let divider = Divider::<1> { row_source_ohm: 0.0, ..Divider::TYPICAL };
+/// // 470 Ω below 58.75 Ω: eight ninths of 4096.
+/// let ohm = divider.row_ohm(&[4096.0 * 8.0 / 9.0], &[f32::NAN], 4095);
+/// assert!((ohm[0] - 58.75).abs() < 1e-3);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Divider<const COLS: usize> {
+    /// Between the reference voltage and a row-wire: switch and lead.
+    pub row_source_ohm: f32,
+    /// From each column to ground.
+    pub reference_ohm: [f32; COLS],
+    /// In series with each column, not part of the sensor.
+    pub series_ohm: [f32; COLS],
+}
+
+impl<const COLS: usize> Divider<COLS> {
+    /// 470 Ω: 6 mA a column and 112 mA a row at 3.3 V; a switch of 0.3 Ω.
+    pub const TYPICAL: Self =
+        Self { row_source_ohm: 0.3, reference_ohm: [470.0; COLS], series_ohm: [0.0; COLS] };
+}
+
+impl<const COLS: usize> Circuit<COLS> for Divider<COLS> {
+    const IDLE_SAMPLES: bool = false;
+
+    fn row_ohm(
+        &self,
+        sampled: &[f32; COLS],
+        _idle: &[f32; COLS],
+        full_scale_counts: u16,
+    ) -> [f32; COLS] {
+        let counts = counts_at_reference(full_scale_counts);
+        // Voltages in units of the reference.
+        let mut current = [0.0; COLS];
+        for ((i, n), r) in current.iter_mut().zip(sampled).zip(&self.reference_ohm) {
+            *i = n / counts / r;
+        }
+        let row = 1.0 - self.row_source_ohm * row_current(&current);
+        let mut ohm = current;
+        for ((place, n), series) in ohm.iter_mut().zip(sampled).zip(&self.series_ohm) {
+            let across = row - n / counts;
+            *place = reading(*n, *n, full_scale_counts, across / *place - series);
+        }
+        ohm
+    }
+}
+
+/// Zero-potential scanning: every column held at V_b by an op-amp with a feedback resistor, idle
+/// rows at V_b too, and the active row pulled below it by `drive_v`.
+///
+/// V_out = V_b + R_f·I, and I = V_d/R. No current flows between wires at one potential, so the
+/// other rows do not disturb (D'Alessio, Sensors and Actuators A 72, 1999). The idle sample takes
+/// out V_b and the op-amp's offset exactly; the row's own drop V_d − R_s·ΣI is known because all its
+/// columns are measured.
+///
+/// ```
+/// use firmware::circuit::{Circuit, ZeroPotential};
+/// let circuit = ZeroPotential::<1> { row_source_ohm: 0.0, ..ZeroPotential::TYPICAL };
+/// // 0.2 V across 62.5 Ω drive 3.2 mA through 560 Ω: 1.792 V above the idle 0.2 V.
+/// let counts = |v: f32| v / 3.3 * 4096.0;
+/// let ohm = circuit.row_ohm(&[counts(1.992)], &[counts(0.2)], 4095);
+/// assert!((ohm[0] - 62.5).abs() < 1e-3);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ZeroPotential<const COLS: usize> {
+    /// The converter's reference.
+    pub reference_v: f32,
+    /// How far the active row is pulled below the others.
+    pub drive_v: f32,
+    /// Between the drive and a row-wire: switch and lead.
+    pub row_source_ohm: f32,
+    /// From each op-amp's output to its column.
+    pub feedback_ohm: [f32; COLS],
+    /// In series with each column, not part of the sensor.
+    pub series_ohm: [f32; COLS],
+}
+
+impl<const COLS: usize> ZeroPotential<COLS> {
+    /// 0.2 V and 560 Ω: 3.6 mA a column, 65 mA a row, readings from 36 Ω; a switch of 0.3 Ω.
+    pub const TYPICAL: Self = Self {
+        reference_v: 3.3,
+        drive_v: 0.2,
+        row_source_ohm: 0.3,
+        feedback_ohm: [560.0; COLS],
+        series_ohm: [0.0; COLS],
+    };
+}
+
+impl<const COLS: usize> Circuit<COLS> for ZeroPotential<COLS> {
+    const IDLE_SAMPLES: bool = true;
+
+    fn row_ohm(
+        &self,
+        sampled: &[f32; COLS],
+        idle: &[f32; COLS],
+        full_scale_counts: u16,
+    ) -> [f32; COLS] {
+        let volt_per_count = self.reference_v / counts_at_reference(full_scale_counts);
+        let mut current = [0.0; COLS];
+        let samples = sampled.iter().zip(idle);
+        for ((i, (n, idle)), r) in current.iter_mut().zip(samples).zip(&self.feedback_ohm) {
+            *i = (n - idle) * volt_per_count / r;
+        }
+        let across = self.drive_v - self.row_source_ohm * row_current(&current);
+        let mut ohm = current;
+        let samples = sampled.iter().zip(idle);
+        for ((place, (n, idle)), series) in ohm.iter_mut().zip(samples).zip(&self.series_ohm) {
+            *place = reading(*n, n - idle, full_scale_counts, across / *place - series);
+        }
+        ohm
+    }
+}
+
+/// Counts that the reference voltage itself would have: one more than the largest.
+fn counts_at_reference(full_scale_counts: u16) -> f32 {
+    f32::from(full_scale_counts) + 1.0
+}
+
+/// Sum of a row's currents; a column that could not be sampled counts as the mean of the others.
+fn row_current(current: &[f32]) -> f32 {
+    let taken = current.iter().filter(|i| !i.is_nan());
+    let (count, sum) = taken.fold((0_usize, 0.0), |(count, sum), i| (count + 1, sum + i));
+    if count == 0 { 0.0 } else { sum * (current.len() as f32 / count as f32) }
+}
+
+/// `ohm`, unless the sample or the counts due to current say otherwise.
+fn reading(sampled: f32, due_to_current: f32, full_scale_counts: u16, ohm: f32) -> f32 {
+    if due_to_current.is_nan() {
+        f32::NAN
+    } else if sampled > f32::from(full_scale_counts) - 0.5 {
+        0.0
+    } else if due_to_current < NO_CURRENT_COUNTS {
+        f32::INFINITY
+    } else {
+        ohm.max(0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COUNTS: f64 = 4096.0;
+
+    /// Counts, unrounded, of a row that is read by `divider` alone (no other row is there).
+    fn divider_counts(divider: &Divider<18>, ohm: &[f64; 18]) -> [f32; 18] {
+        let source = f64::from(divider.row_source_ohm);
+        let branch = |k: usize| {
+            ohm[k] + f64::from(divider.series_ohm[k]) + f64::from(divider.reference_ohm[k])
+        };
+        let load: f64 = (0..18).map(|k| 1.0 / branch(k)).sum();
+        let row = 1.0 / (1.0 + source * load);
+        core::array::from_fn(|k| {
+            (COUNTS * row * f64::from(divider.reference_ohm[k]) / branch(k)) as f32
+        })
+    }
+
+    /// Counts, unrounded, of a row and of idle columns for `circuit`.
+    fn zero_potential_counts(circuit: &ZeroPotential<18>, ohm: &[f64; 18]) -> [[f32; 18]; 2] {
+        let branch = |k: usize| ohm[k] + f64::from(circuit.series_ohm[k]);
+        let load: f64 = (0..18).map(|k| 1.0 / branch(k)).sum();
+        let row = f64::from(circuit.drive_v) / (1.0 + f64::from(circuit.row_source_ohm) * load);
+        let idle: [f64; 18] = core::array::from_fn(|k| 250.0 + 3.0 * k as f64);
+        let sampled = |k: usize| {
+            let above_v = f64::from(circuit.feedback_ohm[k]) * row / branch(k);
+            idle[k] + above_v / f64::from(circuit.reference_v) * COUNTS
+        };
+        [core::array::from_fn(|k| sampled(k) as f32), idle.map(|n| n as f32)]
+    }
+
+    fn row() -> [f64; 18] {
+        core::array::from_fn(|k| 52.0 + 0.9 * k as f64)
+    }
+
+    fn assert_close(found: &[f32; 18], expected: &[f64; 18], relative: f64) {
+        for (k, (found, expected)) in found.iter().zip(expected).enumerate() {
+            let error = (f64::from(*found) / expected - 1.0).abs();
+            assert!(error < relative, "column {k}: {found} Ω, expected {expected} Ω");
+        }
+    }
+
+    #[test]
+    fn both_circuits_return_the_resistances_whatever_the_source_and_each_columns_parts() {
+        for source_ohm in [0.0, 0.3, 5.0] {
+            let mut divider = Divider { row_source_ohm: source_ohm, ..Divider::TYPICAL };
+            let mut circuit =
+                ZeroPotential { row_source_ohm: source_ohm, ..ZeroPotential::TYPICAL };
+            for k in 0..18 {
+                divider.reference_ohm[k] += k as f32;
+                divider.series_ohm[k] = 0.1 * k as f32;
+                circuit.feedback_ohm[k] -= k as f32;
+                circuit.series_ohm[k] = 0.1 * k as f32;
+            }
+            let counts = divider_counts(&divider, &row());
+            // The divider subtracts two voltages that differ by a tenth: fewer digits are left.
+            assert_close(&divider.row_ohm(&counts, &[f32::NAN; 18], 4095), &row(), 1e-5);
+            let [sampled, idle] = zero_potential_counts(&circuit, &row());
+            assert_close(&circuit.row_ohm(&sampled, &idle, 4095), &row(), 2e-6);
+        }
+    }
+
+    #[test]
+    fn an_uncorrected_source_reads_far_too_high() {
+        let circuit = ZeroPotential { row_source_ohm: 0.3, ..ZeroPotential::TYPICAL };
+        let [sampled, idle] = zero_potential_counts(&circuit, &row());
+        let uncorrected = ZeroPotential { row_source_ohm: 0.0, ..circuit };
+        let ohm = uncorrected.row_ohm(&sampled, &idle, 4095);
+        // 0.3 Ω against the 3.3 Ω of 18 columns.
+        let excess = f64::from(ohm[0]) / row()[0] - 1.0;
+        assert!((0.08..0.1).contains(&excess), "{excess}");
+    }
+
+    #[test]
+    fn open_short_and_missing_have_values_of_their_own_and_spare_the_others() {
+        let circuit = ZeroPotential { row_source_ohm: 0.0, ..ZeroPotential::TYPICAL };
+        let [mut sampled, idle] = zero_potential_counts(&circuit, &row());
+        (sampled[0], sampled[1], sampled[2]) = (f32::NAN, 4095.0, idle[2]);
+        sampled[4] = idle[4] - 3.0; // noise may go below idle
+        let mut no_idle = idle;
+        no_idle[3] = f32::NAN;
+        let ohm = circuit.row_ohm(&sampled, &no_idle, 4095);
+        assert!(ohm[0].is_nan() && ohm[3].is_nan());
+        assert_eq!((ohm[1], ohm[2], ohm[4]), (0.0, f32::INFINITY, f32::INFINITY));
+        assert!((f64::from(ohm[5]) / row()[5] - 1.0).abs() < 2e-6);
+
+        let divider = Divider { row_source_ohm: 0.0, ..Divider::TYPICAL };
+        let mut counts = divider_counts(&divider, &row());
+        (counts[0], counts[1], counts[2]) = (f32::NAN, 4095.0, 0.0);
+        let ohm = divider.row_ohm(&counts, &idle, 4095);
+        assert!(ohm[0].is_nan());
+        assert_eq!((ohm[1], ohm[2]), (0.0, f32::INFINITY));
+        assert!((f64::from(ohm[5]) / row()[5] - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_missing_column_hardly_disturbs_the_correction_of_the_others() {
+        let circuit = ZeroPotential { row_source_ohm: 0.3, ..ZeroPotential::TYPICAL };
+        let [mut sampled, idle] = zero_potential_counts(&circuit, &row());
+        sampled[0] = f32::NAN;
+        let ohm = circuit.row_ohm(&sampled, &idle, 4095);
+        // The smallest of the row was taken for the mean of the others: an eighth of one in 18.
+        for (ohm, expected) in ohm.iter().zip(row()).skip(1) {
+            let error = (f64::from(*ohm) / expected - 1.0).abs();
+            assert!((1e-5..1e-3).contains(&error), "{ohm} Ω instead of {expected} Ω: {error}");
+        }
+    }
+
+    #[test]
+    fn a_negative_resistance_is_a_short() {
+        let circuit = ZeroPotential::<1> { series_ohm: [100.0], ..ZeroPotential::TYPICAL };
+        assert_eq!(circuit.row_ohm(&[3000.0], &[250.0], 4095), [0.0]);
+    }
+}

@@ -1,0 +1,405 @@
+//! Every part against a record of what it did to its pins and its bus, in order.
+
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::rc::Rc;
+
+use embedded_hal::delay::DelayNs;
+use embedded_hal::digital::{self, OutputPin};
+use embedded_hal::spi::{self, Operation, SpiDevice};
+
+use super::*;
+use crate::circuit::{Circuit, Divider, ZeroPotential};
+
+#[derive(Debug, Clone, PartialEq)]
+enum Event {
+    Pin(&'static str, bool),
+    Transfer(usize, Vec<u8>),
+    WaitNs(u32),
+}
+
+/// What all fakes of one test share.
+#[derive(Debug, Clone, Default)]
+struct Record(Rc<RefCell<State>>);
+
+#[derive(Debug, Default)]
+struct State {
+    events: Vec<Event>,
+    /// What SPI devices answer, one after the other; the last again and again.
+    answers: Vec<[u8; 3]>,
+    /// Number of the pin change, or of the transfer, that fails.
+    failing_pin_change: Option<usize>,
+    failing_transfer: Option<usize>,
+}
+
+impl Record {
+    fn pin(&self, name: &'static str) -> Pin {
+        Pin { record: self.clone(), name }
+    }
+
+    fn pins<const N: usize>(&self, names: [&'static str; N]) -> [Pin; N] {
+        names.map(|name| self.pin(name))
+    }
+
+    fn chips<const N: usize>(&self) -> [Spi; N] {
+        core::array::from_fn(|chip| Spi { record: self.clone(), chip })
+    }
+
+    fn take(&self) -> Vec<Event> {
+        std::mem::take(&mut self.0.borrow_mut().events)
+    }
+
+    fn transfers(&self) -> usize {
+        let state = self.0.borrow();
+        state.events.iter().filter(|event| matches!(event, Event::Transfer(..))).count()
+    }
+
+    fn pin_changes(&self) -> usize {
+        let state = self.0.borrow();
+        state.events.iter().filter(|event| matches!(event, Event::Pin(..))).count()
+    }
+
+    /// Levels that the pins were left at.
+    fn levels(&self) -> HashMap<&'static str, bool> {
+        let state = self.0.borrow();
+        let changes = state.events.iter().filter_map(|event| match event {
+            Event::Pin(name, high) => Some((*name, *high)),
+            _ => None,
+        });
+        changes.collect()
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Broken;
+
+impl digital::Error for Broken {
+    fn kind(&self) -> digital::ErrorKind {
+        digital::ErrorKind::Other
+    }
+}
+
+impl spi::Error for Broken {
+    fn kind(&self) -> spi::ErrorKind {
+        spi::ErrorKind::Other
+    }
+}
+
+#[derive(Debug)]
+struct Pin {
+    record: Record,
+    name: &'static str,
+}
+
+impl Pin {
+    fn set(&self, high: bool) -> Result<(), Broken> {
+        let fails = self.record.0.borrow().failing_pin_change == Some(self.record.pin_changes());
+        self.record.0.borrow_mut().events.push(Event::Pin(self.name, high));
+        if fails { Err(Broken) } else { Ok(()) }
+    }
+}
+
+impl digital::ErrorType for Pin {
+    type Error = Broken;
+}
+
+impl OutputPin for Pin {
+    fn set_low(&mut self) -> Result<(), Broken> {
+        self.set(false)
+    }
+
+    fn set_high(&mut self) -> Result<(), Broken> {
+        self.set(true)
+    }
+}
+
+#[derive(Debug)]
+struct Spi {
+    record: Record,
+    chip: usize,
+}
+
+impl spi::ErrorType for Spi {
+    type Error = Broken;
+}
+
+impl SpiDevice for Spi {
+    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Broken> {
+        let [Operation::TransferInPlace(bytes)] = operations else { panic!("one exchange") };
+        let transfers = self.record.transfers();
+        let mut state = self.record.0.borrow_mut();
+        state.events.push(Event::Transfer(self.chip, bytes.to_vec()));
+        let last = state.answers.len() - 1;
+        bytes.copy_from_slice(&state.answers[transfers.min(last)]);
+        if state.failing_transfer == Some(transfers) { Err(Broken) } else { Ok(()) }
+    }
+}
+
+impl DelayNs for Record {
+    fn delay_ns(&mut self, ns: u32) {
+        self.0.borrow_mut().events.push(Event::WaitNs(ns));
+    }
+}
+
+const LOW: bool = false;
+const HIGH: bool = true;
+
+#[test]
+fn mcp3208_is_asked_in_the_datasheets_bytes() {
+    let record = Record::default();
+    // Bits before the null bit are undefined: they must not count.
+    record.0.borrow_mut().answers = vec![[0xFF, 0b1110_1010, 0xBC]];
+    let mut sampler = Mcp3208s { chips: record.chips::<3>() };
+    let expected = [
+        [0x06, 0x00],
+        [0x06, 0x40],
+        [0x06, 0x80],
+        [0x06, 0xC0],
+        [0x07, 0x00],
+        [0x07, 0x40],
+        [0x07, 0x80],
+        [0x07, 0xC0],
+    ];
+    for column in 0..24 {
+        assert_eq!(sampler.sample(ColumnWire(column)), Ok(0xABC));
+        let [first, second] = expected[column % 8];
+        assert_eq!(record.take(), [Event::Transfer(column / 8, vec![first, second, 0])]);
+    }
+    assert_eq!(sampler.sample(ColumnWire(24)), Err(SampleError::NotWired(ColumnWire(24))));
+    assert!(record.take().is_empty());
+}
+
+#[test]
+fn mcp3208_that_is_not_there_is_noticed() {
+    let record = Record::default();
+    record.0.borrow_mut().answers = vec![[0xFF; 3]];
+    let mut sampler = Mcp3208s { chips: record.chips::<1>() };
+    assert_eq!(sampler.sample(ColumnWire(0)), Err(SampleError::NoAnswer));
+}
+
+#[test]
+fn multiplexer_breaks_before_it_makes() {
+    let record = Record::default();
+    let mut drive =
+        Multiplexer4051 { address: record.pins(["s0", "s1", "s2"]), enable: record.pin("e") };
+    drive.drive(RowWire(6)).unwrap();
+    let changes = [("e", HIGH), ("s0", LOW), ("s1", HIGH), ("s2", HIGH), ("e", LOW)];
+    assert_eq!(record.take(), changes.map(|(pin, level)| Event::Pin(pin, level)));
+    drive.release().unwrap();
+    assert_eq!(record.take(), [Event::Pin("e", HIGH)]);
+    assert_eq!(drive.drive(RowWire(8)), Err(DriveError::NotWired(RowWire(8))));
+}
+
+#[test]
+fn direct_pins_release_all_before_they_drive_one() {
+    let record = Record::default();
+    let mut drive = DirectPins { rows: record.pins(["r0", "r1", "r2"]) };
+    drive.drive(RowWire(1)).unwrap();
+    let changes = [("r0", LOW), ("r1", LOW), ("r2", LOW), ("r1", HIGH)];
+    assert_eq!(record.take(), changes.map(|(pin, level)| Event::Pin(pin, level)));
+    assert_eq!(drive.drive(RowWire(3)), Err(DriveError::NotWired(RowWire(3))));
+    record.take();
+    // A pin that fails keeps none of the others from being released.
+    record.0.borrow_mut().failing_pin_change = Some(0);
+    assert_eq!(drive.release(), Err(DriveError::Pin(Broken)));
+    assert_eq!(record.pin_changes(), 3);
+}
+
+/// What the outputs of shift registers show after `events`: QA of the first chip first.
+fn latched(events: &[Event]) -> Vec<bool> {
+    let (mut stages, mut shown) = (Vec::new(), Vec::new());
+    let mut level = HashMap::from([("data", false), ("clock", true), ("latch", true)]);
+    for event in events {
+        let Event::Pin(name, high) = event else { panic!("only pins") };
+        let rises = *high && level.insert(*name, *high) == Some(false);
+        match *name {
+            "clock" if rises => stages.insert(0, level["data"]),
+            "latch" if rises => shown.clone_from(&stages),
+            _ => _ = level.insert(*name, *high),
+        }
+    }
+    shown
+}
+
+#[test]
+fn shift_register_shows_one_row_and_whole_bytes() {
+    fn check<const ROWS: usize>(outputs: usize) {
+        let record = Record::default();
+        let (data, clock, latch) = (record.pin("data"), record.pin("clock"), record.pin("latch"));
+        let mut drive = ShiftRegister595::<_, ROWS> { data, clock, latch };
+        for row in 0..ROWS {
+            drive.drive(RowWire(row)).unwrap();
+            let mut expected = vec![false; outputs];
+            expected[row] = true;
+            assert_eq!(latched(&record.take()), expected, "row {row} of {ROWS}");
+        }
+        drive.release().unwrap();
+        assert_eq!(latched(&record.take()), vec![false; outputs]);
+        assert_eq!(drive.drive(RowWire(ROWS)), Err(DriveError::NotWired(RowWire(ROWS))));
+        assert!(record.take().is_empty());
+    }
+    check::<8>(8);
+    check::<10>(16);
+}
+
+/// Answers 7 after some polls.
+struct SlowAdc {
+    polls_left: u32,
+}
+
+impl OnChipAdc for SlowAdc {
+    type Error = Broken;
+    const FULL_SCALE_COUNTS: u16 = 1023;
+
+    fn start(&mut self) -> Result<(), Broken> {
+        Ok(())
+    }
+
+    fn poll(&mut self) -> Result<Option<u16>, Broken> {
+        let ready = self.polls_left == 0;
+        self.polls_left = self.polls_left.saturating_sub(1);
+        Ok(ready.then_some(7))
+    }
+}
+
+#[test]
+fn multiplexed_adc_disables_all_sets_the_address_enables_one_and_waits_for_the_result() {
+    let record = Record::default();
+    let address = record.pins(["s0", "s1", "s2"]);
+    let enable = record.pins(["e0", "e1", "e2"]);
+    let mut sampler = MultiplexedAdc { adc: SlowAdc { polls_left: 20 }, address, enable };
+    assert_eq!(sampler.sample(ColumnWire(17)), Ok(7));
+    let changes = [
+        ("e0", HIGH),
+        ("e1", HIGH),
+        ("e2", HIGH),
+        ("s0", HIGH),
+        ("s1", LOW),
+        ("s2", LOW),
+        ("e2", LOW),
+    ];
+    assert_eq!(record.take(), changes.map(|(pin, level)| Event::Pin(pin, level)));
+    assert_eq!(sampler.sample(ColumnWire(24)), Err(SampleError::NotWired(ColumnWire(24))));
+    sampler.adc.polls_left = u32::MAX;
+    assert_eq!(sampler.sample(ColumnWire(0)), Err(SampleError::NoAnswer));
+}
+
+/// A scanner of 2 × 3 wires over one converter chip and direct row pins.
+fn scanner<C>(
+    record: &Record,
+    circuit: C,
+) -> Scanner<DirectPins<Pin, 2>, Mcp3208s<Spi, 1>, Record, C> {
+    record.0.borrow_mut().answers = vec![[0, 2000_u16.to_be_bytes()[0], 2000_u16.to_be_bytes()[1]]];
+    Scanner {
+        drive: DirectPins { rows: record.pins(["r0", "r1"]) },
+        sampler: Mcp3208s { chips: record.chips() },
+        delay: record.clone(),
+        circuit,
+    }
+}
+
+const SETTINGS: ScanSettings = ScanSettings { settling_us: 46, oversampling: 4 };
+
+#[test]
+fn a_scan_does_what_it_must_and_no_more() {
+    // Rows, and the idle samples of zero-potential scanning: so many waits and samples.
+    fn check<C: Circuit<3>>(circuit: C, steps: usize) {
+        let record = Record::default();
+        let mut scanner = scanner(&record, circuit);
+        let mut frame = Frame::<2, 3>::missing();
+        assert_eq!(scanner.scan(SETTINGS, &mut frame), ScanReport { failed_samples: 0 });
+        assert_eq!(record.transfers(), steps * 3 * 4);
+        // Two pins to release, three to drive.
+        assert_eq!(record.pin_changes(), 2 + 2 * 3 + 2);
+        assert_eq!(record.levels(), HashMap::from([("r0", LOW), ("r1", LOW)]));
+        let events = record.take();
+        let waits = events.iter().filter(|event| **event == Event::WaitNs(46_000)).count();
+        assert_eq!(waits, steps);
+        // Each row settles before it is sampled.
+        let high = events.iter().position(|event| *event == Event::Pin("r1", HIGH)).unwrap();
+        assert_eq!(events[high + 1], Event::WaitNs(46_000));
+        assert_eq!(events[high + 2], Event::Transfer(0, vec![0x06, 0x00, 0]));
+    }
+    check(Divider::TYPICAL, 2);
+    check(ZeroPotential::TYPICAL, 3);
+}
+
+#[test]
+fn readings_are_those_of_the_mean_counts() {
+    let record = Record::default();
+    let circuit = Divider { row_source_ohm: 0.0, ..Divider::TYPICAL };
+    let mut scanner = scanner(&record, circuit);
+    let answer = |n: u16| [0, n.to_be_bytes()[0], n.to_be_bytes()[1]];
+    record.0.borrow_mut().answers = [3600, 3601, 3603, 3604, 3000].map(answer).to_vec();
+    let mut frame = Frame::<2, 3>::missing();
+    scanner.scan(SETTINGS, &mut frame);
+    let expected = circuit.row_ohm(&[3602.0, 3000.0, 3000.0], &[f32::NAN; 3], 4095);
+    assert_eq!(frame.row_column_resistance_ohm[0], expected);
+    assert!((expected[0] - 470.0 * (4096.0 / 3602.0 - 1.0)).abs() < 1e-3);
+}
+
+#[test]
+fn a_failed_transaction_costs_one_reading() {
+    let record = Record::default();
+    let mut scanner = scanner(&record, Divider::TYPICAL);
+    // The third sample of the second row's second column.
+    record.0.borrow_mut().failing_transfer = Some(3 * 4 + 4 + 2);
+    let mut frame = Frame::<2, 3>::missing();
+    assert_eq!(scanner.scan(SETTINGS, &mut frame), ScanReport { failed_samples: 1 });
+    let missing = frame.row_column_resistance_ohm.map(|row| row.map(f32::is_nan));
+    assert_eq!(missing, [[false; 3], [false, true, false]]);
+}
+
+#[test]
+fn a_failed_idle_sample_costs_its_column() {
+    let record = Record::default();
+    let mut scanner = scanner(&record, ZeroPotential::TYPICAL);
+    record.0.borrow_mut().failing_transfer = Some(4);
+    let mut frame = Frame::<2, 3>::missing();
+    assert_eq!(scanner.scan(SETTINGS, &mut frame), ScanReport { failed_samples: 1 });
+    let missing = frame.row_column_resistance_ohm.map(|row| row.map(f32::is_nan));
+    assert_eq!(missing, [[false, true, false]; 2]);
+}
+
+#[test]
+fn whatever_pin_change_fails_all_rows_are_released_and_its_readings_are_missing() {
+    for failing in 0..10 {
+        let record = Record::default();
+        let mut scanner = scanner(&record, Divider::TYPICAL);
+        record.0.borrow_mut().failing_pin_change = Some(failing);
+        let mut frame = Frame::<2, 3> { row_column_resistance_ohm: [[1.0; 3]; 2] };
+        let report = scanner.scan(SETTINGS, &mut frame);
+        let rows_missing =
+            frame.row_column_resistance_ohm.map(|row| row.iter().all(|r| r.is_nan()));
+        // Changes 2 to 4 drive row 0; if the releasing half fails, the driving half is left out.
+        let expected = match failing {
+            2..=4 => ([true, false], 3),
+            5..=7 => ([false, true], 3),
+            _ => ([false, false], 1),
+        };
+        assert_eq!((rows_missing, report.failed_samples), expected, "change {failing}");
+        assert_eq!(record.levels(), HashMap::from([("r0", LOW), ("r1", LOW)]));
+    }
+}
+
+#[test]
+fn settings_out_of_range_are_taken_for_the_nearest() {
+    let record = Record::default();
+    let mut scanner = scanner(&record, Divider::TYPICAL);
+    let mut frame = Frame::<2, 3>::missing();
+    let wild = ScanSettings { settling_us: u32::MAX, oversampling: 0 };
+    assert_eq!(scanner.scan(wild, &mut frame).failed_samples, 0);
+    assert_eq!(record.transfers(), 2 * 3);
+    let waited_ns: u64 = record
+        .take()
+        .iter()
+        .map(|event| if let Event::WaitNs(ns) = event { u64::from(*ns) } else { 0 })
+        .sum();
+    assert_eq!(waited_ns, 2 * 10_000_000);
+    assert_eq!(ScanSettings::try_new(10_001, 1), None);
+    assert_eq!(
+        ScanSettings::try_new(10_000, 256),
+        Some(ScanSettings { settling_us: 10_000, oversampling: 256 })
+    );
+    assert_eq!(ScanSettings::try_new(0, 257), None);
+}
