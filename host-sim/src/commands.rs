@@ -1,14 +1,17 @@
 //! One small file a subcommand: arguments in, library calls, results out.
 
 pub mod decode;
+pub mod emulate;
 pub mod eval;
 pub mod forward;
 pub mod inspect;
+pub mod link;
 pub mod run;
 pub mod synth;
 pub mod table1;
 pub mod train;
 
+mod check_arguments;
 mod print;
 mod scene_argument;
 

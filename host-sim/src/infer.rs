@@ -21,6 +21,20 @@ pub enum Kernel {
     Micromath,
 }
 
+impl Kernel {
+    /// The kernel of that [`ExpKernel::NAME`].
+    #[must_use]
+    pub fn by_name(name: &str) -> Option<Self> {
+        [
+            (Polynomial::NAME, Self::Polynomial),
+            (Libm::NAME, Self::Libm),
+            (Micromath::NAME, Self::Micromath),
+        ]
+        .into_iter()
+        .find_map(|(known, kernel)| (known == name).then_some(kernel))
+    }
+}
+
 /// Infers the outputs for every line of `inputs`.
 #[must_use]
 pub fn infer(network: &Network<'_>, kernel: Kernel, inputs: &Table) -> Vec<f64> {

@@ -31,7 +31,9 @@
 pub mod columns;
 pub mod data_file;
 pub mod dataset;
+pub mod device;
 pub mod digest;
+pub mod emulator;
 pub mod error;
 pub mod evaluate;
 pub mod infer;

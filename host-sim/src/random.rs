@@ -22,6 +22,8 @@ pub enum Purpose {
     Centres = 4,
     /// Assignment of samples to folds.
     Folds = 5,
+    /// Damage that a device must survive.
+    Damage = 6,
 }
 
 /// Which set of frames draws are for. Training and test frames are independent.

@@ -250,3 +250,18 @@ fn a_link_is_followed_and_permissions_stay() {
     let printed = folder.succeed(&["synth", "scene.toml", "-n", "3", "-o", "/dev/stdout"]);
     assert!(printed.starts_with("r4c1_ohm,"), "{printed}");
 }
+
+#[test]
+fn an_emulator_or_an_image_that_is_not_there_is_named() {
+    let folder = Folder::new("no_emulator");
+    refused(&folder, &["emulate", "--image", "none.elf"], &["none.elf", "cargo xtask firmware"]);
+    let image = folder.write("image.elf", "not really");
+    let image = image.to_str().unwrap();
+    folder.write("small.toml", small_scene());
+    let arguments = ["emulate", "small.toml", "--image", image, "--qemu", "no-such-qemu"];
+    refused(&folder, &arguments, &["no-such-qemu", "qemu-system-arm"]);
+    // A model of another scene.
+    folder.succeed(&["train", "small.toml", "-o", "small.bin"]);
+    let arguments = ["emulate", "press", "--model", "small.bin", "--image", image];
+    refused(&folder, &arguments, &["--model", "press"]);
+}

@@ -1,5 +1,7 @@
 //! Running the binary as a user does, in a folder of the test's own.
 
+#![allow(dead_code, reason = "every test file uses its part")]
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 

@@ -1,0 +1,163 @@
+//! What `emulate` and `link … check` have in common: the plan, the model, and the page.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use firmware::link::message::Memory;
+use host_sim::device::check::{Findings, Plan};
+use host_sim::model::{self, LoadedModel, Origin};
+use host_sim::progress::Progress;
+use host_sim::random::Stream;
+use host_sim::scene::Scene;
+use host_sim::train::{self, Options};
+use host_sim::{Error, Result, synth};
+
+use super::scene_argument::SceneArgument;
+use super::{Common, print};
+
+/// What is to be checked.
+#[derive(Args)]
+pub struct CheckArguments {
+    #[command(flatten)]
+    scene: SceneArgument,
+    /// Weight blob; without it a model of the scene is trained.
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// Frames that the device decodes.
+    #[arg(short = 'n', long, value_name = "N", default_value_t = 1000)]
+    frames: usize,
+    /// Damaged models to upload: each must leave the old one in force.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    damaged_uploads: usize,
+    /// Break an upload off after each of its chunks, and restart the device.
+    #[arg(long)]
+    interruptions: bool,
+    /// Random bytes to send; the device must then answer as before.
+    #[arg(long, value_name = "BYTES", default_value_t = 0)]
+    garbage: usize,
+}
+
+impl CheckArguments {
+    /// The scene and the model, trained if none was given.
+    pub fn load(&self, common: &Common) -> Result<(Scene, LoadedModel)> {
+        let scene = self.scene.load(common)?;
+        scene.check_frames("-n", self.frames)?;
+        let model = match &self.model {
+            Some(path) => LoadedModel::read(path)?,
+            None => trained(&scene)?,
+        };
+        let metadata = model.model();
+        let inputs = metadata.metadata().input_names;
+        if !inputs.iter().eq(scene.reading_names().iter().map(String::as_str)) {
+            return Err(Error::Usage(format!(
+                "--model: it decodes other readings than those of scene {:?}; give the scene that it \
+                 was trained on",
+                scene.name
+            )));
+        }
+        Ok((scene, model))
+    }
+
+    /// The plan, with `window` frames on their way at a time.
+    pub fn plan(&self, window: usize) -> Plan {
+        Plan {
+            frames: self.frames,
+            damaged_uploads: self.damaged_uploads,
+            interruptions: self.interruptions,
+            garbage_bytes: self.garbage,
+            window,
+        }
+    }
+}
+
+/// A model as `train` makes it for the scene.
+fn trained(scene: &Scene) -> Result<LoadedModel> {
+    let t = &scene.training;
+    let frames = synth::synthesise(scene, Stream::Training, t.frames);
+    let options = Options::new(t.centres, t.spread, t.affine_tail, scene.seed);
+    let networks = train::train(&frames, &options, &Progress::on_terminal())?;
+    let blob = model::encode(&networks, &frames, &Origin::of_scene(scene))?;
+    LoadedModel::from_bytes(Path::new("the model just trained"), &blob)
+}
+
+/// Prints what was found; wrong answers are a failure.
+pub fn conclude(findings: &Findings, common: &Common) -> Result<()> {
+    if common.json {
+        print::json(findings)?;
+    } else {
+        page_of(findings).print()?;
+    }
+    if findings.all_good() {
+        Ok(())
+    } else {
+        Err(Error::Failed("the device does not do what it must: see above".into()))
+    }
+}
+
+fn page_of(f: &Findings) -> print::Page {
+    let mut page = print::Page::default();
+    let mut line = |label: &str, value: String| page.line(format_args!("{label:<17} {value}"));
+    let d = &f.device;
+    line(
+        "device",
+        format!("{}, firmware {}, {} × {} wires", d.board, d.firmware, d.rows, d.columns),
+    );
+    line("exp kernel", d.kernel.clone());
+    line(
+        "frames",
+        format!(
+            "{} of {} bit-identical to the host's, {:.0} a second",
+            f.frames.bit_identical, f.frames.frames, f.frames.frames_per_s
+        ),
+    );
+    if let Some(u) = &f.uploads {
+        let good = if u.good_came_into_force { "came" } else { "DID NOT COME" };
+        line("good uploads", format!("{good} into force ({} bytes and more)", u.blob_bytes));
+        line(
+            "damaged uploads",
+            format!("{} of {} refused, the old model in force", u.damaged_refused, u.damaged),
+        );
+        line(
+            "interruptions",
+            format!("the old model in force after {} of {}", u.old_stayed, u.interrupted),
+        );
+    }
+    if let Some(g) = &f.garbage {
+        let decodes = if g.decodes_as_before { "as before" } else { "NOT AS BEFORE" };
+        line(
+            "garbage",
+            format!(
+                "{} bytes; request {} after them was answered, frames are decoded {decodes}",
+                g.bytes, g.requests_until_answer
+            ),
+        );
+    }
+    line("line", format!("{} requests sent again, {} damaged reports", f.repeated, f.damaged));
+    let s = &f.statistics;
+    line(
+        "since its start",
+        format!(
+            "{} requests, {} bad packets, {} lost reports, decoding at most {} µs",
+            s.requests, s.bad_packets, s.lost_reports, s.longest_decode_us
+        ),
+    );
+    memory_lines(&mut page, &d.memory);
+    page
+}
+
+/// Where a device's memory goes.
+pub fn memory_lines(page: &mut print::Page, m: &Memory) {
+    let flash = m.vector_table + m.text + m.rodata + m.data;
+    page.line(format_args!(
+        "{:<17} {flash} bytes without the model: vector table {}, code {}, constants {}, start values {}",
+        "flash", m.vector_table, m.text, m.rodata, m.data
+    ));
+    let statics = m.data + m.bss + m.uninit;
+    page.line(format_args!(
+        "{:<17} {} bytes: variables {statics}, stack {} at its deepest (of {} reserved)",
+        "RAM",
+        statics + m.stack_high_water,
+        m.stack_high_water,
+        m.stack_reserved
+    ));
+}

@@ -1,0 +1,69 @@
+//! `emulate`: the device's image in an emulator, held to the host.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use host_sim::device::Device;
+use host_sim::device::check::check;
+use host_sim::emulator::{self, Emulator};
+use host_sim::output;
+use host_sim::progress::Progress;
+use host_sim::{Error, Result};
+
+use super::Common;
+use super::check_arguments::{CheckArguments, conclude};
+
+/// The emulator holds bytes back while the device is busy, so frames may queue.
+const WINDOW: usize = 4;
+
+/// Run the firmware in QEMU, let it decode a scene's frames, and compare with the host bit for bit.
+///
+/// Fails (exit status 1) unless every frame is bit-identical and every check asked for is passed.
+#[derive(Args)]
+#[command(
+    after_help = "Example: cargo xtask firmware && host-sim emulate press -n 10000\n\nNeeds qemu-system-arm and the image; docs/emulator.md tells how to get both."
+)]
+pub struct Arguments {
+    #[command(flatten)]
+    check: CheckArguments,
+    /// Image of the firmware for mps2-an386.
+    #[arg(
+        long,
+        value_name = "ELF",
+        default_value = "target/thumb/thumbv7em-none-eabihf/firmware/qemu-app"
+    )]
+    image: PathBuf,
+    /// The emulator.
+    #[arg(long, value_name = "PROGRAM", default_value = "qemu-system-arm")]
+    qemu: PathBuf,
+    /// File for the image's log, as defmt encodes it (`defmt-print -e ELF < FILE` reads it).
+    #[arg(long, value_name = "FILE")]
+    log: Option<PathBuf>,
+}
+
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+    if let Some(log) = &arguments.log {
+        output::check_writable(log, &[&arguments.image])?;
+    }
+    let options = emulator::Options {
+        qemu: arguments.qemu.clone(),
+        image: arguments.image.clone(),
+        model: None,
+        log: arguments.log.clone(),
+    };
+    options.check()?;
+    let (scene, model) = arguments.check.load(common)?;
+
+    // QEMU puts the blob where a board has it in flash.
+    let file = std::env::temp_dir().join(format!("taxel-model-{}.bin", std::process::id()));
+    let written = std::fs::write(&file, model.bytes());
+    written.map_err(|cause| Error::Write { path: file.clone(), cause })?;
+    let started = Emulator::start(&emulator::Options { model: Some(file.clone()), ..options });
+    let outcome = started.and_then(|(_emulator, line)| {
+        let mut device = Device::new(line)?;
+        check(&mut device, &scene, &model, &arguments.check.plan(WINDOW), &Progress::on_terminal())
+    });
+    // Its content is in the model; only a kill leaves it behind.
+    let _ = std::fs::remove_file(&file);
+    conclude(&outcome?, common)
+}

@@ -1,0 +1,278 @@
+//! `link`: a device on a serial port.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use clap::{Args, Subcommand};
+use firmware::link::message::{
+    Configuration, ConfigurationField, Refusal, Report, Request, Statistics,
+};
+use host_sim::device::check::check;
+use host_sim::device::{Device, DeviceIdentity, Wire, refused, serial, upload};
+use host_sim::model::LoadedModel;
+use host_sim::progress::Progress;
+use host_sim::{Error, Result, data_file, output};
+use serde::Serialize;
+
+use super::check_arguments::{CheckArguments, conclude, memory_lines};
+use super::{Common, print};
+
+/// Talk to a device on a serial port: who it is, its model, its estimates.
+#[derive(Args)]
+#[command(after_help = "Example: host-sim link /dev/ttyACM0 upload press.bin")]
+pub struct Arguments {
+    /// Serial port, such as /dev/ttyACM0 or COM3.
+    port: String,
+    /// Speed of the line in bits a second.
+    #[arg(long, value_name = "BAUD", default_value_t = 921_600)]
+    baud: u32,
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Subcommand)]
+enum Action {
+    /// Show who the device is, which model is in force, where its memory goes, and its counters.
+    Identify,
+    /// Put a model in force; the old one stays if the new one is refused.
+    Upload(UploadArguments),
+    /// Let the device scan, and save its estimates as CSV, one frame a line.
+    Record(RecordArguments),
+    /// Capture the sensor at rest, and save the mean readings as CSV. Leave the sensor alone meanwhile.
+    Baseline(BaselineArguments),
+    /// Let the device decode a scene's frames, and compare with the host bit for bit.
+    ///
+    /// Whatever model is in force is replaced by the one checked with.
+    Check(CheckArguments),
+}
+
+#[derive(Args)]
+struct UploadArguments {
+    /// Weight blob.
+    model: PathBuf,
+}
+
+#[derive(Args)]
+struct RecordArguments {
+    /// Weight blob that is in force on the device: names the columns.
+    model: PathBuf,
+    #[command(flatten)]
+    scan: ScanArguments,
+    /// CSV file to write.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+}
+
+#[derive(Args)]
+struct BaselineArguments {
+    #[command(flatten)]
+    scan: ScanArguments,
+    /// CSV file to write.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+}
+
+#[derive(Args)]
+struct ScanArguments {
+    /// Frames to scan.
+    #[arg(short = 'n', long, value_name = "N", default_value_t = 100)]
+    frames: u16,
+    /// Time from one scan to the next.
+    #[arg(long, value_name = "US", default_value_t = Configuration::DEFAULT.frame_period_us)]
+    period_us: u32,
+    /// Wait after a row is driven.
+    #[arg(long, value_name = "US", default_value_t = Configuration::DEFAULT.scan.settling_us)]
+    settling_us: u32,
+    /// Samples averaged for a reading.
+    #[arg(long, value_name = "N", default_value_t = Configuration::DEFAULT.scan.oversampling)]
+    oversampling: u16,
+}
+
+#[derive(Serialize)]
+struct Status {
+    device: DeviceIdentity,
+    statistics: Statistics,
+}
+
+#[derive(Serialize)]
+struct Saved {
+    frames: usize,
+    /// Numbers missing between the first frame and the last: lost on the line.
+    frames_lost: u32,
+    file: PathBuf,
+}
+
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+    let open = || Device::new(serial::open(&arguments.port, arguments.baud)?);
+    match &arguments.action {
+        Action::Identify => {
+            let mut device = open()?;
+            status(&Status { device: device.identify()?, statistics: device.statistics()? }, common)
+        }
+        Action::Upload(action) => {
+            let model = LoadedModel::read(&action.model)?;
+            let mut device = open()?;
+            upload::replace(&mut device, model.bytes(), &Progress::on_terminal())?;
+            status(&Status { device: device.identify()?, statistics: device.statistics()? }, common)
+        }
+        Action::Record(action) => record(&mut open()?, action, common),
+        Action::Baseline(action) => baseline(&mut open()?, action, common),
+        Action::Check(action) => {
+            let (scene, model) = action.load(common)?;
+            let mut device = open()?;
+            let plan = action.plan(1);
+            let progress = Progress::on_terminal();
+            conclude(&check(&mut device, &scene, &model, &plan, &progress)?, common)
+        }
+    }
+}
+
+fn status(status: &Status, common: &Common) -> Result<()> {
+    if common.json {
+        return print::json(status);
+    }
+    let (d, s) = (&status.device, &status.statistics);
+    let mut page = print::Page::default();
+    page.line(format_args!("{:<17} {}, firmware {}", "device", d.board, d.firmware));
+    page.line(format_args!(
+        "{:<17} {} × {} wires, {} outputs a row, {} exp kernel",
+        "shape", d.rows, d.columns, d.outputs, d.kernel
+    ));
+    let model = d.model.map_or("none: upload one".to_owned(), |m| {
+        format!("CRC-32 {:08x}, slot {}, generation {}", m.crc_32, m.slot, m.generation)
+    });
+    page.line(format_args!("{:<17} {model}", "model"));
+    page.line(format_args!(
+        "{:<17} {} scanned, {} decoded, {} missed, {} samples failed",
+        "frames", s.frames_scanned, s.frames_decoded, s.frames_missed, s.failed_samples
+    ));
+    page.line(format_args!(
+        "{:<17} scan {} µs, decoding {} µs",
+        "longest", s.longest_scan_us, s.longest_decode_us
+    ));
+    page.line(format_args!(
+        "{:<17} {} requests, {} bad packets, {} lost reports, {} bad loops",
+        "link", s.requests, s.bad_packets, s.lost_reports, s.bad_loops
+    ));
+    memory_lines(&mut page, &d.memory);
+    page.print()
+}
+
+/// Puts a configuration in force; a refusal names the option.
+fn configure<W: Wire>(
+    device: &mut Device<W>,
+    scan: &ScanArguments,
+    send_estimates: bool,
+) -> Result<()> {
+    let mut configuration = Configuration {
+        frame_period_us: scan.period_us,
+        send_readings: false,
+        send_estimates,
+        ..Configuration::DEFAULT
+    };
+    configuration.scan.settling_us = scan.settling_us;
+    configuration.scan.oversampling = scan.oversampling;
+    if let Err(field) = configuration.check() {
+        return Err(Error::Usage(match field {
+            ConfigurationField::Settling => {
+                format!("--settling-us {}: at most 10000", scan.settling_us)
+            }
+            ConfigurationField::Oversampling => {
+                format!("--oversampling {}: from 1 to 256", scan.oversampling)
+            }
+            _ => format!("--period-us {}: from 100 to 1000000000", scan.period_us),
+        }));
+    }
+    let request = Request::Configure(configuration);
+    device.ask_plainly(&request, |r| matches!(r, Report::Configuration(_)).then_some(()))
+}
+
+/// Time in which so many frames must have come.
+fn patience(scan: &ScanArguments) -> Duration {
+    Duration::from_secs(2)
+        + 4 * u32::from(scan.frames) * Duration::from_micros(scan.period_us.into())
+}
+
+fn record<W: Wire>(
+    device: &mut Device<W>,
+    action: &RecordArguments,
+    common: &Common,
+) -> Result<()> {
+    let model = LoadedModel::read(&action.model)?;
+    output::check_writable(&action.output, &[&action.model])?;
+    let found = device.identify()?.model;
+    if found.is_none_or(|found| found.crc_32 != model.model().crc()) {
+        return Err(Error::Usage(format!(
+            "{}: the device has another model in force; `upload` this one, or name that",
+            action.model.display()
+        )));
+    }
+    if action.scan.period_us == 0 {
+        return Err(Error::Usage("--period-us 0: nothing would be scanned".into()));
+    }
+    configure(device, &action.scan, true)?;
+    let wanted = usize::from(action.scan.frames);
+    let progress = Progress::on_terminal();
+    progress.stage("recording", wanted);
+    let mut frames: Vec<(u32, Vec<f64>)> = Vec::new();
+    let enough = device.hear(Instant::now() + patience(&action.scan), |_, report| {
+        let Report::Estimate(estimate) = report else { return None };
+        frames.push((estimate.frame, estimate.outputs.iter().map(f64::from).collect()));
+        progress.step();
+        (frames.len() == wanted).then_some(())
+    })?;
+    if enough.is_none() {
+        return Err(Error::Failed(format!(
+            "only {} of {wanted} frames came in time",
+            frames.len()
+        )));
+    }
+    let names: Vec<&str> = model.model().metadata().output_names.iter().collect();
+    let lines = frames.iter().map(|(_, line)| line.iter().copied());
+    data_file::write(&action.output, names, lines)?;
+    let span = frames.last().zip(frames.first()).map_or(0, |(last, first)| last.0 - first.0 + 1);
+    saved(frames.len(), span.saturating_sub(frames.len() as u32), &action.output, common)
+}
+
+fn baseline<W: Wire>(
+    device: &mut Device<W>,
+    action: &BaselineArguments,
+    common: &Common,
+) -> Result<()> {
+    output::check_writable(&action.output, &[])?;
+    let identity = device.identify()?;
+    configure(device, &action.scan, false)?;
+    let frames = action.scan.frames;
+    let request = Request::CaptureBaseline { frames };
+    let answer = device.ask(&request, patience(&action.scan), |report| match report {
+        Report::Baseline { readings_ohm } => {
+            Some(readings_ohm.iter().map(f64::from).collect::<Vec<_>>())
+        }
+        _ => None,
+    })?;
+    let readings = answer.map_err(|refusal| match refusal {
+        Refusal::Baseline => {
+            Error::Usage("-n or --period-us: a baseline needs frames, so neither may be 0".into())
+        }
+        other => refused(&other),
+    })?;
+    let names: Vec<String> = (1..=identity.rows)
+        .flat_map(|m| (1..=identity.columns).map(move |k| format!("r{m}c{k}_ohm")))
+        .collect();
+    let lines = std::iter::once(readings.iter().copied());
+    data_file::write(&action.output, names.iter().map(String::as_str), lines)?;
+    saved(frames.into(), 0, &action.output, common)
+}
+
+fn saved(frames: usize, frames_lost: u32, file: &std::path::Path, common: &Common) -> Result<()> {
+    let saved = Saved { frames, frames_lost, file: file.into() };
+    if common.json {
+        return print::json(&saved);
+    }
+    let mut page = print::Page::default();
+    page.line(format_args!(
+        "{frames} frames in {}, {frames_lost} lost on the line",
+        saved.file.display()
+    ));
+    page.print()
+}

@@ -1,0 +1,280 @@
+//! A device at the other end of a serial line, real or emulated.
+//!
+//! [`Device`] asks and hears; [`upload`] exchanges its model; [`stream`] lets it decode frames;
+//! [`check`] holds it to the host. `docs/link.md` specifies what they say to each other.
+
+use std::collections::VecDeque;
+use std::io::{ErrorKind, Read, Write};
+use std::net::TcpStream;
+use std::time::{Duration, Instant};
+
+use firmware::link::message::{Identity, Memory, ModelIdentity, Refusal, Report, Request};
+use firmware::link::receive::{Received, Receiver};
+use firmware::link::{cobs, packet};
+use serde::Serialize;
+
+use crate::error::{Error, Result};
+
+pub mod check;
+pub mod serial;
+pub mod stream;
+pub mod upload;
+
+/// How long an answer may take, but for those that erase flash.
+const ANSWER: Duration = Duration::from_millis(500);
+/// How often a request is sent before its device is given up.
+const ATTEMPTS: u32 = 6;
+/// How long one look for bytes waits.
+const GLANCE: Duration = Duration::from_millis(5);
+
+/// A line of bytes.
+pub trait Wire: Read + Write {
+    /// Lets reads end after `timeout` where nothing has come.
+    ///
+    /// # Errors
+    /// The system's.
+    fn set_read_timeout(&mut self, timeout: Duration) -> std::io::Result<()>;
+}
+
+impl Wire for TcpStream {
+    fn set_read_timeout(&mut self, timeout: Duration) -> std::io::Result<()> {
+        TcpStream::set_read_timeout(self, Some(timeout))
+    }
+}
+
+/// Who a device says it is.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DeviceIdentity {
+    /// Name of the board.
+    pub board: String,
+    /// Version of its firmware.
+    pub firmware: String,
+    /// Row-wires.
+    pub rows: usize,
+    /// Readings a row.
+    pub columns: usize,
+    /// Outputs a row.
+    pub outputs: usize,
+    /// Exponential that it decodes with.
+    pub kernel: String,
+    /// The model in force.
+    pub model: Option<ModelIdentity>,
+    /// Bytes of blob that a slot holds.
+    pub slot_bytes: usize,
+    /// Most bytes of one chunk of an upload.
+    pub chunk_bytes: usize,
+    /// Where its flash and RAM go.
+    pub memory: Memory,
+}
+
+impl From<&Identity<'_>> for DeviceIdentity {
+    fn from(identity: &Identity<'_>) -> Self {
+        Self {
+            board: identity.board.into(),
+            firmware: identity.firmware.into(),
+            rows: identity.rows.into(),
+            columns: identity.columns.into(),
+            outputs: identity.outputs.into(),
+            kernel: identity.kernel.into(),
+            model: identity.model,
+            slot_bytes: identity.slot_bytes as usize,
+            chunk_bytes: identity.chunk_bytes.into(),
+            memory: identity.memory,
+        }
+    }
+}
+
+/// The host's end of the line.
+pub struct Device<W> {
+    wire: W,
+    receiver: Box<Receiver<4096>>,
+    /// Bytes read and not looked at yet.
+    pending: VecDeque<u8>,
+    number: u16,
+    /// Frames of bytes that arrived damaged.
+    pub damaged: u64,
+    /// Requests that had to be sent again.
+    pub repeated: u64,
+}
+
+impl<W: Wire> Device<W> {
+    /// A device on `wire`; nothing is sent yet.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] if the wire takes no timeout.
+    pub fn new(mut wire: W) -> Result<Self> {
+        wire.set_read_timeout(GLANCE).map_err(|cause| line_failed(&cause))?;
+        let receiver = Box::new(Receiver::new());
+        let pending = VecDeque::new();
+        Ok(Self { wire, receiver, pending, number: 0, damaged: 0, repeated: 0 })
+    }
+
+    /// Sends bytes as they are.
+    ///
+    /// # Errors
+    /// [`Error::Failed`].
+    pub fn send_raw(&mut self, bytes: &[u8]) -> Result<()> {
+        let sent = self.wire.write_all(bytes).and_then(|()| self.wire.flush());
+        sent.map_err(|cause| line_failed(&cause))
+    }
+
+    /// Sends a request under a number of its own, which is returned.
+    ///
+    /// # Errors
+    /// [`Error::Failed`].
+    pub fn send(&mut self, request: &Request<'_>) -> Result<u16> {
+        self.number = self.number.checked_add(1).unwrap_or(packet::UNASKED + 1);
+        self.send_raw(&request_bytes(self.number, request)?)?;
+        Ok(self.number)
+    }
+
+    /// Passes reports to `read`, with their numbers, until it answers; `None` once `deadline` has
+    /// passed.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] if the line fails.
+    pub fn hear<T>(
+        &mut self,
+        deadline: Instant,
+        mut read: impl FnMut(u16, &Report<'_>) -> Option<T>,
+    ) -> Result<Option<T>> {
+        let mut bytes = [0; 4096];
+        loop {
+            while let Some(byte) = self.pending.pop_front() {
+                let report = match self.receiver.push(byte) {
+                    Some(Received::Frame(bytes)) => packet::decode::<Report<'_>>(bytes),
+                    Some(_) => Err(packet::PacketError::Damaged),
+                    None => continue,
+                };
+                match report {
+                    Ok(report) => {
+                        if let Some(answer) = read(report.number, &report.body) {
+                            return Ok(Some(answer));
+                        }
+                    }
+                    Err(_) => self.damaged += 1,
+                }
+            }
+            match self.wire.read(&mut bytes) {
+                Ok(0) => return Err(Error::Failed("the device closed the line".into())),
+                Ok(count) => self.pending.extend(&bytes[..count]),
+                Err(cause) if is_timeout(&cause) => {}
+                Err(cause) => return Err(line_failed(&cause)),
+            }
+            // Looked at after reading, so that even a deadline of now takes what is there.
+            if self.pending.is_empty() && Instant::now() >= deadline {
+                return Ok(None);
+            }
+        }
+    }
+
+    /// Asks until there is an answer; the device's refusal is an answer too.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] if there is none, or another than `read` takes.
+    pub fn ask<T>(
+        &mut self,
+        request: &Request<'_>,
+        timeout: Duration,
+        read: impl Fn(&Report<'_>) -> Option<T>,
+    ) -> Result<std::result::Result<T, Refusal>> {
+        for attempt in 0..ATTEMPTS {
+            self.repeated += u64::from(attempt > 0);
+            let number = self.send(request)?;
+            let answer = self.hear(Instant::now() + timeout, |found, report| {
+                (found == number).then(|| match report {
+                    Report::Refused(refusal) => Ok(Err(*refusal)),
+                    report => read(report).map(Ok).ok_or_else(|| format!("{report:?}")),
+                })
+            })?;
+            match answer {
+                Some(Ok(answer)) => return Ok(answer),
+                Some(Err(other)) => {
+                    let message = format!("the device answers {request:?} with {other}");
+                    return Err(Error::Failed(message));
+                }
+                None => {}
+            }
+        }
+        Err(Error::Failed(format!(
+            "the device does not answer ({ATTEMPTS} attempts, {} ms each); check that it runs this \
+             project's firmware, and the speed of its line",
+            timeout.as_millis()
+        )))
+    }
+
+    /// Asks for what no device of this protocol refuses.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] if it does, or does not answer.
+    pub fn ask_plainly<T>(
+        &mut self,
+        request: &Request<'_>,
+        read: impl Fn(&Report<'_>) -> Option<T>,
+    ) -> Result<T> {
+        self.ask(request, ANSWER, read)?.map_err(|refusal| refused(&refusal))
+    }
+
+    /// Who the device is.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] if it does not answer.
+    pub fn identify(&mut self) -> Result<DeviceIdentity> {
+        self.ask_plainly(&Request::Identify, |report| match report {
+            Report::Identity(identity) => Some(identity.into()),
+            _ => None,
+        })
+    }
+
+    /// The device's counters.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] if it does not answer.
+    pub fn statistics(&mut self) -> Result<firmware::link::message::Statistics> {
+        self.ask_plainly(&Request::Statistics, |report| match report {
+            Report::Statistics(statistics) => Some(*statistics),
+            _ => None,
+        })
+    }
+
+    /// Restarts the device and waits until it answers again.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] if it does not.
+    pub fn restart(&mut self) -> Result<DeviceIdentity> {
+        self.ask_plainly(&Request::Restart, |report| {
+            matches!(report, Report::Restarting).then_some(())
+        })?;
+        self.identify()
+    }
+}
+
+/// The bytes of a request.
+///
+/// # Errors
+/// [`Error::Failed`] for one longer than any device takes.
+pub fn request_bytes(number: u16, request: &Request<'_>) -> Result<Vec<u8>> {
+    let mut buffer = [0; 4096];
+    let packet = packet::encode(number, request, &mut buffer)
+        .ok_or_else(|| Error::Failed("a request longer than 4096 bytes".into()))?;
+    let mut bytes = Vec::with_capacity(packet.len() + 8);
+    cobs::encode(packet, |byte| {
+        bytes.push(byte);
+        true
+    });
+    Ok(bytes)
+}
+
+/// A refusal as an error.
+#[must_use]
+pub fn refused(refusal: &Refusal) -> Error {
+    Error::Failed(format!("the device refused: {refusal:?}"))
+}
+
+fn is_timeout(cause: &std::io::Error) -> bool {
+    matches!(cause.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
+}
+
+fn line_failed(cause: &std::io::Error) -> Error {
+    Error::Failed(format!("the line to the device failed: {cause}"))
+}

@@ -1,0 +1,272 @@
+//! The host's end of the link against the firmware's application, which runs here in a thread.
+
+mod common;
+mod virtual_device;
+
+use std::net::{Ipv4Addr, TcpListener, TcpStream};
+
+use common::Folder;
+use firmware::link::message::{Refusal, Report, Request, UploadStep};
+use host_sim::Error;
+use host_sim::device::check::{Plan, check};
+use host_sim::device::{Device, upload};
+use host_sim::model::{LoadedModel, Origin, encode};
+use host_sim::progress::Progress;
+use host_sim::random::Stream;
+use host_sim::scene::Scene;
+use host_sim::synth::synthesise;
+use host_sim::train::{Options, train};
+use virtual_device::Line;
+
+const SOUND: Line = Line { one_in: None };
+
+fn press() -> Scene {
+    Scene::load("press").unwrap()
+}
+
+fn model(centres: usize) -> LoadedModel {
+    let scene = press();
+    let frames = synthesise(&scene, Stream::Training, 500);
+    let options = Options::new(centres, 0.8, true, scene.seed);
+    let networks = train(&frames, &options, &Progress::silent()).unwrap();
+    let blob = encode(&networks, &frames, &Origin::of_scene(&scene)).unwrap();
+    LoadedModel::from_bytes("test".as_ref(), &blob).unwrap()
+}
+
+/// Ideal readings of a few frames, for a device that scans.
+fn frames() -> Vec<[[f32; 18]; 8]> {
+    let readings = synthesise(&press(), Stream::Test, 5).inputs;
+    let frame = |line: &[f64]| {
+        let mut frame = [[0.0; 18]; 8];
+        let places = frame.as_flattened_mut().iter_mut();
+        places.zip(line).for_each(|(place, reading)| *place = *reading as f32);
+        frame
+    };
+    readings.lines().map(frame).collect()
+}
+
+/// A device with `model`, at the other end of a socket.
+fn device(line: Line, model: &LoadedModel) -> Device<TcpStream> {
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+    let near = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
+    let (far, _) = listener.accept().unwrap();
+    far.set_nonblocking(true).unwrap();
+    near.set_nodelay(true).unwrap();
+    virtual_device::run(Patient(far), line, model.bytes(), frames());
+    Device::new(near).unwrap()
+}
+
+/// A socket that does not block when read, and does when written to.
+struct Patient(TcpStream);
+
+impl std::io::Read for Patient {
+    fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
+        self.0.read(bytes)
+    }
+}
+
+impl std::io::Write for Patient {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        loop {
+            match self.0.write(bytes) {
+                Err(cause) if cause.kind() == std::io::ErrorKind::WouldBlock => {
+                    std::thread::yield_now();
+                }
+                other => return other,
+            }
+        }
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.0.flush()
+    }
+}
+
+#[test]
+fn a_sound_device_passes_every_check() {
+    let model = model(16);
+    let mut device = device(SOUND, &model);
+    let plan = Plan {
+        frames: 500,
+        damaged_uploads: 70,
+        interruptions: true,
+        garbage_bytes: 100_000,
+        window: 4,
+    };
+    let findings = check(&mut device, &press(), &model, &plan, &Progress::silent()).unwrap();
+    assert!(findings.all_good(), "{findings:#?}");
+    assert_eq!(findings.frames.bit_identical, 500);
+    let uploads = findings.uploads.unwrap();
+    assert_eq!((uploads.damaged_refused, uploads.damaged), (70, 70));
+    assert!(uploads.interrupted > 5 && uploads.old_stayed == uploads.interrupted);
+}
+
+#[test]
+fn another_model_on_the_device_is_replaced_by_the_one_checked_with() {
+    let mut device = device(SOUND, &model(3));
+    let wanted = model(5);
+    let plan =
+        Plan { frames: 20, damaged_uploads: 0, interruptions: false, garbage_bytes: 0, window: 1 };
+    let findings = check(&mut device, &press(), &wanted, &plan, &Progress::silent()).unwrap();
+    assert!(findings.all_good(), "{findings:#?}");
+    assert_eq!(findings.device.model.unwrap().crc_32, wanted.model().crc());
+}
+
+#[test]
+fn a_wrong_answer_is_found() {
+    // The device decodes with the model that it has; the host expects another's answers.
+    let (right, wrong) = (model(3), model(4));
+    let mut device = device(SOUND, &right);
+    let expected = wrong
+        .decode(host_sim::infer::Kernel::default(), &synthesise(&press(), Stream::Test, 1).inputs);
+    let readings: Vec<f32> =
+        synthesise(&press(), Stream::Test, 1).inputs.values.iter().map(|v| *v as f32).collect();
+    let mut same = None;
+    host_sim::device::stream::decode_frames(&mut device, &readings, 144, 1, |_, estimate| {
+        same = Some(estimate.outputs.iter().eq(expected.values.iter().map(|v| *v as f32)));
+    })
+    .unwrap();
+    assert_eq!(same, Some(false));
+}
+
+#[test]
+fn over_a_line_that_spoils_bytes_everything_still_arrives() {
+    let old = model(3);
+    // One byte in some 3000 is lost, changed or turned into the end of a frame: a fifth of the frames.
+    let mut device = device(Line { one_in: Some(3000) }, &old);
+    let new = model(16);
+    let identity = upload::replace(&mut device, new.bytes(), &Progress::silent()).unwrap();
+    assert_eq!(identity.model.unwrap().crc_32, new.model().crc());
+    let plan =
+        Plan { frames: 30, damaged_uploads: 0, interruptions: false, garbage_bytes: 0, window: 1 };
+    let findings = check(&mut device, &press(), &new, &plan, &Progress::silent()).unwrap();
+    assert_eq!(findings.frames.bit_identical, 30);
+    assert!(findings.repeated > 0 && !findings.all_good(), "the line was sound");
+}
+
+#[test]
+fn refusals_and_silence_are_told_apart() {
+    let model = model(3);
+    let mut device = device(SOUND, &model);
+    let length = u32::MAX;
+    let refusal = upload::step(&mut device, UploadStep::Begin { length }).unwrap();
+    assert_eq!(refusal, Err(Refusal::TooLarge { slot_bytes: 128 * 1024 - 16 }));
+    // A report that does not belong to the request is no answer.
+    let strange = device.ask_plainly(&Request::Statistics, |report| match report {
+        Report::Identity(_) => Some(()),
+        _ => None,
+    });
+    assert!(matches!(strange, Err(Error::Failed(message)) if message.contains("Statistics")));
+}
+
+#[cfg(unix)]
+mod serial_port {
+    use serialport::{SerialPort, TTYPort};
+
+    use super::*;
+
+    /// A device at the far end of a pseudo-terminal, whose name this is.
+    fn port(model: &LoadedModel) -> (String, TTYPort) {
+        let (mut far, near) = TTYPort::pair().unwrap();
+        far.set_timeout(std::time::Duration::from_millis(1)).unwrap();
+        let name = near.name().unwrap();
+        virtual_device::run(Quick(far), SOUND, model.bytes(), frames());
+        (name, near)
+    }
+
+    /// A port that answers a read without bytes as a socket does.
+    struct Quick(TTYPort);
+
+    impl std::io::Read for Quick {
+        fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
+            match self.0.read(bytes) {
+                // Nobody has the near end open just now.
+                Ok(0) => Err(std::io::ErrorKind::WouldBlock.into()),
+                other => other,
+            }
+        }
+    }
+
+    impl std::io::Write for Quick {
+        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+            self.0.write(bytes)
+        }
+
+        fn flush(&mut self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_device_is_used_from_the_command_line() {
+        let folder = Folder::new("link");
+        let (old, new) = (model(3), model(4));
+        let new_file = folder.write("new.bin", new.bytes());
+        let new_file = new_file.to_str().unwrap();
+        let (port, near) = port(&old);
+        drop(near); // the program opens it itself
+
+        let page = folder.succeed(&["link", &port, "identify"]);
+        assert!(page.contains("virtual, firmware"), "{page}");
+        assert!(page.contains(&format!("CRC-32 {:08x}, slot 0", old.model().crc())), "{page}");
+
+        // Recording under another model's names is refused, before anything is written.
+        let wrong = folder.run(&["link", &port, "record", new_file, "-o", "estimate.csv"]);
+        assert_eq!(wrong.status.code(), Some(2));
+        assert_eq!(folder.names(), ["new.bin"]);
+
+        let page = folder.succeed(&["link", &port, "upload", new_file]);
+        assert!(page.contains(&format!("CRC-32 {:08x}, slot 1", new.model().crc())), "{page}");
+
+        let arguments = ["link", &port, "record", new_file, "-n", "10", "-o", "estimate.csv"];
+        folder.succeed(&arguments);
+        let text = std::fs::read_to_string(folder.path("estimate.csv")).unwrap();
+        assert_eq!(text.lines().count(), 11);
+        assert!(text.starts_with("r1e1_dx_mm,r1e1_dy_mm,r1e1_dz_mm,"), "{text}");
+
+        folder.succeed(&["link", &port, "baseline", "-n", "5", "-o", "rest.csv"]);
+        let text = std::fs::read_to_string(folder.path("rest.csv")).unwrap();
+        let (header, line) = text.trim_end().split_once('\n').unwrap();
+        assert!(header.ends_with("r8c18_ohm"));
+        let frames = frames();
+        let mean = frames.iter().map(|f| f64::from(f[0][0])).sum::<f64>() / frames.len() as f64;
+        let found: f64 = line.split(',').next().unwrap().parse().unwrap();
+        assert!((found / mean - 1.0).abs() < 1e-5, "{found} instead of {mean}");
+
+        let page = folder.succeed(&[
+            "link",
+            &port,
+            "check",
+            "press",
+            "--model",
+            new_file,
+            "-n",
+            "50",
+            "--garbage",
+            "5000",
+        ]);
+        assert!(page.contains("50 of 50 bit-identical"), "{page}");
+
+        for (arguments, text) in [
+            (&["record", new_file, "-o", "x.csv", "--period-us", "7"][..], "--period-us 7"),
+            (&["baseline", "-o", "x.csv", "--oversampling", "0"], "--oversampling 0"),
+            (&["baseline", "-o", "x.csv", "-n", "0"], "-n"),
+            (&["upload", "none.bin"], "none.bin"),
+        ] {
+            let output = folder.run(&[&["link", &port][..], arguments].concat());
+            let message = String::from_utf8_lossy(&output.stderr);
+            assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+            assert!(message.contains(text), "{message}");
+        }
+        assert_eq!(folder.names(), ["estimate.csv", "new.bin", "rest.csv"]);
+    }
+
+    #[test]
+    fn a_port_that_is_not_there_is_named() {
+        let folder = Folder::new("no_port");
+        let output = folder.run(&["link", "/dev/no-such-port", "identify"]);
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2));
+        assert!(message.contains("/dev/no-such-port"), "{message}");
+    }
+}
