@@ -15,6 +15,7 @@ pub mod link;
 mod log;
 pub mod platform;
 pub mod readout;
+pub mod remote;
 pub mod store;
 mod tactile;
 pub mod timing;

@@ -2,7 +2,7 @@
 
 use firmware::app::PaperApp;
 use firmware::link::message::{Configuration, Memory};
-use firmware::platform::Platform;
+use firmware::platform::{Platform, Port};
 use firmware::readout::{FrameSource, ScanReport, ScanSettings};
 use firmware::store::{FlashError, Slot};
 use model_core::Frame;
@@ -11,9 +11,7 @@ use crate::device::{opaque, slot};
 
 struct Board;
 
-impl Platform for Board {
-    const BOARD: &'static str = "link-check";
-
+impl Port for Board {
     fn now_us(&mut self) -> u32 {
         opaque(0)
     }
@@ -26,6 +24,10 @@ impl Platform for Board {
         opaque(byte);
         opaque(true)
     }
+}
+
+impl Platform for Board {
+    const BOARD: &'static str = "link-check";
 
     fn feed_watchdog(&mut self) {
         opaque(());

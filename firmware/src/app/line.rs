@@ -2,7 +2,7 @@
 
 use crate::link::message::Report;
 use crate::link::{cobs, packet};
-use crate::platform::Platform;
+use crate::platform::Port;
 
 /// Longest that a report may make no progress; then it is given up.
 const STALL_US: u32 = 50_000;
@@ -13,7 +13,7 @@ pub struct Line<P, const BYTES: usize> {
     buffer: [u8; BYTES],
 }
 
-impl<P: Platform, const BYTES: usize> Line<P, BYTES> {
+impl<P: Port, const BYTES: usize> Line<P, BYTES> {
     pub fn new(platform: P) -> Self {
         Self { platform, buffer: [0; BYTES] }
     }

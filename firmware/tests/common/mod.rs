@@ -9,7 +9,7 @@ use firmware::app::{App, Leave, Session};
 use firmware::link::message::{Configuration, Memory, Report, Request, UploadStep};
 use firmware::link::receive::{Received, Receiver};
 use firmware::link::{cobs, packet};
-use firmware::platform::Platform;
+use firmware::platform::{Platform, Port};
 use firmware::readout::{FrameSource, ScanReport, ScanSettings};
 use firmware::store::{FlashError, Slot};
 use model_core::Frame;
@@ -50,9 +50,7 @@ pub struct Pins {
 #[derive(Clone, Default)]
 pub struct Board(pub Rc<RefCell<Pins>>);
 
-impl Platform for Board {
-    const BOARD: &'static str = "test";
-
+impl Port for Board {
     fn now_us(&mut self) -> u32 {
         let mut pins = self.0.borrow_mut();
         pins.now_us = pins.now_us.wrapping_add(1);
@@ -73,6 +71,10 @@ impl Platform for Board {
         pins.to_host.push(byte);
         true
     }
+}
+
+impl Platform for Board {
+    const BOARD: &'static str = "test";
 
     fn feed_watchdog(&mut self) {
         self.0.borrow_mut().feeds += 1;

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use firmware::app::PaperApp;
 use firmware::link::message::{Configuration, Memory};
-use firmware::platform::Platform;
+use firmware::platform::{Platform, Port};
 use firmware::readout::{FrameSource, ScanReport, ScanSettings};
 use firmware::store::{FlashError, Slot};
 use host_sim::random::{Purpose, Random, Stream};
@@ -51,9 +51,7 @@ impl<W: Read + Write> Board<W> {
     }
 }
 
-impl<W: Read + Write> Platform for Board<W> {
-    const BOARD: &'static str = "virtual";
-
+impl<W: Read + Write> Port for Board<W> {
     fn now_us(&mut self) -> u32 {
         self.start.elapsed().as_micros() as u32
     }
@@ -90,6 +88,10 @@ impl<W: Read + Write> Platform for Board<W> {
         }
         true
     }
+}
+
+impl<W: Read + Write> Platform for Board<W> {
+    const BOARD: &'static str = "virtual";
 
     fn feed_watchdog(&mut self) {}
 

@@ -1,0 +1,297 @@
+//! A readout whose pins, converters and delays are at the other end of a serial line.
+//!
+//! An emulator has no sensor, and neither has a bare board on a desk: here every transaction goes to
+//! the host, where virtual hardware carries it out. The readout's code is the same as with a sensor.
+//!
+//! On the line: a pin is one byte, 0x80 + 2 · number + level; a wait is 0x02 and its nanoseconds
+//! (u32, little-endian); an SPI transaction is 0x01, the chip's number, the count of bytes and these
+//! bytes, and is answered by as many. Nothing else is answered.
+
+use core::cell::RefCell;
+
+use embedded_hal::delay::DelayNs;
+use embedded_hal::digital::{self, OutputPin};
+use embedded_hal::spi::{self, Operation, SpiDevice};
+
+use crate::platform::Port;
+
+const TRANSFER: u8 = 0x01;
+const WAIT: u8 = 0x02;
+const PIN: u8 = 0x80;
+/// Longest transaction, in bytes.
+const LONGEST_TRANSFER: usize = 16;
+/// Longest that the line may make no progress.
+const STALL_US: u32 = 200_000;
+
+/// Why a transaction failed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RemoteError {
+    /// The other end takes no bytes, or gives none.
+    Silent,
+    /// An SPI transaction other than one transfer in place, or of more than 16 bytes.
+    Unsupported,
+}
+
+impl digital::Error for RemoteError {
+    fn kind(&self) -> digital::ErrorKind {
+        digital::ErrorKind::Other
+    }
+}
+
+impl spi::Error for RemoteError {
+    fn kind(&self) -> spi::ErrorKind {
+        spi::ErrorKind::Other
+    }
+}
+
+/// The line, from which pins, devices and delays are taken.
+#[derive(Debug)]
+pub struct Remote<P>(RefCell<P>);
+
+impl<P: Port> Remote<P> {
+    /// Parts at the other end of `port`.
+    pub const fn new(port: P) -> Self {
+        Self(RefCell::new(port))
+    }
+
+    /// The pin of that number, up to 63.
+    pub fn pin(&self, number: u8) -> RemotePin<'_, P> {
+        RemotePin { remote: self, number: number & 0x3F }
+    }
+
+    /// The SPI device of that number.
+    pub fn spi(&self, chip: u8) -> RemoteSpi<'_, P> {
+        RemoteSpi { remote: self, chip }
+    }
+
+    /// The other end's clock.
+    pub fn delay(&self) -> RemoteDelay<'_, P> {
+        RemoteDelay { remote: self }
+    }
+
+    /// Sends `bytes`, then fills `answer`.
+    fn exchange(&self, bytes: &[u8], answer: &mut [u8]) -> Result<(), RemoteError> {
+        let mut port = self.0.try_borrow_mut().map_err(|_| RemoteError::Silent)?;
+        for byte in bytes {
+            in_time(&mut *port, |port| port.send(*byte).then_some(()))?;
+        }
+        for place in answer {
+            *place = in_time(&mut *port, P::receive)?;
+        }
+        Ok(())
+    }
+}
+
+/// Tries until there is an answer, or the line stalls.
+fn in_time<P: Port, T>(
+    port: &mut P,
+    mut attempt: impl FnMut(&mut P) -> Option<T>,
+) -> Result<T, RemoteError> {
+    if let Some(answer) = attempt(port) {
+        return Ok(answer);
+    }
+    let start_us = port.now_us();
+    while port.now_us().wrapping_sub(start_us) < STALL_US {
+        if let Some(answer) = attempt(port) {
+            return Ok(answer);
+        }
+    }
+    Err(RemoteError::Silent)
+}
+
+/// A pin at the other end.
+#[derive(Debug)]
+pub struct RemotePin<'r, P> {
+    remote: &'r Remote<P>,
+    number: u8,
+}
+
+impl<P> digital::ErrorType for RemotePin<'_, P> {
+    type Error = RemoteError;
+}
+
+impl<P: Port> OutputPin for RemotePin<'_, P> {
+    fn set_low(&mut self) -> Result<(), RemoteError> {
+        self.remote.exchange(&[PIN | self.number << 1], &mut [])
+    }
+
+    fn set_high(&mut self) -> Result<(), RemoteError> {
+        self.remote.exchange(&[PIN | self.number << 1 | 1], &mut [])
+    }
+}
+
+/// An SPI device at the other end.
+#[derive(Debug)]
+pub struct RemoteSpi<'r, P> {
+    remote: &'r Remote<P>,
+    chip: u8,
+}
+
+impl<P> spi::ErrorType for RemoteSpi<'_, P> {
+    type Error = RemoteError;
+}
+
+impl<P: Port> SpiDevice for RemoteSpi<'_, P> {
+    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), RemoteError> {
+        let [Operation::TransferInPlace(bytes)] = operations else {
+            return Err(RemoteError::Unsupported);
+        };
+        if bytes.len() > LONGEST_TRANSFER {
+            return Err(RemoteError::Unsupported);
+        }
+        self.remote.exchange(&[TRANSFER, self.chip, bytes.len() as u8], &mut [])?;
+        for byte in bytes.iter() {
+            self.remote.exchange(&[*byte], &mut [])?;
+        }
+        self.remote.exchange(&[], bytes)
+    }
+}
+
+/// The clock at the other end. Waits there, not here.
+#[derive(Debug)]
+pub struct RemoteDelay<'r, P> {
+    remote: &'r Remote<P>,
+}
+
+impl<P: Port> DelayNs for RemoteDelay<'_, P> {
+    fn delay_ns(&mut self, ns: u32) {
+        let [a, b, c, d] = ns.to_le_bytes();
+        // A line that has failed fails the next transaction too, which can tell.
+        let _ = self.remote.exchange(&[WAIT, a, b, c, d], &mut []);
+    }
+}
+
+/// What the other end is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Asked<'b> {
+    /// Set a pin.
+    Pin {
+        /// Its number.
+        number: u8,
+        /// Its level.
+        high: bool,
+    },
+    /// Carry out an SPI transaction, and answer with as many bytes.
+    Transfer {
+        /// The chip's number.
+        chip: u8,
+        /// What goes out.
+        bytes: &'b [u8],
+    },
+    /// Let time pass.
+    Wait {
+        /// How much, in ns.
+        ns: u32,
+    },
+}
+
+impl<'b> Asked<'b> {
+    /// The first thing that `bytes` ask for, and the bytes behind it; `None` while it is not whole.
+    ///
+    /// # Errors
+    /// The first byte means nothing.
+    pub fn parse(bytes: &'b [u8]) -> Result<Option<(Self, &'b [u8])>, UnknownByte> {
+        match *bytes {
+            [pin @ (PIN..=u8::MAX), ref rest @ ..] => {
+                let (number, high) = (pin >> 1 & 0x3F, pin & 1 == 1);
+                Ok(Some((Self::Pin { number, high }, rest)))
+            }
+            [TRANSFER, chip, count, ref rest @ ..] => {
+                let whole = rest.split_at_checked(count.into());
+                Ok(whole.map(|(bytes, rest)| (Self::Transfer { chip, bytes }, rest)))
+            }
+            [WAIT, a, b, c, d, ref rest @ ..] => {
+                Ok(Some((Self::Wait { ns: u32::from_le_bytes([a, b, c, d]) }, rest)))
+            }
+            [] | [TRANSFER | WAIT, ..] => Ok(None),
+            [other, ..] => Err(UnknownByte(other)),
+        }
+    }
+}
+
+/// A byte that asks for nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct UnknownByte(pub u8);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::VecDeque;
+
+    #[derive(Default)]
+    struct Ends {
+        sent: Vec<u8>,
+        answers: VecDeque<u8>,
+        now_us: u32,
+        deaf: bool,
+    }
+
+    impl Port for Ends {
+        fn now_us(&mut self) -> u32 {
+            self.now_us += 1;
+            self.now_us
+        }
+
+        fn receive(&mut self) -> Option<u8> {
+            self.answers.pop_front()
+        }
+
+        fn send(&mut self, byte: u8) -> bool {
+            if !self.deaf {
+                self.sent.push(byte);
+            }
+            !self.deaf
+        }
+    }
+
+    #[test]
+    fn what_is_asked_for_arrives_and_is_answered() {
+        let remote = Remote::new(Ends { answers: [7, 8, 9].into(), ..Ends::default() });
+        remote.pin(63).set_high().unwrap();
+        remote.pin(5).set_low().unwrap();
+        remote.delay().delay_ns(0x0102_0304);
+        let mut bytes = [1, 2, 3];
+        remote.spi(2).transfer_in_place(&mut bytes).unwrap();
+        assert_eq!(bytes, [7, 8, 9]);
+
+        let sent = remote.0.into_inner().sent;
+        let mut rest = &sent[..];
+        let mut asked = Vec::new();
+        while let Some((one, behind)) = Asked::parse(rest).unwrap() {
+            asked.push(one);
+            rest = behind;
+        }
+        assert_eq!(
+            asked,
+            [
+                Asked::Pin { number: 63, high: true },
+                Asked::Pin { number: 5, high: false },
+                Asked::Wait { ns: 0x0102_0304 },
+                Asked::Transfer { chip: 2, bytes: &[1, 2, 3] },
+            ]
+        );
+        assert!(rest.is_empty());
+        for length in 0..sent.len() {
+            // A prefix never means anything else.
+            let mut rest = &sent[..length];
+            let mut found = 0;
+            while let Some((one, behind)) = Asked::parse(rest).unwrap() {
+                assert_eq!(one, asked[found]);
+                found += 1;
+                rest = behind;
+            }
+        }
+        assert_eq!(Asked::parse(&[0x55]), Err(UnknownByte(0x55)));
+    }
+
+    #[test]
+    fn silence_ends_in_an_error_not_in_a_wait() {
+        let remote = Remote::new(Ends::default());
+        assert_eq!(remote.spi(0).transfer_in_place(&mut [1]), Err(RemoteError::Silent));
+        let remote = Remote::new(Ends { deaf: true, ..Ends::default() });
+        assert_eq!(remote.pin(1).set_high(), Err(RemoteError::Silent));
+        let remote = Remote::new(Ends::default());
+        assert_eq!(remote.spi(0).write(&[1]), Err(RemoteError::Unsupported));
+        assert_eq!(remote.spi(0).transfer_in_place(&mut [0; 17]), Err(RemoteError::Unsupported));
+    }
+}
