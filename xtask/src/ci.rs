@@ -2,8 +2,10 @@
 
 use std::time::{Duration, Instant};
 
+use crate::emulate::{self, Differences};
 use crate::firmware;
 use crate::process::{Outcome, cargo, run as run_command};
+use crate::size;
 
 /// Which tests are still to be run.
 #[derive(Clone, Copy)]
@@ -16,7 +18,7 @@ pub enum Tests {
 
 /// Runs every step, whatever becomes of the ones before, and prints a summary.
 pub fn run(tests: Tests) -> Outcome {
-    let steps: [(&str, &dyn Fn() -> Outcome); 5] = [
+    let steps: [(&str, &dyn Fn() -> Outcome); 7] = [
         ("format", &|| run_command(&mut cargo(&["fmt", "--all", "--check"]))),
         ("clippy", &|| {
             let mut command = cargo(&["clippy", "--workspace", "--all-targets"]);
@@ -33,6 +35,8 @@ pub fn run(tests: Tests) -> Outcome {
             run_command(command.env("RUSTDOCFLAGS", "-D warnings"))
         }),
         ("firmware", &firmware::run),
+        ("emulate", &|| emulate::run(&[], Differences::Fail)),
+        ("size", &size::run),
     ];
 
     let mut ended = Vec::new();

@@ -1,17 +1,49 @@
-//! The firmware for its target, and the proof that it cannot panic.
+//! The firmware for its target, its lints there, and the proof that it cannot panic.
 
-use crate::process::{Outcome, Watched, watch};
+use crate::process::{Outcome, Watched, run as run_command, watch};
 use crate::toolchain::Toolchain;
 
 /// What the link check's panic handler calls, and nobody defines.
 const SYMBOL: &str = "taxel_reachable_panic";
 
-/// Builds model-core and firmware, links the check, and links it once more with a panic in it.
+const PROFILE: [&str; 2] = ["--profile", "firmware"];
+
+/// What is built alone: together, a feature that one asks of a dependency would hold for all.
+type Packages = &'static [&'static str];
+
+/// The emulator's programs.
+pub const QEMU: Packages = &["--package", "qemu-image", "--features", "programs"];
+
+/// The image of the board.
+pub const NUCLEO: Packages = &["--package", "nucleo-f446re"];
+
+/// What the images are made of, and the link check.
+const LIBRARIES: Packages =
+    &["--package", "model-core", "--package", "firmware", "--package", "link-check"];
+
+/// Builds and lints all that runs on a device, links the check, and links it once more with a panic
+/// in it.
 pub fn run() -> Outcome {
     let toolchain = Toolchain::find()?;
     println!("toolchain: {toolchain}");
+    link_check(&toolchain)?;
+    build_image(&toolchain, QEMU)?;
+    build_image(&toolchain, NUCLEO)?;
+    [LIBRARIES, QEMU, NUCLEO].iter().try_for_each(|packages| lint(&toolchain, packages))
+}
 
-    let as_it_stands = build(&toolchain, &[], true)?;
+/// Builds an image.
+pub fn build_image(toolchain: &Toolchain, packages: Packages) -> Outcome {
+    run_command(toolchain.build().args(PROFILE).args(packages))
+}
+
+fn lint(toolchain: &Toolchain, packages: Packages) -> Outcome {
+    let mut command = toolchain.clippy()?;
+    run_command(command.args(PROFILE).args(packages).args(["--", "-D", "warnings"]))
+}
+
+fn link_check(toolchain: &Toolchain) -> Outcome {
+    let as_it_stands = build(toolchain, &[], true)?;
     if names_symbol(&as_it_stands.messages) {
         return Err("a panic is reachable on the device; firmware/link-check/src/main.rs tells \
                     how to find it"
@@ -21,7 +53,7 @@ pub fn run() -> Outcome {
         return Err("the firmware does not build".into());
     }
 
-    let with_panic = build(&toolchain, &["--features", "link-check/must-fail"], false)?;
+    let with_panic = build(toolchain, &["--features", "link-check/must-fail"], false)?;
     if with_panic.success {
         return Err("the link check proves nothing: it links with a reachable panic too".into());
     }
@@ -36,9 +68,7 @@ pub fn run() -> Outcome {
 /// All in one command: built apart, the libraries would be compiled twice.
 fn build(toolchain: &Toolchain, more: &[&str], echo: bool) -> Outcome<Watched> {
     let mut command = toolchain.build();
-    command.args(["--profile", "firmware"]);
-    command.args(["--package", "model-core", "--package", "firmware", "--package", "link-check"]);
-    watch(command.args(more), echo)
+    watch(command.args(PROFILE).args(LIBRARIES).args(more), echo)
 }
 
 /// Whether a linker complained that the symbol is undefined.

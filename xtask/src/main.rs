@@ -1,25 +1,35 @@
 //! One command for everything that people and CI run: `cargo xtask help`.
 
 mod ci;
+mod emulate;
 mod firmware;
 mod process;
+mod size;
 mod toolchain;
 
 use std::env;
 use std::process::ExitCode;
 
+use emulate::Differences;
+
 const HELP: &str = "\
 Usage: cargo xtask COMMAND
 
-  ci [--after-cargo-test]   everything that CI runs: format, clippy, tests, docs, firmware; goes on
-                            after a failure and ends with a summary. After a plain `cargo test`,
-                            the option tests only the crates which that leaves out
-  firmware                  builds model-core and firmware for thumbv7em-none-eabihf, and proves
-                            by linking that no panic is reachable on the device
+  ci [--after-cargo-test]   everything that CI runs: format, clippy, tests, docs, firmware, emulate,
+                            size; goes on after a failure and ends with a summary. After a plain
+                            `cargo test`, the option tests only the crates which that leaves out
+  firmware                  builds and lints for thumbv7em-none-eabihf all that runs on a device,
+                            and proves by linking that no panic is reachable there
+  emulate [--accept] [NAME…]  runs the programs of these names, or all, of firmware/qemu/src/bin in
+                            QEMU, and compares what they log and their exit status with the .out
+                            file beside them; --accept writes these files instead
+  size                      shows what flash and RAM the images take, and fails if that is more
+                            than firmware/budget.txt allows
   help                      this text
 
+`bash firmware/setup.sh` installs what these need on Debian.
 Exit status: 0 all well, 1 something failed, 2 bad usage.
-Example: cargo xtask ci
+Example: cargo xtask emulate hello decode
 ";
 
 fn main() -> ExitCode {
@@ -33,6 +43,11 @@ fn main() -> ExitCode {
         ["ci"] => ci::run(ci::Tests::All),
         ["ci", "--after-cargo-test"] => ci::run(ci::Tests::LeftOutByCargoTest),
         ["firmware"] => firmware::run(),
+        ["emulate", "--accept", ref names @ ..] if are_names(names) => {
+            emulate::run(names, Differences::Accept)
+        }
+        ["emulate", ref names @ ..] if are_names(names) => emulate::run(names, Differences::Fail),
+        ["size"] => size::run(),
         [] => {
             eprint!("cargo xtask needs a command\n\n{HELP}");
             return ExitCode::from(2);
@@ -49,4 +64,8 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+fn are_names(arguments: &[&str]) -> bool {
+    !arguments.iter().any(|argument| argument.starts_with('-'))
 }

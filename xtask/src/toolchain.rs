@@ -11,6 +11,8 @@ const TARGET: &str = "thumbv7em-none-eabihf";
 
 const DEBIAN_CARGO: &str = "/usr/bin/cargo";
 const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
+const DEBIAN_CLIPPY: &str = "/usr/bin/cargo-clippy";
+const DEBIAN_CLIPPY_PACKAGE: &str = "rust-web-clippy";
 
 /// Variables that steer cargo and rustc, and that another toolchain must not inherit from the one
 /// that runs this program.
@@ -64,25 +66,56 @@ impl Toolchain {
 
     /// `cargo build` for the target, in a directory of its own.
     pub fn build(&self) -> Command {
+        self.command(DEBIAN_CARGO, "build")
+    }
+
+    /// `cargo clippy` likewise.
+    ///
+    /// # Errors
+    /// Debian's is not installed: how to get it.
+    pub fn clippy(&self) -> Outcome<Command> {
+        if matches!(self, Self::Debian { .. }) && !Path::new(DEBIAN_CLIPPY).is_file() {
+            return Err(format!(
+                "{DEBIAN_CLIPPY} is not there; either\n  apt-get install {DEBIAN_CLIPPY_PACKAGE}\n\
+                 or\n  rustup target add {TARGET}"
+            ));
+        }
+        Ok(self.command(DEBIAN_CLIPPY, "clippy"))
+    }
+
+    /// `debian_program` is what runs cargo's `subcommand` if the toolchain is Debian's.
+    fn command(&self, debian_program: &str, subcommand: &str) -> Command {
         let mut command = match self {
-            Self::Active => cargo(&["build"]),
+            Self::Active => cargo(&[subcommand]),
             Self::Debian { linker } => {
-                let mut command = Command::new(DEBIAN_CARGO);
+                let mut command = Command::new(debian_program);
                 for variable in OF_THE_HOST_TOOLCHAIN {
                     command.env_remove(variable);
                 }
                 // Building core is an unstable feature, which a stable compiler grants on this word.
                 command.env("RUSTC", DEBIAN_RUSTC).env("RUSTC_BOOTSTRAP", "1");
+                // Clippy's front end would start the first cargo in the path.
+                command.env("CARGO", DEBIAN_CARGO);
                 command.env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", linker);
-                command.current_dir(root()).args(["build", "-Zbuild-std=core"]);
+                command.current_dir(root()).args([subcommand, "-Zbuild-std=core"]);
                 command
             }
         };
         // Flags given for the host, such as target-cpu=native, would break the target's build.
         command.env_remove("RUSTFLAGS").env_remove("CARGO_ENCODED_RUSTFLAGS");
-        command.args(["--target", TARGET, "--target-dir"]).arg(target_dir().join("thumb"));
+        command.args(["--target", TARGET, "--target-dir"]).arg(thumb_dir());
         command
     }
+}
+
+/// Where cargo puts what it builds for the target.
+fn thumb_dir() -> PathBuf {
+    target_dir().join("thumb")
+}
+
+/// Where a program for the target lies once it is built, with profile `firmware`.
+pub fn elf(program: &str) -> PathBuf {
+    thumb_dir().join(TARGET).join("firmware").join(program)
 }
 
 fn debian() -> Outcome<Toolchain> {

@@ -1,0 +1,97 @@
+//! Everything on the board, set up.
+
+use core::cell::RefCell;
+
+use embedded_hal::spi::MODE_0;
+use embedded_hal_bus::spi::{NoDelay, RefCellDevice};
+use stm32f4xx_hal::gpio::{ErasedPin, Output, PinState};
+use stm32f4xx_hal::pac::{Peripherals, SPI2};
+use stm32f4xx_hal::prelude::*;
+use stm32f4xx_hal::rcc::Config;
+use stm32f4xx_hal::spi::Spi;
+use stm32f4xx_hal::watchdog::IndependentWatchdog;
+
+use crate::{Clock, ResetCause, Serial, Slot};
+
+/// Erasing a slot takes up to 4 s, in which nothing is fed; the watchdog's own clock is up to half
+/// as fast again as it should be.
+const WATCHDOG_MS: u32 = 8000;
+
+/// An MCP3208 stands 1 MHz at 3.3 V; what the divider makes of this is 703 kHz.
+const SPI_HZ: u32 = 700_000;
+
+/// One analogue-to-digital converter, an `embedded_hal::spi::SpiDevice`.
+pub type Converter = RefCellDevice<'static, Spi<SPI2>, ErasedPin<Output>, NoDelay>;
+
+/// The board's parts, ready for use.
+pub struct Board {
+    /// Why the program starts.
+    pub reset_cause: ResetCause,
+    /// LD2, green.
+    pub led: ErasedPin<Output>,
+    /// Three MCP3208 on one bus: columns 1–8, 9–16, 17 and 18.
+    pub converters: [Converter; 3],
+    /// Serial data of the 74HC595 that drives the rows.
+    pub row_data: ErasedPin<Output>,
+    /// Shift clock of the 74HC595.
+    pub row_clock: ErasedPin<Output>,
+    /// Storage clock of the 74HC595.
+    pub row_latch: ErasedPin<Output>,
+    /// The ST-LINK's virtual COM port.
+    pub serial: Serial,
+    /// Microseconds since the start.
+    pub clock: Clock,
+    /// Where models lie.
+    pub slots: [Slot; 2],
+    /// Runs already. Not fed for 8 s, it restarts the program.
+    pub watchdog: IndependentWatchdog,
+}
+
+impl Board {
+    /// Sets everything up: 180 MHz from the ST-LINK's 8 MHz; all chip selects and row signals idle.
+    ///
+    /// `None` if this was called before.
+    #[must_use]
+    pub fn take() -> Option<Self> {
+        let parts = Peripherals::take()?;
+        let mut watchdog = IndependentWatchdog::new(parts.IWDG);
+        watchdog.stop_on_debug(&parts.DBGMCU, true);
+        watchdog.start(WATCHDOG_MS.millis());
+
+        let reset_cause = ResetCause::read(&parts.RCC);
+        let clocks = Config::hse(8.MHz()).bypass_hse_oscillator().sysclk(180.MHz());
+        let mut rcc = parts.RCC.freeze(clocks);
+        let gpioa = parts.GPIOA.split(&mut rcc);
+        let gpiob = parts.GPIOB.split(&mut rcc);
+        let gpioc = parts.GPIOC.split(&mut rcc);
+
+        let pins = (Some(gpiob.pb13), Some(gpiob.pb14), Some(gpiob.pb15));
+        let spi = Spi::new(parts.SPI2, pins, MODE_0, SPI_HZ.Hz(), &mut rcc);
+        let bus: &'static RefCell<Spi<SPI2>> =
+            cortex_m::singleton!(: RefCell<Spi<SPI2>> = RefCell::new(spi))?;
+        let converter = |select: ErasedPin<Output>| {
+            let Ok(device) = RefCellDevice::new_no_delay(bus, select);
+            device
+        };
+
+        let serial = Serial::start(parts.USART2, gpioa.pa2, gpioa.pa3, &mut rcc)?;
+        let clock = Clock::start(parts.TIM2, &mut rcc)?;
+        let high = PinState::High;
+        Some(Self {
+            reset_cause,
+            led: gpioa.pa5.into_push_pull_output().erase(),
+            converters: [
+                converter(gpiob.pb12.into_push_pull_output_in_state(high).erase()),
+                converter(gpiob.pb1.into_push_pull_output_in_state(high).erase()),
+                converter(gpioc.pc4.into_push_pull_output_in_state(high).erase()),
+            ],
+            row_data: gpioc.pc6.into_push_pull_output().erase(),
+            row_clock: gpioc.pc8.into_push_pull_output().erase(),
+            row_latch: gpioc.pc9.into_push_pull_output().erase(),
+            serial,
+            clock,
+            slots: Slot::both(parts.FLASH),
+            watchdog,
+        })
+    }
+}

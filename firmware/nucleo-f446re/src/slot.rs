@@ -1,0 +1,103 @@
+//! Model slots: sectors 6 and 7 of the flash.
+
+use core::{ptr, slice};
+
+use stm32f4xx_hal::flash::{Error, FlashExt};
+use stm32f4xx_hal::pac::FLASH;
+
+unsafe extern "C" {
+    static _slot_a_start: u8;
+    static _slot_a_end: u8;
+    static _slot_b_start: u8;
+    static _slot_b_end: u8;
+}
+
+/// Why a slot was not written or erased as asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, defmt::Format)]
+pub enum SlotError {
+    /// The bytes would reach beyond the slot; none was written.
+    OutOfRange,
+    /// The flash holds something else than was written: it was not erased, or is worn out.
+    Verify,
+    /// The flash controller refused: write protection, most likely.
+    Refused,
+}
+
+/// Room for one model: erased as a whole, to ones; written bit by bit, to zeros.
+pub struct Slot {
+    start: usize,
+    length: usize,
+}
+
+impl Slot {
+    /// Both slots. They share the controller, which is therefore taken.
+    pub(crate) fn both(_: FLASH) -> [Self; 2] {
+        let slot = |start: *const u8, end: *const u8| Self {
+            start: start.expose_provenance(),
+            length: end.addr() - start.addr(),
+        };
+        [
+            slot(&raw const _slot_a_start, &raw const _slot_a_end),
+            slot(&raw const _slot_b_start, &raw const _slot_b_end),
+        ]
+    }
+
+    /// All that is in it.
+    #[must_use]
+    pub fn bytes(&self) -> &[u8] {
+        // SAFETY: the linker keeps the slot free of anything else, and only `self` writes to it.
+        unsafe { slice::from_raw_parts(ptr::with_exposed_provenance(self.start), self.length) }
+    }
+
+    /// Sets all of it to 0xFF. Takes 1 to 4 s, in which nothing else runs, interrupts included.
+    ///
+    /// # Errors
+    /// See [`SlotError`].
+    pub fn erase(&mut self) -> Result<(), SlotError> {
+        let mut flash = controller();
+        let sector = flash.sector(self.start - flash.address()).ok_or(SlotError::OutOfRange)?;
+        let erased = flash.unlocked().erase(sector.number);
+        forget_cached(&flash);
+        erased.map_err(refused)?;
+        if self.bytes().iter().all(|&byte| byte == 0xFF) { Ok(()) } else { Err(SlotError::Verify) }
+    }
+
+    /// Writes `bytes` from `offset` on; 16 µs a byte.
+    ///
+    /// # Errors
+    /// See [`SlotError`].
+    pub fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), SlotError> {
+        let end = offset.checked_add(bytes.len()).ok_or(SlotError::OutOfRange)?;
+        if end > self.length {
+            return Err(SlotError::OutOfRange);
+        }
+        let mut flash = controller();
+        let place = self.start - flash.address() + offset;
+        let written = flash.unlocked().program(place, bytes.iter());
+        forget_cached(&flash);
+        written.map_err(refused)?;
+        if self.bytes().get(offset..end) == Some(bytes) { Ok(()) } else { Err(SlotError::Verify) }
+    }
+}
+
+/// The flash controller, without the errors of what went before, which would count for the next.
+fn controller() -> FLASH {
+    // SAFETY: `Slot::both` took it, and no slot keeps it beyond one call.
+    let flash = unsafe { FLASH::steal() };
+    // Flags are cleared by writing ones; bits 1 and 4 to 8 are the errors.
+    // SAFETY: no other bit of this register can be written.
+    flash.sr().write(|w| unsafe { w.bits(0x1F2) });
+    flash
+}
+
+fn refused(_: Error) -> SlotError {
+    SlotError::Refused
+}
+
+/// The data cache does not see that flash changes: empties it.
+fn forget_cached(flash: &FLASH) {
+    flash.acr().modify(|_, w| w.dcen().clear_bit());
+    flash.acr().modify(|_, w| w.dcrst().set_bit());
+    flash.acr().modify(|_, w| w.dcrst().clear_bit());
+    flash.acr().modify(|_, w| w.dcen().set_bit());
+}

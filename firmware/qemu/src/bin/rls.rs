@@ -1,0 +1,14 @@
+//! Learns by recursive least squares; `firmware/tests/bit_for_bit.rs` holds the host to the same
+//! bits.
+#![no_std]
+#![no_main]
+
+use cortex_m_rt::entry;
+use defmt::{info, unwrap};
+use qemu_image::{checks, exit};
+
+#[entry]
+fn main() -> ! {
+    info!("recalibration: {=u32:08x}", unwrap!(checks::recalibration()));
+    exit::success()
+}

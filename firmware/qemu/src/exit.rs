@@ -1,0 +1,11 @@
+//! Ending QEMU.
+
+/// Ends QEMU with exit status 0.
+pub fn success() -> ! {
+    semihosting::process::exit(0)
+}
+
+/// Ends QEMU with exit status 1.
+pub fn failure() -> ! {
+    semihosting::process::exit(1)
+}

@@ -1,0 +1,85 @@
+//! What ends a program early: logged, then QEMU is left with a failure.
+
+use core::panic::PanicInfo;
+use core::sync::atomic::{AtomicBool, Ordering};
+
+use cortex_m::peripheral::SCB;
+use defmt_semihosting as _;
+
+use crate::exit;
+
+unsafe extern "C" {
+    static _stack_end: u32;
+}
+
+/// Ends QEMU without a word if reporting fails in its turn.
+fn report_once() {
+    static REPORTING: AtomicBool = AtomicBool::new(false);
+    if REPORTING.swap(true, Ordering::Relaxed) {
+        exit::failure();
+    }
+}
+
+#[panic_handler]
+fn panic(info: &PanicInfo<'_>) -> ! {
+    report_once();
+    defmt::error!("{}", defmt::Display2Format(info));
+    exit::failure()
+}
+
+/// Where `defmt::panic!` and `defmt::assert!` end, which have logged their message.
+#[defmt::panic_handler]
+fn panicked() -> ! {
+    exit::failure()
+}
+
+/// Denies all access to 256 MB below the RAM, where this machine, unlike a microcontroller, answers
+/// every read with zero: whatever overflows the stack faults at once. Runs before anything else.
+#[unsafe(no_mangle)]
+#[unsafe(naked)]
+extern "C" fn __pre_init() {
+    core::arch::naked_asm!(
+        "ldr r0, =0xE000ED9C", // MPU_RBAR, MPU_RASR: region 0, and what holds in it
+        "ldr r1, =0x10000010",
+        "ldr r2, =0x10000037",
+        "stm r0, {{r1, r2}}",
+        "ldr r0, =0xE000ED94", // MPU_CTRL: on, with the default map everywhere else
+        "movs r1, #5",
+        "str r1, [r0]",
+        "dsb",
+        "isb",
+        "bx lr",
+    )
+}
+
+/// Calls [`report`] on a fresh stack: after an overflow there is no other, and whatever else the old
+/// one holds is no longer needed.
+#[unsafe(no_mangle)]
+#[unsafe(naked)]
+extern "C" fn HardFault() -> ! {
+    core::arch::naked_asm!(
+        "mov r0, sp",
+        "ldr r1, =_stack_end",
+        "cmp r0, r1",
+        "blo 1f",
+        "ldr r1, [r0, #24]", // the program counter, in the frame that the processor pushed
+        "1:",
+        "ldr r2, =_stack_start",
+        "mov sp, r2",
+        "b {report}",
+        report = sym report,
+    )
+}
+
+/// `program_counter` counts only if `stack_pointer` lies within the stack.
+extern "C" fn report(stack_pointer: usize, program_counter: u32) -> ! {
+    report_once();
+    if stack_pointer < (&raw const _stack_end).addr() {
+        defmt::error!("stack overflow");
+    } else {
+        // SAFETY: reading the fault status has no effect.
+        let status = unsafe { (*SCB::PTR).cfsr.read() };
+        defmt::error!("hard fault at {=u32:#010x}, CFSR {=u32:#010x}", program_counter, status);
+    }
+    exit::failure()
+}

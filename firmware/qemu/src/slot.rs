@@ -1,0 +1,76 @@
+//! Model slots, which behave as flash does.
+//!
+//! They lie in code memory, which QEMU lets a program write to. `-device
+//! loader,file=model.bin,addr=0x200000,force-raw=on` on QEMU's command line puts a model into slot
+//! A.
+
+use core::{ptr, slice};
+
+unsafe extern "C" {
+    static _slot_a_start: u8;
+    static _slot_a_end: u8;
+    static _slot_b_start: u8;
+    static _slot_b_end: u8;
+}
+
+/// Why a slot was not written as asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, defmt::Format)]
+pub enum SlotError {
+    /// The bytes would reach beyond the slot; none was written.
+    OutOfRange,
+    /// Bits that were 0 should have become 1, which takes an erase; they are still 0.
+    NotErased,
+}
+
+/// Room for one model: erased as a whole, to ones; written bit by bit, to zeros.
+pub struct Slot {
+    start: usize,
+    length: usize,
+}
+
+impl Slot {
+    /// Both slots.
+    ///
+    /// # Safety
+    /// To be called once: no two may be the same slot.
+    #[must_use]
+    pub unsafe fn take() -> [Self; 2] {
+        let slot = |start: *const u8, end: *const u8| Self {
+            start: start.expose_provenance(),
+            length: end.addr() - start.addr(),
+        };
+        [
+            slot(&raw const _slot_a_start, &raw const _slot_a_end),
+            slot(&raw const _slot_b_start, &raw const _slot_b_end),
+        ]
+    }
+
+    /// All that is in it.
+    #[must_use]
+    pub fn bytes(&self) -> &[u8] {
+        // SAFETY: the linker keeps the slot free of anything else, and only `self` writes to it.
+        unsafe { slice::from_raw_parts(ptr::with_exposed_provenance(self.start), self.length) }
+    }
+
+    fn bytes_mut(&mut self) -> &mut [u8] {
+        let start = ptr::with_exposed_provenance_mut(self.start);
+        // SAFETY: as for `bytes`; `self` is borrowed mutably.
+        unsafe { slice::from_raw_parts_mut(start, self.length) }
+    }
+
+    /// Sets all of it to 0xFF.
+    pub fn erase(&mut self) {
+        self.bytes_mut().fill(0xFF);
+    }
+
+    /// Writes `bytes` from `offset` on.
+    ///
+    /// # Errors
+    /// See [`SlotError`].
+    pub fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), SlotError> {
+        let end = offset.checked_add(bytes.len()).ok_or(SlotError::OutOfRange)?;
+        let place = self.bytes_mut().get_mut(offset..end).ok_or(SlotError::OutOfRange)?;
+        place.iter_mut().zip(bytes).for_each(|(there, byte)| *there &= byte);
+        if place == bytes { Ok(()) } else { Err(SlotError::NotErased) }
+    }
+}

@@ -1,0 +1,29 @@
+#!/usr/bin/env bash
+# Installs what is missing to build, test and emulate everything here, on a Debian machine with rustup.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+export PATH="${CARGO_HOME:-$HOME/.cargo}/bin:$PATH"
+
+target=thumbv7em-none-eabihf
+debian_toolchain=(rustc-web cargo-web rust-web-src rust-web-clippy)
+
+apt_install() {
+    local as_root=()
+    if [ "$(id -u)" -ne 0 ]; then as_root=(sudo -n); fi
+    "${as_root[@]}" apt-get -qq update >/dev/null
+    "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
+        apt-get -qq install -y --no-install-recommends "$@" >/dev/null
+}
+
+command -v cc >/dev/null || apt_install gcc libc6-dev
+rustc --version || rustup toolchain install stable --profile minimal --no-self-update
+cargo fmt --version >/dev/null 2>&1 || rustup component add rustfmt
+cargo clippy --version >/dev/null 2>&1 || rustup component add clippy
+command -v qemu-system-arm >/dev/null || apt_install qemu-system-arm
+
+# The firmware's target: whatever is there already, then rustup's, then Debian's packages.
+if ! [ -d "$(rustc --print target-libdir --target "$target")" ] &&
+    ! dpkg --status "${debian_toolchain[@]}" >/dev/null 2>&1 &&
+    ! timeout 300 rustup --quiet target add "$target"; then
+    apt_install "${debian_toolchain[@]}"
+fi

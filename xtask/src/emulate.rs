@@ -1,0 +1,118 @@
+//! The emulator's programs, each held to the expected output beside it.
+
+mod cable;
+mod expected;
+mod qemu;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::firmware::{QEMU, build_image};
+use crate::process::{Outcome, root};
+use crate::toolchain::{Toolchain, elf};
+
+/// What to do with output that differs.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Differences {
+    Fail,
+    /// Write it into the file beside the program.
+    Accept,
+}
+
+/// Runs the programs of these names, or all, and compares what they log.
+pub fn run(names: &[&str], differences: Differences) -> Outcome {
+    let all = programs(&root().join("firmware/qemu/src/bin"))?;
+    let chosen = choose(&all, names)?;
+    qemu::present()?;
+    build_image(&Toolchain::find()?, QEMU)?;
+
+    let mut failed = Vec::new();
+    for program in &chosen {
+        let name = name(program);
+        match check(program, differences) {
+            Ok(()) => println!("ok      {name}"),
+            Err(cause) => {
+                println!("FAILED  {name}: {cause}");
+                failed.push(name);
+            }
+        }
+    }
+    if failed.is_empty() {
+        Ok(())
+    } else {
+        let failed = failed.join(", ");
+        Err(format!("{failed}; if a difference is meant, cargo xtask emulate --accept"))
+    }
+}
+
+fn check(program: &Path, differences: Differences) -> Outcome {
+    let output = qemu::run(&elf(&name(program)))?;
+    let beside = program.with_extension("out");
+    if differences == Differences::Accept {
+        return fs::write(&beside, output)
+            .map_err(|cause| format!("{}: {cause}", beside.display()));
+    }
+    let expected =
+        fs::read_to_string(&beside).map_err(|cause| format!("{}: {cause}", beside.display()))?;
+    expected::compare(&expected, &output)
+}
+
+/// Every program's source, by name.
+fn programs(directory: &Path) -> Outcome<Vec<PathBuf>> {
+    let entries =
+        fs::read_dir(directory).map_err(|cause| format!("{}: {cause}", directory.display()))?;
+    let mut programs: Vec<_> = entries
+        .flatten()
+        .map(|entry| entry.path())
+        .filter(|path| path.extension().is_some_and(|extension| extension == "rs"))
+        .collect();
+    programs.sort();
+    Ok(programs)
+}
+
+fn name(program: &Path) -> String {
+    program.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// The programs of these names; all if there are none.
+fn choose(all: &[PathBuf], names: &[&str]) -> Outcome<Vec<PathBuf>> {
+    if names.is_empty() {
+        return Ok(all.to_vec());
+    }
+    let find = |wanted: &&str| {
+        all.iter().find(|program| name(program) == **wanted).cloned().ok_or_else(|| {
+            let all: Vec<_> = all.iter().map(|program| name(program)).collect();
+            format!("there is no program `{wanted}`, but {}", all.join(", "))
+        })
+    };
+    names.iter().map(find).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_program_has_its_expected_output_and_no_output_lacks_its_program() {
+        let directory = root().join("firmware/qemu/src/bin");
+        let programs = programs(&directory).unwrap();
+        assert!(!programs.is_empty());
+        let mut outputs: Vec<_> = fs::read_dir(&directory)
+            .unwrap()
+            .map(|entry| entry.unwrap().path())
+            .filter(|path| path.extension().is_some_and(|extension| extension == "out"))
+            .collect();
+        outputs.sort();
+        let expected: Vec<_> = programs.iter().map(|path| path.with_extension("out")).collect();
+        assert_eq!(outputs, expected);
+    }
+
+    #[test]
+    fn programs_are_chosen_by_name() {
+        let all = [PathBuf::from("bin/hello.rs"), PathBuf::from("bin/panic.rs")];
+        assert_eq!(choose(&all, &[]).unwrap(), all);
+        assert_eq!(choose(&all, &["panic"]).unwrap(), all[1..]);
+        let error = choose(&all, &["panic", "helo"]).unwrap_err();
+        assert_eq!(error, "there is no program `helo`, but hello, panic");
+    }
+}

@@ -1,0 +1,62 @@
+//! Comparing what was logged with what should have been.
+
+use crate::process::Outcome;
+
+/// # Errors
+/// They differ: where, line by line.
+pub fn compare(expected: &str, found: &str) -> Outcome {
+    if expected == found {
+        return Ok(());
+    }
+    let (expected, found) = (lines(expected), lines(found));
+    let shorter = expected.len().min(found.len());
+    let alike = |(a, b): &(&&str, &&str)| a == b;
+    let before = expected.iter().zip(&found).take_while(alike).count();
+    let after = expected.iter().rev().zip(found.iter().rev()).take_while(alike).count();
+    let after = after.min(shorter - before);
+
+    let mut difference = vec![format!("from line {} on, - expected, + found", before + 1)];
+    for (lines, sign) in [(&expected, '-'), (&found, '+')] {
+        let only = &lines[before..lines.len() - after];
+        difference.extend(only.iter().map(|line| format!("        {sign} {line}")));
+    }
+    Err(difference.join("\n"))
+}
+
+/// Split so that a missing newline at the end is a difference.
+fn lines(text: &str) -> Vec<&str> {
+    text.split('\n').collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_same_text_is_no_difference() {
+        assert_eq!(compare("INFO a\nexit status 0\n", "INFO a\nexit status 0\n"), Ok(()));
+    }
+
+    #[test]
+    fn what_differs_is_shown_without_what_is_alike_around_it() {
+        let difference = compare("a\nb\nc\nd\n", "a\nx\ny\nc\nd\n").unwrap_err();
+        assert_eq!(
+            difference,
+            "from line 2 on, - expected, + found\n        - b\n        + x\n        + y"
+        );
+    }
+
+    #[test]
+    fn lines_too_many_and_too_few_are_shown_once() {
+        let difference = compare("a\na\n", "a\n").unwrap_err();
+        assert_eq!(difference, "from line 2 on, - expected, + found\n        - a");
+        let difference = compare("a\n", "a\na\n").unwrap_err();
+        assert_eq!(difference, "from line 2 on, - expected, + found\n        + a");
+    }
+
+    #[test]
+    fn a_missing_end_of_line_is_a_difference() {
+        assert!(compare("a\n", "a").is_err());
+        assert!(compare("", "a\n").is_err());
+    }
+}

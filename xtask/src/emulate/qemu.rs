@@ -1,0 +1,117 @@
+//! Running one program in QEMU.
+
+use std::fs;
+use std::io::Read;
+use std::path::Path;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use defmt_decoder::{DecodeError, Table};
+
+use super::cable;
+use crate::process::{Outcome, first_line};
+
+const QEMU: &str = "qemu-system-arm";
+
+/// No program takes more than seconds.
+const LIMIT: Duration = Duration::from_mins(1);
+
+/// # Errors
+/// QEMU is not installed: how to get it.
+pub fn present() -> Outcome {
+    first_line(QEMU, &["--version"]).map(drop).ok_or(format!(
+        "{QEMU} is not there. On Debian,\n  apt-get install qemu-system-arm\nor, for all that the \
+         firmware needs,\n  bash firmware/setup.sh"
+    ))
+}
+
+/// What the program logs, decoded, one entry after the other, and the exit status.
+pub fn run(elf: &Path) -> Outcome<String> {
+    let program = fs::read(elf).map_err(|cause| format!("{}: {cause}", elf.display()))?;
+    let table = Table::parse(&program)
+        .map_err(|cause| format!("{}: {cause:#}", elf.display()))?
+        .ok_or(format!("{} logs nothing through defmt", elf.display()))?;
+
+    let mut child =
+        command(elf)?.spawn().map_err(|cause| format!("cannot start {QEMU}: {cause}"))?;
+    // A pipe that nobody reads fills, and its writer waits.
+    let logged = reader(child.stdout.take());
+    let complaints = reader(child.stderr.take());
+    let status = wait(&mut child)?;
+    let (logged, complaints) = (logged.join(), complaints.join());
+    let (Ok(logged), Ok(complaints)) = (logged, complaints) else {
+        return Err(format!("cannot read what {QEMU} writes"));
+    };
+
+    eprint!("{}", String::from_utf8_lossy(&complaints));
+    let log = decode(&table, &logged);
+    match status.and_then(|status| status.code()) {
+        Some(code) => Ok(format!("{log}exit status {code}\n")),
+        None => {
+            Err(format!("it did not end by itself within {} s; it logged\n{log}", LIMIT.as_secs()))
+        }
+    }
+}
+
+/// The machine, its log on stdout, its first two UARTs connected with one another.
+fn command(elf: &Path) -> Outcome<Command> {
+    let ports = cable::lay().map_err(|cause| format!("cannot connect the UARTs: {cause}"))?;
+    let mut command = Command::new(QEMU);
+    command.args(["-M", "mps2-an386", "-cpu", "cortex-m4", "-display", "none", "-monitor", "none"]);
+    command.args(["-semihosting-config", "enable=on,target=native"]);
+    for port in ports {
+        command.args(["-chardev", &format!("socket,id=uart{port},host=127.0.0.1,port={port}")]);
+        command.args(["-serial", &format!("chardev:uart{port}")]);
+    }
+    command.arg("-kernel").arg(elf);
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    Ok(command)
+}
+
+fn reader(stream: Option<impl Read + Send + 'static>) -> thread::JoinHandle<Vec<u8>> {
+    thread::spawn(move || {
+        let mut bytes = Vec::new();
+        // What was read before an error is shown, so the error itself says nothing more.
+        _ = stream.map(|mut stream| stream.read_to_end(&mut bytes));
+        bytes
+    })
+}
+
+/// The exit status; `None` if the limit was reached and the program killed.
+fn wait(child: &mut Child) -> Outcome<Option<ExitStatus>> {
+    let failed = |cause| format!("cannot wait for {QEMU}: {cause}");
+    let start = Instant::now();
+    while start.elapsed() < LIMIT {
+        if let Some(status) = child.try_wait().map_err(failed)? {
+            return Ok(Some(status));
+        }
+        thread::sleep(Duration::from_millis(5));
+    }
+    child.kill().map_err(failed)?;
+    child.wait().map_err(failed)?;
+    Ok(None)
+}
+
+/// A log as text: `LEVEL message`, one entry after the other.
+fn decode(table: &Table, logged: &[u8]) -> String {
+    let mut decoder = table.new_stream_decoder();
+    decoder.received(logged);
+    let mut text = String::new();
+    loop {
+        match decoder.decode() {
+            Ok(frame) => {
+                let level = frame.level().map(|level| level.as_str().to_uppercase() + " ");
+                text.extend([level.unwrap_or_default(), frame.display_message().to_string()]);
+                text.push('\n');
+            }
+            Err(DecodeError::UnexpectedEof) => return text,
+            Err(DecodeError::Malformed) => {
+                text.push_str("(bytes that are no log)\n");
+                if !table.encoding().can_recover() {
+                    return text;
+                }
+            }
+        }
+    }
+}

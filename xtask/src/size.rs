@@ -1,0 +1,113 @@
+//! What flash and RAM the images take, held to a budget.
+
+mod budget;
+
+use std::fs;
+use std::path::Path;
+
+use object::{Object, ObjectSection, ObjectSymbol};
+
+use crate::firmware::{NUCLEO, QEMU, build_image};
+use crate::process::{Outcome, root};
+use crate::toolchain::{Toolchain, elf};
+
+const BUDGET: &str = "firmware/budget.txt";
+
+/// Bytes that an image takes as linked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Size {
+    vector_table: u64,
+    text: u64,
+    rodata: u64,
+    data: u64,
+    bss: u64,
+    uninit: u64,
+    /// What the stack's region has, not what is used of it.
+    stack: u64,
+}
+
+impl Size {
+    fn flash(&self) -> u64 {
+        self.vector_table + self.text + self.rodata + self.data
+    }
+
+    fn ram(&self) -> u64 {
+        self.data + self.bss + self.uninit
+    }
+}
+
+/// Builds the images, prints their sections beside the budget, and fails if one exceeds it.
+pub fn run() -> Outcome {
+    let path = root().join(BUDGET);
+    let text = fs::read_to_string(&path).map_err(|cause| format!("{BUDGET}: {cause}"))?;
+    let budget = budget::parse(&text).map_err(|cause| format!("{BUDGET}: {cause}"))?;
+    let toolchain = Toolchain::find()?;
+    build_image(&toolchain, QEMU)?;
+    build_image(&toolchain, NUCLEO)?;
+
+    println!(
+        "{:14} {:>6} {:>6} {:>6} {:>5} {:>6} {:>6} | {:>6} of {:>6} {:>6} | {:>5} of {:>5} {:>6} | {:>5}",
+        "image",
+        "vector",
+        "text",
+        "rodata",
+        "data",
+        "bss",
+        "uninit",
+        "flash",
+        "budget",
+        "left",
+        "RAM",
+        "bud.",
+        "left",
+        "stack"
+    );
+    let mut exceeded = Vec::new();
+    for image in &budget {
+        let size = measure(&elf(image.name))?;
+        print_line(image, &size);
+        exceeded.extend(image.exceeded_by(size.flash(), size.ram()));
+    }
+    if exceeded.is_empty() { Ok(()) } else { Err(format!("{BUDGET}: {}", exceeded.join("; "))) }
+}
+
+fn print_line(image: &budget::Budget<'_>, size: &Size) {
+    let left = |budget: u64, taken: u64| i128::from(budget) - i128::from(taken);
+    println!(
+        "{:14} {:6} {:6} {:6} {:5} {:6} {:6} | {:6} of {:6} {:6} | {:5} of {:5} {:6} | {:5}",
+        image.name,
+        size.vector_table,
+        size.text,
+        size.rodata,
+        size.data,
+        size.bss,
+        size.uninit,
+        size.flash(),
+        image.flash,
+        left(image.flash, size.flash()),
+        size.ram(),
+        image.ram,
+        left(image.ram, size.ram()),
+        size.stack,
+    );
+}
+
+fn measure(elf: &Path) -> Outcome<Size> {
+    let failed = |cause: String| format!("{}: {cause}", elf.display());
+    let bytes = fs::read(elf).map_err(|cause| failed(cause.to_string()))?;
+    let file = object::File::parse(&*bytes).map_err(|cause| failed(cause.to_string()))?;
+    let section = |name| file.section_by_name(name).map_or(0, |section| section.size());
+    let address = |name| {
+        let symbol = file.symbols().find(|symbol| symbol.name() == Ok(name));
+        symbol.map(|symbol| symbol.address()).ok_or(failed(format!("there is no symbol {name}")))
+    };
+    Ok(Size {
+        vector_table: section(".vector_table"),
+        text: section(".text"),
+        rodata: section(".rodata"),
+        data: section(".data"),
+        bss: section(".bss"),
+        uninit: section(".uninit"),
+        stack: address("_stack_start")?.saturating_sub(address("_stack_end")?),
+    })
+}
