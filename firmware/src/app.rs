@@ -1,7 +1,8 @@
 //! The application: scan → health → decode → report, and the link, in one loop without waits.
 //!
 //! A board's program makes an [`App`] of its parts and calls [`App::run`], which returns only to be
-//! restarted. Its memory is all here: nothing grows, nothing is allocated.
+//! restarted. Its memory is all in [`Buffers`], for which the program has a static: nothing grows,
+//! nothing is allocated.
 
 use core::marker::PhantomData;
 
@@ -30,12 +31,58 @@ pub use session::{Leave, Session};
 pub const PAPER_MESSAGE_BYTES: usize = 608;
 
 /// The application of the paper's sensor.
-pub type PaperApp<P, F, E = Polynomial> = App<P, F, 8, 18, 18, PAPER_MESSAGE_BYTES, E>;
+pub type PaperApp<'m, P, F, E = Polynomial> = App<'m, P, F, 8, 18, 18, PAPER_MESSAGE_BYTES, E>;
 
-/// All that the application keeps, apart from the sensor with its model.
+/// The buffers of the paper's sensor.
+pub type PaperBuffers = Buffers<8, 18, 18, PAPER_MESSAGE_BYTES>;
+
+/// The large part of an application's memory, all zero at first, so that a static of it costs no
+/// flash and nothing is moved over the stack.
 ///
 /// `BYTES` is that of the longest message: `4 · ROWS · max(COLS, OUTPUTS) + ROWS + 24`.
+pub struct Buffers<const ROWS: usize, const COLS: usize, const OUTPUTS: usize, const BYTES: usize> {
+    receiver: Receiver<BYTES>,
+    message: [u8; BYTES],
+    frame: Frame<ROWS, COLS>,
+    estimate: Estimate<ROWS, OUTPUTS>,
+    baseline: Baseline<ROWS, COLS>,
+}
+
+impl<const ROWS: usize, const COLS: usize, const OUTPUTS: usize, const BYTES: usize> Default
+    for Buffers<ROWS, COLS, OUTPUTS, BYTES>
+{
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const ROWS: usize, const COLS: usize, const OUTPUTS: usize, const BYTES: usize>
+    Buffers<ROWS, COLS, OUTPUTS, BYTES>
+{
+    /// Buffers with nothing in them.
+    #[must_use]
+    pub const fn new() -> Self {
+        const {
+            let widest = if COLS > OUTPUTS { COLS } else { OUTPUTS };
+            assert!(BYTES >= 4 * ROWS * widest + ROWS + 24, "the longest message must fit");
+            assert!(ROWS > 0 && ROWS < 256 && COLS > 0 && OUTPUTS > 0 && OUTPUTS < 256);
+        }
+        Self {
+            receiver: Receiver::new(),
+            message: [0; BYTES],
+            frame: Frame { row_column_resistance_ohm: [[0.0; COLS]; ROWS] },
+            estimate: Estimate {
+                outputs: [[0.0; OUTPUTS]; ROWS],
+                status: [RowStatus::Decoded; ROWS],
+            },
+            baseline: Baseline::new(),
+        }
+    }
+}
+
+/// All that the application keeps, apart from the sensor with its model.
 pub struct App<
+    'm,
     P: Platform,
     F,
     const ROWS: usize,
@@ -44,27 +91,36 @@ pub struct App<
     const BYTES: usize,
     E: ExpKernel = Polynomial,
 > {
-    receiver: Receiver<BYTES>,
-    core: Core<P, F, ROWS, COLS, OUTPUTS, BYTES>,
+    receiver: &'m mut Receiver<BYTES>,
+    core: Core<'m, P, F, ROWS, COLS, OUTPUTS, BYTES>,
     kernel: PhantomData<E>,
 }
 
 /// The application without the receiver, whose bytes a request borrows while it is answered.
-struct Core<P, F, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, const BYTES: usize> {
-    line: Line<P, BYTES>,
+struct Core<
+    'm,
+    P,
+    F,
+    const ROWS: usize,
+    const COLS: usize,
+    const OUTPUTS: usize,
+    const BYTES: usize,
+> {
+    line: Line<'m, P, BYTES>,
     source: F,
     configuration: Configuration,
     statistics: Statistics,
     clock: FrameClock,
-    frame: Frame<ROWS, COLS>,
-    estimate: Estimate<ROWS, OUTPUTS>,
-    baseline: Baseline<ROWS, COLS>,
+    frame: &'m mut Frame<ROWS, COLS>,
+    estimate: &'m mut Estimate<ROWS, OUTPUTS>,
+    baseline: &'m mut Baseline<ROWS, COLS>,
     /// Request that waits for the baseline, and how many frames are still to be scanned for it.
     capture: Option<(u16, u16)>,
     upload: Upload,
 }
 
 impl<
+    'm,
     P: Platform,
     F: FrameSource<ROWS, COLS>,
     const ROWS: usize,
@@ -72,32 +128,30 @@ impl<
     const OUTPUTS: usize,
     const BYTES: usize,
     E: ExpKernel,
-> App<P, F, ROWS, COLS, OUTPUTS, BYTES, E>
+> App<'m, P, F, ROWS, COLS, OUTPUTS, BYTES, E>
 {
     /// An application that starts with `configuration`.
-    pub fn new(mut platform: P, source: F, configuration: Configuration) -> Self {
-        const {
-            let widest = if COLS > OUTPUTS { COLS } else { OUTPUTS };
-            assert!(BYTES >= 4 * ROWS * widest + ROWS + 24, "the longest message must fit");
-            assert!(ROWS > 0 && ROWS < 256 && COLS > 0 && OUTPUTS > 0 && OUTPUTS < 256);
-        }
+    pub fn new(
+        mut platform: P,
+        source: F,
+        configuration: Configuration,
+        buffers: &'m mut Buffers<ROWS, COLS, OUTPUTS, BYTES>,
+    ) -> Self {
+        let Buffers { receiver, message, frame, estimate, baseline } = buffers;
         let clock = FrameClock::starting_at(platform.now_us());
         let core = Core {
-            line: Line::new(platform),
+            line: Line::new(platform, message),
             source,
             configuration,
             statistics: Statistics::default(),
             clock,
-            frame: Frame::missing(),
-            estimate: Estimate {
-                outputs: [[f32::NAN; OUTPUTS]; ROWS],
-                status: [RowStatus::MissingReading; ROWS],
-            },
-            baseline: Baseline::new(),
+            frame,
+            estimate,
+            baseline,
             capture: None,
             upload: Upload::new(),
         };
-        Self { receiver: Receiver::new(), core, kernel: PhantomData }
+        Self { receiver, core, kernel: PhantomData }
     }
 
     /// Runs until the host asks for a restart, exchanging the model when another is committed.
@@ -129,7 +183,7 @@ impl<
             candidates.swap(0, 1);
         }
         candidates.into_iter().find_map(|(index, generation, bytes)| {
-            let sound = Tactile::<ROWS, COLS, OUTPUTS, E>::load(blob_in_slot(bytes)).is_ok();
+            let sound = Tactile::<ROWS, COLS, OUTPUTS, E>::check(blob_in_slot(bytes)).is_ok();
             generation.filter(|_| sound).map(|generation| (index, generation))
         })
     }

@@ -88,6 +88,14 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKerne
         Ok(Self { decoder: Decoder::load(blob)? })
     }
 
+    /// Checks `blob` as [`load`](Self::load) does, and leaves it at that: the CRC-32 of its model.
+    ///
+    /// # Errors
+    /// As for [`load`](Self::load).
+    pub fn check(blob: &'a [u8]) -> Result<u32, DecodeError> {
+        Ok(Decoder::<ROWS, COLS, OUTPUTS, E>::check(blob)?.crc())
+    }
+
     /// Puts the model in `blob` in force from the next frame on.
     ///
     /// # Errors
@@ -104,6 +112,11 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKerne
     #[must_use]
     pub fn decode(&self, frame: &Frame<ROWS, COLS>) -> Estimate<ROWS, OUTPUTS> {
         self.decoder.decode(frame)
+    }
+
+    /// As [`decode`](Self::decode), into an estimate that is there already.
+    pub fn decode_into(&self, frame: &Frame<ROWS, COLS>, estimate: &mut Estimate<ROWS, OUTPUTS>) {
+        self.decoder.decode_into(frame, estimate);
     }
 
     /// CRC-32 of the blob in force: tells host and board that they mean the same model.

@@ -127,12 +127,12 @@ fn frames_are_scanned_on_time_numbered_and_reported() {
 #[test]
 fn a_scan_longer_than_the_period_is_an_overrun() {
     let mut slots = MockSlot::pair_with(&blob(3, 4));
-    let mut bench = Bench::new(Configuration { frame_period_us: 100, ..quiet() });
+    let configuration = Configuration { frame_period_us: 100, ..quiet() };
+    let mut bench = Bench::new(configuration);
     let board = bench.board.clone();
     let frame = bench.frame.clone();
     let source = Source { frame, board: board.clone(), scan_us: 250 };
-    bench.app =
-        TestApp::new(board.clone(), source, Configuration { frame_period_us: 100, ..quiet() });
+    bench.app = TestApp::new(board.clone(), source, configuration, buffers());
     let mut session = Session::start(&mut bench.app, &mut slots);
     while board.0.borrow().now_us < 2000 {
         session.step();

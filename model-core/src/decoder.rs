@@ -5,7 +5,6 @@ use core::marker::PhantomData;
 use crate::blob::{DecodeError, Metadata, Model, ModelShape};
 use crate::exp::{ExpKernel, Polynomial};
 use crate::frame::Frame;
-use crate::rbf::Network;
 
 /// What became of one row of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,16 +27,16 @@ pub struct Estimate<const ROWS: usize, const OUTPUTS: usize> {
 }
 
 /// RAM in bytes that a [`Decoder`] of so many `rows` takes on a 32-bit target, whatever its K: slices
-/// into the blob, a network a row. The link check of the firmware holds it to the compiler.
+/// into the blob. The link check of the firmware holds it to the compiler.
 #[must_use]
 pub const fn decoder_ram_bytes(rows: usize) -> usize {
-    128 + 68 * rows
+    128 + 8 * rows
 }
 
 /// A model ready to decode frames of a sensor whose sizes are known when compiled.
 ///
-/// Any number of centres K is served: it comes with the blob. RAM: a few slices a row; the
-/// weights stay where the blob lies.
+/// Any number of centres K is served: it comes with the blob. RAM: a slice a row; the weights stay
+/// where the blob lies.
 ///
 /// `E` is the [exp kernel](crate::exp).
 #[derive(Debug, Clone, Copy)]
@@ -49,32 +48,46 @@ pub struct Decoder<
     E: ExpKernel = Polynomial,
 > {
     model: Model<'a>,
-    row_networks: [Network<'a>; ROWS],
+    /// Where each row's network is.
+    row_sections: [&'a [u8]; ROWS],
     kernel: PhantomData<E>,
 }
 
 impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKernel>
     Decoder<'a, ROWS, COLS, OUTPUTS, E>
 {
+    /// Checks a blob as [`load`](Self::load) does, and leaves it at that.
+    ///
+    /// # Errors
+    /// [`DecodeError`]: the blob is unsound, or its shape is not this decoder's.
+    pub fn check(blob: &'a [u8]) -> Result<Model<'a>, DecodeError> {
+        const { assert!(ROWS > 0 && COLS > 0 && OUTPUTS > 0, "a sensor has rows, columns, outputs") }
+        let model = Model::decode(blob)?;
+        let expected = ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS };
+        if model.shape() == expected {
+            Ok(model)
+        } else {
+            Err(DecodeError::ShapeMismatch { expected, found: model.shape() })
+        }
+    }
+
     /// Loads a blob. It must lie at a multiple of four ([`Aligned`](crate::Aligned)).
     ///
     /// # Errors
     /// [`DecodeError`]: the blob is unsound, or its shape is not this decoder's.
     pub fn load(blob: &'a [u8]) -> Result<Self, DecodeError> {
-        const { assert!(ROWS > 0 && COLS > 0 && OUTPUTS > 0, "a sensor has rows, columns, outputs") }
-        let model = Model::decode(blob)?;
-        let expected = ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS };
-        let mismatch = DecodeError::ShapeMismatch { expected, found: model.shape() };
-        if model.shape() != expected {
-            return Err(mismatch);
+        let model = Self::check(blob)?;
+        let mut row_sections = [&[][..]; ROWS];
+        for (row, section) in row_sections.iter_mut().enumerate() {
+            // A sound model has a network for every row.
+            let networks = model.network_count() as u8;
+            *section = model.section_of_row(row).ok_or(DecodeError::UnknownNetwork {
+                row,
+                network: networks,
+                networks,
+            })?;
         }
-        let first = model.networks().next().ok_or(mismatch)?;
-        let mut row_networks = [first; ROWS];
-        for (row, slot) in row_networks.iter_mut().enumerate() {
-            let index = model.network_of_row(row).ok_or(mismatch)?;
-            *slot = model.networks().nth(index).ok_or(mismatch)?;
-        }
-        Ok(Self { model, row_networks, kernel: PhantomData })
+        Ok(Self { model, row_sections, kernel: PhantomData })
     }
 
     /// What is known of the model beyond its weights.
@@ -96,13 +109,22 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKerne
             outputs: [[f32::NAN; OUTPUTS]; ROWS],
             status: [RowStatus::MissingReading; ROWS],
         };
-        let rows = self.row_networks.iter().zip(&frame.row_column_resistance_ohm);
+        self.decode_into(frame, &mut estimate);
+        estimate
+    }
+
+    /// As [`decode`](Self::decode), into an estimate that is there already.
+    pub fn decode_into(&self, frame: &Frame<ROWS, COLS>, estimate: &mut Estimate<ROWS, OUTPUTS>) {
+        let rows = self.row_sections.iter().zip(&frame.row_column_resistance_ohm);
         let places = estimate.outputs.iter_mut().zip(&mut estimate.status);
-        for ((network, readings), (outputs, status)) in rows.zip(places) {
+        for (row, ((section, readings), (outputs, status))) in rows.zip(places).enumerate() {
+            *outputs = [f32::NAN; OUTPUTS];
+            *status = RowStatus::MissingReading;
             if !readings.iter().all(|r| r.is_finite()) {
                 continue;
             }
-            // The shape was checked when the blob was loaded.
+            // Both are there: the blob was checked when it was loaded.
+            let Some(network) = self.model.network_in(section, row) else { continue };
             if let Ok(inferred) = network.infer_array::<E, COLS, OUTPUTS>(readings) {
                 if inferred.iter().all(|y| y.is_finite()) {
                     *outputs = inferred;
@@ -112,6 +134,5 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKerne
                 }
             }
         }
-        estimate
     }
 }

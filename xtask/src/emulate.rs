@@ -11,6 +11,9 @@ use crate::firmware::{QEMU, build_image};
 use crate::process::{Outcome, root};
 use crate::toolchain::{Toolchain, elf};
 
+/// The application's image, which `host-sim emulate` runs.
+const APPLICATION: &str = "qemu-app";
+
 /// What to do with output that differs.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Differences {
@@ -43,6 +46,13 @@ pub fn run(names: &[&str], differences: Differences) -> Outcome {
         let failed = failed.join(", ");
         Err(format!("{failed}; if a difference is meant, cargo xtask emulate --accept"))
     }
+}
+
+/// Prints a log that was saved while an image ran: the application's if none is named.
+pub fn print_log(log: &str, image: Option<&str>) -> Outcome {
+    let image = image.map_or_else(|| elf(APPLICATION), PathBuf::from);
+    print!("{}", qemu::decoded(Path::new(log), &image)?);
+    Ok(())
 }
 
 fn check(program: &Path, differences: Differences) -> Outcome {

@@ -23,6 +23,8 @@ Usage: cargo xtask COMMAND
   emulate [--accept] [NAME…]  runs the programs of these names, or all, of firmware/qemu/src/bin in
                             QEMU, and compares what they log and their exit status with the .out
                             file beside them; --accept writes these files instead
+  log FILE [ELF]            prints a log that `host-sim emulate --log FILE` saved; ELF is the image
+                            that wrote it, if it is another than that command's own
   size                      shows what flash and RAM the images take, and fails if that is more
                             than firmware/budget.txt allows
   help                      this text
@@ -47,6 +49,8 @@ fn main() -> ExitCode {
             emulate::run(names, Differences::Accept)
         }
         ["emulate", ref names @ ..] if are_names(names) => emulate::run(names, Differences::Fail),
+        ["log", log] => emulate::print_log(log, None),
+        ["log", log, image] => emulate::print_log(log, Some(image)),
         ["size"] => size::run(),
         [] => {
             eprint!("cargo xtask needs a command\n\n{HELP}");

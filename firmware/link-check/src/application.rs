@@ -1,6 +1,6 @@
 //! The application on a board of which the optimiser knows nothing.
 
-use firmware::app::PaperApp;
+use firmware::app::{PaperApp, PaperBuffers};
 use firmware::link::message::{Configuration, Memory};
 use firmware::platform::{Platform, Port};
 use firmware::readout::{FrameSource, ScanReport, ScanSettings};
@@ -66,6 +66,8 @@ impl Slot for Flash {
 }
 
 pub fn exercise() {
-    let mut app = PaperApp::<_, _>::new(Board, Sensor, opaque(Configuration::DEFAULT));
+    let mut buffers = PaperBuffers::new();
+    let configuration = opaque(Configuration::DEFAULT);
+    let mut app = PaperApp::<_, _>::new(Board, Sensor, configuration, &mut buffers);
     app.run(&mut [Flash, Flash]);
 }

@@ -9,6 +9,7 @@ const RELOAD: usize = 0x8;
 const TICKS_PER_US: u32 = 25;
 
 /// Counts microseconds. To be read at least every 171 s, when the timer has gone round once.
+#[derive(Clone, Copy)]
 pub struct Clock {
     timer: Registers,
     /// Where the timer, which counts down, stood at the last whole microsecond.

@@ -6,6 +6,8 @@
 
 use core::{ptr, slice};
 
+use firmware::store::FlashError;
+
 unsafe extern "C" {
     static _slot_a_start: u8;
     static _slot_a_end: u8;
@@ -72,5 +74,20 @@ impl Slot {
         let place = self.bytes_mut().get_mut(offset..end).ok_or(SlotError::OutOfRange)?;
         place.iter_mut().zip(bytes).for_each(|(there, byte)| *there &= byte);
         if place == bytes { Ok(()) } else { Err(SlotError::NotErased) }
+    }
+}
+
+impl firmware::store::Slot for Slot {
+    fn bytes(&self) -> &[u8] {
+        self.bytes()
+    }
+
+    fn erase(&mut self) -> Result<(), FlashError> {
+        self.erase();
+        Ok(())
+    }
+
+    fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), FlashError> {
+        self.write(offset, bytes).map_err(|_| FlashError)
     }
 }

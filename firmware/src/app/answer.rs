@@ -34,7 +34,7 @@ impl<
     const OUTPUTS: usize,
     const BYTES: usize,
     E: ExpKernel,
-> Session<'_, P, F, S, ROWS, COLS, OUTPUTS, BYTES, E>
+> Session<'_, '_, P, F, S, ROWS, COLS, OUTPUTS, BYTES, E>
 {
     /// Receives until a frame is whole or nothing more is there, and answers it.
     pub(super) fn serve_link(&mut self) -> Option<Leave> {
@@ -57,7 +57,7 @@ impl<
     const COLS: usize,
     const OUTPUTS: usize,
     const BYTES: usize,
-> Core<P, F, ROWS, COLS, OUTPUTS, BYTES>
+> Core<'_, P, F, ROWS, COLS, OUTPUTS, BYTES>
 {
     fn answer<E: ExpKernel, S: Slot>(
         &mut self,
@@ -150,7 +150,7 @@ impl<
         if frames == 0 || self.configuration.frame_period_us == 0 {
             return Err(Refusal::Baseline);
         }
-        self.baseline = Baseline::new();
+        *self.baseline = Baseline::new();
         self.capture = Some((number, frames));
         Ok(())
     }
@@ -193,9 +193,8 @@ impl<
                     return Ok(()); // asked again, since the answer was lost
                 }
                 let blob = self.upload.complete(spare)?;
-                match Tactile::<ROWS, COLS, OUTPUTS, E>::load(blob) {
-                    Ok(sensor) => {
-                        let crc_32 = sensor.model_crc();
+                match Tactile::<ROWS, COLS, OUTPUTS, E>::check(blob) {
+                    Ok(crc_32) => {
                         let before = model.identity.map_or(0, |identity| identity.generation);
                         self.upload.commit(spare, before.saturating_add(1), crc_32)?;
                         *leave = Some(Leave::NewModel);

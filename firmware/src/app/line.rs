@@ -8,14 +8,14 @@ use crate::platform::Port;
 const STALL_US: u32 = 50_000;
 
 /// The board's serial line, with room for one report.
-pub struct Line<P, const BYTES: usize> {
+pub struct Line<'m, P, const BYTES: usize> {
     platform: P,
-    buffer: [u8; BYTES],
+    buffer: &'m mut [u8; BYTES],
 }
 
-impl<P: Port, const BYTES: usize> Line<P, BYTES> {
-    pub fn new(platform: P) -> Self {
-        Self { platform, buffer: [0; BYTES] }
+impl<'m, P: Port, const BYTES: usize> Line<'m, P, BYTES> {
+    pub fn new(platform: P, buffer: &'m mut [u8; BYTES]) -> Self {
+        Self { platform, buffer }
     }
 
     pub fn platform(&mut self) -> &mut P {
@@ -25,7 +25,7 @@ impl<P: Port, const BYTES: usize> Line<P, BYTES> {
     /// Sends one report; `false` if the host's side takes no more bytes.
     #[must_use]
     pub fn send(&mut self, number: u16, report: &Report<'_>) -> bool {
-        let Some(bytes) = packet::encode(number, report, &mut self.buffer) else { return false };
+        let Some(bytes) = packet::encode(number, report, self.buffer) else { return false };
         let platform = &mut self.platform;
         cobs::encode(bytes, |byte| {
             if platform.send(byte) {

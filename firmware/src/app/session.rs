@@ -26,6 +26,7 @@ pub enum Leave {
 /// The application with the model that is in force, whose slot it borrows, and the slot to spare.
 pub struct Session<
     'a,
+    'm,
     P: Platform,
     F,
     S,
@@ -35,7 +36,7 @@ pub struct Session<
     const BYTES: usize,
     E: ExpKernel,
 > {
-    pub(super) app: &'a mut App<P, F, ROWS, COLS, OUTPUTS, BYTES, E>,
+    pub(super) app: &'a mut App<'m, P, F, ROWS, COLS, OUTPUTS, BYTES, E>,
     pub(super) model: InForce<'a, ROWS, COLS, OUTPUTS, E>,
     pub(super) spare: &'a mut S,
 }
@@ -54,6 +55,7 @@ pub(super) struct InForce<
 
 impl<
     'a,
+    'm,
     P: Platform,
     F: FrameSource<ROWS, COLS>,
     S: Slot,
@@ -62,14 +64,15 @@ impl<
     const OUTPUTS: usize,
     const BYTES: usize,
     E: ExpKernel,
-> Session<'a, P, F, S, ROWS, COLS, OUTPUTS, BYTES, E>
+> Session<'a, 'm, P, F, S, ROWS, COLS, OUTPUTS, BYTES, E>
 {
     /// Puts the most recent sound model in force.
+    #[inline(never)] // its stack is free again when the loop begins
     pub fn start(
-        app: &'a mut App<P, F, ROWS, COLS, OUTPUTS, BYTES, E>,
+        app: &'a mut App<'m, P, F, ROWS, COLS, OUTPUTS, BYTES, E>,
         slots: &'a mut [S; 2],
     ) -> Self {
-        let chosen = App::<P, F, ROWS, COLS, OUTPUTS, BYTES, E>::choose(slots);
+        let chosen = App::<'m, P, F, ROWS, COLS, OUTPUTS, BYTES, E>::choose(slots);
         let [first, second] = slots;
         let (active, spare) = match chosen {
             Some((1, _)) => (&*second, first),
@@ -117,7 +120,7 @@ impl<
     const COLS: usize,
     const OUTPUTS: usize,
     const BYTES: usize,
-> Core<P, F, ROWS, COLS, OUTPUTS, BYTES>
+> Core<'_, P, F, ROWS, COLS, OUTPUTS, BYTES>
 {
     /// Scans a frame and reports on it; tells whether it has any reading at all.
     fn scan<E: ExpKernel>(
@@ -126,7 +129,7 @@ impl<
         sensor: Option<&Tactile<'_, ROWS, COLS, OUTPUTS, E>>,
     ) -> bool {
         let start_us = self.line.platform().now_us();
-        let report = self.source.scan(self.configuration.scan, &mut self.frame);
+        let report = self.source.scan(self.configuration.scan, self.frame);
         let scan_us = self.line.platform().now_us().wrapping_sub(start_us);
 
         let s = &mut self.statistics;
@@ -174,10 +177,10 @@ impl<
             shorted_below_ohm: self.configuration.shorted_below_ohm,
             open_above_ohm: self.configuration.open_above_ohm,
         };
-        let health = Health::of(&mut self.frame, limits);
+        let health = Health::of(self.frame, limits);
         let mut flags = if health.is_good() { 0 } else { EstimateReport::FAULTY_READING };
         if let Some(sensor) = sensor {
-            self.estimate = sensor.decode(&self.frame);
+            sensor.decode_into(self.frame, self.estimate);
             if self.estimate.status.contains(&RowStatus::Overflow) {
                 flags |= EstimateReport::OVERFLOW;
             }
@@ -186,7 +189,7 @@ impl<
             self.estimate.status = [RowStatus::MissingReading; ROWS];
             flags |= EstimateReport::NO_MODEL;
         }
-        let change = self.baseline.largest_relative_deviation(&self.frame);
+        let change = self.baseline.largest_relative_deviation(self.frame);
         let contact = change.is_some_and(|change| change > self.configuration.contact_threshold);
         if contact && self.capture.is_none() {
             flags |= EstimateReport::CONTACT;
@@ -214,7 +217,7 @@ impl<
     /// Takes the frame into the baseline that is being captured, and answers when it is whole.
     fn feed_baseline(&mut self) {
         let Some((number, left)) = self.capture else { return };
-        self.baseline.add(&self.frame);
+        self.baseline.add(self.frame);
         self.capture = left.checked_sub(1).filter(|left| *left > 0).map(|left| (number, left));
         if self.capture.is_none() {
             let mean = self.baseline.mean().row_column_resistance_ohm.as_flattened();
@@ -231,7 +234,7 @@ impl<
 
     /// Puts `readings` of a request in the frame's place.
     pub(super) fn set_frame(&mut self, readings: impl Iterator<Item = f32>) {
-        self.frame = Frame::missing();
+        *self.frame = Frame::missing();
         let places = self.frame.row_column_resistance_ohm.as_flattened_mut();
         places.iter_mut().zip(readings).for_each(|(place, reading)| *place = reading);
     }

@@ -31,10 +31,10 @@ impl<const ROWS: usize, const COLS: usize> Default for Baseline<ROWS, COLS> {
 }
 
 impl<const ROWS: usize, const COLS: usize> Baseline<ROWS, COLS> {
-    /// A baseline of no frames: every reading NaN.
+    /// A baseline of no frames, in which no reading is known.
     #[must_use]
     pub const fn new() -> Self {
-        Self { mean: Frame::missing(), frames: 0 }
+        Self { mean: Frame { row_column_resistance_ohm: [[0.0; COLS]; ROWS] }, frames: 0 }
     }
 
     /// Takes one more frame at rest into the mean; beyond 65 535 frames nothing changes.
@@ -58,7 +58,7 @@ impl<const ROWS: usize, const COLS: usize> Baseline<ROWS, COLS> {
         self.frames
     }
 
-    /// The mean, NaN where a reading is not known.
+    /// The mean, NaN (0 before the first frame) where a reading is not known.
     #[must_use]
     pub fn mean(&self) -> &Frame<ROWS, COLS> {
         &self.mean

@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
 
-use firmware::app::{App, Leave, Session};
+use firmware::app::{App, Buffers, Leave, Session};
 use firmware::link::message::{Configuration, Memory, Report, Request, UploadStep};
 use firmware::link::receive::{Received, Receiver};
 use firmware::link::{cobs, packet};
@@ -23,9 +23,10 @@ pub const COLS: usize = 3;
 pub const OUTPUTS: usize = 2;
 pub const MESSAGE_BYTES: usize = 128;
 
-pub type TestApp = App<Board, Source, ROWS, COLS, OUTPUTS, MESSAGE_BYTES>;
+pub type TestApp = App<'static, Board, Source, ROWS, COLS, OUTPUTS, MESSAGE_BYTES>;
 pub type TestSession<'a> = Session<
     'a,
+    'static,
     Board,
     Source,
     MockSlot,
@@ -265,6 +266,11 @@ pub fn quiet() -> Configuration {
     Configuration { frame_period_us: 0, ..Configuration::DEFAULT }
 }
 
+/// Buffers for good: a test's are few.
+pub fn buffers() -> &'static mut Buffers<ROWS, COLS, OUTPUTS, MESSAGE_BYTES> {
+    Box::leak(Box::new(Buffers::new()))
+}
+
 /// An application, and the host's end of everything it is connected to.
 pub struct Bench {
     pub app: TestApp,
@@ -277,7 +283,7 @@ impl Bench {
         let board = Board::default();
         let frame = Rc::new(RefCell::new(frame_at_rest()));
         let source = Source { frame: frame.clone(), board: board.clone(), scan_us: 10 };
-        Self { app: App::new(board.clone(), source, configuration), board, frame }
+        Self { app: App::new(board.clone(), source, configuration, buffers()), board, frame }
     }
 }
 

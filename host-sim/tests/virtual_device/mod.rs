@@ -4,7 +4,7 @@
 use std::io::{Read, Write};
 use std::time::Instant;
 
-use firmware::app::PaperApp;
+use firmware::app::{PaperApp, PaperBuffers};
 use firmware::link::message::{Configuration, Memory};
 use firmware::platform::{Platform, Port};
 use firmware::readout::{FrameSource, ScanReport, ScanSettings};
@@ -160,7 +160,8 @@ pub fn run(
             };
             let source = Source { frames: frames.clone(), next: 0 };
             let quiet = Configuration { frame_period_us: 0, ..Configuration::DEFAULT };
-            let mut app = PaperApp::<_, _>::new(board, source, quiet);
+            let mut buffers = PaperBuffers::new();
+            let mut app = PaperApp::<_, _>::new(board, source, quiet, &mut buffers);
             app.run(&mut slots);
             app.platform().flush();
             if app.platform().gone {

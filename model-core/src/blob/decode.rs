@@ -137,6 +137,23 @@ impl<'a> Model<'a> {
         })
     }
 
+    /// The bytes from the section on of the network that serves `row` (from 0): where to find it
+    /// again with [`network_in`](Self::network_in).
+    pub(crate) fn section_of_row(&self, row: usize) -> Option<&'a [u8]> {
+        let mut rest = self.network_sections;
+        for index in 0..self.network_of_row(row)? {
+            (_, rest) = take_network(rest, self.shape, index as u8).ok()?;
+        }
+        Some(rest)
+    }
+
+    /// The network that serves `row`, in its `section`. Cuts slices; the values were looked at when
+    /// the blob was decoded.
+    pub(crate) fn network_in(&self, section: &'a [u8], row: usize) -> Option<Network<'a>> {
+        let index = self.network_of_row(row)?;
+        take_network(section, self.shape, index as u8).ok().map(|(network, _)| network)
+    }
+
     /// Index of the network that serves `row` (from 0), or `None` for a row outside the sensor.
     #[must_use]
     pub fn network_of_row(&self, row: usize) -> Option<usize> {

@@ -26,12 +26,23 @@ pub fn present() -> Outcome {
     ))
 }
 
+/// What is needed to decode the logs of the program in `elf`.
+fn table(elf: &Path) -> Outcome<Table> {
+    let program = fs::read(elf).map_err(|cause| format!("{}: {cause}", elf.display()))?;
+    Table::parse(&program)
+        .map_err(|cause| format!("{}: {cause:#}", elf.display()))?
+        .ok_or(format!("{} logs nothing through defmt", elf.display()))
+}
+
+/// A log that was saved while the program in `elf` ran, as text.
+pub fn decoded(log: &Path, elf: &Path) -> Outcome<String> {
+    let logged = fs::read(log).map_err(|cause| format!("{}: {cause}", log.display()))?;
+    Ok(decode(&table(elf)?, &logged))
+}
+
 /// What the program logs, decoded, one entry after the other, and the exit status.
 pub fn run(elf: &Path) -> Outcome<String> {
-    let program = fs::read(elf).map_err(|cause| format!("{}: {cause}", elf.display()))?;
-    let table = Table::parse(&program)
-        .map_err(|cause| format!("{}: {cause:#}", elf.display()))?
-        .ok_or(format!("{} logs nothing through defmt", elf.display()))?;
+    let table = table(elf)?;
 
     let mut child =
         command(elf)?.spawn().map_err(|cause| format!("cannot start {QEMU}: {cause}"))?;

@@ -1,0 +1,129 @@
+//! The application in the emulator: the link on the first serial line, the readout's parts at the
+//! other end of the second. `host-sim emulate` is at both.
+#![no_std]
+#![no_main]
+
+use core::cell::Cell;
+
+use cortex_m::peripheral::SCB;
+use cortex_m::singleton;
+use cortex_m_rt::entry;
+use defmt::info;
+use firmware::app::{PaperApp, PaperBuffers};
+use firmware::circuit::ZeroPotential;
+use firmware::link::message::{Configuration, Memory};
+use firmware::platform::{Platform, Port};
+use firmware::readout::{Mcp3208s, Scanner, ShiftRegister595};
+use firmware::remote::Remote;
+use qemu_image::clock::Clock;
+use qemu_image::exit;
+use qemu_image::memory::{Sections, stack_bytes, stack_high_water_bytes};
+use qemu_image::slot::Slot;
+use qemu_image::uart::Uart;
+use qemu_image::watchdog::Watchdog;
+
+/// Longer than a loop takes, were it ever so slow a computer.
+const WATCHDOG_MS: u32 = 20_000;
+
+/// Numbers of the pins of the rows' 74HC595 on the host's virtual board.
+const ROW_DATA: u8 = 12;
+const ROW_CLOCK: u8 = 13;
+const ROW_LATCH: u8 = 14;
+
+/// A serial line with the clock, which all lines share.
+struct Line<'c> {
+    uart: Uart,
+    clock: &'c Cell<Clock>,
+}
+
+impl Port for Line<'_> {
+    fn now_us(&mut self) -> u32 {
+        let mut clock = self.clock.get();
+        let now_us = clock.now_us();
+        self.clock.set(clock);
+        now_us as u32
+    }
+
+    fn receive(&mut self) -> Option<u8> {
+        self.uart.try_read()
+    }
+
+    fn send(&mut self, byte: u8) -> bool {
+        self.uart.try_write(byte)
+    }
+}
+
+struct Board<'c> {
+    line: Line<'c>,
+    watchdog: Watchdog,
+    fed_us: u32,
+}
+
+impl Port for Board<'_> {
+    fn now_us(&mut self) -> u32 {
+        self.line.now_us()
+    }
+
+    fn receive(&mut self) -> Option<u8> {
+        self.line.receive()
+    }
+
+    fn send(&mut self, byte: u8) -> bool {
+        self.line.send(byte)
+    }
+}
+
+impl Platform for Board<'_> {
+    const BOARD: &'static str = "qemu mps2-an386";
+
+    /// Feeding costs QEMU system calls, so it is done once a millisecond at most.
+    fn feed_watchdog(&mut self) {
+        let now_us = self.now_us();
+        if now_us.wrapping_sub(self.fed_us) >= 1000 {
+            self.fed_us = now_us;
+            self.watchdog.feed();
+        }
+    }
+
+    fn memory(&self) -> Memory {
+        let sections = Sections::linked();
+        Memory {
+            vector_table: sections.vector_table as u32,
+            text: sections.text as u32,
+            rodata: sections.rodata as u32,
+            data: sections.data as u32,
+            bss: sections.bss as u32,
+            uninit: sections.uninit as u32,
+            stack_reserved: stack_bytes() as u32,
+            stack_high_water: stack_high_water_bytes() as u32,
+        }
+    }
+}
+
+#[entry]
+fn main() -> ! {
+    info!("taxel {=str} on an emulated Cortex-M4F", env!("CARGO_PKG_VERSION"));
+    let clock = Cell::new(Clock::start());
+    let remote = Remote::new(Line { uart: Uart::second(), clock: &clock });
+    let [data, clock_pin, latch] = [ROW_DATA, ROW_CLOCK, ROW_LATCH].map(|pin| remote.pin(pin));
+    let scanner = Scanner {
+        drive: ShiftRegister595::<_, 8> { data, clock: clock_pin, latch },
+        sampler: Mcp3208s { chips: [0, 1, 2].map(|chip| remote.spi(chip)) },
+        delay: remote.delay(),
+        circuit: ZeroPotential::TYPICAL,
+    };
+    let board = Board {
+        line: Line { uart: Uart::first(), clock: &clock },
+        watchdog: Watchdog::start(WATCHDOG_MS),
+        fed_us: 0,
+    };
+    // The host says when to scan: its virtual hardware may not be there.
+    let configuration = Configuration { frame_period_us: 0, ..Configuration::DEFAULT };
+    let Some(buffers) = singleton!(: PaperBuffers = PaperBuffers::new()) else { exit::failure() };
+    let mut app = PaperApp::<_, _>::new(board, scanner, configuration, buffers);
+    // SAFETY: nobody else takes them.
+    let mut slots = unsafe { Slot::take() };
+    app.run(&mut slots);
+    info!("restarting");
+    SCB::sys_reset()
+}
