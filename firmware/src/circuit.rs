@@ -4,6 +4,8 @@
 //! Readings of the paper's sensor are near 60 Ω, and its 18 columns together load a row with 3.3 Ω:
 //! what lies in series with a row is never small, so both circuits correct for it.
 
+use model_core::Frame;
+
 /// Currents below so many counts are none: the reading is open.
 pub const NO_CURRENT_COUNTS: f32 = 4.0;
 
@@ -25,6 +27,12 @@ pub trait Circuit<const COLS: usize> {
         idle: &[f32; COLS],
         full_scale_counts: u16,
     ) -> [f32; COLS];
+
+    /// Takes out of a whole `frame` what its rows did to each other, as far as that is known. Does
+    /// nothing unless a circuit says otherwise.
+    fn correct<const ROWS: usize>(&self, frame: &mut Frame<ROWS, COLS>) {
+        let _ = frame;
+    }
 }
 
 /// The divider: the active row at the reference voltage, idle rows floating, every column to
@@ -88,7 +96,8 @@ impl<const COLS: usize> Circuit<COLS> for Divider<COLS> {
 /// V_out = V_b + R_f·I, and I = V_d/R. No current flows between wires at one potential, so the
 /// other rows do not disturb (D'Alessio, Sensors and Actuators A 72, 1999). The idle sample takes
 /// out V_b and the op-amp's offset exactly; the row's own drop V_d − R_s·ΣI is known because all its
-/// columns are measured.
+/// columns are measured. A lead in series with a column lets the idle rows feed it: it divides all
+/// currents of the column by 1 + s·Σ1/R, which [`correct`](Circuit::correct) takes back.
 ///
 /// ```
 /// use firmware::circuit::{Circuit, ZeroPotential};
@@ -141,10 +150,29 @@ impl<const COLS: usize> Circuit<COLS> for ZeroPotential<COLS> {
         let across = self.drive_v - self.row_source_ohm * row_current(&current);
         let mut ohm = current;
         let samples = sampled.iter().zip(idle);
-        for ((place, (n, idle)), series) in ohm.iter_mut().zip(samples).zip(&self.series_ohm) {
-            *place = reading(*n, n - idle, full_scale_counts, across / *place - series);
+        for (place, (n, idle)) in ohm.iter_mut().zip(samples) {
+            *place = reading(*n, n - idle, full_scale_counts, across / *place);
         }
         ohm
+    }
+
+    /// By R·(1 − s·Σ1/R), the sum over the column's rows; a row that was not measured counts as
+    /// the mean of the others.
+    fn correct<const ROWS: usize>(&self, frame: &mut Frame<ROWS, COLS>) {
+        let rows = &mut frame.row_column_resistance_ohm;
+        for (column, series) in self.series_ohm.iter().enumerate() {
+            let readings = rows.iter().filter_map(|row| row.get(column));
+            let measured = readings.filter(|ohm| **ohm > 0.0); // neither NaN nor short
+            let (count, sum_s) =
+                measured.fold((0_usize, 0.0), |(count, sum), ohm| (count + 1, sum + 1.0 / ohm));
+            if count > 0 {
+                let factor = 1.0 - series * (sum_s * (ROWS as f32 / count as f32));
+                let readings = rows.iter_mut().filter_map(|row| row.get_mut(column));
+                readings
+                    .filter(|ohm| !ohm.is_nan())
+                    .for_each(|ohm| *ohm = (*ohm * factor).max(0.0));
+            }
+        }
     }
 }
 
@@ -232,7 +260,10 @@ mod tests {
             // The divider subtracts two voltages that differ by a tenth: fewer digits are left.
             assert_close(&divider.row_ohm(&counts, &[f32::NAN; 18], 4095), &row(), 1e-5);
             let [sampled, idle] = zero_potential_counts(&circuit, &row());
-            assert_close(&circuit.row_ohm(&sampled, &idle, 4095), &row(), 2e-6);
+            let ohm = circuit.row_ohm(&sampled, &idle, 4095);
+            let mut frame = Frame { row_column_resistance_ohm: [ohm] };
+            circuit.correct(&mut frame);
+            assert_close(&frame.row_column_resistance_ohm[0], &row(), 2e-6);
         }
     }
 
@@ -283,8 +314,39 @@ mod tests {
     }
 
     #[test]
+    fn a_columns_lead_is_taken_out_of_all_its_rows() {
+        // One column of two rows, 50 and 60 Ω, behind 0.5 Ω: all its currents are smaller by
+        // 1 + 0.5·(1/50 + 1/60).
+        let circuit = ZeroPotential::<1> { series_ohm: [0.5], ..ZeroPotential::TYPICAL };
+        let factor = 1.0 + 0.5 * (1.0 / 50.0 + 1.0 / 60.0);
+        let read = |rows| Frame::<3, 1> { row_column_resistance_ohm: rows };
+        // A missing row counts as the mean of the others: here as one of 54.5 Ω that is there.
+        let third = 2.0 / (1.0 / 50.0 + 1.0 / 60.0);
+        let factor_of_three = factor + 0.5 / third;
+        let mut frame = read([[50.0 * factor_of_three], [60.0 * factor_of_three], [f32::NAN]]);
+        circuit.correct(&mut frame);
+        let [[first], [second], [missing]] = frame.row_column_resistance_ohm;
+        assert!((first - 50.0).abs() < 1e-4 && (second - 60.0).abs() < 1e-4, "{frame:?}");
+        assert!(missing.is_nan());
+        // An open row counts, with no current; a short stays one.
+        let mut frame = read([[50.0 * factor], [60.0 * factor], [f32::INFINITY]]);
+        circuit.correct(&mut frame);
+        let [[first], [second], [open]] = frame.row_column_resistance_ohm;
+        assert!((first - 50.0).abs() < 1e-4 && (second - 60.0).abs() < 1e-4, "{frame:?}");
+        assert_eq!(open, f32::INFINITY);
+        let mut frame = read([[f32::NAN], [0.0], [f32::NAN]]);
+        circuit.correct(&mut frame);
+        let [[missing], [short], _] = frame.row_column_resistance_ohm;
+        assert!(missing.is_nan() && short == 0.0);
+    }
+
+    #[test]
     fn a_negative_resistance_is_a_short() {
-        let circuit = ZeroPotential::<1> { series_ohm: [100.0], ..ZeroPotential::TYPICAL };
-        assert_eq!(circuit.row_ohm(&[3000.0], &[250.0], 4095), [0.0]);
+        let divider = Divider::<1> { series_ohm: [1000.0], ..Divider::TYPICAL };
+        assert_eq!(divider.row_ohm(&[3000.0], &[250.0], 4095), [0.0]);
+        let circuit = ZeroPotential::<1> { series_ohm: [1000.0], ..ZeroPotential::TYPICAL };
+        let mut frame = Frame { row_column_resistance_ohm: [[60.0]] };
+        circuit.correct(&mut frame);
+        assert_eq!(frame.row_column_resistance_ohm, [[0.0]]);
     }
 }

@@ -4,6 +4,7 @@ pub mod decode;
 pub mod eval;
 pub mod forward;
 pub mod inspect;
+pub mod readout;
 pub mod run;
 pub mod synth;
 pub mod table1;

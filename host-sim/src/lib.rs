@@ -46,5 +46,6 @@ pub mod sensor;
 pub mod spread;
 pub mod synth;
 pub mod train;
+pub mod virtual_hardware;
 
 pub use error::{Error, Result};

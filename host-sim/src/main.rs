@@ -7,7 +7,7 @@ use host_sim::Result;
 
 mod commands;
 
-use commands::{Common, decode, eval, forward, inspect, run, synth, table1, train};
+use commands::{Common, decode, eval, forward, inspect, readout, run, synth, table1, train};
 
 /// Simulate, train and evaluate resistive tactile sensors; write weight blobs for the device.
 ///
@@ -32,6 +32,7 @@ enum Command {
     Eval(eval::Arguments),
     Inspect(inspect::Arguments),
     Table1(table1::Arguments),
+    Readout(readout::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -46,6 +47,7 @@ fn main() -> ExitCode {
         Command::Eval(arguments) => eval::execute(&arguments, &cli.common),
         Command::Inspect(arguments) => inspect::execute(&arguments, &cli.common),
         Command::Table1(arguments) => table1::execute(&arguments, &cli.common),
+        Command::Readout(arguments) => readout::execute(&arguments, &cli.common),
     };
     report(outcome)
 }

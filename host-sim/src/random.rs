@@ -22,6 +22,10 @@ pub enum Purpose {
     Centres = 4,
     /// Assignment of samples to folds.
     Folds = 5,
+    /// Offsets of a readout's op-amps.
+    OpAmpOffset = 6,
+    /// Noise of a readout's converter.
+    AdcNoise = 7,
 }
 
 /// Which set of frames draws are for. Training and test frames are independent.

@@ -7,7 +7,7 @@ use super::{ColumnSampler, FrameSource, RowDrive, ScanReport, ScanSettings};
 use crate::circuit::Circuit;
 
 /// Scans a sensor: release all rows; sample every column idle, if the circuit needs it; then row
-/// by row drive, settle, sample every column, convert; release.
+/// by row drive, settle, sample every column, convert; release; correct the whole frame.
 ///
 /// The rows are released at the end whatever failed before. RAM: its parts, and on the stack three
 /// numbers a column.
@@ -87,6 +87,7 @@ where
             }
         }
         self.release(&mut report);
+        self.circuit.correct(frame);
         report
     }
 }
