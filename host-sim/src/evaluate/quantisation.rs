@@ -39,12 +39,12 @@ pub fn reading_bound_ohm(circuit: Circuit, ohm: f64, bits: u8) -> f64 {
     let half = 0.5 * f64::from(1_u32 << (12 - bits));
     let (largest_counts, bound_ohm) = match circuit {
         Circuit::Divider => {
-            let reference_ohm = f64::from(Divider::<1>::TYPICAL.reference_ohm[0]);
+            let reference_ohm = f64::from(Divider::<1, 1>::TYPICAL.reference_ohm[0]);
             let counts = COUNTS * reference_ohm / (reference_ohm + ohm);
             (counts, (reference_ohm + ohm) * half / (counts - half))
         }
         Circuit::ZeroPotential => {
-            let typical = ZeroPotential::<1>::TYPICAL;
+            let typical = ZeroPotential::<1, 1>::TYPICAL;
             let drive = f64::from(typical.drive_v) / f64::from(typical.reference_v) * COUNTS;
             let counts = drive * f64::from(typical.feedback_ohm[0]) / ohm;
             // The sample and the idle sample.

@@ -10,7 +10,7 @@ use crate::scene::{Circuit, Readout};
 /// A node of no resistance conducts no more than this.
 const MOST_CONDUCTANCE_S: f64 = 1e6;
 
-const ZERO_POTENTIAL: ZeroPotential<1> = ZeroPotential::TYPICAL;
+const ZERO_POTENTIAL: ZeroPotential<1, 1> = ZeroPotential::TYPICAL;
 
 /// The sensor's network and the circuit around it.
 #[derive(Debug)]
@@ -81,7 +81,7 @@ impl Analogue {
     }
 
     fn divider_v(&self, active: Option<usize>) -> [f64; COLUMNS] {
-        let reference_ohm = f64::from(Divider::<1>::TYPICAL.reference_ohm[0]);
+        let reference_ohm = f64::from(Divider::<1, 1>::TYPICAL.reference_ohm[0]);
         if !self.cross_talk {
             // Every reading a circuit of its own.
             return std::array::from_fn(|k| {

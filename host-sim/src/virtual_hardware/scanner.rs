@@ -48,8 +48,8 @@ impl VirtualBoard {
     /// The firmware's scanner for this board's parts, calibrated with `series`.
     #[must_use]
     pub fn scanner(&self, series: SeriesResistance) -> FrameScanner {
-        let SeriesResistance { row_source_ohm, column_ohm } = series;
-        let series_ohm = [column_ohm; COLUMNS];
+        let row_source_ohm = [series.row_source_ohm; ROWS];
+        let series_ohm = [series.column_ohm; COLUMNS];
         match self.readout().circuit.unwrap_or_default() {
             scene::Circuit::Divider => {
                 self.with_circuit(Divider { row_source_ohm, series_ohm, ..Divider::TYPICAL })
@@ -61,7 +61,7 @@ impl VirtualBoard {
         }
     }
 
-    fn with_circuit(&self, circuit: impl Circuit<COLUMNS> + 'static) -> FrameScanner {
+    fn with_circuit(&self, circuit: impl Circuit<ROWS, COLUMNS> + 'static) -> FrameScanner {
         match self.readout().sampler.unwrap_or_default() {
             Sampler::Mcp3208 => {
                 let chips: [_; 3] = array::from_fn(|chip| self.spi(chip));
@@ -77,7 +77,7 @@ impl VirtualBoard {
 
     fn with_sampler(
         &self,
-        circuit: impl Circuit<COLUMNS> + 'static,
+        circuit: impl Circuit<ROWS, COLUMNS> + 'static,
         sampler: impl ColumnSampler + 'static,
     ) -> FrameScanner {
         match self.readout().row_drive.unwrap_or_default() {
@@ -100,7 +100,7 @@ impl VirtualBoard {
 
     fn with_drive(
         &self,
-        circuit: impl Circuit<COLUMNS> + 'static,
+        circuit: impl Circuit<ROWS, COLUMNS> + 'static,
         sampler: impl ColumnSampler + 'static,
         drive: impl RowDrive + 'static,
     ) -> FrameScanner {

@@ -28,8 +28,11 @@ fn scan(board: &VirtualBoard, ohm: &[f64], settings: ScanSettings) -> (Vec<f64>,
 
 /// The largest relative error of a scan with the board's own settings, which must succeed.
 fn worst_error(readout: Readout) -> f64 {
-    let board = board(readout);
-    let (readings, report) = scan(&board, &ohm(), board.scan_settings());
+    worst_error_on(&board(readout))
+}
+
+fn worst_error_on(board: &VirtualBoard) -> f64 {
+    let (readings, report) = scan(board, &ohm(), board.scan_settings());
     board.check().unwrap();
     assert_eq!(report, ScanReport::default());
     readings.iter().zip(ohm()).map(|(r, ohm)| (r / ohm - 1.0).abs()).fold(0.0, f64::max)
@@ -40,16 +43,30 @@ fn with(circuit: Circuit) -> Readout {
 }
 
 #[test]
-fn every_drive_sampler_and_circuit_reads_the_resistances() {
+fn every_drive_sampler_and_circuit_reads_the_resistances_with_no_more_than_it_needs() {
     for circuit in Circuit::ALL {
-        for drive in [Drive::Pins, Drive::Multiplexer, Drive::ShiftRegister] {
-            for sampler in [Sampler::Mcp3208, Sampler::OnChip] {
-                let parts =
-                    Readout { row_drive: Some(drive), sampler: Some(sampler), ..with(circuit) };
-                let worst = worst_error(parts);
+        // Pins set to release all rows and to drive one.
+        for (drive, release, select) in [
+            (Drive::Pins, 8, 9),
+            (Drive::Multiplexer, 1, 5),
+            (Drive::ShiftRegister, 26, 26), // the latch twice; eight times clock, data, clock
+        ] {
+            // Pins set for a sample: three multiplexers off, three address lines, one on.
+            for (sampler, of_sample) in [(Sampler::Mcp3208, 0), (Sampler::OnChip, 7)] {
+                let (row_drive, sampler) = (Some(drive), Some(sampler));
+                let board = board(Readout { row_drive, sampler, ..with(circuit) });
+                let worst = worst_error_on(&board);
                 // Half a count is up to 0.15 % of a reading by the divider, 0.06 % by the other.
-                let most = if circuit == Circuit::Divider { 1.5e-3 } else { 6e-4 };
+                let (most, steps) =
+                    if circuit == Circuit::Divider { (1.5e-3, 8) } else { (6e-4, 9) };
                 assert!((1e-5..most).contains(&worst), "{drive:?} {sampler:?}: {worst}");
+
+                let used = board.transactions();
+                let samples = steps * 18;
+                assert_eq!(used.pins_set, 2 * release + 8 * select + samples * of_sample);
+                assert_eq!(used.transfers + used.conversions, samples);
+                assert_eq!(used.conversions == 0, of_sample == 0);
+                assert_eq!((used.waits, board.active_row()), (steps, None));
             }
         }
     }
