@@ -4,6 +4,8 @@
 //! Readings of the paper's sensor are near 60 Ω, and its 18 columns together load a row with 3.3 Ω:
 //! what lies in series with a row is never small, so both circuits correct for it.
 
+use model_core::{Frame, RowWire};
+
 /// Currents below so many counts are none: the reading is open.
 pub const NO_CURRENT_COUNTS: f32 = 4.0;
 
@@ -12,19 +14,45 @@ pub const NO_CURRENT_COUNTS: f32 = 4.0;
 /// What becomes of a reading: NaN if its sample (or its idle sample) could not be taken;
 /// [`f32::INFINITY`] if no current flows (open); 0 if the sample is saturated or the reading below
 /// what can be measured (short).
-pub trait Circuit<const COLS: usize> {
+pub trait Circuit<const ROWS: usize, const COLS: usize> {
     /// Whether the circuit needs a sample of every column while all rows idle.
     const IDLE_SAMPLES: bool;
 
-    /// Readings in Ω of one row. `sampled` and `idle` are counts of every column, averaged, NaN
+    /// Readings in Ω of `row`. `sampled` and `idle` are counts of every column, averaged, NaN
     /// where none could be taken (`idle` is not looked at unless
     /// [`IDLE_SAMPLES`](Self::IDLE_SAMPLES)); `full_scale_counts` is the converter's largest count.
     fn row_ohm(
         &self,
+        row: RowWire,
         sampled: &[f32; COLS],
         idle: &[f32; COLS],
         full_scale_counts: u16,
     ) -> [f32; COLS];
+
+    /// Takes out of a whole `frame` what its rows did to each other, as far as that is known. Does
+    /// nothing unless a circuit says otherwise.
+    fn correct(&self, frame: &mut Frame<ROWS, COLS>) {
+        let _ = frame;
+    }
+}
+
+/// By reference: the constants may stay in flash.
+impl<C: Circuit<ROWS, COLS>, const ROWS: usize, const COLS: usize> Circuit<ROWS, COLS> for &C {
+    const IDLE_SAMPLES: bool = C::IDLE_SAMPLES;
+
+    fn row_ohm(
+        &self,
+        row: RowWire,
+        sampled: &[f32; COLS],
+        idle: &[f32; COLS],
+        full_scale_counts: u16,
+    ) -> [f32; COLS] {
+        C::row_ohm(self, row, sampled, idle, full_scale_counts)
+    }
+
+    fn correct(&self, frame: &mut Frame<ROWS, COLS>) {
+        C::correct(self, frame);
+    }
 }
 
 /// The divider: the active row at the reference voltage, idle rows floating, every column to
@@ -36,32 +64,37 @@ pub trait Circuit<const COLS: usize> {
 ///
 /// ```
 /// use firmware::circuit::{Circuit, Divider};
-/// let divider = Divider::<1> { row_source_ohm: 0.0, ..Divider::TYPICAL };
+/// use model_core::RowWire;
+/// let divider = Divider::<1, 1> { row_source_ohm: [0.0], ..Divider::TYPICAL };
 /// // 470 Ω below 58.75 Ω: eight ninths of 4096.
-/// let ohm = divider.row_ohm(&[4096.0 * 8.0 / 9.0], &[f32::NAN], 4095);
+/// let ohm = divider.row_ohm(RowWire(0), &[4096.0 * 8.0 / 9.0], &[f32::NAN], 4095);
 /// assert!((ohm[0] - 58.75).abs() < 1e-3);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Divider<const COLS: usize> {
-    /// Between the reference voltage and a row-wire: switch and lead.
-    pub row_source_ohm: f32,
+pub struct Divider<const ROWS: usize, const COLS: usize> {
+    /// Between the reference voltage and each row-wire: switch and lead.
+    pub row_source_ohm: [f32; ROWS],
     /// From each column to ground.
     pub reference_ohm: [f32; COLS],
     /// In series with each column, not part of the sensor.
     pub series_ohm: [f32; COLS],
 }
 
-impl<const COLS: usize> Divider<COLS> {
-    /// 470 Ω: 6 mA a column and 112 mA a row at 3.3 V; a switch of 0.3 Ω.
-    pub const TYPICAL: Self =
-        Self { row_source_ohm: 0.3, reference_ohm: [470.0; COLS], series_ohm: [0.0; COLS] };
+impl<const ROWS: usize, const COLS: usize> Divider<ROWS, COLS> {
+    /// 470 Ω: 6 mA a column and 112 mA a row at 3.3 V; a switch of 0.26 Ω.
+    pub const TYPICAL: Self = Self {
+        row_source_ohm: [0.26; ROWS],
+        reference_ohm: [470.0; COLS],
+        series_ohm: [0.0; COLS],
+    };
 }
 
-impl<const COLS: usize> Circuit<COLS> for Divider<COLS> {
+impl<const ROWS: usize, const COLS: usize> Circuit<ROWS, COLS> for Divider<ROWS, COLS> {
     const IDLE_SAMPLES: bool = false;
 
     fn row_ohm(
         &self,
+        row: RowWire,
         sampled: &[f32; COLS],
         _idle: &[f32; COLS],
         full_scale_counts: u16,
@@ -72,7 +105,7 @@ impl<const COLS: usize> Circuit<COLS> for Divider<COLS> {
         for ((i, n), r) in current.iter_mut().zip(sampled).zip(&self.reference_ohm) {
             *i = n / counts / r;
         }
-        let row = 1.0 - self.row_source_ohm * row_current(&current);
+        let row = 1.0 - voltage_drop(&self.row_source_ohm, row, &current);
         let mut ohm = current;
         for ((place, n), series) in ohm.iter_mut().zip(sampled).zip(&self.series_ohm) {
             let across = row - n / counts;
@@ -88,46 +121,49 @@ impl<const COLS: usize> Circuit<COLS> for Divider<COLS> {
 /// V_out = V_b + R_f·I, and I = V_d/R. No current flows between wires at one potential, so the
 /// other rows do not disturb (D'Alessio, Sensors and Actuators A 72, 1999). The idle sample takes
 /// out V_b and the op-amp's offset exactly; the row's own drop V_d − R_s·ΣI is known because all its
-/// columns are measured.
+/// columns are measured. A lead in series with a column lets the idle rows feed it: it divides all
+/// currents of the column by 1 + s·Σ1/R, which [`correct`](Circuit::correct) takes back.
 ///
 /// ```
 /// use firmware::circuit::{Circuit, ZeroPotential};
-/// let circuit = ZeroPotential::<1> { row_source_ohm: 0.0, ..ZeroPotential::TYPICAL };
+/// use model_core::RowWire;
+/// let circuit = ZeroPotential::<1, 1> { row_source_ohm: [0.0], ..ZeroPotential::TYPICAL };
 /// // 0.2 V across 62.5 Ω drive 3.2 mA through 560 Ω: 1.792 V above the idle 0.2 V.
 /// let counts = |v: f32| v / 3.3 * 4096.0;
-/// let ohm = circuit.row_ohm(&[counts(1.992)], &[counts(0.2)], 4095);
+/// let ohm = circuit.row_ohm(RowWire(0), &[counts(1.992)], &[counts(0.2)], 4095);
 /// assert!((ohm[0] - 62.5).abs() < 1e-3);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ZeroPotential<const COLS: usize> {
+pub struct ZeroPotential<const ROWS: usize, const COLS: usize> {
     /// The converter's reference.
     pub reference_v: f32,
     /// How far the active row is pulled below the others.
     pub drive_v: f32,
-    /// Between the drive and a row-wire: switch and lead.
-    pub row_source_ohm: f32,
+    /// Between the drive and each row-wire: switch and lead.
+    pub row_source_ohm: [f32; ROWS],
     /// From each op-amp's output to its column.
     pub feedback_ohm: [f32; COLS],
     /// In series with each column, not part of the sensor.
     pub series_ohm: [f32; COLS],
 }
 
-impl<const COLS: usize> ZeroPotential<COLS> {
-    /// 0.2 V and 560 Ω: 3.6 mA a column, 65 mA a row, readings from 36 Ω; a switch of 0.3 Ω.
+impl<const ROWS: usize, const COLS: usize> ZeroPotential<ROWS, COLS> {
+    /// 0.2 V and 560 Ω: 3.6 mA a column, 65 mA a row, readings from 36 Ω; a switch of 0.26 Ω.
     pub const TYPICAL: Self = Self {
         reference_v: 3.3,
         drive_v: 0.2,
-        row_source_ohm: 0.3,
+        row_source_ohm: [0.26; ROWS],
         feedback_ohm: [560.0; COLS],
         series_ohm: [0.0; COLS],
     };
 }
 
-impl<const COLS: usize> Circuit<COLS> for ZeroPotential<COLS> {
+impl<const ROWS: usize, const COLS: usize> Circuit<ROWS, COLS> for ZeroPotential<ROWS, COLS> {
     const IDLE_SAMPLES: bool = true;
 
     fn row_ohm(
         &self,
+        row: RowWire,
         sampled: &[f32; COLS],
         idle: &[f32; COLS],
         full_scale_counts: u16,
@@ -138,13 +174,32 @@ impl<const COLS: usize> Circuit<COLS> for ZeroPotential<COLS> {
         for ((i, (n, idle)), r) in current.iter_mut().zip(samples).zip(&self.feedback_ohm) {
             *i = (n - idle) * volt_per_count / r;
         }
-        let across = self.drive_v - self.row_source_ohm * row_current(&current);
+        let across = self.drive_v - voltage_drop(&self.row_source_ohm, row, &current);
         let mut ohm = current;
         let samples = sampled.iter().zip(idle);
-        for ((place, (n, idle)), series) in ohm.iter_mut().zip(samples).zip(&self.series_ohm) {
-            *place = reading(*n, n - idle, full_scale_counts, across / *place - series);
+        for (place, (n, idle)) in ohm.iter_mut().zip(samples) {
+            *place = reading(*n, n - idle, full_scale_counts, across / *place);
         }
         ohm
+    }
+
+    /// By R·(1 − s·Σ1/R), the sum over the column's rows; a row that was not measured counts as
+    /// the mean of the others.
+    fn correct(&self, frame: &mut Frame<ROWS, COLS>) {
+        let rows = &mut frame.row_column_resistance_ohm;
+        for (column, series) in self.series_ohm.iter().enumerate() {
+            let readings = rows.iter().filter_map(|row| row.get(column));
+            let measured = readings.filter(|ohm| **ohm > 0.0); // neither NaN nor short
+            let (count, sum_s) =
+                measured.fold((0_usize, 0.0), |(count, sum), ohm| (count + 1, sum + 1.0 / ohm));
+            if count > 0 {
+                let factor = 1.0 - series * (sum_s * (ROWS as f32 / count as f32));
+                let readings = rows.iter_mut().filter_map(|row| row.get_mut(column));
+                readings
+                    .filter(|ohm| !ohm.is_nan())
+                    .for_each(|ohm| *ohm = (*ohm * factor).max(0.0));
+            }
+        }
     }
 }
 
@@ -153,11 +208,13 @@ fn counts_at_reference(full_scale_counts: u16) -> f32 {
     f32::from(full_scale_counts) + 1.0
 }
 
-/// Sum of a row's currents; a column that could not be sampled counts as the mean of the others.
-fn row_current(current: &[f32]) -> f32 {
+/// Voltage that a `row`'s source takes: R_s·ΣI. A column that could not be sampled counts as the
+/// mean of the others.
+fn voltage_drop(row_source_ohm: &[f32], row: RowWire, current: &[f32]) -> f32 {
+    let source_ohm = row_source_ohm.get(row.0).copied().unwrap_or(0.0);
     let taken = current.iter().filter(|i| !i.is_nan());
     let (count, sum) = taken.fold((0_usize, 0.0), |(count, sum), i| (count + 1, sum + i));
-    if count == 0 { 0.0 } else { sum * (current.len() as f32 / count as f32) }
+    if count == 0 { 0.0 } else { source_ohm * sum * (current.len() as f32 / count as f32) }
 }
 
 /// `ohm`, unless the sample or the counts due to current say otherwise.
@@ -180,8 +237,8 @@ mod tests {
     const COUNTS: f64 = 4096.0;
 
     /// Counts, unrounded, of a row that is read by `divider` alone (no other row is there).
-    fn divider_counts(divider: &Divider<18>, ohm: &[f64; 18]) -> [f32; 18] {
-        let source = f64::from(divider.row_source_ohm);
+    fn divider_counts(divider: &Divider<2, 18>, ohm: &[f64; 18]) -> [f32; 18] {
+        let source = f64::from(divider.row_source_ohm[1]);
         let branch = |k: usize| {
             ohm[k] + f64::from(divider.series_ohm[k]) + f64::from(divider.reference_ohm[k])
         };
@@ -193,10 +250,10 @@ mod tests {
     }
 
     /// Counts, unrounded, of a row and of idle columns for `circuit`.
-    fn zero_potential_counts(circuit: &ZeroPotential<18>, ohm: &[f64; 18]) -> [[f32; 18]; 2] {
+    fn zero_potential_counts(circuit: &ZeroPotential<2, 18>, ohm: &[f64; 18]) -> [[f32; 18]; 2] {
         let branch = |k: usize| ohm[k] + f64::from(circuit.series_ohm[k]);
         let load: f64 = (0..18).map(|k| 1.0 / branch(k)).sum();
-        let row = f64::from(circuit.drive_v) / (1.0 + f64::from(circuit.row_source_ohm) * load);
+        let row = f64::from(circuit.drive_v) / (1.0 + f64::from(circuit.row_source_ohm[1]) * load);
         let idle: [f64; 18] = core::array::from_fn(|k| 250.0 + 3.0 * k as f64);
         let sampled = |k: usize| {
             let above_v = f64::from(circuit.feedback_ohm[k]) * row / branch(k);
@@ -217,11 +274,11 @@ mod tests {
     }
 
     #[test]
-    fn both_circuits_return_the_resistances_whatever_the_source_and_each_columns_parts() {
+    fn both_circuits_return_the_resistances_whatever_each_rows_source_and_each_columns_parts() {
         for source_ohm in [0.0, 0.3, 5.0] {
-            let mut divider = Divider { row_source_ohm: source_ohm, ..Divider::TYPICAL };
+            let mut divider = Divider { row_source_ohm: [9.0, source_ohm], ..Divider::TYPICAL };
             let mut circuit =
-                ZeroPotential { row_source_ohm: source_ohm, ..ZeroPotential::TYPICAL };
+                ZeroPotential { row_source_ohm: [9.0, source_ohm], ..ZeroPotential::TYPICAL };
             for k in 0..18 {
                 divider.reference_ohm[k] += k as f32;
                 divider.series_ohm[k] = 0.1 * k as f32;
@@ -230,18 +287,27 @@ mod tests {
             }
             let counts = divider_counts(&divider, &row());
             // The divider subtracts two voltages that differ by a tenth: fewer digits are left.
-            assert_close(&divider.row_ohm(&counts, &[f32::NAN; 18], 4095), &row(), 1e-5);
+            assert_close(
+                &divider.row_ohm(RowWire(1), &counts, &[f32::NAN; 18], 4095),
+                &row(),
+                1e-5,
+            );
             let [sampled, idle] = zero_potential_counts(&circuit, &row());
-            assert_close(&circuit.row_ohm(&sampled, &idle, 4095), &row(), 2e-6);
+            let ohm = circuit.row_ohm(RowWire(1), &sampled, &idle, 4095);
+            // The other row is open: it feeds no column.
+            let rows = [[f32::INFINITY; 18], ohm];
+            let mut frame = Frame { row_column_resistance_ohm: rows };
+            circuit.correct(&mut frame);
+            assert_close(&frame.row_column_resistance_ohm[1], &row(), 2e-6);
         }
     }
 
     #[test]
     fn an_uncorrected_source_reads_far_too_high() {
-        let circuit = ZeroPotential { row_source_ohm: 0.3, ..ZeroPotential::TYPICAL };
+        let circuit = ZeroPotential { row_source_ohm: [9.0, 0.3], ..ZeroPotential::TYPICAL };
         let [sampled, idle] = zero_potential_counts(&circuit, &row());
-        let uncorrected = ZeroPotential { row_source_ohm: 0.0, ..circuit };
-        let ohm = uncorrected.row_ohm(&sampled, &idle, 4095);
+        let uncorrected = ZeroPotential { row_source_ohm: [0.0; 2], ..circuit };
+        let ohm = uncorrected.row_ohm(RowWire(1), &sampled, &idle, 4095);
         // 0.3 Ω against the 3.3 Ω of 18 columns.
         let excess = f64::from(ohm[0]) / row()[0] - 1.0;
         assert!((0.08..0.1).contains(&excess), "{excess}");
@@ -249,21 +315,21 @@ mod tests {
 
     #[test]
     fn open_short_and_missing_have_values_of_their_own_and_spare_the_others() {
-        let circuit = ZeroPotential { row_source_ohm: 0.0, ..ZeroPotential::TYPICAL };
+        let circuit = ZeroPotential { row_source_ohm: [0.0; 2], ..ZeroPotential::TYPICAL };
         let [mut sampled, idle] = zero_potential_counts(&circuit, &row());
         (sampled[0], sampled[1], sampled[2]) = (f32::NAN, 4095.0, idle[2]);
         sampled[4] = idle[4] - 3.0; // noise may go below idle
         let mut no_idle = idle;
         no_idle[3] = f32::NAN;
-        let ohm = circuit.row_ohm(&sampled, &no_idle, 4095);
+        let ohm = circuit.row_ohm(RowWire(1), &sampled, &no_idle, 4095);
         assert!(ohm[0].is_nan() && ohm[3].is_nan());
         assert_eq!((ohm[1], ohm[2], ohm[4]), (0.0, f32::INFINITY, f32::INFINITY));
         assert!((f64::from(ohm[5]) / row()[5] - 1.0).abs() < 2e-6);
 
-        let divider = Divider { row_source_ohm: 0.0, ..Divider::TYPICAL };
+        let divider = Divider { row_source_ohm: [0.0; 2], ..Divider::TYPICAL };
         let mut counts = divider_counts(&divider, &row());
         (counts[0], counts[1], counts[2]) = (f32::NAN, 4095.0, 0.0);
-        let ohm = divider.row_ohm(&counts, &idle, 4095);
+        let ohm = divider.row_ohm(RowWire(1), &counts, &idle, 4095);
         assert!(ohm[0].is_nan());
         assert_eq!((ohm[1], ohm[2]), (0.0, f32::INFINITY));
         assert!((f64::from(ohm[5]) / row()[5] - 1.0).abs() < 1e-5);
@@ -271,10 +337,10 @@ mod tests {
 
     #[test]
     fn a_missing_column_hardly_disturbs_the_correction_of_the_others() {
-        let circuit = ZeroPotential { row_source_ohm: 0.3, ..ZeroPotential::TYPICAL };
+        let circuit = ZeroPotential { row_source_ohm: [9.0, 0.3], ..ZeroPotential::TYPICAL };
         let [mut sampled, idle] = zero_potential_counts(&circuit, &row());
         sampled[0] = f32::NAN;
-        let ohm = circuit.row_ohm(&sampled, &idle, 4095);
+        let ohm = circuit.row_ohm(RowWire(1), &sampled, &idle, 4095);
         // The smallest of the row was taken for the mean of the others: an eighth of one in 18.
         for (ohm, expected) in ohm.iter().zip(row()).skip(1) {
             let error = (f64::from(*ohm) / expected - 1.0).abs();
@@ -283,8 +349,39 @@ mod tests {
     }
 
     #[test]
+    fn a_columns_lead_is_taken_out_of_all_its_rows() {
+        // One column of two rows, 50 and 60 Ω, behind 0.5 Ω: all its currents are smaller by
+        // 1 + 0.5·(1/50 + 1/60).
+        let circuit = ZeroPotential::<3, 1> { series_ohm: [0.5], ..ZeroPotential::TYPICAL };
+        let factor = 1.0 + 0.5 * (1.0 / 50.0 + 1.0 / 60.0);
+        let read = |rows| Frame::<3, 1> { row_column_resistance_ohm: rows };
+        // A missing row counts as the mean of the others: here as one of 54.5 Ω that is there.
+        let third = 2.0 / (1.0 / 50.0 + 1.0 / 60.0);
+        let factor_of_three = factor + 0.5 / third;
+        let mut frame = read([[50.0 * factor_of_three], [60.0 * factor_of_three], [f32::NAN]]);
+        circuit.correct(&mut frame);
+        let [[first], [second], [missing]] = frame.row_column_resistance_ohm;
+        assert!((first - 50.0).abs() < 1e-4 && (second - 60.0).abs() < 1e-4, "{frame:?}");
+        assert!(missing.is_nan());
+        // An open row counts, with no current; a short stays one.
+        let mut frame = read([[50.0 * factor], [60.0 * factor], [f32::INFINITY]]);
+        circuit.correct(&mut frame);
+        let [[first], [second], [open]] = frame.row_column_resistance_ohm;
+        assert!((first - 50.0).abs() < 1e-4 && (second - 60.0).abs() < 1e-4, "{frame:?}");
+        assert_eq!(open, f32::INFINITY);
+        let mut frame = read([[f32::NAN], [0.0], [f32::NAN]]);
+        circuit.correct(&mut frame);
+        let [[missing], [short], _] = frame.row_column_resistance_ohm;
+        assert!(missing.is_nan() && short == 0.0);
+    }
+
+    #[test]
     fn a_negative_resistance_is_a_short() {
-        let circuit = ZeroPotential::<1> { series_ohm: [100.0], ..ZeroPotential::TYPICAL };
-        assert_eq!(circuit.row_ohm(&[3000.0], &[250.0], 4095), [0.0]);
+        let divider = Divider::<1, 1> { series_ohm: [1000.0], ..Divider::TYPICAL };
+        assert_eq!(divider.row_ohm(RowWire(0), &[3000.0], &[250.0], 4095), [0.0]);
+        let circuit = ZeroPotential::<1, 1> { series_ohm: [1000.0], ..ZeroPotential::TYPICAL };
+        let mut frame = Frame { row_column_resistance_ohm: [[60.0]] };
+        circuit.correct(&mut frame);
+        assert_eq!(frame.row_column_resistance_ohm, [[0.0]]);
     }
 }

@@ -6,6 +6,7 @@ pub mod eval;
 pub mod forward;
 pub mod inspect;
 pub mod link;
+pub mod readout;
 pub mod run;
 pub mod synth;
 pub mod table1;

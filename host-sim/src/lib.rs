@@ -2,7 +2,8 @@
 //!
 //! Data flows one way: [`scene`] → [`synth`] → [`dataset`] → [`train`] → [`model`] (the blob) →
 //! [`evaluate`] → [`report`]. Only this crate opens files; the `host-sim` binary is a thin shell
-//! over it. Inference is [`model_core`]'s, the same code that runs on the device.
+//! over it. Inference is [`model_core`]'s, the same code that runs on the device; the firmware's own
+//! readout runs on [`virtual_hardware`].
 //!
 //! ```
 //! use host_sim::infer::Kernel;
@@ -48,5 +49,6 @@ pub mod sensor;
 pub mod spread;
 pub mod synth;
 pub mod train;
+pub mod virtual_hardware;
 
 pub use error::{Error, Result};

@@ -7,7 +7,9 @@ use host_sim::Result;
 
 mod commands;
 
-use commands::{Common, decode, emulate, eval, forward, inspect, link, run, synth, table1, train};
+use commands::{
+    Common, decode, emulate, eval, forward, inspect, link, readout, run, synth, table1, train,
+};
 
 /// Simulate, train and evaluate resistive tactile sensors; write weight blobs for the device.
 ///
@@ -32,6 +34,7 @@ enum Command {
     Eval(eval::Arguments),
     Inspect(inspect::Arguments),
     Table1(table1::Arguments),
+    Readout(readout::Arguments),
     Emulate(emulate::Arguments),
     Link(link::Arguments),
 }
@@ -48,6 +51,7 @@ fn main() -> ExitCode {
         Command::Eval(arguments) => eval::execute(&arguments, &cli.common),
         Command::Inspect(arguments) => inspect::execute(&arguments, &cli.common),
         Command::Table1(arguments) => table1::execute(&arguments, &cli.common),
+        Command::Readout(arguments) => readout::execute(&arguments, &cli.common),
         Command::Emulate(arguments) => emulate::execute(&arguments, &cli.common),
         Command::Link(arguments) => link::execute(&arguments, &cli.common),
     };

@@ -167,7 +167,7 @@ impl LoadedModel {
     }
 
     /// The network that serves each row-wire.
-    fn row_networks(&self) -> Vec<Network<'_>> {
+    pub(crate) fn row_networks(&self) -> Vec<Network<'_>> {
         let model = self.model();
         let networks: Vec<Network<'_>> = model.networks().collect();
         let rows = 0..model.shape().rows;

@@ -22,8 +22,12 @@ pub enum Purpose {
     Centres = 4,
     /// Assignment of samples to folds.
     Folds = 5,
+    /// Offsets of a readout's op-amps.
+    OpAmpOffset = 6,
+    /// Noise of a readout's converter.
+    AdcNoise = 7,
     /// Damage that a device must survive.
-    Damage = 6,
+    Damage = 8,
 }
 
 /// Which set of frames draws are for. Training and test frames are independent.

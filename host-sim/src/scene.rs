@@ -12,9 +12,11 @@ use crate::sensor::{self, Axis, Sensor, Vector3};
 
 mod file;
 mod names;
+mod readout;
 mod validate;
 
 pub use names::deformation_names;
+pub use readout::{Circuit, Drive, Readout, Sampler};
 
 /// Scenes that are part of the program, by name.
 pub const EMBEDDED: [(&str, &str); 2] = [
@@ -39,6 +41,8 @@ pub struct Scene {
     pub noise: Noise,
     /// Row-wires that are read, from 0, ascending.
     pub read_rows: Vec<usize>,
+    /// How they are read.
+    pub readout: Readout,
     /// Which outputs are wanted.
     pub outputs: Outputs,
     /// How the model is trained.

@@ -68,7 +68,7 @@ impl OnChipAdc for Part {
     }
 }
 
-fn scan<D: RowDrive, S: ColumnSampler, C: Circuit<18>>(drive: D, sampler: S, circuit: C) {
+fn scan<D: RowDrive, S: ColumnSampler, C: Circuit<8, 18>>(drive: D, sampler: S, circuit: C) {
     let mut scanner = Scanner { drive, sampler, delay: Part, circuit };
     let settings = ScanSettings { settling_us: opaque(46), oversampling: opaque(2) };
     let mut frame = Frame::<8, 18>::missing();
@@ -84,7 +84,7 @@ fn scan<D: RowDrive, S: ColumnSampler, C: Circuit<18>>(drive: D, sampler: S, cir
 fn scan_with_every_sampler<D: RowDrive>(drive: impl Fn() -> D) {
     scan(drive(), Mcp3208s { chips: [Part; 3] }, opaque(ZeroPotential::TYPICAL));
     let adc = || MultiplexedAdc { adc: Part, address: [Part; 3], enable: [Part; 3] };
-    scan(drive(), adc(), opaque(Divider::TYPICAL));
+    scan(drive(), adc(), &opaque(Divider::TYPICAL));
     let adc = MultiplexedAdc { adc: Part, address: [Part; 4], enable: [Part; 2] };
     scan(
         drive(),

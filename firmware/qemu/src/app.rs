@@ -30,6 +30,9 @@ const ROW_DATA: u8 = 12;
 const ROW_CLOCK: u8 = 13;
 const ROW_LATCH: u8 = 14;
 
+/// Constants of the circuit, which stay in flash.
+static CIRCUIT: ZeroPotential<8, 18> = ZeroPotential::TYPICAL;
+
 /// A serial line with the clock, which all lines share.
 struct Line<'c> {
     uart: Uart,
@@ -110,7 +113,7 @@ fn main() -> ! {
         drive: ShiftRegister595::<_, 8> { data, clock: clock_pin, latch },
         sampler: Mcp3208s { chips: [0, 1, 2].map(|chip| remote.spi(chip)) },
         delay: remote.delay(),
-        circuit: ZeroPotential::TYPICAL,
+        circuit: &CIRCUIT,
     };
     let board = Board {
         line: Line { uart: Uart::first(), clock: &clock },

@@ -7,7 +7,7 @@ use super::{ColumnSampler, FrameSource, RowDrive, ScanReport, ScanSettings};
 use crate::circuit::Circuit;
 
 /// Scans a sensor: release all rows; sample every column idle, if the circuit needs it; then row
-/// by row drive, settle, sample every column, convert; release.
+/// by row drive, settle, sample every column, convert; release; correct the whole frame.
 ///
 /// The rows are released at the end whatever failed before. RAM: its parts, and on the stack three
 /// numbers a column.
@@ -19,7 +19,7 @@ pub struct Scanner<D, S, T, C> {
     pub sampler: S,
     /// Waits for a row to settle.
     pub delay: T,
-    /// Turns counts into Ω.
+    /// Turns counts into Ω; or a reference to what does.
     pub circuit: C,
 }
 
@@ -67,7 +67,7 @@ where
     D: RowDrive,
     S: ColumnSampler,
     T: DelayNs,
-    C: Circuit<COLS>,
+    C: Circuit<ROWS, COLS>,
 {
     fn scan(&mut self, settings: ScanSettings, frame: &mut Frame<ROWS, COLS>) -> ScanReport {
         let settings = settings.clamped();
@@ -78,15 +78,17 @@ where
             idle = self.sample_columns(settings, &mut report);
         }
         for (row, readings) in frame.row_column_resistance_ohm.iter_mut().enumerate() {
-            if self.drive.drive(RowWire(row)).is_ok() {
+            let row = RowWire(row);
+            if self.drive.drive(row).is_ok() {
                 let sampled = self.sample_columns(settings, &mut report);
-                *readings = self.circuit.row_ohm(&sampled, &idle, S::FULL_SCALE_COUNTS);
+                *readings = self.circuit.row_ohm(row, &sampled, &idle, S::FULL_SCALE_COUNTS);
             } else {
                 *readings = [f32::NAN; COLS];
                 count_failures(&mut report, COLS);
             }
         }
         self.release(&mut report);
+        self.circuit.correct(frame);
         report
     }
 }

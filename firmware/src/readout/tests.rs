@@ -303,7 +303,7 @@ const SETTINGS: ScanSettings = ScanSettings { settling_us: 46, oversampling: 4 }
 #[test]
 fn a_scan_does_what_it_must_and_no_more() {
     // Rows, and the idle samples of zero-potential scanning: so many waits and samples.
-    fn check<C: Circuit<3>>(circuit: C, steps: usize) {
+    fn check<C: Circuit<2, 3>>(circuit: C, steps: usize) {
         let record = Record::default();
         let mut scanner = scanner(&record, circuit);
         let mut frame = Frame::<2, 3>::missing();
@@ -327,13 +327,13 @@ fn a_scan_does_what_it_must_and_no_more() {
 #[test]
 fn readings_are_those_of_the_mean_counts() {
     let record = Record::default();
-    let circuit = Divider { row_source_ohm: 0.0, ..Divider::TYPICAL };
-    let mut scanner = scanner(&record, circuit);
+    let circuit = Divider { row_source_ohm: [0.0; 2], ..Divider::TYPICAL };
+    let mut scanner = scanner(&record, &circuit);
     let answer = |n: u16| [0, n.to_be_bytes()[0], n.to_be_bytes()[1]];
     record.0.borrow_mut().answers = [3600, 3601, 3603, 3604, 3000].map(answer).to_vec();
     let mut frame = Frame::<2, 3>::missing();
     scanner.scan(SETTINGS, &mut frame);
-    let expected = circuit.row_ohm(&[3602.0, 3000.0, 3000.0], &[f32::NAN; 3], 4095);
+    let expected = circuit.row_ohm(RowWire(0), &[3602.0, 3000.0, 3000.0], &[f32::NAN; 3], 4095);
     assert_eq!(frame.row_column_resistance_ohm[0], expected);
     assert!((expected[0] - 470.0 * (4096.0 / 3602.0 - 1.0)).abs() < 1e-3);
 }

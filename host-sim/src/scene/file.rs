@@ -2,7 +2,9 @@
 
 use serde::Deserialize;
 
-use super::{Deformation, Noise, Outputs, Scene, Sensor, Table1, Training, Vector3, sensor};
+use super::{
+    Deformation, Noise, Outputs, Readout, Scene, Sensor, Table1, Training, Vector3, sensor,
+};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -14,7 +16,7 @@ pub(super) struct SceneFile {
     deformation: Deformation,
     noise: Noise,
     #[serde(default)]
-    readout: ReadoutFile,
+    readout: Readout,
     outputs: Outputs,
     training: Training,
     table1: Option<Table1>,
@@ -33,13 +35,6 @@ struct SensorFile {
     stiffness_n_per_mm: Vector3,
     upper_electrodes_mm: Option<Vec<Vector3>>,
     lower_electrodes_mm: Option<Vec<Vector3>>,
-}
-
-#[derive(Deserialize, Default)]
-#[serde(deny_unknown_fields)]
-struct ReadoutFile {
-    /// From 1, as in column names; all rows if left out.
-    row_wires: Option<Vec<usize>>,
 }
 
 fn default_seed() -> u64 {
@@ -77,7 +72,8 @@ impl SceneFile {
             resistance_ohm_per_mm: s.resistance_ohm_per_mm,
             stiffness_n_per_mm: s.stiffness_n_per_mm,
         };
-        let read_rows = match self.readout.row_wires {
+        let mut readout = self.readout;
+        let read_rows = match readout.row_wires.take() {
             // Row 0 does not exist in a file; it becomes one that validation refuses.
             Some(rows) => rows.into_iter().map(|row| row.wrapping_sub(1)).collect(),
             None => (0..sensor.row_wires).collect(),
@@ -90,6 +86,7 @@ impl SceneFile {
             deformation: self.deformation,
             noise: self.noise,
             read_rows,
+            readout,
             outputs: self.outputs,
             training: self.training,
             table1: self.table1,

@@ -6,6 +6,7 @@ fn embedded_scenes_are_sound_and_named_as_they_are_called() {
         let scene = Scene::load(name).unwrap();
         assert_eq!(scene.name, name);
         assert_eq!(scene.read_rows, (0..8).collect::<Vec<_>>());
+        assert_eq!(scene.readout, Readout::default());
         assert_eq!(scene.full_scale(Axis::Z), 1.0);
         assert_eq!(scene.sensor, crate::sensor::tests::paper_sensor());
     }
@@ -49,4 +50,25 @@ fn forces_have_their_own_full_scale_and_values() {
     let outputs: Vec<f64> = scene.electrode_outputs([0.25, 9.0, 0.5]).collect();
     assert_eq!(outputs, [0.25, 1.0]);
     assert_eq!(scene.output_names()[1], "r1e1_fz_n");
+}
+
+#[test]
+fn a_readout_changes_nothing_that_is_synthesised() {
+    let read = "[readout]\nrow_wires = [2, 7]\ncircuit = \"divider\"\ncross_talk = true\n\
+                row_switch_ohm = 0.4\nadc_bits = 10\noversampling = 4\n\n[outputs]";
+    let text = EMBEDDED[1].1.replace("[outputs]", read);
+    let scene = Scene::parse("test", &text).unwrap();
+    assert_eq!(scene.read_rows, [1, 6]);
+    let expected = Readout {
+        circuit: Some(Circuit::Divider),
+        cross_talk: Some(true),
+        row_switch_ohm: Some(0.4),
+        adc_bits: Some(10),
+        oversampling: Some(4),
+        ..Readout::default()
+    };
+    assert_eq!(scene.readout, expected);
+    let plain = Scene { readout: Readout::default(), ..scene.clone() };
+    let frames = |scene| crate::synth::synthesise(scene, crate::random::Stream::Training, 20);
+    assert_eq!(frames(&scene), frames(&plain));
 }

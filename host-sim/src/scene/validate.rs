@@ -1,5 +1,7 @@
 //! What a scene must satisfy. Every message names the field, its value and the fix.
 
+use firmware::readout::ScanSettings;
+
 use super::{Deformation, Scene, Sensor, Table1, Training};
 use crate::spread::check_spread;
 
@@ -160,7 +162,40 @@ fn readout(scene: &Scene) -> Check {
     let listed = || rows.iter().map(|row| row.wrapping_add(1)).collect::<Vec<_>>();
     require(!rows.is_empty() && ascending && rows.iter().all(|row| *row < most), || {
         format!("readout.row_wires = {:?}: list rows from 1 to {most}, ascending", listed())
-    })
+    })?;
+    let r = &scene.readout;
+    let whole = |field: &str, value: Option<u32>, [low, high]: [u32; 2]| {
+        require(value.is_none_or(|value| (low..=high).contains(&value)), || {
+            let value = value.unwrap_or_default();
+            format!("readout.{field} = {value}: it must be from {low} to {high}")
+        })
+    };
+    let most_oversampling = ScanSettings::MOST_OVERSAMPLING.into();
+    whole("adc_bits", r.adc_bits.map(u32::from), [4, 12])?;
+    whole("oversampling", r.oversampling.map(u32::from), [1, most_oversampling])?;
+    whole("settling_us", r.settling_us, [0, ScanSettings::MOST_SETTLING_US])?;
+    for (field, value, most) in [
+        ("row_switch_ohm", r.row_switch_ohm, 1e3),
+        ("line_ohm", r.line_ohm, 1e3),
+        ("op_amp_offset_v", r.op_amp_offset_v, 0.1),
+        ("adc_noise_counts", r.adc_noise_counts, 100.0),
+        ("time_constant_us", r.time_constant_us, 1e3),
+    ] {
+        require(value.is_none_or(|value| (0.0..=most).contains(&value)), || {
+            let value = value.unwrap_or_default();
+            format!("readout.{field} = {value}: it must be from 0 to {most}")
+        })?;
+    }
+    for (field, value) in [("row_switch_ohm", r.row_switch_ohm), ("line_ohm", r.line_ohm)] {
+        let shared = value.unwrap_or_default();
+        require(shared == 0.0 || r.cross_talk == Some(true), || {
+            format!(
+                "readout.{field} = {shared}: what the readings of a wire share couples them; set \
+                 readout.cross_talk = true, or leave {field} out"
+            )
+        })?;
+    }
+    Ok(())
 }
 
 fn outputs(scene: &Scene) -> Check {

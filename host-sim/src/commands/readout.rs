@@ -1,0 +1,135 @@
+//! `readout`: what circuits do to readings, and to what is decoded from them.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use host_sim::evaluate::metrics::Errors;
+use host_sim::evaluate::readout::{self, ReadoutResult, Stage};
+use host_sim::model::{self, LoadedModel, Origin};
+use host_sim::progress::Progress;
+use host_sim::random::Stream;
+use host_sim::scene::{Circuit, Scene};
+use host_sim::train::{self, Options};
+use host_sim::virtual_hardware::VirtualBoard;
+use host_sim::{Error, Result, synth};
+
+use super::scene_argument::SceneArgument;
+use super::{Common, print};
+
+/// Scan frames of a scene through a virtual board, and decode them: divider against zero potential.
+///
+/// The firmware's own scanner runs on virtual pins and converters in front of a network of all wires.
+/// Faults come one after the other; what the scene's [readout] does not say is typical
+/// (docs/readout.md). The frames are free of the scene's noise.
+#[derive(Args)]
+#[command(after_help = "Example: host-sim readout press --frames 500")]
+pub struct Arguments {
+    #[command(flatten)]
+    scene: SceneArgument,
+    /// Frames to scan.
+    #[arg(short = 'n', long, value_name = "N", default_value_t = 200)]
+    frames: usize,
+    /// Weight blob of this scene, instead of training one.
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+}
+
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+    let scene = arguments.scene.load(common)?;
+    scene.check_frames("--frames", arguments.frames)?;
+    VirtualBoard::new(&scene)?;
+    let model = match &arguments.model {
+        Some(path) => read(path.clone(), &scene)?,
+        None => train(&scene)?,
+    };
+    let result = readout::measure(&scene, &model, arguments.frames)?;
+    if common.json { print::json(&result) } else { page_of(&result).print() }
+}
+
+fn read(path: PathBuf, scene: &Scene) -> Result<LoadedModel> {
+    let loaded = LoadedModel::read(&path)?;
+    let model = loaded.model();
+    let metadata = model.metadata();
+    let fits = metadata.input_names.iter().eq(scene.reading_names())
+        && metadata.output_names.iter().eq(scene.output_names());
+    if fits {
+        return Ok(loaded);
+    }
+    let message = format!(
+        "its columns are not those of scene {}; train one with `host-sim train` on this scene",
+        scene.name
+    );
+    Err(Error::Data { path, message })
+}
+
+fn train(scene: &Scene) -> Result<LoadedModel> {
+    let t = &scene.training;
+    let training = synth::synthesise(scene, Stream::Training, t.frames);
+    let options = Options::new(t.centres, t.spread, t.affine_tail, scene.seed);
+    let networks = train::train(&training, &options, &Progress::on_terminal())?;
+    let blob = model::encode(&networks, &training, &Origin::of_scene(scene))?;
+    LoadedModel::from_bytes("model.bin".as_ref(), &blob)
+}
+
+fn page_of(result: &ReadoutResult) -> print::Page {
+    let mut page = print::Page::default();
+    page.line(format_args!(
+        "{}: {} frames without noise, seed {}, model {}",
+        result.scene, result.frames, result.seed, result.model_crc
+    ));
+    page.line("error of readings: scanned/ideal − 1; RMSE: decoded against true\n");
+    let cells = |of_group: fn(&Errors) -> String, errors: &[Errors]| {
+        errors.iter().map(of_group).collect::<Vec<_>>().concat()
+    };
+    let header =
+        cells(|group| format!(" {:>13}", format!("{} RMSE", group.group)), &result.ideal_errors);
+    let rmse = |errors: &[Errors]| {
+        cells(|group| format!(" {:>10.4} {:<2}", group.rmse, group.unit), errors)
+    };
+    page.line(format_args!(
+        "{:<15} {:<31} {:>9} {:>9} {:>8}{header}",
+        "circuit", "simulated", "RMS", "largest", "missing"
+    ));
+    let without = |what: &str, errors: &[Errors]| {
+        format!("{:<15} {what:<31} {:>9} {:>9} {:>8}{}", "-", "-", "-", "-", rmse(errors))
+    };
+    page.line(without("ideal readings", &result.ideal_errors));
+    for line in &result.lines {
+        page.line(format_args!(
+            "{:<15} {:<31} {:>7.3} % {:>7.3} % {:>8}{}",
+            line.circuit.name(),
+            line.stage.name(),
+            line.readings.rms_percent,
+            line.readings.largest_percent,
+            line.readings.missing,
+            rmse(&line.errors)
+        ));
+    }
+    page.line(without("answering the mean", &result.mean_errors));
+    if let Some(conclusion) = conclusion(result) {
+        page.line(conclusion);
+    }
+    page
+}
+
+/// What the numbers say of compression, if they say it.
+fn conclusion(result: &ReadoutResult) -> Option<String> {
+    let z = |errors: &[Errors]| {
+        errors.iter().find(|errors| errors.group == "dz_mm").map(|errors| errors.rmse)
+    };
+    let of = |circuit, stage| result.line(circuit, stage).and_then(|line| z(&line.errors));
+    let divider = of(Circuit::Divider, Stage::Everything)?;
+    let zero_potential = of(Circuit::ZeroPotential, Stage::Everything)?;
+    let miscalibrated = of(Circuit::ZeroPotential, Stage::Miscalibrated)?;
+    let (ideal, mean) = (z(&result.ideal_errors)?, z(&result.mean_errors)?);
+    (divider > mean && zero_potential < mean).then(|| {
+        format!(
+            "\nWith all faults the divider decodes z with {:.1} times the error of the mean; zero \
+             potential with {:.2} times\nthat of ideal readings, but {:.1} times if its series \
+             resistance is known only to 10 %.",
+            divider / mean,
+            zero_potential / ideal,
+            miscalibrated / ideal
+        )
+    })
+}
