@@ -22,7 +22,7 @@ pub enum Differences {
     Accept,
 }
 
-/// Runs the programs of these names, or all, and compares what they log.
+/// Runs the programs of these names, or all, and compares what they log; shows it if they were named.
 pub fn run(names: &[&str], differences: Differences) -> Outcome {
     let all = programs(&root().join("firmware/qemu/src/bin"))?;
     let chosen = choose(&all, names)?;
@@ -32,7 +32,11 @@ pub fn run(names: &[&str], differences: Differences) -> Outcome {
     let mut failed = Vec::new();
     for program in &chosen {
         let name = name(program);
-        match check(program, differences) {
+        let output = qemu::run(&elf(&name));
+        if let (Ok(output), false) = (&output, names.is_empty()) {
+            print!("{output}");
+        }
+        match output.and_then(|output| check(program, &output, differences)) {
             Ok(()) => println!("ok      {name}"),
             Err(cause) => {
                 println!("FAILED  {name}: {cause}");
@@ -55,8 +59,7 @@ pub fn print_log(log: &str, image: Option<&str>) -> Outcome {
     Ok(())
 }
 
-fn check(program: &Path, differences: Differences) -> Outcome {
-    let output = qemu::run(&elf(&name(program)))?;
+fn check(program: &Path, output: &str, differences: Differences) -> Outcome {
     let beside = program.with_extension("out");
     if differences == Differences::Accept {
         return fs::write(&beside, output)
@@ -64,7 +67,7 @@ fn check(program: &Path, differences: Differences) -> Outcome {
     }
     let expected =
         fs::read_to_string(&beside).map_err(|cause| format!("{}: {cause}", beside.display()))?;
-    expected::compare(&expected, &output)
+    expected::compare(&expected, output)
 }
 
 /// Every program's source, by name.

@@ -22,7 +22,8 @@ Usage: cargo xtask COMMAND
                             and proves by linking that no panic is reachable there
   emulate [--accept] [NAME…]  runs the programs of these names, or all, of firmware/qemu/src/bin in
                             QEMU, and compares what they log and their exit status with the .out
-                            file beside them; --accept writes these files instead
+                            file beside them; --accept writes these files instead. Shows the logs
+                            of programs that are named
   log FILE [ELF]            prints a log that `host-sim emulate --log FILE` saved; ELF is the image
                             that wrote it, if it is another than that command's own
   size                      shows what flash and RAM the images take, and fails if that is more

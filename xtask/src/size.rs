@@ -111,3 +111,29 @@ fn measure(elf: &Path) -> Outcome<Size> {
         stack: address("_stack_start")?.saturating_sub(address("_stack_end")?),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: Size = Size {
+        vector_table: 1,
+        text: 20,
+        rodata: 300,
+        data: 4000,
+        bss: 50000,
+        uninit: 600_000,
+        stack: 7,
+    };
+
+    #[test]
+    fn variables_with_a_value_take_flash_and_ram() {
+        assert_eq!((SIZE.flash(), SIZE.ram()), (4321, 654_000));
+    }
+
+    #[test]
+    fn what_is_no_image_is_refused_by_name() {
+        let error = measure(Path::new(file!())).unwrap_err();
+        assert!(error.contains("size.rs: "), "{error}");
+    }
+}

@@ -59,7 +59,7 @@ impl Toolchain {
             format!(
                 "no toolchain for {TARGET}: the active one lacks it, and {cause}. Either\n  \
                  rustup target add {TARGET}\nor, on Debian,\n  \
-                 apt-get install rustc-web cargo-web rust-web-src"
+                 apt-get install rustc-web cargo-web rust-web-src rust-web-clippy"
             )
         })
     }

@@ -9,6 +9,7 @@ use stm32f4xx_hal::pac::{Peripherals, SPI2};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Config;
 use stm32f4xx_hal::spi::Spi;
+use stm32f4xx_hal::timer::SysDelay;
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
 use crate::{Clock, ResetCause, Serial, Slot};
@@ -17,8 +18,9 @@ use crate::{Clock, ResetCause, Serial, Slot};
 /// as fast again as it should be.
 const WATCHDOG_MS: u32 = 8000;
 
-/// An MCP3208 stands 1 MHz at 3.3 V; what the divider makes of this is 703 kHz.
-const SPI_HZ: u32 = 700_000;
+/// Clock of the converters' bus. An MCP3208 stands 1 MHz at 3.3 V, and the divider has powers of two:
+/// 45 MHz/64.
+pub const SPI_HZ: u32 = 703_125;
 
 /// One analogue-to-digital converter, an `embedded_hal::spi::SpiDevice`.
 pub type Converter = RefCellDevice<'static, Spi<SPI2>, ErasedPin<Output>, NoDelay>;
@@ -41,6 +43,8 @@ pub struct Board {
     pub serial: Serial,
     /// Microseconds since the start.
     pub clock: Clock,
+    /// Waits, by SysTick.
+    pub delay: SysDelay,
     /// Where models lie.
     pub slots: [Slot; 2],
     /// Runs already. Not fed for 8 s, it restarts the program.
@@ -54,6 +58,7 @@ impl Board {
     #[must_use]
     pub fn take() -> Option<Self> {
         let parts = Peripherals::take()?;
+        let core = cortex_m::Peripherals::take()?;
         let mut watchdog = IndependentWatchdog::new(parts.IWDG);
         watchdog.stop_on_debug(&parts.DBGMCU, true);
         watchdog.start(WATCHDOG_MS.millis());
@@ -90,6 +95,7 @@ impl Board {
             row_latch: gpioc.pc9.into_push_pull_output().erase(),
             serial,
             clock,
+            delay: core.SYST.delay(&rcc.clocks),
             slots: Slot::both(parts.FLASH),
             watchdog,
         })

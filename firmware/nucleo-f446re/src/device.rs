@@ -3,7 +3,7 @@
 use cortex_m_rt::entry;
 use defmt::{info, unwrap};
 use defmt_rtt as _;
-use nucleo_f446re::{Board, Clock};
+use nucleo_f446re::{Board, Clock, memory};
 use panic_probe as _;
 
 const BLINK_US: u64 = 500_000;
@@ -11,7 +11,7 @@ const BLINK_US: u64 = 500_000;
 #[entry]
 fn main() -> ! {
     let mut board = unwrap!(Board::take());
-    info!("started, cause {}", board.reset_cause);
+    info!("started, cause {}; {}", board.reset_cause, memory::Sections::linked());
 
     let mut toggle_at_us = board.clock.now_us();
     loop {

@@ -6,11 +6,13 @@
 
 mod board;
 mod clock;
+#[path = "../../qemu/src/memory.rs"]
+pub mod memory;
 mod reset;
 mod serial;
 mod slot;
 
-pub use board::{Board, Converter};
+pub use board::{Board, Converter, SPI_HZ};
 pub use clock::Clock;
 pub use reset::{ResetCause, restart};
 pub use serial::{BAUD, Serial};

@@ -10,9 +10,9 @@ pub enum ResetCause {
     Power,
     /// The program had stopped feeding the watchdog.
     Watchdog,
-    /// The program asked for it: [`restart`].
+    /// The program asked for it ([`restart`]), or a debugger.
     Software,
-    /// The black button, or the debugger.
+    /// The black button.
     Pin,
 }
 

@@ -8,6 +8,10 @@ use defmt_semihosting as _;
 
 use crate::exit;
 
+/// The most that one instruction pushes. It is taken back if it fails: the stack pointer then still
+/// lies within the stack.
+const LARGEST_PUSH_BYTES: usize = 128;
+
 unsafe extern "C" {
     static _stack_end: u32;
 }
@@ -74,7 +78,7 @@ extern "C" fn HardFault() -> ! {
 /// `program_counter` counts only if `stack_pointer` lies within the stack.
 extern "C" fn report(stack_pointer: usize, program_counter: u32) -> ! {
     report_once();
-    if stack_pointer < (&raw const _stack_end).addr() {
+    if stack_pointer < (&raw const _stack_end).addr() + LARGEST_PUSH_BYTES {
         defmt::error!("stack overflow");
     } else {
         // SAFETY: reading the fault status has no effect.

@@ -49,7 +49,7 @@ pub fn run(elf: &Path) -> Outcome<String> {
     // A pipe that nobody reads fills, and its writer waits.
     let logged = reader(child.stdout.take());
     let complaints = reader(child.stderr.take());
-    let status = wait(&mut child)?;
+    let status = wait(&mut child, LIMIT)?;
     let (logged, complaints) = (logged.join(), complaints.join());
     let (Ok(logged), Ok(complaints)) = (logged, complaints) else {
         return Err(format!("cannot read what {QEMU} writes"));
@@ -70,6 +70,8 @@ fn command(elf: &Path) -> Outcome<Command> {
     let ports = cable::lay().map_err(|cause| format!("cannot connect the UARTs: {cause}"))?;
     let mut command = Command::new(QEMU);
     command.args(["-M", "mps2-an386", "-cpu", "cortex-m4", "-display", "none", "-monitor", "none"]);
+    // Time goes by instructions, 32 ns each: a program runs alike however busy this machine is.
+    command.args(["-icount", "shift=5"]);
     command.args(["-semihosting-config", "enable=on,target=native"]);
     for port in ports {
         command.args(["-chardev", &format!("socket,id=uart{port},host=127.0.0.1,port={port}")]);
@@ -90,10 +92,10 @@ fn reader(stream: Option<impl Read + Send + 'static>) -> thread::JoinHandle<Vec<
 }
 
 /// The exit status; `None` if the limit was reached and the program killed.
-fn wait(child: &mut Child) -> Outcome<Option<ExitStatus>> {
+fn wait(child: &mut Child, limit: Duration) -> Outcome<Option<ExitStatus>> {
     let failed = |cause| format!("cannot wait for {QEMU}: {cause}");
     let start = Instant::now();
-    while start.elapsed() < LIMIT {
+    while start.elapsed() < limit {
         if let Some(status) = child.try_wait().map_err(failed)? {
             return Ok(Some(status));
         }
@@ -124,5 +126,27 @@ fn decode(table: &Table, logged: &[u8]) -> String {
                 }
             }
         }
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    fn shell(command: &str) -> Child {
+        Command::new("sh").args(["-c", command]).spawn().unwrap()
+    }
+
+    #[test]
+    fn a_program_that_ends_tells_its_exit_status() {
+        let status = wait(&mut shell("exit 3"), LIMIT).unwrap();
+        assert_eq!(status.and_then(|status| status.code()), Some(3));
+    }
+
+    #[test]
+    fn a_program_that_does_not_end_is_killed() {
+        let mut child = shell("exec sleep 600");
+        assert_eq!(wait(&mut child, Duration::from_millis(50)), Ok(None));
+        assert_eq!(child.wait().unwrap().code(), None); // a signal, no status
     }
 }

@@ -1,11 +1,13 @@
 //! Decodes with every exp kernel; `firmware/tests/bit_for_bit.rs` holds the host to the same bits.
+//! Decoding leaves most of 8 KiB of RAM, stack included, to what else a device does.
 #![no_std]
 #![no_main]
 
 use cortex_m_rt::entry;
-use defmt::{info, unwrap};
+use defmt::{assert, debug, info, unwrap};
 use model_core::Aligned;
 use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
+use qemu_image::memory::{Sections, stack_high_water_bytes};
 use qemu_image::{checks, exit};
 
 static MODEL: Aligned<[u8; include_bytes!("../../../../testdata/hand-made.bin").len()]> =
@@ -20,5 +22,9 @@ fn main() -> ! {
     decode::<Polynomial>();
     decode::<Libm>();
     decode::<Micromath>();
+    let ram_bytes = Sections::linked().ram() + stack_high_water_bytes();
+    debug!("{=usize} bytes of RAM", ram_bytes);
+    assert!(ram_bytes <= 4096, "{=usize}", ram_bytes);
+    info!("within 4 KiB of RAM");
     exit::success()
 }

@@ -1,10 +1,10 @@
-//! What the core says of itself, at every level of the log that is not filtered.
+//! What the core says of itself, at every level of the log; the clock goes.
 #![no_std]
 #![no_main]
 
 use cortex_m::peripheral::{CPUID, FPU};
 use cortex_m_rt::entry;
-use defmt::{error, info, warn};
+use defmt::{debug, error, info, warn};
 use qemu_image::{clock::Clock, exit, memory};
 
 #[entry]
@@ -14,6 +14,7 @@ fn main() -> ! {
     info!("CPUID {=u32:#010x}, MVFR0 {=u32:#010x}", cpuid, mvfr0);
     warn!("{=usize} bytes of stack", memory::stack_bytes());
     error!("nothing is wrong");
+    debug!("below the level that .cargo/config.toml sets");
 
     let mut clock = Clock::start();
     let start = clock.now_us();
