@@ -20,7 +20,7 @@ pub mod serial;
 pub mod stream;
 pub mod upload;
 
-/// How long an answer may take, but for those that erase flash.
+/// How long a board's answer may take, but for those that erase flash.
 const ANSWER: Duration = Duration::from_millis(500);
 /// How often a request is sent before its device is given up.
 const ATTEMPTS: u32 = 6;
@@ -91,6 +91,8 @@ pub struct Device<W> {
     /// Bytes read and not looked at yet.
     pending: VecDeque<u8>,
     number: u16,
+    /// How long an answer may take.
+    pub patience: Duration,
     /// Frames of bytes that arrived damaged.
     pub damaged: u64,
     /// Requests that had to be sent again.
@@ -106,7 +108,7 @@ impl<W: Wire> Device<W> {
         wire.set_read_timeout(GLANCE).map_err(|cause| line_failed(&cause))?;
         let receiver = Box::new(Receiver::new());
         let pending = VecDeque::new();
-        Ok(Self { wire, receiver, pending, number: 0, damaged: 0, repeated: 0 })
+        Ok(Self { wire, receiver, pending, number: 0, patience: ANSWER, damaged: 0, repeated: 0 })
     }
 
     /// Sends bytes as they are.
@@ -212,7 +214,7 @@ impl<W: Wire> Device<W> {
         request: &Request<'_>,
         read: impl Fn(&Report<'_>) -> Option<T>,
     ) -> Result<T> {
-        self.ask(request, ANSWER, read)?.map_err(|refusal| refused(&refusal))
+        self.ask(request, self.patience, read)?.map_err(|refusal| refused(&refusal))
     }
 
     /// Who the device is.

@@ -247,6 +247,17 @@ mod serial_port {
         ]);
         assert!(page.contains("50 of 50 bit-identical"), "{page}");
 
+        // What the virtual device says of its memory: 20 000 bytes of code, 4000 of RAM.
+        for (limit, enough) in [
+            ("--flash-limit=19999", false),
+            ("--ram-limit=3999", false),
+            ("--ram-limit=4000", true),
+        ] {
+            let arguments =
+                ["link", &port, "check", "press", "--model", new_file, "-n", "1", limit];
+            assert_eq!(folder.run(&arguments).status.code(), Some(i32::from(!enough)), "{limit}");
+        }
+
         for (arguments, text) in [
             (&["record", new_file, "-o", "x.csv", "--period-us", "7"][..], "--period-us 7"),
             (&["baseline", "-o", "x.csv", "--oversampling", "0"], "--oversampling 0"),

@@ -1,5 +1,7 @@
-//! The emulator's programs, each held to the expected output beside it.
+//! The emulator's programs, each held to the expected output beside it, and the application, held to
+//! the host.
 
+mod application;
 mod cable;
 mod expected;
 mod qemu;
@@ -11,8 +13,8 @@ use crate::firmware::{QEMU, build_image};
 use crate::process::{Outcome, root};
 use crate::toolchain::{Toolchain, elf};
 
-/// The application's image, which `host-sim emulate` runs.
-const APPLICATION: &str = "qemu-app";
+/// What the application is called among the programs.
+const APPLICATION: &str = "application";
 
 /// What to do with output that differs.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -22,39 +24,53 @@ pub enum Differences {
     Accept,
 }
 
-/// Runs the programs of these names, or all, and compares what they log; shows it if they were named.
+/// Runs the programs of these names, or all and the application, and compares what they log; shows it
+/// if they were named.
 pub fn run(names: &[&str], differences: Differences) -> Outcome {
     let all = programs(&root().join("firmware/qemu/src/bin"))?;
-    let chosen = choose(&all, names)?;
+    let (application, names): (Vec<&str>, Vec<&str>) =
+        names.iter().partition(|name| **name == APPLICATION);
+    let everything = application.is_empty() && names.is_empty();
+    let chosen = if application.is_empty() || !names.is_empty() {
+        choose(&all, &names)?
+    } else {
+        Vec::new()
+    };
     qemu::present()?;
     build_image(&Toolchain::find()?, QEMU)?;
 
     let mut failed = Vec::new();
+    let mut conclude = |name: &str, outcome: Outcome| match outcome {
+        Ok(()) => println!("ok      {name}"),
+        Err(cause) => {
+            println!("FAILED  {name}: {cause}");
+            failed.push(name.to_owned());
+        }
+    };
     for program in &chosen {
         let name = name(program);
         let output = qemu::run(&elf(&name));
         if let (Ok(output), false) = (&output, names.is_empty()) {
             print!("{output}");
         }
-        match output.and_then(|output| check(program, &output, differences)) {
-            Ok(()) => println!("ok      {name}"),
-            Err(cause) => {
-                println!("FAILED  {name}: {cause}");
-                failed.push(name);
-            }
-        }
+        conclude(&name, output.and_then(|output| check(program, &output, differences)));
+    }
+    if everything || !application.is_empty() {
+        conclude(APPLICATION, application::check());
     }
     if failed.is_empty() {
         Ok(())
     } else {
         let failed = failed.join(", ");
-        Err(format!("{failed}; if a difference is meant, cargo xtask emulate --accept"))
+        Err(format!(
+            "{failed}; if a program's log is meant to differ, cargo xtask emulate --accept"
+        ))
     }
 }
 
 /// Prints a log that was saved while an image ran: the application's if none is named.
 pub fn print_log(log: &str, image: Option<&str>) -> Outcome {
-    let image = image.map_or_else(|| elf(APPLICATION), PathBuf::from);
+    let image = image.map_or_else(|| elf(application::IMAGE), PathBuf::from);
     print!("{}", qemu::decoded(Path::new(log), &image)?);
     Ok(())
 }
@@ -95,7 +111,7 @@ fn choose(all: &[PathBuf], names: &[&str]) -> Outcome<Vec<PathBuf>> {
     let find = |wanted: &&str| {
         all.iter().find(|program| name(program) == **wanted).cloned().ok_or_else(|| {
             let all: Vec<_> = all.iter().map(|program| name(program)).collect();
-            format!("there is no program `{wanted}`, but {}", all.join(", "))
+            format!("there is no program `{wanted}`, but {APPLICATION}, {}", all.join(", "))
         })
     };
     names.iter().map(find).collect()
@@ -126,6 +142,6 @@ mod tests {
         assert_eq!(choose(&all, &[]).unwrap(), all);
         assert_eq!(choose(&all, &["panic"]).unwrap(), all[1..]);
         let error = choose(&all, &["panic", "helo"]).unwrap_err();
-        assert_eq!(error, "there is no program `helo`, but hello, panic");
+        assert_eq!(error, "there is no program `helo`, but application, hello, panic");
     }
 }

@@ -23,7 +23,8 @@ Usage: cargo xtask COMMAND
   emulate [--accept] [NAME…]  runs the programs of these names, or all, of firmware/qemu/src/bin in
                             QEMU, and compares what they log and their exit status with the .out
                             file beside them; --accept writes these files instead. Shows the logs
-                            of programs that are named
+                            of programs that are named. `application`, or no name, holds the
+                            application to the host as well: ten minutes
   log FILE [ELF]            prints a log that `host-sim emulate --log FILE` saved; ELF is the image
                             that wrote it, if it is another than that command's own
   size                      shows what flash and RAM the images take, and fails if that is more

@@ -157,6 +157,22 @@ pub struct Memory {
     pub stack_high_water: u32,
 }
 
+impl Memory {
+    /// Flash that the firmware takes, without models.
+    #[must_use]
+    pub fn flash_bytes(&self) -> u32 {
+        let parts = [self.vector_table, self.text, self.rodata, self.data];
+        parts.into_iter().fold(0, u32::saturating_add)
+    }
+
+    /// RAM that it takes, with the stack at its deepest so far.
+    #[must_use]
+    pub fn ram_bytes(&self) -> u32 {
+        let parts = [self.data, self.bss, self.uninit, self.stack_high_water];
+        parts.into_iter().fold(0, u32::saturating_add)
+    }
+}
+
 /// What can be chosen while the device runs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Configuration {

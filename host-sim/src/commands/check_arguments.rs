@@ -35,6 +35,34 @@ pub struct CheckArguments {
     /// Random bytes to send; the device must then answer as before.
     #[arg(long, value_name = "BYTES", default_value_t = 0)]
     garbage: usize,
+    #[command(flatten)]
+    pub limits: Limits,
+}
+
+/// What the firmware may take, without its models.
+#[derive(Args)]
+pub struct Limits {
+    /// Flash that the firmware may take at most.
+    #[arg(long, value_name = "BYTES", default_value_t = u32::MAX, hide_default_value = true)]
+    flash_limit: u32,
+    /// RAM that variables and the stack at its deepest may take at most.
+    #[arg(long, value_name = "BYTES", default_value_t = u32::MAX, hide_default_value = true)]
+    ram_limit: u32,
+}
+
+impl Limits {
+    fn check(&self, memory: &Memory) -> Result<()> {
+        for (option, limit, taken) in [
+            ("--flash-limit", self.flash_limit, memory.flash_bytes()),
+            ("--ram-limit", self.ram_limit, memory.ram_bytes()),
+        ] {
+            if taken > limit {
+                let message = format!("the firmware takes {taken} bytes, {option} is {limit}");
+                return Err(Error::Failed(message));
+            }
+        }
+        Ok(())
+    }
 }
 
 impl CheckArguments {
@@ -80,15 +108,15 @@ fn trained(scene: &Scene) -> Result<LoadedModel> {
     LoadedModel::from_bytes(Path::new("the model just trained"), &blob)
 }
 
-/// Prints what was found; wrong answers are a failure.
-pub fn conclude(findings: &Findings, common: &Common) -> Result<()> {
+/// Prints what was found; wrong answers, and more memory than allowed, are a failure.
+pub fn conclude(findings: &Findings, limits: &Limits, common: &Common) -> Result<()> {
     if common.json {
         print::json(findings)?;
     } else {
         page_of(findings).print()?;
     }
     if findings.all_good() {
-        Ok(())
+        limits.check(&findings.device.memory)
     } else {
         Err(Error::Failed("the device does not do what it must: see above".into()))
     }
@@ -147,16 +175,20 @@ fn page_of(f: &Findings) -> print::Page {
 
 /// Where a device's memory goes.
 pub fn memory_lines(page: &mut print::Page, m: &Memory) {
-    let flash = m.vector_table + m.text + m.rodata + m.data;
     page.line(format_args!(
-        "{:<17} {flash} bytes without the model: vector table {}, code {}, constants {}, start values {}",
-        "flash", m.vector_table, m.text, m.rodata, m.data
+        "{:<17} {} bytes without the model: vector table {}, code {}, constants {}, start values {}",
+        "flash",
+        m.flash_bytes(),
+        m.vector_table,
+        m.text,
+        m.rodata,
+        m.data
     ));
-    let statics = m.data + m.bss + m.uninit;
     page.line(format_args!(
-        "{:<17} {} bytes: variables {statics}, stack {} at its deepest (of {} reserved)",
+        "{:<17} {} bytes: variables {}, stack {} at its deepest (of {} reserved)",
         "RAM",
-        statics + m.stack_high_water,
+        m.ram_bytes(),
+        m.ram_bytes() - m.stack_high_water,
         m.stack_high_water,
         m.stack_reserved
     ));

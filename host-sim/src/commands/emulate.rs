@@ -1,6 +1,7 @@
 //! `emulate`: the device's image in an emulator, held to the host.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::Args;
 use host_sim::device::Device;
@@ -15,6 +16,8 @@ use super::check_arguments::{CheckArguments, conclude};
 
 /// The emulator holds bytes back while the device is busy, so frames may queue.
 const WINDOW: usize = 4;
+/// It loses nothing, but a busy computer makes it slow: an answer that takes longer is lost.
+const PATIENCE: Duration = Duration::from_secs(20);
 
 /// Run the firmware in QEMU, let it decode a scene's frames, and compare with the host bit for bit.
 ///
@@ -61,9 +64,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let started = Emulator::start(&emulator::Options { model: Some(file.clone()), ..options });
     let outcome = started.and_then(|(_emulator, line)| {
         let mut device = Device::new(line)?;
+        device.patience = PATIENCE;
         check(&mut device, &scene, &model, &arguments.check.plan(WINDOW), &Progress::on_terminal())
     });
     // Its content is in the model; only a kill leaves it behind.
     let _ = std::fs::remove_file(&file);
-    conclude(&outcome?, common)
+    conclude(&outcome?, &arguments.check.limits, common)
 }

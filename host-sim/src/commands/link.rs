@@ -122,7 +122,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             let mut device = open()?;
             let plan = action.plan(1);
             let progress = Progress::on_terminal();
-            conclude(&check(&mut device, &scene, &model, &plan, &progress)?, common)
+            let findings = check(&mut device, &scene, &model, &plan, &progress)?;
+            conclude(&findings, &action.limits, common)
         }
     }
 }

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use firmware::link::message::{EstimateReport, Report, Request};
 use model_core::blob::Floats;
 
-use super::{ANSWER, ATTEMPTS, Device, Wire, refused};
+use super::{ATTEMPTS, Device, Wire, refused};
 use crate::error::{Error, Result};
 
 /// A request on its way.
@@ -47,7 +47,7 @@ pub fn decode_frames<W: Wire>(
             next += 1;
         }
         let Some(oldest) = on_their_way.front() else { break };
-        let deadline = oldest.sent + ANSWER;
+        let deadline = oldest.sent + device.patience;
         let heard = device.hear(deadline, |_, report| match report {
             Report::Estimate(estimate) => {
                 // An answer to a repeated request may come twice.

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use firmware::link::message::{Refusal, Report, Request, UploadState, UploadStep};
 
-use super::{ANSWER, Device, DeviceIdentity, Wire, refused};
+use super::{Device, DeviceIdentity, Wire, refused};
 use crate::error::{Error, Result};
 use crate::progress::Progress;
 
@@ -19,7 +19,11 @@ pub fn step<W: Wire>(
     device: &mut Device<W>,
     step: UploadStep<'_>,
 ) -> Result<std::result::Result<UploadState, Refusal>> {
-    let timeout = if matches!(step, UploadStep::Begin { .. }) { ERASE } else { ANSWER };
+    let timeout = if matches!(step, UploadStep::Begin { .. }) {
+        ERASE.max(device.patience)
+    } else {
+        device.patience
+    };
     device.ask(&Request::Upload(step), timeout, |report| match report {
         Report::Upload(state) => Some(*state),
         _ => None,
