@@ -224,6 +224,15 @@ mod serial_port {
         assert_eq!(text.lines().count(), 11);
         assert!(text.starts_with("r1e1_dx_mm,r1e1_dy_mm,r1e1_dz_mm,"), "{text}");
 
+        // Without a model: readings, which can be trained on. Ideal ones here, five in turn.
+        folder.succeed(&["link", &port, "record", "-n", "6", "-o", "readings.csv"]);
+        let text = std::fs::read_to_string(folder.path("readings.csv")).unwrap();
+        assert!(text.starts_with("r1c1_ohm,r1c2_ohm,"), "{text}");
+        let lines: Vec<&str> = text.lines().skip(1).collect();
+        assert!(lines.len() == 6 && lines[0] == lines[5] && lines[0] != lines[1]);
+        let ohm: Vec<f32> = lines[0].split(',').map(|v| v.parse().unwrap()).collect();
+        assert!(frames().iter().any(|frame| frame.as_flattened() == ohm), "{ohm:?}");
+
         folder.succeed(&["link", &port, "baseline", "-n", "5", "-o", "rest.csv"]);
         let text = std::fs::read_to_string(folder.path("rest.csv")).unwrap();
         let (header, line) = text.trim_end().split_once('\n').unwrap();
@@ -269,7 +278,7 @@ mod serial_port {
             assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
             assert!(message.contains(text), "{message}");
         }
-        assert_eq!(folder.names(), ["estimate.csv", "new.bin", "rest.csv"]);
+        assert_eq!(folder.names(), ["estimate.csv", "new.bin", "readings.csv", "rest.csv"]);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! `link`: a device on a serial port.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use clap::{Args, Subcommand};
@@ -36,7 +36,7 @@ enum Action {
     Identify,
     /// Put a model in force; the old one stays if the new one is refused.
     Upload(UploadArguments),
-    /// Let the device scan, and save its estimates as CSV, one frame a line.
+    /// Let the device scan, and save its readings, or its estimates, as CSV, one frame a line.
     Record(RecordArguments),
     /// Capture the sensor at rest, and save the mean readings as CSV. Leave the sensor alone meanwhile.
     Baseline(BaselineArguments),
@@ -54,8 +54,8 @@ struct UploadArguments {
 
 #[derive(Args)]
 struct RecordArguments {
-    /// Weight blob that is in force on the device: names the columns.
-    model: PathBuf,
+    /// Weight blob that is in force on the device: its estimates are saved. Without it, readings are.
+    model: Option<PathBuf>,
     #[command(flatten)]
     scan: ScanArguments,
     /// CSV file to write.
@@ -159,16 +159,20 @@ fn status(status: &Status, common: &Common) -> Result<()> {
     page.print()
 }
 
+/// What a device is to send of each scan.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Wanted {
+    Nothing,
+    Readings,
+    Estimates,
+}
+
 /// Puts a configuration in force; a refusal names the option.
-fn configure<W: Wire>(
-    device: &mut Device<W>,
-    scan: &ScanArguments,
-    send_estimates: bool,
-) -> Result<()> {
+fn configure<W: Wire>(device: &mut Device<W>, scan: &ScanArguments, wanted: Wanted) -> Result<()> {
     let mut configuration = Configuration {
         frame_period_us: scan.period_us,
-        send_readings: false,
-        send_estimates,
+        send_readings: wanted == Wanted::Readings,
+        send_estimates: wanted == Wanted::Estimates,
         ..Configuration::DEFAULT
     };
     configuration.scan.settling_us = scan.settling_us;
@@ -199,40 +203,68 @@ fn record<W: Wire>(
     action: &RecordArguments,
     common: &Common,
 ) -> Result<()> {
-    let model = LoadedModel::read(&action.model)?;
-    output::check_writable(&action.output, &[&action.model])?;
-    let found = device.identify()?.model;
-    if found.is_none_or(|found| found.crc_32 != model.model().crc()) {
-        return Err(Error::Usage(format!(
-            "{}: the device has another model in force; `upload` this one, or name that",
-            action.model.display()
-        )));
+    if action.scan.frames == 0 || action.scan.period_us == 0 {
+        return Err(Error::Usage("-n or --period-us: neither may be 0".into()));
     }
-    if action.scan.period_us == 0 {
-        return Err(Error::Usage("--period-us 0: nothing would be scanned".into()));
-    }
-    configure(device, &action.scan, true)?;
-    let wanted = usize::from(action.scan.frames);
-    let progress = Progress::on_terminal();
-    progress.stage("recording", wanted);
-    let mut frames: Vec<(u32, Vec<f64>)> = Vec::new();
-    let enough = device.hear(Instant::now() + patience(&action.scan), |_, report| {
-        let Report::Estimate(estimate) = report else { return None };
-        frames.push((estimate.frame, estimate.outputs.iter().map(f64::from).collect()));
-        progress.step();
-        (frames.len() == wanted).then_some(())
-    })?;
-    if enough.is_none() {
-        return Err(Error::Failed(format!(
-            "only {} of {wanted} frames came in time",
-            frames.len()
-        )));
-    }
-    let names: Vec<&str> = model.model().metadata().output_names.iter().collect();
+    let model = action.model.as_ref().map(|path| LoadedModel::read(path)).transpose()?;
+    let inputs: Vec<&Path> = action.model.iter().map(PathBuf::as_path).collect();
+    output::check_writable(&action.output, &inputs)?;
+    let identity = device.identify()?;
+    let (wanted, names) = match &model {
+        Some(model) => (Wanted::Estimates, output_names(model, &identity)?),
+        None => (Wanted::Readings, reading_names(&identity)),
+    };
+    configure(device, &action.scan, wanted)?;
+    let frames = hear_frames(device, &action.scan, wanted)?;
     let lines = frames.iter().map(|(_, line)| line.iter().copied());
-    data_file::write(&action.output, names, lines)?;
+    data_file::write(&action.output, names.iter().map(String::as_str), lines)?;
     let span = frames.last().zip(frames.first()).map_or(0, |(last, first)| last.0 - first.0 + 1);
     saved(frames.len(), span.saturating_sub(frames.len() as u32), &action.output, common)
+}
+
+/// The names of the model's outputs, if it is the one in force.
+fn output_names(model: &LoadedModel, identity: &DeviceIdentity) -> Result<Vec<String>> {
+    if identity.model.is_none_or(|found| found.crc_32 != model.model().crc()) {
+        return Err(Error::Usage(
+            "MODEL: the device has another in force; `upload` this one, or name that".into(),
+        ));
+    }
+    Ok(model.model().metadata().output_names.iter().map(String::from).collect())
+}
+
+fn reading_names(identity: &DeviceIdentity) -> Vec<String> {
+    let rows = 1..=identity.rows;
+    rows.flat_map(|m| (1..=identity.columns).map(move |k| format!("r{m}c{k}_ohm"))).collect()
+}
+
+/// The frames that the device sends, with their numbers.
+fn hear_frames<W: Wire>(
+    device: &mut Device<W>,
+    scan: &ScanArguments,
+    wanted: Wanted,
+) -> Result<Vec<(u32, Vec<f64>)>> {
+    let count = usize::from(scan.frames);
+    let progress = Progress::on_terminal();
+    progress.stage("recording", count);
+    let mut frames = Vec::new();
+    let enough = device.hear(Instant::now() + patience(scan), |_, report| {
+        let (frame, values) = match report {
+            Report::Readings { frame, readings_ohm } if wanted == Wanted::Readings => {
+                (*frame, *readings_ohm)
+            }
+            Report::Estimate(estimate) if wanted == Wanted::Estimates => {
+                (estimate.frame, estimate.outputs)
+            }
+            _ => return None,
+        };
+        frames.push((frame, values.iter().map(f64::from).collect()));
+        progress.step();
+        (frames.len() == count).then_some(())
+    })?;
+    match enough {
+        Some(()) => Ok(frames),
+        None => Err(Error::Failed(format!("only {} of {count} frames came in time", frames.len()))),
+    }
 }
 
 fn baseline<W: Wire>(
@@ -242,7 +274,7 @@ fn baseline<W: Wire>(
 ) -> Result<()> {
     output::check_writable(&action.output, &[])?;
     let identity = device.identify()?;
-    configure(device, &action.scan, false)?;
+    configure(device, &action.scan, Wanted::Nothing)?;
     let frames = action.scan.frames;
     let request = Request::CaptureBaseline { frames };
     let answer = device.ask(&request, patience(&action.scan), |report| match report {
@@ -257,15 +289,13 @@ fn baseline<W: Wire>(
         }
         other => refused(&other),
     })?;
-    let names: Vec<String> = (1..=identity.rows)
-        .flat_map(|m| (1..=identity.columns).map(move |k| format!("r{m}c{k}_ohm")))
-        .collect();
+    let names = reading_names(&identity);
     let lines = std::iter::once(readings.iter().copied());
     data_file::write(&action.output, names.iter().map(String::as_str), lines)?;
     saved(frames.into(), 0, &action.output, common)
 }
 
-fn saved(frames: usize, frames_lost: u32, file: &std::path::Path, common: &Common) -> Result<()> {
+fn saved(frames: usize, frames_lost: u32, file: &Path, common: &Common) -> Result<()> {
     let saved = Saved { frames, frames_lost, file: file.into() };
     if common.json {
         return print::json(&saved);

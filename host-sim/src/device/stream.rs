@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use firmware::link::message::{EstimateReport, Report, Request};
+use firmware::link::packet::UNASKED;
 use model_core::blob::Floats;
 
 use super::{ATTEMPTS, Device, Wire, refused};
@@ -48,8 +49,9 @@ pub fn decode_frames<W: Wire>(
         }
         let Some(oldest) = on_their_way.front() else { break };
         let deadline = oldest.sent + device.patience;
-        let heard = device.hear(deadline, |_, report| match report {
-            Report::Estimate(estimate) => {
+        let heard = device.hear(deadline, |number, report| match report {
+            // An estimate that nobody asked for is of a scan.
+            Report::Estimate(estimate) if number != UNASKED => {
                 // An answer to a repeated request may come twice.
                 let place = on_their_way.iter().position(|o| o.frame == estimate.frame)?;
                 on_their_way.remove(place);
