@@ -237,7 +237,11 @@ fn pause_scanning<W: Wire>(device: &mut Device<W>) -> Result<()> {
 
 /// A small model of the right shape, quick to upload.
 fn small_model(scene: &Scene, centres: usize) -> Result<LoadedModel> {
-    let frames = synth::synthesise(scene, Stream::Training, 64);
+    let mut frames = synth::synthesise(scene, Stream::Training, 64);
+    // Names would be most of it.
+    for names in [&mut frames.inputs.names, &mut frames.outputs.names] {
+        names.fill("x".into());
+    }
     let options = Options::new(centres, scene.training.spread, false, scene.seed);
     let networks = train::train(&frames, &options, &Progress::silent())?;
     let blob = model::encode(&networks, &frames, &Origin::of_scene(scene))?;
