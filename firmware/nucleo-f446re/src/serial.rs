@@ -48,7 +48,9 @@ impl Wires {
             return;
         }
         match self.to_send.dequeue() {
-            Some(byte) => self.tx.write(byte).unwrap_or_default(),
+            Some(byte) => {
+                let _ = self.tx.write(byte);
+            }
             None => self.tx.unlisten(),
         }
     }
