@@ -110,6 +110,7 @@ impl ScanPlan {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::link::message::Configuration;
 
     const PLAN: ScanPlan = ScanPlan {
         rows: 8,
@@ -151,6 +152,23 @@ mod tests {
         assert_eq!(most.scan_us(), u32::MAX);
         let nothing = ScanPlan { rows: 0, columns: 0, ..PLAN };
         assert_eq!((nothing.scan_us(), nothing.most_oversampling(0)), (0, Some(u16::MAX)));
+    }
+
+    #[test]
+    fn the_boards_scan_leaves_a_third_of_the_period() {
+        // The NUCLEO-F446RE's SPI clock, and what its application starts with.
+        let Configuration { frame_period_us, scan, .. } = Configuration::DEFAULT;
+        let plan = ScanPlan {
+            rows: 8,
+            columns: 18,
+            idle_samples: true,
+            settling_us: scan.settling_us,
+            oversampling: scan.oversampling,
+            sample_ns: spi_transfer_ns(3, 703_125),
+        };
+        assert_eq!(plan.scan_us(), 6_430);
+        assert!(plan.scan_us() * 3 <= frame_period_us * 2);
+        assert_eq!(plan.most_oversampling(frame_period_us), Some(1));
     }
 
     #[test]

@@ -81,10 +81,13 @@ fn scan<D: RowDrive, S: ColumnSampler, C: Circuit<8, 18>>(drive: D, sampler: S, 
     opaque(baseline.largest_relative_deviation(&opaque(frame)));
 }
 
+/// Constants of a circuit, which stay in flash.
+static DIVIDER: Divider<8, 18> = Divider::TYPICAL;
+
 fn scan_with_every_sampler<D: RowDrive>(drive: impl Fn() -> D) {
     scan(drive(), Mcp3208s { chips: [Part; 3] }, opaque(ZeroPotential::TYPICAL));
     let adc = || MultiplexedAdc { adc: Part, address: [Part; 3], enable: [Part; 3] };
-    scan(drive(), adc(), &opaque(Divider::TYPICAL));
+    scan(drive(), adc(), opaque(&DIVIDER));
     let adc = MultiplexedAdc { adc: Part, address: [Part; 4], enable: [Part; 2] };
     scan(
         drive(),

@@ -4,7 +4,7 @@ use core::cell::RefCell;
 
 use embedded_hal::spi::MODE_0;
 use embedded_hal_bus::spi::{NoDelay, RefCellDevice};
-use stm32f4xx_hal::gpio::{ErasedPin, Output, PinState};
+use stm32f4xx_hal::gpio::{ErasedPin, Output, PinState, Pull};
 use stm32f4xx_hal::pac::{Peripherals, SPI2};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Config;
@@ -12,6 +12,7 @@ use stm32f4xx_hal::spi::Spi;
 use stm32f4xx_hal::timer::SysDelay;
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
+use crate::held_pin::HeldPin;
 use crate::{Clock, ResetCause, Serial, Slot};
 
 /// Erasing a slot takes up to 4 s, in which nothing is fed; the watchdog's own clock is up to half
@@ -23,7 +24,13 @@ const WATCHDOG_MS: u32 = 8000;
 pub const SPI_HZ: u32 = 703_125;
 
 /// One analogue-to-digital converter, an `embedded_hal::spi::SpiDevice`.
-pub type Converter = RefCellDevice<'static, Spi<SPI2>, ErasedPin<Output>, NoDelay>;
+pub type Converter = RefCellDevice<'static, Spi<SPI2>, Select, NoDelay>;
+
+/// Chip select of an MCP3208, which must be high for 500 ns between two samples.
+pub type Select = HeldPin<90, 0>;
+
+/// A wire to the 74HC595: 100 ns, which is five times what it asks for, leave room for long wires.
+pub type RowPin = HeldPin<18, 18>;
 
 /// The board's parts, ready for use.
 pub struct Board {
@@ -34,11 +41,11 @@ pub struct Board {
     /// Three MCP3208 on one bus: columns 1–8, 9–16, 17 and 18.
     pub converters: [Converter; 3],
     /// Serial data of the 74HC595 that drives the rows.
-    pub row_data: ErasedPin<Output>,
+    pub row_data: RowPin,
     /// Shift clock of the 74HC595.
-    pub row_clock: ErasedPin<Output>,
+    pub row_clock: RowPin,
     /// Storage clock of the 74HC595.
-    pub row_latch: ErasedPin<Output>,
+    pub row_latch: RowPin,
     /// The ST-LINK's virtual COM port.
     pub serial: Serial,
     /// Microseconds since the start.
@@ -70,12 +77,14 @@ impl Board {
         let gpiob = parts.GPIOB.split(&mut rcc);
         let gpioc = parts.GPIOC.split(&mut rcc);
 
-        let pins = (Some(gpiob.pb13), Some(gpiob.pb14), Some(gpiob.pb15));
+        // Pulled up, a line that no converter drives reads as no answer.
+        let data_in = gpiob.pb14.into_alternate::<5>().internal_resistor(Pull::Up);
+        let pins = (Some(gpiob.pb13), Some(data_in), Some(gpiob.pb15));
         let spi = Spi::new(parts.SPI2, pins, MODE_0, SPI_HZ.Hz(), &mut rcc);
         let bus: &'static RefCell<Spi<SPI2>> =
             cortex_m::singleton!(: RefCell<Spi<SPI2>> = RefCell::new(spi))?;
         let converter = |select: ErasedPin<Output>| {
-            let Ok(device) = RefCellDevice::new_no_delay(bus, select);
+            let Ok(device) = RefCellDevice::new_no_delay(bus, select.into());
             device
         };
 
@@ -90,9 +99,9 @@ impl Board {
                 converter(gpiob.pb1.into_push_pull_output_in_state(high).erase()),
                 converter(gpioc.pc4.into_push_pull_output_in_state(high).erase()),
             ],
-            row_data: gpioc.pc6.into_push_pull_output().erase(),
-            row_clock: gpioc.pc8.into_push_pull_output().erase(),
-            row_latch: gpioc.pc9.into_push_pull_output().erase(),
+            row_data: gpioc.pc6.into_push_pull_output().erase().into(),
+            row_clock: gpioc.pc8.into_push_pull_output().erase().into(),
+            row_latch: gpioc.pc9.into_push_pull_output().erase().into(),
             serial,
             clock,
             delay: core.SYST.delay(&rcc.clocks),

@@ -1,35 +1,87 @@
 //! What runs on the board.
 
+use cortex_m::singleton;
 use cortex_m_rt::entry;
 use defmt::{info, unwrap};
 use defmt_rtt as _;
-use nucleo_f446re::{Board, Clock, memory};
+use firmware::app::{PaperApp, PaperBuffers};
+use firmware::circuit::ZeroPotential;
+use firmware::link::message::{Configuration, Memory};
+use firmware::platform::{Platform, Port};
+use firmware::readout::{Mcp3208s, Scanner, ShiftRegister595};
+use nucleo_f446re::{Board, Clock, Serial, memory, restart};
 use panic_probe as _;
+use stm32f4xx_hal::gpio::{ErasedPin, Output};
+use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
-const BLINK_US: u64 = 500_000;
+/// Constants of the circuit, which stay in flash. `docs/readout.md` tells how to measure your own.
+static CIRCUIT: ZeroPotential<8, 18> = ZeroPotential::TYPICAL;
 
-#[entry]
-fn main() -> ! {
-    let mut board = unwrap!(Board::take());
-    info!("started, cause {}; {}", board.reset_cause, memory::Sections::linked());
+struct Nucleo {
+    serial: Serial,
+    clock: Clock,
+    watchdog: IndependentWatchdog,
+    led: ErasedPin<Output>,
+}
 
-    let mut toggle_at_us = board.clock.now_us();
-    loop {
-        board.watchdog.feed();
-        if is_due(&mut board.clock, &mut toggle_at_us) {
-            board.led.toggle();
-        }
-        if let Some(byte) = board.serial.try_read() {
-            info!("received {=u8:#04x}", byte);
-        }
+impl Port for Nucleo {
+    fn now_us(&mut self) -> u32 {
+        self.clock.now_us()
+    }
+
+    fn receive(&mut self) -> Option<u8> {
+        self.serial.try_read()
+    }
+
+    fn send(&mut self, byte: u8) -> bool {
+        self.serial.try_write(byte)
     }
 }
 
-/// Whether the time has come; if so, sets the next.
-fn is_due(clock: &mut Clock, at_us: &mut u64) -> bool {
-    let due = clock.now_us() >= *at_us;
-    if due {
-        *at_us += BLINK_US;
+impl Platform for Nucleo {
+    const BOARD: &'static str = "nucleo-f446re";
+
+    /// Lets the light blink as well, about once a second.
+    fn feed_watchdog(&mut self) {
+        self.watchdog.feed();
+        let on = self.clock.now_us() >> 19 & 1 == 0;
+        self.led.set_state(on.into());
     }
-    due
+
+    fn memory(&self) -> Memory {
+        memory::taken()
+    }
+}
+
+#[entry]
+fn main() -> ! {
+    let board = unwrap!(Board::take());
+    info!(
+        "taxel {=str} on a NUCLEO-F446RE, started by: {}",
+        env!("CARGO_PKG_VERSION"),
+        board.reset_cause
+    );
+    let scanner = Scanner {
+        drive: ShiftRegister595::<_, 8> {
+            data: board.row_data,
+            clock: board.row_clock,
+            latch: board.row_latch,
+        },
+        sampler: Mcp3208s { chips: board.converters },
+        delay: board.delay,
+        circuit: &CIRCUIT,
+    };
+    let nucleo = Nucleo {
+        serial: board.serial,
+        clock: board.clock,
+        watchdog: board.watchdog,
+        led: board.led,
+    };
+    let buffers = unwrap!(singleton!(: PaperBuffers = PaperBuffers::new()));
+    let mut app = PaperApp::<_, _>::new(nucleo, scanner, Configuration::DEFAULT, buffers);
+    let mut slots = board.slots;
+    app.run(&mut slots);
+    info!("restarting");
+    while !app.platform().serial.has_sent_all() {}
+    restart()
 }

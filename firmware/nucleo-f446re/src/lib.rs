@@ -6,14 +6,16 @@
 
 mod board;
 mod clock;
+mod held_pin;
 #[path = "../../qemu/src/memory.rs"]
 pub mod memory;
 mod reset;
 mod serial;
 mod slot;
 
-pub use board::{Board, Converter, SPI_HZ};
+pub use board::{Board, Converter, RowPin, SPI_HZ, Select};
 pub use clock::Clock;
+pub use held_pin::HeldPin;
 pub use reset::{ResetCause, restart};
 pub use serial::{BAUD, Serial};
 pub use slot::{Slot, SlotError};

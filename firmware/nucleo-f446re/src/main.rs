@@ -1,4 +1,4 @@
-//! The image for the board NUCLEO-F446RE: brings the board up, says so in the log, and blinks.
+//! The image for the board NUCLEO-F446RE: the application, with the sensor at its pins.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]

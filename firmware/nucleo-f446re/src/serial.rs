@@ -1,56 +1,79 @@
 //! USART2, which the ST-LINK hands on to the computer.
 //!
-//! An interrupt takes every byte into a ring as it comes. While flash is erased or written, the
-//! processor stands still and takes none: whoever sends a model waits for the answer to each piece.
+//! An interrupt takes every byte into a ring as it comes, and sends from another what was put there: a
+//! report leaves while the next frame is scanned. While flash is erased or written, the processor
+//! stands still: a byte that comes then is lost, and whoever sends a model waits for the answer to
+//! each piece.
 
 use core::cell::RefCell;
-use core::sync::atomic::{AtomicU32, Ordering};
 
 use cortex_m::interrupt::{Mutex, free};
 use cortex_m::peripheral::NVIC;
 use heapless::spsc::{Consumer, Producer, Queue};
 use stm32f4xx_hal::gpio::{PA2, PA3};
-use stm32f4xx_hal::nb;
 use stm32f4xx_hal::pac::{Interrupt, USART2, interrupt};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Rcc;
 use stm32f4xx_hal::serial::config::Config;
-use stm32f4xx_hal::serial::{Rx, RxListen, Tx};
+use stm32f4xx_hal::serial::{Rx, RxListen, Tx, TxISR, TxListen};
 
 /// 8 data bits, no parity, 1 stop bit.
 pub const BAUD: u32 = 921_600;
 
-const RING: usize = 1024;
+/// Keeps 1 KiB: a ring holds one byte less than it has places.
+type Ring = Queue<u8, 1025>;
 
-/// What the interrupt has to itself once it has taken it.
-static RECEIVER: Mutex<RefCell<Option<Receiver>>> = Mutex::new(RefCell::new(None));
-static LOST: AtomicU32 = AtomicU32::new(0);
+/// What the interrupt has to itself.
+static WIRES: Mutex<RefCell<Option<Wires>>> = Mutex::new(RefCell::new(None));
 
-struct Receiver {
-    port: Rx<USART2>,
-    ring: Producer<'static, u8>,
+struct Wires {
+    rx: Rx<USART2>,
+    received: Producer<'static, u8>,
+    tx: Tx<USART2>,
+    to_send: Consumer<'static, u8>,
+}
+
+impl Wires {
+    /// Takes the byte that has come, if one has. A disturbed one is dropped, as is one for which there is
+    /// no room: the link's checksum tells.
+    fn receive(&mut self) {
+        if let Ok(byte) = self.rx.read() {
+            let _ = self.received.enqueue(byte);
+        }
+    }
+
+    /// Sends a byte if the one before has left, and asks for no more interrupts once there is none.
+    fn send(&mut self) {
+        if !self.tx.is_tx_empty() {
+            return;
+        }
+        match self.to_send.dequeue() {
+            Some(byte) => {
+                let _ = self.tx.write(byte);
+            }
+            None => self.tx.unlisten(),
+        }
+    }
 }
 
 /// Both directions. Nothing here waits.
 pub struct Serial {
-    port: Tx<USART2>,
     received: Consumer<'static, u8>,
+    to_send: Producer<'static, u8>,
 }
 
 impl Serial {
     pub(crate) fn start(usart: USART2, tx: PA2, rx: PA3, rcc: &mut Rcc) -> Option<Self> {
         let config = Config::default().baudrate(BAUD.bps());
-        let (port, mut receiver) = usart.serial((tx, rx), config, rcc).ok()?.split();
-        let ring = cortex_m::singleton!(: Queue<u8, RING> = Queue::new())?;
-        let (producer, received) = ring.split();
-        receiver.listen();
-        free(|section| {
-            let receiver = Receiver { port: receiver, ring: producer };
-            RECEIVER.borrow(section).replace(Some(receiver));
-        });
+        let (tx, mut rx) = usart.serial((tx, rx), config, rcc).ok()?.split();
+        let (received, to_read) = cortex_m::singleton!(: Ring = Ring::new())?.split();
+        let (to_send, sending) = cortex_m::singleton!(: Ring = Ring::new())?.split();
+        rx.listen();
+        let wires = Wires { rx, received, tx, to_send: sending };
+        free(|section| WIRES.borrow(section).replace(Some(wires)));
         // SAFETY: what the interrupt uses is in place, and no critical section hangs on its mask.
         unsafe { NVIC::unmask(Interrupt::USART2) };
-        Some(Self { port, received })
+        Some(Self { received: to_read, to_send })
     }
 
     /// The next byte received, or `None` if there is none yet.
@@ -58,32 +81,31 @@ impl Serial {
         self.received.dequeue()
     }
 
-    /// Sends `byte`; `false`, and nothing sent, while the one before is still under way.
+    /// Puts `byte` among those to be sent; `false`, and nothing done, while 1 KiB of them waits.
     #[must_use]
     pub fn try_write(&mut self, byte: u8) -> bool {
-        self.port.write(byte).is_ok()
+        let taken = self.to_send.enqueue(byte).is_ok();
+        with_wires(|wires| wires.tx.listen());
+        taken
     }
 
-    /// How often bytes were lost since the start: the ring was full, the interrupt came too late, or
-    /// the line was disturbed.
+    /// Whether all has left, to the last bit.
     #[must_use]
-    pub fn lost(&self) -> u32 {
-        LOST.load(Ordering::Relaxed)
+    pub fn has_sent_all(&self) -> bool {
+        let mut all = self.to_send.is_empty();
+        with_wires(|wires| all &= wires.tx.flush().is_ok());
+        all
     }
+}
+
+fn with_wires(action: impl FnOnce(&mut Wires)) {
+    free(|section| WIRES.borrow(section).borrow_mut().as_mut().map_or((), action));
 }
 
 #[interrupt]
 fn USART2() {
-    free(|section| {
-        let mut receiver = RECEIVER.borrow(section).borrow_mut();
-        let Some(Receiver { port, ring }) = receiver.as_mut() else { return };
-        let kept = match port.read() {
-            Ok(byte) => ring.enqueue(byte).is_ok(),
-            Err(nb::Error::WouldBlock) => true,
-            Err(nb::Error::Other(_)) => false,
-        };
-        if !kept {
-            LOST.store(LOST.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
-        }
+    with_wires(|wires| {
+        wires.receive();
+        wires.send();
     });
 }

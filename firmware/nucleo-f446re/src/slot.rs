@@ -2,6 +2,7 @@
 
 use core::{ptr, slice};
 
+use firmware::store::FlashError;
 use stm32f4xx_hal::flash::{Error, FlashExt};
 use stm32f4xx_hal::pac::FLASH;
 
@@ -78,6 +79,26 @@ impl Slot {
         written.map_err(refused)?;
         if self.bytes().get(offset..end) == Some(bytes) { Ok(()) } else { Err(SlotError::Verify) }
     }
+}
+
+impl firmware::store::Slot for Slot {
+    fn bytes(&self) -> &[u8] {
+        self.bytes()
+    }
+
+    fn erase(&mut self) -> Result<(), FlashError> {
+        self.erase().map_err(failed)
+    }
+
+    fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), FlashError> {
+        self.write(offset, bytes).map_err(failed)
+    }
+}
+
+/// The log tells why.
+fn failed(cause: SlotError) -> FlashError {
+    defmt::error!("model slot: {}", cause);
+    FlashError
 }
 
 /// The flash controller, without the errors of what went before, which would count for the next.

@@ -16,11 +16,10 @@ use firmware::platform::{Platform, Port};
 use firmware::readout::{Mcp3208s, Scanner, ShiftRegister595};
 use firmware::remote::Remote;
 use qemu_image::clock::Clock;
-use qemu_image::exit;
-use qemu_image::memory::{Sections, stack_bytes, stack_high_water_bytes};
 use qemu_image::slot::Slot;
 use qemu_image::uart::Uart;
 use qemu_image::watchdog::Watchdog;
+use qemu_image::{exit, memory};
 
 /// Longer than a loop takes, were it ever so slow a computer.
 const WATCHDOG_MS: u32 = 20_000;
@@ -89,17 +88,7 @@ impl Platform for Board<'_> {
     }
 
     fn memory(&self) -> Memory {
-        let sections = Sections::linked();
-        Memory {
-            vector_table: sections.vector_table as u32,
-            text: sections.text as u32,
-            rodata: sections.rodata as u32,
-            data: sections.data as u32,
-            bss: sections.bss as u32,
-            uninit: sections.uninit as u32,
-            stack_reserved: stack_bytes() as u32,
-            stack_high_water: stack_high_water_bytes() as u32,
-        }
+        memory::taken()
     }
 }
 

@@ -3,6 +3,7 @@
 use core::ptr::addr_of;
 
 use cortex_m_rt::STACK_PAINT_VALUE;
+use firmware::link::message::Memory;
 
 unsafe extern "C" {
     static __vector_table: u32;
@@ -87,4 +88,20 @@ pub fn stack_high_water_bytes() -> usize {
     let painted =
         (0..words).take_while(|&i| unsafe { bottom.add(i).read_volatile() } == STACK_PAINT_VALUE);
     (words - painted.count()) * size_of::<u32>()
+}
+
+/// All this, as the link tells it.
+#[must_use]
+pub fn taken() -> Memory {
+    let sections = Sections::linked();
+    Memory {
+        vector_table: sections.vector_table as u32,
+        text: sections.text as u32,
+        rodata: sections.rodata as u32,
+        data: sections.data as u32,
+        bss: sections.bss as u32,
+        uninit: sections.uninit as u32,
+        stack_reserved: stack_bytes() as u32,
+        stack_high_water: stack_high_water_bytes() as u32,
+    }
 }

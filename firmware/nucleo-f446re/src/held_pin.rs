@@ -1,0 +1,35 @@
+//! Outputs that are not too fast for the chips that listen.
+
+use core::convert::Infallible;
+
+use cortex_m::asm;
+use embedded_hal::digital::{ErrorType, OutputPin};
+use stm32f4xx_hal::gpio::{ErasedPin, Output};
+
+/// An output that stays high for `HIGH` cycles of the processor (5.6 ns each) at least, and low for
+/// `LOW`.
+pub struct HeldPin<const HIGH: u32, const LOW: u32>(ErasedPin<Output>);
+
+impl<const HIGH: u32, const LOW: u32> From<ErasedPin<Output>> for HeldPin<HIGH, LOW> {
+    fn from(pin: ErasedPin<Output>) -> Self {
+        Self(pin)
+    }
+}
+
+impl<const HIGH: u32, const LOW: u32> ErrorType for HeldPin<HIGH, LOW> {
+    type Error = Infallible;
+}
+
+impl<const HIGH: u32, const LOW: u32> OutputPin for HeldPin<HIGH, LOW> {
+    fn set_high(&mut self) -> Result<(), Infallible> {
+        self.0.set_high();
+        asm::delay(HIGH);
+        Ok(())
+    }
+
+    fn set_low(&mut self) -> Result<(), Infallible> {
+        self.0.set_low();
+        asm::delay(LOW);
+        Ok(())
+    }
+}
