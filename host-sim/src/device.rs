@@ -1,7 +1,7 @@
 //! A device at the other end of a serial line, real or emulated.
 //!
 //! [`Device`] asks and hears; [`upload`] exchanges its model; [`stream`] lets it decode frames;
-//! [`check`] holds it to the host. `docs/link.md` specifies what they say to each other.
+//! [`check`] and [`scan`] hold it to the host. `docs/link.md` specifies what they say to each other.
 
 use std::collections::VecDeque;
 use std::io::{ErrorKind, Read, Write};
@@ -16,6 +16,7 @@ use serde::Serialize;
 use crate::error::{Error, Result};
 
 pub mod check;
+pub mod scan;
 pub mod serial;
 pub mod stream;
 pub mod upload;

@@ -1,4 +1,4 @@
-//! The device's image in QEMU's mps2-an386, a Cortex-M4F, with its serial line here.
+//! The device's image in QEMU's mps2-an386, a Cortex-M4F, with its serial lines here.
 
 use std::io::ErrorKind;
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
@@ -24,6 +24,8 @@ pub struct Options {
     pub model: Option<PathBuf>,
     /// Where the image's log goes, as defmt writes it; nowhere if not given.
     pub log: Option<PathBuf>,
+    /// Whether the readout's line is wanted.
+    pub readout: bool,
 }
 
 impl Options {
@@ -42,6 +44,15 @@ impl Options {
     }
 }
 
+/// The image's serial lines.
+#[derive(Debug)]
+pub struct Lines {
+    /// The first, of the link.
+    pub link: TcpStream,
+    /// The second, of the readout, if it was wanted.
+    pub readout: Option<TcpStream>,
+}
+
 /// A running emulator; it ends with this value.
 #[derive(Debug)]
 pub struct Emulator {
@@ -49,21 +60,30 @@ pub struct Emulator {
 }
 
 impl Emulator {
-    /// Starts QEMU and connects to the image's first serial line.
+    /// Starts QEMU and connects to the image's serial lines.
     ///
     /// # Errors
     /// [`Error::Usage`] if QEMU or the image is missing, [`Error::Failed`] if it does not start.
-    pub fn start(options: &Options) -> Result<(Self, TcpStream)> {
+    pub fn start(options: &Options) -> Result<(Self, Lines)> {
         options.check()?;
         let failed = |cause: &dyn std::fmt::Display| {
             Error::Failed(format!("the emulator does not start: {cause}"))
         };
-        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).map_err(|c| failed(&c))?;
-        let port = listener.local_addr().map_err(|c| failed(&c))?.port();
+        let listen = || {
+            let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
+            let port = listener.local_addr()?.port();
+            Ok((listener, format!("tcp:127.0.0.1:{port},nodelay=on")))
+        };
+        let listen = || listen().map_err(|cause: std::io::Error| failed(&cause));
+        let (link, link_serial) = listen()?;
+        let readout = options.readout.then(listen).transpose()?;
         let mut command = Command::new(&options.qemu);
         command.args(["-M", "mps2-an386", "-cpu", "cortex-m4", "-display", "none"]);
         command.args(["-monitor", "none", "-semihosting-config", "enable=on,target=native"]);
-        command.arg("-serial").arg(format!("tcp:127.0.0.1:{port},nodelay=on"));
+        command.args(["-serial", &link_serial]);
+        if let Some((_, readout_serial)) = &readout {
+            command.args(["-serial", readout_serial]);
+        }
         if let Some(model) = &options.model {
             let path = escaped(model);
             let place = format!("loader,file={path},addr={SLOT_ADDRESS:#x},force-raw=on");
@@ -78,7 +98,7 @@ impl Emulator {
                 None => Stdio::null(),
             },
         );
-        let mut child = command.spawn().map_err(|cause| {
+        let child = command.spawn().map_err(|cause| {
             if cause.kind() == ErrorKind::NotFound {
                 let qemu = options.qemu.display();
                 return Error::Usage(format!(
@@ -87,14 +107,12 @@ impl Emulator {
             }
             failed(&cause)
         })?;
-        match accept(&listener, &mut child) {
-            Ok(stream) => Ok((Self { child }, stream)),
-            Err(cause) => {
-                let _ = child.kill();
-                let _ = child.wait();
-                Err(failed(&cause))
-            }
-        }
+        let mut emulator = Self { child };
+        let mut connect =
+            |to: &TcpListener| accept(to, &mut emulator.child).map_err(|cause| failed(&cause));
+        let link = connect(&link)?;
+        let readout = readout.map(|(listener, _)| connect(&listener)).transpose()?;
+        Ok((emulator, Lines { link, readout }))
     }
 }
 

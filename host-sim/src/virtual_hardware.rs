@@ -30,6 +30,7 @@ mod board;
 mod converters;
 mod handles;
 mod network;
+mod remote;
 mod rows;
 mod scanner;
 #[cfg(test)]

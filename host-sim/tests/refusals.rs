@@ -260,6 +260,17 @@ fn an_emulator_or_an_image_that_is_not_there_is_named() {
     folder.write("small.toml", small_scene());
     let arguments = ["emulate", "small.toml", "--image", image, "--qemu", "no-such-qemu"];
     refused(&folder, &arguments, &["no-such-qemu", "qemu-system-arm"]);
+    // Another readout than the image's.
+    for (field, other, only) in [
+        ("circuit", "divider", "zero-potential"),
+        ("sampler", "on-chip", "mcp3208"),
+        ("row_drive", "pins", "shift-register"),
+    ] {
+        let readout = format!("[readout]\n{field} = \"{other}\"\n");
+        folder.write("other.toml", small_scene().replace("[readout]\n", &readout));
+        let arguments = ["emulate", "other.toml", "--scans", "1", "--image", image];
+        refused(&folder, &arguments, &["--scans", &format!("readout.{field}"), only]);
+    }
     // A model of another scene.
     folder.succeed(&["train", "small.toml", "-o", "small.bin"]);
     let arguments = ["emulate", "press", "--model", "small.bin", "--image", image];

@@ -68,11 +68,23 @@ impl Limits {
 impl CheckArguments {
     /// The scene and the model, trained if none was given.
     pub fn load(&self, common: &Common) -> Result<(Scene, LoadedModel)> {
+        let scene = self.scene(common)?;
+        let model = self.model(&scene)?;
+        Ok((scene, model))
+    }
+
+    /// The scene.
+    pub fn scene(&self, common: &Common) -> Result<Scene> {
         let scene = self.scene.load(common)?;
         scene.check_frames("-n", self.frames)?;
+        Ok(scene)
+    }
+
+    /// The model, trained if none was given.
+    pub fn model(&self, scene: &Scene) -> Result<LoadedModel> {
         let model = match &self.model {
             Some(path) => LoadedModel::read(path)?,
-            None => trained(&scene)?,
+            None => trained(scene)?,
         };
         let metadata = model.model();
         let inputs = metadata.metadata().input_names;
@@ -83,7 +95,7 @@ impl CheckArguments {
                 scene.name
             )));
         }
-        Ok((scene, model))
+        Ok(model)
     }
 
     /// The plan, with `window` frames on their way at a time.
@@ -138,6 +150,21 @@ fn page_of(f: &Findings) -> print::Page {
             f.frames.bit_identical, f.frames.frames, f.frames.frames_per_s
         ),
     );
+    if let Some(s) = &f.scans {
+        line(
+            "scans",
+            format!(
+                "readings of {} of {} and estimates of {} of {} bit-identical to the host's, {} samples \
+                 failed, {:.1} a second",
+                s.bit_identical_readings,
+                s.scans,
+                s.bit_identical_estimates,
+                s.scans,
+                s.failed_samples,
+                s.scans_per_s
+            ),
+        );
+    }
     if let Some(u) = &f.uploads {
         let good = if u.good_came_into_force { "came" } else { "DID NOT COME" };
         line("good uploads", format!("{good} into force ({} bytes and more)", u.blob_bytes));

@@ -5,7 +5,8 @@ use std::time::Duration;
 
 use clap::Args;
 use host_sim::device::Device;
-use host_sim::device::check::check;
+use host_sim::device::check::{Findings, check};
+use host_sim::device::scan;
 use host_sim::emulator::{self, Emulator};
 use host_sim::output;
 use host_sim::progress::Progress;
@@ -24,11 +25,17 @@ const PATIENCE: Duration = Duration::from_secs(20);
 /// Fails (exit status 1) unless every frame is bit-identical and every check asked for is passed.
 #[derive(Args)]
 #[command(
-    after_help = "Example: cargo xtask firmware && host-sim emulate press -n 10000\n\nNeeds qemu-system-arm and the image; docs/emulator.md tells how to get both."
+    after_help = "Example: cargo xtask firmware && host-sim emulate press -n 10000 --scans 100\n\nNeeds qemu-system-arm and the image; docs/emulator.md tells how to get both."
 )]
 pub struct Arguments {
     #[command(flatten)]
     check: CheckArguments,
+    /// Scans of a virtual board at the image's second serial line, to be compared with the host's.
+    ///
+    /// What the scene's [readout] says is simulated; its parts are the image's: zero potential, 74HC595,
+    /// MCP3208.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    scans: usize,
     /// Image of the firmware for mps2-an386.
     #[arg(
         long,
@@ -53,19 +60,31 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         image: arguments.image.clone(),
         model: None,
         log: arguments.log.clone(),
+        readout: arguments.scans > 0,
     };
     options.check()?;
-    let (scene, model) = arguments.check.load(common)?;
+    let scene = arguments.check.scene(common)?;
+    if arguments.scans > 0 {
+        scene.check_frames("--scans", arguments.scans)?;
+        scan::with_parts_of_image(&scene)?;
+    }
+    let model = arguments.check.model(&scene)?;
 
     // QEMU puts the blob where a board has it in flash.
     let file = std::env::temp_dir().join(format!("taxel-model-{}.bin", std::process::id()));
     let written = std::fs::write(&file, model.bytes());
     written.map_err(|cause| Error::Write { path: file.clone(), cause })?;
     let started = Emulator::start(&emulator::Options { model: Some(file.clone()), ..options });
-    let outcome = started.and_then(|(_emulator, line)| {
-        let mut device = Device::new(line)?;
+    let outcome = started.and_then(|(_emulator, lines)| {
+        let mut device = Device::new(lines.link)?;
         device.patience = PATIENCE;
-        check(&mut device, &scene, &model, &arguments.check.plan(WINDOW), &Progress::on_terminal())
+        let progress = Progress::on_terminal();
+        let scanned = lines
+            .readout
+            .map(|line| scan::check(&mut device, &scene, &model, line, arguments.scans, &progress));
+        let scans = scanned.transpose()?;
+        let plan = arguments.check.plan(WINDOW);
+        Ok(Findings { scans, ..check(&mut device, &scene, &model, &plan, &progress)? })
     });
     // Its content is in the model; only a kill leaves it behind.
     let _ = std::fs::remove_file(&file);

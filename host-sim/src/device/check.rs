@@ -8,6 +8,7 @@ use firmware::link::message::{
 use model_core::checksum::CRC_32;
 use serde::Serialize;
 
+use super::scan::ScanFindings;
 use super::{Device, DeviceIdentity, Wire, stream, upload};
 use crate::dataset::Table;
 use crate::error::{Error, Result};
@@ -46,6 +47,8 @@ pub struct Findings {
     pub statistics: Statistics,
     /// Decoding.
     pub frames: FrameFindings,
+    /// Scans, if [they were checked](super::scan::check) as well.
+    pub scans: Option<ScanFindings>,
     /// Uploads, if any were asked for.
     pub uploads: Option<UploadFindings>,
     /// Garbage, if any was asked for.
@@ -61,13 +64,14 @@ impl Findings {
     #[must_use]
     pub fn all_good(&self) -> bool {
         let frames = self.frames.bit_identical == self.frames.frames;
+        let scans = self.scans.as_ref().is_none_or(ScanFindings::all_good);
         let uploads = self.uploads.as_ref().is_none_or(|u| {
             u.good_came_into_force
                 && u.damaged_refused == u.damaged
                 && u.old_stayed == u.interrupted
         });
         let garbage = self.garbage.as_ref().is_none_or(|g| g.decodes_as_before);
-        frames && uploads && garbage && self.repeated == 0 && self.damaged == 0
+        frames && scans && uploads && garbage && self.repeated == 0 && self.damaged == 0
     }
 }
 
@@ -111,14 +115,14 @@ pub struct GarbageFindings {
 }
 
 /// A scene's frames with the answers that the host computes.
-struct Expected {
+pub(super) struct Expected {
     readings_ohm: Vec<f32>,
     outputs: Vec<f32>,
     per_frame: [usize; 2],
 }
 
 impl Expected {
-    fn new(model: &LoadedModel, kernel: Kernel, readings: &Table) -> Self {
+    pub(super) fn new(model: &LoadedModel, kernel: Kernel, readings: &Table) -> Self {
         let outputs = model.decode(kernel, readings);
         let f32s = |values: &[f64]| values.iter().map(|value| *value as f32).collect();
         Self {
@@ -132,11 +136,20 @@ impl Expected {
         &self.readings_ohm[..frames * self.per_frame[0]]
     }
 
-    fn is_same(&self, frame: u32, outputs: impl Iterator<Item = f32>) -> bool {
-        let start = frame as usize * self.per_frame[1];
-        let expected = self.outputs.get(start..start + self.per_frame[1]);
-        expected.is_some_and(|expected| {
-            outputs.map(f32::to_bits).eq(expected.iter().map(|value| value.to_bits()))
+    /// Whether these are the readings of that frame.
+    pub(super) fn was_read(&self, frame: u32, readings: impl Iterator<Item = f32>) -> bool {
+        Self::is_line(&self.readings_ohm, frame, self.per_frame[0], readings)
+    }
+
+    /// Whether these are the outputs of that frame.
+    pub(super) fn is_same(&self, frame: u32, outputs: impl Iterator<Item = f32>) -> bool {
+        Self::is_line(&self.outputs, frame, self.per_frame[1], outputs)
+    }
+
+    fn is_line(all: &[f32], line: u32, width: usize, found: impl Iterator<Item = f32>) -> bool {
+        let start = line as usize * width;
+        all.get(start..start + width).is_some_and(|expected| {
+            found.map(f32::to_bits).eq(expected.iter().map(|value| value.to_bits()))
         })
     }
 
@@ -206,6 +219,7 @@ pub fn check<W: Wire>(
         device: device.identify()?,
         statistics: device.statistics()?,
         frames,
+        scans: None,
         uploads,
         garbage,
         repeated: device.repeated,
@@ -214,7 +228,7 @@ pub fn check<W: Wire>(
 }
 
 /// The kernel that the device decodes with, if it is a device for this model at all.
-fn fitting_kernel(identity: &DeviceIdentity, model: &LoadedModel) -> Result<Kernel> {
+pub(super) fn fitting_kernel(identity: &DeviceIdentity, model: &LoadedModel) -> Result<Kernel> {
     let shape = model.model().shape();
     let found = [identity.rows, identity.columns, identity.outputs];
     let expected = [shape.rows, shape.inputs, shape.outputs];
@@ -228,7 +242,7 @@ fn fitting_kernel(identity: &DeviceIdentity, model: &LoadedModel) -> Result<Kern
 }
 
 /// Frames that nobody asked for would be taken for answers.
-fn pause_scanning<W: Wire>(device: &mut Device<W>) -> Result<()> {
+pub(super) fn pause_scanning<W: Wire>(device: &mut Device<W>) -> Result<()> {
     let quiet = Configuration { frame_period_us: 0, ..Configuration::DEFAULT };
     device.ask_plainly(&Request::Configure(quiet), |report| {
         matches!(report, Report::Configuration(_)).then_some(())

@@ -101,6 +101,7 @@ impl<W: Read + Write> Platform for Board<W> {
 }
 
 /// A sensor that goes through given frames again and again.
+#[derive(Clone)]
 struct Source {
     frames: Vec<[[f32; 18]; 8]>,
     next: usize,
@@ -135,14 +136,25 @@ impl Slot for MemorySlot {
     }
 }
 
-/// Runs a device on `wire` until the host goes, restarting it whenever it asks for that.
-///
-/// `wire` must read without blocking.
+/// Runs a device on `wire` that goes through `frames`: see [`run_with`].
 pub fn run(
-    mut wire: impl Read + Write + Send + 'static,
+    wire: impl Read + Write + Send + 'static,
     line: Line,
     model: &[u8],
     frames: Vec<[[f32; 18]; 8]>,
+) {
+    run_with(wire, line, model, Source { frames, next: 0 });
+}
+
+/// Runs a device on `wire` that scans `source`, until the host goes, restarting it whenever it asks for
+/// that.
+///
+/// `wire` must read without blocking.
+pub fn run_with(
+    mut wire: impl Read + Write + Send + 'static,
+    line: Line,
+    model: &[u8],
+    source: impl FrameSource<8, 18> + Clone + Send + 'static,
 ) {
     let mut slots = [0, 1].map(|_| MemorySlot(vec![u32::MAX; 128 * 1024 / 4]));
     bytemuck::cast_slice_mut(&mut slots[0].0)[..model.len()].copy_from_slice(model);
@@ -158,10 +170,9 @@ pub fn run(
                 to_send: Vec::new(),
                 gone: false,
             };
-            let source = Source { frames: frames.clone(), next: 0 };
             let quiet = Configuration { frame_period_us: 0, ..Configuration::DEFAULT };
             let mut buffers = PaperBuffers::new();
-            let mut app = PaperApp::<_, _>::new(board, source, quiet, &mut buffers);
+            let mut app = PaperApp::<_, _>::new(board, source.clone(), quiet, &mut buffers);
             app.run(&mut slots);
             app.platform().flush();
             if app.platform().gone {
