@@ -29,7 +29,7 @@ pub type Converter = RefCellDevice<'static, Spi<SPI2>, Select, NoDelay>;
 /// Chip select of an MCP3208, which must be high for 500 ns between two samples.
 pub type Select = HeldPin<90, 0>;
 
-/// A wire to the 74HC595: 100 ns, which is five times what it asks for, leave room for long wires.
+/// A wire to the 74HC595: each level for 100 ns, so that slow edges do no harm.
 pub type RowPin = HeldPin<18, 18>;
 
 /// The board's parts, ready for use.
