@@ -39,7 +39,7 @@ pub type PaperBuffers = Buffers<8, 18, 18, PAPER_MESSAGE_BYTES>;
 /// The large part of an application's memory, all zero at first, so that a static of it costs no
 /// flash and nothing is moved over the stack.
 ///
-/// `BYTES` is that of the longest message: `4 · ROWS · max(COLS, OUTPUTS) + ROWS + 24`.
+/// `BYTES` is that of the longest message: `4 · ROWS · max(COLS, OUTPUTS) + ROWS + 24`, at least 128.
 pub struct Buffers<const ROWS: usize, const COLS: usize, const OUTPUTS: usize, const BYTES: usize> {
     receiver: Receiver<BYTES>,
     message: [u8; BYTES],
@@ -65,6 +65,7 @@ impl<const ROWS: usize, const COLS: usize, const OUTPUTS: usize, const BYTES: us
         const {
             let widest = if COLS > OUTPUTS { COLS } else { OUTPUTS };
             assert!(BYTES >= 4 * ROWS * widest + ROWS + 24, "the longest message must fit");
+            assert!(BYTES >= 128, "and so must an identity");
             assert!(ROWS > 0 && ROWS < 256 && COLS > 0 && OUTPUTS > 0 && OUTPUTS < 256);
         }
         Self {
@@ -114,6 +115,8 @@ struct Core<
     frame: &'m mut Frame<ROWS, COLS>,
     estimate: &'m mut Estimate<ROWS, OUTPUTS>,
     baseline: &'m mut Baseline<ROWS, COLS>,
+    /// Whether the last scan gave any reading at all.
+    sensor_answers: bool,
     /// Request that waits for the baseline, and how many frames are still to be scanned for it.
     capture: Option<(u16, u16)>,
     upload: Upload,
@@ -148,6 +151,7 @@ impl<
             frame,
             estimate,
             baseline,
+            sensor_answers: true,
             capture: None,
             upload: Upload::new(),
         };

@@ -196,7 +196,7 @@ impl<const ROWS: usize, const COLS: usize> Circuit<ROWS, COLS> for ZeroPotential
                 let factor = 1.0 - series * (sum_s * (ROWS as f32 / count as f32));
                 let readings = rows.iter_mut().filter_map(|row| row.get_mut(column));
                 readings
-                    .filter(|ohm| !ohm.is_nan())
+                    .filter(|ohm| ohm.is_finite()) // open stays open
                     .for_each(|ohm| *ohm = (*ohm * factor).max(0.0));
             }
         }

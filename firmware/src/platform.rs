@@ -14,8 +14,8 @@ pub trait Port {
     fn send(&mut self, byte: u8) -> bool;
 }
 
-/// A board. Its port leads to the host, and must keep at least the last 1 KiB of what arrives while
-/// the application scans and decodes.
+/// A board. Its port leads to the host, and must keep at least 1000 bytes that arrive while the
+/// application scans and decodes.
 pub trait Platform: Port {
     /// The board's name, as the link tells it.
     const BOARD: &'static str;

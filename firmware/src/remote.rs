@@ -7,7 +7,7 @@
 //! (u32, little-endian); an SPI transaction is 0x01, the chip's number, the count of bytes and these
 //! bytes, and is answered by as many. Nothing else is answered.
 
-use core::cell::RefCell;
+use core::cell::{Cell, RefCell};
 
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::{self, OutputPin};
@@ -45,13 +45,19 @@ impl spi::Error for RemoteError {
 }
 
 /// The line, from which pins, devices and delays are taken.
+///
+/// Once it was silent it stays failed until the program starts anew: an answer that came late would be
+/// taken for that to the next transaction.
 #[derive(Debug)]
-pub struct Remote<P>(RefCell<P>);
+pub struct Remote<P> {
+    port: RefCell<P>,
+    failed: Cell<bool>,
+}
 
 impl<P: Port> Remote<P> {
     /// Parts at the other end of `port`.
     pub const fn new(port: P) -> Self {
-        Self(RefCell::new(port))
+        Self { port: RefCell::new(port), failed: Cell::new(false) }
     }
 
     /// The pin of that number, up to 63.
@@ -71,15 +77,24 @@ impl<P: Port> Remote<P> {
 
     /// Sends `bytes`, then fills `answer`.
     fn exchange(&self, bytes: &[u8], answer: &mut [u8]) -> Result<(), RemoteError> {
-        let mut port = self.0.try_borrow_mut().map_err(|_| RemoteError::Silent)?;
-        for byte in bytes {
-            in_time(&mut *port, |port| port.send(*byte).then_some(()))?;
+        let mut port = self.port.try_borrow_mut().map_err(|_| RemoteError::Silent)?;
+        if self.failed.get() {
+            return Err(RemoteError::Silent);
         }
-        for place in answer {
-            *place = in_time(&mut *port, P::receive)?;
-        }
-        Ok(())
+        let outcome = exchange(&mut *port, bytes, answer);
+        self.failed.set(outcome.is_err());
+        outcome
     }
+}
+
+fn exchange<P: Port>(port: &mut P, bytes: &[u8], answer: &mut [u8]) -> Result<(), RemoteError> {
+    for byte in bytes {
+        in_time(port, |port| port.send(*byte).then_some(()))?;
+    }
+    for place in answer {
+        *place = in_time(port, P::receive)?;
+    }
+    Ok(())
 }
 
 /// Tries until there is an answer, or the line stalls.
@@ -254,7 +269,7 @@ mod tests {
         remote.spi(2).transfer_in_place(&mut bytes).unwrap();
         assert_eq!(bytes, [7, 8, 9]);
 
-        let sent = remote.0.into_inner().sent;
+        let sent = remote.port.into_inner().sent;
         let mut rest = &sent[..];
         let mut asked = Vec::new();
         while let Some((one, behind)) = Asked::parse(rest).unwrap() {
@@ -287,6 +302,9 @@ mod tests {
     #[test]
     fn silence_ends_in_an_error_not_in_a_wait() {
         let remote = Remote::new(Ends::default());
+        assert_eq!(remote.spi(0).transfer_in_place(&mut [1]), Err(RemoteError::Silent));
+        // An answer that comes now is to nothing.
+        remote.port.borrow_mut().answers.push_back(7);
         assert_eq!(remote.spi(0).transfer_in_place(&mut [1]), Err(RemoteError::Silent));
         let remote = Remote::new(Ends { deaf: true, ..Ends::default() });
         assert_eq!(remote.pin(1).set_high(), Err(RemoteError::Silent));

@@ -8,7 +8,9 @@ use std::io::{ErrorKind, Read, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-use firmware::link::message::{Identity, Memory, ModelIdentity, Refusal, Report, Request};
+use firmware::link::message::{
+    Configuration, Identity, Memory, ModelIdentity, Refusal, Report, Request,
+};
 use firmware::link::receive::{Received, Receiver};
 use firmware::link::{cobs, packet};
 use serde::Serialize;
@@ -25,6 +27,8 @@ pub mod upload;
 const ANSWER: Duration = Duration::from_millis(500);
 /// How often a request is sent before its device is given up.
 const ATTEMPTS: u32 = 6;
+/// How long a request may take to be sent.
+const SLOWEST_WRITE: Duration = Duration::from_secs(10);
 /// How long one look for bytes waits.
 const GLANCE: Duration = Duration::from_millis(5);
 
@@ -117,8 +121,16 @@ impl<W: Wire> Device<W> {
     /// # Errors
     /// [`Error::Failed`].
     pub fn send_raw(&mut self, bytes: &[u8]) -> Result<()> {
-        let sent = self.wire.write_all(bytes).and_then(|()| self.wire.flush());
-        sent.map_err(|cause| line_failed(&cause))
+        let (mut rest, start) = (bytes, Instant::now());
+        while !rest.is_empty() {
+            match self.wire.write(rest) {
+                Ok(count) => rest = &rest[count..],
+                // A slow line takes them by and by.
+                Err(cause) if is_timeout(&cause) && start.elapsed() < SLOWEST_WRITE => {}
+                Err(cause) => return Err(line_failed(&cause)),
+            }
+        }
+        self.wire.flush().map_err(|cause| line_failed(&cause))
     }
 
     /// Sends a request under a number of its own, which is returned.
@@ -142,6 +154,7 @@ impl<W: Wire> Device<W> {
         mut read: impl FnMut(u16, &Report<'_>) -> Option<T>,
     ) -> Result<Option<T>> {
         let mut bytes = [0; 4096];
+        let mut is_last_look = false;
         loop {
             while let Some(byte) = self.pending.pop_front() {
                 let report = match self.receiver.push(byte) {
@@ -158,16 +171,18 @@ impl<W: Wire> Device<W> {
                     Err(_) => self.damaged += 1,
                 }
             }
+            if is_last_look {
+                return Ok(None);
+            }
             match self.wire.read(&mut bytes) {
                 Ok(0) => return Err(Error::Failed("the device closed the line".into())),
                 Ok(count) => self.pending.extend(&bytes[..count]),
                 Err(cause) if is_timeout(&cause) => {}
                 Err(cause) => return Err(line_failed(&cause)),
             }
-            // Looked at after reading, so that even a deadline of now takes what is there.
-            if self.pending.is_empty() && Instant::now() >= deadline {
-                return Ok(None);
-            }
+            // Looked at after reading, so that even a deadline of now takes what is there; and whether
+            // or not bytes have come, since a device that scans never pauses for long.
+            is_last_look = Instant::now() >= deadline;
         }
     }
 
@@ -238,6 +253,45 @@ impl<W: Wire> Device<W> {
             Report::Statistics(statistics) => Some(*statistics),
             _ => None,
         })
+    }
+
+    /// The configuration in force.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] if the device does not answer.
+    pub fn configuration(&mut self) -> Result<Configuration> {
+        self.ask_plainly(&Request::Configuration, |report| match report {
+            Report::Configuration(configuration) => Some(*configuration),
+            _ => None,
+        })
+    }
+
+    /// Puts `configuration` in force.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] if the device refuses it, or does not answer.
+    pub fn configure(&mut self, configuration: Configuration) -> Result<()> {
+        self.ask_plainly(&Request::Configure(configuration), |report| {
+            matches!(report, Report::Configuration(_)).then_some(())
+        })
+    }
+
+    /// Does `work` while the device scans nothing, so that nothing comes unasked; afterwards, whatever
+    /// became of it, the configuration is again what it was.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] if the device does not answer, or what `work` returns.
+    pub fn while_paused<T>(&mut self, work: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
+        let before = self.configuration()?;
+        self.pause()?;
+        let outcome = work(self);
+        let restored = self.configure(before);
+        outcome.and_then(|value| restored.map(|()| value))
+    }
+
+    /// Stops scanning.
+    pub(crate) fn pause(&mut self) -> Result<()> {
+        self.configure(Configuration { frame_period_us: 0, ..Configuration::DEFAULT })
     }
 
     /// Restarts the device and waits until it answers again.

@@ -4,9 +4,10 @@ mod common;
 mod virtual_device;
 
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
+use std::time::{Duration, Instant};
 
 use common::Folder;
-use firmware::link::message::{Refusal, Report, Request, UploadStep};
+use firmware::link::message::{Configuration, Refusal, Report, Request, UploadStep};
 use host_sim::Error;
 use host_sim::device::check::{Plan, check};
 use host_sim::device::{Device, upload};
@@ -157,6 +158,31 @@ fn refusals_and_silence_are_told_apart() {
         _ => None,
     });
     assert!(matches!(strange, Err(Error::Failed(message)) if message.contains("Statistics")));
+}
+
+#[test]
+fn a_device_that_never_pauses_does_not_hold_the_host() {
+    // It scans as fast as it can, and its reports alone keep the line busy.
+    let mut device = device(SOUND, &model(3));
+    let busy = Configuration {
+        frame_period_us: 100,
+        send_readings: true,
+        send_estimates: true,
+        ..Configuration::DEFAULT
+    };
+    device.configure(busy).unwrap();
+    let mut reports = 0_u32;
+    let start = Instant::now();
+    let heard = device.hear(start + Duration::from_millis(300), |_, _| {
+        reports += 1;
+        None::<()>
+    });
+    assert_eq!(heard.unwrap(), None);
+    assert!(reports > 100, "{reports}");
+    assert!(start.elapsed() < Duration::from_secs(5));
+    // What was in force before a pause is in force after it.
+    device.while_paused(Device::identify).unwrap();
+    assert_eq!(device.configuration().unwrap(), busy);
 }
 
 #[cfg(unix)]

@@ -141,6 +141,10 @@ impl<
     fn configure(&mut self, configuration: Configuration) -> Result<Report<'static>, Refusal> {
         configuration.check().map_err(Refusal::Configuration)?;
         self.configuration = configuration;
+        if configuration.frame_period_us == 0 {
+            self.give_up_capture();
+            self.sensor_answers = true; // it is not asked any more
+        }
         self.clock.restart(self.line.platform().now_us());
         info!("configured: a frame every {=u32} us", configuration.frame_period_us);
         Ok(Report::Configuration(configuration))
@@ -150,9 +154,22 @@ impl<
         if frames == 0 || self.configuration.frame_period_us == 0 {
             return Err(Refusal::Baseline);
         }
+        if self.capture.is_some_and(|(waiting, _)| waiting == number) {
+            return Ok(()); // asked again, since the answer takes its time
+        }
+        self.give_up_capture();
         *self.baseline = Baseline::new();
         self.capture = Some((number, frames));
         Ok(())
+    }
+
+    /// Answers the request that waits for a baseline, if one does: there will be none.
+    fn give_up_capture(&mut self) {
+        if let Some((number, _)) = self.capture.take() {
+            *self.baseline = Baseline::new();
+            let sent = self.line.send(number, &Report::Refused(Refusal::Baseline));
+            self.count_lost(sent);
+        }
     }
 
     fn decode_readings<E: ExpKernel>(

@@ -6,16 +6,20 @@ use crate::platform::Port;
 
 /// Longest that a report may make no progress; then it is given up.
 const STALL_US: u32 = 50_000;
+/// Longest that a report may take in all: much less than a watchdog's period.
+const REPORT_US: u32 = 2_000_000;
 
 /// The board's serial line, with room for one report.
 pub struct Line<'m, P, const BYTES: usize> {
     platform: P,
     buffer: &'m mut [u8; BYTES],
+    /// The last report was given up in the middle: its frame is still to be ended.
+    cut: bool,
 }
 
 impl<'m, P: Port, const BYTES: usize> Line<'m, P, BYTES> {
     pub fn new(platform: P, buffer: &'m mut [u8; BYTES]) -> Self {
-        Self { platform, buffer }
+        Self { platform, buffer, cut: false }
     }
 
     pub fn platform(&mut self) -> &mut P {
@@ -27,17 +31,28 @@ impl<'m, P: Port, const BYTES: usize> Line<'m, P, BYTES> {
     pub fn send(&mut self, number: u16, report: &Report<'_>) -> bool {
         let Some(bytes) = packet::encode(number, report, self.buffer) else { return false };
         let platform = &mut self.platform;
-        cobs::encode(bytes, |byte| {
-            if platform.send(byte) {
-                return true;
-            }
-            let start_us = platform.now_us();
-            while platform.now_us().wrapping_sub(start_us) < STALL_US {
-                if platform.send(byte) {
-                    return true;
-                }
-            }
-            false
-        })
+        let start_us = platform.now_us();
+        let mut send = |byte| send_in_time(platform, byte, start_us);
+        let sent = (!self.cut || send(cobs::END)) && cobs::encode(bytes, send);
+        self.cut = !sent;
+        sent
+    }
+}
+
+fn send_in_time<P: Port>(platform: &mut P, byte: u8, report_start_us: u32) -> bool {
+    if platform.send(byte) {
+        return true;
+    }
+    let stall_start_us = platform.now_us();
+    loop {
+        let now_us = platform.now_us();
+        if now_us.wrapping_sub(stall_start_us) >= STALL_US
+            || now_us.wrapping_sub(report_start_us) >= REPORT_US
+        {
+            return false;
+        }
+        if platform.send(byte) {
+            return true;
+        }
     }
 }

@@ -95,16 +95,16 @@ impl<
 
     /// One turn of the loop: at most one request is answered, and a frame is scanned if it is due.
     ///
-    /// The watchdog is fed at the end, unless the scan gave not a single reading.
+    /// The watchdog is fed at the end, unless the last scan gave not a single reading: a sensor that
+    /// stays silent leads to a restart, which sets its bus up anew.
     pub fn step(&mut self) -> Option<Leave> {
         let leave = self.serve_link();
         let core = &mut self.app.core;
         let now_us = core.line.platform().now_us();
-        let good = match core.clock.due(now_us, core.configuration.frame_period_us) {
-            Some(missed) => core.scan(missed, self.model.sensor.as_ref()),
-            None => true,
-        };
-        if good {
+        if let Some(missed) = core.clock.due(now_us, core.configuration.frame_period_us) {
+            core.sensor_answers = core.scan(missed, self.model.sensor.as_ref());
+        }
+        if core.sensor_answers {
             core.line.platform().feed_watchdog();
         } else {
             core.statistics.bad_loops = core.statistics.bad_loops.saturating_add(1);

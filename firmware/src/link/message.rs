@@ -290,7 +290,7 @@ pub enum Refusal {
     },
     /// A field of a configuration is out of range.
     Configuration(ConfigurationField),
-    /// A baseline of no frames, or while nothing is scanned.
+    /// A baseline of no frames, or while nothing is scanned; or another was asked for meanwhile.
     Baseline,
     /// The blob does not fit into a slot.
     TooLarge {

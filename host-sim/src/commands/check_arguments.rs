@@ -192,8 +192,8 @@ fn page_of(f: &Findings) -> print::Page {
     line(
         "since its start",
         format!(
-            "{} requests, {} bad packets, {} lost reports, decoding at most {} µs",
-            s.requests, s.bad_packets, s.lost_reports, s.longest_decode_us
+            "{} requests, {} bad packets, {} lost reports",
+            s.requests, s.bad_packets, s.lost_reports
         ),
     );
     memory_lines(&mut page, &d.memory);

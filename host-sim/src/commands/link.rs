@@ -7,6 +7,7 @@ use clap::{Args, Subcommand};
 use firmware::link::message::{
     Configuration, ConfigurationField, Refusal, Report, Request, Statistics,
 };
+use firmware::timing::ScanPlan;
 use host_sim::device::check::check;
 use host_sim::device::{Device, DeviceIdentity, Wire, refused, serial, upload};
 use host_sim::model::LoadedModel;
@@ -112,7 +113,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         Action::Upload(action) => {
             let model = LoadedModel::read(&action.model)?;
             let mut device = open()?;
-            upload::replace(&mut device, model.bytes(), &Progress::on_terminal())?;
+            let progress = Progress::on_terminal();
+            device.while_paused(|device| upload::replace(device, model.bytes(), &progress))?;
             status(&Status { device: device.identify()?, statistics: device.statistics()? }, common)
         }
         Action::Record(action) => record(&mut open()?, action, common),
@@ -188,14 +190,24 @@ fn configure<W: Wire>(device: &mut Device<W>, scan: &ScanArguments, wanted: Want
             _ => format!("--period-us {}: from 100 to 1000000000", scan.period_us),
         }));
     }
-    let request = Request::Configure(configuration);
-    device.ask_plainly(&request, |r| matches!(r, Report::Configuration(_)).then_some(()))
+    device.configure(configuration)
 }
 
+/// A sample takes no longer, with any converter that the readout is written for.
+const SLOWEST_SAMPLE_NS: u32 = 100_000;
+
 /// Time in which so many frames must have come.
-fn patience(scan: &ScanArguments) -> Duration {
-    Duration::from_secs(2)
-        + 4 * u32::from(scan.frames) * Duration::from_micros(scan.period_us.into())
+fn patience(scan: &ScanArguments, identity: &DeviceIdentity) -> Duration {
+    let plan = ScanPlan {
+        rows: identity.rows as u16,
+        columns: identity.columns as u16,
+        idle_samples: true,
+        settling_us: scan.settling_us,
+        oversampling: scan.oversampling,
+        sample_ns: SLOWEST_SAMPLE_NS,
+    };
+    let period = Duration::from_micros(scan.period_us.max(plan.scan_us()).into());
+    Duration::from_secs(2) + 4 * u32::from(scan.frames) * period
 }
 
 fn record<W: Wire>(
@@ -214,8 +226,11 @@ fn record<W: Wire>(
         Some(model) => (Wanted::Estimates, output_names(model, &identity)?),
         None => (Wanted::Readings, reading_names(&identity)),
     };
-    configure(device, &action.scan, wanted)?;
-    let frames = hear_frames(device, &action.scan, wanted)?;
+    let patience = patience(&action.scan, &identity);
+    let frames = device.while_paused(|device| {
+        configure(device, &action.scan, wanted)?;
+        hear_frames(device, action.scan.frames.into(), patience, wanted)
+    })?;
     let lines = frames.iter().map(|(_, line)| line.iter().copied());
     data_file::write(&action.output, names.iter().map(String::as_str), lines)?;
     let span = frames.last().zip(frames.first()).map_or(0, |(last, first)| last.0 - first.0 + 1);
@@ -240,14 +255,14 @@ fn reading_names(identity: &DeviceIdentity) -> Vec<String> {
 /// The frames that the device sends, with their numbers.
 fn hear_frames<W: Wire>(
     device: &mut Device<W>,
-    scan: &ScanArguments,
+    count: usize,
+    patience: Duration,
     wanted: Wanted,
 ) -> Result<Vec<(u32, Vec<f64>)>> {
-    let count = usize::from(scan.frames);
     let progress = Progress::on_terminal();
     progress.stage("recording", count);
-    let mut frames = Vec::new();
-    let enough = device.hear(Instant::now() + patience(scan), |_, report| {
+    let mut frames: Vec<(u32, Vec<f64>)> = Vec::new();
+    let enough = device.hear(Instant::now() + patience, |_, report| {
         let (frame, values) = match report {
             Report::Readings { frame, readings_ohm } if wanted == Wanted::Readings => {
                 (*frame, *readings_ohm)
@@ -257,12 +272,15 @@ fn hear_frames<W: Wire>(
             }
             _ => return None,
         };
+        if frames.last().is_some_and(|(last, _)| *last >= frame) {
+            return Some(Err(Error::Failed("the device has started anew meanwhile".into())));
+        }
         frames.push((frame, values.iter().map(f64::from).collect()));
         progress.step();
-        (frames.len() == count).then_some(())
+        (frames.len() == count).then_some(Ok(()))
     })?;
     match enough {
-        Some(()) => Ok(frames),
+        Some(outcome) => outcome.map(|()| frames),
         None => Err(Error::Failed(format!("only {} of {count} frames came in time", frames.len()))),
     }
 }
@@ -274,14 +292,17 @@ fn baseline<W: Wire>(
 ) -> Result<()> {
     output::check_writable(&action.output, &[])?;
     let identity = device.identify()?;
-    configure(device, &action.scan, Wanted::Nothing)?;
     let frames = action.scan.frames;
     let request = Request::CaptureBaseline { frames };
-    let answer = device.ask(&request, patience(&action.scan), |report| match report {
-        Report::Baseline { readings_ohm } => {
-            Some(readings_ohm.iter().map(f64::from).collect::<Vec<_>>())
-        }
-        _ => None,
+    let patience = patience(&action.scan, &identity);
+    let answer = device.while_paused(|device| {
+        configure(device, &action.scan, Wanted::Nothing)?;
+        device.ask(&request, patience, |report| match report {
+            Report::Baseline { readings_ohm } => {
+                Some(readings_ohm.iter().map(f64::from).collect::<Vec<_>>())
+            }
+            _ => None,
+        })
     })?;
     let readings = answer.map_err(|refusal| match refusal {
         Refusal::Baseline => {

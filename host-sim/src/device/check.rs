@@ -2,9 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use firmware::link::message::{
-    Configuration, Refusal, Report, Request, Statistics, UploadState, UploadStep,
-};
+use firmware::link::message::{Refusal, Report, Request, Statistics, UploadState, UploadStep};
 use model_core::checksum::CRC_32;
 use serde::Serialize;
 
@@ -70,7 +68,10 @@ impl Findings {
                 && u.damaged_refused == u.damaged
                 && u.old_stayed == u.interrupted
         });
-        let garbage = self.garbage.as_ref().is_none_or(|g| g.decodes_as_before);
+        let garbage = self
+            .garbage
+            .as_ref()
+            .is_none_or(|g| g.decodes_as_before && g.requests_until_answer <= 2);
         frames && scans && uploads && garbage && self.repeated == 0 && self.damaged == 0
     }
 }
@@ -190,9 +191,18 @@ pub fn check<W: Wire>(
     plan: &Plan,
     progress: &Progress,
 ) -> Result<Findings> {
+    device.while_paused(|device| check_paused(device, scene, model, plan, progress))
+}
+
+fn check_paused<W: Wire>(
+    device: &mut Device<W>,
+    scene: &Scene,
+    model: &LoadedModel,
+    plan: &Plan,
+    progress: &Progress,
+) -> Result<Findings> {
     let identity = device.identify()?;
     let kernel = fitting_kernel(&identity, model)?;
-    pause_scanning(device)?;
     if identity.model.is_none_or(|found| found.crc_32 != model.model().crc()) {
         upload::replace(device, model.bytes(), progress)?;
     }
@@ -241,14 +251,6 @@ pub(super) fn fitting_kernel(identity: &DeviceIdentity, model: &LoadedModel) -> 
         .ok_or_else(|| Error::Failed(format!("the device decodes with {:?}", identity.kernel)))
 }
 
-/// Frames that nobody asked for would be taken for answers.
-pub(super) fn pause_scanning<W: Wire>(device: &mut Device<W>) -> Result<()> {
-    let quiet = Configuration { frame_period_us: 0, ..Configuration::DEFAULT };
-    device.ask_plainly(&Request::Configure(quiet), |report| {
-        matches!(report, Report::Configuration(_)).then_some(())
-    })
-}
-
 /// A small model of the right shape, quick to upload.
 fn small_model(scene: &Scene, centres: usize) -> Result<LoadedModel> {
     let mut frames = synth::synthesise(scene, Stream::Training, 64);
@@ -272,51 +274,67 @@ fn check_uploads<W: Wire>(
 ) -> Result<UploadFindings> {
     let chunk_bytes = device.identify()?.chunk_bytes;
     let (old, new) = (small_model(scene, 2)?, small_model(scene, 1)?);
-    let mut findings = UploadFindings {
-        blob_bytes: new.bytes().len(),
-        good_came_into_force: true,
-        damaged: plan.damaged_uploads,
-        damaged_refused: 0,
-        interrupted: 0,
-        old_stayed: 0,
+    // First, while the model is where it was when the device started: an emulator that restarts puts
+    // it there again, over whatever had been written to that slot, but not to the other.
+    let (interrupted, old_stayed) = if plan.interruptions {
+        break_uploads_off(device, new.bytes(), chunk_bytes, model.model().crc(), progress)?
+    } else {
+        (0, 0)
     };
     // `replace` fails unless the device then says that the model is in force.
     upload::replace(device, old.bytes(), progress)?;
     let in_force = old.model().crc();
 
     progress.stage("uploading damaged models", plan.damaged_uploads);
+    let mut damaged_refused = 0;
     for index in 0..plan.damaged_uploads {
         let mut random = Random::new(scene.seed, Stream::Test, Purpose::Damage, index as u64, 0);
         let refused = upload_damaged(device, new.bytes(), chunk_bytes, index, &mut random)?;
-        let stayed = device.identify()?.model.is_some_and(|found| found.crc_32 == in_force);
-        findings.damaged_refused += usize::from(refused && stayed);
+        damaged_refused += usize::from(refused && has_in_force(device, in_force)?);
         progress.step();
-    }
-    if plan.interruptions {
-        let chunks: Vec<&[u8]> = new.bytes().chunks(chunk_bytes).collect();
-        progress.stage("breaking uploads off", chunks.len() + 1);
-        for taken in 0..=chunks.len() {
-            expect_receiving(upload::step(
-                device,
-                UploadStep::Begin { length: new.bytes().len() as u32 },
-            )?)?;
-            for (index, bytes) in chunks.iter().take(taken).enumerate() {
-                let offset = (index * chunk_bytes) as u32;
-                expect_receiving(upload::step(device, UploadStep::Chunk { offset, bytes })?)?;
-            }
-            let before = device.identify()?.model;
-            let after = device.restart()?.model;
-            pause_scanning(device)?;
-            let stayed = [before, after].iter().all(|m| m.is_some_and(|m| m.crc_32 == in_force));
-            findings.interrupted += 1;
-            findings.old_stayed += usize::from(stayed);
-            progress.step();
-        }
     }
     upload::replace(device, model.bytes(), progress)?;
     let (same, _) = expected.count_same(device, 1, 1, &Progress::silent())?;
-    findings.good_came_into_force = same == 1;
-    Ok(findings)
+    Ok(UploadFindings {
+        blob_bytes: new.bytes().len(),
+        good_came_into_force: same == 1,
+        damaged: plan.damaged_uploads,
+        damaged_refused,
+        interrupted,
+        old_stayed,
+    })
+}
+
+fn has_in_force<W: Wire>(device: &mut Device<W>, crc_32: u32) -> Result<bool> {
+    Ok(device.identify()?.model.is_some_and(|found| found.crc_32 == crc_32))
+}
+
+/// Breaks an upload off before its first chunk and after each: how often, and how often the model of
+/// `crc_32` was in force afterwards, and after a restart.
+fn break_uploads_off<W: Wire>(
+    device: &mut Device<W>,
+    blob: &[u8],
+    chunk_bytes: usize,
+    crc_32: u32,
+    progress: &Progress,
+) -> Result<(usize, usize)> {
+    let chunks: Vec<&[u8]> = blob.chunks(chunk_bytes).collect();
+    progress.stage("breaking uploads off", chunks.len() + 1);
+    let mut stayed = 0;
+    for taken in 0..=chunks.len() {
+        let length = blob.len() as u32;
+        expect_receiving(upload::step(device, UploadStep::Begin { length })?)?;
+        for (index, bytes) in chunks.iter().take(taken).enumerate() {
+            let offset = (index * chunk_bytes) as u32;
+            expect_receiving(upload::step(device, UploadStep::Chunk { offset, bytes })?)?;
+        }
+        let before = has_in_force(device, crc_32)?;
+        device.restart()?;
+        device.pause()?;
+        stayed += usize::from(before && has_in_force(device, crc_32)?);
+        progress.step();
+    }
+    Ok((chunks.len() + 1, stayed))
 }
 
 fn expect_receiving(answer: std::result::Result<UploadState, Refusal>) -> Result<()> {
@@ -328,6 +346,9 @@ fn expect_receiving(answer: std::result::Result<UploadState, Refusal>) -> Result
     }
 }
 
+/// Ways in which an upload can be damaged.
+const KINDS: usize = 7;
+
 /// Uploads `blob` damaged in one of the ways that there are, in turn; whether the device refused it
 /// in the end.
 fn upload_damaged<W: Wire>(
@@ -337,12 +358,24 @@ fn upload_damaged<W: Wire>(
     index: usize,
     random: &mut Random,
 ) -> Result<bool> {
+    if index % KINDS == KINDS - 1 {
+        return upload_with_a_chunk_lost(device, blob, chunk_bytes, random);
+    }
+    let damaged = damage(blob, index, random);
+    let outcome = upload::send(device, &damaged, chunk_bytes, &Progress::silent())?;
+    Ok(outcome.is_err())
+}
+
+/// `blob` with damage within.
+fn damage(blob: &[u8], index: usize, random: &mut Random) -> Vec<u8> {
     let mut damaged = blob.to_vec();
-    match index % 7 {
+    match index % KINDS {
         0 => damaged[random.below(blob.len())] ^= 1 << random.below(8),
         1 => {
             let start = random.below(blob.len() - 64);
-            damaged[start..start + 64].fill_with(|| random.below(256) as u8);
+            damaged[start..start + 64]
+                .iter_mut()
+                .for_each(|byte| *byte ^= 1 + random.below(255) as u8);
         }
         2 => damaged.truncate(4 * random.below(blob.len() / 4)),
         3 => damaged.extend([0; 4]),
@@ -352,15 +385,13 @@ fn upload_damaged<W: Wire>(
             damaged[start..start + 4].copy_from_slice(&f32::NAN.to_le_bytes());
             seal(&mut damaged);
         }
-        5 => {
+        _ => {
             // A number of the shape, under such a CRC.
             damaged[9 + random.below(5)] ^= 1 << random.below(7);
             seal(&mut damaged);
         }
-        _ => return upload_with_a_chunk_lost(device, blob, chunk_bytes, random),
     }
-    let outcome = upload::send(device, &damaged, chunk_bytes, &Progress::silent())?;
-    Ok(outcome.is_err())
+    damaged
 }
 
 /// Renews the closing CRC-32.
@@ -424,4 +455,91 @@ fn check_garbage<W: Wire>(
     let (same, _) = expected.count_same(device, 1, 1, &Progress::silent())?;
     let in_force = identity.model.is_some_and(|found| found.crc_32 == model.model().crc());
     Ok(GarbageFindings { bytes, requests_until_answer, decodes_as_before: in_force && same == 1 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn good() -> Findings {
+        let device = DeviceIdentity {
+            board: "b".into(),
+            firmware: "0".into(),
+            rows: 1,
+            columns: 1,
+            outputs: 1,
+            kernel: "libm".into(),
+            model: None,
+            slot_bytes: 0,
+            chunk_bytes: 0,
+            memory: firmware::link::message::Memory::default(),
+        };
+        let uploads = UploadFindings {
+            blob_bytes: 1,
+            good_came_into_force: true,
+            damaged: 7,
+            damaged_refused: 7,
+            interrupted: 3,
+            old_stayed: 3,
+        };
+        let garbage =
+            GarbageFindings { bytes: 9, requests_until_answer: 2, decodes_as_before: true };
+        Findings {
+            device,
+            statistics: Statistics::default(),
+            frames: FrameFindings { frames: 5, bit_identical: 5, frames_per_s: 1.0 },
+            scans: None,
+            uploads: Some(uploads),
+            garbage: Some(garbage),
+            repeated: 0,
+            damaged: 0,
+        }
+    }
+
+    #[test]
+    fn any_one_thing_wrong_is_not_all_good() {
+        assert!(good().all_good());
+        let spoilers: [fn(&mut Findings); 8] = [
+            |f| f.frames.bit_identical = 4,
+            |f| f.uploads.as_mut().unwrap().good_came_into_force = false,
+            |f| f.uploads.as_mut().unwrap().damaged_refused = 6,
+            |f| f.uploads.as_mut().unwrap().old_stayed = 2,
+            |f| f.garbage.as_mut().unwrap().decodes_as_before = false,
+            |f| f.garbage.as_mut().unwrap().requests_until_answer = 3,
+            |f| f.repeated = 1,
+            |f| f.damaged = 1,
+        ];
+        for (index, spoil) in spoilers.iter().enumerate() {
+            let mut findings = good();
+            spoil(&mut findings);
+            assert!(!findings.all_good(), "{index}");
+        }
+    }
+
+    #[test]
+    fn one_bit_of_one_output_makes_a_frame_another() {
+        let expected = Expected {
+            readings_ohm: vec![60.0; 4],
+            outputs: vec![0.5, -0.25, 0.0, 1.0],
+            per_frame: [2, 2],
+        };
+        assert!(expected.is_same(1, [0.0, 1.0].into_iter()));
+        let next = f32::from_bits(1.0_f32.to_bits() + 1);
+        for wrong in [&[0.0, next][..], &[-0.0, 1.0], &[0.0], &[0.0, 1.0, 2.0], &[0.5, -0.25]] {
+            assert!(!expected.is_same(1, wrong.iter().copied()), "{wrong:?}");
+        }
+        assert!(!expected.is_same(2, std::iter::empty()));
+    }
+
+    #[test]
+    fn every_kind_of_damage_makes_a_blob_that_is_refused() {
+        let scene = Scene::load("press").unwrap();
+        let blob = small_model(&scene, 1).unwrap().bytes().to_vec();
+        for index in (0..70).filter(|index| index % KINDS != KINDS - 1) {
+            let mut random = Random::new(1, Stream::Test, Purpose::Damage, index as u64, 0);
+            let damaged = damage(&blob, index, &mut random);
+            assert_ne!(damaged, blob, "{index}");
+            assert!(LoadedModel::from_bytes("damaged".as_ref(), &damaged).is_err(), "{index}");
+        }
+    }
 }

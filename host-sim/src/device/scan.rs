@@ -8,7 +8,7 @@ use firmware::circuit::ZeroPotential;
 use firmware::link::message::{Configuration, Report, Request};
 use serde::Serialize;
 
-use super::check::{Expected, fitting_kernel, pause_scanning};
+use super::check::{Expected, fitting_kernel};
 use super::{Device, Wire, refused, upload};
 use crate::dataset::Table;
 use crate::error::{Error, Result};
@@ -97,7 +97,7 @@ pub fn check<W: Wire>(
     let scene = with_parts_of_image(scene)?;
     let identity = device.identify()?;
     let kernel = fitting_kernel(&identity, model)?;
-    pause_scanning(device)?;
+    device.pause()?;
     if identity.model.is_none_or(|found| found.crc_32 != model.model().crc()) {
         upload::replace(device, model.bytes(), progress)?;
     }

@@ -13,6 +13,8 @@ use crate::error::{Error, Result};
 /// A request on its way.
 struct Outstanding {
     frame: u32,
+    /// Of its request that was sent last.
+    number: u16,
     sent: Instant,
     attempts: u32,
 }
@@ -42,9 +44,9 @@ pub fn decode_frames<W: Wire>(
     let (start, mut next) = (Instant::now(), 0);
     while next < frames || !on_their_way.is_empty() {
         while next < frames && on_their_way.len() < window.max(1) {
-            device.send(&request(next))?;
+            let number = device.send(&request(next))?;
             let sent = Instant::now();
-            on_their_way.push_back(Outstanding { frame: next, sent, attempts: 1 });
+            on_their_way.push_back(Outstanding { frame: next, number, sent, attempts: 1 });
             next += 1;
         }
         let Some(oldest) = on_their_way.front() else { break };
@@ -58,7 +60,9 @@ pub fn decode_frames<W: Wire>(
                 take(estimate.frame, estimate);
                 Some(Ok(()))
             }
-            Report::Refused(refusal) => Some(Err(refused(refusal))),
+            Report::Refused(refusal) if on_their_way.iter().any(|o| o.number == number) => {
+                Some(Err(refused(refusal)))
+            }
             _ => None,
         })?;
         match heard {
@@ -84,7 +88,7 @@ fn repeat_oldest<'r, W: Wire>(
     oldest.attempts += 1;
     oldest.sent = Instant::now();
     device.repeated += 1;
-    device.send(&request(oldest.frame))?;
+    oldest.number = device.send(&request(oldest.frame))?;
     on_their_way.push_back(oldest);
     Ok(())
 }

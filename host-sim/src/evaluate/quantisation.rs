@@ -4,7 +4,7 @@
 //! It holds for readings without noise, cross-talk and series resistance, and for the exp kernels
 //! that are within 2 ulp (the polynomial and libm's).
 
-use firmware::circuit::{Divider, ZeroPotential};
+use firmware::circuit::{Divider, NO_CURRENT_COUNTS, ZeroPotential};
 use model_core::rbf::{Network, Shape};
 use model_core::scale::scale;
 
@@ -37,21 +37,23 @@ fn gamma(n: usize) -> f64 {
 pub fn reading_bound_ohm(circuit: Circuit, ohm: f64, bits: u8) -> f64 {
     // Half a step for each sample.
     let half = 0.5 * f64::from(1_u32 << (12 - bits));
-    let (largest_counts, bound_ohm) = match circuit {
+    let (counts, largest_counts, bound_ohm) = match circuit {
         Circuit::Divider => {
             let reference_ohm = f64::from(Divider::<1, 1>::TYPICAL.reference_ohm[0]);
             let counts = COUNTS * reference_ohm / (reference_ohm + ohm);
-            (counts, (reference_ohm + ohm) * half / (counts - half))
+            (counts, counts, (reference_ohm + ohm) * half / (counts - half))
         }
         Circuit::ZeroPotential => {
             let typical = ZeroPotential::<1, 1>::TYPICAL;
             let drive = f64::from(typical.drive_v) / f64::from(typical.reference_v) * COUNTS;
             let counts = drive * f64::from(typical.feedback_ohm[0]) / ohm;
             // The sample and the idle sample.
-            (drive + counts, ohm * 2.0 * half / (counts - 2.0 * half))
+            (counts, drive + counts, ohm * 2.0 * half / (counts - 2.0 * half))
         }
     };
-    if bound_ohm < 0.0 || largest_counts + half > COUNTS - 2.0 * half {
+    // So small a current is taken for none.
+    let is_open = counts - 2.0 * half < f64::from(NO_CURRENT_COUNTS);
+    if bound_ohm < 0.0 || is_open || largest_counts + half > COUNTS - 2.0 * half {
         return f64::INFINITY;
     }
     bound_ohm + gamma(8) * (ohm + bound_ohm)
@@ -114,7 +116,9 @@ fn of_network(network: &Network<'_>, ohm: &[f64], bound_ohm: &[f64]) -> Vec<f64>
         let largest = (-decay * nearest * nearest).exp();
         let third = largest * third_derivative(decay, farthest) * h_norm.powi(3) / 6.0;
         // φ's own rounding: that of d·‖x − c‖², and 2 ulp of the exponential. Two inferences.
-        let exponent = 1.01 * decay * farthest * farthest * gamma(12);
+        // Difference, square, a sum in four lanes, these together, times decay.
+        let operations = 2 + shape.inputs.div_ceil(4) + 2 + 1;
+        let exponent = 1.01 * decay * farthest * farthest * gamma(operations);
         let rounding = 2.0 * (largest * (exponent + 4.1 * UNIT) + 1e-37);
         let magnitudes = || weights.iter().map(|w| f64::from(*w).abs());
         add(&mut rest, third + rounding, magnitudes());
