@@ -20,8 +20,9 @@ const WAIT: u8 = 0x02;
 const PIN: u8 = 0x80;
 /// Longest transaction, in bytes.
 const LONGEST_TRANSFER: usize = 16;
-/// Longest that the line may make no progress.
-const STALL_US: u32 = 200_000;
+/// Longest that the line may make no progress: the other end may run on a busy computer, and an answer
+/// that comes after this would be taken for the next one.
+const STALL_US: u32 = 2_000_000;
 
 /// Why a transaction failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

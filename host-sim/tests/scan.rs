@@ -98,7 +98,7 @@ impl Write for Socket {
 impl Port for Socket {
     /// A slow clock, so that nothing stalls however busy the computer is.
     fn now_us(&mut self) -> u32 {
-        self.start.elapsed().as_millis() as u32
+        (self.start.elapsed().as_micros() / 10) as u32
     }
 
     fn receive(&mut self) -> Option<u8> {
