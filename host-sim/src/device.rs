@@ -25,6 +25,8 @@ pub mod upload;
 
 /// How long a board's answer may take, but for those that erase flash.
 const ANSWER: Duration = Duration::from_millis(500);
+/// How long a device takes to start.
+const START: Duration = Duration::from_millis(100);
 /// How often a request is sent before its device is given up.
 const ATTEMPTS: u32 = 6;
 /// How long a request may take to be sent.
@@ -302,7 +304,16 @@ impl<W: Wire> Device<W> {
         self.ask_plainly(&Request::Restart, |report| {
             matches!(report, Report::Restarting).then_some(())
         })?;
-        self.identify()
+        // What arrives while it starts is lost: that is no fault of the line.
+        let (patience, repeated) = (self.patience, self.repeated);
+        let start = Instant::now();
+        self.patience = START;
+        let mut identity = self.identify();
+        while identity.is_err() && start.elapsed() < patience {
+            identity = self.identify();
+        }
+        (self.patience, self.repeated) = (patience, repeated);
+        identity
     }
 }
 
