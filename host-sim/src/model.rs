@@ -13,8 +13,11 @@ use crate::columns;
 use crate::dataset::{Dataset, Table};
 use crate::error::{Error, Result};
 use crate::infer::{Kernel, infer, infer_line};
+use crate::progress::Progress;
+use crate::random::Stream;
 use crate::scene::{NoiseKind, Scene};
-use crate::train::FittedNetwork;
+use crate::synth;
+use crate::train::{self, FittedNetwork, Options};
 
 /// Where a model's training data came from.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,6 +66,19 @@ impl Origin {
             full_scale: full_scale.collect(),
         }
     }
+}
+
+/// Trains the model that `scene` describes, as the command `train` does.
+///
+/// # Errors
+/// [`Error::Usage`] for training options that cannot be, [`Error::Failed`] as [`encode`].
+pub fn train_scene(scene: &Scene, progress: &Progress) -> Result<LoadedModel> {
+    let t = &scene.training;
+    let frames = synth::synthesise(scene, Stream::Training, t.frames);
+    let options = Options::new(t.centres, t.spread, t.affine_tail, scene.seed);
+    let networks = train::train(&frames, &options, progress)?;
+    let blob = encode(&networks, &frames, &Origin::of_scene(scene))?;
+    LoadedModel::from_bytes(Path::new("the model just trained"), &blob)
 }
 
 /// Writes `networks`, one a row-wire of the `dataset` that trained them, as a blob.

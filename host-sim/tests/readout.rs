@@ -7,12 +7,9 @@ use host_sim::dataset::Table;
 use host_sim::evaluate::quantisation::{output_bounds, reading_bound_ohm};
 use host_sim::evaluate::readout::{self, ReadoutResult, Stage};
 use host_sim::infer::Kernel;
-use host_sim::model::{LoadedModel, Origin, encode};
+use host_sim::model::{LoadedModel, train_scene};
 use host_sim::progress::Progress;
-use host_sim::random::Stream;
 use host_sim::scene::{Circuit, Readout, Scene};
-use host_sim::synth::synthesise;
-use host_sim::train::{Options, train};
 use host_sim::virtual_hardware::{SeriesResistance, VirtualBoard};
 
 const FRAMES: usize = 300;
@@ -20,12 +17,7 @@ const FRAMES: usize = 300;
 /// The model that `run press` makes.
 fn press() -> (Scene, LoadedModel) {
     let scene = Scene::load("press").unwrap();
-    let t = &scene.training;
-    let training = synthesise(&scene, Stream::Training, t.frames);
-    let options = Options::new(t.centres, t.spread, t.affine_tail, scene.seed);
-    let networks = train(&training, &options, &Progress::silent()).unwrap();
-    let blob = encode(&networks, &training, &Origin::of_scene(&scene)).unwrap();
-    let model = LoadedModel::from_bytes("press.bin".as_ref(), &blob).unwrap();
+    let model = train_scene(&scene, &Progress::silent()).unwrap();
     (scene, model)
 }
 

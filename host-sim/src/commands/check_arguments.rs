@@ -1,16 +1,14 @@
 //! What `emulate` and `link … check` have in common: the plan, the model, and the page.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use firmware::link::message::Memory;
 use host_sim::device::check::{Findings, Plan};
-use host_sim::model::{self, LoadedModel, Origin};
+use host_sim::model::{self, LoadedModel};
 use host_sim::progress::Progress;
-use host_sim::random::Stream;
 use host_sim::scene::Scene;
-use host_sim::train::{self, Options};
-use host_sim::{Error, Result, synth};
+use host_sim::{Error, Result};
 
 use super::scene_argument::SceneArgument;
 use super::{Common, print};
@@ -84,7 +82,7 @@ impl CheckArguments {
     pub fn model(&self, scene: &Scene) -> Result<LoadedModel> {
         let model = match &self.model {
             Some(path) => LoadedModel::read(path)?,
-            None => trained(scene)?,
+            None => model::train_scene(scene, &Progress::on_terminal())?,
         };
         let metadata = model.model();
         let inputs = metadata.metadata().input_names;
@@ -108,16 +106,6 @@ impl CheckArguments {
             window,
         }
     }
-}
-
-/// A model as `train` makes it for the scene.
-fn trained(scene: &Scene) -> Result<LoadedModel> {
-    let t = &scene.training;
-    let frames = synth::synthesise(scene, Stream::Training, t.frames);
-    let options = Options::new(t.centres, t.spread, t.affine_tail, scene.seed);
-    let networks = train::train(&frames, &options, &Progress::on_terminal())?;
-    let blob = model::encode(&networks, &frames, &Origin::of_scene(scene))?;
-    LoadedModel::from_bytes(Path::new("the model just trained"), &blob)
 }
 
 /// Prints what was found; wrong answers, and more memory than allowed, are a failure.

@@ -5,13 +5,11 @@ use std::path::PathBuf;
 use clap::Args;
 use host_sim::evaluate::metrics::Errors;
 use host_sim::evaluate::readout::{self, ReadoutResult, Stage};
-use host_sim::model::{self, LoadedModel, Origin};
+use host_sim::model::{self, LoadedModel};
 use host_sim::progress::Progress;
-use host_sim::random::Stream;
 use host_sim::scene::{Circuit, Scene};
-use host_sim::train::{self, Options};
 use host_sim::virtual_hardware::VirtualBoard;
-use host_sim::{Error, Result, synth};
+use host_sim::{Error, Result};
 
 use super::scene_argument::SceneArgument;
 use super::{Common, print};
@@ -40,7 +38,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     VirtualBoard::new(&scene)?;
     let model = match &arguments.model {
         Some(path) => read(path.clone(), &scene)?,
-        None => train(&scene)?,
+        None => model::train_scene(&scene, &Progress::on_terminal())?,
     };
     let result = readout::measure(&scene, &model, arguments.frames)?;
     if common.json { print::json(&result) } else { page_of(&result).print() }
@@ -60,15 +58,6 @@ fn read(path: PathBuf, scene: &Scene) -> Result<LoadedModel> {
         scene.name
     );
     Err(Error::Data { path, message })
-}
-
-fn train(scene: &Scene) -> Result<LoadedModel> {
-    let t = &scene.training;
-    let training = synth::synthesise(scene, Stream::Training, t.frames);
-    let options = Options::new(t.centres, t.spread, t.affine_tail, scene.seed);
-    let networks = train::train(&training, &options, &Progress::on_terminal())?;
-    let blob = model::encode(&networks, &training, &Origin::of_scene(scene))?;
-    LoadedModel::from_bytes("model.bin".as_ref(), &blob)
 }
 
 fn page_of(result: &ReadoutResult) -> print::Page {
