@@ -215,6 +215,8 @@ fn check_paused<W: Wire>(
         bit_identical,
         frames_per_s: plan.frames as f64 / time.as_secs_f64(),
     };
+    // A restart forgets how deep the stack has been.
+    let deepest_so_far = device.identify()?.memory.stack_high_water;
     let uploads = if plan.damaged_uploads > 0 || plan.interruptions {
         Some(check_uploads(device, scene, model, &expected, plan, progress)?)
     } else {
@@ -225,8 +227,11 @@ fn check_paused<W: Wire>(
     } else {
         None
     };
+    let mut identity = device.identify()?;
+    let deepest = &mut identity.memory.stack_high_water;
+    *deepest = deepest_so_far.max(*deepest);
     Ok(Findings {
-        device: device.identify()?,
+        device: identity,
         statistics: device.statistics()?,
         frames,
         scans: None,
