@@ -9,7 +9,7 @@ use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
 use firmware::link::message::{
-    Configuration, Identity, Memory, ModelIdentity, Refusal, Report, Request,
+    Configuration, Identity, Memory, ModelFault, ModelIdentity, Refusal, Report, Request,
 };
 use firmware::link::receive::{Received, Receiver};
 use firmware::link::{cobs, packet};
@@ -336,7 +336,22 @@ pub fn request_bytes(number: u16, request: &Request<'_>) -> Result<Vec<u8>> {
 /// A refusal as an error.
 #[must_use]
 pub fn refused(refusal: &Refusal) -> Error {
-    Error::Failed(format!("the device refused: {refusal:?}"))
+    let why = match refusal {
+        Refusal::Version(version) => format!("it speaks version {version} of the protocol"),
+        Refusal::Unknown => "it does not know the request".into(),
+        Refusal::FrameLength { expected } => format!("a frame of it has {expected} readings"),
+        Refusal::Configuration(field) => format!("{field:?} of the configuration is out of range"),
+        Refusal::Baseline => "it scans nothing, or another baseline was asked for".into(),
+        Refusal::TooLarge { slot_bytes } => format!("a model may have {slot_bytes} bytes at most"),
+        Refusal::NoUpload => "no upload has begun".into(),
+        Refusal::OutOfPlace { received } => format!("it has {received} bytes of the upload so far"),
+        Refusal::BadModel(ModelFault::Shape) => "the model is for a sensor of another shape".into(),
+        Refusal::BadModel(fault) => {
+            format!("the model is unsound ({fault:?}); `inspect` tells more")
+        }
+        Refusal::Flash => "its flash could not be written".into(),
+    };
+    Error::Failed(format!("the device refused: {why}"))
 }
 
 fn is_timeout(cause: &std::io::Error) -> bool {

@@ -1,6 +1,7 @@
 //! The device's image in QEMU's mps2-an386, a Cortex-M4F, with its serial lines here.
 
-use std::io::ErrorKind;
+use std::fs::File;
+use std::io::{ErrorKind, Read};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -34,13 +35,19 @@ impl Options {
     /// # Errors
     /// [`Error::Usage`]: the image is not there.
     pub fn check(&self) -> Result<()> {
-        if self.image.is_file() {
-            return Ok(());
+        let image = self.image.display();
+        let mut magic = [0; 4];
+        let opened = File::open(&self.image).and_then(|mut file| file.read_exact(&mut magic));
+        match opened {
+            Ok(()) if magic == *b"\x7FELF" => Ok(()),
+            Ok(()) => Err(Error::Usage(format!(
+                "--image {image}: it is no ELF file; the application's is `qemu-app`"
+            ))),
+            Err(cause) => Err(Error::Usage(format!(
+                "--image {image}: {cause}; `cargo xtask firmware` builds it, below CARGO_TARGET_DIR if \
+                 that is set"
+            ))),
         }
-        Err(Error::Usage(format!(
-            "--image {}: there is no such file; build it with `cargo xtask firmware`",
-            self.image.display()
-        )))
     }
 }
 
@@ -67,7 +74,10 @@ impl Emulator {
     pub fn start(options: &Options) -> Result<(Self, Lines)> {
         options.check()?;
         let failed = |cause: &dyn std::fmt::Display| {
-            Error::Failed(format!("the emulator does not start: {cause}"))
+            Error::Failed(format!(
+                "--qemu {}: the emulator does not start: {cause}",
+                options.qemu.display()
+            ))
         };
         let listen = || {
             let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
@@ -92,7 +102,7 @@ impl Emulator {
         command.arg("-kernel").arg(&options.image).stdin(Stdio::null()).stdout(
             match &options.log {
                 Some(path) => {
-                    let file = std::fs::File::create(path);
+                    let file = File::create(path);
                     file.map_err(|cause| Error::write(path, cause))?.into()
                 }
                 None => Stdio::null(),
@@ -143,7 +153,7 @@ fn accept(listener: &TcpListener, child: &mut Child) -> std::io::Result<TcpStrea
             Err(cause) => return Err(cause),
         }
         if let Some(status) = child.try_wait()? {
-            return Err(std::io::Error::other(format!("QEMU ended with {status}")));
+            return Err(std::io::Error::other(format!("it ended with {status}")));
         }
         if Instant::now() > deadline {
             return Err(std::io::Error::other("QEMU does not connect"));

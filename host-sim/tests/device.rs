@@ -193,10 +193,15 @@ mod serial_port {
 
     /// A device at the far end of a pseudo-terminal, whose name this is.
     fn port(model: &LoadedModel) -> (String, TTYPort) {
+        port_with(model, frames())
+    }
+
+    /// The same, with a sensor that shows `frames`.
+    fn port_with(model: &LoadedModel, frames: Vec<[[f32; 18]; 8]>) -> (String, TTYPort) {
         let (mut far, near) = TTYPort::pair().unwrap();
         far.set_timeout(std::time::Duration::from_millis(1)).unwrap();
         let name = near.name().unwrap();
-        virtual_device::run(Quick(far), SOUND, model.bytes(), frames());
+        virtual_device::run(Quick(far), SOUND, model.bytes(), frames);
         (name, near)
     }
 
@@ -294,9 +299,10 @@ mod serial_port {
         }
 
         for (arguments, text) in [
-            (&["record", new_file, "-o", "x.csv", "--period-us", "7"][..], "--period-us 7"),
-            (&["baseline", "-o", "x.csv", "--oversampling", "0"], "--oversampling 0"),
-            (&["baseline", "-o", "x.csv", "-n", "0"], "-n"),
+            (&["record", new_file, "-o", "x.csv", "--period-us", "7"][..], "7 is not in 100..="),
+            (&["baseline", "-o", "x.csv", "--oversampling", "0"], "--oversampling <N>': 0"),
+            (&["baseline", "-o", "x.csv", "-n", "0"], "0 is not in 1..="),
+            (&["baseline", "-o", "x.csv", "-n", "-3"], "'-3' for '--frames <N>'"),
             (&["upload", "none.bin"], "none.bin"),
         ] {
             let output = folder.run(&[&["link", &port][..], arguments].concat());
@@ -305,6 +311,21 @@ mod serial_port {
             assert!(message.contains(text), "{message}");
         }
         assert_eq!(folder.names(), ["estimate.csv", "new.bin", "readings.csv", "rest.csv"]);
+    }
+
+    #[test]
+    fn a_sensor_that_says_nothing_is_no_recording() {
+        let folder = Folder::new("silent");
+        let model = model(3);
+        let (port, near) = port_with(&model, vec![[[f32::NAN; 18]; 8]]);
+        drop(near);
+        for command in ["record", "baseline"] {
+            let output = folder.run(&["link", &port, command, "-n", "3", "-o", "x.csv"]);
+            let message = String::from_utf8_lossy(&output.stderr);
+            assert_eq!(output.status.code(), Some(1), "{command}: {message}");
+            assert!(message.contains("not a single reading"), "{message}");
+        }
+        assert!(folder.names().is_empty());
     }
 
     #[test]

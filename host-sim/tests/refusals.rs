@@ -255,7 +255,9 @@ fn a_link_is_followed_and_permissions_stay() {
 fn an_emulator_or_an_image_that_is_not_there_is_named() {
     let folder = Folder::new("no_emulator");
     refused(&folder, &["emulate", "--image", "none.elf"], &["none.elf", "cargo xtask firmware"]);
-    let image = folder.write("image.elf", "not really");
+    let not_elf = folder.write("image.txt", "not really");
+    refused(&folder, &["emulate", "--image", not_elf.to_str().unwrap()], &["image.txt", "no ELF"]);
+    let image = folder.write("image.elf", "\x7FELF, or so it says");
     let image = image.to_str().unwrap();
     folder.write("small.toml", small_scene());
     let arguments = ["emulate", "small.toml", "--image", image, "--qemu", "no-such-qemu"];

@@ -71,7 +71,11 @@ pub fn run(names: &[&str], differences: Differences) -> Outcome {
 /// Prints a log that was saved while an image ran: the application's if none is named.
 pub fn print_log(log: &str, image: Option<&str>) -> Outcome {
     let image = image.map_or_else(|| elf(application::IMAGE), PathBuf::from);
-    print!("{}", qemu::decoded(Path::new(log), &image)?);
+    let text = qemu::decoded(Path::new(log), &image)?;
+    if text.is_empty() {
+        return Err(format!("{log} holds no log of {}", image.display()));
+    }
+    print!("{text}");
     Ok(())
 }
 

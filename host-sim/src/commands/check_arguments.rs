@@ -22,7 +22,13 @@ pub struct CheckArguments {
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// Frames that the device decodes.
-    #[arg(short = 'n', long, value_name = "N", default_value_t = 1000)]
+    #[arg(
+        short = 'n',
+        long,
+        value_name = "N",
+        default_value_t = 1000,
+        allow_negative_numbers = true
+    )]
     frames: usize,
     /// Damaged models to upload: each must leave the old one in force.
     #[arg(long, value_name = "N", default_value_t = 0)]
@@ -85,6 +91,13 @@ impl CheckArguments {
             None => model::train_scene(scene, &Progress::on_terminal())?,
         };
         let metadata = model.model();
+        if metadata.metadata().scene_digest != scene.digest {
+            eprintln!(
+                "note: the model was trained on {:?}, not on this scene; its bits can be compared all \
+                 the same",
+                metadata.metadata().name
+            );
+        }
         let inputs = metadata.metadata().input_names;
         if !inputs.iter().eq(scene.reading_names().iter().map(String::as_str)) {
             return Err(Error::Usage(format!(
@@ -118,7 +131,14 @@ pub fn conclude(findings: &Findings, limits: &Limits, common: &Common) -> Result
     if findings.all_good() {
         limits.check(&findings.device.memory)
     } else {
-        Err(Error::Failed("the device does not do what it must: see above".into()))
+        Err(Error::Failed(if findings.repeated > 0 || findings.damaged > 0 {
+            format!(
+                "the line is not sound: {} requests had to be sent again, {} reports were damaged",
+                findings.repeated, findings.damaged
+            )
+        } else {
+            "the device does not do what it must: see above".into()
+        }))
     }
 }
 
@@ -142,8 +162,7 @@ fn page_of(f: &Findings) -> print::Page {
         line(
             "scans",
             format!(
-                "readings of {} of {} and estimates of {} of {} bit-identical to the host's, {} samples \
-                 failed, {:.1} a second",
+                "{} of {} readings and {} of {} estimates bit-identical, {} samples failed, {:.1} a second",
                 s.bit_identical_readings,
                 s.scans,
                 s.bit_identical_estimates,

@@ -46,7 +46,7 @@ pub struct Arguments {
     /// The emulator.
     #[arg(long, value_name = "PROGRAM", default_value = "qemu-system-arm")]
     qemu: PathBuf,
-    /// File for the image's log, as defmt encodes it (`defmt-print -e ELF < FILE` reads it).
+    /// File for the image's log, as defmt encodes it: `cargo xtask log FILE` prints it.
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
 }
@@ -59,7 +59,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         qemu: arguments.qemu.clone(),
         image: arguments.image.clone(),
         model: None,
-        log: arguments.log.clone(),
+        log: arguments.log.is_some().then(|| temporary("log.defmt")),
         readout: arguments.scans > 0,
     };
     options.check()?;
@@ -71,10 +71,11 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let model = arguments.check.model(&scene)?;
 
     // QEMU puts the blob where a board has it in flash.
-    let file = std::env::temp_dir().join(format!("taxel-model-{}.bin", std::process::id()));
-    let written = std::fs::write(&file, model.bytes());
-    written.map_err(|cause| Error::Write { path: file.clone(), cause })?;
-    let started = Emulator::start(&emulator::Options { model: Some(file.clone()), ..options });
+    let blob = temporary("model.bin");
+    let written = std::fs::write(&blob, model.bytes());
+    written.map_err(|cause| Error::Write { path: blob.clone(), cause })?;
+    let log = options.log.clone();
+    let started = Emulator::start(&emulator::Options { model: Some(blob.clone()), ..options });
     let outcome = started.and_then(|(_emulator, lines)| {
         let mut device = Device::new(lines.link)?;
         device.patience = PATIENCE;
@@ -86,7 +87,18 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         let plan = arguments.check.plan(WINDOW);
         Ok(Findings { scans, ..check(&mut device, &scene, &model, &plan, &progress)? })
     });
-    // Its content is in the model; only a kill leaves it behind.
-    let _ = std::fs::remove_file(&file);
+    // Only a kill leaves these behind.
+    let _ = std::fs::remove_file(&blob);
+    if let Some((temporary, wanted)) = log.zip(arguments.log.as_ref()) {
+        let logged = std::fs::read(&temporary).unwrap_or_default();
+        let _ = std::fs::remove_file(&temporary);
+        if !logged.is_empty() {
+            output::write_bytes(wanted, &logged)?;
+        }
+    }
     conclude(&outcome?, &arguments.check.limits, common)
+}
+
+fn temporary(name: &str) -> PathBuf {
+    std::env::temp_dir().join(format!("taxel-{}-{name}", std::process::id()))
 }

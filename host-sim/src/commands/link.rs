@@ -3,10 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use clap::{Args, Subcommand};
-use firmware::link::message::{
-    Configuration, ConfigurationField, Refusal, Report, Request, Statistics,
-};
+use clap::{Args, Subcommand, value_parser};
+use firmware::link::message::{Configuration, Report, Request, Statistics};
 use firmware::timing::ScanPlan;
 use host_sim::device::check::check;
 use host_sim::device::{Device, DeviceIdentity, Wire, refused, serial, upload};
@@ -25,7 +23,7 @@ pub struct Arguments {
     /// Serial port, such as /dev/ttyACM0 or COM3.
     port: String,
     /// Speed of the line in bits a second.
-    #[arg(long, value_name = "BAUD", default_value_t = 921_600)]
+    #[arg(long, value_name = "BAUD", default_value_t = 921_600, value_parser = value_parser!(u32).range(1..))]
     baud: u32,
     #[command(subcommand)]
     action: Action,
@@ -34,16 +32,23 @@ pub struct Arguments {
 #[derive(Subcommand)]
 enum Action {
     /// Show who the device is, which model is in force, where its memory goes, and its counters.
+    #[command(after_help = "Example: host-sim link /dev/ttyACM0 identify")]
     Identify,
     /// Put a model in force; the old one stays if the new one is refused.
+    #[command(after_help = "Example: host-sim link /dev/ttyACM0 upload press.bin")]
     Upload(UploadArguments),
     /// Let the device scan, and save its readings, or its estimates, as CSV, one frame a line.
+    #[command(
+        after_help = "Example: host-sim link /dev/ttyACM0 record press.bin -n 1000 -o estimates.csv"
+    )]
     Record(RecordArguments),
     /// Capture the sensor at rest, and save the mean readings as CSV. Leave the sensor alone meanwhile.
+    #[command(after_help = "Example: host-sim link /dev/ttyACM0 baseline -o rest.csv")]
     Baseline(BaselineArguments),
     /// Let the device decode a scene's frames, and compare with the host bit for bit.
     ///
     /// Whatever model is in force is replaced by the one checked with.
+    #[command(after_help = "Example: host-sim link /dev/ttyACM0 check press --model press.bin")]
     Check(CheckArguments),
 }
 
@@ -76,16 +81,16 @@ struct BaselineArguments {
 #[derive(Args)]
 struct ScanArguments {
     /// Frames to scan.
-    #[arg(short = 'n', long, value_name = "N", default_value_t = 100)]
+    #[arg(short = 'n', long, value_name = "N", default_value_t = 100, value_parser = value_parser!(u16).range(1..), allow_negative_numbers = true)]
     frames: u16,
     /// Time from one scan to the next.
-    #[arg(long, value_name = "US", default_value_t = Configuration::DEFAULT.frame_period_us)]
+    #[arg(long, value_name = "US", default_value_t = Configuration::DEFAULT.frame_period_us, value_parser = value_parser!(u32).range(100..=1_000_000_000), allow_negative_numbers = true)]
     period_us: u32,
     /// Wait after a row is driven.
-    #[arg(long, value_name = "US", default_value_t = Configuration::DEFAULT.scan.settling_us)]
+    #[arg(long, value_name = "US", default_value_t = Configuration::DEFAULT.scan.settling_us, value_parser = value_parser!(u32).range(..=10_000), allow_negative_numbers = true)]
     settling_us: u32,
     /// Samples averaged for a reading.
-    #[arg(long, value_name = "N", default_value_t = Configuration::DEFAULT.scan.oversampling)]
+    #[arg(long, value_name = "N", default_value_t = Configuration::DEFAULT.scan.oversampling, value_parser = value_parser!(u16).range(1..=256), allow_negative_numbers = true)]
     oversampling: u16,
 }
 
@@ -100,6 +105,8 @@ struct Saved {
     frames: usize,
     /// Numbers missing between the first frame and the last: lost on the line.
     frames_lost: u32,
+    /// Readings or outputs that are empty.
+    values_missing: usize,
     file: PathBuf,
 }
 
@@ -169,7 +176,7 @@ enum Wanted {
     Estimates,
 }
 
-/// Puts a configuration in force; a refusal names the option.
+/// Puts a configuration in force.
 fn configure<W: Wire>(device: &mut Device<W>, scan: &ScanArguments, wanted: Wanted) -> Result<()> {
     let mut configuration = Configuration {
         frame_period_us: scan.period_us,
@@ -179,17 +186,6 @@ fn configure<W: Wire>(device: &mut Device<W>, scan: &ScanArguments, wanted: Want
     };
     configuration.scan.settling_us = scan.settling_us;
     configuration.scan.oversampling = scan.oversampling;
-    if let Err(field) = configuration.check() {
-        return Err(Error::Usage(match field {
-            ConfigurationField::Settling => {
-                format!("--settling-us {}: at most 10000", scan.settling_us)
-            }
-            ConfigurationField::Oversampling => {
-                format!("--oversampling {}: from 1 to 256", scan.oversampling)
-            }
-            _ => format!("--period-us {}: from 100 to 1000000000", scan.period_us),
-        }));
-    }
     device.configure(configuration)
 }
 
@@ -215,9 +211,6 @@ fn record<W: Wire>(
     action: &RecordArguments,
     common: &Common,
 ) -> Result<()> {
-    if action.scan.frames == 0 || action.scan.period_us == 0 {
-        return Err(Error::Usage("-n or --period-us: neither may be 0".into()));
-    }
     let model = action.model.as_ref().map(|path| LoadedModel::read(path)).transpose()?;
     let inputs: Vec<&Path> = action.model.iter().map(PathBuf::as_path).collect();
     output::check_writable(&action.output, &inputs)?;
@@ -231,18 +224,36 @@ fn record<W: Wire>(
         configure(device, &action.scan, wanted)?;
         hear_frames(device, action.scan.frames.into(), patience, wanted)
     })?;
+    let missing = missing(frames.iter().flat_map(|(_, line)| line), wanted)?;
     let lines = frames.iter().map(|(_, line)| line.iter().copied());
     data_file::write(&action.output, names.iter().map(String::as_str), lines)?;
     let span = frames.last().zip(frames.first()).map_or(0, |(last, first)| last.0 - first.0 + 1);
-    saved(frames.len(), span.saturating_sub(frames.len() as u32), &action.output, common)
+    let frames_lost = span.saturating_sub(frames.len() as u32);
+    let file = action.output.clone();
+    saved(&Saved { frames: frames.len(), frames_lost, values_missing: missing, file }, common)
+}
+
+/// How many values are missing; all of them are a failure.
+fn missing<'v>(values: impl Iterator<Item = &'v f64> + Clone, wanted: Wanted) -> Result<usize> {
+    let missing = values.clone().filter(|value| value.is_nan()).count();
+    if missing < values.count() {
+        return Ok(missing);
+    }
+    let what = if wanted == Wanted::Estimates { "estimate" } else { "reading" };
+    Err(Error::Failed(format!(
+        "the device has not a single {what}; `identify` tells of failed samples: check the wiring of \
+         converters and rows (docs/board.md)"
+    )))
 }
 
 /// The names of the model's outputs, if it is the one in force.
 fn output_names(model: &LoadedModel, identity: &DeviceIdentity) -> Result<Vec<String>> {
     if identity.model.is_none_or(|found| found.crc_32 != model.model().crc()) {
-        return Err(Error::Usage(
-            "MODEL: the device has another in force; `upload` this one, or name that".into(),
-        ));
+        return Err(Error::Usage(format!(
+            "MODEL {:08x}: the device has {} in force; `upload` this one, or name that",
+            model.model().crc(),
+            identity.model.map_or("none".into(), |found| format!("{:08x}", found.crc_32))
+        )));
     }
     Ok(model.model().metadata().output_names.iter().map(String::from).collect())
 }
@@ -304,27 +315,26 @@ fn baseline<W: Wire>(
             _ => None,
         })
     })?;
-    let readings = answer.map_err(|refusal| match refusal {
-        Refusal::Baseline => {
-            Error::Usage("-n or --period-us: a baseline needs frames, so neither may be 0".into())
-        }
-        other => refused(&other),
-    })?;
+    let readings = answer.map_err(|refusal| refused(&refusal))?;
     let names = reading_names(&identity);
+    let values_missing = missing(readings.iter(), Wanted::Readings)?;
     let lines = std::iter::once(readings.iter().copied());
     data_file::write(&action.output, names.iter().map(String::as_str), lines)?;
-    saved(frames.into(), 0, &action.output, common)
+    let file = action.output.clone();
+    saved(&Saved { frames: frames.into(), frames_lost: 0, values_missing, file }, common)
 }
 
-fn saved(frames: usize, frames_lost: u32, file: &Path, common: &Common) -> Result<()> {
-    let saved = Saved { frames, frames_lost, file: file.into() };
+fn saved(saved: &Saved, common: &Common) -> Result<()> {
     if common.json {
-        return print::json(&saved);
+        return print::json(saved);
     }
     let mut page = print::Page::default();
     page.line(format_args!(
-        "{frames} frames in {}, {frames_lost} lost on the line",
-        saved.file.display()
+        "{} frames in {}, {} lost on the line, {} values missing",
+        saved.frames,
+        saved.file.display(),
+        saved.frames_lost,
+        saved.values_missing
     ));
     page.print()
 }

@@ -58,7 +58,8 @@ pub struct Findings {
 }
 
 impl Findings {
-    /// Whether all is as it must be.
+    /// Whether all is as it must be. A request that had to be sent again, or a damaged report, is a fault
+    /// of the line, and counts.
     #[must_use]
     pub fn all_good(&self) -> bool {
         let frames = self.frames.bit_identical == self.frames.frames;
