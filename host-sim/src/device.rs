@@ -74,6 +74,14 @@ pub struct DeviceIdentity {
     pub memory: Memory,
 }
 
+impl DeviceIdentity {
+    /// Whether the model of that CRC-32 is in force.
+    #[must_use]
+    pub fn has_in_force(&self, crc_32: u32) -> bool {
+        self.model.is_some_and(|found| found.crc_32 == crc_32)
+    }
+}
+
 impl From<&Identity<'_>> for DeviceIdentity {
     fn from(identity: &Identity<'_>) -> Self {
         Self {

@@ -248,7 +248,7 @@ fn missing<'v>(values: impl Iterator<Item = &'v f64> + Clone, wanted: Wanted) ->
 
 /// The names of the model's outputs, if it is the one in force.
 fn output_names(model: &LoadedModel, identity: &DeviceIdentity) -> Result<Vec<String>> {
-    if identity.model.is_none_or(|found| found.crc_32 != model.model().crc()) {
+    if !identity.has_in_force(model.model().crc()) {
         return Err(Error::Usage(format!(
             "MODEL {:08x}: the device has {} in force; `upload` this one, or name that",
             model.model().crc(),

@@ -188,11 +188,7 @@ fn check_paused<W: Wire>(
     plan: &Plan,
     progress: &Progress,
 ) -> Result<Findings> {
-    let identity = device.identify()?;
-    let kernel = fitting_kernel(&identity, model)?;
-    if identity.model.is_none_or(|found| found.crc_32 != model.model().crc()) {
-        upload::replace(device, model.bytes(), progress)?;
-    }
+    let kernel = prepare(device, model, progress)?;
 
     let readings = synth::synthesise(scene, Stream::Test, plan.frames.max(1)).inputs;
     let expected = Expected::new(model, kernel, &readings);
@@ -229,8 +225,22 @@ fn check_paused<W: Wire>(
     })
 }
 
+/// Puts `model` in force unless it is already; the kernel that the device decodes with.
+pub(super) fn prepare<W: Wire>(
+    device: &mut Device<W>,
+    model: &LoadedModel,
+    progress: &Progress,
+) -> Result<Kernel> {
+    let identity = device.identify()?;
+    let kernel = fitting_kernel(&identity, model)?;
+    if !identity.has_in_force(model.model().crc()) {
+        upload::replace(device, model.bytes(), progress)?;
+    }
+    Ok(kernel)
+}
+
 /// The kernel that the device decodes with, if it is a device for this model at all.
-pub(super) fn fitting_kernel(identity: &DeviceIdentity, model: &LoadedModel) -> Result<Kernel> {
+fn fitting_kernel(identity: &DeviceIdentity, model: &LoadedModel) -> Result<Kernel> {
     let shape = model.model().shape();
     let found = [identity.rows, identity.columns, identity.outputs];
     let expected = [shape.rows, shape.inputs, shape.outputs];
@@ -269,7 +279,7 @@ fn check_garbage<W: Wire>(
     let identity = device.identify()?;
     progress.step();
     let (same, _) = expected.count_same(device, 1, 1, &Progress::silent())?;
-    let in_force = identity.model.is_some_and(|found| found.crc_32 == model.model().crc());
+    let in_force = identity.has_in_force(model.model().crc());
     Ok(GarbageFindings { bytes, requests_until_answer, decodes_as_before: in_force && same == 1 })
 }
 

@@ -5,11 +5,11 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use firmware::circuit::ZeroPotential;
-use firmware::link::message::{Configuration, Report, Request};
+use firmware::link::message::{Configuration, Report};
 use serde::Serialize;
 
-use super::check::{Expected, fitting_kernel};
-use super::{Device, Wire, refused, upload};
+use super::check::{Expected, prepare};
+use super::{Device, Wire};
 use crate::dataset::Table;
 use crate::error::{Error, Result};
 use crate::evaluate::readout;
@@ -95,12 +95,8 @@ pub fn check<W: Wire>(
     progress: &Progress,
 ) -> Result<ScanFindings> {
     let scene = with_parts_of_image(scene)?;
-    let identity = device.identify()?;
-    let kernel = fitting_kernel(&identity, model)?;
     device.pause()?;
-    if identity.model.is_none_or(|found| found.crc_32 != model.model().crc()) {
-        upload::replace(device, model.bytes(), progress)?;
-    }
+    let kernel = prepare(device, model, progress)?;
 
     let readings = readout::all_readings(&scene, scans);
     let board = VirtualBoard::new(&scene)?;
@@ -116,6 +112,8 @@ pub fn check<W: Wire>(
     };
     let samples = ((ROWS + 1) * COLUMNS) as u32 * u32::from(scan.oversampling);
     let patience = Duration::from_secs(5) + samples * SAMPLE;
+    // A request may have to wait for a scan.
+    device.patience = device.patience.max(patience);
 
     let failed = |cause| Error::Failed(format!("the readout's line failed: {cause}"));
     let end = line.try_clone().map_err(failed)?;
@@ -175,7 +173,7 @@ fn count_same<W: Wire>(
         scans_per_s: 0.0,
     };
     let index = |frame: u32| frame.wrapping_sub(before.frames_scanned + 1);
-    configure(device, configuration, patience)?;
+    device.configure(configuration)?;
     let start = Instant::now();
     let (mut ended, mut deadline) = (0, start + patience);
     while ended < scans {
@@ -203,17 +201,7 @@ fn count_same<W: Wire>(
     }
     findings.scans_per_s = scans as f64 / start.elapsed().as_secs_f64();
     // It may have begun another scan, and answers after that.
-    configure(device, Configuration { frame_period_us: 0, ..Configuration::DEFAULT }, patience)?;
+    device.pause()?;
     findings.failed_samples = device.statistics()?.failed_samples - before.failed_samples;
     Ok(findings)
-}
-
-fn configure<W: Wire>(
-    device: &mut Device<W>,
-    configuration: Configuration,
-    patience: Duration,
-) -> Result<()> {
-    let request = Request::Configure(configuration);
-    let taken = |report: &Report<'_>| matches!(report, Report::Configuration(_)).then_some(());
-    device.ask(&request, patience, taken)?.map_err(|refusal| refused(&refusal))
 }

@@ -70,7 +70,7 @@ pub(super) fn check_uploads<W: Wire>(
     for index in 0..plan.damaged_uploads {
         let mut random = Random::new(scene.seed, Stream::Test, Purpose::Damage, index as u64, 0);
         let refused = upload_damaged(device, new.bytes(), chunk_bytes, index, &mut random)?;
-        damaged_refused += usize::from(refused && has_in_force(device, in_force)?);
+        damaged_refused += usize::from(refused && device.identify()?.has_in_force(in_force));
         progress.step();
     }
     upload::replace(device, model.bytes(), progress)?;
@@ -83,10 +83,6 @@ pub(super) fn check_uploads<W: Wire>(
         interrupted,
         old_stayed,
     })
-}
-
-fn has_in_force<W: Wire>(device: &mut Device<W>, crc_32: u32) -> Result<bool> {
-    Ok(device.identify()?.model.is_some_and(|found| found.crc_32 == crc_32))
 }
 
 /// Breaks an upload off before its first chunk and after each: how often, and how often the model of
@@ -108,10 +104,10 @@ fn break_uploads_off<W: Wire>(
             let offset = (index * chunk_bytes) as u32;
             expect_receiving(upload::step(device, UploadStep::Chunk { offset, bytes })?)?;
         }
-        let before = has_in_force(device, crc_32)?;
+        let before = device.identify()?.has_in_force(crc_32);
         device.restart()?;
         device.pause()?;
-        stayed += usize::from(before && has_in_force(device, crc_32)?);
+        stayed += usize::from(before && device.identify()?.has_in_force(crc_32));
         progress.step();
     }
     Ok((chunks.len() + 1, stayed))
