@@ -46,6 +46,7 @@ pub mod report;
 pub mod run;
 pub mod scene;
 pub mod sensor;
+pub mod simd;
 pub mod spread;
 pub mod synth;
 pub mod train;
