@@ -20,7 +20,7 @@ pub type PaperSensor<'a, E = Polynomial> = Tactile<'a, 8, 18, 18, E>;
 /// use model_core::blob::DecodeError;
 /// use model_core::{Aligned, Frame};
 /// # use model_core::blob::{Columns, Floats, Metadata, ModelParts, NoiseKind, encode};
-/// # use model_core::rbf::{Network, Parameters, Shape};
+/// # use model_core::rbf::{Shape, direct::{Network, Parameters}};
 /// # let network = Network::try_new(
 /// #     Shape { inputs: 2, centres: 1, outputs: 1 },
 /// #     Parameters {
@@ -49,7 +49,7 @@ pub type PaperSensor<'a, E = Polynomial> = Tactile<'a, 8, 18, 18, E>;
 /// #     training_rmse: Floats(&[0; 4]),
 /// #     full_scale: Floats(&[0; 4]),
 /// # };
-/// # let parts = ModelParts { networks: &[network], row_network: &[0], metadata };
+/// # let parts = ModelParts { networks: &[network.into()], row_network: &[0], metadata };
 /// # let mut buffer = Aligned([0; 512]);
 /// # let blob: &[u8] = encode(&parts, &mut buffer.0).unwrap();
 /// // `blob` holds a model of one row with two readings (Ω) and one output (mm).

@@ -8,7 +8,8 @@ use model_core::blob::{
     Columns, Floats, Metadata, ModelParts, NoiseKind, encode, encoded_length_bound,
 };
 use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
-use model_core::rbf::{Network, Parameters, Shape};
+use model_core::rbf::direct::{self, Parameters};
+use model_core::rbf::{Network, Shape};
 
 #[path = "../qemu/src/checks.rs"]
 mod checks;
@@ -38,7 +39,7 @@ fn network(
         bias,
         affine,
     };
-    Network::try_new(shape, parameters).unwrap()
+    direct::Network::try_new(shape, parameters).unwrap().into()
 }
 
 /// A model of the paper's shape: two networks, which the rows use in turn.

@@ -5,7 +5,8 @@ mod common;
 use common::*;
 use firmware::app::{Leave, Session};
 use firmware::link::message::{ModelFault, Refusal, Report, Request, UploadState, UploadStep};
-use model_core::rbf::{Network, Parameters, Shape};
+use model_core::rbf::Shape;
+use model_core::rbf::direct::{Network, Parameters};
 
 const CHUNK: usize = 60;
 
@@ -171,7 +172,7 @@ fn each_fault_of_a_model_is_named() {
         (truncated, ModelFault::Length),
         (&[&old[..], &[0; 4]].concat(), ModelFault::Length),
         (&corrupt, ModelFault::Corrupt),
-        (&blob_of(narrow.unwrap()), ModelFault::Shape),
+        (&blob_of(narrow.unwrap().into()), ModelFault::Shape),
     ] {
         let (outcome, _) = upload(&mut session, &bench.board, &upload_steps(blob, CHUNK));
         assert_eq!(outcome, Err(Refusal::BadModel(fault)));

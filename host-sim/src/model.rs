@@ -202,10 +202,8 @@ impl LoadedModel {
         let (mut clamped, mut present) = (0_usize, 0_usize);
         for line in readings.lines() {
             for (network, readings) in networks.iter().zip(line.chunks_exact(inputs)) {
-                let p = network.parameters();
-                let limits = p.input_minimum.iter().zip(p.input_per_span);
-                for (reading, (minimum, per_span)) in readings.iter().zip(limits) {
-                    let place = (*reading as f32 - minimum) * per_span;
+                for (input, reading) in readings.iter().enumerate() {
+                    let place = network.place_of(input, *reading as f32);
                     if !place.is_nan() {
                         present += 1;
                         clamped += usize::from(!(CLAMP[0]..=CLAMP[1]).contains(&place));

@@ -60,16 +60,21 @@ fn offset_of(blob: &[u8], pick: impl for<'a> Fn(&Model<'a>) -> &'a [u8]) -> usiz
     })
 }
 
-type Pick = for<'a> fn(&model_core::rbf::Parameters<'a>) -> &'a [f32];
+type Pick = for<'a> fn(&model_core::rbf::direct::Parameters<'a>) -> &'a [f32];
 
 fn parameter_offset(
     blob: &[u8],
     network: usize,
-    pick: impl for<'a> Fn(&model_core::rbf::Parameters<'a>) -> &'a [f32],
+    pick: impl for<'a> Fn(&model_core::rbf::direct::Parameters<'a>) -> &'a [f32],
 ) -> usize {
     offset_of(blob, |model| {
         let network = model.networks().nth(network).unwrap();
-        bytemuck::cast_slice(pick(network.parameters()))
+        {
+            let model_core::rbf::Network::F32Direct(network) = network else {
+                panic!("{network:?}")
+            };
+            bytemuck::cast_slice(pick(network.parameters()))
+        }
     })
 }
 

@@ -2,7 +2,7 @@
 
 use core::marker::PhantomData;
 
-use crate::blob::{DecodeError, Metadata, Model, ModelShape};
+use crate::blob::{DecodeError, Metadata, Model, ModelShape, NetworkSection};
 use crate::exp::{ExpKernel, Polynomial};
 use crate::frame::Frame;
 
@@ -30,13 +30,13 @@ pub struct Estimate<const ROWS: usize, const OUTPUTS: usize> {
 /// into the blob. The link check of the firmware holds it to the compiler.
 #[must_use]
 pub const fn decoder_ram_bytes(rows: usize) -> usize {
-    128 + 8 * rows
+    128 + 16 * rows
 }
 
 /// A model ready to decode frames of a sensor whose sizes are known when compiled.
 ///
-/// Any number of centres K is served: it comes with the blob. RAM: a slice a row; the weights stay
-/// where the blob lies.
+/// Any number of centres K is served: it comes with the blob. RAM: where each row's weights are; they
+/// stay where the blob lies.
 ///
 /// `E` is the [exp kernel](crate::exp).
 #[derive(Debug, Clone, Copy)]
@@ -49,7 +49,7 @@ pub struct Decoder<
 > {
     model: Model<'a>,
     /// Where each row's network is.
-    row_sections: [&'a [u8]; ROWS],
+    row_sections: [NetworkSection<'a>; ROWS],
     kernel: PhantomData<E>,
 }
 
@@ -77,7 +77,7 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKerne
     /// [`DecodeError`]: the blob is unsound, or its shape is not this decoder's.
     pub fn load(blob: &'a [u8]) -> Result<Self, DecodeError> {
         let model = Self::check(blob)?;
-        let mut row_sections = [&[][..]; ROWS];
+        let mut row_sections = [NetworkSection::EMPTY; ROWS];
         for (row, section) in row_sections.iter_mut().enumerate() {
             // A sound model has a network for every row.
             let networks = model.network_count() as u8;
@@ -117,21 +117,45 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKerne
     pub fn decode_into(&self, frame: &Frame<ROWS, COLS>, estimate: &mut Estimate<ROWS, OUTPUTS>) {
         let rows = self.row_sections.iter().zip(&frame.row_column_resistance_ohm);
         let places = estimate.outputs.iter_mut().zip(&mut estimate.status);
-        for (row, ((section, readings), (outputs, status))) in rows.zip(places).enumerate() {
-            *outputs = [f32::NAN; OUTPUTS];
-            *status = RowStatus::MissingReading;
-            if !readings.iter().all(|r| r.is_finite()) {
-                continue;
+        let mut scaled = [0.0; COLS];
+        for ((section, readings), (outputs, status)) in rows.zip(places) {
+            *status = match section.network(self.model.shape()) {
+                _ if !all_finite(readings) => RowStatus::MissingReading,
+                Ok(network) => match network.infer::<E>(readings, &mut scaled, outputs) {
+                    Ok(()) if network.is_bounded() || all_finite(outputs) => RowStatus::Decoded,
+                    _ => RowStatus::Overflow,
+                },
+                // Not so: it was there when the model was loaded.
+                Err(_) => RowStatus::MissingReading,
+            };
+            if *status != RowStatus::Decoded {
+                *outputs = [f32::NAN; OUTPUTS];
             }
-            // Both are there: the blob was checked when it was loaded.
-            let Some(network) = self.model.network_in(section, row) else { continue };
-            if let Ok(inferred) = network.infer_array::<E, COLS, OUTPUTS>(readings) {
-                if inferred.iter().all(|y| y.is_finite()) {
-                    *outputs = inferred;
-                    *status = RowStatus::Decoded;
-                } else {
-                    *status = RowStatus::Overflow;
-                }
+        }
+    }
+}
+
+/// Whether all `values` are finite, without a branch for each: a carry out of the exponent tells.
+fn all_finite<const N: usize>(values: &[f32; N]) -> bool {
+    const EXPONENT: u32 = 0x7F80_0000;
+    const LAST_PLACE: u32 = 0x0080_0000;
+    let carries = |bits: u32| (bits & EXPONENT) + LAST_PLACE;
+    values.iter().fold(0, |carry, value| carry | carries(value.to_bits())) >> 31 == 0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::all_finite;
+
+    #[test]
+    fn numbers_that_are_not_finite_are_found_anywhere() {
+        let finite = [0.0, -0.0, 1.0, f32::MAX, f32::MIN, f32::MIN_POSITIVE, 1e-45, -1e-45];
+        assert!(all_finite(&finite));
+        for place in 0..finite.len() {
+            for other in [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+                let mut values = finite;
+                values[place] = other;
+                assert!(!all_finite(&values), "{other} at {place}");
             }
         }
     }

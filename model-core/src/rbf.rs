@@ -1,15 +1,26 @@
-//! The K-centre Gaussian radial-basis-function network.
+//! The K-centre Gaussian radial-basis-function network, in three formats.
 //!
-//! F(x) = Σ_k ω_k·exp(−d_k·‖x − c_k‖²) + b (+ A·x), with d = 1/(2σ²) and x the readings scaled to
-//! [0, 1] (the paper, eq. 8–10; the affine tail A·x is ours). All parameters are `f32` and
-//! borrowed, and the shape is part of the value, so that one firmware serves any K.
+//! F(x) = Σ_k ω_k·exp(−‖x − c_k‖²/(2σ²)) + b (+ A·x), with x the scaled readings (the paper, eq. 8–10; the
+//! affine tail A·x is ours). All parameters are borrowed, and the shape is part of the value, so that one
+//! firmware serves any K.
 //!
-//! The order of the floating-point operations is part of the contract: ‖x − c‖² accumulates in
-//! four interleaved partial sums, added pairwise, and the outputs take the affine tail, one centre
-//! after the other, and last the bias, so that a large offset costs no digits of the rest. Host and device thus agree bit for bit, with or without SIMD.
+//! | [`Format`] | distances | a Cortex-M4F computes with |
+//! |---|---|---|
+//! | [`F32Direct`](Format::F32Direct) | Σ (x − c)²: safe at any width | the compiler's code, any [exp kernel](crate::exp) |
+//! | [`F32`](Format::F32) | ‖x‖² − 2x·c + ‖c‖²: where a bound proves it safe | `cortex_m4.s` |
+//! | [`Fixed16`](Format::Fixed16) | the same in integers, 16-bit weights | `cortex_m4.s`, two products an instruction |
+//!
+//! The order of the floating-point operations is part of the contract of each: the outputs take the affine
+//! tail, one centre after the other, and last the bias, so that a large offset costs no digits of the
+//! rest. Host and device thus agree bit for bit, with or without SIMD.
 
 use crate::exp::ExpKernel;
-use crate::scale::scale;
+
+#[cfg(cortex_m4f)]
+mod cortex_m4;
+pub mod direct;
+pub mod expanded;
+pub mod fixed16;
 
 /// The sizes of one network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,25 +31,6 @@ pub struct Shape {
     pub centres: usize,
     /// Quantities given out.
     pub outputs: usize,
-}
-
-/// The parameters of one network, borrowed from where they lie.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Parameters<'a> {
-    /// Smallest reading of each input in training, in the reading's unit: `[inputs]`.
-    pub input_minimum: &'a [f32],
-    /// 1/(maximum − minimum) of each input; 0 for a channel that never changed: `[inputs]`.
-    pub input_per_span: &'a [f32],
-    /// Centres on scaled inputs, centre after centre: `[centres × inputs]`.
-    pub centres: &'a [f32],
-    /// 1/(2σ²) on scaled inputs: `[1]` for one common width, or `[centres]`.
-    pub decay: &'a [f32],
-    /// Output weights ω, centre after centre: `[centres × outputs]`.
-    pub output_weights: &'a [f32],
-    /// Bias in the outputs' units: `[outputs]`.
-    pub bias: &'a [f32],
-    /// Affine tail A on scaled inputs, input after input: `[inputs × outputs]`, or empty.
-    pub affine: &'a [f32],
 }
 
 /// Why parameters do not make a network, or why a buffer does not fit one.
@@ -75,118 +67,152 @@ pub enum NetworkError {
         /// Which input, from 0.
         input: usize,
     },
+    /// Centres, widths and inputs do not go together: an exponent could leave the range of its format.
+    #[error("the exponent of centre {centre} can leave the range that the format computes with")]
+    ExponentOutOfRange {
+        /// Which centre, from 0.
+        centre: usize,
+    },
+    /// More inputs than the format can add up.
+    #[error("{found} inputs; the format holds at most {most}")]
+    TooManyInputs {
+        /// The most that there may be.
+        most: usize,
+        /// How many there are.
+        found: usize,
+    },
 }
 
-/// A network whose parameters have been checked against its shape.
+/// How a network's numbers and distances are represented.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// [`direct`]: f32, distances from differences.
+    F32Direct,
+    /// [`expanded`]: f32, distances from products.
+    F32,
+    /// [`fixed16`]: 16-bit fixed point.
+    Fixed16,
+}
+
+impl Format {
+    /// Every format.
+    pub const ALL: [Self; 3] = [Self::F32Direct, Self::F32, Self::Fixed16];
+
+    /// The format's name, as users choose it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::F32Direct => "f32-direct",
+            Self::F32 => "f32",
+            Self::Fixed16 => "fixed16",
+        }
+    }
+}
+
+/// A network of any format, whose parameters have been checked against its shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Network<'a> {
-    shape: Shape,
-    parameters: Parameters<'a>,
+pub enum Network<'a> {
+    /// See [`Format::F32Direct`].
+    F32Direct(direct::Network<'a>),
+    /// See [`Format::F32`].
+    F32(expanded::Network<'a>),
+    /// See [`Format::Fixed16`].
+    Fixed16(fixed16::Network<'a>),
+}
+
+/// Applies `$body` to the network inside, whatever its format.
+macro_rules! each {
+    ($network:expr, $inner:ident => $body:expr) => {
+        match $network {
+            Network::F32Direct($inner) => $body,
+            Network::F32($inner) => $body,
+            Network::Fixed16($inner) => $body,
+        }
+    };
 }
 
 impl<'a> Network<'a> {
-    /// Checks the lengths and values of `parameters`.
-    ///
-    /// # Errors
-    /// Every variant of [`NetworkError`]; lengths are checked before values.
-    pub fn try_new(shape: Shape, parameters: Parameters<'a>) -> Result<Self, NetworkError> {
-        let network = Self::with_lengths_checked(shape, parameters)?;
-        network.check_values()?;
-        Ok(network)
-    }
-
-    /// As [`try_new`](Self::try_new), without the pass over all values: for parameters that
-    /// passed it before.
-    pub(crate) fn with_lengths_checked(
-        shape: Shape,
-        parameters: Parameters<'a>,
-    ) -> Result<Self, NetworkError> {
-        let Shape { inputs, centres, outputs } = shape;
-        if inputs == 0 || centres == 0 || outputs == 0 {
-            return Err(NetworkError::Empty);
+    /// The network's format.
+    #[must_use]
+    pub fn format(&self) -> Format {
+        match self {
+            Self::F32Direct(_) => Format::F32Direct,
+            Self::F32(_) => Format::F32,
+            Self::Fixed16(_) => Format::Fixed16,
         }
-        let p = &parameters;
-        check_length("input_minimum", p.input_minimum, inputs)?;
-        check_length("input_per_span", p.input_per_span, inputs)?;
-        check_length("centres", p.centres, centres * inputs)?;
-        if p.decay.len() != 1 {
-            check_length("decay", p.decay, centres)?;
-        }
-        check_length("output_weights", p.output_weights, centres * outputs)?;
-        check_length("bias", p.bias, outputs)?;
-        if !p.affine.is_empty() {
-            check_length("affine", p.affine, inputs * outputs)?;
-        }
-        Ok(Self { shape, parameters })
-    }
-
-    fn check_values(&self) -> Result<(), NetworkError> {
-        let p = &self.parameters;
-        if let Some(centre) = p.decay.iter().position(|d| !(d.is_finite() && *d > 0.0)) {
-            return Err(NetworkError::InvalidWidth { centre });
-        }
-        for (what, values) in [
-            ("input_minimum", p.input_minimum),
-            ("input_per_span", p.input_per_span),
-            ("centres", p.centres),
-            ("output_weights", p.output_weights),
-            ("bias", p.bias),
-            ("affine", p.affine),
-        ] {
-            if !values.iter().all(|v| v.is_finite()) {
-                return Err(NetworkError::NotFinite { what });
-            }
-        }
-        if let Some(input) = p.input_per_span.iter().position(|s| *s < 0.0) {
-            return Err(NetworkError::NegativeSpan { input });
-        }
-        Ok(())
     }
 
     /// The network's sizes.
     #[must_use]
     pub fn shape(&self) -> Shape {
-        self.shape
+        each!(self, inner => inner.shape())
     }
 
-    /// The network's parameters.
+    /// Whether there is an affine tail.
     #[must_use]
-    pub fn parameters(&self) -> &Parameters<'a> {
-        &self.parameters
+    pub fn has_affine_tail(&self) -> bool {
+        match self {
+            Self::F32Direct(inner) => !inner.parameters().affine.is_empty(),
+            Self::F32(inner) => inner.has_affine_tail(),
+            Self::Fixed16(inner) => inner.has_affine_tail(),
+        }
     }
 
-    /// Infers `output` from one row of `reading`s, with sizes known when it runs.
+    /// Whether no finite reading can make an output overflow: what is checked of all formats but the first.
+    pub(crate) fn is_bounded(&self) -> bool {
+        !matches!(self, Self::F32Direct(_))
+    }
+
+    /// Width σ of the centres on inputs scaled to [0, 1]: one for all, or one each.
+    pub fn widths(&self) -> impl Iterator<Item = f32> {
+        let (common, each): (Option<f32>, &'a [f32]) = match self {
+            Self::F32Direct(inner) => (None, inner.parameters().decay),
+            Self::F32(inner) => (Some(inner.width()), &[]),
+            Self::Fixed16(inner) => (Some(inner.width()), &[]),
+        };
+        common.into_iter().chain(each.iter().map(|decay| libm::sqrtf(0.5 / decay)))
+    }
+
+    /// Looks at every value, once: for a network of which only the lengths were checked.
+    pub(crate) fn check_values(&self) -> Result<(), NetworkError> {
+        each!(self, inner => inner.check_values())
+    }
+
+    /// All of the network's words, in pieces that follow each other.
+    pub(crate) fn block(&self) -> [&'a [u32]; 7] {
+        match self {
+            Self::F32Direct(inner) => inner.block(),
+            Self::F32(inner) => [inner.block(), &[], &[], &[], &[], &[], &[]],
+            Self::Fixed16(inner) => [inner.block(), &[], &[], &[], &[], &[], &[]],
+        }
+    }
+
+    /// Where `reading` of `input` lies in the training range: 0 at its lowest and 1 at its highest value,
+    /// before any clamp; NaN if there is no such input, and whatever constant if it never changed.
+    #[must_use]
+    pub fn place_of(&self, input: usize, reading: f32) -> f32 {
+        match self {
+            Self::F32Direct(inner) => inner.place_of(input, reading),
+            Self::F32(inner) => inner.place_of(input, reading),
+            Self::Fixed16(inner) => inner.place_of(input, reading),
+        }
+    }
+
+    /// Infers `output` from one row of `reading`s. `E` serves [`Format::F32Direct`]; the other formats have an
+    /// exponential of their own.
     ///
-    /// `scaled` is working space of one value an input; it is left holding the scaled readings. A
-    /// NaN reading makes every output NaN or meaningless: screen readings before
-    /// ([`Decoder`](crate::Decoder) does).
+    /// `scaled` is working space of one value an input. A NaN reading makes the outputs meaningless:
+    /// screen readings before ([`Decoder`](crate::Decoder) does). Inlined, so that lengths known to the
+    /// compiler reach the loops.
     ///
     /// # Errors
     /// [`NetworkError::Length`] if a buffer does not fit the shape; `output` is then untouched.
-    pub fn infer<E: ExpKernel>(
-        &self,
-        reading: &[f32],
-        scaled: &mut [f32],
-        output: &mut [f32],
-    ) -> Result<(), NetworkError> {
-        check_length("reading", reading, self.shape.inputs)?;
-        check_length("scaled", scaled, self.shape.inputs)?;
-        check_length("output", output, self.shape.outputs)?;
-        evaluate::<E>(&self.parameters, reading, scaled, output);
-        Ok(())
-    }
-
-    /// Infers the outputs of one row, with sizes known when it is compiled: the same operations
-    /// in the same order as [`infer`](Self::infer), unrolled for the target.
-    ///
-    /// # Errors
-    /// [`NetworkError::Length`] if the network has other sizes.
     ///
     /// ```
-    /// use model_core::{exp::Polynomial, rbf::{Network, Parameters, Shape}};
-    /// let network = Network::try_new(
+    /// use model_core::{exp::Polynomial, rbf::{Network, Shape, direct}};
+    /// let network = Network::from(direct::Network::try_new(
     ///     Shape { inputs: 2, centres: 1, outputs: 1 },
-    ///     Parameters {
+    ///     direct::Parameters {
     ///         input_minimum: &[50.0, 50.0],
     ///         input_per_span: &[0.1, 0.1],
     ///         centres: &[0.5, 0.5],
@@ -195,25 +221,110 @@ impl<'a> Network<'a> {
     ///         bias: &[1.0],
     ///         affine: &[],
     ///     },
-    /// )?;
+    /// )?);
+    /// let mut output = [0.0];
+    /// network.infer::<Polynomial>(&[55.0, 55.0], &mut [0.0; 2], &mut output)?;
     /// // At its centre the activation is 1, so the output is weight + bias.
-    /// assert_eq!(network.infer_array::<Polynomial, 2, 1>(&[55.0, 55.0])?, [4.0]);
+    /// assert_eq!(output, [4.0]);
     /// # Ok::<(), model_core::rbf::NetworkError>(())
     /// ```
-    pub fn infer_array<E: ExpKernel, const INPUTS: usize, const OUTPUTS: usize>(
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
+    pub fn infer<E: ExpKernel>(
         &self,
-        reading: &[f32; INPUTS],
-    ) -> Result<[f32; OUTPUTS], NetworkError> {
-        check_length("reading", reading, self.shape.inputs)?;
-        let mut output = [0.0; OUTPUTS];
-        check_length("output", &output, self.shape.outputs)?;
-        let mut scaled = [0.0; INPUTS];
-        evaluate::<E>(&self.parameters, reading, &mut scaled, &mut output);
-        Ok(output)
+        reading: &[f32],
+        scaled: &mut [f32],
+        output: &mut [f32],
+    ) -> Result<(), NetworkError> {
+        check_length("reading", reading, self.shape().inputs)?;
+        self.check_buffers(scaled, output)?;
+        match self {
+            Self::F32Direct(inner) => {
+                inner.scale(reading, scaled);
+                inner.infer_scaled::<E>(scaled, output);
+            }
+            Self::F32(inner) => inner.infer(reading, scaled, output),
+            Self::Fixed16(inner) => inner.infer(reading, scaled, output),
+        }
+        Ok(())
+    }
+
+    /// The first half of [`infer`](Self::infer): readings in the format's own unit of inputs, before its
+    /// clamp.
+    ///
+    /// # Errors
+    /// As [`infer`](Self::infer).
+    pub fn scale(&self, reading: &[f32], scaled: &mut [f32]) -> Result<(), NetworkError> {
+        check_length("reading", reading, self.shape().inputs)?;
+        check_length("scaled", scaled, self.shape().inputs)?;
+        each!(self, inner => inner.scale(reading, scaled));
+        Ok(())
+    }
+
+    /// The second half of [`infer`](Self::infer); `scaled` serves as working space.
+    ///
+    /// # Errors
+    /// As [`infer`](Self::infer).
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
+    pub fn infer_scaled<E: ExpKernel>(
+        &self,
+        scaled: &mut [f32],
+        output: &mut [f32],
+    ) -> Result<(), NetworkError> {
+        self.check_buffers(scaled, output)?;
+        match self {
+            Self::F32Direct(inner) => inner.infer_scaled::<E>(scaled, output),
+            Self::F32(inner) => inner.infer_scaled(scaled, output),
+            Self::Fixed16(inner) => inner.infer_scaled(scaled, output),
+        }
+        Ok(())
+    }
+
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
+    fn check_buffers(&self, scaled: &[f32], output: &[f32]) -> Result<(), NetworkError> {
+        let shape = self.shape();
+        check_length("scaled", scaled, shape.inputs)?;
+        check_length("output", output, shape.outputs)
     }
 }
 
-fn check_length(what: &'static str, values: &[f32], expected: usize) -> Result<(), NetworkError> {
+impl<'a> From<direct::Network<'a>> for Network<'a> {
+    fn from(inner: direct::Network<'a>) -> Self {
+        Self::F32Direct(inner)
+    }
+}
+
+impl<'a> From<expanded::Network<'a>> for Network<'a> {
+    fn from(inner: expanded::Network<'a>) -> Self {
+        Self::F32(inner)
+    }
+}
+
+impl<'a> From<fixed16::Network<'a>> for Network<'a> {
+    fn from(inner: fixed16::Network<'a>) -> Self {
+        Self::Fixed16(inner)
+    }
+}
+
+/// Cuts arrays of four-byte words from the front of a network's block.
+pub(crate) struct Cut<'a>(pub &'a [u32]);
+
+impl<'a> Cut<'a> {
+    /// The next `length` words; none if there are fewer.
+    fn words(&mut self, length: usize) -> &'a [u32] {
+        let (head, tail) = self.0.split_at_checked(length).unwrap_or_default();
+        self.0 = tail;
+        head
+    }
+
+    fn floats(&mut self, length: usize) -> &'a [f32] {
+        bytemuck::cast_slice(self.words(length))
+    }
+}
+
+fn check_length<T>(what: &'static str, values: &[T], expected: usize) -> Result<(), NetworkError> {
     if values.len() == expected {
         Ok(())
     } else {
@@ -221,65 +332,27 @@ fn check_length(what: &'static str, values: &[f32], expected: usize) -> Result<(
     }
 }
 
-/// The one implementation of inference. Inlined, so that constant sizes reach the loops.
-#[inline(always)]
-#[expect(clippy::inline_always, reason = "callers with array arguments rely on it for unrolling")]
-fn evaluate<E: ExpKernel>(
-    p: &Parameters<'_>,
-    reading: &[f32],
-    scaled: &mut [f32],
-    output: &mut [f32],
-) {
-    let limits = p.input_minimum.iter().zip(p.input_per_span);
-    for ((x, &r), (&minimum, &per_span)) in scaled.iter_mut().zip(reading).zip(limits) {
-        *x = scale(r, minimum, per_span);
+fn check_finite(arrays: &[(&'static str, &[f32])]) -> Result<(), NetworkError> {
+    let finite = |values: &[f32]| values.iter().all(|v| v.is_finite());
+    match arrays.iter().find(|(_, values)| !finite(values)) {
+        Some((what, _)) => Err(NetworkError::NotFinite { what }),
+        None => Ok(()),
     }
-    output.fill(0.0);
-    // `max(1)`: a checked network has no empty dimension; this tells the compiler.
-    let inputs = scaled.len().max(1);
-    let outputs = output.len().max(1);
-    for (&x, row) in scaled.iter().zip(p.affine.chunks_exact(outputs)) {
-        accumulate(output, x, row);
-    }
-    let common = p.decay.first().copied().unwrap_or(0.0);
-    let centres = p.centres.chunks_exact(inputs).zip(p.output_weights.chunks_exact(outputs));
-    for (k, (centre, weights)) in centres.enumerate() {
-        let decay = p.decay.get(k).copied().unwrap_or(common);
-        let activation = E::exp(-decay * squared_distance(scaled, centre));
-        accumulate(output, activation, weights);
-    }
-    for (y, &b) in output.iter_mut().zip(p.bias) {
-        *y += b;
+}
+
+fn check_spans(per_span: &[f32]) -> Result<(), NetworkError> {
+    match per_span.iter().position(|s| *s < 0.0) {
+        Some(input) => Err(NetworkError::NegativeSpan { input }),
+        None => Ok(()),
     }
 }
 
 #[inline(always)]
-#[expect(clippy::inline_always, reason = "see `evaluate`")]
+#[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
 fn accumulate(output: &mut [f32], factor: f32, weights: &[f32]) {
     for (y, &w) in output.iter_mut().zip(weights) {
         *y += factor * w;
     }
-}
-
-/// ‖a − b‖² by direct differences: the expanded form ‖a‖² − 2a·b + ‖b‖² cancels (400 % error at
-/// offset 100).
-#[inline(always)]
-#[expect(clippy::inline_always, reason = "see `evaluate`")]
-fn squared_distance(a: &[f32], b: &[f32]) -> f32 {
-    let (a4, a_rest) = a.as_chunks::<4>();
-    let (b4, b_rest) = b.as_chunks::<4>();
-    let mut sum = [0.0_f32; 4];
-    for (a, b) in a4.iter().zip(b4) {
-        for ((s, a), b) in sum.iter_mut().zip(a).zip(b) {
-            let d = a - b;
-            *s += d * d;
-        }
-    }
-    for ((s, a), b) in sum.iter_mut().zip(a_rest).zip(b_rest) {
-        let d = a - b;
-        *s += d * d;
-    }
-    (sum[0] + sum[1]) + (sum[2] + sum[3])
 }
 
 #[cfg(test)]

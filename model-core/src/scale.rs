@@ -25,3 +25,28 @@ pub const CLAMP: [f32; 2] = [-0.125, 1.125];
 pub fn scale(reading: f32, minimum: f32, per_span: f32) -> f32 {
     ((reading - minimum) * per_span).clamp(CLAMP[0], CLAMP[1])
 }
+
+/// Half of the clamp's width, in spans of the training range.
+pub const HALF_RANGE: f32 = (CLAMP[1] - CLAMP[0]) / 2.0;
+
+/// Units in [`HALF_RANGE`] that networks with expanded distances count inputs in, from the middle of the
+/// training range: the conversion to `i32`, which saturates, is then the clamp, and takes a Cortex-M4F one
+/// cycle where comparisons take eight.
+pub const UNITS: f32 = 2_147_483_648.0;
+
+/// [`UNITS`] in a step of the 16-bit format, whose inputs are the upper halves of these integers.
+pub const UNITS_PER_STEP: f32 = 65_536.0;
+
+/// Clamps a scaled reading in [`UNITS`]; NaN becomes 0. Nothing is rounded but what lies 24 bits below.
+#[inline]
+#[must_use]
+pub fn clamp_units(scaled: f32) -> f32 {
+    (scaled as i32) as f32
+}
+
+/// Clamps a scaled reading in [`UNITS`] and rounds it down to a step; NaN becomes 0.
+#[inline]
+#[must_use]
+pub fn clamp_steps(scaled: f32) -> i32 {
+    (scaled as i32) >> 16
+}

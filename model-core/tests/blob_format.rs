@@ -5,14 +5,15 @@ use model_core::blob::{
     encoded_length_bound,
 };
 use model_core::exp::Libm;
-use model_core::rbf::{Network, Parameters, Shape};
+use model_core::rbf::direct::{self, Parameters};
+use model_core::rbf::{Network, Shape};
 use model_core::{Aligned, Decoder, Frame, RowStatus};
 use proptest::prelude::*;
 
 const SPECIFICATION: &str = include_str!("../../docs/blob.md");
 
-fn network() -> Network<'static> {
-    let parameters = Parameters {
+fn parameters() -> Parameters<'static> {
+    Parameters {
         input_minimum: &[50.0, 60.0],
         input_per_span: &[0.125, 0.0625],
         centres: &[0.5, 0.25],
@@ -20,8 +21,17 @@ fn network() -> Network<'static> {
         output_weights: &[1.5],
         bias: &[-0.5],
         affine: &[],
-    };
-    Network::try_new(Shape { inputs: 2, centres: 1, outputs: 1 }, parameters).unwrap()
+    }
+}
+
+fn network_of(parameters: Parameters<'_>) -> Network<'_> {
+    direct::Network::try_new(Shape { inputs: 2, centres: 1, outputs: 1 }, parameters)
+        .unwrap()
+        .into()
+}
+
+fn network() -> Network<'static> {
+    network_of(parameters())
 }
 
 fn metadata() -> Metadata<'static> {
@@ -87,6 +97,7 @@ fn weights_are_borrowed_where_the_blob_lies() {
     let range = blob.as_ptr_range();
     let model = Model::decode(blob).unwrap();
     let network = model.networks().next().unwrap();
+    let Network::F32Direct(network) = network else { panic!("{network:?}") };
     let start = network.parameters().centres.as_ptr().cast::<u8>();
     assert!(range.contains(&start));
 }
@@ -108,9 +119,9 @@ fn readings_that_overflow_are_told_from_missing_ones() {
     let parameters = Parameters {
         input_minimum: &[-3e38, 60.0],
         input_per_span: &[0.0, 0.0625],
-        ..*network().parameters()
+        ..parameters()
     };
-    let networks = [Network::try_new(network().shape(), parameters).unwrap()];
+    let networks = [network_of(parameters)];
     let parts = ModelParts { networks: &networks, row_network: &[0, 0], metadata: metadata() };
     let blob = encode(&parts, &mut buffer.0).unwrap();
     let decoder = Decoder::<2, 2, 1, Libm>::load(blob).unwrap();
@@ -171,6 +182,7 @@ proptest! {
         if let Ok(model) = Model::decode(&buffer.0[..length]) {
             prop_assert_eq!(model.networks().count(), model.network_count());
             for network in model.networks() {
+                let Network::F32Direct(network) = network else { continue };
                 prop_assert!(network.parameters().centres.iter().all(|c| c.is_finite()));
             }
         }

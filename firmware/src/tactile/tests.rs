@@ -2,7 +2,8 @@ use model_core::blob::{
     Columns, DecodeError, Floats, Metadata, ModelParts, NoiseKind, encode, encoded_length_bound,
 };
 use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
-use model_core::rbf::{Network, Parameters, Shape};
+use model_core::rbf::direct::{self, Parameters};
+use model_core::rbf::{Network, Shape};
 use model_core::{Decoder, Frame, RowStatus};
 
 use super::{PaperSensor, Tactile};
@@ -77,7 +78,7 @@ impl Numbers {
             affine: &self.affine,
         };
         let shape = Shape { inputs: COLS, centres: CENTRES, outputs: OUTPUTS };
-        Network::try_new(shape, parameters).unwrap()
+        direct::Network::try_new(shape, parameters).unwrap().into()
     }
 }
 

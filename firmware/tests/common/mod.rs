@@ -16,7 +16,8 @@ use model_core::Frame;
 use model_core::blob::{
     Columns, Floats, Metadata, ModelParts, NoiseKind, encode, encoded_length_bound,
 };
-use model_core::rbf::{Network, Parameters, Shape};
+use model_core::rbf::direct::{self, Parameters};
+use model_core::rbf::{Network, Shape};
 
 pub const ROWS: usize = 2;
 pub const COLS: usize = 3;
@@ -210,7 +211,7 @@ pub fn blob(seed: usize, centres: usize) -> Vec<u8> {
     let list = |from: usize, count: usize| (from..from + count).map(number).collect::<Vec<_>>();
     let (centre, weights) = (list(1, centres * COLS), list(2, centres * OUTPUTS));
     let (bias, affine) = (list(3, OUTPUTS), list(4, COLS * OUTPUTS));
-    let network = Network::try_new(
+    let network = direct::Network::try_new(
         Shape { inputs: COLS, centres, outputs: OUTPUTS },
         Parameters {
             input_minimum: &[50.0; COLS],
@@ -223,7 +224,7 @@ pub fn blob(seed: usize, centres: usize) -> Vec<u8> {
         },
     )
     .unwrap();
-    blob_of(network)
+    blob_of(network.into())
 }
 
 /// `network` for both rows, as a blob.

@@ -39,6 +39,7 @@ struct Summary {
 
 #[derive(Serialize)]
 struct NetworkSummary {
+    format: &'static str,
     centres: usize,
     width: Vec<f32>,
     affine_tail: bool,
@@ -79,13 +80,11 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 fn summarise(loaded: &LoadedModel) -> Summary {
     let model = loaded.model();
     let (shape, metadata) = (model.shape(), model.metadata());
-    let networks = model.networks().map(|network| {
-        let p = network.parameters();
-        NetworkSummary {
-            centres: network.shape().centres,
-            width: p.decay.iter().map(|decay| (0.5 / decay).sqrt()).collect(),
-            affine_tail: !p.affine.is_empty(),
-        }
+    let networks = model.networks().map(|network| NetworkSummary {
+        format: network.format().name(),
+        centres: network.shape().centres,
+        width: network.widths().collect(),
+        affine_tail: network.has_affine_tail(),
     });
     let column =
         |(name, unit): (&str, &str)| ColumnSummary { name: name.into(), unit: unit.into() };
@@ -148,7 +147,10 @@ fn page_of(s: &Summary) -> print::Page {
             .fold((f32::INFINITY, 0.0_f32), |(low, high), w| (low.min(*w), high.max(*w)));
         let width = if low == high { format!("{low}") } else { format!("{low}…{high}") };
         let tail = if network.affine_tail { ", affine tail" } else { "" };
-        line(&format!("network {index}"), format!("K = {}, width {width}{tail}", network.centres));
+        line(
+            &format!("network {index}"),
+            format!("{}, K = {}, width {width}{tail}", network.format, network.centres),
+        );
     }
     line("flash", format!("{} bytes", s.flash_bytes));
     let ram = &s.ram_bytes;

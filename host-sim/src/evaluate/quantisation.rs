@@ -5,7 +5,7 @@
 //! that are within 2 ulp (the polynomial and libm's).
 
 use firmware::circuit::{Divider, NO_CURRENT_COUNTS, ZeroPotential};
-use model_core::rbf::{Network, Shape};
+use model_core::rbf::{Network, Shape, direct};
 use model_core::scale::scale;
 
 use crate::dataset::Table;
@@ -63,7 +63,8 @@ pub fn reading_bound_ohm(circuit: Circuit, ohm: f64, bits: u8) -> f64 {
 /// are the model's inputs.
 ///
 /// # Panics
-/// If `readings` has other columns than the model's inputs.
+/// If `readings` has other columns than the model's inputs, or the model is not of the format f32-direct,
+/// for which alone the bound is derived.
 #[must_use]
 pub fn output_bounds(model: &LoadedModel, circuit: Circuit, bits: u8, readings: &Table) -> Table {
     let networks = model.row_networks();
@@ -73,6 +74,7 @@ pub fn output_bounds(model: &LoadedModel, circuit: Circuit, bits: u8, readings: 
         let rows = line.chunks_exact(model.model().shape().inputs);
         for (network, ohm) in networks.iter().zip(rows) {
             let bound_ohm = ohm.iter().map(|ohm| reading_bound_ohm(circuit, *ohm, bits));
+            let Network::F32Direct(network) = network else { panic!("a model of another format") };
             values.extend(of_network(network, ohm, &bound_ohm.collect::<Vec<_>>()));
         }
     }
@@ -80,7 +82,7 @@ pub fn output_bounds(model: &LoadedModel, circuit: Circuit, bits: u8, readings: 
 }
 
 /// Largest change of every output when each reading is off by at most `bound_ohm` from `ohm`.
-fn of_network(network: &Network<'_>, ohm: &[f64], bound_ohm: &[f64]) -> Vec<f64> {
+fn of_network(network: &direct::Network<'_>, ohm: &[f64], bound_ohm: &[f64]) -> Vec<f64> {
     let (p, shape) = (network.parameters(), network.shape());
     // x: the ideal readings exactly as inference scales them; h: how far scanned ones may be off.
     let (mut x, mut h) = (Vec::new(), Vec::new());

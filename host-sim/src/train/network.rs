@@ -1,6 +1,7 @@
 //! A trained network as the blob will hold it.
 
-use model_core::rbf::{Network, Parameters, Shape};
+use model_core::rbf::direct::{self, Parameters};
+use model_core::rbf::{Network, Shape};
 
 use super::InputScale;
 use super::least_squares::Regressors;
@@ -44,7 +45,7 @@ impl FittedNetwork {
             bias: round(bias),
             affine: round(affine),
         };
-        match Network::try_new(fitted.shape, fitted.parameters()) {
+        match direct::Network::try_new(fitted.shape, fitted.parameters()) {
             Ok(_) => Ok(fitted),
             Err(cause) => Err(Error::Usage(format!(
                 "training ends in numbers that an f32 does not hold ({cause}); bring the columns \
@@ -71,6 +72,6 @@ impl FittedNetwork {
     /// Never: the parameters were checked when they were fitted.
     #[must_use]
     pub fn network(&self) -> Network<'_> {
-        Network::try_new(self.shape, self.parameters()).expect("checked when fitted")
+        direct::Network::try_new(self.shape, self.parameters()).expect("checked when fitted").into()
     }
 }

@@ -4,12 +4,12 @@ use serde::{Deserialize, Serialize};
 
 use super::error::DecodeError;
 use super::format::{
-    BlockLengths, CRC_BYTES, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection, PREFIX_BYTES,
-    Prefix, RbfHeader, ShapeField, TAG_METADATA, TAG_RBF_F32,
+    CRC_BYTES, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection, PREFIX_BYTES, Prefix,
+    RbfHeader, ShapeField, TAG_METADATA,
 };
 use super::{Metadata, ModelShape};
 use crate::checksum::CRC_32;
-use crate::rbf::{Network, NetworkError, Parameters, Shape};
+use crate::rbf::{Cut, Format, Network, NetworkError, Shape, direct, expanded, fixed16};
 
 /// Names or units of columns, one a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -85,8 +85,7 @@ impl<'a> Model<'a> {
         for index in 0..networks {
             let (network, after) = take_network(rest, shape, index)?;
             // Every value is looked at once, here; later reads only cut slices.
-            Network::try_new(network.shape(), *network.parameters())
-                .map_err(|cause| DecodeError::Network { index, cause })?;
+            network.check_values().map_err(|cause| DecodeError::Network { index, cause })?;
             rest = after;
         }
         if !rest.is_empty() {
@@ -137,21 +136,14 @@ impl<'a> Model<'a> {
         })
     }
 
-    /// The bytes from the section on of the network that serves `row` (from 0): where to find it
-    /// again with [`network_in`](Self::network_in).
-    pub(crate) fn section_of_row(&self, row: usize) -> Option<&'a [u8]> {
+    /// The section of the network that serves `row` (from 0).
+    pub(crate) fn section_of_row(&self, row: usize) -> Option<NetworkSection<'a>> {
         let mut rest = self.network_sections;
         for index in 0..self.network_of_row(row)? {
-            (_, rest) = take_network(rest, self.shape, index as u8).ok()?;
+            (_, rest) = NetworkSection::take(rest, self.shape, index as u8).ok()?;
         }
-        Some(rest)
-    }
-
-    /// The network that serves `row`, in its `section`. Cuts slices; the values were looked at when
-    /// the blob was decoded.
-    pub(crate) fn network_in(&self, section: &'a [u8], row: usize) -> Option<Network<'a>> {
         let index = self.network_of_row(row)?;
-        take_network(section, self.shape, index as u8).ok().map(|(network, _)| network)
+        NetworkSection::take(rest, self.shape, index as u8).ok().map(|(section, _)| section)
     }
 
     /// Index of the network that serves `row` (from 0), or `None` for a row outside the sensor.
@@ -267,46 +259,91 @@ fn checked_metadata<'a>(
     Ok(metadata)
 }
 
-/// Cuts one network section from the front of `bytes`; lengths are checked, values are not.
+/// One network's section, cut from a blob: what its header says, and its block.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct NetworkSection<'a> {
+    format: Format,
+    common_width: bool,
+    affine: bool,
+    centres: u16,
+    block: &'a [u32],
+}
+
+impl<'a> NetworkSection<'a> {
+    /// No network: what [`network`](Self::network) gives is an error.
+    pub const EMPTY: Self = Self {
+        format: Format::F32Direct,
+        common_width: true,
+        affine: false,
+        centres: 0,
+        block: &[],
+    };
+
+    /// Cuts a section from the front of `bytes`; lengths are checked, values are not.
+    fn take(
+        bytes: &'a [u8],
+        shape: ModelShape,
+        index: u8,
+    ) -> Result<(Self, &'a [u8]), DecodeError> {
+        const SECTION: &str = "network section";
+        let (header, rest) = take::<RbfHeader>(bytes, SECTION)?;
+        let format = header.format()?;
+        if header.index != index {
+            return Err(DecodeError::NetworkOrder { expected: index, found: header.index });
+        }
+        let (padding, rest) = take::<&[u8]>(rest, SECTION)?;
+        if padding.len() >= FLOAT_ALIGNMENT || padding.iter().any(|&byte| byte != 0) {
+            return Err(DecodeError::Malformed { section: "padding" });
+        }
+        let (block, rest) = take::<&[u8]>(rest, SECTION)?;
+        let RbfHeader { common_width, affine, centres, .. } = header;
+        let words = {
+            let shape = network_shape(shape, centres);
+            match format {
+                Format::F32Direct => direct::Network::block_words(shape, common_width, affine),
+                Format::F32 => expanded::Network::block_words(shape, affine),
+                Format::Fixed16 => fixed16::Network::block_words(shape, affine),
+            }
+        };
+        check_count("bytes of weights", words.saturating_mul(4), block.len())?;
+        let block = bytemuck::try_cast_slice::<u8, u32>(block)
+            .map_err(|_| DecodeError::Malformed { section: "padding" })?;
+        let section = Self { format, common_width, affine, centres, block };
+        section.network(shape).map_err(|cause| DecodeError::Network { index, cause })?;
+        Ok((section, rest))
+    }
+
+    /// The network; its values are not looked at.
+    #[inline]
+    pub fn network(&self, shape: ModelShape) -> Result<Network<'a>, NetworkError> {
+        let shape = network_shape(shape, self.centres);
+        let Self { common_width, affine, block, .. } = *self;
+        match self.format {
+            Format::F32Direct => {
+                direct::Network::from_block(shape, common_width, affine, Cut(block))
+                    .map(Network::F32Direct)
+            }
+            Format::F32 => {
+                expanded::Network::with_length_checked(shape, affine, block).map(Network::F32)
+            }
+            Format::Fixed16 => {
+                fixed16::Network::with_length_checked(shape, affine, block).map(Network::Fixed16)
+            }
+        }
+    }
+}
+
+fn network_shape(shape: ModelShape, centres: u16) -> Shape {
+    Shape { inputs: shape.inputs, centres: centres.into(), outputs: shape.outputs }
+}
+
+/// Cuts one network from the front of `bytes`; lengths are checked, values are not.
 fn take_network(
     bytes: &[u8],
     shape: ModelShape,
     index: u8,
 ) -> Result<(Network<'_>, &[u8]), DecodeError> {
-    const SECTION: &str = "network section";
-    let (header, rest) = take::<RbfHeader>(bytes, SECTION)?;
-    check_tag(TAG_RBF_F32, header.tag)?;
-    if header.index != index {
-        return Err(DecodeError::NetworkOrder { expected: index, found: header.index });
-    }
-    let (padding, rest) = take::<&[u8]>(rest, SECTION)?;
-    if padding.len() >= FLOAT_ALIGNMENT || padding.iter().any(|&byte| byte != 0) {
-        return Err(DecodeError::Malformed { section: "padding" });
-    }
-    let (block, rest) = take::<&[u8]>(rest, SECTION)?;
-    let lengths = BlockLengths::new(&header, shape.inputs, shape.outputs);
-    check_count("bytes of weights", lengths.bytes(), block.len())?;
-    let floats = bytemuck::try_cast_slice::<u8, f32>(block)
-        .map_err(|_| DecodeError::Malformed { section: "padding" })?;
-
-    let network_shape =
-        Shape { inputs: shape.inputs, centres: header.centres.into(), outputs: shape.outputs };
-    let mut rest_of_floats = floats;
-    let mut cut = |length: usize| -> &[f32] {
-        let (head, tail) = rest_of_floats.split_at_checked(length).unwrap_or_default();
-        rest_of_floats = tail;
-        head
-    };
-    let parameters = Parameters {
-        input_minimum: cut(lengths.inputs),
-        input_per_span: cut(lengths.inputs),
-        centres: cut(lengths.centres),
-        decay: cut(lengths.decay),
-        output_weights: cut(lengths.output_weights),
-        bias: cut(lengths.bias),
-        affine: cut(lengths.affine),
-    };
-    let network = Network::with_lengths_checked(network_shape, parameters)
-        .map_err(|cause: NetworkError| DecodeError::Network { index, cause })?;
-    Ok((network, rest))
+    let (section, rest) = NetworkSection::take(bytes, shape, index)?;
+    let network = section.network(shape);
+    Ok((network.map_err(|cause| DecodeError::Network { index, cause })?, rest))
 }

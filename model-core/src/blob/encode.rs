@@ -4,8 +4,8 @@ use serde::Serialize;
 
 use super::error::EncodeError;
 use super::format::{
-    BlockLengths, CRC_BYTES, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection, Prefix,
-    RbfHeader, ShapeField, TAG_METADATA, TAG_RBF_F32,
+    CRC_BYTES, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection, Prefix, RbfHeader,
+    ShapeField, TAG_METADATA, tag_of,
 };
 use super::{Metadata, Model};
 use crate::checksum::CRC_32;
@@ -35,19 +35,12 @@ pub fn encoded_length_bound(parts: &ModelParts<'_>) -> usize {
         + m.output_names.0.len()
         + m.output_units.0.len();
     let numbers = m.training_rmse.0.len() + m.full_scale.0.len() + parts.row_network.len();
-    let weights: usize = parts.networks.iter().map(|n| SECTION_FIELDS + 4 * float_count(n)).sum();
+    let weights: usize = parts.networks.iter().map(|n| SECTION_FIELDS + block_bytes(n)).sum();
     FIXED_FIELDS + text + numbers + weights
 }
 
-fn float_count(network: &Network<'_>) -> usize {
-    let p = network.parameters();
-    p.input_minimum.len()
-        + p.input_per_span.len()
-        + p.centres.len()
-        + p.decay.len()
-        + p.output_weights.len()
-        + p.bias.len()
-        + p.affine.len()
+fn block_bytes(network: &Network<'_>) -> usize {
+    network.block().iter().map(|words| words.len() * 4).sum()
 }
 
 /// Writes `parts` at the start of `buffer` and returns the bytes used.
@@ -132,15 +125,15 @@ impl Writer<'_> {
     }
 
     fn put_network(&mut self, index: u8, network: &Network<'_>) -> Result<(), EncodeError> {
-        let (shape, p) = (network.shape(), network.parameters());
+        let common_width = network.widths().count() == 1;
         let header = RbfHeader {
-            tag: TAG_RBF_F32,
+            tag: tag_of(network.format()),
             index,
-            centres: fit("number of centres", shape.centres, u16::MAX)?,
-            common_width: p.decay.len() == 1,
-            affine: !p.affine.is_empty(),
+            centres: fit("number of centres", network.shape().centres, u16::MAX)?,
+            common_width,
+            affine: network.has_affine_tail(),
         };
-        let bytes = BlockLengths::new(&header, shape.inputs, shape.outputs).bytes();
+        let bytes = block_bytes(network);
         self.put(&header)?;
         let length = u32::try_from(bytes).map_err(|_| EncodeError::TooLarge {
             what: "bytes of one network",
@@ -152,16 +145,8 @@ impl Writer<'_> {
         let padding = start.next_multiple_of(FLOAT_ALIGNMENT) - start;
         self.put(&[0_u8; FLOAT_ALIGNMENT].get(..padding).unwrap_or_default())?;
         self.put(&length)?;
-        for values in [
-            p.input_minimum,
-            p.input_per_span,
-            p.centres,
-            p.decay,
-            p.output_weights,
-            p.bias,
-            p.affine,
-        ] {
-            self.put_raw(bytemuck::cast_slice(values))?;
+        for words in network.block() {
+            self.put_raw(bytemuck::cast_slice(words))?;
         }
         Ok(())
     }

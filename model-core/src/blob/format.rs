@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::DecodeError;
+use crate::rbf::Format;
+
 /// The first four bytes of every blob.
 pub const MAGIC: [u8; 4] = *b"TAXL";
 /// The version that this crate reads and writes.
@@ -16,7 +19,7 @@ pub(super) const FLOAT_ALIGNMENT: usize = 4;
 
 /// Section tags. Each kind of section has its own; an unknown one is refused.
 pub(super) const TAG_METADATA: u8 = 0;
-pub(super) const TAG_RBF_F32: u8 = 1;
+pub(super) const TAG_RBF_F32_DIRECT: u8 = 1;
 
 /// Bytes 0..9, at fixed places, so that a blob can be measured before it is trusted.
 #[derive(Serialize, Deserialize)]
@@ -82,41 +85,27 @@ pub(super) struct RbfHeader {
     pub affine: bool,
 }
 
-/// Lengths, in floats, of the arrays in a network's float block, in their order.
-pub(super) struct BlockLengths {
-    pub inputs: usize,
-    pub centres: usize,
-    pub decay: usize,
-    pub output_weights: usize,
-    pub bias: usize,
-    pub affine: usize,
-}
-
-impl BlockLengths {
-    pub fn new(header: &RbfHeader, inputs: usize, outputs: usize) -> Self {
-        let centres = usize::from(header.centres);
-        Self {
-            inputs,
-            centres: centres.saturating_mul(inputs),
-            decay: if header.common_width { 1 } else { centres },
-            output_weights: centres.saturating_mul(outputs),
-            bias: outputs,
-            affine: if header.affine { inputs.saturating_mul(outputs) } else { 0 },
+impl RbfHeader {
+    /// What the tag says of the network's format. Only [`Format::F32Direct`] may have a width a centre.
+    pub fn format(&self) -> Result<Format, DecodeError> {
+        let format = Format::ALL.into_iter().find(|format| tag_of(*format) == self.tag);
+        match format {
+            None => {
+                Err(DecodeError::SectionOrder { expected: TAG_RBF_F32_DIRECT, found: self.tag })
+            }
+            Some(Format::F32 | Format::Fixed16) if !self.common_width => {
+                Err(DecodeError::Malformed { section: "network section" })
+            }
+            Some(format) => Ok(format),
         }
     }
+}
 
-    /// Bytes of the whole block; the largest `usize` where that does not hold it (no block is so long).
-    pub fn bytes(&self) -> usize {
-        [
-            self.inputs,
-            self.inputs,
-            self.centres,
-            self.decay,
-            self.output_weights,
-            self.bias,
-            self.affine,
-        ]
-        .into_iter()
-        .fold(0_usize, |sum, floats| sum.saturating_add(floats.saturating_mul(4)))
+/// The section tag of a network of this format.
+pub(super) const fn tag_of(format: Format) -> u8 {
+    match format {
+        Format::F32Direct => TAG_RBF_F32_DIRECT,
+        Format::F32 => 2,
+        Format::Fixed16 => 3,
     }
 }

@@ -9,6 +9,7 @@ mod encode;
 mod error;
 mod format;
 
+pub(crate) use decode::NetworkSection;
 pub use decode::{Columns, Floats, Model};
 pub use encode::{ModelParts, encode, encoded_length_bound};
 pub use error::{DecodeError, EncodeError};

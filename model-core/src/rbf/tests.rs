@@ -1,3 +1,6 @@
+mod formats;
+
+use super::direct::Parameters;
 use super::*;
 use crate::exp::{Libm, Micromath, Polynomial};
 use crate::scale::CLAMP;
@@ -44,6 +47,12 @@ impl Sample {
     }
 }
 
+fn infer<E: ExpKernel>(network: &Network<'_>, reading: &[f32; 5]) -> [f32; 2] {
+    let mut output = [0.0; 2];
+    network.infer::<E>(reading, &mut [0.0; 5], &mut output).unwrap();
+    output
+}
+
 /// The formula of the module's documentation, in f64.
 fn reference(p: &Parameters<'_>, shape: Shape, reading: &[f32]) -> Vec<f64> {
     let x: Vec<f64> = (0..shape.inputs)
@@ -81,7 +90,7 @@ fn inference_follows_the_formula_with_every_kernel() {
             sample.affine.clear();
         }
         let p = sample.parameters();
-        let network = Network::try_new(SHAPE, p).unwrap();
+        let network = Network::from(direct::Network::try_new(SHAPE, p).unwrap());
         let reading = [55.0, 53.5, 60.0, 40.0, 1e6];
         let truth = reference(&p, SHAPE, &reading);
         let close = |y: &[f32], tolerance: f64| {
@@ -89,9 +98,9 @@ fn inference_follows_the_formula_with_every_kernel() {
                 assert!((f64::from(*y) - t).abs() <= tolerance, "{y} against {t}");
             }
         };
-        close(&network.infer_array::<Libm, 5, 2>(&reading).unwrap(), 1e-6);
-        close(&network.infer_array::<Polynomial, 5, 2>(&reading).unwrap(), 1e-6);
-        close(&network.infer_array::<Micromath, 5, 2>(&reading).unwrap(), 1e-2);
+        close(&infer::<Libm>(&network, &reading), 1e-6);
+        close(&infer::<Polynomial>(&network, &reading), 1e-6);
+        close(&infer::<Micromath>(&network, &reading), 1e-2);
     }
 }
 
@@ -100,13 +109,13 @@ fn lengths_that_do_not_fit_the_shape_are_named() {
     let mut sample = Sample::new();
     sample.output_weights.pop();
     assert_eq!(
-        Network::try_new(SHAPE, sample.parameters()),
+        direct::Network::try_new(SHAPE, sample.parameters()),
         Err(NetworkError::Length { what: "output_weights", expected: 6, found: 5 })
     );
     let sample = Sample::new();
-    let network = Network::try_new(SHAPE, sample.parameters()).unwrap();
+    let network = Network::from(direct::Network::try_new(SHAPE, sample.parameters()).unwrap());
     assert_eq!(
-        network.infer_array::<Libm, 4, 2>(&[0.0; 4]),
+        network.infer::<Libm>(&[0.0; 4], &mut [0.0; 4], &mut [0.0; 2]),
         Err(NetworkError::Length { what: "reading", expected: 5, found: 4 })
     );
     let mut output = [7.0; 3];
@@ -119,7 +128,7 @@ fn unusable_values_are_named() {
     let network = |change: fn(&mut Sample)| {
         let mut sample = Sample::new();
         change(&mut sample);
-        Network::try_new(SHAPE, sample.parameters()).map(|n| n.shape())
+        direct::Network::try_new(SHAPE, sample.parameters()).map(|n| n.shape())
     };
     for (change, error) in [
         ((|s| s.decay[1] = 0.0) as fn(&mut Sample), NetworkError::InvalidWidth { centre: 1 }),
@@ -139,10 +148,10 @@ proptest! {
     #[test]
     fn both_entries_agree_bit_for_bit(reading in prop::array::uniform5(-1e3_f32..1e3)) {
         let sample = Sample::new();
-        let network = Network::try_new(SHAPE, sample.parameters()).unwrap();
+        let network = Network::from(direct::Network::try_new(SHAPE, sample.parameters()).unwrap());
         let mut dynamic = [0.0; 2];
         network.infer::<Polynomial>(&reading, &mut [0.0; 5], &mut dynamic).unwrap();
-        let fixed = network.infer_array::<Polynomial, 5, 2>(&reading).unwrap();
+        let fixed = infer::<Polynomial>(&network, &reading);
         prop_assert_eq!(dynamic.map(f32::to_bits), fixed.map(f32::to_bits));
     }
 
@@ -152,12 +161,12 @@ proptest! {
         reading in prop::array::uniform5(prop::num::f32::NORMAL | prop::num::f32::ZERO),
     ) {
         let sample = Sample::new();
-        let network = Network::try_new(SHAPE, sample.parameters()).unwrap();
+        let network = Network::from(direct::Network::try_new(SHAPE, sample.parameters()).unwrap());
         let sum = |values: &[f32]| values.iter().map(|v| v.abs()).sum::<f32>();
         let bound = sum(&sample.output_weights)
             + sum(&sample.bias)
             + CLAMP[1] * sum(&sample.affine);
-        for y in network.infer_array::<Polynomial, 5, 2>(&reading).unwrap() {
+        for y in infer::<Polynomial>(&network, &reading) {
             prop_assert!(y.abs() <= bound, "{} exceeds {}", y, bound);
         }
     }

@@ -1,0 +1,87 @@
+//! The assembly's functions, made safe: all that they read and write is measured here.
+#![expect(unsafe_code, reason = "calls to assembly, with lengths taken from slices and arrays")]
+
+use core::mem::MaybeUninit;
+
+use super::{expanded, fixed16};
+
+/// The sizes that the assembly is written for.
+const INPUTS: usize = 18;
+/// See INPUTS.
+const OUTPUTS: usize = 18;
+/// Activations of the f32 kernel between its two halves: 512 bytes of stack.
+const MOST_CENTRES_AT_ONCE: usize = 128;
+
+core::arch::global_asm!(include_str!("cortex_m4.s"), options(raw));
+
+/// What a network takes in.
+#[derive(Clone, Copy)]
+pub(super) enum Inputs<'a> {
+    /// In the readings' unit.
+    Readings(&'a [f32; INPUTS]),
+    /// In [`UNITS`](crate::scale::UNITS).
+    Scaled(&'a [f32; INPUTS]),
+}
+
+impl<'a> Inputs<'a> {
+    /// And the flag that tells.
+    fn parts(self) -> (&'a [f32; INPUTS], u32) {
+        match self {
+            Self::Readings(readings) => (readings, 0),
+            Self::Scaled(scaled) => (scaled, SCALED),
+        }
+    }
+}
+
+unsafe extern "C" {
+    fn taxel_f32(
+        inputs: *const [f32; INPUTS],
+        block: *const u32,
+        output: *mut [f32; OUTPUTS],
+        fours: u32,
+        flags: u32,
+        activations: *mut [f32; MOST_CENTRES_AT_ONCE],
+    );
+    fn taxel_fixed16(
+        inputs: *const [f32; INPUTS],
+        block: *const u32,
+        output: *mut [f32; OUTPUTS],
+        sixteens: u32,
+        flags: u32,
+    );
+}
+
+/// Bits of `flags`.
+const AFFINE: u32 = 1;
+const SCALED: u32 = 2;
+
+/// The outputs of a network with expanded distances.
+pub(super) fn expanded(
+    network: &expanded::Network<'_>,
+    inputs: Inputs<'_>,
+    output: &mut [f32; OUTPUTS],
+) {
+    let (inputs, scaled) = inputs.parts();
+    let fours = (network.shape().centres + 3) / 4;
+    let flags = u32::from(network.has_affine_tail()) * AFFINE | scaled;
+    let mut activations = MaybeUninit::uninit();
+    // SAFETY: a network's block is checked against its shape when it is made, and the caller has checked the
+    // shape against INPUTS and OUTPUTS; activations are written, 128 at most, before they are read.
+    unsafe {
+        let block = network.block().as_ptr();
+        taxel_f32(inputs, block, output, fours as u32, flags, activations.as_mut_ptr());
+    }
+}
+
+/// The outputs of a network in fixed point.
+pub(super) fn fixed16(
+    network: &fixed16::Network<'_>,
+    inputs: Inputs<'_>,
+    output: &mut [f32; OUTPUTS],
+) {
+    let (inputs, scaled) = inputs.parts();
+    let sixteens = (network.shape().centres + 15) / 16;
+    let flags = u32::from(network.has_affine_tail()) * AFFINE | scaled;
+    // SAFETY: as in `expanded`.
+    unsafe { taxel_fixed16(inputs, network.block().as_ptr(), output, sixteens as u32, flags) }
+}

@@ -1,0 +1,208 @@
+//! The network in f32 with direct distances: safe at any width, with any exp kernel.
+//!
+//! F(x) = Σ_k ω_k·exp(−d_k·‖x − c_k‖²) + b (+ A·x), with d = 1/(2σ²) and x the readings scaled to
+//! [0, 1]. ‖x − c‖² accumulates in four interleaved partial sums, added pairwise.
+
+use super::{Cut, NetworkError, Shape, accumulate, check_finite, check_length, check_spans};
+use crate::exp::ExpKernel;
+use crate::scale::scale;
+
+/// The parameters of one network, borrowed from where they lie.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Parameters<'a> {
+    /// Smallest reading of each input in training, in the reading's unit: `[inputs]`.
+    pub input_minimum: &'a [f32],
+    /// 1/(maximum − minimum) of each input; 0 for a channel that never changed: `[inputs]`.
+    pub input_per_span: &'a [f32],
+    /// Centres on scaled inputs, centre after centre: `[centres × inputs]`.
+    pub centres: &'a [f32],
+    /// 1/(2σ²) on scaled inputs: `[1]` for one common width, or `[centres]`.
+    pub decay: &'a [f32],
+    /// Output weights ω, centre after centre: `[centres × outputs]`.
+    pub output_weights: &'a [f32],
+    /// Bias in the outputs' units: `[outputs]`.
+    pub bias: &'a [f32],
+    /// Affine tail A on scaled inputs, input after input: `[inputs × outputs]`, or empty.
+    pub affine: &'a [f32],
+}
+
+/// A network whose parameters have been checked against its shape.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(C)] // the shape first, so that it is at the same place in a network of any format
+pub struct Network<'a> {
+    shape: Shape,
+    parameters: Parameters<'a>,
+}
+
+impl<'a> Network<'a> {
+    /// Checks the lengths and values of `parameters`.
+    ///
+    /// # Errors
+    /// Every variant of [`NetworkError`]; lengths are checked before values.
+    pub fn try_new(shape: Shape, parameters: Parameters<'a>) -> Result<Self, NetworkError> {
+        let network = Self::with_lengths_checked(shape, parameters)?;
+        network.check_values()?;
+        Ok(network)
+    }
+
+    /// As [`try_new`](Self::try_new), without the pass over all values: for parameters that
+    /// passed it before.
+    pub(crate) fn with_lengths_checked(
+        shape: Shape,
+        parameters: Parameters<'a>,
+    ) -> Result<Self, NetworkError> {
+        let Shape { inputs, centres, outputs } = shape;
+        if inputs == 0 || centres == 0 || outputs == 0 {
+            return Err(NetworkError::Empty);
+        }
+        let p = &parameters;
+        check_length("input_minimum", p.input_minimum, inputs)?;
+        check_length("input_per_span", p.input_per_span, inputs)?;
+        check_length("centres", p.centres, centres * inputs)?;
+        if p.decay.len() != 1 {
+            check_length("decay", p.decay, centres)?;
+        }
+        check_length("output_weights", p.output_weights, centres * outputs)?;
+        check_length("bias", p.bias, outputs)?;
+        if !p.affine.is_empty() {
+            check_length("affine", p.affine, inputs * outputs)?;
+        }
+        Ok(Self { shape, parameters })
+    }
+
+    pub(crate) fn check_values(&self) -> Result<(), NetworkError> {
+        let p = &self.parameters;
+        if let Some(centre) = p.decay.iter().position(|d| !(d.is_finite() && *d > 0.0)) {
+            return Err(NetworkError::InvalidWidth { centre });
+        }
+        check_finite(&[
+            ("input_minimum", p.input_minimum),
+            ("input_per_span", p.input_per_span),
+            ("centres", p.centres),
+            ("output_weights", p.output_weights),
+            ("bias", p.bias),
+            ("affine", p.affine),
+        ])?;
+        check_spans(p.input_per_span)
+    }
+
+    /// The network's sizes.
+    #[must_use]
+    pub fn shape(&self) -> Shape {
+        self.shape
+    }
+
+    /// The network's parameters.
+    #[must_use]
+    pub fn parameters(&self) -> &Parameters<'a> {
+        &self.parameters
+    }
+
+    /// Words of the block of a network of this shape, with a width a centre or one for all.
+    pub(crate) fn block_words(shape: Shape, common_width: bool, affine: bool) -> usize {
+        let Shape { inputs, centres, outputs } = shape;
+        let decay = if common_width { 1 } else { centres };
+        let affine = if affine { inputs.saturating_mul(outputs) } else { 0 };
+        [
+            inputs,
+            inputs,
+            centres.saturating_mul(inputs),
+            decay,
+            centres.saturating_mul(outputs),
+            outputs,
+            affine,
+        ]
+        .into_iter()
+        .fold(0, usize::saturating_add)
+    }
+
+    /// The network whose arrays follow each other in `block`; values are not looked at.
+    pub(crate) fn from_block(
+        shape: Shape,
+        common_width: bool,
+        affine: bool,
+        mut block: Cut<'a>,
+    ) -> Result<Self, NetworkError> {
+        let Shape { inputs, centres, outputs } = shape;
+        let parameters = Parameters {
+            input_minimum: block.floats(inputs),
+            input_per_span: block.floats(inputs),
+            centres: block.floats(centres * inputs),
+            decay: block.floats(if common_width { 1 } else { centres }),
+            output_weights: block.floats(centres * outputs),
+            bias: block.floats(outputs),
+            affine: block.floats(if affine { inputs * outputs } else { 0 }),
+        };
+        Self::with_lengths_checked(shape, parameters)
+    }
+
+    /// The arrays in the order of their block.
+    pub(crate) fn block(&self) -> [&'a [u32]; 7] {
+        let p = &self.parameters;
+        [p.input_minimum, p.input_per_span, p.centres, p.decay, p.output_weights, p.bias, p.affine]
+            .map(bytemuck::cast_slice)
+    }
+
+    pub(super) fn place_of(&self, input: usize, reading: f32) -> f32 {
+        let p = &self.parameters;
+        match (p.input_minimum.get(input), p.input_per_span.get(input)) {
+            (Some(minimum), Some(per_span)) => (reading - minimum) * per_span,
+            _ => f32::NAN,
+        }
+    }
+
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
+    pub(super) fn scale(&self, reading: &[f32], scaled: &mut [f32]) {
+        let p = &self.parameters;
+        let limits = p.input_minimum.iter().zip(p.input_per_span);
+        for ((x, &r), (&minimum, &per_span)) in scaled.iter_mut().zip(reading).zip(limits) {
+            *x = scale(r, minimum, per_span);
+        }
+    }
+
+    /// Not inlined, so that the registers it takes are saved for no other format; the compiler still sees the
+    /// lengths if every caller has the same.
+    #[inline(never)]
+    pub(super) fn infer_scaled<E: ExpKernel>(&self, scaled: &[f32], output: &mut [f32]) {
+        let p = &self.parameters;
+        output.fill(0.0);
+        // `max(1)`: a checked network has no empty dimension; this tells the compiler.
+        let inputs = scaled.len().max(1);
+        let outputs = output.len().max(1);
+        for (&x, row) in scaled.iter().zip(p.affine.chunks_exact(outputs)) {
+            accumulate(output, x, row);
+        }
+        let common = p.decay.first().copied().unwrap_or(0.0);
+        let centres = p.centres.chunks_exact(inputs).zip(p.output_weights.chunks_exact(outputs));
+        for (k, (centre, weights)) in centres.enumerate() {
+            let decay = p.decay.get(k).copied().unwrap_or(common);
+            let activation = E::exp(-decay * squared_distance(scaled, centre));
+            accumulate(output, activation, weights);
+        }
+        for (y, &b) in output.iter_mut().zip(p.bias) {
+            *y += b;
+        }
+    }
+}
+
+/// ‖a − b‖² by direct differences: the expanded form ‖a‖² − 2a·b + ‖b‖² cancels (400 % error at
+/// offset 100).
+#[inline(always)]
+#[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
+fn squared_distance(a: &[f32], b: &[f32]) -> f32 {
+    let (a4, a_rest) = a.as_chunks::<4>();
+    let (b4, b_rest) = b.as_chunks::<4>();
+    let mut sum = [0.0_f32; 4];
+    for (a, b) in a4.iter().zip(b4) {
+        for ((s, a), b) in sum.iter_mut().zip(a).zip(b) {
+            let d = a - b;
+            *s += d * d;
+        }
+    }
+    for ((s, a), b) in sum.iter_mut().zip(a_rest).zip(b_rest) {
+        let d = a - b;
+        *s += d * d;
+    }
+    (sum[0] + sum[1]) + (sum[2] + sum[3])
+}

@@ -1,0 +1,349 @@
+//! The network in 16-bit fixed point.
+//!
+//! As [`expanded`](super::expanded), in integers. Inputs x are 16 bits, the upper halves of saturated
+//! integers in [`UNITS`](crate::scale::UNITS). The exponent v = g‖x − c‖² is an unsigned 6.26 number: v = b + a·x + g‖x‖² with a = −2g·c in 16
+//! bits, so c is exactly −a/(2g) whatever a was rounded to, and b = g‖c‖² + [`EXPONENT_MARGIN`]. The
+//! activation 2^−v is 16 bits (Q15): a cubic for the fraction, a shift for the integer part. Weights are 16
+//! bits with a scale for each output; sums are 32 bits.
+//!
+//! Nothing wraps around: inputs saturate; that v stays between 0 and 2³² for every input is checked with the
+//! parameters; and the trainer proves that sums fit, by a bound on the network's norm (partial sums may
+//! wrap, since arithmetic modulo 2³² does not mind the way there).
+//!
+//! The bias opens the sums, and one multiplication by the scale closes them: all before it is in integers, so
+//! that any order gives the same bits.
+
+use core::f32::consts::LOG2_E;
+
+use super::{Cut, NetworkError, Shape, check_finite, check_length, check_spans};
+use crate::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP, clamp_steps};
+
+/// Centres are stored in multiples of this.
+pub const CENTRES_AT_ONCE: usize = 16;
+/// Inputs that the squared length of x holds.
+pub const MOST_INPUTS: usize = 63;
+/// Bits of an exponent's fraction.
+pub const EXPONENT_FRACTION_BITS: u32 = 26;
+/// Fraction bits of the decay g, which is per step².
+pub const DECAY_FRACTION_BITS: u32 = 34;
+/// What b holds beyond g‖c‖², in units of the last place: more than all that truncation takes away.
+pub const EXPONENT_MARGIN: u32 = 8;
+/// The activation at a distance of 0; 1 would be 32768.
+pub const HIGHEST_ACTIVATION: i32 = 32_766;
+
+/// 2^−f = Σ c_i·f^i on [0, 1) within 1.1e-4, continuous over whole numbers: p(1) = p(0)/2. In Q33, Q27, Q21
+/// and Q15, since each product with f (Q26) drops 32 bits.
+const CUBIC: [i32; 4] = [-335_049_012, 30_875_674, -1_449_129, HIGHEST_ACTIVATION];
+
+/// The parameters of one network. K' is K rounded up to a multiple of [`CENTRES_AT_ONCE`], I' is the number
+/// of pairs of inputs (a last odd one is paired with 0); a *pair* is a word with the first of two `i16` in
+/// its low half.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Parameters<'a> {
+    /// Middle of each input's training range, in the reading's unit: `[inputs]`.
+    pub input_midpoint: &'a [f32],
+    /// [`UNITS`] in one unit of the reading; 0 for a channel that never changed: `[inputs]`.
+    pub input_per_unit: &'a [f32],
+    /// g per step², in 2^−(26 + 34).
+    pub decay: u32,
+    /// Bias in units of the sums: `[outputs]`.
+    pub bias: &'a [i32],
+    /// What one unit of a sum means, in the outputs' units: `[outputs]`.
+    pub output_scale: &'a [f32],
+    /// Affine tail in pairs of inputs: `[outputs × I']`, or empty.
+    pub affine: &'a [u32],
+    /// Sixteen centres at a time (`[K'/16]`): for each, b and then the pairs of a (`[16 × (1 + I')]`); then
+    /// their output weights in pairs of centres (`[outputs × 8]`).
+    pub centres: &'a [u32],
+}
+
+impl Parameters<'_> {
+    /// The parameters one after the other: the block that [`Network::try_new`] takes.
+    pub fn words(&self) -> impl Iterator<Item = u32> {
+        let bits = |value: &f32| value.to_bits();
+        let before = self.input_midpoint.iter().chain(self.input_per_unit).map(bits);
+        let bias = self.bias.iter().map(|&bias| bias as u32);
+        let scale = self.output_scale.iter().map(bits);
+        let after = self.affine.iter().chain(self.centres).copied();
+        before.chain([self.decay]).chain(bias).chain(scale).chain(after)
+    }
+}
+
+/// A network: a block of words, borrowed from where it lies, that has been checked against its shape.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(C)] // the shape first, so that it is at the same place in a network of any format
+pub struct Network<'a> {
+    shape: Shape,
+    affine: bool,
+    block: &'a [u32],
+}
+
+impl<'a> Network<'a> {
+    /// Checks the length and the values of a `block` ([`Parameters::words`]), and that no reading can drive
+    /// an exponent below 0 or beyond 32 bits. That the sums fit is proved where a network is quantised; a
+    /// device cannot.
+    ///
+    /// # Errors
+    /// Every variant of [`NetworkError`]; lengths are checked before values.
+    pub fn try_new(shape: Shape, affine: bool, block: &'a [u32]) -> Result<Self, NetworkError> {
+        let network = Self::with_length_checked(shape, affine, block)?;
+        network.check_values()?;
+        Ok(network)
+    }
+
+    /// As [`try_new`](Self::try_new), without the pass over all values: for a block that passed it before.
+    pub(crate) fn with_length_checked(
+        shape: Shape,
+        affine: bool,
+        block: &'a [u32],
+    ) -> Result<Self, NetworkError> {
+        if shape.inputs == 0 || shape.centres == 0 || shape.outputs == 0 {
+            return Err(NetworkError::Empty);
+        }
+        if shape.inputs > MOST_INPUTS {
+            return Err(NetworkError::TooManyInputs { most: MOST_INPUTS, found: shape.inputs });
+        }
+        check_length("block", block, Self::block_words(shape, affine))?;
+        Ok(Self { shape, affine, block })
+    }
+
+    /// Words of the block of a network of this shape.
+    #[must_use]
+    pub fn block_words(shape: Shape, affine: bool) -> usize {
+        let Shape { inputs, centres, outputs } = shape;
+        let pairs = inputs.div_ceil(2);
+        let affine = if affine { pairs.saturating_mul(outputs) } else { 0 };
+        let centres = centres.div_ceil(CENTRES_AT_ONCE).saturating_mul(words_at_once(shape));
+        [inputs, inputs, 1, outputs, outputs, affine, centres]
+            .into_iter()
+            .fold(0, usize::saturating_add)
+    }
+
+    /// The network's sizes.
+    #[must_use]
+    pub fn shape(&self) -> Shape {
+        self.shape
+    }
+
+    /// Whether there is an affine tail.
+    #[must_use]
+    pub fn has_affine_tail(&self) -> bool {
+        self.affine
+    }
+
+    /// All of the network's words.
+    #[must_use]
+    pub fn block(&self) -> &'a [u32] {
+        self.block
+    }
+
+    /// The network's parameters.
+    #[must_use]
+    pub fn parameters(&self) -> Parameters<'a> {
+        let Shape { inputs, centres, outputs } = self.shape;
+        let mut cut = Cut(self.block);
+        Parameters {
+            input_midpoint: cut.floats(inputs),
+            input_per_unit: cut.floats(inputs),
+            decay: cut.words(1).first().copied().unwrap_or_default(),
+            bias: bytemuck::cast_slice(cut.words(outputs)),
+            output_scale: cut.floats(outputs),
+            affine: cut.words(if self.affine { inputs.div_ceil(2) * outputs } else { 0 }),
+            centres: cut.words(centres.div_ceil(CENTRES_AT_ONCE) * words_at_once(self.shape)),
+        }
+    }
+
+    /// Sixteen centres at a time: the lines of their exponents, and their weights.
+    fn centres(&self) -> impl Iterator<Item = (&'a [u32], &'a [u32])> {
+        let exponents = CENTRES_AT_ONCE * (1 + self.shape.inputs.div_ceil(2));
+        let at_once = self.parameters().centres.chunks_exact(words_at_once(self.shape).max(1));
+        at_once.map(move |words| words.split_at_checked(exponents).unwrap_or_default())
+    }
+
+    /// Width σ of all centres on inputs scaled to [0, 1].
+    #[must_use]
+    pub fn width(&self) -> f32 {
+        // 2^60 is where the decay's last place stands.
+        let per_step_squared = self.parameters().decay as f32 / 1_152_921_504_606_846_976.0;
+        let step = HALF_RANGE / UNITS * UNITS_PER_STEP;
+        libm::sqrtf(LOG2_E / (2.0 * per_step_squared)) * step
+    }
+
+    pub(crate) fn check_values(&self) -> Result<(), NetworkError> {
+        let p = self.parameters();
+        let decay = u64::from(p.decay);
+        if decay == 0 {
+            return Err(NetworkError::InvalidWidth { centre: 0 });
+        }
+        check_finite(&[
+            ("input_midpoint", p.input_midpoint),
+            ("input_per_unit", p.input_per_unit),
+            ("output_scale", p.output_scale),
+        ])?;
+        check_spans(p.input_per_unit)?;
+        if p.output_scale.iter().any(|scale| !(scale * UNITS).is_finite()) {
+            return Err(NetworkError::NotFinite { what: "the largest output" });
+        }
+        let most_shared = (((self.shape.inputs as u64) << 26) * decay) >> 30;
+        let line = 1 + self.shape.inputs.div_ceil(2);
+        let lines = self.centres().flat_map(|(exponents, _)| exponents.chunks_exact(line));
+        for (centre, line) in lines.enumerate() {
+            let Some((&b, a)) = line.split_first() else { continue };
+            let b = u64::from(b);
+            // b + a·x + g‖x‖² is highest in a corner of the clamp's box, and lowest at x = −a/(2g).
+            let (mut reach, mut square) = (b + most_shared, 0);
+            for a in a.iter().flat_map(|&pair| halves(pair)) {
+                reach += u64::from(a.unsigned_abs()) << 15;
+                square += u64::from(a.unsigned_abs().pow(2));
+            }
+            let room = b.checked_sub(EXPONENT_MARGIN.into());
+            let enough = room.is_some_and(|b| (b * decay) >> 32 >= square);
+            if !enough || reach > u64::from(u32::MAX) {
+                return Err(NetworkError::ExponentOutOfRange { centre });
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) fn place_of(&self, input: usize, reading: f32) -> f32 {
+        let p = self.parameters();
+        match (p.input_midpoint.get(input), p.input_per_unit.get(input)) {
+            (Some(midpoint), Some(per_unit)) => {
+                0.5 + (reading - midpoint) * per_unit * (HALF_RANGE / UNITS)
+            }
+            _ => f32::NAN,
+        }
+    }
+
+    pub(super) fn scale(&self, reading: &[f32], scaled: &mut [f32]) {
+        let p = self.parameters();
+        let limits = p.input_midpoint.iter().zip(p.input_per_unit);
+        for ((x, &r), (&midpoint, &per_unit)) in scaled.iter_mut().zip(reading).zip(limits) {
+            *x = (r - midpoint) * per_unit;
+        }
+    }
+
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "callers rely on it for constant lengths")]
+    pub(super) fn infer(&self, reading: &[f32], scaled: &mut [f32], output: &mut [f32]) {
+        #[cfg(cortex_m4f)]
+        if let (Ok(reading), Ok(output)) = (reading.try_into(), (&mut *output).try_into()) {
+            return super::cortex_m4::fixed16(
+                self,
+                super::cortex_m4::Inputs::Readings(reading),
+                output,
+            );
+        }
+        self.scale(reading, scaled);
+        self.infer_scaled(scaled, output);
+    }
+
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "callers rely on it for constant lengths")]
+    pub(super) fn infer_scaled(&self, scaled: &mut [f32], output: &mut [f32]) {
+        #[cfg(cortex_m4f)]
+        if let (Ok(scaled), Ok(output)) = ((&*scaled).try_into(), (&mut *output).try_into()) {
+            return super::cortex_m4::fixed16(
+                self,
+                super::cortex_m4::Inputs::Scaled(scaled),
+                output,
+            );
+        }
+        self.infer_scaled_portably(scaled, output);
+    }
+
+    /// As [`rbf::Network::infer_scaled`](super::Network::infer_scaled), by the compiled twin of the
+    /// assembly: the same bits; public to measure what the assembly saves. `scaled` and `output` must have
+    /// the sizes of the shape: what is beyond is left alone.
+    #[inline]
+    pub fn infer_scaled_portably(&self, scaled: &mut [f32], output: &mut [f32]) {
+        let p = self.parameters();
+        // The buffers of the caller serve for the integers: no other is of the right length.
+        let x = bytemuck::cast_slice_mut::<f32, i32>(scaled);
+        x.iter_mut().for_each(|x| *x = clamp_steps(f32::from_bits(*x as u32)));
+        let sums = bytemuck::cast_slice_mut::<f32, i32>(output);
+        sums.iter_mut().zip(p.bias).for_each(|(sum, &bias)| *sum = bias);
+        let (pairs, shared) = (x.len().div_ceil(2).max(1), shared_term(p.decay, x));
+        for (sum, row) in sums.iter_mut().zip(p.affine.chunks_exact(pairs)) {
+            *sum = add_products(*sum, row, x);
+        }
+        for (exponents, weights) in self.centres() {
+            let activations = activations_of(exponents, shared, x);
+            for (sum, row) in sums.iter_mut().zip(weights.chunks_exact(CENTRES_AT_ONCE / 2)) {
+                *sum = add_products(*sum, row, &activations);
+            }
+        }
+        for (y, scale) in output.iter_mut().zip(p.output_scale) {
+            *y = y.to_bits().cast_signed() as f32 * scale;
+        }
+    }
+
+    /// The activations in Q15 of sixteen centres after the other, for inputs in steps
+    /// ([`clamp_steps`]): what a trainer fits output weights to.
+    pub fn activations(&self, x: &[i32]) -> impl Iterator<Item = [i32; CENTRES_AT_ONCE]> {
+        let shared = shared_term(self.parameters().decay, x);
+        self.centres().map(move |(exponents, _)| activations_of(exponents, shared, x))
+    }
+}
+
+/// Words of [`Parameters::centres`] that sixteen centres take.
+fn words_at_once(shape: Shape) -> usize {
+    CENTRES_AT_ONCE
+        .saturating_mul(1 + shape.inputs.div_ceil(2))
+        .saturating_add((CENTRES_AT_ONCE / 2).saturating_mul(shape.outputs))
+}
+
+/// The two `i16` of a pair.
+fn halves(pair: u32) -> [i32; 2] {
+    [i32::from(pair as i16), i32::from((pair >> 16) as i16)]
+}
+
+/// Adds the products of pairs with the values they stand for.
+#[inline(always)]
+#[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
+fn add_products(sum: i32, pairs: &[u32], values: &[i32]) -> i32 {
+    let (twos, rest) = values.as_chunks::<2>();
+    let mut sum = sum;
+    for (&pair, two) in pairs.iter().zip(twos) {
+        let [low, high] = halves(pair);
+        sum = sum.wrapping_add(low * two[0]).wrapping_add(high * two[1]);
+    }
+    if let (Some(&pair), Some(&last)) = (pairs.get(twos.len()), rest.first()) {
+        sum = sum.wrapping_add(halves(pair)[0] * last);
+    }
+    sum
+}
+
+/// g‖x‖²
+#[inline(always)]
+#[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
+fn shared_term(decay: u32, x: &[i32]) -> u32 {
+    let square: u64 = x.iter().map(|&x| u64::from(x.unsigned_abs()).pow(2)).sum();
+    (((square >> 4) * u64::from(decay)) >> 30) as u32
+}
+
+/// 2^−v in Q15
+#[inline(always)]
+#[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
+fn power(v: u32) -> i32 {
+    let fraction = i64::from(v & ((1 << EXPONENT_FRACTION_BITS) - 1));
+    let [c3, c2, c1, c0] = CUBIC;
+    let mut p = c3;
+    for c in [c2, c1, c0] {
+        p = ((fraction * i64::from(p)) >> 32) as i32 + c;
+    }
+    p.checked_shr(v >> EXPONENT_FRACTION_BITS).unwrap_or(0)
+}
+
+#[inline(always)]
+#[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
+fn activations_of(exponents: &[u32], shared: u32, x: &[i32]) -> [i32; CENTRES_AT_ONCE] {
+    let mut activations = [0; CENTRES_AT_ONCE];
+    let lines = exponents.chunks_exact(1 + x.len().div_ceil(2));
+    for (activation, line) in activations.iter_mut().zip(lines) {
+        let Some((&b, a)) = line.split_first() else { continue };
+        *activation =
+            power((add_products(b.cast_signed(), a, x).cast_unsigned()).wrapping_add(shared));
+    }
+    activations
+}
