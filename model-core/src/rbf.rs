@@ -211,6 +211,23 @@ impl<'a> Network<'a> {
         evaluate::<E>(&self.parameters, reading, &mut scaled, &mut output);
         Ok(output)
     }
+
+    /// The centres' share of [`infer_array`](Self::infer_array), from readings that are scaled
+    /// already: Σ_k ω_k·exp(−d_k·‖x − c_k‖²) + b, without the affine tail. This is what other
+    /// implementations of such networks compute, and so what their speed is compared by.
+    ///
+    /// # Errors
+    /// [`NetworkError::Length`] if the network has other sizes.
+    pub fn infer_scaled<E: ExpKernel, const INPUTS: usize, const OUTPUTS: usize>(
+        &self,
+        scaled: &[f32; INPUTS],
+    ) -> Result<[f32; OUTPUTS], NetworkError> {
+        check_length("scaled", scaled, self.shape.inputs)?;
+        let mut output = [0.0; OUTPUTS];
+        check_length("output", &output, self.shape.outputs)?;
+        accumulate_centres::<E>(&self.parameters, scaled, &mut output);
+        Ok(output)
+    }
 }
 
 fn check_length(what: &'static str, values: &[f32], expected: usize) -> Result<(), NetworkError> {
@@ -235,12 +252,19 @@ fn evaluate<E: ExpKernel>(
         *x = scale(r, minimum, per_span);
     }
     output.fill(0.0);
+    for (&x, row) in scaled.iter().zip(p.affine.chunks_exact(output.len().max(1))) {
+        accumulate(output, x, row);
+    }
+    accumulate_centres::<E>(p, scaled, output);
+}
+
+/// Adds one centre after the other, and last the bias.
+#[inline(always)]
+#[expect(clippy::inline_always, reason = "see `evaluate`")]
+fn accumulate_centres<E: ExpKernel>(p: &Parameters<'_>, scaled: &[f32], output: &mut [f32]) {
     // `max(1)`: a checked network has no empty dimension; this tells the compiler.
     let inputs = scaled.len().max(1);
     let outputs = output.len().max(1);
-    for (&x, row) in scaled.iter().zip(p.affine.chunks_exact(outputs)) {
-        accumulate(output, x, row);
-    }
     let common = p.decay.first().copied().unwrap_or(0.0);
     let centres = p.centres.chunks_exact(inputs).zip(p.output_weights.chunks_exact(outputs));
     for (k, (centre, weights)) in centres.enumerate() {

@@ -134,6 +134,22 @@ fn unusable_values_are_named() {
     assert_eq!(network(|_| ()), Ok(SHAPE));
 }
 
+/// Scaling apart, and without an affine tail, both do the same.
+#[test]
+fn inference_from_scaled_inputs_is_the_rest_of_inference_bit_for_bit() {
+    let sample = Sample::new();
+    let parameters = Parameters { affine: &[], ..sample.parameters() };
+    let network = Network::try_new(SHAPE, parameters).unwrap();
+    let reading = [50.0, 52.5, 55.0, 57.5, 60.0];
+    let mut scaled = [0.0; 5];
+    let mut expected = [0.0; 2];
+    network.infer::<Polynomial>(&reading, &mut scaled, &mut expected).unwrap();
+    let output = network.infer_scaled::<Polynomial, 5, 2>(&scaled).unwrap();
+    assert_eq!(output.map(f32::to_bits), expected.map(f32::to_bits));
+    let error = NetworkError::Length { what: "scaled", expected: 5, found: 4 };
+    assert_eq!(network.infer_scaled::<Polynomial, 4, 2>(&[0.0; 4]), Err(error));
+}
+
 proptest! {
     /// Sizes known at run time or at compile time: the same bits.
     #[test]
