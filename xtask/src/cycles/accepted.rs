@@ -113,6 +113,19 @@ mod tests {
     }
 
     #[test]
+    fn every_table_of_the_document_is_understood() {
+        let document = include_str!("../../../docs/cycles.md");
+        let compilers: Vec<_> =
+            document.lines().filter_map(|line| line.strip_prefix(HEADING)).collect();
+        assert!(!compilers.is_empty());
+        for compiler in compilers {
+            let figures = read(document, compiler).unwrap().unwrap();
+            assert!(!figures.is_empty(), "{compiler}");
+            assert_eq!(write(document, compiler, &figures), document, "{compiler}");
+        }
+    }
+
+    #[test]
     fn instructions_are_compared_exactly_and_cycles_to_a_per_cent() {
         let accepted = [figures("a", 100, 1000)];
         assert!(differences(&accepted, &[figures("a", 100, 1010)]).is_empty());
