@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use crate::columns;
 use crate::dataset::{Dataset, Table};
 use crate::error::{Error, Result};
-use crate::infer::{Kernel, infer, infer_line};
+use crate::infer::{Kernel, infer, infer_line, is_missing};
 use crate::progress::Progress;
 use crate::random::Stream;
 use crate::scene::{NoiseKind, Scene};
@@ -203,10 +203,12 @@ impl LoadedModel {
         for line in readings.lines() {
             for (network, readings) in networks.iter().zip(line.chunks_exact(inputs)) {
                 for (input, reading) in readings.iter().enumerate() {
-                    let place = network.place_of(input, *reading as f32);
-                    if !place.is_nan() {
+                    if !is_missing(*reading) {
+                        let [lowest, highest] = network.training_range(input).map(f64::from);
+                        let place = (reading - lowest) / (highest - lowest);
+                        let inside = (f64::from(CLAMP[0])..=f64::from(CLAMP[1])).contains(&place);
                         present += 1;
-                        clamped += usize::from(!(CLAMP[0]..=CLAMP[1]).contains(&place));
+                        clamped += usize::from(highest > lowest && !inside);
                     }
                 }
             }

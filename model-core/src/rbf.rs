@@ -15,6 +15,7 @@
 //! rest. Host and device thus agree bit for bit, with or without SIMD.
 
 use crate::exp::ExpKernel;
+use crate::scale::{HALF_RANGE, UNITS};
 
 #[cfg(cortex_m4f)]
 mod cortex_m4;
@@ -187,15 +188,11 @@ impl<'a> Network<'a> {
         }
     }
 
-    /// Where `reading` of `input` lies in the training range: 0 at its lowest and 1 at its highest value,
-    /// before any clamp; NaN if there is no such input, and whatever constant if it never changed.
+    /// Lowest and highest reading of `input` in training, in its unit, as far as f32 tells: the same if it
+    /// never changed, NaN if there is no such input.
     #[must_use]
-    pub fn place_of(&self, input: usize, reading: f32) -> f32 {
-        match self {
-            Self::F32Direct(inner) => inner.place_of(input, reading),
-            Self::F32(inner) => inner.place_of(input, reading),
-            Self::Fixed16(inner) => inner.place_of(input, reading),
-        }
+    pub fn training_range(&self, input: usize) -> [f32; 2] {
+        each!(self, inner => inner.training_range(input))
     }
 
     /// Infers `output` from one row of `reading`s. `E` serves [`Format::F32Direct`]; the other formats have an
@@ -330,6 +327,13 @@ fn check_length<T>(what: &'static str, values: &[T], expected: usize) -> Result<
     } else {
         Err(NetworkError::Length { what, expected, found: values.len() })
     }
+}
+
+/// Lowest and highest reading from the middle of the range and [`UNITS`](crate::scale::UNITS) in one unit.
+fn range_about(midpoint: Option<&f32>, per_unit: Option<&f32>) -> [f32; 2] {
+    let (Some(&midpoint), Some(&per_unit)) = (midpoint, per_unit) else { return [f32::NAN; 2] };
+    let half = if per_unit > 0.0 { 0.5 / HALF_RANGE * UNITS / per_unit } else { 0.0 };
+    [midpoint - half, midpoint + half]
 }
 
 fn check_finite(arrays: &[(&'static str, &[f32])]) -> Result<(), NetworkError> {

@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use crate::cycles;
 use crate::emulate::{self, Differences};
 use crate::firmware;
 use crate::process::{Outcome, cargo, run as run_command};
@@ -18,7 +19,7 @@ pub enum Tests {
 
 /// Runs every step, whatever becomes of the ones before, and prints a summary.
 pub fn run(tests: Tests) -> Outcome {
-    let steps: [(&str, &dyn Fn() -> Outcome); 7] = [
+    let steps: [(&str, &dyn Fn() -> Outcome); 8] = [
         ("format", &|| run_command(&mut cargo(&["fmt", "--all", "--check"]))),
         ("clippy", &|| {
             let mut command = cargo(&["clippy", "--workspace", "--all-targets"]);
@@ -37,6 +38,7 @@ pub fn run(tests: Tests) -> Outcome {
         ("firmware", &firmware::run),
         ("emulate", &|| emulate::run(&[], Differences::Fail)),
         ("size", &size::run),
+        ("cycles", &|| cycles::run(&cycles::Options::default())),
     ];
 
     let mut ended = Vec::new();

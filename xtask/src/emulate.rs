@@ -4,7 +4,7 @@
 mod application;
 mod cable;
 mod expected;
-mod qemu;
+pub mod qemu;
 
 use std::fs;
 use std::path::{Path, PathBuf};

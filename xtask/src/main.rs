@@ -1,6 +1,7 @@
 //! One command for everything that people and CI run: `cargo xtask help`.
 
 mod ci;
+mod cycles;
 mod emulate;
 mod firmware;
 mod process;
@@ -16,7 +17,7 @@ const HELP: &str = "\
 Usage: cargo xtask COMMAND
 
   ci [--after-cargo-test]   everything that CI runs: format, clippy, tests, docs, firmware, emulate,
-                            size; goes on after a failure and ends with a summary. After a plain
+                            size, cycles; goes on after a failure and ends with a summary. After a plain
                             `cargo test`, the option tests only the crates which that leaves out
   firmware                  builds and lints for thumbv7em-none-eabihf all that runs on a device,
                             and proves by linking that no panic is reachable there
@@ -29,6 +30,14 @@ Usage: cargo xtask COMMAND
                             that wrote it, if it is another than that command's own
   size                      shows what flash and RAM the images take, and fails if that is more
                             than firmware/budget.txt allows
+  cycles [OPTION…]          counts in QEMU what decoding costs a Cortex-M4, with every kernel and
+                            K = 16 to 256: instructions, cycles by a model, microseconds; fails if
+                            that is more than its budget, or other than docs/cycles.md has for the
+                            compiler in use
+      --json                prints a list of objects to stdout, and nothing else
+      --accept              writes docs/cycles.md instead
+      --kernel NAME         one kernel alone, held to its budget alone
+      --model FILE          with this model, held to nothing
   help                      this text
 
 `bash firmware/setup.sh` installs what these need on Debian.
@@ -54,6 +63,9 @@ fn main() -> ExitCode {
         ["log", log] => emulate::print_log(log, None),
         ["log", log, image] => emulate::print_log(log, Some(image)),
         ["size"] => size::run(),
+        ["cycles", ref options @ ..] if cycles::Options::parse(options).is_some() => {
+            cycles::run(&cycles::Options::parse(options).unwrap_or_default())
+        }
         [] => {
             eprint!("cargo xtask needs a command\n\n{HELP}");
             return ExitCode::from(2);

@@ -64,6 +64,18 @@ impl Toolchain {
         })
     }
 
+    /// What the compiler says of itself, which tells it from others.
+    ///
+    /// # Errors
+    /// It says nothing.
+    pub fn compiler(&self) -> Outcome<String> {
+        let rustc = match self {
+            Self::Active => "rustc",
+            Self::Debian { .. } => DEBIAN_RUSTC,
+        };
+        first_line(rustc, &["--version"]).ok_or(format!("{rustc} does not tell its version"))
+    }
+
     /// `cargo build` for the target, in a directory of its own.
     pub fn build(&self) -> Command {
         self.command(DEBIAN_CARGO, "build")

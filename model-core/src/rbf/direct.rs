@@ -143,12 +143,14 @@ impl<'a> Network<'a> {
             .map(bytemuck::cast_slice)
     }
 
-    pub(super) fn place_of(&self, input: usize, reading: f32) -> f32 {
+    pub(super) fn training_range(&self, input: usize) -> [f32; 2] {
         let p = &self.parameters;
-        match (p.input_minimum.get(input), p.input_per_span.get(input)) {
-            (Some(minimum), Some(per_span)) => (reading - minimum) * per_span,
-            _ => f32::NAN,
-        }
+        let (Some(&lowest), Some(&per_span)) =
+            (p.input_minimum.get(input), p.input_per_span.get(input))
+        else {
+            return [f32::NAN; 2];
+        };
+        [lowest, if per_span > 0.0 { lowest + 1.0 / per_span } else { lowest }]
     }
 
     #[inline(always)]

@@ -205,14 +205,9 @@ impl<'a> Network<'a> {
         Ok(())
     }
 
-    pub(super) fn place_of(&self, input: usize, reading: f32) -> f32 {
+    pub(super) fn training_range(&self, input: usize) -> [f32; 2] {
         let p = self.parameters();
-        match (p.input_midpoint.get(input), p.input_per_unit.get(input)) {
-            (Some(midpoint), Some(per_unit)) => {
-                0.5 + (reading - midpoint) * per_unit * (HALF_RANGE / UNITS)
-            }
-            _ => f32::NAN,
-        }
+        super::range_about(p.input_midpoint.get(input), p.input_per_unit.get(input))
     }
 
     pub(super) fn scale(&self, reading: &[f32], scaled: &mut [f32]) {

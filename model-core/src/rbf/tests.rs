@@ -143,6 +143,19 @@ fn unusable_values_are_named() {
     assert_eq!(network(|_| ()), Ok(SHAPE));
 }
 
+#[test]
+fn inference_from_scaled_inputs_is_the_rest_of_inference_bit_for_bit() {
+    let sample = Sample::new();
+    let network = Network::from(direct::Network::try_new(SHAPE, sample.parameters()).unwrap());
+    let reading = [50.0, 52.5, 55.0, 57.5, 60.0];
+    let (mut scaled, mut output) = ([0.0; 5], [0.0; 2]);
+    network.scale(&reading, &mut scaled).unwrap();
+    network.infer_scaled::<Polynomial>(&mut scaled, &mut output).unwrap();
+    assert_eq!(output, infer::<Polynomial>(&network, &reading));
+    let error = NetworkError::Length { what: "scaled", expected: 5, found: 4 };
+    assert_eq!(network.infer_scaled::<Polynomial>(&mut [0.0; 4], &mut output), Err(error));
+}
+
 proptest! {
     /// Sizes known at run time or at compile time: the same bits.
     #[test]

@@ -12,7 +12,8 @@ use defmt_decoder::{DecodeError, Table};
 use super::cable;
 use crate::process::{Outcome, first_line};
 
-const QEMU: &str = "qemu-system-arm";
+/// The emulator's program.
+pub const QEMU: &str = "qemu-system-arm";
 
 /// No program takes more than seconds.
 const LIMIT: Duration = Duration::from_mins(1);
@@ -27,7 +28,7 @@ pub fn present() -> Outcome {
 }
 
 /// What is needed to decode the logs of the program in `elf`.
-fn table(elf: &Path) -> Outcome<Table> {
+pub fn table(elf: &Path) -> Outcome<Table> {
     let program = fs::read(elf).map_err(|cause| format!("{}: {cause}", elf.display()))?;
     Table::parse(&program)
         .map_err(|cause| format!("{}: {cause:#}", elf.display()))?
@@ -65,24 +66,31 @@ pub fn run(elf: &Path) -> Outcome<String> {
     }
 }
 
-/// The machine, its log on stdout, its first two UARTs connected with one another.
-fn command(elf: &Path) -> Outcome<Command> {
-    let ports = cable::lay().map_err(|cause| format!("cannot connect the UARTs: {cause}"))?;
+/// The machine with the program in `elf`, whose log goes to stdout.
+pub fn machine(elf: &Path) -> Command {
     let mut command = Command::new(QEMU);
     command.args(["-M", "mps2-an386", "-cpu", "cortex-m4", "-display", "none", "-monitor", "none"]);
+    command.args(["-semihosting-config", "enable=on,target=native"]);
+    command.arg("-kernel").arg(elf);
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+}
+
+/// The same with its first two UARTs connected with one another.
+fn command(elf: &Path) -> Outcome<Command> {
+    let ports = cable::lay().map_err(|cause| format!("cannot connect the UARTs: {cause}"))?;
+    let mut command = machine(elf);
     // Time goes by instructions, 32 ns each: a program runs alike however busy this machine is.
     command.args(["-icount", "shift=5"]);
-    command.args(["-semihosting-config", "enable=on,target=native"]);
     for port in ports {
         command.args(["-chardev", &format!("socket,id=uart{port},host=127.0.0.1,port={port}")]);
         command.args(["-serial", &format!("chardev:uart{port}")]);
     }
-    command.arg("-kernel").arg(elf);
-    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     Ok(command)
 }
 
-fn reader(stream: Option<impl Read + Send + 'static>) -> thread::JoinHandle<Vec<u8>> {
+/// Reads `stream` to its end.
+pub fn reader(stream: Option<impl Read + Send + 'static>) -> thread::JoinHandle<Vec<u8>> {
     thread::spawn(move || {
         let mut bytes = Vec::new();
         // What was read before an error is shown, so the error itself says nothing more.
@@ -92,7 +100,7 @@ fn reader(stream: Option<impl Read + Send + 'static>) -> thread::JoinHandle<Vec<
 }
 
 /// The exit status; `None` if the limit was reached and the program killed.
-fn wait(child: &mut Child, limit: Duration) -> Outcome<Option<ExitStatus>> {
+pub fn wait(child: &mut Child, limit: Duration) -> Outcome<Option<ExitStatus>> {
     let failed = |cause| format!("cannot wait for {QEMU}: {cause}");
     let start = Instant::now();
     while start.elapsed() < limit {
@@ -107,7 +115,7 @@ fn wait(child: &mut Child, limit: Duration) -> Outcome<Option<ExitStatus>> {
 }
 
 /// A log as text: `LEVEL message`, one entry after the other.
-fn decode(table: &Table, logged: &[u8]) -> String {
+pub fn decode(table: &Table, logged: &[u8]) -> String {
     let mut decoder = table.new_stream_decoder();
     decoder.received(logged);
     let mut text = String::new();

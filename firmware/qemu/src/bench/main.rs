@@ -1,0 +1,99 @@
+//! Decodes with every kernel, for `cargo xtask cycles`, which traces it and counts what each region
+//! executes. The model lies in slot A.
+#![no_std]
+#![no_main]
+
+mod inputs;
+mod kernel;
+mod region;
+
+use core::hint::black_box;
+
+use cortex_m_rt::entry;
+use defmt::{assert, info, unwrap};
+use model_core::blob::Model;
+use model_core::exp::{Libm, Micromath, Polynomial};
+use model_core::rbf::Network;
+use model_core::{Estimate, Frame, RowStatus};
+use qemu_image::checks::Numbers;
+use qemu_image::exit;
+use qemu_image::slot::Slot;
+
+use kernel::{COLS, F32, F32Direct, Fixed16, Formatted, Kernel, OUTPUTS, Portable, ROWS};
+use region::{calibrate, region};
+
+/// What is decoded, and by which model.
+struct Bench<'a> {
+    blob: &'a [u8],
+    network: Network<'a>,
+    scaled: [f32; COLS],
+    frame: Frame<ROWS, COLS>,
+}
+
+/// The kernels, in the order of the table: a new one is one line here.
+fn measure_every_kernel(bench: &Bench<'_>) {
+    bench.measure::<Formatted<F32, Polynomial>>("f32");
+    bench.measure::<Portable<F32>>("f32-portable");
+    bench.measure::<Formatted<Fixed16, Polynomial>>("fixed16");
+    bench.measure::<Portable<Fixed16>>("fixed16-portable");
+    bench.measure::<Formatted<F32Direct, Polynomial>>("f32-direct");
+    bench.measure::<Formatted<F32Direct, Libm>>("f32-direct-libm");
+    bench.measure::<Formatted<F32Direct, Micromath>>("f32-direct-micromath");
+}
+
+impl Bench<'_> {
+    /// One kernel in every scope, if the model is made for it.
+    fn measure<K: Kernel>(&self, name: &str) {
+        let Some(decoder) = K::load(self.blob) else { return };
+        let (mut scaled, mut outputs) = (self.scaled, [0.0; OUTPUTS]);
+        region(name, "inference", || {
+            K::infer(black_box(&self.network), black_box(&mut scaled), black_box(&mut outputs));
+        });
+        let readings = &self.frame.row_column_resistance_ohm[0];
+        region(name, "row", || {
+            let (scaled, outputs) = (black_box(&mut scaled), black_box(&mut outputs));
+            K::infer_row(black_box(&self.network), black_box(readings), scaled, outputs);
+        });
+        let mut estimate = Estimate {
+            outputs: [[f32::NAN; OUTPUTS]; ROWS],
+            status: [RowStatus::MissingReading; ROWS],
+        };
+        region(name, "frame", || {
+            K::decode(black_box(&decoder), black_box(&self.frame), black_box(&mut estimate));
+        });
+        assert!(estimate.status == [RowStatus::Decoded; ROWS], "a row was not decoded");
+    }
+}
+
+#[entry]
+fn main() -> ! {
+    calibrate();
+    // SAFETY: nobody else takes them.
+    let [slot, _] = unsafe { Slot::take() };
+    let length = unwrap!(Model::declared_length(slot.bytes()), "slot A holds no model");
+    let blob = unwrap!(slot.bytes().get(..length), "the model in slot A is cut off");
+    let Ok(model) = Model::decode(blob) else { defmt::panic!("the model in slot A is unsound") };
+    let shape = model.shape();
+    assert!(
+        (shape.rows, shape.inputs, shape.outputs) == (ROWS, COLS, OUTPUTS),
+        "this image decodes {=usize} rows of {=usize} readings and {=usize} outputs; the model is for \
+         {=usize}, {=usize} and {=usize}",
+        ROWS,
+        COLS,
+        OUTPUTS,
+        shape.rows,
+        shape.inputs,
+        shape.outputs
+    );
+
+    // One row stands for all: the first.
+    let network = model.network_of_row(0).and_then(|index| model.networks().nth(index));
+    let network = unwrap!(network, "the model has no network for its first row");
+    info!("centres {=usize}", network.shape().centres);
+    let mut numbers = Numbers::new(3);
+    let frame = inputs::frame(&model, &mut numbers);
+    let mut scaled = [0.0; COLS];
+    unwrap!(network.scale(&frame.row_column_resistance_ohm[0], &mut scaled).ok());
+    measure_every_kernel(&Bench { blob, network, scaled, frame });
+    exit::success()
+}

@@ -1,0 +1,79 @@
+//! An image's code, by address.
+
+use std::collections::HashMap;
+use std::fs;
+use std::path::Path;
+
+use object::{Object, ObjectSegment, ObjectSymbol};
+
+use super::thumb::{self, Instruction};
+use crate::process::Outcome;
+
+/// The bytes that an image loads, and the addresses of its symbols.
+pub struct Code {
+    segments: Vec<(u32, Vec<u8>)>,
+    symbols: HashMap<String, u32>,
+}
+
+impl Code {
+    /// That of the ELF file at `elf`.
+    pub fn read(elf: &Path) -> Outcome<Self> {
+        let failed = |cause: String| format!("{}: {cause}", elf.display());
+        let bytes = fs::read(elf).map_err(|cause| failed(cause.to_string()))?;
+        let file = object::File::parse(&*bytes).map_err(|cause| failed(cause.to_string()))?;
+        let mut segments = Vec::new();
+        for segment in file.segments() {
+            let data = segment.data().map_err(|cause| failed(cause.to_string()))?;
+            segments.push((segment.address() as u32, data.to_owned()));
+        }
+        // The lowest bit of a function's address says that it is Thumb code.
+        let address = |symbol: object::Symbol<'_, '_>| symbol.address() as u32 & !1;
+        let symbols = file
+            .symbols()
+            .filter_map(|symbol| Some((symbol.name().ok()?.to_owned(), address(symbol))))
+            .collect();
+        Ok(Self { segments, symbols })
+    }
+
+    /// Code that starts at `address`, without symbols.
+    #[cfg(test)]
+    pub fn of(address: u32, halfwords: &[u16]) -> Self {
+        let bytes = halfwords.iter().flat_map(|halfword| halfword.to_le_bytes()).collect();
+        let segments = vec![(address, bytes)];
+        Self { segments, symbols: HashMap::new() }
+    }
+
+    /// The address of `symbol`.
+    pub fn symbol(&self, symbol: &str) -> Outcome<u32> {
+        self.symbols.get(symbol).copied().ok_or_else(|| format!("the image has no symbol {symbol}"))
+    }
+
+    /// The instruction at `address`.
+    ///
+    /// # Errors
+    /// There is no code, or none that the decoder knows: its address and bytes.
+    pub fn instruction(&self, address: u32) -> Outcome<Instruction> {
+        let first = self
+            .halfword(address)
+            .ok_or_else(|| format!("no code was loaded to {address:#010x}, which was executed"))?;
+        let second = self.halfword(address.wrapping_add(2));
+        thumb::decode(first, second).ok_or_else(|| {
+            let bytes = match second.filter(|_| thumb::is_wide(first)) {
+                Some(second) => format!("{first:04x} {second:04x}"),
+                None => format!("{first:04x}"),
+            };
+            format!(
+                "the instruction {bytes} at {address:#010x} is not known; teach it to \
+                 xtask/src/cycles/thumb.rs, and docs/cycles.md what it costs"
+            )
+        })
+    }
+
+    fn halfword(&self, address: u32) -> Option<u16> {
+        self.segments.iter().find_map(|(start, bytes)| {
+            let at = address.checked_sub(*start)? as usize;
+            let bytes = bytes.get(at..at.checked_add(2)?)?;
+            Some(u16::from_le_bytes([bytes[0], bytes[1]]))
+        })
+    }
+}

@@ -1,0 +1,114 @@
+//! Runs an image in QEMU, instruction by instruction, and counts what its regions execute.
+
+use std::io::BufReader;
+use std::path::Path;
+use std::process::Command;
+use std::thread;
+use std::time::Duration;
+
+use super::code::Code;
+use super::regions::{Count, Regions};
+use super::trace;
+use crate::emulate::qemu::{QEMU, decode, machine, reader, table, wait};
+use crate::process::Outcome;
+
+/// Functions of the image that mark its regions (`firmware/qemu/src/bench/region.rs`).
+const BEGIN: &str = "region_begin";
+const END: &str = "region_end";
+
+/// Where the image expects a model.
+const SLOT: [&str; 2] = ["_slot_a_start", "_slot_a_end"];
+
+/// No run takes more than half a minute.
+const LIMIT: Duration = Duration::from_mins(5);
+
+/// What a program did.
+pub struct Run {
+    /// What its regions executed, in their order.
+    pub counts: Vec<Count>,
+    /// What it logged.
+    pub log: String,
+}
+
+/// Runs the image in `elf`, whose code is `code`, with the blob `model` in its first slot.
+///
+/// # Errors
+/// It does not run to its end, what it executes cannot be costed, or it reports a failure: its log.
+pub fn run(elf: &Path, code: &Code, model: &Path) -> Outcome<Run> {
+    let [start, end] = SLOT.map(|symbol| code.symbol(symbol));
+    let (start, room) = (start?, end? - code.symbol(SLOT[0])?);
+    let length = model.metadata().map_err(|cause| cause.to_string())?.len();
+    if length > room.into() {
+        return Err(format!("{length} bytes; the image's slot has room for {room}"));
+    }
+    let (begin, end) = (code.symbol(BEGIN)?, code.symbol(END)?);
+    let table = table(elf)?;
+
+    let mut command = machine(elf);
+    command.args(one_by_one()?).args(["-d", "exec,nochain"]);
+    // QEMU reads a comma as the end of an option unless it is doubled.
+    let path = model.display().to_string().replace(',', ",,");
+    command.arg("-device").arg(format!("loader,file={path},addr={start:#x},force-raw=on"));
+    let mut child = command.spawn().map_err(|cause| format!("cannot start {QEMU}: {cause}"))?;
+    let logged = reader(child.stdout.take());
+    let trace = child.stderr.take();
+    let (status, traced) = thread::scope(|scope| {
+        let traced = scope.spawn(|| {
+            let trace = trace.ok_or_else(|| format!("{QEMU} has no trace"))?;
+            let mut regions = Regions::new(code, begin, end);
+            let complaints = trace::follow(BufReader::with_capacity(1 << 16, trace), &mut regions)?;
+            Ok::<_, String>((complaints, regions.finish()))
+        });
+        let status = wait(&mut child, LIMIT);
+        (status, traced.join().unwrap_or_else(|_| Err("the trace's reader stopped".to_owned())))
+    });
+    let logged = logged.join().map_err(|_| format!("cannot read what {QEMU} writes"))?;
+    let log = decode(&table, &logged);
+    let (complaints, counts) = traced?;
+    eprint!("{complaints}");
+    match status?.and_then(|status| status.code()) {
+        Some(0) => Ok(Run { counts: counts?, log }),
+        Some(_) => Err(format!("the image failed; it logged\n{log}")),
+        None => Err(format!(
+            "the image did not end by itself within {} s; it logged\n{log}",
+            LIMIT.as_secs()
+        )),
+    }
+}
+
+/// What makes QEMU translate, and so trace, one instruction at a time: named anew in QEMU 8.1, and
+/// the old name taken away in QEMU 9.
+fn one_by_one() -> Outcome<&'static [&'static str]> {
+    let output = Command::new(QEMU).arg("-help").output();
+    let output = output.map_err(|cause| format!("cannot start {QEMU}: {cause}"))?;
+    one_by_one_of(&String::from_utf8_lossy(&output.stdout)).ok_or_else(|| {
+        format!("{QEMU} -help names neither one-insn-per-tb nor -singlestep: use QEMU 7 or later")
+    })
+}
+
+fn one_by_one_of(help: &str) -> Option<&'static [&'static str]> {
+    if help.contains("one-insn-per-tb=on") {
+        Some(&["-accel", "tcg,one-insn-per-tb=on"])
+    } else if help.contains("-singlestep") {
+        Some(&["-singlestep"])
+    } else {
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn old_and_new_versions_of_qemu_are_told_apart() {
+        let old = "-singlestep     always run in singlestep mode\n";
+        assert_eq!(one_by_one_of(old), Some(&["-singlestep"][..]));
+        let new = "                one-insn-per-tb=on|off (one guest instruction per TCG block)\n";
+        let both = format!("{new}-singlestep     deprecated synonym\n");
+        for help in [new, &both] {
+            assert_eq!(one_by_one_of(help), Some(&["-accel", "tcg,one-insn-per-tb=on"][..]));
+        }
+        assert_eq!(one_by_one_of("usage:"), None);
+    }
+}

@@ -1,0 +1,141 @@
+//! Counts what is executed in regions of a program, from the addresses of its instructions.
+//!
+//! A region starts where a call of one function returns, and ends where another is called. What
+//! every region costs beyond what stands in it, the call at its end, is the caller's to subtract.
+
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+
+use super::code::Code;
+use super::cost::cycles;
+use super::thumb::Instruction;
+use crate::process::Outcome;
+
+/// What was executed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Count {
+    pub instructions: u64,
+    /// By the cost model.
+    pub cycles: u64,
+}
+
+/// Where the program is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Place {
+    Outside,
+    /// In the function that starts a region.
+    Starting,
+    Inside,
+}
+
+/// Counts region after region.
+pub struct Regions<'c> {
+    code: &'c Code,
+    /// Of the code, what was decoded already.
+    decoded: HashMap<u32, Instruction>,
+    begin: u32,
+    end: u32,
+    place: Place,
+    /// The last address: what it costs depends on the next one.
+    pending: Option<u32>,
+    previous: Option<Instruction>,
+    count: Count,
+    counted: Vec<Count>,
+}
+
+impl<'c> Regions<'c> {
+    /// Regions from the return of the function at `begin` to the call of the one at `end`.
+    pub fn new(code: &'c Code, begin: u32, end: u32) -> Self {
+        Self {
+            code,
+            decoded: HashMap::new(),
+            begin,
+            end,
+            place: Place::Outside,
+            pending: None,
+            previous: None,
+            count: Count::default(),
+            counted: Vec::new(),
+        }
+    }
+
+    /// The instruction at `address` is about to be executed.
+    ///
+    /// # Errors
+    /// One inside a region cannot be costed, or did not lead where it should.
+    pub fn execute(&mut self, address: u32) -> Outcome {
+        if let Some(last) = self.pending.replace(address) {
+            self.settle(last, address)?;
+        }
+        if self.place == Place::Outside && address == self.begin {
+            self.place = Place::Starting;
+        }
+        Ok(())
+    }
+
+    /// The last instruction was not executed after all.
+    pub fn undo(&mut self) {
+        if self.pending.take() == Some(self.begin) {
+            self.place = Place::Outside;
+        }
+    }
+
+    /// The regions' counts, in their order.
+    ///
+    /// # Errors
+    /// The program ended within one.
+    pub fn finish(self) -> Outcome<Vec<Count>> {
+        if self.place == Place::Outside {
+            Ok(self.counted)
+        } else {
+            Err(format!("the program ended in its region {}", self.counted.len() + 1))
+        }
+    }
+
+    fn instruction(&mut self, address: u32) -> Outcome<Instruction> {
+        match self.decoded.entry(address) {
+            Entry::Occupied(entry) => Ok(*entry.get()),
+            Entry::Vacant(entry) => Ok(*entry.insert(self.code.instruction(address)?)),
+        }
+    }
+
+    fn settle(&mut self, address: u32, next: u32) -> Outcome {
+        if self.place == Place::Outside {
+            return Ok(());
+        }
+        let instruction = self.instruction(address)?;
+        let branched = next != address.wrapping_add(instruction.bytes);
+        if branched && !instruction.may_branch {
+            return Err(format!(
+                "{next:#010x} was executed after {address:#010x}, which is no branch: an exception?"
+            ));
+        }
+        if self.place == Place::Starting {
+            if branched {
+                self.place = Place::Inside;
+                self.count = Count::default();
+                self.previous = None;
+            }
+            return Ok(());
+        }
+        if next == self.begin {
+            return Err(format!("region {} starts another", self.counted.len() + 1));
+        }
+        let cost = cycles(&instruction, self.previous.as_ref(), branched);
+        self.count.cycles += cost.ok_or_else(|| {
+            format!(
+                "the instruction at {address:#010x} has no place in a region: it stops the core"
+            )
+        })?;
+        self.count.instructions += 1;
+        self.previous = Some(instruction);
+        if next == self.end {
+            self.counted.push(self.count);
+            self.place = Place::Outside;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,82 @@
+use super::*;
+
+/// At 0x10 `begin`: nop; bx lr. At 0x14 `end`: bx lr. At 0x16 the program.
+const FUNCTIONS: [u16; 3] = [0xBF00, 0x4770, 0x4770];
+const BEGIN: u32 = 0x10;
+const END: u32 = 0x14;
+const START: u32 = 0x16;
+
+fn code(program: &[u16]) -> Code {
+    Code::of(BEGIN, &[&FUNCTIONS, program].concat())
+}
+
+/// What is counted when these addresses are executed after one another.
+fn count(code: &Code, addresses: impl IntoIterator<Item = u32>) -> Outcome<Vec<Count>> {
+    let mut regions = Regions::new(code, BEGIN, END);
+    for address in addresses {
+        regions.execute(address)?;
+    }
+    regions.finish()
+}
+
+/// A call of `begin`, which the program at `START` comes back from.
+const CALL: [u32; 3] = [0x8, BEGIN, BEGIN + 2];
+
+#[test]
+fn an_empty_region_is_the_call_at_its_end() {
+    let code = code(&[0xF7FF, 0xFFFD]); // bl end
+    let addresses = [CALL.as_slice(), &[START, END, START + 4]].concat();
+    let call = Count { instructions: 1, cycles: 3 };
+    assert_eq!(count(&code, addresses.clone()), Ok(vec![call]));
+    assert_eq!(count(&code, [addresses.clone(), addresses].concat()), Ok(vec![call, call]));
+}
+
+#[test]
+fn a_loop_is_counted_as_by_hand() {
+    // mov.w r0, #1000    1
+    // subs r0, #1        1
+    // bne                3; 1 the last time
+    // bl end             3
+    let code = code(&[0xF44F, 0x707A, 0x3801, 0xD1FD, 0xF7FF, 0xFFF9]);
+    let rounds = (0..1000).flat_map(|_| [START + 4, START + 6]);
+    let addresses = CALL.into_iter().chain([START]).chain(rounds).chain([START + 8, END]);
+    let expected = Count { instructions: 1 + 2000 + 1, cycles: 1 + 1000 + 999 * 3 + 1 + 3 };
+    assert_eq!(count(&code, addresses), Ok(vec![expected]));
+}
+
+#[test]
+fn an_exception_in_a_region_is_found() {
+    let code = code(&[0x3001, 0x3001]); // adds r0, #1, twice
+    let error = count(&code, [CALL.as_slice(), &[START, 0x400]].concat()).unwrap_err();
+    assert!(error.contains("0x00000400 was executed after 0x00000016"), "{error}");
+}
+
+#[test]
+fn what_the_decoder_does_not_know_is_named_with_its_address_and_bytes() {
+    let code = code(&[0xEE31, 0x0B02, 0xB650]); // vadd.f64 d0, d1, d2; setend
+    let error =
+        |start: u32| count(&code, [CALL.as_slice(), &[start, start + 4]].concat()).unwrap_err();
+    assert!(
+        error(START).starts_with("the instruction ee31 0b02 at 0x00000016"),
+        "{}",
+        error(START)
+    );
+    let other = error(START + 4);
+    assert!(other.starts_with("the instruction b650 at 0x0000001a is not known"), "{other}");
+}
+
+#[test]
+fn a_stop_in_a_region_is_refused() {
+    let code = code(&[0xBEAB, 0xBF00]); // bkpt 0xab
+    let error = count(&code, [CALL.as_slice(), &[START, START + 2]].concat()).unwrap_err();
+    assert!(error.contains("at 0x00000016 has no place in a region"), "{error}");
+}
+
+#[test]
+fn a_region_without_an_end_is_refused() {
+    let code = code(&[0xBF00, 0xBF00]);
+    let addresses = [CALL.as_slice(), &[START, START + 2]].concat();
+    assert_eq!(count(&code, addresses), Err("the program ended in its region 1".into()));
+    let nested = [CALL.as_slice(), &[START, BEGIN]].concat();
+    assert!(count(&code, nested).is_err());
+}

@@ -1,0 +1,178 @@
+//! Decodes Thumb instructions of ARMv7E-M with the single-precision VFPv4, as far as their cost
+//! needs it: the ARMv7-M Architecture Reference Manual (ARM DDI 0403), chapters A5 and A6.
+//!
+//! An encoding that is not known here is refused, never guessed at.
+
+mod branch;
+mod data;
+mod float;
+mod memory;
+mod narrow;
+
+/// Core registers: bit n is Rn.
+pub type CoreSet = u16;
+
+/// Floating-point registers: bit n is Sn.
+pub type FpSet = u32;
+
+const SP: u16 = 13;
+const PC: u16 = 15;
+
+/// What the cost of an instruction depends on first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Class {
+    /// Integer data processing, multiplications of all kinds, hints.
+    Data,
+    /// SDIV, UDIV.
+    Divide,
+    /// One register loaded, of any width.
+    Load { writes_base: bool },
+    /// One register stored to base and constant, the base unchanged.
+    Store,
+    /// One register stored to base and register, or with the base changed.
+    StoreIndexed,
+    /// LDRD, STRD.
+    Double,
+    /// LDM, STM, PUSH, POP.
+    Multiple { registers: u32 },
+    /// LDREX, STREX and their kin.
+    Exclusive,
+    /// A branch to a constant or a register, taken or not.
+    Branch,
+    /// TBB, TBH.
+    TableBranch,
+    /// IT.
+    IfThen,
+    /// MRS, MSR, CPS.
+    Special,
+    /// DMB, DSB, ISB.
+    Barrier,
+    /// Floating-point addition, multiplication, conversion, absolute value, negation.
+    FpArithmetic,
+    /// Multiplication and addition in one, fused or chained.
+    FpMultiplyAccumulate,
+    /// VDIV, VSQRT.
+    FpDivide,
+    /// Between floating-point registers, constants to them, comparison, VMRS, VMSR.
+    FpMove,
+    /// Between core and floating-point registers.
+    FpTransfer { registers: u32 },
+    /// VLDR, VSTR, VLDM, VSTM, VPUSH, VPOP, by words.
+    FpMemory { words: u32 },
+    /// What ends or suspends a program: its cost is not the processor's alone.
+    Unpriced,
+}
+
+/// What is known of one instruction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Instruction {
+    /// Length in bytes: 2 or 4.
+    pub bytes: u32,
+    pub class: Class,
+    /// Core registers that it computes, or loads if it is a [`Class::Load`]; those that are changed
+    /// on the side, as a base is, are left out.
+    pub result: CoreSet,
+    /// Core registers that its address in memory is made of.
+    pub address: CoreSet,
+    /// Floating-point registers that it gives a value.
+    pub fp_result: FpSet,
+    /// Floating-point registers that it must have at once; the addend of a multiplication with
+    /// addition comes later, and is left out.
+    pub fp_source: FpSet,
+    /// Whether another instruction than the one behind it may come next.
+    pub may_branch: bool,
+}
+
+impl Instruction {
+    fn new(class: Class) -> Self {
+        let may_branch = matches!(class, Class::Branch | Class::TableBranch);
+        Self { bytes: 0, class, result: 0, address: 0, fp_result: 0, fp_source: 0, may_branch }
+    }
+
+    fn data() -> Self {
+        Self::new(Class::Data)
+    }
+
+    fn load() -> Self {
+        Self::new(Class::Load { writes_base: false })
+    }
+
+    fn multiple(list: u16) -> Option<Self> {
+        // An empty list is unpredictable.
+        (list != 0).then(|| Self::new(Class::Multiple { registers: list.count_ones() }))
+    }
+
+    /// Gives core register `register` a value.
+    fn to(mut self, register: u16) -> Self {
+        self.result |= 1 << register;
+        self.may_branch |= register == PC;
+        self
+    }
+
+    /// Takes `register` into its address. The program counter costs nothing to have.
+    fn at(mut self, register: u16) -> Self {
+        if register != PC {
+            self.address |= 1 << register;
+        }
+        self
+    }
+
+    fn branching(mut self, may_branch: bool) -> Self {
+        self.may_branch = may_branch;
+        self
+    }
+
+    fn fp(mut self, result: FpSet, source: FpSet) -> Self {
+        self.fp_result = result;
+        self.fp_source = source;
+        self
+    }
+}
+
+/// Decodes the instruction that starts with the halfword `first`; `second` is the one behind it.
+/// `None`: it is not known.
+pub fn decode(first: u16, second: Option<u16>) -> Option<Instruction> {
+    if is_wide(first) {
+        let instruction = wide(first, second?)?;
+        Some(Instruction { bytes: 4, ..instruction })
+    } else {
+        Some(Instruction { bytes: 2, ..narrow::decode(first)? })
+    }
+}
+
+/// Whether an instruction that starts so has two halfwords.
+pub fn is_wide(first: u16) -> bool {
+    first >= 0xE800
+}
+
+/// A5.3, table A5-9.
+fn wide(first: u16, second: u16) -> Option<Instruction> {
+    match first >> 8 {
+        0xE8 | 0xE9 if first & 0x40 == 0 => memory::multiple(first, second),
+        0xE8 | 0xE9 => memory::double_or_exclusive(first, second),
+        0xEA | 0xEB => data::shifted_register(first, second),
+        0xEC | 0xED => float::memory(first, second),
+        0xEE => float::register(first, second),
+        0xF0..=0xF7 if second & 0x8000 != 0 => branch::decode(first, second),
+        0xF0..=0xF7 if first & 0x200 == 0 => data::modified_constant(first, second),
+        0xF0..=0xF7 => data::plain_constant(first, second),
+        0xF8 | 0xF9 => memory::single(first, second),
+        0xFA => data::register(first, second),
+        0xFB if first & 0x80 == 0 => data::multiply(first, second),
+        0xFB => data::long_multiply_or_divide(first, second),
+        _ => None,
+    }
+}
+
+/// `count` bits of `halfword` from bit `lowest` on.
+fn bits(halfword: u16, lowest: u32, count: u32) -> u16 {
+    (halfword >> lowest) & ((1 << count) - 1)
+}
+
+/// Bit `index` of `halfword`.
+fn bit(halfword: u16, index: u32) -> bool {
+    bits(halfword, index, 1) == 1
+}
+
+#[cfg(test)]
+mod tests;
