@@ -199,6 +199,8 @@ pub fn train(
 }
 
 /// ‖a − b‖².
+#[inline(always)]
+#[expect(clippy::inline_always, reason = "`simd::widest` runs it")]
 pub(crate) fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
     let ((a4, a_rest), (b4, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
     let mut sum = [0.0; 4];

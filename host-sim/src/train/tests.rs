@@ -1,4 +1,5 @@
-use super::least_squares::{Recursion, Regressors, fit, fit_batch};
+use super::least_squares::tests::fit_batch;
+use super::least_squares::{Regressors, fit};
 use super::standard::StandardNetwork;
 use super::*;
 use crate::dataset::Table;
@@ -41,23 +42,23 @@ fn predictions(regressors: &Regressors<'_>, scaled: &[f64], weights: &[f64]) -> 
 }
 
 #[test]
-fn streamed_weights_equal_batch_ridge_on_a_well_conditioned_set() {
+fn weights_equal_batch_ridge_on_a_well_conditioned_set() {
     let block = block(5000, 0.1); // several pieces are merged
     let samples = Samples::new(&block);
     let centres: Vec<f64> =
         (0..9).flat_map(|i| [f64::from(i % 3), f64::from(i / 3)]).map(|c| c / 2.0).collect();
     let regressors = Regressors { centres: &centres, inputs: 2, decay: 20.0, affine_tail: false };
     for initial_covariance in [1.0, 1e3, 1e6] {
-        let streamed = fit(&regressors, &samples.scaled, &block.outputs, initial_covariance);
+        let blocked = fit(&regressors, &samples.scaled, &block.outputs, initial_covariance);
         let batch = fit_batch(&regressors, &samples.scaled, &block.outputs, initial_covariance);
-        let relative = relative_difference(&streamed, &batch);
+        let relative = relative_difference(&blocked, &batch);
         println!("well-conditioned, δ = {initial_covariance:e}: weights differ by {relative:.1e}");
         assert!(relative <= 1e-8, "δ = {initial_covariance}: {relative:e}");
     }
 }
 
 #[test]
-fn streamed_predictions_equal_batch_ridge_on_an_ill_conditioned_set() {
+fn predictions_equal_batch_ridge_on_an_ill_conditioned_set() {
     let block = block(3000, 0.01);
     let samples = Samples::new(&block);
     let centres: Vec<f64> = (0..32).map(|i| f64::from(i * 7 % 32) / 32.0).collect();
@@ -73,10 +74,10 @@ fn streamed_predictions_equal_batch_ridge_on_an_ill_conditioned_set() {
     let singular = h.singular_values();
     assert!(singular.max() / singular.min() > 1e12, "the set must be hard");
     for initial_covariance in [1e3, 1e6, 1e9] {
-        let streamed = fit(&regressors, &samples.scaled, &block.outputs, initial_covariance);
+        let blocked = fit(&regressors, &samples.scaled, &block.outputs, initial_covariance);
         let batch = fit_batch(&regressors, &samples.scaled, &block.outputs, initial_covariance);
         let relative = relative_difference(
-            &predictions(&regressors, &samples.scaled, &streamed),
+            &predictions(&regressors, &samples.scaled, &blocked),
             &predictions(&regressors, &samples.scaled, &batch),
         );
         println!(
@@ -84,20 +85,6 @@ fn streamed_predictions_equal_batch_ridge_on_an_ill_conditioned_set() {
         );
         assert!(relative <= 1e-6, "δ = {initial_covariance}: {relative:e}");
     }
-}
-
-#[test]
-fn merging_recursions_equals_one_recursion() {
-    let block = block(64, 0.1);
-    let mut one = Recursion::new(2, 2, 1e3);
-    let (mut first, mut second) = (Recursion::new(2, 2, 1e3), Recursion::blank(2, 2));
-    for (i, (input, output)) in block.inputs.lines().zip(block.outputs.lines()).enumerate() {
-        one.update(&mut input.to_vec(), &mut output.to_vec());
-        let half = if i < 20 { &mut first } else { &mut second };
-        half.update(&mut input.to_vec(), &mut output.to_vec());
-    }
-    first.merge(second);
-    assert!(relative_difference(&first.weights(), &one.weights()) < 1e-12);
 }
 
 #[test]

@@ -1,0 +1,38 @@
+//! Data files: reading and writing CSV, against a single pass over the same bytes.
+
+use std::hint::black_box;
+use std::path::Path;
+
+use benchmarks::{csv_of, frames_of};
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use host_sim::data_file::{self, DataFile};
+
+/// Frames in the file: 288 numbers each, 24 MB together.
+const FRAMES: usize = 4096;
+
+fn csv(criterion: &mut Criterion) {
+    let content = csv_of("press", FRAMES);
+    let path = std::env::temp_dir().join(format!("taxel-csv-{}.csv", std::process::id()));
+    std::fs::write(&path, &content).expect("a writable folder for temporary files");
+    let mut group = criterion.benchmark_group("csv");
+    group.sample_size(20).throughput(Throughput::Bytes(content.len() as u64));
+    group.bench_function("copy_file", |bencher| {
+        bencher.iter(|| std::fs::read(black_box(&path)).expect("the file written above"));
+    });
+    group.bench_function("read", |bencher| {
+        bencher.iter(|| DataFile::read(black_box(&path)).expect("the file written above"));
+    });
+    let table = frames_of("press", FRAMES).inputs;
+    let lines = || table.lines().map(|line| line.iter().copied());
+    let names = || table.names.iter().map(String::as_str);
+    let write = |path: &Path| data_file::write(path, names(), lines()).expect("a writable folder");
+    write(&path);
+    let written = std::fs::metadata(&path).expect("the file written above").len();
+    group.throughput(Throughput::Bytes(written));
+    group.bench_function("write", |bencher| bencher.iter(|| write(black_box(&path))));
+    group.finish();
+    let _ = std::fs::remove_file(&path); // a file left behind does no harm
+}
+
+criterion_group!(benches, csv);
+criterion_main!(benches);

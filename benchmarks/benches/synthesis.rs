@@ -1,0 +1,26 @@
+//! Frames of a scene: deformations drawn, readings computed, noise added.
+
+use std::hint::black_box;
+
+use benchmarks::scene;
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use host_sim::random::Stream;
+use host_sim::synth::synthesise;
+
+/// Frames of one measurement; `compare/synthesis.py` divides by it.
+const FRAMES: usize = 16_384;
+
+fn frames_of_a_scene(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("synthesis");
+    group.sample_size(20).throughput(Throughput::Elements(FRAMES as u64));
+    for name in ["paper", "press"] {
+        let scene = scene(name);
+        group.bench_function(name, |bencher| {
+            bencher.iter(|| synthesise(black_box(&scene), Stream::Training, FRAMES));
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, frames_of_a_scene);
+criterion_main!(benches);

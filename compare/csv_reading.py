@@ -1,0 +1,29 @@
+"""Reading a data file: numpy's C parser, and a plain pass over the bytes, against Taxel."""
+
+import subprocess
+
+import numpy as np
+
+from measure import ROOT, Row, bench, criterion_s, median_s, target_folder
+
+FRAMES = 4096  # as benchmarks/benches/csv.rs
+
+
+def rows() -> list[Row]:
+    """The same file in both languages: `synth press`, 288 numbers a frame."""
+    bench("csv")
+    path = target_folder() / "compare.csv"
+    arguments = ["synth", "press", "-n", str(FRAMES), "-o", str(path)]
+    command = ["cargo", "run", "--quiet", "--release", "--", *arguments]
+    subprocess.run(command, cwd=ROOT, check=True, stdout=2)
+    megabytes = path.stat().st_size / 1e6
+    parse_s = median_s(lambda: np.loadtxt(path, delimiter=",", skiprows=1), repeats=3)
+    bytes_s = median_s(path.read_bytes)
+    path.unlink()
+    work = f"reading {megabytes:.0f} MB of CSV"
+    taxel_s = criterion_s("csv/read")
+    return [
+        Row(work, "numpy.loadtxt", parse_s, taxel_s),
+        Row(work, "its bytes alone, Python", bytes_s, taxel_s),
+        Row(work, "its bytes alone, Rust", criterion_s("csv/copy_file"), taxel_s),
+    ]
