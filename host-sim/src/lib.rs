@@ -39,6 +39,7 @@ pub mod error;
 pub mod evaluate;
 pub mod infer;
 pub mod model;
+pub mod number_format;
 pub mod output;
 pub mod progress;
 pub mod random;

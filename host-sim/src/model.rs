@@ -68,14 +68,20 @@ impl Origin {
     }
 }
 
+/// How `scene` wants its model trained.
+#[must_use]
+pub fn options_of(scene: &Scene) -> Options {
+    let t = &scene.training;
+    Options { format: t.format, ..Options::new(t.centres, t.spread, t.affine_tail, scene.seed) }
+}
+
 /// Trains the model that `scene` describes, as the command `train` does.
 ///
 /// # Errors
 /// [`Error::Usage`] for training options that cannot be, [`Error::Failed`] as [`encode`].
 pub fn train_scene(scene: &Scene, progress: &Progress) -> Result<LoadedModel> {
-    let t = &scene.training;
-    let frames = synth::synthesise(scene, Stream::Training, t.frames);
-    let options = Options::new(t.centres, t.spread, t.affine_tail, scene.seed);
+    let frames = synth::synthesise(scene, Stream::Training, scene.training.frames);
+    let options = options_of(scene);
     let networks = train::train(&frames, &options, progress)?;
     let blob = encode(&networks, &frames, &Origin::of_scene(scene))?;
     LoadedModel::from_bytes(Path::new("the model just trained"), &blob)

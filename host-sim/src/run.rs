@@ -13,8 +13,8 @@ use crate::progress::Progress;
 use crate::random::Stream;
 use crate::scene::Scene;
 use crate::synth;
+use crate::train;
 use crate::train::linear::LinearDecoder;
-use crate::train::{self, Options};
 
 /// All that a run measured.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -139,7 +139,7 @@ pub fn run(scene: &Scene, progress: &Progress) -> Result<(RunResult, Vec<u8>)> {
     let test = synth::synthesise(scene, Stream::Test, t.test_frames);
     progress.step();
 
-    let options = Options::new(t.centres, t.spread, t.affine_tail, scene.seed);
+    let options = model::options_of(scene);
     let networks = train::train(&training, &options, progress)?;
 
     let origin = Origin::of_scene(scene);

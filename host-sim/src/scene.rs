@@ -8,6 +8,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use crate::error::{Error, Result};
+use crate::number_format::NumberFormat;
 use crate::sensor::{self, Axis, Sensor, Vector3};
 
 mod file;
@@ -130,6 +131,9 @@ pub struct Training {
     pub spread: f64,
     /// Whether A·x is added.
     pub affine_tail: bool,
+    /// How numbers are represented.
+    #[serde(default)]
+    pub format: NumberFormat,
 }
 
 /// How Table 1 of the paper is computed.

@@ -4,23 +4,24 @@
 //! pieces by the number of samples alone, and pieces are put together in their order. The result is
 //! rounded once to f32, into a [`FittedNetwork`].
 
-use model_core::scale::CLAMP;
+use model_core::scale::{CLAMP, HALF_RANGE, UNITS, clamp_units};
 use rayon::prelude::*;
 
 use crate::dataset::{Block, Dataset};
 use crate::error::{Error, Result};
+use crate::number_format::NumberFormat;
 use crate::progress::Progress;
 use crate::random::{Purpose, Random, Stream};
 use crate::spread::check_spread;
 
+pub mod format;
 pub mod kmeans;
 pub mod least_squares;
 pub mod linear;
-mod network;
 pub mod select;
 pub mod standard;
 
-pub use network::FittedNetwork;
+pub use format::FittedNetwork;
 
 /// Default of [`Options::initial_covariance`].
 pub const INITIAL_COVARIANCE: f64 = 1e6;
@@ -40,6 +41,8 @@ pub struct Options {
     pub seed: u64,
     /// How centres are sought.
     pub search: kmeans::Search,
+    /// How numbers are represented.
+    pub format: NumberFormat,
 }
 
 impl Options {
@@ -53,6 +56,7 @@ impl Options {
             initial_covariance: INITIAL_COVARIANCE,
             seed,
             search: kmeans::Search::default(),
+            format: NumberFormat::default(),
         }
     }
 
@@ -116,6 +120,48 @@ impl InputScale {
     }
 }
 
+/// Middle of every input's range, and the units in one unit of it: what the formats with expanded distances
+/// scale readings by.
+#[derive(Debug, Clone, PartialEq)]
+struct CentredScale {
+    midpoint: Vec<f32>,
+    /// [`UNITS`] in a unit of the reading; 0 for an input that never changes.
+    per_unit: Vec<f32>,
+}
+
+impl CentredScale {
+    fn of(block: &Block) -> Self {
+        let range = |range: [f64; 2]| range.map(|v| f64::from(v as f32));
+        let ranges = || block.inputs.ranges().into_iter().map(range);
+        let per_unit = |[low, high]: [f64; 2]| {
+            let per_unit = (f64::from(UNITS) / (f64::from(HALF_RANGE) * (high - low))) as f32;
+            if per_unit.is_finite() { per_unit } else { 0.0 }
+        };
+        Self {
+            midpoint: ranges().map(|[low, high]| (0.5 * (low + high)) as f32).collect(),
+            per_unit: ranges().map(per_unit).collect(),
+        }
+    }
+
+    fn never_changes(&self) -> impl Iterator<Item = bool> {
+        self.per_unit.iter().map(|per_unit| *per_unit == 0.0)
+    }
+
+    /// All inputs of `block` as the device scales them, before its clamp, line after line.
+    fn units<'a>(&'a self, block: &'a Block) -> impl Iterator<Item = f32> + 'a {
+        block.inputs.lines().flat_map(|line| {
+            let limits = self.midpoint.iter().zip(&self.per_unit);
+            line.iter().zip(limits).map(|(r, (middle, per_unit))| (*r as f32 - middle) * per_unit)
+        })
+    }
+
+    /// All inputs of `block` scaled to [0, 1] and clamped, line after line.
+    fn apply(&self, block: &Block) -> Vec<f64> {
+        let spans = f64::from(HALF_RANGE) / f64::from(UNITS);
+        self.units(block).map(|x| 0.5 + f64::from(clamp_units(x)) * spans).collect()
+    }
+}
+
 /// Samples of one network, with their inputs scaled.
 #[derive(Debug, Clone)]
 pub struct Samples<'b> {
@@ -147,30 +193,13 @@ impl<'b> Samples<'b> {
         found.centres.into_iter().map(|c| f64::from(c as f32)).collect()
     }
 
-    /// Output weights for given `centres`, by recursive least squares over the samples.
+    /// Output weights for given `centres`, by least squares over the samples, for the format that
+    /// `options` ask for.
     ///
     /// # Errors
-    /// [`Error::Usage`] if the fit does not hold in f32.
+    /// [`Error::Usage`] if the fit does not hold in that format.
     pub fn fit(&self, centres: &[f64], options: &Options) -> Result<FittedNetwork> {
-        let regressors = least_squares::Regressors {
-            centres,
-            inputs: self.inputs(),
-            // The decay that the device will use, so that weights fit its activations.
-            decay: f64::from((1.0 / (2.0 * options.spread * options.spread)) as f32),
-            affine_tail: options.affine_tail,
-        };
-        // Deviations from the mean are fitted, and the mean goes into the bias: an offset would
-        // otherwise be spread over large weights that cancel, and cost digits in f32.
-        let means = self.block.outputs.means();
-        let mut deviations = self.block.outputs.clone();
-        for line in deviations.values.chunks_exact_mut(means.len()) {
-            line.iter_mut().zip(&means).for_each(|(value, mean)| *value -= mean);
-        }
-        let mut weights =
-            least_squares::fit(&regressors, &self.scaled, &deviations, options.initial_covariance);
-        let bias = weights.iter_mut().rev().zip(means.iter().rev());
-        bias.for_each(|(bias, mean)| *bias += mean);
-        FittedNetwork::try_new(&self.scale, &regressors, &weights, self.block.outputs.names.len())
+        format::fit(self, centres, options)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use host_sim::infer::Kernel;
 use host_sim::model::{self, LoadedModel, Origin};
+use host_sim::number_format::NumberFormat;
 use host_sim::progress::Progress;
 use host_sim::random::Stream;
 use host_sim::scene::Scene;
@@ -25,8 +26,8 @@ fn scene() -> Scene {
 fn real_blob() -> Vec<u8> {
     let scene = scene();
     let dataset = synth::synthesise(&scene, Stream::Training, 400);
-    let networks =
-        train::train(&dataset, &Options::new(8, 0.8, true, 1), &Progress::silent()).unwrap();
+    let options = Options { format: NumberFormat::F32Direct, ..Options::new(8, 0.8, true, 1) };
+    let networks = train::train(&dataset, &options, &Progress::silent()).unwrap();
     model::encode(&networks, &dataset, &Origin::of_scene(&scene)).unwrap()
 }
 

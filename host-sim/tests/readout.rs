@@ -8,15 +8,17 @@ use host_sim::evaluate::quantisation::{output_bounds, reading_bound_ohm};
 use host_sim::evaluate::readout::{self, ReadoutResult, Stage};
 use host_sim::infer::Kernel;
 use host_sim::model::{LoadedModel, train_scene};
+use host_sim::number_format::NumberFormat;
 use host_sim::progress::Progress;
 use host_sim::scene::{Circuit, Readout, Scene};
 use host_sim::virtual_hardware::{SeriesResistance, VirtualBoard};
 
 const FRAMES: usize = 300;
 
-/// The model that `run press` makes.
+/// The model that `run press` makes, with the distances that the bound is derived for.
 fn press() -> (Scene, LoadedModel) {
-    let scene = Scene::load("press").unwrap();
+    let mut scene = Scene::load("press").unwrap();
+    scene.training.format = NumberFormat::F32Direct;
     let model = train_scene(&scene, &Progress::silent()).unwrap();
     (scene, model)
 }

@@ -6,6 +6,7 @@ use clap::Args;
 use host_sim::data_file::DataFile;
 use host_sim::dataset::Dataset;
 use host_sim::model::{self, LoadedModel, Origin};
+use host_sim::number_format::NumberFormat;
 use host_sim::progress::Progress;
 use host_sim::random::Stream;
 use host_sim::scene::{EMBEDDED, Scene};
@@ -47,6 +48,9 @@ pub struct Arguments {
     /// Leave out the affine tail A·x.
     #[arg(long)]
     no_affine: bool,
+    /// Number format of the weights [default: the scene's, or f32].
+    #[arg(long, value_name = "FORMAT")]
+    format: Option<NumberFormat>,
     /// Choose K and spread among the candidates by cross-validation, and print every score.
     #[arg(long)]
     select: bool,
@@ -81,6 +85,8 @@ struct Summary {
     centres: usize,
     spread: f64,
     affine_tail: bool,
+    /// Of the networks, in their order.
+    formats: Vec<&'static str>,
     outputs: Vec<String>,
     training_rmse: Vec<f64>,
     selection: Option<Selection>,
@@ -95,6 +101,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 
     let mut options = source.defaults;
     options.affine_tail &= !arguments.no_affine;
+    options.format = arguments.format.unwrap_or(options.format);
     let selection = if arguments.select {
         Some(choose(arguments, &source, &mut options)?)
     } else {
@@ -117,6 +124,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         centres: model.networks().map(|n| n.shape().centres).max().unwrap_or(0),
         spread: options.spread,
         affine_tail: options.affine_tail,
+        formats: model.networks().map(|n| n.format().name()).collect(),
         outputs: source.dataset.outputs.names.clone(),
         training_rmse: model.metadata().training_rmse.iter().map(f64::from).collect(),
         selection,
@@ -143,11 +151,10 @@ fn from_scene(arguments: &Arguments, common: &Common) -> Result<Source> {
     arguments.noise.apply(&mut scene)?;
     let frames = arguments.frames.unwrap_or(scene.training.frames);
     scene.check_frames("-n", frames)?;
-    let t = &scene.training;
     Ok(Source {
         dataset: synth::synthesise(&scene, Stream::Training, frames),
         origin: Origin::of_scene(&scene),
-        defaults: Options::new(t.centres, t.spread, t.affine_tail, scene.seed),
+        defaults: model::options_of(&scene),
         fold_of: None,
     })
 }
@@ -273,10 +280,11 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         page.line(format_args!("  {:<36} {linear}", "best linear decoder:"));
     }
     page.line(format_args!(
-        "{}: {} bytes, CRC-32 {}, K = {}, spread = {}, affine tail: {}, {} frames",
+        "{}: {} bytes, CRC-32 {}, {}, K = {}, spread = {}, affine tail: {}, {} frames",
         summary.file.display(),
         summary.blob_bytes,
         summary.blob_crc,
+        summary.formats.first().unwrap_or(&""),
         summary.centres,
         summary.spread,
         if summary.affine_tail { "yes" } else { "no" },

@@ -26,6 +26,15 @@ pub struct Parameters<'a> {
     pub affine: &'a [f32],
 }
 
+impl Parameters<'_> {
+    /// The parameters one after the other, as in the blob.
+    pub fn words(&self) -> impl Iterator<Item = u32> {
+        let before = self.input_minimum.iter().chain(self.input_per_span).chain(self.centres);
+        let after = self.decay.iter().chain(self.output_weights).chain(self.bias);
+        before.chain(after).chain(self.affine).map(|value| value.to_bits())
+    }
+}
+
 /// A network whose parameters have been checked against its shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(C)] // the shape first, so that it is at the same place in a network of any format
@@ -41,6 +50,22 @@ impl<'a> Network<'a> {
     /// Every variant of [`NetworkError`]; lengths are checked before values.
     pub fn try_new(shape: Shape, parameters: Parameters<'a>) -> Result<Self, NetworkError> {
         let network = Self::with_lengths_checked(shape, parameters)?;
+        network.check_values()?;
+        Ok(network)
+    }
+
+    /// As [`try_new`](Self::try_new), for the words of [`Parameters::words`].
+    ///
+    /// # Errors
+    /// As [`try_new`](Self::try_new); wrong lengths are those of the last arrays.
+    pub fn of_words(
+        shape: Shape,
+        common_width: bool,
+        affine: bool,
+        words: &'a [u32],
+    ) -> Result<Self, NetworkError> {
+        check_length("block", words, Self::block_words(shape, common_width, affine))?;
+        let network = Self::from_block(shape, common_width, affine, Cut(words))?;
         network.check_values()?;
         Ok(network)
     }
