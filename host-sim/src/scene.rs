@@ -8,7 +8,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use crate::error::{Error, Result};
-use crate::sensor::{self, Axis, Sensor, Vector3};
+use crate::sensor::{self, Axis, Precision, Sensor, Vector3};
 
 mod file;
 mod names;
@@ -33,6 +33,8 @@ pub struct Scene {
     pub digest: u64,
     /// Seed of every random draw.
     pub seed: u64,
+    /// How precisely readings are computed.
+    pub precision: Precision,
     /// Geometry and material.
     pub sensor: Sensor,
     /// What moves.
