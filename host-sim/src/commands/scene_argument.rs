@@ -5,6 +5,7 @@ use std::path::Path;
 use clap::Args;
 use host_sim::Result;
 use host_sim::scene::Scene;
+use host_sim::sensor::Precision;
 
 use super::Common;
 
@@ -16,11 +17,14 @@ pub struct SceneArgument {
     /// A built-in scene (paper, press) or the path of a scene file.
     #[arg(default_value = DEFAULT_SCENE)]
     scene: String,
+    /// How precisely the sensor's readings are computed, instead of the scene's way.
+    #[arg(long, value_enum)]
+    precision: Option<Precision>,
 }
 
 impl Default for SceneArgument {
     fn default() -> Self {
-        Self { scene: DEFAULT_SCENE.into() }
+        Self { scene: DEFAULT_SCENE.into(), precision: None }
     }
 }
 
@@ -29,6 +33,7 @@ impl SceneArgument {
     pub fn load(&self, common: &Common) -> Result<Scene> {
         let mut scene = Scene::load(&self.scene)?;
         scene.seed = common.seed.unwrap_or(scene.seed);
+        scene.precision = self.precision.unwrap_or(scene.precision);
         Ok(scene)
     }
 
