@@ -17,7 +17,7 @@ pub(super) struct Synthesis<'s> {
     model: BlockModel<'s>,
     /// Span of every channel that is read, in Ω; empty for relative noise.
     span_ohm: Vec<f64>,
-    /// Axis of each output of an electrode, and what its deformation is multiplied by.
+    /// Place of each output of a row among electrodes and axes, and what its deformation is multiplied by.
     outputs: Vec<(usize, f64)>,
 }
 
@@ -46,7 +46,11 @@ impl<'s> Synthesis<'s> {
             Quantity::Deformation => 1.0,
             Quantity::Force => scene.sensor.stiffness_n_per_mm[axis],
         };
-        let outputs = scene.outputs.axes.iter().map(|axis| (axis.index(), factor(axis.index())));
+        let of_an_electrode = |electrode: usize| {
+            let axes = scene.outputs.axes.iter().map(|axis| axis.index());
+            axes.map(move |axis| (3 * electrode + axis, factor(axis)))
+        };
+        let outputs = (0..scene.sensor.electrodes_per_row_wire).flat_map(of_an_electrode);
         let model = BlockModel::new(&scene.sensor);
         Self { scene, stream, model, span_ohm, outputs: outputs.collect() }
     }
@@ -172,15 +176,11 @@ impl Work for Fill<'_, '_> {
                     *place = lanes[frame];
                 }
             }
-            let wanted = &synthesis.outputs;
-            let width = scene.sensor.electrodes_per_row_wire * wanted.len();
+            let (width, lanes) = (synthesis.outputs.len(), deformation_mm.as_flattened());
             let row_of_frames = outputs.chunks_exact_mut(width).skip(place).step_by(rows);
             for (frame, outputs) in row_of_frames.enumerate() {
-                let electrodes = outputs.chunks_exact_mut(wanted.len()).zip(&*deformation_mm);
-                for (outputs, delta) in electrodes {
-                    for (output, (axis, factor)) in outputs.iter_mut().zip(wanted) {
-                        *output = factor * delta[*axis][frame];
-                    }
+                for (output, (place, factor)) in outputs.iter_mut().zip(&synthesis.outputs) {
+                    *output = factor * lanes[*place][frame];
                 }
             }
         }
