@@ -10,6 +10,7 @@ pub mod readout;
 pub mod run;
 pub mod synth;
 pub mod table1;
+pub mod trade;
 pub mod train;
 
 mod check_arguments;

@@ -8,7 +8,8 @@ use host_sim::Result;
 mod commands;
 
 use commands::{
-    Common, decode, emulate, eval, forward, inspect, link, readout, run, synth, table1, train,
+    Common, decode, emulate, eval, forward, inspect, link, readout, run, synth, table1, trade,
+    train,
 };
 
 /// Simulate, train and evaluate resistive tactile sensors; write weight blobs for the device.
@@ -34,6 +35,7 @@ enum Command {
     Eval(eval::Arguments),
     Inspect(inspect::Arguments),
     Table1(table1::Arguments),
+    Trade(trade::Arguments),
     Readout(readout::Arguments),
     Emulate(emulate::Arguments),
     Link(link::Arguments),
@@ -51,6 +53,7 @@ fn main() -> ExitCode {
         Command::Eval(arguments) => eval::execute(&arguments, &cli.common),
         Command::Inspect(arguments) => inspect::execute(&arguments, &cli.common),
         Command::Table1(arguments) => table1::execute(&arguments, &cli.common),
+        Command::Trade(arguments) => trade::execute(&arguments, &cli.common),
         Command::Readout(arguments) => readout::execute(&arguments, &cli.common),
         Command::Emulate(arguments) => emulate::execute(&arguments, &cli.common),
         Command::Link(arguments) => link::execute(&arguments, &cli.common),

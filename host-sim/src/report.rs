@@ -3,6 +3,7 @@
 //! The figures are drawn here rather than by a chart crate because their colours are CSS classes:
 //! one page serves light and dark.
 
+use crate::evaluate::trade::Trade;
 use crate::run::RunResult;
 
 mod chart;
@@ -13,11 +14,24 @@ mod html;
 mod svg;
 mod tables;
 mod ticks;
+mod trade;
 
 /// The page for `result`: no script, no file beside it, the same bytes for the same result.
 #[must_use]
 pub fn html(result: &RunResult) -> String {
     html::page(result)
+}
+
+/// The page for a trade between speed and accuracy.
+#[must_use]
+pub fn trade_html(trade: &Trade) -> String {
+    trade::html(trade)
+}
+
+/// Its picture, as a file of its own: light or dark as the viewer is.
+#[must_use]
+pub fn trade_svg(trade: &Trade) -> String {
+    trade::svg(trade)
 }
 
 #[cfg(test)]

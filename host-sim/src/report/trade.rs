@@ -1,0 +1,180 @@
+//! The trade between speed and accuracy as a picture and as a page.
+
+use std::fmt::Write as _;
+
+use super::chart::{Axis, Chart, Mark, Series};
+use super::format::{grouped, percent, significant, symbol};
+use super::svg::{Shape, escape};
+use super::ticks;
+use crate::evaluate::trade::{Point, Trade};
+
+/// Kernels in the order of their colours and shapes.
+const KERNELS: [(&str, &str, Shape); 5] = [
+    ("fixed16", "c1", Shape::Circle),
+    ("f32", "c2", Shape::Square),
+    ("f32-direct", "c3", Shape::Triangle),
+    ("f32-direct-libm", "c3 pale", Shape::Diamond),
+    ("f32-direct-micromath", "muted", Shape::Dash),
+];
+
+/// Cycles against error, both logarithmic: every point of one sample a reading or more, and the front.
+fn chart(trade: &Trade) -> Chart {
+    let at = |point: &Point| [point.frame.cycles as f64, point.rmse(&trade.group)];
+    let mut front: Vec<[f64; 2]> = Vec::new();
+    let mut series = Vec::new();
+    let mut samples: Vec<usize> = trade.points.iter().map(|p| p.samples_averaged).collect();
+    samples.sort_unstable();
+    samples.dedup();
+    for &samples in &samples {
+        let on_front = trade.points.iter().filter(|p| p.on_front && p.samples_averaged == samples);
+        let mut line: Vec<[f64; 2]> = on_front.map(at).collect();
+        line.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        front.extend(&line);
+        let name = if samples == 1 { "front".into() } else { format!("front, {samples} samples") };
+        let mark = if samples == 1 { Mark::Line } else { Mark::Dashed };
+        series.push(Series::new(&name, "front", mark, line));
+    }
+    for (kernel, class, shape) in KERNELS {
+        let points = trade.points.iter().filter(|p| p.kernel == kernel).map(at).collect();
+        series.push(Series::new(kernel, class, Mark::Points(shape), points));
+    }
+    if let Some(chosen) = trade.chosen {
+        let point = vec![at(&trade.points[chosen])];
+        series.push(Series::new("chosen", "chosen", Mark::Points(Shape::Ring), point));
+    }
+    // K at one point of the lowest line for each.
+    let most = samples.last().copied();
+    let lowest = trade.points.iter().filter(|p| Some(p.samples_averaged) == most && p.on_front);
+    let mut notes: Vec<([f64; 2], String)> = Vec::new();
+    for point in lowest.filter(|p| p.kernel == "fixed16") {
+        let note = format!("K = {}", point.centres);
+        if notes.iter().all(|(_, known)| *known != note) {
+            notes.push((at(point), note));
+        }
+    }
+    series.retain(|series| !series.points.is_empty());
+    let cycles = trade.points.iter().map(|p| p.frame.cycles as f64);
+    let errors = trade.points.iter().map(|p| p.rmse(&trade.group));
+    Chart {
+        title: format!("RMSE of {} against cycles of a frame", symbol(&trade.group)),
+        x: Axis {
+            label: "cycles of a frame, Cortex-M4F".into(),
+            ticks: ticks::logarithmic(cycles, grouped_cycles),
+            logarithmic: true,
+        },
+        y: Axis {
+            label: format!("RMSE of {}, {}", symbol(&trade.group), trade.unit),
+            ticks: ticks::logarithmic(errors, |error| significant(error, 2)),
+            logarithmic: true,
+        },
+        series,
+        bands: vec![],
+        notes,
+        end_labels: false,
+    }
+}
+
+fn grouped_cycles(cycles: f64) -> String {
+    grouped(cycles.round() as usize)
+}
+
+/// The picture alone, as a file of its own.
+pub fn svg(trade: &Trade) -> String {
+    let drawing = chart(trade).draw([960.0, 560.0]);
+    let open =
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"960\" height=\"560\" role=\"img\"";
+    let drawing = drawing.replacen("<svg role=\"img\"", open, 1);
+    let css = format!(
+        "<style>\n{}svg {{ background: var(--paper); }}\n</style>\n",
+        include_str!("style.css")
+    );
+    drawing.replacen("<title>", &format!("{css}<title>"), 1)
+}
+
+/// The page.
+pub fn html(trade: &Trade) -> String {
+    let chart = chart(trade);
+    let title = format!("Taxel: speed against accuracy, {}", trade.scene);
+    let mut body = format!(
+        "<header>\n<h1>{}</h1>\n<p>Noise {} a sample; {} test frames; cycles of a frame of a \
+         Cortex-M4F by the project's model at zero wait states (not checked against silicon), code of {}; \
+         times at {} MHz.</p>\n</header>\n",
+        escape(&title),
+        percent(trade.noise_level),
+        grouped(trade.test_frames),
+        escape(&trade.compiler),
+        trade.clock_mhz
+    );
+    let _ = write!(
+        body,
+        "<figure id=\"figure-1\">\n{}<figcaption><b>Figure 1.</b> RMSE of {} in {} against cycles of a \
+         frame, both logarithmic. Lines: the front, where nothing is better in one of RMSE, cycles and samples \
+         and worse in none. Always answering the mean errs by {}.</figcaption>\n</figure>\n",
+        chart.draw_responsive([920.0, 520.0], [480.0, 460.0]),
+        symbol(&trade.group),
+        escape(&trade.unit),
+        trade
+            .mean
+            .iter()
+            .find(|e| e.group == trade.group)
+            .map_or("-".into(), |e| significant(e.rmse, 3)),
+    );
+    body += &table(trade);
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en-GB\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <meta name=\"color-scheme\" content=\"light dark\">\n<title>{}</title>\n\
+         <style>\n{}</style>\n</head>\n<body>\n<main>\n{body}</main>\n</body>\n</html>\n",
+        escape(&title),
+        include_str!("style.css")
+    )
+}
+
+fn table(trade: &Trade) -> String {
+    let mut html = String::from(
+        "<figure id=\"table-1\" class=\"table\">\n<figcaption><b>Table 1.</b> Every point; those on the \
+         front are bold. In brackets: RMSE over the smallest of all points.</figcaption>\n<div class=\"scroll\" \
+         tabindex=\"0\" role=\"region\" aria-label=\"Table 1\">\n<table>\n<thead><tr><th>kernel</th>\
+         <th class=\"number\">K</th><th class=\"after\">tail</th><th class=\"number\">samples</th>",
+    );
+    for errors in &trade.mean {
+        let _ = write!(
+            html,
+            "<th class=\"number\">RMSE of {}, {}</th>",
+            symbol(&errors.group),
+            escape(&errors.unit)
+        );
+    }
+    for head in ["instructions", "cycles", "µs", "flash, B", "RAM, B"] {
+        let _ = write!(html, "<th class=\"number\">{head}</th>");
+    }
+    html += "</tr></thead>\n<tbody>\n";
+    for (i, p) in trade.points.iter().enumerate() {
+        let cell = if p.on_front { "th" } else { "td" };
+        let mark = if trade.chosen == Some(i) { " (chosen)" } else { "" };
+        let _ = write!(
+            html,
+            "<tr><{cell}>{}{mark}</{cell}><td class=\"number\">{}</td><td class=\"after\">{}</td><td class=\"number\">{}</td>",
+            p.kernel,
+            p.centres,
+            if p.affine_tail { "yes" } else { "no" },
+            p.samples_averaged
+        );
+        for (e, ratio) in p.errors.iter().zip(&p.ratio_to_best) {
+            let _ =
+                write!(html, "<td class=\"number\">{} ({ratio:.2})</td>", significant(e.rmse, 3));
+        }
+        let times = significant(p.frame_us, 3);
+        for number in [
+            grouped(p.frame.instructions as usize),
+            grouped(p.frame.cycles as usize),
+            times,
+            grouped(p.flash_bytes),
+            grouped(p.ram_bytes),
+        ] {
+            let _ = write!(html, "<td class=\"number\">{number}</td>");
+        }
+        html += "</tr>\n";
+    }
+    html + "</tbody>\n</table>\n</div>\n</figure>\n"
+}
