@@ -5,7 +5,7 @@ use core::marker::PhantomData;
 use crate::blob::{DecodeError, Metadata, Model, ModelShape, NetworkSection};
 use crate::exp::{ExpKernel, Polynomial};
 use crate::frame::Frame;
-use crate::rbf::{Finite, Network};
+use crate::rbf::Finite;
 
 /// What became of one row of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,9 +57,6 @@ pub struct Decoder<
 impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKernel>
     Decoder<'a, ROWS, COLS, OUTPUTS, E>
 {
-    /// Of every model that is loaded; known to the compiler, which then has little left to check.
-    const SHAPE: ModelShape = ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS };
-
     /// Checks a blob as [`load`](Self::load) does, and leaves it at that.
     ///
     /// # Errors
@@ -67,7 +64,7 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKerne
     pub fn check(blob: &'a [u8]) -> Result<Model<'a>, DecodeError> {
         const { assert!(ROWS > 0 && COLS > 0 && OUTPUTS > 0, "a sensor has rows, columns, outputs") }
         let model = Model::decode(blob)?;
-        let expected = Self::SHAPE;
+        let expected = ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS };
         if model.shape() == expected {
             Ok(model)
         } else {
@@ -123,13 +120,7 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKerne
         let places = estimate.outputs.iter_mut().zip(&mut estimate.status);
         let mut scaled = [0.0; COLS];
         for ((section, readings), (outputs, status)) in rows.zip(places) {
-            *status = match section.network_of_shape(Self::SHAPE) {
-                Ok(network) => {
-                    decode_row::<E, COLS, OUTPUTS>(&network, readings, &mut scaled, outputs)
-                }
-                // Not so: it was there when the model was loaded.
-                Err(_) => RowStatus::MissingReading,
-            };
+            *status = decode_row(section, E::exp, readings, &mut scaled, outputs);
             if *status != RowStatus::Decoded {
                 *outputs = [f32::NAN; OUTPUTS];
             }
@@ -137,19 +128,26 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKerne
     }
 }
 
-#[inline(always)]
-#[expect(clippy::inline_always, reason = "so that a network is not copied into memory")]
-fn decode_row<E: ExpKernel, const COLS: usize, const OUTPUTS: usize>(
-    network: &Network<'_>,
-    readings: &[f32; COLS],
-    scaled: &mut [f32; COLS],
-    outputs: &mut [f32; OUTPUTS],
+/// A row's outputs. Neither generic nor inlined: it is thus compiled here, for speed, where a whole image is
+/// compiled for size.
+#[inline(never)]
+fn decode_row(
+    section: &NetworkSection<'_>,
+    exp: fn(f32) -> f32,
+    readings: &[f32],
+    scaled: &mut [f32],
+    outputs: &mut [f32],
 ) -> RowStatus {
+    let shape = ModelShape { rows: 1, inputs: readings.len(), outputs: outputs.len() };
+    let Ok(network) = section.network_here(shape) else {
+        // Not so: it was there when the model was loaded.
+        return RowStatus::MissingReading;
+    };
     let bounded = network.is_bounded();
     if !bounded && !all_finite(readings) {
         return RowStatus::MissingReading;
     }
-    match network.infer_and_tell::<E>(readings, scaled, outputs) {
+    match network.infer_and_tell(exp, readings, scaled, outputs) {
         Ok(Finite::Known) => RowStatus::Decoded,
         Ok(Finite::Unknown) if bounded && all_finite(readings) => RowStatus::Decoded,
         Ok(Finite::Unknown) if bounded => RowStatus::MissingReading,
@@ -160,7 +158,7 @@ fn decode_row<E: ExpKernel, const COLS: usize, const OUTPUTS: usize>(
 
 /// Whether all `values` are finite, without a branch for each: a carry out of the exponent tells.
 #[inline(never)]
-fn all_finite<const N: usize>(values: &[f32; N]) -> bool {
+fn all_finite(values: &[f32]) -> bool {
     const EXPONENT: u32 = 0x7F80_0000;
     const LAST_PLACE: u32 = 0x0080_0000;
     let carries = |bits: u32| (bits & EXPONENT) + LAST_PLACE;

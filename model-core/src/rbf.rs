@@ -243,14 +243,15 @@ impl<'a> Network<'a> {
         scaled: &mut [f32],
         output: &mut [f32],
     ) -> Result<(), NetworkError> {
-        self.infer_and_tell::<E>(reading, scaled, output).map(drop)
+        self.infer_and_tell(E::exp, reading, scaled, output).map(drop)
     }
 
     /// As [`infer`](Self::infer); tells besides what came to light of the readings.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
-    pub(crate) fn infer_and_tell<E: ExpKernel>(
+    pub(crate) fn infer_and_tell(
         &self,
+        exp: fn(f32) -> f32,
         reading: &[f32],
         scaled: &mut [f32],
         output: &mut [f32],
@@ -260,7 +261,7 @@ impl<'a> Network<'a> {
         Ok(match self {
             Self::F32Direct(inner) => {
                 inner.scale(reading, scaled);
-                inner.infer_scaled::<E>(scaled, output);
+                inner.infer_scaled(scaled, output, exp);
                 Finite::Unknown
             }
             Self::F32(inner) => inner.infer(reading, scaled, output),
@@ -293,7 +294,7 @@ impl<'a> Network<'a> {
     ) -> Result<(), NetworkError> {
         self.check_buffers(scaled, output)?;
         match self {
-            Self::F32Direct(inner) => inner.infer_scaled::<E>(scaled, output),
+            Self::F32Direct(inner) => inner.infer_scaled(scaled, output, E::exp),
             Self::F32(inner) => inner.infer_scaled(scaled, output),
             Self::Fixed16(inner) => inner.infer_scaled(scaled, output),
         }

@@ -4,7 +4,6 @@
 //! [0, 1]. ‖x − c‖² accumulates in four interleaved partial sums, added pairwise.
 
 use super::{Cut, NetworkError, Shape, accumulate, check_finite, check_length, check_spans};
-use crate::exp::ExpKernel;
 use crate::scale::scale;
 
 /// The parameters of one network, borrowed from where they lie.
@@ -73,7 +72,7 @@ impl<'a> Network<'a> {
     /// As [`try_new`](Self::try_new), without the pass over all values: for parameters that
     /// passed it before.
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "a decoder knows the shape when it is compiled")]
+    #[expect(clippy::inline_always, reason = "a network is large to hand over")]
     pub(crate) fn with_lengths_checked(
         shape: Shape,
         parameters: Parameters<'a>,
@@ -145,7 +144,7 @@ impl<'a> Network<'a> {
 
     /// The network whose arrays follow each other in `block`; values are not looked at.
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "a decoder knows the shape when it is compiled")]
+    #[expect(clippy::inline_always, reason = "a network is large to hand over")]
     pub(crate) fn from_block(
         shape: Shape,
         common_width: bool,
@@ -192,10 +191,10 @@ impl<'a> Network<'a> {
         }
     }
 
-    /// Not inlined, so that the registers it takes are saved for no other format; the compiler still sees the
-    /// lengths if every caller has the same.
+    /// Not inlined, so that the registers it takes are saved for no other format, and not generic, so that it
+    /// is compiled here; the compiler still sees the lengths, and the exponential, if every caller has the same.
     #[inline(never)]
-    pub(super) fn infer_scaled<E: ExpKernel>(&self, scaled: &[f32], output: &mut [f32]) {
+    pub(super) fn infer_scaled(&self, scaled: &[f32], output: &mut [f32], exp: fn(f32) -> f32) {
         let p = &self.parameters;
         output.fill(0.0);
         // `max(1)`: a checked network has no empty dimension; this tells the compiler.
@@ -208,7 +207,7 @@ impl<'a> Network<'a> {
         let centres = p.centres.chunks_exact(inputs).zip(p.output_weights.chunks_exact(outputs));
         for (k, (centre, weights)) in centres.enumerate() {
             let decay = p.decay.get(k).copied().unwrap_or(common);
-            let activation = E::exp(-decay * squared_distance(scaled, centre));
+            let activation = exp(-decay * squared_distance(scaled, centre));
             accumulate(output, activation, weights);
         }
         for (y, &b) in output.iter_mut().zip(p.bias) {

@@ -93,7 +93,7 @@ impl<'a> Network<'a> {
 
     /// As [`try_new`](Self::try_new), without the pass over all values: for a block that passed it before.
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "a decoder knows the shape when it is compiled")]
+    #[expect(clippy::inline_always, reason = "a network is large to hand over")]
     pub(crate) fn with_length_checked(
         shape: Shape,
         affine: bool,
