@@ -23,6 +23,11 @@ pub mod direct;
 pub mod expanded;
 pub mod fixed16;
 
+/// The paper's sizes, which inner loops are made for: in assembly, or compiled with these numbers known.
+const USUAL_INPUTS: usize = 18;
+/// See [`USUAL_INPUTS`].
+const USUAL_OUTPUTS: usize = 18;
+
 /// The sizes of one network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shape {

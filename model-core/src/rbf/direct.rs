@@ -3,7 +3,10 @@
 //! F(x) = Σ_k ω_k·exp(−d_k·‖x − c_k‖²) + b (+ A·x), with d = 1/(2σ²) and x the readings scaled to
 //! [0, 1]. ‖x − c‖² accumulates in four interleaved partial sums, added pairwise.
 
-use super::{Cut, NetworkError, Shape, accumulate, check_finite, check_length, check_spans};
+use super::{
+    Cut, NetworkError, Shape, USUAL_INPUTS, USUAL_OUTPUTS, accumulate, check_finite, check_length,
+    check_spans,
+};
 use crate::scale::scale;
 
 /// The parameters of one network, borrowed from where they lie.
@@ -192,9 +195,21 @@ impl<'a> Network<'a> {
     }
 
     /// Not inlined, so that the registers it takes are saved for no other format, and not generic, so that it
-    /// is compiled here; the compiler still sees the lengths, and the exponential, if every caller has the same.
+    /// is compiled here, for speed.
     #[inline(never)]
     pub(super) fn infer_scaled(&self, scaled: &[f32], output: &mut [f32], exp: fn(f32) -> f32) {
+        let usual: (Result<&[f32; USUAL_INPUTS], _>, Result<&mut [f32; USUAL_OUTPUTS], _>) =
+            (scaled.try_into(), (&mut *output).try_into());
+        if let (Ok(scaled), Ok(output)) = usual {
+            self.add_up(scaled, output, exp);
+        } else {
+            self.add_up(scaled, output, exp);
+        }
+    }
+
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
+    fn add_up(&self, scaled: &[f32], output: &mut [f32], exp: fn(f32) -> f32) {
         let p = &self.parameters;
         output.fill(0.0);
         // `max(1)`: a checked network has no empty dimension; this tells the compiler.

@@ -10,7 +10,8 @@
 //! the second by −g‖x‖². Centres are stored in fours; the last may be fill.
 
 use super::{
-    Cut, Finite, NetworkError, Shape, accumulate, check_finite, check_length, check_spans,
+    Cut, Finite, NetworkError, Shape, USUAL_INPUTS, USUAL_OUTPUTS, accumulate, check_finite,
+    check_length, check_spans,
 };
 use crate::exp::exp2;
 use crate::scale::{HALF_RANGE, UNITS, clamp_units};
@@ -213,14 +214,26 @@ impl<'a> Network<'a> {
             super::cortex_m4::expanded(self, super::cortex_m4::Inputs::Scaled(scaled), output);
             return;
         }
-        self.infer_scaled_portably(scaled, output);
+        self.infer_scaled_in_rust(scaled, output);
     }
 
     /// As [`rbf::Network::infer_scaled`](super::Network::infer_scaled), by the compiled twin of the
     /// assembly: the same bits; public to measure what the assembly saves. `scaled` and `output` must have
     /// the sizes of the shape: what is beyond is left alone.
-    #[inline]
+    #[inline(never)]
     pub fn infer_scaled_portably(&self, scaled: &mut [f32], output: &mut [f32]) {
+        let usual: (Result<&mut [f32; USUAL_INPUTS], _>, Result<&mut [f32; USUAL_OUTPUTS], _>) =
+            ((&mut *scaled).try_into(), (&mut *output).try_into());
+        if let (Ok(scaled), Ok(output)) = usual {
+            self.infer_scaled_in_rust(scaled, output);
+        } else {
+            self.infer_scaled_in_rust(scaled, output);
+        }
+    }
+
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "callers rely on it for constant lengths")]
+    fn infer_scaled_in_rust(&self, scaled: &mut [f32], output: &mut [f32]) {
         scaled.iter_mut().for_each(|x| *x = clamp_units(*x));
         output.fill(0.0);
         // `max(1)`: a checked network has no empty dimension; this tells the compiler.

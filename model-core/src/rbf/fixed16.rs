@@ -15,7 +15,10 @@
 
 use core::f32::consts::LOG2_E;
 
-use super::{Cut, Finite, NetworkError, Shape, check_finite, check_length, check_spans};
+use super::{
+    Cut, Finite, NetworkError, Shape, USUAL_INPUTS, USUAL_OUTPUTS, check_finite, check_length,
+    check_spans,
+};
 use crate::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP, clamp_steps};
 
 /// Centres are stored in multiples of this.
@@ -245,14 +248,26 @@ impl<'a> Network<'a> {
             super::cortex_m4::fixed16(self, super::cortex_m4::Inputs::Scaled(scaled), output);
             return;
         }
-        self.infer_scaled_portably(scaled, output);
+        self.infer_scaled_in_rust(scaled, output);
     }
 
     /// As [`rbf::Network::infer_scaled`](super::Network::infer_scaled), by the compiled twin of the
     /// assembly: the same bits; public to measure what the assembly saves. `scaled` and `output` must have
     /// the sizes of the shape: what is beyond is left alone.
-    #[inline]
+    #[inline(never)]
     pub fn infer_scaled_portably(&self, scaled: &mut [f32], output: &mut [f32]) {
+        let usual: (Result<&mut [f32; USUAL_INPUTS], _>, Result<&mut [f32; USUAL_OUTPUTS], _>) =
+            ((&mut *scaled).try_into(), (&mut *output).try_into());
+        if let (Ok(scaled), Ok(output)) = usual {
+            self.infer_scaled_in_rust(scaled, output);
+        } else {
+            self.infer_scaled_in_rust(scaled, output);
+        }
+    }
+
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "callers rely on it for constant lengths")]
+    fn infer_scaled_in_rust(&self, scaled: &mut [f32], output: &mut [f32]) {
         let p = self.parameters();
         // The buffers of the caller serve for the integers: no other is of the right length.
         let x = bytemuck::cast_slice_mut::<f32, i32>(scaled);
