@@ -5,7 +5,7 @@ use core::marker::PhantomData;
 use crate::blob::{DecodeError, Metadata, Model, ModelShape, NetworkSection};
 use crate::exp::{ExpKernel, Polynomial};
 use crate::frame::Frame;
-use crate::rbf::Finite;
+use crate::rbf::{Finite, Format};
 
 /// What became of one row of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -139,21 +139,37 @@ fn decode_row(
     outputs: &mut [f32],
 ) -> RowStatus {
     let shape = ModelShape { rows: 1, inputs: readings.len(), outputs: outputs.len() };
-    let Ok(network) = section.network_here(shape) else {
-        // Not so: it was there when the model was loaded.
-        return RowStatus::MissingReading;
+    // Their outputs have a bound, which is checked when a model is loaded.
+    let finite = match section.format() {
+        Format::F32Direct => return decode_direct_row(section, exp, readings, scaled, outputs),
+        Format::F32 => section.expanded(shape).map(|it| it.infer(readings, scaled, outputs)),
+        Format::Fixed16 => section.fixed16(shape).map(|it| it.infer(readings, scaled, outputs)),
     };
-    let bounded = network.is_bounded();
-    if !bounded && !all_finite(readings) {
+    match finite {
+        Ok(Finite::Known) => RowStatus::Decoded,
+        Ok(Finite::Unknown) if all_finite(readings) => RowStatus::Decoded,
+        // An error: not so, the network was there when the model was loaded.
+        Ok(Finite::Unknown) | Err(_) => RowStatus::MissingReading,
+    }
+}
+
+/// See [`decode_row`].
+#[inline(never)]
+fn decode_direct_row(
+    section: &NetworkSection<'_>,
+    exp: fn(f32) -> f32,
+    readings: &[f32],
+    scaled: &mut [f32],
+    outputs: &mut [f32],
+) -> RowStatus {
+    let shape = ModelShape { rows: 1, inputs: readings.len(), outputs: outputs.len() };
+    let Ok(network) = section.direct(shape) else { return RowStatus::MissingReading };
+    if !all_finite(readings) {
         return RowStatus::MissingReading;
     }
-    match network.infer_and_tell(exp, readings, scaled, outputs) {
-        Ok(Finite::Known) => RowStatus::Decoded,
-        Ok(Finite::Unknown) if bounded && all_finite(readings) => RowStatus::Decoded,
-        Ok(Finite::Unknown) if bounded => RowStatus::MissingReading,
-        Ok(Finite::Unknown) if all_finite(outputs) => RowStatus::Decoded,
-        Ok(Finite::Unknown) | Err(_) => RowStatus::Overflow,
-    }
+    network.scale(readings, scaled);
+    network.infer_scaled(scaled, outputs, exp);
+    if all_finite(outputs) { RowStatus::Decoded } else { RowStatus::Overflow }
 }
 
 /// Whether all `values` are finite, without a branch for each: a carry out of the exponent tells.

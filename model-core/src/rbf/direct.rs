@@ -186,7 +186,7 @@ impl<'a> Network<'a> {
 
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
-    pub(super) fn scale(&self, reading: &[f32], scaled: &mut [f32]) {
+    pub(crate) fn scale(&self, reading: &[f32], scaled: &mut [f32]) {
         let p = &self.parameters;
         let limits = p.input_minimum.iter().zip(p.input_per_span);
         for ((x, &r), (&minimum, &per_span)) in scaled.iter_mut().zip(reading).zip(limits) {
@@ -197,7 +197,7 @@ impl<'a> Network<'a> {
     /// Not inlined, so that the registers it takes are saved for no other format, and not generic, so that it
     /// is compiled here, for speed.
     #[inline(never)]
-    pub(super) fn infer_scaled(&self, scaled: &[f32], output: &mut [f32], exp: fn(f32) -> f32) {
+    pub(crate) fn infer_scaled(&self, scaled: &[f32], output: &mut [f32], exp: fn(f32) -> f32) {
         let usual: (Result<&[f32; USUAL_INPUTS], _>, Result<&mut [f32; USUAL_OUTPUTS], _>) =
             (scaled.try_into(), (&mut *output).try_into());
         if let (Ok(scaled), Ok(output)) = usual {

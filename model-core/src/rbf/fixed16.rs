@@ -216,7 +216,7 @@ impl<'a> Network<'a> {
         super::range_about(p.input_midpoint.get(input), p.input_per_unit.get(input))
     }
 
-    pub(super) fn scale(&self, reading: &[f32], scaled: &mut [f32]) {
+    pub(crate) fn scale(&self, reading: &[f32], scaled: &mut [f32]) {
         let p = self.parameters();
         let limits = p.input_midpoint.iter().zip(p.input_per_unit);
         for ((x, &r), (&midpoint, &per_unit)) in scaled.iter_mut().zip(reading).zip(limits) {
@@ -226,7 +226,7 @@ impl<'a> Network<'a> {
 
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "callers rely on it for constant lengths")]
-    pub(super) fn infer(&self, reading: &[f32], scaled: &mut [f32], output: &mut [f32]) -> Finite {
+    pub(crate) fn infer(&self, reading: &[f32], scaled: &mut [f32], output: &mut [f32]) -> Finite {
         #[cfg(cortex_m4f)]
         if let (Ok(reading), Ok(output)) = (reading.try_into(), (&mut *output).try_into()) {
             return super::cortex_m4::fixed16(
@@ -242,7 +242,7 @@ impl<'a> Network<'a> {
 
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "callers rely on it for constant lengths")]
-    pub(super) fn infer_scaled(&self, scaled: &mut [f32], output: &mut [f32]) {
+    pub(crate) fn infer_scaled(&self, scaled: &mut [f32], output: &mut [f32]) {
         #[cfg(cortex_m4f)]
         if let (Ok(scaled), Ok(output)) = ((&*scaled).try_into(), (&mut *output).try_into()) {
             super::cortex_m4::fixed16(self, super::cortex_m4::Inputs::Scaled(scaled), output);
