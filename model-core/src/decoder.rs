@@ -5,7 +5,7 @@ use core::marker::PhantomData;
 use crate::blob::{DecodeError, Metadata, Model, ModelShape, NetworkSection};
 use crate::exp::{ExpKernel, Polynomial};
 use crate::frame::Frame;
-use crate::rbf::{Finite, Network};
+use crate::rbf::{Finite, Format};
 
 /// What became of one row of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,9 +57,6 @@ pub struct Decoder<
 impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKernel>
     Decoder<'a, ROWS, COLS, OUTPUTS, E>
 {
-    /// Of every model that is loaded; known to the compiler, which then has little left to check.
-    const SHAPE: ModelShape = ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS };
-
     /// Checks a blob as [`load`](Self::load) does, and leaves it at that.
     ///
     /// # Errors
@@ -67,7 +64,7 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKerne
     pub fn check(blob: &'a [u8]) -> Result<Model<'a>, DecodeError> {
         const { assert!(ROWS > 0 && COLS > 0 && OUTPUTS > 0, "a sensor has rows, columns, outputs") }
         let model = Model::decode(blob)?;
-        let expected = Self::SHAPE;
+        let expected = ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS };
         if model.shape() == expected {
             Ok(model)
         } else {
@@ -123,13 +120,7 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKerne
         let places = estimate.outputs.iter_mut().zip(&mut estimate.status);
         let mut scaled = [0.0; COLS];
         for ((section, readings), (outputs, status)) in rows.zip(places) {
-            *status = match section.network_of_shape(Self::SHAPE) {
-                Ok(network) => {
-                    decode_row::<E, COLS, OUTPUTS>(&network, readings, &mut scaled, outputs)
-                }
-                // Not so: it was there when the model was loaded.
-                Err(_) => RowStatus::MissingReading,
-            };
+            *status = decode_row(section, E::exp, readings, &mut scaled, outputs);
             if *status != RowStatus::Decoded {
                 *outputs = [f32::NAN; OUTPUTS];
             }
@@ -137,30 +128,53 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKerne
     }
 }
 
-#[inline(always)]
-#[expect(clippy::inline_always, reason = "so that a network is not copied into memory")]
-fn decode_row<E: ExpKernel, const COLS: usize, const OUTPUTS: usize>(
-    network: &Network<'_>,
-    readings: &[f32; COLS],
-    scaled: &mut [f32; COLS],
-    outputs: &mut [f32; OUTPUTS],
+/// A row's outputs. Neither generic nor inlined: it is thus compiled here, for speed, where a whole image is
+/// compiled for size.
+#[inline(never)]
+fn decode_row(
+    section: &NetworkSection<'_>,
+    exp: fn(f32) -> f32,
+    readings: &[f32],
+    scaled: &mut [f32],
+    outputs: &mut [f32],
 ) -> RowStatus {
-    let bounded = network.is_bounded();
-    if !bounded && !all_finite(readings) {
+    let shape = ModelShape { rows: 1, inputs: readings.len(), outputs: outputs.len() };
+    // Their outputs have a bound, which is checked when a model is loaded.
+    let finite = match section.format() {
+        Format::F32Direct => return decode_direct_row(section, exp, readings, scaled, outputs),
+        Format::F32 => section.expanded(shape).map(|it| it.infer(readings, scaled, outputs)),
+        Format::Fixed16 => section.fixed16(shape).map(|it| it.infer(readings, scaled, outputs)),
+    };
+    match finite {
+        Ok(Finite::Known) => RowStatus::Decoded,
+        Ok(Finite::Unknown) if all_finite(readings) => RowStatus::Decoded,
+        // An error: not so, the network was there when the model was loaded.
+        Ok(Finite::Unknown) | Err(_) => RowStatus::MissingReading,
+    }
+}
+
+/// See [`decode_row`].
+#[inline(never)]
+fn decode_direct_row(
+    section: &NetworkSection<'_>,
+    exp: fn(f32) -> f32,
+    readings: &[f32],
+    scaled: &mut [f32],
+    outputs: &mut [f32],
+) -> RowStatus {
+    let shape = ModelShape { rows: 1, inputs: readings.len(), outputs: outputs.len() };
+    let Ok(network) = section.direct(shape) else { return RowStatus::MissingReading };
+    if !all_finite(readings) {
         return RowStatus::MissingReading;
     }
-    match network.infer_and_tell::<E>(readings, scaled, outputs) {
-        Ok(Finite::Known) => RowStatus::Decoded,
-        Ok(Finite::Unknown) if bounded && all_finite(readings) => RowStatus::Decoded,
-        Ok(Finite::Unknown) if bounded => RowStatus::MissingReading,
-        Ok(Finite::Unknown) if all_finite(outputs) => RowStatus::Decoded,
-        Ok(Finite::Unknown) | Err(_) => RowStatus::Overflow,
-    }
+    network.scale(readings, scaled);
+    network.infer_scaled(scaled, outputs, exp);
+    if all_finite(outputs) { RowStatus::Decoded } else { RowStatus::Overflow }
 }
 
 /// Whether all `values` are finite, without a branch for each: a carry out of the exponent tells.
 #[inline(never)]
-fn all_finite<const N: usize>(values: &[f32; N]) -> bool {
+fn all_finite(values: &[f32]) -> bool {
     const EXPONENT: u32 = 0x7F80_0000;
     const LAST_PLACE: u32 = 0x0080_0000;
     let carries = |bits: u32| (bits & EXPONENT) + LAST_PLACE;

@@ -23,6 +23,11 @@ pub mod direct;
 pub mod expanded;
 pub mod fixed16;
 
+/// The paper's sizes, which inner loops are made for: in assembly, or compiled with these numbers known.
+const USUAL_INPUTS: usize = 18;
+/// See [`USUAL_INPUTS`].
+const USUAL_OUTPUTS: usize = 18;
+
 /// The sizes of one network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shape {
@@ -110,7 +115,7 @@ impl Format {
     }
 }
 
-/// Whether the readings of an inference were finite.
+/// Whether the readings of an inference were finite, as far as a kernel with a bound on its outputs tells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Finite {
     /// All were.
@@ -167,11 +172,6 @@ impl<'a> Network<'a> {
             Self::F32(inner) => inner.has_affine_tail(),
             Self::Fixed16(inner) => inner.has_affine_tail(),
         }
-    }
-
-    /// Whether no finite reading can make an output overflow: what is checked of all formats but the first.
-    pub(crate) fn is_bounded(&self) -> bool {
-        !matches!(self, Self::F32Direct(_))
     }
 
     /// Width σ of the centres on inputs scaled to [0, 1]: one for all, or one each.
@@ -243,29 +243,17 @@ impl<'a> Network<'a> {
         scaled: &mut [f32],
         output: &mut [f32],
     ) -> Result<(), NetworkError> {
-        self.infer_and_tell::<E>(reading, scaled, output).map(drop)
-    }
-
-    /// As [`infer`](Self::infer); tells besides what came to light of the readings.
-    #[inline(always)]
-    #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
-    pub(crate) fn infer_and_tell<E: ExpKernel>(
-        &self,
-        reading: &[f32],
-        scaled: &mut [f32],
-        output: &mut [f32],
-    ) -> Result<Finite, NetworkError> {
         check_length("reading", reading, self.shape().inputs)?;
         self.check_buffers(scaled, output)?;
-        Ok(match self {
+        match self {
             Self::F32Direct(inner) => {
                 inner.scale(reading, scaled);
-                inner.infer_scaled::<E>(scaled, output);
-                Finite::Unknown
+                inner.infer_scaled(scaled, output, E::exp);
             }
-            Self::F32(inner) => inner.infer(reading, scaled, output),
-            Self::Fixed16(inner) => inner.infer(reading, scaled, output),
-        })
+            Self::F32(inner) => drop(inner.infer(reading, scaled, output)),
+            Self::Fixed16(inner) => drop(inner.infer(reading, scaled, output)),
+        }
+        Ok(())
     }
 
     /// The first half of [`infer`](Self::infer): readings in the format's own unit of inputs, before its
@@ -293,7 +281,7 @@ impl<'a> Network<'a> {
     ) -> Result<(), NetworkError> {
         self.check_buffers(scaled, output)?;
         match self {
-            Self::F32Direct(inner) => inner.infer_scaled::<E>(scaled, output),
+            Self::F32Direct(inner) => inner.infer_scaled(scaled, output, E::exp),
             Self::F32(inner) => inner.infer_scaled(scaled, output),
             Self::Fixed16(inner) => inner.infer_scaled(scaled, output),
         }

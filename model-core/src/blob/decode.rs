@@ -315,27 +315,37 @@ impl<'a> NetworkSection<'a> {
 
     /// The network; its values are not looked at.
     pub fn network(&self, shape: ModelShape) -> Result<Network<'a>, NetworkError> {
-        self.network_of_shape(shape)
+        match self.format {
+            Format::F32Direct => self.direct(shape).map(Network::F32Direct),
+            Format::F32 => self.expanded(shape).map(Network::F32),
+            Format::Fixed16 => self.fixed16(shape).map(Network::Fixed16),
+        }
     }
 
-    /// As [`network`](Self::network), for a `shape` that the compiler knows.
-    #[inline(always)]
-    #[expect(clippy::inline_always, reason = "a decoder knows the shape when it is compiled")]
-    pub fn network_of_shape(&self, shape: ModelShape) -> Result<Network<'a>, NetworkError> {
+    /// Its format.
+    pub fn format(&self) -> Format {
+        self.format
+    }
+
+    /// The network if it is one with direct distances.
+    #[inline]
+    pub fn direct(&self, shape: ModelShape) -> Result<direct::Network<'a>, NetworkError> {
         let shape = network_shape(shape, self.centres);
-        let Self { common_width, affine, block, .. } = *self;
-        match self.format {
-            Format::F32Direct => {
-                direct::Network::from_block(shape, common_width, affine, Cut(block))
-                    .map(Network::F32Direct)
-            }
-            Format::F32 => {
-                expanded::Network::with_length_checked(shape, affine, block).map(Network::F32)
-            }
-            Format::Fixed16 => {
-                fixed16::Network::with_length_checked(shape, affine, block).map(Network::Fixed16)
-            }
-        }
+        direct::Network::from_block(shape, self.common_width, self.affine, Cut(self.block))
+    }
+
+    /// The network if it is one with expanded distances.
+    #[inline]
+    pub fn expanded(&self, shape: ModelShape) -> Result<expanded::Network<'a>, NetworkError> {
+        let shape = network_shape(shape, self.centres);
+        expanded::Network::with_length_checked(shape, self.affine, self.block)
+    }
+
+    /// The network if it is one in fixed point.
+    #[inline]
+    pub fn fixed16(&self, shape: ModelShape) -> Result<fixed16::Network<'a>, NetworkError> {
+        let shape = network_shape(shape, self.centres);
+        fixed16::Network::with_length_checked(shape, self.affine, self.block)
     }
 }
 

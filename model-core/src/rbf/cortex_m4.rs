@@ -3,12 +3,8 @@
 
 use core::mem::MaybeUninit;
 
-use super::{Finite, expanded, fixed16};
+use super::{Finite, USUAL_INPUTS as INPUTS, USUAL_OUTPUTS as OUTPUTS, expanded, fixed16};
 
-/// The sizes that the assembly is written for.
-const INPUTS: usize = 18;
-/// See INPUTS.
-const OUTPUTS: usize = 18;
 /// Activations of the f32 kernel between its two halves: 512 bytes of stack.
 const MOST_CENTRES_AT_ONCE: usize = 128;
 

@@ -3,8 +3,10 @@
 //! F(x) = Σ_k ω_k·exp(−d_k·‖x − c_k‖²) + b (+ A·x), with d = 1/(2σ²) and x the readings scaled to
 //! [0, 1]. ‖x − c‖² accumulates in four interleaved partial sums, added pairwise.
 
-use super::{Cut, NetworkError, Shape, accumulate, check_finite, check_length, check_spans};
-use crate::exp::ExpKernel;
+use super::{
+    Cut, NetworkError, Shape, USUAL_INPUTS, USUAL_OUTPUTS, accumulate, check_finite, check_length,
+    check_spans,
+};
 use crate::scale::scale;
 
 /// The parameters of one network, borrowed from where they lie.
@@ -73,7 +75,7 @@ impl<'a> Network<'a> {
     /// As [`try_new`](Self::try_new), without the pass over all values: for parameters that
     /// passed it before.
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "a decoder knows the shape when it is compiled")]
+    #[expect(clippy::inline_always, reason = "a network is large to hand over")]
     pub(crate) fn with_lengths_checked(
         shape: Shape,
         parameters: Parameters<'a>,
@@ -145,7 +147,7 @@ impl<'a> Network<'a> {
 
     /// The network whose arrays follow each other in `block`; values are not looked at.
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "a decoder knows the shape when it is compiled")]
+    #[expect(clippy::inline_always, reason = "a network is large to hand over")]
     pub(crate) fn from_block(
         shape: Shape,
         common_width: bool,
@@ -184,7 +186,7 @@ impl<'a> Network<'a> {
 
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
-    pub(super) fn scale(&self, reading: &[f32], scaled: &mut [f32]) {
+    pub(crate) fn scale(&self, reading: &[f32], scaled: &mut [f32]) {
         let p = &self.parameters;
         let limits = p.input_minimum.iter().zip(p.input_per_span);
         for ((x, &r), (&minimum, &per_span)) in scaled.iter_mut().zip(reading).zip(limits) {
@@ -192,10 +194,22 @@ impl<'a> Network<'a> {
         }
     }
 
-    /// Not inlined, so that the registers it takes are saved for no other format; the compiler still sees the
-    /// lengths if every caller has the same.
+    /// Not inlined, so that the registers it takes are saved for no other format, and not generic, so that it
+    /// is compiled here, for speed.
     #[inline(never)]
-    pub(super) fn infer_scaled<E: ExpKernel>(&self, scaled: &[f32], output: &mut [f32]) {
+    pub(crate) fn infer_scaled(&self, scaled: &[f32], output: &mut [f32], exp: fn(f32) -> f32) {
+        let usual: (Result<&[f32; USUAL_INPUTS], _>, Result<&mut [f32; USUAL_OUTPUTS], _>) =
+            (scaled.try_into(), (&mut *output).try_into());
+        if let (Ok(scaled), Ok(output)) = usual {
+            self.add_up(scaled, output, exp);
+        } else {
+            self.add_up(scaled, output, exp);
+        }
+    }
+
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
+    fn add_up(&self, scaled: &[f32], output: &mut [f32], exp: fn(f32) -> f32) {
         let p = &self.parameters;
         output.fill(0.0);
         // `max(1)`: a checked network has no empty dimension; this tells the compiler.
@@ -208,7 +222,7 @@ impl<'a> Network<'a> {
         let centres = p.centres.chunks_exact(inputs).zip(p.output_weights.chunks_exact(outputs));
         for (k, (centre, weights)) in centres.enumerate() {
             let decay = p.decay.get(k).copied().unwrap_or(common);
-            let activation = E::exp(-decay * squared_distance(scaled, centre));
+            let activation = exp(-decay * squared_distance(scaled, centre));
             accumulate(output, activation, weights);
         }
         for (y, &b) in output.iter_mut().zip(p.bias) {

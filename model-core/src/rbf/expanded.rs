@@ -10,7 +10,8 @@
 //! the second by −g‖x‖². Centres are stored in fours; the last may be fill.
 
 use super::{
-    Cut, Finite, NetworkError, Shape, accumulate, check_finite, check_length, check_spans,
+    Cut, Finite, NetworkError, Shape, USUAL_INPUTS, USUAL_OUTPUTS, accumulate, check_finite,
+    check_length, check_spans,
 };
 use crate::exp::exp2;
 use crate::scale::{HALF_RANGE, UNITS, clamp_units};
@@ -75,7 +76,7 @@ impl<'a> Network<'a> {
 
     /// As [`try_new`](Self::try_new), without the pass over all values: for a block that passed it before.
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "a decoder knows the shape when it is compiled")]
+    #[expect(clippy::inline_always, reason = "a network is large to hand over")]
     pub(crate) fn with_length_checked(
         shape: Shape,
         affine: bool,
@@ -181,7 +182,7 @@ impl<'a> Network<'a> {
         super::range_about(p.input_midpoint.get(input), p.input_per_unit.get(input))
     }
 
-    pub(super) fn scale(&self, reading: &[f32], scaled: &mut [f32]) {
+    pub(crate) fn scale(&self, reading: &[f32], scaled: &mut [f32]) {
         let p = self.parameters();
         let limits = p.input_midpoint.iter().zip(p.input_per_unit);
         for ((x, &r), (&midpoint, &per_unit)) in scaled.iter_mut().zip(reading).zip(limits) {
@@ -191,7 +192,7 @@ impl<'a> Network<'a> {
 
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "callers rely on it for constant lengths")]
-    pub(super) fn infer(&self, reading: &[f32], scaled: &mut [f32], output: &mut [f32]) -> Finite {
+    pub(crate) fn infer(&self, reading: &[f32], scaled: &mut [f32], output: &mut [f32]) -> Finite {
         #[cfg(cortex_m4f)]
         if let (Ok(reading), Ok(output)) = (reading.try_into(), (&mut *output).try_into()) {
             return super::cortex_m4::expanded(
@@ -207,20 +208,32 @@ impl<'a> Network<'a> {
 
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "callers rely on it for constant lengths")]
-    pub(super) fn infer_scaled(&self, scaled: &mut [f32], output: &mut [f32]) {
+    pub(crate) fn infer_scaled(&self, scaled: &mut [f32], output: &mut [f32]) {
         #[cfg(cortex_m4f)]
         if let (Ok(scaled), Ok(output)) = ((&*scaled).try_into(), (&mut *output).try_into()) {
             super::cortex_m4::expanded(self, super::cortex_m4::Inputs::Scaled(scaled), output);
             return;
         }
-        self.infer_scaled_portably(scaled, output);
+        self.infer_scaled_in_rust(scaled, output);
     }
 
     /// As [`rbf::Network::infer_scaled`](super::Network::infer_scaled), by the compiled twin of the
     /// assembly: the same bits; public to measure what the assembly saves. `scaled` and `output` must have
     /// the sizes of the shape: what is beyond is left alone.
-    #[inline]
+    #[inline(never)]
     pub fn infer_scaled_portably(&self, scaled: &mut [f32], output: &mut [f32]) {
+        let usual: (Result<&mut [f32; USUAL_INPUTS], _>, Result<&mut [f32; USUAL_OUTPUTS], _>) =
+            ((&mut *scaled).try_into(), (&mut *output).try_into());
+        if let (Ok(scaled), Ok(output)) = usual {
+            self.infer_scaled_in_rust(scaled, output);
+        } else {
+            self.infer_scaled_in_rust(scaled, output);
+        }
+    }
+
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "callers rely on it for constant lengths")]
+    fn infer_scaled_in_rust(&self, scaled: &mut [f32], output: &mut [f32]) {
         scaled.iter_mut().for_each(|x| *x = clamp_units(*x));
         output.fill(0.0);
         // `max(1)`: a checked network has no empty dimension; this tells the compiler.
