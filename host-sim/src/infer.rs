@@ -2,11 +2,17 @@
 
 use clap::ValueEnum;
 use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
-use model_core::rbf::Network;
+use model_core::rbf::{Network, Shape};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use self::batch::Batch;
 use crate::dataset::Table;
+
+mod batch;
+
+/// Lines that one thread takes at a time.
+const LINES_AT_ONCE: usize = 256;
 
 /// The exponential that activations are computed with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum, Serialize)]
@@ -38,12 +44,38 @@ impl Kernel {
 /// Infers the outputs for every line of `inputs`.
 #[must_use]
 pub fn infer(network: &Network<'_>, kernel: Kernel, inputs: &Table) -> Vec<f64> {
-    let outputs = network.shape().outputs;
-    let mut values = vec![0.0; inputs.len() * outputs];
-    values
-        .par_chunks_exact_mut(outputs)
-        .zip(inputs.values.par_chunks_exact(inputs.names.len()))
-        .for_each(|(outputs, line)| infer_line(network, kernel, line, outputs));
+    infer_rows(&[*network], kernel, inputs)
+}
+
+/// Infers the outputs for every line of `readings`, which holds the inputs of each network in turn.
+///
+/// # Panics
+/// If the networks differ in inputs or outputs.
+pub(crate) fn infer_rows(networks: &[Network<'_>], kernel: Kernel, readings: &Table) -> Vec<f64> {
+    let Some(Shape { inputs, outputs, .. }) = networks.first().map(Network::shape) else {
+        return Vec::new();
+    };
+    let (readings_step, outputs_step) = (networks.len() * inputs, networks.len() * outputs);
+    let batches: Vec<Option<Batch>> =
+        networks.iter().map(|network| Batch::of(network, kernel)).collect();
+    let mut values = vec![0.0; readings.len() * outputs_step];
+    let pieces = readings.values.par_chunks(LINES_AT_ONCE * readings_step);
+    values.par_chunks_mut(LINES_AT_ONCE * outputs_step).zip(pieces).for_each(
+        |(values, readings)| {
+            for (row, (network, batch)) in networks.iter().zip(&batches).enumerate() {
+                let readings = &readings[row * inputs..];
+                let values = &mut values[row * outputs..];
+                if let Some(batch) = batch {
+                    batch.infer(readings, readings_step, values, outputs_step);
+                } else {
+                    let lines = readings.chunks(readings_step);
+                    for (readings, values) in lines.zip(values.chunks_mut(outputs_step)) {
+                        infer_line(network, kernel, &readings[..inputs], &mut values[..outputs]);
+                    }
+                }
+            }
+        },
+    );
     values
 }
 
@@ -54,12 +86,7 @@ pub fn is_missing(reading: f64) -> bool {
 }
 
 /// Infers the outputs for one line of readings; all NaN if a reading is missing.
-pub(crate) fn infer_line(
-    network: &Network<'_>,
-    kernel: Kernel,
-    readings: &[f64],
-    outputs: &mut [f64],
-) {
+fn infer_line(network: &Network<'_>, kernel: Kernel, readings: &[f64], outputs: &mut [f64]) {
     if readings.iter().any(|reading| is_missing(*reading)) {
         outputs.fill(f64::NAN);
         return;

@@ -7,12 +7,11 @@ use model_core::blob::{
 };
 use model_core::rbf::Network;
 use model_core::scale::CLAMP;
-use rayon::prelude::*;
 
 use crate::columns;
 use crate::dataset::{Dataset, Table};
 use crate::error::{Error, Result};
-use crate::infer::{Kernel, infer, infer_line, is_missing};
+use crate::infer::{Kernel, infer, infer_rows, is_missing};
 use crate::progress::Progress;
 use crate::random::Stream;
 use crate::scene::{NoiseKind, Scene};
@@ -230,20 +229,8 @@ impl LoadedModel {
     #[must_use]
     pub fn decode(&self, kernel: Kernel, readings: &Table) -> Table {
         let model = self.model();
-        let shape = model.shape();
-        let networks = self.row_networks();
         let names = model.metadata().output_names.iter().map(String::from).collect::<Vec<_>>();
-        let mut values = vec![0.0; readings.len() * names.len()];
-        let places = values.par_chunks_exact_mut(names.len());
-        places.zip(readings.values.par_chunks_exact(readings.names.len())).for_each(
-            |(outputs, line)| {
-                let blocks =
-                    line.chunks_exact(shape.inputs).zip(outputs.chunks_exact_mut(shape.outputs));
-                for (network, (readings, outputs)) in networks.iter().zip(blocks) {
-                    infer_line(network, kernel, readings, outputs);
-                }
-            },
-        );
+        let values = infer_rows(&self.row_networks(), kernel, readings);
         Table { names, values }
     }
 }

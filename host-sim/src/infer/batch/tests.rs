@@ -1,0 +1,155 @@
+//! Batches against one line after the other, bit for bit.
+
+use model_core::rbf::{direct, expanded};
+use model_core::scale::{HALF_RANGE, clamp_units};
+use proptest::prelude::*;
+use rand_core::{Rng, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use super::super::{infer_line, infer_rows};
+use super::*;
+use crate::dataset::Table;
+
+struct Draw(Xoshiro256PlusPlus);
+
+impl Draw {
+    fn one(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn floats(&mut self, count: usize, low: f64, high: f64) -> Vec<f32> {
+        (0..count).map(|_| self.one(low, high) as f32).collect()
+    }
+}
+
+/// The words of a network whose training range is about 40 to 80 Ω, and whether they are expanded.
+fn words(draw: &mut Draw, shape: Shape, expanded: bool, affine: bool, one_width: bool) -> Vec<u32> {
+    let Shape { inputs, centres, outputs } = shape;
+    let affine = if affine { inputs * outputs } else { 0 };
+    if !expanded {
+        let parameters = direct::Parameters {
+            input_minimum: &draw.floats(inputs, 40.0, 60.0),
+            input_per_span: &draw.floats(inputs, 0.0, 0.2),
+            centres: &draw.floats(centres * inputs, -0.1, 1.1),
+            // Up to where activations vanish.
+            decay: &draw.floats(if one_width { 1 } else { centres }, 0.01, 40.0),
+            output_weights: &draw.floats(centres * outputs, -1e3, 1e3),
+            bias: &draw.floats(outputs, -1.0, 1.0),
+            affine: &draw.floats(affine, -1.0, 1.0),
+        };
+        return parameters.words().collect();
+    }
+    let unit = f64::from(HALF_RANGE / UNITS);
+    let decay = draw.one(0.01, 10.0 / inputs as f64) * unit * unit;
+    let stored = centres.next_multiple_of(expanded::CENTRES_AT_ONCE);
+    let mut exponents = Vec::new();
+    for k in 0..stored {
+        let within = if k < centres { 0.5 / unit } else { 0.0 };
+        let centre: Vec<f64> = (0..inputs).map(|_| draw.one(-within, within)).collect();
+        exponents.push(-(decay * centre.iter().map(|c| c * c).sum::<f64>()) as f32);
+        exponents.extend(centre.iter().map(|c| (2.0 * decay * c) as f32));
+    }
+    let parameters = expanded::Parameters {
+        input_midpoint: &draw.floats(inputs, 50.0, 70.0),
+        input_per_unit: &draw.floats(inputs, 0.0, 0.1 / unit),
+        decay: decay as f32,
+        bias: &draw.floats(outputs, -1.0, 1.0),
+        affine: &draw.floats(affine, -unit, unit),
+        exponents: &exponents,
+        output_weights: &draw.floats(stored * outputs, -1e3, 1e3),
+    };
+    parameters.words().collect()
+}
+
+fn reading(draw: &mut Draw) -> f64 {
+    match draw.0.next_u64() % 400 {
+        0 => f64::NAN,
+        1 => f64::INFINITY,
+        2 => 1e300, // beyond f32
+        3 => -3e38,
+        4 => 3e38,
+        5 => draw.one(-1e6, 1e6),
+        _ => draw.one(38.0, 82.0),
+    }
+}
+
+/// Infers the same lines at once and one after the other.
+fn check(networks: &[Network<'_>], draw: &mut Draw, lines: usize) {
+    let Shape { inputs, outputs, .. } = networks[0].shape();
+    let columns = networks.len() * inputs;
+    let values: Vec<f64> = (0..lines * columns).map(|_| reading(draw)).collect();
+    let names = vec![String::new(); columns];
+    let table = Table { names, values };
+    let at_once = infer_rows(networks, Kernel::Polynomial, &table);
+    let mut one_by_one = vec![0.0; at_once.len()];
+    let rows = table.values.chunks_exact(inputs).zip(one_by_one.chunks_exact_mut(outputs));
+    for ((readings, places), network) in rows.zip(networks.iter().cycle()) {
+        assert!(Batch::of(network, Kernel::Polynomial).is_some());
+        infer_line(network, Kernel::Polynomial, readings, places);
+    }
+    let bits = |values: &[f64]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
+    assert_eq!(bits(&at_once), bits(&one_by_one));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    /// Of any shape, on tables of any length, with readings missing and beyond all bounds.
+    #[test]
+    fn lines_at_once_are_lines_one_by_one_bit_for_bit(
+        (inputs, centres, outputs) in (1_usize..24, 1_usize..150, 1_usize..24),
+        (networks, lines) in (1_usize..4, 0_usize..70),
+        (expanded, affine, one_width) in (any::<bool>(), any::<bool>(), any::<bool>()),
+        seed in any::<u64>(),
+    ) {
+        let mut draw = Draw(Xoshiro256PlusPlus::seed_from_u64(seed));
+        let shape = Shape { inputs, centres, outputs };
+        let words: Vec<Vec<u32>> =
+            (0..networks).map(|_| words(&mut draw, shape, expanded, affine, one_width)).collect();
+        let networks: Vec<Network<'_>> = words
+            .iter()
+            .map(|words| match expanded {
+                true => expanded::Network::try_new(shape, affine, words).unwrap().into(),
+                false => direct::Network::of_words(shape, one_width, affine, words).unwrap().into(),
+            })
+            .collect();
+        check(&networks, &mut draw, lines);
+    }
+
+    #[test]
+    fn the_clamp_is_the_saturating_conversion(bits in any::<u32>()) {
+        let scaled = f32::from_bits(bits);
+        let clamped = Expanded { decay: 0.0 }.clamp(scaled);
+        prop_assert_eq!(clamped.to_bits(), clamp_units(scaled).to_bits());
+    }
+}
+
+#[test]
+fn an_output_that_overflows_makes_its_line_nan() {
+    let mut draw = Draw(Xoshiro256PlusPlus::seed_from_u64(1));
+    let shape = Shape { inputs: 2, centres: 3, outputs: 2 };
+    let parameters = direct::Parameters {
+        input_minimum: &[40.0; 2],
+        input_per_span: &[0.025; 2],
+        centres: &[0.5; 6],
+        decay: &[5.0],
+        output_weights: &[3e38, 1.0, 3e38, 1.0, 3e38, 1.0],
+        bias: &[0.0; 2],
+        affine: &[],
+    };
+    let network = Network::from(direct::Network::try_new(shape, parameters).unwrap());
+    check(&[network], &mut draw, 50);
+    let table = Table { names: vec![String::new(); 2], values: vec![60.0, 60.0, 1e4, -1e4] };
+    let outputs = infer_rows(&[network], Kernel::Polynomial, &table);
+    assert!(outputs[..2].iter().all(|y| y.is_nan()) && outputs[2..].iter().all(|y| y.is_finite()));
+}
+
+#[test]
+fn special_inputs_are_clamped_as_by_conversion() {
+    for scaled in [0.0, -0.0, -0.5, 0.5, UNITS, -UNITS, UNITS.next_down(), f32::MAX, f32::MIN] {
+        for scaled in [scaled, scaled.next_up(), f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            let clamped = Expanded { decay: 0.0 }.clamp(scaled);
+            assert_eq!(clamped.to_bits(), clamp_units(scaled).to_bits(), "{scaled}");
+        }
+    }
+}
