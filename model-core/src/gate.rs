@@ -1,9 +1,11 @@
 //! Which rows of a frame are at rest, so that the answer for the sensor at rest serves them.
 //!
-//! A reading is at rest if it differs from the baseline by no more than a *tolerance*, relative to the
-//! baseline; a row is if all its readings are. With white noise of the relative level p, the tolerance
-//! k·p wakes an untouched row by chance in 1 − (1 − 2Q(k))^`COLS` of all frames, Q being the upper tail of
-//! the standard normal distribution. `docs/gating.md` has what that saves and what it misses.
+//! With a *tolerance* t, relative to the baseline, a row of n readings is at rest if each of them is within
+//! t of its baseline, and their sum is within t/√n of its own: a dent that is lost in the noise of
+//! each reading moves all of them the same way. With white noise of the relative level p and t = k·p, both
+//! tests have the same k; noise alone wakes an untouched row in at most 1 − (1 − 2Q(k))^(n + 1) of all
+//! frames, Q being the upper tail of the standard normal distribution (Šidák's inequality).
+//! `docs/gating.md` has what that saves and what it misses.
 
 use crate::estimate::{Estimate, RowStatus};
 use crate::frame::Frame;
@@ -18,7 +20,8 @@ use crate::frame::Frame;
 /// let rest = Estimate { outputs: [[0.01]], status: [RowStatus::Decoded] };
 /// let gate = Gate::new(&baseline, &rest, 0.02).unwrap();
 /// assert_eq!(gate.rest_outputs(0, &[50.5, 59.0]), Some(&[0.01]));
-/// assert_eq!(gate.rest_outputs(0, &[50.5, 58.0]), None); // 3 % less
+/// assert_eq!(gate.rest_outputs(0, &[50.5, 58.0]), None); // one is 3 % less
+/// assert_eq!(gate.rest_outputs(0, &[49.1, 59.0]), None); // both are nearly 2 % less
 /// assert!(Gate::new(&baseline, &rest, 0.0).is_none());
 /// ```
 #[derive(Debug, Clone, Copy)]
@@ -57,17 +60,28 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize> Gate<'a, RO
     }
 }
 
-/// Whether every reading is within `tolerance`, from 0 to 1, of a finite `baseline`. No reading is that is
-/// not a number or infinite, and none is of a baseline that is NaN or negative.
+/// Whether each of n `readings` is within `tolerance`, from 0 to 1, of a finite `baseline`, and their sum
+/// within `tolerance`/√n of its sum. A reading that is NaN or infinite is not, nor is any of a baseline that
+/// is NaN or negative.
 ///
 /// Readings beyond the shorter of the two lists are not looked at.
 #[inline(always)]
 #[expect(clippy::inline_always, reason = "lengths that are known make the loop faster")]
 #[must_use]
 pub fn is_at_rest(readings: &[f32], baseline: &[f32], tolerance: f32) -> bool {
-    // A comparison with NaN is false. It ends at the first reading that is away: on a Cortex-M4F that
-    // costs a cycle more a reading than to collect signs, and most rows that are touched show it early.
-    readings.iter().zip(baseline).all(|(r, b)| (r - b).abs() <= tolerance * b)
+    let (mut change, mut most_change) = (0.0, 0.0);
+    for (reading, rest) in readings.iter().zip(baseline) {
+        let (difference, most) = (reading - rest, tolerance * rest);
+        // Not if either is NaN. To leave at once costs no more than to collect signs, and most rows that
+        // are touched show it early.
+        let near = difference.abs() <= most;
+        if !near {
+            return false;
+        }
+        change += difference;
+        most_change += most;
+    }
+    change * change * readings.len() as f32 <= most_change * most_change
 }
 
 #[cfg(test)]
@@ -92,6 +106,21 @@ mod tests {
                 assert!(!is_at_rest(&readings, &baseline, tolerance), "{readings:?}");
             }
         }
+    }
+
+    #[test]
+    fn readings_that_change_together_are_no_rest() {
+        let baseline: [f32; 18] = core::array::from_fn(|k| 50.0 + k as f32);
+        let shifted = |share: f32| baseline.map(|ohm| ohm * (1.0 + share));
+        let most = 0.02 / 18.0_f32.sqrt();
+        for side in [-1.0, 1.0] {
+            assert!(is_at_rest(&shifted(side * 0.999 * most), &baseline, 0.02));
+            assert!(!is_at_rest(&shifted(side * 1.001 * most), &baseline, 0.02));
+        }
+        let mut opposite = baseline;
+        let signs = [0.9 * 0.02, -0.9 * 0.02].into_iter().cycle();
+        opposite.iter_mut().zip(signs).for_each(|(ohm, share)| *ohm *= 1.0 + share);
+        assert!(is_at_rest(&opposite, &baseline, 0.02));
     }
 
     #[test]
