@@ -1,5 +1,6 @@
 //! Evaluation: errors by every definition, and the tables made of them.
 
+pub mod gate;
 pub mod metrics;
 pub mod quantisation;
 pub mod readout;

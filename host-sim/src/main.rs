@@ -8,7 +8,7 @@ use host_sim::Result;
 mod commands;
 
 use commands::{
-    Common, decode, emulate, eval, forward, inspect, link, readout, run, synth, table1, train,
+    Common, decode, emulate, eval, forward, gate, inspect, link, readout, run, synth, table1, train,
 };
 
 /// Simulate, train and evaluate resistive tactile sensors; write weight blobs for the device.
@@ -35,6 +35,7 @@ enum Command {
     Inspect(inspect::Arguments),
     Table1(table1::Arguments),
     Readout(readout::Arguments),
+    Gate(gate::Arguments),
     Emulate(emulate::Arguments),
     Link(link::Arguments),
 }
@@ -52,6 +53,7 @@ fn main() -> ExitCode {
         Command::Inspect(arguments) => inspect::execute(&arguments, &cli.common),
         Command::Table1(arguments) => table1::execute(&arguments, &cli.common),
         Command::Readout(arguments) => readout::execute(&arguments, &cli.common),
+        Command::Gate(arguments) => gate::execute(&arguments, &cli.common),
         Command::Emulate(arguments) => emulate::execute(&arguments, &cli.common),
         Command::Link(arguments) => link::execute(&arguments, &cli.common),
     };

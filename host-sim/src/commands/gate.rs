@@ -130,10 +130,9 @@ fn rows(page: &mut print::Page, result: &GateResult) {
             line.largest_missed_mm.map_or("-".into(), |mm| format!("{mm:.3} mm"))
         ));
     }
-    let rows = result.lines.first().map(|line| {
-        line.missed.iter().map(|missed| format!(" {:>9}", missed.rows)).collect::<String>()
-    });
-    page.line(format_args!("{:>47}   of rows:{}\n", "", rows.unwrap_or_default()));
+    let sizes = result.lines.first().map_or(&[][..], |line| &line.missed);
+    let rows: Vec<String> = sizes.iter().map(|size| format!(" {:>9}", size.rows)).collect();
+    page.line(format_args!("{:>47}   of rows:{}\n", "", rows.concat()));
 }
 
 fn errors(page: &mut print::Page, result: &GateResult) {
