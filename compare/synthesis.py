@@ -100,4 +100,7 @@ def rows() -> list[Row]:
             batch = min(timed, key=timed.get)
             reference = f"numpy, {how}, batches of {batch}"
             table.append(Row(f"a frame of {scene}", reference, timed[batch], taxel_s))
+            if readings is axes_apart:
+                single_s = criterion_s(f"synthesis/{scene}_f32") / FRAMES
+                table.append(Row("the same, f32 in Taxel", reference, timed[batch], single_s))
     return table

@@ -5,6 +5,8 @@ use std::hint::black_box;
 use benchmarks::scene;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use host_sim::random::Stream;
+use host_sim::scene::Scene;
+use host_sim::sensor::Precision;
 use host_sim::synth::synthesise;
 
 /// Frames of one measurement; `compare/synthesis.py` divides by it.
@@ -14,10 +16,12 @@ fn frames_of_a_scene(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("synthesis");
     group.sample_size(20).throughput(Throughput::Elements(FRAMES as u64));
     for name in ["paper", "press"] {
-        let scene = scene(name);
-        group.bench_function(name, |bencher| {
-            bencher.iter(|| synthesise(black_box(&scene), Stream::Training, FRAMES));
-        });
+        for (suffix, precision) in [("", Precision::F64), ("_f32", Precision::F32)] {
+            let scene = Scene { precision, ..scene(name) };
+            group.bench_function(format!("{name}{suffix}"), |bencher| {
+                bencher.iter(|| synthesise(black_box(&scene), Stream::Training, FRAMES));
+            });
+        }
     }
     group.finish();
 }

@@ -1,12 +1,15 @@
 //! CSV files: a header of names, then one frame a line.
 
 use std::collections::HashSet;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use crate::columns;
 use crate::error::{Error, Result};
-use crate::output;
+
+mod body;
+mod write;
+
+pub use write::write;
 
 /// A CSV file, read whole. Empty fields and NaN are missing values, held as NaN.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,7 +48,9 @@ impl DataFile {
         if header.is_empty() {
             return Err(error("the file is empty: line 1 must name the columns".into()));
         }
-        if let (1, Some(line)) = (header.len(), blank_line(bytes)) {
+        if header.len() == 1
+            && let Some(line) = blank_line(bytes)
+        {
             let message = format!(
                 "line {line} is blank; in a file of one column write NaN for a missing value"
             );
@@ -63,12 +68,36 @@ impl DataFile {
                 return Err(error(message));
             }
         }
-        let mut values = Vec::with_capacity(bytes.len() / 8);
+        let lines = lines_of_data(bytes, reader.position());
+        let (digest, values) = rayon::join(
+            || crate::digest::digest(bytes),
+            || lines.and_then(|(_, lines)| body::read(lines, header.len())),
+        );
+        if let (Some((first, _)), Some(values)) = (lines, values)
+            && !values.is_empty()
+        {
+            let line_numbers = (first..).take(values.len() / header.len()).collect();
+            return Ok(Self { path: path.into(), header, digest, values, line_numbers });
+        }
+        let (values, line_numbers) = Self::read_carefully(path, bytes, &mut reader, &header)?;
+        Ok(Self { path: path.into(), header, digest, values, line_numbers })
+    }
+
+    /// Reads the lines after the header one by one, whatever they hold.
+    fn read_carefully(
+        path: &Path,
+        bytes: &[u8],
+        reader: &mut csv::Reader<&[u8]>,
+        header: &[String],
+    ) -> Result<(Vec<f64>, Vec<u64>)> {
+        let error = |message: String| Error::data(path, message);
+        let mut values = Vec::new();
         let mut line_numbers = Vec::new();
+        let mut lines = LineCount { bytes, at: 0, line: 1 };
         let mut record = csv::ByteRecord::new();
         let read_error = |e: csv::Error| error(format!("{e}; check quotes and line ends"));
         while reader.read_byte_record(&mut record).map_err(read_error)? {
-            let line = record.position().map_or(0, csv::Position::line);
+            let line = lines.of_record_at(record.position().map_or(0, csv::Position::byte));
             if record.len() != header.len() {
                 let message = format!(
                     "line {line} has {} fields; the header names {}; mend or remove the line",
@@ -77,7 +106,7 @@ impl DataFile {
                 );
                 return Err(error(message));
             }
-            for (field, name) in record.iter().zip(&header) {
+            for (field, name) in record.iter().zip(header) {
                 let value = number(field).ok_or_else(|| {
                     let field = String::from_utf8_lossy(field);
                     error(format!(
@@ -92,8 +121,7 @@ impl DataFile {
         if values.is_empty() {
             return Err(error("the file has a header but no line of data".into()));
         }
-        let digest = crate::digest::digest(bytes);
-        Ok(Self { path: path.into(), header, digest, values, line_numbers })
+        Ok((values, line_numbers))
     }
 
     /// Lines of data.
@@ -137,6 +165,41 @@ impl DataFile {
     }
 }
 
+/// Counts lines; the CSV reader's own count is one short where lines end in CR LF.
+struct LineCount<'b> {
+    bytes: &'b [u8],
+    at: usize,
+    line: u64,
+}
+
+impl LineCount<'_> {
+    /// The line (from 1) of the record that follows byte `position`, which never decreases.
+    fn of_record_at(&mut self, position: u64) -> u64 {
+        let is_end = |byte: u8| matches!(byte, b'\r' | b'\n');
+        while let Some(&byte) = self.bytes.get(self.at)
+            && ((self.at as u64) < position || is_end(byte))
+        {
+            self.at += 1;
+            let ends = byte == b'\n' || byte == b'\r' && self.bytes.get(self.at) != Some(&b'\n');
+            self.line += u64::from(ends);
+        }
+        self.line
+    }
+}
+
+/// The number (from 1) of the first line after the header, and the lines; nothing where they cannot be
+/// told from the header.
+fn lines_of_data<'b>(bytes: &'b [u8], position: &csv::Position) -> Option<(u64, &'b [u8])> {
+    let (header, lines) = bytes.split_at_checked(usize::try_from(position.byte()).ok()?)?;
+    let (end, lines) = match (header.last()?, lines.strip_prefix(b"\n")) {
+        (b'\n', _) => (0, lines),
+        (b'\r', Some(lines)) => (1, lines),
+        _ => return None,
+    };
+    let ended = memchr::memchr_iter(b'\n', header).count() + end;
+    Some((ended as u64 + 1, lines))
+}
+
 /// The first blank line (from 1) that is followed by another that is not.
 fn blank_line(bytes: &[u8]) -> Option<usize> {
     let is_blank = |line: &[u8]| line.iter().all(u8::is_ascii_whitespace);
@@ -154,39 +217,5 @@ fn number(field: &[u8]) -> Option<f64> {
     text.parse::<f64>().ok().filter(|value| !value.is_infinite())
 }
 
-/// Writes a CSV file: `names`, then `lines`. Every number reads back as the same f64; NaN becomes
-/// an empty field.
-///
-/// # Errors
-/// [`Error::Write`]; `path` is then as it was before.
-pub fn write<'n, L: IntoIterator<Item = f64>>(
-    path: &Path,
-    names: impl IntoIterator<Item = &'n str>,
-    lines: impl IntoIterator<Item = L>,
-) -> Result<()> {
-    output::write_whole(path, |file| {
-        let mut header = csv::Writer::from_writer(&mut *file);
-        let header_written = header.write_record(names).and_then(|()| Ok(header.flush()?));
-        drop(header);
-        header_written.map_err(|e| Error::write(path, e.into()))?;
-        let mut text = String::new();
-        for line in lines {
-            text.clear();
-            for value in line {
-                if !value.is_nan() {
-                    use std::fmt::Write as _;
-                    // Shortest digits that read back as the same number.
-                    let _ = write!(text, "{value}");
-                }
-                text.push(',');
-            }
-            text.pop();
-            if text.is_empty() {
-                text.push_str("NaN"); // a blank line would be no line
-            }
-            text.push('\n');
-            file.write_all(text.as_bytes()).map_err(|cause| Error::write(path, cause))?;
-        }
-        Ok(())
-    })
-}
+#[cfg(test)]
+mod tests;

@@ -34,6 +34,7 @@ pub mod data_file;
 pub mod dataset;
 pub mod device;
 pub mod digest;
+mod elementary;
 pub mod emulator;
 pub mod error;
 pub mod evaluate;

@@ -9,6 +9,10 @@
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+mod block;
+
+pub use block::RandomBlock;
+
 /// What draws are for. Different purposes never share numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Purpose {
@@ -59,7 +63,7 @@ impl Random {
 
     /// Uniform on [0, 1).
     pub fn unit(&mut self) -> f64 {
-        (self.generator.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
+        unit(self.generator.next_u64())
     }
 
     /// Uniform on [`low`, `high`).
@@ -84,9 +88,19 @@ impl Random {
     }
 }
 
+/// Uniform on [0, 1): the upper 53 bits over 2^53.
+#[inline(always)]
+fn unit(bits: u64) -> f64 {
+    (bits >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+/// How far SplitMix64's state moves on with every number.
+const SPLIT_MIX_STEP: u64 = 0x9e37_79b9_7f4a_7c15;
+
 /// One step of SplitMix64 (Steele, Lea & Flood, 2014).
+#[inline(always)]
 fn split_mix(state: u64) -> u64 {
-    let mut z = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let mut z = state.wrapping_add(SPLIT_MIX_STEP);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     z ^ (z >> 31)

@@ -9,7 +9,7 @@ use serde::Deserialize;
 
 use crate::error::{Error, Result};
 use crate::number_format::NumberFormat;
-use crate::sensor::{self, Axis, Sensor, Vector3};
+use crate::sensor::{self, Axis, Precision, Sensor, Vector3};
 
 mod file;
 mod names;
@@ -34,6 +34,8 @@ pub struct Scene {
     pub digest: u64,
     /// Seed of every random draw.
     pub seed: u64,
+    /// How precisely readings are computed.
+    pub precision: Precision,
     /// Geometry and material.
     pub sensor: Sensor,
     /// What moves.

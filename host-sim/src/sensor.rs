@@ -7,6 +7,10 @@
 
 use serde::{Deserialize, Serialize};
 
+mod block;
+
+pub use block::{BlockModel, Precision, Scratch};
+
 /// Direction in the sensor's frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -99,7 +103,7 @@ impl Sensor {
     }
 
     /// Resistances in Ω between row-wire `row` and every column-wire, for the deformation of that
-    /// row's electrodes (which is all they depend on).
+    /// row's electrodes (which is all they depend on). The formula as it stands; [`BlockModel`] is quick.
     ///
     /// # Panics
     /// If the slices do not have one entry an electrode and one a column-wire.

@@ -203,10 +203,11 @@ impl<'b> Samples<'b> {
     }
 }
 
-/// Trains one network a row-wire of `dataset`.
+/// Trains one network a row-wire of `dataset`, all of one format: direct distances if
+/// [`NumberFormat::F32`] is asked for and one row's bound does not prove expanded ones harmless.
 ///
 /// # Errors
-/// [`Error::Usage`] for options that do not fit the data, and data that does not fit f32.
+/// [`Error::Usage`] for options that do not fit the data, and data that does not fit the format.
 pub fn train(
     dataset: &Dataset,
     options: &Options,
@@ -214,9 +215,9 @@ pub fn train(
 ) -> Result<Vec<FittedNetwork>> {
     options.check(dataset.frames())?;
     progress.stage("train", dataset.rows);
-    (0..dataset.rows)
-        .into_par_iter()
-        .map(|row| {
+    let fit_rows = |options: &Options| -> Result<Vec<FittedNetwork>> {
+        let rows = (0..dataset.rows).into_par_iter();
+        rows.map(|row| {
             let block = dataset.block(row);
             let samples = Samples::new(&block);
             let centres = samples.centres(options, row);
@@ -225,6 +226,14 @@ pub fn train(
             fitted
         })
         .collect()
+    };
+    let fitted = fit_rows(options)?;
+    let formats = || fitted.iter().map(FittedNetwork::format);
+    if formats().all(|format| Some(format) == formats().next()) {
+        return Ok(fitted);
+    }
+    progress.stage("train with direct distances", dataset.rows);
+    fit_rows(&Options { format: NumberFormat::F32Direct, ..*options })
 }
 
 /// ‖a − b‖².

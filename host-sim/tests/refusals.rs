@@ -42,6 +42,7 @@ fn bad_scenes() {
         ("dent_radius_mm = [2.0, 5.0]", "dent_radius_mm = [0.0, 5.0]", &["dent_radius_mm"]),
         ("kind = \"press\"", "kind = \"hit\"", &["unknown variant `hit`", "press"]),
         ("kind = \"relative\"", "kind = \"pink\"", &["unknown variant `pink`", "span"]),
+        ("seed = 1", "precision = \"f16\"", &["unknown variant `f16`", "f64"]),
         ("level = 0.005", "level = 5.0", &["noise.level = 5", "0.005 is 0.5 %"]),
         ("row_wires = [4, 5]", "row_wires = [0]", &["readout.row_wires = [0]", "from 1 to 8"]),
         ("row_wires = [4, 5]", "row_wires = [9]", &["readout.row_wires = [9]"]),

@@ -7,6 +7,7 @@ use crate::estimate::{Estimate, RowStatus};
 use crate::exp::{ExpKernel, Polynomial};
 use crate::frame::Frame;
 use crate::gate::Gate;
+use crate::rbf::{Finite, Network};
 
 /// RAM in bytes that a [`Decoder`] of so many `rows` takes on a 32-bit target, whatever its K: slices
 /// into the blob. The link check of the firmware holds it to the compiler.
@@ -38,6 +39,9 @@ pub struct Decoder<
 impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKernel>
     Decoder<'a, ROWS, COLS, OUTPUTS, E>
 {
+    /// Of every model that is loaded; known to the compiler, which then has little left to check.
+    const SHAPE: ModelShape = ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS };
+
     /// Checks a blob as [`load`](Self::load) does, and leaves it at that.
     ///
     /// # Errors
@@ -45,7 +49,7 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKerne
     pub fn check(blob: &'a [u8]) -> Result<Model<'a>, DecodeError> {
         const { assert!(ROWS > 0 && COLS > 0 && OUTPUTS > 0, "a sensor has rows, columns, outputs") }
         let model = Model::decode(blob)?;
-        let expected = ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS };
+        let expected = Self::SHAPE;
         if model.shape() == expected {
             Ok(model)
         } else {
@@ -118,12 +122,10 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKerne
                 *status = RowStatus::AtRest;
                 continue;
             }
-            *status = match section.network(self.model.shape()) {
-                _ if !all_finite(readings) => RowStatus::MissingReading,
-                Ok(network) => match network.infer::<E>(readings, &mut scaled, outputs) {
-                    Ok(()) if network.is_bounded() || all_finite(outputs) => RowStatus::Decoded,
-                    _ => RowStatus::Overflow,
-                },
+            *status = match section.network_of_shape(Self::SHAPE) {
+                Ok(network) => {
+                    decode_row::<E, COLS, OUTPUTS>(&network, readings, &mut scaled, outputs)
+                }
                 // Not so: it was there when the model was loaded.
                 Err(_) => RowStatus::MissingReading,
             };
@@ -141,7 +143,29 @@ fn copy<const N: usize>(from: &[f32; N], to: &mut [f32; N]) {
     to_rest.iter_mut().zip(from_rest).for_each(|(to, from)| *to = *from);
 }
 
+#[inline(always)]
+#[expect(clippy::inline_always, reason = "so that a network is not copied into memory")]
+fn decode_row<E: ExpKernel, const COLS: usize, const OUTPUTS: usize>(
+    network: &Network<'_>,
+    readings: &[f32; COLS],
+    scaled: &mut [f32; COLS],
+    outputs: &mut [f32; OUTPUTS],
+) -> RowStatus {
+    let bounded = network.is_bounded();
+    if !bounded && !all_finite(readings) {
+        return RowStatus::MissingReading;
+    }
+    match network.infer_and_tell::<E>(readings, scaled, outputs) {
+        Ok(Finite::Known) => RowStatus::Decoded,
+        Ok(Finite::Unknown) if bounded && all_finite(readings) => RowStatus::Decoded,
+        Ok(Finite::Unknown) if bounded => RowStatus::MissingReading,
+        Ok(Finite::Unknown) if all_finite(outputs) => RowStatus::Decoded,
+        Ok(Finite::Unknown) | Err(_) => RowStatus::Overflow,
+    }
+}
+
 /// Whether all `values` are finite, without a branch for each: a carry out of the exponent tells.
+#[inline(never)]
 fn all_finite<const N: usize>(values: &[f32; N]) -> bool {
     const EXPONENT: u32 = 0x7F80_0000;
     const LAST_PLACE: u32 = 0x0080_0000;

@@ -110,6 +110,16 @@ impl Format {
     }
 }
 
+/// Whether the readings of an inference were finite.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Finite {
+    /// All were.
+    #[cfg_attr(not(cortex_m4f), expect(dead_code, reason = "assembly alone tells on the side"))]
+    Known,
+    /// That did not come to light.
+    Unknown,
+}
+
 /// A network of any format, whose parameters have been checked against its shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Network<'a> {
@@ -233,17 +243,29 @@ impl<'a> Network<'a> {
         scaled: &mut [f32],
         output: &mut [f32],
     ) -> Result<(), NetworkError> {
+        self.infer_and_tell::<E>(reading, scaled, output).map(drop)
+    }
+
+    /// As [`infer`](Self::infer); tells besides what came to light of the readings.
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
+    pub(crate) fn infer_and_tell<E: ExpKernel>(
+        &self,
+        reading: &[f32],
+        scaled: &mut [f32],
+        output: &mut [f32],
+    ) -> Result<Finite, NetworkError> {
         check_length("reading", reading, self.shape().inputs)?;
         self.check_buffers(scaled, output)?;
-        match self {
+        Ok(match self {
             Self::F32Direct(inner) => {
                 inner.scale(reading, scaled);
                 inner.infer_scaled::<E>(scaled, output);
+                Finite::Unknown
             }
             Self::F32(inner) => inner.infer(reading, scaled, output),
             Self::Fixed16(inner) => inner.infer(reading, scaled, output),
-        }
-        Ok(())
+        })
     }
 
     /// The first half of [`infer`](Self::infer): readings in the format's own unit of inputs, before its

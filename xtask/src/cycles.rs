@@ -1,5 +1,5 @@
 //! What decoding costs on a Cortex-M4: exact instructions from QEMU, cycles by a model of the
-//! processor. `docs/cycles.md` explains both, and holds the figures that were accepted.
+//! processor. `docs/cycles.md` explains both, and has the figures that were accepted.
 
 mod accepted;
 mod budget;
@@ -18,17 +18,20 @@ use std::fs;
 use std::path::Path;
 
 use crate::emulate::qemu;
-use crate::firmware::{QEMU, build_image};
+use crate::firmware::{BENCH, build_image};
 use crate::process::{Outcome, root, target_dir};
 use crate::toolchain::{Toolchain, elf};
+use accepted::Accepted;
 use code::Code;
-use figures::Figures;
+use figures::Figure;
+use models::Blob;
 pub use options::Options;
 
 /// The image that is measured.
 const IMAGE: &str = "qemu-bench";
 
-/// Where the accepted figures are.
+/// Where the accepted figures are, and the tables that are made from them.
+const DATA: &str = "firmware/cycles.csv";
 const DOCUMENT: &str = "docs/cycles.md";
 
 /// Measures, prints, and compares with budgets and accepted figures.
@@ -38,93 +41,106 @@ pub fn run(options: &Options<'_>) -> Outcome {
     }
     qemu::present()?;
     let toolchain = Toolchain::find()?;
-    build_image(&toolchain, QEMU)?;
+    build_image(&toolchain, BENCH)?;
     let image = elf(IMAGE);
     let code = Code::read(&image)?;
-    if let Some(model) = options.model {
-        let figures = chosen(measure(&image, &code, Path::new(model))?, options)?;
-        print(&figures, options);
+    let directory = target_dir().join("cycles");
+    let blobs = match options.model {
+        Some(model) => models::of_file(Path::new(model), &directory)?,
+        None => models::train(&directory)?,
+    };
+    let mut measured = Vec::new();
+    for blob in &blobs {
+        measured.extend(measure(&image, &code, blob)?);
+    }
+    let measured = chosen(in_order(measured), options)?;
+    if options.json {
+        print!("{}", table::json(&measured));
+    } else {
+        print!("{}", table::aligned(&measured));
+    }
+    if options.model.is_some() {
         return Ok(());
     }
-
-    let mut measured = Vec::new();
-    for model in models::write(&target_dir().join("cycles"))? {
-        measured.extend(measure(&image, &code, &model)?);
-    }
-    // Kernel by kernel, each in the order of K.
-    let mut order: Vec<String> = Vec::new();
-    for figures in &measured {
-        if !order.contains(&figures.kernel) {
-            order.push(figures.kernel.clone());
-        }
-    }
-    measured.sort_by_key(|figures| order.iter().position(|kernel| *kernel == figures.kernel));
-    let everything = options.kernel.is_none();
-    let measured = chosen(measured, options)?;
-    print(&measured, options);
     let over_budget = budget::exceeded(&measured);
     if !over_budget.is_empty() {
         return Err(over_budget.join("; "));
     }
-    if everything { hold_to_accepted(&measured, &toolchain.compiler()?, options) } else { Ok(()) }
+    if options.kernel.is_some() {
+        return Ok(());
+    }
+    hold_to_accepted(&measured, &toolchain.compiler()?, options)
 }
 
-fn measure(image: &Path, code: &Code, model: &Path) -> Outcome<Vec<Figures>> {
-    eprintln!("measuring {}", model.display());
-    let figures = machine::run(image, code, model)
-        .and_then(|run| figures::of_run(&run.log, &run.counts))
-        .map_err(|cause| format!("{}: {cause}", model.display()))?;
+fn measure(image: &Path, code: &Code, blob: &Blob) -> Outcome<Vec<Figure>> {
+    let path = &blob.path;
+    eprintln!("measuring {}", path.display());
+    let figures = machine::run(image, code, path)
+        .and_then(|run| figures::of_run(&run.log, &run.counts, blob.affine))
+        .map_err(|cause| format!("{}: {cause}", path.display()))?;
     if figures.is_empty() {
-        return Err(format!("{}: no kernel of the image decodes it", model.display()));
+        return Err(format!("{}: no kernel of the image decodes it", path.display()));
     }
     Ok(figures)
 }
 
+/// Kernel by kernel as they came, and each K by K.
+fn in_order(mut figures: Vec<Figure>) -> Vec<Figure> {
+    let mut order: Vec<String> = Vec::new();
+    for figure in &figures {
+        if !order.contains(&figure.kernel) {
+            order.push(figure.kernel.clone());
+        }
+    }
+    let place = |figure: &Figure| order.iter().position(|kernel| *kernel == figure.kernel);
+    figures.sort_by_key(|figure| (place(figure), figure.centres));
+    figures
+}
+
 /// Those of the kernel that was asked for, or all.
-fn chosen(figures: Vec<Figures>, options: &Options<'_>) -> Outcome<Vec<Figures>> {
+fn chosen(figures: Vec<Figure>, options: &Options<'_>) -> Outcome<Vec<Figure>> {
     let Some(kernel) = options.kernel else { return Ok(figures) };
     let (chosen, others): (Vec<_>, Vec<_>) =
-        figures.into_iter().partition(|figures| figures.kernel == kernel);
+        figures.into_iter().partition(|figure| figure.kernel == kernel);
     if chosen.is_empty() {
-        let mut others: Vec<_> = others.into_iter().map(|figures| figures.kernel).collect();
+        let mut others: Vec<_> = others.into_iter().map(|figure| figure.kernel).collect();
         others.dedup();
         return Err(format!("--kernel {kernel}: measured were {}", others.join(", ")));
     }
     Ok(chosen)
 }
 
-fn print(figures: &[Figures], options: &Options<'_>) {
-    if options.json {
-        print!("{}", table::json(figures));
-    } else {
-        print!("{}", table::aligned(figures));
-    }
-}
-
 /// Compares with the figures for `compiler`, or writes them.
-fn hold_to_accepted(measured: &[Figures], compiler: &str, options: &Options<'_>) -> Outcome {
-    let path = root().join(DOCUMENT);
-    let document = fs::read_to_string(&path).map_err(|cause| format!("{DOCUMENT}: {cause}"))?;
+fn hold_to_accepted(measured: &[Figure], compiler: &str, options: &Options<'_>) -> Outcome {
+    let of = |file: &str, cause: String| format!("{file}: {cause}");
+    let read = |file: &str| {
+        fs::read_to_string(root().join(file)).map_err(|cause| of(file, cause.to_string()))
+    };
+    let mut accepted = Accepted::parse(&read(DATA)?).map_err(|cause| of(DATA, cause))?;
     if options.accept {
-        let document = accepted::write(&document, compiler, measured);
-        return fs::write(&path, document).map_err(|cause| format!("{DOCUMENT}: {cause}"));
+        accepted.replace(compiler, measured);
+        let document = read(DOCUMENT)?;
+        let document = accepted.in_document(&document).map_err(|cause| of(DOCUMENT, cause))?;
+        return [(DATA, accepted.data()), (DOCUMENT, document)].into_iter().try_for_each(
+            |(file, text)| {
+                fs::write(root().join(file), text).map_err(|cause| of(file, cause.to_string()))
+            },
+        );
     }
-    let accepted =
-        accepted::read(&document, compiler).map_err(|cause| format!("{DOCUMENT}: {cause}"))?;
-    let Some(accepted) = accepted else {
+    let Some(accepted) = accepted.of(&accepted::in_csv(compiler)) else {
         eprintln!(
-            "{DOCUMENT} has no figures for {compiler}: held to the budgets alone. To accept these, \
+            "{DATA} has no figures for {compiler}: held to the budgets alone. To accept these, \
              cargo xtask cycles --accept"
         );
         return Ok(());
     };
-    let differences = accepted::differences(&accepted, measured);
+    let differences = accepted::differences(accepted, measured);
     if differences.is_empty() {
-        eprintln!("as accepted in {DOCUMENT} for {compiler}");
+        eprintln!("as accepted in {DATA} for {compiler}");
         Ok(())
     } else {
         Err(format!(
-            "other than accepted in {DOCUMENT} for {compiler}:\n  {}\nif this is meant, cargo xtask \
+            "other than accepted in {DATA} for {compiler}:\n  {}\nif this is meant, cargo xtask \
              cycles --accept",
             differences.join("\n  ")
         ))

@@ -14,6 +14,10 @@ type Packages = &'static [&'static str];
 /// The emulator's programs.
 pub const QEMU: Packages = &["--package", "qemu-image", "--features", "programs"];
 
+/// The image that `cargo xtask cycles` measures: one of them, built as the others are.
+pub const BENCH: Packages =
+    &["--package", "qemu-image", "--features", "programs", "--bin", "qemu-bench"];
+
 /// The image of the board.
 pub const NUCLEO: Packages = &["--package", "nucleo-f446re"];
 

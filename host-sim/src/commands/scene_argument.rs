@@ -6,6 +6,7 @@ use clap::Args;
 use host_sim::model::{self, LoadedModel};
 use host_sim::progress::Progress;
 use host_sim::scene::Scene;
+use host_sim::sensor::Precision;
 use host_sim::{Error, Result};
 
 use super::Common;
@@ -18,11 +19,14 @@ pub struct SceneArgument {
     /// A built-in scene (paper, press) or the path of a scene file.
     #[arg(default_value = DEFAULT_SCENE)]
     scene: String,
+    /// How precisely the sensor's readings are computed, instead of the scene's way.
+    #[arg(long, value_enum)]
+    precision: Option<Precision>,
 }
 
 impl Default for SceneArgument {
     fn default() -> Self {
-        Self { scene: DEFAULT_SCENE.into() }
+        Self { scene: DEFAULT_SCENE.into(), precision: None }
     }
 }
 
@@ -31,6 +35,7 @@ impl SceneArgument {
     pub fn load(&self, common: &Common) -> Result<Scene> {
         let mut scene = Scene::load(&self.scene)?;
         scene.seed = common.seed.unwrap_or(scene.seed);
+        scene.precision = self.precision.unwrap_or(scene.precision);
         Ok(scene)
     }
 

@@ -86,6 +86,8 @@ pub struct Chart {
     pub series: Vec<Series>,
     /// Ranges of x that are shaded, to tell neighbours apart.
     pub bands: Vec<[f64; 2]>,
+    /// Words below points.
+    pub notes: Vec<([f64; 2], String)>,
     /// Whether names stand at the right end of the lines instead of in a legend.
     pub end_labels: bool,
 }
@@ -136,6 +138,10 @@ impl Chart {
             svg.open(&opacity(series));
             frame.draw_series(&mut svg, series);
             svg.close();
+        }
+        for ([x, y], note) in &self.notes {
+            let below = frame.y(*y) + TEXT_PX + 5.0;
+            svg.text(frame.x(*x), below, Anchor::Middle, "note-in-chart", note);
         }
         if self.end_labels {
             frame.draw_end_labels(&mut svg);
@@ -357,6 +363,7 @@ mod tests {
             y: Axis::linear("y", ticks::linear([-1.0, 1.0], 4)),
             series: vec![Series::new("", "c1", mark, points)],
             bands: vec![],
+            notes: vec![],
             end_labels: false,
         }
     }

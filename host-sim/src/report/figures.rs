@@ -57,6 +57,7 @@ pub fn readings(result: &RunResult) -> Figure {
             Series::new("noisy, as decoded", "c1", Mark::Points(Shape::Circle), noisy),
         ],
         bands: vec![],
+        notes: vec![],
         end_labels: false,
     };
     let noise_ohm = difference(&example.noisy_ohm, &example.ideal_ohm);
@@ -69,6 +70,7 @@ pub fn readings(result: &RunResult) -> Figure {
         ),
         series: vec![Series::new("", "c1", Mark::Bars(0.6), numbered(&noise_ohm))],
         bands: vec![],
+        notes: vec![],
         end_labels: false,
     };
     Figure {
@@ -122,6 +124,7 @@ pub fn by_electrode(result: &RunResult) -> Figure {
                 Series::new("decoded", "c1", Mark::Points(Shape::Circle), estimate),
             ],
             bands,
+            notes: vec![],
             end_labels: false,
         }
     };
@@ -168,6 +171,7 @@ pub fn error_by_electrode(result: &RunResult) -> Figure {
             ),
             series: vec![Series::new("", "c2", Mark::Bars(0.7), numbered(&error(output)))],
             bands,
+            notes: vec![],
             end_labels: false,
         }
     };
@@ -281,6 +285,7 @@ pub fn error_by_noise(table: &Table1, group: &str, unit: &str) -> Figure {
             Series::new("linear", "c3 broken", Mark::LineAnd(Shape::Triangle), linear),
         ],
         bands: vec![],
+        notes: vec![],
         end_labels: true,
     };
     let tail = if table.affine_tail { " and an affine tail" } else { "" };
@@ -334,6 +339,7 @@ pub fn error_by_spread(table: &Table1, group: &str, unit: &str) -> Figure {
         x: Axis::linear("spread σ on scaled inputs", x),
         series,
         bands: vec![],
+        notes: vec![],
         end_labels: true,
     };
     Figure {
@@ -374,6 +380,7 @@ pub fn by_row_wire(result: &RunResult) -> Figure {
             ),
             series: vec![Series::new("", "c1", Mark::Bars(0.64), numbered(&values))],
             bands: vec![],
+            notes: vec![],
             end_labels: false,
         };
         drawing += &chart.draw([300.0, 230.0]);

@@ -145,6 +145,8 @@ pub enum Shape {
     Diamond,
     /// A short level bar.
     Dash,
+    /// A circle around another mark.
+    Ring,
 }
 
 impl Shape {
@@ -156,6 +158,10 @@ impl Shape {
             Self::Circle => {
                 let (r, d) = (px(3.6), px(7.2));
                 format!("{}a{r} {r} 0 1 0 {d} 0a{r} {r} 0 1 0 -{d} 0Z", start(-3.6, 0.0))
+            }
+            Self::Ring => {
+                let (r, d) = (px(7.5), px(15.0));
+                format!("{}a{r} {r} 0 1 0 {d} 0a{r} {r} 0 1 0 -{d} 0Z", start(-7.5, 0.0))
             }
             Self::Square => {
                 let side = px(6.4);

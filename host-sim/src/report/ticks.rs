@@ -44,18 +44,24 @@ pub fn linear(values: impl IntoIterator<Item = f64>, wanted: usize) -> Ticks {
     Ticks { low: tick(first), high: tick(last), at: at.collect() }
 }
 
-/// 1-2-5 ticks inside a logarithmic range that leaves some room around all positive `values`.
-/// Labels are in per cent: the only logarithmic quantity is the noise level.
+/// As [`logarithmic`], of noise levels.
 pub fn logarithmic_percent(values: impl IntoIterator<Item = f64>) -> Ticks {
+    logarithmic(values, super::format::percent)
+}
+
+/// 1-2-5 ticks (closer ones within a decade) inside a logarithmic range that leaves some room around all positive `values`.
+pub fn logarithmic(values: impl IntoIterator<Item = f64>, label: impl Fn(f64) -> String) -> Ticks {
     let positive = values.into_iter().filter(|value| *value > 0.0);
     let (low, high) = extent(positive).unwrap_or((0.01, 0.1));
     let room = (high / low).powf(0.08).max(1.2);
     let (low, high) = (low / room, high * room);
+    let mantissas: &[f64] =
+        if high / low < 12.0 { &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0] } else { &[1.0, 2.0, 5.0] };
     let decades = low.log10().floor() as i32..=high.log10().ceil() as i32;
     let at = decades
-        .flat_map(|decade| [1.0, 2.0, 5.0].map(|mantissa| mantissa * 10_f64.powi(decade)))
+        .flat_map(|decade| mantissas.iter().map(move |mantissa| mantissa * 10_f64.powi(decade)))
         .filter(|value| (low..=high).contains(value))
-        .map(|value| (value, super::format::percent(value)));
+        .map(|value| (value, label(value)));
     Ticks { low, high, at: at.collect() }
 }
 

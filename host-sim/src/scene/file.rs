@@ -3,7 +3,8 @@
 use serde::Deserialize;
 
 use super::{
-    Deformation, Noise, Outputs, Readout, Scene, Sensor, Table1, Training, Vector3, sensor,
+    Deformation, Noise, Outputs, Precision, Readout, Scene, Sensor, Table1, Training, Vector3,
+    sensor,
 };
 
 #[derive(Deserialize)]
@@ -12,6 +13,8 @@ pub(super) struct SceneFile {
     name: String,
     #[serde(default = "default_seed")]
     seed: u64,
+    #[serde(default)]
+    precision: Precision,
     sensor: SensorFile,
     deformation: Deformation,
     noise: Noise,
@@ -82,6 +85,7 @@ impl SceneFile {
             name: self.name,
             digest,
             seed: self.seed,
+            precision: self.precision,
             sensor,
             deformation: self.deformation,
             noise: self.noise,

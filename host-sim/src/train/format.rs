@@ -51,6 +51,12 @@ impl FittedNetwork {
         })
     }
 
+    /// The format that it was fitted for.
+    #[must_use]
+    pub fn format(&self) -> Format {
+        self.format
+    }
+
     /// The network, ready to infer.
     ///
     /// # Panics

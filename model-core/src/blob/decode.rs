@@ -314,8 +314,14 @@ impl<'a> NetworkSection<'a> {
     }
 
     /// The network; its values are not looked at.
-    #[inline]
     pub fn network(&self, shape: ModelShape) -> Result<Network<'a>, NetworkError> {
+        self.network_of_shape(shape)
+    }
+
+    /// As [`network`](Self::network), for a `shape` that the compiler knows.
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "a decoder knows the shape when it is compiled")]
+    pub fn network_of_shape(&self, shape: ModelShape) -> Result<Network<'a>, NetworkError> {
         let shape = network_shape(shape, self.centres);
         let Self { common_width, affine, block, .. } = *self;
         match self.format {

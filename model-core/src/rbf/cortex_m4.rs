@@ -3,7 +3,7 @@
 
 use core::mem::MaybeUninit;
 
-use super::{expanded, fixed16};
+use super::{Finite, expanded, fixed16};
 
 /// The sizes that the assembly is written for.
 const INPUTS: usize = 18;
@@ -41,14 +41,23 @@ unsafe extern "C" {
         fours: u32,
         flags: u32,
         activations: *mut [f32; MOST_CENTRES_AT_ONCE],
-    );
+    ) -> u32;
     fn taxel_fixed16(
         inputs: *const [f32; INPUTS],
         block: *const u32,
         output: *mut [f32; OUTPUTS],
         sixteens: u32,
         flags: u32,
-    );
+    ) -> u32;
+}
+
+impl Finite {
+    /// From the floating-point status behind a kernel: a conversion to integers that saturates, or meets
+    /// NaN, is an invalid operation, and no other operation of a kernel is.
+    fn of_status(fpscr: u32) -> Self {
+        const INVALID_OPERATION: u32 = 1;
+        if fpscr & INVALID_OPERATION == 0 { Self::Known } else { Self::Unknown }
+    }
 }
 
 /// Bits of `flags`.
@@ -60,7 +69,7 @@ pub(super) fn expanded(
     network: &expanded::Network<'_>,
     inputs: Inputs<'_>,
     output: &mut [f32; OUTPUTS],
-) {
+) -> Finite {
     let (inputs, scaled) = inputs.parts();
     let fours = (network.shape().centres + 3) / 4;
     let flags = u32::from(network.has_affine_tail()) * AFFINE | scaled;
@@ -69,7 +78,14 @@ pub(super) fn expanded(
     // shape against INPUTS and OUTPUTS; activations are written, 128 at most, before they are read.
     unsafe {
         let block = network.block().as_ptr();
-        taxel_f32(inputs, block, output, fours as u32, flags, activations.as_mut_ptr());
+        Finite::of_status(taxel_f32(
+            inputs,
+            block,
+            output,
+            fours as u32,
+            flags,
+            activations.as_mut_ptr(),
+        ))
     }
 }
 
@@ -78,10 +94,12 @@ pub(super) fn fixed16(
     network: &fixed16::Network<'_>,
     inputs: Inputs<'_>,
     output: &mut [f32; OUTPUTS],
-) {
+) -> Finite {
     let (inputs, scaled) = inputs.parts();
     let sixteens = (network.shape().centres + 15) / 16;
     let flags = u32::from(network.has_affine_tail()) * AFFINE | scaled;
     // SAFETY: as in `expanded`.
-    unsafe { taxel_fixed16(inputs, network.block().as_ptr(), output, sixteens as u32, flags) }
+    let status =
+        unsafe { taxel_fixed16(inputs, network.block().as_ptr(), output, sixteens as u32, flags) };
+    Finite::of_status(status)
 }

@@ -24,6 +24,8 @@
 @ Flags
     .equ AFFINE, 1
     .equ SCALED, 2
+@ Of the FPSCR
+    .equ INVALID_OPERATION, 1
 
 @ s0..s17 = s0..s17 \operation the 18 numbers at \at, which is used up.
     .macro with_eighteen operation, at
@@ -50,9 +52,13 @@
     .endm
 
 @ s0..s17 = the inputs at r0 as integers in UNITS, saturated; r1 goes from the block's start, where middles and
-@ units are, to what follows these. r0 is used up.
+@ units are, to what follows these. r0 and r3 are used up.
+@ The invalid-operation flag is cleared before: after, it tells that an input was saturated or no number.
     .macro inputs flags
+    vmrs r3, fpscr
     vldmia r0, {s0-s17}
+    bic r3, r3, #INVALID_OPERATION
+    vmsr fpscr, r3
     tst \flags, #SCALED
     bne 5f
     mov r0, r1
@@ -180,10 +186,10 @@
     vadd.f32 s17, s17, s29
     .endm
 
-@ void taxel_f32(inputs: *const f32 [18], block: *const u32, output: *mut f32 [18], fours: u32 ≥ 1,
+@ u32 taxel_f32(inputs: *const f32 [18], block: *const u32, output: *mut f32 [18], fours: u32 ≥ 1,
 @                flags: u32, activations: *mut f32 [128])
 @ output = A·x + Σ_k weights_k · 2^(exponents_k[0] + exponents_k[1..]·x − decay·‖x‖²) + bias, with the
-@ parameters in the block as expanded.rs says.
+@ parameters in the block as expanded.rs says. Returns the FPSCR.
     .equ F32_SHARED, 72
     .equ F32_BIAS, 76
     .equ F32_FRAME, 80
@@ -294,6 +300,7 @@
     vldmia r2, {s16-s22}
     mov r2, r7
     mov r3, r9
+taxel_f32_powers: @ to its end: what one exponential costs is counted here
 4:
     vldmia r2, {s0-s3}
     vadd.f32 s4, s0, s22
@@ -341,6 +348,7 @@
     subs r3, #1
     stmia r2!, {r0, r1, r8, r12}
     bne 4b
+taxel_f32_powers_end:
 
     mov r0, r5
     mov r1, r7
@@ -358,6 +366,7 @@
 6:
     ldr r1, [sp, #F32_BIAS]
     with_eighteen vadd, r1
+    vmrs r0, fpscr
     vstmia r6, {s0-s17}
     add sp, #F32_FRAME
     vpop {s16-s31}
@@ -450,19 +459,19 @@ f32_sums:
     pkhtb \pair, r2, r1, asr #16
     .endm
 
-@ void taxel_fixed16(inputs: *const f32 [18], block: *const u32, output: *mut f32 [18], sixteens: u32 ≥ 1,
+@ u32 taxel_fixed16(inputs: *const f32 [18], block: *const u32, output: *mut f32 [18], sixteens: u32 ≥ 1,
 @                    flags: u32)
 @ output = (bias + A·x + Σ_k weights_k · 2^-(exponents_k[0] + exponents_k[1..]·x + decay·‖x‖²/2^34)) · scale,
-@ with the parameters in the block as fixed16.rs says.
+@ with the parameters in the block as fixed16.rs says. Returns the FPSCR.
     function taxel_fixed16
     push {r4-r11, lr}
     vpush {s16-s31}
     sub sp, #FX_FRAME
     ldr lr, [sp, #FX_ARGUMENTS]
     str r2, [sp, #FX_OUTPUT]
+    str r3, [sp, #FX_SIXTEENS]
     inputs lr
     mov r0, r1
-    str r3, [sp, #FX_SIXTEENS]
     fixed16_input r4, s0, s1
     fixed16_input r5, s2, s3
     fixed16_input r6, s4, s5
@@ -472,6 +481,7 @@ f32_sums:
     fixed16_input r10, s12, s13
     fixed16_input r11, s14, s15
     fixed16_input r12, s16, s17
+    ldr r3, [sp, #FX_SIXTEENS]
     cmp r3, #1
     beq 3f
     stmia sp, {r4-r12}
@@ -567,6 +577,7 @@ f32_sums:
     ldr r1, [sp, #FX_SCALE]
     ldr r2, [sp, #FX_OUTPUT]
     with_eighteen vmul, r1
+    vmrs r0, fpscr
     vstmia r2, {s0-s17}
     add sp, #FX_FRAME
     vpop {s16-s31}

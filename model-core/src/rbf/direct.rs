@@ -72,6 +72,8 @@ impl<'a> Network<'a> {
 
     /// As [`try_new`](Self::try_new), without the pass over all values: for parameters that
     /// passed it before.
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "a decoder knows the shape when it is compiled")]
     pub(crate) fn with_lengths_checked(
         shape: Shape,
         parameters: Parameters<'a>,
@@ -142,6 +144,8 @@ impl<'a> Network<'a> {
     }
 
     /// The network whose arrays follow each other in `block`; values are not looked at.
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "a decoder knows the shape when it is compiled")]
     pub(crate) fn from_block(
         shape: Shape,
         common_width: bool,

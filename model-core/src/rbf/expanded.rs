@@ -9,7 +9,9 @@
 //! Inputs are in [`UNITS`]. b + a·x − g‖x‖² adds up in four interleaved partial sums, the first opened by b,
 //! the second by −g‖x‖². Centres are stored in fours; the last may be fill.
 
-use super::{Cut, NetworkError, Shape, accumulate, check_finite, check_length, check_spans};
+use super::{
+    Cut, Finite, NetworkError, Shape, accumulate, check_finite, check_length, check_spans,
+};
 use crate::exp::exp2;
 use crate::scale::{HALF_RANGE, UNITS, clamp_units};
 
@@ -72,6 +74,8 @@ impl<'a> Network<'a> {
     }
 
     /// As [`try_new`](Self::try_new), without the pass over all values: for a block that passed it before.
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "a decoder knows the shape when it is compiled")]
     pub(crate) fn with_length_checked(
         shape: Shape,
         affine: bool,
@@ -86,6 +90,7 @@ impl<'a> Network<'a> {
 
     /// Words of the block of a network of this shape.
     #[must_use]
+    #[inline]
     pub fn block_words(shape: Shape, affine: bool) -> usize {
         let Shape { inputs, centres, outputs } = shape;
         let stored = centres.next_multiple_of(CENTRES_AT_ONCE);
@@ -186,7 +191,7 @@ impl<'a> Network<'a> {
 
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "callers rely on it for constant lengths")]
-    pub(super) fn infer(&self, reading: &[f32], scaled: &mut [f32], output: &mut [f32]) {
+    pub(super) fn infer(&self, reading: &[f32], scaled: &mut [f32], output: &mut [f32]) -> Finite {
         #[cfg(cortex_m4f)]
         if let (Ok(reading), Ok(output)) = (reading.try_into(), (&mut *output).try_into()) {
             return super::cortex_m4::expanded(
@@ -197,6 +202,7 @@ impl<'a> Network<'a> {
         }
         self.scale(reading, scaled);
         self.infer_scaled(scaled, output);
+        Finite::Unknown
     }
 
     #[inline(always)]
@@ -204,11 +210,8 @@ impl<'a> Network<'a> {
     pub(super) fn infer_scaled(&self, scaled: &mut [f32], output: &mut [f32]) {
         #[cfg(cortex_m4f)]
         if let (Ok(scaled), Ok(output)) = ((&*scaled).try_into(), (&mut *output).try_into()) {
-            return super::cortex_m4::expanded(
-                self,
-                super::cortex_m4::Inputs::Scaled(scaled),
-                output,
-            );
+            super::cortex_m4::expanded(self, super::cortex_m4::Inputs::Scaled(scaled), output);
+            return;
         }
         self.infer_scaled_portably(scaled, output);
     }

@@ -15,7 +15,7 @@
 
 use core::f32::consts::LOG2_E;
 
-use super::{Cut, NetworkError, Shape, check_finite, check_length, check_spans};
+use super::{Cut, Finite, NetworkError, Shape, check_finite, check_length, check_spans};
 use crate::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP, clamp_steps};
 
 /// Centres are stored in multiples of this.
@@ -92,6 +92,8 @@ impl<'a> Network<'a> {
     }
 
     /// As [`try_new`](Self::try_new), without the pass over all values: for a block that passed it before.
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "a decoder knows the shape when it is compiled")]
     pub(crate) fn with_length_checked(
         shape: Shape,
         affine: bool,
@@ -109,6 +111,7 @@ impl<'a> Network<'a> {
 
     /// Words of the block of a network of this shape.
     #[must_use]
+    #[inline]
     pub fn block_words(shape: Shape, affine: bool) -> usize {
         let Shape { inputs, centres, outputs } = shape;
         let pairs = inputs.div_ceil(2);
@@ -220,7 +223,7 @@ impl<'a> Network<'a> {
 
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "callers rely on it for constant lengths")]
-    pub(super) fn infer(&self, reading: &[f32], scaled: &mut [f32], output: &mut [f32]) {
+    pub(super) fn infer(&self, reading: &[f32], scaled: &mut [f32], output: &mut [f32]) -> Finite {
         #[cfg(cortex_m4f)]
         if let (Ok(reading), Ok(output)) = (reading.try_into(), (&mut *output).try_into()) {
             return super::cortex_m4::fixed16(
@@ -231,6 +234,7 @@ impl<'a> Network<'a> {
         }
         self.scale(reading, scaled);
         self.infer_scaled(scaled, output);
+        Finite::Unknown
     }
 
     #[inline(always)]
@@ -238,11 +242,8 @@ impl<'a> Network<'a> {
     pub(super) fn infer_scaled(&self, scaled: &mut [f32], output: &mut [f32]) {
         #[cfg(cortex_m4f)]
         if let (Ok(scaled), Ok(output)) = ((&*scaled).try_into(), (&mut *output).try_into()) {
-            return super::cortex_m4::fixed16(
-                self,
-                super::cortex_m4::Inputs::Scaled(scaled),
-                output,
-            );
+            super::cortex_m4::fixed16(self, super::cortex_m4::Inputs::Scaled(scaled), output);
+            return;
         }
         self.infer_scaled_portably(scaled, output);
     }
@@ -282,6 +283,7 @@ impl<'a> Network<'a> {
 }
 
 /// Words of [`Parameters::centres`] that sixteen centres take.
+#[inline]
 fn words_at_once(shape: Shape) -> usize {
     CENTRES_AT_ONCE
         .saturating_mul(1 + shape.inputs.div_ceil(2))

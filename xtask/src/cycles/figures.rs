@@ -1,6 +1,6 @@
 //! What was measured: from the counts of regions and what the image says they are.
 
-use super::regions::Count;
+use super::regions::{Count, Region};
 use crate::process::Outcome;
 
 /// Regions whose cost is known, in the order in which the image runs them.
@@ -12,28 +12,91 @@ const EMPTY: Count = Count { instructions: 1, cycles: 3 };
 /// `mov r0, #1000`, then 1000 times `subs` and `bne`: 1 + 1000 + 999·(1 + 2) + 1 cycles.
 const LOOP: Count = Count { instructions: 2001, cycles: 3999 };
 
-/// The scopes that every kernel is measured in, in the image's order.
-const SCOPES: [&str; 3] = ["inference", "row", "frame"];
+/// The part of decoding that a figure is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scope {
+    /// One row's outputs from scaled inputs.
+    Inference,
+    /// Of an inference, the powers of two of all centres, where they are a loop of their own.
+    Exponential,
+    /// One row's outputs from readings in ohm.
+    Row,
+    /// All rows' outputs from a frame.
+    Frame,
+}
 
-/// What one kernel costs with one model.
+impl Scope {
+    const ALL: [Self; 4] = [Self::Inference, Self::Exponential, Self::Row, Self::Frame];
+
+    /// Those that every kernel is measured in, in the image's order.
+    const OF_IMAGE: [Self; 3] = [Self::Inference, Self::Row, Self::Frame];
+
+    /// As the image and the accepted figures have it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Inference => "inference",
+            Self::Exponential => "exponential",
+            Self::Row => "row",
+            Self::Frame => "frame",
+        }
+    }
+
+    /// The scope of this name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|scope| scope.name() == name)
+    }
+}
+
+/// What one kernel costs in one scope with one model.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Figures {
+pub struct Figure {
     pub kernel: String,
     /// K.
     pub centres: u64,
-    /// One row's outputs from scaled inputs, without the affine tail.
-    pub inference: Count,
-    /// One row's outputs from readings in ohm.
-    pub row: Count,
-    /// All rows' outputs from a frame.
-    pub frame: Count,
+    /// Whether the model has an affine tail.
+    pub affine: bool,
+    pub scope: Scope,
+    pub count: Count,
 }
 
-/// Puts the `counts` of a run's regions together with the names in its `log`.
+impl Figure {
+    /// Whether both are of the same.
+    pub fn is_of(&self, other: &Self) -> bool {
+        let of = |figure: &Self| (figure.centres, figure.affine, figure.scope);
+        self.kernel == other.kernel && of(self) == of(other)
+    }
+}
+
+/// All that was measured of one kernel and K.
+#[derive(Clone, Copy)]
+pub struct Group<'f>(&'f [Figure]);
+
+impl<'f> Group<'f> {
+    /// The groups in `figures`, which stand kernel by kernel and K by K.
+    pub fn of(figures: &'f [Figure]) -> impl Iterator<Item = Self> {
+        figures.chunk_by(|a, b| (&a.kernel, a.centres) == (&b.kernel, b.centres)).map(Self)
+    }
+
+    pub fn kernel(self) -> &'f str {
+        self.0.first().map_or("", |figure| &figure.kernel)
+    }
+
+    pub fn centres(self) -> u64 {
+        self.0.first().map_or(0, |figure| figure.centres)
+    }
+
+    pub fn count(self, affine: bool, scope: Scope) -> Option<Count> {
+        let wanted = |figure: &&Figure| (figure.affine, figure.scope) == (affine, scope);
+        self.0.iter().find(wanted).map(|figure| figure.count)
+    }
+}
+
+/// Puts the `counts` of a run's regions together with the names in its `log`; the run's model has a tail if
+/// `affine`. An inference is one without.
 ///
 /// # Errors
 /// They do not fit one another, or what is known from the start was not counted so.
-pub fn of_run(log: &str, counts: &[Count]) -> Outcome<Vec<Figures>> {
+pub fn of_run(log: &str, counts: &[Region], affine: bool) -> Outcome<Vec<Figure>> {
     let named = |what: &'static str| {
         log.lines().filter_map(move |line| line.strip_prefix("INFO ")?.strip_prefix(what))
     };
@@ -50,11 +113,11 @@ pub fn of_run(log: &str, counts: &[Count]) -> Outcome<Vec<Figures>> {
     else {
         return Err(format!("the image did not calibrate; it logged\n{log}"));
     };
-    if *names != CALIBRATION || *empty != EMPTY || without(*loops, EMPTY) != LOOP {
+    let (empty, loops) = (empty.whole, without(loops.whole, EMPTY));
+    if *names != CALIBRATION || empty != EMPTY || loops != LOOP {
         return Err(format!(
             "the count is wrong: of an empty region {empty:?}, expected {EMPTY:?}; of a known loop \
-             {:?}, expected {LOOP:?}",
-            without(*loops, EMPTY)
+             {loops:?}, expected {LOOP:?}"
         ));
     }
     let centres = named("centres ").next().and_then(|centres| centres.parse().ok());
@@ -64,16 +127,27 @@ pub fn of_run(log: &str, counts: &[Count]) -> Outcome<Vec<Figures>> {
     if !scopes.1.is_empty() {
         return Err(format!("a kernel lacks a scope:\n{log}"));
     }
-    let kernels = scopes.0.iter().zip(counts.0);
-    let figures = kernels.map(|(names, counts)| {
+    let mut figures = Vec::new();
+    for (names, counts) in scopes.0.iter().zip(counts.0) {
         let kernel = names[0].split(' ').next().unwrap_or_default();
-        if *names != SCOPES.map(|scope| format!("{kernel} {scope}")) {
-            return Err(format!("the scopes are not {}:\n{log}", SCOPES.join(", ")));
+        if *names != Scope::OF_IMAGE.map(|scope| format!("{kernel} {}", scope.name())) {
+            let scopes = Scope::OF_IMAGE.map(Scope::name).join(", ");
+            return Err(format!("the scopes are not {scopes}:\n{log}"));
         }
-        let [inference, row, frame] = counts.map(|count| without(count, EMPTY));
-        Ok(Figures { kernel: kernel.to_owned(), centres, inference, row, frame })
-    });
-    figures.collect()
+        for scope in Scope::ALL {
+            let count = match scope {
+                Scope::Inference if !affine => without(counts[0].whole, EMPTY),
+                Scope::Exponential if !affine && counts[0].watched != Count::default() => {
+                    counts[0].watched
+                }
+                Scope::Inference | Scope::Exponential => continue,
+                Scope::Row => without(counts[1].whole, EMPTY),
+                Scope::Frame => without(counts[2].whole, EMPTY),
+            };
+            figures.push(Figure { kernel: kernel.to_owned(), centres, affine, scope, count });
+        }
+    }
+    Ok(figures)
 }
 
 fn without(count: Count, less: Count) -> Count {
@@ -90,17 +164,33 @@ mod tests {
     const LOG: &str = "INFO region calibration empty\nINFO region calibration loop\n\
         INFO centres 16\nINFO region a inference\nINFO region a row\nINFO region a frame\n";
 
-    fn counts(pairs: &[(u64, u64)]) -> Vec<Count> {
-        pairs.iter().map(|&(instructions, cycles)| Count { instructions, cycles }).collect()
+    fn counts(pairs: &[(u64, u64)]) -> Vec<Region> {
+        let count = |&(instructions, cycles)| Count { instructions, cycles };
+        pairs.iter().map(|pair| Region { whole: count(pair), ..Region::default() }).collect()
     }
 
     #[test]
     fn what_an_empty_region_costs_is_taken_off() {
-        let counts = counts(&[(1, 3), (2002, 4002), (11, 23), (21, 43), (31, 63)]);
+        let mut counts = counts(&[(1, 3), (2002, 4002), (11, 23), (21, 43), (31, 63)]);
+        let figure = |affine, scope, n| Figure {
+            kernel: "a".into(),
+            centres: 16,
+            affine,
+            scope,
+            count: Count { instructions: n, cycles: 2 * n },
+        };
         let [inference, row, frame] =
-            [10, 20, 30].map(|n| Count { instructions: n, cycles: 2 * n });
-        let figures = Figures { kernel: "a".into(), centres: 16, inference, row, frame };
-        assert_eq!(of_run(LOG, &counts), Ok(vec![figures]));
+            [(Scope::Inference, 10), (Scope::Row, 20), (Scope::Frame, 30)]
+                .map(|(scope, n)| figure(false, scope, n));
+        let expected = vec![inference.clone(), row.clone(), frame.clone()];
+        assert_eq!(of_run(LOG, &counts, false), Ok(expected));
+
+        counts[2].watched = Count { instructions: 5, cycles: 10 };
+        let expected = vec![inference, figure(false, Scope::Exponential, 5), row, frame];
+        assert_eq!(of_run(LOG, &counts, false), Ok(expected));
+
+        let expected = vec![figure(true, Scope::Row, 20), figure(true, Scope::Frame, 30)];
+        assert_eq!(of_run(LOG, &counts, true), Ok(expected));
     }
 
     #[test]
@@ -108,14 +198,15 @@ mod tests {
         for (empty, loops) in
             [((2, 3), (2002, 4002)), ((1, 3), (2002, 4001)), ((1, 2), (2002, 4002))]
         {
-            let error = of_run(LOG, &counts(&[empty, loops, (1, 3), (1, 3), (1, 3)])).unwrap_err();
+            let counts = counts(&[empty, loops, (1, 3), (1, 3), (1, 3)]);
+            let error = of_run(LOG, &counts, false).unwrap_err();
             assert!(error.starts_with("the count is wrong: "), "{error}");
         }
     }
 
     #[test]
     fn regions_without_a_name_are_refused() {
-        let error = of_run(LOG, &counts(&[(1, 3), (2002, 4002)])).unwrap_err();
+        let error = of_run(LOG, &counts(&[(1, 3), (2002, 4002)]), false).unwrap_err();
         assert!(error.starts_with("2 regions were counted, 5 named"), "{error}");
     }
 }

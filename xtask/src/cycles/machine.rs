@@ -7,7 +7,7 @@ use std::thread;
 use std::time::Duration;
 
 use super::code::Code;
-use super::regions::{Count, Regions};
+use super::regions::{Region, Regions};
 use super::trace;
 use crate::emulate::qemu::{QEMU, decode, machine, reader, table, wait};
 use crate::process::Outcome;
@@ -15,6 +15,9 @@ use crate::process::Outcome;
 /// Functions of the image that mark its regions (`firmware/qemu/src/bench/region.rs`).
 const BEGIN: &str = "region_begin";
 const END: &str = "region_end";
+
+/// What is watched of the image: where `taxel_f32` takes powers of two (`model-core/src/rbf/cortex_m4.s`).
+const WATCHED: [&str; 2] = ["taxel_f32_powers", "taxel_f32_powers_end"];
 
 /// Where the image expects a model.
 const SLOT: [&str; 2] = ["_slot_a_start", "_slot_a_end"];
@@ -25,7 +28,7 @@ const LIMIT: Duration = Duration::from_mins(5);
 /// What a program did.
 pub struct Run {
     /// What its regions executed, in their order.
-    pub counts: Vec<Count>,
+    pub counts: Vec<Region>,
     /// What it logged.
     pub log: String,
 }
@@ -42,6 +45,7 @@ pub fn run(elf: &Path, code: &Code, model: &Path) -> Outcome<Run> {
         return Err(format!("{length} bytes; the image's slot has room for {room}"));
     }
     let (begin, end) = (code.symbol(BEGIN)?, code.symbol(END)?);
+    let watched = code.symbol(WATCHED[0])?..code.symbol(WATCHED[1])?;
     let table = table(elf)?;
 
     let mut command = machine(elf);
@@ -55,7 +59,7 @@ pub fn run(elf: &Path, code: &Code, model: &Path) -> Outcome<Run> {
     let (status, traced) = thread::scope(|scope| {
         let traced = scope.spawn(|| {
             let trace = trace.ok_or_else(|| format!("{QEMU} has no trace"))?;
-            let mut regions = Regions::new(code, begin, end);
+            let mut regions = Regions::new(code, begin, end).watching(watched);
             let complaints = trace::follow(BufReader::with_capacity(1 << 16, trace), &mut regions)?;
             Ok::<_, String>((complaints, regions.finish()))
         });

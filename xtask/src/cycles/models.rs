@@ -1,164 +1,226 @@
-//! The models that are measured: of the paper's shape, one network for all rows, drawn at random
-//! from a fixed seed, so that they are the same everywhere.
+//! The models that are measured: of the scene press, as `host-sim train` makes them, in every format.
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Stdio;
 
-use model_core::blob::{
-    Columns, Floats, Metadata, ModelParts, NoiseKind, encode, encoded_length_bound,
-};
-use model_core::rbf::Shape;
-use model_core::rbf::direct::{Network, Parameters};
+use model_core::blob::{Model, ModelParts, encode, encoded_length_bound};
+use model_core::rbf::{Format, Network, direct, expanded, fixed16};
 
-use crate::process::Outcome;
-
-const ROWS: usize = 8;
-const INPUTS: usize = 18;
-const OUTPUTS: usize = 18;
+use crate::process::{Outcome, cargo, run};
 
 /// K.
 const CENTRES: [usize; 5] = [16, 32, 64, 128, 256];
 
-/// σ of every centre, on scaled inputs.
-const WIDTH: f32 = 0.7;
+/// What is trained on: noise enough that widths and weights stay where every format holds them, and a few
+/// more frames than there are centres.
+const TRAINING: [&str; 7] = ["train", "press", "-n", "500", "--noise", "0.05", "--output"];
 
-/// Readings run from here to here in ohm.
-const READINGS_OHM: [f32; 2] = [50.0, 70.0];
+/// A model to be measured.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Blob {
+    pub path: PathBuf,
+    /// Whether it has an affine tail.
+    pub affine: bool,
+}
 
-/// Kinds of blob, each with what encodes a network so.
-const KINDS: [(&str, Encode); 1] = [("f32-direct", encode_direct)];
-
-type Encode = fn(&[Network<'_>]) -> Outcome<Vec<u8>>;
-
-/// Writes a blob of every kind and size into `directory`.
-pub fn write(directory: &Path) -> Outcome<Vec<PathBuf>> {
-    let failed = |path: &Path, cause| format!("{}: {cause}", path.display());
-    fs::create_dir_all(directory).map_err(|cause| failed(directory, cause))?;
-    let mut paths = Vec::new();
-    for (kind, encode) in KINDS {
+/// Trains a model of every format and size in `directory`, and writes it twice: with its affine tail and
+/// without. All rows have the first row's network, so that the largest fits the image's slot.
+///
+/// # Errors
+/// `host-sim` fails, or makes another model than it is asked for.
+pub fn train(directory: &Path) -> Outcome<Vec<Blob>> {
+    fs::create_dir_all(directory).map_err(|cause| failed(directory, &cause))?;
+    let mut blobs = Vec::new();
+    for format in Format::ALL {
         for centres in CENTRES {
-            let path = directory.join(format!("{kind}-{centres}.bin"));
-            let blob = Drawn::new(centres).encoded(encode)?;
-            fs::write(&path, blob).map_err(|cause| failed(&path, cause))?;
-            paths.push(path);
+            let stem = format!("{}-{centres}", format.name());
+            let trained = directory.join(format!("{stem}-trained.bin"));
+            let mut command = cargo(&["run", "--quiet", "--package", "host-sim", "--"]);
+            command.args(TRAINING).arg(&trained).args(["--format", format.name(), "--centres"]);
+            // What it says of the model is not what this command prints.
+            run(command.arg(centres.to_string()).stdout(Stdio::null()))?;
+            let bytes = Bytes::read(&trained)?;
+            let model = bytes.model().map_err(|cause| failed(&trained, &cause))?;
+            is_as_asked(&model, format, centres).map_err(|cause| failed(&trained, &cause))?;
+            for (affine, suffix) in [(false, ""), (true, "-affine")] {
+                let path = directory.join(format!("{stem}{suffix}.bin"));
+                write(&path, &rewritten(&model, Rows::AsTheFirst, affine)?)?;
+                blobs.push(Blob { path, affine });
+            }
         }
     }
-    Ok(paths)
+    Ok(blobs)
 }
 
-/// Numbers without a pattern, the same everywhere: the upper half of a linear congruential
-/// generator (Knuth's MMIX).
-struct Numbers(u64);
-
-impl Numbers {
-    /// In [0, 1).
-    fn uniform(&mut self) -> f32 {
-        self.0 =
-            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 40) as f32 / (1 << 24) as f32
+/// The blob at `path` and, if it has an affine tail, the same without it, written into `directory`.
+///
+/// # Errors
+/// It is no sound blob.
+pub fn of_file(path: &Path, directory: &Path) -> Outcome<Vec<Blob>> {
+    let bytes = Bytes::read(path)?;
+    let model = bytes.model().map_err(|cause| failed(path, &cause))?;
+    let affine = model.networks().any(|network| network.has_affine_tail());
+    let given = Blob { path: path.to_owned(), affine };
+    if !affine {
+        return Ok(vec![given]);
     }
-
-    /// Of mean 0 and standard deviation 1, nearly: twelve uniform numbers added (Irwin and Hall).
-    fn normal(&mut self) -> f32 {
-        (0..12).map(|_| self.uniform()).sum::<f32>() - 6.0
-    }
-
-    fn normals(&mut self, count: usize, deviation: f32) -> Vec<f32> {
-        (0..count).map(|_| deviation * self.normal()).collect()
-    }
+    fs::create_dir_all(directory).map_err(|cause| failed(directory, &cause))?;
+    let without = directory.join("without-tail.bin");
+    write(&without, &rewritten(&model, Rows::AsTheyAre, false)?)?;
+    Ok(vec![Blob { path: without, affine: false }, given])
 }
 
-/// A network's parameters.
-struct Drawn {
-    shape: Shape,
-    input_minimum: Vec<f32>,
-    input_per_span: Vec<f32>,
-    centres: Vec<f32>,
-    decay: [f32; 1],
-    output_weights: Vec<f32>,
-    bias: Vec<f32>,
-    affine: Vec<f32>,
-}
-
-impl Drawn {
-    fn new(centres: usize) -> Self {
-        let mut numbers = Numbers(centres as u64);
-        let [lowest, highest] = READINGS_OHM;
-        Self {
-            shape: Shape { inputs: INPUTS, centres, outputs: OUTPUTS },
-            input_minimum: vec![lowest; INPUTS],
-            input_per_span: vec![1.0 / (highest - lowest); INPUTS],
-            centres: (0..centres * INPUTS).map(|_| numbers.uniform()).collect(),
-            decay: [1.0 / (2.0 * WIDTH * WIDTH)],
-            output_weights: numbers.normals(centres * OUTPUTS, 1.0 / (centres as f32).sqrt()),
-            bias: numbers.normals(OUTPUTS, 0.1),
-            affine: Vec::new(),
-        }
-    }
-
-    fn encoded(&self, encode: Encode) -> Outcome<Vec<u8>> {
-        let parameters = Parameters {
-            input_minimum: &self.input_minimum,
-            input_per_span: &self.input_per_span,
-            centres: &self.centres,
-            decay: &self.decay,
-            output_weights: &self.output_weights,
-            bias: &self.bias,
-            affine: &self.affine,
-        };
-        let network =
-            Network::try_new(self.shape, parameters).map_err(|cause| cause.to_string())?;
-        encode(&[network])
-    }
-}
-
-fn encode_direct(networks: &[Network<'_>]) -> Outcome<Vec<u8>> {
-    let (inputs, outputs) = (["x"; ROWS * INPUTS].join("\n"), ["y"; ROWS * OUTPUTS].join("\n"));
-    let zeros = [0.0; ROWS * OUTPUTS];
-    let parts = ModelParts {
-        networks: &networks.iter().map(|network| (*network).into()).collect::<Vec<_>>(),
-        row_network: &[0; ROWS],
-        metadata: Metadata {
-            name: "cycles",
-            scene_digest: 0,
-            noise_kind: NoiseKind::None,
-            noise_level: 0.0,
-            seed: 0,
-            training_frames: 0,
-            thickness_mm: 0.0,
-            input_names: Columns(&inputs),
-            input_units: Columns(&inputs),
-            output_names: Columns(&outputs),
-            output_units: Columns(&outputs),
-            training_rmse: Floats::of(&zeros),
-            full_scale: Floats::of(&zeros),
-        },
+fn is_as_asked(model: &Model<'_>, format: Format, centres: usize) -> Outcome {
+    let other = |network: &Network<'_>| {
+        let found = (network.format(), network.shape().centres, network.has_affine_tail());
+        (found != (format, centres, true)).then(|| (found.0.name(), found.1, found.2))
     };
-    // A blob must lie at a multiple of four.
-    let mut room = vec![0; encoded_length_bound(&parts) + 3];
-    let start = room.as_ptr().align_offset(4);
-    let room = room.get_mut(start..).unwrap_or_default();
-    encode(&parts, room).map(<[u8]>::to_vec).map_err(|cause| cause.to_string())
+    match model.networks().find_map(|network| other(&network)) {
+        None => Ok(()),
+        Some((found, found_centres, tail)) => Err(format!(
+            "asked for {} with {centres} centres and an affine tail, host-sim made {found} with \
+             {found_centres} centres, tail: {tail}",
+            format.name()
+        )),
+    }
+}
+
+/// Which networks the rows have.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Rows {
+    AsTheyAre,
+    AsTheFirst,
+}
+
+/// The same model with other rows, or without its affine tail.
+fn rewritten(model: &Model<'_>, rows: Rows, affine: bool) -> Outcome<Vec<u8>> {
+    let count = if rows == Rows::AsTheFirst { 1 } else { model.network_count() };
+    let words: Vec<Vec<u32>> =
+        model.networks().take(count).map(|network| words(&network, affine)).collect();
+    let networks = model.networks().zip(&words);
+    let networks: Vec<Network<'_>> = networks
+        .map(|(network, words)| of_words(&network, affine, words))
+        .collect::<Outcome<_>>()?;
+    let row_network: Vec<u8> = (0..model.shape().rows)
+        .map(|row| {
+            if rows == Rows::AsTheFirst { 0 } else { model.network_of_row(row).unwrap_or(0) as u8 }
+        })
+        .collect();
+    let parts =
+        ModelParts { networks: &networks, row_network: &row_network, metadata: *model.metadata() };
+    let mut room = Bytes::zeros(encoded_length_bound(&parts));
+    encode(&parts, room.bytes_mut()).map(<[u8]>::to_vec).map_err(|cause| cause.to_string())
+}
+
+/// A network's block, with its tail only if `affine`.
+fn words(network: &Network<'_>, affine: bool) -> Vec<u32> {
+    match network {
+        Network::F32Direct(network) => {
+            let mut parameters = *network.parameters();
+            parameters.affine = if affine { parameters.affine } else { &[] };
+            parameters.words().collect()
+        }
+        Network::F32(network) => {
+            let mut parameters = network.parameters();
+            parameters.affine = if affine { parameters.affine } else { &[] };
+            parameters.words().collect()
+        }
+        Network::Fixed16(network) => {
+            let mut parameters = network.parameters();
+            parameters.affine = if affine { parameters.affine } else { &[] };
+            parameters.words().collect()
+        }
+    }
+}
+
+fn of_words<'w>(network: &Network<'_>, affine: bool, words: &'w [u32]) -> Outcome<Network<'w>> {
+    let (shape, affine) = (network.shape(), affine && network.has_affine_tail());
+    let network = match network {
+        Network::F32Direct(network) => {
+            let common_width = network.parameters().decay.len() == 1;
+            direct::Network::of_words(shape, common_width, affine, words).map(Network::from)
+        }
+        Network::F32(_) => expanded::Network::try_new(shape, affine, words).map(Network::from),
+        Network::Fixed16(_) => fixed16::Network::try_new(shape, affine, words).map(Network::from),
+    };
+    network.map_err(|cause| cause.to_string())
+}
+
+/// Bytes at a multiple of four, where a blob must lie.
+struct Bytes {
+    room: Vec<u8>,
+    start: usize,
+}
+
+impl Bytes {
+    fn zeros(length: usize) -> Self {
+        let mut room = vec![0; length + 3];
+        let start = room.as_ptr().align_offset(4).min(3);
+        room.truncate(start + length);
+        Self { room, start }
+    }
+
+    fn of(blob: &[u8]) -> Self {
+        let mut bytes = Self::zeros(blob.len());
+        bytes.bytes_mut().copy_from_slice(blob);
+        bytes
+    }
+
+    fn read(path: &Path) -> Outcome<Self> {
+        let blob = fs::read(path).map_err(|cause| failed(path, &cause))?;
+        Ok(Self::of(&blob))
+    }
+
+    fn bytes_mut(&mut self) -> &mut [u8] {
+        self.room.get_mut(self.start..).unwrap_or_default()
+    }
+
+    fn model(&self) -> Outcome<Model<'_>> {
+        let bytes = self.room.get(self.start..).unwrap_or_default();
+        Model::decode(bytes).map_err(|cause| cause.to_string())
+    }
+}
+
+fn write(path: &Path, blob: &[u8]) -> Outcome {
+    fs::write(path, blob).map_err(|cause| failed(path, &cause))
+}
+
+fn failed(path: &Path, cause: &impl ToString) -> String {
+    format!("{}: {}", path.display(), cause.to_string())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Figures are compared with those of other machines: the models must be the same there.
     #[test]
-    fn the_models_are_the_same_everywhere() {
-        let blob = Drawn::new(16).encoded(encode_direct).unwrap();
-        let crc = blob.last_chunk().copied().map(u32::from_le_bytes);
-        assert_eq!((blob.len(), crc), (6188, Some(0x3DD7_7D55)));
+    fn a_model_without_its_tail_is_otherwise_the_same() {
+        let bytes = Bytes::read(&crate::process::root().join("testdata/hand-made.bin")).unwrap();
+        let model = bytes.model().unwrap();
+        let with = rewritten(&model, Rows::AsTheyAre, true).unwrap();
+        assert_eq!(with, bytes.room[bytes.start..]);
+
+        let without = Bytes::of(&rewritten(&model, Rows::AsTheFirst, false).unwrap());
+        let without = without.model().unwrap();
+        assert_eq!((model.network_count(), without.network_count()), (2, 1));
+        assert_eq!(without.metadata(), model.metadata());
+        let (Some(Network::F32Direct(before)), Some(Network::F32Direct(after))) =
+            (model.networks().next(), without.networks().next())
+        else {
+            panic!("another format");
+        };
+        let expected = direct::Parameters { affine: &[], ..*before.parameters() };
+        assert_eq!(*after.parameters(), expected);
     }
 
     #[test]
-    fn the_draws_are_spread_as_they_should_be() {
-        let mut numbers = Numbers(1);
-        let drawn = numbers.normals(10_000, 1.0);
-        let mean = drawn.iter().sum::<f32>() / drawn.len() as f32;
-        let variance = drawn.iter().map(|x| (x - mean).powi(2)).sum::<f32>() / drawn.len() as f32;
-        assert!(mean.abs() < 0.05 && (variance - 1.0).abs() < 0.05, "{mean}, {variance}");
+    fn a_model_of_another_kind_than_asked_for_is_refused() {
+        let bytes = Bytes::read(&crate::process::root().join("testdata/hand-made.bin")).unwrap();
+        let model = bytes.model().unwrap();
+        assert_eq!(is_as_asked(&model, Format::F32Direct, 12), Ok(()));
+        assert!(is_as_asked(&model, Format::F32Direct, 16).is_err());
+        let error = is_as_asked(&model, Format::F32, 12).unwrap_err();
+        assert!(error.starts_with("asked for f32 with 12 centres"), "{error}");
     }
 }

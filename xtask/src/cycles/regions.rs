@@ -5,6 +5,7 @@
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
+use std::ops::Range;
 
 use super::code::Code;
 use super::cost::cycles;
@@ -17,6 +18,21 @@ pub struct Count {
     pub instructions: u64,
     /// By the cost model.
     pub cycles: u64,
+}
+
+impl Count {
+    fn add(&mut self, cycles: u64) {
+        self.instructions += 1;
+        self.cycles += cycles;
+    }
+}
+
+/// What was executed in one region.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Region {
+    pub whole: Count,
+    /// Of it, what lies where [`Regions::watching`] says.
+    pub watched: Count,
 }
 
 /// Where the program is.
@@ -35,12 +51,13 @@ pub struct Regions<'c> {
     decoded: HashMap<u32, Instruction>,
     begin: u32,
     end: u32,
+    watched: Range<u32>,
     place: Place,
     /// The last address: what it costs depends on the next one.
     pending: Option<u32>,
     previous: Option<Instruction>,
-    count: Count,
-    counted: Vec<Count>,
+    count: Region,
+    counted: Vec<Region>,
 }
 
 impl<'c> Regions<'c> {
@@ -51,12 +68,18 @@ impl<'c> Regions<'c> {
             decoded: HashMap::new(),
             begin,
             end,
+            watched: 0..0,
             place: Place::Outside,
             pending: None,
             previous: None,
-            count: Count::default(),
+            count: Region::default(),
             counted: Vec::new(),
         }
+    }
+
+    /// The same, with what lies at the addresses `watched` counted besides.
+    pub fn watching(self, watched: Range<u32>) -> Self {
+        Self { watched, ..self }
     }
 
     /// The instruction at `address` is about to be executed.
@@ -84,7 +107,7 @@ impl<'c> Regions<'c> {
     ///
     /// # Errors
     /// The program ended within one.
-    pub fn finish(self) -> Outcome<Vec<Count>> {
+    pub fn finish(self) -> Outcome<Vec<Region>> {
         if self.place == Place::Outside {
             Ok(self.counted)
         } else {
@@ -113,7 +136,7 @@ impl<'c> Regions<'c> {
         if self.place == Place::Starting {
             if branched {
                 self.place = Place::Inside;
-                self.count = Count::default();
+                self.count = Region::default();
                 self.previous = None;
             }
             return Ok(());
@@ -122,12 +145,15 @@ impl<'c> Regions<'c> {
             return Err(format!("region {} starts another", self.counted.len() + 1));
         }
         let cost = cycles(&instruction, self.previous.as_ref(), branched);
-        self.count.cycles += cost.ok_or_else(|| {
+        let cost = cost.ok_or_else(|| {
             format!(
                 "the instruction at {address:#010x} has no place in a region: it stops the core"
             )
         })?;
-        self.count.instructions += 1;
+        self.count.whole.add(cost);
+        if self.watched.contains(&address) {
+            self.count.watched.add(cost);
+        }
         self.previous = Some(instruction);
         if next == self.end {
             self.counted.push(self.count);

@@ -1,137 +1,180 @@
-//! Figures as text: a table for people, which can be read back, and JSON.
+//! Figures as text: tables for people, and JSON.
 
-use super::figures::Figures;
+use super::figures::{Figure, Group, Scope};
 use super::regions::Count;
-use crate::process::Outcome;
 
 /// The clock that times are given for: an STM32F4's at its usual highest.
 const CLOCK_MHZ: f64 = 168.0;
 
-/// Marks columns of numbers, in Markdown.
-const RULE: &str = "|---|--:|--:|--:|--:|--:|--:|--:|--:|";
+const HEAD: &str = "\
+| kernel | K | inference: instructions | cycles | row | frame | µs at 168 MHz | with tail: row | frame | µs |
+|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|
+";
 
-const HEAD: &str = "| kernel | K | inference: instructions | cycles | row: instructions | cycles | \
-                    frame: instructions | cycles | µs at 168 MHz |";
+const SAVED_HEAD: &str = "\
+| kernel | K | inference, compiled | assembly | of it |
+|---|--:|--:|--:|--:|
+";
 
 const ALIGNED_HEAD: &str = concat!(
-    "                            |           inference |                 row |               frame",
-    "     µs at\n",
-    "kernel                    K |    instr.    cycles |    instr.    cycles |    instr.    cycles",
-    "   168 MHz\n",
+    "                            |           inference |     row     frame     µs at |  with affine ",
+    "tail:   µs at\n",
+    "kernel                    K |    instr.    cycles |  cycles    cycles   168 MHz |     row     ",
+    "frame  168 MHz\n",
 );
 
-/// A Markdown table.
-pub fn markdown(figures: &[Figures]) -> String {
-    let rows = figures.iter().map(|f| {
-        let (i, r, a) = (f.inference, f.row, f.frame);
-        format!(
-            "| {} | {} | {} | {} | {} | {} | {} | {} | {:.0} |\n",
-            f.kernel,
-            f.centres,
-            i.instructions,
-            i.cycles,
-            r.instructions,
-            r.cycles,
-            a.instructions,
-            a.cycles,
-            a.cycles as f64 / CLOCK_MHZ
-        )
+/// What a compiled twin is called after its kernel's name.
+const TWIN: &str = "-portable";
+
+/// Markdown tables: all figures, and what assembly saves. Cycles where nothing else is said.
+pub fn markdown(figures: &[Figure]) -> String {
+    let cell = |count: Option<Count>, shown: fn(Count) -> String| count.map_or("".into(), shown);
+    let rows = Group::of(figures).map(|group| {
+        let count = |affine, scope| group.count(affine, scope);
+        let cells = [
+            group.kernel().to_owned(),
+            group.centres().to_string(),
+            cell(count(false, Scope::Inference), |count| count.instructions.to_string()),
+            cell(count(false, Scope::Inference), cycles),
+            cell(count(false, Scope::Row), cycles),
+            cell(count(false, Scope::Frame), cycles),
+            cell(count(false, Scope::Frame), microseconds),
+            cell(count(true, Scope::Row), cycles),
+            cell(count(true, Scope::Frame), cycles),
+            cell(count(true, Scope::Frame), microseconds),
+        ];
+        line(&cells)
     });
-    format!("{HEAD}\n{RULE}\n{}", rows.collect::<String>())
+    let inference = |group: Group<'_>| group.count(false, Scope::Inference);
+    let saved = Group::of(figures).filter_map(|group| {
+        let twin = format!("{}{TWIN}", group.kernel());
+        let twin = Group::of(figures)
+            .find(|other| other.kernel() == twin && other.centres() == group.centres())?;
+        let (compiled, assembly) = (inference(twin)?.cycles, inference(group)?.cycles);
+        let part = format!("{:.0} %", 100.0 * assembly as f64 / compiled as f64);
+        let numbers = [group.centres(), compiled, assembly].map(|number| number.to_string());
+        Some(line(&[&[group.kernel().to_owned()][..], &numbers, &[part]].concat()))
+    });
+    let powers = Group::of(figures).filter_map(|group| {
+        let powers = group.count(false, Scope::Exponential)?;
+        let each = powers.cycles as f64 / group.centres() as f64;
+        Some(format!("- {}, K = {}: {each:.1} cycles\n", group.kernel(), group.centres()))
+    });
+    format!(
+        "{HEAD}{}\nWhat assembly saves:\n\n{SAVED_HEAD}{}\nOne exponential:\n\n{}",
+        rows.collect::<String>(),
+        saved.collect::<String>(),
+        powers.collect::<String>()
+    )
+}
+
+fn line(cells: &[String]) -> String {
+    format!("| {} |\n", cells.join(" | "))
+}
+
+fn cycles(count: Count) -> String {
+    count.cycles.to_string()
+}
+
+fn microseconds(count: Count) -> String {
+    format!("{:.0}", count.cycles as f64 / CLOCK_MHZ)
 }
 
 /// The same with its columns aligned, for a terminal.
-pub fn aligned(figures: &[Figures]) -> String {
-    let rows = figures.iter().map(|f| {
+pub fn aligned(figures: &[Figure]) -> String {
+    let rows = Group::of(figures).map(|group| {
+        let shown = |affine, scope, shown: fn(Count) -> String| {
+            group.count(affine, scope).map_or("–".into(), shown)
+        };
+        let instructions = shown(false, Scope::Inference, |count| count.instructions.to_string());
         format!(
-            "{:22} {:4} | {:9} {:9} | {:9} {:9} | {:9} {:9} {:9.0}\n",
-            f.kernel,
-            f.centres,
-            f.inference.instructions,
-            f.inference.cycles,
-            f.row.instructions,
-            f.row.cycles,
-            f.frame.instructions,
-            f.frame.cycles,
-            f.frame.cycles as f64 / CLOCK_MHZ
+            "{:22} {:4} | {instructions:>9} {:>9} | {:>7} {:>9} {:>9} | {:>7} {:>9} {:>8}\n",
+            group.kernel(),
+            group.centres(),
+            shown(false, Scope::Inference, cycles),
+            shown(false, Scope::Row, cycles),
+            shown(false, Scope::Frame, cycles),
+            shown(false, Scope::Frame, microseconds),
+            shown(true, Scope::Row, cycles),
+            shown(true, Scope::Frame, cycles),
+            shown(true, Scope::Frame, microseconds),
         )
     });
     ALIGNED_HEAD.to_owned() + &rows.collect::<String>()
 }
 
-/// Reads a Markdown table back; other text is passed over.
-pub fn parse(text: &str) -> Outcome<Vec<Figures>> {
-    let rows = text.lines().filter(|line| line.starts_with('|') && ![HEAD, RULE].contains(line));
-    rows.map(|row| figures(row).ok_or_else(|| format!("not understood: {row}"))).collect()
-}
-
-fn figures(row: &str) -> Option<Figures> {
-    let cells: Vec<&str> = row.trim().trim_matches('|').split('|').map(str::trim).collect();
-    let [kernel, numbers @ .., _] = &cells[..] else { return None };
-    let numbers: Option<Vec<u64>> = numbers.iter().map(|number| number.parse().ok()).collect();
-    let [centres, i, ic, r, rc, a, ac] = numbers?[..] else { return None };
-    let [inference, row, frame] =
-        [(i, ic), (r, rc), (a, ac)].map(|(instructions, cycles)| Count { instructions, cycles });
-    Some(Figures { kernel: (*kernel).to_owned(), centres, inference, row, frame })
-}
-
 /// A list of objects. Kernels' names have nothing in them that JSON would escape.
-pub fn json(figures: &[Figures]) -> String {
-    let objects: Vec<String> = figures
-        .iter()
-        .map(|f| {
-            format!(
-                "  {{\"kernel\": \"{}\", \"centres\": {}, \"instructions\": {}, \"cycles\": {}, \
-                 \"row_instructions\": {}, \"row_cycles\": {}, \"frame_instructions\": {}, \
-                 \"frame_cycles\": {}}}",
-                f.kernel,
-                f.centres,
-                f.inference.instructions,
-                f.inference.cycles,
-                f.row.instructions,
-                f.row.cycles,
-                f.frame.instructions,
-                f.frame.cycles
-            )
+pub fn json(figures: &[Figure]) -> String {
+    let objects: Vec<String> = Group::of(figures)
+        .map(|group| {
+            let mut object =
+                format!("{{\"kernel\": \"{}\", \"centres\": {}", group.kernel(), group.centres());
+            for (prefix, affine, scope) in [
+                ("", false, Scope::Inference),
+                ("row_", false, Scope::Row),
+                ("frame_", false, Scope::Frame),
+                ("affine_row_", true, Scope::Row),
+                ("affine_frame_", true, Scope::Frame),
+            ] {
+                if let Some(Count { instructions, cycles }) = group.count(affine, scope) {
+                    object.push_str(&format!(
+                        ", \"{prefix}instructions\": {instructions}, \"{prefix}cycles\": {cycles}"
+                    ));
+                }
+            }
+            object + "}"
         })
         .collect();
-    format!("[\n{}\n]\n", objects.join(",\n"))
+    format!("[\n  {}\n]\n", objects.join(",\n  "))
 }
 
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use super::*;
 
-    fn sample() -> Figures {
-        let [inference, row, frame] =
-            [1, 3, 5].map(|n| Count { instructions: n, cycles: 168 * (n + 1) });
-        Figures { kernel: "f32-direct".into(), centres: 16, inference, row, frame }
+    /// Two kernels, of which one is the other's twin.
+    pub fn sample() -> Vec<Figure> {
+        let figure = |kernel: &str, affine, scope, n| Figure {
+            kernel: kernel.into(),
+            centres: 16,
+            affine,
+            scope,
+            count: Count { instructions: n, cycles: 168 * n },
+        };
+        vec![
+            figure("f32", false, Scope::Inference, 2),
+            figure("f32", false, Scope::Exponential, 1),
+            figure("f32", false, Scope::Row, 3),
+            figure("f32", false, Scope::Frame, 4),
+            figure("f32", true, Scope::Row, 5),
+            figure("f32", true, Scope::Frame, 6),
+            figure("f32-portable", false, Scope::Inference, 8),
+        ]
     }
 
     #[test]
-    fn a_table_says_what_was_measured_and_is_read_back() {
-        let text = markdown(&[sample()]);
-        assert!(
-            text.ends_with("| f32-direct | 16 | 1 | 336 | 3 | 672 | 5 | 1008 | 6 |\n"),
-            "{text}"
-        );
-        assert_eq!(parse(&text), Ok(vec![sample()]));
-    }
-
-    #[test]
-    fn a_row_that_says_something_else_is_refused() {
-        for row in ["| a | 16 |", "| a | K | 1 | 1 | 1 | 1 | 1 | 1 | 1 |"] {
-            assert_eq!(parse(row), Err(format!("not understood: {row}")));
+    fn tables_say_what_was_measured_and_what_assembly_saves() {
+        let text = markdown(&sample());
+        for line in [
+            "\n| f32 | 16 | 2 | 336 | 504 | 672 | 4 | 840 | 1008 | 6 |\n",
+            "\n| f32-portable | 16 | 8 | 1344 |  |  |  |  |  |  |\n",
+            "\n| f32 | 16 | 1344 | 336 | 25 % |\n",
+            "\n- f32, K = 16: 10.5 cycles\n",
+        ] {
+            assert!(text.contains(line), "{text}");
         }
+        assert!(aligned(&sample()).contains(" 336 |"));
     }
 
     #[test]
     fn json_names_every_figure() {
         assert_eq!(
-            json(&[sample()]),
-            "[\n  {\"kernel\": \"f32-direct\", \"centres\": 16, \"instructions\": 1, \"cycles\": 336, \
-             \"row_instructions\": 3, \"row_cycles\": 672, \"frame_instructions\": 5, \
-             \"frame_cycles\": 1008}\n]\n"
+            json(&sample()),
+            "[\n  {\"kernel\": \"f32\", \"centres\": 16, \"instructions\": 2, \"cycles\": 336, \
+             \"row_instructions\": 3, \"row_cycles\": 504, \"frame_instructions\": 4, \
+             \"frame_cycles\": 672, \"affine_row_instructions\": 5, \"affine_row_cycles\": 840, \
+             \"affine_frame_instructions\": 6, \"affine_frame_cycles\": 1008},\n  \
+             {\"kernel\": \"f32-portable\", \"centres\": 16, \"instructions\": 8, \"cycles\": 1344}\n]\n"
         );
     }
 }

@@ -56,7 +56,7 @@ fn parse(line: &[u8]) -> Line {
 mod tests {
     use super::*;
     use crate::cycles::code::Code;
-    use crate::cycles::regions::Count;
+    use crate::cycles::regions::{Count, Region};
 
     #[test]
     fn the_address_is_found_in_what_old_and_new_versions_write() {
@@ -85,6 +85,7 @@ mod tests {
         let mut regions = Regions::new(&code, 0x10, 0x30);
         assert_eq!(follow(&trace[..], &mut regions).unwrap(), "a complaint\n");
         // adds: 1; bl: 1 + 2.
-        assert_eq!(regions.finish().unwrap(), [Count { instructions: 2, cycles: 4 }]);
+        let whole = Count { instructions: 2, cycles: 4 };
+        assert_eq!(regions.finish().unwrap(), [Region { whole, ..Region::default() }]);
     }
 }

@@ -85,29 +85,144 @@ pub(super) fn fit(
 /// How far rounding in the exponents, and the error of 2^u, can move each output of `network` for any
 /// reading, in the output's unit; empty for networks of other formats.
 ///
-/// With u = 2^−24 and d rounded operations in the longest chain of additions, |δv| ≤ γ_d·(|b| + Σ|a|·X +
-/// I·g·X²) for inputs up to X, γ_d = d·u/(1 − d·u) (Higham, Accuracy and Stability of Numerical Algorithms,
-/// ch. 3); an activation, at most 1, is off by 2^δv − 1 and 2 ulp; an output by the sum over |ω|.
+/// With u = 2^−24, an exponent v = b + a·x − g‖x‖² that is summed up with at most d rounded operations a
+/// term is off by |δv| ≤ γ_d·(|b| + Σ|aᵢxᵢ| + g‖x‖²), γ_d = d·u/(1 − d·u) (Higham, Accuracy and Stability of
+/// Numerical Algorithms, ch. 3). At a distance t from the centre, whose length is c = ‖a‖/2g, no term exceeds
+/// what ‖x‖ ≤ c + t leaves: the sum is at most |b| + 2gc(c + t) + g(c + t)², while the activation itself is
+/// 2^−gt². Their product has its largest value at a moderate t; an output is off by the sum of these over
+/// |ω|.
 #[must_use]
 pub fn rounding_bounds(network: &Network<'_>) -> Vec<f64> {
-    const U: f64 = 0.5 * f32::EPSILON as f64;
     let Network::F32(network) = network else { return Vec::new() };
     let (p, Shape { inputs, outputs, .. }) = (network.parameters(), network.shape());
-    let gamma = |d: usize| d as f64 * U / (1.0 - d as f64 * U);
-    let reach = f64::from(UNITS);
-    let shared = inputs as f64 * f64::from(p.decay) * reach * reach;
-    // Product, four sums side by side (the first two opened by b and the shared term), two more additions;
-    // the shared term takes as many and a product before.
+    let decay = f64::from(p.decay);
+    // A product, and one of four sums side by side, the first two opened by b and the shared term; then
+    // two more additions. The shared term takes as many before, and is negated and scaled.
     let chain = inputs.div_ceil(4) + 4;
     let mut bounds = vec![0.0; outputs];
     let lines = p.exponents.chunks_exact(1 + inputs);
     for (row, weights) in lines.zip(p.output_weights.chunks_exact(outputs)) {
-        let terms: f64 = row[1..].iter().map(|a| f64::from(a.abs()) * reach).sum();
-        let exponent =
-            gamma(2 * chain) * shared + gamma(chain) * (f64::from(row[0].abs()) + terms + shared);
-        let activation = (core::f64::consts::LN_2 * exponent).exp_m1() + 4.0 * U;
-        let moved = weights.iter().map(|w| f64::from(w.abs()) * activation);
+        let length = row[1..].iter().map(|a| f64::from(*a).powi(2)).sum::<f64>().sqrt();
+        let centre = length / (2.0 * decay);
+        let off = activation_bound(decay, centre, f64::from(row[0].abs()), chain);
+        let moved = weights.iter().map(|w| f64::from(w.abs()) * off);
         bounds.iter_mut().zip(moved).for_each(|(bound, moved)| *bound += moved);
     }
     bounds
+}
+
+/// Largest error of an activation over all distances from its centre, which is `centre` away from the
+/// middle; b is `opened`.
+fn activation_bound(decay: f64, centre: f64, opened: f64, chain: usize) -> f64 {
+    const U: f64 = 0.5 * f32::EPSILON as f64;
+    /// Distances are tried this far apart, in widths; in between, the activation is taken at the nearer and
+    /// the sum at the farther end.
+    const STEP: f64 = 1.0 / 64.0;
+    let gamma = |d: usize| d as f64 * U / (1.0 - d as f64 * U);
+    let width = 1.0 / decay.sqrt();
+    let at = |step: usize| {
+        let [near, far] = [step as f64, (step + 1) as f64].map(|t| t * STEP * width);
+        let reach = centre + far;
+        let square = decay * reach * reach;
+        let terms = opened + 2.0 * decay * centre * reach + square;
+        let exponent = gamma(chain) * terms + gamma(chain + 2) * square;
+        // 2^u itself is within 2 ulp, of which each is at most 2u of the value.
+        let relative = (core::f64::consts::LN_2 * exponent).exp_m1() + 4.0 * U;
+        (-decay * near * near).exp2() * relative
+    };
+    // Beyond twelve widths 2^−144 is left, and exponents end at −125.
+    (0..(12.0 / STEP) as usize).map(at).fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use model_core::exp::Polynomial;
+
+    use super::*;
+    use crate::dataset::Dataset;
+    use crate::number_format::NumberFormat;
+    use crate::random::Stream;
+    use crate::scene::Scene;
+    use crate::{synth, train};
+
+    fn press(noise: f64, frames: usize) -> (Scene, Dataset) {
+        let mut scene = Scene::load("press").unwrap();
+        scene.set_noise_level(noise).unwrap();
+        let data = synth::synthesise(&scene, Stream::Training, frames);
+        (scene, data)
+    }
+
+    /// The bound holds on frames, and is no more than some hundred times what happens there.
+    #[test]
+    fn no_reading_moves_an_output_beyond_its_bound() {
+        let (scene, data) = press(0.05, 1500);
+        let block = data.block(3);
+        let samples = Samples::new(&block);
+        let options =
+            Options { format: NumberFormat::F32, ..Options::new(32, 0.8, true, scene.seed) };
+        let centres = samples.centres(&options, 3);
+        let fitted = samples.fit(&centres, &options).unwrap();
+        let Network::F32(network) = fitted.network() else { panic!("direct distances") };
+        let p = network.parameters();
+        let bounds = rounding_bounds(&network.into());
+        let mut worst = vec![0.0_f64; bounds.len()];
+        for line in block.inputs.lines() {
+            let reading: Vec<f32> = line.iter().map(|r| *r as f32).collect();
+            let (mut scaled, mut output) = (vec![0.0; reading.len()], vec![0.0; bounds.len()]);
+            let network = Network::from(network);
+            network.scale(&reading, &mut scaled).unwrap();
+            let x: Vec<f64> =
+                scaled.iter().map(|x| f64::from(model_core::scale::clamp_units(*x))).collect();
+            network.infer_scaled::<Polynomial>(&mut scaled, &mut output).unwrap();
+            // The same sum without rounding; that of the outputs stays, and is small beside.
+            let mut exact: Vec<f64> = p.bias.iter().map(|b| f64::from(*b)).collect();
+            let mut add = |factor: f64, row: &[f32]| {
+                exact.iter_mut().zip(row).for_each(|(y, w)| *y += factor * f64::from(*w));
+            };
+            for (x, row) in x.iter().zip(p.affine.chunks_exact(bounds.len())) {
+                add(*x, row);
+            }
+            let square: f64 = x.iter().map(|x| x * x).sum();
+            let lines = p.exponents.chunks_exact(1 + x.len());
+            for (row, weights) in lines.zip(p.output_weights.chunks_exact(bounds.len())) {
+                let products = row[1..].iter().zip(&x).map(|(a, x)| f64::from(*a) * x);
+                let v = f64::from(row[0]) + products.sum::<f64>() - f64::from(p.decay) * square;
+                add(v.exp2(), weights);
+            }
+            for ((worst, y), exact) in worst.iter_mut().zip(&output).zip(&exact) {
+                *worst = worst.max((f64::from(*y) - exact).abs());
+            }
+        }
+        for (worst, bound) in worst.iter().zip(&bounds) {
+            assert!(worst <= bound && *bound < 300.0 * worst, "{worst:e} within {bound:e}");
+        }
+    }
+
+    #[test]
+    fn distances_are_expanded_only_where_that_is_proved_harmless() {
+        let format = |noise: f64, spread: f64| {
+            let (scene, data) = press(noise, 1500);
+            let options = Options::new(32, spread, true, scene.seed);
+            let networks =
+                train::train(&data, &options, &crate::progress::Progress::silent()).unwrap();
+            let formats: Vec<_> = networks.iter().map(|n| n.network().format()).collect();
+            assert!(formats.iter().all(|format| *format == formats[0]), "{formats:?}");
+            formats[0]
+        };
+        assert_eq!(format(0.05, 0.8), Format::F32);
+        // Without noise, weights grow by orders of magnitude and errors shrink as much.
+        assert_eq!(format(0.0, 0.8), Format::F32Direct);
+        // A narrow Gaussian's exponents leave their range.
+        assert_eq!(format(0.05, 0.2), Format::F32Direct);
+    }
+
+    #[test]
+    fn a_narrow_width_is_refused_by_fixed16_with_the_fix() {
+        let (scene, data) = press(0.05, 600);
+        let options =
+            Options { format: NumberFormat::Fixed16, ..Options::new(16, 0.2, true, scene.seed) };
+        let progress = crate::progress::Progress::silent();
+        let message = train::train(&data, &options, &progress).unwrap_err().to_string();
+        assert!(message.contains("spread = 0.2") && message.contains("larger spread"), "{message}");
+    }
 }

@@ -97,14 +97,10 @@ impl Groups {
         this
     }
 
-    fn group_of(&self, centre: u32) -> usize {
-        self.lane_of[centre as usize] as usize / (self.vectors * LANES)
-    }
-
-    /// What is kept of a lower bound on the distances of a group's centres as they stand.
-    #[inline(always)]
-    fn bound(&self, group: usize, at_least: f64) -> f32 {
-        (at_least + self.moved[group]) as f32
+    /// Where a centre's group stands among the bounds: which vector, which lane.
+    fn place_of(&self, centre: u32) -> (usize, usize) {
+        let group = self.lane_of[centre as usize] as usize / (self.vectors * LANES);
+        (group / LANES, group % LANES)
     }
 
     /// Looks through a group for centres nearer than `nearest`, and returns the least rounded squared
@@ -115,30 +111,29 @@ impl Groups {
         &self,
         points: &Points<'_>,
         group: usize,
-        own_lane: usize,
         centres: &[f64],
         point: &[f64],
         rounded: &[f32],
         nearest: &mut Nearest,
-        reach: &mut f32,
+        look: &mut Look,
     ) -> f32 {
         let (n, mut least) = (points.dimensions, f32::INFINITY);
         for vector in group * self.vectors..(group + 1) * self.vectors {
-            let distances = self.distances(n, vector, own_lane, rounded);
+            let distances = self.distances(n, vector, look.own_lane, rounded);
             let least_here = smallest(&distances);
             least = if least_here < least { least_here } else { least };
-            if least_here > *reach {
+            if least_here > look.reach {
                 continue;
             }
             for (lane, rounded) in distances.iter().enumerate() {
                 let centre = self.centre_of.get(vector * LANES + lane).copied().unwrap_or(NOBODY);
-                if *rounded > *reach || centre == NOBODY {
+                if *rounded > look.reach || centre == NOBODY {
                     continue;
                 }
                 let squared_distance = exact(point, &centres[centre as usize * n..][..n]);
                 let found = Nearest { centre, squared_distance };
                 if found.is_nearer(nearest) {
-                    (*nearest, *reach) = (found, points.screen.reach(squared_distance));
+                    (*nearest, look.reach) = (found, points.screen.reach(squared_distance));
                 }
             }
         }
@@ -198,26 +193,51 @@ impl Groups {
 }
 
 /// Orders centres so that `size` of them in a row are near each other: halves them again and again
-/// in the dimension in which they reach farthest.
+/// across the direction in which they reach farthest.
 fn gather(order: &mut [u32], centres: &[f64], dimensions: usize, size: usize) {
     if order.len() <= size {
         return;
     }
-    let at = |centre: u32, dimension: usize| centres[centre as usize * dimensions + dimension];
-    let extent = |dimension: usize| {
-        let values = order.iter().map(|centre| at(*centre, dimension));
-        let (low, high) = values
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
-        high - low
-    };
-    let extents: Vec<f64> = (0..dimensions).map(extent).collect();
-    let widest = (0..dimensions).max_by(|a, b| extents[*a].total_cmp(&extents[*b])).unwrap_or(0);
-    let by = |centre: &u32| at(*centre, widest);
-    order.sort_by(|a, b| by(a).total_cmp(&by(b)).then(a.cmp(b)));
+    let direction = principal_direction(order, centres, dimensions);
+    let along = |k: u32| dot(&centres[k as usize * dimensions..], &direction);
+    let mut placed: Vec<(f64, u32)> = order.iter().map(|k| (along(*k), *k)).collect();
+    placed.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    order.iter_mut().zip(placed).for_each(|(k, (_, placed))| *k = placed);
     let half = (order.len() / size).div_ceil(2) * size;
     let (low, high) = order.split_at_mut(half);
     gather(low, centres, dimensions, size);
     gather(high, centres, dimensions, size);
+}
+
+/// About the first principal component of some centres, by a few steps of the power method from the
+/// centre farthest from their mean.
+fn principal_direction(order: &[u32], centres: &[f64], dimensions: usize) -> Vec<f64> {
+    let centre = |k: &u32| &centres[*k as usize * dimensions..][..dimensions];
+    let mut mean = vec![0.0; dimensions];
+    for k in order {
+        mean.iter_mut().zip(centre(k)).for_each(|(m, x)| *m += x / order.len() as f64);
+    }
+    let from_mean = |k: &u32| centre(k).iter().zip(&mean).map(|(x, m)| x - m).collect();
+    let offsets: Vec<Vec<f64>> = order.iter().map(from_mean).collect();
+    let farthest = offsets.iter().max_by(|a, b| dot(a, a).total_cmp(&dot(b, b)));
+    let mut direction = farthest.cloned().unwrap_or(mean);
+    for _ in 0..8 {
+        let mut next = vec![0.0; dimensions];
+        for offset in &offsets {
+            let weight = dot(offset, &direction);
+            next.iter_mut().zip(offset).for_each(|(n, x)| *n += weight * x);
+        }
+        let length = dot(&next, &next).sqrt();
+        if !(length > 0.0 && length.is_finite()) {
+            break; // centres that coincide: any direction will do
+        }
+        direction = next.into_iter().map(|x| x / length).collect();
+    }
+    direction
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 impl<'p> Assignment<'p> {
@@ -301,34 +321,45 @@ impl Piece {
             let mut look = None;
             for (chunk, (bounds, moved)) in bounds.iter_mut().zip(&groups.rounded_moved).enumerate()
             {
-                let near = |l: usize| u32::from(bounds[l] - moved[l] <= limit) << l;
-                let mut hits = (0..LANES).fold(0, |hits, l| hits | near(l));
-                while hits != 0 {
-                    let l = hits.trailing_zeros() as usize;
-                    hits &= hits - 1;
-                    let look = look.get_or_insert_with(|| {
-                        points.copy_rounded(index, &mut rounded);
-                        points.screen.reach(own_squared_distance)
-                    });
+                // Where a centre came from so far that the difference is not a number, it is near.
+                let is_far = |l: usize| bounds[l] - moved[l] > limit;
+                let near = |l: usize| u32::from(!is_far(l)) << l;
+                let hits = (0..LANES).fold(0, |hits, l| hits | near(l));
+                if hits == 0 {
+                    continue;
+                }
+                let look = look.get_or_insert_with(|| {
+                    points.copy_rounded(index, &mut rounded);
+                    Look {
+                        own_lane: groups.lane_of[own as usize] as usize,
+                        reach: points.screen.reach(own_squared_distance),
+                    }
+                });
+                let mut least = [f32::INFINITY; LANES];
+                let mut left = hits;
+                while left != 0 {
+                    let l = left.trailing_zeros() as usize;
+                    left &= left - 1;
                     let group = chunk * LANES + l;
-                    let own_lane = groups.lane_of[own as usize] as usize;
-                    let least = groups
-                        .search(points, group, own_lane, centres, point, &rounded, nearest, look);
-                    bounds[l] = groups.bound(group, points.screen.at_least(least));
+                    least[l] =
+                        groups.search(points, group, centres, point, &rounded, nearest, look);
+                }
+                let found = points.screen.at_least(least);
+                for l in 0..LANES {
+                    bounds[l] = if hits >> l & 1 == 1 { found[l] + moved[l] } else { bounds[l] };
                 }
             }
             if nearest.centre != own {
                 // The old centre is one of the others now, and the new one no longer is.
-                let group = groups.group_of(own);
-                let bound =
-                    groups.bound(group, points.screen.scaled_at_least(own_squared_distance));
-                let place = &mut bounds[group / LANES][group % LANES];
-                *place = place.min(bound);
-                let group = groups.group_of(nearest.centre);
+                let (group, l) = groups.place_of(own);
+                let at_least = points.screen.scaled_at_least(own_squared_distance) as f32;
+                let bound = at_least + groups.rounded_moved[group][l];
+                bounds[group][l] = bounds[group][l].min(bound);
+                let (group, l) = groups.place_of(nearest.centre);
                 let lane = groups.lane_of[nearest.centre as usize] as usize;
-                let least = groups.least(n, group, lane, &rounded);
-                bounds[group / LANES][group % LANES] =
-                    groups.bound(group, points.screen.at_least(least));
+                let least = groups.least(n, group * LANES + l, lane, &rounded);
+                let [at_least, ..] = points.screen.at_least([least; LANES]);
+                bounds[group][l] = at_least + groups.rounded_moved[group][l];
             }
         }
     }
@@ -348,6 +379,13 @@ impl Piece {
             self.inertia += nearest.squared_distance;
         }
     }
+}
+
+/// What is known of a point's own centre, and of how far others may be.
+struct Look {
+    own_lane: usize,
+    /// The largest rounded squared distance of a centre that may be the nearest.
+    reach: f32,
 }
 
 #[inline(always)]

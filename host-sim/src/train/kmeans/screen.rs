@@ -67,8 +67,9 @@ impl<'p> Points<'p> {
 /// Write ρ for the distance of a point and a centre times `scale`, r for their squared distance as
 /// it comes out in f32 from their rounded copies, n for the dimensions, and u for 2⁻²⁴.
 /// Coordinates are at most 1 in magnitude and are rounded by at most u(1 + 2⁻²⁷), so distances
-/// change by at most A = 2.02·u·√n; and n differences, squares and sums change r by at most a
-/// factor of 1 ± (n + 8)·u. Hence √r·(1 − ε) − A ≤ ρ ≤ √r·(1 + ε) + A with ε = (n + 8)·u.
+/// change by at most A = 2.02·u·√n (what a centre farther out adds to this is less than u·ρ); and n
+/// differences, squares and sums change r by at most a factor of 1 ± (n + 8)·u. Hence
+/// √r·(1 − ε) − A ≤ ρ ≤ √r·(1 + ε) + A with ε = (n + 8)·u.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Screen {
     /// The middle of every dimension.
@@ -103,9 +104,11 @@ impl Screen {
         }
     }
 
-    /// A point or centre, scaled and rounded.
+    /// A point or centre, scaled and rounded. A centre that is given may be far from all points: it
+    /// is brought nearer, which keeps squares finite and lower bounds true.
     pub(super) fn round(&self, point: &[f64]) -> impl Iterator<Item = f32> {
-        point.iter().zip(&self.middle).map(|(x, middle)| ((x - middle) * self.scale) as f32)
+        let scaled = |(x, middle): (&f64, &f64)| ((x - middle) * self.scale).clamp(-1e8, 1e8);
+        point.iter().zip(&self.middle).map(move |pair| scaled(pair) as f32)
     }
 
     /// A bound that ρ is not above, from a squared distance as computed in f64.
@@ -123,10 +126,11 @@ impl Screen {
         self.scale * squared_distance.sqrt() * (1.0 - (n + 12.0) * ROUNDING_F64)
     }
 
-    /// A bound that ρ is not below, from r.
+    /// Bounds that ρ is not below but for [`Self::slack`], from r.
     #[inline(always)]
-    pub(super) fn at_least(&self, rounded: f32) -> f64 {
-        f64::from(rounded).sqrt() * (1.0 - self.relative) - self.absolute
+    pub(super) fn at_least(&self, rounded: [f32; LANES]) -> [f32; LANES] {
+        let (factor, less) = ((1.0 - self.relative) as f32, self.absolute as f32);
+        rounded.map(|r| r.sqrt() * factor - less)
     }
 
     /// The largest r that a centre may have which is no farther, in f64, than `squared_distance`.
@@ -137,7 +141,8 @@ impl Screen {
         (most * most * 1.000_001) as f32
     }
 
-    /// What bounds may lose when they, or sums of `moved`, are rounded to f32 and subtracted.
+    /// What bounds may lose in f32: the root, its product and two sums are rounded, and so are
+    /// `moved`, which is added and subtracted, and the difference. Bounds are below 2.1·√n.
     pub(super) fn slack(&self, moved: f64) -> f64 {
         16.0 * ROUNDING_F32 * (4.0 * (self.middle.len() as f64).sqrt() + moved)
     }
@@ -146,18 +151,22 @@ impl Screen {
 /// Squared distances r of a rounded point from [`LANES`] rounded centres.
 #[inline(always)]
 pub(super) fn rounded_distances(point: &[f32], centres: &[[f32; LANES]]) -> [f32; LANES] {
-    let (mut even, mut odd) = ([0.0; LANES], [0.0; LANES]);
-    let ((x2, x1), (c2, c1)) = (point.as_chunks::<2>(), centres.as_chunks::<2>());
-    for (x, c) in x2.iter().zip(c2) {
-        for l in 0..LANES {
-            even[l] += (x[0] - c[0][l]) * (x[0] - c[0][l]);
-            odd[l] += (x[1] - c[1][l]) * (x[1] - c[1][l]);
+    /// Differences that are added up one after the other, twice.
+    const RUN: usize = 3;
+    let mut sums = [[0.0; LANES]; 2];
+    let (points, last_points) = point.as_chunks::<{ 2 * RUN }>();
+    let (runs, last_centres) = centres.as_chunks::<{ 2 * RUN }>();
+    for (x, c) in points.iter().zip(runs) {
+        for i in 0..2 * RUN {
+            for l in 0..LANES {
+                sums[i % 2][l] += (x[i] - c[i][l]) * (x[i] - c[i][l]);
+            }
         }
     }
-    for (x, c) in x1.iter().zip(c1) {
-        (0..LANES).for_each(|l| even[l] += (x - c[l]) * (x - c[l]));
+    for (x, c) in last_points.iter().zip(last_centres) {
+        (0..LANES).for_each(|l| sums[0][l] += (x - c[l]) * (x - c[l]));
     }
-    std::array::from_fn(|l| even[l] + odd[l])
+    std::array::from_fn(|l| sums[0][l] + sums[1][l])
 }
 
 /// What decides: the squared distance in f64.

@@ -82,14 +82,14 @@ fn check_steps(points: &[f64], dimensions: usize, centres: &[f64], iterations: u
     let mut pruned = Assignment::from_scratch(&points, centres.to_vec());
     for _ in 0..iterations {
         let exact = nearest_of_all(points.values, dimensions, &pruned.centres);
-        assert_eq!(all_nearest(&pruned), exact);
+        assert!(all_nearest(&pruned) == exact, "not the nearest of all centres");
         let moved = means(&pruned);
         let mut unpruned = pruned.clone();
         unpruned.forget();
         unpruned.move_to(moved.clone());
         pruned.move_to(moved);
         for (pruned, unpruned) in pruned.pieces.iter().zip(&unpruned.pieces) {
-            assert_eq!(pruned.nearest, unpruned.nearest);
+            assert!(pruned.nearest == unpruned.nearest, "pruning changes the assignment");
             assert_eq!((&pruned.sums, pruned.inertia), (&unpruned.sums, unpruned.inertia));
         }
     }
@@ -137,7 +137,7 @@ proptest! {
         let points: Vec<f64> = grid[..whole].iter().map(|x| f64::from(*x) * 0.7).collect();
         let points = Points::new(&points, dimensions);
         let (picked, nearest) = start::plus_plus(&points, centres, &mut random(seed));
-        prop_assert_eq!(nearest, nearest_of_all(points.values, dimensions, &picked));
+        prop_assert!(nearest == nearest_of_all(points.values, dimensions, &picked));
     }
 }
 
@@ -150,6 +150,16 @@ fn cloud(count: usize, dimensions: usize) -> Vec<f64> {
         points.extend((0..dimensions).map(|i| (a * i as f64).sin() + b + 0.05 * source.normal()));
     }
     points
+}
+
+#[test]
+fn a_start_far_from_all_points_is_no_obstacle() {
+    let points = cloud(600, 3);
+    for far in [3.0, 1e3, 1e9, 1e25, 1e140] {
+        let mut start = points[..20 * 3].to_vec();
+        (start[3], start[10], start[31]) = (far, -far, far);
+        check_steps(&points, 3, &start, 6);
+    }
 }
 
 #[test]

@@ -23,7 +23,7 @@ const LANES: usize = 8;
 /// Columns whose reflections are applied to the rest at once.
 const PANEL: usize = 24;
 /// Rows that are annihilated at once: U, and a tile beside it, stay in the first cache.
-pub(super) const BLOCK: usize = 192;
+pub(super) const BLOCK: usize = 144;
 /// Rows that a product is computed for at a time: 6 × 8 sums fill the vector registers.
 const STRIP: usize = 6;
 /// A column whose squares sum to less holds nothing but underflow.

@@ -16,7 +16,7 @@ fn count(code: &Code, addresses: impl IntoIterator<Item = u32>) -> Outcome<Vec<C
     for address in addresses {
         regions.execute(address)?;
     }
-    regions.finish()
+    Ok(regions.finish()?.into_iter().map(|region| region.whole).collect())
 }
 
 /// A call of `begin`, which the program at `START` comes back from.
@@ -42,6 +42,18 @@ fn a_loop_is_counted_as_by_hand() {
     let addresses = CALL.into_iter().chain([START]).chain(rounds).chain([START + 8, END]);
     let expected = Count { instructions: 1 + 2000 + 1, cycles: 1 + 1000 + 999 * 3 + 1 + 3 };
     assert_eq!(count(&code, addresses), Ok(vec![expected]));
+}
+
+#[test]
+fn what_is_watched_is_counted_besides() {
+    let code = code(&[0x3001, 0x3001, 0xF7FF, 0xFFFB]); // adds r0, #1, twice; bl end
+    let mut regions = Regions::new(&code, BEGIN, END).watching(START + 2..START + 4);
+    for address in [0x8, BEGIN, BEGIN + 2, START, START + 2, START + 4, END, START + 8] {
+        regions.execute(address).unwrap();
+    }
+    let whole = Count { instructions: 3, cycles: 5 };
+    let watched = Count { instructions: 1, cycles: 1 };
+    assert_eq!(regions.finish(), Ok(vec![Region { whole, watched }]));
 }
 
 #[test]

@@ -1,0 +1,154 @@
+//! Writing CSV: numbers become text on all cores, in pieces that are written one after the other.
+
+use std::io::Write;
+use std::path::Path;
+
+use rayon::prelude::*;
+
+use crate::error::{Error, Result};
+use crate::output;
+
+/// Numbers that become text in one piece, and pieces at a time.
+const PIECE: usize = 16 * 1024;
+const PIECES: usize = 64;
+
+/// Writes a CSV file: `names`, then `lines`. Every number reads back as the same f64; NaN becomes
+/// an empty field.
+///
+/// # Errors
+/// [`Error::Write`]; `path` is then as it was before.
+pub fn write<'n, L: IntoIterator<Item = f64>>(
+    path: &Path,
+    names: impl IntoIterator<Item = &'n str>,
+    lines: impl IntoIterator<Item = L>,
+) -> Result<()> {
+    let error = |cause| Error::write(path, cause);
+    output::write_whole(path, |file| {
+        let mut header = csv::Writer::from_writer(&mut *file);
+        let header_written = header.write_record(names).and_then(|()| Ok(header.flush()?));
+        drop(header);
+        header_written.map_err(|e| error(e.into()))?;
+        let mut lines = lines.into_iter();
+        let mut pieces = vec![Piece::default(); PIECES];
+        loop {
+            let mut filled = 0;
+            while filled < PIECES && pieces[filled].fill(&mut lines) {
+                filled += 1;
+            }
+            pieces[..filled].par_iter_mut().for_each(Piece::write_text);
+            for piece in &pieces[..filled] {
+                file.write_all(&piece.text).map_err(error)?;
+            }
+            if filled < PIECES {
+                return Ok(());
+            }
+        }
+    })
+}
+
+/// Some lines, as numbers and as text.
+#[derive(Clone, Default)]
+struct Piece {
+    values: Vec<f64>,
+    /// Where each line ends among the values.
+    line_ends: Vec<usize>,
+    text: Vec<u8>,
+}
+
+impl Piece {
+    /// Takes the next lines; false if there are none.
+    fn fill<L: IntoIterator<Item = f64>>(&mut self, lines: &mut impl Iterator<Item = L>) -> bool {
+        self.values.clear();
+        self.line_ends.clear();
+        while self.values.len() < PIECE
+            && let Some(line) = lines.next()
+        {
+            self.values.extend(line);
+            self.line_ends.push(self.values.len());
+        }
+        !self.line_ends.is_empty()
+    }
+
+    fn write_text(&mut self) {
+        self.text.clear();
+        let mut from = 0;
+        for end in &self.line_ends {
+            let line = &self.values[from..*end];
+            from = *end;
+            for (place, value) in line.iter().enumerate() {
+                if place > 0 {
+                    self.text.push(b',');
+                }
+                write_number(&mut self.text, *value);
+            }
+            if let [value] = line
+                && value.is_nan()
+            {
+                self.text.extend_from_slice(b"NaN"); // a blank line would be no line
+            }
+            self.text.push(b'\n');
+        }
+    }
+}
+
+/// The shortest digits that read back as the same number, as `Display` writes them.
+fn write_number(text: &mut Vec<u8>, value: f64) {
+    if value.is_nan() {
+        return;
+    }
+    let mut buffer = zmij::Buffer::new();
+    let digits = buffer.format(value);
+    if digits.contains('e') || lies_in_the_middle(value, digits) {
+        let _ = write!(text, "{value}"); // a vector takes anything
+    } else {
+        text.extend_from_slice(digits.strip_suffix(".0").unwrap_or(digits).as_bytes());
+    }
+}
+
+/// Whether a number may lie right between `digits` and the next number of as many digits: `Display` then
+/// rounds up, and zmij to even. It is then a multiple of 2^-(decimals + 1).
+fn lies_in_the_middle(value: f64, digits: &str) -> bool {
+    const UNAMBIGUOUS: usize = 15; // digits of which no two numbers are the same f64
+    let decimals = digits.find('.').map_or(0, |point| digits.len() - point - 1);
+    let multiple = value * f64::from_bits((1023 + 1 + decimals as u64) << 52);
+    digits.len() > UNAMBIGUOUS + 1 && multiple == multiple.trunc()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::{Purpose, Random, Stream};
+
+    #[test]
+    fn numbers_are_written_as_display_writes_them() {
+        let mut random = Random::new(1, Stream::Test, Purpose::Damage, 0, 0);
+        let drawn =
+            (0..200_000).map(|_| (random.unit() - 0.5) * 10_f64.powf(40.0 * random.unit() - 20.0));
+        let odd =
+            [0.0, -0.0, 1.0, -1e15, 1e16, 1e17, 1e300, 5e-324, 0.1, 1e-5, 1e-4, f64::INFINITY];
+        let drawn: Vec<f64> = drawn.collect();
+        let rounded: Vec<f64> = drawn.iter().map(|value| f64::from(*value as f32)).collect();
+        for value in drawn.into_iter().chain(rounded).chain(odd) {
+            let mut text = Vec::new();
+            write_number(&mut text, value);
+            assert_eq!(String::from_utf8(text).unwrap(), value.to_string());
+        }
+    }
+
+    #[test]
+    fn lines_keep_their_order_over_many_pieces() {
+        let folder = std::env::temp_dir().join(format!("taxel-write-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let path = folder.join("data.csv");
+        let count = 3 * PIECE * PIECES / 2;
+        write(&path, ["a", "b"], (0..count).map(|i| [i as f64, f64::NAN])).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        std::fs::remove_dir_all(&folder).unwrap();
+        let mut lines = text.lines();
+        assert_eq!(lines.next(), Some("a,b"));
+        for i in 0..count {
+            assert_eq!(lines.next(), Some(&*format!("{i},")));
+        }
+        assert_eq!(lines.next(), None);
+    }
+}

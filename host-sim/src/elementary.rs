@@ -1,0 +1,191 @@
+//! Logarithm, sine, cosine and exponential without branches, for loops that are to be vectorised.
+//!
+//! On the arguments stated they return the very bits of the `libm` crate's functions: they do the same
+//! operations in the same order, and choose where those branch. (The algorithms and constants are those of
+//! FreeBSD's msun, Copyright (C) 1993 by Sun Microsystems, Inc., freely granted.)
+
+/// 2^52: adding it to a whole number from 0 to 2^52 leaves the number in the low bits.
+const TWO_52: f64 = 4_503_599_627_370_496.0;
+
+const LN2_HI: f64 = 6.931_471_803_691_238e-1;
+const LN2_LO: f64 = 1.908_214_929_270_587_7e-10;
+
+/// Natural logarithm as `libm::log`, of a normal positive number.
+#[inline(always)]
+pub fn ln(x: f64) -> f64 {
+    const LG: [f64; 7] = [
+        6.666_666_666_666_735e-1,
+        3.999_999_999_940_942e-1,
+        2.857_142_874_366_239e-1,
+        2.222_219_843_214_978_4e-1,
+        1.818_357_216_161_805e-1,
+        1.531_383_769_920_937_3e-1,
+        1.479_819_860_511_658_6e-1,
+    ];
+    const SQRT_HALF: u64 = 0x3fe6_a09e_0000_0000;
+    const ONE: u64 = 0x3ff0_0000_0000_0000;
+    // x = 2^k·m with m from √½ to √2.
+    let shifted = x.to_bits().wrapping_add(ONE - SQRT_HALF);
+    let dk = f64::from_bits((shifted >> 52) | TWO_52.to_bits()) - (TWO_52 + 1023.0);
+    let m = f64::from_bits((shifted & 0x000f_ffff_ffff_ffff).wrapping_add(SQRT_HALF));
+    let f = m - 1.0;
+    let hfsq = 0.5 * f * f;
+    let s = f / (2.0 + f);
+    let z = s * s;
+    let w = z * z;
+    let t1 = w * (LG[1] + w * (LG[3] + w * LG[5]));
+    let t2 = z * (LG[0] + w * (LG[2] + w * (LG[4] + w * LG[6])));
+    let r = t2 + t1;
+    s * (hfsq + r) + dk * LN2_LO - hfsq + f + dk * LN2_HI
+}
+
+/// Sine and cosine as `libm::sin` and `libm::cos`, of an angle from 0 to 2π that
+/// [`is_near_an_axis`] is false for.
+#[inline(always)]
+pub fn sin_cos(x: f64) -> (f64, f64) {
+    const PIO2_1: f64 = 1.570_796_326_734_125_6;
+    const PIO2_1T: f64 = 6.077_100_506_506_192e-11;
+    const S: [f64; 6] = [
+        -1.666_666_666_666_663_2e-1,
+        8.333_333_333_322_49e-3,
+        -1.984_126_982_985_795e-4,
+        2.755_731_370_707_006_8e-6,
+        -2.505_076_025_340_686_3e-8,
+        1.589_690_995_211_55e-10,
+    ];
+    const C: [f64; 6] = [
+        4.166_666_666_666_66e-2,
+        -1.388_888_888_887_411e-3,
+        2.480_158_728_947_673e-5,
+        -2.755_731_435_139_066_3e-7,
+        2.087_572_321_298_175e-9,
+        -1.135_964_755_778_819_5e-11,
+    ];
+    // Quarter turns to take off: libm decides by the upper half of x's bits.
+    let above = |upper: u64| if x >= f64::from_bits((upper + 1) << 32) { 1.0 } else { 0.0 };
+    let n = above(0x3fe9_21fb) + above(0x4002_d97c) + above(0x400f_6a7a) + above(0x4015_fdbc);
+    let r = x - n * PIO2_1;
+    let tail = n * PIO2_1T;
+    let y0 = r - tail;
+    let y1 = (r - y0) - tail;
+
+    let z = y0 * y0;
+    let w = z * z;
+    let v = z * y0;
+    let r = S[1] + z * (S[2] + z * S[3]) + z * w * (S[4] + z * S[5]);
+    let direct = y0 + v * (S[0] + z * r);
+    let reduced = y0 - ((z * (0.5 * y1 - v * r) - y1) - v * S[0]);
+    let sine = if n == 0.0 { direct } else { reduced };
+
+    let r = z * (C[0] + z * (C[1] + z * C[2])) + w * w * (C[3] + z * (C[4] + z * C[5]));
+    let hz = 0.5 * z;
+    let w = 1.0 - hz;
+    let cosine = w + (((1.0 - w) - hz) + (z * r - y0 * y1));
+
+    let swap = n == 1.0 || n == 3.0;
+    let (s, c) = if swap { (cosine, sine) } else { (sine, cosine) };
+    let s = if n == 2.0 || n == 3.0 { -s } else { s };
+    let c = if n == 1.0 || n == 2.0 { -c } else { c };
+    (s, c)
+}
+
+/// Whether an angle, given as a fraction of the full turn, is so near a multiple of a quarter that libm
+/// reduces it with more digits than [`sin_cos`] does.
+#[inline(always)]
+pub fn is_near_an_axis(turn: f64) -> bool {
+    let quarters = 4.0 * turn;
+    let off = quarters - ((quarters + TWO_52) - TWO_52);
+    off.abs() < 1.0 / 8192.0 && turn > 0.125
+}
+
+/// Exponential as `libm::exp`, of a number from −700 to 0.
+#[inline(always)]
+pub fn exp(x: f64) -> f64 {
+    const INV_LN2: f64 = std::f64::consts::LOG2_E;
+    const P: [f64; 5] = [
+        1.666_666_666_666_660_2e-1,
+        -2.777_777_777_701_559_3e-3,
+        6.613_756_321_437_934e-5,
+        -1.653_390_220_546_525_2e-6,
+        4.138_136_797_057_238_5e-8,
+    ];
+    // libm decides by the upper half of the bits of |x|.
+    let above = |upper: u64| -x >= f64::from_bits((upper + 1) << 32);
+    let many = (INV_LN2 * x - 0.5).trunc();
+    let k = if above(0x3ff0_a2b1) {
+        many
+    } else if above(0x3fd6_2e42) {
+        -1.0
+    } else {
+        0.0
+    };
+    let hi = x - k * LN2_HI;
+    let lo = k * LN2_LO;
+    let reduced = hi - lo;
+    let xx = reduced * reduced;
+    let c = reduced - xx * (P[0] + xx * (P[1] + xx * (P[2] + xx * (P[3] + xx * P[4]))));
+    let y = 1.0 + (reduced * c / (2.0 - c) - lo + hi);
+    let scale = f64::from_bits((k + (TWO_52 + 1023.0)).to_bits() << 52);
+    if above(0x3e30_0000) { y * scale } else { 1.0 + x }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::{Purpose, Random, Stream};
+
+    /// A million uniform numbers on [0, 1).
+    fn units() -> impl Iterator<Item = f64> {
+        let mut random = Random::new(7, Stream::Test, Purpose::Damage, 0, 0);
+        (0..1_000_000).map(move |_| random.unit())
+    }
+
+    /// Numbers around one, bit by bit.
+    fn around(x: f64) -> impl Iterator<Item = f64> {
+        (0..200_u64).map(move |i| f64::from_bits(x.to_bits() - 100 + i))
+    }
+
+    #[test]
+    fn logarithms_are_libms_to_the_bit() {
+        let fine = (0..=53).map(|power| 2.0_f64.powi(-power));
+        let edges = [1.0, std::f64::consts::FRAC_1_SQRT_2].into_iter().flat_map(around);
+        for x in units().map(|u| 1.0 - u).chain(fine).chain(edges) {
+            assert_eq!(ln(x).to_bits(), libm::log(x).to_bits(), "ln {x:e}");
+        }
+    }
+
+    #[test]
+    fn sines_and_cosines_are_libms_to_the_bit() {
+        use std::f64::consts::{FRAC_PI_4, TAU};
+        let small = (20..60).map(|power| 2.0_f64.powi(-power));
+        // Where the number of quarter turns changes, by libm's bits and by value.
+        let upper = [0x3fe9_21fb_u64, 0x4002_d97c, 0x400f_6a7a, 0x4015_fdbc];
+        let edges = upper.into_iter().flat_map(|upper| around(f64::from_bits((upper + 1) << 32)));
+        let eighths = [1.0, 3.0, 5.0, 7.0].into_iter().flat_map(|n| around(n * FRAC_PI_4));
+        let edges = edges.chain(eighths).map(|x| x / TAU);
+        let mut left_out = 0;
+        for turn in units().chain(small).chain(edges).chain([0.0]) {
+            if is_near_an_axis(turn) {
+                left_out += 1;
+                continue;
+            }
+            let angle = TAU * turn;
+            let (s, c) = sin_cos(angle);
+            assert_eq!(s.to_bits(), libm::sin(angle).to_bits(), "sin {angle:e}");
+            assert_eq!(c.to_bits(), libm::cos(angle).to_bits(), "cos {angle:e}");
+        }
+        assert!(left_out < 500, "{left_out} in a million: they cost a call each");
+    }
+
+    #[test]
+    fn exponentials_are_libms_to_the_bit() {
+        let small = (0..60).map(|power| -(2.0_f64.powi(-power)));
+        let edges = [0x3e30_0000_u64, 0x3fd6_2e42, 0x3ff0_a2b1, 0x3ff0_a2b2];
+        let edges = edges.into_iter().flat_map(|u| around(f64::from_bits((u + 1) << 32)));
+        let edges = edges.map(|x| -x);
+        let drawn = units().map(|u| -3.0 * u).chain(units().map(|u| -700.0 * u * u));
+        for x in drawn.chain(small).chain(edges).chain([0.0, -0.0, -700.0]) {
+            assert_eq!(exp(x).to_bits(), libm::exp(x).to_bits(), "exp {x:e}");
+        }
+    }
+}
