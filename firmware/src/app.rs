@@ -1,4 +1,4 @@
-//! The application: scan → health → decode → report, and the link, in one loop without waits.
+//! The application: scan → health → gate → decode → report, and the link, in one loop without waits.
 //!
 //! A board's program makes an [`App`] of its parts and calls [`App::run`], which returns only to be
 //! restarted. Its memory is all in [`Buffers`], for which the program has a static: nothing grows,
@@ -46,6 +46,7 @@ pub struct Buffers<const ROWS: usize, const COLS: usize, const OUTPUTS: usize, c
     frame: Frame<ROWS, COLS>,
     estimate: Estimate<ROWS, OUTPUTS>,
     baseline: Baseline<ROWS, COLS>,
+    rest: Estimate<ROWS, OUTPUTS>,
 }
 
 impl<const ROWS: usize, const COLS: usize, const OUTPUTS: usize, const BYTES: usize> Default
@@ -68,15 +69,15 @@ impl<const ROWS: usize, const COLS: usize, const OUTPUTS: usize, const BYTES: us
             assert!(BYTES >= 128, "and so must an identity");
             assert!(ROWS > 0 && ROWS < 256 && COLS > 0 && OUTPUTS > 0 && OUTPUTS < 256);
         }
+        let nothing =
+            Estimate { outputs: [[0.0; OUTPUTS]; ROWS], status: [RowStatus::Decoded; ROWS] };
         Self {
             receiver: Receiver::new(),
             message: [0; BYTES],
             frame: Frame { row_column_resistance_ohm: [[0.0; COLS]; ROWS] },
-            estimate: Estimate {
-                outputs: [[0.0; OUTPUTS]; ROWS],
-                status: [RowStatus::Decoded; ROWS],
-            },
+            estimate: nothing,
             baseline: Baseline::new(),
+            rest: nothing,
         }
     }
 }
@@ -115,6 +116,8 @@ struct Core<
     frame: &'m mut Frame<ROWS, COLS>,
     estimate: &'m mut Estimate<ROWS, OUTPUTS>,
     baseline: &'m mut Baseline<ROWS, COLS>,
+    /// What the model in force answers to the baseline, once that is captured.
+    rest: &'m mut Estimate<ROWS, OUTPUTS>,
     /// Whether the last scan gave any reading at all.
     sensor_answers: bool,
     /// Request that waits for the baseline, and how many frames are still to be scanned for it.
@@ -140,7 +143,7 @@ impl<
         configuration: Configuration,
         buffers: &'m mut Buffers<ROWS, COLS, OUTPUTS, BYTES>,
     ) -> Self {
-        let Buffers { receiver, message, frame, estimate, baseline } = buffers;
+        let Buffers { receiver, message, frame, estimate, baseline, rest } = buffers;
         let clock = FrameClock::starting_at(platform.now_us());
         let core = Core {
             line: Line::new(platform, message),
@@ -151,6 +154,7 @@ impl<
             frame,
             estimate,
             baseline,
+            rest,
             sensor_answers: true,
             capture: None,
             upload: Upload::new(),

@@ -2,7 +2,7 @@
 
 use model_core::blob::{DecodeError, Metadata};
 use model_core::exp::{ExpKernel, Polynomial};
-use model_core::{Decoder, Estimate, Frame};
+use model_core::{Decoder, Estimate, Frame, Gate};
 
 /// The paper's sensor: 8 row-wires, 18 column-wires, and 18 outputs a row (three axes of six
 /// electrodes).
@@ -117,6 +117,16 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKerne
     /// As [`decode`](Self::decode), into an estimate that is there already.
     pub fn decode_into(&self, frame: &Frame<ROWS, COLS>, estimate: &mut Estimate<ROWS, OUTPUTS>) {
         self.decoder.decode_into(frame, estimate);
+    }
+
+    /// As [`decode_into`](Self::decode_into), but rows that `gate` finds at rest are not inferred.
+    pub fn decode_gated_into(
+        &self,
+        frame: &Frame<ROWS, COLS>,
+        gate: Option<Gate<'_, ROWS, COLS, OUTPUTS>>,
+        estimate: &mut Estimate<ROWS, OUTPUTS>,
+    ) {
+        self.decoder.decode_gated_into(frame, gate, estimate);
     }
 
     /// CRC-32 of the blob in force: tells host and board that they mean the same model.

@@ -224,6 +224,88 @@ fn a_baseline_is_captured_and_contact_is_told_against_it() {
     assert_eq!(decode(&mut session, &board, &nearly).0 & EstimateReport::CONTACT, 0);
 }
 
+/// Captures a baseline of `frames` scans, and returns to a configuration that scans only when asked to, in
+/// which rows are at rest within 2 %.
+fn capture(session: &mut TestSession<'_>, board: &Board, frames: u16) {
+    let scanning = Configuration { frame_period_us: 100, ..quiet() };
+    ask(session, board, &Request::Configure(scanning), |_| ());
+    let request = request_bytes(9, &Request::CaptureBaseline { frames });
+    board.0.borrow_mut().to_device.extend(request);
+    board.0.borrow_mut().to_host.clear();
+    while !reports(&board.0.borrow().to_host).iter().any(|(number, _)| *number == 9) {
+        assert_eq!(session.step(), None);
+        assert!(board.0.borrow().now_us < 1_000_000, "no answer");
+    }
+    let gating = Configuration { rest_tolerance: 0.02, ..quiet() };
+    ask(session, board, &Request::Configure(gating), |_| ());
+}
+
+#[test]
+fn rows_at_rest_answer_as_the_baseline_and_the_others_as_without_a_gate() {
+    let blob = blob(3, 4);
+    let mut slots = MockSlot::pair_with(&blob);
+    let mut bench = Bench::new(Configuration { rest_tolerance: 0.02, ..quiet() });
+    let board = bench.board.clone();
+    let mut session = Session::start(&mut bench.app, &mut slots);
+    let rest = frame_at_rest();
+    let mut touched = rest;
+    touched.row_column_resistance_ohm = [[60.5, 60.5, 62.5], [63.0, 64.0, 63.0]];
+    let row = |frame: &Frame<ROWS, COLS>, row: usize| bits(expected(&blob, frame)[row].into_iter());
+    let ungated = [row(&touched, 0), row(&touched, 1)].concat();
+
+    // No baseline, no gate.
+    let (_, status, found) = decode(&mut session, &board, &touched);
+    assert_eq!((&status[..], &found), (&[0, 0][..], &ungated));
+    capture(&mut session, &board, 3);
+    assert_eq!(statistics(&mut session, &board).rows_at_rest, 0);
+
+    let (_, status, found) = decode(&mut session, &board, &touched);
+    assert_eq!(status, [3, 0]);
+    assert_eq!(found, [row(&rest, 0), row(&touched, 1)].concat());
+    assert_ne!(found, ungated);
+    assert_eq!(statistics(&mut session, &board).rows_at_rest, 1);
+
+    // A fault is no rest.
+    let mut faulty = rest;
+    faulty.row_column_resistance_ohm[0][1] = f32::NAN;
+    assert_eq!(decode(&mut session, &board, &faulty).1, [1, 3]);
+    assert_eq!(statistics(&mut session, &board).rows_at_rest, 2);
+
+    // Switched off, or while a new baseline is captured, every row is decoded.
+    ask(&mut session, &board, &Request::Configure(quiet()), |_| ());
+    assert_eq!(decode(&mut session, &board, &touched).2, ungated);
+    let scanning = Configuration { frame_period_us: 1_000_000, rest_tolerance: 0.02, ..quiet() };
+    ask(&mut session, &board, &Request::Configure(scanning), |_| ());
+    assert_eq!(decode(&mut session, &board, &rest).1, [3, 3]);
+    let again = request_bytes(9, &Request::CaptureBaseline { frames: 1000 });
+    board.0.borrow_mut().to_device.extend(again);
+    settle(&mut session, &board);
+    assert_eq!(decode(&mut session, &board, &rest).1, [0, 0]);
+}
+
+#[test]
+fn another_model_gives_its_own_answer_for_rest() {
+    let (first, second) = (blob(3, 4), blob(5, 4));
+    let mut slots = MockSlot::pair_with(&first);
+    let mut bench = Bench::new(quiet());
+    let board = bench.board.clone();
+    let mut nearly = frame_at_rest();
+    nearly.row_column_resistance_ohm[1][2] = 64.5;
+    let mut session = Session::start(&mut bench.app, &mut slots);
+    capture(&mut session, &board, 1);
+    let rest = |blob: &[u8]| bits(expected(blob, &frame_at_rest()).into_iter().flatten());
+    let (_, status, found) = decode(&mut session, &board, &nearly);
+    assert_eq!((&status[..], found), (&[3, 3][..], rest(&first)));
+    for step in upload_steps(&second, 64) {
+        ask(&mut session, &board, &Request::Upload(step), |_| ());
+    }
+    let _ = session;
+    let mut session = Session::start(&mut bench.app, &mut slots);
+    assert_eq!(model_crc(&mut session, &board), Some(crc_of(&second)));
+    let (_, status, found) = decode(&mut session, &board, &nearly);
+    assert_eq!((&status[..], found), (&[3, 3][..], rest(&second)));
+}
+
 #[test]
 fn a_baseline_that_will_not_come_is_refused_and_one_that_comes_is_counted_once() {
     let mut slots = MockSlot::pair_with(&blob(3, 4));

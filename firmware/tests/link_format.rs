@@ -3,11 +3,12 @@
 mod common;
 
 use common::request_bytes;
+use firmware::link::cobs;
 use firmware::link::message::{
     Configuration, ConfigurationField, EstimateReport, HealthReport, Identity, Memory, ModelFault,
     ModelIdentity, Refusal, Report, Request, Statistics, UploadState, UploadStep,
 };
-use firmware::link::{cobs, packet};
+use firmware::link::packet::{self, PROTOCOL_VERSION};
 use model_core::blob::Floats;
 
 const SPECIFICATION: &str = include_str!("../../docs/link.md");
@@ -51,11 +52,15 @@ fn messages_give_the_specifications_worked_bytes() {
     let floats = [60.0, f32::NAN];
     let readings_ohm = Floats::of(&floats);
     let estimate =
-        EstimateReport { frame: 300, flags: 2, row_status: &[0, 1], outputs: readings_ohm };
+        EstimateReport { frame: 300, flags: 2, row_status: &[3, 1], outputs: readings_ohm };
     let health =
         HealthReport { frame: 300, missing: 1, shorted: 0, open: 0, faulty_columns: &[2, 0, 0, 0] };
-    let statistics =
-        Statistics { frames_scanned: 1, longest_decode_us: 2, ..Statistics::default() };
+    let statistics = Statistics {
+        frames_scanned: 1,
+        rows_at_rest: 8,
+        longest_decode_us: 2,
+        ..Statistics::default()
+    };
     let upload = |step| request_bytes(6, &Request::Upload(step));
     let refused = |refusal| report_bytes(6, &Report::Refused(refusal));
     let found = [
@@ -63,6 +68,16 @@ fn messages_give_the_specifications_worked_bytes() {
         ("statistics?", request_bytes(2, &Request::Statistics)),
         ("configuration?", request_bytes(3, &Request::Configuration)),
         ("configure", request_bytes(300, &Request::Configure(Configuration::DEFAULT))),
+        (
+            "configure: rest tolerance 0.0175",
+            request_bytes(
+                300,
+                &Request::Configure(Configuration {
+                    rest_tolerance: 0.0175,
+                    ..Configuration::DEFAULT
+                }),
+            ),
+        ),
         (
             "capture baseline of 20 frames",
             request_bytes(4, &Request::CaptureBaseline { frames: 20 }),
@@ -90,10 +105,10 @@ fn messages_give_the_specifications_worked_bytes() {
             report_bytes(6, &Report::Upload(UploadState::Committed { crc_32: 0x1234_5678 })),
         ),
         ("restarting", report_bytes(7, &Report::Restarting)),
-        ("refused: version", refused(Refusal::Version(1))),
+        ("refused: version", refused(Refusal::Version(PROTOCOL_VERSION))),
         (
-            "refused: contact threshold",
-            refused(Refusal::Configuration(ConfigurationField::ContactThreshold)),
+            "refused: rest tolerance",
+            refused(Refusal::Configuration(ConfigurationField::RestTolerance)),
         ),
         ("refused: too large", refused(Refusal::TooLarge { slot_bytes: 131_056 })),
         ("refused: another shape", refused(Refusal::BadModel(ModelFault::Shape))),

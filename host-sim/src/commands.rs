@@ -4,6 +4,7 @@ pub mod decode;
 pub mod emulate;
 pub mod eval;
 pub mod forward;
+pub mod gate;
 pub mod inspect;
 pub mod link;
 pub mod readout;

@@ -1,6 +1,7 @@
 //! Evaluation: errors by every definition, and the tables made of them.
 
 pub mod cost;
+pub mod gate;
 pub mod metrics;
 pub mod quantisation;
 pub mod readout;

@@ -8,8 +8,8 @@ use host_sim::Result;
 mod commands;
 
 use commands::{
-    Common, decode, emulate, eval, forward, inspect, link, readout, run, synth, table1, trade,
-    train,
+    Common, decode, emulate, eval, forward, gate, inspect, link, readout, run, synth, table1,
+    trade, train,
 };
 
 /// Simulate, train and evaluate resistive tactile sensors; write weight blobs for the device.
@@ -37,6 +37,7 @@ enum Command {
     Table1(table1::Arguments),
     Trade(trade::Arguments),
     Readout(readout::Arguments),
+    Gate(gate::Arguments),
     Emulate(emulate::Arguments),
     Link(link::Arguments),
 }
@@ -55,6 +56,7 @@ fn main() -> ExitCode {
         Command::Table1(arguments) => table1::execute(&arguments, &cli.common),
         Command::Trade(arguments) => trade::execute(&arguments, &cli.common),
         Command::Readout(arguments) => readout::execute(&arguments, &cli.common),
+        Command::Gate(arguments) => gate::execute(&arguments, &cli.common),
         Command::Emulate(arguments) => emulate::execute(&arguments, &cli.common),
         Command::Link(arguments) => link::execute(&arguments, &cli.common),
     };

@@ -3,29 +3,11 @@
 use core::marker::PhantomData;
 
 use crate::blob::{DecodeError, Metadata, Model, ModelShape, NetworkSection};
+use crate::estimate::{Estimate, RowStatus};
 use crate::exp::{ExpKernel, Polynomial};
 use crate::frame::Frame;
+use crate::gate::Gate;
 use crate::rbf::{Finite, Format};
-
-/// What became of one row of a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum RowStatus {
-    /// All readings were there; the outputs are valid.
-    Decoded,
-    /// At least one reading was missing (not a finite number); the outputs are NaN.
-    MissingReading,
-    /// Readings or weights so large that an output overflowed; the outputs are NaN.
-    Overflow,
-}
-
-/// The outputs of every row, in the units of the model's output columns.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Estimate<const ROWS: usize, const OUTPUTS: usize> {
-    /// `[row][output]`; NaN where the row could not be decoded.
-    pub outputs: [[f32; OUTPUTS]; ROWS],
-    /// What became of each row.
-    pub status: [RowStatus; ROWS],
-}
 
 /// RAM in bytes that a [`Decoder`] of so many `rows` takes on a 32-bit target, whatever its K: slices
 /// into the blob. The link check of the firmware holds it to the compiler.
@@ -116,16 +98,40 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKerne
 
     /// As [`decode`](Self::decode), into an estimate that is there already.
     pub fn decode_into(&self, frame: &Frame<ROWS, COLS>, estimate: &mut Estimate<ROWS, OUTPUTS>) {
+        self.decode_gated_into(frame, None, estimate);
+    }
+
+    /// As [`decode_into`](Self::decode_into), but a row that `gate` finds at rest is not inferred: it takes
+    /// the outputs at rest. All other rows are decoded as without a gate, to the bit.
+    #[inline(never)] // one copy of inference in flash, whoever decodes
+    pub fn decode_gated_into(
+        &self,
+        frame: &Frame<ROWS, COLS>,
+        gate: Option<Gate<'_, ROWS, COLS, OUTPUTS>>,
+        estimate: &mut Estimate<ROWS, OUTPUTS>,
+    ) {
         let rows = self.row_sections.iter().zip(&frame.row_column_resistance_ohm);
         let places = estimate.outputs.iter_mut().zip(&mut estimate.status);
         let mut scaled = [0.0; COLS];
-        for ((section, readings), (outputs, status)) in rows.zip(places) {
+        for (row, ((section, readings), (outputs, status))) in rows.zip(places).enumerate() {
+            if let Some(rest) = gate.and_then(|gate| gate.rest_outputs(row, readings)) {
+                copy(rest, outputs);
+                *status = RowStatus::AtRest;
+                continue;
+            }
             *status = decode_row(section, E::exp, readings, &mut scaled, outputs);
             if *status != RowStatus::Decoded {
                 *outputs = [f32::NAN; OUTPUTS];
             }
         }
     }
+}
+
+/// Copies in pieces that a compiler moves by itself: a call of `memcpy` costs twice the time.
+fn copy<const N: usize>(from: &[f32; N], to: &mut [f32; N]) {
+    let ((from, from_rest), (to, to_rest)) = (from.as_chunks::<8>(), to.as_chunks_mut::<8>());
+    to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
+    to_rest.iter_mut().zip(from_rest).for_each(|(to, from)| *to = *from);
 }
 
 /// A row's outputs. Neither generic nor inlined: it is thus compiled here, for speed, where a whole image is

@@ -1,7 +1,7 @@
 //! Inference for resistive tactile sensors: from row–column resistances to deformation.
 //!
-//! Readings travel one way: [`Frame`] (Ω) → [`health`] → [`scale`] → [`rbf`] (and its affine tail) →
-//! [`Estimate`]. The network's weights are read where the [`blob`] lies, in flash or in a
+//! Readings travel one way: [`Frame`] (Ω) → [`health`] → [`gate`] → [`scale`] → [`rbf`] (and its affine
+//! tail) → [`Estimate`]. The network's weights are read where the [`blob`] lies, in flash or in a
 //! file's buffer: nothing is copied, nothing is allocated, and no release code path of
 //! [`Decoder`] panics. [`rls`] updates output weights sample by sample.
 //!
@@ -19,16 +19,20 @@ compile_error!("the weight blob holds little-endian floats that are borrowed in 
 pub mod blob;
 pub mod checksum;
 mod decoder;
+mod estimate;
 pub mod exp;
 mod frame;
+pub mod gate;
 pub mod health;
 pub mod rbf;
 pub mod rls;
 pub mod scale;
 
 pub use blob::Aligned;
-pub use decoder::{Decoder, Estimate, RowStatus, decoder_ram_bytes};
+pub use decoder::{Decoder, decoder_ram_bytes};
+pub use estimate::{Estimate, RowStatus};
 pub use frame::{ColumnWire, Frame, RowWire};
+pub use gate::Gate;
 
 /// The README's example is a test.
 #[cfg(doctest)]

@@ -6,7 +6,8 @@ use crate::readout::ScanSettings;
 /// Frame periods in µs, from the shortest to the longest.
 const FRAME_PERIOD_US: core::ops::RangeInclusive<u32> = 100..=1_000_000_000;
 impl Configuration {
-    /// 100 frames a second, of which estimates are sent; limits for rubber of some 60 Ω.
+    /// 100 frames a second, of which estimates are sent; limits for rubber of some 60 Ω; every row is
+    /// decoded.
     pub const DEFAULT: Self = Self {
         frame_period_us: 10_000,
         scan: ScanSettings { settling_us: 100, oversampling: 1 },
@@ -15,6 +16,7 @@ impl Configuration {
         shorted_below_ohm: 5.0,
         open_above_ohm: 1000.0,
         contact_threshold: 0.02,
+        rest_tolerance: 0.0,
     };
 
     /// Whether every field is in its range.
@@ -39,6 +41,7 @@ impl Configuration {
                 ConfigurationField::Limits,
             ),
             (positive(self.contact_threshold), ConfigurationField::ContactThreshold),
+            ((0.0..1.0).contains(&self.rest_tolerance), ConfigurationField::RestTolerance),
         ];
         checks.into_iter().find(|(good, _)| !good).map_or(Ok(()), |(_, field)| Err(field))
     }
@@ -67,6 +70,9 @@ mod tests {
                 Configuration { contact_threshold: 0.0, ..good },
                 ConfigurationField::ContactThreshold,
             ),
+            (Configuration { rest_tolerance: -0.01, ..good }, ConfigurationField::RestTolerance),
+            (Configuration { rest_tolerance: 1.0, ..good }, ConfigurationField::RestTolerance),
+            (Configuration { rest_tolerance: f32::NAN, ..good }, ConfigurationField::RestTolerance),
         ] {
             assert_eq!(bad.check(), Err(field), "{bad:?}");
         }

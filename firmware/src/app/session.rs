@@ -3,7 +3,7 @@
 use model_core::blob::Floats;
 use model_core::exp::ExpKernel;
 use model_core::health::{Health, Limits};
-use model_core::{Frame, RowStatus};
+use model_core::{Frame, Gate, RowStatus};
 
 use super::{App, Core};
 use crate::link::message::{EstimateReport, HealthReport, ModelIdentity, Report};
@@ -90,6 +90,7 @@ impl<
         } else {
             warning!("no model in either slot: readings only, until one is uploaded");
         }
+        app.core.decode_baseline(sensor.as_ref());
         Self { app, model: InForce { sensor, identity }, spare }
     }
 
@@ -148,7 +149,7 @@ impl<
             self.count_lost(sent);
         }
         let (flags, health) = self.decode(sensor);
-        self.feed_baseline();
+        self.feed_baseline(sensor);
         if !health.is_good() {
             let faulty = health.faulty_columns.map(u32::to_le_bytes);
             let report = HealthReport {
@@ -180,7 +181,11 @@ impl<
         let health = Health::of(self.frame, limits);
         let mut flags = if health.is_good() { 0 } else { EstimateReport::FAULTY_READING };
         if let Some(sensor) = sensor {
-            sensor.decode_into(self.frame, self.estimate);
+            let captured = self.capture.is_none() && self.baseline.frames() > 0;
+            let gate = captured.then(|| {
+                Gate::new(self.baseline.mean(), self.rest, self.configuration.rest_tolerance)
+            });
+            sensor.decode_gated_into(self.frame, gate.flatten(), self.estimate);
             if self.estimate.status.contains(&RowStatus::Overflow) {
                 flags |= EstimateReport::OVERFLOW;
             }
@@ -195,7 +200,9 @@ impl<
             flags |= EstimateReport::CONTACT;
         }
         let decode_us = self.line.platform().now_us().wrapping_sub(start_us);
+        let at_rest = self.estimate.status.iter().filter(|status| **status == RowStatus::AtRest);
         let s = &mut self.statistics;
+        s.rows_at_rest = s.rows_at_rest.saturating_add(at_rest.count() as u32);
         s.frames_decoded = s.frames_decoded.saturating_add(1);
         s.longest_decode_us = s.longest_decode_us.max(decode_us);
         (flags, health)
@@ -207,6 +214,7 @@ impl<
             RowStatus::Decoded => 0,
             RowStatus::MissingReading => 1,
             RowStatus::Overflow => 2,
+            RowStatus::AtRest => EstimateReport::ROW_AT_REST,
         });
         let outputs = Floats::of(self.estimate.outputs.as_flattened());
         let report = EstimateReport { frame, flags, row_status: &row_status, outputs };
@@ -215,14 +223,28 @@ impl<
     }
 
     /// Takes the frame into the baseline that is being captured, and answers when it is whole.
-    fn feed_baseline(&mut self) {
+    fn feed_baseline<E: ExpKernel>(
+        &mut self,
+        sensor: Option<&Tactile<'_, ROWS, COLS, OUTPUTS, E>>,
+    ) {
         let Some((number, left)) = self.capture else { return };
         self.baseline.add(self.frame);
         self.capture = left.checked_sub(1).filter(|left| *left > 0).map(|left| (number, left));
         if self.capture.is_none() {
+            self.decode_baseline(sensor);
             let mean = self.baseline.mean().row_column_resistance_ohm.as_flattened();
             let sent = self.line.send(number, &Report::Baseline { readings_ohm: Floats::of(mean) });
             self.count_lost(sent);
+        }
+    }
+
+    /// Keeps what the model in force answers to the baseline, for rows at rest.
+    pub(super) fn decode_baseline<E: ExpKernel>(
+        &mut self,
+        sensor: Option<&Tactile<'_, ROWS, COLS, OUTPUTS, E>>,
+    ) {
+        if let Some(sensor) = sensor {
+            sensor.decode_into(self.baseline.mean(), self.rest);
         }
     }
 

@@ -190,6 +190,10 @@ pub struct Configuration {
     pub open_above_ohm: f32,
     /// Relative change against the baseline from which [`EstimateReport::CONTACT`] is told.
     pub contact_threshold: f32,
+    /// Relative change against the baseline within which readings are at rest; a row of such readings,
+    /// whose sum is likewise, is not decoded but answered as the baseline ([`model_core::gate`]). 0
+    /// decodes every row, as does a device without a baseline.
+    pub rest_tolerance: f32,
 }
 
 /// Outputs of one frame.
@@ -199,7 +203,7 @@ pub struct EstimateReport<'a> {
     pub frame: u32,
     /// Sum of the flags below.
     pub flags: u8,
-    /// One byte a row: 0 decoded, 1 a reading missing, 2 overflow.
+    /// One byte a row: 0 decoded, 1 a reading missing, 2 overflow, 3 at rest.
     pub row_status: &'a [u8],
     /// `rows × outputs` numbers in the units of the model's outputs, NaN where a row is not decoded.
     #[serde(borrow)]
@@ -207,6 +211,8 @@ pub struct EstimateReport<'a> {
 }
 
 impl EstimateReport<'_> {
+    /// Status of a row at rest: its outputs are those of the baseline.
+    pub const ROW_AT_REST: u8 = 3;
     /// No model is in force: no row is decoded.
     pub const NO_MODEL: u8 = 1;
     /// Some reading is missing, shorted or open.
@@ -241,6 +247,8 @@ pub struct Statistics {
     pub frames_scanned: u32,
     /// Frames decoded, on request or scanned.
     pub frames_decoded: u32,
+    /// Rows of these that were at rest, and so took no inference.
+    pub rows_at_rest: u32,
     /// Frames that could not be scanned in time.
     pub frames_missed: u32,
     /// Samples that the converter did not give.
@@ -324,6 +332,8 @@ pub enum ConfigurationField {
     Limits,
     /// Positive and finite.
     ContactThreshold,
+    /// From 0, and below 1.
+    RestTolerance,
 }
 
 /// What is wrong with an uploaded blob; the host's `inspect` tells more of the file itself.

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 /// The protocol that this crate speaks. A device answers any other version with
 /// [`Refusal::Version`](super::message::Refusal::Version) and nothing else.
-pub const PROTOCOL_VERSION: u8 = 1;
+pub const PROTOCOL_VERSION: u8 = 2;
 
 /// The number of messages that answer no request.
 pub const UNASKED: u16 = 0;

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use clap::{Args, Subcommand, value_parser};
-use firmware::link::message::{Configuration, Report, Request, Statistics};
+use firmware::link::message::{Configuration, EstimateReport, Report, Request, Statistics};
 use firmware::timing::ScanPlan;
 use host_sim::device::check::check;
 use host_sim::device::{Device, DeviceIdentity, Wire, refused, serial, upload};
@@ -64,6 +64,10 @@ struct RecordArguments {
     model: Option<PathBuf>,
     #[command(flatten)]
     scan: ScanArguments,
+    /// Relative change within which a row is at rest and not decoded, once the device has a `baseline`; 0
+    /// decodes all (docs/gating.md).
+    #[arg(long, value_name = "SHARE", default_value_t = Configuration::DEFAULT.rest_tolerance, value_parser = tolerance, allow_negative_numbers = true)]
+    rest_tolerance: f32,
     /// CSV file to write.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
@@ -107,7 +111,15 @@ struct Saved {
     frames_lost: u32,
     /// Readings or outputs that are empty.
     values_missing: usize,
+    /// Rows that were at rest, and so were not decoded.
+    rows_at_rest: usize,
     file: PathBuf,
+}
+
+/// A tolerance that a device takes.
+fn tolerance(text: &str) -> std::result::Result<f32, String> {
+    let share = text.parse().ok().filter(|share| (0.0..1.0).contains(share));
+    share.ok_or_else(|| "give a share from 0 and below 1, such as 0.0175 for 3.5 × 0.5 %".into())
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
@@ -153,8 +165,13 @@ fn status(status: &Status, common: &Common) -> Result<()> {
     });
     page.line(format_args!("{:<17} {model}", "model"));
     page.line(format_args!(
-        "{:<17} {} scanned, {} decoded, {} missed, {} samples failed",
-        "frames", s.frames_scanned, s.frames_decoded, s.frames_missed, s.failed_samples
+        "{:<17} {} scanned, {} decoded (of which {} rows at rest), {} missed, {} samples failed",
+        "frames",
+        s.frames_scanned,
+        s.frames_decoded,
+        s.rows_at_rest,
+        s.frames_missed,
+        s.failed_samples
     ));
     page.line(format_args!(
         "{:<17} scan {} µs, decoding {} µs",
@@ -177,11 +194,17 @@ enum Wanted {
 }
 
 /// Puts a configuration in force.
-fn configure<W: Wire>(device: &mut Device<W>, scan: &ScanArguments, wanted: Wanted) -> Result<()> {
+fn configure<W: Wire>(
+    device: &mut Device<W>,
+    scan: &ScanArguments,
+    wanted: Wanted,
+    rest_tolerance: f32,
+) -> Result<()> {
     let mut configuration = Configuration {
         frame_period_us: scan.period_us,
         send_readings: wanted == Wanted::Readings,
         send_estimates: wanted == Wanted::Estimates,
+        rest_tolerance,
         ..Configuration::DEFAULT
     };
     configuration.scan.settling_us = scan.settling_us;
@@ -220,8 +243,8 @@ fn record<W: Wire>(
         None => (Wanted::Readings, reading_names(&identity)),
     };
     let patience = patience(&action.scan, &identity);
-    let frames = device.while_paused(|device| {
-        configure(device, &action.scan, wanted)?;
+    let (frames, rows_at_rest) = device.while_paused(|device| {
+        configure(device, &action.scan, wanted, action.rest_tolerance)?;
         hear_frames(device, action.scan.frames.into(), patience, wanted)
     })?;
     let missing = missing(frames.iter().flat_map(|(_, line)| line), wanted)?;
@@ -230,7 +253,8 @@ fn record<W: Wire>(
     let span = frames.last().zip(frames.first()).map_or(0, |(last, first)| last.0 - first.0 + 1);
     let frames_lost = span.saturating_sub(frames.len() as u32);
     let file = action.output.clone();
-    saved(&Saved { frames: frames.len(), frames_lost, values_missing: missing, file }, common)
+    let (frames, values_missing) = (frames.len(), missing);
+    saved(&Saved { frames, frames_lost, values_missing, rows_at_rest, file }, common)
 }
 
 /// How many values are missing; all of them are a failure.
@@ -263,23 +287,27 @@ fn reading_names(identity: &DeviceIdentity) -> Vec<String> {
     rows.flat_map(|m| (1..=identity.columns).map(move |k| format!("r{m}c{k}_ohm"))).collect()
 }
 
-/// The frames that the device sends, with their numbers.
+/// A frame's number, and its readings or outputs.
+type NumberedFrame = (u32, Vec<f64>);
+
+/// The frames that the device sends, with their numbers, and how many rows of all of them were at rest.
 fn hear_frames<W: Wire>(
     device: &mut Device<W>,
     count: usize,
     patience: Duration,
     wanted: Wanted,
-) -> Result<Vec<(u32, Vec<f64>)>> {
+) -> Result<(Vec<NumberedFrame>, usize)> {
     let progress = Progress::on_terminal();
     progress.stage("recording", count);
-    let mut frames: Vec<(u32, Vec<f64>)> = Vec::new();
+    let mut frames: Vec<NumberedFrame> = Vec::new();
+    let mut rows_at_rest = 0;
     let enough = device.hear(Instant::now() + patience, |_, report| {
-        let (frame, values) = match report {
+        let (frame, values, status) = match report {
             Report::Readings { frame, readings_ohm } if wanted == Wanted::Readings => {
-                (*frame, *readings_ohm)
+                (*frame, *readings_ohm, &[][..])
             }
             Report::Estimate(estimate) if wanted == Wanted::Estimates => {
-                (estimate.frame, estimate.outputs)
+                (estimate.frame, estimate.outputs, estimate.row_status)
             }
             _ => return None,
         };
@@ -287,11 +315,13 @@ fn hear_frames<W: Wire>(
             return Some(Err(Error::Failed("the device has started anew meanwhile".into())));
         }
         frames.push((frame, values.iter().map(f64::from).collect()));
+        let at_rest = status.iter().filter(|status| **status == EstimateReport::ROW_AT_REST);
+        rows_at_rest += at_rest.count();
         progress.step();
         (frames.len() == count).then_some(Ok(()))
     })?;
     match enough {
-        Some(outcome) => outcome.map(|()| frames),
+        Some(outcome) => outcome.map(|()| (frames, rows_at_rest)),
         None => Err(Error::Failed(format!("only {} of {count} frames came in time", frames.len()))),
     }
 }
@@ -307,7 +337,7 @@ fn baseline<W: Wire>(
     let request = Request::CaptureBaseline { frames };
     let patience = patience(&action.scan, &identity);
     let answer = device.while_paused(|device| {
-        configure(device, &action.scan, Wanted::Nothing)?;
+        configure(device, &action.scan, Wanted::Nothing, 0.0)?;
         device.ask(&request, patience, |report| match report {
             Report::Baseline { readings_ohm } => {
                 Some(readings_ohm.iter().map(f64::from).collect::<Vec<_>>())
@@ -321,7 +351,8 @@ fn baseline<W: Wire>(
     let lines = std::iter::once(readings.iter().copied());
     data_file::write(&action.output, names.iter().map(String::as_str), lines)?;
     let file = action.output.clone();
-    saved(&Saved { frames: frames.into(), frames_lost: 0, values_missing, file }, common)
+    let (frames, frames_lost, rows_at_rest) = (frames.into(), 0, 0);
+    saved(&Saved { frames, frames_lost, values_missing, rows_at_rest, file }, common)
 }
 
 fn saved(saved: &Saved, common: &Common) -> Result<()> {
@@ -336,5 +367,8 @@ fn saved(saved: &Saved, common: &Common) -> Result<()> {
         saved.frames_lost,
         saved.values_missing
     ));
+    if saved.rows_at_rest > 0 {
+        page.line(format_args!("{} rows were at rest, and not decoded", saved.rows_at_rest));
+    }
     page.print()
 }

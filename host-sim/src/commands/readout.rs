@@ -3,15 +3,14 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use host_sim::Result;
 use host_sim::evaluate::metrics::Errors;
 use host_sim::evaluate::readout::{self, ReadoutResult, Stage};
-use host_sim::model::{self, LoadedModel};
 use host_sim::progress::Progress;
-use host_sim::scene::{Circuit, Scene};
+use host_sim::scene::Circuit;
 use host_sim::virtual_hardware::VirtualBoard;
-use host_sim::{Error, Result};
 
-use super::scene_argument::SceneArgument;
+use super::scene_argument::{self, SceneArgument};
 use super::{Common, print};
 
 /// Scan frames of a scene through a virtual board, and decode them: divider against zero potential.
@@ -36,28 +35,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let scene = arguments.scene.load(common)?;
     scene.check_frames("--frames", arguments.frames)?;
     VirtualBoard::new(&scene)?;
-    let model = match &arguments.model {
-        Some(path) => read(path.clone(), &scene)?,
-        None => model::train_scene(&scene, &Progress::on_terminal())?,
-    };
+    let model =
+        scene_argument::model(arguments.model.as_deref(), &scene, &Progress::on_terminal())?;
     let result = readout::measure(&scene, &model, arguments.frames)?;
     if common.json { print::json(&result) } else { page_of(&result).print() }
-}
-
-fn read(path: PathBuf, scene: &Scene) -> Result<LoadedModel> {
-    let loaded = LoadedModel::read(&path)?;
-    let model = loaded.model();
-    let metadata = model.metadata();
-    let fits = metadata.input_names.iter().eq(scene.reading_names())
-        && metadata.output_names.iter().eq(scene.output_names());
-    if fits {
-        return Ok(loaded);
-    }
-    let message = format!(
-        "its columns are not those of scene {}; train one with `host-sim train` on this scene",
-        scene.name
-    );
-    Err(Error::Data { path, message })
 }
 
 fn page_of(result: &ReadoutResult) -> print::Page {

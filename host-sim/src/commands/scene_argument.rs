@@ -3,9 +3,11 @@
 use std::path::Path;
 
 use clap::Args;
-use host_sim::Result;
+use host_sim::model::{self, LoadedModel};
+use host_sim::progress::Progress;
 use host_sim::scene::Scene;
 use host_sim::sensor::Precision;
+use host_sim::{Error, Result};
 
 use super::Common;
 
@@ -61,4 +63,23 @@ impl NoiseArgument {
     pub fn is_given(&self) -> bool {
         self.noise.is_some()
     }
+}
+
+/// The model in the blob at `path`, whose columns must be those of `scene`; without one, the model that
+/// the scene describes.
+pub fn model(path: Option<&Path>, scene: &Scene, progress: &Progress) -> Result<LoadedModel> {
+    let Some(path) = path else { return model::train_scene(scene, progress) };
+    let loaded = LoadedModel::read(path)?;
+    let model = loaded.model();
+    let metadata = model.metadata();
+    let fits = metadata.input_names.iter().eq(scene.reading_names())
+        && metadata.output_names.iter().eq(scene.output_names());
+    if fits {
+        return Ok(loaded);
+    }
+    let message = format!(
+        "its columns are not those of scene {}; train one with `host-sim train` on this scene",
+        scene.name
+    );
+    Err(Error::Data { path: path.into(), message })
 }

@@ -2,6 +2,7 @@
 
 use super::figures::{Figure, Group, Scope};
 use super::regions::Count;
+use std::fmt::Write as _;
 
 /// The clock that times are given for: an STM32F4's at its usual highest.
 const CLOCK_MHZ: f64 = 168.0;
@@ -28,7 +29,8 @@ const TWIN: &str = "-portable";
 
 /// Markdown tables: all figures, and what assembly saves. Cycles where nothing else is said.
 pub fn markdown(figures: &[Figure]) -> String {
-    let cell = |count: Option<Count>, shown: fn(Count) -> String| count.map_or("".into(), shown);
+    let cell =
+        |count: Option<Count>, shown: fn(Count) -> String| count.map_or(String::new(), shown);
     let rows = Group::of(figures).map(|group| {
         let count = |affine, scope| group.count(affine, scope);
         let cells = [
@@ -117,9 +119,11 @@ pub fn json(figures: &[Figure]) -> String {
                 ("affine_frame_", true, Scope::Frame),
             ] {
                 if let Some(Count { instructions, cycles }) = group.count(affine, scope) {
-                    object.push_str(&format!(
+                    // Writing to a string cannot fail.
+                    let _ = write!(
+                        object,
                         ", \"{prefix}instructions\": {instructions}, \"{prefix}cycles\": {cycles}"
-                    ));
+                    );
                 }
             }
             object + "}"

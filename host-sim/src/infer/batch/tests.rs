@@ -108,9 +108,10 @@ proptest! {
             (0..networks).map(|_| words(&mut draw, shape, expanded, affine, one_width)).collect();
         let networks: Vec<Network<'_>> = words
             .iter()
-            .map(|words| match expanded {
-                true => expanded::Network::try_new(shape, affine, words).unwrap().into(),
-                false => direct::Network::of_words(shape, one_width, affine, words).unwrap().into(),
+            .map(|words| if expanded {
+                expanded::Network::try_new(shape, affine, words).unwrap().into()
+            } else {
+                direct::Network::of_words(shape, one_width, affine, words).unwrap().into()
             })
             .collect();
         check(&networks, &mut draw, lines);

@@ -1,0 +1,327 @@
+//! What gating saves, and what it misses: rows at rest that are not decoded.
+
+use model_core::gate::is_at_rest;
+use serde::Serialize;
+
+use crate::dataset::Table;
+use crate::error::{Error, Result};
+use crate::evaluate::metrics::{self, Errors, Measure};
+use crate::infer::Kernel;
+use crate::model::{LoadedModel, Origin};
+use crate::random::Stream;
+use crate::scene::{Deformation, NoiseKind, Outputs, Quantity, Scene};
+use crate::sensor::Axis;
+use crate::synth::synthesise;
+
+/// Sizes in mm beyond which a deformation is counted as missed if its row is taken to be at rest.
+pub const MISSED_OVER_MM: [f64; 4] = [0.02, 0.05, 0.1, 0.2];
+
+/// What a row costs a device, in cycles.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Costs {
+    /// A row that is decoded without a gate.
+    pub row_cycles: f64,
+    /// A row at rest: the test, and the copy of its outputs.
+    pub resting_row_cycles: f64,
+    /// The test of a row that is decoded after all, at its dearest: by the last reading.
+    pub test_cycles: f64,
+}
+
+impl Costs {
+    /// The cost of a frame of which this share of rows is at rest, in parts of one without a gate.
+    #[must_use]
+    pub fn relative(&self, at_rest: f64) -> f64 {
+        let awake_cycles = self.row_cycles + self.test_cycles;
+        (at_rest * self.resting_row_cycles + (1.0 - at_rest) * awake_cycles) / self.row_cycles
+    }
+}
+
+/// What is measured.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Tolerances, in standard deviations of a reading's noise.
+    pub k: Vec<f64>,
+    /// Frames of the scene, and as many of the untouched sensor.
+    pub frames: usize,
+    /// Frames of the untouched sensor whose mean is the baseline.
+    pub baseline_frames: usize,
+    /// What rows cost, if it is known.
+    pub costs: Option<Costs>,
+}
+
+impl Settings {
+    /// Whether these settings make gates for `scene`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`], naming the option, its value and the fix.
+    pub fn check(&self, scene: &Scene) -> Result<()> {
+        let level = scene.noise.level;
+        if scene.noise.kind != NoiseKind::Relative {
+            return Err(Error::Usage(
+                "noise.kind = \"span\": the gate's tolerance is relative to each reading; use a scene \
+                 with noise.kind = \"relative\""
+                    .into(),
+            ));
+        }
+        if level <= 0.0 {
+            return Err(Error::Usage(
+                "noise level = 0: the gate's tolerance is k times it; give a positive --noise, such as \
+                 0.005"
+                    .into(),
+            ));
+        }
+        if self.baseline_frames == 0 {
+            return Err(Error::Usage(
+                "--baseline-frames 0: give at least 1 frame to average".into(),
+            ));
+        }
+        match self.k.iter().find(|k| !(**k > 0.0 && *k * level < 1.0)) {
+            Some(k) => Err(Error::Usage(format!(
+                "--k {k}: give positive numbers with k × noise below 1, such as 3.5 (noise is {level})"
+            ))),
+            None if self.k.is_empty() => {
+                Err(Error::Usage("--k: give at least one number, such as 3.5".into()))
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+/// Rows that were moved by more than `over_mm`, and those of them that were taken to be at rest.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Missed {
+    /// The size in mm: the largest ‖Δ‖ of the row's electrodes.
+    pub over_mm: f64,
+    /// Rows that were moved so far.
+    pub rows: usize,
+    /// Those of them that were not decoded.
+    pub missed: usize,
+}
+
+impl Missed {
+    /// Share of such rows that is missed; `None` if there are none.
+    #[must_use]
+    pub fn share(&self) -> Option<f64> {
+        (self.rows > 0).then(|| self.missed as f64 / self.rows as f64)
+    }
+}
+
+/// One tolerance.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Line {
+    /// In standard deviations of a reading's noise.
+    pub k: f64,
+    /// The same relative to the reading: what a device is configured with.
+    pub rest_tolerance: f64,
+    /// Share of the scene's rows that is not decoded.
+    pub skipped: f64,
+    /// Share of rows that is decoded although nothing touches the sensor.
+    pub woken: f64,
+    /// The same at most, [by theory](woken_by_theory).
+    pub woken_by_theory: f64,
+    /// Rows of the scene that are missed, by [`MISSED_OVER_MM`].
+    pub missed: Vec<Missed>,
+    /// The largest ‖Δ‖ in mm of a row that was not decoded.
+    pub largest_missed_mm: Option<f64>,
+    /// Errors over the scene with this gate.
+    pub errors: Vec<Errors>,
+    /// What a frame of the scene costs, in parts of one without a gate.
+    pub relative_cost: Option<f64>,
+    /// The same of the untouched sensor.
+    pub relative_cost_untouched: Option<f64>,
+}
+
+/// A scene behind gates of several tolerances.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GateResult {
+    /// Name of the scene.
+    pub scene: String,
+    /// Seed of every draw.
+    pub seed: u64,
+    /// Relative noise of a reading.
+    pub noise_level: f64,
+    /// Frames of the scene, and as many of the untouched sensor.
+    pub frames: usize,
+    /// Rows of a frame.
+    pub rows: usize,
+    /// Frames whose mean is the baseline.
+    pub baseline_frames: usize,
+    /// CRC-32 of the model, in hexadecimal.
+    pub model_crc: String,
+    /// What rows cost, if it is known.
+    pub costs: Option<Costs>,
+    /// Errors over the scene without a gate.
+    pub ungated_errors: Vec<Errors>,
+    /// Errors of answering the mean of these frames.
+    pub mean_errors: Vec<Errors>,
+    /// One tolerance after the other.
+    pub lines: Vec<Line>,
+}
+
+/// The share of untouched rows of n `readings` that wake for noise alone, at most: 1 − (1 − 2Q(k'))^(n + 1)
+/// for the readings and their sum (Šidák's inequality), with Q the upper tail of the normal distribution, and
+/// k' = k/√(1 + 1/B) for the noise that is left in a baseline of B frames.
+#[must_use]
+pub fn woken_by_theory(k: f64, readings: usize, baseline_frames: usize) -> f64 {
+    let k = k / (1.0 + 1.0 / baseline_frames as f64).sqrt();
+    let beyond = libm::erfc(k / std::f64::consts::SQRT_2); // 2Q(k)
+    -libm::expm1((readings + 1) as f64 * libm::log1p(-beyond))
+}
+
+/// Puts every row of `scene`'s test frames, and of as many frames of the untouched sensor, through gates
+/// for `settings`, and decodes those that are awake with `model`, whose columns must be the scene's.
+///
+/// # Errors
+/// [`Error::Usage`] for a setting, or a noise, that makes no gate.
+pub fn measure(scene: &Scene, model: &LoadedModel, settings: &Settings) -> Result<GateResult> {
+    settings.check(scene)?;
+    let untouched_scene = untouched(scene);
+    let baseline = synthesise(&untouched_scene, Stream::Training, settings.baseline_frames).inputs;
+    let baseline = Table { values: baseline.means(), names: baseline.names };
+    let decode = |readings: &Table| model.decode(Kernel::default(), readings).values;
+    let rest_outputs = decode(&baseline);
+    let gate = Gate { baseline: to_f32(&baseline.values), readings: scene.sensor.column_wires };
+
+    let touched = synthesise(scene, Stream::Test, settings.frames);
+    let sizes_mm = largest_deformations_mm(scene, settings.frames);
+    let untouched_readings = synthesise(&untouched_scene, Stream::Test, settings.frames).inputs;
+    let ungated = decode(&touched.inputs);
+    let origin = Origin::of_scene(scene);
+    let measure = Measure { full_scale: origin.full_scale, thickness_mm: origin.thickness_mm };
+    let errors = |estimate: &[f64]| metrics::by_group(&touched.outputs, estimate, &measure);
+
+    let line = |k: f64| {
+        let rest_tolerance = k * scene.noise.level;
+        let at_rest = gate.at_rest(&touched.inputs, rest_tolerance);
+        let untouched_at_rest = gate.at_rest(&untouched_readings, rest_tolerance);
+        let skipped = share(&at_rest);
+        let missed = MISSED_OVER_MM.map(|over_mm| {
+            let rows = || sizes_mm.iter().zip(&at_rest).filter(|(size_mm, _)| **size_mm > over_mm);
+            let missed = rows().filter(|(_, at_rest)| **at_rest).count();
+            Missed { over_mm, rows: rows().count(), missed }
+        });
+        let sizes_at_rest = sizes_mm.iter().zip(&at_rest).filter(|(_, at_rest)| **at_rest);
+        let cost = |at_rest: f64| settings.costs.map(|costs| costs.relative(at_rest));
+        Line {
+            k,
+            rest_tolerance,
+            skipped,
+            woken: 1.0 - share(&untouched_at_rest),
+            woken_by_theory: woken_by_theory(k, gate.readings, settings.baseline_frames),
+            missed: missed.to_vec(),
+            largest_missed_mm: sizes_at_rest.map(|(size_mm, _)| *size_mm).reduce(f64::max),
+            errors: errors(&gated(&ungated, &rest_outputs, &at_rest, scene.read_rows.len())),
+            relative_cost: cost(skipped),
+            relative_cost_untouched: cost(share(&untouched_at_rest)),
+        }
+    };
+    Ok(GateResult {
+        scene: scene.name.clone(),
+        seed: scene.seed,
+        noise_level: scene.noise.level,
+        frames: settings.frames,
+        rows: scene.read_rows.len(),
+        baseline_frames: settings.baseline_frames,
+        model_crc: format!("{:08x}", model.model().crc()),
+        costs: settings.costs,
+        ungated_errors: errors(&ungated),
+        mean_errors: errors(&touched.outputs.means().repeat(settings.frames)),
+        lines: settings.k.iter().copied().map(line).collect(),
+    })
+}
+
+/// The same sensor and noise with nothing that moves.
+fn untouched(scene: &Scene) -> Scene {
+    let still = [0.0; 2];
+    let deformation = Deformation::Independent { dx_mm: still, dy_mm: still, dz_mm: still };
+    Scene { deformation, ..scene.clone() }
+}
+
+/// The largest ‖Δ‖ in mm of each row of each test frame, whatever the scene's outputs are.
+fn largest_deformations_mm(scene: &Scene, frames: usize) -> Vec<f64> {
+    let axes = vec![Axis::X, Axis::Y, Axis::Z];
+    let outputs = Outputs { quantity: Quantity::Deformation, axes };
+    let mut scene = Scene { outputs, ..scene.clone() };
+    scene.noise.level = 0.0; // of no matter here
+    let deformations_mm = synthesise(&scene, Stream::Test, frames).outputs.values;
+    let length = |delta: &[f64]| delta.iter().map(|d| d * d).sum::<f64>().sqrt();
+    deformations_mm
+        .chunks_exact(3 * scene.sensor.electrodes_per_row_wire)
+        .map(|row| row.chunks_exact(3).map(length).fold(0.0, f64::max))
+        .collect()
+}
+
+/// The device's gate, over tables.
+struct Gate {
+    /// Readings of all rows in Ω.
+    baseline: Vec<f32>,
+    /// Readings of a row.
+    readings: usize,
+}
+
+impl Gate {
+    /// Whether each row of each line is at rest.
+    fn at_rest(&self, readings: &Table, tolerance: f64) -> Vec<bool> {
+        let tolerance = tolerance as f32;
+        let of_line = |line: &[f64]| {
+            let line = to_f32(line);
+            let rows =
+                line.chunks_exact(self.readings).zip(self.baseline.chunks_exact(self.readings));
+            rows.map(|(row, baseline)| is_at_rest(row, baseline, tolerance)).collect::<Vec<_>>()
+        };
+        readings.lines().flat_map(of_line).collect()
+    }
+}
+
+/// The estimate with the outputs of rows at rest in their places.
+fn gated(ungated: &[f64], rest_outputs: &[f64], at_rest: &[bool], rows: usize) -> Vec<f64> {
+    let per_row = rest_outputs.len() / rows;
+    let mut estimate = ungated.to_vec();
+    let rest = rest_outputs.chunks_exact(per_row).cycle();
+    for ((outputs, rest), at_rest) in estimate.chunks_exact_mut(per_row).zip(rest).zip(at_rest) {
+        if *at_rest {
+            outputs.copy_from_slice(rest);
+        }
+    }
+    estimate
+}
+
+fn share(of: &[bool]) -> f64 {
+    of.iter().filter(|b| **b).count() as f64 / of.len() as f64
+}
+
+fn to_f32(values: &[f64]) -> Vec<f32> {
+    values.iter().map(|value| *value as f32).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn theory_is_the_normal_distributions() {
+        // Q(3) = 0.001 349 898; a baseline without noise.
+        let close = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-6, "{a} {b}");
+        close(woken_by_theory(3.0, 0, usize::MAX), 2.0 * 0.001_349_898_031_630_1);
+        close(
+            woken_by_theory(3.0, 17, usize::MAX),
+            1.0 - (1.0 - 0.002_699_796_063_26_f64).powi(18),
+        );
+        // A baseline of one frame is as noisy as a reading: the difference has √2 times the noise.
+        close(woken_by_theory(3.0, 1, 1), woken_by_theory(3.0 / 2.0_f64.sqrt(), 1, usize::MAX));
+    }
+
+    #[test]
+    fn costs_run_from_a_row_at_rest_to_one_that_is_tested_in_vain() {
+        let costs = Costs { row_cycles: 1000.0, resting_row_cycles: 100.0, test_cycles: 50.0 };
+        assert_eq!([0.0, 0.5, 1.0].map(|share| costs.relative(share)), [1.05, 0.575, 0.1]);
+    }
+
+    #[test]
+    fn rows_at_rest_take_the_outputs_at_rest() {
+        let ungated = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0];
+        let at_rest = [true, false, false, true];
+        let expected = [-1.0, -2.0, 3.0, 4.0, 5.0, 6.0, -3.0, -4.0];
+        assert_eq!(gated(&ungated, &[-1.0, -2.0, -3.0, -4.0], &at_rest, 2), expected);
+    }
+}
