@@ -10,7 +10,7 @@ import argparse
 import importlib
 
 # A module each, with a function `rows()`.
-SUBJECTS = ["synthesis", "csv_reading", "training"]
+SUBJECTS = ["synthesis", "csv_reading", "training", "decode"]
 
 
 def in_words(seconds: float) -> str:

@@ -24,6 +24,8 @@ const CENTRES: usize = 4;
 const OUTPUTS: usize = 6;
 /// Centres whose activations are kept until the outputs take them: 4 KiB, in the first cache.
 const KEPT: usize = 64;
+/// Registers that are exponentiated side by side: a polynomial by itself would wait for every operation.
+const ABREAST: usize = 4;
 
 /// One value of every line of a block.
 type Lanes<S> = [<S as Simd>::f32s; VECTORS];
@@ -229,7 +231,7 @@ impl WithSimd for Work<'_> {
 
 impl Work<'_> {
     #[inline(always)]
-    fn run<S: Simd>(self, simd: S, exponent: &impl Exponent) {
+    fn run<S: Simd, E: Exponent>(self, simd: S, exponent: &E) {
         let Self { batch, readings, readings_step, outputs, outputs_step } = self;
         let Shape { inputs, outputs: outputs_of_line, .. } = batch.shape;
         let lanes = VECTORS * S::F32_LANES;
@@ -268,10 +270,14 @@ impl Work<'_> {
             for centres in batch.centres.chunks(KEPT / CENTRES * (1 + inputs)) {
                 let tiles = centres.chunks_exact(1 + inputs);
                 for (tile, places) in tiles.zip(activations.as_chunks_mut::<CENTRES>().0) {
-                    *places = exponent.activations(simd, &opened, tile, &x_interleaved);
+                    *places = exponent.exponents(simd, &opened, tile, &x_interleaved);
                 }
-                let count =
-                    (centres.len() / (1 + inputs) * CENTRES).min(batch.weights.factors - first);
+                let tiles = centres.len() / (1 + inputs);
+                let values = activations[..tiles * CENTRES].as_flattened_mut();
+                for values in values.as_chunks_mut::<ABREAST>().0 {
+                    E::powers(simd, values);
+                }
+                let count = (tiles * CENTRES).min(batch.weights.factors - first);
                 batch.weights.accumulate(simd, first, &activations[..count], &mut y);
                 first += count;
             }
@@ -312,14 +318,17 @@ trait Exponent {
     fn term<S: Simd>(simd: S, x: S::f32s, centre: S::f32s) -> S::f32s;
     /// What the centres share: the second partial sum's start.
     fn open<S: Simd>(&self, simd: S, x: &[Lanes<S>]) -> Lanes<S>;
-    /// Activations of the centres of a `tile`.
-    fn activations<S: Simd>(
+    /// Exponents of the centres of a `tile`.
+    fn exponents<S: Simd>(
         &self,
         simd: S,
         opened: &Lanes<S>,
         tile: &[[f32; CENTRES]],
         x: &[Lanes<S>],
     ) -> [Lanes<S>; CENTRES];
+
+    /// Makes activations of exponents.
+    fn powers<S: Simd>(simd: S, exponents: &mut [S::f32s; ABREAST]);
 
     /// Four partial sums of each centre, from their starts, added pairwise.
     #[inline(always)]
@@ -421,7 +430,7 @@ impl Exponent for Expanded {
     }
 
     #[inline(always)]
-    fn activations<S: Simd>(
+    fn exponents<S: Simd>(
         &self,
         simd: S,
         opened: &Lanes<S>,
@@ -434,13 +443,12 @@ impl Exponent for Expanded {
             *place = [simd.splat_f32s(head); VECTORS];
         }
         let starts = [heads, [*opened; CENTRES], [zero; CENTRES], [zero; CENTRES]];
-        let mut values = self.four_sums(simd, starts, &tile[1..], x);
-        for values in &mut values {
-            for value in values {
-                *value = exp2(simd, *value);
-            }
-        }
-        values
+        self.four_sums(simd, starts, &tile[1..], x)
+    }
+
+    #[inline(always)]
+    fn powers<S: Simd>(simd: S, exponents: &mut [S::f32s; ABREAST]) {
+        exp2(simd, exponents);
     }
 }
 
@@ -465,7 +473,7 @@ impl Exponent for Direct {
     }
 
     #[inline(always)]
-    fn activations<S: Simd>(
+    fn exponents<S: Simd>(
         &self,
         simd: S,
         opened: &Lanes<S>,
@@ -476,10 +484,15 @@ impl Exponent for Direct {
         for (values, &decay) in values.iter_mut().zip(&tile[0]) {
             let decay = simd.splat_f32s(decay);
             for value in values {
-                *value = exp(simd, simd.mul_f32s(decay, *value));
+                *value = simd.mul_f32s(decay, *value);
             }
         }
         values
+    }
+
+    #[inline(always)]
+    fn powers<S: Simd>(simd: S, exponents: &mut [S::f32s; ABREAST]) {
+        exp(simd, exponents);
     }
 }
 
@@ -488,45 +501,66 @@ const ROUND: f32 = 12_582_912.0;
 
 /// ((c₀·r + c₁)·r + …)
 #[inline(always)]
-fn polynomial<S: Simd>(simd: S, r: S::f32s, coefficients: &[f32]) -> S::f32s {
-    let mut p = simd.splat_f32s(coefficients[0]);
+fn polynomial<S: Simd>(
+    simd: S,
+    r: &[S::f32s; ABREAST],
+    coefficients: &[f32],
+) -> [S::f32s; ABREAST] {
+    let mut p = [simd.splat_f32s(coefficients[0]); ABREAST];
     for &c in &coefficients[1..] {
-        p = simd.add_f32s(simd.mul_f32s(p, r), simd.splat_f32s(c));
+        let c = simd.splat_f32s(c);
+        for (p, &r) in p.iter_mut().zip(r) {
+            *p = simd.add_f32s(simd.mul_f32s(*p, r), c);
+        }
     }
     p
 }
 
 /// As `model_core::exp::exp2`.
 #[inline(always)]
-fn exp2<S: Simd>(simd: S, u: S::f32s) -> S::f32s {
+fn exp2<S: Simd>(simd: S, values: &mut [S::f32s; ABREAST]) {
     const C: [f32; 6] = [0.001_317_25, 0.009_672_681, 0.055_510_68, 0.240_222_17, 0.693_146_7, 1.0];
     let round = simd.splat_f32s(ROUND);
-    let rounded = simd.add_f32s(u, round);
-    let f = simd.sub_f32s(u, simd.sub_f32s(rounded, round));
-    let p = polynomial(simd, f, &C);
-    let power = simd.wrapping_dyn_shl_u32s(simd.transmute_u32s_f32s(rounded), simd.splat_u32s(23));
-    simd.transmute_f32s_u32s(simd.add_u32s(simd.transmute_u32s_f32s(p), power))
+    let (mut rounded, mut f) = (*values, *values);
+    for (rounded, f) in rounded.iter_mut().zip(&mut f) {
+        *rounded = simd.add_f32s(*rounded, round);
+        *f = simd.sub_f32s(*f, simd.sub_f32s(*rounded, round));
+    }
+    let p = polynomial(simd, &f, &C);
+    let places = simd.splat_u32s(23);
+    for ((value, &p), &rounded) in values.iter_mut().zip(&p).zip(&rounded) {
+        let power = simd.wrapping_dyn_shl_u32s(simd.transmute_u32s_f32s(rounded), places);
+        *value = simd.transmute_f32s_u32s(simd.add_u32s(simd.transmute_u32s_f32s(p), power));
+    }
 }
 
 /// As `model_core::exp::Polynomial`.
 #[inline(always)]
-fn exp<S: Simd>(simd: S, x: S::f32s) -> S::f32s {
+fn exp<S: Simd>(simd: S, values: &mut [S::f32s; ABREAST]) {
     const LN2_HI: f32 = 0.693_359_4;
     const LN2_LO: f32 = -2.121_944_4e-4;
     const C: [f32; 7] =
         [0.001_384_461, 0.008_374_151, 0.041_667_98, 0.166_664_32, 0.499_999_94, 1.0, 1.0];
     let round = simd.splat_f32s(ROUND);
-    let rounded = simd.add_f32s(simd.mul_f32s(x, simd.splat_f32s(LOG2_E)), round);
-    let n = simd.sub_f32s(rounded, round);
-    let r = simd.sub_f32s(x, simd.mul_f32s(n, simd.splat_f32s(LN2_HI)));
-    let r = simd.sub_f32s(r, simd.mul_f32s(n, simd.splat_f32s(LN2_LO)));
-    let mantissa = polynomial(simd, r, &C);
-    // The low bits hold n.
-    let exponent = simd.add_u32s(simd.transmute_u32s_f32s(rounded), simd.splat_u32s(127));
-    let power = simd.wrapping_dyn_shl_u32s(exponent, simd.splat_u32s(23));
-    let value = simd.mul_f32s(mantissa, simd.transmute_f32s_u32s(power));
-    let tiny = simd.less_than_f32s(x, simd.splat_f32s(-87.0));
-    simd.select_f32s(tiny, simd.splat_f32s(0.0), value)
+    let (log2_e, high, low) =
+        (simd.splat_f32s(LOG2_E), simd.splat_f32s(LN2_HI), simd.splat_f32s(LN2_LO));
+    let (mut rounded, mut r) = (*values, *values);
+    for (rounded, r) in rounded.iter_mut().zip(&mut r) {
+        *rounded = simd.add_f32s(simd.mul_f32s(*rounded, log2_e), round);
+        let n = simd.sub_f32s(*rounded, round);
+        *r = simd.sub_f32s(*r, simd.mul_f32s(n, high));
+        *r = simd.sub_f32s(*r, simd.mul_f32s(n, low));
+    }
+    let p = polynomial(simd, &r, &C);
+    let (bias, places) = (simd.splat_u32s(127), simd.splat_u32s(23));
+    let (least, zero) = (simd.splat_f32s(-87.0), simd.splat_f32s(0.0));
+    for ((value, &p), &rounded) in values.iter_mut().zip(&p).zip(&rounded) {
+        // The low bits of `rounded` hold n.
+        let exponent = simd.add_u32s(simd.transmute_u32s_f32s(rounded), bias);
+        let power = simd.wrapping_dyn_shl_u32s(exponent, places);
+        let power = simd.mul_f32s(p, simd.transmute_f32s_u32s(power));
+        *value = simd.select_f32s(simd.less_than_f32s(*value, least), zero, power);
+    }
 }
 
 #[cfg(test)]

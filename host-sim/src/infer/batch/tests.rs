@@ -22,7 +22,7 @@ impl Draw {
     }
 }
 
-/// The words of a network whose training range is about 40 to 80 Ω, and whether they are expanded.
+/// The words of a network whose training range is about 40 to 80 Ω.
 fn words(draw: &mut Draw, shape: Shape, expanded: bool, affine: bool, one_width: bool) -> Vec<u32> {
     let Shape { inputs, centres, outputs } = shape;
     let affine = if affine { inputs * outputs } else { 0 };
@@ -108,10 +108,12 @@ proptest! {
             (0..networks).map(|_| words(&mut draw, shape, expanded, affine, one_width)).collect();
         let networks: Vec<Network<'_>> = words
             .iter()
-            .map(|words| if expanded {
-                expanded::Network::try_new(shape, affine, words).unwrap().into()
-            } else {
-                direct::Network::of_words(shape, one_width, affine, words).unwrap().into()
+            .map(|words| {
+                if expanded {
+                    expanded::Network::try_new(shape, affine, words).unwrap().into()
+                } else {
+                    direct::Network::of_words(shape, one_width, affine, words).unwrap().into()
+                }
             })
             .collect();
         check(&networks, &mut draw, lines);

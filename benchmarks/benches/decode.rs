@@ -1,0 +1,215 @@
+//! Decoding whole tables on one thread, beside the most additions and multiplications that it can make.
+//!
+//! Leaves its readings and answers in cargo's folder for temporary files, for `compare/decode.py`.
+
+use std::fs;
+use std::hint::black_box;
+use std::path::PathBuf;
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use host_sim::dataset::Table;
+use host_sim::infer::{Kernel, infer};
+use host_sim::random::{Purpose, Random, Stream};
+use model_core::rbf::{Network, Shape, direct, expanded};
+use model_core::scale::{HALF_RANGE, UNITS};
+
+/// Lines of a table; `compare/decode.py` divides by it.
+const LINES: usize = 8192;
+const CHANNELS: usize = 18;
+const CENTRES: [usize; 2] = [64, 256];
+const SPREAD: f64 = 0.8;
+const LOWEST_OHM: f64 = 40.0;
+const SPAN_OHM: f64 = 20.0;
+
+/// A network by its formula: centres on inputs scaled to [0, 1].
+struct Formula {
+    shape: Shape,
+    centres: Vec<f64>,
+    weights: Vec<f64>,
+    affine: Vec<f64>,
+    bias: Vec<f64>,
+}
+
+impl Formula {
+    fn random(centres: usize, random: &mut Random) -> Self {
+        let mut draw = |count: usize, low: f64, high: f64| -> Vec<f64> {
+            (0..count).map(|_| random.between([low, high])).collect()
+        };
+        Self {
+            shape: Shape { inputs: CHANNELS, centres, outputs: CHANNELS },
+            centres: draw(centres * CHANNELS, 0.0, 1.0),
+            weights: draw(centres * CHANNELS, -1.0, 1.0),
+            affine: draw(CHANNELS * CHANNELS, -0.5, 0.5),
+            bias: draw(CHANNELS, -1.0, 1.0),
+        }
+    }
+
+    /// The words of this network with expanded distances.
+    fn expanded(&self) -> Vec<u32> {
+        let unit = f64::from(HALF_RANGE / UNITS);
+        let decay = std::f64::consts::LOG2_E / (2.0 * SPREAD * SPREAD) * unit * unit;
+        let mut exponents = Vec::new();
+        for centre in self.centres.chunks_exact(CHANNELS) {
+            let centre: Vec<f64> = centre.iter().map(|c| (c - 0.5) / unit).collect();
+            exponents.push(-(decay * centre.iter().map(|c| c * c).sum::<f64>()) as f32);
+            exponents.extend(centre.iter().map(|c| (2.0 * decay * c) as f32));
+        }
+        // The tail is on inputs about the middle.
+        let mut bias = self.bias.clone();
+        for row in self.affine.chunks_exact(CHANNELS) {
+            bias.iter_mut().zip(row).for_each(|(bias, a)| *bias += 0.5 * a);
+        }
+        let parameters = expanded::Parameters {
+            input_midpoint: &[(LOWEST_OHM + 0.5 * SPAN_OHM) as f32; CHANNELS],
+            input_per_unit: &[(1.0 / (unit * SPAN_OHM)) as f32; CHANNELS],
+            decay: decay as f32,
+            bias: &single(&bias),
+            affine: &single(&self.affine.iter().map(|a| a * unit).collect::<Vec<_>>()),
+            exponents: &exponents,
+            output_weights: &single(&self.weights),
+        };
+        parameters.words().collect()
+    }
+
+    /// The words of this network with direct distances.
+    fn direct(&self) -> Vec<u32> {
+        let parameters = direct::Parameters {
+            input_minimum: &[LOWEST_OHM as f32; CHANNELS],
+            input_per_span: &[(1.0 / SPAN_OHM) as f32; CHANNELS],
+            centres: &single(&self.centres),
+            decay: &[(0.5 / (SPREAD * SPREAD)) as f32],
+            output_weights: &single(&self.weights),
+            bias: &single(&self.bias),
+            affine: &single(&self.affine),
+        };
+        parameters.words().collect()
+    }
+}
+
+fn single(values: &[f64]) -> Vec<f32> {
+    values.iter().map(|value| *value as f32).collect()
+}
+
+fn leave(name: &str, values: &[f64]) {
+    let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("decode-{name}.f64"));
+    let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
+    fs::write(path, bytes).expect("a writable folder for temporary files");
+}
+
+fn decode(criterion: &mut Criterion) {
+    let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+    let mut random = Random::new(1, Stream::Test, Purpose::Centres, 0, 0);
+    let (low, high) = (LOWEST_OHM, LOWEST_OHM + SPAN_OHM);
+    let values = (0..LINES * CHANNELS).map(|_| random.between([low, high])).collect();
+    let table = Table { names: vec![String::new(); CHANNELS], values };
+    leave("readings", &table.values);
+
+    let mut group = criterion.benchmark_group("decode");
+    group.sample_size(30).throughput(Throughput::Elements(LINES as u64));
+    for centres in CENTRES {
+        let formula = Formula::random(centres, &mut random);
+        let (expanded, direct) = (formula.expanded(), formula.direct());
+        let shape = formula.shape;
+        let networks: [Network<'_>; 2] = [
+            expanded::Network::try_new(shape, true, &expanded).expect("sound parameters").into(),
+            direct::Network::of_words(shape, true, true, &direct).expect("sound parameters").into(),
+        ];
+        for network in networks {
+            let name = network.format().name();
+            leave(&format!("{name}-{centres}"), &infer(&network, Kernel::Polynomial, &table));
+            group.bench_function(BenchmarkId::new(name, centres), |bencher| {
+                one_thread.install(|| {
+                    bencher.iter(|| infer(&network, Kernel::Polynomial, black_box(&table)));
+                });
+            });
+        }
+        leave(&format!("centres-{centres}"), &formula.centres);
+        leave(&format!("weights-{centres}"), &formula.weights);
+        leave(&format!("affine-{centres}"), &formula.affine);
+        leave(&format!("bias-{centres}"), &formula.bias);
+    }
+    group.finish();
+}
+
+/// The most f32 multiplications and additions a second: registers alone, nothing to wait for.
+mod peak {
+    use pulp::{Simd, WithSimd};
+
+    /// Chains of operations that do not wait for each other.
+    const CHAINS: usize = 12;
+    const ROUNDS: usize = 20_000;
+
+    /// Operations of a run: contracted, each instruction makes two.
+    pub fn operations(contracted: bool) -> u64 {
+        let lanes = pulp::Arch::new().dispatch(Lanes);
+        (ROUNDS * CHAINS * lanes * if contracted { 2 } else { 1 }) as u64
+    }
+
+    /// The machine's lanes of f32.
+    struct Lanes;
+
+    impl WithSimd for Lanes {
+        type Output = usize;
+
+        fn with_simd<S: Simd>(self, _: S) -> usize {
+            S::F32_LANES
+        }
+    }
+
+    /// As many multiplications as additions, one instruction each; or both in one, contracted.
+    pub struct Peak {
+        pub contracted: bool,
+        pub by: f32,
+    }
+
+    impl WithSimd for Peak {
+        type Output = f32;
+
+        #[inline(always)]
+        #[expect(clippy::inline_always, reason = "what pulp dispatches must be inlined into it")]
+        fn with_simd<S: Simd>(self, simd: S) -> f32 {
+            let by = simd.splat_f32s(self.by);
+            let (mut a, mut b) = ([by; CHAINS / 2], [by; CHAINS / 2]);
+            if self.contracted {
+                for _ in 0..ROUNDS {
+                    for (a, b) in a.iter_mut().zip(&mut b) {
+                        *a = simd.mul_add_f32s(*a, by, by);
+                        *b = simd.mul_add_f32s(*b, by, by);
+                    }
+                }
+            } else {
+                for _ in 0..ROUNDS {
+                    for (a, b) in a.iter_mut().zip(&mut b) {
+                        *a = simd.mul_f32s(*a, by);
+                        *b = simd.add_f32s(*b, by);
+                    }
+                }
+            }
+            let mut sum = 0.0;
+            for (a, b) in a.into_iter().zip(b) {
+                sum += simd.reduce_sum_f32s(simd.add_f32s(a, b));
+            }
+            sum
+        }
+    }
+}
+
+fn peaks(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("peak");
+    for (name, contracted) in [("separate", false), ("contracted", true)] {
+        let operations = peak::operations(contracted);
+        // What `compare/decode.py` divides by the time.
+        leave(name, &[operations as f64]);
+        group.throughput(Throughput::Elements(operations));
+        group.bench_function(name, |bencher| {
+            bencher.iter(|| {
+                // 1 keeps numbers normal for ever.
+                pulp::Arch::new().dispatch(peak::Peak { contracted, by: black_box(1.0) })
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, decode, peaks);
+criterion_main!(benches);

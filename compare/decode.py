@@ -1,0 +1,110 @@
+"""Decoding a table on one core: numpy's batches against Taxel's blocks of lines, bit for bit the device's.
+
+numpy's side expands distances into a matrix product, exponentiates in place and multiplies by the weights, in
+batches that stay in the processor's cache; in f64, which is numpy's own choice, and in f32, which is Taxel's.
+Scaling, clamp, affine tail and bias are in both.
+
+Printed besides: how much of the core's peak the decoding reaches. Counted are the multiplications and
+additions of the network, with those of its exponential, and none of scaling, checks and copies.
+"""
+
+import sys
+
+import numpy as np
+from threadpoolctl import threadpool_limits  # scikit-learn brings it
+
+from measure import Row, bench, criterion_s, median_s, target_folder
+
+CHANNELS, SPREAD = 18, 0.8  # as benchmarks/benches/decode.rs
+LOWEST_OHM, SPAN_OHM = 40.0, 20.0
+CLAMP = (-0.125, 1.125)
+CENTRES = [64, 256]
+BATCHES = [125, 250, 500, 1000, 2000]
+
+
+def left_by_the_bench(name: str, columns: int) -> np.ndarray:
+    """What the bench wrote, in lines of `columns`."""
+    path = target_folder() / "tmp" / f"decode-{name}.f64"
+    return np.fromfile(path, "<f8").reshape(-1, columns)
+
+
+class Network:
+    """The network in numpy, with all numbers of one type."""
+
+    def __init__(self, centres: int, kind: type) -> None:
+        c = left_by_the_bench(f"centres-{centres}", CHANNELS)
+        decay = 0.5 / SPREAD**2
+        self.twice = np.ascontiguousarray(2 * decay * c.T, kind)
+        self.own = (decay * (c**2).sum(axis=1)).astype(kind)
+        self.decay, self.kind = kind(decay), kind
+        self.weights = left_by_the_bench(f"weights-{centres}", CHANNELS).astype(kind)
+        self.affine = left_by_the_bench(f"affine-{centres}", CHANNELS).astype(kind)
+        self.bias = left_by_the_bench(f"bias-{centres}", CHANNELS)[0].astype(kind)
+
+    def infer(self, readings: np.ndarray, batch: int) -> np.ndarray:
+        """Outputs of all lines, `batch` at a time."""
+        outputs = np.empty((len(readings), CHANNELS), self.kind)
+        for start in range(0, len(readings), batch):
+            x = (readings[start : start + batch] - self.kind(LOWEST_OHM)) * self.kind(1 / SPAN_OHM)
+            np.clip(x, *CLAMP, out=x)
+            exponent = x @ self.twice
+            exponent -= self.own
+            exponent -= self.decay * np.einsum("ij,ij->i", x, x)[:, None]
+            np.exp(exponent, out=exponent)
+            y = outputs[start : start + batch]
+            np.matmul(exponent, self.weights, out=y)
+            y += x @ self.affine
+            y += self.bias
+        return outputs
+
+
+def operations(form: str, centres: int) -> int:
+    """Multiplications and additions of a line."""
+    affine_and_bias = 2 * CHANNELS * CHANNELS + CHANNELS
+    if form == "f32":
+        # A product and a sum an input, 3 sums; 3 + 2·5 in the exponential; then the outputs. ‖x‖² once.
+        each = 2 * CHANNELS + 3 + 13 + 2 * CHANNELS
+        return centres * each + 2 * CHANNELS + 4 + affine_and_bias
+    # A difference more an input, the width; 7 + 2·6 + 1 in the exponential.
+    return centres * (3 * CHANNELS + 3 + 1 + 20 + 2 * CHANNELS) + affine_and_bias
+
+
+@threadpool_limits.wrap(limits=1)
+def rows() -> list[Row]:
+    """Both forms of f32 networks, against numpy in both types."""
+    bench("decode")
+    readings = left_by_the_bench("readings", CHANNELS)
+    peak = {
+        how: left_by_the_bench(how, 1)[0, 0] / criterion_s(f"peak/{how}") * 1e-9
+        for how in ["separate", "contracted"]
+    }
+    table, shares = [], []
+    for centres in CENTRES:
+        expected = Network(centres, np.float64).infer(readings, 1000)
+        taxel = {form: criterion_s(f"decode/{form}/{centres}") / len(readings) for form in ["f32", "f32-direct"]}
+        for form, seconds in taxel.items():
+            error = np.abs(left_by_the_bench(f"{form}-{centres}", CHANNELS) - expected).max()
+            assert error < 1e-3, f"{form} with {centres} centres differs by {error}"
+            gflops = operations(form, centres) / seconds * 1e-9
+            shares.append(
+                f"{form} with {centres} centres: {gflops:.1f} Gflop/s, {gflops / peak['separate']:.0%} of the peak"
+            )
+        for kind in [np.float64, np.float32]:
+            network, own = Network(centres, kind), readings.astype(kind)
+            timed = {
+                batch: median_s(lambda: network.infer(own, batch), repeats=7) / len(readings)
+                for batch in BATCHES
+            }
+            batch = min(timed, key=timed.get)
+            for form, seconds in taxel.items():
+                reference = f"numpy, {np.dtype(kind).name}, batches of {batch}"
+                table.append(Row(f"a line, {form}, {centres} centres", reference, timed[batch], seconds))
+    # To stderr, as all that is not the table.
+    print(
+        f"f32 peak of one core: {peak['separate']:.1f} Gflop/s multiplying and adding,"
+        f" {peak['contracted']:.1f} with both contracted into one instruction",
+        *shares,
+        sep="\n",
+        file=sys.stderr,
+    )
+    return table
