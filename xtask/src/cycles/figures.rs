@@ -23,13 +23,27 @@ pub enum Scope {
     Row,
     /// All rows' outputs from a frame.
     Frame,
+    /// The same behind a gate that finds all rows at rest.
+    RestingFrame,
+    /// The same behind a gate that finds all rows awake, each by its last reading.
+    AwakeFrame,
 }
 
 impl Scope {
-    const ALL: [Self; 4] = [Self::Inference, Self::Exponential, Self::Row, Self::Frame];
+    const ALL: [Self; 6] = [
+        Self::Inference,
+        Self::Exponential,
+        Self::Row,
+        Self::Frame,
+        Self::RestingFrame,
+        Self::AwakeFrame,
+    ];
 
     /// Those that every kernel is measured in, in the image's order.
     const OF_IMAGE: [Self; 3] = [Self::Inference, Self::Row, Self::Frame];
+
+    /// Those of the gate, behind all kernels': measured with the one that the firmware runs.
+    const OF_GATE: [Self; 2] = [Self::RestingFrame, Self::AwakeFrame];
 
     /// As the image and the accepted figures have it.
     pub fn name(self) -> &'static str {
@@ -38,6 +52,8 @@ impl Scope {
             Self::Exponential => "exponential",
             Self::Row => "row",
             Self::Frame => "frame",
+            Self::RestingFrame => "resting-frame",
+            Self::AwakeFrame => "awake-frame",
         }
     }
 
@@ -123,6 +139,9 @@ pub fn of_run(log: &str, counts: &[Region], affine: bool) -> Outcome<Vec<Figure>
     let centres = named("centres ").next().and_then(|centres| centres.parse().ok());
     let centres = centres.ok_or_else(|| format!("the image names no centres:\n{log}"))?;
 
+    let first_of_gate = regions.iter().position(|name| name.ends_with(Scope::OF_GATE[0].name()));
+    let (regions, gate_regions) = regions.split_at(first_of_gate.unwrap_or(regions.len()));
+    let (counts, gate_counts) = counts.split_at(regions.len());
     let (scopes, counts) = (regions.as_chunks::<3>(), counts.as_chunks::<3>());
     if !scopes.1.is_empty() {
         return Err(format!("a kernel lacks a scope:\n{log}"));
@@ -140,14 +159,31 @@ pub fn of_run(log: &str, counts: &[Region], affine: bool) -> Outcome<Vec<Figure>
                 Scope::Exponential if !affine && counts[0].watched != Count::default() => {
                     counts[0].watched
                 }
-                Scope::Inference | Scope::Exponential => continue,
+                Scope::Inference | Scope::Exponential | Scope::RestingFrame | Scope::AwakeFrame => {
+                    continue;
+                }
                 Scope::Row => without(counts[1].whole, EMPTY),
                 Scope::Frame => without(counts[2].whole, EMPTY),
             };
             figures.push(Figure { kernel: kernel.to_owned(), centres, affine, scope, count });
         }
     }
+    figures.extend(of_gate(gate_regions, gate_counts, centres, affine)?);
     Ok(figures)
+}
+
+/// The figures of the gate, if it was measured.
+fn of_gate(names: &[&str], counts: &[Region], centres: u64, affine: bool) -> Outcome<Vec<Figure>> {
+    let kernel = names.first().and_then(|name| name.split(' ').next()).unwrap_or_default();
+    let expected = Scope::OF_GATE.map(|scope| format!("{kernel} {}", scope.name()));
+    if !names.is_empty() && *names != expected {
+        return Err(format!("{} instead of {}", names.join(", "), expected.join(", ")));
+    }
+    let figures = Scope::OF_GATE.into_iter().zip(counts).map(|(scope, count)| {
+        let count = without(count.whole, EMPTY);
+        Figure { kernel: kernel.to_owned(), centres, affine, scope, count }
+    });
+    Ok(figures.collect())
 }
 
 fn without(count: Count, less: Count) -> Count {
@@ -191,6 +227,26 @@ mod tests {
 
         let expected = vec![figure(true, Scope::Row, 20), figure(true, Scope::Frame, 30)];
         assert_eq!(of_run(LOG, &counts, true), Ok(expected));
+    }
+
+    #[test]
+    fn the_gate_is_the_kernels_that_it_is_measured_with() {
+        let log = format!("{LOG}INFO region b resting-frame\nINFO region b awake-frame\n");
+        let known = [(1, 3), (2002, 4002), (1, 3), (1, 3), (1, 3)];
+        let all = counts(&[&known[..], &[(41, 83), (51, 103)]].concat());
+        let found = of_run(&log, &all, false).unwrap();
+        let figure = |scope, n| Figure {
+            kernel: "b".into(),
+            centres: 16,
+            affine: false,
+            scope,
+            count: Count { instructions: n, cycles: 2 * n },
+        };
+        let expected = [figure(Scope::RestingFrame, 40), figure(Scope::AwakeFrame, 50)];
+        assert_eq!(found[3..], expected);
+        let cut = log.replace("INFO region b awake-frame\n", "");
+        let error = of_run(&cut, &all[..6], false).unwrap_err();
+        assert_eq!(error, "b resting-frame instead of b resting-frame, b awake-frame");
     }
 
     #[test]

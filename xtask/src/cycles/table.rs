@@ -115,8 +115,12 @@ pub fn json(figures: &[Figure]) -> String {
                 ("", false, Scope::Inference),
                 ("row_", false, Scope::Row),
                 ("frame_", false, Scope::Frame),
+                ("resting_frame_", false, Scope::RestingFrame),
+                ("awake_frame_", false, Scope::AwakeFrame),
                 ("affine_row_", true, Scope::Row),
                 ("affine_frame_", true, Scope::Frame),
+                ("affine_resting_frame_", true, Scope::RestingFrame),
+                ("affine_awake_frame_", true, Scope::AwakeFrame),
             ] {
                 if let Some(Count { instructions, cycles }) = group.count(affine, scope) {
                     // Writing to a string cannot fail.

@@ -14,13 +14,16 @@ use defmt::{assert, info, unwrap};
 use model_core::blob::Model;
 use model_core::exp::{Libm, Micromath, Polynomial};
 use model_core::rbf::Network;
-use model_core::{Estimate, Frame, RowStatus};
+use model_core::{Decoder, Estimate, Frame, Gate, RowStatus};
 use qemu_image::checks::Numbers;
 use qemu_image::exit;
 use qemu_image::slot::Slot;
 
 use kernel::{COLS, F32, F32Direct, Fixed16, Formatted, Kernel, OUTPUTS, Portable, ROWS};
 use region::{calibrate, region};
+
+/// 3.5 times noise of 0.5 %.
+const REST_TOLERANCE: f32 = 0.0175;
 
 /// What is decoded, and by which model.
 struct Bench<'a> {
@@ -63,6 +66,30 @@ impl Bench<'_> {
         });
         assert!(estimate.status == [RowStatus::Decoded; ROWS], "a row was not decoded");
     }
+
+    /// What the gate costs and saves with the kernel that the firmware runs: a frame whose rows are all at
+    /// rest, and one whose rows are all awake by their last readings, so that all of them are looked at.
+    fn measure_gate(&self) {
+        let Ok(decoder) = Decoder::<ROWS, COLS, OUTPUTS>::load(self.blob) else { return };
+        let name = self.network.format().name();
+        let rest = decoder.decode(&self.frame);
+        let mut awake = self.frame;
+        for row in &mut awake.row_column_resistance_ohm {
+            row[COLS - 1] *= 1.0 + 2.0 * REST_TOLERANCE;
+        }
+        let gate = Gate::new(&self.frame, &rest, REST_TOLERANCE);
+        let mut estimate = rest;
+        for (scope, frame, status) in [
+            ("resting-frame", &self.frame, RowStatus::AtRest),
+            ("awake-frame", &awake, RowStatus::Decoded),
+        ] {
+            region(name, scope, || {
+                let (frame, estimate) = (black_box(frame), black_box(&mut estimate));
+                black_box(&decoder).decode_gated_into(frame, black_box(gate), estimate);
+            });
+            assert!(estimate.status == [status; ROWS], "a row is not {=str}", scope);
+        }
+    }
 }
 
 #[entry]
@@ -94,6 +121,8 @@ fn main() -> ! {
     let frame = inputs::frame(&model, &mut numbers);
     let mut scaled = [0.0; COLS];
     unwrap!(network.scale(&frame.row_column_resistance_ohm[0], &mut scaled).ok());
-    measure_every_kernel(&Bench { blob, network, scaled, frame });
+    let bench = Bench { blob, network, scaled, frame };
+    measure_every_kernel(&bench);
+    bench.measure_gate();
     exit::success()
 }
