@@ -128,9 +128,14 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKerne
     }
 }
 
-/// A row's outputs. Neither generic nor inlined: it is thus compiled here, for speed, where a whole image is
-/// compiled for size.
-#[inline(never)]
+/// A row's outputs. For a device neither generic nor inlined: it is thus compiled here, for speed, where a
+/// whole image is compiled for size.
+#[cfg_attr(cortex_m4f, inline(never))]
+#[cfg_attr(
+    not(cortex_m4f),
+    inline(always),
+    expect(clippy::inline_always, reason = "so that the compiler knows the exponential")
+)]
 fn decode_row(
     section: &NetworkSection<'_>,
     exp: fn(f32) -> f32,
@@ -154,7 +159,12 @@ fn decode_row(
 }
 
 /// See [`decode_row`].
-#[inline(never)]
+#[cfg_attr(cortex_m4f, inline(never))]
+#[cfg_attr(
+    not(cortex_m4f),
+    inline(always),
+    expect(clippy::inline_always, reason = "so that the compiler knows the exponential")
+)]
 fn decode_direct_row(
     section: &NetworkSection<'_>,
     exp: fn(f32) -> f32,

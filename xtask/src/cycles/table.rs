@@ -28,7 +28,8 @@ const TWIN: &str = "-portable";
 
 /// Markdown tables: all figures, and what assembly saves. Cycles where nothing else is said.
 pub fn markdown(figures: &[Figure]) -> String {
-    let cell = |count: Option<Count>, shown: fn(Count) -> String| count.map_or("".into(), shown);
+    let cell =
+        |count: Option<Count>, shown: fn(Count) -> String| count.map(shown).unwrap_or_default();
     let rows = Group::of(figures).map(|group| {
         let count = |affine, scope| group.count(affine, scope);
         let cells = [
@@ -117,9 +118,9 @@ pub fn json(figures: &[Figure]) -> String {
                 ("affine_frame_", true, Scope::Frame),
             ] {
                 if let Some(Count { instructions, cycles }) = group.count(affine, scope) {
-                    object.push_str(&format!(
+                    object += &format!(
                         ", \"{prefix}instructions\": {instructions}, \"{prefix}cycles\": {cycles}"
-                    ));
+                    );
                 }
             }
             object + "}"
