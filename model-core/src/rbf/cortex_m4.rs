@@ -1,5 +1,9 @@
 //! The assembly's functions, made safe: all that they read and write is measured here.
 #![expect(unsafe_code, reason = "calls to assembly, with lengths taken from slices and arrays")]
+#![expect(
+    clippy::manual_div_ceil,
+    reason = "no K comes near an overflow, and this is shorter code"
+)]
 
 use core::mem::MaybeUninit;
 
@@ -68,7 +72,7 @@ pub(super) fn expanded(
 ) -> Finite {
     let (inputs, scaled) = inputs.parts();
     let fours = (network.shape().centres + 3) / 4;
-    let flags = u32::from(network.has_affine_tail()) * AFFINE | scaled;
+    let flags = (u32::from(network.has_affine_tail()) * AFFINE) | scaled;
     let mut activations = MaybeUninit::uninit();
     // SAFETY: a network's block is checked against its shape when it is made, and the caller has checked the
     // shape against INPUTS and OUTPUTS; activations are written, 128 at most, before they are read.
@@ -93,7 +97,7 @@ pub(super) fn fixed16(
 ) -> Finite {
     let (inputs, scaled) = inputs.parts();
     let sixteens = (network.shape().centres + 15) / 16;
-    let flags = u32::from(network.has_affine_tail()) * AFFINE | scaled;
+    let flags = (u32::from(network.has_affine_tail()) * AFFINE) | scaled;
     // SAFETY: as in `expanded`.
     let status =
         unsafe { taxel_fixed16(inputs, network.block().as_ptr(), output, sixteens as u32, flags) };
