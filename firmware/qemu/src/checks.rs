@@ -108,7 +108,7 @@ pub fn twins(blob: &[u8]) -> Option<[usize; 2]> {
     let decoder = Decoder::<ROWS, COLS, OUTPUTS>::load(blob).ok()?;
     let model = Model::decode(blob).ok()?;
     let mut numbers = Numbers::new(4);
-    let [mut decoded, mut different] = [0; 2];
+    let [mut compared, mut different] = [0; 2];
     for index in 0..MANY {
         let frame = one_of_many(index, &mut numbers);
         let Estimate { outputs, status } = decoder.decode(&frame);
@@ -127,11 +127,11 @@ pub fn twins(blob: &[u8]) -> Option<[usize; 2]> {
                     network.infer_scaled_portably(&mut scaled, &mut of_twin);
                 }
             }
-            decoded += 1;
+            compared += 1;
             different += usize::from(outputs.map(f32::to_bits) != of_twin.map(f32::to_bits));
         }
     }
-    Some([decoded, different])
+    Some([compared, different])
 }
 
 /// CRC-32 of every bit of the weights that recursive least squares has learnt after each of 200

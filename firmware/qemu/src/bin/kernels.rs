@@ -24,8 +24,8 @@ fn decode<E: ExpKernel>(format: &str, blob: &[u8]) {
 }
 
 fn compare(format: &str, blob: &[u8]) {
-    let [decoded, different] = unwrap!(checks::twins(blob));
-    info!("{=str}: {=usize} of {=usize} rows differ from the twin's", format, different, decoded);
+    let [compared, different] = unwrap!(checks::twins(blob));
+    info!("{=str}: {=usize} of {=usize} rows differ from the twin's", format, different, compared);
 }
 
 #[entry]
