@@ -3,82 +3,17 @@
 
 use std::fs;
 
-use model_core::Aligned;
-use model_core::blob::{
-    Columns, Floats, Metadata, ModelParts, NoiseKind, encode, encoded_length_bound,
-};
 use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
-use model_core::rbf::direct::{self, Parameters};
-use model_core::rbf::{Network, Shape};
 
 #[path = "../qemu/src/checks.rs"]
 mod checks;
+#[path = "bit_for_bit/models.rs"]
+mod models;
 
-use checks::{COLS, Numbers, OUTPUTS, ROWS};
+use models::{FILES, with_blob};
 
-const CENTRES: usize = 12;
-const MODEL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../testdata/hand-made.bin");
-
-/// Room for the model, at a multiple of four.
-type Room = Aligned<[u8; 16384]>;
-
-fn draw(numbers: &mut Numbers, count: usize, middle: f32, reach: f32) -> Vec<f32> {
-    (0..count).map(|_| middle + reach * numbers.draw()).collect()
-}
-
-fn network(
-    [minimum, per_span, centres, decay, weights, bias, affine]: &[Vec<f32>; 7],
-) -> Network<'_> {
-    let shape = Shape { inputs: COLS, centres: CENTRES, outputs: OUTPUTS };
-    let parameters = Parameters {
-        input_minimum: minimum,
-        input_per_span: per_span,
-        centres,
-        decay,
-        output_weights: weights,
-        bias,
-        affine,
-    };
-    direct::Network::try_new(shape, parameters).unwrap().into()
-}
-
-/// A model of the paper's shape: two networks, which the rows use in turn.
-fn hand_made_model(room: &mut Room) -> &[u8] {
-    let mut numbers = Numbers::new(0);
-    let mut parameters = || {
-        [
-            draw(&mut numbers, COLS, 54.0, 1.0),
-            draw(&mut numbers, COLS, 0.08, 0.01),
-            draw(&mut numbers, CENTRES * COLS, 0.5, 0.5),
-            draw(&mut numbers, CENTRES, 0.75, 0.5),
-            draw(&mut numbers, CENTRES * OUTPUTS, 0.0, 1.0),
-            draw(&mut numbers, OUTPUTS, 0.0, 1.0),
-            draw(&mut numbers, COLS * OUTPUTS, 0.0, 0.1),
-        ]
-    };
-    let (even, odd) = (parameters(), parameters());
-    let (inputs, outputs) = (["x"; ROWS * COLS].join("\n"), ["y"; ROWS * OUTPUTS].join("\n"));
-    let zeros = [0; ROWS * OUTPUTS * 4];
-    let metadata = Metadata {
-        name: "hand-made",
-        scene_digest: 0,
-        noise_kind: NoiseKind::None,
-        noise_level: 0.0,
-        seed: 0,
-        training_frames: 0,
-        thickness_mm: 5.0,
-        input_names: Columns(&inputs),
-        input_units: Columns(&inputs),
-        output_names: Columns(&outputs),
-        output_units: Columns(&outputs),
-        training_rmse: Floats(&zeros),
-        full_scale: Floats(&zeros),
-    };
-    let networks = [network(&even), network(&odd)];
-    let row_network = [0, 1, 0, 1, 0, 1, 0, 1];
-    let parts = ModelParts { networks: &networks, row_network: &row_network, metadata };
-    assert!(encoded_length_bound(&parts) <= room.0.len());
-    encode(&parts, &mut room.0).unwrap()
+fn in_testdata(name: &str) -> String {
+    format!("{}/../testdata/{name}", env!("CARGO_MANIFEST_DIR"))
 }
 
 /// What the emulator logs, line by line.
@@ -92,31 +27,58 @@ fn decoding<E: ExpKernel>(blob: &[u8]) -> String {
     format!("INFO decoding with {}: {crc:08x}\n", E::NAME)
 }
 
-#[test]
-fn the_model_in_testdata_is_the_one_made_here() {
-    let committed = fs::read(MODEL).unwrap();
-    let mut room = Aligned([0; _]);
-    assert!(
-        hand_made_model(&mut room) == committed,
-        "changed on purpose? cargo test --package firmware --test bit_for_bit -- --ignored"
-    );
+fn decoding_many<E: ExpKernel>(format: &str) -> String {
+    let crc = with_blob(&format!("kernels-{format}.bin"), checks::decoding_many::<E>);
+    format!("INFO {format}, {}: {:08x}\n", E::NAME, crc.expect("the model loads"))
+}
+
+fn twins(format: &str) -> String {
+    let counts = with_blob(&format!("kernels-{format}.bin"), checks::twins);
+    let [decoded, different] = counts.expect("a model with a twin");
+    format!("INFO {format}: {different} of {decoded} rows differ from the twin's\n")
 }
 
 #[test]
-#[ignore = "writes testdata/hand-made.bin"]
-fn write_the_model_in_testdata() {
-    let mut room = Aligned([0; _]);
-    fs::write(MODEL, hand_made_model(&mut room)).unwrap();
+fn the_models_in_testdata_are_those_made_here() {
+    for (name, blob) in FILES {
+        assert!(
+            fs::read(in_testdata(name)).ok() == Some(blob()),
+            "{name}: changed on purpose? cargo test --package firmware --test bit_for_bit -- --ignored"
+        );
+    }
 }
 
 #[test]
-fn every_kernel_decodes_on_the_host_as_in_the_emulator() {
-    let mut room = Aligned([0; _]);
-    let blob = hand_made_model(&mut room);
-    let of_host =
-        [decoding::<Polynomial>(blob), decoding::<Libm>(blob), decoding::<Micromath>(blob)];
+#[ignore = "writes the models in testdata"]
+fn write_the_models_in_testdata() {
+    for (name, blob) in FILES {
+        fs::write(in_testdata(name), blob()).unwrap();
+    }
+}
+
+#[test]
+fn every_exponential_decodes_on_the_host_as_in_the_emulator() {
+    let of_host = with_blob("hand-made.bin", |blob| {
+        [decoding::<Polynomial>(blob), decoding::<Libm>(blob), decoding::<Micromath>(blob)]
+    });
     let end = "INFO within 4 KiB of RAM\nexit status 0\n";
     assert_eq!(of_host.concat() + end, expected_log("decode"));
+}
+
+#[test]
+fn every_kernel_decodes_many_frames_on_the_host_as_in_the_emulator() {
+    let of_host = [
+        decoding_many::<Polynomial>("f32"),
+        decoding_many::<Polynomial>("fixed16"),
+        decoding_many::<Polynomial>("f32-direct"),
+        decoding_many::<Libm>("f32-direct"),
+        decoding_many::<Micromath>("f32-direct"),
+        twins("f32"),
+        twins("fixed16"),
+        "exit status 0\n".to_owned(),
+    ];
+    assert!(of_host.iter().all(|line| !line.contains("differ") || line.contains(": 0 of ")));
+    assert_eq!(of_host.concat(), expected_log("kernels"));
 }
 
 #[test]

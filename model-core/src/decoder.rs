@@ -134,9 +134,14 @@ fn copy<const N: usize>(from: &[f32; N], to: &mut [f32; N]) {
     to_rest.iter_mut().zip(from_rest).for_each(|(to, from)| *to = *from);
 }
 
-/// A row's outputs. Neither generic nor inlined: it is thus compiled here, for speed, where a whole image is
-/// compiled for size.
-#[inline(never)]
+/// A row's outputs. For a device neither generic nor inlined: it is thus compiled here, for speed, where a
+/// whole image is compiled for size.
+#[cfg_attr(cortex_m4f, inline(never))]
+#[cfg_attr(
+    not(cortex_m4f),
+    inline(always),
+    expect(clippy::inline_always, reason = "so that the compiler knows the exponential")
+)]
 fn decode_row(
     section: &NetworkSection<'_>,
     exp: fn(f32) -> f32,
@@ -160,7 +165,12 @@ fn decode_row(
 }
 
 /// See [`decode_row`].
-#[inline(never)]
+#[cfg_attr(cortex_m4f, inline(never))]
+#[cfg_attr(
+    not(cortex_m4f),
+    inline(always),
+    expect(clippy::inline_always, reason = "so that the compiler knows the exponential")
+)]
 fn decode_direct_row(
     section: &NetworkSection<'_>,
     exp: fn(f32) -> f32,

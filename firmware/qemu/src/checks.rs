@@ -2,9 +2,11 @@
 //! file for the host, and compares.
 
 use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
+use model_core::blob::Model;
 use model_core::exp::ExpKernel;
+use model_core::rbf::Network;
 use model_core::rls::Rls;
-use model_core::{Decoder, Frame};
+use model_core::{Decoder, Estimate, Frame, RowStatus};
 
 /// Of the sensor, as of the paper's.
 pub const ROWS: usize = 8;
@@ -57,6 +59,79 @@ pub fn decoding<E: ExpKernel>(blob: &[u8]) -> Option<u32> {
         add(&mut digest, decoder.decode(&readings).outputs.as_flattened());
     }
     Some(digest.finalize())
+}
+
+/// Frames that every kernel decodes.
+pub const MANY: usize = 10_000;
+
+/// With a table, for many bytes.
+const QUICK_CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
+
+/// By how much readings stray from the middle of the training range, frame after frame: within it, beyond
+/// it, far beyond the clamp, down below zero, and as far as numbers go.
+const REACHES: [f32; 8] = [5.0, 5.0, 5.0, 7.0, 9.0, 30.0, 1e3, 3e38];
+
+/// One of many frames: its readings, some of them none at all.
+fn one_of_many(index: usize, numbers: &mut Numbers) -> Frame<ROWS, COLS> {
+    let mut frame = Frame::missing();
+    let readings = frame.row_column_resistance_ohm.as_flattened_mut();
+    let reach = REACHES[index % REACHES.len()];
+    readings.iter_mut().for_each(|ohm| *ohm = 60.0 + reach * numbers.draw());
+    let none = [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
+    if let (0, Some(reading)) = (index % 50, readings.get_mut(index / 50 % (ROWS * COLS))) {
+        *reading = none[index / 50 % none.len()];
+    }
+    frame
+}
+
+/// CRC-32 of every bit of what the model in `blob` answers to [`MANY`] frames. `None`: the blob does not load.
+#[must_use]
+pub fn decoding_many<E: ExpKernel>(blob: &[u8]) -> Option<u32> {
+    let decoder = Decoder::<ROWS, COLS, OUTPUTS, E>::load(blob).ok()?;
+    let crc = QUICK_CRC;
+    let mut digest = crc.digest();
+    let mut numbers = Numbers::new(4);
+    for index in 0..MANY {
+        let estimate = decoder.decode(&one_of_many(index, &mut numbers));
+        for (outputs, status) in estimate.outputs.iter().zip(estimate.status) {
+            outputs.iter().for_each(|value| digest.update(&value.to_bits().to_le_bytes()));
+            digest.update(&[status as u8]);
+        }
+    }
+    Some(digest.finalize())
+}
+
+/// Of the same frames, the rows that the model in `blob` decodes, and how many of them its kernel's compiled
+/// twin answers otherwise to in any bit. `None`: the blob does not load, or its kernel has no twin.
+#[must_use]
+pub fn twins(blob: &[u8]) -> Option<[usize; 2]> {
+    let decoder = Decoder::<ROWS, COLS, OUTPUTS>::load(blob).ok()?;
+    let model = Model::decode(blob).ok()?;
+    let mut numbers = Numbers::new(4);
+    let [mut compared, mut different] = [0; 2];
+    for index in 0..MANY {
+        let frame = one_of_many(index, &mut numbers);
+        let Estimate { outputs, status } = decoder.decode(&frame);
+        let rows = frame.row_column_resistance_ohm.iter().zip(&outputs).zip(status).enumerate();
+        for (row, ((readings, outputs), status)) in rows {
+            if status != RowStatus::Decoded {
+                continue;
+            }
+            let network = model.networks().nth(model.network_of_row(row)?)?;
+            let (mut scaled, mut of_twin) = ([0.0; COLS], [0.0; OUTPUTS]);
+            network.scale(readings, &mut scaled).ok()?;
+            match network {
+                Network::F32Direct(_) => return None,
+                Network::F32(network) => network.infer_scaled_portably(&mut scaled, &mut of_twin),
+                Network::Fixed16(network) => {
+                    network.infer_scaled_portably(&mut scaled, &mut of_twin);
+                }
+            }
+            compared += 1;
+            different += usize::from(outputs.map(f32::to_bits) != of_twin.map(f32::to_bits));
+        }
+    }
+    Some([compared, different])
 }
 
 /// CRC-32 of every bit of the weights that recursive least squares has learnt after each of 200

@@ -1,5 +1,9 @@
 //! The assembly's functions, made safe: all that they read and write is measured here.
 #![expect(unsafe_code, reason = "calls to assembly, with lengths taken from slices and arrays")]
+#![expect(
+    clippy::manual_div_ceil,
+    reason = "no K comes near an overflow, and this is shorter code"
+)]
 
 use core::mem::MaybeUninit;
 
@@ -67,15 +71,21 @@ pub(super) fn expanded(
     output: &mut [f32; OUTPUTS],
 ) -> Finite {
     let (inputs, scaled) = inputs.parts();
-    // As 32 bits the division is a shift.
-    let fours = (network.shape().centres as u32).div_ceil(4);
+    let fours = (network.shape().centres + 3) / 4;
     let flags = (u32::from(network.has_affine_tail()) * AFFINE) | scaled;
     let mut activations = MaybeUninit::uninit();
     // SAFETY: a network's block is checked against its shape when it is made, and the caller has checked the
     // shape against INPUTS and OUTPUTS; activations are written, 128 at most, before they are read.
     unsafe {
         let block = network.block().as_ptr();
-        Finite::of_status(taxel_f32(inputs, block, output, fours, flags, activations.as_mut_ptr()))
+        Finite::of_status(taxel_f32(
+            inputs,
+            block,
+            output,
+            fours as u32,
+            flags,
+            activations.as_mut_ptr(),
+        ))
     }
 }
 
@@ -86,10 +96,10 @@ pub(super) fn fixed16(
     output: &mut [f32; OUTPUTS],
 ) -> Finite {
     let (inputs, scaled) = inputs.parts();
-    let sixteens = (network.shape().centres as u32).div_ceil(16);
+    let sixteens = (network.shape().centres + 15) / 16;
     let flags = (u32::from(network.has_affine_tail()) * AFFINE) | scaled;
     // SAFETY: as in `expanded`.
     let status =
-        unsafe { taxel_fixed16(inputs, network.block().as_ptr(), output, sixteens, flags) };
+        unsafe { taxel_fixed16(inputs, network.block().as_ptr(), output, sixteens as u32, flags) };
     Finite::of_status(status)
 }

@@ -375,7 +375,7 @@ taxel_f32_powers_end:
 8:
     .fill 18, 4, 0
 9:
-    .word 0x3aaca794 @ 2^f: degree 5 to 1; see exp.rs
+    .word 0x3aaca793 @ 2^f: degree 5 to 1; see exp.rs
     .word 0x3c1e7a2a
     .word 0x3d635f2b
     .word 0x3e75fccd

@@ -194,9 +194,14 @@ impl<'a> Network<'a> {
         }
     }
 
-    /// Not inlined, so that the registers it takes are saved for no other format, and not generic, so that it
+    /// For a device not inlined, so that the registers it takes are saved for no other format, and not generic, so that it
     /// is compiled here, for speed.
-    #[inline(never)]
+    #[cfg_attr(cortex_m4f, inline(never))]
+    #[cfg_attr(
+        not(cortex_m4f),
+        inline(always),
+        expect(clippy::inline_always, reason = "so that the compiler knows the exponential")
+    )]
     pub(crate) fn infer_scaled(&self, scaled: &[f32], output: &mut [f32], exp: fn(f32) -> f32) {
         let usual: (Result<&[f32; USUAL_INPUTS], _>, Result<&mut [f32; USUAL_OUTPUTS], _>) =
             (scaled.try_into(), (&mut *output).try_into());

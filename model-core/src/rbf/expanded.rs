@@ -156,7 +156,9 @@ impl<'a> Network<'a> {
             ("affine", p.affine),
         ])?;
         check_spans(p.input_per_unit)?;
-        for (centre, row) in p.exponents.chunks_exact(1.max(1 + self.shape.inputs)).enumerate() {
+        for (centre, row) in
+            p.exponents.chunks_exact(self.shape.inputs.saturating_add(1)).enumerate()
+        {
             let Some((&b, a)) = row.split_first() else { continue };
             // −g‖x‖² + a·x + b is lowest in a corner of the clamp's box and highest at x = a/(2g).
             let (mut reach, mut square) = (0.0, 0.0);

@@ -15,8 +15,8 @@ use crate::process::{Outcome, first_line};
 /// The emulator's program.
 pub const QEMU: &str = "qemu-system-arm";
 
-/// No program takes more than seconds.
-const LIMIT: Duration = Duration::from_mins(1);
+/// No program takes more than half a minute.
+const LIMIT: Duration = Duration::from_mins(5);
 
 /// # Errors
 /// QEMU is not installed: how to get it.

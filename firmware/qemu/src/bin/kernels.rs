@@ -1,0 +1,43 @@
+//! Decodes 10,000 frames with every kernel, readings within and far beyond what models are trained on;
+//! `firmware/tests/bit_for_bit.rs` holds the host to the same bits. Assembly and its compiled twin agree here.
+#![no_std]
+#![no_main]
+
+use cortex_m_rt::entry;
+use defmt::{info, unwrap};
+use model_core::Aligned;
+use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
+use qemu_image::{checks, exit};
+
+/// The bytes of a model in testdata.
+macro_rules! model {
+    ($name:literal) => {{
+        static MODEL: Aligned<[u8; include_bytes!(concat!("../../../../testdata/", $name)).len()]> =
+            Aligned(*include_bytes!(concat!("../../../../testdata/", $name)));
+        &MODEL.0
+    }};
+}
+
+fn decode<E: ExpKernel>(format: &str, blob: &[u8]) {
+    let crc = unwrap!(checks::decoding_many::<E>(blob));
+    info!("{=str}, {=str}: {=u32:08x}", format, E::NAME, crc);
+}
+
+fn compare(format: &str, blob: &[u8]) {
+    let [compared, different] = unwrap!(checks::twins(blob));
+    info!("{=str}: {=usize} of {=usize} rows differ from the twin's", format, different, compared);
+}
+
+#[entry]
+fn main() -> ! {
+    let (f32, fixed16) = (model!("kernels-f32.bin"), model!("kernels-fixed16.bin"));
+    let f32_direct = model!("kernels-f32-direct.bin");
+    decode::<Polynomial>("f32", f32);
+    decode::<Polynomial>("fixed16", fixed16);
+    decode::<Polynomial>("f32-direct", f32_direct);
+    decode::<Libm>("f32-direct", f32_direct);
+    decode::<Micromath>("f32-direct", f32_direct);
+    compare("f32", f32);
+    compare("fixed16", fixed16);
+    exit::success()
+}
