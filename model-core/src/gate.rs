@@ -65,10 +65,24 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize> Gate<'a, RO
 /// is NaN or negative.
 ///
 /// Readings beyond the shorter of the two lists are not looked at.
-// For a device compiled here, for speed, where a whole image is compiled for size.
-#[cfg_attr(cortex_m4f, inline(never))]
 #[must_use]
 pub fn is_at_rest(readings: &[f32], baseline: &[f32], tolerance: f32) -> bool {
+    match (readings.try_into(), baseline.try_into()) {
+        (Ok(readings), Ok(baseline)) => eighteen_at_rest(readings, baseline, tolerance),
+        _ => all_at_rest(readings, baseline, tolerance),
+    }
+}
+
+/// As many readings as the paper's sensor has in a row. For a device compiled here, for speed and unrolled,
+/// where a whole image is compiled for size.
+#[cfg_attr(cortex_m4f, inline(never))]
+fn eighteen_at_rest(readings: &[f32; 18], baseline: &[f32; 18], tolerance: f32) -> bool {
+    all_at_rest(readings, baseline, tolerance)
+}
+
+#[inline(always)]
+#[expect(clippy::inline_always, reason = "lengths that are known make the loop faster")]
+fn all_at_rest(readings: &[f32], baseline: &[f32], tolerance: f32) -> bool {
     let (mut change, mut most_change) = (0.0, 0.0);
     for (reading, rest) in readings.iter().zip(baseline) {
         let (difference, most) = (reading - rest, tolerance * rest);
