@@ -15,8 +15,11 @@ use super::checks::{COLS, Numbers, OUTPUTS, ROWS};
 /// log₂e/(2σ²) for σ = 0.8
 const DECAY_PER_SPAN_SQUARED: f64 = core::f64::consts::LOG2_E / (2.0 * 0.8 * 0.8);
 
+/// What makes a blob.
+type Make = fn() -> Vec<u8>;
+
 /// The models by the name of their file.
-pub const FILES: [(&str, fn() -> Vec<u8>); 4] = [
+pub const FILES: [(&str, Make); 4] = [
     ("hand-made.bin", hand_made),
     ("kernels-f32.bin", || of_format(Format::F32)),
     ("kernels-fixed16.bin", || of_format(Format::Fixed16)),
@@ -136,8 +139,8 @@ fn fixed16_words(numbers: &mut Numbers, centres: usize, affine: bool) -> Vec<u32
     let [midpoint, per_unit] = scaling(numbers);
     let step = f64::from(HALF_RANGE) / f64::from(UNITS) * f64::from(UNITS_PER_STEP);
     let bits = EXPONENT_FRACTION_BITS + DECAY_FRACTION_BITS;
-    let decay = (DECAY_PER_SPAN_SQUARED * step * step * 2_f64.powi(bits as i32)) as u32;
-    let per_step = f64::from(decay) / 2_f64.powi(DECAY_FRACTION_BITS as i32);
+    let decay = (DECAY_PER_SPAN_SQUARED * step * step * 2_f64.powi(bits.cast_signed())) as u32;
+    let per_step = f64::from(decay) / 2_f64.powi(DECAY_FRACTION_BITS.cast_signed());
     let mut words = Vec::new();
     for first in (0..centres).step_by(CENTRES_AT_ONCE) {
         let here = (centres - first).min(CENTRES_AT_ONCE);

@@ -1,5 +1,7 @@
 //! Figures as text: tables for people, and JSON.
 
+use std::fmt::Write;
+
 use super::figures::{Figure, Group, Scope};
 use super::regions::Count;
 
@@ -118,7 +120,8 @@ pub fn json(figures: &[Figure]) -> String {
                 ("affine_frame_", true, Scope::Frame),
             ] {
                 if let Some(Count { instructions, cycles }) = group.count(affine, scope) {
-                    object += &format!(
+                    let _ = write!(
+                        object,
                         ", \"{prefix}instructions\": {instructions}, \"{prefix}cycles\": {cycles}"
                     );
                 }
