@@ -32,10 +32,10 @@ Usage: cargo xtask COMMAND
                             than firmware/budget.txt allows
   cycles [OPTION…]          counts in QEMU what decoding costs a Cortex-M4, with every kernel and
                             K = 16 to 256: instructions, cycles by a model, microseconds; fails if
-                            that is more than its budget, or other than docs/cycles.md has for the
+                            that is more than its budget, or other than firmware/cycles.csv has for the
                             compiler in use
       --json                prints a list of objects to stdout, and nothing else
-      --accept              writes docs/cycles.md instead
+      --accept              writes firmware/cycles.csv, and the tables of docs/cycles.md, instead
       --kernel NAME         one kernel alone, held to its budget alone
       --model FILE          with this model, held to nothing
   help                      this text

@@ -53,6 +53,12 @@ impl Platform for Nucleo {
     }
 }
 
+/// Theirs alone: what they are put together from leaves the stack again.
+#[inline(never)]
+fn buffers() -> Option<&'static mut PaperBuffers> {
+    singleton!(: PaperBuffers = PaperBuffers::new())
+}
+
 #[entry]
 fn main() -> ! {
     let board = unwrap!(Board::take());
@@ -77,7 +83,7 @@ fn main() -> ! {
         watchdog: board.watchdog,
         led: board.led,
     };
-    let buffers = unwrap!(singleton!(: PaperBuffers = PaperBuffers::new()));
+    let buffers = unwrap!(buffers());
     let mut app = PaperApp::<_, _>::new(nucleo, scanner, Configuration::DEFAULT, buffers);
     let mut slots = board.slots;
     app.run(&mut slots);

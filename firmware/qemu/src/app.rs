@@ -92,6 +92,12 @@ impl Platform for Board<'_> {
     }
 }
 
+/// Theirs alone: what they are put together from leaves the stack again.
+#[inline(never)]
+fn buffers() -> Option<&'static mut PaperBuffers> {
+    singleton!(: PaperBuffers = PaperBuffers::new())
+}
+
 #[entry]
 fn main() -> ! {
     info!("taxel {=str} on an emulated Cortex-M4F", env!("CARGO_PKG_VERSION"));
@@ -111,7 +117,7 @@ fn main() -> ! {
     };
     // The host says when to scan: its virtual hardware may not be there.
     let configuration = Configuration { frame_period_us: 0, ..Configuration::DEFAULT };
-    let Some(buffers) = singleton!(: PaperBuffers = PaperBuffers::new()) else { exit::failure() };
+    let Some(buffers) = buffers() else { exit::failure() };
     let mut app = PaperApp::<_, _>::new(board, scanner, configuration, buffers);
     // SAFETY: nobody else takes them.
     let mut slots = unsafe { Slot::take() };
