@@ -38,6 +38,13 @@ fn twins(format: &str) -> String {
     format!("INFO {format}: {different} of {decoded} rows differ from the twin's\n")
 }
 
+fn gating() -> String {
+    let counts = with_blob("kernels-fixed16.bin", checks::gating);
+    let [rows, at_rest, otherwise] = counts.expect("the model loads");
+    assert!(at_rest > rows / 10 && at_rest < rows / 10 * 9, "{at_rest} of {rows} rows at rest");
+    format!("INFO gate: {at_rest} of {rows} rows at rest, {otherwise} otherwise than the twin's\n")
+}
+
 #[test]
 fn the_models_in_testdata_are_those_made_here() {
     for (name, blob) in FILES {
@@ -75,9 +82,11 @@ fn every_kernel_decodes_many_frames_on_the_host_as_in_the_emulator() {
         decoding_many::<Micromath>("f32-direct"),
         twins("f32"),
         twins("fixed16"),
+        gating(),
         "exit status 0\n".to_owned(),
     ];
     assert!(of_host.iter().all(|line| !line.contains("differ") || line.contains(": 0 of ")));
+    assert!(of_host.iter().all(|line| !line.contains("gate") || line.contains(", 0 otherwise")));
     assert_eq!(of_host.concat(), expected_log("kernels"));
 }
 

@@ -204,17 +204,19 @@ impl LoadedModel {
     pub fn share_out_of_range(&self, readings: &Table) -> f64 {
         let networks = self.row_networks();
         let inputs = self.model().shape().inputs;
+        let range = |network: &Network<'_>, input| network.training_range(input).map(f64::from);
+        let ranges: Vec<[f64; 2]> = networks
+            .iter()
+            .flat_map(|network| (0..inputs).map(move |input| range(network, input)))
+            .collect();
         let (mut clamped, mut present) = (0_usize, 0_usize);
         for line in readings.lines() {
-            for (network, readings) in networks.iter().zip(line.chunks_exact(inputs)) {
-                for (input, reading) in readings.iter().enumerate() {
-                    if !is_missing(*reading) {
-                        let [lowest, highest] = network.training_range(input).map(f64::from);
-                        let place = (reading - lowest) / (highest - lowest);
-                        let inside = (f64::from(CLAMP[0])..=f64::from(CLAMP[1])).contains(&place);
-                        present += 1;
-                        clamped += usize::from(highest > lowest && !inside);
-                    }
+            for (reading, [lowest, highest]) in line.iter().zip(&ranges) {
+                if !is_missing(*reading) {
+                    let place = (reading - lowest) / (highest - lowest);
+                    let inside = (f64::from(CLAMP[0])..=f64::from(CLAMP[1])).contains(&place);
+                    present += 1;
+                    clamped += usize::from(highest > lowest && !inside);
                 }
             }
         }

@@ -114,8 +114,7 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKerne
         let places = estimate.outputs.iter_mut().zip(&mut estimate.status);
         let mut scaled = [0.0; COLS];
         for (row, ((section, readings), (outputs, status))) in rows.zip(places).enumerate() {
-            if let Some(rest) = gate.and_then(|gate| gate.rest_outputs(row, readings)) {
-                copy(rest, outputs);
+            if gate.is_some_and(|gate| gate.give_rest(row, readings, outputs)) {
                 *status = RowStatus::AtRest;
                 continue;
             }
@@ -125,13 +124,6 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKerne
             }
         }
     }
-}
-
-/// Copies in pieces that a compiler moves by itself: a call of `memcpy` costs twice the time.
-fn copy<const N: usize>(from: &[f32; N], to: &mut [f32; N]) {
-    let ((from, from_rest), (to, to_rest)) = (from.as_chunks::<8>(), to.as_chunks_mut::<8>());
-    to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
-    to_rest.iter_mut().zip(from_rest).for_each(|(to, from)| *to = *from);
 }
 
 /// A row's outputs. For a device neither generic nor inlined: it is thus compiled here, for speed, where a

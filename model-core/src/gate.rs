@@ -19,9 +19,12 @@ use crate::frame::Frame;
 /// // What the model in force answers to `baseline`.
 /// let rest = Estimate { outputs: [[0.01]], status: [RowStatus::Decoded] };
 /// let gate = Gate::new(&baseline, &rest, 0.02).unwrap();
-/// assert_eq!(gate.rest_outputs(0, &[50.5, 59.0]), Some(&[0.01]));
-/// assert_eq!(gate.rest_outputs(0, &[50.5, 58.0]), None); // one is 3 % less
-/// assert_eq!(gate.rest_outputs(0, &[49.1, 59.0]), None); // both are nearly 2 % less
+/// let mut outputs = [f32::NAN];
+/// assert!(!gate.give_rest(0, &[50.5, 58.0], &mut outputs)); // one is 3 % less
+/// assert!(!gate.give_rest(0, &[49.1, 59.0], &mut outputs)); // both are nearly 2 % less
+/// assert!(outputs[0].is_nan());
+/// assert!(gate.give_rest(0, &[50.5, 59.0], &mut outputs));
+/// assert_eq!(outputs, [0.01]);
 /// assert!(Gate::new(&baseline, &rest, 0.0).is_none());
 /// ```
 #[derive(Debug, Clone, Copy)]
@@ -45,18 +48,22 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize> Gate<'a, RO
         (tolerance > 0.0 && tolerance < 1.0).then_some(Self { baseline, rest, tolerance })
     }
 
-    /// The outputs of row `row` if its `readings` in Ω are at rest.
-    #[inline(always)]
-    #[expect(
-        clippy::inline_always,
-        reason = "a call would cost a tenth of what a row at rest costs"
-    )]
-    #[must_use]
-    pub fn rest_outputs(&self, row: usize, readings: &[f32; COLS]) -> Option<&'a [f32; OUTPUTS]> {
-        let baseline = self.baseline.row_column_resistance_ohm.get(row)?;
-        let known = self.rest.status.get(row) == Some(&RowStatus::Decoded);
-        let at_rest = known && is_at_rest(readings, baseline, self.tolerance);
-        if at_rest { self.rest.outputs.get(row) } else { None }
+    /// Gives `outputs` the outputs at rest if the `readings` in Ω of row `row` are at rest, and says whether
+    /// they are.
+    pub fn give_rest(
+        &self,
+        row: usize,
+        readings: &[f32; COLS],
+        outputs: &mut [f32; OUTPUTS],
+    ) -> bool {
+        let baseline = self.baseline.row_column_resistance_ohm.get(row);
+        let rest = self.rest.outputs.get(row).zip(self.rest.status.get(row));
+        match baseline.zip(rest) {
+            Some((baseline, (rest, RowStatus::Decoded))) => {
+                give_rest(readings, baseline, self.tolerance, rest, outputs)
+            }
+            _ => false,
+        }
     }
 }
 
@@ -67,22 +74,6 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize> Gate<'a, RO
 /// Readings beyond the shorter of the two lists are not looked at.
 #[must_use]
 pub fn is_at_rest(readings: &[f32], baseline: &[f32], tolerance: f32) -> bool {
-    match (readings.try_into(), baseline.try_into()) {
-        (Ok(readings), Ok(baseline)) => eighteen_at_rest(readings, baseline, tolerance),
-        _ => all_at_rest(readings, baseline, tolerance),
-    }
-}
-
-/// As many readings as the paper's sensor has in a row. For a device compiled here, for speed and unrolled,
-/// where a whole image is compiled for size.
-#[cfg_attr(cortex_m4f, inline(never))]
-fn eighteen_at_rest(readings: &[f32; 18], baseline: &[f32; 18], tolerance: f32) -> bool {
-    all_at_rest(readings, baseline, tolerance)
-}
-
-#[inline(always)]
-#[expect(clippy::inline_always, reason = "lengths that are known make the loop faster")]
-fn all_at_rest(readings: &[f32], baseline: &[f32], tolerance: f32) -> bool {
     let (mut change, mut most_change) = (0.0, 0.0);
     for (reading, rest) in readings.iter().zip(baseline) {
         let (difference, most) = (reading - rest, tolerance * rest);
@@ -95,7 +86,32 @@ fn all_at_rest(readings: &[f32], baseline: &[f32], tolerance: f32) -> bool {
         change += difference;
         most_change += most;
     }
-    change * change * readings.len() as f32 <= most_change * most_change
+    let n = readings.len().min(baseline.len());
+    change * change * n as f32 <= most_change * most_change
+}
+
+/// Gives `outputs` the `rest` if the `readings` [are at rest](is_at_rest), and says whether they are.
+///
+/// For a device neither generic nor inlined, as `decode_row` is.
+#[cfg_attr(cortex_m4f, inline(never))]
+fn give_rest(
+    readings: &[f32],
+    baseline: &[f32],
+    tolerance: f32,
+    rest: &[f32],
+    outputs: &mut [f32],
+) -> bool {
+    #[cfg(cortex_m4f)]
+    if let (Ok(readings), Ok(baseline), Ok(rest), Ok(outputs)) =
+        (readings.try_into(), baseline.try_into(), rest.try_into(), (&mut *outputs).try_into())
+    {
+        return crate::cortex_m4::give_rest(readings, baseline, tolerance, rest, outputs);
+    }
+    let at_rest = is_at_rest(readings, baseline, tolerance);
+    if at_rest {
+        outputs.iter_mut().zip(rest).for_each(|(output, rest)| *output = *rest);
+    }
+    at_rest
 }
 
 #[cfg(test)]
@@ -164,8 +180,12 @@ mod tests {
         ];
         let rest = Estimate { outputs: [[1.0], [2.0], [3.0], [4.0]], status };
         let gate = Gate::new(&baseline, &rest, 0.02).unwrap();
-        let found = [0, 1, 2, 3, 4].map(|row| gate.rest_outputs(row, &[60.0]));
-        assert_eq!(found, [Some(&[1.0]), None, None, Some(&[4.0]), None]);
+        let found = [0, 1, 2, 3, 4].map(|row| {
+            let mut outputs = [0.0];
+            (gate.give_rest(row, &[60.0], &mut outputs), outputs)
+        });
+        let untouched = (false, [0.0]);
+        assert_eq!(found, [(true, [1.0]), untouched, untouched, (true, [4.0]), untouched]);
     }
 
     #[test]

@@ -17,16 +17,14 @@
 use crate::exp::ExpKernel;
 use crate::scale::{HALF_RANGE, UNITS};
 
-#[cfg(cortex_m4f)]
-mod cortex_m4;
 pub mod direct;
 pub mod expanded;
 pub mod fixed16;
 
 /// The paper's sizes, which inner loops are made for: in assembly, or compiled with these numbers known.
-const USUAL_INPUTS: usize = 18;
+pub(crate) const USUAL_INPUTS: usize = 18;
 /// See [`USUAL_INPUTS`].
-const USUAL_OUTPUTS: usize = 18;
+pub(crate) const USUAL_OUTPUTS: usize = 18;
 
 /// The sizes of one network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -336,6 +334,14 @@ fn check_length<T>(what: &'static str, values: &[T], expected: usize) -> Result<
         Ok(())
     } else {
         Err(NetworkError::Length { what, expected, found: values.len() })
+    }
+}
+
+/// Readings in units from the middle of the training range, not clamped yet.
+fn scale_about(midpoint: &[f32], per_unit: &[f32], reading: &[f32], scaled: &mut [f32]) {
+    let limits = midpoint.iter().zip(per_unit);
+    for ((x, &r), (&midpoint, &per_unit)) in scaled.iter_mut().zip(reading).zip(limits) {
+        *x = (r - midpoint) * per_unit;
     }
 }
 

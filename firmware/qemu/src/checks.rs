@@ -4,9 +4,10 @@
 use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
 use model_core::blob::Model;
 use model_core::exp::ExpKernel;
+use model_core::gate::is_at_rest;
 use model_core::rbf::Network;
 use model_core::rls::Rls;
-use model_core::{Decoder, Estimate, Frame, RowStatus};
+use model_core::{Decoder, Estimate, Frame, Gate, RowStatus};
 
 /// Of the sensor, as of the paper's.
 pub const ROWS: usize = 8;
@@ -132,6 +133,70 @@ pub fn twins(blob: &[u8]) -> Option<[usize; 2]> {
         }
     }
     Some([compared, different])
+}
+
+/// How far readings may be from their baseline, relative to it, and be at rest.
+const TOLERANCE: f32 = 0.02;
+
+/// The baseline of `row` with readings about as far from it as the gate allows: each by itself, or all of them
+/// together, now and then one of them alone beyond it, or no number.
+fn nearly_at_rest(
+    index: usize,
+    baseline: &[f32; COLS],
+    most: [f32; 2],
+    numbers: &mut Numbers,
+) -> [f32; COLS] {
+    let [most_alone, most_together] = most;
+    let together = 1.05 * most_together * numbers.draw();
+    let mut readings =
+        baseline.map(|ohm| ohm * (1.0 + together) * (1.0 + 0.4 * most_alone * numbers.draw()));
+    let odd_ones = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, 1.0, 1.0, 1.0, 1.0];
+    if let (0, Some(reading)) = (index % 3, readings.get_mut(index / 3 % COLS)) {
+        *reading *= odd_ones[index / 3 % odd_ones.len()] + 1.2 * most_alone * numbers.draw();
+    }
+    readings
+}
+
+/// Of [`MANY`] frames near the baseline: rows, how many the gate finds at rest, and how many it finds
+/// otherwise than [`is_at_rest`], or gives other outputs than those at rest. `None`: the blob in `blob` does
+/// not load.
+#[must_use]
+pub fn gating(blob: &[u8]) -> Option<[usize; 3]> {
+    let decoder = Decoder::<ROWS, COLS, OUTPUTS>::load(blob).ok()?;
+    let mut numbers = Numbers::new(5);
+    let mut baseline = Frame::missing();
+    let readings = baseline.row_column_resistance_ohm.as_flattened_mut();
+    readings.iter_mut().for_each(|ohm| *ohm = 60.0 + 5.0 * numbers.draw());
+    let rest = decoder.decode(&baseline);
+    // The root of 18, which `core` has no function for.
+    let most = [TOLERANCE, TOLERANCE / 4.242_640_7];
+    let [mut at_rest, mut otherwise] = [0; 2];
+    for index in 0..MANY {
+        let mut frame = Frame::missing();
+        let rows = frame.row_column_resistance_ohm.iter_mut();
+        rows.zip(&baseline.row_column_resistance_ohm).enumerate().for_each(|(row, (to, from))| {
+            *to = nearly_at_rest(index * ROWS + row, from, most, &mut numbers);
+        });
+        let mut estimate = decoder.decode(&frame);
+        let ungated = estimate;
+        estimate.outputs = [[f32::NAN; OUTPUTS]; ROWS];
+        let gate = Gate::new(&baseline, &rest, TOLERANCE)?;
+        decoder.decode_gated_into(&frame, Some(gate), &mut estimate);
+        for row in 0..ROWS {
+            let readings = &frame.row_column_resistance_ohm[row];
+            let expected =
+                if is_at_rest(readings, &baseline.row_column_resistance_ohm[row], TOLERANCE) {
+                    at_rest += 1;
+                    (RowStatus::AtRest, rest.outputs[row])
+                } else {
+                    (ungated.status[row], ungated.outputs[row])
+                };
+            let same = estimate.status[row] == expected.0
+                && estimate.outputs[row].map(f32::to_bits) == expected.1.map(f32::to_bits);
+            otherwise += usize::from(!same);
+        }
+    }
+    Some([MANY * ROWS, at_rest, otherwise])
 }
 
 /// CRC-32 of every bit of the weights that recursive least squares has learnt after each of 200

@@ -83,15 +83,18 @@ pub fn page(result: &RunResult) -> String {
     body.heading("By row-wire");
     body.figure(&figures::by_row_wire(result));
 
-    let title = format!("Taxel: {}", result.scene.name);
+    document(&format!("Taxel: {}", result.scene.name), &body.html)
+}
+
+/// A page of this title around `body`, which is HTML: no script, no file beside it.
+pub fn document(title: &str, body: &str) -> String {
     format!(
         "<!DOCTYPE html>\n<html lang=\"en-GB\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <meta name=\"color-scheme\" content=\"light dark\">\n<title>{}</title>\n\
-         <style>\n{}</style>\n</head>\n<body>\n<main>\n{}</main>\n</body>\n</html>\n",
-        escape(&title),
-        include_str!("style.css"),
-        body.html
+         <style>\n{}</style>\n</head>\n<body>\n<main>\n{body}</main>\n</body>\n</html>\n",
+        escape(title),
+        include_str!("style.css")
     )
 }
 

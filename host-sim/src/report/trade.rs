@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use super::chart::{Axis, Chart, Mark, Series};
 use super::format::{grouped, percent, significant, symbol};
+use super::html::document;
 use super::svg::{Shape, escape};
 use super::ticks;
 use crate::evaluate::trade::{Point, Trade};
@@ -120,14 +121,7 @@ pub fn html(trade: &Trade) -> String {
             .map_or("-".into(), |e| significant(e.rmse, 3)),
     );
     body += &table(trade);
-    format!(
-        "<!DOCTYPE html>\n<html lang=\"en-GB\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <meta name=\"color-scheme\" content=\"light dark\">\n<title>{}</title>\n\
-         <style>\n{}</style>\n</head>\n<body>\n<main>\n{body}</main>\n</body>\n</html>\n",
-        escape(&title),
-        include_str!("style.css")
-    )
+    document(&title, &body)
 }
 
 fn table(trade: &Trade) -> String {

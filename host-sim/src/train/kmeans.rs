@@ -1,10 +1,8 @@
 //! K-means: k-means++ starts, Lloyd's iterations, restarts.
 //!
-//! Every point belongs to the centre with the least squared distance, as [`squared_distance`] computes
-//! it in f64, and to the first of several. How few distances are computed to find it (see `assign`
+//! Every point belongs to the centre with the least squared distance, summed in f64 in the order of the
+//! features, and to the first of several. How few distances are computed to find it (see `assign`
 //! and `screen`) changes nothing in the result.
-//!
-//! [`squared_distance`]: super::squared_distance
 
 #![expect(clippy::inline_always, reason = "what `simd::widest` runs must be inlined into it")]
 

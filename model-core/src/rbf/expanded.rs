@@ -186,10 +186,7 @@ impl<'a> Network<'a> {
 
     pub(crate) fn scale(&self, reading: &[f32], scaled: &mut [f32]) {
         let p = self.parameters();
-        let limits = p.input_midpoint.iter().zip(p.input_per_unit);
-        for ((x, &r), (&midpoint, &per_unit)) in scaled.iter_mut().zip(reading).zip(limits) {
-            *x = (r - midpoint) * per_unit;
-        }
+        super::scale_about(p.input_midpoint, p.input_per_unit, reading, scaled);
     }
 
     #[inline(always)]
@@ -197,9 +194,9 @@ impl<'a> Network<'a> {
     pub(crate) fn infer(&self, reading: &[f32], scaled: &mut [f32], output: &mut [f32]) -> Finite {
         #[cfg(cortex_m4f)]
         if let (Ok(reading), Ok(output)) = (reading.try_into(), (&mut *output).try_into()) {
-            return super::cortex_m4::expanded(
+            return crate::cortex_m4::expanded(
                 self,
-                super::cortex_m4::Inputs::Readings(reading),
+                crate::cortex_m4::Inputs::Readings(reading),
                 output,
             );
         }
@@ -213,7 +210,7 @@ impl<'a> Network<'a> {
     pub(crate) fn infer_scaled(&self, scaled: &mut [f32], output: &mut [f32]) {
         #[cfg(cortex_m4f)]
         if let (Ok(scaled), Ok(output)) = ((&*scaled).try_into(), (&mut *output).try_into()) {
-            super::cortex_m4::expanded(self, super::cortex_m4::Inputs::Scaled(scaled), output);
+            crate::cortex_m4::expanded(self, crate::cortex_m4::Inputs::Scaled(scaled), output);
             return;
         }
         self.infer_scaled_in_rust(scaled, output);

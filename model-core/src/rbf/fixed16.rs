@@ -1,10 +1,10 @@
 //! The network in 16-bit fixed point.
 //!
 //! As [`expanded`](super::expanded), in integers. Inputs x are 16 bits, the upper halves of saturated
-//! integers in [`UNITS`](crate::scale::UNITS). The exponent v = g‖x − c‖² is an unsigned 6.26 number: v = b + a·x + g‖x‖² with a = −2g·c in 16
-//! bits, so c is exactly −a/(2g) whatever a was rounded to, and b = g‖c‖² + [`EXPONENT_MARGIN`]. The
-//! activation 2^−v is 16 bits (Q15): a cubic for the fraction, a shift for the integer part. Weights are 16
-//! bits with a scale for each output; sums are 32 bits.
+//! integers in [`UNITS`]. The exponent v = g‖x − c‖² is an unsigned 6.26 number: v = b + a·x + g‖x‖² with
+//! a = −2g·c in 16 bits, so c is exactly −a/(2g) whatever a was rounded to, and b = g‖c‖² +
+//! [`EXPONENT_MARGIN`]. The activation 2^−v is 16 bits (Q15): a cubic for the fraction, a shift for the integer
+//! part. Weights are 16 bits with a scale for each output; sums are 32 bits.
 //!
 //! Nothing wraps around: inputs saturate; that v stays between 0 and 2³² for every input is checked with the
 //! parameters; and the trainer proves that sums fit, by a bound on the network's norm (partial sums may
@@ -218,10 +218,7 @@ impl<'a> Network<'a> {
 
     pub(crate) fn scale(&self, reading: &[f32], scaled: &mut [f32]) {
         let p = self.parameters();
-        let limits = p.input_midpoint.iter().zip(p.input_per_unit);
-        for ((x, &r), (&midpoint, &per_unit)) in scaled.iter_mut().zip(reading).zip(limits) {
-            *x = (r - midpoint) * per_unit;
-        }
+        super::scale_about(p.input_midpoint, p.input_per_unit, reading, scaled);
     }
 
     #[inline(always)]
@@ -229,9 +226,9 @@ impl<'a> Network<'a> {
     pub(crate) fn infer(&self, reading: &[f32], scaled: &mut [f32], output: &mut [f32]) -> Finite {
         #[cfg(cortex_m4f)]
         if let (Ok(reading), Ok(output)) = (reading.try_into(), (&mut *output).try_into()) {
-            return super::cortex_m4::fixed16(
+            return crate::cortex_m4::fixed16(
                 self,
-                super::cortex_m4::Inputs::Readings(reading),
+                crate::cortex_m4::Inputs::Readings(reading),
                 output,
             );
         }
@@ -245,7 +242,7 @@ impl<'a> Network<'a> {
     pub(crate) fn infer_scaled(&self, scaled: &mut [f32], output: &mut [f32]) {
         #[cfg(cortex_m4f)]
         if let (Ok(scaled), Ok(output)) = ((&*scaled).try_into(), (&mut *output).try_into()) {
-            super::cortex_m4::fixed16(self, super::cortex_m4::Inputs::Scaled(scaled), output);
+            crate::cortex_m4::fixed16(self, crate::cortex_m4::Inputs::Scaled(scaled), output);
             return;
         }
         self.infer_scaled_in_rust(scaled, output);

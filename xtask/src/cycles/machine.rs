@@ -16,7 +16,7 @@ use crate::process::Outcome;
 const BEGIN: &str = "region_begin";
 const END: &str = "region_end";
 
-/// What is watched of the image: where `taxel_f32` takes powers of two (`model-core/src/rbf/cortex_m4.s`).
+/// What is watched of the image: where `taxel_f32` takes powers of two (`model-core/src/cortex_m4.s`).
 const WATCHED: [&str; 2] = ["taxel_f32_powers", "taxel_f32_powers_end"];
 
 /// Where the image expects a model.

@@ -1,5 +1,6 @@
-//! Decodes 10,000 frames with every kernel, readings within and far beyond what models are trained on;
-//! `firmware/tests/bit_for_bit.rs` holds the host to the same bits. Assembly and its compiled twin agree here.
+//! Decodes 10,000 frames with every kernel, readings within and far beyond what models are trained on, and
+//! gates as many; `firmware/tests/bit_for_bit.rs` holds the host to the same bits. Assembly and its compiled
+//! twin agree here.
 #![no_std]
 #![no_main]
 
@@ -28,6 +29,14 @@ fn compare(format: &str, blob: &[u8]) {
     info!("{=str}: {=usize} of {=usize} rows differ from the twin's", format, different, compared);
 }
 
+fn gate(blob: &[u8]) {
+    let [rows, at_rest, otherwise] = unwrap!(checks::gating(blob));
+    info!(
+        "gate: {=usize} of {=usize} rows at rest, {=usize} otherwise than the twin's",
+        at_rest, rows, otherwise
+    );
+}
+
 #[entry]
 fn main() -> ! {
     let (f32, fixed16) = (model!("kernels-f32.bin"), model!("kernels-fixed16.bin"));
@@ -39,5 +48,6 @@ fn main() -> ! {
     decode::<Micromath>("f32-direct", f32_direct);
     compare("f32", f32);
     compare("fixed16", fixed16);
+    gate(fixed16);
     exit::success()
 }

@@ -1,9 +1,9 @@
-@ Inner loops of the two fast kernels for a Cortex-M4F, at 18 inputs and 18 outputs.
+@ Inner loops of the gate and of the two fast kernels for a Cortex-M4F, at 18 inputs and 18 outputs.
 @
 @ The compiler cannot be led here: it neither keeps 18 accumulators in registers while it streams the
 @ weights through the rest by load-multiple, nor pairs 16-bit products (docs/cycles.md has both figures).
-@ cortex_m4.rs declares these functions; expanded.rs and fixed16.rs hold their twins in Rust, which do the
-@ same operations in the same order: answers agree bit for bit, and tests hold them to it.
+@ cortex_m4.rs declares these functions; gate.rs, expanded.rs and fixed16.rs hold their twins in Rust, which
+@ do the same operations in the same order: answers agree bit for bit, and tests hold them to it.
 @
 @ Procedure call standard: AAPCS, hard float. No function calls another; none reads or writes beyond what
 @ its arguments say; stack: at most 180 bytes.
@@ -586,3 +586,55 @@ f32_sums:
 9:
     .word -335049012, 30875674, -1449129, 32766
     .size taxel_fixed16, . - taxel_fixed16
+
+@ ---------------------------------------------------------------------------------------------------------
+@ Gate. The compiler loads number by number (2 cycles each; 7 for six at once) and saves registers.
+@ ---------------------------------------------------------------------------------------------------------
+
+@ One reading: s1 += \reading - \rest, s2 += tolerance * \rest; away if the one is beyond the other, or no
+@ number.
+    .macro gate_reading reading, rest
+    vsub.f32 \reading, \reading, \rest
+    vmul.f32 \rest, \rest, s0
+    vadd.f32 s1, s1, \reading
+    vabs.f32 \reading, \reading
+    vadd.f32 s2, s2, \rest
+    vcmp.f32 \reading, \rest
+    vmrs APSR_nzcv, fpscr
+    bhi 9f
+    .endm
+
+@ u32 taxel_give_rest(readings: *const f32 [18], baseline: *const f32 [18], rest: *const f32 [18],
+@                     outputs: *mut f32 [18], tolerance: f32)
+@ Copies rest to outputs and returns 1 if the readings are at rest as gate.rs says; else 0.
+    function taxel_give_rest
+    mov r12, #0
+    vmov s1, r12
+    vmov s2, r12
+    .rept 3
+    vldmia r0!, {s4-s9}
+    vldmia r1!, {s10-s15}
+    gate_reading s4, s10
+    gate_reading s5, s11
+    gate_reading s6, s12
+    gate_reading s7, s13
+    gate_reading s8, s14
+    gate_reading s9, s15
+    .endr
+    vmov.f32 s3, #18.0
+    vmul.f32 s1, s1, s1
+    vmul.f32 s2, s2, s2
+    vmul.f32 s1, s1, s3
+    vcmp.f32 s1, s2
+    vmrs APSR_nzcv, fpscr
+    bhi 9f
+    vldmia r2!, {s0-s15}
+    vstmia r3!, {s0-s15}
+    vldmia r2, {s0-s1}
+    vstmia r3, {s0-s1}
+    movs r0, #1
+    bx lr
+9:
+    movs r0, #0
+    bx lr
+    .size taxel_give_rest, . - taxel_give_rest

@@ -7,7 +7,7 @@
 
 use core::mem::MaybeUninit;
 
-use super::{Finite, USUAL_INPUTS as INPUTS, USUAL_OUTPUTS as OUTPUTS, expanded, fixed16};
+use crate::rbf::{Finite, USUAL_INPUTS as INPUTS, USUAL_OUTPUTS as OUTPUTS, expanded, fixed16};
 
 /// Activations of the f32 kernel between its two halves: 512 bytes of stack.
 const MOST_CENTRES_AT_ONCE: usize = 128;
@@ -16,7 +16,7 @@ core::arch::global_asm!(include_str!("cortex_m4.s"), options(raw));
 
 /// What a network takes in.
 #[derive(Clone, Copy)]
-pub(super) enum Inputs<'a> {
+pub(crate) enum Inputs<'a> {
     /// In the readings' unit.
     Readings(&'a [f32; INPUTS]),
     /// In [`UNITS`](crate::scale::UNITS).
@@ -49,6 +49,13 @@ unsafe extern "C" {
         sixteens: u32,
         flags: u32,
     ) -> u32;
+    fn taxel_give_rest(
+        readings: *const [f32; INPUTS],
+        baseline: *const [f32; INPUTS],
+        rest: *const [f32; OUTPUTS],
+        outputs: *mut [f32; OUTPUTS],
+        tolerance: f32,
+    ) -> u32;
 }
 
 impl Finite {
@@ -65,7 +72,7 @@ const AFFINE: u32 = 1;
 const SCALED: u32 = 2;
 
 /// The outputs of a network with expanded distances.
-pub(super) fn expanded(
+pub(crate) fn expanded(
     network: &expanded::Network<'_>,
     inputs: Inputs<'_>,
     output: &mut [f32; OUTPUTS],
@@ -90,7 +97,7 @@ pub(super) fn expanded(
 }
 
 /// The outputs of a network in fixed point.
-pub(super) fn fixed16(
+pub(crate) fn fixed16(
     network: &fixed16::Network<'_>,
     inputs: Inputs<'_>,
     output: &mut [f32; OUTPUTS],
@@ -102,4 +109,16 @@ pub(super) fn fixed16(
     let status =
         unsafe { taxel_fixed16(inputs, network.block().as_ptr(), output, sixteens as u32, flags) };
     Finite::of_status(status)
+}
+
+/// See `gate::give_rest`.
+pub(crate) fn give_rest(
+    readings: &[f32; INPUTS],
+    baseline: &[f32; INPUTS],
+    tolerance: f32,
+    rest: &[f32; OUTPUTS],
+    outputs: &mut [f32; OUTPUTS],
+) -> bool {
+    // SAFETY: no more is read and written than these arrays.
+    unsafe { taxel_give_rest(readings, baseline, rest, outputs, tolerance) != 0 }
 }
