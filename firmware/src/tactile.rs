@@ -49,7 +49,7 @@ pub type PaperSensor<'a, E = Polynomial> = Tactile<'a, 8, 18, 18, E>;
 /// #     training_rmse: Floats(&[0; 4]),
 /// #     full_scale: Floats(&[0; 4]),
 /// # };
-/// # let parts = ModelParts { networks: &[network.into()], row_network: &[0], metadata };
+/// # let parts = ModelParts { projection: None, networks: &[network.into()], row_network: &[0], metadata };
 /// # let mut buffer = Aligned([0; 512]);
 /// # let blob: &[u8] = encode(&parts, &mut buffer.0).unwrap();
 /// // `blob` holds a model of one row with two readings (Ω) and one output (mm).

@@ -28,7 +28,8 @@ fn decoding<E: ExpKernel>(blob: &[u8]) -> String {
 }
 
 fn decoding_many<E: ExpKernel>(format: &str) -> String {
-    let crc = with_blob(&format!("kernels-{format}.bin"), checks::decoding_many::<E>);
+    let crc =
+        with_blob(&format!("kernels-{format}.bin"), checks::decoding_many::<E, { checks::ROWS }>);
     format!("INFO {format}, {}: {:08x}\n", E::NAME, crc.expect("the model loads"))
 }
 
@@ -36,6 +37,18 @@ fn twins(format: &str) -> String {
     let counts = with_blob(&format!("kernels-{format}.bin"), checks::twins);
     let [decoded, different] = counts.expect("a model with a twin");
     format!("INFO {format}: {different} of {decoded} rows differ from the twin's\n")
+}
+
+fn array(format: &str, file: &str) -> String {
+    let crc = with_blob(file, checks::decoding_many::<Polynomial, { checks::ARRAY_ROWS }>);
+    let line = format!("INFO array, {format}: {:08x}\n", crc.expect("the model loads"));
+    match with_blob(file, checks::array_twins) {
+        Some([compared, different]) => {
+            assert!(compared > checks::MANY / 2, "{compared} frames compared");
+            line + &format!("INFO {different} of {compared} frames differ from the twins'\n")
+        }
+        None => line,
+    }
 }
 
 fn gating() -> String {
@@ -83,9 +96,14 @@ fn every_kernel_decodes_many_frames_on_the_host_as_in_the_emulator() {
         twins("f32"),
         twins("fixed16"),
         gating(),
+        array("f32", "array-f32.bin"),
+        array("f32", "array-f32-no-tail.bin"),
+        array("fixed16", "array-fixed16.bin"),
+        array("fixed16", "array-fixed16-no-tail.bin"),
+        array("f32-direct", "array-f32-direct.bin"),
         "exit status 0\n".to_owned(),
     ];
-    assert!(of_host.iter().all(|line| !line.contains("differ") || line.contains(": 0 of ")));
+    assert!(of_host.iter().all(|line| !line.contains("differ") || line.contains(" 0 of ")));
     assert!(of_host.iter().all(|line| !line.contains("gate") || line.contains(", 0 otherwise")));
     assert_eq!(of_host.concat(), expected_log("kernels"));
 }

@@ -105,6 +105,7 @@ pub fn encode(networks: &[FittedNetwork], dataset: &Dataset, origin: &Origin) ->
     let training_rmse = floats(&training_rmse(&views, dataset));
     let full_scale = floats(&origin.full_scale);
     let parts = ModelParts {
+        projection: None,
         networks: &views,
         row_network: &row_network,
         metadata: Metadata {

@@ -7,13 +7,16 @@ use crate::estimate::{Estimate, RowStatus};
 use crate::exp::{ExpKernel, Polynomial};
 use crate::frame::Frame;
 use crate::gate::Gate;
-use crate::rbf::{Finite, Format};
+use crate::projection::Projection;
+use crate::rbf::{Finite, Format, NetworkError};
+#[cfg(cortex_m4f)]
+use crate::rbf::{USUAL_INPUTS, USUAL_OUTPUTS};
 
 /// RAM in bytes that a [`Decoder`] of so many `rows` takes on a 32-bit target, whatever its K: slices
 /// into the blob. The link check of the firmware holds it to the compiler.
 #[must_use]
 pub const fn decoder_ram_bytes(rows: usize) -> usize {
-    128 + 16 * rows
+    136 + 16 * rows
 }
 
 /// A model ready to decode frames of a sensor whose sizes are known when compiled.
@@ -103,6 +106,9 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKerne
 
     /// As [`decode_into`](Self::decode_into), but a row that `gate` finds at rest is not inferred: it takes
     /// the outputs at rest. All other rows are decoded as without a gate, to the bit.
+    ///
+    /// A model behind a [`Projection`] decodes all rows or none: all are at rest, or all are decoded; and a
+    /// reading that is missing anywhere marks them all.
     #[inline(never)] // one copy of inference in flash, whoever decodes
     pub fn decode_gated_into(
         &self,
@@ -110,6 +116,9 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKerne
         gate: Option<Gate<'_, ROWS, COLS, OUTPUTS>>,
         estimate: &mut Estimate<ROWS, OUTPUTS>,
     ) {
+        if let Some(projection) = self.model.projection() {
+            return self.decode_array_into(projection, frame, gate, estimate);
+        }
         let rows = self.row_sections.iter().zip(&frame.row_column_resistance_ohm);
         let places = estimate.outputs.iter_mut().zip(&mut estimate.status);
         let mut scaled = [0.0; COLS];
@@ -118,64 +127,141 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKerne
                 *status = RowStatus::AtRest;
                 continue;
             }
-            *status = decode_row(section, E::exp, readings, &mut scaled, outputs);
+            *status = decode_inputs(section, E::exp, readings, &mut scaled, outputs);
             if *status != RowStatus::Decoded {
                 *outputs = [f32::NAN; OUTPUTS];
             }
         }
     }
+
+    /// Not inlined: its stack would burden rows.
+    #[inline(never)]
+    fn decode_array_into(
+        &self,
+        projection: Projection<'_>,
+        frame: &Frame<ROWS, COLS>,
+        gate: Option<Gate<'_, ROWS, COLS, OUTPUTS>>,
+        estimate: &mut Estimate<ROWS, OUTPUTS>,
+    ) {
+        let readings = &frame.row_column_resistance_ohm;
+        let mut rows = readings.iter().zip(&mut estimate.outputs).enumerate();
+        let at_rest = gate.is_some_and(|gate| {
+            rows.all(|(row, (readings, outputs))| gate.give_rest(row, readings, outputs))
+        });
+        let status = match self.row_sections.first() {
+            _ if at_rest => RowStatus::AtRest,
+            Some(section) => {
+                let (mut features, mut scaled) = ([0.0; COLS], [0.0; COLS]);
+                projection.project(readings.as_flattened(), &mut features);
+                let outputs = estimate.outputs.as_flattened_mut();
+                decode_inputs(section, E::exp, &features, &mut scaled, outputs)
+            }
+            None => RowStatus::MissingReading,
+        };
+        if !matches!(status, RowStatus::Decoded | RowStatus::AtRest) {
+            estimate.outputs.as_flattened_mut().fill(f32::NAN);
+        }
+        estimate.status = [status; ROWS];
+    }
 }
 
-/// A row's outputs. For a device neither generic nor inlined: it is thus compiled here, for speed, where a
-/// whole image is compiled for size.
+/// The outputs of a row, or of all rows at once. Inlined: where sizes are those of the assembly, nothing else
+/// is compiled.
+#[inline(always)]
+#[expect(clippy::inline_always, reason = "lengths that are known choose the code")]
+fn decode_inputs(
+    section: &NetworkSection<'_>,
+    exp: fn(f32) -> f32,
+    inputs: &[f32],
+    scaled: &mut [f32],
+    outputs: &mut [f32],
+) -> RowStatus {
+    #[cfg(cortex_m4f)]
+    if let (Ok(inputs), (groups @ [_, ..], [])) = (inputs.try_into(), outputs.as_chunks_mut()) {
+        return decode_in_assembly(section, exp, inputs, scaled, groups);
+    }
+    decode_in_rust(section, exp, inputs, scaled, outputs)
+}
+
+/// For a device neither generic nor inlined: it is thus compiled here, for speed, where a whole image is
+/// compiled for size.
+#[cfg(cortex_m4f)]
+#[inline(never)]
+fn decode_in_assembly(
+    section: &NetworkSection<'_>,
+    exp: fn(f32) -> f32,
+    inputs: &[f32; USUAL_INPUTS],
+    scaled: &mut [f32],
+    groups: &mut [[f32; USUAL_OUTPUTS]],
+) -> RowStatus {
+    let outputs = groups.as_flattened().len();
+    let shape = ModelShape { rows: 1, inputs: USUAL_INPUTS, outputs };
+    let finite = match section.format() {
+        Format::F32Direct => {
+            let outputs = groups.as_flattened_mut();
+            return decode_direct(section, exp, inputs, scaled, outputs);
+        }
+        Format::F32 => section.expanded(shape).map(|it| it.infer_in_assembly(inputs, groups)),
+        Format::Fixed16 => section.fixed16(shape).map(|it| it.infer_in_assembly(inputs, groups)),
+    };
+    status_of(finite, inputs)
+}
+
+/// See [`decode_in_assembly`].
 #[cfg_attr(cortex_m4f, inline(never))]
 #[cfg_attr(
     not(cortex_m4f),
     inline(always),
     expect(clippy::inline_always, reason = "so that the compiler knows the exponential")
 )]
-fn decode_row(
+fn decode_in_rust(
     section: &NetworkSection<'_>,
     exp: fn(f32) -> f32,
-    readings: &[f32],
+    inputs: &[f32],
     scaled: &mut [f32],
     outputs: &mut [f32],
 ) -> RowStatus {
-    let shape = ModelShape { rows: 1, inputs: readings.len(), outputs: outputs.len() };
-    // Their outputs have a bound, which is checked when a model is loaded.
+    let shape = ModelShape { rows: 1, inputs: inputs.len(), outputs: outputs.len() };
     let finite = match section.format() {
-        Format::F32Direct => return decode_direct_row(section, exp, readings, scaled, outputs),
-        Format::F32 => section.expanded(shape).map(|it| it.infer(readings, scaled, outputs)),
-        Format::Fixed16 => section.fixed16(shape).map(|it| it.infer(readings, scaled, outputs)),
+        Format::F32Direct => return decode_direct(section, exp, inputs, scaled, outputs),
+        Format::F32 => section.expanded(shape).map(|it| it.infer(inputs, scaled, outputs)),
+        Format::Fixed16 => section.fixed16(shape).map(|it| it.infer(inputs, scaled, outputs)),
     };
+    status_of(finite, inputs)
+}
+
+/// Of the formats whose outputs have a bound, which is checked when a model is loaded.
+#[inline(always)]
+#[expect(clippy::inline_always, reason = "an enum that need not be made")]
+fn status_of(finite: Result<Finite, NetworkError>, inputs: &[f32]) -> RowStatus {
     match finite {
         Ok(Finite::Known) => RowStatus::Decoded,
-        Ok(Finite::Unknown) if all_finite(readings) => RowStatus::Decoded,
+        Ok(Finite::Unknown) if all_finite(inputs) => RowStatus::Decoded,
         // An error: not so, the network was there when the model was loaded.
         Ok(Finite::Unknown) | Err(_) => RowStatus::MissingReading,
     }
 }
 
-/// See [`decode_row`].
+/// See [`decode_in_rust`].
 #[cfg_attr(cortex_m4f, inline(never))]
 #[cfg_attr(
     not(cortex_m4f),
     inline(always),
     expect(clippy::inline_always, reason = "so that the compiler knows the exponential")
 )]
-fn decode_direct_row(
+fn decode_direct(
     section: &NetworkSection<'_>,
     exp: fn(f32) -> f32,
-    readings: &[f32],
+    inputs: &[f32],
     scaled: &mut [f32],
     outputs: &mut [f32],
 ) -> RowStatus {
-    let shape = ModelShape { rows: 1, inputs: readings.len(), outputs: outputs.len() };
+    let shape = ModelShape { rows: 1, inputs: inputs.len(), outputs: outputs.len() };
     let Ok(network) = section.direct(shape) else { return RowStatus::MissingReading };
-    if !all_finite(readings) {
+    if !all_finite(inputs) {
         return RowStatus::MissingReading;
     }
-    network.scale(readings, scaled);
+    network.scale(inputs, scaled);
     network.infer_scaled(scaled, outputs, exp);
     if all_finite(outputs) { RowStatus::Decoded } else { RowStatus::Overflow }
 }

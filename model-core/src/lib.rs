@@ -1,7 +1,7 @@
 //! Inference for resistive tactile sensors: from row–column resistances to deformation.
 //!
-//! Readings travel one way: [`Frame`] (Ω) → [`health`] → [`gate`] → [`scale`] → [`rbf`] (and its affine
-//! tail) → [`Estimate`]. The network's weights are read where the [`blob`] lies, in flash or in a
+//! Readings travel one way: [`Frame`] (Ω) → [`health`] → [`gate`] → ([`projection`] →) [`scale`] → [`rbf`]
+//! (and its affine tail) → [`Estimate`]. The network's weights are read where the [`blob`] lies, in flash or in a
 //! file's buffer: nothing is copied, nothing is allocated, and no release code path of
 //! [`Decoder`] panics. [`rls`] updates output weights sample by sample.
 //!
@@ -26,6 +26,7 @@ pub mod exp;
 mod frame;
 pub mod gate;
 pub mod health;
+pub mod projection;
 pub mod rbf;
 pub mod rls;
 pub mod scale;

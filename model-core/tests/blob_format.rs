@@ -55,8 +55,16 @@ fn metadata() -> Metadata<'static> {
 /// Two mirror rows that share one network.
 fn small_model(buffer: &mut [u8]) -> &[u8] {
     let networks = [network()];
-    encode(&ModelParts { networks: &networks, row_network: &[0, 0], metadata: metadata() }, buffer)
-        .unwrap()
+    encode(
+        &ModelParts {
+            projection: None,
+            networks: &networks,
+            row_network: &[0, 0],
+            metadata: metadata(),
+        },
+        buffer,
+    )
+    .unwrap()
 }
 
 /// Hexadecimal bytes of the specification's worked example: lines like `| 0 | 54 41 … | … |`.
@@ -122,7 +130,12 @@ fn readings_that_overflow_are_told_from_missing_ones() {
         ..parameters()
     };
     let networks = [network_of(parameters)];
-    let parts = ModelParts { networks: &networks, row_network: &[0, 0], metadata: metadata() };
+    let parts = ModelParts {
+        projection: None,
+        networks: &networks,
+        row_network: &[0, 0],
+        metadata: metadata(),
+    };
     let blob = encode(&parts, &mut buffer.0).unwrap();
     let decoder = Decoder::<2, 2, 1, Libm>::load(blob).unwrap();
     let frame = Frame { row_column_resistance_ohm: [[3e38, 64.0], [54.0, 64.0]] };
@@ -143,7 +156,12 @@ fn a_slot_larger_than_its_blob_tells_the_blobs_length() {
 #[test]
 fn what_does_not_fit_the_format_is_refused_when_written() {
     let networks = [network()];
-    let parts = ModelParts { networks: &networks, row_network: &[0, 0], metadata: metadata() };
+    let parts = ModelParts {
+        projection: None,
+        networks: &networks,
+        row_network: &[0, 0],
+        metadata: metadata(),
+    };
     let mut buffer = Aligned([0; 512]);
     let length = encode(&parts, &mut buffer.0).unwrap().len();
     assert!(length <= encoded_length_bound(&parts));

@@ -44,7 +44,8 @@ fn with_decoder(check: impl FnOnce(&TestDecoder<'_>)) {
         training_rmse: Floats(&[0; 4 * ROWS * OUTPUTS]),
         full_scale: Floats(&[0; 4 * ROWS * OUTPUTS]),
     };
-    let parts = ModelParts { networks: &[network], row_network: &[0; ROWS], metadata };
+    let parts =
+        ModelParts { projection: None, networks: &[network], row_network: &[0; ROWS], metadata };
     let mut buffer = Aligned([0; 512]);
     check(&TestDecoder::load(encode(&parts, &mut buffer.0).unwrap()).unwrap());
 }

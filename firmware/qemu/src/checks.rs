@@ -15,6 +15,8 @@ pub const ROWS: usize = 8;
 pub const COLS: usize = 18;
 /// Of one row.
 pub const OUTPUTS: usize = 18;
+/// Of a small sensor that one network decodes, behind a projection.
+pub const ARRAY_ROWS: usize = 3;
 
 const FRAMES: usize = 6;
 const CRC: Crc<u32, Table<0>> = Crc::<u32, Table<0>>::new(&CRC_32_ISO_HDLC);
@@ -73,13 +75,13 @@ const QUICK_CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC
 const REACHES: [f32; 8] = [5.0, 5.0, 5.0, 7.0, 9.0, 30.0, 1e3, 3e38];
 
 /// One of many frames: its readings, some of them none at all.
-fn one_of_many(index: usize, numbers: &mut Numbers) -> Frame<ROWS, COLS> {
+fn one_of_many<const R: usize>(index: usize, numbers: &mut Numbers) -> Frame<R, COLS> {
     let mut frame = Frame::missing();
     let readings = frame.row_column_resistance_ohm.as_flattened_mut();
     let reach = REACHES[index % REACHES.len()];
     readings.iter_mut().for_each(|ohm| *ohm = 60.0 + reach * numbers.draw());
     let none = [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
-    if let (0, Some(reading)) = (index % 50, readings.get_mut(index / 50 % (ROWS * COLS))) {
+    if let (0, Some(reading)) = (index % 50, readings.get_mut(index / 50 % (R * COLS))) {
         *reading = none[index / 50 % none.len()];
     }
     frame
@@ -87,13 +89,13 @@ fn one_of_many(index: usize, numbers: &mut Numbers) -> Frame<ROWS, COLS> {
 
 /// CRC-32 of every bit of what the model in `blob` answers to [`MANY`] frames. `None`: the blob does not load.
 #[must_use]
-pub fn decoding_many<E: ExpKernel>(blob: &[u8]) -> Option<u32> {
-    let decoder = Decoder::<ROWS, COLS, OUTPUTS, E>::load(blob).ok()?;
+pub fn decoding_many<E: ExpKernel, const R: usize>(blob: &[u8]) -> Option<u32> {
+    let decoder = Decoder::<R, COLS, OUTPUTS, E>::load(blob).ok()?;
     let crc = QUICK_CRC;
     let mut digest = crc.digest();
     let mut numbers = Numbers::new(4);
     for index in 0..MANY {
-        let estimate = decoder.decode(&one_of_many(index, &mut numbers));
+        let estimate = decoder.decode(&one_of_many::<R>(index, &mut numbers));
         for (outputs, status) in estimate.outputs.iter().zip(estimate.status) {
             outputs.iter().for_each(|value| digest.update(&value.to_bits().to_le_bytes()));
             digest.update(&[status as u8]);
@@ -111,7 +113,7 @@ pub fn twins(blob: &[u8]) -> Option<[usize; 2]> {
     let mut numbers = Numbers::new(4);
     let [mut compared, mut different] = [0; 2];
     for index in 0..MANY {
-        let frame = one_of_many(index, &mut numbers);
+        let frame = one_of_many::<ROWS>(index, &mut numbers);
         let Estimate { outputs, status } = decoder.decode(&frame);
         let rows = frame.row_column_resistance_ohm.iter().zip(&outputs).zip(status).enumerate();
         for (row, ((readings, outputs), status)) in rows {
@@ -131,6 +133,42 @@ pub fn twins(blob: &[u8]) -> Option<[usize; 2]> {
             compared += 1;
             different += usize::from(outputs.map(f32::to_bits) != of_twin.map(f32::to_bits));
         }
+    }
+    Some([compared, different])
+}
+
+/// Of as many frames, how many the model in `blob`, which stands behind a projection, decodes, and how many of
+/// them the compiled twins of projection and kernel answer otherwise to in any bit. `None`: the blob does not
+/// load, or its kernel has no twin.
+#[must_use]
+pub fn array_twins(blob: &[u8]) -> Option<[usize; 2]> {
+    let decoder = Decoder::<ARRAY_ROWS, COLS, OUTPUTS>::load(blob).ok()?;
+    let model = Model::decode(blob).ok()?;
+    let (projection, network) = (model.projection()?, model.networks().next()?);
+    let mut numbers = Numbers::new(4);
+    let [mut compared, mut different] = [0; 2];
+    for index in 0..MANY {
+        let frame = one_of_many::<ARRAY_ROWS>(index, &mut numbers);
+        let Estimate { outputs, status } = decoder.decode(&frame);
+        if status != [RowStatus::Decoded; ARRAY_ROWS] {
+            continue;
+        }
+        let (mut features, mut scaled) = ([0.0; COLS], [0.0; COLS]);
+        let mut of_twin = [[0.0; OUTPUTS]; ARRAY_ROWS];
+        projection.project_portably(frame.row_column_resistance_ohm.as_flattened(), &mut features);
+        network.scale(&features, &mut scaled).ok()?;
+        match network {
+            Network::F32Direct(_) => return None,
+            Network::F32(network) => {
+                network.infer_scaled_portably(&mut scaled, of_twin.as_flattened_mut());
+            }
+            Network::Fixed16(network) => {
+                network.infer_scaled_portably(&mut scaled, of_twin.as_flattened_mut());
+            }
+        }
+        let bits = |outputs: [[f32; OUTPUTS]; ARRAY_ROWS]| outputs.map(|row| row.map(f32::to_bits));
+        compared += 1;
+        different += usize::from(bits(outputs) != bits(of_twin));
     }
     Some([compared, different])
 }

@@ -3,6 +3,7 @@
 use model_core::blob::{
     Columns, Floats, Metadata, ModelParts, NoiseKind, encode, encoded_length_bound,
 };
+use model_core::projection::Projection;
 use model_core::rbf::direct::Parameters;
 use model_core::rbf::fixed16::{
     CENTRES_AT_ONCE, DECAY_FRACTION_BITS, EXPONENT_FRACTION_BITS, EXPONENT_MARGIN,
@@ -10,7 +11,7 @@ use model_core::rbf::fixed16::{
 use model_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
 use model_core::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP};
 
-use super::checks::{COLS, Numbers, OUTPUTS, ROWS};
+use super::checks::{ARRAY_ROWS, COLS, Numbers, OUTPUTS};
 
 /// log₂e/(2σ²) for σ = 0.8
 const DECAY_PER_SPAN_SQUARED: f64 = core::f64::consts::LOG2_E / (2.0 * 0.8 * 0.8);
@@ -19,11 +20,16 @@ const DECAY_PER_SPAN_SQUARED: f64 = core::f64::consts::LOG2_E / (2.0 * 0.8 * 0.8
 type Maker = fn() -> Vec<u8>;
 
 /// Every model by its file's name, and what makes it.
-pub const FILES: [(&str, Maker); 4] = [
+pub const FILES: [(&str, Maker); 9] = [
     ("hand-made.bin", hand_made),
     ("kernels-f32.bin", || of_format(Format::F32)),
     ("kernels-fixed16.bin", || of_format(Format::Fixed16)),
     ("kernels-f32-direct.bin", || of_format(Format::F32Direct)),
+    ("array-f32.bin", || of_array(Format::F32, 131, true)),
+    ("array-f32-no-tail.bin", || of_array(Format::F32, 18, false)),
+    ("array-fixed16.bin", || of_array(Format::Fixed16, 33, true)),
+    ("array-fixed16-no-tail.bin", || of_array(Format::Fixed16, 16, false)),
+    ("array-f32-direct.bin", || of_array(Format::F32Direct, 17, true)),
 ];
 
 /// The blob of the file of this name, at a multiple of four.
@@ -43,10 +49,15 @@ fn draw(numbers: &mut Numbers, count: usize, middle: f32, reach: f32) -> Vec<f32
 /// Two networks, which the rows use in turn, with widths of their own for every centre.
 fn hand_made() -> Vec<u8> {
     let mut numbers = Numbers::new(0);
-    let mut words = || direct_words(&mut numbers, 12, true, 12);
+    let shape = row_shape(12);
+    let mut words = || direct_words(&mut numbers, shape, true, 12);
     let (even, odd) = (words(), words());
-    let networks = [&even, &odd].map(|words| network(Format::F32Direct, 12, false, true, words));
-    encoded("hand-made", &networks, [0, 1, 0, 1, 0, 1, 0, 1])
+    let networks = [&even, &odd].map(|words| network(Format::F32Direct, shape, false, true, words));
+    encoded("hand-made", None, &networks, &[0, 1, 0, 1, 0, 1, 0, 1])
+}
+
+fn row_shape(centres: usize) -> Shape {
+    Shape { inputs: COLS, centres, outputs: OUTPUTS }
 }
 
 /// Networks with tail and without. K is a multiple of nothing that a kernel takes at once; in f32, the last
@@ -55,27 +66,45 @@ fn of_format(format: Format) -> Vec<u8> {
     let mut numbers = Numbers::new(5);
     let of_last_row = if format == Format::F32 { 131 } else { 33 };
     let kinds = [(18, true), (17, false), (of_last_row, true)];
-    let mut words_of = |(centres, affine): (usize, bool)| match format {
-        Format::F32Direct => direct_words(&mut numbers, centres, affine, 1),
-        Format::F32 => expanded_words(&mut numbers, centres, affine),
-        Format::Fixed16 => fixed16_words(&mut numbers, centres, affine),
-    };
-    let words = kinds.map(&mut words_of);
+    let words =
+        kinds.map(|(centres, affine)| words_of(format, &mut numbers, row_shape(centres), affine));
     let networks = [0, 1, 2].map(|index| {
         let (centres, affine) = kinds[index];
-        network(format, centres, true, affine, &words[index])
+        network(format, row_shape(centres), true, affine, &words[index])
     });
-    encoded(format.name(), &networks, [0, 1, 0, 1, 0, 1, 0, 2])
+    encoded(format.name(), None, &networks, &[0, 1, 0, 1, 0, 1, 0, 2])
+}
+
+/// One network for all rows behind a projection, whose features stray about as far as single readings do.
+fn of_array(format: Format, centres: usize, affine: bool) -> Vec<u8> {
+    let mut numbers = Numbers::new(6);
+    let readings = ARRAY_ROWS * COLS;
+    let parts = draw(&mut numbers, readings * COLS, 0.0, 0.35);
+    let sum = |feature: usize| parts.iter().skip(feature).step_by(COLS).sum::<f32>();
+    let start = (0..COLS).map(|feature| 60.0 - 60.0 * sum(feature));
+    let block: Vec<f32> = start.chain(parts.iter().copied()).collect();
+    let projection = Projection::new(readings, COLS, &block).unwrap();
+    let shape = Shape { inputs: COLS, centres, outputs: ARRAY_ROWS * OUTPUTS };
+    let words = words_of(format, &mut numbers, shape, affine);
+    let network = network(format, shape, true, affine, &words);
+    encoded(format.name(), Some(projection), &[network], &[0; ARRAY_ROWS])
+}
+
+fn words_of(format: Format, numbers: &mut Numbers, shape: Shape, affine: bool) -> Vec<u32> {
+    match format {
+        Format::F32Direct => direct_words(numbers, shape, affine, 1),
+        Format::F32 => expanded_words(numbers, shape, affine),
+        Format::Fixed16 => fixed16_words(numbers, shape, affine),
+    }
 }
 
 fn network(
     format: Format,
-    centres: usize,
+    shape: Shape,
     common_width: bool,
     affine: bool,
     words: &[u32],
 ) -> Network<'_> {
-    let shape = Shape { inputs: COLS, centres, outputs: OUTPUTS };
     match format {
         Format::F32Direct => {
             direct::Network::of_words(shape, common_width, affine, words).unwrap().into()
@@ -85,16 +114,17 @@ fn network(
     }
 }
 
-fn direct_words(numbers: &mut Numbers, centres: usize, affine: bool, widths: usize) -> Vec<u32> {
+fn direct_words(numbers: &mut Numbers, shape: Shape, affine: bool, widths: usize) -> Vec<u32> {
+    let Shape { centres, outputs, .. } = shape;
     let mut draw = |count, middle, reach| draw(numbers, count, middle, reach);
     let parameters = Parameters {
         input_minimum: &draw(COLS, 54.0, 1.0),
         input_per_span: &draw(COLS, 0.08, 0.01),
         centres: &draw(centres * COLS, 0.5, 0.5),
         decay: &draw(widths, 0.75, 0.5),
-        output_weights: &draw(centres * OUTPUTS, 0.0, 1.0),
-        bias: &draw(OUTPUTS, 0.0, 1.0),
-        affine: &draw(if affine { COLS * OUTPUTS } else { 0 }, 0.0, 0.1),
+        output_weights: &draw(centres * outputs, 0.0, 1.0),
+        bias: &draw(outputs, 0.0, 1.0),
+        affine: &draw(if affine { COLS * outputs } else { 0 }, 0.0, 0.1),
     };
     parameters.words().collect()
 }
@@ -108,7 +138,8 @@ fn scaling(numbers: &mut Numbers) -> [Vec<f32>; 2] {
     [midpoint, per_unit]
 }
 
-fn expanded_words(numbers: &mut Numbers, centres: usize, affine: bool) -> Vec<u32> {
+fn expanded_words(numbers: &mut Numbers, shape: Shape, affine: bool) -> Vec<u32> {
+    let Shape { centres, outputs, .. } = shape;
     let [midpoint, per_unit] = scaling(numbers);
     let unit = f64::from(HALF_RANGE) / f64::from(UNITS);
     let decay = DECAY_PER_SPAN_SQUARED * unit * unit;
@@ -121,21 +152,22 @@ fn expanded_words(numbers: &mut Numbers, centres: usize, affine: bool) -> Vec<u3
         exponents.extend(centre.iter().map(|c| (2.0 * decay * c) as f32));
     }
     exponents.resize(stored * (1 + COLS), 0.0);
-    let mut weights = draw(numbers, centres * OUTPUTS, 0.0, 1.0);
-    weights.resize(stored * OUTPUTS, 0.0);
+    let mut weights = draw(numbers, centres * outputs, 0.0, 1.0);
+    weights.resize(stored * outputs, 0.0);
     let parameters = expanded::Parameters {
         input_midpoint: &midpoint,
         input_per_unit: &per_unit,
         decay: decay as f32,
-        bias: &draw(numbers, OUTPUTS, 0.0, 1.0),
-        affine: &draw(numbers, if affine { COLS * OUTPUTS } else { 0 }, 0.0, 0.1 / UNITS),
+        bias: &draw(numbers, outputs, 0.0, 1.0),
+        affine: &draw(numbers, if affine { COLS * outputs } else { 0 }, 0.0, 0.1 / UNITS),
         exponents: &exponents,
         output_weights: &weights,
     };
     parameters.words().collect()
 }
 
-fn fixed16_words(numbers: &mut Numbers, centres: usize, affine: bool) -> Vec<u32> {
+fn fixed16_words(numbers: &mut Numbers, shape: Shape, affine: bool) -> Vec<u32> {
+    let Shape { centres, outputs, .. } = shape;
     let [midpoint, per_unit] = scaling(numbers);
     let step = f64::from(HALF_RANGE) / f64::from(UNITS) * f64::from(UNITS_PER_STEP);
     let bits = EXPONENT_FRACTION_BITS + DECAY_FRACTION_BITS;
@@ -154,19 +186,19 @@ fn fixed16_words(numbers: &mut Numbers, centres: usize, affine: bool) -> Vec<u32
             words.extend(a.as_chunks::<2>().0.iter().map(|[low, high]| pair(*low, *high)));
         }
         // What sums of at most 33 centres, the tail and the bias can hold.
-        for _ in 0..OUTPUTS {
+        for _ in 0..outputs {
             let mut weights = whole(numbers, here, 1200.0);
             weights.resize(CENTRES_AT_ONCE, 0);
             words.extend(weights.as_chunks::<2>().0.iter().map(|[low, high]| pair(*low, *high)));
         }
     }
-    let tail = whole(numbers, if affine { COLS * OUTPUTS } else { 0 }, 600.0);
+    let tail = whole(numbers, if affine { COLS * outputs } else { 0 }, 600.0);
     let parameters = fixed16::Parameters {
         input_midpoint: &midpoint,
         input_per_unit: &per_unit,
         decay,
-        bias: &whole(numbers, OUTPUTS, 1e8),
-        output_scale: &draw(numbers, OUTPUTS, 2e-8, 1e-8),
+        bias: &whole(numbers, outputs, 1e8),
+        output_scale: &draw(numbers, outputs, 2e-8, 1e-8),
         affine: &tail.as_chunks::<2>().0.iter().map(|[l, h]| pair(*l, *h)).collect::<Vec<_>>(),
         centres: &words,
     };
@@ -181,9 +213,16 @@ fn pair(low: i32, high: i32) -> u32 {
     (low as u32 & 0xFFFF) | (high as u32) << 16
 }
 
-fn encoded(name: &str, networks: &[Network<'_>], row_network: [u8; ROWS]) -> Vec<u8> {
-    let (inputs, outputs) = (["x"; ROWS * COLS].join("\n"), ["y"; ROWS * OUTPUTS].join("\n"));
-    let zeros = [0; ROWS * OUTPUTS * 4];
+fn encoded(
+    name: &str,
+    projection: Option<Projection<'_>>,
+    networks: &[Network<'_>],
+    row_network: &[u8],
+) -> Vec<u8> {
+    let rows = row_network.len();
+    let (inputs, outputs) =
+        (vec!["x"; rows * COLS].join("\n"), vec!["y"; rows * OUTPUTS].join("\n"));
+    let zeros = vec![0; rows * OUTPUTS * 4];
     let metadata = Metadata {
         name,
         scene_digest: 0,
@@ -199,7 +238,7 @@ fn encoded(name: &str, networks: &[Network<'_>], row_network: [u8; ROWS]) -> Vec
         training_rmse: Floats(&zeros),
         full_scale: Floats(&zeros),
     };
-    let parts = ModelParts { networks, row_network: &row_network, metadata };
+    let parts = ModelParts { projection, networks, row_network, metadata };
     // Padding in a blob is counted from its start, which must lie at a multiple of four.
     let mut room = vec![0; encoded_length_bound(&parts) + 3];
     let start = room.as_ptr().align_offset(4);

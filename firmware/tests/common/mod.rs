@@ -248,7 +248,8 @@ pub fn blob_of(network: Network<'_>) -> Vec<u8> {
         training_rmse: Floats(&zeros),
         full_scale: Floats(&zeros),
     };
-    let parts = ModelParts { networks: &[network], row_network: &[0; ROWS], metadata };
+    let parts =
+        ModelParts { projection: None, networks: &[network], row_network: &[0; ROWS], metadata };
     let mut words = vec![0_u32; encoded_length_bound(&parts).div_ceil(4)];
     encode(&parts, bytemuck::cast_slice_mut(&mut words)).unwrap().to_vec()
 }

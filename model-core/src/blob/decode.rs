@@ -5,10 +5,11 @@ use serde::{Deserialize, Serialize};
 use super::error::DecodeError;
 use super::format::{
     CRC_BYTES, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection, PREFIX_BYTES, Prefix,
-    RbfHeader, ShapeField, TAG_METADATA,
+    RbfHeader, ShapeField, TAG_METADATA, TAG_PROJECTION,
 };
 use super::{Metadata, ModelShape};
 use crate::checksum::CRC_32;
+use crate::projection::{self, Projection};
 use crate::rbf::{Cut, Format, Network, NetworkError, Shape, direct, expanded, fixed16};
 
 /// Names or units of columns, one a line.
@@ -48,6 +49,7 @@ pub struct Model<'a> {
     crc: u32,
     row_network: &'a [u8],
     metadata: Metadata<'a>,
+    projection: Option<&'a [f32]>,
     networks: u8,
     network_sections: &'a [u8],
 }
@@ -77,13 +79,18 @@ impl<'a> Model<'a> {
             return Err(DecodeError::Malformed { section: "shape" });
         }
 
-        let (section, network_sections) = take::<MetadataSection>(rest, "metadata")?;
+        let (section, rest) = take::<MetadataSection>(rest, "metadata")?;
         let metadata = checked_metadata(&section, shape)?;
+        let (projection, network_sections) = take_projection(rest, shape)?;
+        if projection.is_some() {
+            check_count("networks behind a projection", 1, networks.into())?;
+        }
 
-        let model = Self { shape, crc, row_network, metadata, networks, network_sections };
+        let model =
+            Self { shape, crc, row_network, metadata, projection, networks, network_sections };
         let mut rest = network_sections;
         for index in 0..networks {
-            let (network, after) = take_network(rest, shape, index)?;
+            let (network, after) = take_network(rest, model.network_shape(), index)?;
             // Every value is looked at once, here; later reads only cut slices.
             network.check_values().map_err(|cause| DecodeError::Network { index, cause })?;
             rest = after;
@@ -126,9 +133,25 @@ impl<'a> Model<'a> {
         self.networks.into()
     }
 
+    /// What makes the networks' inputs from a whole frame; `None` if each row's readings are its network's
+    /// inputs. Behind a projection there is one network, and its outputs are those of all rows.
+    #[must_use]
+    pub fn projection(&self) -> Option<Projection<'a>> {
+        self.projection.map(|block| Projection::of_checked(self.shape.inputs, block))
+    }
+
+    /// What a network takes in and gives out.
+    fn network_shape(&self) -> ModelShape {
+        let ModelShape { rows, inputs, outputs } = self.shape;
+        match self.projection {
+            Some(_) => ModelShape { rows: 1, inputs, outputs: rows * outputs },
+            None => self.shape,
+        }
+    }
+
     /// The networks in their order.
     pub fn networks(&self) -> impl Iterator<Item = Network<'a>> {
-        let (shape, mut rest) = (self.shape, self.network_sections);
+        let (shape, mut rest) = (self.network_shape(), self.network_sections);
         (0..self.networks).map_while(move |index| {
             let (network, after) = take_network(rest, shape, index).ok()?;
             rest = after;
@@ -140,10 +163,11 @@ impl<'a> Model<'a> {
     pub(crate) fn section_of_row(&self, row: usize) -> Option<NetworkSection<'a>> {
         let mut rest = self.network_sections;
         for index in 0..self.network_of_row(row)? {
-            (_, rest) = NetworkSection::take(rest, self.shape, index as u8).ok()?;
+            (_, rest) = NetworkSection::take(rest, self.network_shape(), index as u8).ok()?;
         }
         let index = self.network_of_row(row)?;
-        NetworkSection::take(rest, self.shape, index as u8).ok().map(|(section, _)| section)
+        let taken = NetworkSection::take(rest, self.network_shape(), index as u8);
+        taken.ok().map(|(section, _)| section)
     }
 
     /// Index of the network that serves `row` (from 0), or `None` for a row outside the sensor.
@@ -291,11 +315,7 @@ impl<'a> NetworkSection<'a> {
         if header.index != index {
             return Err(DecodeError::NetworkOrder { expected: index, found: header.index });
         }
-        let (padding, rest) = take::<&[u8]>(rest, SECTION)?;
-        if padding.len() >= FLOAT_ALIGNMENT || padding.iter().any(|&byte| byte != 0) {
-            return Err(DecodeError::Malformed { section: "padding" });
-        }
-        let (block, rest) = take::<&[u8]>(rest, SECTION)?;
+        let (block, rest) = take_block(rest, SECTION)?;
         let RbfHeader { common_width, affine, centres, .. } = header;
         let words = {
             let shape = network_shape(shape, centres);
@@ -347,6 +367,35 @@ impl<'a> NetworkSection<'a> {
         let shape = network_shape(shape, self.centres);
         fixed16::Network::with_length_checked(shape, self.affine, self.block)
     }
+}
+
+/// Cuts padding and block from the front of `bytes`.
+fn take_block<'a>(
+    bytes: &'a [u8],
+    section: &'static str,
+) -> Result<(&'a [u8], &'a [u8]), DecodeError> {
+    let (padding, rest) = take::<&[u8]>(bytes, section)?;
+    if padding.len() >= FLOAT_ALIGNMENT || padding.iter().any(|&byte| byte != 0) {
+        return Err(DecodeError::Malformed { section: "padding" });
+    }
+    take::<&[u8]>(rest, section)
+}
+
+/// Cuts the projection from the front of `bytes` if there is one, and checks it.
+fn take_projection(
+    bytes: &[u8],
+    shape: ModelShape,
+) -> Result<(Option<&[f32]>, &[u8]), DecodeError> {
+    let Some((&TAG_PROJECTION, rest)) = bytes.split_first() else { return Ok((None, bytes)) };
+    let (block, rest) = take_block(rest, "projection section")?;
+    let readings = shape.rows * shape.inputs;
+    let floats = projection::block_floats(readings, shape.inputs);
+    check_count("bytes of projection", floats.saturating_mul(4), block.len())?;
+    let block = bytemuck::try_cast_slice::<u8, f32>(block)
+        .map_err(|_| DecodeError::Malformed { section: "padding" })?;
+    Projection::new(readings, shape.inputs, block)
+        .map_err(|cause| DecodeError::Projection { cause })?;
+    Ok((Some(block), rest))
 }
 
 fn network_shape(shape: ModelShape, centres: u16) -> Shape {

@@ -5,15 +5,18 @@ use serde::Serialize;
 use super::error::EncodeError;
 use super::format::{
     CRC_BYTES, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection, Prefix, RbfHeader,
-    ShapeField, TAG_METADATA, tag_of,
+    ShapeField, TAG_METADATA, TAG_PROJECTION, tag_of,
 };
 use super::{Metadata, Model};
 use crate::checksum::CRC_32;
+use crate::projection::Projection;
 use crate::rbf::Network;
 
 /// All that goes into a blob.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModelParts<'a> {
+    /// What stands between a frame and the one network of all rows, if there is such a network.
+    pub projection: Option<Projection<'a>>,
     /// The networks; all have the same inputs and outputs.
     pub networks: &'a [Network<'a>],
     /// Which network serves each row.
@@ -36,7 +39,8 @@ pub fn encoded_length_bound(parts: &ModelParts<'_>) -> usize {
         + m.output_units.0.len();
     let numbers = m.training_rmse.0.len() + m.full_scale.0.len() + parts.row_network.len();
     let weights: usize = parts.networks.iter().map(|n| SECTION_FIELDS + block_bytes(n)).sum();
-    FIXED_FIELDS + text + numbers + weights
+    let projection = parts.projection.map_or(0, |it| SECTION_FIELDS + it.block().len() * 4);
+    FIXED_FIELDS + text + numbers + projection + weights
 }
 
 fn block_bytes(network: &Network<'_>) -> usize {
@@ -52,17 +56,26 @@ fn block_bytes(network: &Network<'_>) -> usize {
 /// See [`EncodeError`].
 pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u8], EncodeError> {
     let first = parts.networks.first().map(Network::shape);
-    let (inputs, outputs) = first.map_or((0, 0), |s| (s.inputs, s.outputs));
+    let (inputs, mut outputs) = first.map_or((0, 0), |s| (s.inputs, s.outputs));
     for (index, network) in parts.networks.iter().enumerate() {
         if (network.shape().inputs, network.shape().outputs) != (inputs, outputs) {
             return Err(EncodeError::UnequalNetworks { index });
         }
     }
 
+    let rows = parts.row_network.len();
+    if parts.projection.is_some() {
+        // One network for all rows.
+        if !outputs.is_multiple_of(rows.max(1)) {
+            return Err(EncodeError::UnevenRows { outputs, rows });
+        }
+        outputs /= rows.max(1);
+    }
+
     let mut writer = Writer { buffer, at: 0 };
     writer.put(&Prefix { magic: MAGIC, version: FORMAT_VERSION, length: [0; 4] })?;
     writer.put(&ShapeField {
-        rows: fit("number of rows", parts.row_network.len(), u8::MAX)?,
+        rows: fit("number of rows", rows, u8::MAX)?,
         inputs: fit("number of inputs", inputs, u16::MAX)?,
         outputs: fit("number of outputs", outputs, u16::MAX)?,
         networks: fit("number of networks", parts.networks.len(), u8::MAX)?,
@@ -85,6 +98,10 @@ pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u
         training_rmse: m.training_rmse.0,
         full_scale: m.full_scale.0,
     })?;
+    if let Some(projection) = parts.projection {
+        writer.put(&TAG_PROJECTION)?;
+        writer.put_block(&[bytemuck::cast_slice(projection.block())])?;
+    }
     for (index, network) in parts.networks.iter().enumerate() {
         writer.put_network(fit("network index", index, u8::MAX)?, network)?;
     }
@@ -133,10 +150,15 @@ impl Writer<'_> {
             common_width,
             affine: network.has_affine_tail(),
         };
-        let bytes = block_bytes(network);
         self.put(&header)?;
+        self.put_block(&network.block())
+    }
+
+    /// Padding, length and the words of a block, so that these start at a multiple of four.
+    fn put_block(&mut self, block: &[&[u32]]) -> Result<(), EncodeError> {
+        let bytes = block.iter().map(|words| words.len() * 4).sum();
         let length = u32::try_from(bytes).map_err(|_| EncodeError::TooLarge {
-            what: "bytes of one network",
+            what: "bytes of one section",
             value: bytes,
             most: u32::MAX as usize,
         })?;
@@ -145,7 +167,7 @@ impl Writer<'_> {
         let padding = start.next_multiple_of(FLOAT_ALIGNMENT) - start;
         self.put(&[0_u8; FLOAT_ALIGNMENT].get(..padding).unwrap_or_default())?;
         self.put(&length)?;
-        for words in network.block() {
+        for words in block {
             self.put_raw(bytemuck::cast_slice(words))?;
         }
         Ok(())

@@ -90,6 +90,12 @@ pub enum DecodeError {
         /// Which field.
         field: &'static str,
     },
+    /// The projection is unusable.
+    #[error("projection: {cause}")]
+    Projection {
+        /// What is wrong with it.
+        cause: NetworkError,
+    },
     /// The parameters of a network are unusable.
     #[error("network {index}: {cause}")]
     Network {
@@ -135,6 +141,14 @@ pub enum EncodeError {
     UnequalNetworks {
         /// Which network, from 0.
         index: usize,
+    },
+    /// The outputs of the one network behind a projection do not divide among the rows.
+    #[error("{outputs} outputs do not divide among {rows} rows")]
+    UnevenRows {
+        /// Outputs of the network.
+        outputs: usize,
+        /// Rows.
+        rows: usize,
     },
     /// What would be written could not be read back.
     #[error("the model would be refused when read: {0}")]

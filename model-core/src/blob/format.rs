@@ -20,6 +20,7 @@ pub(super) const FLOAT_ALIGNMENT: usize = 4;
 /// Section tags. Each kind of section has its own; an unknown one is refused.
 pub(super) const TAG_METADATA: u8 = 0;
 pub(super) const TAG_RBF_F32_DIRECT: u8 = 1;
+pub(super) const TAG_PROJECTION: u8 = 4;
 
 /// Bytes 0..9, at fixed places, so that a blob can be measured before it is trusted.
 #[derive(Serialize, Deserialize)]

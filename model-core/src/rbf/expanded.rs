@@ -13,6 +13,8 @@ use super::{
     Cut, Finite, NetworkError, Shape, USUAL_INPUTS, USUAL_OUTPUTS, accumulate, check_finite,
     check_length, check_spans,
 };
+#[cfg(cortex_m4f)]
+use crate::cortex_m4;
 use crate::exp::exp2;
 use crate::scale::{HALF_RANGE, UNITS, clamp_units};
 
@@ -194,15 +196,27 @@ impl<'a> Network<'a> {
     pub(crate) fn infer(&self, reading: &[f32], scaled: &mut [f32], output: &mut [f32]) -> Finite {
         #[cfg(cortex_m4f)]
         if let (Ok(reading), Ok(output)) = (reading.try_into(), (&mut *output).try_into()) {
-            return crate::cortex_m4::expanded(
-                self,
-                crate::cortex_m4::Inputs::Readings(reading),
-                output,
-            );
+            return cortex_m4::expanded(self, cortex_m4::Inputs::Readings(reading), output);
         }
         self.scale(reading, scaled);
         self.infer_scaled(scaled, output);
         Finite::Unknown
+    }
+
+    /// As [`infer`](Self::infer), of 18 outputs or several groups of them.
+    #[cfg(cortex_m4f)]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "a match and a call")]
+    pub(crate) fn infer_in_assembly(
+        &self,
+        reading: &[f32; USUAL_INPUTS],
+        groups: &mut [[f32; USUAL_OUTPUTS]],
+    ) -> Finite {
+        let inputs = cortex_m4::Inputs::Readings(reading);
+        match groups {
+            [output] => cortex_m4::expanded(self, inputs, output),
+            groups => cortex_m4::expanded_array(self, inputs, groups),
+        }
     }
 
     #[inline(always)]
@@ -210,7 +224,7 @@ impl<'a> Network<'a> {
     pub(crate) fn infer_scaled(&self, scaled: &mut [f32], output: &mut [f32]) {
         #[cfg(cortex_m4f)]
         if let (Ok(scaled), Ok(output)) = ((&*scaled).try_into(), (&mut *output).try_into()) {
-            crate::cortex_m4::expanded(self, crate::cortex_m4::Inputs::Scaled(scaled), output);
+            cortex_m4::expanded(self, cortex_m4::Inputs::Scaled(scaled), output);
             return;
         }
         self.infer_scaled_in_rust(scaled, output);

@@ -107,8 +107,12 @@ fn rewritten(model: &Model<'_>, rows: Rows, affine: bool) -> Outcome<Vec<u8>> {
             if rows == Rows::AsTheFirst { 0 } else { model.network_of_row(row).unwrap_or(0) as u8 }
         })
         .collect();
-    let parts =
-        ModelParts { networks: &networks, row_network: &row_network, metadata: *model.metadata() };
+    let parts = ModelParts {
+        projection: model.projection(),
+        networks: &networks,
+        row_network: &row_network,
+        metadata: *model.metadata(),
+    };
     let mut room = Bytes::zeros(encoded_length_bound(&parts));
     encode(&parts, room.bytes_mut()).map(<[u8]>::to_vec).map_err(|cause| cause.to_string())
 }

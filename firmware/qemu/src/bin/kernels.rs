@@ -20,13 +20,22 @@ macro_rules! model {
 }
 
 fn decode<E: ExpKernel>(format: &str, blob: &[u8]) {
-    let crc = unwrap!(checks::decoding_many::<E>(blob));
+    let crc = unwrap!(checks::decoding_many::<E, { checks::ROWS }>(blob));
     info!("{=str}, {=str}: {=u32:08x}", format, E::NAME, crc);
 }
 
 fn compare(format: &str, blob: &[u8]) {
     let [compared, different] = unwrap!(checks::twins(blob));
     info!("{=str}: {=usize} of {=usize} rows differ from the twin's", format, different, compared);
+}
+
+/// One network for all rows, behind a projection.
+fn array(format: &str, blob: &[u8]) {
+    let crc = unwrap!(checks::decoding_many::<Polynomial, { checks::ARRAY_ROWS }>(blob));
+    info!("array, {=str}: {=u32:08x}", format, crc);
+    if let Some([compared, different]) = checks::array_twins(blob) {
+        info!("{=usize} of {=usize} frames differ from the twins'", different, compared);
+    }
 }
 
 fn gate(blob: &[u8]) {
@@ -49,5 +58,10 @@ fn main() -> ! {
     compare("f32", f32);
     compare("fixed16", fixed16);
     gate(fixed16);
+    array("f32", model!("array-f32.bin"));
+    array("f32", model!("array-f32-no-tail.bin"));
+    array("fixed16", model!("array-fixed16.bin"));
+    array("fixed16", model!("array-fixed16-no-tail.bin"));
+    array("f32-direct", model!("array-f32-direct.bin"));
     exit::success()
 }

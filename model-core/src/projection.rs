@@ -1,0 +1,105 @@
+//! The whole array's readings in as few numbers as one row has.
+//!
+//! f = f₀ + Σ_j r_j·p_j over all readings r of a frame, in Ω: linear, so that white noise averages out over the
+//! array, and as many features as a row has readings, so that the same inner loops serve both. Which
+//! directions p is a matter of training; `docs/projection.md` explains it.
+
+use crate::rbf::NetworkError;
+
+/// A linear projection of a frame, borrowed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Projection<'a> {
+    features: usize,
+    /// f₀, then p reading after reading.
+    block: &'a [f32],
+}
+
+impl<'a> Projection<'a> {
+    /// A projection of so many `readings` to `features` numbers: in `block` f₀, then for each reading its part
+    /// in each feature.
+    ///
+    /// # Errors
+    /// [`NetworkError::Empty`] without readings or features, [`NetworkError::Length`] for a block that is not
+    /// `(1 + readings) * features` long, [`NetworkError::NotFinite`].
+    pub fn new(readings: usize, features: usize, block: &'a [f32]) -> Result<Self, NetworkError> {
+        if readings == 0 || features == 0 {
+            return Err(NetworkError::Empty);
+        }
+        let (expected, found) = (block_floats(readings, features), block.len());
+        if expected != found {
+            return Err(NetworkError::Length { what: "projection", expected, found });
+        }
+        if !block.iter().all(|value| value.is_finite()) {
+            return Err(NetworkError::NotFinite { what: "projection" });
+        }
+        Ok(Self { features, block })
+    }
+
+    /// As [`new`](Self::new) made it before.
+    pub(crate) fn of_checked(features: usize, block: &'a [f32]) -> Self {
+        Self { features, block }
+    }
+
+    /// f₀, then the parts of each reading.
+    #[must_use]
+    pub fn block(&self) -> &'a [f32] {
+        self.block
+    }
+
+    /// The features of `readings` in Ω; none of them is a number if one of the readings is none.
+    ///
+    /// Readings and features beyond the projection's sizes are left alone.
+    pub fn project(&self, readings: &[f32], features: &mut [f32]) {
+        #[cfg(cortex_m4f)]
+        if let Ok(features) = (&mut *features).try_into()
+            && readings.len().is_multiple_of(2)
+            && self.block.len() == block_floats(readings.len(), crate::rbf::USUAL_INPUTS)
+        {
+            return crate::cortex_m4::project(self.block, readings, features);
+        }
+        self.project_portably(readings, features);
+    }
+
+    /// As [`project`](Self::project), by the compiled twin of the assembly: the same bits.
+    pub fn project_portably(&self, readings: &[f32], features: &mut [f32]) {
+        let (start, parts) = self.block.split_at_checked(self.features).unwrap_or_default();
+        features.iter_mut().zip(start).for_each(|(feature, start)| *feature = *start);
+        for (reading, parts) in readings.iter().zip(parts.chunks_exact(self.features.max(1))) {
+            for (feature, part) in features.iter_mut().zip(parts) {
+                *feature += part * reading;
+            }
+        }
+    }
+}
+
+/// Numbers in the block of a projection.
+pub(crate) fn block_floats(readings: usize, features: usize) -> usize {
+    readings.saturating_add(1).saturating_mul(features)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn features_are_the_sums_of_the_readings_parts() {
+        let block = [1.0, -1.0, 2.0, 0.0, 0.5, 4.0];
+        let projection = Projection::new(2, 2, &block).unwrap();
+        let mut features = [f32::NAN; 2];
+        projection.project(&[10.0, 100.0], &mut features);
+        assert_eq!(features, [1.0 + 20.0 + 50.0, -1.0 + 400.0]);
+        projection.project(&[10.0, f32::NAN], &mut features);
+        assert!(features.iter().all(|feature| feature.is_nan()));
+    }
+
+    #[test]
+    fn a_block_that_does_not_fit_is_refused() {
+        let length = Err(NetworkError::Length { what: "projection", expected: 6, found: 5 });
+        assert_eq!(Projection::new(2, 2, &[0.0; 5]), length);
+        assert_eq!(Projection::new(0, 2, &[0.0; 2]), Err(NetworkError::Empty));
+        assert_eq!(Projection::new(2, 0, &[]), Err(NetworkError::Empty));
+        let block = [0.0, f32::INFINITY];
+        let infinite = Err(NetworkError::NotFinite { what: "projection" });
+        assert_eq!(Projection::new(1, 1, &block), infinite);
+    }
+}

@@ -1,0 +1,144 @@
+//! One network for the whole array, behind a projection: the blob, and what a decoder makes of it.
+
+use model_core::blob::{
+    Columns, DecodeError, EncodeError, Floats, Metadata, Model, ModelParts, NoiseKind, encode,
+    encoded_length_bound,
+};
+use model_core::checksum::CRC_32;
+use model_core::exp::Libm;
+use model_core::projection::Projection;
+use model_core::rbf::direct::{self, Parameters};
+use model_core::rbf::{Network, Shape};
+use model_core::{Aligned, Decoder, Frame, Gate, RowStatus};
+
+/// The first feature is the mean of the four readings, the second what the rows differ by.
+const BLOCK: [f32; 10] = [0.0, 10.0, 0.25, 0.25, 0.25, 0.25, 0.25, -0.25, 0.25, -0.25];
+/// At the centre in the first feature, a quarter of the span from it in the second.
+const NEAR_CENTRE: Frame<2, 2> = Frame { row_column_resistance_ohm: [[48.0, 50.0], [60.0, 58.0]] };
+
+fn network(outputs: usize) -> Network<'static> {
+    let parameters = Parameters {
+        input_minimum: &[50.0, 5.0],
+        input_per_span: &[0.125, 0.1],
+        centres: &[0.5, 0.25],
+        decay: &[2.0],
+        output_weights: &[1.5, 3.0, 4.5][..outputs],
+        bias: &[-0.5, -1.0, 0.0][..outputs],
+        affine: &[],
+    };
+    direct::Network::try_new(Shape { inputs: 2, centres: 1, outputs }, parameters).unwrap().into()
+}
+
+fn metadata() -> Metadata<'static> {
+    Metadata {
+        name: "array",
+        scene_digest: 0,
+        noise_kind: NoiseKind::None,
+        noise_level: 0.0,
+        seed: 1,
+        training_frames: 1,
+        thickness_mm: 5.0,
+        input_names: Columns("a\nb\nc\nd"),
+        input_units: Columns("\n\n\n"),
+        output_names: Columns("x\ny"),
+        output_units: Columns("\n"),
+        training_rmse: Floats(&[0; 8]),
+        full_scale: Floats(&[0; 8]),
+    }
+}
+
+fn encoded<'b>(
+    networks: &[Network<'_>],
+    row_network: &[u8],
+    buffer: &'b mut [u8],
+) -> Result<&'b [u8], EncodeError> {
+    let projection = Projection::new(4, 2, &BLOCK).ok();
+    let parts = ModelParts { projection, networks, row_network, metadata: metadata() };
+    assert!(encoded_length_bound(&parts) <= buffer.len());
+    encode(&parts, buffer)
+}
+
+fn array(buffer: &mut [u8]) -> &[u8] {
+    encoded(&[network(2)], &[0, 0], buffer).unwrap()
+}
+
+#[test]
+fn the_features_of_a_whole_frame_decide_all_rows() {
+    let mut buffer = Aligned([0; 1024]);
+    let blob = array(&mut buffer.0);
+    let (decoder, model) =
+        (Decoder::<2, 2, 1, Libm>::load(blob).unwrap(), Model::decode(blob).unwrap());
+    let mut features = [0.0; 2];
+    let readings = NEAR_CENTRE.row_column_resistance_ohm;
+    model.projection().unwrap().project(readings.as_flattened(), &mut features);
+    assert_eq!(features, [54.0, 5.0]);
+    let activation = (-2.0_f32 * 0.0625).exp();
+    let estimate = decoder.decode(&NEAR_CENTRE);
+    assert_eq!(estimate.status, [RowStatus::Decoded; 2]);
+    let expected = [1.5 * activation - 0.5, 3.0 * activation - 1.0];
+    for (outputs, expected) in estimate.outputs.iter().zip(expected) {
+        assert!((outputs[0] - expected).abs() < 1e-6, "{outputs:?} {expected}");
+    }
+}
+
+#[test]
+fn one_missing_reading_leaves_no_row_to_decode() {
+    let mut buffer = Aligned([0; 1024]);
+    let decoder = Decoder::<2, 2, 1, Libm>::load(array(&mut buffer.0)).unwrap();
+    for missing in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        let mut frame = NEAR_CENTRE;
+        frame.row_column_resistance_ohm[1][0] = missing;
+        let estimate = decoder.decode(&frame);
+        assert_eq!(estimate.status, [RowStatus::MissingReading; 2]);
+        assert!(estimate.outputs.iter().all(|outputs| outputs[0].is_nan()));
+    }
+}
+
+#[test]
+fn an_array_is_at_rest_as_a_whole_or_not_at_all() {
+    let mut buffer = Aligned([0; 1024]);
+    let decoder = Decoder::<2, 2, 1, Libm>::load(array(&mut buffer.0)).unwrap();
+    let rest = decoder.decode(&NEAR_CENTRE);
+    let gate = Gate::new(&NEAR_CENTRE, &rest, 0.02);
+    let mut estimate = rest;
+    let mut frame = NEAR_CENTRE;
+    frame.row_column_resistance_ohm[0][0] *= 1.01;
+    decoder.decode_gated_into(&frame, gate, &mut estimate);
+    assert_eq!((estimate.status, estimate.outputs), ([RowStatus::AtRest; 2], rest.outputs));
+    // The last row wakes the first.
+    frame.row_column_resistance_ohm[1][1] *= 1.03;
+    decoder.decode_gated_into(&frame, gate, &mut estimate);
+    assert_eq!(estimate, decoder.decode(&frame));
+    assert_eq!(estimate.status, [RowStatus::Decoded; 2]);
+}
+
+#[test]
+fn what_cannot_stand_behind_a_projection_is_refused() {
+    let mut buffer = Aligned([0; 1024]);
+    let twice = encoded(&[network(2), network(2)], &[0, 1], &mut buffer.0);
+    let expected =
+        DecodeError::CountMismatch { what: "networks behind a projection", expected: 1, found: 2 };
+    assert_eq!(twice, Err(EncodeError::Refused(expected)));
+    let uneven = encoded(&[network(3)], &[0, 0], &mut buffer.0);
+    assert_eq!(uneven, Err(EncodeError::UnevenRows { outputs: 3, rows: 2 }));
+}
+
+#[test]
+fn every_changed_word_of_a_projection_is_told() {
+    let mut buffer = Aligned([0; 1024]);
+    let length = array(&mut buffer.0).len();
+    let bytes: Vec<u8> = BLOCK.iter().flat_map(|value| value.to_le_bytes()).collect();
+    let start = buffer.0.windows(bytes.len()).position(|window| window == bytes).unwrap();
+    assert!(start.is_multiple_of(4));
+    for word in 0..BLOCK.len() {
+        let mut damaged = buffer;
+        let place = start + 4 * word;
+        damaged.0[place..place + 4].copy_from_slice(&f32::NAN.to_le_bytes());
+        assert!(matches!(Model::decode(&damaged.0[..length]), Err(DecodeError::Corrupt { .. })));
+        // Somebody has made the CRC fit.
+        let crc = CRC_32.checksum(&damaged.0[..length - 4]);
+        damaged.0[length - 4..length].copy_from_slice(&crc.to_le_bytes());
+        let refused = Model::decode(&damaged.0[..length]);
+        assert!(matches!(refused, Err(DecodeError::Projection { .. })), "{refused:?}");
+    }
+}
