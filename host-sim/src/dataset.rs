@@ -92,6 +92,8 @@ pub struct Dataset {
     pub outputs: Table,
     /// Equal blocks of consecutive columns, each with a network of its own.
     pub rows: usize,
+    /// See [`Block::common_span`].
+    pub common_span: bool,
 }
 
 impl Dataset {
@@ -104,7 +106,7 @@ impl Dataset {
         frames: usize,
     ) -> Self {
         let table = |names: Vec<String>| Table { values: vec![0.0; names.len() * frames], names };
-        Self { inputs: table(input_names), outputs: table(output_names), rows }
+        Self { inputs: table(input_names), outputs: table(output_names), rows, common_span: false }
     }
 
     /// Frames in the set.
@@ -120,7 +122,8 @@ impl Dataset {
             let count = table.names.len() / self.rows;
             table.columns(row * count, count)
         };
-        Block { inputs: cut(&self.inputs), outputs: cut(&self.outputs) }
+        let (inputs, outputs) = (cut(&self.inputs), cut(&self.outputs));
+        Block { inputs, outputs, common_span: self.common_span }
     }
 
     /// Reads the columns chosen by `inputs` and `outputs` (see [`columns::select`]); by default the
@@ -168,7 +171,8 @@ impl Dataset {
             names: columns.iter().map(|c| file.header[*c].clone()).collect(),
             values: kept.iter().flat_map(|l| columns.iter().map(|c| file.value(*l, *c))).collect(),
         };
-        let dataset = Self { inputs: take(&input_columns), outputs: take(&output_columns), rows };
+        let (inputs, outputs) = (take(&input_columns), take(&output_columns));
+        let dataset = Self { inputs, outputs, rows, common_span: false };
         Ok((dataset, Kept { lines: kept, of: file.lines() }))
     }
 
@@ -180,7 +184,7 @@ impl Dataset {
             let line = |i: &usize| table.values[i * n..(i + 1) * n].to_vec();
             Table { names: table.names.clone(), values: indices.iter().flat_map(line).collect() }
         };
-        Self { inputs: pick(&self.inputs), outputs: pick(&self.outputs), rows: self.rows }
+        Self { inputs: pick(&self.inputs), outputs: pick(&self.outputs), ..*self }
     }
 }
 
@@ -200,9 +204,26 @@ pub struct Block {
     pub inputs: Table,
     /// What it should answer.
     pub outputs: Table,
+    /// Whether all inputs are scaled by the largest span of any, each about its own middle: they are in one
+    /// unit, and the farther one reaches, the more it tells.
+    pub common_span: bool,
 }
 
 impl Block {
+    /// The range that each input is scaled by.
+    #[must_use]
+    pub fn input_ranges(&self) -> Vec<[f64; 2]> {
+        let mut ranges = self.inputs.ranges();
+        if self.common_span {
+            let half = ranges.iter().map(|[low, high]| 0.5 * (high - low)).fold(0.0, f64::max);
+            for [low, high] in &mut ranges {
+                let middle = 0.5 * (*low + *high);
+                (*low, *high) = (middle - half, middle + half);
+            }
+        }
+        ranges
+    }
+
     /// The first `frames` of the block.
     #[must_use]
     pub fn first(&self, frames: usize) -> Self {
@@ -210,7 +231,7 @@ impl Block {
             names: table.names.clone(),
             values: table.values[..frames * table.names.len()].to_vec(),
         };
-        Self { inputs: cut(&self.inputs), outputs: cut(&self.outputs) }
+        Self { inputs: cut(&self.inputs), outputs: cut(&self.outputs), ..*self }
     }
 }
 

@@ -17,8 +17,8 @@
 //! let mut scene = Scene::load("press")?;
 //! scene.read_rows = vec![3]; // one row-wire: 18 readings, 18 outputs
 //! let frames = synthesise(&scene, Stream::Training, 2000);
-//! let networks = train(&frames, &Options::new(32, 0.8, true, scene.seed), &Progress::silent())?;
-//! let blob = encode(&networks, &frames, &Origin::of_scene(&scene))?;
+//! let trained = train(&frames, &Options::new(32, 0.8, true, scene.seed), &Progress::silent())?;
+//! let blob = encode(&trained, &frames, &Origin::of_scene(&scene))?;
 //!
 //! let model = LoadedModel::from_bytes("press.bin".as_ref(), &blob)?;
 //! let fresh = synthesise(&scene, Stream::Test, 1000);

@@ -1,5 +1,6 @@
 //! Trained models: to a blob and back.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use model_core::blob::{
@@ -16,7 +17,7 @@ use crate::progress::Progress;
 use crate::random::Stream;
 use crate::scene::{NoiseKind, Scene};
 use crate::synth;
-use crate::train::{self, FittedNetwork, Options};
+use crate::train::{self, FittedNetwork, Options, Trained};
 
 /// Where a model's training data came from.
 #[derive(Debug, Clone, PartialEq)]
@@ -71,7 +72,8 @@ impl Origin {
 #[must_use]
 pub fn options_of(scene: &Scene) -> Options {
     let t = &scene.training;
-    Options { format: t.format, ..Options::new(t.centres, t.spread, t.affine_tail, scene.seed) }
+    let options = Options::new(t.centres, t.spread, t.affine_tail, scene.seed);
+    Options { format: t.format, whole_array: t.whole_array, ..options }
 }
 
 /// Trains the model that `scene` describes, as the command `train` does.
@@ -81,18 +83,22 @@ pub fn options_of(scene: &Scene) -> Options {
 pub fn train_scene(scene: &Scene, progress: &Progress) -> Result<LoadedModel> {
     let frames = synth::synthesise(scene, Stream::Training, scene.training.frames);
     let options = options_of(scene);
-    let networks = train::train(&frames, &options, progress)?;
-    let blob = encode(&networks, &frames, &Origin::of_scene(scene))?;
+    let trained = train::train(&frames, &options, progress)?;
+    let blob = encode(&trained, &frames, &Origin::of_scene(scene))?;
     LoadedModel::from_bytes(Path::new("the model just trained"), &blob)
 }
 
-/// Writes `networks`, one a row-wire of the `dataset` that trained them, as a blob.
+/// Writes what was `trained` on `dataset` as a blob.
 ///
 /// # Errors
 /// [`Error::Failed`] for a model beyond what the format holds.
-pub fn encode(networks: &[FittedNetwork], dataset: &Dataset, origin: &Origin) -> Result<Vec<u8>> {
-    let views: Vec<Network<'_>> = networks.iter().map(FittedNetwork::network).collect();
-    let row_network: Vec<u8> = (0..networks.len()).map(|row| row as u8).collect();
+pub fn encode(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<Vec<u8>> {
+    let views: Vec<Network<'_>> = trained.networks.iter().map(FittedNetwork::network).collect();
+    let projection = trained.projection.as_ref().map(|block| train::view(block, dataset));
+    let row_network: Vec<u8> = match projection {
+        Some(_) => vec![0; dataset.rows],
+        None => (0..dataset.rows).map(|row| row as u8).collect(),
+    };
     let lines = |names: &[String]| names.join("\n");
     let units = |names: &[String]| {
         names.iter().map(|name| columns::unit_of(name)).collect::<Vec<_>>().join("\n")
@@ -102,10 +108,13 @@ pub fn encode(networks: &[FittedNetwork], dataset: &Dataset, origin: &Origin) ->
     };
     let (input_names, output_names) = (lines(&dataset.inputs.names), lines(&dataset.outputs.names));
     let (input_units, output_units) = (units(&dataset.inputs.names), units(&dataset.outputs.names));
-    let training_rmse = floats(&training_rmse(&views, dataset));
+    let training_rmse = floats(&match projection {
+        Some(it) => training_rmse(&views, &train::projection::apply(it, dataset)),
+        None => training_rmse(&views, dataset),
+    });
     let full_scale = floats(&origin.full_scale);
     let parts = ModelParts {
-        projection: None,
+        projection,
         networks: &views,
         row_network: &row_network,
         metadata: Metadata {
@@ -188,23 +197,39 @@ impl LoadedModel {
         self.bytes.as_slice()
     }
 
-    /// The network that serves each row-wire.
-    pub(crate) fn row_networks(&self) -> Vec<Network<'_>> {
+    /// The network that serves each row-wire, or the one for all behind a projection.
+    pub(crate) fn networks_in_turn(&self) -> Vec<Network<'_>> {
         let model = self.model();
         let networks: Vec<Network<'_>> = model.networks().collect();
+        if model.projection().is_some() {
+            return networks;
+        }
         let rows = 0..model.shape().rows;
         rows.map(|row| networks[model.network_of_row(row).expect("a row of the model")]).collect()
     }
 
-    /// Share of `readings` that inference clamps: outside the training range by more than an eighth
-    /// of it.
+    /// What these networks take in, in turn: the readings, or features of them.
+    fn inputs_of_networks<'t>(&self, readings: &'t Table) -> Cow<'t, Table> {
+        let model = self.model();
+        match model.projection() {
+            Some(projection) => {
+                let features = model.shape().inputs;
+                Cow::Owned(train::projection::features(projection, features, readings))
+            }
+            None => Cow::Borrowed(readings),
+        }
+    }
+
+    /// Share of `readings`, or of their features behind a projection, that inference clamps: outside the
+    /// training range by more than an eighth of it.
     ///
     /// # Panics
     /// If `readings` has other columns than the model's inputs.
     #[must_use]
     pub fn share_out_of_range(&self, readings: &Table) -> f64 {
-        let networks = self.row_networks();
+        let networks = self.networks_in_turn();
         let inputs = self.model().shape().inputs;
+        let readings = self.inputs_of_networks(readings);
         let range = |network: &Network<'_>, input| network.training_range(input).map(f64::from);
         let ranges: Vec<[f64; 2]> = networks
             .iter()
@@ -225,7 +250,7 @@ impl LoadedModel {
     }
 
     /// Decodes a table of readings whose columns are the model's inputs; NaN readings make the
-    /// outputs of their row-wire NaN.
+    /// outputs of their row-wire NaN, behind a projection those of all.
     ///
     /// # Panics
     /// If `readings` has other columns than the model's inputs.
@@ -233,7 +258,8 @@ impl LoadedModel {
     pub fn decode(&self, kernel: Kernel, readings: &Table) -> Table {
         let model = self.model();
         let names = model.metadata().output_names.iter().map(String::from).collect::<Vec<_>>();
-        let values = infer_rows(&self.row_networks(), kernel, readings);
+        let inputs = self.inputs_of_networks(readings);
+        let values = infer_rows(&self.networks_in_turn(), kernel, &inputs);
         Table { names, values }
     }
 }

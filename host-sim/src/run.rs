@@ -140,10 +140,10 @@ pub fn run(scene: &Scene, progress: &Progress) -> Result<(RunResult, Vec<u8>)> {
     progress.step();
 
     let options = model::options_of(scene);
-    let networks = train::train(&training, &options, progress)?;
+    let trained = train::train(&training, &options, progress)?;
 
     let origin = Origin::of_scene(scene);
-    let blob = model::encode(&networks, &training, &origin)?;
+    let blob = model::encode(&trained, &training, &origin)?;
     let loaded = LoadedModel::from_bytes("model.bin".as_ref(), &blob)?;
 
     progress.stage("decode and evaluate", 1);
@@ -176,7 +176,7 @@ pub fn run(scene: &Scene, progress: &Progress) -> Result<(RunResult, Vec<u8>)> {
         model: ModelSummary {
             training_frames: t.frames,
             test_frames: t.test_frames,
-            networks: networks.len(),
+            networks: trained.networks.len(),
             inputs: shape.inputs,
             centres: model.networks().map(|n| n.shape().centres).max().unwrap_or(0),
             outputs: shape.outputs,

@@ -136,6 +136,9 @@ pub struct Training {
     /// How numbers are represented.
     #[serde(default)]
     pub format: NumberFormat,
+    /// One network for all rows, behind a projection of all readings, instead of one a row.
+    #[serde(default)]
+    pub whole_array: bool,
 }
 
 /// How Table 1 of the paper is computed.

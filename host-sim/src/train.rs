@@ -4,6 +4,7 @@
 //! pieces by the number of samples alone, and pieces are put together in their order. The result is
 //! rounded once to f32, into a [`FittedNetwork`].
 
+use model_core::projection::Projection;
 use model_core::scale::{CLAMP, HALF_RANGE, UNITS, clamp_units};
 use rayon::prelude::*;
 
@@ -18,6 +19,7 @@ pub mod format;
 pub mod kmeans;
 pub mod least_squares;
 pub mod linear;
+pub mod projection;
 pub mod select;
 pub mod standard;
 
@@ -43,6 +45,8 @@ pub struct Options {
     pub search: kmeans::Search,
     /// How numbers are represented.
     pub format: NumberFormat,
+    /// One network for all rows, behind a projection of all readings, instead of one a row.
+    pub whole_array: bool,
 }
 
 impl Options {
@@ -57,6 +61,7 @@ impl Options {
             seed,
             search: kmeans::Search::default(),
             format: NumberFormat::default(),
+            whole_array: false,
         }
     }
 
@@ -94,7 +99,7 @@ impl InputScale {
     pub fn of(block: &Block) -> Self {
         // Of the readings as the device has them, in f32.
         let ranges: Vec<[f32; 2]> =
-            block.inputs.ranges().iter().map(|range| range.map(|v| v as f32)).collect();
+            block.input_ranges().iter().map(|range| range.map(|v| v as f32)).collect();
         let per_span = |[low, high]: &[f32; 2]| {
             let per_span = 1.0 / (high - low);
             if per_span.is_finite() { f64::from(per_span) } else { 0.0 }
@@ -132,7 +137,7 @@ struct CentredScale {
 impl CentredScale {
     fn of(block: &Block) -> Self {
         let range = |range: [f64; 2]| range.map(|v| f64::from(v as f32));
-        let ranges = || block.inputs.ranges().into_iter().map(range);
+        let ranges = || block.input_ranges().into_iter().map(range);
         let per_unit = |[low, high]: [f64; 2]| {
             let per_unit = (f64::from(UNITS) / (f64::from(HALF_RANGE) * (high - low))) as f32;
             if per_unit.is_finite() { per_unit } else { 0.0 }
@@ -203,17 +208,46 @@ impl<'b> Samples<'b> {
     }
 }
 
-/// Trains one network a row-wire of `dataset`, all of one format: direct distances if
+/// What training makes of a data set.
+#[derive(Debug, Clone)]
+pub struct Trained {
+    /// What stands between all readings and the one network of all rows; see [`projection`].
+    pub projection: Option<Vec<f32>>,
+    /// One network a row-wire, or one for all behind the projection.
+    pub networks: Vec<FittedNetwork>,
+}
+
+/// Trains one network a row-wire of `dataset`, or one for all of them, all of one format: direct distances if
 /// [`NumberFormat::F32`] is asked for and one row's bound does not prove expanded ones harmless.
 ///
 /// # Errors
 /// [`Error::Usage`] for options that do not fit the data, and data that does not fit the format.
-pub fn train(
+pub fn train(dataset: &Dataset, options: &Options, progress: &Progress) -> Result<Trained> {
+    options.check(dataset.frames())?;
+    if !options.whole_array {
+        return Ok(Trained { projection: None, networks: train_rows(dataset, options, progress)? });
+    }
+    let block = projection::fit(dataset)?;
+    let seen = projection::apply(view(&block, dataset), dataset);
+    Ok(Trained { networks: train_rows(&seen, options, progress)?, projection: Some(block) })
+}
+
+/// The projection of `dataset`'s readings that `block` holds.
+///
+/// # Panics
+/// If it is not as long as [`projection::fit`] makes it for this data set.
+#[must_use]
+pub fn view<'b>(block: &'b [f32], dataset: &Dataset) -> Projection<'b> {
+    let readings = dataset.inputs.names.len();
+    Projection::new(readings, readings / dataset.rows, block)
+        .expect("a projection of these readings")
+}
+
+fn train_rows(
     dataset: &Dataset,
     options: &Options,
     progress: &Progress,
 ) -> Result<Vec<FittedNetwork>> {
-    options.check(dataset.frames())?;
     progress.stage("train", dataset.rows);
     let fit_rows = |options: &Options| -> Result<Vec<FittedNetwork>> {
         let rows = (0..dataset.rows).into_par_iter();

@@ -31,7 +31,8 @@ fn network_and_linear(scene: &str, noise_level: f64) -> (Vec<Errors>, Vec<Errors
     let t = &scene.training;
     assert!(t.centres <= 128 && t.affine_tail);
     let options = Options::new(t.centres, t.spread, t.affine_tail, scene.seed);
-    let network = &train::train(&training, &options, &Progress::silent()).unwrap()[0];
+    let trained = train::train(&training, &options, &Progress::silent()).unwrap();
+    let network = &trained.networks[0];
     let (training, test) = (training.block(0), test.block(0));
     let estimate = infer(&network.network(), Kernel::default(), &test.inputs);
     let linear = LinearDecoder::fit(&training).predict(&test);

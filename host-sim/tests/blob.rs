@@ -27,8 +27,8 @@ fn real_blob() -> Vec<u8> {
     let scene = scene();
     let dataset = synth::synthesise(&scene, Stream::Training, 400);
     let options = Options { format: NumberFormat::F32Direct, ..Options::new(8, 0.8, true, 1) };
-    let networks = train::train(&dataset, &options, &Progress::silent()).unwrap();
-    model::encode(&networks, &dataset, &Origin::of_scene(&scene)).unwrap()
+    let trained = train::train(&dataset, &options, &Progress::silent()).unwrap();
+    model::encode(&trained, &dataset, &Origin::of_scene(&scene)).unwrap()
 }
 
 /// Bytes at an address that is a multiple of four.

@@ -29,8 +29,8 @@ fn model(centres: usize) -> LoadedModel {
     let scene = press();
     let frames = synthesise(&scene, Stream::Training, 500);
     let options = Options::new(centres, 0.8, true, scene.seed);
-    let networks = train(&frames, &options, &Progress::silent()).unwrap();
-    let blob = encode(&networks, &frames, &Origin::of_scene(&scene)).unwrap();
+    let trained = train(&frames, &options, &Progress::silent()).unwrap();
+    let blob = encode(&trained, &frames, &Origin::of_scene(&scene)).unwrap();
     LoadedModel::from_bytes("test".as_ref(), &blob).unwrap()
 }
 

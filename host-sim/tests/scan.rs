@@ -239,9 +239,9 @@ fn what_is_not_there_ends_serving_at_once() {
 
 fn model(scene: &Scene) -> LoadedModel {
     let frames = synthesise(scene, Stream::Training, 300);
-    let networks =
+    let trained =
         train(&frames, &Options::new(8, 0.8, true, scene.seed), &Progress::silent()).unwrap();
-    let blob = encode(&networks, &frames, &Origin::of_scene(scene)).unwrap();
+    let blob = encode(&trained, &frames, &Origin::of_scene(scene)).unwrap();
     LoadedModel::from_bytes("test".as_ref(), &blob).unwrap()
 }
 

@@ -101,6 +101,47 @@ fn missing_readings_leave_their_rows_outputs_empty_and_no_line_out() {
 }
 
 #[test]
+fn one_network_for_the_whole_array_needs_every_reading_and_errs_less() {
+    let folder = Folder::new("array");
+    folder.write("scene.toml", small_scene());
+    folder.succeed(&["train", "scene.toml", "-n", "2000", "-o", "rows.bin"]);
+    let array = ["train", "scene.toml", "-n", "2000", "--whole-array", "-o", "array.bin"];
+    folder.succeed(&array);
+    let printed = folder.succeed(&["inspect", "array.bin"]);
+    assert!(printed.contains("36 readings → 18 features for all rows"), "{printed}");
+    folder.succeed(&["synth", "scene.toml", "-n", "1000", "--seed", "9", "-o", "d.csv"]);
+    let rmse = |model: &str| {
+        let result = json(&folder.succeed(&["eval", model, "d.csv", "--json"]));
+        let groups = result["errors"].as_array().unwrap().iter();
+        groups.map(|group| group["rmse"].as_f64().unwrap()).sum::<f64>()
+    };
+    let (of_array, of_rows) = (rmse("array.bin"), rmse("rows.bin"));
+    assert!(of_array < of_rows, "{of_array} {of_rows}");
+
+    // The scene asks for the same.
+    let scene =
+        small_scene().replace("affine_tail = true", "affine_tail = true\nwhole_array = true");
+    assert!(scene.contains("whole_array"));
+    folder.write("array.toml", scene);
+    folder.succeed(&["train", "array.toml", "-n", "2000", "-o", "scene.bin"]);
+    let network =
+        |model: &str| json(&folder.succeed(&["inspect", model, "--json"]))["networks"].clone();
+    assert_eq!(network("scene.bin"), network("array.bin"));
+
+    let data = std::fs::read_to_string(folder.path("d.csv")).unwrap();
+    let mut lines: Vec<Vec<&str>> = data.lines().map(|l| l.split(',').collect()).collect();
+    lines[2][0] = "";
+    folder.write("holed.csv", lines.iter().map(|l| l.join(",") + "\n").collect::<String>());
+    folder.succeed(&["decode", "array.bin", "holed.csv", "-o", "e.csv"]);
+    let estimate = std::fs::read_to_string(folder.path("e.csv")).unwrap();
+    let empty: Vec<usize> = estimate
+        .lines()
+        .map(|line| line.split(',').filter(|cell| cell.is_empty()).count())
+        .collect();
+    assert_eq!(empty[..4], [0, 0, 36, 0]);
+}
+
+#[test]
 fn forward_follows_the_equations() {
     let folder = Folder::new("forward");
     let names: Vec<String> = (1..=8)

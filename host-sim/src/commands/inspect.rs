@@ -26,6 +26,8 @@ struct Summary {
     rows: usize,
     inputs_per_row: usize,
     outputs_per_row: usize,
+    /// Features that all readings are projected to, for one network of all rows; 0 without a projection.
+    projected_features: usize,
     networks: Vec<NetworkSummary>,
     noise_kind: String,
     noise_level: f32,
@@ -99,6 +101,7 @@ fn summarise(loaded: &LoadedModel) -> Summary {
         rows: shape.rows,
         inputs_per_row: shape.inputs,
         outputs_per_row: shape.outputs,
+        projected_features: model.projection().map_or(0, |_| shape.inputs),
         networks: networks.collect(),
         noise_kind: format!("{:?}", metadata.noise_kind).to_lowercase(),
         noise_level: metadata.noise_level,
@@ -140,6 +143,10 @@ fn page_of(s: &Summary) -> print::Page {
         "shape",
         format!("{} × ({} readings → {} outputs)", s.rows, s.inputs_per_row, s.outputs_per_row),
     );
+    if s.projected_features > 0 {
+        let (readings, features) = (s.rows * s.inputs_per_row, s.projected_features);
+        line("projection", format!("{readings} readings → {features} features for all rows"));
+    }
     for (index, network) in s.networks.iter().enumerate() {
         let (low, high) = network
             .width

@@ -67,7 +67,7 @@ pub fn reading_bound_ohm(circuit: Circuit, ohm: f64, bits: u8) -> f64 {
 /// for which alone the bound is derived.
 #[must_use]
 pub fn output_bounds(model: &LoadedModel, circuit: Circuit, bits: u8, readings: &Table) -> Table {
-    let networks = model.row_networks();
+    let networks = model.networks_in_turn();
     let names = model.model().metadata().output_names.iter().map(String::from).collect();
     let mut values = Vec::new();
     for line in readings.lines() {

@@ -20,7 +20,7 @@ use crate::progress::Progress;
 use crate::random::Stream;
 use crate::scene::Scene;
 use crate::synth;
-use crate::train::{FittedNetwork, Samples};
+use crate::train::{FittedNetwork, Samples, Trained};
 
 mod choice;
 
@@ -257,7 +257,11 @@ impl Judge<'_> {
         for (variant, (format, affine)) in variants.iter().enumerate() {
             let networks: Vec<FittedNetwork> =
                 rows.iter().map(|row| row[variant].clone()).collect();
-            let blob = model::encode(&networks, training, &Origin::of_scene(averaged))?;
+            let blob = model::encode(
+                &Trained { projection: None, networks },
+                training,
+                &Origin::of_scene(averaged),
+            )?;
             let loaded = LoadedModel::from_bytes("the model just trained".as_ref(), &blob)?;
             let formats: Vec<Format> = loaded.model().networks().map(|n| n.format()).collect();
             let exponentials: &[Kernel] = match format {

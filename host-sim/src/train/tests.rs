@@ -17,6 +17,7 @@ fn block(frames: usize, noise: f64) -> Block {
     }
     let names = |list: [&str; 2]| list.map(String::from).to_vec();
     Block {
+        common_span: false,
         inputs: Table { names: names(["a_ohm", "b_ohm"]), values: inputs },
         outputs: Table { names: names(["wave_mm", "plane_mm"]), values: outputs },
     }

@@ -39,8 +39,8 @@ fn small_model(scene: &Scene, centres: usize) -> Result<LoadedModel> {
         names.fill("x".into());
     }
     let options = Options::new(centres, scene.training.spread, false, scene.seed);
-    let networks = train::train(&frames, &options, &Progress::silent())?;
-    let blob = model::encode(&networks, &frames, &Origin::of_scene(scene))?;
+    let trained = train::train(&frames, &options, &Progress::silent())?;
+    let blob = model::encode(&trained, &frames, &Origin::of_scene(scene))?;
     LoadedModel::from_bytes("small model".as_ref(), &blob)
 }
 

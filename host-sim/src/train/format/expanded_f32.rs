@@ -203,9 +203,9 @@ mod tests {
         let format = |noise: f64, spread: f64| {
             let (scene, data) = press(noise, 1500);
             let options = Options::new(32, spread, true, scene.seed);
-            let networks =
+            let trained =
                 train::train(&data, &options, &crate::progress::Progress::silent()).unwrap();
-            let formats: Vec<_> = networks.iter().map(|n| n.network().format()).collect();
+            let formats: Vec<_> = trained.networks.iter().map(|n| n.network().format()).collect();
             assert!(formats.iter().all(|format| *format == formats[0]), "{formats:?}");
             formats[0]
         };
