@@ -83,14 +83,14 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         flash_bytes: arguments.max_flash,
     };
     let folder = arguments.output.join(&scene.name);
-    let write = |cause| Error::Write { path: folder.clone(), cause };
-    std::fs::create_dir_all(&folder).map_err(write)?;
-    for file in FILES {
-        output::check_writable(&folder.join(file), &[arguments.scene.path()])?;
-    }
-
-    let trade = trade::compute(&scene, &plan, group, &limits, &Progress::on_terminal())?;
-    write_files(&folder, &trade)?;
+    let trade = output::in_folder(&folder, || {
+        for file in FILES {
+            output::check_writable(&folder.join(file), &[arguments.scene.path()])?;
+        }
+        let trade = trade::compute(&scene, &plan, group, &limits, &Progress::on_terminal())?;
+        write_files(&folder, &trade)?;
+        Ok(trade)
+    })?;
     if common.json {
         return print::json(&trade);
     }
