@@ -9,7 +9,7 @@ use model_core::rbf::Format;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::cost::{Cost, Costs, kernel_name};
+use super::cost::{Cost, Costs, MEASURED_SHAPE, kernel_name};
 use super::metrics::{self, Errors, Measure};
 use crate::dataset::Dataset;
 use crate::error::{Error, Result};
@@ -26,8 +26,6 @@ mod choice;
 
 pub use choice::Limits;
 
-/// Rows, readings and outputs of a row that `cargo xtask cycles` measures.
-const MEASURED_SHAPE: [usize; 3] = [8, 18, 18];
 /// Bytes of stack that the f32 kernel keeps activations in.
 const F32_ACTIVATIONS_BYTES: usize = 512;
 
