@@ -71,6 +71,26 @@ pub fn check_writable(path: &Path, inputs: &[&Path]) -> Result<()> {
     File::create(&temporary.0).map(drop).map_err(|cause| Error::write(path, cause))
 }
 
+/// Does `work`, which writes to `folder`; the folder is made first. If the work fails, folders made here go
+/// again, unless something was written to them.
+///
+/// # Errors
+/// [`Error::Write`] for a folder that cannot be made, or what `work` returns.
+pub fn in_folder<T>(folder: &Path, work: impl FnOnce() -> Result<T>) -> Result<T> {
+    let is_new = |path: &&Path| !path.as_os_str().is_empty() && !path.exists();
+    let made: Vec<&Path> = folder.ancestors().take_while(is_new).collect();
+    let outcome = fs::create_dir_all(folder)
+        .map_err(|cause| Error::write(folder, cause))
+        .and_then(|()| work());
+    if outcome.is_err() {
+        for path in made {
+            // Only an empty folder can be removed: what was written stays.
+            let _ = fs::remove_dir(path);
+        }
+    }
+    outcome
+}
+
 /// What stands at an output's path.
 enum Place {
     /// A file, or nothing yet; links are resolved.
@@ -112,5 +132,26 @@ impl Drop for Temporary {
     fn drop(&mut self) {
         // Nothing to remove is the good case.
         let _ = fs::remove_file(&self.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_made_for_work_that_fails_goes_again_unless_something_is_in_it() {
+        let root = std::env::temp_dir().join(format!("taxel-in-folder-{}", std::process::id()));
+        let folder = root.join("scene");
+        let fail = || Err(Error::Failed("no".into()));
+        assert!(in_folder::<()>(&folder, fail).is_err() && !root.exists());
+        let written = folder.join("file");
+        let write_and_fail = || write_bytes(&written, b"whole").and_then(|()| fail());
+        assert!(in_folder::<()>(&folder, write_and_fail).is_err() && written.exists());
+        fs::remove_file(&written).unwrap();
+        // A folder that was there stays, empty or not.
+        assert!(in_folder::<()>(&folder, fail).is_err() && folder.exists());
+        assert_eq!(in_folder(&folder, || Ok(folder.exists())).ok(), Some(true));
+        fs::remove_dir_all(&root).unwrap();
     }
 }

@@ -3,6 +3,7 @@
 mod common;
 
 use common::{Folder, small_scene};
+use host_sim::evaluate::cost::Costs;
 use host_sim::evaluate::gate::{self, GateResult, Settings, woken_by_theory};
 use host_sim::evaluate::metrics::Errors;
 use host_sim::model::train_scene;
@@ -25,7 +26,8 @@ fn noise_wakes_untouched_rows_as_often_as_theory_says() {
     let mut scene = Scene::parse("small", &small_scene()).unwrap();
     scene.read_rows = vec![0, 3, 4, 7];
     let k = [2.5, 3.0, 3.5, 4.0];
-    let settings = Settings { k: k.to_vec(), frames: 20_000, baseline_frames: 10_000, costs: None };
+    let settings =
+        Settings { k: k.to_vec(), frames: 20_000, baseline_frames: 10_000, frame_cycles: None };
     let result = measured(&scene, &settings);
     let rows = (settings.frames * scene.read_rows.len()) as f64;
     for (line, k) in result.lines.iter().zip(k) {
@@ -44,8 +46,11 @@ fn noise_wakes_untouched_rows_as_often_as_theory_says() {
 #[test]
 fn press_loses_little_accuracy_and_saves_half_of_the_rows() {
     let scene = Scene::load("press").unwrap();
-    let settings = Settings { k: vec![3.0, 3.5], frames: 4000, baseline_frames: 100, costs: None };
-    let result = measured(&scene, &settings);
+    let model = train_scene(&scene, &Progress::silent()).unwrap();
+    let frames = Costs::measured().unwrap().frames_of_model(&model.model()).unwrap();
+    let frame_cycles = Some(frames.map(|cost| cost.cycles));
+    let settings = Settings { k: vec![3.0, 3.5], frames: 4000, baseline_frames: 100, frame_cycles };
+    let result = gate::measure(&scene, &model, &settings).unwrap();
     let [three, three_and_half] = &result.lines[..] else { panic!("two lines") };
     let worse = |errors: &[Errors]| z(errors) / z(&result.ungated_errors);
     // Measured: 1.029 and 1.055.
@@ -53,6 +58,11 @@ fn press_loses_little_accuracy_and_saves_half_of_the_rows() {
     assert!(worse(&three.errors) < 1.04 && worse(&three_and_half.errors) < 1.07);
     // Measured: 0.509 and 0.567.
     assert!(three.skipped > 0.48 && three_and_half.skipped > 0.54);
+    let cost = three.relative_cost.unwrap();
+    let rest_and_awake = [frames.at_rest, frames.awake].map(|cost| cost.cycles as f64);
+    let mean = three.skipped * rest_and_awake[0] + (1.0 - three.skipped) * rest_and_awake[1];
+    assert!((cost * frames.ungated.cycles as f64 / mean - 1.0).abs() < 1e-12, "{cost}");
+    assert!(cost < 0.57 && three_and_half.relative_cost.unwrap() < cost);
     for group in ["dx_mm", "dy_mm"] {
         let of = |errors: &[Errors]| errors.iter().find(|e| e.group == group).unwrap().rmse;
         assert!(of(&three_and_half.errors) < 1.005 * of(&result.ungated_errors), "{group}");
@@ -70,11 +80,14 @@ fn press_loses_little_accuracy_and_saves_half_of_the_rows() {
 fn the_command_prints_tables_and_json() {
     let folder = Folder::new("gate");
     folder.write("small.toml", small_scene());
-    let arguments = ["gate", "small.toml", "-n", "200", "--k", "3.5,4", "--cycles", "4000,400,250"];
+    let arguments =
+        ["gate", "small.toml", "-n", "200", "--k", "3.5,4", "--cycles", "4000,400,4250"];
     let text = folder.succeed(&arguments);
     for part in ["1.750 %", "2.000 %", "without a gate", "answering the mean", "k = 4 "] {
         assert!(text.contains(part), "{part:?} is not in {text}");
     }
+    // Two rows were not measured.
+    assert!(folder.succeed(&arguments[..6]).contains("not known: no model of this kind"));
     let json: serde_json::Value =
         serde_json::from_str(&folder.succeed(&[&arguments[..], &["--json"]].concat())).unwrap();
     assert_eq!(json["lines"][1]["k"], 4.0);
@@ -95,8 +108,9 @@ fn what_makes_no_gate_is_refused() {
         (&["small.toml", "--noise", "0"], &["noise level = 0", "0.005"]),
         (&["span.toml"], &["noise.kind = \"span\"", "relative"]),
         (&["small.toml", "--baseline-frames", "0"], &["--baseline-frames = 0"]),
-        (&["small.toml", "--cycles", "1,2"], &["--cycles [1.0, 2.0]", "three"]),
-        (&["small.toml", "--cycles", "1,2,-3"], &["--cycles [1.0, 2.0, -3.0]", "positive"]),
+        (&["small.toml", "--cycles", "1,2"], &["--cycles [1, 2]", "three"]),
+        (&["small.toml", "--cycles", "1,0,3"], &["--cycles [1, 0, 3]", "positive"]),
+        (&["small.toml", "--cycles", "1,2,-3"], &["'-3'", "--cycles"]),
     ] {
         let output = folder.run(&[&["gate"], arguments].concat());
         let stderr = String::from_utf8(output.stderr).unwrap();

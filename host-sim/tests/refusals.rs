@@ -131,6 +131,16 @@ fn bad_training_options() {
 }
 
 #[test]
+fn what_cannot_be_traded_leaves_no_folder_behind() {
+    let folder = Folder::new("bad-trade");
+    folder.write("small.toml", small_scene());
+    refused(&folder, &["trade", "small.toml"], &["2 rows of 18 readings"]);
+    refused(&folder, &["trade", "press", "--centres", "20"], &["--centres 20", "[16, 32"]);
+    refused(&folder, &["trade", "press", "--average", "4,4"], &["--average gives 4 twice"]);
+    refused(&folder, &["trade", "press", "--max-error", "0", "-o", "a/b"], &["--max-error 0"]);
+}
+
+#[test]
 fn unwritable_output_is_found_before_the_work() {
     let folder = Folder::new("unwritable");
     folder.write("file", "not a folder");

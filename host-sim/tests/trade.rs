@@ -1,5 +1,10 @@
 //! The trade between speed and accuracy, on a small plan.
 
+mod common;
+
+use common::Folder;
+use host_sim::evaluate::cost::Costs;
+use host_sim::evaluate::gate::{self, Settings};
 use host_sim::evaluate::trade::{self, Limits, Plan, Trade};
 use host_sim::infer::Kernel;
 use host_sim::model::LoadedModel;
@@ -14,9 +19,17 @@ fn press() -> Scene {
     scene
 }
 
+fn plan() -> Plan {
+    Plan {
+        centres: vec![16, 64],
+        samples_averaged: vec![1, 16],
+        gate_k: vec![3.5],
+        clock_mhz: 100.0,
+    }
+}
+
 fn compute(scene: &Scene, limits: Limits) -> Result<Trade> {
-    let plan = Plan { centres: vec![16, 64], samples_averaged: vec![1, 16], clock_mhz: 100.0 };
-    trade::compute(scene, &plan, "dz_mm", &limits, &Progress::silent())
+    trade::compute(scene, &plan(), "dz_mm", &limits, &Progress::silent())
 }
 
 #[test]
@@ -24,11 +37,14 @@ fn every_knob_has_its_points_and_the_front_is_what_nothing_beats() {
     let trade = compute(&press(), Limits::default()).unwrap();
     assert_eq!(trade.chosen, None);
     let count = |kernel: &str| trade.points.iter().filter(|p| p.kernel == kernel).count();
-    for kernel in ["fixed16", "f32-direct", "f32-direct-libm", "f32-direct-micromath"] {
-        assert_eq!(count(kernel), 2 * 2 * 2, "{kernel}"); // K, tail, samples
+    for kernel in ["fixed16", "f32-direct"] {
+        assert_eq!(count(kernel), 2 * 2 * 2 * 2, "{kernel}"); // K, tail, samples, gate
+    }
+    for kernel in ["f32-direct-libm", "f32-direct-micromath"] {
+        assert_eq!(count(kernel), 2 * 2 * 2, "{kernel}"); // the gate is not measured with them
     }
     // Only where rounding is proved harmless.
-    assert!((1..=8).contains(&count("f32")), "{}", count("f32"));
+    assert!((1..=16).contains(&count("f32")), "{}", count("f32"));
 
     let rank = |p: &trade::Point| (p.frame.cycles, p.samples_averaged, p.rmse("dz_mm"));
     for point in &trade.points {
@@ -49,8 +65,8 @@ fn every_knob_has_its_points_and_the_front_is_what_nothing_beats() {
     // More samples, less error; 16 bits as good as 32.
     let find = |kernel: &str, centres, samples| {
         let wanted = |p: &&trade::Point| {
-            (p.kernel.as_str(), p.centres, p.samples_averaged, p.affine_tail)
-                == (kernel, centres, samples, true)
+            (p.kernel.as_str(), p.centres, p.samples_averaged, p.affine_tail, p.gate_k)
+                == (kernel, centres, samples, true, None)
         };
         trade.points.iter().find(wanted).unwrap()
     };
@@ -66,7 +82,8 @@ fn every_knob_has_its_points_and_the_front_is_what_nothing_beats() {
 fn the_chosen_blob_is_what_the_table_says() {
     let scene = press();
     let limits = Limits { error: Some(0.055), ..Limits::default() };
-    let trade = compute(&scene, limits).unwrap();
+    let plan = Plan { gate_k: vec![], ..plan() };
+    let trade = trade::compute(&scene, &plan, "dz_mm", &limits, &Progress::silent()).unwrap();
     let chosen = trade.chosen.unwrap();
     let point = &trade.points[chosen];
     assert!(point.rmse("dz_mm") <= 0.055);
@@ -88,6 +105,92 @@ fn the_chosen_blob_is_what_the_table_says() {
 }
 
 #[test]
+fn behind_a_gate_points_err_as_the_gates_rows_do_and_cost_their_share() {
+    let mut scene = press();
+    let plan =
+        Plan { centres: vec![16], samples_averaged: vec![4], gate_k: vec![3.5], clock_mhz: 1.0 };
+    let limits = Limits { cycles: Some(10_000), ..Limits::default() };
+    let trade = trade::compute(&scene, &plan, "dz_mm", &limits, &Progress::silent()).unwrap();
+    let costs = Costs::measured().unwrap();
+    // The gate command's way: the model by itself, and the same test frames.
+    scene.noise.level /= 2.0;
+    let mut gated = 0;
+    for (i, point) in trade.points.iter().enumerate() {
+        let Some(k) = point.gate_k else { continue };
+        let without = &trade.points[i - 1];
+        assert_eq!(point.name(), format!("{}, gate k = 3.5", without.name()));
+        let model = LoadedModel::from_bytes("point".as_ref(), trade.blob(i)).unwrap();
+        let frames = costs.frames_of_model(&model.model()).unwrap();
+        let settings = Settings {
+            k: vec![k],
+            frames: scene.training.test_frames,
+            baseline_frames: gate::BASELINE_FRAMES,
+            frame_cycles: None,
+        };
+        let result = gate::measure(&scene, &model, &settings).unwrap();
+        assert_eq!(point.errors, result.lines[0].errors);
+        assert_eq!(without.errors, result.ungated_errors);
+        let skipped = result.lines[0].skipped;
+        assert!(skipped > 0.4 && skipped < 0.8, "{skipped}");
+        let cycles = frames.map(|cost| cost.cycles).mean(skipped);
+        assert_eq!(point.frame.cycles, cycles.round() as u64);
+        assert!(point.frame.instructions < without.frame.instructions);
+        // The baseline and the answer to it.
+        assert_eq!(point.ram_bytes - without.ram_bytes, 576 + 584);
+        assert_eq!(trade.rest_tolerance(i), Some(3.5 * 0.0025));
+        gated += 1;
+    }
+    assert!(gated >= 4, "{gated}");
+    // Only behind a gate does a frame cost so little.
+    let chosen = trade.chosen.unwrap();
+    assert!(trade.points[chosen].gate_k.is_some() && trade.points[chosen].on_front);
+}
+
+#[test]
+fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
+    let folder = Folder::new("trade-files");
+    let scene = include_str!("../../scenes/press.toml")
+        .replace("name = \"press\"", "name = \"few\"")
+        .replace("frames = 20000", "frames = 400")
+        .replace("test_frames = 8000", "test_frames = 100");
+    folder.write("few.toml", scene);
+    let few = ["trade", "few.toml", "--centres", "16", "--average", "1"];
+    let page = folder.succeed(&[&few[..], &["--gate", "3,4", "--max-cycles", "10000"]].concat());
+    assert!(page.contains(" avg gate "), "{page}");
+    assert!(page.contains("--rest-tolerance 0.015") || page.contains("--rest-tolerance 0.02"));
+    let read = |name: &str| std::fs::read_to_string(folder.path(name)).unwrap();
+    let csv = read("out/few/trade.csv");
+    let mut lines = csv.lines();
+    assert!(
+        lines.next().unwrap().starts_with("kernel,centres,affine_tail,samples_averaged,gate_k,")
+    );
+    let k_of = |line: &str| line.split(',').nth(4).unwrap().to_owned();
+    let of_fixed16: Vec<String> =
+        lines.filter(|line| line.starts_with("fixed16,")).map(k_of).collect();
+    assert_eq!(of_fixed16, ["", "3", "4", "", "3", "4"]);
+    let json: serde_json::Value = serde_json::from_str(&read("out/few/trade.json")).unwrap();
+    assert_eq!(json["points"][0]["gate_k"], serde_json::Value::Null);
+    assert_eq!(json["points"][1]["gate_k"], 3.0);
+    assert!(read("out/few/trade.svg").contains("c1 hollow mark"));
+    assert!(read("out/few/trade.html").contains("gate k</th>"));
+
+    let page = folder.succeed(&[&few[..], &["--gate", "none"]].concat());
+    assert!(!read("out/few/trade.svg").contains("c1 hollow mark"), "{page}");
+    // Without noise there is no gate, and the note says why.
+    let output = folder.run(&[&few[..], &["--noise", "0"]].concat());
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && stderr.contains("no points behind a gate"), "{stderr}");
+    for (k, says) in
+        [("none,3", "none alone"), ("3,3", "gives 3 twice"), ("x", "or none"), ("-1", "--gate -1")]
+    {
+        let output = folder.run(&[&few[..], &["--gate", k]].concat());
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{k}: {stderr}");
+        assert!(stderr.contains(says), "{k}: {stderr}");
+    }
+}
+
+#[test]
 fn limits_that_nothing_meets_and_scenes_that_were_not_measured_are_refused() {
     let scene = press();
     let limits = Limits { error: Some(1e-6), cycles: Some(20_000), flash_bytes: None };
@@ -104,8 +207,19 @@ fn limits_that_nothing_meets_and_scenes_that_were_not_measured_are_refused() {
     other.read_rows.pop();
     let message = compute(&other, Limits::default()).unwrap_err().to_string();
     assert!(message.contains("7 rows of 18 readings"), "{message}");
-    let plan = Plan { centres: vec![20], samples_averaged: vec![1], clock_mhz: 1.0 };
-    let outcome = trade::compute(&scene, &plan, "dz_mm", &Limits::default(), &Progress::silent());
-    let message = outcome.unwrap_err().to_string();
+    let refusal = |scene: &Scene, plan: &Plan| {
+        let outcome = trade::compute(scene, plan, "dz_mm", &Limits::default(), &Progress::silent());
+        outcome.unwrap_err().to_string()
+    };
+    let mut plan =
+        Plan { centres: vec![20], samples_averaged: vec![1], gate_k: vec![], clock_mhz: 1.0 };
+    let message = refusal(&scene, &plan);
     assert!(message.contains("--centres 20") && message.contains("[16, 32"), "{message}");
+
+    (plan.centres, plan.gate_k) = (vec![16], vec![3.5, 200.0]);
+    let message = refusal(&scene, &plan);
+    assert!(message.contains("--gate 200") && message.contains("below 1"), "{message}");
+    let mut silent = scene.clone();
+    silent.noise.level = 0.0;
+    assert!(refusal(&silent, &plan).contains("noise level = 0"));
 }

@@ -4,6 +4,7 @@
 mod accepted;
 mod budget;
 mod code;
+mod comparison;
 mod cost;
 mod figures;
 mod machine;
@@ -60,7 +61,8 @@ pub fn run(options: &Options<'_>) -> Outcome {
         print!("{}", table::aligned(&measured));
     }
     if options.model.is_some() {
-        return Ok(());
+        let alike = blobs.iter().all(|blob| blob.rows_alike);
+        return hold_model_to_accepted(&measured, alike, &toolchain.compiler()?, options.json);
     }
     let over_budget = budget::exceeded(&measured);
     if !over_budget.is_empty() {
@@ -108,6 +110,43 @@ fn chosen(figures: Vec<Figure>, options: &Options<'_>) -> Outcome<Vec<Figure>> {
         return Err(format!("--kernel {kernel}: measured were {}", others.join(", ")));
     }
     Ok(chosen)
+}
+
+/// Compares a model of one's own with the figures for `compiler`: what `host-sim trade` says that it costs.
+fn hold_model_to_accepted(
+    measured: &[Figure],
+    rows_alike: bool,
+    compiler: &str,
+    json: bool,
+) -> Outcome {
+    if !rows_alike {
+        eprintln!("its rows have different numbers of centres or formats: compared with nothing");
+        return Ok(());
+    }
+    let data = fs::read_to_string(root().join(DATA)).map_err(|cause| format!("{DATA}: {cause}"))?;
+    let accepted = Accepted::parse(&data).map_err(|cause| format!("{DATA}: {cause}"))?;
+    let Some(accepted) = accepted.of(&accepted::in_csv(compiler)) else {
+        eprintln!("{DATA} has no figures for {compiler}: compared with nothing");
+        return Ok(());
+    };
+    let comparison = comparison::of_model(accepted, measured);
+    if comparison.is_empty() {
+        eprintln!("{DATA} has no figures for such a model: compared with nothing");
+        return Ok(());
+    }
+    let table = comparison::table(&comparison);
+    // With --json, objects alone stand on stdout.
+    if json {
+        eprint!("{table}");
+    } else {
+        print!("\n{table}");
+    }
+    let beyond = comparison::beyond(&comparison);
+    if beyond.is_empty() {
+        eprintln!("it costs what {DATA} says for {compiler}");
+        return Ok(());
+    }
+    Err(format!("other than in {DATA} for {compiler}:\n  {}", beyond.join("\n  ")))
 }
 
 /// Compares with the figures for `compiler`, or writes them.

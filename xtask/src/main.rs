@@ -37,7 +37,8 @@ Usage: cargo xtask COMMAND
       --json                prints a list of objects to stdout, and nothing else
       --accept              writes firmware/cycles.csv, and the tables of docs/cycles.md, instead
       --kernel NAME         one kernel alone, held to its budget alone
-      --model FILE          with this model, held to nothing
+      --model FILE          with this model, such as the chosen.bin of `host-sim trade`, held to
+                            what firmware/cycles.csv has for its format, K and tail
   help                      this text
 
 `bash firmware/setup.sh` installs what these need on Debian.

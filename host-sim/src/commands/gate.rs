@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use host_sim::evaluate::gate::{self, Costs, GateResult, Line, MISSED_OVER_MM, Settings};
+use host_sim::evaluate::cost::{Costs, Frames};
+use host_sim::evaluate::gate::{self, BASELINE_FRAMES, GateResult, Line, MISSED_OVER_MM, Settings};
 use host_sim::evaluate::metrics::Errors;
 use host_sim::progress::Progress;
 use host_sim::{Error, Result};
@@ -33,18 +34,18 @@ pub struct Arguments {
     #[arg(long, value_name = "K,…", value_delimiter = ',', default_values_t = [3.0, 3.5, 4.0, 5.0, 6.0], allow_negative_numbers = true)]
     k: Vec<f64>,
     /// Frames that the baseline averages.
-    #[arg(long, value_name = "N", default_value_t = 100)]
+    #[arg(long, value_name = "N", default_value_t = BASELINE_FRAMES)]
     baseline_frames: usize,
-    /// Cycles of a row without a gate, of a row at rest, and of the test of a row that is awake, for the cost
-    /// of frames.
+    /// Cycles of a frame without a gate, of one whose rows are all at rest, and of one whose rows are all
+    /// awake, instead of those that `cargo xtask cycles` measured of such models.
     #[arg(
         long,
-        value_name = "ROW,REST,TEST",
+        value_name = "FRAME,REST,AWAKE",
         value_delimiter = ',',
         num_args = 1,
         allow_negative_numbers = true
     )]
-    cycles: Vec<f64>,
+    cycles: Vec<u64>,
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
@@ -52,29 +53,31 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     arguments.noise.apply(&mut scene)?;
     scene.check_frames("--frames", arguments.frames)?;
     scene.check_frames("--baseline-frames", arguments.baseline_frames)?;
-    let settings = Settings {
+    let mut settings = Settings {
         k: arguments.k.clone(),
         frames: arguments.frames,
         baseline_frames: arguments.baseline_frames,
-        costs: costs(&arguments.cycles)?,
+        frame_cycles: given(&arguments.cycles)?,
     };
     settings.check(&scene)?;
     let model =
         scene_argument::model(arguments.model.as_deref(), &scene, &Progress::on_terminal())?;
+    if settings.frame_cycles.is_none() {
+        let measured = Costs::measured()?.frames_of_model(&model.model());
+        settings.frame_cycles = measured.map(|frames| frames.map(|cost| cost.cycles));
+    }
     let result = gate::measure(&scene, &model, &settings)?;
     if common.json { print::json(&result) } else { page_of(&result).print() }
 }
 
-fn costs(cycles: &[f64]) -> Result<Option<Costs>> {
+fn given(cycles: &[u64]) -> Result<Option<Frames<u64>>> {
     match *cycles {
         [] => Ok(None),
-        [row_cycles, resting_row_cycles, test_cycles]
-            if cycles.iter().all(|c| c.is_finite() && *c > 0.0) =>
-        {
-            Ok(Some(Costs { row_cycles, resting_row_cycles, test_cycles }))
+        [ungated, at_rest, awake] if !cycles.contains(&0) => {
+            Ok(Some(Frames { ungated, at_rest, awake }))
         }
         _ => Err(Error::Usage(format!(
-            "--cycles {cycles:?}: give three positive numbers, ROW,REST,TEST, as `cargo xtask cycles` \
+            "--cycles {cycles:?}: give three positive numbers, FRAME,REST,AWAKE, as `cargo xtask cycles` \
              measures them (docs/gating.md)"
         ))),
     }
@@ -94,8 +97,12 @@ fn page_of(result: &GateResult) -> print::Page {
     ));
     rows(&mut page, result);
     errors(&mut page, result);
-    if result.costs.is_some() {
-        frames_cost(&mut page, result);
+    match &result.frame_cycles {
+        Some(frames) => frames_cost(&mut page, result, frames),
+        None => page.line(
+            "what frames cost is not known: no model of this kind was measured, see firmware/cycles.csv; \
+             give --cycles\n",
+        ),
     }
     page.line(
         "k: standard deviations of their noise within which a row's readings are, and their sum is, for it to\n\
@@ -150,10 +157,12 @@ fn errors(page: &mut print::Page, result: &GateResult) {
     page.line("");
 }
 
-fn frames_cost(page: &mut print::Page, result: &GateResult) {
-    page.line(
-        "cycles of a frame, in parts of one without a gate: mean over the scene, and untouched",
-    );
+fn frames_cost(page: &mut print::Page, result: &GateResult, frames: &Frames<u64>) {
+    page.line(format_args!(
+        "cycles of a frame: {} without a gate, {} with all rows at rest, {} with all awake; in parts of the\n\
+         first, mean over the scene, and untouched:",
+        frames.ungated, frames.at_rest, frames.awake
+    ));
     let part = |cost: Option<f64>| cost.map_or("-".into(), |cost| percent(cost, 1));
     for line in &result.lines {
         let (scene, untouched) = (part(line.relative_cost), part(line.relative_cost_untouched));

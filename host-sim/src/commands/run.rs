@@ -44,17 +44,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let mut scene = arguments.scene.load(common)?;
     arguments.noise.apply(&mut scene)?;
     let folder = arguments.output.join(&scene.name);
-    let folder_is_new = !folder.exists();
-    let outcome = run_into(&folder, &scene, arguments.scene.path(), common);
-    if outcome.is_err() && folder_is_new {
-        // Removes it only if it is empty: what was written stays.
-        let _ = std::fs::remove_dir(&folder);
-    }
-    outcome
+    output::in_folder(&folder, || run_into(&folder, &scene, arguments.scene.path(), common))
 }
 
 fn run_into(folder: &Path, scene: &Scene, scene_path: &Path, common: &Common) -> Result<()> {
-    std::fs::create_dir_all(folder).map_err(|cause| Error::Write { path: folder.into(), cause })?;
     for file in FILES {
         output::check_writable(&folder.join(file), &[scene_path])?;
     }

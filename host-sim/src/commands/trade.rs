@@ -1,11 +1,15 @@
 //! `trade`: speed against accuracy, every knob measured.
 
+use std::cmp::Ordering;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 use clap::Args;
+use host_sim::evaluate::gate::{self, RECOMMENDED_K};
 use host_sim::evaluate::trade::{self, Limits, Plan, Point, Trade};
 use host_sim::progress::Progress;
+use host_sim::scene::Scene;
 use host_sim::{Error, Result, columns, output, report};
 
 use super::scene_argument::{NoiseArgument, SceneArgument};
@@ -14,16 +18,18 @@ use super::{Common, print};
 /// All files that the command may write.
 const FILES: [&str; 5] = ["trade.csv", "trade.json", "trade.svg", "trade.html", "chosen.bin"];
 
-/// Trade speed for accuracy: train and judge every number format, exponential, K, affine tail and number of
-/// samples averaged; mark the front of what nothing beats; pick a point within limits.
+/// Trade speed for accuracy: train and judge every number format, exponential, K, affine tail, number of
+/// samples averaged and gate for rows at rest; mark the front of what nothing beats; pick a point within limits.
 ///
 /// Writes trade.csv, trade.json, trade.svg and trade.html to out/<scene>/, and with a limit chosen.bin.
-/// Instructions and cycles are those that `cargo xtask cycles` measured of the firmware's code.
+/// Instructions and cycles are those that `cargo xtask cycles` measured of the firmware's code; behind a gate,
+/// the mean of the test frames by their share of rows at rest (docs/trade.md).
 #[derive(Args)]
 #[command(after_help = "Examples:
   host-sim trade press
   host-sim trade press --max-error 0.05
-  host-sim trade press --max-cycles 40000 --max-flash 40000 --average 1")]
+  host-sim trade press --max-cycles 40000 --max-flash 40000 --average 1
+  host-sim trade press --gate 3,3.5 --max-cycles 20000")]
 pub struct Arguments {
     #[command(flatten)]
     scene: SceneArgument,
@@ -38,13 +44,17 @@ pub struct Arguments {
     /// Samples averaged for each reading, to try.
     #[arg(long, value_name = "N", value_delimiter = ',', default_value = "1,4,16")]
     average: Vec<usize>,
+    /// Gates to try besides none: tolerances in standard deviations of the averaged noise; `none` for no gate
+    /// [default: 3.5 if the scene's noise is relative].
+    #[arg(long, value_name = "K,…", value_delimiter = ',', allow_negative_numbers = true)]
+    gate: Vec<Gate>,
     /// Outputs that the front and the choice go by, such as dz_mm [default: the last].
     #[arg(long, value_name = "GROUP")]
     group: Option<String>,
     /// Pick the cheapest point with an RMSE of at most this, in the group's unit.
     #[arg(long, value_name = "RMSE", allow_negative_numbers = true)]
     max_error: Option<f64>,
-    /// Pick within so many cycles a frame: the most accurate point, unless --max-error asks for the cheapest.
+    /// Pick within so many cycles a frame, behind a gate on average: the most accurate point, unless --max-error asks for the cheapest.
     #[arg(long, value_name = "CYCLES")]
     max_cycles: Option<u64>,
     /// Pick within a blob of so many bytes.
@@ -75,6 +85,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let plan = Plan {
         centres: distinct("--centres", &arguments.centres)?,
         samples_averaged: distinct("--average", &arguments.average)?,
+        gate_k: gate_k(&arguments.gate, &scene)?,
         clock_mhz: arguments.clock_mhz,
     };
     let limits = Limits {
@@ -83,23 +94,71 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         flash_bytes: arguments.max_flash,
     };
     let folder = arguments.output.join(&scene.name);
-    let write = |cause| Error::Write { path: folder.clone(), cause };
-    std::fs::create_dir_all(&folder).map_err(write)?;
-    for file in FILES {
-        output::check_writable(&folder.join(file), &[arguments.scene.path()])?;
-    }
-
-    let trade = trade::compute(&scene, &plan, group, &limits, &Progress::on_terminal())?;
-    write_files(&folder, &trade)?;
+    let trade = output::in_folder(&folder, || {
+        for file in FILES {
+            output::check_writable(&folder.join(file), &[arguments.scene.path()])?;
+        }
+        let trade = trade::compute(&scene, &plan, group, &limits, &Progress::on_terminal())?;
+        write_files(&folder, &trade)?;
+        Ok(trade)
+    })?;
     if common.json {
         return print::json(&trade);
     }
     page_of(&trade, &folder).print()
 }
 
-fn distinct(option: &str, values: &[usize]) -> Result<Vec<usize>> {
+/// A value of `--gate`.
+#[derive(Clone, Copy, PartialEq)]
+enum Gate {
+    None,
+    K(f64),
+}
+
+impl FromStr for Gate {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        match text {
+            "none" => Ok(Self::None),
+            k => k.parse().map(Self::K).map_err(|_| "give numbers, such as 3.5, or none".into()),
+        }
+    }
+}
+
+/// The gates that are asked for, or the one that docs/gating.md recommends where the noise allows one.
+fn gate_k(given: &[Gate], scene: &Scene) -> Result<Vec<f64>> {
+    if given.is_empty() {
+        return Ok(match gate::check_noise(scene) {
+            Ok(()) => vec![RECOMMENDED_K],
+            Err(cause) => {
+                eprintln!("note: no points behind a gate: {cause}");
+                vec![]
+            }
+        });
+    }
+    let k: Vec<f64> = given
+        .iter()
+        .filter_map(|gate| if let Gate::K(k) = gate { Some(*k) } else { None })
+        .collect();
+    if k.len() == given.len() {
+        return distinct("--gate", &k);
+    }
+    if given.len() > 1 {
+        let message =
+            "--gate none: there are always points without a gate; give none alone, or numbers";
+        return Err(Error::Usage(message.into()));
+    }
+    Ok(vec![])
+}
+
+fn distinct<T: Copy + PartialOrd + std::fmt::Display>(
+    option: &str,
+    values: &[T],
+) -> Result<Vec<T>> {
     let mut sorted = values.to_vec();
-    sorted.sort_unstable();
+    // What has no order is refused later, by what it is for.
+    sorted.sort_by(|a, b| a.partial_cmp(b).unwrap_or(Ordering::Equal));
     match sorted.windows(2).find(|pair| pair[0] == pair[1]) {
         Some(pair) => Err(Error::Usage(format!("{option} gives {} twice; give it once", pair[0]))),
         None => Ok(sorted),
@@ -129,7 +188,7 @@ fn csv_of(trade: &Trade) -> String {
     let groups: Vec<&str> = trade.mean.iter().map(|e| e.group.as_str()).collect();
     let rmse = groups.iter().map(|group| format!("{group}_rmse,{group}_ratio_to_best"));
     let mut csv = format!(
-        "kernel,centres,affine_tail,samples_averaged,{},instructions,cycles,frame_us,flash_bytes,ram_bytes,\
+        "kernel,centres,affine_tail,samples_averaged,gate_k,{},instructions,cycles,frame_us,flash_bytes,ram_bytes,\
          on_front,chosen\n",
         rmse.collect::<Vec<_>>().join(",")
     );
@@ -138,11 +197,12 @@ fn csv_of(trade: &Trade) -> String {
         let errors = errors.map(|(e, ratio)| format!("{},{ratio}", e.rmse)).collect::<Vec<_>>();
         let _ = writeln!(
             csv,
-            "{},{},{},{},{},{},{},{},{},{},{},{}",
+            "{},{},{},{},{},{},{},{},{},{},{},{},{}",
             p.kernel,
             p.centres,
             p.affine_tail,
             p.samples_averaged,
+            p.gate_k.map_or(String::new(), |k| k.to_string()),
             errors.join(","),
             p.frame.instructions,
             p.frame.cycles,
@@ -169,11 +229,12 @@ fn page_of(trade: &Trade, folder: &Path) -> print::Page {
     ));
     let groups: Vec<String> = trade.mean.iter().map(|e| format!("{:>16}", e.group)).collect();
     page.line(format_args!(
-        "\n{:<22} {:>4} {:>5} {:>4}{groups}{:>13} {:>9} {:>8} {:>8} {:>6}",
+        "\n{:<22} {:>4} {:>5} {:>4} {:>4}{groups}{:>13} {:>9} {:>8} {:>8} {:>6}",
         "RMSE (× best)",
         "K",
         "tail",
         "avg",
+        "gate",
         "instructions",
         "cycles",
         "µs",
@@ -185,9 +246,10 @@ fn page_of(trade: &Trade, folder: &Path) -> print::Page {
         page.line(line_of(point, trade.chosen == Some(i)));
     }
     let mean: Vec<String> = trade.mean.iter().map(|e| format!("{:>9.4}       ", e.rmse)).collect();
-    page.line(format_args!("{:<39}{}", "the mean", mean.concat()));
+    page.line(format_args!("{:<44}{}", "the mean", mean.concat()));
     page.line(format_args!(
-        "\n*: nothing is better than this in RMSE of {}, cycles and samples, and worse in none",
+        "\n*: nothing is better than this in RMSE of {}, cycles and samples, and worse in none\n\
+         gate: k of a gate for rows at rest; its cycles are the mean of the test frames",
         trade.group
     ));
     if let Some(chosen) = trade.chosen {
@@ -200,6 +262,11 @@ fn page_of(trade: &Trade, folder: &Path) -> print::Page {
             point.frame.cycles,
             folder.join("chosen.bin").display()
         ));
+        if let Some(tolerance) = trade.rest_tolerance(chosen) {
+            page.line(format_args!(
+                "its gate, on a device with a baseline: --rest-tolerance {tolerance}"
+            ));
+        }
     }
     page.line(format_args!("all of it, and the curve: {}", folder.join("trade.html").display()));
     page
@@ -212,12 +279,13 @@ fn line_of(point: &Point, chosen: bool) -> String {
         .collect();
     let errors = errors.concat();
     format!(
-        "{} {:<20} {:>4} {:>5} {:>4}{errors}{:>13} {:>9} {:>8.1} {:>8} {:>6}{}",
+        "{} {:<20} {:>4} {:>5} {:>4} {:>4}{errors}{:>13} {:>9} {:>8.1} {:>8} {:>6}{}",
         if point.on_front { "*" } else { " " },
         point.kernel,
         point.centres,
         if point.affine_tail { "yes" } else { "no" },
         point.samples_averaged,
+        point.gate_k.map_or("-".into(), |k| k.to_string()),
         point.frame.instructions,
         point.frame.cycles,
         point.frame_us,

@@ -1,10 +1,14 @@
 //! What decoding costs a Cortex-M4F: the figures that `cargo xtask cycles` measures and checks in.
 
+use model_core::blob::Model;
 use model_core::rbf::Format;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
 use crate::infer::Kernel;
+
+/// Rows, readings and outputs of a row that `cargo xtask cycles` measures.
+pub const MEASURED_SHAPE: [usize; 3] = [8, 18, 18];
 
 /// `firmware/cycles.csv`: compiler, kernel, centres, affine, scope, instructions, cycles.
 const MEASURED: &str = include_str!("../../../firmware/cycles.csv");
@@ -16,6 +20,49 @@ pub struct Cost {
     pub instructions: u64,
     /// Cycles by the model.
     pub cycles: u64,
+}
+
+/// What a frame costs without a gate, and behind one, in any measure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Frames<T> {
+    /// Without a gate.
+    pub ungated: T,
+    /// Behind a gate that finds all rows at rest.
+    pub at_rest: T,
+    /// Behind a gate that finds all rows awake, each by its last reading.
+    pub awake: T,
+}
+
+impl<T> Frames<T> {
+    /// The same in another measure.
+    pub fn map<U>(self, of: impl Fn(T) -> U) -> Frames<U> {
+        Frames { ungated: of(self.ungated), at_rest: of(self.at_rest), awake: of(self.awake) }
+    }
+}
+
+impl Frames<u64> {
+    /// The mean of frames behind a gate, of whose rows this share is at rest: between what was measured of
+    /// frames all at rest and all awake.
+    #[must_use]
+    pub fn mean(&self, share_at_rest: f64) -> f64 {
+        let [awake, at_rest] = [self.awake, self.at_rest].map(|cost| cost as f64);
+        awake + share_at_rest * (at_rest - awake)
+    }
+
+    /// The same in parts of a frame without a gate.
+    #[must_use]
+    pub fn relative(&self, share_at_rest: f64) -> f64 {
+        self.mean(share_at_rest) / self.ungated as f64
+    }
+}
+
+impl Frames<Cost> {
+    /// The mean of frames behind a gate, rounded.
+    #[must_use]
+    pub fn mean_cost(&self, share_at_rest: f64) -> Cost {
+        let mean = |of: fn(Cost) -> u64| self.map(of).mean(share_at_rest).round() as u64;
+        Cost { instructions: mean(|cost| cost.instructions), cycles: mean(|cost| cost.cycles) }
+    }
 }
 
 /// What was measured of one compiler's code.
@@ -80,7 +127,35 @@ impl Costs {
         centres
     }
 
-    /// The cost of `scope` (`inference`, `row` or `frame`); `None` if it was not measured.
+    /// The cost of a frame with and without a gate; `None` if it was not measured, as with exponentials other
+    /// than the firmware's.
+    #[must_use]
+    pub fn frames(&self, kernel: &str, centres: usize, affine: bool) -> Option<Frames<Cost>> {
+        let of = |scope| self.of(kernel, centres, affine, scope);
+        Some(Frames {
+            ungated: of("frame")?,
+            at_rest: of("resting-frame")?,
+            awake: of("awake-frame")?,
+        })
+    }
+
+    /// The same of `model`, with the exponential that the firmware runs; `None` also if its networks are not
+    /// all alike, or its shape is not the measured one.
+    #[must_use]
+    pub fn frames_of_model(&self, model: &Model<'_>) -> Option<Frames<Cost>> {
+        let shape = model.shape();
+        if [shape.rows, shape.inputs, shape.outputs] != MEASURED_SHAPE {
+            return None;
+        }
+        let mut kinds = model
+            .networks()
+            .map(|network| (network.format(), network.shape().centres, network.has_affine_tail()));
+        let kind = kinds.next()?;
+        let (format, centres, affine) = kinds.all(|other| other == kind).then_some(kind)?;
+        self.frames(&kernel_name(format, Kernel::default()), centres, affine)
+    }
+
+    /// The cost of `scope` (`frame`, say); `None` if it was not measured.
     #[must_use]
     pub fn of(&self, kernel: &str, centres: usize, affine: bool, scope: &str) -> Option<Cost> {
         let wanted = |line: &&Line| {
@@ -117,6 +192,33 @@ mod tests {
                     assert!(cost.instructions > before && cost.cycles > cost.instructions);
                     before = cost.instructions;
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn a_gates_frames_cost_between_all_at_rest_and_all_awake() {
+        let cost = |instructions, cycles| Cost { instructions, cycles };
+        let frames =
+            Frames { ungated: cost(90, 1000), at_rest: cost(11, 100), awake: cost(100, 1050) };
+        let means = [0.0, 0.25, 1.0].map(|share| frames.mean_cost(share));
+        // 1050 - 0.25·950 = 812.5; 100 - 0.25·89 = 77.75
+        assert_eq!(means, [cost(100, 1050), cost(78, 813), cost(11, 100)]);
+        let cycles = frames.map(|cost| cost.cycles);
+        assert_eq!([0.0, 0.5, 1.0].map(|share| cycles.relative(share)), [1.05, 0.575, 0.1]);
+    }
+
+    #[test]
+    fn a_gate_was_measured_with_the_firmwares_exponential_alone() {
+        let costs = Costs::measured().unwrap();
+        for centres in costs.centres() {
+            for affine in [false, true] {
+                for kernel in ["f32", "fixed16", "f32-direct"] {
+                    let frames = costs.frames(kernel, centres, affine).unwrap();
+                    let Frames { ungated, at_rest, awake } = frames.map(|cost| cost.cycles);
+                    assert!(at_rest < ungated && ungated < awake, "{kernel} {centres}");
+                }
+                assert_eq!(costs.frames("f32-direct-libm", centres, affine), None);
             }
         }
     }

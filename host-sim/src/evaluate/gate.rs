@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use crate::dataset::Table;
 use crate::error::{Error, Result};
+use crate::evaluate::cost::Frames;
 use crate::evaluate::metrics::{self, Errors, Measure};
 use crate::infer::Kernel;
 use crate::model::{LoadedModel, Origin};
@@ -16,25 +17,10 @@ use crate::synth::synthesise;
 /// Sizes in mm beyond which a deformation is counted as missed if its row is taken to be at rest.
 pub const MISSED_OVER_MM: [f64; 4] = [0.02, 0.05, 0.1, 0.2];
 
-/// What a row costs a device, in cycles.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Costs {
-    /// A row that is decoded without a gate.
-    pub row_cycles: f64,
-    /// A row at rest: the test, and the copy of its outputs.
-    pub resting_row_cycles: f64,
-    /// The test of a row that is decoded after all, at its dearest: by the last reading.
-    pub test_cycles: f64,
-}
-
-impl Costs {
-    /// The cost of a frame of which this share of rows is at rest, in parts of one without a gate.
-    #[must_use]
-    pub fn relative(&self, at_rest: f64) -> f64 {
-        let awake_cycles = self.row_cycles + self.test_cycles;
-        (at_rest * self.resting_row_cycles + (1.0 - at_rest) * awake_cycles) / self.row_cycles
-    }
-}
+/// The tolerance that `docs/gating.md` recommends, in standard deviations of a reading's noise.
+pub const RECOMMENDED_K: f64 = 3.5;
+/// Frames that a baseline averages unless told otherwise.
+pub const BASELINE_FRAMES: usize = 100;
 
 /// What is measured.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,8 +31,8 @@ pub struct Settings {
     pub frames: usize,
     /// Frames of the untouched sensor whose mean is the baseline.
     pub baseline_frames: usize,
-    /// What rows cost, if it is known.
-    pub costs: Option<Costs>,
+    /// Cycles of a frame, if they are known.
+    pub frame_cycles: Option<Frames<u64>>,
 }
 
 impl Settings {
@@ -55,35 +41,52 @@ impl Settings {
     /// # Errors
     /// [`Error::Usage`], naming the option, its value and the fix.
     pub fn check(&self, scene: &Scene) -> Result<()> {
-        let level = scene.noise.level;
-        if scene.noise.kind != NoiseKind::Relative {
-            return Err(Error::Usage(
-                "noise.kind = \"span\": the gate's tolerance is relative to each reading; use a scene \
-                 with noise.kind = \"relative\""
-                    .into(),
-            ));
-        }
-        if level <= 0.0 {
-            return Err(Error::Usage(
-                "noise level = 0: the gate's tolerance is k times it; give a positive --noise, such as \
-                 0.005"
-                    .into(),
-            ));
-        }
+        check(scene, "--k", &self.k)?;
         if self.baseline_frames == 0 {
             return Err(Error::Usage(
                 "--baseline-frames 0: give at least 1 frame to average".into(),
             ));
         }
-        match self.k.iter().find(|k| !(**k > 0.0 && *k * level < 1.0)) {
-            Some(k) => Err(Error::Usage(format!(
-                "--k {k}: give positive numbers with k × noise below 1, such as 3.5 (noise is {level})"
-            ))),
-            None if self.k.is_empty() => {
-                Err(Error::Usage("--k: give at least one number, such as 3.5".into()))
-            }
-            None => Ok(()),
+        if self.k.is_empty() {
+            return Err(Error::Usage("--k: give at least one number, such as 3.5".into()));
         }
+        Ok(())
+    }
+}
+
+/// Whether `scene` has the noise that a gate's tolerance is made of.
+///
+/// # Errors
+/// [`Error::Usage`]: why not, and the fix.
+pub fn check_noise(scene: &Scene) -> Result<()> {
+    if scene.noise.kind != NoiseKind::Relative {
+        return Err(Error::Usage(
+            "noise.kind = \"span\": the gate's tolerance is relative to each reading; use a scene with \
+             noise.kind = \"relative\""
+                .into(),
+        ));
+    }
+    if scene.noise.level <= 0.0 {
+        return Err(Error::Usage(
+            "noise level = 0: the gate's tolerance is k times it; give a positive --noise, such as 0.005"
+                .into(),
+        ));
+    }
+    Ok(())
+}
+
+/// Whether `option`'s tolerances `k`, in standard deviations of a reading's noise, make gates for `scene`.
+///
+/// # Errors
+/// [`Error::Usage`], naming the option, its value and the fix.
+pub fn check(scene: &Scene, option: &str, k: &[f64]) -> Result<()> {
+    check_noise(scene)?;
+    let level = scene.noise.level;
+    match k.iter().find(|k| !(**k > 0.0 && *k * level < 1.0)) {
+        Some(k) => Err(Error::Usage(format!(
+            "{option} {k}: give positive numbers with k × noise below 1, such as 3.5 (noise is {level})"
+        ))),
+        None => Ok(()),
     }
 }
 
@@ -148,8 +151,8 @@ pub struct GateResult {
     pub baseline_frames: usize,
     /// CRC-32 of the model, in hexadecimal.
     pub model_crc: String,
-    /// What rows cost, if it is known.
-    pub costs: Option<Costs>,
+    /// Cycles of a frame, if they are known.
+    pub frame_cycles: Option<Frames<u64>>,
     /// Errors over the scene without a gate.
     pub ungated_errors: Vec<Errors>,
     /// Errors of answering the mean of these frames.
@@ -176,11 +179,9 @@ pub fn woken_by_theory(k: f64, readings: usize, baseline_frames: usize) -> f64 {
 pub fn measure(scene: &Scene, model: &LoadedModel, settings: &Settings) -> Result<GateResult> {
     settings.check(scene)?;
     let untouched_scene = untouched(scene);
-    let baseline = synthesise(&untouched_scene, Stream::Training, settings.baseline_frames).inputs;
-    let baseline = Table { values: baseline.means(), names: baseline.names };
+    let gate = Gate::new(scene, settings.baseline_frames);
     let decode = |readings: &Table| model.decode(Kernel::default(), readings).values;
-    let rest_outputs = decode(&baseline);
-    let gate = Gate { baseline: to_f32(&baseline.values), readings: scene.sensor.column_wires };
+    let rest_outputs = decode(&gate.baseline);
 
     let touched = synthesise(scene, Stream::Test, settings.frames);
     let sizes_mm = largest_deformations_mm(scene, settings.frames);
@@ -201,7 +202,7 @@ pub fn measure(scene: &Scene, model: &LoadedModel, settings: &Settings) -> Resul
             Missed { over_mm, rows: rows().count(), missed }
         });
         let sizes_at_rest = sizes_mm.iter().zip(&at_rest).filter(|(_, at_rest)| **at_rest);
-        let cost = |at_rest: f64| settings.costs.map(|costs| costs.relative(at_rest));
+        let cost = |at_rest: f64| settings.frame_cycles.map(|frames| frames.relative(at_rest));
         Line {
             k,
             rest_tolerance,
@@ -210,7 +211,7 @@ pub fn measure(scene: &Scene, model: &LoadedModel, settings: &Settings) -> Resul
             woken_by_theory: woken_by_theory(k, gate.readings, settings.baseline_frames),
             missed: missed.to_vec(),
             largest_missed_mm: sizes_at_rest.map(|(size_mm, _)| *size_mm).reduce(f64::max),
-            errors: errors(&gated(&ungated, &rest_outputs, &at_rest, scene.read_rows.len())),
+            errors: errors(&gated(&ungated, &rest_outputs, &at_rest)),
             relative_cost: cost(skipped),
             relative_cost_untouched: cost(share(&untouched_at_rest)),
         }
@@ -223,7 +224,7 @@ pub fn measure(scene: &Scene, model: &LoadedModel, settings: &Settings) -> Resul
         rows: scene.read_rows.len(),
         baseline_frames: settings.baseline_frames,
         model_crc: format!("{:08x}", model.model().crc()),
-        costs: settings.costs,
+        frame_cycles: settings.frame_cycles,
         ungated_errors: errors(&ungated),
         mean_errors: errors(&touched.outputs.means().repeat(settings.frames)),
         lines: settings.k.iter().copied().map(line).collect(),
@@ -252,21 +253,28 @@ fn largest_deformations_mm(scene: &Scene, frames: usize) -> Vec<f64> {
 }
 
 /// The device's gate, over tables.
-struct Gate {
-    /// Readings of all rows in Ω.
-    baseline: Vec<f32>,
+pub(super) struct Gate {
+    /// Readings of all rows in Ω, one line.
+    pub baseline: Table,
     /// Readings of a row.
     readings: usize,
 }
 
 impl Gate {
+    /// A gate with the mean of so many frames of the scene's sensor, untouched, as its baseline.
+    pub fn new(scene: &Scene, baseline_frames: usize) -> Self {
+        let frames = synthesise(&untouched(scene), Stream::Training, baseline_frames).inputs;
+        let baseline = Table { values: frames.means(), names: frames.names };
+        Self { baseline, readings: scene.sensor.column_wires }
+    }
+
     /// Whether each row of each line is at rest.
-    fn at_rest(&self, readings: &Table, tolerance: f64) -> Vec<bool> {
+    pub fn at_rest(&self, readings: &Table, tolerance: f64) -> Vec<bool> {
         let tolerance = tolerance as f32;
+        let baseline = to_f32(&self.baseline.values);
         let of_line = |line: &[f64]| {
             let line = to_f32(line);
-            let rows =
-                line.chunks_exact(self.readings).zip(self.baseline.chunks_exact(self.readings));
+            let rows = line.chunks_exact(self.readings).zip(baseline.chunks_exact(self.readings));
             rows.map(|(row, baseline)| is_at_rest(row, baseline, tolerance)).collect::<Vec<_>>()
         };
         readings.lines().flat_map(of_line).collect()
@@ -274,8 +282,8 @@ impl Gate {
 }
 
 /// The estimate with the outputs of rows at rest in their places.
-fn gated(ungated: &[f64], rest_outputs: &[f64], at_rest: &[bool], rows: usize) -> Vec<f64> {
-    let per_row = rest_outputs.len() / rows;
+pub(super) fn gated(ungated: &[f64], rest_outputs: &[f64], at_rest: &[bool]) -> Vec<f64> {
+    let per_row = ungated.len() / at_rest.len();
     let mut estimate = ungated.to_vec();
     let rest = rest_outputs.chunks_exact(per_row).cycle();
     for ((outputs, rest), at_rest) in estimate.chunks_exact_mut(per_row).zip(rest).zip(at_rest) {
@@ -286,7 +294,8 @@ fn gated(ungated: &[f64], rest_outputs: &[f64], at_rest: &[bool], rows: usize) -
     estimate
 }
 
-fn share(of: &[bool]) -> f64 {
+/// The share that is true.
+pub(super) fn share(of: &[bool]) -> f64 {
     of.iter().filter(|b| **b).count() as f64 / of.len() as f64
 }
 
@@ -312,16 +321,10 @@ mod tests {
     }
 
     #[test]
-    fn costs_run_from_a_row_at_rest_to_one_that_is_tested_in_vain() {
-        let costs = Costs { row_cycles: 1000.0, resting_row_cycles: 100.0, test_cycles: 50.0 };
-        assert_eq!([0.0, 0.5, 1.0].map(|share| costs.relative(share)), [1.05, 0.575, 0.1]);
-    }
-
-    #[test]
     fn rows_at_rest_take_the_outputs_at_rest() {
         let ungated = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0];
         let at_rest = [true, false, false, true];
         let expected = [-1.0, -2.0, 3.0, 4.0, 5.0, 6.0, -3.0, -4.0];
-        assert_eq!(gated(&ungated, &[-1.0, -2.0, -3.0, -4.0], &at_rest, 2), expected);
+        assert_eq!(gated(&ungated, &[-1.0, -2.0, -3.0, -4.0], &at_rest), expected);
     }
 }

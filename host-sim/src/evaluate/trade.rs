@@ -9,7 +9,8 @@ use model_core::rbf::Format;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::cost::{Cost, Costs, kernel_name};
+use super::cost::{Cost, Costs, MEASURED_SHAPE, kernel_name};
+use super::gate;
 use super::metrics::{self, Errors, Measure};
 use crate::dataset::Dataset;
 use crate::error::{Error, Result};
@@ -23,11 +24,11 @@ use crate::synth;
 use crate::train::{FittedNetwork, Samples, Trained};
 
 mod choice;
+mod gating;
 
 pub use choice::Limits;
+use gating::Gates;
 
-/// Rows, readings and outputs of a row that `cargo xtask cycles` measures.
-const MEASURED_SHAPE: [usize; 3] = [8, 18, 18];
 /// Bytes of stack that the f32 kernel keeps activations in.
 const F32_ACTIVATIONS_BYTES: usize = 512;
 
@@ -38,6 +39,9 @@ pub struct Plan {
     pub centres: Vec<usize>,
     /// Samples averaged for each reading: white noise falls with the root.
     pub samples_averaged: Vec<usize>,
+    /// Tolerances of gates, in standard deviations of the averaged readings' noise; there are always points
+    /// without a gate as well.
+    pub gate_k: Vec<f64>,
     /// Clock of the device, for times.
     pub clock_mhz: f64,
 }
@@ -53,18 +57,20 @@ pub struct Point {
     pub affine_tail: bool,
     /// Samples averaged for each reading.
     pub samples_averaged: usize,
+    /// Tolerance of the gate, in standard deviations of the averaged readings' noise; `None` without a gate.
+    pub gate_k: Option<f64>,
     /// Errors on the test frames, by group.
     pub errors: Vec<Errors>,
     /// RMSE over the smallest of all points, by group.
     pub ratio_to_best: Vec<f64>,
-    /// One frame on a Cortex-M4F.
+    /// One frame on a Cortex-M4F; behind a gate the mean of the test frames.
     #[serde(flatten)]
     pub frame: Cost,
     /// The same in µs at the plan's clock.
     pub frame_us: f64,
     /// The blob.
     pub flash_bytes: usize,
-    /// Decoder, frame, estimate and working space.
+    /// Decoder, frame, estimate and working space; for a gate also the baseline and the answer to it.
     pub ram_bytes: usize,
     /// Whether no other point is at least as good in cycles, samples and the RMSE of the chosen group, and
     /// better in one.
@@ -86,7 +92,8 @@ impl Point {
             1 => String::new(),
             samples => format!(", {samples} samples"),
         };
-        format!("{}, K = {}{tail}{average}", self.kernel, self.centres)
+        let gate = self.gate_k.map_or(String::new(), |k| format!(", gate k = {k}"));
+        format!("{}, K = {}{tail}{average}{gate}", self.kernel, self.centres)
     }
 }
 
@@ -126,6 +133,13 @@ impl Trade {
     pub fn blob(&self, point: usize) -> &[u8] {
         &self.distinct_blobs[self.blobs[point]]
     }
+
+    /// What a device is configured with for a point behind a gate: its tolerance, relative to each reading.
+    #[must_use]
+    pub fn rest_tolerance(&self, point: usize) -> Option<f64> {
+        let point = &self.points[point];
+        point.gate_k.map(|k| k * self.noise_level / (point.samples_averaged as f64).sqrt())
+    }
 }
 
 /// Trains and judges every point of `plan` for `scene`; front and choice go by the RMSE of `group`.
@@ -156,8 +170,9 @@ pub fn compute(
             let means = training.outputs.means().repeat(test.frames());
             mean = metrics::by_group(&test.outputs, &means, &measure(scene));
         }
+        let gates = Gates::new(&averaged, &test.inputs, &plan.gate_k);
         for &centres in &plan.centres {
-            judge.centres(&averaged, [&training, &test], centres, samples, progress)?;
+            judge.centres(&averaged, [&training, &test], &gates, (centres, samples), progress)?;
         }
     }
     let Judge { costs, mut points, blobs, distinct, .. } = judge;
@@ -204,6 +219,10 @@ fn check(scene: &Scene, plan: &Plan, costs: &Costs) -> Result<()> {
             "--average {samples}: the firmware averages 1 to 256 samples"
         )));
     }
+    if !plan.gate_k.is_empty() {
+        // Averaging only lowers the noise.
+        gate::check(scene, "--gate", &plan.gate_k)?;
+    }
     Ok(())
 }
 
@@ -227,8 +246,8 @@ impl Judge<'_> {
         &mut self,
         averaged: &Scene,
         [training, test]: [&Dataset; 2],
-        centres: usize,
-        samples: usize,
+        gates: &Gates,
+        (centres, samples): (usize, usize),
         progress: &Progress,
     ) -> Result<()> {
         let variants: Vec<(NumberFormat, bool)> =
@@ -272,47 +291,63 @@ impl Judge<'_> {
             };
             let actual = formats[0];
             for &exponential in exponentials {
-                self.point(&loaded, test, (actual, exponential), (centres, *affine, samples))?;
-                self.blobs.push(self.distinct.len());
+                let knobs = (centres, *affine, samples);
+                self.points(&loaded, test, gates, (actual, exponential), knobs)?;
             }
             self.distinct.push(blob);
         }
         Ok(())
     }
 
-    fn point(
+    /// A network without a gate, and behind every gate that was measured with its exponential.
+    fn points(
         &mut self,
         loaded: &LoadedModel,
         test: &Dataset,
+        gates: &Gates,
         (format, exponential): (Format, Kernel),
         (centres, affine_tail, samples_averaged): (usize, bool, usize),
     ) -> Result<()> {
         let kernel = kernel_name(format, exponential);
         // Fewer centres than asked for are decoded as fast as the measured number or faster.
-        let frame = self.costs.of(&kernel, centres, affine_tail, "frame").ok_or_else(|| {
+        let ungated = self.costs.of(&kernel, centres, affine_tail, "frame").ok_or_else(|| {
             Error::Failed(format!("firmware/cycles.csv has no figure for {kernel}, K = {centres}"))
         })?;
-        let estimate = loaded.decode(exponential, &test.inputs);
+        let frames = self.costs.frames(&kernel, centres, affine_tail);
+        let estimate = loaded.decode(exponential, &test.inputs).values;
         let [rows, inputs, outputs] = MEASURED_SHAPE;
         let float = size_of::<f32>();
         let working =
             inputs * float + if format == Format::F32 { F32_ACTIVATIONS_BYTES } else { 0 };
-        self.points.push(Point {
-            kernel,
-            centres,
-            affine_tail,
-            samples_averaged,
-            errors: metrics::by_group(&test.outputs, &estimate.values, &measure(self.scene)),
-            ratio_to_best: vec![],
-            frame,
-            frame_us: frame.cycles as f64 / self.plan.clock_mhz,
-            flash_bytes: loaded.bytes().len(),
-            ram_bytes: model_core::decoder_ram_bytes(rows)
-                + rows * (inputs + outputs) * float
-                + rows
-                + working,
-            on_front: false,
-        });
+        let (frame_bytes, estimate_bytes) = (rows * inputs * float, rows * (outputs * float + 1));
+        let ram_bytes =
+            model_core::decoder_ram_bytes(rows) + frame_bytes + estimate_bytes + working;
+        let mut add = |gate_k: Option<f64>, frame: Cost, estimate: &[f64]| {
+            self.points.push(Point {
+                kernel: kernel.clone(),
+                centres,
+                affine_tail,
+                samples_averaged,
+                gate_k,
+                errors: metrics::by_group(&test.outputs, estimate, &measure(self.scene)),
+                ratio_to_best: vec![],
+                frame,
+                frame_us: frame.cycles as f64 / self.plan.clock_mhz,
+                flash_bytes: loaded.bytes().len(),
+                // The baseline is a frame, and the answer to it an estimate.
+                ram_bytes: ram_bytes + gate_k.map_or(0, |_| frame_bytes + estimate_bytes),
+                on_front: false,
+            });
+            self.blobs.push(self.distinct.len());
+        };
+        add(None, ungated, &estimate);
+        if let Some(frames) = frames {
+            let rest_outputs = loaded.decode(exponential, &gates.baseline).values;
+            for gate in gates.iter() {
+                let frame = frames.mean_cost(gate.share);
+                add(Some(gate.k), frame, &gate.gated(&estimate, &rest_outputs));
+            }
+        }
         Ok(())
     }
 }

@@ -9,13 +9,13 @@ use super::svg::{Shape, escape};
 use super::ticks;
 use crate::evaluate::trade::{Point, Trade};
 
-/// Kernels in the order of their colours and shapes.
-const KERNELS: [(&str, &str, Shape); 5] = [
-    ("fixed16", "c1", Shape::Circle),
-    ("f32", "c2", Shape::Square),
-    ("f32-direct", "c3", Shape::Triangle),
-    ("f32-direct-libm", "c3 pale", Shape::Diamond),
-    ("f32-direct-micromath", "muted", Shape::Dash),
+/// Kernels in the order of their colours and shapes: without a gate full, behind one hollow.
+const KERNELS: [(&str, [&str; 2], Shape); 5] = [
+    ("fixed16", ["c1", "c1 hollow"], Shape::Circle),
+    ("f32", ["c2", "c2 hollow"], Shape::Square),
+    ("f32-direct", ["c3", "c3 hollow"], Shape::Triangle),
+    ("f32-direct-libm", ["c3 pale", "c3 pale hollow"], Shape::Diamond),
+    ("f32-direct-micromath", ["muted", "muted hollow"], Shape::Dash),
 ];
 
 /// Cycles against error, both logarithmic: every point of one sample a reading or more, and the front.
@@ -35,9 +35,13 @@ fn chart(trade: &Trade) -> Chart {
         let mark = if samples == 1 { Mark::Line } else { Mark::Dashed };
         series.push(Series::new(&name, "front", mark, line));
     }
-    for (kernel, class, shape) in KERNELS {
-        let points = trade.points.iter().filter(|p| p.kernel == kernel).map(at).collect();
-        series.push(Series::new(kernel, class, Mark::Points(shape), points));
+    for (kernel, classes, shape) in KERNELS {
+        for (gated, class) in [false, true].into_iter().zip(classes) {
+            let of = |p: &&Point| p.kernel == kernel && p.gate_k.is_some() == gated;
+            let points = trade.points.iter().filter(of).map(at).collect();
+            let name = if gated { format!("{kernel}, gate") } else { kernel.into() };
+            series.push(Series::new(&name, class, Mark::Points(shape), points));
+        }
     }
     if let Some(chosen) = trade.chosen {
         let point = vec![at(&trade.points[chosen])];
@@ -110,10 +114,15 @@ pub fn html(trade: &Trade) -> String {
         body,
         "<figure id=\"figure-1\">\n{}<figcaption><b>Figure 1.</b> RMSE of {} in {} against cycles of a \
          frame, both logarithmic. Lines: the front, where nothing is better in one of RMSE, cycles and samples \
-         and worse in none. Always answering the mean errs by {}.</figcaption>\n</figure>\n",
+         and worse in none. {}Always answering the mean errs by {}.</figcaption>\n</figure>\n",
         chart.draw_responsive([920.0, 520.0], [480.0, 460.0]),
         symbol(&trade.group),
         escape(&trade.unit),
+        if trade.points.iter().any(|p| p.gate_k.is_some()) {
+            "Hollow: behind a gate for rows at rest, with the mean cycles of the test frames. "
+        } else {
+            ""
+        },
         trade
             .mean
             .iter()
@@ -129,7 +138,8 @@ fn table(trade: &Trade) -> String {
         "<figure id=\"table-1\" class=\"table\">\n<figcaption><b>Table 1.</b> Every point; those on the \
          front are bold. In brackets: RMSE over the smallest of all points.</figcaption>\n<div class=\"scroll\" \
          tabindex=\"0\" role=\"region\" aria-label=\"Table 1\">\n<table>\n<thead><tr><th>kernel</th>\
-         <th class=\"number\">K</th><th class=\"after\">tail</th><th class=\"number\">samples</th>",
+         <th class=\"number\">K</th><th class=\"after\">tail</th><th class=\"number\">samples</th>\
+         <th class=\"number\">gate k</th>",
     );
     for errors in &trade.mean {
         let _ = write!(
@@ -148,11 +158,13 @@ fn table(trade: &Trade) -> String {
         let mark = if trade.chosen == Some(i) { " (chosen)" } else { "" };
         let _ = write!(
             html,
-            "<tr><{cell}>{}{mark}</{cell}><td class=\"number\">{}</td><td class=\"after\">{}</td><td class=\"number\">{}</td>",
+            "<tr><{cell}>{}{mark}</{cell}><td class=\"number\">{}</td><td class=\"after\">{}</td><td class=\"number\">{}</td>\
+             <td class=\"number\">{}</td>",
             p.kernel,
             p.centres,
             if p.affine_tail { "yes" } else { "no" },
-            p.samples_averaged
+            p.samples_averaged,
+            p.gate_k.map_or("–".into(), |k| k.to_string())
         );
         for (e, ratio) in p.errors.iter().zip(&p.ratio_to_best) {
             let _ =

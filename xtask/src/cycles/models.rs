@@ -22,6 +22,8 @@ pub struct Blob {
     pub path: PathBuf,
     /// Whether it has an affine tail.
     pub affine: bool,
+    /// Whether all rows' networks have one format, number of centres, and tail or none.
+    pub rows_alike: bool,
 }
 
 /// Trains a model of every format and size in `directory`, and writes it twice: with its affine tail and
@@ -46,7 +48,7 @@ pub fn train(directory: &Path) -> Outcome<Vec<Blob>> {
             for (affine, suffix) in [(false, ""), (true, "-affine")] {
                 let path = directory.join(format!("{stem}{suffix}.bin"));
                 write(&path, &rewritten(&model, Rows::AsTheFirst, affine)?)?;
-                blobs.push(Blob { path, affine });
+                blobs.push(Blob { path, affine, rows_alike: true });
             }
         }
     }
@@ -61,14 +63,24 @@ pub fn of_file(path: &Path, directory: &Path) -> Outcome<Vec<Blob>> {
     let bytes = Bytes::read(path)?;
     let model = bytes.model().map_err(|cause| failed(path, &cause))?;
     let affine = model.networks().any(|network| network.has_affine_tail());
-    let given = Blob { path: path.to_owned(), affine };
+    let rows_alike = rows_alike(&model);
+    let given = Blob { path: path.to_owned(), affine, rows_alike };
     if !affine {
         return Ok(vec![given]);
     }
     fs::create_dir_all(directory).map_err(|cause| failed(directory, &cause))?;
     let without = directory.join("without-tail.bin");
     write(&without, &rewritten(&model, Rows::AsTheyAre, false)?)?;
-    Ok(vec![Blob { path: without, affine: false }, given])
+    Ok(vec![Blob { path: without, affine: false, rows_alike }, given])
+}
+
+fn rows_alike(model: &Model<'_>) -> bool {
+    let kind = |network: Network<'_>| {
+        (network.format(), network.shape().centres, network.has_affine_tail())
+    };
+    let mut kinds = model.networks().map(kind);
+    let first = kinds.next();
+    kinds.all(|other| Some(other) == first)
 }
 
 fn is_as_asked(model: &Model<'_>, format: Format, centres: usize) -> Outcome {

@@ -7,9 +7,9 @@ pub struct Options<'a> {
     pub json: bool,
     /// Write the figures that are compared with.
     pub accept: bool,
-    /// Measure with this blob, and compare with nothing.
+    /// Measure with this blob, and compare with the accepted figures of such models.
     pub model: Option<&'a str>,
-    /// Show this kernel alone, and compare with the budgets alone.
+    /// Show this kernel alone; without a blob, compare with the budgets alone.
     pub kernel: Option<&'a str>,
 }
 

@@ -1,0 +1,157 @@
+//! A model of one's own against the figures that were accepted of models of its kind.
+
+use super::figures::{Figure, Scope};
+use super::regions::Count;
+
+/// By how much figures may differ, in per cent: instructions of [`DATA_DEPENDENT`], and cycles.
+const TOLERANCE_PERCENT: u64 = 1;
+
+/// Kernels whose exponentials branch by their arguments: the first one only for activations below e⁻⁸⁷, which
+/// take narrow widths. The others execute the same instructions whatever the model's numbers and the readings,
+/// but for [`CLAMPING`].
+const DATA_DEPENDENT: [&str; 3] = ["f32-direct", "f32-direct-libm", "f32-direct-micromath"];
+
+/// Kernels that look at all readings of a row again if one is to be clamped. That may be the reading that wakes
+/// a row of the awake frame: it is beyond the range of training of models that saw little noise.
+const CLAMPING: [&str; 2] = ["f32", "fixed16"];
+
+/// What that takes at most, a row.
+const CLAMPED_ROW: Count = Count { instructions: 60, cycles: 90 };
+
+/// Rows of the frame.
+const ROWS: u64 = 8;
+
+/// A figure and the accepted one of the same kernel, K, tail and scope.
+pub type Pair<'f> = (&'f Figure, &'f Figure);
+
+/// What of `measured` can be compared, with what was `accepted`.
+///
+/// Left out are kernels that are not the firmware's: they find each row's network in the blob anew, so that
+/// their frames depend on how many networks there are.
+pub fn of_model<'f>(accepted: &'f [Figure], measured: &'f [Figure]) -> Vec<Pair<'f>> {
+    let is_firmwares = |figure: &&Figure| !figure.kernel.ends_with("-portable");
+    let pair = |now| Some((now, accepted.iter().find(|then| then.is_of(now))?));
+    measured.iter().filter(is_firmwares).filter_map(pair).collect()
+}
+
+/// The pairs as lines with aligned columns.
+pub fn table(pairs: &[Pair<'_>]) -> String {
+    let lines = pairs.iter().map(|(now, then)| {
+        format!(
+            "{:22} {:4} {:>4} {:14} | {:>12} {:>9} | {:>8} {:>9}\n",
+            now.kernel,
+            now.centres,
+            if now.affine { "yes" } else { "no" },
+            now.scope.name(),
+            now.count.instructions,
+            then.count.instructions,
+            now.count.cycles,
+            then.count.cycles
+        )
+    });
+    format!(
+        "{:22} {:>4} {:>4} {:14} | {:>12} {:>9} | {:>8} {:>9}\n{}",
+        "kernel",
+        "K",
+        "tail",
+        "scope",
+        "instructions",
+        "accepted",
+        "cycles",
+        "accepted",
+        lines.collect::<String>()
+    )
+}
+
+/// What differs by more than the model's numbers explain, in words.
+pub fn beyond(pairs: &[Pair<'_>]) -> Vec<String> {
+    let apart = |(now, then): &Pair<'_>| {
+        let [instructions, cycles] = allowances(then);
+        let is_beyond =
+            |now: u64, then: u64, [less, more]: [u64; 2]| now + less < then || now > then + more;
+        let part = |what, now, then, allowance| {
+            is_beyond(now, then, allowance).then(|| format!("{now} {what}, accepted are {then}"))
+        };
+        let name = format!("{}, K = {}, {}", now.kernel, now.centres, now.scope.name());
+        part("instructions", now.count.instructions, then.count.instructions, instructions)
+            .or_else(|| part("cycles", now.count.cycles, then.count.cycles, cycles))
+            .map(|difference| format!("{name}: {difference}"))
+    };
+    pairs.iter().filter_map(apart).collect()
+}
+
+/// How many instructions, and cycles, a figure may be below and above the accepted one.
+fn allowances(accepted: &Figure) -> [[u64; 2]; 2] {
+    let Count { instructions, cycles } = accepted.count;
+    let part = |count: u64| (count * TOLERANCE_PERCENT).div_ceil(100);
+    let is_one_of = |kernels: &[&str]| kernels.contains(&accepted.kernel.as_str());
+    // At rest nothing is inferred.
+    let varies = accepted.scope != Scope::RestingFrame && is_one_of(&DATA_DEPENDENT);
+    let instructions = if varies { part(instructions) } else { 0 };
+    let may_clamp = accepted.scope == Scope::AwakeFrame && is_one_of(&CLAMPING);
+    let clamped_rows = if may_clamp { ROWS } else { 0 };
+    [
+        [instructions, instructions + clamped_rows * CLAMPED_ROW.instructions],
+        [part(cycles), part(cycles) + clamped_rows * CLAMPED_ROW.cycles],
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn figure(kernel: &str, scope: Scope, instructions: u64, cycles: u64) -> Figure {
+        let count = Count { instructions, cycles };
+        Figure { kernel: kernel.into(), centres: 64, affine: true, scope, count }
+    }
+
+    #[test]
+    fn instructions_are_exact_but_where_exponentials_branch_and_readings_are_clamped() {
+        let holds = |kernel, scope, instructions, cycles| {
+            let accepted = [figure(kernel, scope, 1000, 2000)];
+            let measured = [figure(kernel, scope, instructions, cycles)];
+            let pairs = of_model(&accepted, &measured);
+            assert_eq!(pairs.len(), 1);
+            beyond(&pairs).is_empty()
+        };
+        for kernel in CLAMPING {
+            assert!(holds(kernel, Scope::Frame, 1000, 2020));
+            assert!(!holds(kernel, Scope::Frame, 1000, 2021));
+            assert!(
+                !holds(kernel, Scope::Frame, 1001, 2000) && !holds(kernel, Scope::Frame, 999, 2000)
+            );
+            assert!(holds(kernel, Scope::AwakeFrame, 1480, 2740));
+            assert!(!holds(kernel, Scope::AwakeFrame, 999, 2000));
+            assert!(!holds(kernel, Scope::AwakeFrame, 1481, 2000));
+        }
+        for kernel in DATA_DEPENDENT {
+            assert!(
+                holds(kernel, Scope::Frame, 1010, 2000) && holds(kernel, Scope::Frame, 990, 2000)
+            );
+            assert!(!holds(kernel, Scope::Frame, 1011, 2000));
+            assert!(!holds(kernel, Scope::RestingFrame, 1001, 2000));
+        }
+    }
+
+    #[test]
+    fn only_what_was_accepted_and_is_the_firmwares_is_compared() {
+        let accepted = [
+            figure("fixed16", Scope::Frame, 10, 20),
+            figure("fixed16-portable", Scope::Frame, 30, 60),
+        ];
+        let mut measured = vec![
+            figure("fixed16-portable", Scope::Frame, 40, 80),
+            figure("fixed16", Scope::Row, 1, 2),
+        ];
+        assert!(of_model(&accepted, &measured).is_empty());
+        measured.push(figure("fixed16", Scope::Frame, 11, 20));
+        let pairs = of_model(&accepted, &measured);
+        assert_eq!(beyond(&pairs), ["fixed16, K = 64, frame: 11 instructions, accepted are 10"]);
+        let table = table(&pairs);
+        assert!(
+            table.contains(
+                "fixed16                  64  yes frame          |           11        10"
+            )
+        );
+    }
+}
