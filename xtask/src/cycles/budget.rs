@@ -27,7 +27,7 @@ fn budget(figure: &Figure) -> Option<u64> {
     }
     match figure.scope {
         Scope::Exponential => return Some(EXPONENTIAL * figure.centres),
-        Scope::RestingFrame => return Some(RESTING_FRAME),
+        Scope::RestingFrame | Scope::ArrayRestingFrame => return Some(RESTING_FRAME),
         _ => (),
     }
     let of = |(kernel, centres, scope, _): &&(&str, u64, Scope, u64)| {

@@ -86,10 +86,14 @@ fn allowances(accepted: &Figure) -> [[u64; 2]; 2] {
     let part = |count: u64| (count * TOLERANCE_PERCENT).div_ceil(100);
     let is_one_of = |kernels: &[&str]| kernels.contains(&accepted.kernel.as_str());
     // At rest nothing is inferred.
-    let varies = accepted.scope != Scope::RestingFrame && is_one_of(&DATA_DEPENDENT);
+    let rests = matches!(accepted.scope, Scope::RestingFrame | Scope::ArrayRestingFrame);
+    let varies = !rests && is_one_of(&DATA_DEPENDENT);
     let instructions = if varies { part(instructions) } else { 0 };
-    let may_clamp = accepted.scope == Scope::AwakeFrame && is_one_of(&CLAMPING);
-    let clamped_rows = if may_clamp { ROWS } else { 0 };
+    let clamped_rows = match accepted.scope {
+        Scope::AwakeFrame if is_one_of(&CLAMPING) => ROWS,
+        Scope::ArrayAwakeFrame if is_one_of(&CLAMPING) => 1,
+        _ => 0,
+    };
     [
         [instructions, instructions + clamped_rows * CLAMPED_ROW.instructions],
         [part(cycles), part(cycles) + clamped_rows * CLAMPED_ROW.cycles],

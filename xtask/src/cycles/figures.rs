@@ -27,16 +27,25 @@ pub enum Scope {
     RestingFrame,
     /// The same behind a gate that finds all rows awake, each by its last reading.
     AwakeFrame,
+    /// A frame by one network for the whole array.
+    ArrayFrame,
+    /// The same behind a gate that finds the array at rest.
+    ArrayRestingFrame,
+    /// The same behind a gate that finds it awake by its last reading.
+    ArrayAwakeFrame,
 }
 
 impl Scope {
-    const ALL: [Self; 6] = [
+    const ALL: [Self; 9] = [
         Self::Inference,
         Self::Exponential,
         Self::Row,
         Self::Frame,
         Self::RestingFrame,
         Self::AwakeFrame,
+        Self::ArrayFrame,
+        Self::ArrayRestingFrame,
+        Self::ArrayAwakeFrame,
     ];
 
     /// Those that every kernel is measured in, in the image's order.
@@ -54,6 +63,9 @@ impl Scope {
             Self::Frame => "frame",
             Self::RestingFrame => "resting-frame",
             Self::AwakeFrame => "awake-frame",
+            Self::ArrayFrame => "array-frame",
+            Self::ArrayRestingFrame => "array-resting-frame",
+            Self::ArrayAwakeFrame => "array-awake-frame",
         }
     }
 
@@ -139,6 +151,9 @@ pub fn of_run(log: &str, counts: &[Region], affine: bool) -> Outcome<Vec<Figure>
     let centres = named("centres ").next().and_then(|centres| centres.parse().ok());
     let centres = centres.ok_or_else(|| format!("the image names no centres:\n{log}"))?;
 
+    if regions.first().is_some_and(|name| name.ends_with(Scope::ArrayFrame.name())) {
+        return of_array(regions, counts, centres, affine);
+    }
     let first_of_gate = regions.iter().position(|name| name.ends_with(Scope::OF_GATE[0].name()));
     let (regions, gate_regions) = regions.split_at(first_of_gate.unwrap_or(regions.len()));
     let (counts, gate_counts) = counts.split_at(regions.len());
@@ -159,17 +174,25 @@ pub fn of_run(log: &str, counts: &[Region], affine: bool) -> Outcome<Vec<Figure>
                 Scope::Exponential if !affine && counts[0].watched != Count::default() => {
                     counts[0].watched
                 }
-                Scope::Inference | Scope::Exponential | Scope::RestingFrame | Scope::AwakeFrame => {
-                    continue;
-                }
                 Scope::Row => without(counts[1].whole, EMPTY),
                 Scope::Frame => without(counts[2].whole, EMPTY),
+                _ => continue,
             };
             figures.push(Figure { kernel: kernel.to_owned(), centres, affine, scope, count });
         }
     }
     figures.extend(of_gate(gate_regions, gate_counts, centres, affine)?);
     Ok(figures)
+}
+
+/// The figures of one network for the whole array: a kernel and a scope each.
+fn of_array(names: &[&str], counts: &[Region], centres: u64, affine: bool) -> Outcome<Vec<Figure>> {
+    let figures = names.iter().zip(counts).map(|(name, count)| {
+        let (kernel, scope) = name.split_once(' ')?;
+        let (scope, count) = (Scope::named(scope)?, without(count.whole, EMPTY));
+        Some(Figure { kernel: kernel.to_owned(), centres, affine, scope, count })
+    });
+    figures.collect::<Option<_>>().ok_or_else(|| format!("not understood: {}", names.join(", ")))
 }
 
 /// The figures of the gate, if it was measured.
@@ -247,6 +270,29 @@ mod tests {
         let cut = log.replace("INFO region b awake-frame\n", "");
         let error = of_run(&cut, &all[..6], false).unwrap_err();
         assert_eq!(error, "b resting-frame instead of b resting-frame, b awake-frame");
+    }
+
+    #[test]
+    fn the_array_has_scopes_of_its_own() {
+        let log = "INFO region calibration empty\nINFO region calibration loop\nINFO centres 16\n\
+            INFO region a array-frame\nINFO region a array-resting-frame\n\
+            INFO region b array-frame\n";
+        let counts = counts(&[(1, 3), (2002, 4002), (11, 23), (21, 43), (31, 63)]);
+        let figure = |kernel: &str, scope, n| Figure {
+            kernel: kernel.into(),
+            centres: 16,
+            affine: true,
+            scope,
+            count: Count { instructions: n, cycles: 2 * n },
+        };
+        let expected = vec![
+            figure("a", Scope::ArrayFrame, 10),
+            figure("a", Scope::ArrayRestingFrame, 20),
+            figure("b", Scope::ArrayFrame, 30),
+        ];
+        assert_eq!(of_run(log, &counts, true), Ok(expected));
+        let error = of_run(&log.replace("b array-frame", "b else"), &counts, true).unwrap_err();
+        assert!(error.starts_with("not understood: "), "{error}");
     }
 
     #[test]

@@ -16,6 +16,12 @@ const CENTRES: [usize; 5] = [16, 32, 64, 128, 256];
 /// more frames than there are centres.
 const TRAINING: [&str; 7] = ["train", "press", "-n", "500", "--noise", "0.05", "--output"];
 
+/// One network for the whole array, of a width at which every format holds it.
+const OF_ARRAY: [&str; 3] = ["--whole-array", "--spread", "0.4"];
+
+/// The largest blob that a device's slot holds, the image's like any other.
+const SLOT_BYTES: usize = 131_072;
+
 /// A model to be measured.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Blob {
@@ -26,8 +32,9 @@ pub struct Blob {
     pub rows_alike: bool,
 }
 
-/// Trains a model of every format and size in `directory`, and writes it twice: with its affine tail and
-/// without. All rows have the first row's network, so that the largest fits the image's slot.
+/// Trains models of every format and size in `directory`, of rows and of the whole array, and writes each
+/// twice: with its affine tail and without. All rows have the first row's network, so that the largest fits the
+/// image's slot; what does not is left out.
 ///
 /// # Errors
 /// `host-sim` fails, or makes another model than it is asked for.
@@ -36,19 +43,26 @@ pub fn train(directory: &Path) -> Outcome<Vec<Blob>> {
     let mut blobs = Vec::new();
     for format in Format::ALL {
         for centres in CENTRES {
-            let stem = format!("{}-{centres}", format.name());
-            let trained = directory.join(format!("{stem}-trained.bin"));
-            let mut command = cargo(&["run", "--quiet", "--package", "host-sim", "--"]);
-            command.args(TRAINING).arg(&trained).args(["--format", format.name(), "--centres"]);
-            // What it says of the model is not what this command prints.
-            run(command.arg(centres.to_string()).stdout(Stdio::null()))?;
-            let bytes = Bytes::read(&trained)?;
-            let model = bytes.model().map_err(|cause| failed(&trained, &cause))?;
-            is_as_asked(&model, format, centres).map_err(|cause| failed(&trained, &cause))?;
-            for (affine, suffix) in [(false, ""), (true, "-affine")] {
-                let path = directory.join(format!("{stem}{suffix}.bin"));
-                write(&path, &rewritten(&model, Rows::AsTheFirst, affine)?)?;
-                blobs.push(Blob { path, affine, rows_alike: true });
+            for (array, options) in [("", &[][..]), ("-array", &OF_ARRAY[..])] {
+                let stem = format!("{}-{centres}{array}", format.name());
+                let trained = directory.join(format!("{stem}-trained.bin"));
+                let mut command = cargo(&["run", "--quiet", "--package", "host-sim", "--"]);
+                command.args(TRAINING).arg(&trained).args(options);
+                command.args(["--format", format.name(), "--centres"]);
+                // What it says of the model is not what this command prints.
+                run(command.arg(centres.to_string()).stdout(Stdio::null()))?;
+                let bytes = Bytes::read(&trained)?;
+                if bytes.bytes().len() > SLOT_BYTES && !array.is_empty() {
+                    eprintln!("left out: {} is larger than a slot", trained.display());
+                    continue;
+                }
+                let model = bytes.model().map_err(|cause| failed(&trained, &cause))?;
+                is_as_asked(&model, format, centres).map_err(|cause| failed(&trained, &cause))?;
+                for (affine, suffix) in [(false, ""), (true, "-affine")] {
+                    let path = directory.join(format!("{stem}{suffix}.bin"));
+                    write(&path, &rewritten(&model, Rows::AsTheFirst, affine)?)?;
+                    blobs.push(Blob { path, affine, rows_alike: true });
+                }
             }
         }
     }
@@ -192,9 +206,12 @@ impl Bytes {
         self.room.get_mut(self.start..).unwrap_or_default()
     }
 
+    fn bytes(&self) -> &[u8] {
+        self.room.get(self.start..).unwrap_or_default()
+    }
+
     fn model(&self) -> Outcome<Model<'_>> {
-        let bytes = self.room.get(self.start..).unwrap_or_default();
-        Model::decode(bytes).map_err(|cause| cause.to_string())
+        Model::decode(self.bytes()).map_err(|cause| cause.to_string())
     }
 }
 

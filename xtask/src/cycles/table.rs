@@ -24,6 +24,11 @@ const ALIGNED_HEAD: &str = concat!(
     "frame  168 MHz\n",
 );
 
+const ARRAY_HEAD: &str = "\
+| kernel | K | frame: instructions | cycles | µs at 168 MHz | at rest | with tail | µs |
+|---|--:|--:|--:|--:|--:|--:|--:|
+";
+
 /// What a compiled twin is called after its kernel's name.
 const TWIN: &str = "-portable";
 
@@ -62,9 +67,26 @@ pub fn markdown(figures: &[Figure]) -> String {
         let each = powers.cycles as f64 / group.centres() as f64;
         Some(format!("- {}, K = {}: {each:.1} cycles\n", group.kernel(), group.centres()))
     });
+    let arrays = Group::of(figures).filter_map(|group| {
+        let frame = group.count(false, Scope::ArrayFrame)?;
+        let tail = group.count(true, Scope::ArrayFrame);
+        let cells = [
+            group.kernel().to_owned(),
+            group.centres().to_string(),
+            frame.instructions.to_string(),
+            cycles(frame),
+            microseconds(frame),
+            cell(group.count(false, Scope::ArrayRestingFrame), cycles),
+            cell(tail, cycles),
+            cell(tail, microseconds),
+        ];
+        Some(line(&cells))
+    });
     format!(
-        "{HEAD}{}\nWhat assembly saves:\n\n{SAVED_HEAD}{}\nOne exponential:\n\n{}",
+        "{HEAD}{}\nOne network for the whole array ([projection.md](projection.md)):\n\n{ARRAY_HEAD}{}\n\
+         What assembly saves:\n\n{SAVED_HEAD}{}\nOne exponential:\n\n{}",
         rows.collect::<String>(),
+        arrays.collect::<String>(),
         saved.collect::<String>(),
         powers.collect::<String>()
     )
@@ -121,6 +143,12 @@ pub fn json(figures: &[Figure]) -> String {
                 ("affine_frame_", true, Scope::Frame),
                 ("affine_resting_frame_", true, Scope::RestingFrame),
                 ("affine_awake_frame_", true, Scope::AwakeFrame),
+                ("array_frame_", false, Scope::ArrayFrame),
+                ("array_resting_frame_", false, Scope::ArrayRestingFrame),
+                ("array_awake_frame_", false, Scope::ArrayAwakeFrame),
+                ("affine_array_frame_", true, Scope::ArrayFrame),
+                ("affine_array_resting_frame_", true, Scope::ArrayRestingFrame),
+                ("affine_array_awake_frame_", true, Scope::ArrayAwakeFrame),
             ] {
                 if let Some(Count { instructions, cycles }) = group.count(affine, scope) {
                     // Writing to a string cannot fail.
@@ -156,6 +184,8 @@ pub mod tests {
             figure("f32", false, Scope::Frame, 4),
             figure("f32", true, Scope::Row, 5),
             figure("f32", true, Scope::Frame, 6),
+            figure("f32", false, Scope::ArrayFrame, 9),
+            figure("f32", true, Scope::ArrayFrame, 10),
             figure("f32-portable", false, Scope::Inference, 8),
         ]
     }
@@ -167,6 +197,7 @@ pub mod tests {
             "\n| f32 | 16 | 2 | 336 | 504 | 672 | 4 | 840 | 1008 | 6 |\n",
             "\n| f32-portable | 16 | 8 | 1344 |  |  |  |  |  |  |\n",
             "\n| f32 | 16 | 1344 | 336 | 25 % |\n",
+            "\n| f32 | 16 | 9 | 1512 | 9 |  | 1680 | 10 |\n",
             "\n- f32, K = 16: 10.5 cycles\n",
         ] {
             assert!(text.contains(line), "{text}");
@@ -181,7 +212,9 @@ pub mod tests {
             "[\n  {\"kernel\": \"f32\", \"centres\": 16, \"instructions\": 2, \"cycles\": 336, \
              \"row_instructions\": 3, \"row_cycles\": 504, \"frame_instructions\": 4, \
              \"frame_cycles\": 672, \"affine_row_instructions\": 5, \"affine_row_cycles\": 840, \
-             \"affine_frame_instructions\": 6, \"affine_frame_cycles\": 1008},\n  \
+             \"affine_frame_instructions\": 6, \"affine_frame_cycles\": 1008, \"array_frame_instructions\": 9, \
+             \"array_frame_cycles\": 1512, \"affine_array_frame_instructions\": 10, \
+             \"affine_array_frame_cycles\": 1680},\n  \
              {\"kernel\": \"f32-portable\", \"centres\": 16, \"instructions\": 8, \"cycles\": 1344}\n]\n"
         );
     }

@@ -2,12 +2,20 @@
 
 use model_core::Frame;
 use model_core::blob::Model;
+use model_core::projection::Projection;
+use model_core::rbf::Network;
 use qemu_image::checks::Numbers;
 
 use super::kernel::{COLS, ROWS};
 
+/// Enough for the features that matter to come near what is wanted.
+const SWEEPS: usize = 50;
+
 /// A frame within the readings that `model` was trained on, in ohm: every row from scaled inputs.
 pub fn frame(model: &Model<'_>, numbers: &mut Numbers) -> Frame<ROWS, COLS> {
+    if let (Some(projection), Some(network)) = (model.projection(), model.networks().next()) {
+        return array_frame(projection, &network, numbers);
+    }
     let mut frame = Frame::missing();
     for (row, readings) in frame.row_column_resistance_ohm.iter_mut().enumerate() {
         let inputs: [f32; COLS] = core::array::from_fn(|_| 0.5 + 0.5 * numbers.draw());
@@ -16,6 +24,34 @@ pub fn frame(model: &Model<'_>, numbers: &mut Numbers) -> Frame<ROWS, COLS> {
         for (input, (reading, x)) in readings.iter_mut().zip(inputs).enumerate() {
             let [lowest, highest] = network.training_range(input);
             *reading = lowest + x * (highest - lowest);
+        }
+    }
+    frame
+}
+
+/// A frame whose features are within the range of training, nearest to readings of 60 Ω: by Kaczmarz's sweeps
+/// over the features.
+#[inline(never)]
+fn array_frame(
+    projection: Projection<'_>,
+    network: &Network<'_>,
+    numbers: &mut Numbers,
+) -> Frame<ROWS, COLS> {
+    let wanted: [f32; COLS] = core::array::from_fn(|feature| {
+        let [lowest, highest] = network.training_range(feature);
+        lowest + (0.5 + 0.25 * numbers.draw()) * (highest - lowest)
+    });
+    let parts = projection.block().as_chunks::<COLS>().0;
+    let mut frame = Frame { row_column_resistance_ohm: [[60.0; COLS]; ROWS] };
+    let mut features = [0.0; COLS];
+    for _ in 0..SWEEPS {
+        for feature in 0..COLS {
+            let readings = frame.row_column_resistance_ohm.as_flattened_mut();
+            projection.project(readings, &mut features);
+            let parts = || parts.iter().skip(1).map(|parts| parts[feature]);
+            let square: f32 = parts().map(|part| part * part).sum();
+            let step = (wanted[feature] - features[feature]) / square.max(f32::MIN_POSITIVE);
+            readings.iter_mut().zip(parts()).for_each(|(reading, part)| *reading += step * part);
         }
     }
     frame

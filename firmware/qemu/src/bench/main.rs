@@ -12,8 +12,8 @@ use core::hint::black_box;
 use cortex_m_rt::entry;
 use defmt::{assert, info, unwrap};
 use model_core::blob::Model;
-use model_core::exp::{Libm, Micromath, Polynomial};
-use model_core::rbf::Network;
+use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
+use model_core::rbf::{Format, Network};
 use model_core::{Decoder, Estimate, Frame, Gate, RowStatus};
 use qemu_image::checks::Numbers;
 use qemu_image::exit;
@@ -46,6 +46,7 @@ fn measure_every_kernel(bench: &Bench<'_>) {
 
 impl Bench<'_> {
     /// One kernel in every scope, if the model is made for it.
+    #[inline(never)] // of several ways, the stack holds one at a time
     fn measure<K: Kernel>(&self, name: &str) {
         let Some(decoder) = K::load(self.blob) else { return };
         let (mut scaled, mut outputs) = (self.scaled, [0.0; OUTPUTS]);
@@ -69,6 +70,7 @@ impl Bench<'_> {
 
     /// What the gate costs and saves with the kernel that the firmware runs: a frame whose rows are all at
     /// rest, and one whose rows are all awake by their last readings, so that all of them are looked at.
+    #[inline(never)]
     fn measure_gate(&self) {
         let Ok(decoder) = Decoder::<ROWS, COLS, OUTPUTS>::load(self.blob) else { return };
         let name = self.network.format().name();
@@ -89,6 +91,31 @@ impl Bench<'_> {
             });
             assert!(estimate.status == [status; ROWS], "a row is not {=str}", scope);
         }
+    }
+}
+
+/// One network for all rows: frames alone, as the firmware decodes them, and behind the gate.
+#[inline(never)]
+fn measure_array<E: ExpKernel>(blob: &[u8], frame: &Frame<ROWS, COLS>, name: &str, gated: bool) {
+    let decoder = unwrap!(Decoder::<ROWS, COLS, OUTPUTS, E>::load(blob).ok());
+    let rest = decoder.decode(frame);
+    let mut estimate = rest;
+    let mut awake = *frame;
+    awake.row_column_resistance_ohm[ROWS - 1][COLS - 1] *= 1.0 + 2.0 * REST_TOLERANCE;
+    let gate = Gate::new(frame, &rest, REST_TOLERANCE);
+    for (scope, frame, gate, status) in [
+        ("array-frame", frame, None, RowStatus::Decoded),
+        ("array-resting-frame", frame, gate, RowStatus::AtRest),
+        ("array-awake-frame", &awake, gate, RowStatus::Decoded),
+    ] {
+        if gate.is_some() && !gated {
+            continue;
+        }
+        region(name, scope, || {
+            let (frame, estimate) = (black_box(frame), black_box(&mut estimate));
+            black_box(&decoder).decode_gated_into(frame, black_box(gate), estimate);
+        });
+        assert!(estimate.status == [status; ROWS], "a row is not as in {=str}", scope);
     }
 }
 
@@ -117,12 +144,31 @@ fn main() -> ! {
     let network = model.network_of_row(0).and_then(|index| model.networks().nth(index));
     let network = unwrap!(network, "the model has no network for its first row");
     info!("centres {=usize}", network.shape().centres);
-    let mut numbers = Numbers::new(3);
-    let frame = inputs::frame(&model, &mut numbers);
+    if model.projection().is_some() {
+        measure_arrays(blob, &model, &network);
+    } else {
+        measure_rows(blob, &model, network);
+    }
+    exit::success()
+}
+
+#[inline(never)] // of the two, the stack holds one
+fn measure_rows(blob: &[u8], model: &Model<'_>, network: Network<'_>) {
+    let frame = inputs::frame(model, &mut Numbers::new(3));
     let mut scaled = [0.0; COLS];
     unwrap!(network.scale(&frame.row_column_resistance_ohm[0], &mut scaled).ok());
     let bench = Bench { blob, network, scaled, frame };
     measure_every_kernel(&bench);
     bench.measure_gate();
-    exit::success()
+}
+
+#[inline(never)]
+fn measure_arrays(blob: &[u8], model: &Model<'_>, network: &Network<'_>) {
+    let frame = inputs::frame(model, &mut Numbers::new(3));
+    let name = network.format().name();
+    measure_array::<Polynomial>(blob, &frame, name, true);
+    if network.format() == Format::F32Direct {
+        measure_array::<Libm>(blob, &frame, "f32-direct-libm", false);
+        measure_array::<Micromath>(blob, &frame, "f32-direct-micromath", false);
+    }
 }
