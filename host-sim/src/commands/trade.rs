@@ -188,7 +188,7 @@ fn csv_of(trade: &Trade) -> String {
     let groups: Vec<&str> = trade.mean.iter().map(|e| e.group.as_str()).collect();
     let rmse = groups.iter().map(|group| format!("{group}_rmse,{group}_ratio_to_best"));
     let mut csv = format!(
-        "kernel,centres,affine_tail,samples_averaged,gate_k,{},instructions,cycles,frame_us,flash_bytes,ram_bytes,\
+        "kernel,whole_array,centres,spread,affine_tail,samples_averaged,gate_k,{},instructions,cycles,frame_us,flash_bytes,ram_bytes,\
          on_front,chosen\n",
         rmse.collect::<Vec<_>>().join(",")
     );
@@ -197,9 +197,11 @@ fn csv_of(trade: &Trade) -> String {
         let errors = errors.map(|(e, ratio)| format!("{},{ratio}", e.rmse)).collect::<Vec<_>>();
         let _ = writeln!(
             csv,
-            "{},{},{},{},{},{},{},{},{},{},{},{},{}",
+            "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
             p.kernel,
+            p.whole_array,
             p.centres,
+            p.spread,
             p.affine_tail,
             p.samples_averaged,
             p.gate_k.map_or(String::new(), |k| k.to_string()),
@@ -229,7 +231,7 @@ fn page_of(trade: &Trade, folder: &Path) -> print::Page {
     ));
     let groups: Vec<String> = trade.mean.iter().map(|e| format!("{:>16}", e.group)).collect();
     page.line(format_args!(
-        "\n{:<22} {:>4} {:>5} {:>4} {:>4}{groups}{:>13} {:>9} {:>8} {:>8} {:>6}",
+        "\n{:<28} {:>4} {:>5} {:>4} {:>4}{groups}{:>13} {:>9} {:>8} {:>8} {:>6}",
         "RMSE (× best)",
         "K",
         "tail",
@@ -246,9 +248,10 @@ fn page_of(trade: &Trade, folder: &Path) -> print::Page {
         page.line(line_of(point, trade.chosen == Some(i)));
     }
     let mean: Vec<String> = trade.mean.iter().map(|e| format!("{:>9.4}       ", e.rmse)).collect();
-    page.line(format_args!("{:<44}{}", "the mean", mean.concat()));
+    page.line(format_args!("{:<50}{}", "the mean", mean.concat()));
     page.line(format_args!(
         "\n*: nothing is better than this in RMSE of {}, cycles and samples, and worse in none\n\
+         array: one network for all rows, behind a projection; those larger than a slot (128 KiB) are left out\n\
          gate: k of a gate for rows at rest; its cycles are the mean of the test frames",
         trade.group
     ));
@@ -279,9 +282,9 @@ fn line_of(point: &Point, chosen: bool) -> String {
         .collect();
     let errors = errors.concat();
     format!(
-        "{} {:<20} {:>4} {:>5} {:>4} {:>4}{errors}{:>13} {:>9} {:>8.1} {:>8} {:>6}{}",
+        "{} {:<26} {:>4} {:>5} {:>4} {:>4}{errors}{:>13} {:>9} {:>8.1} {:>8} {:>6}{}",
         if point.on_front { "*" } else { " " },
-        point.kernel,
+        point.way(),
         point.centres,
         if point.affine_tail { "yes" } else { "no" },
         point.samples_averaged,

@@ -73,6 +73,9 @@ pub struct Costs {
     lines: Vec<Line>,
 }
 
+/// Kernel, K, whether there is an affine tail, and whether one network decodes the whole array.
+pub type Kind<'k> = (&'k str, usize, bool, bool);
+
 #[derive(Debug, Clone, PartialEq)]
 struct Line {
     kernel: String,
@@ -127,11 +130,17 @@ impl Costs {
         centres
     }
 
+    /// The cost of a frame without a gate; `None` if it was not measured.
+    #[must_use]
+    pub fn frame(&self, kind: Kind<'_>) -> Option<Cost> {
+        self.of(kind, "frame")
+    }
+
     /// The cost of a frame with and without a gate; `None` if it was not measured, as with exponentials other
     /// than the firmware's.
     #[must_use]
-    pub fn frames(&self, kernel: &str, centres: usize, affine: bool) -> Option<Frames<Cost>> {
-        let of = |scope| self.of(kernel, centres, affine, scope);
+    pub fn frames(&self, kind: Kind<'_>) -> Option<Frames<Cost>> {
+        let of = |scope| self.of(kind, scope);
         Some(Frames {
             ungated: of("frame")?,
             at_rest: of("resting-frame")?,
@@ -152,15 +161,15 @@ impl Costs {
             .map(|network| (network.format(), network.shape().centres, network.has_affine_tail()));
         let kind = kinds.next()?;
         let (format, centres, affine) = kinds.all(|other| other == kind).then_some(kind)?;
-        self.frames(&kernel_name(format, Kernel::default()), centres, affine)
+        let kernel = kernel_name(format, Kernel::default());
+        self.frames((&kernel, centres, affine, model.projection().is_some()))
     }
 
-    /// The cost of `scope` (`frame`, say); `None` if it was not measured.
-    #[must_use]
-    pub fn of(&self, kernel: &str, centres: usize, affine: bool, scope: &str) -> Option<Cost> {
+    fn of(&self, (kernel, centres, affine, whole_array): Kind<'_>, scope: &str) -> Option<Cost> {
+        let scope = format!("{}{scope}", if whole_array { "array-" } else { "" });
         let wanted = |line: &&Line| {
             (line.kernel.as_str(), line.centres, line.affine, line.scope.as_str())
-                == (kernel, centres, affine, scope)
+                == (kernel, centres, affine, &scope)
         };
         self.lines.iter().find(wanted).map(|line| line.cost)
     }
@@ -188,11 +197,17 @@ mod tests {
             let mut before = 0;
             for centres in costs.centres() {
                 for affine in [false, true] {
-                    let cost = costs.of(kernel, centres, affine, "frame").unwrap();
+                    let cost = costs.frame((kernel, centres, affine, false)).unwrap();
                     assert!(cost.instructions > before && cost.cycles > cost.instructions);
                     before = cost.instructions;
                 }
             }
+        }
+        // The array's activations serve all rows; its projection costs something.
+        for centres in [64, 128, 256] {
+            let [of_rows, of_array] = [false, true]
+                .map(|whole_array| costs.frame(("fixed16", centres, true, whole_array)).unwrap());
+            assert!(of_array.cycles < of_rows.cycles, "{centres}");
         }
     }
 
@@ -214,11 +229,11 @@ mod tests {
         for centres in costs.centres() {
             for affine in [false, true] {
                 for kernel in ["f32", "fixed16", "f32-direct"] {
-                    let frames = costs.frames(kernel, centres, affine).unwrap();
+                    let frames = costs.frames((kernel, centres, affine, false)).unwrap();
                     let Frames { ungated, at_rest, awake } = frames.map(|cost| cost.cycles);
                     assert!(at_rest < ungated && ungated < awake, "{kernel} {centres}");
                 }
-                assert_eq!(costs.frames("f32-direct-libm", centres, affine), None);
+                assert_eq!(costs.frames(("f32-direct-libm", centres, affine, false)), None);
             }
         }
     }

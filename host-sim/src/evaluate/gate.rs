@@ -179,7 +179,8 @@ pub fn woken_by_theory(k: f64, readings: usize, baseline_frames: usize) -> f64 {
 pub fn measure(scene: &Scene, model: &LoadedModel, settings: &Settings) -> Result<GateResult> {
     settings.check(scene)?;
     let untouched_scene = untouched(scene);
-    let gate = Gate::new(scene, settings.baseline_frames);
+    let whole_array = model.model().projection().is_some();
+    let gate = Gate::new(scene, settings.baseline_frames, whole_array);
     let decode = |readings: &Table| model.decode(Kernel::default(), readings).values;
     let rest_outputs = decode(&gate.baseline);
 
@@ -208,7 +209,7 @@ pub fn measure(scene: &Scene, model: &LoadedModel, settings: &Settings) -> Resul
             rest_tolerance,
             skipped,
             woken: 1.0 - share(&untouched_at_rest),
-            woken_by_theory: woken_by_theory(k, gate.readings, settings.baseline_frames),
+            woken_by_theory: gate.woken_by_theory(k, settings.baseline_frames),
             missed: missed.to_vec(),
             largest_missed_mm: sizes_at_rest.map(|(size_mm, _)| *size_mm).reduce(f64::max),
             errors: errors(&gated(&ungated, &rest_outputs, &at_rest)),
@@ -258,14 +259,23 @@ pub(super) struct Gate {
     pub baseline: Table,
     /// Readings of a row.
     readings: usize,
+    /// Whether all rows are at rest or none, as behind a projection.
+    whole_array: bool,
 }
 
 impl Gate {
     /// A gate with the mean of so many frames of the scene's sensor, untouched, as its baseline.
-    pub fn new(scene: &Scene, baseline_frames: usize) -> Self {
+    pub fn new(scene: &Scene, baseline_frames: usize, whole_array: bool) -> Self {
         let frames = synthesise(&untouched(scene), Stream::Training, baseline_frames).inputs;
         let baseline = Table { values: frames.means(), names: frames.names };
-        Self { baseline, readings: scene.sensor.column_wires }
+        Self { baseline, readings: scene.sensor.column_wires, whole_array }
+    }
+
+    /// See [`woken_by_theory`]; the array wakes with any of its rows.
+    fn woken_by_theory(&self, k: f64, baseline_frames: usize) -> f64 {
+        let of_row = woken_by_theory(k, self.readings, baseline_frames);
+        let rows = self.baseline.values.len() / self.readings;
+        if self.whole_array { -libm::expm1(rows as f64 * libm::log1p(-of_row)) } else { of_row }
     }
 
     /// Whether each row of each line is at rest.
@@ -275,7 +285,13 @@ impl Gate {
         let of_line = |line: &[f64]| {
             let line = to_f32(line);
             let rows = line.chunks_exact(self.readings).zip(baseline.chunks_exact(self.readings));
-            rows.map(|(row, baseline)| is_at_rest(row, baseline, tolerance)).collect::<Vec<_>>()
+            let mut at_rest: Vec<bool> =
+                rows.map(|(row, baseline)| is_at_rest(row, baseline, tolerance)).collect();
+            if self.whole_array {
+                let all = at_rest.iter().all(|at_rest| *at_rest);
+                at_rest.fill(all);
+            }
+            at_rest
         };
         readings.lines().flat_map(of_line).collect()
     }

@@ -5,37 +5,29 @@
 
 use std::collections::BTreeMap;
 
-use model_core::rbf::Format;
-use rayon::prelude::*;
 use serde::Serialize;
 
-use super::cost::{Cost, Costs, MEASURED_SHAPE, kernel_name};
+use super::cost::{Cost, Costs, MEASURED_SHAPE};
 use super::gate;
-use super::metrics::{self, Errors, Measure};
-use crate::dataset::Dataset;
+use super::metrics::{self, Errors};
 use crate::error::{Error, Result};
-use crate::infer::Kernel;
-use crate::model::{self, LoadedModel, Origin};
-use crate::number_format::NumberFormat;
 use crate::progress::Progress;
 use crate::random::Stream;
 use crate::scene::Scene;
 use crate::synth;
-use crate::train::{FittedNetwork, Samples, Trained};
 
 mod choice;
 mod gating;
+mod judge;
 
 pub use choice::Limits;
 use gating::Gates;
-
-/// Bytes of stack that the f32 kernel keeps activations in.
-const F32_ACTIVATIONS_BYTES: usize = 512;
+use judge::{Judge, Knobs, Sets, measure};
 
 /// What to vary.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
-    /// Centres of each row's network, K.
+    /// Centres of each network, K.
     pub centres: Vec<usize>,
     /// Samples averaged for each reading: white noise falls with the root.
     pub samples_averaged: Vec<usize>,
@@ -51,8 +43,12 @@ pub struct Plan {
 pub struct Point {
     /// Format and exponential, as `cargo xtask cycles` names them.
     pub kernel: String,
-    /// Centres of each row's network, K.
+    /// Whether one network decodes all rows, behind a projection, instead of one a row.
+    pub whole_array: bool,
+    /// Centres of each network, K.
     pub centres: usize,
+    /// Width σ on scaled inputs.
+    pub spread: f64,
     /// Whether there is an affine tail.
     pub affine_tail: bool,
     /// Samples averaged for each reading.
@@ -84,6 +80,12 @@ impl Point {
         self.errors.iter().find(|e| e.group == group).map_or(f64::NAN, |e| e.rmse)
     }
 
+    /// The kernel, and whether it decodes the whole array at once.
+    #[must_use]
+    pub fn way(&self) -> String {
+        format!("{}{}", self.kernel, if self.whole_array { " array" } else { "" })
+    }
+
     /// The point's knobs in a few words.
     #[must_use]
     pub fn name(&self) -> String {
@@ -93,7 +95,7 @@ impl Point {
             samples => format!(", {samples} samples"),
         };
         let gate = self.gate_k.map_or(String::new(), |k| format!(", gate k = {k}"));
-        format!("{}, K = {}{tail}{average}{gate}", self.kernel, self.centres)
+        format!("{}, K = {}{tail}{average}{gate}", self.way(), self.centres)
     }
 }
 
@@ -157,9 +159,10 @@ pub fn compute(
     let costs = Costs::measured()?;
     check(scene, plan, &costs)?;
     limits.check()?;
-    progress
-        .stage("trade", plan.samples_averaged.len() * plan.centres.len() * scene.read_rows.len());
-    let mut judge = Judge { scene, plan, costs, points: vec![], blobs: vec![], distinct: vec![] };
+    // Each row's network, and one for the array.
+    let networks = scene.read_rows.len() + 1;
+    progress.stage("trade", plan.samples_averaged.len() * plan.centres.len() * networks);
+    let mut judge = Judge::new(scene, plan, costs);
     let mut mean = Vec::new();
     for &samples in &plan.samples_averaged {
         let mut averaged = scene.clone();
@@ -170,9 +173,13 @@ pub fn compute(
             let means = training.outputs.means().repeat(test.frames());
             mean = metrics::by_group(&test.outputs, &means, &measure(scene));
         }
-        let gates = Gates::new(&averaged, &test.inputs, &plan.gate_k);
-        for &centres in &plan.centres {
-            judge.centres(&averaged, [&training, &test], &gates, (centres, samples), progress)?;
+        for whole_array in [false, true] {
+            let gates = Gates::new(&averaged, &test.inputs, &plan.gate_k, whole_array);
+            let sets = Sets::new(&averaged, &training, &test, &gates, whole_array)?;
+            for &centres in &plan.centres {
+                let knobs = Knobs { whole_array, centres, samples_averaged: samples };
+                judge.centres(&sets, knobs, progress)?;
+            }
         }
     }
     let Judge { costs, mut points, blobs, distinct, .. } = judge;
@@ -224,132 +231,6 @@ fn check(scene: &Scene, plan: &Plan, costs: &Costs) -> Result<()> {
         gate::check(scene, "--gate", &plan.gate_k)?;
     }
     Ok(())
-}
-
-fn measure(scene: &Scene) -> Measure {
-    let Origin { full_scale, thickness_mm, .. } = Origin::of_scene(scene);
-    Measure { full_scale, thickness_mm }
-}
-
-struct Judge<'s> {
-    scene: &'s Scene,
-    plan: &'s Plan,
-    costs: Costs,
-    points: Vec<Point>,
-    blobs: Vec<usize>,
-    distinct: Vec<Vec<u8>>,
-}
-
-impl Judge<'_> {
-    /// Every format and tail with so many centres.
-    fn centres(
-        &mut self,
-        averaged: &Scene,
-        [training, test]: [&Dataset; 2],
-        gates: &Gates,
-        (centres, samples): (usize, usize),
-        progress: &Progress,
-    ) -> Result<()> {
-        let variants: Vec<(NumberFormat, bool)> =
-            [NumberFormat::Fixed16, NumberFormat::F32, NumberFormat::F32Direct]
-                .into_iter()
-                .flat_map(|format| [false, true].map(|affine| (format, affine)))
-                .collect();
-        let defaults = model::options_of(averaged);
-        // Centres are those of the row, whatever the format.
-        let rows: Vec<Vec<FittedNetwork>> = (0..training.rows)
-            .into_par_iter()
-            .map(|row| {
-                let block = training.block(row);
-                let samples = Samples::new(&block);
-                let options = crate::train::Options { centres, ..defaults };
-                options.check(training.frames())?;
-                let found = samples.centres(&options, row);
-                let fit = |&(format, affine_tail): &(NumberFormat, bool)| {
-                    samples.fit(&found, &crate::train::Options { affine_tail, format, ..options })
-                };
-                let fitted = variants.iter().map(fit).collect();
-                progress.step();
-                fitted
-            })
-            .collect::<Result<_>>()?;
-        for (variant, (format, affine)) in variants.iter().enumerate() {
-            let networks: Vec<FittedNetwork> =
-                rows.iter().map(|row| row[variant].clone()).collect();
-            let blob = model::encode(
-                &Trained { projection: None, networks },
-                training,
-                &Origin::of_scene(averaged),
-            )?;
-            let loaded = LoadedModel::from_bytes("the model just trained".as_ref(), &blob)?;
-            let formats: Vec<Format> = loaded.model().networks().map(|n| n.format()).collect();
-            let exponentials: &[Kernel] = match format {
-                // A network that fell back to direct distances is the point of that format.
-                NumberFormat::F32 if formats.contains(&Format::F32Direct) => continue,
-                NumberFormat::F32Direct => &[Kernel::Polynomial, Kernel::Libm, Kernel::Micromath],
-                _ => &[Kernel::Polynomial],
-            };
-            let actual = formats[0];
-            for &exponential in exponentials {
-                let knobs = (centres, *affine, samples);
-                self.points(&loaded, test, gates, (actual, exponential), knobs)?;
-            }
-            self.distinct.push(blob);
-        }
-        Ok(())
-    }
-
-    /// A network without a gate, and behind every gate that was measured with its exponential.
-    fn points(
-        &mut self,
-        loaded: &LoadedModel,
-        test: &Dataset,
-        gates: &Gates,
-        (format, exponential): (Format, Kernel),
-        (centres, affine_tail, samples_averaged): (usize, bool, usize),
-    ) -> Result<()> {
-        let kernel = kernel_name(format, exponential);
-        // Fewer centres than asked for are decoded as fast as the measured number or faster.
-        let ungated = self.costs.of(&kernel, centres, affine_tail, "frame").ok_or_else(|| {
-            Error::Failed(format!("firmware/cycles.csv has no figure for {kernel}, K = {centres}"))
-        })?;
-        let frames = self.costs.frames(&kernel, centres, affine_tail);
-        let estimate = loaded.decode(exponential, &test.inputs).values;
-        let [rows, inputs, outputs] = MEASURED_SHAPE;
-        let float = size_of::<f32>();
-        let working =
-            inputs * float + if format == Format::F32 { F32_ACTIVATIONS_BYTES } else { 0 };
-        let (frame_bytes, estimate_bytes) = (rows * inputs * float, rows * (outputs * float + 1));
-        let ram_bytes =
-            model_core::decoder_ram_bytes(rows) + frame_bytes + estimate_bytes + working;
-        let mut add = |gate_k: Option<f64>, frame: Cost, estimate: &[f64]| {
-            self.points.push(Point {
-                kernel: kernel.clone(),
-                centres,
-                affine_tail,
-                samples_averaged,
-                gate_k,
-                errors: metrics::by_group(&test.outputs, estimate, &measure(self.scene)),
-                ratio_to_best: vec![],
-                frame,
-                frame_us: frame.cycles as f64 / self.plan.clock_mhz,
-                flash_bytes: loaded.bytes().len(),
-                // The baseline is a frame, and the answer to it an estimate.
-                ram_bytes: ram_bytes + gate_k.map_or(0, |_| frame_bytes + estimate_bytes),
-                on_front: false,
-            });
-            self.blobs.push(self.distinct.len());
-        };
-        add(None, ungated, &estimate);
-        if let Some(frames) = frames {
-            let rest_outputs = loaded.decode(exponential, &gates.baseline).values;
-            for gate in gates.iter() {
-                let frame = frames.mean_cost(gate.share);
-                add(Some(gate.k), frame, &gate.gated(&estimate, &rest_outputs));
-            }
-        }
-        Ok(())
-    }
 }
 
 /// Fills in what compares points with each other.

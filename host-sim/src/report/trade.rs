@@ -9,13 +9,19 @@ use super::svg::{Shape, escape};
 use super::ticks;
 use crate::evaluate::trade::{Point, Trade};
 
-/// Kernels in the order of their colours and shapes: without a gate full, behind one hollow.
-const KERNELS: [(&str, [&str; 2], Shape); 5] = [
+/// Ways to decode in the order of their colours and shapes: without a gate full, behind one hollow. The shape is
+/// the kernel's; one colour is that of the whole array.
+const WAYS: [(&str, [&str; 2], Shape); 10] = [
     ("fixed16", ["c1", "c1 hollow"], Shape::Circle),
     ("f32", ["c2", "c2 hollow"], Shape::Square),
     ("f32-direct", ["c3", "c3 hollow"], Shape::Triangle),
     ("f32-direct-libm", ["c3 pale", "c3 pale hollow"], Shape::Diamond),
     ("f32-direct-micromath", ["muted", "muted hollow"], Shape::Dash),
+    ("fixed16 array", ["c4", "c4 hollow"], Shape::Circle),
+    ("f32 array", ["c4", "c4 hollow"], Shape::Square),
+    ("f32-direct array", ["c4", "c4 hollow"], Shape::Triangle),
+    ("f32-direct-libm array", ["c4 pale", "c4 pale hollow"], Shape::Diamond),
+    ("f32-direct-micromath array", ["c4", "c4 hollow"], Shape::Dash),
 ];
 
 /// Cycles against error, both logarithmic: every point of one sample a reading or more, and the front.
@@ -35,11 +41,11 @@ fn chart(trade: &Trade) -> Chart {
         let mark = if samples == 1 { Mark::Line } else { Mark::Dashed };
         series.push(Series::new(&name, "front", mark, line));
     }
-    for (kernel, classes, shape) in KERNELS {
+    for (way, classes, shape) in WAYS {
         for (gated, class) in [false, true].into_iter().zip(classes) {
-            let of = |p: &&Point| p.kernel == kernel && p.gate_k.is_some() == gated;
+            let of = |p: &&Point| p.way() == way && p.gate_k.is_some() == gated;
             let points = trade.points.iter().filter(of).map(at).collect();
-            let name = if gated { format!("{kernel}, gate") } else { kernel.into() };
+            let name = if gated { format!("{way}, gate") } else { way.into() };
             series.push(Series::new(&name, class, Mark::Points(shape), points));
         }
     }
@@ -114,7 +120,7 @@ pub fn html(trade: &Trade) -> String {
         body,
         "<figure id=\"figure-1\">\n{}<figcaption><b>Figure 1.</b> RMSE of {} in {} against cycles of a \
          frame, both logarithmic. Lines: the front, where nothing is better in one of RMSE, cycles and samples \
-         and worse in none. {}Always answering the mean errs by {}.</figcaption>\n</figure>\n",
+         and worse in none. Array: one network for all rows, behind a projection; else one a row. {}Always answering the mean errs by {}.</figcaption>\n</figure>\n",
         chart.draw_responsive([920.0, 520.0], [480.0, 460.0]),
         symbol(&trade.group),
         escape(&trade.unit),
@@ -160,7 +166,7 @@ fn table(trade: &Trade) -> String {
             html,
             "<tr><{cell}>{}{mark}</{cell}><td class=\"number\">{}</td><td class=\"after\">{}</td><td class=\"number\">{}</td>\
              <td class=\"number\">{}</td>",
-            p.kernel,
+            p.way(),
             p.centres,
             if p.affine_tail { "yes" } else { "no" },
             p.samples_averaged,

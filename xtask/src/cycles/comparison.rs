@@ -38,7 +38,7 @@ pub fn of_model<'f>(accepted: &'f [Figure], measured: &'f [Figure]) -> Vec<Pair<
 pub fn table(pairs: &[Pair<'_>]) -> String {
     let lines = pairs.iter().map(|(now, then)| {
         format!(
-            "{:22} {:4} {:>4} {:14} | {:>12} {:>9} | {:>8} {:>9}\n",
+            "{:22} {:4} {:>4} {:19} | {:>12} {:>9} | {:>8} {:>9}\n",
             now.kernel,
             now.centres,
             if now.affine { "yes" } else { "no" },
@@ -50,7 +50,7 @@ pub fn table(pairs: &[Pair<'_>]) -> String {
         )
     });
     format!(
-        "{:22} {:>4} {:>4} {:14} | {:>12} {:>9} | {:>8} {:>9}\n{}",
+        "{:22} {:>4} {:>4} {:19} | {:>12} {:>9} | {:>8} {:>9}\n{}",
         "kernel",
         "K",
         "tail",
@@ -152,10 +152,8 @@ mod tests {
         let pairs = of_model(&accepted, &measured);
         assert_eq!(beyond(&pairs), ["fixed16, K = 64, frame: 11 instructions, accepted are 10"]);
         let table = table(&pairs);
-        assert!(
-            table.contains(
-                "fixed16                  64  yes frame          |           11        10"
-            )
-        );
+        assert!(table.contains(
+            "fixed16                  64  yes frame               |           11        10"
+        ));
     }
 }

@@ -29,6 +29,11 @@ const ARRAY_HEAD: &str = "\
 |---|--:|--:|--:|--:|--:|--:|--:|
 ";
 
+const ALIGNED_ARRAY_HEAD: &str = concat!(
+    "\nby one network for the whole |                   frame     µs at | with tail:     µs at\n",
+    "array                     K |    instr.    cycles   168 MHz |     frame   168 MHz\n",
+);
+
 /// What a compiled twin is called after its kernel's name.
 const TWIN: &str = "-portable";
 
@@ -106,7 +111,10 @@ fn microseconds(count: Count) -> String {
 
 /// The same with its columns aligned, for a terminal.
 pub fn aligned(figures: &[Figure]) -> String {
-    let rows = Group::of(figures).map(|group| {
+    let of_rows = Group::of(figures).filter(|group| {
+        group.count(true, Scope::Row).is_some() || group.count(false, Scope::Row).is_some()
+    });
+    let rows = of_rows.map(|group| {
         let shown = |affine, scope, shown: fn(Count) -> String| {
             group.count(affine, scope).map_or("–".into(), shown)
         };
@@ -124,7 +132,25 @@ pub fn aligned(figures: &[Figure]) -> String {
             shown(true, Scope::Frame, microseconds),
         )
     });
-    ALIGNED_HEAD.to_owned() + &rows.collect::<String>()
+    let arrays = Group::of(figures).filter_map(|group| {
+        let frame = group.count(false, Scope::ArrayFrame)?;
+        let tail = group.count(true, Scope::ArrayFrame);
+        let shown =
+            |count: Option<Count>, shown: fn(Count) -> String| count.map_or("–".into(), shown);
+        Some(format!(
+            "{:22} {:4} | {:>9} {:>9} {:>9} | {:>9} {:>9}\n",
+            group.kernel(),
+            group.centres(),
+            frame.instructions,
+            frame.cycles,
+            microseconds(frame),
+            shown(tail, cycles),
+            shown(tail, microseconds),
+        ))
+    });
+    let arrays = arrays.collect::<String>();
+    let head = if arrays.is_empty() { "" } else { ALIGNED_ARRAY_HEAD };
+    format!("{ALIGNED_HEAD}{}{head}{arrays}", rows.collect::<String>())
 }
 
 /// A list of objects. Kernels' names have nothing in them that JSON would escape.
@@ -202,7 +228,8 @@ pub mod tests {
         ] {
             assert!(text.contains(line), "{text}");
         }
-        assert!(aligned(&sample()).contains(" 336 |"));
+        let aligned = aligned(&sample());
+        assert!(aligned.contains(" 336 |") && aligned.contains("      1512         9 |      1680"));
     }
 
     #[test]

@@ -21,9 +21,9 @@ pub(super) struct AtRest {
 }
 
 impl Gates {
-    /// Those of `averaged`, whose noise is that of its averaged readings, for the `readings` of its test frames.
-    pub fn new(averaged: &Scene, readings: &Table, k: &[f64]) -> Self {
-        let gate = Gate::new(averaged, BASELINE_FRAMES);
+    /// Those of rows, or of the whole array, of `averaged`, whose noise is that of its averaged readings, for the `readings` of its test frames.
+    pub fn new(averaged: &Scene, readings: &Table, k: &[f64], whole_array: bool) -> Self {
+        let gate = Gate::new(averaged, BASELINE_FRAMES, whole_array);
         let at_rest = |&k: &f64| {
             let rows = gate.at_rest(readings, k * averaged.noise.level);
             AtRest { k, share: share(&rows), rows }
