@@ -97,9 +97,9 @@ fn every_kernel_decodes_many_frames_on_the_host_as_in_the_emulator() {
         twins("fixed16"),
         gating(),
         array("f32", "array-f32.bin"),
-        array("f32", "array-f32-no-tail.bin"),
+        array("f32 without tail", "array-f32-no-tail.bin"),
         array("fixed16", "array-fixed16.bin"),
-        array("fixed16", "array-fixed16-no-tail.bin"),
+        array("fixed16 without tail", "array-fixed16-no-tail.bin"),
         array("f32-direct", "array-f32-direct.bin"),
         "exit status 0\n".to_owned(),
     ];

@@ -61,8 +61,10 @@ pub struct ModelSummary {
     pub test_frames: usize,
     /// Networks in the blob.
     pub networks: usize,
-    /// Readings of each network.
+    /// Inputs of each network: its row's readings, or features of all readings.
     pub inputs: usize,
+    /// Readings that are projected to these features; 0 without a projection.
+    pub projected_readings: usize,
     /// Centres of each network (the largest).
     pub centres: usize,
     /// Outputs of each network.
@@ -163,6 +165,7 @@ pub fn run(scene: &Scene, progress: &Progress) -> Result<(RunResult, Vec<u8>)> {
 
     let model = loaded.model();
     let shape = model.shape();
+    let network = trained.networks[0].network().shape();
     let result = RunResult {
         scene: SceneSummary {
             name: scene.name.clone(),
@@ -177,9 +180,10 @@ pub fn run(scene: &Scene, progress: &Progress) -> Result<(RunResult, Vec<u8>)> {
             training_frames: t.frames,
             test_frames: t.test_frames,
             networks: trained.networks.len(),
-            inputs: shape.inputs,
+            inputs: network.inputs,
+            projected_readings: model.projection().map_or(0, |_| shape.rows * shape.inputs),
             centres: model.networks().map(|n| n.shape().centres).max().unwrap_or(0),
-            outputs: shape.outputs,
+            outputs: network.outputs,
             spread: t.spread,
             affine_tail: t.affine_tail,
             blob_bytes: blob.len(),

@@ -1,9 +1,9 @@
-@ Inner loops of the gate and of the two fast kernels for a Cortex-M4F, at 18 inputs and 18 outputs.
+@ Inner loops of gate, projection and the two fast kernels for a Cortex-M4F, at 18 inputs and 18 outputs.
 @
 @ The compiler cannot be led here: it neither keeps 18 accumulators in registers while it streams the
 @ weights through the rest by load-multiple, nor pairs 16-bit products (docs/cycles.md has both figures).
-@ cortex_m4.rs declares these functions; gate.rs, expanded.rs and fixed16.rs hold their twins in Rust, which
-@ do the same operations in the same order: answers agree bit for bit, and tests hold them to it.
+@ cortex_m4.rs declares these functions; gate.rs, projection.rs, expanded.rs and fixed16.rs hold their twins in
+@ Rust, which do the same operations in the same order: answers agree bit for bit, and tests hold them to it.
 @
 @ Procedure call standard: AAPCS, hard float, for what cortex_m4.rs declares; none reads or writes beyond what
 @ its arguments say; stack: at most 192 bytes.

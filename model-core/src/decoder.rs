@@ -88,7 +88,8 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKerne
         self.model.crc()
     }
 
-    /// Decodes one frame. A row with a missing reading is marked and does not touch the others.
+    /// Decodes one frame. A row with a missing reading is marked and does not touch the others; behind a
+    /// [`Projection`] all are marked.
     #[must_use]
     pub fn decode(&self, frame: &Frame<ROWS, COLS>) -> Estimate<ROWS, OUTPUTS> {
         let mut estimate = Estimate {
@@ -148,7 +149,7 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKerne
         let at_rest = gate.is_some_and(|gate| {
             rows.all(|(row, (readings, outputs))| gate.give_rest(row, readings, outputs))
         });
-        let status = match self.row_sections.first() {
+        let mut status = match self.row_sections.first() {
             _ if at_rest => RowStatus::AtRest,
             Some(section) => {
                 let (mut features, mut scaled) = ([0.0; COLS], [0.0; COLS]);
@@ -159,6 +160,10 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKerne
             None => RowStatus::MissingReading,
         };
         if !matches!(status, RowStatus::Decoded | RowStatus::AtRest) {
+            // Features of readings that are all there can overflow.
+            if all_finite(readings.as_flattened()) {
+                status = RowStatus::Overflow;
+            }
             estimate.outputs.as_flattened_mut().fill(f32::NAN);
         }
         estimate.status = [status; ROWS];

@@ -5,7 +5,8 @@
 pub enum RowStatus {
     /// All readings were there; the outputs are valid.
     Decoded,
-    /// At least one reading was missing (not a finite number); the outputs are NaN.
+    /// At least one reading of the row, or behind a projection of any row, was missing (not a finite number);
+    /// the outputs are NaN.
     MissingReading,
     /// Readings or weights so large that an output overflowed; the outputs are NaN.
     Overflow,

@@ -92,7 +92,7 @@ pub fn is_at_rest(readings: &[f32], baseline: &[f32], tolerance: f32) -> bool {
 
 /// Gives `outputs` the `rest` if the `readings` [are at rest](is_at_rest), and says whether they are.
 ///
-/// For a device neither generic nor inlined, as `decode_row` is.
+/// For a device neither generic nor inlined, as `decode_in_assembly` is.
 #[cfg_attr(cortex_m4f, inline(never))]
 fn give_rest(
     readings: &[f32],

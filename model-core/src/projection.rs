@@ -52,12 +52,20 @@ impl<'a> Projection<'a> {
     pub fn project(&self, readings: &[f32], features: &mut [f32]) {
         #[cfg(cortex_m4f)]
         if let Ok(features) = (&mut *features).try_into()
-            && readings.len().is_multiple_of(2)
-            && self.block.len() == block_floats(readings.len(), crate::rbf::USUAL_INPUTS)
+            && self.suits_assembly(readings.len())
         {
             return crate::cortex_m4::project(self.block, readings, features);
         }
         self.project_portably(readings, features);
+    }
+
+    /// Whether these are all readings of a projection to 18 features, in pairs.
+    #[cfg(any(cortex_m4f, test))]
+    fn suits_assembly(&self, readings: usize) -> bool {
+        // A projection has readings: they are not none if their number is the block's.
+        self.features == crate::rbf::USUAL_INPUTS
+            && readings.is_multiple_of(2)
+            && self.block.len() == block_floats(readings, self.features)
     }
 
     /// As [`project`](Self::project), by the compiled twin of the assembly: the same bits.
@@ -90,6 +98,19 @@ mod tests {
         assert_eq!(features, [1.0 + 20.0 + 50.0, -1.0 + 400.0]);
         projection.project(&[10.0, f32::NAN], &mut features);
         assert!(features.iter().all(|feature| feature.is_nan()));
+    }
+
+    #[test]
+    fn only_the_sizes_that_assembly_reads_are_given_to_it() {
+        let block = [0.0; 18 * 19];
+        let suits = |readings, features, of: usize| {
+            let block = &block[..block_floats(readings, features)];
+            Projection::new(readings, features, block).unwrap().suits_assembly(of)
+        };
+        assert!(suits(18, 18, 18));
+        // Blocks of other shapes may be as long as one for 18 features.
+        assert!(!suits(17, 1, 0) && !suits(37, 9, 18));
+        assert!(!suits(18, 18, 16) && !suits(18, 18, 0) && !suits(17, 18, 17));
     }
 
     #[test]

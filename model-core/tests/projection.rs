@@ -48,18 +48,19 @@ fn metadata() -> Metadata<'static> {
 }
 
 fn encoded<'b>(
+    block: &[f32],
     networks: &[Network<'_>],
     row_network: &[u8],
     buffer: &'b mut [u8],
 ) -> Result<&'b [u8], EncodeError> {
-    let projection = Projection::new(4, 2, &BLOCK).ok();
+    let projection = Projection::new(4, 2, block).ok();
     let parts = ModelParts { projection, networks, row_network, metadata: metadata() };
     assert!(encoded_length_bound(&parts) <= buffer.len());
     encode(&parts, buffer)
 }
 
 fn array(buffer: &mut [u8]) -> &[u8] {
-    encoded(&[network(2)], &[0, 0], buffer).unwrap()
+    encoded(&BLOCK, &[network(2)], &[0, 0], buffer).unwrap()
 }
 
 #[test]
@@ -95,6 +96,18 @@ fn one_missing_reading_leaves_no_row_to_decode() {
 }
 
 #[test]
+fn features_that_overflow_are_told_from_missing_readings() {
+    let mut buffer = Aligned([0; 1024]);
+    let block = BLOCK.map(|part| 2.0 * part);
+    let blob = encoded(&block, &[network(2)], &[0, 0], &mut buffer.0).unwrap();
+    let decoder = Decoder::<2, 2, 1, Libm>::load(blob).unwrap();
+    let frame = Frame { row_column_resistance_ohm: [[f32::MAX; 2], [-f32::MAX; 2]] };
+    let estimate = decoder.decode(&frame);
+    assert_eq!(estimate.status, [RowStatus::Overflow; 2]);
+    assert!(estimate.outputs.iter().all(|outputs| outputs[0].is_nan()));
+}
+
+#[test]
 fn an_array_is_at_rest_as_a_whole_or_not_at_all() {
     let mut buffer = Aligned([0; 1024]);
     let decoder = Decoder::<2, 2, 1, Libm>::load(array(&mut buffer.0)).unwrap();
@@ -115,11 +128,11 @@ fn an_array_is_at_rest_as_a_whole_or_not_at_all() {
 #[test]
 fn what_cannot_stand_behind_a_projection_is_refused() {
     let mut buffer = Aligned([0; 1024]);
-    let twice = encoded(&[network(2), network(2)], &[0, 1], &mut buffer.0);
+    let twice = encoded(&BLOCK, &[network(2), network(2)], &[0, 1], &mut buffer.0);
     let expected =
         DecodeError::CountMismatch { what: "networks behind a projection", expected: 1, found: 2 };
     assert_eq!(twice, Err(EncodeError::Refused(expected)));
-    let uneven = encoded(&[network(3)], &[0, 0], &mut buffer.0);
+    let uneven = encoded(&BLOCK, &[network(3)], &[0, 0], &mut buffer.0);
     assert_eq!(uneven, Err(EncodeError::UnevenRows { outputs: 3, rows: 2 }));
 }
 

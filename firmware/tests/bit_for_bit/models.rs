@@ -26,7 +26,7 @@ pub const FILES: [(&str, Maker); 9] = [
     ("kernels-fixed16.bin", || of_format(Format::Fixed16)),
     ("kernels-f32-direct.bin", || of_format(Format::F32Direct)),
     ("array-f32.bin", || of_array(Format::F32, 131, true)),
-    ("array-f32-no-tail.bin", || of_array(Format::F32, 18, false)),
+    ("array-f32-no-tail.bin", || of_array(Format::F32, 130, false)),
     ("array-fixed16.bin", || of_array(Format::Fixed16, 33, true)),
     ("array-fixed16-no-tail.bin", || of_array(Format::Fixed16, 16, false)),
     ("array-f32-direct.bin", || of_array(Format::F32Direct, 17, true)),

@@ -14,7 +14,8 @@ use super::{Common, print};
 
 /// Decode readings from a CSV file; one line of estimates for every line of readings.
 ///
-/// Where a reading is missing, the outputs of its row-wire are left empty.
+/// Where a reading is missing, the outputs of its row-wire are left empty; those of all, if one network decodes
+/// the whole array.
 #[derive(Args)]
 #[command(after_help = "Example: host-sim decode press.bin readings.csv -o estimate.csv")]
 pub struct Arguments {

@@ -54,6 +54,8 @@ struct RamBytes {
     frame: usize,
     estimate: usize,
     scaled_readings: usize,
+    /// Of the whole array; 0 without a projection.
+    features: usize,
 }
 
 #[derive(Serialize)]
@@ -113,6 +115,7 @@ fn summarise(loaded: &LoadedModel) -> Summary {
             frame: shape.rows * shape.inputs * float,
             estimate: shape.rows * (shape.outputs * float + 1),
             scaled_readings: shape.inputs * float,
+            features: model.projection().map_or(0, |_| shape.inputs * float),
         },
         inputs: metadata.input_names.iter().zip(metadata.input_units.iter()).map(column).collect(),
         outputs: outputs
@@ -164,12 +167,13 @@ fn page_of(s: &Summary) -> print::Page {
     line(
         "RAM",
         format!(
-            "{} bytes: decoder {}, frame {}, estimate {}, scaled readings {} (weights stay in flash)",
-            ram.decoder + ram.frame + ram.estimate + ram.scaled_readings,
+            "{} bytes: decoder {}, frame {}, estimate {}, scaled readings {}{} (weights stay in flash)",
+            ram.decoder + ram.frame + ram.estimate + ram.scaled_readings + ram.features,
             ram.decoder,
             ram.frame,
             ram.estimate,
-            ram.scaled_readings
+            ram.scaled_readings,
+            if ram.features > 0 { format!(", features {}", ram.features) } else { String::new() }
         ),
     );
     line("inputs", ends(&s.inputs.iter().map(|c| c.name.as_str()).collect::<Vec<_>>()));

@@ -90,9 +90,13 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
         model.test_frames
     ));
     page.line(format_args!(
-        "model: {} networks, {} readings -> K = {} -> {} outputs, spread {}, {} bytes, CRC-32 {}",
+        "model: {} network{}, {} -> K = {} -> {} outputs, spread {}, {} bytes, CRC-32 {}",
         model.networks,
-        model.inputs,
+        if model.networks == 1 { "" } else { "s" },
+        match model.projected_readings {
+            0 => format!("{} readings", model.inputs),
+            readings => format!("{readings} readings -> {} features", model.inputs),
+        },
         model.centres,
         model.outputs,
         model.spread,

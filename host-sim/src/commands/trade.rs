@@ -57,7 +57,7 @@ pub struct Arguments {
     /// Pick within so many cycles a frame, behind a gate on average: the most accurate point, unless --max-error asks for the cheapest.
     #[arg(long, value_name = "CYCLES")]
     max_cycles: Option<u64>,
-    /// Pick within a blob of so many bytes.
+    /// Pick within a blob of so many bytes [default, with another limit: a slot's 131072].
     #[arg(long, value_name = "BYTES")]
     max_flash: Option<usize>,
     /// Clock of the device, for times.
@@ -251,7 +251,8 @@ fn page_of(trade: &Trade, folder: &Path) -> print::Page {
     page.line(format_args!("{:<50}{}", "the mean", mean.concat()));
     page.line(format_args!(
         "\n*: nothing is better than this in RMSE of {}, cycles and samples, and worse in none\n\
-         array: one network for all rows, behind a projection; those larger than a slot (128 KiB) are left out\n\
+         array: one network for all rows, behind a projection; those larger than a slot (128 KiB) are left out,\n\
+         and none larger than that is chosen unless --max-flash says so\n\
          gate: k of a gate for rows at rest; its cycles are the mean of the test frames",
         trade.group
     ));

@@ -49,7 +49,7 @@ pub struct Arguments {
     #[arg(long)]
     no_affine: bool,
     /// Train one network for all rows, behind a projection of all readings, instead of one a row: more
-    /// accurate, and faster from K = 32 on, but one missing reading leaves nothing to decode.
+    /// accurate, and faster from K = 64 on, but one missing reading leaves nothing to decode.
     #[arg(long)]
     whole_array: bool,
     /// Number format of the weights [default: the scene's, or f32].

@@ -63,10 +63,11 @@ pub fn reading_bound_ohm(circuit: Circuit, ohm: f64, bits: u8) -> f64 {
 /// are the model's inputs.
 ///
 /// # Panics
-/// If `readings` has other columns than the model's inputs, or the model is not of the format f32-direct,
-/// for which alone the bound is derived.
+/// If `readings` has other columns than the model's inputs, or the model is not of the format f32-direct, or
+/// stands behind a projection: the bound is derived for neither.
 #[must_use]
 pub fn output_bounds(model: &LoadedModel, circuit: Circuit, bits: u8, readings: &Table) -> Table {
+    assert!(model.model().projection().is_none(), "a model behind a projection");
     let networks = model.networks_in_turn();
     let names = model.model().metadata().output_names.iter().map(String::from).collect();
     let mut values = Vec::new();

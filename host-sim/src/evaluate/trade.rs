@@ -24,6 +24,9 @@ pub use choice::Limits;
 use gating::Gates;
 use judge::{Judge, Knobs, Sets, measure};
 
+/// The largest blob that a slot of the firmware's images holds.
+pub const SLOT_BYTES: usize = 131_072;
+
 /// What to vary.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {

@@ -101,11 +101,15 @@ pub fn document(title: &str, body: &str) -> String {
 fn header(result: &RunResult) -> String {
     let (scene, model) = (&result.scene, &result.model);
     let tail = if model.affine_tail { "affine tail" } else { "no affine tail" };
+    let inputs = match model.projected_readings {
+        0 => format!("{} readings", model.inputs),
+        readings => format!("{readings} readings → {} features", model.inputs),
+    };
     let plural = if model.networks == 1 { "" } else { "s" };
     format!(
         "<header>\n<h1>Scene “{}”</h1>\n\
          <p>{} noise of {} · seed {} · {} training and {} test frames · scene digest {}</p>\n\
-         <p>{} network{plural}: {} readings → K = {} → {} outputs · spread {} · {tail} · \
+         <p>{} network{plural}: {inputs} → K = {} → {} outputs · spread {} · {tail} · \
          {} bytes · CRC-32 {}</p>\n</header>\n",
         escape(&scene.name),
         escape(&scene.noise_kind),
@@ -115,7 +119,6 @@ fn header(result: &RunResult) -> String {
         grouped(model.test_frames),
         escape(&scene.digest),
         model.networks,
-        model.inputs,
         model.centres,
         model.outputs,
         model.spread,

@@ -53,6 +53,7 @@ fn result(groups: &[&str]) -> RunResult {
             row_wires: 8,
         },
         model: ModelSummary {
+            projected_readings: 0,
             training_frames: 1000,
             test_frames: 100,
             networks: ROW_WIRES,

@@ -25,7 +25,8 @@ const NOISE_FLOOR: f64 = 1e-3;
 /// reading's part in every feature, as [`Projection::new`] takes it.
 ///
 /// # Errors
-/// [`Error::Usage`] for data of a single row, [`Error::Failed`] for data without a regression.
+/// [`Error::Usage`] for data of a single row, [`Error::Failed`] for data without a regression, or with
+/// one that f32 does not hold.
 pub fn fit(dataset: &Dataset) -> Result<Vec<f32>> {
     if dataset.rows < 2 {
         return Err(Error::Usage(
@@ -46,7 +47,12 @@ pub fn fit(dataset: &Dataset) -> Result<Vec<f32>> {
     for reading in 0..readings {
         block.extend((0..features).map(|feature| parts[(reading, feature)]));
     }
-    Ok(block.into_iter().map(|value| value as f32).collect())
+    let block: Vec<f32> = block.into_iter().map(|value| value as f32).collect();
+    if block.iter().all(|value| value.is_finite()) {
+        Ok(block)
+    } else {
+        Err(Error::Failed("the projection of these readings is beyond f32".into()))
+    }
 }
 
 /// `dataset` as the network behind the projection sees it: one row, the features its inputs, all scaled by
@@ -99,7 +105,9 @@ fn directions(dataset: &Dataset, means: &[f64], features: usize) -> Result<DMatr
         DMatrix::from_fn(readings, width - readings, |i, o| products[i * width + readings + o]);
     let regression = of_readings
         .cholesky()
-        .ok_or_else(|| Error::Failed("the readings have no regression: too few frames".into()))?
+        .ok_or_else(|| {
+            Error::Failed("the readings have no regression: some are no numbers".into())
+        })?
         .solve(&with_outputs);
     let predicted = with_outputs.tr_mul(&regression);
     let predicted = (&predicted + predicted.transpose()) * 0.5;

@@ -59,9 +59,9 @@ fn main() -> ! {
     compare("fixed16", fixed16);
     gate(fixed16);
     array("f32", model!("array-f32.bin"));
-    array("f32", model!("array-f32-no-tail.bin"));
+    array("f32 without tail", model!("array-f32-no-tail.bin"));
     array("fixed16", model!("array-fixed16.bin"));
-    array("fixed16", model!("array-fixed16-no-tail.bin"));
+    array("fixed16 without tail", model!("array-fixed16-no-tail.bin"));
     array("f32-direct", model!("array-f32-direct.bin"));
     exit::success()
 }

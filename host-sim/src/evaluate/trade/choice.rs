@@ -10,7 +10,7 @@ pub struct Limits {
     pub error: Option<f64>,
     /// Cycles of a frame.
     pub cycles: Option<u64>,
-    /// Bytes of the blob.
+    /// Bytes of the blob; a slot's ([`SLOT_BYTES`](super::SLOT_BYTES)) unless given.
     pub flash_bytes: Option<usize>,
 }
 
@@ -50,7 +50,7 @@ impl Limits {
         let within = |point: &Point| {
             self.error.is_none_or(|most| point.rmse(group) <= most)
                 && self.cycles.is_none_or(|most| point.frame.cycles <= most)
-                && self.flash_bytes.is_none_or(|most| point.flash_bytes <= most)
+                && point.flash_bytes <= self.flash_bytes.unwrap_or(super::SLOT_BYTES)
         };
         let key = |point: &Point| {
             let (cycles, error) = (point.frame.cycles as f64, point.rmse(group));

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::super::cost::{Cost, Costs, MEASURED_SHAPE, kernel_name};
 use super::super::metrics::{self, Measure};
 use super::gating::Gates;
-use super::{Plan, Point};
+use super::{Plan, Point, SLOT_BYTES};
 use crate::dataset::Dataset;
 use crate::error::{Error, Result};
 use crate::infer::Kernel;
@@ -18,8 +18,6 @@ use crate::train::{self, FittedNetwork, Samples, Trained, projection};
 
 /// Bytes of stack that the f32 kernel keeps activations in.
 const F32_ACTIVATIONS_BYTES: usize = 512;
-/// The largest blob that a device's slot holds, and thus the largest whose cycles are measured.
-const SLOT_BYTES: usize = 131_072;
 /// Widths for features, which share the largest span of any, over those for a row's readings: at K = 64
 /// as good, at K = 256 better (`docs/projection.md`).
 const ARRAY_SPREAD: f64 = 0.5;
@@ -125,7 +123,7 @@ impl<'s> Judge<'s> {
             let exponentials: &[Kernel] = match format {
                 // A network that fell back to direct distances is the point of that format.
                 NumberFormat::F32 if formats.contains(&Format::F32Direct) => continue,
-                // One of rows may share networks, one of the array is as large as it is.
+                // It fits no slot, so its cycles were not measured: those of rows are a network's.
                 _ if knobs.whole_array && blob.len() > SLOT_BYTES => continue,
                 NumberFormat::F32Direct => &[Kernel::Polynomial, Kernel::Libm, Kernel::Micromath],
                 _ => &[Kernel::Polynomial],
