@@ -16,7 +16,7 @@ pub const COLS: usize = 18;
 /// Of one row.
 pub const OUTPUTS: usize = 18;
 /// Of a small sensor that one network decodes, behind a projection.
-pub const ARRAY_ROWS: usize = 4;
+pub const ARRAY_ROWS: usize = 2;
 
 const FRAMES: usize = 6;
 const CRC: Crc<u32, Table<0>> = Crc::<u32, Table<0>>::new(&CRC_32_ISO_HDLC);
