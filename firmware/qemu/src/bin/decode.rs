@@ -13,6 +13,7 @@ use qemu_image::{checks, exit};
 static MODEL: Aligned<[u8; include_bytes!("../../../../testdata/hand-made.bin").len()]> =
     Aligned(*include_bytes!("../../../../testdata/hand-made.bin"));
 
+#[inline(never)] // so that the stack holds one decoder at a time, as a device's does
 fn decode<E: ExpKernel>() {
     info!("decoding with {=str}: {=u32:08x}", E::NAME, unwrap!(checks::decoding::<E>(&MODEL.0)));
 }
