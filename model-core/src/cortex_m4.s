@@ -130,13 +130,8 @@
     f32_second_half
     .endm
 
-@ s0..s17 += two lines of weights at r0, each times its factor at r1.
-    .macro f32_two_centres
-    vldmia r1!, {s30-s31}
-    vldmia r0!, {s18-s29}
-    .irp i, 18,19,20,21,22,23,24,25,26,27,28,29
-    vmul.f32 s\i, s\i, s30
-    .endr
+@ s0..s11 += s18..s29
+    .macro f32_add_twelve
     vadd.f32 s0, s0, s18
     vadd.f32 s1, s1, s19
     vadd.f32 s2, s2, s20
@@ -149,6 +144,26 @@
     vadd.f32 s9, s9, s27
     vadd.f32 s10, s10, s28
     vadd.f32 s11, s11, s29
+    .endm
+
+@ s12..s17 += s18..s23
+    .macro f32_add_six
+    vadd.f32 s12, s12, s18
+    vadd.f32 s13, s13, s19
+    vadd.f32 s14, s14, s20
+    vadd.f32 s15, s15, s21
+    vadd.f32 s16, s16, s22
+    vadd.f32 s17, s17, s23
+    .endm
+
+@ s0..s17 += two lines of weights at r0, each times its factor at r1.
+    .macro f32_two_centres
+    vldmia r1!, {s30-s31}
+    vldmia r0!, {s18-s29}
+    .irp i, 18,19,20,21,22,23,24,25,26,27,28,29
+    vmul.f32 s\i, s\i, s30
+    .endr
+    f32_add_twelve
     vldmia r0!, {s18-s29}
     .irp i, 18,19,20,21,22,23
     vmul.f32 s\i, s\i, s30
@@ -156,12 +171,7 @@
     .irp i, 24,25,26,27,28,29
     vmul.f32 s\i, s\i, s31
     .endr
-    vadd.f32 s12, s12, s18
-    vadd.f32 s13, s13, s19
-    vadd.f32 s14, s14, s20
-    vadd.f32 s15, s15, s21
-    vadd.f32 s16, s16, s22
-    vadd.f32 s17, s17, s23
+    f32_add_six
     vadd.f32 s0, s0, s24
     vadd.f32 s1, s1, s25
     vadd.f32 s2, s2, s26
@@ -194,29 +204,13 @@
     .irp i, 18,19,20,21,22,23,24,25,26,27,28,29
     vmul.f32 s\i, s\i, \factor
     .endr
-    vadd.f32 s0, s0, s18
-    vadd.f32 s1, s1, s19
-    vadd.f32 s2, s2, s20
-    vadd.f32 s3, s3, s21
-    vadd.f32 s4, s4, s22
-    vadd.f32 s5, s5, s23
-    vadd.f32 s6, s6, s24
-    vadd.f32 s7, s7, s25
-    vadd.f32 s8, s8, s26
-    vadd.f32 s9, s9, s27
-    vadd.f32 s10, s10, s28
-    vadd.f32 s11, s11, s29
+    f32_add_twelve
     vldmia r0!, {s18-s23}
     add r0, r0, r11
     .irp i, 18,19,20,21,22,23
     vmul.f32 s\i, s\i, \factor
     .endr
-    vadd.f32 s12, s12, s18
-    vadd.f32 s13, s13, s19
-    vadd.f32 s14, s14, s20
-    vadd.f32 s15, s15, s21
-    vadd.f32 s16, s16, s22
-    vadd.f32 s17, s17, s23
+    f32_add_six
     .endr
     .endm
 

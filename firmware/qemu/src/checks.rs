@@ -107,6 +107,18 @@ pub fn decoding_many<E: ExpKernel, const R: usize>(blob: &[u8]) -> Option<u32> {
     Some(digest.finalize())
 }
 
+/// The outputs of a network by its kernel's compiled twin; `None` if there is none.
+fn infer_by_twin(network: &Network<'_>, inputs: &[f32; COLS], outputs: &mut [f32]) -> Option<()> {
+    let mut scaled = [0.0; COLS];
+    network.scale(inputs, &mut scaled).ok()?;
+    match network {
+        Network::F32Direct(_) => return None,
+        Network::F32(network) => network.infer_scaled_portably(&mut scaled, outputs),
+        Network::Fixed16(network) => network.infer_scaled_portably(&mut scaled, outputs),
+    }
+    Some(())
+}
+
 /// Of the same frames, the rows that the model in `blob` decodes, and how many of them its kernel's compiled
 /// twin answers otherwise to in any bit. `None`: the blob does not load, or its kernel has no twin.
 #[must_use]
@@ -124,15 +136,8 @@ pub fn twins(blob: &[u8]) -> Option<[usize; 2]> {
                 continue;
             }
             let network = model.networks().nth(model.network_of_row(row)?)?;
-            let (mut scaled, mut of_twin) = ([0.0; COLS], [0.0; OUTPUTS]);
-            network.scale(readings, &mut scaled).ok()?;
-            match network {
-                Network::F32Direct(_) => return None,
-                Network::F32(network) => network.infer_scaled_portably(&mut scaled, &mut of_twin),
-                Network::Fixed16(network) => {
-                    network.infer_scaled_portably(&mut scaled, &mut of_twin);
-                }
-            }
+            let mut of_twin = [0.0; OUTPUTS];
+            infer_by_twin(&network, readings, &mut of_twin)?;
             compared += 1;
             different += usize::from(outputs.map(f32::to_bits) != of_twin.map(f32::to_bits));
         }
@@ -156,19 +161,10 @@ pub fn array_twins(blob: &[u8]) -> Option<[usize; 2]> {
         if status != [RowStatus::Decoded; ARRAY_ROWS] {
             continue;
         }
-        let (mut features, mut scaled) = ([0.0; COLS], [0.0; COLS]);
+        let mut features = [0.0; COLS];
         let mut of_twin = [[0.0; OUTPUTS]; ARRAY_ROWS];
         projection.project_portably(frame.row_column_resistance_ohm.as_flattened(), &mut features);
-        network.scale(&features, &mut scaled).ok()?;
-        match network {
-            Network::F32Direct(_) => return None,
-            Network::F32(network) => {
-                network.infer_scaled_portably(&mut scaled, of_twin.as_flattened_mut());
-            }
-            Network::Fixed16(network) => {
-                network.infer_scaled_portably(&mut scaled, of_twin.as_flattened_mut());
-            }
-        }
+        infer_by_twin(&network, &features, of_twin.as_flattened_mut())?;
         let bits = |outputs: [[f32; OUTPUTS]; ARRAY_ROWS]| outputs.map(|row| row.map(f32::to_bits));
         compared += 1;
         different += usize::from(bits(outputs) != bits(of_twin));
