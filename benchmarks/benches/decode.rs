@@ -10,8 +10,8 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use host_sim::dataset::Table;
 use host_sim::infer::{Kernel, infer};
 use host_sim::random::{Purpose, Random, Stream};
-use model_core::rbf::{Network, Shape, direct, expanded};
-use model_core::scale::{HALF_RANGE, UNITS};
+use model_core::rbf::{Network, Shape, direct, expanded, fixed16};
+use model_core::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP};
 
 /// Lines of a table; `compare/decode.py` divides by it.
 const LINES: usize = 8192;
@@ -54,21 +54,71 @@ impl Formula {
             exponents.push(-(decay * centre.iter().map(|c| c * c).sum::<f64>()) as f32);
             exponents.extend(centre.iter().map(|c| (2.0 * decay * c) as f32));
         }
-        // The tail is on inputs about the middle.
-        let mut bias = self.bias.clone();
-        for row in self.affine.chunks_exact(CHANNELS) {
-            bias.iter_mut().zip(row).for_each(|(bias, a)| *bias += 0.5 * a);
-        }
         let parameters = expanded::Parameters {
             input_midpoint: &[(LOWEST_OHM + 0.5 * SPAN_OHM) as f32; CHANNELS],
             input_per_unit: &[(1.0 / (unit * SPAN_OHM)) as f32; CHANNELS],
             decay: decay as f32,
-            bias: &single(&bias),
+            bias: &single(&self.bias_about_the_middle()),
             affine: &single(&self.affine.iter().map(|a| a * unit).collect::<Vec<_>>()),
             exponents: &exponents,
             output_weights: &single(&self.weights),
         };
         parameters.words().collect()
+    }
+
+    /// The words of this network in fixed point.
+    fn fixed16(&self) -> Vec<u32> {
+        let Shape { centres, outputs, .. } = self.shape;
+        let step = f64::from(HALF_RANGE / UNITS * UNITS_PER_STEP);
+        let per_step = std::f64::consts::LOG2_E / (2.0 * SPREAD * SPREAD) * step * step;
+        let decay = (per_step * 2_f64.powi(60)).round();
+        // No sum exceeds as many ones as there are centres, inputs and biases.
+        let scale = (centres + CHANNELS + 1) as f64 / 2_f64.powi(31);
+        let integer = |value: f64| value.round() as i16;
+        let mut words = Vec::new();
+        for first in (0..centres).step_by(fixed16::CENTRES_AT_ONCE) {
+            let group = first..first + fixed16::CENTRES_AT_ONCE;
+            for k in group.clone() {
+                let centre = &self.centres[k * CHANNELS..(k + 1) * CHANNELS];
+                let a = centre
+                    .iter()
+                    .map(|c| integer(-2.0 * decay / 2_f64.powi(34) * (c - 0.5) / step));
+                let a: Vec<i16> = a.collect();
+                let square: u64 = a.iter().map(|a| u64::from(a.unsigned_abs()).pow(2)).sum();
+                words.push((square << 32).div_ceil(decay as u64) as u32 + fixed16::EXPONENT_MARGIN);
+                words.extend_from_slice(bytemuck::cast_slice(&a));
+            }
+            for output in 0..outputs {
+                let weight = |k: usize| self.weights[k * CHANNELS + output] / (scale * 32_768.0);
+                let weights: Vec<i16> = group.clone().map(|k| integer(weight(k))).collect();
+                words.extend_from_slice(bytemuck::cast_slice(&weights));
+            }
+        }
+        let affine = (0..outputs * CHANNELS).map(|at| {
+            let (output, input) = (at / CHANNELS, at % CHANNELS);
+            integer(self.affine[input * CHANNELS + output] * step / scale)
+        });
+        let affine: Vec<i16> = affine.collect();
+        let bias = self.bias_about_the_middle();
+        let parameters = fixed16::Parameters {
+            input_midpoint: &[(LOWEST_OHM + 0.5 * SPAN_OHM) as f32; CHANNELS],
+            input_per_unit: &[(f64::from(UNITS / HALF_RANGE) / SPAN_OHM) as f32; CHANNELS],
+            decay: decay as u32,
+            bias: &bias.iter().map(|b| (b / scale).round() as i32).collect::<Vec<_>>(),
+            output_scale: &[scale as f32; CHANNELS],
+            affine: bytemuck::cast_slice(&affine),
+            centres: &words,
+        };
+        parameters.words().collect()
+    }
+
+    /// The bias with a tail on inputs about the middle.
+    fn bias_about_the_middle(&self) -> Vec<f64> {
+        let mut bias = self.bias.clone();
+        for row in self.affine.chunks_exact(CHANNELS) {
+            bias.iter_mut().zip(row).for_each(|(bias, a)| *bias += 0.5 * a);
+        }
+        bias
     }
 
     /// The words of this network with direct distances.
@@ -108,11 +158,12 @@ fn decode(criterion: &mut Criterion) {
     group.sample_size(30).throughput(Throughput::Elements(LINES as u64));
     for centres in CENTRES {
         let formula = Formula::random(centres, &mut random);
-        let (expanded, direct) = (formula.expanded(), formula.direct());
+        let (expanded, direct, fixed) = (formula.expanded(), formula.direct(), formula.fixed16());
         let shape = formula.shape;
-        let networks: [Network<'_>; 2] = [
+        let networks: [Network<'_>; 3] = [
             expanded::Network::try_new(shape, true, &expanded).expect("sound parameters").into(),
             direct::Network::of_words(shape, true, true, &direct).expect("sound parameters").into(),
+            fixed16::Network::try_new(shape, true, &fixed).expect("sound parameters").into(),
         ];
         for network in networks {
             let name = network.format().name();

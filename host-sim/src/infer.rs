@@ -56,7 +56,7 @@ pub(crate) fn infer_rows(networks: &[Network<'_>], kernel: Kernel, readings: &Ta
         return Vec::new();
     };
     let (readings_step, outputs_step) = (networks.len() * inputs, networks.len() * outputs);
-    let batches: Vec<Option<Batch>> =
+    let batches: Vec<Option<Batch<'_>>> =
         networks.iter().map(|network| Batch::of(network, kernel)).collect();
     let mut values = vec![0.0; readings.len() * outputs_step];
     let pieces = readings.values.par_chunks(LINES_AT_ONCE * readings_step);

@@ -38,7 +38,7 @@ pub const HIGHEST_ACTIVATION: i32 = 32_766;
 
 /// 2^−f = Σ c_i·f^i on [0, 1) within 1.1e-4, continuous over whole numbers: p(1) = p(0)/2. In Q33, Q27, Q21
 /// and Q15, since each product with f (Q26) drops 32 bits.
-const CUBIC: [i32; 4] = [-335_049_012, 30_875_674, -1_449_129, HIGHEST_ACTIVATION];
+pub const CUBIC: [i32; 4] = [-335_049_012, 30_875_674, -1_449_129, HIGHEST_ACTIVATION];
 
 /// The parameters of one network. K' is K rounded up to a multiple of [`CENTRES_AT_ONCE`], I' is the number
 /// of pairs of inputs (a last odd one is paired with 0); a *pair* is a word with the first of two `i16` in
@@ -310,7 +310,8 @@ impl<'a> Network<'a> {
 
 /// Words of [`Parameters::centres`] that sixteen centres take.
 #[inline]
-fn words_at_once(shape: Shape) -> usize {
+#[must_use]
+pub fn words_at_once(shape: Shape) -> usize {
     CENTRES_AT_ONCE
         .saturating_mul(1 + shape.inputs.div_ceil(2))
         .saturating_add((CENTRES_AT_ONCE / 2).saturating_mul(shape.outputs))

@@ -1,12 +1,13 @@
 //! Batches against one line after the other, bit for bit.
 
-use model_core::rbf::{direct, expanded};
-use model_core::scale::{HALF_RANGE, clamp_units};
+use model_core::rbf::{Format, Shape, direct, expanded, fixed16};
+use model_core::scale::{HALF_RANGE, UNITS, clamp_units};
 use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::super::{infer_line, infer_rows};
+use super::exponent::{Expanded, Exponent};
 use super::*;
 use crate::dataset::Table;
 
@@ -23,22 +24,33 @@ impl Draw {
 }
 
 /// The words of a network whose training range is about 40 to 80 Ω.
-fn words(draw: &mut Draw, shape: Shape, expanded: bool, affine: bool, one_width: bool) -> Vec<u32> {
+fn words(draw: &mut Draw, shape: Shape, format: Format, affine: bool, one_width: bool) -> Vec<u32> {
+    match format {
+        Format::F32Direct => direct_words(draw, shape, affine, one_width),
+        Format::F32 => expanded_words(draw, shape, affine),
+        Format::Fixed16 => fixed16_words(draw, shape, affine),
+    }
+}
+
+fn direct_words(draw: &mut Draw, shape: Shape, affine: bool, one_width: bool) -> Vec<u32> {
     let Shape { inputs, centres, outputs } = shape;
     let affine = if affine { inputs * outputs } else { 0 };
-    if !expanded {
-        let parameters = direct::Parameters {
-            input_minimum: &draw.floats(inputs, 40.0, 60.0),
-            input_per_span: &draw.floats(inputs, 0.0, 0.2),
-            centres: &draw.floats(centres * inputs, -0.1, 1.1),
-            // Up to where activations vanish.
-            decay: &draw.floats(if one_width { 1 } else { centres }, 0.01, 40.0),
-            output_weights: &draw.floats(centres * outputs, -1e3, 1e3),
-            bias: &draw.floats(outputs, -1.0, 1.0),
-            affine: &draw.floats(affine, -1.0, 1.0),
-        };
-        return parameters.words().collect();
-    }
+    let parameters = direct::Parameters {
+        input_minimum: &draw.floats(inputs, 40.0, 60.0),
+        input_per_span: &draw.floats(inputs, 0.0, 0.2),
+        centres: &draw.floats(centres * inputs, -0.1, 1.1),
+        // Up to where activations vanish.
+        decay: &draw.floats(if one_width { 1 } else { centres }, 0.01, 40.0),
+        output_weights: &draw.floats(centres * outputs, -1e3, 1e3),
+        bias: &draw.floats(outputs, -1.0, 1.0),
+        affine: &draw.floats(affine, -1.0, 1.0),
+    };
+    parameters.words().collect()
+}
+
+fn expanded_words(draw: &mut Draw, shape: Shape, affine: bool) -> Vec<u32> {
+    let Shape { inputs, centres, outputs } = shape;
+    let affine = if affine { inputs * outputs } else { 0 };
     let unit = f64::from(HALF_RANGE / UNITS);
     let decay = draw.one(0.01, 10.0 / inputs as f64) * unit * unit;
     let stored = centres.next_multiple_of(expanded::CENTRES_AT_ONCE);
@@ -57,6 +69,39 @@ fn words(draw: &mut Draw, shape: Shape, expanded: bool, affine: bool, one_width:
         affine: &draw.floats(affine, -unit, unit),
         exponents: &exponents,
         output_weights: &draw.floats(stored * outputs, -1e3, 1e3),
+    };
+    parameters.words().collect()
+}
+
+/// Weights of any bits: sums may wrap around, on the host as on the device.
+fn fixed16_words(draw: &mut Draw, shape: Shape, affine: bool) -> Vec<u32> {
+    let Shape { inputs, centres, outputs } = shape;
+    let pairs = inputs.div_ceil(2);
+    // Exponents up to 4·1.8² for each of up to four inputs, and of all together for more.
+    let decay = draw.one(1.0, f64::from(u32::MAX) * (4.0 / inputs as f64).min(1.0)) as u32;
+    let slope = f64::from(decay) / 2_f64.powi(33);
+    let mut words = Vec::new();
+    for _ in 0..centres.div_ceil(fixed16::CENTRES_AT_ONCE) {
+        for _ in 0..fixed16::CENTRES_AT_ONCE {
+            let mut a = vec![0_i16; 2 * pairs];
+            let of_inputs = a[..inputs].iter_mut();
+            of_inputs.for_each(|a| *a = (slope * draw.one(-26_214.0, 26_214.0)) as i16);
+            let square: u64 = a.iter().map(|a| u64::from(a.unsigned_abs()).pow(2)).sum();
+            let b = (square << 32).div_ceil(u64::from(decay)) as u32;
+            words.push(b + fixed16::EXPONENT_MARGIN);
+            words.extend_from_slice(bytemuck::cast_slice(&a));
+        }
+        words.extend((0..outputs * fixed16::CENTRES_AT_ONCE / 2).map(|_| draw.0.next_u64() as u32));
+    }
+    let tail = if affine { outputs * pairs } else { 0 };
+    let parameters = fixed16::Parameters {
+        input_midpoint: &draw.floats(inputs, 50.0, 70.0),
+        input_per_unit: &draw.floats(inputs, 0.0, 0.1 * f64::from(UNITS / HALF_RANGE)),
+        decay,
+        bias: &(0..outputs).map(|_| draw.0.next_u64() as i32).collect::<Vec<_>>(),
+        output_scale: &draw.floats(outputs, -1e-6, 1e-6),
+        affine: &(0..tail).map(|_| draw.0.next_u64() as u32).collect::<Vec<_>>(),
+        centres: &words,
     };
     parameters.words().collect()
 }
@@ -84,7 +129,9 @@ fn check(networks: &[Network<'_>], draw: &mut Draw, lines: usize) {
     let mut one_by_one = vec![0.0; at_once.len()];
     let rows = table.values.chunks_exact(inputs).zip(one_by_one.chunks_exact_mut(outputs));
     for ((readings, places), network) in rows.zip(networks.iter().cycle()) {
-        assert!(Batch::of(network, Kernel::Polynomial).is_some());
+        // The fixed-point form needs AVX2.
+        let vectorised = Batch::of(network, Kernel::Polynomial).is_some();
+        assert!(vectorised || network.format() == Format::Fixed16);
         infer_line(network, Kernel::Polynomial, readings, places);
     }
     let bits = |values: &[f64]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
@@ -99,20 +146,25 @@ proptest! {
     fn lines_at_once_are_lines_one_by_one_bit_for_bit(
         (inputs, centres, outputs) in (1_usize..24, 1_usize..150, 1_usize..24),
         (networks, lines) in (1_usize..4, 0_usize..70),
-        (expanded, affine, one_width) in (any::<bool>(), any::<bool>(), any::<bool>()),
+        format in prop::sample::select(vec![Format::F32Direct, Format::F32, Format::Fixed16]),
+        (affine, one_width) in (any::<bool>(), any::<bool>()),
         seed in any::<u64>(),
     ) {
         let mut draw = Draw(Xoshiro256PlusPlus::seed_from_u64(seed));
         let shape = Shape { inputs, centres, outputs };
         let words: Vec<Vec<u32>> =
-            (0..networks).map(|_| words(&mut draw, shape, expanded, affine, one_width)).collect();
+            (0..networks).map(|_| words(&mut draw, shape, format, affine, one_width)).collect();
         let networks: Vec<Network<'_>> = words
             .iter()
             .map(|words| {
-                if expanded {
-                    expanded::Network::try_new(shape, affine, words).unwrap().into()
-                } else {
-                    direct::Network::of_words(shape, one_width, affine, words).unwrap().into()
+match format {
+                    Format::F32Direct => {
+                        direct::Network::of_words(shape, one_width, affine, words).unwrap().into()
+                    }
+                    Format::F32 => expanded::Network::try_new(shape, affine, words).unwrap().into(),
+                    Format::Fixed16 => {
+                        fixed16::Network::try_new(shape, affine, words).unwrap().into()
+                    }
                 }
             })
             .collect();
