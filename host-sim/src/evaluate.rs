@@ -4,6 +4,7 @@ pub mod cost;
 pub mod gate;
 pub mod metrics;
 pub mod quantisation;
+pub mod ram;
 pub mod readout;
 pub mod table1;
 pub mod trade;

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use host_sim::Result;
+use host_sim::evaluate::ram::DecoderRam;
 use host_sim::model::LoadedModel;
 use serde::Serialize;
 
@@ -34,7 +35,7 @@ struct Summary {
     seed: u64,
     training_frames: u32,
     flash_bytes: usize,
-    ram_bytes: RamBytes,
+    ram_bytes: DecoderRam,
     inputs: Vec<ColumnSummary>,
     outputs: Vec<OutputSummary>,
 }
@@ -45,17 +46,6 @@ struct NetworkSummary {
     centres: usize,
     width: Vec<f32>,
     affine_tail: bool,
-}
-
-/// RAM that a 32-bit device needs for this shape, apart from what its calls keep on the stack.
-#[derive(Serialize)]
-struct RamBytes {
-    decoder: usize,
-    frame: usize,
-    estimate: usize,
-    scaled_readings: usize,
-    /// Of the whole array; 0 without a projection.
-    features: usize,
 }
 
 #[derive(Serialize)]
@@ -94,7 +84,6 @@ fn summarise(loaded: &LoadedModel) -> Summary {
         |(name, unit): (&str, &str)| ColumnSummary { name: name.into(), unit: unit.into() };
     let errors = metadata.training_rmse.iter().zip(metadata.full_scale.iter());
     let outputs = metadata.output_names.iter().zip(metadata.output_units.iter()).zip(errors);
-    let float = size_of::<f32>();
     Summary {
         format_version: model_core::blob::FORMAT_VERSION,
         name: metadata.name.into(),
@@ -110,13 +99,7 @@ fn summarise(loaded: &LoadedModel) -> Summary {
         seed: metadata.seed,
         training_frames: metadata.training_frames,
         flash_bytes: loaded.bytes().len(),
-        ram_bytes: RamBytes {
-            decoder: model_core::decoder_ram_bytes(shape.rows),
-            frame: shape.rows * shape.inputs * float,
-            estimate: shape.rows * (shape.outputs * float + 1),
-            scaled_readings: shape.inputs * float,
-            features: model.projection().map_or(0, |_| shape.inputs * float),
-        },
+        ram_bytes: DecoderRam::of(&model),
         inputs: metadata.input_names.iter().zip(metadata.input_units.iter()).map(column).collect(),
         outputs: outputs
             .map(|((name, unit), (training_rmse, full_scale))| OutputSummary {
@@ -164,18 +147,20 @@ fn page_of(s: &Summary) -> print::Page {
     }
     line("flash", format!("{} bytes", s.flash_bytes));
     let ram = &s.ram_bytes;
-    line(
-        "RAM",
-        format!(
-            "{} bytes: decoder {}, frame {}, estimate {}, scaled readings {}{} (weights stay in flash)",
-            ram.decoder + ram.frame + ram.estimate + ram.scaled_readings + ram.features,
-            ram.decoder,
-            ram.frame,
-            ram.estimate,
-            ram.scaled_readings,
-            if ram.features > 0 { format!(", features {}", ram.features) } else { String::new() }
-        ),
-    );
+    let parts = [
+        ("decoder", ram.decoder),
+        ("frame", ram.frame),
+        ("estimate", ram.estimate),
+        ("scaled readings", ram.scaled_readings),
+        ("features", ram.features),
+        ("activations", ram.activations),
+    ];
+    let parts: Vec<String> = parts
+        .iter()
+        .filter(|(_, bytes)| *bytes > 0)
+        .map(|(name, bytes)| format!("{name} {bytes}"))
+        .collect();
+    line("RAM", format!("{} bytes: {} (weights stay in flash)", ram.bytes(), parts.join(", ")));
     line("inputs", ends(&s.inputs.iter().map(|c| c.name.as_str()).collect::<Vec<_>>()));
     page.line(format_args!("{:<17} {:>13} {:>11}", "output", "training RMSE", "full scale"));
     for output in s.outputs.iter().take(SHOWN) {

@@ -3,8 +3,9 @@
 use model_core::rbf::Format;
 use rayon::prelude::*;
 
-use super::super::cost::{Cost, Costs, MEASURED_SHAPE, kernel_name};
+use super::super::cost::{Cost, Costs, kernel_name};
 use super::super::metrics::{self, Measure};
+use super::super::ram::DecoderRam;
 use super::gating::Gates;
 use super::{Plan, Point, SLOT_BYTES};
 use crate::dataset::Dataset;
@@ -16,8 +17,6 @@ use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::train::{self, FittedNetwork, Samples, Trained, projection};
 
-/// Bytes of stack that the f32 kernel keeps activations in.
-const F32_ACTIVATIONS_BYTES: usize = 512;
 /// Widths for features, which share the largest span of any, over those for a row's readings: at K = 64
 /// as good, at K = 256 better (`docs/projection.md`).
 const ARRAY_SPREAD: f64 = 0.5;
@@ -146,6 +145,7 @@ impl<'s> Judge<'s> {
     ) -> Result<()> {
         let Knobs { whole_array, centres, samples_averaged } = knobs;
         let (kernel, test) = (kernel_name(format, exponential), sets.test);
+        let ram = DecoderRam::of(&loaded.model());
         // Fewer centres than asked for are decoded as fast as the measured number or faster.
         let kind = (kernel.as_str(), centres, affine_tail, whole_array);
         let ungated = self.costs.frame(kind).ok_or_else(|| {
@@ -169,7 +169,7 @@ impl<'s> Judge<'s> {
                 frame,
                 frame_us: frame.cycles as f64 / self.plan.clock_mhz,
                 flash_bytes: loaded.bytes().len(),
-                ram_bytes: ram_bytes(format, whole_array, gate_k.is_some()),
+                ram_bytes: if gate_k.is_some() { ram.gated_bytes() } else { ram.bytes() },
                 on_front: false,
             });
             self.blobs.push(self.distinct.len());
@@ -184,21 +184,4 @@ impl<'s> Judge<'s> {
         }
         Ok(())
     }
-}
-
-/// Decoder, frame, estimate and working space; for a gate also the baseline, a frame, and the answer to it, an
-/// estimate.
-fn ram_bytes(format: Format, whole_array: bool, gated: bool) -> usize {
-    let [rows, inputs, outputs] = MEASURED_SHAPE;
-    let float = size_of::<f32>();
-    let frame_and_estimate = rows * inputs * float + rows * (outputs * float + 1);
-    let scaled = inputs * float;
-    let features = if whole_array { inputs * float } else { 0 };
-    let activations = if format == Format::F32 { F32_ACTIVATIONS_BYTES } else { 0 };
-    let copies = if gated { 2 } else { 1 };
-    model_core::decoder_ram_bytes(rows)
-        + copies * frame_and_estimate
-        + scaled
-        + features
-        + activations
 }

@@ -1,0 +1,54 @@
+//! RAM that decoding takes on a 32-bit device.
+
+use model_core::blob::Model;
+use model_core::rbf::Format;
+use serde::Serialize;
+
+/// Bytes of RAM by what they hold, the larger buffers on the stack among them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct DecoderRam {
+    /// Where each row's weights are, which stay in flash.
+    pub decoder: usize,
+    /// Readings of all rows.
+    pub frame: usize,
+    /// Outputs of all rows, and their status.
+    pub estimate: usize,
+    /// Of a row, on the stack.
+    pub scaled_readings: usize,
+    /// Of the whole array, on the stack; 0 without a projection.
+    pub features: usize,
+    /// Of 128 centres, on the stack of the f32 kernel; 0 without a network of that format.
+    pub activations: usize,
+}
+
+impl DecoderRam {
+    /// What `model` takes.
+    #[must_use]
+    pub fn of(model: &Model<'_>) -> Self {
+        let shape = model.shape();
+        let float = size_of::<f32>();
+        let readings = shape.inputs * float;
+        let f32_kernel = model.networks().any(|network| network.format() == Format::F32);
+        Self {
+            decoder: model_core::decoder_ram_bytes(shape.rows),
+            frame: shape.rows * readings,
+            estimate: shape.rows * (shape.outputs * float + 1),
+            scaled_readings: readings,
+            features: model.projection().map_or(0, |_| readings),
+            activations: if f32_kernel { 128 * float } else { 0 },
+        }
+    }
+
+    /// All together.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        let Self { decoder, frame, estimate, scaled_readings, features, activations } = self;
+        decoder + frame + estimate + scaled_readings + features + activations
+    }
+
+    /// All together behind a gate, which holds the baseline, a frame, and the answer to it, an estimate.
+    #[must_use]
+    pub fn gated_bytes(&self) -> usize {
+        self.bytes() + self.frame + self.estimate
+    }
+}
