@@ -86,7 +86,7 @@ pub struct Chart {
     pub series: Vec<Series>,
     /// Ranges of x that are shaded, to tell neighbours apart.
     pub bands: Vec<[f64; 2]>,
-    /// Words below points.
+    /// Words below points, as far as there is room.
     pub notes: Vec<([f64; 2], String)>,
     /// Whether names stand at the right end of the lines instead of in a legend.
     pub end_labels: bool,
@@ -139,9 +139,17 @@ impl Chart {
             frame.draw_series(&mut svg, series);
             svg.close();
         }
+        let mut noted: Vec<[f64; 2]> = Vec::new();
         for ([x, y], note) in &self.notes {
-            let below = frame.y(*y) + TEXT_PX + 5.0;
-            svg.text(frame.x(*x), below, Anchor::Middle, "note-in-chart", note);
+            let [middle, below] = [frame.x(*x), frame.y(*y) + TEXT_PX + 5.0];
+            let beside = |[x, y]: &[f64; 2]| {
+                (middle - x).abs() > text_width(note) + 4.0 || (below - y).abs() > TEXT_PX
+            };
+            // What has no room is left out.
+            if noted.iter().all(beside) {
+                svg.text(middle, below, Anchor::Middle, "note-in-chart", note);
+                noted.push([middle, below]);
+            }
         }
         if self.end_labels {
             frame.draw_end_labels(&mut svg);
