@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::random::Stream;
 use crate::scene::{NoiseKind, Scene, deformation_names};
 use crate::sensor::{BlockModel, Scratch};
-use crate::simd::{self, LANES, Work};
+use crate::simd::{self, LANES};
 
 mod block;
 
@@ -101,7 +101,11 @@ pub fn forward(scene: &Scene, file: &DataFile) -> Result<Vec<f64>> {
     let mut readings = vec![0.0; file.lines() * of_a_line];
     let blocks = readings.par_chunks_mut(LANES * of_a_line).enumerate();
     blocks.for_each_init(Scratch::default, |scratch, (block, readings)| {
-        simd::widest(ForwardBlock { forward: &forward, scratch, first: block * LANES, readings });
+        let first = block * LANES;
+        simd::widest(
+            #[inline(always)]
+            || forward.block(scratch, first, readings),
+        );
     });
     Ok(readings)
 }
@@ -114,38 +118,29 @@ struct Forward<'a> {
     model: BlockModel<'a>,
 }
 
-/// [`forward`] for the lines from number `first` on, at most [`LANES`].
-struct ForwardBlock<'a> {
-    forward: &'a Forward<'a>,
-    scratch: &'a mut Scratch,
-    first: usize,
-    readings: &'a mut [f64],
-}
-
-impl Work for ForwardBlock<'_> {
-    type Output = ();
-
+impl Forward<'_> {
+    /// The lines from number `first` on, at most [`LANES`].
     #[inline(always)]
-    fn call(self) {
-        let Forward { scene, file, columns, model } = self.forward;
+    fn block(&self, scratch: &mut Scratch, first: usize, readings: &mut [f64]) {
+        let Self { scene, file, columns, model } = self;
         let (rows, column_wires) = (scene.read_rows.len(), scene.sensor.column_wires);
-        let lines = self.readings.len() / (rows * column_wires);
+        let lines = readings.len() / (rows * column_wires);
         let mut deformation_mm = vec![[[0.0; LANES]; 3]; columns[0].len() / 3];
         let mut resistance_ohm = vec![[0.0; LANES]; column_wires];
         for (place, (&row, columns)) in scene.read_rows.iter().zip(*columns).enumerate() {
             for (lanes, column) in deformation_mm.as_flattened_mut().iter_mut().zip(columns) {
                 for (line, value) in lanes[..lines].iter_mut().enumerate() {
-                    *value = file.value(self.first + line, *column);
+                    *value = file.value(first + line, *column);
                 }
             }
             model.row_column_resistance_ohm(
                 row,
                 scene.precision,
                 &deformation_mm,
-                self.scratch,
+                scratch,
                 &mut resistance_ohm,
             );
-            let of_lines = self.readings.chunks_exact_mut(column_wires).skip(place).step_by(rows);
+            let of_lines = readings.chunks_exact_mut(column_wires).skip(place).step_by(rows);
             for (line, readings) in of_lines.enumerate() {
                 for (place, lanes) in readings.iter_mut().zip(&resistance_ohm) {
                     *place = lanes[line];

@@ -8,7 +8,7 @@ use crate::elementary::{exp, is_near_an_axis, sin_cos};
 use crate::random::{Purpose, RandomBlock, Stream};
 use crate::scene::{Deformation, Quantity, Scene};
 use crate::sensor::{BlockModel, Scratch, Vector3};
-use crate::simd::{self, LANES, Lanes, Work};
+use crate::simd::{self, LANES, Lanes};
 
 /// What all blocks of a synthesis share.
 pub(super) struct Synthesis<'s> {
@@ -73,7 +73,10 @@ impl<'s> Synthesis<'s> {
         readings: &mut [f64],
         outputs: &mut [f64],
     ) {
-        simd::widest(Fill { synthesis: self, workspace, first, readings, outputs });
+        simd::widest(
+            #[inline(always)]
+            || self.fill_in_lanes(workspace, first, readings, outputs),
+        );
     }
 
     #[inline(always)]
@@ -137,30 +140,24 @@ impl<'s> Synthesis<'s> {
             }
         }
     }
-}
 
-struct Fill<'a, 's> {
-    synthesis: &'a Synthesis<'s>,
-    workspace: &'a mut Workspace,
-    first: usize,
-    readings: &'a mut [f64],
-    outputs: &'a mut [f64],
-}
-
-impl Work for Fill<'_, '_> {
-    type Output = ();
-
+    /// [`fill`](Self::fill), to be inlined into [`simd::widest`].
     #[inline(always)]
-    fn call(self) {
-        let Self { synthesis, workspace, first, readings, outputs } = self;
-        let scene = synthesis.scene;
+    fn fill_in_lanes(
+        &self,
+        workspace: &mut Workspace,
+        first: usize,
+        readings: &mut [f64],
+        outputs: &mut [f64],
+    ) {
+        let scene = self.scene;
         let (rows, columns) = (scene.read_rows.len(), scene.sensor.column_wires);
         let Workspace { deformation_mm, resistance_ohm, scratch } = workspace;
         let mut random = RandomBlock::new(first);
-        let contact = synthesis.draw_contact(&mut random);
+        let contact = self.draw_contact(&mut random);
         for (place, &row) in scene.read_rows.iter().enumerate() {
-            synthesis.draw_deformation(row, &mut random, contact.as_ref(), deformation_mm);
-            let model = &synthesis.model;
+            self.draw_deformation(row, &mut random, contact.as_ref(), deformation_mm);
+            let model = &self.model;
             let precision = scene.precision;
             model.row_column_resistance_ohm(
                 row,
@@ -169,17 +166,17 @@ impl Work for Fill<'_, '_> {
                 scratch,
                 resistance_ohm,
             );
-            synthesis.disturb((place, row), &mut random, resistance_ohm);
+            self.disturb((place, row), &mut random, resistance_ohm);
             let row_of_frames = readings.chunks_exact_mut(columns).skip(place).step_by(rows);
             for (frame, readings) in row_of_frames.enumerate() {
                 for (place, lanes) in readings.iter_mut().zip(&*resistance_ohm) {
                     *place = lanes[frame];
                 }
             }
-            let (width, lanes) = (synthesis.outputs.len(), deformation_mm.as_flattened());
+            let (width, lanes) = (self.outputs.len(), deformation_mm.as_flattened());
             let row_of_frames = outputs.chunks_exact_mut(width).skip(place).step_by(rows);
             for (frame, outputs) in row_of_frames.enumerate() {
-                for (output, (place, factor)) in outputs.iter_mut().zip(&synthesis.outputs) {
+                for (output, (place, factor)) in outputs.iter_mut().zip(&self.outputs) {
                     *output = factor * lanes[*place][frame];
                 }
             }

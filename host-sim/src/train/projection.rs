@@ -141,7 +141,10 @@ fn products(dataset: &Dataset, means: &[f64]) -> Vec<f64> {
                 let readings = readings.iter().map(|reading| f64::from(*reading as f32));
                 let values = readings.chain(outputs.iter().copied());
                 let z: Vec<f64> = values.zip(&means).map(|(value, mean)| value - mean).collect();
-                simd::widest(AddProducts { z: &z, sums: &mut sums, inputs });
+                simd::widest(
+                    #[inline(always)]
+                    || add_products(&z, inputs, &mut sums),
+                );
             }
             sums
         })
@@ -154,22 +157,11 @@ fn products(dataset: &Dataset, means: &[f64]) -> Vec<f64> {
 }
 
 /// Adds zᵢ·zⱼ to the sums, for i among the inputs and j ≥ i.
-struct AddProducts<'a> {
-    z: &'a [f64],
-    sums: &'a mut [f64],
-    inputs: usize,
-}
-
-impl simd::Work for AddProducts<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let Self { z, sums, inputs } = self;
-        for (i, sums) in sums.chunks_exact_mut(z.len()).take(inputs).enumerate() {
-            let factor = z[i];
-            sums[i..].iter_mut().zip(&z[i..]).for_each(|(sum, z)| *sum += factor * z);
-        }
+#[inline(always)]
+fn add_products(z: &[f64], inputs: usize, sums: &mut [f64]) {
+    for (i, sums) in sums.chunks_exact_mut(z.len()).take(inputs).enumerate() {
+        let factor = z[i];
+        sums[i..].iter_mut().zip(&z[i..]).for_each(|(sum, z)| *sum += factor * z);
     }
 }
 
