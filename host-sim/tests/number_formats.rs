@@ -4,12 +4,14 @@
 use host_sim::columns;
 use host_sim::dataset::{Block, Table};
 use host_sim::infer::{Kernel, infer};
+use host_sim::model::{LoadedModel, Origin, encode};
 use host_sim::number_format::NumberFormat;
+use host_sim::progress::Progress;
 use host_sim::random::Stream;
 use host_sim::scene::Scene;
 use host_sim::synth;
 use host_sim::train::least_squares::{self, Regressors};
-use host_sim::train::{InputScale, Options, Samples};
+use host_sim::train::{InputScale, Options, Samples, train};
 use rayon::prelude::*;
 
 const NOISE_LEVELS: [f64; 5] = [0.0, 0.005, 0.01, 0.05, 0.1];
@@ -101,6 +103,39 @@ fn check(name: &str) {
         // Without noise, weights are large and rest on small differences: 16 bits tell.
         let most = if noise >= 0.005 { 1.0 } else { 40.0 };
         assert!(fixed.iter().all(|growth| *growth <= most), "fixed16 at {noise}: {fixed:?}");
+    }
+}
+
+/// RMSE in mm by axis of one network for the whole array.
+fn errors_of_array(noise: f64, spread: f64, format: NumberFormat) -> Vec<f64> {
+    let mut scene = Scene::load("press").unwrap();
+    scene.set_noise_level(noise).unwrap();
+    let training = synth::synthesise(&scene, Stream::Training, 20000);
+    let test = synth::synthesise(&scene, Stream::Test, 4000);
+    let options =
+        Options { whole_array: true, format, ..Options::new(64, spread, true, scene.seed) };
+    let trained = train(&training, &options, &Progress::silent()).unwrap();
+    let blob = encode(&trained, &training, &Origin::of_scene(&scene)).unwrap();
+    let model = LoadedModel::from_bytes("array".as_ref(), &blob).unwrap();
+    let estimate = model.decode(Kernel::default(), &test.inputs);
+    let values = (test.outputs.values.len() / 3) as f64;
+    let squares = by_axis(&test.outputs, &estimate.values);
+    squares.iter().map(|square| (square / values).sqrt()).collect()
+}
+
+#[test]
+fn sixteen_bits_cost_the_whole_array_little() {
+    // Wide Gaussians are like each other, and weights of 16 bits too coarse to tell them apart.
+    for (noise, spread, most) in [(0.005, 0.4, 1.0), (0.05, 0.4, 1.0), (0.005, 0.8, 2.5)] {
+        let [float, fixed] = [NumberFormat::F32, NumberFormat::Fixed16]
+            .map(|format| errors_of_array(noise, spread, format));
+        let growth = float.iter().zip(&fixed).map(|(f32, fixed)| 100.0 * (fixed / f32 - 1.0));
+        let growth: Vec<f64> = growth.collect();
+        println!(
+            "array, spread {spread}, noise {} %: f32 {float:.5?} mm, fixed16 {growth:+.3?} %",
+            100.0 * noise
+        );
+        assert!(growth.iter().all(|growth| *growth <= most), "fixed16 at {noise}: {growth:?}");
     }
 }
 

@@ -10,10 +10,6 @@ use super::tiles::{Accumulate, CENTRES, accumulate};
 
 /// What differs between the forms of exponents.
 pub(super) trait Exponent {
-    /// What one input adds to a sum.
-    type Terms<S: Simd>: Accumulate<Shared = f32, Register = S::f32s>;
-    /// The same, for these vectors.
-    fn terms<S: Simd>(simd: S) -> Self::Terms<S>;
     /// Clamps a scaled input.
     fn clamp(&self, scaled: f32) -> f32;
     /// What the centres share: the second partial sum's start.
@@ -29,33 +25,32 @@ pub(super) trait Exponent {
 
     /// Makes activations of exponents.
     fn powers<S: Simd>(simd: S, exponents: &mut [S::f32s; ABREAST]);
+}
 
-    /// Four partial sums of each centre, from their starts, added pairwise.
-    #[inline(always)]
-    fn four_sums<S: Simd>(
-        &self,
-        simd: S,
-        starts: [[Lanes<S>; CENTRES]; 4],
-        tile: &[[f32; CENTRES]],
-        x: &[Lanes<S>],
-    ) -> [Lanes<S>; CENTRES] {
-        let terms = Self::terms(simd);
-        let [mut first, mut second, mut third, mut fourth] = starts;
-        let (x_first, x_rest) = x.split_at(x.len().div_ceil(4));
-        let (x_second, x_rest) = x_rest.split_at((x.len() + 2) / 4);
-        let (x_third, x_fourth) = x_rest.split_at((x.len() + 1) / 4);
-        let (tile_first, rest) = tile.split_at(x_first.len());
-        let (tile_second, rest) = rest.split_at(x_second.len());
-        let (tile_third, tile_fourth) = rest.split_at(x_third.len());
-        accumulate(terms, x_first, tile_first, &mut first);
-        accumulate(terms, x_second, tile_second, &mut second);
-        add(simd, &mut first, &second);
-        accumulate(terms, x_third, tile_third, &mut third);
-        accumulate(terms, x_fourth, tile_fourth, &mut fourth);
-        add(simd, &mut third, &fourth);
-        add(simd, &mut first, &third);
-        first
-    }
+/// Four partial sums of each centre, from their starts, added pairwise.
+#[inline(always)]
+fn four_sums<S: Simd, const SQUARES: bool>(
+    terms: Terms<S, SQUARES>,
+    starts: [[Lanes<S>; CENTRES]; 4],
+    tile: &[[f32; CENTRES]],
+    x: &[Lanes<S>],
+) -> [Lanes<S>; CENTRES] {
+    let Terms(simd) = terms;
+    let [mut first, mut second, mut third, mut fourth] = starts;
+    let (x_first, x_rest) = x.split_at(x.len().div_ceil(4));
+    let (x_second, x_rest) = x_rest.split_at((x.len() + 2) / 4);
+    let (x_third, x_fourth) = x_rest.split_at((x.len() + 1) / 4);
+    let (tile_first, rest) = tile.split_at(x_first.len());
+    let (tile_second, rest) = rest.split_at(x_second.len());
+    let (tile_third, tile_fourth) = rest.split_at(x_third.len());
+    accumulate(terms, x_first, tile_first, &mut first);
+    accumulate(terms, x_second, tile_second, &mut second);
+    add(simd, &mut first, &second);
+    accumulate(terms, x_third, tile_third, &mut third);
+    accumulate(terms, x_fourth, tile_fourth, &mut fourth);
+    add(simd, &mut third, &fourth);
+    add(simd, &mut first, &third);
+    first
 }
 
 #[inline(always)]
@@ -67,11 +62,11 @@ fn add<S: Simd>(simd: S, to: &mut [Lanes<S>; CENTRES], what: &[Lanes<S>; CENTRES
     }
 }
 
-/// Adds products, not contracted: the device does not.
+/// Adds products, or squares of differences, not contracted: the device does not.
 #[derive(Clone, Copy)]
-pub(super) struct Products<S>(pub S);
+pub(super) struct Terms<S, const SQUARES: bool>(pub S);
 
-impl<S: Simd> Accumulate for Products<S> {
+impl<S: Simd, const SQUARES: bool> Accumulate for Terms<S, SQUARES> {
     type Shared = f32;
     type Register = S::f32s;
 
@@ -82,27 +77,13 @@ impl<S: Simd> Accumulate for Products<S> {
 
     #[inline(always)]
     fn accumulate(self, sum: S::f32s, factor: S::f32s, shared: S::f32s) -> S::f32s {
-        self.0.add_f32s(sum, self.0.mul_f32s(factor, shared))
-    }
-}
-
-/// Adds squares of differences.
-#[derive(Clone, Copy)]
-pub(super) struct Squares<S>(S);
-
-impl<S: Simd> Accumulate for Squares<S> {
-    type Shared = f32;
-    type Register = S::f32s;
-
-    #[inline(always)]
-    fn splat(self, shared: f32) -> S::f32s {
-        self.0.splat_f32s(shared)
-    }
-
-    #[inline(always)]
-    fn accumulate(self, sum: S::f32s, factor: S::f32s, shared: S::f32s) -> S::f32s {
-        let difference = self.0.sub_f32s(factor, shared);
-        self.0.add_f32s(sum, self.0.mul_f32s(difference, difference))
+        let term = if SQUARES {
+            let difference = self.0.sub_f32s(factor, shared);
+            self.0.mul_f32s(difference, difference)
+        } else {
+            self.0.mul_f32s(factor, shared)
+        };
+        self.0.add_f32s(sum, term)
     }
 }
 
@@ -119,13 +100,6 @@ impl Exponent for Expanded {
         let above = if number > -UNITS { number } else { -UNITS };
         let inside = if above < UNITS { above } else { UNITS };
         inside.trunc() + 0.0 // −0 becomes 0
-    }
-
-    type Terms<S: Simd> = Products<S>;
-
-    #[inline(always)]
-    fn terms<S: Simd>(simd: S) -> Products<S> {
-        Products(simd)
     }
 
     #[inline(always)]
@@ -166,7 +140,7 @@ impl Exponent for Expanded {
             *place = [simd.splat_f32s(head); VECTORS];
         }
         let starts = [heads, [*opened; CENTRES], [zero; CENTRES], [zero; CENTRES]];
-        self.four_sums(simd, starts, &tile[1..], x)
+        four_sums(Terms::<S, false>(simd), starts, &tile[1..], x)
     }
 
     #[inline(always)]
@@ -184,13 +158,6 @@ impl Exponent for Direct {
         scaled.clamp(CLAMP[0], CLAMP[1])
     }
 
-    type Terms<S: Simd> = Squares<S>;
-
-    #[inline(always)]
-    fn terms<S: Simd>(simd: S) -> Squares<S> {
-        Squares(simd)
-    }
-
     #[inline(always)]
     fn open<S: Simd>(&self, simd: S, _: &[Lanes<S>]) -> Lanes<S> {
         [simd.splat_f32s(0.0); VECTORS]
@@ -204,7 +171,7 @@ impl Exponent for Direct {
         tile: &[[f32; CENTRES]],
         x: &[Lanes<S>],
     ) -> [Lanes<S>; CENTRES] {
-        let mut values = self.four_sums(simd, [[*opened; CENTRES]; 4], &tile[1..], x);
+        let mut values = four_sums(Terms::<S, true>(simd), [[*opened; CENTRES]; 4], &tile[1..], x);
         for (values, &decay) in values.iter_mut().zip(&tile[0]) {
             let decay = simd.splat_f32s(decay);
             for value in values {

@@ -6,7 +6,7 @@
 use model_core::rbf::{Network, Shape};
 use pulp::{Simd, WithSimd};
 
-use super::exponent::{Direct, Expanded, Exponent, Products};
+use super::exponent::{Direct, Expanded, Exponent, Terms};
 use super::lines::{Lines, VECTORS};
 use super::tiles::{CENTRES, Weights, in_fours};
 use crate::infer::Kernel;
@@ -132,7 +132,7 @@ impl Work<'_> {
             }
 
             y.fill(zero);
-            network.affine.accumulate(Products(simd), 0, &x, &mut y);
+            network.affine.accumulate(Terms::<_, false>(simd), 0, &x, &mut y);
             let opened = exponent.open(simd, &x_interleaved);
             let mut first = 0;
             for centres in network.centres.chunks(KEPT / CENTRES * (1 + inputs)) {
@@ -146,7 +146,12 @@ impl Work<'_> {
                     E::powers(simd, values);
                 }
                 let count = (tiles * CENTRES).min(network.weights.factors() - first);
-                network.weights.accumulate(Products(simd), first, &activations[..count], &mut y);
+                network.weights.accumulate(
+                    Terms::<_, false>(simd),
+                    first,
+                    &activations[..count],
+                    &mut y,
+                );
                 first += count;
             }
             for (y, &bias) in y.iter_mut().zip(network.bias) {
