@@ -121,7 +121,7 @@ impl NullaryFnOnce for Work<'_> {
                     *y = simd.mul_f32x8(simd.convert_i32x8_to_f32x8(sum), scale);
                 }
             }
-            block.give(simd, &mut y, poison);
+            block.give(simd, &y, poison);
         }
     }
 }

@@ -158,7 +158,7 @@ impl Work<'_> {
                 let bias = simd.splat_f32s(bias);
                 y.iter_mut().for_each(|y| *y = simd.add_f32s(*y, bias));
             }
-            block.give(simd, &mut y, poison);
+            block.give(simd, &y, poison);
         }
     }
 }

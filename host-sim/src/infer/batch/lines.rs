@@ -16,33 +16,23 @@ pub(super) struct Lines<'a> {
     pub outputs_step: usize,
 }
 
-impl<'a> Lines<'a> {
-    /// The lines of a block after the other.
+impl Lines<'_> {
+    /// Blocks of as many lines as there are lanes, the last perhaps of fewer.
     #[inline(always)]
-    pub(super) fn blocks<S: Simd>(self) -> impl Iterator<Item = Block<'a>> {
+    pub(super) fn blocks<S: Simd>(self) -> impl Iterator<Item = Self> {
         let lanes = VECTORS * S::F32_LANES;
         let Self { readings, readings_step, outputs, outputs_step } = self;
         let outputs = outputs.chunks_mut(outputs_step * lanes);
-        readings.chunks(readings_step * lanes).zip(outputs).map(move |(readings, outputs)| Block {
+        readings.chunks(readings_step * lanes).zip(outputs).map(move |(readings, outputs)| Self {
             readings,
             readings_step,
             outputs,
             outputs_step,
         })
     }
-}
 
-/// As many lines as there are lanes, or fewer at the end.
-pub(super) struct Block<'a> {
-    readings: &'a [f64],
-    readings_step: usize,
-    outputs: &'a mut [f64],
-    outputs_step: usize,
-}
-
-impl Block<'_> {
-    /// Takes the readings; lanes of no line keep what they had. NaN is returned where one is not finite as an
-    /// `f32`, and 0 elsewhere.
+    /// Takes the readings of a block; lanes of no line keep what they had. Returned is NaN where one is not
+    /// finite as an `f32`, and 0 elsewhere.
     #[inline(always)]
     pub(super) fn take<S: Simd>(&self, simd: S, inputs: &mut [Lanes<S>]) -> Lanes<S> {
         let values = bytemuck::cast_slice_mut::<_, f32>(inputs);
@@ -71,11 +61,11 @@ impl Block<'_> {
         poison
     }
 
-    /// Gives the outputs of its lines, all NaN where `poison` or one of them is not finite.
+    /// Gives the lines of a block their outputs, all NaN where `poison` or one of them is not finite.
     #[inline(always)]
-    pub(super) fn give<S: Simd>(self, simd: S, outputs: &mut [Lanes<S>], poison: Lanes<S>) {
+    pub(super) fn give<S: Simd>(self, simd: S, outputs: &[Lanes<S>], poison: Lanes<S>) {
         let mut poison = poison;
-        for output in &*outputs {
+        for output in outputs {
             add_difference_to_itself(simd, &mut poison, output);
         }
         let count = outputs.len();
