@@ -52,6 +52,19 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
     write_whole(path, |file| file.write_all(bytes).map_err(|cause| Error::write(path, cause)))
 }
 
+/// Removes the file at `path`, if there is one.
+///
+/// # Errors
+/// [`Error::Write`].
+pub fn remove(path: &Path) -> Result<()> {
+    match fs::remove_file(path) {
+        Err(cause) if cause.kind() != std::io::ErrorKind::NotFound => {
+            Err(Error::write(path, cause))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Fails early, before long work, where [`write_whole`] could not write later, or would write over
 /// one of the command's own `inputs`.
 ///

@@ -28,6 +28,10 @@ pub use format::FittedNetwork;
 /// Default of [`Options::initial_covariance`].
 pub const INITIAL_COVARIANCE: f64 = 1e6;
 
+/// Widths for the features of a whole array, which share the largest span of any, over those for a row's
+/// readings: at K = 64 as good, at K = 256 better (`docs/projection.md`).
+pub const WHOLE_ARRAY_SPREAD: f64 = 0.5;
+
 /// How a network is trained.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {

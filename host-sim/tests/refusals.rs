@@ -138,6 +138,8 @@ fn what_cannot_be_traded_leaves_no_folder_behind() {
     refused(&folder, &["trade", "press", "--centres", "20"], &["--centres 20", "[16, 32"]);
     refused(&folder, &["trade", "press", "--average", "4,4"], &["--average gives 4 twice"]);
     refused(&folder, &["trade", "press", "--max-error", "0", "-o", "a/b"], &["--max-error 0"]);
+    refused(&folder, &["trade", "press", "--max-cycles", "0"], &["--max-cycles 0", "positive"]);
+    refused(&folder, &["trade", "press", "--max-flash", "0"], &["--max-flash 0", "positive"]);
 }
 
 #[test]

@@ -29,7 +29,14 @@ fn plan() -> Plan {
 }
 
 fn compute(scene: &Scene, limits: Limits) -> Result<Trade> {
-    trade::compute(scene, &plan(), "dz_mm", &limits, &Progress::silent())
+    compute_plan(scene, &plan(), limits)
+}
+
+fn compute_plan(scene: &Scene, plan: &Plan, limits: Limits) -> Result<Trade> {
+    limits.check()?;
+    let mut trade = trade::compute(scene, plan, "dz_mm", &Progress::silent())?;
+    trade.choose(&limits)?;
+    Ok(trade)
 }
 
 #[test]
@@ -87,7 +94,7 @@ fn the_chosen_blob_is_what_the_table_says() {
     let scene = press();
     let limits = Limits { error: Some(0.055), ..Limits::default() };
     let plan = Plan { gate_k: vec![], ..plan() };
-    let trade = trade::compute(&scene, &plan, "dz_mm", &limits, &Progress::silent()).unwrap();
+    let trade = compute_plan(&scene, &plan, limits).unwrap();
     let chosen = trade.chosen.unwrap();
     let point = &trade.points[chosen];
     assert!(point.rmse("dz_mm") <= 0.055);
@@ -114,7 +121,7 @@ fn behind_a_gate_points_err_as_the_gates_rows_do_and_cost_their_share() {
     let plan =
         Plan { centres: vec![16], samples_averaged: vec![4], gate_k: vec![3.5], clock_mhz: 1.0 };
     let limits = Limits { cycles: Some(10_000), ..Limits::default() };
-    let trade = trade::compute(&scene, &plan, "dz_mm", &limits, &Progress::silent()).unwrap();
+    let trade = compute_plan(&scene, &plan, limits).unwrap();
     let costs = Costs::measured().unwrap();
     // The gate command's way: the model by itself, and the same test frames.
     scene.noise.level /= 2.0;
@@ -183,8 +190,15 @@ fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
     assert!(read("out/few/trade.svg").contains("c1 hollow mark"));
     assert!(read("out/few/trade.html").contains("gate k</th>"));
 
-    let page = folder.succeed(&[&few[..], &["--gate", "none"]].concat());
+    assert!(folder.path("out/few/chosen.bin").exists());
+    // What was measured is kept where nothing is chosen, and no other run's choice beside it.
+    let output = folder.run(&[&few[..], &["--gate", "none", "--max-cycles", "100"]].concat());
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.code() == Some(2) && stderr.contains("--max-cycles 100"), "{stderr}");
+    let page = String::from_utf8(output.stdout).unwrap();
+    assert!(page.contains("f32-direct") && !page.contains("chosen:"), "{page}");
     assert!(!read("out/few/trade.svg").contains("c1 hollow mark"), "{page}");
+    assert!(!folder.path("out/few/chosen.bin").exists());
     // Without noise there is no gate, and the note says why.
     let output = folder.run(&[&few[..], &["--noise", "0"]].concat());
     let stderr = String::from_utf8(output.stderr).unwrap();
@@ -217,8 +231,7 @@ fn limits_that_nothing_meets_and_scenes_that_were_not_measured_are_refused() {
     let message = compute(&other, Limits::default()).unwrap_err().to_string();
     assert!(message.contains("7 rows of 18 readings"), "{message}");
     let refusal = |scene: &Scene, plan: &Plan| {
-        let outcome = trade::compute(scene, plan, "dz_mm", &Limits::default(), &Progress::silent());
-        outcome.unwrap_err().to_string()
+        compute_plan(scene, plan, Limits::default()).unwrap_err().to_string()
     };
     let mut plan =
         Plan { centres: vec![20], samples_averaged: vec![1], gate_k: vec![], clock_mhz: 1.0 };

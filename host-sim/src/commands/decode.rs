@@ -61,9 +61,12 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let mut page = print::Page::default();
     page.line(format_args!("{} frames decoded into {}", summary.frames, summary.file.display()));
     if incomplete > 0 {
-        page.line(format_args!(
-            "{incomplete} of them miss a reading: the outputs of its row-wire are empty"
-        ));
+        let lost = if loaded.model().projection().is_some() {
+            "all outputs are empty there"
+        } else {
+            "the outputs of its row-wire are empty"
+        };
+        page.line(format_args!("{incomplete} of them miss a reading: {lost}"));
     }
     page.print()
 }

@@ -108,7 +108,8 @@ fn page_of(result: &GateResult) -> print::Page {
         "k: standard deviations of their noise within which a row's readings are, and their sum is, for it to\n\
          be at rest; tolerance: k × noise, what a device is configured with. skipped: rows of the scene that\n\
          are at rest, of all. woken: rows of the untouched sensor that are not; theory: at most\n\
-         1 − (1 − 2Q(k'))^(n+1) for n readings a row, k' = k/√(1 + 1/B) for a baseline of B frames. missed: rows\n\
+         1 − (1 − 2Q(k'))^(n+1) for n readings a row (of one network for the whole array, whose rows wake\n\
+         together, as many times over as there are rows), k' = k/√(1 + 1/B) for a baseline of B frames. missed: rows\n\
          at rest, of those in which some electrode moved by more than the size, ‖Δ‖; largest: the largest ‖Δ‖\n\
          in a row at rest.\n\
          RMSE: √mean(e²) over all rows of the scene, whether at rest or not.",

@@ -112,6 +112,12 @@ fn summarise(loaded: &LoadedModel) -> Summary {
     }
 }
 
+/// A width as it was given: numbers of the blob's format lie a little beside.
+fn digits(width: f32) -> String {
+    let text = format!("{width:.4}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
 /// Outputs that are listed for people.
 const SHOWN: usize = 24;
 
@@ -138,7 +144,7 @@ fn page_of(s: &Summary) -> print::Page {
             .width
             .iter()
             .fold((f32::INFINITY, 0.0_f32), |(low, high), w| (low.min(*w), high.max(*w)));
-        let width = if low == high { format!("{low}") } else { format!("{low}…{high}") };
+        let width = if low == high { digits(low) } else { digits(low) + "…" + &digits(high) };
         let tail = if network.affine_tail { ", affine tail" } else { "" };
         line(
             &format!("network {index}"),

@@ -75,6 +75,15 @@ pub fn model(path: Option<&Path>, scene: &Scene, progress: &Progress) -> Result<
     let fits = metadata.input_names.iter().eq(scene.reading_names())
         && metadata.output_names.iter().eq(scene.output_names());
     if fits {
+        if metadata.name != scene.name {
+            eprintln!(
+                "note: {} was trained on {:?}, not on {:?}; give --model a model of the scene's own, or leave \
+                 it out to train one",
+                path.display(),
+                metadata.name,
+                scene.name
+            );
+        }
         return Ok(loaded);
     }
     let message = format!(

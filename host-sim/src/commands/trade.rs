@@ -93,19 +93,24 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         cycles: arguments.max_cycles,
         flash_bytes: arguments.max_flash,
     };
+    limits.check()?;
     let folder = arguments.output.join(&scene.name);
-    let trade = output::in_folder(&folder, || {
+    let (trade, choice) = output::in_folder(&folder, || {
         for file in FILES {
             output::check_writable(&folder.join(file), &[arguments.scene.path()])?;
         }
-        let trade = trade::compute(&scene, &plan, group, &limits, &Progress::on_terminal())?;
+        let mut trade = trade::compute(&scene, &plan, group, &Progress::on_terminal())?;
+        let choice = trade.choose(&limits);
         write_files(&folder, &trade)?;
-        Ok(trade)
+        Ok((trade, choice))
     })?;
     if common.json {
-        return print::json(&trade);
+        print::json(&trade)?;
+    } else {
+        page_of(&trade, &folder).print()?;
     }
-    page_of(&trade, &folder).print()
+    // What was measured is kept and shown, whether or not a point is within the limits.
+    choice
 }
 
 /// A value of `--gate`.
@@ -178,9 +183,11 @@ fn write_files(folder: &Path, trade: &Trade) -> Result<()> {
     for (name, text) in texts {
         output::write_bytes(&folder.join(name), text.as_bytes())?;
     }
+    let chosen = folder.join("chosen.bin");
     match trade.chosen {
-        Some(point) => output::write_bytes(&folder.join("chosen.bin"), trade.blob(point)),
-        None => Ok(()),
+        Some(point) => output::write_bytes(&chosen, trade.blob(point)),
+        // An earlier run's would lie beside figures that are not its own.
+        None => output::remove(&chosen),
     }
 }
 
@@ -253,7 +260,8 @@ fn page_of(trade: &Trade, folder: &Path) -> print::Page {
         "\n*: nothing is better than this in RMSE of {}, cycles and samples, and worse in none\n\
          array: one network for all rows, behind a projection; those larger than a slot (128 KiB) are left out,\n\
          and none larger than that is chosen unless --max-flash says so\n\
-         gate: k of a gate for rows at rest; its cycles are the mean of the test frames",
+         gate: k of a gate for rows at rest; its cycles are the mean of the test frames\n\
+         f32 whose distances may not be expanded (docs/formats.md) is the f32-direct beside it, and not listed",
         trade.group
     ));
     if let Some(chosen) = trade.chosen {

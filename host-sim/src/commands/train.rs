@@ -13,6 +13,7 @@ use host_sim::scene::{EMBEDDED, Scene};
 use host_sim::train::select::{self, Selection};
 use host_sim::train::{self, Options};
 use host_sim::{Error, Result, columns, output, synth};
+use model_core::rbf::Format;
 use serde::Serialize;
 
 use super::scene_argument::NoiseArgument;
@@ -42,7 +43,8 @@ pub struct Arguments {
     /// Centres K; with --select, candidates [default: the scene's, or 64].
     #[arg(long, value_name = "K", value_delimiter = ',')]
     centres: Vec<usize>,
-    /// Width σ on scaled inputs; with --select, candidates [default: the scene's, or 0.8].
+    /// Width σ on scaled inputs; with --select, candidates [default: the scene's, or 0.8; half
+    /// of that for `--whole-array`].
     #[arg(long, value_name = "S", value_delimiter = ',')]
     spread: Vec<f64>,
     /// Leave out the affine tail A·x.
@@ -105,7 +107,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 
     let mut options = source.defaults;
     options.affine_tail &= !arguments.no_affine;
-    options.whole_array |= arguments.whole_array;
+    if arguments.whole_array && !options.whole_array {
+        options.whole_array = true;
+        options.spread *= train::WHOLE_ARRAY_SPREAD;
+    }
     options.format = arguments.format.unwrap_or(options.format);
     if arguments.select && options.whole_array {
         return Err(Error::Usage(
@@ -127,6 +132,15 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     output::write_bytes(&arguments.output, &blob)?;
 
     let model = loaded.model();
+    if options.format == NumberFormat::F32
+        && model.networks().any(|network| network.format() == Format::F32Direct)
+    {
+        eprintln!(
+            "note: distances are direct ones, which take a device more than twice as long: in f32, expanded \
+             ones are not proved harmless for this model (little noise, many centres or a large spread); \
+             --format fixed16 has them, and a smaller --spread may"
+        );
+    }
     let summary = Summary {
         file: arguments.output.clone(),
         blob_bytes: blob.len(),

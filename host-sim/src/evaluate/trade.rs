@@ -123,7 +123,7 @@ pub struct Trade {
     pub mean: Vec<Errors>,
     /// All points.
     pub points: Vec<Point>,
-    /// The point that the limits pick.
+    /// The point that [`Trade::choose`] picked.
     pub chosen: Option<usize>,
     /// Every point's blob: points that differ in the exponential alone share one.
     #[serde(skip)]
@@ -133,6 +133,15 @@ pub struct Trade {
 }
 
 impl Trade {
+    /// Picks the point within `limits`, if any are given.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if no point is within them.
+    pub fn choose(&mut self, limits: &Limits) -> Result<()> {
+        self.chosen = limits.choose(&self.points, &self.group, &self.unit)?;
+        Ok(())
+    }
+
     /// The blob of a point.
     #[must_use]
     pub fn blob(&self, point: usize) -> &[u8] {
@@ -147,21 +156,13 @@ impl Trade {
     }
 }
 
-/// Trains and judges every point of `plan` for `scene`; front and choice go by the RMSE of `group`.
+/// Trains and judges every point of `plan` for `scene`; the front goes by the RMSE of `group`.
 ///
 /// # Errors
-/// [`Error::Usage`] for a scene of another shape than was measured, for a plan that was not measured, and for
-/// limits that no point meets.
-pub fn compute(
-    scene: &Scene,
-    plan: &Plan,
-    group: &str,
-    limits: &Limits,
-    progress: &Progress,
-) -> Result<Trade> {
+/// [`Error::Usage`] for a scene of another shape than was measured, and for a plan that was not measured.
+pub fn compute(scene: &Scene, plan: &Plan, group: &str, progress: &Progress) -> Result<Trade> {
     let costs = Costs::measured()?;
     check(scene, plan, &costs)?;
-    limits.check()?;
     // Each row's network, and one for the array.
     let networks = scene.read_rows.len() + 1;
     progress.stage("trade", plan.samples_averaged.len() * plan.centres.len() * networks);
@@ -188,7 +189,6 @@ pub fn compute(
     let Judge { costs, mut points, blobs, distinct, .. } = judge;
     compare(&mut points, group);
     let unit = mean.iter().find(|e| e.group == group).map_or(String::new(), |e| e.unit.clone());
-    let chosen = limits.choose(&points, group, &unit)?;
     Ok(Trade {
         scene: scene.name.clone(),
         noise_level: scene.noise.level,
@@ -199,7 +199,7 @@ pub fn compute(
         unit,
         mean,
         points,
-        chosen,
+        chosen: None,
         blobs,
         distinct_blobs: distinct,
     })

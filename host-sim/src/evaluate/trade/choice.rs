@@ -18,14 +18,19 @@ impl Limits {
     /// Whether the limits can be met at all.
     ///
     /// # Errors
-    /// [`Error::Usage`] for an error that is not a positive number.
+    /// [`Error::Usage`] for one that is not a positive number.
     pub fn check(&self) -> Result<()> {
-        match self.error {
-            Some(error) if !(error.is_finite() && error > 0.0) => {
-                Err(Error::Usage(format!("--max-error {error}: give a positive number")))
+        let positive = [
+            ("--max-error", self.error),
+            ("--max-cycles", self.cycles.map(|cycles| cycles as f64)),
+            ("--max-flash", self.flash_bytes.map(|bytes| bytes as f64)),
+        ];
+        for (option, limit) in positive {
+            if let Some(limit) = limit.filter(|limit| !(limit.is_finite() && *limit > 0.0)) {
+                return Err(Error::Usage(format!("{option} {limit}: give a positive number")));
             }
-            _ => Ok(()),
         }
+        Ok(())
     }
 
     fn any(&self) -> bool {

@@ -15,11 +15,7 @@ use crate::model::{self, LoadedModel, Origin};
 use crate::number_format::NumberFormat;
 use crate::progress::Progress;
 use crate::scene::Scene;
-use crate::train::{self, FittedNetwork, Samples, Trained, projection};
-
-/// Widths for features, which share the largest span of any, over those for a row's readings: at K = 64
-/// as good, at K = 256 better (`docs/projection.md`).
-const ARRAY_SPREAD: f64 = 0.5;
+use crate::train::{self, FittedNetwork, Samples, Trained, WHOLE_ARRAY_SPREAD, projection};
 
 /// What tells points with the same frames apart, beyond format, tail and gate.
 #[derive(Debug, Clone, Copy)]
@@ -93,7 +89,7 @@ impl<'s> Judge<'s> {
                 .flat_map(|format| [false, true].map(|affine| (format, affine)))
                 .collect();
         let defaults = model::options_of(sets.averaged);
-        let spread = if knobs.whole_array { ARRAY_SPREAD } else { 1.0 } * defaults.spread;
+        let spread = if knobs.whole_array { WHOLE_ARRAY_SPREAD } else { 1.0 } * defaults.spread;
         let options = train::Options { centres: knobs.centres, spread, ..defaults };
         let seen = sets.seen();
         options.check(seen.frames())?;
