@@ -4,10 +4,10 @@ use model_core::rbf::expanded::{CENTRES_AT_ONCE, Parameters};
 use model_core::rbf::{Format, Network, Shape};
 use model_core::scale::{HALF_RANGE, UNITS};
 
-use super::super::least_squares::{self, Regressors};
+use super::super::least_squares::{Factor, Regressors};
 use super::super::{CentredScale, Options, Samples};
 use super::{FittedNetwork, Targets, Weights};
-use crate::dataset::{Block, Table};
+use crate::dataset::Block;
 use crate::infer::{Kernel, infer};
 
 /// Share of an output's training RMSE that rounding in exponents may reach.
@@ -38,14 +38,14 @@ pub(super) fn fit(
     let all = &targets.deviations;
     // Most of what is not harmless is found out in an eighth of the time.
     if all.len() >= FEW * SAMPLES_A_WEIGHT * rounded.regressors(options).count() {
-        let names = all.names.clone();
-        let few = Table { names, values: every(&all.values, targets.outputs()) };
-        let few = rounded.network(&every(&scaled, samples.inputs()), &few, targets, options)?;
+        let deviations = every(&all.values, targets.outputs());
+        let scaled = every(&scaled, samples.inputs());
+        let few = rounded.network(&scaled, &deviations, targets, options)?;
         if worst_share(&few, samples.block) > HOPELESS {
             return None;
         }
     }
-    let fitted = rounded.network(&scaled, all, targets, options)?;
+    let fitted = rounded.network(&scaled, &all.values, targets, options)?;
     (worst_share(&fitted, samples.block) <= HARMLESS).then_some(fitted)
 }
 
@@ -99,16 +99,16 @@ impl Rounded {
     fn network(
         &self,
         scaled: &[f64],
-        deviations: &Table,
+        deviations: &[f64],
         targets: &Targets,
         options: &Options,
     ) -> Option<FittedNetwork> {
         let (inputs, outputs) = (self.inputs, targets.outputs());
         let count = self.centres.len() / inputs;
         let regressors = self.regressors(options);
-        let weights =
-            least_squares::fit(&regressors, scaled, deviations, options.initial_covariance);
-        let mut weights = Weights::split(weights, count, targets);
+        let design = regressors.of(scaled);
+        let factor = Factor::new(&design, deviations, outputs, options.initial_covariance);
+        let mut weights = Weights::split(factor.weights(), count, targets);
         // The tail is on inputs about the middle.
         for row in weights.affine.chunks_exact_mut(outputs) {
             weights.bias.iter_mut().zip(&*row).for_each(|(bias, a)| *bias += 0.5 * a);
@@ -296,13 +296,12 @@ mod tests {
             let all = &targets.deviations;
             assert!(all.len() >= FEW * SAMPLES_A_WEIGHT * regressors);
             let scaled = rounded.scale.apply(&block);
-            let share = |scaled: &[f64], deviations: &Table| {
+            let share = |scaled: &[f64], deviations: &[f64]| {
                 let fitted = rounded.network(scaled, deviations, &targets, &options).unwrap();
                 worst_share(&fitted, &block)
             };
-            let names = all.names.clone();
-            let few = Table { names, values: every(&all.values, targets.outputs()) };
-            let ratio = share(&every(&scaled, 18), &few) / share(&scaled, all);
+            let few = share(&every(&scaled, 18), &every(&all.values, targets.outputs()));
+            let ratio = few / share(&scaled, &all.values);
             // Measured: 0.67, 1.36, 1.77.
             assert!((0.5..2.0).contains(&ratio), "noise {noise}: {ratio}");
         }
