@@ -11,6 +11,7 @@ use self::floats::Floats;
 use self::lines::Lines;
 use super::Kernel;
 
+mod aligned;
 mod exp;
 mod exponent;
 #[cfg(target_arch = "x86_64")]

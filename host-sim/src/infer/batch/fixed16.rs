@@ -11,11 +11,10 @@ use model_core::scale::UNITS;
 use pulp::x86::V3;
 use pulp::{NullaryFnOnce, f32x8, i32x8, u32x8};
 
-use super::lines::{Lines, VECTORS};
+use super::aligned::Aligned;
+use super::lines::{Lines, VECTORS, Values};
 use super::tiles::{Accumulate, CENTRES, OfLines, Weights, accumulate, in_fours};
 
-/// Lines of a block.
-const LANES: usize = 8 * VECTORS;
 /// Pairs of the centres that are stored together.
 const PAIRS: usize = CENTRES_AT_ONCE / 2;
 /// Pairs of centres whose activations are kept until the outputs take them: 2 KiB, in the first cache.
@@ -80,17 +79,20 @@ impl NullaryFnOnce for Work<'_> {
         let Fixed16 { simd, shape, parameters: p, .. } = *self.network;
         let Shape { inputs, outputs, .. } = shape;
         let (pairs, how) = (inputs.div_ceil(2), Products(simd));
-        let mut readings = vec![[simd.splat_f32x8(0.0); VECTORS]; inputs];
-        let mut x = vec![[simd.splat_i32x8(0); VECTORS]; pairs];
-        let mut sums = vec![[simd.splat_i32x8(0); VECTORS]; outputs];
-        let mut y = vec![[simd.splat_f32x8(0.0); VECTORS]; outputs];
-        let mut activations = [[simd.splat_i32x8(0); VECTORS]; KEPT];
-        for block in self.lines.blocks::<V3>() {
-            let poison = block.take(simd, &mut readings);
+        let (mut readings, mut y) = (Values::zeroed(inputs), Values::zeroed(outputs));
+        let mut x = Aligned::<OfLines<Products>>::zeroed(pairs);
+        let mut sums = Aligned::<OfLines<Products>>::zeroed(outputs);
+        let mut exponents = Aligned::<OfLines<Products>>::zeroed(2 * KEPT);
+        let mut activations = Aligned::<OfLines<Products>>::zeroed(KEPT);
+        for mut block in self.lines.blocks::<V3>() {
+            let poison = readings.take(simd, &block);
+            let readings = readings.columns_mut();
             let scaled = readings.iter_mut().zip(p.input_midpoint).zip(p.input_per_unit);
             for ((reading, &from), &by) in scaled {
-                let values: &mut [f32] = bytemuck::cast_slice_mut(reading);
-                values.iter_mut().for_each(|x| *x = clamp((*x - from) * by));
+                let (from, by) = (simd.splat_f32x8(from), simd.splat_f32x8(by));
+                for x in reading {
+                    *x = clamp(simd, simd.mul_f32x8(simd.sub_f32x8(*x, from), by));
+                }
             }
             for (x, two) in x.iter_mut().zip(readings.chunks(2)) {
                 for (v, x) in x.iter_mut().enumerate() {
@@ -106,22 +108,24 @@ impl NullaryFnOnce for Work<'_> {
             let mut first = 0;
             for centres in self.network.centres.chunks(KEPT / (CENTRES / 2) * (1 + pairs)) {
                 let tiles = centres.chunks_exact(1 + pairs);
-                let places = activations.as_chunks_mut::<{ CENTRES / 2 }>().0;
-                for (tile, places) in tiles.zip(places) {
-                    *places = activations_of(how, tile, &x, shared);
+                for (tile, places) in tiles.zip(exponents.as_chunks_mut::<CENTRES>().0) {
+                    *places = exponents_of(how, tile, &x, shared);
                 }
                 let count = centres.len() / (1 + pairs) * (CENTRES / 2);
+                for (pair, two) in activations[..count].iter_mut().zip(exponents.as_chunks().0) {
+                    *pair = powers(simd, two);
+                }
                 self.network.weights.accumulate(how, first, &activations[..count], &mut sums);
                 first += count;
             }
 
-            for ((y, sums), &scale) in y.iter_mut().zip(&sums).zip(p.output_scale) {
+            for ((y, sums), &scale) in y.columns_mut().iter_mut().zip(&*sums).zip(p.output_scale) {
                 let scale = simd.splat_f32x8(scale);
                 for (y, &sum) in y.iter_mut().zip(sums) {
                     *y = simd.mul_f32x8(simd.convert_i32x8_to_f32x8(sum), scale);
                 }
             }
-            block.give(simd, &y, poison);
+            y.give(simd, &mut block, poison);
         }
     }
 }
@@ -149,10 +153,12 @@ impl Accumulate for Products {
 
 /// As `model_core::scale::clamp_steps` saturates: the steps below [`UNITS`] are the last.
 #[inline(always)]
-fn clamp(scaled: f32) -> f32 {
-    let number = if scaled.is_nan() { 0.0 } else { scaled };
-    let above = if number > -UNITS { number } else { -UNITS };
-    if above < UNITS { above } else { UNITS.next_down() }
+fn clamp(simd: V3, scaled: f32x8) -> f32x8 {
+    // NaN, which is not equal to itself, is taken for 0.
+    let number = simd.cmp_eq_f32x8(scaled, scaled);
+    let number = simd.and_u32x8(bytemuck::cast(scaled), bytemuck::cast(number));
+    let above = simd.max_f32x8(bytemuck::cast(number), simd.splat_f32x8(-UNITS));
+    simd.min_f32x8(above, simd.splat_f32x8(UNITS.next_down()))
 }
 
 /// Steps, the upper halves of the integers that [`clamp`] leaves; a last odd input is paired with 0.
@@ -168,14 +174,14 @@ fn in_pairs(simd: V3, low: f32x8, high: Option<f32x8>) -> i32x8 {
     bytemuck::cast(pairs)
 }
 
-/// The activations of the centres of a tile, in pairs.
+/// The exponents of the centres of a tile.
 #[inline(always)]
-fn activations_of(
+fn exponents_of(
     how: Products,
     tile: &[[u32; CENTRES]],
     x: &[OfLines<Products>],
     shared: OfLines<Products>,
-) -> [OfLines<Products>; CENTRES / 2] {
+) -> [OfLines<Products>; CENTRES] {
     let Products(simd) = how;
     let mut v = [shared; CENTRES];
     for (v, &b) in v.iter_mut().zip(&tile[0]) {
@@ -183,14 +189,13 @@ fn activations_of(
         v.iter_mut().for_each(|v| *v = simd.wrapping_add_i32x8(*v, b));
     }
     accumulate(how, x, &tile[1..], &mut v);
-    let [first, second, third, fourth] = v;
-    [powers(simd, first, second), powers(simd, third, fourth)]
+    v
 }
 
 /// Pairs of 2^−v in Q15 of two centres, step by step: a register by itself would wait for every operation.
 #[inline(always)]
-fn powers(simd: V3, low: OfLines<Products>, high: OfLines<Products>) -> OfLines<Products> {
-    let v: [i32x8; 2 * VECTORS] = bytemuck::cast([low, high]);
+fn powers(simd: V3, two: &[OfLines<Products>; 2]) -> OfLines<Products> {
+    let v: [i32x8; 2 * VECTORS] = bytemuck::cast(*two);
     let fraction = simd.splat_i32x8((1 << EXPONENT_FRACTION_BITS) - 1);
     let mut p = [simd.splat_i32x8(CUBIC[0]); 2 * VECTORS];
     for &c in &CUBIC[1..] {
@@ -201,10 +206,9 @@ fn powers(simd: V3, low: OfLines<Products>, high: OfLines<Products>) -> OfLines<
         }
     }
     for (p, &v) in p.iter_mut().zip(&v) {
-        // p is positive and of 16 bits: more than 31 places leave no less of it than 31 do.
-        let whole =
+        // p is positive, and the shift leaves 0 where there are more than 31 places.
+        let places =
             simd.shr_const_u32x8::<{ EXPONENT_FRACTION_BITS.cast_signed() }>(bytemuck::cast(v));
-        let places = simd.min_u32x8(whole, simd.splat_u32x8(31));
         *p = bytemuck::cast(simd.shr_dyn_u32x8(bytemuck::cast(*p), places));
     }
     let [low, high]: [OfLines<Products>; 2] = bytemuck::cast(p);
@@ -218,19 +222,24 @@ fn powers(simd: V3, low: OfLines<Products>, high: OfLines<Products>) -> OfLines<
 /// g‖x‖²
 #[inline(always)]
 fn shared_term(simd: V3, decay: u32, x: &[OfLines<Products>]) -> OfLines<Products> {
-    let mut squares = [0_u64; LANES];
+    // A square of a pair is up to 2³¹, and their sum up to 2³⁶: the halves of 16 bits are added apart.
+    let zero = [simd.splat_u32x8(0); VECTORS];
+    let (mut low, mut high) = (zero, zero);
     for x in x {
-        let mut of_pair = [simd.splat_i32x8(0); VECTORS];
-        for (square, &x) in of_pair.iter_mut().zip(x) {
-            *square = Products(simd).accumulate(*square, x, x);
+        for ((low, high), &x) in low.iter_mut().zip(&mut high).zip(x) {
+            let square = Products(simd).accumulate(simd.splat_i32x8(0), x, x);
+            let square: u32x8 = bytemuck::cast(square);
+            let below = simd.and_u32x8(square, simd.splat_u32x8(0xFFFF));
+            *low = simd.wrapping_add_u32x8(*low, below);
+            *high = simd.wrapping_add_u32x8(*high, simd.shr_const_u32x8::<16>(square));
         }
-        // Up to 2³¹, without a sign.
-        let of_pair: &[u32] = bytemuck::cast_slice(&of_pair);
-        squares.iter_mut().zip(of_pair).for_each(|(sum, &square)| *sum += u64::from(square));
     }
-    let mut shared = [0; LANES];
-    for (place, square) in shared.iter_mut().zip(squares) {
-        *place = (((square >> 4) * u64::from(decay)) >> 30) as u32;
+    let mut shared = zero;
+    for ((shared, low), high) in shared.iter_mut().zip(low).zip(high) {
+        let (low, high) = (simd.shr_const_u32x8::<4>(low), simd.shl_const_u32x8::<12>(high));
+        let sixteenth = simd.wrapping_add_u32x8(low, high);
+        let (low, high) = simd.widening_mul_u32x8(sixteenth, simd.splat_u32x8(decay));
+        *shared = simd.or_u32x8(simd.shr_const_u32x8::<30>(low), simd.shl_const_u32x8::<2>(high));
     }
     bytemuck::cast(shared)
 }

@@ -6,8 +6,9 @@
 use model_core::rbf::{Network, Shape};
 use pulp::{Simd, WithSimd};
 
+use super::aligned::Aligned;
 use super::exponent::{Direct, Expanded, Exponent, Terms};
-use super::lines::{Lines, VECTORS};
+use super::lines::{Lines, VECTORS, Values};
 use super::tiles::{CENTRES, Weights, in_fours};
 use crate::infer::Kernel;
 
@@ -117,22 +118,25 @@ impl Work<'_> {
         let Self { network, lines } = self;
         let Shape { inputs, outputs, .. } = network.shape;
         let zero = [simd.splat_f32s(0.0); VECTORS];
-        let mut x = vec![zero; inputs];
-        let mut x_interleaved = vec![zero; inputs];
-        let mut y = vec![zero; outputs];
-        let mut activations = [zero; KEPT];
-        for block in lines.blocks::<S>() {
-            let poison = block.take(simd, &mut x);
+        let (mut x, mut y) = (Values::zeroed(inputs), Values::zeroed(outputs));
+        let mut x_interleaved = Aligned::zeroed(inputs);
+        let mut activations = Aligned::zeroed(KEPT);
+        for mut block in lines.blocks::<S>() {
+            let poison = x.take(simd, &block);
+            let (x, sums) = (x.columns_mut(), y.columns_mut());
             for (x, &[from, by]) in x.iter_mut().zip(&network.scale) {
-                let values = bytemuck::cast_slice_mut::<_, f32>(x);
-                values.iter_mut().for_each(|x| *x = exponent.clamp((*x - from) * by));
+                let (from, by) = (simd.splat_f32s(from), simd.splat_f32s(by));
+                x.iter_mut().for_each(|x| *x = simd.mul_f32s(simd.sub_f32s(*x, from), by));
             }
+            // One loop over all values: the compiler would make gathers of one loop within another.
+            let values = bytemuck::cast_slice_mut::<_, f32>(x);
+            values.iter_mut().for_each(|x| *x = exponent.clamp(*x));
             for (to, from) in x_interleaved.iter_mut().zip(interleaved(inputs)) {
                 *to = x[from];
             }
 
-            y.fill(zero);
-            network.affine.accumulate(Terms::<_, false>(simd), 0, &x, &mut y);
+            sums.fill(zero);
+            network.affine.accumulate(Terms::<_, false>(simd), 0, x, sums);
             let opened = exponent.open(simd, &x_interleaved);
             let mut first = 0;
             for centres in network.centres.chunks(KEPT / CENTRES * (1 + inputs)) {
@@ -150,15 +154,15 @@ impl Work<'_> {
                     Terms::<_, false>(simd),
                     first,
                     &activations[..count],
-                    &mut y,
+                    sums,
                 );
                 first += count;
             }
-            for (y, &bias) in y.iter_mut().zip(network.bias) {
+            for (y, &bias) in sums.iter_mut().zip(network.bias) {
                 let bias = simd.splat_f32s(bias);
                 y.iter_mut().for_each(|y| *y = simd.add_f32s(*y, bias));
             }
-            block.give(simd, &y, poison);
+            y.give(simd, &mut block, poison);
         }
     }
 }

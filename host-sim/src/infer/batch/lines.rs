@@ -2,8 +2,13 @@
 
 use pulp::Simd;
 
+use super::aligned::Aligned;
+
 /// Registers that hold one value of every line of a block.
 pub(super) const VECTORS: usize = 2;
+
+/// Values of a line that are turned into columns, and back, at a time.
+const TILE: usize = 4;
 
 /// One value of every line of a block.
 pub(super) type Lanes<S> = [<S as Simd>::f32s; VECTORS];
@@ -30,65 +35,100 @@ impl Lines<'_> {
             outputs_step,
         })
     }
+}
 
-    /// Takes the readings of a block; lanes of no line keep what they had. Returned is NaN where one is not
+/// The inputs or the outputs of a block's lines.
+///
+/// Which lane has which line is pulp's affair: what it shuffles on the way in, it shuffles back.
+pub(super) struct Values<S: Simd> {
+    count: usize,
+    /// Of every line, one value after the other: whole tiles, the last perhaps with columns of no value.
+    columns: Aligned<Lanes<S>>,
+}
+
+impl<S: Simd> Values<S> {
+    /// Zeros: `count` a line.
+    pub(super) fn zeroed(count: usize) -> Self {
+        Self { count, columns: Aligned::zeroed(count.next_multiple_of(TILE)) }
+    }
+
+    #[inline(always)]
+    pub(super) fn columns(&self) -> &[Lanes<S>] {
+        &self.columns[..self.count]
+    }
+
+    #[inline(always)]
+    pub(super) fn columns_mut(&mut self) -> &mut [Lanes<S>] {
+        &mut self.columns[..self.count]
+    }
+
+    /// Takes the readings of a block; lanes of no line have any value. Returned is NaN where a reading is not
     /// finite as an `f32`, and 0 elsewhere.
     #[inline(always)]
-    pub(super) fn take<S: Simd>(&self, simd: S, inputs: &mut [Lanes<S>]) -> Lanes<S> {
-        let values = bytemuck::cast_slice_mut::<_, f32>(inputs);
-        for (number, lines) in self.readings.chunks(4 * self.readings_step).enumerate() {
-            let places = values.chunks_exact_mut(VECTORS * S::F32_LANES);
-            let mut lines = lines.chunks(self.readings_step);
-            let four = [lines.next(), lines.next(), lines.next(), lines.next()];
-            if let [Some(a), Some(b), Some(c), Some(d)] = four {
-                let readings = a.iter().zip(b).zip(c).zip(d);
-                for (places, (((a, b), c), d)) in places.zip(readings) {
-                    places.as_chunks_mut().0[number] = [*a as f32, *b as f32, *c as f32, *d as f32];
-                }
-            } else {
-                for (input, places) in places.enumerate() {
-                    for (place, line) in places[4 * number..].iter_mut().zip(four.iter().flatten())
-                    {
-                        *place = line[input] as f32;
-                    }
-                }
+    pub(super) fn take(&mut self, simd: S, block: &Lines<'_>) -> Lanes<S> {
+        let lanes = VECTORS * S::F32_LANES;
+        let tiles: &mut [[f32; TILE]] = bytemuck::cast_slice_mut(&mut self.columns);
+        for (lane, line) in block.readings.chunks(block.readings_step).enumerate() {
+            let (whole, rest) = line[..self.count].as_chunks::<TILE>();
+            let mut places = tiles[lane..].iter_mut().step_by(lanes);
+            for (readings, places) in whole.iter().zip(&mut places) {
+                *places = readings.map(|reading| reading as f32);
+            }
+            if let Some(places) = places.next() {
+                let rest = rest.iter().zip(places);
+                rest.for_each(|(reading, place)| *place = *reading as f32);
             }
         }
-        let mut poison = [simd.splat_f32s(0.0); VECTORS];
-        for input in inputs {
-            add_difference_to_itself(simd, &mut poison, input);
+        for tile in self.columns.as_chunks_mut::<TILE>().0 {
+            let lines: [S::f32s; TILE * VECTORS] = bytemuck::cast(*tile);
+            for (v, lines) in lines.as_chunks::<TILE>().0.iter().enumerate() {
+                let columns = simd.deinterleave_shfl_f32s(*lines);
+                tile.iter_mut().zip(columns).for_each(|(place, column)| place[v] = column);
+            }
         }
-        poison
+        poisoned(simd, [simd.splat_f32s(0.0); VECTORS], self.columns())
     }
 
     /// Gives the lines of a block their outputs, all NaN where `poison` or one of them is not finite.
     #[inline(always)]
-    pub(super) fn give<S: Simd>(self, simd: S, outputs: &[Lanes<S>], poison: Lanes<S>) {
-        let mut poison = poison;
-        for output in outputs {
-            add_difference_to_itself(simd, &mut poison, output);
-        }
-        let count = outputs.len();
-        let values = bytemuck::cast_slice::<_, f32>(outputs);
-        let poison = bytemuck::cast_slice::<_, f32>(&poison);
-        let lines = self.outputs.chunks_mut(self.outputs_step).enumerate();
-        for ((lane, line), poison) in lines.zip(poison) {
-            let line = &mut line[..count];
-            for (place, values) in line.iter_mut().zip(values.chunks_exact(VECTORS * S::F32_LANES))
-            {
-                *place = f64::from(values[lane]);
+    pub(super) fn give(&mut self, simd: S, block: &mut Lines<'_>, poison: Lanes<S>) {
+        let poison = poisoned(simd, poison, self.columns());
+        let lanes = VECTORS * S::F32_LANES;
+        for tile in self.columns.as_chunks_mut::<TILE>().0 {
+            let mut lines = [simd.splat_f32s(f32::NAN); TILE * VECTORS];
+            for (v, lines) in lines.as_chunks_mut::<TILE>().0.iter_mut().enumerate() {
+                let sound = simd.equal_f32s(poison[v], poison[v]);
+                for (line, column) in lines.iter_mut().zip(&*tile) {
+                    *line = simd.select_f32s(sound, column[v], *line);
+                }
+                *lines = simd.interleave_shfl_f32s(*lines);
             }
-            if poison.is_nan() {
-                line.fill(f64::NAN);
+            *tile = bytemuck::cast(lines);
+        }
+        let tiles: &[[f32; TILE]] = bytemuck::cast_slice(&self.columns);
+        for (lane, line) in block.outputs.chunks_mut(block.outputs_step).enumerate() {
+            let (whole, rest) = line[..self.count].as_chunks_mut::<TILE>();
+            let mut values = tiles[lane..].iter().step_by(lanes);
+            for (places, values) in whole.iter_mut().zip(&mut values) {
+                *places = values.map(f64::from);
+            }
+            if let Some(values) = values.next() {
+                let rest = rest.iter_mut().zip(values);
+                rest.for_each(|(place, value)| *place = f64::from(*value));
             }
         }
     }
 }
 
-/// Adds 0 where `value` is finite, and NaN elsewhere.
+/// `poison` and, in lanes where not all of `values` are finite, NaN.
 #[inline(always)]
-fn add_difference_to_itself<S: Simd>(simd: S, sum: &mut Lanes<S>, value: &Lanes<S>) {
-    for (sum, &value) in sum.iter_mut().zip(value) {
-        *sum = simd.add_f32s(*sum, simd.sub_f32s(value, value));
+fn poisoned<S: Simd>(simd: S, poison: Lanes<S>, values: &[Lanes<S>]) -> Lanes<S> {
+    let mut poison = poison;
+    for value in values {
+        for (sum, &value) in poison.iter_mut().zip(value) {
+            // 0 where a value is finite.
+            *sum = simd.add_f32s(*sum, simd.sub_f32s(value, value));
+        }
     }
+    poison
 }
