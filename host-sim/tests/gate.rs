@@ -110,6 +110,7 @@ fn what_makes_no_gate_is_refused() {
         (&["small.toml", "--baseline-frames", "0"], &["--baseline-frames = 0"]),
         (&["small.toml", "--cycles", "1,2"], &["--cycles [1, 2]", "three"]),
         (&["small.toml", "--cycles", "1,0,3"], &["--cycles [1, 0, 3]", "positive"]),
+        (&["small.toml", "--cycles", "3,2,1"], &["--cycles [3, 2, 1]", "REST below AWAKE"]),
         (&["small.toml", "--cycles", "1,2,-3"], &["'-3'", "--cycles"]),
     ] {
         let output = folder.run(&[&["gate"], arguments].concat());

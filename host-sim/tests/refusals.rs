@@ -68,6 +68,7 @@ fn bad_scenes() {
         refused(&folder, &["synth", scene.to_str().unwrap(), "-o", "data.csv"], &says);
     }
     refused(&folder, &["run", "no-such.toml"], &["no-such.toml", "paper, press"]);
+    refused(&folder, &["train", "pres", "-o", "m.bin"], &["pres:", "paper, press"]);
 }
 
 #[test]

@@ -73,12 +73,12 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 fn given(cycles: &[u64]) -> Result<Option<Frames<u64>>> {
     match *cycles {
         [] => Ok(None),
-        [ungated, at_rest, awake] if !cycles.contains(&0) => {
+        [ungated, at_rest, awake] if ungated > 0 && (1..awake).contains(&at_rest) => {
             Ok(Some(Frames { ungated, at_rest, awake }))
         }
         _ => Err(Error::Usage(format!(
-            "--cycles {cycles:?}: give three positive numbers, FRAME,REST,AWAKE, as `cargo xtask cycles` \
-             measures them (docs/gating.md)"
+            "--cycles {cycles:?}: give three positive numbers, FRAME,REST,AWAKE with REST below AWAKE, as \
+             `cargo xtask cycles` measures them (docs/gating.md)"
         ))),
     }
 }

@@ -98,12 +98,20 @@ struct Summary {
     selection: Option<Selection>,
 }
 
+/// Whether that is a scene, or else a CSV file. What is no file and looks like a name is a scene's, mistyped.
+fn names_a_scene(source: &str) -> bool {
+    let path = Path::new(source);
+    EMBEDDED.iter().any(|(name, _)| *name == source)
+        || path.extension().map_or(!path.exists(), |extension| extension == "toml")
+}
+
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     output::check_writable(&arguments.output, &[Path::new(&arguments.source)])?;
-    let is_scene = EMBEDDED.iter().any(|(name, _)| *name == arguments.source)
-        || Path::new(&arguments.source).extension().is_some_and(|e| e == "toml");
-    let source =
-        if is_scene { from_scene(arguments, common)? } else { from_data(arguments, common)? };
+    let source = if names_a_scene(&arguments.source) {
+        from_scene(arguments, common)?
+    } else {
+        from_data(arguments, common)?
+    };
 
     let mut options = source.defaults;
     options.affine_tail &= !arguments.no_affine;
