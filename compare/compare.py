@@ -1,4 +1,4 @@
-"""Times the same work in Taxel and in numpy or scikit-learn, and prints medians and ratios.
+"""Times the same work in Taxel and in numpy or scikit-learn, and prints medians and ratios, of medians and of the fastest runs.
 
     python compare/compare.py                # every subject
     python compare/compare.py synthesis      # one
@@ -31,11 +31,12 @@ def main() -> None:
     rows = [row for name in chosen for row in importlib.import_module(name).rows()]
     work = max(len(row.work) for row in rows)
     reference = max(len(row.reference) for row in rows)
-    print(f"{'work':{work}}  {'reference':{reference}}  {'takes':>8}  {'Taxel':>8}  {'ratio':>6}")
+    print(f"{'work':{work}}  {'reference':{reference}}  {'takes':>8}  {'Taxel':>8}  {'ratio':>6}  {'fastest':>7}")
     for row in rows:
-        times = f"{in_words(row.reference_s):>8}  {in_words(row.taxel_s):>8}"
-        ratio = row.reference_s / row.taxel_s
-        print(f"{row.work:{work}}  {row.reference:{reference}}  {times}  {ratio:6.1f}")
+        times = f"{in_words(row.reference_s.median):>8}  {in_words(row.taxel_s.median):>8}"
+        ratio = row.reference_s.median / row.taxel_s.median
+        fastest = row.reference_s.fastest / row.taxel_s.fastest
+        print(f"{row.work:{work}}  {row.reference:{reference}}  {times}  {ratio:6.1f}  {fastest:7.1f}")
 
 
 if __name__ == "__main__":

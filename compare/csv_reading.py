@@ -4,7 +4,7 @@ import subprocess
 
 import numpy as np
 
-from measure import ROOT, Row, bench, criterion_s, median_s, target_folder
+from measure import ROOT, Row, bench, by_criterion, timed, target_folder
 
 FRAMES = 4096  # as benchmarks/benches/csv.rs
 
@@ -17,13 +17,13 @@ def rows() -> list[Row]:
     command = ["cargo", "run", "--quiet", "--release", "--", *arguments]
     subprocess.run(command, cwd=ROOT, check=True, stdout=2)
     megabytes = path.stat().st_size / 1e6
-    parse_s = median_s(lambda: np.loadtxt(path, delimiter=",", skiprows=1), repeats=3)
-    bytes_s = median_s(path.read_bytes)
+    parse_s = timed(lambda: np.loadtxt(path, delimiter=",", skiprows=1), repeats=3)
+    bytes_s = timed(path.read_bytes)
     path.unlink()
     work = f"reading {megabytes:.0f} MB of CSV"
-    taxel_s = criterion_s("csv/read")
+    taxel_s = by_criterion("csv/read")
     return [
         Row(work, "numpy.loadtxt", parse_s, taxel_s),
         Row(work, "its bytes alone, Python", bytes_s, taxel_s),
-        Row(work, "its bytes alone, Rust", criterion_s("csv/copy_file"), taxel_s),
+        Row(work, "its bytes alone, Rust", by_criterion("csv/copy_file"), taxel_s),
     ]

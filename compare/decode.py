@@ -6,7 +6,7 @@ Scaling, clamp, affine tail and bias are in both.
 
 Printed besides: how much of the core's f32 peaks the decoding reaches. Counted are the multiplications and
 additions of the network, with those of its exponential, and none of scaling, checks and copies; for fixed16,
-whose instructions are others, those that the same network takes in f32.
+whose instructions are others, those that the same network takes in f32. The fastest runs of both are compared.
 """
 
 import sys
@@ -14,7 +14,7 @@ import sys
 import numpy as np
 from threadpoolctl import threadpool_limits  # scikit-learn brings it
 
-from measure import Row, bench, criterion_s, median_s, target_folder
+from measure import Row, bench, by_criterion, timed, target_folder
 
 CHANNELS, SPREAD = 18, 0.8  # as benchmarks/benches/decode.rs
 LOWEST_OHM, SPAN_OHM = 40.0, 20.0
@@ -78,31 +78,33 @@ def rows() -> list[Row]:
     bench("decode")
     readings = left_by_the_bench("readings", CHANNELS)
     peak = {
-        how: left_by_the_bench(how, 1)[0, 0] / criterion_s(f"peak/{how}") * 1e-9
+        how: left_by_the_bench(how, 1)[0, 0] / by_criterion(f"peak/{how}").fastest * 1e-9
         for how in ["separate", "contracted"]
     }
     table, shares = [], []
     for centres in CENTRES:
         expected = Network(centres, np.float64).infer(readings, 1000)
-        taxel = {form: criterion_s(f"decode/{form}/{centres}") / len(readings) for form in MOST_ERROR}
+        taxel = {
+            form: by_criterion(f"decode/{form}/{centres}").over(len(readings)) for form in MOST_ERROR
+        }
         for form, seconds in taxel.items():
             error = np.abs(left_by_the_bench(f"{form}-{centres}", CHANNELS) - expected).max()
             assert error < MOST_ERROR[form], f"{form} with {centres} centres differs by {error}"
-            gflops = operations(form, centres) / seconds * 1e-9
+            gflops = operations(form, centres) / seconds.fastest * 1e-9
             shares.append(
                 f"{form} with {centres} centres: {gflops:.1f} Gflop/s, {gflops / peak['separate']:.0%} and"
                 f" {gflops / peak['contracted']:.0%} of these"
             )
         for kind in [np.float64, np.float32]:
             network, own = Network(centres, kind), readings.astype(kind)
-            timed = {
-                batch: median_s(lambda: network.infer(own, batch), repeats=51) / len(readings)
+            taken = {
+                batch: timed(lambda: network.infer(own, batch), repeats=51).over(len(readings))
                 for batch in BATCHES
             }
-            batch = min(timed, key=timed.get)
+            batch = min(taken, key=taken.get)
             for form, seconds in taxel.items():
                 reference = f"numpy, {np.dtype(kind).name}, batches of {batch}"
-                table.append(Row(f"a line, {form}, {centres} centres", reference, timed[batch], seconds))
+                table.append(Row(f"a line, {form}, {centres} centres", reference, taken[batch], seconds))
     # To stderr, as all that is not the table.
     print(
         f"f32 peak of one core: {peak['separate']:.1f} Gflop/s multiplying and adding,"

@@ -11,24 +11,35 @@ from typing import Callable, NamedTuple
 ROOT = Path(__file__).resolve().parent.parent
 
 
+class Seconds(NamedTuple):
+    """How long work takes: the median of its runs, and the fastest, which others on the machine disturb least."""
+
+    median: float
+    fastest: float
+
+    def over(self, count: int) -> "Seconds":
+        """Of one in `count` equal parts."""
+        return Seconds(self.median / count, self.fastest / count)
+
+
 class Row(NamedTuple):
     """One line of the table: the same work on both sides."""
 
     work: str
     reference: str
-    reference_s: float
-    taxel_s: float
+    reference_s: Seconds
+    taxel_s: Seconds
 
 
-def median_s(work: Callable[[], object], repeats: int = 9) -> float:
-    """The median time of `work` in seconds, after one call that is not timed."""
+def timed(work: Callable[[], object], repeats: int = 9) -> Seconds:
+    """The time of `work`, after one call that is not timed."""
     work()
     times = []
     for _ in range(repeats):
         start = time.perf_counter()
         work()
         times.append(time.perf_counter() - start)
-    return statistics.median(times)
+    return Seconds(statistics.median(times), min(times))
 
 
 def bench(name: str) -> None:
@@ -37,10 +48,12 @@ def bench(name: str) -> None:
     subprocess.run(command, cwd=ROOT, check=True, stdout=2)
 
 
-def criterion_s(benchmark: str) -> float:
-    """Criterion's median for a benchmark called `group/name`, in seconds."""
-    estimates = target_folder() / "criterion" / benchmark / "new" / "estimates.json"
-    return json.loads(estimates.read_text())["median"]["point_estimate"] * 1e-9
+def by_criterion(benchmark: str) -> Seconds:
+    """What criterion measured of a benchmark called `group/name`."""
+    sample = target_folder() / "criterion" / benchmark / "new" / "sample.json"
+    runs = json.loads(sample.read_text())
+    times = [total * 1e-9 / count for total, count in zip(runs["times"], runs["iters"])]
+    return Seconds(statistics.median(times), min(times))
 
 
 def target_folder() -> Path:

@@ -7,7 +7,7 @@ numpy was found to be.
 
 import numpy as np
 
-from measure import Row, bench, criterion_s, median_s
+from measure import Row, bench, by_criterion, timed
 
 FRAMES = 16_384  # as benchmarks/benches/synthesis.rs
 FEWER = 4096  # for numpy: a time by frame does not depend on it
@@ -88,19 +88,19 @@ def rows() -> list[Row]:
     bench("synthesis")
     table = []
     for scene, draw in [("paper", draw_paper), ("press", draw_press)]:
-        taxel_s = criterion_s(f"synthesis/{scene}") / FRAMES
+        taxel_s = by_criterion(f"synthesis/{scene}").over(FRAMES)
         for how, readings, batches in [
             ("as the formula", by_the_formula, [8, 512]),
             ("axes apart", axes_apart, [16, 32, 64, 128]),
         ]:
-            timed = {}
+            taken = {}
             for batch in batches:
                 work = lambda: synthesise(draw, readings, FEWER, batch)
-                timed[batch] = median_s(work, repeats=5) / FEWER
-            batch = min(timed, key=timed.get)
+                taken[batch] = timed(work, repeats=5).over(FEWER)
+            batch = min(taken, key=taken.get)
             reference = f"numpy, {how}, batches of {batch}"
-            table.append(Row(f"a frame of {scene}", reference, timed[batch], taxel_s))
+            table.append(Row(f"a frame of {scene}", reference, taken[batch], taxel_s))
             if readings is axes_apart:
-                single_s = criterion_s(f"synthesis/{scene}_f32") / FRAMES
-                table.append(Row("the same, f32 in Taxel", reference, timed[batch], single_s))
+                single_s = by_criterion(f"synthesis/{scene}_f32").over(FRAMES)
+                table.append(Row("the same, f32 in Taxel", reference, taken[batch], single_s))
     return table

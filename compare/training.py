@@ -12,7 +12,7 @@ import numpy as np
 from sklearn.cluster import KMeans, kmeans_plusplus
 from sklearn.linear_model import Ridge
 
-from measure import Row, bench, criterion_s, median_s, target_folder
+from measure import Row, Seconds, bench, by_criterion, timed, target_folder
 
 CENTRES, ITERATIONS, SPREAD = 256, 30, 0.8  # as benchmarks/benches/training.rs
 PENALTY = 1e-6  # 1/INITIAL_COVARIANCE
@@ -71,17 +71,17 @@ def rows() -> list[Row]:
     ridge_rmse_mm = np.sqrt((errors**2).mean())
     known = regressors(inputs, centres)
 
-    def elkan_s() -> float:
-        return median_s(lambda: k_means(inputs, start, "elkan"), repeats=3)
+    def elkan_s() -> Seconds:
+        return timed(lambda: k_means(inputs, start, "elkan"), repeats=3)
 
-    def lloyd_s() -> float:
-        return median_s(lambda: k_means(inputs, start), repeats=5)
+    def lloyd_s() -> Seconds:
+        return timed(lambda: k_means(inputs, start), repeats=5)
 
-    picking_s = median_s(lambda: kmeans_plusplus(inputs, CENTRES, random_state=1), repeats=5)
-    both_s = median_s(lambda: weights(centres), repeats=5)
-    ridge_s = median_s(lambda: Ridge(alpha=PENALTY).fit(known, outputs), repeats=5)
+    picking_s = timed(lambda: kmeans_plusplus(inputs, CENTRES, random_state=1), repeats=5)
+    both_s = timed(lambda: weights(centres), repeats=5)
+    ridge_s = timed(lambda: Ridge(alpha=PENALTY).fit(known, outputs), repeats=5)
     steps = ["start", "iterations", "weights", "whole"]
-    taxel = {name: criterion_s(f"training/{name}") for name in steps}
+    taxel = {name: by_criterion(f"training/{name}") for name in steps}
     iterating = f"30 iterations, one start: inertia {inertia:.1f}"
     return [
         Row("k-means++ start", "kmeans_plusplus (greedy)", picking_s, taxel["start"]),
@@ -92,7 +92,7 @@ def rows() -> list[Row]:
         Row(
             f"training: inertia {inertia:.1f}, RMSE {rmse_mm:.6f} mm",
             f"all of these: {found.inertia_:.1f}, {ridge_rmse_mm:.6f} mm",
-            median_s(whole, repeats=5),
+            timed(whole, repeats=5),
             taxel["whole"],
         ),
     ]
