@@ -45,18 +45,18 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let readings = decode::model_inputs(&loaded, &file)?;
     let model = loaded.model();
     let metadata = model.metadata();
-    let truth = decode::table_of(&file, metadata.output_names.iter())?;
+    let mut truth = decode::table_of(&file, metadata.output_names.iter())?;
     let estimate = loaded.decode(arguments.kernel, &readings);
     let thickness_mm = f64::from(metadata.thickness_mm);
     let measure = Measure {
         full_scale: metadata.full_scale.iter().map(f64::from).collect(),
         thickness_mm: (thickness_mm > 0.0).then_some(thickness_mm),
     };
-    // The mean is judged on the same pairs as the model.
-    let mut means = truth.means().repeat(truth.len());
-    for (mean, estimate) in means.iter_mut().zip(&estimate.values) {
-        *mean += if estimate.is_nan() { f64::NAN } else { 0.0 };
+    // The mean is judged on the same pairs as the model, and is theirs.
+    for (truth, estimate) in truth.values.iter_mut().zip(&estimate.values) {
+        *truth = if estimate.is_nan() { f64::NAN } else { *truth };
     }
+    let means = truth.means().repeat(truth.len());
     remark_on_range(&loaded, &readings);
     let errors = metrics::by_group(&truth, &estimate.values, &measure);
     if errors.iter().all(|group| group.count == 0) {
