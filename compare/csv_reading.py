@@ -4,7 +4,7 @@ import subprocess
 
 import numpy as np
 
-from measure import ROOT, Row, bench, by_criterion, timed, target_folder
+from measure import ROOT, Row, bench, by_criterion, target_folder, timed
 
 FRAMES = 4096  # as benchmarks/benches/csv.rs
 

@@ -14,7 +14,7 @@ import sys
 import numpy as np
 from threadpoolctl import threadpool_limits  # scikit-learn brings it
 
-from measure import Row, bench, by_criterion, timed, target_folder
+from measure import Row, bench, by_criterion, fastest_of, target_folder, timed
 
 CHANNELS, SPREAD = 18, 0.8  # as benchmarks/benches/decode.rs
 LOWEST_OHM, SPAN_OHM = 40.0, 20.0
@@ -101,10 +101,10 @@ def rows() -> list[Row]:
                 batch: timed(lambda: network.infer(own, batch), repeats=51).over(len(readings))
                 for batch in BATCHES
             }
-            batch = min(taken, key=taken.get)
+            batch, fastest = fastest_of(taken)
             for form, seconds in taxel.items():
                 reference = f"numpy, {np.dtype(kind).name}, batches of {batch}"
-                table.append(Row(f"a line, {form}, {centres} centres", reference, taken[batch], seconds))
+                table.append(Row(f"a line, {form}, {centres} centres", reference, fastest, seconds))
     # To stderr, as all that is not the table.
     print(
         f"f32 peak of one core: {peak['separate']:.1f} Gflop/s multiplying and adding,"

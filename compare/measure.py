@@ -12,7 +12,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 class Seconds(NamedTuple):
-    """How long work takes: the median of its runs, and the fastest, which others on the machine disturb least."""
+    """How long work takes: the median of its runs, and the fastest, which the machine's other work disturbs least."""
 
     median: float
     fastest: float
@@ -42,6 +42,12 @@ def timed(work: Callable[[], object], repeats: int = 9) -> Seconds:
     return Seconds(statistics.median(times), min(times))
 
 
+def fastest_of(taken: dict[int, Seconds]) -> tuple[int, Seconds]:
+    """The way with the lowest median, and that median with the fastest run of any."""
+    best = min(taken, key=taken.get)
+    return best, Seconds(taken[best].median, min(seconds.fastest for seconds in taken.values()))
+
+
 def bench(name: str) -> None:
     """Runs one of the benches of the package `benchmarks`; its log goes to stderr."""
     command = ["cargo", "bench", "--quiet", "--package", "benchmarks", "--bench", name]
@@ -49,7 +55,7 @@ def bench(name: str) -> None:
 
 
 def by_criterion(benchmark: str) -> Seconds:
-    """What criterion measured of a benchmark called `group/name`."""
+    """What criterion measured of a benchmark called `group/name`: its samples, each a mean of some runs."""
     sample = target_folder() / "criterion" / benchmark / "new" / "sample.json"
     runs = json.loads(sample.read_text())
     times = [total * 1e-9 / count for total, count in zip(runs["times"], runs["iters"])]

@@ -12,7 +12,7 @@ import numpy as np
 from sklearn.cluster import KMeans, kmeans_plusplus
 from sklearn.linear_model import Ridge
 
-from measure import Row, Seconds, bench, by_criterion, timed, target_folder
+from measure import Row, Seconds, bench, by_criterion, target_folder, timed
 
 CENTRES, ITERATIONS, SPREAD = 256, 30, 0.8  # as benchmarks/benches/training.rs
 PENALTY = 1e-6  # 1/INITIAL_COVARIANCE

@@ -37,7 +37,7 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value_t = BASELINE_FRAMES)]
     baseline_frames: usize,
     /// Cycles of a frame without a gate, of one whose rows are all at rest, and of one whose rows are all
-    /// awake, instead of those that `cargo xtask cycles` measured of such models.
+    /// awake, instead of those that `cargo xtask cycles` measured of such models; REST is below AWAKE.
     #[arg(
         long,
         value_name = "FRAME,REST,AWAKE",

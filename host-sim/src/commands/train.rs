@@ -98,7 +98,7 @@ struct Summary {
     selection: Option<Selection>,
 }
 
-/// Whether that is a scene, or else a CSV file. What is no file and looks like a name is a scene's, mistyped.
+/// Whether that is a scene, or else a CSV file. What is no file and has no extension is a scene's name, mistyped.
 fn names_a_scene(source: &str) -> bool {
     let path = Path::new(source);
     EMBEDDED.iter().any(|(name, _)| *name == source)
@@ -169,6 +169,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 }
 
 fn from_scene(arguments: &Arguments, common: &Common) -> Result<Source> {
+    let mut scene = Scene::load(&arguments.source)?;
     for (option, given) in [
         ("--inputs", arguments.inputs.is_some()),
         ("--outputs", arguments.outputs.is_some()),
@@ -179,7 +180,6 @@ fn from_scene(arguments: &Arguments, common: &Common) -> Result<Source> {
             return Err(Error::Usage(message));
         }
     }
-    let mut scene = Scene::load(&arguments.source)?;
     scene.seed = common.seed.unwrap_or(scene.seed);
     arguments.noise.apply(&mut scene)?;
     let frames = arguments.frames.unwrap_or(scene.training.frames);

@@ -8,8 +8,8 @@ use bytemuck::Pod;
 /// Bytes of a line of the cache.
 const LINE: usize = 64;
 
-/// So many of `T`. `Vec` aligns for single numbers, since that is how pulp's types are declared: every other
-/// register would lie across two lines, and take twice as long to load.
+/// A fixed number of `T`. `Vec` aligns for single numbers, since that is how pulp's types are declared: registers
+/// would lie across two lines, and take twice as long to load.
 pub(super) struct Aligned<T> {
     /// The registers, and before them what is left to a line of the cache.
     words: Vec<u32>,
@@ -22,7 +22,7 @@ impl<T: Pod> Aligned<T> {
     pub(super) fn zeroed(count: usize) -> Self {
         let length = count * size_of::<T>() / size_of::<u32>();
         let mut words = vec![0; length + LINE / size_of::<u32>()];
-        let first = words.as_ptr().align_offset(LINE);
+        let first = words.as_ptr().align_offset(LINE).min(LINE / size_of::<u32>());
         words.truncate(first + length);
         Self { words, first, of: PhantomData }
     }

@@ -17,7 +17,8 @@ use super::tiles::{Accumulate, CENTRES, OfLines, Weights, accumulate, in_fours};
 
 /// Pairs of the centres that are stored together.
 const PAIRS: usize = CENTRES_AT_ONCE / 2;
-/// Pairs of centres whose activations are kept until the outputs take them: 2 KiB, in the first cache.
+/// Pairs of centres whose exponents (4 KiB) and then activations (2 KiB) are kept until the outputs take them: in
+/// the first cache.
 const KEPT: usize = 32;
 
 /// A network laid out for blocks of lines, and the proof that this machine has the instructions.
@@ -222,7 +223,8 @@ fn powers(simd: V3, two: &[OfLines<Products>; 2]) -> OfLines<Products> {
 /// g‖x‖²
 #[inline(always)]
 fn shared_term(simd: V3, decay: u32, x: &[OfLines<Products>]) -> OfLines<Products> {
-    // A square of a pair is up to 2³¹, and their sum up to 2³⁶: the halves of 16 bits are added apart.
+    // A pair's square is up to 2³¹. The sum of at most 63 squares is below 2³⁶, so a sixteenth of it fits 32
+    // bits; halves of 16 bits are added apart.
     let zero = [simd.splat_u32x8(0); VECTORS];
     let (mut low, mut high) = (zero, zero);
     for x in x {

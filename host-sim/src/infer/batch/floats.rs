@@ -83,6 +83,67 @@ impl<'a> Floats<'a> {
     pub(super) fn infer(&self, lines: Lines<'_>) {
         pulp::Arch::new().dispatch(Work { network: self, lines });
     }
+
+    /// As [`infer`](Self::infer), in the vectors of `simd`.
+    #[inline(always)]
+    pub(super) fn infer_in<S: Simd>(&self, simd: S, lines: Lines<'_>) {
+        match self.form {
+            Form::Expanded(decay) => self.run(simd, &Expanded { decay }, lines),
+            Form::Direct => self.run(simd, &Direct, lines),
+        }
+    }
+
+    #[inline(always)]
+    fn run<S: Simd, E: Exponent>(&self, simd: S, exponent: &E, lines: Lines<'_>) {
+        let Shape { inputs, outputs, .. } = self.shape;
+        let zero = [simd.splat_f32s(0.0); VECTORS];
+        let (mut x, mut y) = (Values::zeroed(inputs), Values::zeroed(outputs));
+        let mut x_interleaved = Aligned::zeroed(inputs);
+        let mut activations = Aligned::zeroed(KEPT);
+        for mut block in lines.blocks::<S>() {
+            let poison = x.take(simd, &block);
+            let (x, sums) = (x.columns_mut(), y.columns_mut());
+            for (x, &[from, by]) in x.iter_mut().zip(&self.scale) {
+                let (from, by) = (simd.splat_f32s(from), simd.splat_f32s(by));
+                x.iter_mut().for_each(|x| *x = simd.mul_f32s(simd.sub_f32s(*x, from), by));
+            }
+            // One flat loop: of nested ones the compiler makes gathers.
+            let values = bytemuck::cast_slice_mut::<_, f32>(x);
+            values.iter_mut().for_each(|x| *x = exponent.clamp(*x));
+            for (to, from) in x_interleaved.iter_mut().zip(interleaved(inputs)) {
+                *to = x[from];
+            }
+
+            sums.fill(zero);
+            self.affine.accumulate(Terms::<_, false>(simd), 0, x, sums);
+            let opened = exponent.open(simd, &x_interleaved);
+            let mut first = 0;
+            for centres in self.centres.chunks(KEPT / CENTRES * (1 + inputs)) {
+                let tiles = centres.chunks_exact(1 + inputs);
+                for (tile, places) in tiles.zip(activations.as_chunks_mut::<CENTRES>().0) {
+                    *places = exponent.exponents(simd, &opened, tile, &x_interleaved);
+                }
+                let tiles = centres.len() / (1 + inputs);
+                let values = activations[..tiles * CENTRES].as_flattened_mut();
+                for values in values.as_chunks_mut::<ABREAST>().0 {
+                    E::powers(simd, values);
+                }
+                let count = (tiles * CENTRES).min(self.weights.factors() - first);
+                self.weights.accumulate(
+                    Terms::<_, false>(simd),
+                    first,
+                    &activations[..count],
+                    sums,
+                );
+                first += count;
+            }
+            for (y, &bias) in sums.iter_mut().zip(self.bias) {
+                let bias = simd.splat_f32s(bias);
+                y.iter_mut().for_each(|y| *y = simd.add_f32s(*y, bias));
+            }
+            y.give(simd, &mut block, poison);
+        }
+    }
 }
 
 /// A centre's head, and its place in the order of the partial sums.
@@ -105,64 +166,6 @@ impl WithSimd for Work<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        match self.network.form {
-            Form::Expanded(decay) => self.run(simd, &Expanded { decay }),
-            Form::Direct => self.run(simd, &Direct),
-        }
-    }
-}
-
-impl Work<'_> {
-    #[inline(always)]
-    fn run<S: Simd, E: Exponent>(self, simd: S, exponent: &E) {
-        let Self { network, lines } = self;
-        let Shape { inputs, outputs, .. } = network.shape;
-        let zero = [simd.splat_f32s(0.0); VECTORS];
-        let (mut x, mut y) = (Values::zeroed(inputs), Values::zeroed(outputs));
-        let mut x_interleaved = Aligned::zeroed(inputs);
-        let mut activations = Aligned::zeroed(KEPT);
-        for mut block in lines.blocks::<S>() {
-            let poison = x.take(simd, &block);
-            let (x, sums) = (x.columns_mut(), y.columns_mut());
-            for (x, &[from, by]) in x.iter_mut().zip(&network.scale) {
-                let (from, by) = (simd.splat_f32s(from), simd.splat_f32s(by));
-                x.iter_mut().for_each(|x| *x = simd.mul_f32s(simd.sub_f32s(*x, from), by));
-            }
-            // One loop over all values: the compiler would make gathers of one loop within another.
-            let values = bytemuck::cast_slice_mut::<_, f32>(x);
-            values.iter_mut().for_each(|x| *x = exponent.clamp(*x));
-            for (to, from) in x_interleaved.iter_mut().zip(interleaved(inputs)) {
-                *to = x[from];
-            }
-
-            sums.fill(zero);
-            network.affine.accumulate(Terms::<_, false>(simd), 0, x, sums);
-            let opened = exponent.open(simd, &x_interleaved);
-            let mut first = 0;
-            for centres in network.centres.chunks(KEPT / CENTRES * (1 + inputs)) {
-                let tiles = centres.chunks_exact(1 + inputs);
-                for (tile, places) in tiles.zip(activations.as_chunks_mut::<CENTRES>().0) {
-                    *places = exponent.exponents(simd, &opened, tile, &x_interleaved);
-                }
-                let tiles = centres.len() / (1 + inputs);
-                let values = activations[..tiles * CENTRES].as_flattened_mut();
-                for values in values.as_chunks_mut::<ABREAST>().0 {
-                    E::powers(simd, values);
-                }
-                let count = (tiles * CENTRES).min(network.weights.factors() - first);
-                network.weights.accumulate(
-                    Terms::<_, false>(simd),
-                    first,
-                    &activations[..count],
-                    sums,
-                );
-                first += count;
-            }
-            for (y, &bias) in sums.iter_mut().zip(network.bias) {
-                let bias = simd.splat_f32s(bias);
-                y.iter_mut().for_each(|y| *y = simd.add_f32s(*y, bias));
-            }
-            y.give(simd, &mut block, poison);
-        }
+        self.network.infer_in(simd, self.lines);
     }
 }

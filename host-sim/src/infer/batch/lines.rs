@@ -53,7 +53,7 @@ impl<S: Simd> Values<S> {
     }
 
     #[inline(always)]
-    pub(super) fn columns(&self) -> &[Lanes<S>] {
+    fn columns(&self) -> &[Lanes<S>] {
         &self.columns[..self.count]
     }
 

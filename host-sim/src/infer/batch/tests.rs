@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::super::{infer_line, infer_rows};
+use super::super::{infer, infer_line, infer_rows};
 use super::exponent::{Expanded, Exponent};
 use super::*;
 use crate::dataset::Table;
@@ -144,7 +144,7 @@ proptest! {
     /// Of any shape, on tables of any length, with readings missing and beyond all bounds.
     #[test]
     fn lines_at_once_are_lines_one_by_one_bit_for_bit(
-        (inputs, centres, outputs) in (1_usize..24, 1_usize..150, 1_usize..24),
+        (inputs, centres, outputs) in (1_usize..=fixed16::MOST_INPUTS, 1_usize..150, 1_usize..24),
         (networks, lines) in (1_usize..4, 0_usize..70),
         format in prop::sample::select(vec![Format::F32Direct, Format::F32, Format::Fixed16]),
         (affine, one_width) in (any::<bool>(), any::<bool>()),
@@ -177,6 +177,48 @@ match format {
         let clamped = Expanded { decay: 0.0 }.clamp(scaled);
         prop_assert_eq!(clamped.to_bits(), clamp_units(scaled).to_bits());
     }
+}
+
+/// All inputs at the end of the range where a sum of squares is largest.
+#[test]
+fn the_most_inputs_at_their_lowest_are_as_one_by_one() {
+    let mut draw = Draw(Xoshiro256PlusPlus::seed_from_u64(3));
+    let shape = Shape { inputs: fixed16::MOST_INPUTS, centres: 20, outputs: 3 };
+    let words = fixed16_words(&mut draw, shape, true);
+    let network = Network::from(fixed16::Network::try_new(shape, true, &words).unwrap());
+    let values = vec![-1e6; 20 * shape.inputs];
+    let table = Table { names: vec![String::new(); shape.inputs], values };
+    let at_once = infer(&network, Kernel::Polynomial, &table);
+    let mut first = vec![0.0; shape.outputs];
+    infer_line(&network, Kernel::Polynomial, &table.values[..shape.inputs], &mut first);
+    assert!(at_once.chunks_exact(shape.outputs).all(|line| line == first), "{first:?}");
+}
+
+/// Vectors of 1, 4 and 16 numbers, as other machines have.
+#[test]
+fn vectors_of_any_width_give_the_same_bits() {
+    let mut draw = Draw(Xoshiro256PlusPlus::seed_from_u64(2));
+    let shape = Shape { inputs: 7, centres: 70, outputs: 5 };
+    let words = expanded_words(&mut draw, shape, true);
+    let network = Network::from(expanded::Network::try_new(shape, true, &words).unwrap());
+    let Some(Batch::Floats(batch)) = Batch::of(&network, Kernel::Polynomial) else { panic!() };
+    let readings: Vec<f64> = (0..45 * shape.inputs).map(|_| reading(&mut draw)).collect();
+    let names = vec![String::new(); shape.inputs];
+    let expected = infer(&network, Kernel::Polynomial, &Table { names, values: readings.clone() });
+    let bits = |values: &[f64]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
+    let check = |infer_in: &dyn Fn(Lines<'_>)| {
+        let mut outputs = vec![0.0; expected.len()];
+        infer_in(Lines {
+            readings: &readings,
+            readings_step: shape.inputs,
+            outputs: &mut outputs,
+            outputs_step: shape.outputs,
+        });
+        assert_eq!(bits(&outputs), bits(&expected));
+    };
+    check(&|lines| batch.infer_in(pulp::Scalar, lines));
+    check(&|lines| batch.infer_in(pulp::Scalar128b, lines));
+    check(&|lines| batch.infer_in(pulp::Scalar512b, lines));
 }
 
 #[test]
