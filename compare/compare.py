@@ -1,9 +1,10 @@
-"""Times the same work in Taxel and in numpy or scikit-learn, and prints medians and ratios, of medians and of the fastest runs.
+"""Times the same work in Taxel and in numpy or scikit-learn, and prints times and ratios.
 
     python compare/compare.py                # every subject
     python compare/compare.py synthesis      # one
 
-Progress goes to stderr, the table to stdout.
+Times and `ratio` are of medians, `fastest` is the ratio of the fastest runs. Progress goes to stderr, the
+table to stdout.
 """
 
 import argparse
@@ -31,7 +32,8 @@ def main() -> None:
     rows = [row for name in chosen for row in importlib.import_module(name).rows()]
     work = max(len(row.work) for row in rows)
     reference = max(len(row.reference) for row in rows)
-    print(f"{'work':{work}}  {'reference':{reference}}  {'takes':>8}  {'Taxel':>8}  {'ratio':>6}  {'fastest':>7}")
+    titles = f"{'takes':>8}  {'Taxel':>8}  {'ratio':>6}  {'fastest':>7}"
+    print(f"{'work':{work}}  {'reference':{reference}}  {titles}")
     for row in rows:
         times = f"{in_words(row.reference_s.median):>8}  {in_words(row.taxel_s.median):>8}"
         ratio = row.reference_s.median / row.taxel_s.median

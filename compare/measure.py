@@ -12,7 +12,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 class Seconds(NamedTuple):
-    """How long work takes: the median of its runs, and the fastest, which the machine's other work disturbs least."""
+    """How long work takes: the median of its runs, and the fastest, the least disturbed by other work."""
 
     median: float
     fastest: float
