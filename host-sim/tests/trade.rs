@@ -168,6 +168,17 @@ fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
         .replace("test_frames = 8000", "test_frames = 100");
     folder.write("few.toml", scene);
     let few = ["trade", "few.toml", "--centres", "16", "--average", "1"];
+    let cycles_of = |page: &str| -> Vec<u64> {
+        let points = page.lines().filter(|line| line.contains(" (1."));
+        let cycles = points.map(|line| line.split_whitespace().rev().nth(3).unwrap());
+        cycles.map(|cycles| cycles.parse().unwrap()).collect()
+    };
+    let front = folder.succeed(&few);
+    let all = folder.succeed(&[&few[..], &["--all"]].concat());
+    let (shown, every) = (cycles_of(&front), cycles_of(&all));
+    assert!(shown.len() > 1 && shown.is_sorted(), "{front}");
+    assert!(front.contains(&format!("{} more points with --all", every.len() - shown.len())));
+    assert!(!all.contains("--all"), "{all}");
     let page = folder.succeed(&[&few[..], &["--gate", "3,4", "--max-cycles", "10000"]].concat());
     assert!(page.contains(" avg gate "), "{page}");
     assert!(page.contains("--rest-tolerance 0.015") || page.contains("--rest-tolerance 0.02"));
@@ -196,7 +207,7 @@ fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
     let stderr = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.code() == Some(2) && stderr.contains("--max-cycles 100"), "{stderr}");
     let page = String::from_utf8(output.stdout).unwrap();
-    assert!(page.contains("f32-direct") && !page.contains("chosen:"), "{page}");
+    assert!(page.contains("\n* fixed16 ") && !page.contains("chosen:"), "{page}");
     assert!(!read("out/few/trade.svg").contains("c1 hollow mark"), "{page}");
     assert!(!folder.path("out/few/chosen.bin").exists());
     // Without noise there is no gate, and the note says why.
@@ -218,8 +229,19 @@ fn limits_that_nothing_meets_and_scenes_that_were_not_measured_are_refused() {
     let scene = press();
     let limits = Limits { error: Some(1e-6), cycles: Some(20_000), flash_bytes: None };
     let message = compute(&scene, limits).unwrap_err().to_string();
-    let told = ["--max-error 0.000001 --max-cycles 20000", "smallest error", "loosen"];
+    let told = ["--max-error 0.000001, --max-cycles 20000, a slot of 131072 bytes", "loosen"];
     assert!(told.iter().all(|part| message.contains(part)), "{message}");
+    // Lifting the limit on cycles lets no point in: what is named is the least of all.
+    let all = compute(&scene, Limits::default()).unwrap();
+    let cheap = all.points.iter().filter(|p| p.frame.cycles <= 20_000 && p.flash_bytes <= 131_072);
+    let error = cheap.map(|p| p.rmse("dz_mm")).fold(f64::MAX, f64::min);
+    let cycles = all.points.iter().map(|p| p.frame.cycles).min().unwrap();
+    for told in [
+        format!("the smallest error within the rest: {error:.4} mm (dz_mm)"),
+        format!("the fewest cycles of all points: {cycles};"),
+    ] {
+        assert!(message.contains(&told), "{message}");
+    }
     for error in [0.0, -1.0, f64::NAN] {
         let limits = Limits { error: Some(error), ..Limits::default() };
         let message = compute(&scene, limits).unwrap_err().to_string();

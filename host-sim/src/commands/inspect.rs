@@ -48,6 +48,19 @@ struct NetworkSummary {
     affine_tail: bool,
 }
 
+impl NetworkSummary {
+    /// For people.
+    fn line(&self) -> String {
+        let (low, high) = self
+            .width
+            .iter()
+            .fold((f32::INFINITY, 0.0_f32), |(low, high), w| (low.min(*w), high.max(*w)));
+        let width = if low == high { digits(low) } else { digits(low) + "…" + &digits(high) };
+        let tail = if self.affine_tail { ", affine tail" } else { "" };
+        format!("{}, K = {}, width {width}{tail}", self.format, self.centres)
+    }
+}
+
 #[derive(Serialize)]
 struct ColumnSummary {
     name: String,
@@ -139,17 +152,17 @@ fn page_of(s: &Summary) -> print::Page {
         let (readings, features) = (s.rows * s.inputs_per_row, s.projected_features);
         line("projection", format!("{readings} readings → {features} features for all rows"));
     }
-    for (index, network) in s.networks.iter().enumerate() {
-        let (low, high) = network
-            .width
-            .iter()
-            .fold((f32::INFINITY, 0.0_f32), |(low, high), w| (low.min(*w), high.max(*w)));
-        let width = if low == high { digits(low) } else { digits(low) + "…" + &digits(high) };
-        let tail = if network.affine_tail { ", affine tail" } else { "" };
-        line(
-            &format!("network {index}"),
-            format!("{}, K = {}, width {width}{tail}", network.format, network.centres),
-        );
+    let networks: Vec<String> = s.networks.iter().map(NetworkSummary::line).collect();
+    let mut index = 0;
+    for alike in networks.chunk_by(|a, b| a == b) {
+        let last = index + alike.len() - 1;
+        let label = if last == index {
+            format!("network {index}")
+        } else {
+            format!("networks {index}–{last}")
+        };
+        line(&label, alike[0].clone());
+        index = last + 1;
     }
     line("flash", format!("{} bytes", s.flash_bytes));
     let ram = &s.ram_bytes;

@@ -63,6 +63,9 @@ pub struct Arguments {
     /// Clock of the device, for times.
     #[arg(long, value_name = "MHZ", default_value_t = 168.0, allow_negative_numbers = true)]
     clock_mhz: f64,
+    /// Print all points, not only the front and the chosen one (files have all of them).
+    #[arg(long)]
+    all: bool,
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
@@ -107,7 +110,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if common.json {
         print::json(&trade)?;
     } else {
-        page_of(&trade, &folder).print()?;
+        page_of(&trade, arguments.all, &folder).print()?;
     }
     // What was measured is kept and shown, whether or not a point is within the limits.
     choice
@@ -225,7 +228,7 @@ fn csv_of(trade: &Trade) -> String {
     csv
 }
 
-fn page_of(trade: &Trade, folder: &Path) -> print::Page {
+fn page_of(trade: &Trade, all: bool, folder: &Path) -> print::Page {
     let mut page = print::Page::default();
     page.line(format_args!(
         "{}: {} points, noise {} % a sample, {} test frames; cycles of a frame on a Cortex-M4F by the\n\
@@ -251,8 +254,9 @@ fn page_of(trade: &Trade, folder: &Path) -> print::Page {
         "RAM",
         groups = groups.concat()
     ));
-    for (i, point) in trade.points.iter().enumerate() {
-        page.line(line_of(point, trade.chosen == Some(i)));
+    let shown = shown(trade, all);
+    for i in &shown {
+        page.line(line_of(&trade.points[*i], trade.chosen == Some(*i)));
     }
     let mean: Vec<String> = trade.mean.iter().map(|e| format!("{:>9.4}       ", e.rmse)).collect();
     page.line(format_args!("{:<50}{}", "the mean", mean.concat()));
@@ -260,10 +264,14 @@ fn page_of(trade: &Trade, folder: &Path) -> print::Page {
         "\n*: nothing is better than this in RMSE of {}, cycles and samples, and worse in none\n\
          array: one network for all rows, behind a projection; those larger than a slot (128 KiB) are left out,\n\
          and none larger than that is chosen unless --max-flash says so\n\
-         gate: k of a gate for rows at rest; its cycles are the mean of the test frames\n\
-         f32 whose distances may not be expanded (docs/formats.md) is the f32-direct beside it, and not listed",
+         gate: k of a gate for rows at rest; its cycles are the mean of the test frames",
         trade.group
     ));
+    page.line(if all {
+        "f32 whose distances may not be expanded (docs/formats.md) is the f32-direct beside it, and not listed".into()
+    } else {
+        format!("{} more points with --all", trade.points.len() - shown.len())
+    });
     if let Some(chosen) = trade.chosen {
         let point = &trade.points[chosen];
         page.line(format_args!(
@@ -282,6 +290,19 @@ fn page_of(trade: &Trade, folder: &Path) -> print::Page {
     }
     page.line(format_args!("all of it, and the curve: {}", folder.join("trade.html").display()));
     page
+}
+
+/// Numbers of the points to print: all as they were measured, or the front from cheap to dear for each number
+/// of samples.
+fn shown(trade: &Trade, all: bool) -> Vec<usize> {
+    let numbers = 0..trade.points.len();
+    if all {
+        return numbers.collect();
+    }
+    let mut shown: Vec<usize> =
+        numbers.filter(|i| trade.points[*i].on_front || trade.chosen == Some(*i)).collect();
+    shown.sort_by_key(|i| (trade.points[*i].samples_averaged, trade.points[*i].frame.cycles));
+    shown
 }
 
 fn line_of(point: &Point, chosen: bool) -> String {

@@ -52,11 +52,6 @@ impl Limits {
         if !self.any() {
             return Ok(None);
         }
-        let within = |point: &Point| {
-            self.error.is_none_or(|most| point.rmse(group) <= most)
-                && self.cycles.is_none_or(|most| point.frame.cycles <= most)
-                && point.flash_bytes <= self.flash_bytes.unwrap_or(super::SLOT_BYTES)
-        };
         let key = |point: &Point| {
             let (cycles, error) = (point.frame.cycles as f64, point.rmse(group));
             let first = if self.error.is_some() { [cycles, error] } else { [error, cycles] };
@@ -68,18 +63,39 @@ impl Limits {
             ordered.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
         };
         let best = (0..points.len())
-            .filter(|i| within(&points[*i]))
+            .filter(|i| self.allow(&points[*i], group))
             .min_by(|a, b| compare(&key(&points[*a]), &key(&points[*b])));
-        best.map(Some).ok_or_else(|| {
-            let least = |of: fn(&Point) -> f64| points.iter().map(of).fold(f64::INFINITY, f64::min);
-            let error = points.iter().map(|p| p.rmse(group)).fold(f64::INFINITY, f64::min);
-            Error::Usage(format!(
-                "no point is within {self}; the smallest error is {error:.4} {unit} ({group}), the fewest \
-                 cycles {}, the smallest blob {} bytes: loosen a limit",
-                least(|p| p.frame.cycles as f64),
-                least(|p| p.flash_bytes as f64)
-            ))
-        })
+        best.map(Some).ok_or_else(|| Error::Usage(self.refusal(points, group, unit)))
+    }
+
+    fn allow(&self, point: &Point, group: &str) -> bool {
+        self.error.is_none_or(|most| point.rmse(group) <= most)
+            && self.cycles.is_none_or(|most| point.frame.cycles <= most)
+            && point.flash_bytes <= self.flash_bytes.unwrap_or(super::SLOT_BYTES)
+    }
+
+    /// How near points within the other limits, or else all points, come to each limit that was given.
+    fn refusal(&self, points: &[Point], group: &str, unit: &str) -> String {
+        let nearest = |others: Self, what: &str, of: &dyn Fn(&Point) -> f64, decimals: usize| {
+            let within = points.iter().filter(|point| others.allow(point, group));
+            let (least, whose) = match within.map(of).reduce(f64::min) {
+                Some(least) => (least, "within the rest"),
+                None => (points.iter().map(of).fold(f64::INFINITY, f64::min), "of all points"),
+            };
+            format!("the {what} {whose}: {least:.decimals$}")
+        };
+        let error = self.error.map(|_| {
+            let others = Self { error: None, ..*self };
+            nearest(others, "smallest error", &|p| p.rmse(group), 4) + &format!(" {unit} ({group})")
+        });
+        let cycles = self.cycles.map(|_| {
+            let others = Self { cycles: None, ..*self };
+            nearest(others, "fewest cycles", &|p| p.frame.cycles as f64, 0)
+        });
+        let others = Self { flash_bytes: Some(usize::MAX), ..*self };
+        let flash = nearest(others, "smallest blob", &|p| p.flash_bytes as f64, 0) + " bytes";
+        let nearest: Vec<String> = [error, cycles, Some(flash)].into_iter().flatten().collect();
+        format!("no point is within {self}; {}: loosen a limit", nearest.join("; "))
     }
 }
 
@@ -87,8 +103,11 @@ impl std::fmt::Display for Limits {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let error = self.error.map(|error| format!("--max-error {error}"));
         let cycles = self.cycles.map(|cycles| format!("--max-cycles {cycles}"));
-        let flash = self.flash_bytes.map(|bytes| format!("--max-flash {bytes}"));
-        let given: Vec<String> = [error, cycles, flash].into_iter().flatten().collect();
-        f.write_str(&given.join(" "))
+        let flash =
+            self.flash_bytes.map_or(format!("a slot of {} bytes", super::SLOT_BYTES), |bytes| {
+                format!("--max-flash {bytes}")
+            });
+        let given: Vec<String> = [error, cycles, Some(flash)].into_iter().flatten().collect();
+        f.write_str(&given.join(", "))
     }
 }
