@@ -15,6 +15,8 @@ pub enum Mark {
     LineAnd(Shape),
     /// A dashed line.
     Dashed,
+    /// A dotted line.
+    Dotted,
     /// A shape at every point.
     Points(Shape),
     /// Bars from zero, this wide on the x axis.
@@ -208,6 +210,7 @@ fn swatch(svg: &mut Svg, series: &Series, [x, y]: [f64; 2]) {
     match &series.mark {
         Mark::Line => line(svg, "line"),
         Mark::Dashed => line(svg, "line dashed"),
+        Mark::Dotted => line(svg, "line dotted"),
         Mark::LineAnd(shape) => {
             line(svg, "line");
             svg.path(&shape.path(middle, 1.0), &format!("{} mark", series.class));
@@ -270,6 +273,7 @@ impl Frame<'_> {
         match &series.mark {
             Mark::Line => self.draw_line(svg, series, &class("line")),
             Mark::Dashed => self.draw_line(svg, series, &class("line dashed")),
+            Mark::Dotted => self.draw_line(svg, series, &class("line dotted")),
             Mark::LineAnd(shape) => {
                 self.draw_line(svg, series, &class("line"));
                 self.draw_points(svg, series, *shape, &class("mark"));

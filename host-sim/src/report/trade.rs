@@ -32,13 +32,13 @@ fn chart(trade: &Trade) -> Chart {
     let mut samples: Vec<usize> = trade.points.iter().map(|p| p.samples_averaged).collect();
     samples.sort_unstable();
     samples.dedup();
-    for &samples in &samples {
+    let marks = [Mark::Line, Mark::Dashed].into_iter().chain(std::iter::repeat(Mark::Dotted));
+    for (&samples, mark) in samples.iter().zip(marks) {
         let on_front = trade.points.iter().filter(|p| p.on_front && p.samples_averaged == samples);
         let mut line: Vec<[f64; 2]> = on_front.map(at).collect();
         line.sort_by(|a, b| a[0].total_cmp(&b[0]));
         front.extend(&line);
         let name = if samples == 1 { "front".into() } else { format!("front, {samples} samples") };
-        let mark = if samples == 1 { Mark::Line } else { Mark::Dashed };
         series.push(Series::new(&name, "front", mark, line));
     }
     for (way, classes, shape) in WAYS {
