@@ -109,6 +109,9 @@ fn one_network_for_the_whole_array_needs_every_reading_and_errs_less() {
     folder.succeed(&array);
     let printed = folder.succeed(&["inspect", "array.bin"]);
     assert!(printed.contains("36 readings → 18 features for all rows"), "{printed}");
+    assert!(printed.contains("\nnetwork 0 ") && !printed.contains("network 1"), "{printed}");
+    let printed = folder.succeed(&["inspect", "rows.bin"]);
+    assert!(printed.contains("\nnetworks 0–1 ") && !printed.contains("network 0"), "{printed}");
     folder.succeed(&["synth", "scene.toml", "-n", "1000", "--seed", "9", "-o", "d.csv"]);
     let rmse = |model: &str| {
         let result = json(&folder.succeed(&["eval", model, "d.csv", "--json"]));

@@ -8,7 +8,7 @@ use crate::exp::{ExpKernel, Polynomial};
 use crate::frame::Frame;
 use crate::gate::Gate;
 use crate::projection::Projection;
-use crate::rbf::{Finite, Format, NetworkError};
+use crate::rbf::{Assembled, Finite, Format, NetworkError};
 #[cfg(cortex_m4f)]
 use crate::rbf::{USUAL_INPUTS, USUAL_OUTPUTS};
 

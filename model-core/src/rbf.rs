@@ -17,6 +17,9 @@
 use crate::exp::ExpKernel;
 use crate::scale::{HALF_RANGE, UNITS};
 
+pub(crate) use assembled::Assembled;
+
+mod assembled;
 pub mod direct;
 pub mod expanded;
 pub mod fixed16;

@@ -10,11 +10,12 @@
 //! the second by −g‖x‖². Centres are stored in fours; the last may be fill.
 
 use super::{
-    Cut, Finite, NetworkError, Shape, USUAL_INPUTS, USUAL_OUTPUTS, accumulate, check_finite,
-    check_length, check_spans,
+    Assembled, Cut, NetworkError, Shape, accumulate, check_finite, check_length, check_spans,
 };
 #[cfg(cortex_m4f)]
-use crate::cortex_m4;
+use super::{Finite, USUAL_OUTPUTS};
+#[cfg(cortex_m4f)]
+use crate::cortex_m4::{self, Inputs};
 use crate::exp::exp2;
 use crate::scale::{HALF_RANGE, UNITS, clamp_units};
 
@@ -186,62 +187,33 @@ impl<'a> Network<'a> {
         super::range_about(p.input_midpoint.get(input), p.input_per_unit.get(input))
     }
 
-    pub(crate) fn scale(&self, reading: &[f32], scaled: &mut [f32]) {
-        let p = self.parameters();
-        super::scale_about(p.input_midpoint, p.input_per_unit, reading, scaled);
-    }
-
-    #[inline(always)]
-    #[expect(clippy::inline_always, reason = "callers rely on it for constant lengths")]
-    pub(crate) fn infer(&self, reading: &[f32], scaled: &mut [f32], output: &mut [f32]) -> Finite {
-        #[cfg(cortex_m4f)]
-        if let (Ok(reading), Ok(output)) = (reading.try_into(), (&mut *output).try_into()) {
-            return cortex_m4::expanded(self, cortex_m4::Inputs::Readings(reading), output);
-        }
-        self.scale(reading, scaled);
-        self.infer_scaled(scaled, output);
-        Finite::Unknown
-    }
-
-    /// As [`infer`](Self::infer), of 18 outputs or several groups of them.
-    #[cfg(cortex_m4f)]
-    #[inline(always)]
-    #[expect(clippy::inline_always, reason = "a match and a call")]
-    pub(crate) fn infer_in_assembly(
-        &self,
-        reading: &[f32; USUAL_INPUTS],
-        groups: &mut [[f32; USUAL_OUTPUTS]],
-    ) -> Finite {
-        let inputs = cortex_m4::Inputs::Readings(reading);
-        match groups {
-            [output] => cortex_m4::expanded(self, inputs, output),
-            groups => cortex_m4::expanded_array(self, inputs, groups),
-        }
-    }
-
-    #[inline(always)]
-    #[expect(clippy::inline_always, reason = "callers rely on it for constant lengths")]
-    pub(crate) fn infer_scaled(&self, scaled: &mut [f32], output: &mut [f32]) {
-        #[cfg(cortex_m4f)]
-        if let (Ok(scaled), Ok(output)) = ((&*scaled).try_into(), (&mut *output).try_into()) {
-            cortex_m4::expanded(self, cortex_m4::Inputs::Scaled(scaled), output);
-            return;
-        }
-        self.infer_scaled_in_rust(scaled, output);
-    }
-
     /// As [`rbf::Network::infer_scaled`](super::Network::infer_scaled), by the compiled twin of the
     /// assembly: the same bits; public to measure what the assembly saves. `scaled` and `output` must have
     /// the sizes of the shape: what is beyond is left alone.
     #[inline(never)]
     pub fn infer_scaled_portably(&self, scaled: &mut [f32], output: &mut [f32]) {
-        let usual: (Result<&mut [f32; USUAL_INPUTS], _>, Result<&mut [f32; USUAL_OUTPUTS], _>) =
-            ((&mut *scaled).try_into(), (&mut *output).try_into());
-        if let (Ok(scaled), Ok(output)) = usual {
-            self.infer_scaled_in_rust(scaled, output);
-        } else {
-            self.infer_scaled_in_rust(scaled, output);
-        }
+        self.infer_scaled_by_twin(scaled, output);
+    }
+}
+
+impl Assembled for Network<'_> {
+    fn scale(&self, reading: &[f32], scaled: &mut [f32]) {
+        let p = self.parameters();
+        super::scale_about(p.input_midpoint, p.input_per_unit, reading, scaled);
+    }
+
+    #[cfg(cortex_m4f)]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "a call")]
+    fn kernel(&self, inputs: Inputs<'_>, output: &mut [f32; USUAL_OUTPUTS]) -> Finite {
+        cortex_m4::expanded(self, inputs, output)
+    }
+
+    #[cfg(cortex_m4f)]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "a call")]
+    fn array_kernel(&self, inputs: Inputs<'_>, groups: &mut [[f32; USUAL_OUTPUTS]]) -> Finite {
+        cortex_m4::expanded_array(self, inputs, groups)
     }
 
     #[inline(always)]

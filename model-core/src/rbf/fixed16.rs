@@ -13,14 +13,13 @@
 //! The bias opens the sums, and one multiplication by the scale closes them: all before it is in integers, so
 //! that any order gives the same bits.
 
-#[cfg(cortex_m4f)]
-use crate::cortex_m4;
 use core::f32::consts::LOG2_E;
 
-use super::{
-    Cut, Finite, NetworkError, Shape, USUAL_INPUTS, USUAL_OUTPUTS, check_finite, check_length,
-    check_spans,
-};
+use super::{Assembled, Cut, NetworkError, Shape, check_finite, check_length, check_spans};
+#[cfg(cortex_m4f)]
+use super::{Finite, USUAL_OUTPUTS};
+#[cfg(cortex_m4f)]
+use crate::cortex_m4::{self, Inputs};
 use crate::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP, clamp_steps};
 
 /// Centres are stored in multiples of this.
@@ -218,62 +217,40 @@ impl<'a> Network<'a> {
         super::range_about(p.input_midpoint.get(input), p.input_per_unit.get(input))
     }
 
-    pub(crate) fn scale(&self, reading: &[f32], scaled: &mut [f32]) {
-        let p = self.parameters();
-        super::scale_about(p.input_midpoint, p.input_per_unit, reading, scaled);
-    }
-
-    #[inline(always)]
-    #[expect(clippy::inline_always, reason = "callers rely on it for constant lengths")]
-    pub(crate) fn infer(&self, reading: &[f32], scaled: &mut [f32], output: &mut [f32]) -> Finite {
-        #[cfg(cortex_m4f)]
-        if let (Ok(reading), Ok(output)) = (reading.try_into(), (&mut *output).try_into()) {
-            return cortex_m4::fixed16(self, cortex_m4::Inputs::Readings(reading), output);
-        }
-        self.scale(reading, scaled);
-        self.infer_scaled(scaled, output);
-        Finite::Unknown
-    }
-
-    /// As [`infer`](Self::infer), of 18 outputs or several groups of them.
-    #[cfg(cortex_m4f)]
-    #[inline(always)]
-    #[expect(clippy::inline_always, reason = "a match and a call")]
-    pub(crate) fn infer_in_assembly(
-        &self,
-        reading: &[f32; USUAL_INPUTS],
-        groups: &mut [[f32; USUAL_OUTPUTS]],
-    ) -> Finite {
-        let inputs = cortex_m4::Inputs::Readings(reading);
-        match groups {
-            [output] => cortex_m4::fixed16(self, inputs, output),
-            groups => cortex_m4::fixed16_array(self, inputs, groups),
-        }
-    }
-
-    #[inline(always)]
-    #[expect(clippy::inline_always, reason = "callers rely on it for constant lengths")]
-    pub(crate) fn infer_scaled(&self, scaled: &mut [f32], output: &mut [f32]) {
-        #[cfg(cortex_m4f)]
-        if let (Ok(scaled), Ok(output)) = ((&*scaled).try_into(), (&mut *output).try_into()) {
-            cortex_m4::fixed16(self, cortex_m4::Inputs::Scaled(scaled), output);
-            return;
-        }
-        self.infer_scaled_in_rust(scaled, output);
-    }
-
     /// As [`rbf::Network::infer_scaled`](super::Network::infer_scaled), by the compiled twin of the
     /// assembly: the same bits; public to measure what the assembly saves. `scaled` and `output` must have
     /// the sizes of the shape: what is beyond is left alone.
     #[inline(never)]
     pub fn infer_scaled_portably(&self, scaled: &mut [f32], output: &mut [f32]) {
-        let usual: (Result<&mut [f32; USUAL_INPUTS], _>, Result<&mut [f32; USUAL_OUTPUTS], _>) =
-            ((&mut *scaled).try_into(), (&mut *output).try_into());
-        if let (Ok(scaled), Ok(output)) = usual {
-            self.infer_scaled_in_rust(scaled, output);
-        } else {
-            self.infer_scaled_in_rust(scaled, output);
-        }
+        self.infer_scaled_by_twin(scaled, output);
+    }
+
+    /// The activations in Q15 of sixteen centres after the other, for inputs in steps
+    /// ([`clamp_steps`]): what a trainer fits output weights to.
+    pub fn activations(&self, x: &[i32]) -> impl Iterator<Item = [i32; CENTRES_AT_ONCE]> {
+        let shared = shared_term(self.parameters().decay, x);
+        self.centres().map(move |(exponents, _)| activations_of(exponents, shared, x))
+    }
+}
+
+impl Assembled for Network<'_> {
+    fn scale(&self, reading: &[f32], scaled: &mut [f32]) {
+        let p = self.parameters();
+        super::scale_about(p.input_midpoint, p.input_per_unit, reading, scaled);
+    }
+
+    #[cfg(cortex_m4f)]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "a call")]
+    fn kernel(&self, inputs: Inputs<'_>, output: &mut [f32; USUAL_OUTPUTS]) -> Finite {
+        cortex_m4::fixed16(self, inputs, output)
+    }
+
+    #[cfg(cortex_m4f)]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "a call")]
+    fn array_kernel(&self, inputs: Inputs<'_>, groups: &mut [[f32; USUAL_OUTPUTS]]) -> Finite {
+        cortex_m4::fixed16_array(self, inputs, groups)
     }
 
     #[inline(always)]
@@ -298,13 +275,6 @@ impl<'a> Network<'a> {
         for (y, scale) in output.iter_mut().zip(p.output_scale) {
             *y = y.to_bits().cast_signed() as f32 * scale;
         }
-    }
-
-    /// The activations in Q15 of sixteen centres after the other, for inputs in steps
-    /// ([`clamp_steps`]): what a trainer fits output weights to.
-    pub fn activations(&self, x: &[i32]) -> impl Iterator<Item = [i32; CENTRES_AT_ONCE]> {
-        let shared = shared_term(self.parameters().decay, x);
-        self.centres().map(move |(exponents, _)| activations_of(exponents, shared, x))
     }
 }
 
