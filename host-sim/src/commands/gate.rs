@@ -62,6 +62,14 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     settings.check(&scene)?;
     let model =
         scene_argument::model(arguments.model.as_deref(), &scene, &Progress::on_terminal())?;
+    let own = f64::from(model.model().metadata().noise_level);
+    if (own - scene.noise.level).abs() > 1e-3 * scene.noise.level {
+        eprintln!(
+            "note: the model was trained for noise of {}, and is judged at the scene's {}; see --noise",
+            percent(own, 2),
+            percent(scene.noise.level, 2)
+        );
+    }
     if settings.frame_cycles.is_none() {
         let measured = Costs::measured()?.frames_of_model(&model.model());
         settings.frame_cycles = measured.map(|frames| frames.map(|cost| cost.cycles));

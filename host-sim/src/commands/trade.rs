@@ -242,7 +242,7 @@ fn page_of(trade: &Trade, all: bool, folder: &Path) -> print::Page {
     let groups: Vec<String> = trade.mean.iter().map(|e| format!("{:>16}", e.group)).collect();
     page.line(format_args!(
         "\n{:<28} {:>4} {:>5} {:>4} {:>4}{groups}{:>13} {:>9} {:>8} {:>8} {:>6}",
-        "RMSE (× best)",
+        "format",
         "K",
         "tail",
         "avg",
@@ -261,10 +261,12 @@ fn page_of(trade: &Trade, all: bool, folder: &Path) -> print::Page {
     let mean: Vec<String> = trade.mean.iter().map(|e| format!("{:>9.4}       ", e.rmse)).collect();
     page.line(format_args!("{:<50}{}", "the mean", mean.concat()));
     page.line(format_args!(
-        "\n*: nothing is better than this in RMSE of {}, cycles and samples, and worse in none\n\
-         array: one network for all rows, behind a projection; those larger than a slot (128 KiB) are left out,\n\
-         and none larger than that is chosen unless --max-flash says so\n\
+        "\nRMSE in {}, in brackets over the smallest of all\n\
+         *: nothing is better than this in RMSE of {}, cycles and samples, and worse in none\n\
+         array: one network for all rows, behind a projection; those larger than a slot (128 KiB) are left out\n\
+         flash: nothing larger than a slot is chosen unless --max-flash says so\n\
          gate: k of a gate for rows at rest; its cycles are the mean of the test frames",
+        trade.unit,
         trade.group
     ));
     page.line(if all {
@@ -282,10 +284,15 @@ fn page_of(trade: &Trade, all: bool, folder: &Path) -> print::Page {
             point.frame.cycles,
             folder.join("chosen.bin").display()
         ));
-        if let Some(tolerance) = trade.rest_tolerance(chosen) {
-            page.line(format_args!(
-                "its gate, on a device with a baseline: --rest-tolerance {tolerance}"
-            ));
+        let oversampling = (point.samples_averaged > 1).then(|| {
+            format!(" --oversampling {}, which makes a scan longer", point.samples_averaged)
+        });
+        let tolerance = trade
+            .rest_tolerance(chosen)
+            .map(|tolerance| format!(" --rest-tolerance {tolerance}, once it has a baseline"));
+        let options: Vec<String> = oversampling.into_iter().chain(tolerance).collect();
+        if !options.is_empty() {
+            page.line(format_args!("on a device, `host-sim link`:{}", options.join(";")));
         }
     }
     page.line(format_args!("all of it, and the curve: {}", folder.join("trade.html").display()));

@@ -38,7 +38,8 @@ fn chart(trade: &Trade) -> Chart {
         let mut line: Vec<[f64; 2]> = on_front.map(at).collect();
         line.sort_by(|a, b| a[0].total_cmp(&b[0]));
         front.extend(&line);
-        let name = if samples == 1 { "front".into() } else { format!("front, {samples} samples") };
+        let plural = if samples == 1 { "" } else { "s" };
+        let name = format!("front, {samples} sample{plural}");
         series.push(Series::new(&name, "front", mark, line));
     }
     for (way, classes, shape) in WAYS {

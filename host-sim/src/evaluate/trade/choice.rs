@@ -74,40 +74,74 @@ impl Limits {
             && point.flash_bytes <= self.flash_bytes.unwrap_or(super::SLOT_BYTES)
     }
 
-    /// How near points within the other limits, or else all points, come to each limit that was given.
+    /// Which limits no point meets, or, where each can be met, how near points within the others come to it.
     fn refusal(&self, points: &[Point], group: &str, unit: &str) -> String {
-        let nearest = |others: Self, what: &str, of: &dyn Fn(&Point) -> f64, decimals: usize| {
-            let within = points.iter().filter(|point| others.allow(point, group));
-            let (least, whose) = match within.map(of).reduce(f64::min) {
-                Some(least) => (least, "within the rest"),
-                None => (points.iter().map(of).fold(f64::INFINITY, f64::min), "of all points"),
-            };
-            format!("the {what} {whose}: {least:.decimals$}")
+        let unit = format!("{unit} ({group})");
+        let least = |within: Self, limit: &Limit| {
+            let within = points.iter().filter(|point| within.allow(point, group));
+            let least = within.map(|point| (limit.of)(point, group)).reduce(f64::min)?;
+            Some((limit.say)(least, &unit))
         };
-        let error = self.error.map(|_| {
-            let others = Self { error: None, ..*self };
-            nearest(others, "smallest error", &|p| p.rmse(group), 4) + &format!(" {unit} ({group})")
+        let limits = self.each();
+        let unmet = limits.iter().filter(|limit| least(limit.alone, limit).is_none());
+        let unmet: Vec<String> = unmet
+            .filter_map(|limit| Some(format!("{}: {} of all", limit.name, least(NONE, limit)?)))
+            .collect();
+        if !unmet.is_empty() {
+            return format!("no point is within {}: loosen it", unmet.join("; nor within "));
+        }
+        let names: Vec<&str> = limits.iter().map(|limit| limit.name.as_str()).collect();
+        let nearest = limits.iter().filter_map(|limit| {
+            Some(format!("without {}, {}", limit.name, least(limit.others, limit)?))
         });
-        let cycles = self.cycles.map(|_| {
-            let others = Self { cycles: None, ..*self };
-            nearest(others, "fewest cycles", &|p| p.frame.cycles as f64, 0)
+        format!(
+            "no point is within {} at once; {}: loosen one",
+            names.join(", "),
+            nearest.collect::<Vec<_>>().join("; ")
+        )
+    }
+
+    /// Those that hold.
+    fn each(&self) -> Vec<Limit> {
+        let error = self.error.map(|most| Limit {
+            name: format!("--max-error {most}"),
+            alone: Self { error: Some(most), ..NONE },
+            others: Self { error: None, ..*self },
+            of: |point, group| point.rmse(group),
+            say: |least, unit| format!("the smallest error is {least:.4} {unit}"),
         });
-        let others = Self { flash_bytes: Some(usize::MAX), ..*self };
-        let flash = nearest(others, "smallest blob", &|p| p.flash_bytes as f64, 0) + " bytes";
-        let nearest: Vec<String> = [error, cycles, Some(flash)].into_iter().flatten().collect();
-        format!("no point is within {self}; {}: loosen a limit", nearest.join("; "))
+        let cycles = self.cycles.map(|most| Limit {
+            name: format!("--max-cycles {most}"),
+            alone: Self { cycles: Some(most), ..NONE },
+            others: Self { cycles: None, ..*self },
+            of: |point, _| point.frame.cycles as f64,
+            say: |least, _| format!("the fewest cycles are {least}"),
+        });
+        let most = self.flash_bytes.unwrap_or(super::SLOT_BYTES);
+        let flash = Limit {
+            name: match self.flash_bytes {
+                Some(_) => format!("--max-flash {most}"),
+                None => format!("a slot's {most} bytes"),
+            },
+            alone: Self { flash_bytes: Some(most), ..NONE },
+            others: Self { flash_bytes: NONE.flash_bytes, ..*self },
+            of: |point, _| point.flash_bytes as f64,
+            say: |least, _| format!("the smallest blob takes {least} bytes"),
+        };
+        error.into_iter().chain(cycles).chain([flash]).collect()
     }
 }
 
-impl std::fmt::Display for Limits {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let error = self.error.map(|error| format!("--max-error {error}"));
-        let cycles = self.cycles.map(|cycles| format!("--max-cycles {cycles}"));
-        let flash =
-            self.flash_bytes.map_or(format!("a slot of {} bytes", super::SLOT_BYTES), |bytes| {
-                format!("--max-flash {bytes}")
-            });
-        let given: Vec<String> = [error, cycles, Some(flash)].into_iter().flatten().collect();
-        f.write_str(&given.join(", "))
-    }
+/// Limits that every point is within.
+const NONE: Limits = Limits { error: None, cycles: None, flash_bytes: Some(usize::MAX) };
+
+/// One of several limits.
+struct Limit {
+    name: String,
+    alone: Limits,
+    others: Limits,
+    /// What it limits.
+    of: fn(&Point, &str) -> f64,
+    /// How the least of that is told, in a unit.
+    say: fn(f64, &str) -> String,
 }
