@@ -177,8 +177,13 @@ fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
     let all = folder.succeed(&[&few[..], &["--all"]].concat());
     let (shown, every) = (cycles_of(&front), cycles_of(&all));
     assert!(shown.len() > 1 && shown.is_sorted(), "{front}");
-    assert!(front.contains(&format!("{} more points with --all", every.len() - shown.len())));
+    assert!(front.contains(&format!("\n{} more points with --all", every.len() - shown.len())));
     assert!(!all.contains("--all"), "{all}");
+    let averages =
+        ["trade", "few.toml", "--centres", "16", "--average", "1,4,16", "--gate", "none"];
+    folder.succeed(&averages);
+    let svg = std::fs::read_to_string(folder.path("out/few/trade.svg")).unwrap();
+    assert!(svg.contains("front line dashed") && svg.contains("front line dotted"));
     let page = folder.succeed(&[&few[..], &["--gate", "3,4", "--max-cycles", "10000"]].concat());
     assert!(page.contains(" avg gate "), "{page}");
     assert!(page.contains("--rest-tolerance 0.015") || page.contains("--rest-tolerance 0.02"));
@@ -232,13 +237,16 @@ fn limits_that_nothing_meets_and_scenes_that_were_not_measured_are_refused() {
     let all = compute(&scene, Limits::default()).unwrap();
     let least_error = |within: &dyn Fn(&trade::Point) -> bool| {
         let within = all.points.iter().filter(|point| within(point));
-        within.map(|point| point.rmse("dz_mm")).fold(f64::MAX, f64::min)
+        let least = within.map(|point| point.rmse("dz_mm")).fold(f64::MAX, f64::min);
+        (least * 1e4).ceil() / 1e4
     };
     let error = least_error(&|_| true);
     let told = format!(
         "no point is within --max-error 0.000001: the smallest error is {error:.4} mm (dz_mm) of all: loosen it"
     );
     assert_eq!(message, told);
+    // The error that is told can be asked for.
+    compute(&scene, Limits { error: Some(error), ..Limits::default() }).unwrap();
     // Each can be met, but not both.
     let cycles = all.points.iter().map(|point| point.frame.cycles).min().unwrap();
     let limits = Limits { error: Some(error), cycles: Some(cycles), flash_bytes: None };

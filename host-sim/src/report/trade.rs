@@ -27,7 +27,6 @@ const WAYS: [(&str, [&str; 2], Shape); 10] = [
 /// Cycles against error, both logarithmic: every point of one sample a reading or more, and the front.
 fn chart(trade: &Trade) -> Chart {
     let at = |point: &Point| [point.frame.cycles as f64, point.rmse(&trade.group)];
-    let mut front: Vec<[f64; 2]> = Vec::new();
     let mut series = Vec::new();
     let mut samples: Vec<usize> = trade.points.iter().map(|p| p.samples_averaged).collect();
     samples.sort_unstable();
@@ -37,7 +36,6 @@ fn chart(trade: &Trade) -> Chart {
         let on_front = trade.points.iter().filter(|p| p.on_front && p.samples_averaged == samples);
         let mut line: Vec<[f64; 2]> = on_front.map(at).collect();
         line.sort_by(|a, b| a[0].total_cmp(&b[0]));
-        front.extend(&line);
         let plural = if samples == 1 { "" } else { "s" };
         let name = format!("front, {samples} sample{plural}");
         series.push(Series::new(&name, "front", mark, line));

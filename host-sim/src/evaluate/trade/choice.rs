@@ -108,7 +108,10 @@ impl Limits {
             alone: Self { error: Some(most), ..NONE },
             others: Self { error: None, ..*self },
             of: |point, group| point.rmse(group),
-            say: |least, unit| format!("the smallest error is {least:.4} {unit}"),
+            // Rounded up: a limit that can be met.
+            say: |least, unit| {
+                format!("the smallest error is {:.4} {unit}", (least * 1e4).ceil() / 1e4)
+            },
         });
         let cycles = self.cycles.map(|most| Limit {
             name: format!("--max-cycles {most}"),
