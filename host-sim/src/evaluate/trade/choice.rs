@@ -79,20 +79,21 @@ impl Limits {
         let unit = format!("{unit} ({group})");
         let least = |within: Self, limit: &Limit| {
             let within = points.iter().filter(|point| within.allow(point, group));
-            let least = within.map(|point| (limit.of)(point, group)).reduce(f64::min)?;
-            Some((limit.say)(least, &unit))
+            within.map(|point| (limit.of)(point, group)).reduce(f64::min)
         };
         let limits = self.each();
-        let unmet = limits.iter().filter(|limit| least(limit.alone, limit).is_none());
-        let unmet: Vec<String> = unmet
-            .filter_map(|limit| Some(format!("{}: {} of all", limit.name, least(NONE, limit)?)))
-            .collect();
+        let unmet = limits.iter().filter_map(|limit| {
+            let least = least(NONE, limit).filter(|least| *least > limit.most)?;
+            Some(format!("{}: {} of all", limit.name, (limit.say)(least, &unit)))
+        });
+        let unmet: Vec<String> = unmet.collect();
         if !unmet.is_empty() {
             return format!("no point is within {}: loosen it", unmet.join("; nor within "));
         }
         let names: Vec<&str> = limits.iter().map(|limit| limit.name.as_str()).collect();
         let nearest = limits.iter().filter_map(|limit| {
-            Some(format!("without {}, {}", limit.name, least(limit.others, limit)?))
+            let least = least(limit.others, limit)?;
+            Some(format!("without {}, {}", limit.name, (limit.say)(least, &unit)))
         });
         format!(
             "no point is within {} at once; {}: loosen one",
@@ -105,7 +106,7 @@ impl Limits {
     fn each(&self) -> Vec<Limit> {
         let error = self.error.map(|most| Limit {
             name: format!("--max-error {most}"),
-            alone: Self { error: Some(most), ..NONE },
+            most,
             others: Self { error: None, ..*self },
             of: |point, group| point.rmse(group),
             // Rounded up: a limit that can be met.
@@ -115,7 +116,7 @@ impl Limits {
         });
         let cycles = self.cycles.map(|most| Limit {
             name: format!("--max-cycles {most}"),
-            alone: Self { cycles: Some(most), ..NONE },
+            most: most as f64,
             others: Self { cycles: None, ..*self },
             of: |point, _| point.frame.cycles as f64,
             say: |least, _| format!("the fewest cycles are {least}"),
@@ -126,7 +127,7 @@ impl Limits {
                 Some(_) => format!("--max-flash {most}"),
                 None => format!("a slot's {most} bytes"),
             },
-            alone: Self { flash_bytes: Some(most), ..NONE },
+            most: most as f64,
             others: Self { flash_bytes: NONE.flash_bytes, ..*self },
             of: |point, _| point.flash_bytes as f64,
             say: |least, _| format!("the smallest blob takes {least} bytes"),
@@ -141,7 +142,8 @@ const NONE: Limits = Limits { error: None, cycles: None, flash_bytes: Some(usize
 /// One of several limits.
 struct Limit {
     name: String,
-    alone: Limits,
+    most: f64,
+    /// All but this one.
     others: Limits,
     /// What it limits.
     of: fn(&Point, &str) -> f64,
