@@ -5,7 +5,7 @@ use std::path::Path;
 
 use benchmarks::{csv_of, frames_of};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use host_sim::data_file::{self, DataFile};
+use taxel_data::csv_file::{self, CsvFile};
 
 /// Frames in the file: 288 numbers each, 24 MB together.
 const FRAMES: usize = 4096;
@@ -20,12 +20,12 @@ fn csv(criterion: &mut Criterion) {
         bencher.iter(|| std::fs::read(black_box(&path)).expect("the file written above"));
     });
     group.bench_function("read", |bencher| {
-        bencher.iter(|| DataFile::read(black_box(&path)).expect("the file written above"));
+        bencher.iter(|| CsvFile::read(black_box(&path)).expect("the file written above"));
     });
     let table = frames_of("press", FRAMES).inputs;
     let lines = || table.lines().map(|line| line.iter().copied());
     let names = || table.names.iter().map(String::as_str);
-    let write = |path: &Path| data_file::write(path, names(), lines()).expect("a writable folder");
+    let write = |path: &Path| csv_file::write(path, names(), lines()).expect("a writable folder");
     write(&path);
     let written = std::fs::metadata(&path).expect("the file written above").len();
     group.throughput(Throughput::Bytes(written));

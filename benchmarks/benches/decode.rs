@@ -7,11 +7,11 @@ use std::hint::black_box;
 use std::path::PathBuf;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use host_sim::dataset::Table;
-use host_sim::infer::{Kernel, infer};
-use host_sim::random::{Purpose, Random, Stream};
 use model_core::rbf::{Network, Shape, direct, expanded, fixed16};
 use model_core::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP};
+use taxel_data::random::{Purpose, Random, Stream};
+use taxel_learn::Exponential;
+use taxel_learn::infer::infer;
 
 /// Lines of a table; `compare/decode.py` divides by it.
 const LINES: usize = 8192;
@@ -150,9 +150,8 @@ fn decode(criterion: &mut Criterion) {
     let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
     let mut random = Random::new(1, Stream::Test, Purpose::Centres, 0, 0);
     let (low, high) = (LOWEST_OHM, LOWEST_OHM + SPAN_OHM);
-    let values = (0..LINES * CHANNELS).map(|_| random.between([low, high])).collect();
-    let table = Table { names: vec![String::new(); CHANNELS], values };
-    leave("readings", &table.values);
+    let readings: Vec<f64> = (0..LINES * CHANNELS).map(|_| random.between([low, high])).collect();
+    leave("readings", &readings);
 
     let mut group = criterion.benchmark_group("decode");
     group.sample_size(30).throughput(Throughput::Elements(LINES as u64));
@@ -167,10 +166,11 @@ fn decode(criterion: &mut Criterion) {
         ];
         for network in networks {
             let name = network.format().name();
-            leave(&format!("{name}-{centres}"), &infer(&network, Kernel::Polynomial, &table));
+            let exponential = Exponential::Polynomial;
+            leave(&format!("{name}-{centres}"), &infer(&network, exponential, &readings));
             group.bench_function(BenchmarkId::new(name, centres), |bencher| {
                 one_thread.install(|| {
-                    bencher.iter(|| infer(&network, Kernel::Polynomial, black_box(&table)));
+                    bencher.iter(|| infer(&network, exponential, black_box(&readings)));
                 });
             });
         }

@@ -2,12 +2,11 @@
 
 use std::hint::black_box;
 
-use benchmarks::scene;
+use benchmarks::world;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use host_sim::random::Stream;
-use host_sim::scene::Scene;
-use host_sim::sensor::Precision;
-use host_sim::synth::synthesise;
+use taxel_data::random::Stream;
+use taxel_simulate::sensor::Precision;
+use taxel_simulate::{World, synthesise};
 
 /// Frames of one measurement; `compare/synthesis.py` divides by it.
 const FRAMES: usize = 16_384;
@@ -17,9 +16,9 @@ fn frames_of_a_scene(criterion: &mut Criterion) {
     group.sample_size(20).throughput(Throughput::Elements(FRAMES as u64));
     for name in ["paper", "press"] {
         for (suffix, precision) in [("", Precision::F64), ("_f32", Precision::F32)] {
-            let scene = Scene { precision, ..scene(name) };
+            let world = World { precision, ..world(name) };
             group.bench_function(format!("{name}{suffix}"), |bencher| {
-                bencher.iter(|| synthesise(black_box(&scene), Stream::Training, FRAMES));
+                bencher.iter(|| synthesise(black_box(&world), Stream::Training, FRAMES));
             });
         }
     }

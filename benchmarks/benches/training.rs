@@ -6,15 +6,15 @@ use std::fs;
 use std::hint::black_box;
 use std::path::PathBuf;
 
-use benchmarks::scene;
 use criterion::{Criterion, criterion_group, criterion_main};
-use host_sim::dataset::Block;
-use host_sim::infer::{Kernel, infer};
-use host_sim::random::{Purpose, Random, Stream};
-use host_sim::synth::synthesise;
-use host_sim::train::kmeans::{self, Search};
-use host_sim::train::least_squares::{Factor, Regressors};
-use host_sim::train::{FittedNetwork, INITIAL_COVARIANCE, InputScale, Options, Samples};
+use taxel_data::dataset::Block;
+use taxel_data::random::{Purpose, Random, Stream};
+use taxel_learn::infer::infer;
+use taxel_learn::train::kmeans::{self, Search};
+use taxel_learn::train::least_squares::{Factor, Regressors};
+use taxel_learn::train::{FittedNetwork, INITIAL_COVARIANCE, InputScale, Samples};
+use taxel_learn::{Exponential, Options};
+use taxel_simulate::{World, synthesise};
 
 const FRAMES: usize = 100_000;
 const TEST_FRAMES: usize = 20_000;
@@ -25,9 +25,8 @@ const SEARCH: Search = Search { restarts: 1, iterations: 30, enough: 0.0, most_p
 
 /// The fourth row-wire of the scene `press`.
 fn samples(stream: Stream, frames: usize) -> Block {
-    let mut scene = scene("press");
-    scene.read_rows = vec![3];
-    synthesise(&scene, stream, frames).block(0)
+    let world = World { read_rows: vec![3], ..World::press() };
+    synthesise(&world, stream, frames).block(0)
 }
 
 fn random() -> Random {
@@ -35,7 +34,8 @@ fn random() -> Random {
 }
 
 fn train(block: &Block) -> FittedNetwork {
-    let options = Options { search: SEARCH, ..Options::new(CENTRES, SPREAD, true, 1) };
+    let options =
+        Options { search: SEARCH, centres: CENTRES, spread: SPREAD, ..Options::default() };
     let samples = Samples::new(block);
     samples.fit(&samples.centres(&options, 0), &options).expect("a network that an f32 holds")
 }
@@ -55,13 +55,13 @@ fn training(criterion: &mut Criterion) {
     let (block, test) = (samples(Stream::Training, FRAMES), samples(Stream::Test, TEST_FRAMES));
     let inputs = block.inputs.names.len();
     let scale = InputScale::of(&block);
-    let scaled = scale.apply(&block);
+    let scaled = scale.apply(&block.inputs.values);
     let start = kmeans::plus_plus(&scaled, inputs, CENTRES, &mut random());
     let found = kmeans::refine(&scaled, inputs, &start, &SEARCH);
-    let predicted = infer(&train(&block).network(), Kernel::default(), &test.inputs);
+    let predicted = infer(&train(&block).network(), Exponential::default(), &test.inputs.values);
     leave("inputs", &scaled);
     leave("outputs", &block.outputs.values);
-    leave("test-inputs", &scale.apply(&test));
+    leave("test-inputs", &scale.apply(&test.inputs.values));
     leave("test-outputs", &test.outputs.values);
     leave("start", &start);
     leave("centres", &found.centres);

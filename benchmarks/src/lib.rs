@@ -1,24 +1,27 @@
 //! What the benchmarks share: scenes and data to work on.
 
-use host_sim::data_file;
-use host_sim::dataset::Dataset;
-use host_sim::random::Stream;
-use host_sim::scene::Scene;
-use host_sim::synth::synthesise;
+use taxel_data::csv_file;
+use taxel_data::dataset::Dataset;
+use taxel_data::random::Stream;
+use taxel_simulate::{World, synthesise};
 
-/// A built-in scene (`paper`, `press`).
+/// The world of a built-in scene (`paper`, `press`).
 ///
 /// # Panics
 /// If there is none of that name.
 #[must_use]
-pub fn scene(name: &str) -> Scene {
-    Scene::load(name).expect("a built-in scene")
+pub fn world(name: &str) -> World {
+    match name {
+        "paper" => World::paper(),
+        "press" => World::press(),
+        _ => panic!("no built-in scene {name:?}"),
+    }
 }
 
 /// `frames` noisy training frames of a built-in scene, in Ω and mm.
 #[must_use]
 pub fn frames_of(scene_name: &str, frames: usize) -> Dataset {
-    synthesise(&scene(scene_name), Stream::Training, frames)
+    synthesise(&world(scene_name), Stream::Training, frames)
 }
 
 /// The content of the CSV file that `synth` writes for `frames` of a built-in scene.
@@ -32,7 +35,7 @@ pub fn csv_of(scene_name: &str, frames: usize) -> Vec<u8> {
     let names = dataset.inputs.names.iter().chain(&dataset.outputs.names).map(String::as_str);
     let lines = dataset.inputs.lines().zip(dataset.outputs.lines());
     let lines = lines.map(|(readings, outputs)| readings.iter().chain(outputs).copied());
-    data_file::write(&path, names, lines).expect("a writable folder for temporary files");
+    csv_file::write(&path, names, lines).expect("a writable folder for temporary files");
     let content = std::fs::read(&path).expect("what was just written");
     let _ = std::fs::remove_file(&path); // a file left behind does no harm
     content

@@ -14,8 +14,10 @@ pub mod table1;
 pub mod trade;
 pub mod train;
 
+mod arguments;
 mod check_arguments;
 mod print;
+mod progress;
 mod scene_argument;
 
 /// Options of every command.

@@ -1,10 +1,8 @@
-//! Evaluation: errors by every definition, and the tables made of them.
+//! Evaluation: what models err and cost, and the tables made of that.
 
 pub mod cost;
-pub mod gate;
-pub mod metrics;
-pub mod quantisation;
 pub mod ram;
+pub mod gate;
 pub mod readout;
 pub mod table1;
 pub mod trade;

@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use host_sim::Result;
+use host_sim::{Error, Result};
 
 mod commands;
 
@@ -68,7 +68,37 @@ fn report(outcome: Result<()>) -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
-            ExitCode::from(error.exit_code())
+            ExitCode::from(exit_status(&error))
         }
+    }
+}
+
+/// 1 for work that failed, 2 for bad usage or input.
+fn exit_status(error: &Error) -> u8 {
+    use taxel_rig::Error as Rig;
+    match error {
+        Error::Failed(_) | Error::Cycles(_) => 1,
+        Error::Simulate(cause) => match cause {
+            taxel_simulate::Error::Setting(_) | taxel_simulate::Error::Data(_) => 2,
+            _ => 1,
+        },
+        Error::Learn(cause) => match cause {
+            taxel_learn::Error::NoRegression
+            | taxel_learn::Error::ProjectionBeyondF32
+            | taxel_learn::Error::NotPacked(_) => 1,
+            _ => 2,
+        },
+        Error::Rig(cause) => match cause {
+            Rig::Port { .. }
+            | Rig::ShapeMismatch { .. }
+            | Rig::OtherReadout { .. }
+            | Rig::NoQemu { .. }
+            | Rig::NoImage { .. }
+            | Rig::NotElf { .. }
+            | Rig::Setting(_)
+            | Rig::File(_) => 2,
+            _ => 1,
+        },
+        _ => 2,
     }
 }

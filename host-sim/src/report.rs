@@ -6,14 +6,14 @@
 use crate::evaluate::trade::Trade;
 use crate::run::RunResult;
 
-mod chart;
-mod figures;
-mod format;
-mod heat_map;
-mod html;
-mod svg;
-mod tables;
 mod ticks;
+mod format;
+mod svg;
+mod chart;
+mod heat_map;
+mod tables;
+mod figures;
+mod html;
 mod trade;
 
 /// The page for `result`: no script, no file beside it, the same bytes for the same result.

@@ -1,20 +1,20 @@
 //! The main job: synthesise, train, write the blob, read it back, decode, evaluate.
 
 use serde::Serialize;
+use taxel_data::columns;
+use taxel_data::dataset::Dataset;
+use taxel_data::progress::Progress;
+use taxel_data::random::Stream;
+use taxel_data::table::Table;
+use taxel_learn::decoders::BASELINES;
+use taxel_learn::train::train;
+use taxel_learn::{Decoder, Exponential, ModelBlob, PreparedModel, pack};
+use taxel_simulate::{Synthesis, World, synthesise};
 
-use crate::columns;
-use crate::dataset::{Dataset, Table};
 use crate::error::Result;
-use crate::evaluate::metrics::{self, Errors, Measure};
-use crate::evaluate::table1::{self, Table1, side_by_side};
-use crate::infer::Kernel;
-use crate::model::{self, LoadedModel, Origin};
-use crate::progress::Progress;
-use crate::random::Stream;
-use crate::scene::Scene;
-use crate::synth;
-use crate::train;
-use crate::train::linear::LinearDecoder;
+use crate::evaluate::table1::{self, Table1};
+use crate::experiment::Experiment;
+use crate::metrics::{self, DecoderErrors, Errors, Measure};
 
 /// All that a run measured.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -79,15 +79,6 @@ pub struct ModelSummary {
     pub blob_crc: String,
 }
 
-/// Errors of one decoder.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct DecoderErrors {
-    /// `network`, `linear` (best linear decoder) or `mean` (training mean).
-    pub decoder: String,
-    /// Errors by group.
-    pub errors: Vec<Errors>,
-}
-
 /// Errors of the network on one row-wire.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RowErrors {
@@ -129,86 +120,83 @@ pub struct ExampleOutput {
     pub estimate: Vec<f64>,
 }
 
-/// Runs `scene`; also returns the blob.
+/// Runs `experiment`; also returns the blob.
 ///
 /// # Errors
-/// [`Error`](crate::Error) for a scene that asks for the impossible.
-pub fn run(scene: &Scene, progress: &Progress) -> Result<(RunResult, Vec<u8>)> {
-    let t = &scene.training;
+/// An experiment that asks for the impossible.
+pub fn run(experiment: &Experiment, progress: &dyn Progress) -> Result<(RunResult, ModelBlob)> {
+    let (world, t) = (&experiment.world, &experiment.training);
     progress.stage("synthesise", 2);
-    let training = synth::synthesise(scene, Stream::Training, t.frames);
+    let training = synthesise(world, Stream::Training, t.frames);
     progress.step();
-    let test = synth::synthesise(scene, Stream::Test, t.test_frames);
+    let test = synthesise(world, Stream::Test, t.test_frames);
     progress.step();
 
-    let options = model::options_of(scene);
-    let trained = train::train(&training, &options, progress)?;
-
-    let origin = Origin::of_scene(scene);
-    let blob = model::encode(&trained, &training, &origin)?;
-    let loaded = LoadedModel::from_bytes("model.bin".as_ref(), &blob)?;
+    let trained = train(&training, &experiment.options(), progress)?;
+    let blob = pack(&trained, &training, &experiment.origin())?;
+    let network = blob.prepare(Exponential::default());
 
     progress.stage("decode and evaluate", 1);
-    let estimate = loaded.decode(Kernel::default(), &test.inputs);
-    let measure = Measure { full_scale: origin.full_scale, thickness_mm: origin.thickness_mm };
-    let baselines = [("linear", LinearDecoder::fit as fn(&_) -> _), ("mean", LinearDecoder::mean)];
-    let mut decoders = vec![DecoderErrors {
-        decoder: "network".into(),
-        errors: metrics::by_group(&test.outputs, &estimate.values, &measure),
-    }];
-    for (name, fit) in baselines {
-        let answers = baseline(fit, &training, &test);
-        let errors = metrics::by_group(&test.outputs, &answers, &measure);
-        decoders.push(DecoderErrors { decoder: name.into(), errors });
-    }
+    let measure = experiment.measure();
+    let baselines: Vec<Box<dyn Decoder>> = BASELINES.iter().map(|b| b.fit(&training)).collect();
+    let decoders = std::iter::once(&network as &dyn Decoder)
+        .chain(baselines.iter().map(AsRef::as_ref))
+        .map(|decoder| metrics::judge(decoder, &test, &measure))
+        .collect();
+    let estimate = network.decode_table(&test.inputs);
     progress.step();
 
-    let model = loaded.model();
-    let shape = model.shape();
-    let network = trained.networks[0].network().shape();
     let result = RunResult {
-        scene: SceneSummary {
-            name: scene.name.clone(),
-            digest: format!("{:016x}", scene.digest),
-            seed: scene.seed,
-            noise_kind: format!("{:?}", scene.noise.kind).to_lowercase(),
-            noise_level: scene.noise.level,
-            size_mm: scene.sensor.size_mm,
-            row_wires: scene.sensor.row_wires,
-        },
-        model: ModelSummary {
-            training_frames: t.frames,
-            test_frames: t.test_frames,
-            networks: trained.networks.len(),
-            inputs: network.inputs,
-            projected_readings: model.projection().map_or(0, |_| shape.rows * shape.inputs),
-            centres: model.networks().map(|n| n.shape().centres).max().unwrap_or(0),
-            outputs: network.outputs,
-            spread: t.spread,
-            affine_tail: t.affine_tail,
-            blob_bytes: blob.len(),
-            blob_crc: format!("{:08x}", model.crc()),
-        },
+        scene: scene_summary(experiment),
+        model: model_summary(experiment, &network, &blob),
         decoders,
-        rows: by_row(scene, &test, &estimate, &measure),
-        example: example(scene, &test, &estimate),
-        table1: scene.table1.is_some().then(|| table1::compute(scene, progress)).transpose()?,
+        rows: by_row(world, &test, &estimate, &measure),
+        example: example(world, &test, &estimate),
+        table1: match experiment.table1 {
+            Some(_) => Some(table1::compute(experiment, progress)?),
+            None => None,
+        },
     };
+    drop(network);
     Ok((result, blob))
 }
 
-fn baseline(
-    fit: fn(&crate::dataset::Block) -> LinearDecoder,
-    training: &Dataset,
-    test: &Dataset,
-) -> Vec<f64> {
-    let rows = 0..training.rows;
-    let answers: Vec<Vec<f64>> =
-        rows.map(|row| fit(&training.block(row)).predict(&test.block(row))).collect();
-    side_by_side(&answers.iter().map(Vec::as_slice).collect::<Vec<_>>(), test)
+fn scene_summary(experiment: &Experiment) -> SceneSummary {
+    let world = &experiment.world;
+    SceneSummary {
+        name: experiment.name.clone(),
+        digest: format!("{:016x}", experiment.digest),
+        seed: world.seed,
+        noise_kind: world.noise.kind.name().into(),
+        noise_level: world.noise.level,
+        size_mm: world.sensor.size_mm,
+        row_wires: world.sensor.row_wires,
+    }
 }
 
-fn by_row(scene: &Scene, test: &Dataset, estimate: &Table, measure: &Measure) -> Vec<RowErrors> {
+fn model_summary(
+    experiment: &Experiment,
+    prepared: &PreparedModel<'_>,
+    blob: &ModelBlob,
+) -> ModelSummary {
+    let (model, t) = (prepared.model(), &experiment.training);
+    let shape = model.shape();
+    ModelSummary {
+        training_frames: t.frames,
+        test_frames: t.test_frames,
+        networks: model.networks().count(),
+        inputs: shape.inputs,
+        projected_readings: model.projection().map_or(0, |_| shape.rows * shape.inputs),
+        centres: model.networks().map(|n| n.shape().centres).max().unwrap_or(0),
+        outputs: model.networks().next().map_or(0, |n| n.shape().outputs),
+        spread: t.spread,
+        affine_tail: t.affine_tail,
+        blob_bytes: blob.bytes().len(),
+        blob_crc: format!("{:08x}", model.crc()),
+    }
+}
+
+fn by_row(world: &World, test: &Dataset, estimate: &Table, measure: &Measure) -> Vec<RowErrors> {
     let width = test.outputs.names.len() / test.rows;
     let errors = |row: usize| {
         let from = row * width;
@@ -219,11 +207,11 @@ fn by_row(scene: &Scene, test: &Dataset, estimate: &Table, measure: &Measure) ->
         let estimate = estimate.columns(from, width).values;
         metrics::by_group(&test.outputs.columns(from, width), &estimate, &measure)
     };
-    let rows = scene.read_rows.iter().enumerate();
+    let rows = world.read_rows.iter().enumerate();
     rows.map(|(row, wire)| RowErrors { row_wire: wire + 1, errors: errors(row) }).collect()
 }
 
-fn example(scene: &Scene, test: &Dataset, estimate: &Table) -> Example {
+fn example(world: &World, test: &Dataset, estimate: &Table) -> Example {
     let largest = |line: &[f64]| line.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
     let frame = (0..test.frames())
         .max_by(|a, b| {
@@ -240,13 +228,13 @@ fn example(scene: &Scene, test: &Dataset, estimate: &Table) -> Example {
         truth: members.iter().map(|column| truth[*column]).collect(),
         estimate: members.iter().map(|column| decoded[*column]).collect(),
     });
-    let ideal = synth::ideal_readings(scene, Stream::Test, frame);
+    let ideal = Synthesis::of(world).ideal().readings_of(Stream::Test, frame);
     let noisy = test.inputs.lines().nth(frame).unwrap_or_default();
-    let column_wires = scene.sensor.column_wires;
+    let column_wires = world.sensor.column_wires;
     let of_row =
         |line: &[f64], row: usize| line[row * column_wires..(row + 1) * column_wires].to_vec();
-    let width = truth.len() / scene.read_rows.len();
-    let row = (0..scene.read_rows.len())
+    let width = truth.len() / world.read_rows.len();
+    let row = (0..world.read_rows.len())
         .max_by(|a, b| {
             let peak = |row: usize| largest(&truth[row * width..(row + 1) * width]);
             peak(*a).total_cmp(&peak(*b))
@@ -254,15 +242,15 @@ fn example(scene: &Scene, test: &Dataset, estimate: &Table) -> Example {
         .unwrap_or(0);
     Example {
         frame,
-        electrodes_mm: scene
+        electrodes_mm: world
             .read_rows
             .iter()
-            .flat_map(|row| scene.sensor.row_electrodes_mm(*row))
+            .flat_map(|row| world.sensor.row_electrodes_mm(*row))
             .map(|[x, y, _]| [*x, *y])
             .collect(),
-        row_wires: scene.read_rows.len(),
+        row_wires: world.read_rows.len(),
         outputs: outputs.collect(),
-        reading_row_wire: scene.read_rows[row] + 1,
+        reading_row_wire: world.read_rows[row] + 1,
         ideal_ohm: of_row(&ideal, row),
         noisy_ohm: of_row(noisy, row),
     }

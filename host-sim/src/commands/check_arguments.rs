@@ -4,12 +4,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 use firmware::link::message::Memory;
-use host_sim::device::check::{Findings, Plan};
-use host_sim::model::{self, LoadedModel};
-use host_sim::progress::Progress;
-use host_sim::scene::Scene;
+use host_sim::experiment::Experiment;
 use host_sim::{Error, Result};
+use taxel_learn::ModelBlob;
+use taxel_rig::device::check::{Findings, Plan};
 
+use super::progress::Terminal;
 use super::scene_argument::SceneArgument;
 use super::{Common, print};
 
@@ -71,42 +71,43 @@ impl Limits {
 
 impl CheckArguments {
     /// The scene and the model, trained if none was given.
-    pub fn load(&self, common: &Common) -> Result<(Scene, LoadedModel)> {
+    pub fn load(&self, common: &Common) -> Result<(Experiment, ModelBlob)> {
         let scene = self.scene(common)?;
         let model = self.model(&scene)?;
         Ok((scene, model))
     }
 
     /// The scene.
-    pub fn scene(&self, common: &Common) -> Result<Scene> {
+    pub fn scene(&self, common: &Common) -> Result<Experiment> {
         let scene = self.scene.load(common)?;
-        scene.check_frames("-n", self.frames)?;
+        scene.world.check_frames("-n", self.frames)?;
         Ok(scene)
     }
 
     /// The model, trained if none was given.
-    pub fn model(&self, scene: &Scene) -> Result<LoadedModel> {
-        let model = match &self.model {
-            Some(path) => LoadedModel::read(path)?,
-            None => model::train_scene(scene, &Progress::on_terminal())?,
+    pub fn model(&self, scene: &Experiment) -> Result<ModelBlob> {
+        let blob = match &self.model {
+            Some(path) => ModelBlob::read(path)?,
+            None => scene.train(&Terminal::new())?,
         };
-        let metadata = model.model();
-        if metadata.metadata().scene_digest != scene.digest {
+        let model = blob.parse();
+        let metadata = model.metadata();
+        if metadata.scene_digest != scene.digest {
             eprintln!(
                 "note: the model was trained on {:?}, not on this scene; its bits can be compared all \
                  the same",
-                metadata.metadata().name
+                metadata.name
             );
         }
-        let inputs = metadata.metadata().input_names;
-        if !inputs.iter().eq(scene.reading_names().iter().map(String::as_str)) {
+        let inputs = metadata.input_names;
+        if !inputs.iter().eq(scene.world.reading_names().iter().map(String::as_str)) {
             return Err(Error::Usage(format!(
                 "--model: it decodes other readings than those of scene {:?}; give the scene that it \
                  was trained on",
                 scene.name
             )));
         }
-        Ok(model)
+        Ok(blob)
     }
 
     /// The plan, with `window` frames on their way at a time.

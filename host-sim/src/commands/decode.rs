@@ -3,13 +3,15 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use host_sim::data_file::{self, DataFile};
-use host_sim::dataset::Table;
-use host_sim::infer::{Kernel, is_missing};
-use host_sim::model::LoadedModel;
-use host_sim::{Result, output};
+use host_sim::Result;
 use serde::Serialize;
+use taxel_data::csv_file::{self, CsvFile};
+use taxel_data::output;
+use taxel_data::table::Table;
+use taxel_learn::infer::is_missing;
+use taxel_learn::{Exponential, ModelBlob, PreparedModel};
 
+use super::arguments::exponential;
 use super::{Common, print};
 
 /// Decode readings from a CSV file; one line of estimates for every line of readings.
@@ -27,32 +29,33 @@ pub struct Arguments {
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Exponential of the activations.
-    #[arg(long, value_enum, default_value_t)]
-    kernel: Kernel,
+    #[arg(long, alias = "kernel", value_parser = exponential(), default_value = "polynomial")]
+    exponential: Exponential,
 }
 
 #[derive(Serialize)]
 struct Summary {
     frames: usize,
     frames_with_missing_readings: usize,
-    kernel: Kernel,
+    exponential: Exponential,
     file: PathBuf,
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let loaded = LoadedModel::read(&arguments.model)?;
-    let file = DataFile::read(&arguments.readings)?;
+    let blob = ModelBlob::read(&arguments.model)?;
+    let model = blob.prepare(arguments.exponential);
+    let file = CsvFile::read(&arguments.readings)?;
     output::check_writable(&arguments.output, &[&arguments.model, &arguments.readings])?;
-    let readings = model_inputs(&loaded, &file)?;
-    remark_on_range(&loaded, &readings);
-    let estimate = loaded.decode(arguments.kernel, &readings);
+    let readings = model_inputs(&model, &file)?;
+    remark_on_range(&model, &readings);
+    let estimate = model.decode_table(&readings);
     let names = estimate.names.iter().map(String::as_str);
-    data_file::write(&arguments.output, names, estimate.lines().map(|l| l.iter().copied()))?;
+    csv_file::write(&arguments.output, names, estimate.lines().map(|l| l.iter().copied()))?;
     let incomplete = readings.lines().filter(|line| line.iter().any(|v| is_missing(*v))).count();
     let summary = Summary {
         frames: estimate.len(),
         frames_with_missing_readings: incomplete,
-        kernel: arguments.kernel,
+        exponential: arguments.exponential,
         file: arguments.output.clone(),
     };
     if common.json {
@@ -61,7 +64,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let mut page = print::Page::default();
     page.line(format_args!("{} frames decoded into {}", summary.frames, summary.file.display()));
     if incomplete > 0 {
-        let lost = if loaded.model().projection().is_some() {
+        let lost = if model.model().projection().is_some() {
             "all outputs are empty there"
         } else {
             "the outputs of its row-wire are empty"
@@ -75,8 +78,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 const SUSPICIOUS: f64 = 0.01;
 
 /// Says on stderr if many readings lie outside what the model was trained on.
-pub fn remark_on_range(loaded: &LoadedModel, readings: &Table) {
-    let share = loaded.share_out_of_range(readings);
+pub fn remark_on_range(model: &PreparedModel<'_>, readings: &Table) {
+    let share = model.share_out_of_range(&readings.values);
     if share > SUSPICIOUS {
         eprintln!(
             "note: {:.1} % of the readings lie outside the range that the model was trained on, and \
@@ -87,13 +90,12 @@ pub fn remark_on_range(loaded: &LoadedModel, readings: &Table) {
 }
 
 /// The model's reading columns of `file`.
-pub fn model_inputs(loaded: &LoadedModel, file: &DataFile) -> Result<Table> {
-    let model = loaded.model();
-    table_of(file, model.metadata().input_names.iter())
+pub fn model_inputs(model: &PreparedModel<'_>, file: &CsvFile) -> Result<Table> {
+    table_of(file, model.model().metadata().input_names.iter())
 }
 
 /// The columns of `file` called `names`.
-pub fn table_of<'n>(file: &DataFile, names: impl Iterator<Item = &'n str>) -> Result<Table> {
+pub fn table_of<'n>(file: &CsvFile, names: impl Iterator<Item = &'n str>) -> Result<Table> {
     let names: Vec<&str> = names.collect();
     let columns = file.columns(names.iter().copied())?;
     let lines = 0..file.lines();

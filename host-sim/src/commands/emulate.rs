@@ -3,14 +3,14 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use super::progress::Terminal;
 use clap::Args;
-use host_sim::device::Device;
-use host_sim::device::check::{Findings, check};
-use host_sim::device::scan;
-use host_sim::emulator::{self, Emulator};
-use host_sim::output;
-use host_sim::progress::Progress;
-use host_sim::{Error, Result};
+use host_sim::Result;
+use taxel_data::output;
+use taxel_rig::device::Device;
+use taxel_rig::device::check::{Findings, check};
+use taxel_rig::device::scan;
+use taxel_rig::emulator::{self, Emulator};
 
 use super::Common;
 use super::check_arguments::{CheckArguments, conclude};
@@ -65,27 +65,27 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     options.check()?;
     let scene = arguments.check.scene(common)?;
     if arguments.scans > 0 {
-        scene.check_frames("--scans", arguments.scans)?;
-        scan::with_parts_of_image(&scene)?;
+        scene.world.check_frames("--scans", arguments.scans)?;
+        scan::with_parts_of_image(&scene.world)?;
     }
     let model = arguments.check.model(&scene)?;
 
     // QEMU puts the blob where a board has it in flash.
     let blob = temporary("model.bin");
     let written = std::fs::write(&blob, model.bytes());
-    written.map_err(|cause| Error::Write { path: blob.clone(), cause })?;
+    written.map_err(|cause| taxel_data::Error::write(&blob, cause))?;
     let log = options.log.clone();
     let started = Emulator::start(&emulator::Options { model: Some(blob.clone()), ..options });
     let outcome = started.and_then(|(_emulator, lines)| {
         let mut device = Device::new(lines.link)?;
         device.patience = PATIENCE;
-        let progress = Progress::on_terminal();
-        let scanned = lines
-            .readout
-            .map(|line| scan::check(&mut device, &scene, &model, line, arguments.scans, &progress));
+        let progress = Terminal::new();
+        let scanned = lines.readout.map(|line| {
+            scan::check(&mut device, &scene.world, &model, line, arguments.scans, &progress)
+        });
         let scans = scanned.transpose()?;
         let plan = arguments.check.plan(WINDOW);
-        Ok(Findings { scans, ..check(&mut device, &scene, &model, &plan, &progress)? })
+        Ok(Findings { scans, ..check(&mut device, &scene.world, &model, &plan, &progress)? })
     });
     // Only a kill leaves these behind.
     let _ = std::fs::remove_file(&blob);

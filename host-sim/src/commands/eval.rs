@@ -3,13 +3,13 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use host_sim::data_file::DataFile;
-use host_sim::evaluate::metrics::{self, Errors, Measure};
-use host_sim::infer::Kernel;
-use host_sim::model::LoadedModel;
+use host_sim::metrics::{self, Errors, Measure};
 use host_sim::{Error, Result};
 use serde::Serialize;
+use taxel_data::csv_file::CsvFile;
+use taxel_learn::{Exponential, ModelBlob};
 
+use super::arguments::exponential;
 use super::decode::remark_on_range;
 use super::{Common, decode, print};
 
@@ -22,8 +22,8 @@ pub struct Arguments {
     /// CSV file with the model's reading and output columns.
     data: PathBuf,
     /// Exponential of the activations.
-    #[arg(long, value_enum, default_value_t)]
-    kernel: Kernel,
+    #[arg(long, alias = "kernel", value_parser = exponential(), default_value = "polynomial")]
+    exponential: Exponential,
 }
 
 #[derive(Serialize)]
@@ -33,20 +33,20 @@ struct Summary {
     values: usize,
     /// Those that count: neither they nor a reading they need is missing.
     values_evaluated: usize,
-    kernel: Kernel,
+    exponential: Exponential,
     errors: Vec<Errors>,
     /// Errors of answering the mean of these very outputs.
     mean_errors: Vec<Errors>,
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let loaded = LoadedModel::read(&arguments.model)?;
-    let file = DataFile::read(&arguments.data)?;
-    let readings = decode::model_inputs(&loaded, &file)?;
-    let model = loaded.model();
-    let metadata = model.metadata();
+    let blob = ModelBlob::read(&arguments.model)?;
+    let model = blob.prepare(arguments.exponential);
+    let file = CsvFile::read(&arguments.data)?;
+    let readings = decode::model_inputs(&model, &file)?;
+    let metadata = model.model().metadata();
     let mut truth = decode::table_of(&file, metadata.output_names.iter())?;
-    let estimate = loaded.decode(arguments.kernel, &readings);
+    let estimate = model.decode_table(&readings);
     let thickness_mm = f64::from(metadata.thickness_mm);
     let measure = Measure {
         full_scale: metadata.full_scale.iter().map(f64::from).collect(),
@@ -57,10 +57,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         *truth = if estimate.is_nan() { f64::NAN } else { *truth };
     }
     let means = truth.means().repeat(truth.len());
-    remark_on_range(&loaded, &readings);
+    remark_on_range(&model, &readings);
     let errors = metrics::by_group(&truth, &estimate.values, &measure);
     if errors.iter().all(|group| group.count == 0) {
-        return Err(Error::Data {
+        return Err(Error::Unfit {
             path: arguments.data.clone(),
             message: "no line has both the model's readings and a true output; fill them in".into(),
         });
@@ -69,7 +69,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         frames: readings.len(),
         values: truth.values.len(),
         values_evaluated: errors.iter().map(|group| group.count).sum(),
-        kernel: arguments.kernel,
+        exponential: arguments.exponential,
         errors,
         mean_errors: metrics::by_group(&truth, &means, &measure),
     };

@@ -3,10 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use host_sim::data_file::{self, DataFile};
-use host_sim::scene::Scene;
-use host_sim::{Result, output, synth};
+use host_sim::Result;
+use host_sim::experiment::Experiment;
 use serde::Serialize;
+use taxel_data::csv_file::{self, CsvFile};
+use taxel_data::output;
+use taxel_simulate::forward::forward;
 
 use super::{Common, print};
 
@@ -31,13 +33,13 @@ struct Summary {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let scene = Scene::load(&arguments.scene)?;
-    let file = DataFile::read(&arguments.deformation)?;
+    let scene = Experiment::load(&arguments.scene)?;
+    let file = CsvFile::read(&arguments.deformation)?;
     output::check_writable(&arguments.output, &[&arguments.deformation, arguments.scene.as_ref()])?;
-    let readings = synth::forward(&scene, &file)?;
-    let names = scene.reading_names();
+    let readings = forward(&scene.world, &file)?;
+    let names = scene.world.reading_names();
     let lines = readings.chunks_exact(names.len()).map(|line| line.iter().copied());
-    data_file::write(&arguments.output, names.iter().map(String::as_str), lines)?;
+    csv_file::write(&arguments.output, names.iter().map(String::as_str), lines)?;
     let summary =
         Summary { frames: file.lines(), readings: names.len(), file: arguments.output.clone() };
     if common.json {

@@ -2,13 +2,15 @@
 
 use std::path::PathBuf;
 
+use super::progress::Terminal;
 use clap::Args;
 use host_sim::evaluate::cost::{Costs, Frames};
 use host_sim::evaluate::gate::{self, BASELINE_FRAMES, GateResult, Line, MISSED_OVER_MM, Settings};
-use host_sim::evaluate::metrics::Errors;
-use host_sim::progress::Progress;
+use host_sim::metrics::Errors;
 use host_sim::{Error, Result};
+use taxel_learn::Exponential;
 
+use super::arguments::of_option;
 use super::scene_argument::{self, NoiseArgument, SceneArgument};
 use super::{Common, print};
 
@@ -51,27 +53,28 @@ pub struct Arguments {
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let mut scene = arguments.scene.load(common)?;
     arguments.noise.apply(&mut scene)?;
-    scene.check_frames("--frames", arguments.frames)?;
-    scene.check_frames("--baseline-frames", arguments.baseline_frames)?;
+    scene.world.check_frames("--frames", arguments.frames)?;
+    scene.world.check_frames("--baseline-frames", arguments.baseline_frames)?;
     let mut settings = Settings {
         k: arguments.k.clone(),
         frames: arguments.frames,
         baseline_frames: arguments.baseline_frames,
         frame_cycles: given(&arguments.cycles)?,
     };
-    settings.check(&scene)?;
-    let model =
-        scene_argument::model(arguments.model.as_deref(), &scene, &Progress::on_terminal())?;
+    let options = [("k", "--k"), ("baseline-frames", "--baseline-frames")];
+    settings.check(&scene.world).map_err(|bad| of_option(bad, &options))?;
+    let blob = scene_argument::model(arguments.model.as_deref(), &scene, &Terminal::new())?;
+    let model = blob.prepare(Exponential::default());
     let own = f64::from(model.model().metadata().noise_level);
-    if (own - scene.noise.level).abs() > 1e-3 * scene.noise.level {
+    if (own - scene.world.noise.level).abs() > 1e-3 * scene.world.noise.level {
         eprintln!(
             "note: the model was trained for noise of {}, and is judged at the scene's {}; see --noise",
             percent(own, 2),
-            percent(scene.noise.level, 2)
+            percent(scene.world.noise.level, 2)
         );
     }
     if settings.frame_cycles.is_none() {
-        let measured = Costs::measured()?.frames_of_model(&model.model());
+        let measured = Costs::measured()?.frames_of_model(model.model());
         settings.frame_cycles = measured.map(|frames| frames.map(|cost| cost.cycles));
     }
     let result = gate::measure(&scene, &model, &settings)?;

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use host_sim::Result;
 use host_sim::evaluate::ram::DecoderRam;
-use host_sim::model::LoadedModel;
 use serde::Serialize;
+use taxel_learn::ModelBlob;
 
 use super::{Common, print};
 
@@ -76,16 +76,16 @@ struct OutputSummary {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let loaded = LoadedModel::read(&arguments.model)?;
-    let summary = summarise(&loaded);
+    let blob = ModelBlob::read(&arguments.model)?;
+    let summary = summarise(&blob);
     if common.json {
         return print::json(&summary);
     }
     page_of(&summary).print()
 }
 
-fn summarise(loaded: &LoadedModel) -> Summary {
-    let model = loaded.model();
+fn summarise(blob: &ModelBlob) -> Summary {
+    let model = blob.parse();
     let (shape, metadata) = (model.shape(), model.metadata());
     let networks = model.networks().map(|network| NetworkSummary {
         format: network.format().name(),
@@ -111,7 +111,7 @@ fn summarise(loaded: &LoadedModel) -> Summary {
         noise_level: metadata.noise_level,
         seed: metadata.seed,
         training_frames: metadata.training_frames,
-        flash_bytes: loaded.bytes().len(),
+        flash_bytes: blob.bytes().len(),
         ram_bytes: DecoderRam::of(&model),
         inputs: metadata.input_names.iter().zip(metadata.input_units.iter()).map(column).collect(),
         outputs: outputs

@@ -3,15 +3,17 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use super::progress::Terminal;
 use clap::{Args, Subcommand, value_parser};
 use firmware::link::message::{Configuration, EstimateReport, Report, Request, Statistics};
 use firmware::timing::ScanPlan;
-use host_sim::device::check::check;
-use host_sim::device::{Device, DeviceIdentity, Wire, refused, serial, upload};
-use host_sim::model::LoadedModel;
-use host_sim::progress::Progress;
-use host_sim::{Error, Result, data_file, output};
+use host_sim::{Error, Result};
 use serde::Serialize;
+use taxel_data::progress::Progress;
+use taxel_data::{csv_file, output};
+use taxel_learn::ModelBlob;
+use taxel_rig::device::check::check;
+use taxel_rig::device::{Device, DeviceIdentity, Wire, serial, upload};
 
 use super::check_arguments::{CheckArguments, conclude, memory_lines};
 use super::{Common, print};
@@ -130,9 +132,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             status(&Status { device: device.identify()?, statistics: device.statistics()? }, common)
         }
         Action::Upload(action) => {
-            let model = LoadedModel::read(&action.model)?;
+            let model = ModelBlob::read(&action.model)?;
             let mut device = open()?;
-            let progress = Progress::on_terminal();
+            let progress = Terminal::new();
             device.while_paused(|device| upload::replace(device, model.bytes(), &progress))?;
             status(&Status { device: device.identify()?, statistics: device.statistics()? }, common)
         }
@@ -142,8 +144,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             let (scene, model) = action.load(common)?;
             let mut device = open()?;
             let plan = action.plan(1);
-            let progress = Progress::on_terminal();
-            let findings = check(&mut device, &scene, &model, &plan, &progress)?;
+            let progress = Terminal::new();
+            let findings = check(&mut device, &scene.world, &model, &plan, &progress)?;
             conclude(&findings, &action.limits, common)
         }
     }
@@ -199,7 +201,7 @@ fn configure<W: Wire>(
     scan: &ScanArguments,
     wanted: Wanted,
     rest_tolerance: f32,
-) -> Result<()> {
+) -> taxel_rig::Result<()> {
     let mut configuration = Configuration {
         frame_period_us: scan.period_us,
         send_readings: wanted == Wanted::Readings,
@@ -234,7 +236,7 @@ fn record<W: Wire>(
     action: &RecordArguments,
     common: &Common,
 ) -> Result<()> {
-    let model = action.model.as_ref().map(|path| LoadedModel::read(path)).transpose()?;
+    let model = action.model.as_ref().map(|path| ModelBlob::read(path)).transpose()?;
     let inputs: Vec<&Path> = action.model.iter().map(PathBuf::as_path).collect();
     output::check_writable(&action.output, &inputs)?;
     let identity = device.identify()?;
@@ -243,13 +245,13 @@ fn record<W: Wire>(
         None => (Wanted::Readings, reading_names(&identity)),
     };
     let patience = patience(&action.scan, &identity);
-    let (frames, rows_at_rest) = device.while_paused(|device| {
+    let (frames, rows_at_rest) = device.while_paused(|device| -> Result<_> {
         configure(device, &action.scan, wanted, action.rest_tolerance)?;
         hear_frames(device, action.scan.frames.into(), patience, wanted)
     })?;
     let missing = missing(frames.iter().flat_map(|(_, line)| line), wanted)?;
     let lines = frames.iter().map(|(_, line)| line.iter().copied());
-    data_file::write(&action.output, names.iter().map(String::as_str), lines)?;
+    csv_file::write(&action.output, names.iter().map(String::as_str), lines)?;
     let span = frames.last().zip(frames.first()).map_or(0, |(last, first)| last.0 - first.0 + 1);
     let frames_lost = span.saturating_sub(frames.len() as u32);
     let file = action.output.clone();
@@ -271,15 +273,16 @@ fn missing<'v>(values: impl Iterator<Item = &'v f64> + Clone, wanted: Wanted) ->
 }
 
 /// The names of the model's outputs, if it is the one in force.
-fn output_names(model: &LoadedModel, identity: &DeviceIdentity) -> Result<Vec<String>> {
-    if !identity.has_in_force(model.model().crc()) {
+fn output_names(model: &ModelBlob, identity: &DeviceIdentity) -> Result<Vec<String>> {
+    let model = model.parse();
+    if !identity.has_in_force(model.crc()) {
         return Err(Error::Usage(format!(
             "MODEL {:08x}: the device has {} in force; `upload` this one, or name that",
-            model.model().crc(),
+            model.crc(),
             identity.model.map_or("none".into(), |found| format!("{:08x}", found.crc_32))
         )));
     }
-    Ok(model.model().metadata().output_names.iter().map(String::from).collect())
+    Ok(model.metadata().output_names.iter().map(String::from).collect())
 }
 
 fn reading_names(identity: &DeviceIdentity) -> Vec<String> {
@@ -297,7 +300,7 @@ fn hear_frames<W: Wire>(
     patience: Duration,
     wanted: Wanted,
 ) -> Result<(Vec<NumberedFrame>, usize)> {
-    let progress = Progress::on_terminal();
+    let progress = Terminal::new();
     progress.stage("recording", count);
     let mut frames: Vec<NumberedFrame> = Vec::new();
     let mut rows_at_rest = 0;
@@ -345,11 +348,11 @@ fn baseline<W: Wire>(
             _ => None,
         })
     })?;
-    let readings = answer.map_err(|refusal| refused(&refusal))?;
+    let readings = answer.map_err(taxel_rig::Error::Refused)?;
     let names = reading_names(&identity);
     let values_missing = missing(readings.iter(), Wanted::Readings)?;
     let lines = std::iter::once(readings.iter().copied());
-    data_file::write(&action.output, names.iter().map(String::as_str), lines)?;
+    csv_file::write(&action.output, names.iter().map(String::as_str), lines)?;
     let file = action.output.clone();
     let (frames, frames_lost, rows_at_rest) = (frames.into(), 0, 0);
     saved(&Saved { frames, frames_lost, values_missing, rows_at_rest, file }, common)

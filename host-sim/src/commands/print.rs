@@ -3,7 +3,7 @@
 use std::fmt::{Display, Write as _};
 use std::io::Write as _;
 
-use host_sim::evaluate::metrics::{Definition, Errors};
+use host_sim::metrics::{Definition, Errors};
 use host_sim::{Error, Result};
 use serde::Serialize;
 

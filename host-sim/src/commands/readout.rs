@@ -2,13 +2,14 @@
 
 use std::path::PathBuf;
 
+use super::progress::Terminal;
 use clap::Args;
 use host_sim::Result;
-use host_sim::evaluate::metrics::Errors;
 use host_sim::evaluate::readout::{self, ReadoutResult, Stage};
-use host_sim::progress::Progress;
-use host_sim::scene::Circuit;
-use host_sim::virtual_hardware::VirtualBoard;
+use host_sim::metrics::Errors;
+use taxel_learn::Exponential;
+use taxel_simulate::readout::Circuit;
+use taxel_simulate::virtual_board::VirtualBoard;
 
 use super::scene_argument::{self, SceneArgument};
 use super::{Common, print};
@@ -33,11 +34,11 @@ pub struct Arguments {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let scene = arguments.scene.load(common)?;
-    scene.check_frames("--frames", arguments.frames)?;
-    VirtualBoard::new(&scene)?;
-    let model =
-        scene_argument::model(arguments.model.as_deref(), &scene, &Progress::on_terminal())?;
-    let result = readout::measure(&scene, &model, arguments.frames)?;
+    scene.world.check_frames("--frames", arguments.frames)?;
+    VirtualBoard::new(&scene.world)?;
+    let model = scene_argument::model(arguments.model.as_deref(), &scene, &Terminal::new())?;
+    let result =
+        readout::measure(&scene, &model.prepare(Exponential::default()), arguments.frames)?;
     if common.json { print::json(&result) } else { page_of(&result).print() }
 }
 

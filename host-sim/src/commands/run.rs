@@ -2,11 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
+use super::progress::Terminal;
 use clap::Args;
-use host_sim::progress::Progress;
+use host_sim::experiment::Experiment;
 use host_sim::run::{self, RunResult};
-use host_sim::scene::Scene;
-use host_sim::{Error, Result, output, report};
+use host_sim::{Error, Result, report};
+use taxel_data::output;
+use taxel_learn::ModelBlob;
 
 use super::scene_argument::{NoiseArgument, SceneArgument};
 use super::{Common, print};
@@ -47,12 +49,12 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     output::in_folder(&folder, || run_into(&folder, &scene, arguments.scene.path(), common))
 }
 
-fn run_into(folder: &Path, scene: &Scene, scene_path: &Path, common: &Common) -> Result<()> {
+fn run_into(folder: &Path, scene: &Experiment, scene_path: &Path, common: &Common) -> Result<()> {
     for file in FILES {
         output::check_writable(&folder.join(file), &[scene_path])?;
     }
     let started = std::time::Instant::now();
-    let (result, blob) = run::run(scene, &Progress::on_terminal())?;
+    let (result, blob) = run::run(scene, &Terminal::new())?;
     let files = write_files(folder, &result, &blob)?;
     if common.json {
         return print::json(&result);
@@ -62,9 +64,9 @@ fn run_into(folder: &Path, scene: &Scene, scene_path: &Path, common: &Common) ->
     Ok(())
 }
 
-fn write_files(folder: &Path, result: &RunResult, blob: &[u8]) -> Result<Vec<&'static str>> {
+fn write_files(folder: &Path, result: &RunResult, blob: &ModelBlob) -> Result<Vec<&'static str>> {
     let mut files = vec!["model.bin", "metrics.json"];
-    output::write_bytes(&folder.join("model.bin"), blob)?;
+    output::write_bytes(&folder.join("model.bin"), blob.bytes())?;
     let metrics = serde_json::to_vec_pretty(result)
         .map_err(|cause| Error::Failed(format!("cannot write JSON: {cause}")))?;
     output::write_bytes(&folder.join("metrics.json"), &metrics)?;

@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use clap::Args;
-use host_sim::model::{self, LoadedModel};
-use host_sim::progress::Progress;
-use host_sim::scene::Scene;
-use host_sim::sensor::Precision;
+use host_sim::experiment::Experiment;
 use host_sim::{Error, Result};
+use taxel_data::progress::Progress;
+use taxel_learn::ModelBlob;
+use taxel_simulate::sensor::Precision;
 
-use super::Common;
+use super::{Common, arguments};
 
 const DEFAULT_SCENE: &str = "paper";
 
@@ -20,7 +20,7 @@ pub struct SceneArgument {
     #[arg(default_value = DEFAULT_SCENE)]
     scene: String,
     /// How precisely the sensor's readings are computed, instead of the scene's way.
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = arguments::precision())]
     precision: Option<Precision>,
 }
 
@@ -32,10 +32,11 @@ impl Default for SceneArgument {
 
 impl SceneArgument {
     /// Loads the scene and applies the overrides.
-    pub fn load(&self, common: &Common) -> Result<Scene> {
-        let mut scene = Scene::load(&self.scene)?;
-        scene.seed = common.seed.unwrap_or(scene.seed);
-        scene.precision = self.precision.unwrap_or(scene.precision);
+    pub fn load(&self, common: &Common) -> Result<Experiment> {
+        let mut scene = Experiment::load(&self.scene)?;
+        let world = &mut scene.world;
+        world.seed = common.seed.unwrap_or(world.seed);
+        world.precision = self.precision.unwrap_or(world.precision);
         Ok(scene)
     }
 
@@ -55,8 +56,8 @@ pub struct NoiseArgument {
 
 impl NoiseArgument {
     /// Applies the level, if one was given.
-    pub fn apply(&self, scene: &mut Scene) -> Result<()> {
-        self.noise.map_or(Ok(()), |level| scene.set_noise_level(level))
+    pub fn apply(&self, scene: &mut Experiment) -> Result<()> {
+        self.noise.map_or(Ok(()), |level| Ok(scene.world.set_noise_level(level)?))
     }
 
     /// Whether a level was given.
@@ -67,13 +68,17 @@ impl NoiseArgument {
 
 /// The model in the blob at `path`, whose columns must be those of `scene`; without one, the model that
 /// the scene describes.
-pub fn model(path: Option<&Path>, scene: &Scene, progress: &Progress) -> Result<LoadedModel> {
-    let Some(path) = path else { return model::train_scene(scene, progress) };
-    let loaded = LoadedModel::read(path)?;
-    let model = loaded.model();
+pub fn model(
+    path: Option<&Path>,
+    scene: &Experiment,
+    progress: &dyn Progress,
+) -> Result<ModelBlob> {
+    let Some(path) = path else { return scene.train(progress) };
+    let blob = ModelBlob::read(path)?;
+    let model = blob.parse();
     let metadata = model.metadata();
-    let fits = metadata.input_names.iter().eq(scene.reading_names())
-        && metadata.output_names.iter().eq(scene.output_names());
+    let fits = metadata.input_names.iter().eq(scene.world.reading_names())
+        && metadata.output_names.iter().eq(scene.world.output_names());
     if fits {
         if metadata.name != scene.name {
             eprintln!(
@@ -84,11 +89,11 @@ pub fn model(path: Option<&Path>, scene: &Scene, progress: &Progress) -> Result<
                 scene.name
             );
         }
-        return Ok(loaded);
+        return Ok(blob);
     }
     let message = format!(
         "its columns are not those of scene {}; train one with `host-sim train` on this scene",
         scene.name
     );
-    Err(Error::Data { path: path.into(), message })
+    Err(Error::Unfit { path: path.into(), message })
 }

@@ -3,9 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use host_sim::random::Stream;
-use host_sim::{Result, data_file, output, synth};
+use host_sim::Result;
 use serde::Serialize;
+use taxel_data::random::Stream;
+use taxel_data::{csv_file, output};
+use taxel_simulate::synthesise;
 
 use super::scene_argument::{NoiseArgument, SceneArgument};
 use super::{Common, print};
@@ -40,18 +42,18 @@ struct Summary {
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let mut scene = arguments.scene.load(common)?;
     arguments.noise.apply(&mut scene)?;
-    scene.check_frames("-n", arguments.frames)?;
+    scene.world.check_frames("-n", arguments.frames)?;
     output::check_writable(&arguments.output, &[arguments.scene.path()])?;
-    let dataset = synth::synthesise(&scene, Stream::Training, arguments.frames);
+    let dataset = synthesise(&scene.world, Stream::Training, arguments.frames);
     let names = dataset.inputs.names.iter().chain(&dataset.outputs.names).map(String::as_str);
     let lines = dataset.inputs.lines().zip(dataset.outputs.lines());
     let lines = lines.map(|(readings, outputs)| readings.iter().chain(outputs).copied());
-    data_file::write(&arguments.output, names, lines)?;
+    csv_file::write(&arguments.output, names, lines)?;
     let summary = Summary {
         frames: dataset.frames(),
         readings: dataset.inputs.names.len(),
         outputs: dataset.outputs.names.len(),
-        seed: scene.seed,
+        seed: scene.world.seed,
         file: arguments.output.clone(),
     };
     if common.json {

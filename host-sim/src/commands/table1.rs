@@ -2,12 +2,14 @@
 
 use std::path::PathBuf;
 
+use super::progress::Terminal;
 use clap::Args;
-use host_sim::data_file::DataFile;
-use host_sim::evaluate::metrics::{Definition, Errors};
-use host_sim::evaluate::table1::{self, PAPER_PRINTED_PERCENT, Printed, Table1};
-use host_sim::progress::Progress;
-use host_sim::{Error, Result, columns, output};
+use host_sim::evaluate::table1::{self, Entry, NETWORK, PAPER_PRINTED_PERCENT, Printed, Table1};
+use host_sim::metrics::{Definition, Errors};
+use host_sim::{Error, Result};
+use taxel_data::csv_file::CsvFile;
+use taxel_data::{columns, output};
+use taxel_learn::decoders::{mean, standard};
 
 use super::scene_argument::SceneArgument;
 use super::{Common, print};
@@ -35,7 +37,7 @@ pub struct Arguments {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let scene = arguments.scene.load(common)?;
-    let names = scene.output_names();
+    let names = scene.world.output_names();
     let groups: Vec<&str> = columns::groups(&names).into_iter().map(|(group, _)| group).collect();
     if !groups.contains(&arguments.group.as_str()) {
         let message = format!("--group {}: the scene has {}", arguments.group, groups.join(", "));
@@ -46,10 +48,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         output::check_writable(path, &[arguments.scene.path(), printed])?;
     }
     let printed = match &arguments.printed {
-        Some(path) => Printed::from_file(&DataFile::read(path)?)?,
+        Some(path) => Printed::from_file(&CsvFile::read(path)?)?,
         None => Vec::new(),
     };
-    let mut table = table1::compute(&scene, &Progress::on_terminal())?;
+    let mut table = table1::compute(&scene, &Terminal::new())?;
     table.printed = printed;
     if let Some(path) = &arguments.output {
         table.write_csv(path)?;
@@ -75,32 +77,29 @@ fn page_of(table: &Table1, group: &str) -> print::Page {
         let of = |errors: &[Errors]| {
             errors.iter().find(|e| e.group == group).and_then(|e| definition.of(e))
         };
-        if table.columns.iter().all(|column| of(&column.mean).is_none()) {
+        if table.columns.iter().all(|column| of(column.errors(mean::NAME, None)).is_none()) {
             continue;
         }
         page.line(format_args!("\n{}", definition.formula()));
         let levels = table.columns.iter().map(|c| format!("{:>20}", percent(c.noise_level)));
         page.line(format_args!("{:<16}{}", "noise", levels.collect::<String>()));
-        for (s, cell) in table.columns[0].cells.iter().enumerate() {
+        for spread in table.columns[0].spreads() {
             let cells = table.columns.iter().map(|column| {
-                let standard = column.cells[s].standard.as_deref().and_then(of);
+                let of_decoder = |name| of(column.errors(name, Some(spread)));
                 format!(
                     "{:>9} {:>10}",
-                    number(definition, of(&column.cells[s].network)),
-                    format!("({})", number(definition, standard))
+                    number(definition, of_decoder(NETWORK)),
+                    format!("({})", number(definition, of_decoder(standard::NAME)))
                 )
             });
-            page.line(format_args!("spread {:<9?}{}", cell.spread, cells.collect::<String>()));
+            page.line(format_args!("spread {spread:<9?}{}", cells.collect::<String>()));
         }
-        for (name, errors) in [
-            ("linear", (|c| &c.linear) as fn(&table1::Column) -> &Vec<Errors>),
-            ("mean", |c| &c.mean),
-        ] {
-            let cells = table
-                .columns
-                .iter()
-                .map(|c| format!("{:>9}{:11}", number(definition, of(errors(c))), ""));
-            page.line(format_args!("{name:<16}{}", cells.collect::<String>().trim_end()));
+        for Entry { decoder, .. } in table.columns[0].baselines() {
+            let cells = table.columns.iter().map(|column| {
+                let value = of(column.errors(decoder, None));
+                format!("{:>9}{:11}", number(definition, value), "")
+            });
+            page.line(format_args!("{decoder:<16}{}", cells.collect::<String>().trim_end()));
         }
     }
     if !table.printed.is_empty() {

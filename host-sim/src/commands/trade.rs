@@ -5,13 +5,17 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+use super::progress::Terminal;
 use clap::Args;
+use host_sim::error::Bounded;
 use host_sim::evaluate::gate::{self, RECOMMENDED_K};
 use host_sim::evaluate::trade::{self, Limits, Plan, Point, Trade};
-use host_sim::progress::Progress;
-use host_sim::scene::Scene;
-use host_sim::{Error, Result, columns, output, report};
+use host_sim::metrics::DecoderErrors;
+use host_sim::{Error, Result, report};
+use taxel_data::{columns, output};
+use taxel_simulate::World;
 
+use super::arguments::of_option;
 use super::scene_argument::{NoiseArgument, SceneArgument};
 use super::{Common, print};
 
@@ -71,7 +75,7 @@ pub struct Arguments {
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let mut scene = arguments.scene.load(common)?;
     arguments.noise.apply(&mut scene)?;
-    let names = scene.output_names();
+    let names = scene.world.output_names();
     let groups: Vec<&str> = columns::groups(&names).into_iter().map(|(group, _)| group).collect();
     let group = match &arguments.group {
         Some(group) if groups.contains(&group.as_str()) => group.as_str(),
@@ -88,7 +92,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let plan = Plan {
         centres: distinct("--centres", &arguments.centres)?,
         samples_averaged: distinct("--average", &arguments.average)?,
-        gate_k: gate_k(&arguments.gate, &scene)?,
+        gate_k: gate_k(&arguments.gate, &scene.world)?,
         clock_mhz: arguments.clock_mhz,
     };
     let limits = Limits {
@@ -96,16 +100,20 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         cycles: arguments.max_cycles,
         flash_bytes: arguments.max_flash,
     };
-    limits.check()?;
+    limits.check().map_err(|bad| of_option(bad, &OPTIONS))?;
     let folder = arguments.output.join(&scene.name);
     let (trade, choice) = output::in_folder(&folder, || {
         for file in FILES {
             output::check_writable(&folder.join(file), &[arguments.scene.path()])?;
         }
-        let mut trade = trade::compute(&scene, &plan, group, &Progress::on_terminal())?;
+        let computed = trade::compute(&scene, &plan, group, &Terminal::new());
+        let mut trade = computed.map_err(|error| match error {
+            Error::Setting(bad) => of_option(bad, &OPTIONS),
+            other => other,
+        })?;
         let choice = trade.choose(&limits);
         write_files(&folder, &trade)?;
-        Ok((trade, choice))
+        Ok::<_, Error>((trade, choice))
     })?;
     if common.json {
         print::json(&trade)?;
@@ -113,7 +121,26 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         page_of(&trade, arguments.all, &folder).print()?;
     }
     // What was measured is kept and shown, whether or not a point is within the limits.
-    choice
+    choice.map_err(|cause| Error::Usage(cause.text(option)))
+}
+
+/// Options by the settings that they are for.
+const OPTIONS: [(&str, &str); 6] = [
+    ("centres", "--centres"),
+    ("average", "--average"),
+    ("gate", "--gate"),
+    ("max-error", option(Bounded::Error)),
+    ("max-cycles", option(Bounded::Cycles)),
+    ("max-flash", option(Bounded::Flash)),
+];
+
+/// The option that sets a bound.
+const fn option(bounded: Bounded) -> &'static str {
+    match bounded {
+        Bounded::Error => "--max-error",
+        Bounded::Cycles => "--max-cycles",
+        Bounded::Flash => "--max-flash",
+    }
 }
 
 /// A value of `--gate`.
@@ -135,9 +162,9 @@ impl FromStr for Gate {
 }
 
 /// The gates that are asked for, or the one that docs/gating.md recommends where the noise allows one.
-fn gate_k(given: &[Gate], scene: &Scene) -> Result<Vec<f64>> {
+fn gate_k(given: &[Gate], world: &World) -> Result<Vec<f64>> {
     if given.is_empty() {
-        return Ok(match gate::check_noise(scene) {
+        return Ok(match gate::check_noise(world) {
             Ok(()) => vec![RECOMMENDED_K],
             Err(cause) => {
                 eprintln!("note: no points behind a gate: {cause}");
@@ -188,15 +215,15 @@ fn write_files(folder: &Path, trade: &Trade) -> Result<()> {
     }
     let chosen = folder.join("chosen.bin");
     match trade.chosen {
-        Some(point) => output::write_bytes(&chosen, trade.blob(point)),
+        Some(point) => output::write_bytes(&chosen, trade.blob(point))?,
         // An earlier run's would lie beside figures that are not its own.
-        None => output::remove(&chosen),
+        None => output::remove(&chosen)?,
     }
+    Ok(())
 }
 
 fn csv_of(trade: &Trade) -> String {
-    let groups: Vec<&str> = trade.mean.iter().map(|e| e.group.as_str()).collect();
-    let rmse = groups.iter().map(|group| format!("{group}_rmse,{group}_ratio_to_best"));
+    let rmse = trade.groups().map(|(group, _)| format!("{group}_rmse,{group}_ratio_to_best"));
     let mut csv = format!(
         "kernel,whole_array,centres,spread,affine_tail,samples_averaged,gate_k,{},instructions,cycles,frame_us,flash_bytes,ram_bytes,\
          on_front,chosen\n",
@@ -208,7 +235,7 @@ fn csv_of(trade: &Trade) -> String {
         let _ = writeln!(
             csv,
             "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
-            p.kernel,
+            p.arithmetic.name(),
             p.whole_array,
             p.centres,
             p.spread,
@@ -239,7 +266,7 @@ fn page_of(trade: &Trade, all: bool, folder: &Path) -> print::Page {
         trade.test_frames,
         trade.compiler
     ));
-    let groups: Vec<String> = trade.mean.iter().map(|e| format!("{:>16}", e.group)).collect();
+    let groups: Vec<String> = trade.groups().map(|(group, _)| format!("{group:>16}")).collect();
     page.line(format_args!(
         "\n{:<28} {:>4} {:>5} {:>4} {:>4}{groups}{:>13} {:>9} {:>8} {:>8} {:>6}",
         "format",
@@ -258,8 +285,11 @@ fn page_of(trade: &Trade, all: bool, folder: &Path) -> print::Page {
     for i in &shown {
         page.line(line_of(&trade.points[*i], trade.chosen == Some(*i)));
     }
-    let mean: Vec<String> = trade.mean.iter().map(|e| format!("{:>9.4}       ", e.rmse)).collect();
-    page.line(format_args!("{:<50}{}", "the mean", mean.concat()));
+    for DecoderErrors { decoder, errors } in &trade.baselines {
+        let errors: Vec<String> =
+            errors.iter().map(|e| format!("{:>9.4}       ", e.rmse)).collect();
+        page.line(format_args!("  {decoder:<48}{}", errors.concat()));
+    }
     page.line(format_args!(
         "\nRMSE in {}, in brackets over the smallest of all\n\
          *: nothing is better than this in RMSE of {}, cycles and samples, and worse in none\n\

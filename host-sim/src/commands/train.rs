@@ -2,20 +2,23 @@
 
 use std::path::{Path, PathBuf};
 
+use super::progress::Terminal;
 use clap::Args;
-use host_sim::data_file::DataFile;
-use host_sim::dataset::Dataset;
-use host_sim::model::{self, LoadedModel, Origin};
-use host_sim::number_format::NumberFormat;
-use host_sim::progress::Progress;
-use host_sim::random::Stream;
-use host_sim::scene::{EMBEDDED, Scene};
-use host_sim::train::select::{self, Selection};
-use host_sim::train::{self, Options};
-use host_sim::{Error, Result, columns, output, synth};
+use host_sim::experiment::{EMBEDDED, Experiment};
+use host_sim::{Error, Result};
 use model_core::rbf::Format;
 use serde::Serialize;
+use taxel_data::csv_file::CsvFile;
+use taxel_data::dataset::Dataset;
+use taxel_data::error::{Problem, Role};
+use taxel_data::random::Stream;
+use taxel_data::{columns, output};
+use taxel_learn::select::{self, Selection};
+use taxel_learn::train::{WHOLE_ARRAY_SPREAD, train};
+use taxel_learn::{Options, Origin, pack};
+use taxel_simulate::synthesise;
 
+use super::arguments::format;
 use super::scene_argument::NoiseArgument;
 use super::{Common, print};
 
@@ -55,8 +58,8 @@ pub struct Arguments {
     #[arg(long)]
     whole_array: bool,
     /// Number format of the weights [default: the scene's, or f32].
-    #[arg(long, value_name = "FORMAT")]
-    format: Option<NumberFormat>,
+    #[arg(long, value_name = "FORMAT", value_parser = format())]
+    format: Option<Format>,
     /// Choose K and spread among the candidates by cross-validation, and print every score.
     #[arg(long)]
     select: bool,
@@ -117,7 +120,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     options.affine_tail &= !arguments.no_affine;
     if arguments.whole_array && !options.whole_array {
         options.whole_array = true;
-        options.spread *= train::WHOLE_ARRAY_SPREAD;
+        options.spread *= WHOLE_ARRAY_SPREAD;
     }
     options.format = arguments.format.unwrap_or(options.format);
     if arguments.select && options.whole_array {
@@ -134,13 +137,12 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         None
     };
 
-    let trained = train::train(&source.dataset, &options, &Progress::on_terminal())?;
-    let blob = model::encode(&trained, &source.dataset, &source.origin)?;
-    let loaded = LoadedModel::from_bytes(&arguments.output, &blob)?;
-    output::write_bytes(&arguments.output, &blob)?;
+    let trained = train(&source.dataset, &options, &Terminal::new())?;
+    let blob = pack(&trained, &source.dataset, &source.origin)?;
+    output::write_bytes(&arguments.output, blob.bytes())?;
 
-    let model = loaded.model();
-    if options.format == NumberFormat::F32
+    let model = blob.parse();
+    if options.format == Format::F32
         && model.networks().any(|network| network.format() == Format::F32Direct)
     {
         eprintln!(
@@ -151,7 +153,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     }
     let summary = Summary {
         file: arguments.output.clone(),
-        blob_bytes: blob.len(),
+        blob_bytes: blob.bytes().len(),
         blob_crc: format!("{:08x}", model.crc()),
         training_frames: source.dataset.frames(),
         centres: model.networks().map(|n| n.shape().centres).max().unwrap_or(0),
@@ -169,7 +171,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 }
 
 fn from_scene(arguments: &Arguments, common: &Common) -> Result<Source> {
-    let mut scene = Scene::load(&arguments.source)?;
+    let mut scene = Experiment::load(&arguments.source)?;
     for (option, given) in [
         ("--inputs", arguments.inputs.is_some()),
         ("--outputs", arguments.outputs.is_some()),
@@ -180,14 +182,14 @@ fn from_scene(arguments: &Arguments, common: &Common) -> Result<Source> {
             return Err(Error::Usage(message));
         }
     }
-    scene.seed = common.seed.unwrap_or(scene.seed);
+    scene.world.seed = common.seed.unwrap_or(scene.world.seed);
     arguments.noise.apply(&mut scene)?;
     let frames = arguments.frames.unwrap_or(scene.training.frames);
-    scene.check_frames("-n", frames)?;
+    scene.world.check_frames("-n", frames)?;
     Ok(Source {
-        dataset: synth::synthesise(&scene, Stream::Training, frames),
-        origin: Origin::of_scene(&scene),
-        defaults: model::options_of(&scene),
+        dataset: synthesise(&scene.world, Stream::Training, frames),
+        origin: scene.origin(),
+        defaults: scene.options(),
         fold_of: None,
     })
 }
@@ -200,9 +202,9 @@ fn from_data(arguments: &Arguments, common: &Common) -> Result<Source> {
         return Err(Error::Usage("--noise adds noise to a scene; a CSV file has its own".into()));
     }
     let path = Path::new(&arguments.source);
-    let file = DataFile::read(path)?;
-    let (dataset, kept) =
-        Dataset::from_file(&file, arguments.inputs.as_deref(), arguments.outputs.as_deref())?;
+    let file = CsvFile::read(path)?;
+    let (inputs, outputs) = (arguments.inputs.as_deref(), arguments.outputs.as_deref());
+    let (dataset, kept) = Dataset::from_file(&file, inputs, outputs).map_err(with_options)?;
     if kept.lines.len() < kept.of {
         let left_out = kept.of - kept.lines.len();
         eprintln!("note: {left_out} of {} lines have a missing value and are left out", kept.of);
@@ -215,24 +217,40 @@ fn from_data(arguments: &Arguments, common: &Common) -> Result<Source> {
     let name = path.file_stem().map_or("data".into(), |stem| stem.to_string_lossy());
     Ok(Source {
         origin: Origin::of_data(&name, file.digest, seed, &dataset),
-        defaults: Options::new(64, 0.8, true, seed),
+        defaults: Options { seed, ..Options::default() },
         dataset,
         fold_of,
     })
 }
 
+/// The error with the options that choose columns.
+fn with_options(error: taxel_data::Error) -> Error {
+    let option = |role| match role {
+        Role::Inputs => "--inputs",
+        Role::Outputs => "--outputs",
+    };
+    match error {
+        taxel_data::Error::File { path, problem } => match problem {
+            Problem::NoMatch { role, .. } | Problem::NoUsualNames { role, .. } => {
+                Error::Unfit { path, message: format!("{problem} ({})", option(role)) }
+            }
+            Problem::InputAndOutput { .. } => {
+                Error::Unfit { path, message: format!("{problem} (--inputs, --outputs)") }
+            }
+            problem => taxel_data::Error::File { path, problem }.into(),
+        },
+        other => other.into(),
+    }
+}
+
 /// Folds as column `name` gives them.
-fn folds_from(file: &DataFile, name: &str, lines: &[usize]) -> Result<Vec<usize>> {
+fn folds_from(file: &CsvFile, name: &str, lines: &[usize]) -> Result<Vec<usize>> {
     let column = file.column(name)?;
     let values: Vec<f64> = lines.iter().map(|line| file.value(*line, column)).collect();
     if let Some(place) = values.iter().position(|value| value.is_nan()) {
-        return Err(Error::Data {
-            path: file.path.clone(),
-            message: format!(
-                "line {}, column {name:?}: every line needs a fold; fill it in",
-                file.line_number(lines[place])
-            ),
-        });
+        let rule = format!("column {name:?}: every line needs a fold; fill it in");
+        let problem = Problem::MissingValue { line: file.line_number(lines[place]), rule };
+        return Err(taxel_data::Error::file(&file.path, problem).into());
     }
     Ok(select::number_folds(&values))
 }
@@ -278,7 +296,7 @@ fn choose(arguments: &Arguments, source: &Source, options: &mut Options) -> Resu
         &centres,
         &spreads,
         options,
-        &Progress::on_terminal(),
+        &Terminal::new(),
     )?;
     options.centres = selection.best().centres;
     options.spread = selection.best().spread;
@@ -309,8 +327,10 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
                 pooled(&scored.rmse)
             ));
         }
-        let linear = pooled(&selection.linear_rmse);
-        page.line(format_args!("  {:<36} {linear}", "best linear decoder:"));
+        for baseline in &selection.baselines {
+            let label = format!("{}:", baseline.decoder);
+            page.line(format_args!("  {label:<36} {}", pooled(&baseline.rmse)));
+        }
     }
     page.line(format_args!(
         "{}: {} bytes, CRC-32 {}, {}, K = {}, spread = {}, affine tail: {}, {} frames",

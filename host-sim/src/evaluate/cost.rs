@@ -3,9 +3,9 @@
 use model_core::blob::Model;
 use model_core::rbf::Format;
 use serde::Serialize;
+use taxel_learn::Exponential;
 
 use crate::error::{Error, Result};
-use crate::infer::Kernel;
 
 /// Rows, readings and outputs of a row that `cargo xtask cycles` measures.
 pub const MEASURED_SHAPE: [usize; 3] = [8, 18, 18];
@@ -89,17 +89,13 @@ impl Costs {
     /// The checked-in figures; those of the compiler that comes first.
     ///
     /// # Errors
-    /// [`Error::Failed`] if the file holds none, or not what it should.
+    /// [`Error::Cycles`] if the file holds none, or not what it should.
     pub fn measured() -> Result<Self> {
         Self::parse(MEASURED)
     }
 
     fn parse(text: &str) -> Result<Self> {
-        let failed = |cause: String| {
-            Error::Failed(format!(
-                "firmware/cycles.csv: {cause}; cargo xtask cycles --accept writes it anew"
-            ))
-        };
+        let failed = Error::Cycles;
         let mut reader = csv::Reader::from_reader(text.as_bytes());
         let mut compiler: Option<String> = None;
         let mut lines = Vec::new();
@@ -161,7 +157,7 @@ impl Costs {
             .map(|network| (network.format(), network.shape().centres, network.has_affine_tail()));
         let kind = kinds.next()?;
         let (format, centres, affine) = kinds.all(|other| other == kind).then_some(kind)?;
-        let kernel = kernel_name(format, Kernel::default());
+        let kernel = kernel_name(format, Exponential::default());
         self.frames((&kernel, centres, affine, model.projection().is_some()))
     }
 
@@ -177,10 +173,10 @@ impl Costs {
 
 /// The name under which a format's figures stand.
 #[must_use]
-pub fn kernel_name(format: Format, exponential: Kernel) -> String {
+pub fn kernel_name(format: Format, exponential: Exponential) -> String {
     match (format, exponential) {
-        (Format::F32Direct, Kernel::Libm) => "f32-direct-libm".into(),
-        (Format::F32Direct, Kernel::Micromath) => "f32-direct-micromath".into(),
+        (Format::F32Direct, Exponential::Libm) => "f32-direct-libm".into(),
+        (Format::F32Direct, Exponential::Micromath) => "f32-direct-micromath".into(),
         _ => format.name().into(),
     }
 }

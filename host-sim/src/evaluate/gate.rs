@@ -2,17 +2,18 @@
 
 use model_core::gate::is_at_rest;
 use serde::Serialize;
+use taxel_data::BadValue;
+use taxel_data::random::Stream;
+use taxel_data::table::Table;
+use taxel_learn::PreparedModel;
+use taxel_simulate::motion::Independent;
+use taxel_simulate::noise::NoiseKind;
+use taxel_simulate::outputs::Outputs;
+use taxel_simulate::{Synthesis, World};
 
-use crate::dataset::Table;
-use crate::error::{Error, Result};
 use crate::evaluate::cost::Frames;
-use crate::evaluate::metrics::{self, Errors, Measure};
-use crate::infer::Kernel;
-use crate::model::{LoadedModel, Origin};
-use crate::random::Stream;
-use crate::scene::{Deformation, NoiseKind, Outputs, Quantity, Scene};
-use crate::sensor::Axis;
-use crate::synth::synthesise;
+use crate::experiment::Experiment;
+use crate::metrics::{self, Errors};
 
 /// Sizes in mm beyond which a deformation is counted as missed if its row is taken to be at rest.
 pub const MISSED_OVER_MM: [f64; 4] = [0.02, 0.05, 0.1, 0.2];
@@ -36,56 +37,52 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// Whether these settings make gates for `scene`.
+    /// Whether these settings make gates for `world`.
     ///
     /// # Errors
-    /// [`Error::Usage`], naming the option, its value and the fix.
-    pub fn check(&self, scene: &Scene) -> Result<()> {
-        check(scene, "--k", &self.k)?;
+    /// The first setting that does not.
+    pub fn check(&self, world: &World) -> Result<(), BadValue> {
+        check(world, &self.k)?;
         if self.baseline_frames == 0 {
-            return Err(Error::Usage(
-                "--baseline-frames 0: give at least 1 frame to average".into(),
-            ));
+            return Err(BadValue::new("baseline-frames", 0, "give at least 1 frame to average"));
         }
         if self.k.is_empty() {
-            return Err(Error::Usage("--k: give at least one number, such as 3.5".into()));
+            return Err(BadValue::new("k", "[]", "give at least one number, such as 3.5"));
         }
         Ok(())
     }
 }
 
-/// Whether `scene` has the noise that a gate's tolerance is made of.
+/// Whether `world` has the noise that a gate's tolerance is made of.
 ///
 /// # Errors
-/// [`Error::Usage`]: why not, and the fix.
-pub fn check_noise(scene: &Scene) -> Result<()> {
-    if scene.noise.kind != NoiseKind::Relative {
-        return Err(Error::Usage(
-            "noise.kind = \"span\": the gate's tolerance is relative to each reading; use a scene with \
-             noise.kind = \"relative\""
-                .into(),
-        ));
+/// Noise that it is not made of.
+pub fn check_noise(world: &World) -> Result<(), BadValue> {
+    if world.noise.kind != NoiseKind::Relative {
+        let rule = "the gate's tolerance is relative to each reading; use a scene with noise.kind = \"relative\"";
+        return Err(BadValue::new("noise.kind", "\"span\"", rule));
     }
-    if scene.noise.level <= 0.0 {
-        return Err(Error::Usage(
-            "noise level = 0: the gate's tolerance is k times it; give a positive --noise, such as 0.005"
-                .into(),
-        ));
+    if world.noise.level <= 0.0 {
+        let rule = "the gate's tolerance is k times it; give a positive one, such as 0.005";
+        return Err(BadValue::new("noise level", 0, rule));
     }
     Ok(())
 }
 
-/// Whether `option`'s tolerances `k`, in standard deviations of a reading's noise, make gates for `scene`.
+/// Whether tolerances `k`, in standard deviations of a reading's noise, make gates for `world`.
 ///
 /// # Errors
-/// [`Error::Usage`], naming the option, its value and the fix.
-pub fn check(scene: &Scene, option: &str, k: &[f64]) -> Result<()> {
-    check_noise(scene)?;
-    let level = scene.noise.level;
+/// The first that does not.
+pub fn check(world: &World, k: &[f64]) -> Result<(), BadValue> {
+    check_noise(world)?;
+    let level = world.noise.level;
     match k.iter().find(|k| !(**k > 0.0 && *k * level < 1.0)) {
-        Some(k) => Err(Error::Usage(format!(
-            "{option} {k}: give positive numbers with k × noise below 1, such as 3.5 (noise is {level})"
-        ))),
+        Some(k) => {
+            let rule = format!(
+                "give positive numbers with k × noise below 1, such as 3.5 (noise is {level})"
+            );
+            Err(BadValue::new("k", k, rule))
+        }
         None => Ok(()),
     }
 }
@@ -171,29 +168,33 @@ pub fn woken_by_theory(k: f64, readings: usize, baseline_frames: usize) -> f64 {
     -libm::expm1((readings + 1) as f64 * libm::log1p(-beyond))
 }
 
-/// Puts every row of `scene`'s test frames, and of as many frames of the untouched sensor, through gates
+/// Puts every row of the scene's test frames, and of as many frames of the untouched sensor, through gates
 /// for `settings`, and decodes those that are awake with `model`, whose columns must be the scene's.
 ///
 /// # Errors
-/// [`Error::Usage`] for a setting, or a noise, that makes no gate.
-pub fn measure(scene: &Scene, model: &LoadedModel, settings: &Settings) -> Result<GateResult> {
-    settings.check(scene)?;
-    let untouched_scene = untouched(scene);
+/// A setting, or a noise, that makes no gate.
+pub fn measure(
+    experiment: &Experiment,
+    model: &PreparedModel<'_>,
+    settings: &Settings,
+) -> Result<GateResult, BadValue> {
+    let world = &experiment.world;
+    settings.check(world)?;
     let whole_array = model.model().projection().is_some();
-    let gate = Gate::new(scene, settings.baseline_frames, whole_array);
-    let decode = |readings: &Table| model.decode(Kernel::default(), readings).values;
+    let frames = Synthesis::of(world);
+    let gate = Gate::new(frames.clone(), settings.baseline_frames, whole_array);
+    let decode = |readings: &Table| model.decode_lines(&readings.values);
     let rest_outputs = decode(&gate.baseline);
 
-    let touched = synthesise(scene, Stream::Test, settings.frames);
-    let sizes_mm = largest_deformations_mm(scene, settings.frames);
-    let untouched_readings = synthesise(&untouched_scene, Stream::Test, settings.frames).inputs;
+    let touched = frames.frames(Stream::Test, settings.frames);
+    let sizes_mm = largest_deformations_mm(world, settings.frames);
+    let untouched_readings = untouched(frames).frames(Stream::Test, settings.frames).inputs;
     let ungated = decode(&touched.inputs);
-    let origin = Origin::of_scene(scene);
-    let measure = Measure { full_scale: origin.full_scale, thickness_mm: origin.thickness_mm };
+    let measure = experiment.measure();
     let errors = |estimate: &[f64]| metrics::by_group(&touched.outputs, estimate, &measure);
 
     let line = |k: f64| {
-        let rest_tolerance = k * scene.noise.level;
+        let rest_tolerance = k * world.noise.level;
         let at_rest = gate.at_rest(&touched.inputs, rest_tolerance);
         let untouched_at_rest = gate.at_rest(&untouched_readings, rest_tolerance);
         let skipped = share(&at_rest);
@@ -218,11 +219,11 @@ pub fn measure(scene: &Scene, model: &LoadedModel, settings: &Settings) -> Resul
         }
     };
     Ok(GateResult {
-        scene: scene.name.clone(),
-        seed: scene.seed,
-        noise_level: scene.noise.level,
+        scene: experiment.name.clone(),
+        seed: world.seed,
+        noise_level: world.noise.level,
         frames: settings.frames,
-        rows: scene.read_rows.len(),
+        rows: world.read_rows.len(),
         baseline_frames: settings.baseline_frames,
         model_crc: format!("{:08x}", model.model().crc()),
         frame_cycles: settings.frame_cycles,
@@ -232,23 +233,18 @@ pub fn measure(scene: &Scene, model: &LoadedModel, settings: &Settings) -> Resul
     })
 }
 
-/// The same sensor and noise with nothing that moves.
-fn untouched(scene: &Scene) -> Scene {
-    let still = [0.0; 2];
-    let deformation = Deformation::Independent { dx_mm: still, dy_mm: still, dz_mm: still };
-    Scene { deformation, ..scene.clone() }
+/// Frames with nothing that moves.
+fn untouched(frames: Synthesis<'_>) -> Synthesis<'_> {
+    frames.motion(Independent::default())
 }
 
-/// The largest ‖Δ‖ in mm of each row of each test frame, whatever the scene's outputs are.
-fn largest_deformations_mm(scene: &Scene, frames: usize) -> Vec<f64> {
-    let axes = vec![Axis::X, Axis::Y, Axis::Z];
-    let outputs = Outputs { quantity: Quantity::Deformation, axes };
-    let mut scene = Scene { outputs, ..scene.clone() };
-    scene.noise.level = 0.0; // of no matter here
-    let deformations_mm = synthesise(&scene, Stream::Test, frames).outputs.values;
+/// The largest ‖Δ‖ in mm of each row of each test frame, whatever the world's outputs are.
+fn largest_deformations_mm(world: &World, frames: usize) -> Vec<f64> {
+    let synthesis = Synthesis::of(world).ideal().outputs(Outputs::all_deformations());
+    let deformations_mm = synthesis.frames(Stream::Test, frames).outputs.values;
     let length = |delta: &[f64]| delta.iter().map(|d| d * d).sum::<f64>().sqrt();
     deformations_mm
-        .chunks_exact(3 * scene.sensor.electrodes_per_row_wire)
+        .chunks_exact(3 * world.sensor.electrodes_per_row_wire)
         .map(|row| row.chunks_exact(3).map(length).fold(0.0, f64::max))
         .collect()
 }
@@ -264,11 +260,12 @@ pub(super) struct Gate {
 }
 
 impl Gate {
-    /// A gate with the mean of so many frames of the scene's sensor, untouched, as its baseline.
-    pub fn new(scene: &Scene, baseline_frames: usize, whole_array: bool) -> Self {
-        let frames = synthesise(&untouched(scene), Stream::Training, baseline_frames).inputs;
-        let baseline = Table { values: frames.means(), names: frames.names };
-        Self { baseline, readings: scene.sensor.column_wires, whole_array }
+    /// A gate with the mean of so many of these `frames`, of the untouched sensor, as its baseline.
+    pub fn new(frames: Synthesis<'_>, baseline_frames: usize, whole_array: bool) -> Self {
+        let frames = untouched(frames).frames(Stream::Training, baseline_frames);
+        let readings = frames.inputs.names.len() / frames.rows;
+        let baseline = Table { values: frames.inputs.means(), names: frames.inputs.names };
+        Self { baseline, readings, whole_array }
     }
 
     /// See [`woken_by_theory`]; the array wakes with any of its rows.

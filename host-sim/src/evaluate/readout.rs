@@ -1,17 +1,15 @@
 //! What a readout does to readings, and to what is decoded from them, one fault after another.
 
-use model_core::Frame;
 use serde::Serialize;
+use taxel_data::random::Stream;
+use taxel_data::table::Table;
+use taxel_learn::PreparedModel;
+use taxel_simulate::Synthesis;
+use taxel_simulate::readout::{Circuit, Readout};
+use taxel_simulate::virtual_board::{VirtualBoard, all_readings, rows_read, scan};
 
-use crate::dataset::Table;
-use crate::error::Result;
-use crate::evaluate::metrics::{self, Errors, Measure};
-use crate::infer::Kernel;
-use crate::model::{LoadedModel, Origin};
-use crate::random::Stream;
-use crate::scene::{Circuit, Readout, Scene};
-use crate::synth::synthesise_ideal;
-use crate::virtual_hardware::{COLUMNS, ROWS, SeriesResistance, VirtualBoard};
+use crate::experiment::Experiment;
+use crate::metrics::{self, Errors};
 
 /// Faults, each with all before it. What a scene does not say takes these typical values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -125,30 +123,32 @@ impl ReadoutResult {
     }
 }
 
-/// Scans `frames` of `scene` with every circuit and stage and decodes them with `model`, whose
+/// Scans `frames` of the scene with every circuit and stage and decodes them with `model`, whose
 /// columns must be the scene's.
 ///
 /// # Errors
-/// [`Error`](crate::Error): a sensor that the virtual board does not have, or a transaction that its
-/// parts refuse.
-pub fn measure(scene: &Scene, model: &LoadedModel, frames: usize) -> Result<ReadoutResult> {
-    let ideal = synthesise_ideal(scene, Stream::Test, frames);
-    let sensor = all_readings(scene, frames);
-    let origin = Origin::of_scene(scene);
-    let measure = Measure { full_scale: origin.full_scale, thickness_mm: origin.thickness_mm };
+/// A sensor that the virtual board does not have, or a transaction that its parts refuse.
+pub fn measure(
+    experiment: &Experiment,
+    model: &PreparedModel<'_>,
+    frames: usize,
+) -> taxel_simulate::Result<ReadoutResult> {
+    let world = &experiment.world;
+    let ideal = Synthesis::of(world).ideal().frames(Stream::Test, frames);
+    let sensor = all_readings(world, frames);
+    let measure = experiment.measure();
     let errors = |estimate: &[f64]| metrics::by_group(&ideal.outputs, estimate, &measure);
-    let decode = |readings: &Table| model.decode(Kernel::default(), readings).values;
+    let decode = |readings: &Table| model.decode_lines(&readings.values);
     let mut lines = Vec::new();
     for circuit in Circuit::ALL {
         for stage in Stage::ALL {
-            let readout = stage.readout(circuit, &scene.readout);
-            let board = VirtualBoard::new(&Scene { readout, ..scene.clone() })?;
+            let board = VirtualBoard::with_readout(world, &stage.readout(circuit, &world.readout))?;
             let series = board.series_resistance().scaled(match stage {
                 Stage::Quantised | Stage::CrossTalk | Stage::Series => 0.0,
                 Stage::Corrected | Stage::Everything => 1.0,
                 Stage::Miscalibrated => 1.1,
             });
-            let scanned = rows_read(scene, &scan(&board, series, &sensor)?);
+            let scanned = rows_read(world, &scan(&board, series, &sensor)?);
             lines.push(Line {
                 circuit,
                 stage,
@@ -158,51 +158,14 @@ pub fn measure(scene: &Scene, model: &LoadedModel, frames: usize) -> Result<Read
         }
     }
     Ok(ReadoutResult {
-        scene: scene.name.clone(),
-        seed: scene.seed,
+        scene: experiment.name.clone(),
+        seed: world.seed,
         frames,
         model_crc: format!("{:08x}", model.model().crc()),
         ideal_errors: errors(&decode(&ideal.inputs)),
         mean_errors: errors(&ideal.outputs.means().repeat(frames)),
         lines,
     })
-}
-
-/// Ideal readings of all row-wires, read or not: what a board is given.
-#[must_use]
-pub fn all_readings(scene: &Scene, frames: usize) -> Table {
-    let whole = Scene { read_rows: (0..scene.sensor.row_wires).collect(), ..scene.clone() };
-    synthesise_ideal(&whole, Stream::Test, frames).inputs
-}
-
-/// Scans every line of `readings` of all row-wires by the firmware's scanner on `board`.
-///
-/// # Errors
-/// [`Error::Failed`](crate::Error::Failed): the board refused a transaction.
-pub fn scan(board: &VirtualBoard, series: SeriesResistance, readings: &Table) -> Result<Table> {
-    let mut scanner = board.scanner(series);
-    let settings = board.scan_settings();
-    let mut frame = Frame::<ROWS, COLUMNS>::missing();
-    let mut values = Vec::with_capacity(readings.values.len());
-    for line in readings.lines() {
-        board.set_readings(line);
-        scanner.scan(settings, &mut frame);
-        let scanned = frame.row_column_resistance_ohm.as_flattened();
-        values.extend(scanned.iter().map(|ohm| f64::from(*ohm)));
-    }
-    board.check()?;
-    Ok(Table { names: readings.names.clone(), values })
-}
-
-/// Of readings of all row-wires those that `scene` reads: the columns of its models.
-#[must_use]
-pub fn rows_read(scene: &Scene, readings: &Table) -> Table {
-    let columns = scene.sensor.column_wires;
-    let rows = |line: &[f64]| -> Vec<f64> {
-        let row = |row: &usize| line[row * columns..(row + 1) * columns].to_vec();
-        scene.read_rows.iter().flat_map(row).collect()
-    };
-    Table { names: scene.reading_names(), values: readings.lines().flat_map(rows).collect() }
 }
 
 fn reading_errors(scanned: &Table, ideal: &Table) -> ReadingErrors {

@@ -4,21 +4,24 @@ use std::path::Path;
 
 use rayon::prelude::*;
 use serde::Serialize;
+use taxel_data::csv_file::CsvFile;
+use taxel_data::dataset::Dataset;
+use taxel_data::error::Problem;
+use taxel_data::output;
+use taxel_data::progress::Progress;
+use taxel_data::random::Stream;
+use taxel_learn::decoders::standard::{self, StandardNetwork};
+use taxel_learn::decoders::{BASELINES, Rows, mean};
+use taxel_learn::train::{FittedNetwork, Samples};
+use taxel_learn::{Decoder, Options};
+use taxel_simulate::Synthesis;
 
-use super::metrics::{self, Definition, Errors, Measure};
-use crate::data_file::DataFile;
-use crate::dataset::{Block, Dataset};
 use crate::error::{Error, Result};
-use crate::infer::{Kernel, infer};
-use crate::model::Origin;
-use crate::output;
-use crate::progress::Progress;
-use crate::random::Stream;
-use crate::scene::{Scene, Table1 as Settings};
-use crate::synth;
-use crate::train::linear::LinearDecoder;
-use crate::train::standard::StandardNetwork;
-use crate::train::{Options, Samples};
+use crate::experiment::{Experiment, Table1 as Settings};
+use crate::metrics::{self, Definition, Errors, Measure};
+
+/// Name of the K-centre network in tables and results.
+pub const NETWORK: &str = "network";
 
 /// Lowest and highest cell of the paper's printed Table 1, in per cent of an error whose
 /// definition the paper does not state.
@@ -58,16 +61,17 @@ impl Printed {
     /// Reads printed cells from a file with the columns `spread`, `noise_level` and `percent`.
     ///
     /// # Errors
-    /// [`Error::Data`] for a column or a value that is missing.
-    pub fn from_file(file: &DataFile) -> Result<Vec<Self>> {
+    /// A column or a value that is missing.
+    pub fn from_file(file: &CsvFile) -> taxel_data::Result<Vec<Self>> {
         let columns = file.columns(["spread", "noise_level", "percent"])?;
         let cell = |line: usize| {
             let value = |column: usize| file.value(line, columns[column]);
             let cell = Self { spread: value(0), noise_level: value(1), percent: value(2) };
             if [cell.spread, cell.noise_level, cell.percent].iter().any(|v| v.is_nan()) {
-                let message =
-                    format!("line {}: every cell needs three numbers", file.line_number(line));
-                return Err(Error::data(&file.path, message));
+                let (line, rule) =
+                    (file.line_number(line), "every cell needs three numbers".into());
+                let problem = Problem::MissingValue { line, rule };
+                return Err(taxel_data::Error::file(&file.path, problem));
             }
             Ok(cell)
         };
@@ -80,51 +84,68 @@ impl Printed {
 pub struct Column {
     /// Noise level p, as a fraction.
     pub noise_level: f64,
-    /// Errors of answering the training mean, by group.
-    pub mean: Vec<Errors>,
-    /// Errors of the best linear decoder, by group.
-    pub linear: Vec<Errors>,
-    /// One entry a spread.
-    pub cells: Vec<Cell>,
+    /// Baselines, then the networks, spread after spread. A standard network (K = N) is left out where its
+    /// interpolation matrix is singular.
+    pub decoders: Vec<Entry>,
 }
 
-/// One cell of the table.
+/// Errors of one decoder at one noise level.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Cell {
-    /// Width σ on scaled inputs.
-    pub spread: f64,
-    /// Errors of the K-centre network, by group.
-    pub network: Vec<Errors>,
-    /// Errors of the standard network (K = N), by group; `None` where its interpolation matrix
-    /// is singular.
-    pub standard: Option<Vec<Errors>>,
+pub struct Entry {
+    /// Name of the decoder.
+    pub decoder: String,
+    /// Width σ on scaled inputs, for decoders that have one.
+    pub spread: Option<f64>,
+    /// Errors by group.
+    pub errors: Vec<Errors>,
 }
 
-/// Answers of every decoder to one row-wire's test readings.
-struct RowAnswers {
-    mean: Vec<f64>,
-    linear: Vec<f64>,
-    /// One entry a spread.
-    network: Vec<Vec<f64>>,
-    standard: Vec<Option<Vec<f64>>>,
+impl Column {
+    /// Errors of the decoder of that name, and of that spread if it has one; empty if there is none.
+    #[must_use]
+    pub fn errors(&self, decoder: &str, spread: Option<f64>) -> &[Errors] {
+        let mut entries = self.decoders.iter();
+        let found = entries.find(|entry| entry.decoder == decoder && entry.spread == spread);
+        found.map_or(&[], |entry| &entry.errors)
+    }
+
+    /// Baselines, in the order of [`BASELINES`].
+    pub fn baselines(&self) -> impl Iterator<Item = &Entry> {
+        self.decoders.iter().rev().filter(|entry| entry.spread.is_none())
+    }
+
+    /// Spreads of the networks.
+    pub fn spreads(&self) -> impl Iterator<Item = f64> {
+        self.decoders.iter().filter(|entry| entry.decoder == NETWORK).filter_map(|e| e.spread)
+    }
 }
 
-/// Computes the table that `scene` asks for.
+/// Networks of one row-wire, one a spread.
+struct RowNetworks {
+    networks: Vec<FittedNetwork>,
+    standard: Vec<Option<StandardNetwork>>,
+}
+
+/// Computes the table that the scene asks for.
 ///
 /// # Errors
-/// [`Error::Scene`] if the scene has no `[table1]`; else as [`train`](crate::train::train).
-pub fn compute(scene: &Scene, progress: &Progress) -> Result<Table1> {
-    let settings = scene.table1.as_ref().ok_or_else(|| Error::Scene {
-        scene: scene.name.clone(),
+/// A scene without `[table1]`; else as [`train`](taxel_learn::train::train).
+pub fn compute(experiment: &Experiment, progress: &dyn Progress) -> Result<Table1> {
+    let settings = experiment.table1.as_ref().ok_or_else(|| Error::Syntax {
+        scene: experiment.name.clone(),
         message: "it has no [table1]: add one, or use a scene that has (paper, press)".into(),
     })?;
-    let origin = Origin::of_scene(scene);
-    let measure = Measure { full_scale: origin.full_scale, thickness_mm: origin.thickness_mm };
-    progress.stage("table 1", settings.noise_levels.len() * scene.read_rows.len());
-    let columns = settings
-        .noise_levels
-        .iter()
-        .map(|level| column(scene, settings, *level, &measure, progress));
+    let measure = experiment.measure();
+    progress.stage("table 1", settings.noise_levels.len() * experiment.world.read_rows.len());
+    let columns = settings.noise_levels.iter().map(|&level| {
+        let frames = Synthesis::of(&experiment.world).noise_level(level);
+        let training = frames.frames(Stream::Training, settings.frames);
+        let test = frames.frames(Stream::Test, settings.test_frames);
+        let decoders = decoders(settings, experiment.world.seed, &training, progress)?;
+        let judged = |(spread, decoder): &Spread| entry(decoder.as_ref(), *spread, &test, &measure);
+        let decoders = decoders.iter().map(judged).collect();
+        Ok(Column { noise_level: level, decoders })
+    });
     Ok(Table1 {
         centres: settings.centres,
         affine_tail: settings.affine_tail,
@@ -136,56 +157,55 @@ pub fn compute(scene: &Scene, progress: &Progress) -> Result<Table1> {
     })
 }
 
-fn column(
-    scene: &Scene,
-    settings: &Settings,
-    noise_level: f64,
-    measure: &Measure,
-    progress: &Progress,
-) -> Result<Column> {
-    let mut scene = scene.clone();
-    scene.noise.level = noise_level;
-    let training = synth::synthesise(&scene, Stream::Training, settings.frames);
-    let test = synth::synthesise(&scene, Stream::Test, settings.test_frames);
-    let rows = (0..training.rows)
-        .into_par_iter()
-        .map(|row| {
-            let (block, test) = (training.block(row), test.block(row));
-            let answers = row_answers(&scene, settings, row, &block, &test);
-            progress.step();
-            answers
-        })
-        .collect::<Result<Vec<RowAnswers>>>()?;
-    let errors = |of_row: &dyn Fn(&RowAnswers) -> &[f64]| {
-        let parts: Vec<&[f64]> = rows.iter().map(of_row).collect();
-        metrics::by_group(&test.outputs, &side_by_side(&parts, &test), measure)
-    };
-    let cells = settings.spreads.iter().enumerate().map(|(s, spread)| Cell {
-        spread: *spread,
-        network: errors(&|row| &row.network[s]),
-        standard: rows
-            .iter()
-            .all(|row| row.standard[s].is_some())
-            .then(|| errors(&|row| row.standard[s].as_deref().unwrap_or_default())),
-    });
-    Ok(Column {
-        noise_level,
-        mean: errors(&|row| &row.mean),
-        linear: errors(&|row| &row.linear),
-        cells: cells.collect(),
-    })
+/// A decoder, and its spread if it has one.
+type Spread = (Option<f64>, Box<dyn Decoder>);
+
+fn entry(decoder: &dyn Decoder, spread: Option<f64>, test: &Dataset, measure: &Measure) -> Entry {
+    let judged = metrics::judge(decoder, test, measure);
+    Entry { decoder: judged.decoder, spread, errors: judged.errors }
 }
 
-fn row_answers(
-    scene: &Scene,
+/// Every decoder of the table at one noise level, fitted to `training`.
+fn decoders(
     settings: &Settings,
+    seed: u64,
+    training: &Dataset,
+    progress: &dyn Progress,
+) -> Result<Vec<Spread>> {
+    let rows = (0..training.rows).into_par_iter();
+    let rows: Vec<RowNetworks> = rows
+        .map(|row| {
+            let networks = row_networks(settings, seed, row, training);
+            progress.step();
+            networks
+        })
+        .collect::<Result<_>>()?;
+    let baselines = BASELINES.iter().rev().map(|baseline| (None, baseline.fit(training)));
+    let mut decoders: Vec<Spread> = baselines.collect();
+    for (place, &spread) in settings.spreads.iter().enumerate() {
+        let networks = rows.iter().map(|row| row.networks[place].clone()).collect();
+        decoders.push((Some(spread), Box::new(Rows::of(NETWORK, training, networks))));
+        let standard: Option<Vec<StandardNetwork>> =
+            rows.iter().map(|row| row.standard[place].clone()).collect();
+        if let Some(standard) = standard {
+            let standard = Rows::of(standard::NAME, training, standard);
+            decoders.push((Some(spread), Box::new(standard)));
+        }
+    }
+    Ok(decoders)
+}
+
+fn row_networks(
+    settings: &Settings,
+    seed: u64,
     row: usize,
-    block: &Block,
-    test: &Block,
-) -> Result<RowAnswers> {
-    let samples = Samples::new(block);
+    training: &Dataset,
+) -> Result<RowNetworks> {
+    let block = training.block(row);
+    let samples = Samples::new(&block);
     let options = |spread| {
-        let mut options = Options::new(settings.centres, spread, settings.affine_tail, scene.seed);
+        let (centres, affine_tail) = (settings.centres, settings.affine_tail);
+        let mut options = Options { centres, spread, affine_tail, seed, ..Options::default() };
         options.search.most_points = 4096;
         options.search.restarts = 1;
         options
@@ -194,26 +214,11 @@ fn row_answers(
     let centres = samples.centres(&options(1.0), row);
     let few = block.first(settings.standard_frames);
     let each = settings.spreads.par_iter().map(|&spread| {
-        let fitted = samples.fit(&centres, &options(spread))?;
-        let network = infer(&fitted.network(), Kernel::default(), &test.inputs);
-        Ok((network, StandardNetwork::fit(&few, spread).map(|standard| standard.predict(test))))
+        let network = samples.fit(&centres, &options(spread))?;
+        Ok((network, StandardNetwork::fit(&few, spread)))
     });
-    let (network, standard) = each.collect::<Result<Vec<_>>>()?.into_iter().unzip();
-    Ok(RowAnswers {
-        mean: LinearDecoder::mean(block).predict(test),
-        linear: LinearDecoder::fit(block).predict(test),
-        network,
-        standard,
-    })
-}
-
-/// Joins the answers of all row-wires into lines of the test set's output table.
-pub(crate) fn side_by_side(parts: &[&[f64]], test: &Dataset) -> Vec<f64> {
-    let width = test.outputs.names.len() / parts.len();
-    (0..test.frames())
-        .flat_map(|line| parts.iter().flat_map(move |part| &part[line * width..(line + 1) * width]))
-        .copied()
-        .collect()
+    let (networks, standard) = each.collect::<Result<Vec<_>>>()?.into_iter().unzip();
+    Ok(RowNetworks { networks, standard })
 }
 
 impl Table1 {
@@ -224,7 +229,7 @@ impl Table1 {
         use std::fmt::Write as _;
         let mut csv = String::from("noise_level,decoder,spread,group,definition,value\n");
         for column in &self.columns {
-            let mut add = |decoder: &str, spread: Option<f64>, errors: &[Errors]| {
+            for Entry { decoder, spread, errors } in &column.decoders {
                 let spread = spread.map_or(String::new(), |s| s.to_string());
                 for group in errors {
                     for definition in Definition::ALL {
@@ -239,14 +244,6 @@ impl Table1 {
                         );
                     }
                 }
-            };
-            add("mean", None, &column.mean);
-            add("linear", None, &column.linear);
-            for cell in &column.cells {
-                add("network", Some(cell.spread), &cell.network);
-                if let Some(standard) = &cell.standard {
-                    add("standard", Some(cell.spread), standard);
-                }
             }
         }
         for Printed { spread, noise_level, percent } in &self.printed {
@@ -258,16 +255,20 @@ impl Table1 {
     /// Writes [`to_csv`](Self::to_csv) to `path`.
     ///
     /// # Errors
-    /// [`Error::Write`].
-    pub fn write_csv(&self, path: &Path) -> Result<()> {
+    /// A file that cannot be written.
+    pub fn write_csv(&self, path: &Path) -> taxel_data::Result<()> {
         output::write_bytes(path, self.to_csv().as_bytes())
     }
 
     /// The groups of outputs that the table covers.
     #[must_use]
     pub fn groups(&self) -> Vec<&str> {
-        let first = self.columns.first().map_or(&[][..], |column| &column.mean);
-        first.iter().map(|errors| errors.group.as_str()).collect()
+        let first = self.columns.first().and_then(|column| column.decoders.first());
+        first
+            .map_or(&[][..], |entry| &entry.errors)
+            .iter()
+            .map(|errors| errors.group.as_str())
+            .collect()
     }
 
     /// The largest ratio of the network's RMSE to that of the mean over all cells of `group`.
@@ -275,8 +276,9 @@ impl Table1 {
     pub fn worst_ratio_to_mean(&self, group: &str) -> Option<f64> {
         let rmse = |errors: &[Errors]| errors.iter().find(|e| e.group == group).map(|e| e.rmse);
         let ratios = self.columns.iter().flat_map(|column| {
-            let mean = rmse(&column.mean);
-            column.cells.iter().filter_map(move |cell| Some(rmse(&cell.network)? / mean?))
+            let mean = rmse(column.errors(mean::NAME, None));
+            let networks = column.decoders.iter().filter(|entry| entry.decoder == NETWORK);
+            networks.filter_map(move |entry| Some(rmse(&entry.errors)? / mean?))
         });
         ratios.max_by(f64::total_cmp)
     }

@@ -5,16 +5,20 @@
 
 use std::collections::BTreeMap;
 
+use model_core::rbf::Format;
 use serde::Serialize;
+use taxel_data::BadValue;
+use taxel_data::progress::Progress;
+use taxel_data::random::Stream;
+use taxel_learn::Exponential;
+use taxel_learn::decoders::{BASELINES, Baseline};
+use taxel_simulate::Synthesis;
 
-use super::cost::{Cost, Costs, MEASURED_SHAPE};
+use super::cost::{Cost, Costs, MEASURED_SHAPE, kernel_name};
 use super::gate;
-use super::metrics::{self, Errors};
-use crate::error::{Error, Result};
-use crate::progress::Progress;
-use crate::random::Stream;
-use crate::scene::Scene;
-use crate::synth;
+use crate::error::{NoPoint, Result};
+use crate::experiment::Experiment;
+use crate::metrics::{self, DecoderErrors, Errors};
 
 mod choice;
 mod gating;
@@ -22,7 +26,7 @@ mod judge;
 
 pub use choice::Limits;
 use gating::Gates;
-use judge::{Judge, Knobs, Sets, measure};
+use judge::{Judge, Knobs, Sets};
 
 /// The largest blob that a slot of the firmware's images holds.
 pub const SLOT_BYTES: usize = 131_072;
@@ -41,11 +45,49 @@ pub struct Plan {
     pub clock_mhz: f64,
 }
 
+/// A number format and an exponential that networks are decoded in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Arithmetic {
+    /// The format.
+    pub format: Format,
+    /// The exponential.
+    pub exponential: Exponential,
+}
+
+impl Arithmetic {
+    /// Every arithmetic that points are decoded in, the cheapest format first.
+    ///
+    /// Direct distances are decoded with every exponential, the other formats with their own.
+    pub fn all() -> impl Iterator<Item = Self> {
+        Format::ALL.into_iter().rev().flat_map(|format| {
+            let all: &[Exponential] = match format {
+                Format::F32Direct => &Exponential::ALL,
+                _ => &[Exponential::Polynomial],
+            };
+            all.iter().map(move |&exponential| Self { format, exponential })
+        })
+    }
+
+    /// Name, as `cargo xtask cycles` has it.
+    #[must_use]
+    pub fn name(self) -> String {
+        kernel_name(self.format, self.exponential)
+    }
+}
+
+fn by_name<S: serde::Serializer>(
+    arithmetic: &Arithmetic,
+    serializer: S,
+) -> std::result::Result<S::Ok, S::Error> {
+    serializer.serialize_str(&arithmetic.name())
+}
+
 /// One way to decode, what it costs and how far it errs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Point {
-    /// Format and exponential, as `cargo xtask cycles` names them.
-    pub kernel: String,
+    /// Format and exponential.
+    #[serde(rename = "kernel", serialize_with = "by_name")]
+    pub arithmetic: Arithmetic,
     /// Whether one network decodes all rows, behind a projection, instead of one a row.
     pub whole_array: bool,
     /// Centres of each network, K.
@@ -83,10 +125,10 @@ impl Point {
         self.errors.iter().find(|e| e.group == group).map_or(f64::NAN, |e| e.rmse)
     }
 
-    /// The kernel, and whether it decodes the whole array at once.
+    /// The arithmetic, and whether it decodes the whole array at once.
     #[must_use]
     pub fn way(&self) -> String {
-        format!("{}{}", self.kernel, if self.whole_array { " array" } else { "" })
+        format!("{}{}", self.arithmetic.name(), if self.whole_array { " array" } else { "" })
     }
 
     /// The point's knobs in a few words.
@@ -119,8 +161,8 @@ pub struct Trade {
     pub group: String,
     /// Its unit.
     pub unit: String,
-    /// RMSE by group of always answering the training mean.
-    pub mean: Vec<Errors>,
+    /// Errors of the baselines, from one sample a reading.
+    pub baselines: Vec<DecoderErrors>,
     /// All points.
     pub points: Vec<Point>,
     /// The point that [`Trade::choose`] picked.
@@ -136,10 +178,16 @@ impl Trade {
     /// Picks the point within `limits`, if any are given.
     ///
     /// # Errors
-    /// [`Error::Usage`] if no point is within them.
-    pub fn choose(&mut self, limits: &Limits) -> Result<()> {
+    /// No point is within them.
+    pub fn choose(&mut self, limits: &Limits) -> std::result::Result<(), NoPoint> {
         self.chosen = limits.choose(&self.points, &self.group, &self.unit)?;
         Ok(())
+    }
+
+    /// The groups of outputs, with their units.
+    pub fn groups(&self) -> impl Iterator<Item = (&str, &str)> {
+        let errors = self.baselines.first().map_or(&[][..], |baseline| &baseline.errors);
+        errors.iter().map(|errors| (errors.group.as_str(), errors.unit.as_str()))
     }
 
     /// The blob of a point.
@@ -156,30 +204,40 @@ impl Trade {
     }
 }
 
-/// Trains and judges every point of `plan` for `scene`; the front goes by the RMSE of `group`.
+/// Trains and judges every point of `plan` for the scene; the front goes by the RMSE of `group`.
 ///
 /// # Errors
-/// [`Error::Usage`] for a scene of another shape than was measured, and for a plan that was not measured.
-pub fn compute(scene: &Scene, plan: &Plan, group: &str, progress: &Progress) -> Result<Trade> {
+/// A scene of another shape than was measured, and a plan that was not measured.
+pub fn compute(
+    experiment: &Experiment,
+    plan: &Plan,
+    group: &str,
+    progress: &dyn Progress,
+) -> Result<Trade> {
     let costs = Costs::measured()?;
-    check(scene, plan, &costs)?;
+    check(experiment, plan, &costs)?;
+    let (world, t) = (&experiment.world, &experiment.training);
     // Each row's network, and one for the array.
-    let networks = scene.read_rows.len() + 1;
+    let networks = world.read_rows.len() + 1;
     progress.stage("trade", plan.samples_averaged.len() * plan.centres.len() * networks);
-    let mut judge = Judge::new(scene, plan, costs);
-    let mut mean = Vec::new();
+    let measure = experiment.measure();
+    let mut judge = Judge::new(experiment.options(), experiment.origin(), &measure, plan, costs);
+    let mut baselines = Vec::new();
     for &samples in &plan.samples_averaged {
-        let mut averaged = scene.clone();
-        averaged.noise.level = scene.noise.level / (samples as f64).sqrt();
-        let training = synth::synthesise(&averaged, Stream::Training, scene.training.frames);
-        let test = synth::synthesise(&averaged, Stream::Test, scene.training.test_frames);
-        if mean.is_empty() {
-            let means = training.outputs.means().repeat(test.frames());
-            mean = metrics::by_group(&test.outputs, &means, &measure(scene));
+        let noise_level = world.noise.level / (samples as f64).sqrt();
+        let frames = Synthesis::of(world).noise_level(noise_level);
+        let training = frames.frames(Stream::Training, t.frames);
+        let test = frames.frames(Stream::Test, t.test_frames);
+        if baselines.is_empty() {
+            let judged = |baseline: &Baseline| {
+                metrics::judge(baseline.fit(&training).as_ref(), &test, &measure)
+            };
+            baselines = BASELINES.iter().map(judged).collect();
         }
         for whole_array in [false, true] {
-            let gates = Gates::new(&averaged, &test.inputs, &plan.gate_k, whole_array);
-            let sets = Sets::new(&averaged, &training, &test, &gates, whole_array)?;
+            let readings = &test.inputs;
+            let gates = Gates::new(&frames, noise_level, readings, &plan.gate_k, whole_array);
+            let sets = Sets::new(noise_level, &training, &test, &gates, whole_array)?;
             for &centres in &plan.centres {
                 let knobs = Knobs { whole_array, centres, samples_averaged: samples };
                 judge.centres(&sets, knobs, progress)?;
@@ -188,16 +246,16 @@ pub fn compute(scene: &Scene, plan: &Plan, group: &str, progress: &Progress) -> 
     }
     let Judge { costs, mut points, blobs, distinct, .. } = judge;
     compare(&mut points, group);
-    let unit = mean.iter().find(|e| e.group == group).map_or(String::new(), |e| e.unit.clone());
+    let of_group = baselines.first().and_then(|b| b.errors.iter().find(|e| e.group == group));
     Ok(Trade {
-        scene: scene.name.clone(),
-        noise_level: scene.noise.level,
-        test_frames: scene.training.test_frames,
+        scene: experiment.name.clone(),
+        noise_level: world.noise.level,
+        test_frames: t.test_frames,
         compiler: costs.compiler,
         clock_mhz: plan.clock_mhz,
         group: group.into(),
-        unit,
-        mean,
+        unit: of_group.map_or(String::new(), |errors| errors.unit.clone()),
+        baselines,
         points,
         chosen: None,
         blobs,
@@ -205,33 +263,32 @@ pub fn compute(scene: &Scene, plan: &Plan, group: &str, progress: &Progress) -> 
     })
 }
 
-fn check(scene: &Scene, plan: &Plan, costs: &Costs) -> Result<()> {
-    let electrodes = scene.sensor.electrodes_per_row_wire * scene.outputs.axes.len();
-    let shape = [scene.read_rows.len(), scene.sensor.column_wires, electrodes];
+fn check(experiment: &Experiment, plan: &Plan, costs: &Costs) -> std::result::Result<(), BadValue> {
+    let world = &experiment.world;
+    let outputs = world.sensor.electrodes_per_row_wire * world.outputs.axes.len();
+    let shape = [world.read_rows.len(), world.sensor.column_wires, outputs];
     if shape != MEASURED_SHAPE {
         let [rows, inputs, outputs] = shape;
         let [r, i, o] = MEASURED_SHAPE;
-        return Err(Error::Usage(format!(
-            "the scene has {rows} rows of {inputs} readings and {outputs} outputs; cycles are measured for \
-             {r} rows of {i} and {o}: give a scene of that shape"
-        )));
+        return Err(BadValue::new(
+            "scene",
+            format!("{rows} rows of {inputs} readings and {outputs} outputs"),
+            format!("cycles are measured for {r} rows of {i} and {o}: give a scene of that shape"),
+        ));
     }
     let measured = costs.centres();
     if let Some(centres) = plan.centres.iter().find(|centres| !measured.contains(centres)) {
-        return Err(Error::Usage(format!(
-            "--centres {centres}: cycles are measured for {measured:?}"
-        )));
+        let rule = format!("cycles are measured for {measured:?}");
+        return Err(BadValue::new("centres", centres, rule));
     }
     if let Some(samples) =
         plan.samples_averaged.iter().find(|samples| !(1..=256).contains(*samples))
     {
-        return Err(Error::Usage(format!(
-            "--average {samples}: the firmware averages 1 to 256 samples"
-        )));
+        return Err(BadValue::new("average", samples, "the firmware averages 1 to 256 samples"));
     }
     if !plan.gate_k.is_empty() {
         // Averaging only lowers the noise.
-        gate::check(scene, "--gate", &plan.gate_k)?;
+        gate::check(world, &plan.gate_k).map_err(|bad| bad.named("gate"))?;
     }
     Ok(())
 }

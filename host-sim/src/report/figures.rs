@@ -6,7 +6,9 @@ use super::heat_map::{ColourScale, HeatMap};
 use super::svg::Shape;
 use super::tables::rmse;
 use super::ticks;
-use crate::evaluate::table1::{Column, Table1};
+use taxel_learn::decoders::{linear, mean, standard};
+
+use crate::evaluate::table1::{Column, NETWORK, Table1};
 use crate::run::{Example, ExampleOutput, RunResult};
 
 /// A figure without its number.
@@ -239,51 +241,79 @@ pub fn maps(result: &RunResult, output: &ExampleOutput) -> Figure {
     }
 }
 
-/// The least RMSE of `group` over the spreads of one noise level.
-fn best(column: &Column, group: &str, standard: bool) -> f64 {
-    let of_cells = column.cells.iter().filter_map(|cell| {
-        let errors = if standard { cell.standard.as_ref()? } else { &cell.network };
-        Some(rmse(errors, group)).filter(|value| value.is_finite())
+/// The RMSE of a decoder, the least over its spreads if it has any; NaN without a finite one.
+fn best(column: &Column, decoder: &str, group: &str) -> f64 {
+    let entries = column.decoders.iter().filter(|entry| entry.decoder == decoder);
+    let finite = entries.map(|entry| rmse(&entry.errors, group)).filter(|rmse| rmse.is_finite());
+    finite.min_by(f64::total_cmp).unwrap_or(f64::NAN)
+}
+
+/// Names of the table's decoders, in the order in which their lines are drawn.
+fn decoder_names(table: &Table1) -> Vec<&str> {
+    let mut names: Vec<&str> = Vec::new();
+    for entry in table.columns.iter().flat_map(|column| &column.decoders) {
+        if !names.contains(&entry.decoder.as_str()) {
+            names.push(&entry.decoder);
+        }
+    }
+    names.sort_by_key(|name| match *name {
+        mean::NAME => 0,
+        standard::NAME => 1,
+        NETWORK => 2,
+        _ => 3,
     });
-    of_cells.min_by(f64::total_cmp).unwrap_or(f64::NAN)
+    names
+}
+
+/// Class and mark of a decoder's line.
+fn line_style(decoder: &str) -> (&'static str, Mark) {
+    match decoder {
+        mean::NAME => ("muted", Mark::Dashed),
+        standard::NAME => ("c2", Mark::LineAnd(Shape::Square)),
+        NETWORK => ("c1", Mark::LineAnd(Shape::Circle)),
+        // Broken, so that it and a network that does no better are both seen.
+        linear::NAME => ("c3 broken", Mark::LineAnd(Shape::Triangle)),
+        _ => ("c4", Mark::LineAnd(Shape::Diamond)),
+    }
 }
 
 /// Error against noise, by decoder.
 pub fn error_by_noise(table: &Table1, group: &str, unit: &str) -> Figure {
     let positive = || table.columns.iter().filter(|column| column.noise_level > 0.0);
-    let points = |value: &dyn Fn(&Column) -> f64| -> Vec<[f64; 2]> {
-        positive().map(|column| [column.noise_level, value(column)]).collect()
+    let points = |decoder: &str| -> Vec<[f64; 2]> {
+        positive().map(|column| [column.noise_level, best(column, decoder, group)]).collect()
     };
-    let network = points(&|column| best(column, group, false));
-    let standard = points(&|column| best(column, group, true));
-    let linear = points(&|column| rmse(&column.linear, group));
-    let mut mean = points(&|column| rmse(&column.mean, group));
-    let heights = |points: &[[f64; 2]]| points.iter().map(|[_, y]| *y).collect::<Vec<_>>();
-    let steady = [heights(&network), heights(&linear), heights(&mean)].concat();
+    let lines: Vec<(&str, Vec<[f64; 2]>)> =
+        decoder_names(table).into_iter().map(|name| (name, points(name))).collect();
+    let heights = |of_standard: bool| {
+        let lines = lines.iter().filter(move |(name, _)| (*name == standard::NAME) == of_standard);
+        lines.flat_map(|(_, points)| points.iter().map(|[_, y]| *y))
+    };
     // The standard network may be off by orders of magnitude; the others must stay apart.
-    let limit = 2.0 * ticks::extent(steady.iter().copied()).map_or(f64::INFINITY, |(_, high)| high);
-    let near = heights(&standard).into_iter().filter(|y| *y <= limit);
-    let y = ticks::linear(steady.iter().copied().chain(near).chain([0.0]), 5);
-    let clipped = heights(&standard).iter().any(|y| *y > limit);
+    let limit = 2.0 * ticks::extent(heights(false)).map_or(f64::INFINITY, |(_, high)| high);
+    let near = heights(true).filter(|y| *y <= limit);
+    let y = ticks::linear(heights(false).chain(near).chain([0.0]), 5);
+    let clipped = heights(true).any(|y| y > limit);
 
     let name = symbol(group);
     let noise = ticks::logarithmic_percent(positive().map(|column| column.noise_level));
-    // A reference runs from edge to edge.
-    if let [[_, first], .., [_, last]] | [[_, first @ last]] = mean[..] {
-        mean.insert(0, [noise.low, first]);
-        mean.push([noise.high, last]);
-    }
+    let series = lines.into_iter().map(|(name, mut points)| {
+        // A reference runs from edge to edge.
+        if name == mean::NAME
+            && let [[_, first], .., [_, last]] | [[_, first @ last]] = points[..]
+        {
+            points.insert(0, [noise.low, first]);
+            points.push([noise.high, last]);
+        }
+        let (class, mark) = line_style(name);
+        Series::new(name, class, mark, points)
+    });
+    let series = series.collect();
     let chart = Chart {
         title: format!("RMSE of {name} against noise level, by decoder"),
         x: Axis { label: "noise level p".into(), ticks: noise, logarithmic: true },
         y: Axis::linear(with_unit(&format!("RMSE of {name}"), unit), y),
-        series: vec![
-            Series::new("mean", "muted", Mark::Dashed, mean),
-            Series::new("standard", "c2", Mark::LineAnd(Shape::Square), standard),
-            Series::new("network", "c1", Mark::LineAnd(Shape::Circle), network),
-            // Broken, so that it and a network that does no better are both seen.
-            Series::new("linear", "c3 broken", Mark::LineAnd(Shape::Triangle), linear),
-        ],
+        series,
         bands: vec![],
         notes: vec![],
         end_labels: true,
@@ -319,15 +349,14 @@ const SHAPES: [Shape; 4] = [Shape::Circle, Shape::Square, Shape::Triangle, Shape
 /// Error against spread, one line a noise level.
 pub fn error_by_spread(table: &Table1, group: &str, unit: &str) -> Figure {
     let name = symbol(group);
-    let spreads = || table.columns.iter().flat_map(|c| c.cells.iter().map(|cell| cell.spread));
-    let x = ticks::linear(spreads(), 6);
-    let mean = table.columns.first().map_or(f64::NAN, |column| rmse(&column.mean, group));
+    let x = ticks::linear(table.columns.iter().flat_map(Column::spreads), 6);
+    let mean = table.columns.first().map_or(f64::NAN, |column| best(column, mean::NAME, group));
     let mut series =
         vec![Series::new("mean", "muted", Mark::Dashed, vec![[x.low, mean], [x.high, mean]])];
     let last = table.columns.len().saturating_sub(1).max(1) as f64;
     for (i, column) in table.columns.iter().enumerate() {
-        let cells = column.cells.iter();
-        let points = cells.map(|cell| [cell.spread, rmse(&cell.network, group)]).collect();
+        let at = |spread| [spread, rmse(column.errors(NETWORK, Some(spread)), group)];
+        let points = column.spreads().map(at).collect();
         let mark = Mark::LineAnd(SHAPES[i % SHAPES.len()]);
         let line = Series::new(&percent(column.noise_level), "c1", mark, points);
         series.push(Series { opacity: 0.6 + 0.4 * i as f64 / last, ..line });

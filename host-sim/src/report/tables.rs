@@ -2,12 +2,14 @@
 
 use std::fmt::Write as _;
 
+use taxel_learn::decoders::{linear, mean};
+
 use super::format::{UNDEFINED, decimals, fixed, percent, symbol, with_unit};
 use super::svg::escape;
 use super::ticks;
-use crate::evaluate::metrics::{Definition, Errors};
-use crate::evaluate::table1::{PAPER_PRINTED_PERCENT, Table1};
-use crate::run::{DecoderErrors, RunResult};
+use crate::evaluate::table1::{Column, NETWORK, PAPER_PRINTED_PERCENT, Table1};
+use crate::metrics::{DecoderErrors, Definition, Errors};
+use crate::run::RunResult;
 
 /// The errors of one group, if it is among `errors`.
 pub fn of_group<'e>(errors: &'e [Errors], group: &str) -> Option<&'e Errors> {
@@ -22,9 +24,9 @@ pub fn rmse(errors: &[Errors], group: &str) -> f64 {
 /// What a decoder is called on the page.
 pub fn decoder_name(decoder: &DecoderErrors) -> &str {
     match decoder.decoder.as_str() {
-        "network" => "Network",
-        "linear" => "Best linear decoder",
-        "mean" => "Training mean",
+        NETWORK => "Network",
+        linear::NAME => "Best linear decoder",
+        mean::NAME => "Training mean",
         other => other,
     }
 }
@@ -104,7 +106,8 @@ pub fn legend() -> String {
 
 /// The definition that the paper's table is shown by: positional where it is defined.
 pub fn printed_definition(table: &Table1, group: &str) -> Definition {
-    let mean = table.columns.first().and_then(|column| of_group(&column.mean, group));
+    let mean =
+        table.columns.first().and_then(|column| of_group(column.errors(mean::NAME, None), group));
     match mean.and_then(|errors| errors.positional_percent) {
         Some(_) => Definition::PositionalPercent,
         None => Definition::FullScalePercent,
@@ -141,18 +144,19 @@ pub fn table1(table: &Table1, group: &str) -> String {
         let _ = write!(html, "<th class=\"number\">{}</th>", percent(column.noise_level));
     }
     html += "</tr></thead>\n<tbody>\n";
-    let spreads = table.columns.first().map_or(&[][..], |column| &column.cells);
-    for (i, first) in spreads.iter().enumerate() {
-        let _ = write!(html, "<tr><th scope=\"row\">{:?}</th>", first.spread);
+    for spread in table.columns.first().into_iter().flat_map(Column::spreads) {
+        let _ = write!(html, "<tr><th scope=\"row\">{spread:?}</th>");
         for column in &table.columns {
-            let value = column.cells.get(i).and_then(|cell| of(&cell.network));
-            let poor = value.zip(of(&column.mean)).is_some_and(|(value, mean)| value >= mean);
+            let value = of(column.errors(NETWORK, Some(spread)));
+            let poor = value
+                .zip(of(column.errors(mean::NAME, None)))
+                .is_some_and(|(value, mean)| value >= mean);
             let (class, mark) =
                 if poor { (" poor", "<span class=\"dagger\">†</span>") } else { ("", "") };
             let text = cell(value);
             let _ = write!(html, "<td class=\"number{class}\">{text}{mark}");
             let printed = table.printed.iter().find(|printed| {
-                same(printed.spread, first.spread) && same(printed.noise_level, column.noise_level)
+                same(printed.spread, spread) && same(printed.noise_level, column.noise_level)
             });
             if let Some(printed) = printed {
                 let _ = write!(html, "<small>paper {}\u{a0}%</small>", printed.percent);
@@ -162,15 +166,22 @@ pub fn table1(table: &Table1, group: &str) -> String {
         html += "</tr>\n";
     }
     html += "</tbody>\n<tbody class=\"reference\">\n";
-    for (name, errors) in [("Linear", 0), ("Mean", 1)] {
-        let _ = write!(html, "<tr><th scope=\"row\">{name}</th>");
+    for baseline in table.columns.first().into_iter().flat_map(Column::baselines) {
+        let name = capitalised(&baseline.decoder);
+        let _ = write!(html, "<tr><th scope=\"row\">{}</th>", escape(&name));
         for column in &table.columns {
-            let text = cell(of([&column.linear, &column.mean][errors]));
+            let text = cell(of(column.errors(&baseline.decoder, None)));
             let _ = write!(html, "<td class=\"number\">{text}</td>");
         }
         html += "</tr>\n";
     }
     html + "</tbody>\n</table>\n"
+}
+
+/// A name as the head of a line.
+fn capitalised(name: &str) -> String {
+    let mut letters = name.chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
 }
 
 /// Whether two settings that people typed are the same.

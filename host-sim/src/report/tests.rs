@@ -1,11 +1,9 @@
 //! The page as a whole, on results made by hand.
 
 use super::html;
-use crate::evaluate::metrics::Errors;
-use crate::evaluate::table1::{Cell, Column, Printed, Table1};
-use crate::run::{
-    DecoderErrors, Example, ExampleOutput, ModelSummary, RowErrors, RunResult, SceneSummary,
-};
+use crate::evaluate::table1::{Column, Entry, NETWORK, Printed, Table1};
+use crate::metrics::{DecoderErrors, Errors};
+use crate::run::{Example, ExampleOutput, ModelSummary, RowErrors, RunResult, SceneSummary};
 
 const ROW_WIRES: usize = 3;
 const PER_ROW: usize = 2;
@@ -13,7 +11,7 @@ const PER_ROW: usize = 2;
 fn errors(group: &str, rmse: f64) -> Errors {
     Errors {
         group: group.into(),
-        unit: crate::columns::unit_of(group).into(),
+        unit: taxel_data::columns::unit_of(group).into(),
         count: 10,
         rmse,
         relative_l2_percent: Some(30.0 * rmse),
@@ -31,16 +29,20 @@ fn of_groups(groups: &[&str], rmse: f64) -> Vec<Errors> {
 fn result(groups: &[&str]) -> RunResult {
     let electrodes = ROW_WIRES * PER_ROW;
     let values = |shift: f64| (0..electrodes).map(|i| 0.1 * i as f64 + shift).collect();
-    let cell = |spread: f64| Cell {
+    let entry = |decoder: &str, spread: Option<f64>, rmse: f64| Entry {
+        decoder: decoder.into(),
         spread,
-        network: of_groups(groups, 0.2 / spread),
-        standard: (spread > 0.5).then(|| of_groups(groups, 1234.0)),
+        errors: of_groups(groups, rmse),
     };
     let column = |noise_level| Column {
         noise_level,
-        mean: of_groups(groups, 0.3),
-        linear: of_groups(groups, 0.25),
-        cells: vec![cell(0.5), cell(1.0)],
+        decoders: vec![
+            entry("mean", None, 0.3),
+            entry("linear", None, 0.25),
+            entry(NETWORK, Some(0.5), 0.4),
+            entry(NETWORK, Some(1.0), 0.2),
+            entry("standard", Some(1.0), 1234.0),
+        ],
     };
     RunResult {
         scene: SceneSummary {
@@ -84,7 +86,7 @@ fn result(groups: &[&str]) -> RunResult {
                 .iter()
                 .map(|group| ExampleOutput {
                     group: (*group).into(),
-                    unit: crate::columns::unit_of(group).into(),
+                    unit: taxel_data::columns::unit_of(group).into(),
                     truth: values(0.0),
                     estimate: values(-0.05),
                 })

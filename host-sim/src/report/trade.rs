@@ -2,26 +2,27 @@
 
 use std::fmt::Write as _;
 
+use model_core::rbf::Format;
+
 use super::chart::{Axis, Chart, Mark, Series};
 use super::format::{grouped, percent, significant, symbol};
 use super::html::document;
 use super::svg::{Shape, escape};
-use super::ticks;
-use crate::evaluate::trade::{Point, Trade};
+use super::{tables, ticks};
+use crate::evaluate::trade::{Arithmetic, Point, Trade};
+use crate::metrics::DecoderErrors;
 
-/// Ways to decode in the order of their colours and shapes: without a gate full, behind one hollow. The shape is
-/// the kernel's; one colour is that of the whole array.
-const WAYS: [(&str, [&str; 2], Shape); 10] = [
-    ("fixed16", ["c1", "c1 hollow"], Shape::Circle),
-    ("f32", ["c2", "c2 hollow"], Shape::Square),
-    ("f32-direct", ["c3", "c3 hollow"], Shape::Triangle),
-    ("f32-direct-libm", ["c3 pale", "c3 pale hollow"], Shape::Diamond),
-    ("f32-direct-micromath", ["muted", "muted hollow"], Shape::Dash),
-    ("fixed16 array", ["c4", "c4 hollow"], Shape::Circle),
-    ("f32 array", ["c4", "c4 hollow"], Shape::Square),
-    ("f32-direct array", ["c4", "c4 hollow"], Shape::Triangle),
-    ("f32-direct-libm array", ["c4 pale", "c4 pale hollow"], Shape::Diamond),
-    ("f32-direct-micromath array", ["c4", "c4 hollow"], Shape::Dash),
+/// How an arithmetic's points are drawn: its classes for a network a row, those for one of the whole array, and
+/// the shape of both. The second of two classes is for points behind a gate.
+type Style = ([&'static str; 2], [&'static str; 2], Shape);
+
+/// The style of every arithmetic, in the order of [`Arithmetic::all`].
+const STYLES: [Style; 5] = [
+    (["c1", "c1 hollow"], ["c4", "c4 hollow"], Shape::Circle),
+    (["c2", "c2 hollow"], ["c4", "c4 hollow"], Shape::Square),
+    (["c3", "c3 hollow"], ["c4", "c4 hollow"], Shape::Triangle),
+    (["c3 pale", "c3 pale hollow"], ["c4 pale", "c4 pale hollow"], Shape::Diamond),
+    (["muted", "muted hollow"], ["c4", "c4 hollow"], Shape::Dash),
 ];
 
 /// Cycles against error, both logarithmic: every point of one sample a reading or more, and the front.
@@ -40,12 +41,22 @@ fn chart(trade: &Trade) -> Chart {
         let name = format!("front, {samples} sample{plural}");
         series.push(Series::new(&name, "front", mark, line));
     }
-    for (way, classes, shape) in WAYS {
-        for (gated, class) in [false, true].into_iter().zip(classes) {
-            let of = |p: &&Point| p.way() == way && p.gate_k.is_some() == gated;
-            let points = trade.points.iter().filter(of).map(at).collect();
-            let name = if gated { format!("{way}, gate") } else { way.into() };
-            series.push(Series::new(&name, class, Mark::Points(shape), points));
+    let arithmetics: Vec<Arithmetic> = Arithmetic::all().collect();
+    assert_eq!(arithmetics.len(), STYLES.len(), "a style for every arithmetic");
+    for whole_array in [false, true] {
+        for (&arithmetic, &(of_rows, of_array, shape)) in arithmetics.iter().zip(&STYLES) {
+            let classes = if whole_array { of_array } else { of_rows };
+            for (gated, class) in [false, true].into_iter().zip(classes) {
+                let of = |p: &&Point| {
+                    (p.arithmetic, p.whole_array, p.gate_k.is_some())
+                        == (arithmetic, whole_array, gated)
+                };
+                let points: Vec<&Point> = trade.points.iter().filter(of).collect();
+                let Some(way) = points.first().map(|point| point.way()) else { continue };
+                let name = if gated { format!("{way}, gate") } else { way };
+                let points = points.into_iter().map(at).collect();
+                series.push(Series::new(&name, class, Mark::Points(shape), points));
+            }
         }
     }
     if let Some(chosen) = trade.chosen {
@@ -56,7 +67,7 @@ fn chart(trade: &Trade) -> Chart {
     let most = samples.last().copied();
     let lowest = trade.points.iter().filter(|p| Some(p.samples_averaged) == most && p.on_front);
     let mut notes: Vec<([f64; 2], String)> = Vec::new();
-    for point in lowest.filter(|p| p.kernel == "fixed16") {
+    for point in lowest.filter(|p| p.arithmetic.format == Format::Fixed16) {
         let note = format!("K = {}", point.centres);
         if notes.iter().all(|(_, known)| *known != note) {
             notes.push((at(point), note));
@@ -119,7 +130,7 @@ pub fn html(trade: &Trade) -> String {
         body,
         "<figure id=\"figure-1\">\n{}<figcaption><b>Figure 1.</b> RMSE of {} in {} against cycles of a \
          frame, both logarithmic. Lines: the front, where nothing is better in one of RMSE, cycles and samples \
-         and worse in none. Array: one network for all rows, behind a projection; else one a row. {}Always answering the mean errs by {}.</figcaption>\n</figure>\n",
+         and worse in none. Array: one network for all rows, behind a projection; else one a row. {}RMSE of the baselines: {}.</figcaption>\n</figure>\n",
         chart.draw_responsive([920.0, 520.0], [480.0, 460.0]),
         symbol(&trade.group),
         escape(&trade.unit),
@@ -128,14 +139,19 @@ pub fn html(trade: &Trade) -> String {
         } else {
             ""
         },
-        trade
-            .mean
-            .iter()
-            .find(|e| e.group == trade.group)
-            .map_or("-".into(), |e| significant(e.rmse, 3)),
+        baselines(trade),
     );
     body += &table(trade);
     document(&title, &body)
+}
+
+/// RMSE of every baseline in words.
+fn baselines(trade: &Trade) -> String {
+    let of = |baseline: &DecoderErrors| {
+        let rmse = significant(tables::rmse(&baseline.errors, &trade.group), 3);
+        format!("{} {rmse} {}", tables::decoder_name(baseline).to_lowercase(), trade.unit)
+    };
+    trade.baselines.iter().map(of).collect::<Vec<_>>().join(", ")
 }
 
 fn table(trade: &Trade) -> String {
@@ -146,13 +162,9 @@ fn table(trade: &Trade) -> String {
          <th class=\"number\">K</th><th class=\"after\">tail</th><th class=\"number\">samples</th>\
          <th class=\"number\">gate k</th>",
     );
-    for errors in &trade.mean {
-        let _ = write!(
-            html,
-            "<th class=\"number\">RMSE of {}, {}</th>",
-            symbol(&errors.group),
-            escape(&errors.unit)
-        );
+    for (group, unit) in trade.groups() {
+        let (group, unit) = (symbol(group), escape(unit));
+        let _ = write!(html, "<th class=\"number\">RMSE of {group}, {unit}</th>");
     }
     for head in ["instructions", "cycles", "µs", "flash, B", "RAM, B"] {
         let _ = write!(html, "<th class=\"number\">{head}</th>");

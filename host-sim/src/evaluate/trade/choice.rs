@@ -1,7 +1,9 @@
 //! Picking one point within limits.
 
+use taxel_data::BadValue;
+
 use super::Point;
-use crate::error::{Error, Result};
+use crate::error::{Bounded, NoPoint, Unmet};
 
 /// What the chosen point may be at most.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -18,16 +20,16 @@ impl Limits {
     /// Whether the limits can be met at all.
     ///
     /// # Errors
-    /// [`Error::Usage`] for one that is not a positive number.
-    pub fn check(&self) -> Result<()> {
-        let positive = [
-            ("--max-error", self.error),
-            ("--max-cycles", self.cycles.map(|cycles| cycles as f64)),
-            ("--max-flash", self.flash_bytes.map(|bytes| bytes as f64)),
+    /// A limit that is not a positive number.
+    pub fn check(&self) -> Result<(), BadValue> {
+        let limits = [
+            (Bounded::Error, self.error),
+            (Bounded::Cycles, self.cycles.map(|cycles| cycles as f64)),
+            (Bounded::Flash, self.flash_bytes.map(|bytes| bytes as f64)),
         ];
-        for (option, limit) in positive {
+        for (bounded, limit) in limits {
             if let Some(limit) = limit.filter(|limit| !(limit.is_finite() && *limit > 0.0)) {
-                return Err(Error::Usage(format!("{option} {limit}: give a positive number")));
+                return Err(BadValue::new(bounded.name(), limit, "give a positive number"));
             }
         }
         Ok(())
@@ -42,13 +44,13 @@ impl Limits {
     /// flash.
     ///
     /// # Errors
-    /// [`Error::Usage`] if no point is within the limits: how near the points come.
+    /// No point is within the limits: how near the points come.
     pub(super) fn choose(
         &self,
         points: &[Point],
         group: &str,
         unit: &str,
-    ) -> Result<Option<usize>> {
+    ) -> Result<Option<usize>, NoPoint> {
         if !self.any() {
             return Ok(None);
         }
@@ -65,7 +67,7 @@ impl Limits {
         let best = (0..points.len())
             .filter(|i| self.allow(&points[*i], group))
             .min_by(|a, b| compare(&key(&points[*a]), &key(&points[*b])));
-        best.map(Some).ok_or_else(|| Error::Usage(self.refusal(points, group, unit)))
+        best.map(Some).ok_or_else(|| self.refusal(points, group, unit))
     }
 
     fn allow(&self, point: &Point, group: &str) -> bool {
@@ -75,62 +77,49 @@ impl Limits {
     }
 
     /// Which limits no point meets, or, where each can be met, how near points within the others come to it.
-    fn refusal(&self, points: &[Point], group: &str, unit: &str) -> String {
+    fn refusal(&self, points: &[Point], group: &str, unit: &str) -> NoPoint {
         let unit = format!("{unit} ({group})");
         let least = |within: Self, limit: &Limit| {
             let within = points.iter().filter(|point| within.allow(point, group));
             within.map(|point| (limit.of)(point, group)).reduce(f64::min)
         };
         let limits = self.each();
-        let unmet = limits.iter().filter_map(|limit| {
-            let least = least(NONE, limit).filter(|least| *least > limit.most)?;
-            Some(format!("{}: {} of all", limit.name, (limit.say)(least, &unit)))
-        });
-        let unmet: Vec<String> = unmet.collect();
+        let unmet: Vec<Unmet> = limits
+            .iter()
+            .filter_map(|limit| {
+                let least = least(NONE, limit).filter(|least| *least > limit.unmet.most)?;
+                Some(Unmet { least, ..limit.unmet })
+            })
+            .collect();
         if !unmet.is_empty() {
-            return format!("no point is within {}: loosen it", unmet.join("; nor within "));
+            return NoPoint::Each { unmet, unit };
         }
-        let names: Vec<&str> = limits.iter().map(|limit| limit.name.as_str()).collect();
-        let nearest = limits.iter().filter_map(|limit| {
-            let least = least(limit.others, limit)?;
-            Some(format!("without {}, {}", limit.name, (limit.say)(least, &unit)))
+        let near = limits.iter().map(|limit| {
+            let least = least(limit.others, limit);
+            (Unmet { least: least.unwrap_or(f64::NAN), ..limit.unmet }, least.is_some())
         });
-        format!(
-            "no point is within {} at once; {}: loosen one",
-            names.join(", "),
-            nearest.collect::<Vec<_>>().join("; ")
-        )
+        NoPoint::Together { bounds: near.collect(), unit }
     }
 
-    /// Those that hold.
+    /// Every limit that holds.
     fn each(&self) -> Vec<Limit> {
+        let unmet = |bounded, most| Unmet { bounded, most, is_slot: false, least: f64::NAN };
         let error = self.error.map(|most| Limit {
-            name: format!("--max-error {most}"),
-            most,
+            unmet: unmet(Bounded::Error, most),
             others: Self { error: None, ..*self },
             of: |point, group| point.rmse(group),
-            // Rounded up: a limit that can be met.
-            say: |least, unit| {
-                format!("the smallest error is {:.4} {unit}", (least * 1e4).ceil() / 1e4)
-            },
         });
         let cycles = self.cycles.map(|most| Limit {
-            name: format!("--max-cycles {most}"),
-            most: most as f64,
+            unmet: unmet(Bounded::Cycles, most as f64),
             others: Self { cycles: None, ..*self },
             of: |point, _| point.frame.cycles as f64,
-            say: |least, _| format!("the fewest cycles are {least}"),
         });
         let most = self.flash_bytes.unwrap_or(super::SLOT_BYTES);
+        let is_slot = self.flash_bytes.is_none();
         let flash = Limit {
-            name: match self.flash_bytes {
-                Some(_) => format!("--max-flash {most}"),
-                None => format!("a slot's {most} bytes"),
-            },
-            most: most as f64,
+            unmet: Unmet { is_slot, ..unmet(Bounded::Flash, most as f64) },
             others: Self { flash_bytes: NONE.flash_bytes, ..*self },
             of: |point, _| point.flash_bytes as f64,
-            say: |least, _| format!("the smallest blob takes {least} bytes"),
         };
         error.into_iter().chain(cycles).chain([flash]).collect()
     }
@@ -141,12 +130,10 @@ const NONE: Limits = Limits { error: None, cycles: None, flash_bytes: Some(usize
 
 /// One of several limits.
 struct Limit {
-    name: String,
-    most: f64,
+    /// What it is, but for the least.
+    unmet: Unmet,
     /// All but this one.
     others: Limits,
     /// What it limits.
     of: fn(&Point, &str) -> f64,
-    /// How the least of that is told, in a unit.
-    say: fn(f64, &str) -> String,
 }

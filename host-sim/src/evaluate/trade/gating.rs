@@ -1,8 +1,9 @@
 //! Points behind a gate: rows at rest are not decoded but take the outputs at rest.
 
+use taxel_data::table::Table;
+use taxel_simulate::Synthesis;
+
 use super::super::gate::{BASELINE_FRAMES, Gate, gated, share};
-use crate::dataset::Table;
-use crate::scene::Scene;
 
 /// Which rows of the test frames are at rest, for every k: a matter of readings alone, whatever decodes them.
 pub(super) struct Gates {
@@ -21,11 +22,17 @@ pub(super) struct AtRest {
 }
 
 impl Gates {
-    /// Those of rows, or of the whole array, of `averaged`, whose noise is that of its averaged readings, for the `readings` of its test frames.
-    pub fn new(averaged: &Scene, readings: &Table, k: &[f64], whole_array: bool) -> Self {
-        let gate = Gate::new(averaged, BASELINE_FRAMES, whole_array);
+    /// Gates of rows, or of the whole array, for the `readings` of test frames with this noise level.
+    pub fn new(
+        frames: &Synthesis<'_>,
+        noise_level: f64,
+        readings: &Table,
+        k: &[f64],
+        whole_array: bool,
+    ) -> Self {
+        let gate = Gate::new(frames.clone(), BASELINE_FRAMES, whole_array);
         let at_rest = |&k: &f64| {
-            let rows = gate.at_rest(readings, k * averaged.noise.level);
+            let rows = gate.at_rest(readings, k * noise_level);
             AtRest { k, share: share(&rows), rows }
         };
         Self { gates: k.iter().map(at_rest).collect(), baseline: gate.baseline }

@@ -2,20 +2,17 @@
 
 use model_core::rbf::Format;
 use rayon::prelude::*;
+use taxel_data::dataset::Dataset;
+use taxel_data::progress::Progress;
+use taxel_learn::train::{self, FittedNetwork, Samples, WHOLE_ARRAY_SPREAD, projection};
+use taxel_learn::{ModelBlob, Options, Origin, Trained, pack};
 
-use super::super::cost::{Cost, Costs, kernel_name};
-use super::super::metrics::{self, Measure};
+use super::super::cost::{Cost, Costs};
 use super::super::ram::DecoderRam;
 use super::gating::Gates;
-use super::{Plan, Point, SLOT_BYTES};
-use crate::dataset::Dataset;
+use super::{Arithmetic, Plan, Point, SLOT_BYTES};
 use crate::error::{Error, Result};
-use crate::infer::Kernel;
-use crate::model::{self, LoadedModel, Origin};
-use crate::number_format::NumberFormat;
-use crate::progress::Progress;
-use crate::scene::Scene;
-use crate::train::{self, FittedNetwork, Samples, Trained, WHOLE_ARRAY_SPREAD, projection};
+use crate::metrics::{self, Measure};
 
 /// What tells points with the same frames apart, beyond format, tail and gate.
 #[derive(Debug, Clone, Copy)]
@@ -27,7 +24,8 @@ pub(super) struct Knobs {
 
 /// Frames to train on and to test on, and what follows from them alone.
 pub(super) struct Sets<'s> {
-    averaged: &'s Scene,
+    /// Of the averaged readings.
+    noise_level: f64,
     training: &'s Dataset,
     test: &'s Dataset,
     gates: &'s Gates,
@@ -37,7 +35,7 @@ pub(super) struct Sets<'s> {
 
 impl<'s> Sets<'s> {
     pub fn new(
-        averaged: &'s Scene,
+        noise_level: f64,
         training: &'s Dataset,
         test: &'s Dataset,
         gates: &'s Gates,
@@ -50,7 +48,7 @@ impl<'s> Sets<'s> {
         } else {
             None
         };
-        Ok(Self { averaged, training, test, gates, projected })
+        Ok(Self { noise_level, training, test, gates, projected })
     }
 
     /// What the networks are trained on.
@@ -59,15 +57,11 @@ impl<'s> Sets<'s> {
     }
 }
 
-/// How errors of this scene are measured.
-pub(super) fn measure(scene: &Scene) -> Measure {
-    let Origin { full_scale, thickness_mm, .. } = Origin::of_scene(scene);
-    Measure { full_scale, thickness_mm }
-}
-
 /// Collects points and the blobs that they decode with.
 pub(super) struct Judge<'s> {
-    scene: &'s Scene,
+    options: Options,
+    origin: Origin,
+    measure: &'s Measure,
     plan: &'s Plan,
     pub costs: Costs,
     pub points: Vec<Point>,
@@ -77,20 +71,31 @@ pub(super) struct Judge<'s> {
 }
 
 impl<'s> Judge<'s> {
-    pub fn new(scene: &'s Scene, plan: &'s Plan, costs: Costs) -> Self {
-        Self { scene, plan, costs, points: vec![], blobs: vec![], distinct: vec![] }
+    /// A judge of networks trained with `options` but for what the plan varies.
+    pub fn new(
+        options: Options,
+        origin: Origin,
+        measure: &'s Measure,
+        plan: &'s Plan,
+        costs: Costs,
+    ) -> Self {
+        let (points, blobs, distinct) = (vec![], vec![], vec![]);
+        Self { options, origin, measure, plan, costs, points, blobs, distinct }
     }
 
     /// Every format and tail with so many centres.
-    pub fn centres(&mut self, sets: &Sets<'_>, knobs: Knobs, progress: &Progress) -> Result<()> {
-        let variants: Vec<(NumberFormat, bool)> =
-            [NumberFormat::Fixed16, NumberFormat::F32, NumberFormat::F32Direct]
-                .into_iter()
-                .flat_map(|format| [false, true].map(|affine| (format, affine)))
-                .collect();
-        let defaults = model::options_of(sets.averaged);
+    pub fn centres(
+        &mut self,
+        sets: &Sets<'_>,
+        knobs: Knobs,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let formats = Format::ALL.into_iter().rev();
+        let variants: Vec<(Format, bool)> =
+            formats.flat_map(|format| [false, true].map(|affine| (format, affine))).collect();
+        let defaults = self.options;
         let spread = if knobs.whole_array { WHOLE_ARRAY_SPREAD } else { 1.0 } * defaults.spread;
-        let options = train::Options { centres: knobs.centres, spread, ..defaults };
+        let options = Options { centres: knobs.centres, spread, ..defaults };
         let seen = sets.seen();
         options.check(seen.frames())?;
         // Centres are those of the row, whatever the format.
@@ -100,33 +105,32 @@ impl<'s> Judge<'s> {
                 let block = seen.block(row);
                 let samples = Samples::new(&block);
                 let found = samples.centres(&options, row);
-                let fit = |&(format, affine_tail): &(NumberFormat, bool)| {
-                    samples.fit(&found, &train::Options { affine_tail, format, ..options })
+                let fit = |&(format, affine_tail): &(Format, bool)| {
+                    samples.fit(&found, &Options { affine_tail, format, ..options })
                 };
-                let fitted = variants.par_iter().map(fit).collect();
+                let fitted = variants.par_iter().map(fit).collect::<taxel_learn::Result<_>>();
                 progress.step();
                 fitted
             })
-            .collect::<Result<_>>()?;
-        for (variant, (format, affine)) in variants.iter().enumerate() {
+            .collect::<taxel_learn::Result<_>>()?;
+        for (variant, &(format, affine)) in variants.iter().enumerate() {
             let networks = rows.iter().map(|row| row[variant].clone()).collect();
             let projection = sets.projected.as_ref().map(|(block, _)| block.clone());
             let trained = Trained { projection, networks };
-            let blob = model::encode(&trained, sets.training, &Origin::of_scene(sets.averaged))?;
-            let loaded = LoadedModel::from_bytes("the model just trained".as_ref(), &blob)?;
-            let formats: Vec<Format> = loaded.model().networks().map(|n| n.format()).collect();
-            let exponentials: &[Kernel] = match format {
-                // A network that fell back to direct distances is the point of that format.
-                NumberFormat::F32 if formats.contains(&Format::F32Direct) => continue,
-                // It fits no slot, so its cycles were not measured: those of rows are a network's.
-                _ if knobs.whole_array && blob.len() > SLOT_BYTES => continue,
-                NumberFormat::F32Direct => &[Kernel::Polynomial, Kernel::Libm, Kernel::Micromath],
-                _ => &[Kernel::Polynomial],
-            };
-            for &exponential in exponentials {
-                self.points(&loaded, sets, (formats[0], exponential), (knobs, *affine, spread))?;
+            let noise = (self.origin.noise.0, sets.noise_level);
+            let origin = Origin { noise, ..self.origin.clone() };
+            let blob = pack(&trained, sets.training, &origin)?;
+            // A network that fell back to direct distances is the point of that format.
+            let fell_back = trained.networks.iter().any(|network| network.format() != format);
+            // What fits no slot had no cycles measured: those of rows are a network's.
+            let fits = !knobs.whole_array || blob.bytes().len() <= SLOT_BYTES;
+            if fell_back || !fits {
+                continue;
             }
-            self.distinct.push(blob);
+            for arithmetic in Arithmetic::all().filter(|a| a.format == format) {
+                self.points(&blob, sets, arithmetic, (knobs, affine, spread))?;
+            }
+            self.distinct.push(blob.bytes().to_vec());
         }
         Ok(())
     }
@@ -134,37 +138,38 @@ impl<'s> Judge<'s> {
     /// A network without a gate, and behind every gate that was measured with its exponential.
     fn points(
         &mut self,
-        loaded: &LoadedModel,
+        blob: &ModelBlob,
         sets: &Sets<'_>,
-        (format, exponential): (Format, Kernel),
+        arithmetic: Arithmetic,
         (knobs, affine_tail, spread): (Knobs, bool, f64),
     ) -> Result<()> {
         let Knobs { whole_array, centres, samples_averaged } = knobs;
-        let (kernel, test) = (kernel_name(format, exponential), sets.test);
-        let ram = DecoderRam::of(&loaded.model());
+        let (kernel, test) = (arithmetic.name(), sets.test);
+        let model = blob.prepare(arithmetic.exponential);
+        let ram = DecoderRam::of(model.model());
         // Fewer centres than asked for are decoded as fast as the measured number or faster.
         let kind = (kernel.as_str(), centres, affine_tail, whole_array);
         let ungated = self.costs.frame(kind).ok_or_else(|| {
-            Error::Failed(format!(
-                "firmware/cycles.csv has no figure for {kernel}, K = {centres}, whole array: {whole_array}"
+            Error::Cycles(format!(
+                "no figure for {kernel}, K = {centres}, whole array: {whole_array}"
             ))
         })?;
         let frames = self.costs.frames(kind);
-        let estimate = loaded.decode(exponential, &test.inputs).values;
+        let estimate = model.decode_lines(&test.inputs.values);
         let mut add = |gate_k: Option<f64>, frame: Cost, estimate: &[f64]| {
             self.points.push(Point {
-                kernel: kernel.clone(),
+                arithmetic,
                 whole_array,
                 centres,
                 spread,
                 affine_tail,
                 samples_averaged,
                 gate_k,
-                errors: metrics::by_group(&test.outputs, estimate, &measure(self.scene)),
+                errors: metrics::by_group(&test.outputs, estimate, self.measure),
                 ratio_to_best: vec![],
                 frame,
                 frame_us: frame.cycles as f64 / self.plan.clock_mhz,
-                flash_bytes: loaded.bytes().len(),
+                flash_bytes: blob.bytes().len(),
                 ram_bytes: if gate_k.is_some() { ram.gated_bytes() } else { ram.bytes() },
                 on_front: false,
             });
@@ -172,7 +177,7 @@ impl<'s> Judge<'s> {
         };
         add(None, ungated, &estimate);
         if let Some(frames) = frames {
-            let rest_outputs = loaded.decode(exponential, &sets.gates.baseline).values;
+            let rest_outputs = model.decode_lines(&sets.gates.baseline.values);
             for gate in sets.gates.iter() {
                 let frame = frames.mean_cost(gate.share);
                 add(Some(gate.k), frame, &gate.gated(&estimate, &rest_outputs));

@@ -1,0 +1,101 @@
+use super::*;
+
+/// What the careful reader makes of a file.
+fn carefully(bytes: &[u8]) -> Result<(Vec<f64>, Vec<u64>)> {
+    let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(bytes);
+    let header: Vec<String> = reader.headers().unwrap().iter().map(str::to_owned).collect();
+    CsvFile::read_carefully(Path::new("test.csv"), bytes, &mut reader, &header)
+}
+
+fn bits(values: &[f64]) -> Vec<u64> {
+    values.iter().map(|value| value.to_bits()).collect()
+}
+
+#[test]
+fn the_quick_reader_reads_what_the_careful_one_reads() {
+    for (text, is_plain) in [
+        ("a,b\n1,2\n3,4\n", true),
+        ("a,b\r\n1,2\r\n3,4\r\n", true),
+        ("a,b\n1,2\n3,4", true),
+        ("a,b\r\n1,2\r\n3,4", true),
+        ("\n\na,b\n1,2\n", true),
+        ("\"a\",b\n-1e-3,+2.5E7\n.5,7.\n", true),
+        ("a,b\n,\nNaN,\nnan,-nan\n", true),
+        ("a,b\n 1 ,\t2\n  ,3\n", true),
+        ("a\n1\n2\n", true),
+        ("a,b\n123456789012345678901234567890,0.1000000000000000055511151231257827\n", true),
+        ("a,b\n4.9406564584124654e-324,1.7976931348623157e308\n", true),
+        ("a,b\n\"1\",2\n", false),
+        ("a,b\n1,2\n\n3,4\n", false),
+        ("a,b\n1,2\n3,4\n\n", false),
+        ("a,b\r1,2\r3,4\r", false),
+        ("a,b\n1,2\r3,4\n", false),
+        ("\u{feff}a,b\n1,2\n", true),
+        ("a,b\n\u{a0}1,2\n", true),
+    ] {
+        let file = CsvFile::parse(Path::new("test.csv"), text.as_bytes()).unwrap();
+        let (values, line_numbers) = carefully(text.as_bytes()).unwrap();
+        assert_eq!(bits(&file.values), bits(&values), "{text:?}");
+        assert_eq!(file.line_numbers, line_numbers, "{text:?}");
+        let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(text.as_bytes());
+        let columns = reader.headers().unwrap().len();
+        let quick = lines_of_data(text.as_bytes(), reader.position())
+            .and_then(|(_, lines)| body::read(lines, columns));
+        assert_eq!(quick.is_some(), is_plain, "{text:?}");
+    }
+}
+
+#[test]
+fn lines_are_counted_as_an_editor_counts_them() {
+    for (text, line) in [
+        ("a,b\n1,2\n3,x\n", 3),
+        ("a,b\r\n1,2\r\n3,x\r\n", 3),
+        ("a,b\r1,2\r3,x\r", 3),
+        ("a,b\n\n1,2\n\n\n3,x\n", 6),
+        ("\n\na,b\n\"1\",2\n3,x", 5),
+        ("\u{feff}a,b\n1,2\n3,x\n", 3),
+    ] {
+        let message = CsvFile::parse(Path::new("test.csv"), text.as_bytes()).unwrap_err();
+        assert!(message.to_string().contains(&format!("line {line}")), "{text:?}: {message}");
+    }
+}
+
+#[test]
+fn what_is_wrong_is_left_to_the_careful_reader() {
+    for text in [
+        "a,b\n1,2\n3\n",
+        "a,b\n1,2,3\n",
+        "a,b\n1,x\n",
+        "a,b\n1,inf\n",
+        "a,b\n1,1e999\n",
+        "a,b\n1,2e\n",
+        "a,b\n1,2 3\n",
+        "a,b\n1,\u{ff12}\n",
+    ] {
+        let message = CsvFile::parse(Path::new("test.csv"), text.as_bytes()).unwrap_err();
+        let careful = carefully(text.as_bytes()).unwrap_err();
+        assert_eq!(message.to_string(), careful.to_string(), "{text:?}");
+    }
+}
+
+#[test]
+fn files_of_many_pieces_are_read_whole_and_faults_in_them_found() {
+    let mut text = String::from("a,b,c\n");
+    let lines = 60_000;
+    for line in 0..lines {
+        let value = f64::from(line).sqrt();
+        text += &[value, -value * 1e-7, f64::from(line)].map(|v| v.to_string()).join(",");
+        text += "\n";
+    }
+    let file = CsvFile::parse(Path::new("test.csv"), text.as_bytes()).unwrap();
+    assert_eq!(file.lines(), lines as usize);
+    for line in 0..lines {
+        let value = f64::from(line).sqrt();
+        let found = [0, 1, 2].map(|column| file.value(line as usize, column));
+        assert_eq!(found, [value, -value * 1e-7, f64::from(line)]);
+        assert_eq!(file.line_number(line as usize), line as u64 + 2);
+    }
+    text += "1,2,three\n";
+    let message = CsvFile::parse(Path::new("test.csv"), text.as_bytes()).unwrap_err().to_string();
+    assert!(message.contains("line 60002, column \"c\": \"three\" is not a number"), "{message}");
+}

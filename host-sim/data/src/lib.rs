@@ -1,0 +1,18 @@
+//! The ground floor of Taxel's host side: tables of measurements, CSV files, seeded random numbers.
+//!
+//! Modules stand from the ground up; each imports only what stands before it.
+
+pub mod error;
+pub mod simd;
+mod elementary;
+pub mod random;
+pub mod digest;
+pub mod progress;
+pub mod output;
+pub mod columns;
+pub mod csv_file;
+pub mod table;
+pub mod dataset;
+
+pub use elementary::{exp, is_near_an_axis, sin_cos};
+pub use error::{BadValue, Error, Result};

@@ -1,0 +1,142 @@
+//! Random draws that are the same on every platform, in any order, on any number of threads.
+//!
+//! Generator: xoshiro256++ (Blackman & Vigna, 2021), one instance for every purpose of every frame
+//! of every row, seeded from those numbers by SplitMix64: a frame never depends on the frames
+//! before it, nor on which rows are read. Uniform: the upper 53 bits over 2^53. Normal: Box–Muller,
+//! √(−2 ln(1 − u₁))·(cos, sin)(2π u₂), with the `libm` crate's functions, which are the same code on
+//! every platform.
+
+use rand_core::{Rng, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+mod lanes;
+
+pub use lanes::RandomLanes;
+
+/// What draws are for. Different purposes never share numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Purpose {
+    /// The contact that a whole frame shares.
+    Contact = 1,
+    /// Deformation of one row's electrodes.
+    Deformation = 2,
+    /// Noise on one row's readings.
+    Noise = 3,
+    /// Start and restarts of K-means.
+    Centres = 4,
+    /// Assignment of samples to folds.
+    Folds = 5,
+    /// Offsets of a readout's op-amps.
+    OpAmpOffset = 6,
+    /// Noise of a readout's converter.
+    AdcNoise = 7,
+    /// Damage that a device must survive.
+    Damage = 8,
+}
+
+/// Which set of frames draws are for. Training and test frames are independent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stream {
+    /// Frames to train on; also what `synth` writes.
+    Training = 1,
+    /// Frames to evaluate on.
+    Test = 2,
+    /// Frames that measure each channel's span.
+    Span = 3,
+}
+
+/// A seeded source of draws.
+#[derive(Debug, Clone)]
+pub struct Random {
+    generator: Xoshiro256PlusPlus,
+    spare_normal: Option<f64>,
+}
+
+impl Random {
+    /// The source for `purpose` number `index` (say a frame) and `part` (say a row) of `stream`.
+    #[must_use]
+    pub fn new(seed: u64, stream: Stream, purpose: Purpose, index: u64, part: u64) -> Self {
+        let words = [stream as u64, purpose as u64, index, part];
+        let mixed = words.iter().fold(seed, |state, word| split_mix(state ^ split_mix(*word)));
+        Self { generator: Xoshiro256PlusPlus::seed_from_u64(mixed), spare_normal: None }
+    }
+
+    /// Uniform on [0, 1).
+    pub fn unit(&mut self) -> f64 {
+        unit(self.generator.next_u64())
+    }
+
+    /// Uniform on [`low`, `high`).
+    pub fn between(&mut self, [low, high]: [f64; 2]) -> f64 {
+        low + (high - low) * self.unit()
+    }
+
+    /// Uniform on 0..`end`.
+    pub fn below(&mut self, end: usize) -> usize {
+        ((self.unit() * end as f64) as usize).min(end.saturating_sub(1))
+    }
+
+    /// Standard normal.
+    pub fn normal(&mut self) -> f64 {
+        if let Some(spare) = self.spare_normal.take() {
+            return spare;
+        }
+        let radius = libm::sqrt(-2.0 * libm::log(1.0 - self.unit()));
+        let angle = std::f64::consts::TAU * self.unit();
+        self.spare_normal = Some(radius * libm::sin(angle));
+        radius * libm::cos(angle)
+    }
+}
+
+/// Uniform on [0, 1): the upper 53 bits over 2^53.
+#[inline(always)]
+fn unit(bits: u64) -> f64 {
+    (bits >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+/// How far SplitMix64's state moves on with every number.
+const SPLIT_MIX_STEP: u64 = 0x9e37_79b9_7f4a_7c15;
+
+/// One step of SplitMix64 (Steele, Lea & Flood, 2014).
+#[inline(always)]
+fn split_mix(state: u64) -> u64 {
+    let mut z = state.wrapping_add(SPLIT_MIX_STEP);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn draws_are_fixed_for_all_time() {
+        let mut random = Random::new(1, Stream::Training, Purpose::Noise, 2, 3);
+        let drawn: Vec<u64> = (0..2).map(|_| random.unit().to_bits()).collect();
+        assert_eq!(drawn, [0x3fea_aca6_aa3b_c8ab, 0x3fee_ddef_39ea_72b4]);
+        assert_eq!(random.normal().to_bits(), 0xbff6_6d30_0488_dda6);
+        let mut other = Random::new(1, Stream::Training, Purpose::Noise, 3, 2);
+        assert_ne!(drawn[0], other.unit().to_bits());
+    }
+
+    #[test]
+    fn normal_draws_have_the_moments_of_a_normal() {
+        let n = 400_000;
+        let mut moments = [0.0; 4];
+        let mut random = Random::new(5, Stream::Test, Purpose::Noise, 0, 0);
+        for _ in 0..n {
+            let x = random.normal();
+            for (power, moment) in (1..).zip(&mut moments) {
+                *moment += x.powi(power) / f64::from(n);
+            }
+        }
+        // Five standard errors of each sample moment.
+        let root = f64::from(n).sqrt();
+        for (moment, (expected, variance)) in
+            moments.iter().zip([(0.0, 1.0_f64), (1.0, 2.0), (0.0, 15.0), (3.0, 96.0)])
+        {
+            assert!((moment - expected).abs() < 5.0 * variance.sqrt() / root, "{moments:?}");
+        }
+    }
+}

@@ -1,0 +1,141 @@
+//! The draws of many frames at once, one frame a lane: the very numbers that [`Random`](super::Random)
+//! gives.
+
+#![allow(clippy::needless_range_loop, reason = "lanes of several arrays are indexed alike")]
+
+use std::f64::consts::TAU;
+
+use super::{Purpose, SPLIT_MIX_STEP, Stream, split_mix, unit};
+use crate::elementary::{is_near_an_axis, ln, sin_cos};
+use crate::simd::{LANES, Lanes};
+
+/// Sources of the same purpose for consecutive frames.
+#[derive(Debug, Clone)]
+pub struct RandomLanes {
+    state: [Lanes<u64>; 4],
+    /// `split_mix` of every frame's number.
+    mixed_frames: Lanes<u64>,
+}
+
+impl RandomLanes {
+    /// For the frames from number `first` on; [`start`](Self::start) comes next.
+    #[inline(always)]
+    #[must_use]
+    pub fn new(first: usize) -> Self {
+        Self::every(first, 1)
+    }
+
+    /// For every `step`th frame from number `first` on; [`start`](Self::start) comes next.
+    #[inline(always)]
+    #[must_use]
+    pub fn every(first: usize, step: usize) -> Self {
+        let mut mixed_frames = [0; LANES];
+        for (lane, mixed) in mixed_frames.iter_mut().enumerate() {
+            *mixed = split_mix((first + lane * step) as u64);
+        }
+        Self { state: [[0; LANES]; 4], mixed_frames }
+    }
+
+    /// Starts the sources for `purpose` and `part` (say a row) of every frame, as [`super::Random::new`].
+    #[inline(always)]
+    pub fn start(&mut self, seed: u64, stream: Stream, purpose: Purpose, part: u64) {
+        let common = [stream as u64, purpose as u64].into_iter();
+        let common = common.fold(seed, |state, word| split_mix(state ^ split_mix(word)));
+        let part = split_mix(part);
+        for lane in 0..LANES {
+            let mixed = split_mix(split_mix(common ^ self.mixed_frames[lane]) ^ part);
+            // As Xoshiro256PlusPlus::seed_from_u64 does.
+            let mut state = mixed;
+            for words in &mut self.state {
+                words[lane] = split_mix(state);
+                state = state.wrapping_add(SPLIT_MIX_STEP);
+            }
+        }
+    }
+
+    /// `N` draws a lane, uniform on [`low`, `high`) of each, as [`super::Random::between`] gives them.
+    #[inline(always)]
+    pub fn between<const N: usize>(&mut self, ranges: [[f64; 2]; N], lanes: &mut [Lanes; N]) {
+        for lane in 0..LANES {
+            let mut state = self.state.each_ref().map(|words| words[lane]);
+            for ([low, high], place) in ranges.into_iter().zip(0..) {
+                lanes[place][lane] = low + (high - low) * unit(next(&mut state));
+            }
+            for (words, word) in self.state.iter_mut().zip(state) {
+                words[lane] = word;
+            }
+        }
+    }
+
+    /// Two standard normal draws a lane, as [`super::Random::normal`] gives them.
+    #[inline(always)]
+    pub fn normal_pair(&mut self, first: &mut Lanes, second: &mut Lanes) {
+        let mut units = [[0.0; LANES]; 2];
+        self.between([[0.0, 1.0]; 2], &mut units);
+        let [radii, turns] = units;
+        let mut rare = 0_u64;
+        for lane in 0..LANES {
+            let radius = (-2.0 * ln(1.0 - radii[lane])).sqrt();
+            rare |= u64::from(is_near_an_axis(turns[lane]));
+            let (sine, cosine) = sin_cos(TAU * turns[lane]);
+            first[lane] = radius * cosine;
+            second[lane] = radius * sine;
+        }
+        if rare != 0 {
+            for lane in (0..LANES).filter(|lane| is_near_an_axis(turns[*lane])) {
+                let radius = (-2.0 * ln(1.0 - radii[lane])).sqrt();
+                let angle = TAU * turns[lane];
+                first[lane] = radius * libm::cos(angle);
+                second[lane] = radius * libm::sin(angle);
+            }
+        }
+    }
+}
+
+/// The next number of xoshiro256++.
+#[inline(always)]
+fn next(s: &mut [u64; 4]) -> u64 {
+    let number = s[0].wrapping_add(s[3]).rotate_left(23).wrapping_add(s[0]);
+    let shifted = s[1] << 17;
+    s[2] ^= s[0];
+    s[3] ^= s[1];
+    s[1] ^= s[2];
+    s[0] ^= s[3];
+    s[2] ^= shifted;
+    s[3] = s[3].rotate_left(45);
+    number
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    #[test]
+    fn a_block_draws_what_its_frames_draw_one_by_one() {
+        for first in (0..100_000).step_by(LANES * 7) {
+            let mut block = RandomLanes::new(first);
+            for (part, purpose) in [(3, Purpose::Noise), (0, Purpose::Contact)] {
+                block.start(9, Stream::Test, purpose, part);
+                let mut lanes = [[0.0; LANES]; 3];
+                block.between([[-1.0, 2.0], [0.0, 1.0], [5.0, 5.5]], &mut lanes);
+                let mut single: Vec<_> = (first..first + LANES)
+                    .map(|frame| Random::new(9, Stream::Test, purpose, frame as u64, part))
+                    .collect();
+                for (lane, random) in single.iter_mut().enumerate() {
+                    let expected = [[-1.0, 2.0], [0.0, 1.0], [5.0, 5.5]];
+                    let expected = expected.map(|range| random.between(range));
+                    assert_eq!(lanes.map(|lanes| lanes[lane]), expected);
+                }
+                for _ in 0..20 {
+                    let [a, b, _] = &mut lanes;
+                    block.normal_pair(a, b);
+                    for (lane, random) in single.iter_mut().enumerate() {
+                        let expected = [random.normal(), random.normal()].map(f64::to_bits);
+                        assert_eq!([lanes[0][lane], lanes[1][lane]].map(f64::to_bits), expected);
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! The seam for decoders: whatever turns frames of readings into estimates.
+//!
+//! As in idsp's `SplitProcess`, configuration (the decoder itself, immutable) stands apart from state (what a
+//! filter remembers between the frames of a trajectory). A new kind of decoder implements [`FrameDecoder`];
+//! programs hold lists of [`Decoder`]s, which every [`FrameDecoder`] is.
+
+use rayon::prelude::*;
+
+/// Estimates of some frames, frame after frame.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Estimates {
+    /// Outputs in their units, `frames × outputs`; NaN where nothing could be decoded.
+    pub values: Vec<f64>,
+    /// Standard deviation of each value, in its unit, from decoders that know it.
+    pub deviation: Option<Vec<f64>>,
+    /// Novelty of each frame, from decoders that know it: 1 is as usual as anything in training.
+    pub novelty: Option<Vec<f64>>,
+}
+
+impl Estimates {
+    /// Estimates without standard deviations and novelty.
+    #[must_use]
+    pub fn of_values(values: Vec<f64>) -> Self {
+        Self { values, deviation: None, novelty: None }
+    }
+
+    /// Adds the estimates of the frames that follow. What only one of the two knows is dropped.
+    fn append(&mut self, next: Self) {
+        let join = |all: &mut Option<Vec<f64>>, next: Option<Vec<f64>>| match (all.as_mut(), next) {
+            (Some(all), Some(next)) => all.extend(next),
+            _ => *all = None,
+        };
+        self.values.extend(next.values);
+        join(&mut self.deviation, next.deviation);
+        join(&mut self.novelty, next.novelty);
+    }
+}
+
+/// A way to decode frames, with its configuration in `self` and its memory in a state.
+pub trait FrameDecoder: Sync {
+    /// Memory between the frames of a trajectory, at its start by default; `()` for none.
+    type State: Default;
+
+    /// Name in tables and results.
+    fn name(&self) -> &str;
+
+    /// Readings of a frame.
+    fn inputs(&self) -> usize;
+
+    /// Decodes consecutive frames of one trajectory: `readings` in Ω (or the data's unit), frame after frame.
+    ///
+    /// A decoder without memory is given frames of any number of trajectories at once.
+    fn decode(&self, state: &mut Self::State, readings: &[f64]) -> Estimates;
+}
+
+/// A decoder of any kind, for lists of them.
+pub trait Decoder: Sync {
+    /// Name in tables and results.
+    fn name(&self) -> &str;
+
+    /// Decodes all of `readings`, frame after frame, in trajectories of `steps` frames each.
+    fn decode_all(&self, readings: &[f64], steps: usize) -> Estimates;
+}
+
+impl<D: FrameDecoder> Decoder for D {
+    fn name(&self) -> &str {
+        FrameDecoder::name(self)
+    }
+
+    fn decode_all(&self, readings: &[f64], steps: usize) -> Estimates {
+        if size_of::<D::State>() == 0 {
+            return self.decode(&mut D::State::default(), readings);
+        }
+        let trajectories = readings.par_chunks(steps.max(1) * self.inputs().max(1));
+        let decoded: Vec<Estimates> =
+            trajectories.map(|readings| self.decode(&mut D::State::default(), readings)).collect();
+        let mut decoded = decoded.into_iter();
+        let mut all = decoded.next().unwrap_or_default();
+        decoded.for_each(|next| all.append(next));
+        all
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The running mean of a trajectory's readings, and how much each frame differs from it.
+    struct RunningMean;
+
+    impl FrameDecoder for RunningMean {
+        type State = (f64, f64);
+
+        fn name(&self) -> &str {
+            "running mean"
+        }
+
+        fn inputs(&self) -> usize {
+            1
+        }
+
+        fn decode(&self, (sum, count): &mut (f64, f64), readings: &[f64]) -> Estimates {
+            let mut estimates = Estimates { novelty: Some(vec![]), ..Estimates::default() };
+            for reading in readings {
+                (*sum, *count) = (*sum + reading, *count + 1.0);
+                estimates.values.push(*sum / *count);
+                estimates.novelty.as_mut().unwrap().push((reading - *sum / *count).abs());
+            }
+            estimates
+        }
+    }
+
+    #[test]
+    fn state_lasts_for_a_trajectory_and_no_longer() {
+        let decoder: &dyn Decoder = &RunningMean;
+        let estimates = decoder.decode_all(&[1.0, 3.0, 10.0, 20.0, 7.0], 2);
+        assert_eq!(estimates.values, [1.0, 2.0, 10.0, 15.0, 7.0]);
+        assert_eq!(estimates.novelty.unwrap(), [0.0, 1.0, 0.0, 5.0, 0.0]);
+        assert_eq!(estimates.deviation, None);
+    }
+}

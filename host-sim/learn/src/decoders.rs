@@ -1,0 +1,102 @@
+//! Decoders besides the packed network, and what they share.
+
+use rayon::prelude::*;
+use taxel_data::dataset::{Block, Dataset};
+
+use crate::decoder::{Decoder, Estimates, FrameDecoder};
+use crate::infer::{Exponential, infer};
+use crate::train::FittedNetwork;
+
+pub mod linear;
+pub mod mean;
+pub mod standard;
+
+/// A decoder that is judged beside every network.
+#[derive(Debug, Clone, Copy)]
+pub struct Baseline {
+    /// Name in tables and results.
+    pub name: &'static str,
+    fit: fn(&Dataset) -> Box<dyn Decoder>,
+}
+
+impl Baseline {
+    /// The decoder, fitted to `training`.
+    #[must_use]
+    pub fn fit(&self, training: &Dataset) -> Box<dyn Decoder> {
+        (self.fit)(training)
+    }
+}
+
+/// Every baseline: `run`, `table1`, `trade`, selection and the report go through this list.
+pub const BASELINES: &[Baseline] = &[
+    Baseline { name: linear::NAME, fit: |training| Box::new(linear::fit(training)) },
+    Baseline { name: mean::NAME, fit: |training| Box::new(mean::Mean::fit(training)) },
+];
+
+/// A decoder of one row-wire's readings.
+pub trait RowDecoder: Sync {
+    /// The outputs for every line of `readings`, line after line.
+    fn predict(&self, readings: &[f64]) -> Vec<f64>;
+}
+
+/// Decoders of a row-wire each, side by side.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rows<D> {
+    name: &'static str,
+    inputs: usize,
+    rows: Vec<D>,
+}
+
+impl RowDecoder for FittedNetwork {
+    fn predict(&self, readings: &[f64]) -> Vec<f64> {
+        infer(&self.network(), Exponential::default(), readings)
+    }
+}
+
+impl<D: RowDecoder + Send> Rows<D> {
+    /// One decoder for each row of `training`, by `fit`.
+    pub fn fit(name: &'static str, training: &Dataset, fit: impl Fn(&Block) -> D + Sync) -> Self {
+        let rows = (0..training.rows).into_par_iter();
+        let rows = rows.map(|row| fit(&training.block(row))).collect();
+        Self::of(name, training, rows)
+    }
+
+    /// The decoders of all rows of `training`, which were fitted already.
+    #[must_use]
+    pub fn of(name: &'static str, training: &Dataset, rows: Vec<D>) -> Self {
+        Self { name, inputs: training.inputs.names.len() / training.rows.max(1), rows }
+    }
+}
+
+impl<D: RowDecoder + Send> FrameDecoder for Rows<D> {
+    type State = ();
+
+    fn name(&self) -> &str {
+        self.name
+    }
+
+    fn inputs(&self) -> usize {
+        self.rows.len() * self.inputs
+    }
+
+    fn decode(&self, (): &mut (), readings: &[f64]) -> Estimates {
+        let frames = readings.chunks_exact(FrameDecoder::inputs(self).max(1));
+        let of_row = |(row, decoder): (usize, &D)| {
+            let places = row * self.inputs..(row + 1) * self.inputs;
+            let readings: Vec<f64> =
+                frames.clone().flat_map(|frame| &frame[places.clone()]).copied().collect();
+            decoder.predict(&readings)
+        };
+        let parts: Vec<Vec<f64>> = self.rows.par_iter().enumerate().map(of_row).collect();
+        Estimates::of_values(side_by_side(&parts, frames.len()))
+    }
+}
+
+/// Joins the outputs of all rows, of so many `frames` each, frame after frame.
+fn side_by_side(parts: &[Vec<f64>], frames: usize) -> Vec<f64> {
+    let width = parts.first().map_or(0, Vec::len) / frames.max(1);
+    let of_frame = |frame: usize| {
+        parts.iter().flat_map(move |part| &part[frame * width..(frame + 1) * width]).copied()
+    };
+    (0..frames).flat_map(of_frame).collect()
+}

@@ -1,0 +1,39 @@
+//! A decoder that always predicts the mean of the training outputs: what any other must beat.
+
+use taxel_data::dataset::Dataset;
+
+use crate::decoder::{Estimates, FrameDecoder};
+
+/// Name in tables and results.
+pub const NAME: &str = "mean";
+
+/// The mean of the training outputs, whatever the readings are.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mean {
+    inputs: usize,
+    outputs: Vec<f64>,
+}
+
+impl Mean {
+    /// The mean of each output of `training`.
+    #[must_use]
+    pub fn fit(training: &Dataset) -> Self {
+        Self { inputs: training.inputs.names.len(), outputs: training.outputs.means() }
+    }
+}
+
+impl FrameDecoder for Mean {
+    type State = ();
+
+    fn name(&self) -> &str {
+        NAME
+    }
+
+    fn inputs(&self) -> usize {
+        self.inputs
+    }
+
+    fn decode(&self, (): &mut (), readings: &[f64]) -> Estimates {
+        Estimates::of_values(self.outputs.repeat(readings.len() / self.inputs.max(1)))
+    }
+}

@@ -1,0 +1,178 @@
+//! Trained models as blobs: the bytes that a device holds.
+
+use std::path::Path;
+
+use model_core::blob::{
+    self, Columns, DecodeError, Floats, Metadata, Model, ModelParts, NoiseKind,
+};
+use model_core::rbf::Network;
+use taxel_data::columns;
+use taxel_data::dataset::Dataset;
+
+use crate::error::{Error, Result};
+use crate::infer::{Exponential, infer};
+use crate::train::{self, FittedNetwork, Trained};
+
+/// Where a model's training data came from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Origin {
+    /// Name of the scene or data set.
+    pub name: String,
+    /// Digest of the scene's or data's file.
+    pub digest: u64,
+    /// Kind of noise that was added, and its level.
+    pub noise: (NoiseKind, f64),
+    /// Seed of every draw.
+    pub seed: u64,
+    /// Sensor thickness H; `None` where it has no meaning.
+    pub thickness_mm: Option<f64>,
+    /// Full scale of each output, in its unit.
+    pub full_scale: Vec<f64>,
+}
+
+impl Origin {
+    /// The origin of measured data: full scale is each output's range.
+    #[must_use]
+    pub fn of_data(name: &str, digest: u64, seed: u64, dataset: &Dataset) -> Self {
+        let full_scale = dataset.outputs.ranges().into_iter().map(|[low, high]| high - low);
+        Self {
+            name: name.into(),
+            digest,
+            noise: (NoiseKind::None, 0.0),
+            seed,
+            thickness_mm: None,
+            full_scale: full_scale.collect(),
+        }
+    }
+}
+
+/// The blob of what was `trained` on `dataset`.
+///
+/// # Errors
+/// [`Error::NotPacked`] for a model beyond what the format holds.
+pub fn pack(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<ModelBlob> {
+    let views: Vec<Network<'_>> = trained.networks.iter().map(FittedNetwork::network).collect();
+    let projection = trained.projection.as_ref().map(|block| train::view(block, dataset));
+    let row_network: Vec<u8> = match projection {
+        Some(_) => vec![0; dataset.rows],
+        None => (0..dataset.rows).map(|row| row as u8).collect(),
+    };
+    let lines = |names: &[String]| names.join("\n");
+    let units = |names: &[String]| {
+        names.iter().map(|name| columns::unit_of(name)).collect::<Vec<_>>().join("\n")
+    };
+    let floats = |values: &[f64]| -> Vec<u8> {
+        values.iter().flat_map(|value| (*value as f32).to_le_bytes()).collect()
+    };
+    let (input_names, output_names) = (lines(&dataset.inputs.names), lines(&dataset.outputs.names));
+    let (input_units, output_units) = (units(&dataset.inputs.names), units(&dataset.outputs.names));
+    let training_rmse = floats(&match projection {
+        Some(it) => training_rmse(&views, &train::projection::apply(it, dataset)),
+        None => training_rmse(&views, dataset),
+    });
+    let full_scale = floats(&origin.full_scale);
+    let parts = ModelParts {
+        projection,
+        networks: &views,
+        row_network: &row_network,
+        metadata: Metadata {
+            name: &origin.name,
+            scene_digest: origin.digest,
+            noise_kind: if origin.noise.1 == 0.0 { NoiseKind::None } else { origin.noise.0 },
+            noise_level: origin.noise.1 as f32,
+            seed: origin.seed,
+            training_frames: u32::try_from(dataset.frames()).unwrap_or(u32::MAX),
+            thickness_mm: origin.thickness_mm.map_or(0.0, |h| h as f32),
+            input_names: Columns(&input_names),
+            input_units: Columns(&input_units),
+            output_names: Columns(&output_names),
+            output_units: Columns(&output_units),
+            training_rmse: Floats(&training_rmse),
+            full_scale: Floats(&full_scale),
+        },
+    };
+    let mut buffer = AlignedBytes::zeroed(blob::encoded_length_bound(&parts));
+    let length = blob::encode(&parts, buffer.as_mut_slice()).map_err(Error::NotPacked)?.len();
+    buffer.length = length;
+    Ok(ModelBlob { bytes: buffer })
+}
+
+fn training_rmse(networks: &[Network<'_>], dataset: &Dataset) -> Vec<f64> {
+    let mut rmse = Vec::new();
+    for (row, network) in networks.iter().enumerate() {
+        let block = dataset.block(row);
+        let predicted = infer(network, Exponential::default(), &block.inputs.values);
+        let squares = block.outputs.squared_errors(&predicted);
+        rmse.extend(squares.iter().map(|s| (s / dataset.frames() as f64).sqrt()));
+    }
+    rmse
+}
+
+/// The bytes of a model, checked from end to end.
+#[derive(Debug)]
+pub struct ModelBlob {
+    bytes: AlignedBytes,
+}
+
+impl ModelBlob {
+    /// Reads and checks the blob at `path`.
+    ///
+    /// # Errors
+    /// [`Error::Data`] for a file that cannot be read, [`Error::Blob`] for a blob that is refused.
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).map_err(|cause| taxel_data::Error::read(path, cause))?;
+        Self::of_bytes(&bytes).map_err(|cause| Error::Blob { path: path.into(), cause })
+    }
+
+    /// Checks a blob.
+    ///
+    /// # Errors
+    /// Why it is refused.
+    pub fn of_bytes(bytes: &[u8]) -> std::result::Result<Self, DecodeError> {
+        let bytes = AlignedBytes::copy_of(bytes);
+        Model::decode(bytes.as_slice()).map(drop)?;
+        Ok(Self { bytes })
+    }
+
+    /// The blob's bytes.
+    #[must_use]
+    pub fn bytes(&self) -> &[u8] {
+        self.bytes.as_slice()
+    }
+
+    /// Parses the model, which looks at every byte: [prepare](Self::prepare) it once where it is used often.
+    ///
+    /// # Panics
+    /// Never: the bytes were checked when they were read and have not changed since.
+    #[must_use]
+    pub fn parse(&self) -> Model<'_> {
+        Model::decode(self.bytes()).expect("checked when read")
+    }
+}
+
+/// Bytes that start at a multiple of four, as a blob must.
+#[derive(Debug)]
+struct AlignedBytes {
+    words: Vec<u32>,
+    length: usize,
+}
+
+impl AlignedBytes {
+    fn zeroed(length: usize) -> Self {
+        Self { words: vec![0; length.div_ceil(4)], length }
+    }
+
+    fn copy_of(bytes: &[u8]) -> Self {
+        let mut this = Self::zeroed(bytes.len());
+        this.as_mut_slice().copy_from_slice(bytes);
+        this
+    }
+
+    fn as_slice(&self) -> &[u8] {
+        &bytemuck::cast_slice(&self.words)[..self.length]
+    }
+
+    fn as_mut_slice(&mut self) -> &mut [u8] {
+        &mut bytemuck::cast_slice_mut(&mut self.words)[..self.length]
+    }
+}

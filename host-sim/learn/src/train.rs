@@ -1,0 +1,301 @@
+//! Training: K-means centres, recursive-least-squares output weights.
+//!
+//! Everything here is f64 and gives the same result on any number of threads: work is cut into
+//! pieces by the number of samples alone, and pieces are put together in their order. The result is
+//! rounded once to f32, into a [`FittedNetwork`].
+
+use model_core::projection::Projection;
+use model_core::rbf::Format;
+use model_core::scale::{CLAMP, HALF_RANGE, UNITS, clamp_units};
+use rayon::prelude::*;
+use taxel_data::BadValue;
+use taxel_data::dataset::{Block, Dataset};
+use taxel_data::progress::Progress;
+use taxel_data::random::{Purpose, Random, Stream};
+
+use crate::error::Result;
+
+pub mod kmeans;
+pub mod least_squares;
+pub mod format;
+pub mod projection;
+
+pub use format::FittedNetwork;
+
+/// Default of [`Options::initial_covariance`].
+pub const INITIAL_COVARIANCE: f64 = 1e6;
+
+/// Widths for the features of a whole array, which share the largest span of any, over those for a row's
+/// readings: at K = 64 as good, at K = 256 better (`docs/projection.md`).
+pub const WHOLE_ARRAY_SPREAD: f64 = 0.5;
+
+/// How a network is trained.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Centres, K. Fewer are used where there are fewer distinct samples.
+    pub centres: usize,
+    /// Width σ of all centres, on scaled inputs.
+    pub spread: f64,
+    /// Whether A·x is added.
+    pub affine_tail: bool,
+    /// δ of the recursive least squares: the penalty on squared weights is 1/δ.
+    pub initial_covariance: f64,
+    /// Seed of the K-means starts.
+    pub seed: u64,
+    /// How centres are sought.
+    pub search: kmeans::Search,
+    /// How numbers are represented.
+    pub format: Format,
+    /// One network for all rows, behind a projection of all readings, instead of one a row.
+    pub whole_array: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            centres: 64,
+            spread: 0.8,
+            affine_tail: true,
+            initial_covariance: INITIAL_COVARIANCE,
+            seed: 1,
+            search: kmeans::Search::default(),
+            format: Format::F32,
+            whole_array: false,
+        }
+    }
+}
+
+impl Options {
+    /// Checks the options against the number of training `frames`.
+    ///
+    /// # Errors
+    /// The first option that cannot be used.
+    pub fn check(&self, frames: usize) -> std::result::Result<(), BadValue> {
+        let refused = |rule: String| Err(BadValue::new("centres", self.centres, rule));
+        if self.centres == 0 || self.centres > 65_535 {
+            return refused("give from 1 to 65535".into());
+        }
+        if self.centres >= frames {
+            return refused(format!(
+                "there must be fewer than the {frames} training frames; lower it or add data"
+            ));
+        }
+        check_spread("spread", self.spread)
+    }
+}
+
+/// Checks a width σ on scaled inputs; `field` names it in the message.
+///
+/// # Errors
+/// A width that is not positive, or whose 1/(2σ²) does not fit an f32.
+pub fn check_spread(field: &str, spread: f64) -> std::result::Result<(), BadValue> {
+    let decay = 1.0 / (2.0 * spread * spread);
+    if spread > 0.0 && (decay as f32).is_normal() {
+        return Ok(());
+    }
+    let rule = "give a positive number, so that 1/(2σ²) fits an f32 (1e-18 to 1e18)";
+    Err(BadValue::new(field, format!("{spread:?}"), rule))
+}
+
+/// Minimum and span of every input: what scales readings to [0, 1].
+#[derive(Debug, Clone, PartialEq)]
+pub struct InputScale {
+    minimum: Vec<f64>,
+    /// 0 for an input that never changes.
+    per_span: Vec<f64>,
+}
+
+impl InputScale {
+    /// The scale of a block's inputs, rounded to what the blob holds.
+    #[must_use]
+    pub fn of(block: &Block) -> Self {
+        // Of the readings as the device has them, in f32.
+        let ranges: Vec<[f32; 2]> =
+            block.input_ranges().iter().map(|range| range.map(|v| v as f32)).collect();
+        let per_span = |[low, high]: &[f32; 2]| {
+            let per_span = 1.0 / (high - low);
+            if per_span.is_finite() { f64::from(per_span) } else { 0.0 }
+        };
+        Self {
+            minimum: ranges.iter().map(|[low, _]| f64::from(*low)).collect(),
+            per_span: ranges.iter().map(per_span).collect(),
+        }
+    }
+
+    /// Lines of `readings` scaled (and clamped as on the device).
+    #[must_use]
+    pub fn apply(&self, readings: &[f64]) -> Vec<f64> {
+        let limits = || self.minimum.iter().zip(&self.per_span);
+        let [low, high] = CLAMP.map(f64::from);
+        let scaled = |line: &[f64]| -> Vec<f64> {
+            let scale = |(value, (minimum, per_span)): (&f64, (&f64, &f64))| {
+                ((f64::from(*value as f32) - minimum) * per_span).clamp(low, high)
+            };
+            line.iter().zip(limits()).map(scale).collect()
+        };
+        readings.chunks_exact(self.minimum.len().max(1)).flat_map(scaled).collect()
+    }
+}
+
+/// Middle of every input's range, and the units in one unit of it: what the formats with expanded distances
+/// scale readings by.
+#[derive(Debug, Clone, PartialEq)]
+struct CentredScale {
+    midpoint: Vec<f32>,
+    /// [`UNITS`] in a unit of the reading; 0 for an input that never changes.
+    per_unit: Vec<f32>,
+}
+
+impl CentredScale {
+    fn of(block: &Block) -> Self {
+        let range = |range: [f64; 2]| range.map(|v| f64::from(v as f32));
+        let ranges = || block.input_ranges().into_iter().map(range);
+        let per_unit = |[low, high]: [f64; 2]| {
+            let per_unit = (f64::from(UNITS) / (f64::from(HALF_RANGE) * (high - low))) as f32;
+            if per_unit.is_finite() { per_unit } else { 0.0 }
+        };
+        Self {
+            midpoint: ranges().map(|[low, high]| (0.5 * (low + high)) as f32).collect(),
+            per_unit: ranges().map(per_unit).collect(),
+        }
+    }
+
+    fn never_changes(&self) -> impl Iterator<Item = bool> {
+        self.per_unit.iter().map(|per_unit| *per_unit == 0.0)
+    }
+
+    /// All inputs of `block` as the device scales them, before its clamp, line after line.
+    fn units<'a>(&'a self, block: &'a Block) -> impl Iterator<Item = f32> + 'a {
+        block.inputs.lines().flat_map(|line| {
+            let limits = self.midpoint.iter().zip(&self.per_unit);
+            line.iter().zip(limits).map(|(r, (middle, per_unit))| (*r as f32 - middle) * per_unit)
+        })
+    }
+
+    /// All inputs of `block` scaled to [0, 1] and clamped, line after line.
+    fn apply(&self, block: &Block) -> Vec<f64> {
+        let spans = f64::from(HALF_RANGE) / f64::from(UNITS);
+        self.units(block).map(|x| 0.5 + f64::from(clamp_units(x)) * spans).collect()
+    }
+}
+
+/// Samples of one network, with their inputs scaled.
+#[derive(Debug, Clone)]
+pub struct Samples<'b> {
+    pub(crate) scale: InputScale,
+    /// Scaled inputs, sample after sample.
+    pub(crate) scaled: Vec<f64>,
+    pub(crate) block: &'b Block,
+}
+
+impl<'b> Samples<'b> {
+    /// Scales the inputs of `block` to [0, 1].
+    #[must_use]
+    pub fn new(block: &'b Block) -> Self {
+        let scale = InputScale::of(block);
+        Self { scaled: scale.apply(&block.inputs.values), scale, block }
+    }
+
+    pub(crate) fn inputs(&self) -> usize {
+        self.block.inputs.names.len()
+    }
+
+    /// K-means centres of these samples, rounded to what the blob holds.
+    #[must_use]
+    pub fn centres(&self, options: &Options, part: usize) -> Vec<f64> {
+        let mut random =
+            Random::new(options.seed, Stream::Training, Purpose::Centres, 0, part as u64);
+        let found =
+            kmeans::fit(&self.scaled, self.inputs(), options.centres, &options.search, &mut random);
+        found.centres.into_iter().map(|c| f64::from(c as f32)).collect()
+    }
+
+    /// Output weights for given `centres`, by least squares over the samples, for the format that
+    /// `options` ask for.
+    ///
+    /// # Errors
+    /// A fit that the format does not hold.
+    pub fn fit(&self, centres: &[f64], options: &Options) -> Result<FittedNetwork> {
+        format::fit(self, centres, options)
+    }
+}
+
+/// What training makes of a data set.
+#[derive(Debug, Clone)]
+pub struct Trained {
+    /// What stands between all readings and the one network of all rows; see [`projection`].
+    pub projection: Option<Vec<f32>>,
+    /// One network a row-wire, or one for all behind the projection.
+    pub networks: Vec<FittedNetwork>,
+}
+
+/// Trains one network a row-wire of `dataset`, or one for all of them, all of one format: direct distances if
+/// [`Format::F32`] is asked for and one row's bound does not prove expanded ones harmless.
+///
+/// # Errors
+/// Options that do not fit the data, and data that does not fit the format.
+pub fn train(dataset: &Dataset, options: &Options, progress: &dyn Progress) -> Result<Trained> {
+    options.check(dataset.frames())?;
+    if !options.whole_array {
+        return Ok(Trained { projection: None, networks: train_rows(dataset, options, progress)? });
+    }
+    let block = projection::fit(dataset)?;
+    let seen = projection::apply(view(&block, dataset), dataset);
+    Ok(Trained { networks: train_rows(&seen, options, progress)?, projection: Some(block) })
+}
+
+/// The projection of `dataset`'s readings that `block` holds.
+///
+/// # Panics
+/// If it is not as long as [`projection::fit`] makes it for this data set.
+#[must_use]
+pub fn view<'b>(block: &'b [f32], dataset: &Dataset) -> Projection<'b> {
+    let readings = dataset.inputs.names.len();
+    Projection::new(readings, readings / dataset.rows, block)
+        .expect("a projection of these readings")
+}
+
+fn train_rows(
+    dataset: &Dataset,
+    options: &Options,
+    progress: &dyn Progress,
+) -> Result<Vec<FittedNetwork>> {
+    progress.stage("train", dataset.rows);
+    let fit_rows = |options: &Options| -> Result<Vec<FittedNetwork>> {
+        let rows = (0..dataset.rows).into_par_iter();
+        rows.map(|row| {
+            let block = dataset.block(row);
+            let samples = Samples::new(&block);
+            let centres = samples.centres(options, row);
+            let fitted = samples.fit(&centres, options);
+            progress.step();
+            fitted
+        })
+        .collect()
+    };
+    let fitted = fit_rows(options)?;
+    let formats = || fitted.iter().map(FittedNetwork::format);
+    if formats().all(|format| Some(format) == formats().next()) {
+        return Ok(fitted);
+    }
+    progress.stage("train with direct distances", dataset.rows);
+    fit_rows(&Options { format: Format::F32Direct, ..*options })
+}
+
+/// ‖a − b‖².
+#[inline(always)]
+#[expect(clippy::inline_always, reason = "`simd::widest` runs it")]
+pub(crate) fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
+    let ((a4, a_rest), (b4, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
+    let mut sum = [0.0; 4];
+    for (a, b) in a4.iter().zip(b4) {
+        for ((s, a), b) in sum.iter_mut().zip(a).zip(b) {
+            *s += (a - b) * (a - b);
+        }
+    }
+    let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| (a - b) * (a - b)).sum();
+    (sum[0] + sum[1]) + (sum[2] + sum[3]) + rest
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,127 @@
+//! Fitting output weights to what a device will compute, one file a format.
+//!
+//! Centres, widths and scaling are rounded to the format first, and the weights are fitted to the activations
+//! that remain: what rounding did to these is then no error any more. Only the weights are rounded last.
+
+use model_core::rbf::{Format, Network, NetworkError, Shape, direct, expanded, fixed16};
+
+use taxel_data::table::Table;
+
+use super::{Options, Samples};
+use crate::error::{Error, Result};
+
+mod direct_f32;
+mod expanded_f32;
+mod fixed_point;
+
+pub use expanded_f32::rounding_bounds;
+
+/// Parameters of one trained network as the blob will hold them, owned.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FittedNetwork {
+    shape: Shape,
+    format: Format,
+    affine: bool,
+    block: Vec<u32>,
+}
+
+impl FittedNetwork {
+    /// The network of `block`.
+    ///
+    /// # Errors
+    /// [`Error::NotHeld`] if a parameter does not fit the format.
+    fn try_new(shape: Shape, format: Format, affine: bool, block: Vec<u32>) -> Result<Self> {
+        let fitted = Self { shape, format, affine, block };
+        match fitted.try_network() {
+            Ok(_) => Ok(fitted),
+            Err(cause) => Err(Error::NotHeld { format, cause }),
+        }
+    }
+
+    fn try_network(&self) -> std::result::Result<Network<'_>, NetworkError> {
+        let Self { shape, format, affine, block } = self;
+        Ok(match format {
+            Format::F32Direct => direct::Network::of_words(*shape, true, *affine, block)?.into(),
+            Format::F32 => expanded::Network::try_new(*shape, *affine, block)?.into(),
+            Format::Fixed16 => fixed16::Network::try_new(*shape, *affine, block)?.into(),
+        })
+    }
+
+    /// The format that it was fitted for.
+    #[must_use]
+    pub fn format(&self) -> Format {
+        self.format
+    }
+
+    /// The network, ready to infer.
+    ///
+    /// # Panics
+    /// Never: the parameters were checked when they were fitted.
+    #[must_use]
+    pub fn network(&self) -> Network<'_> {
+        self.try_network().expect("checked when fitted")
+    }
+}
+
+/// What weights are fitted to: the outputs' deviations from their means. The means go into the bias: an
+/// offset would otherwise be spread over large weights that cancel, and cost digits.
+struct Targets {
+    deviations: Table,
+    means: Vec<f64>,
+}
+
+impl Targets {
+    fn of(outputs: &Table) -> Self {
+        let means = outputs.means();
+        let mut deviations = outputs.clone();
+        for line in deviations.values.chunks_exact_mut(means.len()) {
+            line.iter_mut().zip(&means).for_each(|(value, mean)| *value -= mean);
+        }
+        Self { deviations, means }
+    }
+
+    fn outputs(&self) -> usize {
+        self.means.len()
+    }
+}
+
+/// Weights of a fit by what they multiply.
+struct Weights {
+    /// `centres × outputs`.
+    centres: Vec<f64>,
+    /// `inputs × outputs`, or none.
+    affine: Vec<f64>,
+    /// The means included.
+    bias: Vec<f64>,
+}
+
+impl Weights {
+    /// Of `regressors × outputs` weights: of `centres`, of the inputs if there is a tail, and of 1.
+    fn split(mut weights: Vec<f64>, centres: usize, targets: &Targets) -> Self {
+        let outputs = targets.outputs();
+        let mut bias = weights.split_off(weights.len() - outputs);
+        bias.iter_mut().zip(&targets.means).for_each(|(bias, mean)| *bias += mean);
+        let affine = weights.split_off(centres * outputs);
+        Self { centres: weights, affine, bias }
+    }
+}
+
+/// Fits `samples` with the given `centres` (on inputs scaled to [0, 1]).
+///
+/// # Errors
+/// A fit that the format does not hold.
+pub(super) fn fit(
+    samples: &Samples<'_>,
+    centres: &[f64],
+    options: &Options,
+) -> Result<FittedNetwork> {
+    let targets = Targets::of(&samples.block.outputs);
+    match options.format {
+        Format::F32Direct => direct_f32::fit(samples, centres, options, &targets),
+        Format::F32 => match expanded_f32::fit(samples, centres, options, &targets) {
+            Some(fitted) => Ok(fitted),
+            None => direct_f32::fit(samples, centres, options, &targets),
+        },
+        Format::Fixed16 => fixed_point::fit(samples, centres, options, &targets),
+    }
+}

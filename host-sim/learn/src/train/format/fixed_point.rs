@@ -1,0 +1,340 @@
+//! 16-bit fixed point.
+//!
+//! Weights are rounded in back substitution: each is rounded as soon as it is solved for, and those solved
+//! after it make up for what that did (Babai's nearest plane, Combinatorica 6, 1986). Regressors that are
+//! nearly alike, as Gaussians of neighbouring centres are, make up for nearly all of it.
+
+use core::f64::consts::{LN_2, LOG2_E};
+use std::ops::Range;
+
+use model_core::rbf::fixed16::{
+    CENTRES_AT_ONCE, DECAY_FRACTION_BITS, EXPONENT_FRACTION_BITS, EXPONENT_MARGIN,
+    HIGHEST_ACTIVATION, MOST_INPUTS, Network, Parameters,
+};
+use model_core::rbf::{Format, NetworkError, Shape};
+use model_core::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP, clamp_steps};
+use taxel_data::BadValue;
+
+use super::super::least_squares::{Design, Factor};
+use super::super::{CentredScale, Options, Samples, squared_distance};
+use super::{FittedNetwork, Targets};
+use crate::error::{Error, Result};
+
+/// A step of inputs, in spans of the training range.
+const STEP: f64 = HALF_RANGE as f64 / UNITS as f64 * UNITS_PER_STEP as f64;
+/// 1 as an activation, and as an input in half ranges.
+const ONE: f64 = 32_768.0;
+/// How far an activation may lie from the Gaussian that its exponent stands for: the cubic, and truncation
+/// of the exponent, of the cubic's steps and of the shift.
+const ACTIVATION_ERROR: f64 = 2.0e-4;
+/// Largest magnitude of a 16-bit weight.
+const MOST: f64 = 32_767.0;
+/// Largest sum: a little below 2³¹.
+const MOST_SUM: f64 = 2_147_000_000.0;
+
+/// Centres and width, rounded.
+struct Exponents {
+    shape: Shape,
+    scale: CentredScale,
+    decay: u32,
+    /// Lines of b and pairs of a, K' of them.
+    lines: Vec<u32>,
+    /// What the lines stand for, in steps.
+    centres: Vec<f64>,
+}
+
+impl Exponents {
+    fn new(
+        samples: &Samples<'_>,
+        centres: &[f64],
+        options: &Options,
+        outputs: usize,
+    ) -> Result<Self> {
+        let inputs = samples.inputs();
+        let refused = |why: String| {
+            let rule = format!("{why}; give a larger spread, or another format (f32)");
+            Error::from(BadValue::new("spread", options.spread, rule))
+        };
+        if inputs > MOST_INPUTS {
+            let format = Format::Fixed16;
+            return Err(Error::TooManyInputs { format, inputs, most: MOST_INPUTS });
+        }
+        let exponent_per_step = LOG2_E / (2.0 * options.spread.powi(2)) * STEP * STEP;
+        let bits = EXPONENT_FRACTION_BITS + DECAY_FRACTION_BITS;
+        let decay = (exponent_per_step * 2_f64.powi(bits.cast_signed())).round();
+        if !(1.0..=f64::from(u32::MAX)).contains(&decay) {
+            return Err(refused(
+                "the format fixed16 does not hold so narrow or wide a Gaussian".into(),
+            ));
+        }
+        let scale = CentredScale::of(samples.block);
+        let per_step = decay / 2_f64.powi(DECAY_FRACTION_BITS.cast_signed());
+        let count = centres.len() / inputs;
+        let pairs = inputs.div_ceil(2);
+        let mut lines = Vec::new();
+        let mut rounded = Vec::with_capacity(centres.len());
+        for centre in centres.chunks_exact(inputs) {
+            let mut a = vec![0_i32; 2 * pairs];
+            let of_input = a.iter_mut().zip(centre).zip(scale.never_changes());
+            for ((a, c), still) in of_input {
+                let c = if still { 0.0 } else { (c - 0.5) / STEP };
+                *a = (-2.0 * per_step * c).round() as i32;
+                if i16::try_from(*a).is_err() {
+                    return Err(refused("a centre does not fit the 16 bits of fixed16".into()));
+                }
+                rounded.push(-f64::from(*a) / (2.0 * per_step));
+            }
+            let square: u64 = a.iter().map(|a| u64::from(a.unsigned_abs()).pow(2)).sum();
+            let b = (u128::from(square) << 32).div_ceil(decay as u128) as u64;
+            let b = u32::try_from(b + u64::from(EXPONENT_MARGIN) + 1);
+            let too_far = |_| refused("exponents of fixed16 end at 64".into());
+            lines.push(b.map_err(too_far)?);
+            lines.extend(a.as_chunks::<2>().0.iter().map(|[low, high]| pair(*low, *high)));
+        }
+        let mut fill = vec![0; 1 + pairs];
+        fill[0] = EXPONENT_MARGIN + 1;
+        for _ in count..count.next_multiple_of(CENTRES_AT_ONCE) {
+            lines.extend_from_slice(&fill);
+        }
+        let shape = Shape { inputs, centres: count, outputs };
+        let this = Self { shape, scale, decay: decay as u32, lines, centres: rounded };
+        // Whether exponents can leave their range is the format's to say.
+        match Network::try_new(shape, false, &this.block(None)) {
+            Err(NetworkError::ExponentOutOfRange { .. }) => Err(refused(
+                "a reading could drive an exponent beyond 64, where fixed16 ends".into(),
+            )),
+            _ => Ok(this),
+        }
+    }
+
+    /// The block with these weights, or with none.
+    fn block(&self, weights: Option<&Rounded>) -> Vec<u32> {
+        let Shape { inputs, outputs, .. } = self.shape;
+        let blank = Rounded::blank(self.shape);
+        let weights = weights.unwrap_or(&blank);
+        let line = 1 + inputs.div_ceil(2);
+        let mut centres = Vec::new();
+        for (block, lines) in self.lines.chunks_exact(CENTRES_AT_ONCE * line).enumerate() {
+            centres.extend_from_slice(lines);
+            for output in 0..outputs {
+                let weight = |k: usize| weights.of_centre(block * CENTRES_AT_ONCE + k, output);
+                let words =
+                    (0..CENTRES_AT_ONCE / 2).map(|p| pair(weight(2 * p), weight(2 * p + 1)));
+                centres.extend(words);
+            }
+        }
+        let parameters = Parameters {
+            input_midpoint: &self.scale.midpoint,
+            input_per_unit: &self.scale.per_unit,
+            decay: self.decay,
+            bias: &weights.bias,
+            output_scale: &weights.scale,
+            affine: &weights.affine_pairs(inputs),
+            centres: &centres,
+        };
+        parameters.words().collect()
+    }
+
+    /// ‖f‖ of every output's sum of Gaussians, in the space that they reproduce: no reading makes the sum
+    /// larger, since |f(x)| = |⟨f, k(x, ·)⟩| ≤ ‖f‖·k(x, x)^½, and k(x, x) = 1.
+    fn norms(&self, weights: &[f64]) -> Vec<f64> {
+        let Shape { inputs, outputs, .. } = self.shape;
+        let bits = EXPONENT_FRACTION_BITS + DECAY_FRACTION_BITS;
+        let decay = f64::from(self.decay) / 2_f64.powi(bits.cast_signed()) * LN_2;
+        let mut squares = vec![0.0; outputs];
+        let lines = || self.centres.chunks_exact(inputs).zip(weights.chunks_exact(outputs));
+        for (c, w) in lines() {
+            for (d, v) in lines() {
+                let kernel = (-decay * squared_distance(c, d)).exp();
+                let terms = w.iter().zip(v).map(|(w, v)| w * v * kernel);
+                squares.iter_mut().zip(terms).for_each(|(square, term)| *square += term);
+            }
+        }
+        squares.into_iter().map(|square| square.max(0.0).sqrt()).collect()
+    }
+}
+
+fn pair(low: i32, high: i32) -> u32 {
+    (low.cast_unsigned() & 0xFFFF) | high.cast_unsigned() << 16
+}
+
+/// Activations as the device computes them, inputs in half ranges, and 1.
+struct FixedDesign<'s> {
+    network: Network<'s>,
+    steps: Vec<i32>,
+    affine: bool,
+}
+
+impl Design for FixedDesign<'_> {
+    fn regressors(&self) -> usize {
+        let shape = self.network.shape();
+        shape.centres + if self.affine { shape.inputs } else { 0 } + 1
+    }
+
+    fn fill(&self, samples: Range<usize>, values: &mut [f64]) {
+        let Shape { inputs, centres, .. } = self.network.shape();
+        let steps = self.steps[samples.start * inputs..samples.end * inputs].chunks_exact(inputs);
+        for (steps, row) in steps.zip(values.chunks_exact_mut(self.regressors())) {
+            let (activations, rest) = row.split_at_mut(centres);
+            let places = activations.chunks_mut(CENTRES_AT_ONCE);
+            for (places, found) in places.zip(self.network.activations(steps)) {
+                places.iter_mut().zip(found).for_each(|(place, q)| *place = f64::from(q) / ONE);
+            }
+            let (one, tail) = rest.split_last_mut().expect("at least the bias");
+            tail.iter_mut().zip(steps).for_each(|(place, x)| *place = f64::from(*x) / ONE);
+            *one = 1.0;
+        }
+    }
+}
+
+/// Weights in integers.
+struct Rounded {
+    outputs: usize,
+    centres: Vec<i32>,
+    affine: Vec<i32>,
+    bias: Vec<i32>,
+    scale: Vec<f32>,
+}
+
+impl Rounded {
+    fn blank(shape: Shape) -> Self {
+        let Shape { outputs, .. } = shape;
+        Self {
+            outputs,
+            centres: vec![],
+            affine: vec![],
+            bias: vec![0; outputs],
+            scale: vec![0.0; outputs],
+        }
+    }
+
+    /// 0 for fill.
+    fn of_centre(&self, centre: usize, output: usize) -> i32 {
+        self.centres.get(centre * self.outputs + output).copied().unwrap_or(0)
+    }
+
+    fn affine_pairs(&self, inputs: usize) -> Vec<u32> {
+        if self.affine.is_empty() {
+            return Vec::new();
+        }
+        let at = |input: usize, output: usize| {
+            if input < inputs { self.affine[input * self.outputs + output] } else { 0 }
+        };
+        let of_output = |output| {
+            (0..inputs.div_ceil(2)).map(move |p| pair(at(2 * p, output), at(2 * p + 1, output)))
+        };
+        (0..self.outputs).flat_map(of_output).collect()
+    }
+}
+
+pub(super) fn fit(
+    samples: &Samples<'_>,
+    centres: &[f64],
+    options: &Options,
+    targets: &Targets,
+) -> Result<FittedNetwork> {
+    let outputs = targets.outputs();
+    let exponents = Exponents::new(samples, centres, options, outputs)?;
+    let shape = exponents.shape;
+    let without_weights = exponents.block(None);
+    let refused = |cause| Error::NotHeld { format: Format::Fixed16, cause };
+    let design = FixedDesign {
+        network: Network::try_new(shape, false, &without_weights).map_err(refused)?,
+        steps: exponents.scale.units(samples.block).map(clamp_steps).collect(),
+        affine: options.affine_tail,
+    };
+    let factor =
+        Factor::new(&design, &targets.deviations.values, outputs, options.initial_covariance);
+    let rounded = round(&factor, &exponents, targets, options.affine_tail)?;
+    let block = exponents.block(Some(&rounded));
+    FittedNetwork::try_new(shape, Format::Fixed16, options.affine_tail, block)
+}
+
+/// Rounds the solution of `factor`, with the finest scale for each output that its weights and its sums
+/// fit.
+fn round(
+    factor: &Factor,
+    exponents: &Exponents,
+    targets: &Targets,
+    affine: bool,
+) -> Result<Rounded> {
+    let Shape { inputs, centres, outputs } = exponents.shape;
+    let tail = if affine { inputs } else { 0 };
+    let mut exact = factor.weights();
+    let mut scale = scales(exponents, &exact, targets, tail);
+    // What rounding moves from one weight to others may need a coarser scale; each try is an eighth coarser.
+    for _ in 0..40 {
+        let weights = rounded_solution(factor, &scale, targets);
+        let needed = scales(exponents, &weights, targets, tail);
+        if needed.iter().zip(&scale).all(|(needed, scale)| needed <= scale) {
+            exact = weights;
+            let integer =
+                |grid: f64| move |(w, scale): (&f64, &f64)| (w / (grid * scale)).round() as i32;
+            let rows = |from: usize, to: usize, grid: f64| -> Vec<i32> {
+                let rows = exact[from * outputs..to * outputs].chunks_exact(outputs);
+                rows.flat_map(|row| row.iter().zip(&scale).map(integer(grid))).collect()
+            };
+            let bias = exact[(centres + tail) * outputs..].iter().zip(&targets.means).zip(&scale);
+            return Ok(Rounded {
+                outputs,
+                centres: rows(0, centres, ONE),
+                affine: rows(centres, centres + tail, ONE),
+                bias: bias.map(|((b, mean), scale)| ((b + mean) / scale).round() as i32).collect(),
+                scale: scale.iter().map(|scale| *scale as f32).collect(),
+            });
+        }
+        for (scale, needed) in scale.iter_mut().zip(needed) {
+            if needed > *scale {
+                *scale = power_of_two_eighths(needed.max(*scale * 1.125));
+            }
+        }
+    }
+    Err(Error::WeightsGrow { format: Format::Fixed16 })
+}
+
+/// Solves for the weights from the last to the first, rounding each at once: `regressors × outputs`. The
+/// bias, which comes first, is not rounded: its grid is far finer than all others.
+fn rounded_solution(factor: &Factor, scale: &[f64], targets: &Targets) -> Vec<f64> {
+    let (n, outputs) = (factor.regressors, targets.outputs());
+    let mut weights = vec![0.0; n * outputs];
+    for i in (0..n).rev() {
+        let root = &factor.root[i * n..(i + 1) * n];
+        for output in 0..outputs {
+            let known: f64 = (i + 1..n).map(|j| root[j] * weights[j * outputs + output]).sum();
+            let exact = (factor.projection[i * outputs + output] - known) / root[i];
+            let grid = ONE * scale[output];
+            weights[i * outputs + output] =
+                if i + 1 == n { exact } else { (exact / grid).round() * grid };
+        }
+    }
+    weights
+}
+
+/// The finest scale of each output that its weights and, for every reading, its sum fit.
+fn scales(exponents: &Exponents, weights: &[f64], targets: &Targets, tail: usize) -> Vec<f64> {
+    let Shape { centres, outputs, .. } = exponents.shape;
+    let norms = exponents.norms(&weights[..centres * outputs]);
+    let column = |output: usize, from: usize, to: usize| {
+        (from..to).map(move |i| weights[i * outputs + output].abs())
+    };
+    (0..outputs)
+        .map(|output| {
+            let largest = column(output, 0, centres + tail).fold(0.0, f64::max);
+            let of_centres: f64 = column(output, 0, centres).sum();
+            let of_tail: f64 = column(output, centres, centres + tail).sum();
+            let bias = weights[(centres + tail) * outputs + output] + targets.means[output];
+            let sum = norms[output] * f64::from(HIGHEST_ACTIVATION) / ONE
+                + of_centres * ACTIVATION_ERROR
+                + of_tail
+                + bias.abs();
+            let needed = (largest / (MOST * ONE)).max(sum / MOST_SUM);
+            power_of_two_eighths(needed.max(f64::from(f32::MIN_POSITIVE)))
+        })
+        .collect()
+}
+
+/// The next number of few digits, so that scales are exact in f32.
+fn power_of_two_eighths(value: f64) -> f64 {
+    let unit = value.log2().floor().exp2() / 8.0;
+    (value / unit).ceil() * unit
+}

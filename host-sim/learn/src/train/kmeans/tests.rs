@@ -1,0 +1,183 @@
+use proptest::prelude::*;
+
+use super::*;
+use taxel_data::random::{Purpose, Stream};
+
+fn random(seed: u64) -> Random {
+    Random::new(seed, Stream::Training, Purpose::Centres, 0, 0)
+}
+
+fn sorted(mut values: Vec<f64>) -> Vec<f64> {
+    values.sort_by(f64::total_cmp);
+    values
+}
+
+#[test]
+fn separate_clusters_are_found_whatever_the_seed() {
+    let points: Vec<f64> =
+        (0..300).map(|i| f64::from(i % 3) * 10.0 + f64::from(i / 3 % 10) * 0.01).collect();
+    for seed in 0..20 {
+        let found = fit(&points, 1, 3, &Search::default(), &mut random(seed));
+        for (centre, expected) in sorted(found.centres).iter().zip([0.045, 10.045, 20.045]) {
+            assert!((centre - expected).abs() < 1e-9, "seed {seed}: {centre}");
+        }
+    }
+}
+
+#[test]
+fn duplicates_end_with_one_centre_a_distinct_point() {
+    let points = [1.0, 2.0, 1.0, 2.0, 1.0, 2.0, 5.0, 2.0];
+    let found = fit(&points, 1, 6, &Search::default(), &mut random(1));
+    assert_eq!(sorted(found.centres), [1.0, 2.0, 5.0]);
+    assert_eq!(found.inertia, 0.0);
+    let found = fit(&[7.0; 50], 1, 4, &Search::default(), &mut random(1));
+    assert_eq!(found.centres, [7.0]);
+}
+
+#[test]
+fn as_many_centres_as_points_reach_them_all() {
+    let points = [0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 1.0];
+    let found = fit(&points, 2, 4, &Search::default(), &mut random(3));
+    assert_eq!((found.centres.len(), found.inertia), (8, 0.0));
+}
+
+#[test]
+fn an_empty_cluster_takes_the_farthest_point() {
+    // The third centre is nobody's nearest.
+    let points = [0.0, 1.0, 10.0, 11.0, 30.0];
+    let found = refine(&points, 1, &[0.5, 10.5, 1e6], &Search::default());
+    assert_eq!(sorted(found.centres), [0.5, 10.5, 30.0]);
+}
+
+#[test]
+fn restarts_never_end_worse() {
+    let mut source = random(9);
+    let points: Vec<f64> = (0..4000).map(|_| source.unit()).collect();
+    let with = |restarts| {
+        let search = Search { restarts, ..Search::default() };
+        fit(&points, 4, 25, &search, &mut random(4)).inertia
+    };
+    assert!(with(8) <= with(1));
+}
+
+/// What an assignment is defined as: the least squared distance in f64, of the first centre that has it.
+fn nearest_of_all(points: &[f64], dimensions: usize, centres: &[f64]) -> Vec<Nearest> {
+    let nearest = |point: &[f64]| {
+        let all = centres.chunks_exact(dimensions).enumerate().map(|(k, centre)| Nearest {
+            centre: k as u32,
+            squared_distance: crate::train::squared_distance(point, centre),
+        });
+        all.reduce(|best, one| if one.is_nearer(&best) { one } else { best }).unwrap()
+    };
+    points.chunks_exact(dimensions).map(nearest).collect()
+}
+
+fn all_nearest(assignment: &Assignment<'_>) -> Vec<Nearest> {
+    assignment.pieces.iter().flat_map(|piece| piece.nearest.clone()).collect()
+}
+
+/// Holds every step of `iterations` against looking at every centre.
+fn check_steps(points: &[f64], dimensions: usize, centres: &[f64], iterations: usize) {
+    let points = Points::new(points, dimensions);
+    let mut pruned = Assignment::from_scratch(&points, centres.to_vec());
+    for _ in 0..iterations {
+        let exact = nearest_of_all(points.values, dimensions, &pruned.centres);
+        assert!(all_nearest(&pruned) == exact, "not the nearest of all centres");
+        let moved = means(&pruned);
+        let mut unpruned = pruned.clone();
+        unpruned.forget();
+        unpruned.move_to(moved.clone());
+        pruned.move_to(moved);
+        for (pruned, unpruned) in pruned.pieces.iter().zip(&unpruned.pieces) {
+            assert!(pruned.nearest == unpruned.nearest, "pruning changes the assignment");
+            assert_eq!((&pruned.sums, pruned.inertia), (&unpruned.sums, unpruned.inertia));
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..Default::default() })]
+
+    /// Points on a coarse grid: duplicates, ties, centres that nobody has.
+    #[test]
+    fn pruning_changes_nothing_however_points_coincide(
+        dimensions in 1_usize..6,
+        grid in prop::collection::vec(-3_i8..4, 6..900),
+        centres in 1_usize..90,
+    ) {
+        let whole = grid.len() / dimensions * dimensions;
+        let points: Vec<f64> = grid[..whole].iter().map(|x| f64::from(*x) / 3.0).collect();
+        let start: Vec<f64> =
+            points.iter().cycle().take(centres * dimensions).map(|x| x * 1.5).collect();
+        check_steps(&points, dimensions, &start, 4);
+    }
+
+    #[test]
+    fn pruning_changes_nothing_whatever_the_scale(
+        dimensions in 1_usize..20,
+        unit in prop::collection::vec(0.0_f64..1.0, 60..2000),
+        centres in 1_usize..40,
+        scale in prop::sample::select(vec![1.0, 1e-6, 1e-101, 1e-130, 1e-170, 1e30, 1e120]),
+        offset in prop::sample::select(vec![0.0, 1.0, -1e5, 1e9]),
+    ) {
+        let whole = unit.len() / dimensions * dimensions;
+        let points: Vec<f64> = unit[..whole].iter().map(|x| (x + offset) * scale).collect();
+        let start: Vec<f64> = points.iter().take(centres * dimensions).copied().collect();
+        check_steps(&points, dimensions, &start, 4);
+    }
+
+    #[test]
+    fn a_start_knows_every_points_nearest(
+        dimensions in 1_usize..8,
+        grid in prop::collection::vec(-20_i8..20, 8..700),
+        centres in 1_usize..60,
+        seed in 0_u64..1000,
+    ) {
+        let whole = grid.len() / dimensions * dimensions;
+        let points: Vec<f64> = grid[..whole].iter().map(|x| f64::from(*x) * 0.7).collect();
+        let points = Points::new(&points, dimensions);
+        let (picked, nearest) = start::plus_plus(&points, centres, &mut random(seed));
+        prop_assert!(nearest == nearest_of_all(points.values, dimensions, &picked));
+    }
+}
+
+/// Smooth, noisy, and in more pieces and groups than one.
+fn cloud(count: usize, dimensions: usize) -> Vec<f64> {
+    let mut source = random(17);
+    let mut points = Vec::with_capacity(count * dimensions);
+    for _ in 0..count {
+        let (a, b) = (source.unit(), source.unit());
+        points.extend((0..dimensions).map(|i| (a * i as f64).sin() + b + 0.05 * source.normal()));
+    }
+    points
+}
+
+#[test]
+fn a_start_far_from_all_points_is_no_obstacle() {
+    let points = cloud(600, 3);
+    for far in [3.0, 1e3, 1e9, 1e25, 1e140] {
+        let mut start = points[..20 * 3].to_vec();
+        (start[3], start[10], start[31]) = (far, -far, far);
+        check_steps(&points, 3, &start, 6);
+    }
+}
+
+#[test]
+fn pruning_changes_nothing_where_groups_are_several_vectors() {
+    let points = cloud(3000, 7);
+    check_steps(&points, 7, &points[..700 * 7], 5);
+}
+
+#[test]
+fn the_result_is_the_same_on_any_number_of_threads() {
+    let points = cloud(5000, 18);
+    let search = Search { most_points: 5000, ..Search::default() };
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| fit(&points, 18, 60, &search, &mut random(2)))
+    };
+    let one = on(1);
+    assert_eq!(one, on(2));
+    assert_eq!(one, on(5));
+    assert!(one.iterations > 5);
+}

@@ -1,0 +1,142 @@
+//! Output weights: least squares over all samples, by a blocked QR decomposition.
+//!
+//! The weights minimise Σ_t ‖y_t − Wᵀh_t‖² + ‖W‖²/δ: what recursive least squares
+//! ([`model_core::rls`]) arrives at sample by sample from covariance δ·I without forgetting, and
+//! what the device goes on from. Taking samples in blocks changes the order of rounding only.
+
+use std::ops::Range;
+
+use model_core::rls;
+use rayon::prelude::*;
+
+use taxel_data::table::Table;
+
+mod exp;
+mod gaussian;
+mod triangle;
+
+pub use gaussian::{Gaussians, Regressors};
+use triangle::{BLOCK, Block, Triangle};
+
+/// Regressors of a set of samples: the rows of the matrix that weights are fitted through.
+pub trait Design: Sync {
+    /// Regressors of each sample, n.
+    fn regressors(&self) -> usize;
+
+    /// Writes the regressors of `samples` into `values` (`samples × n`, row-major). Called once for
+    /// every sample, on any thread, a few samples at a time; the squares of the values, and sums of
+    /// these over all samples, must fit an f64.
+    fn fill(&self, samples: Range<usize>, values: &mut [f64]);
+}
+
+/// The triangular factor of a fit: R·W = z has the weights as its solution, and RᵀR is the
+/// information matrix Σ h hᵀ + I/δ.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Factor {
+    /// R, `regressors × regressors`, row-major, upper triangular, its diagonal not negative.
+    pub root: Vec<f64>,
+    /// z, `regressors × outputs`.
+    pub projection: Vec<f64>,
+    /// Regressors, n.
+    pub regressors: usize,
+    /// Outputs.
+    pub outputs: usize,
+}
+
+impl Factor {
+    /// Decomposes the samples of `design` with their `targets` (`samples × outputs`), with a
+    /// penalty of 1/`initial_covariance` on squared weights.
+    ///
+    /// Work: 2n² + 4n·outputs operations a sample. The result is the same on any number of threads:
+    /// pieces, and the order in which they are put together, depend on the shapes alone.
+    ///
+    /// # Panics
+    /// If `initial_covariance` is not positive and finite, or `outputs` is 0.
+    #[must_use]
+    pub fn new(
+        design: &impl Design,
+        targets: &[f64],
+        outputs: usize,
+        initial_covariance: f64,
+    ) -> Self {
+        assert!(
+            initial_covariance > 0.0 && initial_covariance.is_finite(),
+            "the initial covariance must be positive and finite"
+        );
+        let n = design.regressors();
+        let samples = targets.len() / outputs;
+        let piece = piece(samples, n);
+        let starts: Vec<usize> = (0..samples).step_by(piece).collect();
+        let parts: Vec<Triangle> = starts
+            .into_par_iter()
+            .map(|start| decompose(design, targets, outputs, start..samples.min(start + piece)))
+            .collect();
+        let mut whole = Triangle::new(n, outputs);
+        whole.set_diagonal(1.0 / initial_covariance.sqrt());
+        parts.iter().for_each(|part| whole.merge(part));
+        let (root, projection) = whole.into_root_and_projection();
+        Self { root, projection, regressors: n, outputs }
+    }
+
+    /// The weights, `regressors × outputs`.
+    #[must_use]
+    pub fn weights(&self) -> Vec<f64> {
+        let mut weights = vec![0.0; self.regressors * self.outputs];
+        rls::solve(&self.root, &self.projection, self.regressors, &mut weights);
+        weights
+    }
+}
+
+/// Samples that are decomposed one after the other, before what comes of them is merged.
+fn piece(samples: usize, regressors: usize) -> usize {
+    // Merging costs as much as taking in half as many samples as there are regressors.
+    samples.div_ceil(8).max(1024).max(4 * regressors)
+}
+
+/// Samples whose regressors are computed at once: they stay in the first cache until they are laid
+/// out in tiles.
+const FILLED: usize = 8;
+
+fn decompose(
+    design: &impl Design,
+    targets: &[f64],
+    outputs: usize,
+    samples: Range<usize>,
+) -> Triangle {
+    let n = design.regressors();
+    let (mut triangle, mut block) = (Triangle::new(n, outputs), Block::new(n, outputs));
+    let mut values = vec![0.0; FILLED * n];
+    for first in samples.clone().step_by(BLOCK) {
+        let last = samples.end.min(first + BLOCK);
+        block.clear();
+        for start in (first..last).step_by(FILLED) {
+            let run = start..last.min(start + FILLED);
+            let values = &mut values[..run.len() * n];
+            design.fill(run.clone(), values);
+            let targets = targets[run.start * outputs..].chunks_exact(outputs);
+            for (row, (values, targets)) in values.chunks_exact(n).zip(targets).enumerate() {
+                block.set(start - first + row, values, targets);
+            }
+        }
+        triangle.absorb(&mut block);
+    }
+    triangle
+}
+
+/// Weights (`regressors × outputs`) of Gaussian regressors of `scaled` inputs.
+///
+/// # Panics
+/// See [`Factor::new`].
+#[must_use]
+pub fn fit(
+    regressors: &Regressors<'_>,
+    scaled: &[f64],
+    outputs: &Table,
+    initial_covariance: f64,
+) -> Vec<f64> {
+    let design = regressors.of(scaled);
+    Factor::new(&design, &outputs.values, outputs.names.len(), initial_covariance).weights()
+}
+
+#[cfg(test)]
+pub(super) mod tests;

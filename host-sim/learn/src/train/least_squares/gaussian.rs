@@ -1,0 +1,116 @@
+//! Regressors of the network: Gaussian activations, affine tail, bias.
+
+#![expect(clippy::inline_always, reason = "what `simd::widest` runs must be inlined into it")]
+
+use std::ops::Range;
+
+use super::Design;
+use super::exp::exponentiate_non_positive;
+use crate::train::squared_distance;
+use taxel_data::simd::widest;
+
+/// Centres evaluated side by side.
+const LANES: usize = 8;
+
+/// What the output weights multiply: activations, then the scaled inputs if there is an affine
+/// tail, then 1 for the bias.
+#[derive(Debug, Clone, Copy)]
+pub struct Regressors<'c> {
+    /// Centres on scaled inputs, one after the other; none for a linear decoder.
+    pub centres: &'c [f64],
+    /// Inputs.
+    pub inputs: usize,
+    /// 1/(2σ²).
+    pub decay: f64,
+    /// Whether the scaled inputs take part.
+    pub affine_tail: bool,
+}
+
+impl Regressors<'_> {
+    /// How many there are.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.centres.len() / self.inputs + if self.affine_tail { self.inputs } else { 0 } + 1
+    }
+
+    /// Their values for one sample's scaled inputs, into `values`.
+    pub fn evaluate(&self, scaled: &[f64], values: &mut [f64]) {
+        let activations = self
+            .centres
+            .chunks_exact(self.inputs)
+            .map(|centre| libm::exp(-self.decay * squared_distance(scaled, centre)));
+        let tail = if self.affine_tail { scaled } else { &[] };
+        let all = activations.chain(tail.iter().copied()).chain([1.0]);
+        values.iter_mut().zip(all).for_each(|(place, value)| *place = value);
+    }
+
+    /// These regressors of `scaled` inputs (sample after sample).
+    #[must_use]
+    pub fn of<'s>(&'s self, scaled: &'s [f64]) -> Gaussians<'s> {
+        let count = self.centres.len() / self.inputs;
+        let mut lanes = vec![[0.0; LANES]; count.div_ceil(LANES) * self.inputs];
+        for (k, centre) in self.centres.chunks_exact(self.inputs).enumerate() {
+            let places = &mut lanes[k / LANES * self.inputs..];
+            places.iter_mut().zip(centre).for_each(|(place, c)| place[k % LANES] = *c);
+        }
+        Gaussians { regressors: self, scaled, lanes }
+    }
+}
+
+/// [`Regressors`] of a set of samples, several centres at a time.
+///
+/// Values are those of [`Regressors::evaluate`] to within rounding (a few 1e-16).
+#[derive(Debug, Clone)]
+pub struct Gaussians<'s> {
+    regressors: &'s Regressors<'s>,
+    scaled: &'s [f64],
+    /// Centres in groups of [`LANES`], input after input; the last group is filled up with 0.
+    lanes: Vec<[f64; LANES]>,
+}
+
+impl Design for Gaussians<'_> {
+    fn regressors(&self) -> usize {
+        self.regressors.count()
+    }
+
+    fn fill(&self, samples: Range<usize>, values: &mut [f64]) {
+        let (inputs, n) = (self.regressors.inputs, self.regressors.count());
+        let (lanes, decay) = (self.lanes.as_slice(), self.regressors.decay);
+        let centres = self.regressors.centres.len() / inputs;
+        let scaled = &self.scaled[samples.start * inputs..samples.end * inputs];
+        widest(
+            #[inline(always)]
+            || {
+                for (x, row) in scaled.chunks_exact(inputs).zip(values.chunks_exact_mut(n)) {
+                    let (activations, rest) = row.split_at_mut(centres);
+                    for (group, places) in
+                        lanes.chunks_exact(inputs).zip(activations.chunks_mut(LANES))
+                    {
+                        let values = exponents(x, group, decay);
+                        if let Some(whole) = places.first_chunk_mut() {
+                            *whole = values;
+                        } else {
+                            places.copy_from_slice(&values[..places.len()]);
+                        }
+                    }
+                    exponentiate_non_positive(activations);
+                    let tail = rest.len() - 1;
+                    rest[..tail].copy_from_slice(&x[..tail]);
+                    rest[tail] = 1.0;
+                }
+            },
+        );
+    }
+}
+
+/// −decay·‖x − c‖² for a group of centres.
+#[inline(always)]
+fn exponents(x: &[f64], group: &[[f64; LANES]], decay: f64) -> [f64; LANES] {
+    let mut sum = [0.0; LANES];
+    for (x, c) in x.iter().zip(group) {
+        for l in 0..LANES {
+            sum[l] += (x - c[l]) * (x - c[l]);
+        }
+    }
+    sum.map(|sum| -decay * sum)
+}

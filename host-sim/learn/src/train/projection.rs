@@ -1,0 +1,167 @@
+//! Which features of a whole frame one network for the array is given: those directions of the readings'
+//! space that tell the outputs best.
+//!
+//! Reduced-rank regression (Izenman, J. Multivariate Anal. 5, 1975): of all matrices of rank F, B·V·Vᵀ
+//! predicts the outputs from the readings with the least squared error, B being the least-squares solution
+//! and V the first F eigenvectors of Bᵀ·Σxx·B, the covariance of what B predicts. The features are x·B·V, in
+//! the outputs' unit. Unlike principal components, they do not spend a direction on what the readings do
+//! together but the outputs do not need. `docs/projection.md` has what that is worth.
+
+use model_core::projection::Projection;
+use nalgebra::{DMatrix, SymmetricEigen};
+use rayon::prelude::*;
+use taxel_data::dataset::Dataset;
+use taxel_data::simd;
+use taxel_data::table::Table;
+
+use crate::error::{Error, Result};
+
+/// Frames whose products are added up before they are added to those of others.
+const FRAMES_AT_ONCE: usize = 1024;
+/// White noise added to every reading, relative to its standard deviation: keeps directions in which readings
+/// hardly move from being amplified beyond what f32 carries.
+const NOISE_FLOOR: f64 = 1e-3;
+
+/// The projection that `dataset` asks for, to as many features as one of its rows has readings: f₀, then each
+/// reading's part in every feature, as [`Projection::new`] takes it.
+///
+/// # Errors
+/// Data of a single row, without a regression, or with one that f32 does not hold.
+pub fn fit(dataset: &Dataset) -> Result<Vec<f32>> {
+    if dataset.rows < 2 {
+        return Err(Error::OneRow);
+    }
+    let (readings, features) = (dataset.inputs.names.len(), features_of(dataset));
+    let means = dataset.inputs.means();
+    let parts = directions(dataset, &means, features)?;
+    // f₀ makes up for the means after rounding.
+    let mut block = vec![0.0; features];
+    for (reading, mean) in means.iter().enumerate() {
+        for (feature, start) in block.iter_mut().enumerate() {
+            *start -= f64::from(parts[(reading, feature)] as f32) * mean;
+        }
+    }
+    for reading in 0..readings {
+        block.extend((0..features).map(|feature| parts[(reading, feature)]));
+    }
+    let block: Vec<f32> = block.into_iter().map(|value| value as f32).collect();
+    if block.iter().all(|value| value.is_finite()) {
+        Ok(block)
+    } else {
+        Err(Error::ProjectionBeyondF32)
+    }
+}
+
+/// `dataset` as the network behind the projection sees it: one row, the features its inputs, all scaled by
+/// the largest span of any.
+#[must_use]
+pub fn apply(projection: Projection<'_>, dataset: &Dataset) -> Dataset {
+    let (width, count) = (dataset.inputs.names.len(), features_of(dataset));
+    let names = (1..=count).map(|feature| format!("feature{feature}")).collect();
+    let values = features(projection, count, width, &dataset.inputs.values);
+    Dataset {
+        inputs: Table { names, values },
+        outputs: dataset.outputs.clone(),
+        rows: 1,
+        common_span: true,
+    }
+}
+
+/// The `features` of every line of so many `readings`, as the device computes them.
+#[must_use]
+pub fn features(
+    projection: Projection<'_>,
+    features: usize,
+    width: usize,
+    readings: &[f64],
+) -> Vec<f64> {
+    let of_line = |line: &[f64]| {
+        let line: Vec<f32> = line.iter().map(|reading| *reading as f32).collect();
+        let mut features = vec![0.0; features];
+        projection.project(&line, &mut features);
+        features.into_iter().map(f64::from)
+    };
+    let pieces = readings.par_chunks(FRAMES_AT_ONCE * width);
+    let values: Vec<Vec<f64>> =
+        pieces.map(|lines| lines.chunks_exact(width).flat_map(of_line).collect()).collect();
+    values.concat()
+}
+
+fn features_of(dataset: &Dataset) -> usize {
+    dataset.inputs.names.len() / dataset.rows
+}
+
+/// Each reading's part in every feature, one feature a column; columns beyond the number of outputs are 0.
+fn directions(dataset: &Dataset, means: &[f64], features: usize) -> Result<DMatrix<f64>> {
+    let readings = means.len();
+    let products = products(dataset, means);
+    let width = readings + dataset.outputs.names.len();
+    let mut of_readings =
+        DMatrix::from_fn(readings, readings, |i, j| products[i.min(j) * width + i.max(j)]);
+    for reading in 0..readings {
+        // A reading that never changes gets a part of 0, since it is 0 about its mean.
+        let own = of_readings[(reading, reading)];
+        of_readings[(reading, reading)] =
+            if own > 0.0 { own * (1.0 + NOISE_FLOOR * NOISE_FLOOR) } else { 1.0 };
+    }
+    let with_outputs =
+        DMatrix::from_fn(readings, width - readings, |i, o| products[i * width + readings + o]);
+    let regression = of_readings.cholesky().ok_or(Error::NoRegression)?.solve(&with_outputs);
+    let predicted = with_outputs.tr_mul(&regression);
+    let predicted = (&predicted + predicted.transpose()) * 0.5;
+    let eigen = SymmetricEigen::new(predicted);
+    let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
+    order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
+    let mut parts = DMatrix::zeros(readings, features);
+    for (feature, place) in order.into_iter().take(features).enumerate() {
+        let direction = eigen.eigenvectors.column(place);
+        // Either sign serves: the largest component's is taken for positive.
+        let sign = if direction[direction.iamax()] < 0.0 { -1.0 } else { 1.0 };
+        parts.set_column(feature, &(&regression * direction * sign));
+    }
+    Ok(parts)
+}
+
+/// Σ zᵢ·zⱼ over all frames for every i ≤ j, with z the readings and then the outputs, about their means;
+/// pieces are added in their order, whatever the number of threads.
+fn products(dataset: &Dataset, means: &[f64]) -> Vec<f64> {
+    let means = [means, &dataset.outputs.means()].concat();
+    let width = means.len();
+    let (inputs, outputs) = (dataset.inputs.names.len(), dataset.outputs.names.len());
+    let pieces = dataset.inputs.values.par_chunks(FRAMES_AT_ONCE * inputs);
+    let pieces = pieces.zip(dataset.outputs.values.par_chunks(FRAMES_AT_ONCE * outputs));
+    let sums: Vec<Vec<f64>> = pieces
+        .map(|(inputs_of_piece, outputs_of_piece)| {
+            let mut sums = vec![0.0; width * width];
+            let lines = inputs_of_piece.chunks_exact(inputs);
+            for (readings, outputs) in lines.zip(outputs_of_piece.chunks_exact(outputs)) {
+                // Readings as the device has them, in f32.
+                let readings = readings.iter().map(|reading| f64::from(*reading as f32));
+                let values = readings.chain(outputs.iter().copied());
+                let z: Vec<f64> = values.zip(&means).map(|(value, mean)| value - mean).collect();
+                simd::widest(
+                    #[inline(always)]
+                    || add_products(&z, inputs, &mut sums),
+                );
+            }
+            sums
+        })
+        .collect();
+    let mut total = vec![0.0; width * width];
+    for sums in &sums {
+        total.iter_mut().zip(sums).for_each(|(total, sum)| *total += sum);
+    }
+    total
+}
+
+/// Adds zᵢ·zⱼ to the sums, for i among the inputs and j ≥ i.
+#[inline(always)]
+fn add_products(z: &[f64], inputs: usize, sums: &mut [f64]) {
+    for (i, sums) in sums.chunks_exact_mut(z.len()).take(inputs).enumerate() {
+        let factor = z[i];
+        sums[i..].iter_mut().zip(&z[i..]).for_each(|(sum, z)| *sum += factor * z);
+    }
+}
+
+#[cfg(test)]
+mod tests;

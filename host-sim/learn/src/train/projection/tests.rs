@@ -1,0 +1,80 @@
+use taxel_data::random::Stream;
+use taxel_simulate::{World, synthesise};
+
+use super::*;
+
+/// Readings r1…r6 in two rows of three; outputs are known sums of them.
+fn known(frames: usize, noise: f64) -> Dataset {
+    let names = |prefix: &str, count: usize| (1..=count).map(|n| format!("{prefix}{n}")).collect();
+    let mut dataset = Dataset::empty(names("r", 6), names("y", 4), 2, frames);
+    let mut state = 1_u64;
+    let mut draw = move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    let lines = dataset.inputs.values.chunks_exact_mut(6);
+    for (r, y) in lines.zip(dataset.outputs.values.chunks_exact_mut(4)) {
+        r.iter_mut().enumerate().for_each(|(i, r)| *r = 50.0 + 10.0 * i as f64 + draw());
+        r[5] = 100.0; // never changes
+        let (a, b) = (r[0] + r[3], r[1] - 2.0 * r[4]);
+        [a + b, a - b, 2.0 * a, b].iter().zip(y).for_each(|(value, y)| *y = value + noise * draw());
+    }
+    dataset
+}
+
+fn projection<'b>(dataset: &Dataset, block: &'b [f32]) -> Projection<'b> {
+    Projection::new(dataset.inputs.names.len(), features_of(dataset), block).unwrap()
+}
+
+#[test]
+fn features_carry_all_that_outputs_take_from_readings() {
+    let data = known(400, 0.01);
+    let block = fit(&data).unwrap();
+    let seen = apply(projection(&data, &block), &data);
+    assert_eq!((seen.rows, seen.inputs.names.len(), seen.inputs.len()), (1, 3, 400));
+    // Two sums decide all outputs: two features follow them to the noise, the third is the noise's.
+    let spans: Vec<f64> = seen.inputs.ranges().iter().map(|[low, high]| high - low).collect();
+    assert!(spans[0] > 1.0 && spans[1] > 1.0 && spans[2] < 0.02, "{spans:?}");
+    let of = |table: &Table| DMatrix::from_row_slice(table.len(), table.names.len(), &table.values);
+    let (mut x, y) = (of(&seen.inputs).columns(0, 2).into_owned(), of(&data.outputs));
+    x = x.insert_column(2, 1.0);
+    let fitted = (x.tr_mul(&x)).cholesky().unwrap().solve(&x.tr_mul(&y));
+    let worst = (&x * fitted - y).amax();
+    assert!(worst < 0.02, "{worst}");
+    // The reading that never changes has no part.
+    let parts = &block[3..];
+    assert_eq!(parts[5 * 3..], [0.0; 3]);
+}
+
+#[test]
+fn the_projection_does_not_depend_on_the_number_of_threads() {
+    let data = synthesise(&World::press(), Stream::Training, 3000);
+    let with = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| fit(&data).unwrap())
+    };
+    let block = with(1);
+    assert_eq!(block, with(3));
+    assert_eq!(block.len(), 18 * 145);
+    assert!(block.iter().all(|value| value.is_finite()));
+}
+
+#[test]
+fn a_line_is_projected_as_on_the_device_and_nan_where_a_reading_is_missing() {
+    let mut data = known(20, 0.0);
+    data.inputs.values[7] = f64::NAN;
+    let block = fit(&known(20, 0.0)).unwrap();
+    let seen = features(projection(&data, &block), 3, 6, &data.inputs.values);
+    let line: Vec<f32> = data.inputs.values[..6].iter().map(|r| *r as f32).collect();
+    let mut expected = [0.0; 3];
+    projection(&data, &block).project(&line, &mut expected);
+    assert_eq!(seen[..3], expected.map(f64::from));
+    assert!(seen[3..6].iter().all(|feature| feature.is_nan()));
+}
+
+#[test]
+fn data_of_one_row_is_refused() {
+    let data = Dataset { rows: 1, ..known(20, 0.0) };
+    let message = fit(&data).unwrap_err().to_string();
+    assert!(message.contains("two row-wires or more"), "{message}");
+}

@@ -1,0 +1,260 @@
+//! A real, trained blob, harmed in every way there is: each is refused with its own error.
+
+use model_core::blob::{DecodeError, FORMAT_VERSION, Model, ModelShape};
+use model_core::exp::Polynomial;
+use model_core::rbf::{Format, NetworkError};
+use model_core::{Decoder, Frame};
+use taxel_data::progress::Silent;
+use taxel_data::random::Stream;
+use taxel_learn::train::train;
+use taxel_learn::{Exponential, ModelBlob, Options, Origin, pack};
+use taxel_simulate::outputs::Outputs;
+use taxel_simulate::sensor::Axis;
+use taxel_simulate::{World, synthesise};
+
+const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+
+fn world() -> World {
+    let outputs = Outputs { axes: vec![Axis::Z], ..Outputs::all_deformations() };
+    World { outputs, read_rows: vec![3, 4], ..World::press() }
+}
+
+/// Two rows, 18 readings to 6 outputs, K = 8, trained on `press`.
+fn real_blob() -> Vec<u8> {
+    let dataset = synthesise(&world(), Stream::Training, 400);
+    let options = Options { format: Format::F32Direct, centres: 8, ..Options::default() };
+    let trained = train(&dataset, &options, &Silent).unwrap();
+    let origin = Origin::of_data("press", 0, 1, &dataset);
+    pack(&trained, &dataset, &origin).unwrap().bytes().to_vec()
+}
+
+/// Bytes at an address that is a multiple of four.
+fn with_aligned<R>(bytes: &[u8], use_them: impl FnOnce(&[u8]) -> R) -> R {
+    let mut words = vec![0_u32; bytes.len().div_ceil(4) + 1];
+    let aligned: &mut [u8] = bytemuck::cast_slice_mut(&mut words);
+    aligned[..bytes.len()].copy_from_slice(bytes);
+    use_them(&aligned[..bytes.len()])
+}
+
+fn refusal(bytes: &[u8]) -> Option<DecodeError> {
+    with_aligned(bytes, |bytes| Model::decode(bytes).err())
+}
+
+/// Enters length and CRC anew, as one who writes a bad blob on purpose would.
+fn sealed(mut blob: Vec<u8>) -> Vec<u8> {
+    let length = u32::try_from(blob.len()).unwrap();
+    blob[5..9].copy_from_slice(&length.to_le_bytes());
+    let body = blob.len() - 4;
+    let crc = CRC.checksum(&blob[..body]);
+    blob[body..].copy_from_slice(&crc.to_le_bytes());
+    blob
+}
+
+/// Byte offset in the blob of what `pick` borrows from it.
+fn offset_of(blob: &[u8], pick: impl for<'a> Fn(&Model<'a>) -> &'a [u8]) -> usize {
+    with_aligned(blob, |bytes| {
+        let model = Model::decode(bytes).unwrap();
+        pick(&model).as_ptr() as usize - bytes.as_ptr() as usize
+    })
+}
+
+type Pick = for<'a> fn(&model_core::rbf::direct::Parameters<'a>) -> &'a [f32];
+
+fn parameter_offset(
+    blob: &[u8],
+    network: usize,
+    pick: impl for<'a> Fn(&model_core::rbf::direct::Parameters<'a>) -> &'a [f32],
+) -> usize {
+    offset_of(blob, |model| {
+        let network = model.networks().nth(network).unwrap();
+        {
+            let model_core::rbf::Network::F32Direct(network) = network else {
+                panic!("{network:?}")
+            };
+            bytemuck::cast_slice(pick(network.parameters()))
+        }
+    })
+}
+
+fn changed(blob: &[u8], offset: usize, bytes: &[u8]) -> Vec<u8> {
+    let mut blob = blob.to_vec();
+    blob[offset..offset + bytes.len()].copy_from_slice(bytes);
+    sealed(blob)
+}
+
+#[test]
+fn every_single_bit_flip_is_refused_with_its_error() {
+    let mut blob = real_blob();
+    assert_eq!(refusal(&blob), None);
+    for offset in 0..blob.len() {
+        for bit in 0..8 {
+            blob[offset] ^= 1 << bit;
+            let refused = refusal(&blob).unwrap_or_else(|| panic!("byte {offset} bit {bit}"));
+            let as_expected = match offset {
+                0..4 => matches!(refused, DecodeError::BadMagic),
+                4 => matches!(refused, DecodeError::UnsupportedVersion { .. }),
+                5..9 => matches!(
+                    refused,
+                    DecodeError::Truncated { .. } | DecodeError::TrailingBytes { .. }
+                ),
+                _ => matches!(refused, DecodeError::Corrupt { .. }),
+            };
+            assert!(as_expected, "byte {offset} bit {bit}: {refused}");
+            blob[offset] ^= 1 << bit;
+        }
+    }
+}
+
+#[test]
+fn every_truncation_and_any_trailing_byte_is_refused() {
+    let blob = real_blob();
+    for length in 0..blob.len() {
+        let refused = refusal(&blob[..length]);
+        let expected = if length < 9 { 13 } else { blob.len() };
+        assert_eq!(refused, Some(DecodeError::Truncated { expected, found: length }));
+    }
+    for extra in [1, 2, 3, 4, 100] {
+        for filler in [0_u8, 0xff] {
+            let mut longer = blob.clone();
+            longer.resize(blob.len() + extra, filler);
+            assert_eq!(refusal(&longer), Some(DecodeError::TrailingBytes { extra }));
+        }
+    }
+}
+
+#[test]
+fn other_versions_and_other_files_are_refused_by_name() {
+    let blob = real_blob();
+    for version in (0..=255).filter(|v| *v != FORMAT_VERSION) {
+        let refused = refusal(&changed(&blob, 4, &[version]));
+        let expected =
+            DecodeError::UnsupportedVersion { found: version, supported: FORMAT_VERSION };
+        assert_eq!(refused, Some(expected));
+    }
+    for other in [&b"PK\x03\x04 a zip file"[..], b"ELF", b"T", b"TAXM"] {
+        let expected = match other {
+            b"T" => DecodeError::Truncated { expected: 13, found: 1 },
+            _ => DecodeError::BadMagic,
+        };
+        assert_eq!(refusal(other), Some(expected));
+    }
+}
+
+#[test]
+fn bad_numbers_under_a_valid_crc_are_refused() {
+    let blob = real_blob();
+    let decay = parameter_offset(&blob, 1, |p| p.decay);
+    for width in [0.0_f32, -1.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        // A width of zero has the decay 1/0; a decay of zero is a width without bound.
+        for decay_value in [width, 1.0 / (2.0 * width * width)] {
+            if decay_value.is_finite() && decay_value > 0.0 {
+                continue; // the width −1 squares to a good one
+            }
+            let refused = refusal(&changed(&blob, decay, &decay_value.to_le_bytes()));
+            let cause = NetworkError::InvalidWidth { centre: 0 };
+            assert_eq!(refused, Some(DecodeError::Network { index: 1, cause }));
+        }
+    }
+    let arrays: [(&str, Pick); 6] = [
+        ("input_minimum", |p| p.input_minimum),
+        ("input_per_span", |p| p.input_per_span),
+        ("centres", |p| p.centres),
+        ("output_weights", |p| p.output_weights),
+        ("bias", |p| p.bias),
+        ("affine", |p| p.affine),
+    ];
+    for (what, pick) in arrays {
+        let offset = parameter_offset(&blob, 0, pick);
+        for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            let refused = refusal(&changed(&blob, offset + 4, &value.to_le_bytes()));
+            let cause = NetworkError::NotFinite { what };
+            assert_eq!(refused, Some(DecodeError::Network { index: 0, cause }));
+        }
+    }
+    let span = parameter_offset(&blob, 0, |p| p.input_per_span);
+    let refused = refusal(&changed(&blob, span + 8, &(-1.0_f32).to_le_bytes()));
+    let cause = NetworkError::NegativeSpan { input: 2 };
+    assert_eq!(refused, Some(DecodeError::Network { index: 0, cause }));
+    for (field, offset) in [
+        ("training error", offset_of(&blob, |m| m.metadata().training_rmse.0)),
+        ("full scale", offset_of(&blob, |m| m.metadata().full_scale.0)),
+    ] {
+        for value in [f32::NAN, f32::INFINITY, -1.0] {
+            let refused = refusal(&changed(&blob, offset, &value.to_le_bytes()));
+            assert_eq!(refused, Some(DecodeError::InvalidMetadata { field }));
+        }
+    }
+}
+
+#[test]
+fn inconsistent_structure_under_a_valid_crc_is_refused() {
+    let blob = real_blob();
+    // Shape: rows, inputs, outputs and networks are one byte each, at 9 to 12; then the map.
+    assert_eq!(blob[9..16], [2, 18, 6, 2, 2, 0, 1]);
+    let refused = |offset, byte| refusal(&changed(&blob, offset, &[byte])).unwrap();
+    for (offset, value) in [(9, 3), (10, 17), (11, 7), (14 - 1, 1)] {
+        let refused = refused(offset, value);
+        let mismatch = matches!(
+            refused,
+            DecodeError::CountMismatch { .. }
+                | DecodeError::Malformed { .. }
+                | DecodeError::SectionOrder { .. }
+        );
+        assert!(mismatch, "byte {offset}: {refused}");
+    }
+    assert_eq!(refused(15, 2), DecodeError::UnknownNetwork { row: 1, network: 2, networks: 2 });
+    assert_eq!(refused(16, 9), DecodeError::SectionOrder { expected: 0, found: 9 });
+
+    // A network section: tag, index, centres, common width, affine; then padding and floats.
+    let floats = parameter_offset(&blob, 1, |p| p.input_minimum);
+    let header = (0..floats).rev().find(|i| blob[*i..*i + 5] == [1, 1, 8, 1, 1]).unwrap();
+    assert_eq!(refused(header, 7), DecodeError::SectionOrder { expected: 1, found: 7 });
+    assert_eq!(refused(header + 1, 0), DecodeError::NetworkOrder { expected: 1, found: 0 });
+    assert!(matches!(refused(header + 2, 9), DecodeError::CountMismatch { .. }));
+
+    let mut longer = blob.clone();
+    let body = longer.len() - 4;
+    longer.splice(body..body, [0; 8]);
+    assert_eq!(refusal(&sealed(longer)), Some(DecodeError::LeftOver { bytes: 8 }));
+}
+
+#[test]
+fn a_blob_that_cannot_be_borrowed_or_has_another_shape_is_refused() {
+    let blob = real_blob();
+    let mut shifted = vec![0];
+    shifted.extend_from_slice(&blob);
+    with_aligned(&shifted, |bytes| {
+        assert_eq!(Model::decode(&bytes[1..]), Err(DecodeError::Misaligned));
+    });
+    let found = ModelShape { rows: 2, inputs: 18, outputs: 6 };
+    with_aligned(&blob, |bytes| {
+        assert!(Decoder::<2, 18, 6>::load(bytes).is_ok());
+        let expected = ModelShape { rows: 8, inputs: 18, outputs: 6 };
+        let refused = Decoder::<8, 18, 6>::load(bytes).err();
+        assert_eq!(refused, Some(DecodeError::ShapeMismatch { expected, found }));
+        let expected = ModelShape { rows: 2, inputs: 16, outputs: 6 };
+        let refused = Decoder::<2, 16, 6>::load(bytes).err();
+        assert_eq!(refused, Some(DecodeError::ShapeMismatch { expected, found }));
+    });
+}
+
+/// The device's entry and the host's give the same bits.
+#[test]
+fn device_and_host_decode_alike() {
+    let blob = real_blob();
+    let loaded = ModelBlob::of_bytes(&blob).unwrap();
+    let test = synthesise(&world(), Stream::Test, 500);
+    let host = loaded.prepare(Exponential::Polynomial).decode_table(&test.inputs);
+    with_aligned(&blob, |bytes| {
+        let decoder = Decoder::<2, 18, 6, Polynomial>::load(bytes).unwrap();
+        for (readings, expected) in test.inputs.lines().zip(host.lines()) {
+            let mut frame = Frame::<2, 18>::missing();
+            let places = frame.row_column_resistance_ohm.as_flattened_mut();
+            places.iter_mut().zip(readings).for_each(|(place, r)| *place = *r as f32);
+            let estimate = decoder.decode(&frame);
+            for (y, expected) in estimate.outputs.as_flattened().iter().zip(expected) {
+                assert_eq!(f64::from(*y).to_bits(), expected.to_bits());
+            }
+        }
+    });
+}

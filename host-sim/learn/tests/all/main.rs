@@ -1,0 +1,4 @@
+//! Every integration test in one program: it is linked once.
+
+mod blob;
+mod number_formats;

@@ -1,0 +1,148 @@
+//! What number formats cost in accuracy: the same centres fitted and evaluated in f64, in f32 and in 16-bit
+//! fixed point, on both reference scenes, by axis. Figures: `cargo test -p taxel-learn --test all number_formats -- --nocapture`.
+
+use model_core::rbf::Format;
+use rayon::prelude::*;
+use taxel_data::columns;
+use taxel_data::dataset::Block;
+use taxel_data::progress::Silent;
+use taxel_data::random::Stream;
+use taxel_data::table::Table;
+use taxel_learn::infer::infer;
+use taxel_learn::train::least_squares::{self, Regressors};
+use taxel_learn::train::{InputScale, Samples, train};
+use taxel_learn::{Exponential, Options, Origin, pack};
+use taxel_simulate::{Synthesis, World, synthesise};
+
+const NOISE_LEVELS: [f64; 5] = [0.0, 0.005, 0.01, 0.05, 0.1];
+/// Row-wires at the rim, beside the middle, and between.
+const ROWS: [usize; 3] = [1, 4, 7];
+
+fn world(name: &str, noise: f64) -> World {
+    let mut world = if name == "paper" { World::paper() } else { World::press() };
+    world.set_noise_level(noise).unwrap();
+    world.read_rows = ROWS.map(|row| row - 1).to_vec();
+    world
+}
+
+/// What a network of f64 answers: neither its centres nor its weights are rounded.
+fn in_f64(training: &Block, centres: &[f64], options: &Options, test: &Block) -> Vec<f64> {
+    let scale = InputScale::of(training);
+    let regressors = Regressors {
+        centres,
+        inputs: training.inputs.names.len(),
+        decay: 1.0 / (2.0 * options.spread * options.spread),
+        affine_tail: options.affine_tail,
+    };
+    let weights = least_squares::fit(
+        &regressors,
+        &scale.apply(&training.inputs.values),
+        &training.outputs,
+        options.initial_covariance,
+    );
+    let mut values = vec![0.0; regressors.count()];
+    let outputs = training.outputs.names.len();
+    let answer = |scaled: &[f64]| {
+        regressors.evaluate(scaled, &mut values);
+        let column = |output: usize| weights.iter().skip(output).step_by(outputs);
+        let sum = |output| values.iter().zip(column(output)).map(|(v, w)| v * w).sum::<f64>();
+        (0..outputs).map(sum).collect::<Vec<f64>>()
+    };
+    scale.apply(&test.inputs.values).chunks_exact(regressors.inputs).flat_map(answer).collect()
+}
+
+/// Squared errors by axis.
+fn by_axis(truth: &Table, estimate: &[f64]) -> Vec<f64> {
+    let squares = truth.squared_errors(estimate);
+    let groups = columns::groups(&truth.names);
+    groups.iter().map(|(_, members)| members.iter().map(|c| squares[*c]).sum()).collect()
+}
+
+/// RMSE in mm by axis of f64, f32 and fixed16.
+fn errors(name: &str, noise: f64) -> [Vec<f64>; 3] {
+    let world = world(name, noise);
+    let training = synthesise(&world, Stream::Training, 8000);
+    let test = synthesise(&world, Stream::Test, 4000);
+    let options = Options::default();
+    let of_rows: Vec<[Vec<f64>; 3]> = (0..ROWS.len())
+        .into_par_iter()
+        .map(|row| {
+            let (training, test) = (training.block(row), test.block(row));
+            let samples = Samples::new(&training);
+            let centres = samples.centres(&options, row);
+            let exact = by_axis(&test.outputs, &in_f64(&training, &centres, &options, &test));
+            let [float, fixed] = [Format::F32, Format::Fixed16].map(|format| {
+                let fitted = samples.fit(&centres, &Options { format, ..options }).unwrap();
+                let estimate =
+                    infer(&fitted.network(), Exponential::default(), &test.inputs.values);
+                by_axis(&test.outputs, &estimate)
+            });
+            [exact, float, fixed]
+        })
+        .collect();
+    let values = (ROWS.len() * 6 * test.frames()) as f64;
+    std::array::from_fn(|format| {
+        let axis = |axis: usize| of_rows.iter().map(|row| row[format][axis]).sum::<f64>();
+        (0..3).map(|a| (axis(a) / values).sqrt()).collect()
+    })
+}
+
+fn check(name: &str) {
+    println!("{name}: RMSE in mm (x, y, z) of f64; growth in f32 and in fixed16");
+    for noise in NOISE_LEVELS {
+        let [exact, float, fixed] = errors(name, noise);
+        let growth = |of: &[f64]| -> Vec<f64> {
+            of.iter().zip(&exact).map(|(e, exact)| 100.0 * (e / exact - 1.0)).collect()
+        };
+        let (float, fixed) = (growth(&float), growth(&fixed));
+        println!(
+            "  noise {:>4} %: {exact:.5?}  f32 {float:+.3?} %  fixed16 {fixed:+.3?} %",
+            noise * 100.0
+        );
+        assert!(float.iter().all(|growth| *growth <= 0.1), "f32 at {noise}: {float:?}");
+        // Without noise, weights are large and rest on small differences: 16 bits tell.
+        let most = if noise >= 0.005 { 1.0 } else { 40.0 };
+        assert!(fixed.iter().all(|growth| *growth <= most), "fixed16 at {noise}: {fixed:?}");
+    }
+}
+
+/// RMSE in mm by axis of one network for the whole array.
+fn errors_of_array(noise: f64, spread: f64, format: Format) -> Vec<f64> {
+    let world = World::press();
+    let frames = Synthesis::of(&world).noise_level(noise);
+    let training = frames.frames(Stream::Training, 20000);
+    let test = frames.frames(Stream::Test, 4000);
+    let options = Options { whole_array: true, format, spread, ..Options::default() };
+    let trained = train(&training, &options, &Silent).unwrap();
+    let blob = pack(&trained, &training, &Origin::of_data("press", 0, 1, &training)).unwrap();
+    let estimate = blob.prepare(Exponential::default()).decode_table(&test.inputs);
+    let values = (test.outputs.values.len() / 3) as f64;
+    let squares = by_axis(&test.outputs, &estimate.values);
+    squares.iter().map(|square| (square / values).sqrt()).collect()
+}
+
+#[test]
+fn sixteen_bits_cost_the_whole_array_little() {
+    // Wide Gaussians are like each other, and weights of 16 bits too coarse to tell them apart.
+    for (noise, spread, most) in [(0.005, 0.4, 1.0), (0.05, 0.4, 1.0), (0.005, 0.8, 2.5)] {
+        let [float, fixed] =
+            [Format::F32, Format::Fixed16].map(|format| errors_of_array(noise, spread, format));
+        let growth = float.iter().zip(&fixed).map(|(f32, fixed)| 100.0 * (fixed / f32 - 1.0));
+        let growth: Vec<f64> = growth.collect();
+        println!(
+            "array, spread {spread}, noise {} %: f32 {float:.5?} mm, fixed16 {growth:+.3?} %",
+            100.0 * noise
+        );
+        assert!(growth.iter().all(|growth| *growth <= most), "fixed16 at {noise}: {growth:?}");
+    }
+}
+
+#[test]
+fn sixteen_bits_cost_no_more_than_a_hundredth_on_press() {
+    check("press");
+}
+
+#[test]
+fn sixteen_bits_cost_no_more_than_a_hundredth_on_paper() {
+    check("paper");
+}

@@ -1,0 +1,347 @@
+//! A device at the other end of a serial line, real or emulated.
+//!
+//! [`Device`] asks and hears; [`upload`] exchanges its model; [`stream`] lets it decode frames;
+//! [`check`] and [`scan`] hold it to the host. `docs/link.md` specifies what they say to each other.
+
+use std::collections::VecDeque;
+use std::io::{ErrorKind, Read, Write};
+use std::net::TcpStream;
+use std::time::{Duration, Instant};
+
+use firmware::link::message::{
+    Configuration, Identity, Memory, ModelIdentity, Refusal, Report, Request,
+};
+use firmware::link::receive::{Received, Receiver};
+use firmware::link::{cobs, packet};
+use serde::Serialize;
+
+use crate::error::{Error, Result};
+
+pub mod serial;
+pub mod stream;
+pub mod upload;
+mod expected;
+pub mod scan;
+pub mod check;
+
+/// How long a board's answer may take, but for those that erase flash.
+const ANSWER: Duration = Duration::from_millis(500);
+/// How long a device takes to start.
+const START: Duration = Duration::from_millis(100);
+/// How often a request is sent before its device is given up.
+const ATTEMPTS: u32 = 6;
+/// How long a request may take to be sent.
+const SLOWEST_WRITE: Duration = Duration::from_secs(10);
+/// Longest request.
+const MOST_REQUEST_BYTES: usize = 4096;
+/// How long one look for bytes waits.
+const GLANCE: Duration = Duration::from_millis(5);
+
+/// A line of bytes.
+pub trait Wire: Read + Write {
+    /// Lets reads end after `timeout` where nothing has come.
+    ///
+    /// # Errors
+    /// The system's.
+    fn set_read_timeout(&mut self, timeout: Duration) -> std::io::Result<()>;
+}
+
+impl Wire for TcpStream {
+    fn set_read_timeout(&mut self, timeout: Duration) -> std::io::Result<()> {
+        TcpStream::set_read_timeout(self, Some(timeout))
+    }
+}
+
+/// Who a device says it is.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DeviceIdentity {
+    /// Name of the board.
+    pub board: String,
+    /// Version of its firmware.
+    pub firmware: String,
+    /// Row-wires.
+    pub rows: usize,
+    /// Readings a row.
+    pub columns: usize,
+    /// Outputs a row.
+    pub outputs: usize,
+    /// Exponential that it decodes with.
+    pub kernel: String,
+    /// The model in force.
+    pub model: Option<ModelIdentity>,
+    /// Bytes of blob that a slot holds.
+    pub slot_bytes: usize,
+    /// Most bytes of one chunk of an upload.
+    pub chunk_bytes: usize,
+    /// Where its flash and RAM go.
+    pub memory: Memory,
+}
+
+impl DeviceIdentity {
+    /// Whether the model of that CRC-32 is in force.
+    #[must_use]
+    pub fn has_in_force(&self, crc_32: u32) -> bool {
+        self.model.is_some_and(|found| found.crc_32 == crc_32)
+    }
+}
+
+impl From<&Identity<'_>> for DeviceIdentity {
+    fn from(identity: &Identity<'_>) -> Self {
+        Self {
+            board: identity.board.into(),
+            firmware: identity.firmware.into(),
+            rows: identity.rows.into(),
+            columns: identity.columns.into(),
+            outputs: identity.outputs.into(),
+            kernel: identity.kernel.into(),
+            model: identity.model,
+            slot_bytes: identity.slot_bytes as usize,
+            chunk_bytes: identity.chunk_bytes.into(),
+            memory: identity.memory,
+        }
+    }
+}
+
+/// The host's end of the line.
+pub struct Device<W> {
+    wire: W,
+    receiver: Box<Receiver<4096>>,
+    /// Bytes read and not looked at yet.
+    pending: VecDeque<u8>,
+    number: u16,
+    /// How long an answer may take.
+    pub patience: Duration,
+    /// Frames of bytes that arrived damaged.
+    pub damaged: u64,
+    /// Requests that had to be sent again.
+    pub repeated: u64,
+}
+
+impl<W: Wire> Device<W> {
+    /// A device on `wire`; nothing is sent yet.
+    ///
+    /// # Errors
+    /// An [`Error`] if the wire takes no timeout.
+    pub fn new(mut wire: W) -> Result<Self> {
+        wire.set_read_timeout(GLANCE)?;
+        let receiver = Box::new(Receiver::new());
+        let pending = VecDeque::new();
+        Ok(Self { wire, receiver, pending, number: 0, patience: ANSWER, damaged: 0, repeated: 0 })
+    }
+
+    /// Sends bytes as they are.
+    ///
+    /// # Errors
+    /// An [`Error`].
+    pub fn send_raw(&mut self, bytes: &[u8]) -> Result<()> {
+        let (mut rest, start) = (bytes, Instant::now());
+        while !rest.is_empty() {
+            match self.wire.write(rest) {
+                Ok(count) => rest = &rest[count..],
+                // A slow line takes them by and by.
+                Err(cause) if is_timeout(&cause) && start.elapsed() < SLOWEST_WRITE => {}
+                Err(cause) => return Err(cause.into()),
+            }
+        }
+        Ok(self.wire.flush()?)
+    }
+
+    /// Sends a request under a number of its own, which is returned.
+    ///
+    /// # Errors
+    /// An [`Error`].
+    pub fn send(&mut self, request: &Request<'_>) -> Result<u16> {
+        self.number = self.number.checked_add(1).unwrap_or(packet::UNASKED + 1);
+        self.send_raw(&request_bytes(self.number, request)?)?;
+        Ok(self.number)
+    }
+
+    /// Passes reports to `read`, with their numbers, until it answers; `None` once `deadline` has
+    /// passed.
+    ///
+    /// # Errors
+    /// An [`Error`] if the line fails.
+    pub fn hear<T>(
+        &mut self,
+        deadline: Instant,
+        mut read: impl FnMut(u16, &Report<'_>) -> Option<T>,
+    ) -> Result<Option<T>> {
+        let mut bytes = [0; 4096];
+        let mut is_last_look = false;
+        loop {
+            while let Some(byte) = self.pending.pop_front() {
+                let report = match self.receiver.push(byte) {
+                    Some(Received::Frame(bytes)) => packet::decode::<Report<'_>>(bytes),
+                    Some(_) => Err(packet::PacketError::Damaged),
+                    None => continue,
+                };
+                match report {
+                    Ok(report) => {
+                        if let Some(answer) = read(report.number, &report.body) {
+                            return Ok(Some(answer));
+                        }
+                    }
+                    Err(_) => self.damaged += 1,
+                }
+            }
+            if is_last_look {
+                return Ok(None);
+            }
+            match self.wire.read(&mut bytes) {
+                Ok(0) => return Err(Error::Closed),
+                Ok(count) => self.pending.extend(&bytes[..count]),
+                Err(cause) if is_timeout(&cause) => {}
+                Err(cause) => return Err(cause.into()),
+            }
+            // Looked at after reading, so that even a deadline of now takes what is there; and whether
+            // or not bytes have come, since a device that scans never pauses for long.
+            is_last_look = Instant::now() >= deadline;
+        }
+    }
+
+    /// Asks until there is an answer; the device's refusal is an answer too.
+    ///
+    /// # Errors
+    /// An [`Error`] if there is none, or another than `read` takes.
+    pub fn ask<T>(
+        &mut self,
+        request: &Request<'_>,
+        timeout: Duration,
+        read: impl Fn(&Report<'_>) -> Option<T>,
+    ) -> Result<std::result::Result<T, Refusal>> {
+        for attempt in 0..ATTEMPTS {
+            self.repeated += u64::from(attempt > 0);
+            let number = self.send(request)?;
+            let answer = self.hear(Instant::now() + timeout, |found, report| {
+                (found == number).then(|| match report {
+                    Report::Refused(refusal) => Ok(Err(*refusal)),
+                    report => read(report).map(Ok).ok_or_else(|| format!("{report:?}")),
+                })
+            })?;
+            match answer {
+                Some(Ok(answer)) => return Ok(answer),
+                Some(Err(answer)) => {
+                    return Err(Error::Unexpected { request: format!("{request:?}"), answer });
+                }
+                None => {}
+            }
+        }
+        Err(Error::NoAnswer { attempts: ATTEMPTS, timeout })
+    }
+
+    /// Asks for what no device of this protocol refuses.
+    ///
+    /// # Errors
+    /// An [`Error`] if it does, or does not answer.
+    pub fn ask_plainly<T>(
+        &mut self,
+        request: &Request<'_>,
+        read: impl Fn(&Report<'_>) -> Option<T>,
+    ) -> Result<T> {
+        self.ask(request, self.patience, read)?.map_err(Error::Refused)
+    }
+
+    /// Who the device is.
+    ///
+    /// # Errors
+    /// An [`Error`] if it does not answer.
+    pub fn identify(&mut self) -> Result<DeviceIdentity> {
+        self.ask_plainly(&Request::Identify, |report| match report {
+            Report::Identity(identity) => Some(identity.into()),
+            _ => None,
+        })
+    }
+
+    /// The device's counters.
+    ///
+    /// # Errors
+    /// An [`Error`] if it does not answer.
+    pub fn statistics(&mut self) -> Result<firmware::link::message::Statistics> {
+        self.ask_plainly(&Request::Statistics, |report| match report {
+            Report::Statistics(statistics) => Some(*statistics),
+            _ => None,
+        })
+    }
+
+    /// The configuration in force.
+    ///
+    /// # Errors
+    /// An [`Error`] if the device does not answer.
+    pub fn configuration(&mut self) -> Result<Configuration> {
+        self.ask_plainly(&Request::Configuration, |report| match report {
+            Report::Configuration(configuration) => Some(*configuration),
+            _ => None,
+        })
+    }
+
+    /// Puts `configuration` in force.
+    ///
+    /// # Errors
+    /// An [`Error`] if the device refuses it, or does not answer.
+    pub fn configure(&mut self, configuration: Configuration) -> Result<()> {
+        self.ask_plainly(&Request::Configure(configuration), |report| {
+            matches!(report, Report::Configuration(_)).then_some(())
+        })
+    }
+
+    /// Does `work` while the device scans nothing, so that nothing comes unasked; afterwards, whatever
+    /// became of it, the configuration is again what it was.
+    ///
+    /// # Errors
+    /// An [`Error`] if the device does not answer, or what `work` returns.
+    pub fn while_paused<T, E: From<Error>>(
+        &mut self,
+        work: impl FnOnce(&mut Self) -> std::result::Result<T, E>,
+    ) -> std::result::Result<T, E> {
+        let before = self.configuration()?;
+        self.pause()?;
+        let outcome = work(self);
+        let restored = self.configure(before);
+        outcome.and_then(|value| Ok(restored.map(|()| value)?))
+    }
+
+    /// Stops scanning.
+    pub(crate) fn pause(&mut self) -> Result<()> {
+        self.configure(Configuration { frame_period_us: 0, ..Configuration::DEFAULT })
+    }
+
+    /// Restarts the device and waits until it answers again.
+    ///
+    /// # Errors
+    /// An [`Error`] if it does not.
+    pub fn restart(&mut self) -> Result<DeviceIdentity> {
+        self.ask_plainly(&Request::Restart, |report| {
+            matches!(report, Report::Restarting).then_some(())
+        })?;
+        // What arrives while it starts is lost: that is no fault of the line.
+        let (patience, repeated) = (self.patience, self.repeated);
+        let start = Instant::now();
+        self.patience = START;
+        let mut identity = self.identify();
+        while identity.is_err() && start.elapsed() < patience {
+            identity = self.identify();
+        }
+        (self.patience, self.repeated) = (patience, repeated);
+        identity
+    }
+}
+
+/// The bytes of a request.
+///
+/// # Errors
+/// [`Error::RequestTooLong`].
+pub fn request_bytes(number: u16, request: &Request<'_>) -> Result<Vec<u8>> {
+    let mut buffer = [0; MOST_REQUEST_BYTES];
+    let packet = packet::encode(number, request, &mut buffer)
+        .ok_or(Error::RequestTooLong { most_bytes: MOST_REQUEST_BYTES })?;
+    let mut bytes = Vec::with_capacity(packet.len() + 8);
+    cobs::encode(packet, |byte| {
+        bytes.push(byte);
+        true
+    });
+    Ok(bytes)
+}
+
+fn is_timeout(cause: &std::io::Error) -> bool {
+    matches!(cause.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
+}

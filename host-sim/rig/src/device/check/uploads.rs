@@ -1,0 +1,223 @@
+//! Uploads that must not come into force, and one that must.
+
+use firmware::link::message::{Refusal, Request, UploadState, UploadStep};
+use model_core::checksum::CRC_32;
+use serde::Serialize;
+use taxel_data::progress::{Progress, Silent};
+use taxel_data::random::{Purpose, Random, Stream};
+use taxel_learn::train::train;
+use taxel_learn::{ModelBlob, Options, Origin, pack};
+use taxel_simulate::{World, synthesise};
+
+use super::Plan;
+use crate::device::expected::Expected;
+use crate::device::{Device, Wire, request_bytes, upload};
+use crate::error::{Error, Result};
+
+/// How uploads went.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct UploadFindings {
+    /// Bytes of the model that was uploaded again and again.
+    pub blob_bytes: usize,
+    /// Whether a good model came into force, and the old one again after it.
+    pub good_came_into_force: bool,
+    /// Damaged models.
+    pub damaged: usize,
+    /// Those after which the device refused, and the old model was still in force.
+    pub damaged_refused: usize,
+    /// Uploads broken off.
+    pub interrupted: usize,
+    /// Those after which, and after a restart, the old model was in force.
+    pub old_stayed: usize,
+}
+
+/// Name of the small models.
+const SMALL: &str = "small";
+
+/// A small model of the right shape, quick to upload.
+fn small_model(world: &World, centres: usize) -> Result<ModelBlob> {
+    let mut frames = synthesise(world, Stream::Training, 64);
+    // Names would be most of it.
+    for names in [&mut frames.inputs.names, &mut frames.outputs.names] {
+        names.fill("x".into());
+    }
+    let options = Options { centres, affine_tail: false, seed: world.seed, ..Options::default() };
+    let trained = train(&frames, &options, &Silent)?;
+    Ok(pack(&trained, &frames, &Origin::of_data(SMALL, 0, world.seed, &frames))?)
+}
+
+pub(super) fn check_uploads<W: Wire>(
+    device: &mut Device<W>,
+    world: &World,
+    model: &ModelBlob,
+    expected: &Expected,
+    plan: &Plan,
+    progress: &dyn Progress,
+) -> Result<UploadFindings> {
+    let chunk_bytes = device.identify()?.chunk_bytes;
+    let (old, new) = (small_model(world, 2)?, small_model(world, 1)?);
+    // First, while the model is where it was when the device started: an emulator that restarts puts
+    // it there again, over whatever had been written to that slot, but not to the other.
+    let (interrupted, old_stayed) = if plan.interruptions {
+        break_uploads_off(device, new.bytes(), chunk_bytes, model.parse().crc(), progress)?
+    } else {
+        (0, 0)
+    };
+    // `replace` fails unless the device then says that the model is in force.
+    upload::replace(device, old.bytes(), progress)?;
+    let in_force = old.parse().crc();
+
+    progress.stage("uploading damaged models", plan.damaged_uploads);
+    let mut damaged_refused = 0;
+    for index in 0..plan.damaged_uploads {
+        let mut random = Random::new(world.seed, Stream::Test, Purpose::Damage, index as u64, 0);
+        let refused = upload_damaged(device, new.bytes(), chunk_bytes, index, &mut random)?;
+        damaged_refused += usize::from(refused && device.identify()?.has_in_force(in_force));
+        progress.step();
+    }
+    upload::replace(device, model.bytes(), progress)?;
+    let (same, _) = expected.count_same(device, 1, 1, &Silent)?;
+    Ok(UploadFindings {
+        blob_bytes: new.bytes().len(),
+        good_came_into_force: same == 1,
+        damaged: plan.damaged_uploads,
+        damaged_refused,
+        interrupted,
+        old_stayed,
+    })
+}
+
+/// Breaks an upload off before its first chunk and after each: how often, and how often the model of
+/// `crc_32` was in force afterwards, and after a restart.
+fn break_uploads_off<W: Wire>(
+    device: &mut Device<W>,
+    blob: &[u8],
+    chunk_bytes: usize,
+    crc_32: u32,
+    progress: &dyn Progress,
+) -> Result<(usize, usize)> {
+    let chunks: Vec<&[u8]> = blob.chunks(chunk_bytes).collect();
+    progress.stage("breaking uploads off", chunks.len() + 1);
+    let mut stayed = 0;
+    for taken in 0..=chunks.len() {
+        let length = blob.len() as u32;
+        expect_receiving(upload::step(device, UploadStep::Begin { length })?)?;
+        for (index, bytes) in chunks.iter().take(taken).enumerate() {
+            let offset = (index * chunk_bytes) as u32;
+            expect_receiving(upload::step(device, UploadStep::Chunk { offset, bytes })?)?;
+        }
+        let before = device.identify()?.has_in_force(crc_32);
+        device.restart()?;
+        device.pause()?;
+        stayed += usize::from(before && device.identify()?.has_in_force(crc_32));
+        progress.step();
+    }
+    Ok((chunks.len() + 1, stayed))
+}
+
+fn expect_receiving(answer: std::result::Result<UploadState, Refusal>) -> Result<()> {
+    match answer {
+        Ok(UploadState::Receiving { .. }) => Ok(()),
+        other => {
+            let (request, answer) = ("a step of an upload".into(), format!("{other:?}"));
+            Err(Error::Unexpected { request, answer })
+        }
+    }
+}
+
+/// Ways in which an upload can be damaged.
+const KINDS: usize = 7;
+
+/// Uploads `blob` damaged in one of the ways that there are, in turn; whether the device refused it
+/// in the end.
+fn upload_damaged<W: Wire>(
+    device: &mut Device<W>,
+    blob: &[u8],
+    chunk_bytes: usize,
+    index: usize,
+    random: &mut Random,
+) -> Result<bool> {
+    if index % KINDS == KINDS - 1 {
+        return upload_with_a_chunk_lost(device, blob, chunk_bytes, random);
+    }
+    let damaged = damage(blob, index, random);
+    let outcome = upload::send(device, &damaged, chunk_bytes, &Silent)?;
+    Ok(outcome.is_err())
+}
+
+/// `blob` with damage within.
+fn damage(blob: &[u8], index: usize, random: &mut Random) -> Vec<u8> {
+    let mut damaged = blob.to_vec();
+    match index % KINDS {
+        0 => damaged[random.below(blob.len())] ^= 1 << random.below(8),
+        1 => {
+            let start = random.below(blob.len() - 64);
+            damaged[start..start + 64]
+                .iter_mut()
+                .for_each(|byte| *byte ^= 1 + random.below(255) as u8);
+        }
+        2 => damaged.truncate(4 * random.below(blob.len() / 4)),
+        3 => damaged.extend([0; 4]),
+        4 => {
+            // Not a number, where a weight stood, under a CRC that says all is well.
+            let start = blob.len() - 8 - 4 * random.below(64);
+            damaged[start..start + 4].copy_from_slice(&f32::NAN.to_le_bytes());
+            seal(&mut damaged);
+        }
+        _ => {
+            // A number of the shape, under such a CRC.
+            damaged[9 + random.below(5)] ^= 1 << random.below(7);
+            seal(&mut damaged);
+        }
+    }
+    damaged
+}
+
+/// Renews the closing CRC-32.
+fn seal(blob: &mut [u8]) {
+    if let Some((covered, crc)) = blob.split_last_chunk_mut::<4>() {
+        *crc = CRC_32.checksum(covered).to_le_bytes();
+    }
+}
+
+/// As a host would that does not look at answers: one chunk is damaged on the line, the rest follow.
+fn upload_with_a_chunk_lost<W: Wire>(
+    device: &mut Device<W>,
+    blob: &[u8],
+    chunk_bytes: usize,
+    random: &mut Random,
+) -> Result<bool> {
+    expect_receiving(upload::step(device, UploadStep::Begin { length: blob.len() as u32 })?)?;
+    let chunks: Vec<&[u8]> = blob.chunks(chunk_bytes).collect();
+    let lost = random.below(chunks.len());
+    for (index, bytes) in chunks.iter().enumerate() {
+        let offset = (index * chunk_bytes) as u32;
+        let chunk = UploadStep::Chunk { offset, bytes };
+        if index == lost {
+            let mut sent = request_bytes(1, &Request::Upload(chunk))?;
+            let place = random.below(sent.len() - 1);
+            sent[place] ^= 1 << random.below(8);
+            sent.push(0); // the flip may have taken the end
+            device.send_raw(&sent)?;
+        } else if upload::step(device, chunk)?.is_ok() != (index < lost) {
+            return Ok(false);
+        }
+    }
+    Ok(upload::step(device, UploadStep::Commit)?.is_err())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kind_of_damage_makes_a_blob_that_is_refused() {
+        let blob = small_model(&World::press(), 1).unwrap().bytes().to_vec();
+        for index in (0..70).filter(|index| index % KINDS != KINDS - 1) {
+            let mut random = Random::new(1, Stream::Test, Purpose::Damage, index as u64, 0);
+            let damaged = damage(&blob, index, &mut random);
+            assert_ne!(damaged, blob, "{index}");
+            assert!(ModelBlob::of_bytes(&damaged).is_err(), "{index}");
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! What a device must answer, and the model that it must have in force.
+
+use std::time::Duration;
+
+use model_core::blob::Model;
+use taxel_data::progress::Progress;
+use taxel_data::table::Table;
+use taxel_learn::{Exponential, ModelBlob, PreparedModel};
+
+use super::{Device, DeviceIdentity, Wire, stream, upload};
+use crate::error::{Error, Result};
+
+/// A scene's frames with the answers that the host computes.
+pub(super) struct Expected {
+    readings_ohm: Vec<f32>,
+    outputs: Vec<f32>,
+    per_frame: [usize; 2],
+}
+
+impl Expected {
+    /// The answers of `model` to `readings`, with the exponential that it was prepared with.
+    pub(super) fn new(model: &PreparedModel<'_>, readings: &Table) -> Self {
+        let outputs = model.decode_table(readings);
+        let f32s = |values: &[f64]| values.iter().map(|value| *value as f32).collect();
+        Self {
+            readings_ohm: f32s(&readings.values),
+            outputs: f32s(&outputs.values),
+            per_frame: [readings.names.len(), outputs.names.len()],
+        }
+    }
+
+    fn first(&self, frames: usize) -> &[f32] {
+        &self.readings_ohm[..frames * self.per_frame[0]]
+    }
+
+    /// Whether these are the readings of that frame.
+    pub(super) fn was_read(&self, frame: u32, readings: impl Iterator<Item = f32>) -> bool {
+        Self::is_line(&self.readings_ohm, frame, self.per_frame[0], readings)
+    }
+
+    /// Whether these are the outputs of that frame.
+    pub(super) fn is_same(&self, frame: u32, outputs: impl Iterator<Item = f32>) -> bool {
+        Self::is_line(&self.outputs, frame, self.per_frame[1], outputs)
+    }
+
+    fn is_line(all: &[f32], line: u32, width: usize, found: impl Iterator<Item = f32>) -> bool {
+        let start = line as usize * width;
+        all.get(start..start + width).is_some_and(|expected| {
+            found.map(f32::to_bits).eq(expected.iter().map(|value| value.to_bits()))
+        })
+    }
+
+    /// How many of the first `frames` the device decodes to the bit, and how long that took.
+    pub(super) fn count_same<W: Wire>(
+        &self,
+        device: &mut Device<W>,
+        frames: usize,
+        window: usize,
+        progress: &dyn Progress,
+    ) -> Result<(usize, Duration)> {
+        let mut same = 0;
+        progress.stage("decoding on the device", frames);
+        let time = stream::decode_frames(
+            device,
+            self.first(frames),
+            self.per_frame[0],
+            window,
+            |frame, estimate| {
+                same += usize::from(self.is_same(frame, estimate.outputs.iter()));
+                progress.step();
+            },
+        )?;
+        Ok((same, time))
+    }
+}
+
+/// Puts the model of `blob` in force unless it is already; returned is the exponential that the device decodes
+/// with.
+pub(super) fn prepare<W: Wire>(
+    device: &mut Device<W>,
+    blob: &ModelBlob,
+    progress: &dyn Progress,
+) -> Result<Exponential> {
+    let identity = device.identify()?;
+    let model = blob.parse();
+    let exponential = fitting_exponential(&identity, &model)?;
+    if !identity.has_in_force(model.crc()) {
+        upload::replace(device, blob.bytes(), progress)?;
+    }
+    Ok(exponential)
+}
+
+/// The exponential that the device decodes with, if it is a device for this model at all.
+fn fitting_exponential(identity: &DeviceIdentity, model: &Model<'_>) -> Result<Exponential> {
+    let shape = model.shape();
+    let found = [identity.rows, identity.columns, identity.outputs];
+    let expected = [shape.rows, shape.inputs, shape.outputs];
+    if found != expected {
+        return Err(Error::ShapeMismatch { device: found, model: expected });
+    }
+    Exponential::by_name(&identity.kernel)
+        .ok_or_else(|| Error::UnknownExponential(identity.kernel.clone()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_bit_of_one_output_makes_a_frame_another() {
+        let expected = Expected {
+            readings_ohm: vec![60.0; 4],
+            outputs: vec![0.5, -0.25, 0.0, 1.0],
+            per_frame: [2, 2],
+        };
+        assert!(expected.is_same(1, [0.0, 1.0].into_iter()));
+        let next = f32::from_bits(1.0_f32.to_bits() + 1);
+        for wrong in [&[0.0, next][..], &[-0.0, 1.0], &[0.0], &[0.0, 1.0, 2.0], &[0.5, -0.25]] {
+            assert!(!expected.is_same(1, wrong.iter().copied()), "{wrong:?}");
+        }
+        assert!(!expected.is_same(2, std::iter::empty()));
+    }
+}

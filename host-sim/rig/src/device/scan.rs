@@ -1,0 +1,203 @@
+//! Whether a device that scans a virtual board reads and decodes what the host does.
+
+use std::net::{Shutdown, TcpStream};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use firmware::circuit::ZeroPotential;
+use firmware::link::message::{Configuration, Report};
+use serde::Serialize;
+use taxel_data::progress::Progress;
+use taxel_data::table::Table;
+use taxel_learn::ModelBlob;
+use taxel_simulate::World;
+use taxel_simulate::readout::{Circuit, Drive, Readout, Sampler};
+use taxel_simulate::virtual_board::{
+    self, COLUMNS, ROWS, SeriesResistance, VirtualBoard, all_readings, rows_read,
+};
+
+use super::expected::{Expected, prepare};
+use super::{Device, Wire};
+use crate::error::{Error, Result};
+
+/// Time from one scan to the next, if they could be made so fast: the line of the readout is slower.
+const PERIOD_US: u32 = 1000;
+/// How long the line may take for a sample, were it ever so slow a computer.
+const SAMPLE: Duration = Duration::from_millis(5);
+
+/// How scans went.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ScanFindings {
+    /// Scans asked for.
+    pub scans: usize,
+    /// Those whose every reading has the very bits of the host's scan.
+    pub bit_identical_readings: usize,
+    /// Those of which every output has the very bits that the host computes.
+    pub bit_identical_estimates: usize,
+    /// Samples that the device did not get.
+    pub failed_samples: u32,
+    /// Scans a second, decoding and both lines included.
+    pub scans_per_s: f64,
+}
+
+impl ScanFindings {
+    /// Whether all is as it must be.
+    #[must_use]
+    pub fn all_good(&self) -> bool {
+        self.bit_identical_readings == self.scans
+            && self.bit_identical_estimates == self.scans
+            && self.failed_samples == 0
+    }
+}
+
+/// `world` with the parts of the images' readout where it says nothing of them.
+///
+/// # Errors
+/// A world with other parts, or other wires.
+pub fn with_parts_of_image(world: &World) -> Result<World> {
+    let wanted = &world.readout;
+    if wanted.circuit.is_some_and(|circuit| circuit != Circuit::ZeroPotential) {
+        return Err(Error::OtherReadout { field: "circuit", only: "zero-potential" });
+    }
+    if wanted.sampler.is_some_and(|sampler| sampler != Sampler::Mcp3208) {
+        return Err(Error::OtherReadout { field: "sampler", only: "mcp3208" });
+    }
+    if wanted.row_drive.is_some_and(|drive| drive != Drive::ShiftRegister) {
+        return Err(Error::OtherReadout { field: "row_drive", only: "shift-register" });
+    }
+    let readout = Readout {
+        circuit: Some(Circuit::ZeroPotential),
+        sampler: Some(Sampler::Mcp3208),
+        row_drive: Some(Drive::ShiftRegister),
+        ..wanted.clone()
+    };
+    let world = World { readout, ..world.clone() };
+    VirtualBoard::new(&world)?;
+    Ok(world)
+}
+
+/// Lets `device` scan the test frames of `world` on a virtual board that is served on `line`, and
+/// compares with the same scanner on an equal board. The model of `blob` is in force when it is done.
+///
+/// # Errors
+/// The device stops answering, the board refuses anything, or world, model and device do not fit together. What is
+/// merely wrong is in the findings.
+pub fn check<W: Wire>(
+    device: &mut Device<W>,
+    world: &World,
+    blob: &ModelBlob,
+    line: TcpStream,
+    scans: usize,
+    progress: &dyn Progress,
+) -> Result<ScanFindings> {
+    let world = with_parts_of_image(world)?;
+    device.pause()?;
+    let model = blob.prepare(prepare(device, blob, progress)?);
+
+    let readings = all_readings(&world, scans);
+    let board = VirtualBoard::new(&world)?;
+    let scanned = virtual_board::scan(&board, series_of_image(), &readings)?;
+    let expected = Expected::new(&model, &rows_read(&world, &scanned));
+    let scan = board.scan_settings();
+    let configuration = Configuration {
+        frame_period_us: PERIOD_US,
+        scan,
+        send_readings: true,
+        send_estimates: true,
+        ..Configuration::DEFAULT
+    };
+    let samples = ((ROWS + 1) * COLUMNS) as u32 * u32::from(scan.oversampling);
+    let patience = Duration::from_secs(5) + samples * SAMPLE;
+    // A request may have to wait for a scan.
+    device.patience = device.patience.max(patience);
+
+    let end = line.try_clone()?;
+    progress.stage("scanning on the device", scans);
+    thread::scope(|scope| {
+        let served = scope.spawn(|| serve(&world, &readings, line));
+        let go_on = || !served.is_finished();
+        let counted =
+            count_same(device, configuration, &expected, scans, patience, go_on, progress);
+        let _ = end.shutdown(Shutdown::Both); // or the other end has
+        // Why the board is not there any more tells more than that the device waits for it.
+        served
+            .join()
+            .unwrap_or_else(|_| Err(Error::Silent("the virtual board panicked".into())))?;
+        counted
+    })
+}
+
+/// What the images correct for.
+fn series_of_image() -> SeriesResistance {
+    let typical = ZeroPotential::<1, 1>::TYPICAL;
+    SeriesResistance {
+        row_source_ohm: typical.row_source_ohm[0],
+        column_ohm: typical.series_ohm[0],
+    }
+}
+
+/// Serves a board with the first of `readings`, after each scan with the next, then with the last.
+fn serve(world: &World, readings: &Table, line: TcpStream) -> Result<()> {
+    let board = VirtualBoard::new(world)?;
+    let mut frames = readings.lines();
+    let mut show_next = || {
+        if let Some(frame) = frames.next() {
+            board.set_readings(frame);
+        }
+    };
+    show_next();
+    Ok(board.serve(line, show_next)?)
+}
+
+/// Scans under `configuration`, while it is worth it to `go_on`, and counts what is as expected.
+fn count_same<W: Wire>(
+    device: &mut Device<W>,
+    configuration: Configuration,
+    expected: &Expected,
+    scans: usize,
+    patience: Duration,
+    go_on: impl Fn() -> bool,
+    progress: &dyn Progress,
+) -> Result<ScanFindings> {
+    let before = device.statistics()?;
+    let mut findings = ScanFindings {
+        scans,
+        bit_identical_readings: 0,
+        bit_identical_estimates: 0,
+        failed_samples: 0,
+        scans_per_s: 0.0,
+    };
+    let index = |frame: u32| frame.wrapping_sub(before.frames_scanned + 1);
+    device.configure(configuration)?;
+    let start = Instant::now();
+    let (mut ended, mut deadline) = (0, start + patience);
+    while ended < scans {
+        let glance = Instant::now() + Duration::from_millis(100);
+        let heard = device.hear(glance.min(deadline), |_, report| match report {
+            Report::Readings { frame, readings_ohm } => {
+                let same = expected.was_read(index(*frame), readings_ohm.iter());
+                findings.bit_identical_readings += usize::from(same);
+                None
+            }
+            Report::Estimate(estimate) => {
+                let index = index(estimate.frame);
+                let same = expected.is_same(index, estimate.outputs.iter());
+                findings.bit_identical_estimates += usize::from(same);
+                Some(index as usize + 1)
+            }
+            _ => None,
+        })?;
+        if let Some(now_ended) = heard {
+            (ended, deadline) = (now_ended, Instant::now() + patience);
+            progress.step();
+        } else if Instant::now() >= deadline || !go_on() {
+            let message = format!("only {ended} of {scans} scans were reported");
+            return Err(Error::Silent(message));
+        }
+    }
+    findings.scans_per_s = scans as f64 / start.elapsed().as_secs_f64();
+    // It may have begun another scan, and answers after that.
+    device.pause()?;
+    findings.failed_samples = device.statistics()?.failed_samples - before.failed_samples;
+    Ok(findings)
+}

@@ -1,0 +1,93 @@
+//! Frames through a device.
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+use firmware::link::message::{EstimateReport, Report, Request};
+use firmware::link::packet::UNASKED;
+use model_core::blob::Floats;
+
+use super::{ATTEMPTS, Device, Wire};
+use crate::error::{Error, Result};
+
+/// A request on its way.
+struct Outstanding {
+    frame: u32,
+    /// Of its request that was sent last.
+    number: u16,
+    sent: Instant,
+    attempts: u32,
+}
+
+/// Lets the device decode every frame of `readings_ohm` (`per_frame` readings each), up to `window`
+/// of them on their way at a time, and passes each estimate to `take` once. Returns the time it took.
+///
+/// A window above 1 is for lines that hold bytes back while the device is busy, as an emulator's; a
+/// real board may lose them.
+///
+/// # Errors
+/// An [`Error`] if a frame is not answered, or is refused.
+pub fn decode_frames<W: Wire>(
+    device: &mut Device<W>,
+    readings_ohm: &[f32],
+    per_frame: usize,
+    window: usize,
+    mut take: impl FnMut(u32, &EstimateReport<'_>),
+) -> Result<Duration> {
+    let frames = (readings_ohm.len() / per_frame) as u32;
+    let request = |frame: u32| {
+        let start = frame as usize * per_frame;
+        let readings_ohm = Floats::of(&readings_ohm[start..start + per_frame]);
+        Request::Decode { frame, readings_ohm }
+    };
+    let mut on_their_way: VecDeque<Outstanding> = VecDeque::new();
+    let (start, mut next) = (Instant::now(), 0);
+    while next < frames || !on_their_way.is_empty() {
+        while next < frames && on_their_way.len() < window.max(1) {
+            let number = device.send(&request(next))?;
+            let sent = Instant::now();
+            on_their_way.push_back(Outstanding { frame: next, number, sent, attempts: 1 });
+            next += 1;
+        }
+        let Some(oldest) = on_their_way.front() else { break };
+        let deadline = oldest.sent + device.patience;
+        let heard = device.hear(deadline, |number, report| match report {
+            // An estimate that nobody asked for is of a scan.
+            Report::Estimate(estimate) if number != UNASKED => {
+                // An answer to a repeated request may come twice.
+                let place = on_their_way.iter().position(|o| o.frame == estimate.frame)?;
+                on_their_way.remove(place);
+                take(estimate.frame, estimate);
+                Some(Ok(()))
+            }
+            Report::Refused(refusal) if on_their_way.iter().any(|o| o.number == number) => {
+                Some(Err(Error::Refused(*refusal)))
+            }
+            _ => None,
+        })?;
+        match heard {
+            Some(outcome) => outcome?,
+            None => repeat_oldest(device, &mut on_their_way, &request)?,
+        }
+    }
+    Ok(start.elapsed())
+}
+
+fn repeat_oldest<'r, W: Wire>(
+    device: &mut Device<W>,
+    on_their_way: &mut VecDeque<Outstanding>,
+    request: &impl Fn(u32) -> Request<'r>,
+) -> Result<()> {
+    let Some(mut oldest) = on_their_way.pop_front() else { return Ok(()) };
+    if oldest.attempts == ATTEMPTS {
+        let frame = oldest.frame;
+        let message = format!("frame {frame} is not answered, after {ATTEMPTS} attempts");
+        return Err(Error::Silent(message));
+    }
+    oldest.attempts += 1;
+    oldest.sent = Instant::now();
+    device.repeated += 1;
+    oldest.number = device.send(&request(oldest.frame))?;
+    on_their_way.push_back(oldest);
+    Ok(())
+}

@@ -1,0 +1,81 @@
+//! The exchange of a device's model.
+
+use std::time::Duration;
+
+use firmware::link::message::{Refusal, Report, Request, UploadState, UploadStep};
+
+use taxel_data::progress::Progress;
+
+use super::{Device, DeviceIdentity, Wire};
+use crate::error::{Error, Result};
+
+/// Erasing a sector of 128 KiB takes up to 4 s on an STM32F4.
+const ERASE: Duration = Duration::from_secs(6);
+
+/// One step, with the device's answer.
+///
+/// # Errors
+/// An [`Error`] if there is no answer.
+pub fn step<W: Wire>(
+    device: &mut Device<W>,
+    step: UploadStep<'_>,
+) -> Result<std::result::Result<UploadState, Refusal>> {
+    let timeout = if matches!(step, UploadStep::Begin { .. }) {
+        ERASE.max(device.patience)
+    } else {
+        device.patience
+    };
+    device.ask(&Request::Upload(step), timeout, |report| match report {
+        Report::Upload(state) => Some(*state),
+        _ => None,
+    })
+}
+
+/// Sends `blob` from beginning to commit, until the device refuses something.
+///
+/// # Errors
+/// An [`Error`] if there is no answer.
+pub fn send<W: Wire>(
+    device: &mut Device<W>,
+    blob: &[u8],
+    chunk_bytes: usize,
+    progress: &dyn Progress,
+) -> Result<std::result::Result<UploadState, Refusal>> {
+    let chunks = blob.chunks(chunk_bytes);
+    progress.stage("uploading the model", chunks.len());
+    let mut answer = step(device, UploadStep::Begin { length: blob.len() as u32 })?;
+    for (index, bytes) in chunks.enumerate() {
+        if answer.is_err() {
+            return Ok(answer);
+        }
+        let offset = (index * chunk_bytes) as u32;
+        answer = step(device, UploadStep::Chunk { offset, bytes })?;
+        progress.step();
+    }
+    if answer.is_err() { Ok(answer) } else { step(device, UploadStep::Commit) }
+}
+
+/// Puts `blob` in force, and makes sure that it is.
+///
+/// # Errors
+/// An [`Error`] if the device refuses it; its old model is then still in force.
+pub fn replace<W: Wire>(
+    device: &mut Device<W>,
+    blob: &[u8],
+    progress: &dyn Progress,
+) -> Result<DeviceIdentity> {
+    let chunk_bytes = device.identify()?.chunk_bytes;
+    let outcome = send(device, blob, chunk_bytes, progress)?;
+    let crc_32 = match outcome.map_err(Error::Refused)? {
+        UploadState::Committed { crc_32 } => crc_32,
+        other => {
+            let (request, answer) = ("a commit".into(), format!("{other:?}"));
+            return Err(Error::Unexpected { request, answer });
+        }
+    };
+    let identity = device.identify()?;
+    match identity.model {
+        Some(model) if model.crc_32 == crc_32 => Ok(identity),
+        other => Err(Error::NotInForce { committed: crc_32, in_force: format!("{other:?}") }),
+    }
+}

@@ -1,0 +1,148 @@
+//! The device's image in QEMU's mps2-an386, a Cortex-M4F, with its serial lines here.
+
+use std::fs::File;
+use std::io::{ErrorKind, Read};
+use std::net::{Ipv4Addr, TcpListener, TcpStream};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use crate::error::{Error, Result};
+
+/// Where the image expects its first model slot.
+const SLOT_ADDRESS: u32 = 0x0020_0000;
+/// How long QEMU may take to start.
+const START: Duration = Duration::from_secs(20);
+
+/// How to start the emulator.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// The program, by name or path.
+    pub qemu: PathBuf,
+    /// The image, an ELF file.
+    pub image: PathBuf,
+    /// A blob to lie in the first slot from the start.
+    pub model: Option<PathBuf>,
+    /// Where the image's log goes, as defmt writes it; nowhere if not given.
+    pub log: Option<PathBuf>,
+    /// Whether the readout's line is wanted.
+    pub readout: bool,
+}
+
+impl Options {
+    /// Fails early where [`Emulator::start`] could not start.
+    ///
+    /// # Errors
+    /// [`Error::NoImage`], [`Error::NotElf`].
+    pub fn check(&self) -> Result<()> {
+        let mut magic = [0; 4];
+        let opened = File::open(&self.image).and_then(|mut file| file.read_exact(&mut magic));
+        match opened {
+            Ok(()) if magic == *b"\x7FELF" => Ok(()),
+            Ok(()) => Err(Error::NotElf { image: self.image.clone() }),
+            Err(cause) => Err(Error::NoImage { image: self.image.clone(), cause }),
+        }
+    }
+}
+
+/// The image's serial lines.
+#[derive(Debug)]
+pub struct Lines {
+    /// The first, of the link.
+    pub link: TcpStream,
+    /// The second, of the readout, if it was wanted.
+    pub readout: Option<TcpStream>,
+}
+
+/// A running emulator; it ends with this value.
+#[derive(Debug)]
+pub struct Emulator {
+    child: Child,
+}
+
+impl Emulator {
+    /// Starts QEMU and connects to the image's serial lines.
+    ///
+    /// # Errors
+    /// QEMU or the image is missing, or QEMU does not start.
+    pub fn start(options: &Options) -> Result<(Self, Lines)> {
+        options.check()?;
+        let failed = |cause| Error::NoStart { qemu: options.qemu.clone(), cause };
+        let listen = || {
+            let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
+            let port = listener.local_addr()?.port();
+            Ok((listener, format!("tcp:127.0.0.1:{port},nodelay=on")))
+        };
+        let listen = || listen().map_err(failed);
+        let (link, link_serial) = listen()?;
+        let readout = options.readout.then(listen).transpose()?;
+        let mut command = Command::new(&options.qemu);
+        command.args(["-M", "mps2-an386", "-cpu", "cortex-m4", "-display", "none"]);
+        command.args(["-monitor", "none", "-semihosting-config", "enable=on,target=native"]);
+        command.args(["-serial", &link_serial]);
+        if let Some((_, readout_serial)) = &readout {
+            command.args(["-serial", readout_serial]);
+        }
+        if let Some(model) = &options.model {
+            let path = escaped(model);
+            let place = format!("loader,file={path},addr={SLOT_ADDRESS:#x},force-raw=on");
+            command.arg("-device").arg(place);
+        }
+        command.arg("-kernel").arg(&options.image).stdin(Stdio::null()).stdout(
+            match &options.log {
+                Some(path) => {
+                    let file = File::create(path);
+                    file.map_err(|cause| taxel_data::Error::write(path, cause))?.into()
+                }
+                None => Stdio::null(),
+            },
+        );
+        let child = command.spawn().map_err(|cause| {
+            if cause.kind() == ErrorKind::NotFound {
+                return Error::NoQemu { qemu: options.qemu.clone() };
+            }
+            failed(cause)
+        })?;
+        let mut emulator = Self { child };
+        let mut connect = |to: &TcpListener| accept(to, &mut emulator.child).map_err(failed);
+        let link = connect(&link)?;
+        let readout = readout.map(|(listener, _)| connect(&listener)).transpose()?;
+        Ok((emulator, Lines { link, readout }))
+    }
+}
+
+impl Drop for Emulator {
+    fn drop(&mut self) {
+        // It may have ended by itself.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// QEMU reads a comma as the end of an option unless it is doubled.
+fn escaped(path: &Path) -> String {
+    path.display().to_string().replace(',', ",,")
+}
+
+fn accept(listener: &TcpListener, child: &mut Child) -> std::io::Result<TcpStream> {
+    listener.set_nonblocking(true)?;
+    let deadline = Instant::now() + START;
+    loop {
+        match listener.accept() {
+            Ok((stream, _)) => {
+                stream.set_nonblocking(false)?;
+                stream.set_nodelay(true)?;
+                return Ok(stream);
+            }
+            Err(cause) if cause.kind() == ErrorKind::WouldBlock => {}
+            Err(cause) => return Err(cause),
+        }
+        if let Some(status) = child.try_wait()? {
+            return Err(std::io::Error::other(format!("it ended with {status}")));
+        }
+        if Instant::now() > deadline {
+            return Err(std::io::Error::other("QEMU does not connect"));
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}

@@ -1,0 +1,36 @@
+//! One enum of all kinds that implement a trait, so that a new kind is a file and an entry in a list.
+
+/// Makes the enum `Kind` of types that implement a trait; a scene names each by its type, in lower case.
+macro_rules! kinds {
+    ($(#[$doc:meta])* $trait:ident: $($kind:ident),+) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, PartialEq, serde::Deserialize)]
+        #[serde(tag = "kind", rename_all = "lowercase")]
+        pub enum Kind {
+            $(
+                #[doc = concat!("See [`", stringify!($kind), "`].")]
+                $kind($kind)
+            ),+
+        }
+
+        impl std::ops::Deref for Kind {
+            type Target = dyn $trait;
+
+            fn deref(&self) -> &Self::Target {
+                match self {
+                    $(Self::$kind(kind) => kind),+
+                }
+            }
+        }
+
+        $(
+            impl From<$kind> for Kind {
+                fn from(kind: $kind) -> Self {
+                    Self::$kind(kind)
+                }
+            }
+        )+
+    };
+}
+
+pub(crate) use kinds;

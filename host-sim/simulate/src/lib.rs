@@ -1,0 +1,32 @@
+//! What a resistive tactile sensor reads, simulated: the ideal sensor of Wang et al. (2014), how it is
+//! moved, the noise on its readings, and the circuit that reads it.
+//!
+//! A [`World`] says what there is; [`Synthesis`] draws frames of it. Nothing that a world does not ask for is
+//! computed. Modules stand from the ground up; each imports only what stands before it.
+//!
+//! ```
+//! use taxel_data::random::Stream;
+//! use taxel_simulate::{Synthesis, World};
+//!
+//! let world = World::press();
+//! let frames = Synthesis::of(&world).ideal().frames(Stream::Test, 3);
+//! assert_eq!((frames.inputs.names.len(), frames.frames()), (8 * 18, 3));
+//! assert_eq!(frames.outputs.names[2], "r1e1_dz_mm");
+//! ```
+
+pub mod error;
+mod kinds;
+pub mod sensor;
+pub mod motion;
+pub mod rubber;
+pub mod noise;
+pub mod outputs;
+pub mod readout;
+pub mod world;
+pub mod synth;
+pub mod forward;
+pub mod virtual_board;
+
+pub use error::{Error, Result};
+pub use synth::{Synthesis, synthesise};
+pub use world::World;

@@ -1,0 +1,58 @@
+//! Electrodes that each move on their own.
+
+use serde::Deserialize;
+use taxel_data::BadValue;
+use taxel_data::random::Purpose;
+use taxel_data::simd::{self, Lanes};
+
+use super::{Draws, Motion, Trajectories, check_range};
+use crate::sensor::Sensor;
+
+/// Every electrode on its own, uniform along each axis; nothing moves with the default.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Independent {
+    /// Range of Δx in mm.
+    pub dx_mm: [f64; 2],
+    /// Range of Δy in mm.
+    pub dy_mm: [f64; 2],
+    /// Range of Δz in mm.
+    pub dz_mm: [f64; 2],
+}
+
+impl Motion for Independent {
+    fn range_mm(&self) -> [[f64; 2]; 3] {
+        [self.dx_mm, self.dy_mm, self.dz_mm]
+    }
+
+    fn check(&self) -> Result<(), BadValue> {
+        check_range("dx_mm", self.dx_mm)?;
+        check_range("dy_mm", self.dy_mm)?;
+        check_range("dz_mm", self.dz_mm)
+    }
+
+    fn start<'m>(&'m self, _: &'m Sensor, _: &mut Draws) -> Box<dyn Trajectories + 'm> {
+        Box::new(*self)
+    }
+}
+
+impl Trajectories for Independent {
+    fn deform(
+        &mut self,
+        row: usize,
+        _step: usize,
+        draws: &mut Draws,
+        deformation_mm: &mut [[Lanes; 3]],
+    ) {
+        let ranges_mm = self.range_mm();
+        simd::widest(
+            #[inline(always)]
+            || {
+                let random = draws.of(Purpose::Deformation, row as u64);
+                for delta in &mut *deformation_mm {
+                    random.between(ranges_mm, delta);
+                }
+            },
+        );
+    }
+}

@@ -1,0 +1,161 @@
+//! One contact, pressed into the face.
+
+#![allow(clippy::needless_range_loop, reason = "lanes of several arrays are indexed alike")]
+
+use std::f64::consts::TAU;
+
+use serde::Deserialize;
+use taxel_data::random::{Purpose, RandomLanes};
+use taxel_data::simd::{self, LANES, Lanes};
+use taxel_data::{BadValue, exp, is_near_an_axis, sin_cos};
+
+use super::{Draws, Motion, Trajectories, check_range};
+use crate::sensor::{Sensor, Vector3};
+
+/// One contact, centred anywhere on the face: Δz = d·exp(−ρ²/2s²), sheared by
+/// (Δx, Δy) = μ·Δz·(cos θ, sin θ), θ uniform on the circle.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Press {
+    /// Range of the dent's radius s in mm.
+    pub dent_radius_mm: [f64; 2],
+    /// Range of its depth d in mm.
+    pub dent_depth_mm: [f64; 2],
+    /// Range of the shear ratio μ.
+    pub shear_ratio: [f64; 2],
+}
+
+impl Motion for Press {
+    fn range_mm(&self) -> [[f64; 2]; 3] {
+        let [depth, ratio] = [self.dent_depth_mm[1], self.shear_ratio[1]];
+        let shear = depth * ratio;
+        [[-shear, shear], [-shear, shear], [0.0, depth]]
+    }
+
+    fn check(&self) -> Result<(), BadValue> {
+        let lowest = self.dent_radius_mm[0];
+        if !(lowest.is_finite() && lowest > 0.0) {
+            let field = "deformation.dent_radius_mm (low)";
+            return Err(BadValue::new(
+                field,
+                format!("{lowest:?}"),
+                "it must be a positive number",
+            ));
+        }
+        for (field, range, rule) in [
+            ("dent_depth_mm", self.dent_depth_mm, "a depth is not negative"),
+            ("shear_ratio", self.shear_ratio, "a ratio is not negative"),
+        ] {
+            if range[0].is_nan() || range[0] < 0.0 {
+                return Err(BadValue::new(
+                    format!("deformation.{field}"),
+                    format!("{range:?}"),
+                    rule,
+                ));
+            }
+        }
+        check_range("dent_radius_mm", self.dent_radius_mm)?;
+        check_range("dent_depth_mm", self.dent_depth_mm)?;
+        check_range("shear_ratio", self.shear_ratio)
+    }
+
+    fn start<'m>(&'m self, sensor: &'m Sensor, draws: &mut Draws) -> Box<dyn Trajectories + 'm> {
+        let contact = simd::widest(
+            #[inline(always)]
+            || Contact::draw(draws.of(Purpose::Contact, 0), &sensor.size_mm, self),
+        );
+        Box::new(Contacts { sensor, contact })
+    }
+}
+
+/// Contacts that have been drawn, and the sensor that they are pressed into.
+struct Contacts<'m> {
+    sensor: &'m Sensor,
+    contact: Contact,
+}
+
+impl Trajectories for Contacts<'_> {
+    fn deform(
+        &mut self,
+        row: usize,
+        _step: usize,
+        _: &mut Draws,
+        deformation_mm: &mut [[Lanes; 3]],
+    ) {
+        let electrodes_mm = self.sensor.row_electrodes_mm(row);
+        simd::widest(
+            #[inline(always)]
+            || {
+                for (delta, electrode_mm) in deformation_mm.iter_mut().zip(electrodes_mm) {
+                    self.contact.deform(electrode_mm, delta);
+                }
+            },
+        );
+    }
+}
+
+/// One contact a lane.
+struct Contact {
+    centre_mm: [Lanes; 2],
+    dent_radius_mm: Lanes,
+    dent_depth_mm: Lanes,
+    /// Δx/Δz and Δy/Δz.
+    shear: [Lanes; 2],
+}
+
+impl Contact {
+    /// Draws a contact a lane, its centre uniform over the face.
+    #[inline(always)]
+    fn draw(random: &mut RandomLanes, size_mm: &Vector3, press: &Press) -> Self {
+        let ranges = [
+            [0.0, size_mm[0]],
+            [0.0, size_mm[1]],
+            press.dent_radius_mm,
+            press.dent_depth_mm,
+            press.shear_ratio,
+            [0.0, 1.0],
+        ];
+        let mut drawn = [[0.0; LANES]; 6];
+        random.between(ranges, &mut drawn);
+        let [x_mm, y_mm, dent_radius_mm, dent_depth_mm, ratios, turns] = drawn;
+        let mut shear = [[0.0; LANES]; 2];
+        for frame in 0..LANES {
+            let angle_rad = TAU * turns[frame];
+            let (sine, cosine) = if is_near_an_axis(turns[frame]) {
+                (libm::sin(angle_rad), libm::cos(angle_rad))
+            } else {
+                sin_cos(angle_rad)
+            };
+            shear[0][frame] = ratios[frame] * cosine;
+            shear[1][frame] = ratios[frame] * sine;
+        }
+        Self { centre_mm: [x_mm, y_mm], dent_radius_mm, dent_depth_mm, shear }
+    }
+
+    #[inline(always)]
+    fn deform(&self, electrode_mm: &Vector3, [dx_mm, dy_mm, dz_mm]: &mut [Lanes; 3]) {
+        let mut exponents = [0.0; LANES];
+        let mut lowest = 0.0_f64;
+        for frame in 0..LANES {
+            let x = electrode_mm[0] - self.centre_mm[0][frame];
+            let y = electrode_mm[1] - self.centre_mm[1][frame];
+            let radius = self.dent_radius_mm[frame];
+            exponents[frame] = -(x * x + y * y) / (2.0 * radius * radius);
+        }
+        for frame in 0..LANES {
+            dz_mm[frame] = self.dent_depth_mm[frame] * exp(exponents[frame]);
+        }
+        for exponent in exponents {
+            lowest = if exponent < lowest { exponent } else { lowest };
+        }
+        if lowest < -700.0 {
+            for frame in (0..LANES).filter(|frame| exponents[*frame] < -700.0) {
+                dz_mm[frame] = self.dent_depth_mm[frame] * libm::exp(exponents[frame]);
+            }
+        }
+        for frame in 0..LANES {
+            dx_mm[frame] = self.shear[0][frame] * dz_mm[frame];
+            dy_mm[frame] = self.shear[1][frame] * dz_mm[frame];
+        }
+    }
+}

@@ -1,0 +1,246 @@
+//! The ideal sensor: geometry and the forward model, in f64.
+//!
+//! The paper's equations 1–7: an upper electrode moved from U to U − Δ has the node resistance
+//! r = g·‖U − Δ − L‖ to the lower electrode L, and the resistance between row-wire m and
+//! column-wire k is that of all nodes of the two wires in parallel. Force follows the generalised
+//! Hooke law F = diag(kx, ky, kz)·Δ.
+
+use serde::{Deserialize, Serialize};
+
+mod lanes;
+
+pub use lanes::{LaneModel, Precision, Scratch};
+
+/// Direction in the sensor's frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Axis {
+    /// Along the row-wires.
+    X,
+    /// Across the row-wires.
+    Y,
+    /// Along the outward normal.
+    Z,
+}
+
+impl Axis {
+    /// Place in a vector.
+    #[must_use]
+    pub fn index(self) -> usize {
+        self as usize
+    }
+
+    /// Name in column names.
+    #[must_use]
+    pub fn letter(self) -> char {
+        ['x', 'y', 'z'][self.index()]
+    }
+}
+
+/// Position or deformation in mm: x along the row-wires, y across them, z along the outward normal.
+pub type Vector3 = [f64; 3];
+
+/// Geometry and material of a sensor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sensor {
+    /// Row-wires of the upper layer.
+    pub row_wires: usize,
+    /// Electrodes on each row-wire.
+    pub electrodes_per_row_wire: usize,
+    /// Column-wires of the lower layer.
+    pub column_wires: usize,
+    /// Electrodes on each column-wire.
+    pub electrodes_per_column_wire: usize,
+    /// Upper electrodes at rest, row-wire after row-wire: `row_wires × electrodes_per_row_wire`.
+    pub upper_electrodes_mm: Vec<Vector3>,
+    /// Lower electrodes, column-wire after column-wire:
+    /// `column_wires × electrodes_per_column_wire`.
+    pub lower_electrodes_mm: Vec<Vector3>,
+    /// Extent in x, y and z; z is the thickness H.
+    pub size_mm: Vector3,
+    /// Resistance per length of rubber, g.
+    pub resistance_ohm_per_mm: f64,
+    /// Diagonal of the stiffness matrix.
+    pub stiffness_n_per_mm: Vector3,
+}
+
+/// Stiffness typical of a soft silicone; only forces depend on it.
+pub const TYPICAL_STIFFNESS_N_PER_MM: Vector3 = [1.0, 1.0, 2.0];
+
+/// Default upper electrodes: centres of equal cells on the top face, row-wires along x.
+#[must_use]
+pub fn default_upper_electrodes_mm(rows: usize, per_row: usize, size_mm: Vector3) -> Vec<Vector3> {
+    let [x_mm, y_mm, z_mm] = size_mm;
+    (0..rows)
+        .flat_map(|m| {
+            (0..per_row).map(move |i| [cell(i, per_row, x_mm), cell(m, rows, y_mm), z_mm])
+        })
+        .collect()
+}
+
+/// Default lower electrodes: centres of equal cells on the bottom face, column-wires along y.
+#[must_use]
+pub fn default_lower_electrodes_mm(
+    columns: usize,
+    per_column: usize,
+    size_mm: Vector3,
+) -> Vec<Vector3> {
+    let [x_mm, y_mm, _] = size_mm;
+    (0..columns)
+        .flat_map(|k| {
+            (0..per_column).map(move |j| [cell(k, columns, x_mm), cell(j, per_column, y_mm), 0.0])
+        })
+        .collect()
+}
+
+fn cell(index: usize, count: usize, extent_mm: f64) -> f64 {
+    (index as f64 + 0.5) * extent_mm / count as f64
+}
+
+impl Sensor {
+    /// The sensor of Wang et al. (2014): 8 × 18 wires, 20 × 18 × 5 mm, with electrodes at the centres of equal
+    /// cells, since the paper gives no coordinates. Stiffness is that of a soft silicone.
+    #[must_use]
+    pub fn paper() -> Self {
+        let size_mm = [20.0, 18.0, 5.0];
+        Self {
+            row_wires: 8,
+            electrodes_per_row_wire: 6,
+            column_wires: 18,
+            electrodes_per_column_wire: 3,
+            upper_electrodes_mm: default_upper_electrodes_mm(8, 6, size_mm),
+            lower_electrodes_mm: default_lower_electrodes_mm(18, 3, size_mm),
+            size_mm,
+            resistance_ohm_per_mm: 100.0,
+            stiffness_n_per_mm: TYPICAL_STIFFNESS_N_PER_MM,
+        }
+    }
+
+    /// Upper electrodes of one row-wire, at rest.
+    #[must_use]
+    pub fn row_electrodes_mm(&self, row: usize) -> &[Vector3] {
+        let n = self.electrodes_per_row_wire;
+        &self.upper_electrodes_mm[row * n..(row + 1) * n]
+    }
+
+    /// Resistances in Ω between row-wire `row` and every column-wire, for the deformation of that
+    /// row's electrodes (which is all they depend on). The formula as it stands; [`LaneModel`] is quick.
+    ///
+    /// # Panics
+    /// If the slices do not have one entry an electrode and one a column-wire.
+    pub fn row_column_resistance_ohm(
+        &self,
+        row: usize,
+        deformation_mm: &[Vector3],
+        resistance_ohm: &mut [f64],
+    ) {
+        let upper = self.row_electrodes_mm(row);
+        assert_eq!(upper.len(), deformation_mm.len(), "one deformation an electrode");
+        assert_eq!(resistance_ohm.len(), self.column_wires, "one reading a column-wire");
+        let columns = self.lower_electrodes_mm.chunks_exact(self.electrodes_per_column_wire);
+        for (reading, column) in resistance_ohm.iter_mut().zip(columns) {
+            let mut conductance_mm = 0.0; // Σ 1/‖·‖; g is taken out of the sum.
+            for (u, delta) in upper.iter().zip(deformation_mm) {
+                for l in column {
+                    let d = [0, 1, 2].map(|axis| u[axis] - delta[axis] - l[axis]);
+                    conductance_mm += 1.0 / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+                }
+            }
+            *reading = self.resistance_ohm_per_mm / conductance_mm;
+        }
+    }
+
+    /// Names of the readings of `rows` (from 0), row after row.
+    #[must_use]
+    pub fn reading_names(&self, rows: &[usize]) -> Vec<String> {
+        let columns = 1..=self.column_wires;
+        let rows = rows.iter().map(|row| row + 1);
+        rows.flat_map(|m| columns.clone().map(move |k| format!("r{m}c{k}_ohm"))).collect()
+    }
+
+    /// Names of the full deformation of one `row` (from 0), electrode after electrode.
+    #[must_use]
+    pub fn deformation_names(&self, row: usize) -> Vec<String> {
+        let electrodes = 1..=self.electrodes_per_row_wire;
+        electrodes
+            .flat_map(|i| ['x', 'y', 'z'].map(|axis| format!("r{}e{i}_d{axis}_mm", row + 1)))
+            .collect()
+    }
+
+    /// Deformation up to which the model holds along any axis: 20 % of the thickness.
+    #[must_use]
+    pub fn largest_deformation_mm(&self) -> f64 {
+        0.2 * self.size_mm[2]
+    }
+
+    /// Whether the model holds for a deformation along any axis; a rounding error more is let pass.
+    #[must_use]
+    pub fn holds_for(&self, deformation_mm: f64) -> bool {
+        deformation_mm.abs() <= self.largest_deformation_mm() * (1.0 + 1e-12)
+    }
+
+    /// Force on an electrode for its deformation.
+    #[must_use]
+    pub fn force_n(&self, deformation_mm: Vector3) -> Vector3 {
+        [0, 1, 2].map(|axis| self.stiffness_n_per_mm[axis] * deformation_mm[axis])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn readings(sensor: &Sensor, row: usize, deformation_mm: &[Vector3]) -> Vec<f64> {
+        let mut readings = vec![0.0; sensor.column_wires];
+        sensor.row_column_resistance_ohm(row, deformation_mm, &mut readings);
+        readings
+    }
+
+    #[test]
+    fn two_electrodes_give_the_resistance_of_their_distance() {
+        let sensor = Sensor {
+            row_wires: 1,
+            electrodes_per_row_wire: 1,
+            column_wires: 1,
+            electrodes_per_column_wire: 1,
+            upper_electrodes_mm: vec![[3.0, 4.0, 12.0]],
+            lower_electrodes_mm: vec![[0.0; 3]],
+            ..Sensor::paper()
+        };
+        assert!((readings(&sensor, 0, &[[0.0; 3]])[0] - 1300.0).abs() < 1e-9);
+        // Deformation is taken off: positive Δz brings the layers together.
+        assert!((readings(&sensor, 0, &[[3.0, 4.0, 2.0]])[0] - 1000.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn readings_agree_with_values_computed_to_forty_digits() {
+        // By 40-digit decimal arithmetic from the equations (row, deformation rule, column, Ω).
+        let sensor = Sensor::paper();
+        let rule = |i: usize| {
+            let i = i as f64;
+            [0.1 * i - 0.25, 0.3 - 0.125 * i, 0.0625 * (i + 1.0)]
+        };
+        let deformation_mm: Vec<_> = (0..6).map(rule).collect();
+        let rest = [[0.0; 3]; 6];
+        for (row, moved, column, expected) in CASES {
+            let set = if moved { &deformation_mm[..] } else { &rest[..] };
+            let found = readings(&sensor, row, set)[column];
+            assert!((found / expected - 1.0).abs() <= 1e-14, "r{row} c{column}: {found}");
+        }
+    }
+
+    include!("sensor/cases.rs");
+
+    #[test]
+    fn mirror_rows_read_alike_at_rest() {
+        let sensor = Sensor::paper();
+        let rest = [[0.0; 3]; 6];
+        for row in 0..4 {
+            for (a, b) in
+                readings(&sensor, row, &rest).iter().zip(readings(&sensor, 7 - row, &rest))
+            {
+                assert!((a / b - 1.0).abs() < 1e-14);
+            }
+        }
+    }
+}

@@ -1,0 +1,347 @@
+//! The forward model for many frames at once, one frame a lane.
+//!
+//! The sum is the one of [`Sensor::row_column_resistance_ohm`]; what differs is how 1/√ is computed.
+//! Square roots and divisions take a processor three times as long as all the rest, so an estimate in
+//! f32 (a shift of the exponent, then a polynomial) is made exact to 1e-13 by one Newton step in f64. It
+//! consists of shifts, additions and multiplications alone, which every machine rounds alike. Squares of
+//! coordinates that electrodes share are computed once.
+
+#![allow(clippy::needless_range_loop, reason = "lanes of several arrays are indexed alike")]
+
+use serde::{Deserialize, Serialize};
+use taxel_data::simd::{LANES, Lanes};
+
+use super::{Sensor, Vector3};
+
+/// Lengths in mm between which the estimate in f32 holds, with room for their squares.
+const MODERATE_MM: [f64; 2] = [1e-15, 1e15];
+
+/// How precisely readings are computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Precision {
+    /// Within 2e-13 of the sensor's equations.
+    #[default]
+    F64,
+    /// Within 1e-6, a third faster; draws stay as they are.
+    F32,
+}
+
+/// A sensor prepared for computing the readings of many frames.
+#[derive(Debug)]
+pub struct LaneModel<'s> {
+    sensor: &'s Sensor,
+    /// Coordinates of lower electrodes, each once: x, and y with z.
+    x_mm: Vec<f64>,
+    yz_mm: Vec<[f64; 2]>,
+    /// For each lower electrode, where its coordinates stand in those.
+    places: Vec<[usize; 2]>,
+    /// Whether all distances are such that the estimate in f32 holds.
+    is_moderate: bool,
+}
+
+/// What computing a block needs besides: reused from block to block.
+#[derive(Debug, Clone)]
+pub struct Scratch {
+    /// Squared distances along x, and along y and z, by coordinate of lower electrodes.
+    x_mm2: Vec<Squares>,
+    yz_mm2: Vec<Squares>,
+    estimates: [Lanes<f32>; 3],
+}
+
+impl Default for Scratch {
+    fn default() -> Self {
+        Self { x_mm2: Vec::new(), yz_mm2: Vec::new(), estimates: [[0.0; LANES]; 3] }
+    }
+}
+
+/// The same in both precisions.
+#[derive(Debug, Clone)]
+struct Squares {
+    double: Lanes,
+    single: Lanes<f32>,
+}
+
+impl<'s> LaneModel<'s> {
+    /// Prepares `sensor`.
+    #[must_use]
+    pub fn new(sensor: &'s Sensor) -> Self {
+        let (mut x_mm, mut yz_mm, mut places) = (Vec::new(), Vec::new(), Vec::new());
+        for &[x, y, z] in &sensor.lower_electrodes_mm {
+            places.push([place_of(x, &mut x_mm), place_of([y, z], &mut yz_mm)]);
+        }
+        let is_moderate = has_moderate_distances(sensor);
+        Self { sensor, x_mm, yz_mm, places, is_moderate }
+    }
+
+    /// Resistances in Ω between row-wire `row` and every column-wire, for deformations of that row's
+    /// electrodes in mm: by electrode and axis, and by column-wire. NaN makes its frame's readings NaN.
+    ///
+    /// # Panics
+    /// If the slices do not have three entries an electrode and one a column-wire.
+    #[inline(always)]
+    pub fn row_column_resistance_ohm(
+        &self,
+        row: usize,
+        precision: Precision,
+        deformation_mm: &[[Lanes; 3]],
+        scratch: &mut Scratch,
+        resistance_ohm: &mut [Lanes],
+    ) {
+        let sensor = self.sensor;
+        let upper = sensor.row_electrodes_mm(row);
+        assert_eq!(upper.len(), deformation_mm.len(), "one deformation an electrode");
+        assert_eq!(resistance_ohm.len(), sensor.column_wires, "one reading a column-wire");
+        if !self.is_moderate {
+            return self.one_by_one(row, deformation_mm, resistance_ohm);
+        }
+        let Scratch { x_mm2, yz_mm2, estimates } = scratch;
+        x_mm2.resize(self.x_mm.len(), Squares::ZERO);
+        yz_mm2.resize(self.yz_mm.len(), Squares::ZERO);
+        resistance_ohm.fill([0.0; LANES]);
+        for (upper, delta) in upper.iter().zip(deformation_mm) {
+            for (squares, x) in x_mm2.iter_mut().zip(&self.x_mm) {
+                squares.set(|frame| {
+                    let distance = upper[0] - delta[0][frame] - x;
+                    distance * distance
+                });
+            }
+            for (squares, [y, z]) in yz_mm2.iter_mut().zip(&self.yz_mm) {
+                squares.set(|frame| {
+                    let y = upper[1] - delta[1][frame] - y;
+                    let z = upper[2] - delta[2][frame] - z;
+                    y * y + z * z
+                });
+            }
+            let columns = self.places.chunks_exact(sensor.electrodes_per_column_wire);
+            for (places, sum) in columns.zip(&mut *resistance_ohm) {
+                let node = |place: usize| {
+                    let [x, yz] = places[place];
+                    (&x_mm2[x], &yz_mm2[yz])
+                };
+                let threes = places.len() / 3 * 3;
+                for first in (0..threes).step_by(3) {
+                    let three = [node(first), node(first + 1), node(first + 2)];
+                    add_nodes(precision, three, estimates, sum);
+                }
+                for place in threes..places.len() {
+                    add_nodes(precision, [node(place)], estimates, sum);
+                }
+            }
+        }
+        let summed = if precision == Precision::F64 { 2.0 } else { 1.0 }; // see `add_nodes`
+        let unit = summed * sensor.resistance_ohm_per_mm;
+        for sum in resistance_ohm {
+            for sum in sum {
+                *sum = unit / *sum;
+            }
+        }
+    }
+
+    /// The same for sensors of outlandish size, by the plain formula.
+    #[inline(never)]
+    fn one_by_one(&self, row: usize, deformation_mm: &[[Lanes; 3]], resistance_ohm: &mut [Lanes]) {
+        let mut readings = vec![0.0; self.sensor.column_wires];
+        for frame in 0..LANES {
+            let deltas: Vec<Vector3> = deformation_mm
+                .iter()
+                .map(|delta| delta.each_ref().map(|lanes| lanes[frame]))
+                .collect();
+            self.sensor.row_column_resistance_ohm(row, &deltas, &mut readings);
+            for (lanes, reading) in resistance_ohm.iter_mut().zip(&readings) {
+                lanes[frame] = *reading;
+            }
+        }
+    }
+}
+
+impl Squares {
+    const ZERO: Self = Self { double: [0.0; LANES], single: [0.0; LANES] };
+
+    #[inline(always)]
+    fn set(&mut self, squared_mm2: impl Fn(usize) -> f64) {
+        for frame in 0..LANES {
+            self.double[frame] = squared_mm2(frame);
+            self.single[frame] = self.double[frame] as f32;
+        }
+    }
+}
+
+/// Adds 1/‖·‖ of `N` nodes to `sum` (f32), or twice that (f64).
+#[inline(always)]
+fn add_nodes<const N: usize>(
+    precision: Precision,
+    nodes: [(&Squares, &Squares); N],
+    estimates: &mut [Lanes<f32>; 3],
+    sum: &mut Lanes,
+) {
+    // Two loops: the first has eight lanes where the second has four.
+    if precision == Precision::F32 {
+        let added = &mut estimates[0];
+        for frame in 0..LANES {
+            let mut total = 0.0;
+            for node in estimates_at(&nodes, frame) {
+                total += node;
+            }
+            added[frame] = total;
+        }
+        for frame in 0..LANES {
+            sum[frame] += f64::from(added[frame]);
+        }
+        return;
+    }
+    for frame in 0..LANES {
+        let found = estimates_at(&nodes, frame);
+        for place in 0..N {
+            estimates[place][frame] = found[place];
+        }
+    }
+    for frame in 0..LANES {
+        let mut added = 0.0;
+        for place in 0..N {
+            let (x, yz) = nodes[place];
+            let squared_mm2 = x.double[frame] + yz.double[frame];
+            added += twice_refined(squared_mm2, estimates[place][frame]);
+        }
+        sum[frame] += added;
+    }
+}
+
+/// Estimates of 1/‖·‖ of `N` nodes in one frame.
+#[inline(always)]
+fn estimates_at<const N: usize>(nodes: &[(&Squares, &Squares); N], frame: usize) -> [f32; N] {
+    let mut squared_mm2 = [0.0; N];
+    for place in 0..N {
+        let (x, yz) = nodes[place];
+        squared_mm2[place] = x.single[frame] + yz.single[frame];
+    }
+    estimate(squared_mm2)
+}
+
+/// 1/√x to 3e-7: the exponent halved by a shift (Blinn, 1997), to 3.5 %, then the best polynomial of
+/// degree 4 for what is missing.
+///
+/// Step by step for all `N`, so that a processor need not wait for one before it begins the next.
+#[inline(always)]
+fn estimate<const N: usize>(x: [f32; N]) -> [f32; N] {
+    const SHIFTED: u32 = 0x5f37_0000;
+    const P: [f32; 5] = [1.0, 0.499_998_43, 0.374_985_2, 0.313_887_8, 0.278_575_3];
+    let (mut y, mut off, mut factor) = ([0.0; N], [0.0; N], [0.0; N]);
+    for i in 0..N {
+        y[i] = f32::from_bits(SHIFTED.wrapping_sub(x[i].to_bits() >> 1));
+    }
+    for i in 0..N {
+        off[i] = 1.0 - x[i] * y[i] * y[i];
+    }
+    for i in 0..N {
+        let squared = off[i] * off[i];
+        factor[i] = (P[0] + off[i] * P[1]) + squared * ((P[2] + off[i] * P[3]) + squared * P[4]);
+    }
+    for i in 0..N {
+        y[i] *= factor[i];
+    }
+    y
+}
+
+/// 2/√x, by one Newton step from an estimate of 1/√x. The halving is left to who adds them up.
+#[inline(always)]
+fn twice_refined(x: f64, estimate: f32) -> f64 {
+    let y = f64::from(estimate);
+    y * (3.0 - x * y * y)
+}
+
+/// The place of `value` in `known`, where it is put if it is new.
+fn place_of<T: PartialEq>(value: T, known: &mut Vec<T>) -> usize {
+    known.iter().position(|other| *other == value).unwrap_or_else(|| {
+        known.push(value);
+        known.len() - 1
+    })
+}
+
+/// Whether no distance between electrodes leaves [`MODERATE_MM`], however they may be deformed.
+fn has_moderate_distances(sensor: &Sensor) -> bool {
+    let most_mm = 2.0 * sensor.largest_deformation_mm();
+    let (upper, lower) = (&sensor.upper_electrodes_mm, &sensor.lower_electrodes_mm);
+    let z = |electrodes: &[Vector3]| -> Vec<f64> { electrodes.iter().map(|p| p[2]).collect() };
+    let lowest_upper = z(upper).into_iter().fold(f64::INFINITY, f64::min);
+    let highest_lower = z(lower).into_iter().fold(f64::NEG_INFINITY, f64::max);
+    let coordinates = upper.iter().chain(lower).flatten();
+    let farthest = coordinates.fold(most_mm, |most, value| most.max(value.abs()));
+    lowest_upper - most_mm - highest_lower > MODERATE_MM[0] && farthest < MODERATE_MM[1]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use taxel_data::random::{Purpose, Random, Stream};
+
+    /// Readings of drawn deformations by the plain formula, and in a block.
+    fn both_ways(sensor: &Sensor, precision: Precision) -> Vec<[f64; 2]> {
+        let model = LaneModel::new(sensor);
+        let mut random = Random::new(3, Stream::Test, Purpose::Deformation, 0, 0);
+        let mut scratch = Scratch::default();
+        let mut pairs = Vec::new();
+        for row in 0..sensor.row_wires {
+            let mut deformation_mm = vec![[[0.0; LANES]; 3]; sensor.electrodes_per_row_wire];
+            let mut block = vec![[f64::NAN; LANES]; sensor.column_wires];
+            let most = sensor.largest_deformation_mm();
+            for lanes in deformation_mm.as_flattened_mut() {
+                lanes.fill_with(|| random.between([-most, most]));
+            }
+            let (deltas, block_mut) = (&deformation_mm, &mut block);
+            model.row_column_resistance_ohm(row, precision, deltas, &mut scratch, block_mut);
+            let mut plain = vec![0.0; sensor.column_wires];
+            for frame in 0..LANES {
+                let deltas: Vec<Vector3> =
+                    deltas.iter().map(|delta| delta.map(|lanes| lanes[frame])).collect();
+                sensor.row_column_resistance_ohm(row, &deltas, &mut plain);
+                pairs.extend(plain.iter().zip(&block).map(|(plain, lanes)| [*plain, lanes[frame]]));
+            }
+        }
+        pairs
+    }
+
+    fn largest_error(pairs: &[[f64; 2]]) -> f64 {
+        pairs.iter().map(|[plain, block]| (block / plain - 1.0).abs()).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn blocks_agree_with_the_plain_formula() {
+        let odd = Sensor {
+            row_wires: 2,
+            column_wires: 5,
+            electrodes_per_column_wire: 4,
+            lower_electrodes_mm: (0..20)
+                .map(f64::from)
+                .map(|i| [i * i / 20.0, 18.0 - i / 2.0, -i / 30.0])
+                .collect(),
+            ..Sensor::paper()
+        };
+        for sensor in [Sensor::paper(), odd] {
+            let error = largest_error(&both_ways(&sensor, Precision::F64));
+            assert!(error < 1e-13, "f64: {error:e}");
+            let error = largest_error(&both_ways(&sensor, Precision::F32));
+            assert!((1e-9..1e-6).contains(&error), "f32: {error:e}");
+        }
+    }
+
+    #[test]
+    fn outlandish_sensors_are_computed_by_the_plain_formula() {
+        let mut sensor = Sensor::paper();
+        sensor.lower_electrodes_mm[7][0] = 1e200;
+        let pairs = both_ways(&sensor, Precision::F64);
+        assert!(pairs.iter().all(|[plain, block]| plain == block));
+    }
+
+    #[test]
+    fn estimates_of_reciprocal_roots_are_as_good_as_stated() {
+        for i in 0..400_000 {
+            let x = f64::exp(f64::from(i) / 400_000.0 * 2.0_f64.ln() * 3.0 + 3.0);
+            let root = 1.0 / x.sqrt();
+            let [first] = estimate([x as f32]);
+            assert!((f64::from(first) / root - 1.0).abs() < 3e-7, "{x}");
+            let second = 0.5 * twice_refined(x, first);
+            assert!((second / root - 1.0).abs() < 1e-13, "{x}");
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! Some trajectories, one a lane: drawn, computed, disturbed, and laid out frame after frame.
+
+use taxel_data::random::{Purpose, RandomLanes, Stream};
+use taxel_data::simd::{self, LANES, Lanes};
+
+use super::Synthesis;
+use crate::motion::Draws;
+use crate::rubber::Response;
+use crate::sensor::{LaneModel, Scratch};
+
+/// What all lanes of a synthesis share.
+pub(super) struct LaneSynthesis<'s> {
+    synthesis: &'s Synthesis<'s>,
+    stream: Stream,
+    model: LaneModel<'s>,
+    /// Span of every channel that is read, in Ω; empty for relative noise.
+    span_ohm: Vec<f64>,
+    /// Place of each output of a row among electrodes and axes, and what its deformation is multiplied by.
+    outputs: Vec<(usize, f64)>,
+}
+
+/// Memory that the trajectories of one thread use one after the other.
+pub(super) struct Workspace {
+    /// By electrode of a row, and axis.
+    deformation_mm: Vec<[Lanes; 3]>,
+    /// By column-wire.
+    resistance_ohm: Vec<Lanes>,
+    scratch: Scratch,
+}
+
+impl<'s> LaneSynthesis<'s> {
+    /// Prepares frames of `stream`, with noise by `span_ohm` where that is not empty.
+    pub(super) fn new(synthesis: &'s Synthesis<'s>, stream: Stream, span_ohm: Vec<f64>) -> Self {
+        let sensor = &synthesis.world.sensor;
+        let of_an_electrode = |electrode: usize| {
+            let axes = synthesis.outputs.axes.iter();
+            axes.map(move |axis| {
+                (3 * electrode + axis.index(), synthesis.outputs.per_mm(sensor, *axis))
+            })
+        };
+        let outputs = (0..sensor.electrodes_per_row_wire).flat_map(of_an_electrode);
+        let (model, outputs) = (LaneModel::new(sensor), outputs.collect());
+        Self { synthesis, stream, model, span_ohm, outputs }
+    }
+
+    /// Memory for one thread.
+    pub(super) fn workspace(&self) -> Workspace {
+        let sensor = &self.synthesis.world.sensor;
+        Workspace {
+            deformation_mm: vec![[[0.0; LANES]; 3]; sensor.electrodes_per_row_wire],
+            resistance_ohm: vec![[0.0; LANES]; sensor.column_wires],
+            scratch: Scratch::default(),
+        }
+    }
+
+    /// Fills `readings` and `outputs` with the frames of the trajectories from number `first` on; at most
+    /// [`LANES`] of them, the last of which may be cut short.
+    pub(super) fn fill(
+        &self,
+        workspace: &mut Workspace,
+        first: usize,
+        readings: &mut [f64],
+        outputs: &mut [f64],
+    ) {
+        let Synthesis { world, motion, read_rows, .. } = self.synthesis;
+        let mut draws = Draws::new(world.seed, self.stream, first);
+        let mut trajectories = motion.start(&world.sensor, &mut draws);
+        let electrodes = world.sensor.electrodes_per_row_wire;
+        let mut rubber: Vec<Box<dyn Response>> =
+            read_rows.iter().map(|_| world.rubber.at_rest(electrodes)).collect();
+        for step in 0..motion.steps() {
+            for (place, &row) in read_rows.iter().enumerate() {
+                let deformation_mm = &mut workspace.deformation_mm;
+                trajectories.deform(row, step, &mut draws, deformation_mm);
+                rubber[place].respond(motion.step_s(), deformation_mm);
+                simd::widest(
+                    #[inline(always)]
+                    || self.read_row(workspace, (first, step), (place, row), readings, outputs),
+                );
+            }
+        }
+    }
+
+    /// Computes, disturbs and lays out the readings of one row at one step.
+    #[inline(always)]
+    fn read_row(
+        &self,
+        workspace: &mut Workspace,
+        (first, step): (usize, usize),
+        (place, row): (usize, usize),
+        readings: &mut [f64],
+        outputs: &mut [f64],
+    ) {
+        let Synthesis { world, motion, read_rows, .. } = self.synthesis;
+        let (steps, rows, columns) = (motion.steps(), read_rows.len(), world.sensor.column_wires);
+        let Workspace { deformation_mm, resistance_ohm, scratch } = workspace;
+        let precision = world.precision;
+        self.model.row_column_resistance_ohm(
+            row,
+            precision,
+            deformation_mm,
+            scratch,
+            resistance_ohm,
+        );
+        self.disturb((place, row), (first, step), resistance_ohm);
+        let lines = readings.chunks_exact_mut(columns);
+        let line_of_lanes = lines.skip(step * rows + place).step_by(steps * rows);
+        for (lane, readings) in line_of_lanes.enumerate() {
+            for (place, lanes) in readings.iter_mut().zip(&*resistance_ohm) {
+                *place = lanes[lane];
+            }
+        }
+        let (width, of_electrodes) = (self.outputs.len(), deformation_mm.as_flattened());
+        let lines = outputs.chunks_exact_mut(width);
+        let line_of_lanes = lines.skip(step * rows + place).step_by(steps * rows);
+        for (lane, outputs) in line_of_lanes.enumerate() {
+            for (output, (place, factor)) in outputs.iter_mut().zip(&self.outputs) {
+                *output = factor * of_electrodes[*place][lane];
+            }
+        }
+    }
+
+    /// Adds noise to the readings of one row at one step.
+    #[inline(always)]
+    fn disturb(
+        &self,
+        (place, row): (usize, usize),
+        (first, step): (usize, usize),
+        resistance_ohm: &mut [Lanes],
+    ) {
+        let Synthesis { world, noise, motion, .. } = self.synthesis;
+        let (level, columns) = (noise.level, world.sensor.column_wires);
+        if level == 0.0 {
+            return;
+        }
+        // Noise is drawn by frame, whatever trajectory the frame belongs to.
+        let steps = motion.steps();
+        let mut random = RandomLanes::every(first * steps + step, steps);
+        random.start(world.seed, self.stream, Purpose::Noise, row as u64);
+        let mut normals = [[0.0; LANES]; 2];
+        for (pair, readings) in resistance_ohm.chunks_mut(2).enumerate() {
+            let [even, odd] = &mut normals;
+            random.normal_pair(even, odd);
+            for (side, (readings, normals)) in readings.iter_mut().zip(&normals).enumerate() {
+                let span = self.span_ohm.get(place * columns + 2 * pair + side);
+                for (reading, normal) in readings.iter_mut().zip(normals) {
+                    *reading += level * span.unwrap_or(reading) * normal;
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,50 @@
+//! A board that is not there: the firmware's readout, run on the host against a resistor network.
+//!
+//! [`VirtualBoard`] holds the sensor's wires as an electrical network, the parts that select rows
+//! and sample columns, and a clock. Its pins, SPI devices, converter and delay implement
+//! embedded-hal 1.0, so that the firmware's own scanner runs on them. The parts are strict: what the
+//! real one would not accept is refused and recorded ([`VirtualBoard::check`]).
+//!
+//! Cross-talk, resistance in switches and leads, offsets, noise and settling are each simulated only
+//! if the world's readout asks for it. Quantisation always is: counts are what the parts answer.
+//!
+//! ```
+//! use firmware::readout::FrameSource;
+//! use taxel_simulate::World;
+//! use taxel_simulate::virtual_board::{SeriesResistance, VirtualBoard};
+//! use model_core::Frame;
+//!
+//! let board = VirtualBoard::new(&World::press())?;
+//! board.set_readings(&[57.5; 144]); // Ω, row after row
+//! let mut scanner = board.scanner(SeriesResistance::NONE);
+//! let mut frame = Frame::missing();
+//! let report = scanner.scan(board.scan_settings(), &mut frame);
+//! board.check()?;
+//! assert_eq!(report.failed_samples, 0);
+//! assert!((frame.row_column_resistance_ohm[7][17] - 57.5).abs() < 0.02);
+//! # Ok::<(), taxel_simulate::Error>(())
+//! ```
+
+mod pin;
+mod network;
+mod analogue;
+mod rows;
+mod converters;
+mod board;
+mod handles;
+mod scanner;
+mod remote;
+mod scan;
+#[cfg(test)]
+mod tests;
+
+pub use board::{Transactions, VirtualBoard};
+pub use handles::{VirtualAdc, VirtualDelay, VirtualPin, VirtualSpi};
+pub use pin::Pin;
+pub use scan::{all_readings, rows_read, scan};
+pub use scanner::{FrameScanner, SeriesResistance};
+
+/// Row-wires of the virtual board: those of the paper's sensor.
+pub const ROWS: usize = 8;
+/// Column-wires of the virtual board.
+pub const COLUMNS: usize = 18;

@@ -1,0 +1,119 @@
+//! The analogue half of the board: what voltage each column's converter input has.
+
+use firmware::circuit::{Divider, ZeroPotential};
+use taxel_data::random::{Purpose, Random, Stream};
+
+use super::network::{Tie, potentials_v};
+use super::{COLUMNS, ROWS};
+use crate::readout::{Circuit, Readout};
+
+/// A node of no resistance conducts no more than this.
+const MOST_CONDUCTANCE_S: f64 = 1e6;
+
+const ZERO_POTENTIAL: ZeroPotential<1, 1> = ZeroPotential::TYPICAL;
+
+/// The sensor's network and the circuit around it.
+#[derive(Debug)]
+pub(super) struct Analogue {
+    circuit: Circuit,
+    cross_talk: bool,
+    row_source_ohm: f64,
+    line_ohm: f64,
+    offset_v: [f64; COLUMNS],
+    conductance_s: Vec<f64>,
+    /// Outputs by active row, then for none: computed when first asked for.
+    outputs_v: [Option<[f64; COLUMNS]>; ROWS + 1],
+}
+
+/// The converter's reference, and the supply of everything.
+pub(super) fn reference_v() -> f64 {
+    ZERO_POTENTIAL.reference_v.into()
+}
+
+impl Analogue {
+    pub(super) fn new(readout: &Readout, seed: u64) -> Self {
+        let most_v = readout.op_amp_offset_v.unwrap_or(0.0);
+        let offset_v = std::array::from_fn(|k| {
+            let mut random = Random::new(seed, Stream::Test, Purpose::OpAmpOffset, 0, k as u64);
+            random.between([-most_v, most_v])
+        });
+        let line_ohm = readout.line_ohm.unwrap_or(0.0);
+        Self {
+            circuit: readout.circuit.unwrap_or_default(),
+            cross_talk: readout.cross_talk.unwrap_or(false),
+            row_source_ohm: readout.row_switch_ohm.unwrap_or(0.0) + line_ohm,
+            line_ohm,
+            offset_v,
+            conductance_s: vec![0.0; ROWS * COLUMNS],
+            outputs_v: [None; ROWS + 1],
+        }
+    }
+
+    /// Sets the resistance between every row-wire and column-wire, row after row; infinite is open.
+    pub(super) fn set_readings(&mut self, ohm: &[f64]) {
+        assert_eq!(ohm.len(), ROWS * COLUMNS, "a reading of every row-wire and column-wire");
+        for (siemens, ohm) in self.conductance_s.iter_mut().zip(ohm) {
+            assert!(*ohm >= 0.0, "a resistance of {ohm} Ω");
+            *siemens = (1.0 / ohm).min(MOST_CONDUCTANCE_S);
+        }
+        self.outputs_v = [None; ROWS + 1];
+    }
+
+    /// Voltages at the converters' inputs with `active` row, after settling.
+    pub(super) fn outputs_v(&mut self, active: Option<usize>) -> [f64; COLUMNS] {
+        let state = active.unwrap_or(ROWS);
+        if let Some(known) = self.outputs_v[state] {
+            return known;
+        }
+        let outputs = match self.circuit {
+            Circuit::Divider => self.divider_v(active),
+            Circuit::ZeroPotential => self.zero_potential_v(active),
+        };
+        // No output leaves the supply.
+        let outputs = outputs.map(|volt| volt.clamp(0.0, reference_v()));
+        self.outputs_v[state] = Some(outputs);
+        outputs
+    }
+
+    fn row_ties(&self, active: Option<usize>, driven_v: f64, idle: Tie) -> [Tie; ROWS] {
+        let driven = Tie::Held { volt: driven_v, through_ohm: self.row_source_ohm };
+        std::array::from_fn(|row| if Some(row) == active { driven } else { idle })
+    }
+
+    fn divider_v(&self, active: Option<usize>) -> [f64; COLUMNS] {
+        let reference_ohm = f64::from(Divider::<1, 1>::TYPICAL.reference_ohm[0]);
+        if !self.cross_talk {
+            // Every reading a circuit of its own.
+            return std::array::from_fn(|k| {
+                let siemens = active.map_or(0.0, |m| self.conductance_s[m * COLUMNS + k]);
+                reference_v() * siemens * reference_ohm / (siemens * reference_ohm + 1.0)
+            });
+        }
+        let to_ground_ohm = reference_ohm + self.line_ohm;
+        let columns = [Tie::Held { volt: 0.0, through_ohm: to_ground_ohm }; COLUMNS];
+        let rows = self.row_ties(active, reference_v(), Tie::Floating);
+        let potentials = potentials_v(&self.conductance_s, &rows, &columns);
+        std::array::from_fn(|k| potentials[ROWS + k] * reference_ohm / to_ground_ohm)
+    }
+
+    /// With neither switch nor lead between, held wires disturb each other nowhere: no case apart
+    /// is needed for a scene without cross-talk.
+    fn zero_potential_v(&self, active: Option<usize>) -> [f64; COLUMNS] {
+        let drive_v = f64::from(ZERO_POTENTIAL.drive_v);
+        let rest_v = drive_v; // the active row is pulled to ground
+        let feedback_ohm = f64::from(ZERO_POTENTIAL.feedback_ohm[0]);
+        let idle = Tie::Held { volt: rest_v, through_ohm: self.row_source_ohm };
+        let rows = self.row_ties(active, rest_v - drive_v, idle);
+        let columns = self
+            .offset_v
+            .map(|offset| Tie::Held { volt: rest_v + offset, through_ohm: self.line_ohm });
+        let potentials = potentials_v(&self.conductance_s, &rows, &columns);
+        std::array::from_fn(|k| {
+            let current = |m: usize| {
+                (potentials[ROWS + k] - potentials[m]) * self.conductance_s[m * COLUMNS + k]
+            };
+            let current_a: f64 = (0..ROWS).map(current).sum();
+            rest_v + self.offset_v[k] + feedback_ohm * current_a
+        })
+    }
+}

@@ -1,0 +1,48 @@
+//! Whole tables of readings, scanned by the firmware's scanner on a virtual board.
+
+use model_core::Frame;
+use taxel_data::random::Stream;
+use taxel_data::table::Table;
+
+use super::board::VirtualBoard;
+use super::scanner::SeriesResistance;
+use super::{COLUMNS, ROWS};
+use crate::error::Result;
+use crate::synth::Synthesis;
+use crate::world::World;
+
+/// Ideal readings in Ω of all row-wires, whichever are read: what a board is given.
+#[must_use]
+pub fn all_readings(world: &World, frames: usize) -> Table {
+    Synthesis::of(world).ideal().all_rows().frames(Stream::Test, frames).inputs
+}
+
+/// Scans every line of `readings` of all row-wires by the firmware's scanner on `board`.
+///
+/// # Errors
+/// [`Error::Board`](crate::Error::Board): the board refused a transaction.
+pub fn scan(board: &VirtualBoard, series: SeriesResistance, readings: &Table) -> Result<Table> {
+    let mut scanner = board.scanner(series);
+    let settings = board.scan_settings();
+    let mut frame = Frame::<ROWS, COLUMNS>::missing();
+    let mut values = Vec::with_capacity(readings.values.len());
+    for line in readings.lines() {
+        board.set_readings(line);
+        scanner.scan(settings, &mut frame);
+        let scanned = frame.row_column_resistance_ohm.as_flattened();
+        values.extend(scanned.iter().map(|ohm| f64::from(*ohm)));
+    }
+    board.check()?;
+    Ok(Table { names: readings.names.clone(), values })
+}
+
+/// Those of the readings of all row-wires that `world` reads: the columns of its models.
+#[must_use]
+pub fn rows_read(world: &World, readings: &Table) -> Table {
+    let columns = world.sensor.column_wires;
+    let rows = |line: &[f64]| -> Vec<f64> {
+        let row = |row: &usize| line[row * columns..(row + 1) * columns].to_vec();
+        world.read_rows.iter().flat_map(row).collect()
+    };
+    Table { names: world.reading_names(), values: readings.lines().flat_map(rows).collect() }
+}

@@ -1,0 +1,295 @@
+//! A world: a sensor, how it is moved, the noise on its readings, and how it is read.
+
+use firmware::readout::ScanSettings;
+use taxel_data::BadValue;
+
+use crate::motion::{self, Independent, Press};
+use crate::noise::{Noise, NoiseKind};
+use crate::outputs::Outputs;
+use crate::readout::Readout;
+use crate::rubber;
+use crate::sensor::{Axis, Precision, Sensor};
+
+type Check = std::result::Result<(), BadValue>;
+
+/// Most numbers that one data set may hold: 4 GB.
+const MOST_VALUES: usize = 500_000_000;
+
+/// What there is to be simulated, and which of it is wanted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct World {
+    /// Seed of every random draw.
+    pub seed: u64,
+    /// Precision of the readings' computation.
+    pub precision: Precision,
+    /// Geometry and material.
+    pub sensor: Sensor,
+    /// How electrodes move.
+    pub motion: motion::Kind,
+    /// How the rubber follows.
+    pub rubber: rubber::Kind,
+    /// Noise on the readings.
+    pub noise: Noise,
+    /// Row-wires that are read, from 0, ascending.
+    pub read_rows: Vec<usize>,
+    /// Circuit and parts of the readout.
+    pub readout: Readout,
+    /// Outputs that are wanted.
+    pub outputs: Outputs,
+}
+
+impl World {
+    /// The paper's sensor with 0.5 % relative noise, all rows read, all deformations wanted, moved by `motion`.
+    #[must_use]
+    pub fn of_motion(motion: impl Into<motion::Kind>) -> Self {
+        let sensor = Sensor::paper();
+        Self {
+            seed: 1,
+            precision: Precision::default(),
+            motion: motion.into(),
+            rubber: rubber::Kind::default(),
+            noise: Noise { kind: NoiseKind::Relative, level: 0.005 },
+            read_rows: (0..sensor.row_wires).collect(),
+            readout: Readout::default(),
+            outputs: Outputs::all_deformations(),
+            sensor,
+        }
+    }
+
+    /// The world of the scene `press`: one contact.
+    #[must_use]
+    pub fn press() -> Self {
+        Self::of_motion(Press {
+            dent_radius_mm: [2.0, 5.0],
+            dent_depth_mm: [0.0, 1.0],
+            shear_ratio: [0.0, 0.5],
+        })
+    }
+
+    /// The world of the scene `paper`: every electrode on its own.
+    #[must_use]
+    pub fn paper() -> Self {
+        let (dx_mm, dy_mm, dz_mm) = ([-1.0, 1.0], [-1.0, 1.0], [0.0, 1.0]);
+        Self::of_motion(Independent { dx_mm, dy_mm, dz_mm })
+    }
+
+    /// Names of the readings that are wanted, row after row.
+    #[must_use]
+    pub fn reading_names(&self) -> Vec<String> {
+        self.sensor.reading_names(&self.read_rows)
+    }
+
+    /// Names of the outputs that are wanted, row after row.
+    #[must_use]
+    pub fn output_names(&self) -> Vec<String> {
+        self.outputs.names(&self.sensor, &self.read_rows)
+    }
+
+    /// Full scale of the outputs along `axis`, in their unit: the largest deformation magnitude of any axis,
+    /// as the paper has it (1 mm in both reference scenes).
+    #[must_use]
+    pub fn full_scale(&self, axis: Axis) -> f64 {
+        let range_mm = self.motion.range_mm();
+        let largest_mm = range_mm.as_flattened().iter().fold(0.0_f64, |a, b| a.max(b.abs()));
+        largest_mm * self.outputs.per_mm(&self.sensor, axis)
+    }
+
+    /// Full scale of every output, in the order of [`output_names`](Self::output_names).
+    #[must_use]
+    pub fn full_scales(&self) -> Vec<f64> {
+        let electrodes = self.read_rows.len() * self.sensor.electrodes_per_row_wire;
+        let of_one = self.outputs.axes.iter().map(|axis| self.full_scale(*axis));
+        of_one.collect::<Vec<_>>().repeat(electrodes)
+    }
+
+    /// Changes the noise level.
+    ///
+    /// # Errors
+    /// A level that is no fraction.
+    pub fn set_noise_level(&mut self, level: f64) -> Check {
+        check_noise_level("noise level", level)?;
+        self.noise.level = level;
+        Ok(())
+    }
+
+    /// Checks everything; a world that passes can be used without further checks.
+    ///
+    /// # Errors
+    /// The first setting that cannot be used.
+    pub fn check(&self) -> Check {
+        sensor(&self.sensor)?;
+        motion(self)?;
+        check_noise_level("noise.level", self.noise.level)?;
+        rows(self)?;
+        readout(&self.readout)?;
+        outputs(&self.outputs)
+    }
+
+    /// Checks that so many `frames` fit in memory; `field` names them in the message.
+    ///
+    /// # Errors
+    /// Too many frames, or none.
+    pub fn check_frames(&self, field: &str, frames: usize) -> Check {
+        let of_an_electrode = self.sensor.electrodes_per_row_wire * self.outputs.axes.len();
+        let of_a_frame = self.read_rows.len() * (self.sensor.column_wires + of_an_electrode);
+        let most = MOST_VALUES / of_a_frame;
+        require((1..=most).contains(&frames), field, frames, || {
+            format!(
+                "give from 1 to {most} frames; a frame has {of_a_frame} numbers, and a data set of more \
+                 than {MOST_VALUES} does not fit in memory"
+            )
+        })
+    }
+}
+
+/// Checks a noise level; `field` names it in the message.
+///
+/// # Errors
+/// A level that is no fraction.
+pub fn check_noise_level(field: &str, level: f64) -> Check {
+    require((0.0..=1.0).contains(&level), field, level, || {
+        "it is a fraction from 0 to 1 (0.005 is 0.5 %)".into()
+    })
+}
+
+fn require(
+    holds: bool,
+    field: impl Into<String>,
+    value: impl ToString,
+    rule: impl FnOnce() -> String,
+) -> Check {
+    if holds { Ok(()) } else { Err(BadValue::new(field, value, rule())) }
+}
+
+fn positive(field: &str, value: f64) -> Check {
+    require(value.is_finite() && value > 0.0, field, format!("{value:?}"), || {
+        "it must be a positive number".into()
+    })
+}
+
+fn count(field: &str, value: usize, most: usize) -> Check {
+    require((1..=most).contains(&value), field, value, || format!("it must be from 1 to {most}"))
+}
+
+fn sensor(sensor: &Sensor) -> Check {
+    count("sensor.row_wires", sensor.row_wires, 255)?;
+    count("sensor.electrodes_per_row_wire", sensor.electrodes_per_row_wire, 1000)?;
+    count("sensor.column_wires", sensor.column_wires, 10_000)?;
+    count("sensor.electrodes_per_column_wire", sensor.electrodes_per_column_wire, 1000)?;
+    for (axis, value) in ["x", "y", "z"].iter().zip(sensor.size_mm) {
+        positive(&format!("sensor.size_mm ({axis})"), value)?;
+    }
+    for (axis, value) in ["x", "y", "z"].iter().zip(sensor.stiffness_n_per_mm) {
+        positive(&format!("sensor.stiffness_n_per_mm ({axis})"), value)?;
+    }
+    positive("sensor.resistance_ohm_per_mm", sensor.resistance_ohm_per_mm)?;
+    for (field, list, expected, of) in [
+        (
+            "sensor.upper_electrodes_mm",
+            &sensor.upper_electrodes_mm,
+            sensor.row_wires * sensor.electrodes_per_row_wire,
+            "row_wires × electrodes_per_row_wire",
+        ),
+        (
+            "sensor.lower_electrodes_mm",
+            &sensor.lower_electrodes_mm,
+            sensor.column_wires * sensor.electrodes_per_column_wire,
+            "column_wires × electrodes_per_column_wire",
+        ),
+    ] {
+        let listed = format!("a list of {} positions", list.len());
+        require(list.len() == expected, field, listed, || format!("{of} asks for {expected}"))?;
+        let stray = list.as_flattened().iter().find(|value| !value.is_finite());
+        require(stray.is_none(), field, stray.unwrap_or(&0.0), || {
+            "give every position in mm as a finite number".into()
+        })?;
+    }
+    Ok(())
+}
+
+fn motion(world: &World) -> Check {
+    let (motion, sensor) = (&world.motion, &world.sensor);
+    motion.check()?;
+    let range_mm = motion.range_mm();
+    let moves = range_mm.as_flattened().iter().any(|v| *v != 0.0);
+    require(moves, "deformation", format!("{range_mm:?} mm"), || {
+        "nothing can move; widen a range".into()
+    })?;
+    let most = sensor.largest_deformation_mm();
+    for (axis, range) in ["x", "y", "z"].iter().zip(range_mm) {
+        let largest = range[0].abs().max(range[1].abs());
+        let value = format!("up to {largest} mm along {axis}");
+        require(sensor.holds_for(largest), "deformation", value, || {
+            format!(
+                "the sensor model holds up to 20 % of the thickness, {most} mm; narrow the range"
+            )
+        })?;
+    }
+    let lowest_upper = lowest(sensor.upper_electrodes_mm.iter().map(|p| p[2])) - range_mm[2][1];
+    let highest_lower = -lowest(sensor.lower_electrodes_mm.iter().map(|p| -p[2]));
+    let value = format!("down to z = {lowest_upper} mm");
+    require(lowest_upper > highest_lower, "deformation", value, || {
+        format!(
+            "lower electrodes reach {highest_lower} mm: they would touch; raise sensor.upper_electrodes_mm"
+        )
+    })
+}
+
+fn lowest(values: impl Iterator<Item = f64>) -> f64 {
+    values.fold(f64::INFINITY, f64::min)
+}
+
+fn rows(world: &World) -> Check {
+    let (rows, most) = (&world.read_rows, world.sensor.row_wires);
+    let ascending = rows.windows(2).all(|pair| pair[0] < pair[1]);
+    let holds = !rows.is_empty() && ascending && rows.iter().all(|row| *row < most);
+    let listed: Vec<_> = rows.iter().map(|row| row.wrapping_add(1)).collect();
+    require(holds, "readout.row_wires", format!("{listed:?}"), || {
+        format!("list rows from 1 to {most}, ascending")
+    })
+}
+
+fn readout(r: &Readout) -> Check {
+    let whole = |field: &str, value: Option<u32>, [low, high]: [u32; 2]| {
+        let holds = value.is_none_or(|value| (low..=high).contains(&value));
+        require(holds, format!("readout.{field}"), value.unwrap_or_default(), || {
+            format!("it must be from {low} to {high}")
+        })
+    };
+    let most_oversampling = ScanSettings::MOST_OVERSAMPLING.into();
+    whole("adc_bits", r.adc_bits.map(u32::from), [4, 12])?;
+    whole("oversampling", r.oversampling.map(u32::from), [1, most_oversampling])?;
+    whole("settling_us", r.settling_us, [0, ScanSettings::MOST_SETTLING_US])?;
+    for (field, value, most) in [
+        ("row_switch_ohm", r.row_switch_ohm, 1e3),
+        ("line_ohm", r.line_ohm, 1e3),
+        ("op_amp_offset_v", r.op_amp_offset_v, 0.1),
+        ("adc_noise_counts", r.adc_noise_counts, 100.0),
+        ("time_constant_us", r.time_constant_us, 1e3),
+    ] {
+        let holds = value.is_none_or(|value| (0.0..=most).contains(&value));
+        require(holds, format!("readout.{field}"), value.unwrap_or_default(), || {
+            format!("it must be from 0 to {most}")
+        })?;
+    }
+    for (field, value) in [("row_switch_ohm", r.row_switch_ohm), ("line_ohm", r.line_ohm)] {
+        let shared = value.unwrap_or_default();
+        let holds = shared == 0.0 || r.cross_talk == Some(true);
+        require(holds, format!("readout.{field}"), shared, || {
+            format!(
+                "what the readings of a wire share couples them; set readout.cross_talk = true, or leave \
+                 {field} out"
+            )
+        })?;
+    }
+    Ok(())
+}
+
+fn outputs(outputs: &Outputs) -> Check {
+    let axes = &outputs.axes;
+    let ascending = axes.windows(2).all(|pair| pair[0].index() < pair[1].index());
+    let letters: Vec<char> = axes.iter().map(|axis| axis.letter()).collect();
+    require(!axes.is_empty() && ascending, "outputs.axes", format!("{letters:?}"), || {
+        "list at least one of \"x\", \"y\", \"z\", each once, always in the order x, y, z".into()
+    })
+}

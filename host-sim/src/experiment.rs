@@ -1,0 +1,253 @@
+//! Experiments: a world, how a model is trained for it, and how Table 1 is computed, all from a scene's file.
+//!
+//! A scene is a TOML file; `docs/scenes.md` explains every field. [`Experiment::load`] reads and checks it; what
+//! it returns can be used without further checks.
+
+use std::path::Path;
+
+use model_core::blob::NoiseKind as BlobNoiseKind;
+use model_core::rbf::Format;
+use serde::Deserialize;
+use taxel_data::BadValue;
+use taxel_data::digest::digest;
+use taxel_data::progress::Progress;
+use taxel_data::random::Stream;
+use taxel_learn::train::{check_spread, train};
+use taxel_learn::{ModelBlob, Options, Origin, pack};
+use taxel_simulate::noise::NoiseKind;
+use taxel_simulate::world::check_noise_level;
+use taxel_simulate::{World, synthesise};
+
+use crate::error::{Error, Result};
+use crate::metrics::Measure;
+
+mod file;
+
+type Check = std::result::Result<(), BadValue>;
+
+/// Scenes that are part of the program, by name.
+pub const EMBEDDED: [(&str, &str); 2] = [
+    ("paper", include_str!("../../scenes/paper.toml")),
+    ("press", include_str!("../../scenes/press.toml")),
+];
+
+/// A checked scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Experiment {
+    /// Name of the output folder and the model.
+    pub name: String,
+    /// CRC-64/XZ of the scene's text.
+    pub digest: u64,
+    /// What there is.
+    pub world: World,
+    /// How the model is trained.
+    pub training: Training,
+    /// How Table 1 is computed, if it is wanted.
+    pub table1: Option<Table1>,
+}
+
+/// How the model is trained.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Training {
+    /// Frames to train on.
+    pub frames: usize,
+    /// Frames to evaluate on.
+    pub test_frames: usize,
+    /// Centres of each row's network, K.
+    pub centres: usize,
+    /// Width σ on scaled inputs.
+    pub spread: f64,
+    /// Whether A·x is added.
+    pub affine_tail: bool,
+    /// Number format of the weights.
+    #[serde(default = "default_format", deserialize_with = "file::format::deserialize")]
+    pub format: Format,
+    /// One network for all rows, behind a projection of all readings, instead of one a row.
+    #[serde(default)]
+    pub whole_array: bool,
+}
+
+/// How Table 1 of the paper is computed.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Table1 {
+    /// Spreads, one a line of the table.
+    pub spreads: Vec<f64>,
+    /// Noise levels, one a column.
+    pub noise_levels: Vec<f64>,
+    /// Frames to train each cell on.
+    pub frames: usize,
+    /// Frames to evaluate each cell on.
+    pub test_frames: usize,
+    /// Centres of each row's network, K.
+    pub centres: usize,
+    /// Whether A·x is added (the paper's network has no such tail).
+    pub affine_tail: bool,
+    /// Frames, and centres, of the standard network (K = N).
+    pub standard_frames: usize,
+}
+
+fn default_format() -> Format {
+    Options::default().format
+}
+
+impl Experiment {
+    /// Reads a scene: the name of an embedded one, or a path.
+    ///
+    /// # Errors
+    /// A file that cannot be read, [`Error::Syntax`], or [`Error::Scene`].
+    pub fn load(name_or_path: &str) -> Result<Self> {
+        if let Some((_, text)) = EMBEDDED.iter().find(|(name, _)| *name == name_or_path) {
+            return Self::parse(name_or_path, text);
+        }
+        let path = Path::new(name_or_path);
+        let text = std::fs::read_to_string(path).map_err(|cause| {
+            let names: Vec<_> = EMBEDDED.iter().map(|(name, _)| *name).collect();
+            let known = names.join(", ");
+            let hint = format!("{cause}; built-in scenes are: {known}");
+            taxel_data::Error::read(path, std::io::Error::new(cause.kind(), hint))
+        })?;
+        Self::parse(name_or_path, &text)
+    }
+
+    /// Reads a scene from its text; `origin` names it in messages.
+    ///
+    /// # Errors
+    /// [`Error::Syntax`] or [`Error::Scene`].
+    pub fn parse(origin: &str, text: &str) -> Result<Self> {
+        let file: file::SceneFile = toml::from_str(text).map_err(|cause| Error::Syntax {
+            scene: origin.into(),
+            message: cause.to_string().trim_end().to_owned(),
+        })?;
+        let experiment = file.into_experiment(digest(text.as_bytes()));
+        match experiment.check() {
+            Ok(()) => Ok(experiment),
+            Err(cause) => Err(Error::Scene { scene: origin.into(), cause }),
+        }
+    }
+
+    /// Options that the model is trained with.
+    #[must_use]
+    pub fn options(&self) -> Options {
+        let t = &self.training;
+        Options {
+            centres: t.centres,
+            spread: t.spread,
+            affine_tail: t.affine_tail,
+            seed: self.world.seed,
+            format: t.format,
+            whole_array: t.whole_array,
+            ..Options::default()
+        }
+    }
+
+    /// What a model of this scene says of its training data.
+    #[must_use]
+    pub fn origin(&self) -> Origin {
+        let noise = &self.world.noise;
+        let kind = match noise.kind {
+            NoiseKind::Relative => BlobNoiseKind::Relative,
+            NoiseKind::Span => BlobNoiseKind::Span,
+        };
+        Origin {
+            name: self.name.clone(),
+            digest: self.digest,
+            noise: (kind, noise.level),
+            seed: self.world.seed,
+            thickness_mm: Some(self.world.sensor.size_mm[2]),
+            full_scale: self.world.full_scales(),
+        }
+    }
+
+    /// What errors are measured against.
+    #[must_use]
+    pub fn measure(&self) -> Measure {
+        Measure {
+            full_scale: self.world.full_scales(),
+            thickness_mm: Some(self.world.sensor.size_mm[2]),
+        }
+    }
+
+    /// Trains the model that the scene describes, as the command `train` does.
+    ///
+    /// # Errors
+    /// Training options that cannot be used, or a model that cannot be packed.
+    pub fn train(&self, progress: &dyn Progress) -> Result<ModelBlob> {
+        let frames = synthesise(&self.world, Stream::Training, self.training.frames);
+        let trained = train(&frames, &self.options(), progress)?;
+        Ok(pack(&trained, &frames, &self.origin())?)
+    }
+
+    fn check(&self) -> Check {
+        let name_ok = !self.name.is_empty()
+            && self.name.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_');
+        require(name_ok, "name", format!("{:?}", self.name), || {
+            "it names a folder; use letters, digits, - and _".into()
+        })?;
+        self.world.check()?;
+        check_training(&self.training)?;
+        self.table1.as_ref().map_or(Ok(()), check_table1)?;
+        let t = &self.training;
+        let mut counts =
+            vec![("training.frames", t.frames), ("training.test_frames", t.test_frames)];
+        if let Some(t) = &self.table1 {
+            counts.extend([("table1.frames", t.frames), ("table1.test_frames", t.test_frames)]);
+        }
+        counts.into_iter().try_for_each(|(field, frames)| self.world.check_frames(field, frames))
+    }
+}
+
+fn require(
+    holds: bool,
+    field: impl Into<String>,
+    value: impl ToString,
+    rule: impl FnOnce() -> String,
+) -> Check {
+    if holds { Ok(()) } else { Err(BadValue::new(field, value, rule())) }
+}
+
+fn check_training(t: &Training) -> Check {
+    check_sizes("training", t.frames, t.test_frames, t.centres)?;
+    check_spread("training.spread", t.spread)
+}
+
+fn check_table1(t: &Table1) -> Check {
+    check_sizes("table1", t.frames, t.test_frames, t.centres)?;
+    require(!t.spreads.is_empty(), "table1.spreads", "[]", || "list at least one".into())?;
+    require(!t.noise_levels.is_empty(), "table1.noise_levels", "[]", || {
+        "list at least one".into()
+    })?;
+    for spread in &t.spreads {
+        check_spread("table1.spreads", *spread)?;
+    }
+    for level in &t.noise_levels {
+        check_noise_level("table1.noise_levels", *level)?;
+    }
+    let holds = (2..=2000).contains(&t.standard_frames) && t.standard_frames <= t.frames;
+    require(holds, "table1.standard_frames", t.standard_frames, || {
+        format!(
+            "it must be from 2 to 2000 (work grows with its cube) and at most table1.frames = {}",
+            t.frames
+        )
+    })
+}
+
+fn check_sizes(section: &str, frames: usize, test_frames: usize, centres: usize) -> Check {
+    require((1..=65_535).contains(&centres), format!("{section}.centres"), centres, || {
+        "it must be from 1 to 65535".into()
+    })?;
+    require(frames >= 2, format!("{section}.frames"), frames, || "it must be at least 2".into())?;
+    require(test_frames > 0, format!("{section}.test_frames"), 0, || {
+        "it must be at least 1".into()
+    })?;
+    require(centres < frames, format!("{section}.centres"), centres, || {
+        format!(
+            "there must be fewer centres than training frames ({frames}); lower it or raise \
+             {section}.frames"
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests;

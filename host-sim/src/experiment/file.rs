@@ -1,0 +1,120 @@
+//! The scene as it stands in the file, before defaults are filled in.
+
+use serde::Deserialize;
+use taxel_simulate::World;
+use taxel_simulate::motion;
+use taxel_simulate::noise::Noise;
+use taxel_simulate::outputs::Outputs;
+use taxel_simulate::readout::Readout;
+use taxel_simulate::rubber;
+use taxel_simulate::sensor::{self, Precision, Sensor, Vector3};
+
+use super::{Experiment, Table1, Training};
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SceneFile {
+    name: String,
+    #[serde(default = "default_seed")]
+    seed: u64,
+    #[serde(default)]
+    precision: Precision,
+    sensor: SensorFile,
+    deformation: motion::Kind,
+    noise: Noise,
+    #[serde(default)]
+    readout: Readout,
+    outputs: Outputs,
+    training: Training,
+    table1: Option<Table1>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SensorFile {
+    row_wires: usize,
+    electrodes_per_row_wire: usize,
+    column_wires: usize,
+    electrodes_per_column_wire: usize,
+    size_mm: Vector3,
+    resistance_ohm_per_mm: f64,
+    #[serde(default = "default_stiffness")]
+    stiffness_n_per_mm: Vector3,
+    upper_electrodes_mm: Option<Vec<Vector3>>,
+    lower_electrodes_mm: Option<Vec<Vector3>>,
+}
+
+fn default_seed() -> u64 {
+    1
+}
+
+fn default_stiffness() -> Vector3 {
+    sensor::TYPICAL_STIFFNESS_N_PER_MM
+}
+
+/// A number format by its name.
+pub(super) mod format {
+    use model_core::rbf::Format;
+    use serde::{Deserialize, Deserializer, de::Error};
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Format, D::Error> {
+        let name = String::deserialize(deserializer)?;
+        Format::ALL.into_iter().find(|format| format.name() == name).ok_or_else(|| {
+            let known: Vec<String> =
+                Format::ALL.iter().map(|format| format!("`{}`", format.name())).collect();
+            D::Error::custom(format!("unknown format `{name}`, expected {}", known.join(", ")))
+        })
+    }
+}
+
+impl SceneFile {
+    pub(super) fn into_experiment(self, digest: u64) -> Experiment {
+        let s = self.sensor;
+        let sensor = Sensor {
+            upper_electrodes_mm: s.upper_electrodes_mm.unwrap_or_else(|| {
+                sensor::default_upper_electrodes_mm(
+                    s.row_wires,
+                    s.electrodes_per_row_wire,
+                    s.size_mm,
+                )
+            }),
+            lower_electrodes_mm: s.lower_electrodes_mm.unwrap_or_else(|| {
+                sensor::default_lower_electrodes_mm(
+                    s.column_wires,
+                    s.electrodes_per_column_wire,
+                    s.size_mm,
+                )
+            }),
+            row_wires: s.row_wires,
+            electrodes_per_row_wire: s.electrodes_per_row_wire,
+            column_wires: s.column_wires,
+            electrodes_per_column_wire: s.electrodes_per_column_wire,
+            size_mm: s.size_mm,
+            resistance_ohm_per_mm: s.resistance_ohm_per_mm,
+            stiffness_n_per_mm: s.stiffness_n_per_mm,
+        };
+        let mut readout = self.readout;
+        let read_rows = match readout.row_wires.take() {
+            // Row 0 does not exist in a file; it becomes one that validation refuses.
+            Some(rows) => rows.into_iter().map(|row| row.wrapping_sub(1)).collect(),
+            None => (0..sensor.row_wires).collect(),
+        };
+        Experiment {
+            name: self.name,
+            digest,
+            world: World {
+                seed: self.seed,
+                precision: self.precision,
+                sensor,
+                motion: self.deformation,
+                rubber: rubber::Kind::default(),
+                noise: self.noise,
+                read_rows,
+                readout,
+                outputs: self.outputs,
+            },
+            training: self.training,
+            table1: self.table1,
+        }
+    }
+}

@@ -1,0 +1,85 @@
+use taxel_simulate::readout::{Circuit, Readout};
+use taxel_simulate::sensor::{Axis, Sensor};
+
+use super::*;
+
+#[test]
+fn embedded_scenes_are_sound_and_named_as_they_are_called() {
+    for (name, _) in EMBEDDED {
+        let scene = Experiment::load(name).unwrap();
+        assert_eq!(scene.name, name);
+        assert_eq!(scene.world.read_rows, (0..8).collect::<Vec<_>>());
+        assert_eq!(scene.world.readout, Readout::default());
+        assert_eq!(scene.world.full_scale(Axis::Z), 1.0);
+        assert_eq!(scene.world.sensor, Sensor::paper());
+    }
+}
+
+#[test]
+fn worlds_in_code_are_those_of_the_embedded_scenes() {
+    for (name, world) in [("paper", World::paper()), ("press", World::press())] {
+        assert_eq!(Experiment::load(name).unwrap().world, world);
+    }
+}
+
+#[test]
+fn listed_positions_replace_the_cells() {
+    let upper = (0..48).map(|i| format!("[{i}.5, 1.0, 6.0]")).collect::<Vec<_>>().join(", ");
+    let listed = format!(
+        "resistance_ohm_per_mm = 250.0\nstiffness_n_per_mm = [0.5, 0.6, 3.0]\n\
+         upper_electrodes_mm = [{upper}]"
+    );
+    let text = EMBEDDED[1].1.replace("resistance_ohm_per_mm = 100.0", &listed);
+    let scene = Experiment::parse("test", &text).unwrap().world;
+    assert_eq!(scene.sensor.upper_electrodes_mm[47], [47.5, 1.0, 6.0]);
+    assert_eq!(scene.sensor.force_n([1.0, 1.0, 0.5]), [0.5, 0.6, 1.5]);
+    let default = Experiment::load("press").unwrap().world;
+    assert_eq!(scene.sensor.lower_electrodes_mm, default.sensor.lower_electrodes_mm);
+    let digest = |text: &str| Experiment::parse("test", text).unwrap().digest;
+    assert_ne!(digest(&text), digest(EMBEDDED[1].1));
+}
+
+#[test]
+fn electrodes_that_would_touch_are_refused() {
+    let upper = (0..48).map(|i| format!("[{i}.5, 1.0, 0.5]")).collect::<Vec<_>>().join(", ");
+    let text = EMBEDDED[0].1.replace(
+        "resistance_ohm_per_mm = 100.0",
+        &format!("resistance_ohm_per_mm = 100.0\nupper_electrodes_mm = [{upper}]"),
+    );
+    let refused = Experiment::parse("test", &text).unwrap_err().to_string();
+    assert!(refused.contains("they would touch"), "{refused}");
+}
+
+#[test]
+fn forces_have_their_own_full_scale_and_values() {
+    let text = EMBEDDED[0]
+        .1
+        .replace("quantity = \"deformation\"", "quantity = \"force\"")
+        .replace("axes = [\"x\", \"y\", \"z\"]", "axes = [\"x\", \"z\"]");
+    let scene = Experiment::parse("test", &text).unwrap().world;
+    assert_eq!((scene.full_scale(Axis::X), scene.full_scale(Axis::Z)), (1.0, 2.0));
+    let outputs: Vec<f64> = scene.outputs.of_electrode(&scene.sensor, [0.25, 9.0, 0.5]).collect();
+    assert_eq!(outputs, [0.25, 1.0]);
+    assert_eq!(scene.output_names()[1], "r1e1_fz_n");
+}
+
+#[test]
+fn a_readout_changes_nothing_that_is_synthesised() {
+    let read = "[readout]\nrow_wires = [2, 7]\ncircuit = \"divider\"\ncross_talk = true\n\
+                row_switch_ohm = 0.4\nadc_bits = 10\noversampling = 4\n\n[outputs]";
+    let text = EMBEDDED[1].1.replace("[outputs]", read);
+    let scene = Experiment::parse("test", &text).unwrap().world;
+    assert_eq!(scene.read_rows, [1, 6]);
+    let expected = Readout {
+        circuit: Some(Circuit::Divider),
+        cross_talk: Some(true),
+        row_switch_ohm: Some(0.4),
+        adc_bits: Some(10),
+        oversampling: Some(4),
+        ..Readout::default()
+    };
+    assert_eq!(scene.readout, expected);
+    let plain = World { readout: Readout::default(), ..scene.clone() };
+    let frames = |world| synthesise(world, Stream::Training, 20);
+    assert_eq!(frames(&scene), frames(&plain));
+}

@@ -1,0 +1,254 @@
+//! Errors, by every definition in use. No figure stands alone: the definitions differ by more than
+//! the decoders do, so all of them are always given.
+
+use serde::Serialize;
+use taxel_data::columns;
+use taxel_data::dataset::Dataset;
+use taxel_data::table::Table;
+use taxel_learn::Decoder;
+
+/// Mean relative error counts only where the truth exceeds this share of full scale.
+pub const RELATIVE_THRESHOLD: f64 = 0.1;
+
+/// What errors are measured against.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measure {
+    /// Full scale of each output, in its unit.
+    pub full_scale: Vec<f64>,
+    /// Sensor thickness H, for the positional error.
+    pub thickness_mm: Option<f64>,
+}
+
+/// Errors of one group of outputs (an axis, or a column of measured data).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Errors {
+    /// The group: `dz_mm`, or a column's name.
+    pub group: String,
+    /// Unit of `rmse`.
+    pub unit: String,
+    /// Pairs of truth and estimate that count.
+    pub count: usize,
+    /// √(mean e²), in the unit.
+    pub rmse: f64,
+    /// ‖e‖/‖truth‖, in per cent.
+    pub relative_l2_percent: Option<f64>,
+    /// mean|e|/full scale, in per cent.
+    pub full_scale_percent: Option<f64>,
+    /// mean|e|/(H − Δz), in per cent; compression in mm only.
+    pub positional_percent: Option<f64>,
+    /// 1 − Σe²/Σ(truth − its column's mean)².
+    pub r_squared: Option<f64>,
+    /// mean|e|/|truth| over truths above [`RELATIVE_THRESHOLD`] of full scale, in per cent.
+    pub mean_relative_percent: Option<f64>,
+}
+
+/// Errors of one decoder.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DecoderErrors {
+    /// Name of the decoder, such as `network`, `linear` or `mean`.
+    pub decoder: String,
+    /// Errors by group.
+    pub errors: Vec<Errors>,
+}
+
+/// Errors of `decoder` on the frames of `test`.
+#[must_use]
+pub fn judge(decoder: &dyn Decoder, test: &Dataset, measure: &Measure) -> DecoderErrors {
+    let estimates = decoder.decode_all(&test.inputs.values, 1);
+    let errors = by_group(&test.outputs, &estimates.values, measure);
+    DecoderErrors { decoder: decoder.name().into(), errors }
+}
+
+/// Definitions of error, for tables that show one after the other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Definition {
+    /// [`Errors::rmse`].
+    Rmse,
+    /// [`Errors::relative_l2_percent`].
+    RelativeL2Percent,
+    /// [`Errors::full_scale_percent`].
+    FullScalePercent,
+    /// [`Errors::positional_percent`].
+    PositionalPercent,
+    /// [`Errors::r_squared`].
+    RSquared,
+    /// [`Errors::mean_relative_percent`].
+    MeanRelativePercent,
+}
+
+impl Definition {
+    /// All definitions.
+    pub const ALL: [Self; 6] = [
+        Self::Rmse,
+        Self::RelativeL2Percent,
+        Self::FullScalePercent,
+        Self::PositionalPercent,
+        Self::RSquared,
+        Self::MeanRelativePercent,
+    ];
+
+    /// Name in CSV and JSON.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Rmse => "rmse",
+            Self::RelativeL2Percent => "relative_l2_percent",
+            Self::FullScalePercent => "full_scale_percent",
+            Self::PositionalPercent => "positional_percent",
+            Self::RSquared => "r_squared",
+            Self::MeanRelativePercent => "mean_relative_percent",
+        }
+    }
+
+    /// Formula, for captions.
+    #[must_use]
+    pub fn formula(self) -> &'static str {
+        match self {
+            Self::Rmse => "RMSE = √mean(e²), in the output's unit",
+            Self::RelativeL2Percent => "relative L2 = ‖e‖/‖Δ‖, %",
+            Self::FullScalePercent => "%FS = mean|e|/full scale, %",
+            Self::PositionalPercent => "positional = mean|e|/(H − Δz), %",
+            Self::RSquared => "R² = 1 − Σe²/Σ(Δ − mean Δ)²",
+            Self::MeanRelativePercent => "mean(|e|/|Δ|) where |Δ| > 10 % of full scale, %",
+        }
+    }
+
+    /// The value of this definition, where it is defined.
+    #[must_use]
+    pub fn of(self, errors: &Errors) -> Option<f64> {
+        match self {
+            Self::Rmse => Some(errors.rmse),
+            Self::RelativeL2Percent => errors.relative_l2_percent,
+            Self::FullScalePercent => errors.full_scale_percent,
+            Self::PositionalPercent => errors.positional_percent,
+            Self::RSquared => errors.r_squared,
+            Self::MeanRelativePercent => errors.mean_relative_percent,
+        }
+    }
+}
+
+/// Errors of every group of columns, in the order in which groups first appear. Pairs with a
+/// missing value (NaN) on either side do not count.
+///
+/// # Panics
+/// If `estimate` is not as long as `truth`, or `measure` does not have one full scale a column.
+#[must_use]
+pub fn by_group(truth: &Table, estimate: &[f64], measure: &Measure) -> Vec<Errors> {
+    columns::groups(&truth.names)
+        .iter()
+        .map(|(group, members)| of_columns(group, members, truth, estimate, measure))
+        .collect()
+}
+
+#[derive(Default)]
+struct Sums {
+    count: usize,
+    error_squares: f64,
+    truth: f64,
+    truth_squares: f64,
+    full_scale: f64,
+    positional: f64,
+    relative: f64,
+    relative_count: usize,
+}
+
+fn of_columns(
+    group: &str,
+    members: &[usize],
+    truth: &Table,
+    estimate: &[f64],
+    measure: &Measure,
+) -> Errors {
+    assert_eq!(truth.values.len(), estimate.len(), "an estimate for every truth");
+    assert_eq!(measure.full_scale.len(), truth.names.len(), "a full scale for every column");
+    let thickness_mm = measure.thickness_mm.filter(|_| columns::is_compression(group));
+    let mut total = Sums::default();
+    let mut deviation_squares = 0.0; // Σ(truth − its column's mean)²
+    for &column in members {
+        let full_scale = measure.full_scale[column];
+        let mut sums = Sums::default();
+        for (truth, estimate) in truth.lines().zip(estimate.chunks_exact(truth.names.len())) {
+            let (truth, error) = (truth[column], estimate[column] - truth[column]);
+            if error.is_nan() {
+                continue;
+            }
+            sums.count += 1;
+            sums.error_squares += error * error;
+            sums.truth += truth;
+            sums.truth_squares += truth * truth;
+            sums.full_scale += error.abs() / full_scale;
+            if let Some(thickness_mm) = thickness_mm {
+                sums.positional += error.abs() / (thickness_mm - truth);
+            }
+            if truth.abs() > RELATIVE_THRESHOLD * full_scale {
+                sums.relative += error.abs() / truth.abs();
+                sums.relative_count += 1;
+            }
+        }
+        // A second pass: Σtruth² − n·mean² would cancel for outputs with an offset.
+        let mean = sums.truth / sums.count as f64;
+        for (truth, estimate) in truth.lines().zip(estimate.chunks_exact(truth.names.len())) {
+            if !(estimate[column] - truth[column]).is_nan() {
+                deviation_squares += (truth[column] - mean) * (truth[column] - mean);
+            }
+        }
+        total.count += sums.count;
+        total.error_squares += sums.error_squares;
+        total.truth_squares += sums.truth_squares;
+        total.full_scale += sums.full_scale;
+        total.positional += sums.positional;
+        total.relative += sums.relative;
+        total.relative_count += sums.relative_count;
+    }
+    let count = total.count as f64;
+    let finite = |value: f64| value.is_finite().then_some(value);
+    Errors {
+        group: group.into(),
+        unit: columns::unit_of(group).into(),
+        count: total.count,
+        rmse: (total.error_squares / count).sqrt(),
+        relative_l2_percent: finite(100.0 * (total.error_squares / total.truth_squares).sqrt()),
+        full_scale_percent: finite(100.0 * total.full_scale / count),
+        positional_percent: thickness_mm.and_then(|_| finite(100.0 * total.positional / count)),
+        r_squared: finite(1.0 - total.error_squares / deviation_squares),
+        mean_relative_percent: finite(100.0 * total.relative / total.relative_count as f64),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_definition_by_hand() {
+        let truth = Table {
+            names: ["r1e1_dz_mm", "r1e1_dx_mm", "r1e2_dz_mm"].map(String::from).to_vec(),
+            values: vec![0.0, 1.0, 1.0, 1.0, -1.0, 0.5],
+        };
+        let estimate = [0.5, 1.0, 1.0, 1.0, -1.0, f64::NAN];
+        let measure = Measure { full_scale: vec![1.0; 3], thickness_mm: Some(5.0) };
+        let [z, x] = &by_group(&truth, &estimate, &measure)[..] else { panic!("two groups") };
+        assert_eq!((z.group.as_str(), z.count, z.unit.as_str()), ("dz_mm", 3, "mm"));
+        let close = |a: Option<f64>, b: f64| assert!((a.unwrap() - b).abs() < 1e-12, "{a:?} {b}");
+        close(Some(z.rmse), (0.25_f64 / 3.0).sqrt());
+        close(z.relative_l2_percent, 100.0 * (0.25_f64 / 2.0).sqrt());
+        close(z.full_scale_percent, 50.0 / 3.0);
+        close(z.positional_percent, 10.0 / 3.0); // only the first is wrong: 0.5/(5 − 0)
+        close(z.r_squared, 1.0 - 0.25 / 0.5); // means are 0.5 and 1
+        close(z.mean_relative_percent, 0.0); // the wrong one has truth 0
+        assert_eq!((x.rmse, x.positional_percent), (0.0, None));
+    }
+
+    #[test]
+    fn the_mean_explains_nothing_whatever_the_offset() {
+        for offset in [0.0, 1e3, 1e6, 1e9] {
+            let values: Vec<f64> = (0..1000).map(|i| offset + f64::from(i % 37)).collect();
+            let truth = Table { names: vec!["b".into()], values };
+            let means = truth.means().repeat(truth.len());
+            let measure = Measure { full_scale: vec![1.0], thickness_mm: None };
+            let r_squared = by_group(&truth, &means, &measure)[0].r_squared.unwrap();
+            assert!(r_squared.abs() < 1e-9, "offset {offset}: {r_squared}");
+        }
+    }
+}

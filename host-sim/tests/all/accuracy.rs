@@ -1,0 +1,81 @@
+//! Accuracy that the project promises, on the reference scene `press`.
+
+use host_sim::evaluate::table1::{self, NETWORK};
+use host_sim::experiment::Experiment;
+use host_sim::metrics::{self, Definition, Errors};
+use taxel_data::dataset::Dataset;
+use taxel_data::progress::Silent;
+use taxel_data::random::Stream;
+use taxel_learn::Exponential;
+use taxel_learn::decoders::{linear, mean};
+use taxel_simulate::synthesise;
+
+fn row_4(scene: &str, noise_level: f64) -> Experiment {
+    let mut scene = Experiment::load(scene).unwrap();
+    scene.world.read_rows = vec![3];
+    scene.world.set_noise_level(noise_level).unwrap();
+    scene.training.frames = 20_000;
+    scene
+}
+
+/// Errors of the network and of the best linear decoder on fresh frames of row 4.
+fn network_and_linear(scene: &str, noise_level: f64) -> (Vec<Errors>, Vec<Errors>) {
+    let scene = row_4(scene, noise_level);
+    let frames = |stream| -> Dataset { synthesise(&scene.world, stream, 20_000) };
+    let (training, test) = (frames(Stream::Training), frames(Stream::Test));
+    assert!(scene.training.centres <= 128 && scene.training.affine_tail);
+    let blob = scene.train(&Silent).unwrap();
+    let measure = scene.measure();
+    let network = metrics::judge(&blob.prepare(Exponential::default()), &test, &measure);
+    let linear = metrics::judge(&linear::fit(&training), &test, &measure);
+    (network.errors, linear.errors)
+}
+
+#[test]
+fn one_row_of_press_is_decoded_close_to_the_limit() {
+    // The least possible error of any decoder is 0.046 and 0.064 mm.
+    for (noise_level, most_mm) in [(0.005, 0.050), (0.01, 0.069)] {
+        let (network, _) = network_and_linear("press", noise_level);
+        let z = network.iter().find(|e| e.group == "dz_mm").unwrap();
+        println!("press, row 4, noise {noise_level}: z RMSE {:.4} mm", z.rmse);
+        assert!(z.rmse <= most_mm, "noise {noise_level}: {} mm", z.rmse);
+    }
+}
+
+#[test]
+fn without_noise_no_axis_is_behind_the_best_linear_decoder() {
+    for scene in ["press", "paper"] {
+        let (network, linear) = network_and_linear(scene, 0.0);
+        assert_eq!(network.len(), 3);
+        for (network, linear) in network.iter().zip(&linear) {
+            println!(
+                "{scene} {}: {:.5} against {:.5} mm",
+                network.group, network.rmse, linear.rmse
+            );
+            assert!(network.rmse <= linear.rmse, "{scene} {}", network.group);
+        }
+    }
+}
+
+#[test]
+fn no_cell_of_the_papers_table_is_worse_than_the_mean_by_more_than_two_per_cent() {
+    let table = table1::compute(&Experiment::load("paper").unwrap(), &Silent).unwrap();
+    let (mut worst, mut cells) = (0.0_f64, 0);
+    for column in &table.columns {
+        for spread in column.spreads() {
+            let network = column.errors(NETWORK, Some(spread));
+            for (network, mean) in network.iter().zip(column.errors(mean::NAME, None)) {
+                // R² is the RMSE again, on a scale where the mean is 0.
+                for definition in Definition::ALL.iter().filter(|d| **d != Definition::RSquared) {
+                    let pair = (definition.of(network), definition.of(mean));
+                    let (Some(network), Some(mean)) = pair else { continue };
+                    worst = worst.max(network / mean);
+                    cells += 1;
+                }
+            }
+        }
+    }
+    println!("{cells} cells; the worst is {worst:.4} × the mean's error");
+    assert_eq!(cells, 10 * 4 * (4 + 4 + 5));
+    assert!(worst <= 1.02, "{worst}");
+}

@@ -1,0 +1,86 @@
+//! Running the binary as a user does, in a folder of the test's own.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// A folder that goes with the test.
+pub struct Folder(PathBuf);
+
+impl Folder {
+    pub fn new(name: &str) -> Self {
+        let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+        let _ = std::fs::remove_dir_all(&path);
+        std::fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.0.join(name)
+    }
+
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
+        let path = self.path(name);
+        std::fs::write(&path, content).unwrap();
+        path
+    }
+
+    /// Names of everything in the folder, hidden files too.
+    pub fn names(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(&self.0).unwrap();
+        let mut names: Vec<String> =
+            entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    /// Runs `host-sim` in this folder.
+    pub fn run(&self, arguments: &[&str]) -> Output {
+        self.run_with_threads(arguments, 2)
+    }
+
+    pub fn run_with_threads(&self, arguments: &[&str], threads: usize) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_host-sim"))
+            .args(arguments)
+            .current_dir(&self.0)
+            .env("RAYON_NUM_THREADS", threads.to_string())
+            .output()
+            .unwrap()
+    }
+
+    /// Runs `host-sim` and expects success; returns stdout.
+    pub fn succeed(&self, arguments: &[&str]) -> String {
+        let output = self.run(arguments);
+        assert!(
+            output.status.success(),
+            "{arguments:?}: {}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        String::from_utf8(output.stdout).unwrap()
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+/// A scene that runs in a moment: rows 4 and 5 of `press`.
+pub fn small_scene() -> String {
+    let mut scene = include_str!("../../../scenes/press.toml").to_owned();
+    for (from, to) in [
+        ("name = \"press\"", "name = \"small\""),
+        ("[outputs]", "[readout]\nrow_wires = [4, 5]\n\n[outputs]"),
+        ("frames = 20000", "frames = 3000"),
+        ("test_frames = 8000", "test_frames = 500"),
+        ("centres = 64", "centres = 12"),
+        ("frames = 6000", "frames = 1500"),
+        ("test_frames = 3000", "test_frames = 300"),
+        ("centres = 48", "centres = 10"),
+        ("standard_frames = 300", "standard_frames = 40"),
+    ] {
+        assert!(scene.contains(from), "{from}");
+        scene = scene.replacen(from, to, 1);
+    }
+    scene
+}

@@ -1,0 +1,335 @@
+//! The host's end of the link against the firmware's application, which runs here in a thread.
+
+use std::net::{Ipv4Addr, TcpListener, TcpStream};
+use std::time::{Duration, Instant};
+
+use crate::common::Folder;
+use crate::virtual_device::Line;
+use firmware::link::message::{Configuration, Refusal, Report, Request, UploadStep};
+use host_sim::experiment::Experiment;
+use taxel_data::progress::Silent;
+use taxel_data::random::Stream;
+use taxel_learn::{Exponential, ModelBlob};
+use taxel_rig::Error;
+use taxel_rig::device::check::{Plan, check};
+use taxel_rig::device::{Device, upload};
+use taxel_simulate::World;
+use taxel_simulate::synthesise;
+
+const SOUND: Line = Line { one_in: None };
+
+fn press() -> World {
+    World::press()
+}
+
+fn model(centres: usize) -> ModelBlob {
+    let mut scene = Experiment::load("press").unwrap();
+    (scene.training.frames, scene.training.centres) = (500, centres);
+    scene.train(&Silent).unwrap()
+}
+
+/// Ideal readings of a few frames, for a device that scans.
+fn frames() -> Vec<[[f32; 18]; 8]> {
+    let readings = synthesise(&press(), Stream::Test, 5).inputs;
+    let frame = |line: &[f64]| {
+        let mut frame = [[0.0; 18]; 8];
+        let places = frame.as_flattened_mut().iter_mut();
+        places.zip(line).for_each(|(place, reading)| *place = *reading as f32);
+        frame
+    };
+    readings.lines().map(frame).collect()
+}
+
+/// A device with `model`, at the other end of a socket.
+fn device(line: Line, model: &ModelBlob) -> Device<TcpStream> {
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+    let near = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
+    let (far, _) = listener.accept().unwrap();
+    far.set_nonblocking(true).unwrap();
+    near.set_nodelay(true).unwrap();
+    crate::virtual_device::run(Patient(far), line, model.bytes(), frames());
+    Device::new(near).unwrap()
+}
+
+/// A socket that does not block when read, and does when written to.
+struct Patient(TcpStream);
+
+impl std::io::Read for Patient {
+    fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
+        self.0.read(bytes)
+    }
+}
+
+impl std::io::Write for Patient {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        loop {
+            match self.0.write(bytes) {
+                Err(cause) if cause.kind() == std::io::ErrorKind::WouldBlock => {
+                    std::thread::yield_now();
+                }
+                other => return other,
+            }
+        }
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.0.flush()
+    }
+}
+
+#[test]
+fn a_sound_device_passes_every_check() {
+    let model = model(16);
+    let mut device = device(SOUND, &model);
+    let plan = Plan {
+        frames: 500,
+        damaged_uploads: 70,
+        interruptions: true,
+        garbage_bytes: 100_000,
+        window: 4,
+    };
+    let findings = check(&mut device, &press(), &model, &plan, &Silent).unwrap();
+    assert!(findings.all_good(), "{findings:#?}");
+    assert_eq!(findings.frames.bit_identical, 500);
+    let uploads = findings.uploads.unwrap();
+    assert_eq!((uploads.damaged_refused, uploads.damaged), (70, 70));
+    assert!(uploads.interrupted > 5 && uploads.old_stayed == uploads.interrupted);
+}
+
+#[test]
+fn another_model_on_the_device_is_replaced_by_the_one_checked_with() {
+    let mut device = device(SOUND, &model(3));
+    let wanted = model(5);
+    let plan =
+        Plan { frames: 20, damaged_uploads: 0, interruptions: false, garbage_bytes: 0, window: 1 };
+    let findings = check(&mut device, &press(), &wanted, &plan, &Silent).unwrap();
+    assert!(findings.all_good(), "{findings:#?}");
+    assert_eq!(findings.device.model.unwrap().crc_32, wanted.parse().crc());
+}
+
+#[test]
+fn a_wrong_answer_is_found() {
+    // The device decodes with the model that it has; the host expects another's answers.
+    let (right, wrong) = (model(3), model(4));
+    let mut device = device(SOUND, &right);
+    let inputs = synthesise(&press(), Stream::Test, 1).inputs;
+    let expected = wrong.prepare(Exponential::default()).decode_table(&inputs);
+    let readings: Vec<f32> =
+        synthesise(&press(), Stream::Test, 1).inputs.values.iter().map(|v| *v as f32).collect();
+    let mut same = None;
+    taxel_rig::device::stream::decode_frames(&mut device, &readings, 144, 1, |_, estimate| {
+        same = Some(estimate.outputs.iter().eq(expected.values.iter().map(|v| *v as f32)));
+    })
+    .unwrap();
+    assert_eq!(same, Some(false));
+}
+
+#[test]
+fn over_a_line_that_spoils_bytes_everything_still_arrives() {
+    let old = model(3);
+    // One byte in some 3000 is lost, changed or turned into the end of a frame: a fifth of the frames.
+    let mut device = device(Line { one_in: Some(3000) }, &old);
+    let new = model(16);
+    let identity = upload::replace(&mut device, new.bytes(), &Silent).unwrap();
+    assert_eq!(identity.model.unwrap().crc_32, new.parse().crc());
+    let plan =
+        Plan { frames: 30, damaged_uploads: 0, interruptions: false, garbage_bytes: 0, window: 1 };
+    let findings = check(&mut device, &press(), &new, &plan, &Silent).unwrap();
+    assert_eq!(findings.frames.bit_identical, 30);
+    assert!(findings.repeated > 0 && !findings.all_good(), "the line was sound");
+}
+
+#[test]
+fn refusals_and_silence_are_told_apart() {
+    let model = model(3);
+    let mut device = device(SOUND, &model);
+    let length = u32::MAX;
+    let refusal = upload::step(&mut device, UploadStep::Begin { length }).unwrap();
+    assert_eq!(refusal, Err(Refusal::TooLarge { slot_bytes: 128 * 1024 - 16 }));
+    // A report that does not belong to the request is no answer.
+    let strange = device.ask_plainly(&Request::Statistics, |report| match report {
+        Report::Identity(_) => Some(()),
+        _ => None,
+    });
+    assert!(
+        matches!(strange, Err(Error::Unexpected { request, .. }) if request.contains("Statistics"))
+    );
+}
+
+#[test]
+fn a_device_that_never_pauses_does_not_hold_the_host() {
+    // It scans as fast as it can, and its reports alone keep the line busy.
+    let mut device = device(SOUND, &model(3));
+    let busy = Configuration {
+        frame_period_us: 100,
+        send_readings: true,
+        send_estimates: true,
+        ..Configuration::DEFAULT
+    };
+    device.configure(busy).unwrap();
+    let mut reports = 0_u32;
+    let start = Instant::now();
+    let heard = device.hear(start + Duration::from_millis(300), |_, _| {
+        reports += 1;
+        None::<()>
+    });
+    assert_eq!(heard.unwrap(), None);
+    assert!(reports > 100, "{reports}");
+    assert!(start.elapsed() < Duration::from_secs(5));
+    // What was in force before a pause is in force after it.
+    device.while_paused(Device::identify).unwrap();
+    assert_eq!(device.configuration().unwrap(), busy);
+}
+
+#[cfg(unix)]
+mod serial_port {
+    use serialport::{SerialPort, TTYPort};
+
+    use super::*;
+
+    /// A device at the far end of a pseudo-terminal, whose name this is.
+    fn port(model: &ModelBlob) -> (String, TTYPort) {
+        port_with(model, frames())
+    }
+
+    /// The same, with a sensor that shows `frames`.
+    fn port_with(model: &ModelBlob, frames: Vec<[[f32; 18]; 8]>) -> (String, TTYPort) {
+        let (mut far, near) = TTYPort::pair().unwrap();
+        far.set_timeout(std::time::Duration::from_millis(1)).unwrap();
+        let name = near.name().unwrap();
+        crate::virtual_device::run(Quick(far), SOUND, model.bytes(), frames);
+        (name, near)
+    }
+
+    /// A port that answers a read without bytes as a socket does.
+    struct Quick(TTYPort);
+
+    impl std::io::Read for Quick {
+        fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
+            match self.0.read(bytes) {
+                // Nobody has the near end open just now.
+                Ok(0) => Err(std::io::ErrorKind::WouldBlock.into()),
+                other => other,
+            }
+        }
+    }
+
+    impl std::io::Write for Quick {
+        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+            self.0.write(bytes)
+        }
+
+        fn flush(&mut self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_device_is_used_from_the_command_line() {
+        let folder = Folder::new("link");
+        let (old, new) = (model(3), model(4));
+        let new_file = folder.write("new.bin", new.bytes());
+        let new_file = new_file.to_str().unwrap();
+        let (port, near) = port(&old);
+        drop(near); // the program opens it itself
+
+        let page = folder.succeed(&["link", &port, "identify"]);
+        assert!(page.contains("virtual, firmware"), "{page}");
+        assert!(page.contains(&format!("CRC-32 {:08x}, slot 0", old.parse().crc())), "{page}");
+
+        // Recording under another model's names is refused, before anything is written.
+        let wrong = folder.run(&["link", &port, "record", new_file, "-o", "estimate.csv"]);
+        assert_eq!(wrong.status.code(), Some(2));
+        assert_eq!(folder.names(), ["new.bin"]);
+
+        let page = folder.succeed(&["link", &port, "upload", new_file]);
+        assert!(page.contains(&format!("CRC-32 {:08x}, slot 1", new.parse().crc())), "{page}");
+
+        let arguments = ["link", &port, "record", new_file, "-n", "10", "-o", "estimate.csv"];
+        folder.succeed(&arguments);
+        let text = std::fs::read_to_string(folder.path("estimate.csv")).unwrap();
+        assert_eq!(text.lines().count(), 11);
+        assert!(text.starts_with("r1e1_dx_mm,r1e1_dy_mm,r1e1_dz_mm,"), "{text}");
+
+        // Without a model: readings, which can be trained on. Ideal ones here, five in turn.
+        folder.succeed(&["link", &port, "record", "-n", "6", "-o", "readings.csv"]);
+        let text = std::fs::read_to_string(folder.path("readings.csv")).unwrap();
+        assert!(text.starts_with("r1c1_ohm,r1c2_ohm,"), "{text}");
+        let lines: Vec<&str> = text.lines().skip(1).collect();
+        assert!(lines.len() == 6 && lines[0] == lines[5] && lines[0] != lines[1]);
+        let ohm: Vec<f32> = lines[0].split(',').map(|v| v.parse().unwrap()).collect();
+        assert!(frames().iter().any(|frame| frame.as_flattened() == ohm), "{ohm:?}");
+
+        folder.succeed(&["link", &port, "baseline", "-n", "5", "-o", "rest.csv"]);
+        let text = std::fs::read_to_string(folder.path("rest.csv")).unwrap();
+        let (header, line) = text.trim_end().split_once('\n').unwrap();
+        assert!(header.ends_with("r8c18_ohm"));
+        let frames = frames();
+        let mean = frames.iter().map(|f| f64::from(f[0][0])).sum::<f64>() / frames.len() as f64;
+        let found: f64 = line.split(',').next().unwrap().parse().unwrap();
+        assert!((found / mean - 1.0).abs() < 1e-5, "{found} instead of {mean}");
+
+        let page = folder.succeed(&[
+            "link",
+            &port,
+            "check",
+            "press",
+            "--model",
+            new_file,
+            "-n",
+            "50",
+            "--garbage",
+            "5000",
+        ]);
+        assert!(page.contains("50 of 50 bit-identical"), "{page}");
+
+        // What the virtual device says of its memory: 20 000 bytes of code, 4000 of RAM.
+        for (limit, enough) in [
+            ("--flash-limit=19999", false),
+            ("--ram-limit=3999", false),
+            ("--ram-limit=4000", true),
+        ] {
+            let arguments =
+                ["link", &port, "check", "press", "--model", new_file, "-n", "1", limit];
+            assert_eq!(folder.run(&arguments).status.code(), Some(i32::from(!enough)), "{limit}");
+        }
+
+        for (arguments, text) in [
+            (&["record", new_file, "-o", "x.csv", "--period-us", "7"][..], "7 is not in 100..="),
+            (&["baseline", "-o", "x.csv", "--oversampling", "0"], "--oversampling <N>': 0"),
+            (&["baseline", "-o", "x.csv", "-n", "0"], "0 is not in 1..="),
+            (&["baseline", "-o", "x.csv", "-n", "-3"], "'-3' for '--frames <N>'"),
+            (&["upload", "none.bin"], "none.bin"),
+        ] {
+            let output = folder.run(&[&["link", &port][..], arguments].concat());
+            let message = String::from_utf8_lossy(&output.stderr);
+            assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+            assert!(message.contains(text), "{message}");
+        }
+        assert_eq!(folder.names(), ["estimate.csv", "new.bin", "readings.csv", "rest.csv"]);
+    }
+
+    #[test]
+    fn a_sensor_that_says_nothing_is_no_recording() {
+        let folder = Folder::new("silent");
+        let model = model(3);
+        let (port, near) = port_with(&model, vec![[[f32::NAN; 18]; 8]]);
+        drop(near);
+        for command in ["record", "baseline"] {
+            let output = folder.run(&["link", &port, command, "-n", "3", "-o", "x.csv"]);
+            let message = String::from_utf8_lossy(&output.stderr);
+            assert_eq!(output.status.code(), Some(1), "{command}: {message}");
+            assert!(message.contains("not a single reading"), "{message}");
+        }
+        assert!(folder.names().is_empty());
+    }
+
+    #[test]
+    fn a_port_that_is_not_there_is_named() {
+        let folder = Folder::new("no_port");
+        let output = folder.run(&["link", "/dev/no-such-port", "identify"]);
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2));
+        assert!(message.contains("/dev/no-such-port"), "{message}");
+    }
+}

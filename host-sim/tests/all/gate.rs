@@ -1,0 +1,123 @@
+//! Gating: how often noise wakes a row, and what accuracy it costs.
+
+use crate::common::{Folder, small_scene};
+use host_sim::evaluate::cost::Costs;
+use host_sim::evaluate::gate::{self, GateResult, Settings, woken_by_theory};
+use host_sim::experiment::Experiment;
+use host_sim::metrics::Errors;
+use taxel_data::progress::Silent;
+use taxel_learn::Exponential;
+
+const READINGS: usize = 18;
+
+fn measured(scene: &Experiment, settings: &Settings) -> GateResult {
+    let blob = scene.train(&Silent).unwrap();
+    gate::measure(scene, &blob.prepare(Exponential::default()), settings).unwrap()
+}
+
+fn z(errors: &[Errors]) -> f64 {
+    errors.iter().find(|errors| errors.group == "dz_mm").unwrap().rmse
+}
+
+#[test]
+fn noise_wakes_untouched_rows_as_often_as_theory_says() {
+    let mut scene = Experiment::parse("small", &small_scene()).unwrap();
+    scene.world.read_rows = vec![0, 3, 4, 7];
+    let k = [2.5, 3.0, 3.5, 4.0];
+    let settings =
+        Settings { k: k.to_vec(), frames: 20_000, baseline_frames: 10_000, frame_cycles: None };
+    let result = measured(&scene, &settings);
+    let rows = (settings.frames * scene.world.read_rows.len()) as f64;
+    for (line, k) in result.lines.iter().zip(k) {
+        // Between readings alone, and readings and their sum as if they had nothing to do with each other.
+        let [least, most] =
+            [READINGS - 1, READINGS].map(|n| woken_by_theory(k, n, settings.baseline_frames));
+        assert_eq!(line.woken_by_theory, most);
+        let deviation = (most * (1.0 - most) / rows).sqrt();
+        println!("k = {k}: {} from {least} to {most}, ± {deviation}", line.woken);
+        assert!(line.woken > least - 4.0 * deviation && line.woken < most + 4.0 * deviation);
+        // Not vacuous: another k would be told apart.
+        assert!(woken_by_theory(0.97 * k, READINGS - 1, 10_000) > most + 4.0 * deviation);
+    }
+}
+
+#[test]
+fn press_loses_little_accuracy_and_saves_half_of_the_rows() {
+    let scene = Experiment::load("press").unwrap();
+    let blob = scene.train(&Silent).unwrap();
+    let model = blob.prepare(Exponential::default());
+    let frames = Costs::measured().unwrap().frames_of_model(model.model()).unwrap();
+    let frame_cycles = Some(frames.map(|cost| cost.cycles));
+    let settings = Settings { k: vec![3.0, 3.5], frames: 4000, baseline_frames: 100, frame_cycles };
+    let result = gate::measure(&scene, &model, &settings).unwrap();
+    let [three, three_and_half] = &result.lines[..] else { panic!("two lines") };
+    let worse = |errors: &[Errors]| z(errors) / z(&result.ungated_errors);
+    // Measured: 1.029 and 1.055.
+    println!("z RMSE: {:.4} and {:.4} times", worse(&three.errors), worse(&three_and_half.errors));
+    assert!(worse(&three.errors) < 1.04 && worse(&three_and_half.errors) < 1.07);
+    // Measured: 0.509 and 0.567.
+    assert!(three.skipped > 0.48 && three_and_half.skipped > 0.54);
+    let cost = three.relative_cost.unwrap();
+    let rest_and_awake = [frames.at_rest, frames.awake].map(|cost| cost.cycles as f64);
+    let mean = three.skipped * rest_and_awake[0] + (1.0 - three.skipped) * rest_and_awake[1];
+    assert!((cost * frames.ungated.cycles as f64 / mean - 1.0).abs() < 1e-12, "{cost}");
+    assert!(cost < 0.57 && three_and_half.relative_cost.unwrap() < cost);
+    for group in ["dx_mm", "dy_mm"] {
+        let of = |errors: &[Errors]| errors.iter().find(|e| e.group == group).unwrap().rmse;
+        assert!(of(&three_and_half.errors) < 1.005 * of(&result.ungated_errors), "{group}");
+    }
+    // What is missed gets rarer with its size, and more with the tolerance.
+    for line in &result.lines {
+        let shares: Vec<f64> = line.missed.iter().map(|missed| missed.share().unwrap()).collect();
+        assert!(shares.is_sorted_by(|a, b| a > b), "{shares:?}");
+    }
+    let largest = |line: &gate::Line| line.missed.last().unwrap().share().unwrap();
+    assert!(largest(three) < 0.02 && largest(three_and_half) > largest(three));
+}
+
+#[test]
+fn the_command_prints_tables_and_json() {
+    let folder = Folder::new("gate");
+    folder.write("small.toml", small_scene());
+    let arguments =
+        ["gate", "small.toml", "-n", "200", "--k", "3.5,4", "--cycles", "4000,400,4250"];
+    let text = folder.succeed(&arguments);
+    for part in ["1.750 %", "2.000 %", "without a gate", "answering the mean", "k = 4 "] {
+        assert!(text.contains(part), "{part:?} is not in {text}");
+    }
+    // Two rows were not measured.
+    assert!(folder.succeed(&arguments[..6]).contains("not known: no model of this kind"));
+    let json: serde_json::Value =
+        serde_json::from_str(&folder.succeed(&[&arguments[..], &["--json"]].concat())).unwrap();
+    assert_eq!(json["lines"][1]["k"], 4.0);
+    let at_rest = json["lines"][0]["skipped"].as_f64().unwrap();
+    let cost = json["lines"][0]["relative_cost"].as_f64().unwrap();
+    assert!((cost - (at_rest * 0.1 + (1.0 - at_rest) * 1.0625)).abs() < 1e-12);
+}
+
+#[test]
+fn what_makes_no_gate_is_refused() {
+    let folder = Folder::new("gate-refusals");
+    folder.write("small.toml", small_scene());
+    folder.write("span.toml", small_scene().replace("\"relative\"", "\"span\""));
+    for (arguments, says) in [
+        (&["small.toml", "--k", "0"][..], &["--k 0", "positive"][..]),
+        (&["small.toml", "--k", "3,NaN"], &["--k NaN", "3.5"]),
+        (&["small.toml", "--k", "250"], &["--k 250", "below 1"]),
+        (&["small.toml", "--noise", "0"], &["noise level = 0", "0.005"]),
+        (&["span.toml"], &["noise.kind = \"span\"", "relative"]),
+        (&["small.toml", "--baseline-frames", "0"], &["--baseline-frames = 0"]),
+        (&["small.toml", "--cycles", "1,2"], &["--cycles [1, 2]", "three"]),
+        (&["small.toml", "--cycles", "1,0,3"], &["--cycles [1, 0, 3]", "positive"]),
+        (&["small.toml", "--cycles", "3,2,1"], &["--cycles [3, 2, 1]", "REST below AWAKE"]),
+        (&["small.toml", "--cycles", "1,2,-3"], &["'-3'", "--cycles"]),
+    ] {
+        let output = folder.run(&[&["gate"], arguments].concat());
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {stderr}");
+        for part in says {
+            assert!(stderr.contains(part), "{arguments:?}: {part:?} is not in {stderr:?}");
+        }
+        assert!(output.stdout.is_empty());
+    }
+}

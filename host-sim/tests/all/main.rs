@@ -1,0 +1,14 @@
+//! Every integration test in one program: it is linked once.
+
+mod common;
+mod quantisation;
+mod virtual_device;
+
+mod accuracy;
+mod device;
+mod gate;
+mod readout;
+mod refusals;
+mod scan;
+mod trade;
+mod workflow;

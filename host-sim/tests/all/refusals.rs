@@ -1,0 +1,298 @@
+//! Bad input: exit status 2, a message that names file, place, value and fix, and no file left.
+
+use crate::common::{Folder, small_scene};
+
+/// Runs and expects a refusal that says all of `says`, leaving nothing behind.
+fn refused(folder: &Folder, arguments: &[&str], says: &[&str]) {
+    let before = folder.names();
+    let output = folder.run(arguments);
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {stderr}");
+    for part in says {
+        assert!(stderr.contains(part), "{arguments:?}: {part:?} is not in {stderr:?}");
+    }
+    assert!(output.stdout.is_empty(), "{arguments:?} printed a result");
+    assert_eq!(folder.names(), before, "{arguments:?} left something behind");
+}
+
+#[test]
+fn bad_scenes() {
+    let folder = Folder::new("bad-scenes");
+    let good = small_scene();
+    for (from, to, says) in [
+        ("row_wires = 8", "row_wires = 0", &["sensor.row_wires = 0", "from 1 to 255"][..]),
+        ("row_wires = 8", "row_wires = \"8\"", &["row_wires", "invalid type"]),
+        ("row_wires = 8", "rows = 8", &["unknown field `rows`", "row_wires"]),
+        ("[20.0, 18.0, 5.0]", "[20.0, 18.0, -5.0]", &["sensor.size_mm (z) = -5", "positive"]),
+        ("[20.0, 18.0, 5.0]", "[20.0, nan, 5.0]", &["sensor.size_mm (y) = NaN"]),
+        (
+            "resistance_ohm_per_mm = 100.0",
+            "resistance_ohm_per_mm = 0.0",
+            &["sensor.resistance_ohm_per_mm = 0"],
+        ),
+        (
+            "resistance_ohm_per_mm = 100.0",
+            "resistance_ohm_per_mm = 100.0\nupper_electrodes_mm = [[1.0, 2.0, 5.0]]",
+            &["sensor.upper_electrodes_mm lists 1 positions", "48"],
+        ),
+        ("dent_depth_mm = [0.0, 1.0]", "dent_depth_mm = [0.0, 2.0]", &["2 mm along z", "20 %"]),
+        ("dent_depth_mm = [0.0, 1.0]", "dent_depth_mm = [1.0, 0.0]", &["dent_depth_mm", "low ≤"]),
+        ("dent_radius_mm = [2.0, 5.0]", "dent_radius_mm = [0.0, 5.0]", &["dent_radius_mm"]),
+        ("kind = \"press\"", "kind = \"hit\"", &["unknown variant `hit`", "press"]),
+        ("kind = \"relative\"", "kind = \"pink\"", &["unknown variant `pink`", "span"]),
+        ("seed = 1", "precision = \"f16\"", &["unknown variant `f16`", "f64"]),
+        ("level = 0.005", "level = 5.0", &["noise.level = 5", "0.005 is 0.5 %"]),
+        ("row_wires = [4, 5]", "row_wires = [0]", &["readout.row_wires = [0]", "from 1 to 8"]),
+        ("row_wires = [4, 5]", "row_wires = [9]", &["readout.row_wires = [9]"]),
+        ("row_wires = [4, 5]", "row_wires = [5, 4]", &["ascending"]),
+        ("axes = [\"x\", \"y\", \"z\"]", "axes = [\"z\", \"x\"]", &["outputs.axes", "order"]),
+        ("axes = [\"x\", \"y\", \"z\"]", "axes = []", &["outputs.axes"]),
+        ("centres = 12", "centres = 0", &["training.centres = 0"]),
+        ("centres = 12", "centres = 3000", &["training.centres = 3000", "fewer centres than"]),
+        ("spread = 0.8", "spread = 0.0", &["training.spread = 0", "positive"]),
+        ("frames = 3000", "frames = 1", &["training.frames = 1"]),
+        ("spreads = [0.1,", "spreads = [0.0,", &["table1.spreads = 0"]),
+        ("spreads = [0.1,", "spreads = [1e300,", &["table1.spreads = 1e300", "f32"]),
+        ("spread = 0.8", "spread = 1e-30", &["training.spread = 1e-30", "f32"]),
+        ("frames = 3000", "frames = 100000000", &["training.frames", "does not fit in memory"]),
+        ("standard_frames = 40", "standard_frames = 4000", &["table1.standard_frames = 4000"]),
+        ("name = \"small\"", "name = \"../up\"", &["name = \"../up\"", "letters"]),
+        ("name = \"small\"", "name = small", &["TOML parse error", "line 3"]),
+    ] {
+        assert!(good.contains(from), "{from}");
+        let scene = folder.write("scene.toml", good.replacen(from, to, 1));
+        let mut says = says.to_vec();
+        says.push("scene.toml");
+        refused(&folder, &["synth", scene.to_str().unwrap(), "-o", "data.csv"], &says);
+    }
+    refused(&folder, &["run", "no-such.toml"], &["no-such.toml", "paper, press"]);
+    refused(&folder, &["train", "pres", "-o", "m.bin"], &["pres:", "paper, press"]);
+}
+
+#[test]
+fn bad_csv_files() {
+    let folder = Folder::new("bad-csv");
+    for (content, says) in [
+        (&b""[..], &["the file is empty"][..]),
+        (b"ch1,f_n\n", &["no line of data"]),
+        (b"ch1,ch1\n1,2\n", &["line 1", "\"ch1\" stands twice"]),
+        (b"ch1,\n1,2\n", &["line 1", "column 2 has no usable name"]),
+        (b"ch1,f_n\n1,2\n3,four\n", &["line 3", "\"f_n\"", "\"four\" is not a number"]),
+        (b"ch1,f_n\n1,inf\n", &["line 2", "\"inf\" is not a number"]),
+        (b"ch1,f_n\n1,2\n3\n", &["line 3 has 1 fields", "names 2"]),
+        (b"ch1,f_n\n1,2,3\n", &["line 2 has 3 fields"]),
+        (b"ch1,g_n\n1,2\n3,4\n", &["no column matches \"f_n\"", "ch1, g_n"]),
+        (b"ch1,f_n\n1,\n,2\n", &["no line has a value in every chosen column"]),
+        (b"ch1,f\x07n\n1,2\n", &["column 2 has no usable name"]),
+        (b"ch1\n1\n\n2\n", &["line 3 is blank", "NaN"]),
+        (b"ch1,f_n\n1,2\n-1e31,4\n", &["line 3", "\"ch1\"", "beyond 1e30"]),
+    ] {
+        folder.write("data.csv", content);
+        let train = ["train", "data.csv", "--inputs", "ch*", "--outputs", "f_n", "-o", "m.bin"];
+        refused(&folder, &train, &[says, &["data.csv"]].concat());
+    }
+    folder.write("data.csv", "ch1,f_n\n1,2\n3,4\n");
+    refused(&folder, &["train", "data.csv", "-o", "m.bin"], &["r*c*_ohm", "--inputs"]);
+    let twice = ["train", "data.csv", "--inputs", "*", "--outputs", "f_n", "-o", "m.bin"];
+    refused(&folder, &twice, &["\"f_n\" is chosen by --inputs and by --outputs"]);
+}
+
+#[test]
+fn bad_training_options() {
+    let folder = Folder::new("bad-options");
+    folder.write("data.csv", "ch1,f_n,fold\n1,2,0\n3,4,1\n5,5,0\n7,9,1\n");
+    let train = |options: &[&'static str], says: &[&str]| {
+        let base = ["train", "data.csv", "--inputs", "ch*", "--outputs", "f_n", "-o", "m.bin"];
+        refused(&folder, &[&base, options].concat(), says);
+    };
+    train(&["--centres", "0"], &["centres = 0"]);
+    train(&["--centres", "5"], &["centres = 5", "4 training frames"]);
+    train(&["--centres", "4"], &["centres = 4", "fewer than"]);
+    train(&["--centres", "two"], &["two", "--centres"]);
+    train(&["--centres", "2", "--spread", "0"], &["spread = 0"]);
+    train(&["--centres", "2", "--spread", "nan"], &["spread = NaN"]);
+    train(&["--centres", "2", "--spread", "1e-30"], &["spread = 1e-30", "f32"]);
+    train(&["--centres", "1,2"], &["--centres [1, 2]", "--select"]);
+    train(&["--fast"], &["unexpected argument '--fast'"]);
+    train(&["-n", "10"], &["-n sets a scene's frames"]);
+    train(&["--select", "--folds", "9", "--centres", "1"], &["--folds 9", "from 2 to 4"]);
+    train(&["--select", "--fold-column", "day"], &["\"day\" is missing", "ch1, f_n, fold"]);
+    train(&["--select", "--fold-column", "fold", "--centres", "2"], &["centres = 2", "2 training"]);
+    refused(
+        &folder,
+        &["train", "press", "--inputs", "ch*", "-o", "m.bin"],
+        &["--inputs picks columns of a CSV file"],
+    );
+    refused(&folder, &["synth", "press", "-n", "0", "-o", "x.csv"], &["-n = 0"]);
+    refused(&folder, &["synth", "press", "--noise", "2", "-o", "x.csv"], &["noise level = 2"]);
+    refused(&folder, &["fly"], &["fly"]);
+    refused(&folder, &["table1", "press", "--grouping", "z"], &["--grouping"]);
+}
+
+#[test]
+fn what_cannot_be_traded_leaves_no_folder_behind() {
+    let folder = Folder::new("bad-trade");
+    folder.write("small.toml", small_scene());
+    refused(&folder, &["trade", "small.toml"], &["2 rows of 18 readings"]);
+    refused(&folder, &["trade", "press", "--centres", "20"], &["--centres 20", "[16, 32"]);
+    refused(&folder, &["trade", "press", "--average", "4,4"], &["--average gives 4 twice"]);
+    refused(&folder, &["trade", "press", "--max-error", "0", "-o", "a/b"], &["--max-error 0"]);
+    refused(&folder, &["trade", "press", "--max-cycles", "0"], &["--max-cycles 0", "positive"]);
+    refused(&folder, &["trade", "press", "--max-flash", "0"], &["--max-flash 0", "positive"]);
+}
+
+#[test]
+fn unwritable_output_is_found_before_the_work() {
+    let folder = Folder::new("unwritable");
+    folder.write("file", "not a folder");
+    folder.write("data.csv", "ch1,f_n\n1,2\n3,4\n5,5\n");
+    folder.write("scene.toml", small_scene());
+    for output in ["file/m.bin", "no/such/folder/m.bin", "."] {
+        let says = &["cannot write", output, "-o"][..];
+        refused(&folder, &["synth", "press", "-n", "5", "-o", output], says);
+        refused(&folder, &["train", "press", "-o", output], says);
+        refused(&folder, &["table1", "press", "-o", output], says);
+    }
+    refused(&folder, &["run", "scene.toml", "-o", "file"], &["cannot write", "file/small"]);
+}
+
+#[test]
+fn bad_models_and_data_that_does_not_fit_them() {
+    let folder = Folder::new("bad-models");
+    folder.write("scene.toml", small_scene());
+    folder.succeed(&["train", "scene.toml", "-n", "100", "-o", "m.bin"]);
+    folder.succeed(&["synth", "scene.toml", "-n", "10", "-o", "data.csv"]);
+    let mut blob = std::fs::read(folder.path("m.bin")).unwrap();
+    blob[500] ^= 1;
+    folder.write("corrupt.bin", &blob);
+    folder.write("other.bin", "name = \"a scene\"");
+    folder.write("short.csv", "r4c1_ohm\n60\n");
+    let decode = |model, data, says: &[&str]| {
+        refused(&folder, &["decode", model, data, "-o", "e.csv"], says);
+    };
+    decode("corrupt.bin", "data.csv", &["corrupt.bin", "CRC-32"]);
+    decode("other.bin", "data.csv", &["other.bin", "not a weight blob"]);
+    decode("none.bin", "data.csv", &["cannot read none.bin"]);
+    decode("m.bin", "none.csv", &["cannot read none.csv"]);
+    decode("m.bin", "short.csv", &["short.csv", "\"r4c2_ohm\" is missing"]);
+    refused(&folder, &["eval", "m.bin", "short.csv"], &["\"r4c2_ohm\" is missing"]);
+    refused(&folder, &["inspect", "data.csv"], &["not a weight blob"]);
+    folder.write("deformation.csv", "r4e1_dx_mm\n0\n");
+    refused(
+        &folder,
+        &["forward", "scene.toml", "deformation.csv", "-o", "r.csv"],
+        &["deformation.csv", "\"r4e1_dy_mm\" is missing"],
+    );
+}
+
+#[test]
+fn a_failure_keeps_the_file_that_was_there() {
+    let folder = Folder::new("keeps");
+    folder.write("m.bin", "the old model");
+    folder.write("data.csv", "ch1,f_n\n1,2\n3,x\n");
+    let train = ["train", "data.csv", "--inputs", "ch*", "--outputs", "f_n", "-o", "m.bin"];
+    refused(&folder, &train, &["line 3"]);
+    assert_eq!(std::fs::read(folder.path("m.bin")).unwrap(), b"the old model");
+}
+
+#[test]
+fn an_input_is_never_written_over() {
+    let folder = Folder::new("own-input");
+    folder.write("scene.toml", small_scene());
+    folder.succeed(&["train", "scene.toml", "-n", "100", "-o", "m.bin"]);
+    folder.succeed(&["synth", "scene.toml", "-n", "20", "-o", "d.csv"]);
+    let whole = |name: &str| std::fs::read(folder.path(name)).unwrap();
+    let before = [whole("scene.toml"), whole("m.bin"), whole("d.csv")];
+    let says = &["would be written over"][..];
+    refused(&folder, &["synth", "scene.toml", "-o", "scene.toml"], says);
+    refused(&folder, &["train", "d.csv", "--centres", "4", "-o", "./d.csv"], says);
+    refused(&folder, &["decode", "m.bin", "d.csv", "-o", "m.bin"], says);
+    refused(&folder, &["decode", "m.bin", "d.csv", "-o", "d.csv"], says);
+    refused(&folder, &["forward", "scene.toml", "d.csv", "-o", "d.csv"], says);
+    assert_eq!([whole("scene.toml"), whole("m.bin"), whole("d.csv")], before);
+}
+
+#[test]
+fn what_cannot_be_done_is_found_before_anything_is_written() {
+    let folder = Folder::new("before");
+    folder.write("scene.toml", small_scene());
+    let groups = &["--group dq_mm", "dx_mm, dy_mm, dz_mm"][..];
+    refused(&folder, &["table1", "scene.toml", "--group", "dq_mm", "-o", "t.csv"], groups);
+    refused(&folder, &["table1", "scene.toml", "--noise", "0.1"], &["--noise"]);
+    let enormous = &["100000000", "does not fit in memory"][..];
+    refused(&folder, &["synth", "press", "-n", "100000000", "-o", "d.csv"], enormous);
+    std::fs::create_dir_all(folder.path("out/small/report.html")).unwrap();
+    refused(&folder, &["run", "scene.toml"], &["cannot write", "report.html"]);
+    assert_eq!(std::fs::read_dir(folder.path("out/small")).unwrap().count(), 1);
+}
+
+#[test]
+fn nothing_to_evaluate_is_an_error_and_less_is_said() {
+    let folder = Folder::new("evaluate");
+    folder.write("scene.toml", small_scene());
+    folder.succeed(&["train", "scene.toml", "-n", "200", "-o", "m.bin"]);
+    folder.succeed(&["synth", "scene.toml", "-n", "2", "-o", "d.csv"]);
+    let data = std::fs::read_to_string(folder.path("d.csv")).unwrap();
+    let mut lines: Vec<Vec<&str>> = data.lines().map(|line| line.split(',').collect()).collect();
+    lines[1][0] = "1e39"; // beyond f32: missing to the device
+    let text = |lines: &[Vec<&str>]| lines.iter().map(|l| l.join(",") + "\n").collect::<String>();
+    folder.write("less.csv", text(&lines));
+    let page = folder.succeed(&["eval", "m.bin", "less.csv"]);
+    assert!(page.contains("54 of 72 values count"), "{page}");
+    let results = folder.succeed(&["--json", "eval", "m.bin", "less.csv"]);
+    let results: serde_json::Value = serde_json::from_str(&results).unwrap();
+    for errors in results["mean_errors"].as_array().unwrap() {
+        // The mean is that of the values that count.
+        assert!(errors["r_squared"].as_f64().unwrap().abs() < 1e-12, "{errors}");
+    }
+    let page = folder.succeed(&["decode", "m.bin", "less.csv", "-o", "e.csv"]);
+    assert!(page.contains("1 of them"), "{page}");
+    lines.truncate(2);
+    lines[1][20] = "";
+    folder.write("none.csv", text(&lines));
+    refused(&folder, &["eval", "m.bin", "none.csv"], &["none.csv", "no line has both"]);
+}
+
+#[test]
+fn a_link_is_followed_and_permissions_stay() {
+    use std::os::unix::fs::{PermissionsExt, symlink};
+    let folder = Folder::new("links");
+    folder.write("scene.toml", small_scene());
+    let real = folder.write("real.csv", "old");
+    std::fs::set_permissions(&real, std::fs::Permissions::from_mode(0o600)).unwrap();
+    symlink("real.csv", folder.path("link.csv")).unwrap();
+    folder.succeed(&["synth", "scene.toml", "-n", "3", "-o", "link.csv"]);
+    assert!(folder.path("link.csv").is_symlink());
+    assert_eq!(std::fs::read_to_string(&real).unwrap().lines().count(), 4);
+    assert_eq!(std::fs::metadata(&real).unwrap().permissions().mode() & 0o777, 0o600);
+    let printed = folder.succeed(&["synth", "scene.toml", "-n", "3", "-o", "/dev/stdout"]);
+    assert!(printed.starts_with("r4c1_ohm,"), "{printed}");
+}
+
+#[test]
+fn an_emulator_or_an_image_that_is_not_there_is_named() {
+    let folder = Folder::new("no_emulator");
+    refused(&folder, &["emulate", "--image", "none.elf"], &["none.elf", "cargo xtask firmware"]);
+    let not_elf = folder.write("image.txt", "not really");
+    refused(&folder, &["emulate", "--image", not_elf.to_str().unwrap()], &["image.txt", "no ELF"]);
+    let image = folder.write("image.elf", "\x7FELF, or so it says");
+    let image = image.to_str().unwrap();
+    folder.write("small.toml", small_scene());
+    let arguments = ["emulate", "small.toml", "--image", image, "--qemu", "no-such-qemu"];
+    refused(&folder, &arguments, &["no-such-qemu", "qemu-system-arm"]);
+    // Another readout than the image's.
+    for (field, other, only) in [
+        ("circuit", "divider", "zero-potential"),
+        ("sampler", "on-chip", "mcp3208"),
+        ("row_drive", "pins", "shift-register"),
+    ] {
+        let readout = format!("[readout]\n{field} = \"{other}\"\n");
+        folder.write("other.toml", small_scene().replace("[readout]\n", &readout));
+        let arguments = ["emulate", "other.toml", "--scans", "1", "--image", image];
+        refused(&folder, &arguments, &["--scans", &format!("readout.{field}"), only]);
+    }
+    // A model of another scene.
+    folder.succeed(&["train", "small.toml", "-o", "small.bin"]);
+    let arguments = ["emulate", "press", "--model", "small.bin", "--image", image];
+    refused(&folder, &arguments, &["--model", "press"]);
+}

@@ -1,0 +1,285 @@
+//! The trade between speed and accuracy, on a small plan.
+
+use crate::common::Folder;
+use host_sim::Result;
+use host_sim::evaluate::cost::Costs;
+use host_sim::evaluate::gate::{self, Settings};
+use host_sim::evaluate::trade::{self, Limits, Plan, Trade};
+use host_sim::experiment::Experiment;
+use taxel_data::progress::Silent;
+use taxel_data::random::Stream;
+use taxel_learn::{Exponential, ModelBlob};
+use taxel_simulate::Synthesis;
+
+fn press() -> Experiment {
+    let mut scene = Experiment::load("press").unwrap();
+    (scene.training.frames, scene.training.test_frames) = (1500, 500);
+    scene
+}
+
+fn plan() -> Plan {
+    Plan {
+        centres: vec![16, 64],
+        samples_averaged: vec![1, 16],
+        gate_k: vec![3.5],
+        clock_mhz: 100.0,
+    }
+}
+
+fn compute(scene: &Experiment, limits: Limits) -> Result<Trade> {
+    compute_plan(scene, &plan(), limits)
+}
+
+fn compute_plan(scene: &Experiment, plan: &Plan, limits: Limits) -> Result<Trade> {
+    limits.check()?;
+    let mut trade = trade::compute(scene, plan, "dz_mm", &Silent)?;
+    trade.choose(&limits)?;
+    Ok(trade)
+}
+
+#[test]
+fn every_knob_has_its_points_and_the_front_is_what_nothing_beats() {
+    let trade = compute(&press(), Limits::default()).unwrap();
+    assert_eq!(trade.chosen, None);
+    let count = |name: &str| trade.points.iter().filter(|p| p.arithmetic.name() == name).count();
+    for kernel in ["fixed16", "f32-direct"] {
+        assert_eq!(count(kernel), 2 * 2 * 2 * 2 * 2, "{kernel}"); // array, K, tail, samples, gate
+    }
+    for kernel in ["f32-direct-libm", "f32-direct-micromath"] {
+        assert_eq!(count(kernel), 2 * 2 * 2 * 2, "{kernel}"); // the gate is not measured with them
+    }
+    // Only where rounding is proved harmless.
+    assert!((1..32).contains(&count("f32")), "{}", count("f32"));
+
+    let rank = |p: &trade::Point| (p.frame.cycles, p.samples_averaged, p.rmse("dz_mm"));
+    for point in &trade.points {
+        let own = rank(point);
+        let beaten =
+            trade.points.iter().map(rank).any(|other| {
+                other != own && other.0 <= own.0 && other.1 <= own.1 && other.2 <= own.2
+            });
+        assert_eq!(point.on_front, !beaten, "{}", point.name());
+        assert_eq!(point.frame_us, point.frame.cycles as f64 / 100.0);
+        assert!(point.ratio_to_best.iter().all(|ratio| *ratio >= 1.0));
+    }
+    for group in 0..3 {
+        let least = trade.points.iter().map(|p| p.ratio_to_best[group]).fold(f64::MAX, f64::min);
+        assert_eq!(least, 1.0);
+    }
+
+    // More samples, less error; 16 bits as good as 32.
+    let find = |kernel: &str, centres, samples| {
+        let wanted = |p: &&trade::Point| {
+            (p.way().as_str(), p.centres, p.samples_averaged, p.affine_tail, p.gate_k)
+                == (kernel, centres, samples, true, None)
+        };
+        trade.points.iter().find(wanted).unwrap()
+    };
+    let [once, often] = [1, 16].map(|samples| find("fixed16", 64, samples).rmse("dz_mm"));
+    assert!(often < 0.8 * once, "{often} against {once}");
+    let (fixed, float) = (find("fixed16", 64, 1), find("f32-direct", 64, 1));
+    assert!(fixed.rmse("dz_mm") < 1.01 * float.rmse("dz_mm"));
+    assert!(fixed.frame.cycles < float.frame.cycles / 3);
+    assert!(fixed.flash_bytes < 6 * float.flash_bytes / 10);
+    // One network for the array: less error, in fewer cycles.
+    let array = find("fixed16 array", 64, 1);
+    assert!(array.rmse("dz_mm") < 0.95 * fixed.rmse("dz_mm"), "{}", array.rmse("dz_mm"));
+    assert!(array.frame.cycles < fixed.frame.cycles && array.flash_bytes < fixed.flash_bytes);
+}
+
+#[test]
+fn the_chosen_blob_is_what_the_table_says() {
+    let scene = press();
+    let limits = Limits { error: Some(0.055), ..Limits::default() };
+    let plan = Plan { gate_k: vec![], ..plan() };
+    let trade = compute_plan(&scene, &plan, limits).unwrap();
+    let chosen = trade.chosen.unwrap();
+    let point = &trade.points[chosen];
+    assert!(point.rmse("dz_mm") <= 0.055);
+    for other in &trade.points {
+        let cheaper = other.frame.cycles < point.frame.cycles && other.rmse("dz_mm") <= 0.055;
+        assert!(!cheaper, "{} is cheaper", other.name());
+    }
+    let model = ModelBlob::of_bytes(trade.blob(chosen)).unwrap();
+    assert_eq!(model.bytes().len(), point.flash_bytes);
+    let level = scene.world.noise.level / (point.samples_averaged as f64).sqrt();
+    let frames = Synthesis::of(&scene.world).noise_level(level);
+    let test = frames.frames(Stream::Test, scene.training.test_frames);
+    let estimate = model.prepare(Exponential::Polynomial).decode_table(&test.inputs);
+    let errors = test.outputs.squared_errors(&estimate.values);
+    let z = errors.iter().skip(2).step_by(3);
+    let count = errors.len() / 3 * test.frames();
+    let rmse = (z.sum::<f64>() / count as f64).sqrt();
+    assert!((rmse - point.rmse("dz_mm")).abs() < 1e-12, "{rmse}");
+}
+
+#[test]
+fn behind_a_gate_points_err_as_the_gates_rows_do_and_cost_their_share() {
+    let mut scene = press();
+    let plan =
+        Plan { centres: vec![16], samples_averaged: vec![4], gate_k: vec![3.5], clock_mhz: 1.0 };
+    let limits = Limits { cycles: Some(10_000), ..Limits::default() };
+    let trade = compute_plan(&scene, &plan, limits).unwrap();
+    let costs = Costs::measured().unwrap();
+    // The gate command's way: the model by itself, and the same test frames.
+    scene.world.noise.level /= 2.0;
+    let mut gated = 0;
+    for (i, point) in trade.points.iter().enumerate() {
+        let Some(k) = point.gate_k else { continue };
+        let without = &trade.points[i - 1];
+        assert_eq!(point.name(), format!("{}, gate k = 3.5", without.name()));
+        let model = ModelBlob::of_bytes(trade.blob(i)).unwrap();
+        let model = model.prepare(Exponential::default());
+        let frames = costs.frames_of_model(model.model()).unwrap();
+        let settings = Settings {
+            k: vec![k],
+            frames: scene.training.test_frames,
+            baseline_frames: gate::BASELINE_FRAMES,
+            frame_cycles: None,
+        };
+        let result = gate::measure(&scene, &model, &settings).unwrap();
+        assert_eq!(point.errors, result.lines[0].errors);
+        assert_eq!(without.errors, result.ungated_errors);
+        let skipped = result.lines[0].skipped;
+        // A press wakes some row, and with it the whole array.
+        let expected = if point.whole_array { 0.0..0.4 } else { 0.4..0.8 };
+        assert!(expected.contains(&skipped), "{}: {skipped}", point.name());
+        let cycles = frames.map(|cost| cost.cycles).mean(skipped);
+        assert_eq!(point.frame.cycles, cycles.round() as u64);
+        assert!(point.whole_array || point.frame.instructions < without.frame.instructions);
+        // The baseline and the answer to it.
+        assert_eq!(point.ram_bytes - without.ram_bytes, 576 + 584);
+        assert_eq!(trade.rest_tolerance(i), Some(3.5 * 0.0025));
+        gated += 1;
+    }
+    assert!(gated >= 4, "{gated}");
+    // Only behind a gate does a frame cost so little.
+    let chosen = trade.chosen.unwrap();
+    assert!(trade.points[chosen].gate_k.is_some() && trade.points[chosen].on_front);
+}
+
+#[test]
+fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
+    let folder = Folder::new("trade-files");
+    let scene = include_str!("../../../scenes/press.toml")
+        .replace("name = \"press\"", "name = \"few\"")
+        .replace("frames = 20000", "frames = 400")
+        .replace("test_frames = 8000", "test_frames = 100");
+    folder.write("few.toml", scene);
+    let few = ["trade", "few.toml", "--centres", "16", "--average", "1"];
+    let cycles_of = |page: &str| -> Vec<u64> {
+        let points = page.lines().filter(|line| line.contains(" (1."));
+        let cycles = points.map(|line| line.split_whitespace().rev().nth(3).unwrap());
+        cycles.map(|cycles| cycles.parse().unwrap()).collect()
+    };
+    let front = folder.succeed(&few);
+    let all = folder.succeed(&[&few[..], &["--all"]].concat());
+    let (shown, every) = (cycles_of(&front), cycles_of(&all));
+    assert!(shown.len() > 1 && shown.is_sorted(), "{front}");
+    assert!(front.contains(&format!("\n{} more points with --all", every.len() - shown.len())));
+    assert!(!all.contains("--all"), "{all}");
+    let averages =
+        ["trade", "few.toml", "--centres", "16", "--average", "1,4,16", "--gate", "none"];
+    folder.succeed(&averages);
+    let svg = std::fs::read_to_string(folder.path("out/few/trade.svg")).unwrap();
+    assert!(svg.contains("front line dashed") && svg.contains("front line dotted"));
+    let page = folder.succeed(&[&few[..], &["--gate", "3,4", "--max-cycles", "10000"]].concat());
+    assert!(page.contains(" avg gate "), "{page}");
+    assert!(page.contains("--rest-tolerance 0.015") || page.contains("--rest-tolerance 0.02"));
+    let read = |name: &str| std::fs::read_to_string(folder.path(name)).unwrap();
+    let csv = read("out/few/trade.csv");
+    let mut lines = csv.lines();
+    assert!(
+        lines
+            .next()
+            .unwrap()
+            .starts_with("kernel,whole_array,centres,spread,affine_tail,samples_averaged,gate_k,")
+    );
+    let k_of = |line: &str| line.split(',').nth(6).unwrap().to_owned();
+    let of_fixed16: Vec<String> =
+        lines.filter(|line| line.starts_with("fixed16,false,")).map(k_of).collect();
+    assert_eq!(of_fixed16, ["", "3", "4", "", "3", "4"]);
+    let json: serde_json::Value = serde_json::from_str(&read("out/few/trade.json")).unwrap();
+    assert_eq!(json["points"][0]["gate_k"], serde_json::Value::Null);
+    assert_eq!(json["points"][1]["gate_k"], 3.0);
+    assert!(read("out/few/trade.svg").contains("c1 hollow mark"));
+    assert!(read("out/few/trade.html").contains("gate k</th>"));
+
+    assert!(folder.path("out/few/chosen.bin").exists());
+    // What was measured is kept where nothing is chosen, and no other run's choice beside it.
+    let output = folder.run(&[&few[..], &["--gate", "none", "--max-cycles", "100"]].concat());
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.code() == Some(2) && stderr.contains("--max-cycles 100"), "{stderr}");
+    let page = String::from_utf8(output.stdout).unwrap();
+    assert!(page.contains("\n* fixed16 ") && !page.contains("chosen:"), "{page}");
+    assert!(!read("out/few/trade.svg").contains("c1 hollow mark"), "{page}");
+    assert!(!folder.path("out/few/chosen.bin").exists());
+    // Without noise there is no gate, and the note says why.
+    let output = folder.run(&[&few[..], &["--noise", "0"]].concat());
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && stderr.contains("no points behind a gate"), "{stderr}");
+    for (k, says) in
+        [("none,3", "none alone"), ("3,3", "gives 3 twice"), ("x", "or none"), ("-1", "--gate -1")]
+    {
+        let output = folder.run(&[&few[..], &["--gate", k]].concat());
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{k}: {stderr}");
+        assert!(stderr.contains(says), "{k}: {stderr}");
+    }
+}
+
+#[test]
+fn limits_that_nothing_meets_and_scenes_that_were_not_measured_are_refused() {
+    let scene = press();
+    let limits = Limits { error: Some(1e-6), cycles: Some(20_000), flash_bytes: None };
+    let message = compute(&scene, limits).unwrap_err().to_string();
+    let all = compute(&scene, Limits::default()).unwrap();
+    let least_error = |within: &dyn Fn(&trade::Point) -> bool| {
+        let within = all.points.iter().filter(|point| within(point));
+        let least = within.map(|point| point.rmse("dz_mm")).fold(f64::MAX, f64::min);
+        (least * 1e4).ceil() / 1e4
+    };
+    let error = least_error(&|_| true);
+    let told = format!(
+        "no point is within max-error 0.000001: the smallest error is {error:.4} mm (dz_mm) of all: loosen it"
+    );
+    assert_eq!(message, told);
+    // The error that is told can be asked for.
+    compute(&scene, Limits { error: Some(error), ..Limits::default() }).unwrap();
+    // Each can be met, but not both.
+    let cycles = all.points.iter().map(|point| point.frame.cycles).min().unwrap();
+    let limits = Limits { error: Some(error), cycles: Some(cycles), flash_bytes: None };
+    let message = compute(&scene, limits).unwrap_err().to_string();
+    let near = least_error(&|point| point.frame.cycles <= cycles);
+    for told in [
+        format!("max-error {error}, max-cycles {cycles}, a slot's 131072 bytes at once"),
+        format!("without max-error {error}, the smallest error is {near:.4} mm (dz_mm)"),
+        format!("without max-cycles {cycles}, the fewest cycles are "),
+    ] {
+        assert!(message.contains(&told), "{message}");
+    }
+    for error in [0.0, -1.0, f64::NAN] {
+        let limits = Limits { error: Some(error), ..Limits::default() };
+        let message = compute(&scene, limits).unwrap_err().to_string();
+        assert!(message.contains("max-error"), "{message}");
+    }
+
+    let mut other = scene.clone();
+    other.world.read_rows.pop();
+    let message = compute(&other, Limits::default()).unwrap_err().to_string();
+    assert!(message.contains("7 rows of 18 readings"), "{message}");
+    let refusal = |scene: &Experiment, plan: &Plan| {
+        compute_plan(scene, plan, Limits::default()).unwrap_err().to_string()
+    };
+    let mut plan =
+        Plan { centres: vec![20], samples_averaged: vec![1], gate_k: vec![], clock_mhz: 1.0 };
+    let message = refusal(&scene, &plan);
+    assert!(message.contains("centres = 20") && message.contains("[16, 32"), "{message}");
+
+    (plan.centres, plan.gate_k) = (vec![16], vec![3.5, 200.0]);
+    let message = refusal(&scene, &plan);
+    assert!(message.contains("gate = 200") && message.contains("below 1"), "{message}");
+    let mut silent = scene.clone();
+    silent.world.noise.level = 0.0;
+    assert!(refusal(&silent, &plan).contains("noise level = 0"));
+}

@@ -1,0 +1,181 @@
+//! The firmware's application in a thread of this process.
+use std::io::{Read, Write};
+use std::time::Instant;
+
+use firmware::app::{PaperApp, PaperBuffers};
+use firmware::link::message::{Configuration, Memory};
+use firmware::platform::{Platform, Port};
+use firmware::readout::{FrameSource, ScanReport, ScanSettings};
+use firmware::store::{FlashError, Slot};
+use model_core::Frame;
+use taxel_data::random::{Purpose, Random, Stream};
+
+/// How the line to the device spoils bytes, in either direction: one in so many, or none.
+#[derive(Debug, Clone, Copy)]
+pub struct Line {
+    pub one_in: Option<usize>,
+}
+
+/// A board whose serial line is `W`, whose reads must not block.
+struct Board<W> {
+    wire: W,
+    start: Instant,
+    line: Line,
+    random: Random,
+    received: Vec<u8>,
+    taken: usize,
+    to_send: Vec<u8>,
+    /// The host has gone: the thread may end.
+    gone: bool,
+}
+
+impl<W: Read + Write> Board<W> {
+    /// `None` for a byte that is lost.
+    fn spoil(&mut self, byte: u8) -> Option<u8> {
+        let Some(one_in) = self.line.one_in else { return Some(byte) };
+        match self.random.below(3 * one_in) {
+            0 => None,
+            1 => Some(byte ^ 1 << self.random.below(8)),
+            2 => Some(0),
+            _ => Some(byte),
+        }
+    }
+
+    fn flush(&mut self) {
+        if !self.to_send.is_empty() {
+            self.gone |= self.wire.write_all(&self.to_send).is_err();
+            self.to_send.clear();
+        }
+    }
+}
+
+impl<W: Read + Write> Port for Board<W> {
+    fn now_us(&mut self) -> u32 {
+        self.start.elapsed().as_micros() as u32
+    }
+
+    fn receive(&mut self) -> Option<u8> {
+        if self.taken == self.received.len() {
+            self.flush();
+            self.received.resize(4096, 0);
+            self.taken = 0;
+            let count = match self.wire.read(&mut self.received) {
+                Ok(0) => {
+                    self.gone = true;
+                    0
+                }
+                Ok(count) => count,
+                Err(_) => {
+                    std::thread::yield_now();
+                    0
+                }
+            };
+            self.received.truncate(count);
+        }
+        let byte = *self.received.get(self.taken)?;
+        self.taken += 1;
+        self.spoil(byte)
+    }
+
+    fn send(&mut self, byte: u8) -> bool {
+        if let Some(byte) = self.spoil(byte) {
+            self.to_send.push(byte);
+        }
+        if byte == 0 {
+            self.flush();
+        }
+        true
+    }
+}
+
+impl<W: Read + Write> Platform for Board<W> {
+    const BOARD: &'static str = "virtual";
+
+    fn feed_watchdog(&mut self) {}
+
+    fn memory(&self) -> Memory {
+        Memory { text: 20_000, bss: 3000, stack_high_water: 1000, ..Memory::default() }
+    }
+}
+
+/// A sensor that goes through given frames again and again.
+#[derive(Clone)]
+struct Source {
+    frames: Vec<[[f32; 18]; 8]>,
+    next: usize,
+}
+
+impl FrameSource<8, 18> for Source {
+    fn scan(&mut self, _: ScanSettings, frame: &mut Frame<8, 18>) -> ScanReport {
+        frame.row_column_resistance_ohm = self.frames[self.next % self.frames.len()];
+        self.next += 1;
+        ScanReport::default()
+    }
+}
+
+/// A slot that takes writes only where it is erased.
+struct MemorySlot(Vec<u32>);
+
+impl Slot for MemorySlot {
+    fn bytes(&self) -> &[u8] {
+        bytemuck::cast_slice(&self.0)
+    }
+
+    fn erase(&mut self) -> Result<(), FlashError> {
+        self.0.fill(u32::MAX);
+        Ok(())
+    }
+
+    fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), FlashError> {
+        let place = offset / 4..(offset + bytes.len()) / 4;
+        assert!(self.0[place.clone()].iter().all(|word| *word == u32::MAX), "not erased");
+        bytemuck::cast_slice_mut(&mut self.0[place]).copy_from_slice(bytes);
+        Ok(())
+    }
+}
+
+/// Runs a device on `wire` that goes through `frames`: see [`run_with`].
+pub fn run(
+    wire: impl Read + Write + Send + 'static,
+    line: Line,
+    model: &[u8],
+    frames: Vec<[[f32; 18]; 8]>,
+) {
+    run_with(wire, line, model, Source { frames, next: 0 });
+}
+
+/// Runs a device on `wire` that scans `source`, until the host goes, restarting it whenever it asks for
+/// that.
+///
+/// `wire` must read without blocking.
+pub fn run_with(
+    mut wire: impl Read + Write + Send + 'static,
+    line: Line,
+    model: &[u8],
+    source: impl FrameSource<8, 18> + Clone + Send + 'static,
+) {
+    let mut slots = [0, 1].map(|_| MemorySlot(vec![u32::MAX; 128 * 1024 / 4]));
+    bytemuck::cast_slice_mut(&mut slots[0].0)[..model.len()].copy_from_slice(model);
+    std::thread::spawn(move || {
+        for life in 0.. {
+            let board = Board {
+                wire: &mut wire,
+                start: Instant::now(),
+                line,
+                random: Random::new(5, Stream::Test, Purpose::Damage, life, 2),
+                received: Vec::new(),
+                taken: 0,
+                to_send: Vec::new(),
+                gone: false,
+            };
+            let quiet = Configuration { frame_period_us: 0, ..Configuration::DEFAULT };
+            let mut buffers = PaperBuffers::new();
+            let mut app = PaperApp::<_, _>::new(board, source.clone(), quiet, &mut buffers);
+            app.run(&mut slots);
+            app.platform().flush();
+            if app.platform().gone {
+                return;
+            }
+        }
+    });
+}

@@ -1,0 +1,289 @@
+//! What users do, from end to end, with the binary.
+
+use crate::common::{Folder, small_scene};
+
+fn json(text: &str) -> serde_json::Value {
+    serde_json::from_str(text).unwrap()
+}
+
+#[test]
+fn a_csv_file_trains_decodes_and_evaluates() {
+    let folder = Folder::new("csv-workflow");
+    folder.write("scene.toml", small_scene());
+    folder.succeed(&["synth", "scene.toml", "-n", "3000", "-o", "train.csv"]);
+    folder.succeed(&["synth", "scene.toml", "-n", "500", "--seed", "2", "-o", "test.csv"]);
+    folder.succeed(&["train", "train.csv", "--centres", "24", "-o", "m.bin"]);
+    folder.succeed(&["decode", "m.bin", "test.csv", "-o", "estimate.csv"]);
+
+    let estimate = std::fs::read_to_string(folder.path("estimate.csv")).unwrap();
+    assert_eq!(estimate.lines().count(), 501);
+    assert!(estimate.starts_with("r4e1_dx_mm,r4e1_dy_mm,r4e1_dz_mm,r4e2_dx_mm,"));
+
+    let inspected = json(&folder.succeed(&["inspect", "m.bin", "--json"]));
+    assert_eq!(inspected["rows"], 2); // the names tell the row-wires: a network each
+    assert_eq!(inspected["networks"][1]["centres"], 24);
+    assert_eq!(inspected["outputs"][0]["unit"], "mm");
+
+    let evaluated = json(&folder.succeed(&["eval", "m.bin", "test.csv", "--json"]));
+    let rmse = |errors: &str| {
+        let groups = evaluated[errors].as_array().unwrap();
+        let z = groups.iter().find(|g| g["group"] == "dz_mm").unwrap();
+        z["rmse"].as_f64().unwrap()
+    };
+    assert!(rmse("errors") < 0.4 * rmse("mean_errors"), "{evaluated}");
+}
+
+#[test]
+fn columns_with_any_names_train_one_network() {
+    let folder = Folder::new("any-names");
+    let mut data = String::from("left,right,load_n,place_mm,day\n");
+    for i in 0..400 {
+        let (load, place) = (f64::from(i % 20) / 20.0, f64::from(i / 20) / 20.0);
+        let line = format!("{},{},{load},{place},{}\n", load * (1.0 - place), load * place, i % 4);
+        data.push_str(&line);
+    }
+    folder.write("d.csv", data);
+    let chosen = folder.succeed(&[
+        "train",
+        "d.csv",
+        "--inputs",
+        "left,right",
+        "--outputs",
+        "*_n",
+        "--select",
+        "--fold-column",
+        "day",
+        "--centres",
+        "4,16",
+        "--spread",
+        "0.3,0.6",
+        "-o",
+        "m.bin",
+        "--json",
+    ]);
+    let chosen = json(&chosen);
+    assert_eq!(chosen["selection"]["scored"].as_array().unwrap().len(), 4);
+    // The load is the sum of the two readings, so a linear decoder is exact.
+    assert!(chosen["selection"]["linear_rmse"][0].as_f64().unwrap() < 1e-6, "{chosen}");
+    assert_eq!(chosen["outputs"], serde_json::json!(["load_n"]));
+    assert!(chosen["training_rmse"][0].as_f64().unwrap() < 0.01, "{chosen}");
+    folder.succeed(&["decode", "m.bin", "d.csv", "-o", "e.csv"]);
+    let estimate = std::fs::read_to_string(folder.path("e.csv")).unwrap();
+    assert!(estimate.starts_with("load_n\n"));
+}
+
+#[test]
+fn missing_readings_leave_their_rows_outputs_empty_and_no_line_out() {
+    let folder = Folder::new("missing");
+    folder.write("scene.toml", small_scene());
+    folder.succeed(&["train", "scene.toml", "-n", "200", "-o", "m.bin"]);
+    folder.succeed(&["synth", "scene.toml", "-n", "3", "-o", "d.csv"]);
+    let data = std::fs::read_to_string(folder.path("d.csv")).unwrap();
+    let mut lines: Vec<Vec<&str>> = data.lines().map(|l| l.split(',').collect()).collect();
+    let column = lines[0].iter().position(|name| *name == "r5c7_ohm").unwrap();
+    lines[2][column] = "";
+    lines[3][column] = "NaN";
+    let holed = lines.iter().map(|l| l.join(",") + "\n").collect::<String>();
+    folder.write("holed.csv", holed);
+    let printed = folder.succeed(&["decode", "m.bin", "holed.csv", "-o", "e.csv"]);
+    assert!(printed.contains("2 of them miss a reading"), "{printed}");
+    let estimate = std::fs::read_to_string(folder.path("e.csv")).unwrap();
+    let empty = |line: &str| line.split(',').map(str::is_empty).collect::<Vec<_>>();
+    let lines: Vec<Vec<bool>> = estimate.lines().map(empty).collect();
+    assert_eq!(lines.len(), 4);
+    assert!(lines[1].iter().all(|empty| !empty));
+    for holed in &lines[2..] {
+        let (row_4, row_5) = holed.split_at(18);
+        assert!(row_4.iter().all(|empty| !empty) && row_5.iter().all(|empty| *empty));
+    }
+}
+
+#[test]
+fn one_network_for_the_whole_array_needs_every_reading_and_errs_less() {
+    let folder = Folder::new("array");
+    folder.write("scene.toml", small_scene());
+    folder.succeed(&["train", "scene.toml", "-n", "2000", "-o", "rows.bin"]);
+    let array = ["train", "scene.toml", "-n", "2000", "--whole-array", "-o", "array.bin"];
+    folder.succeed(&array);
+    let printed = folder.succeed(&["inspect", "array.bin"]);
+    assert!(printed.contains("36 readings → 18 features for all rows"), "{printed}");
+    assert!(printed.contains("\nnetwork 0 ") && !printed.contains("network 1"), "{printed}");
+    let printed = folder.succeed(&["inspect", "rows.bin"]);
+    assert!(printed.contains("\nnetworks 0–1 ") && !printed.contains("network 0"), "{printed}");
+    folder.succeed(&["synth", "scene.toml", "-n", "1000", "--seed", "9", "-o", "d.csv"]);
+    let rmse = |model: &str| {
+        let result = json(&folder.succeed(&["eval", model, "d.csv", "--json"]));
+        let groups = result["errors"].as_array().unwrap().iter();
+        groups.map(|group| group["rmse"].as_f64().unwrap()).sum::<f64>()
+    };
+    let (of_array, of_rows) = (rmse("array.bin"), rmse("rows.bin"));
+    assert!(of_array < of_rows, "{of_array} {of_rows}");
+
+    // The scene asks for the same; it says its own width, of which --whole-array takes half.
+    let scene = small_scene()
+        .replace("affine_tail = true", "affine_tail = true\nwhole_array = true")
+        .replace("spread = 0.8", "spread = 0.4");
+    assert!(scene.contains("whole_array") && scene.contains("spread = 0.4"));
+    folder.write("array.toml", scene);
+    folder.succeed(&["train", "array.toml", "-n", "2000", "-o", "scene.bin"]);
+    let network =
+        |model: &str| json(&folder.succeed(&["inspect", model, "--json"]))["networks"].clone();
+    assert_eq!(network("scene.bin"), network("array.bin"));
+
+    let data = std::fs::read_to_string(folder.path("d.csv")).unwrap();
+    let mut lines: Vec<Vec<&str>> = data.lines().map(|l| l.split(',').collect()).collect();
+    lines[2][0] = "";
+    folder.write("holed.csv", lines.iter().map(|l| l.join(",") + "\n").collect::<String>());
+    let printed = folder.succeed(&["decode", "array.bin", "holed.csv", "-o", "e.csv"]);
+    assert!(printed.contains("1 of them miss a reading: all outputs are empty"), "{printed}");
+    let estimate = std::fs::read_to_string(folder.path("e.csv")).unwrap();
+    let empty: Vec<usize> = estimate
+        .lines()
+        .map(|line| line.split(',').filter(|cell| cell.is_empty()).count())
+        .collect();
+    assert_eq!(empty[..4], [0, 0, 36, 0]);
+}
+
+#[test]
+fn forward_follows_the_equations() {
+    let folder = Folder::new("forward");
+    let names: Vec<String> = (1..=8)
+        .flat_map(|m| {
+            (1..=6).flat_map(move |i| ["x", "y", "z"].map(|a| format!("r{m}e{i}_d{a}_mm")))
+        })
+        .collect();
+    let moved: Vec<String> =
+        (0..144).map(|i| format!("{}", f64::from(i % 7) * 0.125 - 0.375)).collect();
+    folder.write("d.csv", format!("{}\n{}\n", names.join(","), moved.join(",")));
+    folder.succeed(&["forward", "paper", "d.csv", "-o", "r.csv"]);
+    let written = std::fs::read_to_string(folder.path("r.csv")).unwrap();
+    let (header, values) = written.split_once('\n').unwrap();
+    assert!(header.starts_with("r1c1_ohm,r1c2_ohm,") && header.ends_with(",r8c18_ohm"));
+    // By hand, node after node, straight from equations 1 to 7.
+    for (place, value) in values.trim().split(',').enumerate() {
+        let (m, k) = (place / 18, place % 18);
+        let mut conductance = 0.0;
+        for i in 0..6 {
+            let delta =
+                |axis: usize| f64::from(((m * 6 + i) * 3 + axis) as u32 % 7) * 0.125 - 0.375;
+            let u = [(i as f64 + 0.5) * 20.0 / 6.0, (m as f64 + 0.5) * 2.25, 5.0];
+            for j in 0..3 {
+                let l = [(k as f64 + 0.5) * 20.0 / 18.0, (f64::from(j) + 0.5) * 6.0, 0.0];
+                let squared: f64 = (0..3).map(|a| (u[a] - delta(a) - l[a]).powi(2)).sum();
+                conductance += 1.0 / (100.0 * squared.sqrt());
+            }
+        }
+        let relative = value.parse::<f64>().unwrap() * conductance - 1.0;
+        assert!(relative.abs() <= 1e-12, "r{}c{}: {relative:e}", m + 1, k + 1);
+    }
+}
+
+#[test]
+fn same_seed_same_bytes_on_one_thread_and_on_two() {
+    let folder = Folder::new("determinism");
+    folder.write("scene.toml", small_scene().replace("kind = \"relative\"", "kind = \"span\""));
+    let all = |threads: usize| -> Vec<Vec<u8>> {
+        let name = |what: &str| format!("{what}.{threads}");
+        let (csv, scene_blob, csv_blob, table, out) =
+            (name("d"), name("s"), name("m"), name("t"), name("out"));
+        let runs: [&[&str]; 5] = [
+            &["synth", "scene.toml", "-n", "3000", "-o", &csv],
+            &["train", "scene.toml", "-o", &scene_blob],
+            &[
+                "train",
+                "d.2",
+                "--select",
+                "--centres",
+                "8,12",
+                "--spread",
+                "0.5,1",
+                "-o",
+                &csv_blob,
+            ],
+            &["table1", "scene.toml", "-o", &table],
+            &["run", "scene.toml", "-o", &out],
+        ];
+        for arguments in runs {
+            let output = folder.run_with_threads(arguments, threads);
+            assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        }
+        let small = folder.path(&out).join("small");
+        let mut written: Vec<_> = std::fs::read_dir(&small).unwrap().map(|e| e.unwrap()).collect();
+        written.sort_by_key(std::fs::DirEntry::file_name);
+        let files = [csv, scene_blob, csv_blob, table].into_iter().map(|f| folder.path(&f));
+        files
+            .chain(written.iter().map(std::fs::DirEntry::path))
+            .map(|f| std::fs::read(f).unwrap())
+            .collect()
+    };
+    let two = all(2);
+    let one = all(1);
+    assert!(two.len() >= 7 && two.iter().all(|bytes| bytes.len() > 100));
+    assert_eq!(one.len(), two.len());
+    for (i, (one, two)) in one.iter().zip(&two).enumerate() {
+        assert!(one == two, "file {i} differs");
+    }
+}
+
+#[test]
+fn run_writes_a_whole_folder_and_its_blob_is_the_one_that_train_writes() {
+    let folder = Folder::new("run");
+    folder.write("scene.toml", small_scene());
+    let printed = json(&folder.succeed(&["run", "scene.toml", "--json"]));
+    folder.succeed(&["train", "scene.toml", "-o", "m.bin"]);
+    let out = folder.path("out/small");
+    assert_eq!(
+        std::fs::read(out.join("model.bin")).unwrap(),
+        std::fs::read(folder.path("m.bin")).unwrap()
+    );
+    let metrics = json(&std::fs::read_to_string(out.join("metrics.json")).unwrap());
+    assert_eq!(metrics, printed);
+    let table = std::fs::read_to_string(out.join("table1.csv")).unwrap();
+    // 4 noise levels × (2 baselines + 10 spreads × 2 networks) × 3 axes × 6 definitions.
+    assert_eq!(table.lines().count(), 1 + 4 * (2 + 20) * 3 * 6);
+    let before = folder.names();
+    folder.succeed(&["run", "scene.toml"]); // again, over what is there
+    assert_eq!(folder.names(), before);
+}
+
+#[test]
+fn every_command_has_help_with_an_example() {
+    let folder = Folder::new("help");
+    for command in [
+        "run", "synth", "forward", "train", "decode", "eval", "inspect", "table1", "readout",
+        "emulate", "link",
+    ] {
+        let help = folder.succeed(&[command, "--help"]);
+        assert!(help.contains(&format!("host-sim {command} ")), "{help}");
+        assert!(help.contains("--json"), "{help}");
+    }
+}
+
+#[test]
+fn table1_shows_printed_values_beside_and_keeps_them() {
+    let folder = Folder::new("printed");
+    folder.write("scene.toml", small_scene());
+    folder.write("p.csv", "spread,noise_level,percent\n0.5,0.01,7.25\n");
+    let table = ["table1", "scene.toml", "--printed", "p.csv", "-o", "t.csv"];
+    let page = folder.succeed(&table);
+    assert!(page.contains("positional") && page.contains("7.25"), "{page}");
+    let csv = std::fs::read_to_string(folder.path("t.csv")).unwrap();
+    assert!(csv.ends_with("\n0.01,paper,0.5,dz_mm,as_printed,7.25\n"));
+}
+
+#[test]
+fn readings_of_another_sensor_are_remarked_upon() {
+    let folder = Folder::new("another");
+    folder.write("scene.toml", small_scene());
+    let thicker = small_scene().replace("[20.0, 18.0, 5.0]", "[20.0, 18.0, 7.0]");
+    folder.write("thicker.toml", thicker);
+    folder.succeed(&["train", "scene.toml", "-n", "500", "-o", "m.bin"]);
+    let remark = |scene: &str| {
+        folder.succeed(&["synth", scene, "-n", "100", "--seed", "2", "-o", "d.csv"]);
+        let output = folder.run(&["decode", "m.bin", "d.csv", "-o", "e.csv"]);
+        assert!(output.status.success());
+        String::from_utf8(output.stderr).unwrap()
+    };
+    assert_eq!(remark("scene.toml"), "");
+    assert!(remark("thicker.toml").contains("outside the range that the model was trained on"));
+}
