@@ -3,14 +3,15 @@
 use core::marker::PhantomData;
 
 use crate::blob::{DecodeError, Metadata, Model, ModelShape, NetworkSection};
+use crate::cortex_m4::Finite;
+#[cfg(cortex_m4f)]
+use crate::cortex_m4::{INPUTS, OUTPUTS};
 use crate::estimate::{Estimate, RowStatus};
 use crate::exp::{ExpKernel, Polynomial};
 use crate::frame::Frame;
 use crate::gate::Gate;
 use crate::projection::Projection;
-use crate::rbf::{Assembled, Finite, Format, NetworkError};
-#[cfg(cortex_m4f)]
-use crate::rbf::{USUAL_INPUTS, USUAL_OUTPUTS};
+use crate::rbf::{Assembled, Format};
 
 /// RAM in bytes that a [`Decoder`] of so many `rows` takes on a 32-bit target, whatever its K: slices
 /// into the blob. The link check of the firmware holds it to the compiler.
@@ -195,12 +196,12 @@ fn decode_inputs(
 fn decode_in_assembly(
     section: &NetworkSection<'_>,
     exp: fn(f32) -> f32,
-    inputs: &[f32; USUAL_INPUTS],
+    inputs: &[f32; INPUTS],
     scaled: &mut [f32],
-    groups: &mut [[f32; USUAL_OUTPUTS]],
+    groups: &mut [[f32; OUTPUTS]],
 ) -> RowStatus {
     let outputs = groups.as_flattened().len();
-    let shape = ModelShape { rows: 1, inputs: USUAL_INPUTS, outputs };
+    let shape = ModelShape { rows: 1, inputs: INPUTS, outputs };
     let finite = match section.format() {
         Format::F32Direct => {
             let outputs = groups.as_flattened_mut();
@@ -209,7 +210,7 @@ fn decode_in_assembly(
         Format::F32 => section.expanded(shape).map(|it| it.infer_in_assembly(inputs, groups)),
         Format::Fixed16 => section.fixed16(shape).map(|it| it.infer_in_assembly(inputs, groups)),
     };
-    status_of(finite, inputs)
+    status_of(finite.ok().flatten(), inputs)
 }
 
 /// See [`decode_in_assembly`].
@@ -232,18 +233,18 @@ fn decode_in_rust(
         Format::F32 => section.expanded(shape).map(|it| it.infer(inputs, scaled, outputs)),
         Format::Fixed16 => section.fixed16(shape).map(|it| it.infer(inputs, scaled, outputs)),
     };
-    status_of(finite, inputs)
+    status_of(finite.ok(), inputs)
 }
 
-/// Of the formats whose outputs have a bound, which is checked when a model is loaded.
+/// The status of a row in a format whose outputs have a bound, which is checked when a model is loaded.
 #[inline(always)]
 #[expect(clippy::inline_always, reason = "an enum that need not be made")]
-fn status_of(finite: Result<Finite, NetworkError>, inputs: &[f32]) -> RowStatus {
+fn status_of(finite: Option<Finite>, inputs: &[f32]) -> RowStatus {
     match finite {
-        Ok(Finite::Known) => RowStatus::Decoded,
-        Ok(Finite::Unknown) if all_finite(inputs) => RowStatus::Decoded,
-        // An error: not so, the network was there when the model was loaded.
-        Ok(Finite::Unknown) | Err(_) => RowStatus::MissingReading,
+        Some(Finite::Known) => RowStatus::Decoded,
+        Some(Finite::Unknown) if all_finite(inputs) => RowStatus::Decoded,
+        // `None` never happens: the network was there, in its sizes, when the model was loaded.
+        Some(Finite::Unknown) | None => RowStatus::MissingReading,
     }
 }
 

@@ -18,7 +18,6 @@ compile_error!("the weight blob holds little-endian floats that are borrowed in 
 
 pub mod blob;
 pub mod checksum;
-#[cfg(cortex_m4f)]
 mod cortex_m4;
 mod decoder;
 mod estimate;

@@ -24,11 +24,6 @@ pub mod direct;
 pub mod expanded;
 pub mod fixed16;
 
-/// The paper's sizes, which inner loops are made for: in assembly, or compiled with these numbers known.
-pub(crate) const USUAL_INPUTS: usize = 18;
-/// See [`USUAL_INPUTS`].
-pub(crate) const USUAL_OUTPUTS: usize = 18;
-
 /// The sizes of one network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shape {
@@ -114,16 +109,6 @@ impl Format {
             Self::Fixed16 => "fixed16",
         }
     }
-}
-
-/// Whether the readings of an inference were finite, as far as a kernel with a bound on its outputs tells.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Finite {
-    /// All were.
-    #[cfg_attr(not(cortex_m4f), expect(dead_code, reason = "assembly alone tells on the side"))]
-    Known,
-    /// That did not come to light.
-    Unknown,
 }
 
 /// A network of any format, whose parameters have been checked against its shape.

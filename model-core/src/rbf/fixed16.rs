@@ -12,14 +12,16 @@
 //!
 //! The bias opens the sums, and one multiplication by the scale closes them: all before it is in integers, so
 //! that any order gives the same bits.
+#![cfg_attr(
+    cortex_m4f,
+    expect(unsafe_code, reason = "calls to assembly, whose conditions are checked before")
+)]
 
 use core::f32::consts::LOG2_E;
 
 use super::{Assembled, Cut, NetworkError, Shape, check_finite, check_length, check_spans};
 #[cfg(cortex_m4f)]
-use super::{Finite, USUAL_OUTPUTS};
-#[cfg(cortex_m4f)]
-use crate::cortex_m4::{self, Inputs};
+use crate::cortex_m4::{self, Finite, Inputs, OUTPUTS};
 use crate::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP, clamp_steps};
 
 /// Centres are stored in multiples of this.
@@ -234,6 +236,10 @@ impl<'a> Network<'a> {
 }
 
 impl Assembled for Network<'_> {
+    fn shape(&self) -> Shape {
+        self.shape
+    }
+
     fn scale(&self, reading: &[f32], scaled: &mut [f32]) {
         let p = self.parameters();
         super::scale_about(p.input_midpoint, p.input_per_unit, reading, scaled);
@@ -242,15 +248,20 @@ impl Assembled for Network<'_> {
     #[cfg(cortex_m4f)]
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "a call")]
-    fn kernel(&self, inputs: Inputs<'_>, output: &mut [f32; USUAL_OUTPUTS]) -> Finite {
-        cortex_m4::fixed16(self, inputs, output)
+    unsafe fn routine(&self, inputs: Inputs<'_>, output: &mut [f32; OUTPUTS]) -> Finite {
+        let Self { shape, affine, block } = *self;
+        // SAFETY: the caller has compared the shape with the routine's. When the network was made, its block was
+        // found to be as long as its shape asks for, and no dimension to be 0. A test compares the lengths.
+        unsafe { cortex_m4::fixed16(inputs, block, shape.centres, affine, output) }
     }
 
     #[cfg(cortex_m4f)]
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "a call")]
-    fn array_kernel(&self, inputs: Inputs<'_>, groups: &mut [[f32; USUAL_OUTPUTS]]) -> Finite {
-        cortex_m4::fixed16_array(self, inputs, groups)
+    unsafe fn array_routine(&self, inputs: Inputs<'_>, groups: &mut [[f32; OUTPUTS]]) -> Finite {
+        let Self { shape, affine, block } = *self;
+        // SAFETY: as in `routine`.
+        unsafe { cortex_m4::fixed16_array(inputs, block, shape.centres, affine, groups) }
     }
 
     #[inline(always)]
