@@ -1,3 +1,4 @@
+mod assembly;
 mod formats;
 
 use super::direct::Parameters;

@@ -1,7 +1,6 @@
 //! Networks with expanded distances, in f32 and in fixed point, against their formulas in f64.
 
 use super::super::*;
-use crate::cortex_m4;
 use crate::exp::{Polynomial, exp2};
 use crate::scale::{CLAMP, HALF_RANGE, UNITS, UNITS_PER_STEP};
 use proptest::prelude::*;
@@ -198,20 +197,6 @@ proptest! {
         // A cubic within 1.1e-4, centres moved by rounding, weights of 16 bits and fewer.
         let error = formula.error_of(&network.into(), place);
         prop_assert!(error < 6e-4 * shape.centres as f64, "fixed16: {error}");
-    }
-}
-
-#[test]
-fn a_block_has_the_words_that_the_assembly_reads() {
-    for centres in 1..=70 {
-        for (groups, affine) in (1..=8).flat_map(|groups| [(groups, false), (groups, true)]) {
-            let shape =
-                Shape { inputs: cortex_m4::INPUTS, centres, outputs: cortex_m4::OUTPUTS * groups };
-            let expanded = expanded::Network::block_words(shape, affine);
-            assert_eq!(expanded, cortex_m4::expanded_words(centres, affine, groups), "{shape:?}");
-            let fixed16 = fixed16::Network::block_words(shape, affine);
-            assert_eq!(fixed16, cortex_m4::fixed16_words(centres, affine, groups), "{shape:?}");
-        }
     }
 }
 
