@@ -16,19 +16,21 @@
 #[cfg(target_endian = "big")]
 compile_error!("the weight blob holds little-endian floats that are borrowed in place");
 
-pub mod blob;
-pub mod checksum;
-mod cortex_m4;
-mod decoder;
-mod estimate;
+// From the ground up: a module imports only what is declared before it.
+
 pub mod exp;
-mod frame;
-pub mod gate;
-pub mod health;
-pub mod projection;
-pub mod rbf;
-pub mod rls;
 pub mod scale;
+pub mod checksum;
+pub mod rls;
+mod cortex_m4;
+mod frame;
+mod estimate;
+pub mod health;
+pub mod gate;
+pub mod rbf;
+pub mod projection;
+pub mod blob;
+mod decoder;
 
 pub use blob::Aligned;
 pub use decoder::{Decoder, decoder_ram_bytes};

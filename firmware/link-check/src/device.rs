@@ -1,41 +1,17 @@
 //! Calls everything that a device calls, on inputs of which the optimiser knows nothing.
 
-use core::panic::PanicInfo;
-use core::{ptr, slice};
-
 use firmware::PaperSensor;
 use firmware::store::blob_in_slot;
 use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
 use model_core::rls::{self, Rls};
 use model_core::{ColumnWire, Frame, RowWire};
 
+use crate::application;
+use crate::opaque::{opaque, slot};
+use crate::readout;
+
 /// What `host-sim inspect` tells users of RAM must hold here.
 const _: () = assert!(size_of::<PaperSensor<'static>>() <= model_core::decoder_ram_bytes(8));
-
-unsafe extern "C" {
-    /// Defined nowhere: whatever reaches it does not link.
-    fn taxel_reachable_panic() -> !;
-}
-
-#[panic_handler]
-fn panic(_: &PanicInfo<'_>) -> ! {
-    // SAFETY: never runs, since it never links.
-    unsafe { taxel_reachable_panic() }
-}
-
-/// `value`, after which the optimiser neither knows what it is nor may leave out computing it.
-#[inline(never)]
-pub fn opaque<T: Copy>(value: T) -> T {
-    // SAFETY: a reference is valid for reads.
-    unsafe { ptr::read_volatile(&raw const value) }
-}
-
-/// A flash slot of unknown address, length and content.
-pub fn slot() -> &'static [u8] {
-    let (address, length) = opaque((0x0806_0000_usize, 0x2_0000_usize));
-    // SAFETY: the numbers are those of the last sector of a board's flash.
-    unsafe { slice::from_raw_parts(ptr::with_exposed_provenance(address), length) }
-}
 
 fn exercise_decoding<E: ExpKernel>() {
     let Ok(mut sensor) = PaperSensor::<E>::load(slot()) else { return };
@@ -84,8 +60,8 @@ extern "C" fn _start() -> ! {
     exercise_decoding::<Micromath>();
     exercise_recalibration();
     exercise_recalibration_on_slices();
-    crate::application::exercise();
-    crate::readout::exercise();
+    application::exercise();
+    readout::exercise();
     loop {
         core::hint::spin_loop();
     }

@@ -5,12 +5,13 @@
 #![cfg(target_os = "none")]
 #![no_std]
 
-pub mod checks;
+// From the ground up: a module imports only what is declared before it.
+mod registers;
 pub mod clock;
+pub mod uart;
+pub mod watchdog;
 pub mod exit;
 mod fault;
 pub mod memory;
-mod registers;
 pub mod slot;
-pub mod uart;
-pub mod watchdog;
+pub mod checks;

@@ -1,46 +1,14 @@
 //! Reading a blob: check everything once, then borrow.
 
-use serde::{Deserialize, Serialize};
-
 use super::error::DecodeError;
 use super::format::{
     CRC_BYTES, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection, PREFIX_BYTES, Prefix,
     RbfHeader, ShapeField, TAG_METADATA, TAG_PROJECTION,
 };
-use super::{Metadata, ModelShape};
+use super::metadata::{Columns, Floats, Metadata, ModelShape};
 use crate::checksum::CRC_32;
 use crate::projection::{self, Projection};
 use crate::rbf::{Cut, Format, Network, NetworkError, Shape, direct, expanded, fixed16};
-
-/// Names or units of columns, one a line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Columns<'a>(pub &'a str);
-
-impl<'a> Columns<'a> {
-    /// The entries in their order.
-    pub fn iter(self) -> impl Iterator<Item = &'a str> {
-        // As a set of one: the search for a single `char` indexes a slice in a way that the optimiser
-        // cannot prove, and would be the only reachable panic of the device path.
-        self.0.split(['\n'])
-    }
-}
-
-/// Little-endian `f32` at any address.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Floats<'a>(#[serde(borrow)] pub &'a [u8]);
-
-impl<'a> Floats<'a> {
-    /// The bytes of `numbers`, where they lie.
-    #[must_use]
-    pub fn of(numbers: &'a [f32]) -> Self {
-        Self(bytemuck::cast_slice(numbers))
-    }
-
-    /// The numbers in their order.
-    pub fn iter(self) -> impl Iterator<Item = f32> + 'a {
-        self.0.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes))
-    }
-}
 
 /// A sound blob, borrowed.
 #[derive(Debug, Clone, Copy, PartialEq)]

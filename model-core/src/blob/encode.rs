@@ -2,12 +2,13 @@
 
 use serde::Serialize;
 
+use super::decode::Model;
 use super::error::EncodeError;
 use super::format::{
     CRC_BYTES, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection, Prefix, RbfHeader,
     ShapeField, TAG_METADATA, TAG_PROJECTION, tag_of,
 };
-use super::{Metadata, Model};
+use super::metadata::Metadata;
 use crate::checksum::CRC_32;
 use crate::projection::Projection;
 use crate::rbf::Network;

@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::DecodeError;
+use super::error::DecodeError;
+use super::metadata::NoiseKind;
 use crate::rbf::Format;
 
 /// The first four bytes of every blob.
@@ -40,17 +41,6 @@ pub(super) struct ShapeField<'a> {
     /// Which network serves each row: `rows` bytes.
     #[serde(borrow)]
     pub row_network: &'a [u8],
-}
-
-/// How the noise of a training set was defined.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum NoiseKind {
-    /// None was added (measured data, or an ideal sensor).
-    None,
-    /// R·(1 + p·n).
-    Relative,
-    /// R + p·(channel maximum − minimum)·n.
-    Span,
 }
 
 #[derive(Serialize, Deserialize)]

@@ -5,7 +5,7 @@
     expect(unsafe_code, reason = "calls to assembly, whose conditions are checked before")
 )]
 
-use super::Shape;
+use super::parameters::Shape;
 #[cfg(cortex_m4f)]
 use crate::cortex_m4::Inputs;
 use crate::cortex_m4::{Finite, INPUTS, OUTPUTS};

@@ -3,7 +3,9 @@
 //! F(x) = Σ_k ω_k·exp(−d_k·‖x − c_k‖²) + b (+ A·x), with d = 1/(2σ²) and x the readings scaled to
 //! [0, 1]. ‖x − c‖² accumulates in four interleaved partial sums, added pairwise.
 
-use super::{Cut, NetworkError, Shape, accumulate, check_finite, check_length, check_spans};
+use super::parameters::{
+    Cut, NetworkError, Shape, accumulate, check_finite, check_length, check_spans,
+};
 use crate::cortex_m4::{INPUTS, OUTPUTS};
 use crate::scale::scale;
 

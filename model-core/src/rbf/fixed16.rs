@@ -19,7 +19,10 @@
 
 use core::f32::consts::LOG2_E;
 
-use super::{Assembled, Cut, NetworkError, Shape, check_finite, check_length, check_spans};
+use super::assembled::Assembled;
+use super::parameters::{
+    Cut, NetworkError, Shape, check_finite, check_length, check_spans, range_about, scale_about,
+};
 #[cfg(cortex_m4f)]
 use crate::cortex_m4::{self, Finite, Inputs, OUTPUTS};
 use crate::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP, clamp_steps};
@@ -216,7 +219,7 @@ impl<'a> Network<'a> {
 
     pub(super) fn training_range(&self, input: usize) -> [f32; 2] {
         let p = self.parameters();
-        super::range_about(p.input_midpoint.get(input), p.input_per_unit.get(input))
+        range_about(p.input_midpoint.get(input), p.input_per_unit.get(input))
     }
 
     /// As [`rbf::Network::infer_scaled`](super::Network::infer_scaled), by the compiled twin of the
@@ -242,7 +245,7 @@ impl Assembled for Network<'_> {
 
     fn scale(&self, reading: &[f32], scaled: &mut [f32]) {
         let p = self.parameters();
-        super::scale_about(p.input_midpoint, p.input_per_unit, reading, scaled);
+        scale_about(p.input_midpoint, p.input_per_unit, reading, scaled);
     }
 
     #[cfg(cortex_m4f)]
