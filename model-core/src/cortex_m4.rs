@@ -19,7 +19,7 @@ pub(crate) const OUTPUTS: usize = 18;
 
 /// Whether the readings of an inference were finite, as far as the inference itself can tell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Finite {
+pub enum Finite {
     /// All readings were finite.
     #[cfg_attr(not(cortex_m4f), expect(dead_code, reason = "assembly alone tells on the side"))]
     Known,

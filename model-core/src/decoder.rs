@@ -11,7 +11,9 @@ use crate::exp::{ExpKernel, Polynomial};
 use crate::frame::Frame;
 use crate::gate::Gate;
 use crate::projection::Projection;
-use crate::rbf::{Assembled, Format};
+use crate::rbf::expanded::Expanded;
+use crate::rbf::fixed16::Fixed16;
+use crate::rbf::{Format, NetworkError};
 
 /// RAM in bytes that a [`Decoder`] of so many `rows` takes on a 32-bit target, whatever its K: slices
 /// into the blob. The link check of the firmware holds it to the compiler.
@@ -207,10 +209,14 @@ fn decode_in_assembly(
             let outputs = groups.as_flattened_mut();
             return decode_direct(section, exp, inputs, scaled, outputs);
         }
-        Format::F32 => section.expanded(shape).map(|it| it.infer_in_assembly(inputs, groups)),
-        Format::Fixed16 => section.fixed16(shape).map(|it| it.infer_in_assembly(inputs, groups)),
+        Format::F32 => {
+            section.packed::<Expanded>(shape).map(|it| it.infer_in_assembly(inputs, groups))
+        }
+        Format::Fixed16 => {
+            section.packed::<Fixed16>(shape).map(|it| it.infer_in_assembly(inputs, groups))
+        }
     };
-    status_of(finite.ok().flatten(), inputs)
+    status_of(finite.flatten(), inputs)
 }
 
 /// See [`decode_in_assembly`].
@@ -230,21 +236,25 @@ fn decode_in_rust(
     let shape = ModelShape { rows: 1, inputs: inputs.len(), outputs: outputs.len() };
     let finite = match section.format() {
         Format::F32Direct => return decode_direct(section, exp, inputs, scaled, outputs),
-        Format::F32 => section.expanded(shape).map(|it| it.infer(inputs, scaled, outputs)),
-        Format::Fixed16 => section.fixed16(shape).map(|it| it.infer(inputs, scaled, outputs)),
+        Format::F32 => {
+            section.packed::<Expanded>(shape).map(|it| it.infer(inputs, scaled, outputs))
+        }
+        Format::Fixed16 => {
+            section.packed::<Fixed16>(shape).map(|it| it.infer(inputs, scaled, outputs))
+        }
     };
-    status_of(finite.ok(), inputs)
+    status_of(finite, inputs)
 }
 
 /// The status of a row in a format whose outputs have a bound, which is checked when a model is loaded.
 #[inline(always)]
 #[expect(clippy::inline_always, reason = "an enum that need not be made")]
-fn status_of(finite: Option<Finite>, inputs: &[f32]) -> RowStatus {
+fn status_of(finite: Result<Finite, NetworkError>, inputs: &[f32]) -> RowStatus {
     match finite {
-        Some(Finite::Known) => RowStatus::Decoded,
-        Some(Finite::Unknown) if all_finite(inputs) => RowStatus::Decoded,
-        // `None` never happens: the network was there, in its sizes, when the model was loaded.
-        Some(Finite::Unknown) | None => RowStatus::MissingReading,
+        Ok(Finite::Known) => RowStatus::Decoded,
+        Ok(Finite::Unknown) if all_finite(inputs) => RowStatus::Decoded,
+        // An error never happens: the network was there, in its sizes, when the model was loaded.
+        Ok(Finite::Unknown) | Err(_) => RowStatus::MissingReading,
     }
 }
 

@@ -17,13 +17,13 @@
 // From the ground up.
 mod parameters;
 mod format;
-mod assembled;
+mod packed;
 pub mod direct;
 pub mod expanded;
 pub mod fixed16;
 
-pub(crate) use assembled::Assembled;
 pub use format::Format;
+pub(crate) use packed::{Layout, Network as Packed};
 pub(crate) use parameters::Cut;
 pub use parameters::{NetworkError, Shape};
 

@@ -8,7 +8,9 @@ use super::format::{
 use super::metadata::{Columns, Floats, Metadata, ModelShape};
 use crate::checksum::CRC_32;
 use crate::projection::{self, Projection};
-use crate::rbf::{Cut, Format, Network, NetworkError, Shape, direct, expanded, fixed16};
+use crate::rbf::{
+    Cut, Format, Layout, Network, NetworkError, Packed, Shape, direct, expanded, fixed16,
+};
 
 /// A sound blob, borrowed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -305,8 +307,8 @@ impl<'a> NetworkSection<'a> {
     pub fn network(&self, shape: ModelShape) -> Result<Network<'a>, NetworkError> {
         match self.format {
             Format::F32Direct => self.direct(shape).map(Network::F32Direct),
-            Format::F32 => self.expanded(shape).map(Network::F32),
-            Format::Fixed16 => self.fixed16(shape).map(Network::Fixed16),
+            Format::F32 => self.packed(shape).map(Network::F32),
+            Format::Fixed16 => self.packed(shape).map(Network::Fixed16),
         }
     }
 
@@ -322,18 +324,11 @@ impl<'a> NetworkSection<'a> {
         direct::Network::from_block(shape, self.common_width, self.affine, Cut(self.block))
     }
 
-    /// The network if it is one with expanded distances.
+    /// The network if its format is one of [`Layout`] `L`.
     #[inline]
-    pub fn expanded(&self, shape: ModelShape) -> Result<expanded::Network<'a>, NetworkError> {
+    pub fn packed<L: Layout>(&self, shape: ModelShape) -> Result<Packed<'a, L>, NetworkError> {
         let shape = network_shape(shape, self.centres);
-        expanded::Network::with_length_checked(shape, self.affine, self.block)
-    }
-
-    /// The network if it is one in fixed point.
-    #[inline]
-    pub fn fixed16(&self, shape: ModelShape) -> Result<fixed16::Network<'a>, NetworkError> {
-        let shape = network_shape(shape, self.centres);
-        fixed16::Network::with_length_checked(shape, self.affine, self.block)
+        Packed::with_length_checked(shape, self.affine, self.block)
     }
 }
 

@@ -19,7 +19,7 @@ core::arch::global_asm!(include_str!("../cortex_m4.s"), options(raw));
 
 /// What a network takes in.
 #[derive(Clone, Copy)]
-pub(crate) enum Inputs<'a> {
+pub enum Inputs<'a> {
     /// In the readings' unit.
     Readings(&'a [f32; INPUTS]),
     /// Scaled, in units of the clamp.
@@ -134,13 +134,12 @@ pub(crate) unsafe fn expanded(
     }
 }
 
-/// The outputs of a network with expanded distances, in groups of 18. Not inlined: its stack would burden the
-/// callers of [`expanded`].
+/// The outputs of a network with expanded distances, in groups of 18.
 ///
 /// # Safety
 /// There is at least one of the `groups` and of the `centres`, and `block` has [`expanded_words`] words for
 /// them.
-#[inline(never)]
+#[inline(never)] // its stack would burden the routine for one group
 pub(crate) unsafe fn expanded_array(
     inputs: Inputs<'_>,
     block: &[u32],
@@ -180,13 +179,12 @@ pub(crate) unsafe fn fixed16(
     Finite::of_status(unsafe { taxel_fixed16(inputs, block.as_ptr(), output, sixteens, flags) })
 }
 
-/// The outputs of a network in fixed point, in groups of 18. Not inlined: its stack would burden the callers
-/// of [`fixed16`].
+/// The outputs of a network in fixed point, in groups of 18.
 ///
 /// # Safety
 /// There is at least one of the `groups` and of the `centres`, and `block` has [`fixed16_words`] words for
 /// them.
-#[inline(never)]
+#[inline(never)] // its stack would burden the routine for one group
 pub(crate) unsafe fn fixed16_array(
     inputs: Inputs<'_>,
     block: &[u32],
