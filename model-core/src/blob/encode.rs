@@ -6,7 +6,7 @@ use super::decode::Model;
 use super::error::EncodeError;
 use super::format::{
     CRC_BYTES, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection, Prefix, RbfHeader,
-    ShapeField, TAG_METADATA, TAG_PROJECTION, tag_of,
+    ShapeField, TAG_METADATA, TAG_PROJECTION,
 };
 use super::metadata::Metadata;
 use crate::checksum::CRC_32;
@@ -145,7 +145,7 @@ impl Writer<'_> {
     fn put_network(&mut self, index: u8, network: &Network<'_>) -> Result<(), EncodeError> {
         let common_width = network.widths().count() == 1;
         let header = RbfHeader {
-            tag: tag_of(network.format()),
+            tag: network.format().tag(),
             index,
             centres: fit("number of centres", network.shape().centres, u16::MAX)?,
             common_width,
