@@ -68,7 +68,7 @@ fn gating() -> String {
 fn the_models_in_testdata_are_those_made_here() {
     for (name, blob) in FILES {
         assert!(
-            fs::read(in_testdata(name)).ok() == Some(blob()),
+            fs::read(in_testdata(name)).ok().as_deref() == Some(&*blob()),
             "{name}: changed on purpose? cargo test --package firmware --test bit_for_bit -- --ignored"
         );
     }
@@ -78,7 +78,7 @@ fn the_models_in_testdata_are_those_made_here() {
 #[ignore = "writes the models in testdata"]
 fn write_the_models_in_testdata() {
     for (name, blob) in FILES {
-        fs::write(in_testdata(name), blob()).unwrap();
+        fs::write(in_testdata(name), &*blob()).unwrap();
     }
 }
 

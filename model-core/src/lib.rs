@@ -13,6 +13,9 @@
 //! ("the paper").
 #![cfg_attr(not(test), no_std)]
 
+#[cfg(feature = "std")]
+extern crate std;
+
 #[cfg(target_endian = "big")]
 compile_error!("the weight blob holds little-endian floats that are borrowed in place");
 
@@ -33,6 +36,8 @@ pub mod blob;
 mod decoder;
 
 pub use blob::Aligned;
+#[cfg(feature = "std")]
+pub use blob::AlignedBytes;
 pub use decoder::{Decoder, decoder_ram_bytes};
 pub use estimate::{Estimate, RowStatus};
 pub use frame::{ColumnWire, Frame, RowWire};

@@ -1,8 +1,7 @@
 //! One network for the whole array, behind a projection: the blob, and what a decoder makes of it.
 
 use model_core::blob::{
-    Columns, DecodeError, EncodeError, Floats, Metadata, Model, ModelParts, NoiseKind, encode,
-    encoded_length_bound,
+    DecodeError, EncodeError, Metadata, Model, ModelParts, ModelShape, encode, encoded_length_bound,
 };
 use model_core::checksum::CRC_32;
 use model_core::exp::Libm;
@@ -29,24 +28,6 @@ fn network(outputs: usize) -> Network<'static> {
     direct::Network::try_new(Shape { inputs: 2, centres: 1, outputs }, parameters).unwrap().into()
 }
 
-fn metadata() -> Metadata<'static> {
-    Metadata {
-        name: "array",
-        scene_digest: 0,
-        noise_kind: NoiseKind::None,
-        noise_level: 0.0,
-        seed: 1,
-        training_frames: 1,
-        thickness_mm: 5.0,
-        input_names: Columns("a\nb\nc\nd"),
-        input_units: Columns("\n\n\n"),
-        output_names: Columns("x\ny"),
-        output_units: Columns("\n"),
-        training_rmse: Floats(&[0; 8]),
-        full_scale: Floats(&[0; 8]),
-    }
-}
-
 fn encoded<'b>(
     block: &[f32],
     networks: &[Network<'_>],
@@ -54,7 +35,8 @@ fn encoded<'b>(
     buffer: &'b mut [u8],
 ) -> Result<&'b [u8], EncodeError> {
     let projection = Projection::new(4, 2, block).ok();
-    let parts = ModelParts { projection, networks, row_network, metadata: metadata() };
+    let metadata = Metadata::unnamed(ModelShape { rows: 2, inputs: 2, outputs: 1 });
+    let parts = ModelParts { projection, networks, row_network, metadata };
     assert!(encoded_length_bound(&parts) <= buffer.len());
     encode(&parts, buffer)
 }

@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+#[cfg(feature = "std")]
+use super::aligned::AlignedBytes;
 use super::decode::Model;
 use super::error::EncodeError;
 use super::format::{
@@ -111,6 +113,18 @@ pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u
     let blob = buffer.get(..length).ok_or(EncodeError::BufferTooSmall)?;
     Model::decode(blob)?;
     Ok(blob)
+}
+
+/// Writes `parts` into memory of its own.
+///
+/// # Errors
+/// See [`EncodeError`]; [`EncodeError::BufferTooSmall`] never happens.
+#[cfg(feature = "std")]
+pub fn encode_to_vec(parts: &ModelParts<'_>) -> Result<AlignedBytes, EncodeError> {
+    let mut bytes = AlignedBytes::zeroed(encoded_length_bound(parts));
+    let length = encode(parts, &mut bytes)?.len();
+    bytes.truncate(length);
+    Ok(bytes)
 }
 
 fn fit<T: TryFrom<usize> + Into<usize> + Copy>(

@@ -84,3 +84,60 @@ pub struct Metadata<'a> {
     /// Full scale of each output, in its unit, for %FS.
     pub full_scale: Floats<'a>,
 }
+
+/// Most inputs, and most outputs, of all rows that [`Metadata::unnamed`] serves.
+const MOST_UNNAMED: usize = 1024;
+
+/// A line of the same letter for each of many columns.
+const fn lines_of(letter: u8) -> [u8; 2 * MOST_UNNAMED] {
+    let mut text = [b'\n'; 2 * MOST_UNNAMED];
+    let mut column = 0;
+    while column < MOST_UNNAMED {
+        text[2 * column] = letter;
+        column += 1;
+    }
+    text
+}
+
+static INPUT_NAMES: [u8; 2 * MOST_UNNAMED] = lines_of(b'x');
+static OUTPUT_NAMES: [u8; 2 * MOST_UNNAMED] = lines_of(b'y');
+static NO_UNITS: [u8; MOST_UNNAMED] = [b'\n'; MOST_UNNAMED];
+static ZEROS: [u8; 4 * MOST_UNNAMED] = [0; 4 * MOST_UNNAMED];
+
+impl Metadata<'static> {
+    /// Metadata of a hand-made model of this `shape`: every input is called `x` and every output `y`, all without a
+    /// unit; nothing is known of its training. Use it whole, or for the fields that do not matter.
+    ///
+    /// # Panics
+    /// With more than 1024 inputs or outputs in all rows.
+    ///
+    /// ```
+    /// use model_core::blob::{Metadata, ModelShape};
+    /// let shape = ModelShape { rows: 2, inputs: 2, outputs: 1 };
+    /// let metadata = Metadata { name: "made", ..Metadata::unnamed(shape) };
+    /// assert_eq!(metadata.input_names.0, "x\nx\nx\nx");
+    /// assert_eq!(metadata.output_units.iter().count(), 2);
+    /// ```
+    #[must_use]
+    pub fn unnamed(shape: ModelShape) -> Self {
+        let columns = |bytes: &'static [u8], length: usize| {
+            Columns(core::str::from_utf8(&bytes[..length.saturating_sub(1)]).unwrap_or_default())
+        };
+        let (inputs, outputs) = (shape.rows * shape.inputs, shape.rows * shape.outputs);
+        Self {
+            name: "",
+            scene_digest: 0,
+            noise_kind: NoiseKind::None,
+            noise_level: 0.0,
+            seed: 0,
+            training_frames: 0,
+            thickness_mm: 0.0,
+            input_names: columns(&INPUT_NAMES, 2 * inputs),
+            input_units: columns(&NO_UNITS, inputs),
+            output_names: columns(&OUTPUT_NAMES, 2 * outputs),
+            output_units: columns(&NO_UNITS, outputs),
+            training_rmse: Floats(&ZEROS[..4 * outputs]),
+            full_scale: Floats(&ZEROS[..4 * outputs]),
+        }
+    }
+}

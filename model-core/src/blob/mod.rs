@@ -13,8 +13,12 @@ mod decode;
 mod encode;
 
 pub use aligned::Aligned;
+#[cfg(feature = "std")]
+pub use aligned::AlignedBytes;
 pub use decode::Model;
 pub(crate) use decode::NetworkSection;
+#[cfg(feature = "std")]
+pub use encode::encode_to_vec;
 pub use encode::{ModelParts, encode, encoded_length_bound};
 pub use error::{DecodeError, EncodeError};
 pub use format::{FORMAT_VERSION, MAGIC};
