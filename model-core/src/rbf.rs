@@ -28,7 +28,7 @@ pub(crate) use parameters::Cut;
 pub use parameters::{NetworkError, Shape};
 
 use self::parameters::check_length;
-use crate::exp::ExpKernel;
+use crate::exp::{ExpKernel, Polynomial};
 
 /// A network of any format, whose parameters have been checked against its shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -110,8 +110,7 @@ impl<'a> Network<'a> {
         each!(self, inner => inner.training_range(input))
     }
 
-    /// Infers `output` from one row of `reading`s. `E` serves [`Format::F32Direct`]; the other formats have an
-    /// exponential of their own.
+    /// Infers `output` from one row of `reading`s.
     ///
     /// `scaled` is working space of one value an input. A NaN reading makes the outputs meaningless:
     /// screen readings before ([`Decoder`](crate::Decoder) does). Inlined, so that lengths known to the
@@ -121,7 +120,7 @@ impl<'a> Network<'a> {
     /// [`NetworkError::Length`] if a buffer does not fit the shape; `output` is then untouched.
     ///
     /// ```
-    /// use model_core::{exp::Polynomial, rbf::{Network, Shape, direct}};
+    /// use model_core::rbf::{Network, Shape, direct};
     /// let network = Network::from(direct::Network::try_new(
     ///     Shape { inputs: 2, centres: 1, outputs: 1 },
     ///     direct::Parameters {
@@ -135,14 +134,30 @@ impl<'a> Network<'a> {
     ///     },
     /// )?);
     /// let mut output = [0.0];
-    /// network.infer::<Polynomial>(&[55.0, 55.0], &mut [0.0; 2], &mut output)?;
+    /// network.infer(&[55.0, 55.0], &mut [0.0; 2], &mut output)?;
     /// // At its centre the activation is 1, so the output is weight + bias.
     /// assert_eq!(output, [4.0]);
     /// # Ok::<(), model_core::rbf::NetworkError>(())
     /// ```
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
-    pub fn infer<E: ExpKernel>(
+    pub fn infer(
+        &self,
+        reading: &[f32],
+        scaled: &mut [f32],
+        output: &mut [f32],
+    ) -> Result<(), NetworkError> {
+        self.infer_with::<Polynomial>(reading, scaled, output)
+    }
+
+    /// As [`infer`](Self::infer), with another [exponential](crate::exp) for [`Format::F32Direct`]: to measure
+    /// what it costs. Other formats have an exponential of their own.
+    ///
+    /// # Errors
+    /// As [`infer`](Self::infer).
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
+    pub fn infer_with<E: ExpKernel>(
         &self,
         reading: &[f32],
         scaled: &mut [f32],
@@ -179,7 +194,17 @@ impl<'a> Network<'a> {
     /// As [`infer`](Self::infer).
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
-    pub fn infer_scaled<E: ExpKernel>(
+    pub fn infer_scaled(&self, scaled: &mut [f32], output: &mut [f32]) -> Result<(), NetworkError> {
+        self.infer_scaled_with::<Polynomial>(scaled, output)
+    }
+
+    /// As [`infer_scaled`](Self::infer_scaled), with another exponential, as [`infer_with`](Self::infer_with).
+    ///
+    /// # Errors
+    /// As [`infer`](Self::infer).
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
+    pub fn infer_scaled_with<E: ExpKernel>(
         &self,
         scaled: &mut [f32],
         output: &mut [f32],

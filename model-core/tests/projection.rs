@@ -4,7 +4,6 @@ use model_core::blob::{
     DecodeError, EncodeError, Metadata, Model, ModelParts, ModelShape, encode, encoded_length_bound,
 };
 use model_core::checksum::CRC_32;
-use model_core::exp::Libm;
 use model_core::projection::Projection;
 use model_core::rbf::direct::{self, Parameters};
 use model_core::rbf::{Network, Shape};
@@ -49,8 +48,7 @@ fn array(buffer: &mut [u8]) -> &[u8] {
 fn the_features_of_a_whole_frame_decide_all_rows() {
     let mut buffer = Aligned([0; 1024]);
     let blob = array(&mut buffer.0);
-    let (decoder, model) =
-        (Decoder::<2, 2, 1, Libm>::load(blob).unwrap(), Model::decode(blob).unwrap());
+    let (decoder, model) = (Decoder::<2, 2, 1>::load(blob).unwrap(), Model::decode(blob).unwrap());
     let mut features = [0.0; 2];
     let readings = NEAR_CENTRE.row_column_resistance_ohm;
     model.projection().unwrap().project(readings.as_flattened(), &mut features);
@@ -67,7 +65,7 @@ fn the_features_of_a_whole_frame_decide_all_rows() {
 #[test]
 fn one_missing_reading_leaves_no_row_to_decode() {
     let mut buffer = Aligned([0; 1024]);
-    let decoder = Decoder::<2, 2, 1, Libm>::load(array(&mut buffer.0)).unwrap();
+    let decoder = Decoder::<2, 2, 1>::load(array(&mut buffer.0)).unwrap();
     for missing in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         let mut frame = NEAR_CENTRE;
         frame.row_column_resistance_ohm[1][0] = missing;
@@ -82,7 +80,7 @@ fn features_that_overflow_are_told_from_missing_readings() {
     let mut buffer = Aligned([0; 1024]);
     let block = BLOCK.map(|part| 2.0 * part);
     let blob = encoded(&block, &[network(2)], &[0, 0], &mut buffer.0).unwrap();
-    let decoder = Decoder::<2, 2, 1, Libm>::load(blob).unwrap();
+    let decoder = Decoder::<2, 2, 1>::load(blob).unwrap();
     let frame = Frame { row_column_resistance_ohm: [[f32::MAX; 2], [-f32::MAX; 2]] };
     let estimate = decoder.decode(&frame);
     assert_eq!(estimate.status, [RowStatus::Overflow; 2]);
@@ -92,7 +90,7 @@ fn features_that_overflow_are_told_from_missing_readings() {
 #[test]
 fn an_array_is_at_rest_as_a_whole_or_not_at_all() {
     let mut buffer = Aligned([0; 1024]);
-    let decoder = Decoder::<2, 2, 1, Libm>::load(array(&mut buffer.0)).unwrap();
+    let decoder = Decoder::<2, 2, 1>::load(array(&mut buffer.0)).unwrap();
     let rest = decoder.decode(&NEAR_CENTRE);
     let gate = Gate::new(&NEAR_CENTRE, &rest, 0.02);
     let mut estimate = rest;

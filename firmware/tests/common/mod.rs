@@ -23,18 +23,8 @@ pub const OUTPUTS: usize = 2;
 pub const MESSAGE_BYTES: usize = 128;
 
 pub type TestApp = App<'static, Board, Source, ROWS, COLS, OUTPUTS, MESSAGE_BYTES>;
-pub type TestSession<'a> = Session<
-    'a,
-    'static,
-    Board,
-    Source,
-    MockSlot,
-    ROWS,
-    COLS,
-    OUTPUTS,
-    MESSAGE_BYTES,
-    model_core::exp::Polynomial,
->;
+pub type TestSession<'a> =
+    Session<'a, 'static, Board, Source, MockSlot, ROWS, COLS, OUTPUTS, MESSAGE_BYTES>;
 
 /// What a test sees of the board, whoever owns it.
 #[derive(Default)]
