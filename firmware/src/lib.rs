@@ -15,6 +15,5 @@ pub mod readout;
 pub mod link;
 pub mod timing;
 pub mod platform;
-pub mod remote;
 pub mod store;
 pub mod app;

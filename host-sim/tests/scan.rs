@@ -14,7 +14,6 @@ use firmware::platform::Port;
 use firmware::readout::{
     FrameSource, Mcp3208s, ScanReport, ScanSettings, Scanner, ShiftRegister595,
 };
-use firmware::remote::Remote;
 use host_sim::Result;
 use host_sim::device::{Device, scan};
 use host_sim::model::{LoadedModel, Origin, encode};
@@ -25,6 +24,7 @@ use host_sim::synth::synthesise;
 use host_sim::train::{Options, train};
 use host_sim::virtual_hardware::{SeriesResistance, VirtualBoard};
 use model_core::Frame;
+use remote_readout::Remote;
 
 static CIRCUIT: ZeroPotential<8, 18> = ZeroPotential::TYPICAL;
 /// What it corrects for.

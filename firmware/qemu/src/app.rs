@@ -14,12 +14,12 @@ use firmware::circuit::ZeroPotential;
 use firmware::link::message::{Configuration, Memory};
 use firmware::platform::{Platform, Port};
 use firmware::readout::{Mcp3208s, Scanner, ShiftRegister595};
-use firmware::remote::Remote;
 use qemu_image::clock::Clock;
 use qemu_image::slot::Slot;
 use qemu_image::uart::Uart;
 use qemu_image::watchdog::Watchdog;
 use qemu_image::{exit, memory};
+use remote_readout::Remote;
 
 /// Longer than a loop takes, were it ever so slow a computer.
 const WATCHDOG_MS: u32 = 20_000;
