@@ -5,11 +5,11 @@
 
 use core::cell::Cell;
 
+use board_common::buffers;
 use cortex_m::peripheral::SCB;
-use cortex_m::singleton;
 use cortex_m_rt::entry;
 use defmt::info;
-use firmware::app::{PaperApp, PaperBuffers};
+use firmware::app::PaperApp;
 use firmware::circuit::ZeroPotential;
 use firmware::link::message::{Configuration, Memory};
 use firmware::platform::{Platform, Port};
@@ -90,12 +90,6 @@ impl Platform for Board<'_> {
     fn memory(&self) -> Memory {
         memory::taken()
     }
-}
-
-/// Theirs alone: what they are put together from leaves the stack again.
-#[inline(never)]
-fn buffers() -> Option<&'static mut PaperBuffers> {
-    singleton!(: PaperBuffers = PaperBuffers::new())
 }
 
 #[entry]

@@ -5,6 +5,8 @@
 #![cfg(target_os = "none")]
 #![no_std]
 
+pub use board_common::memory;
+
 // From the ground up: a module imports only what is declared before it.
 mod registers;
 pub mod clock;
@@ -12,6 +14,5 @@ pub mod uart;
 pub mod watchdog;
 pub mod exit;
 mod fault;
-pub mod memory;
 pub mod slot;
 pub mod checks;
