@@ -3,7 +3,8 @@
 //! Readings travel one way: [`Frame`] (Ω) → [`health`] → [`gate`] → ([`projection`] →) [`scale`] → [`rbf`]
 //! (and its affine tail) → [`Estimate`]. The network's weights are read where the [`blob`] lies, in flash or in a
 //! file's buffer: nothing is copied, nothing is allocated, and no release code path of
-//! [`Decoder`] panics. [`rls`] updates output weights sample by sample.
+//! [`Decoder`] panics. [`rls`] is for a device that is to learn its
+//! output weights sample by sample: none does yet.
 //!
 //! The crate knows no pin and no file. The same code serves host, emulator and board, so that
 //! their answers agree bit for bit where the same [`exp`] kernel is chosen.
