@@ -4,10 +4,7 @@
 //! restarted. Its memory is all in [`Buffers`], for which the program has a static: nothing grows,
 //! nothing is allocated.
 
-use core::marker::PhantomData;
-
-use model_core::exp::{ExpKernel, Polynomial};
-use model_core::{Estimate, Frame, RowStatus};
+use model_core::{Decoder, Estimate, Frame, RowStatus};
 
 use crate::link::message::{Configuration, Statistics};
 use crate::link::receive::Receiver;
@@ -15,13 +12,13 @@ use crate::log::info;
 use crate::platform::Platform;
 use crate::readout::{Baseline, FrameSource};
 use crate::store::{Slot, Upload, blob_in_slot, generation};
-use crate::tactile::Tactile;
 
-mod answer;
+// From the ground up.
 mod configuration;
 mod frame_clock;
 mod line;
 mod session;
+mod answer;
 
 use frame_clock::FrameClock;
 use line::Line;
@@ -31,7 +28,7 @@ pub use session::{Leave, Session};
 pub const PAPER_MESSAGE_BYTES: usize = 608;
 
 /// The application of the paper's sensor.
-pub type PaperApp<'m, P, F, E = Polynomial> = App<'m, P, F, 8, 18, 18, PAPER_MESSAGE_BYTES, E>;
+pub type PaperApp<'m, P, F> = App<'m, P, F, 8, 18, 18, PAPER_MESSAGE_BYTES>;
 
 /// The buffers of the paper's sensor.
 pub type PaperBuffers = Buffers<8, 18, 18, PAPER_MESSAGE_BYTES>;
@@ -82,7 +79,7 @@ impl<const ROWS: usize, const COLS: usize, const OUTPUTS: usize, const BYTES: us
     }
 }
 
-/// All that the application keeps, apart from the sensor with its model.
+/// All that the application keeps, apart from the model in force.
 pub struct App<
     'm,
     P: Platform,
@@ -91,11 +88,9 @@ pub struct App<
     const COLS: usize,
     const OUTPUTS: usize,
     const BYTES: usize,
-    E: ExpKernel = Polynomial,
 > {
     receiver: &'m mut Receiver<BYTES>,
     core: Core<'m, P, F, ROWS, COLS, OUTPUTS, BYTES>,
-    kernel: PhantomData<E>,
 }
 
 /// The application without the receiver, whose bytes a request borrows while it is answered.
@@ -133,8 +128,7 @@ impl<
     const COLS: usize,
     const OUTPUTS: usize,
     const BYTES: usize,
-    E: ExpKernel,
-> App<'m, P, F, ROWS, COLS, OUTPUTS, BYTES, E>
+> App<'m, P, F, ROWS, COLS, OUTPUTS, BYTES>
 {
     /// An application that starts with `configuration`.
     pub fn new(
@@ -159,7 +153,7 @@ impl<
             capture: None,
             upload: Upload::new(),
         };
-        Self { receiver, core, kernel: PhantomData }
+        Self { receiver, core }
     }
 
     /// Runs until the host asks for a restart, exchanging the model when another is committed.
@@ -191,7 +185,7 @@ impl<
             candidates.swap(0, 1);
         }
         candidates.into_iter().find_map(|(index, generation, bytes)| {
-            let sound = Tactile::<ROWS, COLS, OUTPUTS, E>::check(blob_in_slot(bytes)).is_ok();
+            let sound = Decoder::<ROWS, COLS, OUTPUTS>::check(blob_in_slot(bytes)).is_ok();
             generation.filter(|_| sound).map(|generation| (index, generation))
         })
     }

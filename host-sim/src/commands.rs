@@ -20,6 +20,8 @@ mod print;
 mod progress;
 mod scene_argument;
 
+use host_sim::Error;
+
 /// Options of every command.
 #[derive(clap::Args)]
 pub struct Common {
@@ -29,4 +31,21 @@ pub struct Common {
     /// Print the results as JSON.
     #[arg(long, global = true)]
     pub json: bool,
+}
+
+/// Which options mend an error that a library told without knowing them.
+pub fn advice(error: &Error) -> &'static str {
+    use taxel_data::Error as Data;
+    match error {
+        Error::Data(Data::Write { .. } | Data::WrittenOverInput { .. }) => " (-o)",
+        Error::Rig(taxel_rig::Error::OtherReadout { .. }) => " (--scans)",
+        Error::Rig(taxel_rig::Error::NoQemu { .. } | taxel_rig::Error::NoStart { .. }) => {
+            " (--qemu)"
+        }
+        Error::Rig(taxel_rig::Error::NoImage { .. } | taxel_rig::Error::NotElf { .. }) => {
+            " (--image)"
+        }
+        Error::Rig(taxel_rig::Error::Port { .. }) => " (PORT)",
+        _ => "",
+    }
 }

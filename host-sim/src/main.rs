@@ -67,7 +67,7 @@ fn report(outcome: Result<()>) -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}");
+            eprintln!("error: {error}{}", commands::advice(&error));
             ExitCode::from(exit_status(&error))
         }
     }

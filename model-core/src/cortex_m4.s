@@ -421,7 +421,7 @@ taxel_f32_powers_end:
     pop {pc}
     .balign 4
 9:
-    .word 0x3aaca793 @ 2^f: degree 5 to 1; see exp.rs
+    .word 0x3aaca793 @ 2^f: degree 5 to 0; EXP2_COEFFICIENTS of exp.rs, which a test compares
     .word 0x3c1e7a2a
     .word 0x3d635f2b
     .word 0x3e75fccd

@@ -1,16 +1,17 @@
 //! From a frame to an estimate: the one entry the device calls.
 
-use core::marker::PhantomData;
-
 use crate::blob::{DecodeError, Metadata, Model, ModelShape, NetworkSection};
+use crate::cortex_m4::Finite;
+#[cfg(cortex_m4f)]
+use crate::cortex_m4::{INPUTS, OUTPUTS};
 use crate::estimate::{Estimate, RowStatus};
 use crate::exp::{ExpKernel, Polynomial};
 use crate::frame::Frame;
 use crate::gate::Gate;
 use crate::projection::Projection;
-use crate::rbf::{Assembled, Finite, Format, NetworkError};
-#[cfg(cortex_m4f)]
-use crate::rbf::{USUAL_INPUTS, USUAL_OUTPUTS};
+use crate::rbf::expanded::Expanded;
+use crate::rbf::fixed16::Fixed16;
+use crate::rbf::{Format, NetworkError};
 
 /// RAM in bytes that a [`Decoder`] of so many `rows` takes on a 32-bit target, whatever its K: slices
 /// into the blob. The link check of the firmware holds it to the compiler.
@@ -24,23 +25,52 @@ pub const fn decoder_ram_bytes(rows: usize) -> usize {
 /// Any number of centres K is served: it comes with the blob. RAM: where each row's weights are; they
 /// stay where the blob lies.
 ///
-/// `E` is the [exp kernel](crate::exp).
+/// A decoder borrows its blob and is never without a model: a blob that is unsound makes no decoder, and leaves
+/// a decoder that is there as it was.
+///
+/// ```
+/// use model_core::blob::DecodeError;
+/// use model_core::{Aligned, Decoder, Frame};
+/// # use model_core::blob::{Metadata, ModelParts, ModelShape, encode};
+/// # use model_core::rbf::{Shape, direct::{Network, Parameters}};
+/// # let network = Network::try_new(
+/// #     Shape { inputs: 2, centres: 1, outputs: 1 },
+/// #     Parameters {
+/// #         input_minimum: &[50.0, 50.0],
+/// #         input_per_span: &[0.1, 0.1],
+/// #         centres: &[0.5, 0.5],
+/// #         decay: &[2.0],
+/// #         output_weights: &[0.5],
+/// #         bias: &[0.25],
+/// #         affine: &[],
+/// #     },
+/// # )
+/// # .unwrap();
+/// # let shape = ModelShape { rows: 1, inputs: 2, outputs: 1 };
+/// # let metadata = Metadata::unnamed(shape);
+/// # let parts = ModelParts { projection: None, networks: &[network.into()], row_network: &[0], metadata };
+/// # let mut buffer = Aligned([0; 512]);
+/// # let blob: &[u8] = encode(&parts, &mut buffer.0).unwrap();
+/// // `blob` holds a model of one row with two readings (Ω) and one output (mm).
+/// let decoder: Decoder<1, 2, 1> = Decoder::load(blob)?;
+///
+/// let frame = Frame { row_column_resistance_ohm: [[55.0, 55.0]] };
+/// assert_eq!(decoder.decode(&frame).outputs, [[0.75]]); // mm
+///
+/// // Half a download is refused.
+/// let half = Decoder::<1, 2, 1>::load(&blob[..blob.len() / 2]);
+/// assert!(matches!(half, Err(DecodeError::Truncated { .. })));
+/// # Ok::<(), DecodeError>(())
+/// ```
 #[derive(Debug, Clone, Copy)]
-pub struct Decoder<
-    'a,
-    const ROWS: usize,
-    const COLS: usize,
-    const OUTPUTS: usize,
-    E: ExpKernel = Polynomial,
-> {
+pub struct Decoder<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize> {
     model: Model<'a>,
     /// Where each row's network is.
     row_sections: [NetworkSection<'a>; ROWS],
-    kernel: PhantomData<E>,
 }
 
-impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKernel>
-    Decoder<'a, ROWS, COLS, OUTPUTS, E>
+impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize>
+    Decoder<'a, ROWS, COLS, OUTPUTS>
 {
     /// Checks a blob as [`load`](Self::load) does, and leaves it at that.
     ///
@@ -73,7 +103,7 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKerne
                 networks,
             })?;
         }
-        Ok(Self { model, row_sections, kernel: PhantomData })
+        Ok(Self { model, row_sections })
     }
 
     /// What is known of the model beyond its weights.
@@ -110,15 +140,27 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKerne
     ///
     /// A model behind a [`Projection`] decodes all rows or none: all are at rest, or all are decoded; and a
     /// reading that is missing anywhere marks them all.
-    #[inline(never)] // one copy of inference in flash, whoever decodes
+    #[inline]
     pub fn decode_gated_into(
         &self,
         frame: &Frame<ROWS, COLS>,
         gate: Option<Gate<'_, ROWS, COLS, OUTPUTS>>,
         estimate: &mut Estimate<ROWS, OUTPUTS>,
     ) {
+        self.decode_with::<Polynomial>(frame, gate, estimate);
+    }
+
+    /// As [`decode_gated_into`](Self::decode_gated_into), with another [exponential](crate::exp) for networks
+    /// of the format `f32-direct`: to measure what it costs. Other formats have an exponential of their own.
+    #[inline(never)] // one copy of inference in flash, whoever decodes
+    pub fn decode_with<E: ExpKernel>(
+        &self,
+        frame: &Frame<ROWS, COLS>,
+        gate: Option<Gate<'_, ROWS, COLS, OUTPUTS>>,
+        estimate: &mut Estimate<ROWS, OUTPUTS>,
+    ) {
         if let Some(projection) = self.model.projection() {
-            return self.decode_array_into(projection, frame, gate, estimate);
+            return self.decode_array_into::<E>(projection, frame, gate, estimate);
         }
         let rows = self.row_sections.iter().zip(&frame.row_column_resistance_ohm);
         let places = estimate.outputs.iter_mut().zip(&mut estimate.status);
@@ -137,7 +179,7 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize, E: ExpKerne
 
     /// Not inlined: its stack would burden rows.
     #[inline(never)]
-    fn decode_array_into(
+    fn decode_array_into<E: ExpKernel>(
         &self,
         projection: Projection<'_>,
         frame: &Frame<ROWS, COLS>,
@@ -195,21 +237,25 @@ fn decode_inputs(
 fn decode_in_assembly(
     section: &NetworkSection<'_>,
     exp: fn(f32) -> f32,
-    inputs: &[f32; USUAL_INPUTS],
+    inputs: &[f32; INPUTS],
     scaled: &mut [f32],
-    groups: &mut [[f32; USUAL_OUTPUTS]],
+    groups: &mut [[f32; OUTPUTS]],
 ) -> RowStatus {
     let outputs = groups.as_flattened().len();
-    let shape = ModelShape { rows: 1, inputs: USUAL_INPUTS, outputs };
+    let shape = ModelShape { rows: 1, inputs: INPUTS, outputs };
     let finite = match section.format() {
         Format::F32Direct => {
             let outputs = groups.as_flattened_mut();
             return decode_direct(section, exp, inputs, scaled, outputs);
         }
-        Format::F32 => section.expanded(shape).map(|it| it.infer_in_assembly(inputs, groups)),
-        Format::Fixed16 => section.fixed16(shape).map(|it| it.infer_in_assembly(inputs, groups)),
+        Format::F32 => {
+            section.packed::<Expanded>(shape).map(|it| it.infer_in_assembly(inputs, groups))
+        }
+        Format::Fixed16 => {
+            section.packed::<Fixed16>(shape).map(|it| it.infer_in_assembly(inputs, groups))
+        }
     };
-    status_of(finite, inputs)
+    status_of(finite.flatten(), inputs)
 }
 
 /// See [`decode_in_assembly`].
@@ -229,20 +275,24 @@ fn decode_in_rust(
     let shape = ModelShape { rows: 1, inputs: inputs.len(), outputs: outputs.len() };
     let finite = match section.format() {
         Format::F32Direct => return decode_direct(section, exp, inputs, scaled, outputs),
-        Format::F32 => section.expanded(shape).map(|it| it.infer(inputs, scaled, outputs)),
-        Format::Fixed16 => section.fixed16(shape).map(|it| it.infer(inputs, scaled, outputs)),
+        Format::F32 => {
+            section.packed::<Expanded>(shape).map(|it| it.infer(inputs, scaled, outputs))
+        }
+        Format::Fixed16 => {
+            section.packed::<Fixed16>(shape).map(|it| it.infer(inputs, scaled, outputs))
+        }
     };
     status_of(finite, inputs)
 }
 
-/// Of the formats whose outputs have a bound, which is checked when a model is loaded.
+/// The status of a row in a format whose outputs have a bound, which is checked when a model is loaded.
 #[inline(always)]
 #[expect(clippy::inline_always, reason = "an enum that need not be made")]
 fn status_of(finite: Result<Finite, NetworkError>, inputs: &[f32]) -> RowStatus {
     match finite {
         Ok(Finite::Known) => RowStatus::Decoded,
         Ok(Finite::Unknown) if all_finite(inputs) => RowStatus::Decoded,
-        // An error: not so, the network was there when the model was loaded.
+        // An error never happens: the network was there, in its sizes, when the model was loaded.
         Ok(Finite::Unknown) | Err(_) => RowStatus::MissingReading,
     }
 }

@@ -55,28 +55,34 @@ impl ExpKernel for Micromath {
     }
 }
 
+/// Adding and subtracting 1.5·2^23 rounds to the nearest integer, which the sum's low bits then hold.
+pub const ROUND: f32 = 12_582_912.0;
+
+/// ln 2 in two parts: their sum is ln 2. The first has 10 significant bits, so that its product with a whole
+/// number of [`Polynomial`]'s range is exact.
+pub const LN_2_PARTS: [f32; 2] = [0.693_359_4, -2.121_944_4e-4];
+
+/// Coefficients of [`Polynomial`] for e^r on |r| ≤ ½ ln 2, from degree 6 down to 0.
+pub const EXP_COEFFICIENTS: [f32; 7] =
+    [0.001_384_461, 0.008_374_151, 0.041_667_98, 0.166_664_32, 0.499_999_94, 1.0, 1.0];
+
+/// Coefficients of [`exp2`] for 2^f on |f| ≤ ½, from degree 5 down to 0.
+pub const EXP2_COEFFICIENTS: [f32; 6] =
+    [0.001_317_25, 0.009_672_681, 0.055_510_68, 0.240_222_17, 0.693_146_7, 1.0];
+
 impl ExpKernel for Polynomial {
     const NAME: &'static str = "polynomial";
     #[inline]
     fn exp(x: f32) -> f32 {
-        // Adding and subtracting 1.5·2^23 rounds to the nearest integer.
-        const ROUND: f32 = 12_582_912.0;
-        // ln 2 in two parts; the first has 10 significant bits, so n·LN2_HI is exact.
-        const LN2_HI: f32 = 0.693_359_4;
-        const LN2_LO: f32 = -2.121_944_4e-4;
-        const C2: f32 = 0.499_999_94;
-        const C3: f32 = 0.166_664_32;
-        const C4: f32 = 0.041_667_98;
-        const C5: f32 = 0.008_374_151;
-        const C6: f32 = 0.001_384_461;
+        let [high, low] = LN_2_PARTS;
+        let [c6, c5, c4, c3, c2, c1, c0] = EXP_COEFFICIENTS;
 
         if x < -87.0 {
             return 0.0;
         }
         let n = (x * core::f32::consts::LOG2_E + ROUND) - ROUND;
-        let r = (x - n * LN2_HI) - n * LN2_LO;
-        let p = ((((C6 * r + C5) * r + C4) * r + C3) * r + C2) * r + 1.0;
-        let mantissa = p * r + 1.0;
+        let r = (x - n * high) - n * low;
+        let mantissa = (((((c6 * r + c5) * r + c4) * r + c3) * r + c2) * r + c1) * r + c0;
         mantissa * f32::from_bits(((n as i32 + 127) as u32) << 23)
     }
 }
@@ -90,17 +96,11 @@ impl ExpKernel for Polynomial {
 #[inline]
 #[must_use]
 pub fn exp2(u: f32) -> f32 {
-    // Adding and subtracting 1.5·2^23 rounds to the nearest integer, which the sum's low bits then hold.
-    const ROUND: f32 = 12_582_912.0;
-    const C1: f32 = 0.693_146_7;
-    const C2: f32 = 0.240_222_17;
-    const C3: f32 = 0.055_510_68;
-    const C4: f32 = 0.009_672_681;
-    const C5: f32 = 0.001_317_25;
+    let [c5, c4, c3, c2, c1, c0] = EXP2_COEFFICIENTS;
 
     let rounded = u + ROUND;
     let f = u - (rounded - ROUND);
-    let p = ((((f * C5 + C4) * f + C3) * f + C2) * f + C1) * f + 1.0;
+    let p = ((((f * c5 + c4) * f + c3) * f + c2) * f + c1) * f + c0;
     f32::from_bits(p.to_bits().wrapping_add(rounded.to_bits() << 23))
 }
 

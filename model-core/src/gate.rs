@@ -7,6 +7,8 @@
 //! frames, Q being the upper tail of the standard normal distribution (Šidák's inequality).
 //! `docs/gating.md` has what that saves and what it misses.
 
+#[cfg(cortex_m4f)]
+use crate::cortex_m4;
 use crate::estimate::{Estimate, RowStatus};
 use crate::frame::Frame;
 
@@ -105,7 +107,7 @@ fn give_rest(
     if let (Ok(readings), Ok(baseline), Ok(rest), Ok(outputs)) =
         (readings.try_into(), baseline.try_into(), rest.try_into(), (&mut *outputs).try_into())
     {
-        return crate::cortex_m4::give_rest(readings, baseline, tolerance, rest, outputs);
+        return cortex_m4::give_rest(readings, baseline, tolerance, rest, outputs);
     }
     let at_rest = is_at_rest(readings, baseline, tolerance);
     if at_rest {

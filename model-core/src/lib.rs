@@ -3,7 +3,8 @@
 //! Readings travel one way: [`Frame`] (Ω) → [`health`] → [`gate`] → ([`projection`] →) [`scale`] → [`rbf`]
 //! (and its affine tail) → [`Estimate`]. The network's weights are read where the [`blob`] lies, in flash or in a
 //! file's buffer: nothing is copied, nothing is allocated, and no release code path of
-//! [`Decoder`] panics. [`rls`] updates output weights sample by sample.
+//! [`Decoder`] panics. [`rls`] is for a device that is to learn its
+//! output weights sample by sample: none does yet.
 //!
 //! The crate knows no pin and no file. The same code serves host, emulator and board, so that
 //! their answers agree bit for bit where the same [`exp`] kernel is chosen.
@@ -13,25 +14,31 @@
 //! ("the paper").
 #![cfg_attr(not(test), no_std)]
 
+#[cfg(feature = "std")]
+extern crate std;
+
 #[cfg(target_endian = "big")]
 compile_error!("the weight blob holds little-endian floats that are borrowed in place");
 
-pub mod blob;
-pub mod checksum;
-#[cfg(cortex_m4f)]
-mod cortex_m4;
-mod decoder;
-mod estimate;
+// From the ground up: a module imports only what is declared before it.
+
 pub mod exp;
-mod frame;
-pub mod gate;
-pub mod health;
-pub mod projection;
-pub mod rbf;
-pub mod rls;
 pub mod scale;
+pub mod checksum;
+pub mod rls;
+mod cortex_m4;
+mod frame;
+mod estimate;
+pub mod health;
+pub mod gate;
+pub mod rbf;
+pub mod projection;
+pub mod blob;
+mod decoder;
 
 pub use blob::Aligned;
+#[cfg(feature = "std")]
+pub use blob::AlignedBytes;
 pub use decoder::{Decoder, decoder_ram_bytes};
 pub use estimate::{Estimate, RowStatus};
 pub use frame::{ColumnWire, Frame, RowWire};

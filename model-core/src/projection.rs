@@ -4,6 +4,8 @@
 //! array, and as many features as a row has readings, so that the same inner loops serve both. Which
 //! directions p is a matter of training; `docs/projection.md` explains it.
 
+#[cfg(any(cortex_m4f, test))]
+use crate::cortex_m4;
 use crate::rbf::NetworkError;
 
 /// A linear projection of a frame, borrowed.
@@ -35,7 +37,7 @@ impl<'a> Projection<'a> {
         Ok(Self { features, block })
     }
 
-    /// As [`new`](Self::new) made it before.
+    /// The projection of a block that [`new`](Self::new) has checked before.
     pub(crate) fn of_checked(features: usize, block: &'a [f32]) -> Self {
         Self { features, block }
     }
@@ -49,12 +51,18 @@ impl<'a> Projection<'a> {
     /// The features of `readings` in Ω; none of them is a number if one of the readings is none.
     ///
     /// Readings and features beyond the projection's sizes are left alone.
+    #[cfg_attr(
+        cortex_m4f,
+        expect(unsafe_code, reason = "a call to assembly, whose condition is checked before")
+    )]
     pub fn project(&self, readings: &[f32], features: &mut [f32]) {
         #[cfg(cortex_m4f)]
         if let Ok(features) = (&mut *features).try_into()
             && self.suits_assembly(readings.len())
         {
-            return crate::cortex_m4::project(self.block, readings, features);
+            // SAFETY: `suits_assembly` has found these readings to be in pairs, and the block to be one of 18
+            // features for as many. They are not none: `new` refuses a projection without readings.
+            return unsafe { cortex_m4::project(self.block, readings, features) };
         }
         self.project_portably(readings, features);
     }
@@ -62,8 +70,7 @@ impl<'a> Projection<'a> {
     /// Whether these are all readings of a projection to 18 features, in pairs.
     #[cfg(any(cortex_m4f, test))]
     fn suits_assembly(&self, readings: usize) -> bool {
-        // A projection has readings: they are not none if their number is the block's.
-        self.features == crate::rbf::USUAL_INPUTS
+        self.features == cortex_m4::INPUTS
             && readings.is_multiple_of(2)
             && self.block.len() == block_floats(readings, self.features)
     }

@@ -14,117 +14,21 @@
 //! tail, one centre after the other, and last the bias, so that a large offset costs no digits of the
 //! rest. Host and device thus agree bit for bit, with or without SIMD.
 
-use crate::exp::ExpKernel;
-use crate::scale::{HALF_RANGE, UNITS};
-
-pub(crate) use assembled::Assembled;
-
-mod assembled;
+// From the ground up.
+mod parameters;
+mod format;
+mod packed;
 pub mod direct;
 pub mod expanded;
 pub mod fixed16;
 
-/// The paper's sizes, which inner loops are made for: in assembly, or compiled with these numbers known.
-pub(crate) const USUAL_INPUTS: usize = 18;
-/// See [`USUAL_INPUTS`].
-pub(crate) const USUAL_OUTPUTS: usize = 18;
+pub use format::Format;
+pub(crate) use packed::{Layout, Network as Packed};
+pub(crate) use parameters::Cut;
+pub use parameters::{NetworkError, Shape};
 
-/// The sizes of one network.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Shape {
-    /// Readings taken in.
-    pub inputs: usize,
-    /// Centres, K.
-    pub centres: usize,
-    /// Quantities given out.
-    pub outputs: usize,
-}
-
-/// Why parameters do not make a network, or why a buffer does not fit one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum NetworkError {
-    /// A dimension is zero.
-    #[error("a network needs at least one input, one centre and one output")]
-    Empty,
-    /// An array has the wrong number of elements.
-    #[error("{what} has {found} elements; the network's shape asks for {expected}")]
-    Length {
-        /// The array.
-        what: &'static str,
-        /// Elements it must have.
-        expected: usize,
-        /// Elements it has.
-        found: usize,
-    },
-    /// A parameter is NaN or infinite.
-    #[error("{what} holds a number that is not finite")]
-    NotFinite {
-        /// The array.
-        what: &'static str,
-    },
-    /// A width is zero, negative or without bound: its decay 1/(2σ²) is not a positive number.
-    #[error("width of centre {centre} is not a positive finite number")]
-    InvalidWidth {
-        /// Which decay, from 0.
-        centre: usize,
-    },
-    /// An input's 1/(maximum − minimum) is negative.
-    #[error("input {input} has a negative span")]
-    NegativeSpan {
-        /// Which input, from 0.
-        input: usize,
-    },
-    /// Centres, widths and inputs do not go together: an exponent could leave the range of its format.
-    #[error("the exponent of centre {centre} can leave the range that the format computes with")]
-    ExponentOutOfRange {
-        /// Which centre, from 0.
-        centre: usize,
-    },
-    /// More inputs than the format can add up.
-    #[error("{found} inputs; the format holds at most {most}")]
-    TooManyInputs {
-        /// The most that there may be.
-        most: usize,
-        /// How many there are.
-        found: usize,
-    },
-}
-
-/// How a network's numbers and distances are represented.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Format {
-    /// [`direct`]: f32, distances from differences.
-    F32Direct,
-    /// [`expanded`]: f32, distances from products.
-    F32,
-    /// [`fixed16`]: 16-bit fixed point.
-    Fixed16,
-}
-
-impl Format {
-    /// Every format.
-    pub const ALL: [Self; 3] = [Self::F32Direct, Self::F32, Self::Fixed16];
-
-    /// The format's name, as users choose it.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::F32Direct => "f32-direct",
-            Self::F32 => "f32",
-            Self::Fixed16 => "fixed16",
-        }
-    }
-}
-
-/// Whether the readings of an inference were finite, as far as a kernel with a bound on its outputs tells.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Finite {
-    /// All were.
-    #[cfg_attr(not(cortex_m4f), expect(dead_code, reason = "assembly alone tells on the side"))]
-    Known,
-    /// That did not come to light.
-    Unknown,
-}
+use self::parameters::check_length;
+use crate::exp::{ExpKernel, Polynomial};
 
 /// A network of any format, whose parameters have been checked against its shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -206,8 +110,7 @@ impl<'a> Network<'a> {
         each!(self, inner => inner.training_range(input))
     }
 
-    /// Infers `output` from one row of `reading`s. `E` serves [`Format::F32Direct`]; the other formats have an
-    /// exponential of their own.
+    /// Infers `output` from one row of `reading`s.
     ///
     /// `scaled` is working space of one value an input. A NaN reading makes the outputs meaningless:
     /// screen readings before ([`Decoder`](crate::Decoder) does). Inlined, so that lengths known to the
@@ -217,7 +120,7 @@ impl<'a> Network<'a> {
     /// [`NetworkError::Length`] if a buffer does not fit the shape; `output` is then untouched.
     ///
     /// ```
-    /// use model_core::{exp::Polynomial, rbf::{Network, Shape, direct}};
+    /// use model_core::rbf::{Network, Shape, direct};
     /// let network = Network::from(direct::Network::try_new(
     ///     Shape { inputs: 2, centres: 1, outputs: 1 },
     ///     direct::Parameters {
@@ -231,14 +134,30 @@ impl<'a> Network<'a> {
     ///     },
     /// )?);
     /// let mut output = [0.0];
-    /// network.infer::<Polynomial>(&[55.0, 55.0], &mut [0.0; 2], &mut output)?;
+    /// network.infer(&[55.0, 55.0], &mut [0.0; 2], &mut output)?;
     /// // At its centre the activation is 1, so the output is weight + bias.
     /// assert_eq!(output, [4.0]);
     /// # Ok::<(), model_core::rbf::NetworkError>(())
     /// ```
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
-    pub fn infer<E: ExpKernel>(
+    pub fn infer(
+        &self,
+        reading: &[f32],
+        scaled: &mut [f32],
+        output: &mut [f32],
+    ) -> Result<(), NetworkError> {
+        self.infer_with::<Polynomial>(reading, scaled, output)
+    }
+
+    /// As [`infer`](Self::infer), with another [exponential](crate::exp) for [`Format::F32Direct`]: to measure
+    /// what it costs. Other formats have an exponential of their own.
+    ///
+    /// # Errors
+    /// As [`infer`](Self::infer).
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
+    pub fn infer_with<E: ExpKernel>(
         &self,
         reading: &[f32],
         scaled: &mut [f32],
@@ -275,7 +194,17 @@ impl<'a> Network<'a> {
     /// As [`infer`](Self::infer).
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
-    pub fn infer_scaled<E: ExpKernel>(
+    pub fn infer_scaled(&self, scaled: &mut [f32], output: &mut [f32]) -> Result<(), NetworkError> {
+        self.infer_scaled_with::<Polynomial>(scaled, output)
+    }
+
+    /// As [`infer_scaled`](Self::infer_scaled), with another exponential, as [`infer_with`](Self::infer_with).
+    ///
+    /// # Errors
+    /// As [`infer`](Self::infer).
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
+    pub fn infer_scaled_with<E: ExpKernel>(
         &self,
         scaled: &mut [f32],
         output: &mut [f32],
@@ -313,68 +242,6 @@ impl<'a> From<expanded::Network<'a>> for Network<'a> {
 impl<'a> From<fixed16::Network<'a>> for Network<'a> {
     fn from(inner: fixed16::Network<'a>) -> Self {
         Self::Fixed16(inner)
-    }
-}
-
-/// Cuts arrays of four-byte words from the front of a network's block.
-pub(crate) struct Cut<'a>(pub &'a [u32]);
-
-impl<'a> Cut<'a> {
-    /// The next `length` words; none if there are fewer.
-    fn words(&mut self, length: usize) -> &'a [u32] {
-        let (head, tail) = self.0.split_at_checked(length).unwrap_or_default();
-        self.0 = tail;
-        head
-    }
-
-    fn floats(&mut self, length: usize) -> &'a [f32] {
-        bytemuck::cast_slice(self.words(length))
-    }
-}
-
-fn check_length<T>(what: &'static str, values: &[T], expected: usize) -> Result<(), NetworkError> {
-    if values.len() == expected {
-        Ok(())
-    } else {
-        Err(NetworkError::Length { what, expected, found: values.len() })
-    }
-}
-
-/// Readings in units from the middle of the training range, not clamped yet.
-fn scale_about(midpoint: &[f32], per_unit: &[f32], reading: &[f32], scaled: &mut [f32]) {
-    let limits = midpoint.iter().zip(per_unit);
-    for ((x, &r), (&midpoint, &per_unit)) in scaled.iter_mut().zip(reading).zip(limits) {
-        *x = (r - midpoint) * per_unit;
-    }
-}
-
-/// Lowest and highest reading from the middle of the range and [`UNITS`](crate::scale::UNITS) in one unit.
-fn range_about(midpoint: Option<&f32>, per_unit: Option<&f32>) -> [f32; 2] {
-    let (Some(&midpoint), Some(&per_unit)) = (midpoint, per_unit) else { return [f32::NAN; 2] };
-    let half = if per_unit > 0.0 { 0.5 / HALF_RANGE * UNITS / per_unit } else { 0.0 };
-    [midpoint - half, midpoint + half]
-}
-
-fn check_finite(arrays: &[(&'static str, &[f32])]) -> Result<(), NetworkError> {
-    let finite = |values: &[f32]| values.iter().all(|v| v.is_finite());
-    match arrays.iter().find(|(_, values)| !finite(values)) {
-        Some((what, _)) => Err(NetworkError::NotFinite { what }),
-        None => Ok(()),
-    }
-}
-
-fn check_spans(per_span: &[f32]) -> Result<(), NetworkError> {
-    match per_span.iter().position(|s| *s < 0.0) {
-        Some(input) => Err(NetworkError::NegativeSpan { input }),
-        None => Ok(()),
-    }
-}
-
-#[inline(always)]
-#[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
-fn accumulate(output: &mut [f32], factor: f32, weights: &[f32]) {
-    for (y, &w) in output.iter_mut().zip(weights) {
-        *y += factor * w;
     }
 }
 

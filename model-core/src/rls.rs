@@ -11,6 +11,10 @@
 //!
 //! The free functions work on slices, for sizes known when they run; [`Rls`] wraps them for
 //! sizes known when compiled.
+//!
+//! What uses it: the trainer of host-sim calls [`solve`] alone, and gets R and z from a QR decomposition of whole
+//! blocks of samples. [`start`], [`update`] and [`Rls`] are for recalibration on the device, which no firmware
+//! does yet. Tests hold them to the decomposition, the host to the emulator, and the link check to no panic.
 
 use core::ops::{Add, Div, Mul, Sub};
 

@@ -4,7 +4,6 @@ use model_core::blob::{
     Columns, DecodeError, EncodeError, Floats, Metadata, Model, ModelParts, NoiseKind, encode,
     encoded_length_bound,
 };
-use model_core::exp::Libm;
 use model_core::rbf::direct::{self, Parameters};
 use model_core::rbf::{Network, Shape};
 use model_core::{Aligned, Decoder, Frame, RowStatus};
@@ -113,7 +112,7 @@ fn weights_are_borrowed_where_the_blob_lies() {
 #[test]
 fn a_decoder_marks_rows_with_missing_readings_and_leaves_the_others() {
     let mut buffer = Aligned([0; 512]);
-    let decoder = Decoder::<2, 2, 1, Libm>::load(small_model(&mut buffer.0)).unwrap();
+    let decoder = Decoder::<2, 2, 1>::load(small_model(&mut buffer.0)).unwrap();
     let frame = Frame { row_column_resistance_ohm: [[54.0, f32::NAN], [54.0, 64.0]] };
     let estimate = decoder.decode(&frame);
     assert_eq!(estimate.status, [RowStatus::MissingReading, RowStatus::Decoded]);
@@ -137,7 +136,7 @@ fn readings_that_overflow_are_told_from_missing_ones() {
         metadata: metadata(),
     };
     let blob = encode(&parts, &mut buffer.0).unwrap();
-    let decoder = Decoder::<2, 2, 1, Libm>::load(blob).unwrap();
+    let decoder = Decoder::<2, 2, 1>::load(blob).unwrap();
     let frame = Frame { row_column_resistance_ohm: [[3e38, 64.0], [54.0, 64.0]] };
     let estimate = decoder.decode(&frame);
     assert_eq!(estimate.status, [RowStatus::Overflow, RowStatus::Decoded]);

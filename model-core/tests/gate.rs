@@ -1,6 +1,6 @@
 //! A decoder that leaves rows at rest alone.
 
-use model_core::blob::{Columns, Floats, Metadata, ModelParts, NoiseKind, encode};
+use model_core::blob::{Metadata, ModelParts, ModelShape, encode};
 use model_core::rbf::Shape;
 use model_core::rbf::direct::{Network, Parameters};
 use model_core::{Aligned, Decoder, Estimate, Frame, Gate, RowStatus};
@@ -29,21 +29,8 @@ fn with_decoder(check: impl FnOnce(&TestDecoder<'_>)) {
     };
     let shape = Shape { inputs: COLS, centres: 1, outputs: OUTPUTS };
     let network = Network::try_new(shape, parameters).unwrap().into();
-    let metadata = Metadata {
-        name: "gated",
-        scene_digest: 0,
-        noise_kind: NoiseKind::None,
-        noise_level: 0.0,
-        seed: 0,
-        training_frames: 0,
-        thickness_mm: 5.0,
-        input_names: Columns("x\nx\nx\nx\nx\nx"),
-        input_units: Columns("x\nx\nx\nx\nx\nx"),
-        output_names: Columns("y\ny\ny\ny\ny\ny"),
-        output_units: Columns("y\ny\ny\ny\ny\ny"),
-        training_rmse: Floats(&[0; 4 * ROWS * OUTPUTS]),
-        full_scale: Floats(&[0; 4 * ROWS * OUTPUTS]),
-    };
+    let shape = ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS };
+    let metadata = Metadata::unnamed(shape);
     let parts =
         ModelParts { projection: None, networks: &[network], row_network: &[0; ROWS], metadata };
     let mut buffer = Aligned([0; 512]);

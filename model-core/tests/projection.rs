@@ -1,11 +1,9 @@
 //! One network for the whole array, behind a projection: the blob, and what a decoder makes of it.
 
 use model_core::blob::{
-    Columns, DecodeError, EncodeError, Floats, Metadata, Model, ModelParts, NoiseKind, encode,
-    encoded_length_bound,
+    DecodeError, EncodeError, Metadata, Model, ModelParts, ModelShape, encode, encoded_length_bound,
 };
 use model_core::checksum::CRC_32;
-use model_core::exp::Libm;
 use model_core::projection::Projection;
 use model_core::rbf::direct::{self, Parameters};
 use model_core::rbf::{Network, Shape};
@@ -29,24 +27,6 @@ fn network(outputs: usize) -> Network<'static> {
     direct::Network::try_new(Shape { inputs: 2, centres: 1, outputs }, parameters).unwrap().into()
 }
 
-fn metadata() -> Metadata<'static> {
-    Metadata {
-        name: "array",
-        scene_digest: 0,
-        noise_kind: NoiseKind::None,
-        noise_level: 0.0,
-        seed: 1,
-        training_frames: 1,
-        thickness_mm: 5.0,
-        input_names: Columns("a\nb\nc\nd"),
-        input_units: Columns("\n\n\n"),
-        output_names: Columns("x\ny"),
-        output_units: Columns("\n"),
-        training_rmse: Floats(&[0; 8]),
-        full_scale: Floats(&[0; 8]),
-    }
-}
-
 fn encoded<'b>(
     block: &[f32],
     networks: &[Network<'_>],
@@ -54,7 +34,8 @@ fn encoded<'b>(
     buffer: &'b mut [u8],
 ) -> Result<&'b [u8], EncodeError> {
     let projection = Projection::new(4, 2, block).ok();
-    let parts = ModelParts { projection, networks, row_network, metadata: metadata() };
+    let metadata = Metadata::unnamed(ModelShape { rows: 2, inputs: 2, outputs: 1 });
+    let parts = ModelParts { projection, networks, row_network, metadata };
     assert!(encoded_length_bound(&parts) <= buffer.len());
     encode(&parts, buffer)
 }
@@ -67,8 +48,7 @@ fn array(buffer: &mut [u8]) -> &[u8] {
 fn the_features_of_a_whole_frame_decide_all_rows() {
     let mut buffer = Aligned([0; 1024]);
     let blob = array(&mut buffer.0);
-    let (decoder, model) =
-        (Decoder::<2, 2, 1, Libm>::load(blob).unwrap(), Model::decode(blob).unwrap());
+    let (decoder, model) = (Decoder::<2, 2, 1>::load(blob).unwrap(), Model::decode(blob).unwrap());
     let mut features = [0.0; 2];
     let readings = NEAR_CENTRE.row_column_resistance_ohm;
     model.projection().unwrap().project(readings.as_flattened(), &mut features);
@@ -85,7 +65,7 @@ fn the_features_of_a_whole_frame_decide_all_rows() {
 #[test]
 fn one_missing_reading_leaves_no_row_to_decode() {
     let mut buffer = Aligned([0; 1024]);
-    let decoder = Decoder::<2, 2, 1, Libm>::load(array(&mut buffer.0)).unwrap();
+    let decoder = Decoder::<2, 2, 1>::load(array(&mut buffer.0)).unwrap();
     for missing in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         let mut frame = NEAR_CENTRE;
         frame.row_column_resistance_ohm[1][0] = missing;
@@ -100,7 +80,7 @@ fn features_that_overflow_are_told_from_missing_readings() {
     let mut buffer = Aligned([0; 1024]);
     let block = BLOCK.map(|part| 2.0 * part);
     let blob = encoded(&block, &[network(2)], &[0, 0], &mut buffer.0).unwrap();
-    let decoder = Decoder::<2, 2, 1, Libm>::load(blob).unwrap();
+    let decoder = Decoder::<2, 2, 1>::load(blob).unwrap();
     let frame = Frame { row_column_resistance_ohm: [[f32::MAX; 2], [-f32::MAX; 2]] };
     let estimate = decoder.decode(&frame);
     assert_eq!(estimate.status, [RowStatus::Overflow; 2]);
@@ -110,7 +90,7 @@ fn features_that_overflow_are_told_from_missing_readings() {
 #[test]
 fn an_array_is_at_rest_as_a_whole_or_not_at_all() {
     let mut buffer = Aligned([0; 1024]);
-    let decoder = Decoder::<2, 2, 1, Libm>::load(array(&mut buffer.0)).unwrap();
+    let decoder = Decoder::<2, 2, 1>::load(array(&mut buffer.0)).unwrap();
     let rest = decoder.decode(&NEAR_CENTRE);
     let gate = Gate::new(&NEAR_CENTRE, &rest, 0.02);
     let mut estimate = rest;

@@ -22,8 +22,16 @@ pub const BENCH: Packages =
 pub const NUCLEO: Packages = &["--package", "nucleo-f446re"];
 
 /// What the images are made of, and the link check.
-const LIBRARIES: Packages =
-    &["--package", "model-core", "--package", "firmware", "--package", "link-check"];
+const LIBRARIES: Packages = &[
+    "--package",
+    "model-core",
+    "--package",
+    "firmware",
+    "--package",
+    "remote-readout",
+    "--package",
+    "link-check",
+];
 
 /// Builds and lints all that runs on a device, links the check, and links it once more with a panic
 /// in it.

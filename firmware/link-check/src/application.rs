@@ -7,7 +7,7 @@ use firmware::readout::{FrameSource, ScanReport, ScanSettings};
 use firmware::store::{FlashError, Slot};
 use model_core::Frame;
 
-use crate::device::{opaque, slot};
+use crate::opaque::{opaque, slot};
 
 struct Board;
 

@@ -1,68 +1,46 @@
 //! Calls everything that a device calls, on inputs of which the optimiser knows nothing.
 
-use core::panic::PanicInfo;
-use core::{ptr, slice};
-
-use firmware::PaperSensor;
 use firmware::store::blob_in_slot;
-use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
 use model_core::rls::{self, Rls};
-use model_core::{ColumnWire, Frame, RowWire};
+use model_core::{ColumnWire, Decoder, Frame, RowWire, decoder_ram_bytes};
+
+use crate::application;
+use crate::opaque::{opaque, slot};
+use crate::readout;
+
+/// A decoder for the paper's sensor, as the application has one.
+type PaperDecoder = Decoder<'static, 8, 18, 18>;
 
 /// What `host-sim inspect` tells users of RAM must hold here.
-const _: () = assert!(size_of::<PaperSensor<'static>>() <= model_core::decoder_ram_bytes(8));
+const _: () = assert!(size_of::<PaperDecoder>() <= decoder_ram_bytes(8));
 
-unsafe extern "C" {
-    /// Defined nowhere: whatever reaches it does not link.
-    fn taxel_reachable_panic() -> !;
-}
-
-#[panic_handler]
-fn panic(_: &PanicInfo<'_>) -> ! {
-    // SAFETY: never runs, since it never links.
-    unsafe { taxel_reachable_panic() }
-}
-
-/// `value`, after which the optimiser neither knows what it is nor may leave out computing it.
-#[inline(never)]
-pub fn opaque<T: Copy>(value: T) -> T {
-    // SAFETY: a reference is valid for reads.
-    unsafe { ptr::read_volatile(&raw const value) }
-}
-
-/// A flash slot of unknown address, length and content.
-pub fn slot() -> &'static [u8] {
-    let (address, length) = opaque((0x0806_0000_usize, 0x2_0000_usize));
-    // SAFETY: the numbers are those of the last sector of a board's flash.
-    unsafe { slice::from_raw_parts(ptr::with_exposed_provenance(address), length) }
-}
-
-fn exercise_decoding<E: ExpKernel>() {
-    let Ok(mut sensor) = PaperSensor::<E>::load(slot()) else { return };
-    opaque(sensor.replace(blob_in_slot(slot())).is_ok());
+/// The decoder by itself, as a program of one's own calls it: the application decodes into buffers.
+fn exercise_decoding() {
+    let Ok(decoder) = PaperDecoder::load(blob_in_slot(slot())) else { return };
 
     let mut frame = opaque(Frame::missing());
     opaque(frame.set_ohm(RowWire(opaque(0)), ColumnWire(opaque(0)), opaque(60.0)));
     opaque(frame.ohm(RowWire(opaque(0)), ColumnWire(opaque(0))));
-    let estimate = opaque(sensor.decode(&frame));
+    let estimate = opaque(decoder.decode(&frame));
 
-    let metadata = sensor.metadata();
+    let metadata = decoder.metadata();
     metadata.output_names.iter().for_each(|name| _ = opaque(name));
     metadata.training_rmse.iter().for_each(|rmse| _ = opaque(rmse));
-    opaque(sensor.model_crc());
+    opaque(decoder.model_crc());
 
     if cfg!(feature = "must-fail") {
         opaque(estimate.outputs[opaque(0)]);
     }
 }
 
+/// Recursive least squares, which no image calls yet.
 fn exercise_recalibration() {
     let Ok(mut rls) = Rls::<f32, 17, 3>::try_new(opaque(1e3), opaque(0.999)) else { return };
     rls.update(opaque([0.5; 17]), opaque([0.25; 3]));
     opaque(rls.output_weights());
 }
 
-/// Recursive least squares again, of sizes known only when it runs.
+/// Recursive least squares of sizes known only when it runs.
 fn exercise_recalibration_on_slices() {
     let mut numbers = [0.0_f32; 512];
     let (root, rest) = numbers.split_at_mut(256);
@@ -79,13 +57,11 @@ fn exercise_recalibration_on_slices() {
 /// Where a linker begins that is given no script: what this does not reach is left out.
 #[unsafe(no_mangle)]
 extern "C" fn _start() -> ! {
-    exercise_decoding::<Polynomial>();
-    exercise_decoding::<Libm>();
-    exercise_decoding::<Micromath>();
+    exercise_decoding();
     exercise_recalibration();
     exercise_recalibration_on_slices();
-    crate::application::exercise();
-    crate::readout::exercise();
+    application::exercise();
+    readout::exercise();
     loop {
         core::hint::spin_loop();
     }

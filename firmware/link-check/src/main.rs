@@ -8,12 +8,15 @@
 //! a function of `core::panicking` is its source.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
+// From the ground up: a module imports only what is declared before it.
+#[cfg(target_os = "none")]
+mod opaque;
+#[cfg(target_os = "none")]
+mod readout;
 #[cfg(target_os = "none")]
 mod application;
 #[cfg(target_os = "none")]
 mod device;
-#[cfg(target_os = "none")]
-mod readout;
 
 #[cfg(not(target_os = "none"))]
 fn main() {

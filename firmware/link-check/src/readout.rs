@@ -14,7 +14,7 @@ use firmware::readout::{
 use firmware::timing;
 use model_core::Frame;
 
-use crate::device::opaque;
+use crate::opaque::opaque;
 
 /// Pin, bus, clock and converter in one: may fail or answer anything.
 #[derive(Clone, Copy)]

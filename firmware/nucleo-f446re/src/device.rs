@@ -1,10 +1,10 @@
 //! What runs on the board.
 
-use cortex_m::singleton;
+use board_common::buffers;
 use cortex_m_rt::entry;
 use defmt::{info, unwrap};
 use defmt_rtt as _;
-use firmware::app::{PaperApp, PaperBuffers};
+use firmware::app::PaperApp;
 use firmware::circuit::ZeroPotential;
 use firmware::link::message::{Configuration, Memory};
 use firmware::platform::{Platform, Port};
@@ -51,12 +51,6 @@ impl Platform for Nucleo {
     fn memory(&self) -> Memory {
         memory::taken()
     }
-}
-
-/// Theirs alone: what they are put together from leaves the stack again.
-#[inline(never)]
-fn buffers() -> Option<&'static mut PaperBuffers> {
-    singleton!(: PaperBuffers = PaperBuffers::new())
 }
 
 #[entry]

@@ -4,16 +4,16 @@
 #![cfg(target_os = "none")]
 #![no_std]
 
-mod board;
+// From the ground up: a module imports only what is declared before it.
 mod clock;
 mod held_pin;
-#[path = "../../qemu/src/memory.rs"]
-pub mod memory;
 mod reset;
 mod serial;
 mod slot;
+mod board;
 
 pub use board::{Board, Converter, RowPin, SPI_HZ, Select};
+pub use board_common::memory;
 pub use clock::Clock;
 pub use held_pin::HeldPin;
 pub use reset::{ResetCause, restart};

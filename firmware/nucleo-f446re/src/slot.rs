@@ -1,17 +1,9 @@
 //! Model slots: sectors 6 and 7 of the flash.
 
-use core::{ptr, slice};
-
+use board_common::region::Region;
 use firmware::store::FlashError;
 use stm32f4xx_hal::flash::{Error, FlashExt};
 use stm32f4xx_hal::pac::FLASH;
-
-unsafe extern "C" {
-    static _slot_a_start: u8;
-    static _slot_a_end: u8;
-    static _slot_b_start: u8;
-    static _slot_b_end: u8;
-}
 
 /// Why a slot was not written or erased as asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, defmt::Format)]
@@ -25,29 +17,19 @@ pub enum SlotError {
 }
 
 /// Room for one model: erased as a whole, to ones; written bit by bit, to zeros.
-pub struct Slot {
-    start: usize,
-    length: usize,
-}
+pub struct Slot(Region);
 
 impl Slot {
     /// Both slots. They share the controller, which is therefore taken.
     pub(crate) fn both(_: FLASH) -> [Self; 2] {
-        let slot = |start: *const u8, end: *const u8| Self {
-            start: start.expose_provenance(),
-            length: end.addr() - start.addr(),
-        };
-        [
-            slot(&raw const _slot_a_start, &raw const _slot_a_end),
-            slot(&raw const _slot_b_start, &raw const _slot_b_end),
-        ]
+        // SAFETY: there is one controller, so this is called once.
+        unsafe { Region::take() }.map(Self)
     }
 
     /// All that is in it.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
-        // SAFETY: the linker keeps the slot free of anything else, and only `self` writes to it.
-        unsafe { slice::from_raw_parts(ptr::with_exposed_provenance(self.start), self.length) }
+        self.0.bytes()
     }
 
     /// Sets all of it to 0xFF. Takes 1 to 4 s, in which nothing else runs, interrupts included.
@@ -56,7 +38,7 @@ impl Slot {
     /// See [`SlotError`].
     pub fn erase(&mut self) -> Result<(), SlotError> {
         let mut flash = controller();
-        let sector = flash.sector(self.start - flash.address()).ok_or(SlotError::OutOfRange)?;
+        let sector = flash.sector(self.0.start() - flash.address()).ok_or(SlotError::OutOfRange)?;
         let erased = flash.unlocked().erase(sector.number);
         forget_cached(&flash);
         erased.map_err(refused)?;
@@ -69,11 +51,11 @@ impl Slot {
     /// See [`SlotError`].
     pub fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), SlotError> {
         let end = offset.checked_add(bytes.len()).ok_or(SlotError::OutOfRange)?;
-        if end > self.length {
+        if end > self.0.length() {
             return Err(SlotError::OutOfRange);
         }
         let mut flash = controller();
-        let place = self.start - flash.address() + offset;
+        let place = self.0.start() - flash.address() + offset;
         let written = flash.unlocked().program(place, bytes.iter());
         forget_cached(&flash);
         written.map_err(refused)?;

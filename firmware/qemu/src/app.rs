@@ -5,21 +5,21 @@
 
 use core::cell::Cell;
 
+use board_common::buffers;
 use cortex_m::peripheral::SCB;
-use cortex_m::singleton;
 use cortex_m_rt::entry;
 use defmt::info;
-use firmware::app::{PaperApp, PaperBuffers};
+use firmware::app::PaperApp;
 use firmware::circuit::ZeroPotential;
 use firmware::link::message::{Configuration, Memory};
 use firmware::platform::{Platform, Port};
 use firmware::readout::{Mcp3208s, Scanner, ShiftRegister595};
-use firmware::remote::Remote;
 use qemu_image::clock::Clock;
 use qemu_image::slot::Slot;
 use qemu_image::uart::Uart;
 use qemu_image::watchdog::Watchdog;
 use qemu_image::{exit, memory};
+use remote_readout::Remote;
 
 /// Longer than a loop takes, were it ever so slow a computer.
 const WATCHDOG_MS: u32 = 20_000;
@@ -90,12 +90,6 @@ impl Platform for Board<'_> {
     fn memory(&self) -> Memory {
         memory::taken()
     }
-}
-
-/// Theirs alone: what they are put together from leaves the stack again.
-#[inline(never)]
-fn buffers() -> Option<&'static mut PaperBuffers> {
-    singleton!(: PaperBuffers = PaperBuffers::new())
 }
 
 #[entry]

@@ -5,12 +5,14 @@
 #![cfg(target_os = "none")]
 #![no_std]
 
-pub mod checks;
-pub mod clock;
-pub mod exit;
-mod fault;
-pub mod memory;
+pub use board_common::memory;
+
+// From the ground up: a module imports only what is declared before it.
 mod registers;
-pub mod slot;
+pub mod clock;
 pub mod uart;
 pub mod watchdog;
+pub mod exit;
+mod fault;
+pub mod slot;
+pub mod checks;

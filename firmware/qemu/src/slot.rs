@@ -4,16 +4,8 @@
 //! loader,file=model.bin,addr=0x200000,force-raw=on` on QEMU's command line puts a model into slot
 //! A.
 
-use core::{ptr, slice};
-
+use board_common::region::Region;
 use firmware::store::FlashError;
-
-unsafe extern "C" {
-    static _slot_a_start: u8;
-    static _slot_a_end: u8;
-    static _slot_b_start: u8;
-    static _slot_b_end: u8;
-}
 
 /// Why a slot was not written as asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, defmt::Format)]
@@ -25,10 +17,7 @@ pub enum SlotError {
 }
 
 /// Room for one model: erased as a whole, to ones; written bit by bit, to zeros.
-pub struct Slot {
-    start: usize,
-    length: usize,
-}
+pub struct Slot(Region);
 
 impl Slot {
     /// Both slots.
@@ -37,27 +26,19 @@ impl Slot {
     /// To be called once: no two may be the same slot.
     #[must_use]
     pub unsafe fn take() -> [Self; 2] {
-        let slot = |start: *const u8, end: *const u8| Self {
-            start: start.expose_provenance(),
-            length: end.addr() - start.addr(),
-        };
-        [
-            slot(&raw const _slot_a_start, &raw const _slot_a_end),
-            slot(&raw const _slot_b_start, &raw const _slot_b_end),
-        ]
+        // SAFETY: the caller calls this once.
+        unsafe { Region::take() }.map(Self)
     }
 
     /// All that is in it.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
-        // SAFETY: the linker keeps the slot free of anything else, and only `self` writes to it.
-        unsafe { slice::from_raw_parts(ptr::with_exposed_provenance(self.start), self.length) }
+        self.0.bytes()
     }
 
     fn bytes_mut(&mut self) -> &mut [u8] {
-        let start = ptr::with_exposed_provenance_mut(self.start);
-        // SAFETY: as for `bytes`; `self` is borrowed mutably.
-        unsafe { slice::from_raw_parts_mut(start, self.length) }
+        // SAFETY: QEMU lets a program write to code memory.
+        unsafe { self.0.bytes_mut() }
     }
 
     /// Sets all of it to 0xFF.

@@ -1,10 +1,11 @@
 //! Requests and their answers.
 
+use model_core::Decoder;
 use model_core::blob::{DecodeError, Floats};
-use model_core::exp::ExpKernel;
+use model_core::exp::{ExpKernel, Polynomial};
 
-use super::session::InForce;
-use super::{Core, Leave, Session};
+use super::Core;
+use super::session::{InForce, Leave, Session};
 use crate::link::message::{
     Configuration, Identity, ModelFault, Refusal, Report, Request, UploadStep,
 };
@@ -14,7 +15,6 @@ use crate::log::{info, warning};
 use crate::platform::Platform;
 use crate::readout::{Baseline, FrameSource};
 use crate::store::{Slot, capacity};
-use crate::tactile::Tactile;
 
 /// Most bytes of one chunk of an upload: as many as leave room for the rest of the message, and no
 /// more than a board surely keeps while it writes the chunk before.
@@ -33,8 +33,7 @@ impl<
     const COLS: usize,
     const OUTPUTS: usize,
     const BYTES: usize,
-    E: ExpKernel,
-> Session<'_, '_, P, F, S, ROWS, COLS, OUTPUTS, BYTES, E>
+> Session<'_, '_, P, F, S, ROWS, COLS, OUTPUTS, BYTES>
 {
     /// Receives until a frame is whole or nothing more is there, and answers it.
     pub(super) fn serve_link(&mut self) -> Option<Leave> {
@@ -59,10 +58,10 @@ impl<
     const BYTES: usize,
 > Core<'_, P, F, ROWS, COLS, OUTPUTS, BYTES>
 {
-    fn answer<E: ExpKernel, S: Slot>(
+    fn answer<S: Slot>(
         &mut self,
         received: Received<'_>,
-        model: &InForce<'_, ROWS, COLS, OUTPUTS, E>,
+        model: &InForce<'_, ROWS, COLS, OUTPUTS>,
         spare: &mut S,
     ) -> Option<Leave> {
         let packet = match received {
@@ -94,7 +93,7 @@ impl<
                 }
             }
             Request::Upload(step) => self
-                .upload_step::<E, S>(step, model, spare, &mut leave)
+                .upload_step(step, model, spare, &mut leave)
                 .map(|()| Report::Upload(self.upload.state())),
             Request::Restart => {
                 info!("restart asked for");
@@ -119,9 +118,9 @@ impl<
         self.count_lost(sent);
     }
 
-    fn identity<E: ExpKernel, S: Slot>(
+    fn identity<S: Slot>(
         &mut self,
-        model: &InForce<'_, ROWS, COLS, OUTPUTS, E>,
+        model: &InForce<'_, ROWS, COLS, OUTPUTS>,
         spare: &S,
     ) -> Identity<'static> {
         Identity {
@@ -130,7 +129,7 @@ impl<
             rows: ROWS as u8,
             columns: COLS as u8,
             outputs: OUTPUTS as u8,
-            kernel: E::NAME,
+            kernel: Polynomial::NAME,
             model: model.identity,
             slot_bytes: capacity(spare.bytes()) as u32,
             chunk_bytes: chunk_bytes(BYTES) as u16,
@@ -172,26 +171,26 @@ impl<
         }
     }
 
-    fn decode_readings<E: ExpKernel>(
+    fn decode_readings(
         &mut self,
         number: u16,
         frame: u32,
         readings_ohm: Floats<'_>,
-        model: &InForce<'_, ROWS, COLS, OUTPUTS, E>,
+        model: &InForce<'_, ROWS, COLS, OUTPUTS>,
     ) -> Result<(), Refusal> {
         if readings_ohm.0.len() != 4 * ROWS * COLS {
             return Err(Refusal::FrameLength { expected: (ROWS * COLS) as u16 });
         }
         self.set_frame(readings_ohm.iter());
-        let (flags, _) = self.decode(model.sensor.as_ref());
+        let (flags, _) = self.decode(model.decoder.as_ref());
         self.send_estimate(number, frame, flags);
         Ok(())
     }
 
-    fn upload_step<E: ExpKernel, S: Slot>(
+    fn upload_step<S: Slot>(
         &mut self,
         step: UploadStep<'_>,
-        model: &InForce<'_, ROWS, COLS, OUTPUTS, E>,
+        model: &InForce<'_, ROWS, COLS, OUTPUTS>,
         spare: &mut S,
         leave: &mut Option<Leave>,
     ) -> Result<(), Refusal> {
@@ -210,7 +209,7 @@ impl<
                     return Ok(()); // asked again, since the answer was lost
                 }
                 let blob = self.upload.complete(spare)?;
-                match Tactile::<ROWS, COLS, OUTPUTS, E>::check(blob) {
+                match Decoder::<ROWS, COLS, OUTPUTS>::check(blob).map(|model| model.crc()) {
                     Ok(crc_32) => {
                         let before = model.identity.map_or(0, |identity| identity.generation);
                         self.upload.commit(spare, before.saturating_add(1), crc_32)?;

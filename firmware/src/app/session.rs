@@ -1,9 +1,8 @@
 //! The loop while one model is in force.
 
 use model_core::blob::Floats;
-use model_core::exp::ExpKernel;
 use model_core::health::{Health, Limits};
-use model_core::{Frame, Gate, RowStatus};
+use model_core::{Decoder, Frame, Gate, RowStatus};
 
 use super::{App, Core};
 use crate::link::message::{EstimateReport, HealthReport, ModelIdentity, Report};
@@ -12,7 +11,6 @@ use crate::log::{info, warning};
 use crate::platform::Platform;
 use crate::readout::FrameSource;
 use crate::store::{Slot, blob_in_slot};
-use crate::tactile::Tactile;
 
 /// Why a session ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,22 +32,15 @@ pub struct Session<
     const COLS: usize,
     const OUTPUTS: usize,
     const BYTES: usize,
-    E: ExpKernel,
 > {
-    pub(super) app: &'a mut App<'m, P, F, ROWS, COLS, OUTPUTS, BYTES, E>,
-    pub(super) model: InForce<'a, ROWS, COLS, OUTPUTS, E>,
+    pub(super) app: &'a mut App<'m, P, F, ROWS, COLS, OUTPUTS, BYTES>,
+    pub(super) model: InForce<'a, ROWS, COLS, OUTPUTS>,
     pub(super) spare: &'a mut S,
 }
 
 /// The model that is in force, if there is one.
-pub(super) struct InForce<
-    'a,
-    const ROWS: usize,
-    const COLS: usize,
-    const OUTPUTS: usize,
-    E: ExpKernel,
-> {
-    pub sensor: Option<Tactile<'a, ROWS, COLS, OUTPUTS, E>>,
+pub(super) struct InForce<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize> {
+    pub decoder: Option<Decoder<'a, ROWS, COLS, OUTPUTS>>,
     pub identity: Option<ModelIdentity>,
 }
 
@@ -63,24 +54,23 @@ impl<
     const COLS: usize,
     const OUTPUTS: usize,
     const BYTES: usize,
-    E: ExpKernel,
-> Session<'a, 'm, P, F, S, ROWS, COLS, OUTPUTS, BYTES, E>
+> Session<'a, 'm, P, F, S, ROWS, COLS, OUTPUTS, BYTES>
 {
     /// Puts the most recent sound model in force.
     #[inline(never)] // its stack is free again when the loop begins
     pub fn start(
-        app: &'a mut App<'m, P, F, ROWS, COLS, OUTPUTS, BYTES, E>,
+        app: &'a mut App<'m, P, F, ROWS, COLS, OUTPUTS, BYTES>,
         slots: &'a mut [S; 2],
     ) -> Self {
-        let chosen = App::<'m, P, F, ROWS, COLS, OUTPUTS, BYTES, E>::choose(slots);
+        let chosen = App::<'m, P, F, ROWS, COLS, OUTPUTS, BYTES>::choose(slots);
         let [first, second] = slots;
         let (active, spare) = match chosen {
             Some((1, _)) => (&*second, first),
             _ => (&*first, second),
         };
-        let sensor = chosen.and_then(|_| Tactile::load(blob_in_slot(active.bytes())).ok());
-        let identity = chosen.zip(sensor.as_ref()).map(|((slot, generation), sensor)| {
-            ModelIdentity { crc_32: sensor.model_crc(), slot: slot as u8, generation }
+        let decoder = chosen.and_then(|_| Decoder::load(blob_in_slot(active.bytes())).ok());
+        let identity = chosen.zip(decoder.as_ref()).map(|((slot, generation), decoder)| {
+            ModelIdentity { crc_32: decoder.model_crc(), slot: slot as u8, generation }
         });
         if let Some(model) = &identity {
             info!(
@@ -90,8 +80,8 @@ impl<
         } else {
             warning!("no model in either slot: readings only, until one is uploaded");
         }
-        app.core.decode_baseline(sensor.as_ref());
-        Self { app, model: InForce { sensor, identity }, spare }
+        app.core.decode_baseline(decoder.as_ref());
+        Self { app, model: InForce { decoder, identity }, spare }
     }
 
     /// One turn of the loop: at most one request is answered, and a frame is scanned if it is due.
@@ -103,7 +93,7 @@ impl<
         let core = &mut self.app.core;
         let now_us = core.line.platform().now_us();
         if let Some(missed) = core.clock.due(now_us, core.configuration.frame_period_us) {
-            core.sensor_answers = core.scan(missed, self.model.sensor.as_ref());
+            core.sensor_answers = core.scan(missed, self.model.decoder.as_ref());
         }
         if core.sensor_answers {
             core.line.platform().feed_watchdog();
@@ -124,11 +114,7 @@ impl<
 > Core<'_, P, F, ROWS, COLS, OUTPUTS, BYTES>
 {
     /// Scans a frame and reports on it; tells whether it has any reading at all.
-    fn scan<E: ExpKernel>(
-        &mut self,
-        missed: u32,
-        sensor: Option<&Tactile<'_, ROWS, COLS, OUTPUTS, E>>,
-    ) -> bool {
+    fn scan(&mut self, missed: u32, decoder: Option<&Decoder<'_, ROWS, COLS, OUTPUTS>>) -> bool {
         let start_us = self.line.platform().now_us();
         let report = self.source.scan(self.configuration.scan, self.frame);
         let scan_us = self.line.platform().now_us().wrapping_sub(start_us);
@@ -148,8 +134,8 @@ impl<
             let sent = self.line.send(UNASKED, &Report::Readings { frame, readings_ohm });
             self.count_lost(sent);
         }
-        let (flags, health) = self.decode(sensor);
-        self.feed_baseline(sensor);
+        let (flags, health) = self.decode(decoder);
+        self.feed_baseline(decoder);
         if !health.is_good() {
             let faulty = health.faulty_columns.map(u32::to_le_bytes);
             let report = HealthReport {
@@ -169,9 +155,9 @@ impl<
     }
 
     /// Decodes the frame, without what cannot be believed of it.
-    pub(super) fn decode<E: ExpKernel>(
+    pub(super) fn decode(
         &mut self,
-        sensor: Option<&Tactile<'_, ROWS, COLS, OUTPUTS, E>>,
+        decoder: Option<&Decoder<'_, ROWS, COLS, OUTPUTS>>,
     ) -> (u8, Health<ROWS>) {
         let start_us = self.line.platform().now_us();
         let limits = Limits {
@@ -180,12 +166,12 @@ impl<
         };
         let health = Health::of(self.frame, limits);
         let mut flags = if health.is_good() { 0 } else { EstimateReport::FAULTY_READING };
-        if let Some(sensor) = sensor {
+        if let Some(decoder) = decoder {
             let captured = self.capture.is_none() && self.baseline.frames() > 0;
             let gate = captured.then(|| {
                 Gate::new(self.baseline.mean(), self.rest, self.configuration.rest_tolerance)
             });
-            sensor.decode_gated_into(self.frame, gate.flatten(), self.estimate);
+            decoder.decode_gated_into(self.frame, gate.flatten(), self.estimate);
             if self.estimate.status.contains(&RowStatus::Overflow) {
                 flags |= EstimateReport::OVERFLOW;
             }
@@ -223,15 +209,12 @@ impl<
     }
 
     /// Takes the frame into the baseline that is being captured, and answers when it is whole.
-    fn feed_baseline<E: ExpKernel>(
-        &mut self,
-        sensor: Option<&Tactile<'_, ROWS, COLS, OUTPUTS, E>>,
-    ) {
+    fn feed_baseline(&mut self, decoder: Option<&Decoder<'_, ROWS, COLS, OUTPUTS>>) {
         let Some((number, left)) = self.capture else { return };
         self.baseline.add(self.frame);
         self.capture = left.checked_sub(1).filter(|left| *left > 0).map(|left| (number, left));
         if self.capture.is_none() {
-            self.decode_baseline(sensor);
+            self.decode_baseline(decoder);
             let mean = self.baseline.mean().row_column_resistance_ohm.as_flattened();
             let sent = self.line.send(number, &Report::Baseline { readings_ohm: Floats::of(mean) });
             self.count_lost(sent);
@@ -239,12 +222,9 @@ impl<
     }
 
     /// Keeps what the model in force answers to the baseline, for rows at rest.
-    pub(super) fn decode_baseline<E: ExpKernel>(
-        &mut self,
-        sensor: Option<&Tactile<'_, ROWS, COLS, OUTPUTS, E>>,
-    ) {
-        if let Some(sensor) = sensor {
-            sensor.decode_into(self.baseline.mean(), self.rest);
+    pub(super) fn decode_baseline(&mut self, decoder: Option<&Decoder<'_, ROWS, COLS, OUTPUTS>>) {
+        if let Some(decoder) = decoder {
+            decoder.decode_into(self.baseline.mean(), self.rest);
         }
     }
 

@@ -17,8 +17,9 @@ pub enum Received<'a> {
 #[derive(Debug, Clone)]
 pub struct Receiver<const BYTES: usize> {
     cobs: Decoder,
-    bytes: [u8; BYTES],
-    length: usize,
+    message: heapless::Vec<u8, BYTES>,
+    /// Whether the message has been passed on, so that the next one takes its place.
+    ended: bool,
     too_long: bool,
 }
 
@@ -33,34 +34,31 @@ impl<const BYTES: usize> Receiver<BYTES> {
     #[must_use]
     pub const fn new() -> Self {
         let cobs = Decoder::new();
-        Self { cobs, bytes: [0; BYTES], length: 0, too_long: false }
+        Self { cobs, message: heapless::Vec::new(), ended: false, too_long: false }
     }
 
     /// Takes one byte; at the end of a frame tells what became of it. Zeros between frames are
     /// nothing.
     pub fn push(&mut self, byte: u8) -> Option<Received<'_>> {
         let idle = self.cobs.is_idle();
+        if core::mem::take(&mut self.ended) {
+            self.message.clear();
+        }
         match self.cobs.push(byte) {
             Decoded::Nothing => None,
             Decoded::Byte(byte) => {
-                match self.bytes.get_mut(self.length) {
-                    Some(place) => {
-                        *place = byte;
-                        self.length += 1;
-                    }
-                    None => self.too_long = true,
-                }
+                self.too_long |= self.message.push(byte).is_err();
                 None
             }
             Decoded::BrokenEnd if idle => None,
             end => {
-                let length = core::mem::take(&mut self.length);
+                self.ended = true;
                 if core::mem::take(&mut self.too_long) {
                     Some(Received::TooLong)
                 } else if end == Decoded::BrokenEnd {
                     Some(Received::Broken)
                 } else {
-                    Some(Received::Frame(self.bytes.get(..length).unwrap_or_default()))
+                    Some(Received::Frame(&self.message))
                 }
             }
         }

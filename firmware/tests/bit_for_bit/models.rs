@@ -1,8 +1,7 @@
 //! The models in `testdata`: of the paper's shape, with parameters from a generator, in every format.
 
-use model_core::blob::{
-    Columns, Floats, Metadata, ModelParts, NoiseKind, encode, encoded_length_bound,
-};
+use model_core::AlignedBytes;
+use model_core::blob::{Metadata, ModelParts, ModelShape, encode_to_vec};
 use model_core::projection::Projection;
 use model_core::rbf::direct::Parameters;
 use model_core::rbf::fixed16::{
@@ -17,7 +16,7 @@ use super::checks::{ARRAY_ROWS, COLS, Numbers, OUTPUTS};
 const DECAY_PER_SPAN_SQUARED: f64 = core::f64::consts::LOG2_E / (2.0 * 0.8 * 0.8);
 
 /// The models by the name of their file.
-type Maker = fn() -> Vec<u8>;
+type Maker = fn() -> AlignedBytes;
 
 /// Every model by its file's name, and what makes it.
 pub const FILES: [(&str, Maker); 9] = [
@@ -32,14 +31,10 @@ pub const FILES: [(&str, Maker); 9] = [
     ("array-f32-direct.bin", || of_array(Format::F32Direct, 17, true)),
 ];
 
-/// The blob of the file of this name, at a multiple of four.
+/// The blob of the file of this name.
 pub fn with_blob<T>(name: &str, work: impl FnOnce(&[u8]) -> T) -> T {
     let (_, blob) = FILES.iter().find(|(file, _)| *file == name).unwrap();
-    let blob = blob();
-    let mut room = vec![0; blob.len() + 3];
-    let start = room.as_ptr().align_offset(4);
-    room[start..start + blob.len()].copy_from_slice(&blob);
-    work(&room[start..start + blob.len()])
+    work(&blob())
 }
 
 fn draw(numbers: &mut Numbers, count: usize, middle: f32, reach: f32) -> Vec<f32> {
@@ -47,7 +42,7 @@ fn draw(numbers: &mut Numbers, count: usize, middle: f32, reach: f32) -> Vec<f32
 }
 
 /// Two networks, which the rows use in turn, with widths of their own for every centre.
-fn hand_made() -> Vec<u8> {
+fn hand_made() -> AlignedBytes {
     let mut numbers = Numbers::new(0);
     let shape = row_shape(12);
     let mut words = || direct_words(&mut numbers, shape, true, 12);
@@ -62,7 +57,7 @@ fn row_shape(centres: usize) -> Shape {
 
 /// Networks with tail and without. K is a multiple of nothing that a kernel takes at once; in f32, the last
 /// row's is more than the assembly keeps activations of.
-fn of_format(format: Format) -> Vec<u8> {
+fn of_format(format: Format) -> AlignedBytes {
     let mut numbers = Numbers::new(5);
     let of_last_row = if format == Format::F32 { 131 } else { 33 };
     let kinds = [(18, true), (17, false), (of_last_row, true)];
@@ -76,7 +71,7 @@ fn of_format(format: Format) -> Vec<u8> {
 }
 
 /// One network for all rows behind a projection, whose features stray about as far as single readings do.
-fn of_array(format: Format, centres: usize, affine: bool) -> Vec<u8> {
+fn of_array(format: Format, centres: usize, affine: bool) -> AlignedBytes {
     let mut numbers = Numbers::new(6);
     let readings = ARRAY_ROWS * COLS;
     let parts = draw(&mut numbers, readings * COLS, 0.0, 0.35);
@@ -218,29 +213,12 @@ fn encoded(
     projection: Option<Projection<'_>>,
     networks: &[Network<'_>],
     row_network: &[u8],
-) -> Vec<u8> {
-    let rows = row_network.len();
-    let (inputs, outputs) =
-        (vec!["x"; rows * COLS].join("\n"), vec!["y"; rows * OUTPUTS].join("\n"));
-    let zeros = vec![0; rows * OUTPUTS * 4];
-    let metadata = Metadata {
-        name,
-        scene_digest: 0,
-        noise_kind: NoiseKind::None,
-        noise_level: 0.0,
-        seed: 0,
-        training_frames: 0,
-        thickness_mm: 5.0,
-        input_names: Columns(&inputs),
-        input_units: Columns(&inputs),
-        output_names: Columns(&outputs),
-        output_units: Columns(&outputs),
-        training_rmse: Floats(&zeros),
-        full_scale: Floats(&zeros),
-    };
+) -> AlignedBytes {
+    let shape = ModelShape { rows: row_network.len(), inputs: COLS, outputs: OUTPUTS };
+    let unnamed = Metadata::unnamed(shape);
+    // The files in testdata call the units as they call the columns.
+    let (input_units, output_units) = (unnamed.input_names, unnamed.output_names);
+    let metadata = Metadata { name, thickness_mm: 5.0, input_units, output_units, ..unnamed };
     let parts = ModelParts { projection, networks, row_network, metadata };
-    // Padding in a blob is counted from its start, which must lie at a multiple of four.
-    let mut room = vec![0; encoded_length_bound(&parts) + 3];
-    let start = room.as_ptr().align_offset(4);
-    encode(&parts, &mut room[start..]).unwrap().to_vec()
+    encode_to_vec(&parts).unwrap()
 }

@@ -12,12 +12,10 @@ use firmware::link::{cobs, packet};
 use firmware::platform::{Platform, Port};
 use firmware::readout::{FrameSource, ScanReport, ScanSettings};
 use firmware::store::{FlashError, Slot};
-use model_core::Frame;
-use model_core::blob::{
-    Columns, Floats, Metadata, ModelParts, NoiseKind, encode, encoded_length_bound,
-};
+use model_core::blob::{Metadata, ModelParts, ModelShape, encode_to_vec};
 use model_core::rbf::direct::{self, Parameters};
 use model_core::rbf::{Network, Shape};
+use model_core::{AlignedBytes, Frame};
 
 pub const ROWS: usize = 2;
 pub const COLS: usize = 3;
@@ -25,18 +23,8 @@ pub const OUTPUTS: usize = 2;
 pub const MESSAGE_BYTES: usize = 128;
 
 pub type TestApp = App<'static, Board, Source, ROWS, COLS, OUTPUTS, MESSAGE_BYTES>;
-pub type TestSession<'a> = Session<
-    'a,
-    'static,
-    Board,
-    Source,
-    MockSlot,
-    ROWS,
-    COLS,
-    OUTPUTS,
-    MESSAGE_BYTES,
-    model_core::exp::Polynomial,
->;
+pub type TestSession<'a> =
+    Session<'a, 'static, Board, Source, MockSlot, ROWS, COLS, OUTPUTS, MESSAGE_BYTES>;
 
 /// What a test sees of the board, whoever owns it.
 #[derive(Default)]
@@ -206,7 +194,7 @@ impl Slot for MockSlot {
 }
 
 /// A blob for this sensor, of `centres` centres and with numbers that depend on `seed`.
-pub fn blob(seed: usize, centres: usize) -> Vec<u8> {
+pub fn blob(seed: usize, centres: usize) -> AlignedBytes {
     let number = |i: usize| ((i * 37 + seed * 11) % 101) as f32 / 50.0 - 1.0;
     let list = |from: usize, count: usize| (from..from + count).map(number).collect::<Vec<_>>();
     let (centre, weights) = (list(1, centres * COLS), list(2, centres * OUTPUTS));
@@ -228,30 +216,13 @@ pub fn blob(seed: usize, centres: usize) -> Vec<u8> {
 }
 
 /// `network` for both rows, as a blob.
-pub fn blob_of(network: Network<'_>) -> Vec<u8> {
+pub fn blob_of(network: Network<'_>) -> AlignedBytes {
     let shape = network.shape();
-    let names = |count: usize| vec!["x"; ROWS * count].join("\n");
-    let (inputs, outputs) = (names(shape.inputs), names(shape.outputs));
-    let zeros = vec![0; ROWS * shape.outputs * 4];
-    let metadata = Metadata {
-        name: "hand-made",
-        scene_digest: 0,
-        noise_kind: NoiseKind::None,
-        noise_level: 0.0,
-        seed: 0,
-        training_frames: 0,
-        thickness_mm: 5.0,
-        input_names: Columns(&inputs),
-        input_units: Columns(&inputs),
-        output_names: Columns(&outputs),
-        output_units: Columns(&outputs),
-        training_rmse: Floats(&zeros),
-        full_scale: Floats(&zeros),
-    };
+    let shape = ModelShape { rows: ROWS, inputs: shape.inputs, outputs: shape.outputs };
+    let metadata = Metadata::unnamed(shape);
     let parts =
         ModelParts { projection: None, networks: &[network], row_network: &[0; ROWS], metadata };
-    let mut words = vec![0_u32; encoded_length_bound(&parts).div_ceil(4)];
-    encode(&parts, bytemuck::cast_slice_mut(&mut words)).unwrap().to_vec()
+    encode_to_vec(&parts).unwrap()
 }
 
 /// The CRC-32 that closes a blob.

@@ -148,7 +148,7 @@ fn infer_with<E: ExpKernel>(network: &Network<'_>, readings: &[f64], outputs: &m
     let readings: Vec<f32> = readings.iter().map(|reading| *reading as f32).collect();
     let mut scaled = vec![0.0; readings.len()];
     let mut inferred = vec![0.0; outputs.len()];
-    network.infer::<E>(&readings, &mut scaled, &mut inferred).expect("lengths of the network");
+    network.infer_with::<E>(&readings, &mut scaled, &mut inferred).expect("lengths of the network");
     let overflow = inferred.iter().any(|value| !value.is_finite());
     let values = inferred.into_iter().map(|value| if overflow { f32::NAN } else { value });
     outputs.iter_mut().zip(values).for_each(|(place, value)| *place = f64::from(value));

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use model_core::AlignedBytes;
 use model_core::blob::{
     self, Columns, DecodeError, Floats, Metadata, Model, ModelParts, NoiseKind,
 };
@@ -91,10 +92,7 @@ pub fn pack(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<Mod
             full_scale: Floats(&full_scale),
         },
     };
-    let mut buffer = AlignedBytes::zeroed(blob::encoded_length_bound(&parts));
-    let length = blob::encode(&parts, buffer.as_mut_slice()).map_err(Error::NotPacked)?.len();
-    buffer.length = length;
-    Ok(ModelBlob { bytes: buffer })
+    Ok(ModelBlob { bytes: blob::encode_to_vec(&parts).map_err(Error::NotPacked)? })
 }
 
 fn training_rmse(networks: &[Network<'_>], dataset: &Dataset) -> Vec<f64> {
@@ -130,14 +128,14 @@ impl ModelBlob {
     /// Why it is refused.
     pub fn of_bytes(bytes: &[u8]) -> std::result::Result<Self, DecodeError> {
         let bytes = AlignedBytes::copy_of(bytes);
-        Model::decode(bytes.as_slice()).map(drop)?;
+        Model::decode(&bytes).map(drop)?;
         Ok(Self { bytes })
     }
 
     /// The blob's bytes.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
-        self.bytes.as_slice()
+        &self.bytes
     }
 
     /// Parses the model, which looks at every byte: [prepare](Self::prepare) it once where it is used often.
@@ -147,32 +145,5 @@ impl ModelBlob {
     #[must_use]
     pub fn parse(&self) -> Model<'_> {
         Model::decode(self.bytes()).expect("checked when read")
-    }
-}
-
-/// Bytes that start at a multiple of four, as a blob must.
-#[derive(Debug)]
-struct AlignedBytes {
-    words: Vec<u32>,
-    length: usize,
-}
-
-impl AlignedBytes {
-    fn zeroed(length: usize) -> Self {
-        Self { words: vec![0; length.div_ceil(4)], length }
-    }
-
-    fn copy_of(bytes: &[u8]) -> Self {
-        let mut this = Self::zeroed(bytes.len());
-        this.as_mut_slice().copy_from_slice(bytes);
-        this
-    }
-
-    fn as_slice(&self) -> &[u8] {
-        &bytemuck::cast_slice(&self.words)[..self.length]
-    }
-
-    fn as_mut_slice(&mut self) -> &mut [u8] {
-        &mut bytemuck::cast_slice_mut(&mut self.words)[..self.length]
     }
 }

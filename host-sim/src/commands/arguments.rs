@@ -9,7 +9,7 @@ use taxel_simulate::sensor::Precision;
 
 /// Reads the name of a number format.
 pub fn format() -> impl TypedValueParser<Value = Format> {
-    let named = |format: Format| PossibleValue::new(format.name());
+    let named = |format: Format| PossibleValue::new(format.name()).help(format.description());
     one_of(Format::ALL.map(|format| (named(format), format)))
 }
 

@@ -288,7 +288,8 @@ fn check(experiment: &Experiment, plan: &Plan, costs: &Costs) -> std::result::Re
     }
     if !plan.gate_k.is_empty() {
         // Averaging only lowers the noise.
-        gate::check(world, &plan.gate_k).map_err(|bad| bad.named("gate"))?;
+        gate::check(world, &plan.gate_k)
+            .map_err(|bad| if bad.field == "k" { bad.named("gate") } else { bad })?;
     }
     Ok(())
 }

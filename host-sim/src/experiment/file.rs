@@ -59,7 +59,7 @@ pub(super) mod format {
 
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Format, D::Error> {
         let name = String::deserialize(deserializer)?;
-        Format::ALL.into_iter().find(|format| format.name() == name).ok_or_else(|| {
+        Format::from_name(&name).ok_or_else(|| {
             let known: Vec<String> =
                 Format::ALL.iter().map(|format| format!("`{}`", format.name())).collect();
             D::Error::custom(format!("unknown format `{name}`, expected {}", known.join(", ")))

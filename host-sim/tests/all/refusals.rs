@@ -33,7 +33,7 @@ fn bad_scenes() {
         (
             "resistance_ohm_per_mm = 100.0",
             "resistance_ohm_per_mm = 100.0\nupper_electrodes_mm = [[1.0, 2.0, 5.0]]",
-            &["sensor.upper_electrodes_mm lists 1 positions", "48"],
+            &["sensor.upper_electrodes_mm = a list of 1 positions", "48"],
         ),
         ("dent_depth_mm = [0.0, 1.0]", "dent_depth_mm = [0.0, 2.0]", &["2 mm along z", "20 %"]),
         ("dent_depth_mm = [0.0, 1.0]", "dent_depth_mm = [1.0, 0.0]", &["dent_depth_mm", "low ≤"]),
@@ -94,7 +94,11 @@ fn bad_csv_files() {
     folder.write("data.csv", "ch1,f_n\n1,2\n3,4\n");
     refused(&folder, &["train", "data.csv", "-o", "m.bin"], &["r*c*_ohm", "--inputs"]);
     let twice = ["train", "data.csv", "--inputs", "*", "--outputs", "f_n", "-o", "m.bin"];
-    refused(&folder, &twice, &["\"f_n\" is chosen by --inputs and by --outputs"]);
+    refused(
+        &folder,
+        &twice,
+        &["\"f_n\" is chosen as an input and as an output", "--inputs", "--outputs"],
+    );
 }
 
 #[test]

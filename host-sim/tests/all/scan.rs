@@ -12,8 +12,8 @@ use firmware::platform::Port;
 use firmware::readout::{
     FrameSource, Mcp3208s, ScanReport, ScanSettings, Scanner, ShiftRegister595,
 };
-use firmware::remote::Remote;
 use model_core::Frame;
+use remote_readout::Remote;
 use taxel_data::progress::Silent;
 use taxel_data::random::Stream;
 use taxel_learn::train::train;

@@ -64,7 +64,9 @@ fn columns_with_any_names_train_one_network() {
     let chosen = json(&chosen);
     assert_eq!(chosen["selection"]["scored"].as_array().unwrap().len(), 4);
     // The load is the sum of the two readings, so a linear decoder is exact.
-    assert!(chosen["selection"]["linear_rmse"][0].as_f64().unwrap() < 1e-6, "{chosen}");
+    let linear = &chosen["selection"]["baselines"][0];
+    assert_eq!(linear["decoder"], "linear");
+    assert!(linear["rmse"][0].as_f64().unwrap() < 1e-6, "{chosen}");
     assert_eq!(chosen["outputs"], serde_json::json!(["load_n"]));
     assert!(chosen["training_rmse"][0].as_f64().unwrap() < 0.01, "{chosen}");
     folder.succeed(&["decode", "m.bin", "d.csv", "-o", "e.csv"]);

@@ -1,46 +1,16 @@
 //! Reading a blob: check everything once, then borrow.
 
-use serde::{Deserialize, Serialize};
-
 use super::error::DecodeError;
 use super::format::{
     CRC_BYTES, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection, PREFIX_BYTES, Prefix,
     RbfHeader, ShapeField, TAG_METADATA, TAG_PROJECTION,
 };
-use super::{Metadata, ModelShape};
+use super::metadata::{Columns, Floats, Metadata, ModelShape};
 use crate::checksum::CRC_32;
 use crate::projection::{self, Projection};
-use crate::rbf::{Cut, Format, Network, NetworkError, Shape, direct, expanded, fixed16};
-
-/// Names or units of columns, one a line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Columns<'a>(pub &'a str);
-
-impl<'a> Columns<'a> {
-    /// The entries in their order.
-    pub fn iter(self) -> impl Iterator<Item = &'a str> {
-        // As a set of one: the search for a single `char` indexes a slice in a way that the optimiser
-        // cannot prove, and would be the only reachable panic of the device path.
-        self.0.split(['\n'])
-    }
-}
-
-/// Little-endian `f32` at any address.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Floats<'a>(#[serde(borrow)] pub &'a [u8]);
-
-impl<'a> Floats<'a> {
-    /// The bytes of `numbers`, where they lie.
-    #[must_use]
-    pub fn of(numbers: &'a [f32]) -> Self {
-        Self(bytemuck::cast_slice(numbers))
-    }
-
-    /// The numbers in their order.
-    pub fn iter(self) -> impl Iterator<Item = f32> + 'a {
-        self.0.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes))
-    }
-}
+use crate::rbf::{
+    Cut, Format, Layout, Network, NetworkError, Packed, Shape, direct, expanded, fixed16,
+};
 
 /// A sound blob, borrowed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -337,8 +307,8 @@ impl<'a> NetworkSection<'a> {
     pub fn network(&self, shape: ModelShape) -> Result<Network<'a>, NetworkError> {
         match self.format {
             Format::F32Direct => self.direct(shape).map(Network::F32Direct),
-            Format::F32 => self.expanded(shape).map(Network::F32),
-            Format::Fixed16 => self.fixed16(shape).map(Network::Fixed16),
+            Format::F32 => self.packed(shape).map(Network::F32),
+            Format::Fixed16 => self.packed(shape).map(Network::Fixed16),
         }
     }
 
@@ -354,18 +324,11 @@ impl<'a> NetworkSection<'a> {
         direct::Network::from_block(shape, self.common_width, self.affine, Cut(self.block))
     }
 
-    /// The network if it is one with expanded distances.
+    /// The network if its format is one of [`Layout`] `L`.
     #[inline]
-    pub fn expanded(&self, shape: ModelShape) -> Result<expanded::Network<'a>, NetworkError> {
+    pub fn packed<L: Layout>(&self, shape: ModelShape) -> Result<Packed<'a, L>, NetworkError> {
         let shape = network_shape(shape, self.centres);
-        expanded::Network::with_length_checked(shape, self.affine, self.block)
-    }
-
-    /// The network if it is one in fixed point.
-    #[inline]
-    pub fn fixed16(&self, shape: ModelShape) -> Result<fixed16::Network<'a>, NetworkError> {
-        let shape = network_shape(shape, self.centres);
-        fixed16::Network::with_length_checked(shape, self.affine, self.block)
+        Packed::with_length_checked(shape, self.affine, self.block)
     }
 }
 

@@ -2,12 +2,15 @@
 
 use serde::Serialize;
 
+#[cfg(feature = "std")]
+use super::aligned::AlignedBytes;
+use super::decode::Model;
 use super::error::EncodeError;
 use super::format::{
     CRC_BYTES, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection, Prefix, RbfHeader,
-    ShapeField, TAG_METADATA, TAG_PROJECTION, tag_of,
+    ShapeField, TAG_METADATA, TAG_PROJECTION,
 };
-use super::{Metadata, Model};
+use super::metadata::Metadata;
 use crate::checksum::CRC_32;
 use crate::projection::Projection;
 use crate::rbf::Network;
@@ -112,6 +115,18 @@ pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u
     Ok(blob)
 }
 
+/// Writes `parts` into memory of its own.
+///
+/// # Errors
+/// See [`EncodeError`]; [`EncodeError::BufferTooSmall`] never happens.
+#[cfg(feature = "std")]
+pub fn encode_to_vec(parts: &ModelParts<'_>) -> Result<AlignedBytes, EncodeError> {
+    let mut bytes = AlignedBytes::zeroed(encoded_length_bound(parts));
+    let length = encode(parts, &mut bytes)?.len();
+    bytes.truncate(length);
+    Ok(bytes)
+}
+
 fn fit<T: TryFrom<usize> + Into<usize> + Copy>(
     what: &'static str,
     value: usize,
@@ -144,7 +159,7 @@ impl Writer<'_> {
     fn put_network(&mut self, index: u8, network: &Network<'_>) -> Result<(), EncodeError> {
         let common_width = network.widths().count() == 1;
         let header = RbfHeader {
-            tag: tag_of(network.format()),
+            tag: network.format().tag(),
             index,
             centres: fit("number of centres", network.shape().centres, u16::MAX)?,
             common_width,

@@ -1,6 +1,6 @@
 //! Why a blob is refused, one variant a cause.
 
-use super::ModelShape;
+use super::metadata::ModelShape;
 use crate::rbf::NetworkError;
 
 /// Why bytes are not a model. Nothing is loaded then: the model before stays in force.

@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::DecodeError;
+use super::error::DecodeError;
+use super::metadata::NoiseKind;
 use crate::rbf::Format;
 
 /// The first four bytes of every blob.
@@ -17,9 +18,9 @@ pub(super) const CRC_BYTES: usize = 4;
 /// Floats are borrowed in place, so their section starts at a multiple of this.
 pub(super) const FLOAT_ALIGNMENT: usize = 4;
 
-/// Section tags. Each kind of section has its own; an unknown one is refused.
+/// Section tags. Each kind of section has its own, and those of networks [one a format](Format::tag); an unknown
+/// one is refused.
 pub(super) const TAG_METADATA: u8 = 0;
-pub(super) const TAG_RBF_F32_DIRECT: u8 = 1;
 pub(super) const TAG_PROJECTION: u8 = 4;
 
 /// Bytes 0..9, at fixed places, so that a blob can be measured before it is trusted.
@@ -40,17 +41,6 @@ pub(super) struct ShapeField<'a> {
     /// Which network serves each row: `rows` bytes.
     #[serde(borrow)]
     pub row_network: &'a [u8],
-}
-
-/// How the noise of a training set was defined.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum NoiseKind {
-    /// None was added (measured data, or an ideal sensor).
-    None,
-    /// R·(1 + p·n).
-    Relative,
-    /// R + p·(channel maximum − minimum)·n.
-    Span,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -89,11 +79,11 @@ pub(super) struct RbfHeader {
 impl RbfHeader {
     /// What the tag says of the network's format. Only [`Format::F32Direct`] may have a width a centre.
     pub fn format(&self) -> Result<Format, DecodeError> {
-        let format = Format::ALL.into_iter().find(|format| tag_of(*format) == self.tag);
-        match format {
-            None => {
-                Err(DecodeError::SectionOrder { expected: TAG_RBF_F32_DIRECT, found: self.tag })
-            }
+        match Format::from_tag(self.tag) {
+            None => Err(DecodeError::SectionOrder {
+                expected: Format::F32Direct.tag(),
+                found: self.tag,
+            }),
             Some(Format::F32 | Format::Fixed16) if !self.common_width => {
                 Err(DecodeError::Malformed { section: "network section" })
             }
@@ -102,11 +92,14 @@ impl RbfHeader {
     }
 }
 
-/// The section tag of a network of this format.
-pub(super) const fn tag_of(format: Format) -> u8 {
-    match format {
-        Format::F32Direct => TAG_RBF_F32_DIRECT,
-        Format::F32 => 2,
-        Format::Fixed16 => 3,
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_format_of_networks_has_the_tag_of_another_section() {
+        for tag in [TAG_METADATA, TAG_PROJECTION] {
+            assert_eq!(Format::from_tag(tag), None);
+        }
     }
 }

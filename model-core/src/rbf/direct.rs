@@ -3,10 +3,10 @@
 //! F(x) = Σ_k ω_k·exp(−d_k·‖x − c_k‖²) + b (+ A·x), with d = 1/(2σ²) and x the readings scaled to
 //! [0, 1]. ‖x − c‖² accumulates in four interleaved partial sums, added pairwise.
 
-use super::{
-    Cut, NetworkError, Shape, USUAL_INPUTS, USUAL_OUTPUTS, accumulate, check_finite, check_length,
-    check_spans,
+use super::parameters::{
+    Cut, NetworkError, Shape, accumulate, check_finite, check_length, check_spans,
 };
+use crate::cortex_m4::{INPUTS, OUTPUTS};
 use crate::scale::scale;
 
 /// The parameters of one network, borrowed from where they lie.
@@ -203,7 +203,7 @@ impl<'a> Network<'a> {
         expect(clippy::inline_always, reason = "so that the compiler knows the exponential")
     )]
     pub(crate) fn infer_scaled(&self, scaled: &[f32], output: &mut [f32], exp: fn(f32) -> f32) {
-        let usual: (Result<&[f32; USUAL_INPUTS], _>, Result<&mut [f32; USUAL_OUTPUTS], _>) =
+        let usual: (Result<&[f32; INPUTS], _>, Result<&mut [f32; OUTPUTS], _>) =
             (scaled.try_into(), (&mut *output).try_into());
         if let (Ok(scaled), Ok(output)) = usual {
             self.add_up(scaled, output, exp);

@@ -8,14 +8,17 @@
 //!
 //! Inputs are in [`UNITS`]. b + a·x − g‖x‖² adds up in four interleaved partial sums, the first opened by b,
 //! the second by −g‖x‖². Centres are stored in fours; the last may be fill.
+#![cfg_attr(
+    cortex_m4f,
+    expect(unsafe_code, reason = "calls to assembly, whose conditions are checked before")
+)]
 
-use super::{
-    Assembled, Cut, NetworkError, Shape, accumulate, check_finite, check_length, check_spans,
+use super::packed::{self, Layout};
+use super::parameters::{
+    Cut, NetworkError, Shape, accumulate, check_finite, check_spans, range_about, scale_about,
 };
 #[cfg(cortex_m4f)]
-use super::{Finite, USUAL_OUTPUTS};
-#[cfg(cortex_m4f)]
-use crate::cortex_m4::{self, Inputs};
+use crate::cortex_m4::{self, Finite, Inputs, OUTPUTS};
 use crate::exp::exp2;
 use crate::scale::{HALF_RANGE, UNITS, clamp_units};
 
@@ -56,46 +59,18 @@ impl Parameters<'_> {
     }
 }
 
-/// A network: a block of words, borrowed from where it lies, that has been checked against its shape.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[repr(C)] // the shape first, so that it is at the same place in a network of any format
-pub struct Network<'a> {
-    shape: Shape,
-    affine: bool,
-    block: &'a [u32],
-}
+/// The layout of blocks of f32 with expanded distances.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Expanded;
 
-impl<'a> Network<'a> {
-    /// Checks the length and the values of a `block` ([`Parameters::words`]), and that no reading can drive
-    /// an exponent out of [`LOWEST_EXPONENT`] to [`HIGHEST_EXPONENT`] or an output out of f32.
-    ///
-    /// # Errors
-    /// Every variant of [`NetworkError`] but `TooManyInputs`; the length is checked before values.
-    pub fn try_new(shape: Shape, affine: bool, block: &'a [u32]) -> Result<Self, NetworkError> {
-        let network = Self::with_length_checked(shape, affine, block)?;
-        network.check_values()?;
-        Ok(network)
-    }
+/// A network in this format. Its block is what [`Parameters::words`] lists.
+pub type Network<'a> = packed::Network<'a, Expanded>;
 
-    /// As [`try_new`](Self::try_new), without the pass over all values: for a block that passed it before.
-    #[inline(always)]
-    #[expect(clippy::inline_always, reason = "a network is large to hand over")]
-    pub(crate) fn with_length_checked(
-        shape: Shape,
-        affine: bool,
-        block: &'a [u32],
-    ) -> Result<Self, NetworkError> {
-        if shape.inputs == 0 || shape.centres == 0 || shape.outputs == 0 {
-            return Err(NetworkError::Empty);
-        }
-        check_length("block", block, Self::block_words(shape, affine))?;
-        Ok(Self { shape, affine, block })
-    }
+impl Layout for Expanded {
+    type Parameters<'a> = Parameters<'a>;
 
-    /// Words of the block of a network of this shape.
-    #[must_use]
     #[inline]
-    pub fn block_words(shape: Shape, affine: bool) -> usize {
+    fn block_words(shape: Shape, affine: bool) -> usize {
         let Shape { inputs, centres, outputs } = shape;
         let stored = centres.next_multiple_of(CENTRES_AT_ONCE);
         let affine = if affine { inputs.saturating_mul(outputs) } else { 0 };
@@ -103,50 +78,8 @@ impl<'a> Network<'a> {
         [inputs, inputs, 1, outputs, affine, centres].into_iter().fold(0, usize::saturating_add)
     }
 
-    /// The network's sizes.
-    #[must_use]
-    pub fn shape(&self) -> Shape {
-        self.shape
-    }
-
-    /// Whether there is an affine tail.
-    #[must_use]
-    pub fn has_affine_tail(&self) -> bool {
-        self.affine
-    }
-
-    /// All of the network's words.
-    #[must_use]
-    pub fn block(&self) -> &'a [u32] {
-        self.block
-    }
-
-    /// The network's parameters.
-    #[must_use]
-    pub fn parameters(&self) -> Parameters<'a> {
-        let Shape { inputs, centres, outputs } = self.shape;
-        let stored = centres.next_multiple_of(CENTRES_AT_ONCE);
-        let mut cut = Cut(self.block);
-        Parameters {
-            input_midpoint: cut.floats(inputs),
-            input_per_unit: cut.floats(inputs),
-            decay: cut.floats(1).first().copied().unwrap_or(f32::NAN),
-            bias: cut.floats(outputs),
-            affine: cut.floats(if self.affine { inputs * outputs } else { 0 }),
-            exponents: cut.floats(stored * (1 + inputs)),
-            output_weights: cut.floats(stored * outputs),
-        }
-    }
-
-    /// Width σ of all centres on inputs scaled to [0, 1].
-    #[must_use]
-    pub fn width(&self) -> f32 {
-        let unit = HALF_RANGE / UNITS;
-        libm::sqrtf(core::f32::consts::LOG2_E / (2.0 * self.parameters().decay)) * unit
-    }
-
-    pub(crate) fn check_values(&self) -> Result<(), NetworkError> {
-        let p = &self.parameters();
+    fn check_values(network: &Network<'_>) -> Result<(), NetworkError> {
+        let p = &network.parameters();
         if !(p.decay.is_finite() && p.decay > 0.0) {
             return Err(NetworkError::InvalidWidth { centre: 0 });
         }
@@ -160,7 +93,7 @@ impl<'a> Network<'a> {
         ])?;
         check_spans(p.input_per_unit)?;
         for (centre, row) in
-            p.exponents.chunks_exact(self.shape.inputs.saturating_add(1)).enumerate()
+            p.exponents.chunks_exact(network.shape().inputs.saturating_add(1)).enumerate()
         {
             let Some((&b, a)) = row.split_first() else { continue };
             // −g‖x‖² + a·x + b is lowest in a corner of the clamp's box and highest at x = a/(2g).
@@ -182,48 +115,44 @@ impl<'a> Network<'a> {
         Ok(())
     }
 
-    pub(super) fn training_range(&self, input: usize) -> [f32; 2] {
-        let p = self.parameters();
-        super::range_about(p.input_midpoint.get(input), p.input_per_unit.get(input))
+    fn parameters<'a>(network: &Network<'a>) -> Parameters<'a> {
+        let Shape { inputs, centres, outputs } = network.shape();
+        let stored = centres.next_multiple_of(CENTRES_AT_ONCE);
+        let mut cut = Cut(network.block());
+        Parameters {
+            input_midpoint: cut.floats(inputs),
+            input_per_unit: cut.floats(inputs),
+            decay: cut.floats(1).first().copied().unwrap_or(f32::NAN),
+            bias: cut.floats(outputs),
+            affine: cut.floats(if network.has_affine_tail() { inputs * outputs } else { 0 }),
+            exponents: cut.floats(stored * (1 + inputs)),
+            output_weights: cut.floats(stored * outputs),
+        }
     }
 
-    /// As [`rbf::Network::infer_scaled`](super::Network::infer_scaled), by the compiled twin of the
-    /// assembly: the same bits; public to measure what the assembly saves. `scaled` and `output` must have
-    /// the sizes of the shape: what is beyond is left alone.
-    #[inline(never)]
-    pub fn infer_scaled_portably(&self, scaled: &mut [f32], output: &mut [f32]) {
-        self.infer_scaled_by_twin(scaled, output);
-    }
-}
-
-impl Assembled for Network<'_> {
-    fn scale(&self, reading: &[f32], scaled: &mut [f32]) {
-        let p = self.parameters();
-        super::scale_about(p.input_midpoint, p.input_per_unit, reading, scaled);
+    fn scale(network: &Network<'_>, reading: &[f32], scaled: &mut [f32]) {
+        let p = network.parameters();
+        scale_about(p.input_midpoint, p.input_per_unit, reading, scaled);
     }
 
-    #[cfg(cortex_m4f)]
-    #[inline(always)]
-    #[expect(clippy::inline_always, reason = "a call")]
-    fn kernel(&self, inputs: Inputs<'_>, output: &mut [f32; USUAL_OUTPUTS]) -> Finite {
-        cortex_m4::expanded(self, inputs, output)
+    fn training_range(network: &Network<'_>, input: usize) -> [f32; 2] {
+        let p = network.parameters();
+        range_about(p.input_midpoint.get(input), p.input_per_unit.get(input))
     }
 
-    #[cfg(cortex_m4f)]
-    #[inline(always)]
-    #[expect(clippy::inline_always, reason = "a call")]
-    fn array_kernel(&self, inputs: Inputs<'_>, groups: &mut [[f32; USUAL_OUTPUTS]]) -> Finite {
-        cortex_m4::expanded_array(self, inputs, groups)
+    fn width(parameters: &Parameters<'_>) -> f32 {
+        let unit = HALF_RANGE / UNITS;
+        libm::sqrtf(core::f32::consts::LOG2_E / (2.0 * parameters.decay)) * unit
     }
 
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "callers rely on it for constant lengths")]
-    fn infer_scaled_in_rust(&self, scaled: &mut [f32], output: &mut [f32]) {
+    fn infer_scaled_in_rust(network: &Network<'_>, scaled: &mut [f32], output: &mut [f32]) {
         scaled.iter_mut().for_each(|x| *x = clamp_units(*x));
         output.fill(0.0);
         // `max(1)`: a checked network has no empty dimension; this tells the compiler.
         let (inputs, outputs) = (scaled.len().max(1), output.len().max(1));
-        let p = self.parameters();
+        let p = network.parameters();
         for (&x, row) in scaled.iter().zip(p.affine.chunks_exact(outputs)) {
             accumulate(output, x, row);
         }
@@ -238,6 +167,43 @@ impl Assembled for Network<'_> {
         for (y, &b) in output.iter_mut().zip(p.bias) {
             *y += b;
         }
+    }
+
+    #[cfg(cortex_m4f)]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "a call")]
+    unsafe fn routine(
+        network: &Network<'_>,
+        inputs: Inputs<'_>,
+        output: &mut [f32; OUTPUTS],
+    ) -> Finite {
+        let (centres, affine) = (network.shape().centres, network.has_affine_tail());
+        // SAFETY: the caller has compared the shape with the routine's. When the network was made, its block was
+        // found to be as long as its shape asks for, and no dimension to be 0. A test compares the lengths.
+        unsafe { cortex_m4::expanded(inputs, network.block(), centres, affine, output) }
+    }
+
+    #[cfg(cortex_m4f)]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "a call")]
+    unsafe fn array_routine(
+        network: &Network<'_>,
+        inputs: Inputs<'_>,
+        groups: &mut [[f32; OUTPUTS]],
+    ) -> Finite {
+        let (centres, affine) = (network.shape().centres, network.has_affine_tail());
+        // SAFETY: as in `routine`.
+        unsafe { cortex_m4::expanded_array(inputs, network.block(), centres, affine, groups) }
+    }
+}
+
+impl Network<'_> {
+    /// As [`rbf::Network::infer_scaled`](super::Network::infer_scaled), by the compiled twin of the
+    /// assembly: the same bits; public to measure what the assembly saves. `scaled` and `output` must have
+    /// the sizes of the shape: what is beyond is left alone.
+    #[inline(never)]
+    pub fn infer_scaled_portably(&self, scaled: &mut [f32], output: &mut [f32]) {
+        self.infer_scaled_by_twin(scaled, output);
     }
 }
 

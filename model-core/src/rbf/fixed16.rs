@@ -12,14 +12,19 @@
 //!
 //! The bias opens the sums, and one multiplication by the scale closes them: all before it is in integers, so
 //! that any order gives the same bits.
+#![cfg_attr(
+    cortex_m4f,
+    expect(unsafe_code, reason = "calls to assembly, whose conditions are checked before")
+)]
 
 use core::f32::consts::LOG2_E;
 
-use super::{Assembled, Cut, NetworkError, Shape, check_finite, check_length, check_spans};
+use super::packed::{self, Layout};
+use super::parameters::{
+    Cut, NetworkError, Shape, check_finite, check_spans, range_about, scale_about,
+};
 #[cfg(cortex_m4f)]
-use super::{Finite, USUAL_OUTPUTS};
-#[cfg(cortex_m4f)]
-use crate::cortex_m4::{self, Inputs};
+use crate::cortex_m4::{self, Finite, Inputs, OUTPUTS};
 use crate::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP, clamp_steps};
 
 /// Centres are stored in multiples of this.
@@ -73,50 +78,18 @@ impl Parameters<'_> {
     }
 }
 
-/// A network: a block of words, borrowed from where it lies, that has been checked against its shape.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[repr(C)] // the shape first, so that it is at the same place in a network of any format
-pub struct Network<'a> {
-    shape: Shape,
-    affine: bool,
-    block: &'a [u32],
-}
+/// The layout of blocks of 16-bit fixed point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Fixed16;
 
-impl<'a> Network<'a> {
-    /// Checks the length and the values of a `block` ([`Parameters::words`]), and that no reading can drive
-    /// an exponent below 0 or beyond 32 bits. That the sums fit is proved where a network is quantised; a
-    /// device cannot.
-    ///
-    /// # Errors
-    /// Every variant of [`NetworkError`]; lengths are checked before values.
-    pub fn try_new(shape: Shape, affine: bool, block: &'a [u32]) -> Result<Self, NetworkError> {
-        let network = Self::with_length_checked(shape, affine, block)?;
-        network.check_values()?;
-        Ok(network)
-    }
+/// A network in this format. Its block is what [`Parameters::words`] lists.
+pub type Network<'a> = packed::Network<'a, Fixed16>;
 
-    /// As [`try_new`](Self::try_new), without the pass over all values: for a block that passed it before.
-    #[inline(always)]
-    #[expect(clippy::inline_always, reason = "a network is large to hand over")]
-    pub(crate) fn with_length_checked(
-        shape: Shape,
-        affine: bool,
-        block: &'a [u32],
-    ) -> Result<Self, NetworkError> {
-        if shape.inputs == 0 || shape.centres == 0 || shape.outputs == 0 {
-            return Err(NetworkError::Empty);
-        }
-        if shape.inputs > MOST_INPUTS {
-            return Err(NetworkError::TooManyInputs { most: MOST_INPUTS, found: shape.inputs });
-        }
-        check_length("block", block, Self::block_words(shape, affine))?;
-        Ok(Self { shape, affine, block })
-    }
+impl Layout for Fixed16 {
+    type Parameters<'a> = Parameters<'a>;
 
-    /// Words of the block of a network of this shape.
-    #[must_use]
     #[inline]
-    pub fn block_words(shape: Shape, affine: bool) -> usize {
+    fn block_words(shape: Shape, affine: bool) -> usize {
         let Shape { inputs, centres, outputs } = shape;
         let pairs = inputs.div_ceil(2);
         let affine = if affine { pairs.saturating_mul(outputs) } else { 0 };
@@ -126,58 +99,17 @@ impl<'a> Network<'a> {
             .fold(0, usize::saturating_add)
     }
 
-    /// The network's sizes.
-    #[must_use]
-    pub fn shape(&self) -> Shape {
-        self.shape
-    }
-
-    /// Whether there is an affine tail.
-    #[must_use]
-    pub fn has_affine_tail(&self) -> bool {
-        self.affine
-    }
-
-    /// All of the network's words.
-    #[must_use]
-    pub fn block(&self) -> &'a [u32] {
-        self.block
-    }
-
-    /// The network's parameters.
-    #[must_use]
-    pub fn parameters(&self) -> Parameters<'a> {
-        let Shape { inputs, centres, outputs } = self.shape;
-        let mut cut = Cut(self.block);
-        Parameters {
-            input_midpoint: cut.floats(inputs),
-            input_per_unit: cut.floats(inputs),
-            decay: cut.words(1).first().copied().unwrap_or_default(),
-            bias: bytemuck::cast_slice(cut.words(outputs)),
-            output_scale: cut.floats(outputs),
-            affine: cut.words(if self.affine { inputs.div_ceil(2) * outputs } else { 0 }),
-            centres: cut.words(centres.div_ceil(CENTRES_AT_ONCE) * words_at_once(self.shape)),
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "one comparison")]
+    fn check_shape(shape: Shape) -> Result<(), NetworkError> {
+        if shape.inputs > MOST_INPUTS {
+            return Err(NetworkError::TooManyInputs { most: MOST_INPUTS, found: shape.inputs });
         }
+        Ok(())
     }
 
-    /// Sixteen centres at a time: the lines of their exponents, and their weights.
-    fn centres(&self) -> impl Iterator<Item = (&'a [u32], &'a [u32])> {
-        let exponents = CENTRES_AT_ONCE * (1 + self.shape.inputs.div_ceil(2));
-        let at_once = self.parameters().centres.chunks_exact(words_at_once(self.shape).max(1));
-        at_once.map(move |words| words.split_at_checked(exponents).unwrap_or_default())
-    }
-
-    /// Width σ of all centres on inputs scaled to [0, 1].
-    #[must_use]
-    pub fn width(&self) -> f32 {
-        // 2^60 is where the decay's last place stands.
-        let per_step_squared = self.parameters().decay as f32 / 1_152_921_504_606_846_976.0;
-        let step = HALF_RANGE / UNITS * UNITS_PER_STEP;
-        libm::sqrtf(LOG2_E / (2.0 * per_step_squared)) * step
-    }
-
-    pub(crate) fn check_values(&self) -> Result<(), NetworkError> {
-        let p = self.parameters();
+    fn check_values(network: &Network<'_>) -> Result<(), NetworkError> {
+        let p = network.parameters();
         let decay = u64::from(p.decay);
         if decay == 0 {
             return Err(NetworkError::InvalidWidth { centre: 0 });
@@ -191,9 +123,9 @@ impl<'a> Network<'a> {
         if p.output_scale.iter().any(|scale| !(scale * UNITS).is_finite()) {
             return Err(NetworkError::NotFinite { what: "the largest output" });
         }
-        let most_shared = (((self.shape.inputs as u64) << 26) * decay) >> 30;
-        let line = 1 + self.shape.inputs.div_ceil(2);
-        let lines = self.centres().flat_map(|(exponents, _)| exponents.chunks_exact(line));
+        let most_shared = (((network.shape().inputs as u64) << 26) * decay) >> 30;
+        let line = 1 + network.shape().inputs.div_ceil(2);
+        let lines = network.centres().flat_map(|(exponents, _)| exponents.chunks_exact(line));
         for (centre, line) in lines.enumerate() {
             let Some((&b, a)) = line.split_first() else { continue };
             let b = u64::from(b);
@@ -212,9 +144,99 @@ impl<'a> Network<'a> {
         Ok(())
     }
 
-    pub(super) fn training_range(&self, input: usize) -> [f32; 2] {
-        let p = self.parameters();
-        super::range_about(p.input_midpoint.get(input), p.input_per_unit.get(input))
+    fn parameters<'a>(network: &Network<'a>) -> Parameters<'a> {
+        let Shape { inputs, centres, outputs } = network.shape();
+        let mut cut = Cut(network.block());
+        Parameters {
+            input_midpoint: cut.floats(inputs),
+            input_per_unit: cut.floats(inputs),
+            decay: cut.words(1).first().copied().unwrap_or_default(),
+            bias: bytemuck::cast_slice(cut.words(outputs)),
+            output_scale: cut.floats(outputs),
+            affine: cut.words(if network.has_affine_tail() {
+                inputs.div_ceil(2) * outputs
+            } else {
+                0
+            }),
+            centres: cut.words(centres.div_ceil(CENTRES_AT_ONCE) * words_at_once(network.shape())),
+        }
+    }
+
+    fn scale(network: &Network<'_>, reading: &[f32], scaled: &mut [f32]) {
+        let p = network.parameters();
+        scale_about(p.input_midpoint, p.input_per_unit, reading, scaled);
+    }
+
+    fn training_range(network: &Network<'_>, input: usize) -> [f32; 2] {
+        let p = network.parameters();
+        range_about(p.input_midpoint.get(input), p.input_per_unit.get(input))
+    }
+
+    fn width(parameters: &Parameters<'_>) -> f32 {
+        // 2^60 is where the decay's last place stands.
+        let per_step_squared = parameters.decay as f32 / 1_152_921_504_606_846_976.0;
+        let step = HALF_RANGE / UNITS * UNITS_PER_STEP;
+        libm::sqrtf(LOG2_E / (2.0 * per_step_squared)) * step
+    }
+
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "callers rely on it for constant lengths")]
+    fn infer_scaled_in_rust(network: &Network<'_>, scaled: &mut [f32], output: &mut [f32]) {
+        let p = network.parameters();
+        // The buffers of the caller serve for the integers: no other is of the right length.
+        let x = bytemuck::cast_slice_mut::<f32, i32>(scaled);
+        x.iter_mut().for_each(|x| *x = clamp_steps(f32::from_bits(*x as u32)));
+        let sums = bytemuck::cast_slice_mut::<f32, i32>(output);
+        sums.iter_mut().zip(p.bias).for_each(|(sum, &bias)| *sum = bias);
+        let (pairs, shared) = (x.len().div_ceil(2).max(1), shared_term(p.decay, x));
+        for (sum, row) in sums.iter_mut().zip(p.affine.chunks_exact(pairs)) {
+            *sum = add_products(*sum, row, x);
+        }
+        for (exponents, weights) in network.centres() {
+            let activations = activations_of(exponents, shared, x);
+            for (sum, row) in sums.iter_mut().zip(weights.chunks_exact(CENTRES_AT_ONCE / 2)) {
+                *sum = add_products(*sum, row, &activations);
+            }
+        }
+        for (y, scale) in output.iter_mut().zip(p.output_scale) {
+            *y = y.to_bits().cast_signed() as f32 * scale;
+        }
+    }
+
+    #[cfg(cortex_m4f)]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "a call")]
+    unsafe fn routine(
+        network: &Network<'_>,
+        inputs: Inputs<'_>,
+        output: &mut [f32; OUTPUTS],
+    ) -> Finite {
+        let (centres, affine) = (network.shape().centres, network.has_affine_tail());
+        // SAFETY: the caller has compared the shape with the routine's. When the network was made, its block was
+        // found to be as long as its shape asks for, and no dimension to be 0. A test compares the lengths.
+        unsafe { cortex_m4::fixed16(inputs, network.block(), centres, affine, output) }
+    }
+
+    #[cfg(cortex_m4f)]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "a call")]
+    unsafe fn array_routine(
+        network: &Network<'_>,
+        inputs: Inputs<'_>,
+        groups: &mut [[f32; OUTPUTS]],
+    ) -> Finite {
+        let (centres, affine) = (network.shape().centres, network.has_affine_tail());
+        // SAFETY: as in `routine`.
+        unsafe { cortex_m4::fixed16_array(inputs, network.block(), centres, affine, groups) }
+    }
+}
+
+impl<'a> Network<'a> {
+    /// Sixteen centres at a time: the lines of their exponents, and their weights.
+    fn centres(&self) -> impl Iterator<Item = (&'a [u32], &'a [u32])> {
+        let exponents = CENTRES_AT_ONCE * (1 + self.shape().inputs.div_ceil(2));
+        let at_once = self.parameters().centres.chunks_exact(words_at_once(self.shape()).max(1));
+        at_once.map(move |words| words.split_at_checked(exponents).unwrap_or_default())
     }
 
     /// As [`rbf::Network::infer_scaled`](super::Network::infer_scaled), by the compiled twin of the
@@ -230,51 +252,6 @@ impl<'a> Network<'a> {
     pub fn activations(&self, x: &[i32]) -> impl Iterator<Item = [i32; CENTRES_AT_ONCE]> {
         let shared = shared_term(self.parameters().decay, x);
         self.centres().map(move |(exponents, _)| activations_of(exponents, shared, x))
-    }
-}
-
-impl Assembled for Network<'_> {
-    fn scale(&self, reading: &[f32], scaled: &mut [f32]) {
-        let p = self.parameters();
-        super::scale_about(p.input_midpoint, p.input_per_unit, reading, scaled);
-    }
-
-    #[cfg(cortex_m4f)]
-    #[inline(always)]
-    #[expect(clippy::inline_always, reason = "a call")]
-    fn kernel(&self, inputs: Inputs<'_>, output: &mut [f32; USUAL_OUTPUTS]) -> Finite {
-        cortex_m4::fixed16(self, inputs, output)
-    }
-
-    #[cfg(cortex_m4f)]
-    #[inline(always)]
-    #[expect(clippy::inline_always, reason = "a call")]
-    fn array_kernel(&self, inputs: Inputs<'_>, groups: &mut [[f32; USUAL_OUTPUTS]]) -> Finite {
-        cortex_m4::fixed16_array(self, inputs, groups)
-    }
-
-    #[inline(always)]
-    #[expect(clippy::inline_always, reason = "callers rely on it for constant lengths")]
-    fn infer_scaled_in_rust(&self, scaled: &mut [f32], output: &mut [f32]) {
-        let p = self.parameters();
-        // The buffers of the caller serve for the integers: no other is of the right length.
-        let x = bytemuck::cast_slice_mut::<f32, i32>(scaled);
-        x.iter_mut().for_each(|x| *x = clamp_steps(f32::from_bits(*x as u32)));
-        let sums = bytemuck::cast_slice_mut::<f32, i32>(output);
-        sums.iter_mut().zip(p.bias).for_each(|(sum, &bias)| *sum = bias);
-        let (pairs, shared) = (x.len().div_ceil(2).max(1), shared_term(p.decay, x));
-        for (sum, row) in sums.iter_mut().zip(p.affine.chunks_exact(pairs)) {
-            *sum = add_products(*sum, row, x);
-        }
-        for (exponents, weights) in self.centres() {
-            let activations = activations_of(exponents, shared, x);
-            for (sum, row) in sums.iter_mut().zip(weights.chunks_exact(CENTRES_AT_ONCE / 2)) {
-                *sum = add_products(*sum, row, &activations);
-            }
-        }
-        for (y, scale) in output.iter_mut().zip(p.output_scale) {
-            *y = y.to_bits().cast_signed() as f32 * scale;
-        }
     }
 }
 

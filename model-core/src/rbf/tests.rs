@@ -1,3 +1,4 @@
+mod assembly;
 mod formats;
 
 use super::direct::Parameters;
@@ -49,7 +50,7 @@ impl Sample {
 
 fn infer<E: ExpKernel>(network: &Network<'_>, reading: &[f32; 5]) -> [f32; 2] {
     let mut output = [0.0; 2];
-    network.infer::<E>(reading, &mut [0.0; 5], &mut output).unwrap();
+    network.infer_with::<E>(reading, &mut [0.0; 5], &mut output).unwrap();
     output
 }
 
@@ -115,11 +116,11 @@ fn lengths_that_do_not_fit_the_shape_are_named() {
     let sample = Sample::new();
     let network = Network::from(direct::Network::try_new(SHAPE, sample.parameters()).unwrap());
     assert_eq!(
-        network.infer::<Libm>(&[0.0; 4], &mut [0.0; 4], &mut [0.0; 2]),
+        network.infer(&[0.0; 4], &mut [0.0; 4], &mut [0.0; 2]),
         Err(NetworkError::Length { what: "reading", expected: 5, found: 4 })
     );
     let mut output = [7.0; 3];
-    assert!(network.infer::<Libm>(&[0.0; 5], &mut [0.0; 5], &mut output).is_err());
+    assert!(network.infer(&[0.0; 5], &mut [0.0; 5], &mut output).is_err());
     assert_eq!(output, [7.0; 3]);
 }
 
@@ -150,10 +151,10 @@ fn inference_from_scaled_inputs_is_the_rest_of_inference_bit_for_bit() {
     let reading = [50.0, 52.5, 55.0, 57.5, 60.0];
     let (mut scaled, mut output) = ([0.0; 5], [0.0; 2]);
     network.scale(&reading, &mut scaled).unwrap();
-    network.infer_scaled::<Polynomial>(&mut scaled, &mut output).unwrap();
+    network.infer_scaled(&mut scaled, &mut output).unwrap();
     assert_eq!(output, infer::<Polynomial>(&network, &reading));
     let error = NetworkError::Length { what: "scaled", expected: 5, found: 4 };
-    assert_eq!(network.infer_scaled::<Polynomial>(&mut [0.0; 4], &mut output), Err(error));
+    assert_eq!(network.infer_scaled(&mut [0.0; 4], &mut output), Err(error));
 }
 
 proptest! {
@@ -163,7 +164,7 @@ proptest! {
         let sample = Sample::new();
         let network = Network::from(direct::Network::try_new(SHAPE, sample.parameters()).unwrap());
         let mut dynamic = [0.0; 2];
-        network.infer::<Polynomial>(&reading, &mut [0.0; 5], &mut dynamic).unwrap();
+        network.infer(&reading, &mut [0.0; 5], &mut dynamic).unwrap();
         let fixed = infer::<Polynomial>(&network, &reading);
         prop_assert_eq!(dynamic.map(f32::to_bits), fixed.map(f32::to_bits));
     }

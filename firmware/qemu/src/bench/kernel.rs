@@ -70,7 +70,7 @@ impl Which for Fixed16 {
 }
 
 impl<F: Which, E: ExpKernel> Kernel for Formatted<F, E> {
-    type Decoder<'a> = Decoder<'a, ROWS, COLS, OUTPUTS, E>;
+    type Decoder<'a> = Decoder<'a, ROWS, COLS, OUTPUTS>;
 
     fn load(blob: &[u8]) -> Option<Self::Decoder<'_>> {
         let network = Model::decode(blob).ok()?.networks().next()?;
@@ -79,7 +79,7 @@ impl<F: Which, E: ExpKernel> Kernel for Formatted<F, E> {
 
     #[inline(never)]
     fn infer(network: &Network<'_>, scaled: &mut [f32; COLS], outputs: &mut [f32; OUTPUTS]) {
-        let _ = network.infer_scaled::<E>(scaled, outputs);
+        let _ = network.infer_scaled_with::<E>(scaled, outputs);
     }
 
     #[inline(never)]
@@ -89,7 +89,7 @@ impl<F: Which, E: ExpKernel> Kernel for Formatted<F, E> {
         scaled: &mut [f32; COLS],
         outputs: &mut [f32; OUTPUTS],
     ) {
-        let _ = network.infer::<E>(readings_ohm, scaled, outputs);
+        let _ = network.infer_with::<E>(readings_ohm, scaled, outputs);
     }
 
     #[inline(never)]
@@ -98,7 +98,7 @@ impl<F: Which, E: ExpKernel> Kernel for Formatted<F, E> {
         frame: &Frame<ROWS, COLS>,
         estimate: &mut Estimate<ROWS, OUTPUTS>,
     ) {
-        decoder.decode_into(frame, estimate);
+        decoder.decode_with::<E>(frame, None, estimate);
     }
 }
 

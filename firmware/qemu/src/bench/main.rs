@@ -97,7 +97,7 @@ impl Bench<'_> {
 /// One network for all rows: frames alone, as the firmware decodes them, and behind the gate.
 #[inline(never)]
 fn measure_array<E: ExpKernel>(blob: &[u8], frame: &Frame<ROWS, COLS>, name: &str, gated: bool) {
-    let decoder = unwrap!(Decoder::<ROWS, COLS, OUTPUTS, E>::load(blob).ok());
+    let decoder = unwrap!(Decoder::<ROWS, COLS, OUTPUTS>::load(blob).ok());
     let rest = decoder.decode(frame);
     let mut estimate = rest;
     let mut awake = *frame;
@@ -113,7 +113,7 @@ fn measure_array<E: ExpKernel>(blob: &[u8], frame: &Frame<ROWS, COLS>, name: &st
         }
         region(name, scope, || {
             let (frame, estimate) = (black_box(frame), black_box(&mut estimate));
-            black_box(&decoder).decode_gated_into(frame, black_box(gate), estimate);
+            black_box(&decoder).decode_with::<E>(frame, black_box(gate), estimate);
         });
         assert!(estimate.status == [status; ROWS], "a row is not as in {=str}", scope);
     }

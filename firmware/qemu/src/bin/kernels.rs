@@ -8,6 +8,7 @@ use cortex_m_rt::entry;
 use defmt::{info, unwrap};
 use model_core::Aligned;
 use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
+use model_core::rbf::Format;
 use qemu_image::{checks, exit};
 
 /// The bytes of a model in testdata.
@@ -19,20 +20,21 @@ macro_rules! model {
     }};
 }
 
-fn decode<E: ExpKernel>(format: &str, blob: &[u8]) {
+fn decode<E: ExpKernel>(format: Format, blob: &[u8]) {
     let crc = unwrap!(checks::decoding_many::<E, { checks::ROWS }>(blob));
-    info!("{=str}, {=str}: {=u32:08x}", format, E::NAME, crc);
+    info!("{=str}, {=str}: {=u32:08x}", format.name(), E::NAME, crc);
 }
 
-fn compare(format: &str, blob: &[u8]) {
+fn compare(format: Format, blob: &[u8]) {
     let [compared, different] = unwrap!(checks::twins(blob));
+    let format = format.name();
     info!("{=str}: {=usize} of {=usize} rows differ from the twin's", format, different, compared);
 }
 
 /// One network for all rows, behind a projection.
-fn array(format: &str, blob: &[u8]) {
+fn array(format: Format, tail: &str, blob: &[u8]) {
     let crc = unwrap!(checks::decoding_many::<Polynomial, { checks::ARRAY_ROWS }>(blob));
-    info!("array, {=str}: {=u32:08x}", format, crc);
+    info!("array, {=str}{=str}: {=u32:08x}", format.name(), tail, crc);
     if let Some([compared, different]) = checks::array_twins(blob) {
         info!("{=usize} of {=usize} frames differ from the twins'", different, compared);
     }
@@ -50,18 +52,18 @@ fn gate(blob: &[u8]) {
 fn main() -> ! {
     let (f32, fixed16) = (model!("kernels-f32.bin"), model!("kernels-fixed16.bin"));
     let f32_direct = model!("kernels-f32-direct.bin");
-    decode::<Polynomial>("f32", f32);
-    decode::<Polynomial>("fixed16", fixed16);
-    decode::<Polynomial>("f32-direct", f32_direct);
-    decode::<Libm>("f32-direct", f32_direct);
-    decode::<Micromath>("f32-direct", f32_direct);
-    compare("f32", f32);
-    compare("fixed16", fixed16);
+    decode::<Polynomial>(Format::F32, f32);
+    decode::<Polynomial>(Format::Fixed16, fixed16);
+    decode::<Polynomial>(Format::F32Direct, f32_direct);
+    decode::<Libm>(Format::F32Direct, f32_direct);
+    decode::<Micromath>(Format::F32Direct, f32_direct);
+    compare(Format::F32, f32);
+    compare(Format::Fixed16, fixed16);
     gate(fixed16);
-    array("f32", model!("array-f32.bin"));
-    array("f32 without tail", model!("array-f32-no-tail.bin"));
-    array("fixed16", model!("array-fixed16.bin"));
-    array("fixed16 without tail", model!("array-fixed16-no-tail.bin"));
-    array("f32-direct", model!("array-f32-direct.bin"));
+    array(Format::F32, "", model!("array-f32.bin"));
+    array(Format::F32, " without tail", model!("array-f32-no-tail.bin"));
+    array(Format::Fixed16, "", model!("array-fixed16.bin"));
+    array(Format::Fixed16, " without tail", model!("array-fixed16-no-tail.bin"));
+    array(Format::F32Direct, "", model!("array-f32-direct.bin"));
     exit::success()
 }

@@ -1,9 +1,8 @@
 //! A real, trained blob, harmed in every way there is: each is refused with its own error.
 
 use model_core::blob::{DecodeError, FORMAT_VERSION, Model, ModelShape};
-use model_core::exp::Polynomial;
 use model_core::rbf::{Format, NetworkError};
-use model_core::{Decoder, Frame};
+use model_core::{AlignedBytes, Decoder, Frame};
 use taxel_data::progress::Silent;
 use taxel_data::random::Stream;
 use taxel_learn::train::train;
@@ -30,10 +29,7 @@ fn real_blob() -> Vec<u8> {
 
 /// Bytes at an address that is a multiple of four.
 fn with_aligned<R>(bytes: &[u8], use_them: impl FnOnce(&[u8]) -> R) -> R {
-    let mut words = vec![0_u32; bytes.len().div_ceil(4) + 1];
-    let aligned: &mut [u8] = bytemuck::cast_slice_mut(&mut words);
-    aligned[..bytes.len()].copy_from_slice(bytes);
-    use_them(&aligned[..bytes.len()])
+    use_them(&AlignedBytes::copy_of(bytes))
 }
 
 fn refusal(bytes: &[u8]) -> Option<DecodeError> {
@@ -246,7 +242,7 @@ fn device_and_host_decode_alike() {
     let test = synthesise(&world(), Stream::Test, 500);
     let host = loaded.prepare(Exponential::Polynomial).decode_table(&test.inputs);
     with_aligned(&blob, |bytes| {
-        let decoder = Decoder::<2, 18, 6, Polynomial>::load(bytes).unwrap();
+        let decoder = Decoder::<2, 18, 6>::load(bytes).unwrap();
         for (readings, expected) in test.inputs.lines().zip(host.lines()) {
             let mut frame = Frame::<2, 18>::missing();
             let places = frame.row_column_resistance_ohm.as_flattened_mut();

@@ -1,8 +1,8 @@
-//! The board at the other end of a line: what `firmware::remote` asks for is carried out here.
+//! The board at the other end of a line: what `remote_readout` asks for is carried out here.
 
 use std::io::{ErrorKind, Read, Write};
 
-use firmware::remote::Asked;
+use remote_readout::Asked;
 
 use super::ROWS;
 use super::board::VirtualBoard;

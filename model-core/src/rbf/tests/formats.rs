@@ -1,7 +1,7 @@
 //! Networks with expanded distances, in f32 and in fixed point, against their formulas in f64.
 
 use super::super::*;
-use crate::exp::{Polynomial, exp2};
+use crate::exp::exp2;
 use crate::scale::{CLAMP, HALF_RANGE, UNITS, UNITS_PER_STEP};
 use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
@@ -158,7 +158,7 @@ impl Formula {
         let reading = self.reading(place);
         let (mut scaled, mut output) =
             (vec![0.0; self.shape.inputs], vec![0.0; self.shape.outputs]);
-        network.infer::<Polynomial>(&reading, &mut scaled, &mut output).unwrap();
+        network.infer(&reading, &mut scaled, &mut output).unwrap();
         let truth = self.outputs(&reading);
         let errors = output.iter().zip(truth).map(|(y, truth)| (f64::from(*y) - truth).abs());
         errors.fold(0.0, f64::max)
@@ -212,7 +212,7 @@ fn a_reading_beyond_the_clamp_counts_as_one_at_it() {
         for network in networks {
             let infer = |reading: f32| {
                 let mut output = [0.0; 18];
-                network.infer::<Polynomial>(&[reading; 18], &mut [0.0; 18], &mut output).unwrap();
+                network.infer(&[reading; 18], &mut [0.0; 18], &mut output).unwrap();
                 output
             };
             assert_eq!(infer(1e4), infer(f32::MAX));

@@ -6,14 +6,16 @@
 //! On the line: a pin is one byte, 0x80 + 2 · number + level; a wait is 0x02 and its nanoseconds
 //! (u32, little-endian); an SPI transaction is 0x01, the chip's number, the count of bytes and these
 //! bytes, and is answered by as many. Nothing else is answered.
+//!
+//! A test rig: the emulator's image asks, and host-sim's virtual board carries out.
+#![cfg_attr(not(test), no_std)]
 
 use core::cell::{Cell, RefCell};
 
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::{self, OutputPin};
 use embedded_hal::spi::{self, Operation, SpiDevice};
-
-use crate::platform::Port;
+use firmware::platform::Port;
 
 const TRANSFER: u8 = 0x01;
 const WAIT: u8 = 0x02;

@@ -1,0 +1,143 @@
+//! What a blob tells of its model beyond the weights.
+
+use serde::{Deserialize, Serialize};
+
+/// The sizes that a blob declares.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ModelShape {
+    /// Row-wires: each has a block of `inputs` readings and a block of `outputs`.
+    pub rows: usize,
+    /// Readings a row.
+    pub inputs: usize,
+    /// Outputs a row.
+    pub outputs: usize,
+}
+
+/// Names or units of columns, one a line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Columns<'a>(pub &'a str);
+
+impl<'a> Columns<'a> {
+    /// The entries in their order.
+    pub fn iter(self) -> impl Iterator<Item = &'a str> {
+        // As a set of one: the search for a single `char` indexes a slice in a way that the optimiser
+        // cannot prove, and would be the only reachable panic of the device path.
+        self.0.split(['\n'])
+    }
+}
+
+/// Little-endian `f32` at any address.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Floats<'a>(#[serde(borrow)] pub &'a [u8]);
+
+impl<'a> Floats<'a> {
+    /// The bytes of `numbers`, where they lie.
+    #[must_use]
+    pub fn of(numbers: &'a [f32]) -> Self {
+        Self(bytemuck::cast_slice(numbers))
+    }
+
+    /// The numbers in their order.
+    pub fn iter(self) -> impl Iterator<Item = f32> + 'a {
+        self.0.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes))
+    }
+}
+
+/// How the noise of a training set was defined.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum NoiseKind {
+    /// None was added (measured data, or an ideal sensor).
+    None,
+    /// R·(1 + p·n).
+    Relative,
+    /// R + p·(channel maximum − minimum)·n.
+    Span,
+}
+
+/// What is known of a model beyond its weights.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Metadata<'a> {
+    /// Name of the scene or data set.
+    pub name: &'a str,
+    /// CRC-64/XZ of the scene or data file that trained it.
+    pub scene_digest: u64,
+    /// How the training noise was defined.
+    pub noise_kind: NoiseKind,
+    /// Training noise level p, as a fraction (0.005 is 0.5 %).
+    pub noise_level: f32,
+    /// Seed of every random draw in synthesis and training.
+    pub seed: u64,
+    /// Frames trained on.
+    pub training_frames: u32,
+    /// Sensor thickness H in mm, for the positional error; 0 where it has no meaning.
+    pub thickness_mm: f32,
+    /// Reading columns, row after row: `rows × inputs` names.
+    pub input_names: Columns<'a>,
+    /// Their units (empty for a plain number).
+    pub input_units: Columns<'a>,
+    /// Output columns, row after row: `rows × outputs` names.
+    pub output_names: Columns<'a>,
+    /// Their units.
+    pub output_units: Columns<'a>,
+    /// RMSE on the training data of each output, in its unit.
+    pub training_rmse: Floats<'a>,
+    /// Full scale of each output, in its unit, for %FS.
+    pub full_scale: Floats<'a>,
+}
+
+/// Most inputs, and most outputs, of all rows that [`Metadata::unnamed`] serves.
+const MOST_UNNAMED: usize = 1024;
+
+/// A line of the same letter for each of many columns.
+const fn lines_of(letter: u8) -> [u8; 2 * MOST_UNNAMED] {
+    let mut text = [b'\n'; 2 * MOST_UNNAMED];
+    let mut column = 0;
+    while column < MOST_UNNAMED {
+        text[2 * column] = letter;
+        column += 1;
+    }
+    text
+}
+
+static INPUT_NAMES: [u8; 2 * MOST_UNNAMED] = lines_of(b'x');
+static OUTPUT_NAMES: [u8; 2 * MOST_UNNAMED] = lines_of(b'y');
+static NO_UNITS: [u8; MOST_UNNAMED] = [b'\n'; MOST_UNNAMED];
+static ZEROS: [u8; 4 * MOST_UNNAMED] = [0; 4 * MOST_UNNAMED];
+
+impl Metadata<'static> {
+    /// Metadata of a hand-made model of this `shape`: every input is called `x` and every output `y`, all without a
+    /// unit; nothing is known of its training. Use it whole, or for the fields that do not matter.
+    ///
+    /// # Panics
+    /// With more than 1024 inputs or outputs in all rows.
+    ///
+    /// ```
+    /// use model_core::blob::{Metadata, ModelShape};
+    /// let shape = ModelShape { rows: 2, inputs: 2, outputs: 1 };
+    /// let metadata = Metadata { name: "made", ..Metadata::unnamed(shape) };
+    /// assert_eq!(metadata.input_names.0, "x\nx\nx\nx");
+    /// assert_eq!(metadata.output_units.iter().count(), 2);
+    /// ```
+    #[must_use]
+    pub fn unnamed(shape: ModelShape) -> Self {
+        let columns = |bytes: &'static [u8], length: usize| {
+            Columns(core::str::from_utf8(&bytes[..length.saturating_sub(1)]).unwrap_or_default())
+        };
+        let (inputs, outputs) = (shape.rows * shape.inputs, shape.rows * shape.outputs);
+        Self {
+            name: "",
+            scene_digest: 0,
+            noise_kind: NoiseKind::None,
+            noise_level: 0.0,
+            seed: 0,
+            training_frames: 0,
+            thickness_mm: 0.0,
+            input_names: columns(&INPUT_NAMES, 2 * inputs),
+            input_units: columns(&NO_UNITS, inputs),
+            output_names: columns(&OUTPUT_NAMES, 2 * outputs),
+            output_units: columns(&NO_UNITS, outputs),
+            training_rmse: Floats(&ZEROS[..4 * outputs]),
+            full_scale: Floats(&ZEROS[..4 * outputs]),
+        }
+    }
+}

@@ -1,0 +1,229 @@
+//! The assembly's functions, with slices and counts instead of pointers.
+//!
+//! A function is unsafe where it reads more than its arguments' types tell: then its section *Safety* says
+//! what the caller must have checked.
+#![expect(unsafe_code, reason = "calls to assembly, which reads as many words as it is told to")]
+#![expect(
+    clippy::manual_div_ceil,
+    reason = "no K comes near an overflow, and this is shorter code"
+)]
+
+use core::mem::MaybeUninit;
+
+use super::{Finite, INPUTS, OUTPUTS, expanded_words, fixed16_words};
+
+/// Activations that the f32 routine keeps between its two halves: 512 bytes of stack.
+const MOST_CENTRES_AT_ONCE: usize = 128;
+
+core::arch::global_asm!(include_str!("../cortex_m4.s"), options(raw));
+
+/// What a network takes in.
+#[derive(Clone, Copy)]
+pub enum Inputs<'a> {
+    /// In the readings' unit.
+    Readings(&'a [f32; INPUTS]),
+    /// Scaled, in units of the clamp.
+    Scaled(&'a [f32; INPUTS]),
+}
+
+impl<'a> Inputs<'a> {
+    /// The numbers, and the flag that tells their unit.
+    fn parts(self) -> (&'a [f32; INPUTS], u32) {
+        match self {
+            Self::Readings(readings) => (readings, 0),
+            Self::Scaled(scaled) => (scaled, SCALED),
+        }
+    }
+}
+
+unsafe extern "C" {
+    fn taxel_f32(
+        inputs: *const [f32; INPUTS],
+        block: *const u32,
+        output: *mut [f32; OUTPUTS],
+        fours: u32,
+        flags: u32,
+        activations: *mut [f32; MOST_CENTRES_AT_ONCE],
+    ) -> u32;
+    fn taxel_fixed16(
+        inputs: *const [f32; INPUTS],
+        block: *const u32,
+        output: *mut [f32; OUTPUTS],
+        sixteens: u32,
+        flags: u32,
+    ) -> u32;
+    fn taxel_project(
+        readings: *const f32,
+        block: *const f32,
+        features: *mut [f32; INPUTS],
+        pairs: u32,
+    );
+    fn taxel_f32_array(
+        inputs: *const [f32; INPUTS],
+        block: *const u32,
+        output: *mut f32,
+        fours: u32,
+        flags: u32,
+        activations: *mut [f32; MOST_CENTRES_AT_ONCE],
+        groups: u32,
+    ) -> u32;
+    fn taxel_fixed16_array(
+        inputs: *const [f32; INPUTS],
+        block: *const u32,
+        output: *mut f32,
+        sixteens: u32,
+        flags: u32,
+        groups: u32,
+    ) -> u32;
+    fn taxel_give_rest(
+        readings: *const [f32; INPUTS],
+        baseline: *const [f32; INPUTS],
+        rest: *const [f32; OUTPUTS],
+        outputs: *mut [f32; OUTPUTS],
+        tolerance: f32,
+    ) -> u32;
+}
+
+impl Finite {
+    /// From the floating-point status behind a routine: a conversion to integers that saturates, or meets
+    /// NaN, is an invalid operation, and no other operation of a routine is.
+    fn of_status(fpscr: u32) -> Self {
+        const INVALID_OPERATION: u32 = 1;
+        if fpscr & INVALID_OPERATION == 0 { Self::Known } else { Self::Unknown }
+    }
+}
+
+/// Bits of `flags`.
+const AFFINE: u32 = 1;
+const SCALED: u32 = 2;
+
+fn flags(affine: bool, scaled: u32) -> u32 {
+    (u32::from(affine) * AFFINE) | scaled
+}
+
+/// Centres in fours, as the f32 routines count them.
+fn fours(centres: usize) -> u32 {
+    ((centres + 3) / 4) as u32
+}
+
+/// Centres in sixteens, as the fixed-point routines count them.
+fn sixteens(centres: usize) -> u32 {
+    ((centres + 15) / 16) as u32
+}
+
+/// The outputs of a network with expanded distances, 18 of them.
+///
+/// # Safety
+/// There is at least one of the `centres`, and `block` has [`expanded_words`] words for them and one group.
+pub(crate) unsafe fn expanded(
+    inputs: Inputs<'_>,
+    block: &[u32],
+    centres: usize,
+    affine: bool,
+    output: &mut [f32; OUTPUTS],
+) -> Finite {
+    debug_assert!(centres > 0 && block.len() >= expanded_words(centres, affine, 1));
+    let (inputs, scaled) = inputs.parts();
+    let (fours, flags) = (fours(centres), flags(affine, scaled));
+    let mut activations = MaybeUninit::uninit();
+    // SAFETY: the caller vouches for the block; the routine reads 18 inputs and writes 18 outputs, which the
+    // types tell; it writes activations, 128 at most, before it reads them.
+    unsafe {
+        let (block, activations) = (block.as_ptr(), activations.as_mut_ptr());
+        Finite::of_status(taxel_f32(inputs, block, output, fours, flags, activations))
+    }
+}
+
+/// The outputs of a network with expanded distances, in groups of 18.
+///
+/// # Safety
+/// There is at least one of the `groups` and of the `centres`, and `block` has [`expanded_words`] words for
+/// them.
+#[inline(never)] // its stack would burden the routine for one group
+pub(crate) unsafe fn expanded_array(
+    inputs: Inputs<'_>,
+    block: &[u32],
+    centres: usize,
+    affine: bool,
+    groups: &mut [[f32; OUTPUTS]],
+) -> Finite {
+    debug_assert!(centres > 0 && !groups.is_empty());
+    debug_assert!(block.len() >= expanded_words(centres, affine, groups.len()));
+    let (inputs, scaled) = inputs.parts();
+    let (fours, flags) = (fours(centres), flags(affine, scaled));
+    let (output, groups) = (groups.as_mut_ptr().cast(), groups.len() as u32);
+    let mut activations = MaybeUninit::uninit();
+    // SAFETY: as in `expanded`; the routine writes as many groups as there are.
+    unsafe {
+        let (block, activations) = (block.as_ptr(), activations.as_mut_ptr());
+        Finite::of_status(taxel_f32_array(inputs, block, output, fours, flags, activations, groups))
+    }
+}
+
+/// The outputs of a network in fixed point, 18 of them.
+///
+/// # Safety
+/// There is at least one of the `centres`, and `block` has [`fixed16_words`] words for them and one group.
+pub(crate) unsafe fn fixed16(
+    inputs: Inputs<'_>,
+    block: &[u32],
+    centres: usize,
+    affine: bool,
+    output: &mut [f32; OUTPUTS],
+) -> Finite {
+    debug_assert!(centres > 0 && block.len() >= fixed16_words(centres, affine, 1));
+    let (inputs, scaled) = inputs.parts();
+    let (sixteens, flags) = (sixteens(centres), flags(affine, scaled));
+    // SAFETY: the caller vouches for the block; the routine reads 18 inputs and writes 18 outputs, which the
+    // types tell.
+    Finite::of_status(unsafe { taxel_fixed16(inputs, block.as_ptr(), output, sixteens, flags) })
+}
+
+/// The outputs of a network in fixed point, in groups of 18.
+///
+/// # Safety
+/// There is at least one of the `groups` and of the `centres`, and `block` has [`fixed16_words`] words for
+/// them.
+#[inline(never)] // its stack would burden the routine for one group
+pub(crate) unsafe fn fixed16_array(
+    inputs: Inputs<'_>,
+    block: &[u32],
+    centres: usize,
+    affine: bool,
+    groups: &mut [[f32; OUTPUTS]],
+) -> Finite {
+    debug_assert!(centres > 0 && !groups.is_empty());
+    debug_assert!(block.len() >= fixed16_words(centres, affine, groups.len()));
+    let (inputs, scaled) = inputs.parts();
+    let (sixteens, flags) = (sixteens(centres), flags(affine, scaled));
+    let (output, groups) = (groups.as_mut_ptr().cast(), groups.len() as u32);
+    // SAFETY: as in `fixed16`; the routine writes as many groups as there are.
+    Finite::of_status(unsafe {
+        taxel_fixed16_array(inputs, block.as_ptr(), output, sixteens, flags, groups)
+    })
+}
+
+/// The features of `readings`: the first 18 numbers of `block`, and for each reading 18 more, times the
+/// reading.
+///
+/// # Safety
+/// There is an even number of `readings`, not none, and `block` has 18 numbers more than 18 for each of them.
+pub(crate) unsafe fn project(block: &[f32], readings: &[f32], features: &mut [f32; INPUTS]) {
+    debug_assert!(!readings.is_empty() && readings.len().is_multiple_of(2));
+    debug_assert!(block.len() >= INPUTS * (1 + readings.len()));
+    let pairs = (readings.len() / 2) as u32;
+    // SAFETY: the caller vouches for the block and the number of readings.
+    unsafe { taxel_project(readings.as_ptr(), block.as_ptr(), features, pairs) }
+}
+
+/// Writes `rest` to `outputs` if the `readings` are at rest, and says whether they are.
+pub(crate) fn give_rest(
+    readings: &[f32; INPUTS],
+    baseline: &[f32; INPUTS],
+    tolerance: f32,
+    rest: &[f32; OUTPUTS],
+    outputs: &mut [f32; OUTPUTS],
+) -> bool {
+    // SAFETY: no more is read and written than these arrays.
+    unsafe { taxel_give_rest(readings, baseline, rest, outputs, tolerance) != 0 }
+}

@@ -1,0 +1,104 @@
+//! The number formats of networks: the one list of them.
+
+/// How a network's numbers and distances are represented.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// [`direct`](super::direct): f32, distances from differences.
+    F32Direct,
+    /// [`expanded`](super::expanded): f32, distances from products.
+    F32,
+    /// [`fixed16`](super::fixed16): 16-bit fixed point.
+    Fixed16,
+}
+
+/// What is declared of a format, once and for all.
+struct Declaration {
+    name: &'static str,
+    tag: u8,
+    description: &'static str,
+}
+
+impl Format {
+    /// Every format.
+    ///
+    /// ```
+    /// use model_core::rbf::Format;
+    /// let names = Format::ALL.map(Format::name);
+    /// assert_eq!(names, ["f32-direct", "f32", "fixed16"]);
+    /// ```
+    pub const ALL: [Self; 3] = [Self::F32Direct, Self::F32, Self::Fixed16];
+
+    const fn declaration(self) -> Declaration {
+        match self {
+            Self::F32Direct => Declaration {
+                name: "f32-direct",
+                tag: 1,
+                description: "f32, distances from differences: safe at any width",
+            },
+            Self::F32 => Declaration {
+                name: "f32",
+                tag: 2,
+                description: "f32, distances from products: where rounding is proved harmless",
+            },
+            Self::Fixed16 => Declaration {
+                name: "fixed16",
+                tag: 3,
+                description: "16-bit fixed point: half the flash and less than half the time",
+            },
+        }
+    }
+
+    /// The format's name, as users choose it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        self.declaration().name
+    }
+
+    /// The tag of a network's section in a blob (`docs/blob.md`).
+    #[must_use]
+    pub const fn tag(self) -> u8 {
+        self.declaration().tag
+    }
+
+    /// The format in one line.
+    #[must_use]
+    pub const fn description(self) -> &'static str {
+        self.declaration().description
+    }
+
+    /// The format of that [name](Self::name).
+    ///
+    /// ```
+    /// use model_core::rbf::Format;
+    /// assert_eq!(Format::from_name("fixed16"), Some(Format::Fixed16));
+    /// assert_eq!(Format::from_name("f64"), None);
+    /// ```
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|format| format.name() == name)
+    }
+
+    /// The format of that [tag](Self::tag).
+    #[must_use]
+    pub fn from_tag(tag: u8) -> Option<Self> {
+        Self::ALL.into_iter().find(|format| format.tag() == tag)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Format;
+
+    #[test]
+    fn names_tags_and_descriptions_are_distinct_and_lead_back_to_their_format() {
+        for (index, format) in Format::ALL.into_iter().enumerate() {
+            assert_eq!(Format::from_name(format.name()), Some(format));
+            assert_eq!(Format::from_tag(format.tag()), Some(format));
+            for other in &Format::ALL[..index] {
+                assert_ne!(format.name(), other.name());
+                assert_ne!(format.tag(), other.tag());
+                assert_ne!(format.description(), other.description());
+            }
+        }
+    }
+}

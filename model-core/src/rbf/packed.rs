@@ -1,0 +1,249 @@
+//! Networks whose parameters are one block of words: what the formats with a routine in assembly share.
+//!
+//! A format is a [`Layout`]: how long its blocks are, what they may hold, and how they are inferred from. A
+//! Cortex-M4F infers by a routine in assembly where the sizes are the paper's. Everywhere else the routine's
+//! twin in Rust serves, which gives the same bits.
+#![cfg_attr(
+    cortex_m4f,
+    expect(unsafe_code, reason = "calls to assembly, whose conditions are checked before")
+)]
+
+use core::fmt::Debug;
+use core::marker::PhantomData;
+
+use super::parameters::{NetworkError, Shape, check_length};
+#[cfg(cortex_m4f)]
+use crate::cortex_m4::Inputs;
+use crate::cortex_m4::{Finite, INPUTS, OUTPUTS};
+
+/// A number format whose networks are one block of words.
+pub trait Layout: Copy + Debug + PartialEq {
+    /// The parameters of a network, cut from its block.
+    type Parameters<'a>;
+
+    /// Words of the block of a network of this shape.
+    fn block_words(shape: Shape, affine: bool) -> usize;
+
+    /// Checks what the format asks of a shape beyond its block's length.
+    ///
+    /// # Errors
+    /// [`NetworkError`].
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "no code")]
+    fn check_shape(_: Shape) -> Result<(), NetworkError> {
+        Ok(())
+    }
+
+    /// Looks at every value of `network`.
+    ///
+    /// # Errors
+    /// [`NetworkError`].
+    fn check_values(network: &Network<'_, Self>) -> Result<(), NetworkError>;
+
+    /// The parameters of `network`.
+    fn parameters<'a>(network: &Network<'a, Self>) -> Self::Parameters<'a>;
+
+    /// Writes readings to `scaled` in the format's unit of inputs, not clamped yet.
+    fn scale(network: &Network<'_, Self>, reading: &[f32], scaled: &mut [f32]);
+
+    /// Lowest and highest reading of `input` in training, in its unit; NaN if there is no such input.
+    fn training_range(network: &Network<'_, Self>, input: usize) -> [f32; 2];
+
+    /// Width σ of all centres on inputs scaled to [0, 1].
+    fn width(parameters: &Self::Parameters<'_>) -> f32;
+
+    /// Infers `output` from `scaled` inputs, which are used up, as the routine does to the bit.
+    fn infer_scaled_in_rust(network: &Network<'_, Self>, scaled: &mut [f32], output: &mut [f32]);
+
+    /// The routine in assembly for one group of outputs.
+    ///
+    /// # Safety
+    /// `network` has 18 inputs and 18 outputs.
+    #[cfg(cortex_m4f)]
+    unsafe fn routine(
+        network: &Network<'_, Self>,
+        inputs: Inputs<'_>,
+        output: &mut [f32; OUTPUTS],
+    ) -> Finite;
+
+    /// The routine in assembly for several groups of outputs.
+    ///
+    /// # Safety
+    /// `network` has 18 inputs, and 18 outputs for each of `groups`.
+    #[cfg(cortex_m4f)]
+    unsafe fn array_routine(
+        network: &Network<'_, Self>,
+        inputs: Inputs<'_>,
+        groups: &mut [[f32; OUTPUTS]],
+    ) -> Finite;
+}
+
+/// A network: a block of words, borrowed from where it lies, that has been checked against its shape.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(C)] // the shape first, so that it is at the same place in a network of any format
+pub struct Network<'a, L> {
+    shape: Shape,
+    affine: bool,
+    block: &'a [u32],
+    layout: PhantomData<L>,
+}
+
+impl<'a, L: Layout> Network<'a, L> {
+    /// Checks the length and the values of a `block`, the words of the format's parameters. No reading can then
+    /// drive an exponent out of the format's range, nor an output out of f32.
+    ///
+    /// That the sums of 16-bit weights fit is proved where a network is quantised; a device cannot.
+    ///
+    /// # Errors
+    /// Every variant of [`NetworkError`]; the length is checked before values.
+    pub fn try_new(shape: Shape, affine: bool, block: &'a [u32]) -> Result<Self, NetworkError> {
+        let network = Self::with_length_checked(shape, affine, block)?;
+        network.check_values()?;
+        Ok(network)
+    }
+
+    /// As [`try_new`](Self::try_new), without the pass over all values: for a block that passed it before.
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "a network is large to hand over")]
+    pub(crate) fn with_length_checked(
+        shape: Shape,
+        affine: bool,
+        block: &'a [u32],
+    ) -> Result<Self, NetworkError> {
+        if shape.inputs == 0 || shape.centres == 0 || shape.outputs == 0 {
+            return Err(NetworkError::Empty);
+        }
+        L::check_shape(shape)?;
+        check_length("block", block, Self::block_words(shape, affine))?;
+        Ok(Self { shape, affine, block, layout: PhantomData })
+    }
+
+    /// Words of the block of a network of this shape.
+    #[must_use]
+    #[inline]
+    pub fn block_words(shape: Shape, affine: bool) -> usize {
+        L::block_words(shape, affine)
+    }
+
+    /// The network's sizes.
+    #[must_use]
+    pub fn shape(&self) -> Shape {
+        self.shape
+    }
+
+    /// Whether there is an affine tail.
+    #[must_use]
+    pub fn has_affine_tail(&self) -> bool {
+        self.affine
+    }
+
+    /// All of the network's words.
+    #[must_use]
+    pub fn block(&self) -> &'a [u32] {
+        self.block
+    }
+
+    /// The network's parameters.
+    #[must_use]
+    pub fn parameters(&self) -> L::Parameters<'a> {
+        L::parameters(self)
+    }
+
+    /// Width σ of all centres on inputs scaled to [0, 1].
+    #[must_use]
+    pub fn width(&self) -> f32 {
+        L::width(&self.parameters())
+    }
+
+    pub(crate) fn check_values(&self) -> Result<(), NetworkError> {
+        L::check_values(self)
+    }
+
+    pub(super) fn training_range(&self, input: usize) -> [f32; 2] {
+        L::training_range(self, input)
+    }
+
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "a call")]
+    pub(crate) fn scale(&self, reading: &[f32], scaled: &mut [f32]) {
+        L::scale(self, reading, scaled);
+    }
+
+    /// Whether the network's sizes are those of the routines, with as many outputs.
+    #[cfg(cortex_m4f)]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "where lengths are known, nothing is left of it")]
+    fn suits(&self, all_outputs: usize) -> bool {
+        let Shape { inputs, outputs, .. } = self.shape;
+        inputs == INPUTS && outputs == all_outputs
+    }
+
+    /// Infers `output` from one row of readings; `scaled` is working space.
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "callers rely on it for constant lengths")]
+    pub(crate) fn infer(&self, reading: &[f32], scaled: &mut [f32], output: &mut [f32]) -> Finite {
+        #[cfg(cortex_m4f)]
+        if let (Ok(reading), Ok(output)) = (reading.try_into(), (&mut *output).try_into())
+            && self.suits(OUTPUTS)
+        {
+            // SAFETY: the network suits one group.
+            return unsafe { L::routine(self, Inputs::Readings(reading), output) };
+        }
+        self.scale(reading, scaled);
+        self.infer_scaled(scaled, output);
+        Finite::Unknown
+    }
+
+    /// Infers groups of 18 outputs from one row of readings.
+    ///
+    /// # Errors
+    /// [`NetworkError::Length`]: the network has other sizes.
+    #[cfg(cortex_m4f)]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "a match and a call")]
+    pub(crate) fn infer_in_assembly(
+        &self,
+        reading: &[f32; INPUTS],
+        groups: &mut [[f32; OUTPUTS]],
+    ) -> Result<Finite, NetworkError> {
+        if !self.suits(groups.as_flattened().len()) {
+            let (expected, found) = (self.shape.outputs, groups.as_flattened().len());
+            return Err(NetworkError::Length { what: "outputs", expected, found });
+        }
+        let inputs = Inputs::Readings(reading);
+        Ok(match groups {
+            // SAFETY: the network suits the groups, of which there is one.
+            [output] => unsafe { L::routine(self, inputs, output) },
+            // SAFETY: the network suits the groups.
+            groups => unsafe { L::array_routine(self, inputs, groups) },
+        })
+    }
+
+    /// Infers `output` from `scaled` inputs, which are used up.
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "callers rely on it for constant lengths")]
+    pub(crate) fn infer_scaled(&self, scaled: &mut [f32], output: &mut [f32]) {
+        #[cfg(cortex_m4f)]
+        if let (Ok(scaled), Ok(output)) = ((&*scaled).try_into(), (&mut *output).try_into())
+            && self.suits(OUTPUTS)
+        {
+            // SAFETY: the network suits one group.
+            unsafe { L::routine(self, Inputs::Scaled(scaled), output) };
+            return;
+        }
+        L::infer_scaled_in_rust(self, scaled, output);
+    }
+
+    /// Infers `output` from `scaled` inputs by the twin, with code of its own for the usual sizes.
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "for callers that are not inlined themselves")]
+    pub(super) fn infer_scaled_by_twin(&self, scaled: &mut [f32], output: &mut [f32]) {
+        let usual: (Result<&mut [f32; INPUTS], _>, Result<&mut [f32; OUTPUTS], _>) =
+            ((&mut *scaled).try_into(), (&mut *output).try_into());
+        if let (Ok(scaled), Ok(output)) = usual {
+            L::infer_scaled_in_rust(self, scaled, output);
+        } else {
+            L::infer_scaled_in_rust(self, scaled, output);
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! What the parameters of every format share: sizes, faults, and the cutting of blocks.
+
+use crate::scale::{HALF_RANGE, UNITS};
+
+/// The sizes of one network.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shape {
+    /// Readings taken in.
+    pub inputs: usize,
+    /// Centres, K.
+    pub centres: usize,
+    /// Quantities given out.
+    pub outputs: usize,
+}
+
+/// Why parameters do not make a network, or why a buffer does not fit one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum NetworkError {
+    /// A dimension is zero.
+    #[error("a network needs at least one input, one centre and one output")]
+    Empty,
+    /// An array has the wrong number of elements.
+    #[error("{what} has {found} elements; the network's shape asks for {expected}")]
+    Length {
+        /// The array.
+        what: &'static str,
+        /// Elements it must have.
+        expected: usize,
+        /// Elements it has.
+        found: usize,
+    },
+    /// A parameter is NaN or infinite.
+    #[error("{what} holds a number that is not finite")]
+    NotFinite {
+        /// The array.
+        what: &'static str,
+    },
+    /// A width is zero, negative or without bound: its decay 1/(2σ²) is not a positive number.
+    #[error("width of centre {centre} is not a positive finite number")]
+    InvalidWidth {
+        /// Which decay, from 0.
+        centre: usize,
+    },
+    /// An input's 1/(maximum − minimum) is negative.
+    #[error("input {input} has a negative span")]
+    NegativeSpan {
+        /// Which input, from 0.
+        input: usize,
+    },
+    /// Centres, widths and inputs do not go together: an exponent could leave the range of its format.
+    #[error("the exponent of centre {centre} can leave the range that the format computes with")]
+    ExponentOutOfRange {
+        /// Which centre, from 0.
+        centre: usize,
+    },
+    /// More inputs than the format can add up.
+    #[error("{found} inputs; the format holds at most {most}")]
+    TooManyInputs {
+        /// The most that there may be.
+        most: usize,
+        /// How many there are.
+        found: usize,
+    },
+}
+
+/// Cuts arrays of four-byte words from the front of a network's block.
+pub(crate) struct Cut<'a>(pub &'a [u32]);
+
+impl<'a> Cut<'a> {
+    /// The next `length` words; none if there are fewer.
+    pub(super) fn words(&mut self, length: usize) -> &'a [u32] {
+        let (head, tail) = self.0.split_at_checked(length).unwrap_or_default();
+        self.0 = tail;
+        head
+    }
+
+    pub(super) fn floats(&mut self, length: usize) -> &'a [f32] {
+        bytemuck::cast_slice(self.words(length))
+    }
+}
+
+pub(super) fn check_length<T>(
+    what: &'static str,
+    values: &[T],
+    expected: usize,
+) -> Result<(), NetworkError> {
+    if values.len() == expected {
+        Ok(())
+    } else {
+        Err(NetworkError::Length { what, expected, found: values.len() })
+    }
+}
+
+/// Readings in units from the middle of the training range, not clamped yet.
+pub(super) fn scale_about(midpoint: &[f32], per_unit: &[f32], reading: &[f32], scaled: &mut [f32]) {
+    let limits = midpoint.iter().zip(per_unit);
+    for ((x, &r), (&midpoint, &per_unit)) in scaled.iter_mut().zip(reading).zip(limits) {
+        *x = (r - midpoint) * per_unit;
+    }
+}
+
+/// Lowest and highest reading from the middle of the range and [`UNITS`](crate::scale::UNITS) in one unit.
+pub(super) fn range_about(midpoint: Option<&f32>, per_unit: Option<&f32>) -> [f32; 2] {
+    let (Some(&midpoint), Some(&per_unit)) = (midpoint, per_unit) else { return [f32::NAN; 2] };
+    let half = if per_unit > 0.0 { 0.5 / HALF_RANGE * UNITS / per_unit } else { 0.0 };
+    [midpoint - half, midpoint + half]
+}
+
+pub(super) fn check_finite(arrays: &[(&'static str, &[f32])]) -> Result<(), NetworkError> {
+    let finite = |values: &[f32]| values.iter().all(|v| v.is_finite());
+    match arrays.iter().find(|(_, values)| !finite(values)) {
+        Some((what, _)) => Err(NetworkError::NotFinite { what }),
+        None => Ok(()),
+    }
+}
+
+pub(super) fn check_spans(per_span: &[f32]) -> Result<(), NetworkError> {
+    match per_span.iter().position(|s| *s < 0.0) {
+        Some(input) => Err(NetworkError::NegativeSpan { input }),
+        None => Ok(()),
+    }
+}
+
+#[inline(always)]
+#[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
+pub(super) fn accumulate(output: &mut [f32], factor: f32, weights: &[f32]) {
+    for (y, &w) in output.iter_mut().zip(weights) {
+        *y += factor * w;
+    }
+}

@@ -1,0 +1,166 @@
+//! A decoder of the paper's sensor: it answers what its networks answer, and takes no unsound blob.
+
+use model_core::blob::{DecodeError, Metadata, ModelParts, ModelShape, encode_to_vec};
+use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
+use model_core::rbf::direct::{self, Parameters};
+use model_core::rbf::{Network, Shape};
+use model_core::{AlignedBytes, Decoder, Estimate, Frame, RowStatus};
+
+const ROWS: usize = 8;
+const COLS: usize = 18;
+const OUTPUTS: usize = 18;
+const CENTRES: usize = 5;
+
+type PaperDecoder<'a> = Decoder<'a, ROWS, COLS, OUTPUTS>;
+
+/// Hand-made numbers that differ from place to place, in [−1, 1].
+fn spread_out(seed: usize, count: usize) -> Vec<f32> {
+    (0..count).map(|i| (((i * 37 + seed * 11) % 101) as f32 - 50.0) / 50.0).collect()
+}
+
+/// The parameters of one network of the paper's shape.
+struct Numbers {
+    minimum: Vec<f32>,
+    per_span: Vec<f32>,
+    centres: Vec<f32>,
+    weights: Vec<f32>,
+    bias: Vec<f32>,
+    affine: Vec<f32>,
+}
+
+impl Numbers {
+    fn new(seed: usize) -> Self {
+        Self {
+            minimum: spread_out(seed, COLS).iter().map(|v| 55.0 + v).collect(),
+            per_span: vec![0.1; COLS],
+            centres: spread_out(seed + 1, CENTRES * COLS).iter().map(|v| 0.5 + v / 2.0).collect(),
+            weights: spread_out(seed + 2, CENTRES * OUTPUTS),
+            bias: spread_out(seed + 3, OUTPUTS),
+            affine: spread_out(seed + 4, COLS * OUTPUTS),
+        }
+    }
+
+    fn network(&self) -> Network<'_> {
+        let parameters = Parameters {
+            input_minimum: &self.minimum,
+            input_per_span: &self.per_span,
+            centres: &self.centres,
+            decay: &[0.75],
+            output_weights: &self.weights,
+            bias: &self.bias,
+            affine: &self.affine,
+        };
+        let shape = Shape { inputs: COLS, centres: CENTRES, outputs: OUTPUTS };
+        direct::Network::try_new(shape, parameters).unwrap().into()
+    }
+}
+
+/// Two networks that the rows use in turn.
+fn blob(seed: usize, rows: usize) -> AlignedBytes {
+    let (even, odd) = (Numbers::new(seed), Numbers::new(seed + 50));
+    let shape = ModelShape { rows, inputs: COLS, outputs: OUTPUTS };
+    let metadata = Metadata { name: "hand-made", ..Metadata::unnamed(shape) };
+    let row_network: Vec<u8> = (0..rows).map(|row| (row % 2) as u8).collect();
+    let parts = ModelParts {
+        projection: None,
+        networks: &[even.network(), odd.network()],
+        row_network: &row_network,
+        metadata,
+    };
+    encode_to_vec(&parts).unwrap()
+}
+
+fn frame() -> Frame<ROWS, COLS> {
+    let mut frame = Frame::missing();
+    let readings = spread_out(9, ROWS * COLS);
+    let places = frame.row_column_resistance_ohm.as_flattened_mut();
+    places.iter_mut().zip(readings).for_each(|(place, v)| *place = 60.0 + 4.0 * v);
+    frame
+}
+
+fn bits(outputs: &[[f32; OUTPUTS]; ROWS]) -> Vec<u32> {
+    outputs.as_flattened().iter().map(|v| v.to_bits()).collect()
+}
+
+/// What the networks themselves answer, through the interface with sizes known when it runs.
+fn inferred<E: ExpKernel>(seed: usize, frame: &Frame<ROWS, COLS>) -> [[f32; OUTPUTS]; ROWS] {
+    let numbers = [Numbers::new(seed), Numbers::new(seed + 50)];
+    let mut outputs = [[0.0; OUTPUTS]; ROWS];
+    for (row, output) in outputs.iter_mut().enumerate() {
+        let reading = &frame.row_column_resistance_ohm[row];
+        let network = numbers[row % 2].network();
+        network.infer_with::<E>(reading, &mut [0.0; COLS], output).unwrap();
+    }
+    outputs
+}
+
+fn decodes_as_its_networks<E: ExpKernel>() {
+    let blob = blob(1, ROWS);
+    let frame = frame();
+    let decoder = PaperDecoder::load(&blob).unwrap();
+    let mut estimate =
+        Estimate { outputs: [[7.0; OUTPUTS]; ROWS], status: [RowStatus::Overflow; ROWS] };
+
+    decoder.decode_with::<E>(&frame, None, &mut estimate);
+
+    assert_eq!(estimate.status, [RowStatus::Decoded; ROWS]);
+    assert_eq!(bits(&estimate.outputs), bits(&inferred::<E>(1, &frame)), "{}", E::NAME);
+}
+
+#[test]
+fn it_decodes_bit_for_bit_as_its_networks_infer_with_every_exponential() {
+    decodes_as_its_networks::<Polynomial>();
+    decodes_as_its_networks::<Libm>();
+    decodes_as_its_networks::<Micromath>();
+}
+
+#[test]
+fn it_decodes_with_the_polynomial_unless_told_otherwise() {
+    let blob = blob(2, ROWS);
+    let decoder = PaperDecoder::load(&blob).unwrap();
+    let estimate = decoder.decode(&frame());
+    assert_eq!(bits(&estimate.outputs), bits(&inferred::<Polynomial>(2, &frame())));
+    assert_ne!(bits(&estimate.outputs), bits(&inferred::<Micromath>(2, &frame())));
+    assert_eq!(decoder.metadata().name, "hand-made");
+    assert_eq!(decoder.model_crc().to_le_bytes(), *blob.last_chunk().unwrap());
+}
+
+#[test]
+fn an_unsound_blob_is_refused_with_its_cause() {
+    let sound = blob(2, ROWS);
+    let mut corrupt = sound.clone();
+    corrupt[sound.len() / 2] ^= 0x10;
+    let mut newer = sound.clone();
+    newer[4] += 1;
+    let seven_rows = blob(2, ROWS - 1);
+    let erased = vec![0xFF; sound.len()];
+    let mut shifted = AlignedBytes::zeroed(sound.len() + 1);
+    shifted[1..].copy_from_slice(&sound);
+
+    for (refused, name) in [
+        (&corrupt[..], "Corrupt"),
+        (&sound[..sound.len() - 1], "Truncated"),
+        (&sound[..0], "Truncated"),
+        (&newer, "UnsupportedVersion"),
+        (&seven_rows, "ShapeMismatch"),
+        (&AlignedBytes::copy_of(&erased), "BadMagic"),
+        (&shifted[1..], "Misaligned"),
+    ] {
+        let error = PaperDecoder::load(refused).unwrap_err();
+        assert!(format!("{error:?}").starts_with(name), "{error:?} instead of {name}");
+        assert_eq!(PaperDecoder::check(refused).unwrap_err(), error);
+    }
+    assert_eq!(
+        PaperDecoder::check(&sound).unwrap().crc().to_le_bytes(),
+        *sound.last_chunk().unwrap()
+    );
+}
+
+#[test]
+fn no_decoder_starts_with_a_model_of_another_shape() {
+    let seven_rows = blob(1, ROWS - 1);
+    let expected = ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS };
+    let found = ModelShape { rows: ROWS - 1, ..expected };
+    let error = PaperDecoder::load(&seven_rows).unwrap_err();
+    assert_eq!(error, DecodeError::ShapeMismatch { expected, found });
+}
