@@ -39,6 +39,7 @@ pub mod emulator;
 pub mod error;
 pub mod evaluate;
 pub mod infer;
+pub mod mailbox;
 pub mod model;
 pub mod number_format;
 pub mod output;

@@ -10,13 +10,14 @@ use common::Folder;
 use firmware::link::message::{Configuration, Refusal, Report, Request, UploadStep};
 use host_sim::Error;
 use host_sim::device::check::{Plan, check};
-use host_sim::device::{Device, upload};
+use host_sim::device::{Device, Wire, request_bytes, upload};
 use host_sim::model::{LoadedModel, Origin, encode};
 use host_sim::progress::Progress;
 use host_sim::random::Stream;
 use host_sim::scene::Scene;
 use host_sim::synth::synthesise;
 use host_sim::train::{Options, train};
+use model_core::blob::Floats;
 use virtual_device::Line;
 
 const SOUND: Line = Line { one_in: None };
@@ -48,13 +49,18 @@ fn frames() -> Vec<[[f32; 18]; 8]> {
 
 /// A device with `model`, at the other end of a socket.
 fn device(line: Line, model: &LoadedModel) -> Device<TcpStream> {
+    Device::new(socket(line, model)).unwrap()
+}
+
+/// The line to a device with `model`.
+fn socket(line: Line, model: &LoadedModel) -> TcpStream {
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
     let near = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
     let (far, _) = listener.accept().unwrap();
     far.set_nonblocking(true).unwrap();
     near.set_nodelay(true).unwrap();
     virtual_device::run(Patient(far), line, model.bytes(), frames());
-    Device::new(near).unwrap()
+    near
 }
 
 /// A socket that does not block when read, and does when written to.
@@ -100,6 +106,84 @@ fn a_sound_device_passes_every_check() {
     let uploads = findings.uploads.unwrap();
     assert_eq!((uploads.damaged_refused, uploads.damaged), (70, 70));
     assert!(uploads.interrupted > 5 && uploads.old_stayed == uploads.interrupted);
+}
+
+/// Requests of every kind, those that are refused among them, and bytes that are none, each with the number
+/// of its answers.
+fn requests(new: &LoadedModel) -> Vec<(Vec<u8>, usize)> {
+    let mut requests = Vec::new();
+    let mut add = |request: &Request<'_>| {
+        requests.push((request_bytes(requests.len() as u16 + 1, request).unwrap(), 1));
+    };
+    add(&Request::Identify);
+    add(&Request::Configuration);
+    let readings = frames();
+    for (frame, readings_ohm) in (0..).zip(readings.iter().cycle().take(40)) {
+        let readings_ohm = Floats::of(readings_ohm.as_flattened());
+        add(&Request::Decode { frame, readings_ohm });
+    }
+    add(&Request::Decode { frame: 40, readings_ohm: Floats::of(&[60.0; 7]) });
+    add(&Request::Upload(UploadStep::Chunk { offset: 0, bytes: &[1; 8] }));
+    add(&Request::Upload(UploadStep::Begin { length: new.bytes().len() as u32 }));
+    for (index, bytes) in new.bytes().chunks(512).enumerate() {
+        add(&Request::Upload(UploadStep::Chunk { offset: 512 * index as u32, bytes }));
+    }
+    add(&Request::Upload(UploadStep::Commit));
+    add(&Request::Identify);
+    let again = Floats::of(readings[0].as_flattened());
+    add(&Request::Decode { frame: 41, readings_ohm: again });
+    // Garbage, with zeros within it and at its end.
+    let garbage: Vec<u8> = (0..40_000_u32).map(|n| (n * n / 7) as u8).chain([0]).collect();
+    requests.push((garbage, 0));
+    let identify = request_bytes(1000, &Request::Identify).unwrap();
+    requests.push((identify, 1));
+    requests
+}
+
+/// All that the device answers.
+fn answers(mut wire: impl Wire, requests: &[(Vec<u8>, usize)]) -> Vec<u8> {
+    wire.set_read_timeout(Duration::from_secs(20)).unwrap();
+    let (mut answers, mut expected) = (Vec::new(), 0);
+    for (request, answered) in requests {
+        wire.write_all(request).unwrap();
+        expected += answered;
+        // Every answer ends with a zero.
+        while answers.split(|byte| *byte == 0).count() <= expected {
+            let mut bytes = [0; 4096];
+            let count = wire.read(&mut bytes).unwrap();
+            answers.extend_from_slice(&bytes[..count]);
+        }
+    }
+    answers
+}
+
+#[test]
+fn a_mailbox_carries_the_bytes_that_a_serial_line_carries() {
+    let (old, new) = (model(3), model(4));
+    let requests = requests(&new);
+    let serial = answers(socket(SOUND, &old), &requests);
+    let (host, end) = virtual_device::mailbox::pair();
+    virtual_device::run(end, SOUND, old.bytes(), frames());
+    assert!(answers(host, &requests) == serial, "other bytes through the mailbox");
+    // More than a ring holds, and so round its end.
+    assert!(serial.len() > 16_384, "{} bytes", serial.len());
+}
+
+#[test]
+fn a_device_behind_a_mailbox_passes_every_check() {
+    let model = model(16);
+    let (host, end) = virtual_device::mailbox::pair();
+    virtual_device::run(end, SOUND, model.bytes(), frames());
+    let mut device = Device::new(host).unwrap();
+    let plan = Plan {
+        frames: 100,
+        damaged_uploads: 14,
+        interruptions: true,
+        garbage_bytes: 50_000,
+        window: 4,
+    };
+    let findings = check(&mut device, &press(), &model, &plan, &Progress::silent()).unwrap();
+    assert!(findings.all_good(), "{findings:#?}");
 }
 
 #[test]

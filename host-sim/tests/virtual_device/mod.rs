@@ -12,6 +12,8 @@ use firmware::store::{FlashError, Slot};
 use host_sim::random::{Purpose, Random, Stream};
 use model_core::Frame;
 
+pub mod mailbox;
+
 /// How the line to the device spoils bytes, in either direction: one in so many, or none.
 #[derive(Debug, Clone, Copy)]
 pub struct Line {
