@@ -11,6 +11,7 @@ use firmware::link::message::{Configuration, Refusal, Report, Request, UploadSte
 use host_sim::Error;
 use host_sim::device::check::{Plan, check};
 use host_sim::device::{Device, Wire, request_bytes, upload};
+use host_sim::emulator::{self, Emulator};
 use host_sim::model::{LoadedModel, Origin, encode};
 use host_sim::progress::Progress;
 use host_sim::random::Stream;
@@ -167,6 +168,31 @@ fn a_mailbox_carries_the_bytes_that_a_serial_line_carries() {
     assert!(answers(host, &requests) == serial, "other bytes through the mailbox");
     // More than a ring holds, and so round its end.
     assert!(serial.len() > 16_384, "{} bytes", serial.len());
+}
+
+/// The image's file comes from the environment, since this needs QEMU and a toolchain for the target.
+#[test]
+#[ignore = "needs QEMU and the image: `cargo xtask emulate application` runs it"]
+fn the_image_answers_alike_on_both_lines() {
+    let image = std::env::var_os("TAXEL_IMAGE").expect("TAXEL_IMAGE is the path of qemu-app");
+    let folder = Folder::new("both_lines");
+    let (old, new) = (model(3), model(4));
+    let blob = folder.write("old.bin", old.bytes());
+    let requests = requests(&new);
+    let answers = [None, Some(folder.path("mailbox.ram"))].map(|mailbox| {
+        let options = emulator::Options {
+            qemu: "qemu-system-arm".into(),
+            image: image.clone().into(),
+            model: Some(blob.clone()),
+            log: None,
+            mailbox,
+            readout: false,
+        };
+        let (_emulator, lines) = Emulator::start(&options).unwrap();
+        answers(lines.link, &requests)
+    });
+    assert!(answers[0] == answers[1], "other bytes through the mailbox");
+    assert_eq!(folder.names(), ["old.bin"], "the mailbox goes with the emulator");
 }
 
 #[test]

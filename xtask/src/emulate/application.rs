@@ -3,7 +3,6 @@
 use std::ffi::{OsStr, OsString};
 use std::fs;
 use std::path::PathBuf;
-use std::process::Command;
 
 use crate::process::{Outcome, Said, capture, cargo, run, target_dir};
 use crate::toolchain::elf;
@@ -35,10 +34,31 @@ const OF_ARRAY: &[&str] = &["-n1000", "--scans=20"];
 /// The network for the whole array: the format and number of centres that take a device the least time.
 const ARRAY: &[&str] = &["--whole-array", "--format=fixed16", "--centres=64"];
 
+/// A test of host-sim that lets the image answer the same requests on both lines, byte for byte.
+const ON_BOTH: &[&str] = &[
+    "test",
+    "--quiet",
+    "--package=host-sim",
+    "--test=device",
+    "--",
+    "--ignored",
+    "--exact",
+    "the_image_answers_alike_on_both_lines",
+];
+
+/// How a test ends that was found, and passed.
+const PASSED: &str = "test result: ok. 1 passed";
+
+/// How cargo runs host-sim.
+const HOST_SIM: &[&str] = &["run", "--quiet", "--package=host-sim", "--"];
+
 /// One run of the application.
 pub struct Check {
     pub name: &'static str,
+    /// What cargo runs.
     arguments: Vec<OsString>,
+    /// What must be among its output.
+    says: &'static str,
 }
 
 /// What the first check leaves of the application's log.
@@ -47,7 +67,7 @@ pub fn log() -> PathBuf {
 }
 
 /// What is to be checked, once the models for it are trained.
-pub fn checks() -> Outcome<[Check; 3]> {
+pub fn checks() -> Outcome<[Check; 4]> {
     let [rows, array] =
         ["qemu-rows.bin", "qemu-array.bin"].map(|name| target_dir().join(name).into_os_string());
     let log = log().into_os_string();
@@ -60,29 +80,34 @@ pub fn checks() -> Outcome<[Check; 3]> {
         // The smaller model, which is uploaded on that line as well.
         Check::new("application on the UART", ON_UART, &["--model".as_ref(), &array]),
         Check::new("application with one network", OF_ARRAY, &["--model".as_ref(), &array]),
+        Check {
+            name: "application on both lines",
+            arguments: ON_BOTH.iter().map(OsString::from).collect(),
+            says: PASSED,
+        },
     ])
 }
 
 impl Check {
     fn new(name: &'static str, checks: &[&str], files: &[&OsStr]) -> Self {
         let image = elf(IMAGE).into_os_string();
-        let arguments = checks.iter().chain(&LIMITS).map(OsString::from);
+        let arguments = HOST_SIM.iter().chain(&["emulate", "press"]).chain(checks).chain(&LIMITS);
         let files = files.iter().map(OsString::from).chain(["--image".into(), image]);
-        Self { name, arguments: arguments.chain(files).collect() }
+        let arguments = arguments.map(OsString::from).chain(files).collect();
+        Self { name, arguments, says: "" }
     }
 
     /// Runs it; its output comes when it is done.
     pub fn run(&self) -> Said {
-        capture(host_sim(&["emulate", "press"]).args(&self.arguments))
+        let mut said = capture(cargo(&[]).args(&self.arguments).env("TAXEL_IMAGE", elf(IMAGE)));
+        if said.outcome.is_ok() && !said.out.contains(self.says) {
+            said.outcome = Err(format!("it does not say {:?}", self.says));
+        }
+        said
     }
 }
 
 fn train(options: &[&str], model: &OsStr) -> Outcome {
-    run(host_sim(&["train", "press"]).args(options).arg("--output").arg(model))
-}
-
-fn host_sim(arguments: &[&str]) -> Command {
-    let mut command = cargo(&["run", "--quiet", "--package", "host-sim", "--"]);
-    command.args(arguments);
-    command
+    let mut command = cargo(HOST_SIM);
+    run(command.args(["train", "press"]).args(options).arg("--output").arg(model))
 }
