@@ -1,16 +1,17 @@
 //! The emulator's programs, each held to the expected output beside it, and the application, held to
-//! the host.
+//! the host: two at a time, told of in order.
 
 mod application;
 mod cable;
 mod expected;
 pub mod qemu;
+mod queue;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::firmware::{QEMU, build_image};
-use crate::process::{Outcome, root};
+use crate::process::{Outcome, Said, root};
 use crate::toolchain::{Toolchain, elf};
 
 /// What the application is called among the programs.
@@ -39,24 +40,26 @@ pub fn run(names: &[&str], differences: Differences) -> Outcome {
     qemu::present()?;
     build_image(&Toolchain::find()?, QEMU)?;
 
-    let mut failed = Vec::new();
-    let mut conclude = |name: &str, outcome: Outcome| match outcome {
-        Ok(()) => println!("ok      {name}"),
-        Err(cause) => {
-            println!("FAILED  {name}: {cause}");
-            failed.push(name.to_owned());
-        }
-    };
-    for program in &chosen {
-        let name = name(program);
-        let output = qemu::run(&elf(&name));
-        if let (Ok(output), false) = (&output, names.is_empty()) {
-            print!("{output}");
-        }
-        conclude(&name, output.and_then(|output| check(program, &output, differences)));
-    }
+    let (mut jobs, mut failed) = (Vec::new(), Vec::new());
     if everything || !application.is_empty() {
-        conclude(APPLICATION, application::check());
+        match application::checks() {
+            // First, since they take longest.
+            Ok(checks) => jobs.extend(checks.map(Job::Application)),
+            Err(cause) => conclude(APPLICATION, Err(cause), &mut failed),
+        }
+    }
+    jobs.extend(chosen.into_iter().map(Job::Program));
+    let work = |job: &Job| match job {
+        Job::Program(program) => run_program(program, differences, !names.is_empty()),
+        Job::Application(check) => check.run(),
+    };
+    queue::work_through(&jobs, work, |job, said: Said| {
+        eprint!("{}", said.err);
+        print!("{}", said.out);
+        conclude(&job.name(), said.outcome, &mut failed);
+    });
+    if jobs.iter().any(|job| matches!(job, Job::Application(_))) {
+        println!("the application's log: cargo xtask log {}", application::log().display());
     }
     if failed.is_empty() {
         Ok(())
@@ -65,6 +68,44 @@ pub fn run(names: &[&str], differences: Differences) -> Outcome {
         Err(format!(
             "{failed}; if a program's log is meant to differ, cargo xtask emulate --accept"
         ))
+    }
+}
+
+/// What is run.
+enum Job {
+    /// The source of a program.
+    Program(PathBuf),
+    Application(application::Check),
+}
+
+impl Job {
+    fn name(&self) -> String {
+        match self {
+            Self::Program(program) => name(program),
+            Self::Application(check) => check.name.to_owned(),
+        }
+    }
+}
+
+/// Tells how `name` ended.
+fn conclude(name: &str, outcome: Outcome, failed: &mut Vec<String>) {
+    match outcome {
+        Ok(()) => println!("ok      {name}"),
+        Err(cause) => {
+            println!("FAILED  {name}: {cause}");
+            failed.push(name.to_owned());
+        }
+    }
+}
+
+fn run_program(program: &Path, differences: Differences, show: bool) -> Said {
+    match qemu::run(&elf(&name(program))) {
+        Ok(ended) => Said {
+            outcome: check(program, &ended.log, differences),
+            out: if show { ended.log } else { String::new() },
+            err: ended.complaints,
+        },
+        Err(cause) => Said { out: String::new(), err: String::new(), outcome: Err(cause) },
     }
 }
 

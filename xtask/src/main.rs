@@ -25,7 +25,7 @@ Usage: cargo xtask COMMAND
                             QEMU, and compares what they log and their exit status with the .out
                             file beside them; --accept writes these files instead. Shows the logs
                             of programs that are named. `application`, or no name, holds the
-                            application to the host as well: ten minutes
+                            application to the host as well: under a minute. Two run at a time
   log FILE [ELF]            prints a log that `host-sim emulate --log FILE` saved; ELF is the image
                             that wrote it, if it is another than that command's own
   size                      shows what flash and RAM the images take, and fails if that is more

@@ -3,7 +3,7 @@
 use std::env;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Command, ExitStatus, Stdio};
 
 /// What a step ends with: nothing to say, or why it failed.
 pub type Outcome<T = ()> = Result<T, String>;
@@ -30,7 +30,33 @@ pub fn cargo(arguments: &[&str]) -> Command {
 pub fn run(command: &mut Command) -> Outcome {
     show(command);
     let status = command.status().map_err(|cause| not_started(command, &cause))?;
-    if status.success() { Ok(()) } else { Err(format!("{} ended with {status}", name(command))) }
+    ended_well(command, status)
+}
+
+/// What a piece of work has to say once it is done.
+pub struct Said {
+    /// For stdout.
+    pub out: String,
+    /// For stderr.
+    pub err: String,
+    pub outcome: Outcome,
+}
+
+/// Runs `command`, and keeps what it prints.
+pub fn capture(command: &mut Command) -> Said {
+    let shown = shown(command);
+    match command.output() {
+        Ok(output) => Said {
+            out: String::from_utf8_lossy(&output.stdout).into_owned(),
+            err: shown + "\n" + &String::from_utf8_lossy(&output.stderr),
+            outcome: ended_well(command, output.status),
+        },
+        Err(cause) => Said {
+            out: String::new(),
+            err: shown + "\n",
+            outcome: Err(not_started(command, &cause)),
+        },
+    }
 }
 
 /// What became of a command whose messages were looked at.
@@ -78,8 +104,16 @@ fn name(command: &Command) -> String {
 }
 
 fn show(command: &Command) {
+    eprintln!("{}", shown(command));
+}
+
+fn shown(command: &Command) -> String {
     let arguments: Vec<_> = command.get_args().map(|a| a.to_string_lossy()).collect();
-    eprintln!("$ {} {}", name(command), arguments.join(" "));
+    format!("$ {} {}", name(command), arguments.join(" "))
+}
+
+fn ended_well(command: &Command, status: ExitStatus) -> Outcome {
+    if status.success() { Ok(()) } else { Err(format!("{} ended with {status}", name(command))) }
 }
 
 fn not_started(command: &Command, cause: &std::io::Error) -> String {

@@ -1,5 +1,5 @@
-//! The application in the emulator: the link on the first serial line, the readout's parts at the
-//! other end of the second. `host-sim emulate` is at both.
+//! The application in the emulator: the link in a mailbox or on the first serial line, the readout's parts at
+//! the other end of the second. `host-sim emulate` is at both.
 #![no_std]
 #![no_main]
 
@@ -15,6 +15,8 @@ use firmware::link::message::{Configuration, Memory};
 use firmware::platform::{Platform, Port};
 use firmware::readout::{Mcp3208s, Scanner, ShiftRegister595};
 use qemu_image::clock::Clock;
+use qemu_image::mailbox::Mailbox;
+use qemu_image::psram::Psram;
 use qemu_image::slot::Slot;
 use qemu_image::uart::Uart;
 use qemu_image::watchdog::Watchdog;
@@ -32,9 +34,31 @@ const ROW_LATCH: u8 = 14;
 /// Constants of the circuit, which stay in flash.
 static CIRCUIT: ZeroPotential<8, 18> = ZeroPotential::TYPICAL;
 
+/// What carries the bytes of a line.
+enum Carrier {
+    Uart(Uart),
+    Mailbox(Mailbox<Psram>),
+}
+
+impl Carrier {
+    /// The link's: the mailbox if the host has laid one out, else the first UART.
+    fn of_link() -> Self {
+        // SAFETY: nobody else takes it.
+        let psram = unsafe { Psram::take() };
+        Mailbox::find(psram).map_or_else(|| Self::Uart(Uart::first()), Self::Mailbox)
+    }
+
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Uart(_) => "UART",
+            Self::Mailbox(_) => "mailbox",
+        }
+    }
+}
+
 /// A serial line with the clock, which all lines share.
 struct Line<'c> {
-    uart: Uart,
+    carrier: Carrier,
     clock: &'c Cell<Clock>,
 }
 
@@ -47,11 +71,17 @@ impl Port for Line<'_> {
     }
 
     fn receive(&mut self) -> Option<u8> {
-        self.uart.try_read()
+        match &mut self.carrier {
+            Carrier::Uart(uart) => uart.try_read(),
+            Carrier::Mailbox(mailbox) => mailbox.try_read(),
+        }
     }
 
     fn send(&mut self, byte: u8) -> bool {
-        self.uart.try_write(byte)
+        match &mut self.carrier {
+            Carrier::Uart(uart) => uart.try_write(byte),
+            Carrier::Mailbox(mailbox) => mailbox.try_write(byte),
+        }
     }
 }
 
@@ -96,7 +126,10 @@ impl Platform for Board<'_> {
 fn main() -> ! {
     info!("taxel {=str} on an emulated Cortex-M4F", env!("CARGO_PKG_VERSION"));
     let clock = Cell::new(Clock::start());
-    let remote = Remote::new(Line { uart: Uart::second(), clock: &clock });
+    let link = Carrier::of_link();
+    info!("link: {=str}", link.name());
+    let readout = Carrier::Uart(Uart::second());
+    let remote = Remote::new(Line { carrier: readout, clock: &clock });
     let [data, clock_pin, latch] = [ROW_DATA, ROW_CLOCK, ROW_LATCH].map(|pin| remote.pin(pin));
     let scanner = Scanner {
         drive: ShiftRegister595::<_, 8> { data, clock: clock_pin, latch },
@@ -105,7 +138,7 @@ fn main() -> ! {
         circuit: &CIRCUIT,
     };
     let board = Board {
-        line: Line { uart: Uart::first(), clock: &clock },
+        line: Line { carrier: link, clock: &clock },
         watchdog: Watchdog::start(WATCHDOG_MS),
         fed_us: 0,
     };

@@ -1,13 +1,15 @@
 //! The device's image in QEMU's mps2-an386, a Cortex-M4F, with its serial lines here.
 
 use std::fs::File;
-use std::io::{ErrorKind, Read};
+use std::io::{self, ErrorKind, Read, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use crate::device::Wire;
 use crate::error::{Error, Result};
+use crate::mailbox::{FILE_BYTES, Mailbox};
 
 /// Where the image expects its first model slot.
 const SLOT_ADDRESS: u32 = 0x0020_0000;
@@ -25,6 +27,8 @@ pub struct Options {
     pub model: Option<PathBuf>,
     /// Where the image's log goes, as defmt writes it; nowhere if not given.
     pub log: Option<PathBuf>,
+    /// Where the file of a mailbox lies while the emulator runs; without it the link is on the first UART.
+    pub mailbox: Option<PathBuf>,
     /// Whether the readout's line is wanted.
     pub readout: bool,
 }
@@ -48,16 +52,92 @@ impl Options {
 /// The image's serial lines.
 #[derive(Debug)]
 pub struct Lines {
-    /// The first, of the link.
-    pub link: TcpStream,
-    /// The second, of the readout, if it was wanted.
+    /// That of the link.
+    pub link: Link,
+    /// The second UART, of the readout, if it was wanted.
     pub readout: Option<TcpStream>,
+}
+
+/// The line of the link.
+#[derive(Debug)]
+pub enum Link {
+    /// Through shared memory.
+    Mailbox {
+        /// What carries the bytes.
+        mailbox: Mailbox,
+        /// The first UART, which is silent, and closed when the emulator ends.
+        uart: TcpStream,
+    },
+    /// Through the first UART.
+    Uart(TcpStream),
+}
+
+impl Read for Link {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        match self {
+            Self::Mailbox { mailbox, uart } => match mailbox.read(bytes) {
+                Err(cause) if cause.kind() == ErrorKind::TimedOut && is_closed(uart) => Ok(0),
+                outcome => outcome,
+            },
+            Self::Uart(uart) => uart.read(bytes),
+        }
+    }
+}
+
+impl Write for Link {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Self::Mailbox { mailbox, uart } => match mailbox.write(bytes) {
+                Err(cause) if cause.kind() == ErrorKind::TimedOut && is_closed(uart) => {
+                    Err(ErrorKind::BrokenPipe.into())
+                }
+                outcome => outcome,
+            },
+            Self::Uart(uart) => uart.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match self {
+            Self::Mailbox { mailbox, .. } => mailbox.flush(),
+            Self::Uart(uart) => uart.flush(),
+        }
+    }
+}
+
+impl Wire for Link {
+    fn set_read_timeout(&mut self, timeout: Duration) -> io::Result<()> {
+        match self {
+            Self::Mailbox { mailbox, .. } => mailbox.set_read_timeout(timeout),
+            Self::Uart(uart) => Wire::set_read_timeout(uart, timeout),
+        }
+    }
+}
+
+/// Whether the other end of a socket that does not block is closed.
+fn is_closed(stream: &TcpStream) -> bool {
+    match stream.peek(&mut [0]) {
+        Ok(count) => count == 0,
+        Err(cause) => cause.kind() != ErrorKind::WouldBlock,
+    }
 }
 
 /// A running emulator; it ends with this value.
 #[derive(Debug)]
 pub struct Emulator {
     child: Child,
+    _shared: Option<SharedFile>,
+}
+
+/// A mailbox's file, which goes with this value.
+#[derive(Debug)]
+struct SharedFile(PathBuf);
+
+impl Drop for SharedFile {
+    fn drop(&mut self) {
+        // Somebody may have tidied up.
+        let _ = std::fs::remove_file(&self.0);
+    }
 }
 
 impl Emulator {
@@ -74,12 +154,15 @@ impl Emulator {
             Ok((listener, format!("tcp:127.0.0.1:{port},nodelay=on")))
         };
         let listen = || listen().map_err(failed);
-        let (link, link_serial) = listen()?;
+        let (uart, uart_serial) = listen()?;
         let readout = options.readout.then(listen).transpose()?;
         let mut command = Command::new(&options.qemu);
-        command.args(["-M", "mps2-an386", "-cpu", "cortex-m4", "-display", "none"]);
+        let mailbox = options.mailbox.as_deref().map(create_mailbox).transpose()?;
+        let shared = options.mailbox.clone().map(SharedFile);
+        command.args(machine(options.mailbox.as_deref()));
+        command.args(["-cpu", "cortex-m4", "-display", "none"]);
         command.args(["-monitor", "none", "-semihosting-config", "enable=on,target=native"]);
-        command.args(["-serial", &link_serial]);
+        command.args(["-serial", &uart_serial]);
         if let Some((_, readout_serial)) = &readout {
             command.args(["-serial", readout_serial]);
         }
@@ -103,10 +186,17 @@ impl Emulator {
             }
             failed(cause)
         })?;
-        let mut emulator = Self { child };
+        let mut emulator = Self { child, _shared: shared };
         let mut connect = |to: &TcpListener| accept(to, &mut emulator.child).map_err(failed);
-        let link = connect(&link)?;
+        let uart = connect(&uart)?;
         let readout = readout.map(|(listener, _)| connect(&listener)).transpose()?;
+        let link = match mailbox {
+            Some(mailbox) => {
+                uart.set_nonblocking(true).map_err(failed)?;
+                Link::Mailbox { mailbox, uart }
+            }
+            None => Link::Uart(uart),
+        };
         Ok((emulator, Lines { link, readout }))
     }
 }
@@ -117,6 +207,18 @@ impl Drop for Emulator {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
+}
+
+fn create_mailbox(path: &Path) -> Result<Mailbox> {
+    Mailbox::create(path).map_err(|cause| Error::Mailbox { path: path.into(), cause })
+}
+
+/// The machine, its PSRAM in the file at `mailbox` if that is given.
+fn machine(mailbox: Option<&Path>) -> Vec<String> {
+    let Some(path) = mailbox else { return ["-M", "mps2-an386"].map(String::from).to_vec() };
+    let file = format!("mem-path={},share=on", escaped(path));
+    let memory = format!("memory-backend-file,id=psram,size={FILE_BYTES},{file}");
+    ["-M", "mps2-an386,memory-backend=psram", "-object", &memory].map(String::from).to_vec()
 }
 
 /// QEMU reads a comma as the end of an option unless it is doubled.

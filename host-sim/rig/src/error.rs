@@ -100,6 +100,14 @@ pub enum Error {
         /// Why.
         cause: std::io::Error,
     },
+    /// The file of a mailbox cannot be made.
+    #[error("cannot make the mailbox {}: {cause}", path.display())]
+    Mailbox {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        cause: std::io::Error,
+    },
     /// The image cannot be read.
     #[error("{}: {cause}; `cargo xtask firmware` builds it, below CARGO_TARGET_DIR if that is set", image.display())]
     NoImage {

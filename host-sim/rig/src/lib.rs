@@ -5,6 +5,7 @@
 
 pub mod error;
 pub mod device;
+pub mod mailbox;
 pub mod emulator;
 
 pub use error::{Error, Result};

@@ -3,8 +3,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use super::progress::Terminal;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use host_sim::Result;
 use taxel_data::output;
 use taxel_rig::device::Device;
@@ -14,11 +13,22 @@ use taxel_rig::emulator::{self, Emulator};
 
 use super::Common;
 use super::check_arguments::{CheckArguments, conclude};
+use super::progress::Terminal;
 
-/// The emulator holds bytes back while the device is busy, so frames may queue.
+/// Either line holds bytes back while the device is busy, so frames may queue.
 const WINDOW: usize = 4;
 /// It loses nothing, but a busy computer makes it slow: an answer that takes longer is lost.
 const PATIENCE: Duration = Duration::from_secs(20);
+
+/// What carries the bytes between the host and the image's link.
+#[derive(Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+enum Line {
+    /// Memory that both share: about as fast as the image decodes.
+    #[default]
+    Mailbox,
+    /// The image's first UART, which QEMU serves byte by byte: some thirty frames a second.
+    Uart,
+}
 
 /// Run the firmware in QEMU, let it decode a scene's frames, and compare with the host bit for bit.
 ///
@@ -36,6 +46,9 @@ pub struct Arguments {
     /// MCP3208.
     #[arg(long, value_name = "N", default_value_t = 0)]
     scans: usize,
+    /// What carries the link.
+    #[arg(long, value_enum, value_name = "LINE", default_value_t)]
+    line: Line,
     /// Image of the firmware for mps2-an386.
     #[arg(
         long,
@@ -60,6 +73,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         image: arguments.image.clone(),
         model: None,
         log: arguments.log.is_some().then(|| temporary("log.defmt")),
+        mailbox: (arguments.line == Line::Mailbox).then(|| temporary("mailbox.ram")),
         readout: arguments.scans > 0,
     };
     options.check()?;

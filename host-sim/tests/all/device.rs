@@ -7,12 +7,14 @@ use crate::common::Folder;
 use crate::virtual_device::Line;
 use firmware::link::message::{Configuration, Refusal, Report, Request, UploadStep};
 use host_sim::experiment::Experiment;
+use model_core::blob::Floats;
 use taxel_data::progress::Silent;
 use taxel_data::random::Stream;
 use taxel_learn::{Exponential, ModelBlob};
 use taxel_rig::Error;
 use taxel_rig::device::check::{Plan, check};
-use taxel_rig::device::{Device, upload};
+use taxel_rig::device::{Device, Wire, request_bytes, upload};
+use taxel_rig::emulator::{self, Emulator};
 use taxel_simulate::World;
 use taxel_simulate::synthesise;
 
@@ -42,13 +44,18 @@ fn frames() -> Vec<[[f32; 18]; 8]> {
 
 /// A device with `model`, at the other end of a socket.
 fn device(line: Line, model: &ModelBlob) -> Device<TcpStream> {
+    Device::new(socket(line, model)).unwrap()
+}
+
+/// The line to a device with `model`.
+fn socket(line: Line, model: &ModelBlob) -> TcpStream {
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
     let near = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
     let (far, _) = listener.accept().unwrap();
     far.set_nonblocking(true).unwrap();
     near.set_nodelay(true).unwrap();
     crate::virtual_device::run(Patient(far), line, model.bytes(), frames());
-    Device::new(near).unwrap()
+    near
 }
 
 /// A socket that does not block when read, and does when written to.
@@ -94,6 +101,109 @@ fn a_sound_device_passes_every_check() {
     let uploads = findings.uploads.unwrap();
     assert_eq!((uploads.damaged_refused, uploads.damaged), (70, 70));
     assert!(uploads.interrupted > 5 && uploads.old_stayed == uploads.interrupted);
+}
+
+/// Requests of every kind, those that are refused among them, and bytes that are none, each with the number
+/// of its answers.
+fn requests(new: &ModelBlob) -> Vec<(Vec<u8>, usize)> {
+    let mut requests = Vec::new();
+    let mut add = |request: &Request<'_>| {
+        requests.push((request_bytes(requests.len() as u16 + 1, request).unwrap(), 1));
+    };
+    add(&Request::Identify);
+    add(&Request::Configuration);
+    let readings = frames();
+    for (frame, readings_ohm) in (0..).zip(readings.iter().cycle().take(40)) {
+        let readings_ohm = Floats::of(readings_ohm.as_flattened());
+        add(&Request::Decode { frame, readings_ohm });
+    }
+    add(&Request::Decode { frame: 40, readings_ohm: Floats::of(&[60.0; 7]) });
+    add(&Request::Upload(UploadStep::Chunk { offset: 0, bytes: &[1; 8] }));
+    add(&Request::Upload(UploadStep::Begin { length: new.bytes().len() as u32 }));
+    for (index, bytes) in new.bytes().chunks(512).enumerate() {
+        add(&Request::Upload(UploadStep::Chunk { offset: 512 * index as u32, bytes }));
+    }
+    add(&Request::Upload(UploadStep::Commit));
+    add(&Request::Identify);
+    let again = Floats::of(readings[0].as_flattened());
+    add(&Request::Decode { frame: 41, readings_ohm: again });
+    // Garbage, with zeros within it and at its end.
+    let garbage: Vec<u8> = (0..40_000_u32).map(|n| (n * n / 7) as u8).chain([0]).collect();
+    requests.push((garbage, 0));
+    let identify = request_bytes(1000, &Request::Identify).unwrap();
+    requests.push((identify, 1));
+    requests
+}
+
+/// All that the device answers.
+fn answers(mut wire: impl Wire, requests: &[(Vec<u8>, usize)]) -> Vec<u8> {
+    wire.set_read_timeout(Duration::from_secs(20)).unwrap();
+    let (mut answers, mut expected) = (Vec::new(), 0);
+    for (request, answered) in requests {
+        wire.write_all(request).unwrap();
+        expected += answered;
+        // Every answer ends with a zero.
+        while answers.split(|byte| *byte == 0).count() <= expected {
+            let mut bytes = [0; 4096];
+            let count = wire.read(&mut bytes).unwrap();
+            answers.extend_from_slice(&bytes[..count]);
+        }
+    }
+    answers
+}
+
+#[test]
+fn a_mailbox_carries_the_bytes_that_a_serial_line_carries() {
+    let (old, new) = (model(3), model(4));
+    let requests = requests(&new);
+    let serial = answers(socket(SOUND, &old), &requests);
+    let (host, end) = crate::virtual_device::mailbox::pair();
+    crate::virtual_device::run(end, SOUND, old.bytes(), frames());
+    assert!(answers(host, &requests) == serial, "other bytes through the mailbox");
+    // More than a ring holds, and so round its end.
+    assert!(serial.len() > 16_384, "{} bytes", serial.len());
+}
+
+/// The image's file comes from the environment, since this needs QEMU and a toolchain for the target.
+#[test]
+#[ignore = "needs QEMU and the image: `cargo xtask emulate application` runs it"]
+fn the_image_answers_alike_on_both_lines() {
+    let image = std::env::var_os("TAXEL_IMAGE").expect("TAXEL_IMAGE is the path of qemu-app");
+    let folder = Folder::new("both_lines");
+    let (old, new) = (model(3), model(4));
+    let blob = folder.write("old.bin", old.bytes());
+    let requests = requests(&new);
+    let answers = [None, Some(folder.path("mailbox.ram"))].map(|mailbox| {
+        let options = emulator::Options {
+            qemu: "qemu-system-arm".into(),
+            image: image.clone().into(),
+            model: Some(blob.clone()),
+            log: None,
+            mailbox,
+            readout: false,
+        };
+        let (_emulator, lines) = Emulator::start(&options).unwrap();
+        answers(lines.link, &requests)
+    });
+    assert!(answers[0] == answers[1], "other bytes through the mailbox");
+    assert_eq!(folder.names(), ["old.bin"], "the mailbox goes with the emulator");
+}
+
+#[test]
+fn a_device_behind_a_mailbox_passes_every_check() {
+    let model = model(16);
+    let (host, end) = crate::virtual_device::mailbox::pair();
+    crate::virtual_device::run(end, SOUND, model.bytes(), frames());
+    let mut device = Device::new(host).unwrap();
+    let plan = Plan {
+        frames: 100,
+        damaged_uploads: 14,
+        interruptions: true,
+        garbage_bytes: 50_000,
+        window: 4,
+    };
+    let findings = check(&mut device, &press(), &model, &plan, &Silent).unwrap();
+    assert!(findings.all_good(), "{findings:#?}");
 }
 
 #[test]

@@ -10,6 +10,8 @@ use firmware::store::{FlashError, Slot};
 use model_core::Frame;
 use taxel_data::random::{Purpose, Random, Stream};
 
+pub mod mailbox;
+
 /// How the line to the device spoils bytes, in either direction: one in so many, or none.
 #[derive(Debug, Clone, Copy)]
 pub struct Line {

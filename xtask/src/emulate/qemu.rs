@@ -41,8 +41,16 @@ pub fn decoded(log: &Path, elf: &Path) -> Outcome<String> {
     Ok(decode(&table(elf)?, &logged))
 }
 
-/// What the program logs, decoded, one entry after the other, and the exit status.
-pub fn run(elf: &Path) -> Outcome<String> {
+/// What a program did that ended by itself.
+pub struct Ended {
+    /// What it logged, decoded, one entry after the other, and its exit status.
+    pub log: String,
+    /// What QEMU had to say.
+    pub complaints: String,
+}
+
+/// Runs the program in `elf` to its end.
+pub fn run(elf: &Path) -> Outcome<Ended> {
     let table = table(elf)?;
 
     let mut child =
@@ -56,13 +64,14 @@ pub fn run(elf: &Path) -> Outcome<String> {
         return Err(format!("cannot read what {QEMU} writes"));
     };
 
-    eprint!("{}", String::from_utf8_lossy(&complaints));
+    let complaints = String::from_utf8_lossy(&complaints).into_owned();
     let log = decode(&table, &logged);
     match status.and_then(|status| status.code()) {
-        Some(code) => Ok(format!("{log}exit status {code}\n")),
-        None => {
-            Err(format!("it did not end by itself within {} s; it logged\n{log}", LIMIT.as_secs()))
-        }
+        Some(code) => Ok(Ended { log: format!("{log}exit status {code}\n"), complaints }),
+        None => Err(format!(
+            "it did not end by itself within {} s; it logged\n{log}{complaints}",
+            LIMIT.as_secs()
+        )),
     }
 }
 
