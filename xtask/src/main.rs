@@ -1,12 +1,16 @@
 //! One command for everything that people and CI run: `cargo xtask help`.
 
-mod ci;
-mod cycles;
-mod emulate;
-mod firmware;
 mod process;
-mod size;
 mod toolchain;
+
+mod firmware;
+mod size;
+
+mod emulate;
+
+mod cycles;
+
+mod ci;
 
 use std::env;
 use std::process::ExitCode;
@@ -32,8 +36,8 @@ Usage: cargo xtask COMMAND
                             than firmware/budget.txt allows
   cycles [OPTION…]          counts in QEMU what decoding costs a Cortex-M4, with every kernel and
                             K = 16 to 256: instructions, cycles by a model, microseconds; fails if
-                            that is more than its budget, or other than firmware/cycles.csv has for the
-                            compiler in use
+                            that is more than its budget, or other than firmware/cycles.csv has: exactly
+                            with the compiler that it names, else 2 % more
       --json                prints a list of objects to stdout, and nothing else
       --accept              writes firmware/cycles.csv, and the tables of docs/cycles.md, instead
       --kernel NAME         one kernel alone, held to its budget alone
