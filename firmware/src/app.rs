@@ -17,11 +17,12 @@ use crate::readout::{Baseline, FrameSource};
 use crate::store::{Slot, Upload, blob_in_slot, generation};
 use crate::tactile::Tactile;
 
-mod answer;
+// From the ground up.
 mod configuration;
 mod frame_clock;
 mod line;
 mod session;
+mod answer;
 
 use frame_clock::FrameClock;
 use line::Line;

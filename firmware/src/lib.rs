@@ -9,15 +9,16 @@
 //! All arithmetic is [`model_core`]'s, so that board and host agree bit for bit.
 #![cfg_attr(not(test), no_std)]
 
-pub mod app;
-pub mod circuit;
-pub mod link;
+// From the ground up: a module imports only what is declared before it.
 mod log;
-pub mod platform;
+pub mod circuit;
 pub mod readout;
+pub mod link;
+pub mod timing;
+pub mod platform;
 pub mod remote;
 pub mod store;
 mod tactile;
-pub mod timing;
+pub mod app;
 
 pub use tactile::{PaperSensor, Tactile};

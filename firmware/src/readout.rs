@@ -11,8 +11,8 @@ use model_core::{ColumnWire, Frame, RowWire};
 use serde::{Deserialize, Serialize};
 
 mod baseline;
-mod columns;
 mod rows;
+mod columns;
 mod scanner;
 #[cfg(test)]
 mod tests;

@@ -1,6 +1,7 @@
 //! One command for everything that people and CI run: `cargo xtask help`.
 
 mod process;
+mod structure;
 mod toolchain;
 
 mod firmware;
@@ -23,6 +24,8 @@ Usage: cargo xtask COMMAND
   ci [--after-cargo-test]   everything that CI runs: format, clippy, tests, docs, firmware, emulate,
                             size, cycles; goes on after a failure and ends with a summary. After a plain
                             `cargo test`, the option tests only the crates which that leaves out
+  structure                 which module and crate may import which, and where `unsafe` may stand, as
+                            ARCHITECTURE.md says; what part of all lines each crate holds
   firmware                  builds and lints for thumbv7em-none-eabihf all that runs on a device,
                             and proves by linking that no panic is reachable there
   emulate [--accept] [NAME…]  runs the programs of these names, or all, of firmware/qemu/src/bin in
@@ -68,6 +71,7 @@ fn main() -> ExitCode {
         ["log", log] => emulate::print_log(log, None),
         ["log", log, image] => emulate::print_log(log, Some(image)),
         ["size"] => size::run(),
+        ["structure"] => structure::run(),
         ["cycles", ref options @ ..] if cycles::Options::parse(options).is_some() => {
             cycles::run(&cycles::Options::parse(options).unwrap_or_default())
         }

@@ -12,8 +12,11 @@ use stm32f4xx_hal::spi::Spi;
 use stm32f4xx_hal::timer::SysDelay;
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
+use crate::clock::Clock;
 use crate::held_pin::HeldPin;
-use crate::{Clock, ResetCause, Serial, Slot};
+use crate::reset::ResetCause;
+use crate::serial::Serial;
+use crate::slot::Slot;
 
 /// Erasing a slot takes up to 4 s, in which nothing is fed; the watchdog's own clock is up to half
 /// as fast again as it should be.

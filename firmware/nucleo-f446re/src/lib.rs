@@ -4,7 +4,7 @@
 #![cfg(target_os = "none")]
 #![no_std]
 
-mod board;
+// From the ground up: a module imports only what is declared before it.
 mod clock;
 mod held_pin;
 #[path = "../../qemu/src/memory.rs"]
@@ -12,6 +12,7 @@ pub mod memory;
 mod reset;
 mod serial;
 mod slot;
+mod board;
 
 pub use board::{Board, Converter, RowPin, SPI_HZ, Select};
 pub use clock::Clock;

@@ -3,8 +3,8 @@
 use model_core::blob::{DecodeError, Floats};
 use model_core::exp::ExpKernel;
 
-use super::session::InForce;
-use super::{Core, Leave, Session};
+use super::Core;
+use super::session::{InForce, Leave, Session};
 use crate::link::message::{
     Configuration, Identity, ModelFault, Refusal, Report, Request, UploadStep,
 };
