@@ -54,16 +54,20 @@ pub fn run() -> Outcome {
 fn module_order(packages: &[Package]) -> Outcome<Vec<String>> {
     let mut broken = Vec::new();
     for package in packages {
-        let mut of_package = Vec::new();
+        let (mut breaches, mut advice) = (Vec::new(), Vec::new());
         for file in &package.roots {
-            let tree = Module::read(file, &text_of)?;
-            of_package.extend(order::broken(&tree));
+            let found = order::broken(&Module::read(file, &text_of)?);
+            breaches.extend(found.breaches);
+            advice.extend(found.advice);
         }
-        let excused = house::NOT_YET_IN_ORDER.contains(&package.name.as_str());
-        match (excused, of_package.len()) {
-            (false, _) => broken.extend(of_package),
-            (true, 0) => println!("{}: in order; take it off NOT_YET_IN_ORDER", package.name),
-            (true, count) => println!("{}: not yet in order, {count} breaches", package.name),
+        if house::NOT_YET_IN_ORDER.contains(&package.name.as_str()) {
+            match breaches.len() {
+                0 => println!("{}: in order; take it off NOT_YET_IN_ORDER", package.name),
+                count => println!("{}: not yet in order, {count} breaches", package.name),
+            }
+        } else {
+            broken.extend(breaches);
+            advice.iter().for_each(|advice| println!("{advice}"));
         }
     }
     Ok(broken)

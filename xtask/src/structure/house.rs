@@ -13,6 +13,8 @@ pub enum Side {
 pub const CRATES: &[(&str, Side)] = &[
     ("model-core", Side::Device),
     ("firmware", Side::Device),
+    ("remote-readout", Side::Device),
+    ("board-common", Side::Device),
     ("link-check", Side::Device),
     ("qemu-image", Side::Device),
     ("nucleo-f446re", Side::Device),

@@ -27,8 +27,16 @@ struct Edge<'m> {
     to: usize,
 }
 
-/// Every breach in the crate, in words; then, for each module that has breaches, what order would do.
-pub fn broken(root: &Module) -> Vec<String> {
+/// What is wrong with a crate, in words.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Disorder {
+    pub breaches: Vec<String>,
+    /// For each module whose children break the order, what order would do.
+    pub advice: Vec<String>,
+}
+
+/// Every breach in the crate.
+pub fn broken(root: &Module) -> Disorder {
     let (mut broken, mut edges) = (Vec::new(), Vec::new());
     visit(root, root, &mut broken, &mut edges);
     let mut parents: Vec<&Module> = Vec::new();
@@ -37,8 +45,8 @@ pub fn broken(root: &Module) -> Vec<String> {
             parents.push(edge.parent);
         }
     }
-    broken.extend(parents.into_iter().map(|parent| advice(parent, &edges)));
-    broken
+    let advice = parents.into_iter().map(|parent| advice(parent, &edges)).collect();
+    Disorder { breaches: broken, advice }
 }
 
 fn visit<'m>(
@@ -172,9 +180,11 @@ fn advice(parent: &Module, edges: &[Edge<'_>]) -> String {
 #[cfg(test)]
 mod tests {
     use super::super::modules::tests::tree;
+    use super::Disorder;
 
     fn broken(files: &[(&str, &str)]) -> Vec<String> {
-        super::broken(&tree(files).unwrap())
+        let Disorder { breaches, advice } = super::broken(&tree(files).unwrap());
+        [breaches, advice].concat()
     }
 
     #[test]

@@ -3,9 +3,10 @@
 #![no_std]
 #![no_main]
 
-mod inputs;
 mod kernel;
 mod region;
+
+mod inputs;
 
 use core::hint::black_box;
 
