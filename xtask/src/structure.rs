@@ -25,6 +25,10 @@ use workspace::Package;
 pub fn run() -> Outcome {
     let packages = workspace::packages()?;
     let mut broken = crates::broken(&packages, house::CRATES);
+    let absent = crates::absent(&packages, house::CRATES);
+    if !absent.is_empty() {
+        println!("declared, but not there: {}", absent.join(", "));
+    }
     broken.extend(module_order(&packages)?);
     let sources = workspace::sources()?;
     let mut lines = Vec::new();

@@ -30,6 +30,12 @@ pub fn broken(packages: &[Package], declared: &[(&str, Side)]) -> Vec<String> {
     broken
 }
 
+/// Crates that are declared and not in the workspace.
+pub fn absent<'d>(packages: &[Package], declared: &[(&'d str, Side)]) -> Vec<&'d str> {
+    let is_there = |name: &str| packages.iter().any(|package| package.name == name);
+    declared.iter().map(|(name, _)| *name).filter(|name| !is_there(name)).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::workspace::Dependency;
@@ -72,6 +78,11 @@ mod tests {
             broken(&[package("board", &[("desk", Kind::Dev)])], DECLARED),
             ["board/Cargo.toml: board depends on desk, which stands above it"]
         );
+    }
+
+    #[test]
+    fn a_crate_that_is_declared_and_not_there_is_named() {
+        assert_eq!(absent(&[package("ground", &[])], DECLARED), ["board", "desk"]);
     }
 
     #[test]

@@ -5,7 +5,9 @@ use std::path::Path;
 use proc_macro2::{Delimiter, LineColumn, TokenStream, TokenTree};
 use syn::spanned::Spanned;
 use syn::visit::{self, Visit};
-use syn::{Attribute, Expr, ExprLit, ForeignItemFn, ImplItemFn, ItemFn, Lit, Meta, Signature};
+use syn::{
+    Attribute, Expr, ExprLit, ForeignItemFn, ImplItem, ItemFn, ItemImpl, Lit, Meta, Signature,
+};
 use syn::{Stmt, TraitItemFn};
 
 use crate::process::Outcome;
@@ -137,9 +139,16 @@ impl<'ast> Visit<'ast> for Found {
         visit::visit_item_fn(self, function);
     }
 
-    fn visit_impl_item_fn(&mut self, function: &'ast ImplItemFn) {
-        self.function(&function.attrs, &function.sig);
-        visit::visit_impl_item_fn(self, function);
+    fn visit_item_impl(&mut self, implementation: &'ast ItemImpl) {
+        // What a trait's functions ask for stands with the trait.
+        if implementation.trait_.is_none() {
+            for item in &implementation.items {
+                if let ImplItem::Fn(function) = item {
+                    self.function(&function.attrs, &function.sig);
+                }
+            }
+        }
+        visit::visit_item_impl(self, implementation);
     }
 
     fn visit_trait_item_fn(&mut self, function: &'ast TraitItemFn) {
@@ -199,7 +208,8 @@ mod tests {
             pub unsafe fn i() {}\n\
             #[unsafe(no_mangle)]\n\
             fn j() {}\n\
-            unsafe extern \"C\" { fn k(); }\n";
+            unsafe extern \"C\" { fn k(); }\n\
+            impl T for S { unsafe fn l() {} }\n";
         for file in ["image/src/main.rs", "image/src/deep/er.rs", "core/assembly.rs"] {
             assert_eq!(found(file, text), <[&str; 0]>::default());
         }
