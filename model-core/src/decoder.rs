@@ -77,8 +77,11 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize>
     /// # Errors
     /// [`DecodeError`]: the blob is unsound, or its shape is not this decoder's.
     pub fn check(blob: &'a [u8]) -> Result<Model<'a>, DecodeError> {
+        Self::of_this_shape(Model::decode(blob)?)
+    }
+
+    fn of_this_shape(model: Model<'a>) -> Result<Model<'a>, DecodeError> {
         const { assert!(ROWS > 0 && COLS > 0 && OUTPUTS > 0, "a sensor has rows, columns, outputs") }
-        let model = Model::decode(blob)?;
         let expected = ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS };
         if model.shape() == expected {
             Ok(model)
@@ -92,7 +95,15 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize>
     /// # Errors
     /// [`DecodeError`]: the blob is unsound, or its shape is not this decoder's.
     pub fn load(blob: &'a [u8]) -> Result<Self, DecodeError> {
-        let model = Self::check(blob)?;
+        Self::of(Model::decode(blob)?)
+    }
+
+    /// A decoder of a model that was read from its blob before.
+    ///
+    /// # Errors
+    /// [`DecodeError::ShapeMismatch`]: the model's shape is not this decoder's.
+    pub fn of(model: Model<'a>) -> Result<Self, DecodeError> {
+        let model = Self::of_this_shape(model)?;
         let mut row_sections = [NetworkSection::EMPTY; ROWS];
         for (row, section) in row_sections.iter_mut().enumerate() {
             // A sound model has a network for every row.

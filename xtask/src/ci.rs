@@ -1,66 +1,109 @@
-//! Everything that CI runs, one step after the other.
+//! Everything that CI runs: two rows of steps beside one another, one for the host and one for the device.
 
+mod step;
+mod times;
+
+use std::path::Path;
+use std::process::Command;
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
+use std::{env, fs, thread};
 
-use crate::cycles;
-use crate::emulate::{self, Differences};
-use crate::firmware;
-use crate::process::{Outcome, cargo, run as run_command};
-use crate::size;
+use crate::process::{Outcome, cargo, root, target_dir};
+use step::{Ended, Step};
+use times::Times;
 
-/// Which tests are still to be run.
-#[derive(Clone, Copy)]
-pub enum Tests {
-    /// Those of the whole workspace.
-    All,
-    /// Those of the crates outside the workspace's default members.
-    LeftOutByCargoTest,
+/// What the steps take on the reference machine.
+const TIMES: &str = "xtask/times.txt";
+
+/// Runs every step, whatever becomes of the others, and prints a summary.
+pub fn run() -> Outcome {
+    let accepted = fs::read_to_string(root().join(TIMES));
+    let accepted = accepted.map_err(|cause| format!("{TIMES}: {cause}"))?;
+    let accepted = Times::parse(&accepted).map_err(|cause| format!("{TIMES}: {cause}"))?;
+    let directory = target_dir().join("ci");
+    let failed = |cause: std::io::Error| format!("{}: {cause}", directory.display());
+    fs::create_dir_all(&directory).map_err(failed)?;
+    // A copy, because a step that builds this program again replaces the file.
+    let this = directory.join("xtask").with_extension(env::consts::EXE_EXTENSION);
+    fs::copy(env::current_exe().map_err(failed)?, &this).map_err(failed)?;
+
+    let start = Instant::now();
+    let ended = in_rows(rows(&this), &directory);
+    summarise(&ended, start.elapsed(), &accepted)
 }
 
-/// Runs every step, whatever becomes of the ones before, and prints a summary.
-pub fn run(tests: Tests) -> Outcome {
-    let steps: [(&str, &dyn Fn() -> Outcome); 8] = [
-        ("format", &|| run_command(&mut cargo(&["fmt", "--all", "--check"]))),
-        ("clippy", &|| {
-            let mut command = cargo(&["clippy", "--workspace", "--all-targets"]);
-            run_command(command.args(["--", "-D", "warnings"]))
-        }),
-        ("tests", &|| {
-            run_command(&mut match tests {
-                Tests::All => cargo(&["test", "--workspace"]),
-                Tests::LeftOutByCargoTest => cargo(&["test", "--package", "xtask"]),
-            })
-        }),
-        ("docs", &|| {
-            let mut command = cargo(&["doc", "--workspace", "--no-deps"]);
-            run_command(command.env("RUSTDOCFLAGS", "-D warnings"))
-        }),
-        ("firmware", &firmware::run),
-        ("emulate", &|| emulate::run(&[], Differences::Fail)),
-        ("size", &size::run),
-        ("cycles", &|| cycles::run(&cycles::Options::default())),
-    ];
-
-    let mut ended = Vec::new();
-    for (name, step) in steps {
-        eprintln!("\n== {name}");
-        let start = Instant::now();
-        let outcome = step();
-        ended.push((name, start.elapsed(), outcome));
-    }
-    summarise(&ended)
+/// The steps, row by row. Those of one row share what they build, so they follow one another; those of the other row
+/// build elsewhere.
+fn rows(this: &Path) -> [Vec<Step>; 2] {
+    let step = |name, command| Step { name, command };
+    let of_cargo = |name, arguments: &[&str]| step(name, cargo(arguments));
+    let own = |name| {
+        let mut command = Command::new(this);
+        command.arg(name).current_dir(root());
+        step(name, command)
+    };
+    let mut docs = cargo(&["doc", "--workspace", "--no-deps"]);
+    docs.env("RUSTDOCFLAGS", "-D warnings");
+    let clippy = ["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"];
+    [
+        vec![
+            of_cargo("format", &["fmt", "--all", "--check"]),
+            own("structure"),
+            // As users run it, without the crates that it leaves out. First, since the emulator's checks wait for
+            // the program that it builds.
+            of_cargo("tests", &["test"]),
+            of_cargo("xtask-tests", &["test", "--package", "xtask"]),
+            // What clippy checks, docs need.
+            of_cargo("clippy", &clippy),
+            step("docs", docs),
+        ],
+        vec![own("firmware"), own("size"), own("cycles"), own("emulate")],
+    ]
 }
 
-fn summarise(ended: &[(&str, Duration, Outcome)]) -> Outcome {
+/// Runs the rows beside one another, and prints what each step wrote as it ends; gives the steps row by row.
+fn in_rows<const ROWS: usize>(rows: [Vec<Step>; ROWS], directory: &Path) -> Vec<Ended> {
+    // One step's output at a time.
+    let printing = Mutex::new(());
+    let run_row = |row: Vec<Step>| -> Vec<Ended> {
+        let run = |step: Step| {
+            eprintln!("-- {} started", step.name);
+            let ended = step.run(directory);
+            let guard = printing.lock();
+            let verdict = if ended.outcome.is_ok() { "ok" } else { "FAILED" };
+            println!(
+                "\n== {} ({verdict}, {} s)\n{}",
+                ended.name,
+                ended.time.as_secs(),
+                ended.output
+            );
+            drop(guard);
+            ended
+        };
+        row.into_iter().map(run).collect()
+    };
+    let run_row = &run_row;
+    thread::scope(|scope| {
+        let rows = rows.map(|row| scope.spawn(move || run_row(row)));
+        rows.into_iter().flat_map(|row| row.join().unwrap_or_default()).collect()
+    })
+}
+
+fn summarise(ended: &[Ended], whole: Duration, accepted: &Times<'_>) -> Outcome {
     println!("\n== summary");
-    for (name, time, outcome) in ended {
-        let seconds = time.as_secs();
+    for Ended { name, time, outcome, .. } in ended {
+        let time = accepted.beside(name, *time);
         match outcome {
-            Ok(()) => println!("ok      {seconds:4} s  {name}"),
-            Err(cause) => println!("FAILED  {seconds:4} s  {name}: {cause}"),
+            Ok(()) => println!("ok      {name:12} {time}"),
+            Err(cause) => println!("FAILED  {name:12} {time}: {cause}"),
         }
     }
-    let failed = ended.iter().filter(|(_, _, outcome)| outcome.is_err()).count();
+    println!("in all  {:12} {:6.0} s, two steps at a time", "", whole.as_secs_f64());
+    for warning in ended.iter().filter_map(|step| accepted.warning(step.name, step.time)) {
+        println!("warning: {warning} ({TIMES})");
+    }
+    let failed = ended.iter().filter(|step| step.outcome.is_err()).count();
     if failed == 0 { Ok(()) } else { Err(format!("{failed} of {} steps failed", ended.len())) }
 }
 
@@ -68,11 +111,55 @@ fn summarise(ended: &[(&str, Duration, Outcome)]) -> Outcome {
 mod tests {
     use super::*;
 
+    fn ended(outcome: Outcome) -> Ended {
+        Ended { name: "step", time: Duration::ZERO, outcome, output: String::new() }
+    }
+
     #[test]
     fn one_failed_step_fails_the_whole() {
-        let step = |outcome| ("step", Duration::ZERO, outcome);
-        assert_eq!(summarise(&[step(Ok(())), step(Ok(()))]), Ok(()));
-        let outcome = summarise(&[step(Err("no".into())), step(Ok(()))]);
+        let accepted = Times::parse("").unwrap();
+        let summarise = |ended: &[Ended]| summarise(ended, Duration::ZERO, &accepted);
+        assert_eq!(summarise(&[ended(Ok(())), ended(Ok(()))]), Ok(()));
+        let outcome = summarise(&[ended(Err("no".into())), ended(Ok(()))]);
         assert_eq!(outcome, Err("1 of 2 steps failed".into()));
+    }
+
+    #[test]
+    fn a_step_that_takes_long_does_not_fail_the_whole() {
+        let accepted = Times::parse("step 1").unwrap();
+        let slow = Ended { time: Duration::from_secs(100), ..ended(Ok(())) };
+        assert_eq!(summarise(&[slow], Duration::ZERO, &accepted), Ok(()));
+    }
+
+    #[test]
+    fn every_step_has_an_accepted_time() {
+        let text = include_str!("../times.txt");
+        let steps: Vec<&str> =
+            rows(Path::new("xtask")).iter().flatten().map(|step| step.name).collect();
+        assert_eq!(Times::parse(text).unwrap().names(), steps);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn steps_of_a_row_follow_one_another_even_after_a_failure_and_rows_run_together() {
+        let directory = env::temp_dir().join(format!("taxel-rows-{}", std::process::id()));
+        fs::create_dir_all(&directory).unwrap();
+        let step = |name, script: &str| {
+            let mut command = Command::new("sh");
+            command.args(["-c", script]).current_dir(&directory);
+            Step { name, command }
+        };
+        // Each row waits for the other one's second step: neither ends unless both run.
+        let wait = |own, other| format!("touch {own}; while [ ! -e {other} ]; do sleep 0.01; done");
+        let rows = [
+            vec![step("a", "exit 1"), step("b", &wait("b-here", "d-here"))],
+            vec![step("c", "true"), step("d", &wait("d-here", "b-here"))],
+        ];
+        let ended: Vec<_> = in_rows(rows, &directory)
+            .into_iter()
+            .map(|ended| (ended.name, ended.outcome.is_ok()))
+            .collect();
+        assert_eq!(ended, [("a", false), ("b", true), ("c", true), ("d", true)]);
+        fs::remove_dir_all(&directory).unwrap();
     }
 }

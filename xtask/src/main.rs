@@ -1,12 +1,17 @@
 //! One command for everything that people and CI run: `cargo xtask help`.
 
-mod ci;
-mod cycles;
-mod emulate;
-mod firmware;
 mod process;
-mod size;
+mod structure;
 mod toolchain;
+
+mod firmware;
+mod size;
+
+mod emulate;
+
+mod cycles;
+
+mod ci;
 
 use std::env;
 use std::process::ExitCode;
@@ -16,9 +21,11 @@ use emulate::Differences;
 const HELP: &str = "\
 Usage: cargo xtask COMMAND
 
-  ci [--after-cargo-test]   everything that CI runs: format, clippy, tests, docs, firmware, emulate,
-                            size, cycles; goes on after a failure and ends with a summary. After a plain
-                            `cargo test`, the option tests only the crates which that leaves out
+  ci                        everything that CI runs: format, structure, tests, clippy, docs, and beside them
+                            firmware, size, cycles, emulate; goes on after a failure and ends with a
+                            summary, in which each step's time stands beside that in xtask/times.txt
+  structure                 which module and crate may import which, and where `unsafe` may stand, as
+                            ARCHITECTURE.md says; what part of all lines each crate holds
   firmware                  builds and lints for thumbv7em-none-eabihf all that runs on a device,
                             and proves by linking that no panic is reachable there
   emulate [--accept] [NAME…]  runs the programs of these names, or all, of firmware/qemu/src/bin in
@@ -32,8 +39,8 @@ Usage: cargo xtask COMMAND
                             than firmware/budget.txt allows
   cycles [OPTION…]          counts in QEMU what decoding costs a Cortex-M4, with every kernel and
                             K = 16 to 256: instructions, cycles by a model, microseconds; fails if
-                            that is more than its budget, or other than firmware/cycles.csv has for the
-                            compiler in use
+                            that is more than its budget, or other than firmware/cycles.csv has: exactly
+                            with the compiler that it names, else 2 % more
       --json                prints a list of objects to stdout, and nothing else
       --accept              writes firmware/cycles.csv, and the tables of docs/cycles.md, instead
       --kernel NAME         one kernel alone, held to its budget alone
@@ -54,8 +61,7 @@ fn main() -> ExitCode {
             print!("{HELP}");
             Ok(())
         }
-        ["ci"] => ci::run(ci::Tests::All),
-        ["ci", "--after-cargo-test"] => ci::run(ci::Tests::LeftOutByCargoTest),
+        ["ci"] => ci::run(),
         ["firmware"] => firmware::run(),
         ["emulate", "--accept", ref names @ ..] if are_names(names) => {
             emulate::run(names, Differences::Accept)
@@ -64,6 +70,7 @@ fn main() -> ExitCode {
         ["log", log] => emulate::print_log(log, None),
         ["log", log, image] => emulate::print_log(log, Some(image)),
         ["size"] => size::run(),
+        ["structure"] => structure::run(),
         ["cycles", ref options @ ..] if cycles::Options::parse(options).is_some() => {
             cycles::run(&cycles::Options::parse(options).unwrap_or_default())
         }

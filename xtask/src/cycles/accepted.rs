@@ -11,12 +11,26 @@ const HEAD: &str = "compiler,kernel,centres,affine,scope,instructions,cycles";
 /// The heading that the tables stand under, in a document, to its end.
 const HEADING: &str = "## Figures\n";
 
-/// By how much cycles may differ, in per cent: the model may learn, instructions may not change.
+/// By how much cycles may differ, in per cent, with the compiler that figures were accepted of: the model may learn,
+/// instructions may not change.
 const TOLERANCE_PERCENT: u64 = 1;
+
+/// By how many per cent cycles may exceed what was accepted of another compiler. Fewer are no fault.
+pub const OTHER_COMPILERS_PERCENT: u64 = 2;
 
 /// Figures by compiler, each in the order of its measurement.
 #[derive(Debug, PartialEq, Eq, Default)]
 pub struct Accepted(Vec<(String, Vec<Figure>)>);
+
+/// The figures that a compiler's are held to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Reference<'a> {
+    /// The compiler that they were accepted of.
+    pub compiler: &'a str,
+    pub figures: &'a [Figure],
+    /// Whether that is the compiler in use.
+    pub is_own: bool,
+}
 
 impl Accepted {
     /// Reads the data.
@@ -49,9 +63,12 @@ impl Accepted {
         format!("{HEAD}\n{}", lines.collect::<String>())
     }
 
-    /// The figures for `compiler`; `None` if there are none.
-    pub fn of(&self, compiler: &str) -> Option<&[Figure]> {
-        self.0.iter().find(|(name, _)| name == compiler).map(|(_, figures)| figures.as_slice())
+    /// What `compiler` is held to: its own figures, else the first other's; `None` if there are none at all.
+    pub fn reference(&self, compiler: &str) -> Option<Reference<'_>> {
+        let compiler = in_csv(compiler);
+        let own = self.0.iter().find(|(name, _)| *name == compiler);
+        let (name, figures) = own.or(self.0.first())?;
+        Some(Reference { compiler: name, figures, is_own: own.is_some() })
     }
 
     /// Puts `figures` in the place of those for `compiler`.
@@ -82,7 +99,7 @@ impl Accepted {
 }
 
 /// No comma may stand in a field.
-pub fn in_csv(compiler: &str) -> String {
+fn in_csv(compiler: &str) -> String {
     compiler.replace(',', ";")
 }
 
@@ -105,8 +122,10 @@ fn parse(line: &str) -> Option<(&str, Figure)> {
     Some((compiler, Figure { kernel, centres, affine, scope: Scope::named(scope)?, count }))
 }
 
-/// What `measured` differs in from what was `accepted`, in words.
-pub fn differences(accepted: &[Figure], measured: &[Figure]) -> Vec<String> {
+/// What `measured` differs in from what was accepted, by more than it may, in words.
+pub fn differences(reference: &Reference<'_>, measured: &[Figure]) -> Vec<String> {
+    let accepted = reference.figures;
+    let difference = if reference.is_own { difference } else { excess };
     let name = |figure: &Figure| {
         let tail = if figure.affine { " with affine tail" } else { "" };
         format!("{}, K = {}, {}{tail}", figure.kernel, figure.centres, figure.scope.name())
@@ -134,6 +153,21 @@ fn difference(then: Count, now: Count) -> Option<String> {
     apart.then(|| format!("{} cycles, were {}", now.cycles, then.cycles))
 }
 
+fn excess(then: Count, now: Count) -> Option<String> {
+    let allowed = then.cycles * (100 + OTHER_COMPILERS_PERCENT);
+    let exceeds = 100 * now.cycles > allowed;
+    exceeds.then(|| format!("{} cycles, {} of the other compiler", now.cycles, then.cycles))
+}
+
+/// The largest parts, in per cent, by which cycles are below and above those accepted.
+pub fn range_percent(reference: &Reference<'_>, measured: &[Figure]) -> [f64; 2] {
+    let pairs = measured.iter().filter_map(|now| {
+        let then = reference.figures.iter().find(|then| then.is_of(now))?;
+        Some(100.0 * (now.count.cycles as f64 / then.count.cycles.max(1) as f64 - 1.0))
+    });
+    pairs.fold([0.0; 2], |[least, most], percent| [percent.min(least), percent.max(most)])
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::table::tests::sample;
@@ -144,6 +178,14 @@ mod tests {
         Figure { kernel: kernel.into(), centres: 16, affine: false, scope: Scope::Row, count }
     }
 
+    fn own(figures: &[Figure]) -> Reference<'_> {
+        Reference { compiler: "rustc", figures, is_own: true }
+    }
+
+    fn others(figures: &[Figure]) -> Reference<'_> {
+        Reference { compiler: "rustc", figures, is_own: false }
+    }
+
     #[test]
     fn what_is_written_is_read_back() {
         let mut accepted = Accepted::default();
@@ -152,10 +194,13 @@ mod tests {
         let data = accepted.data();
         assert!(data.contains("\nrustc 1 (a; b),f32,16,yes,row,5,840\n"), "{data}");
         assert_eq!(Accepted::parse(&data).as_ref(), Ok(&accepted));
-        assert_eq!(accepted.of(&in_csv("rustc 1 (a, b)")), Some(sample().as_slice()));
-        assert_eq!(accepted.of("rustc"), None);
+        let figures = |accepted: &Accepted, compiler| {
+            let reference = accepted.reference(compiler).unwrap();
+            (reference.figures.to_vec(), reference.is_own)
+        };
+        assert_eq!(figures(&accepted, "rustc 1 (a, b)"), (sample(), true));
         accepted.replace("rustc 2", &[figure("b", 3, 4)]);
-        assert_eq!(accepted.of("rustc 2"), Some([figure("b", 3, 4)].as_slice()));
+        assert_eq!(figures(&accepted, "rustc 2"), (vec![figure("b", 3, 4)], true));
     }
 
     #[test]
@@ -183,13 +228,13 @@ mod tests {
     #[test]
     fn instructions_are_compared_exactly_and_cycles_to_a_per_cent() {
         let accepted = [figure("a", 100, 1000)];
-        assert!(differences(&accepted, &[figure("a", 100, 1010)]).is_empty());
+        assert!(differences(&own(&accepted), &[figure("a", 100, 1010)]).is_empty());
         assert_eq!(
-            differences(&accepted, &[figure("a", 100, 1011)]),
+            differences(&own(&accepted), &[figure("a", 100, 1011)]),
             ["a, K = 16, row: 1011 cycles, were 1000"]
         );
         assert_eq!(
-            differences(&accepted, &[figure("a", 101, 1000)]),
+            differences(&own(&accepted), &[figure("a", 101, 1000)]),
             ["a, K = 16, row: 101 instructions, were 100"]
         );
     }
@@ -197,8 +242,41 @@ mod tests {
     #[test]
     fn a_kernel_that_is_new_or_gone_is_a_difference() {
         assert_eq!(
-            differences(&[figure("a", 1, 1)], &[figure("b", 1, 1)]),
+            differences(&own(&[figure("a", 1, 1)]), &[figure("b", 1, 1)]),
             ["b, K = 16, row: not accepted yet", "a, K = 16, row: accepted, but not measured"]
         );
+        assert_eq!(differences(&others(&[]), &[figure("b", 1, 1)]).len(), 1);
+    }
+
+    #[test]
+    fn a_compiler_without_figures_is_held_to_the_first_others() {
+        let mut accepted = Accepted::default();
+        assert_eq!(accepted.reference("rustc 1"), None);
+        accepted.replace("rustc 1", &[figure("a", 1, 2)]);
+        accepted.replace("rustc 2", &[figure("b", 3, 4)]);
+        let reference = accepted.reference("rustc 3 (new)").unwrap();
+        assert_eq!((reference.compiler, reference.is_own), ("rustc 1", false));
+        assert_eq!(reference.figures, [figure("a", 1, 2)]);
+    }
+
+    #[test]
+    fn another_compiler_may_take_two_per_cent_more_cycles_and_any_number_less() {
+        let accepted = [figure("a", 100, 1000)];
+        for (instructions, cycles) in [(100, 1020), (200, 1020), (10, 100)] {
+            let measured = [figure("a", instructions, cycles)];
+            assert!(differences(&others(&accepted), &measured).is_empty());
+        }
+        assert_eq!(
+            differences(&others(&accepted), &[figure("a", 100, 1021)]),
+            ["a, K = 16, row: 1021 cycles, 1000 of the other compiler"]
+        );
+    }
+
+    #[test]
+    fn how_far_figures_are_apart_is_told_on_both_sides() {
+        let accepted = [figure("a", 1, 1000), figure("b", 1, 1000), figure("c", 1, 1000)];
+        let measured = [figure("a", 1, 990), figure("b", 1, 1015), figure("d", 1, 5000)];
+        let [least, most] = range_percent(&others(&accepted), &measured);
+        assert!((least + 1.0).abs() < 1e-9 && (most - 1.5).abs() < 1e-9, "{least} {most}");
     }
 }

@@ -2,9 +2,10 @@
 
 use std::collections::HashMap;
 use std::fs;
+use std::ops::Range;
 use std::path::Path;
 
-use object::{Object, ObjectSegment, ObjectSymbol};
+use object::{Object, ObjectSegment, ObjectSymbol, SymbolKind};
 
 use super::thumb::{self, Instruction};
 use crate::process::Outcome;
@@ -12,7 +13,16 @@ use crate::process::Outcome;
 /// The bytes that an image loads, and the addresses of its symbols.
 pub struct Code {
     segments: Vec<(u32, Vec<u8>)>,
-    symbols: HashMap<String, u32>,
+    symbols: HashMap<String, Symbol>,
+}
+
+/// Where a symbol's code or data lie.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Symbol {
+    address: u32,
+    /// Bytes; none where the image does not say.
+    length: u32,
+    is_function: bool,
 }
 
 impl Code {
@@ -27,10 +37,14 @@ impl Code {
             segments.push((segment.address() as u32, data.to_owned()));
         }
         // The lowest bit of a function's address says that it is Thumb code.
-        let address = |symbol: object::Symbol<'_, '_>| symbol.address() as u32 & !1;
+        let of_file = |symbol: object::Symbol<'_, '_>| Symbol {
+            address: symbol.address() as u32 & !1,
+            length: symbol.size() as u32,
+            is_function: symbol.kind() == SymbolKind::Text,
+        };
         let symbols = file
             .symbols()
-            .filter_map(|symbol| Some((symbol.name().ok()?.to_owned(), address(symbol))))
+            .filter_map(|symbol| Some((symbol.name().ok()?.to_owned(), of_file(symbol))))
             .collect();
         Ok(Self { segments, symbols })
     }
@@ -43,9 +57,24 @@ impl Code {
         Self { segments, symbols: HashMap::new() }
     }
 
+    /// The same with a symbol.
+    #[cfg(test)]
+    pub fn with_symbol(mut self, name: &str, address: u32, length: u32) -> Self {
+        self.symbols.insert(name.to_owned(), Symbol { address, length, is_function: true });
+        self
+    }
+
     /// The address of `symbol`.
     pub fn symbol(&self, symbol: &str) -> Outcome<u32> {
-        self.symbols.get(symbol).copied().ok_or_else(|| format!("the image has no symbol {symbol}"))
+        let found = self.symbols.get(symbol).map(|symbol| symbol.address);
+        found.ok_or_else(|| format!("the image has no symbol {symbol}"))
+    }
+
+    /// Names of functions, and where their code lies.
+    pub fn functions(&self) -> impl Iterator<Item = (&str, Range<u32>)> {
+        let range = |symbol: &Symbol| symbol.address..symbol.address.saturating_add(symbol.length);
+        let functions = self.symbols.iter().filter(|(_, symbol)| symbol.is_function);
+        functions.map(move |(name, symbol)| (name.as_str(), range(symbol)))
     }
 
     /// The instruction at `address`.

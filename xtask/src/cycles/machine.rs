@@ -1,14 +1,14 @@
-//! Runs an image in QEMU, instruction by instruction, and counts what its regions execute.
+//! Runs an image in QEMU, and counts what its regions execute.
 
 use std::io::BufReader;
 use std::path::Path;
-use std::process::Command;
 use std::thread;
 use std::time::Duration;
 
 use super::code::Code;
 use super::regions::{Region, Regions};
 use super::trace;
+use super::untraced::{self, Untraced};
 use crate::emulate::qemu::{QEMU, decode, machine, reader, table, wait};
 use crate::process::Outcome;
 
@@ -49,7 +49,8 @@ pub fn run(elf: &Path, code: &Code, model: &Path) -> Outcome<Run> {
     let table = table(elf)?;
 
     let mut command = machine(elf);
-    command.args(one_by_one()?).args(["-d", "exec,nochain"]);
+    let untraced = Untraced::of(code, &untraced::FUNCTIONS);
+    command.args(["-d", "exec,nochain,in_asm", "-dfilter", &untraced.ranges_of_others()]);
     // QEMU reads a comma as the end of an option unless it is doubled.
     let path = model.display().to_string().replace(',', ",,");
     command.arg("-device").arg(format!("loader,file={path},addr={start:#x},force-raw=on"));
@@ -59,7 +60,8 @@ pub fn run(elf: &Path, code: &Code, model: &Path) -> Outcome<Run> {
     let (status, traced) = thread::scope(|scope| {
         let traced = scope.spawn(|| {
             let trace = trace.ok_or_else(|| format!("{QEMU} has no trace"))?;
-            let mut regions = Regions::new(code, begin, end).watching(watched);
+            let regions = Regions::new(code, begin, end).watching(watched);
+            let mut regions = regions.without(untraced);
             let complaints = trace::follow(BufReader::with_capacity(1 << 16, trace), &mut regions)?;
             Ok::<_, String>((complaints, regions.finish()))
         });
@@ -77,42 +79,5 @@ pub fn run(elf: &Path, code: &Code, model: &Path) -> Outcome<Run> {
             "the image did not end by itself within {} s; it logged\n{log}",
             LIMIT.as_secs()
         )),
-    }
-}
-
-/// What makes QEMU translate, and so trace, one instruction at a time: named anew in QEMU 8.1, and
-/// the old name taken away in QEMU 9.
-fn one_by_one() -> Outcome<&'static [&'static str]> {
-    let output = Command::new(QEMU).arg("-help").output();
-    let output = output.map_err(|cause| format!("cannot start {QEMU}: {cause}"))?;
-    one_by_one_of(&String::from_utf8_lossy(&output.stdout)).ok_or_else(|| {
-        format!("{QEMU} -help names neither one-insn-per-tb nor -singlestep: use QEMU 7 or later")
-    })
-}
-
-fn one_by_one_of(help: &str) -> Option<&'static [&'static str]> {
-    if help.contains("one-insn-per-tb=on") {
-        Some(&["-accel", "tcg,one-insn-per-tb=on"])
-    } else if help.contains("-singlestep") {
-        Some(&["-singlestep"])
-    } else {
-        None
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn old_and_new_versions_of_qemu_are_told_apart() {
-        let old = "-singlestep     always run in singlestep mode\n";
-        assert_eq!(one_by_one_of(old), Some(&["-singlestep"][..]));
-        let new = "                one-insn-per-tb=on|off (one guest instruction per TCG block)\n";
-        let both = format!("{new}-singlestep     deprecated synonym\n");
-        for help in [new, &both] {
-            assert_eq!(one_by_one_of(help), Some(&["-accel", "tcg,one-insn-per-tb=on"][..]));
-        }
-        assert_eq!(one_by_one_of("usage:"), None);
     }
 }

@@ -2,22 +2,15 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Stdio;
 
 use model_core::blob::{Model, ModelParts, encode, encoded_length_bound};
 use model_core::rbf::{Format, Network, direct, expanded, fixed16};
 
-use crate::process::{Outcome, cargo, run};
+use super::training::{self, Wanted};
+use crate::process::Outcome;
 
 /// K.
 const CENTRES: [usize; 5] = [16, 32, 64, 128, 256];
-
-/// What is trained on: noise enough that widths and weights stay where every format holds them, and a few
-/// more frames than there are centres.
-const TRAINING: [&str; 7] = ["train", "press", "-n", "500", "--noise", "0.05", "--output"];
-
-/// One network for the whole array, of a width at which every format holds it.
-const OF_ARRAY: [&str; 3] = ["--whole-array", "--spread", "0.4"];
 
 /// The largest blob that a device's slot holds, the image's like any other.
 const SLOT_BYTES: usize = 131_072;
@@ -32,38 +25,37 @@ pub struct Blob {
     pub rows_alike: bool,
 }
 
-/// Trains models of every format and size in `directory`, of rows and of the whole array, and writes each
+/// Trains models of every format and size, of rows and of the whole array, and writes each into `directory`
 /// twice: with its affine tail and without. All rows have the first row's network, so that the largest fits the
 /// image's slot; what does not is left out.
 ///
 /// # Errors
-/// `host-sim` fails, or makes another model than it is asked for.
+/// Training fails, or makes another model than it is asked for.
 pub fn train(directory: &Path) -> Outcome<Vec<Blob>> {
     fs::create_dir_all(directory).map_err(|cause| failed(directory, &cause))?;
+    let wanted: Vec<Wanted> = Format::ALL
+        .into_iter()
+        .flat_map(|format| CENTRES.map(|centres| (format, centres)))
+        .flat_map(|(format, centres)| {
+            [false, true].map(|whole_array| Wanted { format, centres, whole_array })
+        })
+        .collect();
     let mut blobs = Vec::new();
-    for format in Format::ALL {
-        for centres in CENTRES {
-            for (array, options) in [("", &[][..]), ("-array", &OF_ARRAY[..])] {
-                let stem = format!("{}-{centres}{array}", format.name());
-                let trained = directory.join(format!("{stem}-trained.bin"));
-                let mut command = cargo(&["run", "--quiet", "--package", "host-sim", "--"]);
-                command.args(TRAINING).arg(&trained).args(options);
-                command.args(["--format", format.name(), "--centres"]);
-                // What it says of the model is not what this command prints.
-                run(command.arg(centres.to_string()).stdout(Stdio::null()))?;
-                let bytes = Bytes::read(&trained)?;
-                if bytes.bytes().len() > SLOT_BYTES && !array.is_empty() {
-                    eprintln!("left out: {} is larger than a slot", trained.display());
-                    continue;
-                }
-                let model = bytes.model().map_err(|cause| failed(&trained, &cause))?;
-                is_as_asked(&model, format, centres).map_err(|cause| failed(&trained, &cause))?;
-                for (affine, suffix) in [(false, ""), (true, "-affine")] {
-                    let path = directory.join(format!("{stem}{suffix}.bin"));
-                    write(&path, &rewritten(&model, Rows::AsTheFirst, affine)?)?;
-                    blobs.push(Blob { path, affine, rows_alike: true });
-                }
-            }
+    for (wanted, trained) in wanted.iter().zip(training::train(&wanted)?) {
+        let array = if wanted.whole_array { "-array" } else { "" };
+        let stem = format!("{}-{}{array}", wanted.format.name(), wanted.centres);
+        if trained.len() > SLOT_BYTES && wanted.whole_array {
+            eprintln!("left out: {stem} is larger than a slot");
+            continue;
+        }
+        let bytes = Bytes::of(&trained);
+        let refused = |cause: String| format!("{stem}: {cause}");
+        let model = bytes.model().map_err(refused)?;
+        is_as_asked(&model, wanted.format, wanted.centres).map_err(refused)?;
+        for (affine, suffix) in [(false, ""), (true, "-affine")] {
+            let path = directory.join(format!("{stem}{suffix}.bin"));
+            write(&path, &rewritten(&model, Rows::AsTheFirst, affine)?)?;
+            blobs.push(Blob { path, affine, rows_alike: true });
         }
     }
     Ok(blobs)
@@ -105,7 +97,7 @@ fn is_as_asked(model: &Model<'_>, format: Format, centres: usize) -> Outcome {
     match model.networks().find_map(|network| other(&network)) {
         None => Ok(()),
         Some((found, found_centres, tail)) => Err(format!(
-            "asked for {} with {centres} centres and an affine tail, host-sim made {found} with \
+            "asked for {} with {centres} centres and an affine tail, training made {found} with \
              {found_centres} centres, tail: {tail}",
             format.name()
         )),

@@ -10,6 +10,7 @@ use std::ops::Range;
 use super::code::Code;
 use super::cost::cycles;
 use super::thumb::Instruction;
+use super::untraced::Untraced;
 use crate::process::Outcome;
 
 /// What was executed.
@@ -52,6 +53,7 @@ pub struct Regions<'c> {
     begin: u32,
     end: u32,
     watched: Range<u32>,
+    untraced: Untraced,
     place: Place,
     /// The last address: what it costs depends on the next one.
     pending: Option<u32>,
@@ -69,6 +71,7 @@ impl<'c> Regions<'c> {
             begin,
             end,
             watched: 0..0,
+            untraced: Untraced::default(),
             place: Place::Outside,
             pending: None,
             previous: None,
@@ -82,11 +85,31 @@ impl<'c> Regions<'c> {
         Self { watched, ..self }
     }
 
-    /// The instruction at `address` is about to be executed.
+    /// The same for a trace without the functions `untraced`, which no region may call.
+    pub fn without(self, untraced: Untraced) -> Self {
+        Self { untraced, ..self }
+    }
+
+    /// A block of code was executed, by its instructions' addresses: all of them, and the last one alone may
+    /// lead elsewhere than to the next.
     ///
     /// # Errors
-    /// One inside a region cannot be costed, or did not lead where it should.
-    pub fn execute(&mut self, address: u32) -> Outcome {
+    /// An instruction inside a region cannot be costed, did not lead where it should, or leads to code that is not
+    /// traced.
+    pub fn execute(&mut self, block: &[u32]) -> Outcome {
+        let Some((last, before)) = block.split_last() else { return Ok(()) };
+        for address in before {
+            self.step(*address)?;
+            if self.place == Place::Inside && self.instruction(*address)?.may_branch {
+                return Err(format!(
+                    "{address:#010x} may branch, and is not the last of its block"
+                ));
+            }
+        }
+        self.step(*last)
+    }
+
+    fn step(&mut self, address: u32) -> Outcome {
         if let Some(last) = self.pending.replace(address) {
             self.settle(last, address)?;
         }
@@ -94,13 +117,6 @@ impl<'c> Regions<'c> {
             self.place = Place::Starting;
         }
         Ok(())
-    }
-
-    /// The last instruction was not executed after all.
-    pub fn undo(&mut self) {
-        if self.pending.take() == Some(self.begin) {
-            self.place = Place::Outside;
-        }
     }
 
     /// The regions' counts, in their order.
@@ -143,6 +159,16 @@ impl<'c> Regions<'c> {
         }
         if next == self.begin {
             return Err(format!("region {} starts another", self.counted.len() + 1));
+        }
+        // The first instruction of such a function is traced, to be seen here.
+        if let Some(name) = self.untraced.function_at(next) {
+            return Err(format!(
+                "region {} calls {name}, which is not traced: take it out of xtask/src/cycles/untraced.rs",
+                self.counted.len() + 1
+            ));
+        }
+        if instruction.calls && !branched {
+            return Err(format!("the call at {address:#010x} leads to code that is not traced"));
         }
         let cost = cycles(&instruction, self.previous.as_ref(), branched);
         let cost = cost.ok_or_else(|| {

@@ -81,12 +81,27 @@ pub struct Instruction {
     pub fp_source: FpSet,
     /// Whether another instruction than the one behind it may come next.
     pub may_branch: bool,
+    /// Whether it is a call: BL, BLX.
+    pub calls: bool,
 }
 
 impl Instruction {
     fn new(class: Class) -> Self {
         let may_branch = matches!(class, Class::Branch | Class::TableBranch);
-        Self { bytes: 0, class, result: 0, address: 0, fp_result: 0, fp_source: 0, may_branch }
+        Self {
+            bytes: 0,
+            class,
+            result: 0,
+            address: 0,
+            fp_result: 0,
+            fp_source: 0,
+            may_branch,
+            calls: false,
+        }
+    }
+
+    fn call() -> Self {
+        Self { calls: true, ..Self::new(Class::Branch) }
     }
 
     fn data() -> Self {

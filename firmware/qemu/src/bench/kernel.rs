@@ -19,8 +19,8 @@ pub trait Kernel {
     /// A decoder of frames.
     type Decoder<'a>;
 
-    /// The decoder of `blob`; `None` if the blob is unsound or made for another kernel.
-    fn load(blob: &[u8]) -> Option<Self::Decoder<'_>>;
+    /// The decoder of `model`, whose networks have `format`; `None` if it is made for another kernel.
+    fn of<'a>(model: &Model<'a>, format: Format) -> Option<Self::Decoder<'a>>;
 
     /// A row's outputs from scaled inputs, which are used up.
     fn infer(network: &Network<'_>, scaled: &mut [f32; COLS], outputs: &mut [f32; OUTPUTS]);
@@ -39,6 +39,12 @@ pub trait Kernel {
         frame: &Frame<ROWS, COLS>,
         estimate: &mut Estimate<ROWS, OUTPUTS>,
     );
+}
+
+/// The decoder of `model`; `None` if it is for another sensor.
+#[inline(never)] // what it is put together from leaves the stack again
+pub fn decoder<'a>(model: &Model<'a>) -> Option<Decoder<'a, ROWS, COLS, OUTPUTS>> {
+    Decoder::of(*model).ok()
 }
 
 /// A format of networks, with one of the exponentials where it has a choice.
@@ -72,9 +78,8 @@ impl Which for Fixed16 {
 impl<F: Which, E: ExpKernel> Kernel for Formatted<F, E> {
     type Decoder<'a> = Decoder<'a, ROWS, COLS, OUTPUTS>;
 
-    fn load(blob: &[u8]) -> Option<Self::Decoder<'_>> {
-        let network = Model::decode(blob).ok()?.networks().next()?;
-        if network.format() == F::FORMAT { Decoder::load(blob).ok() } else { None }
+    fn of<'a>(model: &Model<'a>, format: Format) -> Option<Self::Decoder<'a>> {
+        if format == F::FORMAT { decoder(model) } else { None }
     }
 
     #[inline(never)]
@@ -108,10 +113,8 @@ pub struct Portable<F>(PhantomData<F>);
 impl<F: Which> Kernel for Portable<F> {
     type Decoder<'a> = Model<'a>;
 
-    fn load(blob: &[u8]) -> Option<Self::Decoder<'_>> {
-        let model = Model::decode(blob).ok()?;
-        let format = model.networks().next()?.format();
-        (format == F::FORMAT && format != Format::F32Direct).then_some(model)
+    fn of<'a>(model: &Model<'a>, format: Format) -> Option<Self::Decoder<'a>> {
+        (format == F::FORMAT && format != Format::F32Direct).then_some(*model)
     }
 
     #[inline(never)]

@@ -3,9 +3,10 @@
 #![no_std]
 #![no_main]
 
-mod inputs;
 mod kernel;
 mod region;
+
+mod inputs;
 
 use core::hint::black_box;
 
@@ -14,12 +15,12 @@ use defmt::{assert, info, unwrap};
 use model_core::blob::Model;
 use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
 use model_core::rbf::{Format, Network};
-use model_core::{Decoder, Estimate, Frame, Gate, RowStatus};
+use model_core::{Estimate, Frame, Gate, RowStatus};
 use qemu_image::checks::Numbers;
 use qemu_image::exit;
 use qemu_image::slot::Slot;
 
-use kernel::{COLS, F32, F32Direct, Fixed16, Formatted, Kernel, OUTPUTS, Portable, ROWS};
+use kernel::{COLS, F32, F32Direct, Fixed16, Formatted, Kernel, OUTPUTS, Portable, ROWS, decoder};
 use region::{calibrate, region};
 
 /// 3.5 times noise of 0.5 %.
@@ -27,7 +28,7 @@ const REST_TOLERANCE: f32 = 0.0175;
 
 /// What is decoded, and by which model.
 struct Bench<'a> {
-    blob: &'a [u8],
+    model: &'a Model<'a>,
     network: Network<'a>,
     scaled: [f32; COLS],
     frame: Frame<ROWS, COLS>,
@@ -48,7 +49,7 @@ impl Bench<'_> {
     /// One kernel in every scope, if the model is made for it.
     #[inline(never)] // of several ways, the stack holds one at a time
     fn measure<K: Kernel>(&self, name: &str) {
-        let Some(decoder) = K::load(self.blob) else { return };
+        let Some(decoder) = K::of(self.model, self.network.format()) else { return };
         let (mut scaled, mut outputs) = (self.scaled, [0.0; OUTPUTS]);
         region(name, "inference", || {
             K::infer(black_box(&self.network), black_box(&mut scaled), black_box(&mut outputs));
@@ -72,7 +73,7 @@ impl Bench<'_> {
     /// rest, and one whose rows are all awake by their last readings, so that all of them are looked at.
     #[inline(never)]
     fn measure_gate(&self) {
-        let Ok(decoder) = Decoder::<ROWS, COLS, OUTPUTS>::load(self.blob) else { return };
+        let Some(decoder) = decoder(self.model) else { return };
         let name = self.network.format().name();
         let rest = decoder.decode(&self.frame);
         let mut awake = self.frame;
@@ -96,8 +97,13 @@ impl Bench<'_> {
 
 /// One network for all rows: frames alone, as the firmware decodes them, and behind the gate.
 #[inline(never)]
-fn measure_array<E: ExpKernel>(blob: &[u8], frame: &Frame<ROWS, COLS>, name: &str, gated: bool) {
-    let decoder = unwrap!(Decoder::<ROWS, COLS, OUTPUTS>::load(blob).ok());
+fn measure_array<E: ExpKernel>(
+    model: &Model<'_>,
+    frame: &Frame<ROWS, COLS>,
+    name: &str,
+    gated: bool,
+) {
+    let decoder = unwrap!(decoder(model));
     let rest = decoder.decode(frame);
     let mut estimate = rest;
     let mut awake = *frame;
@@ -126,7 +132,7 @@ fn main() -> ! {
     let [slot, _] = unsafe { Slot::take() };
     let length = unwrap!(Model::declared_length(slot.bytes()), "slot A holds no model");
     let blob = unwrap!(slot.bytes().get(..length), "the model in slot A is cut off");
-    let Ok(model) = Model::decode(blob) else { defmt::panic!("the model in slot A is unsound") };
+    let model = unwrap!(checked(blob), "the model in slot A is unsound");
     let shape = model.shape();
     assert!(
         (shape.rows, shape.inputs, shape.outputs) == (ROWS, COLS, OUTPUTS),
@@ -145,30 +151,36 @@ fn main() -> ! {
     let network = unwrap!(network, "the model has no network for its first row");
     info!("centres {=usize}", network.shape().centres);
     if model.projection().is_some() {
-        measure_arrays(blob, &model, &network);
+        measure_arrays(&model, &network);
     } else {
-        measure_rows(blob, &model, network);
+        measure_rows(&model, network);
     }
     exit::success()
 }
 
+/// The model in `blob`, which is checked here and nowhere else.
+#[inline(never)] // what checking takes leaves the stack again
+fn checked(blob: &[u8]) -> Option<Model<'_>> {
+    Model::decode(blob).ok()
+}
+
 #[inline(never)] // of the two, the stack holds one
-fn measure_rows(blob: &[u8], model: &Model<'_>, network: Network<'_>) {
+fn measure_rows(model: &Model<'_>, network: Network<'_>) {
     let frame = inputs::frame(model, &mut Numbers::new(3));
     let mut scaled = [0.0; COLS];
     unwrap!(network.scale(&frame.row_column_resistance_ohm[0], &mut scaled).ok());
-    let bench = Bench { blob, network, scaled, frame };
+    let bench = Bench { model, network, scaled, frame };
     measure_every_kernel(&bench);
     bench.measure_gate();
 }
 
 #[inline(never)]
-fn measure_arrays(blob: &[u8], model: &Model<'_>, network: &Network<'_>) {
+fn measure_arrays(model: &Model<'_>, network: &Network<'_>) {
     let frame = inputs::frame(model, &mut Numbers::new(3));
     let name = network.format().name();
-    measure_array::<Polynomial>(blob, &frame, name, true);
+    measure_array::<Polynomial>(model, &frame, name, true);
     if network.format() == Format::F32Direct {
-        measure_array::<Libm>(blob, &frame, "f32-direct-libm", false);
-        measure_array::<Micromath>(blob, &frame, "f32-direct-micromath", false);
+        measure_array::<Libm>(model, &frame, "f32-direct-libm", false);
+        measure_array::<Micromath>(model, &frame, "f32-direct-micromath", false);
     }
 }

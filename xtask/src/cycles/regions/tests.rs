@@ -14,7 +14,7 @@ fn code(program: &[u16]) -> Code {
 fn count(code: &Code, addresses: impl IntoIterator<Item = u32>) -> Outcome<Vec<Count>> {
     let mut regions = Regions::new(code, BEGIN, END);
     for address in addresses {
-        regions.execute(address)?;
+        regions.execute(&[address])?;
     }
     Ok(regions.finish()?.into_iter().map(|region| region.whole).collect())
 }
@@ -49,7 +49,7 @@ fn what_is_watched_is_counted_besides() {
     let code = code(&[0x3001, 0x3001, 0xF7FF, 0xFFFB]); // adds r0, #1, twice; bl end
     let mut regions = Regions::new(&code, BEGIN, END).watching(START + 2..START + 4);
     for address in [0x8, BEGIN, BEGIN + 2, START, START + 2, START + 4, END, START + 8] {
-        regions.execute(address).unwrap();
+        regions.execute(&[address]).unwrap();
     }
     let whole = Count { instructions: 3, cycles: 5 };
     let watched = Count { instructions: 1, cycles: 1 };
@@ -91,4 +91,52 @@ fn a_region_without_an_end_is_refused() {
     assert_eq!(count(&code, addresses), Err("the program ended in its region 1".into()));
     let nested = [CALL.as_slice(), &[START, BEGIN]].concat();
     assert!(count(&code, nested).is_err());
+}
+
+/// At 0x20: bl 0x30. At 0x24: blx r3. At 0x30, for 8 bytes, a function that is not traced.
+fn code_that_calls() -> Code {
+    let mut halfwords = FUNCTIONS.to_vec();
+    halfwords.resize(8, 0xBF00);
+    halfwords.extend([0xF000, 0xF806, 0x4798]);
+    halfwords.resize(20, 0xBF00);
+    Code::of(BEGIN, &halfwords).with_symbol("_ZN7library9left_out1fE", 0x30, 8)
+}
+
+#[test]
+fn a_region_that_calls_what_is_not_traced_is_refused_by_the_name_of_that() {
+    let code = code_that_calls();
+    let counted = |addresses: &[u32]| {
+        let untraced = Untraced::of(&code, &[&["9left_out"]]);
+        let mut regions = Regions::new(&code, BEGIN, END).without(untraced);
+        addresses.iter().try_for_each(|address| regions.execute(&[*address]))?;
+        regions.finish()
+    };
+    let outside = [&[0x20, 0x30], CALL.as_slice(), &[0x24, END, 0x26]].concat();
+    assert_eq!(counted(&outside).map(|counted| counted.len()), Ok(1));
+    for call in [0x20, 0x24] {
+        let error = counted(&[CALL.as_slice(), &[call, 0x30]].concat()).unwrap_err();
+        assert_eq!(
+            error,
+            "region 1 calls _ZN7library9left_out1fE, which is not traced: take it out of \
+             xtask/src/cycles/untraced.rs"
+        );
+    }
+}
+
+#[test]
+fn a_call_that_comes_back_at_once_went_where_nothing_is_traced() {
+    let code = code_that_calls();
+    for (call, behind) in [(0x20, 0x24), (0x24, 0x26)] {
+        let error = count(&code, [CALL.as_slice(), &[call, behind]].concat()).unwrap_err();
+        assert_eq!(error, format!("the call at {call:#010x} leads to code that is not traced"));
+    }
+}
+
+#[test]
+fn a_branch_within_a_block_is_refused() {
+    let code = code(&[0xD100, 0xBF00, 0xBF00]); // bne; nop
+    let mut regions = Regions::new(&code, BEGIN, END);
+    CALL.iter().try_for_each(|address| regions.execute(&[*address])).unwrap();
+    let error = regions.execute(&[START, START + 2]).unwrap_err();
+    assert_eq!(error, "0x00000016 may branch, and is not the last of its block");
 }

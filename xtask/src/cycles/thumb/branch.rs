@@ -6,8 +6,9 @@ use super::{Class, Instruction, bit, bits};
 pub fn decode(first: u16, second: u16) -> Option<Instruction> {
     let branch = Some(Instruction::new(Class::Branch));
     match (bit(second, 14), bit(second, 12)) {
-        // B, and BL.
-        (false | true, true) => branch,
+        (false, true) => branch,
+        // BL.
+        (true, true) => Some(Instruction::call()),
         // BLX to a constant, which this processor has not.
         (true, false) => None,
         // B with a condition.

@@ -52,7 +52,9 @@ fn high_registers(h: u16) -> Option<Instruction> {
     let destination = bits(h, 0, 3) | (bits(h, 7, 1) << 3);
     match bits(h, 8, 2) {
         1 => Some(Instruction::data()),
-        3 => (bits(h, 0, 3) == 0).then(|| Instruction::new(Class::Branch)),
+        3 if bits(h, 0, 3) != 0 => None,
+        3 if bit(h, 7) => Some(Instruction::call()),
+        3 => Some(Instruction::new(Class::Branch)),
         _ => Some(Instruction::data().to(destination)),
     }
 }

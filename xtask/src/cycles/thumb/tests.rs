@@ -16,8 +16,9 @@ fn registers(letter: char, set: u32) -> String {
 
 fn described(i: &Instruction) -> String {
     let branches = if i.may_branch { ", may branch" } else { "" };
+    let calls = if i.calls { ", calls" } else { "" };
     format!(
-        "{:?}{branches} | {} | {} | {} | {}",
+        "{:?}{branches}{calls} | {} | {} | {} | {}",
         i.class,
         registers('r', i.result.into()),
         registers('r', i.address.into()),
