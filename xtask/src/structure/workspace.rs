@@ -110,11 +110,11 @@ mod tests {
     fn what_cargo_prints_is_read() {
         let metadata = serde_json::json!({"packages": [{
             "name": "a",
-            "manifest_path": "/root/in/a/Cargo.toml",
+            "manifest_path": "/house/in/a/Cargo.toml",
             "targets": [
-                {"kind": ["lib"], "src_path": "/root/in/a/src/lib.rs"},
-                {"kind": ["test"], "src_path": "/root/in/a/tests/all.rs"},
-                {"kind": ["custom-build"], "src_path": "/root/in/a/build.rs"},
+                {"kind": ["lib"], "src_path": "/house/in/a/src/lib.rs"},
+                {"kind": ["test"], "src_path": "/house/in/a/tests/all.rs"},
+                {"kind": ["custom-build"], "src_path": "/house/in/a/build.rs"},
             ],
             "dependencies": [{"name": "b", "kind": null}, {"name": "c", "kind": "dev"}],
         }]});
@@ -127,7 +127,7 @@ mod tests {
             ],
             roots: vec!["in/a/src/lib.rs".into(), "in/a/build.rs".into()],
         };
-        assert_eq!(parse(&metadata, Path::new("/root")), Some(vec![expected]));
+        assert_eq!(parse(&metadata, Path::new("/house")), Some(vec![expected]));
         assert_eq!(parse(&serde_json::json!({"packages": [{}]}), Path::new("/")), None);
     }
 
