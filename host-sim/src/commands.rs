@@ -1,24 +1,24 @@
 //! One small file a subcommand: arguments in, library calls, results out.
 
-pub mod decode;
-pub mod emulate;
-pub mod eval;
-pub mod forward;
-pub mod gate;
-pub mod inspect;
-pub mod link;
-pub mod readout;
-pub mod run;
-pub mod synth;
-pub mod table1;
-pub mod trade;
-pub mod train;
-
-mod arguments;
-mod check_arguments;
 mod print;
 mod progress;
+mod arguments;
 mod scene_argument;
+mod check_arguments;
+
+pub mod run;
+pub mod synth;
+pub mod forward;
+pub mod train;
+pub mod decode;
+pub mod eval;
+pub mod inspect;
+pub mod table1;
+pub mod trade;
+pub mod readout;
+pub mod gate;
+pub mod emulate;
+pub mod link;
 
 use host_sim::Error;
 

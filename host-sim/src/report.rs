@@ -6,8 +6,8 @@
 use crate::evaluate::trade::Trade;
 use crate::run::RunResult;
 
-mod ticks;
 mod format;
+mod ticks;
 mod svg;
 mod chart;
 mod heat_map;

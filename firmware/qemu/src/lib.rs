@@ -9,8 +9,8 @@ pub use board_common::memory;
 
 // From the ground up: a module imports only what is declared before it.
 mod registers;
-pub mod psram;
 pub mod mailbox;
+pub mod psram;
 pub mod clock;
 pub mod uart;
 pub mod watchdog;

@@ -12,13 +12,13 @@ use self::lines::Lines;
 use super::Exponential;
 
 mod aligned;
-mod exp;
-mod exponent;
-#[cfg(target_arch = "x86_64")]
-mod fixed16;
-mod floats;
 mod lines;
 mod tiles;
+mod exp;
+mod exponent;
+mod floats;
+#[cfg(target_arch = "x86_64")]
+mod fixed16;
 
 /// A network made ready for blocks of lines.
 #[derive(Debug)]

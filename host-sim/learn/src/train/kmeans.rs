@@ -10,8 +10,8 @@ use std::borrow::Cow;
 
 use taxel_data::random::Random;
 
-mod assign;
 mod screen;
+mod assign;
 mod start;
 
 use assign::{Assignment, Piece};

@@ -5,7 +5,7 @@ use core::f32::consts::LOG2_E;
 use model_core::exp::{EXP_COEFFICIENTS, EXP2_COEFFICIENTS, LN_2_PARTS, ROUND};
 use pulp::Simd;
 
-use super::floats::ABREAST;
+use super::lines::ABREAST;
 
 /// ((c₀·r + c₁)·r + …)
 #[inline(always)]

@@ -4,8 +4,7 @@ use model_core::scale::{CLAMP, UNITS};
 use pulp::Simd;
 
 use super::exp::{exp, exp2};
-use super::floats::ABREAST;
-use super::lines::{Lanes, VECTORS};
+use super::lines::{ABREAST, Lanes, VECTORS};
 use super::tiles::{Accumulate, CENTRES, accumulate};
 
 /// What differs between the forms of exponents.

@@ -8,14 +8,12 @@ use pulp::{Simd, WithSimd};
 
 use super::aligned::Aligned;
 use super::exponent::{Direct, Expanded, Exponent, Terms};
-use super::lines::{Lines, VECTORS, Values};
+use super::lines::{ABREAST, Lines, VECTORS, Values};
 use super::tiles::{CENTRES, Weights, in_fours};
 use crate::infer::Exponential;
 
 /// Centres whose activations are kept until the outputs take them: 4 KiB, in the first cache.
 const KEPT: usize = 64;
-/// Registers that are exponentiated side by side: a polynomial by itself would wait for every operation.
-pub(super) const ABREAST: usize = 4;
 
 /// A network laid out for blocks of lines.
 #[derive(Debug)]

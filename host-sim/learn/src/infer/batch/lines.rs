@@ -7,6 +7,9 @@ use super::aligned::Aligned;
 /// Registers that hold one value of every line of a block.
 pub(super) const VECTORS: usize = 2;
 
+/// Registers that are exponentiated side by side: a polynomial by itself would wait for every operation.
+pub(super) const ABREAST: usize = 4;
+
 /// Values of a line that are turned into columns, and back, at a time.
 const TILE: usize = 4;
 
