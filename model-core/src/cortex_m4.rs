@@ -27,6 +27,18 @@ pub enum Finite {
     Unknown,
 }
 
+/// A network's parameters as plain words, with the counts that tell how to read them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(C)] // the counts first, so that they are at the same place in a network of any format
+pub struct Block<'a> {
+    pub inputs: usize,
+    pub centres: usize,
+    pub outputs: usize,
+    /// Whether there is an affine tail.
+    pub affine: bool,
+    pub words: &'a [u32],
+}
+
 /// Words that [`expanded_array`] reads of a block, for `groups` groups of outputs.
 #[cfg(any(test, cortex_m4f))]
 pub(crate) const fn expanded_words(centres: usize, affine: bool, groups: usize) -> usize {

@@ -245,6 +245,7 @@ fn decode_inputs(
 /// compiled for size.
 #[cfg(cortex_m4f)]
 #[inline(never)]
+#[expect(unsafe_code, reason = "calls to assembly, for networks that are made to their sizes here")]
 fn decode_in_assembly(
     section: &NetworkSection<'_>,
     exp: fn(f32) -> f32,
@@ -259,14 +260,16 @@ fn decode_in_assembly(
             let outputs = groups.as_flattened_mut();
             return decode_direct(section, exp, inputs, scaled, outputs);
         }
-        Format::F32 => {
-            section.packed::<Expanded>(shape).map(|it| it.infer_in_assembly(inputs, groups))
-        }
-        Format::Fixed16 => {
-            section.packed::<Fixed16>(shape).map(|it| it.infer_in_assembly(inputs, groups))
-        }
+        Format::F32 => section.packed::<Expanded>(shape).map(|network| {
+            // SAFETY: `shape` is made of these inputs and groups, and the network has it.
+            unsafe { network.infer_in_assembly(inputs, groups) }
+        }),
+        Format::Fixed16 => section.packed::<Fixed16>(shape).map(|network| {
+            // SAFETY: as for f32.
+            unsafe { network.infer_in_assembly(inputs, groups) }
+        }),
     };
-    status_of(finite.flatten(), inputs)
+    status_of(finite, inputs)
 }
 
 /// See [`decode_in_assembly`].

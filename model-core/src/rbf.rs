@@ -17,7 +17,7 @@
 // From the ground up.
 mod parameters;
 mod format;
-mod packed;
+pub mod packed;
 pub mod direct;
 pub mod expanded;
 pub mod fixed16;

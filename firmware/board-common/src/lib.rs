@@ -19,6 +19,7 @@ use firmware::app::PaperBuffers;
 /// when the application runs.
 #[cfg(target_os = "none")]
 #[inline(never)]
+#[must_use]
 pub fn buffers() -> Option<&'static mut PaperBuffers> {
     cortex_m::singleton!(: PaperBuffers = PaperBuffers::new())
 }

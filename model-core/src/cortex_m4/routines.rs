@@ -10,7 +10,7 @@
 
 use core::mem::MaybeUninit;
 
-use super::{Finite, INPUTS, OUTPUTS, expanded_words, fixed16_words};
+use super::{Block, Finite, INPUTS, OUTPUTS, expanded_words, fixed16_words};
 
 /// Activations that the f32 routine keeps between its two halves: 512 bytes of stack.
 const MOST_CENTRES_AT_ONCE: usize = 128;
@@ -114,22 +114,22 @@ fn sixteens(centres: usize) -> u32 {
 /// The outputs of a network with expanded distances, 18 of them.
 ///
 /// # Safety
-/// There is at least one of the `centres`, and `block` has [`expanded_words`] words for them and one group.
+/// `block` has at least one centre, and [`expanded_words`] words for its centres and one group.
 pub(crate) unsafe fn expanded(
+    block: &Block<'_>,
     inputs: Inputs<'_>,
-    block: &[u32],
-    centres: usize,
-    affine: bool,
     output: &mut [f32; OUTPUTS],
 ) -> Finite {
-    debug_assert!(centres > 0 && block.len() >= expanded_words(centres, affine, 1));
+    debug_assert!(
+        block.centres > 0 && block.words.len() >= expanded_words(block.centres, block.affine, 1)
+    );
     let (inputs, scaled) = inputs.parts();
-    let (fours, flags) = (fours(centres), flags(affine, scaled));
+    let (fours, flags) = (fours(block.centres), flags(block.affine, scaled));
     let mut activations = MaybeUninit::uninit();
     // SAFETY: the caller vouches for the block; the routine reads 18 inputs and writes 18 outputs, which the
     // types tell; it writes activations, 128 at most, before it reads them.
     unsafe {
-        let (block, activations) = (block.as_ptr(), activations.as_mut_ptr());
+        let (block, activations) = (block.words.as_ptr(), activations.as_mut_ptr());
         Finite::of_status(taxel_f32(inputs, block, output, fours, flags, activations))
     }
 }
@@ -137,25 +137,23 @@ pub(crate) unsafe fn expanded(
 /// The outputs of a network with expanded distances, in groups of 18.
 ///
 /// # Safety
-/// There is at least one of the `groups` and of the `centres`, and `block` has [`expanded_words`] words for
-/// them.
+/// There is at least one of the `groups`; `block` has at least one centre, and [`expanded_words`] words for its
+/// centres and as many groups.
 #[inline(never)] // its stack would burden the routine for one group
 pub(crate) unsafe fn expanded_array(
+    block: &Block<'_>,
     inputs: Inputs<'_>,
-    block: &[u32],
-    centres: usize,
-    affine: bool,
     groups: &mut [[f32; OUTPUTS]],
 ) -> Finite {
-    debug_assert!(centres > 0 && !groups.is_empty());
-    debug_assert!(block.len() >= expanded_words(centres, affine, groups.len()));
+    debug_assert!(block.centres > 0 && !groups.is_empty());
+    debug_assert!(block.words.len() >= expanded_words(block.centres, block.affine, groups.len()));
     let (inputs, scaled) = inputs.parts();
-    let (fours, flags) = (fours(centres), flags(affine, scaled));
+    let (fours, flags) = (fours(block.centres), flags(block.affine, scaled));
     let (output, groups) = (groups.as_mut_ptr().cast(), groups.len() as u32);
     let mut activations = MaybeUninit::uninit();
     // SAFETY: as in `expanded`; the routine writes as many groups as there are.
     unsafe {
-        let (block, activations) = (block.as_ptr(), activations.as_mut_ptr());
+        let (block, activations) = (block.words.as_ptr(), activations.as_mut_ptr());
         Finite::of_status(taxel_f32_array(inputs, block, output, fours, flags, activations, groups))
     }
 }
@@ -163,43 +161,43 @@ pub(crate) unsafe fn expanded_array(
 /// The outputs of a network in fixed point, 18 of them.
 ///
 /// # Safety
-/// There is at least one of the `centres`, and `block` has [`fixed16_words`] words for them and one group.
+/// `block` has at least one centre, and [`fixed16_words`] words for its centres and one group.
 pub(crate) unsafe fn fixed16(
+    block: &Block<'_>,
     inputs: Inputs<'_>,
-    block: &[u32],
-    centres: usize,
-    affine: bool,
     output: &mut [f32; OUTPUTS],
 ) -> Finite {
-    debug_assert!(centres > 0 && block.len() >= fixed16_words(centres, affine, 1));
+    debug_assert!(
+        block.centres > 0 && block.words.len() >= fixed16_words(block.centres, block.affine, 1)
+    );
     let (inputs, scaled) = inputs.parts();
-    let (sixteens, flags) = (sixteens(centres), flags(affine, scaled));
+    let (sixteens, flags) = (sixteens(block.centres), flags(block.affine, scaled));
     // SAFETY: the caller vouches for the block; the routine reads 18 inputs and writes 18 outputs, which the
     // types tell.
-    Finite::of_status(unsafe { taxel_fixed16(inputs, block.as_ptr(), output, sixteens, flags) })
+    Finite::of_status(unsafe {
+        taxel_fixed16(inputs, block.words.as_ptr(), output, sixteens, flags)
+    })
 }
 
 /// The outputs of a network in fixed point, in groups of 18.
 ///
 /// # Safety
-/// There is at least one of the `groups` and of the `centres`, and `block` has [`fixed16_words`] words for
-/// them.
+/// There is at least one of the `groups`; `block` has at least one centre, and [`fixed16_words`] words for its
+/// centres and as many groups.
 #[inline(never)] // its stack would burden the routine for one group
 pub(crate) unsafe fn fixed16_array(
+    block: &Block<'_>,
     inputs: Inputs<'_>,
-    block: &[u32],
-    centres: usize,
-    affine: bool,
     groups: &mut [[f32; OUTPUTS]],
 ) -> Finite {
-    debug_assert!(centres > 0 && !groups.is_empty());
-    debug_assert!(block.len() >= fixed16_words(centres, affine, groups.len()));
+    debug_assert!(block.centres > 0 && !groups.is_empty());
+    debug_assert!(block.words.len() >= fixed16_words(block.centres, block.affine, groups.len()));
     let (inputs, scaled) = inputs.parts();
-    let (sixteens, flags) = (sixteens(centres), flags(affine, scaled));
+    let (sixteens, flags) = (sixteens(block.centres), flags(block.affine, scaled));
     let (output, groups) = (groups.as_mut_ptr().cast(), groups.len() as u32);
     // SAFETY: as in `fixed16`; the routine writes as many groups as there are.
     Finite::of_status(unsafe {
-        taxel_fixed16_array(inputs, block.as_ptr(), output, sixteens, flags, groups)
+        taxel_fixed16_array(inputs, block.words.as_ptr(), output, sixteens, flags, groups)
     })
 }
 

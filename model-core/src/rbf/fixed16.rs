@@ -211,10 +211,9 @@ impl Layout for Fixed16 {
         inputs: Inputs<'_>,
         output: &mut [f32; OUTPUTS],
     ) -> Finite {
-        let (centres, affine) = (network.shape().centres, network.has_affine_tail());
         // SAFETY: the caller has compared the shape with the routine's. When the network was made, its block was
         // found to be as long as its shape asks for, and no dimension to be 0. A test compares the lengths.
-        unsafe { cortex_m4::fixed16(inputs, network.block(), centres, affine, output) }
+        unsafe { cortex_m4::fixed16(network.counted(), inputs, output) }
     }
 
     #[cfg(cortex_m4f)]
@@ -225,9 +224,8 @@ impl Layout for Fixed16 {
         inputs: Inputs<'_>,
         groups: &mut [[f32; OUTPUTS]],
     ) -> Finite {
-        let (centres, affine) = (network.shape().centres, network.has_affine_tail());
         // SAFETY: as in `routine`.
-        unsafe { cortex_m4::fixed16_array(inputs, network.block(), centres, affine, groups) }
+        unsafe { cortex_m4::fixed16_array(network.counted(), inputs, groups) }
     }
 }
 

@@ -14,7 +14,7 @@ use core::marker::PhantomData;
 use super::parameters::{NetworkError, Shape, check_length};
 #[cfg(cortex_m4f)]
 use crate::cortex_m4::Inputs;
-use crate::cortex_m4::{Finite, INPUTS, OUTPUTS};
+use crate::cortex_m4::{Block, Finite, INPUTS, OUTPUTS};
 
 /// A number format whose networks are one block of words.
 pub trait Layout: Copy + Debug + PartialEq {
@@ -82,9 +82,7 @@ pub trait Layout: Copy + Debug + PartialEq {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(C)] // the shape first, so that it is at the same place in a network of any format
 pub struct Network<'a, L> {
-    shape: Shape,
-    affine: bool,
-    block: &'a [u32],
+    block: Block<'a>,
     layout: PhantomData<L>,
 }
 
@@ -115,7 +113,9 @@ impl<'a, L: Layout> Network<'a, L> {
         }
         L::check_shape(shape)?;
         check_length("block", block, Self::block_words(shape, affine))?;
-        Ok(Self { shape, affine, block, layout: PhantomData })
+        let Shape { inputs, centres, outputs } = shape;
+        let block = Block { inputs, centres, outputs, affine, words: block };
+        Ok(Self { block, layout: PhantomData })
     }
 
     /// Words of the block of a network of this shape.
@@ -128,19 +128,28 @@ impl<'a, L: Layout> Network<'a, L> {
     /// The network's sizes.
     #[must_use]
     pub fn shape(&self) -> Shape {
-        self.shape
+        let Block { inputs, centres, outputs, .. } = self.block;
+        Shape { inputs, centres, outputs }
     }
 
     /// Whether there is an affine tail.
     #[must_use]
     pub fn has_affine_tail(&self) -> bool {
-        self.affine
+        self.block.affine
     }
 
     /// All of the network's words.
     #[must_use]
     pub fn block(&self) -> &'a [u32] {
-        self.block
+        self.block.words
+    }
+
+    /// The words with their counts, as the routines take them.
+    #[cfg(cortex_m4f)]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "a reference")]
+    pub(super) fn counted(&self) -> &Block<'a> {
+        &self.block
     }
 
     /// The network's parameters.
@@ -169,13 +178,13 @@ impl<'a, L: Layout> Network<'a, L> {
         L::scale(self, reading, scaled);
     }
 
-    /// Whether the network's sizes are those of the routines, with as many outputs.
+    /// Whether the network's sizes are those of the routine for one group.
     #[cfg(cortex_m4f)]
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "where lengths are known, nothing is left of it")]
-    fn suits(&self, all_outputs: usize) -> bool {
-        let Shape { inputs, outputs, .. } = self.shape;
-        inputs == INPUTS && outputs == all_outputs
+    fn suits_one_group(&self) -> bool {
+        let Block { inputs, outputs, .. } = self.block;
+        inputs == INPUTS && outputs == OUTPUTS
     }
 
     /// Infers `output` from one row of readings; `scaled` is working space.
@@ -184,7 +193,7 @@ impl<'a, L: Layout> Network<'a, L> {
     pub(crate) fn infer(&self, reading: &[f32], scaled: &mut [f32], output: &mut [f32]) -> Finite {
         #[cfg(cortex_m4f)]
         if let (Ok(reading), Ok(output)) = (reading.try_into(), (&mut *output).try_into())
-            && self.suits(OUTPUTS)
+            && self.suits_one_group()
         {
             // SAFETY: the network suits one group.
             return unsafe { L::routine(self, Inputs::Readings(reading), output) };
@@ -196,27 +205,23 @@ impl<'a, L: Layout> Network<'a, L> {
 
     /// Infers groups of 18 outputs from one row of readings.
     ///
-    /// # Errors
-    /// [`NetworkError::Length`]: the network has other sizes.
+    /// # Safety
+    /// The network has 18 inputs, and 18 outputs for each of `groups`.
     #[cfg(cortex_m4f)]
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "a match and a call")]
-    pub(crate) fn infer_in_assembly(
+    pub(crate) unsafe fn infer_in_assembly(
         &self,
         reading: &[f32; INPUTS],
         groups: &mut [[f32; OUTPUTS]],
-    ) -> Result<Finite, NetworkError> {
-        if !self.suits(groups.as_flattened().len()) {
-            let (expected, found) = (self.shape.outputs, groups.as_flattened().len());
-            return Err(NetworkError::Length { what: "outputs", expected, found });
-        }
+    ) -> Finite {
         let inputs = Inputs::Readings(reading);
-        Ok(match groups {
-            // SAFETY: the network suits the groups, of which there is one.
+        match groups {
+            // SAFETY: the caller vouches for the sizes, and there is one group.
             [output] => unsafe { L::routine(self, inputs, output) },
-            // SAFETY: the network suits the groups.
+            // SAFETY: the caller vouches for the sizes.
             groups => unsafe { L::array_routine(self, inputs, groups) },
-        })
+        }
     }
 
     /// Infers `output` from `scaled` inputs, which are used up.
@@ -225,7 +230,7 @@ impl<'a, L: Layout> Network<'a, L> {
     pub(crate) fn infer_scaled(&self, scaled: &mut [f32], output: &mut [f32]) {
         #[cfg(cortex_m4f)]
         if let (Ok(scaled), Ok(output)) = ((&*scaled).try_into(), (&mut *output).try_into())
-            && self.suits(OUTPUTS)
+            && self.suits_one_group()
         {
             // SAFETY: the network suits one group.
             unsafe { L::routine(self, Inputs::Scaled(scaled), output) };
