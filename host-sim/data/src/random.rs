@@ -3,11 +3,13 @@
 //! Generator: xoshiro256++ (Blackman & Vigna, 2021), one instance for every purpose of every frame
 //! of every row, seeded from those numbers by SplitMix64: a frame never depends on the frames
 //! before it, nor on which rows are read. Uniform: the upper 53 bits over 2^53. Normal: Box–Muller,
-//! √(−2 ln(1 − u₁))·(cos, sin)(2π u₂), with the `libm` crate's functions, which are the same code on
-//! every platform.
+//! √(−2 ln(1 − u₁))·(cos, sin)(2π u₂), with functions that every platform computes alike
+//! (`elementary`).
 
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
+
+use crate::elementary::{ln, sin_cos};
 
 mod lanes;
 
@@ -81,10 +83,10 @@ impl Random {
         if let Some(spare) = self.spare_normal.take() {
             return spare;
         }
-        let radius = libm::sqrt(-2.0 * libm::log(1.0 - self.unit()));
-        let angle = std::f64::consts::TAU * self.unit();
-        self.spare_normal = Some(radius * libm::sin(angle));
-        radius * libm::cos(angle)
+        let radius = (-2.0 * ln(1.0 - self.unit())).sqrt();
+        let (sine, cosine) = sin_cos(std::f64::consts::TAU * self.unit());
+        self.spare_normal = Some(radius * sine);
+        radius * cosine
     }
 }
 

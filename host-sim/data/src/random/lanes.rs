@@ -6,7 +6,7 @@
 use std::f64::consts::TAU;
 
 use super::{Purpose, SPLIT_MIX_STEP, Stream, split_mix, unit};
-use crate::elementary::{is_near_an_axis, ln, sin_cos};
+use crate::elementary::{ln, sin_cos};
 use crate::simd::{LANES, Lanes};
 
 /// Sources of the same purpose for consecutive frames.
@@ -73,21 +73,11 @@ impl RandomLanes {
         let mut units = [[0.0; LANES]; 2];
         self.between([[0.0, 1.0]; 2], &mut units);
         let [radii, turns] = units;
-        let mut rare = 0_u64;
         for lane in 0..LANES {
             let radius = (-2.0 * ln(1.0 - radii[lane])).sqrt();
-            rare |= u64::from(is_near_an_axis(turns[lane]));
             let (sine, cosine) = sin_cos(TAU * turns[lane]);
             first[lane] = radius * cosine;
             second[lane] = radius * sine;
-        }
-        if rare != 0 {
-            for lane in (0..LANES).filter(|lane| is_near_an_axis(turns[*lane])) {
-                let radius = (-2.0 * ln(1.0 - radii[lane])).sqrt();
-                let angle = TAU * turns[lane];
-                first[lane] = radius * libm::cos(angle);
-                second[lane] = radius * libm::sin(angle);
-            }
         }
     }
 }

@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 use serde::Deserialize;
 use taxel_data::random::{Purpose, RandomLanes};
 use taxel_data::simd::{self, LANES, Lanes};
-use taxel_data::{BadValue, exp, is_near_an_axis, sin_cos};
+use taxel_data::{BadValue, exp, sin_cos};
 
 use super::{Draws, Motion, Trajectories, check_range};
 use crate::sensor::{Sensor, Vector3};
@@ -120,12 +120,7 @@ impl Contact {
         let [x_mm, y_mm, dent_radius_mm, dent_depth_mm, ratios, turns] = drawn;
         let mut shear = [[0.0; LANES]; 2];
         for frame in 0..LANES {
-            let angle_rad = TAU * turns[frame];
-            let (sine, cosine) = if is_near_an_axis(turns[frame]) {
-                (libm::sin(angle_rad), libm::cos(angle_rad))
-            } else {
-                sin_cos(angle_rad)
-            };
+            let (sine, cosine) = sin_cos(TAU * turns[frame]);
             shear[0][frame] = ratios[frame] * cosine;
             shear[1][frame] = ratios[frame] * sine;
         }
@@ -135,7 +130,6 @@ impl Contact {
     #[inline(always)]
     fn deform(&self, electrode_mm: &Vector3, [dx_mm, dy_mm, dz_mm]: &mut [Lanes; 3]) {
         let mut exponents = [0.0; LANES];
-        let mut lowest = 0.0_f64;
         for frame in 0..LANES {
             let x = electrode_mm[0] - self.centre_mm[0][frame];
             let y = electrode_mm[1] - self.centre_mm[1][frame];
@@ -144,14 +138,6 @@ impl Contact {
         }
         for frame in 0..LANES {
             dz_mm[frame] = self.dent_depth_mm[frame] * exp(exponents[frame]);
-        }
-        for exponent in exponents {
-            lowest = if exponent < lowest { exponent } else { lowest };
-        }
-        if lowest < -700.0 {
-            for frame in (0..LANES).filter(|frame| exponents[*frame] < -700.0) {
-                dz_mm[frame] = self.dent_depth_mm[frame] * libm::exp(exponents[frame]);
-            }
         }
         for frame in 0..LANES {
             dx_mm[frame] = self.shear[0][frame] * dz_mm[frame];
