@@ -3,8 +3,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use model_core::blob::{Model, ModelParts, encode, encoded_length_bound};
+use model_core::blob::{Model, ModelParts, encode_to_vec};
 use model_core::rbf::{Format, Network, direct, expanded, fixed16};
+use taxel_learn::ModelBlob;
 
 use super::training::{self, Wanted};
 use crate::process::Outcome;
@@ -44,13 +45,12 @@ pub fn train(directory: &Path) -> Outcome<Vec<Blob>> {
     for (wanted, trained) in wanted.iter().zip(training::train(&wanted)?) {
         let array = if wanted.whole_array { "-array" } else { "" };
         let stem = format!("{}-{}{array}", wanted.format.name(), wanted.centres);
-        if trained.len() > SLOT_BYTES && wanted.whole_array {
+        if trained.bytes().len() > SLOT_BYTES && wanted.whole_array {
             eprintln!("left out: {stem} is larger than a slot");
             continue;
         }
-        let bytes = Bytes::of(&trained);
         let refused = |cause: String| format!("{stem}: {cause}");
-        let model = bytes.model().map_err(refused)?;
+        let model = trained.parse();
         is_as_asked(&model, wanted.format, wanted.centres).map_err(refused)?;
         for (affine, suffix) in [(false, ""), (true, "-affine")] {
             let path = directory.join(format!("{stem}{suffix}.bin"));
@@ -66,8 +66,8 @@ pub fn train(directory: &Path) -> Outcome<Vec<Blob>> {
 /// # Errors
 /// It is no sound blob.
 pub fn of_file(path: &Path, directory: &Path) -> Outcome<Vec<Blob>> {
-    let bytes = Bytes::read(path)?;
-    let model = bytes.model().map_err(|cause| failed(path, &cause))?;
+    let blob = ModelBlob::read(path).map_err(|cause| cause.to_string())?;
+    let model = blob.parse();
     let affine = model.networks().any(|network| network.has_affine_tail());
     let rows_alike = rows_alike(&model);
     let given = Blob { path: path.to_owned(), affine, rows_alike };
@@ -131,8 +131,7 @@ fn rewritten(model: &Model<'_>, rows: Rows, affine: bool) -> Outcome<Vec<u8>> {
         row_network: &row_network,
         metadata: *model.metadata(),
     };
-    let mut room = Bytes::zeros(encoded_length_bound(&parts));
-    encode(&parts, room.bytes_mut()).map(<[u8]>::to_vec).map_err(|cause| cause.to_string())
+    encode_to_vec(&parts).map(|bytes| bytes.to_vec()).map_err(|cause| cause.to_string())
 }
 
 /// A network's block, with its tail only if `affine`.
@@ -169,44 +168,6 @@ fn of_words<'w>(network: &Network<'_>, affine: bool, words: &'w [u32]) -> Outcom
     network.map_err(|cause| cause.to_string())
 }
 
-/// Bytes at a multiple of four, where a blob must lie.
-struct Bytes {
-    room: Vec<u8>,
-    start: usize,
-}
-
-impl Bytes {
-    fn zeros(length: usize) -> Self {
-        let mut room = vec![0; length + 3];
-        let start = room.as_ptr().align_offset(4).min(3);
-        room.truncate(start + length);
-        Self { room, start }
-    }
-
-    fn of(blob: &[u8]) -> Self {
-        let mut bytes = Self::zeros(blob.len());
-        bytes.bytes_mut().copy_from_slice(blob);
-        bytes
-    }
-
-    fn read(path: &Path) -> Outcome<Self> {
-        let blob = fs::read(path).map_err(|cause| failed(path, &cause))?;
-        Ok(Self::of(&blob))
-    }
-
-    fn bytes_mut(&mut self) -> &mut [u8] {
-        self.room.get_mut(self.start..).unwrap_or_default()
-    }
-
-    fn bytes(&self) -> &[u8] {
-        self.room.get(self.start..).unwrap_or_default()
-    }
-
-    fn model(&self) -> Outcome<Model<'_>> {
-        Model::decode(self.bytes()).map_err(|cause| cause.to_string())
-    }
-}
-
 fn write(path: &Path, blob: &[u8]) -> Outcome {
     fs::write(path, blob).map_err(|cause| failed(path, &cause))
 }
@@ -221,13 +182,14 @@ mod tests {
 
     #[test]
     fn a_model_without_its_tail_is_otherwise_the_same() {
-        let bytes = Bytes::read(&crate::process::root().join("testdata/hand-made.bin")).unwrap();
-        let model = bytes.model().unwrap();
+        let blob = ModelBlob::read(&crate::process::root().join("testdata/hand-made.bin")).unwrap();
+        let model = blob.parse();
         let with = rewritten(&model, Rows::AsTheyAre, true).unwrap();
-        assert_eq!(with, bytes.room[bytes.start..]);
+        assert_eq!(with, blob.bytes());
 
-        let without = Bytes::of(&rewritten(&model, Rows::AsTheFirst, false).unwrap());
-        let without = without.model().unwrap();
+        let without = rewritten(&model, Rows::AsTheFirst, false).unwrap();
+        let without = ModelBlob::of_bytes(&without).unwrap();
+        let without = without.parse();
         assert_eq!((model.network_count(), without.network_count()), (2, 1));
         assert_eq!(without.metadata(), model.metadata());
         let (Some(Network::F32Direct(before)), Some(Network::F32Direct(after))) =
@@ -241,8 +203,8 @@ mod tests {
 
     #[test]
     fn a_model_of_another_kind_than_asked_for_is_refused() {
-        let bytes = Bytes::read(&crate::process::root().join("testdata/hand-made.bin")).unwrap();
-        let model = bytes.model().unwrap();
+        let blob = ModelBlob::read(&crate::process::root().join("testdata/hand-made.bin")).unwrap();
+        let model = blob.parse();
         assert_eq!(is_as_asked(&model, Format::F32Direct, 12), Ok(()));
         assert!(is_as_asked(&model, Format::F32Direct, 16).is_err());
         let error = is_as_asked(&model, Format::F32, 12).unwrap_err();

@@ -4,7 +4,7 @@ use model_core::rbf::Format;
 use rayon::prelude::*;
 use taxel_data::progress::Silent;
 use taxel_data::random::Stream;
-use taxel_learn::{Error, Options, Origin, pack, train as trainer};
+use taxel_learn::{Error, ModelBlob, Options, Origin, pack, train as trainer};
 use taxel_simulate::{Synthesis, World};
 
 use crate::process::Outcome;
@@ -36,18 +36,18 @@ pub struct Wanted {
 ///
 /// # Errors
 /// A model cannot be trained.
-pub fn train(wanted: &[Wanted]) -> Outcome<Vec<Vec<u8>>> {
+pub fn train(wanted: &[Wanted]) -> Outcome<Vec<ModelBlob>> {
     let world = World::press();
     let dataset = Synthesis::of(&world).noise_level(NOISE).frames(Stream::Training, FRAMES);
     let origin = Origin::of_data(SCENE, 0, world.seed, &dataset);
-    let blob = |wanted: &Wanted| -> Result<Vec<u8>, Error> {
+    let blob = |wanted: &Wanted| -> Result<ModelBlob, Error> {
         let &Wanted { format, centres, whole_array } = wanted;
         let mut options = Options { format, centres, whole_array, ..Options::default() };
         if whole_array {
             options.spread = SPREAD_OF_ARRAY;
         }
         let trained = trainer::train(&dataset, &options, &Silent)?;
-        Ok(pack(&trained, &dataset, &origin)?.bytes().to_vec())
+        pack(&trained, &dataset, &origin)
     };
     let blobs = wanted.par_iter().map(blob).collect::<Result<_, _>>();
     blobs.map_err(|cause| format!("training: {cause}"))
