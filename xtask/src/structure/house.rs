@@ -30,6 +30,7 @@ pub const CRATES: &[(&str, Side)] = &[
 /// Files, and folders with all that is in them, in which `unsafe` may stand.
 pub const UNSAFE: &[&str] = &[
     "model-core/src/cortex_m4/routines.rs",
+    "model-core/src/decoder.rs",
     "model-core/src/projection.rs",
     "model-core/src/rbf/expanded.rs",
     "model-core/src/rbf/fixed16.rs",
