@@ -14,8 +14,8 @@ use commands::{
 
 /// Simulate, train and evaluate resistive tactile sensors; write weight blobs for the device.
 ///
-/// Without a command: `run paper`. Results go to stdout, progress and remarks to stderr.
-/// Exit status: 0 done, 1 failed, 2 bad usage or input.
+/// Without a command: `run paper`. Results go to stdout, progress and remarks to stderr. Exit status: 0
+/// done, 1 failed, 2 bad usage or input.
 #[derive(Parser)]
 #[command(version)]
 struct Cli {
@@ -73,7 +73,7 @@ fn report(outcome: Result<()>) -> ExitCode {
     }
 }
 
-/// 1 for work that failed, 2 for bad usage or input.
+/// Exit status of an error: 1 for work that failed, 2 for bad usage or input.
 fn exit_status(error: &Error) -> u8 {
     use taxel_rig::Error as Rig;
     match error {

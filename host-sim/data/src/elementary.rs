@@ -1,17 +1,18 @@
 //! Logarithm, sine, cosine and exponential without branches, for loops that are to be vectorised.
 //!
-//! On the arguments stated they return the very bits of the `libm` crate's functions: they do the same
-//! operations in the same order, and choose where those branch. (The algorithms and constants are those of
-//! FreeBSD's msun, Copyright (C) 1993 by Sun Microsystems, Inc., freely granted.)
+//! On the arguments stated, the functions return the same bits as the `libm` crate's: they do the same
+//! operations in the same order, and select where those branch. (The algorithms and constants are those
+//! of FreeBSD's msun, Copyright (C) 1993 by Sun Microsystems, Inc., freely granted.)
 
-/// 2^52: adding it to a whole number from 0 to 2^52 leaves the number in the low bits.
+/// Number 2^52: adding it to a whole number from 0 to 2^52 leaves the number in the low bits.
 const TWO_52: f64 = 4_503_599_627_370_496.0;
 
 const LN2_HI: f64 = 6.931_471_803_691_238e-1;
 const LN2_LO: f64 = 1.908_214_929_270_587_7e-10;
 
-/// Natural logarithm as `libm::log`, of a normal positive number.
+/// Natural logarithm of a normal positive number, bit for bit `libm::log`.
 #[inline(always)]
+#[must_use]
 pub fn ln(x: f64) -> f64 {
     const LG: [f64; 7] = [
         6.666_666_666_666_735e-1,
@@ -39,9 +40,11 @@ pub fn ln(x: f64) -> f64 {
     s * (hfsq + r) + dk * LN2_LO - hfsq + f + dk * LN2_HI
 }
 
-/// Sine and cosine as `libm::sin` and `libm::cos`, of an angle from 0 to 2π that
-/// [`is_near_an_axis`] is false for.
+/// Sine and cosine of an angle from 0 to 2π, bit for bit `libm::sin` and `libm::cos`.
+///
+/// The angle must not be [near an axis](is_near_an_axis).
 #[inline(always)]
+#[must_use]
 pub fn sin_cos(x: f64) -> (f64, f64) {
     const PIO2_1: f64 = 1.570_796_326_734_125_6;
     const PIO2_1T: f64 = 6.077_100_506_506_192e-11;
@@ -89,17 +92,19 @@ pub fn sin_cos(x: f64) -> (f64, f64) {
     (s, c)
 }
 
-/// Whether an angle, given as a fraction of the full turn, is so near a multiple of a quarter that libm
-/// reduces it with more digits than [`sin_cos`] does.
+/// Whether an angle, given as a fraction of a full turn, is too near a multiple of a quarter turn for
+/// [`sin_cos`]. There libm reduces the angle with more digits.
 #[inline(always)]
+#[must_use]
 pub fn is_near_an_axis(turn: f64) -> bool {
     let quarters = 4.0 * turn;
     let off = quarters - ((quarters + TWO_52) - TWO_52);
     off.abs() < 1.0 / 8192.0 && turn > 0.125
 }
 
-/// Exponential as `libm::exp`, of a number from −700 to 0.
+/// Exponential of a number from −700 to 0, bit for bit `libm::exp`.
 #[inline(always)]
+#[must_use]
 pub fn exp(x: f64) -> f64 {
     const INV_LN2: f64 = std::f64::consts::LOG2_E;
     const P: [f64; 5] = [
