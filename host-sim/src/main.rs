@@ -75,18 +75,15 @@ fn report(outcome: Result<()>) -> ExitCode {
 
 /// Exit status of an error: 1 for work that failed, 2 for bad usage or input.
 fn exit_status(error: &Error) -> u8 {
+    use taxel_learn::Error as Learn;
     use taxel_rig::Error as Rig;
     match error {
-        Error::Failed(_) | Error::Cycles(_) => 1,
+        Error::Failed(_)
+        | Error::Cycles(_)
+        | Error::Learn(Learn::NoRegression | Learn::ProjectionBeyondF32 | Learn::NotPacked(_)) => 1,
         Error::Simulate(cause) => match cause {
             taxel_simulate::Error::Setting(_) | taxel_simulate::Error::Data(_) => 2,
             _ => 1,
-        },
-        Error::Learn(cause) => match cause {
-            taxel_learn::Error::NoRegression
-            | taxel_learn::Error::ProjectionBeyondF32
-            | taxel_learn::Error::NotPacked(_) => 1,
-            _ => 2,
         },
         Error::Rig(cause) => match cause {
             Rig::Port { .. }

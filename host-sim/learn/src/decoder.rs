@@ -96,7 +96,7 @@ mod tests {
     impl FrameDecoder for RunningMean {
         type State = (f64, f64);
 
-        fn name(&self) -> &str {
+        fn name(&self) -> &'static str {
             "running mean"
         }
 

@@ -44,7 +44,7 @@ pub trait RowDecoder: Sync {
 pub struct Rows<D> {
     name: &'static str,
     inputs: usize,
-    rows: Vec<D>,
+    decoders: Vec<D>,
 }
 
 impl RowDecoder for FittedNetwork {
@@ -61,14 +61,14 @@ impl<D: RowDecoder + Send> Rows<D> {
         fit: impl Fn(&RowTable) -> D + Sync,
     ) -> Self {
         let rows = (0..training.rows).into_par_iter();
-        let rows = rows.map(|row| fit(&training.row_table(row))).collect();
-        Self::of(name, training, rows)
+        let decoders = rows.map(|row| fit(&training.row_table(row))).collect();
+        Self::of(name, training, decoders)
     }
 
     /// Joins decoders that were already fitted to the rows of `training`, in their order.
     #[must_use]
-    pub fn of(name: &'static str, training: &Dataset, rows: Vec<D>) -> Self {
-        Self { name, inputs: training.inputs.names.len() / training.rows.max(1), rows }
+    pub fn of(name: &'static str, training: &Dataset, decoders: Vec<D>) -> Self {
+        Self { name, inputs: training.inputs.names.len() / training.rows.max(1), decoders }
     }
 }
 
@@ -80,7 +80,7 @@ impl<D: RowDecoder + Send> FrameDecoder for Rows<D> {
     }
 
     fn inputs(&self) -> usize {
-        self.rows.len() * self.inputs
+        self.decoders.len() * self.inputs
     }
 
     fn decode(&self, (): &mut (), readings: &[f64]) -> Estimates {
@@ -91,7 +91,7 @@ impl<D: RowDecoder + Send> FrameDecoder for Rows<D> {
                 frames.clone().flat_map(|frame| &frame[places.clone()]).copied().collect();
             decoder.predict(&readings)
         };
-        let parts: Vec<Vec<f64>> = self.rows.par_iter().enumerate().map(of_row).collect();
+        let parts: Vec<Vec<f64>> = self.decoders.par_iter().enumerate().map(of_row).collect();
         Estimates::of_values(side_by_side(&parts, frames.len()))
     }
 }

@@ -24,6 +24,9 @@ pub struct PreparedModel<'b> {
 impl ModelBlob {
     /// Prepares the model for decoding with `exponential`; [`Exponential::default`] is that of the
     /// devices.
+    ///
+    /// # Panics
+    /// Never: every row of a model that was checked has a network.
     #[must_use]
     pub fn prepare(&self, exponential: Exponential) -> PreparedModel<'_> {
         let model = self.parse();
@@ -109,7 +112,7 @@ impl<'b> PreparedModel<'b> {
 impl FrameDecoder for PreparedModel<'_> {
     type State = ();
 
-    fn name(&self) -> &str {
+    fn name(&self) -> &'static str {
         "network"
     }
 

@@ -53,7 +53,7 @@ pub enum Error {
         answer: String,
     },
     /// Request that the device refused.
-    #[error("the device refused: {}", why(.0))]
+    #[error("the device refused: {}", why(*.0))]
     Refused(Refusal),
     /// Model that the device says it activated, while another one is active.
     #[error("the device accepted model {committed:08x}, but {in_force} is active")]
@@ -137,7 +137,7 @@ pub enum Error {
 }
 
 /// Reason of a refusal, in words.
-fn why(refusal: &Refusal) -> String {
+fn why(refusal: Refusal) -> String {
     match refusal {
         Refusal::Version(version) => format!("it speaks version {version} of the protocol"),
         Refusal::Unknown => "it does not know the request".into(),

@@ -9,9 +9,9 @@
 //! - A position is written in two steps, the lower byte first. In between it is at most the new position, so
 //!   the image takes no byte that is not there yet. It may be less than the old position; the image then
 //!   waits.
-//! A position is read until two readings agree. The position only grows, and by less than one round
-//! while it is read. So an upper byte that is the same in both readings was valid between them; with the
-//! lower byte of the second reading it makes a position that the image has reached.
+//! - A position is read until two readings agree. The position only grows, and by less than one round
+//!   while it is read. So an upper byte that is the same in both readings was valid between them; with the
+//!   lower byte of the second reading it makes a position that the image has reached.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, ErrorKind, Read, Seek, SeekFrom, Write};

@@ -76,6 +76,7 @@ impl Arithmetic {
     }
 }
 
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
 fn by_name<S: serde::Serializer>(
     arithmetic: &Arithmetic,
     serializer: S,
