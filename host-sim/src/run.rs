@@ -123,7 +123,7 @@ pub struct ExampleOutput {
 /// Runs `experiment` and returns its results and the blob.
 ///
 /// # Errors
-/// [`Error`] for an experiment whose model cannot be trained or packed.
+/// [`Error`](crate::Error) for an experiment whose model cannot be trained or packed.
 pub fn run(experiment: &Experiment, progress: &dyn Progress) -> Result<(RunResult, ModelBlob)> {
     let (world, t) = (&experiment.world, &experiment.training);
     progress.stage("synthesise", 2);

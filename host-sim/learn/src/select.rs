@@ -91,8 +91,8 @@ pub fn smallest_training_part(fold_of: &[usize]) -> usize {
 /// `fold_of` gives each frame's fold, numbered from 0; all other options come from `options`.
 ///
 /// # Errors
-/// [`Error::Setting`] for fewer than two folds, no candidate, or a candidate that does not fit the data;
-/// otherwise the errors of [`train`](crate::train::train).
+/// [`Error::Setting`](crate::Error::Setting) for fewer than two folds, no candidate, or a candidate that
+/// does not fit the data; otherwise the errors of [`train`](crate::train::train).
 pub fn cross_validate(
     dataset: &Dataset,
     fold_of: &[usize],

@@ -78,7 +78,7 @@ pub enum Error {
     UnknownExponential(String),
     /// World with another readout than the image has.
     #[error(
-        "the image's readout has not what readout.{field} says; set it to {only:?}, or leave it out"
+        "the image's readout has no other readout.{field} than {only:?}; set it to that, or remove it"
     )]
     OtherReadout {
         /// Name of the part.
@@ -149,7 +149,7 @@ fn why(refusal: Refusal) -> String {
         Refusal::OutOfPlace { received } => format!("it has {received} bytes of the upload so far"),
         Refusal::BadModel(ModelFault::Shape) => "the model is for a sensor of another shape".into(),
         Refusal::BadModel(fault) => {
-            format!("the model is unsound ({fault:?}); `inspect` tells more")
+            format!("the model is faulty ({fault:?}); `inspect` shows more")
         }
         Refusal::Flash => "its flash could not be written".into(),
     }

@@ -167,7 +167,7 @@ fn status(status: &Status, common: &Common) -> Result<()> {
     });
     page.line(format_args!("{:<17} {model}", "model"));
     page.line(format_args!(
-        "{:<17} {} scanned, {} decoded (of which {} rows at rest), {} missed, {} samples failed",
+        "{:<17} {} scanned, {} decoded (except {} untouched rows), {} missed, {} samples failed",
         "frames",
         s.frames_scanned,
         s.frames_decoded,
@@ -267,7 +267,7 @@ fn missing<'v>(values: impl Iterator<Item = &'v f64> + Clone, wanted: Wanted) ->
     }
     let what = if wanted == Wanted::Estimates { "estimate" } else { "reading" };
     Err(Error::Failed(format!(
-        "the device has not a single {what}; `identify` tells of failed samples: check the wiring of \
+        "the device sent not a single {what}; `identify` shows failed samples: check the wiring of \
          converters and rows (docs/board.md)"
     )))
 }

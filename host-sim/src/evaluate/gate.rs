@@ -176,7 +176,7 @@ pub fn woken_by_theory(k: f64, readings: usize, baseline_frames: usize) -> f64 {
 /// Rows that are not skipped are decoded with `model`, whose columns must be the scene's.
 ///
 /// # Errors
-/// [`Error`] for a setting, or a noise, that makes no gate.
+/// [`Error`](crate::Error) for a setting, or a noise, that makes no gate.
 pub fn measure(
     experiment: &Experiment,
     model: &PreparedModel<'_>,

@@ -129,7 +129,7 @@ impl ReadoutResult {
 /// The model's columns must be the scene's.
 ///
 /// # Errors
-/// [`Error`] for a sensor that the virtual board does not have, or a transaction that its parts refuse.
+/// [`Error`](crate::Error) for a sensor that the virtual board does not have, or a transaction that its parts refuse.
 pub fn measure(
     experiment: &Experiment,
     model: &PreparedModel<'_>,

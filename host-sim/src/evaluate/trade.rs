@@ -211,7 +211,7 @@ impl Trade {
 /// `group`.
 ///
 /// # Errors
-/// [`Error`] for a scene of another shape than was measured, or a plan that was not measured.
+/// [`Error`](crate::Error) for a scene of another shape than was measured, or a plan that was not measured.
 pub fn compute(
     experiment: &Experiment,
     plan: &Plan,

@@ -147,6 +147,6 @@ fn summary(result: &RunResult) -> String {
             escape(unit)
         );
     }
-    html + "</dl>\n<p>The training mean ignores the readings: a decoder has learnt only what it \
-            gains over it. The best linear decoder shows how much of that needs no network.</p>\n</section>\n"
+    html + "</dl>\n<p>The training mean ignores the readings: a decoder has learnt nothing unless \
+            it is better. The best linear decoder shows how much needs no network.</p>\n</section>\n"
 }

@@ -121,7 +121,7 @@ pub fn table1_caption(table: &Table1, group: &str) -> String {
     format!(
         "Error of {} by spread and noise level, arranged as Table 1 of the paper: {}. Network with \
          K = {}. The paper prints {low}–{high} % and does not state its definition. Cells marked † \
-         are no better than always answering the training mean.",
+         are no better than always predicting the training mean.",
         escape(&symbol(group)),
         escape(definition.formula()),
         table.centres

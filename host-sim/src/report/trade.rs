@@ -135,7 +135,7 @@ pub fn html(trade: &Trade) -> String {
         symbol(&trade.group),
         escape(&trade.unit),
         if trade.points.iter().any(|p| p.gate_k.is_some()) {
-            "Hollow: behind a gate for rows at rest, with the mean cycles of the test frames. "
+            "Hollow: behind a gate that skips untouched rows, with the mean cycles of the test frames. "
         } else {
             ""
         },
@@ -157,8 +157,8 @@ fn baselines(trade: &Trade) -> String {
 fn table(trade: &Trade) -> String {
     let mut html = String::from(
         "<figure id=\"table-1\" class=\"table\">\n<figcaption><b>Table 1.</b> Every point; those on the \
-         front are bold. In brackets: RMSE over the smallest of all points.</figcaption>\n<div class=\"scroll\" \
-         tabindex=\"0\" role=\"region\" aria-label=\"Table 1\">\n<table>\n<thead><tr><th>kernel</th>\
+         Pareto front are bold. In brackets: RMSE relative to the smallest of all points.</figcaption>\n<div class=\"scroll\" \
+         tabindex=\"0\" role=\"region\" aria-label=\"Table 1\">\n<table>\n<thead><tr><th>format</th>\
          <th class=\"number\">K</th><th class=\"after\">tail</th><th class=\"number\">samples</th>\
          <th class=\"number\">gate k</th>",
     );

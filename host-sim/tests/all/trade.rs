@@ -38,7 +38,7 @@ fn compute_plan(scene: &Experiment, plan: &Plan, bounds: Bounds) -> Result<Trade
 }
 
 #[test]
-fn every_knob_has_its_points_and_the_front_is_what_nothing_beats() {
+fn every_knob_has_its_points_and_the_front_is_the_pareto_front() {
     let trade = compute(&press(), Bounds::default()).unwrap();
     assert_eq!(trade.chosen, None);
     let count = |name: &str| trade.points.iter().filter(|p| p.arithmetic.name() == name).count();
@@ -114,7 +114,7 @@ fn the_chosen_blob_is_what_the_table_says() {
 }
 
 #[test]
-fn behind_a_gate_points_err_as_the_gates_rows_do_and_cost_their_share() {
+fn behind_a_gate_points_have_the_errors_of_the_gates_rows_and_cost_their_share() {
     let mut scene = press();
     let plan =
         Plan { centres: vec![16], samples_averaged: vec![4], gate_k: vec![3.5], clock_mhz: 1.0 };

@@ -101,7 +101,7 @@ fn missing_readings_leave_their_rows_outputs_empty_and_no_line_out() {
 }
 
 #[test]
-fn one_network_for_the_whole_array_needs_every_reading_and_errs_less() {
+fn one_network_for_the_whole_array_needs_every_reading_and_has_less_error() {
     let folder = Folder::new("array");
     folder.write("scene.toml", small_scene());
     folder.succeed(&["train", "scene.toml", "-n", "2000", "-o", "rows.bin"]);

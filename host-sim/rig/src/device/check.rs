@@ -33,7 +33,7 @@ pub struct Plan {
     pub interruptions: bool,
     /// Number of random bytes to send.
     pub garbage_bytes: usize,
-    /// Number of frames on their way at a time: see [`stream::decode_frames`].
+    /// Number of frames on their way at a time: see [`decode_frames`](super::stream::decode_frames).
     pub window: usize,
 }
 
@@ -105,7 +105,7 @@ pub struct GarbageFindings {
 /// The model of `blob` is uploaded first if it is not active, and must be active at the end.
 ///
 /// # Errors
-/// [`Error`](crate::Error) if the device stops answering, or is not one for this model. Wrong results
+/// [`Error`] if the device stops answering, or is not one for this model. Wrong results
 /// are no error: they are in the findings.
 pub fn check<W: Wire>(
     device: &mut Device<W>,

@@ -15,7 +15,7 @@ const ERASE: Duration = Duration::from_secs(6);
 /// Sends one step of an upload and returns the device's answer.
 ///
 /// # Errors
-/// [`Error::NoAnswer`](crate::Error::NoAnswer) if there is none.
+/// [`Error::NoAnswer`] if there is none.
 pub fn step<W: Wire>(
     device: &mut Device<W>,
     step: UploadStep<'_>,
@@ -34,7 +34,7 @@ pub fn step<W: Wire>(
 /// Sends `blob` from beginning to commit, until the device refuses a step.
 ///
 /// # Errors
-/// [`Error::NoAnswer`](crate::Error::NoAnswer) if the device stops answering.
+/// [`Error::NoAnswer`] if the device stops answering.
 pub fn send<W: Wire>(
     device: &mut Device<W>,
     blob: &[u8],
@@ -58,7 +58,7 @@ pub fn send<W: Wire>(
 /// Uploads `blob`, makes it the active model, and checks that it is.
 ///
 /// # Errors
-/// [`Error`](crate::Error) if the device refuses it; its previous model then stays active.
+/// [`Error`] if the device refuses it; its previous model then stays active.
 pub fn replace<W: Wire>(
     device: &mut Device<W>,
     blob: &[u8],

@@ -279,7 +279,7 @@ fn the_file_holds_what_the_machine_maps() {
     let name = format!("taxel-mailbox-test-{}", std::process::id());
     let path = std::env::temp_dir().join(name);
     let mut host = Mailbox::create(&path).unwrap();
-    assert!(Mailbox::create(&path).is_err(), "another program's file is left alone");
+    assert!(Mailbox::create(&path).is_err(), "another program's file is kept");
     assert_eq!(host.write(b"request").unwrap(), 7);
     let bytes = std::fs::read(&path).unwrap();
     std::fs::remove_file(&path).unwrap();
