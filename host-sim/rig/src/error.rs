@@ -77,9 +77,7 @@ pub enum Error {
     #[error("the device decodes with {0:?}, which this host does not know")]
     UnknownExponential(String),
     /// World with another readout than the image has.
-    #[error(
-        "the image's readout has no other readout.{field} than {only:?}; set it to that, or remove it"
-    )]
+    #[error("the image's readout.{field} is {only:?}; set it to that, or remove it")]
     OtherReadout {
         /// Name of the part.
         field: &'static str,
