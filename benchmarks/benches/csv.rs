@@ -1,4 +1,4 @@
-//! Data files: reading and writing CSV, against a single pass over the same bytes.
+//! Data files: reading and writing of CSV, compared with a single pass over the same bytes.
 
 use std::hint::black_box;
 use std::path::Path;

@@ -1,6 +1,6 @@
-//! Decoding whole tables on one thread, beside the most additions and multiplications that it can make.
+//! Decoding of whole tables on one thread, beside the processor's peak of additions and multiplications.
 //!
-//! Leaves its readings and answers in cargo's folder for temporary files, for `compare/decode.py`.
+//! Readings and estimates are written to cargo's folder for temporary files, for `compare/decode.py`.
 
 use std::fs;
 use std::hint::black_box;
@@ -13,7 +13,7 @@ use taxel_data::random::{Purpose, Random, Stream};
 use taxel_learn::Exponential;
 use taxel_learn::infer::infer;
 
-/// Lines of a table; `compare/decode.py` divides by it.
+/// Lines in a table; `compare/decode.py` divides by it.
 const LINES: usize = 8192;
 const CHANNELS: usize = 18;
 const CENTRES: [usize; 2] = [64, 256];
@@ -21,7 +21,7 @@ const SPREAD: f64 = 0.8;
 const LOWEST_OHM: f64 = 40.0;
 const SPAN_OHM: f64 = 20.0;
 
-/// A network by its formula: centres on inputs scaled to [0, 1].
+/// Network by its formula: centres on inputs scaled to [0, 1].
 struct Formula {
     shape: Shape,
     centres: Vec<f64>,
@@ -44,7 +44,7 @@ impl Formula {
         }
     }
 
-    /// The words of this network with expanded distances.
+    /// Words of this network with expanded distances.
     fn expanded(&self) -> Vec<u32> {
         let unit = f64::from(HALF_RANGE / UNITS);
         let decay = std::f64::consts::LOG2_E / (2.0 * SPREAD * SPREAD) * unit * unit;
@@ -66,7 +66,7 @@ impl Formula {
         parameters.words().collect()
     }
 
-    /// The words of this network in fixed point.
+    /// Words of this network in fixed point.
     fn fixed16(&self) -> Vec<u32> {
         let Shape { centres, outputs, .. } = self.shape;
         let step = f64::from(HALF_RANGE / UNITS * UNITS_PER_STEP);
@@ -112,7 +112,7 @@ impl Formula {
         parameters.words().collect()
     }
 
-    /// The bias with a tail on inputs about the middle.
+    /// Bias for a tail on inputs about the middle.
     fn bias_about_the_middle(&self) -> Vec<f64> {
         let mut bias = self.bias.clone();
         for row in self.affine.chunks_exact(CHANNELS) {
@@ -121,7 +121,7 @@ impl Formula {
         bias
     }
 
-    /// The words of this network with direct distances.
+    /// Words of this network with direct distances.
     fn direct(&self) -> Vec<u32> {
         let parameters = direct::Parameters {
             input_minimum: &[LOWEST_OHM as f32; CHANNELS],
@@ -182,7 +182,7 @@ fn decode(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// The most f32 multiplications and additions a second: registers alone, nothing to wait for.
+/// Peak rate of f32 multiplications and additions: registers alone, without any waiting.
 mod peak {
     use pulp::{Simd, WithSimd};
 
@@ -190,7 +190,7 @@ mod peak {
     const CHAINS: usize = 12;
     const ROUNDS: usize = 20_000;
 
-    /// Operations of a run: contracted, each instruction makes two.
+    /// Number of operations in a run; contracted, each instruction makes two.
     pub fn operations(contracted: bool) -> u64 {
         let lanes = pulp::Arch::new().dispatch(Lanes);
         (ROUNDS * CHAINS * lanes * if contracted { 2 } else { 1 }) as u64
@@ -207,7 +207,8 @@ mod peak {
         }
     }
 
-    /// As many multiplications as additions, one instruction each; or both in one, contracted.
+    /// Equal numbers of multiplications and additions, one instruction each; contracted, one instruction
+    /// for both.
     pub struct Peak {
         pub contracted: bool,
         pub by: f32,
@@ -249,12 +250,12 @@ fn peaks(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("peak");
     for (name, contracted) in [("separate", false), ("contracted", true)] {
         let operations = peak::operations(contracted);
-        // What `compare/decode.py` divides by the time.
+        // `compare/decode.py` divides this by the time.
         leave(name, &[operations as f64]);
         group.throughput(Throughput::Elements(operations));
         group.bench_function(name, |bencher| {
             bencher.iter(|| {
-                // 1 keeps numbers normal for ever.
+                // The factor 1 keeps numbers normal for ever.
                 pulp::Arch::new().dispatch(peak::Peak { contracted, by: black_box(1.0) })
             });
         });

@@ -1,4 +1,4 @@
-//! Frames of a scene: deformations drawn, readings computed, noise added.
+//! Synthesis of a scene's frames: deformations drawn, readings computed, noise added.
 
 use std::hint::black_box;
 
@@ -8,7 +8,7 @@ use taxel_data::random::Stream;
 use taxel_simulate::sensor::Precision;
 use taxel_simulate::{World, synthesise};
 
-/// Frames of one measurement; `compare/synthesis.py` divides by it.
+/// Frames in one measurement; `compare/synthesis.py` divides by it.
 const FRAMES: usize = 16_384;
 
 fn frames_of_a_scene(criterion: &mut Criterion) {

@@ -1,13 +1,13 @@
-//! Training one network: 100,000 samples, 18 inputs and outputs, 256 centres.
+//! Training of one network: 100,000 samples, 18 inputs and outputs, 256 centres.
 //!
-//! Leaves its data and results in cargo's folder for temporary files, for `compare/training.py`.
+//! Data and results are written to cargo's folder for temporary files, for `compare/training.py`.
 
 use std::fs;
 use std::hint::black_box;
 use std::path::PathBuf;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use taxel_data::dataset::Block;
+use taxel_data::dataset::RowTable;
 use taxel_data::random::{Purpose, Random, Stream};
 use taxel_learn::infer::infer;
 use taxel_learn::train::kmeans::{self, Search};
@@ -20,23 +20,23 @@ const FRAMES: usize = 100_000;
 const TEST_FRAMES: usize = 20_000;
 const CENTRES: usize = 256;
 const SPREAD: f64 = 0.8;
-/// All iterations are made, and all samples looked at.
+/// Search that makes all iterations and looks at all samples.
 const SEARCH: Search = Search { restarts: 1, iterations: 30, enough: 0.0, most_points: usize::MAX };
 
-/// The fourth row-wire of the scene `press`.
-fn samples(stream: Stream, frames: usize) -> Block {
+/// Samples of the fourth row-wire of the scene `press`.
+fn samples(stream: Stream, frames: usize) -> RowTable {
     let world = World { read_rows: vec![3], ..World::press() };
-    synthesise(&world, stream, frames).block(0)
+    synthesise(&world, stream, frames).row_table(0)
 }
 
 fn random() -> Random {
     Random::new(1, Stream::Training, Purpose::Centres, 0, 0)
 }
 
-fn train(block: &Block) -> FittedNetwork {
+fn train(table: &RowTable) -> FittedNetwork {
     let options =
         Options { search: SEARCH, centres: CENTRES, spread: SPREAD, ..Options::default() };
-    let samples = Samples::new(block);
+    let samples = Samples::new(table);
     samples.fit(&samples.centres(&options, 0), &options).expect("a network that an f32 holds")
 }
 
@@ -52,26 +52,26 @@ fn leave(name: &str, values: &[f64]) {
 }
 
 fn training(criterion: &mut Criterion) {
-    let (block, test) = (samples(Stream::Training, FRAMES), samples(Stream::Test, TEST_FRAMES));
-    let inputs = block.inputs.names.len();
-    let scale = InputScale::of(&block);
-    let scaled = scale.apply(&block.inputs.values);
+    let (table, test) = (samples(Stream::Training, FRAMES), samples(Stream::Test, TEST_FRAMES));
+    let inputs = table.inputs.names.len();
+    let scale = InputScale::of(&table);
+    let scaled = scale.apply(&table.inputs.values);
     let start = kmeans::plus_plus(&scaled, inputs, CENTRES, &mut random());
     let found = kmeans::refine(&scaled, inputs, &start, &SEARCH);
-    let predicted = infer(&train(&block).network(), Exponential::default(), &test.inputs.values);
+    let predicted = infer(&train(&table).network(), Exponential::default(), &test.inputs.values);
     leave("inputs", &scaled);
-    leave("outputs", &block.outputs.values);
+    leave("outputs", &table.outputs.values);
     leave("test-inputs", &scale.apply(&test.inputs.values));
     leave("test-outputs", &test.outputs.values);
     leave("start", &start);
     leave("centres", &found.centres);
-    // What `compare/training.py` holds against scikit-learn's.
+    // `compare/training.py` compares these with scikit-learn's.
     let error = rmse(&predicted, &test.outputs.values);
     leave("results", &[found.inertia, found.iterations as f64, error]);
 
     let decay = 1.0 / (2.0 * SPREAD * SPREAD);
     let regressors = Regressors { centres: &found.centres, inputs, decay, affine_tail: true };
-    let outputs = block.outputs.names.len();
+    let outputs = table.outputs.names.len();
     let mut group = criterion.benchmark_group("training");
     group.sample_size(15);
     group.bench_function("start", |bencher| {
@@ -83,10 +83,10 @@ fn training(criterion: &mut Criterion) {
     group.bench_function("weights", |bencher| {
         bencher.iter(|| {
             let design = regressors.of(black_box(&scaled));
-            Factor::new(&design, &block.outputs.values, outputs, INITIAL_COVARIANCE).weights()
+            Factor::new(&design, &table.outputs.values, outputs, INITIAL_COVARIANCE).weights()
         });
     });
-    group.bench_function("whole", |bencher| bencher.iter(|| train(black_box(&block))));
+    group.bench_function("whole", |bencher| bencher.iter(|| train(black_box(&table))));
     group.finish();
 }
 

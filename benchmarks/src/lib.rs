@@ -1,14 +1,14 @@
-//! What the benchmarks share: scenes and data to work on.
+//! Scenes and data that the benchmarks share.
 
 use taxel_data::csv_file;
 use taxel_data::dataset::Dataset;
 use taxel_data::random::Stream;
 use taxel_simulate::{World, synthesise};
 
-/// The world of a built-in scene (`paper`, `press`).
+/// World of a built-in scene (`paper`, `press`).
 ///
 /// # Panics
-/// If there is none of that name.
+/// If there is no scene of that name.
 #[must_use]
 pub fn world(name: &str) -> World {
     match name {
@@ -18,13 +18,13 @@ pub fn world(name: &str) -> World {
     }
 }
 
-/// `frames` noisy training frames of a built-in scene, in Ω and mm.
+/// Synthesises `frames` noisy training frames of a built-in scene, in Ω and mm.
 #[must_use]
 pub fn frames_of(scene_name: &str, frames: usize) -> Dataset {
     synthesise(&world(scene_name), Stream::Training, frames)
 }
 
-/// The content of the CSV file that `synth` writes for `frames` of a built-in scene.
+/// Content of the CSV file that `synth` writes for `frames` of a built-in scene.
 ///
 /// # Panics
 /// If the folder for temporary files cannot be written to.

@@ -1,4 +1,4 @@
-//! One small file a subcommand: arguments in, library calls, results out.
+//! Subcommands, one small file each: arguments in, library calls, results out.
 
 mod print;
 mod progress;
@@ -33,7 +33,7 @@ pub struct Common {
     pub json: bool,
 }
 
-/// Which options mend an error that a library told without knowing them.
+/// Advice on options for an error that a library reported without knowing them.
 pub fn advice(error: &Error) -> &'static str {
     use taxel_data::Error as Data;
     match error {

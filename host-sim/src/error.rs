@@ -1,14 +1,14 @@
-//! What can go wrong in the program, as values that a command can match.
+//! Errors of the program, as values that a command can match.
 
 use std::fmt;
 use std::path::PathBuf;
 
 use taxel_data::BadValue;
 
-/// Result of everything in this crate.
+/// Result of the functions of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// What a bound of a trade is on.
+/// Quantity of a trade that a user can bound.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Bounded {
     /// RMSE of the chosen group.
@@ -20,7 +20,7 @@ pub enum Bounded {
 }
 
 impl Bounded {
-    /// Name in messages.
+    /// Name of the quantity in messages.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -31,30 +31,30 @@ impl Bounded {
     }
 }
 
-/// A bound of a trade, and the least that the points come down to.
+/// Bound of a trade, and the least value that points come down to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unmet {
-    /// What it is on.
+    /// Bounded quantity.
     pub bounded: Bounded,
-    /// The bound.
+    /// Largest value that the user allows.
     pub most: f64,
-    /// Whether it is a slot's size, which holds where no bound on flash was given.
+    /// Whether the bound is a slot's size, which applies if no bound on flash was given.
     pub is_slot: bool,
-    /// The least of all points, or of those within the other bounds.
+    /// Least value of all points, or of those within the other bounds.
     pub least: f64,
 }
 
-/// Why no point of a trade is within its bounds.
+/// Reason why no point of a trade is within its bounds.
 #[derive(Debug, Clone, PartialEq)]
 pub enum NoPoint {
-    /// Bounds that no point meets.
+    /// Some bounds that no point meets.
     Each {
-        /// Those bounds.
+        /// Bounds that no point meets.
         unmet: Vec<Unmet>,
         /// Unit and group of the error, such as `mm (dz_mm)`.
         unit: String,
     },
-    /// Bounds that points meet, but none meets all of.
+    /// Bounds that points meet one by one, but no point meets together.
     Together {
         /// All bounds, and whether any point is within all the others.
         bounds: Vec<(Unmet, bool)>,
@@ -64,7 +64,7 @@ pub enum NoPoint {
 }
 
 impl Unmet {
-    /// The bound in words.
+    /// Bound in words.
     fn bound(&self, name: impl Fn(Bounded) -> &'static str) -> String {
         if self.is_slot {
             format!("a slot's {} bytes", self.most)
@@ -73,10 +73,10 @@ impl Unmet {
         }
     }
 
-    /// The least in words.
+    /// Least value in words.
     fn least(&self, unit: &str) -> String {
         match self.bounded {
-            // Rounded up: a bound that can be met.
+            // The error is rounded up, to a bound that can be met.
             Bounded::Error => {
                 format!("the smallest error is {:.4} {unit}", (self.least * 1e4).ceil() / 1e4)
             }
@@ -95,15 +95,15 @@ impl fmt::Display for NoPoint {
 }
 
 impl NoPoint {
-    /// The message, with bounds called by `name`.
+    /// Message, with bounds called by `name`.
     pub fn text(&self, name: impl Fn(Bounded) -> &'static str + Copy) -> String {
         match self {
             Self::Each { unmet, unit } => {
                 let unmet: Vec<String> = unmet
                     .iter()
-                    .map(|u| format!("{}: {} of all", u.bound(name), u.least(unit)))
+                    .map(|u| format!("{} ({})", u.bound(name), u.least(unit)))
                     .collect();
-                format!("no point is within {}: loosen it", unmet.join("; nor within "))
+                format!("no point is within {}: raise the bound", unmet.join(", nor within "))
             }
             Self::Together { bounds, unit } => {
                 let names: Vec<String> = bounds.iter().map(|(b, _)| b.bound(name)).collect();
@@ -113,64 +113,65 @@ impl NoPoint {
                     .map(|(b, _)| format!("without {}, {}", b.bound(name), b.least(unit)))
                     .collect();
                 let (names, nearest) = (names.join(", "), nearest.join("; "));
-                format!("no point is within {names} at once; {nearest}: loosen one")
+                format!("no point is within {names} at once: {nearest}; raise one of these bounds")
             }
         }
     }
 }
 
-/// A failure. Each message names the file, the place and the value, and says what would be right.
+/// Failure of a command. Each message names the file, the place and the value, and says what would be
+/// right.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// A scene's file cannot be parsed.
+    /// Scene file that cannot be parsed.
     #[error("scene {scene}: {message}")]
     Syntax {
-        /// File or name of the scene.
+        /// Path or name of the scene.
         scene: String,
-        /// Where, and what was expected.
+        /// Place in the file, and what was expected there.
         message: String,
     },
-    /// A scene has a setting that cannot be used.
+    /// Scene with a setting that cannot be used.
     #[error("scene {scene}: {cause}")]
     Scene {
-        /// File or name of the scene.
+        /// Path or name of the scene.
         scene: String,
-        /// The setting.
+        /// Setting, and which values can be used.
         cause: BadValue,
     },
-    /// A setting cannot be used.
+    /// Setting that cannot be used.
     #[error(transparent)]
     Setting(#[from] BadValue),
-    /// Data cannot be read, written or used.
+    /// Data that cannot be read, written or used.
     #[error(transparent)]
     Data(#[from] taxel_data::Error),
-    /// A simulation failed.
+    /// Simulation that failed.
     #[error(transparent)]
     Simulate(#[from] taxel_simulate::Error),
-    /// Training or packing failed, or a blob was refused.
+    /// Training or packing that failed, or a blob that was rejected.
     #[error(transparent)]
     Learn(#[from] taxel_learn::Error),
-    /// A device or an emulator failed.
+    /// Device or emulator that failed.
     #[error(transparent)]
     Rig(#[from] taxel_rig::Error),
-    /// No point of a trade is within its bounds.
+    /// Trade without a point within its bounds.
     #[error(transparent)]
     NoPoint(#[from] NoPoint),
-    /// The figures of `firmware/cycles.csv` cannot be used.
+    /// File `firmware/cycles.csv` whose figures cannot be used.
     #[error("firmware/cycles.csv: {0}; cargo xtask cycles --accept writes it anew")]
     Cycles(String),
-    /// A file is not what a command needs.
+    /// File that is not what a command needs.
     #[error("{}: {message}", path.display())]
     Unfit {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why, and what to do.
+        /// Reason, and a remedy.
         message: String,
     },
-    /// Options cannot be used, or not together.
+    /// Options that cannot be used, or not together.
     #[error("{0}")]
     Usage(String),
-    /// The work itself failed.
+    /// Work that failed.
     #[error("{0}")]
     Failed(String),
 }

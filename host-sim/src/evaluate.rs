@@ -1,4 +1,4 @@
-//! Evaluation: what models err and cost, and the tables made of that.
+//! Evaluation: errors and costs of models, and the tables of these.
 
 pub mod cost;
 pub mod ram;

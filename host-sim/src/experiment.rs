@@ -1,7 +1,7 @@
 //! Experiments: a world, how a model is trained for it, and how Table 1 is computed, all from a scene's file.
 //!
-//! A scene is a TOML file; `docs/scenes.md` explains every field. [`Experiment::load`] reads and checks it; what
-//! it returns can be used without further checks.
+//! A scene is a TOML file; `docs/scenes.md` explains every field. [`Experiment::load`] reads and checks
+//! it, and the result can be used without further checks.
 
 use std::path::Path;
 
@@ -25,66 +25,66 @@ mod file;
 
 type Check = std::result::Result<(), BadValue>;
 
-/// Scenes that are part of the program, by name.
+/// Names and texts of the scenes that are part of the program.
 pub const EMBEDDED: [(&str, &str); 2] = [
     ("paper", include_str!("../../scenes/paper.toml")),
     ("press", include_str!("../../scenes/press.toml")),
 ];
 
-/// A checked scene.
+/// Experiment of a scene, checked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Experiment {
-    /// Name of the output folder and the model.
+    /// Name of the scene, which names the output folder and the model.
     pub name: String,
     /// CRC-64/XZ of the scene's text.
     pub digest: u64,
-    /// What there is.
+    /// World to simulate.
     pub world: World,
-    /// How the model is trained.
+    /// Settings of training.
     pub training: Training,
-    /// How Table 1 is computed, if it is wanted.
+    /// Settings of Table 1, if it is wanted.
     pub table1: Option<Table1>,
 }
 
-/// How the model is trained.
+/// Settings of a model's training.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Training {
-    /// Frames to train on.
+    /// Number of frames to train on.
     pub frames: usize,
-    /// Frames to evaluate on.
+    /// Number of frames to evaluate on.
     pub test_frames: usize,
-    /// Centres of each row's network, K.
+    /// Number of centres K of each row's network.
     pub centres: usize,
     /// Width σ on scaled inputs.
     pub spread: f64,
-    /// Whether A·x is added.
+    /// Whether the networks add an affine tail A·x.
     pub affine_tail: bool,
     /// Number format of the weights.
     #[serde(default = "default_format", deserialize_with = "file::format::deserialize")]
     pub format: Format,
-    /// One network for all rows, behind a projection of all readings, instead of one a row.
+    /// Whether one network serves all rows, behind a projection of all readings, instead of one a row.
     #[serde(default)]
     pub whole_array: bool,
 }
 
-/// How Table 1 of the paper is computed.
+/// Settings of the paper's Table 1.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Table1 {
     /// Spreads, one a line of the table.
     pub spreads: Vec<f64>,
-    /// Noise levels, one a column.
+    /// Noise levels as fractions, one a column.
     pub noise_levels: Vec<f64>,
-    /// Frames to train each cell on.
+    /// Number of frames on which each cell is trained.
     pub frames: usize,
-    /// Frames to evaluate each cell on.
+    /// Number of frames on which each cell is evaluated.
     pub test_frames: usize,
-    /// Centres of each row's network, K.
+    /// Number of centres K of each row's network.
     pub centres: usize,
-    /// Whether A·x is added (the paper's network has no such tail).
+    /// Whether the networks add an affine tail A·x (the paper's network has none).
     pub affine_tail: bool,
-    /// Frames, and centres, of the standard network (K = N).
+    /// Number of frames, and of centres, of the standard network (K = N).
     pub standard_frames: usize,
 }
 
@@ -96,7 +96,8 @@ impl Experiment {
     /// Reads a scene: the name of an embedded one, or a path.
     ///
     /// # Errors
-    /// A file that cannot be read, [`Error::Syntax`], or [`Error::Scene`].
+    /// [`Error::Data`] for a file that cannot be read, [`Error::Syntax`] or [`Error::Scene`] for its
+    /// content.
     pub fn load(name_or_path: &str) -> Result<Self> {
         if let Some((_, text)) = EMBEDDED.iter().find(|(name, _)| *name == name_or_path) {
             return Self::parse(name_or_path, text);
@@ -114,7 +115,7 @@ impl Experiment {
     /// Reads a scene from its text; `origin` names it in messages.
     ///
     /// # Errors
-    /// [`Error::Syntax`] or [`Error::Scene`].
+    /// [`Error::Syntax`] for text that is no scene, [`Error::Scene`] for a setting that cannot be used.
     pub fn parse(origin: &str, text: &str) -> Result<Self> {
         let file: file::SceneFile = toml::from_str(text).map_err(|cause| Error::Syntax {
             scene: origin.into(),
@@ -127,7 +128,7 @@ impl Experiment {
         }
     }
 
-    /// Options that the model is trained with.
+    /// Options for training the scene's model.
     #[must_use]
     pub fn options(&self) -> Options {
         let t = &self.training;
@@ -142,7 +143,7 @@ impl Experiment {
         }
     }
 
-    /// What a model of this scene says of its training data.
+    /// Origin of the training data, for the model's metadata.
     #[must_use]
     pub fn origin(&self) -> Origin {
         let noise = &self.world.noise;
@@ -160,7 +161,7 @@ impl Experiment {
         }
     }
 
-    /// What errors are measured against.
+    /// Measure for errors of the scene's outputs.
     #[must_use]
     pub fn measure(&self) -> Measure {
         Measure {
@@ -169,10 +170,10 @@ impl Experiment {
         }
     }
 
-    /// Trains the model that the scene describes, as the command `train` does.
+    /// Trains the model that the scene describes, like the command `train`.
     ///
     /// # Errors
-    /// Training options that cannot be used, or a model that cannot be packed.
+    /// [`Error`] for training options that cannot be used, or a model that cannot be packed.
     pub fn train(&self, progress: &dyn Progress) -> Result<ModelBlob> {
         let frames = synthesise(&self.world, Stream::Training, self.training.frames);
         let trained = train(&frames, &self.options(), progress)?;

@@ -1,8 +1,9 @@
-//! The program's library: experiments from scene files, their evaluation, and the report.
+//! Library of the program: experiments from scene files, their evaluation, and the report.
 //!
-//! Data flows one way: an [experiment] says what to simulate and to train; [`taxel_simulate`] makes frames;
-//! [`taxel_learn`] trains and decodes; [`evaluate`] judges; [`report`] draws. The `host-sim` binary is a thin
-//! shell over it. Modules stand from the ground up; each imports only what stands before it.
+//! Data flows one way. An [experiment] says what to simulate and train; [`taxel_simulate`] makes frames;
+//! [`taxel_learn`] trains and decodes; [`evaluate`] judges; [`report`] draws. The `host-sim` binary is a
+//! thin shell over this library. Modules stand from the ground up; each imports only what stands before
+//! it.
 //!
 //! ```
 //! use host_sim::metrics;

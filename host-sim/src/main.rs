@@ -14,8 +14,8 @@ use commands::{
 
 /// Simulate, train and evaluate resistive tactile sensors; write weight blobs for the device.
 ///
-/// Without a command: `run paper`. Results go to stdout, progress and remarks to stderr.
-/// Exit status: 0 done, 1 failed, 2 bad usage or input.
+/// Without a command: `run paper`. Results go to stdout, progress and remarks to stderr. Exit status: 0
+/// done, 1 failed, 2 bad usage or input.
 #[derive(Parser)]
 #[command(version)]
 struct Cli {
@@ -73,20 +73,17 @@ fn report(outcome: Result<()>) -> ExitCode {
     }
 }
 
-/// 1 for work that failed, 2 for bad usage or input.
+/// Exit status of an error: 1 for work that failed, 2 for bad usage or input.
 fn exit_status(error: &Error) -> u8 {
+    use taxel_learn::Error as Learn;
     use taxel_rig::Error as Rig;
     match error {
-        Error::Failed(_) | Error::Cycles(_) => 1,
+        Error::Failed(_)
+        | Error::Cycles(_)
+        | Error::Learn(Learn::NoRegression | Learn::ProjectionBeyondF32 | Learn::NotPacked(_)) => 1,
         Error::Simulate(cause) => match cause {
             taxel_simulate::Error::Setting(_) | taxel_simulate::Error::Data(_) => 2,
             _ => 1,
-        },
-        Error::Learn(cause) => match cause {
-            taxel_learn::Error::NoRegression
-            | taxel_learn::Error::ProjectionBeyondF32
-            | taxel_learn::Error::NotPacked(_) => 1,
-            _ => 2,
         },
         Error::Rig(cause) => match cause {
             Rig::Port { .. }

@@ -1,5 +1,5 @@
-//! Errors, by every definition in use. No figure stands alone: the definitions differ by more than
-//! the decoders do, so all of them are always given.
+//! Errors of estimates, by every definition in use. No figure stands alone: the definitions differ by
+//! more than the decoders do, so all of them are always given.
 
 use serde::Serialize;
 use taxel_data::columns;
@@ -7,38 +7,39 @@ use taxel_data::dataset::Dataset;
 use taxel_data::table::Table;
 use taxel_learn::Decoder;
 
-/// Mean relative error counts only where the truth exceeds this share of full scale.
+/// Share of full scale that the truth must exceed to count in the mean relative error.
 pub const RELATIVE_THRESHOLD: f64 = 0.1;
 
-/// What errors are measured against.
+/// Measure for errors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measure {
     /// Full scale of each output, in its unit.
     pub full_scale: Vec<f64>,
-    /// Sensor thickness H, for the positional error.
+    /// Sensor thickness H in mm, for the positional error.
     pub thickness_mm: Option<f64>,
 }
 
 /// Errors of one group of outputs (an axis, or a column of measured data).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Errors {
-    /// The group: `dz_mm`, or a column's name.
+    /// Name of the group: `dz_mm`, or a column's name.
     pub group: String,
     /// Unit of `rmse`.
     pub unit: String,
-    /// Pairs of truth and estimate that count.
+    /// Number of pairs of truth and estimate that count.
     pub count: usize,
-    /// √(mean e²), in the unit.
+    /// Root mean square error √(mean e²), in the unit.
     pub rmse: f64,
-    /// ‖e‖/‖truth‖, in per cent.
+    /// Relative L2 error ‖e‖/‖truth‖, in per cent.
     pub relative_l2_percent: Option<f64>,
-    /// mean|e|/full scale, in per cent.
+    /// Error of full scale mean|e|/full scale, in per cent.
     pub full_scale_percent: Option<f64>,
-    /// mean|e|/(H − Δz), in per cent; compression in mm only.
+    /// Positional error mean|e|/(H − Δz), in per cent; compression in mm only.
     pub positional_percent: Option<f64>,
-    /// 1 − Σe²/Σ(truth − its column's mean)².
+    /// Coefficient of determination R²: 1 − Σe²/Σ(truth − its column's mean)².
     pub r_squared: Option<f64>,
-    /// mean|e|/|truth| over truths above [`RELATIVE_THRESHOLD`] of full scale, in per cent.
+    /// Mean relative error mean|e|/|truth| over truths above [`RELATIVE_THRESHOLD`] of full scale, in
+    /// per cent.
     pub mean_relative_percent: Option<f64>,
 }
 
@@ -59,21 +60,21 @@ pub fn judge(decoder: &dyn Decoder, test: &Dataset, measure: &Measure) -> Decode
     DecoderErrors { decoder: decoder.name().into(), errors }
 }
 
-/// Definitions of error, for tables that show one after the other.
+/// Definition of error, for tables that show one after the other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Definition {
-    /// [`Errors::rmse`].
+    /// Root mean square error: [`Errors::rmse`].
     Rmse,
-    /// [`Errors::relative_l2_percent`].
+    /// Relative L2 error: [`Errors::relative_l2_percent`].
     RelativeL2Percent,
-    /// [`Errors::full_scale_percent`].
+    /// Error of full scale: [`Errors::full_scale_percent`].
     FullScalePercent,
-    /// [`Errors::positional_percent`].
+    /// Positional error: [`Errors::positional_percent`].
     PositionalPercent,
-    /// [`Errors::r_squared`].
+    /// Coefficient of determination: [`Errors::r_squared`].
     RSquared,
-    /// [`Errors::mean_relative_percent`].
+    /// Mean relative error: [`Errors::mean_relative_percent`].
     MeanRelativePercent,
 }
 
@@ -88,7 +89,7 @@ impl Definition {
         Self::MeanRelativePercent,
     ];
 
-    /// Name in CSV and JSON.
+    /// Name of the definition in CSV and JSON.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -101,7 +102,7 @@ impl Definition {
         }
     }
 
-    /// Formula, for captions.
+    /// Formula of the definition, for captions.
     #[must_use]
     pub fn formula(self) -> &'static str {
         match self {
@@ -114,7 +115,7 @@ impl Definition {
         }
     }
 
-    /// The value of this definition, where it is defined.
+    /// Error by this definition, where it is defined.
     #[must_use]
     pub fn of(self, errors: &Errors) -> Option<f64> {
         match self {
@@ -128,8 +129,10 @@ impl Definition {
     }
 }
 
-/// Errors of every group of columns, in the order in which groups first appear. Pairs with a
-/// missing value (NaN) on either side do not count.
+/// Errors of every group of columns, in the order in which groups first appear.
+///
+/// `estimate` is laid out like `truth`, `lines × columns`. Pairs with a missing value (NaN) on either
+/// side do not count.
 ///
 /// # Panics
 /// If `estimate` is not as long as `truth`, or `measure` does not have one full scale a column.

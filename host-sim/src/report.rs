@@ -1,4 +1,5 @@
-//! A run as one self-contained page: tables and figures, drawn from [`RunResult`] and nothing else.
+//! Report of a run as one self-contained page: tables and figures, drawn from [`RunResult`] and nothing
+//! else.
 //!
 //! The figures are drawn here rather than by a chart crate because their colours are CSS classes:
 //! one page serves light and dark.
@@ -16,19 +17,19 @@ mod figures;
 mod html;
 mod trade;
 
-/// The page for `result`: no script, no file beside it, the same bytes for the same result.
+/// Page for `result`: no script, no file beside it, the same bytes for the same result.
 #[must_use]
 pub fn html(result: &RunResult) -> String {
     html::page(result)
 }
 
-/// The page for a trade between speed and accuracy.
+/// Page for a trade between speed and accuracy.
 #[must_use]
 pub fn trade_html(trade: &Trade) -> String {
     trade::html(trade)
 }
 
-/// Its picture, as a file of its own: light or dark as the viewer is.
+/// Picture of a trade, as a file of its own: light or dark like the viewer.
 #[must_use]
 pub fn trade_svg(trade: &Trade) -> String {
     trade::svg(trade)

@@ -1,4 +1,4 @@
-//! The main job: synthesise, train, write the blob, read it back, decode, evaluate.
+//! Main job: synthesise, train, write the blob, read it back, decode, evaluate.
 
 use serde::Serialize;
 use taxel_data::columns;
@@ -16,16 +16,16 @@ use crate::evaluate::table1::{self, Table1};
 use crate::experiment::Experiment;
 use crate::metrics::{self, DecoderErrors, Errors, Measure};
 
-/// All that a run measured.
+/// Results of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RunResult {
-    /// What was run.
+    /// Scene that was run.
     pub scene: SceneSummary,
-    /// What was trained.
+    /// Model that was trained.
     pub model: ModelSummary,
     /// Errors on the test frames, by decoder and group.
     pub decoders: Vec<DecoderErrors>,
-    /// The network's errors by row-wire.
+    /// Errors of the network by row-wire.
     pub rows: Vec<RowErrors>,
     /// One test frame, for a closer look.
     pub example: Example,
@@ -33,47 +33,47 @@ pub struct RunResult {
     pub table1: Option<Table1>,
 }
 
-/// What was run.
+/// Summary of the scene that was run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SceneSummary {
-    /// Its name.
+    /// Name of the scene.
     pub name: String,
     /// CRC-64/XZ of its text, in hexadecimal.
     pub digest: String,
-    /// Seed of every draw.
+    /// Seed of every random draw.
     pub seed: u64,
-    /// `relative` or `span`.
+    /// Kind of noise: `relative` or `span`.
     pub noise_kind: String,
-    /// Level p, as a fraction.
+    /// Noise level p, as a fraction.
     pub noise_level: f64,
     /// Extent of the sensor in mm.
     pub size_mm: [f64; 3],
-    /// Row-wires of the sensor, read or not.
+    /// Number of row-wires of the sensor, read or not.
     pub row_wires: usize,
 }
 
-/// What was trained.
+/// Summary of the model that was trained.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModelSummary {
-    /// Frames trained on.
+    /// Number of frames trained on.
     pub training_frames: usize,
-    /// Frames evaluated on.
+    /// Number of frames evaluated on.
     pub test_frames: usize,
-    /// Networks in the blob.
+    /// Number of networks in the blob.
     pub networks: usize,
-    /// Inputs of each network: its row's readings, or features of all readings.
+    /// Number of inputs of each network: its row's readings, or features of all readings.
     pub inputs: usize,
-    /// Readings that are projected to these features; 0 without a projection.
+    /// Number of readings that are projected to these features; 0 without a projection.
     pub projected_readings: usize,
-    /// Centres of each network (the largest).
+    /// Number of centres of each network (the largest).
     pub centres: usize,
-    /// Outputs of each network.
+    /// Number of outputs of each network.
     pub outputs: usize,
     /// Width σ on scaled inputs.
     pub spread: f64,
-    /// Whether A·x is added.
+    /// Whether the networks add an affine tail A·x.
     pub affine_tail: bool,
-    /// Bytes of the blob.
+    /// Size of the blob.
     pub blob_bytes: usize,
     /// CRC-32 of the blob, in hexadecimal.
     pub blob_crc: String,
@@ -88,42 +88,42 @@ pub struct RowErrors {
     pub errors: Vec<Errors>,
 }
 
-/// One test frame: the one with the largest output of all.
+/// Example: the test frame with the largest output of all.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Example {
-    /// Its number among the test frames.
+    /// Index of the frame (from 0) among the test frames.
     pub frame: usize,
-    /// x and y at rest of every electrode that is decoded, in mm, row-wire after row-wire.
+    /// Position x and y at rest of every electrode that is decoded, in mm, row-wire after row-wire.
     pub electrodes_mm: Vec<[f64; 2]>,
-    /// Row-wires that are read.
+    /// Number of row-wires that are read.
     pub row_wires: usize,
-    /// One entry a group of outputs.
+    /// Outputs of the frame by group.
     pub outputs: Vec<ExampleOutput>,
     /// Row-wire (from 1) whose readings are shown: the most disturbed one.
     pub reading_row_wire: usize,
-    /// Its readings without noise, in Ω, by column-wire.
+    /// Readings of that row-wire without noise, in Ω, by column-wire.
     pub ideal_ohm: Vec<f64>,
-    /// Its readings as they were decoded.
+    /// Readings of that row-wire as they were decoded, in Ω, by column-wire.
     pub noisy_ohm: Vec<f64>,
 }
 
 /// One component of the example's outputs, electrode after electrode.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ExampleOutput {
-    /// `dz_mm` and the like.
+    /// Name of the group, such as `dz_mm`.
     pub group: String,
     /// Unit of the values.
     pub unit: String,
-    /// What was true.
+    /// True values.
     pub truth: Vec<f64>,
-    /// What was decoded.
+    /// Decoded values.
     pub estimate: Vec<f64>,
 }
 
-/// Runs `experiment`; also returns the blob.
+/// Runs `experiment` and returns its results and the blob.
 ///
 /// # Errors
-/// An experiment that asks for the impossible.
+/// [`Error`](crate::Error) for an experiment whose model cannot be trained or packed.
 pub fn run(experiment: &Experiment, progress: &dyn Progress) -> Result<(RunResult, ModelBlob)> {
     let (world, t) = (&experiment.world, &experiment.training);
     progress.stage("synthesise", 2);

@@ -1,6 +1,6 @@
-//! Columns of data files: names, units, and what the project's own names mean.
+//! Column names of data files: their units, row-wires and groups.
 
-/// Units that a column's name may end in, and how they are written.
+/// Endings of column names that state a unit, each with the unit as it is written.
 const UNITS: [(&str, &str); 7] = [
     ("_ohm", "Ω"),
     ("_mm", "mm"),
@@ -11,13 +11,13 @@ const UNITS: [(&str, &str); 7] = [
     ("_v", "V"),
 ];
 
-/// The unit that a column's name states, or "".
+/// Unit that a column's name states (`Ω` for `r4c17_ohm`), or "".
 #[must_use]
 pub fn unit_of(name: &str) -> &'static str {
     UNITS.iter().find(|(suffix, _)| name.ends_with(suffix)).map_or("", |(_, unit)| unit)
 }
 
-/// The row-wire (from 1) that a name like `r4c17_ohm` or `r4e2_dz_mm` begins with.
+/// Row-wire (from 1) that a name like `r4c17_ohm` or `r4e2_dz_mm` begins with.
 #[must_use]
 pub fn row_of(name: &str) -> Option<usize> {
     let rest = name.strip_prefix('r')?;
@@ -27,8 +27,8 @@ pub fn row_of(name: &str) -> Option<usize> {
     place.starts_with(|c: char| c.is_ascii_digit()).then(|| row.parse().ok())?
 }
 
-/// What errors of an output are reported under: the axis of an electrode's deformation or force
-/// (`dz_mm` for `r4e2_dz_mm`), or the column itself for any other name.
+/// Group under which errors of an output are reported: the axis of an electrode's deformation or force
+/// (`dz_mm` for `r4e2_dz_mm`). Any other column is a group of its own.
 #[must_use]
 pub fn group_of(name: &str) -> &str {
     match (row_of(name), name.split_once('_')) {
@@ -37,7 +37,7 @@ pub fn group_of(name: &str) -> &str {
     }
 }
 
-/// The groups of `names` in the order in which they first appear, each with its columns' places.
+/// Groups of `names` in the order in which they first appear, each with the indices of its columns.
 #[must_use]
 pub fn groups(names: &[String]) -> Vec<(&str, Vec<usize>)> {
     let mut groups: Vec<(&str, Vec<usize>)> = Vec::new();
@@ -51,27 +51,27 @@ pub fn groups(names: &[String]) -> Vec<(&str, Vec<usize>)> {
     groups
 }
 
-/// Whether `group` is compression in mm, for which the positional error is defined.
+/// Whether `group` is compression in mm, the only one with a positional error.
 #[must_use]
 pub fn is_compression(group: &str) -> bool {
     group == "dz_mm"
 }
 
-/// Columns of `header` that match `pattern`, in the header's order: comma-separated names in which
-/// `*` stands for any characters and `?` for one.
+/// Indices of the columns of `header` that match `pattern`, in the header's order. A pattern is a
+/// comma-separated list of names in which `*` stands for any characters and `?` for one.
 #[must_use]
 pub fn select(header: &[String], pattern: &str) -> Vec<usize> {
     let globs: Vec<&str> = pattern.split(',').map(str::trim).collect();
     (0..header.len()).filter(|i| globs.iter().any(|g| matches(g, &header[*i]))).collect()
 }
 
-/// The first part of a comma-separated `pattern` that no column of `header` matches.
+/// First part of a comma-separated `pattern` that no column of `header` matches.
 #[must_use]
 pub fn unmatched<'p>(header: &[String], pattern: &'p str) -> Option<&'p str> {
     pattern.split(',').map(str::trim).find(|glob| !header.iter().any(|name| matches(glob, name)))
 }
 
-/// The first names of a header, for messages.
+/// First names of a header, as a list for messages.
 #[must_use]
 pub fn some_names(header: &[String]) -> String {
     const SHOWN: usize = 8;

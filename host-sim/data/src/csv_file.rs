@@ -11,35 +11,35 @@ mod write;
 
 pub use write::write;
 
-/// A CSV file, read whole. Empty fields and NaN are missing values, held as NaN.
+/// CSV file that was read whole. Empty fields and NaN are missing values, held as NaN.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CsvFile {
-    /// Where it came from.
+    /// Path of the file, for messages.
     pub path: PathBuf,
     /// Column names.
     pub header: Vec<String>,
-    /// CRC-64/XZ of the file.
+    /// CRC-64/XZ of the file's bytes.
     pub digest: u64,
     values: Vec<f64>,
-    /// Where each line of data stands in the file, from 1.
+    /// Line number in the file (from 1) of each line of data.
     line_numbers: Vec<u64>,
 }
 
 impl CsvFile {
-    /// Reads `path`.
+    /// Reads the CSV file at `path`.
     ///
     /// # Errors
-    /// [`Error::Read`], or [`Error::File`] for an empty file, a name that is missing or stands
-    /// twice, a line with too few or too many fields, or a field that is no number.
+    /// [`Error::Read`] if the file cannot be read. [`Error::File`] for an empty file, a missing or
+    /// repeated column name, a line with too few or too many fields, or a field that is not a number.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).map_err(|cause| Error::read(path, cause))?;
         Self::parse(path, &bytes)
     }
 
-    /// Reads the file's content; `path` names it in messages.
+    /// Parses the bytes of a CSV file; `path` names it in messages.
     ///
     /// # Errors
-    /// [`Error::File`], as [`read`](Self::read).
+    /// [`Error::File`] for content that [`read`](Self::read) rejects.
     pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self> {
         let error = |problem| Error::file(path, problem);
         let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(bytes);
@@ -79,7 +79,7 @@ impl CsvFile {
         Ok(Self { path: path.into(), header, digest, values, line_numbers })
     }
 
-    /// Reads the lines after the header one by one, whatever they hold.
+    /// Reads the lines after the header one by one, quotes and blank lines included.
     fn read_carefully(
         path: &Path,
         bytes: &[u8],
@@ -113,28 +113,31 @@ impl CsvFile {
         Ok((values, line_numbers))
     }
 
-    /// Lines of data.
+    /// Number of lines of data.
     #[must_use]
     pub fn lines(&self) -> usize {
         self.values.len() / self.header.len()
     }
 
-    /// The value at `line` (from 0, header not counted) and `column`; NaN if missing.
+    /// Value at `line` (from 0, header not counted) and `column` (from 0); NaN if missing.
+    ///
+    /// # Panics
+    /// If the file has no such line.
     #[must_use]
     pub fn value(&self, line: usize, column: usize) -> f64 {
         self.values[line * self.header.len() + column]
     }
 
-    /// Where `line` (from 0) stands in the file, from 1 and with the header, for messages.
+    /// Number in the file (from 1, header included) of the line of data `line` (from 0), for messages.
     #[must_use]
     pub fn line_number(&self, line: usize) -> u64 {
         self.line_numbers[line]
     }
 
-    /// The place of the column called `name`.
+    /// Index (from 0) of the column called `name`.
     ///
     /// # Errors
-    /// [`Error::File`] if there is none.
+    /// [`Error::File`] if there is no such column.
     pub fn column(&self, name: &str) -> Result<usize> {
         self.header.iter().position(|n| n == name).ok_or_else(|| {
             let known = columns::some_names(&self.header);
@@ -142,16 +145,16 @@ impl CsvFile {
         })
     }
 
-    /// The places of the columns called `names`.
+    /// Indices (from 0) of the columns called `names`.
     ///
     /// # Errors
-    /// [`Error::File`] for the first that is missing.
+    /// [`Error::File`] for the first name without a column.
     pub fn columns<'n>(&self, names: impl IntoIterator<Item = &'n str>) -> Result<Vec<usize>> {
         names.into_iter().map(|name| self.column(name)).collect()
     }
 }
 
-/// Counts lines; the CSV reader's own count is one short where lines end in CR LF.
+/// Count of lines; the CSV reader's own count is one short where lines end in CR LF.
 struct LineCount<'b> {
     bytes: &'b [u8],
     at: usize,
@@ -159,7 +162,8 @@ struct LineCount<'b> {
 }
 
 impl LineCount<'_> {
-    /// The line (from 1) of the record that follows byte `position`, which never decreases.
+    /// Number (from 1) of the line on which the record after byte `position` begins. `position` never
+    /// decreases.
     fn of_record_at(&mut self, position: u64) -> u64 {
         let is_end = |byte: u8| matches!(byte, b'\r' | b'\n');
         while let Some(&byte) = self.bytes.get(self.at)
@@ -173,8 +177,8 @@ impl LineCount<'_> {
     }
 }
 
-/// The number (from 1) of the first line after the header, and the lines; nothing where they cannot be
-/// told from the header.
+/// Number (from 1) of the first line after the header, and those lines; `None` where the header's end is
+/// not certain.
 fn lines_of_data<'b>(bytes: &'b [u8], position: &csv::Position) -> Option<(u64, &'b [u8])> {
     let (header, lines) = bytes.split_at_checked(usize::try_from(position.byte()).ok()?)?;
     let (end, lines) = match (header.last()?, lines.strip_prefix(b"\n")) {
@@ -186,7 +190,7 @@ fn lines_of_data<'b>(bytes: &'b [u8], position: &csv::Position) -> Option<(u64, 
     Some((ended as u64 + 1, lines))
 }
 
-/// The first blank line (from 1) that is followed by another that is not.
+/// Number (from 1) of the first blank line that a line of text follows.
 fn blank_line(bytes: &[u8]) -> Option<usize> {
     let is_blank = |line: &[u8]| line.iter().all(u8::is_ascii_whitespace);
     let lines: Vec<&[u8]> = bytes.split(|byte| *byte == b'\n').collect();
@@ -194,7 +198,7 @@ fn blank_line(bytes: &[u8]) -> Option<usize> {
     lines[..last].iter().position(|line| is_blank(line)).map(|index| index + 1)
 }
 
-/// A field's number: infinities and text are none; empty and NaN are missing.
+/// Number in a field; NaN if it is empty or NaN. `None` for text and infinities.
 fn number(field: &[u8]) -> Option<f64> {
     let text = std::str::from_utf8(field).ok()?.trim();
     if text.is_empty() {

@@ -1,29 +1,34 @@
-//! Data sets: tables of readings and of the outputs that belong to them.
+//! Data sets: tables of readings and of the outputs that a decoder should predict from them.
 
 use crate::columns;
 use crate::csv_file::CsvFile;
 use crate::error::{Error, Problem, Result, Role};
 use crate::table::Table;
 
-/// Largest magnitude that is trained on: its square, and sums of it, stay far inside f64, and
+/// Largest magnitude that training accepts: its square, and sums of squares, stay far inside f64, and
 /// spans stay inside f32.
 const LARGEST: f64 = 1e30;
 
-/// Readings and outputs, in blocks: one a row-wire where every column belongs to one, else one.
+/// Readings and outputs for training or evaluation, one frame a line.
+///
+/// Columns are ordered by row-wire if each names one, so that every row-wire has its own [`RowTable`];
+/// otherwise there is a single row table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dataset {
-    /// What a decoder is given.
+    /// Readings that a decoder is given, `frames × inputs`, in the columns' own units (Ω for simulated
+    /// ones).
     pub inputs: Table,
-    /// What it should answer.
+    /// Outputs that it should predict, `frames × outputs`, in the columns' own units (mm or N for
+    /// simulated ones).
     pub outputs: Table,
-    /// Equal blocks of consecutive columns, each with a network of its own.
+    /// Number of row tables: equal groups of consecutive columns, each with a network of its own.
     pub rows: usize,
-    /// See [`Block::common_span`].
+    /// Whether inputs share the largest span of any when they are scaled: see [`RowTable::common_span`].
     pub common_span: bool,
 }
 
 impl Dataset {
-    /// Room for `frames`, filled with zeros.
+    /// Data set of `frames` lines of zeros, with the given columns in `rows` row tables.
     #[must_use]
     pub fn empty(
         input_names: Vec<String>,
@@ -35,28 +40,33 @@ impl Dataset {
         Self { inputs: table(input_names), outputs: table(output_names), rows, common_span: false }
     }
 
-    /// Frames in the set.
+    /// Number of frames in the set.
     #[must_use]
     pub fn frames(&self) -> usize {
         self.inputs.len()
     }
 
-    /// The columns of one row-wire's block.
+    /// Readings and outputs of row table number `row` (from 0).
+    ///
+    /// # Panics
+    /// If the set has no such row table.
     #[must_use]
-    pub fn block(&self, row: usize) -> Block {
+    pub fn row_table(&self, row: usize) -> RowTable {
         let cut = |table: &Table| {
             let count = table.names.len() / self.rows;
             table.columns(row * count, count)
         };
         let (inputs, outputs) = (cut(&self.inputs), cut(&self.outputs));
-        Block { inputs, outputs, common_span: self.common_span }
+        RowTable { inputs, outputs, common_span: self.common_span }
     }
 
-    /// Reads the columns chosen by `inputs` and `outputs` (see [`columns::select`]); by default the
-    /// project's own names. Frames with a missing value are left out and counted.
+    /// Selects the columns that match the patterns `inputs` and `outputs` (see [`columns::select`]), by
+    /// default those with the project's own names. Frames with a missing value are skipped; [`Kept`]
+    /// counts them.
     ///
     /// # Errors
-    /// [`Error::File`]: no such column, an unreadable line, or nothing left to use.
+    /// [`Error::File`] for a pattern without a column, a column that is input and output, a value that
+    /// is too large, or a file without a complete frame.
     pub fn from_file(
         file: &CsvFile,
         inputs: Option<&str>,
@@ -99,7 +109,10 @@ impl Dataset {
         Ok((dataset, Kept { lines: kept, of: file.lines() }))
     }
 
-    /// The frames at `indices`, in that order.
+    /// Frames at `indices` (from 0), in that order.
+    ///
+    /// # Panics
+    /// If there is no such frame.
     #[must_use]
     pub fn subset(&self, indices: &[usize]) -> Self {
         let pick = |table: &Table| {
@@ -111,29 +124,29 @@ impl Dataset {
     }
 }
 
-/// Which lines of a file a data set uses.
+/// Lines of a file that a data set uses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Kept {
-    /// Indices of the lines used.
+    /// Indices (from 0) of the lines used.
     pub lines: Vec<usize>,
-    /// Lines in the file.
+    /// Number of lines in the file.
     pub of: usize,
 }
 
-/// Inputs and outputs of one network.
+/// Readings and outputs of one network: those of one row-wire, or of the whole data set.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Block {
-    /// What the network is given.
+pub struct RowTable {
+    /// Readings that the network is given, `frames × inputs`.
     pub inputs: Table,
-    /// What it should answer.
+    /// Outputs that it should predict, `frames × outputs`.
     pub outputs: Table,
-    /// Whether all inputs are scaled by the largest span of any, each about its own middle: they are in one
-    /// unit, and the farther one reaches, the more it tells.
+    /// Whether every input is scaled by the largest span of any, about its own middle. Features of a
+    /// projection share one unit: the wider one's range, the more it tells about the outputs.
     pub common_span: bool,
 }
 
-impl Block {
-    /// The range that each input is scaled by.
+impl RowTable {
+    /// Range `[low, high]` by which each input is scaled, in the input's unit.
     #[must_use]
     pub fn input_ranges(&self) -> Vec<[f64; 2]> {
         let mut ranges = self.inputs.ranges();
@@ -147,7 +160,10 @@ impl Block {
         ranges
     }
 
-    /// The first `frames` of the block.
+    /// First `frames` lines of both tables.
+    ///
+    /// # Panics
+    /// If there are fewer.
     #[must_use]
     pub fn first(&self, frames: usize) -> Self {
         let cut = |table: &Table| Table {
@@ -158,7 +174,7 @@ impl Block {
     }
 }
 
-/// Columns of `file` that `pattern` chooses, or those with the project's own names.
+/// Indices of the columns of `file` that match `pattern`, or that have the project's own names.
 fn chosen(file: &CsvFile, pattern: Option<&str>, role: Role) -> Result<Vec<usize>> {
     let usual = match role {
         Role::Inputs => "r*c*_ohm",
@@ -179,8 +195,8 @@ fn chosen(file: &CsvFile, pattern: Option<&str>, role: Role) -> Result<Vec<usize
     Ok(selected)
 }
 
-/// Orders columns by row-wire and counts the rows, if every column names one and the rows are
-/// equal; otherwise one block of everything, as it stands.
+/// Orders columns by row-wire and counts the rows, if every column names one and all rows have equally
+/// many. Otherwise leaves the order as it is, as one row.
 fn by_rows(
     header: &[String],
     inputs: Vec<usize>,

@@ -6,7 +6,7 @@
 //! splitting of arguments are those of FreeBSD's msun, Copyright (C) 1993 by Sun Microsystems, Inc., freely
 //! granted.)
 
-/// 2^52: adding it to a whole number from 0 to 2^52 leaves the number in the low bits.
+/// Number 2^52: adding it to a whole number from 0 to 2^52 leaves the number in the low bits.
 const TWO_52: f64 = 4_503_599_627_370_496.0;
 
 const LN2_HI: f64 = 6.931_471_803_691_238e-1;
@@ -17,6 +17,7 @@ const LEAST_EXPONENT: f64 = -708.0;
 
 /// Natural logarithm of a normal positive number, within 1 ulp.
 #[inline(always)]
+#[must_use]
 pub fn ln(x: f64) -> f64 {
     const LG: [f64; 7] = [
         6.666_666_666_666_735e-1,
@@ -48,6 +49,7 @@ pub fn ln(x: f64) -> f64 {
 ///
 /// π/2 is taken off as a sum of two numbers, good for 2⁻⁸⁵ of a turn.
 #[inline(always)]
+#[must_use]
 pub fn sin_cos(x: f64) -> (f64, f64) {
     const PIO2_1: f64 = 1.570_796_326_734_125_6;
     const PIO2_1T: f64 = 6.077_100_506_506_192e-11;
@@ -97,6 +99,7 @@ pub fn sin_cos(x: f64) -> (f64, f64) {
 
 /// Exponential of a number ≤ 0, within 1 ulp down to −708; 0 below that.
 #[inline(always)]
+#[must_use]
 pub fn exp(x: f64) -> f64 {
     const INV_LN2: f64 = std::f64::consts::LOG2_E;
     const P: [f64; 5] = [

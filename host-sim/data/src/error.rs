@@ -1,11 +1,11 @@
-//! What can go wrong with data, as values that a program can match.
+//! Errors with data files, as values that a program can match.
 
 use std::path::{Path, PathBuf};
 
-/// Result of everything in this crate.
+/// Result of the functions of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// A setting that cannot be used: which, its value, and what would be right.
+/// Setting that cannot be used: its name, its value, and which values can be used.
 ///
 /// ```
 /// let bad = taxel_data::BadValue::new("noise.level", 5.0, "give a fraction from 0 to 1");
@@ -19,91 +19,92 @@ pub struct BadValue {
     pub field: String,
     /// Value that was given.
     pub value: String,
-    /// Which values can be used.
+    /// Rule for values that can be used.
     pub rule: String,
 }
 
 impl BadValue {
-    /// A setting `field` whose `value` breaks `rule`.
+    /// Describes a setting `field` whose `value` breaks `rule`.
+    #[expect(clippy::needless_pass_by_value, reason = "callers give literals and numbers")]
     pub fn new(field: impl Into<String>, value: impl ToString, rule: impl Into<String>) -> Self {
         Self { field: field.into(), value: value.to_string(), rule: rule.into() }
     }
 
-    /// The same under another name, such as that of a command's option.
+    /// Returns the same problem under another name, such as that of a command's option.
     #[must_use]
     pub fn named(self, field: impl Into<String>) -> Self {
         Self { field: field.into(), ..self }
     }
 }
 
-/// A failure to read, to write, or to use data.
+/// Failure to read, write or use a data file.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// A file cannot be read.
+    /// File that cannot be read.
     #[error("cannot read {}: {cause}; check the path and its permissions", path.display())]
     Read {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Error of the system.
         cause: std::io::Error,
     },
-    /// A file cannot be written.
+    /// File that cannot be written.
     #[error("cannot write {}: {cause}; choose another place", path.display())]
     Write {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Error of the system.
         cause: std::io::Error,
     },
-    /// A file would be written over another that is read.
+    /// Output file that would replace one of the inputs.
     #[error("{} would be written over {}, which is read; choose another output", output.display(), input.display())]
     WrittenOverInput {
-        /// The file to be written.
+        /// Path of the output.
         output: PathBuf,
-        /// The file that is read.
+        /// Path of the input.
         input: PathBuf,
     },
-    /// A data file cannot be used.
+    /// Data file that cannot be used.
     #[error("{}: {problem}", path.display())]
     File {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is wrong with it, and where.
+        /// Problem with the file, and its place.
         problem: Problem,
     },
 }
 
 impl Error {
-    /// A problem with the file at `path`.
+    /// Error for a `problem` with the file at `path`.
     #[must_use]
     pub fn file(path: &Path, problem: Problem) -> Self {
         Self::File { path: path.into(), problem }
     }
 
-    /// A file that cannot be read.
+    /// Error for a file at `path` that cannot be read.
     #[must_use]
     pub fn read(path: &Path, cause: std::io::Error) -> Self {
         Self::Read { path: path.into(), cause }
     }
 
-    /// A file that cannot be written.
+    /// Error for a file at `path` that cannot be written.
     #[must_use]
     pub fn write(path: &Path, cause: std::io::Error) -> Self {
         Self::Write { path: path.into(), cause }
     }
 }
 
-/// Which columns of a file a pattern chooses.
+/// Role of the columns that a pattern selects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// Columns that a decoder is given.
     Inputs,
-    /// Columns that it is to answer.
+    /// Columns that it should predict.
     Outputs,
 }
 
 impl Role {
-    /// Name in messages.
+    /// Name of the role in messages.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -113,144 +114,144 @@ impl Role {
     }
 }
 
-/// What is wrong with a data file. Lines and columns count from 1, the header is line 1.
+/// Problem with a data file. Lines and columns count from 1; the header is line 1.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Problem {
-    /// The header cannot be read.
+    /// Header that cannot be read.
     #[error("line 1: {cause}; save as UTF-8")]
     Header {
-        /// Why.
+        /// Reason.
         cause: String,
     },
-    /// The file is empty.
+    /// File without content.
     #[error("the file is empty: line 1 must name the columns")]
     Empty,
-    /// There is a header and nothing else.
+    /// File with a header and nothing else.
     #[error("the file has a header but no line of data")]
     NoLines,
-    /// A file of one column has a blank line.
+    /// Blank line in a file of one column, where it could be a missing value.
     #[error("line {line} is blank; in a file of one column write NaN for a missing value")]
     BlankLine {
-        /// The line.
+        /// Number of the line.
         line: usize,
     },
-    /// A column's name is empty or holds a control character.
+    /// Column name that is empty or holds a control character.
     #[error("line 1: column {column} has no usable name {name:?}")]
     UnusableName {
-        /// The column.
+        /// Number of the column.
         column: usize,
-        /// Its name.
+        /// Name of the column.
         name: String,
     },
-    /// Two columns have the same name.
+    /// Name that two columns share.
     #[error("line 1: column {name:?} stands twice; rename one")]
     RepeatedName {
-        /// The name.
+        /// Name of the columns.
         name: String,
     },
-    /// A line cannot be cut into fields.
+    /// Line that cannot be split into fields.
     #[error("{cause}; check quotes and line ends")]
     Line {
-        /// Why, with the place.
+        /// Reason, with the place.
         cause: String,
     },
-    /// A line has more or fewer fields than the header.
+    /// Line with more or fewer fields than the header.
     #[error("line {line} has {fields} fields; the header names {columns}; mend or remove the line")]
     FieldCount {
-        /// The line.
+        /// Number of the line.
         line: u64,
-        /// Its fields.
+        /// Fields in the line.
         fields: usize,
-        /// Columns of the header.
+        /// Columns in the header.
         columns: usize,
     },
-    /// A field is no number.
+    /// Field that is not a number.
     #[error(
         "line {line}, column {column:?}: {field:?} is not a number; leave the field empty if the value is missing"
     )]
     NotANumber {
-        /// The line.
+        /// Number of the line.
         line: u64,
         /// Name of the column.
         column: String,
-        /// What stands there.
+        /// Text of the field.
         field: String,
     },
-    /// A column is missing.
+    /// Column that is needed and missing.
     #[error("column {name:?} is missing; the file has: {known}")]
     MissingColumn {
-        /// The name that was looked for.
+        /// Name of the missing column.
         name: String,
-        /// The first columns that there are.
+        /// First columns of the file.
         known: String,
     },
-    /// No column matches a part of a pattern.
+    /// Part of a pattern that matches no column.
     #[error("no column matches {glob:?} of the {} {pattern:?}; the file has: {known}", role.name())]
     NoMatch {
-        /// What the columns are for.
+        /// Role of the columns.
         role: Role,
-        /// The part that nothing matches.
+        /// Part that matches nothing.
         glob: String,
-        /// The whole pattern.
+        /// Whole pattern.
         pattern: String,
-        /// The first columns that there are.
+        /// First columns of the file.
         known: String,
     },
-    /// No column has the project's own names, and no pattern was given.
+    /// File without any column of the project's own names, and no pattern given.
     #[error("no column is named like {pattern}; choose the {}; the file has: {known}", role.name())]
     NoUsualNames {
-        /// What the columns are for.
+        /// Role of the columns.
         role: Role,
-        /// What the project's own names look like.
+        /// Pattern of the project's own names.
         pattern: String,
-        /// The first columns that there are.
+        /// First columns of the file.
         known: String,
     },
-    /// A column is an input and an output.
+    /// Column that both patterns select, as input and as output.
     #[error("column {name:?} is chosen as an input and as an output")]
     InputAndOutput {
-        /// The column.
+        /// Name of the column.
         name: String,
     },
-    /// A value is too large to train on.
+    /// Value too large to train on.
     #[error(
         "line {line}, column {column:?}: {value} is beyond {bound:e}, the largest number that a decoder in f32 is trained on; give the column another unit"
     )]
     TooLarge {
-        /// The line.
+        /// Number of the line.
         line: u64,
         /// Name of the column.
         column: String,
-        /// The value.
+        /// Value of the field.
         value: f64,
-        /// Largest magnitude.
+        /// Largest magnitude that is accepted.
         bound: f64,
     },
-    /// Every line lacks a value in some chosen column.
+    /// File in which every line lacks a value in some selected column.
     #[error("no line has a value in every chosen column; check the columns")]
     NoCompleteLine,
-    /// A value is outside what it may be.
+    /// Value beyond a physical bound.
     #[error("line {line}, column {column:?}: {value} {unit} is beyond {bound_of} ({bound} {unit})")]
     OutOfBound {
-        /// The line.
+        /// Number of the line.
         line: u64,
         /// Name of the column.
         column: String,
-        /// The value.
+        /// Value of the field.
         value: f64,
-        /// Largest magnitude.
+        /// Largest magnitude that is accepted.
         bound: f64,
-        /// What the bound is.
+        /// Meaning of the bound, for the message.
         bound_of: &'static str,
-        /// Unit of value and bound.
+        /// Unit of the value and the bound.
         unit: &'static str,
     },
-    /// A value is missing that must be there.
+    /// Missing value in a column where every line needs one.
     #[error("line {line}: {rule}")]
     MissingValue {
-        /// The line.
+        /// Number of the line.
         line: u64,
-        /// What every line needs.
+        /// Values that every line needs, for the message.
         rule: String,
     },
 }

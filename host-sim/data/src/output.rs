@@ -1,7 +1,7 @@
-//! Files that are either whole or not there.
+//! Output files that appear whole or not at all.
 //!
-//! Only a kill in the middle of a write leaves something behind: the temporary,
-//! `.<name>.<process>.tmp`, which may be removed.
+//! Only killing the program during a write leaves a temporary file behind, `.<name>.<process>.tmp`,
+//! which may be removed.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{BufWriter, Write};
@@ -9,14 +9,14 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 
-/// Writes `path` through a temporary file beside it, renamed only once all is written. On failure
-/// the temporary goes and whatever stood at `path` stays.
+/// Writes `path` through a temporary file beside it, renamed once all is written.
 ///
-/// A link is followed, an existing file's permissions are kept, and what is no file (a device or a
-/// pipe, such as `/dev/stdout`) is written to directly.
+/// If writing fails, the temporary file is removed and whatever stood at `path` stays. A symbolic link
+/// is followed, and an existing file's permissions are kept. A device or a pipe, such as `/dev/stdout`,
+/// is written to directly.
 ///
 /// # Errors
-/// [`Error::Write`], or what `write` returns.
+/// [`Error::Write`] if the file cannot be written, or whatever error `write` returns.
 pub fn write_whole(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> Result<()>,
@@ -44,10 +44,10 @@ pub fn write_whole(
     }
 }
 
-/// As [`write_whole`], for content at hand.
+/// Writes `bytes` to `path`, whole or not at all, like [`write_whole`].
 ///
 /// # Errors
-/// [`Error::Write`].
+/// [`Error::Write`] if the file cannot be written.
 pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
     write_whole(path, |file| file.write_all(bytes).map_err(|cause| Error::write(path, cause)))
 }
@@ -55,7 +55,7 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
 /// Removes the file at `path`, if there is one.
 ///
 /// # Errors
-/// [`Error::Write`].
+/// [`Error::Write`] if there is a file and it cannot be removed.
 pub fn remove(path: &Path) -> Result<()> {
     match fs::remove_file(path) {
         Err(cause) if cause.kind() != std::io::ErrorKind::NotFound => {
@@ -65,11 +65,11 @@ pub fn remove(path: &Path) -> Result<()> {
     }
 }
 
-/// Fails early, before long work, where [`write_whole`] could not write later, or would write over
-/// one of the command's own `inputs`.
+/// Checks before long work that [`write_whole`] can write to `path` and would not replace one of the
+/// command's own `inputs`.
 ///
 /// # Errors
-/// [`Error::Write`], or [`Error::WrittenOverInput`] for an output that is an input.
+/// [`Error::Write`] if `path` cannot be written, or [`Error::WrittenOverInput`] if it is an input.
 pub fn check_writable(path: &Path, inputs: &[&Path]) -> Result<()> {
     let Place::File { real, .. } = Place::of(path)? else { return Ok(()) };
     let same = |input: &&&Path| fs::canonicalize(input).is_ok_and(|input| input == real);
@@ -81,11 +81,11 @@ pub fn check_writable(path: &Path, inputs: &[&Path]) -> Result<()> {
     File::create(&temporary.0).map(drop).map_err(|cause| Error::write(path, cause))
 }
 
-/// Does `work`, which writes to `folder`; the folder is made first. If the work fails, folders made here go
-/// again, unless something was written to them.
+/// Runs `work`, which writes to `folder`; the folder is made first. If the work fails, folders made here
+/// are removed, unless something was written to them.
 ///
 /// # Errors
-/// [`Error::Write`] for a folder that cannot be made, or what `work` returns.
+/// [`Error::Write`] for a folder that cannot be made, or whatever error `work` returns.
 pub fn in_folder<T, E: From<Error>>(
     folder: &Path,
     work: impl FnOnce() -> std::result::Result<T, E>,
@@ -104,7 +104,7 @@ pub fn in_folder<T, E: From<Error>>(
     outcome
 }
 
-/// What stands at an output's path.
+/// Kind of place that an output's path names.
 enum Place {
     /// A file, or nothing yet; links are resolved.
     File { real: PathBuf, permissions: Option<fs::Permissions> },
@@ -129,7 +129,7 @@ impl Place {
     }
 }
 
-/// A temporary file's name; the file is removed when this goes (after a rename: no longer there).
+/// Path of a temporary file, removed on drop (unless it was renamed before).
 struct Temporary(PathBuf);
 
 impl Temporary {

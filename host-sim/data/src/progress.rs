@@ -1,15 +1,15 @@
-//! Progress of long work, told to whoever wants to show it.
+//! Progress of long work, reported to whoever wants to show it.
 
-/// A listener to the progress of long work. Steps may come from any thread.
+/// Listener to the progress of long work; its methods may be called from any thread.
 pub trait Progress: Sync {
-    /// A stage of so many steps begins.
+    /// Begins a stage called `name` of so many `steps`.
     fn stage(&self, name: &str, steps: usize);
 
-    /// A step of the stage is done.
+    /// Counts one step of the current stage as done.
     fn step(&self);
 }
 
-/// A listener that shows nothing.
+/// Listener that shows nothing.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Silent;
 

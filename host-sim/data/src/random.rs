@@ -1,10 +1,11 @@
 //! Random draws that are the same on every platform, in any order, on any number of threads.
 //!
-//! Generator: xoshiro256++ (Blackman & Vigna, 2021), one instance for every purpose of every frame
-//! of every row, seeded from those numbers by SplitMix64: a frame never depends on the frames
-//! before it, nor on which rows are read. Uniform: the upper 53 bits over 2^53. Normal: Box–Muller,
-//! √(−2 ln(1 − u₁))·(cos, sin)(2π u₂), with functions that every platform computes alike
-//! (`elementary`).
+//! Generator: xoshiro256++ (Blackman & Vigna, 2021), one for every purpose, row and frame, seeded from
+//! these by SplitMix64. A frame therefore never depends on the frames before it, nor on which rows are
+//! read.
+//!
+//! Uniform: the upper 53 bits over 2^53. Normal: Box–Muller, √(−2 ln(1 − u₁))·(cos, sin)(2π u₂), by
+//! functions that every platform computes alike (`elementary`).
 
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -15,7 +16,7 @@ mod lanes;
 
 pub use lanes::RandomLanes;
 
-/// What draws are for. Different purposes never share numbers.
+/// Purpose of random draws. Different purposes never share numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Purpose {
     /// The contact that a whole frame shares.
@@ -36,7 +37,7 @@ pub enum Purpose {
     Damage = 8,
 }
 
-/// Which set of frames draws are for. Training and test frames are independent.
+/// Set of frames that draws are for. Training and test frames are independent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stream {
     /// Frames to train on; also what `synth` writes.
@@ -47,7 +48,7 @@ pub enum Stream {
     Span = 3,
 }
 
-/// A seeded source of draws.
+/// Seeded source of random draws.
 #[derive(Debug, Clone)]
 pub struct Random {
     generator: Xoshiro256PlusPlus,
@@ -55,7 +56,7 @@ pub struct Random {
 }
 
 impl Random {
-    /// The source for `purpose` number `index` (say a frame) and `part` (say a row) of `stream`.
+    /// Source for `purpose` number `index` (say a frame) and `part` (say a row) of `stream`.
     #[must_use]
     pub fn new(seed: u64, stream: Stream, purpose: Purpose, index: u64, part: u64) -> Self {
         let words = [stream as u64, purpose as u64, index, part];
@@ -63,22 +64,22 @@ impl Random {
         Self { generator: Xoshiro256PlusPlus::seed_from_u64(mixed), spare_normal: None }
     }
 
-    /// Uniform on [0, 1).
+    /// Draws a uniform number on [0, 1).
     pub fn unit(&mut self) -> f64 {
         unit(self.generator.next_u64())
     }
 
-    /// Uniform on [`low`, `high`).
+    /// Draws a uniform number on [`low`, `high`).
     pub fn between(&mut self, [low, high]: [f64; 2]) -> f64 {
         low + (high - low) * self.unit()
     }
 
-    /// Uniform on 0..`end`.
+    /// Draws a uniform whole number from 0 to `end` − 1; 0 if `end` is 0.
     pub fn below(&mut self, end: usize) -> usize {
         ((self.unit() * end as f64) as usize).min(end.saturating_sub(1))
     }
 
-    /// Standard normal.
+    /// Draws a standard normal number, by Box–Muller.
     pub fn normal(&mut self) -> f64 {
         if let Some(spare) = self.spare_normal.take() {
             return spare;
@@ -90,13 +91,13 @@ impl Random {
     }
 }
 
-/// Uniform on [0, 1): the upper 53 bits over 2^53.
+/// Uniform number on [0, 1) from 64 random bits: the upper 53 over 2^53.
 #[inline(always)]
 fn unit(bits: u64) -> f64 {
     (bits >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// How far SplitMix64's state moves on with every number.
+/// Step by which SplitMix64's state advances with every number.
 const SPLIT_MIX_STEP: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// One step of SplitMix64 (Steele, Lea & Flood, 2014).

@@ -1,18 +1,18 @@
-//! The widest vector instructions that this machine has, chosen when the program runs.
+//! Vector instructions: the widest that this machine has, chosen when the program runs.
 
 use pulp::NullaryFnOnce;
 
-/// Lanes of a block, one frame each: enough to hide what a loop costs, few enough for the first cache.
+/// Frames computed side by side: enough to hide the cost of a loop, few enough for the first cache.
 pub const LANES: usize = 64;
 
-/// One number a frame. Loops over all lanes, whether or not each has a frame, need no bounds check and
-/// no remainder.
+/// Numbers of [`LANES`] frames side by side. Loops over all lanes, whether or not each has a frame, need
+/// no bounds check and no remainder.
 pub type Lanes<T = f64> = [T; LANES];
 
 /// Runs `work` compiled for the machine's widest vectors (AVX2 on most x86-64, NEON on AArch64).
 ///
-/// What is to be vectorised must be inlined into `work`, and `work` itself into this: the closure and what it
-/// calls need `#[inline(always)]`. Results do not depend on the machine: the compiler never contracts or
+/// Code that is to be vectorised must be inlined into `work`: the closure and what it calls need
+/// `#[inline(always)]`. Results do not depend on the machine, since the compiler never contracts or
 /// reorders floating-point operations by itself.
 ///
 /// ```
@@ -24,8 +24,8 @@ pub fn widest<R>(work: impl FnMut() -> R) -> R {
     pulp::Arch::new().dispatch(Closure(work))
 }
 
-/// A closure that is called through `FnMut`: `FnOnce::call_once`, which pulp would call, is a function of its
-/// own around a closure, compiled for the oldest machine unless the compiler happens to inline it.
+/// Closure that is called through `FnMut`. pulp would call `FnOnce::call_once`, a function of its own
+/// around the closure, compiled for the oldest machine unless the compiler happens to inline it.
 struct Closure<F>(F);
 
 impl<R, F: FnMut() -> R> NullaryFnOnce for Closure<F> {

@@ -1,33 +1,33 @@
 //! Tables of numbers with named columns.
 
-/// Named columns of numbers, one line a frame.
+/// Table of numbers with named columns, one frame a line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
     /// Column names.
     pub names: Vec<String>,
-    /// Values, line after line; NaN is missing.
+    /// Values, `lines × columns`, line after line; NaN is missing.
     pub values: Vec<f64>,
 }
 
 impl Table {
-    /// Lines in the table.
+    /// Number of lines.
     #[must_use]
     pub fn len(&self) -> usize {
         if self.names.is_empty() { 0 } else { self.values.len() / self.names.len() }
     }
 
-    /// Whether there is no line.
+    /// Whether the table has no line.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The lines.
+    /// Lines of the table in turn, each a slice of one value a column.
     pub fn lines(&self) -> std::slice::ChunksExact<'_, f64> {
         self.values.chunks_exact(self.names.len().max(1))
     }
 
-    /// Smallest and largest value of every column.
+    /// Smallest and largest value of each column, `[low, high]`; NaN is skipped.
     #[must_use]
     pub fn ranges(&self) -> Vec<[f64; 2]> {
         let mut ranges = vec![[f64::INFINITY, f64::NEG_INFINITY]; self.names.len()];
@@ -39,7 +39,7 @@ impl Table {
         ranges
     }
 
-    /// Mean of every column, NaN left out.
+    /// Mean of each column; NaN is skipped.
     #[must_use]
     pub fn means(&self) -> Vec<f64> {
         let mut sums = vec![(0.0, 0.0); self.names.len()];
@@ -51,7 +51,7 @@ impl Table {
         sums.iter().map(|(sum, count)| sum / count).collect()
     }
 
-    /// Σ(estimate − value)² of every column, for `estimates` laid out as the values are.
+    /// Sum Σ(estimate − value)² of each column, for `estimates` of the same shape, `lines × columns`.
     #[must_use]
     pub fn squared_errors(&self, estimates: &[f64]) -> Vec<f64> {
         let mut sums = vec![0.0; self.names.len()];
@@ -63,10 +63,10 @@ impl Table {
         sums
     }
 
-    /// The `count` columns from the one at `from` on.
+    /// Table of the `count` columns from index `from` on.
     ///
     /// # Panics
-    /// If there are not so many.
+    /// If the table has fewer columns.
     #[must_use]
     pub fn columns(&self, from: usize, count: usize) -> Self {
         let names = self.names[from..from + count].to_vec();

@@ -1,19 +1,20 @@
-//! The seam for decoders: whatever turns frames of readings into estimates.
+//! Interface of decoders: whatever turns frames of readings into estimates.
 //!
-//! As in idsp's `SplitProcess`, configuration (the decoder itself, immutable) stands apart from state (what a
-//! filter remembers between the frames of a trajectory). A new kind of decoder implements [`FrameDecoder`];
-//! programs hold lists of [`Decoder`]s, which every [`FrameDecoder`] is.
+//! Configuration (the decoder itself, immutable) is kept apart from state (what a filter remembers
+//! between the frames of a trajectory), like in idsp's `SplitProcess`. A new kind of decoder implements
+//! [`FrameDecoder`]; every [`FrameDecoder`] is a [`Decoder`], of which programs hold lists.
 
 use rayon::prelude::*;
 
-/// Estimates of some frames, frame after frame.
+/// Estimates of a number of frames, frame after frame.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Estimates {
     /// Outputs in their units, `frames × outputs`; NaN where nothing could be decoded.
     pub values: Vec<f64>,
-    /// Standard deviation of each value, in its unit, from decoders that know it.
+    /// Standard deviation of each value, in its unit, `frames × outputs`; only from decoders that
+    /// compute it.
     pub deviation: Option<Vec<f64>>,
-    /// Novelty of each frame, from decoders that know it: 1 is as usual as anything in training.
+    /// Novelty of each frame, only from decoders that compute it: 1 is as usual as anything in training.
     pub novelty: Option<Vec<f64>>,
 }
 
@@ -24,7 +25,8 @@ impl Estimates {
         Self { values, deviation: None, novelty: None }
     }
 
-    /// Adds the estimates of the frames that follow. What only one of the two knows is dropped.
+    /// Appends the estimates of the following frames. Deviations or novelty that only one of the two has
+    /// are dropped.
     fn append(&mut self, next: Self) {
         let join = |all: &mut Option<Vec<f64>>, next: Option<Vec<f64>>| match (all.as_mut(), next) {
             (Some(all), Some(next)) => all.extend(next),
@@ -36,29 +38,31 @@ impl Estimates {
     }
 }
 
-/// A way to decode frames, with its configuration in `self` and its memory in a state.
+/// Decoder of frames, with its configuration in `self` and its memory in a state.
 pub trait FrameDecoder: Sync {
-    /// Memory between the frames of a trajectory, at its start by default; `()` for none.
+    /// Memory between the frames of a trajectory; its default is the start of one. `()` for no memory.
     type State: Default;
 
-    /// Name in tables and results.
+    /// Name of the decoder in tables and results.
     fn name(&self) -> &str;
 
-    /// Readings of a frame.
+    /// Number of readings in a frame.
     fn inputs(&self) -> usize;
 
-    /// Decodes consecutive frames of one trajectory: `readings` in Ω (or the data's unit), frame after frame.
+    /// Decodes consecutive frames of one trajectory.
     ///
-    /// A decoder without memory is given frames of any number of trajectories at once.
+    /// `readings` are `frames × inputs`, frame after frame, in Ω (or the data's unit). A decoder without
+    /// memory is given frames of any number of trajectories at once.
     fn decode(&self, state: &mut Self::State, readings: &[f64]) -> Estimates;
 }
 
-/// A decoder of any kind, for lists of them.
+/// Decoder of any kind, for lists of decoders.
 pub trait Decoder: Sync {
-    /// Name in tables and results.
+    /// Name of the decoder in tables and results.
     fn name(&self) -> &str;
 
-    /// Decodes all of `readings`, frame after frame, in trajectories of `steps` frames each.
+    /// Decodes all of `readings` (`frames × inputs`, in the data's unit), in trajectories of `steps`
+    /// frames each.
     fn decode_all(&self, readings: &[f64], steps: usize) -> Estimates;
 }
 
@@ -85,13 +89,14 @@ impl<D: FrameDecoder> Decoder for D {
 mod tests {
     use super::*;
 
-    /// The running mean of a trajectory's readings, and how much each frame differs from it.
+    /// Decoder of a test: the running mean of a trajectory's readings, and the distance of each frame
+    /// from it.
     struct RunningMean;
 
     impl FrameDecoder for RunningMean {
         type State = (f64, f64);
 
-        fn name(&self) -> &str {
+        fn name(&self) -> &'static str {
             "running mean"
         }
 

@@ -1,7 +1,7 @@
-//! Decoders besides the packed network, and what they share.
+//! Decoders besides the packed network, and their common parts.
 
 use rayon::prelude::*;
-use taxel_data::dataset::{Block, Dataset};
+use taxel_data::dataset::{Dataset, RowTable};
 
 use crate::decoder::{Decoder, Estimates, FrameDecoder};
 use crate::infer::{Exponential, infer};
@@ -11,16 +11,16 @@ pub mod linear;
 pub mod mean;
 pub mod standard;
 
-/// A decoder that is judged beside every network.
+/// Decoder that every network is compared with.
 #[derive(Debug, Clone, Copy)]
 pub struct Baseline {
-    /// Name in tables and results.
+    /// Name of the decoder in tables and results.
     pub name: &'static str,
     fit: fn(&Dataset) -> Box<dyn Decoder>,
 }
 
 impl Baseline {
-    /// The decoder, fitted to `training`.
+    /// Fits the decoder to `training`.
     #[must_use]
     pub fn fit(&self, training: &Dataset) -> Box<dyn Decoder> {
         (self.fit)(training)
@@ -33,18 +33,18 @@ pub const BASELINES: &[Baseline] = &[
     Baseline { name: mean::NAME, fit: |training| Box::new(mean::Mean::fit(training)) },
 ];
 
-/// A decoder of one row-wire's readings.
+/// Decoder of one row-wire's readings.
 pub trait RowDecoder: Sync {
-    /// The outputs for every line of `readings`, line after line.
+    /// Predicts the outputs (`lines × outputs`) for every line of `readings` (`lines × inputs`).
     fn predict(&self, readings: &[f64]) -> Vec<f64>;
 }
 
-/// Decoders of a row-wire each, side by side.
+/// Decoder of whole frames, made of one decoder for each row-wire.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rows<D> {
     name: &'static str,
     inputs: usize,
-    rows: Vec<D>,
+    decoders: Vec<D>,
 }
 
 impl RowDecoder for FittedNetwork {
@@ -54,17 +54,21 @@ impl RowDecoder for FittedNetwork {
 }
 
 impl<D: RowDecoder + Send> Rows<D> {
-    /// One decoder for each row of `training`, by `fit`.
-    pub fn fit(name: &'static str, training: &Dataset, fit: impl Fn(&Block) -> D + Sync) -> Self {
+    /// Fits one decoder to each row of `training`, by `fit`.
+    pub fn fit(
+        name: &'static str,
+        training: &Dataset,
+        fit: impl Fn(&RowTable) -> D + Sync,
+    ) -> Self {
         let rows = (0..training.rows).into_par_iter();
-        let rows = rows.map(|row| fit(&training.block(row))).collect();
-        Self::of(name, training, rows)
+        let decoders = rows.map(|row| fit(&training.row_table(row))).collect();
+        Self::of(name, training, decoders)
     }
 
-    /// The decoders of all rows of `training`, which were fitted already.
+    /// Joins decoders that were already fitted to the rows of `training`, in their order.
     #[must_use]
-    pub fn of(name: &'static str, training: &Dataset, rows: Vec<D>) -> Self {
-        Self { name, inputs: training.inputs.names.len() / training.rows.max(1), rows }
+    pub fn of(name: &'static str, training: &Dataset, decoders: Vec<D>) -> Self {
+        Self { name, inputs: training.inputs.names.len() / training.rows.max(1), decoders }
     }
 }
 
@@ -76,7 +80,7 @@ impl<D: RowDecoder + Send> FrameDecoder for Rows<D> {
     }
 
     fn inputs(&self) -> usize {
-        self.rows.len() * self.inputs
+        self.decoders.len() * self.inputs
     }
 
     fn decode(&self, (): &mut (), readings: &[f64]) -> Estimates {
@@ -87,12 +91,12 @@ impl<D: RowDecoder + Send> FrameDecoder for Rows<D> {
                 frames.clone().flat_map(|frame| &frame[places.clone()]).copied().collect();
             decoder.predict(&readings)
         };
-        let parts: Vec<Vec<f64>> = self.rows.par_iter().enumerate().map(of_row).collect();
+        let parts: Vec<Vec<f64>> = self.decoders.par_iter().enumerate().map(of_row).collect();
         Estimates::of_values(side_by_side(&parts, frames.len()))
     }
 }
 
-/// Joins the outputs of all rows, of so many `frames` each, frame after frame.
+/// Joins the outputs of all rows, each of so many `frames`, frame after frame.
 fn side_by_side(parts: &[Vec<f64>], frames: usize) -> Vec<f64> {
     let width = parts.first().map_or(0, Vec::len) / frames.max(1);
     let of_frame = |frame: usize| {

@@ -1,4 +1,4 @@
-//! What can go wrong in training and packing, as values that a program can match.
+//! Errors of training and packing, as values that a program can match.
 
 use std::path::PathBuf;
 
@@ -6,62 +6,62 @@ use model_core::blob::{DecodeError, EncodeError};
 use model_core::rbf::{Format, NetworkError};
 use taxel_data::BadValue;
 
-/// Result of everything in this crate.
+/// Result of the functions of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// A failure of training, selection or packing.
+/// Failure of training, selection or packing.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// An option cannot be used, by itself or with this data.
+    /// Option that cannot be used, by itself or with this data.
     #[error(transparent)]
     Setting(#[from] BadValue),
-    /// A file cannot be read.
+    /// Data file that cannot be read or used.
     #[error(transparent)]
     Data(#[from] taxel_data::Error),
-    /// A blob was refused.
+    /// Blob that was rejected.
     #[error("{}: {cause}", path.display())]
     Blob {
-        /// The file.
+        /// Path of the blob.
         path: PathBuf,
-        /// Why.
+        /// Reason.
         cause: DecodeError,
     },
-    /// A format has no room for so many inputs.
+    /// More inputs than a format has room for.
     #[error("{inputs} inputs a row: the format {} holds at most {most}; give another format ({})", format.name(), Format::F32.name())]
     TooManyInputs {
-        /// The format.
+        /// Number format of the network.
         format: Format,
-        /// Inputs of a row.
+        /// Number of inputs of a row.
         inputs: usize,
-        /// Inputs that it holds.
+        /// Largest number of inputs that the format holds.
         most: usize,
     },
-    /// Training ended in parameters that a format does not hold.
+    /// Trained network with a parameter that its format does not hold.
     #[error("training ends in numbers that the format {} does not hold ({cause}); bring the columns to a moderate scale, say by another unit", format.name())]
     NotHeld {
-        /// The format.
+        /// Number format of the network.
         format: Format,
-        /// Which, and why.
+        /// Parameter that does not fit, and why.
         cause: NetworkError,
     },
-    /// Weights grow without end while they are rounded to a format.
+    /// Weights that grow without end while they are rounded to a format.
     #[error("the format {} does not hold this model: its weights grow without end as they are rounded; give a larger spread, fewer centres, or another format ({})", format.name(), Format::F32.name())]
     WeightsGrow {
-        /// The format.
+        /// Number format of the network.
         format: Format,
     },
-    /// One network for the whole array was asked for, of data with the readings of one row-wire.
+    /// Network for the whole array asked for, while the data has readings of one row-wire only.
     #[error(
         "whole-array input needs the readings of two row-wires or more; the data has one: leave it out"
     )]
     OneRow,
-    /// The readings have no regression on which a projection could be based.
+    /// Readings without any regression on which a projection could be based.
     #[error("the readings have no regression: some are no numbers")]
     NoRegression,
-    /// The projection of the readings is beyond f32.
+    /// Projection of the readings with numbers beyond f32.
     #[error("the projection of these readings is beyond f32")]
     ProjectionBeyondF32,
-    /// The model is beyond what the blob's format holds.
+    /// Model beyond what the blob's format holds.
     #[error("the model cannot be written: {0}")]
     NotPacked(EncodeError),
 }

@@ -12,16 +12,16 @@ mod batch;
 /// Lines that one thread takes at a time.
 const LINES_AT_ONCE: usize = 256;
 
-/// The exponential that activations are computed with.
+/// Implementation of the exponential that activations are computed with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Exponential {
-    /// Within 2 ulp and fast: the device's default.
+    /// Polynomial within 2 ulp, and fast: the device's default.
     #[default]
     Polynomial,
-    /// Within 1 ulp.
+    /// The `libm` crate's, within 1 ulp.
     Libm,
-    /// Up to 2.4e-3 relative error; to see what that costs.
+    /// The `micromath` crate's, up to 2.4e-3 relative error; to see what that costs.
     Micromath,
 }
 
@@ -29,7 +29,7 @@ impl Exponential {
     /// Every exponential, the device's default first.
     pub const ALL: [Self; 3] = [Self::Polynomial, Self::Libm, Self::Micromath];
 
-    /// Name, as users choose it and a device reports it.
+    /// Name that users choose it by and a device reports.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -39,7 +39,7 @@ impl Exponential {
         }
     }
 
-    /// What it is worth, in a line.
+    /// Accuracy in one line, for help texts and tables.
     #[must_use]
     pub fn description(self) -> &'static str {
         match self {
@@ -49,20 +49,22 @@ impl Exponential {
         }
     }
 
-    /// The exponential of that name.
+    /// Exponential called `name`.
     #[must_use]
     pub fn by_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|exponential| exponential.name() == name)
     }
 }
 
-/// Infers the outputs of `network` for every line of `readings`.
+/// Infers the outputs of `network` for every line of `readings` (`lines × inputs`): `lines × outputs`.
+///
+/// All outputs of a line are NaN if a reading is missing.
 #[must_use]
 pub fn infer(network: &Network<'_>, exponential: Exponential, readings: &[f64]) -> Vec<f64> {
     Prepared::new(&[*network], exponential).infer(readings)
 }
 
-/// Networks of one shape, laid out for many lines, each of which holds the inputs of every network in turn.
+/// Networks of one shape, laid out for many lines. Each line holds the inputs of every network in turn.
 #[derive(Debug)]
 pub(crate) struct Prepared<'n> {
     shape: Shape,
@@ -79,17 +81,17 @@ impl<'n> Prepared<'n> {
         Self { shape, exponential, networks: networks.iter().map(of).collect() }
     }
 
-    /// The networks in turn.
+    /// Networks in turn.
     pub(crate) fn networks(&self) -> impl Iterator<Item = &Network<'n>> {
         self.networks.iter().map(|(network, _)| network)
     }
 
-    /// Inputs of each network.
+    /// Number of inputs of each network.
     pub(crate) fn inputs(&self) -> usize {
         self.shape.inputs
     }
 
-    /// Infers the outputs for every line of `readings`: all NaN for a network that misses a reading.
+    /// Infers the outputs for every line of `readings`; NaN for a network that misses a reading.
     pub(crate) fn infer(&self, readings: &[f64]) -> Vec<f64> {
         let Shape { inputs, outputs, .. } = self.shape;
         let (readings_step, outputs_step) =

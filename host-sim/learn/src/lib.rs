@@ -1,9 +1,10 @@
 //! Decoders of tactile frames: trained, packed for a device, and run over tables.
 //!
-//! A program gives readings and the outputs that belong to them, as a
-//! [`Dataset`](taxel_data::dataset::Dataset). Training makes a network of one of model-core's number formats;
-//! packing makes the weight blob that a device holds; a [`PreparedModel`] decodes as the device does, bit for
-//! bit. Modules stand from the ground up; each imports only what stands before it.
+//! A program gives readings and outputs as a [`Dataset`](taxel_data::dataset::Dataset).
+//! [`train`](train::train) makes networks of one of model-core's number formats, and [`pack`] makes the
+//! weight blob that a device holds. A [`PreparedModel`] decodes like the device does, bit for bit.
+//!
+//! Modules stand from the ground up; each imports only what stands before it.
 //!
 //! ```
 //! use taxel_data::{progress::Silent, random::Stream};

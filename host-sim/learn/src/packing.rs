@@ -1,4 +1,4 @@
-//! Trained models as blobs: the bytes that a device holds.
+//! Packing of trained models into blobs: the bytes that a device holds.
 
 use std::path::Path;
 
@@ -14,25 +14,25 @@ use crate::error::{Error, Result};
 use crate::infer::{Exponential, infer};
 use crate::train::{self, FittedNetwork, Trained};
 
-/// Where a model's training data came from.
+/// Origin of a model's training data, for the blob's metadata.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Origin {
     /// Name of the scene or data set.
     pub name: String,
-    /// Digest of the scene's or data's file.
+    /// CRC-64/XZ of the scene's or data's file.
     pub digest: u64,
-    /// Kind of noise that was added, and its level.
+    /// Kind of noise that was added, and its level as a fraction.
     pub noise: (NoiseKind, f64),
-    /// Seed of every draw.
+    /// Seed of every random draw.
     pub seed: u64,
-    /// Sensor thickness H; `None` where it has no meaning.
+    /// Sensor thickness H in mm; `None` where it has no meaning.
     pub thickness_mm: Option<f64>,
     /// Full scale of each output, in its unit.
     pub full_scale: Vec<f64>,
 }
 
 impl Origin {
-    /// The origin of measured data: full scale is each output's range.
+    /// Origin of measured data, without noise: full scale is each output's range.
     #[must_use]
     pub fn of_data(name: &str, digest: u64, seed: u64, dataset: &Dataset) -> Self {
         let full_scale = dataset.outputs.ranges().into_iter().map(|[low, high]| high - low);
@@ -47,13 +47,13 @@ impl Origin {
     }
 }
 
-/// The blob of what was `trained` on `dataset`.
+/// Packs the networks and projection `trained` on `dataset` into a blob.
 ///
 /// # Errors
 /// [`Error::NotPacked`] for a model beyond what the format holds.
 pub fn pack(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<ModelBlob> {
     let views: Vec<Network<'_>> = trained.networks.iter().map(FittedNetwork::network).collect();
-    let projection = trained.projection.as_ref().map(|block| train::view(block, dataset));
+    let projection = trained.projection.as_ref().map(|parameters| train::view(parameters, dataset));
     let row_network: Vec<u8> = match projection {
         Some(_) => vec![0; dataset.rows],
         None => (0..dataset.rows).map(|row| row as u8).collect(),
@@ -98,15 +98,15 @@ pub fn pack(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<Mod
 fn training_rmse(networks: &[Network<'_>], dataset: &Dataset) -> Vec<f64> {
     let mut rmse = Vec::new();
     for (row, network) in networks.iter().enumerate() {
-        let block = dataset.block(row);
-        let predicted = infer(network, Exponential::default(), &block.inputs.values);
-        let squares = block.outputs.squared_errors(&predicted);
+        let table = dataset.row_table(row);
+        let predicted = infer(network, Exponential::default(), &table.inputs.values);
+        let squares = table.outputs.squared_errors(&predicted);
         rmse.extend(squares.iter().map(|s| (s / dataset.frames() as f64).sqrt()));
     }
     rmse
 }
 
-/// The bytes of a model, checked from end to end.
+/// Blob of a model, checked from end to end.
 #[derive(Debug)]
 pub struct ModelBlob {
     bytes: AlignedBytes,
@@ -116,29 +116,29 @@ impl ModelBlob {
     /// Reads and checks the blob at `path`.
     ///
     /// # Errors
-    /// [`Error::Data`] for a file that cannot be read, [`Error::Blob`] for a blob that is refused.
+    /// [`Error::Data`] for a file that cannot be read, [`Error::Blob`] for a blob that is rejected.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).map_err(|cause| taxel_data::Error::read(path, cause))?;
         Self::of_bytes(&bytes).map_err(|cause| Error::Blob { path: path.into(), cause })
     }
 
-    /// Checks a blob.
+    /// Checks and copies the `bytes` of a blob.
     ///
     /// # Errors
-    /// Why it is refused.
+    /// [`DecodeError`] that says why the blob is rejected.
     pub fn of_bytes(bytes: &[u8]) -> std::result::Result<Self, DecodeError> {
         let bytes = AlignedBytes::copy_of(bytes);
         Model::decode(&bytes).map(drop)?;
         Ok(Self { bytes })
     }
 
-    /// The blob's bytes.
+    /// Bytes of the blob.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
 
-    /// Parses the model, which looks at every byte: [prepare](Self::prepare) it once where it is used often.
+    /// Parses the model, which checks every byte: [prepare](Self::prepare) it once if it is used often.
     ///
     /// # Panics
     /// Never: the bytes were checked when they were read and have not changed since.

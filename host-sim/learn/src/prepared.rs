@@ -1,4 +1,4 @@
-//! A model laid out once for decoding frames and tables of any shape, bit for bit as a device does.
+//! Models laid out once for decoding frames and tables of any shape, bit for bit as a device does.
 
 use std::borrow::Cow;
 
@@ -12,17 +12,21 @@ use crate::infer::{Exponential, Prepared, is_missing};
 use crate::packing::ModelBlob;
 use crate::train::projection;
 
-/// A model that was parsed and laid out, ready to decode.
+/// Model that was parsed and laid out, ready to decode.
 #[derive(Debug)]
 pub struct PreparedModel<'b> {
     model: Model<'b>,
-    /// The network that serves each row-wire, or the one for all behind a projection.
+    /// Network of each row-wire, or the one network behind a projection.
     networks: Prepared<'b>,
     output_names: Vec<String>,
 }
 
 impl ModelBlob {
-    /// Prepares the model for decoding with `exponential`, which devices compute by the default.
+    /// Prepares the model for decoding with `exponential`; [`Exponential::default`] is that of the
+    /// devices.
+    ///
+    /// # Panics
+    /// Never: every row of a model that was checked has a network.
     #[must_use]
     pub fn prepare(&self, exponential: Exponential) -> PreparedModel<'_> {
         let model = self.parse();
@@ -38,30 +42,33 @@ impl ModelBlob {
 }
 
 impl<'b> PreparedModel<'b> {
-    /// The model: its shape, networks and metadata.
+    /// Parsed model: its shape, networks and metadata.
     #[must_use]
     pub fn model(&self) -> &Model<'b> {
         &self.model
     }
 
-    /// Decodes a table of readings whose columns are the model's inputs. A reading that is missing makes the
-    /// outputs of its row-wire NaN; behind a projection, all outputs of the frame.
+    /// Decodes a table of readings (`frames × inputs`, in the model's units) to one of outputs (`frames
+    /// × outputs`).
+    ///
+    /// A missing reading makes the outputs of its row-wire NaN; behind a projection, all outputs of the
+    /// frame.
     ///
     /// # Panics
-    /// If `readings` has other columns than the model's inputs.
+    /// If the number of columns differs from the model's number of readings.
     #[must_use]
     pub fn decode_table(&self, readings: &Table) -> Table {
         assert_eq!(readings.names.len(), self.inputs(), "the model's inputs");
         Table { names: self.output_names.clone(), values: self.decode_lines(&readings.values) }
     }
 
-    /// The outputs for every line of `readings`, line after line.
+    /// Decodes `readings` (`frames × inputs`) to outputs (`frames × outputs`), line after line.
     #[must_use]
     pub fn decode_lines(&self, readings: &[f64]) -> Vec<f64> {
         self.networks.infer(&self.inputs_of_networks(readings))
     }
 
-    /// What the networks take in, in turn: the readings, or features of them.
+    /// Inputs of the networks in turn: the readings, or features of them.
     fn inputs_of_networks<'r>(&self, readings: &'r [f64]) -> Cow<'r, [f64]> {
         match self.model.projection() {
             Some(projection) => {
@@ -72,11 +79,11 @@ impl<'b> PreparedModel<'b> {
         }
     }
 
-    /// Share of `readings`, or of their features behind a projection, that inference clamps: outside the
-    /// training range by more than an eighth of it.
+    /// Share of `readings`, or of their features behind a projection, that inference clamps: those
+    /// outside the training range by more than an eighth of it.
     ///
     /// # Panics
-    /// If `readings` are no whole frames of the model's readings.
+    /// If `readings` are not whole frames of the model.
     #[must_use]
     pub fn share_out_of_range(&self, readings: &[f64]) -> f64 {
         let inputs = self.networks.inputs();
@@ -105,7 +112,7 @@ impl<'b> PreparedModel<'b> {
 impl FrameDecoder for PreparedModel<'_> {
     type State = ();
 
-    fn name(&self) -> &str {
+    fn name(&self) -> &'static str {
         "network"
     }
 

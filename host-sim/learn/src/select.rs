@@ -1,4 +1,4 @@
-//! Choosing K and spread by k-fold cross-validation.
+//! Selection of K and spread by k-fold cross-validation.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -12,32 +12,32 @@ use crate::error::Result;
 use crate::infer::{Exponential, infer};
 use crate::train::{Options, Samples, check_spread};
 
-/// What one candidate scored on the folds that it was not trained on.
+/// Result of one candidate on the folds that it was not trained on.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Scored {
-    /// Centres, K.
+    /// Number of centres, K.
     pub centres: usize,
     /// Width σ on scaled inputs.
     pub spread: f64,
     /// RMSE of each output over all held-out samples, in the output's unit.
     pub rmse: Vec<f64>,
-    /// Mean over the outputs of RMSE/standard deviation: what is minimised. Outputs that never
-    /// change do not count.
+    /// Mean over the outputs of RMSE/standard deviation: the quantity that selection minimises. Outputs
+    /// that never change do not count.
     pub score: f64,
 }
 
-/// Every candidate, and the best.
+/// Results of every candidate, and the best one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Selection {
     /// All candidates, by K and then spread.
     pub scored: Vec<Scored>,
-    /// Place of the one with the lowest score (the first among equals).
+    /// Index in `scored` of the lowest score (the first among equals).
     pub best: usize,
     /// Baselines on the same folds, for comparison.
     pub baselines: Vec<BaselineScore>,
 }
 
-/// What a baseline scored on the folds that it was not fitted to.
+/// Result of a baseline on the folds that it was not fitted to.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BaselineScore {
     /// Name of the baseline.
@@ -47,14 +47,14 @@ pub struct BaselineScore {
 }
 
 impl Selection {
-    /// The candidate with the lowest score.
+    /// Candidate with the lowest score.
     #[must_use]
     pub fn best(&self) -> &Scored {
         &self.scored[self.best]
     }
 }
 
-/// Assigns `frames` to `folds` at random, in equal numbers.
+/// Assigns `frames` to `folds` at random, in equal numbers: the fold of each frame, from 0.
 #[must_use]
 pub fn random_folds(frames: usize, folds: usize, seed: u64) -> Vec<usize> {
     let mut assigned: Vec<usize> = (0..frames).map(|i| i % folds).collect();
@@ -65,7 +65,8 @@ pub fn random_folds(frames: usize, folds: usize, seed: u64) -> Vec<usize> {
     assigned
 }
 
-/// Folds by `values`: equal values share one; folds are numbered from 0 by ascending value.
+/// Folds by `values`: frames with equal values share a fold; folds are numbered from 0 by ascending
+/// value.
 #[must_use]
 pub fn number_folds(values: &[f64]) -> Vec<usize> {
     let mut distinct = values.to_vec();
@@ -78,18 +79,20 @@ fn training_part(fold_of: &[usize], fold: usize) -> usize {
     fold_of.iter().filter(|f| **f != fold).count()
 }
 
-/// Frames that the fold which leaves fewest is trained on.
+/// Number of training frames left by the largest fold.
 #[must_use]
 pub fn smallest_training_part(fold_of: &[usize]) -> usize {
     let folds = fold_of.iter().max().map_or(0, |last| last + 1);
     (0..folds).map(|fold| training_part(fold_of, fold)).min().unwrap_or(0)
 }
 
-/// Scores every pair of `centres` and `spreads` by cross-validation; `fold_of` gives each frame's
-/// fold, numbered from 0. Everything else comes from `options`.
+/// Scores every pair of `centres` and `spreads` by cross-validation.
+///
+/// `fold_of` gives each frame's fold, numbered from 0; all other options come from `options`.
 ///
 /// # Errors
-/// Fewer than two folds, or a candidate that does not fit the data.
+/// [`Error::Setting`](crate::Error::Setting) for fewer than two folds, no candidate, or a candidate that
+/// does not fit the data; otherwise the errors of [`train`](crate::train::train).
 pub fn cross_validate(
     dataset: &Dataset,
     fold_of: &[usize],
@@ -170,8 +173,8 @@ fn held_out_squares(
     let (training, test) = split(dataset, fold_of, fold);
     let mut squares = vec![Vec::new(); spreads.len()];
     for row in 0..dataset.rows {
-        let (block, test) = (training.block(row), test.block(row));
-        let samples = Samples::new(&block);
+        let (table, test) = (training.row_table(row), test.row_table(row));
+        let samples = Samples::new(&table);
         let centres = samples.centres(options, row);
         for (squares, &spread) in squares.iter_mut().zip(spreads) {
             let fitted = samples.fit(&centres, &Options { spread, ..*options })?;
@@ -194,7 +197,7 @@ fn baseline_squares(
     test.outputs.squared_errors(&predicted.values)
 }
 
-/// What is trained on and what is held out.
+/// Training part and held-out part of a data set, for one fold.
 fn split(dataset: &Dataset, fold_of: &[usize], fold: usize) -> (Dataset, Dataset) {
     let (held, kept): (Vec<usize>, Vec<usize>) =
         (0..dataset.frames()).partition(|i| fold_of[*i] == fold);
@@ -225,7 +228,7 @@ mod tests {
     use taxel_data::progress::Silent;
     use taxel_data::table::Table;
 
-    /// y follows two inputs; `constant` says nothing.
+    /// Data set whose output y follows two inputs, while `constant` never changes.
     fn dataset(outputs: &[&str]) -> Dataset {
         let mut random = Random::new(3, Stream::Training, Purpose::Noise, 0, 0);
         let (mut inputs, mut values) = (Vec::new(), Vec::new());

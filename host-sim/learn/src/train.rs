@@ -1,15 +1,15 @@
-//! Training: K-means centres, recursive-least-squares output weights.
+//! Training of networks: K-means centres, least-squares output weights.
 //!
-//! Everything here is f64 and gives the same result on any number of threads: work is cut into
-//! pieces by the number of samples alone, and pieces are put together in their order. The result is
-//! rounded once to f32, into a [`FittedNetwork`].
+//! All training is in f64 and gives the same result on any number of threads. The number of samples
+//! alone decides how work is cut into pieces, whose results are merged in order. The network is rounded
+//! once, to the numbers of its format, as a [`FittedNetwork`].
 
 use model_core::projection::Projection;
 use model_core::rbf::Format;
 use model_core::scale::{CLAMP, HALF_RANGE, UNITS, clamp_units};
 use rayon::prelude::*;
 use taxel_data::BadValue;
-use taxel_data::dataset::{Block, Dataset};
+use taxel_data::dataset::{Dataset, RowTable};
 use taxel_data::progress::Progress;
 use taxel_data::random::{Purpose, Random, Stream};
 
@@ -22,31 +22,34 @@ pub mod projection;
 
 pub use format::FittedNetwork;
 
-/// Default of [`Options::initial_covariance`].
+/// Default of [`Options::initial_covariance`]: a penalty of 1e-6, too small to be felt.
 pub const INITIAL_COVARIANCE: f64 = 1e6;
 
-/// Widths for the features of a whole array, which share the largest span of any, over those for a row's
-/// readings: at K = 64 as good, at K = 256 better (`docs/projection.md`).
+/// Factor on the spread for networks of a whole array, relative to those of a row.
+///
+/// Features of a projection share the largest span of any. With this factor K = 64 is as good, and K =
+/// 256 better (`docs/projection.md`).
 pub const WHOLE_ARRAY_SPREAD: f64 = 0.5;
 
-/// How a network is trained.
+/// Options of training.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
-    /// Centres, K. Fewer are used where there are fewer distinct samples.
+    /// Number of centres, K. Fewer are used where there are fewer distinct samples.
     pub centres: usize,
-    /// Width σ of all centres, on scaled inputs.
+    /// Width σ of all Gaussians, on scaled inputs.
     pub spread: f64,
-    /// Whether A·x is added.
+    /// Whether the network adds an affine tail A·x.
     pub affine_tail: bool,
-    /// δ of the recursive least squares: the penalty on squared weights is 1/δ.
+    /// Initial covariance δ of the recursive least squares: the penalty on squared weights is 1/δ.
     pub initial_covariance: f64,
     /// Seed of the K-means starts.
     pub seed: u64,
-    /// How centres are sought.
+    /// Effort of the search for centres.
     pub search: kmeans::Search,
-    /// How numbers are represented.
+    /// Number format of the network.
     pub format: Format,
-    /// One network for all rows, behind a projection of all readings, instead of one a row.
+    /// Whether one network serves all rows, behind a projection of all readings, instead of one network
+    /// a row.
     pub whole_array: bool,
 }
 
@@ -69,7 +72,7 @@ impl Options {
     /// Checks the options against the number of training `frames`.
     ///
     /// # Errors
-    /// The first option that cannot be used.
+    /// [`BadValue`] for the first option that cannot be used.
     pub fn check(&self, frames: usize) -> std::result::Result<(), BadValue> {
         let refused = |rule: String| Err(BadValue::new("centres", self.centres, rule));
         if self.centres == 0 || self.centres > 65_535 {
@@ -87,7 +90,7 @@ impl Options {
 /// Checks a width σ on scaled inputs; `field` names it in the message.
 ///
 /// # Errors
-/// A width that is not positive, or whose 1/(2σ²) does not fit an f32.
+/// [`BadValue`] for a width that is not positive, or whose 1/(2σ²) does not fit an f32.
 pub fn check_spread(field: &str, spread: f64) -> std::result::Result<(), BadValue> {
     let decay = 1.0 / (2.0 * spread * spread);
     if spread > 0.0 && (decay as f32).is_normal() {
@@ -97,21 +100,21 @@ pub fn check_spread(field: &str, spread: f64) -> std::result::Result<(), BadValu
     Err(BadValue::new(field, format!("{spread:?}"), rule))
 }
 
-/// Minimum and span of every input: what scales readings to [0, 1].
+/// Minimum and span of every input, by which readings are scaled to [0, 1].
 #[derive(Debug, Clone, PartialEq)]
 pub struct InputScale {
     minimum: Vec<f64>,
-    /// 0 for an input that never changes.
+    /// One over each input's span; 0 for an input that never changes.
     per_span: Vec<f64>,
 }
 
 impl InputScale {
-    /// The scale of a block's inputs, rounded to what the blob holds.
+    /// Scale of a table's inputs, rounded to the numbers that the blob holds.
     #[must_use]
-    pub fn of(block: &Block) -> Self {
-        // Of the readings as the device has them, in f32.
+    pub fn of(table: &RowTable) -> Self {
+        // Ranges of the readings in f32, as the device has them.
         let ranges: Vec<[f32; 2]> =
-            block.input_ranges().iter().map(|range| range.map(|v| v as f32)).collect();
+            table.input_ranges().iter().map(|range| range.map(|v| v as f32)).collect();
         let per_span = |[low, high]: &[f32; 2]| {
             let per_span = 1.0 / (high - low);
             if per_span.is_finite() { f64::from(per_span) } else { 0.0 }
@@ -122,34 +125,34 @@ impl InputScale {
         }
     }
 
-    /// Lines of `readings` scaled (and clamped as on the device).
+    /// Scales `readings` (`samples × inputs`) to [0, 1], and clamps them like the device does.
     #[must_use]
     pub fn apply(&self, readings: &[f64]) -> Vec<f64> {
-        let limits = || self.minimum.iter().zip(&self.per_span);
+        let ranges = || self.minimum.iter().zip(&self.per_span);
         let [low, high] = CLAMP.map(f64::from);
         let scaled = |line: &[f64]| -> Vec<f64> {
             let scale = |(value, (minimum, per_span)): (&f64, (&f64, &f64))| {
                 ((f64::from(*value as f32) - minimum) * per_span).clamp(low, high)
             };
-            line.iter().zip(limits()).map(scale).collect()
+            line.iter().zip(ranges()).map(scale).collect()
         };
         readings.chunks_exact(self.minimum.len().max(1)).flat_map(scaled).collect()
     }
 }
 
-/// Middle of every input's range, and the units in one unit of it: what the formats with expanded distances
-/// scale readings by.
+/// Middle of every input's range, and scale about it: the scaling of the formats with expanded
+/// distances.
 #[derive(Debug, Clone, PartialEq)]
 struct CentredScale {
     midpoint: Vec<f32>,
-    /// [`UNITS`] in a unit of the reading; 0 for an input that never changes.
+    /// Number of [`UNITS`] in one unit of the reading; 0 for an input that never changes.
     per_unit: Vec<f32>,
 }
 
 impl CentredScale {
-    fn of(block: &Block) -> Self {
+    fn of(table: &RowTable) -> Self {
         let range = |range: [f64; 2]| range.map(|v| f64::from(v as f32));
-        let ranges = || block.input_ranges().into_iter().map(range);
+        let ranges = || table.input_ranges().into_iter().map(range);
         let per_unit = |[low, high]: [f64; 2]| {
             let per_unit = (f64::from(UNITS) / (f64::from(HALF_RANGE) * (high - low))) as f32;
             if per_unit.is_finite() { per_unit } else { 0.0 }
@@ -164,43 +167,46 @@ impl CentredScale {
         self.per_unit.iter().map(|per_unit| *per_unit == 0.0)
     }
 
-    /// All inputs of `block` as the device scales them, before its clamp, line after line.
-    fn units<'a>(&'a self, block: &'a Block) -> impl Iterator<Item = f32> + 'a {
-        block.inputs.lines().flat_map(|line| {
-            let limits = self.midpoint.iter().zip(&self.per_unit);
-            line.iter().zip(limits).map(|(r, (middle, per_unit))| (*r as f32 - middle) * per_unit)
+    /// Scales all inputs of `table` like the device does before its clamp, line after line.
+    fn units<'a>(&'a self, table: &'a RowTable) -> impl Iterator<Item = f32> + 'a {
+        table.inputs.lines().flat_map(|line| {
+            let ranges = self.midpoint.iter().zip(&self.per_unit);
+            line.iter().zip(ranges).map(|(r, (middle, per_unit))| (*r as f32 - middle) * per_unit)
         })
     }
 
-    /// All inputs of `block` scaled to [0, 1] and clamped, line after line.
-    fn apply(&self, block: &Block) -> Vec<f64> {
+    /// Scales all inputs of `table` to [0, 1] and clamps them, line after line.
+    fn apply(&self, table: &RowTable) -> Vec<f64> {
         let spans = f64::from(HALF_RANGE) / f64::from(UNITS);
-        self.units(block).map(|x| 0.5 + f64::from(clamp_units(x)) * spans).collect()
+        self.units(table).map(|x| 0.5 + f64::from(clamp_units(x)) * spans).collect()
     }
 }
 
-/// Samples of one network, with their inputs scaled.
+/// Samples of one network, with their inputs scaled to [0, 1].
 #[derive(Debug, Clone)]
 pub struct Samples<'b> {
     pub(crate) scale: InputScale,
-    /// Scaled inputs, sample after sample.
+    /// Scaled inputs, `samples × inputs`.
     pub(crate) scaled: Vec<f64>,
-    pub(crate) block: &'b Block,
+    pub(crate) table: &'b RowTable,
 }
 
 impl<'b> Samples<'b> {
-    /// Scales the inputs of `block` to [0, 1].
+    /// Scales the inputs of `table` to [0, 1].
     #[must_use]
-    pub fn new(block: &'b Block) -> Self {
-        let scale = InputScale::of(block);
-        Self { scaled: scale.apply(&block.inputs.values), scale, block }
+    pub fn new(table: &'b RowTable) -> Self {
+        let scale = InputScale::of(table);
+        Self { scaled: scale.apply(&table.inputs.values), scale, table }
     }
 
     pub(crate) fn inputs(&self) -> usize {
-        self.block.inputs.names.len()
+        self.table.inputs.names.len()
     }
 
-    /// K-means centres of these samples, rounded to what the blob holds.
+    /// K-means centres of these samples (`centres × inputs`), rounded to the numbers that the blob
+    /// holds.
+    ///
+    /// `part` numbers the network, so that each draws its own starting points.
     #[must_use]
     pub fn centres(&self, options: &Options, part: usize) -> Vec<f64> {
         let mut random =
@@ -210,48 +216,51 @@ impl<'b> Samples<'b> {
         found.centres.into_iter().map(|c| f64::from(c as f32)).collect()
     }
 
-    /// Output weights for given `centres`, by least squares over the samples, for the format that
-    /// `options` ask for.
+    /// Fits output weights to the samples for given `centres` (`centres × inputs`, on scaled inputs), by
+    /// least squares, in the format that `options` ask for.
     ///
     /// # Errors
-    /// A fit that the format does not hold.
+    /// [`Error`](crate::Error) if the format does not hold the network.
     pub fn fit(&self, centres: &[f64], options: &Options) -> Result<FittedNetwork> {
         format::fit(self, centres, options)
     }
 }
 
-/// What training makes of a data set.
+/// Result of training on a data set.
 #[derive(Debug, Clone)]
 pub struct Trained {
-    /// What stands between all readings and the one network of all rows; see [`projection`].
+    /// Parameters of the projection in front of the one network of all rows; see [`projection`].
     pub projection: Option<Vec<f32>>,
-    /// One network a row-wire, or one for all behind the projection.
+    /// Networks of the row-wires in order, or the one network behind the projection.
     pub networks: Vec<FittedNetwork>,
 }
 
-/// Trains one network a row-wire of `dataset`, or one for all of them, all of one format: direct distances if
-/// [`Format::F32`] is asked for and one row's bound does not prove expanded ones harmless.
+/// Trains one network for each row-wire of `dataset`, or one for all of them.
+///
+/// All networks have one format. Direct distances replace [`Format::F32`] if the rounding of expanded
+/// ones is not proved harmless for every row.
 ///
 /// # Errors
-/// Options that do not fit the data, and data that does not fit the format.
+/// [`Error::Setting`](crate::Error::Setting) for options that do not fit the data; other
+/// [`Error`](crate::Error)s for data that does not fit the format.
 pub fn train(dataset: &Dataset, options: &Options, progress: &dyn Progress) -> Result<Trained> {
     options.check(dataset.frames())?;
     if !options.whole_array {
         return Ok(Trained { projection: None, networks: train_rows(dataset, options, progress)? });
     }
-    let block = projection::fit(dataset)?;
-    let seen = projection::apply(view(&block, dataset), dataset);
-    Ok(Trained { networks: train_rows(&seen, options, progress)?, projection: Some(block) })
+    let parameters = projection::fit(dataset)?;
+    let seen = projection::apply(view(&parameters, dataset), dataset);
+    Ok(Trained { networks: train_rows(&seen, options, progress)?, projection: Some(parameters) })
 }
 
-/// The projection of `dataset`'s readings that `block` holds.
+/// Projection of `dataset`'s readings with the given `parameters`.
 ///
 /// # Panics
-/// If it is not as long as [`projection::fit`] makes it for this data set.
+/// If `parameters` are not as many as [`projection::fit`] makes for this data set.
 #[must_use]
-pub fn view<'b>(block: &'b [f32], dataset: &Dataset) -> Projection<'b> {
+pub fn view<'b>(parameters: &'b [f32], dataset: &Dataset) -> Projection<'b> {
     let readings = dataset.inputs.names.len();
-    Projection::new(readings, readings / dataset.rows, block)
+    Projection::new(readings, readings / dataset.rows, parameters)
         .expect("a projection of these readings")
 }
 
@@ -264,8 +273,8 @@ fn train_rows(
     let fit_rows = |options: &Options| -> Result<Vec<FittedNetwork>> {
         let rows = (0..dataset.rows).into_par_iter();
         rows.map(|row| {
-            let block = dataset.block(row);
-            let samples = Samples::new(&block);
+            let table = dataset.row_table(row);
+            let samples = Samples::new(&table);
             let centres = samples.centres(options, row);
             let fitted = samples.fit(&centres, options);
             progress.step();
@@ -282,7 +291,7 @@ fn train_rows(
     fit_rows(&Options { format: Format::F32Direct, ..*options })
 }
 
-/// ‖a − b‖².
+/// Squared distance ‖a − b‖².
 #[inline(always)]
 #[expect(clippy::inline_always, reason = "`simd::widest` runs it")]
 pub(crate) fn squared_distance(a: &[f64], b: &[f64]) -> f64 {

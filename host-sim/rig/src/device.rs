@@ -1,7 +1,8 @@
 //! A device at the other end of a serial line, real or emulated.
 //!
-//! [`Device`] asks and hears; [`upload`] exchanges its model; [`stream`] lets it decode frames;
-//! [`check`] and [`scan`] hold it to the host. `docs/link.md` specifies what they say to each other.
+//! [`Device`] sends requests and receives reports; [`upload`] replaces its model; [`stream`] lets it
+//! decode frames; [`check`] and [`scan`] compare it with the host. `docs/link.md` specifies the
+//! protocol.
 
 use std::collections::VecDeque;
 use std::io::{ErrorKind, Read, Write};
@@ -24,25 +25,25 @@ mod expected;
 pub mod scan;
 pub mod check;
 
-/// How long a board's answer may take, but for those that erase flash.
+/// Longest time that a board takes to answer a request that erases no flash.
 const ANSWER: Duration = Duration::from_millis(500);
-/// How long a device takes to start.
+/// Time that a device takes to start.
 const START: Duration = Duration::from_millis(100);
-/// How often a request is sent before its device is given up.
+/// Number of times that a request is sent before the device is given up.
 const ATTEMPTS: u32 = 6;
-/// How long a request may take to be sent.
+/// Longest time that sending a request may take.
 const SLOWEST_WRITE: Duration = Duration::from_secs(10);
-/// Longest request.
+/// Largest size of a request.
 const MOST_REQUEST_BYTES: usize = 4096;
-/// How long one look for bytes waits.
+/// Time that one look for bytes waits.
 const GLANCE: Duration = Duration::from_millis(5);
 
-/// A line of bytes.
+/// Line of bytes to a device.
 pub trait Wire: Read + Write {
-    /// Lets reads end after `timeout` where nothing has come.
+    /// Lets reads end after `timeout` if nothing has come.
     ///
     /// # Errors
-    /// The system's.
+    /// Error of the system if the timeout cannot be set.
     fn set_read_timeout(&mut self, timeout: Duration) -> std::io::Result<()>;
 }
 
@@ -52,33 +53,33 @@ impl Wire for TcpStream {
     }
 }
 
-/// Who a device says it is.
+/// Identity that a device reports.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DeviceIdentity {
     /// Name of the board.
     pub board: String,
     /// Version of its firmware.
     pub firmware: String,
-    /// Row-wires.
+    /// Number of row-wires.
     pub rows: usize,
-    /// Readings a row.
+    /// Number of readings in a row.
     pub columns: usize,
-    /// Outputs a row.
+    /// Number of outputs of a row.
     pub outputs: usize,
-    /// Exponential that it decodes with.
+    /// Name of the exponential that it decodes with.
     pub kernel: String,
-    /// The model in force.
+    /// Active model, if there is one.
     pub model: Option<ModelIdentity>,
-    /// Bytes of blob that a slot holds.
+    /// Largest blob that a slot holds, in bytes.
     pub slot_bytes: usize,
-    /// Most bytes of one chunk of an upload.
+    /// Largest chunk of an upload, in bytes.
     pub chunk_bytes: usize,
-    /// Where its flash and RAM go.
+    /// Use of its flash and RAM.
     pub memory: Memory,
 }
 
 impl DeviceIdentity {
-    /// Whether the model of that CRC-32 is in force.
+    /// Whether the model with that CRC-32 is active.
     #[must_use]
     pub fn has_in_force(&self, crc_32: u32) -> bool {
         self.model.is_some_and(|found| found.crc_32 == crc_32)
@@ -102,26 +103,26 @@ impl From<&Identity<'_>> for DeviceIdentity {
     }
 }
 
-/// The host's end of the line.
+/// Host's end of the line to a device.
 pub struct Device<W> {
     wire: W,
     receiver: Box<Receiver<4096>>,
-    /// Bytes read and not looked at yet.
+    /// Bytes that were read and not looked at yet.
     pending: VecDeque<u8>,
     number: u16,
-    /// How long an answer may take.
+    /// Longest time that an answer may take.
     pub patience: Duration,
-    /// Frames of bytes that arrived damaged.
+    /// Number of frames of bytes that arrived damaged.
     pub damaged: u64,
-    /// Requests that had to be sent again.
+    /// Number of requests that had to be sent again.
     pub repeated: u64,
 }
 
 impl<W: Wire> Device<W> {
-    /// A device on `wire`; nothing is sent yet.
+    /// Device on `wire`; nothing is sent yet.
     ///
     /// # Errors
-    /// An [`Error`] if the wire takes no timeout.
+    /// [`Error::Line`] if the wire takes no timeout.
     pub fn new(mut wire: W) -> Result<Self> {
         wire.set_read_timeout(GLANCE)?;
         let receiver = Box::new(Receiver::new());
@@ -129,16 +130,16 @@ impl<W: Wire> Device<W> {
         Ok(Self { wire, receiver, pending, number: 0, patience: ANSWER, damaged: 0, repeated: 0 })
     }
 
-    /// Sends bytes as they are.
+    /// Sends `bytes` unframed, as they are.
     ///
     /// # Errors
-    /// An [`Error`].
+    /// [`Error::Line`] if the line fails, or takes no bytes for too long.
     pub fn send_raw(&mut self, bytes: &[u8]) -> Result<()> {
         let (mut rest, start) = (bytes, Instant::now());
         while !rest.is_empty() {
             match self.wire.write(rest) {
                 Ok(count) => rest = &rest[count..],
-                // A slow line takes them by and by.
+                // A slow line takes them little by little.
                 Err(cause) if is_timeout(&cause) && start.elapsed() < SLOWEST_WRITE => {}
                 Err(cause) => return Err(cause.into()),
             }
@@ -146,21 +147,21 @@ impl<W: Wire> Device<W> {
         Ok(self.wire.flush()?)
     }
 
-    /// Sends a request under a number of its own, which is returned.
+    /// Sends a request with a new number, and returns the number.
     ///
     /// # Errors
-    /// An [`Error`].
+    /// [`Error::RequestTooLong`], or [`Error::Line`] if the line fails.
     pub fn send(&mut self, request: &Request<'_>) -> Result<u16> {
         self.number = self.number.checked_add(1).unwrap_or(packet::UNASKED + 1);
         self.send_raw(&request_bytes(self.number, request)?)?;
         Ok(self.number)
     }
 
-    /// Passes reports to `read`, with their numbers, until it answers; `None` once `deadline` has
+    /// Passes reports with their numbers to `read` until it returns a value; `None` once `deadline` has
     /// passed.
     ///
     /// # Errors
-    /// An [`Error`] if the line fails.
+    /// [`Error::Line`] or [`Error::Closed`] if the line fails.
     pub fn hear<T>(
         &mut self,
         deadline: Instant,
@@ -193,16 +194,18 @@ impl<W: Wire> Device<W> {
                 Err(cause) if is_timeout(&cause) => {}
                 Err(cause) => return Err(cause.into()),
             }
-            // Looked at after reading, so that even a deadline of now takes what is there; and whether
-            // or not bytes have come, since a device that scans never pauses for long.
+            // The time is looked at after reading, so that even a deadline of now takes the bytes that
+            // are there. Bytes that came do not prolong it, since a device that scans never pauses for
+            // long.
             is_last_look = Instant::now() >= deadline;
         }
     }
 
-    /// Asks until there is an answer; the device's refusal is an answer too.
+    /// Sends `request` until the device answers; its refusal is an answer too.
     ///
     /// # Errors
-    /// An [`Error`] if there is none, or another than `read` takes.
+    /// [`Error::NoAnswer`] if there is none, [`Error::Unexpected`] for an answer that `read` does not
+    /// take.
     pub fn ask<T>(
         &mut self,
         request: &Request<'_>,
@@ -229,10 +232,10 @@ impl<W: Wire> Device<W> {
         Err(Error::NoAnswer { attempts: ATTEMPTS, timeout })
     }
 
-    /// Asks for what no device of this protocol refuses.
+    /// Sends a `request` that no device of this protocol refuses, until the device answers.
     ///
     /// # Errors
-    /// An [`Error`] if it does, or does not answer.
+    /// [`Error::Refused`] if it does refuse, or the errors of [`ask`](Self::ask).
     pub fn ask_plainly<T>(
         &mut self,
         request: &Request<'_>,
@@ -241,10 +244,10 @@ impl<W: Wire> Device<W> {
         self.ask(request, self.patience, read)?.map_err(Error::Refused)
     }
 
-    /// Who the device is.
+    /// Asks the device for its identity.
     ///
     /// # Errors
-    /// An [`Error`] if it does not answer.
+    /// Errors of [`ask`](Self::ask), such as [`Error::NoAnswer`].
     pub fn identify(&mut self) -> Result<DeviceIdentity> {
         self.ask_plainly(&Request::Identify, |report| match report {
             Report::Identity(identity) => Some(identity.into()),
@@ -252,10 +255,10 @@ impl<W: Wire> Device<W> {
         })
     }
 
-    /// The device's counters.
+    /// Asks for the device's counters.
     ///
     /// # Errors
-    /// An [`Error`] if it does not answer.
+    /// Errors of [`ask`](Self::ask), such as [`Error::NoAnswer`].
     pub fn statistics(&mut self) -> Result<firmware::link::message::Statistics> {
         self.ask_plainly(&Request::Statistics, |report| match report {
             Report::Statistics(statistics) => Some(*statistics),
@@ -263,10 +266,10 @@ impl<W: Wire> Device<W> {
         })
     }
 
-    /// The configuration in force.
+    /// Asks for the active configuration.
     ///
     /// # Errors
-    /// An [`Error`] if the device does not answer.
+    /// Errors of [`ask`](Self::ask), such as [`Error::NoAnswer`].
     pub fn configuration(&mut self) -> Result<Configuration> {
         self.ask_plainly(&Request::Configuration, |report| match report {
             Report::Configuration(configuration) => Some(*configuration),
@@ -274,21 +277,21 @@ impl<W: Wire> Device<W> {
         })
     }
 
-    /// Puts `configuration` in force.
+    /// Sends `configuration` and makes it the active one.
     ///
     /// # Errors
-    /// An [`Error`] if the device refuses it, or does not answer.
+    /// [`Error::Refused`] if the device refuses it, or the errors of [`ask`](Self::ask).
     pub fn configure(&mut self, configuration: Configuration) -> Result<()> {
         self.ask_plainly(&Request::Configure(configuration), |report| {
             matches!(report, Report::Configuration(_)).then_some(())
         })
     }
 
-    /// Does `work` while the device scans nothing, so that nothing comes unasked; afterwards, whatever
-    /// became of it, the configuration is again what it was.
+    /// Runs `work` while the device does not scan, so that no reports come unasked. The former
+    /// configuration is restored afterwards, even if the work failed.
     ///
     /// # Errors
-    /// An [`Error`] if the device does not answer, or what `work` returns.
+    /// Errors of [`ask`](Self::ask), or whatever error `work` returns.
     pub fn while_paused<T, E: From<Error>>(
         &mut self,
         work: impl FnOnce(&mut Self) -> std::result::Result<T, E>,
@@ -308,12 +311,12 @@ impl<W: Wire> Device<W> {
     /// Restarts the device and waits until it answers again.
     ///
     /// # Errors
-    /// An [`Error`] if it does not.
+    /// [`Error::NoAnswer`] if the device does not answer in time.
     pub fn restart(&mut self) -> Result<DeviceIdentity> {
         self.ask_plainly(&Request::Restart, |report| {
             matches!(report, Report::Restarting).then_some(())
         })?;
-        // What arrives while it starts is lost: that is no fault of the line.
+        // Bytes that arrive while it starts are lost, which is no fault of the line.
         let (patience, repeated) = (self.patience, self.repeated);
         let start = Instant::now();
         self.patience = START;
@@ -326,10 +329,10 @@ impl<W: Wire> Device<W> {
     }
 }
 
-/// The bytes of a request.
+/// Bytes of a request, framed for the line.
 ///
 /// # Errors
-/// [`Error::RequestTooLong`].
+/// [`Error::RequestTooLong`] for a request of more than 4096 bytes.
 pub fn request_bytes(number: u16, request: &Request<'_>) -> Result<Vec<u8>> {
     let mut buffer = [0; MOST_REQUEST_BYTES];
     let packet = packet::encode(number, request, &mut buffer)

@@ -1,4 +1,5 @@
-//! The device's image in QEMU's mps2-an386, a Cortex-M4F, with its serial lines here.
+//! Emulated device: the firmware's image in QEMU's mps2-an386, a Cortex-M4F, with its serial lines
+//! connected.
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read, Write};
@@ -11,33 +12,34 @@ use crate::device::Wire;
 use crate::error::{Error, Result};
 use crate::mailbox::{FILE_BYTES, Mailbox};
 
-/// Where the image expects its first model slot.
+/// Address at which the image expects its first model slot.
 const SLOT_ADDRESS: u32 = 0x0020_0000;
-/// How long QEMU may take to start.
+/// Longest time that QEMU may take to start.
 const START: Duration = Duration::from_secs(20);
 
-/// How to start the emulator.
+/// Options of the emulator.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// The program, by name or path.
+    /// QEMU's program, by name or path.
     pub qemu: PathBuf,
-    /// The image, an ELF file.
+    /// Path of the image, an ELF file.
     pub image: PathBuf,
-    /// A blob to lie in the first slot from the start.
+    /// Path of a blob that lies in the first slot from the start.
     pub model: Option<PathBuf>,
-    /// Where the image's log goes, as defmt writes it; nowhere if not given.
+    /// Path for the image's log, in defmt's encoding; no log if not given.
     pub log: Option<PathBuf>,
-    /// Where the file of a mailbox lies while the emulator runs; without it the link is on the first UART.
+    /// Path for the file of a mailbox while the emulator runs; without it the link is on the first UART.
     pub mailbox: Option<PathBuf>,
     /// Whether the readout's line is wanted.
     pub readout: bool,
 }
 
 impl Options {
-    /// Fails early where [`Emulator::start`] could not start.
+    /// Checks that [`Emulator::start`] can find an image, before long work.
     ///
     /// # Errors
-    /// [`Error::NoImage`], [`Error::NotElf`].
+    /// [`Error::NoImage`] for an image that cannot be read, [`Error::NotElf`] for a file that is no
+    /// program.
     pub fn check(&self) -> Result<()> {
         let mut magic = [0; 4];
         let opened = File::open(&self.image).and_then(|mut file| file.read_exact(&mut magic));
@@ -49,26 +51,26 @@ impl Options {
     }
 }
 
-/// The image's serial lines.
+/// Serial lines of the image.
 #[derive(Debug)]
 pub struct Lines {
-    /// That of the link.
+    /// Line of the link.
     pub link: Link,
-    /// The second UART, of the readout, if it was wanted.
+    /// Second UART, of the readout, if it was wanted.
     pub readout: Option<TcpStream>,
 }
 
-/// The line of the link.
+/// Line that carries the link.
 #[derive(Debug)]
 pub enum Link {
-    /// Through shared memory.
+    /// Mailbox in shared memory.
     Mailbox {
-        /// What carries the bytes.
+        /// Mailbox that carries the bytes.
         mailbox: Mailbox,
-        /// The first UART, which is silent, and closed when the emulator ends.
+        /// First UART, which is silent, and closed when the emulator ends.
         uart: TcpStream,
     },
-    /// Through the first UART.
+    /// First UART.
     Uart(TcpStream),
 }
 
@@ -114,7 +116,7 @@ impl Wire for Link {
     }
 }
 
-/// Whether the other end of a socket that does not block is closed.
+/// Whether the other end of a non-blocking socket is closed.
 fn is_closed(stream: &TcpStream) -> bool {
     match stream.peek(&mut [0]) {
         Ok(count) => count == 0,
@@ -122,20 +124,20 @@ fn is_closed(stream: &TcpStream) -> bool {
     }
 }
 
-/// A running emulator; it ends with this value.
+/// Running emulator; it ends when this value is dropped.
 #[derive(Debug)]
 pub struct Emulator {
     child: Child,
     _shared: Option<SharedFile>,
 }
 
-/// A mailbox's file, which goes with this value.
+/// File of a mailbox, removed when this value is dropped.
 #[derive(Debug)]
 struct SharedFile(PathBuf);
 
 impl Drop for SharedFile {
     fn drop(&mut self) {
-        // Somebody may have tidied up.
+        // The file may have been removed already.
         let _ = std::fs::remove_file(&self.0);
     }
 }
@@ -144,7 +146,8 @@ impl Emulator {
     /// Starts QEMU and connects to the image's serial lines.
     ///
     /// # Errors
-    /// QEMU or the image is missing, or QEMU does not start.
+    /// [`Error::NoQemu`], [`Error::NoImage`] or [`Error::NotElf`] if a file is missing or wrong,
+    /// [`Error::Mailbox`] if its file cannot be made, or [`Error::NoStart`].
     pub fn start(options: &Options) -> Result<(Self, Lines)> {
         options.check()?;
         let failed = |cause| Error::NoStart { qemu: options.qemu.clone(), cause };
@@ -203,7 +206,7 @@ impl Emulator {
 
 impl Drop for Emulator {
     fn drop(&mut self) {
-        // It may have ended by itself.
+        // QEMU may have ended by itself.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -213,7 +216,7 @@ fn create_mailbox(path: &Path) -> Result<Mailbox> {
     Mailbox::create(path).map_err(|cause| Error::Mailbox { path: path.into(), cause })
 }
 
-/// The machine, its PSRAM in the file at `mailbox` if that is given.
+/// Arguments that choose the machine, with its PSRAM in the file at `mailbox` if that is given.
 fn machine(mailbox: Option<&Path>) -> Vec<String> {
     let Some(path) = mailbox else { return ["-M", "mps2-an386"].map(String::from).to_vec() };
     let file = format!("mem-path={},share=on", escaped(path));
@@ -221,7 +224,7 @@ fn machine(mailbox: Option<&Path>) -> Vec<String> {
     ["-M", "mps2-an386,memory-backend=psram", "-object", &memory].map(String::from).to_vec()
 }
 
-/// QEMU reads a comma as the end of an option unless it is doubled.
+/// Path as QEMU's options need it: a comma would end an option unless it is doubled.
 fn escaped(path: &Path) -> String {
     path.display().to_string().replace(',', ",,")
 }

@@ -1,4 +1,4 @@
-//! A serial line through memory that this program shares with the image in the emulator.
+//! Mailbox: a serial line through memory that this program shares with the image in the emulator.
 //!
 //! QEMU keeps the machine's PSRAM in a file. This end of the line reads and writes that file; the image's
 //! end (`firmware/qemu/src/mailbox.rs`) reads and writes the memory. `docs/emulator.md` has the layout: two
@@ -9,8 +9,8 @@
 //! - A position is written in two steps, the lower byte first. In between it is at most the new position, so
 //!   the image takes no byte that is not there yet. It may be less than the old position; the image then
 //!   waits.
-//! - A position is read until two readings agree. The position only grows, and by less than one round while
-//!   it is read. So an upper byte that is the same in both readings was in force between them; with the
+//! - A position is read until two readings agree. The position only grows, and by less than one round
+//!   while it is read. So an upper byte that is the same in both readings was valid between them; with the
 //!   lower byte of the second reading it makes a position that the image has reached.
 
 use std::fs::{File, OpenOptions};
@@ -22,44 +22,44 @@ use std::time::{Duration, Instant};
 
 use crate::device::Wire;
 
-/// First bytes of the file: they tell the image that there is a mailbox.
+/// First bytes of the file, by which the image knows that there is a mailbox.
 const MAGIC: [u8; 8] = *b"taxelbox";
-/// Bytes that each ring holds: a power of two, at most 2¹⁵.
+/// Size of each ring in bytes: a power of two, at most 2¹⁵.
 const CAPACITY: u16 = 0x4000;
-/// Bytes of the machine's PSRAM, and so of the file.
+/// Size of the machine's PSRAM in bytes, and so of the file.
 pub const FILE_BYTES: u64 = 16 << 20;
 
-/// The first pause while there is nothing to do; every further one is twice as long.
+/// First pause while there is nothing to do; each further pause is twice as long.
 const SHORTEST_PAUSE: Duration = Duration::from_micros(20);
-/// The longest pause: it adds to the time of an answer after a rest.
+/// Longest pause, which delays the first answer after a quiet time.
 const LONGEST_PAUSE: Duration = Duration::from_millis(1);
 
-/// Where a ring lies in the file.
+/// Layout of a ring in the file: offsets in bytes.
 struct Ring {
-    /// Position of the writer.
+    /// Offset of the writer's position.
     written: u64,
-    /// Position of the reader.
+    /// Offset of the reader's position.
     read: u64,
     bytes: u64,
 }
 
-/// From this program to the image.
+/// Ring from this program to the image.
 const TO_IMAGE: Ring = Ring { written: 0x40, read: 0x80, bytes: 0x1000 };
-/// From the image to this program.
+/// Ring from the image to this program.
 const TO_HOST: Ring = Ring { written: 0xC0, read: 0x100, bytes: 0x5000 };
 
-/// Bytes that another program reads and writes at the same time.
+/// Bytes of memory that another program reads and writes at the same time.
 pub trait SharedBytes {
-    /// Fills `bytes` from `place` on.
+    /// Fills `bytes` with the memory from offset `place` on.
     ///
     /// # Errors
-    /// The system's.
+    /// Error of the system.
     fn read_at(&mut self, bytes: &mut [u8], place: u64) -> io::Result<()>;
 
-    /// Writes `bytes` from `place` on.
+    /// Writes `bytes` to the memory from offset `place` on.
     ///
     /// # Errors
-    /// The system's.
+    /// Error of the system.
     fn write_at(&mut self, bytes: &[u8], place: u64) -> io::Result<()>;
 }
 
@@ -75,7 +75,7 @@ impl SharedBytes for File {
     }
 }
 
-/// This program's end of the line.
+/// Host's end of the line.
 #[derive(Debug)]
 pub struct Mailbox<S = File> {
     shared: S,
@@ -90,7 +90,7 @@ impl Mailbox {
     /// Lays out a mailbox in a new file at `path`, before the emulator is started with it.
     ///
     /// # Errors
-    /// The system's; a file that is there already is one.
+    /// Error of the system; a file that exists already is one.
     pub fn create(path: &Path) -> io::Result<Self> {
         let file = OpenOptions::new().read(true).write(true).create_new(true).open(path)?;
         file.set_len(FILE_BYTES)?;
@@ -102,13 +102,13 @@ impl<S: SharedBytes> Mailbox<S> {
     /// Lays out a mailbox in `shared`, which holds zeros.
     ///
     /// # Errors
-    /// The system's.
+    /// Error of the system.
     pub fn new(mut shared: S) -> io::Result<Self> {
         shared.write_at(&MAGIC, 0)?;
         Ok(Self { shared, written: 0, read: 0, timeout: Duration::ZERO })
     }
 
-    /// A position that the image writes.
+    /// Reads a position that the image writes.
     fn position(&mut self, place: u64) -> io::Result<u16> {
         let mut read = || {
             let mut bytes = [0; 2];
@@ -135,7 +135,7 @@ impl<S: SharedBytes> Mailbox<S> {
         self.shared.write_at(&[upper], place + 1)
     }
 
-    /// Bytes between two positions of a ring.
+    /// Number of bytes between two positions of a ring.
     fn between(written: u16, read: u16) -> io::Result<u16> {
         let bytes = written.wrapping_sub(read);
         if bytes > CAPACITY {
@@ -147,7 +147,7 @@ impl<S: SharedBytes> Mailbox<S> {
         Ok(bytes)
     }
 
-    /// Receives what there is, without waiting.
+    /// Receives the bytes that are there, without waiting.
     fn try_read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
         let there = Self::between(self.position(TO_HOST.written)?, self.read)?;
         let count = bytes.len().min(there.into());
@@ -164,7 +164,7 @@ impl<S: SharedBytes> Mailbox<S> {
         Ok(count)
     }
 
-    /// Sends what there is room for, without waiting.
+    /// Sends as many bytes as there is room for, without waiting.
     fn try_write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let there = Self::between(self.written, self.position(TO_IMAGE.read)?)?;
         let count = bytes.len().min((CAPACITY - there).into());
@@ -181,7 +181,7 @@ impl<S: SharedBytes> Mailbox<S> {
         Ok(count)
     }
 
-    /// Tries until something was done or the time is over, with pauses that grow.
+    /// Tries until something was done or the time is over, with growing pauses.
     fn wait(
         &mut self,
         mut attempt: impl FnMut(&mut Self) -> io::Result<usize>,
@@ -203,7 +203,7 @@ impl<S: SharedBytes> Mailbox<S> {
     }
 }
 
-/// `count` bytes from `position` on: how many lie before the ring's end, and how many at its start.
+/// Splits `count` bytes from `position` on into those before the ring's end and those at its start.
 fn split(count: usize, position: u16) -> (usize, usize) {
     let before_end = usize::from(CAPACITY - position % CAPACITY);
     let first = count.min(before_end);

@@ -1,4 +1,4 @@
-//! The forward model over a file: deformations in, ideal readings out.
+//! Forward model over a file: deformations in, ideal readings out.
 
 use rayon::prelude::*;
 use taxel_data::csv_file::CsvFile;
@@ -8,11 +8,14 @@ use taxel_data::simd::{self, LANES};
 use crate::sensor::{LaneModel, Scratch};
 use crate::world::World;
 
-/// Ideal readings in Ω of the rows that `world` reads, for the deformations in `file`, line after line; a missing
-/// deformation makes its row's readings NaN.
+/// Ideal readings in Ω of the rows that `world` reads, for the deformations in `file`: `lines ×
+/// readings`, line after line.
+///
+/// A missing deformation makes its row's readings NaN.
 ///
 /// # Errors
-/// A column that is missing, or a deformation that the model does not hold for.
+/// [`Error::File`](taxel_data::Error::File) for a column that is missing, or a deformation for which the
+/// model does not hold.
 pub fn forward(world: &World, file: &CsvFile) -> taxel_data::Result<Vec<f64>> {
     let sensor = &world.sensor;
     let mut columns = Vec::new();
@@ -24,7 +27,7 @@ pub fn forward(world: &World, file: &CsvFile) -> taxel_data::Result<Vec<f64>> {
     for line in 0..file.lines() {
         for &column in columns.iter().flatten() {
             let value = file.value(line, column);
-            // A missing one passes: its row's readings will be missing.
+            // A missing deformation passes: its row's readings will be missing.
             if !value.is_nan() && !sensor.holds_for(value) {
                 let problem = Problem::OutOfBound {
                     line: file.line_number(line),
@@ -55,13 +58,13 @@ pub fn forward(world: &World, file: &CsvFile) -> taxel_data::Result<Vec<f64>> {
 struct Forward<'a> {
     world: &'a World,
     file: &'a CsvFile,
-    /// Where each row's deformations stand in the file, by electrode and axis.
+    /// Indices in the file of each row's deformations, by electrode and axis.
     columns: &'a [Vec<usize>],
     model: LaneModel<'a>,
 }
 
 impl Forward<'_> {
-    /// The lines from number `first` on, at most [`LANES`].
+    /// Computes the lines from number `first` on, at most [`LANES`].
     #[inline(always)]
     fn lines(&self, scratch: &mut Scratch, first: usize, readings: &mut [f64]) {
         let Self { world, file, columns, model } = self;

@@ -1,6 +1,6 @@
-//! One enum of all kinds that implement a trait, so that a new kind is a file and an entry in a list.
+//! Enums of all kinds that implement a trait, so that a new kind is a file and an entry in a list.
 
-/// Makes the enum `Kind` of types that implement a trait; a scene names each by its type, in lower case.
+/// Makes the enum `Kind` of types that implement a trait; a scene names each type in lower case.
 macro_rules! kinds {
     ($(#[$doc:meta])* $trait:ident: $($kind:ident),+) => {
         $(#[$doc])*

@@ -1,8 +1,8 @@
-//! What a resistive tactile sensor reads, simulated: the ideal sensor of Wang et al. (2014), how it is
-//! moved, the noise on its readings, and the circuit that reads it.
+//! Simulation of a resistive tactile sensor: the ideal sensor of Wang et al. (2014), its motion, the
+//! noise on its readings, and the circuit that reads it.
 //!
-//! A [`World`] says what there is; [`Synthesis`] draws frames of it. Nothing that a world does not ask for is
-//! computed. Modules stand from the ground up; each imports only what stands before it.
+//! A [`World`] holds the settings; [`Synthesis`] draws frames of it. Nothing that a world does not ask
+//! for is computed. Modules stand from the ground up; each imports only what stands before it.
 //!
 //! ```
 //! use taxel_data::random::Stream;

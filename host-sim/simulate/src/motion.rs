@@ -1,7 +1,7 @@
-//! How electrodes are moved: one file a kind of motion, each an implementation of [`Motion`].
+//! Motions of the electrodes: one file a kind of motion, each an implementation of [`Motion`].
 //!
-//! A lane of the synthesis is a *trajectory* of [`Motion::steps`] steps, and a frame is read at each step.
-//! Today's kinds draw every frame on its own: their trajectories have one step.
+//! A lane of the synthesis is a *trajectory* of [`Motion::steps`] steps, and a frame is read at each
+//! step. The present kinds draw every frame independently: their trajectories have one step.
 
 use std::fmt::Debug;
 
@@ -18,36 +18,38 @@ mod press;
 pub use independent::Independent;
 pub use press::Press;
 
-/// A way in which electrodes move, drawn at random for every trajectory.
+/// Motion of the electrodes, drawn at random for every trajectory.
 pub trait Motion: Debug + Send + Sync {
-    /// Extreme deformation of any electrode along each axis, in mm: `[axis][low, high]`.
+    /// Extreme deformations of any electrode along each axis, in mm: `[axis][low, high]`.
     fn range_mm(&self) -> [[f64; 2]; 3];
 
     /// Checks the motion's settings.
     ///
     /// # Errors
-    /// The first setting that cannot be used.
+    /// [`BadValue`] for the first setting that cannot be used.
     fn check(&self) -> Result<(), BadValue>;
 
-    /// Frames of a trajectory.
+    /// Number of frames in a trajectory.
     fn steps(&self) -> usize {
         1
     }
 
-    /// Time between two steps, in s; nothing depends on it where trajectories have one step.
+    /// Time between two steps, in s; trajectories of one step do not depend on it.
     fn step_s(&self) -> f64 {
         0.0
     }
 
-    /// Draws what [`LANES`](taxel_data::simd::LANES) trajectories of `sensor` share over all rows and steps.
+    /// Draws the quantities that all rows and steps of a trajectory share, for
+    /// [`LANES`](taxel_data::simd::LANES) trajectories of `sensor`.
     fn start<'m>(&'m self, sensor: &'m Sensor, draws: &mut Draws) -> Box<dyn Trajectories + 'm>;
 }
 
 /// Trajectories that have been drawn, one a lane.
 pub trait Trajectories {
-    /// Deformation in mm of the electrodes of row-wire `row` (from 0) at `step`, by electrode and axis.
+    /// Writes the deformation in mm of the electrodes of row-wire `row` (from 0) at `step`, by electrode
+    /// and axis.
     ///
-    /// Steps come in ascending order; at each step, rows do too.
+    /// Callers take steps in ascending order, and at each step rows in ascending order.
     fn deform(
         &mut self,
         row: usize,
@@ -72,7 +74,7 @@ impl Draws {
         Self { seed, stream, lanes: RandomLanes::new(first) }
     }
 
-    /// The sources for `purpose` and `part` (say a row), at their beginning.
+    /// Sources for `purpose` and `part` (say a row), at their beginning.
     #[inline(always)]
     pub fn of(&mut self, purpose: Purpose, part: u64) -> &mut RandomLanes {
         self.lanes.start(self.seed, self.stream, purpose, part);
@@ -81,7 +83,7 @@ impl Draws {
 }
 
 kinds! {
-    /// One of the kinds of motion that a scene can name.
+    /// Kind of motion that a scene can name.
     Motion: Independent, Press
 }
 

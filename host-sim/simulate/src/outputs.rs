@@ -1,26 +1,26 @@
-//! Which quantities a model is to give out, and the names of their columns.
+//! Outputs that a model should predict, and the names of their columns.
 
 use serde::Deserialize;
 
 use crate::sensor::{Axis, Sensor, Vector3};
 
-/// What a model gives out, for every electrode of the rows that are read.
+/// Outputs of a model, for every electrode of the rows that are read.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Outputs {
-    /// Deformation in mm or force in N.
+    /// Quantity: deformation in mm or force in N.
     pub quantity: Quantity,
-    /// Components, each once, in the order x, y, z.
+    /// Axes of the components, each once, in the order x, y, z.
     pub axes: Vec<Axis>,
 }
 
-/// The quantity that outputs measure.
+/// Quantity that outputs measure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Quantity {
-    /// Δ, in mm.
+    /// Deformation Δ, in mm.
     Deformation,
-    /// F = diag(kx, ky, kz)·Δ, in N.
+    /// Force F = diag(kx, ky, kz)·Δ, in N.
     Force,
 }
 
@@ -31,7 +31,7 @@ impl Outputs {
         Self { quantity: Quantity::Deformation, axes: vec![Axis::X, Axis::Y, Axis::Z] }
     }
 
-    /// Output of an electrode of `sensor` for a deformation of 1 mm along `axis`.
+    /// Output of an electrode of `sensor` for a deformation of 1 mm along `axis`, in mm or N.
     #[must_use]
     pub fn per_mm(&self, sensor: &Sensor, axis: Axis) -> f64 {
         match self.quantity {
@@ -40,7 +40,7 @@ impl Outputs {
         }
     }
 
-    /// The outputs of one electrode of `sensor` for its deformation, in the order of the axes.
+    /// Outputs of one electrode of `sensor` for its deformation in mm, in the order of the axes.
     pub fn of_electrode(
         &self,
         sensor: &Sensor,

@@ -1,26 +1,27 @@
-//! How a sensor is read out: the circuit, its parts, and which of their faults are simulated.
+//! Readout of a sensor: the circuit, its parts, and the faults of these that are simulated.
 
 use serde::{Deserialize, Serialize};
 
-/// A readout. What it leaves out is not simulated.
+/// Settings of a readout. Faults that are left out are not simulated.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Readout {
-    /// Only in a scene's file, from 1: a world has [`read_rows`](crate::world::World::read_rows).
+    /// Row-wires that are read, from 1; only in a scene's file, since a world has
+    /// [`read_rows`](crate::world::World::read_rows).
     pub row_wires: Option<Vec<usize>>,
-    /// The circuit that turns resistances into voltages.
+    /// Circuit that turns resistances into voltages.
     pub circuit: Option<Circuit>,
-    /// How rows are selected.
+    /// Parts that select rows.
     pub row_drive: Option<Drive>,
-    /// How columns are sampled.
+    /// Parts that sample columns.
     pub sampler: Option<Sampler>,
-    /// How many of the converter's 12 bits are worth anything.
+    /// Effective resolution of the converter, of 12 bits.
     pub adc_bits: Option<u8>,
-    /// Samples averaged for a reading.
+    /// Number of samples averaged for a reading.
     pub oversampling: Option<u16>,
     /// Wait after every change of the rows.
     pub settling_us: Option<u32>,
-    /// Whether all wires are one network; else each reading is a circuit of its own.
+    /// Whether all wires form one network; otherwise each reading is a circuit of its own.
     pub cross_talk: Option<bool>,
     /// Resistance of a row's switch.
     pub row_switch_ohm: Option<f64>,
@@ -34,22 +35,22 @@ pub struct Readout {
     pub time_constant_us: Option<f64>,
 }
 
-/// How a resistance becomes a voltage; `docs/readout.md` draws both.
+/// Circuit that turns a resistance into a voltage; `docs/readout.md` draws both.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Circuit {
-    /// Idle rows float, every column has a resistor to ground.
+    /// Voltage divider: idle rows float, and every column has a resistor to ground.
     Divider,
-    /// Idle rows and all columns are held at one potential.
+    /// Zero-potential circuit: idle rows and all columns are held at one potential.
     #[default]
     ZeroPotential,
 }
 
 impl Circuit {
-    /// Both, the simpler one first.
+    /// Both circuits, the simpler one first.
     pub const ALL: [Self; 2] = [Self::Divider, Self::ZeroPotential];
 
-    /// Name in scenes and tables.
+    /// Name of the circuit in scenes and tables.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -59,26 +60,26 @@ impl Circuit {
     }
 }
 
-/// How rows are selected.
+/// Parts that select rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Drive {
-    /// One pin a row.
+    /// One pin of the microcontroller for each row.
     #[default]
     Pins,
-    /// A 74HC4051.
+    /// A 74HC4051 multiplexer.
     Multiplexer,
-    /// A 74HC595.
+    /// A 74HC595 shift register.
     ShiftRegister,
 }
 
-/// How columns are sampled.
+/// Parts that sample columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sampler {
-    /// Three MCP3208.
+    /// Three MCP3208 converters.
     #[default]
     Mcp3208,
-    /// A converter on the microcontroller behind three 74HC4051.
+    /// Converter on the microcontroller behind three 74HC4051 multiplexers.
     OnChip,
 }

@@ -1,4 +1,5 @@
-//! How the rubber follows what moves it: one type a kind of rubber, each an implementation of [`Rubber`].
+//! Rubber, which follows the motion that deforms it: one type a kind, each an implementation of
+//! [`Rubber`].
 
 use std::fmt::Debug;
 
@@ -7,21 +8,21 @@ use taxel_data::simd::Lanes;
 
 use crate::kinds::kinds;
 
-/// A material between what pushes an electrode and where the electrode goes.
+/// Material between whatever pushes an electrode and the place where the electrode goes.
 pub trait Rubber: Debug + Send + Sync {
-    /// Rubber at rest under one row-wire, one trajectory a lane; it remembers what was done to it.
+    /// Rubber at rest under one row-wire, one trajectory a lane, with a memory of its own.
     fn at_rest(&self, electrodes: usize) -> Box<dyn Response>;
 }
 
-/// The rubber under one row-wire, with its memory of earlier steps.
+/// Rubber under one row-wire, with its memory of earlier steps.
 pub trait Response {
-    /// Replaces the deformation that is wanted at the next step, `step_s` later, by the one that is reached.
+    /// Replaces the deformation that is wanted at the next step by the deformation that is reached.
     ///
-    /// Deformations are in mm, by electrode and axis.
+    /// The step is `step_s` later than the previous one. Deformations are in mm, by electrode and axis.
     fn respond(&mut self, step_s: f64, deformation_mm: &mut [[Lanes; 3]]);
 }
 
-/// Rubber that follows at once and remembers nothing: the paper's ideal sensor.
+/// Elastic rubber that follows at once and remembers nothing: the paper's ideal sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Elastic {}
@@ -37,7 +38,7 @@ impl Response for Elastic {
 }
 
 kinds! {
-    /// One of the kinds of rubber.
+    /// Kind of rubber.
     Rubber: Elastic
 }
 

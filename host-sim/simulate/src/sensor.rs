@@ -1,9 +1,9 @@
-//! The ideal sensor: geometry and the forward model, in f64.
+//! Ideal sensor: geometry and the forward model, in f64.
 //!
-//! The paper's equations 1–7: an upper electrode moved from U to U − Δ has the node resistance
-//! r = g·‖U − Δ − L‖ to the lower electrode L, and the resistance between row-wire m and
-//! column-wire k is that of all nodes of the two wires in parallel. Force follows the generalised
-//! Hooke law F = diag(kx, ky, kz)·Δ.
+//! The model is the paper's equations 1–7. An upper electrode moved from U to U − Δ has the node
+//! resistance r = g·‖U − Δ − L‖ to the lower electrode L. The resistance between row-wire m and
+//! column-wire k is that of all nodes of the two wires in parallel. Force follows the generalised Hooke
+//! law F = diag(kx, ky, kz)·Δ.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,26 +11,26 @@ mod lanes;
 
 pub use lanes::{LaneModel, Precision, Scratch};
 
-/// Direction in the sensor's frame.
+/// Axis of the sensor's right-handed frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Axis {
-    /// Along the row-wires.
+    /// Axis x, along the row-wires.
     X,
-    /// Across the row-wires.
+    /// Axis y, across the row-wires.
     Y,
-    /// Along the outward normal.
+    /// Axis z, along the outward normal.
     Z,
 }
 
 impl Axis {
-    /// Place in a vector.
+    /// Index of the axis in a [`Vector3`].
     #[must_use]
     pub fn index(self) -> usize {
         self as usize
     }
 
-    /// Name in column names.
+    /// Letter of the axis in column names.
     #[must_use]
     pub fn letter(self) -> char {
         ['x', 'y', 'z'][self.index()]
@@ -43,24 +43,23 @@ pub type Vector3 = [f64; 3];
 /// Geometry and material of a sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sensor {
-    /// Row-wires of the upper layer.
+    /// Number of row-wires, in the upper layer.
     pub row_wires: usize,
-    /// Electrodes on each row-wire.
+    /// Number of electrodes on each row-wire.
     pub electrodes_per_row_wire: usize,
-    /// Column-wires of the lower layer.
+    /// Number of column-wires, in the lower layer.
     pub column_wires: usize,
-    /// Electrodes on each column-wire.
+    /// Number of electrodes on each column-wire.
     pub electrodes_per_column_wire: usize,
     /// Upper electrodes at rest, row-wire after row-wire: `row_wires × electrodes_per_row_wire`.
     pub upper_electrodes_mm: Vec<Vector3>,
-    /// Lower electrodes, column-wire after column-wire:
-    /// `column_wires × electrodes_per_column_wire`.
+    /// Lower electrodes, column-wire after column-wire: `column_wires × electrodes_per_column_wire`.
     pub lower_electrodes_mm: Vec<Vector3>,
     /// Extent in x, y and z; z is the thickness H.
     pub size_mm: Vector3,
-    /// Resistance per length of rubber, g.
+    /// Resistance g per length of rubber.
     pub resistance_ohm_per_mm: f64,
-    /// Diagonal of the stiffness matrix.
+    /// Diagonal of the stiffness matrix: force per deformation along x, y and z.
     pub stiffness_n_per_mm: Vector3,
 }
 
@@ -98,8 +97,10 @@ fn cell(index: usize, count: usize, extent_mm: f64) -> f64 {
 }
 
 impl Sensor {
-    /// The sensor of Wang et al. (2014): 8 × 18 wires, 20 × 18 × 5 mm, with electrodes at the centres of equal
-    /// cells, since the paper gives no coordinates. Stiffness is that of a soft silicone.
+    /// Sensor of Wang et al. (2014): 8 × 18 wires, 20 × 18 × 5 mm, g = 100 Ω/mm.
+    ///
+    /// The paper gives no coordinates, so electrodes lie at the centres of equal cells. Stiffness is
+    /// that of a soft silicone.
     #[must_use]
     pub fn paper() -> Self {
         let size_mm = [20.0, 18.0, 5.0];
@@ -116,18 +117,20 @@ impl Sensor {
         }
     }
 
-    /// Upper electrodes of one row-wire, at rest.
+    /// Upper electrodes of row-wire `row` (from 0), at rest, in mm.
     #[must_use]
     pub fn row_electrodes_mm(&self, row: usize) -> &[Vector3] {
         let n = self.electrodes_per_row_wire;
         &self.upper_electrodes_mm[row * n..(row + 1) * n]
     }
 
-    /// Resistances in Ω between row-wire `row` and every column-wire, for the deformation of that
-    /// row's electrodes (which is all they depend on). The formula as it stands; [`LaneModel`] is quick.
+    /// Computes the resistances in Ω between row-wire `row` (from 0) and every column-wire.
+    ///
+    /// They depend on the deformation of that row's electrodes only. This is the formula as it stands;
+    /// [`LaneModel`] is fast.
     ///
     /// # Panics
-    /// If the slices do not have one entry an electrode and one a column-wire.
+    /// If `deformation_mm` has not one entry an electrode, or `resistance_ohm` not one a column-wire.
     pub fn row_column_resistance_ohm(
         &self,
         row: usize,
@@ -150,7 +153,7 @@ impl Sensor {
         }
     }
 
-    /// Names of the readings of `rows` (from 0), row after row.
+    /// Names `r{m}c{k}_ohm` of the readings of `rows` (from 0), row after row.
     #[must_use]
     pub fn reading_names(&self, rows: &[usize]) -> Vec<String> {
         let columns = 1..=self.column_wires;
@@ -158,7 +161,8 @@ impl Sensor {
         rows.flat_map(|m| columns.clone().map(move |k| format!("r{m}c{k}_ohm"))).collect()
     }
 
-    /// Names of the full deformation of one `row` (from 0), electrode after electrode.
+    /// Names `r{m}e{i}_d{x|y|z}_mm` of the full deformation of one `row` (from 0), electrode after
+    /// electrode.
     #[must_use]
     pub fn deformation_names(&self, row: usize) -> Vec<String> {
         let electrodes = 1..=self.electrodes_per_row_wire;
@@ -167,19 +171,19 @@ impl Sensor {
             .collect()
     }
 
-    /// Deformation up to which the model holds along any axis: 20 % of the thickness.
+    /// Largest deformation along any axis for which the model holds: 20 % of the thickness.
     #[must_use]
     pub fn largest_deformation_mm(&self) -> f64 {
         0.2 * self.size_mm[2]
     }
 
-    /// Whether the model holds for a deformation along any axis; a rounding error more is let pass.
+    /// Whether the model holds for a deformation along any axis; rounding errors beyond it are accepted.
     #[must_use]
     pub fn holds_for(&self, deformation_mm: f64) -> bool {
         deformation_mm.abs() <= self.largest_deformation_mm() * (1.0 + 1e-12)
     }
 
-    /// Force on an electrode for its deformation.
+    /// Force in N on an electrode for its deformation in mm: F = diag(kx, ky, kz)·Δ.
     #[must_use]
     pub fn force_n(&self, deformation_mm: Vector3) -> Vector3 {
         [0, 1, 2].map(|axis| self.stiffness_n_per_mm[axis] * deformation_mm[axis])
@@ -208,13 +212,14 @@ mod tests {
             ..Sensor::paper()
         };
         assert!((readings(&sensor, 0, &[[0.0; 3]])[0] - 1300.0).abs() < 1e-9);
-        // Deformation is taken off: positive Δz brings the layers together.
+        // Deformation is subtracted: positive Δz brings the layers together.
         assert!((readings(&sensor, 0, &[[3.0, 4.0, 2.0]])[0] - 1000.0).abs() < 1e-9);
     }
 
     #[test]
     fn readings_agree_with_values_computed_to_forty_digits() {
-        // By 40-digit decimal arithmetic from the equations (row, deformation rule, column, Ω).
+        // Expected values come from 40-digit decimal arithmetic on the equations (row, deformation rule,
+        // column, Ω).
         let sensor = Sensor::paper();
         let rule = |i: usize| {
             let i = i as f64;

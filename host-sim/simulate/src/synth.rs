@@ -16,10 +16,10 @@ mod lanes;
 
 use lanes::LaneSynthesis;
 
-/// Frames that measure a channel's maximum and minimum over the world, for `span` noise.
+/// Number of frames that measure a channel's maximum and minimum over the world, for `span` noise.
 const SPAN_FRAMES: usize = 4096;
 
-/// Frames of a world, drawn as it says but for what is set otherwise here.
+/// Synthesis of frames of a world, with some of its settings replaced.
 #[derive(Debug, Clone)]
 pub struct Synthesis<'w> {
     world: &'w World,
@@ -29,15 +29,15 @@ pub struct Synthesis<'w> {
     outputs: Cow<'w, Outputs>,
 }
 
-/// Synthesises `frames` of `stream`: noisy readings and true outputs, of the rows and axes that `world` asks
-/// for.
+/// Synthesises `frames` of `stream`: noisy readings in Ω and true outputs, of the rows and axes that
+/// `world` asks for.
 #[must_use]
 pub fn synthesise(world: &World, stream: Stream, frames: usize) -> Dataset {
     Synthesis::of(world).frames(stream, frames)
 }
 
 impl<'w> Synthesis<'w> {
-    /// Frames as `world` says.
+    /// Synthesis with all settings of `world`.
     #[must_use]
     pub fn of(world: &'w World) -> Self {
         Self {
@@ -49,44 +49,44 @@ impl<'w> Synthesis<'w> {
         }
     }
 
-    /// Readings with another noise level.
+    /// Replaces the noise level, a fraction (0.005 is 0.5 %).
     #[must_use]
     pub fn noise_level(mut self, level: f64) -> Self {
         self.noise.level = level;
         self
     }
 
-    /// Readings without noise.
+    /// Leaves out the noise on readings.
     #[must_use]
     pub fn ideal(self) -> Self {
         self.noise_level(0.0)
     }
 
-    /// Electrodes that move otherwise.
+    /// Replaces the motion of the electrodes.
     #[must_use]
     pub fn motion(mut self, motion: impl Into<motion::Kind>) -> Self {
         self.motion = Cow::Owned(motion.into());
         self
     }
 
-    /// Readings and outputs of all row-wires, whichever the world reads.
+    /// Synthesises readings and outputs of all row-wires, whichever the world reads.
     #[must_use]
     pub fn all_rows(mut self) -> Self {
         self.read_rows = Cow::Owned((0..self.world.sensor.row_wires).collect());
         self
     }
 
-    /// Other outputs.
+    /// Replaces the outputs.
     #[must_use]
     pub fn outputs(mut self, outputs: Outputs) -> Self {
         self.outputs = Cow::Owned(outputs);
         self
     }
 
-    /// The first `frames` of `stream`: readings, and the outputs that belong to them.
+    /// Synthesises the first `frames` of `stream`: readings in Ω, and their true outputs.
     ///
-    /// Frame n is the same however many frames are asked for. It is step n mod S of trajectory n div S, where
-    /// S is the motion's number of steps.
+    /// Frame n is the same however many frames are asked for. It is step n mod S of trajectory n div S,
+    /// where S is the motion's number of steps.
     #[must_use]
     pub fn frames(&self, stream: Stream, frames: usize) -> Dataset {
         let sensor = &self.world.sensor;
@@ -110,7 +110,8 @@ impl<'w> Synthesis<'w> {
         dataset
     }
 
-    /// The readings of one `frame` of `stream`, for motions whose trajectories have one step.
+    /// Synthesises the readings in Ω of one `frame` of `stream`, for motions whose trajectories have one
+    /// step.
     #[must_use]
     pub fn readings_of(&self, stream: Stream, frame: usize) -> Vec<f64> {
         let sensor = &self.world.sensor;
@@ -121,7 +122,7 @@ impl<'w> Synthesis<'w> {
         readings
     }
 
-    /// Span of every channel over the world in Ω, if its noise is measured by that.
+    /// Span in Ω of every channel over the world, if its noise is relative to the span; otherwise empty.
     fn noise_span_ohm(&self) -> Vec<f64> {
         if self.noise.kind == NoiseKind::Relative || self.noise.level == 0.0 {
             return Vec::new();

@@ -1,12 +1,12 @@
-//! A board that is not there: the firmware's readout, run on the host against a resistor network.
+//! Virtual board: the firmware's readout, run on the host against a resistor network.
 //!
-//! [`VirtualBoard`] holds the sensor's wires as an electrical network, the parts that select rows
-//! and sample columns, and a clock. Its pins, SPI devices, converter and delay implement
-//! embedded-hal 1.0, so that the firmware's own scanner runs on them. The parts are strict: what the
-//! real one would not accept is refused and recorded ([`VirtualBoard::check`]).
+//! [`VirtualBoard`] holds the sensor's wires as an electrical network, the parts that select rows and
+//! sample columns, and a clock. Its pins, SPI devices, converter and delay implement embedded-hal 1.0,
+//! so that the firmware's own scanner runs on them. The parts are strict: a request that the real one
+//! would not accept is refused and recorded ([`VirtualBoard::check`]).
 //!
-//! Cross-talk, resistance in switches and leads, offsets, noise and settling are each simulated only
-//! if the world's readout asks for it. Quantisation always is: counts are what the parts answer.
+//! Cross-talk, resistance in switches and leads, offsets, noise and settling are each simulated only if
+//! the world's readout asks for it. Quantisation always is, since the parts give counts.
 //!
 //! ```
 //! use firmware::readout::FrameSource;

@@ -1,4 +1,4 @@
-//! A world: a sensor, how it is moved, the noise on its readings, and how it is read.
+//! Worlds: a sensor, how it is moved, the noise on its readings, and how it is read.
 
 use firmware::readout::ScanSettings;
 use taxel_data::BadValue;
@@ -12,21 +12,21 @@ use crate::sensor::{Axis, Precision, Sensor};
 
 type Check = std::result::Result<(), BadValue>;
 
-/// Most numbers that one data set may hold: 4 GB.
+/// Largest number of values that one data set may hold: 4 GB.
 const MOST_VALUES: usize = 500_000_000;
 
-/// What there is to be simulated, and which of it is wanted.
+/// World to be simulated, and the part of it that is wanted.
 #[derive(Debug, Clone, PartialEq)]
 pub struct World {
     /// Seed of every random draw.
     pub seed: u64,
-    /// Precision of the readings' computation.
+    /// Precision in which readings are computed.
     pub precision: Precision,
-    /// Geometry and material.
+    /// Geometry and material of the sensor.
     pub sensor: Sensor,
-    /// How electrodes move.
+    /// Motion of the electrodes.
     pub motion: motion::Kind,
-    /// How the rubber follows.
+    /// Rubber, and how it follows the motion.
     pub rubber: rubber::Kind,
     /// Noise on the readings.
     pub noise: Noise,
@@ -39,7 +39,8 @@ pub struct World {
 }
 
 impl World {
-    /// The paper's sensor with 0.5 % relative noise, all rows read, all deformations wanted, moved by `motion`.
+    /// World with the paper's sensor, 0.5 % relative noise, all rows read, all deformations wanted,
+    /// moved by `motion`.
     #[must_use]
     pub fn of_motion(motion: impl Into<motion::Kind>) -> Self {
         let sensor = Sensor::paper();
@@ -56,7 +57,7 @@ impl World {
         }
     }
 
-    /// The world of the scene `press`: one contact.
+    /// World of the scene `press`: one contact.
     #[must_use]
     pub fn press() -> Self {
         Self::of_motion(Press {
@@ -66,7 +67,7 @@ impl World {
         })
     }
 
-    /// The world of the scene `paper`: every electrode on its own.
+    /// World of the scene `paper`: every electrode moves independently.
     #[must_use]
     pub fn paper() -> Self {
         let (dx_mm, dy_mm, dz_mm) = ([-1.0, 1.0], [-1.0, 1.0], [0.0, 1.0]);
@@ -85,8 +86,10 @@ impl World {
         self.outputs.names(&self.sensor, &self.read_rows)
     }
 
-    /// Full scale of the outputs along `axis`, in their unit: the largest deformation magnitude of any axis,
-    /// as the paper has it (1 mm in both reference scenes).
+    /// Full scale of the outputs along `axis`, in their unit.
+    ///
+    /// It is the largest deformation magnitude of any axis, as in the paper (1 mm in both reference
+    /// scenes), times the stiffness for forces.
     #[must_use]
     pub fn full_scale(&self, axis: Axis) -> f64 {
         let range_mm = self.motion.range_mm();
@@ -94,7 +97,7 @@ impl World {
         largest_mm * self.outputs.per_mm(&self.sensor, axis)
     }
 
-    /// Full scale of every output, in the order of [`output_names`](Self::output_names).
+    /// Full scale of every output in its unit, in the order of [`output_names`](Self::output_names).
     #[must_use]
     pub fn full_scales(&self) -> Vec<f64> {
         let electrodes = self.read_rows.len() * self.sensor.electrodes_per_row_wire;
@@ -102,20 +105,20 @@ impl World {
         of_one.collect::<Vec<_>>().repeat(electrodes)
     }
 
-    /// Changes the noise level.
+    /// Changes the noise level, a fraction (0.005 is 0.5 %).
     ///
     /// # Errors
-    /// A level that is no fraction.
+    /// [`BadValue`] for a level outside 0 to 1.
     pub fn set_noise_level(&mut self, level: f64) -> Check {
         check_noise_level("noise level", level)?;
         self.noise.level = level;
         Ok(())
     }
 
-    /// Checks everything; a world that passes can be used without further checks.
+    /// Checks every setting; a world that passes can be used without further checks.
     ///
     /// # Errors
-    /// The first setting that cannot be used.
+    /// [`BadValue`] for the first setting that cannot be used.
     pub fn check(&self) -> Check {
         sensor(&self.sensor)?;
         motion(self)?;
@@ -128,7 +131,7 @@ impl World {
     /// Checks that so many `frames` fit in memory; `field` names them in the message.
     ///
     /// # Errors
-    /// Too many frames, or none.
+    /// [`BadValue`] for too many frames, or none.
     pub fn check_frames(&self, field: &str, frames: usize) -> Check {
         let of_an_electrode = self.sensor.electrodes_per_row_wire * self.outputs.axes.len();
         let of_a_frame = self.read_rows.len() * (self.sensor.column_wires + of_an_electrode);
@@ -142,10 +145,10 @@ impl World {
     }
 }
 
-/// Checks a noise level; `field` names it in the message.
+/// Checks a noise level (a fraction); `field` names it in the message.
 ///
 /// # Errors
-/// A level that is no fraction.
+/// [`BadValue`] for a level outside 0 to 1.
 pub fn check_noise_level(field: &str, level: f64) -> Check {
     require((0.0..=1.0).contains(&level), field, level, || {
         "it is a fraction from 0 to 1 (0.005 is 0.5 %)".into()

@@ -1,4 +1,4 @@
-//! Options as the library knows them: names of formats and exponentials, and errors that name an option.
+//! Parsers of options: names of formats and exponentials, and errors that name an option.
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use host_sim::Error;
@@ -7,24 +7,24 @@ use taxel_data::BadValue;
 use taxel_learn::Exponential;
 use taxel_simulate::sensor::Precision;
 
-/// Reads the name of a number format.
+/// Parser for the name of a number format.
 pub fn format() -> impl TypedValueParser<Value = Format> {
     let named = |format: Format| PossibleValue::new(format.name()).help(format.description());
     one_of(Format::ALL.map(|format| (named(format), format)))
 }
 
-/// Reads the name of an exponential.
+/// Parser for the name of an exponential.
 pub fn exponential() -> impl TypedValueParser<Value = Exponential> {
     let named = |e: Exponential| PossibleValue::new(e.name()).help(e.description());
     one_of(Exponential::ALL.map(|exponential| (named(exponential), exponential)))
 }
 
-/// Reads a precision.
+/// Parser for the name of a precision.
 pub fn precision() -> impl TypedValueParser<Value = Precision> {
     let named = |name, help| PossibleValue::new(name).help(help);
     one_of([
         (named("f64", "Within 2e-13 of the sensor's equations"), Precision::F64),
-        (named("f32", "Within 1e-6, a third faster; draws stay as they are"), Precision::F32),
+        (named("f32", "Within 1e-6, a third faster; random draws stay the same"), Precision::F32),
     ])
 }
 
@@ -39,7 +39,7 @@ fn one_of<T: Copy + Send + Sync + 'static, const N: usize>(
     })
 }
 
-/// An error that names the option which sets `bad`'s field, if one of `options` (field, option) does.
+/// Error that names the option which sets `bad`'s field, if one of `options` (field, option) does.
 pub fn of_option(bad: BadValue, options: &[(&str, &str)]) -> Error {
     match options.iter().find(|(field, _)| *field == bad.field) {
         Some((_, option)) => Error::Usage(format!("{option} {}: {}", bad.value, bad.rule)),

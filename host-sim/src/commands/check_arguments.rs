@@ -1,4 +1,4 @@
-//! What `emulate` and `link … check` have in common: the plan, the model, and the page.
+//! Common parts of `emulate` and `link … check`: the plan, the model, and the page.
 
 use std::path::PathBuf;
 
@@ -13,7 +13,7 @@ use super::progress::Terminal;
 use super::scene_argument::SceneArgument;
 use super::{Common, print};
 
-/// What is to be checked.
+/// Options of a check.
 #[derive(Args)]
 pub struct CheckArguments {
     #[command(flatten)]
@@ -30,7 +30,7 @@ pub struct CheckArguments {
         allow_negative_numbers = true
     )]
     frames: usize,
-    /// Damaged models to upload: each must leave the old one in force.
+    /// Damaged models to upload; after each, the previous model must still be active.
     #[arg(long, value_name = "N", default_value_t = 0)]
     damaged_uploads: usize,
     /// Break an upload off after each of its chunks, and restart the device.
@@ -43,13 +43,13 @@ pub struct CheckArguments {
     pub limits: Limits,
 }
 
-/// What the firmware may take, without its models.
+/// Bounds on the memory of the firmware, without its models.
 #[derive(Args)]
 pub struct Limits {
-    /// Flash that the firmware may take at most.
+    /// Most flash in bytes that the firmware may take.
     #[arg(long, value_name = "BYTES", default_value_t = u32::MAX, hide_default_value = true)]
     flash_limit: u32,
-    /// RAM that variables and the stack at its deepest may take at most.
+    /// Most RAM in bytes that variables and the stack at its deepest may take.
     #[arg(long, value_name = "BYTES", default_value_t = u32::MAX, hide_default_value = true)]
     ram_limit: u32,
 }
@@ -61,7 +61,8 @@ impl Limits {
             ("--ram-limit", self.ram_limit, memory.ram_bytes()),
         ] {
             if taken > limit {
-                let message = format!("the firmware takes {taken} bytes, {option} is {limit}");
+                let message =
+                    format!("the firmware takes {taken} bytes, more than {option} {limit}");
                 return Err(Error::Failed(message));
             }
         }
@@ -70,21 +71,21 @@ impl Limits {
 }
 
 impl CheckArguments {
-    /// The scene and the model, trained if none was given.
+    /// Loads the scene and the model, which is trained if none was given.
     pub fn load(&self, common: &Common) -> Result<(Experiment, ModelBlob)> {
         let scene = self.scene(common)?;
         let model = self.model(&scene)?;
         Ok((scene, model))
     }
 
-    /// The scene.
+    /// Loads the scene.
     pub fn scene(&self, common: &Common) -> Result<Experiment> {
         let scene = self.scene.load(common)?;
         scene.world.check_frames("-n", self.frames)?;
         Ok(scene)
     }
 
-    /// The model, trained if none was given.
+    /// Loads the model, or trains it if none was given.
     pub fn model(&self, scene: &Experiment) -> Result<ModelBlob> {
         let blob = match &self.model {
             Some(path) => ModelBlob::read(path)?,
@@ -110,7 +111,7 @@ impl CheckArguments {
         Ok(blob)
     }
 
-    /// The plan, with `window` frames on their way at a time.
+    /// Plan of the check, with `window` frames on their way at a time.
     pub fn plan(&self, window: usize) -> Plan {
         Plan {
             frames: self.frames,
@@ -122,7 +123,7 @@ impl CheckArguments {
     }
 }
 
-/// Prints what was found; wrong answers, and more memory than allowed, are a failure.
+/// Prints the findings. Wrong answers, and more memory than allowed, are a failure.
 pub fn conclude(findings: &Findings, limits: &Limits, common: &Common) -> Result<()> {
     if common.json {
         print::json(findings)?;
@@ -134,11 +135,11 @@ pub fn conclude(findings: &Findings, limits: &Limits, common: &Common) -> Result
     } else {
         Err(Error::Failed(if findings.repeated > 0 || findings.damaged > 0 {
             format!(
-                "the line is not sound: {} requests had to be sent again, {} reports were damaged",
+                "the line is not reliable: {} requests had to be sent again, {} reports were damaged",
                 findings.repeated, findings.damaged
             )
         } else {
-            "the device does not do what it must: see above".into()
+            "the device failed a check: see above".into()
         }))
     }
 }
@@ -151,7 +152,7 @@ fn page_of(f: &Findings) -> print::Page {
         "device",
         format!("{}, firmware {}, {} × {} wires", d.board, d.firmware, d.rows, d.columns),
     );
-    line("exp kernel", d.kernel.clone());
+    line("exponential", d.kernel.clone());
     line(
         "frames",
         format!(
@@ -175,14 +176,14 @@ fn page_of(f: &Findings) -> print::Page {
     }
     if let Some(u) = &f.uploads {
         let good = if u.good_came_into_force { "came" } else { "DID NOT COME" };
-        line("good uploads", format!("{good} into force ({} bytes and more)", u.blob_bytes));
+        line("good uploads", format!("{good} activated ({} bytes and more)", u.blob_bytes));
         line(
             "damaged uploads",
-            format!("{} of {} refused, the old model in force", u.damaged_refused, u.damaged),
+            format!("{} of {} refused, previous model active", u.damaged_refused, u.damaged),
         );
         line(
             "interruptions",
-            format!("the old model in force after {} of {}", u.old_stayed, u.interrupted),
+            format!("previous model active after {} of {}", u.old_stayed, u.interrupted),
         );
     }
     if let Some(g) = &f.garbage {
@@ -208,7 +209,7 @@ fn page_of(f: &Findings) -> print::Page {
     page
 }
 
-/// Where a device's memory goes.
+/// Adds lines about the use of a device's memory.
 pub fn memory_lines(page: &mut print::Page, m: &Memory) {
     page.line(format_args!(
         "{:<17} {} bytes without the model: vector table {}, code {}, constants {}, start values {}",

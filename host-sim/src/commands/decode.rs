@@ -1,4 +1,4 @@
-//! `decode`: readings to estimates, with a trained model.
+//! Command `decode`: readings to estimates, with a trained model.
 
 use std::path::PathBuf;
 
@@ -14,10 +14,10 @@ use taxel_learn::{Exponential, ModelBlob, PreparedModel};
 use super::arguments::exponential;
 use super::{Common, print};
 
-/// Decode readings from a CSV file; one line of estimates for every line of readings.
+/// Decode readings from a CSV file, one line of estimates a line.
 ///
-/// Where a reading is missing, the outputs of its row-wire are left empty; those of all, if one network decodes
-/// the whole array.
+/// Where a reading is missing, the outputs of its row-wire are left empty. If one network decodes the whole
+/// array, all outputs of the line are.
 #[derive(Args)]
 #[command(after_help = "Example: host-sim decode press.bin readings.csv -o estimate.csv")]
 pub struct Arguments {
@@ -74,10 +74,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     page.print()
 }
 
-/// Share of clamped readings above which the model is likely to be another sensor's.
+/// Share of clamped readings above which the model probably belongs to another sensor.
 const SUSPICIOUS: f64 = 0.01;
 
-/// Says on stderr if many readings lie outside what the model was trained on.
+/// Remarks on stderr if many readings lie outside the range that the model was trained on.
 pub fn remark_on_range(model: &PreparedModel<'_>, readings: &Table) {
     let share = model.share_out_of_range(&readings.values);
     if share > SUSPICIOUS {
@@ -89,12 +89,12 @@ pub fn remark_on_range(model: &PreparedModel<'_>, readings: &Table) {
     }
 }
 
-/// The model's reading columns of `file`.
+/// Columns of `file` with the model's readings.
 pub fn model_inputs(model: &PreparedModel<'_>, file: &CsvFile) -> Result<Table> {
     table_of(file, model.model().metadata().input_names.iter())
 }
 
-/// The columns of `file` called `names`.
+/// Columns of `file` called `names`.
 pub fn table_of<'n>(file: &CsvFile, names: impl Iterator<Item = &'n str>) -> Result<Table> {
     let names: Vec<&str> = names.collect();
     let columns = file.columns(names.iter().copied())?;

@@ -1,4 +1,4 @@
-//! `emulate`: the device's image in an emulator, held to the host.
+//! Command `emulate`: the device's image in an emulator, compared with the host.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -15,12 +15,12 @@ use super::Common;
 use super::check_arguments::{CheckArguments, conclude};
 use super::progress::Terminal;
 
-/// Either line holds bytes back while the device is busy, so frames may queue.
+/// Frames on their way at a time: either line holds bytes back while the device is busy.
 const WINDOW: usize = 4;
-/// It loses nothing, but a busy computer makes it slow: an answer that takes longer is lost.
+/// Longest time for an answer: the emulator loses nothing, but a busy computer makes it slow.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// What carries the bytes between the host and the image's link.
+/// Line that carries the bytes between the host and the image's link.
 #[derive(Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 enum Line {
     /// Memory that both share: about as fast as the image decodes.
@@ -30,9 +30,10 @@ enum Line {
     Uart,
 }
 
-/// Run the firmware in QEMU, let it decode a scene's frames, and compare with the host bit for bit.
+/// Run the firmware in QEMU and compare its estimates with the host's.
 ///
-/// Fails (exit status 1) unless every frame is bit-identical and every check asked for is passed.
+/// Decodes frames of a scene. Fails (exit status 1) unless every frame is bit-identical and every check
+/// asked for is passed.
 #[derive(Args)]
 #[command(
     after_help = "Example: cargo xtask firmware && host-sim emulate press -n 10000 --scans 100\n\nNeeds qemu-system-arm and the image; docs/emulator.md tells how to get both."
@@ -42,11 +43,11 @@ pub struct Arguments {
     check: CheckArguments,
     /// Scans of a virtual board at the image's second serial line, to be compared with the host's.
     ///
-    /// What the scene's [readout] says is simulated; its parts are the image's: zero potential, 74HC595,
+    /// Faults of the scene's [readout] are simulated; its parts are the image's: zero potential, 74HC595,
     /// MCP3208.
     #[arg(long, value_name = "N", default_value_t = 0)]
     scans: usize,
-    /// What carries the link.
+    /// Line that carries the link.
     #[arg(long, value_enum, value_name = "LINE", default_value_t)]
     line: Line,
     /// Image of the firmware for mps2-an386.
@@ -56,7 +57,7 @@ pub struct Arguments {
         default_value = "target/thumb/thumbv7em-none-eabihf/firmware/qemu-app"
     )]
     image: PathBuf,
-    /// The emulator.
+    /// QEMU's program.
     #[arg(long, value_name = "PROGRAM", default_value = "qemu-system-arm")]
     qemu: PathBuf,
     /// File for the image's log, as defmt encodes it: `cargo xtask log FILE` prints it.
@@ -84,7 +85,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     }
     let model = arguments.check.model(&scene)?;
 
-    // QEMU puts the blob where a board has it in flash.
+    // QEMU puts the blob at the place where a board has it in flash.
     let blob = temporary("model.bin");
     let written = std::fs::write(&blob, model.bytes());
     written.map_err(|cause| taxel_data::Error::write(&blob, cause))?;
@@ -101,7 +102,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         let plan = arguments.check.plan(WINDOW);
         Ok(Findings { scans, ..check(&mut device, &scene.world, &model, &plan, &progress)? })
     });
-    // Only a kill leaves these behind.
+    // Only killing the program leaves these files behind.
     let _ = std::fs::remove_file(&blob);
     if let Some((temporary, wanted)) = log.zip(arguments.log.as_ref()) {
         let logged = std::fs::read(&temporary).unwrap_or_default();

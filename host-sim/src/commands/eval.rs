@@ -1,4 +1,4 @@
-//! `eval`: a model's errors on data whose outputs are known.
+//! Command `eval`: a model's errors on data whose outputs are known.
 
 use std::path::PathBuf;
 
@@ -13,7 +13,7 @@ use super::arguments::exponential;
 use super::decode::remark_on_range;
 use super::{Common, decode, print};
 
-/// Evaluate a model on a CSV file that holds readings and true outputs.
+/// Evaluate a model on a CSV file of readings and true outputs.
 #[derive(Args)]
 #[command(after_help = "Example: host-sim eval press.bin test.csv")]
 pub struct Arguments {
@@ -29,13 +29,13 @@ pub struct Arguments {
 #[derive(Serialize)]
 struct Summary {
     frames: usize,
-    /// True outputs in the file.
+    /// Number of true outputs in the file.
     values: usize,
-    /// Those that count: neither they nor a reading they need is missing.
+    /// Number of these that count: neither they nor a reading they need is missing.
     values_evaluated: usize,
     exponential: Exponential,
     errors: Vec<Errors>,
-    /// Errors of answering the mean of these very outputs.
+    /// Errors of always predicting the mean of these outputs.
     mean_errors: Vec<Errors>,
 }
 
@@ -52,7 +52,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         full_scale: metadata.full_scale.iter().map(f64::from).collect(),
         thickness_mm: (thickness_mm > 0.0).then_some(thickness_mm),
     };
-    // The mean is judged on the same pairs as the model, and is theirs.
+    // The mean is judged on the same pairs as the model, and computed from them.
     for (truth, estimate) in truth.values.iter_mut().zip(&estimate.values) {
         *truth = if estimate.is_nan() { f64::NAN } else { *truth };
     }

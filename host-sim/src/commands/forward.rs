@@ -1,4 +1,4 @@
-//! `forward`: the ideal sensor's readings for given deformations.
+//! Command `forward`: the ideal sensor's readings for given deformations.
 
 use std::path::PathBuf;
 

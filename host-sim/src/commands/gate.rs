@@ -1,4 +1,4 @@
-//! `gate`: what leaving rows at rest alone saves and misses.
+//! Command `gate`: the work that skipping untouched rows saves, and the touches that it misses.
 
 use std::path::PathBuf;
 
@@ -14,11 +14,12 @@ use super::arguments::of_option;
 use super::scene_argument::{self, NoiseArgument, SceneArgument};
 use super::{Common, print};
 
-/// Leave rows at rest alone: what that saves, misses, and does to the errors.
+/// Skip untouched rows: work saved, touches missed, and errors.
 ///
-/// A row is at rest if its readings, and their sum, are within k times their noise of the baseline: the mean
-/// of frames of the untouched sensor with the same noise. It then takes the model's answer to the baseline.
-/// Test and model compute as on the device (docs/gating.md).
+/// A row counts as untouched if every reading, and their sum, lies within k standard deviations of the
+/// baseline. The baseline is the mean of frames of the untouched sensor with the same noise. An untouched
+/// row takes the model's estimate for the baseline. Gate and model compute like on the device
+/// (docs/gating.md).
 #[derive(Args)]
 #[command(after_help = "Example: host-sim gate press --k 3,3.5,4 --noise 0.01")]
 pub struct Arguments {
@@ -38,8 +39,9 @@ pub struct Arguments {
     /// Frames that the baseline averages.
     #[arg(long, value_name = "N", default_value_t = BASELINE_FRAMES)]
     baseline_frames: usize,
-    /// Cycles of a frame without a gate, of one whose rows are all at rest, and of one whose rows are all
-    /// awake, instead of those that `cargo xtask cycles` measured of such models; REST is below AWAKE.
+    /// Cycles of a frame without a gate, of one with all rows untouched (REST), and of one with all rows
+    /// touched (AWAKE). REST is below AWAKE. They replace those that `cargo xtask cycles` measured of such
+    /// models.
     #[arg(
         long,
         value_name = "FRAME,REST,AWAKE",
@@ -111,19 +113,20 @@ fn page_of(result: &GateResult) -> print::Page {
     match &result.frame_cycles {
         Some(frames) => frames_cost(&mut page, result, frames),
         None => page.line(
-            "what frames cost is not known: no model of this kind was measured, see firmware/cycles.csv; \
+            "the cost of frames is not known: no model of this kind was measured (see firmware/cycles.csv); \
              give --cycles\n",
         ),
     }
     page.line(
-        "k: standard deviations of their noise within which a row's readings are, and their sum is, for it to\n\
-         be at rest; tolerance: k × noise, what a device is configured with. skipped: rows of the scene that\n\
-         are at rest, of all. woken: rows of the untouched sensor that are not; theory: at most\n\
-         1 − (1 − 2Q(k'))^(n+1) for n readings a row (of one network for the whole array, whose rows wake\n\
-         together, as many times over as there are rows), k' = k/√(1 + 1/B) for a baseline of B frames. missed: rows\n\
-         at rest, of those in which some electrode moved by more than the size, ‖Δ‖; largest: the largest ‖Δ‖\n\
-         in a row at rest.\n\
-         RMSE: √mean(e²) over all rows of the scene, whether at rest or not.",
+        "k: a row counts as untouched if every reading, and their sum, lies within k standard deviations of\n\
+         the baseline. tolerance: k × noise, for a device's configuration.\n\
+         skipped: share of the scene's rows that count as untouched, and are not decoded.\n\
+         woken: share of the untouched sensor's rows that do not. theory: its upper bound\n\
+         1 − (1 − 2Q(k'))^(n+1), with n readings a row and k' = k/√(1 + 1/B) for a baseline of B frames. If one\n\
+         network decodes the whole array, rows wake together: the bound is multiplied by their number.\n\
+         missed: share of skipped rows among those with an electrode that moved by more than this, ‖Δ‖.\n\
+         largest: the largest ‖Δ‖ in a skipped row.\n\
+         RMSE: √mean(e²) over all rows of the scene, skipped or not.",
     );
     page
 }
@@ -165,15 +168,15 @@ fn errors(page: &mut print::Page, result: &GateResult) {
     for Line { k, errors, .. } in &result.lines {
         line(format!("k = {k}"), errors);
     }
-    line("answering the mean".into(), &result.mean_errors);
+    line("predicting the mean".into(), &result.mean_errors);
     page.line("");
 }
 
 fn frames_cost(page: &mut print::Page, result: &GateResult, frames: &Frames<u64>) {
     page.line(format_args!(
-        "cycles of a frame: {} without a gate, {} with all rows at rest, {} with all awake; in parts of the\n\
-         first, mean over the scene, and untouched:",
-        frames.ungated, frames.at_rest, frames.awake
+        "cycles of a frame: {} without a gate, {} with all rows untouched, {} with all touched.\n\
+         Mean cycles relative to no gate:\n{:>6} {:>10} {:>10}",
+        frames.ungated, frames.at_rest, frames.awake, "k", "scene", "untouched"
     ));
     let part = |cost: Option<f64>| cost.map_or("-".into(), |cost| percent(cost, 1));
     for line in &result.lines {

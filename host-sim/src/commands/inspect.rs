@@ -1,4 +1,4 @@
-//! `inspect`: what a weight blob holds and costs.
+//! Command `inspect`: content and cost of a weight blob.
 
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ use taxel_learn::ModelBlob;
 
 use super::{Common, print};
 
-/// Show a blob's shape, origin, training errors, and what it needs on a device.
+/// Show a blob's shape, origin, training errors and needs on a device.
 #[derive(Args)]
 #[command(after_help = "Example: host-sim inspect press.bin")]
 pub struct Arguments {
@@ -49,7 +49,7 @@ struct NetworkSummary {
 }
 
 impl NetworkSummary {
-    /// For people.
+    /// Line for people.
     fn line(&self) -> String {
         let (low, high) = self
             .width
@@ -125,13 +125,13 @@ fn summarise(blob: &ModelBlob) -> Summary {
     }
 }
 
-/// A width as it was given: numbers of the blob's format lie a little beside.
+/// Digits of a width as it was given: the blob's rounded number lies a little beside.
 fn digits(width: f32) -> String {
     let text = format!("{width:.4}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// Outputs that are listed for people.
+/// Most outputs that are listed for people.
 const SHOWN: usize = 24;
 
 fn page_of(s: &Summary) -> print::Page {

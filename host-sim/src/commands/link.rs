@@ -1,4 +1,4 @@
-//! `link`: a device on a serial port.
+//! Command `link`: a device on a serial port.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -18,7 +18,7 @@ use taxel_rig::device::{Device, DeviceIdentity, Wire, serial, upload};
 use super::check_arguments::{CheckArguments, conclude, memory_lines};
 use super::{Common, print};
 
-/// Talk to a device on a serial port: who it is, its model, its estimates.
+/// Talk to a device on a serial port: identify, upload, record.
 #[derive(Args)]
 #[command(after_help = "Example: host-sim link /dev/ttyACM0 upload press.bin")]
 pub struct Arguments {
@@ -33,23 +33,23 @@ pub struct Arguments {
 
 #[derive(Subcommand)]
 enum Action {
-    /// Show who the device is, which model is in force, where its memory goes, and its counters.
+    /// Show the device's identity, active model, use of memory, and counters.
     #[command(after_help = "Example: host-sim link /dev/ttyACM0 identify")]
     Identify,
-    /// Put a model in force; the old one stays if the new one is refused.
+    /// Upload a model and activate it; if refused, the previous one stays.
     #[command(after_help = "Example: host-sim link /dev/ttyACM0 upload press.bin")]
     Upload(UploadArguments),
-    /// Let the device scan, and save its readings, or its estimates, as CSV, one frame a line.
+    /// Let the device scan, and save readings or estimates as CSV.
     #[command(
         after_help = "Example: host-sim link /dev/ttyACM0 record press.bin -n 1000 -o estimates.csv"
     )]
     Record(RecordArguments),
-    /// Capture the sensor at rest, and save the mean readings as CSV. Leave the sensor alone meanwhile.
+    /// Capture the untouched sensor, and save the mean readings as CSV.
     #[command(after_help = "Example: host-sim link /dev/ttyACM0 baseline -o rest.csv")]
     Baseline(BaselineArguments),
     /// Let the device decode a scene's frames, and compare with the host bit for bit.
     ///
-    /// Whatever model is in force is replaced by the one checked with.
+    /// The model that is checked with replaces the active one.
     #[command(after_help = "Example: host-sim link /dev/ttyACM0 check press --model press.bin")]
     Check(CheckArguments),
 }
@@ -62,12 +62,12 @@ struct UploadArguments {
 
 #[derive(Args)]
 struct RecordArguments {
-    /// Weight blob that is in force on the device: its estimates are saved. Without it, readings are.
+    /// Weight blob that is active on the device: its estimates are saved. Without it, readings are.
     model: Option<PathBuf>,
     #[command(flatten)]
     scan: ScanArguments,
-    /// Relative change within which a row is at rest and not decoded, once the device has a `baseline`; 0
-    /// decodes all (docs/gating.md).
+    /// Relative change within which a row counts as untouched and is not decoded, once the device has a
+    /// `baseline`; 0 decodes all rows (docs/gating.md).
     #[arg(long, value_name = "SHARE", default_value_t = Configuration::DEFAULT.rest_tolerance, value_parser = tolerance, allow_negative_numbers = true)]
     rest_tolerance: f32,
     /// CSV file to write.
@@ -109,16 +109,16 @@ struct Status {
 #[derive(Serialize)]
 struct Saved {
     frames: usize,
-    /// Numbers missing between the first frame and the last: lost on the line.
+    /// Frame numbers missing between the first frame and the last: lost on the line.
     frames_lost: u32,
     /// Readings or outputs that are empty.
     values_missing: usize,
-    /// Rows that were at rest, and so were not decoded.
+    /// Rows that were untouched, and so were not decoded.
     rows_at_rest: usize,
     file: PathBuf,
 }
 
-/// A tolerance that a device takes.
+/// Tolerance within the range that a device accepts.
 fn tolerance(text: &str) -> std::result::Result<f32, String> {
     let share = text.parse().ok().filter(|share| (0.0..1.0).contains(share));
     share.ok_or_else(|| "give a share from 0 and below 1, such as 0.0175 for 3.5 × 0.5 %".into())
@@ -159,7 +159,7 @@ fn status(status: &Status, common: &Common) -> Result<()> {
     let mut page = print::Page::default();
     page.line(format_args!("{:<17} {}, firmware {}", "device", d.board, d.firmware));
     page.line(format_args!(
-        "{:<17} {} × {} wires, {} outputs a row, {} exp kernel",
+        "{:<17} {} × {} wires, {} outputs a row, {} exponential",
         "shape", d.rows, d.columns, d.outputs, d.kernel
     ));
     let model = d.model.map_or("none: upload one".to_owned(), |m| {
@@ -167,7 +167,7 @@ fn status(status: &Status, common: &Common) -> Result<()> {
     });
     page.line(format_args!("{:<17} {model}", "model"));
     page.line(format_args!(
-        "{:<17} {} scanned, {} decoded (of which {} rows at rest), {} missed, {} samples failed",
+        "{:<17} {} scanned, {} decoded (except {} untouched rows), {} missed, {} samples failed",
         "frames",
         s.frames_scanned,
         s.frames_decoded,
@@ -187,7 +187,7 @@ fn status(status: &Status, common: &Common) -> Result<()> {
     page.print()
 }
 
-/// What a device is to send of each scan.
+/// Content that a device is to send of each scan.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Wanted {
     Nothing,
@@ -195,7 +195,7 @@ enum Wanted {
     Estimates,
 }
 
-/// Puts a configuration in force.
+/// Activates a configuration for scanning.
 fn configure<W: Wire>(
     device: &mut Device<W>,
     scan: &ScanArguments,
@@ -214,10 +214,10 @@ fn configure<W: Wire>(
     device.configure(configuration)
 }
 
-/// A sample takes no longer, with any converter that the readout is written for.
+/// Longest time of a sample, with any converter that the readout is written for.
 const SLOWEST_SAMPLE_NS: u32 = 100_000;
 
-/// Time in which so many frames must have come.
+/// Time within which so many frames must have come.
 fn patience(scan: &ScanArguments, identity: &DeviceIdentity) -> Duration {
     let plan = ScanPlan {
         rows: identity.rows as u16,
@@ -259,7 +259,7 @@ fn record<W: Wire>(
     saved(&Saved { frames, frames_lost, values_missing, rows_at_rest, file }, common)
 }
 
-/// How many values are missing; all of them are a failure.
+/// Number of missing values; if all are missing, that is a failure.
 fn missing<'v>(values: impl Iterator<Item = &'v f64> + Clone, wanted: Wanted) -> Result<usize> {
     let missing = values.clone().filter(|value| value.is_nan()).count();
     if missing < values.count() {
@@ -267,17 +267,17 @@ fn missing<'v>(values: impl Iterator<Item = &'v f64> + Clone, wanted: Wanted) ->
     }
     let what = if wanted == Wanted::Estimates { "estimate" } else { "reading" };
     Err(Error::Failed(format!(
-        "the device has not a single {what}; `identify` tells of failed samples: check the wiring of \
+        "the device sent not a single {what}; `identify` shows failed samples: check the wiring of \
          converters and rows (docs/board.md)"
     )))
 }
 
-/// The names of the model's outputs, if it is the one in force.
+/// Names of the model's outputs, if it is the active one.
 fn output_names(model: &ModelBlob, identity: &DeviceIdentity) -> Result<Vec<String>> {
     let model = model.parse();
     if !identity.has_in_force(model.crc()) {
         return Err(Error::Usage(format!(
-            "MODEL {:08x}: the device has {} in force; `upload` this one, or name that",
+            "MODEL {:08x}: {} is active on the device; `upload` this one, or name that one",
             model.crc(),
             identity.model.map_or("none".into(), |found| format!("{:08x}", found.crc_32))
         )));
@@ -290,10 +290,11 @@ fn reading_names(identity: &DeviceIdentity) -> Vec<String> {
     rows.flat_map(|m| (1..=identity.columns).map(move |k| format!("r{m}c{k}_ohm"))).collect()
 }
 
-/// A frame's number, and its readings or outputs.
+/// Number of a frame, and its readings or outputs.
 type NumberedFrame = (u32, Vec<f64>);
 
-/// The frames that the device sends, with their numbers, and how many rows of all of them were at rest.
+/// Receives the frames that the device sends, with their numbers, and counts the untouched rows in all of
+/// them.
 fn hear_frames<W: Wire>(
     device: &mut Device<W>,
     count: usize,
@@ -315,7 +316,7 @@ fn hear_frames<W: Wire>(
             _ => return None,
         };
         if frames.last().is_some_and(|(last, _)| *last >= frame) {
-            return Some(Err(Error::Failed("the device has started anew meanwhile".into())));
+            return Some(Err(Error::Failed("the device has restarted meanwhile".into())));
         }
         frames.push((frame, values.iter().map(f64::from).collect()));
         let at_rest = status.iter().filter(|status| **status == EstimateReport::ROW_AT_REST);
@@ -371,7 +372,7 @@ fn saved(saved: &Saved, common: &Common) -> Result<()> {
         saved.values_missing
     ));
     if saved.rows_at_rest > 0 {
-        page.line(format_args!("{} rows were at rest, and not decoded", saved.rows_at_rest));
+        page.line(format_args!("{} rows were untouched, and not decoded", saved.rows_at_rest));
     }
     page.print()
 }

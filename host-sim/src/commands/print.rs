@@ -1,4 +1,4 @@
-//! Results on stdout: aligned tables for people, JSON for programs.
+//! Printing of results on stdout: aligned tables for people, JSON for programs.
 
 use std::fmt::{Display, Write as _};
 use std::io::Write as _;
@@ -7,7 +7,7 @@ use host_sim::metrics::{Definition, Errors};
 use host_sim::{Error, Result};
 use serde::Serialize;
 
-/// Text for people, printed as a whole.
+/// Page of text for people, printed as a whole.
 #[derive(Default)]
 pub struct Page(String);
 
@@ -24,7 +24,7 @@ impl Page {
     }
 }
 
-/// A reader who has seen enough (`| head`) is no failure.
+/// Writes to stdout; a reader who has seen enough (`| head`) is no failure.
 fn to_stdout(text: &str) -> Result<()> {
     match std::io::stdout().write_all(text.as_bytes()) {
         Err(cause) if cause.kind() != std::io::ErrorKind::BrokenPipe => {
@@ -71,7 +71,7 @@ pub fn errors(page: &mut Page, decoders: &[(&str, &[Errors])]) {
     }
 }
 
-/// Four decimals, or powers of ten where these would say nothing.
+/// Text of an error with four decimals, or in powers of ten where these would say nothing.
 fn number(value: f64) -> String {
     if value == 0.0 || (1e-3..1e5).contains(&value) {
         format!("{value:.4}")

@@ -5,12 +5,12 @@ use std::time::Duration;
 use indicatif::{ProgressBar, ProgressStyle};
 use taxel_data::progress::Progress;
 
-/// Shows which stage runs and how far it is. Silent where stderr is no terminal.
+/// Display of the stage that runs and how far it is; silent where stderr is no terminal.
 #[derive(Debug, Clone)]
 pub struct Terminal(ProgressBar);
 
 impl Terminal {
-    /// Progress on stderr.
+    /// Display of progress on stderr.
     pub fn new() -> Self {
         let bar = ProgressBar::new(0);
         let style = ProgressStyle::with_template("{msg:<28} {bar:32} {pos}/{len} {elapsed}");

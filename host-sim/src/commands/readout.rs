@@ -1,4 +1,4 @@
-//! `readout`: what circuits do to readings, and to what is decoded from them.
+//! Command `readout`: the effect of circuits on readings, and on the estimates from them.
 
 use std::path::PathBuf;
 
@@ -14,11 +14,11 @@ use taxel_simulate::virtual_board::VirtualBoard;
 use super::scene_argument::{self, SceneArgument};
 use super::{Common, print};
 
-/// Scan frames of a scene through a virtual board, and decode them: divider against zero potential.
+/// Compare readout circuits: scan a scene through a virtual board, and decode.
 ///
 /// The firmware's own scanner runs on virtual pins and converters in front of a network of all wires.
-/// Faults come one after the other; what the scene's [readout] does not say is typical
-/// (docs/readout.md). The frames are free of the scene's noise.
+/// Faults are added one after the other. Parts that the scene's [readout] does not set have typical values
+/// (docs/readout.md). The frames have none of the scene's noise.
 #[derive(Args)]
 #[command(after_help = "Example: host-sim readout press --frames 500")]
 pub struct Arguments {
@@ -76,14 +76,14 @@ fn page_of(result: &ReadoutResult) -> print::Page {
             rmse(&line.errors)
         ));
     }
-    page.line(without("answering the mean", &result.mean_errors));
+    page.line(without("predicting the mean", &result.mean_errors));
     if let Some(conclusion) = conclusion(result) {
         page.line(conclusion);
     }
     page
 }
 
-/// What the numbers say of compression, if they say it.
+/// Conclusion about compression, if the numbers support it.
 fn conclusion(result: &ReadoutResult) -> Option<String> {
     let z = |errors: &[Errors]| {
         errors.iter().find(|errors| errors.group == "dz_mm").map(|errors| errors.rmse)

@@ -1,4 +1,4 @@
-//! `run`: the main job, from scene to blob to report.
+//! Command `run`: the main job, from scene to blob to report.
 
 use std::path::{Path, PathBuf};
 
@@ -14,10 +14,10 @@ use super::scene_argument::{NoiseArgument, SceneArgument};
 use super::{Common, print};
 
 const DEFAULT_OUTPUT: &str = "out";
-/// All files that a run may write.
+/// Names of all files that a run may write.
 const FILES: [&str; 4] = ["model.bin", "metrics.json", "table1.csv", "report.html"];
 
-/// Run a scene: synthesise, train, write the blob, read it back, decode, evaluate, report.
+/// Run a scene: synthesise, train, write the blob, evaluate, report.
 ///
 /// Writes model.bin, metrics.json, table1.csv and report.html to out/<scene>/.
 #[derive(Args)]

@@ -1,4 +1,4 @@
-//! The scene argument, and the overrides that commands share.
+//! Scene argument, and the overrides that commands share.
 
 use std::path::Path;
 
@@ -13,13 +13,13 @@ use super::{Common, arguments};
 
 const DEFAULT_SCENE: &str = "paper";
 
-/// A scene and what is changed in it.
+/// Scene, with the settings that are changed in it.
 #[derive(Args)]
 pub struct SceneArgument {
     /// A built-in scene (paper, press) or the path of a scene file.
     #[arg(default_value = DEFAULT_SCENE)]
     scene: String,
-    /// How precisely the sensor's readings are computed, instead of the scene's way.
+    /// Precision of the sensor's readings, instead of the scene's.
     #[arg(long, value_parser = arguments::precision())]
     precision: Option<Precision>,
 }
@@ -40,13 +40,13 @@ impl SceneArgument {
         Ok(scene)
     }
 
-    /// The scene's path, as an input that must not be written over.
+    /// Path of the scene, as an input that must not be replaced.
     pub fn path(&self) -> &Path {
         Path::new(&self.scene)
     }
 }
 
-/// Another noise level than the scene's.
+/// Noise level instead of the scene's.
 #[derive(Args, Default)]
 pub struct NoiseArgument {
     /// Noise level as a fraction (0.01 is 1 %), instead of the scene's.
@@ -66,7 +66,7 @@ impl NoiseArgument {
     }
 }
 
-/// The model in the blob at `path`, whose columns must be those of `scene`; without one, the model that
+/// Loads the blob at `path`, whose columns must be those of `scene`; without a path, trains the model that
 /// the scene describes.
 pub fn model(
     path: Option<&Path>,

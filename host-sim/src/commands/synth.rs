@@ -1,4 +1,4 @@
-//! `synth`: frames of a scene as CSV.
+//! Command `synth`: frames of a scene as CSV.
 
 use std::path::PathBuf;
 
@@ -12,7 +12,7 @@ use taxel_simulate::synthesise;
 use super::scene_argument::{NoiseArgument, SceneArgument};
 use super::{Common, print};
 
-/// Synthesise frames of a scene: noisy readings and true outputs, as CSV.
+/// Synthesise frames of a scene as CSV: noisy readings, true outputs.
 #[derive(Args)]
 #[command(
     after_help = "Example: host-sim synth press -n 5000 --seed 2 -o test.csv\n\nA scene's own seed gives the very frames that `train` and `run` train on: evaluate on another."

@@ -1,4 +1,4 @@
-//! `table1`: the paper's Table 1, by every definition of error.
+//! Command `table1`: the paper's Table 1, by every definition of error.
 
 use std::path::PathBuf;
 
@@ -14,10 +14,10 @@ use taxel_learn::decoders::{mean, standard};
 use super::scene_argument::SceneArgument;
 use super::{Common, print};
 
-/// Compute the paper's Table 1: error against spread and noise, by every definition of error.
+/// Compute the paper's Table 1: errors by spread and noise.
 ///
-/// Beside the K-centre network stand the training mean, the best linear decoder and the paper's
-/// standard network (K = N).
+/// Every definition of error is given. The K-centre network is compared with the training mean, the best
+/// linear decoder and the paper's standard network (K = N).
 #[derive(Args)]
 #[command(after_help = "Example: host-sim table1 paper -o table1.csv")]
 pub struct Arguments {
@@ -26,7 +26,7 @@ pub struct Arguments {
     /// CSV file to write, with all axes, decoders and definitions.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// CSV file of the paper's printed cells, to list and store them with the computed ones (columns
+    /// CSV file of the paper's printed cells, to be listed and stored with the computed ones (columns
     /// spread, noise_level as a fraction, percent).
     #[arg(long, value_name = "FILE")]
     printed: Option<PathBuf>,

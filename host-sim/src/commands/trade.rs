@@ -1,4 +1,4 @@
-//! `trade`: speed against accuracy, every knob measured.
+//! Command `trade`: speed against accuracy, every setting measured.
 
 use std::cmp::Ordering;
 use std::fmt::Write as _;
@@ -9,7 +9,7 @@ use super::progress::Terminal;
 use clap::Args;
 use host_sim::error::Bounded;
 use host_sim::evaluate::gate::{self, RECOMMENDED_K};
-use host_sim::evaluate::trade::{self, Limits, Plan, Point, Trade};
+use host_sim::evaluate::trade::{self, Bounds, Plan, Point, Trade};
 use host_sim::metrics::DecoderErrors;
 use host_sim::{Error, Result, report};
 use taxel_data::{columns, output};
@@ -19,15 +19,17 @@ use super::arguments::of_option;
 use super::scene_argument::{NoiseArgument, SceneArgument};
 use super::{Common, print};
 
-/// All files that the command may write.
+/// Names of all files that the command may write.
 const FILES: [&str; 5] = ["trade.csv", "trade.json", "trade.svg", "trade.html", "chosen.bin"];
 
-/// Trade speed for accuracy: train and judge every number format, exponential, K, affine tail, number of
-/// samples averaged and gate for rows at rest; mark the front of what nothing beats; pick a point within limits.
+/// Trade speed for accuracy: measure every decoder, and choose the best.
 ///
-/// Writes trade.csv, trade.json, trade.svg and trade.html to out/<scene>/, and with a limit chosen.bin.
-/// Instructions and cycles are those that `cargo xtask cycles` measured of the firmware's code; behind a gate,
-/// the mean of the test frames by their share of rows at rest (docs/trade.md).
+/// Trains and judges every number format, exponential, K, affine tail, number of samples averaged and gate.
+/// Marks the Pareto front, and chooses the best point within your bounds.
+///
+/// Writes trade.csv, trade.json, trade.svg and trade.html to out/<scene>/, and with a bound chosen.bin.
+/// `cargo xtask cycles` measured the instructions and cycles on the firmware's code. Behind a gate they are
+/// the mean over the test frames, by the share of untouched rows (docs/trade.md).
 #[derive(Args)]
 #[command(after_help = "Examples:
   host-sim trade press
@@ -45,23 +47,24 @@ pub struct Arguments {
     /// Centres K to try.
     #[arg(long, value_name = "K", value_delimiter = ',', default_value = "16,32,64,128,256")]
     centres: Vec<usize>,
-    /// Samples averaged for each reading, to try.
+    /// Numbers of samples averaged for each reading, to try.
     #[arg(long, value_name = "N", value_delimiter = ',', default_value = "1,4,16")]
     average: Vec<usize>,
-    /// Gates to try besides none: tolerances in standard deviations of the averaged noise; `none` for no gate
-    /// [default: 3.5 if the scene's noise is relative].
+    /// Gates to try besides none: tolerances in standard deviations of the averaged noise; `none` for no
+    /// gate [default: 3.5 if the scene's noise is relative].
     #[arg(long, value_name = "K,…", value_delimiter = ',', allow_negative_numbers = true)]
-    gate: Vec<Gate>,
-    /// Outputs that the front and the choice go by, such as dz_mm [default: the last].
+    gate: Vec<GateOption>,
+    /// Outputs that determine the front and the choice, such as dz_mm [default: the last].
     #[arg(long, value_name = "GROUP")]
     group: Option<String>,
-    /// Pick the cheapest point with an RMSE of at most this, in the group's unit.
+    /// Choose the cheapest point with an RMSE of at most this, in the group's unit.
     #[arg(long, value_name = "RMSE", allow_negative_numbers = true)]
     max_error: Option<f64>,
-    /// Pick within so many cycles a frame, behind a gate on average: the most accurate point, unless --max-error asks for the cheapest.
+    /// Choose within so many cycles a frame (behind a gate: on average). Unless --max-error is given, the
+    /// most accurate such point is chosen.
     #[arg(long, value_name = "CYCLES")]
     max_cycles: Option<u64>,
-    /// Pick within a blob of so many bytes [default, with another limit: a slot's 131072].
+    /// Choose within a blob of so many bytes [default, with another bound: a slot's 131072].
     #[arg(long, value_name = "BYTES")]
     max_flash: Option<usize>,
     /// Clock of the device, for times.
@@ -95,12 +98,12 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         gate_k: gate_k(&arguments.gate, &scene.world)?,
         clock_mhz: arguments.clock_mhz,
     };
-    let limits = Limits {
+    let bounds = Bounds {
         error: arguments.max_error,
         cycles: arguments.max_cycles,
         flash_bytes: arguments.max_flash,
     };
-    limits.check().map_err(|bad| of_option(bad, &OPTIONS))?;
+    bounds.check().map_err(|bad| of_option(bad, &OPTIONS))?;
     let folder = arguments.output.join(&scene.name);
     let (trade, choice) = output::in_folder(&folder, || {
         for file in FILES {
@@ -111,7 +114,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             Error::Setting(bad) => of_option(bad, &OPTIONS),
             other => other,
         })?;
-        let choice = trade.choose(&limits);
+        let choice = trade.choose(&bounds);
         write_files(&folder, &trade)?;
         Ok::<_, Error>((trade, choice))
     })?;
@@ -120,11 +123,11 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     } else {
         page_of(&trade, arguments.all, &folder).print()?;
     }
-    // What was measured is kept and shown, whether or not a point is within the limits.
+    // Measurements are kept and shown even if no point is within the bounds.
     choice.map_err(|cause| Error::Usage(cause.text(option)))
 }
 
-/// Options by the settings that they are for.
+/// Options by the settings that they set.
 const OPTIONS: [(&str, &str); 6] = [
     ("centres", "--centres"),
     ("average", "--average"),
@@ -134,7 +137,7 @@ const OPTIONS: [(&str, &str); 6] = [
     ("max-flash", option(Bounded::Flash)),
 ];
 
-/// The option that sets a bound.
+/// Option that sets a bound.
 const fn option(bounded: Bounded) -> &'static str {
     match bounded {
         Bounded::Error => "--max-error",
@@ -143,14 +146,14 @@ const fn option(bounded: Bounded) -> &'static str {
     }
 }
 
-/// A value of `--gate`.
+/// Value of `--gate`.
 #[derive(Clone, Copy, PartialEq)]
-enum Gate {
+enum GateOption {
     None,
     K(f64),
 }
 
-impl FromStr for Gate {
+impl FromStr for GateOption {
     type Err = String;
 
     fn from_str(text: &str) -> std::result::Result<Self, String> {
@@ -161,8 +164,8 @@ impl FromStr for Gate {
     }
 }
 
-/// The gates that are asked for, or the one that docs/gating.md recommends where the noise allows one.
-fn gate_k(given: &[Gate], world: &World) -> Result<Vec<f64>> {
+/// Gates that are asked for, or the one that docs/gating.md recommends where the noise allows one.
+fn gate_k(given: &[GateOption], world: &World) -> Result<Vec<f64>> {
     if given.is_empty() {
         return Ok(match gate::check_noise(world) {
             Ok(()) => vec![RECOMMENDED_K],
@@ -174,7 +177,7 @@ fn gate_k(given: &[Gate], world: &World) -> Result<Vec<f64>> {
     }
     let k: Vec<f64> = given
         .iter()
-        .filter_map(|gate| if let Gate::K(k) = gate { Some(*k) } else { None })
+        .filter_map(|gate| if let GateOption::K(k) = gate { Some(*k) } else { None })
         .collect();
     if k.len() == given.len() {
         return distinct("--gate", &k);
@@ -192,7 +195,7 @@ fn distinct<T: Copy + PartialOrd + std::fmt::Display>(
     values: &[T],
 ) -> Result<Vec<T>> {
     let mut sorted = values.to_vec();
-    // What has no order is refused later, by what it is for.
+    // Values without an order are refused later, by whatever uses them.
     sorted.sort_by(|a, b| a.partial_cmp(b).unwrap_or(Ordering::Equal));
     match sorted.windows(2).find(|pair| pair[0] == pair[1]) {
         Some(pair) => Err(Error::Usage(format!("{option} gives {} twice; give it once", pair[0]))),
@@ -216,7 +219,7 @@ fn write_files(folder: &Path, trade: &Trade) -> Result<()> {
     let chosen = folder.join("chosen.bin");
     match trade.chosen {
         Some(point) => output::write_bytes(&chosen, trade.blob(point))?,
-        // An earlier run's would lie beside figures that are not its own.
+        // A blob from an earlier run would lie beside figures that are not its own.
         None => output::remove(&chosen)?,
     }
     Ok(())
@@ -291,16 +294,16 @@ fn page_of(trade: &Trade, all: bool, folder: &Path) -> print::Page {
         page.line(format_args!("  {decoder:<48}{}", errors.concat()));
     }
     page.line(format_args!(
-        "\nRMSE in {}, in brackets over the smallest of all\n\
-         *: nothing is better than this in RMSE of {}, cycles and samples, and worse in none\n\
-         array: one network for all rows, behind a projection; those larger than a slot (128 KiB) are left out\n\
-         flash: nothing larger than a slot is chosen unless --max-flash says so\n\
-         gate: k of a gate for rows at rest; its cycles are the mean of the test frames",
+        "\nRMSE in {}; in brackets: relative to the smallest of all points\n\
+         *: on the Pareto front (RMSE of {}, cycles, samples)\n\
+         array: one network for all rows, behind a projection; not listed if larger than a slot (128 KiB)\n\
+         flash: no point larger than a slot is chosen unless --max-flash allows it\n\
+         gate: k of a gate that skips untouched rows; its cycles are the mean over the test frames",
         trade.unit,
         trade.group
     ));
     page.line(if all {
-        "f32 whose distances may not be expanded (docs/formats.md) is the f32-direct beside it, and not listed".into()
+        "f32 is not listed where its distances may not be expanded (docs/formats.md): see f32-direct there".into()
     } else {
         format!("{} more points with --all", trade.points.len() - shown.len())
     });
@@ -325,12 +328,12 @@ fn page_of(trade: &Trade, all: bool, folder: &Path) -> print::Page {
             page.line(format_args!("on a device, `host-sim link`:{}", options.join(";")));
         }
     }
-    page.line(format_args!("all of it, and the curve: {}", folder.join("trade.html").display()));
+    page.line(format_args!("all points, and the curve: {}", folder.join("trade.html").display()));
     page
 }
 
-/// Numbers of the points to print: all as they were measured, or the front from cheap to dear for each number
-/// of samples.
+/// Indices of the points to print: all as they were measured, or the front from cheap to dear for each
+/// number of samples.
 fn shown(trade: &Trade, all: bool) -> Vec<usize> {
     let numbers = 0..trade.points.len();
     if all {

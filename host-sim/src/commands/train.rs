@@ -1,4 +1,4 @@
-//! `train`: from a scene or any CSV file to a weight blob.
+//! Command `train`: from a scene or any CSV file to a weight blob.
 
 use std::path::{Path, PathBuf};
 
@@ -22,10 +22,10 @@ use super::arguments::format;
 use super::scene_argument::NoiseArgument;
 use super::{Common, print};
 
-/// Train a model on a scene or on a CSV file, and write its weight blob.
+/// Train a model on a scene or a CSV file, and write its blob.
 ///
-/// A CSV file trains one network for all its chosen columns, or one a row-wire where the columns
-/// carry the project's own names (r4c17_ohm, r4e2_dz_mm).
+/// A CSV file trains one network for all selected columns. If the columns have the project's own names
+/// (r4c17_ohm, r4e2_dz_mm), it trains one for each row-wire.
 #[derive(Args)]
 #[command(after_help = "Examples:
   host-sim train press -o press.bin
@@ -46,15 +46,15 @@ pub struct Arguments {
     /// Centres K; with --select, candidates [default: the scene's, or 64].
     #[arg(long, value_name = "K", value_delimiter = ',')]
     centres: Vec<usize>,
-    /// Width σ on scaled inputs; with --select, candidates [default: the scene's, or 0.8; half
-    /// of that for `--whole-array`].
+    /// Width σ on scaled inputs; with --select, candidates [default: the scene's, or 0.8; half of that for
+    /// `--whole-array`].
     #[arg(long, value_name = "S", value_delimiter = ',')]
     spread: Vec<f64>,
-    /// Leave out the affine tail A·x.
+    /// Train without the affine tail A·x.
     #[arg(long)]
     no_affine: bool,
-    /// Train one network for all rows, behind a projection of all readings, instead of one a row: more
-    /// accurate, and faster from K = 64 on, but one missing reading leaves nothing to decode.
+    /// Train one network for all rows, behind a projection of all readings, instead of one a row. It is
+    /// more accurate, and faster from K = 64 on, but one missing reading leaves nothing to decode.
     #[arg(long)]
     whole_array: bool,
     /// Number format of the weights [default: the scene's, or f32].
@@ -76,12 +76,12 @@ pub struct Arguments {
     frames: Option<usize>,
 }
 
-/// What a model is trained on.
+/// Data that a model is trained on.
 struct Source {
     dataset: Dataset,
     origin: Origin,
     defaults: Options,
-    /// Fold of each frame, where the data says.
+    /// Fold of each frame, if the data gives it.
     fold_of: Option<Vec<usize>>,
 }
 
@@ -94,14 +94,15 @@ struct Summary {
     centres: usize,
     spread: f64,
     affine_tail: bool,
-    /// Of the networks, in their order.
+    /// Number formats of the networks, in their order.
     formats: Vec<&'static str>,
     outputs: Vec<String>,
     training_rmse: Vec<f64>,
     selection: Option<Selection>,
 }
 
-/// Whether that is a scene, or else a CSV file. What is no file and has no extension is a scene's name, mistyped.
+/// Whether `source` is a scene, or otherwise a CSV file. A name without a file and an extension is a
+/// mistyped scene.
 fn names_a_scene(source: &str) -> bool {
     let path = Path::new(source);
     EMBEDDED.iter().any(|(name, _)| *name == source)
@@ -146,9 +147,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         && model.networks().any(|network| network.format() == Format::F32Direct)
     {
         eprintln!(
-            "note: distances are direct ones, which take a device more than twice as long: in f32, expanded \
-             ones are not proved harmless for this model (little noise, many centres or a large spread); \
-             --format fixed16 has them, and a smaller --spread may"
+            "note: the fast formula for distances could lose accuracy in f32 with this model (little noise, many \
+             centres or a large spread), so the exact one is used, which takes a device more than twice as long; \
+             use --format fixed16, or try a smaller --spread"
         );
     }
     let summary = Summary {
@@ -207,7 +208,7 @@ fn from_data(arguments: &Arguments, common: &Common) -> Result<Source> {
     let (dataset, kept) = Dataset::from_file(&file, inputs, outputs).map_err(with_options)?;
     if kept.lines.len() < kept.of {
         let left_out = kept.of - kept.lines.len();
-        eprintln!("note: {left_out} of {} lines have a missing value and are left out", kept.of);
+        eprintln!("note: {left_out} of {} lines have a missing value and are skipped", kept.of);
     }
     let fold_of = match &arguments.fold_column {
         Some(name) => Some(folds_from(&file, name, &kept.lines)?),
@@ -223,7 +224,7 @@ fn from_data(arguments: &Arguments, common: &Common) -> Result<Source> {
     })
 }
 
-/// The error with the options that choose columns.
+/// Error that names the options which choose columns.
 fn with_options(error: taxel_data::Error) -> Error {
     let option = |role| match role {
         Role::Inputs => "--inputs",
@@ -243,7 +244,7 @@ fn with_options(error: taxel_data::Error) -> Error {
     }
 }
 
-/// Folds as column `name` gives them.
+/// Folds from column `name`.
 fn folds_from(file: &CsvFile, name: &str, lines: &[usize]) -> Result<Vec<usize>> {
     let column = file.column(name)?;
     let values: Vec<f64> = lines.iter().map(|line| file.value(*line, column)).collect();
@@ -276,7 +277,7 @@ fn choose(arguments: &Arguments, source: &Source, options: &mut Options) -> Resu
         }
     };
     let centres = if arguments.centres.is_empty() {
-        // Around the usual K, as far as the smallest training part allows.
+        // K around the usual one, as far as the smallest training part allows.
         let largest = select::smallest_training_part(&fold_of).saturating_sub(1).max(1);
         let usual = [options.centres / 2, options.centres, options.centres * 2];
         let mut candidates = usual.map(|k| k.clamp(1, largest)).to_vec();

@@ -1,4 +1,4 @@
-//! What decoding costs a Cortex-M4F: the figures that `cargo xtask cycles` measures and checks in.
+//! Cost of decoding on a Cortex-M4F, as `cargo xtask cycles` measures it and the repository holds it.
 
 use model_core::blob::Model;
 use model_core::rbf::Format;
@@ -7,49 +7,50 @@ use taxel_learn::Exponential;
 
 use crate::error::{Error, Result};
 
-/// Rows, readings and outputs of a row that `cargo xtask cycles` measures.
+/// Rows, readings of a row and outputs of a row that `cargo xtask cycles` measures.
 pub const MEASURED_SHAPE: [usize; 3] = [8, 18, 18];
 
-/// `firmware/cycles.csv`: compiler, kernel, centres, affine, scope, instructions, cycles.
+/// Content of `firmware/cycles.csv`: compiler, kernel, centres, affine, scope, instructions, cycles.
 const MEASURED: &str = include_str!("../../../firmware/cycles.csv");
 
-/// Instructions, and cycles by the model of `docs/cycles.md` (zero wait states; not checked against silicon).
+/// Instructions, and cycles by the model of `docs/cycles.md` (zero wait states; not checked against
+/// silicon).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Cost {
-    /// Instructions that are executed: exact.
+    /// Number of instructions that are executed: exact.
     pub instructions: u64,
-    /// Cycles by the model.
+    /// Number of cycles, by the model.
     pub cycles: u64,
 }
 
-/// What a frame costs without a gate, and behind one, in any measure.
+/// Costs of a frame without a gate and behind one, in any measure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Frames<T> {
-    /// Without a gate.
+    /// Cost without a gate.
     pub ungated: T,
-    /// Behind a gate that finds all rows at rest.
+    /// Cost behind a gate that finds all rows untouched.
     pub at_rest: T,
-    /// Behind a gate that finds all rows awake, each by its last reading.
+    /// Cost behind a gate that finds all rows touched, each by its last reading.
     pub awake: T,
 }
 
 impl<T> Frames<T> {
-    /// The same in another measure.
+    /// Costs in another measure, by `of`.
     pub fn map<U>(self, of: impl Fn(T) -> U) -> Frames<U> {
         Frames { ungated: of(self.ungated), at_rest: of(self.at_rest), awake: of(self.awake) }
     }
 }
 
 impl Frames<u64> {
-    /// The mean of frames behind a gate, of whose rows this share is at rest: between what was measured of
-    /// frames all at rest and all awake.
+    /// Mean cost of frames behind a gate, with this share of untouched rows. It lies between the
+    /// measured costs of frames with all rows untouched and all touched.
     #[must_use]
     pub fn mean(&self, share_at_rest: f64) -> f64 {
         let [awake, at_rest] = [self.awake, self.at_rest].map(|cost| cost as f64);
         awake + share_at_rest * (at_rest - awake)
     }
 
-    /// The same in parts of a frame without a gate.
+    /// Mean cost of frames behind a gate, relative to a frame without a gate.
     #[must_use]
     pub fn relative(&self, share_at_rest: f64) -> f64 {
         self.mean(share_at_rest) / self.ungated as f64
@@ -57,7 +58,7 @@ impl Frames<u64> {
 }
 
 impl Frames<Cost> {
-    /// The mean of frames behind a gate, rounded.
+    /// Mean cost of frames behind a gate, rounded.
     #[must_use]
     pub fn mean_cost(&self, share_at_rest: f64) -> Cost {
         let mean = |of: fn(Cost) -> u64| self.map(of).mean(share_at_rest).round() as u64;
@@ -65,15 +66,16 @@ impl Frames<Cost> {
     }
 }
 
-/// What was measured of one compiler's code.
+/// Measured costs of one compiler's code.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Costs {
-    /// The compiler.
+    /// Name and version of the compiler.
     pub compiler: String,
     lines: Vec<Line>,
 }
 
-/// Kernel, K, whether there is an affine tail, and whether one network decodes the whole array.
+/// Number format and exponential, K, whether there is an affine tail, and whether one network decodes
+/// the whole array.
 pub type Kind<'k> = (&'k str, usize, bool, bool);
 
 #[derive(Debug, Clone, PartialEq)]
@@ -86,10 +88,10 @@ struct Line {
 }
 
 impl Costs {
-    /// The checked-in figures; those of the compiler that comes first.
+    /// Costs in the repository, of the first compiler there.
     ///
     /// # Errors
-    /// [`Error::Cycles`] if the file holds none, or not what it should.
+    /// [`Error::Cycles`] if the file holds no figures, or not the expected ones.
     pub fn measured() -> Result<Self> {
         Self::parse(MEASURED)
     }
@@ -126,14 +128,15 @@ impl Costs {
         centres
     }
 
-    /// The cost of a frame without a gate; `None` if it was not measured.
+    /// Cost of a frame without a gate; `None` if it was not measured.
     #[must_use]
     pub fn frame(&self, kind: Kind<'_>) -> Option<Cost> {
         self.of(kind, "frame")
     }
 
-    /// The cost of a frame with and without a gate; `None` if it was not measured, as with exponentials other
-    /// than the firmware's.
+    /// Costs of a frame with and without a gate.
+    ///
+    /// `None` if they were not measured, as with exponentials other than the firmware's.
     #[must_use]
     pub fn frames(&self, kind: Kind<'_>) -> Option<Frames<Cost>> {
         let of = |scope| self.of(kind, scope);
@@ -144,8 +147,10 @@ impl Costs {
         })
     }
 
-    /// The same of `model`, with the exponential that the firmware runs; `None` also if its networks are not
-    /// all alike, or its shape is not the measured one.
+    /// Costs of a frame with and without a gate for `model`, with the firmware's exponential.
+    ///
+    /// `None` if they were not measured, if the networks are not all alike, or for another shape than
+    /// the measured one.
     #[must_use]
     pub fn frames_of_model(&self, model: &Model<'_>) -> Option<Frames<Cost>> {
         let shape = model.shape();
@@ -171,7 +176,7 @@ impl Costs {
     }
 }
 
-/// The name under which a format's figures stand.
+/// Name of a format in the file of costs.
 #[must_use]
 pub fn kernel_name(format: Format, exponential: Exponential) -> String {
     match (format, exponential) {
@@ -199,7 +204,7 @@ mod tests {
                 }
             }
         }
-        // The array's activations serve all rows; its projection costs something.
+        // The array's activations serve all rows; its projection has a cost of its own.
         for centres in [64, 128, 256] {
             let [of_rows, of_array] = [false, true]
                 .map(|whole_array| costs.frame(("fixed16", centres, true, whole_array)).unwrap());

@@ -1,4 +1,4 @@
-//! What gating saves, and what it misses: rows at rest that are not decoded.
+//! Gating: the work saved by skipping untouched rows, and the touches missed.
 
 use model_core::gate::is_at_rest;
 use serde::Serialize;
@@ -15,32 +15,32 @@ use crate::evaluate::cost::Frames;
 use crate::experiment::Experiment;
 use crate::metrics::{self, Errors};
 
-/// Sizes in mm beyond which a deformation is counted as missed if its row is taken to be at rest.
+/// Deformations in mm beyond which a row that is skipped counts as missed.
 pub const MISSED_OVER_MM: [f64; 4] = [0.02, 0.05, 0.1, 0.2];
 
-/// The tolerance that `docs/gating.md` recommends, in standard deviations of a reading's noise.
+/// Tolerance that `docs/gating.md` recommends, in standard deviations of a reading's noise.
 pub const RECOMMENDED_K: f64 = 3.5;
-/// Frames that a baseline averages unless told otherwise.
+/// Default number of frames that a baseline averages.
 pub const BASELINE_FRAMES: usize = 100;
 
-/// What is measured.
+/// Settings of a measurement of gates.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// Tolerances, in standard deviations of a reading's noise.
     pub k: Vec<f64>,
-    /// Frames of the scene, and as many of the untouched sensor.
+    /// Number of frames of the scene, and as many of the untouched sensor.
     pub frames: usize,
-    /// Frames of the untouched sensor whose mean is the baseline.
+    /// Number of frames of the untouched sensor whose mean is the baseline.
     pub baseline_frames: usize,
     /// Cycles of a frame, if they are known.
     pub frame_cycles: Option<Frames<u64>>,
 }
 
 impl Settings {
-    /// Whether these settings make gates for `world`.
+    /// Checks that these settings make gates for `world`.
     ///
     /// # Errors
-    /// The first setting that does not.
+    /// [`BadValue`] for the first setting that does not.
     pub fn check(&self, world: &World) -> Result<(), BadValue> {
         check(world, &self.k)?;
         if self.baseline_frames == 0 {
@@ -53,10 +53,10 @@ impl Settings {
     }
 }
 
-/// Whether `world` has the noise that a gate's tolerance is made of.
+/// Checks that `world` has noise that a gate's tolerance can be derived from.
 ///
 /// # Errors
-/// Noise that it is not made of.
+/// [`BadValue`] for noise that is not relative, or zero.
 pub fn check_noise(world: &World) -> Result<(), BadValue> {
     if world.noise.kind != NoiseKind::Relative {
         let rule = "the gate's tolerance is relative to each reading; use a scene with noise.kind = \"relative\"";
@@ -69,10 +69,10 @@ pub fn check_noise(world: &World) -> Result<(), BadValue> {
     Ok(())
 }
 
-/// Whether tolerances `k`, in standard deviations of a reading's noise, make gates for `world`.
+/// Checks that tolerances `k`, in standard deviations of a reading's noise, make gates for `world`.
 ///
 /// # Errors
-/// The first that does not.
+/// [`BadValue`] for the first tolerance that does not.
 pub fn check(world: &World, k: &[f64]) -> Result<(), BadValue> {
     check_noise(world)?;
     let level = world.noise.level;
@@ -87,14 +87,14 @@ pub fn check(world: &World, k: &[f64]) -> Result<(), BadValue> {
     }
 }
 
-/// Rows that were moved by more than `over_mm`, and those of them that were taken to be at rest.
+/// Rows that were moved by more than `over_mm`, and how many of them were skipped.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Missed {
-    /// The size in mm: the largest ‖Δ‖ of the row's electrodes.
+    /// Bound in mm on the largest ‖Δ‖ of the row's electrodes.
     pub over_mm: f64,
-    /// Rows that were moved so far.
+    /// Number of rows that were moved farther.
     pub rows: usize,
-    /// Those of them that were not decoded.
+    /// Number of these rows that were not decoded.
     pub missed: usize,
 }
 
@@ -106,45 +106,45 @@ impl Missed {
     }
 }
 
-/// One tolerance.
+/// Result of a gate with one tolerance.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Line {
-    /// In standard deviations of a reading's noise.
+    /// Tolerance k, in standard deviations of a reading's noise.
     pub k: f64,
-    /// The same relative to the reading: what a device is configured with.
+    /// Tolerance relative to the reading, for the configuration of a device.
     pub rest_tolerance: f64,
     /// Share of the scene's rows that is not decoded.
     pub skipped: f64,
     /// Share of rows that is decoded although nothing touches the sensor.
     pub woken: f64,
-    /// The same at most, [by theory](woken_by_theory).
+    /// Upper bound on that share, [by theory](woken_by_theory).
     pub woken_by_theory: f64,
     /// Rows of the scene that are missed, by [`MISSED_OVER_MM`].
     pub missed: Vec<Missed>,
-    /// The largest ‖Δ‖ in mm of a row that was not decoded.
+    /// Largest ‖Δ‖ in mm of a row that was not decoded.
     pub largest_missed_mm: Option<f64>,
     /// Errors over the scene with this gate.
     pub errors: Vec<Errors>,
-    /// What a frame of the scene costs, in parts of one without a gate.
+    /// Mean cost of a frame of the scene, relative to one without a gate.
     pub relative_cost: Option<f64>,
-    /// The same of the untouched sensor.
+    /// Mean cost of a frame of the untouched sensor, relative to one without a gate.
     pub relative_cost_untouched: Option<f64>,
 }
 
-/// A scene behind gates of several tolerances.
+/// Results of a scene behind gates of several tolerances.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GateResult {
     /// Name of the scene.
     pub scene: String,
-    /// Seed of every draw.
+    /// Seed of every random draw.
     pub seed: u64,
-    /// Relative noise of a reading.
+    /// Relative noise of a reading, as a fraction.
     pub noise_level: f64,
-    /// Frames of the scene, and as many of the untouched sensor.
+    /// Number of frames of the scene, and as many of the untouched sensor.
     pub frames: usize,
-    /// Rows of a frame.
+    /// Number of rows in a frame.
     pub rows: usize,
-    /// Frames whose mean is the baseline.
+    /// Number of frames whose mean is the baseline.
     pub baseline_frames: usize,
     /// CRC-32 of the model, in hexadecimal.
     pub model_crc: String,
@@ -152,15 +152,17 @@ pub struct GateResult {
     pub frame_cycles: Option<Frames<u64>>,
     /// Errors over the scene without a gate.
     pub ungated_errors: Vec<Errors>,
-    /// Errors of answering the mean of these frames.
+    /// Errors of always predicting the mean of these frames.
     pub mean_errors: Vec<Errors>,
-    /// One tolerance after the other.
+    /// Results by tolerance.
     pub lines: Vec<Line>,
 }
 
-/// The share of untouched rows of n `readings` that wake for noise alone, at most: 1 − (1 − 2Q(k'))^(n + 1)
-/// for the readings and their sum (Šidák's inequality), with Q the upper tail of the normal distribution, and
-/// k' = k/√(1 + 1/B) for the noise that is left in a baseline of B frames.
+/// Upper bound on the share of untouched rows of n `readings` that noise alone wakes: 1 − (1 −
+/// 2Q(k'))^(n + 1).
+///
+/// It holds for the readings and their sum (Šidák's inequality), with Q the upper tail of the normal
+/// distribution. k' = k/√(1 + 1/B) accounts for the noise that is left in a baseline of B frames.
 #[must_use]
 pub fn woken_by_theory(k: f64, readings: usize, baseline_frames: usize) -> f64 {
     let k = k / (1.0 + 1.0 / baseline_frames as f64).sqrt();
@@ -168,11 +170,13 @@ pub fn woken_by_theory(k: f64, readings: usize, baseline_frames: usize) -> f64 {
     -libm::expm1((readings + 1) as f64 * libm::log1p(-beyond))
 }
 
-/// Puts every row of the scene's test frames, and of as many frames of the untouched sensor, through gates
-/// for `settings`, and decodes those that are awake with `model`, whose columns must be the scene's.
+/// Puts every row of the scene's test frames, and of as many frames of the untouched sensor, through
+/// gates for `settings`.
+///
+/// Rows that are not skipped are decoded with `model`, whose columns must be the scene's.
 ///
 /// # Errors
-/// A setting, or a noise, that makes no gate.
+/// [`Error`](crate::Error) for a setting, or a noise, that makes no gate.
 pub fn measure(
     experiment: &Experiment,
     model: &PreparedModel<'_>,
@@ -233,12 +237,12 @@ pub fn measure(
     })
 }
 
-/// Frames with nothing that moves.
+/// Synthesis of frames in which nothing moves.
 fn untouched(frames: Synthesis<'_>) -> Synthesis<'_> {
     frames.motion(Independent::default())
 }
 
-/// The largest ‖Δ‖ in mm of each row of each test frame, whatever the world's outputs are.
+/// Largest ‖Δ‖ in mm of each row of each test frame, whatever the world's outputs are.
 fn largest_deformations_mm(world: &World, frames: usize) -> Vec<f64> {
     let synthesis = Synthesis::of(world).ideal().outputs(Outputs::all_deformations());
     let deformations_mm = synthesis.frames(Stream::Test, frames).outputs.values;
@@ -249,18 +253,18 @@ fn largest_deformations_mm(world: &World, frames: usize) -> Vec<f64> {
         .collect()
 }
 
-/// The device's gate, over tables.
+/// Gate of a device, applied to tables.
 pub(super) struct Gate {
-    /// Readings of all rows in Ω, one line.
+    /// Baseline: one line with the readings of all rows in Ω.
     pub baseline: Table,
-    /// Readings of a row.
+    /// Number of readings in a row.
     readings: usize,
-    /// Whether all rows are at rest or none, as behind a projection.
+    /// Whether rows are skipped all together or not at all, as behind a projection.
     whole_array: bool,
 }
 
 impl Gate {
-    /// A gate with the mean of so many of these `frames`, of the untouched sensor, as its baseline.
+    /// Gate whose baseline is the mean of so many of these `frames` of the untouched sensor.
     pub fn new(frames: Synthesis<'_>, baseline_frames: usize, whole_array: bool) -> Self {
         let frames = untouched(frames).frames(Stream::Training, baseline_frames);
         let readings = frames.inputs.names.len() / frames.rows;
@@ -268,14 +272,14 @@ impl Gate {
         Self { baseline, readings, whole_array }
     }
 
-    /// See [`woken_by_theory`]; the array wakes with any of its rows.
+    /// Upper bound by [`woken_by_theory`]; the array wakes with any of its rows.
     fn woken_by_theory(&self, k: f64, baseline_frames: usize) -> f64 {
         let of_row = woken_by_theory(k, self.readings, baseline_frames);
         let rows = self.baseline.values.len() / self.readings;
         if self.whole_array { -libm::expm1(rows as f64 * libm::log1p(-of_row)) } else { of_row }
     }
 
-    /// Whether each row of each line is at rest.
+    /// Whether each row of each line is untouched within the tolerance.
     pub fn at_rest(&self, readings: &Table, tolerance: f64) -> Vec<bool> {
         let tolerance = tolerance as f32;
         let baseline = to_f32(&self.baseline.values);
@@ -294,7 +298,7 @@ impl Gate {
     }
 }
 
-/// The estimate with the outputs of rows at rest in their places.
+/// Estimate with the outputs `rest_outputs` in the places of untouched rows.
 pub(super) fn gated(ungated: &[f64], rest_outputs: &[f64], at_rest: &[bool]) -> Vec<f64> {
     let per_row = ungated.len() / at_rest.len();
     let mut estimate = ungated.to_vec();
@@ -307,7 +311,7 @@ pub(super) fn gated(ungated: &[f64], rest_outputs: &[f64], at_rest: &[bool]) -> 
     estimate
 }
 
-/// The share that is true.
+/// Share of values that are true.
 pub(super) fn share(of: &[bool]) -> f64 {
     of.iter().filter(|b| **b).count() as f64 / of.len() as f64
 }

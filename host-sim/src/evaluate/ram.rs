@@ -1,28 +1,28 @@
-//! RAM that decoding takes on a 32-bit device.
+//! RAM for decoding on a 32-bit device.
 
 use model_core::blob::Model;
 use model_core::rbf::Format;
 use serde::Serialize;
 
-/// Bytes of RAM by what they hold, the larger buffers on the stack among them.
+/// RAM in bytes by its use, including the larger buffers on the stack.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct DecoderRam {
-    /// Where each row's weights are, which stay in flash.
+    /// Pointers to each row's weights, which stay in flash.
     pub decoder: usize,
     /// Readings of all rows.
     pub frame: usize,
     /// Outputs of all rows, and their status.
     pub estimate: usize,
-    /// Of a row, on the stack.
+    /// Scaled readings of one row, on the stack.
     pub scaled_readings: usize,
-    /// Of the whole array, on the stack; 0 without a projection.
+    /// Features of the whole array, on the stack; 0 without a projection.
     pub features: usize,
-    /// Of 128 centres, on the stack of the f32 kernel; 0 without a network of that format.
+    /// Activations of 128 centres, on the stack of f32 networks; 0 without a network of that format.
     pub activations: usize,
 }
 
 impl DecoderRam {
-    /// What `model` takes.
+    /// RAM for decoding with `model`.
     #[must_use]
     pub fn of(model: &Model<'_>) -> Self {
         let shape = model.shape();
@@ -39,14 +39,14 @@ impl DecoderRam {
         }
     }
 
-    /// All together.
+    /// Total in bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         let Self { decoder, frame, estimate, scaled_readings, features, activations } = self;
         decoder + frame + estimate + scaled_readings + features + activations
     }
 
-    /// All together behind a gate, which holds the baseline, a frame, and the answer to it, an estimate.
+    /// Total in bytes behind a gate, which holds the baseline (a frame) and its estimate.
     #[must_use]
     pub fn gated_bytes(&self) -> usize {
         self.bytes() + self.frame + self.estimate

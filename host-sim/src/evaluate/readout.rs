@@ -1,4 +1,4 @@
-//! What a readout does to readings, and to what is decoded from them, one fault after another.
+//! Effect of a readout's faults on readings and estimates, one fault after another.
 
 use serde::Serialize;
 use taxel_data::random::Stream;
@@ -11,21 +11,22 @@ use taxel_simulate::virtual_board::{VirtualBoard, all_readings, rows_read, scan}
 use crate::experiment::Experiment;
 use crate::metrics::{self, Errors};
 
-/// Faults, each with all before it. What a scene does not say takes these typical values.
+/// Fault of a readout, together with all faults before it. Parts that a scene does not set have these
+/// typical values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stage {
-    /// A converter of 12 bits.
+    /// Quantisation by a converter of 12 bits.
     Quantised,
-    /// All wires in one network.
+    /// Cross-talk: all wires form one network.
     CrossTalk,
-    /// 0.26 Ω in each row's switch (TS3A24159), 0.1 Ω in each wire's lead.
+    /// Series resistance: 0.26 Ω in each row's switch (TS3A24159), 0.1 Ω in each wire's lead.
     Series,
-    /// The same, and the firmware knows it.
+    /// Series resistance that the firmware knows and corrects for.
     Corrected,
-    /// Op-amp offsets within 0.5 mV (MCP6024), noise of half a count, a time constant of 5 µs.
+    /// Op-amp offsets within 0.5 mV (MCP6024), noise of half a count, and a time constant of 5 µs.
     Everything,
-    /// The same, and the firmware takes all series resistance for a tenth larger than it is.
+    /// Calibration error: the firmware takes all series resistance for a tenth larger than it is.
     Miscalibrated,
 }
 
@@ -40,7 +41,7 @@ impl Stage {
         Self::Miscalibrated,
     ];
 
-    /// What is simulated, for tables.
+    /// Name of the fault that the stage adds, for tables.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -53,7 +54,7 @@ impl Stage {
         }
     }
 
-    /// The readout of this stage.
+    /// Readout of this stage.
     #[must_use]
     pub fn readout(self, circuit: Circuit, of_scene: &Readout) -> Readout {
         let from = |stage: Self, given: Option<f64>, typical: f64| {
@@ -75,59 +76,60 @@ impl Stage {
 /// Errors of scanned readings against ideal ones.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ReadingErrors {
-    /// √mean((scanned/ideal − 1)²), in per cent.
+    /// Root mean square √mean((scanned/ideal − 1)²), in per cent.
     pub rms_percent: f64,
-    /// The largest |scanned/ideal − 1|, in per cent.
+    /// Largest |scanned/ideal − 1|, in per cent.
     pub largest_percent: f64,
-    /// Readings that could not be taken, open or shorted; they do not count above.
+    /// Number of readings that could not be taken, open or shorted; they do not count above.
     pub missing: usize,
 }
 
-/// One circuit with the faults of one stage.
+/// Result of one circuit with the faults of one stage.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Line {
-    /// The circuit.
+    /// Circuit of the readout.
     pub circuit: Circuit,
-    /// The faults.
+    /// Stage of the faults.
     pub stage: Stage,
-    /// What becomes of the readings.
+    /// Errors of the scanned readings.
     pub readings: ReadingErrors,
-    /// What is decoded from them, against truth, by group.
+    /// Errors of the outputs decoded from them, by group.
     pub errors: Vec<Errors>,
 }
 
-/// All circuits and stages on the same frames.
+/// Results of all circuits and stages on the same frames.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReadoutResult {
     /// Name of the scene.
     pub scene: String,
-    /// Seed of every draw.
+    /// Seed of every random draw.
     pub seed: u64,
-    /// Frames that were scanned, without the scene's noise.
+    /// Number of frames that were scanned, without the scene's noise.
     pub frames: usize,
     /// CRC-32 of the model, in hexadecimal.
     pub model_crc: String,
     /// Errors of decoding the ideal readings.
     pub ideal_errors: Vec<Errors>,
-    /// Errors of answering the mean of these frames.
+    /// Errors of always predicting the mean of these frames.
     pub mean_errors: Vec<Errors>,
-    /// Errors of decoding scanned readings.
+    /// Results by circuit and stage.
     pub lines: Vec<Line>,
 }
 
 impl ReadoutResult {
-    /// A line.
+    /// Result of a circuit at a stage.
     #[must_use]
     pub fn line(&self, circuit: Circuit, stage: Stage) -> Option<&Line> {
         self.lines.iter().find(|line| line.circuit == circuit && line.stage == stage)
     }
 }
 
-/// Scans `frames` of the scene with every circuit and stage and decodes them with `model`, whose
-/// columns must be the scene's.
+/// Scans `frames` of the scene with every circuit and stage and decodes them with `model`.
+///
+/// The model's columns must be the scene's.
 ///
 /// # Errors
-/// A sensor that the virtual board does not have, or a transaction that its parts refuse.
+/// [`Error`](crate::Error) for a sensor that the virtual board does not have, or a transaction that its parts refuse.
 pub fn measure(
     experiment: &Experiment,
     model: &PreparedModel<'_>,

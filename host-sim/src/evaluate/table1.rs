@@ -1,4 +1,4 @@
-//! Table 1 of the paper: error against spread and noise, by every definition.
+//! Table 1 of the paper: errors by spread and noise, by every definition.
 
 use std::path::Path;
 
@@ -23,37 +23,37 @@ use crate::metrics::{self, Definition, Errors, Measure};
 /// Name of the K-centre network in tables and results.
 pub const NETWORK: &str = "network";
 
-/// Lowest and highest cell of the paper's printed Table 1, in per cent of an error whose
-/// definition the paper does not state.
+/// Lowest and highest cell of the paper's printed Table 1, in per cent. The paper does not state its
+/// definition of the error.
 pub const PAPER_PRINTED_PERCENT: [f64; 2] = [6.5, 11.4];
 
-/// The whole table.
+/// Table 1 of a scene: errors of every decoder at every noise level.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Table1 {
-    /// Centres of each row-wire's network.
+    /// Number of centres of each row-wire's network.
     pub centres: usize,
     /// Whether the networks have an affine tail.
     pub affine_tail: bool,
-    /// Frames each cell was trained on.
+    /// Number of frames on which each cell was trained.
     pub training_frames: usize,
-    /// Frames each cell was evaluated on.
+    /// Number of frames on which each cell was evaluated.
     pub test_frames: usize,
-    /// Frames, and centres, of the standard networks.
+    /// Number of frames, and of centres, of the standard networks.
     pub standard_frames: usize,
-    /// One entry a noise level.
+    /// Columns of the table, one a noise level.
     pub columns: Vec<Column>,
-    /// What the paper prints, where the reader supplied it.
+    /// Cells as the paper prints them, where the reader supplied them.
     pub printed: Vec<Printed>,
 }
 
-/// One cell as the paper prints it.
+/// Cell as the paper prints it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Printed {
     /// Spread of its line.
     pub spread: f64,
     /// Noise level of its column, as a fraction.
     pub noise_level: f64,
-    /// The number, in per cent.
+    /// Error in per cent.
     pub percent: f64,
 }
 
@@ -61,7 +61,7 @@ impl Printed {
     /// Reads printed cells from a file with the columns `spread`, `noise_level` and `percent`.
     ///
     /// # Errors
-    /// A column or a value that is missing.
+    /// [`Error`] for a file that cannot be read, or a column or value that is missing.
     pub fn from_file(file: &CsvFile) -> taxel_data::Result<Vec<Self>> {
         let columns = file.columns(["spread", "noise_level", "percent"])?;
         let cell = |line: usize| {
@@ -79,13 +79,13 @@ impl Printed {
     }
 }
 
-/// All that was measured at one noise level.
+/// Errors of all decoders at one noise level.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Column {
     /// Noise level p, as a fraction.
     pub noise_level: f64,
-    /// Baselines, then the networks, spread after spread. A standard network (K = N) is left out where its
-    /// interpolation matrix is singular.
+    /// Baselines, then the networks, spread after spread. A standard network (K = N) is omitted where
+    /// its interpolation matrix is singular.
     pub decoders: Vec<Entry>,
 }
 
@@ -101,7 +101,8 @@ pub struct Entry {
 }
 
 impl Column {
-    /// Errors of the decoder of that name, and of that spread if it has one; empty if there is none.
+    /// Errors of the decoder called `decoder`, with that spread if it has one; empty if there is no such
+    /// decoder.
     #[must_use]
     pub fn errors(&self, decoder: &str, spread: Option<f64>) -> &[Errors] {
         let mut entries = self.decoders.iter();
@@ -126,10 +127,10 @@ struct RowNetworks {
     standard: Vec<Option<StandardNetwork>>,
 }
 
-/// Computes the table that the scene asks for.
+/// Computes Table 1 as the scene asks for.
 ///
 /// # Errors
-/// A scene without `[table1]`; else as [`train`](taxel_learn::train::train).
+/// [`Error`] for a scene without `[table1]`, or an error of [`train`](taxel_learn::train::train).
 pub fn compute(experiment: &Experiment, progress: &dyn Progress) -> Result<Table1> {
     let settings = experiment.table1.as_ref().ok_or_else(|| Error::Syntax {
         scene: experiment.name.clone(),
@@ -157,7 +158,7 @@ pub fn compute(experiment: &Experiment, progress: &dyn Progress) -> Result<Table
     })
 }
 
-/// A decoder, and its spread if it has one.
+/// Decoder, with its spread if it has one.
 type Spread = (Option<f64>, Box<dyn Decoder>);
 
 fn entry(decoder: &dyn Decoder, spread: Option<f64>, test: &Dataset, measure: &Measure) -> Entry {
@@ -165,7 +166,7 @@ fn entry(decoder: &dyn Decoder, spread: Option<f64>, test: &Dataset, measure: &M
     Entry { decoder: judged.decoder, spread, errors: judged.errors }
 }
 
-/// Every decoder of the table at one noise level, fitted to `training`.
+/// Fits every decoder of the table at one noise level to `training`.
 fn decoders(
     settings: &Settings,
     seed: u64,
@@ -201,8 +202,8 @@ fn row_networks(
     row: usize,
     training: &Dataset,
 ) -> Result<RowNetworks> {
-    let block = training.block(row);
-    let samples = Samples::new(&block);
+    let table = training.row_table(row);
+    let samples = Samples::new(&table);
     let options = |spread| {
         let (centres, affine_tail) = (settings.centres, settings.affine_tail);
         let mut options = Options { centres, spread, affine_tail, seed, ..Options::default() };
@@ -212,7 +213,7 @@ fn row_networks(
     };
     // The centres do not depend on the spread.
     let centres = samples.centres(&options(1.0), row);
-    let few = block.first(settings.standard_frames);
+    let few = table.first(settings.standard_frames);
     let each = settings.spreads.par_iter().map(|&spread| {
         let network = samples.fit(&centres, &options(spread))?;
         Ok((network, StandardNetwork::fit(&few, spread)))
@@ -222,8 +223,8 @@ fn row_networks(
 }
 
 impl Table1 {
-    /// The table as CSV: one line a noise level, decoder, spread, group and definition. Values that
-    /// are not defined are empty.
+    /// Table as CSV: one line a noise level, decoder, spread, group and definition. Undefined values are
+    /// empty.
     #[must_use]
     pub fn to_csv(&self) -> String {
         use std::fmt::Write as _;
@@ -255,12 +256,12 @@ impl Table1 {
     /// Writes [`to_csv`](Self::to_csv) to `path`.
     ///
     /// # Errors
-    /// A file that cannot be written.
+    /// [`Error`] for a file that cannot be written.
     pub fn write_csv(&self, path: &Path) -> taxel_data::Result<()> {
         output::write_bytes(path, self.to_csv().as_bytes())
     }
 
-    /// The groups of outputs that the table covers.
+    /// Groups of outputs that the table covers.
     #[must_use]
     pub fn groups(&self) -> Vec<&str> {
         let first = self.columns.first().and_then(|column| column.decoders.first());
@@ -271,7 +272,8 @@ impl Table1 {
             .collect()
     }
 
-    /// The largest ratio of the network's RMSE to that of the mean over all cells of `group`.
+    /// Largest ratio of the network's RMSE to the RMSE of always predicting the mean, over all cells of
+    /// `group`.
     #[must_use]
     pub fn worst_ratio_to_mean(&self, group: &str) -> Option<f64> {
         let rmse = |errors: &[Errors]| errors.iter().find(|e| e.group == group).map(|e| e.rmse);

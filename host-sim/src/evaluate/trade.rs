@@ -1,7 +1,8 @@
-//! The trade between speed and accuracy: every knob of a scene's decoder, its errors and its cost.
+//! Trade between speed and accuracy: every setting of a scene's decoder, its errors and its cost.
 //!
-//! Errors are measured on test frames through the blob that a device would get; instructions and cycles are
-//! those measured of the firmware's own code ([`Costs`]), so only shapes that were measured can be traded.
+//! Errors are measured on test frames through the blob that a device would get. Instructions and cycles
+//! were measured on the firmware's own code ([`Costs`]), so only shapes that were measured can be
+//! traded.
 
 use std::collections::BTreeMap;
 
@@ -24,38 +25,38 @@ mod choice;
 mod gating;
 mod judge;
 
-pub use choice::Limits;
+pub use choice::Bounds;
 use gating::Gates;
 use judge::{Judge, Knobs, Sets};
 
-/// The largest blob that a slot of the firmware's images holds.
+/// Largest blob in bytes that a slot of the firmware's images holds.
 pub const SLOT_BYTES: usize = 131_072;
 
-/// What to vary.
+/// Settings that a trade varies.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
-    /// Centres of each network, K.
+    /// Numbers of centres K of each network.
     pub centres: Vec<usize>,
-    /// Samples averaged for each reading: white noise falls with the root.
+    /// Numbers of samples averaged for each reading: white noise falls with the square root.
     pub samples_averaged: Vec<usize>,
-    /// Tolerances of gates, in standard deviations of the averaged readings' noise; there are always points
-    /// without a gate as well.
+    /// Tolerances of gates, in standard deviations of the averaged readings' noise. There are always
+    /// points without a gate as well.
     pub gate_k: Vec<f64>,
     /// Clock of the device, for times.
     pub clock_mhz: f64,
 }
 
-/// A number format and an exponential that networks are decoded in.
+/// Number format and exponential with which networks are decoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Arithmetic {
-    /// The format.
+    /// Number format.
     pub format: Format,
-    /// The exponential.
+    /// Exponential.
     pub exponential: Exponential,
 }
 
 impl Arithmetic {
-    /// Every arithmetic that points are decoded in, the cheapest format first.
+    /// Every arithmetic of the points, the cheapest format first.
     ///
     /// Direct distances are decoded with every exponential, the other formats with their own.
     pub fn all() -> impl Iterator<Item = Self> {
@@ -68,13 +69,14 @@ impl Arithmetic {
         })
     }
 
-    /// Name, as `cargo xtask cycles` has it.
+    /// Name of the arithmetic, as `cargo xtask cycles` spells it.
     #[must_use]
     pub fn name(self) -> String {
         kernel_name(self.format, self.exponential)
     }
 }
 
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
 fn by_name<S: serde::Serializer>(
     arithmetic: &Arithmetic,
     serializer: S,
@@ -82,7 +84,7 @@ fn by_name<S: serde::Serializer>(
     serializer.serialize_str(&arithmetic.name())
 }
 
-/// One way to decode, what it costs and how far it errs.
+/// Way to decode, with its cost and its errors.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Point {
     /// Format and exponential.
@@ -90,48 +92,49 @@ pub struct Point {
     pub arithmetic: Arithmetic,
     /// Whether one network decodes all rows, behind a projection, instead of one a row.
     pub whole_array: bool,
-    /// Centres of each network, K.
+    /// Number of centres K of each network.
     pub centres: usize,
     /// Width σ on scaled inputs.
     pub spread: f64,
-    /// Whether there is an affine tail.
+    /// Whether the networks have an affine tail.
     pub affine_tail: bool,
-    /// Samples averaged for each reading.
+    /// Number of samples averaged for each reading.
     pub samples_averaged: usize,
     /// Tolerance of the gate, in standard deviations of the averaged readings' noise; `None` without a gate.
     pub gate_k: Option<f64>,
     /// Errors on the test frames, by group.
     pub errors: Vec<Errors>,
-    /// RMSE over the smallest of all points, by group.
+    /// Ratio of the RMSE to the smallest of all points, by group.
     pub ratio_to_best: Vec<f64>,
-    /// One frame on a Cortex-M4F; behind a gate the mean of the test frames.
+    /// Cost of one frame on a Cortex-M4F; behind a gate, the mean over the test frames.
     #[serde(flatten)]
     pub frame: Cost,
-    /// The same in µs at the plan's clock.
+    /// Time of one frame in µs, at the plan's clock.
     pub frame_us: f64,
-    /// The blob.
+    /// Size of the blob.
     pub flash_bytes: usize,
-    /// Decoder, frame, estimate and working space; for a gate also the baseline and the answer to it.
+    /// Size of decoder, frame, estimate and working memory; for a gate also the baseline and its
+    /// estimate.
     pub ram_bytes: usize,
-    /// Whether no other point is at least as good in cycles, samples and the RMSE of the chosen group, and
-    /// better in one.
+    /// Whether the point is on the Pareto front: no other point is at least as good in cycles, samples
+    /// and the RMSE of the chosen group, and better in one.
     pub on_front: bool,
 }
 
 impl Point {
-    /// RMSE of a group.
+    /// RMSE of a group, in its unit.
     #[must_use]
     pub fn rmse(&self, group: &str) -> f64 {
         self.errors.iter().find(|e| e.group == group).map_or(f64::NAN, |e| e.rmse)
     }
 
-    /// The arithmetic, and whether it decodes the whole array at once.
+    /// Arithmetic of the point, and whether it decodes the whole array at once.
     #[must_use]
     pub fn way(&self) -> String {
         format!("{}{}", self.arithmetic.name(), if self.whole_array { " array" } else { "" })
     }
 
-    /// The point's knobs in a few words.
+    /// Settings of the point in a few words.
     #[must_use]
     pub fn name(&self) -> String {
         let tail = if self.affine_tail { " + tail" } else { "" };
@@ -144,30 +147,30 @@ impl Point {
     }
 }
 
-/// Every point of a scene.
+/// Trade of a scene: every point, and the one chosen.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Trade {
     /// Name of the scene.
     pub scene: String,
-    /// Noise level of one sample.
+    /// Noise level of one sample, as a fraction.
     pub noise_level: f64,
-    /// Test frames.
+    /// Number of test frames.
     pub test_frames: usize,
-    /// Whose code the costs are.
+    /// Compiler of the code whose costs are given.
     pub compiler: String,
     /// Clock for times.
     pub clock_mhz: f64,
-    /// The group that front and choice go by.
+    /// Group of outputs by which front and choice are determined.
     pub group: String,
-    /// Its unit.
+    /// Unit of that group.
     pub unit: String,
     /// Errors of the baselines, from one sample a reading.
     pub baselines: Vec<DecoderErrors>,
-    /// All points.
+    /// Every point that was judged.
     pub points: Vec<Point>,
-    /// The point that [`Trade::choose`] picked.
+    /// Index of the point that [`Trade::choose`] picked.
     pub chosen: Option<usize>,
-    /// Every point's blob: points that differ in the exponential alone share one.
+    /// Index of every point's blob: points that differ only in the exponential share one.
     #[serde(skip)]
     blobs: Vec<usize>,
     #[serde(skip)]
@@ -175,28 +178,28 @@ pub struct Trade {
 }
 
 impl Trade {
-    /// Picks the point within `limits`, if any are given.
+    /// Picks the point within `bounds`, if any are given.
     ///
     /// # Errors
-    /// No point is within them.
-    pub fn choose(&mut self, limits: &Limits) -> std::result::Result<(), NoPoint> {
-        self.chosen = limits.choose(&self.points, &self.group, &self.unit)?;
+    /// [`NoPoint`] if no point is within them.
+    pub fn choose(&mut self, bounds: &Bounds) -> std::result::Result<(), NoPoint> {
+        self.chosen = bounds.choose(&self.points, &self.group, &self.unit)?;
         Ok(())
     }
 
-    /// The groups of outputs, with their units.
+    /// Groups of outputs, with their units.
     pub fn groups(&self) -> impl Iterator<Item = (&str, &str)> {
         let errors = self.baselines.first().map_or(&[][..], |baseline| &baseline.errors);
         errors.iter().map(|errors| (errors.group.as_str(), errors.unit.as_str()))
     }
 
-    /// The blob of a point.
+    /// Blob of a point.
     #[must_use]
     pub fn blob(&self, point: usize) -> &[u8] {
         &self.distinct_blobs[self.blobs[point]]
     }
 
-    /// What a device is configured with for a point behind a gate: its tolerance, relative to each reading.
+    /// Tolerance for the configuration of a device, relative to each reading, for a point behind a gate.
     #[must_use]
     pub fn rest_tolerance(&self, point: usize) -> Option<f64> {
         let point = &self.points[point];
@@ -204,10 +207,11 @@ impl Trade {
     }
 }
 
-/// Trains and judges every point of `plan` for the scene; the front goes by the RMSE of `group`.
+/// Trains and judges every point of `plan` for the scene. The front is determined by the RMSE of
+/// `group`.
 ///
 /// # Errors
-/// A scene of another shape than was measured, and a plan that was not measured.
+/// [`Error`](crate::Error) for a scene of another shape than was measured, or a plan that was not measured.
 pub fn compute(
     experiment: &Experiment,
     plan: &Plan,
@@ -217,7 +221,7 @@ pub fn compute(
     let costs = Costs::measured()?;
     check(experiment, plan, &costs)?;
     let (world, t) = (&experiment.world, &experiment.training);
-    // Each row's network, and one for the array.
+    // One network for each row, and one for the array.
     let networks = world.read_rows.len() + 1;
     progress.stage("trade", plan.samples_averaged.len() * plan.centres.len() * networks);
     let measure = experiment.measure();
@@ -294,7 +298,7 @@ fn check(experiment: &Experiment, plan: &Plan, costs: &Costs) -> std::result::Re
     Ok(())
 }
 
-/// Fills in what compares points with each other.
+/// Fills in the fields that compare points with each other.
 fn compare(points: &mut [Point], group: &str) {
     let mut best: BTreeMap<String, f64> = BTreeMap::new();
     for errors in points.iter().flat_map(|point| &point.errors) {

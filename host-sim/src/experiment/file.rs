@@ -1,4 +1,4 @@
-//! The scene as it stands in the file, before defaults are filled in.
+//! Scene as it stands in its file, before defaults are filled in.
 
 use serde::Deserialize;
 use taxel_simulate::World;
@@ -52,7 +52,7 @@ fn default_stiffness() -> Vector3 {
     sensor::TYPICAL_STIFFNESS_N_PER_MM
 }
 
-/// A number format by its name.
+/// Number format by its name.
 pub(super) mod format {
     use model_core::rbf::Format;
     use serde::{Deserialize, Deserializer, de::Error};
@@ -95,7 +95,7 @@ impl SceneFile {
         };
         let mut readout = self.readout;
         let read_rows = match readout.row_wires.take() {
-            // Row 0 does not exist in a file; it becomes one that validation refuses.
+            // Row 0 does not exist in a file; it becomes one that the check refuses.
             Some(rows) => rows.into_iter().map(|row| row.wrapping_sub(1)).collect(),
             None => (0..sensor.row_wires).collect(),
         };

@@ -1,4 +1,4 @@
-//! One chart: two axes, some series, a legend or labels at the end of the lines.
+//! Charts: two axes, some series, and a legend or labels at the ends of lines.
 
 use std::fmt::Write as _;
 
@@ -6,18 +6,18 @@ use super::format::significant;
 use super::svg::{Anchor, Px, Shape, Svg, TEXT_PX, text_width};
 use super::ticks::Ticks;
 
-/// How a series is drawn.
+/// Mark of a series.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Mark {
-    /// A line through the points; a missing value is a gap.
+    /// Line through the points; a missing value is a gap.
     Line,
-    /// A line with a shape at every point.
+    /// Line with a shape at every point.
     LineAnd(Shape),
-    /// A dashed line.
+    /// Dashed line.
     Dashed,
-    /// A dotted line.
+    /// Dotted line.
     Dotted,
-    /// A shape at every point.
+    /// Shape at every point.
     Points(Shape),
     /// Bars from zero, this wide on the x axis.
     Bars(f64),
@@ -25,7 +25,7 @@ pub enum Mark {
     From(Vec<f64>),
 }
 
-/// One series of values.
+/// Series of values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
     /// Name in the legend; none if empty.
@@ -34,32 +34,32 @@ pub struct Series {
     pub class: &'static str,
     /// Opacity, for series that are graded.
     pub opacity: f64,
-    /// How it is drawn.
+    /// Mark of the series.
     pub mark: Mark,
-    /// x and y; a y that is not finite is missing.
+    /// Points [x, y]; a y that is not finite is missing.
     pub points: Vec<[f64; 2]>,
 }
 
 impl Series {
-    /// A series in full colour.
+    /// Series in full colour.
     pub fn new(name: &str, class: &'static str, mark: Mark, points: Vec<[f64; 2]>) -> Self {
         Self { name: name.into(), class, opacity: 1.0, mark, points }
     }
 }
 
-/// One axis.
+/// Axis of a chart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
-    /// What it measures, with its unit.
+    /// Quantity on the axis, with its unit.
     pub label: String,
-    /// Its range and ticks.
+    /// Range and ticks.
     pub ticks: Ticks,
     /// Whether it is logarithmic.
     pub logarithmic: bool,
 }
 
 impl Axis {
-    /// A linear axis.
+    /// Linear axis.
     pub fn linear(label: impl Into<String>, ticks: Ticks) -> Self {
         Self { label: label.into(), ticks, logarithmic: false }
     }
@@ -75,18 +75,18 @@ impl Axis {
     }
 }
 
-/// One chart.
+/// Chart with two axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart {
-    /// What it is read out as.
+    /// Title that screen readers read out.
     pub title: String,
-    /// The axis along the bottom.
+    /// Axis along the bottom.
     pub x: Axis,
-    /// The axis up the left side; its label stands above it, to be read level.
+    /// Axis up the left side; its label stands above it, to be read level.
     pub y: Axis,
-    /// What is drawn, in order.
+    /// Series, in the order in which they are drawn.
     pub series: Vec<Series>,
-    /// Ranges of x that are shaded, to tell neighbours apart.
+    /// Ranges of x that are shaded, to separate neighbours.
     pub bands: Vec<[f64; 2]>,
     /// Words below points, as far as there is room.
     pub notes: Vec<([f64; 2], String)>,
@@ -94,31 +94,31 @@ pub struct Chart {
     pub end_labels: bool,
 }
 
-/// Where things are, in px.
+/// Layout of a chart, in px.
 struct Frame<'c> {
     chart: &'c Chart,
     left: f64,
     right: f64,
     top: f64,
     bottom: f64,
-    /// Marks shrink where they would cover each other.
+    /// Size of marks, which shrink where they would cover each other.
     mark_size: f64,
 }
 
 const LINE_PX: f64 = TEXT_PX + 7.0;
 const SWATCH_PX: f64 = 24.0;
-/// Bars are no wider, however few they are.
+/// Largest width of a bar, in px.
 const BAR_PX: f64 = 30.0;
 
 impl Chart {
-    /// The chart at this size.
+    /// Draws the chart in this size.
     pub fn draw(&self, [width, height]: [f64; 2]) -> String {
         let mut svg = Svg::new(width, height, &self.title);
         let tick_width =
             |ticks: &Ticks| ticks.at.iter().map(|(_, label)| text_width(label)).fold(0.0, f64::max);
         let named = self.series.iter().filter(|series| !series.name.is_empty());
         let end_width = named.map(|s| text_width(&s.name)).fold(0.0, f64::max) + 12.0;
-        // Charts that stand above each other are flush unless a label is long.
+        // Charts that stand above each other are aligned unless a label is long.
         let left = tick_width(&self.y.ticks).max(5.0 * text_width("0")) + 10.0;
         let mut frame = Frame {
             chart: self,
@@ -147,7 +147,7 @@ impl Chart {
             let beside = |[x, y]: &[f64; 2]| {
                 (middle - x).abs() > text_width(note) + 4.0 || (below - y).abs() > TEXT_PX
             };
-            // What has no room is left out.
+            // Words without room are omitted.
             if noted.iter().all(beside) {
                 svg.text(middle, below, Anchor::Middle, "note-in-chart", note);
                 noted.push([middle, below]);
@@ -159,7 +159,7 @@ impl Chart {
         svg.finish()
     }
 
-    /// The chart twice, for wide and for narrow windows: text keeps its size on both.
+    /// Draws the chart twice, for wide and for narrow windows: text keeps its size on both.
     pub fn draw_responsive(&self, wide: [f64; 2], narrow: [f64; 2]) -> String {
         format!(
             "<div class=\"wide\">{}</div><div class=\"narrow\">{}</div>\n",
@@ -177,8 +177,8 @@ fn opacity(series: &Series) -> String {
     }
 }
 
-/// Draws names and marks: beside the label of the y axis where there is room, else below it.
-/// Returns where the legend ends.
+/// Draws names and marks: beside the label of the y axis where there is room, otherwise below it.
+/// Returns the y coordinate at which the legend ends.
 fn legend(svg: &mut Svg, series: &[Series], width: f64, label_width: f64) -> f64 {
     let named: Vec<_> = series.iter().filter(|series| !series.name.is_empty()).collect();
     let entry = |series: &Series| SWATCH_PX + text_width(&series.name) + 14.0;
@@ -247,7 +247,7 @@ impl Frame<'_> {
             svg.text(left - 7.0, y + TEXT_PX * 0.35, Anchor::End, "tick", label);
         }
         svg.line([left, bottom], [right, bottom], "axis");
-        // Where labels are dense, only every so many are written; their ticks stay.
+        // Where labels are dense, only some are written; all ticks stay.
         let ticks = &chart.x.ticks.at;
         let fits = |every: &usize| {
             let written: Vec<_> = ticks.iter().step_by(*every).collect();
@@ -297,7 +297,7 @@ impl Frame<'_> {
         }
     }
 
-    /// Missing values and values off the scale break the line.
+    /// Draws a line, broken at missing values and at values off the scale.
     fn draw_line(&self, svg: &mut Svg, series: &Series, class: &str) {
         let mut d = String::new();
         let mut pen = 'M';
@@ -321,7 +321,7 @@ impl Frame<'_> {
             if self.is_drawn(*y) {
                 svg.path(&shape.path(place, self.mark_size), class);
             } else if *y > self.chart.y.ticks.high {
-                // Off the scale: an arrow at its edge, with the value beside it.
+                // A value off the scale is an arrow at the edge, with the value beside it.
                 let x = place[0];
                 svg.path(&Shape::Triangle.path([x, self.top + 5.0], 1.0), class);
                 let label = significant(*y, 2);
@@ -334,7 +334,7 @@ impl Frame<'_> {
         (self.chart.y.ticks.low..=self.chart.y.ticks.high).contains(&y)
     }
 
-    /// Names at the last point of their lines, moved apart where they would overlap.
+    /// Writes names at the last points of their lines, moved apart where they would overlap.
     fn draw_end_labels(&self, svg: &mut Svg) {
         const GAP: f64 = TEXT_PX + 3.0;
         let named = self.chart.series.iter().filter(|series| !series.name.is_empty());

@@ -1,4 +1,4 @@
-//! The figures: what each one shows, and what it says about itself.
+//! Figures of the report, with their captions.
 
 use super::chart::{Axis, Chart, Mark, Series};
 use super::format::{percent, quantity, significant, symbol, with_unit};
@@ -11,12 +11,12 @@ use taxel_learn::decoders::{linear, mean, standard};
 use crate::evaluate::table1::{Column, NETWORK, Table1};
 use crate::run::{Example, ExampleOutput, RunResult};
 
-/// A figure without its number.
+/// Figure without its number.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
-    /// What it shows, with units.
+    /// Description of the figure, with units.
     pub caption: String,
-    /// The drawings.
+    /// Drawings of the figure, as SVG.
     pub drawing: String,
 }
 
@@ -24,12 +24,12 @@ const WIDE: [f64; 2] = [920.0, 230.0];
 const WIDE_SINGLE: [f64; 2] = [920.0, 340.0];
 const NARROW: [f64; 2] = [360.0, 270.0];
 
-/// How the example frame was chosen, for captions.
+/// Choice of the example frame in words, for captions.
 fn chosen(result: &RunResult) -> String {
     format!("test frame {} (from 0), the one with the largest output", result.example.frame)
 }
 
-/// Position of every value of a row of `values`, from 1.
+/// Values of a row with their positions, from 1.
 fn numbered(values: &[f64]) -> Vec<[f64; 2]> {
     values.iter().enumerate().map(|(i, value)| [i as f64 + 1.0, *value]).collect()
 }
@@ -38,7 +38,7 @@ fn difference(of: &[f64], to: &[f64]) -> Vec<f64> {
     of.iter().zip(to).map(|(a, b)| a - b).collect()
 }
 
-/// Readings of one row-wire, ideal and noisy, and what lies between them.
+/// Figure of the readings of one row-wire, ideal and noisy, and their difference.
 pub fn readings(result: &RunResult) -> Figure {
     let example = &result.example;
     let row_wire = example.reading_row_wire;
@@ -89,7 +89,7 @@ pub fn readings(result: &RunResult) -> Figure {
     }
 }
 
-/// The axis of electrodes, row-wire after row-wire, and the bands that part row-wires.
+/// Axis of electrodes, row-wire after row-wire, and the bands that separate row-wires.
 fn electrodes(result: &RunResult) -> (Axis, Vec<[f64; 2]>) {
     let count = result.example.electrodes_mm.len();
     let rows = result.rows.len().max(1);
@@ -109,7 +109,7 @@ fn electrodes(result: &RunResult) -> (Axis, Vec<[f64; 2]>) {
     (Axis::linear(label, ticks), bands.collect())
 }
 
-/// Truth and estimate by electrode: one chart an axis.
+/// Figure of truth and estimate by electrode: one chart an axis.
 pub fn by_electrode(result: &RunResult) -> Figure {
     let chart = |output: &ExampleOutput| {
         let (x, bands) = electrodes(result);
@@ -155,7 +155,7 @@ fn what_is_decoded(result: &RunResult) -> &'static str {
     }
 }
 
-/// Errors by electrode: one chart an axis.
+/// Figure of errors by electrode: one chart an axis.
 pub fn error_by_electrode(result: &RunResult) -> Figure {
     let outputs = &result.example.outputs;
     let error = |output: &ExampleOutput| difference(&output.estimate, &output.truth);
@@ -190,13 +190,13 @@ pub fn error_by_electrode(result: &RunResult) -> Figure {
     }
 }
 
-/// The output that maps and sweeps show: z if there is one.
+/// Output that maps and sweeps show: z if there is one.
 pub fn shown(example: &Example) -> Option<&ExampleOutput> {
     let z = |output: &&ExampleOutput| super::format::axis(&output.group) == Some('z');
     example.outputs.iter().find(z).or(example.outputs.last())
 }
 
-/// Maps over the face: true, decoded, difference.
+/// Figure of maps over the face: true, decoded, difference.
 pub fn maps(result: &RunResult, output: &ExampleOutput) -> Figure {
     let [x_mm, y_mm, _] = result.scene.size_mm;
     let example = &result.example;
@@ -241,7 +241,7 @@ pub fn maps(result: &RunResult, output: &ExampleOutput) -> Figure {
     }
 }
 
-/// The RMSE of a decoder, the least over its spreads if it has any; NaN without a finite one.
+/// Least RMSE of a decoder over its spreads, or its only one; NaN without a finite one.
 fn best(column: &Column, decoder: &str, group: &str) -> f64 {
     let entries = column.decoders.iter().filter(|entry| entry.decoder == decoder);
     let finite = entries.map(|entry| rmse(&entry.errors, group)).filter(|rmse| rmse.is_finite());
@@ -265,19 +265,19 @@ fn decoder_names(table: &Table1) -> Vec<&str> {
     names
 }
 
-/// Class and mark of a decoder's line.
+/// CSS class and mark of a decoder's line.
 fn line_style(decoder: &str) -> (&'static str, Mark) {
     match decoder {
         mean::NAME => ("muted", Mark::Dashed),
         standard::NAME => ("c2", Mark::LineAnd(Shape::Square)),
         NETWORK => ("c1", Mark::LineAnd(Shape::Circle)),
-        // Broken, so that it and a network that does no better are both seen.
+        // A broken line, so that it can be seen together with a network that is no better.
         linear::NAME => ("c3 broken", Mark::LineAnd(Shape::Triangle)),
         _ => ("c4", Mark::LineAnd(Shape::Diamond)),
     }
 }
 
-/// Error against noise, by decoder.
+/// Figure of error against noise, by decoder.
 pub fn error_by_noise(table: &Table1, group: &str, unit: &str) -> Figure {
     let positive = || table.columns.iter().filter(|column| column.noise_level > 0.0);
     let points = |decoder: &str| -> Vec<[f64; 2]> {
@@ -289,7 +289,7 @@ pub fn error_by_noise(table: &Table1, group: &str, unit: &str) -> Figure {
         let lines = lines.iter().filter(move |(name, _)| (*name == standard::NAME) == of_standard);
         lines.flat_map(|(_, points)| points.iter().map(|[_, y]| *y))
     };
-    // The standard network may be off by orders of magnitude; the others must stay apart.
+    // The standard network's error may be larger by orders of magnitude; the others must stay apart.
     let limit = 2.0 * ticks::extent(heights(false)).map_or(f64::INFINITY, |(_, high)| high);
     let near = heights(true).filter(|y| *y <= limit);
     let y = ticks::linear(heights(false).chain(near).chain([0.0]), 5);
@@ -298,7 +298,7 @@ pub fn error_by_noise(table: &Table1, group: &str, unit: &str) -> Figure {
     let name = symbol(group);
     let noise = ticks::logarithmic_percent(positive().map(|column| column.noise_level));
     let series = lines.into_iter().map(|(name, mut points)| {
-        // A reference runs from edge to edge.
+        // A reference line runs from edge to edge.
         if name == mean::NAME
             && let [[_, first], .., [_, last]] | [[_, first @ last]] = points[..]
         {
@@ -346,7 +346,7 @@ pub fn error_by_noise(table: &Table1, group: &str, unit: &str) -> Figure {
 
 const SHAPES: [Shape; 4] = [Shape::Circle, Shape::Square, Shape::Triangle, Shape::Diamond];
 
-/// Error against spread, one line a noise level.
+/// Figure of error against spread, one line a noise level.
 pub fn error_by_spread(table: &Table1, group: &str, unit: &str) -> Figure {
     let name = symbol(group);
     let x = ticks::linear(table.columns.iter().flat_map(Column::spreads), 6);
@@ -382,7 +382,7 @@ pub fn error_by_spread(table: &Table1, group: &str, unit: &str) -> Figure {
     }
 }
 
-/// The network's RMSE by row-wire, one chart a group.
+/// Figure of the network's RMSE by row-wire, one chart a group.
 pub fn by_row_wire(result: &RunResult) -> Figure {
     let groups = result.rows.first().map_or(&[][..], |row| &row.errors);
     let mut drawing = String::from("<div class=\"panels\">\n");

@@ -1,9 +1,9 @@
 //! Numbers and names as people read them.
 
-/// What stands for a value that is not defined.
+/// Text for a value that is not defined.
 pub const UNDEFINED: &str = "–";
 
-/// `value` with so many decimals and a true minus sign.
+/// Text of `value` with so many decimals and a true minus sign.
 pub fn fixed(value: f64, decimals: usize) -> String {
     if !value.is_finite() {
         return UNDEFINED.into();
@@ -13,19 +13,19 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     if value < 0.0 && !zero { format!("\u{2212}{text}") } else { text }
 }
 
-/// Decimals that give `value` so many significant digits.
+/// Number of decimals that gives `value` so many significant digits.
 pub fn decimals(value: f64, digits: usize) -> usize {
     let magnitude = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
-    // A value that is not finite has none: casts saturate, and NaN becomes 0.
+    // A value that is not finite has no decimals: casts saturate, and NaN becomes 0.
     (digits as f64 - 1.0 - magnitude).clamp(0.0, 9.0) as usize
 }
 
-/// `value` with so many significant digits.
+/// Text of `value` with so many significant digits.
 pub fn significant(value: f64, digits: usize) -> String {
     fixed(value, decimals(value, digits))
 }
 
-/// `count` in groups of three digits.
+/// Text of `count` in groups of three digits.
 pub fn grouped(count: usize) -> String {
     let digits = count.to_string();
     let mut text = String::new();
@@ -38,16 +38,16 @@ pub fn grouped(count: usize) -> String {
     text
 }
 
-/// A fraction in per cent, without needless digits.
+/// Text of a fraction in per cent, without needless digits.
 pub fn percent(fraction: f64) -> String {
     if !fraction.is_finite() {
         return UNDEFINED.into();
     }
-    // Rounded, as 0.07 · 100 is not 7.
+    // Rounding first, since 0.07 · 100 is not 7.
     format!("{}\u{a0}%", (fraction * 1e8).round() / 1e6)
 }
 
-/// How the group of outputs `dz_mm` is written: its symbol Δz.
+/// Symbol of a group of outputs: Δz for `dz_mm`.
 pub fn symbol(group: &str) -> String {
     match axis(group) {
         Some(axis) if group.starts_with('d') => format!("Δ{axis}"),
@@ -56,7 +56,7 @@ pub fn symbol(group: &str) -> String {
     }
 }
 
-/// The quantity that the group of outputs `dz_mm` measures.
+/// Quantity that a group of outputs measures: deformation for `dz_mm`.
 pub fn quantity(group: &str) -> &'static str {
     match axis(group) {
         Some(_) if group.starts_with('d') => "deformation",
@@ -65,12 +65,12 @@ pub fn quantity(group: &str) -> &'static str {
     }
 }
 
-/// `symbol (unit)`, for axes and headers.
+/// Text `symbol (unit)`, for axes and headers.
 pub fn with_unit(symbol: &str, unit: &str) -> String {
     if unit.is_empty() { symbol.into() } else { format!("{symbol} ({unit})") }
 }
 
-/// x, y or z of the project's own groups (`dz_mm`, `fz_n`).
+/// Axis x, y or z of the project's own groups (`dz_mm`, `fz_n`).
 pub fn axis(group: &str) -> Option<char> {
     let component = group.strip_suffix("_mm").and_then(|g| g.strip_prefix('d'));
     let component = component.or(group.strip_suffix("_n").and_then(|g| g.strip_prefix('f')));

@@ -1,15 +1,15 @@
-//! Values over the sensor's face, as coloured cells with their numbers.
+//! Maps of values over the sensor's face, as coloured cells with their numbers.
 
 use super::format::fixed;
 use super::svg::{Anchor, Svg, TEXT_PX, text_width};
 use super::ticks::{self, Ticks};
 
-/// One map over the face.
+/// Map of values over the face.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeatMap {
-    /// What it is read out as.
+    /// Title that screen readers read out.
     pub title: String,
-    /// What stands above it.
+    /// Heading above the map.
     pub heading: String,
     /// Extent of the face in x and y.
     pub face_mm: [f64; 2],
@@ -17,18 +17,18 @@ pub struct HeatMap {
     pub cell_mm: [f64; 2],
     /// Centre and value of every cell; a value that is not finite leaves its cell empty.
     pub cells: Vec<([f64; 2], f64)>,
-    /// Number and height of every row-wire.
+    /// Number of every row-wire, and its height y on the face.
     pub row_wires: Vec<(usize, f64)>,
 }
 
-/// Colours: none at zero, ever fuller away from it, one hue above and one below.
+/// Colour scale: no colour at zero, ever fuller away from it, one hue above and one below.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ColourScale(Ticks);
 
 const WIDTH: f64 = 310.0;
 
 impl ColourScale {
-    /// A scale that covers zero and all of `values`.
+    /// Scale that covers zero and all of `values`.
     pub fn new(values: impl IntoIterator<Item = f64>) -> Self {
         Self(ticks::linear(values.into_iter().chain([0.0]), 4))
     }
@@ -39,7 +39,7 @@ impl ColourScale {
         (if value < 0.0 { "below" } else { "above" }, (value.abs() / most).min(1.0))
     }
 
-    /// The bar that explains the colours; `label` names the quantity and its unit.
+    /// Draws the bar that explains the colours; `label` names the quantity and its unit.
     pub fn draw_bar(&self, title: &str, label: &str) -> String {
         let Ticks { low, high, at } = &self.0;
         let (left, right, top, height) = (24.0, WIDTH - 24.0, 2.0, 14.0);
@@ -75,7 +75,7 @@ impl ColourScale {
 }
 
 impl HeatMap {
-    /// The map in the colours of `scale`.
+    /// Draws the map in the colours of `scale`.
     pub fn draw(&self, scale: &ColourScale) -> String {
         let half = [self.cell_mm[0] / 2.0, self.cell_mm[1] / 2.0];
         // Electrodes may be listed outside the face.

@@ -1,4 +1,4 @@
-//! The page: its order, its words, and its style.
+//! HTML page: its order, its words, and its style.
 
 use std::fmt::{Display, Write as _};
 
@@ -8,7 +8,7 @@ use super::svg::escape;
 use super::tables;
 use crate::run::RunResult;
 
-/// Figures and tables so far, so that each has its number.
+/// Body of a page, which numbers its figures and tables.
 #[derive(Default)]
 struct Body {
     html: String,
@@ -36,7 +36,7 @@ impl Body {
         ));
     }
 
-    /// `caption` is HTML.
+    /// Adds a numbered table; `caption` is HTML.
     fn table(&mut self, caption: &str, table: &str, legend: &str) {
         self.tables += 1;
         let number = self.tables;
@@ -48,7 +48,7 @@ impl Body {
     }
 }
 
-/// The whole page.
+/// Whole page of a run.
 pub fn page(result: &RunResult) -> String {
     let mut body = Body::default();
     body.html += &header(result);
@@ -86,7 +86,7 @@ pub fn page(result: &RunResult) -> String {
     document(&format!("Taxel: {}", result.scene.name), &body.html)
 }
 
-/// A page of this title around `body`, which is HTML: no script, no file beside it.
+/// Page with this title around `body`, which is HTML: no script, no file beside it.
 pub fn document(title: &str, body: &str) -> String {
     format!(
         "<!DOCTYPE html>\n<html lang=\"en-GB\">\n<head>\n<meta charset=\"utf-8\">\n\
@@ -127,7 +127,7 @@ fn header(result: &RunResult) -> String {
     )
 }
 
-/// The headline: one output, every decoder.
+/// Headline: one output, every decoder.
 fn summary(result: &RunResult) -> String {
     let Some(output) = figures::shown(&result.example) else { return String::new() };
     let (group, unit) = (&output.group, &output.unit);
@@ -147,6 +147,6 @@ fn summary(result: &RunResult) -> String {
             escape(unit)
         );
     }
-    html + "</dl>\n<p>The training mean ignores the readings: a decoder has learnt only what it \
-            gains over it. The best linear decoder shows how much of that needs no network.</p>\n</section>\n"
+    html + "</dl>\n<p>The training mean ignores the readings: a decoder has learnt nothing unless \
+            it is better. The best linear decoder shows how much needs no network.</p>\n</section>\n"
 }

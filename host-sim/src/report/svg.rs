@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Display, Write as _};
 
-/// Text made safe for HTML and SVG.
+/// Text escaped for HTML and SVG.
 pub fn escape(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for c in text.chars() {
@@ -18,7 +18,7 @@ pub fn escape(text: &str) -> String {
     safe
 }
 
-/// A coordinate: one decimal is finer than any screen.
+/// Coordinate in px: one decimal is finer than any screen.
 #[derive(Debug, Clone, Copy)]
 pub struct Px(pub f64);
 
@@ -30,26 +30,26 @@ impl Display for Px {
     }
 }
 
-/// Where text stands relative to its point.
+/// Position of text relative to its point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Anchor {
-    /// To the right of it.
+    /// Text to the right of its point.
     Start,
-    /// Around it.
+    /// Text around its point.
     Middle,
-    /// To the left of it.
+    /// Text to the left of its point.
     End,
 }
 
-/// Height of text, as the page's style has it.
+/// Height of text, as in the page's style.
 pub const TEXT_PX: f64 = 13.0;
 
-/// A generous estimate of the width of text: fonts differ, and nothing may overlap.
+/// Generous estimate of the width of text in px: fonts differ, and nothing may overlap.
 pub fn text_width(text: &str) -> f64 {
     text.chars().count() as f64 * TEXT_PX * 0.62
 }
 
-/// A drawing in the making.
+/// Drawing under construction.
 #[derive(Debug, Clone)]
 pub struct Svg {
     width: f64,
@@ -59,7 +59,7 @@ pub struct Svg {
 }
 
 impl Svg {
-    /// An empty drawing; `title` is what it is read out as.
+    /// Empty drawing; screen readers read out `title`.
     pub fn new(width: f64, height: f64, title: &str) -> Self {
         Self { width, height, title: title.into(), body: String::new() }
     }
@@ -114,13 +114,13 @@ impl Svg {
         self.add("</g>");
     }
 
-    /// Adds an element as it is.
+    /// Adds an element of SVG text, unchanged.
     pub fn add(&mut self, element: impl Display) {
         // Writing to a string cannot fail.
         let _ = writeln!(self.body, "{element}");
     }
 
-    /// The whole element.
+    /// Finished SVG element.
     pub fn finish(self) -> String {
         format!(
             "<svg role=\"img\" viewBox=\"0 0 {} {}\"><title>{}</title>\n{}</svg>\n",
@@ -132,20 +132,20 @@ impl Svg {
     }
 }
 
-/// Shapes that tell series apart without colour.
+/// Shapes that distinguish series without colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shape {
-    /// A disc.
+    /// Disc.
     Circle,
-    /// A square.
+    /// Square.
     Square,
-    /// A triangle that points up.
+    /// Triangle that points up.
     Triangle,
-    /// A square on its corner.
+    /// Square on its corner.
     Diamond,
-    /// A short level bar.
+    /// Short level bar.
     Dash,
-    /// A circle around another mark.
+    /// Circle around another mark.
     Ring,
 }
 

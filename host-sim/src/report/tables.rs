@@ -11,7 +11,7 @@ use crate::evaluate::table1::{Column, NETWORK, PAPER_PRINTED_PERCENT, Table1};
 use crate::metrics::{DecoderErrors, Definition, Errors};
 use crate::run::RunResult;
 
-/// The errors of one group, if it is among `errors`.
+/// Errors of one group, if it is among `errors`.
 pub fn of_group<'e>(errors: &'e [Errors], group: &str) -> Option<&'e Errors> {
     errors.iter().find(|errors| errors.group == group)
 }
@@ -21,7 +21,7 @@ pub fn rmse(errors: &[Errors], group: &str) -> f64 {
     of_group(errors, group).map_or(f64::NAN, |errors| errors.rmse)
 }
 
-/// What a decoder is called on the page.
+/// Name of a decoder on the page.
 pub fn decoder_name(decoder: &DecoderErrors) -> &str {
     match decoder.decoder.as_str() {
         NETWORK => "Network",
@@ -42,7 +42,7 @@ fn heading(definition: Definition) -> &'static str {
     }
 }
 
-/// The value of a definition; RMSE with `rmse_decimals`, so that decimal points are in line.
+/// Text of an error by one definition; RMSE with `rmse_decimals`, so that decimal points line up.
 fn value(definition: Definition, errors: &Errors, rmse_decimals: usize) -> String {
     let Some(value) = definition.of(errors).filter(|value| value.is_finite()) else {
         return UNDEFINED.into();
@@ -61,7 +61,7 @@ fn value(definition: Definition, errors: &Errors, rmse_decimals: usize) -> Strin
     }
 }
 
-/// Errors by axis, decoder and definition.
+/// Table of errors by axis, decoder and definition.
 pub fn errors(result: &RunResult) -> String {
     let mut html = String::from("<table>\n<thead><tr><th>Output</th><th>Decoder</th>");
     for definition in Definition::ALL {
@@ -93,7 +93,7 @@ pub fn errors(result: &RunResult) -> String {
     html + "</table>\n"
 }
 
-/// The formulas of all definitions.
+/// List of the formulas of all definitions.
 pub fn legend() -> String {
     let formulas =
         Definition::ALL.map(|definition| format!("<li>{}</li>", escape(definition.formula())));
@@ -104,7 +104,7 @@ pub fn legend() -> String {
     )
 }
 
-/// The definition that the paper's table is shown by: positional where it is defined.
+/// Definition in which the paper's table is shown: positional where it is defined.
 pub fn printed_definition(table: &Table1, group: &str) -> Definition {
     let mean =
         table.columns.first().and_then(|column| of_group(column.errors(mean::NAME, None), group));
@@ -121,14 +121,14 @@ pub fn table1_caption(table: &Table1, group: &str) -> String {
     format!(
         "Error of {} by spread and noise level, arranged as Table 1 of the paper: {}. Network with \
          K = {}. The paper prints {low}–{high} % and does not state its definition. Cells marked † \
-         are no better than always answering the training mean.",
+         are no better than always predicting the training mean.",
         escape(&symbol(group)),
         escape(definition.formula()),
         table.centres
     )
 }
 
-/// Error by spread (lines) and noise level (columns).
+/// Table of errors by spread (lines) and noise level (columns).
 pub fn table1(table: &Table1, group: &str) -> String {
     let definition = printed_definition(table, group);
     let of = |errors: &[Errors]| {
@@ -178,13 +178,13 @@ pub fn table1(table: &Table1, group: &str) -> String {
     html + "</tbody>\n</table>\n"
 }
 
-/// A name as the head of a line.
+/// Name with a capital letter, as the head of a line.
 fn capitalised(name: &str) -> String {
     let mut letters = name.chars();
     letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
 }
 
-/// Whether two settings that people typed are the same.
+/// Whether two settings that people typed are the same number.
 fn same(a: f64, b: f64) -> bool {
     (a - b).abs() < 1e-9
 }

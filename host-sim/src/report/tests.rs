@@ -1,4 +1,4 @@
-//! The page as a whole, on results made by hand.
+//! Tests of whole pages, on results made by hand.
 
 use super::html;
 use crate::evaluate::table1::{Column, Entry, NETWORK, Printed, Table1};
@@ -107,7 +107,7 @@ fn result(groups: &[&str]) -> RunResult {
     }
 }
 
-/// Every number that places something in a drawing.
+/// Whether every number that places an element in a drawing is finite.
 fn is_drawable(page: &str) -> bool {
     !["NaN", "inf\"", "inf ", "-inf"].iter().any(|word| page.contains(word))
 }
@@ -142,7 +142,7 @@ fn one_chart_for_every_group_of_outputs() {
     for groups in [&["dz_mm"][..], &["dx_mm", "dy_mm", "dz_mm"], &["fx_n", "fz_n"]] {
         let page = html(&result(groups));
         let titled = |end: &str| page.matches(end).count();
-        // Twice each: for wide and for narrow windows.
+        // Every chart appears twice: for wide and for narrow windows.
         assert_eq!(titled("by electrode, true and decoded</title>"), 2 * groups.len());
         assert_eq!(titled("<title>Error of"), 2 * groups.len());
         assert_eq!(titled("by row-wire, at most"), groups.len());
@@ -167,7 +167,7 @@ fn a_missing_value_is_drawn_nowhere() {
     let page = html(&result);
     assert!(is_drawable(&page));
     let fewer = |mark: &str| whole.matches(mark).count() - page.matches(mark).count();
-    // Its dot, on both layouts, and the dot of the reading.
+    // One dot fewer on both layouts, and one dot of the reading.
     assert_eq!(fewer("c1 mark\"/>"), 2 * 3 + 1, "two dots and a bar of noise twice, a bar by row");
     assert_eq!(fewer("c2 mark\"/>"), 2, "its error");
     assert_eq!(page.matches(">×</text>").count(), 2, "its cells, decoded and difference");

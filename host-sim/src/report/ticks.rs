@@ -1,8 +1,8 @@
-//! Ticks in steps of 1, 2 and 5.
+//! Ticks of axes, in steps of 1, 2 and 5.
 
 use super::format::fixed;
 
-/// A range with ticks on it.
+/// Range of an axis with its ticks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ticks {
     /// Least value of the range.
@@ -13,7 +13,7 @@ pub struct Ticks {
     pub at: Vec<(f64, String)>,
 }
 
-/// About `wanted` intervals that cover all finite `values`; the range ends on ticks.
+/// Range with about `wanted` intervals that covers all finite `values` and ends on ticks.
 pub fn linear(values: impl IntoIterator<Item = f64>, wanted: usize) -> Ticks {
     let (low, high) = extent(values).unwrap_or((0.0, 1.0));
     let (low, high) = if high > low {
@@ -25,7 +25,7 @@ pub fn linear(values: impl IntoIterator<Item = f64>, wanted: usize) -> Ticks {
     let rough = (high - low) / wanted as f64;
     let exponent = rough.log10().floor();
     let mantissa = rough / 10_f64.powf(exponent);
-    // Changes over at the geometric means of 1, 2, 5 and 10.
+    // The step changes at the geometric means of 1, 2, 5 and 10.
     let (mantissa, exponent) = match mantissa {
         m if m < 1.41 => (1.0, exponent),
         m if m < 3.16 => (2.0, exponent),
@@ -33,10 +33,10 @@ pub fn linear(values: impl IntoIterator<Item = f64>, wanted: usize) -> Ticks {
         _ => (1.0, exponent + 1.0),
     };
     let step = mantissa * 10_f64.powf(exponent);
-    // A division of whole numbers, so that 0.3 is 0.3.
+    // Whole numbers are divided, so that 0.3 is 0.3.
     let scale = 10_f64.powf(-exponent);
     let tick = |i: i64| i as f64 * mantissa / scale;
-    // The slack keeps an end that is a tick, but for rounding, from adding an interval.
+    // The slack keeps rounding from adding an interval at an end that is a tick.
     let first = (low / step + 1e-9).floor() as i64;
     let last = (high / step - 1e-9).ceil() as i64;
     let decimals = (-exponent).max(0.0) as usize;
@@ -44,12 +44,13 @@ pub fn linear(values: impl IntoIterator<Item = f64>, wanted: usize) -> Ticks {
     Ticks { low: tick(first), high: tick(last), at: at.collect() }
 }
 
-/// As [`logarithmic`], of noise levels.
+/// Ticks of a [`logarithmic`] axis of noise levels, labelled in per cent.
 pub fn logarithmic_percent(values: impl IntoIterator<Item = f64>) -> Ticks {
     logarithmic(values, super::format::percent)
 }
 
-/// 1-2-5 ticks (closer ones within a decade) inside a logarithmic range that leaves some room around all positive `values`.
+/// Logarithmic range around all positive `values`, with some room. Its ticks are at 1-2-5, or closer
+/// within one decade.
 pub fn logarithmic(values: impl IntoIterator<Item = f64>, label: impl Fn(f64) -> String) -> Ticks {
     let positive = values.into_iter().filter(|value| *value > 0.0);
     let (low, high) = extent(positive).unwrap_or((0.01, 0.1));

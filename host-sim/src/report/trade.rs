@@ -1,4 +1,4 @@
-//! The trade between speed and accuracy as a picture and as a page.
+//! Report of a trade between speed and accuracy: a picture, and a page.
 
 use std::fmt::Write as _;
 
@@ -12,11 +12,11 @@ use super::{tables, ticks};
 use crate::evaluate::trade::{Arithmetic, Point, Trade};
 use crate::metrics::DecoderErrors;
 
-/// How an arithmetic's points are drawn: its classes for a network a row, those for one of the whole array, and
-/// the shape of both. The second of two classes is for points behind a gate.
+/// Style of an arithmetic's points: two classes for networks of a row, two for networks of the whole
+/// array, and the shape of both. The second of two classes is for points behind a gate.
 type Style = ([&'static str; 2], [&'static str; 2], Shape);
 
-/// The style of every arithmetic, in the order of [`Arithmetic::all`].
+/// Styles of every arithmetic, in the order of [`Arithmetic::all`].
 const STYLES: [Style; 5] = [
     (["c1", "c1 hollow"], ["c4", "c4 hollow"], Shape::Circle),
     (["c2", "c2 hollow"], ["c4", "c4 hollow"], Shape::Square),
@@ -25,7 +25,7 @@ const STYLES: [Style; 5] = [
     (["muted", "muted hollow"], ["c4", "c4 hollow"], Shape::Dash),
 ];
 
-/// Cycles against error, both logarithmic: every point of one sample a reading or more, and the front.
+/// Chart of cycles against error, both logarithmic: every point by its number of samples, and the front.
 fn chart(trade: &Trade) -> Chart {
     let at = |point: &Point| [point.frame.cycles as f64, point.rmse(&trade.group)];
     let mut series = Vec::new();
@@ -63,7 +63,7 @@ fn chart(trade: &Trade) -> Chart {
         let point = vec![at(&trade.points[chosen])];
         series.push(Series::new("chosen", "chosen", Mark::Points(Shape::Ring), point));
     }
-    // K at one point of the lowest line for each.
+    // K is noted at one point of the lowest line for each.
     let most = samples.last().copied();
     let lowest = trade.points.iter().filter(|p| Some(p.samples_averaged) == most && p.on_front);
     let mut notes: Vec<([f64; 2], String)> = Vec::new();
@@ -99,7 +99,7 @@ fn grouped_cycles(cycles: f64) -> String {
     grouped(cycles.round() as usize)
 }
 
-/// The picture alone, as a file of its own.
+/// Picture of a trade, as a file of its own.
 pub fn svg(trade: &Trade) -> String {
     let drawing = chart(trade).draw([960.0, 560.0]);
     let open =
@@ -112,7 +112,7 @@ pub fn svg(trade: &Trade) -> String {
     drawing.replacen("<title>", &format!("{css}<title>"), 1)
 }
 
-/// The page.
+/// Page of a trade.
 pub fn html(trade: &Trade) -> String {
     let chart = chart(trade);
     let title = format!("Taxel: speed against accuracy, {}", trade.scene);
@@ -135,7 +135,7 @@ pub fn html(trade: &Trade) -> String {
         symbol(&trade.group),
         escape(&trade.unit),
         if trade.points.iter().any(|p| p.gate_k.is_some()) {
-            "Hollow: behind a gate for rows at rest, with the mean cycles of the test frames. "
+            "Hollow: behind a gate that skips untouched rows, with the mean cycles of the test frames. "
         } else {
             ""
         },
@@ -157,8 +157,8 @@ fn baselines(trade: &Trade) -> String {
 fn table(trade: &Trade) -> String {
     let mut html = String::from(
         "<figure id=\"table-1\" class=\"table\">\n<figcaption><b>Table 1.</b> Every point; those on the \
-         front are bold. In brackets: RMSE over the smallest of all points.</figcaption>\n<div class=\"scroll\" \
-         tabindex=\"0\" role=\"region\" aria-label=\"Table 1\">\n<table>\n<thead><tr><th>kernel</th>\
+         Pareto front are bold. In brackets: RMSE relative to the smallest of all points.</figcaption>\n<div class=\"scroll\" \
+         tabindex=\"0\" role=\"region\" aria-label=\"Table 1\">\n<table>\n<thead><tr><th>format</th>\
          <th class=\"number\">K</th><th class=\"after\">tail</th><th class=\"number\">samples</th>\
          <th class=\"number\">gate k</th>",
     );

@@ -1,9 +1,9 @@
-//! Running the binary as a user does, in a folder of the test's own.
+//! Runs of the binary as by a user, in a folder of the test's own.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// A folder that goes with the test.
+/// Folder that is removed after the test.
 pub struct Folder(PathBuf);
 
 impl Folder {
@@ -65,7 +65,7 @@ impl Drop for Folder {
     }
 }
 
-/// A scene that runs in a moment: rows 4 and 5 of `press`.
+/// Scene that runs in a moment: rows 4 and 5 of `press`.
 pub fn small_scene() -> String {
     let mut scene = include_str!("../../../scenes/press.toml").to_owned();
     for (from, to) in [

@@ -42,12 +42,12 @@ fn frames() -> Vec<[[f32; 18]; 8]> {
     readings.lines().map(frame).collect()
 }
 
-/// A device with `model`, at the other end of a socket.
+/// Device with `model`, at the other end of a socket.
 fn device(line: Line, model: &ModelBlob) -> Device<TcpStream> {
     Device::new(socket(line, model)).unwrap()
 }
 
-/// The line to a device with `model`.
+/// Line to a device with `model`.
 fn socket(line: Line, model: &ModelBlob) -> TcpStream {
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
     let near = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
@@ -58,7 +58,7 @@ fn socket(line: Line, model: &ModelBlob) -> TcpStream {
     near
 }
 
-/// A socket that does not block when read, and does when written to.
+/// Socket whose reads do not block and whose writes do.
 struct Patient(TcpStream);
 
 impl std::io::Read for Patient {
@@ -103,8 +103,7 @@ fn a_sound_device_passes_every_check() {
     assert!(uploads.interrupted > 5 && uploads.old_stayed == uploads.interrupted);
 }
 
-/// Requests of every kind, those that are refused among them, and bytes that are none, each with the number
-/// of its answers.
+/// Requests of every kind, refused ones and garbage included, each with the number of its answers.
 fn requests(new: &ModelBlob) -> Vec<(Vec<u8>, usize)> {
     let mut requests = Vec::new();
     let mut add = |request: &Request<'_>| {
@@ -135,7 +134,7 @@ fn requests(new: &ModelBlob) -> Vec<(Vec<u8>, usize)> {
     requests
 }
 
-/// All that the device answers.
+/// Bytes of all answers of the device.
 fn answers(mut wire: impl Wire, requests: &[(Vec<u8>, usize)]) -> Vec<u8> {
     wire.set_read_timeout(Duration::from_secs(20)).unwrap();
     let (mut answers, mut expected) = (Vec::new(), 0);
@@ -160,7 +159,7 @@ fn a_mailbox_carries_the_bytes_that_a_serial_line_carries() {
     let (host, end) = crate::virtual_device::mailbox::pair();
     crate::virtual_device::run(end, SOUND, old.bytes(), frames());
     assert!(answers(host, &requests) == serial, "other bytes through the mailbox");
-    // More than a ring holds, and so round its end.
+    // More bytes than a ring holds, so that they wrap around its end.
     assert!(serial.len() > 16_384, "{} bytes", serial.len());
 }
 
@@ -219,7 +218,7 @@ fn another_model_on_the_device_is_replaced_by_the_one_checked_with() {
 
 #[test]
 fn a_wrong_answer_is_found() {
-    // The device decodes with the model that it has; the host expects another's answers.
+    // The device decodes with the model that it has, while the host expects another one's answers.
     let (right, wrong) = (model(3), model(4));
     let mut device = device(SOUND, &right);
     let inputs = synthesise(&press(), Stream::Test, 1).inputs;
@@ -237,7 +236,8 @@ fn a_wrong_answer_is_found() {
 #[test]
 fn over_a_line_that_spoils_bytes_everything_still_arrives() {
     let old = model(3);
-    // One byte in some 3000 is lost, changed or turned into the end of a frame: a fifth of the frames.
+    // One byte in some 3000 is lost, changed or turned into the end of a frame: this spoils a fifth of
+    // the frames.
     let mut device = device(Line { one_in: Some(3000) }, &old);
     let new = model(16);
     let identity = upload::replace(&mut device, new.bytes(), &Silent).unwrap();
@@ -268,7 +268,7 @@ fn refusals_and_silence_are_told_apart() {
 
 #[test]
 fn a_device_that_never_pauses_does_not_hold_the_host() {
-    // It scans as fast as it can, and its reports alone keep the line busy.
+    // The device scans as fast as it can, and its reports alone keep the line busy.
     let mut device = device(SOUND, &model(3));
     let busy = Configuration {
         frame_period_us: 100,
@@ -286,7 +286,7 @@ fn a_device_that_never_pauses_does_not_hold_the_host() {
     assert_eq!(heard.unwrap(), None);
     assert!(reports > 100, "{reports}");
     assert!(start.elapsed() < Duration::from_secs(5));
-    // What was in force before a pause is in force after it.
+    // The configuration that was active before a pause is active after it.
     device.while_paused(Device::identify).unwrap();
     assert_eq!(device.configuration().unwrap(), busy);
 }
@@ -297,12 +297,12 @@ mod serial_port {
 
     use super::*;
 
-    /// A device at the far end of a pseudo-terminal, whose name this is.
+    /// Name of a pseudo-terminal with a device at its far end.
     fn port(model: &ModelBlob) -> (String, TTYPort) {
         port_with(model, frames())
     }
 
-    /// The same, with a sensor that shows `frames`.
+    /// Name of a pseudo-terminal with a device at its far end, whose sensor shows `frames`.
     fn port_with(model: &ModelBlob, frames: Vec<[[f32; 18]; 8]>) -> (String, TTYPort) {
         let (mut far, near) = TTYPort::pair().unwrap();
         far.set_timeout(std::time::Duration::from_millis(1)).unwrap();
@@ -311,13 +311,13 @@ mod serial_port {
         (name, near)
     }
 
-    /// A port that answers a read without bytes as a socket does.
+    /// Port that answers a read without bytes like a socket does.
     struct Quick(TTYPort);
 
     impl std::io::Read for Quick {
         fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
             match self.0.read(bytes) {
-                // Nobody has the near end open just now.
+                // No program has the near end open at the moment.
                 Ok(0) => Err(std::io::ErrorKind::WouldBlock.into()),
                 other => other,
             }
@@ -361,7 +361,8 @@ mod serial_port {
         assert_eq!(text.lines().count(), 11);
         assert!(text.starts_with("r1e1_dx_mm,r1e1_dy_mm,r1e1_dz_mm,"), "{text}");
 
-        // Without a model: readings, which can be trained on. Ideal ones here, five in turn.
+        // Without a model, readings are recorded, which can be trained on. Here they are ideal, five in
+        // turn.
         folder.succeed(&["link", &port, "record", "-n", "6", "-o", "readings.csv"]);
         let text = std::fs::read_to_string(folder.path("readings.csv")).unwrap();
         assert!(text.starts_with("r1c1_ohm,r1c2_ohm,"), "{text}");
@@ -393,7 +394,7 @@ mod serial_port {
         ]);
         assert!(page.contains("50 of 50 bit-identical"), "{page}");
 
-        // What the virtual device says of its memory: 20 000 bytes of code, 4000 of RAM.
+        // The virtual device reports 20 000 bytes of code and 4000 of RAM.
         for (limit, enough) in [
             ("--flash-limit=19999", false),
             ("--ram-limit=3999", false),

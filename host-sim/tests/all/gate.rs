@@ -29,14 +29,14 @@ fn noise_wakes_untouched_rows_as_often_as_theory_says() {
     let result = measured(&scene, &settings);
     let rows = (settings.frames * scene.world.read_rows.len()) as f64;
     for (line, k) in result.lines.iter().zip(k) {
-        // Between readings alone, and readings and their sum as if they had nothing to do with each other.
+        // Between the readings alone, and readings and their sum as if these were independent.
         let [least, most] =
             [READINGS - 1, READINGS].map(|n| woken_by_theory(k, n, settings.baseline_frames));
         assert_eq!(line.woken_by_theory, most);
         let deviation = (most * (1.0 - most) / rows).sqrt();
         println!("k = {k}: {} from {least} to {most}, ± {deviation}", line.woken);
         assert!(line.woken > least - 4.0 * deviation && line.woken < most + 4.0 * deviation);
-        // Not vacuous: another k would be told apart.
+        // The measurement is fine enough to distinguish another k.
         assert!(woken_by_theory(0.97 * k, READINGS - 1, 10_000) > most + 4.0 * deviation);
     }
 }
@@ -66,7 +66,7 @@ fn press_loses_little_accuracy_and_saves_half_of_the_rows() {
         let of = |errors: &[Errors]| errors.iter().find(|e| e.group == group).unwrap().rmse;
         assert!(of(&three_and_half.errors) < 1.005 * of(&result.ungated_errors), "{group}");
     }
-    // What is missed gets rarer with its size, and more with the tolerance.
+    // Larger touches are missed more rarely, and a larger tolerance misses more.
     for line in &result.lines {
         let shares: Vec<f64> = line.missed.iter().map(|missed| missed.share().unwrap()).collect();
         assert!(shares.is_sorted_by(|a, b| a > b), "{shares:?}");
@@ -82,10 +82,10 @@ fn the_command_prints_tables_and_json() {
     let arguments =
         ["gate", "small.toml", "-n", "200", "--k", "3.5,4", "--cycles", "4000,400,4250"];
     let text = folder.succeed(&arguments);
-    for part in ["1.750 %", "2.000 %", "without a gate", "answering the mean", "k = 4 "] {
+    for part in ["1.750 %", "2.000 %", "without a gate", "predicting the mean", "k = 4 "] {
         assert!(text.contains(part), "{part:?} is not in {text}");
     }
-    // Two rows were not measured.
+    // Costs of a model with two rows were not measured.
     assert!(folder.succeed(&arguments[..6]).contains("not known: no model of this kind"));
     let json: serde_json::Value =
         serde_json::from_str(&folder.succeed(&[&arguments[..], &["--json"]].concat())).unwrap();

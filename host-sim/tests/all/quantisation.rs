@@ -1,8 +1,8 @@
-//! A rigorous bound on what quantisation does to an estimate: from half a count to the difference
-//! between what is decoded from scanned and from ideal readings. `docs/readout.md` derives it.
+//! Rigorous bound on the effect of quantisation on an estimate: the difference between estimates from
+//! scanned and from ideal readings, for samples off by half a count. `docs/readout.md` derives it.
 //!
-//! It holds for readings without noise, cross-talk and series resistance, and for the exp kernels
-//! that are within 2 ulp (the polynomial and libm's).
+//! It holds for readings without noise, cross-talk and series resistance, and for the exponentials that
+//! are within 2 ulp (the polynomial and libm's).
 
 use firmware::circuit::{Divider, NO_CURRENT_COUNTS, ZeroPotential};
 use model_core::blob::Model;
@@ -16,7 +16,7 @@ const COUNTS: f64 = 4096.0;
 /// Unit roundoff of f32.
 const UNIT: f64 = 0.5 * f32::EPSILON as f64;
 
-/// γ_n of `n` rounded operations in f32: their product is off by at most this, relatively.
+/// Bound γ_n on the relative error of a product of `n` operations rounded to f32.
 fn gamma(n: usize) -> f64 {
     let n = n as f64 * UNIT;
     n / (1.0 - n)
@@ -25,7 +25,7 @@ fn gamma(n: usize) -> f64 {
 /// Largest |scanned − `ohm`| in Ω for a converter of `bits` behind `circuit` (its typical parts);
 /// infinite where the converter's range ends.
 pub fn reading_bound_ohm(circuit: Circuit, ohm: f64, bits: u8) -> f64 {
-    // Half a step for each sample.
+    // Each sample is off by half a step.
     let half = 0.5 * f64::from(1_u32 << (12 - bits));
     let (counts, largest_counts, bound_ohm) = match circuit {
         Circuit::Divider => {
@@ -37,11 +37,11 @@ pub fn reading_bound_ohm(circuit: Circuit, ohm: f64, bits: u8) -> f64 {
             let typical = ZeroPotential::<1, 1>::TYPICAL;
             let drive = f64::from(typical.drive_v) / f64::from(typical.reference_v) * COUNTS;
             let counts = drive * f64::from(typical.feedback_ohm[0]) / ohm;
-            // The sample and the idle sample.
+            // The sample and the idle sample are both off.
             (counts, drive + counts, ohm * 2.0 * half / (counts - 2.0 * half))
         }
     };
-    // So small a current is taken for none.
+    // So small a current counts as none.
     let is_open = counts - 2.0 * half < f64::from(NO_CURRENT_COUNTS);
     if bound_ohm < 0.0 || is_open || largest_counts + half > COUNTS - 2.0 * half {
         return f64::INFINITY;
@@ -76,7 +76,7 @@ pub fn output_bounds(model: &Model<'_>, circuit: Circuit, bits: u8, readings: &T
 /// Largest change of every output when each reading is off by at most `bound_ohm` from `ohm`.
 fn of_network(network: &direct::Network<'_>, ohm: &[f64], bound_ohm: &[f64]) -> Vec<f64> {
     let (p, shape) = (network.parameters(), network.shape());
-    // x: the ideal readings exactly as inference scales them; h: how far scanned ones may be off.
+    // x: the ideal readings exactly as inference scales them; h: the largest deviation of scanned ones.
     let (mut x, mut h) = (Vec::new(), Vec::new());
     for (k, (ohm, bound_ohm)) in ohm.iter().zip(bound_ohm).enumerate() {
         let (minimum, per_span) = (p.input_minimum[k], p.input_per_span[k]);
@@ -89,9 +89,9 @@ fn of_network(network: &direct::Network<'_>, ohm: &[f64], bound_ohm: &[f64]) -> 
     }
     let h_norm = norm(&h);
 
-    // A Taylor polynomial of second order about x, its coefficients with their signs and the box's
-    // half-sides as the argument; then the largest third derivative in the box, and rounding, both by
-    // sums of magnitudes.
+    // A Taylor polynomial of second order about x is maximised with the signs of its coefficients and
+    // the box's half-sides. The largest third derivative in the box, and rounding, are added as sums of
+    // magnitudes.
     let mut taylor = Taylor::new(p.affine, shape);
     let mut magnitude: Vec<f64> = p.bias.iter().map(|b| f64::from(*b).abs()).collect();
     for ((x, h), row) in x.iter().zip(&h).zip(p.affine.chunks_exact(shape.outputs)) {
@@ -109,8 +109,8 @@ fn of_network(network: &direct::Network<'_>, ohm: &[f64], bound_ohm: &[f64]) -> 
         let (nearest, farthest) = ((distance - h_norm).max(0.0), distance + h_norm);
         let largest = (-decay * nearest * nearest).exp();
         let third = largest * third_derivative(decay, farthest) * h_norm.powi(3) / 6.0;
-        // φ's own rounding: that of d·‖x − c‖², and 2 ulp of the exponential. Two inferences.
-        // Difference, square, a sum in four lanes, these together, times decay.
+        // Rounding of φ: that of d·‖x − c‖², and 2 ulp of the exponential, in two inferences.
+        // Operations: difference, square, a sum in four lanes, these together, times decay.
         let operations = 2 + shape.inputs.div_ceil(4) + 2 + 1;
         let exponent = 1.01 * decay * farthest * farthest * gamma(operations);
         let rounding = 2.0 * (largest * (exponent + 4.1 * UNIT) + 1e-37);
@@ -122,7 +122,7 @@ fn of_network(network: &direct::Network<'_>, ohm: &[f64], bound_ohm: &[f64]) -> 
     add(&mut rest, 2.0 * gamma(shape.inputs + shape.centres + 3), magnitude.iter().copied());
     let bounds =
         taylor.largest_change(&h).into_iter().zip(rest).map(|(change, rest)| change + rest);
-    // This computation's own rounding, in f64.
+    // Rounding of this computation itself, in f64.
     bounds.map(|bound| bound * (1.0 + 1e-9)).collect()
 }
 
@@ -143,14 +143,14 @@ fn third_derivative(decay: f64, farthest: f64) -> f64 {
 /// First and second derivatives of a network's outputs.
 struct Taylor {
     outputs: usize,
-    /// `[input × output]`.
+    /// Gradient, `[input × output]`.
     gradient: Vec<f64>,
-    /// `[pair of inputs × output]`, pairs (0, 0), (0, 1), …, (1, 1), …
+    /// Second derivatives, `[pair of inputs × output]`, for pairs (0, 0), (0, 1), …, (1, 1), …
     hessian: Vec<f64>,
 }
 
 impl Taylor {
-    /// Those of the affine tail.
+    /// Derivatives of the affine tail alone.
     fn new(affine: &[f32], shape: Shape) -> Self {
         let Shape { inputs, outputs, .. } = shape;
         let mut gradient: Vec<f64> = affine.iter().map(|a| f64::from(*a)).collect();
@@ -158,7 +158,7 @@ impl Taylor {
         Self { outputs, gradient, hessian: vec![0.0; inputs * (inputs + 1) / 2 * outputs] }
     }
 
-    /// Adds those of a centre: ∂φ = −2d·u·φ, ∂²φ = (4d²·u·uᵀ − 2d·1)·φ with u = x − c.
+    /// Adds the derivatives of a centre: ∂φ = −2d·u·φ, ∂²φ = (4d²·u·uᵀ − 2d·1)·φ with u = x − c.
     fn add_centre(&mut self, decay: f64, u: &[f64], weights: &[f32]) {
         let activation = (-decay * u.iter().map(|u| u * u).sum::<f64>()).exp();
         let weights: Vec<f64> = weights.iter().map(|w| f64::from(*w) * activation).collect();

@@ -1,4 +1,5 @@
-//! The firmware's readout on the virtual board: what it costs, and what the circuit is worth.
+//! The firmware's readout on the virtual board: the errors that it adds, and the difference between
+//! circuits.
 
 use crate::common::{Folder, small_scene};
 use crate::quantisation::{output_bounds, reading_bound_ohm};
@@ -14,7 +15,7 @@ use taxel_simulate::virtual_board::{self, SeriesResistance, VirtualBoard, all_re
 
 const FRAMES: usize = 300;
 
-/// The model that `run press` makes, with the distances that the bound is derived for.
+/// Scene and model of `run press`, with direct distances, for which the bound is derived.
 fn press() -> (Experiment, ModelBlob) {
     let mut scene = Experiment::load("press").unwrap();
     scene.training.format = Format::F32Direct;
@@ -22,14 +23,14 @@ fn press() -> (Experiment, ModelBlob) {
     (scene, model)
 }
 
-/// `readings` scanned through `circuit` by a converter of so many bits, with no other fault.
+/// Scans `readings` through `circuit` by a converter of so many bits, with no other fault.
 fn scanned(world: &World, circuit: Circuit, bits: u8, readings: &Table) -> Table {
     let readout = Readout { circuit: Some(circuit), adc_bits: Some(bits), ..Readout::default() };
     let board = VirtualBoard::with_readout(world, &readout).unwrap();
     virtual_board::scan(&board, SeriesResistance::NONE, readings).unwrap()
 }
 
-/// |a − b| over `bound`, pair by pair.
+/// Ratios of |a − b| to `bound`, pair by pair.
 fn shares(a: &Table, b: &Table, bound: &Table) -> Vec<f64> {
     let pairs = a.values.iter().zip(&b.values).zip(&bound.values);
     pairs.map(|((a, b), bound)| (a - b).abs() / bound).collect()
@@ -72,13 +73,13 @@ fn every_output_stays_within_the_bound_of_quantisation_and_coarser_converters_do
         );
         assert_eq!(of_outputs.len(), FRAMES * 144);
         assert!(largest(&of_readings) <= 1.0 && largest(&of_outputs) <= 1.0);
-        // Not vacuous. (The idle sample is the same in all frames, a quarter of a count off: together
-        // with half a count of the sample, three quarters of the bound.)
+        // The bound is not far off. (The idle sample is the same in all frames, a quarter of a count
+        // off: together with half a count of the sample, three quarters of the bound.)
         assert!(largest(&of_readings) > 0.7, "{}", largest(&of_readings));
         assert!(mean(&of_outputs) > 1e-3, "{}", mean(&of_outputs));
         assert!(mean(&bound.values) < most_mm, "{} mm", mean(&bound.values));
 
-        // Two bits fewer break that of readings; three bits that of many outputs.
+        // Two bits fewer exceed the bound of readings; three bits fewer exceed that of many outputs.
         let beyond = |shares: &[f64]| shares.iter().filter(|share| **share > 1.0).count();
         let readings_beyond = beyond(&shares(&ten, &ideal, &bound_ohm));
         let outputs_beyond = [&ten, &nine].map(|r| beyond(&shares(&decode(r), &truth, &bound)));
@@ -113,12 +114,12 @@ fn cross_talk_ruins_the_divider_and_spares_zero_potential() {
     assert!(rms(divider, Stage::Quantised) < 0.1);
     assert!(rms(zero_potential, Stage::CrossTalk) < 0.02);
     assert!(rms(divider, Stage::CrossTalk) > 100.0 * rms(zero_potential, Stage::CrossTalk));
-    // Switches and leads cost 13 %, and come back when they are corrected for.
+    // Switches and leads cost 13 %, which correction recovers.
     assert!((10.0..17.0).contains(&rms(zero_potential, Stage::Series)));
     assert!(rms(zero_potential, Stage::Corrected) < 0.04);
     assert!(rms(zero_potential, Stage::Everything) < 0.06);
     assert!(rms(divider, Stage::Corrected) > 5.0);
-    // A correction that is a tenth wrong leaves more than all the rest.
+    // A correction that is a tenth wrong leaves more error than all other faults.
     assert!((0.5..2.5).contains(&rms(zero_potential, Stage::Miscalibrated)));
 
     assert!(z(divider, Stage::Everything) > 3.0 * mean_mm);
@@ -135,7 +136,7 @@ fn users_see_every_circuit_and_stage() {
     folder.succeed(&["train", "scene.toml", "-o", "m.bin"]);
     let arguments = ["readout", "scene.toml", "--model", "m.bin", "--frames", "20"];
     let page = folder.succeed(&arguments);
-    for says in ["ideal readings", "answering the mean", "divider", "zero-potential", "dz_mm RMSE"]
+    for says in ["ideal readings", "predicting the mean", "divider", "zero-potential", "dz_mm RMSE"]
     {
         assert!(page.contains(says), "{says:?} is not in {page}");
     }
@@ -145,7 +146,7 @@ fn users_see_every_circuit_and_stage() {
     assert_eq!(lines.len(), 2 * Stage::ALL.len());
     assert_eq!(lines[6]["circuit"], "zero-potential");
     assert_eq!(result["frames"], 20);
-    // The same model is trained if none is given, and the same seed draws the same frames.
+    // Without --model the same model is trained, and the same seed draws the same frames.
     let trained = folder.succeed(&["readout", "scene.toml", "--frames", "20"]);
     assert_eq!(trained, page);
     assert_ne!(folder.succeed(&[&arguments[..], &["--seed", "7"]].concat()), page);
@@ -161,7 +162,7 @@ fn a_scenes_own_values_replace_the_typical_ones() {
     let result: serde_json::Value = serde_json::from_str(&json).unwrap();
     let uncorrected = &result["lines"][6 + 2];
     assert_eq!(uncorrected["stage"], "series");
-    // 5 Ω before the 3.1 Ω of a row.
+    // A series resistance of 5 Ω lies before the 3.1 Ω of a row.
     let rms_percent = uncorrected["readings"]["rms_percent"].as_f64().unwrap();
     assert!((140.0..190.0).contains(&rms_percent), "{rms_percent}");
 }
@@ -204,7 +205,7 @@ fn a_readout_that_cannot_be_is_refused() {
     refused(&["readout", "scene.toml", "--frames", "0"], &["--frames = 0"]);
     folder.write("nine.toml", small_scene().replace("column_wires = 18", "column_wires = 9"));
     refused(&["readout", "nine.toml"], &["9 column-wires", "18"]);
-    // Settling that is asked for and not waited for: the board refuses, and that is a failure.
+    // A wait shorter than the time constant needs: the board refuses, and the command fails.
     let hasty = "[readout]\ntime_constant_us = 5.0\nsettling_us = 10";
     folder.write("hasty.toml", small_scene().replace("[readout]", hasty));
     let output = folder.run(&["readout", "hasty.toml", "--model", "m.bin"]);

@@ -1,8 +1,9 @@
-//! Bad input: exit status 2, a message that names file, place, value and fix, and no file left.
+//! Refusals of bad input: exit status 2, a message that names file, place, value and fix, and no file
+//! left.
 
 use crate::common::{Folder, small_scene};
 
-/// Runs and expects a refusal that says all of `says`, leaving nothing behind.
+/// Runs a command and expects a refusal that contains all of `says`, with no file left.
 fn refused(folder: &Folder, arguments: &[&str], says: &[&str]) {
     let before = folder.names();
     let output = folder.run(arguments);
@@ -284,7 +285,7 @@ fn an_emulator_or_an_image_that_is_not_there_is_named() {
     folder.write("small.toml", small_scene());
     let arguments = ["emulate", "small.toml", "--image", image, "--qemu", "no-such-qemu"];
     refused(&folder, &arguments, &["no-such-qemu", "qemu-system-arm"]);
-    // Another readout than the image's.
+    // Scenes with another readout than the image's.
     for (field, other, only) in [
         ("circuit", "divider", "zero-potential"),
         ("sampler", "on-chip", "mcp3208"),
@@ -295,7 +296,7 @@ fn an_emulator_or_an_image_that_is_not_there_is_named() {
         let arguments = ["emulate", "other.toml", "--scans", "1", "--image", image];
         refused(&folder, &arguments, &["--scans", &format!("readout.{field}"), only]);
     }
-    // A model of another scene.
+    // Model of another scene.
     folder.succeed(&["train", "small.toml", "-o", "small.bin"]);
     let arguments = ["emulate", "press", "--model", "small.bin", "--image", image];
     refused(&folder, &arguments, &["--model", "press"]);

@@ -1,4 +1,4 @@
-//! A virtual board at the other end of a line, and a device that scans it; both in this process.
+//! Virtual board at the other end of a line, and a device that scans it; both in this process.
 
 use std::cell::Cell;
 use std::io::{Read, Write};
@@ -25,10 +25,10 @@ use taxel_simulate::synthesise;
 use taxel_simulate::virtual_board::{SeriesResistance, VirtualBoard};
 
 static CIRCUIT: ZeroPotential<8, 18> = ZeroPotential::TYPICAL;
-/// What it corrects for.
+/// Series resistances for which the device corrects.
 const SERIES: SeriesResistance = SeriesResistance { row_source_ohm: 0.26, column_ohm: 0.0 };
 
-/// `press` on a board with every fault, of the image's parts.
+/// World `press` on a board with every fault, of the image's parts.
 fn world() -> World {
     let mut world = World::press();
     world.readout = Readout {
@@ -94,7 +94,7 @@ impl Write for Socket {
 }
 
 impl Port for Socket {
-    /// A slow clock, so that nothing stalls however busy the computer is.
+    /// Slow clock, so that nothing stalls however busy the computer is.
     fn now_us(&mut self) -> u32 {
         (self.start.elapsed().as_micros() / 10) as u32
     }
@@ -131,7 +131,7 @@ impl FrameSource<8, 18> for RemoteReadout {
     }
 }
 
-/// The same, with one bit wrong in every second scan.
+/// Readout over a line with one bit wrong in every second scan.
 #[derive(Clone)]
 struct Spoilt(RemoteReadout, u32);
 
@@ -149,7 +149,7 @@ fn bits(frame: &Frame<8, 18>) -> Vec<u32> {
     frame.row_column_resistance_ohm.as_flattened().iter().map(|ohm| ohm.to_bits()).collect()
 }
 
-/// Scans so many frames over a line; their bits and reports, and how serving them ended.
+/// Scans so many frames over a line. Returns their bits and reports, and the outcome of serving them.
 fn scan_served(
     world: &World,
     frames: u32,
@@ -181,7 +181,7 @@ fn scan_served(
     })
 }
 
-/// The same with the board's own handles.
+/// Scans so many frames with the board's own handles.
 fn scan_directly(world: &World, frames: u32) -> Vec<(Vec<u32>, ScanReport)> {
     let board = VirtualBoard::new(world).unwrap();
     let mut scanner = board.scanner(SERIES);
@@ -227,7 +227,7 @@ fn what_is_not_there_ends_serving_at_once() {
         assert!(refused.to_string().contains(says), "{refused}");
     }
     board.check().unwrap();
-    // Whatever the chip is asked, as many bytes come back.
+    // A chip gives back as many bytes as it is sent, whatever they ask.
     let [mut near, far] = line();
     near.write_all(&[0x01, 7, 2, 0xAA, 0xAA]).unwrap();
     near.shutdown(Shutdown::Write).unwrap();
@@ -243,8 +243,7 @@ fn model(world: &World) -> ModelBlob {
     pack(&trained, &frames, &Origin::of_data("test", 0, 1, &frames)).unwrap()
 }
 
-/// A device in a thread of this process, whose `source` scans `world` on a served board, held to the
-/// host.
+/// Checks a device in a thread of this process, whose `source` scans `world` on a served board.
 fn check<F: FrameSource<8, 18> + Clone + Send + 'static>(
     world: &World,
     scans: usize,

@@ -4,7 +4,7 @@ use crate::common::Folder;
 use host_sim::Result;
 use host_sim::evaluate::cost::Costs;
 use host_sim::evaluate::gate::{self, Settings};
-use host_sim::evaluate::trade::{self, Limits, Plan, Trade};
+use host_sim::evaluate::trade::{self, Bounds, Plan, Trade};
 use host_sim::experiment::Experiment;
 use taxel_data::progress::Silent;
 use taxel_data::random::Stream;
@@ -26,20 +26,20 @@ fn plan() -> Plan {
     }
 }
 
-fn compute(scene: &Experiment, limits: Limits) -> Result<Trade> {
-    compute_plan(scene, &plan(), limits)
+fn compute(scene: &Experiment, bounds: Bounds) -> Result<Trade> {
+    compute_plan(scene, &plan(), bounds)
 }
 
-fn compute_plan(scene: &Experiment, plan: &Plan, limits: Limits) -> Result<Trade> {
-    limits.check()?;
+fn compute_plan(scene: &Experiment, plan: &Plan, bounds: Bounds) -> Result<Trade> {
+    bounds.check()?;
     let mut trade = trade::compute(scene, plan, "dz_mm", &Silent)?;
-    trade.choose(&limits)?;
+    trade.choose(&bounds)?;
     Ok(trade)
 }
 
 #[test]
-fn every_knob_has_its_points_and_the_front_is_what_nothing_beats() {
-    let trade = compute(&press(), Limits::default()).unwrap();
+fn every_knob_has_its_points_and_the_front_is_the_pareto_front() {
+    let trade = compute(&press(), Bounds::default()).unwrap();
     assert_eq!(trade.chosen, None);
     let count = |name: &str| trade.points.iter().filter(|p| p.arithmetic.name() == name).count();
     for kernel in ["fixed16", "f32-direct"] {
@@ -48,7 +48,7 @@ fn every_knob_has_its_points_and_the_front_is_what_nothing_beats() {
     for kernel in ["f32-direct-libm", "f32-direct-micromath"] {
         assert_eq!(count(kernel), 2 * 2 * 2 * 2, "{kernel}"); // the gate is not measured with them
     }
-    // Only where rounding is proved harmless.
+    // Expanded distances appear only where their rounding is proved harmless.
     assert!((1..32).contains(&count("f32")), "{}", count("f32"));
 
     let rank = |p: &trade::Point| (p.frame.cycles, p.samples_averaged, p.rmse("dz_mm"));
@@ -67,7 +67,7 @@ fn every_knob_has_its_points_and_the_front_is_what_nothing_beats() {
         assert_eq!(least, 1.0);
     }
 
-    // More samples, less error; 16 bits as good as 32.
+    // More samples have less error, and 16 bits are as good as 32.
     let find = |kernel: &str, centres, samples| {
         let wanted = |p: &&trade::Point| {
             (p.way().as_str(), p.centres, p.samples_averaged, p.affine_tail, p.gate_k)
@@ -81,7 +81,7 @@ fn every_knob_has_its_points_and_the_front_is_what_nothing_beats() {
     assert!(fixed.rmse("dz_mm") < 1.01 * float.rmse("dz_mm"));
     assert!(fixed.frame.cycles < float.frame.cycles / 3);
     assert!(fixed.flash_bytes < 6 * float.flash_bytes / 10);
-    // One network for the array: less error, in fewer cycles.
+    // One network for the array has less error, in fewer cycles.
     let array = find("fixed16 array", 64, 1);
     assert!(array.rmse("dz_mm") < 0.95 * fixed.rmse("dz_mm"), "{}", array.rmse("dz_mm"));
     assert!(array.frame.cycles < fixed.frame.cycles && array.flash_bytes < fixed.flash_bytes);
@@ -90,9 +90,9 @@ fn every_knob_has_its_points_and_the_front_is_what_nothing_beats() {
 #[test]
 fn the_chosen_blob_is_what_the_table_says() {
     let scene = press();
-    let limits = Limits { error: Some(0.055), ..Limits::default() };
+    let bounds = Bounds { error: Some(0.055), ..Bounds::default() };
     let plan = Plan { gate_k: vec![], ..plan() };
-    let trade = compute_plan(&scene, &plan, limits).unwrap();
+    let trade = compute_plan(&scene, &plan, bounds).unwrap();
     let chosen = trade.chosen.unwrap();
     let point = &trade.points[chosen];
     assert!(point.rmse("dz_mm") <= 0.055);
@@ -114,14 +114,14 @@ fn the_chosen_blob_is_what_the_table_says() {
 }
 
 #[test]
-fn behind_a_gate_points_err_as_the_gates_rows_do_and_cost_their_share() {
+fn behind_a_gate_points_have_the_errors_of_the_gates_rows_and_cost_their_share() {
     let mut scene = press();
     let plan =
         Plan { centres: vec![16], samples_averaged: vec![4], gate_k: vec![3.5], clock_mhz: 1.0 };
-    let limits = Limits { cycles: Some(10_000), ..Limits::default() };
-    let trade = compute_plan(&scene, &plan, limits).unwrap();
+    let bounds = Bounds { cycles: Some(10_000), ..Bounds::default() };
+    let trade = compute_plan(&scene, &plan, bounds).unwrap();
     let costs = Costs::measured().unwrap();
-    // The gate command's way: the model by itself, and the same test frames.
+    // The same gate by other means: the model by itself, and the same test frames.
     scene.world.noise.level /= 2.0;
     let mut gated = 0;
     for (i, point) in trade.points.iter().enumerate() {
@@ -147,13 +147,13 @@ fn behind_a_gate_points_err_as_the_gates_rows_do_and_cost_their_share() {
         let cycles = frames.map(|cost| cost.cycles).mean(skipped);
         assert_eq!(point.frame.cycles, cycles.round() as u64);
         assert!(point.whole_array || point.frame.instructions < without.frame.instructions);
-        // The baseline and the answer to it.
+        // RAM of the baseline and of its estimate.
         assert_eq!(point.ram_bytes - without.ram_bytes, 576 + 584);
         assert_eq!(trade.rest_tolerance(i), Some(3.5 * 0.0025));
         gated += 1;
     }
     assert!(gated >= 4, "{gated}");
-    // Only behind a gate does a frame cost so little.
+    // A frame costs so little only behind a gate.
     let chosen = trade.chosen.unwrap();
     assert!(trade.points[chosen].gate_k.is_some() && trade.points[chosen].on_front);
 }
@@ -206,7 +206,7 @@ fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
     assert!(read("out/few/trade.html").contains("gate k</th>"));
 
     assert!(folder.path("out/few/chosen.bin").exists());
-    // What was measured is kept where nothing is chosen, and no other run's choice beside it.
+    // Measurements are kept where no point is chosen, and another run's choice is not left beside them.
     let output = folder.run(&[&few[..], &["--gate", "none", "--max-cycles", "100"]].concat());
     let stderr = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.code() == Some(2) && stderr.contains("--max-cycles 100"), "{stderr}");
@@ -214,7 +214,7 @@ fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
     assert!(page.contains("\n* fixed16 ") && !page.contains("chosen:"), "{page}");
     assert!(!read("out/few/trade.svg").contains("c1 hollow mark"), "{page}");
     assert!(!folder.path("out/few/chosen.bin").exists());
-    // Without noise there is no gate, and the note says why.
+    // Without noise there is no gate, and the note gives the reason.
     let output = folder.run(&[&few[..], &["--noise", "0"]].concat());
     let stderr = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.success() && stderr.contains("no points behind a gate"), "{stderr}");
@@ -229,11 +229,11 @@ fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
 }
 
 #[test]
-fn limits_that_nothing_meets_and_scenes_that_were_not_measured_are_refused() {
+fn bounds_that_no_point_meets_and_scenes_that_were_not_measured_are_refused() {
     let scene = press();
-    let limits = Limits { error: Some(1e-6), cycles: Some(20_000), flash_bytes: None };
-    let message = compute(&scene, limits).unwrap_err().to_string();
-    let all = compute(&scene, Limits::default()).unwrap();
+    let bounds = Bounds { error: Some(1e-6), cycles: Some(20_000), flash_bytes: None };
+    let message = compute(&scene, bounds).unwrap_err().to_string();
+    let all = compute(&scene, Bounds::default()).unwrap();
     let least_error = |within: &dyn Fn(&trade::Point) -> bool| {
         let within = all.points.iter().filter(|point| within(point));
         let least = within.map(|point| point.rmse("dz_mm")).fold(f64::MAX, f64::min);
@@ -241,15 +241,15 @@ fn limits_that_nothing_meets_and_scenes_that_were_not_measured_are_refused() {
     };
     let error = least_error(&|_| true);
     let told = format!(
-        "no point is within max-error 0.000001: the smallest error is {error:.4} mm (dz_mm) of all: loosen it"
+        "no point is within max-error 0.000001 (the smallest error is {error:.4} mm (dz_mm)): raise the bound"
     );
     assert_eq!(message, told);
-    // The error that is told can be asked for.
-    compute(&scene, Limits { error: Some(error), ..Limits::default() }).unwrap();
-    // Each can be met, but not both.
+    // The error in the message can be asked for.
+    compute(&scene, Bounds { error: Some(error), ..Bounds::default() }).unwrap();
+    // Each bound can be met, but not both.
     let cycles = all.points.iter().map(|point| point.frame.cycles).min().unwrap();
-    let limits = Limits { error: Some(error), cycles: Some(cycles), flash_bytes: None };
-    let message = compute(&scene, limits).unwrap_err().to_string();
+    let bounds = Bounds { error: Some(error), cycles: Some(cycles), flash_bytes: None };
+    let message = compute(&scene, bounds).unwrap_err().to_string();
     let near = least_error(&|point| point.frame.cycles <= cycles);
     for told in [
         format!("max-error {error}, max-cycles {cycles}, a slot's 131072 bytes at once"),
@@ -259,17 +259,17 @@ fn limits_that_nothing_meets_and_scenes_that_were_not_measured_are_refused() {
         assert!(message.contains(&told), "{message}");
     }
     for error in [0.0, -1.0, f64::NAN] {
-        let limits = Limits { error: Some(error), ..Limits::default() };
-        let message = compute(&scene, limits).unwrap_err().to_string();
+        let bounds = Bounds { error: Some(error), ..Bounds::default() };
+        let message = compute(&scene, bounds).unwrap_err().to_string();
         assert!(message.contains("max-error"), "{message}");
     }
 
     let mut other = scene.clone();
     other.world.read_rows.pop();
-    let message = compute(&other, Limits::default()).unwrap_err().to_string();
+    let message = compute(&other, Bounds::default()).unwrap_err().to_string();
     assert!(message.contains("7 rows of 18 readings"), "{message}");
     let refusal = |scene: &Experiment, plan: &Plan| {
-        compute_plan(scene, plan, Limits::default()).unwrap_err().to_string()
+        compute_plan(scene, plan, Bounds::default()).unwrap_err().to_string()
     };
     let mut plan =
         Plan { centres: vec![20], samples_averaged: vec![1], gate_k: vec![], clock_mhz: 1.0 };

@@ -12,13 +12,13 @@ use taxel_data::random::{Purpose, Random, Stream};
 
 pub mod mailbox;
 
-/// How the line to the device spoils bytes, in either direction: one in so many, or none.
+/// Line to the device that spoils bytes, in either direction: one in so many, or none.
 #[derive(Debug, Clone, Copy)]
 pub struct Line {
     pub one_in: Option<usize>,
 }
 
-/// A board whose serial line is `W`, whose reads must not block.
+/// Board whose serial line is `W`, whose reads must not block.
 struct Board<W> {
     wire: W,
     start: Instant,
@@ -27,12 +27,12 @@ struct Board<W> {
     received: Vec<u8>,
     taken: usize,
     to_send: Vec<u8>,
-    /// The host has gone: the thread may end.
+    /// Whether the host has gone, so that the thread may end.
     gone: bool,
 }
 
 impl<W: Read + Write> Board<W> {
-    /// `None` for a byte that is lost.
+    /// Byte as it arrives; `None` if it is lost.
     fn spoil(&mut self, byte: u8) -> Option<u8> {
         let Some(one_in) = self.line.one_in else { return Some(byte) };
         match self.random.below(3 * one_in) {
@@ -100,7 +100,7 @@ impl<W: Read + Write> Platform for Board<W> {
     }
 }
 
-/// A sensor that goes through given frames again and again.
+/// Sensor that goes through given frames again and again.
 #[derive(Clone)]
 struct Source {
     frames: Vec<[[f32; 18]; 8]>,
@@ -115,7 +115,7 @@ impl FrameSource<8, 18> for Source {
     }
 }
 
-/// A slot that takes writes only where it is erased.
+/// Slot that takes writes only where it is erased.
 struct MemorySlot(Vec<u32>);
 
 impl Slot for MemorySlot {
@@ -146,8 +146,8 @@ pub fn run(
     run_with(wire, line, model, Source { frames, next: 0 });
 }
 
-/// Runs a device on `wire` that scans `source`, until the host goes, restarting it whenever it asks for
-/// that.
+/// Runs a device on `wire` that scans `source`, until the host goes. The device is restarted whenever it
+/// asks for that.
 ///
 /// `wire` must read without blocking.
 pub fn run_with(

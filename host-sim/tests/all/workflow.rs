@@ -1,4 +1,4 @@
-//! What users do, from end to end, with the binary.
+//! Work of users, from end to end, with the binary.
 
 use crate::common::{Folder, small_scene};
 
@@ -101,7 +101,7 @@ fn missing_readings_leave_their_rows_outputs_empty_and_no_line_out() {
 }
 
 #[test]
-fn one_network_for_the_whole_array_needs_every_reading_and_errs_less() {
+fn one_network_for_the_whole_array_needs_every_reading_and_has_less_error() {
     let folder = Folder::new("array");
     folder.write("scene.toml", small_scene());
     folder.succeed(&["train", "scene.toml", "-n", "2000", "-o", "rows.bin"]);
@@ -121,7 +121,7 @@ fn one_network_for_the_whole_array_needs_every_reading_and_errs_less() {
     let (of_array, of_rows) = (rmse("array.bin"), rmse("rows.bin"));
     assert!(of_array < of_rows, "{of_array} {of_rows}");
 
-    // The scene asks for the same; it says its own width, of which --whole-array takes half.
+    // The scene asks for the same, but with a width of its own, of which --whole-array takes half.
     let scene = small_scene()
         .replace("affine_tail = true", "affine_tail = true\nwhole_array = true")
         .replace("spread = 0.8", "spread = 0.4");

@@ -1,15 +1,15 @@
-//! The lines of data of a plain CSV file, read on all cores.
+//! Fast reader for the lines of data of a plain CSV file, on all cores.
 //!
-//! Plain means: no quotes, no blank line, every field a number or empty. Anything else is left to the
-//! careful reader, which also knows what to say about it.
+//! A file is plain if it has no quotes and no blank line, and every field is a number or empty. The
+//! careful reader takes all other files, and writes the messages.
 
 use rayon::prelude::*;
 
-/// Bytes that are read in one piece: large against what starting costs, small against a core's cache.
+/// Bytes read at a time: many enough to be worth a thread's start, few enough for a core's cache.
 const PIECE: usize = 256 * 1024;
 
-/// The values of `lines` of CSV with as many fields as there are `columns`, NaN where one is missing;
-/// nothing if the lines are not plain.
+/// Values of CSV `lines` of so many `columns`, NaN where one is missing; `None` if the lines are not
+/// plain.
 pub(super) fn read(lines: &[u8], columns: usize) -> Option<Vec<f64>> {
     let pieces = pieces(lines);
     let counts: Option<Vec<usize>> = pieces.par_iter().map(|piece| count_lines(piece)).collect();
@@ -31,7 +31,7 @@ pub(super) fn read(lines: &[u8], columns: usize) -> Option<Vec<f64>> {
     Some(values)
 }
 
-/// Cuts after line ends.
+/// Pieces of about [`PIECE`] bytes, each cut after a line end.
 fn pieces(mut lines: &[u8]) -> Vec<&[u8]> {
     let mut pieces = Vec::with_capacity(lines.len() / PIECE + 1);
     while lines.len() > PIECE {
@@ -46,7 +46,7 @@ fn pieces(mut lines: &[u8]) -> Vec<&[u8]> {
     pieces
 }
 
-/// Lines in a piece, the last perhaps without an end; nothing if there are quotes.
+/// Number of lines in a piece, the last perhaps without an end; `None` if there are quotes.
 fn count_lines(piece: &[u8]) -> Option<usize> {
     if memchr::memchr(b'"', piece).is_some() {
         return None;
@@ -78,7 +78,7 @@ fn read_piece(mut piece: &[u8], columns: usize, values: &mut [f64]) -> Option<()
     piece.is_empty().then_some(())
 }
 
-/// The number at the start of `text`, and its length.
+/// Number at the start of `text`, and its length in bytes.
 #[inline]
 fn field(text: &[u8]) -> Option<(f64, usize)> {
     if let Ok((value, length)) = fast_float2::parse_partial::<f64, _>(text) {

@@ -1,6 +1,6 @@
 use super::*;
 
-/// What the careful reader makes of a file.
+/// Values and line numbers that the careful reader finds in a file.
 fn carefully(bytes: &[u8]) -> Result<(Vec<f64>, Vec<u64>)> {
     let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(bytes);
     let header: Vec<String> = reader.headers().unwrap().iter().map(str::to_owned).collect();

@@ -1,4 +1,4 @@
-//! Writing CSV: numbers become text on all cores, in pieces that are written one after the other.
+//! Writing of CSV: numbers are formatted on all cores, in pieces that are written in turn.
 
 use std::io::Write;
 use std::path::Path;
@@ -8,15 +8,15 @@ use rayon::prelude::*;
 use crate::error::{Error, Result};
 use crate::output;
 
-/// Numbers that become text in one piece, and pieces at a time.
+/// Numbers formatted as one piece, and pieces formatted at a time.
 const PIECE: usize = 16 * 1024;
 const PIECES: usize = 64;
 
-/// Writes a CSV file: `names`, then `lines`. Every number reads back as the same f64; NaN becomes
-/// an empty field.
+/// Writes a CSV file: a header of `names`, then `lines`. Every number reads back as the same f64; NaN
+/// becomes an empty field.
 ///
 /// # Errors
-/// [`Error::Write`]; `path` is then as it was before.
+/// [`Error::Write`] if the file cannot be written; whatever stood at `path` then stays.
 pub fn write<'n, L: IntoIterator<Item = f64>>(
     path: &Path,
     names: impl IntoIterator<Item = &'n str>,
@@ -46,17 +46,17 @@ pub fn write<'n, L: IntoIterator<Item = f64>>(
     })
 }
 
-/// Some lines, as numbers and as text.
+/// Lines to be written together, as numbers and as text.
 #[derive(Clone, Default)]
 struct Piece {
     values: Vec<f64>,
-    /// Where each line ends among the values.
+    /// Index in the values at which each line ends.
     line_ends: Vec<usize>,
     text: Vec<u8>,
 }
 
 impl Piece {
-    /// Takes the next lines; false if there are none.
+    /// Takes the next lines; returns false if none are left.
     fn fill<L: IntoIterator<Item = f64>>(&mut self, lines: &mut impl Iterator<Item = L>) -> bool {
         self.values.clear();
         self.line_ends.clear();
@@ -91,7 +91,7 @@ impl Piece {
     }
 }
 
-/// The shortest digits that read back as the same number, as `Display` writes them.
+/// Appends the shortest digits that read back as the same number, as `Display` writes them.
 fn write_number(text: &mut Vec<u8>, value: f64) {
     if value.is_nan() {
         return;
@@ -105,8 +105,8 @@ fn write_number(text: &mut Vec<u8>, value: f64) {
     }
 }
 
-/// Whether a number may lie right between `digits` and the next number of as many digits: `Display` then
-/// rounds up, and zmij to even. It is then a multiple of 2^-(decimals + 1).
+/// Whether a number may lie exactly between `digits` and the next number of as many digits. `Display`
+/// then rounds up, and zmij to even. Such a number is a multiple of 2^-(decimals + 1).
 fn lies_in_the_middle(value: f64, digits: &str) -> bool {
     const UNAMBIGUOUS: usize = 15; // digits of which no two numbers are the same f64
     let decimals = digits.find('.').map_or(0, |point| digits.len() - point - 1);

@@ -1,5 +1,5 @@
-//! The draws of many frames at once, one frame a lane: the very numbers that [`Random`](super::Random)
-//! gives.
+//! Random draws of many frames at once, one frame a lane: the same numbers as [`Random`](super::Random)
+//! draws.
 
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays are indexed alike")]
 
@@ -13,19 +13,20 @@ use crate::simd::{LANES, Lanes};
 #[derive(Debug, Clone)]
 pub struct RandomLanes {
     state: [Lanes<u64>; 4],
-    /// `split_mix` of every frame's number.
+    /// `split_mix` of every frame's number: the frame's share of the seed.
     mixed_frames: Lanes<u64>,
 }
 
 impl RandomLanes {
-    /// For the frames from number `first` on; [`start`](Self::start) comes next.
+    /// Sources for the frames from number `first` on; call [`start`](Self::start) before drawing.
     #[inline(always)]
     #[must_use]
     pub fn new(first: usize) -> Self {
         Self::every(first, 1)
     }
 
-    /// For every `step`th frame from number `first` on; [`start`](Self::start) comes next.
+    /// Sources for every `step`th frame from number `first` on; call [`start`](Self::start) before
+    /// drawing.
     #[inline(always)]
     #[must_use]
     pub fn every(first: usize, step: usize) -> Self {
@@ -36,7 +37,8 @@ impl RandomLanes {
         Self { state: [[0; LANES]; 4], mixed_frames }
     }
 
-    /// Starts the sources for `purpose` and `part` (say a row) of every frame, as [`super::Random::new`].
+    /// Starts the sources for `purpose` and `part` (say a row) of every frame, seeded like
+    /// [`super::Random::new`].
     #[inline(always)]
     pub fn start(&mut self, seed: u64, stream: Stream, purpose: Purpose, part: u64) {
         let common = [stream as u64, purpose as u64].into_iter();
@@ -44,7 +46,7 @@ impl RandomLanes {
         let part = split_mix(part);
         for lane in 0..LANES {
             let mixed = split_mix(split_mix(common ^ self.mixed_frames[lane]) ^ part);
-            // As Xoshiro256PlusPlus::seed_from_u64 does.
+            // The four words of state that Xoshiro256PlusPlus::seed_from_u64 fills.
             let mut state = mixed;
             for words in &mut self.state {
                 words[lane] = split_mix(state);
@@ -53,7 +55,8 @@ impl RandomLanes {
         }
     }
 
-    /// `N` draws a lane, uniform on [`low`, `high`) of each, as [`super::Random::between`] gives them.
+    /// Draws `N` uniform numbers a lane, one from each range [`low`, `high`), equal to those of
+    /// [`super::Random::between`].
     #[inline(always)]
     pub fn between<const N: usize>(&mut self, ranges: [[f64; 2]; N], lanes: &mut [Lanes; N]) {
         for lane in 0..LANES {
@@ -67,7 +70,7 @@ impl RandomLanes {
         }
     }
 
-    /// Two standard normal draws a lane, as [`super::Random::normal`] gives them.
+    /// Draws two standard normal numbers a lane, equal to those of [`super::Random::normal`].
     #[inline(always)]
     pub fn normal_pair(&mut self, first: &mut Lanes, second: &mut Lanes) {
         let mut units = [[0.0; LANES]; 2];

@@ -1,40 +1,40 @@
-//! The best linear decoder of each row-wire: a baseline that a network must beat.
+//! Baseline: the best linear decoder of each row-wire, which a network must beat.
 
-use taxel_data::dataset::{Block, Dataset};
+use taxel_data::dataset::{Dataset, RowTable};
 
 use super::{RowDecoder, Rows};
 use crate::train::least_squares::{self, Regressors};
 use crate::train::{INITIAL_COVARIANCE, InputScale, Samples};
 
-/// Name in tables and results.
+/// Name of the decoder in tables and results.
 pub const NAME: &str = "linear";
 
-/// y = A·x + b on scaled inputs, by least squares.
+/// Linear decoder y = A·x + b on scaled inputs, fitted by least squares.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinearRow {
     scale: InputScale,
     inputs: usize,
-    /// `inputs × outputs`.
+    /// Matrix A, `inputs × outputs`.
     slope: Vec<f64>,
     bias: Vec<f64>,
 }
 
-/// The best linear decoder of every row of `training`.
+/// Fits the best linear decoder of every row of `training`.
 #[must_use]
 pub fn fit(training: &Dataset) -> Rows<LinearRow> {
     Rows::fit(NAME, training, LinearRow::fit)
 }
 
 impl LinearRow {
-    /// The best linear decoder of `block` in the sense of least squares.
+    /// Fits the best linear decoder of `table` in the sense of least squares.
     #[must_use]
-    pub fn fit(block: &Block) -> Self {
-        let samples = Samples::new(block);
+    pub fn fit(table: &RowTable) -> Self {
+        let samples = Samples::new(table);
         let inputs = samples.inputs();
         let regressors = Regressors { centres: &[], inputs, decay: 1.0, affine_tail: true };
         let mut slope =
-            least_squares::fit(&regressors, &samples.scaled, &block.outputs, INITIAL_COVARIANCE);
-        let bias = slope.split_off(slope.len() - block.outputs.names.len());
+            least_squares::fit(&regressors, &samples.scaled, &table.outputs, INITIAL_COVARIANCE);
+        let bias = slope.split_off(slope.len() - table.outputs.names.len());
         Self { scale: samples.scale, inputs, slope, bias }
     }
 }

@@ -1,13 +1,13 @@
-//! A decoder that always predicts the mean of the training outputs: what any other must beat.
+//! Baseline: always predicting the mean of the training outputs, which any decoder must beat.
 
 use taxel_data::dataset::Dataset;
 
 use crate::decoder::{Estimates, FrameDecoder};
 
-/// Name in tables and results.
+/// Name of the decoder in tables and results.
 pub const NAME: &str = "mean";
 
-/// The mean of the training outputs, whatever the readings are.
+/// Decoder that always predicts the mean of the training outputs, whatever the readings are.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mean {
     inputs: usize,
@@ -15,7 +15,7 @@ pub struct Mean {
 }
 
 impl Mean {
-    /// The mean of each output of `training`.
+    /// Computes the mean of each output of `training`.
     #[must_use]
     pub fn fit(training: &Dataset) -> Self {
         Self { inputs: training.inputs.names.len(), outputs: training.outputs.means() }

@@ -1,36 +1,38 @@
-//! The paper's *standard* network, a baseline: every training sample is a centre (K = N) and the
+//! Baseline: the paper's *standard* network, in which every training sample is a centre (K = N) and the
 //! weights interpolate exactly. It is not meant for a device, so it stays in f64.
 
 use nalgebra::DMatrix;
-use taxel_data::dataset::Block;
+use taxel_data::dataset::RowTable;
 
 use super::RowDecoder;
 use crate::train::least_squares::Regressors;
 use crate::train::{InputScale, Samples};
 
-/// Name in tables and results.
+/// Name of the decoder in tables and results.
 pub const NAME: &str = "standard";
 
-/// An exactly interpolating network.
+/// Network that interpolates its training samples exactly.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StandardNetwork {
     scale: InputScale,
     inputs: usize,
     centres: Vec<f64>,
     decay: f64,
-    /// `centres × outputs`.
+    /// Weights, `centres × outputs`.
     weights: Vec<f64>,
     outputs: usize,
 }
 
 impl StandardNetwork {
-    /// Interpolates all samples of `block` with width `spread`; `None` where the interpolation
-    /// matrix is singular (duplicates), or so nearly that the solution misses the samples by more
-    /// than a thousandth (a spread far above the distances).
+    /// Interpolates all samples of `table` with width `spread` on scaled inputs.
+    ///
+    /// Returns `None` where the interpolation matrix is singular (duplicates), or so nearly singular
+    /// that the solution misses the samples by more than a thousandth (a spread far above the
+    /// distances).
     #[must_use]
-    pub fn fit(block: &Block, spread: f64) -> Option<Self> {
-        let samples = Samples::new(block);
-        let (count, outputs) = (block.inputs.len(), block.outputs.names.len());
+    pub fn fit(table: &RowTable, spread: f64) -> Option<Self> {
+        let samples = Samples::new(table);
+        let (count, outputs) = (table.inputs.len(), table.outputs.names.len());
         let decay = 1.0 / (2.0 * spread * spread);
         let this = Self {
             inputs: samples.inputs(),
@@ -42,11 +44,11 @@ impl StandardNetwork {
         };
         let mut interpolation = DMatrix::zeros(count, count);
         let mut row = vec![0.0; count + 1];
-        for (i, sample) in this.centres.chunks_exact(block.inputs.names.len()).enumerate() {
-            this.regressors(block.inputs.names.len()).evaluate(sample, &mut row);
+        for (i, sample) in this.centres.chunks_exact(table.inputs.names.len()).enumerate() {
+            this.regressors(table.inputs.names.len()).evaluate(sample, &mut row);
             (0..count).for_each(|j| interpolation[(i, j)] = row[j]);
         }
-        let targets = DMatrix::from_row_slice(count, outputs, &block.outputs.values);
+        let targets = DMatrix::from_row_slice(count, outputs, &table.outputs.values);
         let solved = interpolation.clone().lu().solve(&targets)?;
         if !solved.iter().all(|w| w.is_finite()) {
             return None;
@@ -71,7 +73,7 @@ impl RowDecoder for StandardNetwork {
         let mut row = vec![0.0; self.centres.len() / inputs];
         let mut predicted = Vec::with_capacity(readings.len() / inputs * self.outputs);
         for line in self.scale.apply(readings).chunks_exact(inputs) {
-            regressors.evaluate(line, &mut row); // the bias's 1 finds no place and is dropped
+            regressors.evaluate(line, &mut row); // the bias's 1 has no place in the row and is dropped
             let start = predicted.len();
             predicted.resize(start + self.outputs, 0.0);
             for (activation, weights) in row.iter().zip(self.weights.chunks_exact(self.outputs)) {

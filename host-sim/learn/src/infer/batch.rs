@@ -1,5 +1,7 @@
-//! Many lines at once, in vector instructions: every lane computes one line, by the operations of
-//! `model_core::rbf` in their order where that matters, so that answers stay the same bit for bit.
+//! Inference on many lines at once, in vector instructions, one line a lane.
+//!
+//! Operations are those of `model_core::rbf`, in their order where that matters, so that outputs stay
+//! the same bit for bit.
 
 #![expect(clippy::inline_always, reason = "what pulp dispatches must be inlined into it")]
 
@@ -20,7 +22,7 @@ mod floats;
 #[cfg(target_arch = "x86_64")]
 mod fixed16;
 
-/// A network made ready for blocks of lines.
+/// Network laid out for computing several lines at once.
 #[derive(Debug)]
 pub(super) enum Batch<'a> {
     Floats(Floats<'a>),
@@ -29,7 +31,7 @@ pub(super) enum Batch<'a> {
 }
 
 impl<'a> Batch<'a> {
-    /// The network, if there is a vectorised form of it.
+    /// Network in its vectorised form, if it has one.
     pub(super) fn of(network: &Network<'a>, exponential: Exponential) -> Option<Self> {
         match network {
             #[cfg(target_arch = "x86_64")]
@@ -38,8 +40,10 @@ impl<'a> Batch<'a> {
         }
     }
 
-    /// Infers the outputs for lines of readings, all NaN where a reading is missing or an output overflows.
-    /// Each line of the network starts `readings_step` (`outputs_step`) values after the one before.
+    /// Infers the outputs for lines of readings; NaN for a line where a reading is missing or an output
+    /// overflows.
+    ///
+    /// Each line of the network starts `readings_step` (`outputs_step`) values after the previous one.
     pub(super) fn infer(
         &self,
         readings: &[f64],

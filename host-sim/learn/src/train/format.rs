@@ -1,7 +1,8 @@
-//! Fitting output weights to what a device will compute, one file a format.
+//! Fitting of output weights to the activations that a device will compute, one file a number format.
 //!
-//! Centres, widths and scaling are rounded to the format first, and the weights are fitted to the activations
-//! that remain: what rounding did to these is then no error any more. Only the weights are rounded last.
+//! Centres, widths and scaling are rounded to the format first, and the weights are fitted to the
+//! resulting activations. That rounding then causes no error any more; only the weights are rounded
+//! last.
 
 use model_core::rbf::{Format, Network, NetworkError, Shape, direct, expanded, fixed16};
 
@@ -16,22 +17,22 @@ mod fixed_point;
 
 pub use expanded_f32::rounding_bounds;
 
-/// Parameters of one trained network as the blob will hold them, owned.
+/// Trained network with its parameters as the blob will hold them, owned.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FittedNetwork {
     shape: Shape,
     format: Format,
     affine: bool,
-    block: Vec<u32>,
+    words: Vec<u32>,
 }
 
 impl FittedNetwork {
-    /// The network of `block`.
+    /// Checks and holds the network in `words`.
     ///
     /// # Errors
     /// [`Error::NotHeld`] if a parameter does not fit the format.
-    fn try_new(shape: Shape, format: Format, affine: bool, block: Vec<u32>) -> Result<Self> {
-        let fitted = Self { shape, format, affine, block };
+    fn try_new(shape: Shape, format: Format, affine: bool, words: Vec<u32>) -> Result<Self> {
+        let fitted = Self { shape, format, affine, words };
         match fitted.try_network() {
             Ok(_) => Ok(fitted),
             Err(cause) => Err(Error::NotHeld { format, cause }),
@@ -39,21 +40,21 @@ impl FittedNetwork {
     }
 
     fn try_network(&self) -> std::result::Result<Network<'_>, NetworkError> {
-        let Self { shape, format, affine, block } = self;
+        let Self { shape, format, affine, words } = self;
         Ok(match format {
-            Format::F32Direct => direct::Network::of_words(*shape, true, *affine, block)?.into(),
-            Format::F32 => expanded::Network::try_new(*shape, *affine, block)?.into(),
-            Format::Fixed16 => fixed16::Network::try_new(*shape, *affine, block)?.into(),
+            Format::F32Direct => direct::Network::of_words(*shape, true, *affine, words)?.into(),
+            Format::F32 => expanded::Network::try_new(*shape, *affine, words)?.into(),
+            Format::Fixed16 => fixed16::Network::try_new(*shape, *affine, words)?.into(),
         })
     }
 
-    /// The format that it was fitted for.
+    /// Number format of the network.
     #[must_use]
     pub fn format(&self) -> Format {
         self.format
     }
 
-    /// The network, ready to infer.
+    /// Network of these parameters, ready to infer.
     ///
     /// # Panics
     /// Never: the parameters were checked when they were fitted.
@@ -63,8 +64,10 @@ impl FittedNetwork {
     }
 }
 
-/// What weights are fitted to: the outputs' deviations from their means. The means go into the bias: an
-/// offset would otherwise be spread over large weights that cancel, and cost digits.
+/// Deviations of the outputs from their means, to which weights are fitted.
+///
+/// The means go into the bias. An offset would otherwise be spread over large weights that cancel, and
+/// cost digits.
 struct Targets {
     deviations: Table,
     means: Vec<f64>,
@@ -85,18 +88,19 @@ impl Targets {
     }
 }
 
-/// Weights of a fit by what they multiply.
+/// Weights of a fit, separated by the regressors that they multiply.
 struct Weights {
-    /// `centres × outputs`.
+    /// Weights of the activations, `centres × outputs`.
     centres: Vec<f64>,
-    /// `inputs × outputs`, or none.
+    /// Weights of the affine tail, `inputs × outputs`, or none.
     affine: Vec<f64>,
-    /// The means included.
+    /// Biases, one an output, with the means added.
     bias: Vec<f64>,
 }
 
 impl Weights {
-    /// Of `regressors × outputs` weights: of `centres`, of the inputs if there is a tail, and of 1.
+    /// Separates `regressors × outputs` weights: those of `centres`, of the inputs if there is a tail,
+    /// and of 1.
     fn split(mut weights: Vec<f64>, centres: usize, targets: &Targets) -> Self {
         let outputs = targets.outputs();
         let mut bias = weights.split_off(weights.len() - outputs);
@@ -106,16 +110,16 @@ impl Weights {
     }
 }
 
-/// Fits `samples` with the given `centres` (on inputs scaled to [0, 1]).
+/// Fits `samples` with the given `centres` (`centres × inputs`, on inputs scaled to [0, 1]).
 ///
 /// # Errors
-/// A fit that the format does not hold.
+/// [`Error`](crate::Error) if the format does not hold the network.
 pub(super) fn fit(
     samples: &Samples<'_>,
     centres: &[f64],
     options: &Options,
 ) -> Result<FittedNetwork> {
-    let targets = Targets::of(&samples.block.outputs);
+    let targets = Targets::of(&samples.table.outputs);
     match options.format {
         Format::F32Direct => direct_f32::fit(samples, centres, options, &targets),
         Format::F32 => match expanded_f32::fit(samples, centres, options, &targets) {

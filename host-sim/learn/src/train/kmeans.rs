@@ -1,8 +1,8 @@
 //! K-means: k-means++ starts, Lloyd's iterations, restarts.
 //!
 //! Every point belongs to the centre with the least squared distance, summed in f64 in the order of the
-//! features, and to the first of several. How few distances are computed to find it (see `assign`
-//! and `screen`) changes nothing in the result.
+//! features; among equals, to the first. `assign` and `screen` avoid computing most distances, which
+//! changes nothing in the result.
 
 #![expect(clippy::inline_always, reason = "what `simd::widest` runs must be inlined into it")]
 
@@ -17,16 +17,16 @@ mod start;
 use assign::{Assignment, Piece};
 use screen::Points;
 
-/// How hard to look for centres.
+/// Effort of a search for centres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Search {
-    /// Independent starts; the best is kept.
+    /// Number of independent starts; the best result is kept.
     pub restarts: usize,
-    /// Most iterations of one start.
+    /// Largest number of iterations from one start.
     pub iterations: usize,
     /// Relative gain in inertia below which iterations stop.
     pub enough: f64,
-    /// Points looked at: an even selection where there are more.
+    /// Largest number of points looked at: an even selection where there are more.
     pub most_points: usize,
 }
 
@@ -36,18 +36,18 @@ impl Default for Search {
     }
 }
 
-/// Centres found.
+/// Result of a search for centres.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Found {
-    /// Centre after centre. Fewer than asked for where there are fewer distinct points.
+    /// Centres, `centres × dimensions`. Fewer than asked for where there are fewer distinct points.
     pub centres: Vec<f64>,
-    /// Sum of squared distances of the points looked at to their nearest centre.
+    /// Sum of squared distances of the points looked at from their nearest centres.
     pub inertia: f64,
-    /// Iterations that led here.
+    /// Number of iterations that led to these centres.
     pub iterations: usize,
 }
 
-/// A point's centre, and its squared distance.
+/// Nearest centre of a point, and its squared distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Nearest {
     centre: u32,
@@ -61,7 +61,7 @@ impl Default for Nearest {
 }
 
 impl Nearest {
-    /// Whether this is the better one; the first centre is, of equals.
+    /// Whether this centre is nearer than `other`; among equals, the first centre wins.
     #[inline(always)]
     fn is_nearer(&self, other: &Self) -> bool {
         self.squared_distance < other.squared_distance
@@ -69,15 +69,15 @@ impl Nearest {
     }
 }
 
-/// Points that a thread takes at a time. Depends on their number alone: sums are then the same on any
+/// Points that a thread takes at a time. It depends on their number alone, so sums are the same on any
 /// number of threads.
 fn piece(count: usize) -> usize {
     count.div_ceil(64).next_multiple_of(screen::LANES).max(512)
 }
 
-/// Looks for `centres` centres of `points` (each of `dimensions` finite numbers).
+/// Searches for `centres` centres of `points` (`points × dimensions`, all finite).
 ///
-/// Always ends; an empty cluster takes the point farthest from its centre. If there are fewer
+/// The search always ends; an empty cluster takes the point farthest from its centre. If there are fewer
 /// distinct points than `centres`, every distinct point becomes one.
 ///
 /// # Panics
@@ -111,7 +111,7 @@ pub fn fit(
     best.expect("at least one start")
 }
 
-/// The start of one search: k-means++ centres of `points`, fewer than `centres` where there are
+/// Starting centres of one search, by k-means++ over `points`; fewer than `centres` where there are
 /// fewer distinct points.
 ///
 /// # Panics
@@ -127,8 +127,8 @@ pub fn plus_plus(
     start::plus_plus(&Points::new(points, dimensions), centres, random).0
 }
 
-/// Lloyd's iterations over all `points` from given centres on; of `search` only the iterations, and
-/// when they end, matter.
+/// Lloyd's iterations over all `points` from given centres on. Only [`Search::iterations`] and
+/// [`Search::enough`] matter.
 ///
 /// # Panics
 /// If `dimensions` is 0, or there is no point or no centre.
@@ -149,7 +149,7 @@ fn lloyd(mut assignment: Assignment<'_>, search: &Search) -> Found {
         assignment.move_to(means(&assignment));
         let after = inertia_of(&assignment);
         if after > inertia {
-            // Rounding, or an empty cluster's new place did not pay.
+            // Stop here: rounding spoiled the gain, or an empty cluster's new place did not pay.
             return Found { centres: before, inertia, iterations: iteration };
         }
         let gain = inertia - after;
@@ -179,7 +179,7 @@ fn means(assignment: &Assignment<'_>) -> Vec<f64> {
         if *count > 0 {
             mean.iter_mut().for_each(|m| *m /= *count as f64);
         } else {
-            // Take a point of its own, the farthest left over.
+            // The empty cluster takes the farthest point that is left.
             let queue = farthest.get_or_insert_with(|| by_distance(&assignment.pieces));
             let index = queue.pop().unwrap_or(0);
             mean.copy_from_slice(points.point(index));
@@ -188,7 +188,7 @@ fn means(assignment: &Assignment<'_>) -> Vec<f64> {
     sums
 }
 
-/// Indices of all points, the farthest from its centre last.
+/// Indices of all points, ascending by distance from their centres.
 fn by_distance(pieces: &[Piece]) -> Vec<usize> {
     let nearest = pieces.iter().flat_map(|piece| &piece.nearest);
     let distances: Vec<f64> = nearest.map(|nearest| nearest.squared_distance).collect();

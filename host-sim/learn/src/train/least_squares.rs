@@ -1,8 +1,8 @@
-//! Output weights: least squares over all samples, by a blocked QR decomposition.
+//! Output weights: least squares over all samples, by a QR decomposition.
 //!
-//! The weights minimise Σ_t ‖y_t − Wᵀh_t‖² + ‖W‖²/δ: what recursive least squares
-//! ([`model_core::rls`]) arrives at sample by sample from covariance δ·I without forgetting, and
-//! what the device goes on from. Taking samples in blocks changes the order of rounding only.
+//! The weights minimise Σ_t ‖y_t − Wᵀh_t‖² + ‖W‖²/δ. Recursive least squares ([`model_core::rls`]) from
+//! covariance δ·I without forgetting arrives at the same weights sample by sample, and the device can go
+//! on from there. Taking many samples at once changes the order of rounding only.
 
 use std::ops::Range;
 
@@ -16,30 +16,31 @@ mod gaussian;
 mod triangle;
 
 pub use gaussian::{Gaussians, Regressors};
-use triangle::{BLOCK, Block, Triangle};
+use triangle::{NewRows, ROWS_AT_ONCE, Triangle};
 
 /// Regressors of a set of samples: the rows of the matrix that weights are fitted through.
 pub trait Design: Sync {
-    /// Regressors of each sample, n.
+    /// Number n of regressors of each sample.
     fn regressors(&self) -> usize;
 
-    /// Writes the regressors of `samples` into `values` (`samples × n`, row-major). Called once for
-    /// every sample, on any thread, a few samples at a time; the squares of the values, and sums of
-    /// these over all samples, must fit an f64.
+    /// Writes the regressors of `samples` into `values` (`samples × n`, row-major).
+    ///
+    /// It is called once for every sample, on any thread, a few samples at a time. The squares of the
+    /// values, and sums of these over all samples, must fit an f64.
     fn fill(&self, samples: Range<usize>, values: &mut [f64]);
 }
 
-/// The triangular factor of a fit: R·W = z has the weights as its solution, and RᵀR is the
-/// information matrix Σ h hᵀ + I/δ.
+/// Triangular factor of a fit: the weights W solve R·W = z, and RᵀR is the information matrix Σ h hᵀ +
+/// I/δ.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Factor {
-    /// R, `regressors × regressors`, row-major, upper triangular, its diagonal not negative.
+    /// Triangle R, `regressors × regressors`, row-major, upper triangular, its diagonal not negative.
     pub root: Vec<f64>,
-    /// z, `regressors × outputs`.
+    /// Transformed targets z, `regressors × outputs`.
     pub projection: Vec<f64>,
-    /// Regressors, n.
+    /// Number n of regressors.
     pub regressors: usize,
-    /// Outputs.
+    /// Number of outputs.
     pub outputs: usize,
 }
 
@@ -78,7 +79,7 @@ impl Factor {
         Self { root, projection, regressors: n, outputs }
     }
 
-    /// The weights, `regressors × outputs`.
+    /// Weights, `regressors × outputs`, by back substitution.
     #[must_use]
     pub fn weights(&self) -> Vec<f64> {
         let mut weights = vec![0.0; self.regressors * self.outputs];
@@ -87,14 +88,14 @@ impl Factor {
     }
 }
 
-/// Samples that are decomposed one after the other, before what comes of them is merged.
+/// Samples that a thread decomposes before its triangle is merged with others.
 fn piece(samples: usize, regressors: usize) -> usize {
-    // Merging costs as much as taking in half as many samples as there are regressors.
+    // Merging costs as much as absorbing half as many samples as there are regressors.
     samples.div_ceil(8).max(1024).max(4 * regressors)
 }
 
-/// Samples whose regressors are computed at once: they stay in the first cache until they are laid
-/// out in tiles.
+/// Samples whose regressors are computed at once: they stay in the first cache until they are laid out
+/// in tiles.
 const FILLED: usize = 8;
 
 fn decompose(
@@ -104,29 +105,29 @@ fn decompose(
     samples: Range<usize>,
 ) -> Triangle {
     let n = design.regressors();
-    let (mut triangle, mut block) = (Triangle::new(n, outputs), Block::new(n, outputs));
+    let (mut triangle, mut new_rows) = (Triangle::new(n, outputs), NewRows::new(n, outputs));
     let mut values = vec![0.0; FILLED * n];
-    for first in samples.clone().step_by(BLOCK) {
-        let last = samples.end.min(first + BLOCK);
-        block.clear();
+    for first in samples.clone().step_by(ROWS_AT_ONCE) {
+        let last = samples.end.min(first + ROWS_AT_ONCE);
+        new_rows.clear();
         for start in (first..last).step_by(FILLED) {
             let run = start..last.min(start + FILLED);
             let values = &mut values[..run.len() * n];
             design.fill(run.clone(), values);
             let targets = targets[run.start * outputs..].chunks_exact(outputs);
             for (row, (values, targets)) in values.chunks_exact(n).zip(targets).enumerate() {
-                block.set(start - first + row, values, targets);
+                new_rows.set(start - first + row, values, targets);
             }
         }
-        triangle.absorb(&mut block);
+        triangle.absorb(&mut new_rows);
     }
     triangle
 }
 
-/// Weights (`regressors × outputs`) of Gaussian regressors of `scaled` inputs.
+/// Fits weights (`regressors × outputs`) of Gaussian regressors of `scaled` inputs (`samples × inputs`).
 ///
 /// # Panics
-/// See [`Factor::new`].
+/// If `initial_covariance` is not positive and finite, or there is no output.
 #[must_use]
 pub fn fit(
     regressors: &Regressors<'_>,

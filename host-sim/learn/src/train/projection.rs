@@ -1,11 +1,12 @@
-//! Which features of a whole frame one network for the array is given: those directions of the readings'
-//! space that tell the outputs best.
+//! Projection of all readings of a frame to a few features: those directions that tell most about the
+//! outputs.
 //!
-//! Reduced-rank regression (Izenman, J. Multivariate Anal. 5, 1975): of all matrices of rank F, B·V·Vᵀ
-//! predicts the outputs from the readings with the least squared error, B being the least-squares solution
-//! and V the first F eigenvectors of Bᵀ·Σxx·B, the covariance of what B predicts. The features are x·B·V, in
-//! the outputs' unit. Unlike principal components, they do not spend a direction on what the readings do
-//! together but the outputs do not need. `docs/projection.md` has what that is worth.
+//! Reduced-rank regression (Izenman, J. Multivariate Anal. 5, 1975): let B be the least-squares
+//! solution, and V the first F eigenvectors of Bᵀ·Σxx·B, the covariance of its predictions. Of all
+//! matrices of rank F, B·V·Vᵀ then predicts the outputs with the least squared error.
+//!
+//! The features are x·B·V, in the outputs' unit. Principal components would also spend directions on
+//! common changes of the readings that no output needs. `docs/projection.md` has measurements.
 
 use model_core::projection::Projection;
 use nalgebra::{DMatrix, SymmetricEigen};
@@ -16,17 +17,19 @@ use taxel_data::table::Table;
 
 use crate::error::{Error, Result};
 
-/// Frames whose products are added up before they are added to those of others.
+/// Frames whose products are summed before the sum is added to those of others.
 const FRAMES_AT_ONCE: usize = 1024;
-/// White noise added to every reading, relative to its standard deviation: keeps directions in which readings
-/// hardly move from being amplified beyond what f32 carries.
+/// White noise added to every reading, relative to its standard deviation. Without it, directions in
+/// which readings hardly move would be amplified beyond f32.
 const NOISE_FLOOR: f64 = 1e-3;
 
-/// The projection that `dataset` asks for, to as many features as one of its rows has readings: f₀, then each
-/// reading's part in every feature, as [`Projection::new`] takes it.
+/// Fits the projection of `dataset`'s readings to as many features as one of its rows has readings.
+///
+/// Returns f₀, then each reading's part in every feature (`readings × features`), as [`Projection::new`]
+/// takes them.
 ///
 /// # Errors
-/// Data of a single row, without a regression, or with one that f32 does not hold.
+/// [`Error`] for data of a single row-wire, without a regression, or with a projection beyond f32.
 pub fn fit(dataset: &Dataset) -> Result<Vec<f32>> {
     if dataset.rows < 2 {
         return Err(Error::OneRow);
@@ -35,25 +38,25 @@ pub fn fit(dataset: &Dataset) -> Result<Vec<f32>> {
     let means = dataset.inputs.means();
     let parts = directions(dataset, &means, features)?;
     // f₀ makes up for the means after rounding.
-    let mut block = vec![0.0; features];
+    let mut parameters = vec![0.0; features];
     for (reading, mean) in means.iter().enumerate() {
-        for (feature, start) in block.iter_mut().enumerate() {
+        for (feature, start) in parameters.iter_mut().enumerate() {
             *start -= f64::from(parts[(reading, feature)] as f32) * mean;
         }
     }
     for reading in 0..readings {
-        block.extend((0..features).map(|feature| parts[(reading, feature)]));
+        parameters.extend((0..features).map(|feature| parts[(reading, feature)]));
     }
-    let block: Vec<f32> = block.into_iter().map(|value| value as f32).collect();
-    if block.iter().all(|value| value.is_finite()) {
-        Ok(block)
+    let parameters: Vec<f32> = parameters.into_iter().map(|value| value as f32).collect();
+    if parameters.iter().all(|value| value.is_finite()) {
+        Ok(parameters)
     } else {
         Err(Error::ProjectionBeyondF32)
     }
 }
 
-/// `dataset` as the network behind the projection sees it: one row, the features its inputs, all scaled by
-/// the largest span of any.
+/// Data set that the network behind the projection is trained on: one row, with the features as inputs,
+/// all scaled by the largest span of any.
 #[must_use]
 pub fn apply(projection: Projection<'_>, dataset: &Dataset) -> Dataset {
     let (width, count) = (dataset.inputs.names.len(), features_of(dataset));
@@ -67,7 +70,9 @@ pub fn apply(projection: Projection<'_>, dataset: &Dataset) -> Dataset {
     }
 }
 
-/// The `features` of every line of so many `readings`, as the device computes them.
+/// Projects every line of `readings` as the device does: `lines × features`, in the outputs' unit.
+///
+/// A line has `width` readings and gets so many `features`.
 #[must_use]
 pub fn features(
     projection: Projection<'_>,
@@ -91,7 +96,8 @@ fn features_of(dataset: &Dataset) -> usize {
     dataset.inputs.names.len() / dataset.rows
 }
 
-/// Each reading's part in every feature, one feature a column; columns beyond the number of outputs are 0.
+/// Each reading's part in every feature, one feature a column; columns beyond the number of outputs are
+/// 0.
 fn directions(dataset: &Dataset, means: &[f64], features: usize) -> Result<DMatrix<f64>> {
     let readings = means.len();
     let products = products(dataset, means);
@@ -115,15 +121,15 @@ fn directions(dataset: &Dataset, means: &[f64], features: usize) -> Result<DMatr
     let mut parts = DMatrix::zeros(readings, features);
     for (feature, place) in order.into_iter().take(features).enumerate() {
         let direction = eigen.eigenvectors.column(place);
-        // Either sign serves: the largest component's is taken for positive.
+        // Either sign would serve; the largest component is made positive.
         let sign = if direction[direction.iamax()] < 0.0 { -1.0 } else { 1.0 };
         parts.set_column(feature, &(&regression * direction * sign));
     }
     Ok(parts)
 }
 
-/// Σ zᵢ·zⱼ over all frames for every i ≤ j, with z the readings and then the outputs, about their means;
-/// pieces are added in their order, whatever the number of threads.
+/// Sums Σ zᵢ·zⱼ over all frames for every i ≤ j, with z the readings and then the outputs, about their
+/// means. Pieces are added in their order, whatever the number of threads.
 fn products(dataset: &Dataset, means: &[f64]) -> Vec<f64> {
     let means = [means, &dataset.outputs.means()].concat();
     let width = means.len();
@@ -135,7 +141,7 @@ fn products(dataset: &Dataset, means: &[f64]) -> Vec<f64> {
             let mut sums = vec![0.0; width * width];
             let lines = inputs_of_piece.chunks_exact(inputs);
             for (readings, outputs) in lines.zip(outputs_of_piece.chunks_exact(outputs)) {
-                // Readings as the device has them, in f32.
+                // Readings in f32, as the device has them.
                 let readings = readings.iter().map(|reading| f64::from(*reading as f32));
                 let values = readings.chain(outputs.iter().copied());
                 let z: Vec<f64> = values.zip(&means).map(|(value, mean)| value - mean).collect();
@@ -154,7 +160,7 @@ fn products(dataset: &Dataset, means: &[f64]) -> Vec<f64> {
     total
 }
 
-/// Adds zᵢ·zⱼ to the sums, for i among the inputs and j ≥ i.
+/// Adds the products zᵢ·zⱼ to the sums, for i among the inputs and j ≥ i.
 #[inline(always)]
 fn add_products(z: &[f64], inputs: usize, sums: &mut [f64]) {
     for (i, sums) in sums.chunks_exact_mut(z.len()).take(inputs).enumerate() {

@@ -7,8 +7,8 @@ use crate::decoders::RowDecoder;
 use crate::decoders::standard::StandardNetwork;
 use crate::infer::{Exponential, infer};
 
-/// `frames` of a smooth function of two inputs, with a little noise.
-fn block(frames: usize, noise: f64) -> Block {
+/// Table of `frames` of a smooth function of two inputs, with a little noise.
+fn table(frames: usize, noise: f64) -> RowTable {
     let mut random = Random::new(11, Stream::Training, Purpose::Noise, 0, 0);
     let (mut inputs, mut outputs) = (Vec::new(), Vec::new());
     for _ in 0..frames {
@@ -18,7 +18,7 @@ fn block(frames: usize, noise: f64) -> Block {
         outputs.extend([wave + noise * random.normal(), a - 2.0 * b + noise * random.normal()]);
     }
     let names = |list: [&str; 2]| list.map(String::from).to_vec();
-    Block {
+    RowTable {
         common_span: false,
         inputs: Table { names: names(["a_ohm", "b_ohm"]), values: inputs },
         outputs: Table { names: names(["wave_mm", "plane_mm"]), values: outputs },
@@ -46,15 +46,15 @@ fn predictions(regressors: &Regressors<'_>, scaled: &[f64], weights: &[f64]) -> 
 
 #[test]
 fn weights_equal_batch_ridge_on_a_well_conditioned_set() {
-    let block = block(5000, 0.1); // several pieces are merged
-    let samples = Samples::new(&block);
+    let table = table(5000, 0.1); // several pieces are merged
+    let samples = Samples::new(&table);
     let centres: Vec<f64> =
         (0..9).flat_map(|i| [f64::from(i % 3), f64::from(i / 3)]).map(|c| c / 2.0).collect();
     let regressors = Regressors { centres: &centres, inputs: 2, decay: 20.0, affine_tail: false };
     for initial_covariance in [1.0, 1e3, 1e6] {
-        let blocked = fit(&regressors, &samples.scaled, &block.outputs, initial_covariance);
-        let batch = fit_batch(&regressors, &samples.scaled, &block.outputs, initial_covariance);
-        let relative = relative_difference(&blocked, &batch);
+        let in_groups = fit(&regressors, &samples.scaled, &table.outputs, initial_covariance);
+        let batch = fit_batch(&regressors, &samples.scaled, &table.outputs, initial_covariance);
+        let relative = relative_difference(&in_groups, &batch);
         println!("well-conditioned, δ = {initial_covariance:e}: weights differ by {relative:.1e}");
         assert!(relative <= 1e-8, "δ = {initial_covariance}: {relative:e}");
     }
@@ -62,13 +62,13 @@ fn weights_equal_batch_ridge_on_a_well_conditioned_set() {
 
 #[test]
 fn predictions_equal_batch_ridge_on_an_ill_conditioned_set() {
-    let block = block(3000, 0.01);
-    let samples = Samples::new(&block);
+    let table = table(3000, 0.01);
+    let samples = Samples::new(&table);
     let centres: Vec<f64> = (0..32).map(|i| f64::from(i * 7 % 32) / 32.0).collect();
-    // Wide Gaussians all look alike, and the affine tail repeats what they say.
+    // Wide Gaussians all look alike, and the affine tail repeats their information.
     let regressors = Regressors { centres: &centres, inputs: 2, decay: 0.02, affine_tail: true };
     let n = regressors.count();
-    let mut h = nalgebra::DMatrix::zeros(block.inputs.len(), n);
+    let mut h = nalgebra::DMatrix::zeros(table.inputs.len(), n);
     let mut row = vec![0.0; n];
     for (i, line) in samples.scaled.chunks_exact(2).enumerate() {
         regressors.evaluate(line, &mut row);
@@ -77,10 +77,10 @@ fn predictions_equal_batch_ridge_on_an_ill_conditioned_set() {
     let singular = h.singular_values();
     assert!(singular.max() / singular.min() > 1e12, "the set must be hard");
     for initial_covariance in [1e3, 1e6, 1e9] {
-        let blocked = fit(&regressors, &samples.scaled, &block.outputs, initial_covariance);
-        let batch = fit_batch(&regressors, &samples.scaled, &block.outputs, initial_covariance);
+        let in_groups = fit(&regressors, &samples.scaled, &table.outputs, initial_covariance);
+        let batch = fit_batch(&regressors, &samples.scaled, &table.outputs, initial_covariance);
         let relative = relative_difference(
-            &predictions(&regressors, &samples.scaled, &blocked),
+            &predictions(&regressors, &samples.scaled, &in_groups),
             &predictions(&regressors, &samples.scaled, &batch),
         );
         println!(
@@ -92,47 +92,47 @@ fn predictions_equal_batch_ridge_on_an_ill_conditioned_set() {
 
 #[test]
 fn a_trained_network_learns_a_smooth_function() {
-    let block = block(4000, 0.0);
-    let samples = Samples::new(&block);
+    let table = table(4000, 0.0);
+    let samples = Samples::new(&table);
     let options = Options { centres: 40, spread: 0.3, ..Options::default() };
     let fitted = samples.fit(&samples.centres(&options, 0), &options).unwrap();
-    let predicted = infer(&fitted.network(), Exponential::Libm, &block.inputs.values);
-    let relative = relative_difference(&predicted, &block.outputs.values);
+    let predicted = infer(&fitted.network(), Exponential::Libm, &table.inputs.values);
+    let relative = relative_difference(&predicted, &table.outputs.values);
     assert!(relative < 2e-3, "{relative}");
 }
 
 #[test]
 fn an_input_that_never_changes_is_no_obstacle() {
-    let mut block = block(500, 0.0);
-    block.inputs.values.iter_mut().skip(1).step_by(2).for_each(|v| *v = 77.0);
-    let samples = Samples::new(&block);
+    let mut table = table(500, 0.0);
+    table.inputs.values.iter_mut().skip(1).step_by(2).for_each(|v| *v = 77.0);
+    let samples = Samples::new(&table);
     let options = Options { centres: 10, spread: 0.3, ..Options::default() };
     let fitted = samples.fit(&samples.centres(&options, 0), &options).unwrap();
     let [lowest, highest] = fitted.network().training_range(1);
     assert_eq!(lowest, highest);
-    let predicted = infer(&fitted.network(), Exponential::Libm, &block.inputs.values);
+    let predicted = infer(&fitted.network(), Exponential::Libm, &table.inputs.values);
     assert!(predicted.iter().all(|y| y.is_finite()));
 }
 
 #[test]
 fn duplicate_samples_give_fewer_centres() {
-    let mut block = block(6, 0.0);
-    block.inputs.values = [[50.0, 99.0], [51.0, 99.0], [50.0, 98.0]].as_flattened().repeat(2);
-    let samples = Samples::new(&block);
+    let mut table = table(6, 0.0);
+    table.inputs.values = [[50.0, 99.0], [51.0, 99.0], [50.0, 98.0]].as_flattened().repeat(2);
+    let samples = Samples::new(&table);
     let options = Options { centres: 6, spread: 0.3, affine_tail: false, ..Options::default() };
     assert_eq!(samples.centres(&options, 0).len(), 3 * 2);
 }
 
 #[test]
 fn the_standard_network_interpolates_its_samples_exactly() {
-    let block = block(60, 0.2);
-    let standard = StandardNetwork::fit(&block, 0.05).unwrap();
+    let table = table(60, 0.2);
+    let standard = StandardNetwork::fit(&table, 0.05).unwrap();
     let relative =
-        relative_difference(&standard.predict(&block.inputs.values), &block.outputs.values);
+        relative_difference(&standard.predict(&table.inputs.values), &table.outputs.values);
     assert!(relative < 1e-9, "{relative}");
-    let mut twice = block.clone();
-    twice.inputs.values.extend(block.inputs.values);
-    twice.outputs.values.extend(block.outputs.values);
+    let mut twice = table.clone();
+    twice.inputs.values.extend(table.inputs.values);
+    twice.outputs.values.extend(table.outputs.values);
     assert!(StandardNetwork::fit(&twice, 0.05).is_none(), "duplicates cannot be interpolated");
 }
 
@@ -140,13 +140,13 @@ fn the_standard_network_interpolates_its_samples_exactly() {
 #[test]
 fn an_offset_of_the_outputs_costs_no_more_than_f32_itself() {
     let rmse_at = |offset: f64| {
-        let mut block = block(500, 0.0);
-        block.outputs.values.iter_mut().for_each(|value| *value += offset);
-        let samples = Samples::new(&block);
+        let mut table = table(500, 0.0);
+        table.outputs.values.iter_mut().for_each(|value| *value += offset);
+        let samples = Samples::new(&table);
         let options = Options { centres: 30, spread: 0.5, ..Options::default() };
         let fitted = samples.fit(&samples.centres(&options, 0), &options).unwrap();
-        let predicted = infer(&fitted.network(), Exponential::Polynomial, &block.inputs.values);
-        let squares = predicted.iter().zip(&block.outputs.values).map(|(p, t)| (p - t).powi(2));
+        let predicted = infer(&fitted.network(), Exponential::Polynomial, &table.inputs.values);
+        let squares = predicted.iter().zip(&table.outputs.values).map(|(p, t)| (p - t).powi(2));
         (squares.sum::<f64>() / predicted.len() as f64).sqrt()
     };
     let without = rmse_at(0.0);

@@ -1,4 +1,4 @@
-//! A real, trained blob, harmed in every way there is: each is refused with its own error.
+//! A real, trained blob, damaged in every way there is: each damage is rejected with a specific error.
 
 use model_core::blob::{DecodeError, FORMAT_VERSION, Model, ModelShape};
 use model_core::rbf::{Format, NetworkError};
@@ -18,7 +18,7 @@ fn world() -> World {
     World { outputs, read_rows: vec![3, 4], ..World::press() }
 }
 
-/// Two rows, 18 readings to 6 outputs, K = 8, trained on `press`.
+/// Blob of a model trained on `press`: two rows, 18 readings to 6 outputs, K = 8.
 fn real_blob() -> Vec<u8> {
     let dataset = synthesise(&world(), Stream::Training, 400);
     let options = Options { format: Format::F32Direct, centres: 8, ..Options::default() };
@@ -27,7 +27,7 @@ fn real_blob() -> Vec<u8> {
     pack(&trained, &dataset, &origin).unwrap().bytes().to_vec()
 }
 
-/// Bytes at an address that is a multiple of four.
+/// Calls `use_them` with a copy of `bytes` at an address that is a multiple of four.
 fn with_aligned<R>(bytes: &[u8], use_them: impl FnOnce(&[u8]) -> R) -> R {
     use_them(&AlignedBytes::copy_of(bytes))
 }
@@ -36,7 +36,7 @@ fn refusal(bytes: &[u8]) -> Option<DecodeError> {
     with_aligned(bytes, |bytes| Model::decode(bytes).err())
 }
 
-/// Enters length and CRC anew, as one who writes a bad blob on purpose would.
+/// Renews length and CRC, as someone who writes a bad blob on purpose would.
 fn sealed(mut blob: Vec<u8>) -> Vec<u8> {
     let length = u32::try_from(blob.len()).unwrap();
     blob[5..9].copy_from_slice(&length.to_le_bytes());
@@ -46,7 +46,7 @@ fn sealed(mut blob: Vec<u8>) -> Vec<u8> {
     blob
 }
 
-/// Byte offset in the blob of what `pick` borrows from it.
+/// Byte offset in the blob of the part that `pick` borrows from it.
 fn offset_of(blob: &[u8], pick: impl for<'a> Fn(&Model<'a>) -> &'a [u8]) -> usize {
     with_aligned(blob, |bytes| {
         let model = Model::decode(bytes).unwrap();
@@ -234,7 +234,7 @@ fn a_blob_that_cannot_be_borrowed_or_has_another_shape_is_refused() {
     });
 }
 
-/// The device's entry and the host's give the same bits.
+/// The device's entry point and the host's give the same bits.
 #[test]
 fn device_and_host_decode_alike() {
     let blob = real_blob();

@@ -1,10 +1,10 @@
-//! What number formats cost in accuracy: the same centres fitted and evaluated in f64, in f32 and in 16-bit
+//! Loss of accuracy by number formats: the same centres fitted and evaluated in f64, in f32 and in 16-bit
 //! fixed point, on both reference scenes, by axis. Figures: `cargo test -p taxel-learn --test all number_formats -- --nocapture`.
 
 use model_core::rbf::Format;
 use rayon::prelude::*;
 use taxel_data::columns;
-use taxel_data::dataset::Block;
+use taxel_data::dataset::RowTable;
 use taxel_data::progress::Silent;
 use taxel_data::random::Stream;
 use taxel_data::table::Table;
@@ -15,7 +15,7 @@ use taxel_learn::{Exponential, Options, Origin, pack};
 use taxel_simulate::{Synthesis, World, synthesise};
 
 const NOISE_LEVELS: [f64; 5] = [0.0, 0.005, 0.01, 0.05, 0.1];
-/// Row-wires at the rim, beside the middle, and between.
+/// Row-wires at the rim, beside the middle, and in between.
 const ROWS: [usize; 3] = [1, 4, 7];
 
 fn world(name: &str, noise: f64) -> World {
@@ -25,8 +25,8 @@ fn world(name: &str, noise: f64) -> World {
     world
 }
 
-/// What a network of f64 answers: neither its centres nor its weights are rounded.
-fn in_f64(training: &Block, centres: &[f64], options: &Options, test: &Block) -> Vec<f64> {
+/// Predictions of a network in f64, with neither centres nor weights rounded.
+fn in_f64(training: &RowTable, centres: &[f64], options: &Options, test: &RowTable) -> Vec<f64> {
     let scale = InputScale::of(training);
     let regressors = Regressors {
         centres,
@@ -51,14 +51,14 @@ fn in_f64(training: &Block, centres: &[f64], options: &Options, test: &Block) ->
     scale.apply(&test.inputs.values).chunks_exact(regressors.inputs).flat_map(answer).collect()
 }
 
-/// Squared errors by axis.
+/// Squared errors, summed by axis.
 fn by_axis(truth: &Table, estimate: &[f64]) -> Vec<f64> {
     let squares = truth.squared_errors(estimate);
     let groups = columns::groups(&truth.names);
     groups.iter().map(|(_, members)| members.iter().map(|c| squares[*c]).sum()).collect()
 }
 
-/// RMSE in mm by axis of f64, f32 and fixed16.
+/// RMSE in mm by axis for f64, f32 and fixed16.
 fn errors(name: &str, noise: f64) -> [Vec<f64>; 3] {
     let world = world(name, noise);
     let training = synthesise(&world, Stream::Training, 8000);
@@ -67,7 +67,7 @@ fn errors(name: &str, noise: f64) -> [Vec<f64>; 3] {
     let of_rows: Vec<[Vec<f64>; 3]> = (0..ROWS.len())
         .into_par_iter()
         .map(|row| {
-            let (training, test) = (training.block(row), test.block(row));
+            let (training, test) = (training.row_table(row), test.row_table(row));
             let samples = Samples::new(&training);
             let centres = samples.centres(&options, row);
             let exact = by_axis(&test.outputs, &in_f64(&training, &centres, &options, &test));
@@ -100,7 +100,7 @@ fn check(name: &str) {
             noise * 100.0
         );
         assert!(float.iter().all(|growth| *growth <= 0.1), "f32 at {noise}: {float:?}");
-        // Without noise, weights are large and rest on small differences: 16 bits tell.
+        // Without noise, weights are large and results are small differences, so 16 bits show.
         let most = if noise >= 0.005 { 1.0 } else { 40.0 };
         assert!(fixed.iter().all(|growth| *growth <= most), "fixed16 at {noise}: {fixed:?}");
     }
@@ -123,7 +123,7 @@ fn errors_of_array(noise: f64, spread: f64, format: Format) -> Vec<f64> {
 
 #[test]
 fn sixteen_bits_cost_the_whole_array_little() {
-    // Wide Gaussians are like each other, and weights of 16 bits too coarse to tell them apart.
+    // Wide Gaussians resemble each other, and weights of 16 bits are too coarse to tell them apart.
     for (noise, spread, most) in [(0.005, 0.4, 1.0), (0.05, 0.4, 1.0), (0.005, 0.8, 2.5)] {
         let [float, fixed] =
             [Format::F32, Format::Fixed16].map(|format| errors_of_array(noise, spread, format));

@@ -1,4 +1,4 @@
-//! Whether a device does what the host does, and survives what must not harm it.
+//! Check of a device: it must decode like the host, and survive bad input.
 
 use std::time::{Duration, Instant};
 
@@ -19,48 +19,48 @@ mod uploads;
 pub use uploads::UploadFindings;
 use uploads::check_uploads;
 
-/// In this time a device has taken all that was sent to it, however slow it is.
+/// Time in which any device has taken all bytes that were sent to it, however slow it is.
 const SWALLOWED: Duration = Duration::from_mins(2);
 
-/// What is to be checked.
+/// Plan of a check.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
-    /// Frames to decode.
+    /// Number of frames to decode.
     pub frames: usize,
-    /// Damaged models to upload.
+    /// Number of damaged models to upload.
     pub damaged_uploads: usize,
     /// Whether an upload is broken off after each of its chunks, with a restart of the device.
     pub interruptions: bool,
-    /// Random bytes to send.
+    /// Number of random bytes to send.
     pub garbage_bytes: usize,
-    /// Frames on their way at a time: see [`stream::decode_frames`].
+    /// Number of frames on their way at a time: see [`decode_frames`](super::stream::decode_frames).
     pub window: usize,
 }
 
-/// What was found.
+/// Findings of a check.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Findings {
-    /// The device, at the end: its memory tells how deep the stack has been.
+    /// Identity of the device at the end, with the deepest use of its stack.
     pub device: DeviceIdentity,
-    /// Its counters.
+    /// Counters of the device.
     pub statistics: Statistics,
-    /// Decoding.
+    /// Findings about decoding.
     pub frames: FrameFindings,
-    /// Scans, if [they were checked](super::scan::check) as well.
+    /// Findings about scans, if [they were checked](super::scan::check) as well.
     pub scans: Option<ScanFindings>,
-    /// Uploads, if any were asked for.
+    /// Findings about uploads, if any were asked for.
     pub uploads: Option<UploadFindings>,
-    /// Garbage, if any was asked for.
+    /// Findings about garbage, if any was asked for.
     pub garbage: Option<GarbageFindings>,
-    /// Requests that were not answered in time and sent again.
+    /// Number of requests that were not answered in time and sent again.
     pub repeated: u64,
-    /// Frames of bytes from the device that were damaged.
+    /// Number of damaged frames of bytes from the device.
     pub damaged: u64,
 }
 
 impl Findings {
-    /// Whether all is as it must be. A request that had to be sent again, or a damaged report, is a fault
-    /// of the line, and counts.
+    /// Whether every finding is good. A request that had to be sent again, or a damaged report, is a
+    /// fault of the line, and counts as bad.
     #[must_use]
     pub fn all_good(&self) -> bool {
         let frames = self.frames.bit_identical == self.frames.frames;
@@ -78,33 +78,35 @@ impl Findings {
     }
 }
 
-/// How frames were decoded.
+/// Findings about decoding.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FrameFindings {
-    /// Frames sent.
+    /// Number of frames sent.
     pub frames: usize,
-    /// Frames whose every output has the very bits that the host computes.
+    /// Number of frames in which every output has the bits that the host computes.
     pub bit_identical: usize,
     /// Frames a second, the line included.
     pub frames_per_s: f64,
 }
 
-/// How garbage went.
+/// Findings about garbage.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GarbageFindings {
-    /// Random bytes.
+    /// Number of random bytes sent.
     pub bytes: usize,
-    /// Requests until the device answered again: 1 or 2.
+    /// Number of requests until the device answered again: 1 or 2.
     pub requests_until_answer: u64,
-    /// Whether it then decoded a frame to the bit, by the same model.
+    /// Whether it then decoded a frame bit for bit, by the same model.
     pub decodes_as_before: bool,
 }
 
-/// Holds `device` to the host: the model of `blob` must be in force when it is done, and is uploaded if it is not
-/// now. Frames are those of `world`.
+/// Compares `device` with the host on frames of `world`.
+///
+/// The model of `blob` is uploaded first if it is not active, and must be active at the end.
 ///
 /// # Errors
-/// The device stops answering, or is not one for this model; what is merely wrong is in the findings.
+/// [`Error`] if the device stops answering, or is not one for this model. Wrong results
+/// are no error: they are in the findings.
 pub fn check<W: Wire>(
     device: &mut Device<W>,
     world: &World,
@@ -134,7 +136,7 @@ fn check_paused<W: Wire>(
         bit_identical,
         frames_per_s: plan.frames as f64 / time.as_secs_f64(),
     };
-    // A restart forgets how deep the stack has been.
+    // A restart resets the record of the deepest stack.
     let deepest_so_far = device.identify()?.memory.stack_high_water;
     let uploads = if plan.damaged_uploads > 0 || plan.interruptions {
         Some(check_uploads(device, world, blob, &expected, plan, progress)?)
@@ -175,7 +177,7 @@ fn check_garbage<W: Wire>(
     for part in garbage.chunks(1024) {
         device.send_raw(part)?;
     }
-    // The first may run into a frame that the garbage left open; the second may not.
+    // The first request may run into a frame that the garbage left open; the second may not.
     let [first, second] = [device.send(&Request::Identify)?, device.send(&Request::Identify)?];
     let answered = device.hear(Instant::now() + SWALLOWED, |number, report| match report {
         Report::Identity(_) if number == first => Some(1),

@@ -1,4 +1,4 @@
-//! What a device must answer, and the model that it must have in force.
+//! Answers that a device must give, and the model that it must have.
 
 use std::time::Duration;
 
@@ -10,7 +10,7 @@ use taxel_learn::{Exponential, ModelBlob, PreparedModel};
 use super::{Device, DeviceIdentity, Wire, stream, upload};
 use crate::error::{Error, Result};
 
-/// A scene's frames with the answers that the host computes.
+/// Frames of a scene with the answers that the host computes.
 pub(super) struct Expected {
     readings_ohm: Vec<f32>,
     outputs: Vec<f32>,
@@ -18,7 +18,7 @@ pub(super) struct Expected {
 }
 
 impl Expected {
-    /// The answers of `model` to `readings`, with the exponential that it was prepared with.
+    /// Answers of `model` to `readings`, with the exponential that it was prepared with.
     pub(super) fn new(model: &PreparedModel<'_>, readings: &Table) -> Self {
         let outputs = model.decode_table(readings);
         let f32s = |values: &[f64]| values.iter().map(|value| *value as f32).collect();
@@ -33,12 +33,12 @@ impl Expected {
         &self.readings_ohm[..frames * self.per_frame[0]]
     }
 
-    /// Whether these are the readings of that frame.
+    /// Whether these are the readings of frame number `frame`.
     pub(super) fn was_read(&self, frame: u32, readings: impl Iterator<Item = f32>) -> bool {
         Self::is_line(&self.readings_ohm, frame, self.per_frame[0], readings)
     }
 
-    /// Whether these are the outputs of that frame.
+    /// Whether these are the outputs of frame number `frame`.
     pub(super) fn is_same(&self, frame: u32, outputs: impl Iterator<Item = f32>) -> bool {
         Self::is_line(&self.outputs, frame, self.per_frame[1], outputs)
     }
@@ -50,7 +50,7 @@ impl Expected {
         })
     }
 
-    /// How many of the first `frames` the device decodes to the bit, and how long that took.
+    /// Number of the first `frames` that the device decodes bit for bit, and the time that it took.
     pub(super) fn count_same<W: Wire>(
         &self,
         device: &mut Device<W>,
@@ -74,8 +74,8 @@ impl Expected {
     }
 }
 
-/// Puts the model of `blob` in force unless it is already; returned is the exponential that the device decodes
-/// with.
+/// Activates the model of `blob` unless it is active already, and returns the exponential that the
+/// device decodes with.
 pub(super) fn prepare<W: Wire>(
     device: &mut Device<W>,
     blob: &ModelBlob,
@@ -90,7 +90,7 @@ pub(super) fn prepare<W: Wire>(
     Ok(exponential)
 }
 
-/// The exponential that the device decodes with, if it is a device for this model at all.
+/// Exponential that the device decodes with, if the device is one for this model.
 fn fitting_exponential(identity: &DeviceIdentity, model: &Model<'_>) -> Result<Exponential> {
     let shape = model.shape();
     let found = [identity.rows, identity.columns, identity.outputs];

@@ -1,4 +1,4 @@
-//! Whether a device that scans a virtual board reads and decodes what the host does.
+//! Check of scans: a device that scans a virtual board must read and decode like the host.
 
 use std::net::{Shutdown, TcpStream};
 use std::thread;
@@ -20,28 +20,28 @@ use super::expected::{Expected, prepare};
 use super::{Device, Wire};
 use crate::error::{Error, Result};
 
-/// Time from one scan to the next, if they could be made so fast: the line of the readout is slower.
+/// Time from one scan to the next, if the readout's line were fast enough; it is slower.
 const PERIOD_US: u32 = 1000;
-/// How long the line may take for a sample, were it ever so slow a computer.
+/// Longest time that the line may take for a sample, even on a slow computer.
 const SAMPLE: Duration = Duration::from_millis(5);
 
-/// How scans went.
+/// Findings about scans.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ScanFindings {
-    /// Scans asked for.
+    /// Number of scans asked for.
     pub scans: usize,
-    /// Those whose every reading has the very bits of the host's scan.
+    /// Number of scans in which every reading has the same bits as the host's scan.
     pub bit_identical_readings: usize,
-    /// Those of which every output has the very bits that the host computes.
+    /// Number of scans in which every output has the bits that the host computes.
     pub bit_identical_estimates: usize,
-    /// Samples that the device did not get.
+    /// Number of samples that the device did not get.
     pub failed_samples: u32,
     /// Scans a second, decoding and both lines included.
     pub scans_per_s: f64,
 }
 
 impl ScanFindings {
-    /// Whether all is as it must be.
+    /// Whether every scan was as expected and no sample failed.
     #[must_use]
     pub fn all_good(&self) -> bool {
         self.bit_identical_readings == self.scans
@@ -50,10 +50,10 @@ impl ScanFindings {
     }
 }
 
-/// `world` with the parts of the images' readout where it says nothing of them.
+/// World with the parts of the images' readout wherever `world` does not set them.
 ///
 /// # Errors
-/// A world with other parts, or other wires.
+/// [`Error`] for a world with other parts, or other wires.
 pub fn with_parts_of_image(world: &World) -> Result<World> {
     let wanted = &world.readout;
     if wanted.circuit.is_some_and(|circuit| circuit != Circuit::ZeroPotential) {
@@ -76,12 +76,14 @@ pub fn with_parts_of_image(world: &World) -> Result<World> {
     Ok(world)
 }
 
-/// Lets `device` scan the test frames of `world` on a virtual board that is served on `line`, and
-/// compares with the same scanner on an equal board. The model of `blob` is in force when it is done.
+/// Lets `device` scan the test frames of `world` on a virtual board that is served on `line`.
+///
+/// The results are compared with those of the same scanner on an equal board. The model of `blob` is
+/// active afterwards.
 ///
 /// # Errors
-/// The device stops answering, the board refuses anything, or world, model and device do not fit together. What is
-/// merely wrong is in the findings.
+/// [`Error`] if the device stops answering, the board refuses a request, or world, model and device do
+/// not fit together. Wrong results are no error: they are in the findings.
 pub fn check<W: Wire>(
     device: &mut Device<W>,
     world: &World,
@@ -118,8 +120,8 @@ pub fn check<W: Wire>(
         let go_on = || !served.is_finished();
         let counted =
             count_same(device, configuration, &expected, scans, patience, go_on, progress);
-        let _ = end.shutdown(Shutdown::Both); // or the other end has
-        // Why the board is not there any more tells more than that the device waits for it.
+        let _ = end.shutdown(Shutdown::Both); // unless the other end has shut it down
+        // The reason why the board ended tells more than the device's silence.
         served
             .join()
             .unwrap_or_else(|_| Err(Error::Silent("the virtual board panicked".into())))?;
@@ -127,7 +129,7 @@ pub fn check<W: Wire>(
     })
 }
 
-/// What the images correct for.
+/// Series resistances for which the images correct.
 fn series_of_image() -> SeriesResistance {
     let typical = ZeroPotential::<1, 1>::TYPICAL;
     SeriesResistance {
@@ -136,7 +138,8 @@ fn series_of_image() -> SeriesResistance {
     }
 }
 
-/// Serves a board with the first of `readings`, after each scan with the next, then with the last.
+/// Serves a board with the first of `readings`, after each scan with the next, and finally with the
+/// last.
 fn serve(world: &World, readings: &Table, line: TcpStream) -> Result<()> {
     let board = VirtualBoard::new(world)?;
     let mut frames = readings.lines();
@@ -149,7 +152,8 @@ fn serve(world: &World, readings: &Table, line: TcpStream) -> Result<()> {
     Ok(board.serve(line, show_next)?)
 }
 
-/// Scans under `configuration`, while it is worth it to `go_on`, and counts what is as expected.
+/// Lets the device scan under `configuration` as long as `go_on` wants, and counts the scans that are as
+/// expected.
 fn count_same<W: Wire>(
     device: &mut Device<W>,
     configuration: Configuration,
@@ -196,7 +200,7 @@ fn count_same<W: Wire>(
         }
     }
     findings.scans_per_s = scans as f64 / start.elapsed().as_secs_f64();
-    // It may have begun another scan, and answers after that.
+    // The device may have begun another scan, and answers after it.
     device.pause()?;
     findings.failed_samples = device.statistics()?.failed_samples - before.failed_samples;
     Ok(findings)

@@ -1,4 +1,4 @@
-//! Frames through a device.
+//! Stream of frames through a device.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -10,23 +10,23 @@ use model_core::blob::Floats;
 use super::{ATTEMPTS, Device, Wire};
 use crate::error::{Error, Result};
 
-/// A request on its way.
+/// Request on its way.
 struct Outstanding {
     frame: u32,
-    /// Of its request that was sent last.
+    /// Number of the request that was sent last for this frame.
     number: u16,
     sent: Instant,
     attempts: u32,
 }
 
-/// Lets the device decode every frame of `readings_ohm` (`per_frame` readings each), up to `window`
-/// of them on their way at a time, and passes each estimate to `take` once. Returns the time it took.
+/// Lets the device decode every frame of `readings_ohm` (`frames × per_frame`, in Ω), and passes each
+/// estimate to `take` once. Returns the time it took.
 ///
-/// A window above 1 is for lines that hold bytes back while the device is busy, as an emulator's; a
-/// real board may lose them.
+/// Up to `window` frames are on their way at a time. A window above 1 is for lines that hold bytes back
+/// while the device is busy, such as an emulator's; a real board may lose them.
 ///
 /// # Errors
-/// An [`Error`] if a frame is not answered, or is refused.
+/// [`Error`] if a frame is not answered, or is refused.
 pub fn decode_frames<W: Wire>(
     device: &mut Device<W>,
     readings_ohm: &[f32],
@@ -52,9 +52,9 @@ pub fn decode_frames<W: Wire>(
         let Some(oldest) = on_their_way.front() else { break };
         let deadline = oldest.sent + device.patience;
         let heard = device.hear(deadline, |number, report| match report {
-            // An estimate that nobody asked for is of a scan.
+            // An estimate without a request belongs to a scan.
             Report::Estimate(estimate) if number != UNASKED => {
-                // An answer to a repeated request may come twice.
+                // The answer to a repeated request may come twice.
                 let place = on_their_way.iter().position(|o| o.frame == estimate.frame)?;
                 on_their_way.remove(place);
                 take(estimate.frame, estimate);

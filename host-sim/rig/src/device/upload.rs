@@ -1,4 +1,4 @@
-//! The exchange of a device's model.
+//! Upload of models to a device.
 
 use std::time::Duration;
 
@@ -9,13 +9,13 @@ use taxel_data::progress::Progress;
 use super::{Device, DeviceIdentity, Wire};
 use crate::error::{Error, Result};
 
-/// Erasing a sector of 128 KiB takes up to 4 s on an STM32F4.
+/// Longest time for erasing flash: a sector of 128 KiB takes up to 4 s on an STM32F4.
 const ERASE: Duration = Duration::from_secs(6);
 
-/// One step, with the device's answer.
+/// Sends one step of an upload and returns the device's answer.
 ///
 /// # Errors
-/// An [`Error`] if there is no answer.
+/// [`Error::NoAnswer`] if there is none.
 pub fn step<W: Wire>(
     device: &mut Device<W>,
     step: UploadStep<'_>,
@@ -31,10 +31,10 @@ pub fn step<W: Wire>(
     })
 }
 
-/// Sends `blob` from beginning to commit, until the device refuses something.
+/// Sends `blob` from beginning to commit, until the device refuses a step.
 ///
 /// # Errors
-/// An [`Error`] if there is no answer.
+/// [`Error::NoAnswer`] if the device stops answering.
 pub fn send<W: Wire>(
     device: &mut Device<W>,
     blob: &[u8],
@@ -55,10 +55,10 @@ pub fn send<W: Wire>(
     if answer.is_err() { Ok(answer) } else { step(device, UploadStep::Commit) }
 }
 
-/// Puts `blob` in force, and makes sure that it is.
+/// Uploads `blob`, makes it the active model, and checks that it is.
 ///
 /// # Errors
-/// An [`Error`] if the device refuses it; its old model is then still in force.
+/// [`Error`] if the device refuses it; its previous model then stays active.
 pub fn replace<W: Wire>(
     device: &mut Device<W>,
     blob: &[u8],

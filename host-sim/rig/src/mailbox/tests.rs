@@ -1,4 +1,4 @@
-//! Both ends of the mailbox against each other, in memory where every byte that the host's end copies is a
+//! Both ends of the mailbox against each other, in memory where the host's end copies each byte at a
 //! moment of its own.
 
 use std::cell::RefCell;
@@ -13,10 +13,10 @@ mod image;
 
 use image::SharedMemory;
 
-/// Bytes of memory that a mailbox takes.
+/// Size of the memory that a mailbox takes, in bytes.
 const BYTES: usize = 0x9000;
 
-/// The shared memory.
+/// Memory that both ends share.
 #[derive(Debug, Clone)]
 struct Memory(Rc<RefCell<Vec<u8>>>);
 
@@ -60,7 +60,7 @@ impl SharedBytes for Memory {
     }
 }
 
-/// The `n`th byte sent: never 0, and another one than a round before.
+/// Value of the `n`th byte sent: never 0, and different from one round before.
 fn byte(n: usize) -> u8 {
     1 + (n % 251) as u8
 }
@@ -74,7 +74,7 @@ struct Image {
 }
 
 impl Image {
-    /// Nothing, a few bytes, or more than the lower byte of a position counts.
+    /// Sends or receives nothing, a few bytes, or more than the lower byte of a position counts.
     fn step(&mut self) {
         let most = [0, 0, 0, 0, 0, 0, 1, 3, 400][self.random.below(9)];
         for _ in 0..self.random.below(most + 1) {
@@ -109,7 +109,7 @@ struct Torn {
 }
 
 impl Torn {
-    /// The places of `count` bytes from `place` on, each once, after the image went on.
+    /// Offsets of `count` bytes from `place` on, each once, after the image went on.
     fn moments(
         &mut self,
         count: usize,
@@ -150,7 +150,7 @@ fn random(index: u64) -> Random {
     Random::new(1, Stream::Test, Purpose::Damage, index, 0)
 }
 
-/// A mailbox whose image goes on whenever the host's end copies a byte.
+/// Mailbox whose image goes on whenever the host's end copies a byte.
 fn torn(seed: u64) -> (Mailbox<Torn>, Rc<RefCell<Image>>) {
     let memory = Memory::empty();
     let torn = Torn { memory: memory.clone(), image: None, random: random(2 * seed) };
@@ -183,13 +183,13 @@ fn every_byte_arrives_once_and_in_order_however_accesses_are_torn() {
             received += count;
             assert!(received <= image.borrow().sent);
         }
-        // What is still on its way arrives too.
+        // Bytes that are still on their way arrive too.
         while image.borrow_mut().receive() {}
         assert_eq!(image.borrow().received, sent);
     }
 }
 
-/// A mailbox whose image does nothing of itself.
+/// Mailbox whose image does nothing by itself.
 fn still() -> (Mailbox<Memory>, image::Mailbox<Memory>) {
     let memory = Memory::empty();
     let host = Mailbox::new(memory.clone()).unwrap();
@@ -256,7 +256,7 @@ fn reading_and_writing_end_with_the_time_for_them() {
     assert!(start.elapsed() >= Duration::from_millis(20));
     assert_eq!(host.write(&vec![7; 1 << 16]).unwrap(), usize::from(CAPACITY));
     assert_eq!(host.write(&[7]).unwrap_err().kind(), ErrorKind::TimedOut);
-    // What is there is read at once; nothing is asked for and nothing is waited for.
+    // Bytes that are there are read at once, without a request and without waiting.
     assert!(image.try_write(9));
     let (start, mut bytes) = (Instant::now(), [0; 4]);
     host.set_read_timeout(Duration::from_mins(1)).unwrap();
@@ -279,7 +279,7 @@ fn the_file_holds_what_the_machine_maps() {
     let name = format!("taxel-mailbox-test-{}", std::process::id());
     let path = std::env::temp_dir().join(name);
     let mut host = Mailbox::create(&path).unwrap();
-    assert!(Mailbox::create(&path).is_err(), "another program's file is left alone");
+    assert!(Mailbox::create(&path).is_err(), "another program's file is kept");
     assert_eq!(host.write(b"request").unwrap(), 7);
     let bytes = std::fs::read(&path).unwrap();
     std::fs::remove_file(&path).unwrap();

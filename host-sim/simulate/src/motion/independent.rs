@@ -1,4 +1,4 @@
-//! Electrodes that each move on their own.
+//! Motion of each electrode independently of all others.
 
 use serde::Deserialize;
 use taxel_data::BadValue;
@@ -8,7 +8,7 @@ use taxel_data::simd::{self, Lanes};
 use super::{Draws, Motion, Trajectories, check_range};
 use crate::sensor::Sensor;
 
-/// Every electrode on its own, uniform along each axis; nothing moves with the default.
+/// Independent motion of every electrode, uniform along each axis; with the default, nothing moves.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Independent {

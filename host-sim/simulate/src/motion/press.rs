@@ -1,4 +1,4 @@
-//! One contact, pressed into the face.
+//! Motion by one contact, pressed into the face.
 
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays are indexed alike")]
 
@@ -12,14 +12,16 @@ use taxel_data::{BadValue, exp, sin_cos};
 use super::{Draws, Motion, Trajectories, check_range};
 use crate::sensor::{Sensor, Vector3};
 
-/// One contact, centred anywhere on the face: Δz = d·exp(−ρ²/2s²), sheared by
-/// (Δx, Δy) = μ·Δz·(cos θ, sin θ), θ uniform on the circle.
+/// One contact, centred anywhere on the face.
+///
+/// Deformation: Δz = d·exp(−ρ²/2s²) at a distance ρ from the centre, and (Δx, Δy) = μ·Δz·(cos θ, sin θ)
+/// with θ uniform on the circle. The other parameters are uniform on their ranges.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Press {
     /// Range of the dent's radius s in mm.
     pub dent_radius_mm: [f64; 2],
-    /// Range of its depth d in mm.
+    /// Range of the dent's depth d in mm.
     pub dent_depth_mm: [f64; 2],
     /// Range of the shear ratio μ.
     pub shear_ratio: [f64; 2],
@@ -94,17 +96,17 @@ impl Trajectories for Contacts<'_> {
     }
 }
 
-/// One contact a lane.
+/// Contact in each lane.
 struct Contact {
     centre_mm: [Lanes; 2],
     dent_radius_mm: Lanes,
     dent_depth_mm: Lanes,
-    /// Δx/Δz and Δy/Δz.
+    /// Shear along x and y: Δx/Δz and Δy/Δz.
     shear: [Lanes; 2],
 }
 
 impl Contact {
-    /// Draws a contact a lane, its centre uniform over the face.
+    /// Draws one contact a lane, its centre uniform over the face.
     #[inline(always)]
     fn draw(random: &mut RandomLanes, size_mm: &Vector3, press: &Press) -> Self {
         let ranges = [

@@ -1,4 +1,4 @@
-/// (row, deformed by the rule or at rest, column, Ω), rounded to f64.
+/// Cases of the forward model: row, deformed by the rule or at rest, column, and Ω rounded to f64.
 const CASES: [(usize, bool, usize, f64); 6] = [
     (0, false, 0, 69.732_600_274_078_82),
     (3, false, 8, 46.737_473_715_473_56),

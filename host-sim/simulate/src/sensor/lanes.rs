@@ -1,10 +1,11 @@
-//! The forward model for many frames at once, one frame a lane.
+//! Forward model for many frames at once, one frame a lane.
 //!
-//! The sum is the one of [`Sensor::row_column_resistance_ohm`]; what differs is how 1/√ is computed.
-//! Square roots and divisions take a processor three times as long as all the rest, so an estimate in
-//! f32 (a shift of the exponent, then a polynomial) is made exact to 1e-13 by one Newton step in f64. It
-//! consists of shifts, additions and multiplications alone, which every machine rounds alike. Squares of
-//! coordinates that electrodes share are computed once.
+//! The sum is that of [`Sensor::row_column_resistance_ohm`]; only 1/√ is computed in another way. Square
+//! roots and divisions would take three times as long as all the rest. Instead, an estimate in f32 (a
+//! shift of the exponent, then a polynomial) is made exact to 1e-13 by one Newton step in f64.
+//!
+//! It consists of shifts, additions and multiplications alone, which every machine rounds alike. Squares
+//! of coordinates that electrodes share are computed once.
 
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays are indexed alike")]
 
@@ -16,31 +17,31 @@ use super::{Sensor, Vector3};
 /// Lengths in mm between which the estimate in f32 holds, with room for their squares.
 const MODERATE_MM: [f64; 2] = [1e-15, 1e15];
 
-/// How precisely readings are computed.
+/// Precision of computed readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Precision {
-    /// Within 2e-13 of the sensor's equations.
+    /// Double precision: within 2e-13 of the sensor's equations.
     #[default]
     F64,
-    /// Within 1e-6, a third faster; draws stay as they are.
+    /// Single precision: within 1e-6, a third faster; random draws stay the same.
     F32,
 }
 
-/// A sensor prepared for computing the readings of many frames.
+/// Sensor prepared for computing the readings of many frames.
 #[derive(Debug)]
 pub struct LaneModel<'s> {
     sensor: &'s Sensor,
-    /// Coordinates of lower electrodes, each once: x, and y with z.
+    /// Distinct coordinates of lower electrodes: x, and y with z.
     x_mm: Vec<f64>,
     yz_mm: Vec<[f64; 2]>,
-    /// For each lower electrode, where its coordinates stand in those.
+    /// Indices of each lower electrode's coordinates in these lists.
     places: Vec<[usize; 2]>,
-    /// Whether all distances are such that the estimate in f32 holds.
+    /// Whether the estimate in f32 holds for all distances.
     is_moderate: bool,
 }
 
-/// What computing a block needs besides: reused from block to block.
+/// Working memory of [`LaneModel::row_column_resistance_ohm`], used again for the next frames.
 #[derive(Debug, Clone)]
 pub struct Scratch {
     /// Squared distances along x, and along y and z, by coordinate of lower electrodes.
@@ -55,7 +56,7 @@ impl Default for Scratch {
     }
 }
 
-/// The same in both precisions.
+/// Squared distances of all lanes, in both precisions.
 #[derive(Debug, Clone)]
 struct Squares {
     double: Lanes,
@@ -74,11 +75,13 @@ impl<'s> LaneModel<'s> {
         Self { sensor, x_mm, yz_mm, places, is_moderate }
     }
 
-    /// Resistances in Ω between row-wire `row` and every column-wire, for deformations of that row's
-    /// electrodes in mm: by electrode and axis, and by column-wire. NaN makes its frame's readings NaN.
+    /// Computes the resistances in Ω between row-wire `row` and every column-wire.
+    ///
+    /// `deformation_mm` has the deformations of that row's electrodes, by electrode and axis;
+    /// `resistance_ohm` receives one entry a column-wire. NaN makes its frame's readings NaN.
     ///
     /// # Panics
-    /// If the slices do not have three entries an electrode and one a column-wire.
+    /// If `deformation_mm` has not one entry an electrode, or `resistance_ohm` not one a column-wire.
     #[inline(always)]
     pub fn row_column_resistance_ohm(
         &self,
@@ -129,7 +132,7 @@ impl<'s> LaneModel<'s> {
                 }
             }
         }
-        let summed = if precision == Precision::F64 { 2.0 } else { 1.0 }; // see `add_nodes`
+        let summed = if precision == Precision::F64 { 2.0 } else { 1.0 }; // as `add_nodes` returns
         let unit = summed * sensor.resistance_ohm_per_mm;
         for sum in resistance_ohm {
             for sum in sum {
@@ -138,7 +141,7 @@ impl<'s> LaneModel<'s> {
         }
     }
 
-    /// The same for sensors of outlandish size, by the plain formula.
+    /// Resistances of sensors of outlandish size, by the plain formula.
     #[inline(never)]
     fn one_by_one(&self, row: usize, deformation_mm: &[[Lanes; 3]], resistance_ohm: &mut [Lanes]) {
         let mut readings = vec![0.0; self.sensor.column_wires];
@@ -167,7 +170,7 @@ impl Squares {
     }
 }
 
-/// Adds 1/‖·‖ of `N` nodes to `sum` (f32), or twice that (f64).
+/// Adds Σ 1/‖·‖ of `N` nodes to `sum` (f32), or twice that (f64).
 #[inline(always)]
 fn add_nodes<const N: usize>(
     precision: Precision,
@@ -218,10 +221,11 @@ fn estimates_at<const N: usize>(nodes: &[(&Squares, &Squares); N], frame: usize)
     estimate(squared_mm2)
 }
 
-/// 1/√x to 3e-7: the exponent halved by a shift (Blinn, 1997), to 3.5 %, then the best polynomial of
-/// degree 4 for what is missing.
+/// Estimates 1/√x to 3e-7: the exponent is halved by a shift (Blinn, 1997), which is right to 3.5 %, and
+/// the best polynomial of degree 4 corrects the rest.
 ///
-/// Step by step for all `N`, so that a processor need not wait for one before it begins the next.
+/// Each step is done for all `N`, so that a processor need not wait for one estimate before it begins
+/// the next.
 #[inline(always)]
 fn estimate<const N: usize>(x: [f32; N]) -> [f32; N] {
     const SHIFTED: u32 = 0x5f37_0000;
@@ -243,14 +247,14 @@ fn estimate<const N: usize>(x: [f32; N]) -> [f32; N] {
     y
 }
 
-/// 2/√x, by one Newton step from an estimate of 1/√x. The halving is left to who adds them up.
+/// Refines an `estimate` of 1/√x to 2/√x by one Newton step. The caller halves the sum.
 #[inline(always)]
 fn twice_refined(x: f64, estimate: f32) -> f64 {
     let y = f64::from(estimate);
     y * (3.0 - x * y * y)
 }
 
-/// The place of `value` in `known`, where it is put if it is new.
+/// Index of `value` in `known`, to which it is added if it is new.
 fn place_of<T: PartialEq>(value: T, known: &mut Vec<T>) -> usize {
     known.iter().position(|other| *other == value).unwrap_or_else(|| {
         known.push(value);
@@ -258,7 +262,7 @@ fn place_of<T: PartialEq>(value: T, known: &mut Vec<T>) -> usize {
     })
 }
 
-/// Whether no distance between electrodes leaves [`MODERATE_MM`], however they may be deformed.
+/// Whether all distances between electrodes stay within [`MODERATE_MM`], however these are deformed.
 fn has_moderate_distances(sensor: &Sensor) -> bool {
     let most_mm = 2.0 * sensor.largest_deformation_mm();
     let (upper, lower) = (&sensor.upper_electrodes_mm, &sensor.lower_electrodes_mm);
@@ -275,7 +279,7 @@ mod tests {
     use super::*;
     use taxel_data::random::{Purpose, Random, Stream};
 
-    /// Readings of drawn deformations by the plain formula, and in a block.
+    /// Readings of drawn deformations by the plain formula, and in lanes.
     fn both_ways(sensor: &Sensor, precision: Precision) -> Vec<[f64; 2]> {
         let model = LaneModel::new(sensor);
         let mut random = Random::new(3, Stream::Test, Purpose::Deformation, 0, 0);
@@ -283,30 +287,32 @@ mod tests {
         let mut pairs = Vec::new();
         for row in 0..sensor.row_wires {
             let mut deformation_mm = vec![[[0.0; LANES]; 3]; sensor.electrodes_per_row_wire];
-            let mut block = vec![[f64::NAN; LANES]; sensor.column_wires];
+            let mut in_lanes = vec![[f64::NAN; LANES]; sensor.column_wires];
             let most = sensor.largest_deformation_mm();
             for lanes in deformation_mm.as_flattened_mut() {
                 lanes.fill_with(|| random.between([-most, most]));
             }
-            let (deltas, block_mut) = (&deformation_mm, &mut block);
-            model.row_column_resistance_ohm(row, precision, deltas, &mut scratch, block_mut);
+            let (deltas, in_lanes_mut) = (&deformation_mm, &mut in_lanes);
+            model.row_column_resistance_ohm(row, precision, deltas, &mut scratch, in_lanes_mut);
             let mut plain = vec![0.0; sensor.column_wires];
             for frame in 0..LANES {
                 let deltas: Vec<Vector3> =
                     deltas.iter().map(|delta| delta.map(|lanes| lanes[frame])).collect();
                 sensor.row_column_resistance_ohm(row, &deltas, &mut plain);
-                pairs.extend(plain.iter().zip(&block).map(|(plain, lanes)| [*plain, lanes[frame]]));
+                pairs.extend(
+                    plain.iter().zip(&in_lanes).map(|(plain, lanes)| [*plain, lanes[frame]]),
+                );
             }
         }
         pairs
     }
 
     fn largest_error(pairs: &[[f64; 2]]) -> f64 {
-        pairs.iter().map(|[plain, block]| (block / plain - 1.0).abs()).fold(0.0, f64::max)
+        pairs.iter().map(|[plain, lanes]| (lanes / plain - 1.0).abs()).fold(0.0, f64::max)
     }
 
     #[test]
-    fn blocks_agree_with_the_plain_formula() {
+    fn lanes_agree_with_the_plain_formula() {
         let odd = Sensor {
             row_wires: 2,
             column_wires: 5,
@@ -330,7 +336,7 @@ mod tests {
         let mut sensor = Sensor::paper();
         sensor.lower_electrodes_mm[7][0] = 1e200;
         let pairs = both_ways(&sensor, Precision::F64);
-        assert!(pairs.iter().all(|[plain, block]| plain == block));
+        assert!(pairs.iter().all(|[plain, lanes]| plain == lanes));
     }
 
     #[test]

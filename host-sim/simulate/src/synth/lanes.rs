@@ -1,4 +1,5 @@
-//! Some trajectories, one a lane: drawn, computed, disturbed, and laid out frame after frame.
+//! Synthesis of some trajectories, one a lane: drawn, computed, disturbed, and laid out frame after
+//! frame.
 
 use taxel_data::random::{Purpose, RandomLanes, Stream};
 use taxel_data::simd::{self, LANES, Lanes};
@@ -8,28 +9,28 @@ use crate::motion::Draws;
 use crate::rubber::Response;
 use crate::sensor::{LaneModel, Scratch};
 
-/// What all lanes of a synthesis share.
+/// Settings that all lanes of a synthesis share.
 pub(super) struct LaneSynthesis<'s> {
     synthesis: &'s Synthesis<'s>,
     stream: Stream,
     model: LaneModel<'s>,
-    /// Span of every channel that is read, in Ω; empty for relative noise.
+    /// Span in Ω of every channel that is read; empty for relative noise.
     span_ohm: Vec<f64>,
-    /// Place of each output of a row among electrodes and axes, and what its deformation is multiplied by.
+    /// Index of each output of a row among electrodes and axes, and factor on its deformation.
     outputs: Vec<(usize, f64)>,
 }
 
-/// Memory that the trajectories of one thread use one after the other.
+/// Working memory that the trajectories of one thread use in turn.
 pub(super) struct Workspace {
-    /// By electrode of a row, and axis.
+    /// Deformation in mm, by electrode of a row and axis.
     deformation_mm: Vec<[Lanes; 3]>,
-    /// By column-wire.
+    /// Resistance in Ω, by column-wire.
     resistance_ohm: Vec<Lanes>,
     scratch: Scratch,
 }
 
 impl<'s> LaneSynthesis<'s> {
-    /// Prepares frames of `stream`, with noise by `span_ohm` where that is not empty.
+    /// Synthesis of frames of `stream`, with noise relative to `span_ohm` where that is not empty.
     pub(super) fn new(synthesis: &'s Synthesis<'s>, stream: Stream, span_ohm: Vec<f64>) -> Self {
         let sensor = &synthesis.world.sensor;
         let of_an_electrode = |electrode: usize| {
@@ -43,7 +44,7 @@ impl<'s> LaneSynthesis<'s> {
         Self { synthesis, stream, model, span_ohm, outputs }
     }
 
-    /// Memory for one thread.
+    /// Working memory for one thread.
     pub(super) fn workspace(&self) -> Workspace {
         let sensor = &self.synthesis.world.sensor;
         Workspace {
@@ -53,8 +54,8 @@ impl<'s> LaneSynthesis<'s> {
         }
     }
 
-    /// Fills `readings` and `outputs` with the frames of the trajectories from number `first` on; at most
-    /// [`LANES`] of them, the last of which may be cut short.
+    /// Fills `readings` and `outputs` with the frames of the trajectories from number `first` on. There
+    /// are at most [`LANES`] trajectories, the last of which may be cut short.
     pub(super) fn fill(
         &self,
         workspace: &mut Workspace,
@@ -133,7 +134,7 @@ impl<'s> LaneSynthesis<'s> {
         if level == 0.0 {
             return;
         }
-        // Noise is drawn by frame, whatever trajectory the frame belongs to.
+        // Noise is drawn by frame, whichever trajectory the frame belongs to.
         let steps = motion.steps();
         let mut random = RandomLanes::every(first * steps + step, steps);
         random.start(world.seed, self.stream, Purpose::Noise, row as u64);

@@ -16,8 +16,8 @@ fn a_frame_is_the_same_however_many_are_asked_for_and_whichever_rows_are_read() 
         let mut two_rows = world(name);
         two_rows.read_rows = vec![2, 6];
         let two_rows = synthesise(&two_rows, Stream::Training, 20);
-        assert_eq!(two_rows.block(0), whole.block(2));
-        assert_eq!(two_rows.block(1), whole.block(6));
+        assert_eq!(two_rows.row_table(0), whole.row_table(2));
+        assert_eq!(two_rows.row_table(1), whole.row_table(6));
     }
 }
 
@@ -131,7 +131,8 @@ fn readings_are_those_of_the_sensors_equations() {
     }
 }
 
-/// The same bytes on every platform and in every release, until the changelog says otherwise.
+/// Synthesised bytes are the same on every platform and in every release, until the changelog says
+/// otherwise.
 #[test]
 fn synthesised_numbers_are_fixed_for_all_time() {
     for (name, pinned) in [("paper", 0xa286_1098_286b_610f_u64), ("press", 0xd4e0_e1f1_2618_58b2)] {

@@ -1,4 +1,4 @@
-//! The analogue half of the board: what voltage each column's converter input has.
+//! Analogue half of the board: the voltage at each column's converter input.
 
 use firmware::circuit::{Divider, ZeroPotential};
 use taxel_data::random::{Purpose, Random, Stream};
@@ -7,12 +7,12 @@ use super::network::{Tie, potentials_v};
 use super::{COLUMNS, ROWS};
 use crate::readout::{Circuit, Readout};
 
-/// A node of no resistance conducts no more than this.
+/// Largest conductance of a node, in S; a node of no resistance has it.
 const MOST_CONDUCTANCE_S: f64 = 1e6;
 
 const ZERO_POTENTIAL: ZeroPotential<1, 1> = ZeroPotential::TYPICAL;
 
-/// The sensor's network and the circuit around it.
+/// Network of the sensor, and the circuit around it.
 #[derive(Debug)]
 pub(super) struct Analogue {
     circuit: Circuit,
@@ -21,11 +21,11 @@ pub(super) struct Analogue {
     line_ohm: f64,
     offset_v: [f64; COLUMNS],
     conductance_s: Vec<f64>,
-    /// Outputs by active row, then for none: computed when first asked for.
+    /// Outputs in V by active row, then for none active; computed when first asked for.
     outputs_v: [Option<[f64; COLUMNS]>; ROWS + 1],
 }
 
-/// The converter's reference, and the supply of everything.
+/// Reference voltage of the converter, which also supplies everything else.
 pub(super) fn reference_v() -> f64 {
     ZERO_POTENTIAL.reference_v.into()
 }
@@ -49,7 +49,7 @@ impl Analogue {
         }
     }
 
-    /// Sets the resistance between every row-wire and column-wire, row after row; infinite is open.
+    /// Sets the resistance in Ω between every row-wire and column-wire, row after row; infinite is open.
     pub(super) fn set_readings(&mut self, ohm: &[f64]) {
         assert_eq!(ohm.len(), ROWS * COLUMNS, "a reading of every row-wire and column-wire");
         for (siemens, ohm) in self.conductance_s.iter_mut().zip(ohm) {
@@ -59,7 +59,7 @@ impl Analogue {
         self.outputs_v = [None; ROWS + 1];
     }
 
-    /// Voltages at the converters' inputs with `active` row, after settling.
+    /// Voltages in V at the converters' inputs with row `active`, after settling.
     pub(super) fn outputs_v(&mut self, active: Option<usize>) -> [f64; COLUMNS] {
         let state = active.unwrap_or(ROWS);
         if let Some(known) = self.outputs_v[state] {
@@ -69,7 +69,7 @@ impl Analogue {
             Circuit::Divider => self.divider_v(active),
             Circuit::ZeroPotential => self.zero_potential_v(active),
         };
-        // No output leaves the supply.
+        // No output leaves the range of the supply.
         let outputs = outputs.map(|volt| volt.clamp(0.0, reference_v()));
         self.outputs_v[state] = Some(outputs);
         outputs
@@ -83,7 +83,7 @@ impl Analogue {
     fn divider_v(&self, active: Option<usize>) -> [f64; COLUMNS] {
         let reference_ohm = f64::from(Divider::<1, 1>::TYPICAL.reference_ohm[0]);
         if !self.cross_talk {
-            // Every reading a circuit of its own.
+            // Without cross-talk, every reading is a circuit of its own.
             return std::array::from_fn(|k| {
                 let siemens = active.map_or(0.0, |m| self.conductance_s[m * COLUMNS + k]);
                 reference_v() * siemens * reference_ohm / (siemens * reference_ohm + 1.0)
@@ -96,8 +96,10 @@ impl Analogue {
         std::array::from_fn(|k| potentials[ROWS + k] * reference_ohm / to_ground_ohm)
     }
 
-    /// With neither switch nor lead between, held wires disturb each other nowhere: no case apart
-    /// is needed for a scene without cross-talk.
+    /// Outputs in V of the circuit with one potential.
+    ///
+    /// Without switch and lead resistance, held wires do not disturb each other. A scene without
+    /// cross-talk therefore needs no separate case.
     fn zero_potential_v(&self, active: Option<usize>) -> [f64; COLUMNS] {
         let drive_v = f64::from(ZERO_POTENTIAL.drive_v);
         let rest_v = drive_v; // the active row is pulled to ground

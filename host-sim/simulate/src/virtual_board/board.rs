@@ -1,4 +1,4 @@
-//! The board: its parts, its clock, and a record of what they were asked for.
+//! Virtual board: its parts, its clock, and a record of their use.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -17,18 +17,18 @@ use crate::error::{Error, Violation};
 use crate::readout::{Readout, Sampler};
 use crate::world::World;
 
-/// Bits of every converter here.
+/// Resolution of every converter on the board, in bits.
 const CONVERTER_BITS: u8 = 12;
-/// Clock of the SPI bus: what an MCP3208 bears at 3.3 V.
+/// Clock of the SPI bus: the highest that an MCP3208 accepts at 3.3 V.
 const SPI_CLOCK_HZ: u32 = 1_000_000;
-/// How often the converter on the microcontroller is not ready yet, and how long one look takes.
+/// Number of looks for which the microcontroller's converter is not ready, and duration of one look.
 const POLLS: u32 = 2;
 const POLL_NS: u64 = 500;
 
-/// How often each kind of part was used.
+/// Number of uses of each kind of part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Transactions {
-    /// Pins that were set, to whatever level.
+    /// Pins that were set, to either level.
     pub pins_set: usize,
     /// Transfers over SPI.
     pub transfers: usize,
@@ -38,7 +38,7 @@ pub struct Transactions {
     pub waits: usize,
 }
 
-/// A board with a sensor on it. Clones are the same board.
+/// Board with a sensor on it. Clones are handles to the same board.
 #[derive(Debug, Clone)]
 pub struct VirtualBoard {
     board: Rc<RefCell<Board>>,
@@ -49,7 +49,7 @@ pub struct VirtualBoard {
 struct Board {
     analogue: Analogue,
     rows: RowSelector,
-    /// `None` if MCP3208s sample the columns.
+    /// Column multiplexers; `None` if MCP3208s sample the columns.
     columns: Option<ColumnSelector>,
     adc_bits: u8,
     adc_noise_counts: f64,
@@ -58,7 +58,7 @@ struct Board {
     frame: u64,
     time_constant_us: f64,
     now_ns: u64,
-    /// When rows last changed, if they ever did, and what the outputs were then.
+    /// Time of the rows' last change, if there was one, and the outputs at that time.
     changed_ns: Option<u64>,
     before_v: [f64; COLUMNS],
     violations: Vec<Violation>,
@@ -66,18 +66,18 @@ struct Board {
 }
 
 impl VirtualBoard {
-    /// A board for `world`'s sensor, seed and readout, with nothing connected: all open.
+    /// Board for `world`'s sensor, seed and readout, with nothing connected: all nodes open.
     ///
     /// # Errors
-    /// A sensor of other than 8 × 18 wires.
+    /// [`BadValue`] for a sensor of other than 8 × 18 wires.
     pub fn new(world: &World) -> Result<Self, BadValue> {
         Self::with_readout(world, &world.readout)
     }
 
-    /// A board with another `readout` than the world's.
+    /// Board like [`new`](Self::new)'s, with another `readout` than the world's.
     ///
     /// # Errors
-    /// A sensor of other than 8 × 18 wires.
+    /// [`BadValue`] for a sensor of other than 8 × 18 wires.
     pub fn with_readout(world: &World, readout: &Readout) -> Result<Self, BadValue> {
         let sensor = &world.sensor;
         if (sensor.row_wires, sensor.column_wires) != (ROWS, COLUMNS) {
@@ -112,11 +112,11 @@ impl VirtualBoard {
         Ok(Self { board: Rc::new(RefCell::new(board)), readout: Rc::new(readout.clone()) })
     }
 
-    /// Connects a sensor with the given resistances in Ω, row after row; infinite is open. Its
-    /// voltages are settled.
+    /// Connects a sensor with the given row–column resistances in Ω, row after row; infinite is open.
+    /// All voltages settle at once.
     ///
     /// # Panics
-    /// If there are not 144 of them, or one is negative or NaN.
+    /// If there are not 144 resistances, or one is negative or NaN.
     pub fn set_readings(&self, ohm: &[f64]) {
         let board = &mut *self.board.borrow_mut();
         board.analogue.set_readings(ohm);
@@ -125,7 +125,7 @@ impl VirtualBoard {
         board.noise = noise_of_frame(board.seed, board.frame);
     }
 
-    /// Settings that the readout asks for: its own wait, or what its time constant needs.
+    /// Scan settings of the readout, with its own wait or the one that its time constant needs.
     #[must_use]
     pub fn scan_settings(&self) -> ScanSettings {
         let board = self.board.borrow();
@@ -145,15 +145,15 @@ impl VirtualBoard {
         self.board.borrow_mut().set_pin(pin, high)
     }
 
-    /// One SPI transaction with MCP3208 number `chip`: `bytes` go out and are replaced by the answer.
+    /// Makes one SPI transfer with MCP3208 number `chip`: `bytes` go out and are replaced by the answer.
     ///
     /// # Errors
-    /// [`Violation`], which is recorded as well; there is then no answer.
+    /// [`Violation`], which is recorded as well; `bytes` then hold no answer.
     pub fn transfer(&self, chip: usize, bytes: &mut [u8]) -> Result<(), Violation> {
         self.board.borrow_mut().transfer(chip, bytes)
     }
 
-    /// Lets time pass.
+    /// Lets time pass on the board's clock.
     pub fn wait_ns(&self, ns: u32) {
         let board = &mut *self.board.borrow_mut();
         board.transactions.waits += 1;
@@ -168,24 +168,24 @@ impl VirtualBoard {
         self.board.borrow_mut().start_conversion()
     }
 
-    /// The conversion's counts, or `None` while it takes.
+    /// Counts of the conversion, or `None` while it is not ready.
     ///
     /// # Errors
-    /// [`Violation`] if none was started, which is recorded as well.
+    /// [`Violation`] if no conversion was started, which is recorded as well.
     pub fn poll_conversion(&self) -> Result<Option<u16>, Violation> {
         self.board.borrow_mut().poll_conversion()
     }
 
-    /// What the parts were asked for and would not have accepted, in order.
+    /// Requests that the real parts would not have accepted, in order.
     #[must_use]
     pub fn violations(&self) -> Vec<Violation> {
         self.board.borrow().violations.clone()
     }
 
-    /// That there were no violations.
+    /// Checks that there were no violations.
     ///
     /// # Errors
-    /// [`Error::Board`], with the first of them.
+    /// [`Error::Board`], with the first violation.
     pub fn check(&self) -> Result<(), Error> {
         let board = self.board.borrow();
         board.violations.first().map_or(Ok(()), |first| {
@@ -193,7 +193,7 @@ impl VirtualBoard {
         })
     }
 
-    /// How often each kind of part was used so far.
+    /// Number of uses of each kind of part so far.
     #[must_use]
     pub fn transactions(&self) -> Transactions {
         self.board.borrow().transactions
@@ -205,7 +205,7 @@ impl VirtualBoard {
         self.board.borrow().now_ns
     }
 
-    /// The row that is active.
+    /// Row (from 0) that is active, if any.
     #[must_use]
     pub fn active_row(&self) -> Option<usize> {
         self.board.borrow().rows.active()
@@ -291,7 +291,7 @@ impl Board {
         timing::settling_us((self.time_constant_us * 1e3) as f32, self.adc_bits)
     }
 
-    /// Voltages of all outputs now.
+    /// Voltages in V of all outputs now.
     fn voltages(&mut self) -> [f64; COLUMNS] {
         let mut voltages = self.analogue.outputs_v(self.rows.active());
         if let Some(changed_ns) = self.changed_ns.filter(|_| self.time_constant_us > 0.0) {
@@ -320,7 +320,7 @@ impl Board {
         if self.adc_noise_counts > 0.0 {
             counts += self.adc_noise_counts * self.noise.normal();
         }
-        // Transitions lie half a step off the steps; at its end a converter answers all ones.
+        // Transitions lie half a step off the steps; at full scale a converter gives all ones.
         let step = f64::from(1_u32 << (CONVERTER_BITS - self.adc_bits));
         let counts = (counts / step).round() * step;
         Ok(if counts > full - step { full - 1.0 } else { counts.max(0.0) } as u16)

@@ -1,11 +1,10 @@
-//! The parts that sample a column, as strict as the real ones.
+//! Parts that sample a column, as strict as the real ones.
 
 use super::COLUMNS;
 use super::pin::Pin;
 use super::rows::{number, set_address};
 
-/// The column that an MCP3208 of number `chip` is asked for by three bytes, or what is wrong with
-/// them.
+/// Column that three bytes ask MCP3208 number `chip` for, or the fault in these bytes.
 pub(super) fn mcp3208_column(chip: usize, bytes: &[u8]) -> Result<usize, String> {
     let [first, second, _] = bytes else {
         return Err(format!("an MCP3208 was sent {} bytes; a conversion takes 3", bytes.len()));
@@ -20,7 +19,7 @@ pub(super) fn mcp3208_column(chip: usize, bytes: &[u8]) -> Result<usize, String>
     wired(chip * 8 + channel)
 }
 
-/// An MCP3208's answer: before the null bit, whatever; then twelve bits.
+/// Answer of an MCP3208: undefined bits before the null bit, then twelve bits of the sample.
 pub(super) fn mcp3208_answer(counts: u16) -> [u8; 3] {
     let [high, low] = counts.to_be_bytes();
     [0xFF, 0b1110_0000 | high, low]
@@ -31,7 +30,7 @@ pub(super) fn mcp3208_answer(counts: u16) -> [u8; 3] {
 pub(super) struct ColumnSelector {
     address: [bool; 3],
     disabled: [bool; 3],
-    /// A conversion that was started: its counts, and how often it will not be ready yet.
+    /// Counts of a conversion that was started, and for how many more looks it will not be ready.
     pub(super) conversion: Option<(u16, u32)>,
 }
 
@@ -40,7 +39,7 @@ impl ColumnSelector {
         Self { address: [false; 3], disabled: [true; 3], conversion: None }
     }
 
-    /// The column that is selected.
+    /// Column that is selected, or the fault in the selection.
     pub(super) fn column(&self) -> Result<usize, String> {
         match self.disabled.iter().position(|disabled| !disabled) {
             Some(multiplexer) => wired(multiplexer * 8 + number(&self.address)),
@@ -48,7 +47,8 @@ impl ColumnSelector {
         }
     }
 
-    /// Sets one of the selector's pins; `None` if it has no such pin, else what is wrong with it.
+    /// Sets one of the selector's pins; `None` if it has no such pin, otherwise whether the part accepts
+    /// it.
     pub(super) fn set(&mut self, pin: Pin, high: bool) -> Option<Result<(), String>> {
         match pin {
             Pin::ColumnAddress(bit) => {

@@ -1,4 +1,4 @@
-//! What the firmware gets hold of: pins, SPI devices, the converter and the delay.
+//! Handles for the firmware: pins, SPI devices, the converter and the delay.
 
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::{self, OutputPin};
@@ -10,32 +10,32 @@ use super::pin::Pin;
 use crate::error::Violation;
 
 impl VirtualBoard {
-    /// A pin.
+    /// Handle to a pin.
     #[must_use]
     pub fn pin(&self, pin: Pin) -> VirtualPin {
         VirtualPin { board: self.clone(), pin }
     }
 
-    /// The SPI device of an MCP3208.
+    /// Handle to MCP3208 number `chip` as an SPI device.
     #[must_use]
     pub fn spi(&self, chip: usize) -> VirtualSpi {
         VirtualSpi::new(self.clone(), chip)
     }
 
-    /// The microcontroller's own converter.
+    /// Handle to the microcontroller's own converter.
     #[must_use]
     pub fn adc(&self) -> VirtualAdc {
         VirtualAdc::new(self.clone())
     }
 
-    /// A delay that moves the board's clock.
+    /// Delay that advances the board's clock.
     #[must_use]
     pub fn delay(&self) -> VirtualDelay {
         VirtualDelay::new(self.clone())
     }
 }
 
-/// A pin of a virtual board.
+/// Pin of a virtual board.
 #[derive(Debug, Clone)]
 pub struct VirtualPin {
     board: VirtualBoard,
@@ -56,7 +56,7 @@ impl OutputPin for VirtualPin {
     }
 }
 
-/// The SPI device of one MCP3208 of a virtual board.
+/// MCP3208 of a virtual board, as an SPI device.
 #[derive(Debug, Clone)]
 pub struct VirtualSpi {
     board: VirtualBoard,
@@ -108,7 +108,7 @@ impl SpiDevice for VirtualSpi {
     }
 }
 
-/// The delay of a virtual board: moves its clock.
+/// Delay that advances a virtual board's clock.
 #[derive(Debug, Clone)]
 pub struct VirtualDelay(VirtualBoard);
 
@@ -124,7 +124,7 @@ impl DelayNs for VirtualDelay {
     }
 }
 
-/// The converter on the microcontroller of a virtual board.
+/// Converter on the microcontroller of a virtual board.
 #[derive(Debug, Clone)]
 pub struct VirtualAdc(VirtualBoard);
 

@@ -1,21 +1,23 @@
-//! Nodal analysis of the wires: Kirchhoff's current law at every wire that is not held.
+//! Nodal analysis of the wires: Kirchhoff's current law at every wire whose potential is not held.
 
 use nalgebra::{DMatrix, DVector};
 
-/// What a wire is connected to, besides the rubber.
+/// Connection of a wire, besides the rubber.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Tie {
-    /// Nothing.
+    /// No connection.
     Floating,
-    /// A voltage, through a resistance that may be zero.
+    /// Connection to a voltage, through a resistance that may be zero.
     Held { volt: f64, through_ohm: f64 },
 }
 
-/// Leakage to ground of every wire: a wire without any connection is at 0 V.
+/// Leakage to ground of every wire, in S: a wire without any connection is at 0 V.
 const LEAKAGE_S: f64 = 1e-15;
 
-/// Potentials in V of all row-wires, then all column-wires. `conductance_s` has the conductances
-/// between them, row after row; `ties` those of every wire.
+/// Potentials in V of all row-wires, then all column-wires.
+///
+/// `conductance_s` has the conductances in S between them, row after row; `rows` and `columns` the
+/// connections of every wire.
 pub(super) fn potentials_v(conductance_s: &[f64], rows: &[Tie], columns: &[Tie]) -> Vec<f64> {
     let ties = || rows.iter().chain(columns);
     let mut potentials: Vec<f64> = ties()
@@ -28,7 +30,7 @@ pub(super) fn potentials_v(conductance_s: &[f64], rows: &[Tie], columns: &[Tie])
     let mut place_of = vec![usize::MAX; potentials.len()];
     unknown.iter().enumerate().for_each(|(place, wire)| place_of[*wire] = place);
 
-    // G·V = I: currents that leave each unknown wire, and those that held potentials drive into it.
+    // G·V = I: currents that leave each unknown wire, and currents that held potentials drive into it.
     let mut matrix = DMatrix::from_diagonal_element(unknown.len(), unknown.len(), LEAKAGE_S);
     let mut current = DVector::zeros(unknown.len());
     for (wire, tie) in ties().enumerate() {

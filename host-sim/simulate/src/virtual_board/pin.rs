@@ -1,6 +1,6 @@
 //! The pins of a virtual board.
 
-/// The board's pins. Which of them are there depends on the scene's parts.
+/// Pin of the board. Which pins exist depends on the parts in the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pin {
     /// Control line of a row, from 0.
@@ -22,7 +22,7 @@ pub enum Pin {
 }
 
 impl Pin {
-    /// All pins; a pin's place here is its number.
+    /// Every pin; its index is its number.
     pub const ALL: [Self; 21] = [
         Self::Row(0),
         Self::Row(1),
@@ -47,7 +47,7 @@ impl Pin {
         Self::ColumnEnable(2),
     ];
 
-    /// The pin of a number, for callers that send numbers.
+    /// Pin of a number, for callers that send numbers.
     #[must_use]
     pub fn from_number(number: u8) -> Option<Self> {
         Self::ALL.get(usize::from(number)).copied()

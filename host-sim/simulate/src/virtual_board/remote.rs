@@ -1,4 +1,4 @@
-//! The board at the other end of a line: what `remote_readout` asks for is carried out here.
+//! Board at the other end of a line, which carries out the requests of `remote_readout`.
 
 use std::io::{ErrorKind, Read, Write};
 
@@ -9,17 +9,17 @@ use super::board::VirtualBoard;
 use super::pin::Pin;
 use crate::error::{Error, Result};
 
-/// What a line reads as that nobody drives.
+/// Byte that a line reads as while nobody drives it.
 const NOBODY: u8 = 0xFF;
 
 impl VirtualBoard {
-    /// Carries out what the other end of `line` asks for until it closes the line. Calls `scanned` when
-    /// the last row is released, which ends every scan.
+    /// Carries out the requests from the other end of `line` until it closes the line. Calls `scanned`
+    /// when the last row is released, which ends every scan.
     ///
-    /// What a part refuses is answered by ones, as by a line that nobody drives.
+    /// A request that a part refuses is answered by ones, like a line that nobody drives.
     ///
     /// # Errors
-    /// [`Error`]: at once if the line fails or asks for what is not there; once it is closed if
+    /// [`Error`] at once if the line fails or asks for a part that does not exist; once it is closed if
     /// the parts refused anything, now or before.
     pub fn serve(&self, mut line: impl Read + Write, mut scanned: impl FnMut()) -> Result<()> {
         let mut pending = Vec::new();
@@ -54,7 +54,7 @@ impl VirtualBoard {
                 let pin = Pin::from_number(number)
                     .ok_or_else(|| Error::UnknownRequest(format!("pin {number}")))?;
                 let before = self.active_row();
-                // A refusal is on record.
+                // A refusal is recorded by the board.
                 let _ = self.set_pin(pin, high);
                 if before == Some(ROWS - 1) && self.active_row().is_none() {
                     scanned();

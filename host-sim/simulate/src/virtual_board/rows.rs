@@ -1,10 +1,10 @@
-//! The parts that select a row, as strict as the real ones.
+//! Parts that select a row, as strict as the real ones.
 
 use super::ROWS;
 use super::pin::Pin;
 use crate::readout::Drive;
 
-/// What selects the rows, with the levels of its pins.
+/// Row selector, with the levels of its pins.
 #[derive(Debug)]
 pub(super) enum RowSelector {
     Pins { high: [bool; ROWS] },
@@ -19,13 +19,13 @@ pub(super) struct ShiftRegister {
     latch: bool,
     /// The eight stages, QA first.
     stages: [bool; ROWS],
-    /// What the outputs show.
+    /// Levels at the outputs, QA first.
     latched: [bool; ROWS],
     clocks_since_latch: usize,
 }
 
 impl RowSelector {
-    /// At power-up: no row active.
+    /// Selector at power-up: no row active.
     pub(super) fn new(drive: Drive) -> Self {
         match drive {
             Drive::Pins => Self::Pins { high: [false; ROWS] },
@@ -34,7 +34,7 @@ impl RowSelector {
         }
     }
 
-    /// The active row.
+    /// Row (from 0) that is active, if any.
     pub(super) fn active(&self) -> Option<usize> {
         match self {
             Self::Pins { high } => high.iter().position(|high| *high),
@@ -44,7 +44,8 @@ impl RowSelector {
         }
     }
 
-    /// Sets one of the selector's pins; `None` if it has no such pin, else what is wrong with it.
+    /// Sets one of the selector's pins; `None` if it has no such pin, otherwise whether the part accepts
+    /// it.
     pub(super) fn set(&mut self, pin: Pin, high: bool) -> Option<Result<(), String>> {
         let outcome = match (self, pin) {
             (Self::Pins { high: rows }, Pin::Row(row)) => {
@@ -100,7 +101,7 @@ impl ShiftRegister {
     }
 }
 
-/// The number whose bits, least significant first, are `address`.
+/// Number whose bits, least significant first, are `address`.
 pub(super) fn number(address: &[bool]) -> usize {
     address.iter().rev().fold(0, |number, bit| number << 1 | usize::from(*bit))
 }

@@ -1,4 +1,4 @@
-//! Whole tables of readings, scanned by the firmware's scanner on a virtual board.
+//! Scans of whole tables of readings, by the firmware's scanner on a virtual board.
 
 use model_core::Frame;
 use taxel_data::random::Stream;
@@ -11,16 +11,19 @@ use crate::error::Result;
 use crate::synth::Synthesis;
 use crate::world::World;
 
-/// Ideal readings in Ω of all row-wires, whichever are read: what a board is given.
+/// Ideal readings in Ω of all row-wires (`frames × 144`), whichever the world reads: the input of a
+/// board.
 #[must_use]
 pub fn all_readings(world: &World, frames: usize) -> Table {
     Synthesis::of(world).ideal().all_rows().frames(Stream::Test, frames).inputs
 }
 
-/// Scans every line of `readings` of all row-wires by the firmware's scanner on `board`.
+/// Scans every line of `readings` (Ω, all row-wires) by the firmware's scanner on `board`.
+///
+/// Returns the readings in Ω as the scanner computes them, one line a scan.
 ///
 /// # Errors
-/// [`Error::Board`](crate::Error::Board): the board refused a transaction.
+/// [`Error::Board`](crate::Error::Board) if the board refused a transaction.
 pub fn scan(board: &VirtualBoard, series: SeriesResistance, readings: &Table) -> Result<Table> {
     let mut scanner = board.scanner(series);
     let settings = board.scan_settings();
@@ -36,7 +39,7 @@ pub fn scan(board: &VirtualBoard, series: SeriesResistance, readings: &Table) ->
     Ok(Table { names: readings.names.clone(), values })
 }
 
-/// Those of the readings of all row-wires that `world` reads: the columns of its models.
+/// Columns of `readings` of the row-wires that `world` reads: the inputs of its models.
 #[must_use]
 pub fn rows_read(world: &World, readings: &Table) -> Table {
     let columns = world.sensor.column_wires;

@@ -1,4 +1,4 @@
-//! The firmware's own scanner on the parts of a virtual board.
+//! Scanner of the firmware, on the parts of a virtual board.
 
 use std::array;
 
@@ -13,23 +13,23 @@ use super::pin::Pin;
 use super::{COLUMNS, ROWS};
 use crate::readout::{self, Drive, Sampler};
 
-/// A scanner for whatever parts a board has.
+/// Scanner for whatever parts a board has.
 pub type FrameScanner = Box<dyn FrameSource<ROWS, COLUMNS>>;
 
-/// What the firmware takes to lie in series with each wire, and corrects for.
+/// Resistances in series with each wire for which the firmware corrects readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SeriesResistance {
-    /// With each row: switch and lead.
+    /// Resistance in series with each row: switch and lead.
     pub row_source_ohm: f32,
-    /// With each column: lead.
+    /// Resistance in series with each column: lead.
     pub column_ohm: f32,
 }
 
 impl SeriesResistance {
-    /// Nothing: uncorrected readings.
+    /// No series resistance: readings stay uncorrected.
     pub const NONE: Self = Self { row_source_ohm: 0.0, column_ohm: 0.0 };
 
-    /// So many times these resistances.
+    /// These resistances times `factor`.
     #[must_use]
     pub fn scaled(self, factor: f32) -> Self {
         Self { row_source_ohm: factor * self.row_source_ohm, column_ohm: factor * self.column_ohm }
@@ -37,7 +37,7 @@ impl SeriesResistance {
 }
 
 impl VirtualBoard {
-    /// What lies in series with this board's wires: a perfect calibration.
+    /// Actual series resistances of this board: a perfect calibration.
     #[must_use]
     pub fn series_resistance(&self) -> SeriesResistance {
         let line_ohm = self.readout().line_ohm.unwrap_or(0.0);
@@ -45,7 +45,7 @@ impl VirtualBoard {
         SeriesResistance { row_source_ohm: row_source_ohm as f32, column_ohm: line_ohm as f32 }
     }
 
-    /// The firmware's scanner for this board's parts, calibrated with `series`.
+    /// Scanner of the firmware for this board's parts, calibrated with `series`.
     #[must_use]
     pub fn scanner(&self, series: SeriesResistance) -> FrameScanner {
         let row_source_ohm = [series.row_source_ohm; ROWS];

@@ -25,7 +25,7 @@ fn scan(board: &VirtualBoard, ohm: &[f64], settings: ScanSettings) -> (Vec<f64>,
     (readings.iter().map(|ohm| f64::from(*ohm)).collect(), report)
 }
 
-/// The largest relative error of a scan with the board's own settings, which must succeed.
+/// Largest relative error of a scan with the board's own settings, which must succeed.
 fn worst_error(readout: Readout) -> f64 {
     worst_error_on(&board(readout))
 }
@@ -44,13 +44,13 @@ fn with(circuit: Circuit) -> Readout {
 #[test]
 fn every_drive_sampler_and_circuit_reads_the_resistances_with_no_more_than_it_needs() {
     for circuit in Circuit::ALL {
-        // Pins set to release all rows and to drive one.
+        // Number of pins set to release all rows and to drive one.
         for (drive, release, select) in [
             (Drive::Pins, 8, 9),
             (Drive::Multiplexer, 1, 5),
             (Drive::ShiftRegister, 26, 26), // the latch twice; eight times clock, data, clock
         ] {
-            // Pins set for a sample: three multiplexers off, three address lines, one on.
+            // Number of pins set for a sample: three multiplexers off, three address lines, one on.
             for (sampler, of_sample) in [(Sampler::Mcp3208, 0), (Sampler::OnChip, 7)] {
                 let (row_drive, sampler) = (Some(drive), Some(sampler));
                 let board = board(Readout { row_drive, sampler, ..with(circuit) });
@@ -103,7 +103,7 @@ fn sampling_before_voltages_have_settled_is_refused() {
         Readout { time_constant_us: Some(5.0), settling_us: Some(20), ..Readout::default() };
     let board = board(hasty);
     let (readings, report) = scan(&board, &ohm(), board.scan_settings());
-    // Nothing has changed yet when the idle samples are taken: only the first of a row are early.
+    // Nothing has changed yet when the idle samples are taken, so only the first of a row are early.
     assert!(report.failed_samples >= 8, "{report:?}");
     assert!(readings.iter().filter(|r| r.is_nan()).count() >= 8);
     let refused = board.check().unwrap_err().to_string();
@@ -184,7 +184,7 @@ fn fewer_bits_make_larger_steps() {
     assert!((8.0..32.0).contains(&ratio), "{ratio} instead of 16");
 }
 
-/// Runs `misuse` on a board of the given parts; exactly one refusal must say `says`.
+/// Runs `misuse` on a board of the given parts; exactly one violation must contain `says`.
 fn refused(readout: Readout, says: &str, misuse: impl FnOnce(&VirtualBoard)) {
     let board = board(readout);
     board.set_readings(&ohm());

@@ -1,35 +1,35 @@
-//! Picking one point within limits.
+//! Choice of one point within the user's bounds.
 
 use taxel_data::BadValue;
 
 use super::Point;
 use crate::error::{Bounded, NoPoint, Unmet};
 
-/// What the chosen point may be at most.
+/// Bounds that a user sets for the chosen point.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Limits {
-    /// RMSE of the group, in its unit: the cheapest point within it is chosen.
+pub struct Bounds {
+    /// Largest RMSE of the group, in its unit; the cheapest point within it is chosen.
     pub error: Option<f64>,
-    /// Cycles of a frame.
+    /// Largest number of cycles of a frame.
     pub cycles: Option<u64>,
-    /// Bytes of the blob; a slot's ([`SLOT_BYTES`](super::SLOT_BYTES)) unless given.
+    /// Largest size of the blob; a slot's ([`SLOT_BYTES`](super::SLOT_BYTES)) unless given.
     pub flash_bytes: Option<usize>,
 }
 
-impl Limits {
-    /// Whether the limits can be met at all.
+impl Bounds {
+    /// Checks that the bounds can be met at all.
     ///
     /// # Errors
-    /// A limit that is not a positive number.
+    /// [`BadValue`] for a bound that is not a positive number.
     pub fn check(&self) -> Result<(), BadValue> {
-        let limits = [
+        let bounds = [
             (Bounded::Error, self.error),
             (Bounded::Cycles, self.cycles.map(|cycles| cycles as f64)),
             (Bounded::Flash, self.flash_bytes.map(|bytes| bytes as f64)),
         ];
-        for (bounded, limit) in limits {
-            if let Some(limit) = limit.filter(|limit| !(limit.is_finite() && *limit > 0.0)) {
-                return Err(BadValue::new(bounded.name(), limit, "give a positive number"));
+        for (bounded, bound) in bounds {
+            if let Some(bound) = bound.filter(|bound| !(bound.is_finite() && *bound > 0.0)) {
+                return Err(BadValue::new(bounded.name(), bound, "give a positive number"));
             }
         }
         Ok(())
@@ -39,12 +39,13 @@ impl Limits {
         self.error.is_some() || self.cycles.is_some() || self.flash_bytes.is_some()
     }
 
-    /// The point within all limits that takes the fewest cycles if an error was given, else the one with
-    /// the smallest error; nothing if no limit was given. Among equals, the fewest samples, then the least
-    /// flash.
+    /// Index of the best point within all bounds; `None` if no bound was given.
+    ///
+    /// With a bound on the error, the best point takes the fewest cycles; otherwise it has the smallest
+    /// error. Among equals, it needs the fewest samples, then the least flash.
     ///
     /// # Errors
-    /// No point is within the limits: how near the points come.
+    /// [`NoPoint`] if no point is within the bounds, with the nearest that points come to them.
     pub(super) fn choose(
         &self,
         points: &[Point],
@@ -76,47 +77,48 @@ impl Limits {
             && point.flash_bytes <= self.flash_bytes.unwrap_or(super::SLOT_BYTES)
     }
 
-    /// Which limits no point meets, or, where each can be met, how near points within the others come to it.
+    /// Bounds that no point meets. If each can be met, the nearest that points within the others come to
+    /// it.
     fn refusal(&self, points: &[Point], group: &str, unit: &str) -> NoPoint {
         let unit = format!("{unit} ({group})");
-        let least = |within: Self, limit: &Limit| {
+        let least = |within: Self, bound: &Bound| {
             let within = points.iter().filter(|point| within.allow(point, group));
-            within.map(|point| (limit.of)(point, group)).reduce(f64::min)
+            within.map(|point| (bound.of)(point, group)).reduce(f64::min)
         };
-        let limits = self.each();
-        let unmet: Vec<Unmet> = limits
+        let bounds = self.each();
+        let unmet: Vec<Unmet> = bounds
             .iter()
-            .filter_map(|limit| {
-                let least = least(NONE, limit).filter(|least| *least > limit.unmet.most)?;
-                Some(Unmet { least, ..limit.unmet })
+            .filter_map(|bound| {
+                let least = least(NONE, bound).filter(|least| *least > bound.unmet.most)?;
+                Some(Unmet { least, ..bound.unmet })
             })
             .collect();
         if !unmet.is_empty() {
             return NoPoint::Each { unmet, unit };
         }
-        let near = limits.iter().map(|limit| {
-            let least = least(limit.others, limit);
-            (Unmet { least: least.unwrap_or(f64::NAN), ..limit.unmet }, least.is_some())
+        let near = bounds.iter().map(|bound| {
+            let least = least(bound.others, bound);
+            (Unmet { least: least.unwrap_or(f64::NAN), ..bound.unmet }, least.is_some())
         });
         NoPoint::Together { bounds: near.collect(), unit }
     }
 
-    /// Every limit that holds.
-    fn each(&self) -> Vec<Limit> {
+    /// Every bound that applies.
+    fn each(&self) -> Vec<Bound> {
         let unmet = |bounded, most| Unmet { bounded, most, is_slot: false, least: f64::NAN };
-        let error = self.error.map(|most| Limit {
+        let error = self.error.map(|most| Bound {
             unmet: unmet(Bounded::Error, most),
             others: Self { error: None, ..*self },
             of: |point, group| point.rmse(group),
         });
-        let cycles = self.cycles.map(|most| Limit {
+        let cycles = self.cycles.map(|most| Bound {
             unmet: unmet(Bounded::Cycles, most as f64),
             others: Self { cycles: None, ..*self },
             of: |point, _| point.frame.cycles as f64,
         });
         let most = self.flash_bytes.unwrap_or(super::SLOT_BYTES);
         let is_slot = self.flash_bytes.is_none();
-        let flash = Limit {
+        let flash = Bound {
             unmet: Unmet { is_slot, ..unmet(Bounded::Flash, most as f64) },
             others: Self { flash_bytes: NONE.flash_bytes, ..*self },
             of: |point, _| point.flash_bytes as f64,
@@ -125,15 +127,15 @@ impl Limits {
     }
 }
 
-/// Limits that every point is within.
-const NONE: Limits = Limits { error: None, cycles: None, flash_bytes: Some(usize::MAX) };
+/// Bounds that every point is within.
+const NONE: Bounds = Bounds { error: None, cycles: None, flash_bytes: Some(usize::MAX) };
 
-/// One of several limits.
-struct Limit {
-    /// What it is, but for the least.
+/// One of several bounds.
+struct Bound {
+    /// Description of the bound, with the least value still to be filled in.
     unmet: Unmet,
-    /// All but this one.
-    others: Limits,
-    /// What it limits.
+    /// All bounds but this one.
+    others: Bounds,
+    /// Quantity of a point that is bounded.
     of: fn(&Point, &str) -> f64,
 }

@@ -1,22 +1,22 @@
-//! Points behind a gate: rows at rest are not decoded but take the outputs at rest.
+//! Points behind a gate: untouched rows are not decoded but take the outputs of the baseline.
 
 use taxel_data::table::Table;
 use taxel_simulate::Synthesis;
 
 use super::super::gate::{BASELINE_FRAMES, Gate, gated, share};
 
-/// Which rows of the test frames are at rest, for every k: a matter of readings alone, whatever decodes them.
+/// Untouched rows of the test frames for every k. They depend on the readings alone, not on the decoder.
 pub(super) struct Gates {
-    /// The line of readings that rows at rest are answered for.
+    /// Baseline: the line of readings whose outputs untouched rows take.
     pub baseline: Table,
     gates: Vec<AtRest>,
 }
 
-/// The rows at rest for one k.
+/// Untouched rows for one k.
 pub(super) struct AtRest {
     /// Tolerance in standard deviations of a reading's noise.
     pub k: f64,
-    /// Share of rows at rest.
+    /// Share of untouched rows.
     pub share: f64,
     rows: Vec<bool>,
 }
@@ -38,14 +38,14 @@ impl Gates {
         Self { gates: k.iter().map(at_rest).collect(), baseline: gate.baseline }
     }
 
-    /// One for each k.
+    /// Untouched rows for each k.
     pub fn iter(&self) -> impl Iterator<Item = &AtRest> {
         self.gates.iter()
     }
 }
 
 impl AtRest {
-    /// The `estimate` of all rows, with `rest_outputs` in the places of rows at rest.
+    /// Estimate of all rows, with `rest_outputs` in the places of untouched rows.
     pub fn gated(&self, estimate: &[f64], rest_outputs: &[f64]) -> Vec<f64> {
         gated(estimate, rest_outputs, &self.rows)
     }

@@ -1,4 +1,4 @@
-//! Training and judging the points that share their training and test frames.
+//! Training and judging of the points that share their training and test frames.
 
 use model_core::rbf::Format;
 use rayon::prelude::*;
@@ -14,7 +14,7 @@ use super::{Arithmetic, Plan, Point, SLOT_BYTES};
 use crate::error::{Error, Result};
 use crate::metrics::{self, Measure};
 
-/// What tells points with the same frames apart, beyond format, tail and gate.
+/// Settings that distinguish points with the same frames, besides format, tail and gate.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Knobs {
     pub whole_array: bool,
@@ -22,14 +22,14 @@ pub(super) struct Knobs {
     pub samples_averaged: usize,
 }
 
-/// Frames to train on and to test on, and what follows from them alone.
+/// Frames to train on and to test on, and the data derived from them alone.
 pub(super) struct Sets<'s> {
-    /// Of the averaged readings.
+    /// Noise level of the averaged readings, as a fraction.
     noise_level: f64,
     training: &'s Dataset,
     test: &'s Dataset,
     gates: &'s Gates,
-    /// Of the whole array, and the training frames behind it.
+    /// Projection of the whole array, and the training frames behind it.
     projected: Option<(Vec<f32>, Dataset)>,
 }
 
@@ -42,22 +42,22 @@ impl<'s> Sets<'s> {
         whole_array: bool,
     ) -> Result<Self> {
         let projected = if whole_array {
-            let block = projection::fit(training)?;
-            let seen = projection::apply(train::view(&block, training), training);
-            Some((block, seen))
+            let parameters = projection::fit(training)?;
+            let seen = projection::apply(train::view(&parameters, training), training);
+            Some((parameters, seen))
         } else {
             None
         };
         Ok(Self { noise_level, training, test, gates, projected })
     }
 
-    /// What the networks are trained on.
+    /// Data on which the networks are trained.
     fn seen(&self) -> &Dataset {
         self.projected.as_ref().map_or(self.training, |(_, seen)| seen)
     }
 }
 
-/// Collects points and the blobs that they decode with.
+/// Collector of points, and of the blobs that they decode with.
 pub(super) struct Judge<'s> {
     options: Options,
     origin: Origin,
@@ -65,13 +65,13 @@ pub(super) struct Judge<'s> {
     plan: &'s Plan,
     pub costs: Costs,
     pub points: Vec<Point>,
-    /// Of each point, which of the distinct ones.
+    /// Index of each point's blob among the distinct ones.
     pub blobs: Vec<usize>,
     pub distinct: Vec<Vec<u8>>,
 }
 
 impl<'s> Judge<'s> {
-    /// A judge of networks trained with `options` but for what the plan varies.
+    /// Judge of networks trained with `options`, except for the settings that the plan varies.
     pub fn new(
         options: Options,
         origin: Origin,
@@ -83,7 +83,7 @@ impl<'s> Judge<'s> {
         Self { options, origin, measure, plan, costs, points, blobs, distinct }
     }
 
-    /// Every format and tail with so many centres.
+    /// Trains and judges every format and tail with so many centres.
     pub fn centres(
         &mut self,
         sets: &Sets<'_>,
@@ -98,12 +98,12 @@ impl<'s> Judge<'s> {
         let options = Options { centres: knobs.centres, spread, ..defaults };
         let seen = sets.seen();
         options.check(seen.frames())?;
-        // Centres are those of the row, whatever the format.
+        // Centres are shared by all formats of a row.
         let rows: Vec<Vec<FittedNetwork>> = (0..seen.rows)
             .into_par_iter()
             .map(|row| {
-                let block = seen.block(row);
-                let samples = Samples::new(&block);
+                let table = seen.row_table(row);
+                let samples = Samples::new(&table);
                 let found = samples.centres(&options, row);
                 let fit = |&(format, affine_tail): &(Format, bool)| {
                     samples.fit(&found, &Options { affine_tail, format, ..options })
@@ -115,14 +115,15 @@ impl<'s> Judge<'s> {
             .collect::<taxel_learn::Result<_>>()?;
         for (variant, &(format, affine)) in variants.iter().enumerate() {
             let networks = rows.iter().map(|row| row[variant].clone()).collect();
-            let projection = sets.projected.as_ref().map(|(block, _)| block.clone());
+            let projection = sets.projected.as_ref().map(|(parameters, _)| parameters.clone());
             let trained = Trained { projection, networks };
             let noise = (self.origin.noise.0, sets.noise_level);
             let origin = Origin { noise, ..self.origin.clone() };
             let blob = pack(&trained, sets.training, &origin)?;
             // A network that fell back to direct distances is the point of that format.
             let fell_back = trained.networks.iter().any(|network| network.format() != format);
-            // What fits no slot had no cycles measured: those of rows are a network's.
+            // A blob of the array that fits no slot has no measured cycles; those of rows are measured
+            // by network.
             let fits = !knobs.whole_array || blob.bytes().len() <= SLOT_BYTES;
             if fell_back || !fits {
                 continue;
@@ -135,7 +136,8 @@ impl<'s> Judge<'s> {
         Ok(())
     }
 
-    /// A network without a gate, and behind every gate that was measured with its exponential.
+    /// Adds the points of a network: without a gate, and behind every gate that was measured with its
+    /// exponential.
     fn points(
         &mut self,
         blob: &ModelBlob,
@@ -147,7 +149,7 @@ impl<'s> Judge<'s> {
         let (kernel, test) = (arithmetic.name(), sets.test);
         let model = blob.prepare(arithmetic.exponential);
         let ram = DecoderRam::of(model.model());
-        // Fewer centres than asked for are decoded as fast as the measured number or faster.
+        // Fewer centres than asked for take at most the time of the measured number.
         let kind = (kernel.as_str(), centres, affine_tail, whole_array);
         let ungated = self.costs.frame(kind).ok_or_else(|| {
             Error::Cycles(format!(

@@ -1,4 +1,4 @@
-//! A mailbox between two threads, with the image's own code at the device's end.
+//! Mailbox between two threads, with the image's own code at the device's end.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::sync::{Arc, Mutex};
@@ -51,7 +51,7 @@ impl image::SharedMemory for Memory {
     fn barrier(&self) {}
 }
 
-/// The device's end, which does not block when read, and does when written to.
+/// The device's end, whose reads do not block and whose writes do.
 pub struct End {
     mailbox: image::Mailbox<Memory>,
     memory: Memory,

@@ -1,24 +1,26 @@
-//! Registers in memory that begin where a line of the processor's cache does.
+//! Registers in memory that start at a line of the processor's cache.
 
 use core::marker::PhantomData;
 use core::ops::{Deref, DerefMut};
 
 use bytemuck::Pod;
 
-/// Bytes of a line of the cache.
+/// Bytes in a line of the cache.
 const LINE: usize = 64;
 
-/// A fixed number of `T`. `Vec` aligns for single numbers, since that is how pulp's types are declared: registers
-/// would lie across two lines, and take twice as long to load.
+/// Fixed number of `T`, aligned to lines of the cache.
+///
+/// `Vec` aligns for single numbers only, since that is how pulp's types are declared. Registers would
+/// lie across two lines, and take twice as long to load.
 pub(super) struct Aligned<T> {
-    /// The registers, and before them what is left to a line of the cache.
+    /// Registers, after the words that are skipped to reach a line of the cache.
     words: Vec<u32>,
     first: usize,
     of: PhantomData<T>,
 }
 
 impl<T: Pod> Aligned<T> {
-    /// Of zeros.
+    /// Memory for `count` registers of zeros.
     pub(super) fn zeroed(count: usize) -> Self {
         let length = count * size_of::<T>() / size_of::<u32>();
         let mut words = vec![0; length + LINE / size_of::<u32>()];

@@ -7,7 +7,7 @@ use pulp::Simd;
 
 use super::lines::ABREAST;
 
-/// ((c₀·r + c₁)·r + …)
+/// Polynomial ((c₀·r + c₁)·r + …) of several registers.
 #[inline(always)]
 fn polynomial<S: Simd>(
     simd: S,
@@ -24,7 +24,7 @@ fn polynomial<S: Simd>(
     p
 }
 
-/// As `model_core::exp::exp2`.
+/// Powers 2^x, bit for bit `model_core::exp::exp2`.
 #[inline(always)]
 pub(super) fn exp2<S: Simd>(simd: S, values: &mut [S::f32s; ABREAST]) {
     let round = simd.splat_f32s(ROUND);
@@ -41,7 +41,7 @@ pub(super) fn exp2<S: Simd>(simd: S, values: &mut [S::f32s; ABREAST]) {
     }
 }
 
-/// As `model_core::exp::Polynomial`.
+/// Exponentials e^x, bit for bit `model_core::exp::Polynomial`.
 #[inline(always)]
 pub(super) fn exp<S: Simd>(simd: S, values: &mut [S::f32s; ABREAST]) {
     let (round, log2_e) = (simd.splat_f32s(ROUND), simd.splat_f32s(LOG2_E));

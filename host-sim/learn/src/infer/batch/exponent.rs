@@ -1,4 +1,4 @@
-//! How exponents follow from inputs, in either form of single precision.
+//! Exponents of Gaussians from inputs, in either form of single precision.
 
 use model_core::scale::{CLAMP, UNITS};
 use pulp::Simd;
@@ -7,11 +7,11 @@ use super::exp::{exp, exp2};
 use super::lines::{ABREAST, Lanes, VECTORS};
 use super::tiles::{Accumulate, CENTRES, accumulate};
 
-/// What differs between the forms of exponents.
+/// Form of exponents: expanded or direct.
 pub(super) trait Exponent {
     /// Clamps a scaled input.
     fn clamp(&self, scaled: f32) -> f32;
-    /// What the centres share: the second partial sum's start.
+    /// Start of the second partial sum, which the centres share.
     fn open<S: Simd>(&self, simd: S, x: &[Lanes<S>]) -> Lanes<S>;
     /// Exponents of the centres of a `tile`.
     fn exponents<S: Simd>(
@@ -22,11 +22,11 @@ pub(super) trait Exponent {
         x: &[Lanes<S>],
     ) -> [Lanes<S>; CENTRES];
 
-    /// Makes activations of exponents.
+    /// Turns exponents into activations.
     fn powers<S: Simd>(simd: S, exponents: &mut [S::f32s; ABREAST]);
 }
 
-/// Four partial sums of each centre, from their starts, added pairwise.
+/// Four partial sums of each centre, from their starts, added in pairs.
 #[inline(always)]
 fn four_sums<S: Simd, const SQUARES: bool>(
     terms: Terms<S, SQUARES>,
@@ -61,7 +61,7 @@ fn add<S: Simd>(simd: S, to: &mut [Lanes<S>; CENTRES], what: &[Lanes<S>; CENTRES
     }
 }
 
-/// Adds products, or squares of differences, not contracted: the device does not.
+/// Accumulation of products, or of squares of differences, not contracted: the device does not either.
 #[derive(Clone, Copy)]
 pub(super) struct Terms<S, const SQUARES: bool>(pub S);
 
@@ -86,13 +86,13 @@ impl<S: Simd, const SQUARES: bool> Accumulate for Terms<S, SQUARES> {
     }
 }
 
-/// See `model_core::rbf::expanded`.
+/// Expanded distances, as in `model_core::rbf::expanded`.
 pub(super) struct Expanded {
     pub decay: f32,
 }
 
 impl Exponent for Expanded {
-    /// As `model_core::scale::clamp_units` (tested), without an integer.
+    /// Clamps like `model_core::scale::clamp_units` (tested), without integers.
     #[inline(always)]
     fn clamp(&self, scaled: f32) -> f32 {
         let number = if scaled.is_nan() { 0.0 } else { scaled };
@@ -148,7 +148,7 @@ impl Exponent for Expanded {
     }
 }
 
-/// See `model_core::rbf::direct`.
+/// Direct distances, as in `model_core::rbf::direct`.
 pub(super) struct Direct;
 
 impl Exponent for Direct {

@@ -1,6 +1,7 @@
-//! Networks in 16-bit fixed point: a pair of factors in each 32-bit lane, as the device's SMLAD takes them.
+//! Networks in 16-bit fixed point: a pair of factors in each 32-bit lane, as the device's SMLAD takes
+//! them.
 //!
-//! The operations are those of `model_core::rbf::fixed16`; that sums are integers makes their order free.
+//! The operations are those of `model_core::rbf::fixed16`; sums of integers may be taken in any order.
 //! AVX2 multiplies and adds such pairs in one instruction; without it there is no vectorised form.
 
 use model_core::rbf::Shape;
@@ -17,25 +18,25 @@ use super::tiles::{Accumulate, CENTRES, OfLines, Weights, accumulate, in_fours};
 
 /// Pairs of the centres that are stored together.
 const PAIRS: usize = CENTRES_AT_ONCE / 2;
-/// Pairs of centres whose exponents (4 KiB) and then activations (2 KiB) are kept until the outputs take them: in
-/// the first cache.
+/// Pairs of centres whose exponents (4 KiB) and then activations (2 KiB) stay in the first cache until
+/// the outputs take them.
 const KEPT: usize = 32;
 
-/// A network laid out for blocks of lines, and the proof that this machine has the instructions.
+/// Network laid out for computing several lines at once, and the proof that this machine has AVX2.
 #[derive(Debug)]
 pub(in crate::infer) struct Fixed16<'a> {
     simd: V3,
     shape: Shape,
     parameters: Parameters<'a>,
-    /// [`CENTRES`] at a time: b, and then pairs of a.
+    /// Parameters of [`CENTRES`] centres at a time: b, and then pairs of a.
     centres: Vec<[u32; CENTRES]>,
-    /// Of pairs of centres, and of inputs.
+    /// Weights of pairs of centres, and of pairs of inputs.
     weights: Weights<u32>,
     affine: Weights<u32>,
 }
 
 impl<'a> Fixed16<'a> {
-    /// The network's layout, if this machine has the instructions.
+    /// Network laid out, if this machine has AVX2.
     pub(super) fn of(network: &Network<'a>) -> Option<Self> {
         let (simd, shape, p) = (V3::try_new()?, network.shape(), network.parameters());
         let Shape { inputs, outputs, .. } = shape;
@@ -56,13 +57,13 @@ impl<'a> Fixed16<'a> {
         })
     }
 
-    /// Infers the outputs of `lines`, all NaN where a reading is missing.
+    /// Infers the outputs of `lines`; NaN for a line where a reading is missing.
     pub(super) fn infer(&self, lines: Lines<'_>) {
         self.simd.vectorize(Work { network: self, lines });
     }
 }
 
-/// Columns of lines of that length after the other.
+/// Columns of `values` one after the other, in lines of so many numbers.
 fn transposed(values: &[u32], length: usize) -> impl Iterator<Item = u32> {
     (0..length).flat_map(move |column| values.iter().skip(column).step_by(length).copied())
 }
@@ -85,8 +86,8 @@ impl NullaryFnOnce for Work<'_> {
         let mut sums = Aligned::<OfLines<Products>>::zeroed(outputs);
         let mut exponents = Aligned::<OfLines<Products>>::zeroed(2 * KEPT);
         let mut activations = Aligned::<OfLines<Products>>::zeroed(KEPT);
-        for mut block in self.lines.blocks::<V3>() {
-            let poison = readings.take(simd, &block);
+        for mut part in self.lines.parts::<V3>() {
+            let poison = readings.take(simd, &part);
             let readings = readings.columns_mut();
             let scaled = readings.iter_mut().zip(p.input_midpoint).zip(p.input_per_unit);
             for ((reading, &from), &by) in scaled {
@@ -126,12 +127,12 @@ impl NullaryFnOnce for Work<'_> {
                     *y = simd.mul_f32x8(simd.convert_i32x8_to_f32x8(sum), scale);
                 }
             }
-            y.give(simd, &mut block, poison);
+            y.give(simd, &mut part, poison);
         }
     }
 }
 
-/// Adds the products of pairs.
+/// Accumulation of products of pairs.
 #[derive(Clone, Copy)]
 struct Products(V3);
 
@@ -152,17 +153,19 @@ impl Accumulate for Products {
     }
 }
 
-/// As `model_core::scale::clamp_steps` saturates: the steps below [`UNITS`] are the last.
+/// Clamps scaled inputs as `model_core::scale::clamp_steps` saturates: the steps below [`UNITS`] are the
+/// last.
 #[inline(always)]
 fn clamp(simd: V3, scaled: f32x8) -> f32x8 {
-    // NaN, which is not equal to itself, is taken for 0.
+    // NaN, which is not equal to itself, counts as 0.
     let number = simd.cmp_eq_f32x8(scaled, scaled);
     let number = simd.and_u32x8(bytemuck::cast(scaled), bytemuck::cast(number));
     let above = simd.max_f32x8(bytemuck::cast(number), simd.splat_f32x8(-UNITS));
     simd.min_f32x8(above, simd.splat_f32x8(UNITS.next_down()))
 }
 
-/// Steps, the upper halves of the integers that [`clamp`] leaves; a last odd input is paired with 0.
+/// Pairs of steps, the upper halves of the integers that [`clamp`] leaves. A last odd input is paired
+/// with 0.
 #[inline(always)]
 fn in_pairs(simd: V3, low: f32x8, high: Option<f32x8>) -> i32x8 {
     let integers =
@@ -175,7 +178,7 @@ fn in_pairs(simd: V3, low: f32x8, high: Option<f32x8>) -> i32x8 {
     bytemuck::cast(pairs)
 }
 
-/// The exponents of the centres of a tile.
+/// Exponents of the centres of a tile.
 #[inline(always)]
 fn exponents_of(
     how: Products,
@@ -193,7 +196,7 @@ fn exponents_of(
     v
 }
 
-/// Pairs of 2^−v in Q15 of two centres, step by step: a register by itself would wait for every operation.
+/// Pairs of 2^−v in Q15 of two centres, step by step: one register alone would wait for every operation.
 #[inline(always)]
 fn powers(simd: V3, two: &[OfLines<Products>; 2]) -> OfLines<Products> {
     let v: [i32x8; 2 * VECTORS] = bytemuck::cast(*two);
@@ -220,11 +223,11 @@ fn powers(simd: V3, two: &[OfLines<Products>; 2]) -> OfLines<Products> {
     pairs
 }
 
-/// g‖x‖²
+/// Term g‖x‖² that all centres share.
 #[inline(always)]
 fn shared_term(simd: V3, decay: u32, x: &[OfLines<Products>]) -> OfLines<Products> {
-    // A pair's square is up to 2³¹. The sum of at most 63 squares is below 2³⁶, so a sixteenth of it fits 32
-    // bits; halves of 16 bits are added apart.
+    // The square of a pair is up to 2³¹. The sum of at most 63 squares is below 2³⁶, so a sixteenth of
+    // it fits 32 bits; halves of 16 bits are added separately.
     let zero = [simd.splat_u32x8(0); VECTORS];
     let (mut low, mut high) = (zero, zero);
     for x in x {

@@ -1,7 +1,7 @@
 //! Networks in single precision, by the operations of `model_core::rbf` in their order.
 //!
 //! Exponents of four centres, and then six outputs, are added up in registers. No multiplication is
-//! contracted with an addition: the device does not.
+//! contracted with an addition, since the device does not either.
 
 use model_core::rbf::{Network, Shape};
 use pulp::{Simd, WithSimd};
@@ -12,34 +12,35 @@ use super::lines::{ABREAST, Lines, VECTORS, Values};
 use super::tiles::{CENTRES, Weights, in_fours};
 use crate::infer::Exponential;
 
-/// Centres whose activations are kept until the outputs take them: 4 KiB, in the first cache.
+/// Centres whose activations stay in the first cache (4 KiB) until the outputs take them.
 const KEPT: usize = 64;
 
-/// A network laid out for blocks of lines.
+/// Network laid out for computing several lines at once.
 #[derive(Debug)]
 pub(in crate::infer) struct Floats<'a> {
     shape: Shape,
     form: Form,
-    /// What is subtracted from each input, and what it is then multiplied by.
+    /// Offset subtracted from each input, and factor that it is then multiplied by.
     scale: Vec<[f32; 2]>,
-    /// [`CENTRES`] at a time: b or −d, and then a or c, in the order of the [partial sums](interleaved).
+    /// Parameters of [`CENTRES`] centres at a time: b or −d, and then a or c, in the order of the
+    /// [partial sums](interleaved).
     centres: Vec<[f32; CENTRES]>,
     weights: Weights<f32>,
     affine: Weights<f32>,
     bias: &'a [f32],
 }
 
-/// How an exponent follows from inputs.
+/// Form in which an exponent is computed from inputs.
 #[derive(Debug, Clone, Copy)]
 enum Form {
-    /// b + a·x − g‖x‖², with this g.
+    /// Exponent b + a·x − g‖x‖², with this g.
     Expanded(f32),
-    /// −d‖x − c‖²
+    /// Exponent −d‖x − c‖².
     Direct,
 }
 
 impl<'a> Floats<'a> {
-    /// The network's layout, if there is a vectorised form of it.
+    /// Network laid out, if there is a vectorised form of it.
     pub(super) fn of(network: &Network<'a>, exponential: Exponential) -> Option<Self> {
         let shape = network.shape();
         let scale = |from: &[f32], by: &[f32]| from.iter().zip(by).map(|(m, u)| [*m, *u]).collect();
@@ -77,12 +78,12 @@ impl<'a> Floats<'a> {
         }
     }
 
-    /// Infers the outputs of `lines`, all NaN where a reading is missing or an output overflows.
+    /// Infers the outputs of `lines`; NaN for a line where a reading is missing or an output overflows.
     pub(super) fn infer(&self, lines: Lines<'_>) {
         pulp::Arch::new().dispatch(Work { network: self, lines });
     }
 
-    /// As [`infer`](Self::infer), in the vectors of `simd`.
+    /// Infers the outputs of `lines` in the vectors of `simd`.
     #[inline(always)]
     pub(super) fn infer_in<S: Simd>(&self, simd: S, lines: Lines<'_>) {
         match self.form {
@@ -98,14 +99,14 @@ impl<'a> Floats<'a> {
         let (mut x, mut y) = (Values::zeroed(inputs), Values::zeroed(outputs));
         let mut x_interleaved = Aligned::zeroed(inputs);
         let mut activations = Aligned::zeroed(KEPT);
-        for mut block in lines.blocks::<S>() {
-            let poison = x.take(simd, &block);
+        for mut part in lines.parts::<S>() {
+            let poison = x.take(simd, &part);
             let (x, sums) = (x.columns_mut(), y.columns_mut());
             for (x, &[from, by]) in x.iter_mut().zip(&self.scale) {
                 let (from, by) = (simd.splat_f32s(from), simd.splat_f32s(by));
                 x.iter_mut().for_each(|x| *x = simd.mul_f32s(simd.sub_f32s(*x, from), by));
             }
-            // One flat loop: of nested ones the compiler makes gathers.
+            // One flat loop: the compiler turns nested ones into slow gathers.
             let values = bytemuck::cast_slice_mut::<_, f32>(x);
             values.iter_mut().for_each(|x| *x = exponent.clamp(*x));
             for (to, from) in x_interleaved.iter_mut().zip(interleaved(inputs)) {
@@ -139,17 +140,17 @@ impl<'a> Floats<'a> {
                 let bias = simd.splat_f32s(bias);
                 y.iter_mut().for_each(|y| *y = simd.add_f32s(*y, bias));
             }
-            y.give(simd, &mut block, poison);
+            y.give(simd, &mut part, poison);
         }
     }
 }
 
-/// A centre's head, and its place in the order of the partial sums.
+/// Parameters of a centre: its head, then its place in the order of the partial sums.
 fn in_order(head: f32, place: &[f32]) -> impl Iterator<Item = f32> {
     [head].into_iter().chain(interleaved(place.len()).map(|i| place[i]))
 }
 
-/// The order in which inputs enter the four partial sums: every fourth, from each of the first four.
+/// Order in which inputs enter the four partial sums: every fourth, from each of the first four.
 fn interleaved(inputs: usize) -> impl Iterator<Item = usize> {
     (0..4).flat_map(move |sum| (sum..inputs).step_by(4))
 }

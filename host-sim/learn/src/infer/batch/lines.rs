@@ -1,22 +1,22 @@
-//! A table's lines in blocks: a lane a line, what belongs to one input or output side by side.
+//! Lines of a table in lanes: one line a lane, with the values of one input or output side by side.
 
 use pulp::Simd;
 
 use super::aligned::Aligned;
 
-/// Registers that hold one value of every line of a block.
+/// Registers that hold one value of each line that is computed at once.
 pub(super) const VECTORS: usize = 2;
 
-/// Registers that are exponentiated side by side: a polynomial by itself would wait for every operation.
+/// Registers that are exponentiated side by side: a single polynomial would wait for every operation.
 pub(super) const ABREAST: usize = 4;
 
-/// Values of a line that are turned into columns, and back, at a time.
+/// Values of a line that are transposed into columns, and back, at a time.
 const TILE: usize = 4;
 
-/// One value of every line of a block.
+/// One value of each line that is computed at once, a lane a line.
 pub(super) type Lanes<S> = [<S as Simd>::f32s; VECTORS];
 
-/// Lines of a table for one network of a row: each starts a step after the one before.
+/// Lines of a table for the network of one row-wire: each starts a step after the previous one.
 pub(super) struct Lines<'a> {
     pub readings: &'a [f64],
     pub readings_step: usize,
@@ -25,9 +25,9 @@ pub(super) struct Lines<'a> {
 }
 
 impl Lines<'_> {
-    /// Blocks of as many lines as there are lanes, the last perhaps of fewer.
+    /// Splits the lines into parts of as many as there are lanes; the last may have fewer.
     #[inline(always)]
-    pub(super) fn blocks<S: Simd>(self) -> impl Iterator<Item = Self> {
+    pub(super) fn parts<S: Simd>(self) -> impl Iterator<Item = Self> {
         let lanes = VECTORS * S::F32_LANES;
         let Self { readings, readings_step, outputs, outputs_step } = self;
         let outputs = outputs.chunks_mut(outputs_step * lanes);
@@ -40,17 +40,17 @@ impl Lines<'_> {
     }
 }
 
-/// The inputs or the outputs of a block's lines.
+/// Inputs or outputs of the lines that are computed at once.
 ///
-/// Which lane has which line is pulp's affair: what it shuffles on the way in, it shuffles back.
+/// pulp decides which lane has which line: what it shuffles on the way in, it shuffles back.
 pub(super) struct Values<S: Simd> {
     count: usize,
-    /// Of every line, one value after the other: whole tiles, the last perhaps with columns of no value.
+    /// Columns of one value of each line: whole tiles, the last perhaps with columns that are not used.
     columns: Aligned<Lanes<S>>,
 }
 
 impl<S: Simd> Values<S> {
-    /// Zeros: `count` a line.
+    /// Memory for `count` values a line, all zero.
     pub(super) fn zeroed(count: usize) -> Self {
         Self { count, columns: Aligned::zeroed(count.next_multiple_of(TILE)) }
     }
@@ -65,13 +65,13 @@ impl<S: Simd> Values<S> {
         &mut self.columns[..self.count]
     }
 
-    /// Takes the readings of a block; lanes of no line have any value. Returned is NaN where a reading is not
-    /// finite as an `f32`, and 0 elsewhere.
+    /// Takes the readings of a part; lanes without a line have any value. Returns NaN in lanes with a reading
+    /// that is not finite as an `f32`, and 0 elsewhere.
     #[inline(always)]
-    pub(super) fn take(&mut self, simd: S, block: &Lines<'_>) -> Lanes<S> {
+    pub(super) fn take(&mut self, simd: S, part: &Lines<'_>) -> Lanes<S> {
         let lanes = VECTORS * S::F32_LANES;
         let tiles: &mut [[f32; TILE]] = bytemuck::cast_slice_mut(&mut self.columns);
-        for (lane, line) in block.readings.chunks(block.readings_step).enumerate() {
+        for (lane, line) in part.readings.chunks(part.readings_step).enumerate() {
             let (whole, rest) = line[..self.count].as_chunks::<TILE>();
             let mut places = tiles[lane..].iter_mut().step_by(lanes);
             for (readings, places) in whole.iter().zip(&mut places) {
@@ -92,9 +92,9 @@ impl<S: Simd> Values<S> {
         poisoned(simd, [simd.splat_f32s(0.0); VECTORS], self.columns())
     }
 
-    /// Gives the lines of a block their outputs, all NaN where `poison` or one of them is not finite.
+    /// Writes the outputs of a part's lines; NaN for a line where `poison` or an output is not finite.
     #[inline(always)]
-    pub(super) fn give(&mut self, simd: S, block: &mut Lines<'_>, poison: Lanes<S>) {
+    pub(super) fn give(&mut self, simd: S, part: &mut Lines<'_>, poison: Lanes<S>) {
         let poison = poisoned(simd, poison, self.columns());
         let lanes = VECTORS * S::F32_LANES;
         for tile in self.columns.as_chunks_mut::<TILE>().0 {
@@ -109,7 +109,7 @@ impl<S: Simd> Values<S> {
             *tile = bytemuck::cast(lines);
         }
         let tiles: &[[f32; TILE]] = bytemuck::cast_slice(&self.columns);
-        for (lane, line) in block.outputs.chunks_mut(block.outputs_step).enumerate() {
+        for (lane, line) in part.outputs.chunks_mut(part.outputs_step).enumerate() {
             let (whole, rest) = line[..self.count].as_chunks_mut::<TILE>();
             let mut values = tiles[lane..].iter().step_by(lanes);
             for (places, values) in whole.iter_mut().zip(&mut values) {
@@ -123,7 +123,7 @@ impl<S: Simd> Values<S> {
     }
 }
 
-/// `poison` and, in lanes where not all of `values` are finite, NaN.
+/// Adds NaN to `poison` in lanes where not all of `values` are finite.
 #[inline(always)]
 fn poisoned<S: Simd>(simd: S, poison: Lanes<S>, values: &[Lanes<S>]) -> Lanes<S> {
     let mut poison = poison;

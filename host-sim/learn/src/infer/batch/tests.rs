@@ -1,4 +1,4 @@
-//! Batches against one line after the other, bit for bit.
+//! Comparison of batches with one line after the other, bit for bit.
 
 use model_core::rbf::{Format, Shape, direct, expanded, fixed16};
 use model_core::scale::{HALF_RANGE, UNITS, clamp_units};
@@ -22,7 +22,7 @@ impl Draw {
     }
 }
 
-/// The words of a network whose training range is about 40 to 80 Ω.
+/// Words of a network whose training range is about 40 to 80 Ω.
 fn words(draw: &mut Draw, shape: Shape, format: Format, affine: bool, one_width: bool) -> Vec<u32> {
     match format {
         Format::F32Direct => direct_words(draw, shape, affine, one_width),
@@ -38,7 +38,7 @@ fn direct_words(draw: &mut Draw, shape: Shape, affine: bool, one_width: bool) ->
         input_minimum: &draw.floats(inputs, 40.0, 60.0),
         input_per_span: &draw.floats(inputs, 0.0, 0.2),
         centres: &draw.floats(centres * inputs, -0.1, 1.1),
-        // Up to where activations vanish.
+        // Decays up to where activations vanish.
         decay: &draw.floats(if one_width { 1 } else { centres }, 0.01, 40.0),
         output_weights: &draw.floats(centres * outputs, -1e3, 1e3),
         bias: &draw.floats(outputs, -1.0, 1.0),
@@ -72,11 +72,11 @@ fn expanded_words(draw: &mut Draw, shape: Shape, affine: bool) -> Vec<u32> {
     parameters.words().collect()
 }
 
-/// Weights of any bits: sums may wrap around, on the host as on the device.
+/// Words with weights of any bits: sums may wrap around, on the host like on the device.
 fn fixed16_words(draw: &mut Draw, shape: Shape, affine: bool) -> Vec<u32> {
     let Shape { inputs, centres, outputs } = shape;
     let pairs = inputs.div_ceil(2);
-    // Exponents up to 4·1.8² for each of up to four inputs, and of all together for more.
+    // Exponents reach up to 4·1.8² for each of up to four inputs, and for all together beyond four.
     let decay = draw.one(1.0, f64::from(u32::MAX) * (4.0 / inputs as f64).min(1.0)) as u32;
     let slope = f64::from(decay) / 2_f64.powi(33);
     let mut words = Vec::new();
@@ -117,7 +117,7 @@ fn reading(draw: &mut Draw) -> f64 {
     }
 }
 
-/// Infers the same lines at once and one after the other.
+/// Infers the same lines at once and one after the other, and compares the bits.
 fn check(networks: &[Network<'_>], draw: &mut Draw, lines: usize) {
     let Shape { inputs, outputs, .. } = networks[0].shape();
     let columns = networks.len() * inputs;
@@ -138,7 +138,7 @@ fn check(networks: &[Network<'_>], draw: &mut Draw, lines: usize) {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
 
-    /// Of any shape, on tables of any length, with readings missing and beyond all bounds.
+    /// Networks of any shape, on tables of any length, with readings missing and beyond all bounds.
     #[test]
     fn lines_at_once_are_lines_one_by_one_bit_for_bit(
         (inputs, centres, outputs) in (1_usize..=fixed16::MOST_INPUTS, 1_usize..150, 1_usize..24),

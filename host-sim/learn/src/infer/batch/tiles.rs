@@ -1,4 +1,4 @@
-//! Sums of products of what every line of a block has with numbers that all lines share.
+//! Sums of products of each line's own factors with numbers that all lines share.
 
 use core::fmt::Debug;
 
@@ -9,11 +9,11 @@ pub(super) const CENTRES: usize = 4;
 /// Outputs that are accumulated at a time.
 const OUTPUTS: usize = 6;
 
-/// How a sum takes a factor and the number that all lines share.
+/// Operation that adds a factor, combined with a number that all lines share, to a sum.
 pub(super) trait Accumulate: Copy {
-    /// A number, or a pair of them.
+    /// Number that all lines share, or a pair of them.
     type Shared: Copy + Default + Debug;
-    /// The same of several lines.
+    /// Numbers of several lines, a lane a line.
     type Register: Copy;
 
     fn splat(self, shared: Self::Shared) -> Self::Register;
@@ -25,10 +25,10 @@ pub(super) trait Accumulate: Copy {
     ) -> Self::Register;
 }
 
-/// What every line of a block has.
+/// Registers with a factor of each line that is computed at once.
 pub(super) type OfLines<A> = [<A as Accumulate>::Register; VECTORS];
 
-/// Accumulates `factors` with the shared numbers of each of N sums, one after the other, in registers.
+/// Accumulates `factors` with the shared numbers of each of N sums, one factor after the other, in registers.
 #[inline(always)]
 pub(super) fn accumulate<A: Accumulate, const N: usize>(
     how: A,
@@ -64,17 +64,17 @@ pub(super) fn in_fours<T: Copy + Default>(
     fours
 }
 
-/// Weights of each factor (a centre or an input, or a pair of them) in each output, some outputs at a time.
+/// Weights of each factor (a centre or an input, or a pair of them) for each output, some outputs at a time.
 #[derive(Debug)]
 pub(super) struct Weights<T> {
     factors: usize,
     whole: Vec<[T; OUTPUTS]>,
-    /// Of the outputs that are left, factor after factor.
+    /// Weights of the outputs that are left, factor after factor.
     rest: Vec<T>,
 }
 
 impl<T: Copy> Weights<T> {
-    /// Of `factors × outputs` values.
+    /// Lays out `factors × outputs` weights.
     pub(super) fn of(values: &[T], outputs: usize) -> Self {
         let tiles = outputs / OUTPUTS;
         let mut whole = Vec::with_capacity(values.len() / OUTPUTS);
@@ -86,12 +86,12 @@ impl<T: Copy> Weights<T> {
         Self { factors: values.len() / outputs, whole, rest: rest.copied().collect() }
     }
 
-    /// How many there are of each output.
+    /// Number of factors of each output.
     pub(super) fn factors(&self) -> usize {
         self.factors
     }
 
-    /// Accumulates `factors`, from the one of that number on, to `sums`.
+    /// Adds the products of `factors` and their weights, from factor number `first` on, to `sums`.
     #[inline(always)]
     pub(super) fn accumulate<A: Accumulate<Shared = T>>(
         &self,

@@ -1,4 +1,4 @@
-//! f32 with direct distances.
+//! Fit of networks in f32 with direct distances.
 
 use model_core::rbf::direct::Parameters;
 use model_core::rbf::{Format, Shape};
@@ -18,7 +18,7 @@ pub(super) fn fit(
     let regressors = Regressors {
         centres,
         inputs,
-        // The decay that the device will use, so that weights fit its activations.
+        // The decay in f32, as the device will use it, so that weights fit the device's activations.
         decay: f64::from((1.0 / (2.0 * options.spread * options.spread)) as f32),
         affine_tail: options.affine_tail,
     };
@@ -41,6 +41,6 @@ pub(super) fn fit(
         affine: &round(&weights.affine),
     };
     let shape = Shape { inputs, centres: count, outputs: targets.outputs() };
-    let block = parameters.words().collect();
-    FittedNetwork::try_new(shape, Format::F32Direct, options.affine_tail, block)
+    let words = parameters.words().collect();
+    FittedNetwork::try_new(shape, Format::F32Direct, options.affine_tail, words)
 }

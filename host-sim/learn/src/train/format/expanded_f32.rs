@@ -1,4 +1,4 @@
-//! f32 with expanded distances, where rounding is proved harmless.
+//! Fit of networks in f32 with expanded distances, where their rounding is proved harmless.
 
 use model_core::rbf::expanded::{CENTRES_AT_ONCE, Parameters};
 use model_core::rbf::{Format, Network, Shape};
@@ -8,25 +8,28 @@ use super::super::least_squares::{Factor, Regressors};
 use super::super::{CentredScale, Options, Samples};
 use super::{FittedNetwork, Targets, Weights};
 use crate::infer::{Exponential, infer};
-use taxel_data::dataset::Block;
+use taxel_data::dataset::RowTable;
 
-/// Share of an output's training RMSE that rounding in exponents may reach.
+/// Largest share of an output's training RMSE that the rounding of exponents may reach.
 const HARMLESS: f64 = 0.1;
 
-/// Weights are first fitted to one in so many samples.
+/// Step through the samples for a first, cheap fit: it sees one in so many.
 const FEW: usize = 8;
-/// Fewer samples for each weight may make weights of another magnitude.
+/// Samples for each weight below which a first fit is skipped, since its weights could have another
+/// magnitude.
 const SAMPLES_A_WEIGHT: usize = 16;
 
-/// A share from weights of few samples that the one from all is not below [`HARMLESS`] with: they differ by
-/// less than twice (tested).
+/// Share of RMSE in a first fit beyond which a full fit is not tried. The two shares differ by less than
+/// a factor of two (tested), so the full one could not be below [`HARMLESS`].
 const HOPELESS: f64 = 2.0 * HARMLESS;
 
-/// A unit of inputs, in spans of the training range.
+/// One unit of inputs, in spans of the training range.
 const UNIT: f64 = HALF_RANGE as f64 / UNITS as f64;
 
-/// The fit, or nothing if rounding is not proved harmless: if an exponent could leave its range, or the
-/// [bound](rounding_bounds) of an output exceeds a tenth of its training RMSE.
+/// Fits a network, or returns `None` if its rounding is not proved harmless.
+///
+/// That is so if an exponent could leave its range, or the [bound](rounding_bounds) of an output exceeds
+/// a tenth of its training RMSE.
 pub(super) fn fit(
     samples: &Samples<'_>,
     centres: &[f64],
@@ -34,19 +37,19 @@ pub(super) fn fit(
     targets: &Targets,
 ) -> Option<FittedNetwork> {
     let rounded = Rounded::new(samples, centres, options);
-    let scaled = rounded.scale.apply(samples.block);
+    let scaled = rounded.scale.apply(samples.table);
     let all = &targets.deviations;
-    // Most of what is not harmless is found out in an eighth of the time.
+    // A first fit finds most unsuitable networks in an eighth of the time.
     if all.len() >= FEW * SAMPLES_A_WEIGHT * rounded.regressors(options).count() {
         let deviations = every(&all.values, targets.outputs());
         let scaled = every(&scaled, samples.inputs());
         let few = rounded.network(&scaled, &deviations, targets, options)?;
-        if worst_share(&few, samples.block) > HOPELESS {
+        if worst_share(&few, samples.table) > HOPELESS {
             return None;
         }
     }
     let fitted = rounded.network(&scaled, &all.values, targets, options)?;
-    (worst_share(&fitted, samples.block) <= HARMLESS).then_some(fitted)
+    (worst_share(&fitted, samples.table) <= HARMLESS).then_some(fitted)
 }
 
 /// Centres and width, rounded.
@@ -54,9 +57,9 @@ struct Rounded {
     inputs: usize,
     scale: CentredScale,
     decay: f32,
-    /// b and a of every centre, K' of them.
+    /// Parameters b and a of every centre, K' of them.
     exponents: Vec<f32>,
-    /// What a stands for, on inputs scaled to [0, 1].
+    /// Centres that the rounded a stand for, on inputs scaled to [0, 1].
     centres: Vec<f64>,
 }
 
@@ -64,7 +67,7 @@ impl Rounded {
     fn new(samples: &Samples<'_>, centres: &[f64], options: &Options) -> Self {
         let inputs = samples.inputs();
         let count = centres.len() / inputs;
-        let scale = CentredScale::of(samples.block);
+        let scale = CentredScale::of(samples.table);
         let decay = core::f64::consts::LOG2_E / (2.0 * options.spread.powi(2)) * UNIT * UNIT;
         let decay = decay as f32;
         let twice = 2.0 * f64::from(decay);
@@ -94,7 +97,7 @@ impl Rounded {
         }
     }
 
-    /// The network whose weights fit `scaled` inputs to `deviations`, or nothing if an exponent could leave
+    /// Network whose weights fit `scaled` inputs to `deviations`, or `None` if an exponent could leave
     /// its range.
     fn network(
         &self,
@@ -109,7 +112,7 @@ impl Rounded {
         let design = regressors.of(scaled);
         let factor = Factor::new(&design, deviations, outputs, options.initial_covariance);
         let mut weights = Weights::split(factor.weights(), count, targets);
-        // The tail is on inputs about the middle.
+        // The tail acts on inputs about their middle.
         for row in weights.affine.chunks_exact_mut(outputs) {
             weights.bias.iter_mut().zip(&*row).for_each(|(bias, a)| *bias += 0.5 * a);
             row.iter_mut().for_each(|a| *a *= UNIT);
@@ -127,29 +130,30 @@ impl Rounded {
             output_weights: &output_weights,
         };
         let shape = Shape { inputs, centres: count, outputs };
-        let block = parameters.words().collect();
-        FittedNetwork::try_new(shape, Format::F32, options.affine_tail, block).ok()
+        let words = parameters.words().collect();
+        FittedNetwork::try_new(shape, Format::F32, options.affine_tail, words).ok()
     }
 }
 
-/// One in [`FEW`] of lines of that length.
+/// Every [`FEW`]th line of `values`, in lines of so many numbers.
 fn every(values: &[f64], length: usize) -> Vec<f64> {
     values.chunks_exact(length).step_by(FEW).flatten().copied().collect()
 }
 
-/// The largest share of an output's RMSE on `block` that rounding may reach.
-fn worst_share(fitted: &FittedNetwork, block: &Block) -> f64 {
-    let predicted = infer(&fitted.network(), Exponential::default(), &block.inputs.values);
-    let squares = block.outputs.squared_errors(&predicted);
-    let frames = block.outputs.len() as f64;
+/// Largest share of any output's RMSE on `table` that rounding may reach.
+fn worst_share(fitted: &FittedNetwork, table: &RowTable) -> f64 {
+    let predicted = infer(&fitted.network(), Exponential::default(), &table.inputs.values);
+    let squares = table.outputs.squared_errors(&predicted);
+    let frames = table.outputs.len() as f64;
     let bounds = rounding_bounds(&fitted.network());
     let shares =
         squares.iter().zip(&bounds).map(|(square, bound)| bound / (square / frames).sqrt());
     shares.fold(0.0, f64::max)
 }
 
-/// How far rounding in the exponents, and the error of 2^u, can move each output of `network` for any
-/// reading, in the output's unit; empty for networks of other formats.
+/// Bounds on the error of each output of `network` for any reading, in the output's unit.
+///
+/// They cover rounding in the exponents and the error of 2^u. Empty for networks of other formats.
 ///
 /// With u = 2^−24, an exponent v = b + a·x − g‖x‖² that is summed up with at most d rounded operations a
 /// term is off by |δv| ≤ γ_d·(|b| + Σ|aᵢxᵢ| + g‖x‖²), γ_d = d·u/(1 − d·u) (Higham, Accuracy and Stability of
@@ -162,8 +166,9 @@ pub fn rounding_bounds(network: &Network<'_>) -> Vec<f64> {
     let Network::F32(network) = network else { return Vec::new() };
     let (p, Shape { inputs, outputs, .. }) = (network.parameters(), network.shape());
     let decay = f64::from(p.decay);
-    // A product, and one of four sums side by side, the first two opened by b and the shared term; then
-    // two more additions. The shared term takes as many before, and is negated and scaled.
+    // A term passes through a product, one of four partial sums (the first two start from b and the
+    // shared term), and two more additions. The shared term passes through as many before, and is
+    // negated and scaled.
     let chain = inputs.div_ceil(4) + 4;
     let mut bounds = vec![0.0; outputs];
     let lines = p.exponents.chunks_exact(1 + inputs);
@@ -177,12 +182,12 @@ pub fn rounding_bounds(network: &Network<'_>) -> Vec<f64> {
     bounds
 }
 
-/// Largest error of an activation over all distances from its centre, which is `centre` away from the
-/// middle; b is `opened`.
+/// Largest error of an activation over all distances from its centre. The centre is `centre` away from
+/// the middle; its b is `opened`.
 fn activation_bound(decay: f64, centre: f64, opened: f64, chain: usize) -> f64 {
     const U: f64 = 0.5 * f32::EPSILON as f64;
-    /// Distances are tried this far apart, in widths; in between, the activation is taken at the nearer and
-    /// the sum at the farther end.
+    /// Step between the distances tried, in widths. In between, the activation is taken at the nearer
+    /// end and the sum at the farther.
     const STEP: f64 = 1.0 / 64.0;
     let gamma = |d: usize| d as f64 * U / (1.0 - d as f64 * U);
     let width = 1.0 / decay.sqrt();
@@ -192,11 +197,11 @@ fn activation_bound(decay: f64, centre: f64, opened: f64, chain: usize) -> f64 {
         let square = decay * reach * reach;
         let terms = opened + 2.0 * decay * centre * reach + square;
         let exponent = gamma(chain) * terms + gamma(chain + 2) * square;
-        // 2^u itself is within 2 ulp, of which each is at most 2u of the value.
+        // 2^u itself is within 2 ulp, each at most 2u of the value.
         let relative = (core::f64::consts::LN_2 * exponent).exp_m1() + 4.0 * U;
         (-decay * near * near).exp2() * relative
     };
-    // Beyond twelve widths 2^−144 is left, and exponents end at −125.
+    // Beyond twelve widths an activation is below 2^−144, and exponents end at −125.
     (0..(12.0 / STEP) as usize).map(at).fold(0.0, f64::max)
 }
 
@@ -216,12 +221,12 @@ mod tests {
         (world, data)
     }
 
-    /// The bound holds on frames, and is no more than some hundred times what happens there.
+    /// The bound holds on frames, and is at most some hundred times the actual error there.
     #[test]
     fn no_reading_moves_an_output_beyond_its_bound() {
         let (world, data) = press(0.05, 1500);
-        let block = data.block(3);
-        let samples = Samples::new(&block);
+        let table = data.row_table(3);
+        let samples = Samples::new(&table);
         let options = Options {
             format: Format::F32,
             ..Options { centres: 32, seed: world.seed, ..Options::default() }
@@ -232,7 +237,7 @@ mod tests {
         let p = network.parameters();
         let bounds = rounding_bounds(&network.into());
         let mut worst = vec![0.0_f64; bounds.len()];
-        for line in block.inputs.lines() {
+        for line in table.inputs.lines() {
             let reading: Vec<f32> = line.iter().map(|r| *r as f32).collect();
             let (mut scaled, mut output) = (vec![0.0; reading.len()], vec![0.0; bounds.len()]);
             let network = Network::from(network);
@@ -240,7 +245,8 @@ mod tests {
             let x: Vec<f64> =
                 scaled.iter().map(|x| f64::from(model_core::scale::clamp_units(*x))).collect();
             network.infer_scaled(&mut scaled, &mut output).unwrap();
-            // The same sum without rounding; that of the outputs stays, and is small beside.
+            // The same sum without rounding of the exponents; rounding in the outputs' sum stays, and is
+            // small.
             let mut exact: Vec<f64> = p.bias.iter().map(|b| f64::from(*b)).collect();
             let mut add = |factor: f64, row: &[f32]| {
                 exact.iter_mut().zip(row).for_each(|(y, w)| *y += factor * f64::from(*w));
@@ -285,19 +291,19 @@ mod tests {
     fn few_samples_tell_what_all_would() {
         for noise in [0.0, 0.005, 0.05] {
             let (world, data) = press(noise, 4000);
-            let block = data.block(3);
-            let samples = Samples::new(&block);
+            let table = data.row_table(3);
+            let samples = Samples::new(&table);
             let options = Options { centres: 8, seed: world.seed, ..Options::default() };
             let centres = samples.centres(&options, 3);
-            let targets = Targets::of(&block.outputs);
+            let targets = Targets::of(&table.outputs);
             let rounded = Rounded::new(&samples, &centres, &options);
             let regressors = rounded.regressors(&options).count();
             let all = &targets.deviations;
             assert!(all.len() >= FEW * SAMPLES_A_WEIGHT * regressors);
-            let scaled = rounded.scale.apply(&block);
+            let scaled = rounded.scale.apply(&table);
             let share = |scaled: &[f64], deviations: &[f64]| {
                 let fitted = rounded.network(scaled, deviations, &targets, &options).unwrap();
-                worst_share(&fitted, &block)
+                worst_share(&fitted, &table)
             };
             let few = share(&every(&scaled, 18), &every(&all.values, targets.outputs()));
             let ratio = few / share(&scaled, &all.values);

@@ -1,8 +1,8 @@
-//! 16-bit fixed point.
+//! Fit of networks in 16-bit fixed point.
 //!
-//! Weights are rounded in back substitution: each is rounded as soon as it is solved for, and those solved
-//! after it make up for what that did (Babai's nearest plane, Combinatorica 6, 1986). Regressors that are
-//! nearly alike, as Gaussians of neighbouring centres are, make up for nearly all of it.
+//! Weights are rounded during back substitution. Each is rounded as soon as it is solved for, and the
+//! weights solved after it compensate for that (Babai's nearest plane, Combinatorica 6, 1986). Gaussians
+//! of neighbouring centres are nearly alike, so they compensate for nearly all of it.
 
 use core::f64::consts::{LN_2, LOG2_E};
 use std::ops::Range;
@@ -20,16 +20,16 @@ use super::super::{CentredScale, Options, Samples, squared_distance};
 use super::{FittedNetwork, Targets};
 use crate::error::{Error, Result};
 
-/// A step of inputs, in spans of the training range.
+/// One step of inputs, in spans of the training range.
 const STEP: f64 = HALF_RANGE as f64 / UNITS as f64 * UNITS_PER_STEP as f64;
-/// 1 as an activation, and as an input in half ranges.
+/// Fixed-point number that stands for 1 in activations, and for half a range in inputs.
 const ONE: f64 = 32_768.0;
-/// How far an activation may lie from the Gaussian that its exponent stands for: the cubic, and truncation
-/// of the exponent, of the cubic's steps and of the shift.
+/// Largest error of an activation against the Gaussian that its exponent stands for. It covers the
+/// cubic, and truncation of the exponent, of the cubic's steps and of the shift.
 const ACTIVATION_ERROR: f64 = 2.0e-4;
 /// Largest magnitude of a 16-bit weight.
 const MOST: f64 = 32_767.0;
-/// Largest sum: a little below 2³¹.
+/// Largest magnitude of a sum: a little below 2³¹.
 const MOST_SUM: f64 = 2_147_000_000.0;
 
 /// Centres and width, rounded.
@@ -39,7 +39,7 @@ struct Exponents {
     decay: u32,
     /// Lines of b and pairs of a, K' of them.
     lines: Vec<u32>,
-    /// What the lines stand for, in steps.
+    /// Centres that the lines stand for, in steps.
     centres: Vec<f64>,
 }
 
@@ -67,7 +67,7 @@ impl Exponents {
                 "the format fixed16 does not hold so narrow or wide a Gaussian".into(),
             ));
         }
-        let scale = CentredScale::of(samples.block);
+        let scale = CentredScale::of(samples.table);
         let per_step = decay / 2_f64.powi(DECAY_FRACTION_BITS.cast_signed());
         let count = centres.len() / inputs;
         let pairs = inputs.div_ceil(2);
@@ -98,8 +98,8 @@ impl Exponents {
         }
         let shape = Shape { inputs, centres: count, outputs };
         let this = Self { shape, scale, decay: decay as u32, lines, centres: rounded };
-        // Whether exponents can leave their range is the format's to say.
-        match Network::try_new(shape, false, &this.block(None)) {
+        // The format itself checks whether exponents can leave their range.
+        match Network::try_new(shape, false, &this.words(None)) {
             Err(NetworkError::ExponentOutOfRange { .. }) => Err(refused(
                 "a reading could drive an exponent beyond 64, where fixed16 ends".into(),
             )),
@@ -107,17 +107,17 @@ impl Exponents {
         }
     }
 
-    /// The block with these weights, or with none.
-    fn block(&self, weights: Option<&Rounded>) -> Vec<u32> {
+    /// Words of the network with these weights, or without weights.
+    fn words(&self, weights: Option<&Rounded>) -> Vec<u32> {
         let Shape { inputs, outputs, .. } = self.shape;
         let blank = Rounded::blank(self.shape);
         let weights = weights.unwrap_or(&blank);
         let line = 1 + inputs.div_ceil(2);
         let mut centres = Vec::new();
-        for (block, lines) in self.lines.chunks_exact(CENTRES_AT_ONCE * line).enumerate() {
+        for (group, lines) in self.lines.chunks_exact(CENTRES_AT_ONCE * line).enumerate() {
             centres.extend_from_slice(lines);
             for output in 0..outputs {
-                let weight = |k: usize| weights.of_centre(block * CENTRES_AT_ONCE + k, output);
+                let weight = |k: usize| weights.of_centre(group * CENTRES_AT_ONCE + k, output);
                 let words =
                     (0..CENTRES_AT_ONCE / 2).map(|p| pair(weight(2 * p), weight(2 * p + 1)));
                 centres.extend(words);
@@ -135,8 +135,10 @@ impl Exponents {
         parameters.words().collect()
     }
 
-    /// ‖f‖ of every output's sum of Gaussians, in the space that they reproduce: no reading makes the sum
-    /// larger, since |f(x)| = |⟨f, k(x, ·)⟩| ≤ ‖f‖·k(x, x)^½, and k(x, x) = 1.
+    /// Norm ‖f‖ of every output's sum of Gaussians, in the Hilbert space whose reproducing function k is
+    /// the Gaussian.
+    ///
+    /// No reading makes the sum larger, since |f(x)| = |⟨f, k(x, ·)⟩| ≤ ‖f‖·k(x, x)^½ and k(x, x) = 1.
     fn norms(&self, weights: &[f64]) -> Vec<f64> {
         let Shape { inputs, outputs, .. } = self.shape;
         let bits = EXPONENT_FRACTION_BITS + DECAY_FRACTION_BITS;
@@ -158,7 +160,7 @@ fn pair(low: i32, high: i32) -> u32 {
     (low.cast_unsigned() & 0xFFFF) | high.cast_unsigned() << 16
 }
 
-/// Activations as the device computes them, inputs in half ranges, and 1.
+/// Regressors as the device computes them: activations, inputs in half ranges, and 1.
 struct FixedDesign<'s> {
     network: Network<'s>,
     steps: Vec<i32>,
@@ -187,7 +189,7 @@ impl Design for FixedDesign<'_> {
     }
 }
 
-/// Weights in integers.
+/// Weights rounded to integers.
 struct Rounded {
     outputs: usize,
     centres: Vec<i32>,
@@ -208,7 +210,7 @@ impl Rounded {
         }
     }
 
-    /// 0 for fill.
+    /// Weight of a centre for an output; 0 for fill.
     fn of_centre(&self, centre: usize, output: usize) -> i32 {
         self.centres.get(centre * self.outputs + output).copied().unwrap_or(0)
     }
@@ -236,22 +238,21 @@ pub(super) fn fit(
     let outputs = targets.outputs();
     let exponents = Exponents::new(samples, centres, options, outputs)?;
     let shape = exponents.shape;
-    let without_weights = exponents.block(None);
+    let without_weights = exponents.words(None);
     let refused = |cause| Error::NotHeld { format: Format::Fixed16, cause };
     let design = FixedDesign {
         network: Network::try_new(shape, false, &without_weights).map_err(refused)?,
-        steps: exponents.scale.units(samples.block).map(clamp_steps).collect(),
+        steps: exponents.scale.units(samples.table).map(clamp_steps).collect(),
         affine: options.affine_tail,
     };
     let factor =
         Factor::new(&design, &targets.deviations.values, outputs, options.initial_covariance);
     let rounded = round(&factor, &exponents, targets, options.affine_tail)?;
-    let block = exponents.block(Some(&rounded));
-    FittedNetwork::try_new(shape, Format::Fixed16, options.affine_tail, block)
+    let words = exponents.words(Some(&rounded));
+    FittedNetwork::try_new(shape, Format::Fixed16, options.affine_tail, words)
 }
 
-/// Rounds the solution of `factor`, with the finest scale for each output that its weights and its sums
-/// fit.
+/// Rounds the solution of `factor`, with the finest scale that each output's weights and sums fit.
 fn round(
     factor: &Factor,
     exponents: &Exponents,
@@ -262,7 +263,7 @@ fn round(
     let tail = if affine { inputs } else { 0 };
     let mut exact = factor.weights();
     let mut scale = scales(exponents, &exact, targets, tail);
-    // What rounding moves from one weight to others may need a coarser scale; each try is an eighth coarser.
+    // Compensation may make weights larger, which needs a coarser scale; each try is an eighth coarser.
     for _ in 0..40 {
         let weights = rounded_solution(factor, &scale, targets);
         let needed = scales(exponents, &weights, targets, tail);
@@ -310,7 +311,7 @@ fn rounded_solution(factor: &Factor, scale: &[f64], targets: &Targets) -> Vec<f6
     weights
 }
 
-/// The finest scale of each output that its weights and, for every reading, its sum fit.
+/// Finest scale of each output that its weights and, for every reading, its sum fit.
 fn scales(exponents: &Exponents, weights: &[f64], targets: &Targets, tail: usize) -> Vec<f64> {
     let Shape { centres, outputs, .. } = exponents.shape;
     let norms = exponents.norms(&weights[..centres * outputs]);
@@ -333,7 +334,7 @@ fn scales(exponents: &Exponents, weights: &[f64], targets: &Targets, tail: usize
         .collect()
 }
 
-/// The next number of few digits, so that scales are exact in f32.
+/// Next larger number of few digits, so that scales are exact in f32.
 fn power_of_two_eighths(value: f64) -> f64 {
     let unit = value.log2().floor().exp2() / 8.0;
     (value / unit).ceil() * unit

@@ -1,15 +1,16 @@
-//! Every point's nearest centre, again and again while centres move, without looking at most of them.
+//! Assignment of points to their nearest centres while centres move, without looking at most centres.
 //!
-//! Centres are put into groups. Of every point and group a lower bound is kept on the distance of
-//! the group's centres (but for the one that the point belongs to); it falls by as much as the
-//! group's centres have moved at most, and only groups whose bound is not above the distance of the
-//! point's own centre are looked at: Yinyang K-means (Ding et al., "Yinyang K-means: a drop-in
-//! replacement of the classic K-means with consistent speedup", ICML 2015). A group is as many
-//! centres as a vector holds, so looking at one costs little; and bounds that hold for groups near
-//! by fall slowly, unlike those of Hamerly's algorithm, while there are fewer of them than Elkan's.
+//! This is Yinyang K-means (Ding et al., "Yinyang K-means: a drop-in replacement of the classic K-means with
+//! consistent speedup", ICML 2015). Centres are put into groups. For every point and group, a lower bound is
+//! kept on the distance of the group's centres, except the one that the point belongs to. The bound falls by
+//! the largest movement of the group's centres. Only groups whose bound is not above the distance of the
+//! point's own centre are looked at.
 //!
-//! Bounds are of what f64 would make of the distances, all rounding included ([`Screen`]), so the
-//! assignment, ties included, is that of looking at every centre.
+//! A group is as many centres as a vector holds, so looking at one costs little. Bounds for groups of near
+//! centres fall slowly, unlike those of Hamerly's algorithm, and there are fewer of them than Elkan's.
+//!
+//! Bounds hold for the distances as f64 computes them, all rounding included ([`Screen`]), so the
+//! assignment, ties included, is the same as by looking at every centre.
 //!
 //! [`Screen`]: super::screen::Screen
 
@@ -21,26 +22,26 @@ use super::screen::{LANES, Points, exact, rounded_distances};
 use super::{Nearest, piece};
 use taxel_data::simd::widest;
 
-/// Most groups that bounds are kept for.
+/// Largest number of groups for which bounds are kept.
 const MOST_GROUPS: usize = 64;
 
-/// What one piece of the points knows, and adds to an iteration.
+/// Piece of the points: their assignment, and their share of an iteration's sums.
 #[derive(Debug, Clone)]
 pub(super) struct Piece {
-    /// Of every point.
+    /// Nearest centre of every point.
     pub(super) nearest: Vec<Nearest>,
-    /// Lower bounds on scaled distances, [`LANES`] groups at a time, point after point; each was
-    /// raised by what its group had moved by when it was found.
+    /// Lower bounds on scaled distances, [`LANES`] groups at a time, point after point. Each was raised,
+    /// when it was found, by the movement of its group until then.
     bounds: Vec<[f32; LANES]>,
-    /// Sums of the points of every centre.
+    /// Sums of the points of every centre, `centres × dimensions`.
     pub(super) sums: Vec<f64>,
-    /// Points of every centre.
+    /// Number of points of every centre.
     pub(super) counts: Vec<usize>,
-    /// Sum of the squared distances.
+    /// Sum of the squared distances of points from their centres.
     pub(super) inertia: f64,
 }
 
-/// The assignment of points to centres that move.
+/// Assignment of points to centres that move.
 #[derive(Debug, Clone)]
 pub(super) struct Assignment<'p> {
     pub(super) points: &'p Points<'p>,
@@ -52,20 +53,20 @@ pub(super) struct Assignment<'p> {
 /// Centres in groups.
 #[derive(Debug, Clone)]
 struct Groups {
-    /// Vectors of a group.
+    /// Vectors in a group.
     vectors: usize,
-    /// Which centre stands in which lane; [`NOBODY`] in what fills up the last group.
+    /// Centre in each lane; [`NOBODY`] in lanes that fill up the last group.
     centre_of: Vec<u32>,
-    /// In which lane a centre stands.
+    /// Lane of each centre.
     lane_of: Vec<u32>,
     /// Rounded centres: vector after vector, dimension after dimension.
     rounded: Vec<[f32; LANES]>,
-    /// By how much a group's centres have moved, at most and altogether, scaled; filled up to whole
+    /// Largest movement of each group's centres, summed over all iterations, scaled; filled up to whole
     /// vectors.
     moved: Vec<f64>,
-    /// The same in f32.
+    /// Movements of the groups, as `moved`, in f32.
     rounded_moved: Vec<[f32; LANES]>,
-    /// What all this may lose by rounding.
+    /// Error that rounding may cause in a comparison of bounds.
     slack: f64,
 }
 
@@ -97,14 +98,14 @@ impl Groups {
         this
     }
 
-    /// Where a centre's group stands among the bounds: which vector, which lane.
+    /// Vector and lane of the bound of a centre's group.
     fn place_of(&self, centre: u32) -> (usize, usize) {
         let group = self.lane_of[centre as usize] as usize / (self.vectors * LANES);
         (group / LANES, group % LANES)
     }
 
-    /// Looks through a group for centres nearer than `nearest`, and returns the least rounded squared
-    /// distance of all but the one in `own_lane`.
+    /// Searches a group for centres nearer than `nearest`. Returns the least rounded squared distance of
+    /// all centres but the one in `own_lane`.
     #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "private, and called in one place")]
     fn search(
@@ -140,7 +141,7 @@ impl Groups {
         least
     }
 
-    /// The least rounded squared distance of a group's centres but for the one in `own_lane`.
+    /// Least rounded squared distance of a group's centres but the one in `own_lane`.
     #[inline(always)]
     fn least(&self, dimensions: usize, group: usize, own_lane: usize, rounded: &[f32]) -> f32 {
         let vectors = group * self.vectors..(group + 1) * self.vectors;
@@ -156,7 +157,7 @@ impl Groups {
         own_lane: usize,
         rounded: &[f32],
     ) -> [f32; LANES] {
-        // Of a group that is not there, nothing is near.
+        // A group that does not exist is infinitely far away.
         let Some(centres) = self.rounded.get(vector * dimensions..(vector + 1) * dimensions) else {
             return [f32::INFINITY; LANES];
         };
@@ -192,8 +193,8 @@ impl Groups {
     }
 }
 
-/// Orders centres so that `size` of them in a row are near each other: halves them again and again
-/// across the direction in which they reach farthest.
+/// Orders centres so that `size` neighbours in the order are near each other: halves them again and
+/// again across the direction in which they reach farthest.
 fn gather(order: &mut [u32], centres: &[f64], dimensions: usize, size: usize) {
     if order.len() <= size {
         return;
@@ -209,8 +210,8 @@ fn gather(order: &mut [u32], centres: &[f64], dimensions: usize, size: usize) {
     gather(high, centres, dimensions, size);
 }
 
-/// About the first principal component of some centres, by a few steps of the power method from the
-/// centre farthest from their mean.
+/// Approximate first principal component of the given centres, by a few steps of the power method from
+/// the centre farthest from their mean.
 fn principal_direction(order: &[u32], centres: &[f64], dimensions: usize) -> Vec<f64> {
     let centre = |k: &u32| &centres[*k as usize * dimensions..][..dimensions];
     let mut mean = vec![0.0; dimensions];
@@ -321,7 +322,7 @@ impl Piece {
             let mut look = None;
             for (chunk, (bounds, moved)) in bounds.iter_mut().zip(&groups.rounded_moved).enumerate()
             {
-                // Where a centre came from so far that the difference is not a number, it is near.
+                // A bound that is not a number, because a centre came from very far, counts as near.
                 let is_far = |l: usize| bounds[l] - moved[l] > limit;
                 let near = |l: usize| u32::from(!is_far(l)) << l;
                 let hits = (0..LANES).fold(0, |hits, l| hits | near(l));
@@ -350,7 +351,7 @@ impl Piece {
                 }
             }
             if nearest.centre != own {
-                // The old centre is one of the others now, and the new one no longer is.
+                // The former centre is now one of the others, and the new one no longer is.
                 let (group, l) = groups.place_of(own);
                 let at_least = points.screen.scaled_at_least(own_squared_distance) as f32;
                 let bound = at_least + groups.rounded_moved[group][l];
@@ -364,7 +365,7 @@ impl Piece {
         }
     }
 
-    /// Adds up points and distances, in the order of the points.
+    /// Adds up points and squared distances, in the order of the points.
     #[inline(always)]
     fn add_up(&mut self, points: &Points<'_>, first: usize) {
         let n = points.dimensions;
@@ -381,10 +382,10 @@ impl Piece {
     }
 }
 
-/// What is known of a point's own centre, and of how far others may be.
+/// State of the search for one point's nearest centre.
 struct Look {
     own_lane: usize,
-    /// The largest rounded squared distance of a centre that may be the nearest.
+    /// Largest rounded squared distance of a centre that may be the nearest.
     reach: f32,
 }
 

@@ -1,5 +1,5 @@
-//! Where Lloyd's iterations start: k-means++ (Arthur & Vassilvitskii, "k-means++: the advantages of
-//! careful seeding", SODA 2007).
+//! Starting centres for Lloyd's iterations, by k-means++ (Arthur & Vassilvitskii, "k-means++: the
+//! advantages of careful seeding", SODA 2007).
 
 #![expect(clippy::inline_always, reason = "what `simd::widest` runs must be inlined into it")]
 
@@ -10,19 +10,20 @@ use super::{Nearest, piece};
 use taxel_data::random::Random;
 use taxel_data::simd::widest;
 
-/// What is known of one piece of the points.
+/// Piece of the points, with their nearest centres so far.
 struct Piece {
     nearest: Vec<Nearest>,
-    /// What rounded squared distance a centre may have that comes nearer, of every point.
+    /// Rounded squared distance that a new centre must be within to be nearer, for every point.
     reach: Vec<[f32; LANES]>,
-    /// Sum of the squared distances.
+    /// Sum of the points' squared distances from their centres.
     sum: f64,
 }
 
-/// Picks starting centres, each with a probability proportional to the squared distance from the
-/// nearest one picked before. Stops early when every point coincides with a centre.
+/// Picks starting centres, each with a probability proportional to the squared distance from the nearest
+/// one picked before.
 ///
-/// Returns them, and every point's nearest.
+/// Returns the centres, and the nearest of them for every point. Stops early when every point coincides
+/// with a centre.
 pub(super) fn plus_plus(
     points: &Points<'_>,
     centres: usize,
@@ -35,7 +36,7 @@ pub(super) fn plus_plus(
         .map(|first| {
             let count = size.min(count - first);
             let mut reach = vec![[f32::INFINITY; LANES]; count.div_ceil(LANES)];
-            reach.as_flattened_mut()[count..].fill(-1.0); // filling comes nearer to nothing
+            reach.as_flattened_mut()[count..].fill(-1.0); // unused lanes are never approached
             Piece { nearest: vec![Nearest::default(); count], reach, sum: 0.0 }
         })
         .collect();
@@ -63,7 +64,7 @@ pub(super) fn plus_plus(
 }
 
 impl Piece {
-    /// Takes one more centre into account. `first` is the place of the piece's first point.
+    /// Takes one more centre into account. `first` is the index of the piece's first point.
     #[inline(always)]
     fn approach(
         &mut self,
@@ -73,13 +74,13 @@ impl Piece {
         centre: &[f64],
         rounded: &[f32],
     ) {
-        for (block, reach) in self.reach.iter_mut().enumerate() {
-            let rounded = rounded_distances(rounded, points.block(first / LANES + block));
+        for (group, reach) in self.reach.iter_mut().enumerate() {
+            let rounded = rounded_distances(rounded, points.lanes_of(first / LANES + group));
             if rounded.iter().zip(reach.iter()).all(|(rounded, reach)| rounded > reach) {
                 continue;
             }
             for lane in 0..LANES {
-                let place = block * LANES + lane;
+                let place = group * LANES + lane;
                 if rounded[lane] <= reach[lane] {
                     let squared_distance = exact(points.point(first + place), centre);
                     if squared_distance < self.nearest[place].squared_distance {
@@ -99,7 +100,7 @@ impl Piece {
     }
 }
 
-/// The point at which the running sum of squared distances passes `left`.
+/// Index of the point at which the running sum of squared distances passes `left`.
 fn draw(pieces: &[Piece], size: usize, mut left: f64) -> usize {
     // Rounding may leave a remainder: the last piece with a distance takes it.
     let last = pieces.iter().rposition(|piece| piece.sum > 0.0).expect("the sum is positive");

@@ -43,7 +43,7 @@ fn as_many_centres_as_points_reach_them_all() {
 
 #[test]
 fn an_empty_cluster_takes_the_farthest_point() {
-    // The third centre is nobody's nearest.
+    // The third centre is nearest to no point.
     let points = [0.0, 1.0, 10.0, 11.0, 30.0];
     let found = refine(&points, 1, &[0.5, 10.5, 1e6], &Search::default());
     assert_eq!(sorted(found.centres), [0.5, 10.5, 30.0]);
@@ -60,7 +60,7 @@ fn restarts_never_end_worse() {
     assert!(with(8) <= with(1));
 }
 
-/// What an assignment is defined as: the least squared distance in f64, of the first centre that has it.
+/// Assignment by definition: the least squared distance in f64, and the first centre that has it.
 fn nearest_of_all(points: &[f64], dimensions: usize, centres: &[f64]) -> Vec<Nearest> {
     let nearest = |point: &[f64]| {
         let all = centres.chunks_exact(dimensions).enumerate().map(|(k, centre)| Nearest {
@@ -76,7 +76,7 @@ fn all_nearest(assignment: &Assignment<'_>) -> Vec<Nearest> {
     assignment.pieces.iter().flat_map(|piece| piece.nearest.clone()).collect()
 }
 
-/// Holds every step of `iterations` against looking at every centre.
+/// Compares every step of `iterations` with an assignment that looks at every centre.
 fn check_steps(points: &[f64], dimensions: usize, centres: &[f64], iterations: usize) {
     let points = Points::new(points, dimensions);
     let mut pruned = Assignment::from_scratch(&points, centres.to_vec());
@@ -98,7 +98,7 @@ fn check_steps(points: &[f64], dimensions: usize, centres: &[f64], iterations: u
 proptest! {
     #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..Default::default() })]
 
-    /// Points on a coarse grid: duplicates, ties, centres that nobody has.
+    /// Points on a coarse grid: duplicates, ties, and centres without any point.
     #[test]
     fn pruning_changes_nothing_however_points_coincide(
         dimensions in 1_usize..6,
@@ -141,7 +141,7 @@ proptest! {
     }
 }
 
-/// Smooth, noisy, and in more pieces and groups than one.
+/// Smooth, noisy points, enough for several pieces and groups.
 fn cloud(count: usize, dimensions: usize) -> Vec<f64> {
     let mut source = random(17);
     let mut points = Vec::with_capacity(count * dimensions);

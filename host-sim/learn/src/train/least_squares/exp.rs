@@ -1,18 +1,18 @@
-//! e^x for many x ≤ 0 at once, in plain f64 operations that the compiler turns into vector
-//! instructions, and the same on every machine.
+//! Exponentials e^x of many x ≤ 0 at once, in plain f64 operations that compilers turn into vector
+//! instructions. They give the same result on every machine.
 
 #![expect(clippy::inline_always, reason = "what `simd::widest` runs must be inlined into it")]
 
 use std::f64::consts::LOG2_E;
 
-/// ln 2 in two pieces: the first has 21 zero bits at its end, so that k times it is exact.
+/// First part of ln 2, with 21 zero bits at its end, so that k times it is exact.
 const LN_2_HIGH: f64 = f64::from_bits(0x3FE6_2E42_FEE0_0000);
 const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
-/// Adding it leaves a whole number in the last bits of the sum.
+/// Number whose addition leaves a whole number in the last bits of the sum.
 const ROUNDER: f64 = 6_755_399_441_055_744.0; // 1.5·2⁵²
-/// Below it, e^x is next to nothing and would need subnormal numbers.
+/// Least x whose e^x needs no subnormal numbers.
 const LEAST: f64 = -708.0;
-/// 1/13! … 1/0!: the rest of the series is below 5e-18 for |r| ≤ ln 2/2.
+/// Coefficients 1/13! … 1/0!: the rest of the series is below 5e-18 for |r| ≤ ln 2/2.
 const SERIES: [f64; 14] = [
     1.605_904_383_682_161_3e-10,
     2.087_675_698_786_81e-9,
@@ -30,11 +30,11 @@ const SERIES: [f64; 14] = [
     1.0,
 ];
 
-/// Replaces every x ≤ 0 by e^x, to within 4e-16 of the value; 0 below −708.
+/// Replaces every x ≤ 0 by e^x, to within 4e-16 of the value; by 0 below −708.
 ///
-/// x = k·ln 2 + r with a whole k (Cody & Waite, *Software Manual for the Elementary Functions*,
-/// 1980), then the series of e^r, times 2^k put together from its bits. A plain loop without a
-/// branch: the compiler makes vectors of it, several at a time.
+/// x = k·ln 2 + r with a whole k (Cody & Waite, *Software Manual for the Elementary Functions*, 1980),
+/// then the series of e^r, times 2^k put together from its bits. The loop has no branch, so the compiler
+/// makes vectors of it, several at a time.
 #[inline(always)]
 pub(super) fn exponentiate_non_positive(values: &mut [f64]) {
     for value in values {
@@ -59,7 +59,7 @@ mod tests {
     fn the_exponential_is_that_of_libm_to_within_two_units_of_the_last_place() {
         let mut worst = 0.0_f64;
         for i in 0..1_000_000 {
-            // Dense near 0, where activations are, and down to the end of the normal numbers.
+            // Samples dense near 0, where activations are, and down to the end of the normal numbers.
             let x = -707.9 * (f64::from(i) / 1e6).powi(3);
             let mut ours = [x];
             exponentiate_non_positive(&mut ours);

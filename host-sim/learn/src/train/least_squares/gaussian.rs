@@ -12,28 +12,28 @@ use taxel_data::simd::widest;
 /// Centres evaluated side by side.
 const LANES: usize = 8;
 
-/// What the output weights multiply: activations, then the scaled inputs if there is an affine
-/// tail, then 1 for the bias.
+/// Regressors that the output weights multiply: activations, then the scaled inputs if there is an
+/// affine tail, then 1 for the bias.
 #[derive(Debug, Clone, Copy)]
 pub struct Regressors<'c> {
-    /// Centres on scaled inputs, one after the other; none for a linear decoder.
+    /// Centres on scaled inputs, `centres × inputs`; empty for a linear decoder.
     pub centres: &'c [f64],
-    /// Inputs.
+    /// Number of inputs.
     pub inputs: usize,
-    /// 1/(2σ²).
+    /// Decay 1/(2σ²) of the Gaussians, on scaled inputs.
     pub decay: f64,
-    /// Whether the scaled inputs take part.
+    /// Whether the scaled inputs are regressors too.
     pub affine_tail: bool,
 }
 
 impl Regressors<'_> {
-    /// How many there are.
+    /// Number of regressors.
     #[must_use]
     pub fn count(&self) -> usize {
         self.centres.len() / self.inputs + if self.affine_tail { self.inputs } else { 0 } + 1
     }
 
-    /// Their values for one sample's scaled inputs, into `values`.
+    /// Writes the regressors of one sample's `scaled` inputs into `values`.
     pub fn evaluate(&self, scaled: &[f64], values: &mut [f64]) {
         let activations = self
             .centres
@@ -44,7 +44,7 @@ impl Regressors<'_> {
         values.iter_mut().zip(all).for_each(|(place, value)| *place = value);
     }
 
-    /// These regressors of `scaled` inputs (sample after sample).
+    /// Regressors of many samples, with `scaled` inputs (`samples × inputs`).
     #[must_use]
     pub fn of<'s>(&'s self, scaled: &'s [f64]) -> Gaussians<'s> {
         let count = self.centres.len() / self.inputs;
@@ -59,7 +59,7 @@ impl Regressors<'_> {
 
 /// [`Regressors`] of a set of samples, several centres at a time.
 ///
-/// Values are those of [`Regressors::evaluate`] to within rounding (a few 1e-16).
+/// Values agree with [`Regressors::evaluate`] to within rounding (a few 1e-16).
 #[derive(Debug, Clone)]
 pub struct Gaussians<'s> {
     regressors: &'s Regressors<'s>,
@@ -103,7 +103,7 @@ impl Design for Gaussians<'_> {
     }
 }
 
-/// −decay·‖x − c‖² for a group of centres.
+/// Exponents −decay·‖x − c‖² of a group of centres.
 #[inline(always)]
 fn exponents(x: &[f64], group: &[[f64; LANES]], decay: f64) -> [f64; LANES] {
     let mut sum = [0.0; LANES];

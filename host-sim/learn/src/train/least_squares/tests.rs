@@ -3,8 +3,8 @@ use nalgebra::{DMatrix, DVector};
 use super::*;
 use taxel_data::random::{Purpose, Random, Stream};
 
-/// The batch oracle: ridge regression with penalty 1/δ through nalgebra's QR decomposition of all
-/// samples at once.
+/// Oracle by batch: ridge regression with penalty 1/δ through nalgebra's QR decomposition of all samples
+/// at once.
 pub(in super::super) fn fit_batch(
     regressors: &Regressors<'_>,
     scaled: &[f64],
@@ -33,7 +33,7 @@ pub(in super::super) fn fit_batch(
     weights
 }
 
-/// The recursive oracle: every sample through the device's own recursion.
+/// Oracle by recursion: every sample through the device's own recursive least squares.
 fn recursive(design: &impl Design, targets: &[f64], outputs: usize, covariance: f64) -> Factor {
     let n = design.regressors();
     let (mut root, mut projection) = (vec![0.0; n * n], vec![0.0; n * outputs]);
@@ -92,13 +92,13 @@ impl Case {
 }
 
 #[test]
-fn blocks_give_the_weights_of_the_recursion_whatever_the_shape() {
+fn groups_of_rows_give_the_weights_of_the_recursion_whatever_the_shape() {
     let shapes = [
-        // Samples, centres, inputs, outputs: partial blocks, panels and tiles of every kind.
+        // Samples, centres, inputs, outputs: partial groups of rows, panels and tiles of every kind.
         (1, 1, 1, 1),
         (7, 3, 2, 1),
-        (BLOCK - 1, 22, 2, 3),
-        (BLOCK + 1, 23, 1, 8),
+        (ROWS_AT_ONCE - 1, 22, 2, 3),
+        (ROWS_AT_ONCE + 1, 23, 1, 8),
         (400, 24, 3, 9),
         (1500, 47, 5, 2),
         (2600, 60, 4, 17),
@@ -121,7 +121,7 @@ fn blocks_give_the_weights_of_the_recursion_whatever_the_shape() {
 }
 
 #[test]
-fn blocks_predict_as_the_recursion_does_where_regressors_are_all_but_dependent() {
+fn groups_of_rows_predict_as_the_recursion_does_where_regressors_are_all_but_dependent() {
     let case = Case::new(3000, 48, 2, 3);
     let regressors = case.regressors(0.05, true);
     let design = regressors.of(&case.scaled);
@@ -130,7 +130,8 @@ fn blocks_predict_as_the_recursion_does_where_regressors_are_all_but_dependent()
     design.fill(0..3000, &mut h);
     let singular = DMatrix::from_row_slice(3000, n, &h).singular_values();
     assert!(singular.max() / singular.min() > 1e12, "the set must be hard");
-    // Rounding grows with the condition of R, which the penalty caps: about 4e5 and 1e7 for the last two.
+    // Rounding grows with the condition of R, which the penalty limits to about 4e5 and 1e7 for the last
+    // two.
     for (covariance, allowed) in [(1.0, 1e-10), (1e6, 1e-10), (1e9, 1e-9)] {
         let blocked = Factor::new(&design, &case.targets, 3, covariance);
         let recursive = recursive(&design, &case.targets, 3, covariance);
@@ -142,7 +143,7 @@ fn blocks_predict_as_the_recursion_does_where_regressors_are_all_but_dependent()
 }
 
 #[test]
-fn blocks_of_activations_are_those_of_single_samples() {
+fn groups_of_activations_are_those_of_single_samples() {
     let case = Case::new(50, 37, 7, 1);
     for decay in [0.1, 5.0, 900.0] {
         let regressors = case.regressors(decay, true);
@@ -153,7 +154,7 @@ fn blocks_of_activations_are_those_of_single_samples() {
         for (line, blocked) in case.scaled.chunks_exact(7).zip(blocked.chunks_exact(n)) {
             regressors.evaluate(line, &mut single);
             for (blocked, single) in blocked.iter().zip(&single) {
-                // An exponent of −700 carries its own rounding into the value; below come subnormals.
+                // An exponent of −700 carries its own rounding into the value; below it come subnormals.
                 let allowed = 1e-15 * (1.0 - single.max(1e-300).ln()) * single + 1e-307;
                 assert!((blocked - single).abs() <= allowed, "{blocked} and {single}");
             }
@@ -183,7 +184,7 @@ fn regressors_that_are_never_excited_get_no_weight() {
         }
         fn fill(&self, samples: Range<usize>, values: &mut [f64]) {
             for (i, row) in samples.zip(values.chunks_exact_mut(30)) {
-                // Below the root of what an f64 holds: squares are nothing.
+                // Below the root of the smallest f64: squares underflow to 0.
                 row.fill(1e-170);
                 row[i % 15] = 1.0;
             }

@@ -1,14 +1,15 @@
-//! Blocked QR decomposition of a matrix that arrives a few rows at a time.
+//! QR decomposition of a matrix that arrives a few rows at a time.
 //!
-//! [`Triangle`] keeps the upper triangle R of the rows so far, and the targets z transformed with
-//! them. A block of rows B below it is annihilated by Householder reflections, a panel of columns at
-//! a time, whose product is applied to the columns on their right as I − V·T·Vᵀ (Schreiber & Van
-//! Loan, "A storage-efficient WY representation for products of Householder transformations",
-//! SIAM J. Sci. Stat. Comput. 10, 1989). Above B, R is triangular, so V = [I; U] with a dense U
-//! the height of B, and the work is 2·n² operations a row (Golub & Van Loan, *Matrix
-//! Computations*, §12.5; as TSQR by Demmel et al., SIAM J. Sci. Comput. 34, 2012, when triangles
-//! are absorbed by triangles). Orthogonal transformations do not square the condition number, as
-//! normal equations would.
+//! [`Triangle`] keeps the upper triangle R of the rows so far, and the targets z transformed with them.
+//! New rows B below it are annihilated by Householder reflections, a panel of columns at a time. The
+//! product of a panel's reflections is applied to the columns on their right as I − V·T·Vᵀ (Schreiber &
+//! Van Loan, "A storage-efficient WY representation for products of Householder transformations", SIAM
+//! J. Sci. Stat. Comput. 10, 1989).
+//!
+//! Above B, R is triangular, so V = [I; U] with a dense U the height of B, and the work is 2·n²
+//! operations a row (Golub & Van Loan, *Matrix Computations*, §12.5). Triangles absorb triangles as in
+//! TSQR (Demmel et al., SIAM J. Sci. Comput. 34, 2012). Orthogonal transformations do not square the
+//! condition number, as normal equations would.
 //!
 //! The order of operations is fixed by the shapes alone, and nothing is contracted: the result is the
 //! same on every machine.
@@ -20,30 +21,30 @@ use taxel_data::simd::widest;
 
 /// Columns in a tile, which stand side by side in memory.
 const LANES: usize = 8;
-/// Columns whose reflections are applied to the rest at once.
+/// Columns in a panel, whose reflections are applied to the rest at once.
 const PANEL: usize = 24;
 /// Rows that are annihilated at once: U, and a tile beside it, stay in the first cache.
-pub(super) const BLOCK: usize = 144;
-/// Rows that a product is computed for at a time: 6 × 8 sums fill the vector registers.
+pub(super) const ROWS_AT_ONCE: usize = 144;
+/// Rows for which a product is computed at a time: 6 × 8 sums fill the vector registers.
 const STRIP: usize = 6;
-/// A column whose squares sum to less holds nothing but underflow.
+/// Sum of squares below which a column holds nothing but underflow.
 const NEGLIGIBLE: f64 = 1e-280;
 
-/// One row of a tile: a cache line.
+/// Row of a tile: a cache line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(align(64))]
 struct Tile([f64; LANES]);
 
 const BLANK: Tile = Tile([0.0; LANES]);
 
-/// One row of a panel: whole cache lines.
+/// Row of a panel: whole cache lines.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(align(64))]
 struct PanelRow([f64; PANEL]);
 
 const BLANK_ROW: PanelRow = PanelRow([0.0; PANEL]);
 
-/// The columns of [R | z], and of blocks below it: tile after tile, each from top to bottom. The
+/// Columns of [R | z] and of the new rows below it: tile after tile, each from top to bottom. The
 /// regressors are filled up with zeros to whole panels, the outputs to whole tiles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Columns {
@@ -66,29 +67,29 @@ impl Columns {
     }
 }
 
-/// R and z of all rows so far.
+/// Triangle R and transformed targets z of all rows so far.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Triangle {
     columns: Columns,
-    /// `panels · PANEL` rows a tile.
+    /// Tiles of `panels · PANEL` rows each.
     tiles: Vec<Tile>,
 }
 
-/// Up to [`BLOCK`] rows of regressors and targets.
+/// New rows of regressors and targets, up to [`ROWS_AT_ONCE`].
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Block {
+pub(super) struct NewRows {
     columns: Columns,
-    /// [`BLOCK`] rows a tile; those that were not set are 0 and change nothing.
+    /// Tiles of [`ROWS_AT_ONCE`] rows each; rows that were not set are 0 and change nothing.
     tiles: Vec<Tile>,
-    /// Working space: [`BLOCK`] rows of one panel.
+    /// Working space: [`ROWS_AT_ONCE`] rows of one panel.
     panel: Vec<PanelRow>,
 }
 
-impl Block {
+impl NewRows {
     pub(super) fn new(regressors: usize, outputs: usize) -> Self {
         let columns = Columns { regressors, outputs };
-        let tiles = vec![BLANK; columns.tiles() * BLOCK];
-        Self { columns, tiles, panel: vec![BLANK_ROW; BLOCK] }
+        let tiles = vec![BLANK; columns.tiles() * ROWS_AT_ONCE];
+        Self { columns, tiles, panel: vec![BLANK_ROW; ROWS_AT_ONCE] }
     }
 
     pub(super) fn clear(&mut self) {
@@ -97,10 +98,10 @@ impl Block {
 
     /// Sets one row.
     pub(super) fn set(&mut self, row: usize, regressors: &[f64], targets: &[f64]) {
-        let after = self.columns.panels() * (PANEL / LANES) * BLOCK;
+        let after = self.columns.panels() * (PANEL / LANES) * ROWS_AT_ONCE;
         for (values, from) in [(regressors, 0), (targets, after)] {
             let (whole, rest) = values.as_chunks::<LANES>();
-            let mut places = self.tiles[from + row..].iter_mut().step_by(BLOCK);
+            let mut places = self.tiles[from + row..].iter_mut().step_by(ROWS_AT_ONCE);
             whole.iter().zip(&mut places).for_each(|(values, place)| place.0 = *values);
             if let (false, Some(place)) = (rest.is_empty(), places.next()) {
                 place.0[..rest.len()].copy_from_slice(rest);
@@ -110,7 +111,7 @@ impl Block {
 }
 
 impl Triangle {
-    /// No rows yet: R = 0.
+    /// Triangle of no rows: R = 0.
     pub(super) fn new(regressors: usize, outputs: usize) -> Self {
         let columns = Columns { regressors, outputs };
         let rows = columns.panels() * PANEL;
@@ -129,40 +130,43 @@ impl Triangle {
         self.columns.panels() * PANEL
     }
 
-    /// Takes in the rows of `block`, which is working space afterwards.
-    pub(super) fn absorb(&mut self, block: &mut Block) {
-        self.absorb_from(block, 0);
+    /// Absorbs the rows of `new`, which is working space afterwards.
+    pub(super) fn absorb(&mut self, new: &mut NewRows) {
+        self.absorb_from(new, 0);
     }
 
-    /// Takes in all rows that `other` has taken in.
+    /// Absorbs all rows that `other` has absorbed.
     pub(super) fn merge(&mut self, other: &Self) {
         let rows = other.rows();
-        let mut block = Block::new(self.columns.regressors, self.columns.outputs);
-        for first in (0..rows).step_by(BLOCK) {
-            let count = BLOCK.min(rows - first);
-            block.clear();
-            let tiles = block.tiles.chunks_exact_mut(BLOCK).zip(other.tiles.chunks_exact(rows));
+        let mut rows_of_other = NewRows::new(self.columns.regressors, self.columns.outputs);
+        for first in (0..rows).step_by(ROWS_AT_ONCE) {
+            let count = ROWS_AT_ONCE.min(rows - first);
+            rows_of_other.clear();
+            let tiles = rows_of_other
+                .tiles
+                .chunks_exact_mut(ROWS_AT_ONCE)
+                .zip(other.tiles.chunks_exact(rows));
             tiles.for_each(|(to, from)| to[..count].copy_from_slice(&from[first..first + count]));
             // A triangle's rows are 0 on the left of its diagonal.
-            self.absorb_from(&mut block, first / PANEL);
+            self.absorb_from(&mut rows_of_other, first / PANEL);
         }
     }
 
-    fn absorb_from(&mut self, block: &mut Block, first_panel: usize) {
+    fn absorb_from(&mut self, new: &mut NewRows, first_panel: usize) {
         let (columns, rows) = (self.columns, self.rows());
         let tiles = &mut self.tiles;
         widest(
             #[inline(always)]
             || {
-                let u = block.panel.first_chunk_mut().expect("a block of rows");
+                let u = new.panel.first_chunk_mut().expect("rows of one panel");
                 for panel in first_panel..columns.panels() {
-                    annihilate(columns, rows, tiles, &mut block.tiles, panel, u);
+                    annihilate(columns, rows, tiles, &mut new.tiles, panel, u);
                 }
             },
         );
     }
 
-    /// R (`n × n`, row-major, its diagonal not negative) and z (`n × outputs`).
+    /// Returns R (`n × n`, row-major, its diagonal not negative) and z (`n × outputs`).
     pub(super) fn into_root_and_projection(self) -> (Vec<f64>, Vec<f64>) {
         let (n, outputs, rows) = (self.columns.regressors, self.columns.outputs, self.rows());
         let at =
@@ -177,22 +181,22 @@ impl Triangle {
     }
 }
 
-/// Annihilates one panel of a block against its rows of R, and transforms all that is on its right.
+/// Annihilates one panel of new rows against its rows of R, and transforms all columns on its right.
 #[inline(always)]
 fn annihilate(
     columns: Columns,
     rows: usize,
     triangle: &mut [Tile],
-    block: &mut [Tile],
+    new_tiles: &mut [Tile],
     panel: usize,
-    u: &mut [PanelRow; BLOCK],
+    u: &mut [PanelRow; ROWS_AT_ONCE],
 ) {
     let first_tile = panel * (PANEL / LANES);
     let head_rows = panel * PANEL..(panel + 1) * PANEL;
     let mut head = [BLANK_ROW; PANEL];
     for t in 0..PANEL / LANES {
         let lanes = t * LANES..(t + 1) * LANES;
-        let from = &block[(first_tile + t) * BLOCK..][..BLOCK];
+        let from = &new_tiles[(first_tile + t) * ROWS_AT_ONCE..][..ROWS_AT_ONCE];
         u.iter_mut().zip(from).for_each(|(u, from)| u.0[lanes.clone()].copy_from_slice(&from.0));
         let from = &triangle[(first_tile + t) * rows..][head_rows.clone()];
         head.iter_mut().zip(from).for_each(|(h, from)| h.0[lanes.clone()].copy_from_slice(&from.0));
@@ -207,20 +211,20 @@ fn annihilate(
         if !columns.is_blank(tile) {
             let above = &mut triangle[tile * rows..][head_rows.clone()];
             let above = above.first_chunk_mut().expect("a panel of rows");
-            let below = &mut block[tile * BLOCK..][..BLOCK];
-            transform(u, &factor, above, below.first_chunk_mut().expect("a block of rows"));
+            let below = &mut new_tiles[tile * ROWS_AT_ONCE..][..ROWS_AT_ONCE];
+            transform(u, &factor, above, below.first_chunk_mut().expect("rows of one panel"));
         }
     }
 }
 
-/// Reduces [head; u] to [R; 0], head being upper triangular. Leaves R in `head`, U in `u`, and
+/// Reduces [head; u] to [R; 0], with an upper triangular head. Leaves R in `head` and U in `u`, and
 /// returns T.
 #[inline(always)]
-fn reflect(head: &mut [PanelRow; PANEL], u: &mut [PanelRow; BLOCK]) -> [PanelRow; PANEL] {
+fn reflect(head: &mut [PanelRow; PANEL], u: &mut [PanelRow; ROWS_AT_ONCE]) -> [PanelRow; PANEL] {
     let mut t = [BLANK_ROW; PANEL];
-    // While they are made, columns of U lack these factors.
+    // Factors that columns of U lack while they are computed.
     let mut scales = [0.0; PANEL];
-    // Of one column with all columns, from its own row of `u` on downwards.
+    // Products of one column with all columns, from its own row of `u` on downwards.
     let mut products = [0.0; PANEL];
     for PanelRow(row) in u.iter() {
         (0..PANEL).for_each(|c| products[c] += row[0] * row[c]);
@@ -255,7 +259,7 @@ fn reflect(head: &mut [PanelRow; PANEL], u: &mut [PanelRow; BLOCK]) -> [PanelRow
 
 /// Applies the reflection of column `j`, and returns the products of column `j` + 1 with all columns.
 #[inline(always)]
-fn sweep(u: &mut [PanelRow; BLOCK], j: usize, update: &[f64; PANEL]) -> [f64; PANEL] {
+fn sweep(u: &mut [PanelRow; ROWS_AT_ONCE], j: usize, update: &[f64; PANEL]) -> [f64; PANEL] {
     let (mut products, next_update) = ([0.0; PANEL], update[j + 1]);
     for PanelRow(row) in u.iter_mut() {
         let own = row[j];
@@ -268,13 +272,13 @@ fn sweep(u: &mut [PanelRow; BLOCK], j: usize, update: &[f64; PANEL]) -> [f64; PA
     products
 }
 
-/// [above; below] ← (I − V·Tᵀ·Vᵀ)·[above; below] for one tile of columns.
+/// Transforms one tile of columns: [above; below] ← (I − V·Tᵀ·Vᵀ)·[above; below].
 #[inline(always)]
 fn transform(
-    u: &[PanelRow; BLOCK],
+    u: &[PanelRow; ROWS_AT_ONCE],
     t: &[PanelRow; PANEL],
     above: &mut [Tile; PANEL],
-    below: &mut [Tile; BLOCK],
+    below: &mut [Tile; ROWS_AT_ONCE],
 ) {
     let (mut sums, mut w) = (*above, [BLANK; PANEL]);
     for (strip, sums) in sums.as_chunks_mut::<STRIP>().0.iter_mut().enumerate() {
@@ -301,7 +305,7 @@ fn transform(
     }
 }
 
-/// `sums` + Aᵀ·B for [`STRIP`] columns of A, from the one at `first` on.
+/// Adds Aᵀ·B to `sums` for [`STRIP`] columns of A, from the one at `first` on.
 #[inline(always)]
 fn add_products(
     mut sums: [Tile; STRIP],

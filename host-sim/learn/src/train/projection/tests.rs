@@ -3,7 +3,7 @@ use taxel_simulate::{World, synthesise};
 
 use super::*;
 
-/// Readings r1…r6 in two rows of three; outputs are known sums of them.
+/// Data set of readings r1…r6 in two rows of three; the outputs are known sums of them.
 fn known(frames: usize, noise: f64) -> Dataset {
     let names = |prefix: &str, count: usize| (1..=count).map(|n| format!("{prefix}{n}")).collect();
     let mut dataset = Dataset::empty(names("r", 6), names("y", 4), 2, frames);
@@ -22,17 +22,17 @@ fn known(frames: usize, noise: f64) -> Dataset {
     dataset
 }
 
-fn projection<'b>(dataset: &Dataset, block: &'b [f32]) -> Projection<'b> {
-    Projection::new(dataset.inputs.names.len(), features_of(dataset), block).unwrap()
+fn projection<'b>(dataset: &Dataset, parameters: &'b [f32]) -> Projection<'b> {
+    Projection::new(dataset.inputs.names.len(), features_of(dataset), parameters).unwrap()
 }
 
 #[test]
 fn features_carry_all_that_outputs_take_from_readings() {
     let data = known(400, 0.01);
-    let block = fit(&data).unwrap();
-    let seen = apply(projection(&data, &block), &data);
+    let parameters = fit(&data).unwrap();
+    let seen = apply(projection(&data, &parameters), &data);
     assert_eq!((seen.rows, seen.inputs.names.len(), seen.inputs.len()), (1, 3, 400));
-    // Two sums decide all outputs: two features follow them to the noise, the third is the noise's.
+    // Two sums decide all outputs: two features follow them to the noise, and the third is noise.
     let spans: Vec<f64> = seen.inputs.ranges().iter().map(|[low, high]| high - low).collect();
     assert!(spans[0] > 1.0 && spans[1] > 1.0 && spans[2] < 0.02, "{spans:?}");
     let of = |table: &Table| DMatrix::from_row_slice(table.len(), table.names.len(), &table.values);
@@ -42,7 +42,7 @@ fn features_carry_all_that_outputs_take_from_readings() {
     let worst = (&x * fitted - y).amax();
     assert!(worst < 0.02, "{worst}");
     // The reading that never changes has no part.
-    let parts = &block[3..];
+    let parts = &parameters[3..];
     assert_eq!(parts[5 * 3..], [0.0; 3]);
 }
 
@@ -53,21 +53,21 @@ fn the_projection_does_not_depend_on_the_number_of_threads() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| fit(&data).unwrap())
     };
-    let block = with(1);
-    assert_eq!(block, with(3));
-    assert_eq!(block.len(), 18 * 145);
-    assert!(block.iter().all(|value| value.is_finite()));
+    let parameters = with(1);
+    assert_eq!(parameters, with(3));
+    assert_eq!(parameters.len(), 18 * 145);
+    assert!(parameters.iter().all(|value| value.is_finite()));
 }
 
 #[test]
 fn a_line_is_projected_as_on_the_device_and_nan_where_a_reading_is_missing() {
     let mut data = known(20, 0.0);
     data.inputs.values[7] = f64::NAN;
-    let block = fit(&known(20, 0.0)).unwrap();
-    let seen = features(projection(&data, &block), 3, 6, &data.inputs.values);
+    let parameters = fit(&known(20, 0.0)).unwrap();
+    let seen = features(projection(&data, &parameters), 3, 6, &data.inputs.values);
     let line: Vec<f32> = data.inputs.values[..6].iter().map(|r| *r as f32).collect();
     let mut expected = [0.0; 3];
-    projection(&data, &block).project(&line, &mut expected);
+    projection(&data, &parameters).project(&line, &mut expected);
     assert_eq!(seen[..3], expected.map(f64::from));
     assert!(seen[3..6].iter().all(|feature| feature.is_nan()));
 }

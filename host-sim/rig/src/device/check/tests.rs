@@ -1,4 +1,4 @@
-//! Findings: what counts as good.
+//! Findings, and which of them count as good.
 
 use super::*;
 

@@ -1,4 +1,4 @@
-//! Uploads that must not come into force, and one that must.
+//! Check of uploads: damaged and interrupted ones must not become active, and a good one must.
 
 use firmware::link::message::{Refusal, Request, UploadState, UploadStep};
 use model_core::checksum::CRC_32;
@@ -14,30 +14,30 @@ use crate::device::expected::Expected;
 use crate::device::{Device, Wire, request_bytes, upload};
 use crate::error::{Error, Result};
 
-/// How uploads went.
+/// Findings about uploads.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct UploadFindings {
-    /// Bytes of the model that was uploaded again and again.
+    /// Size in bytes of the model that was uploaded again and again.
     pub blob_bytes: usize,
-    /// Whether a good model came into force, and the old one again after it.
+    /// Whether a good model became active, and then the previous one again.
     pub good_came_into_force: bool,
-    /// Damaged models.
+    /// Number of damaged models uploaded.
     pub damaged: usize,
-    /// Those after which the device refused, and the old model was still in force.
+    /// Number of damaged models that the device refused, with the previous model still active.
     pub damaged_refused: usize,
-    /// Uploads broken off.
+    /// Number of uploads broken off.
     pub interrupted: usize,
-    /// Those after which, and after a restart, the old model was in force.
+    /// Number of these after which, also after a restart, the previous model was active.
     pub old_stayed: usize,
 }
 
 /// Name of the small models.
 const SMALL: &str = "small";
 
-/// A small model of the right shape, quick to upload.
+/// Small model of the right shape, quick to upload.
 fn small_model(world: &World, centres: usize) -> Result<ModelBlob> {
     let mut frames = synthesise(world, Stream::Training, 64);
-    // Names would be most of it.
+    // Long names would be most of the blob.
     for names in [&mut frames.inputs.names, &mut frames.outputs.names] {
         names.fill("x".into());
     }
@@ -56,14 +56,15 @@ pub(super) fn check_uploads<W: Wire>(
 ) -> Result<UploadFindings> {
     let chunk_bytes = device.identify()?.chunk_bytes;
     let (old, new) = (small_model(world, 2)?, small_model(world, 1)?);
-    // First, while the model is where it was when the device started: an emulator that restarts puts
-    // it there again, over whatever had been written to that slot, but not to the other.
+    // Interruptions come first, while the model is where it was when the device started. An emulator
+    // that restarts puts it there again, over whatever had been written to that slot, but not to the
+    // other.
     let (interrupted, old_stayed) = if plan.interruptions {
         break_uploads_off(device, new.bytes(), chunk_bytes, model.parse().crc(), progress)?
     } else {
         (0, 0)
     };
-    // `replace` fails unless the device then says that the model is in force.
+    // `replace` fails unless the device then reports the model as active.
     upload::replace(device, old.bytes(), progress)?;
     let in_force = old.parse().crc();
 
@@ -87,8 +88,8 @@ pub(super) fn check_uploads<W: Wire>(
     })
 }
 
-/// Breaks an upload off before its first chunk and after each: how often, and how often the model of
-/// `crc_32` was in force afterwards, and after a restart.
+/// Breaks an upload off before its first chunk and after each. Returns how often, and how often the
+/// model with CRC-32 `crc_32` was active afterwards and after a restart.
 fn break_uploads_off<W: Wire>(
     device: &mut Device<W>,
     blob: &[u8],
@@ -125,11 +126,11 @@ fn expect_receiving(answer: std::result::Result<UploadState, Refusal>) -> Result
     }
 }
 
-/// Ways in which an upload can be damaged.
+/// Number of ways in which an upload is damaged.
 const KINDS: usize = 7;
 
-/// Uploads `blob` damaged in one of the ways that there are, in turn; whether the device refused it
-/// in the end.
+/// Uploads `blob` damaged in one of these ways, in turn, and returns whether the device refused it in
+/// the end.
 fn upload_damaged<W: Wire>(
     device: &mut Device<W>,
     blob: &[u8],
@@ -145,7 +146,7 @@ fn upload_damaged<W: Wire>(
     Ok(outcome.is_err())
 }
 
-/// `blob` with damage within.
+/// Copy of `blob` with damage within.
 fn damage(blob: &[u8], index: usize, random: &mut Random) -> Vec<u8> {
     let mut damaged = blob.to_vec();
     match index % KINDS {
@@ -159,13 +160,13 @@ fn damage(blob: &[u8], index: usize, random: &mut Random) -> Vec<u8> {
         2 => damaged.truncate(4 * random.below(blob.len() / 4)),
         3 => damaged.extend([0; 4]),
         4 => {
-            // Not a number, where a weight stood, under a CRC that says all is well.
+            // A weight that is not a number, under a correct CRC.
             let start = blob.len() - 8 - 4 * random.below(64);
             damaged[start..start + 4].copy_from_slice(&f32::NAN.to_le_bytes());
             seal(&mut damaged);
         }
         _ => {
-            // A number of the shape, under such a CRC.
+            // A wrong number in the shape, under a correct CRC.
             damaged[9 + random.below(5)] ^= 1 << random.below(7);
             seal(&mut damaged);
         }
@@ -180,7 +181,7 @@ fn seal(blob: &mut [u8]) {
     }
 }
 
-/// As a host would that does not look at answers: one chunk is damaged on the line, the rest follow.
+/// Uploads with one damaged chunk, like a host that does not look at answers and sends the rest.
 fn upload_with_a_chunk_lost<W: Wire>(
     device: &mut Device<W>,
     blob: &[u8],
