@@ -148,7 +148,8 @@ pub struct ZeroPotential<const ROWS: usize, const COLS: usize> {
 }
 
 impl<const ROWS: usize, const COLS: usize> ZeroPotential<ROWS, COLS> {
-    /// Typical constants: 0.2 V and 560 Ω (3.6 mA a column, 65 mA a row, readings from 36 Ω), and a switch of 0.26 Ω.
+    /// Typical constants: 0.2 V and 560 Ω (3.6 mA a column, 65 mA a row, readings from 36 Ω), and a switch of 0.26
+    /// Ω.
     pub const TYPICAL: Self = Self {
         reference_v: 3.3,
         drive_v: 0.2,

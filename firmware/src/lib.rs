@@ -1,7 +1,7 @@
 //! The program of a board, as a library that is tested on the host.
 //!
-//! [`readout`] scans frames over embedded-hal; [`circuit`] converts counts to Ω, and [`timing`] computes how long a
-//! scan takes. [`store`] keeps models in two slots of flash. [`link`] carries messages to and from the host.
+//! [`readout`] scans frames over embedded-hal; [`circuit`] converts counts to Ω, and [`timing`] computes how long
+//! a scan takes. [`store`] keeps models in two slots of flash. [`link`] carries messages to and from the host.
 //! [`App`](app::App) is the loop that joins them and decodes with the model in force. A board implements
 //! [`platform`]. Nothing here allocates, panics or waits without bound; the weights stay in flash.
 //!

@@ -28,7 +28,8 @@ pub trait Slot {
     /// [`FlashError`]: the flash could not be erased.
     fn erase(&mut self) -> Result<(), FlashError>;
 
-    /// Writes `bytes` from `offset` on, where the slot must be erased. Offset and length must be multiples of four.
+    /// Writes `bytes` from `offset` on, where the slot must be erased. Offset and length must be multiples of
+    /// four.
     ///
     /// # Errors
     /// [`FlashError`]: the flash could not be written, or holds other bytes afterwards.
@@ -38,8 +39,8 @@ pub trait Slot {
 /// The blob at the start of `slot`, without the bytes behind it.
 ///
 /// A flash slot is a whole number of erase units, and so larger than its blob; the rest is erased (0xFF) or left
-/// from an older blob. Only the first bytes are checked. A slot that does not start with a blob, or is shorter than
-/// it, is returned whole, so that the error of loading it names the cause.
+/// from an older blob. Only the first bytes are checked. A slot that does not start with a blob, or is shorter
+/// than it, is returned whole, so that the error of loading it names the cause.
 ///
 /// ```
 /// use firmware::store::blob_in_slot;
@@ -80,8 +81,8 @@ fn record(generation: u32, blob_crc: u32) -> [u8; RECORD_BYTES] {
 
 /// Generation of the model in `slot` number `index`: the larger, the more recent; `None` without a valid model.
 ///
-/// Uploaded models count from 1. Slot 0 may also hold a model without a record, flashed together with the firmware:
-/// its generation is 0. Slot 1 holds only uploaded models.
+/// Uploaded models count from 1. Slot 0 may also hold a model without a record, flashed together with the
+/// firmware: its generation is 0. Slot 1 holds only uploaded models.
 #[must_use]
 pub fn generation(index: usize, slot: &[u8]) -> Option<u32> {
     let (_, found) = slot.split_last_chunk::<RECORD_BYTES>()?;

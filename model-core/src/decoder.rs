@@ -131,8 +131,8 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize>
 
     /// Decodes one frame (Ω) to an estimate in the units of the model's outputs.
     ///
-    /// A row with a missing reading is marked in the estimate's status and does not affect the other rows. Behind a
-    /// [`Projection`] one missing reading marks all rows.
+    /// A row with a missing reading is marked in the estimate's status and does not affect the other rows. Behind
+    /// a [`Projection`] one missing reading marks all rows.
     #[must_use]
     pub fn decode(&self, frame: &Frame<ROWS, COLS>) -> Estimate<ROWS, OUTPUTS> {
         let mut estimate = Estimate {
@@ -148,8 +148,8 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize>
         self.decode_gated_into(frame, None, estimate);
     }
 
-    /// Decodes one frame as [`decode_into`](Self::decode_into) does, but skips rows that `gate` finds at rest: they
-    /// get the outputs at rest. All other rows are decoded as without a gate, to the bit.
+    /// Decodes one frame as [`decode_into`](Self::decode_into) does, but skips rows that `gate` finds at rest:
+    /// they get the outputs at rest. All other rows are decoded as without a gate, to the bit.
     ///
     /// Behind a [`Projection`], rows are not gated one by one: all are at rest, or all are decoded. A reading that
     /// is missing anywhere marks them all.

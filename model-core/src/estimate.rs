@@ -5,8 +5,8 @@
 pub enum RowStatus {
     /// The row was decoded; its outputs are valid.
     Decoded,
-    /// At least one reading of the row was missing (not a finite number); the outputs are NaN. Behind a projection,
-    /// a missing reading of any row counts.
+    /// At least one reading of the row was missing (not a finite number); the outputs are NaN. Behind a
+    /// projection, a missing reading of any row counts.
     MissingReading,
     /// Readings or weights were so large that an output overflowed; the outputs are NaN.
     Overflow,

@@ -53,8 +53,8 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize> Gate<'a, RO
         (tolerance > 0.0 && tolerance < 1.0).then_some(Self { baseline, rest, tolerance })
     }
 
-    /// Copies the outputs at rest to `outputs` if the `readings` (Ω) of row `row` are at rest; returns whether they
-    /// are.
+    /// Copies the outputs at rest to `outputs` if the `readings` (Ω) of row `row` are at rest; returns whether
+    /// they are.
     pub fn give_rest(
         &self,
         row: usize,

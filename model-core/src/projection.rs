@@ -67,7 +67,8 @@ impl<'a> Projection<'a> {
         self.project_portably(readings, features);
     }
 
-    /// Whether the assembly can project so many `readings`: an even number, all those of the block, to 18 features.
+    /// Whether the assembly can project so many `readings`: an even number, all those of the block, to 18
+    /// features.
     #[cfg(any(cortex_m4f, test))]
     fn suits_assembly(&self, readings: usize) -> bool {
         self.features == cortex_m4::INPUTS
@@ -75,7 +76,8 @@ impl<'a> Projection<'a> {
             && self.block.len() == block_floats(readings, self.features)
     }
 
-    /// Projects as [`project`](Self::project) does, to the bit, in portable Rust: the compiled twin of the assembly.
+    /// Projects as [`project`](Self::project) does, to the bit, in portable Rust: the compiled twin of the
+    /// assembly.
     pub fn project_portably(&self, readings: &[f32], features: &mut [f32]) {
         let (start, parts) = self.block.split_at_checked(self.features).unwrap_or_default();
         features.iter_mut().zip(start).for_each(|(feature, start)| *feature = *start);

@@ -113,8 +113,9 @@ impl<'a> Network<'a> {
 
     /// Infers `output` (one value an output, in its unit) from one row of `reading`s (one an input, in its unit).
     ///
-    /// `scaled` is working space of one value an input. A NaN reading makes the outputs meaningless: check readings
-    /// first ([`Decoder`](crate::Decoder) does). Inlined, so that lengths known to the compiler reach the loops.
+    /// `scaled` is working space of one value an input. A NaN reading makes the outputs meaningless: check
+    /// readings first ([`Decoder`](crate::Decoder) does). Inlined, so that lengths known to the compiler reach the
+    /// loops.
     ///
     /// # Errors
     /// [`NetworkError::Length`] if a buffer does not fit the shape; `output` is then untouched.

@@ -29,8 +29,8 @@ pub fn scale(reading: f32, minimum: f32, per_span: f32) -> f32 {
 /// Half the width of [`CLAMP`], in spans of the training range.
 pub const HALF_RANGE: f32 = (CLAMP[1] - CLAMP[0]) / 2.0;
 
-/// Number of units in [`HALF_RANGE`]; networks with expanded distances count inputs in these units, from the middle
-/// of the training range.
+/// Number of units in [`HALF_RANGE`]; networks with expanded distances count inputs in these units, from the
+/// middle of the training range.
 ///
 /// The conversion to `i32`, which saturates, is then the clamp: it takes a Cortex-M4F one cycle, where comparisons
 /// take eight.

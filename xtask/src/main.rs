@@ -1,4 +1,4 @@
-//! One command for everything that people and CI run: `cargo xtask help`.
+//! Commands for everything that people and CI run; `cargo xtask help` lists them.
 
 mod process;
 mod structure;

@@ -59,7 +59,8 @@ impl Region {
     #[must_use]
     pub unsafe fn bytes_mut(&mut self) -> &mut [u8] {
         let start = ptr::with_exposed_provenance_mut(self.start);
-        // SAFETY: as in `bytes`; `self` is borrowed mutably, and the caller ensures that the memory can be written.
+        // SAFETY: as in `bytes`; `self` is borrowed mutably, and the caller ensures that the memory can be
+        // written.
         unsafe { slice::from_raw_parts_mut(start, self.length) }
     }
 }

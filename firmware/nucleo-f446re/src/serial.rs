@@ -33,8 +33,8 @@ struct Wires {
 }
 
 impl Wires {
-    /// Takes a received byte, if there is one. A damaged byte, or one without room, is dropped: the link's checksum
-    /// detects that.
+    /// Takes a received byte, if there is one. A damaged byte, or one without room, is dropped: the link's
+    /// checksum detects that.
     fn receive(&mut self) {
         if let Ok(byte) = self.rx.read() {
             let _ = self.received.enqueue(byte);

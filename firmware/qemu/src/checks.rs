@@ -121,8 +121,8 @@ fn infer_by_twin(network: &Network<'_>, inputs: &[f32; COLS], outputs: &mut [f32
     Some(())
 }
 
-/// Number of rows of [`MANY`] frames that the model in `blob` decodes, and how many of them the compiled twin decodes
-/// to other bits. `None` if the blob does not load, or its number format has no twin.
+/// Number of rows of [`MANY`] frames that the model in `blob` decodes, and how many of them the compiled twin
+/// decodes to other bits. `None` if the blob does not load, or its number format has no twin.
 #[must_use]
 pub fn twins(blob: &[u8]) -> Option<[usize; 2]> {
     let decoder = Decoder::<ROWS, COLS, OUTPUTS>::load(blob).ok()?;

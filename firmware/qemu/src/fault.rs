@@ -75,8 +75,8 @@ extern "C" fn HardFault() -> ! {
     )
 }
 
-/// Logs the fault, and ends QEMU with a failure. `program_counter` is valid only if `stack_pointer` lies within the
-/// stack.
+/// Logs the fault, and ends QEMU with a failure. `program_counter` is valid only if `stack_pointer` lies within
+/// the stack.
 extern "C" fn report(stack_pointer: usize, program_counter: u32) -> ! {
     report_once();
     if stack_pointer < (&raw const _stack_end).addr() + LARGEST_PUSH_BYTES {

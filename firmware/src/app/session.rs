@@ -86,8 +86,8 @@ impl<
 
     /// Runs one turn of the loop: answers at most one request, and scans a frame if one is due.
     ///
-    /// The watchdog is fed at the end, unless the last scan gave no reading at all. A sensor that stays silent thus
-    /// leads to a restart, which sets up its bus again.
+    /// The watchdog is fed at the end, unless the last scan gave no reading at all. A sensor that stays silent
+    /// thus leads to a restart, which sets up its bus again.
     pub fn step(&mut self) -> Option<Leave> {
         let leave = self.serve_link();
         let core = &mut self.app.core;
@@ -208,7 +208,8 @@ impl<
         self.count_lost(sent);
     }
 
-    /// Adds the frame to the baseline that is being captured, and answers the request when the baseline is complete.
+    /// Adds the frame to the baseline that is being captured, and answers the request when the baseline is
+    /// complete.
     fn feed_baseline(&mut self, decoder: Option<&Decoder<'_, ROWS, COLS, OUTPUTS>>) {
         let Some((number, left)) = self.capture else { return };
         self.baseline.add(self.frame);

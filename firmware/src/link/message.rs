@@ -21,8 +21,8 @@ pub enum Request<'a> {
     /// Put a configuration in force until the next restart. Answered by [`Report::Configuration`], or by
     /// [`Refusal::Configuration`], which leaves the previous one in force.
     Configure(Configuration),
-    /// Average the next frames as the baseline, the sensor at rest. Answered by [`Report::Baseline`] when they have
-    /// been scanned.
+    /// Average the next frames as the baseline, the sensor at rest. Answered by [`Report::Baseline`] when they
+    /// have been scanned.
     CaptureBaseline {
         /// Number of frames, at least 1.
         frames: u16,
@@ -191,8 +191,8 @@ pub struct Configuration {
     /// Smallest relative change against the baseline that sets [`EstimateReport::CONTACT`].
     pub contact_threshold: f32,
     /// Tolerance of the gate ([`model_core::gate`]): relative change against the baseline within which a row is at
-    /// rest. Such a row is skipped, and gets the outputs of the baseline. With 0, or without a baseline, every row is
-    /// decoded.
+    /// rest. Such a row is skipped, and gets the outputs of the baseline. With 0, or without a baseline, every row
+    /// is decoded.
     pub rest_tolerance: f32,
 }
 
@@ -307,8 +307,8 @@ pub enum Refusal {
     },
     /// A chunk or a commit came without a begin.
     NoUpload,
-    /// A chunk leaves a gap, is not a multiple of four, or goes beyond the announced length; or a commit came before
-    /// all bytes were received.
+    /// A chunk leaves a gap, is not a multiple of four, or goes beyond the announced length; or a commit came
+    /// before all bytes were received.
     OutOfPlace {
         /// Number of bytes received from the start without a gap: the offset of the next chunk.
         received: u32,

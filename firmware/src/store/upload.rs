@@ -55,8 +55,8 @@ impl Upload {
     /// Writes the next chunk to `spare`. Bytes that were received before are skipped.
     ///
     /// # Errors
-    /// [`Refusal::NoUpload`] without a begin, [`Refusal::OutOfPlace`] for a chunk that leaves a gap or does not fit,
-    /// [`Refusal::Flash`] if writing fails.
+    /// [`Refusal::NoUpload`] without a begin, [`Refusal::OutOfPlace`] for a chunk that leaves a gap or does not
+    /// fit, [`Refusal::Flash`] if writing fails.
     pub fn chunk<S: Slot>(
         &mut self,
         spare: &mut S,

@@ -55,8 +55,8 @@ fn row_shape(centres: usize) -> Shape {
     Shape { inputs: COLS, centres, outputs: OUTPUTS }
 }
 
-/// A model of networks with an affine tail and without. K is no multiple of the centres that a routine takes at once.
-/// In f32, the last row's K is larger than the number of activations that the assembly keeps.
+/// A model of networks with an affine tail and without. K is no multiple of the centres that a routine takes at
+/// once. In f32, the last row's K is larger than the number of activations that the assembly keeps.
 fn of_format(format: Format) -> AlignedBytes {
     let mut numbers = Numbers::new(5);
     let of_last_row = if format == Format::F32 { 131 } else { 33 };

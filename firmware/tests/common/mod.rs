@@ -105,8 +105,8 @@ struct Power {
     gone: bool,
 }
 
-/// A slot of NOR flash. It writes whole words, only where it is erased, and can lose its power in the middle of any
-/// operation.
+/// A slot of NOR flash. It writes whole words, only where it is erased, and can lose its power in the middle of
+/// any operation.
 pub struct MockSlot {
     words: Vec<u32>,
     /// Power of both slots.

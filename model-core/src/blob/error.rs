@@ -95,8 +95,8 @@ pub enum DecodeError {
     Projection {
         /// What is wrong with the projection.
         cause: NetworkError,
-        },
-        /// The parameters of a network are not valid.
+    },
+    /// The parameters of a network are not valid.
     #[error("network {index}: {cause}")]
     Network {
         /// Index of the network, from 0.

@@ -194,7 +194,8 @@ impl<'a> Network<'a> {
     }
 
     /// Infers `output` from `scaled` inputs with the exponential `exp`. Not inlined on a device, so that other
-    /// formats need not save the registers it uses. Not generic, so that it is compiled with this crate, for speed.
+    /// formats need not save the registers it uses. Not generic, so that it is compiled with this crate, for
+    /// speed.
     #[cfg_attr(cortex_m4f, inline(never))]
     #[cfg_attr(
         not(cortex_m4f),

@@ -7,8 +7,8 @@
 //! are counted from the middle of the training range, and clamped, which makes the bound small (400 % error was
 //! seen at an offset of 100 spans).
 //!
-//! Inputs are in [`UNITS`]. b + a·x − g‖x‖² adds up in four interleaved partial sums; the first starts with b,
-//! the second with −g‖x‖². Centres are stored in groups of four; the last group may be filled up with zero weights.
+//! Inputs are in [`UNITS`]. b + a·x − g‖x‖² adds up in four interleaved partial sums; the first starts with b, the
+//! second with −g‖x‖². Centres are stored in groups of four; the last group may be filled up with zero weights.
 #![cfg_attr(
     cortex_m4f,
     expect(unsafe_code, reason = "calls to assembly, whose conditions are checked before")

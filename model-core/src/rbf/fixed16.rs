@@ -64,8 +64,8 @@ pub struct Parameters<'a> {
     pub output_scale: &'a [f32],
     /// Affine tail in pairs of inputs: `[outputs × I']`, or empty.
     pub affine: &'a [u32],
-    /// Groups of sixteen centres (`[K'/16]`): for each centre b and then the pairs of a (`[16 × (1 + I')]`), followed
-    /// by the group's output weights in pairs of centres (`[outputs × 8]`).
+    /// Groups of sixteen centres (`[K'/16]`): for each centre b and then the pairs of a (`[16 × (1 + I')]`),
+    /// followed by the group's output weights in pairs of centres (`[outputs × 8]`).
     pub centres: &'a [u32],
 }
 

@@ -69,8 +69,8 @@ pub trait Layout: Copy + Debug + PartialEq {
     /// Infers several groups of 18 outputs by the format's assembly routine.
     ///
     /// # Safety
-    /// The caller must check that `network` has 18 inputs and 18 outputs for each of `groups`, and that there is at
-    /// least one group.
+    /// The caller must check that `network` has 18 inputs and 18 outputs for each of `groups`, and that there is
+    /// at least one group.
     #[cfg(cortex_m4f)]
     unsafe fn array_routine(
         network: &Network<'_, Self>,

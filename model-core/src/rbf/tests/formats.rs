@@ -194,7 +194,8 @@ proptest! {
         let words = formula.fixed16();
         let network = fixed16::Network::try_new(shape, affine, &words).unwrap();
         prop_assert!((f64::from(network.width()) - sigma).abs() < 1e-4);
-        // The error comes from the cubic (within 1.1e-4), from rounded centres, and from weights of at most 16 bits.
+        // The error comes from the cubic (within 1.1e-4), from rounded centres, and from weights of at most 16
+        // bits.
         let error = formula.error_of(&network.into(), place);
         prop_assert!(error < 6e-4 * shape.centres as f64, "fixed16: {error}");
     }
