@@ -120,7 +120,7 @@ impl<'f> Group<'f> {
 }
 
 /// Joins the `counts` of a run's regions with the names in its `log`. The run's model has an affine tail if
-/// `affine`; only models without one give figures for [`Scope::Inference`].
+/// `affine`; only models without one give figures for [`Scope::Inference`] and [`Scope::Exponential`].
 ///
 /// # Errors
 /// Counts and names do not fit each other, or a region of known cost was counted otherwise.
