@@ -70,7 +70,7 @@ pub struct Parameters<'a> {
 }
 
 impl Parameters<'_> {
-    /// All parameters as words, one array after the other: the block that [`Network::try_new`] takes.
+    /// All parameters as words, one array after the other: the block that `Network::try_new` takes.
     pub fn words(&self) -> impl Iterator<Item = u32> {
         let bits = |value: &f32| value.to_bits();
         let before = self.input_midpoint.iter().chain(self.input_per_unit).map(bits);
