@@ -273,7 +273,7 @@ fn decode_in_assembly(
     status_of(finite.flatten(), inputs)
 }
 
-/// See [`decode_in_assembly`].
+/// Infers the outputs of a network in portable Rust, where no assembly serves ([`decode_in_assembly`]).
 #[cfg_attr(cortex_m4f, inline(never))]
 #[cfg_attr(
     not(cortex_m4f),
@@ -312,7 +312,7 @@ fn status_of(finite: Result<Finite, NetworkError>, inputs: &[f32]) -> RowStatus 
     }
 }
 
-/// See [`decode_in_rust`].
+/// Infers the outputs of a network in `f32-direct`, which has no assembly routine, and returns their status.
 #[cfg_attr(cortex_m4f, inline(never))]
 #[cfg_attr(
     not(cortex_m4f),

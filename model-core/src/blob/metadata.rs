@@ -43,7 +43,7 @@ impl<'a> Floats<'a> {
     }
 }
 
-/// How the noise of a training set was defined.
+/// Definition of the noise of a training set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum NoiseKind {
     /// No noise was added (measured data, or an ideal sensor).
@@ -61,7 +61,7 @@ pub struct Metadata<'a> {
     pub name: &'a str,
     /// CRC-64/XZ of the scene or data file that trained it.
     pub scene_digest: u64,
-    /// How the training noise was defined.
+    /// Definition of the training noise.
     pub noise_kind: NoiseKind,
     /// Training noise level p, as a fraction (0.005 is 0.5 %).
     pub noise_level: f32,
