@@ -1,8 +1,8 @@
 //! The application: scan → health → gate → decode → report, and the link, in one loop without waits.
 //!
-//! A board's program makes an [`App`] of its parts and calls [`App::run`], which returns only to be
-//! restarted. Its memory is all in [`Buffers`], for which the program has a static: nothing grows,
-//! nothing is allocated.
+//! A board's program makes an [`App`] of its parts and calls [`App::run`], which returns only when the program
+//! must restart. All large memory is in [`Buffers`], for which the program has a static: nothing grows, nothing
+//! is allocated.
 
 use model_core::{Decoder, Estimate, Frame, RowStatus};
 
@@ -13,7 +13,7 @@ use crate::platform::Platform;
 use crate::readout::{Baseline, FrameSource};
 use crate::store::{Slot, Upload, blob_in_slot, generation};
 
-// From the ground up.
+// From the ground up: a module imports only what is declared before it.
 mod configuration;
 mod frame_clock;
 mod line;
@@ -24,19 +24,19 @@ use frame_clock::FrameClock;
 use line::Line;
 pub use session::{Leave, Session};
 
-/// Bytes of the longest message of the paper's sensor, 8 × 18 floats and what belongs to them.
+/// Bytes of the longest message for the paper's sensor: 8 × 18 floats and the fields around them.
 pub const PAPER_MESSAGE_BYTES: usize = 608;
 
-/// The application of the paper's sensor.
+/// The application for the paper's sensor.
 pub type PaperApp<'m, P, F> = App<'m, P, F, 8, 18, 18, PAPER_MESSAGE_BYTES>;
 
-/// The buffers of the paper's sensor.
+/// The buffers for the paper's sensor.
 pub type PaperBuffers = Buffers<8, 18, 18, PAPER_MESSAGE_BYTES>;
 
-/// The large part of an application's memory, all zero at first, so that a static of it costs no
-/// flash and nothing is moved over the stack.
+/// The large part of an application's memory. It is all zero at first, so that a static of it costs no flash, and
+/// nothing is moved over the stack.
 ///
-/// `BYTES` is that of the longest message: `4 · ROWS · max(COLS, OUTPUTS) + ROWS + 24`, at least 128.
+/// `BYTES` is the length of the longest message: `4 · ROWS · max(COLS, OUTPUTS) + ROWS + 24`, at least 128.
 pub struct Buffers<const ROWS: usize, const COLS: usize, const OUTPUTS: usize, const BYTES: usize> {
     receiver: Receiver<BYTES>,
     message: [u8; BYTES],
@@ -57,7 +57,7 @@ impl<const ROWS: usize, const COLS: usize, const OUTPUTS: usize, const BYTES: us
 impl<const ROWS: usize, const COLS: usize, const OUTPUTS: usize, const BYTES: usize>
     Buffers<ROWS, COLS, OUTPUTS, BYTES>
 {
-    /// Buffers with nothing in them.
+    /// Makes empty buffers.
     #[must_use]
     pub const fn new() -> Self {
         const {
@@ -79,7 +79,7 @@ impl<const ROWS: usize, const COLS: usize, const OUTPUTS: usize, const BYTES: us
     }
 }
 
-/// All that the application keeps, apart from the model in force.
+/// The application's state, except the model in force.
 pub struct App<
     'm,
     P: Platform,
@@ -93,7 +93,7 @@ pub struct App<
     core: Core<'m, P, F, ROWS, COLS, OUTPUTS, BYTES>,
 }
 
-/// The application without the receiver, whose bytes a request borrows while it is answered.
+/// The application without the receiver: a request borrows the receiver's bytes while it is answered.
 struct Core<
     'm,
     P,
@@ -111,11 +111,11 @@ struct Core<
     frame: &'m mut Frame<ROWS, COLS>,
     estimate: &'m mut Estimate<ROWS, OUTPUTS>,
     baseline: &'m mut Baseline<ROWS, COLS>,
-    /// What the model in force answers to the baseline, once that is captured.
+    /// The baseline, decoded by the model in force; valid once a baseline is captured.
     rest: &'m mut Estimate<ROWS, OUTPUTS>,
-    /// Whether the last scan gave any reading at all.
+    /// Whether the last scan gave at least one reading.
     sensor_answers: bool,
-    /// Request that waits for the baseline, and how many frames are still to be scanned for it.
+    /// Number of the request that waits for the baseline, and number of frames still to be scanned for it.
     capture: Option<(u16, u16)>,
     upload: Upload,
 }
@@ -130,7 +130,7 @@ impl<
     const BYTES: usize,
 > App<'m, P, F, ROWS, COLS, OUTPUTS, BYTES>
 {
-    /// An application that starts with `configuration`.
+    /// Makes an application that starts with `configuration`.
     pub fn new(
         mut platform: P,
         source: F,
@@ -156,7 +156,7 @@ impl<
         Self { receiver, core }
     }
 
-    /// Runs until the host asks for a restart, exchanging the model when another is committed.
+    /// Runs until the host asks for a restart. When another model is committed, it replaces the one in force.
     pub fn run<S: Slot>(&mut self, slots: &mut [S; 2]) {
         loop {
             let mut session = Session::start(self, slots);
@@ -172,12 +172,12 @@ impl<
         }
     }
 
-    /// What the board is made of, for tests that look behind it.
+    /// The board's platform, for tests that inspect it.
     pub fn platform(&mut self) -> &mut P {
         self.core.line.platform()
     }
 
-    /// The most recent slot whose model is sound: its number and generation.
+    /// Number and generation of the most recent slot whose model is sound.
     fn choose<S: Slot>(slots: &[S; 2]) -> Option<(usize, u32)> {
         let [a, b] = slots.each_ref().map(Slot::bytes);
         let mut candidates = [(0, generation(0, a), a), (1, generation(1, b), b)];

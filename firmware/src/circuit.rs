@@ -1,26 +1,26 @@
 //! From ADC counts to Ω: the two circuits that a sensor can be read with, as pure arithmetic.
 //!
-//! `docs/readout.md` draws both, derives the equations, and tells how to measure the constants.
-//! Readings of the paper's sensor are near 60 Ω, and its 18 columns together load a row with 3.3 Ω:
-//! what lies in series with a row is never small, so both circuits correct for it.
+//! `docs/readout.md` draws both, derives the equations, and explains how to measure the constants.
+//! Readings of the paper's sensor are near 60 Ω, and its 18 columns together load a row with 3.3 Ω. A resistance
+//! in series with a row is therefore never negligible, and both circuits correct for it.
 
 use model_core::{Frame, RowWire};
 
-/// Currents below so many counts are none: the reading is open.
+/// Smallest current in counts that counts as one; below it, the reading is open.
 pub const NO_CURRENT_COUNTS: f32 = 4.0;
 
-/// Turns the samples of one row into readings.
+/// Converts the samples of one row to readings.
 ///
-/// What becomes of a reading: NaN if its sample (or its idle sample) could not be taken;
-/// [`f32::INFINITY`] if no current flows (open); 0 if the sample is saturated or the reading below
-/// what can be measured (short).
+/// A reading is NaN if its sample (or its idle sample) could not be taken, and [`f32::INFINITY`] if no current
+/// flows (open). It is 0 if the sample is saturated, or the resistance too small to be measured (short).
 pub trait Circuit<const ROWS: usize, const COLS: usize> {
     /// Whether the circuit needs a sample of every column while all rows idle.
     const IDLE_SAMPLES: bool;
 
-    /// Readings in Ω of `row`. `sampled` and `idle` are counts of every column, averaged, NaN
-    /// where none could be taken (`idle` is not looked at unless
-    /// [`IDLE_SAMPLES`](Self::IDLE_SAMPLES)); `full_scale_counts` is the converter's largest count.
+    /// Readings in Ω of `row`.
+    ///
+    /// `sampled` and `idle` are averaged counts of every column, NaN where none could be taken. `idle` is ignored
+    /// unless [`IDLE_SAMPLES`](Self::IDLE_SAMPLES). `full_scale_counts` is the converter's largest count.
     fn row_ohm(
         &self,
         row: RowWire,
@@ -29,14 +29,14 @@ pub trait Circuit<const ROWS: usize, const COLS: usize> {
         full_scale_counts: u16,
     ) -> [f32; COLS];
 
-    /// Takes out of a whole `frame` what its rows did to each other, as far as that is known. Does
-    /// nothing unless a circuit says otherwise.
+    /// Corrects a whole `frame` for the influence of its rows on each other, as far as that is known. Does
+    /// nothing unless a circuit overrides it.
     fn correct(&self, frame: &mut Frame<ROWS, COLS>) {
         let _ = frame;
     }
 }
 
-/// By reference: the constants may stay in flash.
+/// A reference to a circuit is a circuit too, so that its constants can stay in flash.
 impl<C: Circuit<ROWS, COLS>, const ROWS: usize, const COLS: usize> Circuit<ROWS, COLS> for &C {
     const IDLE_SAMPLES: bool = C::IDLE_SAMPLES;
 
@@ -55,12 +55,12 @@ impl<C: Circuit<ROWS, COLS>, const ROWS: usize, const COLS: usize> Circuit<ROWS,
     }
 }
 
-/// The divider: the active row at the reference voltage, idle rows floating, every column to
-/// ground through a resistor of its own.
+/// The divider circuit: the active row is at the reference voltage, idle rows float, and every column goes to
+/// ground through its own resistor.
 ///
-/// V = V_row·R_ref/(R_ref + R). The converter shares the reference, so no voltage is needed.
-/// The floating rows connect all columns with each other: this circuit reads a sensor of many rows
-/// wrongly, whatever its calibration (`docs/readout.md` measures it).
+/// V = V_row·R_ref/(R_ref + R). The converter shares the reference, so its voltage need not be known.
+/// The floating rows connect all columns with each other. This circuit therefore reads a sensor of many rows
+/// wrongly, whatever its calibration (`docs/readout.md` shows by how much).
 ///
 /// ```
 /// use firmware::circuit::{Circuit, Divider};
@@ -72,16 +72,16 @@ impl<C: Circuit<ROWS, COLS>, const ROWS: usize, const COLS: usize> Circuit<ROWS,
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Divider<const ROWS: usize, const COLS: usize> {
-    /// Between the reference voltage and each row-wire: switch and lead.
+    /// Resistance in Ω between the reference voltage and each row-wire: switch and lead.
     pub row_source_ohm: [f32; ROWS],
-    /// From each column to ground.
+    /// Resistance in Ω from each column to ground.
     pub reference_ohm: [f32; COLS],
-    /// In series with each column, not part of the sensor.
+    /// Resistance in Ω in series with each column, not part of the sensor.
     pub series_ohm: [f32; COLS],
 }
 
 impl<const ROWS: usize, const COLS: usize> Divider<ROWS, COLS> {
-    /// 470 Ω: 6 mA a column and 112 mA a row at 3.3 V; a switch of 0.26 Ω.
+    /// Typical constants: 470 Ω to ground (6 mA a column and 112 mA a row at 3.3 V), and a switch of 0.26 Ω.
     pub const TYPICAL: Self = Self {
         row_source_ohm: [0.26; ROWS],
         reference_ohm: [470.0; COLS],
@@ -115,14 +115,14 @@ impl<const ROWS: usize, const COLS: usize> Circuit<ROWS, COLS> for Divider<ROWS,
     }
 }
 
-/// Zero-potential scanning: every column held at V_b by an op-amp with a feedback resistor, idle
-/// rows at V_b too, and the active row pulled below it by `drive_v`.
+/// The zero-potential circuit: an op-amp with a feedback resistor holds every column at V_b, idle rows are at V_b
+/// too, and the active row is pulled below it by `drive_v`.
 ///
 /// V_out = V_b + R_f·I, and I = V_d/R. No current flows between wires at one potential, so the
-/// other rows do not disturb (D'Alessio, Sensors and Actuators A 72, 1999). The idle sample takes
-/// out V_b and the op-amp's offset exactly; the row's own drop V_d − R_s·ΣI is known because all its
-/// columns are measured. A lead in series with a column lets the idle rows feed it: it divides all
-/// currents of the column by 1 + s·Σ1/R, which [`correct`](Circuit::correct) takes back.
+/// other rows do not disturb (D'Alessio, Sensors and Actuators A 72, 1999). Subtracting the idle sample removes
+/// V_b and the op-amp's offset exactly. The row's own drop V_d − R_s·ΣI is known because all its columns are
+/// measured. A lead in series with a column lets the idle rows feed it: it divides all currents of the column by
+/// 1 + s·Σ1/R, which [`correct`](Circuit::correct) undoes.
 ///
 /// ```
 /// use firmware::circuit::{Circuit, ZeroPotential};
@@ -135,20 +135,21 @@ impl<const ROWS: usize, const COLS: usize> Circuit<ROWS, COLS> for Divider<ROWS,
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ZeroPotential<const ROWS: usize, const COLS: usize> {
-    /// The converter's reference.
+    /// Reference voltage of the converter, in V.
     pub reference_v: f32,
-    /// How far the active row is pulled below the others.
+    /// Voltage in V by which the active row is pulled below the others.
     pub drive_v: f32,
-    /// Between the drive and each row-wire: switch and lead.
+    /// Resistance in Ω between the drive and each row-wire: switch and lead.
     pub row_source_ohm: [f32; ROWS],
-    /// From each op-amp's output to its column.
+    /// Feedback resistance in Ω from each op-amp's output to its column.
     pub feedback_ohm: [f32; COLS],
-    /// In series with each column, not part of the sensor.
+    /// Resistance in Ω in series with each column, not part of the sensor.
     pub series_ohm: [f32; COLS],
 }
 
 impl<const ROWS: usize, const COLS: usize> ZeroPotential<ROWS, COLS> {
-    /// 0.2 V and 560 Ω: 3.6 mA a column, 65 mA a row, readings from 36 Ω; a switch of 0.26 Ω.
+    /// Typical constants: 0.2 V and 560 Ω (3.6 mA a column, 65 mA a row, readings from 36 Ω), and a switch of 0.26
+    /// Ω.
     pub const TYPICAL: Self = Self {
         reference_v: 3.3,
         drive_v: 0.2,
@@ -183,8 +184,8 @@ impl<const ROWS: usize, const COLS: usize> Circuit<ROWS, COLS> for ZeroPotential
         ohm
     }
 
-    /// By R·(1 − s·Σ1/R), the sum over the column's rows; a row that was not measured counts as
-    /// the mean of the others.
+    /// Corrects each reading to R·(1 − s·Σ1/R), with the sum over the column's rows. A row that was not measured
+    /// counts as the mean of the others.
     fn correct(&self, frame: &mut Frame<ROWS, COLS>) {
         let rows = &mut frame.row_column_resistance_ohm;
         for (column, series) in self.series_ohm.iter().enumerate() {
@@ -203,13 +204,13 @@ impl<const ROWS: usize, const COLS: usize> Circuit<ROWS, COLS> for ZeroPotential
     }
 }
 
-/// Counts that the reference voltage itself would have: one more than the largest.
+/// Counts of the reference voltage itself: one more than the largest count.
 fn counts_at_reference(full_scale_counts: u16) -> f32 {
     f32::from(full_scale_counts) + 1.0
 }
 
-/// Voltage that a `row`'s source takes: R_s·ΣI. A column that could not be sampled counts as the
-/// mean of the others.
+/// Voltage drop at the source of a `row`: R_s·ΣI. A column that could not be sampled counts as the mean of the
+/// others.
 fn voltage_drop(row_source_ohm: &[f32], row: RowWire, current: &[f32]) -> f32 {
     let source_ohm = row_source_ohm.get(row.0).copied().unwrap_or(0.0);
     let taken = current.iter().filter(|i| !i.is_nan());
@@ -217,7 +218,7 @@ fn voltage_drop(row_source_ohm: &[f32], row: RowWire, current: &[f32]) -> f32 {
     if count == 0 { 0.0 } else { source_ohm * sum * (current.len() as f32 / count as f32) }
 }
 
-/// `ohm`, unless the sample or the counts due to current say otherwise.
+/// The reading: `ohm`, or NaN, infinity or 0 if the sample is missing, open or short.
 fn reading(sampled: f32, due_to_current: f32, full_scale_counts: u16, ohm: f32) -> f32 {
     if due_to_current.is_nan() {
         f32::NAN
@@ -236,7 +237,7 @@ mod tests {
 
     const COUNTS: f64 = 4096.0;
 
-    /// Counts, unrounded, of a row that is read by `divider` alone (no other row is there).
+    /// Unrounded counts of a row that is read by `divider`, without other rows.
     fn divider_counts(divider: &Divider<2, 18>, ohm: &[f64; 18]) -> [f32; 18] {
         let source = f64::from(divider.row_source_ohm[1]);
         let branch = |k: usize| {
@@ -249,7 +250,7 @@ mod tests {
         })
     }
 
-    /// Counts, unrounded, of a row and of idle columns for `circuit`.
+    /// Unrounded counts of a row, and of idle columns, for `circuit`.
     fn zero_potential_counts(circuit: &ZeroPotential<2, 18>, ohm: &[f64; 18]) -> [[f32; 18]; 2] {
         let branch = |k: usize| ohm[k] + f64::from(circuit.series_ohm[k]);
         let load: f64 = (0..18).map(|k| 1.0 / branch(k)).sum();

@@ -1,9 +1,9 @@
-//! What a board runs, as a library that is tested on the host.
+//! The program of a board, as a library that is tested on the host.
 //!
-//! [`readout`] scans frames over embedded-hal, with [`circuit`] to turn counts into Ω and [`timing`] to tell
-//! how long that takes; [`store`] keeps models in two slots of flash; [`link`] carries messages to and from the
-//! host; and [`App`](app::App) is the loop that joins them, and decodes with the model in force. A board gives what [`platform`] asks for. Nothing here allocates, panics or waits
-//! without bound; the weights stay in flash.
+//! [`readout`] scans frames over embedded-hal; [`circuit`] converts counts to Ω, and [`timing`] computes how long
+//! a scan takes. [`store`] keeps models in two slots of flash. [`link`] carries messages to and from the host.
+//! [`App`](app::App) is the loop that joins them and decodes with the model in force. A board implements
+//! [`platform`]. Nothing here allocates, panics or waits without bound; the weights stay in flash.
 //!
 //! All arithmetic is [`model_core`]'s, so that board and host agree bit for bit.
 #![cfg_attr(not(test), no_std)]

@@ -1,13 +1,13 @@
 //! Logging through defmt where the feature is on, and nothing where it is not.
 
-/// As `defmt::info!`.
+/// Logs as `defmt::info!` does.
 macro_rules! info {
     ($($argument:expr),+) => {
         $crate::log::log!(info, $($argument),+)
     };
 }
 
-/// As `defmt::warn!`.
+/// Logs as `defmt::warn!` does.
 macro_rules! warning {
     ($($argument:expr),+) => {
         $crate::log::log!(warn, $($argument),+)

@@ -1,28 +1,28 @@
-//! What the application needs of a board, besides the sensor and the slots.
+//! The interface of a board to the application, besides the sensor and the slots.
 
 use crate::link::message::Memory;
 
-/// A serial line, and a clock to give it up by. Nothing here waits.
+/// A serial line, and a clock for time limits on it. No function may wait.
 pub trait Port {
-    /// A clock in µs that never stops, and starts anew from 0 after its largest value.
+    /// Time in µs of a clock that never stops, and wraps around to 0 after its largest value.
     fn now_us(&mut self) -> u32;
 
-    /// The next byte from the other end, if one has arrived.
+    /// Receives the next byte from the other end, if one has arrived.
     fn receive(&mut self) -> Option<u8>;
 
-    /// Takes a byte for the other end, if there is room.
+    /// Queues a byte for the other end; returns `false` if there is no room.
     fn send(&mut self, byte: u8) -> bool;
 }
 
-/// A board. Its port leads to the host, and must keep at least 1000 bytes that arrive while the
+/// A board, whose port leads to the host. The port must keep at least 1000 bytes that arrive while the
 /// application scans and decodes.
 pub trait Platform: Port {
-    /// The board's name, as the link tells it.
+    /// Name of the board, as the link reports it.
     const BOARD: &'static str;
 
-    /// Holds the watchdog off for another period.
+    /// Feeds the watchdog, so that it waits for another period.
     fn feed_watchdog(&mut self);
 
-    /// Where flash and RAM go.
+    /// Use of flash and RAM.
     fn memory(&self) -> Memory;
 }

@@ -24,7 +24,7 @@ pub use scanner::Scanner;
 
 /// Selects the row-wire that is active; all others idle.
 pub trait RowDrive {
-    /// What a pin or bus may fail with.
+    /// Error of a pin or bus.
     type Error;
 
     /// Makes `row` the only active row.
@@ -42,37 +42,36 @@ pub trait RowDrive {
 
 /// Samples the voltage of one column.
 pub trait ColumnSampler {
-    /// What a pin or bus may fail with.
+    /// Error of a pin, bus or converter.
     type Error;
 
     /// The converter's largest count.
     const FULL_SCALE_COUNTS: u16;
 
-    /// One sample of `column`, in counts.
+    /// Takes one sample of `column`, in counts.
     ///
     /// # Errors
     /// The column is not wired, or a pin, bus or converter failed.
     fn sample(&mut self, column: ColumnWire) -> Result<u16, Self::Error>;
 }
 
-/// How a frame is scanned. May come from the host: what is out of range is taken for the nearest
-/// that is not.
+/// Settings of a scan. They may come from the host: a value out of range is replaced by the nearest one within.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ScanSettings {
-    /// Wait after every change of the rows, up to [`MOST_SETTLING_US`](Self::MOST_SETTLING_US); see
-    /// [`settling_us`](crate::timing::settling_us).
+    /// Waiting time in µs after every change of the rows, up to [`MOST_SETTLING_US`](Self::MOST_SETTLING_US);
+    /// [`settling_us`](crate::timing::settling_us) computes it.
     pub settling_us: u32,
-    /// Samples averaged for a reading, from 1 to [`MOST_OVERSAMPLING`](Self::MOST_OVERSAMPLING).
+    /// Number of samples averaged for a reading, from 1 to [`MOST_OVERSAMPLING`](Self::MOST_OVERSAMPLING).
     pub oversampling: u16,
 }
 
 impl ScanSettings {
-    /// Longest wait for a row: no scan may hang.
+    /// Longest waiting time for a row in µs, so that no scan can hang.
     pub const MOST_SETTLING_US: u32 = 10_000;
-    /// Most samples of a reading.
+    /// Largest number of samples averaged for a reading.
     pub const MOST_OVERSAMPLING: u16 = 256;
 
-    /// Settings within their ranges, or `None`.
+    /// Makes settings; `None` if a value is out of its range.
     ///
     /// ```
     /// use firmware::readout::ScanSettings;
@@ -85,7 +84,7 @@ impl ScanSettings {
         (settings == settings.clamped()).then_some(settings)
     }
 
-    /// The nearest settings within their ranges.
+    /// Replaces values out of range by the nearest ones within.
     #[must_use]
     pub fn clamped(self) -> Self {
         Self {
@@ -95,16 +94,16 @@ impl ScanSettings {
     }
 }
 
-/// What became of a scan.
+/// Report on a scan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ScanReport {
-    /// Samples that could not be taken, those of idle rows included; a failed release of the rows
+    /// Number of samples that could not be taken, those of idle rows included. A failed release of the rows
     /// counts as one.
     pub failed_samples: u16,
 }
 
-/// Where frames come from: a scanned sensor, or whatever stands in for one.
+/// Source of frames: a scanned sensor, or a substitute for one.
 pub trait FrameSource<const ROWS: usize, const COLS: usize> {
-    /// Takes a whole frame into `frame`; readings that could not be taken become NaN.
+    /// Scans a whole frame into `frame`, in Ω; readings that could not be taken become NaN.
     fn scan(&mut self, settings: ScanSettings, frame: &mut Frame<ROWS, COLS>) -> ScanReport;
 }

@@ -1,8 +1,7 @@
-//! Where models lie in flash: two slots, one in force and one to spare.
+//! Model slots in flash: one holds the model in force, the other is spare.
 //!
 //! A slot holds a blob at its start and, once the blob has been found sound, a record of 16 bytes at its
-//! end. The record is written last and in one go: whatever is interrupted before leaves a slot that
-//! is not chosen.
+//! end. The record is written last and in one go, so that a slot whose upload was interrupted is not chosen.
 
 use model_core::blob::Model;
 use model_core::checksum::CRC_32;
@@ -11,37 +10,37 @@ mod upload;
 
 pub use upload::Upload;
 
-/// The flash could not be erased or written.
+/// Error of a flash that could not be erased or written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FlashError;
 
-/// A region of flash that is erased as a whole and read where it lies.
+/// A region of flash that is erased as a whole and read in place.
 ///
-/// There are two, and the borrow checker keeps them apart: a sensor borrows the slot of its model
+/// There are two, and the borrow checker keeps them apart: a decoder borrows the slot of its model
 /// while the other is written.
 pub trait Slot {
     /// All bytes of the slot, at an address that is a multiple of four.
     fn bytes(&self) -> &[u8];
 
-    /// Makes every byte 0xFF. May take seconds.
+    /// Sets every byte to 0xFF. May take seconds.
     ///
     /// # Errors
-    /// [`FlashError`].
+    /// [`FlashError`]: the flash could not be erased.
     fn erase(&mut self) -> Result<(), FlashError>;
 
-    /// Writes `bytes` from `offset` on, where the slot is erased. Both are multiples of four.
+    /// Writes `bytes` from `offset` on, where the slot must be erased. Offset and length must be multiples of
+    /// four.
     ///
     /// # Errors
-    /// [`FlashError`]: also if what is read back differs.
+    /// [`FlashError`]: the flash could not be written, or holds other bytes afterwards.
     fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), FlashError>;
 }
 
-/// The blob at the start of `slot`, without what lies behind it.
+/// The blob at the start of `slot`, without the bytes behind it.
 ///
-/// A flash slot is a whole number of erase units and so larger than the blob that was written to
-/// it; the rest is erased (0xFF) or left from an older blob. Nothing is checked but the opening
-/// bytes: a slot that does not start with a blob, or ends before it does, is returned whole, so
-/// that loading it tells the cause.
+/// A flash slot is a whole number of erase units, and so larger than its blob; the rest is erased (0xFF) or left
+/// from an older blob. Only the first bytes are checked. A slot that does not start with a blob, or is shorter
+/// than it, is returned whole, so that the error of loading it names the cause.
 ///
 /// ```
 /// use firmware::store::blob_in_slot;
@@ -57,13 +56,13 @@ pub fn blob_in_slot(slot: &[u8]) -> &[u8] {
     Model::declared_length(slot).and_then(|length| slot.get(..length)).unwrap_or(slot)
 }
 
-/// Bytes of the record at a slot's end.
+/// Length in bytes of the record at a slot's end.
 pub const RECORD_BYTES: usize = 16;
 
-/// Opens a record.
+/// First bytes of a record.
 const RECORD_MAGIC: [u8; 4] = *b"SLOT";
 
-/// Bytes of blob that a slot holds.
+/// Largest blob that a slot holds, in bytes.
 #[must_use]
 pub fn capacity(slot: &[u8]) -> usize {
     slot.len().saturating_sub(RECORD_BYTES)
@@ -80,10 +79,10 @@ fn record(generation: u32, blob_crc: u32) -> [u8; RECORD_BYTES] {
     record
 }
 
-/// How recent the model in `slot` number `index` is; `None` if there is none to be believed.
+/// Generation of the model in `slot` number `index`: the larger, the more recent; `None` without a valid model.
 ///
-/// An uploaded model counts from 1. Slot 0 may also hold a model without a record, put there together
-/// with the firmware: that is generation 0. Slot 1 is only ever uploaded to.
+/// Uploaded models count from 1. Slot 0 may also hold a model without a record, flashed together with the
+/// firmware: its generation is 0. Slot 1 holds only uploaded models.
 #[must_use]
 pub fn generation(index: usize, slot: &[u8]) -> Option<u32> {
     let (_, found) = slot.split_last_chunk::<RECORD_BYTES>()?;

@@ -1,8 +1,8 @@
-//! How long settling, samples and scans take, as pure functions.
+//! Times of settling, samples and scans, as pure functions.
 //!
-//! Times that are waited for are rounded up; what does not fit is the largest number there is.
+//! Waiting times are rounded up; a time that does not fit its type becomes the type's largest number.
 
-/// Time constant in ns of a resistance that charges a capacitance.
+/// Time constant in ns of a resistance (Ω) that charges a capacitance (pF).
 ///
 /// ```
 /// assert_eq!(firmware::timing::time_constant_ns(560.0, 1000.0), 560.0); // 560 Ω and 1 nF
@@ -12,7 +12,7 @@ pub fn time_constant_ns(resistance_ohm: f32, capacitance_pf: f32) -> f32 {
     resistance_ohm * capacitance_pf / 1000.0
 }
 
-/// Time in µs until a voltage is within half a count of its end: τ·ln 2^(bits + 1).
+/// Time in µs until a voltage is within half a count of its final value: τ·ln 2^(bits + 1).
 ///
 /// ```
 /// use firmware::timing::settling_us;
@@ -25,7 +25,7 @@ pub fn settling_us(time_constant_ns: f32, bits: u8) -> u32 {
     whole.saturating_add(u32::from((whole as f32) < us))
 }
 
-/// Time in ns of so many bytes over SPI, gaps left out; `u32::MAX` for a clock that stands still.
+/// Time in ns of so many bytes over SPI, without gaps; `u32::MAX` for a clock of 0 Hz.
 ///
 /// ```
 /// assert_eq!(firmware::timing::spi_transfer_ns(3, 1_000_000), 24_000);
@@ -39,20 +39,20 @@ pub fn spi_transfer_ns(bytes: u32, clock_hz: u32) -> u32 {
     u32::try_from(bits_ns.div_ceil(u64::from(clock_hz))).unwrap_or(u32::MAX)
 }
 
-/// What a scan consists of.
+/// Plan of a scan: numbers of rows, columns and samples, and the time of each step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ScanPlan {
-    /// Rows that are driven one after the other.
+    /// Number of rows that are driven one after the other.
     pub rows: u16,
-    /// Columns that are sampled at each.
+    /// Number of columns that are sampled for each row.
     pub columns: u16,
     /// Whether every column is sampled once more while all rows idle.
     pub idle_samples: bool,
-    /// Wait after every change of the rows.
+    /// Waiting time in µs after every change of the rows.
     pub settling_us: u32,
-    /// Samples averaged for a reading.
+    /// Number of samples averaged for a reading.
     pub oversampling: u16,
-    /// Time of one sample.
+    /// Time of one sample in ns.
     pub sample_ns: u32,
 }
 
@@ -81,8 +81,8 @@ impl ScanPlan {
         u32::try_from(sampling_us.saturating_add(waiting_us)).unwrap_or(u32::MAX)
     }
 
-    /// The largest oversampling at which a scan takes no longer than `period_us`, or `None` if not
-    /// even one sample a reading does.
+    /// Largest oversampling at which a scan takes no longer than `period_us`; `None` if a single sample a reading
+    /// takes longer.
     ///
     /// ```
     /// # use firmware::timing::ScanPlan;
@@ -97,7 +97,7 @@ impl ScanPlan {
         if !fits(1) {
             return None;
         }
-        // Bisection: `low` fits, nothing above `high` does.
+        // Bisection: `low` fits, and nothing above `high` fits.
         let (mut low, mut high) = (1_u16, u16::MAX);
         while low < high {
             let middle = high - (high - low) / 2;
@@ -156,7 +156,7 @@ mod tests {
 
     #[test]
     fn the_boards_scan_leaves_a_third_of_the_period() {
-        // The NUCLEO-F446RE's SPI clock, and what its application starts with.
+        // The NUCLEO-F446RE's SPI clock, and its application's first configuration.
         let Configuration { frame_period_us, scan, .. } = Configuration::DEFAULT;
         let plan = ScanPlan {
             rows: 8,

@@ -20,7 +20,7 @@ fn statistics(session: &mut TestSession<'_>, board: &Board) -> Statistics {
     .0
 }
 
-/// What model-core itself answers.
+/// Outputs of model-core itself.
 fn expected(blob: &[u8], frame: &Frame<ROWS, COLS>) -> [[f32; OUTPUTS]; ROWS] {
     let mut aligned = Aligned([0; 2048]);
     aligned.0[..blob.len()].copy_from_slice(blob);
@@ -32,7 +32,7 @@ fn bits(values: impl Iterator<Item = f32>) -> Vec<u32> {
     values.map(f32::to_bits).collect()
 }
 
-/// Asks for an estimate of `frame`: its flags, row status and bits.
+/// Asks for an estimate of `frame`, and returns its flags, row status and bits.
 fn decode(
     session: &mut TestSession<'_>,
     board: &Board,
@@ -160,7 +160,7 @@ fn the_watchdog_is_fed_by_good_loops_only() {
         session.step();
         assert_eq!(feeds(), before + 1);
     }
-    // A converter that gives nothing: from the next scan on no loop is good, whether it scans or not.
+    // With a converter that gives nothing, no loop is good from the next scan on, whether it scans or not.
     *bench.frame.borrow_mut() = Frame::missing();
     let scanned = statistics(&mut session, &board).frames_scanned;
     while statistics(&mut session, &board).frames_scanned == scanned {
@@ -183,7 +183,7 @@ fn the_watchdog_is_fed_by_good_loops_only() {
         session.step();
     }
     assert_eq!(feeds(), fed + 2000);
-    // A host that asks for no scans does not have to do without the device.
+    // Without scans, a silent sensor must not restart the device.
     *bench.frame.borrow_mut() = Frame::missing();
     for _ in 0..2000 {
         session.step();
@@ -224,8 +224,8 @@ fn a_baseline_is_captured_and_contact_is_told_against_it() {
     assert_eq!(decode(&mut session, &board, &nearly).0 & EstimateReport::CONTACT, 0);
 }
 
-/// Captures a baseline of `frames` scans, and returns to a configuration that scans only when asked to, in
-/// which rows are at rest within 2 %.
+/// Captures a baseline of `frames` scans. Then sets a configuration that scans only on request, in which rows are
+/// at rest within 2 %.
 fn capture(session: &mut TestSession<'_>, board: &Board, frames: u16) {
     let scanning = Configuration { frame_period_us: 100, ..quiet() };
     ask(session, board, &Request::Configure(scanning), |_| ());
@@ -253,7 +253,7 @@ fn rows_at_rest_answer_as_the_baseline_and_the_others_as_without_a_gate() {
     let row = |frame: &Frame<ROWS, COLS>, row: usize| bits(expected(&blob, frame)[row].into_iter());
     let ungated = [row(&touched, 0), row(&touched, 1)].concat();
 
-    // No baseline, no gate.
+    // Without a baseline there is no gate.
     let (_, status, found) = decode(&mut session, &board, &touched);
     assert_eq!((&status[..], &found), (&[0, 0][..], &ungated));
     capture(&mut session, &board, 3);
@@ -265,13 +265,13 @@ fn rows_at_rest_answer_as_the_baseline_and_the_others_as_without_a_gate() {
     assert_ne!(found, ungated);
     assert_eq!(statistics(&mut session, &board).rows_at_rest, 1);
 
-    // A fault is no rest.
+    // A row with a faulty reading is not at rest.
     let mut faulty = rest;
     faulty.row_column_resistance_ohm[0][1] = f32::NAN;
     assert_eq!(decode(&mut session, &board, &faulty).1, [1, 3]);
     assert_eq!(statistics(&mut session, &board).rows_at_rest, 2);
 
-    // Switched off, or while a new baseline is captured, every row is decoded.
+    // With the gate switched off, or while a new baseline is captured, every row is decoded.
     ask(&mut session, &board, &Request::Configure(quiet()), |_| ());
     assert_eq!(decode(&mut session, &board, &touched).2, ungated);
     let scanning = Configuration { frame_period_us: 1_000_000, rest_tolerance: 0.02, ..quiet() };
@@ -324,7 +324,7 @@ fn a_baseline_that_will_not_come_is_refused_and_one_that_comes_is_counted_once()
             .map(|(_, text)| text)
             .collect::<Vec<_>>()
     };
-    // Another capture, then a configuration without scans, end the one before.
+    // Another capture, and then a configuration without scans, end the previous capture.
     say(&mut session, 10, &Request::CaptureBaseline { frames: 1000 });
     say(&mut session, 11, &Request::CaptureBaseline { frames: 1000 });
     assert_eq!(answer(10), [refused.as_str()]);
@@ -381,7 +381,7 @@ fn a_host_that_takes_no_bytes_costs_a_report_but_not_the_device() {
     while board.0.borrow().now_us < 500_000 {
         session.step();
     }
-    // What was cut is a broken frame; it does not take the next report with it.
+    // The report that was cut is a broken frame, which does not damage the next report.
     board.0.borrow_mut().room = None;
     board.0.borrow_mut().to_device.extend(request_bytes(7, &Request::Statistics));
     settle(&mut session, &board);

@@ -1,5 +1,5 @@
-//! Host and emulator answer alike to the last bit: what the emulator's programs log, `cargo xtask
-//! emulate` compares with the files beside them; what the host computes is compared with them here.
+//! Host and emulator give the same results to the last bit. `cargo xtask emulate` compares the logs of the
+//! emulator's programs with the files beside them; here the host's results are compared with the same files.
 
 use std::fs;
 
@@ -17,7 +17,7 @@ fn in_testdata(name: &str) -> String {
     format!("{}/../testdata/{name}", env!("CARGO_MANIFEST_DIR"))
 }
 
-/// What the emulator logs, line by line.
+/// Expected log of a program in the emulator.
 fn expected_log(program: &str) -> String {
     let path = format!("{}/qemu/src/bin/{program}.out", env!("CARGO_MANIFEST_DIR"));
     fs::read_to_string(&path).unwrap_or_else(|cause| panic!("{path}: {cause}"))

@@ -1,4 +1,4 @@
-//! The link's bytes, held to `docs/link.md`.
+//! The link's bytes, compared with those in `docs/link.md`.
 
 mod common;
 
@@ -13,7 +13,7 @@ use model_core::blob::Floats;
 
 const SPECIFICATION: &str = include_str!("../../docs/link.md");
 
-/// Frames in the marked table, by the name of their message.
+/// Frames of the marked table, with the names of their messages.
 fn specified() -> Vec<(&'static str, String)> {
     let table = SPECIFICATION.split("<!-- worked examples -->").nth(1).expect("the marked table");
     let lines = table.lines().filter(|line| line.starts_with('|')).skip(2);

@@ -1,4 +1,4 @@
-//! Ten million random and mutated bytes into the running application.
+//! Ten million random and mutated bytes, sent to the running application.
 
 mod common;
 
@@ -9,11 +9,11 @@ use model_core::blob::Floats;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Bytes given to the device in all.
+/// Number of bytes sent to the device in all.
 const BYTES: usize = 10_000_000;
 
-/// Requests whose bytes are damaged: one of each kind, none of which may be carried out twice with
-/// harm. (A restart and a commit would end the session.)
+/// Requests whose bytes are damaged: one of each kind that does no harm when it is repeated. (A restart and a
+/// commit would end the session.)
 fn requests(readings: &[f32]) -> Vec<Vec<u8>> {
     let all = [
         Request::Identify,
@@ -29,7 +29,7 @@ fn requests(readings: &[f32]) -> Vec<Vec<u8>> {
     all.iter().zip(1..).map(|(request, number)| request_bytes(number, request)).collect()
 }
 
-/// One of the ways in which a line spoils what it carries.
+/// Bytes as a bad line may deliver them, spoilt in one of several ways.
 fn spoil(random: &mut Xoshiro256PlusPlus, requests: &[Vec<u8>]) -> Vec<u8> {
     let mut below = |end: usize| random.next_u32() as usize % end.max(1);
     let mut bytes = requests[below(requests.len())].clone();
@@ -65,8 +65,8 @@ fn no_bytes_stop_the_device_and_the_second_request_after_them_is_answered() {
 
     let (mut given, mut answered_at_once, mut bursts) = (0, 0_u32, 0_u32);
     while given < BYTES {
-        // A burst of damage, and then two good requests: the first may run into a frame that has not
-        // ended, the second may not.
+        // A burst of damage, and then two good requests. The first may be lost in a frame that has not
+        // ended; the second must be answered.
         let mut burst = Vec::new();
         for _ in 0..=random.next_u32() % 8 {
             burst.extend(spoil(&mut random, &requests));

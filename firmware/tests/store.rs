@@ -1,4 +1,4 @@
-//! Blobs that lie in slots of flash.
+//! Loading blobs from slots of flash.
 
 mod common;
 

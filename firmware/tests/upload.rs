@@ -1,4 +1,4 @@
-//! The exchange of the model: good ones come into force, and nothing else ever does.
+//! Uploading a model: sound models come into force, and nothing else ever does.
 
 mod common;
 
@@ -10,7 +10,7 @@ use model_core::rbf::direct::{Network, Parameters};
 
 const CHUNK: usize = 60;
 
-/// Takes an upload as far as it goes; the last answer and whether the session ended.
+/// Carries out an upload as far as it goes; returns the last answer, and whether the session ended.
 fn upload(
     session: &mut TestSession<'_>,
     board: &Board,
@@ -82,7 +82,7 @@ fn an_interruption_after_any_step_leaves_the_old_model() {
             assert!(outcome.is_ok() && leave.is_none(), "{taken}: {outcome:?}");
             assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&old)), "{taken}");
         }
-        // And after a restart.
+        // The old model is in force after a restart too.
         let mut bench = Bench::new(quiet());
         let mut session = Session::start(&mut bench.app, &mut slots);
         assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&old)), "{taken}");
@@ -92,7 +92,7 @@ fn an_interruption_after_any_step_leaves_the_old_model() {
 #[test]
 fn the_power_may_go_in_the_middle_of_any_word() {
     let (old, new) = (blob(1, 3), blob(2, 5));
-    // Old in slot 0 without a record, then old in slot 1 with one: both ways round.
+    // The old model is in slot 0 without a record, and then in slot 1 with one.
     for old_uploaded in [false, true] {
         let mut operations = 0;
         let mut cuts = 0;
@@ -125,7 +125,7 @@ fn the_power_may_go_in_the_middle_of_any_word() {
             operations += 1;
             cuts += 1;
         }
-        // Every word of the erase, the blob and the record.
+        // The power was cut at every word of the erase, the blob and the record.
         assert_eq!(cuts, MockSlot::BYTES / 4 + new.len().div_ceil(4) + 4);
     }
 }

@@ -1,4 +1,4 @@
-//! The one CRC of the project, so that its table stands in flash once.
+//! The one CRC-32 of the project, so that its table is in flash only once.
 
 /// CRC-32 (ISO-HDLC, as in zip and Ethernet): closes blobs, slot records and link messages.
 pub static CRC_32: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);

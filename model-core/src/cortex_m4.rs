@@ -1,8 +1,8 @@
-//! What a Cortex-M4F runs in assembly, and what every target must know of it.
+//! Assembly routines for a Cortex-M4F, and their sizes, which every target knows.
 //!
 //! The assembly is made for the paper's sizes: 18 inputs, and outputs in groups of 18. It reads networks as
 //! plain blocks of words. The functions below count the words that it reads, and a test compares these counts
-//! with the formats' own.
+//! with the formats' own. Every routine has a compiled twin: portable Rust code that gives the same bits.
 
 #[cfg(cortex_m4f)]
 mod routines;
@@ -12,12 +12,12 @@ pub(crate) use routines::{
     Inputs, expanded, expanded_array, fixed16, fixed16_array, give_rest, project,
 };
 
-/// Inputs of the paper's sensor, a row: inner loops are made for this number, in assembly or compiled.
+/// Inputs a row of the paper's sensor; inner loops are made for this number, in assembly or compiled.
 pub(crate) const INPUTS: usize = 18;
-/// Outputs of the paper's sensor, a row: inner loops are made for groups of this number.
+/// Outputs a row of the paper's sensor; inner loops are made for groups of this number.
 pub(crate) const OUTPUTS: usize = 18;
 
-/// Whether the readings of an inference were finite, as far as the inference itself can tell.
+/// Whether the readings of an inference were finite, as far as the inference itself has seen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Finite {
     /// All readings were finite.
@@ -39,7 +39,7 @@ pub struct Block<'a> {
     pub words: &'a [u32],
 }
 
-/// Words that [`expanded_array`] reads of a block, for `groups` groups of outputs.
+/// Number of words that [`expanded_array`] reads from a block, for `groups` groups of outputs.
 #[cfg(any(test, cortex_m4f))]
 pub(crate) const fn expanded_words(centres: usize, affine: bool, groups: usize) -> usize {
     let outputs = OUTPUTS * groups;
@@ -47,7 +47,7 @@ pub(crate) const fn expanded_words(centres: usize, affine: bool, groups: usize) 
     2 * INPUTS + 1 + outputs + affine + centres.next_multiple_of(4) * (1 + INPUTS + outputs)
 }
 
-/// Words that [`fixed16_array`] reads of a block, for `groups` groups of outputs.
+/// Number of words that [`fixed16_array`] reads from a block, for `groups` groups of outputs.
 #[cfg(any(test, cortex_m4f))]
 pub(crate) const fn fixed16_words(centres: usize, affine: bool, groups: usize) -> usize {
     let outputs = OUTPUTS * groups;

@@ -1,12 +1,13 @@
-@ Inner loops of gate, projection and the two fast kernels for a Cortex-M4F, at 18 inputs and 18 outputs.
+@ Inner loops of the gate, the projection and the two fast number formats for a Cortex-M4F, at 18 inputs and 18
+@ outputs.
 @
 @ The compiler cannot be led here: it neither keeps 18 accumulators in registers while it streams the
 @ weights through the rest by load-multiple, nor pairs 16-bit products (docs/cycles.md has both figures).
 @ cortex_m4.rs declares these functions; gate.rs, projection.rs, expanded.rs and fixed16.rs hold their twins in
-@ Rust, which do the same operations in the same order: answers agree bit for bit, and tests hold them to it.
+@ Rust, which do the same operations in the same order: outputs agree bit for bit, which tests check.
 @
-@ Procedure call standard: AAPCS, hard float, for what cortex_m4.rs declares; none reads or writes beyond what
-@ its arguments say; stack: at most 192 bytes.
+@ Procedure call standard: AAPCS, hard float, for the functions that cortex_m4.rs declares. None reads or writes
+@ beyond the sizes that its arguments give. Stack: at most 192 bytes.
 
     .syntax unified
     .fpu fpv4-sp-d16
@@ -21,13 +22,13 @@
 \name:
     .endm
 
-@ Flags
+@ Bits of the argument flags
     .equ AFFINE, 1
     .equ SCALED, 2
-@ Of the FPSCR
+@ Bit of the FPSCR
     .equ INVALID_OPERATION, 1
 
-@ s0..s17 = s0..s17 \operation the 18 numbers at \at, which is used up.
+@ s0..s17 = s0..s17 \operation the 18 numbers at \at; \at is overwritten.
     .macro with_eighteen operation, at
     vldmia \at!, {s18-s31}
     \operation\().f32 s0, s0, s18
@@ -51,9 +52,9 @@
     \operation\().f32 s17, s17, s21
     .endm
 
-@ s0..s17 = the inputs at r0 as integers in UNITS, saturated; r1 goes from the block's start, where middles and
-@ units are, to what follows these. r0 and r3 are used up.
-@ The invalid-operation flag is cleared before: after, it tells that an input was saturated or no number.
+@ s0..s17 = the inputs at r0 as integers in UNITS, saturated. r1 moves from the block's start, past its middles and
+@ units. r0 and r3 are overwritten.
+@ The invalid-operation flag is cleared first; it is set afterwards if an input was saturated or NaN.
     .macro inputs flags
     vmrs r3, fpscr
     vldmia r0, {s0-s17}
@@ -121,7 +122,7 @@
     vadd.f32 s19, s20, s21
     .endm
 
-@ The centre before gets its last addition and is stored while this one's coefficients are at work.
+@ The previous centre gets its last addition and is stored while this centre's coefficients are used.
     .macro f32_next_centre
     vldmia r1!, {s20-s29}
     vadd.f32 s18, s18, s19
@@ -196,7 +197,7 @@
     vadd.f32 s17, s17, s29
     .endm
 
-@ The same, lines of weights being 72 bytes and r11 apart.
+@ s0..s17 += two lines of weights at r0, 72 bytes and r11 apart, each times its factor at r1.
     .macro f32_two_centres_apart
     vldmia r1!, {s30-s31}
     .irp factor, s30, s31
@@ -221,7 +222,7 @@
     vcvt.f32.s32 s\i, s\i
     .endr
     vldr s30, [r1]
-@ In four partial sums
+@ ‖x‖² in four partial sums
     vmul.f32 s18, s0, s0
     vmul.f32 s19, s1, s1
     vmul.f32 s20, s2, s2
@@ -263,7 +264,7 @@
     vnmul.f32 s31, s30, s18
     .endm
 
-@ r9 = fours to take now, of r10 to go
+@ r9 = groups of four centres to do now, of the r10 left
     .macro f32_take_fours
     mov r9, r10
     cmp r9, #MOST_FOURS
@@ -304,7 +305,7 @@
     cmp r10, #MOST_FOURS
     bls 2f
 1:
-@ The inputs are needed again
+@ The inputs are needed again later
     vstmia sp, {s0-s17}
     vstr s31, [sp, #F32_SHARED]
     tst r9, #AFFINE
@@ -314,7 +315,7 @@
     bl taxel_f32_sums
     b 7f
 
-@ r4 exponents, r5 weights, r6 output, r7 activations, r10 fours to go, r11 sums so far
+@ r4 exponents, r5 weights, r6 output, r7 activations, r10 groups of four left, r11 sums so far
 2:
     f32_take_fours
     bl taxel_f32_activations
@@ -344,8 +345,8 @@
     .fill 18, 4, 0
     .size taxel_f32, . - taxel_f32
 
-@ Activations of 4·r9 centres, at r7, of the inputs in s0..s17 and the shared term in s31; r4 goes from their
-@ exponents to what follows these. r0..r3, r8, r12 are used up.
+@ Writes the activations of 4·r9 centres to r7, from the inputs in s0..s17 and the shared term in s31. r4 moves
+@ past their exponents. r0..r3, r8, r12 are overwritten.
     function taxel_f32_activations
     push {lr}
     mov r3, r9
@@ -453,7 +454,7 @@ taxel_f32_powers_end:
 
 @ void taxel_project(readings: *const f32 [2·pairs], block: *const f32 [18·(1 + 2·pairs)],
 @                    features: *mut f32 [18], pairs: u32 ≥ 1)
-@ See projection.rs.
+@ features = f₀ + Σ_j readings_j · p_j, with the parameters in the block as projection.rs says.
     function taxel_project
     push {r11, lr}
     vpush {s16-s31}
@@ -469,7 +470,7 @@ taxel_f32_powers_end:
 
 @ u32 taxel_f32_array(inputs: *const f32 [18], block: *const u32, output: *mut f32 [18·groups],
 @                     fours: u32 ≥ 1, flags: u32, activations: *mut f32 [128], groups: u32 ≥ 1)
-@ As taxel_f32 with so many groups of 18 outputs.
+@ Computes what taxel_f32 does, for several groups of 18 outputs.
     .equ F32A_AFFINE, 80
     .equ F32A_FIRST, 84
     .equ F32A_FRAME, 88
@@ -503,7 +504,7 @@ taxel_f32_powers_end:
     mov r0, #1
     str r0, [sp, #F32A_FIRST]
 
-@ r4 exponents, r5 weights, r6 output, r7 activations, r8 groups to go, r10 fours to go
+@ r4 exponents, r5 weights, r6 output, r7 activations, r8 groups of outputs left, r10 groups of four centres left
 2:
     f32_take_fours
     vldmia sp, {s0-s17}
@@ -603,7 +604,7 @@ f32_sums_apart:
     smlad r1, lr, r12, r1
     .endm
 
-@ \power = 2^-\exponent in Q15 by the cubic in r0, r1, r12, lr (fixed16.rs); \exponent is used up.
+@ \power = 2^-\exponent in Q15 by the cubic in r0, r1, r12, lr (fixed16.rs); \exponent is overwritten.
     .macro fixed16_power power, exponent, fraction
     ubfx \fraction, \exponent, #0, #26
     smmla \power, \fraction, r0, r1
@@ -613,7 +614,7 @@ f32_sums_apart:
     lsr \power, \power, \exponent
     .endm
 
-@ \pair = activations of two centres, whose exponents are in \even and \odd but for the shared term, r11.
+@ \pair = activations of two centres, whose exponents are \even + r11 and \odd + r11 (r11 is the shared term).
     .macro fixed16_pair even, odd, pair, scratch
     vmov r2, r3, \even, \odd
     add r2, r2, r11
@@ -629,7 +630,7 @@ f32_sums_apart:
     pkhtb \pair, r2, r1, asr #16
     .endm
 
-@ r4..r12 = the inputs in pairs; \flags and r0 as `inputs` leaves them, r0 at what follows the units.
+@ r4..r12 = the inputs in pairs; \flags and r0 as `inputs` leaves them, r0 behind the units.
     .macro fixed16_inputs flags
     inputs \flags
     mov r0, r1
@@ -644,7 +645,7 @@ f32_sums_apart:
     fixed16_input r12, s16, s17
     .endm
 
-@ [sp, #FX_SHARED] = the term that all exponents share; r0 goes on to the bias. r1..r3 are used up.
+@ [sp, #FX_SHARED] = the term that all exponents share; r0 moves on to the bias. r1..r3 are overwritten.
     .macro fixed16_shared
     movs r1, #0
     movs r2, #0
@@ -661,7 +662,7 @@ f32_sums_apart:
     str r1, [sp, #FX_SHARED]
     .endm
 
-@ s0..s17 += the affine tail at r0, which goes on.
+@ s0..s17 += the affine tail at r0; r0 moves past it.
     .macro fixed16_tail
     .irp sum, s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11, s12, s13, s14, s15, s16, s17
     vmov r1, \sum
@@ -674,7 +675,7 @@ f32_sums_apart:
     .endr
     .endm
 
-@ r4..r11 = activations of sixteen centres at r0; where their weights are is kept at [sp, #FX_NEXT].
+@ r4..r11 = activations of sixteen centres at r0; the address of their weights is kept at [sp, #FX_NEXT].
     .macro fixed16_activations
     .irp place, s18, s19, s20, s21, s22, s23, s24, s25, s26, s27, s28, s29, s30, s31
     fixed16_exponent
@@ -695,7 +696,7 @@ f32_sums_apart:
     fixed16_pair s26, s27, r8, r9
     fixed16_pair s28, s29, r9, r10
     fixed16_pair s30, s31, r10, r11
-@ The last two have no register to spare
+@ No register is left for the last two
     ldr r2, [sp, #FX_EXPONENTS]
     ldr r3, [sp, #FX_SHARED]
     add r2, r2, r3
@@ -712,7 +713,7 @@ f32_sums_apart:
     pkhbt r11, r3, r0, lsl #16
     .endm
 
-@ s0..s17 += the weights at r0, which goes on, times the activations in r4..r11.
+@ s0..s17 += the weights at r0 times the activations in r4..r11; r0 moves past the weights.
     .macro fixed16_sums
     .irp sum, s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11, s12, s13, s14, s15, s16, s17
     vmov r1, \sum
@@ -783,13 +784,14 @@ f32_sums_apart:
 
 @ u32 taxel_fixed16_array(inputs: *const f32 [18], block: *const u32, output: *mut f32 [18·groups],
 @                         sixteens: u32 ≥ 1, flags: u32, groups: u32 ≥ 1)
-@ As taxel_fixed16 with so many groups of 18 outputs, where their sums are kept between. Three outputs at a
-@ time: one costs a tenth more than with all sums in registers, and the code is a third as long.
+@ Computes what taxel_fixed16 does, for several groups of 18 outputs; sums are kept in the outputs meanwhile.
+@ Three outputs at a time: an output costs a tenth more than with all sums in registers, and the code is a third
+@ as long.
     .equ FXA_END, FX_FRAME
     .equ FXA_FRAME, FX_FRAME + 8
     .equ FXA_ARGUMENTS, FXA_FRAME + 16 * 4 + 9 * 4
 
-@ r1 += the eight pairs at r0, which goes on, times those in r4..r11.
+@ r1 += the eight pairs at r0 times those in r4..r11; r0 moves past its pairs.
     .macro fixed16_eight_pairs
     ldmia r0!, {r2, r3}
     smlad r1, r2, r4, r1
@@ -887,11 +889,12 @@ f32_sums_apart:
     .size taxel_fixed16_array, . - taxel_fixed16_array
 
 @ ---------------------------------------------------------------------------------------------------------
-@ Gate. The compiler loads number by number (2 cycles each; 7 for six at once) and saves registers.
+@ Gate. In assembly because the compiler loads number by number (2 cycles each; 7 for six at once) and saves
+@ registers.
 @ ---------------------------------------------------------------------------------------------------------
 
-@ One reading: s1 += \reading - \rest, s2 += tolerance * \rest; away if the one is beyond the other, or no
-@ number.
+@ One reading: s1 += \reading - \rest, s2 += tolerance * \rest; branches away if the first difference is larger
+@ than the second, or NaN.
     .macro gate_reading reading, rest
     vsub.f32 \reading, \reading, \rest
     vmul.f32 \rest, \rest, s0
@@ -905,7 +908,7 @@ f32_sums_apart:
 
 @ u32 taxel_give_rest(readings: *const f32 [18], baseline: *const f32 [18], rest: *const f32 [18],
 @                     outputs: *mut f32 [18], tolerance: f32)
-@ Copies rest to outputs and returns 1 if the readings are at rest as gate.rs says; else 0.
+@ Copies rest to outputs and returns 1 if the readings are at rest, as gate.rs defines it; else returns 0.
     function taxel_give_rest
     mov r12, #0
     vmov s1, r12

@@ -1,4 +1,4 @@
-//! From a frame to an estimate: the one entry the device calls.
+//! Decoding a frame to an estimate: the one entry point for a device.
 
 use crate::blob::{DecodeError, Metadata, Model, ModelShape, NetworkSection};
 use crate::cortex_m4::Finite;
@@ -13,20 +13,20 @@ use crate::rbf::expanded::Expanded;
 use crate::rbf::fixed16::Fixed16;
 use crate::rbf::{Format, NetworkError};
 
-/// RAM in bytes that a [`Decoder`] of so many `rows` takes on a 32-bit target, whatever its K: slices
-/// into the blob. The link check of the firmware holds it to the compiler.
+/// RAM in bytes that a [`Decoder`] of so many `rows` takes on a 32-bit target, for any K: slices into the
+/// blob. The firmware's link check compares it with the compiler's own figure.
 #[must_use]
 pub const fn decoder_ram_bytes(rows: usize) -> usize {
     136 + 16 * rows
 }
 
-/// A model ready to decode frames of a sensor whose sizes are known when compiled.
+/// Decodes frames of a sensor whose sizes are known at compile time, with the model of a blob.
 ///
-/// Any number of centres K is served: it comes with the blob. RAM: where each row's weights are; they
-/// stay where the blob lies.
+/// The number of centres K comes with the blob and may be any. The decoder keeps references to each row's
+/// weights in RAM ([`decoder_ram_bytes`]); the weights stay in the blob.
 ///
-/// A decoder borrows its blob and is never without a model: a blob that is unsound makes no decoder, and leaves
-/// a decoder that is there as it was.
+/// A decoder borrows its blob and always has a model: a blob that is not sound makes no decoder, and changes no
+/// existing one.
 ///
 /// ```
 /// use model_core::blob::DecodeError;
@@ -57,7 +57,7 @@ pub const fn decoder_ram_bytes(rows: usize) -> usize {
 /// let frame = Frame { row_column_resistance_ohm: [[55.0, 55.0]] };
 /// assert_eq!(decoder.decode(&frame).outputs, [[0.75]]); // mm
 ///
-/// // Half a download is refused.
+/// // Half a download is rejected.
 /// let half = Decoder::<1, 2, 1>::load(&blob[..blob.len() / 2]);
 /// assert!(matches!(half, Err(DecodeError::Truncated { .. })));
 /// # Ok::<(), DecodeError>(())
@@ -65,14 +65,14 @@ pub const fn decoder_ram_bytes(rows: usize) -> usize {
 #[derive(Debug, Clone, Copy)]
 pub struct Decoder<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize> {
     model: Model<'a>,
-    /// Where each row's network is.
+    /// The section of each row's network.
     row_sections: [NetworkSection<'a>; ROWS],
 }
 
 impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize>
     Decoder<'a, ROWS, COLS, OUTPUTS>
 {
-    /// Checks a blob as [`load`](Self::load) does, and leaves it at that.
+    /// Checks a blob as [`load`](Self::load) does, and returns its model without making a decoder.
     ///
     /// # Errors
     /// [`DecodeError`]: the blob is unsound, or its shape is not this decoder's.
@@ -90,7 +90,7 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize>
         }
     }
 
-    /// Loads a blob. It must lie at a multiple of four ([`Aligned`](crate::Aligned)).
+    /// Loads a blob, which must lie at a multiple of four ([`Aligned`](crate::Aligned)).
     ///
     /// # Errors
     /// [`DecodeError`]: the blob is unsound, or its shape is not this decoder's.
@@ -98,7 +98,7 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize>
         Self::of(Model::decode(blob)?)
     }
 
-    /// A decoder of a model that was read from its blob before.
+    /// Makes a decoder of a model that has been parsed already.
     ///
     /// # Errors
     /// [`DecodeError::ShapeMismatch`]: the model's shape is not this decoder's.
@@ -117,20 +117,22 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize>
         Ok(Self { model, row_sections })
     }
 
-    /// What is known of the model beyond its weights.
+    /// Metadata of the model: names, units, and how it was trained.
     #[must_use]
     pub fn metadata(&self) -> &Metadata<'a> {
         self.model.metadata()
     }
 
-    /// CRC-32 of the blob: tells which model is in force.
+    /// CRC-32 of the blob: a fingerprint that identifies the model.
     #[must_use]
     pub fn model_crc(&self) -> u32 {
         self.model.crc()
     }
 
-    /// Decodes one frame. A row with a missing reading is marked and does not touch the others; behind a
-    /// [`Projection`] all are marked.
+    /// Decodes one frame (Ω) to an estimate in the units of the model's outputs.
+    ///
+    /// A row with a missing reading is marked in the estimate's status and does not affect the other rows. Behind
+    /// a [`Projection`] one missing reading marks all rows.
     #[must_use]
     pub fn decode(&self, frame: &Frame<ROWS, COLS>) -> Estimate<ROWS, OUTPUTS> {
         let mut estimate = Estimate {
@@ -141,16 +143,16 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize>
         estimate
     }
 
-    /// As [`decode`](Self::decode), into an estimate that is there already.
+    /// Decodes one frame as [`decode`](Self::decode) does, into an existing estimate.
     pub fn decode_into(&self, frame: &Frame<ROWS, COLS>, estimate: &mut Estimate<ROWS, OUTPUTS>) {
         self.decode_gated_into(frame, None, estimate);
     }
 
-    /// As [`decode_into`](Self::decode_into), but a row that `gate` finds at rest is not inferred: it takes
-    /// the outputs at rest. All other rows are decoded as without a gate, to the bit.
+    /// Decodes one frame as [`decode_into`](Self::decode_into) does, but skips rows that `gate` finds at rest:
+    /// they get the outputs at rest. All other rows are decoded as without a gate, to the bit.
     ///
-    /// A model behind a [`Projection`] decodes all rows or none: all are at rest, or all are decoded; and a
-    /// reading that is missing anywhere marks them all.
+    /// Behind a [`Projection`], rows are not gated one by one: all are at rest, or all are decoded. A reading that
+    /// is missing anywhere marks them all.
     #[inline]
     pub fn decode_gated_into(
         &self,
@@ -161,8 +163,9 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize>
         self.decode_with::<Polynomial>(frame, gate, estimate);
     }
 
-    /// As [`decode_gated_into`](Self::decode_gated_into), with another [exponential](crate::exp) for networks
-    /// of the format `f32-direct`: to measure what it costs. Other formats have an exponential of their own.
+    /// Decodes one frame as [`decode_gated_into`](Self::decode_gated_into) does, with the
+    /// [exponential](crate::exp) `E` for networks of the format `f32-direct`. It serves to measure what an
+    /// exponential costs; other formats have one of their own.
     #[inline(never)] // one copy of inference in flash, whoever decodes
     pub fn decode_with<E: ExpKernel>(
         &self,
@@ -188,7 +191,8 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize>
         }
     }
 
-    /// Not inlined: its stack would burden rows.
+    /// Decodes all rows by one network behind `projection`. Not inlined, because decoding by rows would need its
+    /// stack too.
     #[inline(never)]
     fn decode_array_into<E: ExpKernel>(
         &self,
@@ -213,7 +217,7 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize>
             None => RowStatus::MissingReading,
         };
         if !matches!(status, RowStatus::Decoded | RowStatus::AtRest) {
-            // Features of readings that are all there can overflow.
+            // Features can overflow although no reading is missing.
             if all_finite(readings.as_flattened()) {
                 status = RowStatus::Overflow;
             }
@@ -223,8 +227,8 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize>
     }
 }
 
-/// The outputs of a row, or of all rows at once. Inlined: where sizes are those of the assembly, nothing else
-/// is compiled.
+/// Infers the outputs of a row, or of all rows at once, and returns their status. Inlined, so that only the
+/// assembly's path is compiled where the sizes are the assembly's.
 #[inline(always)]
 #[expect(clippy::inline_always, reason = "lengths that are known choose the code")]
 fn decode_inputs(
@@ -241,8 +245,8 @@ fn decode_inputs(
     decode_in_rust(section, exp, inputs, scaled, outputs)
 }
 
-/// For a device neither generic nor inlined: it is thus compiled here, for speed, where a whole image is
-/// compiled for size.
+/// Infers the outputs of a network by assembly routines. Neither generic nor inlined on a device: it is thus
+/// compiled with this crate, for speed, while the rest of an image is compiled for size.
 #[cfg(cortex_m4f)]
 #[inline(never)]
 #[expect(unsafe_code, reason = "calls to assembly, for networks that are made to their sizes here")]
@@ -272,7 +276,7 @@ fn decode_in_assembly(
     status_of(finite, inputs)
 }
 
-/// See [`decode_in_assembly`].
+/// Infers the outputs of a network in portable Rust, where no assembly serves ([`decode_in_assembly`]).
 #[cfg_attr(cortex_m4f, inline(never))]
 #[cfg_attr(
     not(cortex_m4f),
@@ -299,19 +303,19 @@ fn decode_in_rust(
     status_of(finite, inputs)
 }
 
-/// The status of a row in a format whose outputs have a bound, which is checked when a model is loaded.
+/// The status of a row in a format whose outputs cannot overflow; that is checked when a model is loaded.
 #[inline(always)]
 #[expect(clippy::inline_always, reason = "an enum that need not be made")]
 fn status_of(finite: Result<Finite, NetworkError>, inputs: &[f32]) -> RowStatus {
     match finite {
         Ok(Finite::Known) => RowStatus::Decoded,
         Ok(Finite::Unknown) if all_finite(inputs) => RowStatus::Decoded,
-        // An error never happens: the network was there, in its sizes, when the model was loaded.
+        // No error can occur: the network and its sizes were checked when the model was loaded.
         Ok(Finite::Unknown) | Err(_) => RowStatus::MissingReading,
     }
 }
 
-/// See [`decode_in_rust`].
+/// Infers the outputs of a network in `f32-direct`, which has no assembly routine, and returns their status.
 #[cfg_attr(cortex_m4f, inline(never))]
 #[cfg_attr(
     not(cortex_m4f),
@@ -335,7 +339,7 @@ fn decode_direct(
     if all_finite(outputs) { RowStatus::Decoded } else { RowStatus::Overflow }
 }
 
-/// Whether all `values` are finite, without a branch for each: a carry out of the exponent tells.
+/// Whether all `values` are finite, by the carry out of the exponent, without a branch for each.
 #[inline(never)]
 fn all_finite(values: &[f32]) -> bool {
     const EXPONENT: u32 = 0x7F80_0000;

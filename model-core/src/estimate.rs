@@ -1,24 +1,25 @@
-//! What a frame is decoded to.
+//! The estimate that a frame is decoded to.
 
-/// What became of one row of a frame.
+/// How the decoding of one row of a frame ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RowStatus {
-    /// All readings were there; the outputs are valid.
+    /// The row was decoded; its outputs are valid.
     Decoded,
-    /// At least one reading of the row, or behind a projection of any row, was missing (not a finite number);
-    /// the outputs are NaN.
+    /// At least one reading of the row was missing (not a finite number); the outputs are NaN. Behind a
+    /// projection, a missing reading of any row counts.
     MissingReading,
-    /// Readings or weights so large that an output overflowed; the outputs are NaN.
+    /// Readings or weights were so large that an output overflowed; the outputs are NaN.
     Overflow,
-    /// All readings are near those at rest ([`Gate`](crate::Gate)); the outputs are those at rest.
+    /// The row is untouched: its readings are near those at rest ([`Gate`](crate::Gate)). The row was skipped; the
+    /// outputs are those at rest.
     AtRest,
 }
 
-/// The outputs of every row, in the units of the model's output columns.
+/// The decoded outputs of every row, in the units of the model's output columns.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate<const ROWS: usize, const OUTPUTS: usize> {
     /// `[row][output]`; NaN where the row could not be decoded.
     pub outputs: [[f32; OUTPUTS]; ROWS],
-    /// What became of each row.
+    /// How the decoding of each row ended.
     pub status: [RowStatus; ROWS],
 }

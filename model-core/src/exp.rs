@@ -1,31 +1,32 @@
-//! The exponential of the Gaussian activation, as a choice of kernels.
+//! Exponentials for the Gaussian activation, to choose from.
 //!
-//! Every kernel is a zero-sized type, so that a device links only the one it names. All agree
-//! between host and target bit for bit, because each uses plain `f32` arithmetic or a
-//! pure-Rust library; they do not agree with one another.
+//! Every exponential is a zero-sized type, so that a device links only the one it names. Each gives the
+//! same bits on host and target, because it uses plain `f32` arithmetic or a pure-Rust library. Two different
+//! exponentials do not give the same bits.
 
-/// The exponential of a non-positive number.
+/// An exponential of non-positive numbers.
 ///
-/// The activation's argument −‖x − c‖²/(2σ²) is never positive: that is all a kernel must
-/// serve. A NaN argument has no defined result (inference refuses NaN readings before).
+/// The activation's argument −‖x − c‖²/(2σ²) is never positive, so no other argument is needed. The result for
+/// NaN is not defined ([`Decoder`](crate::Decoder) marks rows with NaN readings instead).
 pub trait ExpKernel: Copy + Default {
-    /// The kernel's name, as users choose it.
+    /// Name of the exponential, as users choose it.
     const NAME: &'static str;
     /// e^`x` for `x` ≤ 0.
     fn exp(x: f32) -> f32;
 }
 
-/// `libm::expf`: within 1 ulp, the most accurate and the reference for the others.
+/// `libm::expf`: within 1 ulp on [−87, 0] (tested), the most accurate, and the reference for the others.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Libm;
 
-/// `micromath`: relative error up to 2.4e-3 on [−30, 0] and not even faster on a Cortex-M4F;
-/// here so that users can see it measured. Below −80 it is wrong by orders of magnitude, so
-/// such arguments give 0.
+/// `micromath`'s exponential: relative error up to 2.4e-3 on [−30, 0], and not even faster on a Cortex-M4F.
+///
+/// It is here so that users can compare it. Below −80 it is wrong by orders of magnitude, so such arguments
+/// give 0.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Micromath;
 
-/// Own polynomial: within 2 ulp on [−87, 0] (tested), no division, no table. The default.
+/// The default exponential, a polynomial: within 2 ulp on [−87, 0] (tested), no division, no table.
 ///
 /// Range reduction x = n·ln 2 + r by Cody and Waite (Software Manual for the Elementary
 /// Functions, 1980, ch. 6), then a degree-6 minimax polynomial for e^r on |r| ≤ ½ ln 2 whose
@@ -49,17 +50,17 @@ impl ExpKernel for Micromath {
         if x < -80.0 {
             return 0.0;
         }
-        // Through the wrapper type: the extension trait's `exp` gives way to std's as soon as a
-        // dependency turns std on, and host and device would then disagree.
+        // Called through the wrapper type: if a dependency turns on `std`, its `exp` takes precedence over the
+        // extension trait's, and host and device would disagree.
         micromath::F32(x).exp().0
     }
 }
 
-/// Adding and subtracting 1.5·2^23 rounds to the nearest integer, which the sum's low bits then hold.
+/// 1.5·2^23: adding and subtracting it rounds to the nearest integer, which the sum's low bits then hold.
 pub const ROUND: f32 = 12_582_912.0;
 
-/// ln 2 in two parts: their sum is ln 2. The first has 10 significant bits, so that its product with a whole
-/// number of [`Polynomial`]'s range is exact.
+/// Two numbers whose sum is ln 2. The first has 10 significant bits, so that its product with any integer in
+/// the range of [`Polynomial`] is exact.
 pub const LN_2_PARTS: [f32; 2] = [0.693_359_4, -2.121_944_4e-4];
 
 /// Coefficients of [`Polynomial`] for e^r on |r| ≤ ½ ln 2, from degree 6 down to 0.
@@ -87,12 +88,12 @@ impl ExpKernel for Polynomial {
     }
 }
 
-/// 2^`u`, for `u` from −126 to 1: the exponential of networks with
-/// [expanded distances](crate::rbf::expanded), within 2 ulp (tested). Elsewhere the result is meaningless.
+/// 2^`u` for `u` from −126 to 1, within 2 ulp (tested); elsewhere the result is meaningless. It is the exponential
+/// of networks with [expanded distances](crate::rbf::expanded).
 ///
 /// A degree-5 polynomial for 2^f on |f| ≤ ½, fitted so that its error and that of rounding stay below 1.9 ulp
-/// together; the power of two goes straight into the exponent bits. In the logarithm to base 2 there is
-/// no reduction by ln 2, and 13 operations are all.
+/// together; the power of two goes straight into the exponent bits. Base 2 needs no reduction by ln 2, so that
+/// 13 operations suffice.
 #[inline]
 #[must_use]
 pub fn exp2(u: f32) -> f32 {

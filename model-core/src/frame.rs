@@ -1,4 +1,4 @@
-//! One complete scan of the sensor.
+//! A frame: one complete scan of the sensor.
 
 /// Index of a row-wire (upper layer), from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -1,24 +1,27 @@
-//! Which rows of a frame are at rest, so that the answer for the sensor at rest serves them.
+//! Gating: rows that are at rest (untouched) are not decoded, but get the outputs of the sensor at rest.
 //!
-//! With a *tolerance* t, relative to the baseline, a row of n readings is at rest if each of them is within
-//! t of its baseline, and their sum is within t/√n of its own: a dent that is lost in the noise of
-//! each reading moves all of them the same way. With white noise of the relative level p and t = k·p, both
-//! tests have the same k; noise alone wakes an untouched row in at most 1 − (1 − 2Q(k))^(n + 1) of all
-//! frames, Q being the upper tail of the standard normal distribution (Šidák's inequality).
-//! `docs/gating.md` has what that saves and what it misses.
+//! A row of n readings is at rest if each reading is within a *tolerance* t, relative to the baseline, and
+//! their sum is within t/√n of the baseline's sum. The second test is there because a dent that is lost in the
+//! noise of each reading moves all of them the same way.
+//!
+//! With white noise of the relative level p and t = k·p, both tests have the same k. Noise alone makes an
+//! untouched row count as touched in at most 1 − (1 − 2Q(k))^(n + 1) of all frames, Q being the upper tail of
+//! the standard normal distribution (Šidák's inequality). `docs/gating.md` shows what gating saves and misses.
 
 #[cfg(cortex_m4f)]
 use crate::cortex_m4;
 use crate::estimate::{Estimate, RowStatus};
 use crate::frame::Frame;
 
-/// What [`Decoder::decode_gated_into`](crate::Decoder::decode_gated_into) gives to rows at rest, and how it
-/// knows them. It borrows both, so that a device keeps one copy of its baseline.
+/// Finds the rows of a frame that are at rest (untouched), and gives them the outputs at rest.
+///
+/// [`Decoder::decode_gated_into`](crate::Decoder::decode_gated_into) skips these rows. The gate borrows baseline
+/// and outputs, so that a device keeps one copy of each.
 ///
 /// ```
 /// use model_core::{Estimate, Frame, Gate, RowStatus};
 /// let baseline = Frame { row_column_resistance_ohm: [[50.0, 60.0]] };
-/// // What the model in force answers to `baseline`.
+/// // What the model decodes `baseline` to.
 /// let rest = Estimate { outputs: [[0.01]], status: [RowStatus::Decoded] };
 /// let gate = Gate::new(&baseline, &rest, 0.02).unwrap();
 /// let mut outputs = [f32::NAN];
@@ -37,10 +40,10 @@ pub struct Gate<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize> 
 }
 
 impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize> Gate<'a, ROWS, COLS, OUTPUTS> {
-    /// A gate from the mean of frames at rest in Ω, the answer of the model in force to it, and the
-    /// tolerance k·p; `None` for a tolerance that is not above 0 and below 1.
+    /// Makes a gate from `baseline` (mean of frames at rest, in Ω), `rest` (the model's estimate of the baseline)
+    /// and the `tolerance` k·p. `None` for a tolerance that is not above 0 and below 1.
     ///
-    /// A row that `rest` marks as anything but decoded is never at rest: its baseline is not known.
+    /// A row whose status in `rest` is not decoded is never at rest: its baseline is not known.
     #[must_use]
     pub fn new(
         baseline: &'a Frame<ROWS, COLS>,
@@ -50,7 +53,7 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize> Gate<'a, RO
         (tolerance > 0.0 && tolerance < 1.0).then_some(Self { baseline, rest, tolerance })
     }
 
-    /// Gives `outputs` the outputs at rest if the `readings` in Ω of row `row` are at rest, and says whether
+    /// Copies the outputs at rest to `outputs` if the `readings` (Ω) of row `row` are at rest; returns whether
     /// they are.
     pub fn give_rest(
         &self,
@@ -69,18 +72,18 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize> Gate<'a, RO
     }
 }
 
-/// Whether each of n `readings` is within `tolerance`, from 0 to 1, of a finite `baseline`, and their sum
-/// within `tolerance`/√n of its sum. A reading that is NaN or infinite is not, nor is any of a baseline that
-/// is NaN or negative.
+/// Whether a row is at rest: each of its n `readings` is within `tolerance` (0 to 1) of its finite `baseline`,
+/// relative to it, and their sum within `tolerance`/√n of the baseline's sum.
 ///
-/// Readings beyond the shorter of the two lists are not looked at.
+/// A row with a reading that is NaN or infinite is not at rest, nor one with a baseline that is NaN or negative.
+/// Readings beyond the shorter of the two lists are ignored.
 #[must_use]
 pub fn is_at_rest(readings: &[f32], baseline: &[f32], tolerance: f32) -> bool {
     let (mut change, mut most_change) = (0.0, 0.0);
     for (reading, rest) in readings.iter().zip(baseline) {
         let (difference, most) = (reading - rest, tolerance * rest);
-        // Not if either is NaN. To leave at once costs no more than to collect signs, and most rows that
-        // are touched show it early.
+        // False if either is NaN. Leaving at once costs no more than collecting signs, and most touched rows
+        // show it early.
         let near = difference.abs() <= most;
         if !near {
             return false;
@@ -92,9 +95,9 @@ pub fn is_at_rest(readings: &[f32], baseline: &[f32], tolerance: f32) -> bool {
     change * change * n as f32 <= most_change * most_change
 }
 
-/// Gives `outputs` the `rest` if the `readings` [are at rest](is_at_rest), and says whether they are.
+/// Copies `rest` to `outputs` if the `readings` [are at rest](is_at_rest); returns whether they are.
 ///
-/// For a device neither generic nor inlined, as `decode_in_assembly` is.
+/// Neither generic nor inlined on a device, so that it is compiled with this crate, for speed.
 #[cfg_attr(cortex_m4f, inline(never))]
 fn give_rest(
     readings: &[f32],
@@ -122,7 +125,7 @@ mod tests {
 
     #[test]
     fn a_reading_on_the_tolerance_is_at_rest_and_the_next_number_is_not() {
-        // Numbers for which no operation rounds.
+        // With these numbers no operation rounds.
         let (baseline, tolerance) = ([64.0, 32.0, 16.0], 0.03125);
         for place in 0..baseline.len() {
             for side in [-1.0, 1.0] {

@@ -1,34 +1,33 @@
-//! Which readings of a frame can be believed.
+//! Health of a frame: finds readings that are missing, shorted or open.
 
 use crate::frame::Frame;
 
-/// Resistances between which a reading can be that of rubber.
+/// Range of resistances that the sensor's rubber can have; a reading outside is a fault.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
-    /// Below this, the two wires are shorted (or the circuit is saturated).
+    /// Lower limit in Ω; below it, the two wires are shorted (or the circuit is saturated).
     pub shorted_below_ohm: f32,
-    /// Above this, one of the two wires is broken or not connected.
+    /// Upper limit in Ω; above it, one of the two wires is broken or not connected.
     pub open_above_ohm: f32,
 }
 
-/// What is wrong with the readings of one frame.
+/// Faults in the readings of one frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Health<const ROWS: usize> {
-    /// Of each row-wire, bit k set if the reading of column-wire k cannot be believed.
+    /// One word for each row-wire; bit k is set if the reading of column-wire k is faulty.
     pub faulty_columns: [u32; ROWS],
-    /// Readings that were not taken (NaN).
+    /// Number of readings that were not taken (NaN).
     pub missing: u16,
-    /// Readings below the limits.
+    /// Number of readings below the limits.
     pub shorted: u16,
-    /// Readings above the limits.
+    /// Number of readings above the limits.
     pub open: u16,
 }
 
 impl<const ROWS: usize> Health<ROWS> {
-    /// Looks at every reading of `frame`, and makes those missing (NaN) that cannot be believed, so
-    /// that no estimate rests on them.
+    /// Checks every reading of `frame`, and makes faulty ones missing (NaN), so that no estimate depends on them.
     ///
-    /// A sensor has at most 32 column-wires here; more do not compile.
+    /// A sensor may have at most 32 column-wires; more do not compile.
     ///
     /// ```
     /// use model_core::Frame;
@@ -64,7 +63,7 @@ impl<const ROWS: usize> Health<ROWS> {
         health
     }
 
-    /// Whether every reading can be believed.
+    /// Whether no reading is faulty.
     #[must_use]
     pub fn is_good(&self) -> bool {
         self.faulty_columns.iter().all(|bits| *bits == 0)

@@ -2,12 +2,11 @@
 //!
 //! Readings travel one way: [`Frame`] (Ω) → [`health`] → [`gate`] → ([`projection`] →) [`scale`] → [`rbf`]
 //! (and its affine tail) → [`Estimate`]. The network's weights are read where the [`blob`] lies, in flash or in a
-//! file's buffer: nothing is copied, nothing is allocated, and no release code path of
-//! [`Decoder`] panics. [`rls`] is for a device that is to learn its
-//! output weights sample by sample: none does yet.
+//! file's buffer: nothing is copied, nothing is allocated, and no release code path of [`Decoder`] panics.
+//! [`rls`] is for a device that trains its output weights sample by sample; no firmware does so yet.
 //!
 //! The crate knows no pin and no file. The same code serves host, emulator and board, so that
-//! their answers agree bit for bit where the same [`exp`] kernel is chosen.
+//! their estimates agree bit for bit where the same [exponential](exp) is chosen.
 //!
 //! The network and its training follow Wang et al., "Decoupling research of flexible tactile
 //! sensors interfered by white Gaussian noise using improved RBFNN", Sensors & Transducers, 2014

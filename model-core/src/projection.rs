@@ -1,28 +1,28 @@
-//! The whole array's readings in as few numbers as one row has.
+//! Projection of a whole frame to a few features: as many as one row has readings.
 //!
-//! f = f₀ + Σ_j r_j·p_j over all readings r of a frame, in Ω: linear, so that white noise averages out over the
-//! array, and as many features as a row has readings, so that the same inner loops serve both. Which
-//! directions p is a matter of training; `docs/projection.md` explains it.
+//! f = f₀ + Σ_j r_j·p_j over all readings r of a frame, in Ω. It is linear, so that white noise averages out over
+//! the array. There are as many features as a row has readings, so that the same inner loops serve both. The
+//! directions p come from training; `docs/projection.md` explains how.
 
 #[cfg(any(cortex_m4f, test))]
 use crate::cortex_m4;
 use crate::rbf::NetworkError;
 
-/// A linear projection of a frame, borrowed.
+/// A linear projection of a frame to features, borrowed from a blob.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Projection<'a> {
     features: usize,
-    /// f₀, then p reading after reading.
+    /// f₀ of every feature, then p of every feature for one reading after the other.
     block: &'a [f32],
 }
 
 impl<'a> Projection<'a> {
-    /// A projection of so many `readings` to `features` numbers: in `block` f₀, then for each reading its part
-    /// in each feature.
+    /// Makes a projection of so many `readings` to `features` numbers. `block` holds f₀, then for each reading its
+    /// part in each feature.
     ///
     /// # Errors
     /// [`NetworkError::Empty`] without readings or features, [`NetworkError::Length`] for a block that is not
-    /// `(1 + readings) * features` long, [`NetworkError::NotFinite`].
+    /// `(1 + readings) * features` long, [`NetworkError::NotFinite`] for a number that is NaN or infinite.
     pub fn new(readings: usize, features: usize, block: &'a [f32]) -> Result<Self, NetworkError> {
         if readings == 0 || features == 0 {
             return Err(NetworkError::Empty);
@@ -37,20 +37,20 @@ impl<'a> Projection<'a> {
         Ok(Self { features, block })
     }
 
-    /// The projection of a block that [`new`](Self::new) has checked before.
+    /// Makes a projection of a block that [`new`](Self::new) has checked before.
     pub(crate) fn of_checked(features: usize, block: &'a [f32]) -> Self {
         Self { features, block }
     }
 
-    /// f₀, then the parts of each reading.
+    /// The projection's numbers: f₀, then for each reading its part in each feature.
     #[must_use]
     pub fn block(&self) -> &'a [f32] {
         self.block
     }
 
-    /// The features of `readings` in Ω; none of them is a number if one of the readings is none.
+    /// Projects `readings` (Ω) to `features`; all features are NaN if a reading is NaN.
     ///
-    /// Readings and features beyond the projection's sizes are left alone.
+    /// Readings and features beyond the projection's sizes are ignored.
     #[cfg_attr(
         cortex_m4f,
         expect(unsafe_code, reason = "a call to assembly, whose condition is checked before")
@@ -60,14 +60,15 @@ impl<'a> Projection<'a> {
         if let Ok(features) = (&mut *features).try_into()
             && self.suits_assembly(readings.len())
         {
-            // SAFETY: `suits_assembly` has found these readings to be in pairs, and the block to be one of 18
-            // features for as many. They are not none: `new` refuses a projection without readings.
+            // SAFETY: `suits_assembly` has found the number of readings even, and the block to be one of 18
+            // features for as many. It is not 0, because `new` rejects a projection without readings.
             return unsafe { cortex_m4::project(self.block, readings, features) };
         }
         self.project_portably(readings, features);
     }
 
-    /// Whether these are all readings of a projection to 18 features, in pairs.
+    /// Whether the assembly can project so many `readings`: an even number, all those of the block, to 18
+    /// features.
     #[cfg(any(cortex_m4f, test))]
     fn suits_assembly(&self, readings: usize) -> bool {
         self.features == cortex_m4::INPUTS
@@ -75,7 +76,8 @@ impl<'a> Projection<'a> {
             && self.block.len() == block_floats(readings, self.features)
     }
 
-    /// As [`project`](Self::project), by the compiled twin of the assembly: the same bits.
+    /// Projects as [`project`](Self::project) does, to the bit, in portable Rust: the compiled twin of the
+    /// assembly.
     pub fn project_portably(&self, readings: &[f32], features: &mut [f32]) {
         let (start, parts) = self.block.split_at_checked(self.features).unwrap_or_default();
         features.iter_mut().zip(start).for_each(|(feature, start)| *feature = *start);
@@ -87,7 +89,7 @@ impl<'a> Projection<'a> {
     }
 }
 
-/// Numbers in the block of a projection.
+/// Number of floats in the block of a projection.
 pub(crate) fn block_floats(readings: usize, features: usize) -> usize {
     readings.saturating_add(1).saturating_mul(features)
 }
@@ -115,7 +117,7 @@ mod tests {
             Projection::new(readings, features, block).unwrap().suits_assembly(of)
         };
         assert!(suits(18, 18, 18));
-        // Blocks of other shapes may be as long as one for 18 features.
+        // Blocks of other shapes can be as long as one for 18 features.
         assert!(!suits(17, 1, 0) && !suits(37, 9, 18));
         assert!(!suits(18, 18, 16) && !suits(18, 18, 0) && !suits(17, 18, 17));
     }

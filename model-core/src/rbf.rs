@@ -6,15 +6,15 @@
 //!
 //! | [`Format`] | distances | a Cortex-M4F computes with |
 //! |---|---|---|
-//! | [`F32Direct`](Format::F32Direct) | Σ (x − c)²: safe at any width | the compiler's code, any [exp kernel](crate::exp) |
+//! | [`F32Direct`](Format::F32Direct) | Σ (x − c)²: safe at any width | compiled code, any [`exp`](crate::exp) |
 //! | [`F32`](Format::F32) | ‖x‖² − 2x·c + ‖c‖²: where a bound proves it safe | `cortex_m4.s` |
-//! | [`Fixed16`](Format::Fixed16) | the same in integers, 16-bit weights | `cortex_m4.s`, two products an instruction |
+//! | [`Fixed16`](Format::Fixed16) | as `F32`, in integers | `cortex_m4.s`, two products an instruction |
 //!
-//! The order of the floating-point operations is part of the contract of each: the outputs take the affine
-//! tail, one centre after the other, and last the bias, so that a large offset costs no digits of the
-//! rest. Host and device thus agree bit for bit, with or without SIMD.
+//! The order of the floating-point operations is part of each format's contract. The affine tail comes first,
+//! then one centre after the other, and last the bias, so that a large offset costs no digits of the rest.
+//! Host and device thus agree bit for bit, with or without SIMD.
 
-// From the ground up.
+// From the ground up: a module imports only what is declared before it.
 mod parameters;
 mod format;
 pub mod packed;
@@ -33,11 +33,11 @@ use crate::exp::{ExpKernel, Polynomial};
 /// A network of any format, whose parameters have been checked against its shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Network<'a> {
-    /// See [`Format::F32Direct`].
+    /// A network in f32 with direct distances ([`Format::F32Direct`]).
     F32Direct(direct::Network<'a>),
-    /// See [`Format::F32`].
+    /// A network in f32 with expanded distances ([`Format::F32`]).
     F32(expanded::Network<'a>),
-    /// See [`Format::Fixed16`].
+    /// A network in 16-bit fixed point ([`Format::Fixed16`]).
     Fixed16(fixed16::Network<'a>),
 }
 
@@ -63,13 +63,13 @@ impl<'a> Network<'a> {
         }
     }
 
-    /// The network's sizes.
+    /// The network's numbers of inputs, centres and outputs.
     #[must_use]
     pub fn shape(&self) -> Shape {
         each!(self, inner => inner.shape())
     }
 
-    /// Whether there is an affine tail.
+    /// Whether the network has an affine tail.
     #[must_use]
     pub fn has_affine_tail(&self) -> bool {
         match self {
@@ -79,7 +79,7 @@ impl<'a> Network<'a> {
         }
     }
 
-    /// Width σ of the centres on inputs scaled to [0, 1]: one for all, or one each.
+    /// Widths σ of the centres on inputs scaled to [0, 1]: one for all, or one for each.
     pub fn widths(&self) -> impl Iterator<Item = f32> {
         let (common, each): (Option<f32>, &'a [f32]) = match self {
             Self::F32Direct(inner) => (None, inner.parameters().decay),
@@ -89,12 +89,12 @@ impl<'a> Network<'a> {
         common.into_iter().chain(each.iter().map(|decay| libm::sqrtf(0.5 / decay)))
     }
 
-    /// Looks at every value, once: for a network of which only the lengths were checked.
+    /// Checks every value of a network whose lengths alone were checked before.
     pub(crate) fn check_values(&self) -> Result<(), NetworkError> {
         each!(self, inner => inner.check_values())
     }
 
-    /// All of the network's words, in pieces that follow each other.
+    /// All words of the network, in slices that follow each other.
     pub(crate) fn block(&self) -> [&'a [u32]; 7] {
         match self {
             Self::F32Direct(inner) => inner.block(),
@@ -103,18 +103,19 @@ impl<'a> Network<'a> {
         }
     }
 
-    /// Lowest and highest reading of `input` in training, in its unit, as far as f32 tells: the same if it
-    /// never changed, NaN if there is no such input.
+    /// Lowest and highest reading of `input` in training, in its unit, as precisely as f32 can hold.
+    ///
+    /// Both are the same if the reading never changed, and NaN if there is no such input.
     #[must_use]
     pub fn training_range(&self, input: usize) -> [f32; 2] {
         each!(self, inner => inner.training_range(input))
     }
 
-    /// Infers `output` from one row of `reading`s.
+    /// Infers `output` (one value an output, in its unit) from one row of `reading`s (one an input, in its unit).
     ///
-    /// `scaled` is working space of one value an input. A NaN reading makes the outputs meaningless:
-    /// screen readings before ([`Decoder`](crate::Decoder) does). Inlined, so that lengths known to the
-    /// compiler reach the loops.
+    /// `scaled` is working space of one value an input. A NaN reading makes the outputs meaningless: check
+    /// readings first ([`Decoder`](crate::Decoder) does). Inlined, so that lengths known to the compiler reach the
+    /// loops.
     ///
     /// # Errors
     /// [`NetworkError::Length`] if a buffer does not fit the shape; `output` is then untouched.
@@ -150,11 +151,11 @@ impl<'a> Network<'a> {
         self.infer_with::<Polynomial>(reading, scaled, output)
     }
 
-    /// As [`infer`](Self::infer), with another [exponential](crate::exp) for [`Format::F32Direct`]: to measure
-    /// what it costs. Other formats have an exponential of their own.
+    /// Infers as [`infer`](Self::infer) does, with the [exponential](crate::exp) `E` for [`Format::F32Direct`]. It
+    /// serves to measure what an exponential costs; other formats have one of their own.
     ///
     /// # Errors
-    /// As [`infer`](Self::infer).
+    /// [`NetworkError::Length`] if a buffer does not fit the shape; `output` is then untouched.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
     pub fn infer_with<E: ExpKernel>(
@@ -176,11 +177,12 @@ impl<'a> Network<'a> {
         Ok(())
     }
 
-    /// The first half of [`infer`](Self::infer): readings in the format's own unit of inputs, before its
-    /// clamp.
+    /// Converts readings to the format's own unit of inputs: the first half of [`infer`](Self::infer).
+    ///
+    /// [`Format::F32Direct`] clamps them here; the other formats do so when they infer.
     ///
     /// # Errors
-    /// As [`infer`](Self::infer).
+    /// [`NetworkError::Length`] if a buffer does not fit the shape; `scaled` is then untouched.
     pub fn scale(&self, reading: &[f32], scaled: &mut [f32]) -> Result<(), NetworkError> {
         check_length("reading", reading, self.shape().inputs)?;
         check_length("scaled", scaled, self.shape().inputs)?;
@@ -188,20 +190,22 @@ impl<'a> Network<'a> {
         Ok(())
     }
 
-    /// The second half of [`infer`](Self::infer); `scaled` serves as working space.
+    /// Infers `output` from inputs that [`scale`](Self::scale) gave: the second half of [`infer`](Self::infer).
+    /// `scaled` is overwritten.
     ///
     /// # Errors
-    /// As [`infer`](Self::infer).
+    /// [`NetworkError::Length`] if a buffer does not fit the shape; `output` is then untouched.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
     pub fn infer_scaled(&self, scaled: &mut [f32], output: &mut [f32]) -> Result<(), NetworkError> {
         self.infer_scaled_with::<Polynomial>(scaled, output)
     }
 
-    /// As [`infer_scaled`](Self::infer_scaled), with another exponential, as [`infer_with`](Self::infer_with).
+    /// Infers as [`infer_scaled`](Self::infer_scaled) does, with the [exponential](crate::exp) `E` for
+    /// [`Format::F32Direct`].
     ///
     /// # Errors
-    /// As [`infer`](Self::infer).
+    /// [`NetworkError::Length`] if a buffer does not fit the shape; `output` is then untouched.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
     pub fn infer_scaled_with<E: ExpKernel>(

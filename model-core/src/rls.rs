@@ -12,13 +12,14 @@
 //! The free functions work on slices, for sizes known when they run; [`Rls`] wraps them for
 //! sizes known when compiled.
 //!
-//! What uses it: the trainer of host-sim calls [`solve`] alone, and gets R and z from a QR decomposition of whole
-//! blocks of samples. [`start`], [`update`] and [`Rls`] are for recalibration on the device, which no firmware
-//! does yet. Tests hold them to the decomposition, the host to the emulator, and the link check to no panic.
+//! The trainer of host-sim calls [`solve`] alone, and gets R and z from a QR decomposition of many samples at
+//! once. [`start`], [`update`] and [`Rls`] are for recalibration on the device, which no firmware does yet. Tests
+//! compare them with batch ridge regression and the host with the emulator; the link check proves that they
+//! cannot panic.
 
 use core::ops::{Add, Div, Mul, Sub};
 
-/// `f32` or `f64`.
+/// A floating-point type that the recursion can work in: `f32` or `f64`.
 pub trait Real:
     Copy
     + PartialOrd
@@ -27,16 +28,16 @@ pub trait Real:
     + Mul<Output = Self>
     + Div<Output = Self>
 {
-    /// 0.
+    /// The number 0.
     const ZERO: Self;
-    /// 1.
+    /// The number 1.
     const ONE: Self;
-    /// √(smallest normal number): a diagonal or an entry below it squares to nothing.
+    /// √(smallest normal number): the square of a smaller diagonal or entry is not a normal number.
     const NEGLIGIBLE: Self;
-    /// Square root.
+    /// Square root of the number.
     #[must_use]
     fn sqrt(self) -> Self;
-    /// Neither NaN nor infinite.
+    /// Whether the number is neither NaN nor infinite.
     fn is_finite(self) -> bool;
 }
 
@@ -95,7 +96,7 @@ pub fn start<T: Real>(
     Ok(())
 }
 
-/// Takes in one sample. `regressor` (h, `n`) and `target` (y, `outputs`) are working space and
+/// Updates R and z with one sample. `regressor` (h, `n`) and `target` (y, `outputs`) are working space and
 /// hold rotated values afterwards: `target` the rotated residual.
 ///
 /// `root_forgetting` is √λ. Work: 3n² + 6n·outputs floating-point operations.
@@ -131,8 +132,7 @@ pub fn update<T: Real>(
 
 /// Solves R·W = z by back substitution into `weights` (`n × outputs` row-major).
 ///
-/// A direction that was never excited, and whose information has faded to nothing under
-/// forgetting, gets weight 0.
+/// A direction that was never excited, and whose information forgetting has faded to nothing, gets weight 0.
 pub fn solve<T: Real>(information_root: &[T], projection: &[T], n: usize, weights: &mut [T]) {
     let n = n.max(1);
     let outputs = (weights.len() / n).max(1);
@@ -160,7 +160,7 @@ pub fn solve<T: Real>(information_root: &[T], projection: &[T], n: usize, weight
     }
 }
 
-/// Recursive least squares with sizes known when compiled, for use on the device.
+/// Recursive least squares with sizes known at compile time, for use on the device.
 ///
 /// `REGRESSORS` counts activations, affine inputs and the bias's 1. RAM: `REGRESSORS` ×
 /// (`REGRESSORS` + `OUTPUTS`) values.
@@ -187,7 +187,7 @@ impl<T: Real, const REGRESSORS: usize, const OUTPUTS: usize> Rls<T, REGRESSORS, 
     /// Starts with weights 0, covariance δ·I and forgetting factor λ (1 forgets nothing).
     ///
     /// # Errors
-    /// See [`RlsError`].
+    /// [`RlsError`]: δ is not positive and finite, or λ is not in (0, 1].
     pub fn try_new(initial_covariance: T, forgetting_factor: T) -> Result<Self, RlsError> {
         if !(forgetting_factor > T::ZERO && forgetting_factor <= T::ONE) {
             return Err(RlsError::ForgettingFactor);
@@ -206,7 +206,7 @@ impl<T: Real, const REGRESSORS: usize, const OUTPUTS: usize> Rls<T, REGRESSORS, 
         Ok(rls)
     }
 
-    /// Takes in one sample: what the network's `regressor`s were and what `target` was true.
+    /// Updates the recursion with one sample: the network's `regressor`s and the true `target`.
     pub fn update(&mut self, mut regressor: [T; REGRESSORS], mut target: [T; OUTPUTS]) {
         update(
             self.information_root.as_flattened_mut(),
@@ -217,7 +217,7 @@ impl<T: Real, const REGRESSORS: usize, const OUTPUTS: usize> Rls<T, REGRESSORS, 
         );
     }
 
-    /// The weights that fit all samples so far best: `[regressor][output]`.
+    /// The weights that fit all samples so far best, in the least-squares sense: `[regressor][output]`.
     #[must_use]
     pub fn output_weights(&self) -> [[T; OUTPUTS]; REGRESSORS] {
         let mut weights = [[T::ZERO; OUTPUTS]; REGRESSORS];

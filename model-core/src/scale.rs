@@ -1,13 +1,13 @@
 //! Min–max scaling of readings.
 
-/// Scaled readings are clamped to this range: [0, 1] is the training range, and an eighth of it more
-/// on either side is let through.
+/// Range that scaled readings are clamped to: the training range [0, 1], and an eighth of it more on either
+/// side.
 ///
 /// The clamp bounds every distance to a centre, so that no reading can leave the region where the
 /// network was fitted. It is not tight, because a clamp at 0 and 1 bends readings that exceed the
-/// training range by a hair, and neighbouring channels are so alike that weights of 1e3 and more
-/// rest on their differences: without noise that alone made the error in z of `press` 0.0195 mm
-/// instead of 0.0071 mm.
+/// training range by a hair. Neighbouring channels are so alike that weights of 1e3 and more depend on their
+/// differences: without noise, a tight clamp alone made the error in z of `press` 0.0195 mm instead of
+/// 0.0071 mm.
 pub const CLAMP: [f32; 2] = [-0.125, 1.125];
 
 /// Scales one `reading` by its training minimum and by `per_span` = 1/(maximum − minimum), so that
@@ -26,18 +26,20 @@ pub fn scale(reading: f32, minimum: f32, per_span: f32) -> f32 {
     ((reading - minimum) * per_span).clamp(CLAMP[0], CLAMP[1])
 }
 
-/// Half of the clamp's width, in spans of the training range.
+/// Half the width of [`CLAMP`], in spans of the training range.
 pub const HALF_RANGE: f32 = (CLAMP[1] - CLAMP[0]) / 2.0;
 
-/// Units in [`HALF_RANGE`] that networks with expanded distances count inputs in, from the middle of the
-/// training range: the conversion to `i32`, which saturates, is then the clamp, and takes a Cortex-M4F one
-/// cycle where comparisons take eight.
+/// Number of units in [`HALF_RANGE`]; networks with expanded distances count inputs in these units, from the
+/// middle of the training range.
+///
+/// The conversion to `i32`, which saturates, is then the clamp: it takes a Cortex-M4F one cycle, where comparisons
+/// take eight.
 pub const UNITS: f32 = 2_147_483_648.0;
 
-/// [`UNITS`] in a step of the 16-bit format, whose inputs are the upper halves of these integers.
+/// Number of [`UNITS`] in one step of the 16-bit format, whose inputs are the upper halves of these integers.
 pub const UNITS_PER_STEP: f32 = 65_536.0;
 
-/// Clamps a scaled reading in [`UNITS`]; NaN becomes 0. Nothing is rounded but what lies 24 bits below.
+/// Clamps a scaled reading in [`UNITS`] and drops fractions of a unit; NaN becomes 0.
 #[inline]
 #[must_use]
 pub fn clamp_units(scaled: f32) -> f32 {

@@ -1,4 +1,4 @@
-//! The blob format, held to its specification in `docs/blob.md`.
+//! The blob format, compared with its specification in `docs/blob.md`.
 
 use model_core::blob::{
     Columns, DecodeError, EncodeError, Floats, Metadata, Model, ModelParts, NoiseKind, encode,
@@ -51,7 +51,7 @@ fn metadata() -> Metadata<'static> {
     }
 }
 
-/// Two mirror rows that share one network.
+/// A blob of two mirrored rows that share one network.
 fn small_model(buffer: &mut [u8]) -> &[u8] {
     let networks = [network()];
     encode(
@@ -182,7 +182,7 @@ fn what_does_not_fit_the_format_is_refused_when_written() {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(20_000))]
-    /// Whatever is written under a valid CRC, decoding ends, and what it accepts is usable.
+    /// Parsing ends for any bytes under a valid CRC, and a model that it accepts is usable.
     #[test]
     fn hostile_bytes_under_a_valid_crc_never_panic(
         changes in prop::collection::vec((9_usize..500, any::<u8>()), 1..6),

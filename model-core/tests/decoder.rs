@@ -1,4 +1,4 @@
-//! A decoder of the paper's sensor: it answers what its networks answer, and takes no unsound blob.
+//! A decoder of the paper's sensor: it decodes as its networks infer, and rejects an unsound blob.
 
 use model_core::blob::{DecodeError, Metadata, ModelParts, ModelShape, encode_to_vec};
 use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
@@ -55,7 +55,7 @@ impl Numbers {
     }
 }
 
-/// Two networks that the rows use in turn.
+/// A blob of two networks that the rows use in turn.
 fn blob(seed: usize, rows: usize) -> AlignedBytes {
     let (even, odd) = (Numbers::new(seed), Numbers::new(seed + 50));
     let shape = ModelShape { rows, inputs: COLS, outputs: OUTPUTS };
@@ -82,7 +82,7 @@ fn bits(outputs: &[[f32; OUTPUTS]; ROWS]) -> Vec<u32> {
     outputs.as_flattened().iter().map(|v| v.to_bits()).collect()
 }
 
-/// What the networks themselves answer, through the interface with sizes known when it runs.
+/// Outputs of the networks themselves, through the interface with sizes known at run time.
 fn inferred<E: ExpKernel>(seed: usize, frame: &Frame<ROWS, COLS>) -> [[f32; OUTPUTS]; ROWS] {
     let numbers = [Numbers::new(seed), Numbers::new(seed + 50)];
     let mut outputs = [[0.0; OUTPUTS]; ROWS];

@@ -1,4 +1,4 @@
-//! A decoder that leaves rows at rest alone.
+//! A decoder that skips rows at rest.
 
 use model_core::blob::{Metadata, ModelParts, ModelShape, encode};
 use model_core::rbf::Shape;
@@ -39,7 +39,7 @@ fn with_decoder(check: impl FnOnce(&TestDecoder<'_>)) {
 
 fn gated(decoder: &TestDecoder<'_>, frame: &TestFrame, baseline: &TestFrame) -> TestEstimate {
     let rest = decoder.decode(baseline);
-    // What was there before must not show through.
+    // These values must all be overwritten.
     let mut estimate = Estimate { outputs: [[7.0; 2]; 3], status: [RowStatus::Overflow; 3] };
     decoder.decode_gated_into(frame, Gate::new(baseline, &rest, TOLERANCE), &mut estimate);
     estimate

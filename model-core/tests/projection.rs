@@ -1,4 +1,4 @@
-//! One network for the whole array, behind a projection: the blob, and what a decoder makes of it.
+//! One network for the whole array, behind a projection: its blob, and how a decoder decodes with it.
 
 use model_core::blob::{
     DecodeError, EncodeError, Metadata, Model, ModelParts, ModelShape, encode, encoded_length_bound,
@@ -9,9 +9,9 @@ use model_core::rbf::direct::{self, Parameters};
 use model_core::rbf::{Network, Shape};
 use model_core::{Aligned, Decoder, Frame, Gate, RowStatus};
 
-/// The first feature is the mean of the four readings, the second what the rows differ by.
+/// A projection block: the first feature is the mean of the four readings, the second the difference of the rows.
 const BLOCK: [f32; 10] = [0.0, 10.0, 0.25, 0.25, 0.25, 0.25, 0.25, -0.25, 0.25, -0.25];
-/// At the centre in the first feature, a quarter of the span from it in the second.
+/// A frame at the network's centre in the first feature, and a quarter of the span from it in the second.
 const NEAR_CENTRE: Frame<2, 2> = Frame { row_column_resistance_ohm: [[48.0, 50.0], [60.0, 58.0]] };
 
 fn network(outputs: usize) -> Network<'static> {
@@ -98,7 +98,7 @@ fn an_array_is_at_rest_as_a_whole_or_not_at_all() {
     frame.row_column_resistance_ohm[0][0] *= 1.01;
     decoder.decode_gated_into(&frame, gate, &mut estimate);
     assert_eq!((estimate.status, estimate.outputs), ([RowStatus::AtRest; 2], rest.outputs));
-    // The last row wakes the first.
+    // A touch of the last row makes the first one be decoded too.
     frame.row_column_resistance_ohm[1][1] *= 1.03;
     decoder.decode_gated_into(&frame, gate, &mut estimate);
     assert_eq!(estimate, decoder.decode(&frame));
@@ -128,7 +128,7 @@ fn every_changed_word_of_a_projection_is_told() {
         let place = start + 4 * word;
         damaged.0[place..place + 4].copy_from_slice(&f32::NAN.to_le_bytes());
         assert!(matches!(Model::decode(&damaged.0[..length]), Err(DecodeError::Corrupt { .. })));
-        // Somebody has made the CRC fit.
+        // The CRC fits the damaged bytes.
         let crc = CRC_32.checksum(&damaged.0[..length - 4]);
         damaged.0[length - 4..length].copy_from_slice(&crc.to_le_bytes());
         let refused = Model::decode(&damaged.0[..length]);

@@ -1,4 +1,4 @@
-//! Everything that CI runs: two rows of steps beside one another, one for the host and one for the device.
+//! Everything that CI runs: two rows of steps side by side, one for the host and one for the device.
 
 mod step;
 mod times;
@@ -13,10 +13,10 @@ use crate::process::{Outcome, cargo, root, target_dir};
 use step::{Ended, Step};
 use times::Times;
 
-/// What the steps take on the reference machine.
+/// File of the times that the steps take on the reference machine.
 const TIMES: &str = "xtask/times.txt";
 
-/// Runs every step, whatever becomes of the others, and prints a summary.
+/// Runs every step, even after a failure, and prints a summary.
 pub fn run() -> Outcome {
     let accepted = fs::read_to_string(root().join(TIMES));
     let accepted = accepted.map_err(|cause| format!("{TIMES}: {cause}"))?;
@@ -24,7 +24,7 @@ pub fn run() -> Outcome {
     let directory = target_dir().join("ci");
     let failed = |cause: std::io::Error| format!("{}: {cause}", directory.display());
     fs::create_dir_all(&directory).map_err(failed)?;
-    // A copy, because a step that builds this program again replaces the file.
+    // The steps run a copy, because a step that builds this program again replaces the file.
     let this = directory.join("xtask").with_extension(env::consts::EXE_EXTENSION);
     fs::copy(env::current_exe().map_err(failed)?, &this).map_err(failed)?;
 
@@ -33,8 +33,8 @@ pub fn run() -> Outcome {
     summarise(&ended, start.elapsed(), &accepted)
 }
 
-/// The steps, row by row. Those of one row share what they build, so they follow one another; those of the other row
-/// build elsewhere.
+/// The steps, row by row. The steps of one row share their builds, so they follow one another; the two rows build
+/// in different folders.
 fn rows(this: &Path) -> [Vec<Step>; 2] {
     let step = |name, command| Step { name, command };
     let of_cargo = |name, arguments: &[&str]| step(name, cargo(arguments));
@@ -50,11 +50,11 @@ fn rows(this: &Path) -> [Vec<Step>; 2] {
         vec![
             of_cargo("format", &["fmt", "--all", "--check"]),
             own("structure"),
-            // As users run it, without the crates that it leaves out. First, since the emulator's checks wait for
-            // the program that it builds.
+            // Plain `cargo test`, as users run it, for the default crates. It comes first, since the emulator's
+            // checks wait for the program that it builds.
             of_cargo("tests", &["test"]),
             of_cargo("xtask-tests", &["test", "--package", "xtask"]),
-            // What clippy checks, docs need.
+            // Docs need what clippy has checked.
             of_cargo("clippy", &clippy),
             step("docs", docs),
         ],
@@ -62,9 +62,9 @@ fn rows(this: &Path) -> [Vec<Step>; 2] {
     ]
 }
 
-/// Runs the rows beside one another, and prints what each step wrote as it ends; gives the steps row by row.
+/// Runs the rows side by side, and prints each step's output when it ends; returns the steps row by row.
 fn in_rows<const ROWS: usize>(rows: [Vec<Step>; ROWS], directory: &Path) -> Vec<Ended> {
-    // One step's output at a time.
+    // Only one step's output is printed at a time.
     let printing = Mutex::new(());
     let run_row = |row: Vec<Step>| -> Vec<Ended> {
         let run = |step: Step| {
@@ -149,7 +149,7 @@ mod tests {
             command.args(["-c", script]).current_dir(&directory);
             Step { name, command }
         };
-        // Each row waits for the other one's second step: neither ends unless both run.
+        // The steps of both rows wait for each other: neither ends unless both run.
         let wait = |own, other| format!("touch {own}; while [ ! -e {other} ]; do sleep 0.01; done");
         let rows = [
             vec![step("a", "exit 1"), step("b", &wait("b-here", "d-here"))],

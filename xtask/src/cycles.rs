@@ -1,5 +1,8 @@
-//! What decoding costs on a Cortex-M4: exact instructions from QEMU, cycles by a model of the
-//! processor. `docs/cycles.md` explains both, and has the figures that were accepted.
+//! Cost of decoding on a Cortex-M4: exact instructions from QEMU, and cycles by a model of the processor.
+//!
+//! A *kernel*, as in the column of `firmware/cycles.csv`, is one way to decode: a number format, with another
+//! exponential than the default if its name ends with one, or its compiled twin (portable Rust instead of
+//! assembly) if it ends with `-portable`. `docs/cycles.md` explains all this, and has the accepted figures.
 
 mod options;
 
@@ -41,10 +44,10 @@ use figures::Figure;
 use models::Blob;
 pub use options::Options;
 
-/// The image that is measured.
+/// Name of the image that is measured.
 const IMAGE: &str = "qemu-bench";
 
-/// Where the accepted figures are, and the tables that are made from them.
+/// Files of the accepted figures, and of the tables that are made from them.
 const DATA: &str = "firmware/cycles.csv";
 const DOCUMENT: &str = "docs/cycles.md";
 
@@ -63,7 +66,7 @@ pub fn run(options: &Options<'_>) -> Outcome {
         Some(model) => models::of_file(Path::new(model), &directory)?,
         None => models::train(&directory)?,
     };
-    // On every core: QEMU runs an image on one.
+    // Images are measured on all cores at once, since QEMU runs an image on one.
     let measured: Vec<Vec<Figure>> =
         blobs.par_iter().map(|blob| measure(&image, &code, blob)).collect::<Outcome<_>>()?;
     let measured = chosen(in_order(measured.concat()), options)?;
@@ -98,7 +101,7 @@ fn measure(image: &Path, code: &Code, blob: &Blob) -> Outcome<Vec<Figure>> {
     Ok(figures)
 }
 
-/// Kernel by kernel as they came, and each K by K.
+/// Sorts figures by kernel, in the order of their first appearance, and then by K.
 fn in_order(mut figures: Vec<Figure>) -> Vec<Figure> {
     let mut order: Vec<String> = Vec::new();
     for figure in &figures {
@@ -111,7 +114,7 @@ fn in_order(mut figures: Vec<Figure>) -> Vec<Figure> {
     figures
 }
 
-/// Those of the kernel that was asked for, or all.
+/// The figures of the kernel that was asked for, or all.
 fn chosen(figures: Vec<Figure>, options: &Options<'_>) -> Outcome<Vec<Figure>> {
     let Some(kernel) = options.kernel else { return Ok(figures) };
     let (chosen, others): (Vec<_>, Vec<_>) =
@@ -124,7 +127,7 @@ fn chosen(figures: Vec<Figure>, options: &Options<'_>) -> Outcome<Vec<Figure>> {
     Ok(chosen)
 }
 
-/// Compares a model of one's own with what was accepted of such models: what `host-sim trade` says that it costs.
+/// Compares the figures of a user's own model with the accepted ones of such models, which `host-sim trade` shows.
 fn hold_model_to_accepted(
     measured: &[Figure],
     rows_alike: bool,
@@ -146,7 +149,7 @@ fn hold_model_to_accepted(
         return Ok(());
     }
     let table = comparison::table(&comparison);
-    // With --json, objects alone stand on stdout.
+    // With --json, stdout has the objects only.
     if json {
         eprint!("{table}");
     } else {
@@ -161,7 +164,7 @@ fn hold_model_to_accepted(
     Err(format!("other than in {DATA} for {}:\n  {}", reference.compiler, beyond.join("\n  ")))
 }
 
-/// Compares with what was accepted, or writes it.
+/// Compares figures with the accepted ones, or writes them as accepted.
 fn hold_to_accepted(measured: &[Figure], compiler: &str, options: &Options<'_>) -> Outcome {
     let of = |file: &str, cause: String| format!("{file}: {cause}");
     let mut accepted = Accepted::parse(&read(DATA)?).map_err(|cause| of(DATA, cause))?;
@@ -198,7 +201,7 @@ fn hold_to_accepted(measured: &[Figure], compiler: &str, options: &Options<'_>) 
     }
 }
 
-/// Tells what holds for a compiler whose figures were not accepted.
+/// Prints how figures are compared for a compiler that has no accepted ones.
 fn say_if_others(reference: &Reference<'_>, compiler: &str, measured: &[Figure]) {
     if reference.is_own {
         return;

@@ -1,5 +1,5 @@
-//! The emulator's programs, each held to the expected output beside it, and the application, held to
-//! the host: two at a time, told of in order.
+//! Running the emulator's programs and comparing each with its expected output, and the application with the host.
+//! Two run at a time; results are printed in order.
 
 mod application;
 mod cable;
@@ -14,19 +14,19 @@ use crate::firmware::{QEMU, build_image};
 use crate::process::{Outcome, Said, root};
 use crate::toolchain::{Toolchain, elf};
 
-/// What the application is called among the programs.
+/// Name of the application among the programs.
 const APPLICATION: &str = "application";
 
-/// What to do with output that differs.
+/// What happens if a program's output differs from the expected one.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Differences {
     Fail,
-    /// Write it into the file beside the program.
+    /// Write the output into the file beside the program.
     Accept,
 }
 
-/// Runs the programs of these names, or all and the application, and compares what they log; shows it
-/// if they were named.
+/// Runs the programs of these names, or all and the application, and compares their logs with the expected ones.
+/// Prints the logs of programs that were named.
 pub fn run(names: &[&str], differences: Differences) -> Outcome {
     let all = programs(&root().join("firmware/qemu/src/bin"))?;
     let (application, names): (Vec<&str>, Vec<&str>) =
@@ -43,7 +43,7 @@ pub fn run(names: &[&str], differences: Differences) -> Outcome {
     let (mut jobs, mut failed) = (Vec::new(), Vec::new());
     if everything || !application.is_empty() {
         match application::checks() {
-            // First, since they take longest.
+            // These checks come first, since they take longest.
             Ok(checks) => jobs.extend(checks.map(Job::Application)),
             Err(cause) => conclude(APPLICATION, Err(cause), &mut failed),
         }
@@ -71,7 +71,7 @@ pub fn run(names: &[&str], differences: Differences) -> Outcome {
     }
 }
 
-/// What is run.
+/// One thing to run.
 enum Job {
     /// The source of a program.
     Program(PathBuf),
@@ -87,7 +87,7 @@ impl Job {
     }
 }
 
-/// Tells how `name` ended.
+/// Prints how `name` ended.
 fn conclude(name: &str, outcome: Outcome, failed: &mut Vec<String>) {
     match outcome {
         Ok(()) => println!("ok      {name}"),
@@ -109,7 +109,7 @@ fn run_program(program: &Path, differences: Differences, show: bool) -> Said {
     }
 }
 
-/// Prints a log that was saved while an image ran: the application's if none is named.
+/// Prints a log that was saved while an image ran; without `image`, it is the application's log.
 pub fn print_log(log: &str, image: Option<&str>) -> Outcome {
     let image = image.map_or_else(|| elf(application::IMAGE), PathBuf::from);
     let text = qemu::decoded(Path::new(log), &image)?;
@@ -131,7 +131,7 @@ fn check(program: &Path, output: &str, differences: Differences) -> Outcome {
     expected::compare(&expected, output)
 }
 
-/// Every program's source, by name.
+/// Sources of all programs, sorted by name.
 fn programs(directory: &Path) -> Outcome<Vec<PathBuf>> {
     let entries =
         fs::read_dir(directory).map_err(|cause| format!("{}: {cause}", directory.display()))?;
@@ -148,7 +148,7 @@ fn name(program: &Path) -> String {
     program.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// The programs of these names; all if there are none.
+/// The programs of these names; all if no name is given.
 fn choose(all: &[PathBuf], names: &[&str]) -> Outcome<Vec<PathBuf>> {
     if names.is_empty() {
         return Ok(all.to_vec());

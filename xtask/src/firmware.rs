@@ -1,27 +1,28 @@
-//! The firmware for its target, its lints there, and the proof that it cannot panic.
+//! Building and linting the firmware for its target, and proving that it cannot panic.
 
 use crate::process::{Outcome, Watched, run as run_command, watch};
 use crate::toolchain::Toolchain;
 
-/// What the link check's panic handler calls, and nobody defines.
+/// Function that the link check's panic handler calls, and that is defined nowhere.
 const SYMBOL: &str = "taxel_reachable_panic";
 
 const PROFILE: [&str; 2] = ["--profile", "firmware"];
 
-/// What is built alone: together, a feature that one asks of a dependency would hold for all.
+/// Packages that are built together. Others are built separately, since a feature that one package enables in a
+/// dependency would hold for all.
 type Packages = &'static [&'static str];
 
-/// The emulator's programs.
+/// Packages of the emulator's programs.
 pub const QEMU: Packages = &["--package", "qemu-image", "--features", "programs"];
 
-/// The image that `cargo xtask cycles` measures: one of them, built as the others are.
+/// The image that `cargo xtask cycles` measures: one of the emulator's programs, built as the others are.
 pub const BENCH: Packages =
     &["--package", "qemu-image", "--features", "programs", "--bin", "qemu-bench"];
 
-/// The image of the board.
+/// The board's image.
 pub const NUCLEO: Packages = &["--package", "nucleo-f446re"];
 
-/// What the images are made of, and the link check.
+/// Libraries of the images, and the link check.
 const LIBRARIES: Packages = &[
     "--package",
     "model-core",
@@ -33,8 +34,8 @@ const LIBRARIES: Packages = &[
     "link-check",
 ];
 
-/// Builds and lints all that runs on a device, links the check, and links it once more with a panic
-/// in it.
+/// Builds and lints everything that runs on a device. Links the link check, and once more with a panic in it,
+/// which must fail.
 pub fn run() -> Outcome {
     let toolchain = Toolchain::find()?;
     println!("toolchain: {toolchain}");
@@ -77,13 +78,13 @@ fn link_check(toolchain: &Toolchain) -> Outcome {
     Ok(())
 }
 
-/// All in one command: built apart, the libraries would be compiled twice.
+/// Builds all libraries in one command: otherwise they would be compiled twice.
 fn build(toolchain: &Toolchain, more: &[&str], echo: bool) -> Outcome<Watched> {
     let mut command = toolchain.build();
     watch(command.args(PROFILE).args(LIBRARIES).args(more), echo)
 }
 
-/// Whether a linker complained that the symbol is undefined.
+/// Whether `messages` contain a linker's complaint that [`SYMBOL`] is undefined.
 fn names_symbol(messages: &str) -> bool {
     messages.lines().any(|line| line.contains("undefined") && line.contains(SYMBOL))
 }

@@ -1,4 +1,4 @@
-//! One command for everything that people and CI run: `cargo xtask help`.
+//! Commands for everything that people and CI run; `cargo xtask help` lists them.
 
 mod process;
 mod structure;
@@ -21,35 +21,36 @@ use emulate::Differences;
 const HELP: &str = "\
 Usage: cargo xtask COMMAND
 
-  ci                        everything that CI runs: format, structure, tests, clippy, docs, and beside them
-                            firmware, size, cycles, emulate; goes on after a failure and ends with a
-                            summary, in which each step's time stands beside that in xtask/times.txt
-  structure                 which module and crate may import which, and where `unsafe` may stand, as
-                            ARCHITECTURE.md says; what part of all lines each crate holds
-  firmware                  builds and lints for thumbv7em-none-eabihf all that runs on a device,
-                            and proves by linking that no panic is reachable there
-  emulate [--accept] [NAME…]  runs the programs of these names, or all, of firmware/qemu/src/bin in
-                            QEMU, and compares what they log and their exit status with the .out
-                            file beside them; --accept writes these files instead. Shows the logs
-                            of programs that are named. `application`, or no name, holds the
-                            application to the host as well: under a minute. Two run at a time
-  log FILE [ELF]            prints a log that `host-sim emulate --log FILE` saved; ELF is the image
-                            that wrote it, if it is another than that command's own
-  size                      shows what flash and RAM the images take, and fails if that is more
-                            than firmware/budget.txt allows
-  cycles [OPTION…]          counts in QEMU what decoding costs a Cortex-M4, with every kernel and
-                            K = 16 to 256: instructions, cycles by a model, microseconds; fails if
-                            that is more than its budget, or other than firmware/cycles.csv has: exactly
-                            with the compiler that it names, else 2 % more
-      --json                prints a list of objects to stdout, and nothing else
-      --accept              writes firmware/cycles.csv, and the tables of docs/cycles.md, instead
-      --kernel NAME         one kernel alone, held to its budget alone
-      --model FILE          with this model, such as the chosen.bin of `host-sim trade`, held to
-                            what firmware/cycles.csv has for its format, K and tail
-  help                      this text
+  ci                          runs everything that CI runs: format, structure, tests, clippy and docs, and at the
+                              same time firmware, size, cycles and emulate. Goes on after a failure. Ends with a
+                              summary, which shows each step's time beside that in xtask/times.txt
+  structure                   checks the rules in ARCHITECTURE.md: which module and crate may import which, where
+                              `unsafe` may stand, and how large a part of all lines each crate may hold
+  firmware                    builds and lints all code for a device (thumbv7em-none-eabihf), and proves by
+                              linking that it cannot panic
+  emulate [--accept] [NAME…]  runs the programs in firmware/qemu/src/bin in QEMU, two at a time: those of these
+                              names, or all. Compares log and exit status of each with the .out file beside it.
+                              Prints the logs of programs that are named. The name `application`, or no name,
+                              also compares the application with the host, in less than a minute
+      --accept                writes the .out files instead
+  log FILE [ELF]              prints a log that `host-sim emulate --log FILE` saved. ELF is the image that wrote
+                              it, if it is not that command's own
+  size                        prints the flash and RAM of the images; fails if an image takes more than
+                              firmware/budget.txt allows
+  cycles [OPTION…]            measures in QEMU what decoding costs a Cortex-M4: instructions, cycles (by a model
+                              of the processor) and microseconds, for K = 16 to 256 and every kernel: a number
+                              format with an exponential, or its portable Rust version. Fails if a figure exceeds
+                              its budget or differs from firmware/cycles.csv. With another compiler than named
+                              there, up to 2 % more cycles are allowed
+      --json                  prints a list of objects to stdout, and nothing else
+      --accept                writes firmware/cycles.csv and the tables of docs/cycles.md instead of comparing
+      --kernel NAME           shows this kernel only, and compares it with its budget only
+      --model FILE            measures with this model, such as the chosen.bin of `host-sim trade`. Compares it
+                              with the figures in firmware/cycles.csv for the same format, K and affine tail
+  help                        prints this text
 
-`bash firmware/setup.sh` installs what these need on Debian.
-Exit status: 0 all well, 1 something failed, 2 bad usage.
+`bash firmware/setup.sh` installs the tools for these commands on Debian.
+Exit status: 0 success, 1 failure, 2 wrong usage.
 Example: cargo xtask emulate hello decode
 ";
 
@@ -71,17 +72,11 @@ fn main() -> ExitCode {
         ["log", log, image] => emulate::print_log(log, Some(image)),
         ["size"] => size::run(),
         ["structure"] => structure::run(),
-        ["cycles", ref options @ ..] if cycles::Options::parse(options).is_some() => {
-            cycles::run(&cycles::Options::parse(options).unwrap_or_default())
-        }
-        [] => {
-            eprint!("cargo xtask needs a command\n\n{HELP}");
-            return ExitCode::from(2);
-        }
-        _ => {
-            eprint!("cargo xtask does not know `{}`\n\n{HELP}", arguments.join(" "));
-            return ExitCode::from(2);
-        }
+        ["cycles", ref options @ ..] => match cycles::Options::parse(options) {
+            Ok(options) => cycles::run(&options),
+            Err(cause) => return wrong_usage(&format!("cycles: {cause}")),
+        },
+        ref arguments => return wrong_usage(&misunderstood(arguments)),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
@@ -94,4 +89,30 @@ fn main() -> ExitCode {
 
 fn are_names(arguments: &[&str]) -> bool {
     !arguments.iter().any(|argument| argument.starts_with('-'))
+}
+
+/// Says why no command has these `arguments`.
+fn misunderstood(arguments: &[&str]) -> String {
+    const COMMANDS: [&str; 6] = ["ci", "structure", "firmware", "emulate", "log", "size"];
+    match arguments {
+        [] => "cargo xtask needs a command".to_owned(),
+        ["log"] => "log: needs a file behind it".to_owned(),
+        [command, rest @ ..] if COMMANDS.contains(command) => {
+            let options = || rest.iter().filter(|argument| argument.starts_with('-'));
+            let accepts = *command == "emulate" && rest.contains(&"--accept");
+            match options().find(|option| !accepts || **option != "--accept") {
+                Some(option) => format!("{command}: unknown option `{option}`"),
+                None if accepts => {
+                    "emulate: `--accept` must stand once, before the names".to_owned()
+                }
+                None => format!("{command}: too many arguments: `{}`", rest.join(" ")),
+            }
+        }
+        [command, ..] => format!("unknown command `{command}`"),
+    }
+}
+
+fn wrong_usage(cause: &str) -> ExitCode {
+    eprint!("error: {cause}\n\n{HELP}");
+    ExitCode::from(2)
 }

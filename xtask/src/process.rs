@@ -5,44 +5,44 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
 
-/// What a step ends with: nothing to say, or why it failed.
+/// Result of a step: its value, or the reason why it failed.
 pub type Outcome<T = ()> = Result<T, String>;
 
-/// The workspace's root.
+/// Root folder of the workspace.
 pub fn root() -> &'static Path {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     here.parent().unwrap_or(here)
 }
 
-/// Where cargo puts what it builds for the host.
+/// Folder for cargo's builds for the host.
 pub fn target_dir() -> PathBuf {
     root().join(env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into()))
 }
 
-/// The cargo that runs this program.
+/// Command with the cargo that runs this program.
 pub fn cargo(arguments: &[&str]) -> Command {
     let mut command = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.args(arguments).current_dir(root());
     command
 }
 
-/// Shows and runs `command`, its output passed through.
+/// Prints and runs `command`; its output is passed through.
 pub fn run(command: &mut Command) -> Outcome {
     show(command);
     let status = command.status().map_err(|cause| not_started(command, &cause))?;
     ended_well(command, status)
 }
 
-/// What a piece of work has to say once it is done.
+/// Output and outcome of a piece of work that is done.
 pub struct Said {
-    /// For stdout.
+    /// Text for stdout.
     pub out: String,
-    /// For stderr.
+    /// Text for stderr.
     pub err: String,
     pub outcome: Outcome,
 }
 
-/// Runs `command`, and keeps what it prints.
+/// Runs `command`, and returns its output.
 pub fn capture(command: &mut Command) -> Said {
     let shown = shown(command);
     match command.output() {
@@ -59,14 +59,14 @@ pub fn capture(command: &mut Command) -> Said {
     }
 }
 
-/// What became of a command whose messages were looked at.
+/// Result of a command whose messages are examined.
 pub struct Watched {
     pub success: bool,
-    /// Everything it wrote to stderr.
+    /// Everything that the command wrote to stderr.
     pub messages: String,
 }
 
-/// Shows and runs `command`, and keeps what it writes to stderr; with `echo`, passes it through too.
+/// Prints and runs `command`, and returns its stderr; with `echo`, also passes it through.
 pub fn watch(command: &mut Command, echo: bool) -> Outcome<Watched> {
     show(command);
     let mut child =

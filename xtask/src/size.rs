@@ -1,4 +1,4 @@
-//! What flash and RAM the images take, held to a budget.
+//! Flash and RAM of the images, compared with a budget.
 
 mod budget;
 
@@ -13,7 +13,7 @@ use crate::toolchain::{Toolchain, elf};
 
 const BUDGET: &str = "firmware/budget.txt";
 
-/// Bytes that an image takes as linked.
+/// Bytes of flash and RAM that an image takes as linked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Size {
     vector_table: u64,
@@ -22,7 +22,7 @@ struct Size {
     data: u64,
     bss: u64,
     uninit: u64,
-    /// What the stack's region has, not what is used of it.
+    /// Size of the stack's region, whether it is used or not.
     stack: u64,
 }
 

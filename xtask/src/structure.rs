@@ -1,5 +1,5 @@
-//! What ARCHITECTURE.md says must never be, held to the code: which module and which crate may import which,
-//! where `unsafe` may stand, and how large a crate may be. `house` has what is declared.
+//! Checks of the code against the rules in ARCHITECTURE.md: which module and which crate may import which, where
+//! `unsafe` may stand, and how large a crate may be. The module `house` declares the rules' values.
 
 mod house;
 mod workspace;
@@ -21,7 +21,7 @@ use crate::process::{Outcome, root};
 use modules::Module;
 use workspace::Package;
 
-/// Checks every rule, prints what was found, and fails if a rule is broken.
+/// Checks every rule, prints the results, and fails if a rule is broken.
 pub fn run() -> Outcome {
     let packages = workspace::packages()?;
     let mut broken = crates::broken(&packages, house::CRATES);
@@ -53,8 +53,7 @@ pub fn run() -> Outcome {
     Err(format!("{} breaches of the rules in ARCHITECTURE.md", broken.len()))
 }
 
-/// Breaches of the order of modules, but for the crates that are not in order yet: of these, only their number
-/// is printed.
+/// Breaches of the order of modules. For crates that are not in order yet, only their number is printed.
 fn module_order(packages: &[Package]) -> Outcome<Vec<String>> {
     let mut broken = Vec::new();
     for package in packages {

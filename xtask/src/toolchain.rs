@@ -14,8 +14,8 @@ const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
 const DEBIAN_CLIPPY: &str = "/usr/bin/cargo-clippy";
 const DEBIAN_CLIPPY_PACKAGE: &str = "rust-web-clippy";
 
-/// Variables that steer cargo and rustc, and that another toolchain must not inherit from the one
-/// that runs this program.
+/// Environment variables that control cargo and rustc. Another toolchain must not inherit them from the one that
+/// runs this program.
 const OF_THE_HOST_TOOLCHAIN: [&str; 7] = [
     "CARGO",
     "LD_LIBRARY_PATH",
@@ -26,11 +26,11 @@ const OF_THE_HOST_TOOLCHAIN: [&str; 7] = [
     "RUSTUP_TOOLCHAIN",
 ];
 
-/// Where the target's `core` comes from.
+/// Toolchain for the target, by the source of the target's `core`.
 pub enum Toolchain {
     /// The active toolchain has the target.
     Active,
-    /// Debian's has the library's source instead, but no linker for the target.
+    /// Debian's toolchain has the library's source instead, but no linker for the target.
     Debian { linker: PathBuf },
 }
 
@@ -46,10 +46,10 @@ impl fmt::Display for Toolchain {
 }
 
 impl Toolchain {
-    /// The active toolchain if it has the target, else Debian's.
+    /// Finds the active toolchain if it has the target, else Debian's.
     ///
     /// # Errors
-    /// Neither will do: how to get either.
+    /// Neither can build for the target; the message says how to get either.
     pub fn find() -> Outcome<Self> {
         let library = first_line("rustc", &["--print", "target-libdir", "--target", TARGET]);
         if library.is_some_and(|path| Path::new(&path).is_dir()) {
@@ -64,10 +64,10 @@ impl Toolchain {
         })
     }
 
-    /// What the compiler says of itself, which tells it from others.
+    /// Version of the compiler, as it prints it.
     ///
     /// # Errors
-    /// It says nothing.
+    /// The compiler prints nothing.
     pub fn compiler(&self) -> Outcome<String> {
         let rustc = match self {
             Self::Active => "rustc",
@@ -76,15 +76,15 @@ impl Toolchain {
         first_line(rustc, &["--version"]).ok_or(format!("{rustc} does not tell its version"))
     }
 
-    /// `cargo build` for the target, in a directory of its own.
+    /// Command `cargo build` for the target, with a separate target directory.
     pub fn build(&self) -> Command {
         self.command(DEBIAN_CARGO, "build")
     }
 
-    /// `cargo clippy` likewise.
+    /// Command `cargo clippy` for the target, with a separate target directory.
     ///
     /// # Errors
-    /// Debian's is not installed: how to get it.
+    /// Debian's clippy is not installed; the message says how to get it.
     pub fn clippy(&self) -> Outcome<Command> {
         if matches!(self, Self::Debian { .. }) && !Path::new(DEBIAN_CLIPPY).is_file() {
             return Err(format!(
@@ -95,7 +95,7 @@ impl Toolchain {
         Ok(self.command(DEBIAN_CLIPPY, "clippy"))
     }
 
-    /// `debian_program` is what runs cargo's `subcommand` if the toolchain is Debian's.
+    /// Command for cargo's `subcommand`; with Debian's toolchain, `debian_program` runs it.
     fn command(&self, debian_program: &str, subcommand: &str) -> Command {
         let mut command = match self {
             Self::Active => cargo(&[subcommand]),
@@ -104,7 +104,7 @@ impl Toolchain {
                 for variable in OF_THE_HOST_TOOLCHAIN {
                     command.env_remove(variable);
                 }
-                // Building core is an unstable feature, which a stable compiler grants on this word.
+                // Building core is an unstable feature; this variable enables it in a stable compiler.
                 command.env("RUSTC", DEBIAN_RUSTC).env("RUSTC_BOOTSTRAP", "1");
                 // Clippy's front end would start the first cargo in the path.
                 command.env("CARGO", DEBIAN_CARGO);
@@ -120,12 +120,12 @@ impl Toolchain {
     }
 }
 
-/// Where cargo puts what it builds for the target.
+/// Folder for cargo's builds for the target.
 fn thumb_dir() -> PathBuf {
     target_dir().join("thumb")
 }
 
-/// Where a program for the target lies once it is built, with profile `firmware`.
+/// Path of a program for the target that was built with the profile `firmware`.
 pub fn elf(program: &str) -> PathBuf {
     thumb_dir().join(TARGET).join("firmware").join(program)
 }
@@ -150,7 +150,7 @@ fn sysroot(rustc: &str) -> Option<PathBuf> {
     first_line(rustc, &["--print", "sysroot"]).map(PathBuf::from)
 }
 
-/// Debian's compiler comes without `rust-lld`; rustup's has it.
+/// Path of rustup's `rust-lld`, which Debian's compiler comes without.
 fn linker(debian_sysroot: &Path) -> Option<PathBuf> {
     let of_rust = [sysroot("rustc"), Some(debian_sysroot.to_owned())]
         .into_iter()
@@ -162,7 +162,7 @@ fn linker(debian_sysroot: &Path) -> Option<PathBuf> {
     of_rust.chain(of_system).find(|linker| linker.is_file())
 }
 
-/// Major and minor number of the first version that `text` names.
+/// Major and minor number of the first version in `text`.
 fn release(text: &str) -> Option<(u32, u32)> {
     text.split_whitespace().find_map(|word| {
         let mut numbers = word.split('.').map(|number| number.parse().ok());

@@ -1,7 +1,6 @@
-//! What the images share: where memory goes, where models lie, the application's buffers, and, for their
-//! build scripts, the linker's scripts.
+//! Code shared by all images: use of memory, model slots, the application's buffers, and linker scripts.
 //!
-//! On the target the library is what an image links; on a host it is what an image's build script calls.
+//! On the target, an image links this library; on a host, an image's build script calls it.
 #![cfg_attr(target_os = "none", no_std)]
 
 // From the ground up: a module imports only what is declared before it.
@@ -15,8 +14,8 @@ pub mod region;
 #[cfg(target_os = "none")]
 use firmware::app::PaperBuffers;
 
-/// The application's buffers, once. They are put together in a function of its own, whose stack is free again
-/// when the application runs.
+/// Takes the application's buffers; `None` after the first call. A separate function builds them, so that its
+/// stack is free again when the application runs.
 #[cfg(target_os = "none")]
 #[inline(never)]
 #[must_use]

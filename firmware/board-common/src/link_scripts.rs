@@ -1,13 +1,13 @@
-//! For build scripts of images: hands the linker its scripts.
+//! Linker scripts for the build scripts of images.
 
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
-/// Puts the image's `regions.x` and the `memory.x` that all images share where the linker finds them, and names
-/// the scripts of cortex-m-rt and defmt. Does nothing on a build for a host.
+/// Copies the image's `regions.x` and the shared `memory.x` to where the linker finds them, and passes it the
+/// scripts of cortex-m-rt and defmt. Does nothing in a build for a host.
 ///
 /// # Panics
-/// If a script cannot be copied, or cargo did not start the build script.
+/// If a script cannot be copied, or if the build script was not started by cargo.
 pub fn hand_over() {
     let (regions, memory) = (Path::new("regions.x"), Path::new("../../memory.x"));
     for script in [regions, memory] {

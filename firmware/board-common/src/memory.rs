@@ -1,4 +1,4 @@
-//! How much memory is taken: by the program, as linked, and by its stack, as it ran.
+//! Use of memory: by the program as linked, and by its stack so far.
 
 use core::ptr::addr_of;
 
@@ -21,32 +21,32 @@ unsafe extern "C" {
     static _stack_end: u32;
 }
 
-/// Bytes from the first of two symbols of the linker to the second.
+/// Number of bytes from one symbol of the linker to another.
 macro_rules! bytes {
     ($start:ident .. $end:ident) => {
         addr_of!($end).addr() - addr_of!($start).addr()
     };
 }
 
-/// The program's sections, in bytes.
+/// Sizes of the program's sections, in bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, defmt::Format)]
 pub struct Sections {
-    /// Exceptions and interrupts.
+    /// Table of exceptions and interrupts, in flash.
     pub vector_table: usize,
-    /// Code.
+    /// Code, in flash.
     pub text: usize,
-    /// Constants.
+    /// Constants, in flash.
     pub rodata: usize,
-    /// Variables that start with a value, which lies in flash as well.
+    /// Variables with an initial value: in RAM, and their values in flash as well.
     pub data: usize,
-    /// Variables that start with zero.
+    /// Variables that start as zero, in RAM.
     pub bss: usize,
-    /// Variables that start with nothing.
+    /// Variables that are not initialised, in RAM.
     pub uninit: usize,
 }
 
 impl Sections {
-    /// What the linker placed.
+    /// Sizes of the sections as the linker placed them.
     #[must_use]
     pub fn linked() -> Self {
         Self {
@@ -59,38 +59,38 @@ impl Sections {
         }
     }
 
-    /// Flash that they take.
+    /// Bytes of flash that the sections take.
     #[must_use]
     pub fn flash(&self) -> usize {
         self.vector_table + self.text + self.rodata + self.data
     }
 
-    /// RAM that they take, the stack apart.
+    /// Bytes of RAM that the sections take, without the stack.
     #[must_use]
     pub fn ram(&self) -> usize {
         self.data + self.bss + self.uninit
     }
 }
 
-/// Bytes that there are for the stack.
+/// Bytes reserved for the stack.
 #[must_use]
 pub fn stack_bytes() -> usize {
     bytes!(_stack_end.._stack_start)
 }
 
-/// The most bytes of stack that were in use at any time since the start: all but those that are
+/// Largest number of bytes of stack in use at any time since the start: all bytes except those that are
 /// still painted.
 #[must_use]
 pub fn stack_high_water_bytes() -> usize {
     let words = stack_bytes() / size_of::<u32>();
     let bottom = addr_of!(_stack_end);
-    // SAFETY: all of it lies within the stack's region, which the start-up code painted.
+    // SAFETY: every address lies within the stack's region, which the start-up code painted.
     let painted =
         (0..words).take_while(|&i| unsafe { bottom.add(i).read_volatile() } == STACK_PAINT_VALUE);
     (words - painted.count()) * size_of::<u32>()
 }
 
-/// All this, as the link tells it.
+/// Sizes of sections and stack, as the link reports them.
 #[must_use]
 pub fn taken() -> Memory {
     let sections = Sections::linked();

@@ -1,4 +1,4 @@
-//! Where the linker put the model slots.
+//! Memory regions of the model slots, as the linker placed them.
 
 use core::{ptr, slice};
 
@@ -9,7 +9,7 @@ unsafe extern "C" {
     static _slot_b_end: u8;
 }
 
-/// One slot's memory. Whoever has it is alone with it.
+/// Memory of one model slot, with exclusive access.
 #[derive(Debug)]
 pub struct Region {
     start: usize,
@@ -17,10 +17,10 @@ pub struct Region {
 }
 
 impl Region {
-    /// The regions of both slots.
+    /// Takes the regions of both slots.
     ///
     /// # Safety
-    /// To be called once: no two may be the same region.
+    /// The caller must ensure that this is called only once: no two values may be the same region.
     #[must_use]
     pub unsafe fn take() -> [Self; 2] {
         let region = |start: *const u8, end: *const u8| Self {
@@ -33,33 +33,34 @@ impl Region {
         ]
     }
 
-    /// The address of the first byte.
+    /// Address of the region's first byte.
     #[must_use]
     pub fn start(&self) -> usize {
         self.start
     }
 
-    /// How many bytes there are.
+    /// Length of the region in bytes.
     #[must_use]
     pub fn length(&self) -> usize {
         self.length
     }
 
-    /// All that is in it.
+    /// All bytes of the region.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
-        // SAFETY: the linker keeps the slot free of anything else, and only who has `self` writes to it.
+        // SAFETY: the linker places nothing else in the slot, and only the owner of `self` writes to it.
         unsafe { slice::from_raw_parts(ptr::with_exposed_provenance(self.start), self.length) }
     }
 
-    /// All that is in it, to be written.
+    /// All bytes of the region, to be written.
     ///
     /// # Safety
-    /// The slot lies in memory that a program may write to.
+    /// The caller must ensure that the slot lies in memory that a program may write to.
     #[must_use]
     pub unsafe fn bytes_mut(&mut self) -> &mut [u8] {
         let start = ptr::with_exposed_provenance_mut(self.start);
-        // SAFETY: as for `bytes`; `self` is borrowed mutably, and the caller vouches that it can be written.
+        // SAFETY: as in `bytes`; `self` is borrowed mutably, and the caller ensures that the memory can be
+        // written.
         unsafe { slice::from_raw_parts_mut(start, self.length) }
     }
 }

@@ -1,4 +1,4 @@
-//! The application on a board of which the optimiser knows nothing.
+//! The application on a board that is opaque to the optimiser.
 
 use firmware::app::{PaperApp, PaperBuffers};
 use firmware::link::message::{Configuration, Memory};

@@ -1,4 +1,4 @@
-//! Calls everything that a device calls, on inputs of which the optimiser knows nothing.
+//! Calls every function that a device calls, on inputs that are opaque to the optimiser.
 
 use firmware::store::blob_in_slot;
 use model_core::rls::{self, Rls};
@@ -8,13 +8,13 @@ use crate::application;
 use crate::opaque::{opaque, slot};
 use crate::readout;
 
-/// A decoder for the paper's sensor, as the application has one.
+/// A decoder for the paper's sensor, as in the application.
 type PaperDecoder = Decoder<'static, 8, 18, 18>;
 
-/// What `host-sim inspect` tells users of RAM must hold here.
+/// The RAM figure of `host-sim inspect` must be at least the compiler's.
 const _: () = assert!(size_of::<PaperDecoder>() <= decoder_ram_bytes(8));
 
-/// The decoder by itself, as a program of one's own calls it: the application decodes into buffers.
+/// Calls the decoder directly, as a user's own program does; the application decodes into buffers.
 fn exercise_decoding() {
     let Ok(decoder) = PaperDecoder::load(blob_in_slot(slot())) else { return };
 
@@ -33,14 +33,14 @@ fn exercise_decoding() {
     }
 }
 
-/// Recursive least squares, which no image calls yet.
+/// Calls recursive least squares, which no image does yet.
 fn exercise_recalibration() {
     let Ok(mut rls) = Rls::<f32, 17, 3>::try_new(opaque(1e3), opaque(0.999)) else { return };
     rls.update(opaque([0.5; 17]), opaque([0.25; 3]));
     opaque(rls.output_weights());
 }
 
-/// Recursive least squares of sizes known only when it runs.
+/// Calls recursive least squares with sizes known only at run time.
 fn exercise_recalibration_on_slices() {
     let mut numbers = [0.0_f32; 512];
     let (root, rest) = numbers.split_at_mut(256);
@@ -54,7 +54,7 @@ fn exercise_recalibration_on_slices() {
     opaque(numbers);
 }
 
-/// Where a linker begins that is given no script: what this does not reach is left out.
+/// Entry point for a linker without a script: it leaves out whatever this function does not reach.
 #[unsafe(no_mangle)]
 extern "C" fn _start() -> ! {
     exercise_decoding();

@@ -1,10 +1,10 @@
-//! Values of which the optimiser knows nothing, and a panic handler that does not link.
+//! Values that are opaque to the optimiser, and a panic handler that does not link.
 
 use core::panic::PanicInfo;
 use core::{ptr, slice};
 
 unsafe extern "C" {
-    /// Defined nowhere: whatever reaches it does not link.
+    /// A function that is defined nowhere: a program that can reach it does not link.
     fn taxel_reachable_panic() -> !;
 }
 
@@ -14,7 +14,7 @@ fn panic(_: &PanicInfo<'_>) -> ! {
     unsafe { taxel_reachable_panic() }
 }
 
-/// `value`, after which the optimiser neither knows what it is nor may leave out computing it.
+/// Returns `value`, hidden from the optimiser, which must compute it and can assume nothing about it.
 #[inline(never)]
 pub fn opaque<T: Copy>(value: T) -> T {
     // SAFETY: a reference is valid for reads.
@@ -24,6 +24,6 @@ pub fn opaque<T: Copy>(value: T) -> T {
 /// A flash slot of unknown address, length and content.
 pub fn slot() -> &'static [u8] {
     let (address, length) = opaque((0x0806_0000_usize, 0x2_0000_usize));
-    // SAFETY: the numbers are those of the last sector of a board's flash.
+    // SAFETY: address and length are those of the last sector of a board's flash.
     unsafe { slice::from_raw_parts(ptr::with_exposed_provenance(address), length) }
 }

@@ -1,4 +1,4 @@
-//! Calls every way of reading a frame, with pins and buses of which the optimiser knows nothing.
+//! Calls every way of reading a frame, with pins and buses that are opaque to the optimiser.
 
 use core::array;
 use core::convert::Infallible;
@@ -16,7 +16,7 @@ use model_core::Frame;
 
 use crate::opaque::opaque;
 
-/// Pin, bus, clock and converter in one: may fail or answer anything.
+/// Pin, bus, clock and converter in one, which may fail or return anything.
 #[derive(Clone, Copy)]
 struct Part;
 

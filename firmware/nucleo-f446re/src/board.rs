@@ -1,4 +1,4 @@
-//! Everything on the board, set up.
+//! The board's parts, set up.
 
 use core::cell::RefCell;
 
@@ -18,12 +18,12 @@ use crate::reset::ResetCause;
 use crate::serial::Serial;
 use crate::slot::Slot;
 
-/// Erasing a slot takes up to 4 s, in which nothing is fed; the watchdog's own clock is up to half
-/// as fast again as it should be.
+/// Watchdog period in ms. Erasing a slot takes up to 4 s, in which the watchdog is not fed, and its own clock
+/// may be up to 50 % too fast.
 const WATCHDOG_MS: u32 = 8000;
 
-/// Clock of the converters' bus. An MCP3208 stands 1 MHz at 3.3 V, and the divider has powers of two:
-/// 45 MHz/64.
+/// Clock of the converters' bus in Hz: 45 MHz/64. An MCP3208 takes at most 1 MHz at 3.3 V, and the divider has
+/// powers of two.
 pub const SPI_HZ: u32 = 703_125;
 
 /// One analogue-to-digital converter, an `embedded_hal::spi::SpiDevice`.
@@ -32,16 +32,16 @@ pub type Converter = RefCellDevice<'static, Spi<SPI2>, Select, NoDelay>;
 /// Chip select of an MCP3208, which must be high for 500 ns between two samples.
 pub type Select = HeldPin<90, 0>;
 
-/// A wire to the 74HC595: each level for 100 ns, so that slow edges do no harm.
+/// A wire to the 74HC595; it keeps each level for 100 ns, so that slow edges do no harm.
 pub type RowPin = HeldPin<18, 18>;
 
 /// The board's parts, ready for use.
 pub struct Board {
-    /// Why the program starts.
+    /// Cause of the reset that started the program.
     pub reset_cause: ResetCause,
-    /// LD2, green.
+    /// The green light LD2.
     pub led: ErasedPin<Output>,
-    /// Three MCP3208 on one bus: columns 1–8, 9–16, 17 and 18.
+    /// Three MCP3208 converters on one bus: columns 1–8, 9–16, 17 and 18.
     pub converters: [Converter; 3],
     /// Serial data of the 74HC595 that drives the rows.
     pub row_data: RowPin,
@@ -49,22 +49,22 @@ pub struct Board {
     pub row_clock: RowPin,
     /// Storage clock of the 74HC595.
     pub row_latch: RowPin,
-    /// The ST-LINK's virtual COM port.
+    /// Serial line to the ST-LINK's virtual COM port.
     pub serial: Serial,
-    /// Microseconds since the start.
+    /// Clock that counts microseconds since the start.
     pub clock: Clock,
-    /// Waits, by SysTick.
+    /// Delays, by SysTick.
     pub delay: SysDelay,
-    /// Where models lie.
+    /// The two model slots.
     pub slots: [Slot; 2],
-    /// Runs already. Not fed for 8 s, it restarts the program.
+    /// Watchdog, already running; it restarts the program if it is not fed for 8 s.
     pub watchdog: IndependentWatchdog,
 }
 
 impl Board {
-    /// Sets everything up: 180 MHz from the ST-LINK's 8 MHz; all chip selects and row signals idle.
+    /// Sets up all parts: 180 MHz from the ST-LINK's 8 MHz; all chip selects and row signals idle.
     ///
-    /// `None` if this was called before.
+    /// `None` if it was called before.
     #[must_use]
     pub fn take() -> Option<Self> {
         let parts = Peripherals::take()?;
@@ -80,7 +80,7 @@ impl Board {
         let gpiob = parts.GPIOB.split(&mut rcc);
         let gpioc = parts.GPIOC.split(&mut rcc);
 
-        // Pulled up, a line that no converter drives reads as no answer.
+        // The pull-up makes a line that no converter drives read as no answer.
         let data_in = gpiob.pb14.into_alternate::<5>().internal_resistor(Pull::Up);
         let pins = (Some(gpiob.pb13), Some(data_in), Some(gpiob.pb15));
         let spi = Spi::new(parts.SPI2, pins, MODE_0, SPI_HZ.Hz(), &mut rcc);

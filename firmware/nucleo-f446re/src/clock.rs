@@ -1,11 +1,11 @@
-//! Microseconds, from timer 2.
+//! Clock in microseconds, by timer 2.
 
 use stm32f4xx_hal::pac::TIM2;
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Rcc;
 use stm32f4xx_hal::timer::CounterUs;
 
-/// Counts microseconds.
+/// Clock that counts microseconds.
 pub struct Clock(CounterUs<TIM2>);
 
 impl Clock {
@@ -15,7 +15,7 @@ impl Clock {
         Some(Self(timer))
     }
 
-    /// Microseconds since the start; anew from 0 every 71 minutes.
+    /// Microseconds since the start; it restarts from 0 every 71 minutes.
     #[must_use]
     pub fn now_us(&self) -> u32 {
         self.0.now().ticks()

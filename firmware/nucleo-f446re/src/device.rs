@@ -1,4 +1,4 @@
-//! What runs on the board.
+//! The program on the board: the application with the board's parts.
 
 use board_common::buffers;
 use cortex_m_rt::entry;
@@ -14,7 +14,7 @@ use panic_probe as _;
 use stm32f4xx_hal::gpio::{ErasedPin, Output};
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
-/// Constants of the circuit, which stay in flash. `docs/readout.md` tells how to measure your own.
+/// Constants of the circuit, which stay in flash. `docs/readout.md` explains how to measure your own.
 static CIRCUIT: ZeroPotential<8, 18> = ZeroPotential::TYPICAL;
 
 struct Nucleo {
@@ -41,7 +41,7 @@ impl Port for Nucleo {
 impl Platform for Nucleo {
     const BOARD: &'static str = "nucleo-f446re";
 
-    /// Lets the light blink as well, about once a second.
+    /// Feeds the watchdog, and blinks the light about once a second.
     fn feed_watchdog(&mut self) {
         self.watchdog.feed();
         let on = self.clock.now_us() >> 19 & 1 == 0;

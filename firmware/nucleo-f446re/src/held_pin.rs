@@ -1,4 +1,4 @@
-//! Outputs that are not too fast for the chips that listen.
+//! Output pins that hold each level long enough for the chips that read it.
 
 use core::convert::Infallible;
 
@@ -6,8 +6,8 @@ use cortex_m::asm;
 use embedded_hal::digital::{ErrorType, OutputPin};
 use stm32f4xx_hal::gpio::{ErasedPin, Output};
 
-/// An output that stays high for `HIGH` cycles of the processor (5.6 ns each) at least, and low for
-/// `LOW`.
+/// An output pin that stays high for at least `HIGH` cycles of the processor (5.6 ns each), and low for at
+/// least `LOW`.
 pub struct HeldPin<const HIGH: u32, const LOW: u32>(ErasedPin<Output>);
 
 impl<const HIGH: u32, const LOW: u32> From<ErasedPin<Output>> for HeldPin<HIGH, LOW> {

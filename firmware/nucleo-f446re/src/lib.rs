@@ -1,4 +1,4 @@
-//! The board NUCLEO-F446RE: what a program needs of it. `docs/board.md` has the wiring.
+//! Drivers for the board NUCLEO-F446RE. `docs/board.md` has the wiring.
 //!
 //! On any other target this library is empty.
 #![cfg(target_os = "none")]

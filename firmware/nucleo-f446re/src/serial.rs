@@ -1,9 +1,8 @@
-//! USART2, which the ST-LINK hands on to the computer.
+//! USART2, which the ST-LINK passes on to the computer.
 //!
-//! An interrupt takes every byte into a ring as it comes, and sends from another what was put there: a
-//! report leaves while the next frame is scanned. While flash is erased or written, the processor
-//! stands still: a byte that comes then is lost, and whoever sends a model waits for the answer to
-//! each piece.
+//! An interrupt puts every received byte into a ring, and sends bytes from another ring: a report is sent while
+//! the next frame is scanned. The processor stops while flash is erased or written. A byte that arrives then is
+//! lost, so a host that uploads a model waits for the answer to each chunk.
 
 use core::cell::RefCell;
 
@@ -17,13 +16,13 @@ use stm32f4xx_hal::rcc::Rcc;
 use stm32f4xx_hal::serial::config::Config;
 use stm32f4xx_hal::serial::{Rx, RxListen, Tx, TxISR, TxListen};
 
-/// 8 data bits, no parity, 1 stop bit.
+/// Baud rate; 8 data bits, no parity, 1 stop bit.
 pub const BAUD: u32 = 921_600;
 
-/// Keeps 1 KiB: a ring holds one byte less than it has places.
+/// Ring for 1 KiB: it holds one byte less than it has places.
 type Ring = Queue<u8, 1025>;
 
-/// What the interrupt has to itself.
+/// The parts that only the interrupt uses.
 static WIRES: Mutex<RefCell<Option<Wires>>> = Mutex::new(RefCell::new(None));
 
 struct Wires {
@@ -34,15 +33,15 @@ struct Wires {
 }
 
 impl Wires {
-    /// Takes the byte that has come, if one has. A disturbed one is dropped, as is one for which there is
-    /// no room: the link's checksum tells.
+    /// Takes a received byte, if there is one. A damaged byte, or one without room, is dropped: the link's
+    /// checksum detects that.
     fn receive(&mut self) {
         if let Ok(byte) = self.rx.read() {
             let _ = self.received.enqueue(byte);
         }
     }
 
-    /// Sends a byte if the one before has left, and asks for no more interrupts once there is none.
+    /// Sends a byte if the previous one has left; disables its interrupt when there are no more bytes.
     fn send(&mut self) {
         if !self.tx.is_tx_empty() {
             return;
@@ -56,7 +55,7 @@ impl Wires {
     }
 }
 
-/// Both directions. Nothing here waits.
+/// The serial line, in both directions. No function waits.
 pub struct Serial {
     received: Consumer<'static, u8>,
     to_send: Producer<'static, u8>,
@@ -71,7 +70,7 @@ impl Serial {
         rx.listen();
         let wires = Wires { rx, received, tx, to_send: sending };
         free(|section| WIRES.borrow(section).replace(Some(wires)));
-        // SAFETY: what the interrupt uses is in place, and no critical section hangs on its mask.
+        // SAFETY: the interrupt's parts are in place, and no critical section depends on its mask.
         unsafe { NVIC::unmask(Interrupt::USART2) };
         Some(Self { received: to_read, to_send })
     }
@@ -81,7 +80,7 @@ impl Serial {
         self.received.dequeue()
     }
 
-    /// Puts `byte` among those to be sent; `false`, and nothing done, while 1 KiB of them waits.
+    /// Queues `byte` for sending; returns `false`, and does nothing, while 1 KiB is waiting.
     #[must_use]
     pub fn try_write(&mut self, byte: u8) -> bool {
         let taken = self.to_send.enqueue(byte).is_ok();
@@ -89,7 +88,7 @@ impl Serial {
         taken
     }
 
-    /// Whether all has left, to the last bit.
+    /// Whether all queued bytes have been sent, to the last bit.
     #[must_use]
     pub fn has_sent_all(&self) -> bool {
         let mut all = self.to_send.is_empty();

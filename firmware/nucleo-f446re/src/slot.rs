@@ -1,41 +1,41 @@
-//! Model slots: sectors 6 and 7 of the flash.
+//! Model slots in sectors 6 and 7 of the flash.
 
 use board_common::region::Region;
 use firmware::store::FlashError;
 use stm32f4xx_hal::flash::{Error, FlashExt};
 use stm32f4xx_hal::pac::FLASH;
 
-/// Why a slot was not written or erased as asked.
+/// Why a slot could not be written or erased.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, defmt::Format)]
 pub enum SlotError {
     /// The bytes would reach beyond the slot; none was written.
     OutOfRange,
-    /// The flash holds something else than was written: it was not erased, or is worn out.
+    /// The flash does not hold the bytes that were written: it was not erased, or is worn out.
     Verify,
-    /// The flash controller refused: write protection, most likely.
+    /// The flash controller reported an error, most likely because of write protection.
     Refused,
 }
 
-/// Room for one model: erased as a whole, to ones; written bit by bit, to zeros.
+/// Flash for one model. Erasing sets all its bits to 1; writing can only set bits to 0.
 pub struct Slot(Region);
 
 impl Slot {
-    /// Both slots. They share the controller, which is therefore taken.
+    /// Takes both slots, and the flash controller, which they share.
     pub(crate) fn both(_: FLASH) -> [Self; 2] {
-        // SAFETY: there is one controller, so this is called once.
+        // SAFETY: there is only one controller value, so this is called only once.
         unsafe { Region::take() }.map(Self)
     }
 
-    /// All that is in it.
+    /// All bytes of the slot.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
         self.0.bytes()
     }
 
-    /// Sets all of it to 0xFF. Takes 1 to 4 s, in which nothing else runs, interrupts included.
+    /// Sets all bytes to 0xFF. Takes 1 to 4 s, in which nothing else runs, not even interrupts.
     ///
     /// # Errors
-    /// See [`SlotError`].
+    /// Every variant of [`SlotError`].
     pub fn erase(&mut self) -> Result<(), SlotError> {
         let mut flash = controller();
         let sector = flash.sector(self.0.start() - flash.address()).ok_or(SlotError::OutOfRange)?;
@@ -45,10 +45,10 @@ impl Slot {
         if self.bytes().iter().all(|&byte| byte == 0xFF) { Ok(()) } else { Err(SlotError::Verify) }
     }
 
-    /// Writes `bytes` from `offset` on; 16 µs a byte.
+    /// Writes `bytes` from `offset` on; takes 16 µs a byte.
     ///
     /// # Errors
-    /// See [`SlotError`].
+    /// Every variant of [`SlotError`].
     pub fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), SlotError> {
         let end = offset.checked_add(bytes.len()).ok_or(SlotError::OutOfRange)?;
         if end > self.0.length() {
@@ -77,15 +77,15 @@ impl firmware::store::Slot for Slot {
     }
 }
 
-/// The log tells why.
+/// Logs the cause, and converts it to the store's error.
 fn failed(cause: SlotError) -> FlashError {
     defmt::error!("model slot: {}", cause);
     FlashError
 }
 
-/// The flash controller, without the errors of what went before, which would count for the next.
+/// The flash controller, with the error flags of earlier operations cleared.
 fn controller() -> FLASH {
-    // SAFETY: `Slot::both` took it, and no slot keeps it beyond one call.
+    // SAFETY: `Slot::both` took the controller, and no slot keeps it beyond one call.
     let flash = unsafe { FLASH::steal() };
     // Flags are cleared by writing ones; bits 1 and 4 to 8 are the errors.
     // SAFETY: no other bit of this register can be written.
@@ -97,7 +97,7 @@ fn refused(_: Error) -> SlotError {
     SlotError::Refused
 }
 
-/// The data cache does not see that flash changes: empties it.
+/// Empties the data cache, which does not notice that flash has changed.
 fn forget_cached(flash: &FLASH) {
     flash.acr().modify(|_, w| w.dcen().clear_bit());
     flash.acr().modify(|_, w| w.dcrst().set_bit());

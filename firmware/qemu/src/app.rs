@@ -1,5 +1,5 @@
-//! The application in the emulator: the link in a mailbox or on the first serial line, the readout's parts at
-//! the other end of the second. `host-sim emulate` is at both.
+//! The application in the emulator. The link goes through a mailbox or the first serial line; the readout's parts
+//! are at the other end of the second. `host-sim emulate` is at the other end of both.
 #![no_std]
 #![no_main]
 
@@ -23,10 +23,10 @@ use qemu_image::watchdog::Watchdog;
 use qemu_image::{exit, memory};
 use remote_readout::Remote;
 
-/// Longer than a loop takes, were it ever so slow a computer.
+/// Watchdog period in ms: longer than a loop takes even on a very slow computer.
 const WATCHDOG_MS: u32 = 20_000;
 
-/// Numbers of the pins of the rows' 74HC595 on the host's virtual board.
+/// Number of the data pin of the rows' 74HC595 on the host's virtual board; clock and latch follow.
 const ROW_DATA: u8 = 12;
 const ROW_CLOCK: u8 = 13;
 const ROW_LATCH: u8 = 14;
@@ -34,16 +34,16 @@ const ROW_LATCH: u8 = 14;
 /// Constants of the circuit, which stay in flash.
 static CIRCUIT: ZeroPotential<8, 18> = ZeroPotential::TYPICAL;
 
-/// What carries the bytes of a line.
+/// Carrier of a serial line's bytes: the mailbox or a UART.
 enum Carrier {
     Uart(Uart),
     Mailbox(Mailbox<Psram>),
 }
 
 impl Carrier {
-    /// The link's: the mailbox if the host has laid one out, else the first UART.
+    /// The link's carrier: the mailbox if the host has laid one out, else the first UART.
     fn of_link() -> Self {
-        // SAFETY: nobody else takes it.
+        // SAFETY: the memory is taken here only.
         let psram = unsafe { Psram::take() };
         Mailbox::find(psram).map_or_else(|| Self::Uart(Uart::first()), Self::Mailbox)
     }
@@ -56,7 +56,7 @@ impl Carrier {
     }
 }
 
-/// A serial line with the clock, which all lines share.
+/// A serial line, with the clock that all lines share.
 struct Line<'c> {
     carrier: Carrier,
     clock: &'c Cell<Clock>,
@@ -108,7 +108,7 @@ impl Port for Board<'_> {
 impl Platform for Board<'_> {
     const BOARD: &'static str = "qemu mps2-an386";
 
-    /// Feeding costs QEMU system calls, so it is done once a millisecond at most.
+    /// Feeds the watchdog at most once a millisecond, because feeding costs QEMU system calls.
     fn feed_watchdog(&mut self) {
         let now_us = self.now_us();
         if now_us.wrapping_sub(self.fed_us) >= 1000 {
@@ -142,11 +142,11 @@ fn main() -> ! {
         watchdog: Watchdog::start(WATCHDOG_MS),
         fed_us: 0,
     };
-    // The host says when to scan: its virtual hardware may not be there.
+    // The host says when to scan, because its virtual hardware may be missing.
     let configuration = Configuration { frame_period_us: 0, ..Configuration::DEFAULT };
     let Some(buffers) = buffers() else { exit::failure() };
     let mut app = PaperApp::<_, _>::new(board, scanner, configuration, buffers);
-    // SAFETY: nobody else takes them.
+    // SAFETY: the slots are taken here only.
     let mut slots = unsafe { Slot::take() };
     app.run(&mut slots);
     info!("restarting");

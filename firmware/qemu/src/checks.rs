@@ -1,5 +1,5 @@
-//! What host and target must compute to the last bit alike. `firmware/tests/bit_for_bit.rs` compiles this
-//! file for the host, and compares.
+//! Computations whose results must be the same on host and target, to the last bit.
+//! `firmware/tests/bit_for_bit.rs` compiles this file for the host, and compares.
 
 use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
 use model_core::blob::Model;
@@ -9,30 +9,30 @@ use model_core::rbf::Network;
 use model_core::rls::Rls;
 use model_core::{Decoder, Estimate, Frame, Gate, RowStatus};
 
-/// Of the sensor, as of the paper's.
+/// Number of row-wires, as in the paper's sensor.
 pub const ROWS: usize = 8;
-/// Of the sensor, as of the paper's.
+/// Number of column-wires, as in the paper's sensor.
 pub const COLS: usize = 18;
-/// Of one row.
+/// Number of outputs a row.
 pub const OUTPUTS: usize = 18;
-/// Of a small sensor that one network decodes, behind a projection.
+/// Number of row-wires of a small sensor that one network decodes, behind a projection.
 pub const ARRAY_ROWS: usize = 2;
 
 const FRAMES: usize = 6;
 const CRC: Crc<u32, Table<0>> = Crc::<u32, Table<0>>::new(&CRC_32_ISO_HDLC);
 
-/// Numbers without a pattern in [−1, 1), the same everywhere: the upper half of a linear congruential
-/// generator (Knuth's MMIX).
+/// Generator of pseudo-random numbers in [−1, 1), the same on every platform: the upper bits of a linear
+/// congruential generator (Knuth's MMIX).
 pub struct Numbers(u64);
 
 impl Numbers {
-    /// Those of `seed`.
+    /// Starts a generator with this `seed`.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         Self(seed)
     }
 
-    /// The next one.
+    /// Draws the next number.
     pub fn draw(&mut self) -> f32 {
         self.0 =
             self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -44,8 +44,8 @@ fn add(digest: &mut Digest<'_, u32, Table<0>>, values: &[f32]) {
     values.iter().for_each(|value| digest.update(&value.to_bits().to_le_bytes()));
 }
 
-/// CRC-32 of every bit of what the model in `blob` answers to some frames, one with a reading
-/// missing. `None`: the blob does not load.
+/// CRC-32 of all bits that the model in `blob` decodes some frames to, one with a missing reading. `None` if the
+/// blob does not load.
 #[must_use]
 pub fn decoding<E: ExpKernel>(blob: &[u8]) -> Option<u32> {
     let decoder = Decoder::<ROWS, COLS, OUTPUTS>::load(blob).ok()?;
@@ -67,17 +67,17 @@ pub fn decoding<E: ExpKernel>(blob: &[u8]) -> Option<u32> {
     Some(digest.finalize())
 }
 
-/// Frames that every kernel decodes.
+/// Number of frames that every number format decodes.
 pub const MANY: usize = 10_000;
 
-/// With a table, for many bytes.
+/// CRC-32 with a table, for many bytes.
 const QUICK_CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
-/// By how much readings stray from the middle of the training range, frame after frame: within it, beyond
-/// it, far beyond the clamp, down below zero, and as far as numbers go.
+/// Largest distances in Ω of readings from the middle of the training range, one for each frame in turn: within
+/// the range, beyond it, far beyond the clamp, below zero, and up to the largest numbers.
 const REACHES: [f32; 8] = [5.0, 5.0, 5.0, 7.0, 9.0, 30.0, 1e3, 3e38];
 
-/// One of many frames: its readings, some of them none at all.
+/// Frame number `index` of many, with some readings missing or infinite.
 fn one_of_many<const R: usize>(index: usize, numbers: &mut Numbers) -> Frame<R, COLS> {
     let mut frame = Frame::missing();
     let readings = frame.row_column_resistance_ohm.as_flattened_mut();
@@ -90,7 +90,7 @@ fn one_of_many<const R: usize>(index: usize, numbers: &mut Numbers) -> Frame<R, 
     frame
 }
 
-/// CRC-32 of every bit of what the model in `blob` answers to [`MANY`] frames. `None`: the blob does not load.
+/// CRC-32 of all bits that the model in `blob` decodes [`MANY`] frames to. `None` if the blob does not load.
 #[must_use]
 pub fn decoding_many<E: ExpKernel, const R: usize>(blob: &[u8]) -> Option<u32> {
     let decoder = Decoder::<R, COLS, OUTPUTS>::load(blob).ok()?;
@@ -109,7 +109,7 @@ pub fn decoding_many<E: ExpKernel, const R: usize>(blob: &[u8]) -> Option<u32> {
     Some(digest.finalize())
 }
 
-/// The outputs of a network by its kernel's compiled twin; `None` if there is none.
+/// Infers a network's outputs by the compiled twin of its assembly routine; `None` if the format has none.
 fn infer_by_twin(network: &Network<'_>, inputs: &[f32; COLS], outputs: &mut [f32]) -> Option<()> {
     let mut scaled = [0.0; COLS];
     network.scale(inputs, &mut scaled).ok()?;
@@ -121,8 +121,8 @@ fn infer_by_twin(network: &Network<'_>, inputs: &[f32; COLS], outputs: &mut [f32
     Some(())
 }
 
-/// Of the same frames, the rows that the model in `blob` decodes, and how many of them its kernel's compiled
-/// twin answers otherwise to in any bit. `None`: the blob does not load, or its kernel has no twin.
+/// Number of rows of [`MANY`] frames that the model in `blob` decodes, and how many of them the compiled twin
+/// decodes to other bits. `None` if the blob does not load, or its number format has no twin.
 #[must_use]
 pub fn twins(blob: &[u8]) -> Option<[usize; 2]> {
     let decoder = Decoder::<ROWS, COLS, OUTPUTS>::load(blob).ok()?;
@@ -147,9 +147,9 @@ pub fn twins(blob: &[u8]) -> Option<[usize; 2]> {
     Some([compared, different])
 }
 
-/// Of as many frames, how many the model in `blob`, which stands behind a projection, decodes, and how many of
-/// them the compiled twins of projection and kernel answer otherwise to in any bit. `None`: the blob does not
-/// load, or its kernel has no twin.
+/// Number of the [`MANY`] frames that the model in `blob` decodes behind a projection, and how many of them the
+/// compiled twins of projection and network decode to other bits. `None` if the blob does not load, or its number
+/// format has no twin.
 #[must_use]
 pub fn array_twins(blob: &[u8]) -> Option<[usize; 2]> {
     let decoder = Decoder::<ARRAY_ROWS, COLS, OUTPUTS>::load(blob).ok()?;
@@ -174,11 +174,11 @@ pub fn array_twins(blob: &[u8]) -> Option<[usize; 2]> {
     Some([compared, different])
 }
 
-/// How far readings may be from their baseline, relative to it, and be at rest.
+/// Tolerance of the gate, relative to the baseline.
 const TOLERANCE: f32 = 0.02;
 
-/// The baseline of `row` with readings about as far from it as the gate allows: each by itself, or all of them
-/// together, now and then one of them alone beyond it, or no number.
+/// Readings about as far from the `baseline` as the gate allows, each by itself or all together. Now and then one
+/// reading is beyond, NaN or infinite.
 fn nearly_at_rest(
     index: usize,
     baseline: &[f32; COLS],
@@ -196,9 +196,8 @@ fn nearly_at_rest(
     readings
 }
 
-/// Of [`MANY`] frames near the baseline: rows, how many the gate finds at rest, and how many it finds
-/// otherwise than [`is_at_rest`], or gives other outputs than those at rest. `None`: the blob in `blob` does
-/// not load.
+/// Number of rows in [`MANY`] frames near the baseline, how many of them are at rest, and how many the gate treats
+/// wrongly: otherwise than [`is_at_rest`] says, or with other outputs. `None` if the blob does not load.
 #[must_use]
 pub fn gating(blob: &[u8]) -> Option<[usize; 3]> {
     let decoder = Decoder::<ROWS, COLS, OUTPUTS>::load(blob).ok()?;
@@ -207,7 +206,7 @@ pub fn gating(blob: &[u8]) -> Option<[usize; 3]> {
     let readings = baseline.row_column_resistance_ohm.as_flattened_mut();
     readings.iter_mut().for_each(|ohm| *ohm = 60.0 + 5.0 * numbers.draw());
     let rest = decoder.decode(&baseline);
-    // The root of 18, which `core` has no function for.
+    // √18 as a number, because `core` has no square root.
     let most = [TOLERANCE, TOLERANCE / 4.242_640_7];
     let [mut at_rest, mut otherwise] = [0; 2];
     for index in 0..MANY {
@@ -238,8 +237,7 @@ pub fn gating(blob: &[u8]) -> Option<[usize; 3]> {
     Some([MANY * ROWS, at_rest, otherwise])
 }
 
-/// CRC-32 of every bit of the weights that recursive least squares has learnt after each of 200
-/// samples.
+/// CRC-32 of all bits of the weights that recursive least squares has after each of 200 samples.
 #[must_use]
 pub fn recalibration() -> Option<u32> {
     let mut rls = Rls::<f32, 9, 3>::try_new(1e4, 0.99).ok()?;

@@ -1,4 +1,4 @@
-//! Microseconds since the start, from CMSDK timer 0.
+//! Clock in microseconds, by CMSDK timer 0.
 
 use crate::registers::Registers;
 
@@ -8,11 +8,11 @@ const RELOAD: usize = 0x8;
 
 const TICKS_PER_US: u32 = 25;
 
-/// Counts microseconds. To be read at least every 171 s, when the timer has gone round once.
+/// Clock that counts microseconds. It must be read at least every 171 s, before the timer wraps around.
 #[derive(Clone, Copy)]
 pub struct Clock {
     timer: Registers,
-    /// Where the timer, which counts down, stood at the last whole microsecond.
+    /// Count of the timer, which counts down, at the last whole microsecond.
     last: u32,
     now_us: u64,
 }
@@ -21,7 +21,7 @@ impl Clock {
     /// Starts the timer.
     #[must_use]
     pub fn start() -> Self {
-        // SAFETY: timer 0 is there.
+        // SAFETY: timer 0 lies at this address.
         let timer = unsafe { Registers::at(0x4000_0000) };
         timer.write(RELOAD, u32::MAX);
         timer.write(VALUE, u32::MAX);

@@ -1,4 +1,4 @@
-//! Ending QEMU.
+//! Ending QEMU with an exit status.
 
 /// Ends QEMU with exit status 0.
 pub fn success() -> ! {

@@ -1,4 +1,4 @@
-//! What ends a program early: logged, then QEMU is left with a failure.
+//! Panics, faults and stack overflows: each is logged, and ends QEMU with a failure.
 
 use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -8,15 +8,15 @@ use defmt_semihosting as _;
 
 use crate::exit;
 
-/// The most that one instruction pushes. It is taken back if it fails: the stack pointer then still
-/// lies within the stack.
+/// Largest number of bytes that one instruction pushes. A push that fails is undone, so that the stack pointer
+/// still lies within the stack.
 const LARGEST_PUSH_BYTES: usize = 128;
 
 unsafe extern "C" {
     static _stack_end: u32;
 }
 
-/// Ends QEMU without a word if reporting fails in its turn.
+/// Ends QEMU without logging anything if reporting itself fails.
 fn report_once() {
     static REPORTING: AtomicBool = AtomicBool::new(false);
     if REPORTING.swap(true, Ordering::Relaxed) {
@@ -31,14 +31,14 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     exit::failure()
 }
 
-/// Where `defmt::panic!` and `defmt::assert!` end, which have logged their message.
+/// Ends a program whose `defmt::panic!` or `defmt::assert!` has logged its message.
 #[defmt::panic_handler]
 fn panicked() -> ! {
     exit::failure()
 }
 
-/// Denies all access to 256 MB below the RAM, where this machine, unlike a microcontroller, answers
-/// every read with zero: whatever overflows the stack faults at once. Runs before anything else.
+/// Denies all access to the 256 MB below the RAM, so that a stack overflow faults at once. This machine, unlike a
+/// microcontroller, would let every read there give zero. Runs before anything else.
 #[unsafe(no_mangle)]
 #[unsafe(naked)]
 extern "C" fn __pre_init() {
@@ -56,8 +56,8 @@ extern "C" fn __pre_init() {
     )
 }
 
-/// Calls [`report`] on a fresh stack: after an overflow there is no other, and whatever else the old
-/// one holds is no longer needed.
+/// Calls [`report`] on a fresh stack: after an overflow the old one has no room, and its contents are no longer
+/// needed.
 #[unsafe(no_mangle)]
 #[unsafe(naked)]
 extern "C" fn HardFault() -> ! {
@@ -75,7 +75,8 @@ extern "C" fn HardFault() -> ! {
     )
 }
 
-/// `program_counter` counts only if `stack_pointer` lies within the stack.
+/// Logs the fault, and ends QEMU with a failure. `program_counter` is valid only if `stack_pointer` lies within
+/// the stack.
 extern "C" fn report(stack_pointer: usize, program_counter: u32) -> ! {
     report_once();
     if stack_pointer < (&raw const _stack_end).addr() + LARGEST_PUSH_BYTES {

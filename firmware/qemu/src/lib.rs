@@ -1,4 +1,4 @@
-//! QEMU's mps2-an386, a Cortex-M4F at 25 MHz: what a program needs of it.
+//! Drivers for QEMU's machine mps2-an386, a Cortex-M4F at 25 MHz.
 //!
 //! Logs are defmt's, through semihosting. A panic, a fault and a stack overflow are logged and end
 //! QEMU with a failure. On any other target this library is empty.

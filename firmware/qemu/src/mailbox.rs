@@ -1,7 +1,7 @@
 //! A serial line through memory that the image shares with a program on the host.
 //!
-//! QEMU's UART moves one byte a turn of its main loop; here a message takes no longer than its copy. The
-//! memory holds two rings of bytes, one for each direction. Every ring has one writer, one reader and two
+//! QEMU's UART moves only one byte in each turn of its main loop; here a message takes no longer than its copy.
+//! The memory holds two rings of bytes, one for each direction. Every ring has one writer, one reader and two
 //! positions: the bytes written so far, and the bytes read so far, both modulo 2¹⁶. `docs/emulator.md` has
 //! the layout.
 //!
@@ -12,61 +12,61 @@
 //! so no byte is read too early or overwritten too soon. It may be less than the old one: then it lies
 //! outside the ring, and the image waits.
 
-/// First bytes of the memory if the host has laid out a mailbox.
+/// The first bytes of the memory if the host has laid out a mailbox.
 pub const MAGIC: [u8; 8] = *b"taxelbox";
-/// Bytes that each ring holds: a power of two, at most 2¹⁵.
+/// Number of bytes that each ring holds: a power of two, at most 2¹⁵.
 pub const CAPACITY: u16 = 0x4000;
 
-/// Where a ring lies in the shared memory.
+/// Offsets of a ring's parts in the shared memory.
 struct Ring {
-    /// Position of the writer.
+    /// Offset of the writer's position.
     written: usize,
-    /// Position of the reader.
+    /// Offset of the reader's position.
     read: usize,
     bytes: usize,
 }
 
-/// From the host to the image.
+/// The ring for bytes from the host to the image.
 const TO_IMAGE: Ring = Ring { written: 0x40, read: 0x80, bytes: 0x1000 };
-/// From the image to the host.
+/// The ring for bytes from the image to the host.
 const TO_HOST: Ring = Ring { written: 0xC0, read: 0x100, bytes: 0x5000 };
 
 impl Ring {
-    /// Where the byte of that position lies.
+    /// Offset in the shared memory of the byte at `position`.
     fn place(&self, position: u16) -> usize {
         self.bytes + usize::from(position % CAPACITY)
     }
 }
 
-/// Memory that another program reads and writes at the same time.
+/// Memory that another program may read and write at the same time.
 pub trait SharedMemory {
-    /// The byte at `place`.
+    /// Reads the byte at `place`.
     fn byte(&self, place: usize) -> u8;
 
     /// Writes the byte at `place`.
     fn set_byte(&mut self, place: usize, byte: u8);
 
-    /// The little-endian number at `place`, both bytes read at once.
+    /// Reads the little-endian number at `place`, both bytes at once.
     fn number(&self, place: usize) -> u16;
 
-    /// Writes the number at `place`, both bytes at once.
+    /// Writes the little-endian number at `place`, both bytes at once.
     fn set_number(&mut self, place: usize, number: u16);
 
-    /// Separates accesses: none from before happens after it, and none from after happens before it.
+    /// Keeps accesses in order: those before the barrier happen before those after it.
     fn barrier(&self);
 }
 
-/// The image's end of the line.
+/// The image's end of the serial line in shared memory.
 pub struct Mailbox<M>(M);
 
 impl<M: SharedMemory> Mailbox<M> {
-    /// The mailbox in `memory`; `None` if the host has laid out none.
+    /// Finds the mailbox in `memory`; `None` if the host has laid out none.
     pub fn find(memory: M) -> Option<Self> {
         let is_there = MAGIC.iter().enumerate().all(|(place, byte)| memory.byte(place) == *byte);
         is_there.then_some(Self(memory))
     }
 
-    /// The next byte from the host; `None` if there is none yet.
+    /// Receives the next byte from the host; `None` if there is none yet.
     pub fn try_read(&mut self) -> Option<u8> {
         let memory = &mut self.0;
         let read = memory.number(TO_IMAGE.read);

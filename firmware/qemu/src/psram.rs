@@ -5,18 +5,18 @@ use core::ptr;
 use crate::mailbox::SharedMemory;
 
 const START: usize = 0x2100_0000;
-/// Keeps a place within the memory, and that of a number on an even address.
+/// Mask that keeps a place within the memory; the mask below also makes it even, for a number.
 const WITHIN: usize = 0xFF_FFFF;
 const WITHIN_EVEN: usize = 0xFF_FFFE;
 
-/// The memory; the linker places nothing in it.
+/// The machine's PSRAM, in which the linker places nothing.
 pub struct Psram(());
 
 impl Psram {
-    /// All of it.
+    /// Takes the whole memory.
     ///
     /// # Safety
-    /// To be called once: only this value may write to the memory.
+    /// The caller must ensure that this is called only once, because only one value may write to the memory.
     #[must_use]
     pub const unsafe fn take() -> Self {
         Self(())
@@ -31,19 +31,19 @@ impl SharedMemory for Psram {
 
     fn set_byte(&mut self, place: usize, byte: u8) {
         let address = ptr::with_exposed_provenance_mut::<u8>(START + (place & WITHIN));
-        // SAFETY: as above, and `take` vouches that nobody else writes.
+        // SAFETY: the address lies within the memory, and `take` ensures that no other value writes.
         unsafe { address.write_volatile(byte) }
     }
 
     fn number(&self, place: usize) -> u16 {
         let address = ptr::with_exposed_provenance::<u16>(START + (place & WITHIN_EVEN));
-        // SAFETY: as above; the address is even.
+        // SAFETY: the address lies within the memory, and is even.
         u16::from_le(unsafe { address.read_volatile() })
     }
 
     fn set_number(&mut self, place: usize, number: u16) {
         let address = ptr::with_exposed_provenance_mut::<u16>(START + (place & WITHIN_EVEN));
-        // SAFETY: as above.
+        // SAFETY: the address lies within the memory and is even, and no other value writes.
         unsafe { address.write_volatile(number.to_le()) }
     }
 

@@ -5,22 +5,22 @@
 pub struct Registers(usize);
 
 impl Registers {
-    /// Those at `base`.
+    /// The registers of the peripheral at the address `base`.
     ///
     /// # Safety
-    /// A peripheral must lie there, and only its driver may use this.
+    /// The caller must ensure that a peripheral lies at `base`, and that only its driver uses the value.
     pub const unsafe fn at(base: usize) -> Self {
         Self(base)
     }
 
     pub fn read(self, offset: usize) -> u32 {
-        // SAFETY: `at` vouches for the address.
+        // SAFETY: the caller of `at` has ensured that the address is a peripheral's.
         unsafe { core::ptr::with_exposed_provenance::<u32>(self.0 + offset).read_volatile() }
     }
 
     pub fn write(self, offset: usize, value: u32) {
         let register = core::ptr::with_exposed_provenance_mut::<u32>(self.0 + offset);
-        // SAFETY: `at` vouches for the address.
+        // SAFETY: the caller of `at` has ensured that the address is a peripheral's.
         unsafe { register.write_volatile(value) }
     }
 }

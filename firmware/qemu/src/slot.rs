@@ -7,30 +7,30 @@
 use board_common::region::Region;
 use firmware::store::FlashError;
 
-/// Why a slot was not written as asked.
+/// Why a slot could not be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, defmt::Format)]
 pub enum SlotError {
     /// The bytes would reach beyond the slot; none was written.
     OutOfRange,
-    /// Bits that were 0 should have become 1, which takes an erase; they are still 0.
+    /// Bits that are 0 should have become 1, which needs an erase; they are still 0.
     NotErased,
 }
 
-/// Room for one model: erased as a whole, to ones; written bit by bit, to zeros.
+/// Memory for one model. Erasing sets all its bits to 1; writing can only set bits to 0.
 pub struct Slot(Region);
 
 impl Slot {
-    /// Both slots.
+    /// Takes both slots.
     ///
     /// # Safety
-    /// To be called once: no two may be the same slot.
+    /// The caller must ensure that this is called only once: no two values may be the same slot.
     #[must_use]
     pub unsafe fn take() -> [Self; 2] {
-        // SAFETY: the caller calls this once.
+        // SAFETY: the caller ensures that this is called only once.
         unsafe { Region::take() }.map(Self)
     }
 
-    /// All that is in it.
+    /// All bytes of the slot.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
         self.0.bytes()
@@ -41,7 +41,7 @@ impl Slot {
         unsafe { self.0.bytes_mut() }
     }
 
-    /// Sets all of it to 0xFF.
+    /// Sets all bytes to 0xFF.
     pub fn erase(&mut self) {
         self.bytes_mut().fill(0xFF);
     }
@@ -49,7 +49,7 @@ impl Slot {
     /// Writes `bytes` from `offset` on.
     ///
     /// # Errors
-    /// See [`SlotError`].
+    /// Every variant of [`SlotError`].
     pub fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), SlotError> {
         let end = offset.checked_add(bytes.len()).ok_or(SlotError::OutOfRange)?;
         let place = self.bytes_mut().get_mut(offset..end).ok_or(SlotError::OutOfRange)?;

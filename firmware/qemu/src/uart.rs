@@ -1,4 +1,4 @@
-//! CMSDK APB UART, polled.
+//! Driver of the CMSDK APB UART, by polling.
 
 use crate::registers::Registers;
 
@@ -11,22 +11,22 @@ const TRANSMIT_FULL: u32 = 1;
 const RECEIVE_FULL: u32 = 2;
 const BOTH_ENABLED: u32 = 3;
 
-/// QEMU takes a byte from the other end only when there is room for it, so that none is lost
+/// A UART. QEMU takes a byte from the other end only when there is room for it, so that none is lost
 /// however late the program reads.
 pub struct Uart(Registers);
 
 impl Uart {
-    /// The first `-serial` of QEMU's command line.
+    /// Starts the UART of the first `-serial` on QEMU's command line.
     #[must_use]
     pub fn first() -> Self {
-        // SAFETY: UART0 is there.
+        // SAFETY: UART0 lies at this address.
         Self::start(unsafe { Registers::at(0x4000_4000) })
     }
 
-    /// The second `-serial` of QEMU's command line.
+    /// Starts the UART of the second `-serial` on QEMU's command line.
     #[must_use]
     pub fn second() -> Self {
-        // SAFETY: UART1 is there.
+        // SAFETY: UART1 lies at this address.
         Self::start(unsafe { Registers::at(0x4000_5000) })
     }
 
@@ -36,12 +36,12 @@ impl Uart {
         Self(registers)
     }
 
-    /// The next byte received, or `None` if there is none yet.
+    /// Receives the next byte; `None` if there is none yet.
     pub fn try_read(&mut self) -> Option<u8> {
         (self.0.read(STATE) & RECEIVE_FULL != 0).then(|| self.0.read(DATA) as u8)
     }
 
-    /// Sends `byte`; `false`, and nothing sent, while the one before is still under way.
+    /// Sends `byte`; returns `false`, and sends nothing, while the previous byte is being sent.
     #[must_use]
     pub fn try_write(&mut self, byte: u8) -> bool {
         let free = self.0.read(STATE) & TRANSMIT_FULL == 0;

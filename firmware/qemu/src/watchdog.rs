@@ -8,19 +8,19 @@ const CLEAR: usize = 0x00C;
 const LOCK: usize = 0xC00;
 
 const TICKS_PER_MS: u32 = 25_000;
-/// Interrupt at the first end of the count, reset at the second.
+/// Control bits: interrupt when the count ends first, reset when it ends again.
 const INTERRUPT_AND_RESET: u32 = 3;
 const UNLOCK: u32 = 0x1ACC_E551;
 
-/// Once started, it runs on.
+/// The watchdog, which cannot be stopped once it is started.
 pub struct Watchdog(Registers);
 
 impl Watchdog {
-    /// Starts it. A program that does not feed it for `timeout_ms` is stopped by a non-maskable
-    /// interrupt, and restarted after as long again. At most 171 s.
+    /// Starts the watchdog. A program that does not feed it for `timeout_ms` (at most 171 s) is stopped by a
+    /// non-maskable interrupt, and restarted after as long again.
     #[must_use]
     pub fn start(timeout_ms: u32) -> Self {
-        // SAFETY: the watchdog is there.
+        // SAFETY: the watchdog lies at this address.
         let registers = unsafe { Registers::at(0x4000_8000) };
         registers.write(LOCK, UNLOCK);
         registers.write(LOAD, timeout_ms.saturating_mul(TICKS_PER_MS));
@@ -28,7 +28,7 @@ impl Watchdog {
         Self(registers)
     }
 
-    /// Begins the count anew.
+    /// Feeds the watchdog: its count starts again.
     pub fn feed(&mut self) {
         self.0.write(CLEAR, 1);
     }

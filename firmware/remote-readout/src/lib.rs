@@ -1,13 +1,14 @@
 //! A readout whose pins, converters and delays are at the other end of a serial line.
 //!
-//! An emulator has no sensor, and neither has a bare board on a desk: here every transaction goes to
+//! An emulator has no sensor, and neither has a bare board on a desk. Here every transaction goes to
 //! the host, where virtual hardware carries it out. The readout's code is the same as with a sensor.
 //!
-//! On the line: a pin is one byte, 0x80 + 2 · number + level; a wait is 0x02 and its nanoseconds
-//! (u32, little-endian); an SPI transaction is 0x01, the chip's number, the count of bytes and these
-//! bytes, and is answered by as many. Nothing else is answered.
+//! Bytes on the line: setting a pin is one byte, 0x80 + 2 · number + level. A wait is 0x02 and its nanoseconds
+//! (u32, little-endian). An SPI transaction is 0x01, the chip's number, the count of bytes and these bytes; the
+//! host replies with as many bytes. It replies to nothing else.
 //!
-//! A test rig: the emulator's image asks, and host-sim's virtual board carries out.
+//! The crate is part of a test rig: the emulator's image sends transactions, and host-sim's virtual board carries
+//! them out.
 #![cfg_attr(not(test), no_std)]
 
 use core::cell::{Cell, RefCell};
@@ -20,18 +21,18 @@ use firmware::platform::Port;
 const TRANSFER: u8 = 0x01;
 const WAIT: u8 = 0x02;
 const PIN: u8 = 0x80;
-/// Longest transaction, in bytes.
+/// Largest SPI transaction, in bytes.
 const LONGEST_TRANSFER: usize = 16;
-/// Longest that the line may make no progress: the other end may run on a busy computer, and an answer
-/// that comes after this would be taken for the next one.
+/// Longest time in µs without progress on the line. The other end may run on a busy computer; a reply that comes
+/// later would be taken for the next transaction's.
 const STALL_US: u32 = 2_000_000;
 
 /// Why a transaction failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RemoteError {
-    /// The other end takes no bytes, or gives none.
+    /// The other end accepts no bytes, or sends none.
     Silent,
-    /// An SPI transaction other than one transfer in place, or of more than 16 bytes.
+    /// The SPI transaction is not one transfer in place, or has more than 16 bytes.
     Unsupported,
 }
 
@@ -47,10 +48,10 @@ impl spi::Error for RemoteError {
     }
 }
 
-/// The line, from which pins, devices and delays are taken.
+/// The line to the host, which gives pins, SPI devices and delays.
 ///
-/// Once it was silent it stays failed until the program starts anew: an answer that came late would be
-/// taken for that to the next transaction.
+/// Once the line was silent it stays failed until the program restarts: a late reply would be taken for the next
+/// transaction's.
 #[derive(Debug)]
 pub struct Remote<P> {
     port: RefCell<P>,
@@ -58,27 +59,27 @@ pub struct Remote<P> {
 }
 
 impl<P: Port> Remote<P> {
-    /// Parts at the other end of `port`.
+    /// Makes a line of `port`, whose other end has the parts.
     pub const fn new(port: P) -> Self {
         Self { port: RefCell::new(port), failed: Cell::new(false) }
     }
 
-    /// The pin of that number, up to 63.
+    /// The pin with this number, from 0 to 63.
     pub fn pin(&self, number: u8) -> RemotePin<'_, P> {
         RemotePin { remote: self, number: number & 0x3F }
     }
 
-    /// The SPI device of that number.
+    /// The SPI device with this number.
     pub fn spi(&self, chip: u8) -> RemoteSpi<'_, P> {
         RemoteSpi { remote: self, chip }
     }
 
-    /// The other end's clock.
+    /// Delays by the clock of the other end.
     pub fn delay(&self) -> RemoteDelay<'_, P> {
         RemoteDelay { remote: self }
     }
 
-    /// Sends `bytes`, then fills `answer`.
+    /// Sends `bytes`, then fills `answer` with received bytes.
     fn exchange(&self, bytes: &[u8], answer: &mut [u8]) -> Result<(), RemoteError> {
         let mut port = self.port.try_borrow_mut().map_err(|_| RemoteError::Silent)?;
         if self.failed.get() {
@@ -100,7 +101,7 @@ fn exchange<P: Port>(port: &mut P, bytes: &[u8], answer: &mut [u8]) -> Result<()
     Ok(())
 }
 
-/// Tries until there is an answer, or the line stalls.
+/// Tries until there is a result, or until the line makes no progress for too long.
 fn in_time<P: Port, T>(
     port: &mut P,
     mut attempt: impl FnMut(&mut P) -> Option<T>,
@@ -165,7 +166,7 @@ impl<P: Port> SpiDevice for RemoteSpi<'_, P> {
     }
 }
 
-/// The clock at the other end. Waits there, not here.
+/// Delays by the clock of the other end: the wait happens there, not here.
 #[derive(Debug)]
 pub struct RemoteDelay<'r, P> {
     remote: &'r Remote<P>,
@@ -174,40 +175,41 @@ pub struct RemoteDelay<'r, P> {
 impl<P: Port> DelayNs for RemoteDelay<'_, P> {
     fn delay_ns(&mut self, ns: u32) {
         let [a, b, c, d] = ns.to_le_bytes();
-        // A line that has failed fails the next transaction too, which can tell.
+        // A failed line also fails the next transaction, which can report it.
         let _ = self.remote.exchange(&[WAIT, a, b, c, d], &mut []);
     }
 }
 
-/// What the other end is asked for.
+/// A transaction that the other end is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Asked<'b> {
     /// Set a pin.
     Pin {
-        /// Its number.
+        /// Number of the pin.
         number: u8,
-        /// Its level.
+        /// Whether its level is high.
         high: bool,
     },
-    /// Carry out an SPI transaction, and answer with as many bytes.
+    /// Carry out an SPI transaction, and reply with as many bytes.
     Transfer {
-        /// The chip's number.
+        /// Number of the SPI device.
         chip: u8,
-        /// What goes out.
+        /// Bytes to send to the device.
         bytes: &'b [u8],
     },
     /// Let time pass.
     Wait {
-        /// How much, in ns.
+        /// Time in ns.
         ns: u32,
     },
 }
 
 impl<'b> Asked<'b> {
-    /// The first thing that `bytes` ask for, and the bytes behind it; `None` while it is not whole.
+    /// Parses the first transaction in `bytes`, and returns it with the bytes behind it; `None` while it is not
+    /// complete.
     ///
     /// # Errors
-    /// The first byte means nothing.
+    /// [`UnknownByte`]: the first byte starts no transaction.
     pub fn parse(bytes: &'b [u8]) -> Result<Option<(Self, &'b [u8])>, UnknownByte> {
         match *bytes {
             [pin @ (PIN..=u8::MAX), ref rest @ ..] => {
@@ -227,7 +229,7 @@ impl<'b> Asked<'b> {
     }
 }
 
-/// A byte that asks for nothing.
+/// A byte that starts no transaction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct UnknownByte(pub u8);
 
@@ -290,7 +292,7 @@ mod tests {
         );
         assert!(rest.is_empty());
         for length in 0..sent.len() {
-            // A prefix never means anything else.
+            // A prefix is never taken for another transaction.
             let mut rest = &sent[..length];
             let mut found = 0;
             while let Some((one, behind)) = Asked::parse(rest).unwrap() {
@@ -306,7 +308,7 @@ mod tests {
     fn silence_ends_in_an_error_not_in_a_wait() {
         let remote = Remote::new(Ends::default());
         assert_eq!(remote.spi(0).transfer_in_place(&mut [1]), Err(RemoteError::Silent));
-        // An answer that comes now is to nothing.
+        // This byte comes too late: it must not be taken for a reply.
         remote.port.borrow_mut().answers.push_back(7);
         assert_eq!(remote.spi(0).transfer_in_place(&mut [1]), Err(RemoteError::Silent));
         let remote = Remote::new(Ends { deaf: true, ..Ends::default() });

@@ -16,8 +16,8 @@ use crate::platform::Platform;
 use crate::readout::{Baseline, FrameSource};
 use crate::store::{Slot, capacity};
 
-/// Most bytes of one chunk of an upload: as many as leave room for the rest of the message, and no
-/// more than a board surely keeps while it writes the chunk before.
+/// Largest chunk of an upload in bytes: it leaves room for the rest of the message, and every board can keep it
+/// while it writes the previous chunk.
 const LARGEST_CHUNK_BYTES: usize = 512;
 
 const fn chunk_bytes(message_bytes: usize) -> usize {
@@ -35,7 +35,7 @@ impl<
     const BYTES: usize,
 > Session<'_, '_, P, F, S, ROWS, COLS, OUTPUTS, BYTES>
 {
-    /// Receives until a frame is whole or nothing more is there, and answers it.
+    /// Receives bytes until a frame is complete or no more bytes are there, and answers the frame's request.
     pub(super) fn serve_link(&mut self) -> Option<Leave> {
         let app = &mut *self.app;
         // Bounded, so that a host that never pauses does not keep the sensor from being scanned.
@@ -106,7 +106,7 @@ impl<
         leave
     }
 
-    /// Counts bytes that are no request, and answers those that are whole.
+    /// Counts a frame that is no valid request, and refuses it if it is a whole packet.
     fn reject(&mut self, error: PacketError) {
         self.statistics.bad_packets = self.statistics.bad_packets.saturating_add(1);
         let (number, refusal) = match error {
@@ -142,7 +142,7 @@ impl<
         self.configuration = configuration;
         if configuration.frame_period_us == 0 {
             self.give_up_capture();
-            self.sensor_answers = true; // it is not asked any more
+            self.sensor_answers = true; // it is not scanned any more
         }
         self.clock.restart(self.line.platform().now_us());
         info!("configured: a frame every {=u32} us", configuration.frame_period_us);
@@ -154,7 +154,7 @@ impl<
             return Err(Refusal::Baseline);
         }
         if self.capture.is_some_and(|(waiting, _)| waiting == number) {
-            return Ok(()); // asked again, since the answer takes its time
+            return Ok(()); // the host repeats the request, because the answer takes a while
         }
         self.give_up_capture();
         *self.baseline = Baseline::new();
@@ -162,7 +162,7 @@ impl<
         Ok(())
     }
 
-    /// Answers the request that waits for a baseline, if one does: there will be none.
+    /// Refuses the request that waits for a baseline, if there is one: no baseline will come.
     fn give_up_capture(&mut self) {
         if let Some((number, _)) = self.capture.take() {
             *self.baseline = Baseline::new();
@@ -206,7 +206,7 @@ impl<
             }
             UploadStep::Commit => {
                 if self.upload.is_committed() {
-                    return Ok(()); // asked again, since the answer was lost
+                    return Ok(()); // the host repeats the request, because the answer was lost
                 }
                 let blob = self.upload.complete(spare)?;
                 match Decoder::<ROWS, COLS, OUTPUTS>::check(blob).map(|model| model.crc()) {
@@ -227,7 +227,7 @@ impl<
     }
 }
 
-/// The kind of a fault, small enough for the link.
+/// The link's code for a fault of a model.
 fn fault(error: &DecodeError) -> ModelFault {
     match error {
         DecodeError::BadMagic | DecodeError::UnsupportedVersion { .. } => ModelFault::NotABlob,

@@ -1,13 +1,13 @@
-//! What a configuration may be.
+//! Default and ranges of a configuration.
 
 use crate::link::message::{Configuration, ConfigurationField};
 use crate::readout::ScanSettings;
 
-/// Frame periods in µs, from the shortest to the longest.
+/// Range of frame periods in µs.
 const FRAME_PERIOD_US: core::ops::RangeInclusive<u32> = 100..=1_000_000_000;
 impl Configuration {
-    /// 100 frames a second, of which estimates are sent; limits for rubber of some 60 Ω; every row is
-    /// decoded.
+    /// The default configuration: 100 frames a second, estimates are sent, limits for rubber of about 60 Ω, and
+    /// every row is decoded.
     pub const DEFAULT: Self = Self {
         frame_period_us: 10_000,
         scan: ScanSettings { settling_us: 100, oversampling: 1 },
@@ -19,10 +19,10 @@ impl Configuration {
         rest_tolerance: 0.0,
     };
 
-    /// Whether every field is in its range.
+    /// Checks that every field is in its range.
     ///
     /// # Errors
-    /// The first field that is not.
+    /// The first field that is not in its range.
     pub fn check(&self) -> Result<(), ConfigurationField> {
         let positive = |value: f32| value.is_finite() && value > 0.0;
         let limits = [self.shorted_below_ohm, self.open_above_ohm];

@@ -1,14 +1,14 @@
-//! When the next frame is due.
+//! A clock for frames: tells when the next one is due.
 
-/// Counts periods of a clock that starts anew after its largest value.
+/// Counts frame periods by a clock in µs that wraps around to 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FrameClock {
-    /// When the last period began.
+    /// Time in µs at which the last period began.
     last_us: u32,
 }
 
 impl FrameClock {
-    /// The first frame is due one period after `now_us`.
+    /// Makes a clock whose first frame is due one period after `now_us`.
     pub const fn starting_at(now_us: u32) -> Self {
         Self { last_us: now_us }
     }
@@ -18,8 +18,9 @@ impl FrameClock {
         self.last_us = now_us;
     }
 
-    /// `Some` when a frame is due: how many before it could not be scanned in time. Must be called more
-    /// often than the clock starts anew; a period of 0 is never due.
+    /// Whether a frame is due: `Some` number of earlier frames that were missed, or `None` if none is due yet.
+    ///
+    /// Must be called more often than the clock wraps around. With a period of 0 no frame is ever due.
     pub fn due(&mut self, now_us: u32, period_us: u32) -> Option<u32> {
         let elapsed_us = now_us.wrapping_sub(self.last_us);
         let periods = elapsed_us.checked_div(period_us).filter(|periods| *periods > 0)?;
@@ -38,7 +39,7 @@ mod tests {
         assert_eq!(clock.due(1099, 1000), None);
         assert_eq!(clock.due(1700, 1000), Some(0)); // late by 600 µs
         assert_eq!(clock.due(2099, 1000), None);
-        assert_eq!(clock.due(2100, 1000), Some(0)); // and yet not delayed
+        assert_eq!(clock.due(2100, 1000), Some(0)); // on time, although the last was late
         assert_eq!(clock.due(6050, 1000), Some(2)); // frames at 3100 and 4100 were missed
         assert_eq!(clock.due(6099, 1000), None);
         assert_eq!(clock.due(6100, 1000), Some(0));

@@ -1,19 +1,19 @@
-//! Reports on their way to the host.
+//! Sending reports to the host.
 
 use crate::link::message::Report;
 use crate::link::{cobs, packet};
 use crate::platform::Port;
 
-/// Longest that a report may make no progress; then it is given up.
+/// Longest time in µs without progress of a report; then it is given up.
 const STALL_US: u32 = 50_000;
-/// Longest that a report may take in all: much less than a watchdog's period.
+/// Longest time in µs that a report may take in all: much less than a watchdog's period.
 const REPORT_US: u32 = 2_000_000;
 
 /// The board's serial line, with room for one report.
 pub struct Line<'m, P, const BYTES: usize> {
     platform: P,
     buffer: &'m mut [u8; BYTES],
-    /// The last report was given up in the middle: its frame is still to be ended.
+    /// Whether the last report was given up in the middle, so that its frame must still be ended.
     cut: bool,
 }
 
@@ -26,7 +26,7 @@ impl<'m, P: Port, const BYTES: usize> Line<'m, P, BYTES> {
         &mut self.platform
     }
 
-    /// Sends one report; `false` if the host's side takes no more bytes.
+    /// Sends one report; returns `false` if the host's side takes no more bytes.
     #[must_use]
     pub fn send(&mut self, number: u16, report: &Report<'_>) -> bool {
         let Some(bytes) = packet::encode(number, report, self.buffer) else { return false };

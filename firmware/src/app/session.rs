@@ -1,4 +1,4 @@
-//! The loop while one model is in force.
+//! A session: the application's loop while one model is in force.
 
 use model_core::blob::Floats;
 use model_core::health::{Health, Limits};
@@ -15,13 +15,13 @@ use crate::store::{Slot, blob_in_slot};
 /// Why a session ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Leave {
-    /// Another model was committed.
+    /// Another model was committed, and must be put in force.
     NewModel,
     /// The host asked for a restart.
     Restart,
 }
 
-/// The application with the model that is in force, whose slot it borrows, and the slot to spare.
+/// The application with the model in force, whose slot it borrows, and with the spare slot.
 pub struct Session<
     'a,
     'm,
@@ -38,7 +38,7 @@ pub struct Session<
     pub(super) spare: &'a mut S,
 }
 
-/// The model that is in force, if there is one.
+/// The model in force, if there is one.
 pub(super) struct InForce<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize> {
     pub decoder: Option<Decoder<'a, ROWS, COLS, OUTPUTS>>,
     pub identity: Option<ModelIdentity>,
@@ -56,8 +56,8 @@ impl<
     const BYTES: usize,
 > Session<'a, 'm, P, F, S, ROWS, COLS, OUTPUTS, BYTES>
 {
-    /// Puts the most recent sound model in force.
-    #[inline(never)] // its stack is free again when the loop begins
+    /// Starts a session with the most recent sound model in force.
+    #[inline(never)] // so that its stack is free again when the loop begins
     pub fn start(
         app: &'a mut App<'m, P, F, ROWS, COLS, OUTPUTS, BYTES>,
         slots: &'a mut [S; 2],
@@ -84,10 +84,10 @@ impl<
         Self { app, model: InForce { decoder, identity }, spare }
     }
 
-    /// One turn of the loop: at most one request is answered, and a frame is scanned if it is due.
+    /// Runs one turn of the loop: answers at most one request, and scans a frame if one is due.
     ///
-    /// The watchdog is fed at the end, unless the last scan gave not a single reading: a sensor that
-    /// stays silent leads to a restart, which sets its bus up anew.
+    /// The watchdog is fed at the end, unless the last scan gave no reading at all. A sensor that stays silent
+    /// thus leads to a restart, which sets up its bus again.
     pub fn step(&mut self) -> Option<Leave> {
         let leave = self.serve_link();
         let core = &mut self.app.core;
@@ -113,7 +113,7 @@ impl<
     const BYTES: usize,
 > Core<'_, P, F, ROWS, COLS, OUTPUTS, BYTES>
 {
-    /// Scans a frame and reports on it; tells whether it has any reading at all.
+    /// Scans a frame and reports on it; returns whether it has at least one reading.
     fn scan(&mut self, missed: u32, decoder: Option<&Decoder<'_, ROWS, COLS, OUTPUTS>>) -> bool {
         let start_us = self.line.platform().now_us();
         let report = self.source.scan(self.configuration.scan, self.frame);
@@ -154,7 +154,7 @@ impl<
         any
     }
 
-    /// Decodes the frame, without what cannot be believed of it.
+    /// Decodes the frame without its faulty readings.
     pub(super) fn decode(
         &mut self,
         decoder: Option<&Decoder<'_, ROWS, COLS, OUTPUTS>>,
@@ -194,7 +194,7 @@ impl<
         (flags, health)
     }
 
-    /// Sends the estimate, as the answer to request `number` or unasked.
+    /// Sends the estimate, either as the answer to request `number` or unasked.
     pub(super) fn send_estimate(&mut self, number: u16, frame: u32, flags: u8) {
         let row_status = self.estimate.status.map(|status| match status {
             RowStatus::Decoded => 0,
@@ -208,7 +208,8 @@ impl<
         self.count_lost(sent);
     }
 
-    /// Takes the frame into the baseline that is being captured, and answers when it is whole.
+    /// Adds the frame to the baseline that is being captured, and answers the request when the baseline is
+    /// complete.
     fn feed_baseline(&mut self, decoder: Option<&Decoder<'_, ROWS, COLS, OUTPUTS>>) {
         let Some((number, left)) = self.capture else { return };
         self.baseline.add(self.frame);
@@ -221,7 +222,7 @@ impl<
         }
     }
 
-    /// Keeps what the model in force answers to the baseline, for rows at rest.
+    /// Decodes the baseline with the model in force, and keeps the outputs for rows at rest.
     pub(super) fn decode_baseline(&mut self, decoder: Option<&Decoder<'_, ROWS, COLS, OUTPUTS>>) {
         if let Some(decoder) = decoder {
             decoder.decode_into(self.baseline.mean(), self.rest);
@@ -234,7 +235,7 @@ impl<
         }
     }
 
-    /// Puts `readings` of a request in the frame's place.
+    /// Replaces the frame with the `readings` (Ω) of a request.
     pub(super) fn set_frame(&mut self, readings: impl Iterator<Item = f32>) {
         *self.frame = Frame::missing();
         let places = self.frame.row_column_resistance_ohm.as_flattened_mut();

@@ -1,23 +1,23 @@
 //! Consistent overhead byte stuffing (Cheshire & Baker, IEEE/ACM Transactions on Networking 1999).
 //!
-//! Own code, for two reasons: it needs no second buffer in either direction, and no panic is
-//! reachable in it, which the link check proves. Tests hold it to the `cobs` crate.
+//! It is implemented here for two reasons: it needs no second buffer in either direction, and no panic is
+//! reachable in it, which the link check proves. Tests compare it with the `cobs` crate.
 
-/// Longest run of bytes that one code byte can open.
+/// Longest run of bytes behind one code byte.
 const LONGEST_RUN: usize = 254;
 
-/// Ends every frame, and stands nowhere within.
+/// The byte that ends every frame, and does not occur within one.
 pub const END: u8 = 0;
 
-/// Calls `send` with every byte of the frame of `message`, [`END`] included, until it answers `false`;
-/// tells whether all was sent.
+/// Calls `send` with every byte of the frame of `message`, [`END`] included, until it returns `false`;
+/// returns whether all bytes were sent.
 pub fn encode(message: &[u8], mut send: impl FnMut(u8) -> bool) -> bool {
     let mut rest = message;
     loop {
         let window = rest.get(..LONGEST_RUN).unwrap_or(rest);
         let zero = window.iter().position(|byte| *byte == END);
         let run = zero.and_then(|length| window.get(..length)).unwrap_or(window);
-        // At most 254 + 1.
+        // The sum is at most 254 + 1.
         if !send(run.len() as u8 + 1) || !run.iter().all(|byte| send(*byte)) {
             return false;
         }
@@ -29,14 +29,14 @@ pub fn encode(message: &[u8], mut send: impl FnMut(u8) -> bool) -> bool {
     }
 }
 
-/// What one received byte meant.
+/// Meaning of one received byte.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Decoded {
     /// A byte of the message.
     Byte(u8),
-    /// Nothing by itself.
+    /// A byte without a meaning of its own, such as a code byte.
     Nothing,
-    /// The frame ended where it had to.
+    /// The frame ended where it may end.
     End,
     /// The frame ended in the middle of a run: bytes are lost.
     BrokenEnd,
@@ -45,11 +45,11 @@ pub enum Decoded {
 /// Decodes a stream byte by byte.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Decoder {
-    /// Bytes until the next code byte.
+    /// Number of bytes until the next code byte.
     left: u8,
     /// Whether a zero of the message stands before that code byte, unless the frame ends there.
     zero_follows: bool,
-    /// Whether anything came since the last end.
+    /// Whether any byte came since the last end.
     started: bool,
 }
 
@@ -60,7 +60,7 @@ impl Default for Decoder {
 }
 
 impl Decoder {
-    /// A decoder at the start of a frame.
+    /// Makes a decoder at the start of a frame.
     #[must_use]
     pub const fn new() -> Self {
         Self { left: 0, zero_follows: false, started: false }
@@ -84,7 +84,7 @@ impl Decoder {
         if zero { Decoded::Byte(0) } else { Decoded::Nothing }
     }
 
-    /// Whether nothing came since the last end.
+    /// Whether no byte came since the last end.
     #[must_use]
     pub fn is_idle(&self) -> bool {
         !self.started
@@ -129,7 +129,7 @@ mod tests {
 
     #[test]
     fn known_frames() {
-        // From the paper and the usual corner cases at a run's longest length.
+        // Examples of the paper, and the usual corner cases at the longest run.
         assert_eq!(frame_of(&[]), [1, 0]);
         assert_eq!(frame_of(&[0]), [1, 1, 0]);
         assert_eq!(frame_of(&[1, 2, 0, 3]), [3, 1, 2, 2, 3, 0]);

@@ -1,6 +1,6 @@
-//! What device and host say to each other.
+//! Messages between host and device.
 //!
-//! The order of fields and variants is the wire format: to change it is to raise
+//! The order of fields and variants is the wire format: whoever changes it must raise
 //! [`PROTOCOL_VERSION`](super::packet::PROTOCOL_VERSION).
 
 use model_core::blob::Floats;
@@ -8,23 +8,23 @@ use serde::{Deserialize, Serialize};
 
 use crate::readout::ScanSettings;
 
-/// What the host asks for. Every request is answered by one [`Report`] that repeats its number;
-/// [`Request::Identify`] and all others may be repeated without harm.
+/// A request of the host. The device answers each with one [`Report`] that repeats the request's number. Every
+/// request may be repeated without harm.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Request<'a> {
-    /// Who are you? Answered by [`Report::Identity`].
+    /// Ask for the device's identity. Answered by [`Report::Identity`].
     Identify,
-    /// Answered by [`Report::Statistics`].
+    /// Ask for the counters since the start. Answered by [`Report::Statistics`].
     Statistics,
-    /// Answered by [`Report::Configuration`].
+    /// Ask for the configuration in force. Answered by [`Report::Configuration`].
     Configuration,
-    /// Put a configuration in force until the next restart. Answered by [`Report::Configuration`], or
-    /// [`Refusal::Configuration`] with the old one still in force.
+    /// Put a configuration in force until the next restart. Answered by [`Report::Configuration`], or by
+    /// [`Refusal::Configuration`], which leaves the previous one in force.
     Configure(Configuration),
-    /// Average the next so many frames as the sensor at rest. Answered by [`Report::Baseline`] when
-    /// they have been scanned.
+    /// Average the next frames as the baseline, the sensor at rest. Answered by [`Report::Baseline`] when they
+    /// have been scanned.
     CaptureBaseline {
-        /// From 1.
+        /// Number of frames, at least 1.
         frames: u16,
     },
     /// Decode these readings as if they had been scanned, with the faults that a scan would have.
@@ -36,136 +36,136 @@ pub enum Request<'a> {
         #[serde(borrow)]
         readings_ohm: Floats<'a>,
     },
-    /// A step in the exchange of the model. Answered by [`Report::Upload`].
+    /// Carry out one step of uploading a model. Answered by [`Report::Upload`].
     Upload(#[serde(borrow)] UploadStep<'a>),
-    /// Start anew, as after power-on. Answered by [`Report::Restarting`].
+    /// Restart the device, as after power-on. Answered by [`Report::Restarting`].
     Restart,
 }
 
-/// Steps in the exchange of the model, in their order.
+/// Steps of uploading a model, in their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum UploadStep<'a> {
     /// Erase the spare slot for a blob of so many bytes. Takes up to seconds on a board.
     Begin {
-        /// Of the whole blob.
+        /// Length of the whole blob in bytes.
         length: u32,
     },
-    /// The next bytes of the blob.
+    /// Write the next bytes of the blob.
     Chunk {
-        /// Where they belong; what was received already is passed over.
+        /// Offset of these bytes in the blob; bytes that were received before are skipped.
         offset: u32,
-        /// A multiple of four, but for the last chunk.
+        /// The bytes; their number is a multiple of four, except in the last chunk.
         #[serde(borrow)]
         bytes: &'a [u8],
     },
     /// Check the blob from end to end, and put it in force if it is sound.
     Commit,
-    /// Forget what was received.
+    /// Abort the upload, and forget the bytes received.
     Abort,
 }
 
-/// What the device says.
+/// A report of the device, as an answer or unasked.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Report<'a> {
-    /// Who the device is, and which model is in force.
+    /// Identity of the device, and of the model in force.
     Identity(#[serde(borrow)] Identity<'a>),
-    /// What has happened since the start.
+    /// Counters since the start.
     Statistics(Statistics),
     /// The configuration in force.
     Configuration(Configuration),
-    /// The sensor at rest.
+    /// The baseline: the sensor at rest.
     Baseline {
         /// Mean readings in Ω, row after row; NaN where one was missing.
         #[serde(borrow)]
         readings_ohm: Floats<'a>,
     },
-    /// One scan, before faulty readings are taken out.
+    /// Readings of one scan, before faulty ones are removed.
     Readings {
         /// Number of the frame, from 1 at the start.
         frame: u32,
-        /// In Ω, row after row.
+        /// Readings in Ω, row after row.
         #[serde(borrow)]
         readings_ohm: Floats<'a>,
     },
-    /// One estimate.
+    /// The estimate of one frame.
     Estimate(#[serde(borrow)] EstimateReport<'a>),
     /// Faults in the readings of one frame; sent for every frame that has some.
     Health(#[serde(borrow)] HealthReport<'a>),
-    /// How far the exchange of the model is.
+    /// Progress of uploading a model.
     Upload(UploadState),
-    /// The device will start anew now.
+    /// The device restarts now.
     Restarting,
-    /// The request was not carried out; all is as it was.
+    /// The request was not carried out, and changed nothing.
     Refused(Refusal),
 }
 
-/// Who the device is.
+/// Identity of the device, and of the model in force.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Identity<'a> {
     /// Name of the board.
     pub board: &'a str,
     /// Version of the firmware.
     pub firmware: &'a str,
-    /// Row-wires.
+    /// Number of row-wires.
     pub rows: u8,
-    /// Column-wires: readings a row.
+    /// Number of column-wires: readings a row.
     pub columns: u8,
-    /// Outputs a row.
+    /// Number of outputs a row.
     pub outputs: u8,
-    /// Name of the exponential that activations are computed with
+    /// Name of the exponential for activations of networks in `f32-direct`
     /// ([`ExpKernel::NAME`](model_core::exp::ExpKernel::NAME)).
     pub kernel: &'a str,
-    /// The model in force.
+    /// The model in force; `None` if there is none.
     pub model: Option<ModelIdentity>,
-    /// Bytes of blob that a slot holds.
+    /// Largest blob that a slot holds, in bytes.
     pub slot_bytes: u32,
-    /// Most bytes of one chunk of an upload, a multiple of four.
+    /// Largest chunk of an upload in bytes, a multiple of four.
     pub chunk_bytes: u16,
-    /// Where flash and RAM go.
+    /// Use of flash and RAM.
     pub memory: Memory,
 }
 
-/// Which model is in force.
+/// Identity of the model in force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ModelIdentity {
-    /// CRC-32 that closes its blob.
+    /// CRC-32 at the end of the model's blob.
     pub crc_32: u32,
-    /// Slot it lies in, 0 or 1.
+    /// Slot of the model, 0 or 1.
     pub slot: u8,
-    /// Models committed to this device before it, and it: 0 if it was not uploaded.
+    /// Number of models committed to this device up to this one; 0 if the model was not uploaded.
     pub generation: u32,
 }
 
-/// Where a device's memory goes, in bytes.
+/// Use of a device's memory, in bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Memory {
-    /// Flash: vector table.
+    /// Flash for the vector table.
     pub vector_table: u32,
-    /// Flash: code.
+    /// Flash for code.
     pub text: u32,
-    /// Flash: constants.
+    /// Flash for constants.
     pub rodata: u32,
-    /// RAM, and as much flash to start it from: variables that start with a value.
+    /// RAM for variables with an initial value, and as much flash for these values.
     pub data: u32,
-    /// RAM: variables that start as zero.
+    /// RAM for variables that start as zero.
     pub bss: u32,
-    /// RAM: never initialised.
+    /// RAM for variables that are not initialised.
     pub uninit: u32,
-    /// RAM: kept for the stack.
+    /// RAM reserved for the stack.
     pub stack_reserved: u32,
-    /// RAM: deepest that the stack has been since the start.
+    /// RAM that the stack has used at most since the start.
     pub stack_high_water: u32,
 }
 
 impl Memory {
-    /// Flash that the firmware takes, without models.
+    /// Bytes of flash that the firmware takes, without models.
     #[must_use]
     pub fn flash_bytes(&self) -> u32 {
         let parts = [self.vector_table, self.text, self.rodata, self.data];
         parts.into_iter().fold(0, u32::saturating_add)
     }
 
-    /// RAM that it takes, with the stack at its deepest so far.
+    /// Bytes of RAM that the firmware takes, with the stack at its deepest so far.
     #[must_use]
     pub fn ram_bytes(&self) -> u32 {
         let parts = [self.data, self.bss, self.uninit, self.stack_high_water];
@@ -173,12 +173,12 @@ impl Memory {
     }
 }
 
-/// What can be chosen while the device runs.
+/// Settings that can be changed while the device runs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Configuration {
-    /// Time from one scan to the next in µs; 0 scans never.
+    /// Time from one scan to the next in µs; with 0, nothing is scanned.
     pub frame_period_us: u32,
-    /// How each scan is made.
+    /// Settings of each scan.
     pub scan: ScanSettings,
     /// Whether every scan's readings are sent.
     pub send_readings: bool,
@@ -188,15 +188,15 @@ pub struct Configuration {
     pub shorted_below_ohm: f32,
     /// A reading above this in Ω is taken for a broken wire.
     pub open_above_ohm: f32,
-    /// Relative change against the baseline from which [`EstimateReport::CONTACT`] is told.
+    /// Smallest relative change against the baseline that sets [`EstimateReport::CONTACT`].
     pub contact_threshold: f32,
-    /// Relative change against the baseline within which readings are at rest; a row of such readings,
-    /// whose sum is likewise, is not decoded but answered as the baseline ([`model_core::gate`]). 0
-    /// decodes every row, as does a device without a baseline.
+    /// Tolerance of the gate ([`model_core::gate`]): relative change against the baseline within which a row is at
+    /// rest. Such a row is skipped, and gets the outputs of the baseline. With 0, or without a baseline, every row
+    /// is decoded.
     pub rest_tolerance: f32,
 }
 
-/// Outputs of one frame.
+/// The estimate of one frame: outputs, status of rows, and flags.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct EstimateReport<'a> {
     /// Number of the frame.
@@ -211,55 +211,55 @@ pub struct EstimateReport<'a> {
 }
 
 impl EstimateReport<'_> {
-    /// Status of a row at rest: its outputs are those of the baseline.
+    /// Row status of a row at rest: its outputs are those of the baseline.
     pub const ROW_AT_REST: u8 = 3;
-    /// No model is in force: no row is decoded.
+    /// Flag: no model is in force, so no row is decoded.
     pub const NO_MODEL: u8 = 1;
-    /// Some reading is missing, shorted or open.
+    /// Flag: at least one reading is missing, shorted or open.
     pub const FAULTY_READING: u8 = 1 << 1;
-    /// Some output overflowed.
+    /// Flag: at least one output overflowed.
     pub const OVERFLOW: u8 = 1 << 2;
-    /// At least one frame before this one could not be scanned in time.
+    /// Flag: at least one frame before this one could not be scanned in time.
     pub const OVERRUN: u8 = 1 << 3;
-    /// A baseline was captured, and some reading differs from it by more than the threshold.
+    /// Flag: a baseline was captured, and a reading differs from it by more than the threshold.
     pub const CONTACT: u8 = 1 << 4;
 }
 
-/// Faults of one frame.
+/// Faulty readings of one frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct HealthReport<'a> {
     /// Number of the frame.
     pub frame: u32,
-    /// Readings not taken.
+    /// Number of readings that were not taken.
     pub missing: u16,
-    /// Readings below the limit.
+    /// Number of readings below the lower limit.
     pub shorted: u16,
-    /// Readings above the limit.
+    /// Number of readings above the upper limit.
     pub open: u16,
-    /// Four bytes a row, little-endian: bit k is column k.
+    /// Faulty columns: four bytes a row, little-endian, in which bit k is column k.
     pub faulty_columns: &'a [u8],
 }
 
 /// Counters since the start; each stops at its largest value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Statistics {
-    /// Frames scanned.
+    /// Number of frames scanned.
     pub frames_scanned: u32,
-    /// Frames decoded, on request or scanned.
+    /// Number of frames decoded, scanned or on request.
     pub frames_decoded: u32,
-    /// Rows of these that were at rest, and so took no inference.
+    /// Number of rows of decoded frames that were at rest, and so were skipped.
     pub rows_at_rest: u32,
-    /// Frames that could not be scanned in time.
+    /// Number of frames that could not be scanned in time.
     pub frames_missed: u32,
-    /// Samples that the converter did not give.
+    /// Number of samples that the converter did not give.
     pub failed_samples: u32,
-    /// Requests answered.
+    /// Number of requests answered.
     pub requests: u32,
-    /// Frames of bytes that were damaged, cut, too long or not of this protocol.
+    /// Number of frames of bytes that were damaged, cut, too long or not of this protocol.
     pub bad_packets: u32,
-    /// Reports that the host did not take in time.
+    /// Number of reports that the host did not take in time.
     pub lost_reports: u32,
-    /// Loops that did not feed the watchdog.
+    /// Number of turns of the loop that did not feed the watchdog.
     pub bad_loops: u32,
     /// Longest scan in µs.
     pub longest_scan_us: u32,
@@ -267,19 +267,19 @@ pub struct Statistics {
     pub longest_decode_us: u32,
 }
 
-/// How far the exchange of the model is.
+/// Progress of uploading a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum UploadState {
-    /// None is going on.
+    /// No upload is going on.
     Idle,
-    /// The spare slot takes bytes.
+    /// The spare slot receives bytes.
     Receiving {
-        /// Bytes received from the start without a gap: where to go on.
+        /// Number of bytes received from the start without a gap: the offset of the next chunk.
         received: u32,
     },
     /// The blob is sound and in force.
     Committed {
-        /// Its CRC-32.
+        /// CRC-32 of the blob.
         crc_32: u32,
     },
 }
@@ -287,30 +287,30 @@ pub enum UploadState {
 /// Why a request was not carried out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Refusal {
-    /// The device speaks another version of the protocol: its own.
+    /// The device speaks another version of the protocol, which is given here.
     Version(u8),
     /// The request is not one of this protocol.
     Unknown,
-    /// A frame must have `rows × columns` readings.
+    /// The frame does not have `rows × columns` readings.
     FrameLength {
-        /// Readings that it must have.
+        /// Number of readings that it must have.
         expected: u16,
     },
     /// A field of a configuration is out of range.
     Configuration(ConfigurationField),
-    /// A baseline of no frames, or while nothing is scanned; or another was asked for meanwhile.
+    /// The baseline cannot be captured: it has no frames, nothing is scanned, or another was requested meanwhile.
     Baseline,
     /// The blob does not fit into a slot.
     TooLarge {
-        /// Bytes that fit.
+        /// Largest blob that fits, in bytes.
         slot_bytes: u32,
     },
-    /// A chunk or a commit without a beginning.
+    /// A chunk or a commit came without a begin.
     NoUpload,
-    /// A chunk that leaves a gap, is not a multiple of four, or goes beyond the announced length; or a
-    /// commit before all was received.
+    /// A chunk leaves a gap, is not a multiple of four, or goes beyond the announced length; or a commit came
+    /// before all bytes were received.
     OutOfPlace {
-        /// Bytes received from the start without a gap: where to go on.
+        /// Number of bytes received from the start without a gap: the offset of the next chunk.
         received: u32,
     },
     /// The blob is unsound or of another shape. The upload is over.
@@ -319,34 +319,34 @@ pub enum Refusal {
     Flash,
 }
 
-/// Fields of [`Configuration`].
+/// A field of [`Configuration`] that can be out of range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ConfigurationField {
-    /// 0, or from 100 µs to 1000 s.
+    /// The frame period: 0, or from 100 µs to 1000 s.
     FramePeriod,
-    /// At most 10 ms.
+    /// The settling time: at most 10 ms.
     Settling,
-    /// From 1 to 256.
+    /// The oversampling: from 1 to 256.
     Oversampling,
-    /// Positive, finite, and below the other.
+    /// The limits of readings: positive and finite, the lower one below the upper one.
     Limits,
-    /// Positive and finite.
+    /// The threshold for contact: positive and finite.
     ContactThreshold,
-    /// From 0, and below 1.
+    /// The tolerance of the gate: at least 0, and below 1.
     RestTolerance,
 }
 
-/// What is wrong with an uploaded blob; the host's `inspect` tells more of the file itself.
+/// Fault of an uploaded blob; `host-sim inspect` says more about the file itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ModelFault {
-    /// It does not open as a blob, or is of another version.
+    /// The bytes do not start as a blob does, or the blob is of another version.
     NotABlob,
-    /// Its length is not the announced one.
+    /// The blob's length is not the announced one.
     Length,
-    /// Its CRC-32 does not match.
+    /// The blob's CRC-32 does not match.
     Corrupt,
-    /// Sound by its CRC, but a field or a number is not acceptable.
+    /// The CRC-32 matches, but a field or a number is not acceptable.
     Invalid,
-    /// It is for a sensor of another shape.
+    /// The blob is for a sensor of another shape.
     Shape,
 }

@@ -1,20 +1,20 @@
-//! A message with what makes it whole: version and number before it, CRC-32 behind it.
+//! A packet: a message with version and number before it, and a CRC-32 behind it.
 
 use model_core::checksum::CRC_32;
 use serde::{Deserialize, Serialize};
 
-/// The protocol that this crate speaks. A device answers any other version with
-/// [`Refusal::Version`](super::message::Refusal::Version) and nothing else.
+/// Version of the protocol that this crate speaks. A device answers any other version only with
+/// [`Refusal::Version`](super::message::Refusal::Version).
 pub const PROTOCOL_VERSION: u8 = 2;
 
-/// The number of messages that answer no request.
+/// Number of a packet that answers no request.
 pub const UNASKED: u16 = 0;
 
-/// A message as it travels: `version`, `number` and `body` as postcard fields, then the CRC-32 of
+/// A message as it is sent: `version`, `number` and `body` as postcard fields, then the CRC-32 of
 /// these bytes, little-endian.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Packet<T> {
-    /// Chosen by the host for each request, and repeated in its answer; [`UNASKED`] else.
+    /// Number that the host chooses for each request, and that its answer repeats; otherwise [`UNASKED`].
     pub number: u16,
     /// The message.
     pub body: T,
@@ -23,21 +23,21 @@ pub struct Packet<T> {
 /// Why bytes are no packet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PacketError {
-    /// The CRC-32 does not match: damage on the way.
+    /// The CRC-32 does not match: the bytes were damaged.
     Damaged,
-    /// Whole, but of another version of the protocol.
+    /// The packet is whole, but of another version of the protocol.
     OtherVersion {
         /// The number of the packet.
         number: u16,
     },
-    /// Whole, but not a message of this protocol.
+    /// The packet is whole, but has no message of this protocol.
     NotAMessage {
         /// The number of the packet.
         number: u16,
     },
 }
 
-/// Writes the packet of `body` to `buffer` and returns its bytes; `None` if it does not fit.
+/// Encodes the packet of `body` in `buffer` and returns its bytes; `None` if it does not fit.
 pub fn encode<'b, T: Serialize>(number: u16, body: &T, buffer: &'b mut [u8]) -> Option<&'b [u8]> {
     let covered = postcard::to_slice(&(PROTOCOL_VERSION, number, body), buffer).ok()?.len();
     let (bytes, rest) = buffer.split_at_mut_checked(covered)?;
@@ -46,10 +46,10 @@ pub fn encode<'b, T: Serialize>(number: u16, body: &T, buffer: &'b mut [u8]) -> 
     buffer.get(..covered + crc.len())
 }
 
-/// Reads a packet; what its body borrows lies in `bytes`.
+/// Decodes a packet, whose body borrows from `bytes`. The CRC is checked before anything else.
 ///
 /// # Errors
-/// [`PacketError`]; nothing of the bytes is believed before their CRC.
+/// Every variant of [`PacketError`].
 pub fn decode<'b, T: Deserialize<'b>>(bytes: &'b [u8]) -> Result<Packet<T>, PacketError> {
     let (covered, stored) = bytes.split_last_chunk::<4>().ok_or(PacketError::Damaged)?;
     if CRC_32.checksum(covered) != u32::from_le_bytes(*stored) {

@@ -1,24 +1,24 @@
-//! From bytes to packets, whatever the bytes.
+//! Receiving packets from a stream of arbitrary bytes.
 
 use super::cobs::{Decoded, Decoder};
 
-/// What a receiver made of the bytes up to the end of a frame.
+/// Outcome of receiving the bytes up to the end of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Received<'a> {
-    /// A frame, decoded: the bytes of a packet, unless they are damaged.
+    /// A decoded frame: the bytes of a packet, unless they are damaged.
     Frame(&'a [u8]),
     /// A frame with bytes missing.
     Broken,
-    /// A frame longer than `BYTES`; it was skipped.
+    /// A frame longer than `BYTES`, which was skipped.
     TooLong,
 }
 
-/// Gathers frames of up to `BYTES` bytes, CRC included.
+/// Receiver of frames of up to `BYTES` bytes, CRC included.
 #[derive(Debug, Clone)]
 pub struct Receiver<const BYTES: usize> {
     cobs: Decoder,
     message: heapless::Vec<u8, BYTES>,
-    /// Whether the message has been passed on, so that the next one takes its place.
+    /// Whether the message has been returned, so that the next one overwrites it.
     ended: bool,
     too_long: bool,
 }
@@ -30,15 +30,14 @@ impl<const BYTES: usize> Default for Receiver<BYTES> {
 }
 
 impl<const BYTES: usize> Receiver<BYTES> {
-    /// A receiver that has received nothing.
+    /// Makes a receiver that has received nothing.
     #[must_use]
     pub const fn new() -> Self {
         let cobs = Decoder::new();
         Self { cobs, message: heapless::Vec::new(), ended: false, too_long: false }
     }
 
-    /// Takes one byte; at the end of a frame tells what became of it. Zeros between frames are
-    /// nothing.
+    /// Takes one byte, and at the end of a frame returns its outcome. Zeros between frames are ignored.
     pub fn push(&mut self, byte: u8) -> Option<Received<'_>> {
         let idle = self.cobs.is_idle();
         if core::mem::take(&mut self.ended) {
@@ -79,7 +78,7 @@ mod tests {
         frame
     }
 
-    /// What a receiver of four bytes makes of `stream`.
+    /// Outcomes of a receiver of four bytes for `stream`.
     fn received(stream: &[u8]) -> Vec<Result<Vec<u8>, &'static str>> {
         let mut receiver = Receiver::<4>::new();
         let mut all = Vec::new();

@@ -1,11 +1,10 @@
-//! The unloaded frame.
+//! The baseline: the frame of the unloaded sensor.
 
 use model_core::Frame;
 
-/// The mean of frames at rest, against which a frame is judged.
+/// The mean of frames at rest, with which other frames are compared.
 ///
-/// One array of readings. A reading that was missing, open or shorted in any of the frames is NaN
-/// for good.
+/// It takes one array of readings. A reading that was missing, open or shorted in any of the frames stays NaN.
 ///
 /// ```
 /// use firmware::readout::Baseline;
@@ -31,13 +30,13 @@ impl<const ROWS: usize, const COLS: usize> Default for Baseline<ROWS, COLS> {
 }
 
 impl<const ROWS: usize, const COLS: usize> Baseline<ROWS, COLS> {
-    /// A baseline of no frames, in which no reading is known.
+    /// Makes a baseline of no frames, in which no reading is known.
     #[must_use]
     pub const fn new() -> Self {
         Self { mean: Frame { row_column_resistance_ohm: [[0.0; COLS]; ROWS] }, frames: 0 }
     }
 
-    /// Takes one more frame at rest into the mean; beyond 65 535 frames nothing changes.
+    /// Adds one frame at rest to the mean; after 65 535 frames nothing changes any more.
     pub fn add(&mut self, frame: &Frame<ROWS, COLS>) {
         let Some(frames) = self.frames.checked_add(1) else { return };
         let share = 1.0 / f32::from(frames);
@@ -52,13 +51,13 @@ impl<const ROWS: usize, const COLS: usize> Baseline<ROWS, COLS> {
         self.frames = frames;
     }
 
-    /// Frames taken so far.
+    /// Number of frames added so far.
     #[must_use]
     pub fn frames(&self) -> u16 {
         self.frames
     }
 
-    /// The mean, NaN (0 before the first frame) where a reading is not known.
+    /// The mean of the frames in Ω; NaN where a reading is not known, and 0 before the first frame.
     #[must_use]
     pub fn mean(&self) -> &Frame<ROWS, COLS> {
         &self.mean

@@ -1,4 +1,4 @@
-//! Two ways to sample a column.
+//! Two ways to sample a column: MCP3208 converters, or an on-chip converter behind multiplexers.
 
 use embedded_hal::digital::OutputPin;
 use embedded_hal::spi::SpiDevice;
@@ -22,12 +22,12 @@ pub enum SampleError<B, P = B> {
 
 /// MCP3208 converters, eight columns each: column k at channel k mod 8 of chip k/8.
 ///
-/// Single-ended, three bytes a sample (Microchip DS21298, figure 6-1): `0000 011c`, `cc·· ····` and
-/// eight clocks more, with ccc the channel; the result is the lower twelve bits of what comes back,
-/// after a null bit. SPI mode 0, at most 1 MHz at 3.3 V (2 MHz only at 5 V).
+/// A sample is single-ended and takes three bytes (Microchip DS21298, figure 6-1): `0000 011c`, `cc·· ····` and
+/// eight more clocks, with ccc the channel. The result is the lower twelve bits of the reply, after a null bit.
+/// SPI mode 0, at most 1 MHz at 3.3 V (2 MHz only at 5 V).
 #[derive(Debug)]
 pub struct Mcp3208s<S, const CHIPS: usize> {
-    /// One device a chip.
+    /// One SPI device for each chip.
     pub chips: [S; CHIPS],
 }
 
@@ -42,7 +42,7 @@ impl<S: SpiDevice, const CHIPS: usize> ColumnSampler for Mcp3208s<S, CHIPS> {
         let mut bytes = [0b0000_0110 | channel >> 2, channel << 6, 0];
         chip.transfer_in_place(&mut bytes).map_err(SampleError::Converter)?;
         let [_, high, low] = bytes;
-        // The null bit. A line that nobody drives, pulled up, reads as ones.
+        // The null bit must be 0. An undriven line, which is pulled up, reads as ones.
         if high & 0b1_0000 != 0 {
             return Err(SampleError::NoAnswer);
         }
@@ -52,7 +52,7 @@ impl<S: SpiDevice, const CHIPS: usize> ColumnSampler for Mcp3208s<S, CHIPS> {
 
 /// An analogue-to-digital converter on the microcontroller's own chip.
 pub trait OnChipAdc {
-    /// What a conversion may fail with.
+    /// Error of a conversion.
     type Error;
 
     /// The largest count.
@@ -64,7 +64,7 @@ pub trait OnChipAdc {
     /// The converter failed.
     fn start(&mut self) -> Result<(), Self::Error>;
 
-    /// The result in counts, or `None` while the conversion takes; returns at once.
+    /// Polls for the result in counts; returns at once, with `None` while the conversion is running.
     ///
     /// # Errors
     /// The converter failed.
@@ -75,23 +75,22 @@ pub trait OnChipAdc {
 /// `ADDRESS_PINS` = 3 or 74HC4067 with 4. Column k is at input k mod 2^`ADDRESS_PINS` of
 /// multiplexer k/2^`ADDRESS_PINS`.
 ///
-/// Breaks before it makes: disable all, set the address, enable one. The multiplexer's resistance
-/// (70 Ω) does not matter here: no current flows into a converter.
+/// Switching breaks before it makes: disable all, set the address, enable one. The multiplexer's resistance
+/// (70 Ω) does not matter here, because no current flows into a converter.
 #[derive(Debug)]
 pub struct MultiplexedAdc<A, P, const ADDRESS_PINS: usize, const MULTIPLEXERS: usize> {
     /// The converter.
     pub adc: A,
-    /// S0 first, shared by all multiplexers.
+    /// Address pins, S0 first, shared by all multiplexers.
     pub address: [P; ADDRESS_PINS],
-    /// E̅ of each multiplexer, active low.
+    /// Enable pin E̅ of each multiplexer, active low.
     pub enable: [P; MULTIPLEXERS],
 }
 
 impl<A, P, const ADDRESS_PINS: usize, const MULTIPLEXERS: usize>
     MultiplexedAdc<A, P, ADDRESS_PINS, MULTIPLEXERS>
 {
-    /// How often a conversion is asked for before it counts as failed: far beyond any converter's
-    /// time.
+    /// Number of polls after which a conversion counts as failed: far beyond any converter's time.
     pub const MOST_POLLS: u32 = 10_000;
 }
 

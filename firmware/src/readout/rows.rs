@@ -1,4 +1,4 @@
-//! Three ways to select a row. An active pin is high; see `docs/readout.md` for what it switches.
+//! Three ways to select a row. An active pin is high; `docs/readout.md` shows what it switches.
 
 use embedded_hal::digital::OutputPin;
 use model_core::RowWire;
@@ -20,10 +20,10 @@ impl<E> From<E> for DriveError<E> {
     }
 }
 
-/// One pin a row, each at the control input of its row's switch.
+/// One pin for each row, at the control input of the row's switch.
 #[derive(Debug)]
 pub struct DirectPins<P, const ROWS: usize> {
-    /// Pins of the rows.
+    /// The rows' pins.
     pub rows: [P; ROWS],
 }
 
@@ -35,7 +35,7 @@ impl<P: OutputPin, const ROWS: usize> RowDrive for DirectPins<P, ROWS> {
         Ok(self.rows.get_mut(row.0).ok_or(DriveError::NotWired(row))?.set_high()?)
     }
 
-    /// Tries every pin, even if one fails.
+    /// Lets all rows idle; tries every pin, even if one fails.
     fn release(&mut self) -> Result<(), Self::Error> {
         let mut outcome = Ok(());
         for pin in &mut self.rows {
@@ -45,15 +45,15 @@ impl<P: OutputPin, const ROWS: usize> RowDrive for DirectPins<P, ROWS> {
     }
 }
 
-/// A 74HC4051: one of eight rows by three address pins, none while `enable` is high.
+/// A 74HC4051 multiplexer: selects one of eight rows by three address pins, and none while `enable` is high.
 ///
-/// Breaks before it makes: disable, set the address, enable. Its 70 Ω are too many for a row of
-/// 3.3 Ω; let it switch a logic level to the rows' switches.
+/// Switching breaks before it makes: disable, set the address, enable. The multiplexer's 70 Ω are too much for a
+/// row of 3.3 Ω, so it must switch a logic level to the rows' switches.
 #[derive(Debug)]
 pub struct Multiplexer4051<P> {
-    /// S0, S1, S2.
+    /// Address pins S0, S1, S2.
     pub address: [P; 3],
-    /// E̅, active low.
+    /// Enable pin E̅, active low.
     pub enable: P,
 }
 
@@ -84,22 +84,22 @@ pub(super) fn set_address<P: OutputPin>(pins: &mut [P], address: usize) -> Resul
     Ok(())
 }
 
-/// 74HC595 shift registers in series, one output a row: row 0 at QA of the first chip.
+/// 74HC595 shift registers in series, with one output for each row: row 0 is QA of the first chip.
 ///
-/// All rows change at once when the latch rises. `ROWS` that are no multiple of eight leave the
-/// last outputs of the last chip low.
+/// All rows change at once when the latch rises. If `ROWS` is not a multiple of eight, the last outputs of the
+/// last chip stay low.
 #[derive(Debug)]
 pub struct ShiftRegister595<P, const ROWS: usize> {
-    /// SER.
+    /// Data pin SER.
     pub data: P,
-    /// SRCLK.
+    /// Shift clock pin SRCLK.
     pub clock: P,
-    /// RCLK.
+    /// Latch pin RCLK.
     pub latch: P,
 }
 
 impl<P: OutputPin, const ROWS: usize> ShiftRegister595<P, ROWS> {
-    /// Shifts one bit an output, the last output's first, and latches them.
+    /// Shifts one bit for each output, the last output's first, and latches them.
     fn shift(&mut self, active: Option<usize>) -> Result<(), P::Error> {
         self.latch.set_low()?;
         for output in (0..ROWS.div_ceil(8) * 8).rev() {

@@ -6,11 +6,12 @@ use model_core::{ColumnWire, Frame, RowWire};
 use super::{ColumnSampler, FrameSource, RowDrive, ScanReport, ScanSettings};
 use crate::circuit::Circuit;
 
-/// Scans a sensor: release all rows; sample every column idle, if the circuit needs it; then row
-/// by row drive, settle, sample every column, convert; release; correct the whole frame.
+/// Scanner of a sensor, made of a row drive, a column sampler, a delay and a circuit.
 ///
-/// The rows are released at the end whatever failed before. RAM: its parts, and on the stack three
-/// numbers a column.
+/// It releases all rows and, if the circuit needs it, samples every column idle. Then it drives row by row, waits
+/// until the row has settled, samples every column and converts the counts. It releases the rows, and corrects the
+/// whole frame. The rows are released at the end even if something failed. RAM: its parts, and three numbers a
+/// column on the stack.
 #[derive(Debug)]
 pub struct Scanner<D, S, T, C> {
     /// Selects rows.
@@ -19,12 +20,12 @@ pub struct Scanner<D, S, T, C> {
     pub sampler: S,
     /// Waits for a row to settle.
     pub delay: T,
-    /// Turns counts into Ω; or a reference to what does.
+    /// Converts counts to Ω; may be a reference.
     pub circuit: C,
 }
 
 impl<D: RowDrive, S: ColumnSampler, T: DelayNs, C> Scanner<D, S, T, C> {
-    /// Settles, then samples every column; NaN where that failed.
+    /// Waits until the row has settled, then samples every column; NaN where that failed.
     fn sample_columns<const COLS: usize>(
         &mut self,
         settings: ScanSettings,
@@ -73,7 +74,7 @@ where
         let settings = settings.clamped();
         let mut report = ScanReport::default();
         let mut idle = [f32::NAN; COLS];
-        // Without an idle sample that can be trusted the circuit answers NaN.
+        // Without a valid idle sample the circuit gives NaN.
         if self.release(&mut report) && C::IDLE_SAMPLES {
             idle = self.sample_columns(settings, &mut report);
         }

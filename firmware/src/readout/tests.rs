@@ -1,4 +1,4 @@
-//! Every part against a record of what it did to its pins and its bus, in order.
+//! Tests of every part of the readout, against a record of its actions on pins and bus, in order.
 
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -18,16 +18,16 @@ enum Event {
     WaitNs(u32),
 }
 
-/// What all fakes of one test share.
+/// The record that all fakes of one test share.
 #[derive(Debug, Clone, Default)]
 struct Record(Rc<RefCell<State>>);
 
 #[derive(Debug, Default)]
 struct State {
     events: Vec<Event>,
-    /// What SPI devices answer, one after the other; the last again and again.
+    /// Replies of SPI devices, one after the other; the last one is repeated.
     answers: Vec<[u8; 3]>,
-    /// Number of the pin change, or of the transfer, that fails.
+    /// Number of the pin change that fails; below it, that of the transfer.
     failing_pin_change: Option<usize>,
     failing_transfer: Option<usize>,
 }
@@ -59,7 +59,7 @@ impl Record {
         state.events.iter().filter(|event| matches!(event, Event::Pin(..))).count()
     }
 
-    /// Levels that the pins were left at.
+    /// Levels of the pins after all events.
     fn levels(&self) -> HashMap<&'static str, bool> {
         let state = self.0.borrow();
         let changes = state.events.iter().filter_map(|event| match event {
@@ -205,7 +205,7 @@ fn direct_pins_release_all_before_they_drive_one() {
     assert_eq!(record.pin_changes(), 3);
 }
 
-/// What the outputs of shift registers show after `events`: QA of the first chip first.
+/// Levels of the shift registers' outputs after `events`, QA of the first chip first.
 fn latched(events: &[Event]) -> Vec<bool> {
     let (mut stages, mut shown) = (Vec::new(), Vec::new());
     let mut level = HashMap::from([("data", false), ("clock", true), ("latch", true)]);
@@ -242,7 +242,7 @@ fn shift_register_shows_one_row_and_whole_bytes() {
     check::<10>(16);
 }
 
-/// Answers 7 after some polls.
+/// Converter that returns 7 after some polls.
 struct SlowAdc {
     polls_left: u32,
 }
@@ -302,14 +302,14 @@ const SETTINGS: ScanSettings = ScanSettings { settling_us: 46, oversampling: 4 }
 
 #[test]
 fn a_scan_does_what_it_must_and_no_more() {
-    // Rows, and the idle samples of zero-potential scanning: so many waits and samples.
+    // Each row, and the idle samples of zero-potential scanning, take one wait and one sample a column.
     fn check<C: Circuit<2, 3>>(circuit: C, steps: usize) {
         let record = Record::default();
         let mut scanner = scanner(&record, circuit);
         let mut frame = Frame::<2, 3>::missing();
         assert_eq!(scanner.scan(SETTINGS, &mut frame), ScanReport { failed_samples: 0 });
         assert_eq!(record.transfers(), steps * 3 * 4);
-        // Two pins to release, three to drive.
+        // A release changes two pins, a drive three.
         assert_eq!(record.pin_changes(), 2 + 2 * 3 + 2);
         assert_eq!(record.levels(), HashMap::from([("r0", LOW), ("r1", LOW)]));
         let events = record.take();
@@ -342,7 +342,7 @@ fn readings_are_those_of_the_mean_counts() {
 fn a_failed_transaction_costs_one_reading() {
     let record = Record::default();
     let mut scanner = scanner(&record, Divider::TYPICAL);
-    // The third sample of the second row's second column.
+    // This is the third sample of the second row's second column.
     record.0.borrow_mut().failing_transfer = Some(3 * 4 + 4 + 2);
     let mut frame = Frame::<2, 3>::missing();
     assert_eq!(scanner.scan(SETTINGS, &mut frame), ScanReport { failed_samples: 1 });

@@ -1,13 +1,13 @@
-//! A blob that arrives in pieces.
+//! Upload of a blob in chunks.
 
 use super::{FlashError, Slot, capacity, record};
 use crate::link::message::{Refusal, UploadState};
 
-/// How far the exchange of the model is. The bytes are in the spare slot.
+/// State of an upload, whose bytes are in the spare slot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Upload {
     state: UploadState,
-    /// Announced length of the blob.
+    /// Announced length of the blob in bytes.
     length: usize,
 }
 
@@ -18,13 +18,13 @@ impl Default for Upload {
 }
 
 impl Upload {
-    /// None going on.
+    /// Makes a state in which no upload is going on.
     #[must_use]
     pub const fn new() -> Self {
         Self { state: UploadState::Idle, length: 0 }
     }
 
-    /// How far it is.
+    /// Progress of the upload.
     #[must_use]
     pub fn state(&self) -> UploadState {
         self.state
@@ -39,7 +39,7 @@ impl Upload {
     /// Erases `spare` for a blob of `length` bytes.
     ///
     /// # Errors
-    /// [`Refusal::TooLarge`], [`Refusal::Flash`].
+    /// [`Refusal::TooLarge`] if the blob does not fit, [`Refusal::Flash`] if erasing fails.
     pub fn begin<S: Slot>(&mut self, spare: &mut S, length: u32) -> Result<(), Refusal> {
         let capacity = capacity(spare.bytes());
         let length = length as usize;
@@ -52,10 +52,11 @@ impl Upload {
         Ok(())
     }
 
-    /// Writes the next bytes to `spare`. Bytes that were received before are passed over.
+    /// Writes the next chunk to `spare`. Bytes that were received before are skipped.
     ///
     /// # Errors
-    /// [`Refusal::NoUpload`], [`Refusal::OutOfPlace`], [`Refusal::Flash`].
+    /// [`Refusal::NoUpload`] without a begin, [`Refusal::OutOfPlace`] for a chunk that leaves a gap or does not
+    /// fit, [`Refusal::Flash`] if writing fails.
     pub fn chunk<S: Slot>(
         &mut self,
         spare: &mut S,
@@ -87,10 +88,10 @@ impl Upload {
         Ok(())
     }
 
-    /// The blob in `spare`, once all of it is there.
+    /// The blob in `spare`, once all its bytes are there.
     ///
     /// # Errors
-    /// [`Refusal::NoUpload`], [`Refusal::OutOfPlace`].
+    /// [`Refusal::NoUpload`] without a begin, [`Refusal::OutOfPlace`] while bytes are missing.
     pub fn complete<'s, S: Slot>(&self, spare: &'s S) -> Result<&'s [u8], Refusal> {
         let UploadState::Receiving { received } = self.state else {
             return Err(Refusal::NoUpload);
@@ -99,10 +100,11 @@ impl Upload {
         whole.flatten().ok_or(Refusal::OutOfPlace { received })
     }
 
-    /// Writes the record that makes the blob in `spare`, found sound, the one to start with.
+    /// Commits the blob in `spare`, which must have been found sound: writes the record that makes it the most
+    /// recent.
     ///
     /// # Errors
-    /// [`Refusal::Flash`].
+    /// [`Refusal::Flash`] if writing fails.
     pub fn commit<S: Slot>(
         &mut self,
         spare: &mut S,
@@ -115,12 +117,12 @@ impl Upload {
         Ok(())
     }
 
-    /// Forgets what was received.
+    /// Aborts the upload, and forgets the bytes received.
     pub fn abort(&mut self) {
         *self = Self::new();
     }
 
-    /// A failure of the flash ends the upload.
+    /// Converts an outcome of the flash; a failure ends the upload.
     fn flash(&mut self, outcome: Result<(), FlashError>) -> Result<(), Refusal> {
         outcome.map_err(|FlashError| {
             self.abort();

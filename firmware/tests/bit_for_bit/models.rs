@@ -12,13 +12,13 @@ use model_core::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP};
 
 use super::checks::{ARRAY_ROWS, COLS, Numbers, OUTPUTS};
 
-/// log₂e/(2σ²) for σ = 0.8
+/// Decay log₂e/(2σ²) for σ = 0.8.
 const DECAY_PER_SPAN_SQUARED: f64 = core::f64::consts::LOG2_E / (2.0 * 0.8 * 0.8);
 
-/// The models by the name of their file.
+/// Function that makes a model's blob.
 type Maker = fn() -> AlignedBytes;
 
-/// Every model by its file's name, and what makes it.
+/// Every model: the name of its file, and the function that makes it.
 pub const FILES: [(&str, Maker); 9] = [
     ("hand-made.bin", hand_made),
     ("kernels-f32.bin", || of_format(Format::F32)),
@@ -31,7 +31,7 @@ pub const FILES: [(&str, Maker); 9] = [
     ("array-f32-direct.bin", || of_array(Format::F32Direct, 17, true)),
 ];
 
-/// The blob of the file of this name.
+/// Calls `work` with the blob of the file of this name.
 pub fn with_blob<T>(name: &str, work: impl FnOnce(&[u8]) -> T) -> T {
     let (_, blob) = FILES.iter().find(|(file, _)| *file == name).unwrap();
     work(&blob())
@@ -41,7 +41,7 @@ fn draw(numbers: &mut Numbers, count: usize, middle: f32, reach: f32) -> Vec<f32
     (0..count).map(|_| middle + reach * numbers.draw()).collect()
 }
 
-/// Two networks, which the rows use in turn, with widths of their own for every centre.
+/// A model of two networks that the rows use in turn, with a width for every centre.
 fn hand_made() -> AlignedBytes {
     let mut numbers = Numbers::new(0);
     let shape = row_shape(12);
@@ -55,8 +55,8 @@ fn row_shape(centres: usize) -> Shape {
     Shape { inputs: COLS, centres, outputs: OUTPUTS }
 }
 
-/// Networks with tail and without. K is a multiple of nothing that a kernel takes at once; in f32, the last
-/// row's is more than the assembly keeps activations of.
+/// A model of networks with an affine tail and without. K is no multiple of the centres that a routine takes at
+/// once. In f32, the last row's K is larger than the number of activations that the assembly keeps.
 fn of_format(format: Format) -> AlignedBytes {
     let mut numbers = Numbers::new(5);
     let of_last_row = if format == Format::F32 { 131 } else { 33 };
@@ -70,7 +70,7 @@ fn of_format(format: Format) -> AlignedBytes {
     encoded(format.name(), None, &networks, &[0, 1, 0, 1, 0, 1, 0, 2])
 }
 
-/// One network for all rows behind a projection, whose features stray about as far as single readings do.
+/// A model of one network for all rows behind a projection, whose features vary about as much as single readings.
 fn of_array(format: Format, centres: usize, affine: bool) -> AlignedBytes {
     let mut numbers = Numbers::new(6);
     let readings = ARRAY_ROWS * COLS;
@@ -124,7 +124,7 @@ fn direct_words(numbers: &mut Numbers, shape: Shape, affine: bool, widths: usize
     parameters.words().collect()
 }
 
-/// Middles of the training range, and units in an ohm.
+/// Middles of the training range in Ω, and numbers of units in 1 Ω.
 fn scaling(numbers: &mut Numbers) -> [Vec<f32>; 2] {
     let midpoint = draw(numbers, COLS, 60.0, 1.0);
     let mut per_unit = draw(numbers, COLS, UNITS / 7.5, UNITS / 75.0);
@@ -180,7 +180,7 @@ fn fixed16_words(numbers: &mut Numbers, shape: Shape, affine: bool) -> Vec<u32> 
             words.push(((square << 32) / u64::from(decay)) as u32 + EXPONENT_MARGIN + 1);
             words.extend(a.as_chunks::<2>().0.iter().map(|[low, high]| pair(*low, *high)));
         }
-        // What sums of at most 33 centres, the tail and the bias can hold.
+        // The scale leaves room for sums of at most 33 centres, the tail and the bias.
         for _ in 0..outputs {
             let mut weights = whole(numbers, here, 1200.0);
             weights.resize(CENTRES_AT_ONCE, 0);
@@ -216,7 +216,7 @@ fn encoded(
 ) -> AlignedBytes {
     let shape = ModelShape { rows: row_network.len(), inputs: COLS, outputs: OUTPUTS };
     let unnamed = Metadata::unnamed(shape);
-    // The files in testdata call the units as they call the columns.
+    // In the files in testdata, the units have the same names as the columns.
     let (input_units, output_units) = (unnamed.input_names, unnamed.output_names);
     let metadata = Metadata { name, thickness_mm: 5.0, input_units, output_units, ..unnamed };
     let parts = ModelParts { projection, networks, row_network, metadata };

@@ -1,4 +1,4 @@
-//! A board, slots and a host for tests: all stricter than the real ones.
+//! A board, slots and a host for tests; all are stricter than the real ones.
 #![allow(dead_code, reason = "every test file uses its part")]
 
 use std::cell::RefCell;
@@ -26,14 +26,14 @@ pub type TestApp = App<'static, Board, Source, ROWS, COLS, OUTPUTS, MESSAGE_BYTE
 pub type TestSession<'a> =
     Session<'a, 'static, Board, Source, MockSlot, ROWS, COLS, OUTPUTS, MESSAGE_BYTES>;
 
-/// What a test sees of the board, whoever owns it.
+/// State of the board, which a test can see while the application owns the board.
 #[derive(Default)]
 pub struct Pins {
     pub to_device: VecDeque<u8>,
     pub to_host: Vec<u8>,
     pub now_us: u32,
     pub feeds: u32,
-    /// Bytes that the host's side still takes; `None` takes all.
+    /// Number of bytes that the host's side still takes; `None` takes all.
     pub room: Option<usize>,
 }
 
@@ -94,22 +94,22 @@ impl FrameSource<ROWS, COLS> for Source {
     }
 }
 
-/// The power went; nothing more happens until [`MockSlot::power_on`].
+/// Error of a slot without power; nothing more happens until [`MockSlot::power_on`].
 struct PowerCut;
 
-/// When the power goes.
+/// When the power is cut.
 #[derive(Default)]
 struct Power {
-    /// Operations on words until then.
+    /// Number of operations on words until the power is cut; `None` if it is not.
     left: Option<usize>,
     gone: bool,
 }
 
-/// A slot of NOR flash: writes in whole words, only where it is erased, and can lose its power in
-/// the middle of any operation.
+/// A slot of NOR flash. It writes whole words, only where it is erased, and can lose its power in the middle of
+/// any operation.
 pub struct MockSlot {
     words: Vec<u32>,
-    /// Shared by both slots.
+    /// Power of both slots.
     power: Rc<RefCell<Power>>,
     pub erases: usize,
     pub writes: usize,
@@ -128,7 +128,7 @@ impl MockSlot {
         })
     }
 
-    /// A pair with `blob` in the first, as flashed together with the firmware.
+    /// A pair of slots with `blob` in the first, as if flashed together with the firmware.
     pub fn pair_with(blob: &[u8]) -> [Self; 2] {
         let mut slots = Self::pair();
         bytemuck::cast_slice_mut(&mut slots[0].words)[..blob.len()].copy_from_slice(blob);
@@ -139,7 +139,7 @@ impl MockSlot {
         *self.power.borrow_mut() = Power { left: Some(operations), gone: false };
     }
 
-    /// Whether the power had gone.
+    /// Switches the power on; returns whether it had been cut.
     pub fn power_on(&self) -> bool {
         std::mem::take(&mut *self.power.borrow_mut()).gone
     }
@@ -167,7 +167,7 @@ impl Slot for MockSlot {
         self.erases += 1;
         for place in 0..self.words.len() {
             if self.operate().is_err() {
-                // Half erased: bits of no meaning.
+                // A word that is half erased has meaningless bits.
                 self.words[place] ^= 0x5555_5555;
                 return Err(FlashError);
             }
@@ -193,7 +193,7 @@ impl Slot for MockSlot {
     }
 }
 
-/// A blob for this sensor, of `centres` centres and with numbers that depend on `seed`.
+/// A blob for this sensor, with `centres` centres and numbers that depend on `seed`.
 pub fn blob(seed: usize, centres: usize) -> AlignedBytes {
     let number = |i: usize| ((i * 37 + seed * 11) % 101) as f32 / 50.0 - 1.0;
     let list = |from: usize, count: usize| (from..from + count).map(number).collect::<Vec<_>>();
@@ -215,7 +215,7 @@ pub fn blob(seed: usize, centres: usize) -> AlignedBytes {
     blob_of(network.into())
 }
 
-/// `network` for both rows, as a blob.
+/// A blob with `network` for both rows.
 pub fn blob_of(network: Network<'_>) -> AlignedBytes {
     let shape = network.shape();
     let shape = ModelShape { rows: ROWS, inputs: shape.inputs, outputs: shape.outputs };
@@ -234,17 +234,17 @@ pub fn frame_at_rest() -> Frame<ROWS, COLS> {
     Frame { row_column_resistance_ohm: [[60.0, 61.0, 62.0], [63.0, 64.0, 65.0]] }
 }
 
-/// A configuration that scans only when asked to.
+/// A configuration that scans only on request.
 pub fn quiet() -> Configuration {
     Configuration { frame_period_us: 0, ..Configuration::DEFAULT }
 }
 
-/// Buffers for good: a test's are few.
+/// Buffers that are never freed; a test needs only few.
 pub fn buffers() -> &'static mut Buffers<ROWS, COLS, OUTPUTS, MESSAGE_BYTES> {
     Box::leak(Box::new(Buffers::new()))
 }
 
-/// An application, and the host's end of everything it is connected to.
+/// An application's parts, and the host's ends of everything it is connected to.
 pub struct Bench {
     pub app: TestApp,
     pub board: Board,
@@ -272,8 +272,7 @@ pub fn request_bytes(number: u16, request: &Request<'_>) -> Vec<u8> {
     bytes
 }
 
-/// What the host reads of a device's bytes: the number and debug text of each report, and whether
-/// each was whole.
+/// Reports that the host finds in a device's bytes: the number and debug text of each. Checks that each is whole.
 pub fn reports(bytes: &[u8]) -> Vec<(u16, String)> {
     let mut receiver = Receiver::<1024>::new();
     let mut reports = Vec::new();
@@ -290,7 +289,7 @@ pub fn reports(bytes: &[u8]) -> Vec<(u16, String)> {
     reports
 }
 
-/// Runs turns of the loop until everything sent is read, or the session ends.
+/// Runs turns of the loop until the device has read all bytes sent to it, or the session ends.
 pub fn settle(session: &mut TestSession<'_>, board: &Board) -> Option<Leave> {
     while !board.0.borrow().to_device.is_empty() {
         if let Some(leave) = session.step() {

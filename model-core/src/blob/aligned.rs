@@ -28,7 +28,7 @@ pub struct AlignedBytes {
 
 #[cfg(feature = "std")]
 impl AlignedBytes {
-    /// So many bytes, all 0.
+    /// A buffer of `length` bytes, all 0.
     #[must_use]
     pub fn zeroed(length: usize) -> Self {
         Self { words: std::vec![0; length.div_ceil(4)], length }
@@ -42,11 +42,11 @@ impl AlignedBytes {
         copy
     }
 
-    /// Drops all bytes from `length` on; changes nothing if there are fewer.
+    /// Shortens the buffer to `length` bytes; does nothing if it is not longer.
     pub fn truncate(&mut self, length: usize) {
         self.length = self.length.min(length);
         self.words.truncate(self.length.div_ceil(4));
-        // What is behind the last byte counts when two are compared.
+        // Whole words are compared, so the unused bytes of the last one must be 0.
         if let (Some(last), used @ 1..) = (self.words.last_mut(), self.length % 4) {
             bytemuck::bytes_of_mut(last).iter_mut().skip(used).for_each(|byte| *byte = 0);
         }

@@ -1,4 +1,4 @@
-//! Reading a blob: check everything once, then borrow.
+//! Parsing a blob to a model: everything is checked once, then borrowed.
 
 use super::error::DecodeError;
 use super::format::{
@@ -12,7 +12,7 @@ use crate::rbf::{
     Cut, Format, Layout, Network, NetworkError, Packed, Shape, direct, expanded, fixed16,
 };
 
-/// A sound blob, borrowed.
+/// A model, borrowed from a blob whose every byte and value has been checked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Model<'a> {
     shape: ModelShape,
@@ -25,10 +25,10 @@ pub struct Model<'a> {
 }
 
 impl<'a> Model<'a> {
-    /// Checks `blob` from end to end and borrows from it.
+    /// Parses `blob` to a model: checks it from end to end and borrows from it.
     ///
     /// # Errors
-    /// Every variant of [`DecodeError`] but `ShapeMismatch`. Checked in this order: address, magic,
+    /// Every variant of [`DecodeError`] except `ShapeMismatch`. Checked in this order: address, magic,
     /// version, length, CRC, shape, then the sections.
     pub fn decode(blob: &'a [u8]) -> Result<Self, DecodeError> {
         if !(blob.as_ptr() as usize).is_multiple_of(FLOAT_ALIGNMENT) {
@@ -71,15 +71,16 @@ impl<'a> Model<'a> {
         Ok(model)
     }
 
-    /// The length in bytes that a blob declares, for one that lies in a larger flash slot;
-    /// `None` if `slot` does not start with a blob of this version.
+    /// Length in bytes that the blob at the start of `slot` declares; the slot may be larger.
+    ///
+    /// `None` if `slot` does not start with a blob of this version. Nothing else is checked.
     #[must_use]
     pub fn declared_length(slot: &[u8]) -> Option<usize> {
         let prefix = checked_prefix(slot).ok()?;
         Some(u32::from_le_bytes(prefix.length) as usize)
     }
 
-    /// Rows, inputs and outputs.
+    /// The model's number of rows, and of inputs and outputs a row.
     #[must_use]
     pub fn shape(&self) -> ModelShape {
         self.shape
@@ -91,26 +92,26 @@ impl<'a> Model<'a> {
         self.crc
     }
 
-    /// What is known of the model beyond its weights.
+    /// Metadata of the model: names, units, and how it was trained.
     #[must_use]
     pub fn metadata(&self) -> &Metadata<'a> {
         &self.metadata
     }
 
-    /// How many networks the blob holds; rows may share them.
+    /// Number of networks in the blob; rows may share them.
     #[must_use]
     pub fn network_count(&self) -> usize {
         self.networks.into()
     }
 
-    /// What makes the networks' inputs from a whole frame; `None` if each row's readings are its network's
+    /// The projection from a whole frame to the network's inputs; `None` if each row's readings are its network's
     /// inputs. Behind a projection there is one network, and its outputs are those of all rows.
     #[must_use]
     pub fn projection(&self) -> Option<Projection<'a>> {
         self.projection.map(|block| Projection::of_checked(self.shape.inputs, block))
     }
 
-    /// What a network takes in and gives out.
+    /// Inputs and outputs of each network; behind a projection, its features and the outputs of all rows.
     fn network_shape(&self) -> ModelShape {
         let ModelShape { rows, inputs, outputs } = self.shape;
         match self.projection {
@@ -119,7 +120,7 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// The networks in their order.
+    /// The networks, in the order of the blob.
     pub fn networks(&self) -> impl Iterator<Item = Network<'a>> {
         let (shape, mut rest) = (self.network_shape(), self.network_sections);
         (0..self.networks).map_while(move |index| {
@@ -149,7 +150,7 @@ impl<'a> Model<'a> {
 
 fn checked_prefix(blob: &[u8]) -> Result<Prefix, DecodeError> {
     if blob.len() < PREFIX_BYTES {
-        // Too short to tell its own length: what is there decides between the two causes.
+        // Too short to declare a length: truncated if it starts as a blob does, else no blob.
         let is_start = MAGIC.iter().zip(blob).all(|(a, b)| a == b);
         return Err(if is_start {
             DecodeError::Truncated { expected: PREFIX_BYTES + CRC_BYTES, found: blob.len() }
@@ -170,7 +171,7 @@ fn checked_prefix(blob: &[u8]) -> Result<Prefix, DecodeError> {
     Ok(prefix)
 }
 
-/// Checks prefix, length and CRC; returns what lies between prefix and CRC, and the CRC.
+/// Checks prefix, length and CRC; returns the bytes between prefix and CRC, and the CRC.
 fn checked_body(blob: &[u8]) -> Result<(&[u8], u32), DecodeError> {
     let prefix = checked_prefix(blob)?;
     let (expected, found) = (u32::from_le_bytes(prefix.length) as usize, blob.len());
@@ -253,7 +254,7 @@ fn checked_metadata<'a>(
     Ok(metadata)
 }
 
-/// One network's section, cut from a blob: what its header says, and its block.
+/// One network's section, cut from a blob: the fields of its header, and its block of words.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct NetworkSection<'a> {
     format: Format,
@@ -264,7 +265,7 @@ pub(crate) struct NetworkSection<'a> {
 }
 
 impl<'a> NetworkSection<'a> {
-    /// No network: what [`network`](Self::network) gives is an error.
+    /// A section without a network: [`network`](Self::network) returns an error.
     pub const EMPTY: Self = Self {
         format: Format::F32Direct,
         common_width: true,
@@ -273,7 +274,7 @@ impl<'a> NetworkSection<'a> {
         block: &[],
     };
 
-    /// Cuts a section from the front of `bytes`; lengths are checked, values are not.
+    /// Cuts a network's section from the front of `bytes`; checks lengths, but no values.
     fn take(
         bytes: &'a [u8],
         shape: ModelShape,
@@ -303,7 +304,7 @@ impl<'a> NetworkSection<'a> {
         Ok((section, rest))
     }
 
-    /// The network; its values are not looked at.
+    /// The section's network; its values are not checked again.
     pub fn network(&self, shape: ModelShape) -> Result<Network<'a>, NetworkError> {
         match self.format {
             Format::F32Direct => self.direct(shape).map(Network::F32Direct),
@@ -312,19 +313,19 @@ impl<'a> NetworkSection<'a> {
         }
     }
 
-    /// Its format.
+    /// The network's format.
     pub fn format(&self) -> Format {
         self.format
     }
 
-    /// The network if it is one with direct distances.
+    /// The section's network if its format is `f32-direct`; else an error.
     #[inline]
     pub fn direct(&self, shape: ModelShape) -> Result<direct::Network<'a>, NetworkError> {
         let shape = network_shape(shape, self.centres);
         direct::Network::from_block(shape, self.common_width, self.affine, Cut(self.block))
     }
 
-    /// The network if its format is one of [`Layout`] `L`.
+    /// The section's network if its format has the [`Layout`] `L`; else an error.
     #[inline]
     pub fn packed<L: Layout>(&self, shape: ModelShape) -> Result<Packed<'a, L>, NetworkError> {
         let shape = network_shape(shape, self.centres);
@@ -332,7 +333,7 @@ impl<'a> NetworkSection<'a> {
     }
 }
 
-/// Cuts padding and block from the front of `bytes`.
+/// Cuts padding, length and the block of words from the front of `bytes`.
 fn take_block<'a>(
     bytes: &'a [u8],
     section: &'static str,
@@ -365,7 +366,7 @@ fn network_shape(shape: ModelShape, centres: u16) -> Shape {
     Shape { inputs: shape.inputs, centres: centres.into(), outputs: shape.outputs }
 }
 
-/// Cuts one network from the front of `bytes`; lengths are checked, values are not.
+/// Cuts one network from the front of `bytes`; checks lengths, but no values.
 fn take_network(
     bytes: &[u8],
     shape: ModelShape,

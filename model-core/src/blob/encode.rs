@@ -1,4 +1,4 @@
-//! Writing a blob, into memory the caller owns.
+//! Encoding a model as a blob, in memory that the caller owns.
 
 use serde::Serialize;
 
@@ -15,23 +15,23 @@ use crate::checksum::CRC_32;
 use crate::projection::Projection;
 use crate::rbf::Network;
 
-/// All that goes into a blob.
+/// Contents of a blob: what [`encode`] writes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModelParts<'a> {
-    /// What stands between a frame and the one network of all rows, if there is such a network.
+    /// Projection from a frame to the inputs of one network for all rows; `None` with a network a row.
     pub projection: Option<Projection<'a>>,
-    /// The networks; all have the same inputs and outputs.
+    /// The networks; all have the same number of inputs and of outputs.
     pub networks: &'a [Network<'a>],
-    /// Which network serves each row.
+    /// Index into `networks` for each row.
     pub row_network: &'a [u8],
-    /// What is known beyond the weights.
+    /// Names, units, and how the model was trained.
     pub metadata: Metadata<'a>,
 }
 
-/// A buffer of this many bytes holds the blob of `parts`.
+/// Bytes that a buffer needs at most to hold the blob of `parts`.
 #[must_use]
 pub fn encoded_length_bound(parts: &ModelParts<'_>) -> usize {
-    // Fixed fields, and the largest varint of every field that has one.
+    // Fixed fields, and the longest varint of every field that is one.
     const FIXED_FIELDS: usize = 128;
     const SECTION_FIELDS: usize = 32;
     let m = &parts.metadata;
@@ -50,13 +50,13 @@ fn block_bytes(network: &Network<'_>) -> usize {
     network.block().iter().map(|words| words.len() * 4).sum()
 }
 
-/// Writes `parts` at the start of `buffer` and returns the bytes used.
+/// Encodes `parts` at the start of `buffer` and returns the blob.
 ///
-/// `buffer` must lie at a multiple of four ([`Aligned`](super::Aligned)), since the result is read
-/// back before it is returned: a blob that leaves this function decodes.
+/// `buffer` must lie at a multiple of four ([`Aligned`](super::Aligned)). The blob is parsed again before it is
+/// returned, so that every returned blob can be loaded.
 ///
 /// # Errors
-/// See [`EncodeError`].
+/// Every variant of [`EncodeError`].
 pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u8], EncodeError> {
     let first = parts.networks.first().map(Network::shape);
     let (inputs, mut outputs) = first.map_or((0, 0), |s| (s.inputs, s.outputs));
@@ -68,7 +68,7 @@ pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u
 
     let rows = parts.row_network.len();
     if parts.projection.is_some() {
-        // One network for all rows.
+        // One network has the outputs of all rows.
         if !outputs.is_multiple_of(rows.max(1)) {
             return Err(EncodeError::UnevenRows { outputs, rows });
         }
@@ -115,10 +115,10 @@ pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u
     Ok(blob)
 }
 
-/// Writes `parts` into memory of its own.
+/// Encodes `parts` as a blob on the heap.
 ///
 /// # Errors
-/// See [`EncodeError`]; [`EncodeError::BufferTooSmall`] never happens.
+/// Every variant of [`EncodeError`] except [`EncodeError::BufferTooSmall`].
 #[cfg(feature = "std")]
 pub fn encode_to_vec(parts: &ModelParts<'_>) -> Result<AlignedBytes, EncodeError> {
     let mut bytes = AlignedBytes::zeroed(encoded_length_bound(parts));
@@ -169,7 +169,7 @@ impl Writer<'_> {
         self.put_block(&network.block())
     }
 
-    /// Padding, length and the words of a block, so that these start at a multiple of four.
+    /// Writes padding, length and the words of a block, so that the words start at a multiple of four.
     fn put_block(&mut self, block: &[&[u32]]) -> Result<(), EncodeError> {
         let bytes = block.iter().map(|words| words.len() * 4).sum();
         let length = u32::try_from(bytes).map_err(|_| EncodeError::TooLarge {
@@ -177,7 +177,7 @@ impl Writer<'_> {
             value: bytes,
             most: u32::MAX as usize,
         })?;
-        // One byte for the padding's own length, then the padding, then the block's length.
+        // In this order: one byte for the padding's length, the padding, the block's length.
         let start = self.at + 1 + varint_bytes(length);
         let padding = start.next_multiple_of(FLOAT_ALIGNMENT) - start;
         self.put(&[0_u8; FLOAT_ALIGNMENT].get(..padding).unwrap_or_default())?;
@@ -188,7 +188,7 @@ impl Writer<'_> {
         Ok(())
     }
 
-    /// Enters the length, appends the CRC, and returns the length.
+    /// Completes the blob: enters its length, appends its CRC, and returns its length in bytes.
     fn finish(self) -> Result<usize, EncodeError> {
         let end = self.at + CRC_BYTES;
         let length = u32::try_from(end).map_err(|_| EncodeError::TooLarge {
@@ -206,7 +206,7 @@ impl Writer<'_> {
     }
 }
 
-/// Bytes that postcard's varint takes: seven bits a byte.
+/// Bytes that `value` takes as a postcard varint: seven bits a byte.
 fn varint_bytes(value: u32) -> usize {
     (32 - value.leading_zeros()).max(1).div_ceil(7) as usize
 }

@@ -1,18 +1,18 @@
-//! Why a blob is refused, one variant a cause.
+//! Errors of parsing and encoding a blob, with one variant for each cause.
 
 use super::metadata::ModelShape;
 use crate::rbf::NetworkError;
 
-/// Why bytes are not a model. Nothing is loaded then: the model before stays in force.
+/// Why bytes are not a model. Nothing is loaded then: the previous model stays in force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum DecodeError {
     /// The buffer does not start at a multiple of four, so floats cannot be borrowed.
     #[error("the blob must lie at an address that is a multiple of 4 (wrap it in `Aligned`)")]
     Misaligned,
-    /// Not a weight blob at all.
+    /// The bytes do not start with the magic "TAXL": they are not a blob.
     #[error("not a weight blob: it does not start with \"TAXL\"")]
     BadMagic,
-    /// Written by another version of the format.
+    /// The blob was written in another version of the format.
     #[error("blob format version {found}; this build reads version {supported}")]
     UnsupportedVersion {
         /// Version in the blob.
@@ -23,7 +23,7 @@ pub enum DecodeError {
     /// Bytes are missing at the end.
     #[error("blob is truncated: {found} bytes of {expected}")]
     Truncated {
-        /// Bytes the blob says it has.
+        /// Length in bytes that the blob declares.
         expected: usize,
         /// Bytes given.
         found: usize,
@@ -31,83 +31,83 @@ pub enum DecodeError {
     /// Bytes follow the blob's end.
     #[error("{extra} bytes follow the end of the blob")]
     TrailingBytes {
-        /// How many.
+        /// Number of bytes behind the blob.
         extra: usize,
     },
     /// The CRC-32 does not match: at least one bit changed.
     #[error("blob is corrupt: CRC-32 is {found:#010x}, should be {expected:#010x}")]
     Corrupt {
-        /// Checksum computed over the bytes.
+        /// CRC-32 computed over the bytes.
         expected: u32,
-        /// Checksum stored.
+        /// CRC-32 stored at the end of the blob.
         found: u32,
     },
-    /// A section cannot be read as what it should be.
+    /// A section does not have the fields that it must have.
     #[error("blob is malformed in its {section}")]
     Malformed {
-        /// Which section.
+        /// Name of the section.
         section: &'static str,
     },
-    /// A section of a kind this build does not know, or not at its place.
+    /// A section is of an unknown kind, or not in its place.
     #[error("blob has a section of kind {found} where kind {expected} belongs")]
     SectionOrder {
-        /// Tag that belongs there.
+        /// Tag that belongs in this place.
         expected: u8,
-        /// Tag found.
+        /// Tag found in this place.
         found: u8,
     },
-    /// Networks do not stand in the order 0, 1, ….
+    /// The networks are not in the order 0, 1, ….
     #[error("blob has network {found} where network {expected} belongs")]
     NetworkOrder {
-        /// Index that belongs there.
+        /// Index that belongs in this place.
         expected: u8,
-        /// Index found.
+        /// Index found in this place.
         found: u8,
     },
     /// A row names a network that does not exist.
     #[error("row {row} uses network {network}, but the blob holds {networks}")]
     UnknownNetwork {
-        /// Row, from 0.
+        /// Index of the row, from 0.
         row: usize,
-        /// Network it names.
+        /// Index of the network that it names.
         network: u8,
-        /// Networks there are.
+        /// Number of networks in the blob.
         networks: u8,
     },
     /// A list has the wrong number of entries for the shape.
     #[error("blob lists {found} {what}; its shape asks for {expected}")]
     CountMismatch {
-        /// What is listed.
+        /// What the list holds.
         what: &'static str,
-        /// Entries the shape asks for.
+        /// Number of entries that the shape asks for.
         expected: usize,
-        /// Entries there are.
+        /// Number of entries found.
         found: usize,
     },
-    /// A number in the metadata is not finite or out of its range.
+    /// A number in the metadata is not finite, or out of its range.
     #[error("blob metadata: {field} is out of range")]
     InvalidMetadata {
-        /// Which field.
+        /// Name of the field.
         field: &'static str,
     },
-    /// The projection is unusable.
+    /// The projection's parameters are not valid.
     #[error("projection: {cause}")]
     Projection {
-        /// What is wrong with it.
+        /// What is wrong with the projection.
         cause: NetworkError,
     },
-    /// The parameters of a network are unusable.
+    /// The parameters of a network are not valid.
     #[error("network {index}: {cause}")]
     Network {
-        /// Which network, from 0.
+        /// Index of the network, from 0.
         index: u8,
-        /// What is wrong with it.
+        /// What is wrong with the network.
         cause: NetworkError,
     },
     /// Bytes are left over between the last section and the CRC.
     #[error("{bytes} bytes are left over after the last section")]
     LeftOver {
-        /// How many.
+        /// Number of bytes left over.
         bytes: usize,
     },
     /// The blob is sound, but for a sensor of another shape.
@@ -115,7 +115,7 @@ pub enum DecodeError {
     ShapeMismatch {
         /// Shape the decoder is built for.
         expected: ModelShape,
-        /// Shape of the blob.
+        /// Shape of the blob's model.
         found: ModelShape,
     },
 }
@@ -129,28 +129,28 @@ pub enum EncodeError {
     /// A dimension exceeds what the format holds.
     #[error("{what} is {value}; the format holds at most {most}")]
     TooLarge {
-        /// Which dimension.
+        /// Name of the dimension.
         what: &'static str,
-        /// Its value.
+        /// Value of the dimension.
         value: usize,
-        /// The largest that fits.
+        /// Largest value that the format holds.
         most: usize,
     },
-    /// A network's inputs or outputs differ from the first one's.
+    /// A network has another number of inputs or outputs than network 0.
     #[error("network {index} has another shape than network 0")]
     UnequalNetworks {
-        /// Which network, from 0.
+        /// Index of the network, from 0.
         index: usize,
     },
     /// The outputs of the one network behind a projection do not divide among the rows.
     #[error("{outputs} outputs do not divide among {rows} rows")]
     UnevenRows {
-        /// Outputs of the network.
+        /// Number of outputs of the network.
         outputs: usize,
-        /// Rows.
+        /// Number of rows.
         rows: usize,
     },
-    /// What would be written could not be read back.
+    /// The encoded blob is rejected when it is parsed again.
     #[error("the model would be refused when read: {0}")]
     Refused(#[from] DecodeError),
 }

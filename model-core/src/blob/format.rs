@@ -1,4 +1,4 @@
-//! The fields of the format, in their order. `docs/blob.md` is the specification.
+//! The fields of the blob, in their order. `docs/blob.md` is the specification.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,27 +8,27 @@ use crate::rbf::Format;
 
 /// The first four bytes of every blob.
 pub const MAGIC: [u8; 4] = *b"TAXL";
-/// The version that this crate reads and writes.
+/// Version of the blob format that this crate parses and encodes.
 pub const FORMAT_VERSION: u8 = 1;
 
-/// Bytes before the postcard fields: magic, version, length.
+/// Number of bytes before the postcard fields: magic, version, length.
 pub(super) const PREFIX_BYTES: usize = 9;
-/// Bytes of the closing CRC-32.
+/// Number of bytes of the closing CRC-32.
 pub(super) const CRC_BYTES: usize = 4;
-/// Floats are borrowed in place, so their section starts at a multiple of this.
+/// Multiple of bytes at which a section of floats starts, because they are borrowed in place.
 pub(super) const FLOAT_ALIGNMENT: usize = 4;
 
-/// Section tags. Each kind of section has its own, and those of networks [one a format](Format::tag); an unknown
-/// one is refused.
+/// Tag of the metadata section. Each kind of section has its own tag, and networks have
+/// [one for each format](Format::tag); an unknown tag is rejected.
 pub(super) const TAG_METADATA: u8 = 0;
 pub(super) const TAG_PROJECTION: u8 = 4;
 
-/// Bytes 0..9, at fixed places, so that a blob can be measured before it is trusted.
+/// Bytes 0..9, at fixed places, so that a blob's length is known before anything else is read.
 #[derive(Serialize, Deserialize)]
 pub(super) struct Prefix {
     pub magic: [u8; 4],
     pub version: u8,
-    /// Whole length in bytes, CRC included; little-endian.
+    /// Length of the whole blob in bytes, CRC included; little-endian.
     pub length: [u8; 4],
 }
 
@@ -38,7 +38,7 @@ pub(super) struct ShapeField<'a> {
     pub inputs: u16,
     pub outputs: u16,
     pub networks: u8,
-    /// Which network serves each row: `rows` bytes.
+    /// Index of the network for each row: `rows` bytes.
     #[serde(borrow)]
     pub row_network: &'a [u8],
 }
@@ -54,7 +54,7 @@ pub(super) struct MetadataSection<'a> {
     pub seed: u64,
     pub training_frames: u32,
     pub thickness_mm: f32,
-    // Columns: one a line.
+    // Names or units of columns, one a line.
     pub input_names: &'a str,
     pub input_units: &'a str,
     pub output_names: &'a str,
@@ -64,20 +64,20 @@ pub(super) struct MetadataSection<'a> {
     pub full_scale: &'a [u8],
 }
 
-/// Opens a network section; `padding` and the float block follow.
+/// Header of a network section; padding and the block of words follow.
 #[derive(Serialize, Deserialize)]
 pub(super) struct RbfHeader {
     pub tag: u8,
-    /// Networks stand in order: 0, 1, …
+    /// Index of the network; networks are in the order 0, 1, …
     pub index: u8,
     pub centres: u16,
-    /// One width for all centres, or one each.
+    /// Whether all centres have one width; else each has its own.
     pub common_width: bool,
     pub affine: bool,
 }
 
 impl RbfHeader {
-    /// What the tag says of the network's format. Only [`Format::F32Direct`] may have a width a centre.
+    /// The network's format, from its tag. Only [`Format::F32Direct`] may have a width for each centre.
     pub fn format(&self) -> Result<Format, DecodeError> {
         match Format::from_tag(self.tag) {
             None => Err(DecodeError::SectionOrder {

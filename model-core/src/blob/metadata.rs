@@ -1,15 +1,15 @@
-//! What a blob tells of its model beyond the weights.
+//! Metadata of a blob: all that it says of its model beyond the weights.
 
 use serde::{Deserialize, Serialize};
 
-/// The sizes that a blob declares.
+/// Number of rows of a model, and of inputs and outputs a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ModelShape {
-    /// Row-wires: each has a block of `inputs` readings and a block of `outputs`.
+    /// Number of row-wires; each has `inputs` readings and `outputs` outputs.
     pub rows: usize,
-    /// Readings a row.
+    /// Number of readings a row.
     pub inputs: usize,
-    /// Outputs a row.
+    /// Number of outputs a row.
     pub outputs: usize,
 }
 
@@ -18,15 +18,15 @@ pub struct ModelShape {
 pub struct Columns<'a>(pub &'a str);
 
 impl<'a> Columns<'a> {
-    /// The entries in their order.
+    /// The columns' names or units, in their order.
     pub fn iter(self) -> impl Iterator<Item = &'a str> {
-        // As a set of one: the search for a single `char` indexes a slice in a way that the optimiser
-        // cannot prove, and would be the only reachable panic of the device path.
+        // An array of one `char`: the search for a single `char` indexes a slice in a way that the optimiser
+        // cannot prove safe. It would be the only reachable panic of the device path.
         self.0.split(['\n'])
     }
 }
 
-/// Little-endian `f32` at any address.
+/// A list of little-endian `f32` numbers, borrowed from any address.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Floats<'a>(#[serde(borrow)] pub &'a [u8]);
 
@@ -37,58 +37,58 @@ impl<'a> Floats<'a> {
         Self(bytemuck::cast_slice(numbers))
     }
 
-    /// The numbers in their order.
+    /// The numbers, in their order.
     pub fn iter(self) -> impl Iterator<Item = f32> + 'a {
         self.0.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes))
     }
 }
 
-/// How the noise of a training set was defined.
+/// Definition of the noise of a training set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum NoiseKind {
-    /// None was added (measured data, or an ideal sensor).
+    /// No noise was added (measured data, or an ideal sensor).
     None,
-    /// R·(1 + p·n).
+    /// Relative noise: R·(1 + p·n), with n standard normal.
     Relative,
-    /// R + p·(channel maximum − minimum)·n.
+    /// Noise relative to a channel's span: R + p·(channel maximum − minimum)·n, with n standard normal.
     Span,
 }
 
-/// What is known of a model beyond its weights.
+/// Metadata of a model: names, units, and how it was trained.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Metadata<'a> {
     /// Name of the scene or data set.
     pub name: &'a str,
     /// CRC-64/XZ of the scene or data file that trained it.
     pub scene_digest: u64,
-    /// How the training noise was defined.
+    /// Definition of the training noise.
     pub noise_kind: NoiseKind,
     /// Training noise level p, as a fraction (0.005 is 0.5 %).
     pub noise_level: f32,
     /// Seed of every random draw in synthesis and training.
     pub seed: u64,
-    /// Frames trained on.
+    /// Number of frames that the model was trained on.
     pub training_frames: u32,
     /// Sensor thickness H in mm, for the positional error; 0 where it has no meaning.
     pub thickness_mm: f32,
-    /// Reading columns, row after row: `rows × inputs` names.
+    /// Names of the reading columns, row after row: `rows × inputs`.
     pub input_names: Columns<'a>,
-    /// Their units (empty for a plain number).
+    /// Units of the reading columns (empty for a plain number): `rows × inputs`.
     pub input_units: Columns<'a>,
-    /// Output columns, row after row: `rows × outputs` names.
+    /// Names of the output columns, row after row: `rows × outputs`.
     pub output_names: Columns<'a>,
-    /// Their units.
+    /// Units of the output columns (empty for a plain number): `rows × outputs`.
     pub output_units: Columns<'a>,
-    /// RMSE on the training data of each output, in its unit.
+    /// RMSE of each output on the training data, in the output's unit.
     pub training_rmse: Floats<'a>,
-    /// Full scale of each output, in its unit, for %FS.
+    /// Full scale of each output for %FS, in the output's unit.
     pub full_scale: Floats<'a>,
 }
 
-/// Most inputs, and most outputs, of all rows that [`Metadata::unnamed`] serves.
+/// Largest number of inputs, and of outputs, in all rows that [`Metadata::unnamed`] serves.
 const MOST_UNNAMED: usize = 1024;
 
-/// A line of the same letter for each of many columns.
+/// Lines of one `letter` each, for [`MOST_UNNAMED`] columns.
 const fn lines_of(letter: u8) -> [u8; 2 * MOST_UNNAMED] {
     let mut text = [b'\n'; 2 * MOST_UNNAMED];
     let mut column = 0;
@@ -105,11 +105,11 @@ static NO_UNITS: [u8; MOST_UNNAMED] = [b'\n'; MOST_UNNAMED];
 static ZEROS: [u8; 4 * MOST_UNNAMED] = [0; 4 * MOST_UNNAMED];
 
 impl Metadata<'static> {
-    /// Metadata of a hand-made model of this `shape`: every input is called `x` and every output `y`, all without a
-    /// unit; nothing is known of its training. Use it whole, or for the fields that do not matter.
+    /// Metadata of a hand-made model of this `shape`. Every input is called `x` and every output `y`, without
+    /// units; the fields about training are empty. Use it whole, or for the fields that do not matter.
     ///
     /// # Panics
-    /// With more than 1024 inputs or outputs in all rows.
+    /// If all rows together have more than 1024 inputs or 1024 outputs.
     ///
     /// ```
     /// use model_core::blob::{Metadata, ModelShape};

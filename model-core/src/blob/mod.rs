@@ -1,10 +1,10 @@
-//! The weight blob: everything a device needs to decode, in one checked, relocatable piece.
+//! The weight blob: everything a device needs to decode frames, in one checked, relocatable piece.
 //!
 //! Postcard fields, opened by magic, version, length and shape, closed by a CRC-32; the format
-//! is specified with worked bytes in `docs/blob.md`. [`Model::decode`] checks all of it and then
-//! borrows; [`encode`] is its inverse and lives beside it.
+//! is specified with worked bytes in `docs/blob.md`. [`Model::decode`] parses a blob: it checks all of it and
+//! then borrows. [`encode`] is its inverse.
 
-// From the ground up.
+// From the ground up: a module imports only what is declared before it.
 mod aligned;
 mod metadata;
 mod error;

@@ -1,6 +1,6 @@
-//! The assembly's functions, with slices and counts instead of pointers.
+//! The assembly routines, called with slices and counts instead of pointers.
 //!
-//! A function is unsafe where it reads more than its arguments' types tell: then its section *Safety* says
+//! A function is unsafe if it reads more than its arguments' types guarantee. Its section *Safety* then says
 //! what the caller must have checked.
 #![expect(unsafe_code, reason = "calls to assembly, which reads as many words as it is told to")]
 #![expect(
@@ -12,22 +12,22 @@ use core::mem::MaybeUninit;
 
 use super::{Block, Finite, INPUTS, OUTPUTS, expanded_words, fixed16_words};
 
-/// Activations that the f32 routine keeps between its two halves: 512 bytes of stack.
+/// Number of activations that the f32 routine keeps between its two halves: 512 bytes of stack.
 const MOST_CENTRES_AT_ONCE: usize = 128;
 
 core::arch::global_asm!(include_str!("../cortex_m4.s"), options(raw));
 
-/// What a network takes in.
+/// Inputs of one inference, with their unit.
 #[derive(Clone, Copy)]
 pub enum Inputs<'a> {
-    /// In the readings' unit.
+    /// Readings in their own unit, not scaled yet.
     Readings(&'a [f32; INPUTS]),
-    /// Scaled, in units of the clamp.
+    /// Scaled inputs, in units of the clamp ([`UNITS`](crate::scale::UNITS)).
     Scaled(&'a [f32; INPUTS]),
 }
 
 impl<'a> Inputs<'a> {
-    /// The numbers, and the flag that tells their unit.
+    /// The numbers, and the routine's flag for their unit.
     fn parts(self) -> (&'a [f32; INPUTS], u32) {
         match self {
             Self::Readings(readings) => (readings, 0),
@@ -85,15 +85,15 @@ unsafe extern "C" {
 }
 
 impl Finite {
-    /// From the floating-point status behind a routine: a conversion to integers that saturates, or meets
-    /// NaN, is an invalid operation, and no other operation of a routine is.
+    /// The verdict from the floating-point status after a routine. A conversion to an integer that saturates or
+    /// meets NaN is an invalid operation; no other operation of a routine is.
     fn of_status(fpscr: u32) -> Self {
         const INVALID_OPERATION: u32 = 1;
         if fpscr & INVALID_OPERATION == 0 { Self::Known } else { Self::Unknown }
     }
 }
 
-/// Bits of `flags`.
+/// Bit of `flags`: the network has an affine tail.
 const AFFINE: u32 = 1;
 const SCALED: u32 = 2;
 
@@ -101,20 +101,20 @@ fn flags(affine: bool, scaled: u32) -> u32 {
     (u32::from(affine) * AFFINE) | scaled
 }
 
-/// Centres in fours, as the f32 routines count them.
+/// Number of groups of four centres, as the f32 routines count them.
 fn fours(centres: usize) -> u32 {
     ((centres + 3) / 4) as u32
 }
 
-/// Centres in sixteens, as the fixed-point routines count them.
+/// Number of groups of sixteen centres, as the fixed-point routines count them.
 fn sixteens(centres: usize) -> u32 {
     ((centres + 15) / 16) as u32
 }
 
-/// The outputs of a network with expanded distances, 18 of them.
+/// Infers the 18 outputs of a network with expanded distances from 18 inputs.
 ///
 /// # Safety
-/// `block` has at least one centre, and [`expanded_words`] words for its centres and one group.
+/// The caller must check that `block` has at least one centre, and [`expanded_words`] words for its centres and one group.
 pub(crate) unsafe fn expanded(
     block: &Block<'_>,
     inputs: Inputs<'_>,
@@ -126,18 +126,18 @@ pub(crate) unsafe fn expanded(
     let (inputs, scaled) = inputs.parts();
     let (fours, flags) = (fours(block.centres), flags(block.affine, scaled));
     let mut activations = MaybeUninit::uninit();
-    // SAFETY: the caller vouches for the block; the routine reads 18 inputs and writes 18 outputs, which the
-    // types tell; it writes activations, 128 at most, before it reads them.
+    // SAFETY: the caller has checked the block. The routine reads 18 inputs and writes 18 outputs, as the types
+    // say. It writes at most 128 activations, and writes each before it reads it.
     unsafe {
         let (block, activations) = (block.words.as_ptr(), activations.as_mut_ptr());
         Finite::of_status(taxel_f32(inputs, block, output, fours, flags, activations))
     }
 }
 
-/// The outputs of a network with expanded distances, in groups of 18.
+/// Infers the outputs of a network with expanded distances, in groups of 18, from 18 inputs.
 ///
 /// # Safety
-/// There is at least one of the `groups`; `block` has at least one centre, and [`expanded_words`] words for its
+/// The caller must check that there is at least one of the `groups`, and that `block` has at least one centre, and [`expanded_words`] words for its
 /// centres and as many groups.
 #[inline(never)] // its stack would burden the routine for one group
 pub(crate) unsafe fn expanded_array(
@@ -158,10 +158,10 @@ pub(crate) unsafe fn expanded_array(
     }
 }
 
-/// The outputs of a network in fixed point, 18 of them.
+/// Infers the 18 outputs of a network in 16-bit fixed point from 18 inputs.
 ///
 /// # Safety
-/// `block` has at least one centre, and [`fixed16_words`] words for its centres and one group.
+/// The caller must check that `block` has at least one centre, and [`fixed16_words`] words for its centres and one group.
 pub(crate) unsafe fn fixed16(
     block: &Block<'_>,
     inputs: Inputs<'_>,
@@ -172,17 +172,17 @@ pub(crate) unsafe fn fixed16(
     );
     let (inputs, scaled) = inputs.parts();
     let (sixteens, flags) = (sixteens(block.centres), flags(block.affine, scaled));
-    // SAFETY: the caller vouches for the block; the routine reads 18 inputs and writes 18 outputs, which the
-    // types tell.
+    // SAFETY: the caller has checked the block. The routine reads 18 inputs and writes 18 outputs, as the types
+    // say.
     Finite::of_status(unsafe {
         taxel_fixed16(inputs, block.words.as_ptr(), output, sixteens, flags)
     })
 }
 
-/// The outputs of a network in fixed point, in groups of 18.
+/// Infers the outputs of a network in 16-bit fixed point, in groups of 18, from 18 inputs.
 ///
 /// # Safety
-/// There is at least one of the `groups`; `block` has at least one centre, and [`fixed16_words`] words for its
+/// The caller must check that there is at least one of the `groups`, and that `block` has at least one centre, and [`fixed16_words`] words for its
 /// centres and as many groups.
 #[inline(never)] // its stack would burden the routine for one group
 pub(crate) unsafe fn fixed16_array(
@@ -201,20 +201,21 @@ pub(crate) unsafe fn fixed16_array(
     })
 }
 
-/// The features of `readings`: the first 18 numbers of `block`, and for each reading 18 more, times the
-/// reading.
+/// Projects `readings` to 18 features: the first 18 numbers of `block`, plus 18 more numbers for each reading,
+/// times the reading.
 ///
 /// # Safety
-/// There is an even number of `readings`, not none, and `block` has 18 numbers more than 18 for each of them.
+/// The caller must check that `readings.len()` is even and not 0, and that `block` has at least
+/// 18 · (1 + `readings.len()`) numbers.
 pub(crate) unsafe fn project(block: &[f32], readings: &[f32], features: &mut [f32; INPUTS]) {
     debug_assert!(!readings.is_empty() && readings.len().is_multiple_of(2));
     debug_assert!(block.len() >= INPUTS * (1 + readings.len()));
     let pairs = (readings.len() / 2) as u32;
-    // SAFETY: the caller vouches for the block and the number of readings.
+    // SAFETY: the caller has checked the block and the number of readings.
     unsafe { taxel_project(readings.as_ptr(), block.as_ptr(), features, pairs) }
 }
 
-/// Writes `rest` to `outputs` if the `readings` are at rest, and says whether they are.
+/// Copies `rest` to `outputs` if the `readings` are at rest; returns whether they are.
 pub(crate) fn give_rest(
     readings: &[f32; INPUTS],
     baseline: &[f32; INPUTS],
@@ -222,6 +223,6 @@ pub(crate) fn give_rest(
     rest: &[f32; OUTPUTS],
     outputs: &mut [f32; OUTPUTS],
 ) -> bool {
-    // SAFETY: no more is read and written than these arrays.
+    // SAFETY: the routine reads and writes nothing but these arrays.
     unsafe { taxel_give_rest(readings, baseline, rest, outputs, tolerance) != 0 }
 }

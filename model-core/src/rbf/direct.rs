@@ -1,4 +1,4 @@
-//! The network in f32 with direct distances: safe at any width, with any exp kernel.
+//! The network in f32 with direct distances: safe at any width, with any exponential.
 //!
 //! F(x) = Σ_k ω_k·exp(−d_k·‖x − c_k‖²) + b (+ A·x), with d = 1/(2σ²) and x the readings scaled to
 //! [0, 1]. ‖x − c‖² accumulates in four interleaved partial sums, added pairwise.
@@ -29,7 +29,7 @@ pub struct Parameters<'a> {
 }
 
 impl Parameters<'_> {
-    /// The parameters one after the other, as in the blob.
+    /// All parameters as words, one array after the other, as in the blob.
     pub fn words(&self) -> impl Iterator<Item = u32> {
         let before = self.input_minimum.iter().chain(self.input_per_span).chain(self.centres);
         let after = self.decay.iter().chain(self.output_weights).chain(self.bias);
@@ -46,7 +46,7 @@ pub struct Network<'a> {
 }
 
 impl<'a> Network<'a> {
-    /// Checks the lengths and values of `parameters`.
+    /// Makes a network after checking the lengths and values of `parameters`.
     ///
     /// # Errors
     /// Every variant of [`NetworkError`]; lengths are checked before values.
@@ -56,10 +56,10 @@ impl<'a> Network<'a> {
         Ok(network)
     }
 
-    /// As [`try_new`](Self::try_new), for the words of [`Parameters::words`].
+    /// Makes a network from the words of [`Parameters::words`], after checking lengths and values.
     ///
     /// # Errors
-    /// As [`try_new`](Self::try_new); wrong lengths are those of the last arrays.
+    /// Every variant of [`NetworkError`]. If there are too few words, the last arrays have the wrong length.
     pub fn of_words(
         shape: Shape,
         common_width: bool,
@@ -72,8 +72,7 @@ impl<'a> Network<'a> {
         Ok(network)
     }
 
-    /// As [`try_new`](Self::try_new), without the pass over all values: for parameters that
-    /// passed it before.
+    /// Makes a network after checking the lengths alone, for parameters whose values were checked before.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "a network is large to hand over")]
     pub(crate) fn with_lengths_checked(
@@ -115,7 +114,7 @@ impl<'a> Network<'a> {
         check_spans(p.input_per_span)
     }
 
-    /// The network's sizes.
+    /// The network's numbers of inputs, centres and outputs.
     #[must_use]
     pub fn shape(&self) -> Shape {
         self.shape
@@ -127,7 +126,7 @@ impl<'a> Network<'a> {
         &self.parameters
     }
 
-    /// Words of the block of a network of this shape, with a width a centre or one for all.
+    /// Number of words in the block of a network of this shape, with one width for all centres or one for each.
     pub(crate) fn block_words(shape: Shape, common_width: bool, affine: bool) -> usize {
         let Shape { inputs, centres, outputs } = shape;
         let decay = if common_width { 1 } else { centres };
@@ -145,7 +144,7 @@ impl<'a> Network<'a> {
         .fold(0, usize::saturating_add)
     }
 
-    /// The network whose arrays follow each other in `block`; values are not looked at.
+    /// Makes a network of the arrays that follow each other in `block`; its values are not checked.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "a network is large to hand over")]
     pub(crate) fn from_block(
@@ -167,7 +166,7 @@ impl<'a> Network<'a> {
         Self::with_lengths_checked(shape, parameters)
     }
 
-    /// The arrays in the order of their block.
+    /// The network's arrays as words, in the order of the blob.
     pub(crate) fn block(&self) -> [&'a [u32]; 7] {
         let p = &self.parameters;
         [p.input_minimum, p.input_per_span, p.centres, p.decay, p.output_weights, p.bias, p.affine]
@@ -194,8 +193,9 @@ impl<'a> Network<'a> {
         }
     }
 
-    /// For a device not inlined, so that the registers it takes are saved for no other format, and not generic, so that it
-    /// is compiled here, for speed.
+    /// Infers `output` from `scaled` inputs with the exponential `exp`. Not inlined on a device, so that other
+    /// formats need not save the registers it uses. Not generic, so that it is compiled with this crate, for
+    /// speed.
     #[cfg_attr(cortex_m4f, inline(never))]
     #[cfg_attr(
         not(cortex_m4f),
@@ -236,8 +236,7 @@ impl<'a> Network<'a> {
     }
 }
 
-/// ‖a − b‖² by direct differences: the expanded form ‖a‖² − 2a·b + ‖b‖² cancels (400 % error at
-/// offset 100).
+/// ‖a − b‖² by direct differences; the expanded form ‖a‖² − 2a·b + ‖b‖² cancels (400 % error at offset 100).
 #[inline(always)]
 #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
 fn squared_distance(a: &[f32], b: &[f32]) -> f32 {

@@ -1,13 +1,14 @@
 //! The network in f32 with expanded distances.
 //!
-//! With g = log₂e/(2σ²), exp(−‖x − c‖²/(2σ²)) = 2^(b + a·x − g‖x‖²), where a = 2g·c and b = −g‖c‖²: two
-//! operations an input and centre instead of three, and no constant of the base e. Products cancel, so a
-//! model takes this form only where the trainer has proved the rounding harmless; inputs counted from the
-//! middle of the training range, and clamped, make the bound small (400 % error was seen at an offset of
-//! 100 spans).
+//! With g = log₂e/(2σ²), exp(−‖x − c‖²/(2σ²)) = 2^(b + a·x − g‖x‖²), where a = 2g·c and b = −g‖c‖². This takes
+//! two operations for each input and centre instead of three, and no constant of the base e.
 //!
-//! Inputs are in [`UNITS`]. b + a·x − g‖x‖² adds up in four interleaved partial sums, the first opened by b,
-//! the second by −g‖x‖². Centres are stored in fours; the last may be fill.
+//! Products cancel, so a model uses this form only where the trainer has proved the rounding harmless. Inputs
+//! are counted from the middle of the training range, and clamped, which makes the bound small (400 % error was
+//! seen at an offset of 100 spans).
+//!
+//! Inputs are in [`UNITS`]. b + a·x − g‖x‖² adds up in four interleaved partial sums; the first starts with b, the
+//! second with −g‖x‖². Centres are stored in groups of four; the last group may be filled up with zero weights.
 #![cfg_attr(
     cortex_m4f,
     expect(unsafe_code, reason = "calls to assembly, whose conditions are checked before")
@@ -22,36 +23,37 @@ use crate::cortex_m4::{self, Finite, Inputs, OUTPUTS};
 use crate::exp::exp2;
 use crate::scale::{HALF_RANGE, UNITS, clamp_units};
 
-/// Centres are stored in multiples of this.
+/// Number of centres in a group: K is rounded up to a multiple of it in the block.
 pub const CENTRES_AT_ONCE: usize = 4;
 
-/// The smallest exponent that can be computed with: 2^−126 is the smallest normal number.
+/// Smallest exponent that a network may reach; 2^−126 is the smallest normal number.
 pub const LOWEST_EXPONENT: f32 = -125.0;
 
-/// The largest: rounding may lift an exponent a little above 0, and no sound parameters lift it further.
+/// Largest exponent that a network may reach: rounding can lift an exponent slightly above 0.
 pub const HIGHEST_EXPONENT: f32 = 0.125;
 
-/// The parameters of one network. With K' for K rounded up to a multiple of [`CENTRES_AT_ONCE`]:
+/// The parameters of one network, borrowed from its block. K' is K rounded up to a multiple of
+/// [`CENTRES_AT_ONCE`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parameters<'a> {
     /// Middle of each input's training range, in the reading's unit: `[inputs]`.
     pub input_midpoint: &'a [f32],
-    /// [`UNITS`] in one unit of the reading; 0 for a channel that never changed: `[inputs]`.
+    /// Number of [`UNITS`] in one unit of the reading; 0 for a channel that never changed: `[inputs]`.
     pub input_per_unit: &'a [f32],
-    /// g, on inputs in [`UNITS`].
+    /// Decay g = log₂e/(2σ²), on inputs in [`UNITS`].
     pub decay: f32,
     /// Bias in the outputs' units: `[outputs]`.
     pub bias: &'a [f32],
     /// Affine tail A on inputs in [`UNITS`], input after input: `[inputs × outputs]`, or empty.
     pub affine: &'a [f32],
-    /// b and then a, centre after centre: `[K' × (1 + inputs)]`.
+    /// Coefficients of the exponents, b and then a, centre after centre: `[K' × (1 + inputs)]`.
     pub exponents: &'a [f32],
-    /// Output weights ω, centre after centre; 0 where there is none: `[K' × outputs]`.
+    /// Output weights ω, centre after centre, 0 beyond K: `[K' × outputs]`.
     pub output_weights: &'a [f32],
 }
 
 impl Parameters<'_> {
-    /// The parameters one after the other: the block that [`Network::try_new`] takes.
+    /// All parameters as words, one array after the other: the block that `Network::try_new` takes.
     pub fn words(&self) -> impl Iterator<Item = u32> {
         let before = self.input_midpoint.iter().chain(self.input_per_unit).chain([&self.decay]);
         let after = self.bias.iter().chain(self.affine).chain(self.exponents);
@@ -59,11 +61,11 @@ impl Parameters<'_> {
     }
 }
 
-/// The layout of blocks of f32 with expanded distances.
+/// The layout of a block in f32 with expanded distances.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Expanded;
 
-/// A network in this format. Its block is what [`Parameters::words`] lists.
+/// A network in f32 with expanded distances; its block is what [`Parameters::words`] lists.
 pub type Network<'a> = packed::Network<'a, Expanded>;
 
 impl Layout for Expanded {
@@ -196,16 +198,17 @@ impl Layout for Expanded {
 }
 
 impl Network<'_> {
-    /// As [`rbf::Network::infer_scaled`](super::Network::infer_scaled), by the compiled twin of the
-    /// assembly: the same bits; public to measure what the assembly saves. `scaled` and `output` must have
-    /// the sizes of the shape: what is beyond is left alone.
+    /// Infers as [`rbf::Network::infer_scaled`](super::Network::infer_scaled) does, to the bit, by the assembly's
+    /// compiled twin in portable Rust. It is public to measure what the assembly saves.
+    ///
+    /// `scaled` and `output` must have the lengths of the shape; elements beyond are ignored.
     #[inline(never)]
     pub fn infer_scaled_portably(&self, scaled: &mut [f32], output: &mut [f32]) {
         self.infer_scaled_by_twin(scaled, output);
     }
 }
 
-/// `opened` and the products in turn, in four partial sums that are added pairwise.
+/// Sum of `opened` and the products of `a` and `b`, in four partial sums that are added pairwise.
 #[inline(always)]
 #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
 fn sum_of_products(opened: [f32; 4], a: &[f32], b: &[f32]) -> f32 {

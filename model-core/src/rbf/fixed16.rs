@@ -1,17 +1,17 @@
 //! The network in 16-bit fixed point.
 //!
-//! As [`expanded`](super::expanded), in integers. Inputs x are 16 bits, the upper halves of saturated
-//! integers in [`UNITS`]. The exponent v = g‖x − c‖² is an unsigned 6.26 number: v = b + a·x + g‖x‖² with
-//! a = −2g·c in 16 bits, so c is exactly −a/(2g) whatever a was rounded to, and b = g‖c‖² +
-//! [`EXPONENT_MARGIN`]. The activation 2^−v is 16 bits (Q15): a cubic for the fraction, a shift for the integer
-//! part. Weights are 16 bits with a scale for each output; sums are 32 bits.
+//! It computes as [`expanded`](super::expanded) does, in integers. Inputs x have 16 bits, the upper halves of
+//! saturated integers in [`UNITS`]. The exponent v = g‖x − c‖² is an unsigned 6.26 number: v = b + a·x + g‖x‖².
+//! There a = −2g·c has 16 bits, so c is exactly −a/(2g) after a was rounded, and b = g‖c‖² +
+//! [`EXPONENT_MARGIN`]. The activation 2^−v has 16 bits (Q15): a cubic for the fraction, a shift for the integer
+//! part. Weights have 16 bits and a scale for each output; sums have 32 bits.
 //!
-//! Nothing wraps around: inputs saturate; that v stays between 0 and 2³² for every input is checked with the
-//! parameters; and the trainer proves that sums fit, by a bound on the network's norm (partial sums may
-//! wrap, since arithmetic modulo 2³² does not mind the way there).
+//! No result wraps around. Inputs saturate. A check of the parameters ensures that v stays between 0 and 2³²
+//! for every input. The trainer proves that sums fit, by a bound on the network's norm; partial sums may wrap,
+//! which does not change the result modulo 2³².
 //!
-//! The bias opens the sums, and one multiplication by the scale closes them: all before it is in integers, so
-//! that any order gives the same bits.
+//! Sums start with the bias and end with one multiplication by the scale. All before it is in integers, so that
+//! any order gives the same bits.
 #![cfg_attr(
     cortex_m4f,
     expect(unsafe_code, reason = "calls to assembly, whose conditions are checked before")
@@ -27,47 +27,50 @@ use super::parameters::{
 use crate::cortex_m4::{self, Finite, Inputs, OUTPUTS};
 use crate::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP, clamp_steps};
 
-/// Centres are stored in multiples of this.
+/// Number of centres in a group: K is rounded up to a multiple of it in the block.
 pub const CENTRES_AT_ONCE: usize = 16;
-/// Inputs that the squared length of x holds.
+/// Largest number of inputs for which the squared length of x cannot overflow.
 pub const MOST_INPUTS: usize = 63;
-/// Bits of an exponent's fraction.
+/// Number of fraction bits of an exponent v.
 pub const EXPONENT_FRACTION_BITS: u32 = 26;
-/// Fraction bits of the decay g, which is per step².
+/// Number of fraction bits of the decay g, which is per step².
 pub const DECAY_FRACTION_BITS: u32 = 34;
-/// What b holds beyond g‖c‖², in units of the last place: more than all that truncation takes away.
+/// Margin that b holds beyond g‖c‖², in units of the last place: more than truncation can take away.
 pub const EXPONENT_MARGIN: u32 = 8;
-/// The activation at a distance of 0; 1 would be 32768.
+/// The activation at a distance of 0, in Q15; 1 would be 32768.
 pub const HIGHEST_ACTIVATION: i32 = 32_766;
 
-/// 2^−f = Σ c_i·f^i on [0, 1) within 1.1e-4, continuous over whole numbers: p(1) = p(0)/2. In Q33, Q27, Q21
-/// and Q15, since each product with f (Q26) drops 32 bits.
+/// Coefficients of the cubic p(f) = Σ c_i·f^i for 2^−f on [0, 1), within 1.1e-4. It is continuous over whole
+/// numbers: p(1) = p(0)/2.
+///
+/// They are in Q33, Q27, Q21 and Q15, since each product with f (Q26) drops 32 bits.
 pub const CUBIC: [i32; 4] = [-335_049_012, 30_875_674, -1_449_129, HIGHEST_ACTIVATION];
 
-/// The parameters of one network. K' is K rounded up to a multiple of [`CENTRES_AT_ONCE`], I' is the number
-/// of pairs of inputs (a last odd one is paired with 0); a *pair* is a word with the first of two `i16` in
-/// its low half.
+/// The parameters of one network, borrowed from its block.
+///
+/// K' is K rounded up to a multiple of [`CENTRES_AT_ONCE`]. A *pair* is a word of two `i16`, the first in its low
+/// half. I' is the number of pairs of inputs (a last odd input is paired with 0).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parameters<'a> {
     /// Middle of each input's training range, in the reading's unit: `[inputs]`.
     pub input_midpoint: &'a [f32],
-    /// [`UNITS`] in one unit of the reading; 0 for a channel that never changed: `[inputs]`.
+    /// Number of [`UNITS`] in one unit of the reading; 0 for a channel that never changed: `[inputs]`.
     pub input_per_unit: &'a [f32],
-    /// g per step², in 2^−(26 + 34).
+    /// Decay g per step², in units of 2^−(26 + 34).
     pub decay: u32,
     /// Bias in units of the sums: `[outputs]`.
     pub bias: &'a [i32],
-    /// What one unit of a sum means, in the outputs' units: `[outputs]`.
+    /// Value of one unit of a sum, in the outputs' units: `[outputs]`.
     pub output_scale: &'a [f32],
     /// Affine tail in pairs of inputs: `[outputs × I']`, or empty.
     pub affine: &'a [u32],
-    /// Sixteen centres at a time (`[K'/16]`): for each, b and then the pairs of a (`[16 × (1 + I')]`); then
-    /// their output weights in pairs of centres (`[outputs × 8]`).
+    /// Groups of sixteen centres (`[K'/16]`): for each centre b and then the pairs of a (`[16 × (1 + I')]`),
+    /// followed by the group's output weights in pairs of centres (`[outputs × 8]`).
     pub centres: &'a [u32],
 }
 
 impl Parameters<'_> {
-    /// The parameters one after the other: the block that [`Network::try_new`] takes.
+    /// All parameters as words, one array after the other: the block that `Network::try_new` takes.
     pub fn words(&self) -> impl Iterator<Item = u32> {
         let bits = |value: &f32| value.to_bits();
         let before = self.input_midpoint.iter().chain(self.input_per_unit).map(bits);
@@ -78,11 +81,11 @@ impl Parameters<'_> {
     }
 }
 
-/// The layout of blocks of 16-bit fixed point.
+/// The layout of a block in 16-bit fixed point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Fixed16;
 
-/// A network in this format. Its block is what [`Parameters::words`] lists.
+/// A network in 16-bit fixed point; its block is what [`Parameters::words`] lists.
 pub type Network<'a> = packed::Network<'a, Fixed16>;
 
 impl Layout for Fixed16 {
@@ -183,7 +186,7 @@ impl Layout for Fixed16 {
     #[expect(clippy::inline_always, reason = "callers rely on it for constant lengths")]
     fn infer_scaled_in_rust(network: &Network<'_>, scaled: &mut [f32], output: &mut [f32]) {
         let p = network.parameters();
-        // The buffers of the caller serve for the integers: no other is of the right length.
+        // The caller's buffers also hold the integers: no others have the right length.
         let x = bytemuck::cast_slice_mut::<f32, i32>(scaled);
         x.iter_mut().for_each(|x| *x = clamp_steps(f32::from_bits(*x as u32)));
         let sums = bytemuck::cast_slice_mut::<f32, i32>(output);
@@ -230,30 +233,31 @@ impl Layout for Fixed16 {
 }
 
 impl<'a> Network<'a> {
-    /// Sixteen centres at a time: the lines of their exponents, and their weights.
+    /// The groups of sixteen centres: for each, the lines of its exponents, and its weights.
     fn centres(&self) -> impl Iterator<Item = (&'a [u32], &'a [u32])> {
         let exponents = CENTRES_AT_ONCE * (1 + self.shape().inputs.div_ceil(2));
         let at_once = self.parameters().centres.chunks_exact(words_at_once(self.shape()).max(1));
         at_once.map(move |words| words.split_at_checked(exponents).unwrap_or_default())
     }
 
-    /// As [`rbf::Network::infer_scaled`](super::Network::infer_scaled), by the compiled twin of the
-    /// assembly: the same bits; public to measure what the assembly saves. `scaled` and `output` must have
-    /// the sizes of the shape: what is beyond is left alone.
+    /// Infers as [`rbf::Network::infer_scaled`](super::Network::infer_scaled) does, to the bit, by the assembly's
+    /// compiled twin in portable Rust. It is public to measure what the assembly saves.
+    ///
+    /// `scaled` and `output` must have the lengths of the shape; elements beyond are ignored.
     #[inline(never)]
     pub fn infer_scaled_portably(&self, scaled: &mut [f32], output: &mut [f32]) {
         self.infer_scaled_by_twin(scaled, output);
     }
 
-    /// The activations in Q15 of sixteen centres after the other, for inputs in steps
-    /// ([`clamp_steps`]): what a trainer fits output weights to.
+    /// Activations in Q15, for one group of sixteen centres after the other, of inputs `x` in steps
+    /// ([`clamp_steps`]). A trainer fits output weights to them.
     pub fn activations(&self, x: &[i32]) -> impl Iterator<Item = [i32; CENTRES_AT_ONCE]> {
         let shared = shared_term(self.parameters().decay, x);
         self.centres().map(move |(exponents, _)| activations_of(exponents, shared, x))
     }
 }
 
-/// Words of [`Parameters::centres`] that sixteen centres take.
+/// Number of words that a group of sixteen centres takes in [`Parameters::centres`].
 #[inline]
 #[must_use]
 pub fn words_at_once(shape: Shape) -> usize {
@@ -262,12 +266,12 @@ pub fn words_at_once(shape: Shape) -> usize {
         .saturating_add((CENTRES_AT_ONCE / 2).saturating_mul(shape.outputs))
 }
 
-/// The two `i16` of a pair.
+/// The two `i16` of a pair, the low half first.
 fn halves(pair: u32) -> [i32; 2] {
     [i32::from(pair as i16), i32::from((pair >> 16) as i16)]
 }
 
-/// Adds the products of pairs with the values they stand for.
+/// `sum` plus the products of the `i16` in `pairs` with the `values` in the same places.
 #[inline(always)]
 #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
 fn add_products(sum: i32, pairs: &[u32], values: &[i32]) -> i32 {
@@ -283,7 +287,7 @@ fn add_products(sum: i32, pairs: &[u32], values: &[i32]) -> i32 {
     sum
 }
 
-/// g‖x‖²
+/// The term g‖x‖² of the exponent, which all centres share.
 #[inline(always)]
 #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
 fn shared_term(decay: u32, x: &[i32]) -> u32 {
@@ -291,7 +295,7 @@ fn shared_term(decay: u32, x: &[i32]) -> u32 {
     (((square >> 4) * u64::from(decay)) >> 30) as u32
 }
 
-/// 2^−v in Q15
+/// The activation 2^−v in Q15.
 #[inline(always)]
 #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
 fn power(v: u32) -> i32 {

@@ -1,17 +1,17 @@
-//! The number formats of networks: the one list of them.
+//! The number formats of networks, in one list.
 
-/// How a network's numbers and distances are represented.
+/// Number format of a network: the types of its numbers, and the form of its distances.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
-    /// [`direct`](super::direct): f32, distances from differences.
+    /// f32 with distances from differences ([`direct`](super::direct)).
     F32Direct,
-    /// [`expanded`](super::expanded): f32, distances from products.
+    /// f32 with distances from products ([`expanded`](super::expanded)).
     F32,
-    /// [`fixed16`](super::fixed16): 16-bit fixed point.
+    /// 16-bit fixed point with distances from products ([`fixed16`](super::fixed16)).
     Fixed16,
 }
 
-/// What is declared of a format, once and for all.
+/// Name, tag and description of a format.
 struct Declaration {
     name: &'static str,
     tag: u8,
@@ -19,7 +19,7 @@ struct Declaration {
 }
 
 impl Format {
-    /// Every format.
+    /// Every number format.
     ///
     /// ```
     /// use model_core::rbf::Format;
@@ -60,13 +60,13 @@ impl Format {
         self.declaration().tag
     }
 
-    /// The format in one line.
+    /// Description of the format in one line.
     #[must_use]
     pub const fn description(self) -> &'static str {
         self.declaration().description
     }
 
-    /// The format of that [name](Self::name).
+    /// The format whose [name](Self::name) is `name`, if there is one.
     ///
     /// ```
     /// use model_core::rbf::Format;
@@ -78,7 +78,7 @@ impl Format {
         Self::ALL.into_iter().find(|format| format.name() == name)
     }
 
-    /// The format of that [tag](Self::tag).
+    /// The format whose [tag](Self::tag) is `tag`, if there is one.
     #[must_use]
     pub fn from_tag(tag: u8) -> Option<Self> {
         Self::ALL.into_iter().find(|format| format.tag() == tag)

@@ -1,8 +1,8 @@
-//! Networks whose parameters are one block of words: what the formats with a routine in assembly share.
+//! Networks whose parameters are one block of words, as in all formats that have an assembly routine.
 //!
-//! A format is a [`Layout`]: how long its blocks are, what they may hold, and how they are inferred from. A
-//! Cortex-M4F infers by a routine in assembly where the sizes are the paper's. Everywhere else the routine's
-//! twin in Rust serves, which gives the same bits.
+//! A format implements [`Layout`]: how long its blocks are, what they may hold, and how to infer from them. A
+//! Cortex-M4F infers by an assembly routine where the sizes are the paper's. Elsewhere the routine's compiled
+//! twin is used: portable Rust that gives the same bits.
 #![cfg_attr(
     cortex_m4f,
     expect(unsafe_code, reason = "calls to assembly, whose conditions are checked before")
@@ -18,32 +18,32 @@ use crate::cortex_m4::{Block, Finite, INPUTS, OUTPUTS};
 
 /// A number format whose networks are one block of words.
 pub trait Layout: Copy + Debug + PartialEq {
-    /// The parameters of a network, cut from its block.
+    /// Parameters of a network, cut from its block.
     type Parameters<'a>;
 
-    /// Words of the block of a network of this shape.
+    /// Number of words in the block of a network of this shape, with an affine tail or without.
     fn block_words(shape: Shape, affine: bool) -> usize;
 
-    /// Checks what the format asks of a shape beyond its block's length.
+    /// Checks the format's limits on a shape, beyond the length of its block.
     ///
     /// # Errors
-    /// [`NetworkError`].
+    /// [`NetworkError::TooManyInputs`], or whatever the format rejects.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "no code")]
     fn check_shape(_: Shape) -> Result<(), NetworkError> {
         Ok(())
     }
 
-    /// Looks at every value of `network`.
+    /// Checks every value of `network`.
     ///
     /// # Errors
-    /// [`NetworkError`].
+    /// The variant of [`NetworkError`] that names the first bad value.
     fn check_values(network: &Network<'_, Self>) -> Result<(), NetworkError>;
 
     /// The parameters of `network`.
     fn parameters<'a>(network: &Network<'a, Self>) -> Self::Parameters<'a>;
 
-    /// Writes readings to `scaled` in the format's unit of inputs, not clamped yet.
+    /// Converts readings to the format's unit of inputs, not clamped yet, in `scaled`.
     fn scale(network: &Network<'_, Self>, reading: &[f32], scaled: &mut [f32]);
 
     /// Lowest and highest reading of `input` in training, in its unit; NaN if there is no such input.
@@ -52,13 +52,13 @@ pub trait Layout: Copy + Debug + PartialEq {
     /// Width σ of all centres on inputs scaled to [0, 1].
     fn width(parameters: &Self::Parameters<'_>) -> f32;
 
-    /// Infers `output` from `scaled` inputs, which are used up, as the routine does to the bit.
+    /// Infers `output` from `scaled` inputs, which are overwritten, in Rust: the same bits as the routine's.
     fn infer_scaled_in_rust(network: &Network<'_, Self>, scaled: &mut [f32], output: &mut [f32]);
 
-    /// The routine in assembly for one group of outputs.
+    /// Infers one group of 18 outputs by the format's assembly routine.
     ///
     /// # Safety
-    /// `network` has 18 inputs and 18 outputs.
+    /// The caller must check that `network` has 18 inputs and 18 outputs.
     #[cfg(cortex_m4f)]
     unsafe fn routine(
         network: &Network<'_, Self>,
@@ -66,10 +66,11 @@ pub trait Layout: Copy + Debug + PartialEq {
         output: &mut [f32; OUTPUTS],
     ) -> Finite;
 
-    /// The routine in assembly for several groups of outputs.
+    /// Infers several groups of 18 outputs by the format's assembly routine.
     ///
     /// # Safety
-    /// `network` has 18 inputs, and 18 outputs for each of `groups`.
+    /// The caller must check that `network` has 18 inputs and 18 outputs for each of `groups`, and that there is
+    /// at least one group.
     #[cfg(cortex_m4f)]
     unsafe fn array_routine(
         network: &Network<'_, Self>,
@@ -78,7 +79,7 @@ pub trait Layout: Copy + Debug + PartialEq {
     ) -> Finite;
 }
 
-/// A network: a block of words, borrowed from where it lies, that has been checked against its shape.
+/// A network whose parameters are one borrowed block of words, checked against its shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(C)] // the shape first, so that it is at the same place in a network of any format
 pub struct Network<'a, L> {
@@ -87,10 +88,10 @@ pub struct Network<'a, L> {
 }
 
 impl<'a, L: Layout> Network<'a, L> {
-    /// Checks the length and the values of a `block`, the words of the format's parameters. No reading can then
-    /// drive an exponent out of the format's range, nor an output out of f32.
+    /// Makes a network after checking the length and values of `block`, the words of the format's parameters.
     ///
-    /// That the sums of 16-bit weights fit is proved where a network is quantised; a device cannot.
+    /// After that, no reading can drive an exponent out of the format's range, nor an output out of f32. That the
+    /// sums of 16-bit weights fit is not checked here: it is proved where a network is quantised.
     ///
     /// # Errors
     /// Every variant of [`NetworkError`]; the length is checked before values.
@@ -100,7 +101,7 @@ impl<'a, L: Layout> Network<'a, L> {
         Ok(network)
     }
 
-    /// As [`try_new`](Self::try_new), without the pass over all values: for a block that passed it before.
+    /// Makes a network after checking the length alone, for a block whose values were checked before.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "a network is large to hand over")]
     pub(crate) fn with_length_checked(
@@ -118,27 +119,27 @@ impl<'a, L: Layout> Network<'a, L> {
         Ok(Self { block, layout: PhantomData })
     }
 
-    /// Words of the block of a network of this shape.
+    /// Number of words in the block of a network of this shape, with an affine tail or without.
     #[must_use]
     #[inline]
     pub fn block_words(shape: Shape, affine: bool) -> usize {
         L::block_words(shape, affine)
     }
 
-    /// The network's sizes.
+    /// The network's numbers of inputs, centres and outputs.
     #[must_use]
     pub fn shape(&self) -> Shape {
         let Block { inputs, centres, outputs, .. } = self.block;
         Shape { inputs, centres, outputs }
     }
 
-    /// Whether there is an affine tail.
+    /// Whether the network has an affine tail.
     #[must_use]
     pub fn has_affine_tail(&self) -> bool {
         self.block.affine
     }
 
-    /// All of the network's words.
+    /// All words of the network.
     #[must_use]
     pub fn block(&self) -> &'a [u32] {
         self.block.words
@@ -152,7 +153,7 @@ impl<'a, L: Layout> Network<'a, L> {
         &self.block
     }
 
-    /// The network's parameters.
+    /// The network's parameters, cut from its block.
     #[must_use]
     pub fn parameters(&self) -> L::Parameters<'a> {
         L::parameters(self)
@@ -195,7 +196,7 @@ impl<'a, L: Layout> Network<'a, L> {
         if let (Ok(reading), Ok(output)) = (reading.try_into(), (&mut *output).try_into())
             && self.suits_one_group()
         {
-            // SAFETY: the network suits one group.
+            // SAFETY: the network has 18 inputs and 18 outputs, as `suits_one_group` has checked.
             return unsafe { L::routine(self, Inputs::Readings(reading), output) };
         }
         self.scale(reading, scaled);
@@ -203,7 +204,7 @@ impl<'a, L: Layout> Network<'a, L> {
         Finite::Unknown
     }
 
-    /// Infers groups of 18 outputs from one row of readings.
+    /// Infers groups of 18 outputs from one row of inputs by an assembly routine.
     ///
     /// # Safety
     /// The network has 18 inputs, and 18 outputs for each of `groups`.
@@ -217,14 +218,14 @@ impl<'a, L: Layout> Network<'a, L> {
     ) -> Finite {
         let inputs = Inputs::Readings(reading);
         match groups {
-            // SAFETY: the caller vouches for the sizes, and there is one group.
+            // SAFETY: the caller has checked the sizes, and there is one group.
             [output] => unsafe { L::routine(self, inputs, output) },
-            // SAFETY: the caller vouches for the sizes.
+            // SAFETY: the caller has checked the sizes.
             groups => unsafe { L::array_routine(self, inputs, groups) },
         }
     }
 
-    /// Infers `output` from `scaled` inputs, which are used up.
+    /// Infers `output` from `scaled` inputs, which are overwritten.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "callers rely on it for constant lengths")]
     pub(crate) fn infer_scaled(&self, scaled: &mut [f32], output: &mut [f32]) {
@@ -232,14 +233,14 @@ impl<'a, L: Layout> Network<'a, L> {
         if let (Ok(scaled), Ok(output)) = ((&*scaled).try_into(), (&mut *output).try_into())
             && self.suits_one_group()
         {
-            // SAFETY: the network suits one group.
+            // SAFETY: the network has 18 inputs and 18 outputs, as `suits_one_group` has checked.
             unsafe { L::routine(self, Inputs::Scaled(scaled), output) };
             return;
         }
         L::infer_scaled_in_rust(self, scaled, output);
     }
 
-    /// Infers `output` from `scaled` inputs by the twin, with code of its own for the usual sizes.
+    /// Infers `output` from `scaled` inputs by the compiled twin, with separate code for the usual sizes.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "for callers that are not inlined themselves")]
     pub(super) fn infer_scaled_by_twin(&self, scaled: &mut [f32], output: &mut [f32]) {

@@ -1,19 +1,19 @@
-//! What the parameters of every format share: sizes, faults, and the cutting of blocks.
+//! Parts shared by all formats: the shape of a network, its errors, and cutting arrays from a block.
 
 use crate::scale::{HALF_RANGE, UNITS};
 
-/// The sizes of one network.
+/// Numbers of inputs, centres and outputs of one network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shape {
-    /// Readings taken in.
+    /// Number of inputs: readings, or features of a projection.
     pub inputs: usize,
-    /// Centres, K.
+    /// Number of centres K.
     pub centres: usize,
-    /// Quantities given out.
+    /// Number of outputs.
     pub outputs: usize,
 }
 
-/// Why parameters do not make a network, or why a buffer does not fit one.
+/// Why parameters make no network, or why a buffer does not fit one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum NetworkError {
     /// A dimension is zero.
@@ -22,43 +22,43 @@ pub enum NetworkError {
     /// An array has the wrong number of elements.
     #[error("{what} has {found} elements; the network's shape asks for {expected}")]
     Length {
-        /// The array.
+        /// Name of the array.
         what: &'static str,
-        /// Elements it must have.
+        /// Number of elements that it must have.
         expected: usize,
-        /// Elements it has.
+        /// Number of elements that it has.
         found: usize,
     },
     /// A parameter is NaN or infinite.
     #[error("{what} holds a number that is not finite")]
     NotFinite {
-        /// The array.
+        /// Name of the array.
         what: &'static str,
     },
     /// A width is zero, negative or without bound: its decay 1/(2σ²) is not a positive number.
     #[error("width of centre {centre} is not a positive finite number")]
     InvalidWidth {
-        /// Which decay, from 0.
+        /// Index of the decay, from 0.
         centre: usize,
     },
     /// An input's 1/(maximum − minimum) is negative.
     #[error("input {input} has a negative span")]
     NegativeSpan {
-        /// Which input, from 0.
+        /// Index of the input, from 0.
         input: usize,
     },
-    /// Centres, widths and inputs do not go together: an exponent could leave the range of its format.
+    /// The exponent of a centre could leave the range of its format for some input.
     #[error("the exponent of centre {centre} can leave the range that the format computes with")]
     ExponentOutOfRange {
-        /// Which centre, from 0.
+        /// Index of the centre, from 0.
         centre: usize,
     },
-    /// More inputs than the format can add up.
+    /// There are more inputs than the format can add up.
     #[error("{found} inputs; the format holds at most {most}")]
     TooManyInputs {
-        /// The most that there may be.
+        /// Largest number of inputs that the format allows.
         most: usize,
-        /// How many there are.
+        /// Number of inputs found.
         found: usize,
     },
 }
@@ -67,7 +67,7 @@ pub enum NetworkError {
 pub(crate) struct Cut<'a>(pub &'a [u32]);
 
 impl<'a> Cut<'a> {
-    /// The next `length` words; none if there are fewer.
+    /// Cuts the next `length` words; an empty slice if there are fewer.
     pub(super) fn words(&mut self, length: usize) -> &'a [u32] {
         let (head, tail) = self.0.split_at_checked(length).unwrap_or_default();
         self.0 = tail;
@@ -91,7 +91,7 @@ pub(super) fn check_length<T>(
     }
 }
 
-/// Readings in units from the middle of the training range, not clamped yet.
+/// Converts readings to units counted from the middle of the training range, not clamped yet.
 pub(super) fn scale_about(midpoint: &[f32], per_unit: &[f32], reading: &[f32], scaled: &mut [f32]) {
     let limits = midpoint.iter().zip(per_unit);
     for ((x, &r), (&midpoint, &per_unit)) in scaled.iter_mut().zip(reading).zip(limits) {
@@ -99,7 +99,8 @@ pub(super) fn scale_about(midpoint: &[f32], per_unit: &[f32], reading: &[f32], s
     }
 }
 
-/// Lowest and highest reading from the middle of the range and [`UNITS`](crate::scale::UNITS) in one unit.
+/// Lowest and highest reading, computed from the middle of the training range and the number of
+/// [`UNITS`](crate::scale::UNITS) in one unit of the reading.
 pub(super) fn range_about(midpoint: Option<&f32>, per_unit: Option<&f32>) -> [f32; 2] {
     let (Some(&midpoint), Some(&per_unit)) = (midpoint, per_unit) else { return [f32::NAN; 2] };
     let half = if per_unit > 0.0 { 0.5 / HALF_RANGE * UNITS / per_unit } else { 0.0 };

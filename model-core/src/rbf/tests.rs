@@ -9,7 +9,7 @@ use proptest::prelude::*;
 
 const SHAPE: Shape = Shape { inputs: 5, centres: 3, outputs: 2 };
 
-/// Owned parameters to borrow from.
+/// Parameters that own their numbers, to borrow from.
 struct Sample {
     input_minimum: Vec<f32>,
     input_per_span: Vec<f32>,
@@ -54,7 +54,7 @@ fn infer<E: ExpKernel>(network: &Network<'_>, reading: &[f32; 5]) -> [f32; 2] {
     output
 }
 
-/// The formula of the module's documentation, in f64.
+/// Outputs by the formula of the module's documentation, in f64.
 fn reference(p: &Parameters<'_>, shape: Shape, reading: &[f32]) -> Vec<f64> {
     let x: Vec<f64> = (0..shape.inputs)
         .map(|i| {
@@ -158,7 +158,7 @@ fn inference_from_scaled_inputs_is_the_rest_of_inference_bit_for_bit() {
 }
 
 proptest! {
-    /// Sizes known at run time or at compile time: the same bits.
+    /// Inference gives the same bits with sizes known at run time and at compile time.
     #[test]
     fn both_entries_agree_bit_for_bit(reading in prop::array::uniform5(-1e3_f32..1e3)) {
         let sample = Sample::new();
@@ -169,7 +169,7 @@ proptest! {
         prop_assert_eq!(dynamic.map(f32::to_bits), fixed.map(f32::to_bits));
     }
 
-    /// The clamp keeps any finite reading within what the weights can produce.
+    /// The clamp keeps the outputs of any finite reading within a bound from the weights.
     #[test]
     fn output_is_bounded_for_any_finite_reading(
         reading in prop::array::uniform5(prop::num::f32::NORMAL | prop::num::f32::ZERO),

@@ -28,7 +28,7 @@ impl Source {
             let d2: f64 = x.iter().zip(c).map(|(x, c)| (x - c).powi(2)).sum();
             *h = (-d2 / (2.0 * self.width.powi(2))).exp();
         }
-        // Sum of twelve uniforms: near enough to normal for a test.
+        // The sum of twelve uniforms is close enough to normal for a test.
         let normal = (0..12).map(|_| uniform(&mut self.random)).sum::<f64>() - 6.0;
         (h, (6.0 * t).sin() + noise * normal)
     }

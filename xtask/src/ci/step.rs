@@ -1,4 +1,4 @@
-//! One step of CI: a command whose output is kept until it ends, because others run beside it.
+//! One step of CI: a command whose output is kept until it ends, because others run at the same time.
 
 use std::fs::{self, File};
 use std::path::Path;
@@ -7,27 +7,27 @@ use std::time::{Duration, Instant};
 
 use crate::process::Outcome;
 
-/// What begins the line, of a program of this project or of cargo, that says why it failed.
+/// Start of the line in which cargo, or a program of this project, says why it failed.
 const CAUSE: &str = "error: ";
 
-/// What is to be run.
+/// A step to be run.
 pub struct Step {
     pub name: &'static str,
     pub command: Command,
 }
 
-/// What became of a step.
+/// A step that has ended, with its outcome.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Ended {
     pub name: &'static str,
     pub time: Duration,
     pub outcome: Outcome,
-    /// All that it wrote.
+    /// Everything that the step printed.
     pub output: String,
 }
 
 impl Step {
-    /// Runs it to its end. What it writes stands in a file in `directory` meanwhile.
+    /// Runs the step to its end. Its output goes to a file in `directory` meanwhile.
     pub fn run(mut self, directory: &Path) -> Ended {
         let start = Instant::now();
         let log = directory.join(format!("{}.log", self.name));
@@ -45,7 +45,7 @@ impl Step {
     }
 }
 
-/// Whether the command succeeds, whose output goes into `log`.
+/// Runs `command` with its output in the file `log`; returns whether it succeeds.
 fn into_file(command: &mut Command, log: &Path) -> Outcome<bool> {
     let failed = |cause: std::io::Error| format!("{}: {cause}", log.display());
     let file = File::create(log).map_err(failed)?;
@@ -56,7 +56,7 @@ fn into_file(command: &mut Command, log: &Path) -> Outcome<bool> {
     Ok(status.success())
 }
 
-/// From the last cause that is named to the end.
+/// The output from the last cause of a failure to the end.
 fn cause(output: &str) -> Option<&str> {
     let start = output.rfind(&format!("\n{CAUSE}")).map(|at| at + 1);
     let start = start.or(output.starts_with(CAUSE).then_some(0))?;

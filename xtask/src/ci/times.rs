@@ -1,10 +1,10 @@
-//! The file of accepted times: what each step of CI takes on the reference machine.
+//! The file of accepted times, which each step of CI takes on the reference machine.
 
 use std::time::Duration;
 
 use crate::process::Outcome;
 
-/// How many times its accepted time a step may take before it is pointed out.
+/// Multiple of its accepted time that a step may take without a warning.
 const SLOW: f64 = 2.0;
 
 /// Steps and their accepted times.
@@ -12,10 +12,10 @@ const SLOW: f64 = 2.0;
 pub struct Times<'a>(Vec<(&'a str, Duration)>);
 
 impl<'a> Times<'a> {
-    /// Reads `name seconds`, one step a line; `#` starts a comment.
+    /// Parses lines of `name seconds`, one for each step; `#` starts a comment.
     ///
     /// # Errors
-    /// A line is not understood: which.
+    /// The number of a line that cannot be parsed.
     pub fn parse(text: &'a str) -> Outcome<Self> {
         let mut times = Vec::new();
         for (number, line) in (1..).zip(text.lines()) {
@@ -35,7 +35,7 @@ impl<'a> Times<'a> {
         Ok(Self(times))
     }
 
-    /// The steps, in the file's order.
+    /// Names of the steps, in the file's order.
     #[cfg(test)]
     pub fn names(&self) -> Vec<&'a str> {
         self.0.iter().map(|(name, _)| *name).collect()
@@ -53,7 +53,7 @@ impl<'a> Times<'a> {
         }
     }
 
-    /// What to say of a step that takes much longer than accepted.
+    /// Warning about a step that takes much longer than accepted.
     pub fn warning(&self, name: &str, time: Duration) -> Option<String> {
         let ratio = self.ratio(name, time).filter(|ratio| *ratio > SLOW)?;
         Some(format!("{name} took {ratio:.1} times its accepted time"))

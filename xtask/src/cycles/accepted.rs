@@ -1,4 +1,4 @@
-//! The figures that were accepted: a file of data, and tables for people made from it.
+//! The accepted figures: a file of data, and tables in a document made from it.
 
 use super::figures::{Figure, Scope};
 use super::regions::Count;
@@ -8,35 +8,35 @@ use crate::process::Outcome;
 /// The first line of the data.
 const HEAD: &str = "compiler,kernel,centres,affine,scope,instructions,cycles";
 
-/// The heading that the tables stand under, in a document, to its end.
+/// Heading in the document, behind which the tables go to its end.
 const HEADING: &str = "## Figures\n";
 
-/// By how much cycles may differ, in per cent, with the compiler that figures were accepted of: the model may learn,
-/// instructions may not change.
+/// Largest difference of cycles in per cent, with the compiler of the accepted figures. The model of the processor
+/// may be improved; instructions may not change.
 const TOLERANCE_PERCENT: u64 = 1;
 
-/// By how many per cent cycles may exceed what was accepted of another compiler. Fewer are no fault.
+/// Largest excess of cycles in per cent over the accepted figures of another compiler. Fewer cycles are no fault.
 pub const OTHER_COMPILERS_PERCENT: u64 = 2;
 
-/// Figures by compiler, each in the order of its measurement.
+/// Accepted figures by compiler, each in the order of its measurement.
 #[derive(Debug, PartialEq, Eq, Default)]
 pub struct Accepted(Vec<(String, Vec<Figure>)>);
 
-/// The figures that a compiler's are held to.
+/// The accepted figures that a compiler's are compared with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Reference<'a> {
-    /// The compiler that they were accepted of.
+    /// Compiler of the accepted figures.
     pub compiler: &'a str,
     pub figures: &'a [Figure],
-    /// Whether that is the compiler in use.
+    /// Whether this is the compiler in use.
     pub is_own: bool,
 }
 
 impl Accepted {
-    /// Reads the data.
+    /// Parses the file of accepted figures.
     ///
     /// # Errors
-    /// A line is not understood: which.
+    /// The number of a line that cannot be parsed.
     pub fn parse(data: &str) -> Outcome<Self> {
         let mut lines = data.lines();
         if lines.next() != Some(HEAD) {
@@ -50,7 +50,7 @@ impl Accepted {
         Ok(accepted)
     }
 
-    /// The data.
+    /// The contents of the file of accepted figures.
     pub fn data(&self) -> String {
         let lines = self.0.iter().flat_map(|(compiler, figures)| {
             figures.iter().map(move |figure| {
@@ -63,7 +63,8 @@ impl Accepted {
         format!("{HEAD}\n{}", lines.collect::<String>())
     }
 
-    /// What `compiler` is held to: its own figures, else the first other's; `None` if there are none at all.
+    /// The figures that `compiler` is compared with: its own, else the first other's; `None` if there are none at
+    /// all.
     pub fn reference(&self, compiler: &str) -> Option<Reference<'_>> {
         let compiler = in_csv(compiler);
         let own = self.0.iter().find(|(name, _)| *name == compiler);
@@ -71,7 +72,7 @@ impl Accepted {
         Some(Reference { compiler: name, figures, is_own: own.is_some() })
     }
 
-    /// Puts `figures` in the place of those for `compiler`.
+    /// Replaces the figures of `compiler` by `figures`.
     pub fn replace(&mut self, compiler: &str, figures: &[Figure]) {
         *self.of_mut(&in_csv(compiler)) = figures.to_vec();
     }
@@ -84,10 +85,10 @@ impl Accepted {
         &mut self.0[at].1
     }
 
-    /// `document` with the tables of these figures, and nothing behind them.
+    /// The `document` with the tables of these figures at its end.
     ///
     /// # Errors
-    /// It has no place for them.
+    /// The document does not have the heading of the tables.
     pub fn in_document(&self, document: &str) -> Outcome<String> {
         let start = document.find(HEADING).ok_or(format!("it lacks {}", HEADING.trim()))?;
         let tables = self
@@ -98,7 +99,7 @@ impl Accepted {
     }
 }
 
-/// No comma may stand in a field.
+/// The compiler's name as a field of a CSV file, in which no comma may stand.
 fn in_csv(compiler: &str) -> String {
     compiler.replace(',', ";")
 }
@@ -122,7 +123,7 @@ fn parse(line: &str) -> Option<(&str, Figure)> {
     Some((compiler, Figure { kernel, centres, affine, scope: Scope::named(scope)?, count }))
 }
 
-/// What `measured` differs in from what was accepted, by more than it may, in words.
+/// Descriptions of all figures in `measured` that differ from the accepted ones by more than they may.
 pub fn differences(reference: &Reference<'_>, measured: &[Figure]) -> Vec<String> {
     let accepted = reference.figures;
     let difference = if reference.is_own { difference } else { excess };
@@ -159,7 +160,7 @@ fn excess(then: Count, now: Count) -> Option<String> {
     exceeds.then(|| format!("{} cycles, {} of the other compiler", now.cycles, then.cycles))
 }
 
-/// The largest parts, in per cent, by which cycles are below and above those accepted.
+/// Largest differences of cycles in per cent, below and above the accepted ones.
 pub fn range_percent(reference: &Reference<'_>, measured: &[Figure]) -> [f64; 2] {
     let pairs = measured.iter().filter_map(|now| {
         let then = reference.figures.iter().find(|then| then.is_of(now))?;

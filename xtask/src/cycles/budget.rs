@@ -1,8 +1,8 @@
-//! What decoding may cost at most, whatever the compiler.
+//! Budgets: the most cycles that decoding may take, with any compiler.
 
 use super::figures::{Figure, Scope};
 
-/// Kernel, K, scope, model cycles without an affine tail.
+/// Budgets: kernel, K, scope, and cycles of a model without an affine tail.
 const BUDGETS: [(&str, u64, Scope, u64); 7] = [
     ("fixed16", 16, Scope::Inference, 1220),
     ("fixed16", 64, Scope::Inference, 4120),
@@ -10,17 +10,17 @@ const BUDGETS: [(&str, u64, Scope, u64); 7] = [
     ("f32", 16, Scope::Inference, 2600),
     ("f32", 64, Scope::Inference, 9300),
     ("f32", 256, Scope::Inference, 36_500),
-    // 0.2 ms at 168 MHz
+    // This is 0.2 ms at 168 MHz.
     ("fixed16", 64, Scope::Frame, 33_600),
 ];
 
-/// Of one power of two, in the kernel that has a loop for them.
+/// Budget in cycles of one power of two, in the number format that has a loop for them.
 const EXPONENTIAL: u64 = 32;
 
-/// Of a frame whose rows are all at rest, with whatever kernel: a tenth of the last line above.
+/// Budget in cycles of a frame whose rows are all at rest, in any number format: a tenth of that of a frame.
 const RESTING_FRAME: u64 = 3360;
 
-/// What a figure may be.
+/// Budget of a figure in cycles; `None` if it has none.
 fn budget(figure: &Figure) -> Option<u64> {
     if figure.affine {
         return None;
@@ -36,7 +36,7 @@ fn budget(figure: &Figure) -> Option<u64> {
     BUDGETS.iter().find(of).map(|(.., cycles)| *cycles)
 }
 
-/// What exceeds its budget, in words.
+/// Descriptions of all figures that exceed their budgets.
 pub fn exceeded(figures: &[Figure]) -> Vec<String> {
     let over = |figure: &Figure| {
         let allowed = budget(figure).filter(|allowed| figure.count.cycles > *allowed)?;

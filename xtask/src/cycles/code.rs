@@ -16,17 +16,17 @@ pub struct Code {
     symbols: HashMap<String, Symbol>,
 }
 
-/// Where a symbol's code or data lie.
+/// Address and length of a symbol's code or data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Symbol {
     address: u32,
-    /// Bytes; none where the image does not say.
+    /// Length in bytes; 0 if the image does not say.
     length: u32,
     is_function: bool,
 }
 
 impl Code {
-    /// That of the ELF file at `elf`.
+    /// Reads the code of the ELF file at `elf`.
     pub fn read(elf: &Path) -> Outcome<Self> {
         let failed = |cause: String| format!("{}: {cause}", elf.display());
         let bytes = fs::read(elf).map_err(|cause| failed(cause.to_string()))?;
@@ -36,7 +36,7 @@ impl Code {
             let data = segment.data().map_err(|cause| failed(cause.to_string()))?;
             segments.push((segment.address() as u32, data.to_owned()));
         }
-        // The lowest bit of a function's address says that it is Thumb code.
+        // The lowest bit of a function's address only marks Thumb code.
         let of_file = |symbol: object::Symbol<'_, '_>| Symbol {
             address: symbol.address() as u32 & !1,
             length: symbol.size() as u32,
@@ -57,7 +57,7 @@ impl Code {
         Self { segments, symbols: HashMap::new() }
     }
 
-    /// The same with a symbol.
+    /// Adds a symbol.
     #[cfg(test)]
     pub fn with_symbol(mut self, name: &str, address: u32, length: u32) -> Self {
         self.symbols.insert(name.to_owned(), Symbol { address, length, is_function: true });
@@ -70,7 +70,7 @@ impl Code {
         found.ok_or_else(|| format!("the image has no symbol {symbol}"))
     }
 
-    /// Names of functions, and where their code lies.
+    /// Names of functions, with the addresses of their code.
     pub fn functions(&self) -> impl Iterator<Item = (&str, Range<u32>)> {
         let range = |symbol: &Symbol| symbol.address..symbol.address.saturating_add(symbol.length);
         let functions = self.symbols.iter().filter(|(_, symbol)| symbol.is_function);
@@ -80,7 +80,7 @@ impl Code {
     /// The instruction at `address`.
     ///
     /// # Errors
-    /// There is no code, or none that the decoder knows: its address and bytes.
+    /// Address and bytes, if there is no code, or none that the decoder knows.
     pub fn instruction(&self, address: u32) -> Outcome<Instruction> {
         let first = self
             .halfword(address)

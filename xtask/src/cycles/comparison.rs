@@ -1,34 +1,34 @@
-//! A model of one's own against the figures that were accepted of models of its kind.
+//! Comparison of a user's own model with the accepted figures of such models.
 
 use super::accepted::OTHER_COMPILERS_PERCENT;
 use super::figures::{Figure, Scope};
 use super::regions::Count;
 
-/// By how much figures may differ, in per cent: instructions of [`DATA_DEPENDENT`], and cycles.
+/// Largest difference in per cent of cycles, and of instructions of [`DATA_DEPENDENT`] kernels.
 const TOLERANCE_PERCENT: u64 = 1;
 
 /// Kernels whose exponentials branch by their arguments: the first one only for activations below e⁻⁸⁷, which
-/// take narrow widths. The others execute the same instructions whatever the model's numbers and the readings,
-/// but for [`CLAMPING`].
+/// occur with narrow widths. All other kernels execute the same instructions for any model and any readings,
+/// except those in [`CLAMPING`].
 const DATA_DEPENDENT: [&str; 3] = ["f32-direct", "f32-direct-libm", "f32-direct-micromath"];
 
-/// Kernels that look at all readings of a row again if one is to be clamped. That may be the reading that wakes
-/// a row of the awake frame: it is beyond the range of training of models that saw little noise.
+/// Kernels that check all readings of a row again if one is clamped. In the awake frame that can be the reading
+/// that touches a row: it is beyond the training range of models that were trained with little noise.
 const CLAMPING: [&str; 2] = ["f32", "fixed16"];
 
-/// What that takes at most, a row.
+/// Largest cost of clamping, for a row.
 const CLAMPED_ROW: Count = Count { instructions: 60, cycles: 90 };
 
-/// Rows of the frame.
+/// Number of rows of a frame.
 const ROWS: u64 = 8;
 
 /// A figure and the accepted one of the same kernel, K, tail and scope.
 pub type Pair<'f> = (&'f Figure, &'f Figure);
 
-/// What of `measured` can be compared, with what was `accepted`.
+/// The figures of `measured` that can be compared, each with the `accepted` one.
 ///
-/// Left out are kernels that are not the firmware's: they find each row's network in the blob anew, so that
-/// their frames depend on how many networks there are.
+/// Compiled twins are left out: they search each row's network in the blob for every frame, so that their cost
+/// depends on the number of networks.
 pub fn of_model<'f>(accepted: &'f [Figure], measured: &'f [Figure]) -> Vec<Pair<'f>> {
     let is_firmwares = |figure: &&Figure| !figure.kernel.ends_with("-portable");
     let pair = |now| Some((now, accepted.iter().find(|then| then.is_of(now))?));
@@ -64,8 +64,8 @@ pub fn table(pairs: &[Pair<'_>]) -> String {
     )
 }
 
-/// What differs by more than the model's numbers explain, in words. If the figures are another compiler's, cycles
-/// alone are compared, and fewer are no fault.
+/// Descriptions of figures that differ by more than the model's numbers explain. With another compiler's figures,
+/// only cycles are compared, and fewer are no fault.
 pub fn beyond(pairs: &[Pair<'_>], other_compiler: bool) -> Vec<String> {
     let apart = |(now, then): &Pair<'_>| {
         let [mut instructions, mut cycles] = allowances(then);
@@ -87,12 +87,12 @@ pub fn beyond(pairs: &[Pair<'_>], other_compiler: bool) -> Vec<String> {
     pairs.iter().filter_map(apart).collect()
 }
 
-/// How many instructions, and cycles, a figure may be below and above the accepted one.
+/// Numbers of instructions, and of cycles, by which a figure may be below and above the accepted one.
 fn allowances(accepted: &Figure) -> [[u64; 2]; 2] {
     let Count { instructions, cycles } = accepted.count;
     let part = |count: u64| (count * TOLERANCE_PERCENT).div_ceil(100);
     let is_one_of = |kernels: &[&str]| kernels.contains(&accepted.kernel.as_str());
-    // At rest nothing is inferred.
+    // Rows at rest are skipped, so that nothing is clamped.
     let rests = matches!(accepted.scope, Scope::RestingFrame | Scope::ArrayRestingFrame);
     let varies = !rests && is_one_of(&DATA_DEPENDENT);
     let instructions = if varies { part(instructions) } else { 0 };
@@ -151,7 +151,7 @@ mod tests {
             let measured = [figure("fixed16", Scope::Frame, instructions, cycles)];
             !beyond(&of_model(&accepted, &measured), true).is_empty()
         };
-        // One per cent of the model, two of the compiler.
+        // One per cent is for the model, two for the compiler.
         assert!(!is_beyond(1500, 2060) && !is_beyond(10, 20));
         assert!(is_beyond(1000, 2061));
     }

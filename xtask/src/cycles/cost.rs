@@ -1,32 +1,34 @@
-//! What an instruction costs on a Cortex-M4 with floating point whose memory never waits, by the
-//! Cortex-M4 Technical Reference Manual (ARM DDI 0439D): tables 3-1, 3-2 and 7-1, section 3.3.2.
+//! Cost of an instruction on a Cortex-M4 with floating point whose memory never waits.
 //!
-//! `docs/cycles.md` has this as a table, with its sources, and what is taken where the manual leaves
-//! a choice: the larger number. Not checked against silicon.
+//! The source is the Cortex-M4 Technical Reference Manual (ARM DDI 0439D): tables 3-1, 3-2 and 7-1, section 3.3.2.
+//! Where the manual gives a range, the larger number is taken. `docs/cycles.md` has this as a table, with its
+//! sources. It was not checked on hardware.
 
 use super::thumb::{Class, Instruction};
 
-/// P, the cycles to refill the pipeline after a branch: 1 to 3 by the alignment and width of the
-/// target, and whether its address is known early.
+/// Cycles P to refill the pipeline after a branch: 1 to 3, depending on the alignment and width of the target,
+/// and on how early its address is known.
 const REFILL: u64 = 2;
 
-/// A load to the program counter: "at least five cycles" (3.3.2).
+/// Cycles of a load to the program counter: "at least five cycles" (3.3.2).
 const LOAD_TO_PC: u64 = 5;
 
-/// TBB, TBH: "at least six cycles" (3.3.2).
+/// Cycles of TBB and TBH: "at least six cycles" (3.3.2).
 const TABLE_BRANCH: u64 = 6;
 
-/// SDIV, UDIV: 2 to 12, by the operands.
+/// Cycles of SDIV and UDIV: 2 to 12, depending on the operands.
 const DIVIDE: u64 = 12;
 
-/// MRS, MSR, CPS: 1 or 2.
+/// Cycles of MRS, MSR and CPS: 1 or 2.
 const SPECIAL: u64 = 2;
 
-/// VDIV, VSQRT; fewer if integer instructions alone follow.
+/// Cycles of VDIV and VSQRT; fewer if only integer instructions follow.
 const FP_DIVIDE: u64 = 14;
 
-/// Cycles of `instruction` behind `previous`, the one executed before it; `branched` if another came
-/// next than the one that lies behind it. `None`: it has no cost of its own ([`Class::Unpriced`]).
+/// Cycles of `instruction` when `previous` was executed directly before it.
+///
+/// `branched` says whether the next instruction executed is not the one behind it in memory. `None` if the
+/// instruction has no cost of its own ([`Class::Unpriced`]).
 pub fn cycles(
     instruction: &Instruction,
     previous: Option<&Instruction>,
@@ -54,9 +56,10 @@ pub fn cycles(
     Some(own + previous.map_or(0, |previous| stall(previous, instruction)))
 }
 
-/// Whether the address phase of `instruction` overlaps the data phase of `previous`: a load, and
-/// then a load or store whose address does not wait for what was loaded. Neither may change its
-/// base, and nothing pipelines behind a store.
+/// Whether the address phase of `instruction` overlaps the data phase of `previous`.
+///
+/// This needs a load, and then a load or store whose address does not depend on the loaded value. Neither may
+/// change its base, and nothing pipelines behind a store.
 fn pipelines(previous: &Instruction, instruction: &Instruction) -> bool {
     let plain = |class| class == Class::Load { writes_base: false };
     plain(previous.class)
@@ -66,7 +69,7 @@ fn pipelines(previous: &Instruction, instruction: &Instruction) -> bool {
 
 /// Cycles that `instruction` waits for the result of `previous`.
 fn stall(previous: &Instruction, instruction: &Instruction) -> u64 {
-    // An address that data processing has just computed: "there is no forwarding path" (3.3.2).
+    // For an address that data processing has just computed, "there is no forwarding path" (3.3.2).
     let address =
         !matches!(previous.class, Class::Load { .. }) && previous.result & instruction.address != 0;
     // Arithmetic takes "one cycle longer if [its] result is consumed by the following

@@ -1,4 +1,4 @@
-//! What was measured: from the counts of regions and what the image says they are.
+//! Measured figures, made from the counts of regions and their names in the image's log.
 
 use super::regions::{Count, Region};
 use crate::process::Outcome;
@@ -6,32 +6,32 @@ use crate::process::Outcome;
 /// Regions whose cost is known, in the order in which the image runs them.
 const CALIBRATION: [&str; 2] = ["calibration empty", "calibration loop"];
 
-/// What an empty region costs: the call at its end, a branch taken.
+/// Cost of an empty region: the call at its end, a branch taken.
 const EMPTY: Count = Count { instructions: 1, cycles: 3 };
 
-/// `mov r0, #1000`, then 1000 times `subs` and `bne`: 1 + 1000 + 999·(1 + 2) + 1 cycles.
+/// Cost of `mov r0, #1000`, then 1000 times `subs` and `bne`: 1 + 1000 + 999·(1 + 2) + 1 cycles.
 const LOOP: Count = Count { instructions: 2001, cycles: 3999 };
 
-/// The part of decoding that a figure is of.
+/// Part of decoding whose cost a figure is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scope {
     /// One row's outputs from scaled inputs.
     Inference,
-    /// Of an inference, the powers of two of all centres, where they are a loop of their own.
+    /// Powers of two of all centres in an inference, where they are a separate loop.
     Exponential,
-    /// One row's outputs from readings in ohm.
+    /// One row's outputs from readings in Ω.
     Row,
     /// All rows' outputs from a frame.
     Frame,
-    /// The same behind a gate that finds all rows at rest.
+    /// All rows' outputs behind a gate that finds all rows at rest.
     RestingFrame,
-    /// The same behind a gate that finds all rows awake, each by its last reading.
+    /// All rows' outputs behind a gate that finds all rows awake (not at rest), each by its last reading.
     AwakeFrame,
-    /// A frame by one network for the whole array.
+    /// All rows' outputs by one network for the whole array.
     ArrayFrame,
-    /// The same behind a gate that finds the array at rest.
+    /// All rows' outputs by one network, behind a gate that finds the array at rest.
     ArrayRestingFrame,
-    /// The same behind a gate that finds it awake by its last reading.
+    /// All rows' outputs by one network, behind a gate that finds the array awake by its last reading.
     ArrayAwakeFrame,
 }
 
@@ -48,13 +48,13 @@ impl Scope {
         Self::ArrayAwakeFrame,
     ];
 
-    /// Those that every kernel is measured in, in the image's order.
+    /// Scopes in which every kernel is measured, in the image's order.
     const OF_IMAGE: [Self; 3] = [Self::Inference, Self::Row, Self::Frame];
 
-    /// Those of the gate, behind all kernels': measured with the one that the firmware runs.
+    /// Scopes of the gate, measured after all others, with the kernel that the firmware runs.
     const OF_GATE: [Self; 2] = [Self::RestingFrame, Self::AwakeFrame];
 
-    /// As the image and the accepted figures have it.
+    /// Name of the scope in the image's log and in the accepted figures.
     pub fn name(self) -> &'static str {
         match self {
             Self::Inference => "inference",
@@ -75,11 +75,11 @@ impl Scope {
     }
 }
 
-/// What one kernel costs in one scope with one model.
+/// Cost of one kernel in one scope with one model.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Figure {
     pub kernel: String,
-    /// K.
+    /// Number of centres K.
     pub centres: u64,
     /// Whether the model has an affine tail.
     pub affine: bool,
@@ -88,19 +88,19 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// Whether both are of the same.
+    /// Whether both figures have the same kernel, K, tail and scope.
     pub fn is_of(&self, other: &Self) -> bool {
         let of = |figure: &Self| (figure.centres, figure.affine, figure.scope);
         self.kernel == other.kernel && of(self) == of(other)
     }
 }
 
-/// All that was measured of one kernel and K.
+/// All figures of one kernel and K.
 #[derive(Clone, Copy)]
 pub struct Group<'f>(&'f [Figure]);
 
 impl<'f> Group<'f> {
-    /// The groups in `figures`, which stand kernel by kernel and K by K.
+    /// The groups in `figures`, which must be sorted by kernel and K.
     pub fn of(figures: &'f [Figure]) -> impl Iterator<Item = Self> {
         figures.chunk_by(|a, b| (&a.kernel, a.centres) == (&b.kernel, b.centres)).map(Self)
     }
@@ -119,11 +119,11 @@ impl<'f> Group<'f> {
     }
 }
 
-/// Puts the `counts` of a run's regions together with the names in its `log`; the run's model has a tail if
-/// `affine`. An inference is one without.
+/// Joins the `counts` of a run's regions with the names in its `log`. The run's model has an affine tail if
+/// `affine`; only models without one give figures for [`Scope::Inference`] and [`Scope::Exponential`].
 ///
 /// # Errors
-/// They do not fit one another, or what is known from the start was not counted so.
+/// Counts and names do not fit each other, or a region of known cost was counted otherwise.
 pub fn of_run(log: &str, counts: &[Region], affine: bool) -> Outcome<Vec<Figure>> {
     let named = |what: &'static str| {
         log.lines().filter_map(move |line| line.strip_prefix("INFO ")?.strip_prefix(what))
@@ -185,7 +185,7 @@ pub fn of_run(log: &str, counts: &[Region], affine: bool) -> Outcome<Vec<Figure>
     Ok(figures)
 }
 
-/// The figures of one network for the whole array: a kernel and a scope each.
+/// Figures of one network for the whole array, from names of kernel and scope.
 fn of_array(names: &[&str], counts: &[Region], centres: u64, affine: bool) -> Outcome<Vec<Figure>> {
     let figures = names.iter().zip(counts).map(|(name, count)| {
         let (kernel, scope) = name.split_once(' ')?;
@@ -195,7 +195,7 @@ fn of_array(names: &[&str], counts: &[Region], centres: u64, affine: bool) -> Ou
     figures.collect::<Option<_>>().ok_or_else(|| format!("not understood: {}", names.join(", ")))
 }
 
-/// The figures of the gate, if it was measured.
+/// Figures of the gate, if it was measured.
 fn of_gate(names: &[&str], counts: &[Region], centres: u64, affine: bool) -> Outcome<Vec<Figure>> {
     let kernel = names.first().and_then(|name| name.split(' ').next()).unwrap_or_default();
     let expected = Scope::OF_GATE.map(|scope| format!("{kernel} {}", scope.name()));

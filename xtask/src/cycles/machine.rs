@@ -1,4 +1,4 @@
-//! Runs an image in QEMU, and counts what its regions execute.
+//! Running an image in QEMU, and counting the instructions of its regions.
 
 use std::io::BufReader;
 use std::path::Path;
@@ -16,27 +16,27 @@ use crate::process::Outcome;
 const BEGIN: &str = "region_begin";
 const END: &str = "region_end";
 
-/// What is watched of the image: where `taxel_f32` takes powers of two (`model-core/src/cortex_m4.s`).
+/// Symbols around the code that is watched: the powers of two of `taxel_f32` (`model-core/src/cortex_m4.s`).
 const WATCHED: [&str; 2] = ["taxel_f32_powers", "taxel_f32_powers_end"];
 
-/// Where the image expects a model.
+/// Symbols around the slot in which the image expects a model.
 const SLOT: [&str; 2] = ["_slot_a_start", "_slot_a_end"];
 
-/// No run takes more than half a minute.
+/// Time limit of a run; none takes more than half a minute.
 const LIMIT: Duration = Duration::from_mins(5);
 
-/// What a program did.
+/// Result of running a program.
 pub struct Run {
-    /// What its regions executed, in their order.
+    /// Counts of the program's regions, in their order.
     pub counts: Vec<Region>,
-    /// What it logged.
+    /// Log of the program.
     pub log: String,
 }
 
 /// Runs the image in `elf`, whose code is `code`, with the blob `model` in its first slot.
 ///
 /// # Errors
-/// It does not run to its end, what it executes cannot be costed, or it reports a failure: its log.
+/// The image does not run to its end, an instruction has no known cost, or the image fails; then its log.
 pub fn run(elf: &Path, code: &Code, model: &Path) -> Outcome<Run> {
     let [start, end] = SLOT.map(|symbol| code.symbol(symbol));
     let (start, room) = (start?, end? - code.symbol(SLOT[0])?);

@@ -1,4 +1,4 @@
-//! The models that are measured: of the scene press, as `host-sim train` makes them, in every format.
+//! The models that are measured: trained on the scene `press`, as by `host-sim train`, in every number format.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,10 +10,10 @@ use taxel_learn::ModelBlob;
 use super::training::{self, Wanted};
 use crate::process::Outcome;
 
-/// K.
+/// Numbers of centres K.
 const CENTRES: [usize; 5] = [16, 32, 64, 128, 256];
 
-/// The largest blob that a device's slot holds, the image's like any other.
+/// Largest blob in bytes that a slot holds, in the image as on every device.
 const SLOT_BYTES: usize = 131_072;
 
 /// A model to be measured.
@@ -22,16 +22,18 @@ pub struct Blob {
     pub path: PathBuf,
     /// Whether it has an affine tail.
     pub affine: bool,
-    /// Whether all rows' networks have one format, number of centres, and tail or none.
+    /// Whether all rows' networks have the same format and number of centres, and all or none have a tail.
     pub rows_alike: bool,
 }
 
-/// Trains models of every format and size, of rows and of the whole array, and writes each into `directory`
-/// twice: with its affine tail and without. All rows have the first row's network, so that the largest fits the
-/// image's slot; what does not is left out.
+/// Trains models of every format and size, with a network a row and with one for the whole array. Writes each into
+/// `directory` twice: with its affine tail and without.
+///
+/// All rows get the first row's network, so that the largest model fits the image's slot. A model that does not
+/// fit is left out.
 ///
 /// # Errors
-/// Training fails, or makes another model than it is asked for.
+/// Training fails, or makes another model than requested.
 pub fn train(directory: &Path) -> Outcome<Vec<Blob>> {
     fs::create_dir_all(directory).map_err(|cause| failed(directory, &cause))?;
     let wanted: Vec<Wanted> = Format::ALL
@@ -61,10 +63,10 @@ pub fn train(directory: &Path) -> Outcome<Vec<Blob>> {
     Ok(blobs)
 }
 
-/// The blob at `path` and, if it has an affine tail, the same without it, written into `directory`.
+/// The blob at `path` and, if it has an affine tail, a copy without it, written into `directory`.
 ///
 /// # Errors
-/// It is no sound blob.
+/// The file is not a sound blob.
 pub fn of_file(path: &Path, directory: &Path) -> Outcome<Vec<Blob>> {
     let blob = ModelBlob::read(path).map_err(|cause| cause.to_string())?;
     let model = blob.parse();
@@ -104,14 +106,14 @@ fn is_as_asked(model: &Model<'_>, format: Format, centres: usize) -> Outcome {
     }
 }
 
-/// Which networks the rows have.
+/// Choice of the rows' networks.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Rows {
     AsTheyAre,
     AsTheFirst,
 }
 
-/// The same model with other rows, or without its affine tail.
+/// A blob of the model with other rows, or without its affine tail.
 fn rewritten(model: &Model<'_>, rows: Rows, affine: bool) -> Outcome<Vec<u8>> {
     let count = if rows == Rows::AsTheFirst { 1 } else { model.network_count() };
     let words: Vec<Vec<u32>> =
@@ -134,7 +136,7 @@ fn rewritten(model: &Model<'_>, rows: Rows, affine: bool) -> Outcome<Vec<u8>> {
     encode_to_vec(&parts).map(|bytes| bytes.to_vec()).map_err(|cause| cause.to_string())
 }
 
-/// A network's block, with its tail only if `affine`.
+/// The network's block of words, with its tail only if `affine`.
 fn words(network: &Network<'_>, affine: bool) -> Vec<u32> {
     match network {
         Network::F32Direct(network) => {

@@ -1,35 +1,44 @@
-//! What `cargo xtask cycles` is told.
+//! The options of `cargo xtask cycles`.
 
-/// The command line's options.
+/// Options from the command line.
 #[derive(Debug, PartialEq, Eq, Default)]
 pub struct Options<'a> {
-    /// Print JSON, and nothing else, to stdout.
+    /// Whether to print JSON, and nothing else, to stdout.
     pub json: bool,
-    /// Write the figures that are compared with.
+    /// Whether to write the accepted figures instead of comparing with them.
     pub accept: bool,
-    /// Measure with this blob, and compare with the accepted figures of such models.
+    /// Blob to measure with, and to compare with the accepted figures of such models.
     pub model: Option<&'a str>,
-    /// Show this kernel alone; without a blob, compare with the budgets alone.
+    /// The only kernel to show; without a blob, it is compared with its budget only.
     pub kernel: Option<&'a str>,
 }
 
 impl<'a> Options<'a> {
-    /// `None`: they make no sense, alone or together.
-    pub fn parse(arguments: &[&'a str]) -> Option<Self> {
+    /// Parses the options of the command line.
+    ///
+    /// # Errors
+    /// The option that is unknown or lacks its value, or options that exclude each other.
+    pub fn parse(arguments: &[&'a str]) -> Result<Self, String> {
         let mut options = Self::default();
         let mut arguments = arguments.iter().copied();
         while let Some(argument) = arguments.next() {
+            let mut value = |what: &str| {
+                arguments.next().ok_or_else(|| format!("`{argument}` needs {what} behind it"))
+            };
             match argument {
                 "--json" => options.json = true,
                 "--accept" => options.accept = true,
-                "--model" => options.model = Some(arguments.next()?),
-                "--kernel" => options.kernel = Some(arguments.next()?),
-                _ => return None,
+                "--model" => options.model = Some(value("a file")?),
+                "--kernel" => options.kernel = Some(value("a name")?),
+                _ => return Err(format!("unknown option `{argument}`")),
             }
         }
         // Only all figures together can be accepted.
-        let partial = options.model.is_some() || options.kernel.is_some();
-        (!(options.accept && partial)).then_some(options)
+        let part = options.model.map(|_| "--model").or(options.kernel.map(|_| "--kernel"));
+        if let (true, Some(part)) = (options.accept, part) {
+            return Err(format!("`--accept` needs all figures: leave out `{part}`"));
+        }
+        Ok(options)
     }
 }
 
@@ -38,12 +47,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn options_come_in_any_order_and_part_of_the_figures_cannot_be_accepted() {
+    fn options_come_in_any_order() {
         let model = Options { json: true, model: Some("a.bin"), ..Options::default() };
-        assert_eq!(Options::parse(&["--model", "a.bin", "--json"]), Some(model));
-        assert_eq!(Options::parse(&[]), Some(Options::default()));
-        for nonsense in [&["--model"][..], &["a.bin"], &["--accept", "--kernel", "f32"]] {
-            assert_eq!(Options::parse(nonsense), None, "{nonsense:?}");
+        assert_eq!(Options::parse(&["--model", "a.bin", "--json"]), Ok(model));
+        assert_eq!(Options::parse(&[]), Ok(Options::default()));
+    }
+
+    #[test]
+    fn options_that_make_no_sense_are_named() {
+        for (arguments, named) in [
+            (&["--json", "--jsn"][..], "`--jsn`"),
+            (&["a.bin"], "`a.bin`"),
+            (&["--model"], "`--model`"),
+            (&["--accept", "--kernel", "f32"], "`--kernel`"),
+        ] {
+            let message = Options::parse(arguments).unwrap_err();
+            assert!(message.contains(named), "{message}");
         }
     }
 }

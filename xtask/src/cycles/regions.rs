@@ -1,7 +1,7 @@
-//! Counts what is executed in regions of a program, from the addresses of its instructions.
+//! Counting instructions and cycles in regions of a program, from the addresses of its instructions.
 //!
-//! A region starts where a call of one function returns, and ends where another is called. What
-//! every region costs beyond what stands in it, the call at its end, is the caller's to subtract.
+//! A region starts where a call of one function returns, and ends where another is called. The count of every
+//! region includes the call at its end, which the caller must subtract.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -13,11 +13,11 @@ use super::thumb::Instruction;
 use super::untraced::Untraced;
 use crate::process::Outcome;
 
-/// What was executed.
+/// Number of instructions executed, and their cycles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Count {
     pub instructions: u64,
-    /// By the cost model.
+    /// Cycles by the cost model.
     pub cycles: u64,
 }
 
@@ -28,15 +28,15 @@ impl Count {
     }
 }
 
-/// What was executed in one region.
+/// Counts of one region.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Region {
     pub whole: Count,
-    /// Of it, what lies where [`Regions::watching`] says.
+    /// Count of the part at the addresses of [`Regions::watching`].
     pub watched: Count,
 }
 
-/// Where the program is.
+/// Place of the program, relative to regions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Place {
     Outside,
@@ -45,17 +45,17 @@ enum Place {
     Inside,
 }
 
-/// Counts region after region.
+/// Counter of one region after the other.
 pub struct Regions<'c> {
     code: &'c Code,
-    /// Of the code, what was decoded already.
+    /// Instructions that have been decoded already, by address.
     decoded: HashMap<u32, Instruction>,
     begin: u32,
     end: u32,
     watched: Range<u32>,
     untraced: Untraced,
     place: Place,
-    /// The last address: what it costs depends on the next one.
+    /// Last address executed; its cost depends on the next one.
     pending: Option<u32>,
     previous: Option<Instruction>,
     count: Region,
@@ -63,7 +63,7 @@ pub struct Regions<'c> {
 }
 
 impl<'c> Regions<'c> {
-    /// Regions from the return of the function at `begin` to the call of the one at `end`.
+    /// Makes a counter of regions from the return of the function at `begin` to the call of the one at `end`.
     pub fn new(code: &'c Code, begin: u32, end: u32) -> Self {
         Self {
             code,
@@ -80,22 +80,22 @@ impl<'c> Regions<'c> {
         }
     }
 
-    /// The same, with what lies at the addresses `watched` counted besides.
+    /// Also counts the code at the addresses `watched` separately.
     pub fn watching(self, watched: Range<u32>) -> Self {
         Self { watched, ..self }
     }
 
-    /// The same for a trace without the functions `untraced`, which no region may call.
+    /// Expects a trace without the functions `untraced`, which no region may call.
     pub fn without(self, untraced: Untraced) -> Self {
         Self { untraced, ..self }
     }
 
-    /// A block of code was executed, by its instructions' addresses: all of them, and the last one alone may
-    /// lead elsewhere than to the next.
+    /// Counts a block of code that was executed, given by its instructions' addresses. All of them were executed,
+    /// and only the last one may branch.
     ///
     /// # Errors
-    /// An instruction inside a region cannot be costed, did not lead where it should, or leads to code that is not
-    /// traced.
+    /// An instruction inside a region has no known cost, was not followed by the next one, or leads to code that
+    /// is not traced.
     pub fn execute(&mut self, block: &[u32]) -> Outcome {
         let Some((last, before)) = block.split_last() else { return Ok(()) };
         for address in before {
@@ -119,10 +119,10 @@ impl<'c> Regions<'c> {
         Ok(())
     }
 
-    /// The regions' counts, in their order.
+    /// Ends counting, and returns the regions' counts in their order.
     ///
     /// # Errors
-    /// The program ended within one.
+    /// The program ended within a region.
     pub fn finish(self) -> Outcome<Vec<Region>> {
         if self.place == Place::Outside {
             Ok(self.counted)

@@ -4,7 +4,7 @@ use super::figures::{Figure, Group, Scope};
 use super::regions::Count;
 use std::fmt::Write as _;
 
-/// The clock that times are given for: an STM32F4's at its usual highest.
+/// Clock for which times are given: the usual highest one of an STM32F4.
 const CLOCK_MHZ: f64 = 168.0;
 
 const HEAD: &str = "\
@@ -34,10 +34,10 @@ const ALIGNED_ARRAY_HEAD: &str = concat!(
     "array                     K |    instr.    cycles   168 MHz |     frame   168 MHz\n",
 );
 
-/// What a compiled twin is called after its kernel's name.
+/// Suffix to a kernel's name that names its compiled twin.
 const TWIN: &str = "-portable";
 
-/// Markdown tables: all figures, and what assembly saves. Cycles where nothing else is said.
+/// Markdown tables of all figures, and of what assembly saves. Numbers without a unit are cycles.
 pub fn markdown(figures: &[Figure]) -> String {
     let cell =
         |count: Option<Count>, shown: fn(Count) -> String| count.map_or(String::new(), shown);
@@ -109,7 +109,7 @@ fn microseconds(count: Count) -> String {
     format!("{:.0}", count.cycles as f64 / CLOCK_MHZ)
 }
 
-/// The same with its columns aligned, for a terminal.
+/// Tables of all figures with aligned columns, for a terminal.
 pub fn aligned(figures: &[Figure]) -> String {
     let of_rows = Group::of(figures).filter(|group| {
         group.count(true, Scope::Row).is_some() || group.count(false, Scope::Row).is_some()
@@ -153,7 +153,7 @@ pub fn aligned(figures: &[Figure]) -> String {
     format!("{ALIGNED_HEAD}{}{head}{arrays}", rows.collect::<String>())
 }
 
-/// A list of objects. Kernels' names have nothing in them that JSON would escape.
+/// JSON list of all figures as objects. Kernels' names contain nothing that JSON would escape.
 pub fn json(figures: &[Figure]) -> String {
     let objects: Vec<String> = Group::of(figures)
         .map(|group| {
@@ -194,7 +194,7 @@ pub fn json(figures: &[Figure]) -> String {
 pub mod tests {
     use super::*;
 
-    /// Two kernels, of which one is the other's twin.
+    /// Figures of two kernels, of which one is the other's compiled twin.
     pub fn sample() -> Vec<Figure> {
         let figure = |kernel: &str, affine, scope, n| Figure {
             kernel: kernel.into(),

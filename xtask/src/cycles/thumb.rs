@@ -1,7 +1,7 @@
 //! Decodes Thumb instructions of ARMv7E-M with the single-precision VFPv4, as far as their cost
 //! needs it: the ARMv7-M Architecture Reference Manual (ARM DDI 0403), chapters A5 and A6.
 //!
-//! An encoding that is not known here is refused, never guessed at.
+//! An unknown encoding is rejected, never guessed.
 
 mod branch;
 mod data;
@@ -9,21 +9,21 @@ mod float;
 mod memory;
 mod narrow;
 
-/// Core registers: bit n is Rn.
+/// Set of core registers: bit n is Rn.
 pub type CoreSet = u16;
 
-/// Floating-point registers: bit n is Sn.
+/// Set of floating-point registers: bit n is Sn.
 pub type FpSet = u32;
 
 const SP: u16 = 13;
 const PC: u16 = 15;
 
-/// What the cost of an instruction depends on first.
+/// Class of an instruction, on which its cost mainly depends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Class {
     /// Integer data processing, multiplications of all kinds, hints.
     Data,
-    /// SDIV, UDIV.
+    /// Integer division: SDIV, UDIV.
     Divide,
     /// One register loaded, of any width.
     Load { writes_base: bool },
@@ -31,57 +31,57 @@ pub enum Class {
     Store,
     /// One register stored to base and register, or with the base changed.
     StoreIndexed,
-    /// LDRD, STRD.
+    /// Load or store of two registers: LDRD, STRD.
     Double,
-    /// LDM, STM, PUSH, POP.
+    /// Load or store of several registers: LDM, STM, PUSH, POP.
     Multiple { registers: u32 },
-    /// LDREX, STREX and their kin.
+    /// Exclusive load or store: LDREX, STREX and their variants.
     Exclusive,
     /// A branch to a constant or a register, taken or not.
     Branch,
-    /// TBB, TBH.
+    /// Branch by a table: TBB, TBH.
     TableBranch,
-    /// IT.
+    /// Condition for the next instructions: IT.
     IfThen,
-    /// MRS, MSR, CPS.
+    /// Access to special registers: MRS, MSR, CPS.
     Special,
-    /// DMB, DSB, ISB.
+    /// Barrier: DMB, DSB, ISB.
     Barrier,
     /// Floating-point addition, multiplication, conversion, absolute value, negation.
     FpArithmetic,
     /// Multiplication and addition in one, fused or chained.
     FpMultiplyAccumulate,
-    /// VDIV, VSQRT.
+    /// Floating-point division and square root: VDIV, VSQRT.
     FpDivide,
-    /// Between floating-point registers, constants to them, comparison, VMRS, VMSR.
+    /// Moves between floating-point registers, of constants to them, comparison, VMRS, VMSR.
     FpMove,
-    /// Between core and floating-point registers.
+    /// Moves between core and floating-point registers.
     FpTransfer { registers: u32 },
-    /// VLDR, VSTR, VLDM, VSTM, VPUSH, VPOP, by words.
+    /// Loads and stores of floating-point registers: VLDR, VSTR, VLDM, VSTM, VPUSH, VPOP.
     FpMemory { words: u32 },
-    /// What ends or suspends a program: its cost is not the processor's alone.
+    /// Instructions that end or suspend a program: their cost does not depend on the processor alone.
     Unpriced,
 }
 
-/// What is known of one instruction.
+/// Properties of one instruction, as far as its cost needs them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Instruction {
     /// Length in bytes: 2 or 4.
     pub bytes: u32,
     pub class: Class,
-    /// Core registers that it computes, or loads if it is a [`Class::Load`]; those that are changed
-    /// on the side, as a base is, are left out.
+    /// Core registers that the instruction computes, or loads if it is a [`Class::Load`]. Registers that are
+    /// changed as a side effect, such as a base, are left out.
     pub result: CoreSet,
-    /// Core registers that its address in memory is made of.
+    /// Core registers from which its address in memory is computed.
     pub address: CoreSet,
-    /// Floating-point registers that it gives a value.
+    /// Floating-point registers that the instruction writes.
     pub fp_result: FpSet,
-    /// Floating-point registers that it must have at once; the addend of a multiplication with
-    /// addition comes later, and is left out.
+    /// Floating-point registers that the instruction needs at once. The addend of a multiplication with addition
+    /// is needed later, and is left out.
     pub fp_source: FpSet,
-    /// Whether another instruction than the one behind it may come next.
+    /// Whether another instruction than the next one in memory may be executed next.
     pub may_branch: bool,
-    /// Whether it is a call: BL, BLX.
+    /// Whether the instruction is a call: BL, BLX.
     pub calls: bool,
 }
 
@@ -117,14 +117,14 @@ impl Instruction {
         (list != 0).then(|| Self::new(Class::Multiple { registers: list.count_ones() }))
     }
 
-    /// Gives core register `register` a value.
+    /// Adds core register `register` to the result.
     fn to(mut self, register: u16) -> Self {
         self.result |= 1 << register;
         self.may_branch |= register == PC;
         self
     }
 
-    /// Takes `register` into its address. The program counter costs nothing to have.
+    /// Adds `register` to those of the address. The program counter is left out, because it is always available.
     fn at(mut self, register: u16) -> Self {
         if register != PC {
             self.address |= 1 << register;
@@ -144,8 +144,8 @@ impl Instruction {
     }
 }
 
-/// Decodes the instruction that starts with the halfword `first`; `second` is the one behind it.
-/// `None`: it is not known.
+/// Decodes the instruction that starts with the halfword `first`; `second` is the next halfword. `None` if the
+/// encoding is unknown.
 pub fn decode(first: u16, second: Option<u16>) -> Option<Instruction> {
     if is_wide(first) {
         let instruction = wide(first, second?)?;
@@ -155,12 +155,12 @@ pub fn decode(first: u16, second: Option<u16>) -> Option<Instruction> {
     }
 }
 
-/// Whether an instruction that starts so has two halfwords.
+/// Whether an instruction that starts with the halfword `first` has two halfwords.
 pub fn is_wide(first: u16) -> bool {
     first >= 0xE800
 }
 
-/// A5.3, table A5-9.
+/// Decodes an instruction of two halfwords: A5.3, table A5-9.
 fn wide(first: u16, second: u16) -> Option<Instruction> {
     match first >> 8 {
         0xE8 | 0xE9 if first & 0x40 == 0 => memory::multiple(first, second),
@@ -179,7 +179,7 @@ fn wide(first: u16, second: u16) -> Option<Instruction> {
     }
 }
 
-/// `count` bits of `halfword` from bit `lowest` on.
+/// The `count` bits of `halfword` from bit `lowest` on.
 fn bits(halfword: u16, lowest: u32, count: u32) -> u16 {
     (halfword >> lowest) & ((1 << count) - 1)
 }

@@ -1,6 +1,6 @@
-//! Reads the trace that QEMU writes with `-d exec,nochain,in_asm`, as it comes.
+//! Parsing the trace that QEMU writes with `-d exec,nochain,in_asm`, while it is written.
 //!
-//! QEMU lists a block of code when it translates it, and names it by its address whenever it starts. A block is
+//! QEMU lists a block of code when it translates it, and prints its address whenever the block starts. A block is
 //! executed from its first instruction to its last, and only the last one may branch.
 
 use std::collections::HashMap;
@@ -32,15 +32,16 @@ enum Line {
 #[derive(Default)]
 struct Blocks {
     instructions: HashMap<u32, Vec<u32>>,
-    /// What is being listed.
+    /// Addresses of the block that is being listed.
     listed: Vec<u32>,
 }
 
 impl Blocks {
-    /// What was listed is complete.
+    /// Completes the block that was listed.
     ///
     /// # Errors
-    /// The same address was listed with another length: which of the two is executed is not said.
+    /// A block at the same address was listed with another length: the trace does not say which of them is
+    /// executed.
     fn close(&mut self) -> Outcome {
         let listed = std::mem::take(&mut self.listed);
         let Some(first) = listed.first().copied() else { return Ok(()) };
@@ -63,14 +64,14 @@ impl Blocks {
     }
 }
 
-/// Hands what `trace` tells to `regions`, and gives back the lines that are no trace.
+/// Passes the blocks in `trace` to `regions`, and returns the lines that belong to no trace.
 ///
 /// # Errors
-/// Whatever [`Regions::execute`] says, or the trace cannot be read.
+/// Errors of [`Regions::execute`], or of reading the trace.
 pub fn follow(mut trace: impl BufRead, regions: &mut Regions<'_>) -> Outcome<String> {
     let mut others = String::new();
     let mut blocks = Blocks::default();
-    // The last block: what becomes of it stands in the next line.
+    // The block that was announced last; the next line says whether it started.
     let mut pending = None;
     let mut line = Vec::new();
     loop {
@@ -113,7 +114,7 @@ fn parse(line: &[u8]) -> Line {
     }
 }
 
-/// A number of up to 16 digits that fits an address.
+/// Parses a hexadecimal number of up to 16 digits that fits an address.
 fn hexadecimal(digits: &[u8]) -> Option<u32> {
     if digits.is_empty() || digits.len() > 16 {
         return None;
@@ -144,7 +145,7 @@ mod tests {
         assert_eq!(parse(b"qemu-system-arm: a warning\n"), Line::Other);
     }
 
-    /// 0x10 begin: bx lr; 0x20: adds r0, #1; adds r0, #1; bl 0x30.
+    /// Code with `begin` at 0x10 (bx lr), and adds r0, #1; adds r0, #1; bl 0x30 at 0x20.
     fn code() -> Code {
         let mut halfwords = vec![0x4770; 17];
         halfwords[8..12].copy_from_slice(&[0x3001, 0x3001, 0xF000, 0xF804]);

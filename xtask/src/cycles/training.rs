@@ -1,4 +1,4 @@
-//! Trains the models that are measured: the one place that calls the library for training.
+//! Training of the models that are measured: the one place that calls the library for training.
 
 use model_core::rbf::Format;
 use rayon::prelude::*;
@@ -9,30 +9,30 @@ use taxel_simulate::{Synthesis, World};
 
 use crate::process::Outcome;
 
-/// The name of the scene that is trained on.
+/// Name of the scene for training.
 const SCENE: &str = "press";
 
-/// Its noise: enough that widths and weights stay where every format holds them.
+/// Noise level of the scene: large enough for widths and weights that every number format can hold.
 const NOISE: f64 = 0.05;
 
-/// Its frames: a few more than there are centres.
+/// Number of frames of the scene: somewhat more than centres.
 const FRAMES: usize = 500;
 
-/// Width of one network for the whole array at which every format holds it.
+/// Spread of one network for the whole array that every number format can hold.
 const SPREAD_OF_ARRAY: f64 = 0.4;
 
 /// A model to be trained.
 #[derive(Debug, Clone, Copy)]
 pub struct Wanted {
     pub format: Format,
-    /// K.
+    /// Number of centres K.
     pub centres: usize,
-    /// One network for the whole array, instead of one a row.
+    /// Whether the model has one network for the whole array, instead of one a row.
     pub whole_array: bool,
 }
 
-/// The blobs of the models `wanted`, in their order: their networks are those that
-/// `host-sim train press -n 500 --noise 0.05` trains with the options for each.
+/// Trains the models `wanted`, and returns their blobs in the same order. Their networks are those of
+/// `host-sim train press -n 500 --noise 0.05` with the options for each.
 ///
 /// # Errors
 /// A model cannot be trained.

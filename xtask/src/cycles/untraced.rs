@@ -1,14 +1,14 @@
-//! Code of the image that is not traced, because it stands in no region: QEMU writes a line for every block that
-//! it starts, and most blocks of a run check the model and print.
+//! Code of the image that is not traced, because it is in no region. QEMU writes a line for every block that it
+//! starts, and most blocks of a run only check the model and print.
 
 use std::ops::Range;
 
 use super::code::Code;
 
-/// What the symbols of these functions have in them, as compilers of either way to mangle names write it. One that
-/// stands in a region after all is found there and refused, by its name.
+/// Parts of the symbols of these functions, which both ways to mangle names contain. If a region calls one of them
+/// after all, the measurement fails and names it.
 pub const FUNCTIONS: [&[&str]; 11] = [
-    // The blob, checked once: all but what finds a row's network.
+    // Checking the blob, once: everything except the search for a row's network.
     &["10model_core8checksum"],
     &["10model_core4blob6decode", "5Model6decode"],
     &["10model_core4blob6decode4take"],
@@ -16,18 +16,18 @@ pub const FUNCTIONS: [&[&str]; 11] = [
     &["10model_core4blob6decode16checked_metadata"],
     &["10model_core3rbf", "7Network12check_values"],
     &["4core3str8converts9from_utf8"],
-    // The readings, made once.
+    // Making the readings, once.
     &["10qemu_bench6inputs"],
-    // What is logged.
+    // Logging.
     &["defmt"],
     &["semihosting"],
     &["4core3fmt"],
 ];
 
-/// Bytes of a function's shortest first instruction.
+/// Bytes of the shortest instruction that a function can start with.
 const FIRST_INSTRUCTION: u32 = 2;
 
-/// Functions whose blocks are not traced, but for the first one of each: so a call of theirs is seen.
+/// Functions whose blocks are not traced, except the first instruction of each, so that a call is noticed.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Untraced {
     /// Names and addresses, in the order of the addresses.
@@ -35,7 +35,7 @@ pub struct Untraced {
 }
 
 impl Untraced {
-    /// The functions of `code` that have all parts of one of `names` in their symbols.
+    /// The functions of `code` whose symbols contain all parts of one of `names`.
     pub fn of(code: &Code, names: &[&[&str]]) -> Self {
         let is_meant =
             |name: &str| names.iter().any(|parts| parts.iter().all(|part| name.contains(part)));
@@ -49,15 +49,15 @@ impl Untraced {
         Self { functions }
     }
 
-    /// The name of the function that is entered at `address`, or that it lies in.
+    /// Name of the function that contains `address`.
     pub fn function_at(&self, address: u32) -> Option<&str> {
         let after = self.functions.partition_point(|(_, range)| range.start <= address);
         let (name, range) = self.functions.get(after.checked_sub(1)?)?;
         range.contains(&address).then_some(name)
     }
 
-    /// All other addresses, and where these functions are entered, as QEMU's `-dfilter` takes them: first and last
-    /// address of each range.
+    /// Ranges of all addresses to be traced, for QEMU's `-dfilter`: the first and last address of each range. They
+    /// include the first instruction of each untraced function.
     pub fn ranges_of_others(&self) -> String {
         let mut ranges = Vec::new();
         let mut start = 0;

@@ -1,4 +1,4 @@
-//! The application in the emulator, held to the host by `host-sim emulate`.
+//! The application in the emulator, compared with the host by `host-sim emulate`.
 
 use std::ffi::{OsStr, OsString};
 use std::fs;
@@ -7,18 +7,18 @@ use std::path::PathBuf;
 use crate::process::{Outcome, Said, capture, cargo, run, target_dir};
 use crate::toolchain::elf;
 
-/// The application's image.
+/// Name of the application's image.
 pub const IMAGE: &str = "qemu-app";
 
-/// Flash that it may take without a model, and RAM with the stack at its deepest, in bytes.
+/// Limits in bytes: flash without a model, and RAM with the stack at its deepest.
 const LIMITS: [&str; 2] = ["--flash-limit=49152", "--ram-limit=8192"];
 
-/// What must hold of it with a network a row.
+/// Options of the check with a network a row.
 const OF_ROWS: &[&str] =
     &["-n10000", "--scans=20", "--damaged-uploads=1000", "--interruptions", "--garbage=100000"];
 
-/// What must hold on the UART, where every byte takes a turn of QEMU's main loop: enough to show that its
-/// driver loses nothing, and that the link finds its messages again after damage.
+/// Options of the check on the UART, where every byte takes a turn of QEMU's main loop. They are enough to show
+/// that the driver loses nothing, and that the link finds its messages again after damage.
 const ON_UART: &[&str] = &[
     "--line=uart",
     "-n200",
@@ -28,13 +28,13 @@ const ON_UART: &[&str] = &[
     "--garbage=20000",
 ];
 
-/// What must hold with one network for the whole array: decoding is what differs, and takes more stack.
+/// Options of the check with one network for the whole array. Only decoding differs; it takes more stack.
 const OF_ARRAY: &[&str] = &["-n1000", "--scans=20"];
 
-/// The network for the whole array: the format and number of centres that take a device the least time.
+/// Training options of the network for the whole array: the number format and K that are the fastest on a device.
 const ARRAY: &[&str] = &["--whole-array", "--format=fixed16", "--centres=64"];
 
-/// A test of host-sim that lets the image answer the same requests on both lines, byte for byte.
+/// Arguments for a test of host-sim, which checks that the image answers the same requests alike on both lines.
 const ON_BOTH: &[&str] = &[
     "test",
     "--quiet",
@@ -46,38 +46,38 @@ const ON_BOTH: &[&str] = &[
     "device::the_image_answers_alike_on_both_lines",
 ];
 
-/// How a test ends that was found, and passed.
+/// Output of a test that was found, and passed.
 const PASSED: &str = "test result: ok. 1 passed";
 
-/// How cargo runs host-sim.
+/// Arguments with which cargo runs host-sim.
 const HOST_SIM: &[&str] = &["run", "--quiet", "--package=host-sim", "--"];
 
 /// One run of the application.
 pub struct Check {
     pub name: &'static str,
-    /// What cargo runs.
+    /// Arguments for cargo.
     arguments: Vec<OsString>,
-    /// What must be among its output.
+    /// Text that the output must contain.
     says: &'static str,
 }
 
-/// What the first check leaves of the application's log.
+/// File in which the first check saves the application's log.
 pub fn log() -> PathBuf {
     target_dir().join("qemu-app.defmt")
 }
 
-/// What is to be checked, once the models for it are trained.
+/// Trains the models for the checks, and returns the checks.
 pub fn checks() -> Outcome<[Check; 4]> {
     let [rows, array] =
         ["qemu-rows.bin", "qemu-array.bin"].map(|name| target_dir().join(name).into_os_string());
     let log = log().into_os_string();
-    // That of the run before, if there was one.
+    // Removes the log of the previous run, if there was one.
     let _ = fs::remove_file(&log);
     train(&[], &rows)?;
     train(ARRAY, &array)?;
     Ok([
         Check::new("application", OF_ROWS, &["--model".as_ref(), &rows, "--log".as_ref(), &log]),
-        // The smaller model, which is uploaded on that line as well.
+        // This is the smaller model, because it is uploaded on that line as well.
         Check::new("application on the UART", ON_UART, &["--model".as_ref(), &array]),
         Check::new("application with one network", OF_ARRAY, &["--model".as_ref(), &array]),
         Check {
@@ -97,7 +97,7 @@ impl Check {
         Self { name, arguments, says: "" }
     }
 
-    /// Runs it; its output comes when it is done.
+    /// Runs the check, and returns its output when it is done.
     pub fn run(&self) -> Said {
         let mut said = capture(cargo(&[]).args(&self.arguments).env("TAXEL_IMAGE", elf(IMAGE)));
         if said.outcome.is_ok() && !said.out.contains(self.says) {

@@ -4,14 +4,15 @@ use std::io;
 use std::net::{Ipv4Addr, Shutdown, TcpListener, TcpStream};
 use std::thread;
 
-/// Waits for two connections and hands on what comes, either way; gives the ports to connect to.
+/// Lays a cable: waits for two connections, and passes bytes on in both directions. Returns the ports to connect
+/// to.
 ///
-/// QEMU connects before it starts the program, so that nothing is lost.
+/// QEMU connects before it starts the program, so that no byte is lost.
 pub fn lay() -> io::Result<[u16; 2]> {
     let one = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
     let other = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
     let ports = [one.local_addr()?.port(), other.local_addr()?.port()];
-    // Ends when QEMU does; if it never connects, with this program.
+    // The thread ends with QEMU or, if QEMU never connects, with this program.
     thread::spawn(move || connect(&one, &other));
     Ok(ports)
 }

@@ -1,9 +1,11 @@
-//! Comparing what was logged with what should have been.
+//! Comparing a log with the expected one.
 
 use crate::process::Outcome;
 
+/// Compares the log `found` with the `expected` one.
+///
 /// # Errors
-/// They differ: where, line by line.
+/// The differences, line by line.
 pub fn compare(expected: &str, found: &str) -> Outcome {
     if expected == found {
         return Ok(());
@@ -23,7 +25,7 @@ pub fn compare(expected: &str, found: &str) -> Outcome {
     Err(difference.join("\n"))
 }
 
-/// Split so that a missing newline at the end is a difference.
+/// Splits `text` into lines so that a missing newline at the end is a difference.
 fn lines(text: &str) -> Vec<&str> {
     text.split('\n').collect()
 }

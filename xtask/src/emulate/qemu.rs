@@ -12,14 +12,16 @@ use defmt_decoder::{DecodeError, Table};
 use super::cable;
 use crate::process::{Outcome, first_line};
 
-/// The emulator's program.
+/// Name of the emulator's program.
 pub const QEMU: &str = "qemu-system-arm";
 
-/// No program takes more than half a minute.
+/// Time limit of a program; none takes more than half a minute.
 const LIMIT: Duration = Duration::from_mins(5);
 
+/// Checks that QEMU is installed.
+///
 /// # Errors
-/// QEMU is not installed: how to get it.
+/// QEMU is not installed; the message says how to get it.
 pub fn present() -> Outcome {
     first_line(QEMU, &["--version"]).map(drop).ok_or(format!(
         "{QEMU} is not there. On Debian,\n  apt-get install qemu-system-arm\nor, for all that the \
@@ -27,7 +29,7 @@ pub fn present() -> Outcome {
     ))
 }
 
-/// What is needed to decode the logs of the program in `elf`.
+/// The table that decodes the logs of the program in `elf`.
 pub fn table(elf: &Path) -> Outcome<Table> {
     let program = fs::read(elf).map_err(|cause| format!("{}: {cause}", elf.display()))?;
     Table::parse(&program)
@@ -35,17 +37,17 @@ pub fn table(elf: &Path) -> Outcome<Table> {
         .ok_or(format!("{} logs nothing through defmt", elf.display()))
 }
 
-/// A log that was saved while the program in `elf` ran, as text.
+/// Decodes a log that was saved while the program in `elf` ran.
 pub fn decoded(log: &Path, elf: &Path) -> Outcome<String> {
     let logged = fs::read(log).map_err(|cause| format!("{}: {cause}", log.display()))?;
     Ok(decode(&table(elf)?, &logged))
 }
 
-/// What a program did that ended by itself.
+/// Result of a program that ended by itself.
 pub struct Ended {
-    /// What it logged, decoded, one entry after the other, and its exit status.
+    /// Decoded log, one entry a line, and the exit status.
     pub log: String,
-    /// What QEMU had to say.
+    /// Messages of QEMU itself.
     pub complaints: String,
 }
 
@@ -55,7 +57,7 @@ pub fn run(elf: &Path) -> Outcome<Ended> {
 
     let mut child =
         command(elf)?.spawn().map_err(|cause| format!("cannot start {QEMU}: {cause}"))?;
-    // A pipe that nobody reads fills, and its writer waits.
+    // Both pipes must be read, because a full pipe makes its writer wait.
     let logged = reader(child.stdout.take());
     let complaints = reader(child.stderr.take());
     let status = wait(&mut child, LIMIT)?;
@@ -75,7 +77,7 @@ pub fn run(elf: &Path) -> Outcome<Ended> {
     }
 }
 
-/// The machine with the program in `elf`, whose log goes to stdout.
+/// Command that runs the program in `elf` in QEMU, with its log on stdout.
 pub fn machine(elf: &Path) -> Command {
     let mut command = Command::new(QEMU);
     command.args(["-M", "mps2-an386", "-cpu", "cortex-m4", "-display", "none", "-monitor", "none"]);
@@ -85,11 +87,11 @@ pub fn machine(elf: &Path) -> Command {
     command
 }
 
-/// The same with its first two UARTs connected with one another.
+/// Command that runs the program in `elf` in QEMU, with its first two UARTs connected to each other.
 fn command(elf: &Path) -> Outcome<Command> {
     let ports = cable::lay().map_err(|cause| format!("cannot connect the UARTs: {cause}"))?;
     let mut command = machine(elf);
-    // Time goes by instructions, 32 ns each: a program runs alike however busy this machine is.
+    // Time is counted by instructions, 32 ns each, so that a program runs alike on a busy computer.
     command.args(["-icount", "shift=5"]);
     for port in ports {
         command.args(["-chardev", &format!("socket,id=uart{port},host=127.0.0.1,port={port}")]);
@@ -98,17 +100,17 @@ fn command(elf: &Path) -> Outcome<Command> {
     Ok(command)
 }
 
-/// Reads `stream` to its end.
+/// Reads `stream` to its end, in a thread.
 pub fn reader(stream: Option<impl Read + Send + 'static>) -> thread::JoinHandle<Vec<u8>> {
     thread::spawn(move || {
         let mut bytes = Vec::new();
-        // What was read before an error is shown, so the error itself says nothing more.
+        // The bytes before an error are shown, so the error itself can be ignored.
         _ = stream.map(|mut stream| stream.read_to_end(&mut bytes));
         bytes
     })
 }
 
-/// The exit status; `None` if the limit was reached and the program killed.
+/// Waits for a program's exit status; `None` if the time limit was reached and the program killed.
 pub fn wait(child: &mut Child, limit: Duration) -> Outcome<Option<ExitStatus>> {
     let failed = |cause| format!("cannot wait for {QEMU}: {cause}");
     let start = Instant::now();
@@ -123,7 +125,7 @@ pub fn wait(child: &mut Child, limit: Duration) -> Outcome<Option<ExitStatus>> {
     Ok(None)
 }
 
-/// A log as text: `LEVEL message`, one entry after the other.
+/// Decodes a log to text: `LEVEL message`, one entry after the other.
 pub fn decode(table: &Table, logged: &[u8]) -> String {
     let mut decoder = table.new_stream_decoder();
     decoder.received(logged);

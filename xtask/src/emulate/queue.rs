@@ -1,15 +1,15 @@
-//! Pieces of work done two at a time.
+//! Doing pieces of work, two at a time.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 use std::thread;
 
-/// As many as there are cores on a small machine: a program in QEMU takes one.
+/// Number of pieces at a time: a program in QEMU takes one core, and small computers have two.
 const AT_A_TIME: usize = 2;
 
-/// Does `work` on all `pieces`, and passes the results to `take` in the order of the pieces, each as soon as
-/// its turn has come.
+/// Does `work` on all `pieces`. Passes the results to `take` in the order of the pieces, each as soon as it and
+/// all before it are done.
 pub fn work_through<T: Sync, R: Send>(
     pieces: &[T],
     work: impl Fn(&T) -> R + Sync,
@@ -24,7 +24,7 @@ pub fn work_through<T: Sync, R: Send>(
                 loop {
                     let index = next.fetch_add(1, Ordering::Relaxed);
                     let Some(piece) = pieces.get(index) else { return };
-                    // Fails only if the receiver has panicked.
+                    // Sending fails only if the receiver has panicked.
                     let _ = done.send((index, work(piece)));
                 }
             });
@@ -51,7 +51,7 @@ mod tests {
 
     #[test]
     fn results_come_in_the_order_of_the_pieces() {
-        // The first takes longest: all others are done before it.
+        // The first piece takes longest: all others are done before it.
         let pieces = [60, 0, 20, 0, 5, 0, 0];
         let mut taken = Vec::new();
         let work = |milliseconds: &u64| {
@@ -68,7 +68,7 @@ mod tests {
         let (busy, both) = (AtomicUsize::new(0), Barrier::new(2));
         let work = |_: &u8| {
             assert!(busy.fetch_add(1, Ordering::SeqCst) < AT_A_TIME);
-            // Nobody passes alone.
+            // No piece passes alone.
             both.wait();
             busy.fetch_sub(1, Ordering::SeqCst);
             both.wait();

@@ -1,8 +1,8 @@
-//! The budget file: what each image may take.
+//! The budget file: flash and RAM that each image may take.
 
 use crate::process::Outcome;
 
-/// Bytes that an image may take at most.
+/// Bytes of flash and RAM that an image may take at most.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Budget<'a> {
     pub name: &'a str,
@@ -11,7 +11,7 @@ pub struct Budget<'a> {
 }
 
 impl Budget<'_> {
-    /// What is taken beyond it, in words.
+    /// Descriptions of what exceeds the budget.
     pub fn exceeded_by(&self, flash: u64, ram: u64) -> Vec<String> {
         [("flash", flash, self.flash), ("RAM", ram, self.ram)]
             .into_iter()
@@ -23,7 +23,7 @@ impl Budget<'_> {
     }
 }
 
-/// Reads `name flash ram`, one image a line; `#` starts a comment.
+/// Parses lines of `name flash ram`, one for each image; `#` starts a comment.
 pub fn parse(text: &str) -> Outcome<Vec<Budget<'_>>> {
     let mut budgets = Vec::new();
     for (number, line) in (1..).zip(text.lines()) {

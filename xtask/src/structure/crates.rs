@@ -3,8 +3,8 @@
 use super::house::Side;
 use super::workspace::{Kind, Package};
 
-/// Breaches of the order that `declared` has, from the ground up. Dependencies of tests may stand anywhere, but
-/// nothing that runs on a device is tested with what runs on a desk alone.
+/// Breaches of the `declared` order, which goes from the ground up. Dependencies of tests are free, except that a
+/// crate for the device is not tested with crates for the host.
 pub fn broken(packages: &[Package], declared: &[(&str, Side)]) -> Vec<String> {
     let place = |name: &str| declared.iter().position(|(declared, _)| *declared == name);
     let mut broken = Vec::new();
@@ -15,7 +15,7 @@ pub fn broken(packages: &[Package], declared: &[(&str, Side)]) -> Vec<String> {
             continue;
         };
         for dependency in &package.dependencies {
-            // One that is not declared is complained of as a package, or is none of the workspace.
+            // An undeclared dependency is reported as a package, or is not part of the workspace.
             let Some(other) = place(&dependency.name) else { continue };
             let climbs = declared[own].1 == Side::Device && declared[other].1 == Side::Host;
             if climbs || (dependency.kind != Kind::Dev && other >= own) {
@@ -30,7 +30,7 @@ pub fn broken(packages: &[Package], declared: &[(&str, Side)]) -> Vec<String> {
     broken
 }
 
-/// Crates that are declared and not in the workspace.
+/// Crates that are declared, but not in the workspace.
 pub fn absent<'d>(packages: &[Package], declared: &[(&'d str, Side)]) -> Vec<&'d str> {
     let is_there = |name: &str| packages.iter().any(|package| package.name == name);
     declared.iter().map(|(name, _)| *name).filter(|name| !is_there(name)).collect()

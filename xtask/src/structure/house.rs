@@ -1,11 +1,11 @@
-//! What is declared of the house: the one place to change when a crate is added.
+//! Declaration of the workspace's structure: the one place to change when a crate is added.
 
-/// What a crate is for.
+/// Side for which a crate is: device or host.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
-    /// Runs on a device, or is linked into what does.
+    /// The crate runs on a device, or is linked into an image that does.
     Device,
-    /// Runs on a desk alone.
+    /// The crate runs on the host only.
     Host,
 }
 
@@ -27,7 +27,7 @@ pub const CRATES: &[(&str, Side)] = &[
     ("benchmarks", Side::Host),
 ];
 
-/// Files, and folders with all that is in them, in which `unsafe` may stand.
+/// Files in which `unsafe` may stand, and folders in whose files it may.
 pub const UNSAFE: &[&str] = &[
     "model-core/src/cortex_m4/routines.rs",
     "model-core/src/decoder.rs",
@@ -47,5 +47,5 @@ pub const NOT_YET_IN_ORDER: &[&str] = &[];
 /// The largest share of all lines of Rust that one crate may hold, in per cent.
 pub const LARGEST_SHARE_PERCENT: f64 = 27.0;
 
-/// Whether a larger share is a breach, or only printed.
+/// Whether a larger share is a breach; else it is only printed.
 pub const SHARES_MUST_HOLD: bool = true;

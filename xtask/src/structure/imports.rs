@@ -1,4 +1,4 @@
-//! The paths by which code reaches other modules of its crate.
+//! Paths by which code reaches other modules of its crate.
 
 use proc_macro2::{TokenStream, TokenTree};
 use syn::visit::{self, Visit};
@@ -10,7 +10,7 @@ use super::test_code::{is_test, of_impl_item, of_item};
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Mention {
     pub path: Vec<String>,
-    /// Whether all that is at the path is meant.
+    /// Whether the path stands for everything in it (`*`).
     pub glob: bool,
     pub line: usize,
 }
@@ -24,10 +24,10 @@ pub struct Import {
     pub line: usize,
 }
 
-/// The names that a `use` brings in, one by one.
+/// All names that a `use` brings in, one by one.
 pub fn of_use(item: &ItemUse) -> Vec<Import> {
     let mut imports = Vec::new();
-    // A path from the root of all crates leads to another crate.
+    // A path that starts with `::` leads to another crate.
     if item.leading_colon.is_none() {
         flatten(&item.tree, &mut Vec::new(), &mut imports);
     }
@@ -36,7 +36,7 @@ pub fn of_use(item: &ItemUse) -> Vec<Import> {
 
 fn flatten(tree: &UseTree, before: &mut Vec<String>, imports: &mut Vec<Import>) {
     let mut add = |name: Option<String>, last: Option<&syn::Ident>, line: usize| {
-        // `a::{self}` is `a`.
+        // The path `a::{self}` is the same as `a`.
         let last = last.filter(|last| **last != "self" || before.is_empty());
         let path: Vec<String> =
             before.iter().cloned().chain(last.map(ToString::to_string)).collect();
@@ -66,8 +66,8 @@ fn flatten(tree: &UseTree, before: &mut Vec<String>, imports: &mut Vec<Import>) 
     }
 }
 
-/// All paths of `items` that begin with `crate`, `self` or `super`, in `use` and elsewhere; without those of tests
-/// and of modules among the items.
+/// All paths of `items` that begin with `crate`, `self` or `super`, in `use` and elsewhere. Tests and inner
+/// modules are left out.
 pub fn mentions(items: &[Item]) -> Vec<Mention> {
     let mut collector = Collector::default();
     items.iter().for_each(|item| collector.visit_item(item));
@@ -85,7 +85,7 @@ impl Collector {
         }
     }
 
-    /// What a macro is given is no syntax yet: paths are found by their beginning.
+    /// Adds the paths in a macro's arguments, which are not parsed yet: a path is found by its first name.
     fn tokens(&mut self, tokens: TokenStream) {
         let tokens: Vec<TokenTree> = tokens.into_iter().collect();
         let mut at = 0;
@@ -111,7 +111,7 @@ fn is_start(name: &str) -> bool {
     ["crate", "self", "super"].contains(&name)
 }
 
-/// The name behind `::`.
+/// The name behind `::`, if there is one.
 fn segment(tokens: &[TokenTree]) -> Option<String> {
     match tokens {
         [TokenTree::Punct(one), TokenTree::Punct(two), TokenTree::Ident(name), ..]
@@ -165,7 +165,7 @@ impl<'ast> Visit<'ast> for Collector {
         self.tokens(called.tokens.clone());
     }
 
-    // Where something may be seen is no import.
+    // The path of a visibility is not an import.
     fn visit_visibility(&mut self, _: &'ast Visibility) {}
 }
 

@@ -9,52 +9,52 @@ use super::imports::{Import, Mention, mentions, of_use};
 use super::test_code::{is_test, of_item};
 use crate::process::Outcome;
 
-/// A module, without what is compiled for tests alone.
+/// A module, without code that is compiled for tests only.
 #[derive(Debug)]
 pub struct Module {
-    /// Its name and those of the modules around it, from the crate's root.
+    /// Names of the modules from the crate's root to this one.
     pub path: Vec<String>,
     pub file: PathBuf,
-    /// The modules in it, as declared.
+    /// Modules inside this one, in the order of their declaration.
     pub children: Vec<Module>,
-    /// What is defined in it by name, but for modules.
+    /// Names of items that are defined in the module, except modules.
     pub items: HashSet<String>,
-    /// The names that `use` brings in.
+    /// Names that `use` brings into the module.
     pub imports: Vec<Import>,
-    /// Where it names something by its path.
+    /// Paths in the module, with their places.
     pub mentions: Vec<Mention>,
 }
 
-/// Gives a file's text.
+/// Function that returns a file's text.
 pub type TextOf<'t> = &'t dyn Fn(&Path) -> Outcome<String>;
 
 impl Module {
-    /// The crate that starts with the file `root`.
+    /// Reads the modules of the crate that starts with the file `root`.
     ///
     /// # Errors
-    /// A file is not there, or is not understood.
+    /// A file is missing, or cannot be parsed.
     pub fn read(root: &Path, text_of: TextOf<'_>) -> Outcome<Self> {
         let folder = root.parent().unwrap_or(Path::new(""));
         of_file(root, folder, Vec::new(), text_of)
     }
 
-    /// The module in this one that has the name.
+    /// The child module of this name.
     pub fn child(&self, name: &str) -> Option<&Self> {
         self.children.iter().find(|child| child.path.last().is_some_and(|last| last == name))
     }
 
-    /// The place among its siblings of the child that has the name.
+    /// Place of the child module of this name among its siblings.
     pub fn place(&self, name: &str) -> Option<usize> {
         self.children.iter().position(|child| child.path.last().is_some_and(|last| last == name))
     }
 
-    /// The module at a path from this one.
+    /// The module at this path, which starts from `self`.
     pub fn at(&self, path: &[String]) -> Option<&Self> {
         path.iter().try_fold(self, |module, name| module.child(name))
     }
 }
 
-/// `folder` is where files of modules in the file lie.
+/// Reads the module in `file`; the files of its inner modules are in `folder`.
 fn of_file(file: &Path, folder: &Path, path: Vec<String>, text_of: TextOf<'_>) -> Outcome<Module> {
     let text = text_of(file)?;
     let parsed = syn::parse_file(&text)
@@ -95,7 +95,7 @@ fn child(item: &ItemMod, around: &Module, folder: &Path, text_of: TextOf<'_>) ->
         return of_items(items, &around.file, &below, path, text_of);
     }
     if let Some(elsewhere) = item.attrs.iter().find_map(path_of) {
-        // Beside the file that declares it, whatever that is called.
+        // The path is relative to the folder of the file that declares it.
         let file = around.file.parent().unwrap_or(Path::new("")).join(elsewhere);
         let folder = file.parent().unwrap_or(Path::new("")).to_owned();
         return of_file(&file, &folder, path, text_of);

@@ -1,41 +1,41 @@
 //! The rule for modules: siblings are declared from the ground up, and a module imports only from siblings
-//! declared before it, at the level where the paths of the two part. So nothing imports in a circle.
+//! declared before it, at the level where the two paths part. So nothing imports in a circle.
 //!
-//! What a module's ancestors define themselves is free to use; what they only pass on, by `use`, is followed to
-//! where it comes from.
+//! A module may use whatever its ancestors define themselves. A name that they only pass on by `use` is followed
+//! to its definition.
 
 use super::modules::Module;
 
-/// Names that are passed on by more `use` than this are given up.
+/// Largest number of `use` through which a name is followed.
 const LONGEST_CHAIN: usize = 16;
 
-/// Where a path leads, seen from a module.
+/// Target of a path, seen from a module.
 #[derive(Debug, PartialEq, Eq)]
 enum Target {
-    /// To itself, into it, to another crate, or to what an ancestor defines.
+    /// The module itself, something inside it, another crate, or an item that an ancestor defines.
     Free,
-    /// To a module that an ancestor holds, by the ancestor's path and the child's name.
+    /// A child module of an ancestor: the ancestor's path, and the child's name.
     Sibling(Vec<String>, String),
-    /// To an ancestor as a whole.
+    /// An ancestor as a whole.
     Ancestor(Vec<String>),
 }
 
-/// An import between two modules that one module holds.
+/// An import between two child modules of one module.
 struct Edge<'m> {
     parent: &'m Module,
     from: usize,
     to: usize,
 }
 
-/// What is wrong with a crate, in words.
+/// Description of the breaches in a crate.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Disorder {
     pub breaches: Vec<String>,
-    /// For each module whose children break the order, what order would do.
+    /// For each module whose children break the order, an order that would not.
     pub advice: Vec<String>,
 }
 
-/// Every breach in the crate.
+/// Finds every breach in the crate.
 pub fn broken(root: &Module) -> Disorder {
     let (mut broken, mut edges) = (Vec::new(), Vec::new());
     visit(root, root, &mut broken, &mut edges);
@@ -93,7 +93,7 @@ fn shown(path: &[String]) -> String {
     if path.is_empty() { "the crate's root".into() } else { format!("`{}`", path.join("::")) }
 }
 
-/// A path from the crate's root. `None`: it leads out of the crate, or above its root.
+/// The path from the crate's root; `None` if it leads out of the crate, or above its root.
 fn absolute(module: &Module, path: &[String]) -> Option<Vec<String>> {
     let (first, rest) = path.split_first()?;
     match first.as_str() {
@@ -141,7 +141,7 @@ fn target(root: &Module, from: &Module, path: &[String], depth: usize) -> Target
     of_globs.next().unwrap_or(Target::Free)
 }
 
-/// An order of the modules in `parent` that breaks nothing, or those that import in a circle.
+/// An order of the modules in `parent` without breaches, or the modules that import in a circle.
 fn advice(parent: &Module, edges: &[Edge<'_>]) -> String {
     let name = |index: usize| parent.children[index].path.last().map_or("", String::as_str);
     let edges: Vec<(usize, usize)> = edges
@@ -151,7 +151,7 @@ fn advice(parent: &Module, edges: &[Edge<'_>]) -> String {
         .collect();
     let mut left: Vec<usize> = (0..parent.children.len()).collect();
     let mut order = Vec::new();
-    // The first one that needs nothing of what is left stays as near to its place as can be.
+    // Always taking the first module that needs none of the rest keeps modules near their places.
     while let Some(at) = left
         .iter()
         .position(|module| !edges.iter().any(|(from, to)| from == module && left.contains(to)))
@@ -163,7 +163,7 @@ fn advice(parent: &Module, edges: &[Edge<'_>]) -> String {
     if left.is_empty() {
         return format!("{}: this order would do: {}", parent.file.display(), names(&order));
     }
-    // Whoever nobody of the circle needs only stands on it.
+    // A module that no other of the circle needs is not part of the circle.
     while let Some(at) = left
         .iter()
         .position(|module| !edges.iter().any(|(from, to)| to == module && left.contains(from)))

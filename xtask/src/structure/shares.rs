@@ -12,7 +12,7 @@ pub struct Share {
     pub percent: f64,
 }
 
-/// The crates' parts, the largest first, from the number of lines of each file. A file is of the crate whose
+/// The crates' shares, the largest first, from the number of lines of each file. A file belongs to the crate whose
 /// folder is the innermost around it.
 pub fn of(packages: &[Package], files: &[(&Path, usize)]) -> Vec<Share> {
     let owner = |file: &Path| {
@@ -33,7 +33,7 @@ pub fn of(packages: &[Package], files: &[(&Path, usize)]) -> Vec<Share> {
     shares
 }
 
-/// The parts as lines with aligned columns.
+/// The shares as lines with aligned columns.
 pub fn table(shares: &[Share]) -> String {
     let line = |share: &Share| {
         format!("{:16} {:6} lines of Rust {:5.1} %\n", share.name, share.lines, share.percent)
@@ -41,7 +41,7 @@ pub fn table(shares: &[Share]) -> String {
     shares.iter().map(line).collect()
 }
 
-/// What holds more than `largest_percent`, in words.
+/// Descriptions of crates that hold more than `largest_percent`.
 pub fn too_large(shares: &[Share], largest_percent: f64) -> Vec<String> {
     let message = |share: &Share| {
         format!(

@@ -1,9 +1,9 @@
-//! Which items are compiled for tests alone.
+//! Finding items that are compiled for tests only.
 
 use syn::punctuated::Punctuated;
 use syn::{Attribute, ImplItem, Item, Meta, Token};
 
-/// Whether something with these attributes is compiled for tests alone.
+/// Whether an item with these attributes is compiled for tests only.
 pub fn is_test(attributes: &[Attribute]) -> bool {
     attributes.iter().any(|attribute| {
         let path = attribute.path();
@@ -12,7 +12,7 @@ pub fn is_test(attributes: &[Attribute]) -> bool {
     })
 }
 
-/// Whether a condition holds in tests alone.
+/// Whether a condition holds in tests only.
 fn needs_test(condition: &Meta) -> bool {
     let parts = |list: &syn::MetaList| {
         list.parse_args_with(Punctuated::<Meta, Token![,]>::parse_terminated).unwrap_or_default()
@@ -28,7 +28,7 @@ fn needs_test(condition: &Meta) -> bool {
     }
 }
 
-/// An item's attributes.
+/// Attributes of an item.
 pub fn of_item(item: &Item) -> &[Attribute] {
     match item {
         Item::Const(item) => &item.attrs,
@@ -50,7 +50,7 @@ pub fn of_item(item: &Item) -> &[Attribute] {
     }
 }
 
-/// Likewise of an item in an `impl`.
+/// Attributes of an item in an `impl`.
 pub fn of_impl_item(item: &ImplItem) -> &[Attribute] {
     match item {
         ImplItem::Const(item) => &item.attrs,

@@ -1,4 +1,4 @@
-//! The rule for `unsafe`: it stands where it is declared to stand, and says why it is sound.
+//! The rule for `unsafe`: it stands only in declared files, and a comment says why it is sound.
 
 use std::path::Path;
 
@@ -12,21 +12,21 @@ use syn::{Stmt, TraitItemFn};
 
 use crate::process::Outcome;
 
-/// What must stand directly before an unsafe block.
+/// Start of the comment that must stand directly before an unsafe block.
 const REASON: &str = "// SAFETY:";
 
-/// What the documentation of an unsafe function must have.
+/// Section that the documentation of an unsafe function must have.
 const SECTION: &str = "# Safety";
 
-/// Breaches in one file, in words; `allowed` are the files and folders in which `unsafe` may stand.
+/// Descriptions of the breaches in one file; `allowed` are the files and folders in which `unsafe` may stand.
 ///
 /// # Errors
-/// The file is not understood.
+/// The file cannot be parsed.
 pub fn broken(file: &Path, text: &str, allowed: &[&str]) -> Outcome<Vec<String>> {
     let failed = |cause: &dyn ToString, line: usize| {
         format!("{}:{line}: {}", file.display(), cause.to_string())
     };
-    // What is no Rust is the compiler's to complain of, if it is compiled at all.
+    // The compiler reports text that is not Rust, if it is compiled at all.
     let parsed =
         syn::parse_file(text).map_err(|cause| failed(&cause, cause.span().start().line))?;
     let tokens: TokenStream = text
@@ -62,10 +62,10 @@ pub fn broken(file: &Path, text: &str, allowed: &[&str]) -> Outcome<Vec<String>>
     Ok(broken.into_iter().map(|(line, message)| failed(&message, line)).collect())
 }
 
-/// The word `unsafe`.
+/// One occurrence of the word `unsafe`.
 struct Word {
     at: LineColumn,
-    /// Whether it opens a block or an implementation, which need a reason.
+    /// Whether it starts a block or an implementation, which need a reason.
     needs_reason: bool,
 }
 
@@ -93,10 +93,10 @@ fn has_reason(lines: &[&str], line: usize) -> bool {
     above.take_while(|line| line.starts_with("//")).any(|line| line.starts_with(REASON))
 }
 
-/// What is known of the file's syntax.
+/// Statements and unsafe functions found in the file.
 #[derive(Default)]
 struct Found {
-    /// Where statements start and end.
+    /// Start and end of each statement.
     statements: Vec<(LineColumn, LineColumn)>,
     /// Unsafe functions without the section, and their lines.
     undocumented: Vec<(String, usize)>,
@@ -140,7 +140,7 @@ impl<'ast> Visit<'ast> for Found {
     }
 
     fn visit_item_impl(&mut self, implementation: &'ast ItemImpl) {
-        // What a trait's functions ask for stands with the trait.
+        // The safety section of a trait's function is in the trait.
         if implementation.trait_.is_none() {
             for item in &implementation.items {
                 if let ImplItem::Fn(function) = item {

@@ -1,4 +1,4 @@
-//! The workspace as cargo and git see it.
+//! The workspace's crates and files, as cargo and git list them.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -11,7 +11,7 @@ use crate::process::{Outcome, cargo, root};
 #[derive(Debug, PartialEq, Eq)]
 pub struct Package {
     pub name: String,
-    /// Its folder, from the workspace's root.
+    /// The crate's folder, relative to the workspace's root.
     pub directory: PathBuf,
     pub dependencies: Vec<Dependency>,
     /// The files that its libraries, programs and build scripts start with; tests and benches are left out.
@@ -25,7 +25,7 @@ pub struct Dependency {
     pub kind: Kind,
 }
 
-/// What a dependency is for.
+/// Purpose of a dependency.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     Normal,
@@ -36,17 +36,17 @@ pub enum Kind {
 /// The workspace's crates.
 ///
 /// # Errors
-/// Cargo does not tell.
+/// Cargo fails, or its answer cannot be parsed.
 pub fn packages() -> Outcome<Vec<Package>> {
     let json = output(&mut cargo(&["metadata", "--no-deps", "--format-version", "1"]))?;
     let metadata = serde_json::from_str(&json).map_err(|cause| cause.to_string())?;
     parse(&metadata, root()).ok_or("what `cargo metadata` prints is not understood".into())
 }
 
-/// The workspace's files of Rust, from its root: those that git tracks, and new ones that it does not ignore.
+/// The workspace's Rust files, relative to its root: those that git tracks, and new ones that it does not ignore.
 ///
 /// # Errors
-/// Git does not tell.
+/// Git fails.
 pub fn sources() -> Outcome<Vec<PathBuf>> {
     let mut command = Command::new("git");
     command.args(["ls-files", "--cached", "--others", "--exclude-standard", "--", "*.rs"]);
@@ -54,7 +54,7 @@ pub fn sources() -> Outcome<Vec<PathBuf>> {
     let mut files: Vec<PathBuf> = listed.lines().map(PathBuf::from).collect();
     files.sort();
     files.dedup();
-    // One that was removed and not committed yet is listed nevertheless.
+    // Git also lists a file that was removed, while that is not committed.
     files.retain(|file| root().join(file).is_file());
     if files.is_empty() { Err("git lists no file of Rust".into()) } else { Ok(files) }
 }
@@ -68,7 +68,7 @@ fn output(command: &mut Command) -> Outcome<String> {
     String::from_utf8(output.stdout).map_err(|cause| format!("{program}: {cause}"))
 }
 
-/// `None`: a part that cargo promises is not there.
+/// Parses cargo's metadata; `None` if a documented field is missing.
 fn parse(metadata: &Value, root: &Path) -> Option<Vec<Package>> {
     metadata["packages"].as_array()?.iter().map(|package| of_package(package, root)).collect()
 }

@@ -1,4 +1,4 @@
-//! What is decoded: the same for every kernel.
+//! The frames that are decoded: the same for every number format and exponential.
 
 use model_core::Frame;
 use model_core::blob::Model;
@@ -8,10 +8,10 @@ use qemu_image::checks::Numbers;
 
 use super::kernel::{COLS, ROWS};
 
-/// Enough for the features that matter to come near what is wanted.
+/// Number of sweeps: enough for the important features to come near the wanted values.
 const SWEEPS: usize = 50;
 
-/// A frame within the readings that `model` was trained on, in ohm: every row from scaled inputs.
+/// A frame in Ω within the training range of `model`: every row from random scaled inputs.
 pub fn frame(model: &Model<'_>, numbers: &mut Numbers) -> Frame<ROWS, COLS> {
     if let (Some(projection), Some(network)) = (model.projection(), model.networks().next()) {
         return array_frame(projection, &network, numbers);
@@ -29,7 +29,7 @@ pub fn frame(model: &Model<'_>, numbers: &mut Numbers) -> Frame<ROWS, COLS> {
     frame
 }
 
-/// A frame whose features are within the range of training, nearest to readings of 60 Ω: by Kaczmarz's sweeps
+/// A frame in Ω whose features are within the training range, nearest to readings of 60 Ω: by Kaczmarz's sweeps
 /// over the features.
 #[inline(never)]
 fn array_frame(
@@ -49,7 +49,7 @@ fn array_frame(
         for feature in 0..COLS {
             let readings = frame.row_column_resistance_ohm.as_flattened_mut();
             let parts = || parts.iter().map(|parts| parts[feature]);
-            // The bits of `Projection::project`, whose code is measured, and so not called for anything else.
+            // Same bits as `Projection::project`, which is not called here: its code is measured.
             let found = readings.iter().zip(parts());
             let found = found.fold(start[feature], |sum, (reading, part)| sum + part * reading);
             let square: f32 = parts().map(|part| part * part).sum();

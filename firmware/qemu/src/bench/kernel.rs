@@ -1,4 +1,4 @@
-//! The ways to decode that are measured.
+//! The kernels that are measured: number formats, each with an exponential or in portable Rust.
 
 use core::marker::PhantomData;
 
@@ -7,25 +7,26 @@ use model_core::exp::ExpKernel;
 use model_core::rbf::{Format, Network};
 use model_core::{Decoder, Estimate, Frame, RowStatus};
 
-/// Rows of the sensor, as of the paper's.
+/// Number of rows, as in the paper's sensor.
 pub const ROWS: usize = 8;
-/// Readings of a row.
+/// Number of readings a row.
 pub const COLS: usize = 18;
-/// Outputs of a row.
+/// Number of outputs a row.
 pub const OUTPUTS: usize = 18;
 
-/// One way to decode. Every function is a call of what the firmware calls, and nothing besides.
+/// One way to decode: a number format, with an exponential or in portable Rust. Every function only calls
+/// what the firmware calls.
 pub trait Kernel {
-    /// A decoder of frames.
+    /// The decoder of frames.
     type Decoder<'a>;
 
-    /// The decoder of `model`, whose networks have `format`; `None` if it is made for another kernel.
+    /// The decoder of `model`, whose networks have `format`; `None` if this kernel is for another format.
     fn of<'a>(model: &Model<'a>, format: Format) -> Option<Self::Decoder<'a>>;
 
-    /// A row's outputs from scaled inputs, which are used up.
+    /// Infers a row's outputs from scaled inputs, which are overwritten.
     fn infer(network: &Network<'_>, scaled: &mut [f32; COLS], outputs: &mut [f32; OUTPUTS]);
 
-    /// A row's outputs from readings in ohm.
+    /// Infers a row's outputs from readings in Ω.
     fn infer_row(
         network: &Network<'_>,
         readings_ohm: &[f32; COLS],
@@ -33,7 +34,7 @@ pub trait Kernel {
         outputs: &mut [f32; OUTPUTS],
     );
 
-    /// Every row's outputs from a frame.
+    /// Decodes a frame to the outputs of every row.
     fn decode(
         decoder: &Self::Decoder<'_>,
         frame: &Frame<ROWS, COLS>,
@@ -41,26 +42,26 @@ pub trait Kernel {
     );
 }
 
-/// The decoder of `model`; `None` if it is for another sensor.
-#[inline(never)] // what it is put together from leaves the stack again
+/// The decoder of `model`; `None` if the model is for another sensor.
+#[inline(never)] // frees the stack that building the decoder needs
 pub fn decoder<'a>(model: &Model<'a>) -> Option<Decoder<'a, ROWS, COLS, OUTPUTS>> {
     Decoder::of(*model).ok()
 }
 
-/// A format of networks, with one of the exponentials where it has a choice.
+/// The number format `F`, with the exponential `E` if the format has a choice.
 pub struct Formatted<F, E>(PhantomData<(F, E)>);
 
-/// Which format.
+/// A type that names a number format.
 pub trait Which {
-    /// This one.
+    /// The number format that the type names.
     const FORMAT: Format;
 }
 
-/// [`Format::F32Direct`]
+/// The type that names [`Format::F32Direct`].
 pub struct F32Direct;
-/// [`Format::F32`]
+/// The type that names [`Format::F32`].
 pub struct F32;
-/// [`Format::Fixed16`]
+/// The type that names [`Format::Fixed16`].
 pub struct Fixed16;
 
 impl Which for F32Direct {
@@ -107,7 +108,7 @@ impl<F: Which, E: ExpKernel> Kernel for Formatted<F, E> {
     }
 }
 
-/// The compiled twin of a format's assembly.
+/// The number format `F` in portable Rust: the compiled twin of its assembly routine.
 pub struct Portable<F>(PhantomData<F>);
 
 impl<F: Which> Kernel for Portable<F> {

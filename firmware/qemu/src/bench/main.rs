@@ -1,5 +1,5 @@
-//! Decodes with every kernel, for `cargo xtask cycles`, which traces it and counts what each region
-//! executes. The model lies in slot A.
+//! Decodes with every number format and exponential, for `cargo xtask cycles`, which traces this program and
+//! counts the instructions of each region. The model lies in slot A.
 #![no_std]
 #![no_main]
 
@@ -23,10 +23,10 @@ use qemu_image::slot::Slot;
 use kernel::{COLS, F32, F32Direct, Fixed16, Formatted, Kernel, OUTPUTS, Portable, ROWS, decoder};
 use region::{calibrate, region};
 
-/// 3.5 times noise of 0.5 %.
+/// Tolerance of the gate: 3.5 times a noise of 0.5 %.
 const REST_TOLERANCE: f32 = 0.0175;
 
-/// What is decoded, and by which model.
+/// Inputs of the measurement: the model, and the frame that is decoded.
 struct Bench<'a> {
     model: &'a Model<'a>,
     network: Network<'a>,
@@ -34,7 +34,7 @@ struct Bench<'a> {
     frame: Frame<ROWS, COLS>,
 }
 
-/// The kernels, in the order of the table: a new one is one line here.
+/// Measures every kernel (number format and exponential), in the order of the table.
 fn measure_every_kernel(bench: &Bench<'_>) {
     bench.measure::<Formatted<F32, Polynomial>>("f32");
     bench.measure::<Portable<F32>>("f32-portable");
@@ -46,8 +46,8 @@ fn measure_every_kernel(bench: &Bench<'_>) {
 }
 
 impl Bench<'_> {
-    /// One kernel in every scope, if the model is made for it.
-    #[inline(never)] // of several ways, the stack holds one at a time
+    /// Measures one kernel in every scope, if the model has its number format.
+    #[inline(never)] // so that the stack holds only one kernel's values at a time
     fn measure<K: Kernel>(&self, name: &str) {
         let Some(decoder) = K::of(self.model, self.network.format()) else { return };
         let (mut scaled, mut outputs) = (self.scaled, [0.0; OUTPUTS]);
@@ -69,8 +69,8 @@ impl Bench<'_> {
         assert!(estimate.status == [RowStatus::Decoded; ROWS], "a row was not decoded");
     }
 
-    /// What the gate costs and saves with the kernel that the firmware runs: a frame whose rows are all at
-    /// rest, and one whose rows are all awake by their last readings, so that all of them are looked at.
+    /// Measures the gate with the kernel that the firmware runs, on two frames: one with all rows at rest, and one
+    /// with all rows touched at their last readings, so that the gate looks at all readings.
     #[inline(never)]
     fn measure_gate(&self) {
         let Some(decoder) = decoder(self.model) else { return };
@@ -95,7 +95,7 @@ impl Bench<'_> {
     }
 }
 
-/// One network for all rows: frames alone, as the firmware decodes them, and behind the gate.
+/// Measures one network for all rows, on whole frames: without a gate and, if `gated`, behind it.
 #[inline(never)]
 fn measure_array<E: ExpKernel>(
     model: &Model<'_>,
@@ -128,7 +128,7 @@ fn measure_array<E: ExpKernel>(
 #[entry]
 fn main() -> ! {
     calibrate();
-    // SAFETY: nobody else takes them.
+    // SAFETY: the slots are taken here only.
     let [slot, _] = unsafe { Slot::take() };
     let length = unwrap!(Model::declared_length(slot.bytes()), "slot A holds no model");
     let blob = unwrap!(slot.bytes().get(..length), "the model in slot A is cut off");
@@ -146,7 +146,7 @@ fn main() -> ! {
         shape.outputs
     );
 
-    // One row stands for all: the first.
+    // The first row is measured for all.
     let network = model.network_of_row(0).and_then(|index| model.networks().nth(index));
     let network = unwrap!(network, "the model has no network for its first row");
     info!("centres {=usize}", network.shape().centres);
@@ -158,13 +158,13 @@ fn main() -> ! {
     exit::success()
 }
 
-/// The model in `blob`, which is checked here and nowhere else.
-#[inline(never)] // what checking takes leaves the stack again
+/// Parses `blob` to a model; it is checked only here.
+#[inline(never)] // frees the stack that checking needs
 fn checked(blob: &[u8]) -> Option<Model<'_>> {
     Model::decode(blob).ok()
 }
 
-#[inline(never)] // of the two, the stack holds one
+#[inline(never)] // so that the stack holds only one of the two functions' values
 fn measure_rows(model: &Model<'_>, network: Network<'_>) {
     let frame = inputs::frame(model, &mut Numbers::new(3));
     let mut scaled = [0.0; COLS];

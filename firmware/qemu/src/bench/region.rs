@@ -4,23 +4,23 @@ use core::arch::{asm, naked_asm};
 
 use defmt::info;
 
-/// Where it returns, a region starts. Unlike its counterpart in code, so that no linker makes one of
-/// the two.
+/// Starts a region where it returns. Its code differs from that of [`region_end`], so that no linker merges the
+/// two.
 #[unsafe(no_mangle)]
 #[unsafe(naked)]
 extern "C" fn region_begin() {
     naked_asm!("nop", "bx lr")
 }
 
-/// Where it is called, a region ends.
+/// Ends a region where it is called.
 #[unsafe(no_mangle)]
 #[unsafe(naked)]
 extern "C" fn region_end() {
     naked_asm!("bx lr")
 }
 
-/// Runs `work` as a region, and says in the log what it is: `xtask` counts regions, and finds their
-/// names there in the same order.
+/// Runs `work` as a region, and logs the region's name. `xtask` counts the regions, and reads their names from the
+/// log in the same order.
 #[inline(always)]
 #[expect(clippy::inline_always, reason = "the work itself must stand between the two calls")]
 pub fn region(kernel: &str, scope: &str, work: impl FnOnce()) {
@@ -30,11 +30,11 @@ pub fn region(kernel: &str, scope: &str, work: impl FnOnce()) {
     region_end();
 }
 
-/// Regions whose cost is known: nothing, and a loop that was counted by hand.
+/// Runs regions whose cost is known: an empty one, and a loop that was counted by hand.
 pub fn calibrate() {
     region("calibration", "empty", || ());
     region("calibration", "loop", || {
-        // SAFETY: changes r0 and the flags alone.
+        // SAFETY: the code changes only r0 and the flags.
         unsafe {
             asm!("mov.w r0, #1000", "2:", "subs r0, #1", "bne 2b", out("r0") _, options(nomem, nostack));
         }

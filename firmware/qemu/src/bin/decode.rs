@@ -1,5 +1,5 @@
-//! Decodes with every exp kernel; `firmware/tests/bit_for_bit.rs` holds the host to the same bits.
-//! Decoding leaves most of 8 KiB of RAM, stack included, to what else a device does.
+//! Decodes with every exponential; `firmware/tests/bit_for_bit.rs` checks that the host gives the same bits.
+//! Decoding uses little of 8 KiB of RAM, stack included, and leaves most of it to the rest of a device's work.
 #![no_std]
 #![no_main]
 
@@ -13,7 +13,7 @@ use qemu_image::{checks, exit};
 static MODEL: Aligned<[u8; include_bytes!("../../../../testdata/hand-made.bin").len()]> =
     Aligned(*include_bytes!("../../../../testdata/hand-made.bin"));
 
-#[inline(never)] // so that the stack holds one decoder at a time, as a device's does
+#[inline(never)] // so that the stack holds one decoder at a time, as on a device
 fn decode<E: ExpKernel>() {
     info!("decoding with {=str}: {=u32:08x}", E::NAME, unwrap!(checks::decoding::<E>(&MODEL.0)));
 }

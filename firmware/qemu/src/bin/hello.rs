@@ -1,4 +1,4 @@
-//! What the core says of itself, at every level of the log; the clock goes.
+//! Logs the core's identification at every level, and checks that the clock runs.
 #![no_std]
 #![no_main]
 

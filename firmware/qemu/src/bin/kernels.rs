@@ -1,6 +1,6 @@
-//! Decodes 10,000 frames with every kernel, readings within and far beyond what models are trained on, and
-//! gates as many; `firmware/tests/bit_for_bit.rs` holds the host to the same bits. Assembly and its compiled
-//! twin agree here.
+//! Decodes 10,000 frames with every number format and exponential, with readings within and far beyond the
+//! training range, and gates as many. `firmware/tests/bit_for_bit.rs` checks that the host gives the same bits.
+//! Assembly routines and their compiled twins agree here.
 #![no_std]
 #![no_main]
 
@@ -11,7 +11,7 @@ use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
 use model_core::rbf::Format;
 use qemu_image::{checks, exit};
 
-/// The bytes of a model in testdata.
+/// Bytes of a model in testdata, aligned.
 macro_rules! model {
     ($name:literal) => {{
         static MODEL: Aligned<[u8; include_bytes!(concat!("../../../../testdata/", $name)).len()]> =
@@ -31,7 +31,7 @@ fn compare(format: Format, blob: &[u8]) {
     info!("{=str}: {=usize} of {=usize} rows differ from the twin's", format, different, compared);
 }
 
-/// One network for all rows, behind a projection.
+/// Decodes with one network for all rows, behind a projection.
 fn array(format: Format, tail: &str, blob: &[u8]) {
     let crc = unwrap!(checks::decoding_many::<Polynomial, { checks::ARRAY_ROWS }>(blob));
     info!("array, {=str}{=str}: {=u32:08x}", format.name(), tail, crc);

@@ -1,4 +1,4 @@
-//! The slots behave as flash does, and what is told of memory is right.
+//! The slots behave as flash does, and the reported sizes of memory are right.
 #![no_std]
 #![no_main]
 
@@ -18,7 +18,7 @@ fn take_a_kilobyte() {
 }
 
 fn slots() {
-    // SAFETY: called once.
+    // SAFETY: the slots are taken only here.
     let [mut a, mut b] = unsafe { Slot::take() };
     assert_eq!((a.bytes().len(), b.bytes().len()), (0x2_0000, 0x2_0000));
     assert_eq!(a.bytes().as_ptr_range().end, b.bytes().as_ptr_range().start);
@@ -50,7 +50,7 @@ fn stack() {
 
 fn sections() {
     let sections = Sections::linked();
-    // SAFETY: one thread, and no interrupt is on.
+    // SAFETY: there is one thread, and no interrupt is enabled.
     let (data, bss) =
         unsafe { (black_box(&raw const WITH_A_VALUE).read(), black_box(&raw const ZEROED).read()) };
     assert_eq!((data, bss), ([1, 2, 3], [0; 5]));

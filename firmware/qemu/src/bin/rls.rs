@@ -1,4 +1,4 @@
-//! Learns by recursive least squares; `firmware/tests/bit_for_bit.rs` holds the host to the same
+//! Trains by recursive least squares; `firmware/tests/bit_for_bit.rs` checks that the host gives the same
 //! bits.
 #![no_std]
 #![no_main]

@@ -8,7 +8,7 @@ use cortex_m_rt::entry;
 use defmt::info;
 use qemu_image::{exit, memory};
 
-/// Takes at least so many bytes of stack. Ends the run, without a word, if there are as many.
+/// Uses at least so many bytes of stack. Ends the run without logging anything if the stack has that many.
 fn take(bytes: usize) -> usize {
     let room = black_box([0_u32; 4]);
     if bytes < size_of_val(&room) {

@@ -1,5 +1,5 @@
-//! Bytes pass between the two UARTs, which `cargo xtask emulate` connects, in both directions at
-//! once; none is lost while the reader is slow.
+//! Bytes pass in both directions at once between the two UARTs, which `cargo xtask emulate` connects; none is
+//! lost while the reader is slow.
 #![no_std]
 #![no_main]
 
@@ -16,12 +16,12 @@ struct Progress {
     received: u32,
 }
 
-/// The `n`th byte of a sequence that begins anew after 251.
+/// Byte `n` of a sequence that repeats after 251 bytes.
 fn byte(n: u32) -> u8 {
     (n % 251) as u8
 }
 
-/// Tries to send; looks every third time whether something has come.
+/// Tries to send a byte, and every third time to receive one.
 fn step(uart: &mut Uart, progress: &mut Progress) {
     progress.steps += 1;
     if progress.sent < BYTES && uart.try_write(byte(progress.sent)) {

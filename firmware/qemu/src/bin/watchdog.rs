@@ -1,4 +1,4 @@
-//! The watchdog leaves a program alone that feeds it, and restarts one that does not.
+//! The watchdog restarts a program that does not feed it, and no other.
 #![no_std]
 #![no_main]
 
@@ -11,14 +11,14 @@ use qemu_image::{clock::Clock, exit, watchdog::Watchdog};
 const TIMEOUT_MS: u32 = 100;
 const RESTARTING: u32 = 0x5EED_0001;
 
-/// Survives a restart, since no start-up code writes to it.
+/// A mark that survives a restart, since no start-up code writes to it.
 #[unsafe(link_section = ".uninit.MARK")]
 static mut MARK: MaybeUninit<u32> = MaybeUninit::uninit();
 
 #[entry]
 fn main() -> ! {
     let mark = (&raw mut MARK).cast::<u32>();
-    // SAFETY: one thread; RAM holds something, whatever it is.
+    // SAFETY: there is one thread, and RAM holds some value, whichever it is.
     if unsafe { mark.read_volatile() } == RESTARTING {
         info!("restarted");
         exit::success();
@@ -30,7 +30,7 @@ fn main() -> ! {
         watchdog.feed();
     }
     info!("fed for five times its limit");
-    // SAFETY: as above.
+    // SAFETY: there is one thread.
     unsafe { mark.write_volatile(RESTARTING) };
     loop {
         cortex_m::asm::nop();

@@ -1,4 +1,4 @@
-//! What the assembly takes for granted, against what its twins have.
+//! Constants and sizes that the assembly assumes, compared with those of its compiled twins.
 
 use super::super::fixed16::CUBIC;
 use super::super::{Shape, expanded, fixed16};
@@ -19,7 +19,7 @@ fn words(assembly: &str) -> Vec<u32> {
 #[test]
 fn the_assembly_has_the_coefficients_of_its_twins_and_no_other_constants() {
     let exp2 = EXP2_COEFFICIENTS.into_iter().chain([ROUND]).map(f32::to_bits);
-    // Sixteen centres at once, for rows and for arrays.
+    // The routines for rows and for arrays each have the cubic once.
     let cubics = [CUBIC, CUBIC].into_iter().flatten().map(i32::cast_unsigned);
     let expected: Vec<u32> = exp2.chain(cubics).collect();
     assert_eq!(words(include_str!("../../cortex_m4.s")), expected);

@@ -1,4 +1,4 @@
-//! Networks with expanded distances, in f32 and in fixed point, against their formulas in f64.
+//! Networks with expanded distances, in f32 and in fixed point, compared with their formulas in f64.
 
 use super::super::*;
 use crate::exp::exp2;
@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// A network by its formula: centres on inputs scaled to [0, 1], σ, weights, bias, affine tail.
+/// Parameters of a network's formula: centres on inputs scaled to [0, 1], σ, weights, bias, affine tail.
 struct Formula {
     shape: Shape,
     minimum: Vec<f64>,
@@ -65,7 +65,7 @@ impl Formula {
         outputs
     }
 
-    /// Middles and units.
+    /// Middle of each input's range, and number of units in one unit of the reading.
     fn scaling(&self) -> [Vec<f32>; 2] {
         let half = f64::from(HALF_RANGE);
         let limits = || self.minimum.iter().zip(&self.span);
@@ -194,7 +194,8 @@ proptest! {
         let words = formula.fixed16();
         let network = fixed16::Network::try_new(shape, affine, &words).unwrap();
         prop_assert!((f64::from(network.width()) - sigma).abs() < 1e-4);
-        // A cubic within 1.1e-4, centres moved by rounding, weights of 16 bits and fewer.
+        // The error comes from the cubic (within 1.1e-4), from rounded centres, and from weights of at most 16
+        // bits.
         let error = formula.error_of(&network.into(), place);
         prop_assert!(error < 6e-4 * shape.centres as f64, "fixed16: {error}");
     }
@@ -281,7 +282,7 @@ fn activations_are_continuous_and_fall_with_distance() {
     let words = formula.fixed16();
     let network = fixed16::Network::try_new(shape, false, &words).unwrap();
     let mut before = network.activations(&[-26_214]).next().unwrap()[0];
-    // The margin below the exponent may cost the last place.
+    // The margin in the exponent may change the last place.
     assert!((0..=1).contains(&(fixed16::HIGHEST_ACTIVATION - before)), "{before}");
     for x in -26_213..=32_767 {
         let activation = network.activations(&[x]).next().unwrap()[0];

@@ -1,4 +1,4 @@
-//! Counted by hand from the manual's tables; the encodings are GNU as's.
+//! Costs counted by hand from the manual's tables; GNU as made the encodings.
 
 use super::*;
 use crate::cycles::thumb::decode;
@@ -10,7 +10,7 @@ fn decoded(code: Code) -> Instruction {
     decode(code[0], code.get(1).copied()).unwrap()
 }
 
-/// Cycles of instructions one behind the other, none of which branches.
+/// Cycles of instructions in sequence, none of which branches.
 fn sequence(codes: &[Code]) -> Vec<u64> {
     let instructions: Vec<_> = codes.iter().map(|code| decoded(code)).collect();
     (0..instructions.len())
@@ -21,7 +21,7 @@ fn sequence(codes: &[Code]) -> Vec<u64> {
         .collect()
 }
 
-/// Cycles of so many rounds of a loop that ends in a conditional branch to its start.
+/// Cycles of `count` rounds of a loop that ends in a conditional branch to its start.
 fn rounds(body: &[Code], count: usize) -> u64 {
     let body: Vec<_> = body.iter().map(|code| decoded(code)).collect();
     let mut previous = None;

@@ -1,6 +1,6 @@
 use super::*;
 
-/// At 0x10 `begin`: nop; bx lr. At 0x14 `end`: bx lr. At 0x16 the program.
+/// Code with `begin` at 0x10 (nop; bx lr), `end` at 0x14 (bx lr), and the program at 0x16.
 const FUNCTIONS: [u16; 3] = [0xBF00, 0x4770, 0x4770];
 const BEGIN: u32 = 0x10;
 const END: u32 = 0x14;
@@ -10,7 +10,7 @@ fn code(program: &[u16]) -> Code {
     Code::of(BEGIN, &[&FUNCTIONS, program].concat())
 }
 
-/// What is counted when these addresses are executed after one another.
+/// Counts of the regions when these addresses are executed in sequence.
 fn count(code: &Code, addresses: impl IntoIterator<Item = u32>) -> Outcome<Vec<Count>> {
     let mut regions = Regions::new(code, BEGIN, END);
     for address in addresses {
@@ -19,7 +19,7 @@ fn count(code: &Code, addresses: impl IntoIterator<Item = u32>) -> Outcome<Vec<C
     Ok(regions.finish()?.into_iter().map(|region| region.whole).collect())
 }
 
-/// A call of `begin`, which the program at `START` comes back from.
+/// Addresses of a call of `begin`, which returns to the program at `START`.
 const CALL: [u32; 3] = [0x8, BEGIN, BEGIN + 2];
 
 #[test]
@@ -93,7 +93,7 @@ fn a_region_without_an_end_is_refused() {
     assert!(count(&code, nested).is_err());
 }
 
-/// At 0x20: bl 0x30. At 0x24: blx r3. At 0x30, for 8 bytes, a function that is not traced.
+/// Code with bl 0x30 at 0x20, blx r3 at 0x24, and an untraced function of 8 bytes at 0x30.
 fn code_that_calls() -> Code {
     let mut halfwords = FUNCTIONS.to_vec();
     halfwords.resize(8, 0xBF00);

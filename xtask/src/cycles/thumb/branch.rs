@@ -2,14 +2,14 @@
 
 use super::{Class, Instruction, bit, bits};
 
-/// Decodes one; `None`: it is not known.
+/// Decodes a branch or control instruction; `None` if the encoding is unknown.
 pub fn decode(first: u16, second: u16) -> Option<Instruction> {
     let branch = Some(Instruction::new(Class::Branch));
     match (bit(second, 14), bit(second, 12)) {
         (false, true) => branch,
         // BL.
         (true, true) => Some(Instruction::call()),
-        // BLX to a constant, which this processor has not.
+        // BLX to a constant, which this processor does not have.
         (true, false) => None,
         // B with a condition.
         (false, false) if bits(first, 7, 3) != 7 => branch,
@@ -17,7 +17,7 @@ pub fn decode(first: u16, second: u16) -> Option<Instruction> {
     }
 }
 
-/// A5.3.5, with the bits that must be so.
+/// Decodes miscellaneous control: A5.3.5, with the bits that must be as given.
 fn control(first: u16, second: u16) -> Option<Instruction> {
     let (operation, rest) = (bits(second, 0, 8), second & 0xFF00);
     match (first, rest) {

@@ -2,10 +2,10 @@
 
 use super::{Class, Instruction, PC, bit, bits};
 
-/// PKHBT and PKHTB share the space of the operations on shifted registers.
+/// Operation code of PKHBT and PKHTB, among the operations on shifted registers.
 const PACK: u16 = 6;
 
-/// A5.3.11.
+/// Decodes data processing of a shifted register: A5.3.11.
 pub fn shifted_register(first: u16, second: u16) -> Option<Instruction> {
     if bit(second, 15) {
         return None;
@@ -13,12 +13,12 @@ pub fn shifted_register(first: u16, second: u16) -> Option<Instruction> {
     operation(first, second, bits(first, 5, 4) == PACK && !bit(first, 4) && !bit(second, 4))
 }
 
-/// A5.3.1.
+/// Decodes data processing of a modified constant: A5.3.1.
 pub fn modified_constant(first: u16, second: u16) -> Option<Instruction> {
     operation(first, second, false)
 }
 
-/// The operations that both have. Without a destination, some of them compare.
+/// Decodes an operation of shifted registers or modified constants. Without a destination, some of them compare.
 fn operation(first: u16, second: u16, also_known: bool) -> Option<Instruction> {
     let (operation, sets_flags) = (bits(first, 5, 4), bit(first, 4));
     let known = also_known || matches!(operation, 0..=4 | 8 | 10 | 11 | 13 | 14);
@@ -31,7 +31,7 @@ fn operation(first: u16, second: u16, also_known: bool) -> Option<Instruction> {
     }
 }
 
-/// A5.3.3.
+/// Decodes data processing of a plain constant: A5.3.3.
 pub fn plain_constant(first: u16, second: u16) -> Option<Instruction> {
     let known = match bits(first, 4, 5) {
         // ADD, ADR; MOVW; SUB, ADR; MOVT.
@@ -48,7 +48,7 @@ pub fn plain_constant(first: u16, second: u16) -> Option<Instruction> {
     (known && destination != PC).then(|| Instruction::data().to(destination))
 }
 
-/// A5.3.12 to A5.3.15.
+/// Decodes data processing of registers: A5.3.12 to A5.3.15.
 pub fn register(first: u16, second: u16) -> Option<Instruction> {
     let destination = bits(second, 8, 4);
     if bits(second, 12, 4) != 0xF || destination == PC {
@@ -68,7 +68,7 @@ pub fn register(first: u16, second: u16) -> Option<Instruction> {
     known.then(|| Instruction::data().to(destination))
 }
 
-/// A5.3.16.
+/// Decodes multiplications: A5.3.16.
 pub fn multiply(first: u16, second: u16) -> Option<Instruction> {
     let (operation, variant) = (bits(first, 4, 3), bits(second, 4, 2));
     let known = match (operation, variant) {
@@ -82,7 +82,7 @@ pub fn multiply(first: u16, second: u16) -> Option<Instruction> {
         .then(|| Instruction::data().to(destination))
 }
 
-/// A5.3.17.
+/// Decodes long multiplications and divisions: A5.3.17.
 pub fn long_multiply_or_divide(first: u16, second: u16) -> Option<Instruction> {
     let (low, high) = (bits(second, 12, 4), bits(second, 8, 4));
     match (bits(first, 4, 3), bits(second, 4, 4)) {

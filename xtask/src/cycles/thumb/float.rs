@@ -2,7 +2,7 @@
 
 use super::{Class, FpSet, Instruction, PC, bit, bits};
 
-/// Whether an instruction works on single or double registers; `None`: on another coprocessor.
+/// Whether an instruction works on double registers, not single ones; `None` if it is another coprocessor's.
 fn is_double(second: u16) -> Option<bool> {
     match bits(second, 8, 4) {
         10 => Some(false),
@@ -11,18 +11,18 @@ fn is_double(second: u16) -> Option<bool> {
     }
 }
 
-/// The single register whose number is in four bits and, lowest, in one more.
+/// Number of the single register, from its four upper bits and its lowest bit.
 fn single(four: u16, lowest: u16) -> u32 {
     u32::from(four << 1 | lowest)
 }
 
-/// So many single registers from `first` on; `None` if there are not so many.
+/// Set of `count` single registers from `first` on; `None` if there are fewer.
 fn run(first: u32, count: u32) -> Option<FpSet> {
     let fits = count > 0 && first + count <= FpSet::BITS;
     fits.then(|| (FpSet::MAX >> (FpSet::BITS - count)) << first)
 }
 
-/// VLDR, VSTR, VLDM, VSTM, VPUSH, VPOP, and VMOV of two core registers: A6.5, A6.7.
+/// Decodes VLDR, VSTR, VLDM, VSTM, VPUSH, VPOP, and VMOV of two core registers: A6.5, A6.7.
 pub fn memory(first: u16, second: u16) -> Option<Instruction> {
     let double = is_double(second)?;
     let (before, up, high, changes) = (bit(first, 8), bit(first, 7), bit(first, 6), bit(first, 5));
@@ -70,13 +70,13 @@ fn two_core_registers(first: u16, second: u16, double: bool) -> Option<Instructi
     })
 }
 
-/// Data processing, and transfers of one core register: A6.4, A6.6.
+/// Decodes data processing, and transfers of one core register: A6.4, A6.6.
 pub fn register(first: u16, second: u16) -> Option<Instruction> {
     let double = is_double(second)?;
     match (bit(second, 4), double) {
         (true, _) => one_core_register(first, second, double),
         (false, false) => arithmetic(first, second),
-        // Double precision, which this processor has not.
+        // Double precision, which this processor does not have.
         (false, true) => None,
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{Class, Instruction, PC, bit, bits};
 
-/// LDM, STM, and PUSH and POP with high registers: A5.3.5.
+/// Decodes LDM, STM, and PUSH and POP with high registers: A5.3.5.
 pub fn multiple(first: u16, second: u16) -> Option<Instruction> {
     // Increment after, decrement before; the others are for other processors.
     let known = matches!(bits(first, 7, 2), 1 | 2) && bits(first, 0, 4) != PC;
@@ -13,7 +13,7 @@ pub fn multiple(first: u16, second: u16) -> Option<Instruction> {
     Some(instruction.at(bits(first, 0, 4)).branching(loads && bit(second, PC.into())))
 }
 
-/// LDRD, STRD, LDREX, STREX and their kin, TBB, TBH: A5.3.6.
+/// Decodes LDRD, STRD, LDREX, STREX and their variants, TBB, TBH: A5.3.6.
 pub fn double_or_exclusive(first: u16, second: u16) -> Option<Instruction> {
     let base = bits(first, 0, 4);
     if bit(first, 8) || bit(first, 5) {
@@ -34,7 +34,7 @@ pub fn double_or_exclusive(first: u16, second: u16) -> Option<Instruction> {
     }
 }
 
-/// One register of any width: A5.3.7 to A5.3.10.
+/// Decodes a load or store of one register of any width: A5.3.7 to A5.3.10.
 pub fn single(first: u16, second: u16) -> Option<Instruction> {
     let (loads, signed, size) = (bit(first, 4), bit(first, 8), bits(first, 5, 2));
     let (base, register) = (bits(first, 0, 4), bits(second, 12, 4));

@@ -2,7 +2,7 @@
 
 use super::{Class, Instruction, SP, bit, bits};
 
-/// Decodes one; `None`: it is not known.
+/// Decodes an instruction of one halfword; `None` if the encoding is unknown.
 pub fn decode(h: u16) -> Option<Instruction> {
     let data = Instruction::data();
     let load = Instruction::load();
@@ -47,7 +47,7 @@ pub fn decode(h: u16) -> Option<Instruction> {
     })
 }
 
-/// ADD, CMP, MOV of any registers, BX, BLX: A5.2.3.
+/// Decodes ADD, CMP, MOV of any registers, BX, BLX: A5.2.3.
 fn high_registers(h: u16) -> Option<Instruction> {
     let destination = bits(h, 0, 3) | (bits(h, 7, 1) << 3);
     match bits(h, 8, 2) {
@@ -59,7 +59,7 @@ fn high_registers(h: u16) -> Option<Instruction> {
     }
 }
 
-/// A5.2.5.
+/// Decodes miscellaneous instructions: A5.2.5.
 fn miscellaneous(h: u16) -> Option<Instruction> {
     let data = Instruction::data();
     match bits(h, 8, 4) {

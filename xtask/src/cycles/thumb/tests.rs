@@ -1,6 +1,6 @@
 use super::*;
 
-/// As `r4-r6 r14`; `-` if there are none.
+/// Registers in the form `r4-r6 r14`; `-` if there are none.
 fn registers(letter: char, set: u32) -> String {
     let is_in = |n: u32| n < 32 && set >> n & 1 == 1;
     let runs =
