@@ -175,8 +175,8 @@ fn page_of(f: &Findings) -> print::Page {
         );
     }
     if let Some(u) = &f.uploads {
-        let good = if u.good_came_into_force { "came" } else { "DID NOT COME" };
-        line("good uploads", format!("{good} activated ({} bytes and more)", u.blob_bytes));
+        let good = if u.good_came_into_force { "activated" } else { "NOT ACTIVATED" };
+        line("good uploads", format!("{good} ({} bytes and more)", u.blob_bytes));
         line(
             "damaged uploads",
             format!("{} of {} refused, previous model active", u.damaged_refused, u.damaged),

@@ -114,7 +114,8 @@ fn sixteens(centres: usize) -> u32 {
 /// Infers the 18 outputs of a network with expanded distances from 18 inputs.
 ///
 /// # Safety
-/// The caller must check that `block` has at least one centre, and [`expanded_words`] words for its centres and one group.
+/// The caller must check that `block` has at least one centre, and [`expanded_words`] words for its centres and
+/// one group.
 pub(crate) unsafe fn expanded(
     block: &Block<'_>,
     inputs: Inputs<'_>,
@@ -137,7 +138,8 @@ pub(crate) unsafe fn expanded(
 /// Infers the outputs of a network with expanded distances, in groups of 18, from 18 inputs.
 ///
 /// # Safety
-/// The caller must check that there is at least one of the `groups`, and that `block` has at least one centre, and [`expanded_words`] words for its
+/// The caller must check that there is at least one of the `groups`, and that `block` has at least one centre,
+/// and [`expanded_words`] words for its
 /// centres and as many groups.
 #[inline(never)] // its stack would burden the routine for one group
 pub(crate) unsafe fn expanded_array(
@@ -161,7 +163,8 @@ pub(crate) unsafe fn expanded_array(
 /// Infers the 18 outputs of a network in 16-bit fixed point from 18 inputs.
 ///
 /// # Safety
-/// The caller must check that `block` has at least one centre, and [`fixed16_words`] words for its centres and one group.
+/// The caller must check that `block` has at least one centre, and [`fixed16_words`] words for its centres and
+/// one group.
 pub(crate) unsafe fn fixed16(
     block: &Block<'_>,
     inputs: Inputs<'_>,
@@ -182,7 +185,8 @@ pub(crate) unsafe fn fixed16(
 /// Infers the outputs of a network in 16-bit fixed point, in groups of 18, from 18 inputs.
 ///
 /// # Safety
-/// The caller must check that there is at least one of the `groups`, and that `block` has at least one centre, and [`fixed16_words`] words for its
+/// The caller must check that there is at least one of the `groups`, and that `block` has at least one centre,
+/// and [`fixed16_words`] words for its
 /// centres and as many groups.
 #[inline(never)] // its stack would burden the routine for one group
 pub(crate) unsafe fn fixed16_array(
