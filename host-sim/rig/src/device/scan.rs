@@ -109,9 +109,9 @@ pub fn check<W: Wire>(
         ..Configuration::DEFAULT
     };
     let samples = ((ROWS + 1) * COLUMNS) as u32 * u32::from(scan.oversampling);
-    let patience = Duration::from_secs(5) + samples * SAMPLE;
+    let patience = device.patience.max(Duration::from_secs(5) + samples * SAMPLE);
     // A request may have to wait for a scan.
-    device.patience = device.patience.max(patience);
+    device.patience = patience;
 
     let end = line.try_clone()?;
     progress.stage("scanning on the device", scans);
