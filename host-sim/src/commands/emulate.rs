@@ -18,7 +18,7 @@ use super::progress::Terminal;
 /// Frames on their way at a time: either line holds bytes back while the device is busy.
 const WINDOW: usize = 4;
 /// Longest time for an answer: the emulator loses nothing, but a busy computer makes it slow.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_mins(1);
 
 /// Line that carries the bytes between the host and the image's link.
 #[derive(Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
