@@ -10,6 +10,7 @@ use model_core::rbf::Format;
 use serde::Deserialize;
 use taxel_data::BadValue;
 use taxel_data::digest::digest;
+use taxel_data::error::require;
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
 use taxel_learn::train::{check_spread, train};
@@ -197,15 +198,6 @@ impl Experiment {
         }
         counts.into_iter().try_for_each(|(field, frames)| self.world.check_frames(field, frames))
     }
-}
-
-fn require(
-    holds: bool,
-    field: impl Into<String>,
-    value: impl ToString,
-    rule: impl FnOnce() -> String,
-) -> Check {
-    if holds { Ok(()) } else { Err(BadValue::new(field, value, rule())) }
 }
 
 fn check_training(t: &Training) -> Check {

@@ -37,6 +37,19 @@ impl BadValue {
     }
 }
 
+/// Checks that a setting `holds`; its `value` and the `rule` for it are told if not.
+///
+/// # Errors
+/// The setting, if it does not hold.
+pub fn require(
+    holds: bool,
+    field: impl Into<String>,
+    value: impl ToString,
+    rule: impl FnOnce() -> String,
+) -> std::result::Result<(), BadValue> {
+    if holds { Ok(()) } else { Err(BadValue::new(field, value, rule())) }
+}
+
 /// Failure to read, write or use a data file.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {

@@ -2,6 +2,7 @@
 
 use firmware::readout::ScanSettings;
 use taxel_data::BadValue;
+use taxel_data::error::require;
 
 use crate::motion::{self, Independent, Press};
 use crate::noise::{Noise, NoiseKind};
@@ -153,15 +154,6 @@ pub fn check_noise_level(field: &str, level: f64) -> Check {
     require((0.0..=1.0).contains(&level), field, level, || {
         "it is a fraction from 0 to 1 (0.005 is 0.5 %)".into()
     })
-}
-
-fn require(
-    holds: bool,
-    field: impl Into<String>,
-    value: impl ToString,
-    rule: impl FnOnce() -> String,
-) -> Check {
-    if holds { Ok(()) } else { Err(BadValue::new(field, value, rule())) }
 }
 
 fn positive(field: &str, value: f64) -> Check {
