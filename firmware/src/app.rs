@@ -4,115 +4,59 @@
 //! must restart. All large memory is in [`Buffers`], for which the program has a static: nothing grows, nothing
 //! is allocated.
 
-use model_core::{Decoder, Estimate, Frame, RowStatus};
+use model_core::{Estimate, Wires};
 
+use crate::capacity::Capacity;
 use crate::link::message::{Configuration, Statistics};
 use crate::link::receive::Receiver;
 use crate::log::info;
 use crate::platform::Platform;
 use crate::readout::{Baseline, FrameSource};
-use crate::store::{Slot, Upload, blob_in_slot, generation};
+use crate::store::{Slot, Upload};
 
 // From the ground up: a module imports only what is declared before it.
+mod buffers;
 mod configuration;
 mod frame_clock;
 mod line;
+mod model;
 mod session;
 mod answer;
 
-use frame_clock::FrameClock;
+pub use buffers::Buffers;
+use frame_clock::{FrameClock, LongClock};
 use line::Line;
 pub use session::{Leave, Session};
 
-/// Bytes of the longest message for the paper's sensor: 8 × 18 floats and the fields around them.
-pub const PAPER_MESSAGE_BYTES: usize = 608;
-
-/// The application for the paper's sensor.
-pub type PaperApp<'m, P, F> = App<'m, P, F, 8, 18, 18, PAPER_MESSAGE_BYTES>;
-
-/// The buffers for the paper's sensor.
-pub type PaperBuffers = Buffers<8, 18, 18, PAPER_MESSAGE_BYTES>;
-
-/// The large part of an application's memory. It is all zero at first, so that a static of it costs no flash, and
-/// nothing is moved over the stack.
-///
-/// `BYTES` is the length of the longest message: `4 · ROWS · max(COLS, OUTPUTS) + ROWS + 24`, at least 128.
-pub struct Buffers<const ROWS: usize, const COLS: usize, const OUTPUTS: usize, const BYTES: usize> {
-    receiver: Receiver<BYTES>,
-    message: [u8; BYTES],
-    frame: Frame<ROWS, COLS>,
-    estimate: Estimate<ROWS, OUTPUTS>,
-    baseline: Baseline<ROWS, COLS>,
-    rest: Estimate<ROWS, OUTPUTS>,
-}
-
-impl<const ROWS: usize, const COLS: usize, const OUTPUTS: usize, const BYTES: usize> Default
-    for Buffers<ROWS, COLS, OUTPUTS, BYTES>
-{
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl<const ROWS: usize, const COLS: usize, const OUTPUTS: usize, const BYTES: usize>
-    Buffers<ROWS, COLS, OUTPUTS, BYTES>
-{
-    /// Makes empty buffers.
-    #[must_use]
-    pub const fn new() -> Self {
-        const {
-            let widest = if COLS > OUTPUTS { COLS } else { OUTPUTS };
-            assert!(BYTES >= 4 * ROWS * widest + ROWS + 24, "the longest message must fit");
-            assert!(BYTES >= 128, "and so must an identity");
-            assert!(ROWS > 0 && ROWS < 256 && COLS > 0 && OUTPUTS > 0 && OUTPUTS < 256);
-        }
-        let nothing =
-            Estimate { outputs: [[0.0; OUTPUTS]; ROWS], status: [RowStatus::Decoded; ROWS] };
-        Self {
-            receiver: Receiver::new(),
-            message: [0; BYTES],
-            frame: Frame { row_column_resistance_ohm: [[0.0; COLS]; ROWS] },
-            estimate: nothing,
-            baseline: Baseline::new(),
-            rest: nothing,
-        }
-    }
-}
-
-/// The application's state, except the model in force.
-pub struct App<
-    'm,
-    P: Platform,
-    F,
-    const ROWS: usize,
-    const COLS: usize,
-    const OUTPUTS: usize,
-    const BYTES: usize,
-> {
-    receiver: &'m mut Receiver<BYTES>,
-    core: Core<'m, P, F, ROWS, COLS, OUTPUTS, BYTES>,
+/// The application's state, except the model in force. `ROWS` is the largest number of rows.
+pub struct App<'m, P, F, const ROWS: usize> {
+    receiver: Receiver<&'m mut [u8]>,
+    core: Core<'m, P, F, ROWS>,
 }
 
 /// The application without the receiver: a request borrows the receiver's bytes while it is answered.
-struct Core<
-    'm,
-    P,
-    F,
-    const ROWS: usize,
-    const COLS: usize,
-    const OUTPUTS: usize,
-    const BYTES: usize,
-> {
-    line: Line<'m, P, BYTES>,
+struct Core<'m, P, F, const ROWS: usize> {
+    line: Line<'m, P>,
     source: F,
     configuration: Configuration,
     statistics: Statistics,
     clock: FrameClock,
-    frame: &'m mut Frame<ROWS, COLS>,
-    estimate: &'m mut Estimate<ROWS, OUTPUTS>,
-    baseline: &'m mut Baseline<ROWS, COLS>,
+    time: LongClock,
+    capacity: Capacity,
+    /// Wires that are scanned: those of the model in force, else all.
+    wires: Wires,
+    /// Rows of the model in force, and outputs of all of them; without a model, rows that are scanned and 0.
+    rows: usize,
+    outputs: usize,
+    /// Room for the longest frame, and for working space as long.
+    frame: &'m mut [f32],
+    scratch: &'m mut [f32],
+    estimate: Estimate<'m>,
     /// The baseline, decoded by the model in force; valid once a baseline is captured.
-    rest: &'m mut Estimate<ROWS, OUTPUTS>,
+    rest: Estimate<'m>,
+    /// Bits of the last frame's faulty readings, a word a row.
+    faulty_columns: [u32; ROWS],
+    baseline: Baseline<'m>,
     /// Whether the last scan gave at least one reading.
     sensor_answers: bool,
     /// Number of the request that waits for the baseline, and number of frames still to be scanned for it.
@@ -120,46 +64,48 @@ struct Core<
     upload: Upload,
 }
 
-impl<
-    'm,
-    P: Platform,
-    F: FrameSource<ROWS, COLS>,
-    const ROWS: usize,
-    const COLS: usize,
-    const OUTPUTS: usize,
-    const BYTES: usize,
-> App<'m, P, F, ROWS, COLS, OUTPUTS, BYTES>
-{
+impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
     /// Makes an application that starts with `configuration`.
-    pub fn new(
+    pub fn new<const COLUMNS: usize, const OUTPUTS: usize, const BYTES: usize>(
         mut platform: P,
         source: F,
         configuration: Configuration,
-        buffers: &'m mut Buffers<ROWS, COLS, OUTPUTS, BYTES>,
+        buffers: &'m mut Buffers<ROWS, COLUMNS, OUTPUTS, BYTES>,
     ) -> Self {
-        let Buffers { receiver, message, frame, estimate, baseline, rest } = buffers;
-        let clock = FrameClock::starting_at(platform.now_us());
+        let Buffers { received, message, frame, baseline, scratch, estimate, rest } = buffers;
+        let capacity = Buffers::<ROWS, COLUMNS, OUTPUTS, BYTES>::CAPACITY;
+        let now_us = platform.now_us();
         let core = Core {
             line: Line::new(platform, message),
             source,
             configuration,
             statistics: Statistics::default(),
-            clock,
-            frame,
-            estimate,
-            baseline,
-            rest,
+            clock: FrameClock::starting_at(now_us),
+            time: LongClock::starting_at(now_us),
+            capacity,
+            wires: capacity.wires(),
+            rows: ROWS,
+            outputs: 0,
+            frame: frame.as_flattened_mut(),
+            scratch: scratch.as_flattened_mut(),
+            estimate: estimate.whole(),
+            rest: rest.whole(),
+            faulty_columns: [0; ROWS],
+            baseline: Baseline::new(baseline.as_flattened_mut()),
             sensor_answers: true,
             capture: None,
             upload: Upload::new(),
         };
-        Self { receiver, core }
+        Self { receiver: Receiver::new(received), core }
     }
 
     /// Runs until the host asks for a restart. When another model is committed, it replaces the one in force.
-    pub fn run<S: Slot>(&mut self, slots: &mut [S; 2]) {
+    ///
+    /// A model that fits into `weights` is copied there from its slot, and decoded from there: on most boards RAM is
+    /// faster than flash. It may be empty.
+    pub fn run<S: Slot>(&mut self, slots: &mut [S; 2], weights: &mut [u32]) {
         loop {
-            let mut session = Session::start(self, slots);
+            let mut session = Session::start(self, slots, weights);
             let leave = loop {
                 if let Some(leave) = session.step() {
                     break leave;
@@ -175,18 +121,5 @@ impl<
     /// The board's platform, for tests that inspect it.
     pub fn platform(&mut self) -> &mut P {
         self.core.line.platform()
-    }
-
-    /// Number and generation of the most recent slot whose model is sound.
-    fn choose<S: Slot>(slots: &[S; 2]) -> Option<(usize, u32)> {
-        let [a, b] = slots.each_ref().map(Slot::bytes);
-        let mut candidates = [(0, generation(0, a), a), (1, generation(1, b), b)];
-        if candidates[1].1 > candidates[0].1 {
-            candidates.swap(0, 1);
-        }
-        candidates.into_iter().find_map(|(index, generation, bytes)| {
-            let sound = Decoder::<ROWS, COLS, OUTPUTS>::check(blob_in_slot(bytes)).is_ok();
-            generation.filter(|_| sound).map(|generation| (index, generation))
-        })
     }
 }

@@ -4,7 +4,7 @@
 //! Readings of the paper's sensor are near 60 Ω, and its 18 columns together load a row with 3.3 Ω. A resistance
 //! in series with a row is therefore never negligible, and both circuits correct for it.
 
-use model_core::{Frame, RowWire};
+use model_core::{RowWire, Wires};
 
 /// Smallest current in counts that counts as one; below it, the reading is open.
 pub const NO_CURRENT_COUNTS: f32 = 4.0;
@@ -13,45 +13,34 @@ pub const NO_CURRENT_COUNTS: f32 = 4.0;
 ///
 /// A reading is NaN if its sample (or its idle sample) could not be taken, and [`f32::INFINITY`] if no current
 /// flows (open). It is 0 if the sample is saturated, or the resistance too small to be measured (short).
-pub trait Circuit<const ROWS: usize, const COLS: usize> {
+pub trait Circuit {
     /// Whether the circuit needs a sample of every column while all rows idle.
     const IDLE_SAMPLES: bool;
 
-    /// Readings in Ω of `row`.
+    /// Converts the samples of `row` to Ω, in place.
     ///
-    /// `sampled` and `idle` are averaged counts of every column, NaN where none could be taken. `idle` is ignored
-    /// unless [`IDLE_SAMPLES`](Self::IDLE_SAMPLES). `full_scale_counts` is the converter's largest count.
-    fn row_ohm(
-        &self,
-        row: RowWire,
-        sampled: &[f32; COLS],
-        idle: &[f32; COLS],
-        full_scale_counts: u16,
-    ) -> [f32; COLS];
+    /// `readings` holds averaged counts of every column, NaN where none could be taken, and Ω afterwards. `idle`
+    /// holds as many idle counts; it is ignored unless [`IDLE_SAMPLES`](Self::IDLE_SAMPLES).
+    /// `full_scale_counts` is the converter's largest count.
+    fn row_ohm(&self, row: RowWire, idle: &[f32], full_scale_counts: u16, readings: &mut [f32]);
 
-    /// Corrects a whole `frame` for the influence of its rows on each other, as far as that is known. Does
-    /// nothing unless a circuit overrides it.
-    fn correct(&self, frame: &mut Frame<ROWS, COLS>) {
-        let _ = frame;
+    /// Corrects a whole `frame` (Ω, row after row) for the influence of its rows on each other, as far as that is
+    /// known. Does nothing unless a circuit overrides it.
+    fn correct(&self, wires: Wires, frame: &mut [f32]) {
+        let _ = (wires, frame);
     }
 }
 
 /// A reference to a circuit is a circuit too, so that its constants can stay in flash.
-impl<C: Circuit<ROWS, COLS>, const ROWS: usize, const COLS: usize> Circuit<ROWS, COLS> for &C {
+impl<C: Circuit> Circuit for &C {
     const IDLE_SAMPLES: bool = C::IDLE_SAMPLES;
 
-    fn row_ohm(
-        &self,
-        row: RowWire,
-        sampled: &[f32; COLS],
-        idle: &[f32; COLS],
-        full_scale_counts: u16,
-    ) -> [f32; COLS] {
-        C::row_ohm(self, row, sampled, idle, full_scale_counts)
+    fn row_ohm(&self, row: RowWire, idle: &[f32], full_scale_counts: u16, readings: &mut [f32]) {
+        C::row_ohm(self, row, idle, full_scale_counts, readings);
     }
 
-    fn correct(&self, frame: &mut Frame<ROWS, COLS>) {
-        C::correct(self, frame);
+    fn correct(&self, wires: Wires, frame: &mut [f32]) {
+        C::correct(self, wires, frame);
     }
 }
 
@@ -67,8 +56,9 @@ impl<C: Circuit<ROWS, COLS>, const ROWS: usize, const COLS: usize> Circuit<ROWS,
 /// use model_core::RowWire;
 /// let divider = Divider::<1, 1> { row_source_ohm: [0.0], ..Divider::TYPICAL };
 /// // 470 Ω below 58.75 Ω: eight ninths of 4096.
-/// let ohm = divider.row_ohm(RowWire(0), &[4096.0 * 8.0 / 9.0], &[f32::NAN], 4095);
-/// assert!((ohm[0] - 58.75).abs() < 1e-3);
+/// let mut reading = [4096.0 * 8.0 / 9.0];
+/// divider.row_ohm(RowWire(0), &[f32::NAN], 4095, &mut reading);
+/// assert!((reading[0] - 58.75).abs() < 1e-3);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Divider<const ROWS: usize, const COLS: usize> {
@@ -89,29 +79,20 @@ impl<const ROWS: usize, const COLS: usize> Divider<ROWS, COLS> {
     };
 }
 
-impl<const ROWS: usize, const COLS: usize> Circuit<ROWS, COLS> for Divider<ROWS, COLS> {
+impl<const ROWS: usize, const COLS: usize> Circuit for Divider<ROWS, COLS> {
     const IDLE_SAMPLES: bool = false;
 
-    fn row_ohm(
-        &self,
-        row: RowWire,
-        sampled: &[f32; COLS],
-        _idle: &[f32; COLS],
-        full_scale_counts: u16,
-    ) -> [f32; COLS] {
+    fn row_ohm(&self, row: RowWire, _: &[f32], full_scale_counts: u16, readings: &mut [f32]) {
         let counts = counts_at_reference(full_scale_counts);
         // Voltages in units of the reference.
-        let mut current = [0.0; COLS];
-        for ((i, n), r) in current.iter_mut().zip(sampled).zip(&self.reference_ohm) {
-            *i = n / counts / r;
+        let currents = readings.iter().zip(&self.reference_ohm).map(|(n, r)| n / counts / r);
+        let row = 1.0 - voltage_drop(&self.row_source_ohm, row, currents);
+        let columns = self.reference_ohm.iter().zip(&self.series_ohm);
+        for (reading, (r, series)) in readings.iter_mut().zip(columns) {
+            let n = *reading;
+            let (across, current) = (row - n / counts, n / counts / r);
+            *reading = reading_of(n, n, full_scale_counts, across / current - series);
         }
-        let row = 1.0 - voltage_drop(&self.row_source_ohm, row, &current);
-        let mut ohm = current;
-        for ((place, n), series) in ohm.iter_mut().zip(sampled).zip(&self.series_ohm) {
-            let across = row - n / counts;
-            *place = reading(*n, *n, full_scale_counts, across / *place - series);
-        }
-        ohm
     }
 }
 
@@ -130,8 +111,9 @@ impl<const ROWS: usize, const COLS: usize> Circuit<ROWS, COLS> for Divider<ROWS,
 /// let circuit = ZeroPotential::<1, 1> { row_source_ohm: [0.0], ..ZeroPotential::TYPICAL };
 /// // 0.2 V across 62.5 Ω drive 3.2 mA through 560 Ω: 1.792 V above the idle 0.2 V.
 /// let counts = |v: f32| v / 3.3 * 4096.0;
-/// let ohm = circuit.row_ohm(RowWire(0), &[counts(1.992)], &[counts(0.2)], 4095);
-/// assert!((ohm[0] - 62.5).abs() < 1e-3);
+/// let mut reading = [counts(1.992)];
+/// circuit.row_ohm(RowWire(0), &[counts(0.2)], 4095, &mut reading);
+/// assert!((reading[0] - 62.5).abs() < 1e-3);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ZeroPotential<const ROWS: usize, const COLS: usize> {
@@ -159,43 +141,32 @@ impl<const ROWS: usize, const COLS: usize> ZeroPotential<ROWS, COLS> {
     };
 }
 
-impl<const ROWS: usize, const COLS: usize> Circuit<ROWS, COLS> for ZeroPotential<ROWS, COLS> {
+impl<const ROWS: usize, const COLS: usize> Circuit for ZeroPotential<ROWS, COLS> {
     const IDLE_SAMPLES: bool = true;
 
-    fn row_ohm(
-        &self,
-        row: RowWire,
-        sampled: &[f32; COLS],
-        idle: &[f32; COLS],
-        full_scale_counts: u16,
-    ) -> [f32; COLS] {
+    fn row_ohm(&self, row: RowWire, idle: &[f32], full_scale_counts: u16, readings: &mut [f32]) {
         let volt_per_count = self.reference_v / counts_at_reference(full_scale_counts);
-        let mut current = [0.0; COLS];
-        let samples = sampled.iter().zip(idle);
-        for ((i, (n, idle)), r) in current.iter_mut().zip(samples).zip(&self.feedback_ohm) {
-            *i = (n - idle) * volt_per_count / r;
+        let current = |n: f32, idle: f32, r: f32| (n - idle) * volt_per_count / r;
+        let columns = || idle.iter().zip(&self.feedback_ohm);
+        let currents = readings.iter().zip(columns()).map(|(n, (idle, r))| current(*n, *idle, *r));
+        let across = self.drive_v - voltage_drop(&self.row_source_ohm, row, currents);
+        for (reading, (idle, r)) in readings.iter_mut().zip(columns()) {
+            let n = *reading;
+            *reading = reading_of(n, n - idle, full_scale_counts, across / current(n, *idle, *r));
         }
-        let across = self.drive_v - voltage_drop(&self.row_source_ohm, row, &current);
-        let mut ohm = current;
-        let samples = sampled.iter().zip(idle);
-        for (place, (n, idle)) in ohm.iter_mut().zip(samples) {
-            *place = reading(*n, n - idle, full_scale_counts, across / *place);
-        }
-        ohm
     }
 
     /// Corrects each reading to R·(1 − s·Σ1/R), with the sum over the column's rows. A row that was not measured
     /// counts as the mean of the others.
-    fn correct(&self, frame: &mut Frame<ROWS, COLS>) {
-        let rows = &mut frame.row_column_resistance_ohm;
-        for (column, series) in self.series_ohm.iter().enumerate() {
-            let readings = rows.iter().filter_map(|row| row.get(column));
+    fn correct(&self, wires: Wires, frame: &mut [f32]) {
+        for (column, series) in self.series_ohm.iter().enumerate().take(wires.columns) {
+            let readings = frame.iter().skip(column).step_by(wires.columns.max(1));
             let measured = readings.filter(|ohm| **ohm > 0.0); // neither NaN nor short
             let (count, sum_s) =
                 measured.fold((0_usize, 0.0), |(count, sum), ohm| (count + 1, sum + 1.0 / ohm));
             if count > 0 {
-                let factor = 1.0 - series * (sum_s * (ROWS as f32 / count as f32));
-                let readings = rows.iter_mut().filter_map(|row| row.get_mut(column));
+                let factor = 1.0 - series * (sum_s * (wires.rows as f32 / count as f32));
+                let readings = frame.iter_mut().skip(column).step_by(wires.columns.max(1));
                 readings
                     .filter(|ohm| ohm.is_finite()) // open stays open
                     .for_each(|ohm| *ohm = (*ohm * factor).max(0.0));
@@ -211,15 +182,20 @@ fn counts_at_reference(full_scale_counts: u16) -> f32 {
 
 /// Voltage drop at the source of a `row`: R_s·ΣI. A column that could not be sampled counts as the mean of the
 /// others.
-fn voltage_drop(row_source_ohm: &[f32], row: RowWire, current: &[f32]) -> f32 {
+fn voltage_drop(
+    row_source_ohm: &[f32],
+    row: RowWire,
+    currents: impl ExactSizeIterator<Item = f32>,
+) -> f32 {
     let source_ohm = row_source_ohm.get(row.0).copied().unwrap_or(0.0);
-    let taken = current.iter().filter(|i| !i.is_nan());
+    let columns = currents.len();
+    let taken = currents.filter(|i| !i.is_nan());
     let (count, sum) = taken.fold((0_usize, 0.0), |(count, sum), i| (count + 1, sum + i));
-    if count == 0 { 0.0 } else { source_ohm * sum * (current.len() as f32 / count as f32) }
+    if count == 0 { 0.0 } else { source_ohm * sum * (columns as f32 / count as f32) }
 }
 
 /// The reading: `ohm`, or NaN, infinity or 0 if the sample is missing, open or short.
-fn reading(sampled: f32, due_to_current: f32, full_scale_counts: u16, ohm: f32) -> f32 {
+fn reading_of(sampled: f32, due_to_current: f32, full_scale_counts: u16, ohm: f32) -> f32 {
     if due_to_current.is_nan() {
         f32::NAN
     } else if sampled > f32::from(full_scale_counts) - 0.5 {
@@ -263,6 +239,28 @@ mod tests {
         [core::array::from_fn(|k| sampled(k) as f32), idle.map(|n| n as f32)]
     }
 
+    /// Readings of the row `row` from its samples.
+    fn read<const N: usize>(
+        circuit: &impl Circuit,
+        row: usize,
+        sampled: &[f32; N],
+        idle: &[f32; N],
+    ) -> [f32; N] {
+        let mut readings = *sampled;
+        circuit.row_ohm(RowWire(row), idle, 4095, &mut readings);
+        readings
+    }
+
+    /// A frame after the circuit has corrected it.
+    fn corrected<const R: usize, const C: usize>(
+        circuit: &impl Circuit,
+        frame: [[f32; C]; R],
+    ) -> [[f32; C]; R] {
+        let mut corrected = frame;
+        circuit.correct(Wires { rows: R, columns: C }, corrected.as_flattened_mut());
+        corrected
+    }
+
     fn row() -> [f64; 18] {
         core::array::from_fn(|k| 52.0 + 0.9 * k as f64)
     }
@@ -288,18 +286,12 @@ mod tests {
             }
             let counts = divider_counts(&divider, &row());
             // The divider subtracts two voltages that differ by a tenth: fewer digits are left.
-            assert_close(
-                &divider.row_ohm(RowWire(1), &counts, &[f32::NAN; 18], 4095),
-                &row(),
-                1e-5,
-            );
+            assert_close(&read(&divider, 1, &counts, &[f32::NAN; 18]), &row(), 1e-5);
             let [sampled, idle] = zero_potential_counts(&circuit, &row());
-            let ohm = circuit.row_ohm(RowWire(1), &sampled, &idle, 4095);
+            let ohm = read(&circuit, 1, &sampled, &idle);
             // The other row is open: it feeds no column.
             let rows = [[f32::INFINITY; 18], ohm];
-            let mut frame = Frame { row_column_resistance_ohm: rows };
-            circuit.correct(&mut frame);
-            assert_close(&frame.row_column_resistance_ohm[1], &row(), 2e-6);
+            assert_close(&corrected(&circuit, rows)[1], &row(), 2e-6);
         }
     }
 
@@ -308,7 +300,7 @@ mod tests {
         let circuit = ZeroPotential { row_source_ohm: [9.0, 0.3], ..ZeroPotential::TYPICAL };
         let [sampled, idle] = zero_potential_counts(&circuit, &row());
         let uncorrected = ZeroPotential { row_source_ohm: [0.0; 2], ..circuit };
-        let ohm = uncorrected.row_ohm(RowWire(1), &sampled, &idle, 4095);
+        let ohm = read(&uncorrected, 1, &sampled, &idle);
         // 0.3 Ω against the 3.3 Ω of 18 columns.
         let excess = f64::from(ohm[0]) / row()[0] - 1.0;
         assert!((0.08..0.1).contains(&excess), "{excess}");
@@ -322,7 +314,7 @@ mod tests {
         sampled[4] = idle[4] - 3.0; // noise may go below idle
         let mut no_idle = idle;
         no_idle[3] = f32::NAN;
-        let ohm = circuit.row_ohm(RowWire(1), &sampled, &no_idle, 4095);
+        let ohm = read(&circuit, 1, &sampled, &no_idle);
         assert!(ohm[0].is_nan() && ohm[3].is_nan());
         assert_eq!((ohm[1], ohm[2], ohm[4]), (0.0, f32::INFINITY, f32::INFINITY));
         assert!((f64::from(ohm[5]) / row()[5] - 1.0).abs() < 2e-6);
@@ -330,7 +322,7 @@ mod tests {
         let divider = Divider { row_source_ohm: [0.0; 2], ..Divider::TYPICAL };
         let mut counts = divider_counts(&divider, &row());
         (counts[0], counts[1], counts[2]) = (f32::NAN, 4095.0, 0.0);
-        let ohm = divider.row_ohm(RowWire(1), &counts, &idle, 4095);
+        let ohm = read(&divider, 1, &counts, &idle);
         assert!(ohm[0].is_nan());
         assert_eq!((ohm[1], ohm[2]), (0.0, f32::INFINITY));
         assert!((f64::from(ohm[5]) / row()[5] - 1.0).abs() < 1e-5);
@@ -341,7 +333,7 @@ mod tests {
         let circuit = ZeroPotential { row_source_ohm: [9.0, 0.3], ..ZeroPotential::TYPICAL };
         let [mut sampled, idle] = zero_potential_counts(&circuit, &row());
         sampled[0] = f32::NAN;
-        let ohm = circuit.row_ohm(RowWire(1), &sampled, &idle, 4095);
+        let ohm = read(&circuit, 1, &sampled, &idle);
         // The smallest of the row was taken for the mean of the others: an eighth of one in 18.
         for (ohm, expected) in ohm.iter().zip(row()).skip(1) {
             let error = (f64::from(*ohm) / expected - 1.0).abs();
@@ -355,34 +347,27 @@ mod tests {
         // 1 + 0.5·(1/50 + 1/60).
         let circuit = ZeroPotential::<3, 1> { series_ohm: [0.5], ..ZeroPotential::TYPICAL };
         let factor = 1.0 + 0.5 * (1.0 / 50.0 + 1.0 / 60.0);
-        let read = |rows| Frame::<3, 1> { row_column_resistance_ohm: rows };
         // A missing row counts as the mean of the others: here as one of 54.5 Ω that is there.
         let third = 2.0 / (1.0 / 50.0 + 1.0 / 60.0);
         let factor_of_three = factor + 0.5 / third;
-        let mut frame = read([[50.0 * factor_of_three], [60.0 * factor_of_three], [f32::NAN]]);
-        circuit.correct(&mut frame);
-        let [[first], [second], [missing]] = frame.row_column_resistance_ohm;
+        let frame = [[50.0 * factor_of_three], [60.0 * factor_of_three], [f32::NAN]];
+        let [[first], [second], [missing]] = corrected(&circuit, frame);
         assert!((first - 50.0).abs() < 1e-4 && (second - 60.0).abs() < 1e-4, "{frame:?}");
         assert!(missing.is_nan());
         // An open row counts, with no current; a short stays one.
-        let mut frame = read([[50.0 * factor], [60.0 * factor], [f32::INFINITY]]);
-        circuit.correct(&mut frame);
-        let [[first], [second], [open]] = frame.row_column_resistance_ohm;
+        let frame = [[50.0 * factor], [60.0 * factor], [f32::INFINITY]];
+        let [[first], [second], [open]] = corrected(&circuit, frame);
         assert!((first - 50.0).abs() < 1e-4 && (second - 60.0).abs() < 1e-4, "{frame:?}");
         assert_eq!(open, f32::INFINITY);
-        let mut frame = read([[f32::NAN], [0.0], [f32::NAN]]);
-        circuit.correct(&mut frame);
-        let [[missing], [short], _] = frame.row_column_resistance_ohm;
+        let [[missing], [short], _] = corrected(&circuit, [[f32::NAN], [0.0], [f32::NAN]]);
         assert!(missing.is_nan() && short == 0.0);
     }
 
     #[test]
     fn a_negative_resistance_is_a_short() {
         let divider = Divider::<1, 1> { series_ohm: [1000.0], ..Divider::TYPICAL };
-        assert_eq!(divider.row_ohm(RowWire(0), &[3000.0], &[250.0], 4095), [0.0]);
+        assert_eq!(read(&divider, 0, &[3000.0], &[250.0]), [0.0]);
         let circuit = ZeroPotential::<1, 1> { series_ohm: [1000.0], ..ZeroPotential::TYPICAL };
-        let mut frame = Frame { row_column_resistance_ohm: [[60.0]] };
-        circuit.correct(&mut frame);
-        assert_eq!(frame.row_column_resistance_ohm, [[0.0]]);
+        assert_eq!(corrected(&circuit, [[60.0]]), [[0.0]]);
     }
 }

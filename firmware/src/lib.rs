@@ -3,7 +3,8 @@
 //! [`readout`] scans frames over embedded-hal; [`circuit`] converts counts to Ω, and [`timing`] computes how long
 //! a scan takes. [`store`] keeps models in two slots of flash. [`link`] carries messages to and from the host.
 //! [`App`](app::App) is the loop that joins them and decodes with the model in force. A board implements
-//! [`platform`]. Nothing here allocates, panics or waits without bound; the weights stay in flash.
+//! [`platform`]; [`capacity`] says how large a sensor and a model it has room for. Nothing here allocates, panics or
+//! waits without bound.
 //!
 //! All arithmetic is [`model_core`]'s, so that board and host agree bit for bit.
 #![cfg_attr(not(test), no_std)]
@@ -14,6 +15,7 @@ pub mod circuit;
 pub mod readout;
 pub mod link;
 pub mod timing;
+pub mod capacity;
 pub mod platform;
 pub mod store;
 pub mod app;

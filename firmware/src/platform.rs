@@ -25,4 +25,9 @@ pub trait Platform: Port {
 
     /// Use of flash and RAM.
     fn memory(&self) -> Memory;
+
+    /// Count of the processor's cycles, which wraps around; always 0 on a board without a counter.
+    fn cycles(&self) -> u32 {
+        0
+    }
 }

@@ -7,7 +7,7 @@
 //!
 //! `docs/readout.md` has the circuits, their parts and the timing.
 
-use model_core::{ColumnWire, Frame, RowWire};
+use model_core::{ColumnWire, RowWire, Wires};
 use serde::{Deserialize, Serialize};
 
 mod baseline;
@@ -103,7 +103,8 @@ pub struct ScanReport {
 }
 
 /// Source of frames: a scanned sensor, or a substitute for one.
-pub trait FrameSource<const ROWS: usize, const COLS: usize> {
-    /// Scans a whole frame into `frame`, in Ω; readings that could not be taken become NaN.
-    fn scan(&mut self, settings: ScanSettings, frame: &mut Frame<ROWS, COLS>) -> ScanReport;
+pub trait FrameSource {
+    /// Scans the first `wires` of the sensor into `frame`: one reading in Ω for each row and column, row after row.
+    /// Readings that could not be taken become NaN.
+    fn scan(&mut self, settings: ScanSettings, wires: Wires, frame: &mut [f32]) -> ScanReport;
 }

@@ -44,17 +44,37 @@ fn messages_give_the_specifications_worked_bytes() {
         columns: 18,
         outputs: 18,
         kernel: "polynomial",
-        model: Some(ModelIdentity { crc_32: 0x1234_5678, slot: 1, generation: 3 }),
+        model: Some(ModelIdentity {
+            crc_32: 0x1234_5678,
+            slot: 1,
+            generation: 3,
+            rows: 1,
+            inputs: 12,
+            outputs: 5,
+            in_ram: true,
+        }),
         slot_bytes: 131_056,
         chunk_bytes: 512,
         memory: Memory { vector_table: 1024, stack_reserved: 300, ..Memory::default() },
     });
     let floats = [60.0, f32::NAN];
     let readings_ohm = Floats::of(&floats);
-    let estimate =
-        EstimateReport { frame: 300, flags: 2, row_status: &[3, 1], outputs: readings_ohm };
-    let health =
-        HealthReport { frame: 300, missing: 1, shorted: 0, open: 0, faulty_columns: &[2, 0, 0, 0] };
+    let start_us = 3_000_000;
+    let estimate = EstimateReport {
+        frame: 300,
+        start_us,
+        flags: 2,
+        row_status: &[3, 1],
+        outputs: readings_ohm,
+    };
+    let health = HealthReport {
+        frame: 300,
+        start_us,
+        missing: 1,
+        shorted: 0,
+        open: 0,
+        faulty_columns: &[2, 0, 0, 0],
+    };
     let statistics = Statistics {
         frames_scanned: 1,
         rows_at_rest: 8,
@@ -95,7 +115,7 @@ fn messages_give_the_specifications_worked_bytes() {
         ("statistics", report_bytes(2, &Report::Statistics(statistics))),
         ("configuration", report_bytes(3, &Report::Configuration(Configuration::DEFAULT))),
         ("baseline", report_bytes(4, &Report::Baseline { readings_ohm })),
-        ("readings", report_bytes(0, &Report::Readings { frame: 300, readings_ohm })),
+        ("readings", report_bytes(0, &Report::Readings { frame: 300, start_us, readings_ohm })),
         ("estimate", report_bytes(5, &Report::Estimate(estimate))),
         ("health", report_bytes(0, &Report::Health(health))),
         ("idle", report_bytes(6, &Report::Upload(UploadState::Idle))),

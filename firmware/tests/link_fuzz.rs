@@ -59,7 +59,7 @@ fn no_bytes_stop_the_device_and_the_second_request_after_them_is_answered() {
     let mut slots = MockSlot::pair_with(&model);
     let mut bench = Bench::new(Configuration { frame_period_us: 50_000, ..quiet() });
     let board = bench.board.clone();
-    let mut session = Session::start(&mut bench.app, &mut slots);
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let mut random = Xoshiro256PlusPlus::seed_from_u64(11);
     let requests = requests(&[60.0; ROWS * COLS]);
 

@@ -2,12 +2,12 @@
 
 mod common;
 
-use common::{COLS, OUTPUTS, ROWS, blob, frame_at_rest};
+use common::{ROWS, blob, frame_at_rest};
 use firmware::store::blob_in_slot;
 use model_core::blob::DecodeError;
 use model_core::{AlignedBytes, Decoder};
 
-type TestDecoder<'a> = Decoder<'a, ROWS, COLS, OUTPUTS>;
+type TestDecoder<'a> = Decoder<'a, ROWS>;
 
 fn erased(length: usize) -> AlignedBytes {
     AlignedBytes::copy_of(&vec![0xFF; length])
@@ -21,8 +21,8 @@ fn a_blob_loads_from_a_larger_erased_slot() {
 
     assert_eq!(blob_in_slot(&slot), &blob[..]);
     let decoder = TestDecoder::load(blob_in_slot(&slot)).unwrap();
-    let expected = TestDecoder::load(&blob).unwrap().decode(&frame_at_rest());
-    assert_eq!(decoder.decode(&frame_at_rest()), expected);
+    let expected = TestDecoder::load(&blob).unwrap().decode(frame_at_rest().as_flattened());
+    assert_eq!(decoder.decode(frame_at_rest().as_flattened()), expected);
 
     // The slot as a whole is not a blob.
     let error = TestDecoder::load(&slot).unwrap_err();

@@ -37,13 +37,13 @@ fn a_good_model_comes_into_force_and_stays_through_restarts() {
         let next = blob(1 + generation as usize, 2 + generation as usize);
         {
             let mut bench = Bench::new(quiet());
-            let mut session = Session::start(&mut bench.app, &mut slots);
+            let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
             let (outcome, leave) = upload(&mut session, &bench.board, &upload_steps(&next, CHUNK));
             assert_eq!(outcome, Ok(UploadState::Committed { crc_32: crc_of(&next) }));
             assert_eq!(leave, Some(Leave::NewModel));
         }
         let mut bench = Bench::new(quiet());
-        let mut session = Session::start(&mut bench.app, &mut slots);
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
         let (identity, _) = ask(&mut session, &bench.board, &Request::Identify, |r| match r {
             Report::Identity(identity) => identity.model.unwrap(),
             other => panic!("{other:?}"),
@@ -60,12 +60,12 @@ fn a_device_without_a_model_takes_one() {
     let mut bench = Bench::new(quiet());
     let new = blob(4, 3);
     {
-        let mut session = Session::start(&mut bench.app, &mut slots);
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
         assert_eq!(model_crc(&mut session, &bench.board), None);
         let (_, leave) = upload(&mut session, &bench.board, &upload_steps(&new, CHUNK));
         assert_eq!(leave, Some(Leave::NewModel));
     }
-    let mut session = Session::start(&mut bench.app, &mut slots);
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&new)));
 }
 
@@ -77,14 +77,14 @@ fn an_interruption_after_any_step_leaves_the_old_model() {
     for taken in 0..steps.len() {
         {
             let mut bench = Bench::new(quiet());
-            let mut session = Session::start(&mut bench.app, &mut slots);
+            let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
             let (outcome, leave) = upload(&mut session, &bench.board, &steps[..taken]);
             assert!(outcome.is_ok() && leave.is_none(), "{taken}: {outcome:?}");
             assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&old)), "{taken}");
         }
         // The old model is in force after a restart too.
         let mut bench = Bench::new(quiet());
-        let mut session = Session::start(&mut bench.app, &mut slots);
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
         assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&old)), "{taken}");
     }
 }
@@ -100,19 +100,19 @@ fn the_power_may_go_in_the_middle_of_any_word() {
             let mut slots = MockSlot::pair_with(if old_uploaded { &new } else { &old });
             if old_uploaded {
                 let mut bench = Bench::new(quiet());
-                let mut session = Session::start(&mut bench.app, &mut slots);
+                let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
                 upload(&mut session, &bench.board, &upload_steps(&old, CHUNK)).0.unwrap();
             }
             slots[0].cut_power_after(operations);
             {
                 let mut bench = Bench::new(quiet());
-                let mut session = Session::start(&mut bench.app, &mut slots);
+                let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
                 let (outcome, _) = upload(&mut session, &bench.board, &upload_steps(&new, CHUNK));
                 assert!(matches!(outcome, Ok(UploadState::Committed { .. }) | Err(Refusal::Flash)));
             }
             let cut = slots[0].power_on();
             let mut bench = Bench::new(quiet());
-            let mut session = Session::start(&mut bench.app, &mut slots);
+            let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
             let found = model_crc(&mut session, &bench.board);
             if !cut {
                 assert_eq!(found, Some(crc_of(&new)));
@@ -135,7 +135,7 @@ fn damage_of_any_bit_leaves_the_old_model() {
     let (old, new) = (blob(1, 3), blob(2, 4));
     let mut slots = MockSlot::pair_with(&old);
     let mut bench = Bench::new(quiet());
-    let mut session = Session::start(&mut bench.app, &mut slots);
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     for bit in 0..8 * new.len() {
         let mut damaged = new.clone();
         damaged[bit / 8] ^= 1 << (bit % 8);
@@ -151,13 +151,13 @@ fn each_fault_of_a_model_is_named() {
     let old = blob(1, 3);
     let mut slots = MockSlot::pair_with(&old);
     let mut bench = Bench::new(quiet());
-    let mut session = Session::start(&mut bench.app, &mut slots);
-    let narrow = Network::try_new(
-        Shape { inputs: 1, centres: 1, outputs: 1 },
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let wide = Network::try_new(
+        Shape { inputs: COLS + 1, centres: 1, outputs: 1 },
         Parameters {
-            input_minimum: &[0.0],
-            input_per_span: &[1.0],
-            centres: &[0.5],
+            input_minimum: &[0.0; COLS + 1],
+            input_per_span: &[1.0; COLS + 1],
+            centres: &[0.5; COLS + 1],
             decay: &[1.0],
             output_weights: &[1.0],
             bias: &[0.0],
@@ -172,7 +172,7 @@ fn each_fault_of_a_model_is_named() {
         (truncated, ModelFault::Length),
         (&[&old[..], &[0; 4]].concat(), ModelFault::Length),
         (&corrupt, ModelFault::Corrupt),
-        (&blob_of(narrow.unwrap().into()), ModelFault::Shape),
+        (&blob_of(wide.unwrap().into()), ModelFault::Shape),
     ] {
         let (outcome, _) = upload(&mut session, &bench.board, &upload_steps(blob, CHUNK));
         assert_eq!(outcome, Err(Refusal::BadModel(fault)));
@@ -186,7 +186,7 @@ fn steps_out_of_order_are_refused_and_repeated_ones_are_not() {
     let steps = upload_steps(&new, CHUNK);
     let mut slots = MockSlot::pair_with(&old);
     let mut bench = Bench::new(quiet());
-    let mut session = Session::start(&mut bench.app, &mut slots);
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let board = bench.board.clone();
     let mut one = |step: &UploadStep<'_>| upload(&mut session, &board, &[*step]).0;
 

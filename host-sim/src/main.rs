@@ -87,7 +87,7 @@ fn exit_status(error: &Error) -> u8 {
         },
         Error::Rig(cause) => match cause {
             Rig::Port { .. }
-            | Rig::ShapeMismatch { .. }
+            | Rig::NoRoom { .. }
             | Rig::OtherReadout { .. }
             | Rig::NoQemu { .. }
             | Rig::NoImage { .. }

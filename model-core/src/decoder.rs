@@ -6,31 +6,31 @@ use crate::cortex_m4::Finite;
 use crate::cortex_m4::{INPUTS, OUTPUTS};
 use crate::estimate::{Estimate, RowStatus};
 use crate::exp::{ExpKernel, Polynomial};
-use crate::frame::Frame;
 use crate::gate::Gate;
 use crate::projection::Projection;
 use crate::rbf::expanded::Expanded;
 use crate::rbf::fixed16::Fixed16;
 use crate::rbf::{Format, NetworkError};
 
-/// RAM in bytes that a [`Decoder`] of so many `rows` takes on a 32-bit target, for any K: slices into the
+/// RAM in bytes that a [`Decoder`] for at most so many `rows` takes on a 32-bit target, for any K: slices into the
 /// blob. The firmware's link check compares it with the compiler's own figure.
 #[must_use]
 pub const fn decoder_ram_bytes(rows: usize) -> usize {
     136 + 16 * rows
 }
 
-/// Decodes frames of a sensor whose sizes are known at compile time, with the model of a blob.
+/// Decodes frames with the model of a blob.
 ///
-/// The number of centres K comes with the blob and may be any. The decoder keeps references to each row's
-/// weights in RAM ([`decoder_ram_bytes`]); the weights stay in the blob.
+/// The numbers of rows, inputs, outputs and centres come with the blob, and may be any. `ROWS` is the largest number
+/// of rows that the decoder has room for: it keeps references to each row's weights in RAM
+/// ([`decoder_ram_bytes`]). The weights stay in the blob.
 ///
 /// A decoder borrows its blob and always has a model: a blob that is not sound makes no decoder, and changes no
 /// existing one.
 ///
 /// ```
 /// use model_core::blob::DecodeError;
-/// use model_core::{Aligned, Decoder, Frame};
+/// use model_core::{Aligned, Decoder, Estimate, RowStatus};
 /// # use model_core::blob::{Metadata, ModelParts, ModelShape, encode};
 /// # use model_core::rbf::{Shape, direct::{Network, Parameters}};
 /// # let network = Network::try_new(
@@ -51,49 +51,34 @@ pub const fn decoder_ram_bytes(rows: usize) -> usize {
 /// # let parts = ModelParts { projection: None, networks: &[network.into()], row_network: &[0], metadata };
 /// # let mut buffer = Aligned([0; 512]);
 /// # let blob: &[u8] = encode(&parts, &mut buffer.0).unwrap();
-/// // `blob` holds a model of one row with two readings (Ω) and one output (mm).
-/// let decoder: Decoder<1, 2, 1> = Decoder::load(blob)?;
+/// // `blob` holds a model of one row with two readings (Ω) and one output (mm), called `y`.
+/// let decoder = Decoder::<8>::load(blob)?;
+/// assert_eq!(decoder.shape().inputs, 2);
 ///
-/// let frame = Frame { row_column_resistance_ohm: [[55.0, 55.0]] };
-/// assert_eq!(decoder.decode(&frame).outputs, [[0.75]]); // mm
+/// let (mut outputs, mut status) = ([0.0; 1], [RowStatus::MissingReading; 1]);
+/// let mut scratch = [0.0; 2]; // as many numbers as `scratch_floats` says
+/// let mut estimate = Estimate { outputs: &mut outputs, status: &mut status };
+/// decoder.decode_into(&[55.0, 55.0], &mut scratch, &mut estimate).unwrap();
+/// let y = decoder.metadata().output_names.position("y").unwrap();
+/// assert_eq!(outputs[y], 0.75); // mm
 ///
 /// // Half a download is rejected.
-/// let half = Decoder::<1, 2, 1>::load(&blob[..blob.len() / 2]);
+/// let half = Decoder::<8>::load(&blob[..blob.len() / 2]);
 /// assert!(matches!(half, Err(DecodeError::Truncated { .. })));
 /// # Ok::<(), DecodeError>(())
 /// ```
 #[derive(Debug, Clone, Copy)]
-pub struct Decoder<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize> {
+pub struct Decoder<'a, const ROWS: usize> {
     model: Model<'a>,
-    /// The section of each row's network.
+    /// The section of each row's network; rows beyond the model's have none.
     row_sections: [NetworkSection<'a>; ROWS],
 }
 
-impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize>
-    Decoder<'a, ROWS, COLS, OUTPUTS>
-{
-    /// Checks a blob as [`load`](Self::load) does, and returns its model without making a decoder.
-    ///
-    /// # Errors
-    /// [`DecodeError`]: the blob is unsound, or its shape is not this decoder's.
-    pub fn check(blob: &'a [u8]) -> Result<Model<'a>, DecodeError> {
-        Self::of_this_shape(Model::decode(blob)?)
-    }
-
-    fn of_this_shape(model: Model<'a>) -> Result<Model<'a>, DecodeError> {
-        const { assert!(ROWS > 0 && COLS > 0 && OUTPUTS > 0, "a sensor has rows, columns, outputs") }
-        let expected = ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS };
-        if model.shape() == expected {
-            Ok(model)
-        } else {
-            Err(DecodeError::ShapeMismatch { expected, found: model.shape() })
-        }
-    }
-
+impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
     /// Loads a blob, which must lie at a multiple of four ([`Aligned`](crate::Aligned)).
     ///
     /// # Errors
-    /// [`DecodeError`]: the blob is unsound, or its shape is not this decoder's.
+    /// [`DecodeError`]: the blob is unsound, or has more rows than `ROWS`.
     pub fn load(blob: &'a [u8]) -> Result<Self, DecodeError> {
         Self::of(Model::decode(blob)?)
     }
@@ -101,11 +86,14 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize>
     /// Makes a decoder of a model that has been parsed already.
     ///
     /// # Errors
-    /// [`DecodeError::ShapeMismatch`]: the model's shape is not this decoder's.
+    /// [`DecodeError::TooManyRows`]: the model has more rows than `ROWS`.
     pub fn of(model: Model<'a>) -> Result<Self, DecodeError> {
-        let model = Self::of_this_shape(model)?;
+        let ModelShape { rows, .. } = model.shape();
+        if rows > ROWS {
+            return Err(DecodeError::TooManyRows { most: ROWS, found: rows });
+        }
         let mut row_sections = [NetworkSection::EMPTY; ROWS];
-        for (row, section) in row_sections.iter_mut().enumerate() {
+        for (row, section) in row_sections.iter_mut().take(rows).enumerate() {
             // A sound model has a network for every row.
             let networks = model.network_count() as u8;
             *section = model.section_of_row(row).ok_or(DecodeError::UnknownNetwork {
@@ -115,6 +103,12 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize>
             })?;
         }
         Ok(Self { model, row_sections })
+    }
+
+    /// The model's number of rows, and of inputs and outputs a row.
+    #[must_use]
+    pub fn shape(&self) -> ModelShape {
+        self.model.shape()
     }
 
     /// Metadata of the model: names, units, and how it was trained.
@@ -129,23 +123,29 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize>
         self.model.crc()
     }
 
-    /// Decodes one frame (Ω) to an estimate in the units of the model's outputs.
-    ///
-    /// A row with a missing reading is marked in the estimate's status and does not affect the other rows. Behind
-    /// a [`Projection`] one missing reading marks all rows.
+    /// Number of floats of working space that decoding needs.
     #[must_use]
-    pub fn decode(&self, frame: &Frame<ROWS, COLS>) -> Estimate<ROWS, OUTPUTS> {
-        let mut estimate = Estimate {
-            outputs: [[f32::NAN; OUTPUTS]; ROWS],
-            status: [RowStatus::MissingReading; ROWS],
-        };
-        self.decode_into(frame, &mut estimate);
-        estimate
+    pub fn scratch_floats(&self) -> usize {
+        let ModelShape { inputs, .. } = self.model.shape();
+        if self.model.projection().is_some() { inputs.saturating_mul(2) } else { inputs }
     }
 
-    /// Decodes one frame as [`decode`](Self::decode) does, into an existing estimate.
-    pub fn decode_into(&self, frame: &Frame<ROWS, COLS>, estimate: &mut Estimate<ROWS, OUTPUTS>) {
-        self.decode_gated_into(frame, None, estimate);
+    /// Decodes one frame to an estimate in the units of the model's outputs.
+    ///
+    /// `readings` are `rows × inputs` numbers in Ω, row after row, and `scratch` is working space of
+    /// [`scratch_floats`](Self::scratch_floats). A row with a missing reading is marked in the estimate's status and
+    /// does not affect the other rows. Behind a [`Projection`] one missing reading marks all rows.
+    ///
+    /// # Errors
+    /// [`NetworkError::Length`] if a slice does not have the model's length, or `scratch` is too short; the estimate
+    /// is then untouched.
+    pub fn decode_into(
+        &self,
+        readings: &[f32],
+        scratch: &mut [f32],
+        estimate: &mut Estimate<'_>,
+    ) -> Result<(), NetworkError> {
+        self.decode_gated(readings, None, scratch, estimate)
     }
 
     /// Decodes one frame as [`decode_into`](Self::decode_into) does, but skips rows that `gate` finds at rest:
@@ -153,77 +153,149 @@ impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize>
     ///
     /// Behind a [`Projection`], rows are not gated one by one: all are at rest, or all are decoded. A reading that
     /// is missing anywhere marks them all.
+    ///
+    /// # Errors
+    /// As [`decode_into`](Self::decode_into).
     #[inline]
-    pub fn decode_gated_into(
+    pub fn decode_gated(
         &self,
-        frame: &Frame<ROWS, COLS>,
-        gate: Option<Gate<'_, ROWS, COLS, OUTPUTS>>,
-        estimate: &mut Estimate<ROWS, OUTPUTS>,
-    ) {
-        self.decode_with::<Polynomial>(frame, gate, estimate);
+        readings: &[f32],
+        gate: Option<Gate<'_>>,
+        scratch: &mut [f32],
+        estimate: &mut Estimate<'_>,
+    ) -> Result<(), NetworkError> {
+        self.decode_with::<Polynomial>(readings, gate, scratch, estimate)
     }
 
-    /// Decodes one frame as [`decode_gated_into`](Self::decode_gated_into) does, with the
-    /// [exponential](crate::exp) `E` for networks of the format `f32-direct`. It serves to measure what an
-    /// exponential costs; other formats have one of their own.
+    /// Decodes one frame as [`decode_gated`](Self::decode_gated) does, with the [exponential](crate::exp) `E` for
+    /// networks of the format `f32-direct`. It serves to measure what an exponential costs; other formats have one
+    /// of their own.
+    ///
+    /// # Errors
+    /// As [`decode_into`](Self::decode_into).
     #[inline(never)] // one copy of inference in flash, whoever decodes
     pub fn decode_with<E: ExpKernel>(
         &self,
-        frame: &Frame<ROWS, COLS>,
-        gate: Option<Gate<'_, ROWS, COLS, OUTPUTS>>,
-        estimate: &mut Estimate<ROWS, OUTPUTS>,
-    ) {
+        readings: &[f32],
+        gate: Option<Gate<'_>>,
+        scratch: &mut [f32],
+        estimate: &mut Estimate<'_>,
+    ) -> Result<(), NetworkError> {
+        let ModelShape { rows, inputs, outputs } = self.model.shape();
+        check_length("frame", readings, rows.saturating_mul(inputs))?;
+        check_length("outputs of the estimate", estimate.outputs, rows.saturating_mul(outputs))?;
+        check_length("status of the estimate", estimate.status, rows)?;
+        let (expected, found) = (self.scratch_floats(), scratch.len());
+        let too_short = NetworkError::Length { what: "scratch", expected, found };
+        let (scaled, more) = scratch.split_at_mut_checked(inputs).ok_or(too_short)?;
         if let Some(projection) = self.model.projection() {
-            return self.decode_array_into::<E>(projection, frame, gate, estimate);
+            let features = more.get_mut(..inputs).ok_or(too_short)?;
+            let Some(section) = self.row_sections.first() else { return Ok(()) };
+            let array = Array { projection, section, inputs, outputs };
+            array.decode(E::exp, readings, gate, [scaled, features], estimate);
+            return Ok(());
         }
-        let rows = self.row_sections.iter().zip(&frame.row_column_resistance_ohm);
-        let places = estimate.outputs.iter_mut().zip(&mut estimate.status);
-        let mut scaled = [0.0; COLS];
+        // A model has at least one input and one output a row; `max` tells the compiler.
+        let rows = self.row_sections.iter().zip(readings.chunks_exact(inputs.max(1)));
+        let outputs = estimate.outputs.chunks_exact_mut(outputs.max(1));
+        let places = outputs.zip(estimate.status.iter_mut());
         for (row, ((section, readings), (outputs, status))) in rows.zip(places).enumerate() {
             if gate.is_some_and(|gate| gate.give_rest(row, readings, outputs)) {
                 *status = RowStatus::AtRest;
                 continue;
             }
-            *status = decode_inputs(section, E::exp, readings, &mut scaled, outputs);
+            *status = decode_inputs(section, E::exp, readings, scaled, outputs);
             if *status != RowStatus::Decoded {
-                *outputs = [f32::NAN; OUTPUTS];
+                outputs.fill(f32::NAN);
             }
         }
+        Ok(())
     }
+}
 
-    /// Decodes all rows by one network behind `projection`. Not inlined, because decoding by rows would need its
-    /// stack too.
+fn check_length<T>(what: &'static str, slice: &[T], expected: usize) -> Result<(), NetworkError> {
+    let found = slice.len();
+    if found == expected { Ok(()) } else { Err(NetworkError::Length { what, expected, found }) }
+}
+
+/// An estimate of its own, on the heap.
+#[cfg(feature = "std")]
+#[derive(Debug, Clone, PartialEq)]
+pub struct OwnedEstimate {
+    /// `rows × outputs` numbers, row after row; NaN where a row could not be decoded.
+    pub outputs: std::vec::Vec<f32>,
+    /// How the decoding of each row ended.
+    pub status: std::vec::Vec<RowStatus>,
+}
+
+#[cfg(feature = "std")]
+impl OwnedEstimate {
+    /// The estimate as a decoder writes it.
+    pub fn borrowed(&mut self) -> Estimate<'_> {
+        Estimate { outputs: &mut self.outputs, status: &mut self.status }
+    }
+}
+
+#[cfg(feature = "std")]
+impl<const ROWS: usize> Decoder<'_, ROWS> {
+    /// Decodes one frame as [`decode_into`](Self::decode_into) does, to an estimate on the heap.
+    ///
+    /// # Errors
+    /// [`NetworkError::Length`] if `readings` are not `rows × inputs` numbers.
+    pub fn decode(&self, readings: &[f32]) -> Result<OwnedEstimate, NetworkError> {
+        let ModelShape { rows, outputs, .. } = self.shape();
+        let mut estimate = OwnedEstimate {
+            outputs: std::vec![f32::NAN; rows * outputs],
+            status: std::vec![RowStatus::MissingReading; rows],
+        };
+        let mut scratch = std::vec![0.0; self.scratch_floats()];
+        self.decode_into(readings, &mut scratch, &mut estimate.borrowed())?;
+        Ok(estimate)
+    }
+}
+
+/// One network for all rows, behind a projection.
+struct Array<'s, 'a> {
+    projection: Projection<'a>,
+    section: &'s NetworkSection<'a>,
+    /// Readings of a row, and features of the projection.
+    inputs: usize,
+    /// Outputs of a row.
+    outputs: usize,
+}
+
+impl Array<'_, '_> {
+    /// Decodes all rows of a frame at once; `scratch` is room for scaled inputs and for features. Not inlined,
+    /// because decoding by rows would need its stack too.
     #[inline(never)]
-    fn decode_array_into<E: ExpKernel>(
+    fn decode(
         &self,
-        projection: Projection<'_>,
-        frame: &Frame<ROWS, COLS>,
-        gate: Option<Gate<'_, ROWS, COLS, OUTPUTS>>,
-        estimate: &mut Estimate<ROWS, OUTPUTS>,
+        exp: fn(f32) -> f32,
+        readings: &[f32],
+        gate: Option<Gate<'_>>,
+        scratch: [&mut [f32]; 2],
+        estimate: &mut Estimate<'_>,
     ) {
-        let readings = &frame.row_column_resistance_ohm;
-        let mut rows = readings.iter().zip(&mut estimate.outputs).enumerate();
+        let outputs = estimate.outputs.chunks_exact_mut(self.outputs.max(1));
+        let mut rows = readings.chunks_exact(self.inputs.max(1)).zip(outputs).enumerate();
         let at_rest = gate.is_some_and(|gate| {
             rows.all(|(row, (readings, outputs))| gate.give_rest(row, readings, outputs))
         });
-        let mut status = match self.row_sections.first() {
-            _ if at_rest => RowStatus::AtRest,
-            Some(section) => {
-                let (mut features, mut scaled) = ([0.0; COLS], [0.0; COLS]);
-                projection.project(readings.as_flattened(), &mut features);
-                let outputs = estimate.outputs.as_flattened_mut();
-                decode_inputs(section, E::exp, &features, &mut scaled, outputs)
-            }
-            None => RowStatus::MissingReading,
+        let mut status = if at_rest {
+            RowStatus::AtRest
+        } else {
+            let [scaled, features] = scratch;
+            self.projection.project(readings, features);
+            decode_inputs(self.section, exp, features, scaled, estimate.outputs)
         };
         if !matches!(status, RowStatus::Decoded | RowStatus::AtRest) {
             // Features can overflow although no reading is missing.
-            if all_finite(readings.as_flattened()) {
+            if all_finite(readings) {
                 status = RowStatus::Overflow;
             }
-            estimate.outputs.as_flattened_mut().fill(f32::NAN);
+            estimate.outputs.fill(f32::NAN);
         }
-        estimate.status = [status; ROWS];
+        estimate.status.fill(status);
     }
 }
 

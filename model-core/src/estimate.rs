@@ -15,11 +15,12 @@ pub enum RowStatus {
     AtRest,
 }
 
-/// The decoded outputs of every row, in the units of the model's output columns.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Estimate<const ROWS: usize, const OUTPUTS: usize> {
-    /// `[row][output]`; NaN where the row could not be decoded.
-    pub outputs: [[f32; OUTPUTS]; ROWS],
+/// Where a decoder writes the outputs of a frame, and the status of each row.
+#[derive(Debug, PartialEq)]
+pub struct Estimate<'e> {
+    /// `rows × outputs` numbers, row after row, in the units of the model's output columns. NaN where a row could
+    /// not be decoded.
+    pub outputs: &'e mut [f32],
     /// How the decoding of each row ended.
-    pub status: [RowStatus; ROWS],
+    pub status: &'e mut [RowStatus],
 }

@@ -1,4 +1,7 @@
-//! A frame: one complete scan of the sensor.
+//! A frame: one complete scan of the sensor, as a slice of readings.
+//!
+//! A frame holds the resistance between every row-wire and every column-wire in Ω, row after row. A reading that
+//! could not be taken is NaN. How many rows and columns there are is known at run time ([`Wires`]).
 
 /// Index of a row-wire (upper layer), from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -8,44 +11,37 @@ pub struct RowWire(pub usize);
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct ColumnWire(pub usize);
 
-/// One complete scan: the resistance between every row-wire and every column-wire, in Ω.
-///
-/// A reading that could not be taken is NaN.
+/// Numbers of a sensor's wires. There is one reading for each pair of a row-wire and a column-wire.
 ///
 /// ```
-/// use model_core::{ColumnWire, Frame, RowWire};
-/// let mut frame = Frame::<8, 18>::missing();
-/// assert!(frame.set_ohm(RowWire(3), ColumnWire(17), 59.6));
-/// assert_eq!(frame.ohm(RowWire(3), ColumnWire(17)), Some(59.6));
-/// assert_eq!(frame.ohm(RowWire(8), ColumnWire(0)), None);
+/// use model_core::{ColumnWire, RowWire, Wires};
+/// let wires = Wires { rows: 8, columns: 18 };
+/// let mut frame = [f32::NAN; 144]; // Ω
+/// assert_eq!(wires.readings(), frame.len());
+/// let place = wires.place(RowWire(3), ColumnWire(17)).unwrap();
+/// frame[place] = 59.6;
+/// assert_eq!(frame.chunks(wires.columns).nth(3).unwrap()[17], 59.6);
+/// assert_eq!(wires.place(RowWire(8), ColumnWire(0)), None);
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Frame<const ROWS: usize, const COLS: usize> {
-    /// Readings in Ω, `[row-wire][column-wire]`.
-    pub row_column_resistance_ohm: [[f32; COLS]; ROWS],
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Wires {
+    /// Number of row-wires.
+    pub rows: usize,
+    /// Number of column-wires.
+    pub columns: usize,
 }
 
-impl<const ROWS: usize, const COLS: usize> Frame<ROWS, COLS> {
-    /// A frame in which every reading is still missing.
+impl Wires {
+    /// Number of readings in a frame.
     #[must_use]
-    pub const fn missing() -> Self {
-        Self { row_column_resistance_ohm: [[f32::NAN; COLS]; ROWS] }
+    pub const fn readings(self) -> usize {
+        self.rows.saturating_mul(self.columns)
     }
 
-    /// The reading between two wires in Ω (NaN if missing), or `None` for a wire outside the
-    /// sensor.
+    /// Index in a frame of the reading between two wires; `None` for a wire outside the sensor.
     #[must_use]
-    pub fn ohm(&self, row: RowWire, column: ColumnWire) -> Option<f32> {
-        self.row_column_resistance_ohm.get(row.0)?.get(column.0).copied()
-    }
-
-    /// Stores a reading in Ω; `false`, and nothing stored, for a wire outside the sensor.
-    #[must_use]
-    pub fn set_ohm(&mut self, row: RowWire, column: ColumnWire, ohm: f32) -> bool {
-        let slot = self
-            .row_column_resistance_ohm
-            .get_mut(row.0)
-            .and_then(|readings| readings.get_mut(column.0));
-        slot.map(|reading| *reading = ohm).is_some()
+    pub fn place(self, row: RowWire, column: ColumnWire) -> Option<usize> {
+        let inside = row.0 < self.rows && column.0 < self.columns;
+        inside.then(|| row.0.saturating_mul(self.columns).saturating_add(column.0))
     }
 }

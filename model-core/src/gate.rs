@@ -10,66 +10,75 @@
 
 #[cfg(cortex_m4f)]
 use crate::cortex_m4;
-use crate::estimate::{Estimate, RowStatus};
-use crate::frame::Frame;
+use crate::estimate::RowStatus;
+
+/// What a gate compares frames with: the sensor at rest.
+#[derive(Debug, Clone, Copy)]
+pub struct Rest<'a> {
+    /// Mean of frames at rest in Ω, row after row.
+    pub baseline_ohm: &'a [f32],
+    /// Outputs that the model decodes the baseline to, row after row.
+    pub outputs: &'a [f32],
+    /// How the decoding of each row of the baseline ended.
+    pub status: &'a [RowStatus],
+}
 
 /// Finds the rows of a frame that are at rest (untouched), and gives them the outputs at rest.
 ///
-/// [`Decoder::decode_gated_into`](crate::Decoder::decode_gated_into) skips these rows. The gate borrows baseline
-/// and outputs, so that a device keeps one copy of each.
+/// [`Decoder::decode_gated`](crate::Decoder::decode_gated) skips these rows. The gate borrows baseline and outputs,
+/// so that a device keeps one copy of each.
 ///
 /// ```
-/// use model_core::{Estimate, Frame, Gate, RowStatus};
-/// let baseline = Frame { row_column_resistance_ohm: [[50.0, 60.0]] };
-/// // What the model decodes `baseline` to.
-/// let rest = Estimate { outputs: [[0.01]], status: [RowStatus::Decoded] };
-/// let gate = Gate::new(&baseline, &rest, 0.02).unwrap();
+/// use model_core::gate::{Gate, Rest};
+/// use model_core::RowStatus;
+/// // One row of two readings and one output; 0.01 is what the model decodes the baseline to.
+/// let (baseline_ohm, outputs, status) = ([50.0, 60.0], [0.01], [RowStatus::Decoded]);
+/// let rest = Rest { baseline_ohm: &baseline_ohm, outputs: &outputs, status: &status };
+/// let gate = Gate::new(rest, 0.02).unwrap();
 /// let mut outputs = [f32::NAN];
 /// assert!(!gate.give_rest(0, &[50.5, 58.0], &mut outputs)); // one is 3 % less
 /// assert!(!gate.give_rest(0, &[49.1, 59.0], &mut outputs)); // both are nearly 2 % less
 /// assert!(outputs[0].is_nan());
 /// assert!(gate.give_rest(0, &[50.5, 59.0], &mut outputs));
 /// assert_eq!(outputs, [0.01]);
-/// assert!(Gate::new(&baseline, &rest, 0.0).is_none());
+/// assert!(Gate::new(rest, 0.0).is_none());
 /// ```
 #[derive(Debug, Clone, Copy)]
-pub struct Gate<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize> {
-    baseline: &'a Frame<ROWS, COLS>,
-    rest: &'a Estimate<ROWS, OUTPUTS>,
+pub struct Gate<'a> {
+    rest: Rest<'a>,
     tolerance: f32,
 }
 
-impl<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize> Gate<'a, ROWS, COLS, OUTPUTS> {
-    /// Makes a gate from `baseline` (mean of frames at rest, in Ω), `rest` (the model's estimate of the baseline)
-    /// and the `tolerance` k·p. `None` for a tolerance that is not above 0 and below 1.
+impl<'a> Gate<'a> {
+    /// Makes a gate from what the sensor is like at `rest` and the `tolerance` k·p. `None` for a tolerance that is
+    /// not above 0 and below 1.
     ///
     /// A row whose status in `rest` is not decoded is never at rest: its baseline is not known.
     #[must_use]
-    pub fn new(
-        baseline: &'a Frame<ROWS, COLS>,
-        rest: &'a Estimate<ROWS, OUTPUTS>,
-        tolerance: f32,
-    ) -> Option<Self> {
-        (tolerance > 0.0 && tolerance < 1.0).then_some(Self { baseline, rest, tolerance })
+    pub fn new(rest: Rest<'a>, tolerance: f32) -> Option<Self> {
+        (tolerance > 0.0 && tolerance < 1.0).then_some(Self { rest, tolerance })
     }
 
     /// Copies the outputs at rest to `outputs` if the `readings` (Ω) of row `row` are at rest; returns whether
     /// they are.
-    pub fn give_rest(
-        &self,
-        row: usize,
-        readings: &[f32; COLS],
-        outputs: &mut [f32; OUTPUTS],
-    ) -> bool {
-        let baseline = self.baseline.row_column_resistance_ohm.get(row);
-        let rest = self.rest.outputs.get(row).zip(self.rest.status.get(row));
-        match baseline.zip(rest) {
-            Some((baseline, (rest, RowStatus::Decoded))) => {
+    #[inline]
+    pub fn give_rest(&self, row: usize, readings: &[f32], outputs: &mut [f32]) -> bool {
+        let Rest { baseline_ohm, outputs: rest, status } = self.rest;
+        let baseline = row_of(baseline_ohm, row, readings.len());
+        let rest = row_of(rest, row, outputs.len());
+        match (baseline, rest, status.get(row)) {
+            (Some(baseline), Some(rest), Some(RowStatus::Decoded)) => {
                 give_rest(readings, baseline, self.tolerance, rest, outputs)
             }
             _ => false,
         }
     }
+}
+
+/// The numbers of `row` in a list of rows of `length` numbers.
+#[inline]
+fn row_of(rows: &[f32], row: usize, length: usize) -> Option<&[f32]> {
+    rows.get(row.checked_mul(length)?..)?.get(..length)
 }
 
 /// Whether a row is at rest: each of its n `readings` is within `tolerance` (0 to 1) of its finite `baseline`,
@@ -176,15 +185,15 @@ mod tests {
 
     #[test]
     fn a_row_without_an_answer_for_rest_is_never_at_rest() {
-        let baseline = Frame { row_column_resistance_ohm: [[60.0]; 4] };
         let status = [
             RowStatus::Decoded,
             RowStatus::MissingReading,
             RowStatus::Overflow,
             RowStatus::Decoded,
         ];
-        let rest = Estimate { outputs: [[1.0], [2.0], [3.0], [4.0]], status };
-        let gate = Gate::new(&baseline, &rest, 0.02).unwrap();
+        let rest =
+            Rest { baseline_ohm: &[60.0; 4], outputs: &[1.0, 2.0, 3.0, 4.0], status: &status };
+        let gate = Gate::new(rest, 0.02).unwrap();
         let found = [0, 1, 2, 3, 4].map(|row| {
             let mut outputs = [0.0];
             (gate.give_rest(row, &[60.0], &mut outputs), outputs)
@@ -195,10 +204,9 @@ mod tests {
 
     #[test]
     fn a_tolerance_that_is_none_makes_no_gate() {
-        let baseline = Frame { row_column_resistance_ohm: [[60.0]] };
-        let rest = Estimate { outputs: [[1.0]], status: [RowStatus::Decoded] };
+        let rest = Rest { baseline_ohm: &[60.0], outputs: &[1.0], status: &[RowStatus::Decoded] };
         for tolerance in [0.0, -0.0, -0.02, 1.0, f32::INFINITY, f32::NAN] {
-            assert!(Gate::new(&baseline, &rest, tolerance).is_none(), "{tolerance}");
+            assert!(Gate::new(rest, tolerance).is_none(), "{tolerance}");
         }
     }
 }

@@ -1,7 +1,5 @@
 //! Health of a frame: finds readings that are missing, shorted or open.
 
-use crate::frame::Frame;
-
 /// Range of resistances that the sensor's rubber can have; a reading outside is a fault.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
@@ -11,11 +9,12 @@ pub struct Limits {
     pub open_above_ohm: f32,
 }
 
-/// Faults in the readings of one frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Health<const ROWS: usize> {
-    /// One word for each row-wire; bit k is set if the reading of column-wire k is faulty.
-    pub faulty_columns: [u32; ROWS],
+/// Largest number of column-wires whose faults can be told apart.
+pub const MOST_COLUMNS: usize = 32;
+
+/// Number of faults in the readings of one frame, by kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Health {
     /// Number of readings that were not taken (NaN).
     pub missing: u16,
     /// Number of readings below the limits.
@@ -24,49 +23,66 @@ pub struct Health<const ROWS: usize> {
     pub open: u16,
 }
 
-impl<const ROWS: usize> Health<ROWS> {
-    /// Checks every reading of `frame`, and makes faulty ones missing (NaN), so that no estimate depends on them.
+impl Health {
+    /// Checks every reading of `frame` (Ω), a row of `columns` readings after the other. Makes faulty ones missing
+    /// (NaN), so that no estimate depends on them.
     ///
-    /// A sensor may have at most 32 column-wires; more do not compile.
+    /// `faulty_columns` takes one word for each row-wire: bit k is set if the reading of column-wire k is faulty.
+    /// Rows without a word, and columns from [`MOST_COLUMNS`] on, are counted alone.
     ///
     /// ```
-    /// use model_core::Frame;
     /// use model_core::health::{Health, Limits};
     /// let limits = Limits { shorted_below_ohm: 5.0, open_above_ohm: 500.0 };
-    /// let mut frame = Frame { row_column_resistance_ohm: [[60.0, 0.0, f32::INFINITY]] };
-    /// let health = Health::of(&mut frame, limits);
-    /// assert_eq!(health.faulty_columns, [0b110]);
+    /// let mut frame = [60.0, 0.0, f32::INFINITY];
+    /// let mut faulty_columns = [0];
+    /// let health = Health::of(&mut frame, 3, limits, &mut faulty_columns);
+    /// assert_eq!(faulty_columns, [0b110]);
     /// assert_eq!((health.missing, health.shorted, health.open), (0, 1, 1));
-    /// assert!(frame.row_column_resistance_ohm[0][1].is_nan());
+    /// assert!(frame[1].is_nan());
     /// ```
     #[must_use]
-    pub fn of<const COLS: usize>(frame: &mut Frame<ROWS, COLS>, limits: Limits) -> Self {
-        const { assert!(COLS <= 32, "a row's faults are the bits of one u32") }
-        let mut health = Self { faulty_columns: [0; ROWS], missing: 0, shorted: 0, open: 0 };
-        let rows = frame.row_column_resistance_ohm.iter_mut().zip(&mut health.faulty_columns);
-        for (readings, faulty) in rows {
-            for (column, reading) in readings.iter_mut().enumerate() {
-                let count = if reading.is_nan() {
-                    &mut health.missing
-                } else if *reading < limits.shorted_below_ohm {
-                    &mut health.shorted
-                } else if *reading > limits.open_above_ohm {
-                    &mut health.open
-                } else {
-                    continue;
-                };
-                *count = count.saturating_add(1);
-                *faulty |= 1 << (column % 32);
-                *reading = f32::NAN;
+    pub fn of(
+        frame: &mut [f32],
+        columns: usize,
+        limits: Limits,
+        faulty_columns: &mut [u32],
+    ) -> Self {
+        faulty_columns.fill(0);
+        let mut health = Self::default();
+        let mut words = faulty_columns.iter_mut();
+        for row in frame.chunks_mut(columns.max(1)) {
+            let faulty = health.check_row(row, limits);
+            if let Some(word) = words.next() {
+                *word = faulty;
             }
         }
         health
     }
 
+    /// Counts the faults of one row, makes these readings missing, and returns them as bits.
+    fn check_row(&mut self, row: &mut [f32], limits: Limits) -> u32 {
+        let mut faulty = 0;
+        for (column, reading) in row.iter_mut().enumerate() {
+            let count = if reading.is_nan() {
+                &mut self.missing
+            } else if *reading < limits.shorted_below_ohm {
+                &mut self.shorted
+            } else if *reading > limits.open_above_ohm {
+                &mut self.open
+            } else {
+                continue;
+            };
+            *count = count.saturating_add(1);
+            faulty |= 1_u32.checked_shl(column as u32).unwrap_or(0);
+            *reading = f32::NAN;
+        }
+        faulty
+    }
+
     /// Whether no reading is faulty.
     #[must_use]
     pub fn is_good(&self) -> bool {
-        self.faulty_columns.iter().all(|bits| *bits == 0)
+        *self == Self::default()
     }
 }
 
@@ -78,27 +94,37 @@ mod tests {
 
     #[test]
     fn every_fault_is_told_by_wire_and_kind_and_the_rest_is_untouched() {
-        let mut frame = Frame { row_column_resistance_ohm: [[60.0_f32; 32]; 3] };
-        frame.row_column_resistance_ohm[0][31] = f32::NAN;
-        frame.row_column_resistance_ohm[2][0] = 4.9;
-        frame.row_column_resistance_ohm[2][7] = f32::INFINITY;
-        frame.row_column_resistance_ohm[2][8] = -1.0;
+        let mut frame = [[60.0_f32; 32]; 3];
+        frame[0][31] = f32::NAN;
+        frame[2][0] = 4.9;
+        frame[2][7] = f32::INFINITY;
+        frame[2][8] = -1.0;
         let before = frame;
-        let health = Health::of(&mut frame, LIMITS);
-        assert_eq!(health.faulty_columns, [1 << 31, 0, 1 | 1 << 7 | 1 << 8]);
+        let mut faulty_columns = [u32::MAX; 3];
+        let health = Health::of(frame.as_flattened_mut(), 32, LIMITS, &mut faulty_columns);
+        assert_eq!(faulty_columns, [1 << 31, 0, 1 | 1 << 7 | 1 << 8]);
         assert_eq!((health.missing, health.shorted, health.open), (1, 2, 1));
         assert!(!health.is_good());
-        let readings = before.row_column_resistance_ohm.as_flattened().iter().enumerate();
+        let readings = before.as_flattened().iter().enumerate();
         for (place, old) in readings {
-            let new = frame.row_column_resistance_ohm.as_flattened()[place];
-            let faulty = health.faulty_columns[place / 32] >> (place % 32) & 1 == 1;
+            let new = frame.as_flattened()[place];
+            let faulty = faulty_columns[place / 32] >> (place % 32) & 1 == 1;
             assert!(if faulty { new.is_nan() } else { new == *old }, "{place}");
         }
     }
 
     #[test]
     fn readings_on_the_limits_are_good() {
-        let mut frame = Frame { row_column_resistance_ohm: [[5.0, 500.0]] };
-        assert!(Health::of(&mut frame, LIMITS).is_good());
+        let mut frame = [5.0, 500.0];
+        assert!(Health::of(&mut frame, 2, LIMITS, &mut [0]).is_good());
+    }
+
+    #[test]
+    fn faults_without_a_bit_of_their_own_are_counted() {
+        let mut frame = [f32::NAN; 80];
+        let mut faulty_columns = [0];
+        let health = Health::of(&mut frame, 40, LIMITS, &mut faulty_columns);
+        assert_eq!((health.missing, faulty_columns), (80, [u32::MAX]));
+        assert!(Health::of(&mut [], 0, LIMITS, &mut []).is_good());
     }
 }

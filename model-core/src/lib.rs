@@ -1,6 +1,6 @@
 //! Inference for resistive tactile sensors: from row–column resistances to deformation.
 //!
-//! Readings travel one way: [`Frame`] (Ω) → [`health`] → [`gate`] → ([`projection`] →) [`scale`] → [`rbf`]
+//! Readings travel one way: frame (Ω, a slice) → [`health`] → [`gate`] → ([`projection`] →) [`scale`] → [`rbf`]
 //! (and its affine tail) → [`Estimate`]. The network's weights are read where the [`blob`] lies, in flash or in a
 //! file's buffer: nothing is copied, nothing is allocated, and no release code path of [`Decoder`] panics.
 //! [`rls`] is for a device that trains its output weights sample by sample; no firmware does so yet.
@@ -38,9 +38,11 @@ mod decoder;
 pub use blob::Aligned;
 #[cfg(feature = "std")]
 pub use blob::AlignedBytes;
+#[cfg(feature = "std")]
+pub use decoder::OwnedEstimate;
 pub use decoder::{Decoder, decoder_ram_bytes};
 pub use estimate::{Estimate, RowStatus};
-pub use frame::{ColumnWire, Frame, RowWire};
+pub use frame::{ColumnWire, RowWire, Wires};
 pub use gate::Gate;
 
 /// The README's example is a test.

@@ -6,7 +6,7 @@ use model_core::blob::{
 };
 use model_core::rbf::direct::{self, Parameters};
 use model_core::rbf::{Network, Shape};
-use model_core::{Aligned, Decoder, Frame, RowStatus};
+use model_core::{Aligned, Decoder, RowStatus};
 use proptest::prelude::*;
 
 const SPECIFICATION: &str = include_str!("../../docs/blob.md");
@@ -112,12 +112,12 @@ fn weights_are_borrowed_where_the_blob_lies() {
 #[test]
 fn a_decoder_marks_rows_with_missing_readings_and_leaves_the_others() {
     let mut buffer = Aligned([0; 512]);
-    let decoder = Decoder::<2, 2, 1>::load(small_model(&mut buffer.0)).unwrap();
-    let frame = Frame { row_column_resistance_ohm: [[54.0, f32::NAN], [54.0, 64.0]] };
-    let estimate = decoder.decode(&frame);
+    let decoder = Decoder::<2>::load(small_model(&mut buffer.0)).unwrap();
+    let frame = [54.0, f32::NAN, 54.0, 64.0];
+    let estimate = decoder.decode(&frame).unwrap();
     assert_eq!(estimate.status, [RowStatus::MissingReading, RowStatus::Decoded]);
-    assert!(estimate.outputs[0][0].is_nan());
-    assert_eq!(estimate.outputs[1][0], 1.0); // at the centre: 1.5·1 − 0.5
+    assert!(estimate.outputs[0].is_nan());
+    assert_eq!(estimate.outputs[1], 1.0); // at the centre: 1.5·1 − 0.5
 }
 
 #[test]
@@ -136,11 +136,11 @@ fn readings_that_overflow_are_told_from_missing_ones() {
         metadata: metadata(),
     };
     let blob = encode(&parts, &mut buffer.0).unwrap();
-    let decoder = Decoder::<2, 2, 1>::load(blob).unwrap();
-    let frame = Frame { row_column_resistance_ohm: [[3e38, 64.0], [54.0, 64.0]] };
-    let estimate = decoder.decode(&frame);
+    let decoder = Decoder::<2>::load(blob).unwrap();
+    let frame = [3e38, 64.0, 54.0, 64.0];
+    let estimate = decoder.decode(&frame).unwrap();
     assert_eq!(estimate.status, [RowStatus::Overflow, RowStatus::Decoded]);
-    assert!(estimate.outputs[0][0].is_nan() && estimate.outputs[1][0].is_finite());
+    assert!(estimate.outputs[0].is_nan() && estimate.outputs[1].is_finite());
 }
 
 #[test]

@@ -4,15 +4,16 @@ use model_core::blob::{
     DecodeError, EncodeError, Metadata, Model, ModelParts, ModelShape, encode, encoded_length_bound,
 };
 use model_core::checksum::CRC_32;
+use model_core::gate::Rest;
 use model_core::projection::Projection;
 use model_core::rbf::direct::{self, Parameters};
 use model_core::rbf::{Network, Shape};
-use model_core::{Aligned, Decoder, Frame, Gate, RowStatus};
+use model_core::{Aligned, Decoder, Gate, OwnedEstimate, RowStatus};
 
 /// A projection block: the first feature is the mean of the four readings, the second the difference of the rows.
 const BLOCK: [f32; 10] = [0.0, 10.0, 0.25, 0.25, 0.25, 0.25, 0.25, -0.25, 0.25, -0.25];
 /// A frame at the network's centre in the first feature, and a quarter of the span from it in the second.
-const NEAR_CENTRE: Frame<2, 2> = Frame { row_column_resistance_ohm: [[48.0, 50.0], [60.0, 58.0]] };
+const NEAR_CENTRE: [f32; 4] = [48.0, 50.0, 60.0, 58.0];
 
 fn network(outputs: usize) -> Network<'static> {
     let parameters = Parameters {
@@ -48,30 +49,29 @@ fn array(buffer: &mut [u8]) -> &[u8] {
 fn the_features_of_a_whole_frame_decide_all_rows() {
     let mut buffer = Aligned([0; 1024]);
     let blob = array(&mut buffer.0);
-    let (decoder, model) = (Decoder::<2, 2, 1>::load(blob).unwrap(), Model::decode(blob).unwrap());
+    let (decoder, model) = (Decoder::<2>::load(blob).unwrap(), Model::decode(blob).unwrap());
     let mut features = [0.0; 2];
-    let readings = NEAR_CENTRE.row_column_resistance_ohm;
-    model.projection().unwrap().project(readings.as_flattened(), &mut features);
+    model.projection().unwrap().project(&NEAR_CENTRE, &mut features);
     assert_eq!(features, [54.0, 5.0]);
     let activation = (-2.0_f32 * 0.0625).exp();
-    let estimate = decoder.decode(&NEAR_CENTRE);
+    let estimate = decoder.decode(&NEAR_CENTRE).unwrap();
     assert_eq!(estimate.status, [RowStatus::Decoded; 2]);
     let expected = [1.5 * activation - 0.5, 3.0 * activation - 1.0];
     for (outputs, expected) in estimate.outputs.iter().zip(expected) {
-        assert!((outputs[0] - expected).abs() < 1e-6, "{outputs:?} {expected}");
+        assert!((outputs - expected).abs() < 1e-6, "{outputs:?} {expected}");
     }
 }
 
 #[test]
 fn one_missing_reading_leaves_no_row_to_decode() {
     let mut buffer = Aligned([0; 1024]);
-    let decoder = Decoder::<2, 2, 1>::load(array(&mut buffer.0)).unwrap();
+    let decoder = Decoder::<2>::load(array(&mut buffer.0)).unwrap();
     for missing in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         let mut frame = NEAR_CENTRE;
-        frame.row_column_resistance_ohm[1][0] = missing;
-        let estimate = decoder.decode(&frame);
+        frame[2] = missing;
+        let estimate = decoder.decode(&frame).unwrap();
         assert_eq!(estimate.status, [RowStatus::MissingReading; 2]);
-        assert!(estimate.outputs.iter().all(|outputs| outputs[0].is_nan()));
+        assert!(estimate.outputs.iter().all(|output| output.is_nan()));
     }
 }
 
@@ -80,28 +80,30 @@ fn features_that_overflow_are_told_from_missing_readings() {
     let mut buffer = Aligned([0; 1024]);
     let block = BLOCK.map(|part| 2.0 * part);
     let blob = encoded(&block, &[network(2)], &[0, 0], &mut buffer.0).unwrap();
-    let decoder = Decoder::<2, 2, 1>::load(blob).unwrap();
-    let frame = Frame { row_column_resistance_ohm: [[f32::MAX; 2], [-f32::MAX; 2]] };
-    let estimate = decoder.decode(&frame);
+    let decoder = Decoder::<2>::load(blob).unwrap();
+    let frame = [f32::MAX, f32::MAX, -f32::MAX, -f32::MAX];
+    let estimate = decoder.decode(&frame).unwrap();
     assert_eq!(estimate.status, [RowStatus::Overflow; 2]);
-    assert!(estimate.outputs.iter().all(|outputs| outputs[0].is_nan()));
+    assert!(estimate.outputs.iter().all(|output| output.is_nan()));
 }
 
 #[test]
 fn an_array_is_at_rest_as_a_whole_or_not_at_all() {
     let mut buffer = Aligned([0; 1024]);
-    let decoder = Decoder::<2, 2, 1>::load(array(&mut buffer.0)).unwrap();
-    let rest = decoder.decode(&NEAR_CENTRE);
-    let gate = Gate::new(&NEAR_CENTRE, &rest, 0.02);
-    let mut estimate = rest;
+    let decoder = Decoder::<2>::load(array(&mut buffer.0)).unwrap();
+    let rest = decoder.decode(&NEAR_CENTRE).unwrap();
+    let OwnedEstimate { outputs, status } = &rest;
+    let gate = Gate::new(Rest { baseline_ohm: &NEAR_CENTRE, outputs, status }, 0.02);
+    let mut estimate = rest.clone();
+    let mut scratch = [0.0; 4];
     let mut frame = NEAR_CENTRE;
-    frame.row_column_resistance_ohm[0][0] *= 1.01;
-    decoder.decode_gated_into(&frame, gate, &mut estimate);
-    assert_eq!((estimate.status, estimate.outputs), ([RowStatus::AtRest; 2], rest.outputs));
+    frame[0] *= 1.01;
+    decoder.decode_gated(&frame, gate, &mut scratch, &mut estimate.borrowed()).unwrap();
+    assert_eq!((&estimate.status[..], &estimate.outputs), (&[RowStatus::AtRest; 2][..], outputs));
     // A touch of the last row makes the first one be decoded too.
-    frame.row_column_resistance_ohm[1][1] *= 1.03;
-    decoder.decode_gated_into(&frame, gate, &mut estimate);
-    assert_eq!(estimate, decoder.decode(&frame));
+    frame[3] *= 1.03;
+    decoder.decode_gated(&frame, gate, &mut scratch, &mut estimate.borrowed()).unwrap();
+    assert_eq!(estimate, decoder.decode(&frame).unwrap());
     assert_eq!(estimate.status, [RowStatus::Decoded; 2]);
 }
 

@@ -1,4 +1,4 @@
-//! Memory regions of the model slots, as the linker placed them.
+//! Memory regions of the model slots and of weights in RAM, as the linker placed them.
 
 use core::{ptr, slice};
 
@@ -7,6 +7,26 @@ unsafe extern "C" {
     static _slot_a_end: u8;
     static _slot_b_start: u8;
     static _slot_b_end: u8;
+    static mut _weights_start: u32;
+    static mut _weights_end: u32;
+}
+
+/// Takes the RAM to which a model's blob is copied.
+///
+/// # Safety
+/// The caller must ensure that this is called only once: no two values may be the same memory.
+#[must_use]
+pub unsafe fn take_weights() -> &'static mut [u32] {
+    let (start, end) = (&raw mut _weights_start, &raw mut _weights_end);
+    let words = (end.addr() - start.addr()) / size_of::<u32>();
+    // SAFETY: the linker places nothing else there, and the caller ensures that nobody else has it. Every bit
+    // pattern that RAM holds at power-on is a number. The region is not of Rust's making, so its provenance is exposed.
+    unsafe {
+        slice::from_raw_parts_mut(
+            ptr::with_exposed_provenance_mut(start.expose_provenance()),
+            words,
+        )
+    }
 }
 
 /// Memory of one model slot, with exclusive access.

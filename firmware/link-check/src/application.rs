@@ -1,11 +1,12 @@
 //! The application on a board that is opaque to the optimiser.
 
-use firmware::app::{PaperApp, PaperBuffers};
+use firmware::app::{App, Buffers};
+use firmware::capacity::Capacity;
 use firmware::link::message::{Configuration, Memory};
 use firmware::platform::{Platform, Port};
 use firmware::readout::{FrameSource, ScanReport, ScanSettings};
 use firmware::store::{FlashError, Slot};
-use model_core::Frame;
+use model_core::Wires;
 
 use crate::opaque::{opaque, slot};
 
@@ -40,10 +41,10 @@ impl Platform for Board {
 
 struct Sensor;
 
-impl FrameSource<8, 18> for Sensor {
-    fn scan(&mut self, settings: ScanSettings, frame: &mut Frame<8, 18>) -> ScanReport {
-        opaque(settings);
-        *frame = opaque(Frame::missing());
+impl FrameSource for Sensor {
+    fn scan(&mut self, settings: ScanSettings, wires: Wires, frame: &mut [f32]) -> ScanReport {
+        opaque((settings, wires));
+        frame.fill(opaque(60.0));
         opaque(ScanReport::default())
     }
 }
@@ -66,8 +67,10 @@ impl Slot for Flash {
 }
 
 pub fn exercise() {
-    let mut buffers = PaperBuffers::new();
+    let mut buffers = Buffers::<8, 18, 18, { Capacity::PAPER.message_bytes() }>::new();
     let configuration = opaque(Configuration::DEFAULT);
-    let mut app = PaperApp::<_, _>::new(Board, Sensor, configuration, &mut buffers);
-    app.run(&mut [Flash, Flash]);
+    let mut app = App::new(Board, Sensor, configuration, &mut buffers);
+    let mut weights = [0; 1024];
+    app.run(&mut [Flash, Flash], &mut weights);
+    opaque(weights);
 }

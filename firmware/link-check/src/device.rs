@@ -2,14 +2,14 @@
 
 use firmware::store::blob_in_slot;
 use model_core::rls::{self, Rls};
-use model_core::{ColumnWire, Decoder, Frame, RowWire, decoder_ram_bytes};
+use model_core::{ColumnWire, Decoder, Estimate, RowStatus, RowWire, Wires, decoder_ram_bytes};
 
 use crate::application;
 use crate::opaque::{opaque, slot};
 use crate::readout;
 
 /// A decoder for the paper's sensor, as in the application.
-type PaperDecoder = Decoder<'static, 8, 18, 18>;
+type PaperDecoder = Decoder<'static, 8>;
 
 /// The RAM figure of `host-sim inspect` must be at least the compiler's.
 const _: () = assert!(size_of::<PaperDecoder>() <= decoder_ram_bytes(8));
@@ -18,16 +18,27 @@ const _: () = assert!(size_of::<PaperDecoder>() <= decoder_ram_bytes(8));
 fn exercise_decoding() {
     let Ok(decoder) = PaperDecoder::load(blob_in_slot(slot())) else { return };
 
-    let mut frame = opaque(Frame::missing());
-    opaque(frame.set_ohm(RowWire(opaque(0)), ColumnWire(opaque(0)), opaque(60.0)));
-    opaque(frame.ohm(RowWire(opaque(0)), ColumnWire(opaque(0))));
-    let estimate = opaque(decoder.decode(&frame));
+    let wires = opaque(Wires { rows: 8, columns: 18 });
+    opaque(wires.place(RowWire(opaque(0)), ColumnWire(opaque(0))));
+    let frame = opaque([60.0; 144]);
+    let (mut outputs, mut status) = (opaque([0.0; 144]), [RowStatus::MissingReading; 8]);
+    let mut scratch = [0.0; 144];
+    let length = |all: usize| opaque(all);
+    let (Some(frame), Some(outputs)) = (frame.get(..length(144)), outputs.get_mut(..length(144)))
+    else {
+        return;
+    };
+    let mut estimate = Estimate { outputs, status: &mut status };
+    opaque(decoder.decode_into(frame, &mut scratch, &mut estimate).is_ok());
+    opaque((decoder.shape(), decoder.scratch_floats()));
 
     let metadata = decoder.metadata();
     metadata.output_names.iter().for_each(|name| _ = opaque(name));
+    opaque(metadata.output_names.position(opaque("r1e1_dz_mm")));
     metadata.training_rmse.iter().for_each(|rmse| _ = opaque(rmse));
     opaque(decoder.model_crc());
 
+    opaque(&*estimate.outputs);
     if cfg!(feature = "must-fail") {
         opaque(estimate.outputs[opaque(0)]);
     }

@@ -12,7 +12,7 @@ use firmware::readout::{
     OnChipAdc, RowDrive, ScanSettings, Scanner, ShiftRegister595,
 };
 use firmware::timing;
-use model_core::Frame;
+use model_core::Wires;
 
 use crate::opaque::opaque;
 
@@ -68,24 +68,28 @@ impl OnChipAdc for Part {
     }
 }
 
-fn scan<D: RowDrive, S: ColumnSampler, C: Circuit<8, 18>>(drive: D, sampler: S, circuit: C) {
-    let mut scanner = Scanner { drive, sampler, delay: Part, circuit };
+fn scan<D: RowDrive, S: ColumnSampler, C: Circuit>(drive: D, sampler: S, circuit: C) {
+    let mut scanner = Scanner::<_, _, _, _, 18>::new(drive, sampler, Part, circuit);
     let settings = ScanSettings { settling_us: opaque(46), oversampling: opaque(2) };
-    let mut frame = Frame::<8, 18>::missing();
-    opaque(scanner.scan(settings, &mut frame).failed_samples);
+    let wires = opaque(Wires { rows: 8, columns: 18 });
+    let mut frame = [0.0; 144];
+    let Some(frame) = frame.get_mut(..opaque(144)) else { return };
+    opaque(scanner.scan(settings, wires, frame).failed_samples);
 
-    let mut baseline = Baseline::<8, 18>::new();
-    baseline.add(&opaque(frame));
-    baseline.add(&opaque(frame));
+    let mut memory = [0.0; 144];
+    let mut baseline = Baseline::new(&mut memory);
+    baseline.restart(opaque(144));
+    baseline.add(frame);
+    baseline.add(frame);
     opaque(baseline.frames());
-    opaque(baseline.largest_relative_deviation(&opaque(frame)));
+    opaque(baseline.largest_relative_deviation(frame));
 }
 
 /// Constants of a circuit, which stay in flash.
 static DIVIDER: Divider<8, 18> = Divider::TYPICAL;
 
 fn scan_with_every_sampler<D: RowDrive>(drive: impl Fn() -> D) {
-    scan(drive(), Mcp3208s { chips: [Part; 3] }, opaque(ZeroPotential::TYPICAL));
+    scan(drive(), Mcp3208s { chips: [Part; 3] }, opaque(ZeroPotential::<8, 18>::TYPICAL));
     let adc = || MultiplexedAdc { adc: Part, address: [Part; 3], enable: [Part; 3] };
     scan(drive(), adc(), opaque(&DIVIDER));
     let adc = MultiplexedAdc { adc: Part, address: [Part; 4], enable: [Part; 2] };
@@ -94,7 +98,7 @@ fn scan_with_every_sampler<D: RowDrive>(drive: impl Fn() -> D) {
         adc,
         opaque(ZeroPotential {
             feedback_ohm: array::from_fn(|_| opaque(560.0)),
-            ..ZeroPotential::TYPICAL
+            ..ZeroPotential::<8, 18>::TYPICAL
         }),
     );
 }

@@ -1,10 +1,10 @@
 //! The program on the board: the application with the board's parts.
 
-use board_common::buffers;
+use board_common::region::take_weights;
+use board_common::{BoardApp, CAPACITY, buffers};
 use cortex_m_rt::entry;
 use defmt::{info, unwrap};
 use defmt_rtt as _;
-use firmware::app::PaperApp;
 use firmware::circuit::ZeroPotential;
 use firmware::link::message::{Configuration, Memory};
 use firmware::platform::{Platform, Port};
@@ -15,7 +15,7 @@ use stm32f4xx_hal::gpio::{ErasedPin, Output};
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
 /// Constants of the circuit, which stay in flash. `docs/readout.md` explains how to measure your own.
-static CIRCUIT: ZeroPotential<8, 18> = ZeroPotential::TYPICAL;
+static CIRCUIT: ZeroPotential<{ CAPACITY.rows }, { CAPACITY.columns }> = ZeroPotential::TYPICAL;
 
 struct Nucleo {
     serial: Serial,
@@ -61,16 +61,14 @@ fn main() -> ! {
         env!("CARGO_PKG_VERSION"),
         board.reset_cause
     );
-    let scanner = Scanner {
-        drive: ShiftRegister595::<_, 8> {
-            data: board.row_data,
-            clock: board.row_clock,
-            latch: board.row_latch,
-        },
-        sampler: Mcp3208s { chips: board.converters },
-        delay: board.delay,
-        circuit: &CIRCUIT,
+    let drive = ShiftRegister595::<_, { CAPACITY.rows }> {
+        data: board.row_data,
+        clock: board.row_clock,
+        latch: board.row_latch,
     };
+    let sampler = Mcp3208s { chips: board.converters };
+    let scanner =
+        Scanner::<_, _, _, _, { CAPACITY.columns }>::new(drive, sampler, board.delay, &CIRCUIT);
     let nucleo = Nucleo {
         serial: board.serial,
         clock: board.clock,
@@ -78,9 +76,10 @@ fn main() -> ! {
         led: board.led,
     };
     let buffers = unwrap!(buffers());
-    let mut app = PaperApp::<_, _>::new(nucleo, scanner, Configuration::DEFAULT, buffers);
+    let mut app = BoardApp::<_, _>::new(nucleo, scanner, Configuration::DEFAULT, buffers);
     let mut slots = board.slots;
-    app.run(&mut slots);
+    // SAFETY: the memory is taken here only.
+    app.run(&mut slots, unsafe { take_weights() });
     info!("restarting");
     while !app.platform().serial.has_sent_all() {}
     restart()

@@ -5,11 +5,11 @@
 
 use core::cell::Cell;
 
-use board_common::buffers;
+use board_common::region::take_weights;
+use board_common::{BoardApp, CAPACITY, CONVERTERS, buffers};
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::entry;
 use defmt::info;
-use firmware::app::PaperApp;
 use firmware::circuit::ZeroPotential;
 use firmware::link::message::{Configuration, Memory};
 use firmware::platform::{Platform, Port};
@@ -32,7 +32,7 @@ const ROW_CLOCK: u8 = 13;
 const ROW_LATCH: u8 = 14;
 
 /// Constants of the circuit, which stay in flash.
-static CIRCUIT: ZeroPotential<8, 18> = ZeroPotential::TYPICAL;
+static CIRCUIT: ZeroPotential<{ CAPACITY.rows }, { CAPACITY.columns }> = ZeroPotential::TYPICAL;
 
 /// Carrier of a serial line's bytes: the mailbox or a UART.
 enum Carrier {
@@ -131,12 +131,11 @@ fn main() -> ! {
     let readout = Carrier::Uart(Uart::second());
     let remote = Remote::new(Line { carrier: readout, clock: &clock });
     let [data, clock_pin, latch] = [ROW_DATA, ROW_CLOCK, ROW_LATCH].map(|pin| remote.pin(pin));
-    let scanner = Scanner {
-        drive: ShiftRegister595::<_, 8> { data, clock: clock_pin, latch },
-        sampler: Mcp3208s { chips: [0, 1, 2].map(|chip| remote.spi(chip)) },
-        delay: remote.delay(),
-        circuit: &CIRCUIT,
-    };
+    let drive = ShiftRegister595::<_, { CAPACITY.rows }> { data, clock: clock_pin, latch };
+    let sampler =
+        Mcp3208s { chips: core::array::from_fn::<_, CONVERTERS, _>(|chip| remote.spi(chip as u8)) };
+    let scanner =
+        Scanner::<_, _, _, _, { CAPACITY.columns }>::new(drive, sampler, remote.delay(), &CIRCUIT);
     let board = Board {
         line: Line { carrier: link, clock: &clock },
         watchdog: Watchdog::start(WATCHDOG_MS),
@@ -145,10 +144,11 @@ fn main() -> ! {
     // The host says when to scan, because its virtual hardware may be missing.
     let configuration = Configuration { frame_period_us: 0, ..Configuration::DEFAULT };
     let Some(buffers) = buffers() else { exit::failure() };
-    let mut app = PaperApp::<_, _>::new(board, scanner, configuration, buffers);
+    let mut app = BoardApp::<_, _>::new(board, scanner, configuration, buffers);
     // SAFETY: the slots are taken here only.
     let mut slots = unsafe { Slot::take() };
-    app.run(&mut slots);
+    // SAFETY: the memory is taken here only.
+    app.run(&mut slots, unsafe { take_weights() });
     info!("restarting");
     SCB::sys_reset()
 }

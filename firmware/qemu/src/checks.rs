@@ -3,11 +3,11 @@
 
 use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
 use model_core::blob::Model;
-use model_core::exp::ExpKernel;
-use model_core::gate::is_at_rest;
+use model_core::exp::{ExpKernel, Polynomial};
+use model_core::gate::{Rest, is_at_rest};
 use model_core::rbf::Network;
 use model_core::rls::Rls;
-use model_core::{Decoder, Estimate, Frame, Gate, RowStatus};
+use model_core::{Decoder, Estimate, Gate, RowStatus};
 
 /// Number of row-wires, as in the paper's sensor.
 pub const ROWS: usize = 8;
@@ -44,25 +44,59 @@ fn add(digest: &mut Digest<'_, u32, Table<0>>, values: &[f32]) {
     values.iter().for_each(|value| digest.update(&value.to_bits().to_le_bytes()));
 }
 
+/// Readings of `R` rows in Ω.
+type Frame<const R: usize> = [[f32; COLS]; R];
+
+/// What a decoder makes of a frame of `R` rows.
+#[derive(Clone, Copy)]
+struct Decoded<const R: usize> {
+    outputs: [[f32; OUTPUTS]; R],
+    status: [RowStatus; R],
+}
+
+impl<const R: usize> Decoded<R> {
+    const NOTHING: Self =
+        Self { outputs: [[0.0; OUTPUTS]; R], status: [RowStatus::MissingReading; R] };
+
+    /// Decodes `frame` into `self`; `None` if the model has another shape.
+    fn decode<E: ExpKernel>(
+        &mut self,
+        decoder: &Decoder<'_, R>,
+        frame: &Frame<R>,
+        gate: Option<Gate<'_>>,
+    ) -> Option<()> {
+        let outputs = self.outputs.as_flattened_mut();
+        let mut estimate = Estimate { outputs, status: &mut self.status };
+        let mut scratch = [0.0; 2 * COLS];
+        decoder.decode_with::<E>(frame.as_flattened(), gate, &mut scratch, &mut estimate).ok()
+    }
+
+    /// What `decoder` makes of `frame`.
+    fn of(decoder: &Decoder<'_, R>, frame: &Frame<R>) -> Option<Self> {
+        let mut outcome = Self::NOTHING;
+        outcome.decode::<Polynomial>(decoder, frame, None)?;
+        Some(outcome)
+    }
+}
+
 /// CRC-32 of all bits that the model in `blob` decodes some frames to, one with a missing reading. `None` if the
 /// blob does not load.
 #[must_use]
 pub fn decoding<E: ExpKernel>(blob: &[u8]) -> Option<u32> {
-    let decoder = Decoder::<ROWS, COLS, OUTPUTS>::load(blob).ok()?;
+    let decoder = Decoder::<ROWS>::load(blob).ok()?;
     let crc = CRC;
     let mut digest = crc.digest();
     let mut numbers = Numbers::new(1);
-    let mut estimate =
-        Estimate { outputs: [[0.0; OUTPUTS]; ROWS], status: [RowStatus::MissingReading; ROWS] };
+    let mut outcome = Decoded::NOTHING;
     for frame in 0..FRAMES {
-        let mut readings = Frame::<ROWS, COLS>::missing();
-        let places = readings.row_column_resistance_ohm.as_flattened_mut();
-        places.iter_mut().for_each(|ohm| *ohm = 60.0 + 5.0 * numbers.draw());
+        let mut readings: Frame<ROWS> = [[f32::NAN; COLS]; ROWS];
+        let places = readings.as_flattened_mut().iter_mut();
+        places.for_each(|ohm| *ohm = 60.0 + 5.0 * numbers.draw());
         if frame == 1 {
-            readings.row_column_resistance_ohm[2][3] = f32::NAN;
+            readings[2][3] = f32::NAN;
         }
-        decoder.decode_with::<E>(&readings, None, &mut estimate);
-        add(&mut digest, estimate.outputs.as_flattened());
+        outcome.decode::<E>(&decoder, &readings, None)?;
+        add(&mut digest, outcome.outputs.as_flattened());
     }
     Some(digest.finalize())
 }
@@ -78,9 +112,9 @@ const QUICK_CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC
 const REACHES: [f32; 8] = [5.0, 5.0, 5.0, 7.0, 9.0, 30.0, 1e3, 3e38];
 
 /// Frame number `index` of many, with some readings missing or infinite.
-fn one_of_many<const R: usize>(index: usize, numbers: &mut Numbers) -> Frame<R, COLS> {
-    let mut frame = Frame::missing();
-    let readings = frame.row_column_resistance_ohm.as_flattened_mut();
+fn one_of_many<const R: usize>(index: usize, numbers: &mut Numbers) -> Frame<R> {
+    let mut frame = [[f32::NAN; COLS]; R];
+    let readings = frame.as_flattened_mut();
     let reach = REACHES[index % REACHES.len()];
     readings.iter_mut().for_each(|ohm| *ohm = 60.0 + reach * numbers.draw());
     let none = [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
@@ -93,15 +127,14 @@ fn one_of_many<const R: usize>(index: usize, numbers: &mut Numbers) -> Frame<R, 
 /// CRC-32 of all bits that the model in `blob` decodes [`MANY`] frames to. `None` if the blob does not load.
 #[must_use]
 pub fn decoding_many<E: ExpKernel, const R: usize>(blob: &[u8]) -> Option<u32> {
-    let decoder = Decoder::<R, COLS, OUTPUTS>::load(blob).ok()?;
+    let decoder = Decoder::<R>::load(blob).ok()?;
     let crc = QUICK_CRC;
     let mut digest = crc.digest();
     let mut numbers = Numbers::new(4);
-    let mut estimate =
-        Estimate { outputs: [[0.0; OUTPUTS]; R], status: [RowStatus::MissingReading; R] };
+    let mut outcome = Decoded::NOTHING;
     for index in 0..MANY {
-        decoder.decode_with::<E>(&one_of_many::<R>(index, &mut numbers), None, &mut estimate);
-        for (outputs, status) in estimate.outputs.iter().zip(estimate.status) {
+        outcome.decode::<E>(&decoder, &one_of_many::<R>(index, &mut numbers), None)?;
+        for (outputs, status) in outcome.outputs.iter().zip(outcome.status) {
             outputs.iter().for_each(|value| digest.update(&value.to_bits().to_le_bytes()));
             digest.update(&[status as u8]);
         }
@@ -125,14 +158,14 @@ fn infer_by_twin(network: &Network<'_>, inputs: &[f32; COLS], outputs: &mut [f32
 /// decodes to other bits. `None` if the blob does not load, or its number format has no twin.
 #[must_use]
 pub fn twins(blob: &[u8]) -> Option<[usize; 2]> {
-    let decoder = Decoder::<ROWS, COLS, OUTPUTS>::load(blob).ok()?;
+    let decoder = Decoder::<ROWS>::load(blob).ok()?;
     let model = Model::decode(blob).ok()?;
     let mut numbers = Numbers::new(4);
     let [mut compared, mut different] = [0; 2];
     for index in 0..MANY {
         let frame = one_of_many::<ROWS>(index, &mut numbers);
-        let Estimate { outputs, status } = decoder.decode(&frame);
-        let rows = frame.row_column_resistance_ohm.iter().zip(&outputs).zip(status).enumerate();
+        let Decoded { outputs, status } = Decoded::of(&decoder, &frame)?;
+        let rows = frame.iter().zip(&outputs).zip(status).enumerate();
         for (row, ((readings, outputs), status)) in rows {
             if status != RowStatus::Decoded {
                 continue;
@@ -152,20 +185,20 @@ pub fn twins(blob: &[u8]) -> Option<[usize; 2]> {
 /// format has no twin.
 #[must_use]
 pub fn array_twins(blob: &[u8]) -> Option<[usize; 2]> {
-    let decoder = Decoder::<ARRAY_ROWS, COLS, OUTPUTS>::load(blob).ok()?;
+    let decoder = Decoder::<ARRAY_ROWS>::load(blob).ok()?;
     let model = Model::decode(blob).ok()?;
     let (projection, network) = (model.projection()?, model.networks().next()?);
     let mut numbers = Numbers::new(4);
     let [mut compared, mut different] = [0; 2];
     for index in 0..MANY {
         let frame = one_of_many::<ARRAY_ROWS>(index, &mut numbers);
-        let Estimate { outputs, status } = decoder.decode(&frame);
+        let Decoded { outputs, status } = Decoded::of(&decoder, &frame)?;
         if status != [RowStatus::Decoded; ARRAY_ROWS] {
             continue;
         }
         let mut features = [0.0; COLS];
         let mut of_twin = [[0.0; OUTPUTS]; ARRAY_ROWS];
-        projection.project_portably(frame.row_column_resistance_ohm.as_flattened(), &mut features);
+        projection.project_portably(frame.as_flattened(), &mut features);
         infer_by_twin(&network, &features, of_twin.as_flattened_mut())?;
         let bits = |outputs: [[f32; OUTPUTS]; ARRAY_ROWS]| outputs.map(|row| row.map(f32::to_bits));
         compared += 1;
@@ -200,37 +233,38 @@ fn nearly_at_rest(
 /// wrongly: otherwise than [`is_at_rest`] says, or with other outputs. `None` if the blob does not load.
 #[must_use]
 pub fn gating(blob: &[u8]) -> Option<[usize; 3]> {
-    let decoder = Decoder::<ROWS, COLS, OUTPUTS>::load(blob).ok()?;
+    let decoder = Decoder::<ROWS>::load(blob).ok()?;
     let mut numbers = Numbers::new(5);
-    let mut baseline = Frame::missing();
-    let readings = baseline.row_column_resistance_ohm.as_flattened_mut();
-    readings.iter_mut().for_each(|ohm| *ohm = 60.0 + 5.0 * numbers.draw());
-    let rest = decoder.decode(&baseline);
+    let mut baseline: Frame<ROWS> = [[f32::NAN; COLS]; ROWS];
+    let readings = baseline.as_flattened_mut().iter_mut();
+    readings.for_each(|ohm| *ohm = 60.0 + 5.0 * numbers.draw());
+    let rest = Decoded::of(&decoder, &baseline)?;
     // √18 as a number, because `core` has no square root.
     let most = [TOLERANCE, TOLERANCE / 4.242_640_7];
     let [mut at_rest, mut otherwise] = [0; 2];
     for index in 0..MANY {
-        let mut frame = Frame::missing();
-        let rows = frame.row_column_resistance_ohm.iter_mut();
-        rows.zip(&baseline.row_column_resistance_ohm).enumerate().for_each(|(row, (to, from))| {
+        let mut frame: Frame<ROWS> = [[f32::NAN; COLS]; ROWS];
+        let rows = frame.iter_mut();
+        rows.zip(&baseline).enumerate().for_each(|(row, (to, from))| {
             *to = nearly_at_rest(index * ROWS + row, from, most, &mut numbers);
         });
-        let mut estimate = decoder.decode(&frame);
-        let ungated = estimate;
-        estimate.outputs = [[f32::NAN; OUTPUTS]; ROWS];
-        let gate = Gate::new(&baseline, &rest, TOLERANCE)?;
-        decoder.decode_gated_into(&frame, Some(gate), &mut estimate);
+        let ungated = Decoded::of(&decoder, &frame)?;
+        let mut outcome = Decoded { outputs: [[f32::NAN; OUTPUTS]; ROWS], ..ungated };
+        let outputs = rest.outputs.as_flattened();
+        let rest_of_all =
+            Rest { baseline_ohm: baseline.as_flattened(), outputs, status: &rest.status };
+        let gate = Gate::new(rest_of_all, TOLERANCE)?;
+        outcome.decode::<Polynomial>(&decoder, &frame, Some(gate))?;
         for row in 0..ROWS {
-            let readings = &frame.row_column_resistance_ohm[row];
-            let expected =
-                if is_at_rest(readings, &baseline.row_column_resistance_ohm[row], TOLERANCE) {
-                    at_rest += 1;
-                    (RowStatus::AtRest, rest.outputs[row])
-                } else {
-                    (ungated.status[row], ungated.outputs[row])
-                };
-            let same = estimate.status[row] == expected.0
-                && estimate.outputs[row].map(f32::to_bits) == expected.1.map(f32::to_bits);
+            let readings = &frame[row];
+            let expected = if is_at_rest(readings, &baseline[row], TOLERANCE) {
+                at_rest += 1;
+                (RowStatus::AtRest, rest.outputs[row])
+            } else {
+                (ungated.status[row], ungated.outputs[row])
+            };
+            let same = outcome.status[row] == expected.0
+                && outcome.outputs[row].map(f32::to_bits) == expected.1.map(f32::to_bits);
             otherwise += usize::from(!same);
         }
     }

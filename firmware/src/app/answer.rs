@@ -1,19 +1,17 @@
 //! Requests and their answers.
 
-use model_core::Decoder;
-use model_core::blob::{DecodeError, Floats};
+use model_core::blob::Floats;
 use model_core::exp::{ExpKernel, Polynomial};
 
 use super::Core;
-use super::session::{InForce, Leave, Session};
-use crate::link::message::{
-    Configuration, Identity, ModelFault, Refusal, Report, Request, UploadStep,
-};
+use super::model::{self, InForce};
+use super::session::{Leave, Session};
+use crate::link::message::{Configuration, Identity, Refusal, Report, Request, UploadStep};
 use crate::link::packet::{self, PROTOCOL_VERSION, PacketError};
 use crate::link::receive::Received;
 use crate::log::{info, warning};
 use crate::platform::Platform;
-use crate::readout::{Baseline, FrameSource};
+use crate::readout::FrameSource;
 use crate::store::{Slot, capacity};
 
 /// Largest chunk of an upload in bytes: it leaves room for the rest of the message, and every board can keep it
@@ -25,21 +23,12 @@ const fn chunk_bytes(message_bytes: usize) -> usize {
     if room < LARGEST_CHUNK_BYTES { room } else { LARGEST_CHUNK_BYTES }
 }
 
-impl<
-    P: Platform,
-    F: FrameSource<ROWS, COLS>,
-    S: Slot,
-    const ROWS: usize,
-    const COLS: usize,
-    const OUTPUTS: usize,
-    const BYTES: usize,
-> Session<'_, '_, P, F, S, ROWS, COLS, OUTPUTS, BYTES>
-{
+impl<P: Platform, F: FrameSource, S: Slot, const ROWS: usize> Session<'_, '_, P, F, S, ROWS> {
     /// Receives bytes until a frame is complete or no more bytes are there, and answers the frame's request.
     pub(super) fn serve_link(&mut self) -> Option<Leave> {
         let app = &mut *self.app;
         // Bounded, so that a host that never pauses does not keep the sensor from being scanned.
-        for _ in 0..BYTES {
+        for _ in 0..app.core.capacity.message_bytes() {
             let byte = app.core.line.platform().receive()?;
             if let Some(received) = app.receiver.push(byte) {
                 return app.core.answer(received, &self.model, self.spare);
@@ -49,19 +38,11 @@ impl<
     }
 }
 
-impl<
-    P: Platform,
-    F: FrameSource<ROWS, COLS>,
-    const ROWS: usize,
-    const COLS: usize,
-    const OUTPUTS: usize,
-    const BYTES: usize,
-> Core<'_, P, F, ROWS, COLS, OUTPUTS, BYTES>
-{
+impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
     fn answer<S: Slot>(
         &mut self,
         received: Received<'_>,
-        model: &InForce<'_, ROWS, COLS, OUTPUTS>,
+        model: &InForce<'_, ROWS>,
         spare: &mut S,
     ) -> Option<Leave> {
         let packet = match received {
@@ -118,21 +99,17 @@ impl<
         self.count_lost(sent);
     }
 
-    fn identity<S: Slot>(
-        &mut self,
-        model: &InForce<'_, ROWS, COLS, OUTPUTS>,
-        spare: &S,
-    ) -> Identity<'static> {
+    fn identity<S: Slot>(&mut self, model: &InForce<'_, ROWS>, spare: &S) -> Identity<'static> {
         Identity {
             board: P::BOARD,
             firmware: env!("CARGO_PKG_VERSION"),
-            rows: ROWS as u8,
-            columns: COLS as u8,
-            outputs: OUTPUTS as u8,
+            rows: self.capacity.rows as u8,
+            columns: self.capacity.columns as u8,
+            outputs: self.capacity.outputs as u8,
             kernel: Polynomial::NAME,
             model: model.identity,
             slot_bytes: capacity(spare.bytes()) as u32,
-            chunk_bytes: chunk_bytes(BYTES) as u16,
+            chunk_bytes: chunk_bytes(self.capacity.message_bytes()) as u16,
             memory: self.line.platform().memory(),
         }
     }
@@ -157,15 +134,15 @@ impl<
             return Ok(()); // the host repeats the request, because the answer takes a while
         }
         self.give_up_capture();
-        *self.baseline = Baseline::new();
+        self.baseline.restart(self.wires.readings());
         self.capture = Some((number, frames));
         Ok(())
     }
 
     /// Refuses the request that waits for a baseline, if there is one: no baseline will come.
-    fn give_up_capture(&mut self) {
+    pub(super) fn give_up_capture(&mut self) {
         if let Some((number, _)) = self.capture.take() {
-            *self.baseline = Baseline::new();
+            self.baseline.restart(self.wires.readings());
             let sent = self.line.send(number, &Report::Refused(Refusal::Baseline));
             self.count_lost(sent);
         }
@@ -176,21 +153,22 @@ impl<
         number: u16,
         frame: u32,
         readings_ohm: Floats<'_>,
-        model: &InForce<'_, ROWS, COLS, OUTPUTS>,
+        model: &InForce<'_, ROWS>,
     ) -> Result<(), Refusal> {
-        if readings_ohm.0.len() != 4 * ROWS * COLS {
-            return Err(Refusal::FrameLength { expected: (ROWS * COLS) as u16 });
+        let expected = self.wires.readings();
+        if readings_ohm.0.len() != 4 * expected {
+            return Err(Refusal::FrameLength { expected: expected as u16 });
         }
         self.set_frame(readings_ohm.iter());
         let (flags, _) = self.decode(model.decoder.as_ref());
-        self.send_estimate(number, frame, flags);
+        self.send_estimate(number, frame, 0, flags);
         Ok(())
     }
 
     fn upload_step<S: Slot>(
         &mut self,
         step: UploadStep<'_>,
-        model: &InForce<'_, ROWS, COLS, OUTPUTS>,
+        model: &InForce<'_, ROWS>,
         spare: &mut S,
         leave: &mut Option<Leave>,
     ) -> Result<(), Refusal> {
@@ -209,31 +187,20 @@ impl<
                     return Ok(()); // the host repeats the request, because the answer was lost
                 }
                 let blob = self.upload.complete(spare)?;
-                match Decoder::<ROWS, COLS, OUTPUTS>::check(blob).map(|model| model.crc()) {
+                match model::check(self.capacity, blob).map(|model| model.crc()) {
                     Ok(crc_32) => {
                         let before = model.identity.map_or(0, |identity| identity.generation);
                         self.upload.commit(spare, before.saturating_add(1), crc_32)?;
                         *leave = Some(Leave::NewModel);
                         Ok(())
                     }
-                    Err(error) => {
+                    Err(fault) => {
                         warning!("uploaded model refused");
                         self.upload.abort();
-                        Err(Refusal::BadModel(fault(&error)))
+                        Err(Refusal::BadModel(fault))
                     }
                 }
             }
         }
-    }
-}
-
-/// The link's code for a fault of a model.
-fn fault(error: &DecodeError) -> ModelFault {
-    match error {
-        DecodeError::BadMagic | DecodeError::UnsupportedVersion { .. } => ModelFault::NotABlob,
-        DecodeError::Truncated { .. } | DecodeError::TrailingBytes { .. } => ModelFault::Length,
-        DecodeError::Corrupt { .. } => ModelFault::Corrupt,
-        DecodeError::ShapeMismatch { .. } => ModelFault::Shape,
-        _ => ModelFault::Invalid,
     }
 }

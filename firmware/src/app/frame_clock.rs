@@ -1,4 +1,4 @@
-//! A clock for frames: tells when the next one is due.
+//! Clocks for frames: when the next one is due, and the time since the start.
 
 /// Counts frame periods by a clock in µs that wraps around to 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,9 +29,39 @@ impl FrameClock {
     }
 }
 
+/// Time since the start in µs, from a clock of 32 bits that wraps around to 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LongClock {
+    us: u64,
+}
+
+impl LongClock {
+    /// Makes a clock that shows `now_us`.
+    pub const fn starting_at(now_us: u32) -> Self {
+        Self { us: now_us as u64 }
+    }
+
+    /// Time since the start in µs, when the short clock shows `now_us`.
+    ///
+    /// Must be called more often than the short clock wraps around.
+    pub fn at(&mut self, now_us: u32) -> u64 {
+        self.us += u64::from(now_us.wrapping_sub(self.us as u32));
+        self.us
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn time_goes_on_where_the_short_clock_wraps_around() {
+        let mut clock = LongClock::starting_at(u32::MAX - 1);
+        assert_eq!(clock.at(u32::MAX), u64::from(u32::MAX));
+        assert_eq!(clock.at(5), u64::from(u32::MAX) + 6);
+        assert_eq!(clock.at(5), u64::from(u32::MAX) + 6);
+        assert_eq!(clock.at(4), 2 * (1 << 32) + 4);
+    }
 
     #[test]
     fn frames_keep_to_the_period_however_late_they_are_looked_for() {

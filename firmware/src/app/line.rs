@@ -10,15 +10,15 @@ const STALL_US: u32 = 50_000;
 const REPORT_US: u32 = 2_000_000;
 
 /// The board's serial line, with room for one report.
-pub struct Line<'m, P, const BYTES: usize> {
+pub struct Line<'m, P> {
     platform: P,
-    buffer: &'m mut [u8; BYTES],
+    buffer: &'m mut [u8],
     /// Whether the last report was given up in the middle, so that its frame must still be ended.
     cut: bool,
 }
 
-impl<'m, P: Port, const BYTES: usize> Line<'m, P, BYTES> {
-    pub fn new(platform: P, buffer: &'m mut [u8; BYTES]) -> Self {
+impl<'m, P: Port> Line<'m, P> {
+    pub fn new(platform: P, buffer: &'m mut [u8]) -> Self {
         Self { platform, buffer, cut: false }
     }
 

@@ -1,16 +1,18 @@
 //! A session: the application's loop while one model is in force.
 
 use model_core::blob::Floats;
+use model_core::gate::Rest;
 use model_core::health::{Health, Limits};
-use model_core::{Decoder, Frame, Gate, RowStatus};
+use model_core::{Decoder, Estimate, Gate, RowStatus};
 
+use super::model::{InForce, choose, copy_to};
 use super::{App, Core};
-use crate::link::message::{EstimateReport, HealthReport, ModelIdentity, Report};
+use crate::link::message::{EstimateReport, HealthReport, Report};
 use crate::link::packet::UNASKED;
 use crate::log::{info, warning};
 use crate::platform::Platform;
 use crate::readout::FrameSource;
-use crate::store::{Slot, blob_in_slot};
+use crate::store::Slot;
 
 /// Why a session ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,67 +23,46 @@ pub enum Leave {
     Restart,
 }
 
-/// The application with the model in force, whose slot it borrows, and with the spare slot.
-pub struct Session<
-    'a,
-    'm,
-    P: Platform,
-    F,
-    S,
-    const ROWS: usize,
-    const COLS: usize,
-    const OUTPUTS: usize,
-    const BYTES: usize,
-> {
-    pub(super) app: &'a mut App<'m, P, F, ROWS, COLS, OUTPUTS, BYTES>,
-    pub(super) model: InForce<'a, ROWS, COLS, OUTPUTS>,
+/// The application with the model in force, whose memory it borrows, and with the spare slot.
+pub struct Session<'a, 'm, P, F, S, const ROWS: usize> {
+    pub(super) app: &'a mut App<'m, P, F, ROWS>,
+    pub(super) model: InForce<'a, ROWS>,
     pub(super) spare: &'a mut S,
 }
 
-/// The model in force, if there is one.
-pub(super) struct InForce<'a, const ROWS: usize, const COLS: usize, const OUTPUTS: usize> {
-    pub decoder: Option<Decoder<'a, ROWS, COLS, OUTPUTS>>,
-    pub identity: Option<ModelIdentity>,
-}
-
-impl<
-    'a,
-    'm,
-    P: Platform,
-    F: FrameSource<ROWS, COLS>,
-    S: Slot,
-    const ROWS: usize,
-    const COLS: usize,
-    const OUTPUTS: usize,
-    const BYTES: usize,
-> Session<'a, 'm, P, F, S, ROWS, COLS, OUTPUTS, BYTES>
+impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
+    Session<'a, 'm, P, F, S, ROWS>
 {
-    /// Starts a session with the most recent sound model in force.
+    /// Starts a session with the most recent sound model in force. Its blob is copied to `weights` if it fits.
     #[inline(never)] // so that its stack is free again when the loop begins
     pub fn start(
-        app: &'a mut App<'m, P, F, ROWS, COLS, OUTPUTS, BYTES>,
+        app: &'a mut App<'m, P, F, ROWS>,
         slots: &'a mut [S; 2],
+        weights: &'a mut [u32],
     ) -> Self {
-        let chosen = App::<'m, P, F, ROWS, COLS, OUTPUTS, BYTES>::choose(slots);
+        let chosen = choose(app.core.capacity, slots);
         let [first, second] = slots;
         let (active, spare) = match chosen {
             Some((1, _)) => (&*second, first),
             _ => (&*first, second),
         };
-        let decoder = chosen.and_then(|_| Decoder::load(blob_in_slot(active.bytes())).ok());
-        let identity = chosen.zip(decoder.as_ref()).map(|((slot, generation), decoder)| {
-            ModelIdentity { crc_32: decoder.model_crc(), slot: slot as u8, generation }
-        });
-        if let Some(model) = &identity {
+        let model = match chosen {
+            Some((slot, generation)) => match copy_to(weights, active.bytes()) {
+                Some(copy) => InForce::of(copy, slot, generation, true),
+                None => InForce::of(active.bytes(), slot, generation, false),
+            },
+            None => InForce::NONE,
+        };
+        if let Some(model) = &model.identity {
             info!(
-                "model {=u32:08x} in force, slot {=u8}, generation {=u32}",
-                model.crc_32, model.slot, model.generation
+                "model {=u32:08x} in force, slot {=u8}, generation {=u32}, in RAM: {=bool}",
+                model.crc_32, model.slot, model.generation, model.in_ram
             );
         } else {
             warning!("no model in either slot: readings only, until one is uploaded");
         }
-        app.core.decode_baseline(decoder.as_ref());
-        Self { app, model: InForce { decoder, identity }, spare }
+        app.core.take_shape_of(model.decoder.as_ref());
+        Self { app, model, spare }
     }
 
     /// Runs one turn of the loop: answers at most one request, and scans a frame if one is due.
@@ -92,6 +73,7 @@ impl<
         let leave = self.serve_link();
         let core = &mut self.app.core;
         let now_us = core.line.platform().now_us();
+        core.time.at(now_us);
         if let Some(missed) = core.clock.due(now_us, core.configuration.frame_period_us) {
             core.sensor_answers = core.scan(missed, self.model.decoder.as_ref());
         }
@@ -104,20 +86,41 @@ impl<
     }
 }
 
-impl<
-    P: Platform,
-    F: FrameSource<ROWS, COLS>,
-    const ROWS: usize,
-    const COLS: usize,
-    const OUTPUTS: usize,
-    const BYTES: usize,
-> Core<'_, P, F, ROWS, COLS, OUTPUTS, BYTES>
-{
+impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
+    /// Makes frames and estimates as long as the model's, and decodes the baseline with it. A baseline of other
+    /// wires is forgotten.
+    fn take_shape_of(&mut self, decoder: Option<&Decoder<'_, ROWS>>) {
+        let before = self.wires;
+        let shape = decoder.map(Decoder::shape);
+        self.wires =
+            shape.and_then(|shape| self.capacity.wires_for(shape)).unwrap_or(self.capacity.wires());
+        self.rows = shape.map_or(self.wires.rows, |shape| shape.rows);
+        self.outputs = shape.map_or(0, |shape| shape.rows.saturating_mul(shape.outputs));
+        if self.wires != before {
+            self.give_up_capture();
+            self.baseline.restart(self.wires.readings());
+        }
+        self.decode_baseline(decoder);
+    }
+
+    /// The readings of the last frame.
+    fn readings(&mut self) -> &mut [f32] {
+        self.frame.get_mut(..self.wires.readings()).unwrap_or_default()
+    }
+
+    /// The time in µs that has passed since the start.
+    pub(super) fn now_us(&mut self) -> u64 {
+        let now_us = self.line.platform().now_us();
+        self.time.at(now_us)
+    }
+
     /// Scans a frame and reports on it; returns whether it has at least one reading.
-    fn scan(&mut self, missed: u32, decoder: Option<&Decoder<'_, ROWS, COLS, OUTPUTS>>) -> bool {
-        let start_us = self.line.platform().now_us();
-        let report = self.source.scan(self.configuration.scan, self.frame);
-        let scan_us = self.line.platform().now_us().wrapping_sub(start_us);
+    fn scan(&mut self, missed: u32, decoder: Option<&Decoder<'_, ROWS>>) -> bool {
+        let start_us = self.now_us();
+        let frame = self.frame.get_mut(..self.wires.readings()).unwrap_or_default();
+        let report = self.source.scan(self.configuration.scan, self.wires, frame);
+        let any = frame.iter().any(|reading| !reading.is_nan());
+        let scan_us = self.now_us().wrapping_sub(start_us) as u32;
 
         let s = &mut self.statistics;
         s.frames_scanned = s.frames_scanned.saturating_add(1);
@@ -127,105 +130,132 @@ impl<
         let frame = s.frames_scanned;
         let overrun = if missed > 0 { EstimateReport::OVERRUN } else { 0 };
 
-        let readings = self.frame.row_column_resistance_ohm.as_flattened();
-        let any = readings.iter().any(|reading| !reading.is_nan());
         if self.configuration.send_readings {
-            let readings_ohm = Floats::of(readings);
-            let sent = self.line.send(UNASKED, &Report::Readings { frame, readings_ohm });
+            let readings = self.frame.get(..self.wires.readings()).unwrap_or_default();
+            let report = Report::Readings { frame, start_us, readings_ohm: Floats::of(readings) };
+            let sent = self.line.send(UNASKED, &report);
             self.count_lost(sent);
         }
         let (flags, health) = self.decode(decoder);
         self.feed_baseline(decoder);
         if !health.is_good() {
-            let faulty = health.faulty_columns.map(u32::to_le_bytes);
-            let report = HealthReport {
-                frame,
-                missing: health.missing,
-                shorted: health.shorted,
-                open: health.open,
-                faulty_columns: faulty.as_flattened(),
-            };
-            let sent = self.line.send(UNASKED, &Report::Health(report));
-            self.count_lost(sent);
+            self.send_health(frame, start_us, health);
         }
         if self.configuration.send_estimates {
-            self.send_estimate(UNASKED, frame, flags | overrun);
+            self.send_estimate(UNASKED, frame, start_us, flags | overrun);
         }
         any
     }
 
+    fn send_health(&mut self, frame: u32, start_us: u64, health: Health) {
+        let faulty = self.faulty_columns.map(u32::to_le_bytes);
+        let report = HealthReport {
+            frame,
+            start_us,
+            missing: health.missing,
+            shorted: health.shorted,
+            open: health.open,
+            faulty_columns: faulty.get(..self.wires.rows).unwrap_or_default().as_flattened(),
+        };
+        let sent = self.line.send(UNASKED, &Report::Health(report));
+        self.count_lost(sent);
+    }
+
     /// Decodes the frame without its faulty readings.
-    pub(super) fn decode(
-        &mut self,
-        decoder: Option<&Decoder<'_, ROWS, COLS, OUTPUTS>>,
-    ) -> (u8, Health<ROWS>) {
+    pub(super) fn decode(&mut self, decoder: Option<&Decoder<'_, ROWS>>) -> (u8, Health) {
         let start_us = self.line.platform().now_us();
+        let start_cycles = self.line.platform().cycles();
         let limits = Limits {
             shorted_below_ohm: self.configuration.shorted_below_ohm,
             open_above_ohm: self.configuration.open_above_ohm,
         };
-        let health = Health::of(self.frame, limits);
+        let frame = self.frame.get_mut(..self.wires.readings()).unwrap_or_default();
+        let health = Health::of(frame, self.wires.columns, limits, &mut self.faulty_columns);
         let mut flags = if health.is_good() { 0 } else { EstimateReport::FAULTY_READING };
         if let Some(decoder) = decoder {
             let captured = self.capture.is_none() && self.baseline.frames() > 0;
-            let gate = captured.then(|| {
-                Gate::new(self.baseline.mean(), self.rest, self.configuration.rest_tolerance)
-            });
-            decoder.decode_gated_into(self.frame, gate.flatten(), self.estimate);
-            if self.estimate.status.contains(&RowStatus::Overflow) {
+            let rest = cut(&mut self.rest, self.rows, self.outputs);
+            let rest = Rest {
+                baseline_ohm: self.baseline.mean(),
+                outputs: rest.outputs,
+                status: rest.status,
+            };
+            let gate = captured.then(|| Gate::new(rest, self.configuration.rest_tolerance));
+            let mut estimate = cut(&mut self.estimate, self.rows, self.outputs);
+            let decoded = decoder.decode_gated(frame, gate.flatten(), self.scratch, &mut estimate);
+            // The model's shape was found to fit when it came into force.
+            if decoded.is_err() || estimate.status.contains(&RowStatus::Overflow) {
                 flags |= EstimateReport::OVERFLOW;
             }
         } else {
-            self.estimate.outputs = [[f32::NAN; OUTPUTS]; ROWS];
-            self.estimate.status = [RowStatus::MissingReading; ROWS];
+            cut(&mut self.estimate, self.rows, 0).status.fill(RowStatus::MissingReading);
             flags |= EstimateReport::NO_MODEL;
         }
-        let change = self.baseline.largest_relative_deviation(self.frame);
+        let change = self.baseline.largest_relative_deviation(frame);
         let contact = change.is_some_and(|change| change > self.configuration.contact_threshold);
         if contact && self.capture.is_none() {
             flags |= EstimateReport::CONTACT;
         }
+        let decode_cycles = self.line.platform().cycles().wrapping_sub(start_cycles);
         let decode_us = self.line.platform().now_us().wrapping_sub(start_us);
-        let at_rest = self.estimate.status.iter().filter(|status| **status == RowStatus::AtRest);
+        self.count_decoded(decode_us, decode_cycles);
+        (flags, health)
+    }
+
+    fn count_decoded(&mut self, decode_us: u32, decode_cycles: u32) {
+        let status = cut(&mut self.estimate, self.rows, 0).status;
+        let at_rest = status.iter().filter(|status| **status == RowStatus::AtRest);
         let s = &mut self.statistics;
         s.rows_at_rest = s.rows_at_rest.saturating_add(at_rest.count() as u32);
         s.frames_decoded = s.frames_decoded.saturating_add(1);
         s.longest_decode_us = s.longest_decode_us.max(decode_us);
-        (flags, health)
+        s.longest_decode_cycles = s.longest_decode_cycles.max(decode_cycles);
+        if s.shortest_decode_cycles == 0 || decode_cycles < s.shortest_decode_cycles {
+            s.shortest_decode_cycles = decode_cycles;
+        }
     }
 
     /// Sends the estimate, either as the answer to request `number` or unasked.
-    pub(super) fn send_estimate(&mut self, number: u16, frame: u32, flags: u8) {
-        let row_status = self.estimate.status.map(|status| match status {
-            RowStatus::Decoded => 0,
-            RowStatus::MissingReading => 1,
-            RowStatus::Overflow => 2,
-            RowStatus::AtRest => EstimateReport::ROW_AT_REST,
-        });
-        let outputs = Floats::of(self.estimate.outputs.as_flattened());
-        let report = EstimateReport { frame, flags, row_status: &row_status, outputs };
+    pub(super) fn send_estimate(&mut self, number: u16, frame: u32, start_us: u64, flags: u8) {
+        let estimate = cut(&mut self.estimate, self.rows, self.outputs);
+        let mut codes = [0; ROWS];
+        for (code, status) in codes.iter_mut().zip(estimate.status.iter()) {
+            *code = match status {
+                RowStatus::Decoded => 0,
+                RowStatus::MissingReading => 1,
+                RowStatus::Overflow => 2,
+                RowStatus::AtRest => EstimateReport::ROW_AT_REST,
+            };
+        }
+        let row_status = codes.get(..self.rows).unwrap_or_default();
+        let outputs = Floats::of(estimate.outputs);
+        let report = EstimateReport { frame, start_us, flags, row_status, outputs };
         let sent = self.line.send(number, &Report::Estimate(report));
         self.count_lost(sent);
     }
 
     /// Adds the frame to the baseline that is being captured, and answers the request when the baseline is
     /// complete.
-    fn feed_baseline(&mut self, decoder: Option<&Decoder<'_, ROWS, COLS, OUTPUTS>>) {
+    fn feed_baseline(&mut self, decoder: Option<&Decoder<'_, ROWS>>) {
         let Some((number, left)) = self.capture else { return };
         self.baseline.add(self.frame);
         self.capture = left.checked_sub(1).filter(|left| *left > 0).map(|left| (number, left));
         if self.capture.is_none() {
             self.decode_baseline(decoder);
-            let mean = self.baseline.mean().row_column_resistance_ohm.as_flattened();
-            let sent = self.line.send(number, &Report::Baseline { readings_ohm: Floats::of(mean) });
+            let report = Report::Baseline { readings_ohm: Floats::of(self.baseline.mean()) };
+            let sent = self.line.send(number, &report);
             self.count_lost(sent);
         }
     }
 
     /// Decodes the baseline with the model in force, and keeps the outputs for rows at rest.
-    pub(super) fn decode_baseline(&mut self, decoder: Option<&Decoder<'_, ROWS, COLS, OUTPUTS>>) {
-        if let Some(decoder) = decoder {
-            decoder.decode_into(self.baseline.mean(), self.rest);
+    fn decode_baseline(&mut self, decoder: Option<&Decoder<'_, ROWS>>) {
+        let mut rest = cut(&mut self.rest, self.rows, self.outputs);
+        let decoded = decoder.is_some_and(|decoder| {
+            decoder.decode_into(self.baseline.mean(), self.scratch, &mut rest).is_ok()
+        });
+        if !decoded {
+            rest.status.fill(RowStatus::MissingReading);
         }
     }
 
@@ -237,8 +267,16 @@ impl<
 
     /// Replaces the frame with the `readings` (Ω) of a request.
     pub(super) fn set_frame(&mut self, readings: impl Iterator<Item = f32>) {
-        *self.frame = Frame::missing();
-        let places = self.frame.row_column_resistance_ohm.as_flattened_mut();
-        places.iter_mut().zip(readings).for_each(|(place, reading)| *place = reading);
+        let frame = self.readings();
+        frame.fill(f32::NAN);
+        frame.iter_mut().zip(readings).for_each(|(place, reading)| *place = reading);
+    }
+}
+
+/// The part of an estimate's memory that the model in force uses.
+fn cut<'e>(whole: &'e mut Estimate<'_>, rows: usize, outputs: usize) -> Estimate<'e> {
+    Estimate {
+        outputs: whole.outputs.get_mut(..outputs).unwrap_or_default(),
+        status: whole.status.get_mut(..rows).unwrap_or_default(),
     }
 }

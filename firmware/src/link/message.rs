@@ -32,7 +32,7 @@ pub enum Request<'a> {
     Decode {
         /// Number of the frame, repeated in the answer.
         frame: u32,
-        /// `rows × columns` readings in Ω, row after row; NaN is missing.
+        /// Readings in Ω for the model in force, row after row; NaN is missing.
         #[serde(borrow)]
         readings_ohm: Floats<'a>,
     },
@@ -83,6 +83,8 @@ pub enum Report<'a> {
     Readings {
         /// Number of the frame, from 1 at the start.
         frame: u32,
+        /// Time in µs since the device's start at which the scan began.
+        start_us: u64,
         /// Readings in Ω, row after row.
         #[serde(borrow)]
         readings_ohm: Floats<'a>,
@@ -106,11 +108,11 @@ pub struct Identity<'a> {
     pub board: &'a str,
     /// Version of the firmware.
     pub firmware: &'a str,
-    /// Number of row-wires.
+    /// Largest number of row-wires.
     pub rows: u8,
-    /// Number of column-wires: readings a row.
+    /// Largest number of column-wires: readings a row.
     pub columns: u8,
-    /// Number of outputs a row.
+    /// Largest number of outputs a row.
     pub outputs: u8,
     /// Name of the exponential for activations of networks in `f32-direct`
     /// ([`ExpKernel::NAME`](model_core::exp::ExpKernel::NAME)).
@@ -134,6 +136,14 @@ pub struct ModelIdentity {
     pub slot: u8,
     /// Number of models committed to this device up to this one; 0 if the model was not uploaded.
     pub generation: u32,
+    /// Number of rows.
+    pub rows: u8,
+    /// Number of readings a row.
+    pub inputs: u16,
+    /// Number of outputs a row.
+    pub outputs: u16,
+    /// Whether the weights are decoded from a copy in RAM; else from the slot.
+    pub in_ram: bool,
 }
 
 /// Use of a device's memory, in bytes.
@@ -201,11 +211,14 @@ pub struct Configuration {
 pub struct EstimateReport<'a> {
     /// Number of the frame.
     pub frame: u32,
+    /// Time in µs since the device's start at which the scan began; 0 in an answer to [`Request::Decode`].
+    pub start_us: u64,
     /// Sum of the flags below.
     pub flags: u8,
     /// One byte a row: 0 decoded, 1 a reading missing, 2 overflow, 3 at rest.
     pub row_status: &'a [u8],
-    /// `rows × outputs` numbers in the units of the model's outputs, NaN where a row is not decoded.
+    /// `rows × outputs` numbers in the units of the model's outputs, NaN where a row is not decoded; none without a
+    /// model.
     #[serde(borrow)]
     pub outputs: Floats<'a>,
 }
@@ -230,6 +243,8 @@ impl EstimateReport<'_> {
 pub struct HealthReport<'a> {
     /// Number of the frame.
     pub frame: u32,
+    /// Time in µs since the device's start at which the scan began.
+    pub start_us: u64,
     /// Number of readings that were not taken.
     pub missing: u16,
     /// Number of readings below the lower limit.
@@ -265,6 +280,10 @@ pub struct Statistics {
     pub longest_scan_us: u32,
     /// Longest decoding of one frame in µs.
     pub longest_decode_us: u32,
+    /// Longest decoding of one frame in cycles of the processor; 0 on a board that does not count them.
+    pub longest_decode_cycles: u32,
+    /// Shortest decoding of one frame in cycles of the processor; 0 on a board that does not count them.
+    pub shortest_decode_cycles: u32,
 }
 
 /// Progress of uploading a model.
@@ -291,7 +310,7 @@ pub enum Refusal {
     Version(u8),
     /// The request is not one of this protocol.
     Unknown,
-    /// The frame does not have `rows × columns` readings.
+    /// The frame does not have as many readings as are scanned for the model in force.
     FrameLength {
         /// Number of readings that it must have.
         expected: u16,
@@ -347,6 +366,6 @@ pub enum ModelFault {
     Corrupt,
     /// The CRC-32 matches, but a field or a number is not acceptable.
     Invalid,
-    /// The blob is for a sensor of another shape.
+    /// The device has no room for a model of this shape.
     Shape,
 }

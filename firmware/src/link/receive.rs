@@ -9,44 +9,45 @@ pub enum Received<'a> {
     Frame(&'a [u8]),
     /// A frame with bytes missing.
     Broken,
-    /// A frame longer than `BYTES`, which was skipped.
+    /// A frame longer than the receiver's memory, which was skipped.
     TooLong,
 }
 
-/// Receiver of frames of up to `BYTES` bytes, CRC included.
+/// Receiver of frames that are at most as long as its memory `B` of bytes, CRC included.
 #[derive(Debug, Clone)]
-pub struct Receiver<const BYTES: usize> {
+pub struct Receiver<B> {
     cobs: Decoder,
-    message: heapless::Vec<u8, BYTES>,
+    memory: B,
+    /// Number of bytes of the message so far.
+    length: usize,
     /// Whether the message has been returned, so that the next one overwrites it.
     ended: bool,
     too_long: bool,
 }
 
-impl<const BYTES: usize> Default for Receiver<BYTES> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl<const BYTES: usize> Receiver<BYTES> {
-    /// Makes a receiver that has received nothing.
+impl<B: AsMut<[u8]>> Receiver<B> {
+    /// Makes a receiver that has received nothing, with `memory` for one message.
     #[must_use]
-    pub const fn new() -> Self {
-        let cobs = Decoder::new();
-        Self { cobs, message: heapless::Vec::new(), ended: false, too_long: false }
+    pub const fn new(memory: B) -> Self {
+        Self { cobs: Decoder::new(), memory, length: 0, ended: false, too_long: false }
     }
 
     /// Takes one byte, and at the end of a frame returns its outcome. Zeros between frames are ignored.
     pub fn push(&mut self, byte: u8) -> Option<Received<'_>> {
         let idle = self.cobs.is_idle();
         if core::mem::take(&mut self.ended) {
-            self.message.clear();
+            self.length = 0;
         }
         match self.cobs.push(byte) {
             Decoded::Nothing => None,
             Decoded::Byte(byte) => {
-                self.too_long |= self.message.push(byte).is_err();
+                match self.memory.as_mut().get_mut(self.length) {
+                    Some(place) => {
+                        *place = byte;
+                        self.length += 1;
+                    }
+                    None => self.too_long = true,
+                }
                 None
             }
             Decoded::BrokenEnd if idle => None,
@@ -57,7 +58,8 @@ impl<const BYTES: usize> Receiver<BYTES> {
                 } else if end == Decoded::BrokenEnd {
                     Some(Received::Broken)
                 } else {
-                    Some(Received::Frame(&self.message))
+                    let message = self.memory.as_mut().get(..self.length).unwrap_or_default();
+                    Some(Received::Frame(message))
                 }
             }
         }
@@ -80,7 +82,7 @@ mod tests {
 
     /// Outcomes of a receiver of four bytes for `stream`.
     fn received(stream: &[u8]) -> Vec<Result<Vec<u8>, &'static str>> {
-        let mut receiver = Receiver::<4>::new();
+        let mut receiver = Receiver::new([0; 4]);
         let mut all = Vec::new();
         for byte in stream {
             all.extend(receiver.push(*byte).map(|received| match received {

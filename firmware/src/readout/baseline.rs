@@ -1,47 +1,45 @@
 //! The baseline: the frame of the unloaded sensor.
 
-use model_core::Frame;
-
 /// The mean of frames at rest, with which other frames are compared.
 ///
-/// It takes one array of readings. A reading that was missing, open or shorted in any of the frames stays NaN.
+/// It takes memory for one frame. A reading that was missing, open or shorted in any of the frames stays NaN.
 ///
 /// ```
 /// use firmware::readout::Baseline;
-/// use model_core::Frame;
-/// let mut baseline = Baseline::<1, 2>::new();
-/// baseline.add(&Frame { row_column_resistance_ohm: [[59.0, 60.0]] });
-/// baseline.add(&Frame { row_column_resistance_ohm: [[61.0, f32::NAN]] });
+/// let mut memory = [0.0; 2];
+/// let mut baseline = Baseline::new(&mut memory);
+/// baseline.restart(2);
+/// baseline.add(&[59.0, 60.0]);
+/// baseline.add(&[61.0, f32::NAN]);
 /// assert_eq!(baseline.frames(), 2);
-/// assert_eq!(baseline.mean().row_column_resistance_ohm[0][0], 60.0);
-/// let pressed = Frame { row_column_resistance_ohm: [[54.0, 1.0]] };
-/// assert_eq!(baseline.largest_relative_deviation(&pressed), Some(0.1));
+/// assert_eq!(baseline.mean()[0], 60.0);
+/// assert_eq!(baseline.largest_relative_deviation(&[54.0, 1.0]), Some(0.1));
 /// ```
-#[derive(Debug, Clone, PartialEq)]
-pub struct Baseline<const ROWS: usize, const COLS: usize> {
-    mean: Frame<ROWS, COLS>,
+#[derive(Debug, PartialEq)]
+pub struct Baseline<'m> {
+    memory: &'m mut [f32],
+    readings: usize,
     frames: u16,
 }
 
-impl<const ROWS: usize, const COLS: usize> Default for Baseline<ROWS, COLS> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl<const ROWS: usize, const COLS: usize> Baseline<ROWS, COLS> {
-    /// Makes a baseline of no frames, in which no reading is known.
+impl<'m> Baseline<'m> {
+    /// Makes a baseline of no frames, with `memory` for the longest one.
     #[must_use]
-    pub const fn new() -> Self {
-        Self { mean: Frame { row_column_resistance_ohm: [[0.0; COLS]; ROWS] }, frames: 0 }
+    pub const fn new(memory: &'m mut [f32]) -> Self {
+        Self { memory, readings: 0, frames: 0 }
     }
 
-    /// Adds one frame at rest to the mean; after 65 535 frames nothing changes any more.
-    pub fn add(&mut self, frame: &Frame<ROWS, COLS>) {
+    /// Forgets all frames, and expects frames of so many `readings`, at most as many as there is memory for.
+    pub fn restart(&mut self, readings: usize) {
+        (self.readings, self.frames) = (readings.min(self.memory.len()), 0);
+        self.memory.fill(0.0);
+    }
+
+    /// Adds one frame at rest (Ω) to the mean; after 65 535 frames nothing changes any more.
+    pub fn add(&mut self, frame: &[f32]) {
         let Some(frames) = self.frames.checked_add(1) else { return };
         let share = 1.0 / f32::from(frames);
-        let means = self.mean.row_column_resistance_ohm.as_flattened_mut();
-        for (mean, ohm) in means.iter_mut().zip(frame.row_column_resistance_ohm.as_flattened()) {
+        for (mean, ohm) in self.memory.iter_mut().take(self.readings).zip(frame) {
             *mean = match (usable(*ohm), frames) {
                 (false, _) => f32::NAN,
                 (true, 1) => *ohm,
@@ -59,15 +57,14 @@ impl<const ROWS: usize, const COLS: usize> Baseline<ROWS, COLS> {
 
     /// The mean of the frames in Ω; NaN where a reading is not known, and 0 before the first frame.
     #[must_use]
-    pub fn mean(&self) -> &Frame<ROWS, COLS> {
-        &self.mean
+    pub fn mean(&self) -> &[f32] {
+        self.memory.get(..self.readings).unwrap_or_default()
     }
 
     /// The largest |R/R_rest − 1| of `frame`, or `None` if no reading is known in both.
     #[must_use]
-    pub fn largest_relative_deviation(&self, frame: &Frame<ROWS, COLS>) -> Option<f32> {
-        let rest = self.mean.row_column_resistance_ohm.as_flattened().iter();
-        let pairs = rest.zip(frame.row_column_resistance_ohm.as_flattened());
+    pub fn largest_relative_deviation(&self, frame: &[f32]) -> Option<f32> {
+        let pairs = self.mean().iter().zip(frame);
         pairs
             .filter(|(rest, ohm)| usable(**rest) && usable(**ohm))
             .map(|(rest, ohm)| ((ohm - rest) / rest).abs())
@@ -83,18 +80,22 @@ fn usable(ohm: f32) -> bool {
 mod tests {
     use super::*;
 
-    fn frame(ohm: [f32; 3]) -> Frame<1, 3> {
-        Frame { row_column_resistance_ohm: [ohm] }
+    /// A baseline of frames of three readings.
+    fn baseline(memory: &mut [f32; 3]) -> Baseline<'_> {
+        let mut baseline = Baseline::new(memory);
+        baseline.restart(3);
+        baseline
     }
 
     #[test]
     fn the_mean_of_many_frames_is_theirs_to_the_last_digits() {
-        let mut baseline = Baseline::<1, 3>::new();
+        let mut memory = [0.0; 3];
+        let mut baseline = baseline(&mut memory);
         let reading = |i: u16, k: f32| 55.0 + k + f32::from(i % 7) * 0.1;
         for i in 0..7000 {
-            baseline.add(&frame([reading(i, 0.0), reading(i, 1.0), reading(i, 2.0)]));
+            baseline.add(&[reading(i, 0.0), reading(i, 1.0), reading(i, 2.0)]);
         }
-        for (k, mean) in baseline.mean().row_column_resistance_ohm[0].iter().enumerate() {
+        for (k, mean) in baseline.mean().iter().enumerate() {
             let expected = 55.3 + k as f32;
             assert!((mean / expected - 1.0).abs() < 1e-5, "{mean} instead of {expected}");
         }
@@ -104,15 +105,15 @@ mod tests {
     fn what_was_missing_once_stays_missing() {
         for bad in [f32::NAN, f32::INFINITY, 0.0] {
             for place in 0..3 {
-                let mut baseline = Baseline::<1, 3>::new();
+                let mut memory = [0.0; 3];
+                let mut baseline = baseline(&mut memory);
                 for i in 0..3 {
                     let first = if i == place { bad } else { 60.0 };
-                    baseline.add(&frame([first, 50.0, 40.0]));
+                    baseline.add(&[first, 50.0, 40.0]);
                 }
-                let [[first, rest @ ..]] = baseline.mean().row_column_resistance_ohm;
-                assert!(first.is_nan());
-                assert_eq!(rest, [50.0, 40.0]);
-                let deviation = baseline.largest_relative_deviation(&frame([1.0, 50.0, 30.0]));
+                assert!(baseline.mean()[0].is_nan());
+                assert_eq!(baseline.mean()[1..], [50.0, 40.0]);
+                let deviation = baseline.largest_relative_deviation(&[1.0, 50.0, 30.0]);
                 assert_eq!(deviation, Some(0.25));
             }
         }
@@ -120,18 +121,30 @@ mod tests {
 
     #[test]
     fn nothing_known_is_no_deviation_at_all() {
-        let mut baseline = Baseline::<1, 3>::new();
-        assert_eq!(baseline.largest_relative_deviation(&frame([60.0; 3])), None);
-        baseline.add(&frame([60.0; 3]));
-        assert_eq!(baseline.largest_relative_deviation(&frame([f32::NAN; 3])), None);
-        assert_eq!(baseline.largest_relative_deviation(&frame([60.0; 3])), Some(0.0));
+        let mut memory = [0.0; 3];
+        let mut baseline = baseline(&mut memory);
+        assert_eq!(baseline.largest_relative_deviation(&[60.0; 3]), None);
+        baseline.add(&[60.0; 3]);
+        assert_eq!(baseline.largest_relative_deviation(&[f32::NAN; 3]), None);
+        assert_eq!(baseline.largest_relative_deviation(&[60.0; 3]), Some(0.0));
     }
 
     #[test]
     fn a_counter_at_its_end_changes_nothing_more() {
-        let mut baseline = Baseline { mean: frame([60.0; 3]), frames: u16::MAX };
-        let before = baseline.clone();
-        baseline.add(&frame([1.0; 3]));
-        assert_eq!(baseline, before);
+        let mut memory = [60.0; 3];
+        let mut baseline = Baseline { memory: &mut memory, readings: 3, frames: u16::MAX };
+        baseline.add(&[1.0; 3]);
+        assert_eq!((baseline.mean(), baseline.frames()), (&[60.0; 3][..], u16::MAX));
+    }
+
+    #[test]
+    fn frames_of_another_length_start_anew() {
+        let mut memory = [0.0; 3];
+        let mut baseline = baseline(&mut memory);
+        baseline.add(&[60.0; 3]);
+        baseline.restart(2);
+        assert_eq!((baseline.mean(), baseline.frames()), (&[0.0; 2][..], 0));
+        baseline.restart(9);
+        assert_eq!(baseline.mean().len(), 3); // no memory for more
     }
 }

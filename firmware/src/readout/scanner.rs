@@ -1,53 +1,39 @@
 //! The scan itself: the same sequence for every drive, sampler and circuit.
 
 use embedded_hal::delay::DelayNs;
-use model_core::{ColumnWire, Frame, RowWire};
+use model_core::{ColumnWire, RowWire, Wires};
 
 use super::{ColumnSampler, FrameSource, RowDrive, ScanReport, ScanSettings};
 use crate::circuit::Circuit;
 
-/// Scanner of a sensor, made of a row drive, a column sampler, a delay and a circuit.
+/// Scanner of a sensor with at most `COLUMNS` columns, made of a row drive, a column sampler, a delay and a circuit.
 ///
 /// It releases all rows and, if the circuit needs it, samples every column idle. Then it drives row by row, waits
 /// until the row has settled, samples every column and converts the counts. It releases the rows, and corrects the
-/// whole frame. The rows are released at the end even if something failed. RAM: its parts, and three numbers a
-/// column on the stack.
+/// whole frame. The rows are released at the end even if something failed. RAM: its parts, and one number a
+/// column.
 #[derive(Debug)]
-pub struct Scanner<D, S, T, C> {
-    /// Selects rows.
-    pub drive: D,
-    /// Samples columns.
-    pub sampler: S,
-    /// Waits for a row to settle.
-    pub delay: T,
-    /// Converts counts to Ω; may be a reference.
-    pub circuit: C,
+pub struct Scanner<D, S, T, C, const COLUMNS: usize> {
+    drive: D,
+    sampler: S,
+    delay: T,
+    circuit: C,
+    /// Idle counts of each column in the scan that is going on.
+    idle: [f32; COLUMNS],
 }
 
-impl<D: RowDrive, S: ColumnSampler, T: DelayNs, C> Scanner<D, S, T, C> {
-    /// Waits until the row has settled, then samples every column; NaN where that failed.
-    fn sample_columns<const COLS: usize>(
-        &mut self,
-        settings: ScanSettings,
-        report: &mut ScanReport,
-    ) -> [f32; COLS] {
-        self.delay.delay_us(settings.settling_us);
-        let mut counts = [f32::NAN; COLS];
-        for (column, mean) in counts.iter_mut().enumerate() {
-            match self.mean_of_samples(ColumnWire(column), settings.oversampling) {
-                Ok(counts) => *mean = counts,
-                Err(_) => count_failures(report, 1),
-            }
-        }
-        counts
+impl<D: RowDrive, S: ColumnSampler, T: DelayNs, C: Circuit, const COLUMNS: usize>
+    Scanner<D, S, T, C, COLUMNS>
+{
+    /// Makes a scanner of its parts: `drive` selects rows, `sampler` samples columns, `delay` waits for a row to
+    /// settle, and `circuit` converts counts to Ω. The circuit may be a reference.
+    pub const fn new(drive: D, sampler: S, delay: T, circuit: C) -> Self {
+        Self { drive, sampler, delay, circuit, idle: [f32::NAN; COLUMNS] }
     }
 
-    fn mean_of_samples(&mut self, column: ColumnWire, samples: u16) -> Result<f32, S::Error> {
-        let mut sum = 0_u32; // 256 samples of 16 bits fit
-        for _ in 0..samples {
-            sum += u32::from(self.sampler.sample(column)?);
-        }
-        Ok(sum as f32 / f32::from(samples))
+    /// The circuit, whose constants may be set between scans.
+    pub fn circuit_mut(&mut self) -> &mut C {
+        &mut self.circuit
     }
 
     fn release(&mut self, report: &mut ScanReport) -> bool {
@@ -55,6 +41,61 @@ impl<D: RowDrive, S: ColumnSampler, T: DelayNs, C> Scanner<D, S, T, C> {
         count_failures(report, usize::from(!released));
         released
     }
+
+    /// Samples all columns while all rows idle; without a valid idle sample the circuit gives NaN.
+    fn sample_idle(&mut self, settings: ScanSettings, columns: usize, report: &mut ScanReport) {
+        self.idle.fill(f32::NAN);
+        if self.release(report)
+            && C::IDLE_SAMPLES
+            && let Some(idle) = self.idle.get_mut(..columns)
+        {
+            self.delay.delay_us(settings.settling_us);
+            sample_columns(&mut self.sampler, settings.oversampling, idle, report);
+        }
+    }
+
+    /// Drives `row` and turns its samples into `readings` in Ω; NaN where that failed.
+    fn scan_row(
+        &mut self,
+        row: RowWire,
+        settings: ScanSettings,
+        readings: &mut [f32],
+        report: &mut ScanReport,
+    ) {
+        let (Ok(()), Some(idle)) = (self.drive.drive(row), self.idle.get(..readings.len())) else {
+            readings.fill(f32::NAN);
+            return count_failures(report, readings.len());
+        };
+        self.delay.delay_us(settings.settling_us);
+        sample_columns(&mut self.sampler, settings.oversampling, readings, report);
+        self.circuit.row_ohm(row, idle, S::FULL_SCALE_COUNTS, readings);
+    }
+}
+
+/// Samples every column, whose mean counts go to `counts`; NaN where that failed.
+fn sample_columns<S: ColumnSampler>(
+    sampler: &mut S,
+    samples: u16,
+    counts: &mut [f32],
+    report: &mut ScanReport,
+) {
+    for (column, mean) in counts.iter_mut().enumerate() {
+        let counts = mean_of_samples(sampler, ColumnWire(column), samples);
+        count_failures(report, usize::from(counts.is_err()));
+        *mean = counts.unwrap_or(f32::NAN);
+    }
+}
+
+fn mean_of_samples<S: ColumnSampler>(
+    sampler: &mut S,
+    column: ColumnWire,
+    samples: u16,
+) -> Result<f32, S::Error> {
+    let mut sum = 0_u32; // 256 samples of 16 bits fit
+    for _ in 0..samples {
+        sum += u32::from(sampler.sample(column)?);
+    }
+    Ok(sum as f32 / f32::from(samples))
 }
 
 fn count_failures(report: &mut ScanReport, failures: usize) {
@@ -62,34 +103,19 @@ fn count_failures(report: &mut ScanReport, failures: usize) {
     report.failed_samples = report.failed_samples.saturating_add(failures);
 }
 
-impl<D, S, T, C, const ROWS: usize, const COLS: usize> FrameSource<ROWS, COLS>
-    for Scanner<D, S, T, C>
-where
-    D: RowDrive,
-    S: ColumnSampler,
-    T: DelayNs,
-    C: Circuit<ROWS, COLS>,
+impl<D: RowDrive, S: ColumnSampler, T: DelayNs, C: Circuit, const COLUMNS: usize> FrameSource
+    for Scanner<D, S, T, C, COLUMNS>
 {
-    fn scan(&mut self, settings: ScanSettings, frame: &mut Frame<ROWS, COLS>) -> ScanReport {
+    fn scan(&mut self, settings: ScanSettings, wires: Wires, frame: &mut [f32]) -> ScanReport {
         let settings = settings.clamped();
         let mut report = ScanReport::default();
-        let mut idle = [f32::NAN; COLS];
-        // Without a valid idle sample the circuit gives NaN.
-        if self.release(&mut report) && C::IDLE_SAMPLES {
-            idle = self.sample_columns(settings, &mut report);
-        }
-        for (row, readings) in frame.row_column_resistance_ohm.iter_mut().enumerate() {
-            let row = RowWire(row);
-            if self.drive.drive(row).is_ok() {
-                let sampled = self.sample_columns(settings, &mut report);
-                *readings = self.circuit.row_ohm(row, &sampled, &idle, S::FULL_SCALE_COUNTS);
-            } else {
-                *readings = [f32::NAN; COLS];
-                count_failures(&mut report, COLS);
-            }
+        self.sample_idle(settings, wires.columns, &mut report);
+        let rows = frame.chunks_mut(wires.columns.max(1)).take(wires.rows);
+        for (row, readings) in rows.enumerate() {
+            self.scan_row(RowWire(row), settings, readings, &mut report);
         }
         self.release(&mut report);
-        self.circuit.correct(frame);
+        self.circuit.correct(wires, frame);
         report
     }
 }

@@ -285,29 +285,29 @@ fn multiplexed_adc_disables_all_sets_the_address_enables_one_and_waits_for_the_r
 }
 
 /// A scanner of 2 × 3 wires over one converter chip and direct row pins.
-fn scanner<C>(
+fn scanner<C: Circuit>(
     record: &Record,
     circuit: C,
-) -> Scanner<DirectPins<Pin, 2>, Mcp3208s<Spi, 1>, Record, C> {
+) -> Scanner<DirectPins<Pin, 2>, Mcp3208s<Spi, 1>, Record, C, 3> {
     record.0.borrow_mut().answers = vec![[0, 2000_u16.to_be_bytes()[0], 2000_u16.to_be_bytes()[1]]];
-    Scanner {
-        drive: DirectPins { rows: record.pins(["r0", "r1"]) },
-        sampler: Mcp3208s { chips: record.chips() },
-        delay: record.clone(),
-        circuit,
-    }
+    let drive = DirectPins { rows: record.pins(["r0", "r1"]) };
+    Scanner::new(drive, Mcp3208s { chips: record.chips() }, record.clone(), circuit)
 }
 
+const WIRES: Wires = Wires { rows: 2, columns: 3 };
 const SETTINGS: ScanSettings = ScanSettings { settling_us: 46, oversampling: 4 };
 
 #[test]
 fn a_scan_does_what_it_must_and_no_more() {
     // Each row, and the idle samples of zero-potential scanning, take one wait and one sample a column.
-    fn check<C: Circuit<2, 3>>(circuit: C, steps: usize) {
+    fn check<C: Circuit>(circuit: C, steps: usize) {
         let record = Record::default();
         let mut scanner = scanner(&record, circuit);
-        let mut frame = Frame::<2, 3>::missing();
-        assert_eq!(scanner.scan(SETTINGS, &mut frame), ScanReport { failed_samples: 0 });
+        let mut frame = [[f32::NAN; 3]; 2];
+        assert_eq!(
+            scanner.scan(SETTINGS, WIRES, frame.as_flattened_mut()),
+            ScanReport { failed_samples: 0 }
+        );
         assert_eq!(record.transfers(), steps * 3 * 4);
         // A release changes two pins, a drive three.
         assert_eq!(record.pin_changes(), 2 + 2 * 3 + 2);
@@ -320,44 +320,51 @@ fn a_scan_does_what_it_must_and_no_more() {
         assert_eq!(events[high + 1], Event::WaitNs(46_000));
         assert_eq!(events[high + 2], Event::Transfer(0, vec![0x06, 0x00, 0]));
     }
-    check(Divider::TYPICAL, 2);
-    check(ZeroPotential::TYPICAL, 3);
+    check(Divider::<2, 3>::TYPICAL, 2);
+    check(ZeroPotential::<2, 3>::TYPICAL, 3);
 }
 
 #[test]
 fn readings_are_those_of_the_mean_counts() {
     let record = Record::default();
-    let circuit = Divider { row_source_ohm: [0.0; 2], ..Divider::TYPICAL };
+    let circuit = Divider { row_source_ohm: [0.0; 2], ..Divider::<2, 3>::TYPICAL };
     let mut scanner = scanner(&record, &circuit);
     let answer = |n: u16| [0, n.to_be_bytes()[0], n.to_be_bytes()[1]];
     record.0.borrow_mut().answers = [3600, 3601, 3603, 3604, 3000].map(answer).to_vec();
-    let mut frame = Frame::<2, 3>::missing();
-    scanner.scan(SETTINGS, &mut frame);
-    let expected = circuit.row_ohm(RowWire(0), &[3602.0, 3000.0, 3000.0], &[f32::NAN; 3], 4095);
-    assert_eq!(frame.row_column_resistance_ohm[0], expected);
+    let mut frame = [[f32::NAN; 3]; 2];
+    scanner.scan(SETTINGS, WIRES, frame.as_flattened_mut());
+    let mut expected = [3602.0, 3000.0, 3000.0];
+    circuit.row_ohm(RowWire(0), &[f32::NAN; 3], 4095, &mut expected);
+    assert_eq!(frame[0], expected);
     assert!((expected[0] - 470.0 * (4096.0 / 3602.0 - 1.0)).abs() < 1e-3);
 }
 
 #[test]
 fn a_failed_transaction_costs_one_reading() {
     let record = Record::default();
-    let mut scanner = scanner(&record, Divider::TYPICAL);
+    let mut scanner = scanner(&record, Divider::<2, 3>::TYPICAL);
     // This is the third sample of the second row's second column.
     record.0.borrow_mut().failing_transfer = Some(3 * 4 + 4 + 2);
-    let mut frame = Frame::<2, 3>::missing();
-    assert_eq!(scanner.scan(SETTINGS, &mut frame), ScanReport { failed_samples: 1 });
-    let missing = frame.row_column_resistance_ohm.map(|row| row.map(f32::is_nan));
+    let mut frame = [[f32::NAN; 3]; 2];
+    assert_eq!(
+        scanner.scan(SETTINGS, WIRES, frame.as_flattened_mut()),
+        ScanReport { failed_samples: 1 }
+    );
+    let missing = frame.map(|row| row.map(f32::is_nan));
     assert_eq!(missing, [[false; 3], [false, true, false]]);
 }
 
 #[test]
 fn a_failed_idle_sample_costs_its_column() {
     let record = Record::default();
-    let mut scanner = scanner(&record, ZeroPotential::TYPICAL);
+    let mut scanner = scanner(&record, ZeroPotential::<2, 3>::TYPICAL);
     record.0.borrow_mut().failing_transfer = Some(4);
-    let mut frame = Frame::<2, 3>::missing();
-    assert_eq!(scanner.scan(SETTINGS, &mut frame), ScanReport { failed_samples: 1 });
-    let missing = frame.row_column_resistance_ohm.map(|row| row.map(f32::is_nan));
+    let mut frame = [[f32::NAN; 3]; 2];
+    assert_eq!(
+        scanner.scan(SETTINGS, WIRES, frame.as_flattened_mut()),
+        ScanReport { failed_samples: 1 }
+    );
+    let missing = frame.map(|row| row.map(f32::is_nan));
     assert_eq!(missing, [[false, true, false]; 2]);
 }
 
@@ -365,12 +372,11 @@ fn a_failed_idle_sample_costs_its_column() {
 fn whatever_pin_change_fails_all_rows_are_released_and_its_readings_are_missing() {
     for failing in 0..10 {
         let record = Record::default();
-        let mut scanner = scanner(&record, Divider::TYPICAL);
+        let mut scanner = scanner(&record, Divider::<2, 3>::TYPICAL);
         record.0.borrow_mut().failing_pin_change = Some(failing);
-        let mut frame = Frame::<2, 3> { row_column_resistance_ohm: [[1.0; 3]; 2] };
-        let report = scanner.scan(SETTINGS, &mut frame);
-        let rows_missing =
-            frame.row_column_resistance_ohm.map(|row| row.iter().all(|r| r.is_nan()));
+        let mut frame = [[1.0; 3]; 2];
+        let report = scanner.scan(SETTINGS, WIRES, frame.as_flattened_mut());
+        let rows_missing = frame.map(|row| row.iter().all(|r| r.is_nan()));
         // Changes 2 to 4 drive row 0; if the releasing half fails, the driving half is left out.
         let expected = match failing {
             2..=4 => ([true, false], 3),
@@ -385,10 +391,10 @@ fn whatever_pin_change_fails_all_rows_are_released_and_its_readings_are_missing(
 #[test]
 fn settings_out_of_range_are_taken_for_the_nearest() {
     let record = Record::default();
-    let mut scanner = scanner(&record, Divider::TYPICAL);
-    let mut frame = Frame::<2, 3>::missing();
+    let mut scanner = scanner(&record, Divider::<2, 3>::TYPICAL);
+    let mut frame = [[f32::NAN; 3]; 2];
     let wild = ScanSettings { settling_us: u32::MAX, oversampling: 0 };
-    assert_eq!(scanner.scan(wild, &mut frame).failed_samples, 0);
+    assert_eq!(scanner.scan(wild, WIRES, frame.as_flattened_mut()).failed_samples, 0);
     assert_eq!(record.transfers(), 2 * 3);
     let waited_ns: u64 = record
         .take()
@@ -402,4 +408,26 @@ fn settings_out_of_range_are_taken_for_the_nearest() {
         Some(ScanSettings { settling_us: 10_000, oversampling: 256 })
     );
     assert_eq!(ScanSettings::try_new(0, 257), None);
+}
+
+#[test]
+fn a_scan_touches_only_the_wires_that_it_is_asked_for() {
+    let record = Record::default();
+    let mut scanner = scanner(&record, ZeroPotential::<2, 3>::TYPICAL);
+    let mut frame = [7.0; 4];
+    let report = scanner.scan(SETTINGS, Wires { rows: 1, columns: 2 }, &mut frame[..2]);
+    assert_eq!(report.failed_samples, 0);
+    assert_eq!(record.transfers(), 2 * 2 * 4); // idle and one row, two columns, four samples
+    assert!(frame[..2].iter().all(|ohm| *ohm != 7.0));
+    assert_eq!(frame[2..], [7.0; 2]);
+}
+
+#[test]
+fn wires_that_a_scanner_does_not_have_are_missing() {
+    let record = Record::default();
+    let mut scanner = scanner(&record, ZeroPotential::<2, 3>::TYPICAL);
+    let mut frame = [7.0; 4];
+    let report = scanner.scan(SETTINGS, Wires { rows: 1, columns: 4 }, &mut frame);
+    assert!(frame.iter().all(|ohm| ohm.is_nan()));
+    assert_eq!(report.failed_samples, 4);
 }

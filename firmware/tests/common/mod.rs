@@ -15,16 +15,16 @@ use firmware::store::{FlashError, Slot};
 use model_core::blob::{Metadata, ModelParts, ModelShape, encode_to_vec};
 use model_core::rbf::direct::{self, Parameters};
 use model_core::rbf::{Network, Shape};
-use model_core::{AlignedBytes, Frame};
+use model_core::{AlignedBytes, Wires};
 
 pub const ROWS: usize = 2;
 pub const COLS: usize = 3;
 pub const OUTPUTS: usize = 2;
-pub const MESSAGE_BYTES: usize = 128;
+pub const MESSAGE_BYTES: usize = 256;
 
-pub type TestApp = App<'static, Board, Source, ROWS, COLS, OUTPUTS, MESSAGE_BYTES>;
-pub type TestSession<'a> =
-    Session<'a, 'static, Board, Source, MockSlot, ROWS, COLS, OUTPUTS, MESSAGE_BYTES>;
+pub type TestApp = App<'static, Board, Source, ROWS>;
+pub type TestSession<'a> = Session<'a, 'static, Board, Source, MockSlot, ROWS>;
+pub type TestFrame = [[f32; COLS]; ROWS];
 
 /// State of the board, which a test can see while the application owns the board.
 #[derive(Default)]
@@ -78,18 +78,21 @@ impl Platform for Board {
 /// A sensor that shows the same frame until it is given another.
 #[derive(Clone)]
 pub struct Source {
-    pub frame: Rc<RefCell<Frame<ROWS, COLS>>>,
+    pub frame: Rc<RefCell<TestFrame>>,
     pub board: Board,
     pub scan_us: u32,
 }
 
-impl FrameSource<ROWS, COLS> for Source {
-    fn scan(&mut self, settings: ScanSettings, frame: &mut Frame<ROWS, COLS>) -> ScanReport {
+impl FrameSource for Source {
+    fn scan(&mut self, settings: ScanSettings, wires: Wires, frame: &mut [f32]) -> ScanReport {
         assert!(settings.oversampling > 0, "a scan without samples");
-        *frame = *self.frame.borrow();
+        assert_eq!(frame.len(), wires.readings());
+        for (to, from) in frame.chunks_mut(wires.columns).zip(self.frame.borrow().iter()) {
+            to.copy_from_slice(&from[..wires.columns]);
+        }
         let mut pins = self.board.0.borrow_mut();
         pins.now_us = pins.now_us.wrapping_add(self.scan_us);
-        let missing = frame.row_column_resistance_ohm.as_flattened().iter();
+        let missing = frame.iter();
         ScanReport { failed_samples: missing.filter(|reading| reading.is_nan()).count() as u16 }
     }
 }
@@ -230,8 +233,8 @@ pub fn crc_of(blob: &[u8]) -> u32 {
     u32::from_le_bytes(*blob.last_chunk().unwrap())
 }
 
-pub fn frame_at_rest() -> Frame<ROWS, COLS> {
-    Frame { row_column_resistance_ohm: [[60.0, 61.0, 62.0], [63.0, 64.0, 65.0]] }
+pub fn frame_at_rest() -> TestFrame {
+    [[60.0, 61.0, 62.0], [63.0, 64.0, 65.0]]
 }
 
 /// A configuration that scans only on request.
@@ -248,7 +251,7 @@ pub fn buffers() -> &'static mut Buffers<ROWS, COLS, OUTPUTS, MESSAGE_BYTES> {
 pub struct Bench {
     pub app: TestApp,
     pub board: Board,
-    pub frame: Rc<RefCell<Frame<ROWS, COLS>>>,
+    pub frame: Rc<RefCell<TestFrame>>,
 }
 
 impl Bench {
@@ -274,7 +277,7 @@ pub fn request_bytes(number: u16, request: &Request<'_>) -> Vec<u8> {
 
 /// Reports that the host finds in a device's bytes: the number and debug text of each. Checks that each is whole.
 pub fn reports(bytes: &[u8]) -> Vec<(u16, String)> {
-    let mut receiver = Receiver::<1024>::new();
+    let mut receiver = Receiver::new([0; 1024]);
     let mut reports = Vec::new();
     for byte in bytes {
         match receiver.push(*byte) {
@@ -310,7 +313,7 @@ pub fn ask<T>(
     board.0.borrow_mut().to_device.extend(request_bytes(77, request));
     let leave = settle(session, board);
     let answer = std::mem::take(&mut board.0.borrow_mut().to_host);
-    let mut receiver = Receiver::<1024>::new();
+    let mut receiver = Receiver::new([0; 1024]);
     for byte in &answer {
         if let Some(Received::Frame(bytes)) = receiver.push(*byte) {
             let packet = packet::decode::<Report<'_>>(bytes).expect("a whole report");

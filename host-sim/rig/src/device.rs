@@ -9,11 +9,14 @@ use std::io::{ErrorKind, Read, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
+use firmware::capacity::Capacity;
 use firmware::link::message::{
     Configuration, Identity, Memory, ModelIdentity, Refusal, Report, Request,
 };
 use firmware::link::receive::{Received, Receiver};
 use firmware::link::{cobs, packet};
+use model_core::Wires;
+use model_core::blob::ModelShape;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
@@ -35,6 +38,8 @@ const ATTEMPTS: u32 = 6;
 const SLOWEST_WRITE: Duration = Duration::from_secs(10);
 /// Largest size of a request.
 const MOST_REQUEST_BYTES: usize = 4096;
+/// Largest size of a report: that of a sensor of 255 rows, 32 columns and 255 outputs a row would be larger.
+const MOST_REPORT_BYTES: usize = 64 * 1024;
 /// Time that one look for bytes waits.
 const GLANCE: Duration = Duration::from_millis(5);
 
@@ -60,11 +65,11 @@ pub struct DeviceIdentity {
     pub board: String,
     /// Version of its firmware.
     pub firmware: String,
-    /// Number of row-wires.
+    /// Largest number of row-wires.
     pub rows: usize,
-    /// Number of readings in a row.
+    /// Largest number of readings in a row.
     pub columns: usize,
-    /// Number of outputs of a row.
+    /// Largest number of outputs of a row.
     pub outputs: usize,
     /// Name of the exponential that it decodes with.
     pub kernel: String,
@@ -79,6 +84,24 @@ pub struct DeviceIdentity {
 }
 
 impl DeviceIdentity {
+    /// Sensor and model that the device has room for.
+    #[must_use]
+    pub fn capacity(&self) -> Capacity {
+        Capacity { rows: self.rows, columns: self.columns, outputs: self.outputs }
+    }
+
+    /// Wires that the device scans: those of its model, or all without one.
+    #[must_use]
+    pub fn wires(&self) -> Wires {
+        let capacity = self.capacity();
+        let shape = self.model.map(|model| ModelShape {
+            rows: model.rows.into(),
+            inputs: model.inputs.into(),
+            outputs: model.outputs.into(),
+        });
+        shape.and_then(|shape| capacity.wires_for(shape)).unwrap_or(capacity.wires())
+    }
+
     /// Whether the model with that CRC-32 is active.
     #[must_use]
     pub fn has_in_force(&self, crc_32: u32) -> bool {
@@ -106,7 +129,7 @@ impl From<&Identity<'_>> for DeviceIdentity {
 /// Host's end of the line to a device.
 pub struct Device<W> {
     wire: W,
-    receiver: Box<Receiver<4096>>,
+    receiver: Receiver<Vec<u8>>,
     /// Bytes that were read and not looked at yet.
     pending: VecDeque<u8>,
     number: u16,
@@ -125,7 +148,7 @@ impl<W: Wire> Device<W> {
     /// [`Error::Line`] if the wire takes no timeout.
     pub fn new(mut wire: W) -> Result<Self> {
         wire.set_read_timeout(GLANCE)?;
-        let receiver = Box::new(Receiver::new());
+        let receiver = Receiver::new(vec![0; MOST_REPORT_BYTES]);
         let pending = VecDeque::new();
         Ok(Self { wire, receiver, pending, number: 0, patience: ANSWER, damaged: 0, repeated: 0 })
     }

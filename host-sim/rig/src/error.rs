@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use firmware::capacity::Capacity;
 use firmware::link::message::{ModelFault, Refusal};
+use model_core::blob::ModelShape;
 
 /// Result of the functions of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
@@ -63,15 +65,18 @@ pub enum Error {
         /// Active model, as it reports it.
         in_force: String,
     },
-    /// Device and model of different shapes.
+    /// Model that the device has no room for.
     #[error(
-        "the device is for {device:?} rows, columns and outputs a row, the model for {model:?}"
+        "the model has {} rows of {} readings and {} outputs; the device has room for {} rows of {} readings and \
+         {} outputs: build its image with TAXEL_CAPACITY={}x{}x{} (docs/board.md)",
+        shape.rows, shape.inputs, shape.outputs, capacity.rows, capacity.columns, capacity.outputs,
+        shape.rows.max(capacity.rows), shape.inputs.max(capacity.columns), shape.outputs.max(capacity.outputs)
     )]
-    ShapeMismatch {
-        /// Rows, columns and outputs a row of the device.
-        device: [usize; 3],
-        /// Rows, columns and outputs a row of the model.
-        model: [usize; 3],
+    NoRoom {
+        /// What the device has room for.
+        capacity: Capacity,
+        /// Shape of the model.
+        shape: ModelShape,
     },
     /// Exponential of the device that the host does not know.
     #[error("the device decodes with {0:?}, which this host does not know")]
@@ -145,7 +150,7 @@ fn why(refusal: Refusal) -> String {
         Refusal::TooLarge { slot_bytes } => format!("a model may have {slot_bytes} bytes at most"),
         Refusal::NoUpload => "no upload has begun".into(),
         Refusal::OutOfPlace { received } => format!("it has {received} bytes of the upload so far"),
-        Refusal::BadModel(ModelFault::Shape) => "the model is for a sensor of another shape".into(),
+        Refusal::BadModel(ModelFault::Shape) => "it has no room for a model of this shape".into(),
         Refusal::BadModel(fault) => {
             format!("the model is faulty ({fault:?}); `inspect` shows more")
         }

@@ -12,18 +12,21 @@
 //! use firmware::readout::FrameSource;
 //! use taxel_simulate::World;
 //! use taxel_simulate::virtual_board::{SeriesResistance, VirtualBoard};
-//! use model_core::Frame;
+//! use model_core::Wires;
 //!
 //! let board = VirtualBoard::new(&World::press())?;
 //! board.set_readings(&[57.5; 144]); // Ω, row after row
 //! let mut scanner = board.scanner(SeriesResistance::NONE);
-//! let mut frame = Frame::missing();
-//! let report = scanner.scan(board.scan_settings(), &mut frame);
+//! let mut frame = [f32::NAN; 144];
+//! let wires = Wires { rows: 8, columns: 18 };
+//! let report = scanner.scan(board.scan_settings(), wires, &mut frame);
 //! board.check()?;
 //! assert_eq!(report.failed_samples, 0);
-//! assert!((frame.row_column_resistance_ohm[7][17] - 57.5).abs() < 0.02);
+//! assert!((frame[143] - 57.5).abs() < 0.02);
 //! # Ok::<(), taxel_simulate::Error>(())
 //! ```
+
+use model_core::Wires;
 
 mod pin;
 mod network;
@@ -48,3 +51,5 @@ pub use scanner::{FrameScanner, SeriesResistance};
 pub const ROWS: usize = 8;
 /// Column-wires of the virtual board.
 pub const COLUMNS: usize = 18;
+/// All wires of the virtual board.
+pub const WIRES: Wires = Wires { rows: ROWS, columns: COLUMNS };

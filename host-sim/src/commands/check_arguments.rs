@@ -150,8 +150,20 @@ fn page_of(f: &Findings) -> print::Page {
     let d = &f.device;
     line(
         "device",
-        format!("{}, firmware {}, {} × {} wires", d.board, d.firmware, d.rows, d.columns),
+        format!("{}, firmware {}, room for {} × {} wires", d.board, d.firmware, d.rows, d.columns),
     );
+    if let Some(m) = &d.model {
+        line(
+            "model",
+            format!(
+                "{} rows of {} readings and {} outputs, weights in {}",
+                m.rows,
+                m.inputs,
+                m.outputs,
+                if m.in_ram { "RAM" } else { "flash" }
+            ),
+        );
+    }
     line("exponential", d.kernel.clone());
     line(
         "frames",

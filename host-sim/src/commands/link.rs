@@ -8,6 +8,7 @@ use clap::{Args, Subcommand, value_parser};
 use firmware::link::message::{Configuration, EstimateReport, Report, Request, Statistics};
 use firmware::timing::ScanPlan;
 use host_sim::{Error, Result};
+use model_core::Wires;
 use serde::Serialize;
 use taxel_data::progress::Progress;
 use taxel_data::{csv_file, output};
@@ -159,13 +160,25 @@ fn status(status: &Status, common: &Common) -> Result<()> {
     let mut page = print::Page::default();
     page.line(format_args!("{:<17} {}, firmware {}", "device", d.board, d.firmware));
     page.line(format_args!(
-        "{:<17} {} × {} wires, {} outputs a row, {} exponential",
-        "shape", d.rows, d.columns, d.outputs, d.kernel
+        "{:<17} {} rows, {} columns, {} outputs a row; {} exponential",
+        "room for", d.rows, d.columns, d.outputs, d.kernel
     ));
-    let model = d.model.map_or("none: upload one".to_owned(), |m| {
-        format!("CRC-32 {:08x}, slot {}, generation {}", m.crc_32, m.slot, m.generation)
-    });
-    page.line(format_args!("{:<17} {model}", "model"));
+    if let Some(m) = &d.model {
+        page.line(format_args!(
+            "{:<17} CRC-32 {:08x}, slot {}, generation {}, weights in {}",
+            "model",
+            m.crc_32,
+            m.slot,
+            m.generation,
+            if m.in_ram { "RAM" } else { "flash" }
+        ));
+        page.line(format_args!(
+            "{:<17} {} rows of {} readings and {} outputs",
+            "shape", m.rows, m.inputs, m.outputs
+        ));
+    } else {
+        page.line(format_args!("{:<17} none: upload one", "model"));
+    }
     page.line(format_args!(
         "{:<17} {} scanned, {} decoded (except {} untouched rows), {} missed, {} samples failed",
         "frames",
@@ -179,6 +192,12 @@ fn status(status: &Status, common: &Common) -> Result<()> {
         "{:<17} scan {} µs, decoding {} µs",
         "longest", s.longest_scan_us, s.longest_decode_us
     ));
+    if s.longest_decode_cycles > 0 {
+        page.line(format_args!(
+            "{:<17} decoding {} to {} of the processor",
+            "cycles", s.shortest_decode_cycles, s.longest_decode_cycles
+        ));
+    }
     page.line(format_args!(
         "{:<17} {} requests, {} bad packets, {} lost reports, {} bad loops",
         "link", s.requests, s.bad_packets, s.lost_reports, s.bad_loops
@@ -219,9 +238,10 @@ const SLOWEST_SAMPLE_NS: u32 = 100_000;
 
 /// Time within which so many frames must have come.
 fn patience(scan: &ScanArguments, identity: &DeviceIdentity) -> Duration {
+    let wires = identity.wires();
     let plan = ScanPlan {
-        rows: identity.rows as u16,
-        columns: identity.columns as u16,
+        rows: wires.rows as u16,
+        columns: wires.columns as u16,
         idle_samples: true,
         settling_us: scan.settling_us,
         oversampling: scan.oversampling,
@@ -286,8 +306,8 @@ fn output_names(model: &ModelBlob, identity: &DeviceIdentity) -> Result<Vec<Stri
 }
 
 fn reading_names(identity: &DeviceIdentity) -> Vec<String> {
-    let rows = 1..=identity.rows;
-    rows.flat_map(|m| (1..=identity.columns).map(move |k| format!("r{m}c{k}_ohm"))).collect()
+    let Wires { rows, columns } = identity.wires();
+    (1..=rows).flat_map(|m| (1..=columns).map(move |k| format!("r{m}c{k}_ohm"))).collect()
 }
 
 /// Number of a frame, and its readings or outputs.
@@ -307,7 +327,7 @@ fn hear_frames<W: Wire>(
     let mut rows_at_rest = 0;
     let enough = device.hear(Instant::now() + patience, |_, report| {
         let (frame, values, status) = match report {
-            Report::Readings { frame, readings_ohm } if wanted == Wanted::Readings => {
+            Report::Readings { frame, readings_ohm, .. } if wanted == Wanted::Readings => {
                 (*frame, *readings_ohm, &[][..])
             }
             Report::Estimate(estimate) if wanted == Wanted::Estimates => {

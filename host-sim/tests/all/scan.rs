@@ -12,7 +12,7 @@ use firmware::platform::Port;
 use firmware::readout::{
     FrameSource, Mcp3208s, ScanReport, ScanSettings, Scanner, ShiftRegister595,
 };
-use model_core::Frame;
+use model_core::Wires;
 use remote_readout::Remote;
 use taxel_data::progress::Silent;
 use taxel_data::random::Stream;
@@ -23,6 +23,9 @@ use taxel_simulate::World;
 use taxel_simulate::readout::Readout;
 use taxel_simulate::synthesise;
 use taxel_simulate::virtual_board::{SeriesResistance, VirtualBoard};
+
+/// All wires of the virtual board.
+const WIRES: Wires = Wires { rows: 8, columns: 18 };
 
 static CIRCUIT: ZeroPotential<8, 18> = ZeroPotential::TYPICAL;
 /// Series resistances for which the device corrects.
@@ -117,17 +120,14 @@ impl Port for Socket {
 #[derive(Clone)]
 struct RemoteReadout(Socket);
 
-impl FrameSource<8, 18> for RemoteReadout {
-    fn scan(&mut self, settings: ScanSettings, frame: &mut Frame<8, 18>) -> ScanReport {
+impl FrameSource for RemoteReadout {
+    fn scan(&mut self, settings: ScanSettings, wires: Wires, frame: &mut [f32]) -> ScanReport {
         let remote = Remote::new(self.0.clone());
         let [data, clock, latch] = [12, 13, 14].map(|pin| remote.pin(pin));
-        let mut scanner = Scanner {
-            drive: ShiftRegister595::<_, 8> { data, clock, latch },
-            sampler: Mcp3208s { chips: [0, 1, 2].map(|chip| remote.spi(chip)) },
-            delay: remote.delay(),
-            circuit: &CIRCUIT,
-        };
-        scanner.scan(settings, frame)
+        let drive = ShiftRegister595::<_, 8> { data, clock, latch };
+        let sampler = Mcp3208s { chips: [0, 1, 2].map(|chip| remote.spi(chip)) };
+        let mut scanner = Scanner::<_, _, _, _, 18>::new(drive, sampler, remote.delay(), &CIRCUIT);
+        scanner.scan(settings, wires, frame)
     }
 }
 
@@ -135,18 +135,18 @@ impl FrameSource<8, 18> for RemoteReadout {
 #[derive(Clone)]
 struct Spoilt(RemoteReadout, u32);
 
-impl FrameSource<8, 18> for Spoilt {
-    fn scan(&mut self, settings: ScanSettings, frame: &mut Frame<8, 18>) -> ScanReport {
-        let report = self.0.scan(settings, frame);
-        let reading = &mut frame.row_column_resistance_ohm[7][17];
+impl FrameSource for Spoilt {
+    fn scan(&mut self, settings: ScanSettings, wires: Wires, frame: &mut [f32]) -> ScanReport {
+        let report = self.0.scan(settings, wires, frame);
+        let reading = &mut frame[143];
         *reading = f32::from_bits(reading.to_bits() ^ self.1);
         self.1 ^= 1;
         report
     }
 }
 
-fn bits(frame: &Frame<8, 18>) -> Vec<u32> {
-    frame.row_column_resistance_ohm.as_flattened().iter().map(|ohm| ohm.to_bits()).collect()
+fn bits(frame: &[f32]) -> Vec<u32> {
+    frame.iter().map(|ohm| ohm.to_bits()).collect()
 }
 
 /// Scans so many frames over a line. Returns their bits and reports, and the outcome of serving them.
@@ -170,9 +170,9 @@ fn scan_served(
         });
         let settings = VirtualBoard::new(world).unwrap().scan_settings();
         let mut readout = RemoteReadout(Socket::new(near));
-        let mut frame = Frame::missing();
+        let mut frame = [f32::NAN; 144];
         let scans = (0..frames).map(|_| {
-            let report = readout.scan(settings, &mut frame);
+            let report = readout.scan(settings, WIRES, &mut frame);
             (bits(&frame), report)
         });
         let scans = scans.collect();
@@ -185,10 +185,10 @@ fn scan_served(
 fn scan_directly(world: &World, frames: u32) -> Vec<(Vec<u32>, ScanReport)> {
     let board = VirtualBoard::new(world).unwrap();
     let mut scanner = board.scanner(SERIES);
-    let mut frame = Frame::missing();
+    let mut frame = [f32::NAN; 144];
     let scans = (0..frames).map(|number| {
         board.set_readings(&ohm(number));
-        let report = scanner.scan(board.scan_settings(), &mut frame);
+        let report = scanner.scan(board.scan_settings(), WIRES, &mut frame);
         (bits(&frame), report)
     });
     scans.collect()
@@ -244,7 +244,7 @@ fn model(world: &World) -> ModelBlob {
 }
 
 /// Checks a device in a thread of this process, whose `source` scans `world` on a served board.
-fn check<F: FrameSource<8, 18> + Clone + Send + 'static>(
+fn check<F: FrameSource + Clone + Send + 'static>(
     world: &World,
     scans: usize,
     source: impl FnOnce(RemoteReadout) -> F,

@@ -2,12 +2,13 @@
 use std::io::{Read, Write};
 use std::time::Instant;
 
-use firmware::app::{PaperApp, PaperBuffers};
+use firmware::app::{App, Buffers};
+use firmware::capacity::Capacity;
 use firmware::link::message::{Configuration, Memory};
 use firmware::platform::{Platform, Port};
 use firmware::readout::{FrameSource, ScanReport, ScanSettings};
 use firmware::store::{FlashError, Slot};
-use model_core::Frame;
+use model_core::Wires;
 use taxel_data::random::{Purpose, Random, Stream};
 
 pub mod mailbox;
@@ -107,9 +108,12 @@ struct Source {
     next: usize,
 }
 
-impl FrameSource<8, 18> for Source {
-    fn scan(&mut self, _: ScanSettings, frame: &mut Frame<8, 18>) -> ScanReport {
-        frame.row_column_resistance_ohm = self.frames[self.next % self.frames.len()];
+impl FrameSource for Source {
+    fn scan(&mut self, _: ScanSettings, wires: Wires, frame: &mut [f32]) -> ScanReport {
+        let shown = &self.frames[self.next % self.frames.len()];
+        for (to, from) in frame.chunks_mut(wires.columns).zip(shown) {
+            to.copy_from_slice(&from[..wires.columns]);
+        }
         self.next += 1;
         ScanReport::default()
     }
@@ -154,10 +158,12 @@ pub fn run_with(
     mut wire: impl Read + Write + Send + 'static,
     line: Line,
     model: &[u8],
-    source: impl FrameSource<8, 18> + Clone + Send + 'static,
+    source: impl FrameSource + Clone + Send + 'static,
 ) {
     let mut slots = [0, 1].map(|_| MemorySlot(vec![u32::MAX; 128 * 1024 / 4]));
     bytemuck::cast_slice_mut(&mut slots[0].0)[..model.len()].copy_from_slice(model);
+    // Half of a large model fits: both ways are taken.
+    let mut weights = vec![0; 8 * 1024];
     std::thread::spawn(move || {
         for life in 0.. {
             let board = Board {
@@ -171,9 +177,9 @@ pub fn run_with(
                 gone: false,
             };
             let quiet = Configuration { frame_period_us: 0, ..Configuration::DEFAULT };
-            let mut buffers = PaperBuffers::new();
-            let mut app = PaperApp::<_, _>::new(board, source.clone(), quiet, &mut buffers);
-            app.run(&mut slots);
+            let mut buffers = Buffers::<8, 18, 18, { Capacity::PAPER.message_bytes() }>::new();
+            let mut app = App::new(board, source.clone(), quiet, &mut buffers);
+            app.run(&mut slots, &mut weights);
             app.platform().flush();
             if app.platform().gone {
                 return;

@@ -2,9 +2,16 @@
 
 /// Bytes at an address that the floats of a blob may be borrowed from.
 ///
+/// One line puts a model into a program:
+///
 /// ```
-/// static MODEL: model_core::Aligned<[u8; 4]> = model_core::Aligned(*b"TAXL");
-/// assert_eq!(MODEL.0.as_ptr() as usize % 4, 0);
+/// use model_core::{Aligned, Decoder};
+/// # macro_rules! include_bytes { ($file:literal) => {
+/// #     core::include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/../testdata/hand-made.bin"))
+/// # } }
+/// static MODEL: &[u8] = &Aligned(*include_bytes!("model.bin")).0;
+///
+/// assert!(Decoder::<8>::load(MODEL).is_ok());
 /// ```
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(4))]

@@ -28,7 +28,7 @@ impl<'a> Model<'a> {
     /// Parses `blob` to a model: checks it from end to end and borrows from it.
     ///
     /// # Errors
-    /// Every variant of [`DecodeError`] except `ShapeMismatch`. Checked in this order: address, magic,
+    /// Every variant of [`DecodeError`] except `TooManyRows`. Checked in this order: address, magic,
     /// version, length, CRC, shape, then the sections.
     pub fn decode(blob: &'a [u8]) -> Result<Self, DecodeError> {
         if !(blob.as_ptr() as usize).is_multiple_of(FLOAT_ALIGNMENT) {

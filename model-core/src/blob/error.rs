@@ -1,6 +1,5 @@
 //! Errors of parsing and encoding a blob, with one variant for each cause.
 
-use super::metadata::ModelShape;
 use crate::rbf::NetworkError;
 
 /// Why bytes are not a model. Nothing is loaded then: the previous model stays in force.
@@ -110,13 +109,13 @@ pub enum DecodeError {
         /// Number of bytes left over.
         bytes: usize,
     },
-    /// The blob is sound, but for a sensor of another shape.
-    #[error("blob is for {found:?}; this decoder is built for {expected:?}")]
-    ShapeMismatch {
-        /// Shape the decoder is built for.
-        expected: ModelShape,
-        /// Shape of the blob's model.
-        found: ModelShape,
+    /// The blob is sound, but has more rows than the decoder has room for.
+    #[error("blob has {found} rows; this decoder has room for {most}")]
+    TooManyRows {
+        /// Largest number of rows that the decoder has room for.
+        most: usize,
+        /// Number of rows of the blob's model.
+        found: usize,
     },
 }
 

@@ -24,6 +24,19 @@ impl<'a> Columns<'a> {
         // cannot prove safe. It would be the only reachable panic of the device path.
         self.0.split(['\n'])
     }
+
+    /// Index of the column called `name`, from 0; `None` if there is none.
+    ///
+    /// ```
+    /// use model_core::blob::Columns;
+    /// let names = Columns("r1e1_dx_mm\nr1e1_dy_mm\nr1e1_dz_mm");
+    /// assert_eq!(names.position("r1e1_dz_mm"), Some(2));
+    /// assert_eq!(names.position("r1e1"), None);
+    /// ```
+    #[must_use]
+    pub fn position(self, name: &str) -> Option<usize> {
+        self.iter().position(|column| column == name)
+    }
 }
 
 /// A list of little-endian `f32` numbers, borrowed from any address.

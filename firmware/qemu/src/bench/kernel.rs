@@ -5,7 +5,7 @@ use core::marker::PhantomData;
 use model_core::blob::Model;
 use model_core::exp::ExpKernel;
 use model_core::rbf::{Format, Network};
-use model_core::{Decoder, Estimate, Frame, RowStatus};
+use model_core::{Decoder, Estimate, Gate, RowStatus};
 
 /// Number of rows, as in the paper's sensor.
 pub const ROWS: usize = 8;
@@ -13,6 +13,39 @@ pub const ROWS: usize = 8;
 pub const COLS: usize = 18;
 /// Number of outputs a row.
 pub const OUTPUTS: usize = 18;
+
+/// Readings in Ω, row after row.
+pub type Frame = [[f32; COLS]; ROWS];
+
+/// Outputs and status of all rows.
+#[derive(Clone, Copy)]
+pub struct Decoded {
+    pub outputs: [[f32; OUTPUTS]; ROWS],
+    pub status: [RowStatus; ROWS],
+}
+
+impl Decoded {
+    pub const NOTHING: Self =
+        Self { outputs: [[f32::NAN; OUTPUTS]; ROWS], status: [RowStatus::MissingReading; ROWS] };
+
+    /// Decodes `frame` as the firmware does.
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "the firmware's call alone is measured")]
+    pub fn decode<E: ExpKernel>(
+        &mut self,
+        decoder: &Decoder<'_, ROWS>,
+        frame: &Frame,
+        gate: Option<Gate<'_>>,
+        scratch: &mut [f32],
+    ) {
+        let outputs = self.outputs.as_flattened_mut();
+        let mut estimate = Estimate { outputs, status: &mut self.status };
+        let _ = decoder.decode_with::<E>(frame.as_flattened(), gate, scratch, &mut estimate);
+    }
+}
+
+/// Number of floats of working space for any model.
+pub const SCRATCH: usize = 2 * COLS;
 
 /// One way to decode: a number format, with an exponential or in portable Rust. Every function only calls
 /// what the firmware calls.
@@ -35,16 +68,12 @@ pub trait Kernel {
     );
 
     /// Decodes a frame to the outputs of every row.
-    fn decode(
-        decoder: &Self::Decoder<'_>,
-        frame: &Frame<ROWS, COLS>,
-        estimate: &mut Estimate<ROWS, OUTPUTS>,
-    );
+    fn decode(decoder: &Self::Decoder<'_>, frame: &Frame, outcome: &mut Decoded);
 }
 
 /// The decoder of `model`; `None` if the model is for another sensor.
 #[inline(never)] // frees the stack that building the decoder needs
-pub fn decoder<'a>(model: &Model<'a>) -> Option<Decoder<'a, ROWS, COLS, OUTPUTS>> {
+pub fn decoder<'a>(model: &Model<'a>) -> Option<Decoder<'a, ROWS>> {
     Decoder::of(*model).ok()
 }
 
@@ -77,7 +106,7 @@ impl Which for Fixed16 {
 }
 
 impl<F: Which, E: ExpKernel> Kernel for Formatted<F, E> {
-    type Decoder<'a> = Decoder<'a, ROWS, COLS, OUTPUTS>;
+    type Decoder<'a> = Decoder<'a, ROWS>;
 
     fn of<'a>(model: &Model<'a>, format: Format) -> Option<Self::Decoder<'a>> {
         if format == F::FORMAT { decoder(model) } else { None }
@@ -99,12 +128,8 @@ impl<F: Which, E: ExpKernel> Kernel for Formatted<F, E> {
     }
 
     #[inline(never)]
-    fn decode(
-        decoder: &Self::Decoder<'_>,
-        frame: &Frame<ROWS, COLS>,
-        estimate: &mut Estimate<ROWS, OUTPUTS>,
-    ) {
-        decoder.decode_with::<E>(frame, None, estimate);
+    fn decode(decoder: &Self::Decoder<'_>, frame: &Frame, outcome: &mut Decoded) {
+        outcome.decode::<E>(decoder, frame, None, &mut [0.0; SCRATCH]);
     }
 }
 
@@ -139,19 +164,15 @@ impl<F: Which> Kernel for Portable<F> {
     }
 
     #[inline(never)]
-    fn decode(
-        model: &Self::Decoder<'_>,
-        frame: &Frame<ROWS, COLS>,
-        estimate: &mut Estimate<ROWS, OUTPUTS>,
-    ) {
+    fn decode(model: &Self::Decoder<'_>, frame: &Frame, outcome: &mut Decoded) {
         let mut scaled = [0.0; COLS];
-        let rows = frame.row_column_resistance_ohm.iter().zip(&mut estimate.outputs);
+        let rows = frame.iter().zip(&mut outcome.outputs);
         for (row, (readings, outputs)) in rows.enumerate() {
             let network = model.network_of_row(row).and_then(|index| model.networks().nth(index));
             if let Some(network) = network {
                 Self::infer_row(&network, readings, &mut scaled, outputs);
             }
         }
-        estimate.status = [RowStatus::Decoded; ROWS];
+        outcome.status = [RowStatus::Decoded; ROWS];
     }
 }

@@ -14,13 +14,17 @@ use cortex_m_rt::entry;
 use defmt::{assert, info, unwrap};
 use model_core::blob::Model;
 use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
+use model_core::gate::{Gate, Rest};
 use model_core::rbf::{Format, Network};
-use model_core::{Estimate, Frame, Gate, RowStatus};
+use model_core::{Decoder, RowStatus};
 use qemu_image::checks::Numbers;
 use qemu_image::exit;
 use qemu_image::slot::Slot;
 
-use kernel::{COLS, F32, F32Direct, Fixed16, Formatted, Kernel, OUTPUTS, Portable, ROWS, decoder};
+use kernel::{
+    COLS, Decoded, F32, F32Direct, Fixed16, Formatted, Frame, Kernel, OUTPUTS, Portable, ROWS,
+    SCRATCH, decoder,
+};
 use region::{calibrate, region};
 
 /// Tolerance of the gate: 3.5 times a noise of 0.5 %.
@@ -31,7 +35,7 @@ struct Bench<'a> {
     model: &'a Model<'a>,
     network: Network<'a>,
     scaled: [f32; COLS],
-    frame: Frame<ROWS, COLS>,
+    frame: Frame,
 }
 
 /// Measures every kernel (number format and exponential), in the order of the table.
@@ -54,19 +58,16 @@ impl Bench<'_> {
         region(name, "inference", || {
             K::infer(black_box(&self.network), black_box(&mut scaled), black_box(&mut outputs));
         });
-        let readings = &self.frame.row_column_resistance_ohm[0];
+        let readings = &self.frame[0];
         region(name, "row", || {
             let (scaled, outputs) = (black_box(&mut scaled), black_box(&mut outputs));
             K::infer_row(black_box(&self.network), black_box(readings), scaled, outputs);
         });
-        let mut estimate = Estimate {
-            outputs: [[f32::NAN; OUTPUTS]; ROWS],
-            status: [RowStatus::MissingReading; ROWS],
-        };
+        let mut outcome = Decoded::NOTHING;
         region(name, "frame", || {
-            K::decode(black_box(&decoder), black_box(&self.frame), black_box(&mut estimate));
+            K::decode(black_box(&decoder), black_box(&self.frame), black_box(&mut outcome));
         });
-        assert!(estimate.status == [RowStatus::Decoded; ROWS], "a row was not decoded");
+        assert!(outcome.status == [RowStatus::Decoded; ROWS], "a row was not decoded");
     }
 
     /// Measures the gate with the kernel that the firmware runs, on two frames: one with all rows at rest, and one
@@ -75,40 +76,51 @@ impl Bench<'_> {
     fn measure_gate(&self) {
         let Some(decoder) = decoder(self.model) else { return };
         let name = self.network.format().name();
-        let rest = decoder.decode(&self.frame);
+        let rest = at_rest(&decoder, &self.frame);
+        let mut scratch = [0.0; SCRATCH];
         let mut awake = self.frame;
-        for row in &mut awake.row_column_resistance_ohm {
+        for row in &mut awake {
             row[COLS - 1] *= 1.0 + 2.0 * REST_TOLERANCE;
         }
-        let gate = Gate::new(&self.frame, &rest, REST_TOLERANCE);
-        let mut estimate = rest;
+        let gate = gate(&self.frame, &rest);
+        let mut outcome = rest;
         for (scope, frame, status) in [
             ("resting-frame", &self.frame, RowStatus::AtRest),
             ("awake-frame", &awake, RowStatus::Decoded),
         ] {
             region(name, scope, || {
-                let (frame, estimate) = (black_box(frame), black_box(&mut estimate));
-                black_box(&decoder).decode_gated_into(frame, black_box(gate), estimate);
+                let (frame, outcome) = (black_box(frame), black_box(&mut outcome));
+                let (decoder, gate) = (black_box(&decoder), black_box(gate));
+                outcome.decode::<Polynomial>(decoder, frame, gate, &mut scratch);
             });
-            assert!(estimate.status == [status; ROWS], "a row is not {=str}", scope);
+            assert!(outcome.status == [status; ROWS], "a row is not {=str}", scope);
         }
     }
 }
 
+/// What the sensor shows at rest, if `frame` is its baseline.
+fn at_rest(decoder: &Decoder<'_, ROWS>, frame: &Frame) -> Decoded {
+    let mut rest = Decoded::NOTHING;
+    rest.decode::<Polynomial>(decoder, frame, None, &mut [0.0; SCRATCH]);
+    rest
+}
+
+fn gate<'a>(baseline: &'a Frame, rest: &'a Decoded) -> Option<Gate<'a>> {
+    let (outputs, status) = (rest.outputs.as_flattened(), &rest.status);
+    let rest = Rest { baseline_ohm: baseline.as_flattened(), outputs, status };
+    Gate::new(rest, REST_TOLERANCE)
+}
+
 /// Measures one network for all rows, on whole frames: without a gate and, if `gated`, behind it.
 #[inline(never)]
-fn measure_array<E: ExpKernel>(
-    model: &Model<'_>,
-    frame: &Frame<ROWS, COLS>,
-    name: &str,
-    gated: bool,
-) {
+fn measure_array<E: ExpKernel>(model: &Model<'_>, frame: &Frame, name: &str, gated: bool) {
     let decoder = unwrap!(decoder(model));
-    let rest = decoder.decode(frame);
-    let mut estimate = rest;
+    let rest = at_rest(&decoder, frame);
+    let mut outcome = rest;
+    let mut scratch = [0.0; SCRATCH];
     let mut awake = *frame;
-    awake.row_column_resistance_ohm[ROWS - 1][COLS - 1] *= 1.0 + 2.0 * REST_TOLERANCE;
-    let gate = Gate::new(frame, &rest, REST_TOLERANCE);
+    awake[ROWS - 1][COLS - 1] *= 1.0 + 2.0 * REST_TOLERANCE;
+    let gate = gate(frame, &rest);
     for (scope, frame, gate, status) in [
         ("array-frame", frame, None, RowStatus::Decoded),
         ("array-resting-frame", frame, gate, RowStatus::AtRest),
@@ -118,10 +130,11 @@ fn measure_array<E: ExpKernel>(
             continue;
         }
         region(name, scope, || {
-            let (frame, estimate) = (black_box(frame), black_box(&mut estimate));
-            black_box(&decoder).decode_with::<E>(frame, black_box(gate), estimate);
+            let (frame, outcome) = (black_box(frame), black_box(&mut outcome));
+            let (decoder, gate) = (black_box(&decoder), black_box(gate));
+            outcome.decode::<E>(decoder, frame, gate, &mut scratch);
         });
-        assert!(estimate.status == [status; ROWS], "a row is not as in {=str}", scope);
+        assert!(outcome.status == [status; ROWS], "a row is not as in {=str}", scope);
     }
 }
 
@@ -168,7 +181,7 @@ fn checked(blob: &[u8]) -> Option<Model<'_>> {
 fn measure_rows(model: &Model<'_>, network: Network<'_>) {
     let frame = inputs::frame(model, &mut Numbers::new(3));
     let mut scaled = [0.0; COLS];
-    unwrap!(network.scale(&frame.row_column_resistance_ohm[0], &mut scaled).ok());
+    unwrap!(network.scale(&frame[0], &mut scaled).ok());
     let bench = Bench { model, network, scaled, frame };
     measure_every_kernel(&bench);
     bench.measure_gate();

@@ -90,13 +90,11 @@ pub(super) fn prepare<W: Wire>(
     Ok(exponential)
 }
 
-/// Exponential that the device decodes with, if the device is one for this model.
+/// Exponential that the device decodes with, if the device has room for this model.
 fn fitting_exponential(identity: &DeviceIdentity, model: &Model<'_>) -> Result<Exponential> {
-    let shape = model.shape();
-    let found = [identity.rows, identity.columns, identity.outputs];
-    let expected = [shape.rows, shape.inputs, shape.outputs];
-    if found != expected {
-        return Err(Error::ShapeMismatch { device: found, model: expected });
+    let (capacity, shape) = (identity.capacity(), model.shape());
+    if capacity.wires_for(shape).is_none() {
+        return Err(Error::NoRoom { capacity, shape });
     }
     Exponential::by_name(&identity.kernel)
         .ok_or_else(|| Error::UnknownExponential(identity.kernel.clone()))

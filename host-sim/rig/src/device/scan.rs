@@ -178,7 +178,7 @@ fn count_same<W: Wire>(
     while ended < scans {
         let glance = Instant::now() + Duration::from_millis(100);
         let heard = device.hear(glance.min(deadline), |_, report| match report {
-            Report::Readings { frame, readings_ohm } => {
+            Report::Readings { frame, readings_ohm, .. } => {
                 let same = expected.was_read(index(*frame), readings_ohm.iter());
                 findings.bit_identical_readings += usize::from(same);
                 None

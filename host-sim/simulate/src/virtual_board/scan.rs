@@ -1,12 +1,11 @@
 //! Scans of whole tables of readings, by the firmware's scanner on a virtual board.
 
-use model_core::Frame;
 use taxel_data::random::Stream;
 use taxel_data::table::Table;
 
+use super::WIRES;
 use super::board::VirtualBoard;
 use super::scanner::SeriesResistance;
-use super::{COLUMNS, ROWS};
 use crate::error::Result;
 use crate::synth::Synthesis;
 use crate::world::World;
@@ -27,13 +26,12 @@ pub fn all_readings(world: &World, frames: usize) -> Table {
 pub fn scan(board: &VirtualBoard, series: SeriesResistance, readings: &Table) -> Result<Table> {
     let mut scanner = board.scanner(series);
     let settings = board.scan_settings();
-    let mut frame = Frame::<ROWS, COLUMNS>::missing();
+    let mut frame = vec![f32::NAN; WIRES.readings()];
     let mut values = Vec::with_capacity(readings.values.len());
     for line in readings.lines() {
         board.set_readings(line);
-        scanner.scan(settings, &mut frame);
-        let scanned = frame.row_column_resistance_ohm.as_flattened();
-        values.extend(scanned.iter().map(|ohm| f64::from(*ohm)));
+        scanner.scan(settings, WIRES, &mut frame);
+        values.extend(frame.iter().map(|ohm| f64::from(*ohm)));
     }
     board.check()?;
     Ok(Table { names: readings.names.clone(), values })

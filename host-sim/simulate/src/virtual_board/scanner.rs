@@ -14,7 +14,7 @@ use super::{COLUMNS, ROWS};
 use crate::readout::{self, Drive, Sampler};
 
 /// Scanner for whatever parts a board has.
-pub type FrameScanner = Box<dyn FrameSource<ROWS, COLUMNS>>;
+pub type FrameScanner = Box<dyn FrameSource>;
 
 /// Resistances in series with each wire for which the firmware corrects readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,8 +48,8 @@ impl VirtualBoard {
     /// Scanner of the firmware for this board's parts, calibrated with `series`.
     #[must_use]
     pub fn scanner(&self, series: SeriesResistance) -> FrameScanner {
-        let row_source_ohm = [series.row_source_ohm; ROWS];
-        let series_ohm = [series.column_ohm; COLUMNS];
+        let row_source_ohm: [f32; ROWS] = [series.row_source_ohm; ROWS];
+        let series_ohm: [f32; COLUMNS] = [series.column_ohm; COLUMNS];
         match self.readout().circuit.unwrap_or_default() {
             readout::Circuit::Divider => {
                 self.with_circuit(Divider { row_source_ohm, series_ohm, ..Divider::TYPICAL })
@@ -61,7 +61,7 @@ impl VirtualBoard {
         }
     }
 
-    fn with_circuit(&self, circuit: impl Circuit<ROWS, COLUMNS> + 'static) -> FrameScanner {
+    fn with_circuit(&self, circuit: impl Circuit + 'static) -> FrameScanner {
         match self.readout().sampler.unwrap_or_default() {
             Sampler::Mcp3208 => {
                 let chips: [_; 3] = array::from_fn(|chip| self.spi(chip));
@@ -77,7 +77,7 @@ impl VirtualBoard {
 
     fn with_sampler(
         &self,
-        circuit: impl Circuit<ROWS, COLUMNS> + 'static,
+        circuit: impl Circuit + 'static,
         sampler: impl ColumnSampler + 'static,
     ) -> FrameScanner {
         match self.readout().row_drive.unwrap_or_default() {
@@ -100,11 +100,11 @@ impl VirtualBoard {
 
     fn with_drive(
         &self,
-        circuit: impl Circuit<ROWS, COLUMNS> + 'static,
+        circuit: impl Circuit + 'static,
         sampler: impl ColumnSampler + 'static,
         drive: impl RowDrive + 'static,
     ) -> FrameScanner {
-        Box::new(Scanner { drive, sampler, delay: self.delay(), circuit })
+        Box::new(Scanner::<_, _, _, _, COLUMNS>::new(drive, sampler, self.delay(), circuit))
     }
 
     fn pins<const N: usize>(&self, pin: fn(u8) -> Pin) -> [super::VirtualPin; N] {

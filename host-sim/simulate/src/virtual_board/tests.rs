@@ -2,7 +2,6 @@ use embedded_hal::digital::OutputPin;
 use embedded_hal::spi::{Operation, SpiDevice};
 use firmware::readout::{ScanReport, ScanSettings};
 use firmware::timing::ScanPlan;
-use model_core::Frame;
 
 use super::*;
 use crate::readout::{Circuit, Drive, Readout, Sampler};
@@ -19,10 +18,9 @@ fn ohm() -> Vec<f64> {
 
 fn scan(board: &VirtualBoard, ohm: &[f64], settings: ScanSettings) -> (Vec<f64>, ScanReport) {
     board.set_readings(ohm);
-    let mut frame = Frame::missing();
-    let report = board.scanner(board.series_resistance()).scan(settings, &mut frame);
-    let readings = frame.row_column_resistance_ohm.as_flattened();
-    (readings.iter().map(|ohm| f64::from(*ohm)).collect(), report)
+    let mut frame = [f32::NAN; ROWS * COLUMNS];
+    let report = board.scanner(board.series_resistance()).scan(settings, WIRES, &mut frame);
+    (frame.iter().map(|ohm| f64::from(*ohm)).collect(), report)
 }
 
 /// Largest relative error of a scan with the board's own settings, which must succeed.

@@ -1,0 +1,73 @@
+//! The large part of an application's memory.
+
+use model_core::{Estimate, RowStatus};
+
+/// The buffers of an application with room for `ROWS` rows of `COLUMNS` readings and `OUTPUTS` outputs. They are all
+/// zero at first, so that a static of them costs no flash, and nothing is moved over the stack.
+///
+/// `BYTES` is the length of the longest message ([`Capacity::message_bytes`](crate::capacity::Capacity)).
+pub struct Buffers<
+    const ROWS: usize,
+    const COLUMNS: usize,
+    const OUTPUTS: usize,
+    const BYTES: usize,
+> {
+    pub(super) received: [u8; BYTES],
+    pub(super) message: [u8; BYTES],
+    pub(super) frame: [[f32; COLUMNS]; ROWS],
+    pub(super) baseline: [[f32; COLUMNS]; ROWS],
+    pub(super) scratch: [[f32; COLUMNS]; ROWS],
+    pub(super) estimate: Outcome<ROWS, OUTPUTS>,
+    pub(super) rest: Outcome<ROWS, OUTPUTS>,
+}
+
+/// Outputs of all rows, and their status.
+pub(super) struct Outcome<const ROWS: usize, const OUTPUTS: usize> {
+    outputs: [[f32; OUTPUTS]; ROWS],
+    status: [RowStatus; ROWS],
+}
+
+impl<const ROWS: usize, const OUTPUTS: usize> Outcome<ROWS, OUTPUTS> {
+    const NOTHING: Self =
+        Self { outputs: [[0.0; OUTPUTS]; ROWS], status: [RowStatus::Decoded; ROWS] };
+
+    pub fn whole(&mut self) -> Estimate<'_> {
+        Estimate { outputs: self.outputs.as_flattened_mut(), status: &mut self.status }
+    }
+}
+
+impl<const ROWS: usize, const COLUMNS: usize, const OUTPUTS: usize, const BYTES: usize> Default
+    for Buffers<ROWS, COLUMNS, OUTPUTS, BYTES>
+{
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const ROWS: usize, const COLUMNS: usize, const OUTPUTS: usize, const BYTES: usize>
+    Buffers<ROWS, COLUMNS, OUTPUTS, BYTES>
+{
+    /// Makes empty buffers.
+    #[must_use]
+    pub const fn new() -> Self {
+        const {
+            let capacity = Self::CAPACITY;
+            assert!(BYTES >= capacity.message_bytes(), "the longest message must fit");
+            assert!(ROWS >= 1 && ROWS <= 255 && OUTPUTS >= 1 && OUTPUTS <= 255);
+            assert!(COLUMNS >= 1 && COLUMNS <= model_core::health::MOST_COLUMNS);
+        }
+        Self {
+            received: [0; BYTES],
+            message: [0; BYTES],
+            frame: [[0.0; COLUMNS]; ROWS],
+            baseline: [[0.0; COLUMNS]; ROWS],
+            scratch: [[0.0; COLUMNS]; ROWS],
+            estimate: Outcome::NOTHING,
+            rest: Outcome::NOTHING,
+        }
+    }
+
+    /// Sensor and model that these buffers have room for.
+    pub const CAPACITY: crate::capacity::Capacity =
+        crate::capacity::Capacity { rows: ROWS, columns: COLUMNS, outputs: OUTPUTS };
+}

@@ -1,0 +1,102 @@
+//! The model in force: which slot it comes from, and whether the image has room for it.
+
+use model_core::Decoder;
+use model_core::blob::{DecodeError, Model};
+
+use crate::capacity::Capacity;
+use crate::link::message::{ModelFault, ModelIdentity};
+use crate::store::{Slot, blob_in_slot, generation};
+
+/// The model in force, if there is one.
+pub struct InForce<'a, const ROWS: usize> {
+    pub decoder: Option<Decoder<'a, ROWS>>,
+    pub identity: Option<ModelIdentity>,
+}
+
+impl<'a, const ROWS: usize> InForce<'a, ROWS> {
+    pub const NONE: Self = Self { decoder: None, identity: None };
+
+    /// The model in `bytes`, which start with a blob that was checked before.
+    pub fn of(bytes: &'a [u8], slot: usize, generation: u32, in_ram: bool) -> Self {
+        let decoder = Decoder::load(blob_in_slot(bytes)).ok();
+        let identity = decoder.as_ref().map(|decoder: &Decoder<'_, ROWS>| {
+            let shape = decoder.shape();
+            ModelIdentity {
+                crc_32: decoder.model_crc(),
+                slot: slot as u8,
+                generation,
+                rows: shape.rows as u8,
+                inputs: shape.inputs as u16,
+                outputs: shape.outputs as u16,
+                in_ram,
+            }
+        });
+        Self { decoder, identity }
+    }
+}
+
+/// Checks a blob from end to end, and that the image has room for its model.
+pub fn check(capacity: Capacity, blob: &[u8]) -> Result<Model<'_>, ModelFault> {
+    let model = Model::decode(blob).map_err(|error| fault(&error))?;
+    let scratch = if model.projection().is_some() { 2 } else { 1 };
+    let room = scratch * model.shape().inputs <= capacity.wires().readings();
+    match capacity.wires_for(model.shape()) {
+        Some(_) if room => Ok(model),
+        _ => Err(ModelFault::Shape),
+    }
+}
+
+/// Number and generation of the most recent slot whose model is sound and has room.
+pub fn choose<S: Slot>(capacity: Capacity, slots: &[S; 2]) -> Option<(usize, u32)> {
+    let [a, b] = slots.each_ref().map(Slot::bytes);
+    let mut candidates = [(0, generation(0, a), a), (1, generation(1, b), b)];
+    if candidates[1].1 > candidates[0].1 {
+        candidates.swap(0, 1);
+    }
+    candidates.into_iter().find_map(|(index, generation, bytes)| {
+        let sound = check(capacity, blob_in_slot(bytes)).is_ok();
+        generation.filter(|_| sound).map(|generation| (index, generation))
+    })
+}
+
+/// Copies the blob at the start of `bytes` to `room`, if it fits; returns the copy.
+pub fn copy_to<'r>(room: &'r mut [u32], bytes: &[u8]) -> Option<&'r [u8]> {
+    let blob = blob_in_slot(bytes);
+    let (words, last) = blob.as_chunks::<4>();
+    let copy = room.get_mut(..words.len() + usize::from(!last.is_empty()))?;
+    let mut padded = [0; 4];
+    padded.iter_mut().zip(last).for_each(|(place, byte)| *place = *byte);
+    for (place, word) in copy.iter_mut().zip(words.iter().chain([&padded])) {
+        *place = u32::from_le_bytes(*word);
+    }
+    Some(bytemuck::cast_slice(copy).get(..blob.len()).unwrap_or_default())
+}
+
+/// The link's code for a fault of a model.
+fn fault(error: &DecodeError) -> ModelFault {
+    match error {
+        DecodeError::BadMagic | DecodeError::UnsupportedVersion { .. } => ModelFault::NotABlob,
+        DecodeError::Truncated { .. } | DecodeError::TrailingBytes { .. } => ModelFault::Length,
+        DecodeError::Corrupt { .. } => ModelFault::Corrupt,
+        DecodeError::TooManyRows { .. } => ModelFault::Shape,
+        _ => ModelFault::Invalid,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_copy_holds_every_byte_or_is_not_made() {
+        let blob: Vec<u8> = (0..=255).collect();
+        for length in [0, 1, 3, 4, 5, 255, 256] {
+            let mut room = [u32::MAX; 64];
+            let copy = copy_to(&mut room, &blob[..length]).unwrap();
+            assert_eq!(copy, &blob[..length]);
+            let mut too_small = vec![0; length.div_ceil(4).saturating_sub(1)];
+            let copy = copy_to(&mut too_small, &blob[..length]);
+            assert_eq!(copy.is_some(), length == 0, "{length}");
+        }
+    }
+}
