@@ -4,7 +4,7 @@
 //! must restart. All large memory is in [`Buffers`], for which the program has a static: nothing grows, nothing
 //! is allocated.
 
-use model_core::{Estimate, Wires};
+use model_core::{Estimate, RowWire, Wires};
 
 use crate::capacity::Capacity;
 use crate::link::message::{Configuration, Statistics};
@@ -43,8 +43,10 @@ struct Core<'m, P, F, const ROWS: usize> {
     clock: FrameClock,
     time: LongClock,
     capacity: Capacity,
-    /// Wires that are scanned: those of the model in force, else all.
+    /// Numbers of wires that are scanned: those of the model in force, else all.
     wires: Wires,
+    /// Which row-wires these are.
+    row_wires: [RowWire; ROWS],
     /// Rows of the model in force, and outputs of all of them; without a model, rows that are scanned and 0.
     rows: usize,
     outputs: usize,
@@ -84,6 +86,7 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
             time: LongClock::starting_at(now_us),
             capacity,
             wires: capacity.wires(),
+            row_wires: core::array::from_fn(RowWire),
             rows: ROWS,
             outputs: 0,
             frame: frame.as_flattened_mut(),

@@ -4,7 +4,7 @@
 //! Readings of the paper's sensor are near 60 Ω, and its 18 columns together load a row with 3.3 Ω. A resistance
 //! in series with a row is therefore never negligible, and both circuits correct for it.
 
-use model_core::{RowWire, Wires};
+use model_core::RowWire;
 
 /// Smallest current in counts that counts as one; below it, the reading is open.
 pub const NO_CURRENT_COUNTS: f32 = 4.0;
@@ -24,10 +24,10 @@ pub trait Circuit {
     /// `full_scale_counts` is the converter's largest count.
     fn row_ohm(&self, row: RowWire, idle: &[f32], full_scale_counts: u16, readings: &mut [f32]);
 
-    /// Corrects a whole `frame` (Ω, row after row) for the influence of its rows on each other, as far as that is
-    /// known. Does nothing unless a circuit overrides it.
-    fn correct(&self, wires: Wires, frame: &mut [f32]) {
-        let _ = (wires, frame);
+    /// Corrects a whole `frame` (Ω, rows of `columns` readings) for the influence of its rows on each other, as far
+    /// as that is known. Does nothing unless a circuit overrides it.
+    fn correct(&self, columns: usize, frame: &mut [f32]) {
+        let _ = (columns, frame);
     }
 }
 
@@ -39,8 +39,8 @@ impl<C: Circuit> Circuit for &C {
         C::row_ohm(self, row, idle, full_scale_counts, readings);
     }
 
-    fn correct(&self, wires: Wires, frame: &mut [f32]) {
-        C::correct(self, wires, frame);
+    fn correct(&self, columns: usize, frame: &mut [f32]) {
+        C::correct(self, columns, frame);
     }
 }
 
@@ -117,6 +117,8 @@ impl<const ROWS: usize, const COLS: usize> Circuit for Divider<ROWS, COLS> {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ZeroPotential<const ROWS: usize, const COLS: usize> {
+    /// Number of the sensor's row-wires, read or not: all of them feed a column.
+    pub sensor_rows: u16,
     /// Reference voltage of the converter, in V.
     pub reference_v: f32,
     /// Voltage in V by which the active row is pulled below the others.
@@ -133,6 +135,7 @@ impl<const ROWS: usize, const COLS: usize> ZeroPotential<ROWS, COLS> {
     /// Typical constants: 0.2 V and 560 Ω (3.6 mA a column, 65 mA a row, readings from 36 Ω), and a switch of 0.26
     /// Ω.
     pub const TYPICAL: Self = Self {
+        sensor_rows: ROWS as u16,
         reference_v: 3.3,
         drive_v: 0.2,
         row_source_ohm: [0.26; ROWS],
@@ -156,17 +159,17 @@ impl<const ROWS: usize, const COLS: usize> Circuit for ZeroPotential<ROWS, COLS>
         }
     }
 
-    /// Corrects each reading to R·(1 − s·Σ1/R), with the sum over the column's rows. A row that was not measured
-    /// counts as the mean of the others.
-    fn correct(&self, wires: Wires, frame: &mut [f32]) {
-        for (column, series) in self.series_ohm.iter().enumerate().take(wires.columns) {
-            let readings = frame.iter().skip(column).step_by(wires.columns.max(1));
+    /// Corrects each reading to R·(1 − s·Σ1/R), with the sum over the column's rows. A row that was not measured, or
+    /// is not read, counts as the mean of the others.
+    fn correct(&self, columns: usize, frame: &mut [f32]) {
+        for (column, series) in self.series_ohm.iter().enumerate().take(columns) {
+            let readings = frame.iter().skip(column).step_by(columns.max(1));
             let measured = readings.filter(|ohm| **ohm > 0.0); // neither NaN nor short
             let (count, sum_s) =
                 measured.fold((0_usize, 0.0), |(count, sum), ohm| (count + 1, sum + 1.0 / ohm));
             if count > 0 {
-                let factor = 1.0 - series * (sum_s * (wires.rows as f32 / count as f32));
-                let readings = frame.iter_mut().skip(column).step_by(wires.columns.max(1));
+                let factor = 1.0 - series * (sum_s * (f32::from(self.sensor_rows) / count as f32));
+                let readings = frame.iter_mut().skip(column).step_by(columns.max(1));
                 readings
                     .filter(|ohm| ohm.is_finite()) // open stays open
                     .for_each(|ohm| *ohm = (*ohm * factor).max(0.0));
@@ -257,7 +260,7 @@ mod tests {
         frame: [[f32; C]; R],
     ) -> [[f32; C]; R] {
         let mut corrected = frame;
-        circuit.correct(Wires { rows: R, columns: C }, corrected.as_flattened_mut());
+        circuit.correct(C, corrected.as_flattened_mut());
         corrected
     }
 

@@ -7,7 +7,7 @@
 //!
 //! `docs/readout.md` has the circuits, their parts and the timing.
 
-use model_core::{ColumnWire, RowWire, Wires};
+use model_core::{ColumnWire, RowWire};
 use serde::{Deserialize, Serialize};
 
 mod baseline;
@@ -102,9 +102,23 @@ pub struct ScanReport {
     pub failed_samples: u16,
 }
 
+/// Wires that a scan reads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Selection<'a> {
+    /// Row-wires, in the order in which they are read and stand in a frame.
+    pub rows: &'a [RowWire],
+    /// Number of column-wires, from the first on.
+    pub columns: usize,
+}
+
 /// Source of frames: a scanned sensor, or a substitute for one.
 pub trait FrameSource {
-    /// Scans the first `wires` of the sensor into `frame`: one reading in Ω for each row and column, row after row.
-    /// Readings that could not be taken become NaN.
-    fn scan(&mut self, settings: ScanSettings, wires: Wires, frame: &mut [f32]) -> ScanReport;
+    /// Scans `wires` into `frame`: one reading in Ω for each row and column, row after row. Readings that could not
+    /// be taken become NaN.
+    fn scan(
+        &mut self,
+        settings: ScanSettings,
+        wires: Selection<'_>,
+        frame: &mut [f32],
+    ) -> ScanReport;
 }

@@ -9,7 +9,7 @@ use firmware::link::message::{
 };
 use firmware::link::packet;
 use firmware::link::receive::{Received, Receiver};
-use model_core::blob::{Floats, Metadata, ModelParts, ModelShape, encode_to_vec};
+use model_core::blob::{Columns, Floats, Metadata, ModelParts, ModelShape, encode_to_vec};
 use model_core::rbf::Shape;
 use model_core::rbf::direct::{self, Parameters};
 use model_core::{Aligned, AlignedBytes, Decoder};
@@ -413,6 +413,13 @@ fn a_restart_is_answered_and_ends_the_session() {
 
 /// A blob for one row of `inputs` readings and `outputs` outputs.
 fn blob_of_one_row(inputs: usize, outputs: usize) -> AlignedBytes {
+    let shape = ModelShape { rows: 1, inputs, outputs };
+    blob_with(shape, Metadata::unnamed(shape))
+}
+
+/// A blob of one network with this `shape` of one row.
+fn blob_with(shape: ModelShape, metadata: Metadata<'_>) -> AlignedBytes {
+    let ModelShape { inputs, outputs, .. } = shape;
     let number = |i: usize| ((i * 37) % 101) as f32 / 50.0 - 1.0;
     let list = |from: usize, count: usize| (from..from + count).map(number).collect::<Vec<_>>();
     let (centre, weights, bias) = (list(1, inputs), list(2, outputs), list(3, outputs));
@@ -429,8 +436,6 @@ fn blob_of_one_row(inputs: usize, outputs: usize) -> AlignedBytes {
             affine: &[],
         },
     );
-    let shape = ModelShape { rows: 1, inputs, outputs };
-    let metadata = Metadata::unnamed(shape);
     let networks = &[network.unwrap().into()];
     encode_to_vec(&ModelParts { projection: None, networks, row_network: &[0], metadata }).unwrap()
 }
@@ -457,6 +462,30 @@ fn the_model_says_what_is_scanned_and_decoded() {
         let row = format!("row_status: [0], outputs: {:?}", Floats::of(&outputs));
         assert!(found(row), "{all:?}");
     }
+}
+
+#[test]
+fn the_names_of_readings_say_which_rows_are_scanned() {
+    let shape = ModelShape { rows: 1, inputs: 2, outputs: 1 };
+    for (names, row) in [("r1c1_ohm\nr1c2_ohm", 0), ("r2c1_ohm\nr2c2_ohm", 1), ("a\nb", 0)] {
+        let metadata = Metadata { input_names: Columns(names), ..Metadata::unnamed(shape) };
+        let mut slots = MockSlot::pair_with(&blob_with(shape, metadata));
+        let scanning = Configuration { frame_period_us: 1000, send_readings: true, ..quiet() };
+        let mut bench = Bench::new(scanning);
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        while bench.board.0.borrow().now_us < 1500 {
+            assert_eq!(session.step(), None);
+        }
+        let all = reports(&bench.board.0.borrow().to_host);
+        let expected = format!("readings_ohm: {:?}", Floats::of(&frame_at_rest()[row][..2]));
+        assert!(all[0].1.contains(&expected), "{names}: {all:?}");
+    }
+    let metadata =
+        Metadata { input_names: Columns("r3c1_ohm\nr3c2_ohm"), ..Metadata::unnamed(shape) };
+    let mut slots = MockSlot::pair_with(&blob_with(shape, metadata));
+    let mut bench = Bench::new(quiet());
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    assert_eq!(model_crc(&mut session, &bench.board), None, "there are two rows");
 }
 
 #[test]

@@ -105,6 +105,12 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
         Ok(Self { model, row_sections })
     }
 
+    /// The model that the decoder was made of.
+    #[must_use]
+    pub fn model(&self) -> &Model<'a> {
+        &self.model
+    }
+
     /// The model's number of rows, and of inputs and outputs a row.
     #[must_use]
     pub fn shape(&self) -> ModelShape {

@@ -4,9 +4,8 @@ use firmware::app::{App, Buffers};
 use firmware::capacity::Capacity;
 use firmware::link::message::{Configuration, Memory};
 use firmware::platform::{Platform, Port};
-use firmware::readout::{FrameSource, ScanReport, ScanSettings};
+use firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
 use firmware::store::{FlashError, Slot};
-use model_core::Wires;
 
 use crate::opaque::{opaque, slot};
 
@@ -42,7 +41,12 @@ impl Platform for Board {
 struct Sensor;
 
 impl FrameSource for Sensor {
-    fn scan(&mut self, settings: ScanSettings, wires: Wires, frame: &mut [f32]) -> ScanReport {
+    fn scan(
+        &mut self,
+        settings: ScanSettings,
+        wires: Selection<'_>,
+        frame: &mut [f32],
+    ) -> ScanReport {
         opaque((settings, wires));
         frame.fill(opaque(60.0));
         opaque(ScanReport::default())

@@ -9,10 +9,10 @@ use embedded_hal::spi::{self, Operation, SpiDevice};
 use firmware::circuit::{Circuit, Divider, ZeroPotential};
 use firmware::readout::{
     Baseline, ColumnSampler, DirectPins, FrameSource, Mcp3208s, MultiplexedAdc, Multiplexer4051,
-    OnChipAdc, RowDrive, ScanSettings, Scanner, ShiftRegister595,
+    OnChipAdc, RowDrive, ScanSettings, Scanner, Selection, ShiftRegister595,
 };
 use firmware::timing;
-use model_core::Wires;
+use model_core::RowWire;
 
 use crate::opaque::opaque;
 
@@ -71,7 +71,8 @@ impl OnChipAdc for Part {
 fn scan<D: RowDrive, S: ColumnSampler, C: Circuit>(drive: D, sampler: S, circuit: C) {
     let mut scanner = Scanner::<_, _, _, _, 18>::new(drive, sampler, Part, circuit);
     let settings = ScanSettings { settling_us: opaque(46), oversampling: opaque(2) };
-    let wires = opaque(Wires { rows: 8, columns: 18 });
+    let rows: [RowWire; 8] = array::from_fn(|_| RowWire(opaque(0)));
+    let wires = Selection { rows: &rows, columns: opaque(18) };
     let mut frame = [0.0; 144];
     let Some(frame) = frame.get_mut(..opaque(144)) else { return };
     opaque(scanner.scan(settings, wires, frame).failed_samples);

@@ -1,7 +1,7 @@
 //! The model in force: which slot it comes from, and whether the image has room for it.
 
-use model_core::Decoder;
-use model_core::blob::{DecodeError, Model};
+use model_core::blob::{DecodeError, Model, ModelShape};
+use model_core::{Decoder, RowWire};
 
 use crate::capacity::Capacity;
 use crate::link::message::{ModelFault, ModelIdentity};
@@ -40,10 +40,38 @@ pub fn check(capacity: Capacity, blob: &[u8]) -> Result<Model<'_>, ModelFault> {
     let model = Model::decode(blob).map_err(|error| fault(&error))?;
     let scratch = if model.projection().is_some() { 2 } else { 1 };
     let room = scratch * model.shape().inputs <= capacity.wires().readings();
+    let mut names = model.metadata().input_names.iter().step_by(model.shape().inputs.max(1));
+    let driven = names.all(|name| row_of(name).is_none_or(|row| row.0 < capacity.rows));
     match capacity.wires_for(model.shape()) {
-        Some(_) if room => Ok(model),
+        Some(_) if room && driven => Ok(model),
         _ => Err(ModelFault::Shape),
     }
+}
+
+/// Row-wires of a model, one for each of its rows.
+///
+/// A reading's name tells its wires: `r4c1_ohm` is row-wire 4 with column-wire 1, both counted from 1. A model with
+/// other names, or of one row with the readings of several wires, takes the first row-wires in their order.
+pub fn row_wires<const ROWS: usize>(model: &Model<'_>) -> [RowWire; ROWS] {
+    let ModelShape { rows, inputs, .. } = model.shape();
+    let in_order = core::array::from_fn(RowWire);
+    let names = model.metadata().input_names;
+    let mut wires = in_order;
+    let first_names = names.iter().step_by(inputs.max(1)).take(rows);
+    for (wire, name) in wires.iter_mut().zip(first_names) {
+        match row_of(name) {
+            Some(row) => *wire = row,
+            None => return in_order,
+        }
+    }
+    wires
+}
+
+/// The row-wire of a reading called `r{m}c1_ohm`.
+fn row_of(name: &str) -> Option<RowWire> {
+    let number = name.strip_prefix('r')?.strip_suffix("c1_ohm")?;
+    let row: usize = number.parse().ok()?;
+    row.checked_sub(1).map(RowWire)
 }
 
 /// Number and generation of the most recent slot whose model is sound and has room.
@@ -86,6 +114,15 @@ fn fault(error: &DecodeError) -> ModelFault {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_readings_name_tells_its_row() {
+        assert_eq!(row_of("r1c1_ohm"), Some(RowWire(0)));
+        assert_eq!(row_of("r16c1_ohm"), Some(RowWire(15)));
+        for other in ["r1c2_ohm", "r0c1_ohm", "rc1_ohm", "ch1", "", "r-1c1_ohm", "r1c1", "x"] {
+            assert_eq!(row_of(other), None, "{other}");
+        }
+    }
 
     #[test]
     fn a_copy_holds_every_byte_or_is_not_made() {

@@ -3,15 +3,15 @@
 use model_core::blob::Floats;
 use model_core::gate::Rest;
 use model_core::health::{Health, Limits};
-use model_core::{Decoder, Estimate, Gate, RowStatus};
+use model_core::{Decoder, Estimate, Gate, RowStatus, RowWire};
 
-use super::model::{InForce, choose, copy_to};
+use super::model::{InForce, choose, copy_to, row_wires};
 use super::{App, Core};
 use crate::link::message::{EstimateReport, HealthReport, Report};
 use crate::link::packet::UNASKED;
 use crate::log::{info, warning};
 use crate::platform::Platform;
-use crate::readout::FrameSource;
+use crate::readout::{FrameSource, Selection};
 use crate::store::Slot;
 
 /// Why a session ends.
@@ -90,13 +90,15 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
     /// Makes frames and estimates as long as the model's, and decodes the baseline with it. A baseline of other
     /// wires is forgotten.
     fn take_shape_of(&mut self, decoder: Option<&Decoder<'_, ROWS>>) {
-        let before = self.wires;
+        let before = (self.wires, self.row_wires);
         let shape = decoder.map(Decoder::shape);
         self.wires =
             shape.and_then(|shape| self.capacity.wires_for(shape)).unwrap_or(self.capacity.wires());
         self.rows = shape.map_or(self.wires.rows, |shape| shape.rows);
         self.outputs = shape.map_or(0, |shape| shape.rows.saturating_mul(shape.outputs));
-        if self.wires != before {
+        self.row_wires =
+            decoder.map_or(core::array::from_fn(RowWire), |decoder| row_wires(decoder.model()));
+        if (self.wires, self.row_wires) != before {
             self.give_up_capture();
             self.baseline.restart(self.wires.readings());
         }
@@ -118,7 +120,9 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
     fn scan(&mut self, missed: u32, decoder: Option<&Decoder<'_, ROWS>>) -> bool {
         let start_us = self.now_us();
         let frame = self.frame.get_mut(..self.wires.readings()).unwrap_or_default();
-        let report = self.source.scan(self.configuration.scan, self.wires, frame);
+        let rows = self.row_wires.get(..self.wires.rows).unwrap_or_default();
+        let wires = Selection { rows, columns: self.wires.columns };
+        let report = self.source.scan(self.configuration.scan, wires, frame);
         let any = frame.iter().any(|reading| !reading.is_nan());
         let scan_us = self.now_us().wrapping_sub(start_us) as u32;
 

@@ -1,9 +1,9 @@
 //! The scan itself: the same sequence for every drive, sampler and circuit.
 
 use embedded_hal::delay::DelayNs;
-use model_core::{ColumnWire, RowWire, Wires};
+use model_core::{ColumnWire, RowWire};
 
-use super::{ColumnSampler, FrameSource, RowDrive, ScanReport, ScanSettings};
+use super::{ColumnSampler, FrameSource, RowDrive, ScanReport, ScanSettings, Selection};
 use crate::circuit::Circuit;
 
 /// Scanner of a sensor with at most `COLUMNS` columns, made of a row drive, a column sampler, a delay and a circuit.
@@ -106,16 +106,20 @@ fn count_failures(report: &mut ScanReport, failures: usize) {
 impl<D: RowDrive, S: ColumnSampler, T: DelayNs, C: Circuit, const COLUMNS: usize> FrameSource
     for Scanner<D, S, T, C, COLUMNS>
 {
-    fn scan(&mut self, settings: ScanSettings, wires: Wires, frame: &mut [f32]) -> ScanReport {
+    fn scan(
+        &mut self,
+        settings: ScanSettings,
+        wires: Selection<'_>,
+        frame: &mut [f32],
+    ) -> ScanReport {
         let settings = settings.clamped();
         let mut report = ScanReport::default();
         self.sample_idle(settings, wires.columns, &mut report);
-        let rows = frame.chunks_mut(wires.columns.max(1)).take(wires.rows);
-        for (row, readings) in rows.enumerate() {
-            self.scan_row(RowWire(row), settings, readings, &mut report);
+        for (row, readings) in wires.rows.iter().zip(frame.chunks_mut(wires.columns.max(1))) {
+            self.scan_row(*row, settings, readings, &mut report);
         }
         self.release(&mut report);
-        self.circuit.correct(wires, frame);
+        self.circuit.correct(wires.columns, frame);
         report
     }
 }

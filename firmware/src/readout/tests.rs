@@ -294,7 +294,7 @@ fn scanner<C: Circuit>(
     Scanner::new(drive, Mcp3208s { chips: record.chips() }, record.clone(), circuit)
 }
 
-const WIRES: Wires = Wires { rows: 2, columns: 3 };
+const WIRES: Selection<'static> = Selection { rows: &[RowWire(0), RowWire(1)], columns: 3 };
 const SETTINGS: ScanSettings = ScanSettings { settling_us: 46, oversampling: 4 };
 
 #[test]
@@ -415,9 +415,12 @@ fn a_scan_touches_only_the_wires_that_it_is_asked_for() {
     let record = Record::default();
     let mut scanner = scanner(&record, ZeroPotential::<2, 3>::TYPICAL);
     let mut frame = [7.0; 4];
-    let report = scanner.scan(SETTINGS, Wires { rows: 1, columns: 2 }, &mut frame[..2]);
+    let report =
+        scanner.scan(SETTINGS, Selection { rows: &[RowWire(1)], columns: 2 }, &mut frame[..2]);
     assert_eq!(report.failed_samples, 0);
     assert_eq!(record.transfers(), 2 * 2 * 4); // idle and one row, two columns, four samples
+    let driven = |row| record.0.borrow().events.contains(&Event::Pin(row, HIGH));
+    assert_eq!([driven("r0"), driven("r1")], [false, true]);
     assert!(frame[..2].iter().all(|ohm| *ohm != 7.0));
     assert_eq!(frame[2..], [7.0; 2]);
 }
@@ -427,7 +430,7 @@ fn wires_that_a_scanner_does_not_have_are_missing() {
     let record = Record::default();
     let mut scanner = scanner(&record, ZeroPotential::<2, 3>::TYPICAL);
     let mut frame = [7.0; 4];
-    let report = scanner.scan(SETTINGS, Wires { rows: 1, columns: 4 }, &mut frame);
+    let report = scanner.scan(SETTINGS, Selection { rows: &[RowWire(0)], columns: 4 }, &mut frame);
     assert!(frame.iter().all(|ohm| ohm.is_nan()));
     assert_eq!(report.failed_samples, 4);
 }

@@ -10,12 +10,12 @@ use firmware::link::message::{Configuration, Memory, Report, Request, UploadStep
 use firmware::link::receive::{Received, Receiver};
 use firmware::link::{cobs, packet};
 use firmware::platform::{Platform, Port};
-use firmware::readout::{FrameSource, ScanReport, ScanSettings};
+use firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
 use firmware::store::{FlashError, Slot};
+use model_core::AlignedBytes;
 use model_core::blob::{Metadata, ModelParts, ModelShape, encode_to_vec};
 use model_core::rbf::direct::{self, Parameters};
 use model_core::rbf::{Network, Shape};
-use model_core::{AlignedBytes, Wires};
 
 pub const ROWS: usize = 2;
 pub const COLS: usize = 3;
@@ -84,11 +84,16 @@ pub struct Source {
 }
 
 impl FrameSource for Source {
-    fn scan(&mut self, settings: ScanSettings, wires: Wires, frame: &mut [f32]) -> ScanReport {
+    fn scan(
+        &mut self,
+        settings: ScanSettings,
+        wires: Selection<'_>,
+        frame: &mut [f32],
+    ) -> ScanReport {
         assert!(settings.oversampling > 0, "a scan without samples");
-        assert_eq!(frame.len(), wires.readings());
-        for (to, from) in frame.chunks_mut(wires.columns).zip(self.frame.borrow().iter()) {
-            to.copy_from_slice(&from[..wires.columns]);
+        assert_eq!(frame.len(), wires.rows.len() * wires.columns);
+        for (to, row) in frame.chunks_mut(wires.columns).zip(wires.rows) {
+            to.copy_from_slice(&self.frame.borrow()[row.0][..wires.columns]);
         }
         let mut pins = self.board.0.borrow_mut();
         pins.now_us = pins.now_us.wrapping_add(self.scan_us);

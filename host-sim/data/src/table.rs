@@ -63,6 +63,14 @@ impl Table {
         sums
     }
 
+    /// Table of so many `lines`: the lines of this one, again and again from the first.
+    #[must_use]
+    pub fn cycled(&self, lines: usize) -> Self {
+        let count = lines * self.names.len();
+        let values = self.values.iter().copied().cycle().take(count).collect();
+        Self { names: self.names.clone(), values }
+    }
+
     /// Table of the `count` columns from index `from` on.
     ///
     /// # Panics

@@ -12,21 +12,17 @@
 //! use firmware::readout::FrameSource;
 //! use taxel_simulate::World;
 //! use taxel_simulate::virtual_board::{SeriesResistance, VirtualBoard};
-//! use model_core::Wires;
 //!
 //! let board = VirtualBoard::new(&World::press())?;
 //! board.set_readings(&[57.5; 144]); // Ω, row after row
 //! let mut scanner = board.scanner(SeriesResistance::NONE);
 //! let mut frame = [f32::NAN; 144];
-//! let wires = Wires { rows: 8, columns: 18 };
-//! let report = scanner.scan(board.scan_settings(), wires, &mut frame);
+//! let report = scanner.scan(board.scan_settings(), board.wires(), &mut frame);
 //! board.check()?;
 //! assert_eq!(report.failed_samples, 0);
 //! assert!((frame[143] - 57.5).abs() < 0.02);
 //! # Ok::<(), taxel_simulate::Error>(())
 //! ```
-
-use model_core::Wires;
 
 mod pin;
 mod network;
@@ -44,12 +40,10 @@ mod tests;
 pub use board::{Transactions, VirtualBoard};
 pub use handles::{VirtualAdc, VirtualDelay, VirtualPin, VirtualSpi};
 pub use pin::Pin;
-pub use scan::{all_readings, rows_read, scan};
+pub use scan::{all_readings, scan};
 pub use scanner::{FrameScanner, SeriesResistance};
 
-/// Row-wires of the virtual board: those of the paper's sensor.
+/// Row-wires that the board's parts can drive.
 pub const ROWS: usize = 8;
-/// Column-wires of the virtual board.
+/// Column-wires that the board's parts can sample.
 pub const COLUMNS: usize = 18;
-/// All wires of the virtual board.
-pub const WIRES: Wires = Wires { rows: ROWS, columns: COLUMNS };

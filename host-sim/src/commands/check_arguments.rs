@@ -1,27 +1,36 @@
 //! Common parts of `emulate` and `link … check`: the plan, the model, and the page.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use firmware::link::message::Memory;
-use host_sim::experiment::Experiment;
 use host_sim::{Error, Result};
-use taxel_learn::ModelBlob;
+use taxel_data::csv_file::CsvFile;
+use taxel_data::random::Stream;
+use taxel_data::table::Table;
+use taxel_learn::{Exponential, ModelBlob};
 use taxel_rig::device::check::{Findings, Plan};
+use taxel_simulate::sensor::Precision;
+use taxel_simulate::{World, synthesise};
 
+use super::decode::model_inputs;
 use super::progress::Terminal;
 use super::scene_argument::SceneArgument;
-use super::{Common, print};
+use super::{Common, arguments, print};
 
 /// Options of a check.
 #[derive(Args)]
 pub struct CheckArguments {
-    #[command(flatten)]
-    scene: SceneArgument,
+    /// A built-in scene (paper, press), the path of a scene file, or of a CSV file with the readings of --model.
+    #[arg(default_value = "paper", value_name = "SCENE|CSV")]
+    source: String,
+    /// Precision of the sensor's readings, instead of the scene's.
+    #[arg(long, value_parser = arguments::precision())]
+    precision: Option<Precision>,
     /// Weight blob; without it a model of the scene is trained.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Frames that the device decodes.
+    /// Frames that the device decodes. Lines of a CSV file are repeated.
     #[arg(
         short = 'n',
         long,
@@ -41,6 +50,16 @@ pub struct CheckArguments {
     garbage: usize,
     #[command(flatten)]
     pub limits: Limits,
+}
+
+/// What a device is checked with.
+pub struct Checked {
+    /// Readings in Ω, in the columns of the model's inputs.
+    pub readings: Table,
+    /// Model of the device.
+    pub model: ModelBlob,
+    /// World of the readings; `None` for those of a CSV file.
+    pub world: Option<World>,
 }
 
 /// Bounds on the memory of the firmware, without its models.
@@ -71,28 +90,37 @@ impl Limits {
 }
 
 impl CheckArguments {
-    /// Loads the scene and the model, which is trained if none was given.
-    pub fn load(&self, common: &Common) -> Result<(Experiment, ModelBlob)> {
-        let scene = self.scene(common)?;
-        let model = self.model(&scene)?;
-        Ok((scene, model))
+    /// Loads readings and model, which is trained if none was given.
+    pub fn load(&self, common: &Common) -> Result<Checked> {
+        if Path::new(&self.source).extension().is_some_and(|end| end.eq_ignore_ascii_case("csv")) {
+            self.load_csv()
+        } else {
+            self.load_scene(common)
+        }
     }
 
-    /// Loads the scene.
-    pub fn scene(&self, common: &Common) -> Result<Experiment> {
-        let scene = self.scene.load(common)?;
+    fn load_csv(&self) -> Result<Checked> {
+        let Some(path) = &self.model else {
+            return Err(Error::Usage(format!(
+                "{}: readings of a CSV file need --model FILE; `host-sim train` makes one",
+                self.source
+            )));
+        };
+        let model = ModelBlob::read(path)?;
+        let file = CsvFile::read(Path::new(&self.source))?;
+        let readings = model_inputs(&model.prepare(Exponential::default()), &file)?;
+        Ok(Checked { readings: readings.cycled(self.frames.max(1)), model, world: None })
+    }
+
+    fn load_scene(&self, common: &Common) -> Result<Checked> {
+        let scene = SceneArgument::new(&self.source, self.precision).load(common)?;
         scene.world.check_frames("-n", self.frames)?;
-        Ok(scene)
-    }
-
-    /// Loads the model, or trains it if none was given.
-    pub fn model(&self, scene: &Experiment) -> Result<ModelBlob> {
-        let blob = match &self.model {
+        let model = match &self.model {
             Some(path) => ModelBlob::read(path)?,
             None => scene.train(&Terminal::new())?,
         };
-        let model = blob.parse();
-        let metadata = model.metadata();
+        let parsed = model.parse();
+        let metadata = parsed.metadata();
         if metadata.scene_digest != scene.digest {
             eprintln!(
                 "note: the model was trained on {:?}, not on this scene; its bits can be compared all \
@@ -108,13 +136,14 @@ impl CheckArguments {
                 scene.name
             )));
         }
-        Ok(blob)
+        let readings = synthesise(&scene.world, Stream::Test, self.frames.max(1)).inputs;
+        Ok(Checked { readings, model, world: Some(scene.world) })
     }
 
     /// Plan of the check, with `window` frames on their way at a time.
-    pub fn plan(&self, window: usize) -> Plan {
+    pub fn plan(&self, window: usize, common: &Common) -> Plan {
         Plan {
-            frames: self.frames,
+            seed: common.seed.unwrap_or(1),
             damaged_uploads: self.damaged_uploads,
             interruptions: self.interruptions,
             garbage_bytes: self.garbage,

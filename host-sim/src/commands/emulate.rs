@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
-use host_sim::Result;
+use host_sim::{Error, Result};
 use taxel_data::output;
 use taxel_rig::device::Device;
 use taxel_rig::device::check::{Findings, check};
@@ -12,7 +12,7 @@ use taxel_rig::device::scan;
 use taxel_rig::emulator::{self, Emulator};
 
 use super::Common;
-use super::check_arguments::{CheckArguments, conclude};
+use super::check_arguments::{CheckArguments, Checked, conclude};
 use super::progress::Terminal;
 
 /// Frames on their way at a time: either line holds bytes back while the device is busy.
@@ -32,7 +32,7 @@ enum Line {
 
 /// Run the firmware in QEMU and compare its estimates with the host's.
 ///
-/// Decodes frames of a scene. Fails (exit status 1) unless every frame is bit-identical and every check
+/// Decodes frames of a scene, or of a CSV file with a model of it. Fails (exit status 1) unless every frame is bit-identical and every check
 /// asked for is passed.
 #[derive(Args)]
 #[command(
@@ -78,12 +78,17 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         readout: arguments.scans > 0,
     };
     options.check()?;
-    let scene = arguments.check.scene(common)?;
-    if arguments.scans > 0 {
-        scene.world.check_frames("--scans", arguments.scans)?;
-        scan::with_parts_of_image(&scene.world)?;
-    }
-    let model = arguments.check.model(&scene)?;
+    let Checked { readings, model, world } = arguments.check.load(common)?;
+    let scanned_world = match &world {
+        _ if arguments.scans == 0 => None,
+        None => {
+            return Err(Error::Usage("--scans needs a scene, whose sensor is simulated".into()));
+        }
+        Some(world) => {
+            world.check_frames("--scans", arguments.scans)?;
+            Some(scan::with_parts_of_image(world)?)
+        }
+    };
 
     // QEMU puts the blob at the place where a board has it in flash.
     let blob = temporary("model.bin");
@@ -95,12 +100,12 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         let mut device = Device::new(lines.link)?;
         device.patience = PATIENCE;
         let progress = Terminal::new();
-        let scanned = lines.readout.map(|line| {
-            scan::check(&mut device, &scene.world, &model, line, arguments.scans, &progress)
+        let scanned = lines.readout.zip(scanned_world).map(|(line, world)| {
+            scan::check(&mut device, &world, &model, line, arguments.scans, &progress)
         });
         let scans = scanned.transpose()?;
-        let plan = arguments.check.plan(WINDOW);
-        Ok(Findings { scans, ..check(&mut device, &scene.world, &model, &plan, &progress)? })
+        let plan = arguments.check.plan(WINDOW, common);
+        Ok(Findings { scans, ..check(&mut device, &readings, &model, &plan, &progress)? })
     });
     // Only killing the program leaves these files behind.
     let _ = std::fs::remove_file(&blob);

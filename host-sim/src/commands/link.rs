@@ -16,7 +16,7 @@ use taxel_learn::ModelBlob;
 use taxel_rig::device::check::check;
 use taxel_rig::device::{Device, DeviceIdentity, Wire, serial, upload};
 
-use super::check_arguments::{CheckArguments, conclude, memory_lines};
+use super::check_arguments::{CheckArguments, Checked, conclude, memory_lines};
 use super::{Common, print};
 
 /// Talk to a device on a serial port: identify, upload, record.
@@ -142,11 +142,11 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         Action::Record(action) => record(&mut open()?, action, common),
         Action::Baseline(action) => baseline(&mut open()?, action, common),
         Action::Check(action) => {
-            let (scene, model) = action.load(common)?;
+            let Checked { readings, model, .. } = action.load(common)?;
             let mut device = open()?;
-            let plan = action.plan(1);
+            let plan = action.plan(1, common);
             let progress = Terminal::new();
-            let findings = check(&mut device, &scene.world, &model, &plan, &progress)?;
+            let findings = check(&mut device, &readings, &model, &plan, &progress)?;
             conclude(&findings, &action.limits, common)
         }
     }

@@ -31,6 +31,11 @@ impl Default for SceneArgument {
 }
 
 impl SceneArgument {
+    /// Makes an argument as if it had been given on the command line.
+    pub fn new(scene: &str, precision: Option<Precision>) -> Self {
+        Self { scene: scene.into(), precision }
+    }
+
     /// Loads the scene and applies the overrides.
     pub fn load(&self, common: &Common) -> Result<Experiment> {
         let mut scene = Experiment::load(&self.scene)?;

@@ -6,7 +6,7 @@ use taxel_data::table::Table;
 use taxel_learn::PreparedModel;
 use taxel_simulate::Synthesis;
 use taxel_simulate::readout::{Circuit, Readout};
-use taxel_simulate::virtual_board::{VirtualBoard, all_readings, rows_read, scan};
+use taxel_simulate::virtual_board::{VirtualBoard, all_readings, scan};
 
 use crate::experiment::Experiment;
 use crate::metrics::{self, Errors};
@@ -150,7 +150,7 @@ pub fn measure(
                 Stage::Corrected | Stage::Everything => 1.0,
                 Stage::Miscalibrated => 1.1,
             });
-            let scanned = rows_read(world, &scan(&board, series, &sensor)?);
+            let scanned = scan(&board, series, &sensor)?;
             lines.push(Line {
                 circuit,
                 stage,

@@ -10,6 +10,7 @@ use host_sim::experiment::Experiment;
 use model_core::blob::Floats;
 use taxel_data::progress::Silent;
 use taxel_data::random::Stream;
+use taxel_data::table::Table;
 use taxel_learn::{Exponential, ModelBlob};
 use taxel_rig::Error;
 use taxel_rig::device::check::{Plan, check};
@@ -28,6 +29,11 @@ fn model(centres: usize) -> ModelBlob {
     let mut scene = Experiment::load("press").unwrap();
     (scene.training.frames, scene.training.centres) = (500, centres);
     scene.train(&Silent).unwrap()
+}
+
+/// Readings of so many test frames.
+fn readings(frames: usize) -> Table {
+    synthesise(&press(), Stream::Test, frames).inputs
 }
 
 /// Ideal readings of a few frames, for a device that scans.
@@ -89,13 +95,13 @@ fn a_sound_device_passes_every_check() {
     let model = model(16);
     let mut device = device(SOUND, &model);
     let plan = Plan {
-        frames: 500,
+        seed: 1,
         damaged_uploads: 70,
         interruptions: true,
         garbage_bytes: 100_000,
         window: 4,
     };
-    let findings = check(&mut device, &press(), &model, &plan, &Silent).unwrap();
+    let findings = check(&mut device, &readings(500), &model, &plan, &Silent).unwrap();
     assert!(findings.all_good(), "{findings:#?}");
     assert_eq!(findings.frames.bit_identical, 500);
     let uploads = findings.uploads.unwrap();
@@ -195,13 +201,13 @@ fn a_device_behind_a_mailbox_passes_every_check() {
     crate::virtual_device::run(end, SOUND, model.bytes(), frames());
     let mut device = Device::new(host).unwrap();
     let plan = Plan {
-        frames: 100,
+        seed: 1,
         damaged_uploads: 14,
         interruptions: true,
         garbage_bytes: 50_000,
         window: 4,
     };
-    let findings = check(&mut device, &press(), &model, &plan, &Silent).unwrap();
+    let findings = check(&mut device, &readings(100), &model, &plan, &Silent).unwrap();
     assert!(findings.all_good(), "{findings:#?}");
 }
 
@@ -210,8 +216,8 @@ fn another_model_on_the_device_is_replaced_by_the_one_checked_with() {
     let mut device = device(SOUND, &model(3));
     let wanted = model(5);
     let plan =
-        Plan { frames: 20, damaged_uploads: 0, interruptions: false, garbage_bytes: 0, window: 1 };
-    let findings = check(&mut device, &press(), &wanted, &plan, &Silent).unwrap();
+        Plan { seed: 1, damaged_uploads: 0, interruptions: false, garbage_bytes: 0, window: 1 };
+    let findings = check(&mut device, &readings(20), &wanted, &plan, &Silent).unwrap();
     assert!(findings.all_good(), "{findings:#?}");
     assert_eq!(findings.device.model.unwrap().crc_32, wanted.parse().crc());
 }
@@ -243,8 +249,8 @@ fn over_a_line_that_spoils_bytes_everything_still_arrives() {
     let identity = upload::replace(&mut device, new.bytes(), &Silent).unwrap();
     assert_eq!(identity.model.unwrap().crc_32, new.parse().crc());
     let plan =
-        Plan { frames: 30, damaged_uploads: 0, interruptions: false, garbage_bytes: 0, window: 1 };
-    let findings = check(&mut device, &press(), &new, &plan, &Silent).unwrap();
+        Plan { seed: 1, damaged_uploads: 0, interruptions: false, garbage_bytes: 0, window: 1 };
+    let findings = check(&mut device, &readings(30), &new, &plan, &Silent).unwrap();
     assert_eq!(findings.frames.bit_identical, 30);
     assert!(findings.repeated > 0 && !findings.all_good(), "the line was sound");
 }

@@ -203,8 +203,8 @@ fn a_readout_that_cannot_be_is_refused() {
     let other = &["m.bin", "not those of scene press"][..];
     refused(&["readout", "press", "--model", "m.bin"], other);
     refused(&["readout", "scene.toml", "--frames", "0"], &["--frames = 0"]);
-    folder.write("nine.toml", small_scene().replace("column_wires = 18", "column_wires = 9"));
-    refused(&["readout", "nine.toml"], &["9 column-wires", "18"]);
+    folder.write("wide.toml", small_scene().replace("column_wires = 18", "column_wires = 19"));
+    refused(&["readout", "wide.toml"], &["19 column-wires", "18"]);
     // A wait shorter than the time constant needs: the board refuses, and the command fails.
     let hasty = "[readout]\ntime_constant_us = 5.0\nsettling_us = 10";
     folder.write("hasty.toml", small_scene().replace("[readout]", hasty));

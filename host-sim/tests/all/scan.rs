@@ -10,9 +10,9 @@ use std::time::Instant;
 use firmware::circuit::ZeroPotential;
 use firmware::platform::Port;
 use firmware::readout::{
-    FrameSource, Mcp3208s, ScanReport, ScanSettings, Scanner, ShiftRegister595,
+    FrameSource, Mcp3208s, ScanReport, ScanSettings, Scanner, Selection, ShiftRegister595,
 };
-use model_core::Wires;
+use model_core::RowWire;
 use remote_readout::Remote;
 use taxel_data::progress::Silent;
 use taxel_data::random::Stream;
@@ -25,7 +25,17 @@ use taxel_simulate::synthesise;
 use taxel_simulate::virtual_board::{SeriesResistance, VirtualBoard};
 
 /// All wires of the virtual board.
-const WIRES: Wires = Wires { rows: 8, columns: 18 };
+const WIRES: Selection<'static> = Selection { rows: &ROWS, columns: 18 };
+const ROWS: [RowWire; 8] = [
+    RowWire(0),
+    RowWire(1),
+    RowWire(2),
+    RowWire(3),
+    RowWire(4),
+    RowWire(5),
+    RowWire(6),
+    RowWire(7),
+];
 
 static CIRCUIT: ZeroPotential<8, 18> = ZeroPotential::TYPICAL;
 /// Series resistances for which the device corrects.
@@ -121,7 +131,12 @@ impl Port for Socket {
 struct RemoteReadout(Socket);
 
 impl FrameSource for RemoteReadout {
-    fn scan(&mut self, settings: ScanSettings, wires: Wires, frame: &mut [f32]) -> ScanReport {
+    fn scan(
+        &mut self,
+        settings: ScanSettings,
+        wires: Selection<'_>,
+        frame: &mut [f32],
+    ) -> ScanReport {
         let remote = Remote::new(self.0.clone());
         let [data, clock, latch] = [12, 13, 14].map(|pin| remote.pin(pin));
         let drive = ShiftRegister595::<_, 8> { data, clock, latch };
@@ -136,7 +151,12 @@ impl FrameSource for RemoteReadout {
 struct Spoilt(RemoteReadout, u32);
 
 impl FrameSource for Spoilt {
-    fn scan(&mut self, settings: ScanSettings, wires: Wires, frame: &mut [f32]) -> ScanReport {
+    fn scan(
+        &mut self,
+        settings: ScanSettings,
+        wires: Selection<'_>,
+        frame: &mut [f32],
+    ) -> ScanReport {
         let report = self.0.scan(settings, wires, frame);
         let reading = &mut frame[143];
         *reading = f32::from_bits(reading.to_bits() ^ self.1);

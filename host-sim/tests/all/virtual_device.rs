@@ -6,9 +6,8 @@ use firmware::app::{App, Buffers};
 use firmware::capacity::Capacity;
 use firmware::link::message::{Configuration, Memory};
 use firmware::platform::{Platform, Port};
-use firmware::readout::{FrameSource, ScanReport, ScanSettings};
+use firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
 use firmware::store::{FlashError, Slot};
-use model_core::Wires;
 use taxel_data::random::{Purpose, Random, Stream};
 
 pub mod mailbox;
@@ -109,10 +108,10 @@ struct Source {
 }
 
 impl FrameSource for Source {
-    fn scan(&mut self, _: ScanSettings, wires: Wires, frame: &mut [f32]) -> ScanReport {
+    fn scan(&mut self, _: ScanSettings, wires: Selection<'_>, frame: &mut [f32]) -> ScanReport {
         let shown = &self.frames[self.next % self.frames.len()];
-        for (to, from) in frame.chunks_mut(wires.columns).zip(shown) {
-            to.copy_from_slice(&from[..wires.columns]);
+        for (to, row) in frame.chunks_mut(wires.columns).zip(wires.rows) {
+            to.copy_from_slice(&shown[row.0][..wires.columns]);
         }
         self.next += 1;
         ScanReport::default()

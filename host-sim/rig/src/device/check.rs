@@ -6,8 +6,8 @@ use firmware::link::message::{Report, Request, Statistics};
 use serde::Serialize;
 use taxel_data::progress::{Progress, Silent};
 use taxel_data::random::{Purpose, Random, Stream};
+use taxel_data::table::Table;
 use taxel_learn::ModelBlob;
-use taxel_simulate::{World, synthesise};
 
 use super::expected::{Expected, prepare};
 use super::scan::ScanFindings;
@@ -25,8 +25,8 @@ const SWALLOWED: Duration = Duration::from_mins(2);
 /// Plan of a check.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
-    /// Number of frames to decode.
-    pub frames: usize,
+    /// Seed of every random draw.
+    pub seed: u64,
     /// Number of damaged models to upload.
     pub damaged_uploads: usize,
     /// Whether an upload is broken off after each of its chunks, with a restart of the device.
@@ -100,7 +100,7 @@ pub struct GarbageFindings {
     pub decodes_as_before: bool,
 }
 
-/// Compares `device` with the host on frames of `world`.
+/// Compares `device` with the host on frames of `readings` (Ω), which are in the columns of the model's inputs.
 ///
 /// The model of `blob` is uploaded first if it is not active, and must be active at the end.
 ///
@@ -109,42 +109,39 @@ pub struct GarbageFindings {
 /// are no error: they are in the findings.
 pub fn check<W: Wire>(
     device: &mut Device<W>,
-    world: &World,
+    readings: &Table,
     blob: &ModelBlob,
     plan: &Plan,
     progress: &dyn Progress,
 ) -> Result<Findings> {
-    device.while_paused(|device| check_paused(device, world, blob, plan, progress))
+    device.while_paused(|device| check_paused(device, readings, blob, plan, progress))
 }
 
 fn check_paused<W: Wire>(
     device: &mut Device<W>,
-    world: &World,
+    readings: &Table,
     blob: &ModelBlob,
     plan: &Plan,
     progress: &dyn Progress,
 ) -> Result<Findings> {
     let exponential = prepare(device, blob, progress)?;
 
-    let readings = synthesise(world, Stream::Test, plan.frames.max(1)).inputs;
     let model = blob.prepare(exponential);
-    let expected = Expected::new(&model, &readings);
+    let expected = Expected::new(&model, readings);
+    let frames = readings.len();
     let crc_32 = model.model().crc();
-    let (bit_identical, time) = expected.count_same(device, plan.frames, plan.window, progress)?;
-    let frames = FrameFindings {
-        frames: plan.frames,
-        bit_identical,
-        frames_per_s: plan.frames as f64 / time.as_secs_f64(),
-    };
+    let (bit_identical, time) = expected.count_same(device, frames, plan.window, progress)?;
+    let frames =
+        FrameFindings { frames, bit_identical, frames_per_s: frames as f64 / time.as_secs_f64() };
     // A restart resets the record of the deepest stack.
     let deepest_so_far = device.identify()?.memory.stack_high_water;
     let uploads = if plan.damaged_uploads > 0 || plan.interruptions {
-        Some(check_uploads(device, world, blob, &expected, plan, progress)?)
+        Some(check_uploads(device, readings, blob, &expected, plan, progress)?)
     } else {
         None
     };
     let garbage = if plan.garbage_bytes > 0 {
-        Some(check_garbage(device, world.seed, &expected, crc_32, plan.garbage_bytes, progress)?)
+        Some(check_garbage(device, plan.seed, &expected, crc_32, plan.garbage_bytes, progress)?)
     } else {
         None
     };

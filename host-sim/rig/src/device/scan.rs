@@ -12,9 +12,7 @@ use taxel_data::table::Table;
 use taxel_learn::ModelBlob;
 use taxel_simulate::World;
 use taxel_simulate::readout::{Circuit, Drive, Readout, Sampler};
-use taxel_simulate::virtual_board::{
-    self, COLUMNS, ROWS, SeriesResistance, VirtualBoard, all_readings, rows_read,
-};
+use taxel_simulate::virtual_board::{self, SeriesResistance, VirtualBoard, all_readings};
 
 use super::expected::{Expected, prepare};
 use super::{Device, Wire};
@@ -99,7 +97,7 @@ pub fn check<W: Wire>(
     let readings = all_readings(&world, scans);
     let board = VirtualBoard::new(&world)?;
     let scanned = virtual_board::scan(&board, series_of_image(), &readings)?;
-    let expected = Expected::new(&model, &rows_read(&world, &scanned));
+    let expected = Expected::new(&model, &scanned);
     let scan = board.scan_settings();
     let configuration = Configuration {
         frame_period_us: PERIOD_US,
@@ -108,7 +106,9 @@ pub fn check<W: Wire>(
         send_estimates: true,
         ..Configuration::DEFAULT
     };
-    let samples = ((ROWS + 1) * COLUMNS) as u32 * u32::from(scan.oversampling);
+    let wires = board.wires();
+    let readings_a_scan = (wires.rows.len() + 1) * wires.columns;
+    let samples = readings_a_scan as u32 * u32::from(scan.oversampling);
     let patience = device.patience.max(Duration::from_secs(5) + samples * SAMPLE);
     // A request may have to wait for a scan.
     device.patience = patience;

@@ -3,8 +3,9 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use firmware::readout::ScanSettings;
+use firmware::readout::{ScanSettings, Selection};
 use firmware::timing;
+use model_core::RowWire;
 use taxel_data::BadValue;
 use taxel_data::random::{Purpose, Random, Stream};
 
@@ -43,6 +44,11 @@ pub struct Transactions {
 pub struct VirtualBoard {
     board: Rc<RefCell<Board>>,
     readout: Rc<Readout>,
+    /// Row-wires that the world reads, and column-wires of its sensor.
+    rows: Rc<[RowWire]>,
+    columns: usize,
+    /// Number of the sensor's row-wires.
+    sensor_rows: usize,
 }
 
 #[derive(Debug)]
@@ -69,7 +75,7 @@ impl VirtualBoard {
     /// Board for `world`'s sensor, seed and readout, with nothing connected: all nodes open.
     ///
     /// # Errors
-    /// [`BadValue`] for a sensor of other than 8 × 18 wires.
+    /// [`BadValue`] for a sensor of more than 8 × 18 wires.
     pub fn new(world: &World) -> Result<Self, BadValue> {
         Self::with_readout(world, &world.readout)
     }
@@ -77,15 +83,15 @@ impl VirtualBoard {
     /// Board like [`new`](Self::new)'s, with another `readout` than the world's.
     ///
     /// # Errors
-    /// [`BadValue`] for a sensor of other than 8 × 18 wires.
+    /// [`BadValue`] for a sensor of more than 8 × 18 wires.
     pub fn with_readout(world: &World, readout: &Readout) -> Result<Self, BadValue> {
         let sensor = &world.sensor;
-        if (sensor.row_wires, sensor.column_wires) != (ROWS, COLUMNS) {
+        if sensor.row_wires > ROWS || sensor.column_wires > COLUMNS {
             let wires =
                 format!("{} row-wires and {} column-wires", sensor.row_wires, sensor.column_wires);
             let rule = format!(
-                "the virtual board has {ROWS} and {COLUMNS}; set sensor.row_wires and \
-                 sensor.column_wires to these"
+                "the virtual board has parts for {ROWS} and {COLUMNS}; set sensor.row_wires and \
+                 sensor.column_wires to at most these"
             );
             return Err(BadValue::new("sensor", wires, rule));
         }
@@ -109,17 +115,34 @@ impl VirtualBoard {
             violations: Vec::new(),
             transactions: Transactions::default(),
         };
-        Ok(Self { board: Rc::new(RefCell::new(board)), readout: Rc::new(readout.clone()) })
+        Ok(Self {
+            board: Rc::new(RefCell::new(board)),
+            readout: Rc::new(readout.clone()),
+            rows: world.read_rows.iter().copied().map(RowWire).collect(),
+            columns: sensor.column_wires,
+            sensor_rows: sensor.row_wires,
+        })
+    }
+
+    /// Wires that a scan reads: the world's rows, and all columns of its sensor.
+    #[must_use]
+    pub fn wires(&self) -> Selection<'_> {
+        Selection { rows: &self.rows, columns: self.columns }
     }
 
     /// Connects a sensor with the given row–column resistances in Ω, row after row; infinite is open.
     /// All voltages settle at once.
     ///
     /// # Panics
-    /// If there are not 144 resistances, or one is negative or NaN.
+    /// If there is not one resistance for each of the sensor's row-wires and column-wires, or one is negative or NaN.
     pub fn set_readings(&self, ohm: &[f64]) {
+        assert_eq!(ohm.len(), self.sensor_rows * self.columns, "a reading of each two wires");
         let board = &mut *self.board.borrow_mut();
-        board.analogue.set_readings(ohm);
+        let mut all = vec![f64::INFINITY; ROWS * COLUMNS];
+        for (to, from) in all.chunks_mut(COLUMNS).zip(ohm.chunks(self.columns)) {
+            to[..self.columns].copy_from_slice(from);
+        }
+        board.analogue.set_readings(&all);
         board.before_v = board.analogue.outputs_v(board.rows.active());
         board.frame += 1;
         board.noise = noise_of_frame(board.seed, board.frame);
@@ -131,6 +154,10 @@ impl VirtualBoard {
         let board = self.board.borrow();
         let settling_us = self.readout.settling_us.unwrap_or(board.needed_settling_us());
         ScanSettings { settling_us, oversampling: self.readout.oversampling.unwrap_or(1) }.clamped()
+    }
+
+    pub(super) fn sensor_rows(&self) -> usize {
+        self.sensor_rows
     }
 
     pub(super) fn readout(&self) -> &Readout {

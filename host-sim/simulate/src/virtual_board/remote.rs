@@ -4,7 +4,6 @@ use std::io::{ErrorKind, Read, Write};
 
 use remote_readout::Asked;
 
-use super::ROWS;
 use super::board::VirtualBoard;
 use super::pin::Pin;
 use crate::error::{Error, Result};
@@ -14,7 +13,7 @@ const NOBODY: u8 = 0xFF;
 
 impl VirtualBoard {
     /// Carries out the requests from the other end of `line` until it closes the line. Calls `scanned`
-    /// when the last row is released, which ends every scan.
+    /// when the last row that the world reads is released, which ends every scan.
     ///
     /// A request that a part refuses is answered by ones, like a line that nobody drives.
     ///
@@ -56,7 +55,8 @@ impl VirtualBoard {
                 let before = self.active_row();
                 // A refusal is recorded by the board.
                 let _ = self.set_pin(pin, high);
-                if before == Some(ROWS - 1) && self.active_row().is_none() {
+                let last = self.wires().rows.last().map(|row| row.0);
+                if before.is_some() && before == last && self.active_row().is_none() {
                     scanned();
                 }
             }

@@ -3,15 +3,13 @@
 use taxel_data::random::Stream;
 use taxel_data::table::Table;
 
-use super::WIRES;
 use super::board::VirtualBoard;
 use super::scanner::SeriesResistance;
 use crate::error::Result;
 use crate::synth::Synthesis;
 use crate::world::World;
 
-/// Ideal readings in Ω of all row-wires (`frames × 144`), whichever the world reads: the input of a
-/// board.
+/// Ideal readings in Ω of all row-wires of the sensor, whichever the world reads: the input of a board.
 #[must_use]
 pub fn all_readings(world: &World, frames: usize) -> Table {
     Synthesis::of(world).ideal().all_rows().frames(Stream::Test, frames).inputs
@@ -19,31 +17,25 @@ pub fn all_readings(world: &World, frames: usize) -> Table {
 
 /// Scans every line of `readings` (Ω, all row-wires) by the firmware's scanner on `board`.
 ///
-/// Returns the readings in Ω as the scanner computes them, one line a scan.
+/// Returns the readings in Ω of the rows that the board's world reads, as the scanner computes them, one line a scan.
 ///
 /// # Errors
 /// [`Error::Board`](crate::Error::Board) if the board refused a transaction.
 pub fn scan(board: &VirtualBoard, series: SeriesResistance, readings: &Table) -> Result<Table> {
     let mut scanner = board.scanner(series);
-    let settings = board.scan_settings();
-    let mut frame = vec![f32::NAN; WIRES.readings()];
-    let mut values = Vec::with_capacity(readings.values.len());
+    let (settings, wires) = (board.scan_settings(), board.wires());
+    let names = wires.rows.iter().flat_map(|row| {
+        let first = row.0 * wires.columns;
+        readings.names[first..first + wires.columns].iter().cloned()
+    });
+    let names: Vec<String> = names.collect();
+    let mut frame = vec![f32::NAN; names.len()];
+    let mut values = Vec::with_capacity(readings.len() * frame.len());
     for line in readings.lines() {
         board.set_readings(line);
-        scanner.scan(settings, WIRES, &mut frame);
+        scanner.scan(settings, wires, &mut frame);
         values.extend(frame.iter().map(|ohm| f64::from(*ohm)));
     }
     board.check()?;
-    Ok(Table { names: readings.names.clone(), values })
-}
-
-/// Columns of `readings` of the row-wires that `world` reads: the inputs of its models.
-#[must_use]
-pub fn rows_read(world: &World, readings: &Table) -> Table {
-    let columns = world.sensor.column_wires;
-    let rows = |line: &[f64]| -> Vec<f64> {
-        let row = |row: &usize| line[row * columns..(row + 1) * columns].to_vec();
-        world.read_rows.iter().flat_map(row).collect()
-    };
-    Table { names: world.reading_names(), values: readings.lines().flat_map(rows).collect() }
+    Ok(Table { names, values })
 }

@@ -56,7 +56,13 @@ impl VirtualBoard {
             }
             readout::Circuit::ZeroPotential => {
                 let typical = ZeroPotential::TYPICAL;
-                self.with_circuit(ZeroPotential { row_source_ohm, series_ohm, ..typical })
+                let sensor_rows = self.sensor_rows() as u16;
+                self.with_circuit(ZeroPotential {
+                    sensor_rows,
+                    row_source_ohm,
+                    series_ohm,
+                    ..typical
+                })
             }
         }
     }

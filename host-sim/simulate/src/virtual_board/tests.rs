@@ -5,6 +5,7 @@ use firmware::timing::ScanPlan;
 
 use super::*;
 use crate::readout::{Circuit, Drive, Readout, Sampler};
+use crate::sensor::Sensor;
 use crate::world::World;
 
 fn board(readout: Readout) -> VirtualBoard {
@@ -18,8 +19,9 @@ fn ohm() -> Vec<f64> {
 
 fn scan(board: &VirtualBoard, ohm: &[f64], settings: ScanSettings) -> (Vec<f64>, ScanReport) {
     board.set_readings(ohm);
-    let mut frame = [f32::NAN; ROWS * COLUMNS];
-    let report = board.scanner(board.series_resistance()).scan(settings, WIRES, &mut frame);
+    let mut frame = vec![f32::NAN; board.wires().rows.len() * board.wires().columns];
+    let mut scanner = board.scanner(board.series_resistance());
+    let report = scanner.scan(settings, board.wires(), &mut frame);
     (frame.iter().map(|ohm| f64::from(*ohm)).collect(), report)
 }
 
@@ -302,4 +304,27 @@ fn a_sensor_of_other_sizes_is_refused() {
     let refused = VirtualBoard::new(&world).unwrap_err();
     assert_eq!(refused.field, "sensor");
     assert!(refused.to_string().contains("8 row-wires and 9 column-wires"), "{refused}");
+}
+
+#[test]
+fn a_smaller_sensor_and_some_of_its_rows_are_read_alone() {
+    let world = World {
+        sensor: Sensor { row_wires: 4, column_wires: 5, ..World::press().sensor },
+        ..World::press()
+    };
+    let ohm: Vec<f64> = (0..20).map(|i| 45.0 + f64::from(i)).collect();
+    for (read_rows, first) in [(vec![0, 1, 2, 3], 0), (vec![2], 10), (vec![1, 3], 5)] {
+        let steps = read_rows.len() + 1;
+        let leads = Readout { line_ohm: Some(0.1), cross_talk: Some(true), ..Readout::default() };
+        let world = World { read_rows, readout: leads, ..world.clone() };
+        let board = VirtualBoard::new(&world).unwrap();
+        let (readings, report) = scan(&board, &ohm, board.scan_settings());
+        board.check().unwrap();
+        assert_eq!((report.failed_samples, board.transactions().transfers), (0, steps * 5));
+        assert_eq!(readings.len(), (steps - 1) * 5);
+        assert!((readings[0] / ohm[first] - 1.0).abs() < 1e-3, "{readings:?}");
+    }
+    let wide = Sensor { row_wires: 9, ..World::press().sensor };
+    let refused = VirtualBoard::new(&World { sensor: wide, ..World::press() }).unwrap_err();
+    assert!(refused.to_string().contains("parts for 8 and 18"), "{refused}");
 }
