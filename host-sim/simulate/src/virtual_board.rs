@@ -41,7 +41,7 @@ mod tests;
 pub use board::{Transactions, VirtualBoard};
 pub use handles::{VirtualAdc, VirtualDelay, VirtualPin, VirtualSpi};
 pub use pin::Pin;
-pub use scan::{all_readings, rows_read, scan};
+pub use scan::{all_readings, rows_read, scan, untouched_readings};
 pub use scanner::{FrameScanner, SeriesResistance};
 
 /// Row-wires of the virtual board: those of the paper's sensor.

@@ -15,7 +15,7 @@ use taxel_learn::ModelBlob;
 use taxel_rig::device::check::check;
 use taxel_rig::device::{Device, DeviceIdentity, Wire, serial, upload};
 
-use super::check_arguments::{CheckArguments, conclude, memory_lines};
+use super::check_arguments::{CheckArguments, conclude, memory_lines, refuse_relative_inputs};
 use super::{Common, print};
 
 /// Talk to a device on a serial port: identify, upload, record.
@@ -133,6 +133,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         }
         Action::Upload(action) => {
             let model = ModelBlob::read(&action.model)?;
+            refuse_relative_inputs(&model)?;
             let mut device = open()?;
             let progress = Terminal::new();
             device.while_paused(|device| upload::replace(device, model.bytes(), &progress))?;
