@@ -47,11 +47,11 @@ struct Summary {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+    let baseline = arguments.baseline.baseline.as_ref().unwrap_or(&arguments.readings);
+    output::check_writable(&arguments.output, &[&arguments.model, &arguments.readings, baseline])?;
     let blob = ModelBlob::read(&arguments.model)?;
     let model = arguments.baseline.apply(blob.prepare(arguments.exponential), &arguments.model)?;
     let file = CsvFile::read(&arguments.readings)?;
-    let baseline = arguments.baseline.baseline.as_ref().unwrap_or(&arguments.readings);
-    output::check_writable(&arguments.output, &[&arguments.model, &arguments.readings, baseline])?;
     let readings = model_inputs(&model, &file)?;
     remark_on_range(&model, &readings);
     let estimate = model.decode_table(&readings);
