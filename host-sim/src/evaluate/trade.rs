@@ -234,9 +234,10 @@ pub fn compute(
         let training = experiment.dataset(&frames, Stream::Training, t.frames);
         let test = experiment.dataset(&frames, Stream::Test, t.test_frames);
         // The gate compares readings in Ω.
-        let readings_ohm = match t.relative_inputs {
-            true => Cow::Owned(frames.frames(Stream::Test, t.test_frames).inputs),
-            false => Cow::Borrowed(&test.inputs),
+        let readings_ohm = if t.relative_inputs {
+            Cow::Owned(frames.frames(Stream::Test, t.test_frames).inputs)
+        } else {
+            Cow::Borrowed(&test.inputs)
         };
         if baselines.is_empty() {
             let judged = |baseline: &Baseline| {

@@ -3,12 +3,15 @@
 use crate::common::{Folder, small_scene};
 use host_sim::evaluate::drift::{self, Line};
 use host_sim::evaluate::gate::{self, GateResult, Settings};
+use host_sim::evaluate::readout::{self, Stage};
 use host_sim::evaluate::trade::{self, Plan};
 use host_sim::experiment::Experiment;
 use host_sim::metrics::Errors;
 use taxel_data::progress::Silent;
 use taxel_learn::Exponential;
 use taxel_learn::decoders::linear;
+use taxel_simulate::drift::Drift;
+use taxel_simulate::readout::Circuit;
 
 const NETWORK: &str = "network";
 
@@ -82,7 +85,7 @@ fn a_gate_and_a_trade_see_readings_and_baselines_of_the_same_session() {
         Plan { centres: vec![16], samples_averaged: vec![1], gate_k: vec![3.5], clock_mhz: 168.0 };
     let trade = |scene: &Experiment| trade::compute(scene, &plan, "dz_mm", &Silent).unwrap();
     let still = trade(&scene);
-    scene.world.drift = Some(taxel_simulate::drift::Drift { gain: 0.02 });
+    scene.world.drift = Some(Drift { gain: 0.02 });
     let drifting = trade(&scene);
     assert!(still.points.iter().any(|point| point.gate_k.is_some()));
     for (a, b) in still.points.iter().zip(&drifting.points) {
@@ -92,10 +95,28 @@ fn a_gate_and_a_trade_see_readings_and_baselines_of_the_same_session() {
 }
 
 #[test]
+fn a_baseline_that_was_scanned_with_the_same_series_resistance_cancels_it() {
+    let at = |relative_inputs: bool| {
+        let mut scene = small();
+        scene.training.relative_inputs = relative_inputs;
+        // The readout does not drift.
+        scene.world.drift = Some(Drift { gain: if relative_inputs { 0.05 } else { 0.0 } });
+        let blob = scene.train(&Silent).unwrap();
+        let result = readout::measure(&scene, &blob.prepare(Exponential::default()), 20).unwrap();
+        let line = result.line(Circuit::ZeroPotential, Stage::Series).unwrap();
+        assert!(line.readings.rms_percent > 10.0);
+        z(&line.errors) / z(&result.ideal_errors)
+    };
+    let (readings, relative) = (at(false), at(true));
+    println!("z RMSE relative to ideal readings: {readings:.2} and {relative:.2}");
+    assert!(readings > 3.0 && (0.8..1.25).contains(&relative));
+}
+
+#[test]
 fn a_run_with_relative_inputs_says_so_and_shows_readings_in_ohms() {
     let mut scene = small();
     scene.training.relative_inputs = true;
-    scene.world.drift = Some(taxel_simulate::drift::Drift { gain: 0.02 });
+    scene.world.drift = Some(Drift { gain: 0.02 });
     let (result, blob) = host_sim::run::run(&scene, &Silent).unwrap();
     assert!(blob.parse().metadata().relative_inputs && result.model.relative_inputs);
     assert_eq!(result.scene.gain_drift, 0.02);
