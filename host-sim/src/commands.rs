@@ -5,6 +5,7 @@ mod progress;
 mod arguments;
 mod scene_argument;
 mod check_arguments;
+mod readings;
 
 pub mod run;
 pub mod synth;
@@ -17,6 +18,7 @@ pub mod table1;
 pub mod trade;
 pub mod readout;
 pub mod gate;
+pub mod drift;
 pub mod emulate;
 pub mod link;
 

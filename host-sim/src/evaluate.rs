@@ -3,6 +3,7 @@
 pub mod cost;
 pub mod ram;
 pub mod gate;
+pub mod drift;
 pub mod readout;
 pub mod table1;
 pub mod trade;

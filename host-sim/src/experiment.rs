@@ -9,15 +9,17 @@ use model_core::blob::NoiseKind as BlobNoiseKind;
 use model_core::rbf::Format;
 use serde::Deserialize;
 use taxel_data::BadValue;
+use taxel_data::dataset::Dataset;
 use taxel_data::digest::digest;
 use taxel_data::error::require;
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
 use taxel_learn::train::{check_spread, train};
-use taxel_learn::{ModelBlob, Options, Origin, pack};
+use taxel_learn::{ModelBlob, Options, Origin, pack, relative};
 use taxel_simulate::noise::NoiseKind;
+use taxel_simulate::synth::BASELINE_FRAMES;
 use taxel_simulate::world::check_noise_level;
-use taxel_simulate::{World, synthesise};
+use taxel_simulate::{Synthesis, World};
 
 use crate::error::{Error, Result};
 use crate::metrics::Measure;
@@ -67,6 +69,9 @@ pub struct Training {
     /// Whether one network serves all rows, behind a projection of all readings, instead of one a row.
     #[serde(default)]
     pub whole_array: bool,
+    /// Whether inputs are readings relative to the baseline (R/R₀), and not readings as they are.
+    #[serde(default)]
+    pub relative_inputs: bool,
 }
 
 /// Settings of the paper's Table 1.
@@ -171,12 +176,26 @@ impl Experiment {
         }
     }
 
+    /// Data set of so many `frames` of `stream`, for training and for decoders that see what it saw.
+    ///
+    /// Its inputs are readings, or readings relative to the baseline of each session: the mean of
+    /// [`BASELINE_FRAMES`] frames of the untouched sensor. `synthesis` is one of the experiment's world.
+    #[must_use]
+    pub fn dataset(&self, synthesis: &Synthesis<'_>, stream: Stream, frames: usize) -> Dataset {
+        let readings = synthesis.frames(stream, frames);
+        if !self.training.relative_inputs {
+            return readings;
+        }
+        relative::dataset(readings, &synthesis.baselines(stream, frames, BASELINE_FRAMES))
+    }
+
     /// Trains the model that the scene describes, like the command `train`.
     ///
     /// # Errors
     /// [`Error`] for training options that cannot be used, or a model that cannot be packed.
     pub fn train(&self, progress: &dyn Progress) -> Result<ModelBlob> {
-        let frames = synthesise(&self.world, Stream::Training, self.training.frames);
+        let synthesis = Synthesis::of(&self.world);
+        let frames = self.dataset(&synthesis, Stream::Training, self.training.frames);
         let trained = train(&frames, &self.options(), progress)?;
         Ok(pack(&trained, &frames, &self.origin())?)
     }

@@ -8,8 +8,8 @@ use host_sim::{Error, Result};
 mod commands;
 
 use commands::{
-    Common, decode, emulate, eval, forward, gate, inspect, link, readout, run, synth, table1,
-    trade, train,
+    Common, decode, drift, emulate, eval, forward, gate, inspect, link, readout, run, synth,
+    table1, trade, train,
 };
 
 /// Simulate, train and evaluate resistive tactile sensors; write weight blobs for the device.
@@ -38,6 +38,7 @@ enum Command {
     Trade(trade::Arguments),
     Readout(readout::Arguments),
     Gate(gate::Arguments),
+    Drift(drift::Arguments),
     Emulate(emulate::Arguments),
     Link(link::Arguments),
 }
@@ -57,6 +58,7 @@ fn main() -> ExitCode {
         Command::Trade(arguments) => trade::execute(&arguments, &cli.common),
         Command::Readout(arguments) => readout::execute(&arguments, &cli.common),
         Command::Gate(arguments) => gate::execute(&arguments, &cli.common),
+        Command::Drift(arguments) => drift::execute(&arguments, &cli.common),
         Command::Emulate(arguments) => emulate::execute(&arguments, &cli.common),
         Command::Link(arguments) => link::execute(&arguments, &cli.common),
     };

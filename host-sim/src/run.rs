@@ -9,7 +9,7 @@ use taxel_data::table::Table;
 use taxel_learn::decoders::BASELINES;
 use taxel_learn::train::train;
 use taxel_learn::{Decoder, Exponential, ModelBlob, PreparedModel, pack};
-use taxel_simulate::{Synthesis, World, synthesise};
+use taxel_simulate::{Synthesis, World};
 
 use crate::error::Result;
 use crate::evaluate::table1::{self, Table1};
@@ -46,6 +46,8 @@ pub struct SceneSummary {
     pub noise_kind: String,
     /// Noise level p, as a fraction.
     pub noise_level: f64,
+    /// Largest relative change of a drifting gain; 0 without drift.
+    pub gain_drift: f64,
     /// Extent of the sensor in mm.
     pub size_mm: [f64; 3],
     /// Number of row-wires of the sensor, read or not.
@@ -65,6 +67,8 @@ pub struct ModelSummary {
     pub inputs: usize,
     /// Number of readings that are projected to these features; 0 without a projection.
     pub projected_readings: usize,
+    /// Whether inputs are readings relative to the baseline.
+    pub relative_inputs: bool,
     /// Number of centres of each network (the largest).
     pub centres: usize,
     /// Number of outputs of each network.
@@ -127,14 +131,15 @@ pub struct ExampleOutput {
 pub fn run(experiment: &Experiment, progress: &dyn Progress) -> Result<(RunResult, ModelBlob)> {
     let (world, t) = (&experiment.world, &experiment.training);
     progress.stage("synthesise", 2);
-    let training = synthesise(world, Stream::Training, t.frames);
+    let synthesis = Synthesis::of(world);
+    let training = experiment.dataset(&synthesis, Stream::Training, t.frames);
     progress.step();
-    let test = synthesise(world, Stream::Test, t.test_frames);
+    let test = experiment.dataset(&synthesis, Stream::Test, t.test_frames);
     progress.step();
 
     let trained = train(&training, &experiment.options(), progress)?;
     let blob = pack(&trained, &training, &experiment.origin())?;
-    let network = blob.prepare(Exponential::default());
+    let network = blob.prepare(Exponential::default()).of_inputs();
 
     progress.stage("decode and evaluate", 1);
     let measure = experiment.measure();
@@ -169,6 +174,7 @@ fn scene_summary(experiment: &Experiment) -> SceneSummary {
         seed: world.seed,
         noise_kind: world.noise.kind.name().into(),
         noise_level: world.noise.level,
+        gain_drift: world.drift.map_or(0.0, |drift| drift.gain),
         size_mm: world.sensor.size_mm,
         row_wires: world.sensor.row_wires,
     }
@@ -187,6 +193,7 @@ fn model_summary(
         networks: model.networks().count(),
         inputs: shape.inputs,
         projected_readings: model.projection().map_or(0, |_| shape.rows * shape.inputs),
+        relative_inputs: model.metadata().relative_inputs,
         centres: model.networks().map(|n| n.shape().centres).max().unwrap_or(0),
         outputs: model.networks().next().map_or(0, |n| n.shape().outputs),
         spread: t.spread,
@@ -228,8 +235,9 @@ fn example(world: &World, test: &Dataset, estimate: &Table) -> Example {
         truth: members.iter().map(|column| truth[*column]).collect(),
         estimate: members.iter().map(|column| decoded[*column]).collect(),
     });
-    let ideal = Synthesis::of(world).ideal().readings_of(Stream::Test, frame);
-    let noisy = test.inputs.lines().nth(frame).unwrap_or_default();
+    let synthesis = Synthesis::of(world);
+    let noisy = synthesis.readings_of(Stream::Test, frame);
+    let ideal = synthesis.ideal().readings_of(Stream::Test, frame);
     let column_wires = world.sensor.column_wires;
     let of_row =
         |line: &[f64], row: usize| line[row * column_wires..(row + 1) * column_wires].to_vec();
@@ -252,6 +260,6 @@ fn example(world: &World, test: &Dataset, estimate: &Table) -> Example {
         outputs: outputs.collect(),
         reading_row_wire: world.read_rows[row] + 1,
         ideal_ohm: of_row(&ideal, row),
-        noisy_ohm: of_row(noisy, row),
+        noisy_ohm: of_row(&noisy, row),
     }
 }

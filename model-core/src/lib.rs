@@ -1,7 +1,7 @@
 //! Inference for resistive tactile sensors: from row–column resistances to deformation.
 //!
-//! Readings travel one way: frame (Ω, a slice) → [`health`] → [`gate`] → ([`projection`] →) [`scale`] → [`rbf`]
-//! (and its affine tail) → [`Estimate`]. The network's weights are read where the [`blob`] lies, in flash or in a
+//! Readings travel one way: frame (Ω, a slice) → [`health`] → [`gate`] → ([`relative`] →) ([`projection`] →)
+//! [`scale`] → [`rbf`] (and its affine tail) → [`Estimate`]. The network's weights are read where the [`blob`] lies, in flash or in a
 //! file's buffer: nothing is copied, nothing is allocated, and no release code path of [`Decoder`] panics.
 //! [`rls`] is for a device that trains its output weights sample by sample; no firmware does so yet.
 //!
@@ -23,6 +23,7 @@ compile_error!("the weight blob holds little-endian floats that are borrowed in 
 
 pub mod exp;
 pub mod scale;
+pub mod relative;
 pub mod checksum;
 pub mod rls;
 mod cortex_m4;

@@ -42,6 +42,7 @@ fn metadata() -> Metadata<'static> {
         seed: 7,
         training_frames: 1000,
         thickness_mm: 5.0,
+        relative_inputs: false,
         input_names: Columns("r1c1_ohm\nr1c2_ohm\nr2c1_ohm\nr2c2_ohm"),
         input_units: Columns("Ω\nΩ\nΩ\nΩ"),
         output_names: Columns("r1e1_dz_mm\nr2e1_dz_mm"),
@@ -95,6 +96,24 @@ fn decoding_gives_back_what_was_encoded() {
     assert_eq!(*model.metadata(), metadata());
     assert_eq!(model.networks().collect::<Vec<_>>(), [network()]);
     assert_eq!((model.network_of_row(1), model.network_of_row(2)), (Some(0), None));
+}
+
+/// One byte tells that inputs are relative; all other bytes keep their values.
+#[test]
+fn relative_inputs_are_a_section_of_one_byte_before_all_others() {
+    let (mut plain, mut relative) = (Aligned([0; 512]), Aligned([0; 512]));
+    let networks = [network()];
+    let metadata = Metadata { relative_inputs: true, ..metadata() };
+    let parts =
+        ModelParts { projection: None, networks: &networks, row_network: &[0, 0], metadata };
+    let blob = encode(&parts, &mut relative.0).unwrap();
+    let model = Model::decode(blob).unwrap();
+    assert_eq!(*model.metadata(), metadata);
+    assert_eq!(model.networks().collect::<Vec<_>>(), [network()]);
+    // The metadata end at 130. The padding of the floats, which begin at 140, is a byte shorter.
+    let plain = small_model(&mut plain.0);
+    assert_eq!((blob.len(), blob[130], blob[136]), (plain.len(), 5, 2));
+    assert_eq!((&blob[131..136], &blob[139..176]), (&plain[130..135], &plain[139..176]));
 }
 
 #[test]

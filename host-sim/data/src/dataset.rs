@@ -25,6 +25,8 @@ pub struct Dataset {
     pub rows: usize,
     /// Whether inputs share the largest span of any when they are scaled: see [`RowTable::common_span`].
     pub common_span: bool,
+    /// Whether inputs are readings relative to the baseline (R/R₀), without a unit, and not readings as they are.
+    pub relative_inputs: bool,
 }
 
 impl Dataset {
@@ -37,7 +39,8 @@ impl Dataset {
         frames: usize,
     ) -> Self {
         let table = |names: Vec<String>| Table { values: vec![0.0; names.len() * frames], names };
-        Self { inputs: table(input_names), outputs: table(output_names), rows, common_span: false }
+        let (inputs, outputs) = (table(input_names), table(output_names));
+        Self { inputs, outputs, rows, common_span: false, relative_inputs: false }
     }
 
     /// Number of frames in the set.
@@ -105,7 +108,7 @@ impl Dataset {
             values: kept.iter().flat_map(|l| columns.iter().map(|c| file.value(*l, *c))).collect(),
         };
         let (inputs, outputs) = (take(&input_columns), take(&output_columns));
-        let dataset = Self { inputs, outputs, rows, common_span: false };
+        let dataset = Self { inputs, outputs, rows, common_span: false, relative_inputs: false };
         Ok((dataset, Kept { lines: kept, of: file.lines() }))
     }
 

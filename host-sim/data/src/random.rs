@@ -35,6 +35,10 @@ pub enum Purpose {
     AdcNoise = 7,
     /// Damage that a device must survive.
     Damage = 8,
+    /// Drift of the gain in one session.
+    Drift = 9,
+    /// Noise that is left in the baseline of one session.
+    Baseline = 10,
 }
 
 /// Set of frames that draws are for. Training and test frames are independent.

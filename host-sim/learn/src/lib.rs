@@ -25,6 +25,7 @@
 pub mod error;
 pub mod decoder;
 pub mod infer;
+pub mod relative;
 pub mod train;
 pub mod packing;
 pub mod prepared;

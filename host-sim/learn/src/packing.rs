@@ -66,7 +66,12 @@ pub fn pack(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<Mod
         values.iter().flat_map(|value| (*value as f32).to_le_bytes()).collect()
     };
     let (input_names, output_names) = (lines(&dataset.inputs.names), lines(&dataset.outputs.names));
-    let (input_units, output_units) = (units(&dataset.inputs.names), units(&dataset.outputs.names));
+    let output_units = units(&dataset.outputs.names);
+    let input_units = if dataset.relative_inputs {
+        "\n".repeat(dataset.inputs.names.len() - 1)
+    } else {
+        units(&dataset.inputs.names)
+    };
     let training_rmse = floats(&match projection {
         Some(it) => training_rmse(&views, &train::projection::apply(it, dataset)),
         None => training_rmse(&views, dataset),
@@ -84,6 +89,7 @@ pub fn pack(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<Mod
             seed: origin.seed,
             training_frames: u32::try_from(dataset.frames()).unwrap_or(u32::MAX),
             thickness_mm: origin.thickness_mm.map_or(0.0, |h| h as f32),
+            relative_inputs: dataset.relative_inputs,
             input_names: Columns(&input_names),
             input_units: Columns(&input_units),
             output_names: Columns(&output_names),

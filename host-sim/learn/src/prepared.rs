@@ -1,6 +1,7 @@
 //! Models laid out once for decoding frames and tables of any shape, bit for bit as a device does.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use model_core::blob::Model;
 use model_core::rbf::Network;
@@ -10,20 +11,26 @@ use taxel_data::table::Table;
 use crate::decoder::{Estimates, FrameDecoder};
 use crate::infer::{Exponential, Prepared, is_missing};
 use crate::packing::ModelBlob;
+use crate::relative::{ratios, reciprocals};
 use crate::train::projection;
 
-/// Model that was parsed and laid out, ready to decode.
-#[derive(Debug)]
+/// Model that was parsed and laid out, ready to decode. Clones share what was laid out.
+///
+/// A model whose inputs are relative (R/R₀) takes readings once it has a [baseline](Self::with_baseline). Before,
+/// every reading counts as missing.
+#[derive(Debug, Clone)]
 pub struct PreparedModel<'b> {
     model: Model<'b>,
     /// Network of each row-wire, or the one network behind a projection.
-    networks: Prepared<'b>,
+    networks: Arc<Prepared<'b>>,
     output_names: Vec<String>,
+    /// One over the baseline of each reading; `None` for a model that takes what it is given.
+    reciprocals: Option<Vec<f32>>,
 }
 
 impl ModelBlob {
     /// Prepares the model for decoding with `exponential`; [`Exponential::default`] is that of the
-    /// devices.
+    /// devices. A model with relative inputs then needs a [baseline](PreparedModel::with_baseline).
     ///
     /// # Panics
     /// Never: every row of a model that was checked has a network.
@@ -37,7 +44,13 @@ impl ModelBlob {
             None => (0..model.shape().rows).map(of_row).collect(),
         };
         let output_names = model.metadata().output_names.iter().map(String::from).collect();
-        PreparedModel { networks: Prepared::new(&in_turn, exponential), output_names, model }
+        let readings = model.shape().rows * model.shape().inputs;
+        PreparedModel {
+            networks: Arc::new(Prepared::new(&in_turn, exponential)),
+            output_names,
+            reciprocals: model.metadata().relative_inputs.then(|| vec![f32::NAN; readings]),
+            model,
+        }
     }
 }
 
@@ -48,7 +61,43 @@ impl<'b> PreparedModel<'b> {
         &self.model
     }
 
-    /// Decodes a table of readings (`frames × inputs`, in the model's units) to one of outputs (`frames
+    /// Model that decodes readings relative to `baseline`: the mean of each reading of the untouched sensor, in the
+    /// readings' units. It changes nothing in a model that takes readings as they are.
+    ///
+    /// A channel whose baseline is missing (NaN), zero or infinite is missing in every frame.
+    ///
+    /// # Panics
+    /// If the baseline does not have one value for each of the model's readings.
+    #[must_use]
+    pub fn with_baseline(mut self, baseline: &[f64]) -> Self {
+        assert_eq!(baseline.len(), self.inputs(), "the model's readings");
+        if self.model.metadata().relative_inputs {
+            self.reciprocals = Some(reciprocals(baseline));
+        }
+        self
+    }
+
+    /// Model that is given its inputs instead of readings: those of a model with relative inputs are then
+    /// [ratios](crate::relative::inputs). It changes nothing in any other model.
+    #[must_use]
+    pub fn of_inputs(mut self) -> Self {
+        self.reciprocals = None;
+        self
+    }
+
+    /// Inputs of the model for `readings` (`frames × inputs`): the readings, or their ratios to the baseline.
+    #[must_use]
+    pub fn model_inputs<'r>(&self, readings: &'r [f64]) -> Cow<'r, [f64]> {
+        match &self.reciprocals {
+            Some(reciprocals) => {
+                let frames = readings.chunks_exact(reciprocals.len().max(1));
+                Cow::Owned(frames.flat_map(|frame| ratios(frame, reciprocals)).collect())
+            }
+            None => Cow::Borrowed(readings),
+        }
+    }
+
+    /// Decodes a table of readings (`frames × inputs`, in their units) to one of outputs (`frames
     /// × outputs`).
     ///
     /// A missing reading makes the outputs of its row-wire NaN; behind a projection, all outputs of the
@@ -68,18 +117,19 @@ impl<'b> PreparedModel<'b> {
         self.networks.infer(&self.inputs_of_networks(readings))
     }
 
-    /// Inputs of the networks in turn: the readings, or features of them.
+    /// Inputs of the networks in turn: those of the model, or features of them.
     fn inputs_of_networks<'r>(&self, readings: &'r [f64]) -> Cow<'r, [f64]> {
+        let inputs = self.model_inputs(readings);
         match self.model.projection() {
             Some(projection) => {
                 let features = self.model.shape().inputs;
-                Cow::Owned(projection::features(projection, features, self.inputs(), readings))
+                Cow::Owned(projection::features(projection, features, self.inputs(), &inputs))
             }
-            None => Cow::Borrowed(readings),
+            None => inputs,
         }
     }
 
-    /// Share of `readings`, or of their features behind a projection, that inference clamps: those
+    /// Share of the inputs for `readings`, or of their features behind a projection, that inference clamps: those
     /// outside the training range by more than an eighth of it.
     ///
     /// # Panics

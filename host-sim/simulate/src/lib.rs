@@ -20,6 +20,7 @@ pub mod sensor;
 pub mod motion;
 pub mod rubber;
 pub mod noise;
+pub mod drift;
 pub mod outputs;
 pub mod readout;
 pub mod world;

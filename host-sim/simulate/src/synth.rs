@@ -4,10 +4,12 @@ use std::borrow::Cow;
 
 use rayon::prelude::*;
 use taxel_data::dataset::Dataset;
-use taxel_data::random::Stream;
+use taxel_data::random::{Purpose, Stream};
 use taxel_data::simd::LANES;
+use taxel_data::table::Table;
 
-use crate::motion;
+use crate::drift::Drift;
+use crate::motion::{self, Independent};
 use crate::noise::{Noise, NoiseKind};
 use crate::outputs::Outputs;
 use crate::world::World;
@@ -16,6 +18,8 @@ mod lanes;
 
 use lanes::LaneSynthesis;
 
+/// Number of frames of the untouched sensor whose mean is a baseline, unless a user says otherwise.
+pub const BASELINE_FRAMES: usize = 100;
 /// Number of frames that measure a channel's maximum and minimum over the world, for `span` noise.
 const SPAN_FRAMES: usize = 4096;
 
@@ -24,6 +28,9 @@ const SPAN_FRAMES: usize = 4096;
 pub struct Synthesis<'w> {
     world: &'w World,
     noise: Noise,
+    /// Purpose of the draws of noise.
+    noise_purpose: Purpose,
+    drift: Option<Drift>,
     motion: Cow<'w, motion::Kind>,
     read_rows: Cow<'w, [usize]>,
     outputs: Cow<'w, Outputs>,
@@ -43,10 +50,18 @@ impl<'w> Synthesis<'w> {
         Self {
             world,
             noise: world.noise,
+            noise_purpose: Purpose::Noise,
+            drift: world.drift,
             motion: Cow::Borrowed(&world.motion),
             read_rows: Cow::Borrowed(&world.read_rows),
             outputs: Cow::Borrowed(&world.outputs),
         }
+    }
+
+    /// World whose frames are synthesised.
+    #[must_use]
+    pub fn world(&self) -> &'w World {
+        self.world
     }
 
     /// Replaces the noise level, a fraction (0.005 is 0.5 %).
@@ -62,10 +77,17 @@ impl<'w> Synthesis<'w> {
         self.noise_level(0.0)
     }
 
-    /// Replaces the motion of the electrodes.
+    /// Replaces the drift of the gain; `None` for no drift.
     #[must_use]
-    pub fn motion(mut self, motion: impl Into<motion::Kind>) -> Self {
-        self.motion = Cow::Owned(motion.into());
+    pub fn drift(mut self, drift: Option<Drift>) -> Self {
+        self.drift = drift;
+        self
+    }
+
+    /// Leaves the sensor untouched: nothing moves.
+    #[must_use]
+    pub fn untouched(mut self) -> Self {
+        self.motion = Cow::Owned(Independent::default().into());
         self
     }
 
@@ -110,6 +132,27 @@ impl<'w> Synthesis<'w> {
         dataset
     }
 
+    /// Synthesises the baseline of the session that each of the first `frames` of `stream` belongs to: one line a
+    /// frame, in Ω. A session is a trajectory.
+    ///
+    /// A baseline is what a user captures before the session: the mean of so many `averaged` frames of the untouched
+    /// sensor. It has the session's drift, and what averaging leaves of the white noise: the noise level over the
+    /// square root of that number, with draws of its own.
+    #[must_use]
+    pub fn baselines(&self, stream: Stream, frames: usize, averaged: usize) -> Table {
+        let steps = self.motion.steps();
+        let mut at_rest = self.clone().untouched();
+        at_rest.noise.level /= (averaged as f64).sqrt();
+        at_rest.noise_purpose = Purpose::Baseline;
+        let sessions = at_rest.frames(stream, frames.div_ceil(steps)).inputs;
+        if steps == 1 {
+            return sessions;
+        }
+        let of_frame = |frame: usize| sessions.lines().nth(frame / steps).unwrap_or_default();
+        let values = (0..frames).flat_map(|frame| of_frame(frame).iter().copied()).collect();
+        Table { names: sessions.names, values }
+    }
+
     /// Synthesises the readings in Ω of one `frame` of `stream`, for motions whose trajectories have one
     /// step.
     #[must_use]
@@ -127,7 +170,9 @@ impl<'w> Synthesis<'w> {
         if self.noise.kind == NoiseKind::Relative || self.noise.level == 0.0 {
             return Vec::new();
         }
-        let ideal = self.clone().ideal().frames(Stream::Span, SPAN_FRAMES);
+        let motion = Cow::Borrowed(&self.world.motion);
+        let moved = Self { motion, drift: None, ..self.clone() };
+        let ideal = moved.ideal().frames(Stream::Span, SPAN_FRAMES);
         ideal.inputs.ranges().into_iter().map(|[low, high]| high - low).collect()
     }
 }

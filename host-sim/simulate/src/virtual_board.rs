@@ -40,7 +40,7 @@ mod tests;
 pub use board::{Transactions, VirtualBoard};
 pub use handles::{VirtualAdc, VirtualDelay, VirtualPin, VirtualSpi};
 pub use pin::Pin;
-pub use scan::{all_readings, scan};
+pub use scan::{all_readings, scan, untouched_readings};
 pub use scanner::{FrameScanner, SeriesResistance};
 
 /// Row-wires that the board's parts can drive.

@@ -4,6 +4,7 @@ use firmware::readout::ScanSettings;
 use taxel_data::BadValue;
 use taxel_data::error::require;
 
+use crate::drift::Drift;
 use crate::motion::{self, Independent, Press};
 use crate::noise::{Noise, NoiseKind};
 use crate::outputs::Outputs;
@@ -31,6 +32,8 @@ pub struct World {
     pub rubber: rubber::Kind,
     /// Noise on the readings.
     pub noise: Noise,
+    /// Drift of the gain between sessions, if any.
+    pub drift: Option<Drift>,
     /// Row-wires that are read, from 0, ascending.
     pub read_rows: Vec<usize>,
     /// Circuit and parts of the readout.
@@ -51,6 +54,7 @@ impl World {
             motion: motion.into(),
             rubber: rubber::Kind::default(),
             noise: Noise { kind: NoiseKind::Relative, level: 0.005 },
+            drift: None,
             read_rows: (0..sensor.row_wires).collect(),
             readout: Readout::default(),
             outputs: Outputs::all_deformations(),
@@ -124,6 +128,7 @@ impl World {
         sensor(&self.sensor)?;
         motion(self)?;
         check_noise_level("noise.level", self.noise.level)?;
+        self.drift.map_or(Ok(()), |drift| check_gain("drift.gain", drift.gain))?;
         rows(self)?;
         readout(&self.readout)?;
         outputs(&self.outputs)
@@ -153,6 +158,16 @@ impl World {
 pub fn check_noise_level(field: &str, level: f64) -> Check {
     require((0.0..=1.0).contains(&level), field, level, || {
         "it is a fraction from 0 to 1 (0.005 is 0.5 %)".into()
+    })
+}
+
+/// Checks the largest relative change of a drifting gain; `field` names it in the message.
+///
+/// # Errors
+/// [`BadValue`] for a change that is not from 0 to below 1.
+pub fn check_gain(field: &str, gain: f64) -> Check {
+    require((0.0..1.0).contains(&gain), field, gain, || {
+        "it is a fraction from 0 to below 1 (0.02 is ±2 %)".into()
     })
 }
 

@@ -152,6 +152,18 @@ impl CheckArguments {
     }
 }
 
+/// Refuses a model that the firmware would decode without the baseline that its inputs are relative to.
+pub fn refuse_relative_inputs(blob: &ModelBlob) -> Result<()> {
+    if blob.parse().metadata().relative_inputs {
+        return Err(Error::Usage(
+            "the model's inputs are readings relative to the baseline, which the firmware does not compute: train \
+             one without --relative-inputs, or without relative_inputs = true in the scene"
+                .into(),
+        ));
+    }
+    Ok(())
+}
+
 /// Prints the findings. Wrong answers, and more memory than allowed, are a failure.
 pub fn conclude(findings: &Findings, limits: &Limits, common: &Common) -> Result<()> {
     if common.json {

@@ -12,6 +12,7 @@ use taxel_learn::infer::is_missing;
 use taxel_learn::{Exponential, ModelBlob, PreparedModel};
 
 use super::arguments::exponential;
+use super::readings::{BaselineArgument, table_of};
 use super::{Common, print};
 
 /// Decode readings from a CSV file, one line of estimates a line.
@@ -19,7 +20,9 @@ use super::{Common, print};
 /// Where a reading is missing, the outputs of its row-wire are left empty. If one network decodes the whole
 /// array, all outputs of the line are.
 #[derive(Args)]
-#[command(after_help = "Example: host-sim decode press.bin readings.csv -o estimate.csv")]
+#[command(after_help = "Examples:
+  host-sim decode press.bin readings.csv -o estimate.csv
+  host-sim decode relative.bin readings.csv --baseline rest.csv -o estimate.csv")]
 pub struct Arguments {
     /// Weight blob.
     model: PathBuf,
@@ -28,6 +31,8 @@ pub struct Arguments {
     /// CSV file to write, with the model's output columns.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
+    #[command(flatten)]
+    baseline: BaselineArgument,
     /// Exponential of the activations.
     #[arg(long, alias = "kernel", value_parser = exponential(), default_value = "polynomial")]
     exponential: Exponential,
@@ -42,16 +47,19 @@ struct Summary {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+    let baseline = arguments.baseline.baseline.as_ref().unwrap_or(&arguments.readings);
+    output::check_writable(&arguments.output, &[&arguments.model, &arguments.readings, baseline])?;
     let blob = ModelBlob::read(&arguments.model)?;
-    let model = blob.prepare(arguments.exponential);
+    let model = arguments.baseline.apply(blob.prepare(arguments.exponential), &arguments.model)?;
     let file = CsvFile::read(&arguments.readings)?;
-    output::check_writable(&arguments.output, &[&arguments.model, &arguments.readings])?;
     let readings = model_inputs(&model, &file)?;
     remark_on_range(&model, &readings);
     let estimate = model.decode_table(&readings);
     let names = estimate.names.iter().map(String::as_str);
     csv_file::write(&arguments.output, names, estimate.lines().map(|l| l.iter().copied()))?;
-    let incomplete = readings.lines().filter(|line| line.iter().any(|v| is_missing(*v))).count();
+    let inputs = model.model_inputs(&readings.values);
+    let frames = inputs.chunks_exact(readings.names.len());
+    let incomplete = frames.filter(|frame| frame.iter().any(|v| is_missing(*v))).count();
     let summary = Summary {
         frames: estimate.len(),
         frames_with_missing_readings: incomplete,
@@ -92,13 +100,4 @@ pub fn remark_on_range(model: &PreparedModel<'_>, readings: &Table) {
 /// Columns of `file` with the model's readings.
 pub fn model_inputs(model: &PreparedModel<'_>, file: &CsvFile) -> Result<Table> {
     table_of(file, model.model().metadata().input_names.iter())
-}
-
-/// Columns of `file` called `names`.
-pub fn table_of<'n>(file: &CsvFile, names: impl Iterator<Item = &'n str>) -> Result<Table> {
-    let names: Vec<&str> = names.collect();
-    let columns = file.columns(names.iter().copied())?;
-    let lines = 0..file.lines();
-    let values = lines.flat_map(|line| columns.iter().map(move |c| file.value(line, *c)));
-    Ok(Table { values: values.collect(), names: names.into_iter().map(String::from).collect() })
 }

@@ -11,16 +11,21 @@ use taxel_learn::{Exponential, ModelBlob};
 
 use super::arguments::exponential;
 use super::decode::remark_on_range;
+use super::readings::{BaselineArgument, table_of};
 use super::{Common, decode, print};
 
 /// Evaluate a model on a CSV file of readings and true outputs.
 #[derive(Args)]
-#[command(after_help = "Example: host-sim eval press.bin test.csv")]
+#[command(after_help = "Examples:
+  host-sim eval press.bin test.csv
+  host-sim eval relative.bin test.csv --baseline rest.csv")]
 pub struct Arguments {
     /// Weight blob.
     model: PathBuf,
     /// CSV file with the model's reading and output columns.
     data: PathBuf,
+    #[command(flatten)]
+    baseline: BaselineArgument,
     /// Exponential of the activations.
     #[arg(long, alias = "kernel", value_parser = exponential(), default_value = "polynomial")]
     exponential: Exponential,
@@ -41,11 +46,11 @@ struct Summary {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let blob = ModelBlob::read(&arguments.model)?;
-    let model = blob.prepare(arguments.exponential);
+    let model = arguments.baseline.apply(blob.prepare(arguments.exponential), &arguments.model)?;
     let file = CsvFile::read(&arguments.data)?;
     let readings = decode::model_inputs(&model, &file)?;
     let metadata = model.model().metadata();
-    let mut truth = decode::table_of(&file, metadata.output_names.iter())?;
+    let mut truth = table_of(&file, metadata.output_names.iter())?;
     let estimate = model.decode_table(&readings);
     let thickness_mm = f64::from(metadata.thickness_mm);
     let measure = Measure {

@@ -27,6 +27,8 @@ struct Summary {
     rows: usize,
     inputs_per_row: usize,
     outputs_per_row: usize,
+    /// Whether inputs are readings relative to the baseline, R/R₀.
+    relative_inputs: bool,
     /// Features that all readings are projected to, for one network of all rows; 0 without a projection.
     projected_features: usize,
     networks: Vec<NetworkSummary>,
@@ -105,6 +107,7 @@ fn summarise(blob: &ModelBlob) -> Summary {
         rows: shape.rows,
         inputs_per_row: shape.inputs,
         outputs_per_row: shape.outputs,
+        relative_inputs: metadata.relative_inputs,
         projected_features: model.projection().map_or(0, |_| shape.inputs),
         networks: networks.collect(),
         noise_kind: format!("{:?}", metadata.noise_kind).to_lowercase(),
@@ -180,7 +183,9 @@ fn page_of(s: &Summary) -> print::Page {
         .map(|(name, bytes)| format!("{name} {bytes}"))
         .collect();
     line("RAM", format!("{} bytes: {} (weights stay in flash)", ram.bytes(), parts.join(", ")));
-    line("inputs", ends(&s.inputs.iter().map(|c| c.name.as_str()).collect::<Vec<_>>()));
+    let relative = if s.relative_inputs { "; relative to the baseline, R/R₀" } else { "" };
+    let names = ends(&s.inputs.iter().map(|c| c.name.as_str()).collect::<Vec<_>>());
+    line("inputs", format!("{names}{relative}"));
     page.line(format_args!("{:<17} {:>13} {:>11}", "output", "training RMSE", "full scale"));
     for output in s.outputs.iter().take(SHOWN) {
         let OutputSummary { name, unit, training_rmse, full_scale } = output;

@@ -16,7 +16,9 @@ use taxel_learn::ModelBlob;
 use taxel_rig::device::check::check;
 use taxel_rig::device::{Device, DeviceIdentity, Wire, serial, upload};
 
-use super::check_arguments::{CheckArguments, Checked, conclude, memory_lines};
+use super::check_arguments::{
+    CheckArguments, Checked, conclude, memory_lines, refuse_relative_inputs,
+};
 use super::{Common, print};
 
 /// Talk to a device on a serial port: identify, upload, record.
@@ -134,6 +136,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         }
         Action::Upload(action) => {
             let model = ModelBlob::read(&action.model)?;
+            refuse_relative_inputs(&model)?;
             let mut device = open()?;
             let progress = Terminal::new();
             device.while_paused(|device| upload::replace(device, model.bytes(), &progress))?;

@@ -10,7 +10,7 @@ use host_sim::{Error, Result, report};
 use taxel_data::output;
 use taxel_learn::ModelBlob;
 
-use super::scene_argument::{NoiseArgument, SceneArgument};
+use super::scene_argument::{NoiseArgument, RelativeInputsArgument, SceneArgument};
 use super::{Common, print};
 
 const DEFAULT_OUTPUT: &str = "out";
@@ -27,6 +27,8 @@ pub struct Arguments {
     scene: SceneArgument,
     #[command(flatten)]
     noise: NoiseArgument,
+    #[command(flatten)]
+    relative_inputs: RelativeInputsArgument,
     /// Folder that receives a folder named after the scene.
     #[arg(short, long, value_name = "DIR", default_value = DEFAULT_OUTPUT)]
     output: PathBuf,
@@ -37,6 +39,7 @@ impl Default for Arguments {
         Self {
             scene: SceneArgument::default(),
             noise: NoiseArgument::default(),
+            relative_inputs: RelativeInputsArgument::default(),
             output: DEFAULT_OUTPUT.into(),
         }
     }
@@ -45,6 +48,7 @@ impl Default for Arguments {
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let mut scene = arguments.scene.load(common)?;
     arguments.noise.apply(&mut scene)?;
+    arguments.relative_inputs.apply(&mut scene);
     let folder = arguments.output.join(&scene.name);
     output::in_folder(&folder, || run_into(&folder, &scene, arguments.scene.path(), common))
 }
@@ -83,10 +87,14 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
     let mut page = print::Page::default();
     let (scene, model) = (&result.scene, &result.model);
     page.line(format_args!(
-        "{}: {} noise {} %, seed {}, {} training and {} test frames",
+        "{}: {} noise {} %{}, seed {}, {} training and {} test frames",
         scene.name,
         scene.noise_kind,
         scene.noise_level * 100.0,
+        match scene.gain_drift {
+            0.0 => String::new(),
+            gain => format!(", gain drift ±{} %", gain * 100.0),
+        },
         scene.seed,
         model.training_frames,
         model.test_frames
@@ -95,9 +103,12 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
         "model: {} network{}, {} -> K = {} -> {} outputs, spread {}, {} bytes, CRC-32 {}",
         model.networks,
         if model.networks == 1 { "" } else { "s" },
-        match model.projected_readings {
-            0 => format!("{} readings", model.inputs),
-            readings => format!("{readings} readings -> {} features", model.inputs),
+        {
+            let readings = if model.relative_inputs { "relative readings" } else { "readings" };
+            match model.projected_readings {
+                0 => format!("{} {readings}", model.inputs),
+                count => format!("{count} {readings} -> {} features", model.inputs),
+            }
         },
         model.centres,
         model.outputs,

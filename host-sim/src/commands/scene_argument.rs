@@ -71,6 +71,22 @@ impl NoiseArgument {
     }
 }
 
+/// Inputs relative to the baseline, whatever the scene says.
+#[derive(Args, Default)]
+pub struct RelativeInputsArgument {
+    /// Train on readings relative to the baseline, R/R₀, which a drift of the gain leaves as they are
+    /// (docs/drift.md).
+    #[arg(long)]
+    pub relative_inputs: bool,
+}
+
+impl RelativeInputsArgument {
+    /// Asks for relative inputs, if the option was given.
+    pub fn apply(&self, scene: &mut Experiment) {
+        scene.training.relative_inputs |= self.relative_inputs;
+    }
+}
+
 /// Loads the blob at `path`, whose columns must be those of `scene`; without a path, trains the model that
 /// the scene describes.
 pub fn model(

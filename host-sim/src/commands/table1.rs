@@ -11,7 +11,7 @@ use taxel_data::csv_file::CsvFile;
 use taxel_data::{columns, output};
 use taxel_learn::decoders::{mean, standard};
 
-use super::scene_argument::SceneArgument;
+use super::scene_argument::{RelativeInputsArgument, SceneArgument};
 use super::{Common, print};
 
 /// Compute the paper's Table 1: errors by spread and noise.
@@ -23,6 +23,8 @@ use super::{Common, print};
 pub struct Arguments {
     #[command(flatten)]
     scene: SceneArgument,
+    #[command(flatten)]
+    relative_inputs: RelativeInputsArgument,
     /// CSV file to write, with all axes, decoders and definitions.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -36,7 +38,8 @@ pub struct Arguments {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let scene = arguments.scene.load(common)?;
+    let mut scene = arguments.scene.load(common)?;
+    arguments.relative_inputs.apply(&mut scene);
     let names = scene.world.output_names();
     let groups: Vec<&str> = columns::groups(&names).into_iter().map(|(group, _)| group).collect();
     if !groups.contains(&arguments.group.as_str()) {

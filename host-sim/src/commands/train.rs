@@ -16,10 +16,11 @@ use taxel_data::{columns, output};
 use taxel_learn::select::{self, Selection};
 use taxel_learn::train::{WHOLE_ARRAY_SPREAD, train};
 use taxel_learn::{Options, Origin, pack};
-use taxel_simulate::synthesise;
+use taxel_simulate::Synthesis;
 
 use super::arguments::format;
-use super::scene_argument::NoiseArgument;
+use super::readings;
+use super::scene_argument::{NoiseArgument, RelativeInputsArgument};
 use super::{Common, print};
 
 /// Train a model on a scene or a CSV file, and write its blob.
@@ -30,7 +31,8 @@ use super::{Common, print};
 #[command(after_help = "Examples:
   host-sim train press -o press.bin
   host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --centres 200 --spread 0.5 -o m.bin
-  host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --select --fold-column fold -o m.bin")]
+  host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --select --fold-column fold -o m.bin
+  host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --relative-inputs --baseline rest.csv -o m.bin")]
 pub struct Arguments {
     /// A built-in scene (paper, press), a scene file (.toml) or a CSV file.
     source: String,
@@ -57,6 +59,12 @@ pub struct Arguments {
     /// more accurate, and faster from K = 64 on, but one missing reading leaves nothing to decode.
     #[arg(long)]
     whole_array: bool,
+    #[command(flatten)]
+    relative_inputs: RelativeInputsArgument,
+    /// CSV file with frames of the untouched sensor, whose mean is the baseline; a CSV file's --relative-inputs
+    /// needs it.
+    #[arg(long, value_name = "FILE", requires = "relative_inputs")]
+    baseline: Option<PathBuf>,
     /// Number format of the weights [default: the scene's, or f32].
     #[arg(long, value_name = "FORMAT", value_parser = format())]
     format: Option<Format>,
@@ -94,6 +102,8 @@ struct Summary {
     centres: usize,
     spread: f64,
     affine_tail: bool,
+    /// Whether inputs are readings relative to the baseline.
+    relative_inputs: bool,
     /// Number formats of the networks, in their order.
     formats: Vec<&'static str>,
     outputs: Vec<String>,
@@ -110,7 +120,9 @@ fn names_a_scene(source: &str) -> bool {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    output::check_writable(&arguments.output, &[Path::new(&arguments.source)])?;
+    let source = Path::new(&arguments.source);
+    let baseline = arguments.baseline.as_deref().unwrap_or(source);
+    output::check_writable(&arguments.output, &[source, baseline])?;
     let source = if names_a_scene(&arguments.source) {
         from_scene(arguments, common)?
     } else {
@@ -160,6 +172,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         centres: model.networks().map(|n| n.shape().centres).max().unwrap_or(0),
         spread: options.spread,
         affine_tail: options.affine_tail,
+        relative_inputs: source.dataset.relative_inputs,
         formats: model.networks().map(|n| n.format().name()).collect(),
         outputs: source.dataset.outputs.names.clone(),
         training_rmse: model.metadata().training_rmse.iter().map(f64::from).collect(),
@@ -183,12 +196,17 @@ fn from_scene(arguments: &Arguments, common: &Common) -> Result<Source> {
             return Err(Error::Usage(message));
         }
     }
+    if arguments.baseline.is_some() {
+        let message = "--baseline is for a CSV file; a scene synthesises its own: leave it out";
+        return Err(Error::Usage(message.into()));
+    }
     scene.world.seed = common.seed.unwrap_or(scene.world.seed);
+    arguments.relative_inputs.apply(&mut scene);
     arguments.noise.apply(&mut scene)?;
     let frames = arguments.frames.unwrap_or(scene.training.frames);
     scene.world.check_frames("-n", frames)?;
     Ok(Source {
-        dataset: synthesise(&scene.world, Stream::Training, frames),
+        dataset: scene.dataset(&Synthesis::of(&scene.world), Stream::Training, frames),
         origin: scene.origin(),
         defaults: scene.options(),
         fold_of: None,
@@ -202,6 +220,13 @@ fn from_data(arguments: &Arguments, common: &Common) -> Result<Source> {
     if arguments.noise.is_given() {
         return Err(Error::Usage("--noise adds noise to a scene; a CSV file has its own".into()));
     }
+    if arguments.relative_inputs.relative_inputs && arguments.baseline.is_none() {
+        return Err(Error::Usage(
+            "--relative-inputs: a CSV file does not tell the baseline; give --baseline FILE, with frames of the \
+             untouched sensor"
+                .into(),
+        ));
+    }
     let path = Path::new(&arguments.source);
     let file = CsvFile::read(path)?;
     let (inputs, outputs) = (arguments.inputs.as_deref(), arguments.outputs.as_deref());
@@ -210,6 +235,10 @@ fn from_data(arguments: &Arguments, common: &Common) -> Result<Source> {
         let left_out = kept.of - kept.lines.len();
         eprintln!("note: {left_out} of {} lines have a missing value and are skipped", kept.of);
     }
+    let dataset = match &arguments.baseline {
+        Some(file) => readings::relative_to(dataset, file)?,
+        None => dataset,
+    };
     let fold_of = match &arguments.fold_column {
         Some(name) => Some(folds_from(&file, name, &kept.lines)?),
         None => None,
@@ -334,7 +363,7 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         }
     }
     page.line(format_args!(
-        "{}: {} bytes, CRC-32 {}, {}, K = {}, spread = {}, affine tail: {}, {} frames",
+        "{}: {} bytes, CRC-32 {}, {}, K = {}, spread = {}, affine tail: {}, {} frames{}",
         summary.file.display(),
         summary.blob_bytes,
         summary.blob_crc,
@@ -342,7 +371,8 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         summary.centres,
         summary.spread,
         if summary.affine_tail { "yes" } else { "no" },
-        summary.training_frames
+        summary.training_frames,
+        if summary.relative_inputs { ", inputs relative to the baseline" } else { "" }
     ));
     if summary.centres < asked {
         page.line(format_args!(

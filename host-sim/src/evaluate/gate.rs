@@ -5,10 +5,10 @@ use serde::Serialize;
 use taxel_data::BadValue;
 use taxel_data::random::Stream;
 use taxel_data::table::Table;
-use taxel_learn::PreparedModel;
-use taxel_simulate::motion::Independent;
+use taxel_learn::{PreparedModel, relative};
 use taxel_simulate::noise::NoiseKind;
 use taxel_simulate::outputs::Outputs;
+pub use taxel_simulate::synth::BASELINE_FRAMES;
 use taxel_simulate::{Synthesis, World};
 
 use crate::evaluate::cost::Frames;
@@ -20,8 +20,6 @@ pub const MISSED_OVER_MM: [f64; 4] = [0.02, 0.05, 0.1, 0.2];
 
 /// Tolerance that `docs/gating.md` recommends, in standard deviations of a reading's noise.
 pub const RECOMMENDED_K: f64 = 3.5;
-/// Default number of frames that a baseline averages.
-pub const BASELINE_FRAMES: usize = 100;
 
 /// Settings of a measurement of gates.
 #[derive(Debug, Clone, PartialEq)]
@@ -186,13 +184,22 @@ pub fn measure(
     settings.check(world)?;
     let whole_array = model.model().projection().is_some();
     let frames = Synthesis::of(world);
-    let gate = Gate::new(frames.clone(), settings.baseline_frames, whole_array);
-    let decode = |readings: &Table| model.decode_lines(&readings.values);
+    let relative_inputs = model.model().metadata().relative_inputs;
+    let sessions = has_sessions(world, relative_inputs).then_some(settings.frames);
+    let gate = Gate::new(&frames, settings.baseline_frames, whole_array, sessions);
+    let model = model.clone().of_inputs();
+    let decode = |readings: &Table| {
+        if relative_inputs {
+            model.decode_lines(&relative::inputs(readings, &gate.baseline).values)
+        } else {
+            model.decode_lines(&readings.values)
+        }
+    };
     let rest_outputs = decode(&gate.baseline);
 
     let touched = frames.frames(Stream::Test, settings.frames);
     let sizes_mm = largest_deformations_mm(world, settings.frames);
-    let untouched_readings = untouched(frames).frames(Stream::Test, settings.frames).inputs;
+    let untouched_readings = frames.untouched().frames(Stream::Test, settings.frames).inputs;
     let ungated = decode(&touched.inputs);
     let measure = experiment.measure();
     let errors = |estimate: &[f64]| metrics::by_group(&touched.outputs, estimate, &measure);
@@ -237,11 +244,6 @@ pub fn measure(
     })
 }
 
-/// Synthesis of frames in which nothing moves.
-fn untouched(frames: Synthesis<'_>) -> Synthesis<'_> {
-    frames.motion(Independent::default())
-}
-
 /// Largest ‖Δ‖ in mm of each row of each test frame, whatever the world's outputs are.
 fn largest_deformations_mm(world: &World, frames: usize) -> Vec<f64> {
     let synthesis = Synthesis::of(world).ideal().outputs(Outputs::all_deformations());
@@ -253,9 +255,14 @@ fn largest_deformations_mm(world: &World, frames: usize) -> Vec<f64> {
         .collect()
 }
 
+/// Whether each session has a baseline of its own, which a gate must use. Without it, one baseline serves all.
+pub(super) fn has_sessions(world: &World, relative_inputs: bool) -> bool {
+    relative_inputs || world.drift.is_some()
+}
+
 /// Gate of a device, applied to tables.
 pub(super) struct Gate {
-    /// Baseline: one line with the readings of all rows in Ω.
+    /// Baseline: the readings of all rows in Ω, on one line, or on one for each test frame.
     pub baseline: Table,
     /// Number of readings in a row.
     readings: usize,
@@ -264,18 +271,27 @@ pub(super) struct Gate {
 }
 
 impl Gate {
-    /// Gate whose baseline is the mean of so many of these `frames` of the untouched sensor.
-    pub fn new(frames: Synthesis<'_>, baseline_frames: usize, whole_array: bool) -> Self {
-        let frames = untouched(frames).frames(Stream::Training, baseline_frames);
-        let readings = frames.inputs.names.len() / frames.rows;
-        let baseline = Table { values: frames.inputs.means(), names: frames.inputs.names };
-        Self { baseline, readings, whole_array }
+    /// Gate whose baseline is the mean of so many of these `frames` of the untouched sensor: one for all, or one
+    /// for each of the first `sessions` test frames.
+    pub fn new(
+        frames: &Synthesis<'_>,
+        baseline_frames: usize,
+        whole_array: bool,
+        sessions: Option<usize>,
+    ) -> Self {
+        let baseline = if let Some(sessions) = sessions {
+            frames.baselines(Stream::Test, sessions, baseline_frames)
+        } else {
+            let at_rest = frames.clone().untouched().frames(Stream::Training, baseline_frames);
+            Table { values: at_rest.inputs.means(), names: at_rest.inputs.names }
+        };
+        Self { baseline, readings: frames.world().sensor.column_wires, whole_array }
     }
 
     /// Upper bound by [`woken_by_theory`]; the array wakes with any of its rows.
     fn woken_by_theory(&self, k: f64, baseline_frames: usize) -> f64 {
         let of_row = woken_by_theory(k, self.readings, baseline_frames);
-        let rows = self.baseline.values.len() / self.readings;
+        let rows = self.baseline.names.len() / self.readings;
         if self.whole_array { -libm::expm1(rows as f64 * libm::log1p(-of_row)) } else { of_row }
     }
 
@@ -283,7 +299,8 @@ impl Gate {
     pub fn at_rest(&self, readings: &Table, tolerance: f64) -> Vec<bool> {
         let tolerance = tolerance as f32;
         let baseline = to_f32(&self.baseline.values);
-        let of_line = |line: &[f64]| {
+        let baselines = baseline.chunks_exact(self.baseline.names.len()).cycle();
+        let of_line = |(line, baseline): (&[f64], &[f32])| {
             let line = to_f32(line);
             let rows = line.chunks_exact(self.readings).zip(baseline.chunks_exact(self.readings));
             let mut at_rest: Vec<bool> =
@@ -294,7 +311,7 @@ impl Gate {
             }
             at_rest
         };
-        readings.lines().flat_map(of_line).collect()
+        readings.lines().zip(baselines).flat_map(of_line).collect()
     }
 }
 

@@ -6,7 +6,8 @@ use taxel_data::table::Table;
 use taxel_learn::PreparedModel;
 use taxel_simulate::Synthesis;
 use taxel_simulate::readout::{Circuit, Readout};
-use taxel_simulate::virtual_board::{VirtualBoard, all_readings, scan};
+use taxel_simulate::synth::BASELINE_FRAMES;
+use taxel_simulate::virtual_board::{VirtualBoard, all_readings, scan, untouched_readings};
 
 use crate::experiment::Experiment;
 use crate::metrics::{self, Errors};
@@ -126,7 +127,7 @@ impl ReadoutResult {
 
 /// Scans `frames` of the scene with every circuit and stage and decodes them with `model`.
 ///
-/// The model's columns must be the scene's.
+/// The model's columns must be the scene's. If its inputs are relative, each board captures a baseline of its own.
 ///
 /// # Errors
 /// [`Error`](crate::Error) for a sensor that the virtual board does not have, or a transaction that its parts refuse.
@@ -136,11 +137,17 @@ pub fn measure(
     frames: usize,
 ) -> taxel_simulate::Result<ReadoutResult> {
     let world = &experiment.world;
-    let ideal = Synthesis::of(world).ideal().frames(Stream::Test, frames);
+    let ideal_sensor = Synthesis::of(world).ideal().drift(None);
+    let ideal = ideal_sensor.frames(Stream::Test, frames);
+    let ideal_baseline = ideal_sensor.untouched().frames(Stream::Test, 1).inputs;
+    let relative_inputs = model.model().metadata().relative_inputs;
+    let untouched = relative_inputs.then(|| untouched_readings(world, BASELINE_FRAMES));
     let sensor = all_readings(world, frames);
     let measure = experiment.measure();
     let errors = |estimate: &[f64]| metrics::by_group(&ideal.outputs, estimate, &measure);
-    let decode = |readings: &Table| model.decode_lines(&readings.values);
+    let decode = |readings: &Table, baseline: &[f64]| {
+        model.clone().with_baseline(baseline).decode_lines(&readings.values)
+    };
     let mut lines = Vec::new();
     for circuit in Circuit::ALL {
         for stage in Stage::ALL {
@@ -151,11 +158,16 @@ pub fn measure(
                 Stage::Miscalibrated => 1.1,
             });
             let scanned = scan(&board, series, &sensor)?;
+            // A baseline is captured with the faults that frames are.
+            let baseline = match &untouched {
+                Some(untouched) => scan(&board, series, untouched)?.means(),
+                None => ideal_baseline.values.clone(),
+            };
             lines.push(Line {
                 circuit,
                 stage,
                 readings: reading_errors(&scanned, &ideal.inputs),
-                errors: errors(&decode(&scanned)),
+                errors: errors(&decode(&scanned, &baseline)),
             });
         }
     }
@@ -164,7 +176,7 @@ pub fn measure(
         seed: world.seed,
         frames,
         model_crc: format!("{:08x}", model.model().crc()),
-        ideal_errors: errors(&decode(&ideal.inputs)),
+        ideal_errors: errors(&decode(&ideal.inputs, &ideal_baseline.values)),
         mean_errors: errors(&ideal.outputs.means().repeat(frames)),
         lines,
     })

@@ -140,8 +140,8 @@ pub fn compute(experiment: &Experiment, progress: &dyn Progress) -> Result<Table
     progress.stage("table 1", settings.noise_levels.len() * experiment.world.read_rows.len());
     let columns = settings.noise_levels.iter().map(|&level| {
         let frames = Synthesis::of(&experiment.world).noise_level(level);
-        let training = frames.frames(Stream::Training, settings.frames);
-        let test = frames.frames(Stream::Test, settings.test_frames);
+        let training = experiment.dataset(&frames, Stream::Training, settings.frames);
+        let test = experiment.dataset(&frames, Stream::Test, settings.test_frames);
         let decoders = decoders(settings, experiment.world.seed, &training, progress)?;
         let judged = |(spread, decoder): &Spread| entry(decoder.as_ref(), *spread, &test, &measure);
         let decoders = decoders.iter().map(judged).collect();

@@ -4,6 +4,7 @@
 //! were measured on the firmware's own code ([`Costs`]), so only shapes that were measured can be
 //! traded.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use model_core::rbf::Format;
@@ -230,8 +231,14 @@ pub fn compute(
     for &samples in &plan.samples_averaged {
         let noise_level = world.noise.level / (samples as f64).sqrt();
         let frames = Synthesis::of(world).noise_level(noise_level);
-        let training = frames.frames(Stream::Training, t.frames);
-        let test = frames.frames(Stream::Test, t.test_frames);
+        let training = experiment.dataset(&frames, Stream::Training, t.frames);
+        let test = experiment.dataset(&frames, Stream::Test, t.test_frames);
+        // The gate compares readings in Ω.
+        let readings_ohm = if t.relative_inputs {
+            Cow::Owned(frames.frames(Stream::Test, t.test_frames).inputs)
+        } else {
+            Cow::Borrowed(&test.inputs)
+        };
         if baselines.is_empty() {
             let judged = |baseline: &Baseline| {
                 metrics::judge(baseline.fit(&training).as_ref(), &test, &measure)
@@ -239,8 +246,13 @@ pub fn compute(
             baselines = BASELINES.iter().map(judged).collect();
         }
         for whole_array in [false, true] {
-            let readings = &test.inputs;
-            let gates = Gates::new(&frames, noise_level, readings, &plan.gate_k, whole_array);
+            let gates = Gates::new(
+                &frames,
+                noise_level,
+                &readings_ohm,
+                &plan.gate_k,
+                (whole_array, t.relative_inputs),
+            );
             let sets = Sets::new(noise_level, &training, &test, &gates, whole_array)?;
             for &centres in &plan.centres {
                 let knobs = Knobs { whole_array, centres, samples_averaged: samples };

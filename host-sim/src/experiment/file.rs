@@ -2,6 +2,7 @@
 
 use serde::Deserialize;
 use taxel_simulate::World;
+use taxel_simulate::drift::Drift;
 use taxel_simulate::motion;
 use taxel_simulate::noise::Noise;
 use taxel_simulate::outputs::Outputs;
@@ -22,6 +23,7 @@ pub(super) struct SceneFile {
     sensor: SensorFile,
     deformation: motion::Kind,
     noise: Noise,
+    drift: Option<Drift>,
     #[serde(default)]
     readout: Readout,
     outputs: Outputs,
@@ -109,6 +111,7 @@ impl SceneFile {
                 motion: self.deformation,
                 rubber: rubber::Kind::default(),
                 noise: self.noise,
+                drift: self.drift,
                 read_rows,
                 readout,
                 outputs: self.outputs,

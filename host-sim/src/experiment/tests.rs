@@ -1,5 +1,6 @@
 use taxel_simulate::readout::{Circuit, Readout};
 use taxel_simulate::sensor::{Axis, Sensor};
+use taxel_simulate::synthesise;
 
 use super::*;
 

@@ -101,19 +101,25 @@ pub fn document(title: &str, body: &str) -> String {
 fn header(result: &RunResult) -> String {
     let (scene, model) = (&result.scene, &result.model);
     let tail = if model.affine_tail { "affine tail" } else { "no affine tail" };
+    let readings = if model.relative_inputs { "relative readings" } else { "readings" };
     let inputs = match model.projected_readings {
-        0 => format!("{} readings", model.inputs),
-        readings => format!("{readings} readings → {} features", model.inputs),
+        0 => format!("{} {readings}", model.inputs),
+        count => format!("{count} {readings} → {} features", model.inputs),
+    };
+    let drift = match scene.gain_drift {
+        0.0 => String::new(),
+        gain => format!(" · gain drift ±{}", percent(gain)),
     };
     let plural = if model.networks == 1 { "" } else { "s" };
     format!(
         "<header>\n<h1>Scene “{}”</h1>\n\
-         <p>{} noise of {} · seed {} · {} training and {} test frames · scene digest {}</p>\n\
+         <p>{} noise of {}{} · seed {} · {} training and {} test frames · scene digest {}</p>\n\
          <p>{} network{plural}: {inputs} → K = {} → {} outputs · spread {} · {tail} · \
          {} bytes · CRC-32 {}</p>\n</header>\n",
         escape(&scene.name),
         escape(&scene.noise_kind),
         percent(scene.noise_level),
+        drift,
         scene.seed,
         grouped(model.training_frames),
         grouped(model.test_frames),

@@ -6,6 +6,7 @@ mod virtual_device;
 
 mod accuracy;
 mod device;
+mod drift;
 mod gate;
 mod readout;
 mod refusals;

@@ -43,6 +43,8 @@ fn bad_scenes() {
         ("kind = \"relative\"", "kind = \"pink\"", &["unknown variant `pink`", "span"]),
         ("seed = 1", "precision = \"f16\"", &["unknown variant `f16`", "f64"]),
         ("level = 0.005", "level = 5.0", &["noise.level = 5", "0.005 is 0.5 %"]),
+        ("[noise]", "[drift]\ngain = 1.0\n\n[noise]", &["drift.gain = 1", "0.02 is ±2 %"]),
+        ("[noise]", "[drift]\nrate = 1.0\n\n[noise]", &["unknown field `rate`", "gain"]),
         ("row_wires = [4, 5]", "row_wires = [0]", &["readout.row_wires = [0]", "from 1 to 8"]),
         ("row_wires = [4, 5]", "row_wires = [9]", &["readout.row_wires = [9]"]),
         ("row_wires = [4, 5]", "row_wires = [5, 4]", &["ascending"]),
@@ -188,6 +190,46 @@ fn bad_models_and_data_that_does_not_fit_them() {
         &["forward", "scene.toml", "deformation.csv", "-o", "r.csv"],
         &["deformation.csv", "\"r4e1_dy_mm\" is missing"],
     );
+}
+
+#[test]
+fn relative_inputs_without_a_baseline() {
+    let folder = Folder::new("no-baseline");
+    folder.write("scene.toml", small_scene());
+    folder.write("data.csv", "ch1,ch2,f_n\n1,5,2\n2,6,3\n3,6,4\n4,6,5\n");
+    folder.write("rest.csv", "ch1,ch2\n0.5,0\n1.5,0\n");
+    folder.write("other.csv", "ch1\n0.5\n");
+    folder.succeed(&["train", "scene.toml", "-n", "100", "-o", "readings.bin"]);
+    folder.succeed(&["train", "scene.toml", "-n", "100", "--relative-inputs", "-o", "m.bin"]);
+    folder.succeed(&["synth", "scene.toml", "-n", "10", "-o", "d.csv"]);
+    let needs = &["m.bin", "relative to the baseline", "--baseline FILE", "untouched"][..];
+    refused(&folder, &["decode", "m.bin", "d.csv", "-o", "e.csv"], needs);
+    refused(&folder, &["eval", "m.bin", "d.csv"], needs);
+    let needless = &["readings.bin", "as they are", "leave --baseline out"][..];
+    refused(&folder, &["eval", "readings.bin", "d.csv", "--baseline", "d.csv"], needless);
+    let other = &["other.csv", "\"r4c1_ohm\" is missing"][..];
+    refused(&folder, &["eval", "m.bin", "d.csv", "--baseline", "other.csv"], other);
+    let onto_baseline = ["decode", "m.bin", "d.csv", "--baseline", "rest.csv", "-o", "rest.csv"];
+    refused(&folder, &onto_baseline, &["would be written over"]);
+
+    let train = |options: &[&'static str], says: &[&str]| {
+        let base = ["train", "data.csv", "--inputs", "ch*", "--outputs", "f_n", "-o", "x.bin"];
+        refused(&folder, &[&base, options].concat(), says);
+    };
+    train(&["--relative-inputs"], &["--baseline FILE", "untouched"]);
+    train(&["--baseline", "rest.csv"], &["--relative-inputs"]);
+    let zero = &["rest.csv", "no baseline for ch2", "missing or zero", "--inputs"][..];
+    train(&["--relative-inputs", "--baseline", "rest.csv"], zero);
+    train(&["--relative-inputs", "--baseline", "other.csv"], &["\"ch2\" is missing"]);
+    let of_scene = ["train", "press", "--relative-inputs", "--baseline", "rest.csv", "-o", "x.bin"];
+    refused(&folder, &of_scene, &["--baseline is for a CSV file"]);
+    refused(&folder, &["drift", "press", "--gain", "1"], &["--gain 1", "below 1"]);
+    refused(
+        &folder,
+        &["synth", "press", "--scale", "0", "-o", "x.csv"],
+        &["--scale 0", "positive"],
+    );
+    refused(&folder, &["link", "/dev/null", "upload", "m.bin"], &["relative", "firmware"]);
 }
 
 #[test]

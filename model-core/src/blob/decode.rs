@@ -3,7 +3,7 @@
 use super::error::DecodeError;
 use super::format::{
     CRC_BYTES, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection, PREFIX_BYTES, Prefix,
-    RbfHeader, ShapeField, TAG_METADATA, TAG_PROJECTION,
+    RbfHeader, ShapeField, TAG_METADATA, TAG_PROJECTION, TAG_RELATIVE_INPUTS,
 };
 use super::metadata::{Columns, Floats, Metadata, ModelShape};
 use crate::checksum::CRC_32;
@@ -50,7 +50,8 @@ impl<'a> Model<'a> {
         }
 
         let (section, rest) = take::<MetadataSection>(rest, "metadata")?;
-        let metadata = checked_metadata(&section, shape)?;
+        let (relative_inputs, rest) = take_relative_inputs(rest);
+        let metadata = checked_metadata(&section, relative_inputs, shape)?;
         let (projection, network_sections) = take_projection(rest, shape)?;
         if projection.is_some() {
             check_count("networks behind a projection", 1, networks.into())?;
@@ -215,6 +216,7 @@ fn check_count(what: &'static str, expected: usize, found: usize) -> Result<(), 
 
 fn checked_metadata<'a>(
     section: &MetadataSection<'a>,
+    relative_inputs: bool,
     shape: ModelShape,
 ) -> Result<Metadata<'a>, DecodeError> {
     check_tag(TAG_METADATA, section.tag)?;
@@ -226,6 +228,7 @@ fn checked_metadata<'a>(
         seed: section.seed,
         training_frames: section.training_frames,
         thickness_mm: section.thickness_mm,
+        relative_inputs,
         input_names: Columns(section.input_names),
         input_units: Columns(section.input_units),
         output_names: Columns(section.output_names),
@@ -343,6 +346,14 @@ fn take_block<'a>(
         return Err(DecodeError::Malformed { section: "padding" });
     }
     take::<&[u8]>(rest, section)
+}
+
+/// Cuts the section of relative inputs from the front of `bytes`; returns whether there is one.
+fn take_relative_inputs(bytes: &[u8]) -> (bool, &[u8]) {
+    match bytes.split_first() {
+        Some((&TAG_RELATIVE_INPUTS, rest)) => (true, rest),
+        _ => (false, bytes),
+    }
 }
 
 /// Cuts the projection from the front of `bytes` if there is one, and checks it.

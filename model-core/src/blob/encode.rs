@@ -8,7 +8,7 @@ use super::decode::Model;
 use super::error::EncodeError;
 use super::format::{
     CRC_BYTES, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection, Prefix, RbfHeader,
-    ShapeField, TAG_METADATA, TAG_PROJECTION,
+    ShapeField, TAG_METADATA, TAG_PROJECTION, TAG_RELATIVE_INPUTS,
 };
 use super::metadata::Metadata;
 use crate::checksum::CRC_32;
@@ -101,6 +101,9 @@ pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u
         training_rmse: m.training_rmse.0,
         full_scale: m.full_scale.0,
     })?;
+    if m.relative_inputs {
+        writer.put(&TAG_RELATIVE_INPUTS)?;
+    }
     if let Some(projection) = parts.projection {
         writer.put(&TAG_PROJECTION)?;
         writer.put_block(&[bytemuck::cast_slice(projection.block())])?;

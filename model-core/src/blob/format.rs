@@ -22,6 +22,8 @@ pub(super) const FLOAT_ALIGNMENT: usize = 4;
 /// [one for each format](Format::tag); an unknown tag is rejected.
 pub(super) const TAG_METADATA: u8 = 0;
 pub(super) const TAG_PROJECTION: u8 = 4;
+/// Tag of a section without fields: the model's inputs are relative to the baseline.
+pub(super) const TAG_RELATIVE_INPUTS: u8 = 5;
 
 /// Bytes 0..9, at fixed places, so that a blob's length is known before anything else is read.
 #[derive(Serialize, Deserialize)]
@@ -98,7 +100,7 @@ mod tests {
 
     #[test]
     fn no_format_of_networks_has_the_tag_of_another_section() {
-        for tag in [TAG_METADATA, TAG_PROJECTION] {
+        for tag in [TAG_METADATA, TAG_PROJECTION, TAG_RELATIVE_INPUTS] {
             assert_eq!(Format::from_tag(tag), None);
         }
     }

@@ -84,9 +84,12 @@ pub struct Metadata<'a> {
     pub training_frames: u32,
     /// Sensor thickness H in mm, for the positional error; 0 where it has no meaning.
     pub thickness_mm: f32,
+    /// Whether the model's inputs are readings relative to the baseline, R/R₀ ([`relative`](crate::relative)), and
+    /// not readings as they are.
+    pub relative_inputs: bool,
     /// Names of the reading columns, row after row: `rows × inputs`.
     pub input_names: Columns<'a>,
-    /// Units of the reading columns (empty for a plain number): `rows × inputs`.
+    /// Units of the inputs (empty for a plain number, as relative ones are): `rows × inputs`.
     pub input_units: Columns<'a>,
     /// Names of the output columns, row after row: `rows × outputs`.
     pub output_names: Columns<'a>,
@@ -145,6 +148,7 @@ impl Metadata<'static> {
             seed: 0,
             training_frames: 0,
             thickness_mm: 0.0,
+            relative_inputs: false,
             input_names: columns(&INPUT_NAMES, 2 * inputs),
             input_units: columns(&NO_UNITS, inputs),
             output_names: columns(&OUTPUT_NAMES, 2 * outputs),

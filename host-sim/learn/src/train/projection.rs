@@ -67,6 +67,7 @@ pub fn apply(projection: Projection<'_>, dataset: &Dataset) -> Dataset {
         outputs: dataset.outputs.clone(),
         rows: 1,
         common_span: true,
+        relative_inputs: false,
     }
 }
 

@@ -2,3 +2,4 @@
 
 mod blob;
 mod number_formats;
+mod relative;

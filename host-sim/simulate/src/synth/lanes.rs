@@ -1,7 +1,7 @@
 //! Synthesis of some trajectories, one a lane: drawn, computed, disturbed, and laid out frame after
 //! frame.
 
-use taxel_data::random::{Purpose, RandomLanes, Stream};
+use taxel_data::random::{RandomLanes, Stream};
 use taxel_data::simd::{self, LANES, Lanes};
 
 use super::Synthesis;
@@ -26,6 +26,8 @@ pub(super) struct Workspace {
     deformation_mm: Vec<[Lanes; 3]>,
     /// Resistance in Ω, by column-wire.
     resistance_ohm: Vec<Lanes>,
+    /// Factor on all readings of each trajectory, if the gain drifts.
+    gain: Option<Lanes>,
     scratch: Scratch,
 }
 
@@ -50,6 +52,7 @@ impl<'s> LaneSynthesis<'s> {
         Workspace {
             deformation_mm: vec![[[0.0; LANES]; 3]; sensor.electrodes_per_row_wire],
             resistance_ohm: vec![[0.0; LANES]; sensor.column_wires],
+            gain: None,
             scratch: Scratch::default(),
         }
     }
@@ -65,6 +68,7 @@ impl<'s> LaneSynthesis<'s> {
     ) {
         let Synthesis { world, motion, read_rows, .. } = self.synthesis;
         let mut draws = Draws::new(world.seed, self.stream, first);
+        workspace.gain = self.synthesis.drift.map(|drift| drift.factors(&mut draws));
         let mut trajectories = motion.start(&world.sensor, &mut draws);
         let electrodes = world.sensor.electrodes_per_row_wire;
         let mut rubber: Vec<Box<dyn Response>> =
@@ -94,7 +98,7 @@ impl<'s> LaneSynthesis<'s> {
     ) {
         let Synthesis { world, motion, read_rows, .. } = self.synthesis;
         let (steps, rows, columns) = (motion.steps(), read_rows.len(), world.sensor.column_wires);
-        let Workspace { deformation_mm, resistance_ohm, scratch } = workspace;
+        let Workspace { deformation_mm, resistance_ohm, gain, scratch } = workspace;
         let precision = world.precision;
         self.model.row_column_resistance_ohm(
             row,
@@ -104,6 +108,11 @@ impl<'s> LaneSynthesis<'s> {
             resistance_ohm,
         );
         self.disturb((place, row), (first, step), resistance_ohm);
+        if let Some(gain) = gain {
+            for readings in resistance_ohm.iter_mut() {
+                readings.iter_mut().zip(&*gain).for_each(|(reading, gain)| *reading *= gain);
+            }
+        }
         let lines = readings.chunks_exact_mut(columns);
         let line_of_lanes = lines.skip(step * rows + place).step_by(steps * rows);
         for (lane, readings) in line_of_lanes.enumerate() {
@@ -129,7 +138,7 @@ impl<'s> LaneSynthesis<'s> {
         (first, step): (usize, usize),
         resistance_ohm: &mut [Lanes],
     ) {
-        let Synthesis { world, noise, motion, .. } = self.synthesis;
+        let Synthesis { world, noise, noise_purpose, motion, .. } = self.synthesis;
         let (level, columns) = (noise.level, world.sensor.column_wires);
         if level == 0.0 {
             return;
@@ -137,7 +146,7 @@ impl<'s> LaneSynthesis<'s> {
         // Noise is drawn by frame, whichever trajectory the frame belongs to.
         let steps = motion.steps();
         let mut random = RandomLanes::every(first * steps + step, steps);
-        random.start(world.seed, self.stream, Purpose::Noise, row as u64);
+        random.start(world.seed, self.stream, *noise_purpose, row as u64);
         let mut normals = [[0.0; LANES]; 2];
         for (pair, readings) in resistance_ohm.chunks_mut(2).enumerate() {
             let [even, odd] = &mut normals;

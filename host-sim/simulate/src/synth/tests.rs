@@ -1,7 +1,7 @@
 use taxel_data::digest::digest;
 
 use super::*;
-use crate::sensor::Precision;
+use crate::sensor::{Precision, Sensor};
 
 fn world(name: &str) -> World {
     if name == "paper" { World::paper() } else { World::press() }
@@ -59,6 +59,78 @@ fn noise_of_either_kind_has_the_size_it_is_asked_for() {
         assert!((sum / count).abs() < 5.0 / count.sqrt(), "{text}: mean {}", sum / count);
         let error = (squares / count - 1.0).abs();
         assert!(error < 5.0 * (2.0 / count).sqrt(), "{text}: variance is off by {error}");
+    }
+}
+
+/// Ratio of two tables, line after line.
+fn ratios<'t>(a: &'t Table, b: &'t Table) -> impl Iterator<Item = Vec<f64>> + 't {
+    a.lines().zip(b.lines()).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a / b).collect())
+}
+
+#[test]
+fn a_drifting_gain_multiplies_all_readings_of_a_session_and_its_baseline() {
+    let gain = 0.02;
+    let still = world("press");
+    let drifting = World { drift: Some(Drift { gain }), ..still.clone() };
+    let frames = 5000;
+    let drifted = synthesise(&drifting, Stream::Test, frames);
+    let undrifted = synthesise(&still, Stream::Test, frames);
+    assert_eq!(drifted.outputs, undrifted.outputs);
+    let baselines =
+        [&drifting, &still].map(|w| Synthesis::of(w).baselines(Stream::Test, frames, 100));
+    let pairs = ratios(&drifted.inputs, &undrifted.inputs)
+        .zip(ratios(&baselines[0], &baselines[1]))
+        .map(|(readings, baseline)| [readings, baseline].concat());
+    let mut factors = Vec::new();
+    for ratios in pairs {
+        assert!(ratios.iter().all(|ratio| (ratio / ratios[0] - 1.0).abs() < 1e-14));
+        factors.push(ratios[0]);
+    }
+    // Uniform on [0.98, 1.02]: its range, its mean and its variance, within five standard errors.
+    let (n, least) = (frames as f64, factors.iter().copied().fold(f64::INFINITY, f64::min));
+    let most = factors.iter().copied().fold(0.0, f64::max);
+    assert!(least >= 1.0 - gain && least < 0.981 && most < 1.0 + gain && most > 1.019);
+    let mean = factors.iter().sum::<f64>() / n;
+    let variance = factors.iter().map(|f| (f - mean).powi(2)).sum::<f64>() / n;
+    assert!((mean - 1.0).abs() < 5.0 * gain / (3.0 * n).sqrt(), "{mean}");
+    assert!((variance / (gain * gain / 3.0) - 1.0).abs() < 5.0 * (0.8 / n).sqrt(), "{variance}");
+    assert_ne!(
+        synthesise(&drifting, Stream::Training, 1).inputs.values,
+        drifted.inputs.values[..144]
+    );
+    let few = synthesise(&drifting, Stream::Test, 7);
+    assert_eq!(few.inputs.values, drifted.inputs.values[..7 * 144]);
+}
+
+#[test]
+fn a_baseline_is_the_untouched_sensor_with_the_noise_that_averaging_leaves() {
+    for kind in [NoiseKind::Relative, NoiseKind::Span] {
+        let mut world = World { read_rows: vec![3, 4], ..World::press() };
+        world.noise = Noise { kind, level: 0.02 };
+        let (frames, averaged) = (4000, 25);
+        let untouched = Synthesis::of(&world).ideal().untouched().frames(Stream::Test, 1).inputs;
+        let ideal = Sensor::paper();
+        let mut row_ohm = [0.0; 18];
+        ideal.row_column_resistance_ohm(4, &[[0.0; 3]; 6], &mut row_ohm);
+        assert!((untouched.values[18] / row_ohm[0] - 1.0).abs() < 1e-12);
+        let spans = Synthesis::of(&world).ideal().frames(Stream::Span, SPAN_FRAMES).inputs.ranges();
+        let baselines = Synthesis::of(&world).baselines(Stream::Test, frames, averaged);
+        assert_eq!((baselines.len(), &baselines.names), (frames, &untouched.names));
+        let mut squares = 0.0;
+        for line in baselines.lines() {
+            for ((found, ideal), [low, high]) in line.iter().zip(&untouched.values).zip(&spans) {
+                let unit = if kind == NoiseKind::Relative { *ideal } else { high - low };
+                squares += ((found - ideal) / (0.02 / 5.0 * unit)).powi(2);
+            }
+        }
+        let count = (frames * 36) as f64;
+        let error = (squares / count - 1.0).abs();
+        assert!(error < 5.0 * (2.0 / count).sqrt(), "{kind:?}: variance is off by {error}");
+        // Its noise is not that of the frames.
+        let noisy = Synthesis::of(&world).untouched().frames(Stream::Test, 1).inputs;
+        let [of_frame, of_baseline] =
+            [noisy.values[0], baselines.values[0]].map(|ohm| ohm - untouched.values[0]);
+        assert!((of_frame / of_baseline / 5.0 - 1.0).abs() > 1e-3);
     }
 }
 

@@ -9,10 +9,21 @@ use crate::error::Result;
 use crate::synth::Synthesis;
 use crate::world::World;
 
-/// Ideal readings in Ω of all row-wires of the sensor, whichever the world reads: the input of a board.
+/// Ideal readings in Ω of all row-wires of the sensor, whichever the world reads, without noise and drift: the input
+/// of a board.
 #[must_use]
 pub fn all_readings(world: &World, frames: usize) -> Table {
-    Synthesis::of(world).ideal().all_rows().frames(Stream::Test, frames).inputs
+    ideal(world).frames(Stream::Test, frames).inputs
+}
+
+/// Ideal readings in Ω of all row-wires of the untouched sensor, so many times.
+#[must_use]
+pub fn untouched_readings(world: &World, frames: usize) -> Table {
+    ideal(world).untouched().frames(Stream::Test, frames).inputs
+}
+
+fn ideal(world: &World) -> Synthesis<'_> {
+    Synthesis::of(world).ideal().drift(None).all_rows()
 }
 
 /// Scans every line of `readings` (Ω, all row-wires) by the firmware's scanner on `board`.

@@ -1,14 +1,15 @@
 //! Points behind a gate: untouched rows are not decoded but take the outputs of the baseline.
 
 use taxel_data::table::Table;
+use taxel_learn::relative;
 use taxel_simulate::Synthesis;
 
-use super::super::gate::{BASELINE_FRAMES, Gate, gated, share};
+use super::super::gate::{BASELINE_FRAMES, Gate, gated, has_sessions, share};
 
 /// Untouched rows of the test frames for every k. They depend on the readings alone, not on the decoder.
 pub(super) struct Gates {
-    /// Baseline: the line of readings whose outputs untouched rows take.
-    pub baseline: Table,
+    /// Inputs of a model at rest, whose outputs untouched rows take: one line, or one for each test frame.
+    pub rest_inputs: Table,
     gates: Vec<AtRest>,
 }
 
@@ -22,20 +23,28 @@ pub(super) struct AtRest {
 }
 
 impl Gates {
-    /// Gates of rows, or of the whole array, for the `readings` of test frames with this noise level.
+    /// Gates of rows, or of the whole array, for the `readings` in Ω of test frames with this noise level.
+    /// `relative_inputs` tells what models take.
     pub fn new(
         frames: &Synthesis<'_>,
         noise_level: f64,
         readings: &Table,
         k: &[f64],
-        whole_array: bool,
+        (whole_array, relative_inputs): (bool, bool),
     ) -> Self {
-        let gate = Gate::new(frames.clone(), BASELINE_FRAMES, whole_array);
+        let sessions = has_sessions(frames.world(), relative_inputs).then_some(readings.len());
+        let gate = Gate::new(frames, BASELINE_FRAMES, whole_array, sessions);
         let at_rest = |&k: &f64| {
             let rows = gate.at_rest(readings, k * noise_level);
             AtRest { k, share: share(&rows), rows }
         };
-        Self { gates: k.iter().map(at_rest).collect(), baseline: gate.baseline }
+        let gates = k.iter().map(at_rest).collect();
+        let rest_inputs = if relative_inputs {
+            relative::inputs(&gate.baseline, &gate.baseline)
+        } else {
+            gate.baseline
+        };
+        Self { rest_inputs, gates }
     }
 
     /// Untouched rows for each k.

@@ -147,7 +147,7 @@ impl<'s> Judge<'s> {
     ) -> Result<()> {
         let Knobs { whole_array, centres, samples_averaged } = knobs;
         let (kernel, test) = (arithmetic.name(), sets.test);
-        let model = blob.prepare(arithmetic.exponential);
+        let model = blob.prepare(arithmetic.exponential).of_inputs();
         let ram = DecoderRam::of(model.model());
         // Fewer centres than asked for take at most the time of the measured number.
         let kind = (kernel.as_str(), centres, affine_tail, whole_array);
@@ -179,7 +179,7 @@ impl<'s> Judge<'s> {
         };
         add(None, ungated, &estimate);
         if let Some(frames) = frames {
-            let rest_outputs = model.decode_lines(&sets.gates.baseline.values);
+            let rest_outputs = model.decode_lines(&sets.gates.rest_inputs.values);
             for gate in sets.gates.iter() {
                 let frame = frames.mean_cost(gate.share);
                 add(Some(gate.k), frame, &gate.gated(&estimate, &rest_outputs));

@@ -45,7 +45,8 @@ fn small_model(
     let rows = model.parse().shape().rows;
     let few = readings.cycled(64);
     let outputs = model.prepare(Exponential::default()).decode_table(&few);
-    let mut frames = Dataset { inputs: few, outputs, rows, common_span: false };
+    let mut frames =
+        Dataset { inputs: few, outputs, rows, common_span: false, relative_inputs: false };
     // Long names would be most of the blob; those of the first readings tell the rows.
     for names in [&mut frames.inputs.names, &mut frames.outputs.names] {
         names

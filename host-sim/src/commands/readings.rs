@@ -1,0 +1,90 @@
+//! Readings and baselines from CSV files, for the models that decode them.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use host_sim::{Error, Result};
+use taxel_data::columns;
+use taxel_data::csv_file::CsvFile;
+use taxel_data::dataset::Dataset;
+use taxel_data::table::Table;
+use taxel_learn::{PreparedModel, relative};
+
+/// Baseline of the sensor that readings are from.
+#[derive(Args)]
+pub struct BaselineArgument {
+    /// CSV file with frames of the untouched sensor, in columns of the same names as the readings. A model with
+    /// relative inputs needs it: the mean of its lines is the baseline.
+    #[arg(long, value_name = "FILE")]
+    pub baseline: Option<PathBuf>,
+}
+
+impl BaselineArgument {
+    /// Gives the baseline to `model`, which was read from `path`.
+    pub fn apply<'b>(&self, model: PreparedModel<'b>, path: &Path) -> Result<PreparedModel<'b>> {
+        let metadata = model.model().metadata();
+        let unfit =
+            |message: &str| Err(Error::Unfit { path: path.into(), message: message.into() });
+        match (&self.baseline, metadata.relative_inputs) {
+            (None, false) => Ok(model),
+            (None, true) => unfit(
+                "its inputs are readings relative to the baseline: give --baseline FILE, with frames of the \
+                 untouched sensor",
+            ),
+            (Some(_), false) => unfit(
+                "its inputs are readings as they are: leave --baseline out, or train with --relative-inputs",
+            ),
+            (Some(file), true) => {
+                let baseline = baseline(file, metadata.input_names.iter())?;
+                let missing = unusable(&baseline);
+                if !missing.is_empty() {
+                    eprintln!(
+                        "note: {} has no baseline for {}: a mean that is missing or zero; these readings count \
+                         as missing",
+                        file.display(),
+                        columns::some_names(&missing)
+                    );
+                }
+                Ok(model.with_baseline(&baseline.values))
+            }
+        }
+    }
+}
+
+/// Makes the inputs of `dataset` relative to the baseline in `file`, of which every input needs one.
+pub fn relative_to(dataset: Dataset, file: &Path) -> Result<Dataset> {
+    let names: Vec<String> = dataset.inputs.names.clone();
+    let baseline = baseline(file, names.iter().map(String::as_str))?;
+    let missing = unusable(&baseline);
+    if missing.is_empty() {
+        return Ok(relative::dataset(dataset, &baseline));
+    }
+    let names = columns::some_names(&missing);
+    let message = format!(
+        "no baseline for {names}: a mean that is missing or zero; give frames in which every input has a reading, \
+         or choose others with --inputs"
+    );
+    Err(Error::Unfit { path: file.into(), message })
+}
+
+/// One line: the mean of each of the columns called `names` in `file`.
+fn baseline<'n>(file: &Path, names: impl Iterator<Item = &'n str>) -> Result<Table> {
+    let frames = table_of(&CsvFile::read(file)?, names)?;
+    Ok(Table { values: frames.means(), names: frames.names })
+}
+
+/// Names of the columns of `baseline` that no reading can be divided by.
+fn unusable(baseline: &Table) -> Vec<String> {
+    let ratios = relative::inputs(baseline, baseline);
+    let columns = ratios.values.iter().zip(&baseline.names);
+    columns.filter(|(ratio, _)| ratio.is_nan()).map(|(_, name)| name.clone()).collect()
+}
+
+/// Columns of `file` called `names`.
+pub fn table_of<'n>(file: &CsvFile, names: impl Iterator<Item = &'n str>) -> Result<Table> {
+    let names: Vec<&str> = names.collect();
+    let columns = file.columns(names.iter().copied())?;
+    let lines = 0..file.lines();
+    let values = lines.flat_map(|line| columns.iter().map(move |c| file.value(line, *c)));
+    Ok(Table { values: values.collect(), names: names.into_iter().map(String::from).collect() })
+}

@@ -1,0 +1,179 @@
+//! A gain that drifts: what it costs models of readings, and that it costs relative inputs nothing.
+
+use crate::common::{Folder, small_scene};
+use host_sim::evaluate::drift::{self, Line};
+use host_sim::evaluate::gate::{self, GateResult, Settings};
+use host_sim::evaluate::readout::{self, Stage};
+use host_sim::evaluate::trade::{self, Plan};
+use host_sim::experiment::Experiment;
+use host_sim::metrics::Errors;
+use taxel_data::progress::Silent;
+use taxel_learn::Exponential;
+use taxel_learn::decoders::linear;
+use taxel_simulate::drift::Drift;
+use taxel_simulate::readout::Circuit;
+
+const NETWORK: &str = "network";
+
+fn z(errors: &[Errors]) -> f64 {
+    errors.iter().find(|errors| errors.group == "dz_mm").unwrap().rmse
+}
+
+fn small() -> Experiment {
+    Experiment::parse("small", &small_scene()).unwrap()
+}
+
+#[test]
+fn two_per_cent_of_drift_cost_readings_a_factor_and_relative_inputs_nothing() {
+    let mut scene = Experiment::load("press").unwrap();
+    scene.world.read_rows = vec![3];
+    (scene.training.frames, scene.training.test_frames) = (8000, 8000);
+    let result = drift::measure(&scene, 0.02, &Silent).unwrap();
+    let line = |decoder, relative, with_drift| result.line(decoder, relative, with_drift).unwrap();
+    let ratio = |line: &Line| z(&line.drifted) / z(&line.undrifted);
+    for decoder in [NETWORK, linear::NAME] {
+        let (readings, relative) = (line(decoder, false, false), line(decoder, true, false));
+        let trained = line(decoder, false, true);
+        println!(
+            "{decoder}: {:.4} → {:.4} mm, trained with drift {:.4} mm, relative {:.4} → {:.4} mm",
+            z(&readings.undrifted),
+            z(&readings.drifted),
+            z(&trained.drifted),
+            z(&relative.undrifted),
+            z(&relative.drifted)
+        );
+        assert!(ratio(readings) > 2.0 && z(&trained.drifted) > 1.2 * z(&relative.drifted));
+        assert!((ratio(relative) - 1.0).abs() < 0.001);
+        // The noise of the baseline is a tenth of a reading's.
+        assert!((z(&relative.drifted) / z(&readings.undrifted) - 1.0).abs() < 0.05);
+    }
+    assert_eq!(result.lines.iter().filter(|line| line.decoder == "mean").count(), 1);
+}
+
+#[test]
+fn a_gate_and_a_trade_see_readings_and_baselines_of_the_same_session() {
+    let measured = |scene: &Experiment| -> GateResult {
+        let blob = scene.train(&Silent).unwrap();
+        let model = blob.prepare(Exponential::default());
+        let settings =
+            Settings { k: vec![3.5], frames: 2000, baseline_frames: 100, frame_cycles: None };
+        gate::measure(scene, &model, &settings).unwrap()
+    };
+    let scene_of = |gain: &str, relative_inputs: bool| {
+        let drift = format!("[drift]\ngain = {gain}\n\n[noise]");
+        let mut scene =
+            Experiment::parse("drifting", &small_scene().replace("[noise]", &drift)).unwrap();
+        scene.training.relative_inputs = relative_inputs;
+        scene
+    };
+    let [still, drifting] = ["0.0", "0.05"].map(|gain| measured(&scene_of(gain, true)));
+    let (a, b) = (&still.lines[0], &drifting.lines[0]);
+    assert_eq!((a.skipped, a.woken, &a.missed), (b.skipped, b.woken, &b.missed));
+    assert!((z(&b.errors) / z(&a.errors) - 1.0).abs() < 0.005, "{} {}", z(&a.errors), z(&b.errors));
+    assert!(z(&b.errors) < 1.2 * z(&drifting.ungated_errors));
+    // Rows at rest take the outputs for their session's baseline, and wake no more often than noise tells.
+    assert!(b.skipped > 0.4 && b.woken < 1.5 * b.woken_by_theory);
+    // Models of readings are behind the same gate.
+    let readings = measured(&scene_of("0.05", false));
+    assert_eq!(readings.lines[0].skipped, b.skipped);
+    assert!(z(&readings.ungated_errors) > 1.3 * z(&drifting.ungated_errors));
+
+    let mut scene = Experiment::load("press").unwrap();
+    (scene.training.frames, scene.training.test_frames) = (1000, 300);
+    scene.training.relative_inputs = true;
+    let plan =
+        Plan { centres: vec![16], samples_averaged: vec![1], gate_k: vec![3.5], clock_mhz: 168.0 };
+    let trade = |scene: &Experiment| trade::compute(scene, &plan, "dz_mm", &Silent).unwrap();
+    let still = trade(&scene);
+    scene.world.drift = Some(Drift { gain: 0.02 });
+    let drifting = trade(&scene);
+    assert!(still.points.iter().any(|point| point.gate_k.is_some()));
+    for (a, b) in still.points.iter().zip(&drifting.points) {
+        assert_eq!((a.name(), a.frame), (b.name(), b.frame));
+        assert!((b.rmse("dz_mm") / a.rmse("dz_mm") - 1.0).abs() < 0.01, "{}", a.name());
+    }
+}
+
+#[test]
+fn a_baseline_that_was_scanned_with_the_same_series_resistance_cancels_it() {
+    let at = |relative_inputs: bool| {
+        let mut scene = small();
+        scene.training.relative_inputs = relative_inputs;
+        // The readout does not drift.
+        scene.world.drift = Some(Drift { gain: if relative_inputs { 0.05 } else { 0.0 } });
+        let blob = scene.train(&Silent).unwrap();
+        let result = readout::measure(&scene, &blob.prepare(Exponential::default()), 20).unwrap();
+        let line = result.line(Circuit::ZeroPotential, Stage::Series).unwrap();
+        assert!(line.readings.rms_percent > 10.0);
+        z(&line.errors) / z(&result.ideal_errors)
+    };
+    let (readings, relative) = (at(false), at(true));
+    println!("z RMSE relative to ideal readings: {readings:.2} and {relative:.2}");
+    assert!(readings > 3.0 && (0.8..1.25).contains(&relative));
+}
+
+#[test]
+fn a_run_with_relative_inputs_says_so_and_shows_readings_in_ohms() {
+    let mut scene = small();
+    scene.training.relative_inputs = true;
+    scene.world.drift = Some(Drift { gain: 0.02 });
+    let (result, blob) = host_sim::run::run(&scene, &Silent).unwrap();
+    assert!(blob.parse().metadata().relative_inputs && result.model.relative_inputs);
+    assert_eq!(result.scene.gain_drift, 0.02);
+    assert!(result.example.noisy_ohm.iter().all(|ohm| (30.0..100.0).contains(ohm)));
+    let rmse = |decoder: usize| z(&result.decoders[decoder].errors);
+    assert!(rmse(0) < rmse(1) && rmse(1) < 0.6 * rmse(2), "network, linear, mean");
+    // Table 1 is computed on the same inputs: at little noise its best network is far below the mean.
+    let column = &result.table1.as_ref().unwrap().columns[0];
+    let best = column.decoders.iter().filter(|entry| entry.spread.is_some());
+    let best = best.map(|entry| z(&entry.errors)).fold(f64::INFINITY, f64::min);
+    assert!(best < 0.5 * z(column.errors("mean", None)), "{best}");
+    let page = host_sim::report::html(&result);
+    assert!(page.contains("18 relative readings") && page.contains("gain drift ±2"), "report");
+}
+
+#[test]
+fn a_user_trains_on_a_csv_file_and_decodes_a_drifted_sensor_with_its_own_baseline() {
+    let folder = Folder::new("drift-csv");
+    folder.write("scene.toml", small_scene());
+    let synth = |seed: &str, scale: &str, data: &str, rest: &str| {
+        let of_seed = ["synth", "scene.toml", "--seed", seed, "--scale", scale];
+        folder.succeed(&[&of_seed[..], &["-n", "1500", "-o", data]].concat());
+        folder.succeed(&[&of_seed[..], &["-n", "100", "--untouched", "-o", rest]].concat());
+    };
+    synth("1", "1", "train.csv", "rest.csv");
+    synth("2", "1.02", "drifted.csv", "drifted_rest.csv");
+    folder.succeed(&["train", "train.csv", "--centres", "24", "-o", "readings.bin"]);
+    let relative = ["--relative-inputs", "--baseline", "rest.csv", "-o", "relative.bin", "--json"];
+    let trained =
+        folder.succeed(&[&["train", "train.csv", "--centres", "24"], &relative[..]].concat());
+    assert!(trained.contains("\"relative_inputs\": true"), "{trained}");
+    let inspected = folder.succeed(&["inspect", "relative.bin"]);
+    assert!(inspected.contains("relative to the baseline"), "{inspected}");
+    assert!(!folder.succeed(&["inspect", "readings.bin"]).contains("relative to the baseline"));
+
+    let rmse = |arguments: &[&str]| {
+        let result = folder.succeed(&[&["eval", "--json"], arguments].concat());
+        let result: serde_json::Value = serde_json::from_str(&result).unwrap();
+        let groups = result["errors"].as_array().unwrap().clone();
+        groups.iter().find(|group| group["group"] == "dz_mm").unwrap()["rmse"].as_f64().unwrap()
+    };
+    let of_relative = rmse(&["relative.bin", "drifted.csv", "--baseline", "drifted_rest.csv"]);
+    let of_readings = rmse(&["readings.bin", "drifted.csv"]);
+    let with_old_baseline = rmse(&["relative.bin", "drifted.csv", "--baseline", "rest.csv"]);
+    println!("{of_relative} {of_readings} {with_old_baseline} mm");
+    assert!(2.0 * of_relative < of_readings.min(with_old_baseline));
+
+    // A channel without a baseline is missing, with all outputs of its row-wire.
+    let rest = std::fs::read_to_string(folder.path("drifted_rest.csv")).unwrap();
+    let mut lines: Vec<Vec<&str>> = rest.lines().map(|line| line.split(',').collect()).collect();
+    lines[1..].iter_mut().for_each(|line| line[3] = "");
+    let holed = lines.iter().map(|line| line.join(",") + "\n").collect::<String>();
+    folder.write("holed_rest.csv", &holed);
+    let decode = ["decode", "relative.bin", "drifted.csv", "-o", "e.csv", "--baseline"];
+    let page = folder.succeed(&[&decode[..], &["holed_rest.csv"]].concat());
+    assert!(page.contains("1500 of them miss a reading"), "{page}");
+    let estimate = std::fs::read_to_string(folder.path("e.csv")).unwrap();
+    let empty = estimate.lines().nth(1).unwrap().split(',').map(str::is_empty);
+    assert_eq!(empty.collect::<Vec<_>>(), [[true; 18], [false; 18]].concat());
+}
