@@ -50,8 +50,11 @@ struct Core<'m, P, F, const ROWS: usize> {
     /// Rows of the model in force, and outputs of all of them; without a model, rows that are scanned and 0.
     rows: usize,
     outputs: usize,
-    /// Room for the longest frame, and for working space as long.
+    /// Room for the longest frame.
     frame: &'m mut [f32],
+    /// One over each reading of the baseline; NaN without one.
+    reciprocals: &'m mut [f32],
+    /// Working space of a decoder.
     scratch: &'m mut [f32],
     estimate: Estimate<'m>,
     /// The baseline, decoded by the model in force; valid once a baseline is captured.
@@ -74,7 +77,8 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
         configuration: Configuration,
         buffers: &'m mut Buffers<ROWS, COLUMNS, OUTPUTS, BYTES>,
     ) -> Self {
-        let Buffers { received, message, frame, baseline, scratch, estimate, rest } = buffers;
+        let Buffers { received, message, frame, baseline, reciprocals, scratch, estimate, rest } =
+            buffers;
         let capacity = Buffers::<ROWS, COLUMNS, OUTPUTS, BYTES>::CAPACITY;
         let now_us = platform.now_us();
         let core = Core {
@@ -90,7 +94,8 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
             rows: ROWS,
             outputs: 0,
             frame: frame.as_flattened_mut(),
-            scratch: scratch.as_flattened_mut(),
+            reciprocals: reciprocals.as_flattened_mut(),
+            scratch: scratch.as_flattened_mut().as_flattened_mut(),
             estimate: estimate.whole(),
             rest: rest.whole(),
             faulty_columns: [0; ROWS],

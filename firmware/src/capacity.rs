@@ -4,6 +4,10 @@ use model_core::Wires;
 use model_core::blob::ModelShape;
 use model_core::health::MOST_COLUMNS;
 
+/// RAM in bytes that this project's images reserve for a copy of the model in force. A larger blob is decoded from
+/// its slot.
+pub const WEIGHT_RAM_BYTES: usize = 96 * 1024;
+
 /// Largest sensor and model that an image has room for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Capacity {
@@ -22,7 +26,7 @@ impl Capacity {
     /// Parses `ROWSxCOLUMNSxOUTPUTS`, such as `16x32x18`. It is meant for a build setting, at compile time.
     ///
     /// # Panics
-    /// If the text is not three numbers, or one of them is out of range: 1 to 255 rows, 1 to 32 columns and 1 to 255
+    /// If the text is not three numbers, or one of them is out of range: 2 to 255 rows, 1 to 32 columns and 1 to 255
     /// outputs a row.
     ///
     /// ```
@@ -46,7 +50,7 @@ impl Capacity {
             place += 1;
         }
         let [rows, columns, outputs] = numbers;
-        assert!(rows >= 1 && rows <= 255, "a capacity has 1 to 255 rows");
+        assert!(rows >= 2 && rows <= 255, "a capacity has 2 to 255 rows");
         assert!(columns >= 1 && columns <= MOST_COLUMNS, "a capacity has 1 to 32 columns");
         assert!(outputs >= 1 && outputs <= 255, "a capacity has 1 to 255 outputs a row");
         Self { rows, columns, outputs }
@@ -129,7 +133,7 @@ mod tests {
     #[test]
     fn what_is_no_capacity_does_not_compile() {
         for text in
-            ["", "8", "8x18", "8x18x", "8x18x18x1", "8 x 18 x 18", "0x18x18", "8x33x18", "256x1x1"]
+            ["", "8", "8x18", "8x18x", "8x18x18x1", "8 x 18 x 18", "1x18x18", "8x33x18", "256x1x1"]
         {
             let parsed = std::panic::catch_unwind(|| Capacity::parse(text));
             assert!(parsed.is_err(), "{text}");

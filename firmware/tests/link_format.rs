@@ -111,6 +111,7 @@ fn messages_give_the_specifications_worked_bytes() {
         ("commit", upload(UploadStep::Commit)),
         ("abort", upload(UploadStep::Abort)),
         ("restart", request_bytes(7, &Request::Restart)),
+        ("set baseline: 60 Ω, unknown", request_bytes(8, &Request::SetBaseline { readings_ohm })),
         ("identity", report_bytes(1, &identity)),
         ("statistics", report_bytes(2, &Report::Statistics(statistics))),
         ("configuration", report_bytes(3, &Report::Configuration(Configuration::DEFAULT))),

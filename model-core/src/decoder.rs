@@ -11,12 +11,34 @@ use crate::projection::Projection;
 use crate::rbf::expanded::Expanded;
 use crate::rbf::fixed16::Fixed16;
 use crate::rbf::{Format, NetworkError};
+use crate::relative::relative;
 
 /// RAM in bytes that a [`Decoder`] for at most so many `rows` takes on a 32-bit target, for any K: slices into the
 /// blob. The firmware's link check compares it with the compiler's own figure.
 #[must_use]
 pub const fn decoder_ram_bytes(rows: usize) -> usize {
     136 + 16 * rows
+}
+
+/// A frame to be decoded, and what is known of the sensor at rest.
+#[derive(Debug, Clone, Copy)]
+pub struct Frame<'f> {
+    /// `rows × inputs` readings in Ω, row after row; NaN is missing.
+    pub readings_ohm: &'f [f32],
+    /// [Reciprocals](crate::relative::reciprocal) of the baseline, one a reading, for a model with relative inputs.
+    /// Without them, or if their number is another, such a model finds every reading missing. Other models ignore
+    /// them.
+    pub reciprocals: &'f [f32],
+    /// Gate that skips rows at rest: they get the outputs at rest. All other rows are decoded as without a gate, to
+    /// the bit. Behind a [`Projection`], all rows are at rest, or all are decoded.
+    pub gate: Option<Gate<'f>>,
+}
+
+impl<'f> From<&'f [f32]> for Frame<'f> {
+    /// Readings in Ω, without baseline and gate.
+    fn from(readings_ohm: &'f [f32]) -> Self {
+        Self { readings_ohm, reciprocals: &[], gate: None }
+    }
 }
 
 /// Decodes frames with the model of a blob.
@@ -30,7 +52,7 @@ pub const fn decoder_ram_bytes(rows: usize) -> usize {
 ///
 /// ```
 /// use model_core::blob::DecodeError;
-/// use model_core::{Aligned, Decoder, Estimate, RowStatus};
+/// use model_core::{Aligned, Decoder, Estimate, Frame, RowStatus};
 /// # use model_core::blob::{Metadata, ModelParts, ModelShape, encode};
 /// # use model_core::rbf::{Shape, direct::{Network, Parameters}};
 /// # let network = Network::try_new(
@@ -58,7 +80,7 @@ pub const fn decoder_ram_bytes(rows: usize) -> usize {
 /// let (mut outputs, mut status) = ([0.0; 1], [RowStatus::MissingReading; 1]);
 /// let mut scratch = [0.0; 2]; // as many numbers as `scratch_floats` says
 /// let mut estimate = Estimate { outputs: &mut outputs, status: &mut status };
-/// decoder.decode_into(&[55.0, 55.0], &mut scratch, &mut estimate).unwrap();
+/// decoder.decode_into(Frame::from(&[55.0, 55.0][..]), &mut scratch, &mut estimate).unwrap();
 /// let y = decoder.metadata().output_names.position("y").unwrap();
 /// assert_eq!(outputs[y], 0.75); // mm
 ///
@@ -132,48 +154,35 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
     /// Number of floats of working space that decoding needs.
     #[must_use]
     pub fn scratch_floats(&self) -> usize {
-        let ModelShape { inputs, .. } = self.model.shape();
-        if self.model.projection().is_some() { inputs.saturating_mul(2) } else { inputs }
+        let ModelShape { rows, inputs, .. } = self.model.shape();
+        let relative = self.model.metadata().relative_inputs;
+        match (self.model.projection().is_some(), relative) {
+            (false, false) => inputs,
+            (false, true) | (true, false) => inputs.saturating_mul(2),
+            (true, true) => inputs.saturating_mul(rows.saturating_add(2)),
+        }
     }
 
     /// Decodes one frame to an estimate in the units of the model's outputs.
     ///
-    /// `readings` are `rows × inputs` numbers in Ω, row after row, and `scratch` is working space of
-    /// [`scratch_floats`](Self::scratch_floats). A row with a missing reading is marked in the estimate's status and
-    /// does not affect the other rows. Behind a [`Projection`] one missing reading marks all rows.
+    /// `scratch` is working space of [`scratch_floats`](Self::scratch_floats). A row with a missing reading is marked
+    /// in the estimate's status and does not affect the other rows. Behind a [`Projection`] one missing reading marks
+    /// all rows.
     ///
     /// # Errors
     /// [`NetworkError::Length`] if a slice does not have the model's length, or `scratch` is too short; the estimate
     /// is then untouched.
+    #[inline]
     pub fn decode_into(
         &self,
-        readings: &[f32],
+        frame: Frame<'_>,
         scratch: &mut [f32],
         estimate: &mut Estimate<'_>,
     ) -> Result<(), NetworkError> {
-        self.decode_gated(readings, None, scratch, estimate)
+        self.decode_with::<Polynomial>(frame, scratch, estimate)
     }
 
-    /// Decodes one frame as [`decode_into`](Self::decode_into) does, but skips rows that `gate` finds at rest:
-    /// they get the outputs at rest. All other rows are decoded as without a gate, to the bit.
-    ///
-    /// Behind a [`Projection`], rows are not gated one by one: all are at rest, or all are decoded. A reading that
-    /// is missing anywhere marks them all.
-    ///
-    /// # Errors
-    /// As [`decode_into`](Self::decode_into).
-    #[inline]
-    pub fn decode_gated(
-        &self,
-        readings: &[f32],
-        gate: Option<Gate<'_>>,
-        scratch: &mut [f32],
-        estimate: &mut Estimate<'_>,
-    ) -> Result<(), NetworkError> {
-        self.decode_with::<Polynomial>(readings, gate, scratch, estimate)
-    }
-
-    /// Decodes one frame as [`decode_gated`](Self::decode_gated) does, with the [exponential](crate::exp) `E` for
+    /// Decodes one frame as [`decode_into`](Self::decode_into) does, with the [exponential](crate::exp) `E` for
     /// networks of the format `f32-direct`. It serves to measure what an exponential costs; other formats have one
     /// of their own.
     ///
@@ -182,27 +191,29 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
     #[inline(never)] // one copy of inference in flash, whoever decodes
     pub fn decode_with<E: ExpKernel>(
         &self,
-        readings: &[f32],
-        gate: Option<Gate<'_>>,
+        frame: Frame<'_>,
         scratch: &mut [f32],
         estimate: &mut Estimate<'_>,
     ) -> Result<(), NetworkError> {
+        let Frame { readings_ohm, reciprocals, gate } = frame;
         let ModelShape { rows, inputs, outputs } = self.model.shape();
-        check_length("frame", readings, rows.saturating_mul(inputs))?;
+        check_length("frame", readings_ohm, rows.saturating_mul(inputs))?;
         check_length("outputs of the estimate", estimate.outputs, rows.saturating_mul(outputs))?;
         check_length("status of the estimate", estimate.status, rows)?;
         let (expected, found) = (self.scratch_floats(), scratch.len());
         let too_short = NetworkError::Length { what: "scratch", expected, found };
+        let scratch = scratch.get_mut(..expected).ok_or(too_short)?;
         let (scaled, more) = scratch.split_at_mut_checked(inputs).ok_or(too_short)?;
+        let relative = self.model.metadata().relative_inputs;
         if let Some(projection) = self.model.projection() {
-            let features = more.get_mut(..inputs).ok_or(too_short)?;
+            let (features, ratios) = more.split_at_mut_checked(inputs).ok_or(too_short)?;
             let Some(section) = self.row_sections.first() else { return Ok(()) };
-            let array = Array { projection, section, inputs, outputs };
-            array.decode(E::exp, readings, gate, [scaled, features], estimate);
+            let array = Array { projection, section, inputs, outputs, relative };
+            array.decode(E::exp, frame, [scaled, features, ratios], estimate);
             return Ok(());
         }
         // A model has at least one input and one output a row; `max` tells the compiler.
-        let rows = self.row_sections.iter().zip(readings.chunks_exact(inputs.max(1)));
+        let rows = self.row_sections.iter().zip(readings_ohm.chunks_exact(inputs.max(1)));
         let outputs = estimate.outputs.chunks_exact_mut(outputs.max(1));
         let places = outputs.zip(estimate.status.iter_mut());
         for (row, ((section, readings), (outputs, status))) in rows.zip(places).enumerate() {
@@ -210,12 +221,28 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
                 *status = RowStatus::AtRest;
                 continue;
             }
-            *status = decode_inputs(section, E::exp, readings, scaled, outputs);
+            let given = if relative {
+                let start = row.saturating_mul(inputs);
+                divide(readings, reciprocals.get(start..).unwrap_or_default(), more);
+                &*more
+            } else {
+                readings
+            };
+            *status = decode_inputs(section, E::exp, given, scaled, outputs);
             if *status != RowStatus::Decoded {
                 outputs.fill(f32::NAN);
             }
         }
         Ok(())
+    }
+}
+
+/// Writes the `readings` relative to the baseline to `ratios`, from the baseline's `reciprocals`; NaN where there
+/// is none.
+fn divide(readings: &[f32], reciprocals: &[f32], ratios: &mut [f32]) {
+    ratios.fill(f32::NAN);
+    for ((ratio, reading), reciprocal) in ratios.iter_mut().zip(readings).zip(reciprocals) {
+        *ratio = relative(*reading, *reciprocal);
     }
 }
 
@@ -247,15 +274,15 @@ impl<const ROWS: usize> Decoder<'_, ROWS> {
     /// Decodes one frame as [`decode_into`](Self::decode_into) does, to an estimate on the heap.
     ///
     /// # Errors
-    /// [`NetworkError::Length`] if `readings` are not `rows × inputs` numbers.
-    pub fn decode(&self, readings: &[f32]) -> Result<OwnedEstimate, NetworkError> {
+    /// [`NetworkError::Length`] if the frame does not have `rows × inputs` readings.
+    pub fn decode<'f>(&self, frame: impl Into<Frame<'f>>) -> Result<OwnedEstimate, NetworkError> {
         let ModelShape { rows, outputs, .. } = self.shape();
         let mut estimate = OwnedEstimate {
             outputs: std::vec![f32::NAN; rows * outputs],
             status: std::vec![RowStatus::MissingReading; rows],
         };
         let mut scratch = std::vec![0.0; self.scratch_floats()];
-        self.decode_into(readings, &mut scratch, &mut estimate.borrowed())?;
+        self.decode_into(frame.into(), &mut scratch, &mut estimate.borrowed())?;
         Ok(estimate)
     }
 }
@@ -268,39 +295,46 @@ struct Array<'s, 'a> {
     inputs: usize,
     /// Outputs of a row.
     outputs: usize,
+    /// Whether inputs are relative to the baseline.
+    relative: bool,
 }
 
 impl Array<'_, '_> {
-    /// Decodes all rows of a frame at once; `scratch` is room for scaled inputs and for features. Not inlined,
-    /// because decoding by rows would need its stack too.
+    /// Decodes all rows of a frame at once; `scratch` is room for scaled inputs, for features and for readings relative
+    /// to the baseline. Not inlined, because decoding by rows would need its stack too.
     #[inline(never)]
     fn decode(
         &self,
         exp: fn(f32) -> f32,
-        readings: &[f32],
-        gate: Option<Gate<'_>>,
-        scratch: [&mut [f32]; 2],
+        frame: Frame<'_>,
+        scratch: [&mut [f32]; 3],
         estimate: &mut Estimate<'_>,
     ) {
         let outputs = estimate.outputs.chunks_exact_mut(self.outputs.max(1));
-        let mut rows = readings.chunks_exact(self.inputs.max(1)).zip(outputs).enumerate();
-        let at_rest = gate.is_some_and(|gate| {
+        let mut rows = frame.readings_ohm.chunks_exact(self.inputs.max(1)).zip(outputs).enumerate();
+        let at_rest = frame.gate.is_some_and(|gate| {
             rows.all(|(row, (readings, outputs))| gate.give_rest(row, readings, outputs))
         });
-        let mut status = if at_rest {
+        let status = if at_rest {
             RowStatus::AtRest
         } else {
-            let [scaled, features] = scratch;
+            let [scaled, features, ratios] = scratch;
+            let readings = if self.relative {
+                divide(frame.readings_ohm, frame.reciprocals, ratios);
+                &*ratios
+            } else {
+                frame.readings_ohm
+            };
             self.projection.project(readings, features);
-            decode_inputs(self.section, exp, features, scaled, estimate.outputs)
-        };
-        if !matches!(status, RowStatus::Decoded | RowStatus::AtRest) {
-            // Features can overflow although no reading is missing.
-            if all_finite(readings) {
-                status = RowStatus::Overflow;
+            match decode_inputs(self.section, exp, features, scaled, estimate.outputs) {
+                RowStatus::Decoded => RowStatus::Decoded,
+                other => {
+                    estimate.outputs.fill(f32::NAN);
+                    // Features can overflow although no reading is missing.
+                    if all_finite(readings) { RowStatus::Overflow } else { other }
+                }
             }
-            estimate.outputs.fill(f32::NAN);
-        }
+        };
         estimate.status.fill(status);
     }
 }

@@ -41,7 +41,7 @@ pub use blob::Aligned;
 pub use blob::AlignedBytes;
 #[cfg(feature = "std")]
 pub use decoder::OwnedEstimate;
-pub use decoder::{Decoder, decoder_ram_bytes};
+pub use decoder::{Decoder, Frame, decoder_ram_bytes};
 pub use estimate::{Estimate, RowStatus};
 pub use frame::{ColumnWire, RowWire, Wires};
 pub use gate::Gate;

@@ -133,7 +133,7 @@ fn a_decoder_marks_rows_with_missing_readings_and_leaves_the_others() {
     let mut buffer = Aligned([0; 512]);
     let decoder = Decoder::<2>::load(small_model(&mut buffer.0)).unwrap();
     let frame = [54.0, f32::NAN, 54.0, 64.0];
-    let estimate = decoder.decode(&frame).unwrap();
+    let estimate = decoder.decode(&frame[..]).unwrap();
     assert_eq!(estimate.status, [RowStatus::MissingReading, RowStatus::Decoded]);
     assert!(estimate.outputs[0].is_nan());
     assert_eq!(estimate.outputs[1], 1.0); // at the centre: 1.5·1 − 0.5
@@ -157,7 +157,7 @@ fn readings_that_overflow_are_told_from_missing_ones() {
     let blob = encode(&parts, &mut buffer.0).unwrap();
     let decoder = Decoder::<2>::load(blob).unwrap();
     let frame = [3e38, 64.0, 54.0, 64.0];
-    let estimate = decoder.decode(&frame).unwrap();
+    let estimate = decoder.decode(&frame[..]).unwrap();
     assert_eq!(estimate.status, [RowStatus::Overflow, RowStatus::Decoded]);
     assert!(estimate.outputs[0].is_nan() && estimate.outputs[1].is_finite());
 }

@@ -4,7 +4,7 @@ use model_core::blob::{DecodeError, Metadata, ModelParts, ModelShape, encode_to_
 use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
 use model_core::rbf::direct::{self, Parameters};
 use model_core::rbf::{Network, NetworkError, Shape};
-use model_core::{AlignedBytes, Decoder, Estimate, RowStatus};
+use model_core::{AlignedBytes, Decoder, Estimate, Frame, RowStatus};
 
 const ROWS: usize = 8;
 const COLS: usize = 18;
@@ -96,7 +96,8 @@ fn decodes_as_its_networks<E: ExpKernel>() {
     let (mut outputs, mut status) = ([7.0; ROWS * OUTPUTS], [RowStatus::Overflow; ROWS]);
     let mut estimate = Estimate { outputs: &mut outputs, status: &mut status };
 
-    decoder.decode_with::<E>(&frame, None, &mut [0.0; COLS], &mut estimate).unwrap();
+    let whole = Frame::from(&frame[..]);
+    decoder.decode_with::<E>(whole, &mut [0.0; COLS], &mut estimate).unwrap();
 
     assert_eq!(status, [RowStatus::Decoded; ROWS]);
     assert_eq!(bits(&outputs), bits(&inferred::<E>(1, &frame)), "{}", E::NAME);
@@ -113,7 +114,7 @@ fn it_decodes_bit_for_bit_as_its_networks_infer_with_every_exponential() {
 fn it_decodes_with_the_polynomial_unless_told_otherwise() {
     let blob = blob(2, ROWS);
     let decoder = PaperDecoder::load(&blob).unwrap();
-    let estimate = decoder.decode(&frame()).unwrap();
+    let estimate = decoder.decode(&frame()[..]).unwrap();
     assert_eq!(bits(&estimate.outputs), bits(&inferred::<Polynomial>(2, &frame())));
     assert_ne!(bits(&estimate.outputs), bits(&inferred::<Micromath>(2, &frame())));
     assert_eq!(decoder.metadata().name, "hand-made");
@@ -169,7 +170,7 @@ fn a_slice_of_another_length_is_refused_by_name_and_nothing_is_written() {
         let (mut outputs, mut status) = (vec![7.0; outputs], vec![RowStatus::Overflow; rows]);
         let mut estimate = Estimate { outputs: &mut outputs, status: &mut status };
         let readings = &frame.repeat(2)[..readings];
-        let error = decoder.decode_into(readings, &mut vec![0.0; scratch], &mut estimate);
+        let error = decoder.decode_into(readings.into(), &mut vec![0.0; scratch], &mut estimate);
         assert!(outputs.iter().all(|output| *output == 7.0));
         assert!(status.iter().all(|status| *status == RowStatus::Overflow));
         error.unwrap_err()

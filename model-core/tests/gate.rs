@@ -4,7 +4,7 @@ use model_core::blob::{Metadata, ModelParts, ModelShape, encode};
 use model_core::gate::Rest;
 use model_core::rbf::Shape;
 use model_core::rbf::direct::{Network, Parameters};
-use model_core::{Aligned, Decoder, Gate, OwnedEstimate, RowStatus};
+use model_core::{Aligned, Decoder, Frame, Gate, OwnedEstimate, RowStatus};
 
 const ROWS: usize = 3;
 const COLS: usize = 2;
@@ -51,8 +51,8 @@ fn decode_gated(
         status: vec![RowStatus::Overflow; ROWS],
     };
     let mut scratch = [0.0; COLS];
-    let readings = frame.as_flattened();
-    decoder.decode_gated(readings, gate, &mut scratch, &mut estimate.borrowed()).unwrap();
+    let frame = Frame { gate, ..Frame::from(frame.as_flattened()) };
+    decoder.decode_into(frame, &mut scratch, &mut estimate.borrowed()).unwrap();
     estimate
 }
 

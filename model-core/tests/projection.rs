@@ -8,7 +8,7 @@ use model_core::gate::Rest;
 use model_core::projection::Projection;
 use model_core::rbf::direct::{self, Parameters};
 use model_core::rbf::{Network, Shape};
-use model_core::{Aligned, Decoder, Gate, OwnedEstimate, RowStatus};
+use model_core::{Aligned, Decoder, Frame, Gate, OwnedEstimate, RowStatus};
 
 /// A projection block: the first feature is the mean of the four readings, the second the difference of the rows.
 const BLOCK: [f32; 10] = [0.0, 10.0, 0.25, 0.25, 0.25, 0.25, 0.25, -0.25, 0.25, -0.25];
@@ -54,7 +54,7 @@ fn the_features_of_a_whole_frame_decide_all_rows() {
     model.projection().unwrap().project(&NEAR_CENTRE, &mut features);
     assert_eq!(features, [54.0, 5.0]);
     let activation = (-2.0_f32 * 0.0625).exp();
-    let estimate = decoder.decode(&NEAR_CENTRE).unwrap();
+    let estimate = decoder.decode(&NEAR_CENTRE[..]).unwrap();
     assert_eq!(estimate.status, [RowStatus::Decoded; 2]);
     let expected = [1.5 * activation - 0.5, 3.0 * activation - 1.0];
     for (outputs, expected) in estimate.outputs.iter().zip(expected) {
@@ -69,7 +69,7 @@ fn one_missing_reading_leaves_no_row_to_decode() {
     for missing in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         let mut frame = NEAR_CENTRE;
         frame[2] = missing;
-        let estimate = decoder.decode(&frame).unwrap();
+        let estimate = decoder.decode(&frame[..]).unwrap();
         assert_eq!(estimate.status, [RowStatus::MissingReading; 2]);
         assert!(estimate.outputs.iter().all(|output| output.is_nan()));
     }
@@ -82,7 +82,7 @@ fn features_that_overflow_are_told_from_missing_readings() {
     let blob = encoded(&block, &[network(2)], &[0, 0], &mut buffer.0).unwrap();
     let decoder = Decoder::<2>::load(blob).unwrap();
     let frame = [f32::MAX, f32::MAX, -f32::MAX, -f32::MAX];
-    let estimate = decoder.decode(&frame).unwrap();
+    let estimate = decoder.decode(&frame[..]).unwrap();
     assert_eq!(estimate.status, [RowStatus::Overflow; 2]);
     assert!(estimate.outputs.iter().all(|output| output.is_nan()));
 }
@@ -91,19 +91,21 @@ fn features_that_overflow_are_told_from_missing_readings() {
 fn an_array_is_at_rest_as_a_whole_or_not_at_all() {
     let mut buffer = Aligned([0; 1024]);
     let decoder = Decoder::<2>::load(array(&mut buffer.0)).unwrap();
-    let rest = decoder.decode(&NEAR_CENTRE).unwrap();
+    let rest = decoder.decode(&NEAR_CENTRE[..]).unwrap();
     let OwnedEstimate { outputs, status } = &rest;
     let gate = Gate::new(Rest { baseline_ohm: &NEAR_CENTRE, outputs, status }, 0.02);
     let mut estimate = rest.clone();
     let mut scratch = [0.0; 4];
     let mut frame = NEAR_CENTRE;
     frame[0] *= 1.01;
-    decoder.decode_gated(&frame, gate, &mut scratch, &mut estimate.borrowed()).unwrap();
+    let gated = Frame { gate, ..Frame::from(&frame[..]) };
+    decoder.decode_into(gated, &mut scratch, &mut estimate.borrowed()).unwrap();
     assert_eq!((&estimate.status[..], &estimate.outputs), (&[RowStatus::AtRest; 2][..], outputs));
     // A touch of the last row makes the first one be decoded too.
     frame[3] *= 1.03;
-    decoder.decode_gated(&frame, gate, &mut scratch, &mut estimate.borrowed()).unwrap();
-    assert_eq!(estimate, decoder.decode(&frame).unwrap());
+    let gated = Frame { gate, ..Frame::from(&frame[..]) };
+    decoder.decode_into(gated, &mut scratch, &mut estimate.borrowed()).unwrap();
+    assert_eq!(estimate, decoder.decode(&frame[..]).unwrap());
     assert_eq!(estimate.status, [RowStatus::Decoded; 2]);
 }
 

@@ -68,7 +68,8 @@ impl<const R: usize> Decoded<R> {
         let outputs = self.outputs.as_flattened_mut();
         let mut estimate = Estimate { outputs, status: &mut self.status };
         let mut scratch = [0.0; 2 * COLS];
-        decoder.decode_with::<E>(frame.as_flattened(), gate, &mut scratch, &mut estimate).ok()
+        let frame = model_core::Frame { gate, ..frame.as_flattened().into() };
+        decoder.decode_with::<E>(frame, &mut scratch, &mut estimate).ok()
     }
 
     /// What `decoder` makes of `frame`.

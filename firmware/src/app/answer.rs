@@ -73,6 +73,12 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                     Err(refusal) => Err(refusal),
                 }
             }
+            Request::SetBaseline { readings_ohm } => {
+                match self.set_baseline(number, readings_ohm, model) {
+                    Ok(()) => return None,
+                    Err(refusal) => Err(refusal),
+                }
+            }
             Request::Upload(step) => self
                 .upload_step(step, model, spare, &mut leave)
                 .map(|()| Report::Upload(self.upload.state())),
@@ -148,6 +154,34 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         }
     }
 
+    fn set_baseline(
+        &mut self,
+        number: u16,
+        readings_ohm: Floats<'_>,
+        model: &InForce<'_, ROWS>,
+    ) -> Result<(), Refusal> {
+        self.check_length(readings_ohm)?;
+        self.give_up_capture();
+        self.set_frame(readings_ohm.iter());
+        self.baseline.restart(self.wires.readings());
+        self.baseline.add(self.frame);
+        self.decode_baseline(model.decoder.as_ref());
+        let report = Report::Baseline { readings_ohm: Floats::of(self.baseline.mean()) };
+        let sent = self.line.send(number, &report);
+        self.count_lost(sent);
+        Ok(())
+    }
+
+    /// Checks that there are as many readings as are scanned.
+    fn check_length(&self, readings_ohm: Floats<'_>) -> Result<(), Refusal> {
+        let expected = self.wires.readings();
+        if readings_ohm.0.len() == 4 * expected {
+            Ok(())
+        } else {
+            Err(Refusal::FrameLength { expected: expected as u16 })
+        }
+    }
+
     fn decode_readings(
         &mut self,
         number: u16,
@@ -155,10 +189,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         readings_ohm: Floats<'_>,
         model: &InForce<'_, ROWS>,
     ) -> Result<(), Refusal> {
-        let expected = self.wires.readings();
-        if readings_ohm.0.len() != 4 * expected {
-            return Err(Refusal::FrameLength { expected: expected as u16 });
-        }
+        self.check_length(readings_ohm)?;
         self.set_frame(readings_ohm.iter());
         let (flags, _) = self.decode(model.decoder.as_ref());
         self.send_estimate(number, frame, 0, flags);

@@ -16,7 +16,10 @@ pub struct Buffers<
     pub(super) message: [u8; BYTES],
     pub(super) frame: [[f32; COLUMNS]; ROWS],
     pub(super) baseline: [[f32; COLUMNS]; ROWS],
-    pub(super) scratch: [[f32; COLUMNS]; ROWS],
+    /// One over each reading of the baseline.
+    pub(super) reciprocals: [[f32; COLUMNS]; ROWS],
+    /// Working space of a decoder: more than a frame's readings and those of two rows.
+    pub(super) scratch: [[[f32; COLUMNS]; ROWS]; 2],
     pub(super) estimate: Outcome<ROWS, OUTPUTS>,
     pub(super) rest: Outcome<ROWS, OUTPUTS>,
 }
@@ -53,7 +56,7 @@ impl<const ROWS: usize, const COLUMNS: usize, const OUTPUTS: usize, const BYTES:
         const {
             let capacity = Self::CAPACITY;
             assert!(BYTES >= capacity.message_bytes(), "the longest message must fit");
-            assert!(ROWS >= 1 && ROWS <= 255 && OUTPUTS >= 1 && OUTPUTS <= 255);
+            assert!(ROWS >= 2 && ROWS <= 255 && OUTPUTS >= 1 && OUTPUTS <= 255);
             assert!(COLUMNS >= 1 && COLUMNS <= model_core::health::MOST_COLUMNS);
         }
         Self {
@@ -61,7 +64,8 @@ impl<const ROWS: usize, const COLUMNS: usize, const OUTPUTS: usize, const BYTES:
             message: [0; BYTES],
             frame: [[0.0; COLUMNS]; ROWS],
             baseline: [[0.0; COLUMNS]; ROWS],
-            scratch: [[0.0; COLUMNS]; ROWS],
+            reciprocals: [[0.0; COLUMNS]; ROWS],
+            scratch: [[[0.0; COLUMNS]; ROWS]; 2],
             estimate: Outcome::NOTHING,
             rest: Outcome::NOTHING,
         }

@@ -38,12 +38,10 @@ impl<'a, const ROWS: usize> InForce<'a, ROWS> {
 /// Checks a blob from end to end, and that the image has room for its model.
 pub fn check(capacity: Capacity, blob: &[u8]) -> Result<Model<'_>, ModelFault> {
     let model = Model::decode(blob).map_err(|error| fault(&error))?;
-    let scratch = if model.projection().is_some() { 2 } else { 1 };
-    let room = scratch * model.shape().inputs <= capacity.wires().readings();
     let mut names = model.metadata().input_names.iter().step_by(model.shape().inputs.max(1));
     let driven = names.all(|name| row_of(name).is_none_or(|row| row.0 < capacity.rows));
     match capacity.wires_for(model.shape()) {
-        Some(_) if room && driven => Ok(model),
+        Some(_) if driven => Ok(model),
         _ => Err(ModelFault::Shape),
     }
 }

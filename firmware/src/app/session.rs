@@ -3,7 +3,8 @@
 use model_core::blob::Floats;
 use model_core::gate::Rest;
 use model_core::health::{Health, Limits};
-use model_core::{Decoder, Estimate, Gate, RowStatus, RowWire};
+use model_core::relative::reciprocal;
+use model_core::{Decoder, Estimate, Frame, Gate, RowStatus, RowWire};
 
 use super::model::{InForce, choose, copy_to, row_wires};
 use super::{App, Core};
@@ -186,7 +187,14 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             };
             let gate = captured.then(|| Gate::new(rest, self.configuration.rest_tolerance));
             let mut estimate = cut(&mut self.estimate, self.rows, self.outputs);
-            let decoded = decoder.decode_gated(frame, gate.flatten(), self.scratch, &mut estimate);
+            let decoded = decoder.decode_into(
+                Frame { readings_ohm: frame, reciprocals: self.reciprocals, gate: gate.flatten() },
+                self.scratch,
+                &mut estimate,
+            );
+            if decoder.metadata().relative_inputs && self.baseline.frames() == 0 {
+                flags |= EstimateReport::NO_BASELINE;
+            }
             // The model's shape was found to fit when it came into force.
             if decoded.is_err() || estimate.status.contains(&RowStatus::Overflow) {
                 flags |= EstimateReport::OVERFLOW;
@@ -252,11 +260,19 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         }
     }
 
-    /// Decodes the baseline with the model in force, and keeps the outputs for rows at rest.
-    fn decode_baseline(&mut self, decoder: Option<&Decoder<'_, ROWS>>) {
+    /// Takes the baseline's reciprocals, decodes it with the model in force, and keeps the outputs for rows at rest.
+    pub(super) fn decode_baseline(&mut self, decoder: Option<&Decoder<'_, ROWS>>) {
+        let known = self.baseline.frames() > 0;
+        self.reciprocals.fill(f32::NAN);
+        for (place, mean) in self.reciprocals.iter_mut().zip(self.baseline.mean()).filter(|_| known)
+        {
+            *place = reciprocal(*mean);
+        }
         let mut rest = cut(&mut self.rest, self.rows, self.outputs);
-        let decoded = decoder.is_some_and(|decoder| {
-            decoder.decode_into(self.baseline.mean(), self.scratch, &mut rest).is_ok()
+        let decoded = decoder.filter(|_| known).is_some_and(|decoder| {
+            let readings_ohm = self.baseline.mean();
+            let frame = Frame { readings_ohm, reciprocals: self.reciprocals, gate: None };
+            decoder.decode_into(frame, self.scratch, &mut rest).is_ok()
         });
         if !decoded {
             rest.status.fill(RowStatus::MissingReading);

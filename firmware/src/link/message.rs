@@ -40,6 +40,12 @@ pub enum Request<'a> {
     Upload(#[serde(borrow)] UploadStep<'a>),
     /// Restart the device, as after power-on. Answered by [`Report::Restarting`].
     Restart,
+    /// Take these readings as the baseline. Answered by [`Report::Baseline`].
+    SetBaseline {
+        /// Readings in Ω for the model in force, row after row; NaN is unknown.
+        #[serde(borrow)]
+        readings_ohm: Floats<'a>,
+    },
 }
 
 /// Steps of uploading a model, in their order.
@@ -234,6 +240,8 @@ impl EstimateReport<'_> {
     pub const OVERFLOW: u8 = 1 << 2;
     /// Flag: at least one frame before this one could not be scanned in time.
     pub const OVERRUN: u8 = 1 << 3;
+    /// Flag: the model takes readings relative to the baseline, and there is none: no row is decoded.
+    pub const NO_BASELINE: u8 = 1 << 5;
     /// Flag: a baseline was captured, and a reading differs from it by more than the threshold.
     pub const CONTACT: u8 = 1 << 4;
 }

@@ -16,7 +16,7 @@ use firmware::link::message::{
 use firmware::link::receive::{Received, Receiver};
 use firmware::link::{cobs, packet};
 use model_core::Wires;
-use model_core::blob::ModelShape;
+use model_core::blob::{Floats, ModelShape};
 use serde::Serialize;
 
 use crate::error::{Error, Result};
@@ -308,6 +308,15 @@ impl<W: Wire> Device<W> {
         self.ask_plainly(&Request::Configure(configuration), |report| {
             matches!(report, Report::Configuration(_)).then_some(())
         })
+    }
+
+    /// Gives the device a baseline in Ω, one number a reading of its model.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] if their number is another, or the errors of [`ask`](Self::ask).
+    pub fn set_baseline(&mut self, baseline_ohm: &[f32]) -> Result<()> {
+        let request = Request::SetBaseline { readings_ohm: Floats::of(baseline_ohm) };
+        self.ask_plainly(&request, |report| matches!(report, Report::Baseline { .. }).then_some(()))
     }
 
     /// Runs `work` while the device does not scan, so that no reports come unasked. The former

@@ -7,14 +7,15 @@ use firmware::link::message::Memory;
 use host_sim::{Error, Result};
 use taxel_data::csv_file::CsvFile;
 use taxel_data::random::Stream;
-use taxel_data::table::Table;
 use taxel_learn::{Exponential, ModelBlob};
-use taxel_rig::device::check::{Findings, Plan};
+use taxel_rig::device::check::{Findings, Frames, Plan};
 use taxel_simulate::sensor::Precision;
-use taxel_simulate::{World, synthesise};
+use taxel_simulate::synth::BASELINE_FRAMES;
+use taxel_simulate::{Synthesis, World, synthesise};
 
 use super::decode::model_inputs;
 use super::progress::Terminal;
+use super::readings::BaselineArgument;
 use super::scene_argument::SceneArgument;
 use super::{Common, arguments, print};
 
@@ -30,6 +31,8 @@ pub struct CheckArguments {
     /// Weight blob; without it a model of the scene is trained.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
+    #[command(flatten)]
+    baseline: BaselineArgument,
     /// Frames that the device decodes. Lines of a CSV file are repeated.
     #[arg(
         short = 'n',
@@ -54,8 +57,8 @@ pub struct CheckArguments {
 
 /// What a device is checked with.
 pub struct Checked {
-    /// Readings in Ω, in the columns of the model's inputs.
-    pub readings: Table,
+    /// Readings and baseline in Ω, in the columns of the model's inputs.
+    pub frames: Frames,
     /// Model of the device.
     pub model: ModelBlob,
     /// World of the readings; `None` for those of a CSV file.
@@ -109,7 +112,9 @@ impl CheckArguments {
         let model = ModelBlob::read(path)?;
         let file = CsvFile::read(Path::new(&self.source))?;
         let readings = model_inputs(&model.prepare(Exponential::default()), &file)?;
-        Ok(Checked { readings: readings.cycled(self.frames.max(1)), model, world: None })
+        let baseline_ohm = self.baseline.values(model.parse().metadata(), path)?;
+        let frames = Frames { readings: readings.cycled(self.frames.max(1)), baseline_ohm };
+        Ok(Checked { frames, model, world: None })
     }
 
     fn load_scene(&self, common: &Common) -> Result<Checked> {
@@ -136,8 +141,17 @@ impl CheckArguments {
                 scene.name
             )));
         }
+        let path = self.model.as_deref().unwrap_or(Path::new(&self.source));
+        let baseline_ohm = if metadata.relative_inputs && self.baseline.baseline.is_none() {
+            // All frames are of one session, which does not drift.
+            let session = Synthesis::of(&scene.world).drift(None);
+            Some(session.baselines(Stream::Test, 1, BASELINE_FRAMES).values)
+        } else {
+            self.baseline.values(metadata, path)?
+        };
         let readings = synthesise(&scene.world, Stream::Test, self.frames.max(1)).inputs;
-        Ok(Checked { readings, model, world: Some(scene.world) })
+        let frames = Frames { readings, baseline_ohm };
+        Ok(Checked { frames, model, world: Some(scene.world) })
     }
 
     /// Plan of the check, with `window` frames on their way at a time.
@@ -150,18 +164,6 @@ impl CheckArguments {
             window,
         }
     }
-}
-
-/// Refuses a model that the firmware would decode without the baseline that its inputs are relative to.
-pub fn refuse_relative_inputs(blob: &ModelBlob) -> Result<()> {
-    if blob.parse().metadata().relative_inputs {
-        return Err(Error::Usage(
-            "the model's inputs are readings relative to the baseline, which the firmware does not compute: train \
-             one without --relative-inputs, or without relative_inputs = true in the scene"
-                .into(),
-        ));
-    }
-    Ok(())
 }
 
 /// Prints the findings. Wrong answers, and more memory than allowed, are a failure.

@@ -78,7 +78,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         readout: arguments.scans > 0,
     };
     options.check()?;
-    let Checked { readings, model, world } = arguments.check.load(common)?;
+    let Checked { frames, model, world } = arguments.check.load(common)?;
     let scanned_world = match &world {
         _ if arguments.scans == 0 => None,
         None => {
@@ -101,11 +101,13 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         device.patience = PATIENCE;
         let progress = Terminal::new();
         let scanned = lines.readout.zip(scanned_world).map(|(line, world)| {
-            scan::check(&mut device, &world, &model, line, arguments.scans, &progress)
+            let baseline_ohm = frames.baseline_ohm.as_deref();
+            let scans = arguments.scans;
+            scan::check(&mut device, &world, &model, baseline_ohm, line, scans, &progress)
         });
         let scans = scanned.transpose()?;
         let plan = arguments.check.plan(WINDOW, common);
-        Ok(Findings { scans, ..check(&mut device, &readings, &model, &plan, &progress)? })
+        Ok(Findings { scans, ..check(&mut device, &frames, &model, &plan, &progress)? })
     });
     // Only killing the program leaves these files behind.
     let _ = std::fs::remove_file(&blob);

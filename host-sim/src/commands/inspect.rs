@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use firmware::capacity::WEIGHT_RAM_BYTES;
 use host_sim::Result;
 use host_sim::evaluate::ram::DecoderRam;
 use serde::Serialize;
@@ -38,6 +39,8 @@ struct Summary {
     training_frames: u32,
     flash_bytes: usize,
     ram_bytes: DecoderRam,
+    /// Whether the images have room in RAM for a copy of the blob.
+    weights_in_ram: bool,
     inputs: Vec<ColumnSummary>,
     outputs: Vec<OutputSummary>,
 }
@@ -116,6 +119,7 @@ fn summarise(blob: &ModelBlob) -> Summary {
         training_frames: metadata.training_frames,
         flash_bytes: blob.bytes().len(),
         ram_bytes: DecoderRam::of(&model),
+        weights_in_ram: blob.bytes().len() <= WEIGHT_RAM_BYTES,
         inputs: metadata.input_names.iter().zip(metadata.input_units.iter()).map(column).collect(),
         outputs: outputs
             .map(|((name, unit), (training_rmse, full_scale))| OutputSummary {
@@ -175,6 +179,7 @@ fn page_of(s: &Summary) -> print::Page {
         ("estimate", ram.estimate),
         ("scaled readings", ram.scaled_readings),
         ("features", ram.features),
+        ("relative inputs", ram.relative_inputs),
         ("activations", ram.activations),
     ];
     let parts: Vec<String> = parts
@@ -182,7 +187,15 @@ fn page_of(s: &Summary) -> print::Page {
         .filter(|(_, bytes)| *bytes > 0)
         .map(|(name, bytes)| format!("{name} {bytes}"))
         .collect();
-    line("RAM", format!("{} bytes: {} (weights stay in flash)", ram.bytes(), parts.join(", ")));
+    let weights = if s.weights_in_ram {
+        format!("the images copy the blob's {} bytes to RAM, and decode there", s.flash_bytes)
+    } else {
+        format!(
+            "decoded from flash: the blob does not fit into the images' {WEIGHT_RAM_BYTES} bytes"
+        )
+    };
+    line("RAM", format!("{} bytes: {}", ram.bytes(), parts.join(", ")));
+    line("weights", weights);
     let relative = if s.relative_inputs { "; relative to the baseline, R/R₀" } else { "" };
     let names = ends(&s.inputs.iter().map(|c| c.name.as_str()).collect::<Vec<_>>());
     line("inputs", format!("{names}{relative}"));

@@ -16,9 +16,7 @@ use taxel_learn::ModelBlob;
 use taxel_rig::device::check::check;
 use taxel_rig::device::{Device, DeviceIdentity, Wire, serial, upload};
 
-use super::check_arguments::{
-    CheckArguments, Checked, conclude, memory_lines, refuse_relative_inputs,
-};
+use super::check_arguments::{CheckArguments, Checked, conclude, memory_lines};
 use super::{Common, print};
 
 /// Talk to a device on a serial port: identify, upload, record.
@@ -136,7 +134,6 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         }
         Action::Upload(action) => {
             let model = ModelBlob::read(&action.model)?;
-            refuse_relative_inputs(&model)?;
             let mut device = open()?;
             let progress = Terminal::new();
             device.while_paused(|device| upload::replace(device, model.bytes(), &progress))?;
@@ -145,11 +142,11 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         Action::Record(action) => record(&mut open()?, action, common),
         Action::Baseline(action) => baseline(&mut open()?, action, common),
         Action::Check(action) => {
-            let Checked { readings, model, .. } = action.load(common)?;
+            let Checked { frames, model, .. } = action.load(common)?;
             let mut device = open()?;
             let plan = action.plan(1, common);
             let progress = Terminal::new();
-            let findings = check(&mut device, &readings, &model, &plan, &progress)?;
+            let findings = check(&mut device, &frames, &model, &plan, &progress)?;
             conclude(&findings, &action.limits, common)
         }
     }

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use host_sim::{Error, Result};
+use model_core::blob::Metadata;
 use taxel_data::columns;
 use taxel_data::csv_file::CsvFile;
 use taxel_data::dataset::Dataset;
@@ -22,11 +23,19 @@ pub struct BaselineArgument {
 impl BaselineArgument {
     /// Gives the baseline to `model`, which was read from `path`.
     pub fn apply<'b>(&self, model: PreparedModel<'b>, path: &Path) -> Result<PreparedModel<'b>> {
-        let metadata = model.model().metadata();
+        Ok(match self.values(model.model().metadata(), path)? {
+            Some(baseline) => model.with_baseline(&baseline),
+            None => model,
+        })
+    }
+
+    /// Baseline in the readings' units, for the model with this `metadata`, which was read from `path`; `None` for a
+    /// model that needs none.
+    pub fn values(&self, metadata: &Metadata<'_>, path: &Path) -> Result<Option<Vec<f64>>> {
         let unfit =
             |message: &str| Err(Error::Unfit { path: path.into(), message: message.into() });
         match (&self.baseline, metadata.relative_inputs) {
-            (None, false) => Ok(model),
+            (None, false) => Ok(None),
             (None, true) => unfit(
                 "its inputs are readings relative to the baseline: give --baseline FILE, with frames of the \
                  untouched sensor",
@@ -45,7 +54,7 @@ impl BaselineArgument {
                         columns::some_names(&missing)
                     );
                 }
-                Ok(model.with_baseline(&baseline.values))
+                Ok(Some(baseline.values))
             }
         }
     }

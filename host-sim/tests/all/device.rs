@@ -5,7 +5,9 @@ use std::time::{Duration, Instant};
 
 use crate::common::Folder;
 use crate::virtual_device::Line;
-use firmware::link::message::{Configuration, Refusal, Report, Request, UploadStep};
+use firmware::link::message::{
+    Configuration, EstimateReport, Refusal, Report, Request, UploadStep,
+};
 use host_sim::experiment::Experiment;
 use model_core::blob::Floats;
 use taxel_data::progress::Silent;
@@ -13,11 +15,10 @@ use taxel_data::random::Stream;
 use taxel_data::table::Table;
 use taxel_learn::{Exponential, ModelBlob};
 use taxel_rig::Error;
-use taxel_rig::device::check::{Plan, check};
+use taxel_rig::device::check::{Frames, Plan, check};
 use taxel_rig::device::{Device, Wire, request_bytes, upload};
 use taxel_rig::emulator::{self, Emulator};
-use taxel_simulate::World;
-use taxel_simulate::synthesise;
+use taxel_simulate::{Synthesis, World, synthesise};
 
 const SOUND: Line = Line { one_in: None };
 
@@ -31,9 +32,10 @@ fn model(centres: usize) -> ModelBlob {
     scene.train(&Silent).unwrap()
 }
 
-/// Readings of so many test frames.
-fn readings(frames: usize) -> Table {
-    synthesise(&press(), Stream::Test, frames).inputs
+/// So many test frames, for a model that needs no baseline.
+fn frames_of(frames: usize) -> Frames {
+    let readings = synthesise(&press(), Stream::Test, frames).inputs;
+    Frames { readings, baseline_ohm: None }
 }
 
 /// Ideal readings of a few frames, for a device that scans.
@@ -101,7 +103,7 @@ fn a_sound_device_passes_every_check() {
         garbage_bytes: 100_000,
         window: 4,
     };
-    let findings = check(&mut device, &readings(500), &model, &plan, &Silent).unwrap();
+    let findings = check(&mut device, &frames_of(500), &model, &plan, &Silent).unwrap();
     assert!(findings.all_good(), "{findings:#?}");
     assert_eq!(findings.frames.bit_identical, 500);
     let uploads = findings.uploads.unwrap();
@@ -207,7 +209,7 @@ fn a_device_behind_a_mailbox_passes_every_check() {
         garbage_bytes: 50_000,
         window: 4,
     };
-    let findings = check(&mut device, &readings(100), &model, &plan, &Silent).unwrap();
+    let findings = check(&mut device, &frames_of(100), &model, &plan, &Silent).unwrap();
     assert!(findings.all_good(), "{findings:#?}");
 }
 
@@ -217,9 +219,40 @@ fn another_model_on_the_device_is_replaced_by_the_one_checked_with() {
     let wanted = model(5);
     let plan =
         Plan { seed: 1, damaged_uploads: 0, interruptions: false, garbage_bytes: 0, window: 1 };
-    let findings = check(&mut device, &readings(20), &wanted, &plan, &Silent).unwrap();
+    let findings = check(&mut device, &frames_of(20), &wanted, &plan, &Silent).unwrap();
     assert!(findings.all_good(), "{findings:#?}");
     assert_eq!(findings.device.model.unwrap().crc_32, wanted.parse().crc());
+}
+
+#[test]
+fn a_device_divides_by_its_baseline_as_the_host_does() {
+    for whole_array in [false, true] {
+        let mut scene = Experiment::load("press").unwrap();
+        (scene.training.frames, scene.training.centres) = (500, 5);
+        (scene.training.relative_inputs, scene.training.whole_array) = (true, whole_array);
+        let model = scene.train(&Silent).unwrap();
+        let mut device = device(SOUND, &model);
+        // A device without a baseline decodes nothing, and says why.
+        let unknown = synthesise(&press(), Stream::Test, 1).inputs;
+        let readings: Vec<f32> = unknown.values.iter().map(|ohm| *ohm as f32).collect();
+        taxel_rig::device::stream::decode_frames(&mut device, &readings, 144, 1, |_, estimate| {
+            assert_eq!(estimate.flags, EstimateReport::NO_BASELINE);
+            assert!(estimate.outputs.iter().all(f32::is_nan));
+        })
+        .unwrap();
+        // The gain drifts by 2 %, and the baseline with it.
+        let drifted = |mut table: Table| {
+            table.values.iter_mut().for_each(|ohm| *ohm *= 1.02);
+            table
+        };
+        let session = Synthesis::of(&scene.world);
+        let baseline_ohm = Some(drifted(session.baselines(Stream::Test, 1, 100)).values);
+        let frames = Frames { readings: drifted(frames_of(50).readings), baseline_ohm };
+        let plan =
+            Plan { seed: 1, damaged_uploads: 7, interruptions: false, garbage_bytes: 0, window: 1 };
+        let findings = check(&mut device, &frames, &model, &plan, &Silent).unwrap();
+        assert!(findings.all_good(), "{findings:#?}");
+    }
 }
 
 #[test]
@@ -250,7 +283,7 @@ fn over_a_line_that_spoils_bytes_everything_still_arrives() {
     assert_eq!(identity.model.unwrap().crc_32, new.parse().crc());
     let plan =
         Plan { seed: 1, damaged_uploads: 0, interruptions: false, garbage_bytes: 0, window: 1 };
-    let findings = check(&mut device, &readings(30), &new, &plan, &Silent).unwrap();
+    let findings = check(&mut device, &frames_of(30), &new, &plan, &Silent).unwrap();
     assert_eq!(findings.frames.bit_identical, 30);
     assert!(findings.repeated > 0 && !findings.all_good(), "the line was sound");
 }

@@ -275,7 +275,7 @@ fn check<F: FrameSource + Clone + Send + 'static>(
     let source = source(RemoteReadout(Socket::new(readout)));
     crate::virtual_device::run_with(Socket::new(far), sound, model.bytes(), source);
     let mut device = Device::new(near).unwrap();
-    let findings = scan::check(&mut device, world, &model, board_end, scans, &Silent);
+    let findings = scan::check(&mut device, world, &model, None, board_end, scans, &Silent);
     // Scanning is over, and the device answers without any repetition.
     device.identify().unwrap();
     assert_eq!((device.repeated, device.damaged), (0, 0));

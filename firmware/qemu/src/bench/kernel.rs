@@ -40,7 +40,8 @@ impl Decoded {
     ) {
         let outputs = self.outputs.as_flattened_mut();
         let mut estimate = Estimate { outputs, status: &mut self.status };
-        let _ = decoder.decode_with::<E>(frame.as_flattened(), gate, scratch, &mut estimate);
+        let frame = model_core::Frame { gate, ..frame.as_flattened().into() };
+        let _ = decoder.decode_with::<E>(frame, scratch, &mut estimate);
     }
 }
 

@@ -240,7 +240,7 @@ fn device_and_host_decode_alike() {
         let decoder = Decoder::<2>::load(bytes).unwrap();
         for (readings, expected) in test.inputs.lines().zip(host.lines()) {
             let frame: Vec<f32> = readings.iter().map(|reading| *reading as f32).collect();
-            let estimate = decoder.decode(&frame).unwrap();
+            let estimate = decoder.decode(&frame[..]).unwrap();
             for (y, expected) in estimate.outputs.iter().zip(expected) {
                 assert_eq!(f64::from(*y).to_bits(), expected.to_bits());
             }

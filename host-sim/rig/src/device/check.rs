@@ -22,6 +22,15 @@ use uploads::check_uploads;
 /// Time in which any device has taken all bytes that were sent to it, however slow it is.
 const SWALLOWED: Duration = Duration::from_mins(2);
 
+/// Frames that a device is to decode.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frames {
+    /// Readings in Ω, in the columns of the model's inputs.
+    pub readings: Table,
+    /// Baseline in Ω of each of these columns, for a model with relative inputs.
+    pub baseline_ohm: Option<Vec<f64>>,
+}
+
 /// Plan of a check.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
@@ -100,7 +109,7 @@ pub struct GarbageFindings {
     pub decodes_as_before: bool,
 }
 
-/// Compares `device` with the host on frames of `readings` (Ω), which are in the columns of the model's inputs.
+/// Compares `device` with the host on `frames`, whose baseline the device takes.
 ///
 /// The model of `blob` is uploaded first if it is not active, and must be active at the end.
 ///
@@ -109,17 +118,17 @@ pub struct GarbageFindings {
 /// are no error: they are in the findings.
 pub fn check<W: Wire>(
     device: &mut Device<W>,
-    readings: &Table,
+    frames: &Frames,
     blob: &ModelBlob,
     plan: &Plan,
     progress: &dyn Progress,
 ) -> Result<Findings> {
-    device.while_paused(|device| check_paused(device, readings, blob, plan, progress))
+    device.while_paused(|device| check_paused(device, frames, blob, plan, progress))
 }
 
 fn check_paused<W: Wire>(
     device: &mut Device<W>,
-    readings: &Table,
+    frames: &Frames,
     blob: &ModelBlob,
     plan: &Plan,
     progress: &dyn Progress,
@@ -127,9 +136,10 @@ fn check_paused<W: Wire>(
     let exponential = prepare(device, blob, progress)?;
 
     let model = blob.prepare(exponential);
-    let expected = Expected::new(&model, readings);
+    let Frames { readings, baseline_ohm } = frames;
+    let expected = Expected::new(model, readings, baseline_ohm.as_deref());
     let frames = readings.len();
-    let crc_32 = model.model().crc();
+    let crc_32 = blob.parse().crc();
     let (bit_identical, time) = expected.count_same(device, frames, plan.window, progress)?;
     let frames =
         FrameFindings { frames, bit_identical, frames_per_s: frames as f64 / time.as_secs_f64() };

@@ -15,18 +15,35 @@ pub(super) struct Expected {
     readings_ohm: Vec<f32>,
     outputs: Vec<f32>,
     per_frame: [usize; 2],
+    /// Baseline that the device needs, in Ω.
+    baseline_ohm: Option<Vec<f32>>,
 }
 
 impl Expected {
-    /// Answers of `model` to `readings`, with the exponential that it was prepared with.
-    pub(super) fn new(model: &PreparedModel<'_>, readings: &Table) -> Self {
+    /// Answers of `model` to `readings`, with the exponential that it was prepared with, and with this baseline if
+    /// its inputs are relative.
+    pub(super) fn new(
+        model: PreparedModel<'_>,
+        readings: &Table,
+        baseline_ohm: Option<&[f64]>,
+    ) -> Self {
+        let model = match baseline_ohm {
+            Some(baseline) => model.with_baseline(baseline),
+            None => model,
+        };
         let outputs = model.decode_table(readings);
         let f32s = |values: &[f64]| values.iter().map(|value| *value as f32).collect();
         Self {
+            baseline_ohm: baseline_ohm.map(f32s),
             readings_ohm: f32s(&readings.values),
             outputs: f32s(&outputs.values),
             per_frame: [readings.names.len(), outputs.names.len()],
         }
+    }
+
+    /// Gives the device the baseline that it needs, if any.
+    pub(super) fn set_baseline<W: Wire>(&self, device: &mut Device<W>) -> Result<()> {
+        self.baseline_ohm.as_deref().map_or(Ok(()), |baseline| device.set_baseline(baseline))
     }
 
     fn first(&self, frames: usize) -> &[f32] {
@@ -59,6 +76,7 @@ impl Expected {
         progress: &dyn Progress,
     ) -> Result<(usize, Duration)> {
         let mut same = 0;
+        self.set_baseline(device)?;
         progress.stage("decoding on the device", frames);
         let time = stream::decode_frames(
             device,
@@ -110,6 +128,7 @@ mod tests {
             readings_ohm: vec![60.0; 4],
             outputs: vec![0.5, -0.25, 0.0, 1.0],
             per_frame: [2, 2],
+            baseline_ohm: None,
         };
         assert!(expected.is_same(1, [0.0, 1.0].into_iter()));
         let next = f32::from_bits(1.0_f32.to_bits() + 1);

@@ -77,7 +77,7 @@ pub fn with_parts_of_image(world: &World) -> Result<World> {
 /// Lets `device` scan the test frames of `world` on a virtual board that is served on `line`.
 ///
 /// The results are compared with those of the same scanner on an equal board. The model of `blob` is
-/// active afterwards.
+/// active afterwards, with the baseline `baseline_ohm` if it needs one.
 ///
 /// # Errors
 /// [`Error`] if the device stops answering, the board refuses a request, or world, model and device do
@@ -86,6 +86,7 @@ pub fn check<W: Wire>(
     device: &mut Device<W>,
     world: &World,
     blob: &ModelBlob,
+    baseline_ohm: Option<&[f64]>,
     line: TcpStream,
     scans: usize,
     progress: &dyn Progress,
@@ -97,7 +98,8 @@ pub fn check<W: Wire>(
     let readings = all_readings(&world, scans);
     let board = VirtualBoard::new(&world)?;
     let scanned = virtual_board::scan(&board, series_of_image(), &readings)?;
-    let expected = Expected::new(&model, &scanned);
+    let expected = Expected::new(model, &scanned, baseline_ohm);
+    expected.set_baseline(device)?;
     let scan = board.scan_settings();
     let configuration = Configuration {
         frame_period_us: PERIOD_US,

@@ -298,15 +298,6 @@ fn pins_have_numbers() {
 }
 
 #[test]
-fn a_sensor_of_other_sizes_is_refused() {
-    let mut world = World::press();
-    world.sensor.column_wires = 9;
-    let refused = VirtualBoard::new(&world).unwrap_err();
-    assert_eq!(refused.field, "sensor");
-    assert!(refused.to_string().contains("8 row-wires and 9 column-wires"), "{refused}");
-}
-
-#[test]
 fn a_smaller_sensor_and_some_of_its_rows_are_read_alone() {
     let world = World {
         sensor: Sensor { row_wires: 4, column_wires: 5, ..World::press().sensor },

@@ -44,7 +44,7 @@ fn small_model(
 ) -> Result<ModelBlob> {
     let rows = model.parse().shape().rows;
     let few = readings.cycled(64);
-    let outputs = model.prepare(Exponential::default()).decode_table(&few);
+    let outputs = model.prepare(Exponential::default()).of_inputs().decode_table(&few);
     let mut frames =
         Dataset { inputs: few, outputs, rows, common_span: false, relative_inputs: false };
     // Long names would be most of the blob; those of the first readings tell the rows.
