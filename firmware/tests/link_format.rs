@@ -35,6 +35,41 @@ fn report_bytes(number: u16, report: &Report<'_>) -> Vec<u8> {
     bytes
 }
 
+/// One request of each kind, with its bytes.
+fn requests(readings_ohm: Floats<'_>) -> Vec<(&'static str, Vec<u8>)> {
+    let upload = |step| request_bytes(6, &Request::Upload(step));
+    vec![
+        ("identify", request_bytes(1, &Request::Identify)),
+        ("statistics?", request_bytes(2, &Request::Statistics)),
+        ("configuration?", request_bytes(3, &Request::Configuration)),
+        ("configure", request_bytes(300, &Request::Configure(Configuration::DEFAULT))),
+        (
+            "configure: rest tolerance 0.0175",
+            request_bytes(
+                300,
+                &Request::Configure(Configuration {
+                    rest_tolerance: 0.0175,
+                    ..Configuration::DEFAULT
+                }),
+            ),
+        ),
+        (
+            "capture baseline of 20 frames",
+            request_bytes(4, &Request::CaptureBaseline { frames: 20 }),
+        ),
+        (
+            "decode frame 300: 60 Ω, missing",
+            request_bytes(5, &Request::Decode { frame: 300, readings_ohm }),
+        ),
+        ("begin, 1000 bytes", upload(UploadStep::Begin { length: 1000 })),
+        ("chunk at 512", upload(UploadStep::Chunk { offset: 512, bytes: &[0, 1, 0, 2] })),
+        ("commit", upload(UploadStep::Commit)),
+        ("abort", upload(UploadStep::Abort)),
+        ("restart", request_bytes(7, &Request::Restart)),
+        ("set baseline: 60 Ω, unknown", request_bytes(8, &Request::SetBaseline { readings_ohm })),
+    ]
+}
+
 #[test]
 fn messages_give_the_specifications_worked_bytes() {
     let identity = Report::Identity(Identity {
@@ -81,37 +116,8 @@ fn messages_give_the_specifications_worked_bytes() {
         longest_decode_us: 2,
         ..Statistics::default()
     };
-    let upload = |step| request_bytes(6, &Request::Upload(step));
     let refused = |refusal| report_bytes(6, &Report::Refused(refusal));
-    let found = [
-        ("identify", request_bytes(1, &Request::Identify)),
-        ("statistics?", request_bytes(2, &Request::Statistics)),
-        ("configuration?", request_bytes(3, &Request::Configuration)),
-        ("configure", request_bytes(300, &Request::Configure(Configuration::DEFAULT))),
-        (
-            "configure: rest tolerance 0.0175",
-            request_bytes(
-                300,
-                &Request::Configure(Configuration {
-                    rest_tolerance: 0.0175,
-                    ..Configuration::DEFAULT
-                }),
-            ),
-        ),
-        (
-            "capture baseline of 20 frames",
-            request_bytes(4, &Request::CaptureBaseline { frames: 20 }),
-        ),
-        (
-            "decode frame 300: 60 Ω, missing",
-            request_bytes(5, &Request::Decode { frame: 300, readings_ohm }),
-        ),
-        ("begin, 1000 bytes", upload(UploadStep::Begin { length: 1000 })),
-        ("chunk at 512", upload(UploadStep::Chunk { offset: 512, bytes: &[0, 1, 0, 2] })),
-        ("commit", upload(UploadStep::Commit)),
-        ("abort", upload(UploadStep::Abort)),
-        ("restart", request_bytes(7, &Request::Restart)),
-        ("set baseline: 60 Ω, unknown", request_bytes(8, &Request::SetBaseline { readings_ohm })),
+    let reports = [
         ("identity", report_bytes(1, &identity)),
         ("statistics", report_bytes(2, &Report::Statistics(statistics))),
         ("configuration", report_bytes(3, &Report::Configuration(Configuration::DEFAULT))),
@@ -135,6 +141,7 @@ fn messages_give_the_specifications_worked_bytes() {
         ("refused: another shape", refused(Refusal::BadModel(ModelFault::Shape))),
         ("refused: flash", refused(Refusal::Flash)),
     ];
+    let found = [requests(readings_ohm), reports.to_vec()].concat();
     let found: Vec<_> = found.iter().map(|(name, bytes)| (*name, hex(bytes))).collect();
     let table: Vec<_> = found.iter().map(|(name, hex)| format!("| {name} | `{hex}` |")).collect();
     assert!(found == specified(), "docs/link.md should say\n{}", table.join("\n"));

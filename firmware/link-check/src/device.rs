@@ -29,7 +29,7 @@ fn exercise_decoding() {
         return;
     };
     let mut estimate = Estimate { outputs, status: &mut status };
-    opaque(decoder.decode_into((&*frame).into(), &mut scratch, &mut estimate).is_ok());
+    opaque(decoder.decode_into(frame.into(), &mut scratch, &mut estimate).is_ok());
     opaque((decoder.shape(), decoder.scratch_floats()));
 
     let metadata = decoder.metadata();
