@@ -12,6 +12,11 @@ pub mod memory;
 pub mod region;
 
 #[cfg(target_os = "none")]
+use core::cell::UnsafeCell;
+#[cfg(target_os = "none")]
+use core::sync::atomic::{AtomicBool, Ordering};
+
+#[cfg(target_os = "none")]
 use firmware::app::{App, Buffers};
 #[cfg(target_os = "none")]
 use firmware::capacity::Capacity;
@@ -41,11 +46,21 @@ pub type BoardBuffers = Buffers<
     { CAPACITY.message_bytes() },
 >;
 
-/// Takes the application's buffers; `None` after the first call. A separate function builds them, so that its
-/// stack is free again when the application runs.
 #[cfg(target_os = "none")]
-#[inline(never)]
+struct Place(UnsafeCell<BoardBuffers>);
+
+// SAFETY: only `buffers` uses the place, and lends it once.
+#[cfg(target_os = "none")]
+unsafe impl Sync for Place {}
+
+/// Takes the application's buffers; `None` after the first call. They are zero at first, so that they need neither
+/// flash nor stack.
+#[cfg(target_os = "none")]
 #[must_use]
 pub fn buffers() -> Option<&'static mut BoardBuffers> {
-    cortex_m::singleton!(: BoardBuffers = BoardBuffers::new())
+    static BUFFERS: Place = Place(UnsafeCell::new(BoardBuffers::new()));
+    static TAKEN: AtomicBool = AtomicBool::new(false);
+    let first = !TAKEN.swap(true, Ordering::Relaxed);
+    // SAFETY: this is reached once, so no other reference exists.
+    first.then(|| unsafe { &mut *BUFFERS.0.get() })
 }
