@@ -36,10 +36,8 @@ impl Configuration {
                 (1..=ScanSettings::MOST_OVERSAMPLING).contains(&self.scan.oversampling),
                 ConfigurationField::Oversampling,
             ),
-            (
-                limits.iter().all(|limit| positive(*limit)) && limits[0] < limits[1],
-                ConfigurationField::Limits,
-            ),
+            // False for NaN. An infinite limit is none.
+            (limits[0] < limits[1], ConfigurationField::Limits),
             (positive(self.contact_threshold), ConfigurationField::ContactThreshold),
             ((0.0..1.0).contains(&self.rest_tolerance), ConfigurationField::RestTolerance),
         ];
@@ -64,7 +62,7 @@ mod tests {
             (Configuration { scan: scan(0, 0), ..good }, ConfigurationField::Oversampling),
             (Configuration { scan: scan(0, 257), ..good }, ConfigurationField::Oversampling),
             (Configuration { open_above_ohm: 5.0, ..good }, ConfigurationField::Limits),
-            (Configuration { open_above_ohm: f32::INFINITY, ..good }, ConfigurationField::Limits),
+            (Configuration { open_above_ohm: f32::NAN, ..good }, ConfigurationField::Limits),
             (Configuration { shorted_below_ohm: f32::NAN, ..good }, ConfigurationField::Limits),
             (
                 Configuration { contact_threshold: 0.0, ..good },

@@ -355,7 +355,7 @@ pub enum ConfigurationField {
     Settling,
     /// The oversampling: from 1 to 256.
     Oversampling,
-    /// The limits of readings: positive and finite, the lower one below the upper one.
+    /// The limits of readings: the lower one below the upper one. An infinite one is none.
     Limits,
     /// The threshold for contact: positive and finite.
     ContactThreshold,

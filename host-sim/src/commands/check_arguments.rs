@@ -199,9 +199,10 @@ fn page_of(f: &Findings) -> print::Page {
         line(
             "model",
             format!(
-                "{} rows of {} readings and {} outputs, weights in {}",
+                "{} × {} readings to {} × {} outputs, weights in {}",
                 m.rows,
                 m.inputs,
+                m.rows,
                 m.outputs,
                 if m.in_ram { "RAM" } else { "flash" }
             ),

@@ -173,8 +173,8 @@ fn status(status: &Status, common: &Common) -> Result<()> {
             if m.in_ram { "RAM" } else { "flash" }
         ));
         page.line(format_args!(
-            "{:<17} {} rows of {} readings and {} outputs",
-            "shape", m.rows, m.inputs, m.outputs
+            "{:<17} {} × {} readings to {} × {} outputs",
+            "shape", m.rows, m.inputs, m.rows, m.outputs
         ));
     } else {
         page.line(format_args!("{:<17} none: upload one", "model"));
