@@ -55,7 +55,7 @@ fn rows(this: &Path) -> [Vec<Step>; 2] {
             of_cargo("clippy", &clippy),
             step("docs", docs),
         ],
-        vec![own("firmware"), own("size"), own("cycles")],
+        vec![own("firmware"), own("cores"), own("size"), own("cycles")],
     ]
 }
 

@@ -6,7 +6,8 @@ use crate::toolchain::Toolchain;
 /// Function that the link check's panic handler calls, and that is defined nowhere.
 const SYMBOL: &str = "taxel_reachable_panic";
 
-const PROFILE: [&str; 2] = ["--profile", "firmware"];
+/// Profile of everything that is built for a device.
+pub const PROFILE: [&str; 2] = ["--profile", "firmware"];
 
 /// Packages that are built together. Others are built separately, since a feature that one package enables in a
 /// dependency would hold for all.

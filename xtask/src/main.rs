@@ -5,6 +5,7 @@ mod structure;
 mod toolchain;
 
 mod firmware;
+mod cores;
 mod size;
 
 mod emulate;
@@ -22,12 +23,14 @@ const HELP: &str = "\
 Usage: cargo xtask COMMAND
 
   ci                          runs everything that CI runs: format, structure, tests, clippy and docs, and at the
-                              same time firmware, size, cycles and emulate. Goes on after a failure. Ends with a
+                              same time firmware, cores, size, cycles and emulate. Goes on after a failure. Ends with a
                               summary, which shows each step's time beside that in xtask/times.txt
   structure                   checks the rules in ARCHITECTURE.md: which module and crate may import which, where
                               `unsafe` may stand, and how large a part of all lines each crate may hold
   firmware                    builds and lints all code for a device (thumbv7em-none-eabihf), and proves by
                               linking that it cannot panic
+  cores                       builds model-core and firmware for other cores as well: thumbv6m, thumbv7m,
+                              thumbv8m.main-hf, riscv32imac, and model-core for wasm32
   emulate [--accept] [NAME…]  runs the programs in firmware/qemu/src/bin in QEMU, two at a time: those of these
                               names, or all. Compares log and exit status of each with the .out file beside it.
                               Prints the logs of programs that are named. The name `application`, or no name,
@@ -70,6 +73,7 @@ fn main() -> ExitCode {
         ["emulate", ref names @ ..] if are_names(names) => emulate::run(names, Differences::Fail),
         ["log", log] => emulate::print_log(log, None),
         ["log", log, image] => emulate::print_log(log, Some(image)),
+        ["cores"] => cores::run(),
         ["size"] => size::run(),
         ["structure"] => structure::run(),
         ["cycles", ref options @ ..] => match cycles::Options::parse(options) {
@@ -93,7 +97,7 @@ fn are_names(arguments: &[&str]) -> bool {
 
 /// Says why no command has these `arguments`.
 fn misunderstood(arguments: &[&str]) -> String {
-    const COMMANDS: [&str; 6] = ["ci", "structure", "firmware", "emulate", "log", "size"];
+    const COMMANDS: [&str; 7] = ["ci", "structure", "firmware", "cores", "emulate", "log", "size"];
     match arguments {
         [] => "cargo xtask needs a command".to_owned(),
         ["log"] => "log: needs a file behind it".to_owned(),

@@ -7,7 +7,8 @@ use std::{env, fs};
 
 use crate::process::{Outcome, cargo, first_line, root, target_dir};
 
-const TARGET: &str = "thumbv7em-none-eabihf";
+/// The target of the images.
+pub const TARGET: &str = "thumbv7em-none-eabihf";
 
 const DEBIAN_CARGO: &str = "/usr/bin/cargo";
 const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
@@ -26,8 +27,14 @@ const OF_THE_HOST_TOOLCHAIN: [&str; 7] = [
     "RUSTUP_TOOLCHAIN",
 ];
 
-/// Toolchain for the target, by the source of the target's `core`.
-pub enum Toolchain {
+/// Toolchain for a target.
+pub struct Toolchain {
+    target: &'static str,
+    source: Source,
+}
+
+/// Source of the target's `core`.
+enum Source {
     /// The active toolchain has the target.
     Active,
     /// Debian's toolchain has the library's source instead, but no linker for the target.
@@ -36,9 +43,9 @@ pub enum Toolchain {
 
 impl fmt::Display for Toolchain {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Active => write!(f, "the active one, which has {TARGET}"),
-            Self::Debian { linker } => {
+        match &self.source {
+            Source::Active => write!(f, "the active one, which has {}", self.target),
+            Source::Debian { linker } => {
                 write!(f, "{DEBIAN_CARGO} with core built from source, and {}", linker.display())
             }
         }
@@ -46,22 +53,31 @@ impl fmt::Display for Toolchain {
 }
 
 impl Toolchain {
-    /// Finds the active toolchain if it has the target, else Debian's.
+    /// Finds a toolchain for the images' target.
+    ///
+    /// # Errors
+    /// As [`of`](Self::of).
+    pub fn find() -> Outcome<Self> {
+        Self::of(TARGET)
+    }
+
+    /// Finds the active toolchain if it has `target`, else Debian's.
     ///
     /// # Errors
     /// Neither can build for the target; the message says how to get either.
-    pub fn find() -> Outcome<Self> {
-        let library = first_line("rustc", &["--print", "target-libdir", "--target", TARGET]);
+    pub fn of(target: &'static str) -> Outcome<Self> {
+        let library = first_line("rustc", &["--print", "target-libdir", "--target", target]);
         if library.is_some_and(|path| Path::new(&path).is_dir()) {
-            return Ok(Self::Active);
+            return Ok(Self { target, source: Source::Active });
         }
-        debian().map_err(|cause| {
+        let source = debian().map_err(|cause| {
             format!(
-                "no toolchain for {TARGET}: the active one lacks it, and {cause}. Either\n  \
-                 rustup target add {TARGET}\nor, on Debian,\n  \
+                "no toolchain for {target}: the active one lacks it, and {cause}. Either\n  \
+                 rustup target add {target}\nor, on Debian,\n  \
                  apt-get install rustc-web cargo-web rust-web-src rust-web-clippy"
             )
-        })
+        })?;
+        Ok(Self { target, source })
     }
 
     /// Version of the compiler, as it prints it.
@@ -69,9 +85,9 @@ impl Toolchain {
     /// # Errors
     /// The compiler prints nothing.
     pub fn compiler(&self) -> Outcome<String> {
-        let rustc = match self {
-            Self::Active => "rustc",
-            Self::Debian { .. } => DEBIAN_RUSTC,
+        let rustc = match self.source {
+            Source::Active => "rustc",
+            Source::Debian { .. } => DEBIAN_RUSTC,
         };
         first_line(rustc, &["--version"]).ok_or(format!("{rustc} does not tell its version"))
     }
@@ -86,10 +102,11 @@ impl Toolchain {
     /// # Errors
     /// Debian's clippy is not installed; the message says how to get it.
     pub fn clippy(&self) -> Outcome<Command> {
-        if matches!(self, Self::Debian { .. }) && !Path::new(DEBIAN_CLIPPY).is_file() {
+        if matches!(self.source, Source::Debian { .. }) && !Path::new(DEBIAN_CLIPPY).is_file() {
             return Err(format!(
                 "{DEBIAN_CLIPPY} is not there; either\n  apt-get install {DEBIAN_CLIPPY_PACKAGE}\n\
-                 or\n  rustup target add {TARGET}"
+                 or\n  rustup target add {}",
+                self.target
             ));
         }
         Ok(self.command(DEBIAN_CLIPPY, "clippy"))
@@ -97,9 +114,9 @@ impl Toolchain {
 
     /// Command for cargo's `subcommand`; with Debian's toolchain, `debian_program` runs it.
     fn command(&self, debian_program: &str, subcommand: &str) -> Command {
-        let mut command = match self {
-            Self::Active => cargo(&[subcommand]),
-            Self::Debian { linker } => {
+        let mut command = match &self.source {
+            Source::Active => cargo(&[subcommand]),
+            Source::Debian { linker } => {
                 let mut command = Command::new(debian_program);
                 for variable in OF_THE_HOST_TOOLCHAIN {
                     command.env_remove(variable);
@@ -115,7 +132,7 @@ impl Toolchain {
         };
         // Flags given for the host, such as target-cpu=native, would break the target's build.
         command.env_remove("RUSTFLAGS").env_remove("CARGO_ENCODED_RUSTFLAGS");
-        command.args(["--target", TARGET, "--target-dir"]).arg(thumb_dir());
+        command.args(["--target", self.target, "--target-dir"]).arg(thumb_dir());
         command
     }
 }
@@ -130,7 +147,7 @@ pub fn elf(program: &str) -> PathBuf {
     thumb_dir().join(TARGET).join("firmware").join(program)
 }
 
-fn debian() -> Outcome<Toolchain> {
+fn debian() -> Outcome<Source> {
     let version = first_line(DEBIAN_RUSTC, &["--version"])
         .filter(|_| Path::new(DEBIAN_CARGO).is_file())
         .ok_or(format!("{DEBIAN_RUSTC} and {DEBIAN_CARGO} are not there"))?;
@@ -143,7 +160,7 @@ fn debian() -> Outcome<Toolchain> {
         return Err(format!("{DEBIAN_RUSTC} comes without its library's source"));
     }
     let linker = linker(&sysroot).ok_or("there is no linker for it (rust-lld or ld.lld)")?;
-    Ok(Toolchain::Debian { linker })
+    Ok(Source::Debian { linker })
 }
 
 fn sysroot(rustc: &str) -> Option<PathBuf> {
