@@ -2,14 +2,14 @@
 
 use board_common::buffers;
 use cortex_m_rt::entry;
-use defmt::{info, unwrap};
+use defmt::{info, unwrap, warn};
 use defmt_rtt as _;
 use firmware::app::PaperApp;
 use firmware::circuit::ZeroPotential;
 use firmware::link::message::{Configuration, Memory};
 use firmware::platform::{Platform, Port};
 use firmware::readout::{Mcp3208s, Scanner, ShiftRegister595};
-use nucleo_f446re::{Board, Clock, Serial, memory, restart};
+use nucleo_f446re::{Board, Clock, Oscillator, Serial, memory, restart};
 use panic_probe as _;
 use stm32f4xx_hal::gpio::{ErasedPin, Output};
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
@@ -61,6 +61,9 @@ fn main() -> ! {
         env!("CARGO_PKG_VERSION"),
         board.reset_cause
     );
+    if board.oscillator == Oscillator::Internal {
+        warn!("no 8 MHz from the ST-LINK: running from the internal oscillator, within 1 %");
+    }
     let scanner = Scanner {
         drive: ShiftRegister595::<_, 8> {
             data: board.row_data,

@@ -10,7 +10,7 @@ use crate::link::packet::UNASKED;
 use crate::log::{info, warning};
 use crate::platform::Platform;
 use crate::readout::FrameSource;
-use crate::store::{Slot, blob_in_slot};
+use crate::store::{Slot, blob_in_slot, generation};
 
 /// Why a session ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -79,6 +79,13 @@ impl<
             );
         } else {
             warning!("no model in either slot: readings only, until one is uploaded");
+        }
+        // Behind an uploaded model in slot 1, the spare slot is slot 0.
+        if chosen.is_some_and(|(slot, _)| slot == 1)
+            && generation(0, spare.bytes()) == Some(0)
+            && Decoder::<ROWS, COLS, OUTPUTS>::check(blob_in_slot(spare.bytes())).is_ok()
+        {
+            info!("slot 0 holds a model that was flashed, not uploaded: it is not used");
         }
         app.core.decode_baseline(decoder.as_ref());
         Self { app, model: InForce { decoder, identity }, spare }
