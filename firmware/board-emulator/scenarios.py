@@ -8,8 +8,10 @@ import csv
 import math
 import pathlib
 import re
+import signal
 
 from bench import ERASE_PATIENCE_S, IDENTIFY, RESTART, begin, expect
+from machine.line import Terminal
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 #: Flash that was never erased: the slots hold rubbish at first.
@@ -147,6 +149,17 @@ def restart(make, files):
     answer, _ = bench.ask(IDENTIFY)
     expect(answer[0] == IDENTITY, f"identify is answered by {answer.hex(' ')}")
     bench.finish(resets=["program"])
+
+
+def serve(make, files):
+    """A board for you: its serial port stays open until Ctrl-C."""
+    bench = make()
+    terminal = Terminal(bench.board)
+    bench.board.note(f"host-sim link {terminal.path} identify")
+    stopped = []
+    signal.signal(signal.SIGINT, lambda *_: stopped.append(True))
+    bench.board.run_until(lambda: stopped)
+    bench.finish()
 
 
 SCENARIOS = {

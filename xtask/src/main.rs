@@ -37,7 +37,8 @@ Usage: cargo xtask COMMAND
                               also compares the application with the host, in less than a minute
       --accept                writes the .out files instead
   board [OPTION…] [NAME…]     runs the board's image on an emulated STM32F446 (firmware/board-emulator): the scenarios
-                              of these names, or all. Needs Python with Unicorn, which firmware/setup.sh installs
+                              of these names, or all. The name `serve` lets the board run until Ctrl-C, at a serial
+                              port that it names. Needs Python with Unicorn, which firmware/setup.sh installs
       --frames N              lets `check` decode N frames (30)
       --model FILE            uploads this model of the scene `press`, instead of a small one
       --mutants               instead, builds images with one fault each, of these names or all; the scenarios must

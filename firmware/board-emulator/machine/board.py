@@ -1,7 +1,5 @@
 """The whole board: the microcontroller, what hangs on its pins, and the loop that runs it."""
 
-import struct
-
 from . import circuit, flash, gpio
 from .bus import Bus
 from .core import Core
@@ -181,9 +179,8 @@ class Board:
         """The processor stands still; the rest of the world does not."""
         self.usart.advance()
         self.time.now += self.time.cycles(seconds)
-        self.usart.excused = True
+        self.usart.excuse()
         self.usart.advance()
-        self.usart.excused = False
         self.time.due = self.time.now
 
     def _look(self):
@@ -294,7 +291,3 @@ class Board:
                 self.rules.breach("line-floats")
             received = received << 1 | (1 if bit is None else bit)
         return received
-
-    def word(self, symbol):
-        """The 32-bit variable of this name in memory."""
-        return struct.unpack("<I", self.cpu.uc.mem_read(self.image.symbols[symbol], 4))[0]

@@ -12,10 +12,6 @@ class Registers:
     def __init__(self):
         self.values = dict(self.AFTER_RESET)
 
-    def reset(self):
-        """Sets all registers back."""
-        self.values = dict(self.AFTER_RESET)
-
     def read(self, offset):
         """Value of the register at `offset`."""
         return self.values.get(offset, 0)

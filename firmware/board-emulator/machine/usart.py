@@ -23,16 +23,12 @@ class Usart(Registers):
         self.to_host, self.from_host = bytearray(), collections.deque()
         #: Called before the device's bytes leave.
         self.on_send = lambda: None
-        #: Whether the processor stands still because of the flash: bytes may be lost then, which hosts know.
-        self.excused = False
+        #: Cycle until which bytes may be lost, because the processor stood still for the flash. Hosts know that.
+        self._excused_until = 0
         self._status_read = False
         self._waiting = None
         self._sent_at = self._arrives_at = None
         self._byte_cycles = 0
-
-    def reset(self):
-        super().reset()
-        self._waiting = self._sent_at = self._arrives_at = None
 
     def next_event(self):
         """Cycle of the next change, or `None`."""
@@ -65,13 +61,17 @@ class Usart(Registers):
             self._receive(self.from_host.popleft())
             self._arrives_at = self._arrives_at + self._host_byte() if self.from_host else None
 
+    def excuse(self):
+        """Allows for the loss of bytes that arrived until now, or that find the byte before still there."""
+        self._excused_until = self._time.now + 2 * self._host_byte()
+
     def _host_byte(self):
         return BITS_A_BYTE * self._time.hz / self._baud
 
     def _receive(self, byte):
         if self.values[SR] & RXNE:
             self.values[SR] |= ORE
-            if not self.excused:
+            if self._time.now > self._excused_until:
                 self._rules.breach("usart-overrun")
         else:
             self.values[DR] = byte
