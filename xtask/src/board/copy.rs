@@ -1,4 +1,7 @@
 //! A copy of the workspace in which an image can be built that differs from the project's in one place.
+//!
+//! Both are built in one folder, so that the libraries of others are built once. So the copy's packages have another
+//! version: cargo would take packages of one name and version for the same, wherever they lie.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,10 +13,17 @@ use crate::toolchain::{Toolchain, elf};
 /// Folders and files that are not copied, besides hidden ones: what is built or written.
 const LEFT_OUT: [&str; 2] = ["target", "out"];
 
-/// Manifest in which the image gets another name, so that it does not replace the project's own.
-const MANIFEST: &str = "firmware/nucleo-f446re/Cargo.toml";
-const NAMED: &str = "[[bin]]\nname = \"nucleo-f446re\"";
-const RENAMED: &str = "[[bin]]\nname = \"nucleo-mutant\"";
+/// Manifests of the copy that differ: file, text that stands once in it, and what replaces it. The image has another
+/// name too, so that it does not replace the project's own.
+const MANIFESTS: [(&str, &str, &str); 2] = [
+    ("Cargo.toml", concat!("version = \"", env!("CARGO_PKG_VERSION"), "\""), "version = \"0.0.0\""),
+    (
+        "firmware/nucleo-f446re/Cargo.toml",
+        "[[bin]]\nname = \"nucleo-f446re\"",
+        "[[bin]]\nname = \"nucleo-mutant\"",
+    ),
+];
+
 const PACKAGE: &str = "nucleo-f446re";
 const IMAGE: &str = "nucleo-mutant";
 
@@ -27,10 +37,11 @@ impl Copy {
     pub fn make() -> Outcome<Self> {
         let folder = target_dir().join("board").join("workspace");
         copy_folder(root(), &folder)?;
-        let copy = Self { folder };
-        let text = read(&root().join(MANIFEST))?;
-        write_if_new(&copy.folder.join(MANIFEST), text.replacen(NAMED, RENAMED, 1).as_bytes())?;
-        Ok(copy)
+        for (file, text, other) in MANIFESTS {
+            let changed = read(&root().join(file))?.replacen(text, other, 1);
+            write_if_new(&folder.join(file), changed.as_bytes())?;
+        }
+        Ok(Self { folder })
     }
 
     /// Builds the image of `mutant`, and returns its path.
@@ -67,7 +78,7 @@ fn copy_folder(from: &Path, to: &Path) -> Outcome {
         }
         if entry.file_type().map_err(failed)?.is_dir() {
             copy_folder(&entry.path(), &to.join(name))?;
-        } else if entry.path() != root().join(MANIFEST) {
+        } else if !MANIFESTS.iter().any(|(file, ..)| entry.path() == root().join(file)) {
             let bytes = fs::read(entry.path()).map_err(failed)?;
             write_if_new(&to.join(name), &bytes)?;
         }
@@ -92,8 +103,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_image_is_renamed() {
-        let manifest = read(&root().join(MANIFEST)).unwrap();
-        assert_eq!(manifest.matches(NAMED).count(), 1);
+    fn what_differs_stands_once_in_its_manifest() {
+        for (file, text, _) in MANIFESTS {
+            assert_eq!(read(&root().join(file)).unwrap().matches(text).count(), 1, "{file}");
+        }
     }
 }
