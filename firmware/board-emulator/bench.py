@@ -1,5 +1,6 @@
 """A bench: an emulated board, and `host-sim` beside it."""
 
+import pathlib
 import random
 import re
 import subprocess
@@ -7,8 +8,12 @@ import subprocess
 from machine.board import Board
 from machine.line import Terminal, framed, packets, varint
 
-#: Version of the link's protocol that `ask` speaks (docs/link.md).
-PROTOCOL_VERSION = 2
+#: Requests that have no fields, and the variant of an answer (docs/link.md).
+IDENTIFY, CONFIGURATION, CONFIGURE = b"\x00", b"\x02", b"\x03"
+CONFIGURED = b"\x02"
+RESTART = b"\x07"
+#: Where the version of the link's protocol stands.
+PACKET = pathlib.Path(__file__).resolve().parents[1] / "src/link/packet.rs"
 #: Longest time in s of the board within which it answers most requests, and one that erases flash.
 PATIENCE_S, ERASE_PATIENCE_S = 0.5, 6.0
 #: Error of `host-sim` if the board answered too slowly, and nothing else is wrong.
@@ -66,7 +71,7 @@ class Bench:
         self._number = self._number % 126 + 1
         start, number, answers, resets = board.time.seconds(), self._number, [], len(board.resets)
         line = board.usart.to_host
-        board.usart.from_host.extend(framed(message, number, PROTOCOL_VERSION))
+        board.usart.from_host.extend(framed(message, number, protocol_version()))
 
         def over():
             whole = line.rfind(0) + 1
@@ -80,14 +85,6 @@ class Bench:
         expect(answers, silent)
         return answers[0], board.time.seconds() - start
 
-    def finish(self, resets=()):
-        """Ends the scenario: no rule may be broken, and the resets must be these."""
-        board = self.board
-        broken = ", ".join(f"{name} ({count}×)" for name, count in board.rules.counts.items())
-        expect(not broken, f"broken rules: {broken}")
-        expect(board.resets == list(resets), f"resets by {board.resets}, expected {list(resets)}")
-
-
     def scan_every(self, seconds):
         """Configures the time from one scan to the next, and nothing else."""
         answer, _ = self.ask(CONFIGURATION)
@@ -97,10 +94,17 @@ class Bench:
         answer, _ = self.ask(CONFIGURE + varint(round(seconds * 1e6)) + answer[1 + length:])
         expect(answer[:1] == CONFIGURED, f"configure is answered by {answer.hex(' ')}")
 
+    def finish(self, resets=()):
+        """Ends the scenario: no rule may be broken, and the resets must be these."""
+        board = self.board
+        broken = ", ".join(f"{name} ({count}×)" for name, count in board.rules.counts.items())
+        expect(not broken, f"broken rules: {broken}")
+        expect(board.resets == list(resets), f"resets by {board.resets}, expected {list(resets)}")
 
-IDENTIFY, CONFIGURATION, CONFIGURE = b"\x00", b"\x02", b"\x03"
-CONFIGURED = b"\x02"
-RESTART = b"\x07"
+
+def protocol_version():
+    """Version of the link's protocol."""
+    return int(re.search(r"PROTOCOL_VERSION: u8 = (\d+);", PACKET.read_text())[1])
 
 
 def begin(length):

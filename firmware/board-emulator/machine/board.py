@@ -57,7 +57,7 @@ class Board:
         self.interrupts = 0
         #: Called again and again while the board runs, with whether the program idles.
         self.glance = lambda idle: None
-        self._reset_flags, self._pending_reset, self._dead = POWER_ON, None, False
+        self._reset_flags, self._pending_reset = POWER_ON, None
         self._start()
 
     def note(self, text):
@@ -121,7 +121,7 @@ class Board:
         self.note(f"RESET by {cause}")
         self.resets.append(cause)
         self.take_log()
-        self._reset_flags, self._dead, self._pending_reset = flags, False, None
+        self._reset_flags, self._pending_reset = flags, None
         to_host = self.usart.to_host
         self._start()
         self.usart.to_host = to_host

@@ -48,9 +48,12 @@ class Core(Registers):
         self._tick_start, self._tick_pending = self._tick_due(), False
         return control | COUNTFLAG
 
+    def counts_cycles(self):
+        """Whether the counter of cycles is on."""
+        return bool(self.values.get(DEMCR, 0) & TRACE_ON and self.values.get(CYCCNT_CONTROL, 0) & 1)
+
     def _cycles(self):
-        on = self.values.get(DEMCR, 0) & TRACE_ON and self.values.get(CYCCNT_CONTROL, 0) & 1
-        return self._time.now - self._cycles_offset & 0xFFFF_FFFF if on else 0
+        return self._time.now - self._cycles_offset & 0xFFFF_FFFF if self.counts_cycles() else 0
 
     def write(self, offset, value):
         super().write(offset, value)

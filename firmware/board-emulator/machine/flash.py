@@ -14,7 +14,7 @@ SECTORS = [(0x0, 0x4000), (0x4000, 0x4000), (0x8000, 0x4000), (0xC000, 0x4000), 
            (0x20000, 0x20000), (0x40000, 0x20000), (0x60000, 0x20000)]
 #: Sectors below this one hold the program.
 FIRST_SLOT = 6
-#: Longest time in s to erase 128 KiB, by PSIZE: 8, 16 and 32 bits at once (DS10693, table 49).
+#: Longest time in s to erase 128 KiB, by PSIZE: 8, 16 and 32 bits at once (DS10693).
 ERASE_S = (4.0, 2.6, 2.0, 2.0)
 #: Time in s to program once, whatever the width.
 PROGRAM_S = 16e-6

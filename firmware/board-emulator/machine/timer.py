@@ -20,6 +20,10 @@ class Timer(Registers):
         #: Number of looks since the program did anything else.
         self.looks = 0
 
+    def period(self):
+        """Counts until it starts anew."""
+        return self.values[ARR] + 1
+
     def read(self, offset):
         if offset != CNT:
             return super().read(offset)
@@ -30,7 +34,7 @@ class Timer(Registers):
         if not self.values.get(CR1, 0) & CEN:
             return 0
         seconds = (self._time.now - self._start) / self._time.hz
-        return int(seconds * self._rate() / (self._prescaler + 1)) % (self.values[ARR] + 1)
+        return int(seconds * self._rate() / (self._prescaler + 1)) % self.period()
 
     def write(self, offset, value):
         if offset == CR1 and value & CEN and not self.values.get(CR1, 0) & CEN:

@@ -119,6 +119,18 @@ pub const MUTANTS: &[Mutant] = &[
         Instead("psize().variant(PSIZE::Psize32).ser()", "psize().variant(PSIZE::Psize8).ser()"),
         ["session", "erasing and writing take"],
     ),
+    mutant(
+        "clock-short",
+        "firmware/nucleo-f446re/src/clock.rs",
+        Instead("w.bits(u32::MAX)", "w.bits(u32::MAX - 1)"),
+        ["restart", "the clock in us ends early"],
+    ),
+    mutant(
+        "cycles-off",
+        BOARD,
+        Instead("        core.DWT.enable_cycle_counter();\n", ""),
+        ["restart", "the counter of cycles is off"],
+    ),
     // Clocks.
     mutant(
         "over-drive",
