@@ -27,3 +27,10 @@ if ! [ -d "$(rustc --print target-libdir --target "$target")" ] &&
     ! timeout 300 rustup --quiet target add "$target"; then
     apt_install "${debian_toolchain[@]}"
 fi
+
+# The emulated board: Python with Unicorn, in a folder of its own.
+emulator=firmware/board-emulator
+command -v python3 >/dev/null && python3 -m venv --help >/dev/null 2>&1 && python3 -c 'import ensurepip' 2>/dev/null ||
+    apt_install python3 python3-venv
+[ -x "$emulator/.venv/bin/python" ] || python3 -m venv "$emulator/.venv"
+"$emulator/.venv/bin/python" -m pip --quiet --disable-pip-version-check install --requirement "$emulator/requirements.txt"

@@ -4,7 +4,10 @@ mod common;
 
 use common::*;
 use firmware::app::{Leave, Session};
-use firmware::link::message::{ModelFault, Refusal, Report, Request, UploadState, UploadStep};
+use firmware::link::message::{
+    Configuration, ModelFault, Refusal, Report, Request, UploadState, UploadStep,
+};
+use model_core::Frame;
 use model_core::rbf::Shape;
 use model_core::rbf::direct::{Network, Parameters};
 
@@ -67,6 +70,24 @@ fn a_device_without_a_model_takes_one() {
     }
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&new)));
+}
+
+#[test]
+fn the_watchdog_is_fed_just_before_a_slot_is_erased_even_if_the_sensor_is_silent() {
+    let mut slots = MockSlot::pair();
+    let mut bench = Bench::new(Configuration { frame_period_us: 1000, ..quiet() });
+    let mut session = Session::start(&mut bench.app, &mut slots);
+    let board = bench.board.clone();
+    *bench.frame.borrow_mut() = Frame::missing();
+    for _ in 0..2000 {
+        session.step();
+    }
+    let feeds = || board.0.borrow().feeds;
+    let fed = feeds();
+    for (length, more) in [(1 << 20, 0), (100, 1)] {
+        let (outcome, _) = upload(&mut session, &board, &[UploadStep::Begin { length }]);
+        assert_eq!((outcome.is_ok(), feeds() - fed), (more == 1, more), "{length} bytes");
+    }
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Everything that CI runs: two rows of steps side by side, one for the host and one for the device, and the emulator
+//! Everything that CI runs: two rows of steps side by side, one for the host and one for the device, and the emulators
 //! after both.
 
 mod step;
@@ -31,7 +31,7 @@ pub fn run() -> Outcome {
 
     let start = Instant::now();
     let mut ended = in_rows(rows(&this), &directory);
-    ended.extend(in_rows([vec![last(&this)]], &directory));
+    ended.extend(in_rows([last(&this)], &directory));
     summarise(&ended, start.elapsed(), &accepted)
 }
 
@@ -59,10 +59,16 @@ fn rows(this: &Path) -> [Vec<Step>; 2] {
     ]
 }
 
-/// The step after both rows. It runs two emulators at a time, whose devices answer in time only if the machine has a
-/// core for each.
-fn last(this: &Path) -> Step {
-    own("emulate", this)
+/// Mutants of the board's image that CI builds: one for each of its files that matter most. All take some minutes.
+const MUTANTS: [&str; 4] = ["select-early", "cache-stale", "over-drive", "not-fed-before-erase"];
+
+/// The steps after both rows. They run two programs at a time, an emulator and a host or two emulators, whose devices
+/// answer in time only if the machine has a core for each.
+fn last(this: &Path) -> Vec<Step> {
+    let mut mutants = Command::new(this);
+    mutants.args(["board", "--mutants"]).args(MUTANTS).current_dir(root());
+    let mutants = Step { name: "mutants", command: mutants };
+    vec![own("emulate", this), own("board", this), mutants]
 }
 
 /// A step that is a command of this program, of which `this` is a copy.
@@ -145,9 +151,8 @@ mod tests {
     fn every_step_has_an_accepted_time() {
         let text = include_str!("../times.txt");
         let this = Path::new("xtask");
-        let last = last(this).name;
-        let rows = rows(this);
-        let steps: Vec<&str> = rows.iter().flatten().map(|step| step.name).chain([last]).collect();
+        let steps = rows(this).into_iter().flatten().chain(last(this));
+        let steps: Vec<&str> = steps.map(|step| step.name).collect();
         assert_eq!(Times::parse(text).unwrap().names(), steps);
     }
 

@@ -10,6 +10,8 @@ mod size;
 
 mod emulate;
 
+mod board;
+
 mod cycles;
 
 mod ci;
@@ -23,8 +25,9 @@ const HELP: &str = "\
 Usage: cargo xtask COMMAND
 
   ci                          runs everything that CI runs: format, structure, tests, clippy and docs, and at the
-                              same time firmware, cores, size, cycles and emulate. Goes on after a failure. Ends with a
-                              summary, which shows each step's time beside that in xtask/times.txt
+                              same time firmware, cores, size and cycles; then emulate, board and some of its mutants.
+                              Goes on after a failure. Ends with a summary, which shows each step's time beside that in
+                              xtask/times.txt
   structure                   checks the rules in ARCHITECTURE.md: which module and crate may import which, where
                               `unsafe` may stand, and how large a part of all lines each crate may hold
   firmware                    builds and lints all code for a device (thumbv7em-none-eabihf), and proves by
@@ -36,6 +39,13 @@ Usage: cargo xtask COMMAND
                               Prints the logs of programs that are named. The name `application`, or no name,
                               also compares the application with the host, in less than a minute
       --accept                writes the .out files instead
+  board [OPTION…] [NAME…]     runs the board's image on an emulated STM32F446 (firmware/board-emulator): the scenarios
+                              of these names, or all. The name `serve` lets the board run until Ctrl-C, at a serial
+                              port that it names. Needs Python with Unicorn, which firmware/setup.sh installs
+      --frames N              lets `check` decode N frames (30)
+      --model FILE            uploads this model of the scene `press`, instead of a small one
+      --mutants               instead, builds images with one fault each, of these names or all; the scenarios must
+                              fail. Takes some minutes
   log FILE [ELF]              prints a log that `host-sim emulate --log FILE` saved. ELF is the image that wrote
                               it, if it is not that command's own
   size                        prints the flash and RAM of the images; fails if an image takes more than
@@ -74,6 +84,10 @@ fn main() -> ExitCode {
         ["log", log] => emulate::print_log(log, None),
         ["log", log, image] => emulate::print_log(log, Some(image)),
         ["cores"] => cores::run(),
+        ["board", ref options @ ..] => match board::Options::parse(options) {
+            Ok(options) => board::run(&options),
+            Err(cause) => return wrong_usage(&format!("board: {cause}")),
+        },
         ["size"] => size::run(),
         ["structure"] => structure::run(),
         ["cycles", ref options @ ..] => match cycles::Options::parse(options) {

@@ -1,30 +1,31 @@
 //! Use of memory: by the program as linked, and by its stack so far.
 
-use core::ptr::addr_of;
+use core::ptr;
 
 use cortex_m_rt::STACK_PAINT_VALUE;
 use firmware::link::message::Memory;
 
 unsafe extern "C" {
-    static __vector_table: u32;
-    static __stext: u32;
-    static __etext: u32;
-    static __srodata: u32;
-    static __erodata: u32;
-    static __sdata: u32;
-    static __edata: u32;
-    static __sbss: u32;
-    static __ebss: u32;
-    static __suninit: u32;
-    static __euninit: u32;
-    static _stack_start: u32;
-    static _stack_end: u32;
+    // Mutable, because what stands there changes.
+    static mut __vector_table: u32;
+    static mut __stext: u32;
+    static mut __etext: u32;
+    static mut __srodata: u32;
+    static mut __erodata: u32;
+    static mut __sdata: u32;
+    static mut __edata: u32;
+    static mut __sbss: u32;
+    static mut __ebss: u32;
+    static mut __suninit: u32;
+    static mut __euninit: u32;
+    static mut _stack_start: u32;
+    static mut _stack_end: u32;
 }
 
 /// Number of bytes from one symbol of the linker to another.
 macro_rules! bytes {
     ($start:ident .. $end:ident) => {
-        addr_of!($end).addr() - addr_of!($start).addr()
+        (&raw const $end).addr() - (&raw const $start).addr()
     };
 }
 
@@ -83,7 +84,8 @@ pub fn stack_bytes() -> usize {
 #[must_use]
 pub fn stack_high_water_bytes() -> usize {
     let words = stack_bytes() / size_of::<u32>();
-    let bottom = addr_of!(_stack_end);
+    // The symbol is a single word, and the stack is not: exposed, its address stands for all of it.
+    let bottom = ptr::with_exposed_provenance::<u32>((&raw const _stack_end).expose_provenance());
     // SAFETY: every address lies within the stack's region, which the start-up code painted.
     let painted =
         (0..words).take_while(|&i| unsafe { bottom.add(i).read_volatile() } == STACK_PAINT_VALUE);

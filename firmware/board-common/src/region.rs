@@ -3,10 +3,11 @@
 use core::{ptr, slice};
 
 unsafe extern "C" {
-    static _slot_a_start: u8;
-    static _slot_a_end: u8;
-    static _slot_b_start: u8;
-    static _slot_b_end: u8;
+    // Mutable, because erasing and writing change what stands there.
+    static mut _slot_a_start: u8;
+    static mut _slot_a_end: u8;
+    static mut _slot_b_start: u8;
+    static mut _slot_b_end: u8;
     static mut _weights_start: u32;
     static mut _weights_end: u32;
 }

@@ -4,21 +4,23 @@ use core::cell::RefCell;
 
 use embedded_hal::spi::MODE_0;
 use embedded_hal_bus::spi::{NoDelay, RefCellDevice};
-use stm32f4xx_hal::gpio::{ErasedPin, Output, PinState, Pull};
-use stm32f4xx_hal::pac::{Peripherals, SPI2};
+use stm32f4xx_hal::gpio::{ErasedPin, Output, PinState, Pull, Speed};
+use stm32f4xx_hal::pac::Peripherals;
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Config;
 use stm32f4xx_hal::spi::Spi;
-use stm32f4xx_hal::timer::SysDelay;
+use stm32f4xx_hal::timer::{SysDelay, Timer};
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
+use crate::bus::Bus;
 use crate::clock::Clock;
 use crate::held_pin::HeldPin;
+use crate::oscillator::Oscillator;
 use crate::reset::ResetCause;
 use crate::serial::Serial;
 use crate::slot::Slot;
 
-/// Watchdog period in ms. Erasing a slot takes up to 4 s, in which the watchdog is not fed, and its own clock
+/// Watchdog period in ms. Erasing a slot takes up to 2 s, in which the watchdog is not fed, and its own clock
 /// may be up to 50 % too fast.
 const WATCHDOG_MS: u32 = 8000;
 
@@ -27,7 +29,7 @@ const WATCHDOG_MS: u32 = 8000;
 pub const SPI_HZ: u32 = 703_125;
 
 /// One analogue-to-digital converter, an `embedded_hal::spi::SpiDevice`.
-pub type Converter = RefCellDevice<'static, Spi<SPI2>, Select, NoDelay>;
+pub type Converter = RefCellDevice<'static, Bus, Select, NoDelay>;
 
 /// Chip select of an MCP3208, which must be high for 500 ns between two samples.
 pub type Select = HeldPin<90, 0>;
@@ -39,6 +41,8 @@ pub type RowPin = HeldPin<18, 18>;
 pub struct Board {
     /// Cause of the reset that started the program.
     pub reset_cause: ResetCause,
+    /// What the processor's clock is made of.
+    pub oscillator: Oscillator,
     /// The green light LD2.
     pub led: ErasedPin<Output>,
     /// Three MCP3208 converters on one bus: columns 1–8, 9–16, 17 and 18.
@@ -51,7 +55,7 @@ pub struct Board {
     pub row_latch: RowPin,
     /// Serial line to the ST-LINK's virtual COM port.
     pub serial: Serial,
-    /// Clock that counts microseconds since the start.
+    /// Clock that counts microseconds and cycles since the start.
     pub clock: Clock,
     /// Delays, by SysTick.
     pub delay: SysDelay,
@@ -62,30 +66,38 @@ pub struct Board {
 }
 
 impl Board {
-    /// Sets up all parts: 180 MHz from the ST-LINK's 8 MHz; all chip selects and row signals idle.
+    /// Sets up all parts: 180 MHz, from the ST-LINK's 8 MHz if they are there; all chip selects and row signals idle.
     ///
     /// `None` if it was called before.
     #[must_use]
     pub fn take() -> Option<Self> {
         let parts = Peripherals::take()?;
-        let core = cortex_m::Peripherals::take()?;
+        let mut core = cortex_m::Peripherals::take()?;
         let mut watchdog = IndependentWatchdog::new(parts.IWDG);
         watchdog.stop_on_debug(&parts.DBGMCU, true);
         watchdog.start(WATCHDOG_MS.millis());
 
         let reset_cause = ResetCause::read(&parts.RCC);
-        let clocks = Config::hse(8.MHz()).bypass_hse_oscillator().sysclk(180.MHz());
-        let mut rcc = parts.RCC.freeze(clocks);
+        core.DCB.enable_trace();
+        core.DWT.enable_cycle_counter();
+        let oscillator = Oscillator::find(&parts.RCC);
+        let source = match oscillator {
+            Oscillator::External => Config::hse(8.MHz()).bypass_hse_oscillator(),
+            Oscillator::Internal => Config::hsi(),
+        };
+        let mut rcc = parts.RCC.freeze(source.sysclk(180.MHz()));
         let gpioa = parts.GPIOA.split(&mut rcc);
         let gpiob = parts.GPIOB.split(&mut rcc);
         let gpioc = parts.GPIOC.split(&mut rcc);
 
         // The pull-up makes a line that no converter drives read as no answer.
         let data_in = gpiob.pb14.into_alternate::<5>().internal_resistor(Pull::Up);
-        let pins = (Some(gpiob.pb13), Some(data_in), Some(gpiob.pb15));
+        // A slow clock pin delays the clock's feedback: the last bit of each byte would be wrong (ES0298).
+        let clock_out = gpiob.pb13.into_alternate::<5>().speed(Speed::High);
+        let pins = (Some(clock_out), Some(data_in), Some(gpiob.pb15));
         let spi = Spi::new(parts.SPI2, pins, MODE_0, SPI_HZ.Hz(), &mut rcc);
-        let bus: &'static RefCell<Spi<SPI2>> =
-            cortex_m::singleton!(: RefCell<Spi<SPI2>> = RefCell::new(spi))?;
+        let bus: &'static RefCell<Bus> =
+            cortex_m::singleton!(: RefCell<Bus> = RefCell::new(Bus::new(spi)))?;
         let converter = |select: ErasedPin<Output>| {
             let Ok(device) = RefCellDevice::new_no_delay(bus, select.into());
             device
@@ -96,6 +108,7 @@ impl Board {
         let high = PinState::High;
         Some(Self {
             reset_cause,
+            oscillator,
             led: gpioa.pa5.into_push_pull_output().erase(),
             converters: [
                 converter(gpiob.pb12.into_push_pull_output_in_state(high).erase()),
@@ -107,7 +120,8 @@ impl Board {
             row_latch: gpioc.pc9.into_push_pull_output().erase().into(),
             serial,
             clock,
-            delay: core.SYST.delay(&rcc.clocks),
+            // From the processor's own clock: from an eighth of it, the HAL's waits would be 2 % short.
+            delay: Timer::syst(core.SYST, &rcc.clocks).delay(),
             slots: Slot::both(parts.FLASH),
             watchdog,
         })

@@ -3,13 +3,13 @@
 use board_common::region::take_weights;
 use board_common::{BoardApp, CAPACITY, buffers};
 use cortex_m_rt::entry;
-use defmt::{info, unwrap};
+use defmt::{info, unwrap, warn};
 use defmt_rtt as _;
 use firmware::circuit::ZeroPotential;
 use firmware::link::message::{Configuration, Memory};
 use firmware::platform::{Platform, Port};
 use firmware::readout::{Mcp3208s, Scanner, ShiftRegister595};
-use nucleo_f446re::{Board, Clock, Serial, memory, restart};
+use nucleo_f446re::{Board, Clock, Oscillator, Serial, memory, restart};
 use panic_probe as _;
 use stm32f4xx_hal::gpio::{ErasedPin, Output};
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
@@ -51,6 +51,10 @@ impl Platform for Nucleo {
     fn memory(&self) -> Memory {
         memory::taken()
     }
+
+    fn cycles(&self) -> u32 {
+        self.clock.cycles()
+    }
 }
 
 #[entry]
@@ -61,6 +65,9 @@ fn main() -> ! {
         env!("CARGO_PKG_VERSION"),
         board.reset_cause
     );
+    if board.oscillator == Oscillator::Internal {
+        warn!("no 8 MHz from the ST-LINK: running from the internal oscillator, within 1 %");
+    }
     let drive = ShiftRegister595::<_, { CAPACITY.rows }> {
         data: board.row_data,
         clock: board.row_clock,

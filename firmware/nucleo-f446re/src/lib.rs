@@ -5,8 +5,11 @@
 #![no_std]
 
 // From the ground up: a module imports only what is declared before it.
+mod bus;
 mod clock;
+mod flash;
 mod held_pin;
+mod oscillator;
 mod reset;
 mod serial;
 mod slot;
@@ -14,8 +17,10 @@ mod board;
 
 pub use board::{Board, Converter, RowPin, SPI_HZ, Select};
 pub use board_common::memory;
+pub use bus::Bus;
 pub use clock::Clock;
 pub use held_pin::HeldPin;
+pub use oscillator::Oscillator;
 pub use reset::{ResetCause, restart};
 pub use serial::{BAUD, Serial};
 pub use slot::{Slot, SlotError};

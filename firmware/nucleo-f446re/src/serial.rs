@@ -16,8 +16,14 @@ use stm32f4xx_hal::rcc::Rcc;
 use stm32f4xx_hal::serial::config::Config;
 use stm32f4xx_hal::serial::{Rx, RxListen, Tx, TxISR, TxListen};
 
-/// Baud rate; 8 data bits, no parity, 1 stop bit.
-pub const BAUD: u32 = 921_600;
+/// Baud rate; 8 data bits, no parity, 1 stop bit. `TAXEL_BAUD=115200` in the environment of the build sets another.
+pub const BAUD: u32 = match option_env!("TAXEL_BAUD") {
+    None => 921_600,
+    Some(text) => match u32::from_str_radix(text, 10) {
+        Ok(baud) => baud,
+        Err(_) => panic!("TAXEL_BAUD must be a number of bits a second, such as 115200"),
+    },
+};
 
 /// Ring for 1 KiB: it holds one byte less than it has places.
 type Ring = Queue<u8, 1025>;

@@ -206,7 +206,8 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         match step {
             UploadStep::Begin { length } => {
                 info!("upload of {=u32} bytes begins", length);
-                self.upload.begin(spare, length)
+                let platform = self.line.platform();
+                self.upload.begin(spare, length, || platform.feed_watchdog())
             }
             UploadStep::Chunk { offset, bytes } => self.upload.chunk(spare, offset, bytes),
             UploadStep::Abort => {

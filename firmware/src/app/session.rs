@@ -6,14 +6,14 @@ use model_core::health::{Health, Limits};
 use model_core::relative::reciprocal;
 use model_core::{Decoder, Estimate, Frame, Gate, RowStatus, RowWire};
 
-use super::model::{InForce, choose, copy_to, row_wires};
+use super::model::{InForce, check, choose, copy_to, row_wires};
 use super::{App, Core};
 use crate::link::message::{EstimateReport, HealthReport, Report};
 use crate::link::packet::UNASKED;
 use crate::log::{info, warning};
 use crate::platform::Platform;
 use crate::readout::{FrameSource, Selection};
-use crate::store::Slot;
+use crate::store::{Slot, blob_in_slot, generation};
 
 /// Why a session ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,6 +61,13 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
             );
         } else {
             warning!("no model in either slot: readings only, until one is uploaded");
+        }
+        // Behind an uploaded model in slot 1, the spare slot is slot 0.
+        if chosen.is_some_and(|(slot, _)| slot == 1)
+            && generation(0, spare.bytes()) == Some(0)
+            && check(app.core.capacity, blob_in_slot(spare.bytes())).is_ok()
+        {
+            info!("slot 0 holds a model that was flashed, not uploaded: it is not used");
         }
         app.core.take_shape_of(model.decoder.as_ref());
         Self { app, model, spare }

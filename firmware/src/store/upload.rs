@@ -36,17 +36,24 @@ impl Upload {
         matches!(self.state, UploadState::Committed { .. })
     }
 
-    /// Erases `spare` for a blob of `length` bytes.
+    /// Erases `spare` for a blob of `length` bytes. Calls `feed` just before, so that the watchdog is not due while
+    /// the processor stands still: a sensor that is silent may not have let it be fed for a while.
     ///
     /// # Errors
     /// [`Refusal::TooLarge`] if the blob does not fit, [`Refusal::Flash`] if erasing fails.
-    pub fn begin<S: Slot>(&mut self, spare: &mut S, length: u32) -> Result<(), Refusal> {
+    pub fn begin<S: Slot>(
+        &mut self,
+        spare: &mut S,
+        length: u32,
+        feed: impl FnOnce(),
+    ) -> Result<(), Refusal> {
         let capacity = capacity(spare.bytes());
         let length = length as usize;
         if length > capacity {
             return Err(Refusal::TooLarge { slot_bytes: capacity as u32 });
         }
         self.state = UploadState::Idle;
+        feed();
         self.flash(spare.erase())?;
         *self = Self { state: UploadState::Receiving { received: 0 }, length };
         Ok(())

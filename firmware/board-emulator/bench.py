@@ -1,0 +1,112 @@
+"""A bench: an emulated board, and `host-sim` beside it."""
+
+import pathlib
+import random
+import re
+import subprocess
+
+from machine.board import Board
+from machine.line import Terminal, framed, packets, varint
+
+#: Requests that have no fields, and the variant of an answer (docs/link.md).
+IDENTIFY, CONFIGURATION, CONFIGURE = b"\x00", b"\x02", b"\x03"
+CONFIGURED = b"\x02"
+RESTART = b"\x07"
+#: Where the version of the link's protocol stands.
+PACKET = pathlib.Path(__file__).resolve().parents[1] / "src/link/packet.rs"
+#: Longest time in s of the board within which it answers most requests, and one that erases flash.
+PATIENCE_S, ERASE_PATIENCE_S = 0.5, 6.0
+#: Error of `host-sim` if the board answered too slowly, and nothing else is wrong.
+TOO_SLOW = re.compile(r"^error: the line is not reliable: \d+ requests had to be sent again, 0 reports", re.MULTILINE)
+
+
+class Failed(Exception):
+    """The board did something else than it should."""
+
+
+def expect(condition, text):
+    """Fails with `text` unless `condition` is true."""
+    if not condition:
+        raise Failed(text)
+
+
+class Bench:
+    """A board that runs `image`. `options` are those of `Board`. The resistances at its wires are known: `ohm`."""
+
+    def __init__(self, image, host_sim, log, **options):
+        draw = random.Random(7)
+        self.ohm = [[draw.uniform(44.0, 68.0) for _ in range(18)] for _ in range(8)]
+        self.board = Board(image, self.ohm, log=log, **options)
+        self._host_sim, self._log, self._number = host_sim, log, 0
+
+    def run_for(self, seconds):
+        """Lets the board run for so many seconds of its own time."""
+        self.board.run_for(seconds)
+
+    def host_sim(self, *arguments):
+        """Runs `host-sim link` with the board's serial port and `arguments` to its end, and returns what it says.
+
+        The emulated board is slower than a real one, so an answer may come too late on a busy computer, and the host
+        sends the request again. That alone is no failure: the rule `usart-overrun` sees bytes that are lost.
+        """
+        terminal = Terminal(self.board)
+        command = [self._host_sim, "link", terminal.path, *map(str, arguments)]
+        self._log("$ host-sim link", *arguments)
+        host = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        try:
+            self.board.run_until(lambda: host.poll() is not None)
+        finally:
+            host.kill()
+            said = host.communicate()[0]
+            terminal.close()
+        self._log(said.rstrip())
+        well = host.returncode == 0 or host.returncode == 1 and TOO_SLOW.search(said)
+        expect(well, f"host-sim link {arguments[0]} ended with {host.returncode}")
+        return said
+
+    def ask(self, message, patience_s=PATIENCE_S):
+        """Sends a request of the link to the board; returns its answer, and how long that took in s."""
+        board = self.board
+        # Numbers that take one byte.
+        self._number = self._number % 126 + 1
+        start, number, answers, resets = board.time.seconds(), self._number, [], len(board.resets)
+        line = board.usart.to_host
+        board.usart.from_host.extend(framed(message, number, protocol_version()))
+
+        def over():
+            whole = line.rfind(0) + 1
+            answers.extend(body for found, body in packets(line[:whole]) if found == number)
+            del line[:whole]
+            return answers or len(board.resets) > resets or board.time.seconds() > start + patience_s
+
+        board.run_until(over)
+        resets = ", ".join(board.resets[resets:]) or "none"
+        silent = f"request {message.hex(' ')} is not answered; resets by: {resets}; it stands in {board.where()}"
+        expect(answers, silent)
+        return answers[0], board.time.seconds() - start
+
+    def scan_every(self, seconds):
+        """Configures the time from one scan to the next, and nothing else."""
+        answer, _ = self.ask(CONFIGURATION)
+        expect(answer[:1] == CONFIGURED, f"configuration is answered by {answer.hex(' ')}")
+        # The period is the first field, whatever follows it.
+        length = next(place for place, byte in enumerate(answer[1:]) if byte < 0x80) + 1
+        answer, _ = self.ask(CONFIGURE + varint(round(seconds * 1e6)) + answer[1 + length:])
+        expect(answer[:1] == CONFIGURED, f"configure is answered by {answer.hex(' ')}")
+
+    def finish(self, resets=()):
+        """Ends the scenario: no rule may be broken, and the resets must be these."""
+        board = self.board
+        broken = ", ".join(f"{name} ({count}×)" for name, count in board.rules.counts.items())
+        expect(not broken, f"broken rules: {broken}")
+        expect(board.resets == list(resets), f"resets by {board.resets}, expected {list(resets)}")
+
+
+def protocol_version():
+    """Version of the link's protocol."""
+    return int(re.search(r"PROTOCOL_VERSION: u8 = (\d+);", PACKET.read_text())[1])
+
+
+def begin(length):
+    """The request that begins an upload of so many bytes."""
+    return b"\x06\x00" + varint(length)

@@ -1,0 +1,293 @@
+"""The whole board: the microcontroller, what hangs on its pins, and the loop that runs it."""
+
+from . import circuit, flash, gpio
+from .bus import Bus
+from .core import Core
+from .cpu import FLASH, FLASH_BYTES, Cpu
+from .image import Image
+from .mcp3208 import Mcp3208
+from .rcc import Rcc
+from .rtt import Rtt
+from .rules import Fault, Rules
+from .shift_register import ShiftRegister
+from .spi import Spi
+from .timer import Timer
+from .time import Time
+from .usart import Usart
+from .watchdog import Watchdog
+
+#: Number of the interrupt of USART2, and of the first interrupt among the exceptions.
+USART2, FIRST_INTERRUPT = 38, 16
+#: Flags of RCC_CSR after power-on, after a reset by the watchdog, and after one by the program.
+POWER_ON, BY_WATCHDOG, BY_PROGRAM = 0x0E00_0000, 0x2400_0000, 0x1400_0000
+#: Alternate functions that the pins need: SPI2 at PB13 to PB15, USART2 at PA2 and PA3.
+SPI_FUNCTION, USART_FUNCTION = 5, 7
+SCK, MISO, MOSI, TX, RX = 13, 14, 15, 2, 3
+#: Longest time in s between two looks at the host's end of the line.
+GLANCE_S = 0.2e-3
+#: Longest time in cycles from one look to the next at whether an interrupt can be taken.
+LONGEST_PATIENCE = 2048
+#: Chip selects: port, pin.
+SELECTS = (("B", 12), ("B", 1), ("C", 4))
+
+
+class Board:
+    """A board that runs the image at `path`, with the resistances `ohm[row][column]` at its wires.
+
+    `hse`: the ST-LINK gives its 8 MHz. `lsi_hz`: the watchdog's own clock. `erase_s`: how long erasing 128 KiB
+    takes, whatever the data sheet says. `sensor`: the converters are there. `settling_us`: the wait after each
+    change of rows that the device is configured to.
+    """
+
+    def __init__(self, path, ohm, *, hse=True, lsi_hz=32_000, erase_s=None, sensor=True, baud=921_600,
+                 settling_us=100.0, log=print):
+        self.image = Image(path)
+        self._ohm, self._hse, self._lsi_hz, self._erase_s = ohm, hse, lsi_hz, erase_s
+        self._sensor, self._baud, self._settling_us, self._log = sensor, baud, settling_us, log
+        self.time = Time()
+        self.rules = Rules(self.where, self.note)
+        self.content = bytearray(b"\xff" * FLASH_BYTES)
+        for address, data in self.image.segments:
+            self.content[address - FLASH:address - FLASH + len(data)] = data
+        #: Causes of the resets so far.
+        self.resets = []
+        #: Bytes of the log so far.
+        self.logged = bytearray()
+        #: Number of interrupts taken.
+        self.interrupts = 0
+        #: Called again and again while the board runs, with whether the program idles.
+        self.glance = lambda idle: None
+        self._reset_flags, self._pending_reset = POWER_ON, None
+        self._start()
+
+    def note(self, text):
+        """Logs `text` with the time."""
+        self._log(f"[{self.time.seconds():9.6f} s] {text}")
+
+    def where(self):
+        """The function that is executed."""
+        return self.image.place(self.cpu.where())
+
+    # Start and resets
+
+    def _start(self):
+        time, rules = self.time, self.rules
+        time.change_clock(16_000_000)
+        time.due = time.now
+        bus = self._bus = Bus(time, rules)
+        self.cpu = Cpu(time, self, self.content)
+        self.rtt = Rtt(self.cpu, self.image.symbols["_SEGGER_RTT"])
+        self.ports = {
+            "A": gpio.Port({gpio.MODER: 0xA800_0000, gpio.OSPEEDR: 0x0C00_0000, gpio.PUPDR: 0x6400_0000}),
+            "B": gpio.Port({gpio.MODER: 0x280, gpio.OSPEEDR: 0xC0, gpio.PUPDR: 0x100}),
+            "C": gpio.Port(),
+        }
+        self.register = ShiftRegister(time, rules)
+        self.circuit = circuit.Circuit(time, rules, self.register, self._ohm)
+        self.converters = [
+            Mcp3208(time, rules, circuit.REFERENCE_V,
+                    lambda channel, cycle, first=8 * chip: self.circuit.volts(first + channel, cycle))
+            for chip in range(3)
+        ]
+        self.rcc = Rcc(bus, time, rules, self._hse, self._reset_flags, self._clocks_changed)
+        self.flash = flash.Flash(self.content, rules, self._stall, self.cpu.uc.mem_write, self._erase_s)
+        self.rcc.flash_wait_states = self.flash.wait_states
+        self.flash.wait_states_changed = self.rcc.flash_changed
+        self.core = Core(time, rules, self._wait, self._ask_for_reset)
+        self.spi = Spi(time, rules, self._wait, lambda: self.rcc.clocks.pclk1, self._sck_slow, self._exchange)
+        self.usart = Usart(time, rules, lambda: self.rcc.clocks.pclk1, self._baud)
+        self.usart.on_send = self._before_sending
+        self.timer = Timer(time, lambda: self.rcc.clocks.timer1, self._look, self._idle)
+        self.watchdog = Watchdog(time, rules, self._lsi_hz)
+        bus.attach(0x00000, self.timer, "TIM2")
+        bus.attach(0x03000, self.watchdog, "IWDG", gated=False)
+        bus.attach(0x03800, self.spi, "SPI2")
+        bus.attach(0x04400, self.usart, "USART2")
+        bus.attach(0x07000, self.rcc.pwr, "PWR")
+        for index, port in enumerate(self.ports.values()):
+            bus.attach(0x20000 + 0x400 * index, port, f"GPIO{'ABC'[index]}")
+        bus.attach(0x23800, self.rcc, "RCC", gated=False)
+        bus.attach(0x23C00, self.flash, "FLASH", gated=False)
+        for chip, (port, pin) in enumerate(SELECTS):
+            self.ports[port].listeners[pin] = lambda high, chip=chip: self._select(chip, high)
+        self.ports["C"].listeners.update({6: self.register.data, 8: self.register.clock, 9: self.register.latch})
+        self._idles, self._pins_checked, self._next_glance, self._patience = False, False, 0, 1
+
+    def _ask_for_reset(self):
+        self._pending_reset = ("program", BY_PROGRAM)
+        self.cpu.stop()
+
+    def _reset(self, cause, flags):
+        self.note(f"RESET by {cause}")
+        self.resets.append(cause)
+        self.take_log()
+        self._reset_flags, self._pending_reset = flags, None
+        to_host = self.usart.to_host
+        self._start()
+        self.usart.to_host = to_host
+
+    def take_log(self):
+        """Takes the log out of the board's memory."""
+        self.logged += self.rtt.read()
+
+    # What Unicorn asks
+
+    def read_peripheral(self, _uc, offset, size, _):
+        return self._bus.read(offset, size)
+
+    def write_peripheral(self, _uc, offset, size, value, _):
+        self._bus.write(offset, size, value)
+
+    def read_bit(self, _uc, offset, _size, _):
+        return self._bus.read_bit(offset)
+
+    def write_bit(self, _uc, offset, _size, value, _):
+        self._bus.write_bit(offset, value)
+
+    def read_core(self, _uc, offset, _size, _):
+        return self.core.read(offset)
+
+    def write_core(self, _uc, offset, _size, value, _):
+        self.core.write(offset, value)
+
+    def write_flash(self, _uc, _access, address, size, value, _):
+        if not FLASH <= address < FLASH + FLASH_BYTES:
+            return False
+        self.flash.program(address, size, value)
+        return True
+
+    # Time
+
+    def _interrupt_pending(self):
+        return self.core.enabled >> USART2 & 1 and self.usart.interrupt()
+
+    def _clocks_changed(self, clocks):
+        self.note(f"runs at {clocks.hclk / 1e6:g} MHz, APB1 at {clocks.pclk1 / 1e6:g} MHz")
+
+    def _wait(self, cycle):
+        """A register is polled: time passes until `cycle`, or until the next byte on the line."""
+        self.usart.advance()
+        if self._interrupt_pending():
+            return
+        event = self.usart.next_event()
+        if event is not None:
+            cycle = min(cycle, event)
+            self.time.wake_at(event)
+        self.time.now = max(self.time.now, int(cycle) + 1)
+
+    def _stall(self, seconds):
+        """The processor stands still; the rest of the world does not."""
+        self.usart.advance()
+        self.time.now += self.time.cycles(seconds)
+        self.usart.excuse()
+        self.usart.advance()
+        self.time.due = self.time.now
+
+    def _look(self):
+        """The program looks at the time, as it does in its main loop."""
+        if self.flash.stale:
+            self.rules.breach("cache-stale")
+
+    def _idle(self):
+        """The program only looks at the time: it passes until something happens, or it is time for a glance."""
+        self._idles = True
+        self._wait(self._next_glance)
+
+    def _busy(self):
+        self._idles, self.timer.looks = False, 0
+
+    def run_until(self, over):
+        """Runs until `over()` returns true; it is asked at each glance."""
+        while True:
+            if self._attend() and over():
+                return
+            try:
+                self.cpu.run()
+            except Fault as fault:
+                self._die(fault)
+
+    def run_for(self, seconds):
+        """Runs for so many seconds of the board."""
+        end = self.time.seconds() + seconds
+        self.run_until(lambda: self.time.seconds() >= end)
+
+    def _die(self, fault):
+        """A fault's handler never returns: only the watchdog helps."""
+        self.rules.breach("fault", str(fault))
+        if not self.watchdog.runs:
+            raise fault
+        self._stall(max(0.0, self.watchdog.expires_s() - self.time.seconds()) + 1e-3)
+
+    def _attend(self):
+        """Does what is due; returns whether it was time for a glance at the host's end."""
+        time = self.time
+        self.usart.advance()
+        if self._pending_reset:
+            self._reset(*self._pending_reset)
+        elif time.seconds() > self.watchdog.expires_s():
+            self._reset("watchdog", BY_WATCHDOG)
+        glance = time.now >= self._next_glance
+        if glance:
+            self.glance(self._idles)
+            self._next_glance = time.now + time.cycles(GLANCE_S)
+            self.usart.advance()
+        time.due = self._next_glance
+        event = self.usart.next_event()
+        if event is not None:
+            time.wake_at(event)
+        if self._interrupt_pending():
+            if self.cpu.may_interrupt():
+                self._busy()
+                self.interrupts += 1
+                self.cpu.enter(FIRST_INTERRUPT + USART2)
+                self._patience = 1
+            else:
+                # Interrupts are off, or one is running. The longer it lasts, the rarer it is looked at.
+                self._patience = min(2 * self._patience, LONGEST_PATIENCE)
+                time.wake_at(time.now + self._patience)
+        return glance
+
+    # Pins
+
+    def _sck_slow(self):
+        return self.ports["B"].speed(SCK) == gpio.LOW_SPEED
+
+    def _check_function(self, port, pins, function, name):
+        for pin in pins:
+            if self.ports[port].function(pin) != function:
+                self.rules.breach("pin-function", f"P{port}{pin} is not {name}")
+
+    def _before_sending(self):
+        self._busy()
+        if not self._pins_checked:
+            self._pins_checked = True
+            self._check_function("A", (TX, RX), USART_FUNCTION, "USART2")
+
+    def _select(self, chip, high):
+        self._busy()
+        now, ends = self.time.now, self.spi.ends
+        if now < ends:
+            self.rules.breach("select-early", f"{self.time.ns(ends - now):.0f} ns before the end")
+        if not high:
+            waited_us = self.time.ns(now - self.register.changed_at) / 1e3
+            if waited_us < self._settling_us:
+                self.rules.breach("wait-short", f"{waited_us:.2f} us of {self._settling_us:g}")
+        self.converters[chip].select(not high)
+
+    def _exchange(self, byte, start, bit_cycles):
+        """Shifts a byte out to the converters; returns the byte that comes back."""
+        selected = [chip for chip in self.converters if chip.selected]
+        if len(selected) > 1:
+            self.rules.breach("two-converters")
+        self._check_function("B", (SCK, MISO, MOSI), SPI_FUNCTION, "SPI2")
+        pulled_up = self.ports["B"].pulled_up(MISO)
+        received = 0
+        for index in range(8):
+            data = byte >> 7 - index & 1
+            bit = None
+            for chip in selected if self._sensor else ():
+                bit = chip.rise(data, start + (index + 0.5) * bit_cycles)
+            if bit is None and not pulled_up:
+                self.rules.breach("line-floats")
+            received = received << 1 | (1 if bit is None else bit)
+        return received

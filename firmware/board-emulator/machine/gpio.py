@@ -1,0 +1,56 @@
+"""A port of general-purpose pins (RM0390, chapter 7)."""
+
+from .bus import Registers
+
+MODER, OSPEEDR, PUPDR, IDR, ODR, BSRR, AFRL = 0x00, 0x08, 0x0C, 0x10, 0x14, 0x18, 0x20
+OUTPUT, ALTERNATE = 1, 2
+LOW_SPEED, PULL_UP = 0, 1
+
+
+class Port(Registers):
+    """Sixteen pins. Whoever wants to know of a pin's level enters a function in `listeners`."""
+
+    def __init__(self, after_reset=None):
+        super().__init__()
+        self.values.update(after_reset or {})
+        self.listeners = {}
+        self._levels = {}
+
+    def _field(self, offset, pin):
+        return self.values.get(offset, 0) >> 2 * pin & 3
+
+    def mode(self, pin):
+        """Mode: 0 input, 1 output, 2 alternate function, 3 analogue."""
+        return self._field(MODER, pin)
+
+    def speed(self, pin):
+        """Speed of the output: 0 low to 3 very high."""
+        return self._field(OSPEEDR, pin)
+
+    def pulled_up(self, pin):
+        """Whether a pull-up holds the pin."""
+        return self._field(PUPDR, pin) == PULL_UP
+
+    def function(self, pin):
+        """Number of the alternate function; `None` if the pin is not in that mode."""
+        chosen = self.values.get(AFRL + 4 * (pin // 8), 0) >> 4 * (pin % 8) & 15
+        return chosen if self.mode(pin) == ALTERNATE else None
+
+    def high(self, pin):
+        """Whether the output register has a one for the pin."""
+        return bool(self.values.get(ODR, 0) >> pin & 1)
+
+    def read(self, offset):
+        return super().read(ODR if offset == IDR else offset)
+
+    def write(self, offset, value):
+        if offset == BSRR:
+            offset, value = ODR, self.values.get(ODR, 0) & ~(value >> 16) | value & 0xFFFF
+        super().write(offset, value)
+        if offset in (ODR, MODER):
+            for pin, listener in self.listeners.items():
+                level = self.high(pin) if self.mode(pin) == OUTPUT else None
+                if level != self._levels.get(pin):
+                    self._levels[pin] = level
+                    if level is not None:
+                        listener(level)

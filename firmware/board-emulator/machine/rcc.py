@@ -1,0 +1,148 @@
+"""RCC and PWR: oscillators, PLL, over-drive, prescalers, and the clocks of the peripherals (RM0390, chapters 5, 6)."""
+
+from dataclasses import dataclass
+
+from .bus import PAGE_BITS, Registers
+
+CR, PLLCFGR, CFGR, APB1RSTR, CSR = 0x00, 0x04, 0x08, 0x20, 0x74
+AHB1ENR, APB1ENR = 0x30, 0x40
+HSION, HSIRDY, HSEON, HSERDY, PLLON, PLLRDY = 1 << 0, 1 << 1, 1 << 16, 1 << 17, 1 << 24, 1 << 25
+PLLSRC = 1 << 22
+LSION, LSIRDY, RMVF = 1 << 0, 1 << 1, 1 << 24
+HSI_HZ, HSE_HZ = 16_000_000, 8_000_000
+
+#: Enable bits by register and bit, with the page of the peripheral.
+GATES = {
+    (AHB1ENR, 0): 0x20000, (AHB1ENR, 1): 0x20400, (AHB1ENR, 2): 0x20800,
+    (APB1ENR, 0): 0x00000, (APB1ENR, 14): 0x03800, (APB1ENR, 17): 0x04400, (APB1ENR, 28): 0x07000,
+}
+
+
+@dataclass
+class Clocks:
+    """Frequencies in Hz."""
+
+    pll_input: float
+    vco: float
+    hclk: float
+    pclk1: float
+    pclk2: float
+    from_pll: bool
+
+    @property
+    def timer1(self):
+        """Clock of the timers on APB1."""
+        return self.pclk1 * (1 if self.pclk1 == self.hclk else 2)
+
+
+class Pwr(Registers):
+    """Power controller: over-drive."""
+
+    CR, CSR = 0x0, 0x4
+    ODEN, ODSWEN = 1 << 16, 1 << 17
+    AFTER_RESET = {0x0: 0xC000}
+
+    def __init__(self, changed):
+        super().__init__()
+        self._changed = changed
+
+    def read(self, offset):
+        value = super().read(offset)
+        # Ready bits stand where the bits of CR stand, and follow them.
+        return 0x4000 | super().read(self.CR) & (self.ODEN | self.ODSWEN) if offset == self.CSR else value
+
+    def write(self, offset, value):
+        super().write(offset, value)
+        self._changed()
+
+    def over_drive(self):
+        """Whether over-drive is on and switched through."""
+        both = self.ODEN | self.ODSWEN
+        return self.values[self.CR] & both == both
+
+
+class Rcc(Registers):
+    """Reset and clock control."""
+
+    AFTER_RESET = {CR: 0x83, PLLCFGR: 0x2400_3010, CFGR: 0}
+
+    def __init__(self, bus, time, rules, hse_present, reset_flags, on_change):
+        super().__init__()
+        self._bus, self._time, self._rules = bus, time, rules
+        self._hse_present, self._on_change = hse_present, on_change
+        self.values[CSR] = reset_flags
+        self.pwr, self.flash_wait_states = Pwr(self._check), lambda: 0
+        self.clocks = self._tree()
+
+    def read(self, offset):
+        value = super().read(offset)
+        if offset == CR:
+            return self._ready(value)
+        if offset == CFGR:
+            return value & ~0xC | (value & 3) << 2
+        if offset == CSR:
+            return value & ~LSIRDY | (LSIRDY if value & LSION else 0)
+        return value
+
+    def _ready(self, value):
+        value &= ~(HSIRDY | HSERDY | PLLRDY)
+        value |= HSIRDY if value & HSION else 0
+        value |= HSERDY if value & HSEON and self._hse_present else 0
+        source = HSERDY if super().read(PLLCFGR) & PLLSRC else HSIRDY
+        return value | (PLLRDY if value & PLLON and value & source else 0)
+
+    def write(self, offset, value):
+        if offset == PLLCFGR and super().read(CR) & PLLON:
+            self._rules.breach("pll-running")
+        if offset == CSR and value & RMVF:
+            value &= 0xFFFFFF
+        super().write(offset, value)
+        if offset in (AHB1ENR, APB1ENR):
+            self._gate(offset, value)
+        if offset == CFGR:
+            self._switch()
+
+    def _gate(self, register, value):
+        for (at, bit), page in GATES.items():
+            if at == register:
+                change = self._bus.clocked.add if value >> bit & 1 else self._bus.clocked.discard
+                change(page >> PAGE_BITS)
+
+    def _tree(self):
+        pll, cfgr = super().read(PLLCFGR), super().read(CFGR)
+        source = HSE_HZ if pll & PLLSRC else HSI_HZ
+        pll_input = source / max(pll & 63, 1)
+        vco = pll_input * (pll >> 6 & 511)
+        system = (HSI_HZ, HSE_HZ, vco / (2 * (pll >> 16 & 3) + 2), HSI_HZ)[cfgr & 3]
+        ahb = cfgr >> 4 & 15
+        hclk = system / (1 if ahb < 8 else (2, 4, 8, 16, 64, 128, 256, 512)[ahb - 8])
+
+        def divided(bits):
+            return hclk / (1 if bits < 4 else 2 << (bits - 4))
+
+        return Clocks(pll_input, vco, hclk, divided(cfgr >> 10 & 7), divided(cfgr >> 13 & 7), cfgr & 3 == 2)
+
+    def _switch(self):
+        clocks = self.clocks = self._tree()
+        if clocks.from_pll and not self._ready(super().read(CR)) & PLLRDY:
+            self._rules.breach("pll-not-ready")
+        if clocks.hclk != self._time.hz:
+            self._time.change_clock(clocks.hclk)
+            self._on_change(clocks)
+        self._check()
+
+    def flash_changed(self):
+        """The wait states of the flash were written."""
+        self._check()
+
+    def _check(self):
+        clocks = self.clocks
+        if clocks.from_pll and not (0.95e6 <= clocks.pll_input <= 2.1e6 and 100e6 <= clocks.vco <= 432e6):
+            self._rules.breach("pll-range", f"{clocks.pll_input / 1e6:g} MHz in, {clocks.vco / 1e6:g} MHz out")
+        if clocks.hclk > 180e6 or clocks.pclk1 > 45e6 or clocks.pclk2 > 90e6:
+            self._rules.breach("bus-speed", f"{clocks.hclk:g}, {clocks.pclk1:g}, {clocks.pclk2:g} Hz")
+        if clocks.hclk > 168e6 and not self.pwr.over_drive():
+            self._rules.breach("over-drive")
+        needed = int((clocks.hclk - 1) // 30e6)
+        if self.flash_wait_states() < needed:
+            self._rules.breach("wait-states", f"{self.flash_wait_states()} of {needed}")

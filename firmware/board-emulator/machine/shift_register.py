@@ -1,0 +1,50 @@
+"""The 74HC595 that controls the rows' switches."""
+
+#: Shortest time in ns of set-up and of each level at 3.3 V (between the data sheet's figures for 2 V and 4.5 V).
+SHORTEST_NS = 50
+
+
+class ShiftRegister:
+    """Eight outputs. They are undefined (`None`) until the first latch."""
+
+    def __init__(self, time, rules):
+        self._time, self._rules = time, rules
+        self.outputs = None
+        #: Cycle at which the outputs changed.
+        self.changed_at = 0
+        self._bits, self._data = 0, False
+        self._edges = {}
+
+    def _edge(self, pin):
+        self._edges[pin] = self._time.now
+
+    def _since(self, pin):
+        at = self._edges.get(pin)
+        return float("inf") if at is None else self._time.ns(self._time.now - at)
+
+    def data(self, high):
+        """An edge of SER."""
+        self._data = high
+        self._edge("data")
+
+    def clock(self, high):
+        """An edge of SRCLK."""
+        if high:
+            self._check("data", "SER before SRCLK")
+            self._check("clock", "SRCLK low")
+            self._bits = (self._bits << 1 | self._data) & 0xFF
+        self._edge("clock")
+
+    def latch(self, high):
+        """An edge of RCLK."""
+        if high:
+            self._check("clock", "SRCLK before RCLK")
+            if self._bits & (self._bits - 1):
+                self._rules.breach("two-rows", f"{self._bits:08b}")
+            if self._bits != self.outputs:
+                self.outputs, self.changed_at = self._bits, self._time.now
+        self._edge("latch")
+
+    def _check(self, pin, what):
+        if self._since(pin) < SHORTEST_NS:
+            self._rules.breach("register-timing", f"{what}: {self._since(pin):.0f} ns")

@@ -1,0 +1,65 @@
+"""Runs scenarios on the emulated board; `cargo xtask board` starts this.
+
+Exit status: 0 all scenarios passed, 1 one failed, 2 wrong usage.
+"""
+
+import argparse
+import pathlib
+import signal
+import sys
+import time
+
+from bench import Bench, Failed
+from machine.rules import Fault
+from scenarios import SCENARIOS, serve
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--image", type=pathlib.Path, required=True, help="the board's image (ELF)")
+    parser.add_argument("scenarios", nargs="*", metavar="scenario",
+                        help=f"all, or some of: {', '.join(SCENARIOS)}; or serve")
+    parser.add_argument("--host-sim", type=pathlib.Path, required=True, help="the program host-sim")
+    parser.add_argument("--model", type=pathlib.Path, required=True, help="a model of the scene `press`")
+    parser.add_argument("--directory", type=pathlib.Path, required=True, help="folder for logs and tables")
+    parser.add_argument("--frames", type=int, default=30, help="frames that `check` decodes (30)")
+    files = parser.parse_args()
+    # Python's own handling would be lost where Unicorn calls Python.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    known = {**SCENARIOS, "serve": serve}
+    unknown = [name for name in files.scenarios if name not in known]
+    if unknown:
+        parser.error(f"there is no scenario {unknown[0]}, but {', '.join(known)}")
+    failed = [name for name in files.scenarios or SCENARIOS if not run(name, known[name], files)]
+    return 1 if failed else 0
+
+
+def run(name, scenario, files):
+    """Runs a scenario; returns whether it passed."""
+    print(f"-- {name}: {' '.join(scenario.__doc__.split())}", flush=True)
+    start, made = time.monotonic(), []
+
+    def log(*words):
+        print("  ", *words, flush=True)
+
+    def make(**options):
+        made.append(Bench(files.image, files.host_sim, log, **options))
+        return made[-1]
+
+    try:
+        scenario(make, files)
+        cause = None
+    except (Failed, Fault) as failure:
+        cause = failure
+    seconds = time.monotonic() - start
+    for bench in made:
+        bench.board.take_log()
+        (files.directory / f"{name}.defmt").write_bytes(bench.board.logged)
+        print(f"   {bench.board.time.seconds():.3f} s of the board, {bench.board.interrupts} interrupts, in "
+              f"{seconds:.1f} s")
+    print(f"ok      {name}" if cause is None else f"FAILED  {name}: {cause}", flush=True)
+    return cause is None
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,111 @@
+//! A copy of the workspace in which an image can be built that differs from the project's in one place.
+//!
+//! Both are built in one folder, so that the libraries of others are built once. So the copy's packages have another
+//! version: cargo would take packages of one name and version for the same, wherever they lie.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::mutants::Mutant;
+use crate::process::{Outcome, root, target_dir, watch};
+use crate::toolchain::{Toolchain, elf};
+
+/// Folders and files that are not copied, besides hidden ones: what is built or written.
+const LEFT_OUT: [&str; 2] = ["target", "out"];
+
+/// Manifests of the copy that differ: file, text that stands once in it, and what replaces it. The image has another
+/// name too, so that it does not replace the project's own.
+const MANIFESTS: [(&str, &str, &str); 2] = [
+    ("Cargo.toml", concat!("version = \"", env!("CARGO_PKG_VERSION"), "\""), "version = \"0.0.0\""),
+    (
+        "firmware/nucleo-f446re/Cargo.toml",
+        "[[bin]]\nname = \"nucleo-f446re\"",
+        "[[bin]]\nname = \"nucleo-mutant\"",
+    ),
+];
+
+const PACKAGE: &str = "nucleo-f446re";
+const IMAGE: &str = "nucleo-mutant";
+
+/// The copy.
+pub struct Copy {
+    folder: PathBuf,
+}
+
+impl Copy {
+    /// Makes the copy, or brings it up to date. Files that are the same stay untouched, so that little is built again.
+    pub fn make() -> Outcome<Self> {
+        let folder = target_dir().join("board").join("workspace");
+        copy_folder(root(), &folder)?;
+        for (file, text, other) in MANIFESTS {
+            let changed = read(&root().join(file))?.replacen(text, other, 1);
+            write_if_new(&folder.join(file), changed.as_bytes())?;
+        }
+        Ok(Self { folder })
+    }
+
+    /// Builds the image of `mutant`, and returns its path.
+    ///
+    /// # Errors
+    /// It does not build.
+    pub fn build(&self, toolchain: &Toolchain, mutant: &Mutant) -> Outcome<PathBuf> {
+        let file = self.folder.join(mutant.file);
+        let sound = read(&file)?;
+        write_if_new(&file, mutant.apply(&sound)?.as_bytes())?;
+        let mut command = toolchain.build();
+        command.arg("--manifest-path").arg(self.folder.join("Cargo.toml"));
+        command.args(["--profile", "firmware", "--package", PACKAGE, "--bin", IMAGE]);
+        let built = watch(&mut command, false);
+        write_if_new(&file, sound.as_bytes())?;
+        let built = built?;
+        if built.success {
+            Ok(elf(IMAGE))
+        } else {
+            Err(format!("mutant {} does not build:\n{}", mutant.name, built.messages))
+        }
+    }
+}
+
+fn copy_folder(from: &Path, to: &Path) -> Outcome {
+    let failed = |cause| format!("{}: {cause}", from.display());
+    fs::create_dir_all(to).map_err(|cause| format!("{}: {cause}", to.display()))?;
+    for entry in fs::read_dir(from).map_err(failed)? {
+        let entry = entry.map_err(failed)?;
+        let name = entry.file_name();
+        let shown = name.to_string_lossy();
+        if shown.starts_with('.') || LEFT_OUT.contains(&&*shown) {
+            continue;
+        }
+        if entry.file_type().map_err(failed)?.is_dir() {
+            copy_folder(&entry.path(), &to.join(name))?;
+        } else if !MANIFESTS.iter().any(|(file, ..)| entry.path() == root().join(file)) {
+            let bytes = fs::read(entry.path()).map_err(failed)?;
+            write_if_new(&to.join(name), &bytes)?;
+        }
+    }
+    Ok(())
+}
+
+fn read(file: &Path) -> Outcome<String> {
+    fs::read_to_string(file).map_err(|cause| format!("{}: {cause}", file.display()))
+}
+
+/// Writes `bytes` unless the file holds them already.
+fn write_if_new(file: &Path, bytes: &[u8]) -> Outcome {
+    if fs::read(file).is_ok_and(|old| old == bytes) {
+        return Ok(());
+    }
+    fs::write(file, bytes).map_err(|cause| format!("{}: {cause}", file.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_differs_stands_once_in_its_manifest() {
+        for (file, text, _) in MANIFESTS {
+            assert_eq!(read(&root().join(file)).unwrap().matches(text).count(), 1, "{file}");
+        }
+    }
+}

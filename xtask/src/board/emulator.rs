@@ -1,0 +1,91 @@
+//! The emulated board, which is a Python program: what it needs, and running it.
+
+use std::ffi::OsString;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use super::options::Options;
+use crate::process::{Outcome, Said, capture, cargo, first_line, root, run, target_dir};
+
+const FOLDER: &str = "firmware/board-emulator";
+
+/// Python as `firmware/setup.sh` installs it.
+const OWN_PYTHON: &str = "firmware/board-emulator/.venv/bin/python";
+
+/// A Python program that fails if a package is missing, and prints a line otherwise.
+const NEEDS: &str = "import elftools, unicorn; print(unicorn.__version__)";
+
+/// Arguments that train the model which scenarios upload, small enough that an upload takes seconds.
+const TRAIN: [&str; 4] = ["train", "press", "--centres=16", "--output"];
+
+/// What a scenario needs besides the image.
+pub struct Emulator {
+    python: PathBuf,
+    /// Arguments that are the same for all scenarios.
+    arguments: Vec<OsString>,
+}
+
+impl Emulator {
+    /// Finds Python and its packages, builds host-sim, and trains the model.
+    ///
+    /// # Errors
+    /// Something is missing; the message says how to get it.
+    pub fn prepare(options: &Options<'_>) -> Outcome<Self> {
+        let python = python()?;
+        let folder = folder();
+        fs::create_dir_all(&folder).map_err(|cause| format!("{}: {cause}", folder.display()))?;
+        run(&mut cargo(&["build", "--quiet", "--package", "host-sim"]))?;
+        let host_sim = target_dir().join("debug").join("host-sim");
+        let model = if let Some(model) = options.model {
+            root().join(model)
+        } else {
+            let model = folder.join("model.bin");
+            run(Command::new(&host_sim).args(TRAIN).arg(&model).current_dir(root()))?;
+            model
+        };
+        let frames = options.frames.unwrap_or(30).to_string();
+        let named = [("--host-sim", host_sim), ("--model", model), ("--directory", folder)];
+        let mut arguments = vec![root().join(FOLDER).join("run.py").into_os_string()];
+        for (name, value) in named {
+            arguments.extend([name.into(), value.into_os_string()]);
+        }
+        arguments.extend(["--frames".into(), frames.into()]);
+        Ok(Self { python, arguments })
+    }
+
+    /// Runs the scenarios of these names on `image`, or all; their output is passed through.
+    pub fn run(&self, image: &Path, scenarios: &[&str]) -> Outcome {
+        run(self.command(image).args(scenarios)).map_err(|_| "a scenario failed: see above".into())
+    }
+
+    /// Runs a scenario on `image`, and returns its output.
+    pub fn capture(&self, image: &Path, scenario: &str) -> Said {
+        capture(self.command(image).arg(scenario))
+    }
+
+    fn command(&self, image: &Path) -> Command {
+        let mut command = Command::new(&self.python);
+        command.args(&self.arguments).arg("--image").arg(image).current_dir(root());
+        command
+    }
+}
+
+/// File of a scenario's log.
+pub fn log(scenario: &str) -> PathBuf {
+    folder().join(format!("{scenario}.defmt"))
+}
+
+/// Folder for models, tables and logs.
+fn folder() -> PathBuf {
+    target_dir().join("board")
+}
+
+fn python() -> Outcome<PathBuf> {
+    let candidates = [root().join(OWN_PYTHON), "python3".into()];
+    let complete = |python: &PathBuf| first_line(python, &["-c", NEEDS]).is_some();
+    candidates.into_iter().find(complete).ok_or(format!(
+        "the emulated board needs Python with the packages in {FOLDER}/requirements.txt. For all that the \
+         firmware needs,\n  bash firmware/setup.sh"
+    ))
+}
