@@ -49,7 +49,7 @@ impl<D: RowDrive, S: ColumnSampler, T: DelayNs, C: Circuit, const COLUMNS: usize
             && C::IDLE_SAMPLES
             && let Some(idle) = self.idle.get_mut(..columns)
         {
-            self.delay.delay_us(settings.settling_us);
+            settle(&mut self.delay, settings);
             sample_columns(&mut self.sampler, settings.oversampling, idle, report);
         }
     }
@@ -66,10 +66,15 @@ impl<D: RowDrive, S: ColumnSampler, T: DelayNs, C: Circuit, const COLUMNS: usize
             readings.fill(f32::NAN);
             return count_failures(report, readings.len());
         };
-        self.delay.delay_us(settings.settling_us);
+        settle(&mut self.delay, settings);
         sample_columns(&mut self.sampler, settings.oversampling, readings, report);
         self.circuit.row_ohm(row, idle, S::FULL_SCALE_COUNTS, readings);
     }
+}
+
+/// Waits until voltages have followed a change of the rows.
+fn settle(delay: &mut impl DelayNs, settings: ScanSettings) {
+    delay.delay_us(settings.settling_us);
 }
 
 /// Samples every column, whose mean counts go to `counts`; NaN where that failed.
