@@ -7,7 +7,6 @@ use firmware::app::{Leave, Session};
 use firmware::link::message::{
     Configuration, ModelFault, Refusal, Report, Request, UploadState, UploadStep,
 };
-use model_core::Frame;
 use model_core::rbf::Shape;
 use model_core::rbf::direct::{Network, Parameters};
 
@@ -76,9 +75,9 @@ fn a_device_without_a_model_takes_one() {
 fn the_watchdog_is_fed_just_before_a_slot_is_erased_even_if_the_sensor_is_silent() {
     let mut slots = MockSlot::pair();
     let mut bench = Bench::new(Configuration { frame_period_us: 1000, ..quiet() });
-    let mut session = Session::start(&mut bench.app, &mut slots);
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let board = bench.board.clone();
-    *bench.frame.borrow_mut() = Frame::missing();
+    *bench.frame.borrow_mut() = [[f32::NAN; COLS]; ROWS];
     for _ in 0..2000 {
         session.step();
     }

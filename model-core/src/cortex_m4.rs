@@ -1,16 +1,13 @@
-//! Assembly routines for a Cortex-M4F, and their sizes, which every target knows.
+//! Assembly routines for a Cortex-M4F, and the blocks of words that they read, which every target knows.
 //!
-//! The assembly is made for the paper's sizes: 18 inputs, and outputs in groups of 18. It reads networks as
-//! plain blocks of words. The functions below count the words that it reads, and a test compares these counts
-//! with the formats' own. Every routine has a compiled twin: portable Rust code that gives the same bits.
+//! The assembly takes any number of inputs, centres and outputs. It is fastest at 18 inputs, and at outputs in
+//! groups of 18: the paper's sizes. Every routine has a compiled twin: portable Rust code that gives the same bits.
 
 #[cfg(cortex_m4f)]
 mod routines;
 
 #[cfg(cortex_m4f)]
-pub(crate) use routines::{
-    Inputs, expanded, expanded_array, fixed16, fixed16_array, give_rest, project,
-};
+pub(crate) use routines::{Inputs, expanded, fixed16, give_rest, project};
 
 /// Inputs a row of the paper's sensor; inner loops are made for this number, in assembly or compiled.
 pub(crate) const INPUTS: usize = 18;
@@ -27,31 +24,64 @@ pub enum Finite {
     Unknown,
 }
 
-/// A network's parameters as plain words, with the counts that tell how to read them.
+/// A network's parameters as plain words, with the counts that tell how to read them. Assembly reads this, so that
+/// order and sizes are its own.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[repr(C)] // the counts first, so that they are at the same place in a network of any format
+#[repr(C)]
 pub struct Block<'a> {
     pub inputs: usize,
     pub centres: usize,
     pub outputs: usize,
-    /// Whether there is an affine tail.
-    pub affine: bool,
+    form: Form,
     pub words: &'a [u32],
 }
 
-/// Number of words that [`expanded_array`] reads from a block, for `groups` groups of outputs.
-#[cfg(any(test, cortex_m4f))]
-pub(crate) const fn expanded_words(centres: usize, affine: bool, groups: usize) -> usize {
-    let outputs = OUTPUTS * groups;
-    let affine = if affine { INPUTS * outputs } else { 0 };
-    2 * INPUTS + 1 + outputs + affine + centres.next_multiple_of(4) * (1 + INPUTS + outputs)
+/// What else a routine needs to know of a network: bits, so that the paper's is recognised by a 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(transparent)]
+struct Form(u32);
+
+impl Form {
+    /// There is an affine tail.
+    const AFFINE: u32 = 1;
+    /// There are not 18 inputs, or more than 18 outputs.
+    const OTHER_SIZES: u32 = 2;
+    /// There are more centres than a batch has.
+    const BATCHES: u32 = 4;
+    /// From this bit on is the number of outputs, if there are 18 inputs and fewer than 18 outputs.
+    const OUTPUTS_SHIFT: u32 = 8;
 }
 
-/// Number of words that [`fixed16_array`] reads from a block, for `groups` groups of outputs.
-#[cfg(any(test, cortex_m4f))]
-pub(crate) const fn fixed16_words(centres: usize, affine: bool, groups: usize) -> usize {
-    let outputs = OUTPUTS * groups;
-    let affine = if affine { INPUTS / 2 * outputs } else { 0 };
-    let sixteen_centres = 16 * (1 + INPUTS / 2) + 8 * outputs;
-    2 * INPUTS + 1 + 2 * outputs + affine + centres.div_ceil(16) * sixteen_centres
+impl<'a> Block<'a> {
+    /// Makes a block of these counts. A batch of the format's routine has `batch` centres.
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "where counts are known, little is left of it")]
+    pub fn new(counts: [usize; 3], affine: bool, words: &'a [u32], batch: usize) -> Self {
+        let [inputs, centres, outputs] = counts;
+        let sizes = if inputs != INPUTS || outputs > OUTPUTS {
+            Form::OTHER_SIZES
+        } else if outputs < OUTPUTS {
+            (outputs as u32) << Form::OUTPUTS_SHIFT
+        } else {
+            0
+        };
+        let affine = if affine { Form::AFFINE } else { 0 };
+        let batches = if centres > batch { Form::BATCHES } else { 0 };
+        Self { inputs, centres, outputs, form: Form(affine | sizes | batches), words }
+    }
+
+    /// Whether there is an affine tail.
+    #[inline]
+    pub fn affine(&self) -> bool {
+        self.form.0 & Form::AFFINE != 0
+    }
 }
+
+// What the assembly relies on.
+#[cfg(cortex_m4f)]
+const _: () = {
+    use core::mem::offset_of;
+    assert!(offset_of!(Block<'_>, inputs) == 0 && offset_of!(Block<'_>, centres) == 4);
+    assert!(offset_of!(Block<'_>, outputs) == 8 && offset_of!(Block<'_>, form) == 12);
+    assert!(offset_of!(Block<'_>, words) == 16 && size_of::<Block<'_>>() == 24);
+};

@@ -2,8 +2,6 @@
 
 use crate::blob::{DecodeError, Metadata, Model, ModelShape, NetworkSection};
 use crate::cortex_m4::Finite;
-#[cfg(cortex_m4f)]
-use crate::cortex_m4::{INPUTS, OUTPUTS};
 use crate::estimate::{Estimate, RowStatus};
 use crate::exp::{ExpKernel, Polynomial};
 use crate::gate::Gate;
@@ -339,63 +337,20 @@ impl Array<'_, '_> {
     }
 }
 
-/// Infers the outputs of a row, or of all rows at once, and returns their status. Inlined, so that only the
-/// assembly's path is compiled where the sizes are the assembly's.
-#[inline(always)]
-#[expect(clippy::inline_always, reason = "lengths that are known choose the code")]
-fn decode_inputs(
-    section: &NetworkSection<'_>,
-    exp: fn(f32) -> f32,
-    inputs: &[f32],
-    scaled: &mut [f32],
-    outputs: &mut [f32],
-) -> RowStatus {
-    #[cfg(cortex_m4f)]
-    if let (Ok(inputs), (groups @ [_, ..], [])) = (inputs.try_into(), outputs.as_chunks_mut()) {
-        return decode_in_assembly(section, exp, inputs, scaled, groups);
-    }
-    decode_in_rust(section, exp, inputs, scaled, outputs)
-}
-
-/// Infers the outputs of a network by assembly routines. Neither generic nor inlined on a device: it is thus
-/// compiled with this crate, for speed, while the rest of an image is compiled for size.
-#[cfg(cortex_m4f)]
-#[inline(never)]
-#[expect(unsafe_code, reason = "calls to assembly, for networks that are made to their sizes here")]
-fn decode_in_assembly(
-    section: &NetworkSection<'_>,
-    exp: fn(f32) -> f32,
-    inputs: &[f32; INPUTS],
-    scaled: &mut [f32],
-    groups: &mut [[f32; OUTPUTS]],
-) -> RowStatus {
-    let outputs = groups.as_flattened().len();
-    let shape = ModelShape { rows: 1, inputs: INPUTS, outputs };
-    let finite = match section.format() {
-        Format::F32Direct => {
-            let outputs = groups.as_flattened_mut();
-            return decode_direct(section, exp, inputs, scaled, outputs);
-        }
-        Format::F32 => section.packed::<Expanded>(shape).map(|network| {
-            // SAFETY: `shape` is made of these inputs and groups, and the network has it.
-            unsafe { network.infer_in_assembly(inputs, groups) }
-        }),
-        Format::Fixed16 => section.packed::<Fixed16>(shape).map(|network| {
-            // SAFETY: as for f32.
-            unsafe { network.infer_in_assembly(inputs, groups) }
-        }),
-    };
-    status_of(finite, inputs)
-}
-
-/// Infers the outputs of a network in portable Rust, where no assembly serves ([`decode_in_assembly`]).
+/// Infers the outputs of a row, or of all rows at once, and returns their status.
+///
+/// Neither generic nor inlined on a device: it is thus compiled with this crate, for speed, while the rest of an
+/// image is compiled for size.
 #[cfg_attr(cortex_m4f, inline(never))]
 #[cfg_attr(
     not(cortex_m4f),
     inline(always),
-    expect(clippy::inline_always, reason = "so that the compiler knows the exponential")
+    expect(
+        clippy::inline_always,
+        reason = "so that the compiler knows lengths and the exponential"
+    )
 )]
-fn decode_in_rust(
+fn decode_inputs(
     section: &NetworkSection<'_>,
     exp: fn(f32) -> f32,
     inputs: &[f32],

@@ -106,8 +106,12 @@ pub fn is_at_rest(readings: &[f32], baseline: &[f32], tolerance: f32) -> bool {
 
 /// Copies `rest` to `outputs` if the `readings` [are at rest](is_at_rest); returns whether they are.
 ///
-/// Neither generic nor inlined on a device, so that it is compiled with this crate, for speed.
-#[cfg_attr(cortex_m4f, inline(never))]
+/// Inlined on a device, because the compiler's call would cost as much as the assembly's.
+#[cfg_attr(
+    cortex_m4f,
+    inline(always),
+    expect(clippy::inline_always, reason = "two comparisons and a call")
+)]
 fn give_rest(
     readings: &[f32],
     baseline: &[f32],
@@ -116,11 +120,21 @@ fn give_rest(
     outputs: &mut [f32],
 ) -> bool {
     #[cfg(cortex_m4f)]
-    if let (Ok(readings), Ok(baseline), Ok(rest), Ok(outputs)) =
-        (readings.try_into(), baseline.try_into(), rest.try_into(), (&mut *outputs).try_into())
-    {
-        return cortex_m4::give_rest(readings, baseline, tolerance, rest, outputs);
+    if let Some(at_rest) = cortex_m4::give_rest(readings, baseline, tolerance, rest, outputs) {
+        return at_rest;
     }
+    give_rest_in_rust(readings, baseline, tolerance, rest, outputs)
+}
+
+/// Gives rest as [`give_rest`] does, in portable Rust: the compiled twin of the assembly.
+#[cfg_attr(cortex_m4f, inline(never))]
+fn give_rest_in_rust(
+    readings: &[f32],
+    baseline: &[f32],
+    tolerance: f32,
+    rest: &[f32],
+    outputs: &mut [f32],
+) -> bool {
     let at_rest = is_at_rest(readings, baseline, tolerance);
     if at_rest {
         outputs.iter_mut().zip(rest).for_each(|(output, rest)| *output = *rest);

@@ -4,7 +4,7 @@
 //! the array. There are as many features as a row has readings, so that the same inner loops serve both. The
 //! directions p come from training; `docs/projection.md` explains how.
 
-#[cfg(any(cortex_m4f, test))]
+#[cfg(cortex_m4f)]
 use crate::cortex_m4;
 use crate::rbf::NetworkError;
 
@@ -57,23 +57,18 @@ impl<'a> Projection<'a> {
     )]
     pub fn project(&self, readings: &[f32], features: &mut [f32]) {
         #[cfg(cortex_m4f)]
-        if let Ok(features) = (&mut *features).try_into()
-            && self.suits_assembly(readings.len())
-        {
-            // SAFETY: `suits_assembly` has found the number of readings even, and the block to be one of 18
-            // features for as many. It is not 0, because `new` rejects a projection without readings.
+        if self.suits(readings.len(), features.len()) {
+            // SAFETY: `suits` has found the block to be one of so many readings and features. Neither is 0,
+            // because `new` rejects such a projection.
             return unsafe { cortex_m4::project(self.block, readings, features) };
         }
         self.project_portably(readings, features);
     }
 
-    /// Whether the assembly can project so many `readings`: an even number, all those of the block, to 18
-    /// features.
+    /// Whether the projection is one of so many `readings` to so many `features`.
     #[cfg(any(cortex_m4f, test))]
-    fn suits_assembly(&self, readings: usize) -> bool {
-        self.features == cortex_m4::INPUTS
-            && readings.is_multiple_of(2)
-            && self.block.len() == block_floats(readings, self.features)
+    fn suits(&self, readings: usize, features: usize) -> bool {
+        self.features == features && self.block.len() == block_floats(readings, features)
     }
 
     /// Projects as [`project`](Self::project) does, to the bit, in portable Rust: the compiled twin of the
@@ -110,16 +105,16 @@ mod tests {
     }
 
     #[test]
-    fn only_the_sizes_that_assembly_reads_are_given_to_it() {
+    fn only_its_own_sizes_are_given_to_assembly() {
         let block = [0.0; 18 * 19];
-        let suits = |readings, features, of: usize| {
+        let suits = |readings, features, of: [usize; 2]| {
             let block = &block[..block_floats(readings, features)];
-            Projection::new(readings, features, block).unwrap().suits_assembly(of)
+            Projection::new(readings, features, block).unwrap().suits(of[0], of[1])
         };
-        assert!(suits(18, 18, 18));
-        // Blocks of other shapes can be as long as one for 18 features.
-        assert!(!suits(17, 1, 0) && !suits(37, 9, 18));
-        assert!(!suits(18, 18, 16) && !suits(18, 18, 0) && !suits(17, 18, 17));
+        assert!(suits(18, 18, [18, 18]) && suits(7, 3, [7, 3]));
+        // A block can be as long as one of another shape.
+        assert!(!suits(17, 1, [0, 18]) && !suits(37, 9, [18, 18]));
+        assert!(!suits(18, 18, [16, 18]) && !suits(18, 18, [0, 18]) && !suits(17, 18, [17, 17]));
     }
 
     #[test]

@@ -7,8 +7,8 @@
 //! | [`Format`] | distances | a Cortex-M4F computes with |
 //! |---|---|---|
 //! | [`F32Direct`](Format::F32Direct) | Σ (x − c)²: safe at any width | compiled code, any [`exp`](crate::exp) |
-//! | [`F32`](Format::F32) | ‖x‖² − 2x·c + ‖c‖²: where a bound proves it safe | `cortex_m4.s` |
-//! | [`Fixed16`](Format::Fixed16) | as `F32`, in integers | `cortex_m4.s`, two products an instruction |
+//! | [`F32`](Format::F32) | ‖x‖² − 2x·c + ‖c‖²: where a bound proves it safe | `cortex_m4/f32.s` |
+//! | [`Fixed16`](Format::Fixed16) | as `F32`, in integers | `cortex_m4/fixed16.s`, two products an instruction |
 //!
 //! The order of the floating-point operations is part of each format's contract. The affine tail comes first,
 //! then one centre after the other, and last the bias, so that a large offset costs no digits of the rest.

@@ -18,3 +18,4 @@ pub mod exit;
 mod fault;
 pub mod slot;
 pub mod checks;
+pub mod shapes;

@@ -19,7 +19,7 @@ use super::parameters::{
     Cut, NetworkError, Shape, accumulate, check_finite, check_spans, range_about, scale_about,
 };
 #[cfg(cortex_m4f)]
-use crate::cortex_m4::{self, Finite, Inputs, OUTPUTS};
+use crate::cortex_m4::{self, Finite, Inputs};
 use crate::exp::exp2;
 use crate::scale::{HALF_RANGE, UNITS, clamp_units};
 
@@ -69,6 +69,8 @@ pub struct Expanded;
 pub type Network<'a> = packed::Network<'a, Expanded>;
 
 impl Layout for Expanded {
+    const BATCH: usize = 128;
+
     type Parameters<'a> = Parameters<'a>;
 
     #[inline]
@@ -174,26 +176,10 @@ impl Layout for Expanded {
     #[cfg(cortex_m4f)]
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "a call")]
-    unsafe fn routine(
-        network: &Network<'_>,
-        inputs: Inputs<'_>,
-        output: &mut [f32; OUTPUTS],
-    ) -> Finite {
-        // SAFETY: the caller has compared the shape with the routine's. When the network was made, its block was
-        // found to be as long as its shape asks for, and no dimension to be 0. A test compares the lengths.
+    unsafe fn routine(network: &Network<'_>, inputs: Inputs<'_>, output: &mut [f32]) -> Finite {
+        // SAFETY: the caller has compared the lengths with the shape. When the network was made, its block was found
+        // to be as long as its shape asks for, and no dimension to be 0.
         unsafe { cortex_m4::expanded(network.counted(), inputs, output) }
-    }
-
-    #[cfg(cortex_m4f)]
-    #[inline(always)]
-    #[expect(clippy::inline_always, reason = "a call")]
-    unsafe fn array_routine(
-        network: &Network<'_>,
-        inputs: Inputs<'_>,
-        groups: &mut [[f32; OUTPUTS]],
-    ) -> Finite {
-        // SAFETY: as in `routine`.
-        unsafe { cortex_m4::expanded_array(network.counted(), inputs, groups) }
     }
 }
 

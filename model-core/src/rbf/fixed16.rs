@@ -24,13 +24,13 @@ use super::parameters::{
     Cut, NetworkError, Shape, check_finite, check_spans, range_about, scale_about,
 };
 #[cfg(cortex_m4f)]
-use crate::cortex_m4::{self, Finite, Inputs, OUTPUTS};
+use crate::cortex_m4::{self, Finite, Inputs};
 use crate::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP, clamp_steps};
 
 /// Number of centres in a group: K is rounded up to a multiple of it in the block.
 pub const CENTRES_AT_ONCE: usize = 16;
-/// Largest number of inputs for which the squared length of x cannot overflow.
-pub const MOST_INPUTS: usize = 63;
+/// Largest number of inputs of a network.
+pub const MOST_INPUTS: usize = 65_535;
 /// Number of fraction bits of an exponent v.
 pub const EXPONENT_FRACTION_BITS: u32 = 26;
 /// Number of fraction bits of the decay g, which is per step².
@@ -89,6 +89,8 @@ pub struct Fixed16;
 pub type Network<'a> = packed::Network<'a, Fixed16>;
 
 impl Layout for Fixed16 {
+    const BATCH: usize = 256;
+
     type Parameters<'a> = Parameters<'a>;
 
     #[inline]
@@ -209,26 +211,10 @@ impl Layout for Fixed16 {
     #[cfg(cortex_m4f)]
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "a call")]
-    unsafe fn routine(
-        network: &Network<'_>,
-        inputs: Inputs<'_>,
-        output: &mut [f32; OUTPUTS],
-    ) -> Finite {
-        // SAFETY: the caller has compared the shape with the routine's. When the network was made, its block was
-        // found to be as long as its shape asks for, and no dimension to be 0. A test compares the lengths.
+    unsafe fn routine(network: &Network<'_>, inputs: Inputs<'_>, output: &mut [f32]) -> Finite {
+        // SAFETY: the caller has compared the lengths with the shape. When the network was made, its block was found
+        // to be as long as its shape asks for, and no dimension to be 0.
         unsafe { cortex_m4::fixed16(network.counted(), inputs, output) }
-    }
-
-    #[cfg(cortex_m4f)]
-    #[inline(always)]
-    #[expect(clippy::inline_always, reason = "a call")]
-    unsafe fn array_routine(
-        network: &Network<'_>,
-        inputs: Inputs<'_>,
-        groups: &mut [[f32; OUTPUTS]],
-    ) -> Finite {
-        // SAFETY: as in `routine`.
-        unsafe { cortex_m4::fixed16_array(network.counted(), inputs, groups) }
     }
 }
 
@@ -287,12 +273,23 @@ fn add_products(sum: i32, pairs: &[u32], values: &[i32]) -> i32 {
     sum
 }
 
+/// Number of bits that ‖x‖² of so many inputs drops, so that the rest fits 32 bits.
+///
+/// Up to 63 inputs it is 4. What the bits are worth in an exponent stays below 5 units, less than
+/// [`EXPONENT_MARGIN`]: with more inputs, exponents below 64 allow only a smaller decay.
+#[inline]
+#[must_use]
+pub fn square_shift(inputs: usize) -> u32 {
+    inputs.checked_ilog2().unwrap_or(0).saturating_sub(1).max(4)
+}
+
 /// The term g‖x‖² of the exponent, which all centres share.
 #[inline(always)]
 #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
 fn shared_term(decay: u32, x: &[i32]) -> u32 {
     let square: u64 = x.iter().map(|&x| u64::from(x.unsigned_abs()).pow(2)).sum();
-    (((square >> 4) * u64::from(decay)) >> 30) as u32
+    let shift = square_shift(x.len());
+    (((square >> shift) * u64::from(decay)) >> (DECAY_FRACTION_BITS - shift)) as u32
 }
 
 /// The activation 2^−v in Q15.

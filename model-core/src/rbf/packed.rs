@@ -1,8 +1,8 @@
 //! Networks whose parameters are one block of words, as in all formats that have an assembly routine.
 //!
 //! A format implements [`Layout`]: how long its blocks are, what they may hold, and how to infer from them. A
-//! Cortex-M4F infers by an assembly routine where the sizes are the paper's. Elsewhere the routine's compiled
-//! twin is used: portable Rust that gives the same bits.
+//! Cortex-M4F infers by an assembly routine. Elsewhere the routine's compiled twin is used: portable Rust that gives
+//! the same bits.
 #![cfg_attr(
     cortex_m4f,
     expect(unsafe_code, reason = "calls to assembly, whose conditions are checked before")
@@ -18,6 +18,9 @@ use crate::cortex_m4::{Block, Finite, INPUTS, OUTPUTS};
 
 /// A number format whose networks are one block of words.
 pub trait Layout: Copy + Debug + PartialEq {
+    /// Most centres of a batch of the assembly routine.
+    const BATCH: usize;
+
     /// Parameters of a network, cut from its block.
     type Parameters<'a>;
 
@@ -55,27 +58,15 @@ pub trait Layout: Copy + Debug + PartialEq {
     /// Infers `output` from `scaled` inputs, which are overwritten, in Rust: the same bits as the routine's.
     fn infer_scaled_in_rust(network: &Network<'_, Self>, scaled: &mut [f32], output: &mut [f32]);
 
-    /// Infers one group of 18 outputs by the format's assembly routine.
+    /// Infers `output` by the format's assembly routine.
     ///
     /// # Safety
-    /// The caller must check that `network` has 18 inputs and 18 outputs.
+    /// The caller must check that there are as many `inputs`, with their space, and outputs as `network` has.
     #[cfg(cortex_m4f)]
     unsafe fn routine(
         network: &Network<'_, Self>,
         inputs: Inputs<'_>,
-        output: &mut [f32; OUTPUTS],
-    ) -> Finite;
-
-    /// Infers several groups of 18 outputs by the format's assembly routine.
-    ///
-    /// # Safety
-    /// The caller must check that `network` has 18 inputs and 18 outputs for each of `groups`, and that there is
-    /// at least one group.
-    #[cfg(cortex_m4f)]
-    unsafe fn array_routine(
-        network: &Network<'_, Self>,
-        inputs: Inputs<'_>,
-        groups: &mut [[f32; OUTPUTS]],
+        output: &mut [f32],
     ) -> Finite;
 }
 
@@ -115,7 +106,7 @@ impl<'a, L: Layout> Network<'a, L> {
         L::check_shape(shape)?;
         check_length("block", block, Self::block_words(shape, affine))?;
         let Shape { inputs, centres, outputs } = shape;
-        let block = Block { inputs, centres, outputs, affine, words: block };
+        let block = Block::new([inputs, centres, outputs], affine, block, L::BATCH);
         Ok(Self { block, layout: PhantomData })
     }
 
@@ -136,7 +127,7 @@ impl<'a, L: Layout> Network<'a, L> {
     /// Whether the network has an affine tail.
     #[must_use]
     pub fn has_affine_tail(&self) -> bool {
-        self.block.affine
+        self.block.affine()
     }
 
     /// All words of the network.
@@ -179,65 +170,42 @@ impl<'a, L: Layout> Network<'a, L> {
         L::scale(self, reading, scaled);
     }
 
-    /// Whether the network's sizes are those of the routine for one group.
-    #[cfg(cortex_m4f)]
-    #[inline(always)]
-    #[expect(clippy::inline_always, reason = "where lengths are known, nothing is left of it")]
-    fn suits_one_group(&self) -> bool {
-        let Block { inputs, outputs, .. } = self.block;
-        inputs == INPUTS && outputs == OUTPUTS
-    }
-
-    /// Infers `output` from one row of readings; `scaled` is working space.
+    /// Infers `output` from one row of readings; `scaled` is working space. All must have the lengths of the shape.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "callers rely on it for constant lengths")]
     pub(crate) fn infer(&self, reading: &[f32], scaled: &mut [f32], output: &mut [f32]) -> Finite {
         #[cfg(cortex_m4f)]
-        if let (Ok(reading), Ok(output)) = (reading.try_into(), (&mut *output).try_into())
-            && self.suits_one_group()
-        {
-            // SAFETY: the network has 18 inputs and 18 outputs, as `suits_one_group` has checked.
-            return unsafe { L::routine(self, Inputs::Readings(reading), output) };
+        if reading.len() == self.block.inputs && self.fit(scaled, output) {
+            // SAFETY: the lengths are the network's, as was just checked.
+            return unsafe { L::routine(self, Inputs::Readings(reading, scaled), output) };
         }
-        self.scale(reading, scaled);
-        self.infer_scaled(scaled, output);
+        #[cfg(not(cortex_m4f))]
+        {
+            self.scale(reading, scaled);
+            L::infer_scaled_in_rust(self, scaled, output);
+        }
         Finite::Unknown
     }
 
-    /// Infers groups of 18 outputs from one row of inputs by an assembly routine.
-    ///
-    /// # Safety
-    /// The network has 18 inputs, and 18 outputs for each of `groups`.
-    #[cfg(cortex_m4f)]
-    #[inline(always)]
-    #[expect(clippy::inline_always, reason = "a match and a call")]
-    pub(crate) unsafe fn infer_in_assembly(
-        &self,
-        reading: &[f32; INPUTS],
-        groups: &mut [[f32; OUTPUTS]],
-    ) -> Finite {
-        let inputs = Inputs::Readings(reading);
-        match groups {
-            // SAFETY: the caller has checked the sizes, and there is one group.
-            [output] => unsafe { L::routine(self, inputs, output) },
-            // SAFETY: the caller has checked the sizes.
-            groups => unsafe { L::array_routine(self, inputs, groups) },
-        }
-    }
-
-    /// Infers `output` from `scaled` inputs, which are overwritten.
+    /// Infers `output` from `scaled` inputs, which are overwritten. Both must have the lengths of the shape.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "callers rely on it for constant lengths")]
     pub(crate) fn infer_scaled(&self, scaled: &mut [f32], output: &mut [f32]) {
         #[cfg(cortex_m4f)]
-        if let (Ok(scaled), Ok(output)) = ((&*scaled).try_into(), (&mut *output).try_into())
-            && self.suits_one_group()
-        {
-            // SAFETY: the network has 18 inputs and 18 outputs, as `suits_one_group` has checked.
+        if self.fit(scaled, output) {
+            // SAFETY: the lengths are the network's, as was just checked.
             unsafe { L::routine(self, Inputs::Scaled(scaled), output) };
-            return;
         }
+        #[cfg(not(cortex_m4f))]
         L::infer_scaled_in_rust(self, scaled, output);
+    }
+
+    /// Whether buffers have the lengths of the shape.
+    #[cfg(cortex_m4f)]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "where lengths are known, nothing is left of it")]
+    fn fit(&self, scaled: &[f32], output: &[f32]) -> bool {
+        scaled.len() == self.block.inputs && output.len() == self.block.outputs
     }
 
     /// Infers `output` from `scaled` inputs by the compiled twin, with separate code for the usual sizes.

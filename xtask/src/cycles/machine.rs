@@ -16,7 +16,7 @@ use crate::process::Outcome;
 const BEGIN: &str = "region_begin";
 const END: &str = "region_end";
 
-/// Symbols around the code that is watched: the powers of two of `taxel_f32` (`model-core/src/cortex_m4.s`).
+/// Symbols around the code that is watched: the powers of two of `taxel_f32` (`model-core/src/cortex_m4/f32.s`).
 const WATCHED: [&str; 2] = ["taxel_f32_powers", "taxel_f32_powers_end"];
 
 /// Symbols around the slot in which the image expects a model.

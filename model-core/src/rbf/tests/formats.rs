@@ -248,9 +248,9 @@ fn exponents_beyond_their_range_are_refused() {
         let refused = fixed16::Network::try_new(SHAPES[1], false, &words);
         assert_eq!(refused, Err(NetworkError::ExponentOutOfRange { centre: 0 }), "{b}");
     }
-    let wide = Shape { inputs: 64, centres: 1, outputs: 1 };
+    let wide = Shape { inputs: 65_536, centres: 1, outputs: 1 };
     let refused = fixed16::Network::try_new(wide, false, &[]);
-    assert_eq!(refused, Err(NetworkError::TooManyInputs { most: 63, found: 64 }));
+    assert_eq!(refused, Err(NetworkError::TooManyInputs { most: 65_535, found: 65_536 }));
 }
 
 #[test]

@@ -6,7 +6,8 @@
 
 use model_core::rbf::Shape;
 use model_core::rbf::fixed16::{
-    CENTRES_AT_ONCE, CUBIC, EXPONENT_FRACTION_BITS, Network, Parameters, words_at_once,
+    CENTRES_AT_ONCE, CUBIC, DECAY_FRACTION_BITS, EXPONENT_FRACTION_BITS, Network, Parameters,
+    square_shift, words_at_once,
 };
 use model_core::scale::UNITS;
 use pulp::x86::V3;
@@ -106,7 +107,7 @@ impl NullaryFnOnce for Work<'_> {
                 *sums = [simd.splat_i32x8(bias); VECTORS];
             }
             self.network.affine.accumulate(how, 0, &x, &mut sums);
-            let shared = shared_term(simd, p.decay, &x);
+            let shared = shared_term(simd, p.decay, p.input_midpoint.len(), &x);
             let mut first = 0;
             for centres in self.network.centres.chunks(KEPT / (CENTRES / 2) * (1 + pairs)) {
                 let tiles = centres.chunks_exact(1 + pairs);
@@ -225,9 +226,9 @@ fn powers(simd: V3, two: &[OfLines<Products>; 2]) -> OfLines<Products> {
 
 /// Term g‖x‖² that all centres share.
 #[inline(always)]
-fn shared_term(simd: V3, decay: u32, x: &[OfLines<Products>]) -> OfLines<Products> {
-    // The square of a pair is up to 2³¹. The sum of at most 63 squares is below 2³⁶, so a sixteenth of
-    // it fits 32 bits; halves of 16 bits are added separately.
+fn shared_term(simd: V3, decay: u32, inputs: usize, x: &[OfLines<Products>]) -> OfLines<Products> {
+    // The square of a pair is up to 2³¹. Halves of 16 bits are added separately, so that neither sum leaves 32 bits;
+    // nor does their whole after the shift.
     let zero = [simd.splat_u32x8(0); VECTORS];
     let (mut low, mut high) = (zero, zero);
     for x in x {
@@ -240,11 +241,15 @@ fn shared_term(simd: V3, decay: u32, x: &[OfLines<Products>]) -> OfLines<Product
         }
     }
     let mut shared = zero;
+    let shift = square_shift(inputs);
+    let by = |places: u32| simd.splat_u32x8(places);
     for ((shared, low), high) in shared.iter_mut().zip(low).zip(high) {
-        let (low, high) = (simd.shr_const_u32x8::<4>(low), simd.shl_const_u32x8::<12>(high));
-        let sixteenth = simd.wrapping_add_u32x8(low, high);
-        let (low, high) = simd.widening_mul_u32x8(sixteenth, simd.splat_u32x8(decay));
-        *shared = simd.or_u32x8(simd.shr_const_u32x8::<30>(low), simd.shl_const_u32x8::<2>(high));
+        let low = simd.shr_dyn_u32x8(low, by(shift));
+        let high = simd.shl_dyn_u32x8(high, by(16 - shift));
+        let square = simd.wrapping_add_u32x8(low, high);
+        let (low, high) = simd.widening_mul_u32x8(square, simd.splat_u32x8(decay));
+        let low = simd.shr_dyn_u32x8(low, by(DECAY_FRACTION_BITS - shift));
+        *shared = simd.or_u32x8(low, simd.shl_dyn_u32x8(high, by(shift - 2)));
     }
     bytemuck::cast(shared)
 }

@@ -1,0 +1,27 @@
+//! Infers by networks of many shapes, projects and gates, by assembly and by its compiled twins, which must give the
+//! same bits. Nothing may be read or written beyond what a shape has.
+#![no_std]
+#![no_main]
+
+use cortex_m_rt::entry;
+use defmt::{info, unwrap};
+use model_core::rbf::Format;
+use qemu_image::exit;
+use qemu_image::shapes::{self, Comparison, Memory};
+
+fn log(what: &str, comparison: Comparison) {
+    let Comparison { compared, different } = comparison;
+    info!("{=str}: {=usize} of {=usize} differ from the twin's", what, different, compared);
+}
+
+#[entry]
+fn main() -> ! {
+    let peripherals = unwrap!(cortex_m::Peripherals::take());
+    // SAFETY: the memory and the MPU are used here only.
+    let mut memory = unsafe { Memory::take(&peripherals.MPU) };
+    log("f32", unwrap!(shapes::networks(&mut memory, Format::F32)));
+    log("fixed16", unwrap!(shapes::networks(&mut memory, Format::Fixed16)));
+    log("projection", unwrap!(shapes::projections(&mut memory)));
+    log("gate", shapes::gates());
+    exit::success()
+}

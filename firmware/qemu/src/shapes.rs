@@ -1,0 +1,316 @@
+//! Networks, projections and gates of many shapes, by assembly and by its compiled twins.
+//!
+//! What assembly reads lies directly before a place where reads fault. What it writes is followed by numbers that
+//! must stay.
+
+use core::{ptr, slice};
+
+use cortex_m::peripheral::MPU;
+
+use model_core::gate::{Rest, is_at_rest};
+use model_core::projection::Projection;
+use model_core::rbf::{Format, Network, Shape, expanded, fixed16};
+use model_core::scale::UNITS;
+use model_core::{Gate, RowStatus};
+
+use crate::checks::Numbers;
+
+/// End of the parameters, in the machine's PSRAM; what lies behind must not be read.
+const END: usize = 0x21FF_0000;
+/// Number of words before the end that are used.
+const WORDS: usize = 0x4_0000;
+/// Most inputs, and most outputs, of a shape.
+const MOST: usize = 160;
+/// Number of readings beyond the most, which must stay what they are.
+const BEYOND: usize = 4;
+/// A NaN that no computation makes.
+const UNTOUCHED: u32 = 0x7FC1_2345;
+/// Middle of all training ranges, in Ω.
+const MIDDLE_OHM: f32 = 60.0;
+/// Largest distances in Ω of readings from the middle, one for each inference of a network.
+const REACHES_OHM: [f32; 4] = [5.0, 9.0, 300.0, 3e38];
+
+/// Numbers of networks or the like that were compared, and of those that differ.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Comparison {
+    /// How many were compared.
+    pub compared: usize,
+    /// How many differ from the twin in some bit, or write beyond their outputs.
+    pub different: usize,
+}
+
+impl Comparison {
+    fn add(&mut self, same: bool) {
+        self.compared += 1;
+        self.different += usize::from(!same);
+    }
+}
+
+/// Memory for parameters, behind which reads fault, and for what is computed.
+pub struct Memory {
+    words: &'static mut [u32],
+    buffers: [Guarded; 3],
+}
+
+/// A buffer of which some first numbers are written, and those behind must stay.
+struct Guarded(&'static mut [f32]);
+
+impl Memory {
+    /// Takes the memory, and protects the 64 KiB behind the parameters.
+    ///
+    /// # Safety
+    /// The caller must ensure that this is called only once, and that nothing else uses the PSRAM or the MPU.
+    #[must_use]
+    pub unsafe fn take(mpu: &MPU) -> Self {
+        const SIZE_64_KIB_NO_ACCESS: u32 = 15 << 1 | 1;
+        const ENABLE_WITH_DEFAULT_MAP: u32 = 1 << 2 | 1;
+        // SAFETY: the region holds nothing that is used.
+        unsafe {
+            mpu.rnr.write(0);
+            mpu.rbar.write(END as u32);
+            mpu.rasr.write(SIZE_64_KIB_NO_ACCESS);
+            mpu.ctrl.write(ENABLE_WITH_DEFAULT_MAP);
+        }
+        cortex_m::asm::dsb();
+        cortex_m::asm::isb();
+        let start = END - WORDS * 4;
+        let at = ptr::with_exposed_provenance_mut(start);
+        // SAFETY: the memory is there, of this size, aligned, and any bits are numbers. Nothing else uses it.
+        let words = unsafe { slice::from_raw_parts_mut(at, WORDS) };
+        let buffers = [1, 2, 3].map(|number| {
+            let at = ptr::with_exposed_provenance_mut(start - number * (MOST + BEYOND) * 4);
+            // SAFETY: as above; the buffers lie before the words, one before the other.
+            Guarded(unsafe { slice::from_raw_parts_mut(at, MOST + BEYOND) })
+        });
+        Self { words, buffers }
+    }
+}
+
+/// The last `count` words.
+fn last(words: &mut [u32], count: usize) -> &mut [u32] {
+    let first = words.len().saturating_sub(count);
+    words.get_mut(first..).unwrap_or_default()
+}
+
+impl Guarded {
+    fn first(&mut self, count: usize) -> &mut [f32] {
+        self.0.get_mut(..count).unwrap_or_default()
+    }
+
+    /// Fills the whole buffer with what must stay.
+    fn guard(&mut self) {
+        self.0.fill(f32::from_bits(UNTOUCHED));
+    }
+
+    fn is_untouched_from(&self, count: usize) -> bool {
+        self.0.iter().skip(count).all(|value| value.to_bits() == UNTOUCHED)
+    }
+}
+
+fn same_bits(a: &[f32], b: &[f32]) -> bool {
+    a.iter().map(|value| value.to_bits()).eq(b.iter().map(|value| value.to_bits()))
+}
+
+/// Shapes to compare: all small numbers of inputs and outputs, some large ones, and every remainder of centres.
+fn shapes() -> impl Iterator<Item = Shape> {
+    let all = (1..=40).flat_map(|inputs| {
+        [1, 4, 5, 6, 12, 18, 41 - inputs].map(|outputs| Shape { inputs, centres: 20, outputs })
+    });
+    let outputs = (1..=40).map(|outputs| Shape { inputs: 7, centres: 16, outputs });
+    let large = [1, 15, 16, 17, 128, 129, 257].into_iter().flat_map(|centres| {
+        let sizes = [(18, 18), (18, 6), (18, 36), (12, 5), (1, 1), (32, 24), (144, 6)];
+        sizes.map(|(inputs, outputs)| Shape { inputs, centres, outputs })
+    });
+    let wide = [17, 63, 64, 127, 128, 144, 160]
+        .into_iter()
+        .flat_map(|inputs| [1, 19, 144].map(|outputs| Shape { inputs, centres: 5, outputs }));
+    all.chain(outputs).chain(large).chain(wide)
+}
+
+/// Writes a network of `shape` with random numbers in the format's own ranges to `words`.
+fn write_network(
+    words: &mut [u32],
+    format: Format,
+    shape: Shape,
+    affine: bool,
+    numbers: &mut Numbers,
+) {
+    let Shape { inputs, centres, outputs } = shape;
+    let mut words = words.iter_mut();
+    let mut put = |count: usize, next: &mut dyn FnMut() -> u32| {
+        words.by_ref().take(count).for_each(|word| *word = next());
+    };
+    let any = |numbers: &mut Numbers| ((numbers.draw() * UNITS) as i32).cast_unsigned();
+    put(inputs, &mut || MIDDLE_OHM.to_bits());
+    put(inputs, &mut || ((0.12 + 0.02 * numbers.draw()) * UNITS).to_bits());
+    if format == Format::F32 {
+        // Exponents between −80 and −0.5 for all inputs within the clamp.
+        let decay = 10.0 / inputs as f32 / UNITS / UNITS;
+        put(1, &mut || decay.to_bits());
+        put(outputs, &mut || numbers.draw().to_bits());
+        let tail = if affine { inputs * outputs } else { 0 };
+        put(tail, &mut || (numbers.draw() / UNITS).to_bits());
+        let stored = centres.next_multiple_of(expanded::CENTRES_AT_ONCE);
+        for _ in 0..stored {
+            put(1, &mut || (-31.5 + 28.5 * numbers.draw()).to_bits());
+            put(inputs, &mut || (decay * UNITS * numbers.draw()).to_bits());
+        }
+        put(stored * outputs, &mut || numbers.draw().to_bits());
+        return;
+    }
+    // Exponents below 2 for the distance, and as much for a·x.
+    let decay = 8_589_934_592.0 / inputs.max(4) as f32;
+    put(1, &mut || (decay as i32).cast_unsigned());
+    put(outputs, &mut || any(numbers));
+    put(outputs, &mut || (1e-6 * numbers.draw()).to_bits());
+    let pairs = inputs.div_ceil(2);
+    put(if affine { pairs * outputs } else { 0 }, &mut || any(numbers));
+    let most = decay / 17_179_869_184.0 * 32_768.0;
+    for _ in 0..centres.div_ceil(fixed16::CENTRES_AT_ONCE) {
+        for _ in 0..fixed16::CENTRES_AT_ONCE {
+            put(1, &mut || ((1_610_612_736.0 + 5e8 * numbers.draw()) as i32).cast_unsigned());
+            let mut half = || u32::from(((most * numbers.draw()) as i16).cast_unsigned());
+            put(pairs, &mut || half() | half() << 16);
+        }
+        put(outputs * fixed16::CENTRES_AT_ONCE / 2, &mut || any(numbers));
+    }
+}
+
+/// Whether assembly infers the same as the twin, from readings and from scaled inputs.
+fn is_as_its_twin(
+    network: &Network<'_>,
+    [scaled, found, expected]: &mut [Guarded; 3],
+    numbers: &mut Numbers,
+) -> Option<bool> {
+    let Shape { inputs, outputs, .. } = network.shape();
+    let mut same = true;
+    for reach in REACHES_OHM {
+        let mut readings = [0.0; MOST];
+        readings.fill_with(|| MIDDLE_OHM + reach * numbers.draw());
+        let readings = readings.get(..inputs)?;
+        scaled.guard();
+        found.guard();
+        network.scale(readings, scaled.first(inputs)).ok()?;
+        let (of_scaled, of_twin) = (scaled.first(inputs), expected.first(outputs));
+        match network {
+            Network::F32Direct(_) => return None,
+            Network::F32(network) => network.infer_scaled_portably(of_scaled, of_twin),
+            Network::Fixed16(network) => network.infer_scaled_portably(of_scaled, of_twin),
+        }
+        for from_readings in [true, false] {
+            found.first(outputs).fill(f32::NAN);
+            if from_readings {
+                network.infer(readings, scaled.first(inputs), found.first(outputs)).ok()?;
+            } else {
+                network.scale(readings, scaled.first(inputs)).ok()?;
+                network.infer_scaled(scaled.first(inputs), found.first(outputs)).ok()?;
+            }
+            same &= same_bits(found.first(outputs), expected.first(outputs));
+            same &= scaled.is_untouched_from(inputs) && found.is_untouched_from(outputs);
+        }
+    }
+    Some(same)
+}
+
+/// Compares networks of every shape in `format`, with an affine tail and without. `None` if a network is unsound.
+#[must_use]
+#[inline(never)] // frees the stack that this needs
+pub fn networks(memory: &mut Memory, format: Format) -> Option<Comparison> {
+    let mut numbers = Numbers::new(6);
+    let mut comparison = Comparison::default();
+    for (shape, affine) in shapes().flat_map(|shape| [(shape, false), (shape, true)]) {
+        let count = if format == Format::F32 {
+            expanded::Network::block_words(shape, affine)
+        } else {
+            fixed16::Network::block_words(shape, affine)
+        };
+        let words = last(memory.words, count);
+        write_network(words, format, shape, affine, &mut numbers);
+        let network = if format == Format::F32 {
+            Network::from(expanded::Network::try_new(shape, affine, words).ok()?)
+        } else {
+            Network::from(fixed16::Network::try_new(shape, affine, words).ok()?)
+        };
+        comparison.add(is_as_its_twin(&network, &mut memory.buffers, &mut numbers)?);
+    }
+    Some(comparison)
+}
+
+/// Compares projections of 1 to 40 readings to 1 to 40 features, and of 144 readings. `None` if one is unsound.
+#[must_use]
+#[inline(never)]
+pub fn projections(memory: &mut Memory) -> Option<Comparison> {
+    let mut numbers = Numbers::new(7);
+    let mut comparison = Comparison::default();
+    let sizes = (1..=41).flat_map(|readings| (1..=40).map(move |features| (readings, features)));
+    for (readings, features) in sizes {
+        let readings = if readings == 41 { 144 } else { readings };
+        let block = last(memory.words, (1 + readings) * features);
+        block.iter_mut().for_each(|word| *word = numbers.draw().to_bits());
+        let block = as_floats(block);
+        let projection = Projection::new(readings, features, block).ok()?;
+        let mut given = [0.0; MOST];
+        given.fill_with(|| MIDDLE_OHM + 5.0 * numbers.draw());
+        let given = given.get(..readings)?;
+        let [_, found, expected] = &mut memory.buffers;
+        found.guard();
+        projection.project(given, found.first(features));
+        projection.project_portably(given, expected.first(features));
+        let same = same_bits(found.first(features), expected.first(features));
+        comparison.add(same && found.is_untouched_from(features));
+    }
+    Some(comparison)
+}
+
+/// The same bits as floats.
+fn as_floats(words: &[u32]) -> &[f32] {
+    // SAFETY: both types have the same size and alignment, and any bits are numbers of either.
+    unsafe { slice::from_raw_parts(words.as_ptr().cast(), words.len()) }
+}
+
+/// Compares gates of rows with `COLS` readings and `OUTPUTS` outputs.
+#[inline(never)]
+fn gate<const COLS: usize, const OUTPUTS: usize>(
+    comparison: &mut Comparison,
+    numbers: &mut Numbers,
+) {
+    const TOLERANCE: f32 = 0.02;
+    for index in 0..8 * COLS.max(8) {
+        let row = [(); COLS].map(|()| MIDDLE_OHM + 5.0 * numbers.draw());
+        let outputs = [(); OUTPUTS].map(|()| numbers.draw());
+        let rest = Rest { baseline_ohm: &row, outputs: &outputs, status: &[RowStatus::Decoded] };
+        // Mostly at rest; now and then one reading is far off, or all are by a little.
+        let together = if index % 4 == 0 { 0.02 * numbers.draw() } else { 0.0 };
+        let mut readings = row.map(|ohm| ohm * (1.0 + together + 0.004 * numbers.draw()));
+        if let (1, Some(reading)) = (index % 4, readings.get_mut(index / 4 % COLS)) {
+            *reading *= [1.03, 0.97, f32::NAN, f32::INFINITY][index / 4 % 4];
+        }
+        let Some(gate) = Gate::new(rest, TOLERANCE) else {
+            return comparison.add(false);
+        };
+        let mut found = [f32::from_bits(UNTOUCHED); OUTPUTS];
+        let at_rest = gate.give_rest(0, &readings, &mut found);
+        let expected = is_at_rest(&readings, &row, TOLERANCE);
+        let outputs = if expected { outputs } else { [f32::from_bits(UNTOUCHED); OUTPUTS] };
+        comparison.add(at_rest == expected && same_bits(&found, &outputs));
+    }
+}
+
+/// Compares gates of rows of many sizes.
+#[must_use]
+pub fn gates() -> Comparison {
+    let (mut comparison, mut numbers) = (Comparison::default(), Numbers::new(8));
+    let (c, n) = (&mut comparison, &mut numbers);
+    gate::<1, 1>(c, n);
+    gate::<2, 17>(c, n);
+    gate::<4, 4>(c, n);
+    gate::<12, 5>(c, n);
+    gate::<17, 19>(c, n);
+    gate::<18, 6>(c, n);
+    gate::<18, 18>(c, n);
+    gate::<19, 36>(c, n);
+    gate::<32, 24>(c, n);
+    gate::<36, 37>(c, n);
+    gate::<40, 2>(c, n);
+    comparison
+}
