@@ -10,6 +10,8 @@
 use model_core::{ColumnWire, RowWire, Wires};
 use serde::{Deserialize, Serialize};
 
+use crate::circuit::{Constants, ConstantsFault};
+
 mod baseline;
 mod rows;
 mod columns;
@@ -107,4 +109,18 @@ pub trait FrameSource {
     /// Scans the first `wires` of the sensor into `frame`: one reading in Ω for each row and column, row after row.
     /// Readings that could not be taken become NaN.
     fn scan(&mut self, settings: ScanSettings, wires: Wires, frame: &mut [f32]) -> ScanReport;
+
+    /// The circuit's constants, if there are any that can be asked for.
+    fn constants(&self) -> Option<Constants<'_>> {
+        None
+    }
+
+    /// Replaces the circuit's constants.
+    ///
+    /// # Errors
+    /// [`ConstantsFault`], which leaves the constants as they were.
+    fn set_constants(&mut self, constants: Constants<'_>) -> Result<(), ConstantsFault> {
+        let _ = constants;
+        Err(ConstantsFault::Fixed)
+    }
 }

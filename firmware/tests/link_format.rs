@@ -3,10 +3,12 @@
 mod common;
 
 use common::request_bytes;
+use firmware::circuit::{Circuit, ConstantsFault, ZeroPotential};
 use firmware::link::cobs;
 use firmware::link::message::{
-    Configuration, ConfigurationField, EstimateReport, HealthReport, Identity, Memory, ModelFault,
-    ModelIdentity, Refusal, Report, Request, Statistics, UploadState, UploadStep,
+    Configuration, ConfigurationField, EstimateReport, HealthReport, Identity, KeepFault, Kept,
+    KeptBaseline, Memory, ModelFault, ModelIdentity, Refusal, Report, Request, Setting, Statistics,
+    UploadState, UploadStep,
 };
 use firmware::link::packet::{self, PROTOCOL_VERSION};
 use model_core::blob::Floats;
@@ -81,6 +83,14 @@ fn messages_give_the_specifications_worked_bytes() {
         longest_decode_us: 2,
         ..Statistics::default()
     };
+    let circuit = ZeroPotential::<1, 2>::TYPICAL;
+    let constants = circuit.constants().unwrap();
+    let kept = Kept {
+        configuration: None,
+        constants: true,
+        baseline: Some(KeptBaseline { rows: 8, columns: 18, frames: 20 }),
+        writes_left: 99,
+    };
     let upload = |step| request_bytes(6, &Request::Upload(step));
     let refused = |refusal| report_bytes(6, &Report::Refused(refusal));
     let found = [
@@ -111,6 +121,11 @@ fn messages_give_the_specifications_worked_bytes() {
         ("commit", upload(UploadStep::Commit)),
         ("abort", upload(UploadStep::Abort)),
         ("restart", request_bytes(7, &Request::Restart)),
+        ("constants?", request_bytes(8, &Request::Constants)),
+        ("set constants", request_bytes(8, &Request::SetConstants(constants))),
+        ("kept?", request_bytes(9, &Request::Kept)),
+        ("keep the baseline", request_bytes(9, &Request::Keep(Setting::Baseline))),
+        ("forget the constants", request_bytes(9, &Request::Forget(Setting::Constants))),
         ("identity", report_bytes(1, &identity)),
         ("statistics", report_bytes(2, &Report::Statistics(statistics))),
         ("configuration", report_bytes(3, &Report::Configuration(Configuration::DEFAULT))),
@@ -125,6 +140,8 @@ fn messages_give_the_specifications_worked_bytes() {
             report_bytes(6, &Report::Upload(UploadState::Committed { crc_32: 0x1234_5678 })),
         ),
         ("restarting", report_bytes(7, &Report::Restarting)),
+        ("constants", report_bytes(8, &Report::Constants(constants))),
+        ("kept", report_bytes(9, &Report::Kept(kept))),
         ("refused: version", refused(Refusal::Version(PROTOCOL_VERSION))),
         (
             "refused: rest tolerance",
@@ -133,6 +150,8 @@ fn messages_give_the_specifications_worked_bytes() {
         ("refused: too large", refused(Refusal::TooLarge { slot_bytes: 131_056 })),
         ("refused: another shape", refused(Refusal::BadModel(ModelFault::Shape))),
         ("refused: flash", refused(Refusal::Flash)),
+        ("refused: feedback", refused(Refusal::Constants(ConstantsFault::Feedback))),
+        ("refused: nothing to keep", refused(Refusal::Keep(KeepFault::Nothing))),
     ];
     let found: Vec<_> = found.iter().map(|(name, bytes)| (*name, hex(bytes))).collect();
     let table: Vec<_> = found.iter().map(|(name, hex)| format!("| {name} | `{hex}` |")).collect();
@@ -152,6 +171,8 @@ fn every_refusal_has_the_specified_number() {
         (Refusal::OutOfPlace { received: 1 }, 7),
         (Refusal::BadModel(ModelFault::NotABlob), 8),
         (Refusal::Flash, 9),
+        (Refusal::Constants(ConstantsFault::Fixed), 10),
+        (Refusal::Keep(KeepFault::Nothing), 11),
     ];
     for (refusal, number) in refusals {
         let mut buffer = [0; 8];

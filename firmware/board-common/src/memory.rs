@@ -7,6 +7,7 @@ use firmware::link::message::Memory;
 
 unsafe extern "C" {
     static __vector_table: u32;
+    static _vector_table_end: u32;
     static __stext: u32;
     static __etext: u32;
     static __srodata: u32;
@@ -50,7 +51,7 @@ impl Sections {
     #[must_use]
     pub fn linked() -> Self {
         Self {
-            vector_table: bytes!(__vector_table..__stext),
+            vector_table: bytes!(__vector_table.._vector_table_end),
             text: bytes!(__stext..__etext),
             rodata: bytes!(__srodata..__erodata),
             data: bytes!(__sdata..__edata),

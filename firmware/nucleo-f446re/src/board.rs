@@ -57,6 +57,8 @@ pub struct Board {
     pub delay: SysDelay,
     /// The two model slots.
     pub slots: [Slot; 2],
+    /// The two pages of settings.
+    pub settings: [Slot; 2],
     /// Watchdog, already running; it restarts the program if it is not fed for 8 s.
     pub watchdog: IndependentWatchdog,
 }
@@ -93,6 +95,7 @@ impl Board {
 
         let serial = Serial::start(parts.USART2, gpioa.pa2, gpioa.pa3, &mut rcc)?;
         let clock = Clock::start(parts.TIM2, &mut rcc)?;
+        let (slots, settings) = Slot::all(parts.FLASH);
         let high = PinState::High;
         Some(Self {
             reset_cause,
@@ -108,7 +111,8 @@ impl Board {
             serial,
             clock,
             delay: core.SYST.delay(&rcc.clocks),
-            slots: Slot::both(parts.FLASH),
+            slots,
+            settings,
             watchdog,
         })
     }

@@ -1,4 +1,4 @@
-//! Model slots in sectors 6 and 7 of the flash.
+//! Model slots in sectors 6 and 7 of the flash, and pages of settings in sectors 1 and 2.
 
 use board_common::region::Region;
 use firmware::store::FlashError;
@@ -16,14 +16,15 @@ pub enum SlotError {
     Refused,
 }
 
-/// Flash for one model. Erasing sets all its bits to 1; writing can only set bits to 0.
+/// Flash for one model, or one page of settings. Erasing sets all its bits to 1; writing can only set bits to 0.
 pub struct Slot(Region);
 
 impl Slot {
-    /// Takes both slots, and the flash controller, which they share.
-    pub(crate) fn both(_: FLASH) -> [Self; 2] {
+    /// Takes both model slots, both pages of settings, and the flash controller, which they share.
+    pub(crate) fn all(_: FLASH) -> ([Self; 2], [Self; 2]) {
         // SAFETY: there is only one controller value, so this is called only once.
-        unsafe { Region::take() }.map(Self)
+        let (slots, pages) = unsafe { Region::take() };
+        (slots.map(Self), pages.map(Self))
     }
 
     /// All bytes of the slot.
@@ -79,13 +80,13 @@ impl firmware::store::Slot for Slot {
 
 /// Logs the cause, and converts it to the store's error.
 fn failed(cause: SlotError) -> FlashError {
-    defmt::error!("model slot: {}", cause);
+    defmt::error!("flash: {}", cause);
     FlashError
 }
 
 /// The flash controller, with the error flags of earlier operations cleared.
 fn controller() -> FLASH {
-    // SAFETY: `Slot::both` took the controller, and no slot keeps it beyond one call.
+    // SAFETY: `Slot::all` took the controller, and no slot keeps it beyond one call.
     let flash = unsafe { FLASH::steal() };
     // Flags are cleared by writing ones; bits 1 and 4 to 8 are the errors.
     // SAFETY: no other bit of this register can be written.

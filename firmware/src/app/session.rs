@@ -88,7 +88,7 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
 
 impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
     /// Makes frames and estimates as long as the model's, and decodes the baseline with it. A baseline of other
-    /// wires is forgotten.
+    /// wires is replaced by the one that is kept, if that fits.
     fn take_shape_of(&mut self, decoder: Option<&Decoder<'_, ROWS>>) {
         let before = self.wires;
         let shape = decoder.map(Decoder::shape);
@@ -99,6 +99,9 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         if self.wires != before {
             self.give_up_capture();
             self.baseline.restart(self.wires.readings());
+        }
+        if self.baseline.frames() == 0 && self.capture.is_none() {
+            self.load_baseline();
         }
         self.decode_baseline(decoder);
     }
