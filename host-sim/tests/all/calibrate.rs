@@ -1,0 +1,219 @@
+//! Calibration of a device that scans a virtual board whose parts are not those that the firmware assumes.
+
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use firmware::circuit::{Circuit, Constants, ConstantsFault, ZeroPotential};
+use firmware::link::message::Setting;
+use firmware::readout::{
+    FrameSource, Mcp3208s, ScanReport, ScanSettings, Scanner, ShiftRegister595,
+};
+use model_core::Wires;
+use taxel_data::progress::Silent;
+use taxel_data::random::Stream;
+use taxel_rig::Error;
+use taxel_rig::calibration::{CircuitConstants, Fit};
+use taxel_rig::device::calibrate::{Reading, calibrate};
+use taxel_rig::device::{Device, scan};
+use taxel_rig::mailbox::Mailbox;
+use taxel_simulate::readout::Readout;
+use taxel_simulate::virtual_board::{Parts, Pin, VirtualBoard};
+use taxel_simulate::{World, synthesise};
+
+use crate::virtual_device::mailbox::{Memory, pair};
+use crate::virtual_device::{Line, run_with};
+
+const WIRES: Wires = Wires { rows: 8, columns: 18 };
+
+/// Parts of the board: V_b is 3 % high, a feedback resistor is up to 1 % off, and each row's source is another one.
+fn parts() -> Parts {
+    Parts {
+        drive_v: 0.206,
+        row_source_ohm: std::array::from_fn(|m| 0.15 + 0.05 * ((5 * m) % 8) as f64),
+        feedback_ohm: std::array::from_fn(|k| 560.0 * (0.99 + 0.02 * ((7 * k) % 18) as f64 / 17.0)),
+    }
+}
+
+fn world() -> World {
+    let readout = Readout {
+        cross_talk: Some(true),
+        op_amp_offset_v: Some(5e-4),
+        adc_noise_counts: Some(0.5),
+        time_constant_us: Some(5.0),
+        ..Readout::default()
+    };
+    scan::with_parts_of_image(&World { readout, ..World::press() }).unwrap()
+}
+
+/// The image's readout on a virtual board, in whatever thread scans it, with constants that can be set.
+#[derive(Clone)]
+struct Bench {
+    circuit: ZeroPotential<8, 18>,
+    /// Resistors that are connected, in Ω.
+    connected: Arc<Mutex<Vec<f64>>>,
+}
+
+impl FrameSource for Bench {
+    fn scan(&mut self, settings: ScanSettings, wires: Wires, frame: &mut [f32]) -> ScanReport {
+        thread_local! {
+            static BOARD: VirtualBoard = {
+                let board = VirtualBoard::new(&world()).unwrap();
+                board.set_parts(parts());
+                board
+            };
+        }
+        BOARD.with(|board| {
+            board.set_readings(&self.connected.lock().unwrap());
+            let drive = ShiftRegister595::<_, 8> {
+                data: board.pin(Pin::RowData),
+                clock: board.pin(Pin::RowClock),
+                latch: board.pin(Pin::RowLatch),
+            };
+            let sampler = Mcp3208s { chips: [0, 1, 2].map(|chip| board.spi(chip)) };
+            let mut scanner =
+                Scanner::<_, _, _, _, 18>::new(drive, sampler, board.delay(), &self.circuit);
+            let report = scanner.scan(settings, wires, frame);
+            board.check().unwrap();
+            report
+        })
+    }
+
+    fn constants(&self) -> Option<Constants<'_>> {
+        self.circuit.constants()
+    }
+
+    fn set_constants(&mut self, constants: Constants<'_>) -> Result<(), ConstantsFault> {
+        self.circuit.set_constants(constants)
+    }
+}
+
+/// Device without a model, and what is connected to it.
+fn device() -> (Device<Mailbox<Memory>>, Arc<Mutex<Vec<f64>>>) {
+    let connected = Arc::new(Mutex::new(vec![f64::INFINITY; 144]));
+    let bench = Bench { circuit: ZeroPotential::TYPICAL, connected: connected.clone() };
+    let (near, far) = pair();
+    run_with(far, Line { one_in: None }, &[], bench);
+    let mut device = Device::new(near).unwrap();
+    device.patience = Duration::from_secs(2);
+    (device, connected)
+}
+
+fn reading(frames: u16) -> Reading {
+    let scan = ScanSettings { settling_us: 100, oversampling: 1 };
+    Reading { frames, period_us: 1000, scan, patience: Duration::from_secs(20) }
+}
+
+/// An array of resistors of the series E96, 47.5 to 64.9 Ω.
+fn array() -> Vec<f64> {
+    let series =
+        [47.5, 48.7, 49.9, 51.1, 52.3, 53.6, 54.9, 56.2, 57.6, 59.0, 60.4, 61.9, 63.4, 64.9];
+    (0..144).map(|i| series[i * 5 % series.len()]).collect()
+}
+
+/// One resistor alone.
+fn single(place: usize) -> Vec<f64> {
+    (0..144).map(|i| if i == place { 49.9 } else { f64::NAN }).collect()
+}
+
+/// Calibrates while `connect` makes of the known resistors what is really connected.
+fn run(
+    device: &mut Device<Mailbox<Memory>>,
+    connected: &Mutex<Vec<f64>>,
+    known: &[Vec<f64>],
+    connect: impl Fn(&[f64]) -> Vec<f64>,
+) -> Result<Fit, Error> {
+    let connect = |number: usize| {
+        *connected.lock().unwrap() = connect(&known[number]);
+        Ok(())
+    };
+    calibrate(device, WIRES, known, reading(40), connect, &Silent)
+}
+
+fn as_known(known: &[f64]) -> Vec<f64> {
+    known.iter().map(|ohm| if ohm.is_nan() { f64::INFINITY } else { *ohm }).collect()
+}
+
+/// Largest error of a row's source in Ω, and largest relative error of a column's factor V_d·R_f/V_ref.
+fn errors(found: &CircuitConstants) -> (f64, f64) {
+    let parts = parts();
+    let sources = found.row_source_ohm.iter().zip(parts.row_source_ohm);
+    let factor = f64::from(found.drive_v) / f64::from(found.reference_v) / (parts.drive_v / 3.3);
+    let columns = found.feedback_ohm.iter().zip(parts.feedback_ohm);
+    (
+        sources.map(|(found, actual)| (f64::from(*found) - actual).abs()).fold(0.0, f64::max),
+        columns
+            .map(|(found, actual)| (f64::from(*found) / actual * factor - 1.0).abs())
+            .fold(0.0, f64::max),
+    )
+}
+
+#[test]
+fn known_resistors_tell_the_parts_of_a_board_and_are_kept() {
+    let (mut device, connected) = device();
+    let assumed = device.constants().unwrap();
+    assert!(errors(&assumed).0 > 0.1 && errors(&assumed).1 > 0.03);
+    let known = [array(), single(0)];
+    let fit = run(&mut device, &connected, &known, as_known).unwrap();
+    let (source_ohm, factor) = errors(&fit.constants);
+    println!("source within {source_ohm:.4} Ω, factors within {:.4} %: {fit:?}", 100.0 * factor);
+    // Half a count of noise in 40 frames of 2500 counts, twice, and what of it a single resistor tells.
+    assert!(source_ohm < 0.003, "{source_ohm} Ω");
+    assert!(factor < 5e-4, "{factor}");
+    assert!(fit.before.largest > 0.05, "{}", fit.before);
+    assert!(fit.after.largest < 5e-4, "{}", fit.after);
+    assert!(source_ohm < 5.0 * fit.row_source_error_ohm && factor < 5.0 * fit.feedback_error);
+    // The common factor is the drive voltage's.
+    assert!((f64::from(fit.constants.drive_v) / 0.206 - 1.0).abs() < 2e-3);
+
+    // The constants are active, and stay so over a restart once they are kept.
+    assert_eq!(device.constants().unwrap(), fit.constants);
+    device.restart().unwrap();
+    assert_eq!(device.constants().unwrap(), assumed);
+    device.set_constants(&fit.constants).unwrap();
+    assert!(device.keep(Setting::Constants).unwrap().constants);
+    device.restart().unwrap();
+    assert_eq!(device.constants().unwrap(), fit.constants);
+
+    // Other resistances are read rightly: frames of a press.
+    let press = synthesise(&world(), Stream::Test, 3).inputs;
+    for frame in press.lines() {
+        let fit = run(&mut device, &connected, &[frame.to_vec(), single(7)], as_known).unwrap();
+        assert!(fit.before.largest < 1e-3, "{}", fit.before);
+    }
+    assert!(!device.forget(Setting::Constants).unwrap().constants);
+}
+
+#[test]
+fn what_is_connected_wrongly_leaves_the_constants_as_they_were() {
+    let (mut device, connected) = device();
+    let assumed = device.constants().unwrap();
+    let mut refused = |known: &[Vec<f64>], connect: &dyn Fn(&[f64]) -> Vec<f64>| {
+        let refused = run(&mut device, &connected, known, connect).unwrap_err().to_string();
+        assert_eq!(device.constants().unwrap(), assumed, "{refused}");
+        refused
+    };
+    // The sensor was left connected.
+    let with_sensor =
+        |known: &[f64]| known.iter().map(|ohm| if ohm.is_nan() { 58.0 } else { *ohm }).collect();
+    let says = refused(&[array(), single(0)], &with_sensor);
+    assert!(says.starts_with("arrangement 2: r1c2 reads") && says.contains("remove"), "{says}");
+    // The resistor is at another row.
+    let elsewhere = |known: &[f64]| {
+        let mut connected = as_known(known);
+        connected.rotate_right(18);
+        connected
+    };
+    let says = refused(&[single(0), array()], &elsewhere);
+    assert!(says.starts_with("arrangement 1: r1c1 reads as open"), "{says}");
+    // One resistor is 5 % off.
+    let off = |known: &[f64]| {
+        let mut connected = as_known(known);
+        connected[40] *= 1.05;
+        connected
+    };
+    let says = refused(&[array(), single(0)], &off);
+    assert!(says.contains("no constants explain"), "{says}");
+    // One arrangement does not tell.
+    let says = refused(&[array()], &as_known);
+    assert!(says.contains("such as a single resistor"), "{says}");
+}
