@@ -1,5 +1,7 @@
 //! Calibration of a device that scans a virtual board whose parts are not those that the firmware assumes.
 
+use std::io::{Read, Write};
+use std::process::{Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -20,6 +22,7 @@ use taxel_simulate::readout::Readout;
 use taxel_simulate::virtual_board::{Parts, Pin, VirtualBoard};
 use taxel_simulate::{World, synthesise};
 
+use crate::common::Folder;
 use crate::virtual_device::mailbox::{Memory, pair};
 use crate::virtual_device::{Line, run_with};
 
@@ -87,12 +90,18 @@ impl FrameSource for Bench {
     }
 }
 
-/// Device without a model, and what is connected to it.
-fn device() -> (Device<Mailbox<Memory>>, Arc<Mutex<Vec<f64>>>) {
+/// Runs a device without a model at the far end of a line; returns what is connected to it.
+fn run_device(far: impl Read + Write + Send + 'static) -> Arc<Mutex<Vec<f64>>> {
     let connected = Arc::new(Mutex::new(vec![f64::INFINITY; 144]));
     let bench = Bench { circuit: ZeroPotential::TYPICAL, connected: connected.clone() };
-    let (near, far) = pair();
     run_with(far, Line { one_in: None }, &[], bench);
+    connected
+}
+
+/// Device without a model, and what is connected to it.
+fn device() -> (Device<Mailbox<Memory>>, Arc<Mutex<Vec<f64>>>) {
+    let (near, far) = pair();
+    let connected = run_device(far);
     let mut device = Device::new(near).unwrap();
     device.patience = Duration::from_secs(2);
     (device, connected)
@@ -216,4 +225,126 @@ fn what_is_connected_wrongly_leaves_the_constants_as_they_were() {
     // One arrangement does not tell.
     let says = refused(&[array()], &as_known);
     assert!(says.contains("such as a single resistor"), "{says}");
+}
+
+/// Runs `calibrate known.csv` and connects the resistors that it asks for; returns stdout.
+#[cfg(unix)]
+fn calibrate_by_hand(
+    folder: &Folder,
+    port: &str,
+    connected: &Mutex<Vec<f64>>,
+    known: &[Vec<f64>],
+) -> String {
+    let mut program = Command::new(env!("CARGO_BIN_EXE_host-sim"))
+        .args([
+            "link",
+            port,
+            "calibrate",
+            "known.csv",
+            "-n",
+            "20",
+            "--period-us",
+            "1000",
+            "--store",
+        ])
+        .current_dir(folder.path(""))
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let (mut stdin, mut stderr) = (program.stdin.take().unwrap(), program.stderr.take().unwrap());
+    let (mut said, mut bytes) = (String::new(), [0; 256]);
+    for (number, ohm) in (1..).zip(known) {
+        let asked = format!("{number} of {}: connect", known.len());
+        while !said.contains(&asked) || !said.ends_with("Enter: ") {
+            let count = stderr.read(&mut bytes).unwrap();
+            assert!(count > 0, "{said}");
+            said.push_str(&String::from_utf8_lossy(&bytes[..count]));
+        }
+        *connected.lock().unwrap() = as_known(ohm);
+        stdin.write_all(b"\n").unwrap();
+    }
+    let output = program.wait_with_output().unwrap();
+    stderr.read_to_string(&mut said).unwrap();
+    assert!(output.status.success(), "{said}");
+    assert!(said.contains("144 resistors, from r1c1 to r8c18"), "{said}");
+    assert!(said.contains("49.9 Ω at r3c3 alone"), "{said}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[cfg(unix)]
+#[test]
+fn a_board_is_set_up_from_the_command_line_and_stays_so() {
+    let folder = Folder::new("calibrate");
+    let (port, near, far) = crate::device::serial_port::terminal();
+    let connected = run_device(far);
+    drop(near); // the program opens it itself
+    let link = |arguments: &[&str]| folder.succeed(&[&["link", &port][..], arguments].concat());
+
+    let known = [array(), single(2 * 18 + 2)];
+    let names: Vec<String> =
+        (1..=8).flat_map(|m| (1..=18).map(move |k| format!("r{m}c{k}_ohm"))).collect();
+    let line = |ohm: &Vec<f64>| {
+        let fields =
+            ohm.iter().map(|ohm| if ohm.is_nan() { String::new() } else { ohm.to_string() });
+        fields.collect::<Vec<_>>().join(",")
+    };
+    let lines: Vec<String> = known.iter().map(line).collect();
+    folder.write("known.csv", format!("{}\n{}\n", names.join(","), lines.join("\n")));
+    let page = calibrate_by_hand(&folder, &port, &connected, &known);
+    assert!(
+        page.contains("145 readings of known resistors tell the constants of 8 rows"),
+        "{page}"
+    );
+    let drive = page.split("drive ").nth(1).and_then(|rest| rest.split(' ').next()).unwrap();
+    assert!((drive.parse::<f64>().unwrap() / 0.206 - 1.0).abs() < 1e-3, "{page}");
+    assert!(page.contains("kept over restarts"), "{page}");
+
+    let page = link(&[
+        "configure",
+        "--period-us",
+        "20000",
+        "--send",
+        "both",
+        "--contact-threshold",
+        "0.05",
+    ]);
+    assert!(page.contains("configuration     kept"), "{page}");
+    *connected.lock().unwrap() = array();
+    link(&["baseline", "-n", "5", "--period-us", "1000", "-o", "rest.csv", "--store"]);
+    let kept = |page: &str| {
+        assert!(page.contains("a scan every 20000 µs"), "{page}");
+        assert!(page.contains("readings yes, estimates yes"), "{page}");
+        assert!(page.contains("contact from 0.05"), "{page}");
+        assert!(page.contains("constants         kept"), "{page}");
+        assert!(page.contains("kept: mean of 5 frames of 8 × 18 readings"), "{page}");
+    };
+    kept(&link(&["settings"]));
+
+    // Constants measured by hand are active until the restart, unless they are stored.
+    folder.write("constants.toml", "drive_v = 0.21\nseries_ohm = 0.05\n");
+    let page = link(&["calibrate", "--constants", "constants.toml"]);
+    assert!(page.contains("drive 0.21000 V of 3.3000 V") && page.contains("0.050"), "{page}");
+    assert!(page.contains("active until the restart"), "{page}");
+
+    let page = link(&["settings", "--forget", "all"]);
+    assert!(page.contains("until the restart; none is kept"), "{page}");
+    assert!(page.contains("baseline          none is kept"), "{page}");
+
+    folder.write("other.csv", "r1c1_ohm,r9c1_ohm\n50,50\n");
+    folder.write("negative.csv", "r1c1_ohm\n-50\n");
+    folder.write("other.toml", "feedback_ohm = [1.0, 2.0]\n");
+    for (arguments, text) in [
+        (&["configure"][..], "required arguments"),
+        (&["calibrate"], "required arguments"),
+        (&["calibrate", "other.csv"], "r9c1_ohm is no reading"),
+        (&["calibrate", "negative.csv"], "line 2, r1c1_ohm: -50"),
+        (&["calibrate", "--constants", "other.toml"], "feedback_ohm has 2 numbers"),
+    ] {
+        let output = folder.run(&[&["link", &port][..], arguments].concat());
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+        assert!(message.contains(text), "{message}");
+    }
 }
