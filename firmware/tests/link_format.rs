@@ -13,6 +13,8 @@ use firmware::link::message::{
 use firmware::link::packet::{self, PROTOCOL_VERSION};
 use model_core::blob::Floats;
 
+const START_US: u64 = 3_000_000;
+
 const SPECIFICATION: &str = include_str!("../../docs/link.md");
 
 /// Frames of the marked table, with the names of their messages.
@@ -37,9 +39,8 @@ fn report_bytes(number: u16, report: &Report<'_>) -> Vec<u8> {
     bytes
 }
 
-#[test]
-fn messages_give_the_specifications_worked_bytes() {
-    let identity = Report::Identity(Identity {
+fn identity() -> Report<'static> {
+    Report::Identity(Identity {
         board: "b",
         firmware: "0.1.0",
         rows: 8,
@@ -58,20 +59,48 @@ fn messages_give_the_specifications_worked_bytes() {
         slot_bytes: 131_056,
         chunk_bytes: 512,
         memory: Memory { vector_table: 1024, stack_reserved: 300, ..Memory::default() },
-    });
+    })
+}
+
+/// Messages about constants of the circuit and settings that are kept.
+fn about_settings() -> [(&'static str, Vec<u8>); 9] {
+    let circuit = ZeroPotential::<1, 2>::TYPICAL;
+    let constants = circuit.constants().unwrap();
+    let kept = Kept {
+        configuration: None,
+        constants: true,
+        baseline: Some(KeptBaseline { rows: 8, columns: 18, frames: 20 }),
+        writes_left: 99,
+    };
+    let refused = |refusal| report_bytes(9, &Report::Refused(refusal));
+    [
+        ("constants?", request_bytes(8, &Request::Constants)),
+        ("set constants", request_bytes(8, &Request::SetConstants(constants))),
+        ("kept?", request_bytes(9, &Request::Kept)),
+        ("keep the baseline", request_bytes(9, &Request::Keep(Setting::Baseline))),
+        ("forget the constants", request_bytes(9, &Request::Forget(Setting::Constants))),
+        ("constants", report_bytes(8, &Report::Constants(constants))),
+        ("kept", report_bytes(9, &Report::Kept(kept))),
+        ("refused: feedback", refused(Refusal::Constants(ConstantsFault::Feedback))),
+        ("refused: nothing to keep", refused(Refusal::Keep(KeepFault::Nothing))),
+    ]
+}
+
+#[test]
+fn messages_give_the_specifications_worked_bytes() {
+    let identity = identity();
     let floats = [60.0, f32::NAN];
     let readings_ohm = Floats::of(&floats);
-    let start_us = 3_000_000;
     let estimate = EstimateReport {
         frame: 300,
-        start_us,
+        start_us: START_US,
         flags: 2,
         row_status: &[3, 1],
         outputs: readings_ohm,
     };
     let health = HealthReport {
         frame: 300,
-        start_us,
+        start_us: START_US,
         missing: 1,
         shorted: 0,
         open: 0,
@@ -82,14 +111,6 @@ fn messages_give_the_specifications_worked_bytes() {
         rows_at_rest: 8,
         longest_decode_us: 2,
         ..Statistics::default()
-    };
-    let circuit = ZeroPotential::<1, 2>::TYPICAL;
-    let constants = circuit.constants().unwrap();
-    let kept = Kept {
-        configuration: None,
-        constants: true,
-        baseline: Some(KeptBaseline { rows: 8, columns: 18, frames: 20 }),
-        writes_left: 99,
     };
     let upload = |step| request_bytes(6, &Request::Upload(step));
     let refused = |refusal| report_bytes(6, &Report::Refused(refusal));
@@ -121,16 +142,14 @@ fn messages_give_the_specifications_worked_bytes() {
         ("commit", upload(UploadStep::Commit)),
         ("abort", upload(UploadStep::Abort)),
         ("restart", request_bytes(7, &Request::Restart)),
-        ("constants?", request_bytes(8, &Request::Constants)),
-        ("set constants", request_bytes(8, &Request::SetConstants(constants))),
-        ("kept?", request_bytes(9, &Request::Kept)),
-        ("keep the baseline", request_bytes(9, &Request::Keep(Setting::Baseline))),
-        ("forget the constants", request_bytes(9, &Request::Forget(Setting::Constants))),
         ("identity", report_bytes(1, &identity)),
         ("statistics", report_bytes(2, &Report::Statistics(statistics))),
         ("configuration", report_bytes(3, &Report::Configuration(Configuration::DEFAULT))),
         ("baseline", report_bytes(4, &Report::Baseline { readings_ohm })),
-        ("readings", report_bytes(0, &Report::Readings { frame: 300, start_us, readings_ohm })),
+        (
+            "readings",
+            report_bytes(0, &Report::Readings { frame: 300, start_us: START_US, readings_ohm }),
+        ),
         ("estimate", report_bytes(5, &Report::Estimate(estimate))),
         ("health", report_bytes(0, &Report::Health(health))),
         ("idle", report_bytes(6, &Report::Upload(UploadState::Idle))),
@@ -140,8 +159,6 @@ fn messages_give_the_specifications_worked_bytes() {
             report_bytes(6, &Report::Upload(UploadState::Committed { crc_32: 0x1234_5678 })),
         ),
         ("restarting", report_bytes(7, &Report::Restarting)),
-        ("constants", report_bytes(8, &Report::Constants(constants))),
-        ("kept", report_bytes(9, &Report::Kept(kept))),
         ("refused: version", refused(Refusal::Version(PROTOCOL_VERSION))),
         (
             "refused: rest tolerance",
@@ -150,10 +167,9 @@ fn messages_give_the_specifications_worked_bytes() {
         ("refused: too large", refused(Refusal::TooLarge { slot_bytes: 131_056 })),
         ("refused: another shape", refused(Refusal::BadModel(ModelFault::Shape))),
         ("refused: flash", refused(Refusal::Flash)),
-        ("refused: feedback", refused(Refusal::Constants(ConstantsFault::Feedback))),
-        ("refused: nothing to keep", refused(Refusal::Keep(KeepFault::Nothing))),
     ];
-    let found: Vec<_> = found.iter().map(|(name, bytes)| (*name, hex(bytes))).collect();
+    let all = found.into_iter().chain(about_settings());
+    let found: Vec<_> = all.map(|(name, bytes)| (name, hex(&bytes))).collect();
     let table: Vec<_> = found.iter().map(|(name, hex)| format!("| {name} | `{hex}` |")).collect();
     assert!(found == specified(), "docs/link.md should say\n{}", table.join("\n"));
 }

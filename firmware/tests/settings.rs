@@ -159,7 +159,7 @@ fn what_is_out_of_range_is_refused_and_what_was_in_force_stays() {
     let mut bench = Bench::new(quiet());
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let good = circuit();
-    let mut set = |circuit: &dyn Circuit2| {
+    let mut set = |circuit: &dyn AnyCircuit| {
         let request = Request::SetConstants(circuit.all());
         ask(&mut session, &bench.board, &request, |report| match report {
             Report::Refused(Refusal::Constants(fault)) => Err(fault),
@@ -190,11 +190,11 @@ fn what_is_out_of_range_is_refused_and_what_was_in_force_stays() {
 }
 
 /// A circuit of any size.
-trait Circuit2 {
+trait AnyCircuit {
     fn all(&self) -> Constants<'_>;
 }
 
-impl<C: Circuit> Circuit2 for C {
+impl<C: Circuit> AnyCircuit for C {
     fn all(&self) -> Constants<'_> {
         self.constants().unwrap()
     }
@@ -313,7 +313,7 @@ fn pages_that_hold_anything_are_no_harm_and_can_be_used() {
             }
         }
         if case % 3 == 2 {
-            for _ in 0..1 + random.next_u32() % 8 {
+            for _ in 0..=random.next_u32() % 8 {
                 let place = random.next_u32() as usize % PAGE_BYTES;
                 pages[random.next_u32() as usize % 2][place] ^= 1 << (random.next_u32() % 8);
             }

@@ -42,9 +42,10 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         let (keeper, buffer) = self.line.settings();
         let kept = keeper.read(Setting::Constants, buffer).and_then(constants);
         if let Some(constants) = kept {
-            match self.source.set_constants(constants) {
-                Ok(()) => info!("constants as kept: drive voltage {=f32} V", constants.drive_v),
-                Err(_) => warning!("the constants that are kept do not fit this image"),
+            if self.source.set_constants(constants).is_ok() {
+                info!("constants as kept: drive voltage {=f32} V", constants.drive_v);
+            } else {
+                warning!("the constants that are kept do not fit this image");
             }
         }
     }
