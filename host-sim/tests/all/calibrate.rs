@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use firmware::circuit::{Circuit, Constants, ConstantsFault, ZeroPotential};
-use firmware::link::message::Setting;
+use firmware::link::message::{Configuration, Setting};
 use firmware::readout::{
     FrameSource, Mcp3208s, ScanReport, ScanSettings, Scanner, ShiftRegister595,
 };
@@ -17,6 +17,7 @@ use taxel_rig::Error;
 use taxel_rig::calibration::{CircuitConstants, Fit};
 use taxel_rig::device::calibrate::{Reading, calibrate};
 use taxel_rig::device::{Device, scan};
+use taxel_rig::emulator::{self, Emulator};
 use taxel_rig::mailbox::Mailbox;
 use taxel_simulate::readout::Readout;
 use taxel_simulate::virtual_board::{Parts, Pin, VirtualBoard};
@@ -225,6 +226,48 @@ fn what_is_connected_wrongly_leaves_the_constants_as_they_were() {
     // One arrangement does not tell.
     let says = refused(&[array()], &as_known);
     assert!(says.contains("such as a single resistor"), "{says}");
+}
+
+/// The image's file comes from the environment, since this needs QEMU and a toolchain for the target.
+#[test]
+#[ignore = "needs QEMU and the image: `cargo xtask emulate application` runs it"]
+fn the_image_keeps_settings_over_restarts() {
+    let image = std::env::var_os("TAXEL_IMAGE").expect("TAXEL_IMAGE is the path of qemu-app");
+    let folder = Folder::new("kept_in_qemu");
+    let options = emulator::Options {
+        qemu: "qemu-system-arm".into(),
+        image: image.into(),
+        model: None,
+        log: None,
+        mailbox: Some(folder.path("mailbox.ram")),
+        readout: false,
+    };
+    let (_emulator, lines) = Emulator::start(&options).unwrap();
+    let mut device = Device::new(lines.link).unwrap();
+    device.patience = Duration::from_mins(1);
+    assert_eq!(device.kept().unwrap().configuration, None);
+    let quiet = device.configuration().unwrap();
+    let mut constants = device.constants().unwrap();
+    // Enough writes for two exchanges of the pages.
+    for life in 0..2 {
+        for write in 0..48 {
+            constants.row_source_ohm[write % 8] = 0.25 + write as f32 / 1000.0;
+            device.set_constants(&constants).unwrap();
+            assert!(device.keep(Setting::Constants).unwrap().constants);
+        }
+        let configuration = Configuration { contact_threshold: 0.1 + life as f32, ..quiet };
+        device.configure(configuration).unwrap();
+        device.keep(Setting::Configuration).unwrap();
+        device.restart().unwrap();
+        assert_eq!(device.constants().unwrap(), constants);
+        assert_eq!(device.configuration().unwrap(), configuration);
+        let kept = device.kept().unwrap();
+        assert_eq!((kept.configuration, kept.constants), (Some(configuration), true));
+        constants.drive_v += 0.01;
+    }
+    let memory = device.identify().unwrap().memory;
+    println!("{memory:?}");
+    assert!(memory.stack_high_water < memory.stack_reserved);
 }
 
 /// Runs `calibrate known.csv` and connects the resistors that it asks for; returns stdout.
