@@ -115,6 +115,12 @@ fn every_setting_survives_a_restart_and_can_be_forgotten() {
         };
         assert_eq!(decode(&mut session, 65.0) & 16, 0);
         assert_eq!(decode(&mut session, 40.0) & 16, 16);
+        // With other constants it means nothing, and with the former ones it does again.
+        for (circuit, contact) in [(ZeroPotential::TYPICAL, 0), (circuit(), 16)] {
+            let set = Request::SetConstants(circuit.constants().unwrap());
+            ask(&mut session, &bench.board, &set, |_| ());
+            assert_eq!(decode(&mut session, 40.0) & 16, contact);
+        }
 
         let mut ask =
             |request: &Request<'_>| ask(&mut session, &bench.board, request, |r| kept(&r)).0;
@@ -141,7 +147,7 @@ fn every_setting_survives_a_restart_and_can_be_forgotten() {
 fn a_baseline_of_other_wires_is_ignored_until_a_model_of_its_wires_comes() {
     let mut settings = SharedSettings::default();
     let readings: Vec<u8> = [60.0_f32; 4].iter().flat_map(|ohm| ohm.to_le_bytes()).collect();
-    let bytes = [&[1, 2, 2, 7, 0][..], &readings].concat();
+    let bytes = [&[1, 2, 2, 7, 0, 0, 0, 0, 0][..], &readings].concat();
     settings.keep_bytes(Setting::Baseline, &bytes).unwrap();
     let mut slots = MockSlot::pair_with(&blob(1, 3));
     let mut bench = Bench::with_settings(quiet(), &settings);
@@ -232,7 +238,7 @@ fn writes_are_limited_between_restarts() {
 
 /// Bytes of a setting, different for each `seed`.
 fn bytes_of(setting: Setting, seed: usize) -> Vec<u8> {
-    let length = [40, 187, 581][setting as usize];
+    let length = [40, 187, 585][setting as usize];
     (0..length).map(|i| ((i * 7 + seed * 13) % 251) as u8).collect()
 }
 
@@ -332,7 +338,7 @@ fn pages_that_hold_anything_are_no_harm_and_can_be_used() {
             assert_eq!(settings.read_owned(setting), Some(new), "case {case}");
         }
     }
-    assert!((2000..3000).contains(&readable), "{readable}");
+    assert!((2900..=3000).contains(&readable), "{readable}"); // hardly any damage reaches the newest items
 }
 
 #[test]

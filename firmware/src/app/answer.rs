@@ -6,7 +6,7 @@ use model_core::exp::{ExpKernel, Polynomial};
 use super::Core;
 use super::model::{self, InForce};
 use super::session::{Leave, Session};
-use crate::circuit::ConstantsFault;
+use crate::circuit::{Constants, ConstantsFault};
 use crate::link::message::{Configuration, Identity, Refusal, Report, Request, UploadStep};
 use crate::link::packet::{self, PROTOCOL_VERSION, PacketError};
 use crate::link::receive::Received;
@@ -86,7 +86,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                 self.send_constants(number);
                 return None;
             }
-            Request::SetConstants(constants) => match self.source.set_constants(constants) {
+            Request::SetConstants(constants) => match self.set_constants(constants, model) {
                 Ok(()) => {
                     self.send_constants(number);
                     return None;
@@ -100,6 +100,23 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         let sent = self.line.send(number, &report.unwrap_or_else(Report::Refused));
         self.count_lost(sent);
         leave
+    }
+
+    /// Puts constants in force. A baseline that was read with others means nothing any more.
+    fn set_constants(
+        &mut self,
+        constants: Constants<'_>,
+        model: &InForce<'_, ROWS>,
+    ) -> Result<(), ConstantsFault> {
+        let before = self.constants_crc();
+        self.source.set_constants(constants)?;
+        if self.constants_crc() != before {
+            self.give_up_capture();
+            self.baseline.restart(self.wires.readings());
+            self.load_baseline();
+            self.decode_baseline(model.decoder.as_ref());
+        }
+        Ok(())
     }
 
     fn send_constants(&mut self, number: u16) {

@@ -5,12 +5,14 @@
 //! - Configuration: postcard fields, as in the link.
 //! - Constants: number of rows and of columns; reference and drive voltage; then source by row, feedback by column
 //!   and series resistance by column.
-//! - Baseline: number of rows and of columns, number of frames (u16), readings.
+//! - Baseline: number of rows and of columns, number of frames (u16), CRC-32 of the constants that it was read with,
+//!   readings.
 //!
 //! Numbers are little-endian; voltages and resistances are f32.
 
 use model_core::Wires;
 use model_core::blob::Floats;
+use model_core::checksum::CRC_32;
 
 use super::Core;
 use crate::circuit::Constants;
@@ -50,16 +52,18 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         }
     }
 
-    /// Puts the baseline that is kept in force, if it is of the wires that are scanned.
+    /// Puts the baseline that is kept in force, if it is of the wires that are scanned, and was read with the
+    /// constants in force.
     pub(super) fn load_baseline(&mut self) {
+        let constants_crc = self.constants_crc();
         let (keeper, buffer) = self.line.settings();
         let kept = keeper.read(Setting::Baseline, buffer).and_then(baseline);
         match kept {
-            Some((wires, frames, readings)) if wires == self.wires => {
-                self.baseline.restore(readings, frames);
-                info!("baseline as kept: {=u16} frames", frames);
+            Some(kept) if kept.wires == self.wires && kept.constants_crc == constants_crc => {
+                self.baseline.restore(kept.readings, kept.frames);
+                info!("baseline as kept: {=u16} frames", kept.frames);
             }
-            Some(_) => warning!("the baseline that is kept is of other wires"),
+            Some(_) => warning!("the baseline that is kept is of other wires or constants"),
             None => {}
         }
     }
@@ -71,10 +75,10 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         let configuration = keeper.read(Setting::Configuration, buffer).and_then(configuration);
         let constants = keeper.read(Setting::Constants, buffer).and_then(constants).is_some();
         let baseline = keeper.read(Setting::Baseline, buffer).and_then(baseline);
-        let baseline = baseline.map(|(wires, frames, _)| KeptBaseline {
-            rows: wires.rows as u8,
-            columns: wires.columns as u8,
-            frames,
+        let baseline = baseline.map(|kept| KeptBaseline {
+            rows: kept.wires.rows as u8,
+            columns: kept.wires.columns as u8,
+            frames: kept.frames,
         });
         Kept { configuration, constants, baseline, writes_left }
     }
@@ -85,6 +89,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         if self.writes_left == 0 {
             return Err(Refusal::Keep(KeepFault::TooOften));
         }
+        let constants_crc = self.constants_crc();
         let (keeper, buffer) = self.line.settings();
         let written = match setting {
             Setting::Configuration => {
@@ -113,10 +118,22 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                 }
                 let [low, high] = frames.to_le_bytes();
                 let head = [VERSION, self.wires.rows as u8, self.wires.columns as u8, low, high];
-                keeper.keep(setting, &[&head, Floats::of(self.baseline.mean()).0], buffer)
+                let readings = Floats::of(self.baseline.mean()).0;
+                keeper.keep(setting, &[&head, &constants_crc.to_le_bytes(), readings], buffer)
             }
         };
         self.count_write(written)
+    }
+
+    /// CRC-32 of the constants in force; 0 if there are none.
+    pub(super) fn constants_crc(&self) -> u32 {
+        let Some(c) = self.source.constants() else { return 0 };
+        let mut digest = CRC_32.digest();
+        let voltages = [c.reference_v.to_le_bytes(), c.drive_v.to_le_bytes()];
+        let resistances = [c.row_source_ohm.0, c.feedback_ohm.0, c.series_ohm.0];
+        digest.update(voltages.as_flattened());
+        resistances.iter().for_each(|bytes| digest.update(bytes));
+        digest.finalize()
     }
 
     /// Keeps a setting no longer.
@@ -171,11 +188,20 @@ fn constants(bytes: &[u8]) -> Option<Constants<'_>> {
     constants.check(wires).is_ok().then_some(constants)
 }
 
-/// Wires, number of frames, and mean readings of a baseline.
-fn baseline(bytes: &[u8]) -> Option<(Wires, u16, Floats<'_>)> {
-    let (&[rows, columns, low, high], readings) = content(bytes)?.split_first_chunk()?;
+/// A baseline as it is kept.
+struct Baseline<'b> {
+    wires: Wires,
+    frames: u16,
+    constants_crc: u32,
+    readings: Floats<'b>,
+}
+
+fn baseline(bytes: &[u8]) -> Option<Baseline<'_>> {
+    let (&[rows, columns, low, high], rest) = content(bytes)?.split_first_chunk()?;
+    let (constants_crc, readings) = rest.split_first_chunk()?;
     let wires = Wires { rows: rows.into(), columns: columns.into() };
     let frames = u16::from_le_bytes([low, high]);
+    let constants_crc = u32::from_le_bytes(*constants_crc);
     let sound = frames > 0 && readings.len() == 4 * wires.readings();
-    sound.then_some((wires, frames, Floats(readings)))
+    sound.then_some(Baseline { wires, frames, constants_crc, readings: Floats(readings) })
 }

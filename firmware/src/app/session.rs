@@ -252,7 +252,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
     }
 
     /// Decodes the baseline with the model in force, and keeps the outputs for rows at rest.
-    fn decode_baseline(&mut self, decoder: Option<&Decoder<'_, ROWS>>) {
+    pub(super) fn decode_baseline(&mut self, decoder: Option<&Decoder<'_, ROWS>>) {
         let mut rest = cut(&mut self.rest, self.rows, self.outputs);
         let decoded = decoder.is_some_and(|decoder| {
             decoder.decode_into(self.baseline.mean(), self.scratch, &mut rest).is_ok()

@@ -372,7 +372,7 @@ fn a_board_is_set_up_from_the_command_line_and_stays_so() {
     assert!(page.contains("active until the restart"), "{page}");
 
     let page = link(&["settings", "--forget", "all"]);
-    assert!(page.contains("until the restart; none is kept"), "{page}");
+    assert!(page.contains("configuration     none is kept"), "{page}");
     assert!(page.contains("baseline          none is kept"), "{page}");
 
     folder.write("other.csv", "r1c1_ohm,r9c1_ohm\n50,50\n");

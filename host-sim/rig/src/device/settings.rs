@@ -9,7 +9,7 @@ use crate::calibration::CircuitConstants;
 use crate::error::{Error, Result};
 
 /// Longest time that writing a setting takes: pages of flash may have to be erased.
-const WRITING: Duration = Duration::from_secs(3);
+const WRITING: Duration = Duration::from_secs(5);
 
 impl<W: Wire> Device<W> {
     /// Asks for the active constants of the circuit.

@@ -133,8 +133,8 @@ fn show<W: Wire>(device: &mut Device<W>, common: &Common) -> Result<()> {
     let (c, kept) = (&settings.configuration, &settings.kept);
     let whether = match kept.configuration {
         Some(kept) if kept == *c => "kept",
-        Some(_) => "until the restart; another one is kept",
-        None => "until the restart; none is kept",
+        Some(_) => "another one is kept",
+        None => "none is kept",
     };
     page.line(format_args!("{:<17} {whether}", "configuration"));
     page.line(format_args!(
