@@ -9,7 +9,7 @@ use firmware::circuit::{Circuit, Constants, ConstantsFault, ZeroPotential};
 use firmware::link::message::{
     Configuration, KeepFault, Kept, KeptBaseline, Refusal, Report, Request, Setting,
 };
-use firmware::settings::{KeepError, PAGE_BYTES};
+use firmware::settings::{KeepError, Keeper, PAGE_BYTES};
 use model_core::blob::Floats;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -375,4 +375,20 @@ fn what_does_not_fit_is_refused_and_nothing_is_lost() {
     assert_eq!(settings.keep_bytes(Setting::Baseline, &[1; 2000]), Err(KeepError::TooLarge));
     assert_eq!(settings.read_owned(Setting::Constants), Some(vec![7; 100]));
     assert_eq!(settings.erases(), 0);
+}
+
+#[test]
+fn the_settings_of_a_sensor_of_16_rows_and_32_columns_fit_however_often_they_change() {
+    let settings = SharedSettings::default();
+    let mut buffer = [0; 2200];
+    let lengths = [40, 11 + 4 * (16 + 2 * 32), 9 + 4 * 16 * 32];
+    for seed in 0..30_u8 {
+        for (setting, length) in Setting::ALL.into_iter().zip(lengths) {
+            let bytes = vec![seed; length];
+            let mut pages = settings.0.borrow_mut();
+            assert_eq!(pages.keep(setting, &[&bytes], &mut buffer), Ok(true), "{seed}");
+            assert_eq!(pages.read(setting, &mut buffer), Some(&bytes[..]), "{seed}");
+        }
+    }
+    assert!(settings.erases() > 4);
 }
