@@ -20,6 +20,7 @@ mod configuration;
 mod frame_clock;
 mod line;
 mod model;
+mod kept;
 mod session;
 mod answer;
 
@@ -67,10 +68,13 @@ struct Core<'m, P, F, const ROWS: usize> {
     /// Number of the request that waits for the baseline, and number of frames still to be scanned for it.
     capture: Option<(u16, u16)>,
     upload: Upload,
+    /// Number of times that settings may still be written before the next restart.
+    writes_left: u16,
 }
 
 impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
-    /// Makes an application that starts with `configuration`.
+    /// Makes an application. It starts with the configuration and constants that are kept, else with
+    /// `configuration` and the constants of `source`.
     pub fn new<const COLUMNS: usize, const OUTPUTS: usize, const BYTES: usize>(
         mut platform: P,
         source: F,
@@ -81,7 +85,7 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
             buffers;
         let capacity = Buffers::<ROWS, COLUMNS, OUTPUTS, BYTES>::CAPACITY;
         let now_us = platform.now_us();
-        let core = Core {
+        let mut core = Core {
             line: Line::new(platform, message),
             source,
             configuration,
@@ -103,7 +107,9 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
             sensor_answers: true,
             capture: None,
             upload: Upload::new(),
+            writes_left: kept::MOST_WRITES,
         };
+        core.load_settings();
         Self { receiver: Receiver::new(received), core }
     }
 

@@ -68,12 +68,15 @@ impl Capacity {
         self.rows * self.outputs
     }
 
-    /// Bytes of the longest message: a report of all readings or all outputs, or an identity.
+    /// Bytes of the longest message: a report of all readings or all outputs, the circuit's constants, or an
+    /// identity.
     #[must_use]
     pub const fn message_bytes(self) -> usize {
         let widest = if self.columns > self.outputs { self.columns } else { self.outputs };
         let frame = 4 * self.rows * widest + self.rows + 40;
-        if frame > 256 { frame } else { 256 }
+        let constants = 4 * (self.rows + 2 * self.columns) + 40;
+        let longest = if frame > constants { frame } else { constants };
+        if longest > 256 { longest } else { 256 }
     }
 
     /// The wires to be scanned for a model of this `shape`; `None` if there is no room for it.

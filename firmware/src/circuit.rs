@@ -4,7 +4,9 @@
 //! Readings of the paper's sensor are near 60 Ω, and its 18 columns together load a row with 3.3 Ω. A resistance
 //! in series with a row is therefore never negligible, and both circuits correct for it.
 
-use model_core::RowWire;
+use model_core::blob::Floats;
+use model_core::{RowWire, Wires};
+use serde::{Deserialize, Serialize};
 
 /// Smallest current in counts that counts as one; below it, the reading is open.
 pub const NO_CURRENT_COUNTS: f32 = 4.0;
@@ -29,7 +31,85 @@ pub trait Circuit {
     fn correct(&self, columns: usize, frame: &mut [f32]) {
         let _ = (columns, frame);
     }
+
+    /// The constants, if they can be asked for. A circuit has none unless it overrides this.
+    fn constants(&self) -> Option<Constants<'_>> {
+        None
+    }
+
+    /// Replaces all constants. A circuit takes none unless it overrides this.
+    ///
+    /// # Errors
+    /// [`ConstantsFault`], which leaves the constants as they were.
+    fn set_constants(&mut self, constants: Constants<'_>) -> Result<(), ConstantsFault> {
+        let _ = constants;
+        Err(ConstantsFault::Fixed)
+    }
 }
+
+/// Constants of a [`ZeroPotential`], for the link and for keeping.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Constants<'a> {
+    /// Reference voltage of the converter, in V.
+    pub reference_v: f32,
+    /// Voltage in V by which the active row is pulled below the others.
+    pub drive_v: f32,
+    /// Resistance in Ω between the drive and each row-wire: one number a row.
+    #[serde(borrow)]
+    pub row_source_ohm: Floats<'a>,
+    /// Feedback resistance in Ω of each column.
+    #[serde(borrow)]
+    pub feedback_ohm: Floats<'a>,
+    /// Resistance in Ω in series with each column.
+    #[serde(borrow)]
+    pub series_ohm: Floats<'a>,
+}
+
+/// Why a circuit does not take constants.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ConstantsFault {
+    /// The circuit's constants are fixed.
+    Fixed,
+    /// There are not as many rows or columns as the circuit has.
+    Length,
+    /// The reference voltage is not above 0, or above 100 V.
+    Reference,
+    /// The drive voltage is not above 0, or above 100 V.
+    Drive,
+    /// A row's source is below 0, or above 1 MΩ.
+    RowSource,
+    /// A feedback resistance is not above 0, or above 1 MΩ.
+    Feedback,
+    /// A column's series resistance is below 0, or above 1 MΩ.
+    Series,
+}
+
+impl Constants<'_> {
+    /// Checks that there are as many numbers as `wires`, and that each is in its range.
+    ///
+    /// # Errors
+    /// The first fault.
+    pub fn check(&self, wires: Wires) -> Result<(), ConstantsFault> {
+        let within = |value: f32, most: f32| value > 0.0 && value <= most;
+        let source = |ohm: f32| (0.0..=MOST_OHM).contains(&ohm);
+        let lengths = [self.row_source_ohm, self.feedback_ohm, self.series_ohm]
+            .map(|numbers| numbers.0.len());
+        let expected = [wires.rows, wires.columns, wires.columns].map(|count| 4 * count);
+        let checks = [
+            (lengths == expected, ConstantsFault::Length),
+            (within(self.reference_v, MOST_V), ConstantsFault::Reference),
+            (within(self.drive_v, MOST_V), ConstantsFault::Drive),
+            (self.row_source_ohm.iter().all(source), ConstantsFault::RowSource),
+            (self.feedback_ohm.iter().all(|r| within(r, MOST_OHM)), ConstantsFault::Feedback),
+            (self.series_ohm.iter().all(source), ConstantsFault::Series),
+        ];
+        checks.into_iter().find(|(good, _)| !good).map_or(Ok(()), |(_, fault)| Err(fault))
+    }
+}
+
+/// Largest voltage and resistance that a constant can have.
+const MOST_V: f32 = 100.0;
+const MOST_OHM: f32 = 1e6;
 
 /// A reference to a circuit is a circuit too, so that its constants can stay in flash.
 impl<C: Circuit> Circuit for &C {
@@ -41,6 +121,10 @@ impl<C: Circuit> Circuit for &C {
 
     fn correct(&self, columns: usize, frame: &mut [f32]) {
         C::correct(self, columns, frame);
+    }
+
+    fn constants(&self) -> Option<Constants<'_>> {
+        C::constants(self)
     }
 }
 
@@ -176,6 +260,29 @@ impl<const ROWS: usize, const COLS: usize> Circuit for ZeroPotential<ROWS, COLS>
             }
         }
     }
+
+    fn constants(&self) -> Option<Constants<'_>> {
+        Some(Constants {
+            reference_v: self.reference_v,
+            drive_v: self.drive_v,
+            row_source_ohm: Floats::of(&self.row_source_ohm),
+            feedback_ohm: Floats::of(&self.feedback_ohm),
+            series_ohm: Floats::of(&self.series_ohm),
+        })
+    }
+
+    fn set_constants(&mut self, constants: Constants<'_>) -> Result<(), ConstantsFault> {
+        constants.check(Wires { rows: ROWS, columns: COLS })?;
+        (self.reference_v, self.drive_v) = (constants.reference_v, constants.drive_v);
+        copy(constants.row_source_ohm, &mut self.row_source_ohm);
+        copy(constants.feedback_ohm, &mut self.feedback_ohm);
+        copy(constants.series_ohm, &mut self.series_ohm);
+        Ok(())
+    }
+}
+
+fn copy(from: Floats<'_>, to: &mut [f32]) {
+    to.iter_mut().zip(from.iter()).for_each(|(place, number)| *place = number);
 }
 
 /// Counts of the reference voltage itself: one more than the largest count.

@@ -1,7 +1,7 @@
 //! The program of a board, as a library that is tested on the host.
 //!
 //! [`readout`] scans frames over embedded-hal; [`circuit`] converts counts to Ω, and [`timing`] computes how long
-//! a scan takes. [`store`] keeps models in two slots of flash. [`link`] carries messages to and from the host.
+//! a scan takes. [`store`] keeps models in two slots of flash, [`settings`] what else survives a restart. [`link`] carries messages to and from the host.
 //! [`App`](app::App) is the loop that joins them and decodes with the model in force. A board implements
 //! [`platform`]; [`capacity`] says how large a sensor and a model it has room for. Nothing here allocates, panics or
 //! waits without bound.
@@ -16,6 +16,7 @@ pub mod readout;
 pub mod link;
 pub mod timing;
 pub mod capacity;
-pub mod platform;
 pub mod store;
+pub mod settings;
+pub mod platform;
 pub mod app;

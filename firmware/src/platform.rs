@@ -1,6 +1,7 @@
 //! The interface of a board to the application, besides the sensor and the slots.
 
 use crate::link::message::Memory;
+use crate::settings::Keeper;
 
 /// A serial line, and a clock for time limits on it. No function may wait.
 pub trait Port {
@@ -17,6 +18,9 @@ pub trait Port {
 /// A board, whose port leads to the host. The port must keep at least 1000 bytes that arrive while the
 /// application scans and decodes.
 pub trait Platform: Port {
+    /// Memory that keeps settings over restarts.
+    type Settings: Keeper;
+
     /// Name of the board, as the link reports it.
     const BOARD: &'static str;
 
@@ -25,6 +29,9 @@ pub trait Platform: Port {
 
     /// Use of flash and RAM.
     fn memory(&self) -> Memory;
+
+    /// The memory that keeps settings.
+    fn settings(&mut self) -> &mut Self::Settings;
 
     /// Count of the processor's cycles, which wraps around; always 0 on a board without a counter.
     fn cycles(&self) -> u32 {

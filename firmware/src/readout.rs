@@ -10,6 +10,8 @@
 use model_core::{ColumnWire, RowWire};
 use serde::{Deserialize, Serialize};
 
+use crate::circuit::{Constants, ConstantsFault};
+
 mod baseline;
 mod rows;
 mod columns;
@@ -121,4 +123,18 @@ pub trait FrameSource {
         wires: Selection<'_>,
         frame: &mut [f32],
     ) -> ScanReport;
+
+    /// The circuit's constants, if there are any that can be asked for.
+    fn constants(&self) -> Option<Constants<'_>> {
+        None
+    }
+
+    /// Replaces the circuit's constants.
+    ///
+    /// # Errors
+    /// [`ConstantsFault`], which leaves the constants as they were.
+    fn set_constants(&mut self, constants: Constants<'_>) -> Result<(), ConstantsFault> {
+        let _ = constants;
+        Err(ConstantsFault::Fixed)
+    }
 }

@@ -135,8 +135,7 @@ fn a_scan_longer_than_the_period_is_an_overrun() {
     let configuration = Configuration { frame_period_us: 100, ..quiet() };
     let mut bench = Bench::new(configuration);
     let board = bench.board.clone();
-    let frame = bench.frame.clone();
-    let source = Source { frame, board: board.clone(), scan_us: 250 };
+    let source = Source::new(&bench.frame, &board, 250);
     bench.app = TestApp::new(board.clone(), source, configuration, buffers());
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     while board.0.borrow().now_us < 2000 {

@@ -8,6 +8,7 @@ use firmware::link::message::Memory;
 unsafe extern "C" {
     // Mutable, because what stands there changes.
     static mut __vector_table: u32;
+    static mut _vector_table_end: u32;
     static mut __stext: u32;
     static mut __etext: u32;
     static mut __srodata: u32;
@@ -51,7 +52,7 @@ impl Sections {
     #[must_use]
     pub fn linked() -> Self {
         Self {
-            vector_table: bytes!(__vector_table..__stext),
+            vector_table: bytes!(__vector_table.._vector_table_end),
             text: bytes!(__stext..__etext),
             rodata: bytes!(__srodata..__erodata),
             data: bytes!(__sdata..__edata),

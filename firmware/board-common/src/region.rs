@@ -1,4 +1,4 @@
-//! Memory regions of the model slots and of weights in RAM, as the linker placed them.
+//! Memory regions of the model slots, of settings, and of weights in RAM, as the linker placed them.
 
 use core::{ptr, slice};
 
@@ -8,6 +8,8 @@ unsafe extern "C" {
     static mut _slot_a_end: u8;
     static mut _slot_b_start: u8;
     static mut _slot_b_end: u8;
+    static mut _settings_start: u8;
+    static mut _settings_end: u8;
     static mut _weights_start: u32;
     static mut _weights_end: u32;
 }
@@ -30,7 +32,7 @@ pub unsafe fn take_weights() -> &'static mut [u32] {
     }
 }
 
-/// Memory of one model slot, with exclusive access.
+/// Memory of one model slot or one page of settings, with exclusive access.
 #[derive(Debug)]
 pub struct Region {
     start: usize,
@@ -38,20 +40,23 @@ pub struct Region {
 }
 
 impl Region {
-    /// Takes the regions of both slots.
+    /// Takes the regions of both slots, and of both pages of settings.
     ///
     /// # Safety
     /// The caller must ensure that this is called only once: no two values may be the same region.
     #[must_use]
-    pub unsafe fn take() -> [Self; 2] {
+    pub unsafe fn take() -> ([Self; 2], [Self; 2]) {
         let region = |start: *const u8, end: *const u8| Self {
             start: start.expose_provenance(),
             length: end.addr() - start.addr(),
         };
-        [
+        let slots = [
             region(&raw const _slot_a_start, &raw const _slot_a_end),
             region(&raw const _slot_b_start, &raw const _slot_b_end),
-        ]
+        ];
+        let settings = region(&raw const _settings_start, &raw const _settings_end);
+        let length = settings.length / 2;
+        (slots, [0, length].map(|offset| Self { start: settings.start + offset, length }))
     }
 
     /// Address of the region's first byte.

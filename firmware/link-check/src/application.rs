@@ -2,14 +2,36 @@
 
 use firmware::app::{App, Buffers};
 use firmware::capacity::Capacity;
-use firmware::link::message::{Configuration, Memory};
+use firmware::circuit::{Circuit, Constants, ConstantsFault, ZeroPotential};
+use firmware::link::message::{Configuration, Memory, Setting};
 use firmware::platform::{Platform, Port};
 use firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
+use firmware::settings::{KeepError, Keeper};
 use firmware::store::{FlashError, Slot};
 
 use crate::opaque::{opaque, slot};
 
-struct Board;
+struct Board(Settings);
+
+/// A memory that may hold anything. It stands for the images' `SettingPages`: that calls a library whose panics the
+/// compiler cannot rule out.
+struct Settings;
+
+impl Keeper for Settings {
+    fn read<'b>(&mut self, setting: Setting, buffer: &'b mut [u8]) -> Option<&'b [u8]> {
+        opaque(setting);
+        buffer.fill(opaque(0));
+        buffer.get(..opaque(0))
+    }
+
+    fn keep(&mut self, setting: Setting, parts: &[&[u8]], _: &mut [u8]) -> Result<bool, KeepError> {
+        opaque(setting);
+        for part in parts {
+            opaque(part.len());
+        }
+        opaque(Ok(true))
+    }
+}
 
 impl Port for Board {
     fn now_us(&mut self) -> u32 {
@@ -27,6 +49,8 @@ impl Port for Board {
 }
 
 impl Platform for Board {
+    type Settings = Settings;
+
     const BOARD: &'static str = "link-check";
 
     fn feed_watchdog(&mut self) {
@@ -36,9 +60,13 @@ impl Platform for Board {
     fn memory(&self) -> Memory {
         opaque(Memory::default())
     }
+
+    fn settings(&mut self) -> &mut Settings {
+        &mut self.0
+    }
 }
 
-struct Sensor;
+struct Sensor(ZeroPotential<8, 18>);
 
 impl FrameSource for Sensor {
     fn scan(
@@ -50,6 +78,14 @@ impl FrameSource for Sensor {
         opaque((settings, wires));
         frame.fill(opaque(60.0));
         opaque(ScanReport::default())
+    }
+
+    fn constants(&self) -> Option<Constants<'_>> {
+        self.0.constants()
+    }
+
+    fn set_constants(&mut self, constants: Constants<'_>) -> Result<(), ConstantsFault> {
+        self.0.set_constants(constants)
     }
 }
 
@@ -73,7 +109,8 @@ impl Slot for Flash {
 pub fn exercise() {
     let mut buffers = Buffers::<8, 18, 18, { Capacity::PAPER.message_bytes() }>::new();
     let configuration = opaque(Configuration::DEFAULT);
-    let mut app = App::new(Board, Sensor, configuration, &mut buffers);
+    let sensor = Sensor(opaque(ZeroPotential::TYPICAL));
+    let mut app = App::new(Board(Settings), sensor, configuration, &mut buffers);
     let mut weights = [0; 1024];
     app.run(&mut [Flash, Flash], &mut weights);
     opaque(weights);

@@ -61,6 +61,8 @@ pub struct Board {
     pub delay: SysDelay,
     /// The two model slots.
     pub slots: [Slot; 2],
+    /// The two pages of settings.
+    pub settings: [Slot; 2],
     /// Watchdog, already running; it restarts the program if it is not fed for 8 s.
     pub watchdog: IndependentWatchdog,
 }
@@ -105,6 +107,7 @@ impl Board {
 
         let serial = Serial::start(parts.USART2, gpioa.pa2, gpioa.pa3, &mut rcc)?;
         let clock = Clock::start(parts.TIM2, &mut rcc)?;
+        let (slots, settings) = Slot::all(parts.FLASH);
         let high = PinState::High;
         Some(Self {
             reset_cause,
@@ -122,7 +125,8 @@ impl Board {
             clock,
             // From the processor's own clock: from an eighth of it, the HAL's waits would be 2 % short.
             delay: Timer::syst(core.SYST, &rcc.clocks).delay(),
-            slots: Slot::both(parts.FLASH),
+            slots,
+            settings,
             watchdog,
         })
     }

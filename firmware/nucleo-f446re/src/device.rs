@@ -9,19 +9,21 @@ use firmware::circuit::ZeroPotential;
 use firmware::link::message::{Configuration, Memory};
 use firmware::platform::{Platform, Port};
 use firmware::readout::{Mcp3208s, Scanner, ShiftRegister595};
-use nucleo_f446re::{Board, Clock, Oscillator, Serial, memory, restart};
+use firmware::settings::SettingPages;
+use nucleo_f446re::{Board, Clock, Oscillator, Serial, Slot, memory, restart};
 use panic_probe as _;
 use stm32f4xx_hal::gpio::{ErasedPin, Output};
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
-/// Constants of the circuit, which stay in flash. `docs/readout.md` explains how to measure your own.
-static CIRCUIT: ZeroPotential<{ CAPACITY.rows }, { CAPACITY.columns }> = ZeroPotential::TYPICAL;
+/// Constants of the circuit, until others are kept: `host-sim link PORT calibrate` measures your own.
+const CIRCUIT: ZeroPotential<{ CAPACITY.rows }, { CAPACITY.columns }> = ZeroPotential::TYPICAL;
 
 struct Nucleo {
     serial: Serial,
     clock: Clock,
     watchdog: IndependentWatchdog,
     led: ErasedPin<Output>,
+    settings: SettingPages<Slot>,
 }
 
 impl Port for Nucleo {
@@ -39,6 +41,8 @@ impl Port for Nucleo {
 }
 
 impl Platform for Nucleo {
+    type Settings = SettingPages<Slot>;
+
     const BOARD: &'static str = "nucleo-f446re";
 
     /// Feeds the watchdog, and blinks the light about once a second.
@@ -54,6 +58,10 @@ impl Platform for Nucleo {
 
     fn cycles(&self) -> u32 {
         self.clock.cycles()
+    }
+
+    fn settings(&mut self) -> &mut SettingPages<Slot> {
+        &mut self.settings
     }
 }
 
@@ -75,12 +83,13 @@ fn main() -> ! {
     };
     let sampler = Mcp3208s { chips: board.converters };
     let scanner =
-        Scanner::<_, _, _, _, { CAPACITY.columns }>::new(drive, sampler, board.delay, &CIRCUIT);
+        Scanner::<_, _, _, _, { CAPACITY.columns }>::new(drive, sampler, board.delay, CIRCUIT);
     let nucleo = Nucleo {
         serial: board.serial,
         clock: board.clock,
         watchdog: board.watchdog,
         led: board.led,
+        settings: SettingPages::new(board.settings),
     };
     let buffers = unwrap!(buffers());
     let mut app = BoardApp::<_, _>::new(nucleo, scanner, Configuration::DEFAULT, buffers);

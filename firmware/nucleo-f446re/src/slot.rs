@@ -1,4 +1,4 @@
-//! Model slots in sectors 6 and 7 of the flash.
+//! Model slots in sectors 6 and 7 of the flash, and pages of settings in sectors 1 and 2.
 
 use board_common::region::Region;
 use firmware::store::FlashError;
@@ -19,14 +19,15 @@ pub enum SlotError {
     Refused,
 }
 
-/// Flash for one model. Erasing sets all its bits to 1; writing can only set bits to 0.
+/// Flash for one model, or one page of settings. Erasing sets all its bits to 1; writing can only set bits to 0.
 pub struct Slot(Region);
 
 impl Slot {
-    /// Takes both slots, and the flash controller, which they share.
-    pub(crate) fn both(_: FLASH) -> [Self; 2] {
+    /// Takes both model slots, both pages of settings, and the flash controller, which they share.
+    pub(crate) fn all(_: FLASH) -> ([Self; 2], [Self; 2]) {
         // SAFETY: there is only one controller value, so this is called only once.
-        unsafe { Region::take() }.map(Self)
+        let (slots, pages) = unsafe { Region::take() };
+        (slots.map(Self), pages.map(Self))
     }
 
     /// All bytes of the slot.
@@ -35,12 +36,12 @@ impl Slot {
         self.0.bytes()
     }
 
-    /// Sets all bytes to 0xFF. Takes 1 to 2 s, in which nothing else runs, not even interrupts.
+    /// Sets all bytes to 0xFF. A slot takes 1 to 2 s, a page up to half a second, in which nothing else runs, not even interrupts.
     ///
     /// # Errors
     /// [`SlotError::OutOfRange`], [`SlotError::Refused`], [`SlotError::Verify`].
     pub fn erase(&mut self) -> Result<(), SlotError> {
-        // SAFETY: `both` took the controller, and no slot keeps it beyond one call.
+        // SAFETY: `all` took the controller, and no slot keeps it beyond one call.
         let mut flash = unsafe { Unlocked::new() };
         let sector = flash.sector(self.0.start()).ok_or(SlotError::OutOfRange)?;
         // SAFETY: the sector is this slot, which is borrowed mutably: nobody reads it.
@@ -63,7 +64,7 @@ impl Slot {
         if !offset.is_multiple_of(4) {
             return Err(SlotError::Unaligned);
         }
-        // SAFETY: `both` took the controller, and no slot keeps it beyond one call.
+        // SAFETY: `all` took the controller, and no slot keeps it beyond one call.
         let mut flash = unsafe { Unlocked::new() };
         // SAFETY: the words lie within this slot, which is borrowed mutably: nobody reads it.
         let written = unsafe { flash.write(self.0.start() + offset, words) };
@@ -89,6 +90,6 @@ impl firmware::store::Slot for Slot {
 
 /// Logs the cause, and converts it to the store's error.
 fn failed(cause: SlotError) -> FlashError {
-    defmt::error!("model slot: {}", cause);
+    defmt::error!("flash: {}", cause);
     FlashError
 }

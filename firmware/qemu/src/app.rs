@@ -14,6 +14,7 @@ use firmware::circuit::ZeroPotential;
 use firmware::link::message::{Configuration, Memory};
 use firmware::platform::{Platform, Port};
 use firmware::readout::{Mcp3208s, Scanner, ShiftRegister595};
+use firmware::settings::SettingPages;
 use qemu_image::clock::Clock;
 use qemu_image::mailbox::Mailbox;
 use qemu_image::psram::Psram;
@@ -31,8 +32,8 @@ const ROW_DATA: u8 = 12;
 const ROW_CLOCK: u8 = 13;
 const ROW_LATCH: u8 = 14;
 
-/// Constants of the circuit, which stay in flash.
-static CIRCUIT: ZeroPotential<{ CAPACITY.rows }, { CAPACITY.columns }> = ZeroPotential::TYPICAL;
+/// Constants of the circuit, until others are kept.
+const CIRCUIT: ZeroPotential<{ CAPACITY.rows }, { CAPACITY.columns }> = ZeroPotential::TYPICAL;
 
 /// Carrier of a serial line's bytes: the mailbox or a UART.
 enum Carrier {
@@ -89,6 +90,7 @@ struct Board<'c> {
     line: Line<'c>,
     watchdog: Watchdog,
     fed_us: u32,
+    settings: SettingPages<Slot>,
 }
 
 impl Port for Board<'_> {
@@ -106,6 +108,8 @@ impl Port for Board<'_> {
 }
 
 impl Platform for Board<'_> {
+    type Settings = SettingPages<Slot>;
+
     const BOARD: &'static str = "qemu mps2-an386";
 
     /// Feeds the watchdog at most once a millisecond, because feeding costs QEMU system calls.
@@ -119,6 +123,10 @@ impl Platform for Board<'_> {
 
     fn memory(&self) -> Memory {
         memory::taken()
+    }
+
+    fn settings(&mut self) -> &mut SettingPages<Slot> {
+        &mut self.settings
     }
 }
 
@@ -135,18 +143,19 @@ fn main() -> ! {
     let sampler =
         Mcp3208s { chips: core::array::from_fn::<_, CONVERTERS, _>(|chip| remote.spi(chip as u8)) };
     let scanner =
-        Scanner::<_, _, _, _, { CAPACITY.columns }>::new(drive, sampler, remote.delay(), &CIRCUIT);
+        Scanner::<_, _, _, _, { CAPACITY.columns }>::new(drive, sampler, remote.delay(), CIRCUIT);
+    // SAFETY: the slots are taken here only.
+    let (mut slots, pages) = unsafe { Slot::take() };
     let board = Board {
         line: Line { carrier: link, clock: &clock },
         watchdog: Watchdog::start(WATCHDOG_MS),
         fed_us: 0,
+        settings: SettingPages::new(pages),
     };
     // The host says when to scan, because its virtual hardware may be missing.
     let configuration = Configuration { frame_period_us: 0, ..Configuration::DEFAULT };
     let Some(buffers) = buffers() else { exit::failure() };
     let mut app = BoardApp::<_, _>::new(board, scanner, configuration, buffers);
-    // SAFETY: the slots are taken here only.
-    let mut slots = unsafe { Slot::take() };
     // SAFETY: the memory is taken here only.
     app.run(&mut slots, unsafe { take_weights() });
     info!("restarting");

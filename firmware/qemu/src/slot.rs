@@ -1,4 +1,4 @@
-//! Model slots, which behave as flash does.
+//! Model slots and pages of settings, which behave as flash does.
 //!
 //! They lie in code memory, which QEMU lets a program write to. `-device
 //! loader,file=model.bin,addr=0x200000,force-raw=on` on QEMU's command line puts a model into slot
@@ -16,18 +16,19 @@ pub enum SlotError {
     NotErased,
 }
 
-/// Memory for one model. Erasing sets all its bits to 1; writing can only set bits to 0.
+/// Memory for one model, or one page of settings. Erasing sets all its bits to 1; writing can only set bits to 0.
 pub struct Slot(Region);
 
 impl Slot {
-    /// Takes both slots.
+    /// Takes both model slots, and both pages of settings.
     ///
     /// # Safety
     /// The caller must ensure that this is called only once: no two values may be the same slot.
     #[must_use]
-    pub unsafe fn take() -> [Self; 2] {
+    pub unsafe fn take() -> ([Self; 2], [Self; 2]) {
         // SAFETY: the caller ensures that this is called only once.
-        unsafe { Region::take() }.map(Self)
+        let (slots, pages) = unsafe { Region::take() };
+        (slots.map(Self), pages.map(Self))
     }
 
     /// All bytes of the slot.

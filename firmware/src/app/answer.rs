@@ -6,6 +6,7 @@ use model_core::exp::{ExpKernel, Polynomial};
 use super::Core;
 use super::model::{self, InForce};
 use super::session::{Leave, Session};
+use crate::circuit::{Constants, ConstantsFault};
 use crate::link::message::{Configuration, Identity, Refusal, Report, Request, UploadStep};
 use crate::link::packet::{self, PROTOCOL_VERSION, PacketError};
 use crate::link::receive::Received;
@@ -87,10 +88,48 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                 leave = Some(Leave::Restart);
                 Ok(Report::Restarting)
             }
+            Request::Constants => {
+                self.send_constants(number);
+                return None;
+            }
+            Request::SetConstants(constants) => match self.set_constants(constants, model) {
+                Ok(()) => {
+                    self.send_constants(number);
+                    return None;
+                }
+                Err(fault) => Err(Refusal::Constants(fault)),
+            },
+            Request::Kept => Ok(Report::Kept(self.kept())),
+            Request::Keep(setting) => self.keep(setting).map(|()| Report::Kept(self.kept())),
+            Request::Forget(setting) => self.forget(setting).map(|()| Report::Kept(self.kept())),
         };
         let sent = self.line.send(number, &report.unwrap_or_else(Report::Refused));
         self.count_lost(sent);
         leave
+    }
+
+    /// Puts constants in force. A baseline that was read with others means nothing any more.
+    fn set_constants(
+        &mut self,
+        constants: Constants<'_>,
+        model: &InForce<'_, ROWS>,
+    ) -> Result<(), ConstantsFault> {
+        let before = self.constants_crc();
+        self.source.set_constants(constants)?;
+        if self.constants_crc() != before {
+            self.give_up_capture();
+            self.baseline.restart(self.wires.readings());
+            self.load_baseline();
+            self.decode_baseline(model.decoder.as_ref());
+        }
+        Ok(())
+    }
+
+    fn send_constants(&mut self, number: u16) {
+        let constants = self.source.constants().ok_or(Refusal::Constants(ConstantsFault::Fixed));
+        let report = constants.map_or_else(Report::Refused, Report::Constants);
+        let sent = self.line.send(number, &report);
+        self.count_lost(sent);
     }
 
     /// Counts a frame that is no valid request, and refuses it if it is a whole packet.

@@ -2,7 +2,7 @@
 
 use crate::link::message::Report;
 use crate::link::{cobs, packet};
-use crate::platform::Port;
+use crate::platform::{Platform, Port};
 
 /// Longest time in µs without progress of a report; then it is given up.
 const STALL_US: u32 = 50_000;
@@ -15,6 +15,13 @@ pub struct Line<'m, P> {
     buffer: &'m mut [u8],
     /// Whether the last report was given up in the middle, so that its frame must still be ended.
     cut: bool,
+}
+
+impl<P: Platform> Line<'_, P> {
+    /// The memory that keeps settings, and the room for a report, which no report needs meanwhile.
+    pub fn settings(&mut self) -> (&mut P::Settings, &mut [u8]) {
+        (self.platform.settings(), self.buffer)
+    }
 }
 
 impl<'m, P: Port> Line<'m, P> {

@@ -96,7 +96,7 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
 
 impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
     /// Makes frames and estimates as long as the model's, and decodes the baseline with it. A baseline of other
-    /// wires is forgotten.
+    /// wires is replaced by the one that is kept, if that fits.
     fn take_shape_of(&mut self, decoder: Option<&Decoder<'_, ROWS>>) {
         let before = (self.wires, self.row_wires);
         let shape = decoder.map(Decoder::shape);
@@ -109,6 +109,9 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         if (self.wires, self.row_wires) != before {
             self.give_up_capture();
             self.baseline.restart(self.wires.readings());
+        }
+        if self.baseline.frames() == 0 && self.capture.is_none() {
+            self.load_baseline();
         }
         self.decode_baseline(decoder);
     }

@@ -6,6 +6,7 @@
 use model_core::blob::Floats;
 use serde::{Deserialize, Serialize};
 
+use crate::circuit::{Constants, ConstantsFault};
 use crate::readout::ScanSettings;
 
 /// A request of the host. The device answers each with one [`Report`] that repeats the request's number. Every
@@ -46,6 +47,17 @@ pub enum Request<'a> {
         #[serde(borrow)]
         readings_ohm: Floats<'a>,
     },
+    /// Ask for the circuit's constants in force. Answered by [`Report::Constants`], or refused if there are none.
+    Constants,
+    /// Put constants in force until the next restart. Answered by [`Report::Constants`], or by
+    /// [`Refusal::Constants`], which leaves the previous ones in force.
+    SetConstants(#[serde(borrow)] Constants<'a>),
+    /// Ask which settings are kept. Answered by [`Report::Kept`].
+    Kept,
+    /// Keep the setting in force over restarts. Answered by [`Report::Kept`]. Takes up to seconds on a board.
+    Keep(Setting),
+    /// Keep a setting no longer; it stays in force until the next restart. Answered by [`Report::Kept`].
+    Forget(Setting),
 }
 
 /// Steps of uploading a model, in their order.
@@ -68,6 +80,22 @@ pub enum UploadStep<'a> {
     Commit,
     /// Abort the upload, and forget the bytes received.
     Abort,
+}
+
+/// A setting that a device can keep over restarts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Setting {
+    /// The configuration.
+    Configuration,
+    /// The circuit's constants.
+    Constants,
+    /// The baseline.
+    Baseline,
+}
+
+impl Setting {
+    /// All settings.
+    pub const ALL: [Self; 3] = [Self::Configuration, Self::Constants, Self::Baseline];
 }
 
 /// A report of the device, as an answer or unasked.
@@ -105,6 +133,10 @@ pub enum Report<'a> {
     Restarting,
     /// The request was not carried out, and changed nothing.
     Refused(Refusal),
+    /// The circuit's constants in force.
+    Constants(#[serde(borrow)] Constants<'a>),
+    /// The settings that are kept over restarts.
+    Kept(Kept),
 }
 
 /// Identity of the device, and of the model in force.
@@ -210,6 +242,30 @@ pub struct Configuration {
     /// rest. Such a row is skipped, and gets the outputs of the baseline. With 0, or without a baseline, every row
     /// is decoded.
     pub rest_tolerance: f32,
+}
+
+/// Settings that are kept over restarts.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Kept {
+    /// The configuration at the start; `None` if it is the image's.
+    pub configuration: Option<Configuration>,
+    /// Whether constants of the circuit are kept; else the image's are in force at the start.
+    pub constants: bool,
+    /// The baseline at the start; `None` if there is none.
+    pub baseline: Option<KeptBaseline>,
+    /// Number of times that settings may still be written before the next restart.
+    pub writes_left: u16,
+}
+
+/// A baseline that is kept over restarts. It comes into force if the device scans these wires.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct KeptBaseline {
+    /// Number of row-wires.
+    pub rows: u8,
+    /// Number of column-wires.
+    pub columns: u8,
+    /// Number of frames that it is the mean of.
+    pub frames: u16,
 }
 
 /// The estimate of one frame: outputs, status of rows, and flags.
@@ -342,8 +398,23 @@ pub enum Refusal {
     },
     /// The blob is unsound or of another shape. The upload is over.
     BadModel(ModelFault),
-    /// The flash could not be erased or written. The upload is over.
+    /// The flash could not be erased or written. If it was for an upload, the upload is over.
     Flash,
+    /// The circuit has no constants, or cannot take these.
+    Constants(ConstantsFault),
+    /// The setting cannot be kept.
+    Keep(KeepFault),
+}
+
+/// Why a setting cannot be kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum KeepFault {
+    /// There is none: no baseline was captured, or the circuit has no constants.
+    Nothing,
+    /// It is too large for the device's memory.
+    TooLarge,
+    /// Settings were written too often since the start; a restart allows more.
+    TooOften,
 }
 
 /// A field of [`Configuration`] that can be out of range.

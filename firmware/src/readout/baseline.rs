@@ -1,5 +1,7 @@
 //! The baseline: the frame of the unloaded sensor.
 
+use model_core::blob::Floats;
+
 /// The mean of frames at rest, with which other frames are compared.
 ///
 /// It takes memory for one frame. A reading that was missing, open or shorted in any of the frames stays NaN.
@@ -33,6 +35,15 @@ impl<'m> Baseline<'m> {
     pub fn restart(&mut self, readings: usize) {
         (self.readings, self.frames) = (readings.min(self.memory.len()), 0);
         self.memory.fill(0.0);
+    }
+
+    /// Replaces all frames by so many `frames` with the mean `readings` (Ω), which were kept.
+    pub fn restore(&mut self, readings: Floats<'_>, frames: u16) {
+        self.restart(readings.0.len() / 4);
+        for (mean, ohm) in self.memory.iter_mut().zip(readings.iter()) {
+            *mean = if usable(ohm) { ohm } else { f32::NAN };
+        }
+        self.frames = frames;
     }
 
     /// Adds one frame at rest (Ω) to the mean; after 65 535 frames nothing changes any more.

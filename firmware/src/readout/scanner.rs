@@ -4,7 +4,7 @@ use embedded_hal::delay::DelayNs;
 use model_core::{ColumnWire, RowWire};
 
 use super::{ColumnSampler, FrameSource, RowDrive, ScanReport, ScanSettings, Selection};
-use crate::circuit::Circuit;
+use crate::circuit::{Circuit, Constants, ConstantsFault};
 
 /// Scanner of a sensor with at most `COLUMNS` columns, made of a row drive, a column sampler, a delay and a circuit.
 ///
@@ -126,5 +126,13 @@ impl<D: RowDrive, S: ColumnSampler, T: DelayNs, C: Circuit, const COLUMNS: usize
         self.release(&mut report);
         self.circuit.correct(wires.columns, frame);
         report
+    }
+
+    fn constants(&self) -> Option<Constants<'_>> {
+        self.circuit.constants()
+    }
+
+    fn set_constants(&mut self, constants: Constants<'_>) -> Result<(), ConstantsFault> {
+        self.circuit.set_constants(constants)
     }
 }

@@ -6,6 +6,7 @@ use std::collections::VecDeque;
 use std::rc::Rc;
 
 use firmware::app::{App, Buffers, Leave, Session};
+use firmware::circuit::{Circuit, Constants, ConstantsFault, ZeroPotential};
 use firmware::link::message::{Configuration, Memory, Report, Request, UploadStep};
 use firmware::link::receive::{Received, Receiver};
 use firmware::link::{cobs, packet};
@@ -16,6 +17,10 @@ use model_core::AlignedBytes;
 use model_core::blob::{Metadata, ModelParts, ModelShape, encode_to_vec};
 use model_core::rbf::direct::{self, Parameters};
 use model_core::rbf::{Network, Shape};
+
+pub mod pages;
+
+use pages::SharedSettings;
 
 pub const ROWS: usize = 2;
 pub const COLS: usize = 3;
@@ -38,7 +43,7 @@ pub struct Pins {
 }
 
 #[derive(Clone, Default)]
-pub struct Board(pub Rc<RefCell<Pins>>);
+pub struct Board(pub Rc<RefCell<Pins>>, pub SharedSettings);
 
 impl Port for Board {
     fn now_us(&mut self) -> u32 {
@@ -64,6 +69,8 @@ impl Port for Board {
 }
 
 impl Platform for Board {
+    type Settings = SharedSettings;
+
     const BOARD: &'static str = "test";
 
     fn feed_watchdog(&mut self) {
@@ -73,14 +80,30 @@ impl Platform for Board {
     fn memory(&self) -> Memory {
         Memory { stack_reserved: 1024, ..Memory::default() }
     }
+
+    fn settings(&mut self) -> &mut SharedSettings {
+        &mut self.1
+    }
 }
 
-/// A sensor that shows the same frame until it is given another.
+/// A sensor that shows the same frame until it is given another. Its circuit's constants change nothing.
 #[derive(Clone)]
 pub struct Source {
+    pub circuit: ZeroPotential<ROWS, COLS>,
     pub frame: Rc<RefCell<TestFrame>>,
     pub board: Board,
     pub scan_us: u32,
+}
+
+impl Source {
+    pub fn new(frame: &Rc<RefCell<TestFrame>>, board: &Board, scan_us: u32) -> Self {
+        Self {
+            circuit: ZeroPotential::TYPICAL,
+            frame: frame.clone(),
+            board: board.clone(),
+            scan_us,
+        }
+    }
 }
 
 impl FrameSource for Source {
@@ -99,6 +122,14 @@ impl FrameSource for Source {
         pins.now_us = pins.now_us.wrapping_add(self.scan_us);
         let missing = frame.iter();
         ScanReport { failed_samples: missing.filter(|reading| reading.is_nan()).count() as u16 }
+    }
+
+    fn constants(&self) -> Option<Constants<'_>> {
+        self.circuit.constants()
+    }
+
+    fn set_constants(&mut self, constants: Constants<'_>) -> Result<(), ConstantsFault> {
+        self.circuit.set_constants(constants)
     }
 }
 
@@ -153,17 +184,22 @@ impl MockSlot {
     }
 
     fn operate(&self) -> Result<(), PowerCut> {
-        let mut power = self.power.borrow_mut();
-        match power.left {
-            Some(0) => {
-                power.gone = true;
-                return Err(PowerCut);
-            }
-            Some(left) => power.left = Some(left - 1),
-            None => {}
-        }
-        Ok(())
+        operate(&self.power)
     }
+}
+
+/// Carries out an operation on a word, unless the power is cut.
+fn operate(power: &RefCell<Power>) -> Result<(), PowerCut> {
+    let mut power = power.borrow_mut();
+    match power.left {
+        Some(0) => {
+            power.gone = true;
+            return Err(PowerCut);
+        }
+        Some(left) => power.left = Some(left - 1),
+        None => {}
+    }
+    Ok(())
 }
 
 impl Slot for MockSlot {
@@ -261,9 +297,14 @@ pub struct Bench {
 
 impl Bench {
     pub fn new(configuration: Configuration) -> Self {
-        let board = Board::default();
+        Self::with_settings(configuration, &SharedSettings::default())
+    }
+
+    /// A board on which these settings are kept.
+    pub fn with_settings(configuration: Configuration, settings: &SharedSettings) -> Self {
+        let board = Board(Rc::default(), settings.clone());
         let frame = Rc::new(RefCell::new(frame_at_rest()));
-        let source = Source { frame: frame.clone(), board: board.clone(), scan_us: 10 };
+        let source = Source::new(&frame, &board, 10);
         Self { app: App::new(board.clone(), source, configuration, buffers()), board, frame }
     }
 }

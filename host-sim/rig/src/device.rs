@@ -1,7 +1,7 @@
 //! A device at the other end of a serial line, real or emulated.
 //!
-//! [`Device`] sends requests and receives reports; [`upload`] replaces its model; [`stream`] lets it
-//! decode frames; [`check`] and [`scan`] compare it with the host. `docs/link.md` specifies the
+//! [`Device`] sends requests and receives reports; [`upload`] replaces its model; [`calibrate`] finds the constants
+//! of its circuit; [`stream`] lets it decode frames; [`check`] and [`scan`] compare it with the host. `docs/link.md` specifies the
 //! protocol.
 
 use std::collections::VecDeque;
@@ -22,6 +22,8 @@ use serde::Serialize;
 use crate::error::{Error, Result};
 
 pub mod serial;
+mod settings;
+pub mod calibrate;
 pub mod stream;
 pub mod upload;
 mod expected;

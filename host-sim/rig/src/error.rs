@@ -4,7 +4,8 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use firmware::capacity::Capacity;
-use firmware::link::message::{ModelFault, Refusal};
+use firmware::circuit::ConstantsFault;
+use firmware::link::message::{KeepFault, ModelFault, Refusal};
 use model_core::blob::ModelShape;
 
 /// Result of the functions of this crate.
@@ -57,6 +58,9 @@ pub enum Error {
     /// Request that the device refused.
     #[error("the device refused: {}", why(*.0))]
     Refused(Refusal),
+    /// Readings of known resistors from which no constants of the circuit can be found.
+    #[error("{0}")]
+    Calibration(String),
     /// Model that the device says it activated, while another one is active.
     #[error("the device accepted model {committed:08x}, but {in_force} is active")]
     NotInForce {
@@ -155,5 +159,17 @@ fn why(refusal: Refusal) -> String {
             format!("the model is faulty ({fault:?}); `inspect` shows more")
         }
         Refusal::Flash => "its flash could not be written".into(),
+        Refusal::Constants(ConstantsFault::Fixed) => "its circuit's constants are fixed".into(),
+        Refusal::Constants(ConstantsFault::Length) => {
+            "its circuit has another number of rows or columns".into()
+        }
+        Refusal::Constants(fault) => format!("{fault:?} of the constants is out of range"),
+        Refusal::Keep(KeepFault::Nothing) => {
+            "it has nothing of that kind to keep; capture a baseline first".into()
+        }
+        Refusal::Keep(KeepFault::TooLarge) => "it has no room to keep that".into(),
+        Refusal::Keep(KeepFault::TooOften) => {
+            "settings were written too often since its start, which wears its flash; restart it to go on".into()
+        }
     }
 }

@@ -37,6 +37,7 @@ mod scan;
 #[cfg(test)]
 mod tests;
 
+pub use analogue::Parts;
 pub use board::{Transactions, VirtualBoard};
 pub use handles::{VirtualAdc, VirtualDelay, VirtualPin, VirtualSpi};
 pub use pin::Pin;

@@ -5,7 +5,9 @@ use std::time::{Duration, Instant};
 
 use super::progress::Terminal;
 use clap::{Args, Subcommand, value_parser};
-use firmware::link::message::{Configuration, EstimateReport, Report, Request, Statistics};
+use firmware::link::message::{
+    Configuration, EstimateReport, Report, Request, Setting, Statistics,
+};
 use firmware::timing::ScanPlan;
 use host_sim::{Error, Result};
 use model_core::Wires;
@@ -19,7 +21,7 @@ use taxel_rig::device::{Device, DeviceIdentity, Wire, serial, upload};
 use super::check_arguments::{CheckArguments, Checked, conclude, memory_lines};
 use super::{Common, print};
 
-/// Talk to a device on a serial port: identify, upload, record.
+/// Talk to a device on a serial port: identify, upload, record, calibrate.
 #[derive(Args)]
 #[command(after_help = "Example: host-sim link /dev/ttyACM0 upload press.bin")]
 pub struct Arguments {
@@ -31,6 +33,10 @@ pub struct Arguments {
     #[command(subcommand)]
     action: Action,
 }
+
+// From the ground up: a module imports only what is declared before it.
+mod settings;
+mod calibrate;
 
 #[derive(Subcommand)]
 enum Action {
@@ -48,6 +54,19 @@ enum Action {
     /// Capture the untouched sensor, and save the mean readings as CSV.
     #[command(after_help = "Example: host-sim link /dev/ttyACM0 baseline -o rest.csv")]
     Baseline(BaselineArguments),
+    /// Change the configuration, and keep it over restarts.
+    #[command(
+        after_help = "Example: host-sim link /dev/ttyACM0 configure --period-us 20000 --send both"
+    )]
+    Configure(settings::ConfigureArguments),
+    /// Find the constants of the device's circuit with known resistors.
+    ///
+    /// Asks for one arrangement of resistors after the other. docs/readout.md says which ones tell the constants.
+    #[command(after_help = "Example: host-sim link /dev/ttyACM0 calibrate known.csv --store")]
+    Calibrate(calibrate::Arguments),
+    /// Show configuration, constants and baseline, and what of them is kept over restarts.
+    #[command(after_help = "Example: host-sim link /dev/ttyACM0 settings")]
+    Settings(settings::SettingsArguments),
     /// Let the device decode a scene's frames, and compare with the host bit for bit.
     ///
     /// The model that is checked with replaces the active one.
@@ -80,6 +99,9 @@ struct RecordArguments {
 struct BaselineArguments {
     #[command(flatten)]
     scan: ScanArguments,
+    /// Keep the baseline over restarts; otherwise it is active until the next one.
+    #[arg(long)]
+    store: bool,
     /// CSV file to write.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
@@ -141,6 +163,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         }
         Action::Record(action) => record(&mut open()?, action, common),
         Action::Baseline(action) => baseline(&mut open()?, action, common),
+        Action::Configure(action) => settings::configure(&mut open()?, action, common),
+        Action::Calibrate(action) => calibrate::execute(&mut open()?, action, common),
+        Action::Settings(action) => settings::settings(&mut open()?, action, common),
         Action::Check(action) => {
             let Checked { frames, model, .. } = action.load(common)?;
             let mut device = open()?;
@@ -372,6 +397,9 @@ fn baseline<W: Wire>(
     let readings = answer.map_err(taxel_rig::Error::Refused)?;
     let names = reading_names(&identity);
     let values_missing = missing(readings.iter(), Wanted::Readings)?;
+    if action.store {
+        device.keep(Setting::Baseline)?;
+    }
     let lines = std::iter::once(readings.iter().copied());
     csv_file::write(&action.output, names.iter().map(String::as_str), lines)?;
     let file = action.output.clone();

@@ -331,7 +331,7 @@ fn a_device_that_never_pauses_does_not_hold_the_host() {
 }
 
 #[cfg(unix)]
-mod serial_port {
+pub mod serial_port {
     use serialport::{SerialPort, TTYPort};
 
     use super::*;
@@ -343,15 +343,20 @@ mod serial_port {
 
     /// Name of a pseudo-terminal with a device at its far end, whose sensor shows `frames`.
     fn port_with(model: &ModelBlob, frames: Vec<[[f32; 18]; 8]>) -> (String, TTYPort) {
-        let (mut far, near) = TTYPort::pair().unwrap();
-        far.set_timeout(std::time::Duration::from_millis(1)).unwrap();
-        let name = near.name().unwrap();
-        crate::virtual_device::run(Quick(far), SOUND, model.bytes(), frames);
+        let (name, near, far) = terminal();
+        crate::virtual_device::run(far, SOUND, model.bytes(), frames);
         (name, near)
     }
 
+    /// Name of a pseudo-terminal, and both its ends; the far one is for a device.
+    pub fn terminal() -> (String, TTYPort, Quick) {
+        let (mut far, near) = TTYPort::pair().unwrap();
+        far.set_timeout(std::time::Duration::from_millis(1)).unwrap();
+        (near.name().unwrap(), near, Quick(far))
+    }
+
     /// Port that answers a read without bytes like a socket does.
-    struct Quick(TTYPort);
+    pub struct Quick(TTYPort);
 
     impl std::io::Read for Quick {
         fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {

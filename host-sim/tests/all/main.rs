@@ -5,6 +5,7 @@ mod quantisation;
 mod virtual_device;
 
 mod accuracy;
+mod calibrate;
 mod device;
 mod drift;
 mod gate;

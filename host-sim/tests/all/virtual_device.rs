@@ -7,6 +7,7 @@ use firmware::capacity::Capacity;
 use firmware::link::message::{Configuration, Memory};
 use firmware::platform::{Platform, Port};
 use firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
+use firmware::settings::{PAGE_BYTES, SettingPages};
 use firmware::store::{FlashError, Slot};
 use taxel_data::random::{Purpose, Random, Stream};
 
@@ -19,8 +20,9 @@ pub struct Line {
 }
 
 /// Board whose serial line is `W`, whose reads must not block.
-struct Board<W> {
+struct Board<'s, W> {
     wire: W,
+    settings: &'s mut SettingPages<MemorySlot>,
     start: Instant,
     line: Line,
     random: Random,
@@ -31,7 +33,7 @@ struct Board<W> {
     gone: bool,
 }
 
-impl<W: Read + Write> Board<W> {
+impl<W: Read + Write> Board<'_, W> {
     /// Byte as it arrives; `None` if it is lost.
     fn spoil(&mut self, byte: u8) -> Option<u8> {
         let Some(one_in) = self.line.one_in else { return Some(byte) };
@@ -51,7 +53,7 @@ impl<W: Read + Write> Board<W> {
     }
 }
 
-impl<W: Read + Write> Port for Board<W> {
+impl<W: Read + Write> Port for Board<'_, W> {
     fn now_us(&mut self) -> u32 {
         self.start.elapsed().as_micros() as u32
     }
@@ -90,13 +92,19 @@ impl<W: Read + Write> Port for Board<W> {
     }
 }
 
-impl<W: Read + Write> Platform for Board<W> {
+impl<W: Read + Write> Platform for Board<'_, W> {
+    type Settings = SettingPages<MemorySlot>;
+
     const BOARD: &'static str = "virtual";
 
     fn feed_watchdog(&mut self) {}
 
     fn memory(&self) -> Memory {
         Memory { text: 20_000, bss: 3000, stack_high_water: 1000, ..Memory::default() }
+    }
+
+    fn settings(&mut self) -> &mut SettingPages<MemorySlot> {
+        self.settings
     }
 }
 
@@ -161,12 +169,15 @@ pub fn run_with(
 ) {
     let mut slots = [0, 1].map(|_| MemorySlot(vec![u32::MAX; 128 * 1024 / 4]));
     bytemuck::cast_slice_mut(&mut slots[0].0)[..model.len()].copy_from_slice(model);
+    let mut settings =
+        SettingPages::new([0, 1].map(|_| MemorySlot(vec![u32::MAX; PAGE_BYTES / 4])));
     // Half of a large model fits: both ways are taken.
     let mut weights = vec![0; 8 * 1024];
     std::thread::spawn(move || {
         for life in 0.. {
             let board = Board {
                 wire: &mut wire,
+                settings: &mut settings,
                 start: Instant::now(),
                 line,
                 random: Random::new(5, Stream::Test, Purpose::Damage, life, 2),

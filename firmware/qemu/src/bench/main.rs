@@ -142,7 +142,7 @@ fn measure_array<E: ExpKernel>(model: &Model<'_>, frame: &Frame, name: &str, gat
 fn main() -> ! {
     calibrate();
     // SAFETY: the slots are taken here only.
-    let [slot, _] = unsafe { Slot::take() };
+    let ([slot, _], _) = unsafe { Slot::take() };
     let length = unwrap!(Model::declared_length(slot.bytes()), "slot A holds no model");
     let blob = unwrap!(slot.bytes().get(..length), "the model in slot A is cut off");
     let model = unwrap!(checked(blob), "the model in slot A is unsound");

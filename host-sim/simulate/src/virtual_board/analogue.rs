@@ -12,12 +12,23 @@ const MOST_CONDUCTANCE_S: f64 = 1e6;
 
 const ZERO_POTENTIAL: ZeroPotential<1, 1> = ZeroPotential::TYPICAL;
 
+/// Actual values of a board's parts in the zero-potential circuit; the firmware's constants should be the same.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parts {
+    /// Voltage in V by which the active row is pulled below the others.
+    pub drive_v: f64,
+    /// Resistance in Ω of each row's switch and lead.
+    pub row_source_ohm: [f64; ROWS],
+    /// Feedback resistance in Ω of each column.
+    pub feedback_ohm: [f64; COLUMNS],
+}
+
 /// Network of the sensor, and the circuit around it.
 #[derive(Debug)]
 pub(super) struct Analogue {
     circuit: Circuit,
     cross_talk: bool,
-    row_source_ohm: f64,
+    parts: Parts,
     line_ohm: f64,
     offset_v: [f64; COLUMNS],
     conductance_s: Vec<f64>,
@@ -41,7 +52,11 @@ impl Analogue {
         Self {
             circuit: readout.circuit.unwrap_or_default(),
             cross_talk: readout.cross_talk.unwrap_or(false),
-            row_source_ohm: readout.row_switch_ohm.unwrap_or(0.0) + line_ohm,
+            parts: Parts {
+                drive_v: ZERO_POTENTIAL.drive_v.into(),
+                row_source_ohm: [readout.row_switch_ohm.unwrap_or(0.0) + line_ohm; ROWS],
+                feedback_ohm: [ZERO_POTENTIAL.feedback_ohm[0].into(); COLUMNS],
+            },
             line_ohm,
             offset_v,
             conductance_s: vec![0.0; ROWS * COLUMNS],
@@ -56,6 +71,11 @@ impl Analogue {
             assert!(*ohm >= 0.0, "a resistance of {ohm} Ω");
             *siemens = (1.0 / ohm).min(MOST_CONDUCTANCE_S);
         }
+        self.outputs_v = [None; ROWS + 1];
+    }
+
+    pub(super) fn set_parts(&mut self, parts: Parts) {
+        self.parts = parts;
         self.outputs_v = [None; ROWS + 1];
     }
 
@@ -75,9 +95,13 @@ impl Analogue {
         outputs
     }
 
-    fn row_ties(&self, active: Option<usize>, driven_v: f64, idle: Tie) -> [Tie; ROWS] {
-        let driven = Tie::Held { volt: driven_v, through_ohm: self.row_source_ohm };
-        std::array::from_fn(|row| if Some(row) == active { driven } else { idle })
+    /// Ties of all rows: the `active` one to `driven_v`, the others to `idle_v`, or floating.
+    fn row_ties(&self, active: Option<usize>, driven_v: f64, idle_v: Option<f64>) -> [Tie; ROWS] {
+        std::array::from_fn(|row| {
+            let volt = if Some(row) == active { Some(driven_v) } else { idle_v };
+            let through_ohm = self.parts.row_source_ohm[row];
+            volt.map_or(Tie::Floating, |volt| Tie::Held { volt, through_ohm })
+        })
     }
 
     fn divider_v(&self, active: Option<usize>) -> [f64; COLUMNS] {
@@ -91,7 +115,7 @@ impl Analogue {
         }
         let to_ground_ohm = reference_ohm + self.line_ohm;
         let columns = [Tie::Held { volt: 0.0, through_ohm: to_ground_ohm }; COLUMNS];
-        let rows = self.row_ties(active, reference_v(), Tie::Floating);
+        let rows = self.row_ties(active, reference_v(), None);
         let potentials = potentials_v(&self.conductance_s, &rows, &columns);
         std::array::from_fn(|k| potentials[ROWS + k] * reference_ohm / to_ground_ohm)
     }
@@ -101,11 +125,9 @@ impl Analogue {
     /// Without switch and lead resistance, held wires do not disturb each other. A scene without
     /// cross-talk therefore needs no separate case.
     fn zero_potential_v(&self, active: Option<usize>) -> [f64; COLUMNS] {
-        let drive_v = f64::from(ZERO_POTENTIAL.drive_v);
+        let drive_v = self.parts.drive_v;
         let rest_v = drive_v; // the active row is pulled to ground
-        let feedback_ohm = f64::from(ZERO_POTENTIAL.feedback_ohm[0]);
-        let idle = Tie::Held { volt: rest_v, through_ohm: self.row_source_ohm };
-        let rows = self.row_ties(active, rest_v - drive_v, idle);
+        let rows = self.row_ties(active, rest_v - drive_v, Some(rest_v));
         let columns = self
             .offset_v
             .map(|offset| Tie::Held { volt: rest_v + offset, through_ohm: self.line_ohm });
@@ -115,7 +137,7 @@ impl Analogue {
                 (potentials[ROWS + k] - potentials[m]) * self.conductance_s[m * COLUMNS + k]
             };
             let current_a: f64 = (0..ROWS).map(current).sum();
-            rest_v + self.offset_v[k] + feedback_ohm * current_a
+            rest_v + self.offset_v[k] + self.parts.feedback_ohm[k] * current_a
         })
     }
 }

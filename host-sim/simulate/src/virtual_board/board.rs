@@ -9,7 +9,7 @@ use model_core::RowWire;
 use taxel_data::BadValue;
 use taxel_data::random::{Purpose, Random, Stream};
 
-use super::analogue::{Analogue, reference_v};
+use super::analogue::{Analogue, Parts, reference_v};
 use super::converters::{ColumnSelector, mcp3208_answer, mcp3208_column};
 use super::pin::Pin;
 use super::rows::RowSelector;
@@ -146,6 +146,11 @@ impl VirtualBoard {
         board.before_v = board.analogue.outputs_v(board.rows.active());
         board.frame += 1;
         board.noise = noise_of_frame(board.seed, board.frame);
+    }
+
+    /// Replaces the parts of the zero-potential circuit, which are typical and alike otherwise.
+    pub fn set_parts(&self, parts: Parts) {
+        self.board.borrow_mut().analogue.set_parts(parts);
     }
 
     /// Scan settings of the readout, with its own wait or the one that its time constant needs.

@@ -1,0 +1,207 @@
+//! Settings that are kept over restarts, as bytes.
+//!
+//! The first byte is the version of what follows; content of another version is not believed.
+//!
+//! - Configuration: postcard fields, as in the link.
+//! - Constants: number of rows and of columns; reference and drive voltage; then source by row, feedback by column
+//!   and series resistance by column.
+//! - Baseline: number of rows and of columns, number of frames (u16), CRC-32 of the constants that it was read with,
+//!   readings.
+//!
+//! Numbers are little-endian; voltages and resistances are f32.
+
+use model_core::Wires;
+use model_core::blob::Floats;
+use model_core::checksum::CRC_32;
+
+use super::Core;
+use crate::circuit::Constants;
+use crate::link::message::{Configuration, KeepFault, Kept, KeptBaseline, Refusal, Setting};
+use crate::log::{info, warning};
+use crate::platform::Platform;
+use crate::readout::FrameSource;
+use crate::settings::{KeepError, Keeper};
+
+/// Version of what is kept. Whoever changes the fields of a setting must raise it.
+const VERSION: u8 = 1;
+
+/// Most writes between two restarts: flash wears, and a host may be in an endless loop.
+pub const MOST_WRITES: u16 = 100;
+
+/// Largest size of a configuration in bytes.
+const CONFIGURATION_BYTES: usize = 64;
+
+impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
+    /// Puts the configuration and the constants that are kept in force.
+    pub(super) fn load_settings(&mut self) {
+        let (keeper, buffer) = self.line.settings();
+        if let Some(configuration) =
+            keeper.read(Setting::Configuration, buffer).and_then(configuration)
+        {
+            self.configuration = configuration;
+            info!("configuration as kept: a frame every {=u32} us", configuration.frame_period_us);
+        }
+        let (keeper, buffer) = self.line.settings();
+        let kept = keeper.read(Setting::Constants, buffer).and_then(constants);
+        if let Some(constants) = kept {
+            if self.source.set_constants(constants).is_ok() {
+                info!("constants as kept: drive voltage {=f32} V", constants.drive_v);
+            } else {
+                warning!("the constants that are kept do not fit this image");
+            }
+        }
+    }
+
+    /// Puts the baseline that is kept in force, if it is of the wires that are scanned, and was read with the
+    /// constants in force.
+    pub(super) fn load_baseline(&mut self) {
+        let constants_crc = self.constants_crc();
+        let (keeper, buffer) = self.line.settings();
+        let kept = keeper.read(Setting::Baseline, buffer).and_then(baseline);
+        match kept {
+            Some(kept) if kept.wires == self.wires && kept.constants_crc == constants_crc => {
+                self.baseline.restore(kept.readings, kept.frames);
+                info!("baseline as kept: {=u16} frames", kept.frames);
+            }
+            Some(_) => warning!("the baseline that is kept is of other wires or constants"),
+            None => {}
+        }
+    }
+
+    /// The settings that are kept.
+    pub(super) fn kept(&mut self) -> Kept {
+        let writes_left = self.writes_left;
+        let (keeper, buffer) = self.line.settings();
+        let configuration = keeper.read(Setting::Configuration, buffer).and_then(configuration);
+        let constants = keeper.read(Setting::Constants, buffer).and_then(constants).is_some();
+        let baseline = keeper.read(Setting::Baseline, buffer).and_then(baseline);
+        let baseline = baseline.map(|kept| KeptBaseline {
+            rows: kept.wires.rows as u8,
+            columns: kept.wires.columns as u8,
+            frames: kept.frames,
+        });
+        Kept { configuration, constants, baseline, writes_left }
+    }
+
+    /// Keeps a setting that is in force.
+    pub(super) fn keep(&mut self, setting: Setting) -> Result<(), Refusal> {
+        const NOTHING: Refusal = Refusal::Keep(KeepFault::Nothing);
+        if self.writes_left == 0 {
+            return Err(Refusal::Keep(KeepFault::TooOften));
+        }
+        let constants_crc = self.constants_crc();
+        let (keeper, buffer) = self.line.settings();
+        let written = match setting {
+            Setting::Configuration => {
+                let mut bytes = [0; CONFIGURATION_BYTES];
+                let fields = postcard::to_slice(&self.configuration, &mut bytes);
+                let fields = fields.map_err(|_| Refusal::Keep(KeepFault::TooLarge))?;
+                keeper.keep(setting, &[&[VERSION], fields], buffer)
+            }
+            Setting::Constants => {
+                let Some(c) = self.source.constants() else { return Err(NOTHING) };
+                let (rows, columns) = (c.row_source_ohm.0.len() / 4, c.feedback_ohm.0.len() / 4);
+                let parts: [&[u8]; 6] = [
+                    &[VERSION, rows as u8, columns as u8],
+                    &c.reference_v.to_le_bytes(),
+                    &c.drive_v.to_le_bytes(),
+                    c.row_source_ohm.0,
+                    c.feedback_ohm.0,
+                    c.series_ohm.0,
+                ];
+                keeper.keep(setting, &parts, buffer)
+            }
+            Setting::Baseline => {
+                let frames = self.baseline.frames();
+                if frames == 0 || self.capture.is_some() {
+                    return Err(NOTHING);
+                }
+                let [low, high] = frames.to_le_bytes();
+                let head = [VERSION, self.wires.rows as u8, self.wires.columns as u8, low, high];
+                let readings = Floats::of(self.baseline.mean()).0;
+                keeper.keep(setting, &[&head, &constants_crc.to_le_bytes(), readings], buffer)
+            }
+        };
+        self.count_write(written)
+    }
+
+    /// CRC-32 of the constants in force; 0 if there are none.
+    pub(super) fn constants_crc(&self) -> u32 {
+        let Some(c) = self.source.constants() else { return 0 };
+        let mut digest = CRC_32.digest();
+        let voltages = [c.reference_v.to_le_bytes(), c.drive_v.to_le_bytes()];
+        let resistances = [c.row_source_ohm.0, c.feedback_ohm.0, c.series_ohm.0];
+        digest.update(voltages.as_flattened());
+        resistances.iter().for_each(|bytes| digest.update(bytes));
+        digest.finalize()
+    }
+
+    /// Keeps a setting no longer.
+    pub(super) fn forget(&mut self, setting: Setting) -> Result<(), Refusal> {
+        if self.writes_left == 0 {
+            return Err(Refusal::Keep(KeepFault::TooOften));
+        }
+        let (keeper, buffer) = self.line.settings();
+        let written = keeper.keep(setting, &[], buffer);
+        self.count_write(written)
+    }
+
+    fn count_write(&mut self, written: Result<bool, KeepError>) -> Result<(), Refusal> {
+        if written != Ok(false) {
+            self.writes_left = self.writes_left.saturating_sub(1);
+        }
+        match written {
+            Ok(_) => Ok(()),
+            Err(KeepError::TooLarge) => Err(Refusal::Keep(KeepFault::TooLarge)),
+            Err(KeepError::Failed) => Err(Refusal::Flash),
+        }
+    }
+}
+
+/// What follows the version, if it is ours.
+fn content(bytes: &[u8]) -> Option<&[u8]> {
+    bytes.split_first().filter(|(version, _)| **version == VERSION).map(|(_, content)| content)
+}
+
+fn configuration(bytes: &[u8]) -> Option<Configuration> {
+    match postcard::take_from_bytes::<Configuration>(content(bytes)?) {
+        Ok((configuration, [])) => configuration.check().is_ok().then_some(configuration),
+        _ => None,
+    }
+}
+
+/// Constants of the numbers of rows and columns that they say; each number in its range.
+fn constants(bytes: &[u8]) -> Option<Constants<'_>> {
+    let (&[rows, columns], numbers) = content(bytes)?.split_first_chunk()?;
+    let (reference, numbers) = numbers.split_first_chunk()?;
+    let (drive, numbers) = numbers.split_first_chunk()?;
+    let wires = Wires { rows: rows.into(), columns: columns.into() };
+    let (row_source, numbers) = numbers.split_at_checked(4 * wires.rows)?;
+    let (feedback, series) = numbers.split_at_checked(4 * wires.columns)?;
+    let constants = Constants {
+        reference_v: f32::from_le_bytes(*reference),
+        drive_v: f32::from_le_bytes(*drive),
+        row_source_ohm: Floats(row_source),
+        feedback_ohm: Floats(feedback),
+        series_ohm: Floats(series),
+    };
+    constants.check(wires).is_ok().then_some(constants)
+}
+
+/// A baseline as it is kept.
+struct Baseline<'b> {
+    wires: Wires,
+    frames: u16,
+    constants_crc: u32,
+    readings: Floats<'b>,
+}
+
+fn baseline(bytes: &[u8]) -> Option<Baseline<'_>> {
+    let (&[rows, columns, low, high], rest) = content(bytes)?.split_first_chunk()?;
+    let (constants_crc, readings) = rest.split_first_chunk()?;
+    let wires = Wires { rows: rows.into(), columns: columns.into() };
+    let frames = u16::from_le_bytes([low, high]);
+    let constants_crc = u32::from_le_bytes(*constants_crc);
+    let sound = frames > 0 && readings.len() == 4 * wires.readings();
+    sound.then_some(Baseline { wires, frames, constants_crc, readings: Floats(readings) })
+}

@@ -1,0 +1,200 @@
+//! Settings in two pages of flash.
+//!
+//! The pages are a map of `sequential-storage`: an item is added behind the last one, and the newest one counts.
+//! When a page is full, the newest items move to the other page, and the full one is erased. Every item has a
+//! CRC-32, so power that fails in the middle of any word leaves the old item or the new one. Pages that hold
+//! something else, such as a part of an older program, count as empty.
+//!
+//! `sequential-storage` has functions that can panic: the compiler cannot prove that none of them does. So the link
+//! check leaves this file out, and `tests/settings.rs` shows that whatever the pages hold does no harm.
+
+use core::future::Future;
+use core::pin::pin;
+use core::task::{Context, Poll, Waker};
+
+use embedded_storage_async::nor_flash::{
+    ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
+};
+use sequential_storage::Error;
+use sequential_storage::cache::{Cache, Uncached};
+use sequential_storage::map::{MapConfig, MapStorage, SerializationError, Value};
+
+use super::{KeepError, Keeper};
+use crate::link::message::Setting;
+use crate::store::{FlashError, Slot};
+
+/// Bytes of a page that are used, from its start. The time that moving the items takes grows with their square.
+pub const PAGE_BYTES: usize = 8 * 1024;
+
+/// Number of times that an item is written, each time at another place, until it is given up.
+const ATTEMPTS: usize = 4;
+
+/// Settings in two pages of flash, each of which is erased as a whole.
+///
+/// A page has at least [`PAGE_BYTES`]; if it is shorter, nothing can be kept.
+pub struct SettingPages<S>([S; 2]);
+
+/// The map in its pages.
+type Map<'s, S> = MapStorage<u8, Pages<'s, S>, Cache<Uncached, Uncached, Uncached, u8>>;
+
+impl<S: Slot> SettingPages<S> {
+    /// Makes a keeper of these pages, whatever they hold.
+    pub const fn new(pages: [S; 2]) -> Self {
+        Self(pages)
+    }
+
+    /// The pages, for tests that inspect them.
+    pub fn pages(&mut self) -> &mut [S; 2] {
+        &mut self.0
+    }
+
+    fn map(&mut self) -> Map<'_, S> {
+        let config = const { MapConfig::new(0..2 * PAGE_BYTES as u32) };
+        MapStorage::new(Pages(&mut self.0), config, Cache::new_uncached())
+    }
+
+    fn store(
+        &mut self,
+        setting: Setting,
+        parts: &[&[u8]],
+        buffer: &mut [u8],
+    ) -> Result<(), KeepError> {
+        match at_once(self.map().store_item(buffer, &(setting as u8), &Parts(parts))) {
+            Some(Ok(())) => Ok(()),
+            Some(Err(Error::SerializationError(_) | Error::ItemTooBig | Error::FullStorage)) => {
+                Err(KeepError::TooLarge)
+            }
+            _ => Err(KeepError::Failed),
+        }
+    }
+
+    /// Erases pages that count as free without being blank: something else left them, or an erase that was cut.
+    fn blank_free_pages(&mut self) -> Result<(), KeepError> {
+        for page in &mut self.0 {
+            let bytes = page.bytes().get(..PAGE_BYTES).ok_or(KeepError::Failed)?;
+            let in_use = bytes.first().is_some_and(|mark| mark.count_zeros() >= 4);
+            if !in_use && bytes.iter().any(|byte| *byte != 0xFF) {
+                page.erase().map_err(|FlashError| KeepError::Failed)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<S: Slot> Keeper for SettingPages<S> {
+    fn read<'b>(&mut self, setting: Setting, buffer: &'b mut [u8]) -> Option<&'b [u8]> {
+        let fetched = at_once(self.map().fetch_item::<&[u8]>(buffer, &(setting as u8)));
+        fetched?.ok()?.filter(|bytes| !bytes.is_empty())
+    }
+
+    fn keep(
+        &mut self,
+        setting: Setting,
+        parts: &[&[u8]],
+        buffer: &mut [u8],
+    ) -> Result<bool, KeepError> {
+        let kept = self.read(setting, buffer).unwrap_or_default();
+        if kept.iter().eq(parts.iter().copied().flatten()) {
+            return Ok(false);
+        }
+        self.blank_free_pages()?;
+        let mut stored = Err(KeepError::Failed);
+        for _ in 0..ATTEMPTS {
+            if stored == Err(KeepError::Failed) {
+                stored = self.store(setting, parts, buffer); // behind an item that could not be written
+            }
+        }
+        if stored == Err(KeepError::Failed)
+            && Setting::ALL.iter().all(|setting| self.read(*setting, buffer).is_none())
+        {
+            // Nothing can be lost.
+            at_once(self.map().erase_all()).and_then(Result::ok).ok_or(KeepError::Failed)?;
+            stored = self.store(setting, parts, buffer);
+        }
+        stored.map(|()| true)
+    }
+}
+
+/// The output of `future`, which waits for nothing.
+fn at_once<T>(future: impl Future<Output = T>) -> Option<T> {
+    match pin!(future).poll(&mut Context::from_waker(Waker::noop())) {
+        Poll::Ready(output) => Some(output),
+        Poll::Pending => None,
+    }
+}
+
+/// Parts of a setting, which are kept one after the other.
+struct Parts<'a>(&'a [&'a [u8]]);
+
+impl<'a> Value<'a> for Parts<'a> {
+    fn serialize_into(&self, buffer: &mut [u8]) -> Result<usize, SerializationError> {
+        let mut rest = &mut *buffer;
+        let mut length = 0_usize;
+        for part in self.0 {
+            let (place, behind) = core::mem::take(&mut rest)
+                .split_at_mut_checked(part.len())
+                .ok_or(SerializationError::BufferTooSmall)?;
+            place.copy_from_slice(part);
+            rest = behind;
+            length += part.len();
+        }
+        Ok(length)
+    }
+
+    fn deserialize_from(_: &'a [u8]) -> Result<(Self, usize), SerializationError> {
+        Err(SerializationError::InvalidData) // settings are read as bytes
+    }
+}
+
+/// Two pages, one behind the other, as flash for `sequential-storage`.
+struct Pages<'s, S>(&'s mut [S; 2]);
+
+impl NorFlashError for FlashError {
+    fn kind(&self) -> NorFlashErrorKind {
+        NorFlashErrorKind::Other
+    }
+}
+
+impl<S> ErrorType for Pages<'_, S> {
+    type Error = FlashError;
+}
+
+impl<S: Slot> ReadNorFlash for Pages<'_, S> {
+    const READ_SIZE: usize = 1;
+
+    async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
+        let (page, place) = place(offset);
+        let page = self.0.get(page).ok_or(FlashError)?;
+        let source = page.bytes().get(place..).and_then(|rest| rest.get(..bytes.len()));
+        source.map(|source| bytes.copy_from_slice(source)).ok_or(FlashError)
+    }
+
+    fn capacity(&self) -> usize {
+        2 * PAGE_BYTES
+    }
+}
+
+impl<S: Slot> NorFlash for Pages<'_, S> {
+    const WRITE_SIZE: usize = 4;
+    const ERASE_SIZE: usize = PAGE_BYTES;
+
+    async fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
+        for (page, start) in self.0.iter_mut().zip((0..).step_by(PAGE_BYTES)) {
+            if (from..to).contains(&start) {
+                page.erase()?;
+            }
+        }
+        Ok(())
+    }
+
+    async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
+        let (page, place) = place(offset);
+        self.0.get_mut(page).ok_or(FlashError)?.write(place, bytes)
+    }
+}
+
+/// Number of the page at `offset`, and the place in it.
+fn place(offset: u32) -> (usize, usize) {
+    let offset = offset as usize;
+    (offset / PAGE_BYTES, offset % PAGE_BYTES)
+}

@@ -1,0 +1,395 @@
+//! Settings survive restarts, power cuts at any word, and pages that hold anything.
+
+mod common;
+
+use common::pages::SharedSettings;
+use common::*;
+use firmware::app::Session;
+use firmware::circuit::{Circuit, Constants, ConstantsFault, ZeroPotential};
+use firmware::link::message::{
+    Configuration, KeepFault, Kept, KeptBaseline, Refusal, Report, Request, Setting,
+};
+use firmware::settings::{KeepError, Keeper, PAGE_BYTES};
+use model_core::blob::Floats;
+use rand_core::{Rng, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+/// Bits that a cut leaves as they were: the mark of a page then counts or does not.
+const CUTS: [u32; 3] = [0x0F0F_0F0F, 0xFFFF_FFF0, 0x3F7F_7F3F];
+
+fn kept(report: &Report<'_>) -> Kept {
+    match report {
+        Report::Kept(kept) => *kept,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn refusal(report: &Report<'_>) -> Refusal {
+    match report {
+        Report::Refused(refusal) => *refusal,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Circuit with constants that are all different.
+fn circuit() -> ZeroPotential<ROWS, COLS> {
+    ZeroPotential {
+        sensor_rows: 2,
+        reference_v: 3.25,
+        drive_v: 0.21,
+        row_source_ohm: [0.3, 0.5],
+        feedback_ohm: [550.0, 560.0, 570.0],
+        series_ohm: [0.0, 0.125, 0.25],
+    }
+}
+
+#[test]
+fn every_setting_survives_a_restart_and_can_be_forgotten() {
+    let settings = SharedSettings::default();
+    let configuration = Configuration { contact_threshold: 0.25, ..quiet() };
+    let scanning = Configuration { frame_period_us: 1000, ..configuration };
+    let mut slots = MockSlot::pair_with(&blob(1, 3));
+    {
+        let mut bench = Bench::with_settings(quiet(), &settings);
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        let mut ask =
+            |request: &Request<'_>| ask(&mut session, &bench.board, request, |r| kept(&r)).0;
+        assert_eq!(
+            ask(&Request::Kept),
+            Kept { configuration: None, constants: false, baseline: None, writes_left: 100 }
+        );
+    }
+    {
+        let mut bench = Bench::with_settings(quiet(), &settings);
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        let constants = circuit();
+        let set = Request::SetConstants(constants.constants().unwrap());
+        ask(&mut session, &bench.board, &set, |report| match report {
+            Report::Constants(found) => assert_eq!(Some(found), constants.constants()),
+            other => panic!("{other:?}"),
+        });
+        let capture = [Request::Configure(scanning), Request::CaptureBaseline { frames: 3 }];
+        for (number, request) in (1..).zip(&capture) {
+            bench.board.0.borrow_mut().to_device.extend(request_bytes(number, request));
+        }
+        for _ in 0..10_000 {
+            session.step();
+        }
+        let mut ask =
+            |request: &Request<'_>| ask(&mut session, &bench.board, request, |r| kept(&r)).0;
+        for setting in Setting::ALL {
+            ask(&Request::Keep(setting));
+        }
+        let baseline = Some(KeptBaseline { rows: 2, columns: 3, frames: 3 });
+        let all =
+            Kept { configuration: Some(scanning), constants: true, baseline, writes_left: 97 };
+        assert_eq!(ask(&Request::Kept), all);
+        // What is kept already is not written again.
+        let written = settings.words_written();
+        for setting in Setting::ALL {
+            assert_eq!(ask(&Request::Keep(setting)), all);
+        }
+        assert_eq!(settings.words_written(), written);
+    }
+    {
+        let mut bench = Bench::with_settings(quiet(), &settings);
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        ask(&mut session, &bench.board, &Request::Configuration, |report| match report {
+            Report::Configuration(found) => assert_eq!(found, scanning),
+            other => panic!("{other:?}"),
+        });
+        ask(&mut session, &bench.board, &Request::Constants, |report| match report {
+            Report::Constants(found) => assert_eq!(Some(found), circuit().constants()),
+            other => panic!("{other:?}"),
+        });
+        // The baseline is in force: a frame that differs from it is a contact.
+        let decode = |session: &mut TestSession<'_>, ohm: f32| {
+            let mut frame = frame_at_rest();
+            frame[1][2] = ohm;
+            let readings_ohm = Floats::of(frame.as_flattened());
+            let request = Request::Decode { frame: 1, readings_ohm };
+            ask(session, &bench.board, &request, |report| match report {
+                Report::Estimate(estimate) => estimate.flags,
+                other => panic!("{other:?}"),
+            })
+            .0
+        };
+        assert_eq!(decode(&mut session, 65.0) & 16, 0);
+        assert_eq!(decode(&mut session, 40.0) & 16, 16);
+        // With other constants it means nothing, and with the former ones it does again.
+        for (circuit, contact) in [(ZeroPotential::TYPICAL, 0), (circuit(), 16)] {
+            let set = Request::SetConstants(circuit.constants().unwrap());
+            ask(&mut session, &bench.board, &set, |_| ());
+            assert_eq!(decode(&mut session, 40.0) & 16, contact);
+        }
+
+        let mut ask =
+            |request: &Request<'_>| ask(&mut session, &bench.board, request, |r| kept(&r)).0;
+        for setting in Setting::ALL {
+            ask(&Request::Forget(setting));
+        }
+        let none = Kept { configuration: None, constants: false, baseline: None, writes_left: 97 };
+        assert_eq!(ask(&Request::Kept), none);
+    }
+    let mut bench = Bench::with_settings(quiet(), &settings);
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    ask(&mut session, &bench.board, &Request::Constants, |report| match report {
+        Report::Constants(found) => {
+            assert_eq!(Some(found), ZeroPotential::<ROWS, COLS>::TYPICAL.constants());
+        }
+        other => panic!("{other:?}"),
+    });
+    let keep = Request::Keep(Setting::Baseline);
+    let refused = ask(&mut session, &bench.board, &keep, |report| refusal(&report)).0;
+    assert_eq!(refused, Refusal::Keep(KeepFault::Nothing));
+}
+
+#[test]
+fn a_baseline_of_other_wires_is_ignored_until_a_model_of_its_wires_comes() {
+    let mut settings = SharedSettings::default();
+    let readings: Vec<u8> = [60.0_f32; 4].iter().flat_map(|ohm| ohm.to_le_bytes()).collect();
+    let bytes = [&[1, 2, 2, 7, 0, 0, 0, 0, 0][..], &readings].concat();
+    settings.keep_bytes(Setting::Baseline, &bytes).unwrap();
+    let mut slots = MockSlot::pair_with(&blob(1, 3));
+    let mut bench = Bench::with_settings(quiet(), &settings);
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let keep = Request::Keep(Setting::Baseline);
+    let refused = ask(&mut session, &bench.board, &keep, |report| refusal(&report)).0;
+    assert_eq!(refused, Refusal::Keep(KeepFault::Nothing)); // none is in force
+    let (found, _) = ask(&mut session, &bench.board, &Request::Kept, |report| kept(&report));
+    assert_eq!(found.baseline, Some(KeptBaseline { rows: 2, columns: 2, frames: 7 }));
+}
+
+#[test]
+fn what_is_out_of_range_is_refused_and_what_was_in_force_stays() {
+    let mut slots = MockSlot::pair();
+    let mut bench = Bench::new(quiet());
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let good = circuit();
+    let mut set = |circuit: &dyn AnyCircuit| {
+        let request = Request::SetConstants(circuit.all());
+        ask(&mut session, &bench.board, &request, |report| match report {
+            Report::Refused(Refusal::Constants(fault)) => Err(fault),
+            Report::Constants(_) => Ok(()),
+            other => panic!("{other:?}"),
+        })
+        .0
+    };
+    let series_ohm = [0.0, 0.0, -0.1];
+    let bad: [(ZeroPotential<ROWS, COLS>, ConstantsFault); 6] = [
+        (ZeroPotential { reference_v: 0.0, ..good }, ConstantsFault::Reference),
+        (ZeroPotential { drive_v: f32::NAN, ..good }, ConstantsFault::Drive),
+        (ZeroPotential { row_source_ohm: [0.1, -0.1], ..good }, ConstantsFault::RowSource),
+        (ZeroPotential { feedback_ohm: [1.0, 0.0, 1.0], ..good }, ConstantsFault::Feedback),
+        (ZeroPotential { feedback_ohm: [f32::INFINITY; 3], ..good }, ConstantsFault::Feedback),
+        (ZeroPotential { series_ohm, ..good }, ConstantsFault::Series),
+    ];
+    assert_eq!(set(&good), Ok(()));
+    for (circuit, fault) in &bad {
+        assert_eq!(set(circuit), Err(*fault));
+    }
+    assert_eq!(set(&ZeroPotential::<2, 2>::TYPICAL), Err(ConstantsFault::Length));
+    assert_eq!(set(&ZeroPotential::<3, 3>::TYPICAL), Err(ConstantsFault::Length));
+    ask(&mut session, &bench.board, &Request::Constants, |report| match report {
+        Report::Constants(found) => assert_eq!(Some(found), good.constants()),
+        other => panic!("{other:?}"),
+    });
+}
+
+/// A circuit of any size.
+trait AnyCircuit {
+    fn all(&self) -> Constants<'_>;
+}
+
+impl<C: Circuit> AnyCircuit for C {
+    fn all(&self) -> Constants<'_> {
+        self.constants().unwrap()
+    }
+}
+
+#[test]
+fn writes_are_limited_between_restarts() {
+    let settings = SharedSettings::default();
+    let mut slots = MockSlot::pair();
+    for _ in 0..2 {
+        let mut bench = Bench::with_settings(quiet(), &settings);
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        let mut kept_times = 0;
+        let refused = loop {
+            let threshold = 0.001 + kept_times as f32 * 1e-5;
+            let configuration = Configuration { contact_threshold: threshold, ..quiet() };
+            ask(&mut session, &bench.board, &Request::Configure(configuration), |_| ());
+            let keep = Request::Keep(Setting::Configuration);
+            let answer = ask(&mut session, &bench.board, &keep, |report| match report {
+                Report::Kept(kept) => Ok(kept.writes_left),
+                Report::Refused(refusal) => Err(refusal),
+                other => panic!("{other:?}"),
+            });
+            match answer.0 {
+                Ok(left) => {
+                    kept_times += 1;
+                    assert_eq!(u32::from(left), 100 - kept_times);
+                }
+                Err(refusal) => break refusal,
+            }
+        };
+        assert_eq!((refused, kept_times), (Refusal::Keep(KeepFault::TooOften), 100));
+    }
+}
+
+/// Bytes of a setting, different for each `seed`.
+fn bytes_of(setting: Setting, seed: usize) -> Vec<u8> {
+    let length = [40, 187, 585][setting as usize];
+    (0..length).map(|i| ((i * 7 + seed * 13) % 251) as u8).collect()
+}
+
+#[test]
+fn the_power_may_go_in_the_middle_of_any_word_also_while_pages_are_exchanged() {
+    // Enough writes for an exchange of the pages.
+    let mut base = SharedSettings::default();
+    for setting in Setting::ALL {
+        assert_eq!(base.keep_bytes(setting, &bytes_of(setting, 0)), Ok(true));
+    }
+    let (mut cuts, mut exchanges) = (0, 0);
+    let mut newest = [0; 3];
+    for seed in 1..35 {
+        let setting = Setting::ALL[seed % 3];
+        let new = bytes_of(setting, seed);
+        let before = base.bytes();
+        for untouched in CUTS {
+            for operations in 0.. {
+                let mut settings = SharedSettings::holding([&before[0], &before[1]]);
+                settings.cut_power_after(operations, untouched);
+                let kept = settings.keep_bytes(setting, &new);
+                if !settings.power_on() {
+                    assert_eq!(kept, Ok(true));
+                    break;
+                }
+                cuts += 1;
+                for (other, seed) in Setting::ALL.into_iter().zip(newest) {
+                    let found = settings.read_owned(other);
+                    let old = Some(bytes_of(other, seed));
+                    let is_new = other == setting && found.as_ref() == Some(&new);
+                    assert!(
+                        found == old || is_new,
+                        "{other:?} after {operations} words of keeping {setting:?} {seed}: {found:?}"
+                    );
+                }
+                // It can be kept at the next attempt.
+                assert!(settings.keep_bytes(setting, &new).is_ok(), "{operations} words");
+                assert_eq!(settings.read_owned(setting).as_ref(), Some(&new));
+            }
+        }
+        let erases = base.erases();
+        assert_eq!(base.keep_bytes(setting, &new), Ok(true));
+        exchanges += usize::from(base.erases() > erases);
+        newest[setting as usize] = seed;
+    }
+    assert!(exchanges >= 1, "{exchanges}");
+    assert!(cuts > 3 * 2048 * exchanges, "{cuts}"); // at every word of every erase, and more
+    // Wear: the pages were erased once in so many writes.
+    assert!(base.erases() <= 4, "{}", base.erases());
+}
+
+#[test]
+fn pages_that_hold_anything_are_no_harm_and_can_be_used() {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(11);
+    let mut full = SharedSettings::default();
+    for seed in 0..20 {
+        for setting in Setting::ALL {
+            full.keep_bytes(setting, &bytes_of(setting, seed)).unwrap();
+        }
+    }
+    let full = full.bytes();
+    let mut readable = 0;
+    for case in 0..3000 {
+        let mut pages = match case % 3 {
+            // Noise; noise behind the marks of pages; what was kept, with damage.
+            0 | 1 => [0, 1].map(|_| {
+                let mut page = vec![0; PAGE_BYTES];
+                random.fill_bytes(&mut page);
+                page
+            }),
+            _ => full.clone(),
+        };
+        if case % 3 == 1 {
+            for page in &mut pages {
+                let [start, end] = [random.next_u32(), random.next_u32()].map(|r| r % 3 > 0);
+                page[..4].fill(if start { 0 } else { 0xFF });
+                page[PAGE_BYTES - 4..].fill(if end { 0 } else { 0xFF });
+            }
+        }
+        if case % 3 == 2 {
+            for _ in 0..=random.next_u32() % 8 {
+                let place = random.next_u32() as usize % PAGE_BYTES;
+                pages[random.next_u32() as usize % 2][place] ^= 1 << (random.next_u32() % 8);
+            }
+        }
+        let mut settings = SharedSettings::holding([&pages[0], &pages[1]]);
+        for setting in Setting::ALL {
+            if let Some(found) = settings.read_owned(setting) {
+                readable += 1;
+                assert!((0..20).any(|seed| found == bytes_of(setting, seed)), "case {case}");
+            }
+        }
+        for setting in Setting::ALL {
+            let new = bytes_of(setting, 100 + case);
+            let kept = settings.keep_bytes(setting, &new);
+            assert!(kept.is_ok(), "case {case}: {kept:?}");
+            assert_eq!(settings.read_owned(setting), Some(new), "case {case}");
+        }
+    }
+    assert!((2900..=3000).contains(&readable), "{readable}"); // hardly any damage reaches the newest items
+}
+
+#[test]
+fn an_application_starts_with_its_defaults_whatever_the_bytes_of_a_setting_are() {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(12);
+    for case in 0..500 {
+        let mut settings = SharedSettings::default();
+        for setting in Setting::ALL {
+            let mut bytes = vec![0; random.next_u32() as usize % 60];
+            random.fill_bytes(&mut bytes);
+            if let Some(version) = bytes.first_mut().filter(|_| case % 2 == 0) {
+                *version = 1;
+            }
+            settings.keep_bytes(setting, &bytes).unwrap();
+        }
+        let mut slots = MockSlot::pair_with(&blob(1, 3));
+        let mut bench = Bench::with_settings(quiet(), &settings);
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        let (kept, _) = ask(&mut session, &bench.board, &Request::Kept, |report| kept(&report));
+        assert!(!kept.constants && kept.configuration.is_none(), "case {case}: {kept:?}");
+        ask(&mut session, &bench.board, &Request::Constants, |report| match report {
+            Report::Constants(found) => {
+                assert_eq!(Some(found), ZeroPotential::<ROWS, COLS>::TYPICAL.constants());
+            }
+            other => panic!("{other:?}"),
+        });
+    }
+}
+
+#[test]
+fn what_does_not_fit_is_refused_and_nothing_is_lost() {
+    let mut settings = SharedSettings::default();
+    settings.keep_bytes(Setting::Constants, &[7; 100]).unwrap();
+    assert_eq!(settings.keep_bytes(Setting::Baseline, &[1; 2000]), Err(KeepError::TooLarge));
+    assert_eq!(settings.read_owned(Setting::Constants), Some(vec![7; 100]));
+    assert_eq!(settings.erases(), 0);
+}
+
+#[test]
+fn the_settings_of_a_sensor_of_16_rows_and_32_columns_fit_however_often_they_change() {
+    let settings = SharedSettings::default();
+    let mut buffer = [0; 2200];
+    let lengths = [40, 11 + 4 * (16 + 2 * 32), 9 + 4 * 16 * 32];
+    for seed in 0..30_u8 {
+        for (setting, length) in Setting::ALL.into_iter().zip(lengths) {
+            let bytes = vec![seed; length];
+            let mut pages = settings.0.borrow_mut();
+            assert_eq!(pages.keep(setting, &[&bytes], &mut buffer), Ok(true), "{seed}");
+            assert_eq!(pages.read(setting, &mut buffer), Some(&bytes[..]), "{seed}");
+        }
+    }
+    assert!(settings.erases() > 4);
+}

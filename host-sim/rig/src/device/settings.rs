@@ -1,0 +1,72 @@
+//! Constants of a device's circuit, and settings that it keeps over restarts.
+
+use std::time::Duration;
+
+use firmware::link::message::{Kept, Report, Request, Setting};
+
+use super::{Device, Wire};
+use crate::calibration::CircuitConstants;
+use crate::error::{Error, Result};
+
+/// Longest time that writing a setting takes: pages of flash may have to be erased.
+const WRITING: Duration = Duration::from_secs(5);
+
+impl<W: Wire> Device<W> {
+    /// Asks for the active constants of the circuit.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] if there are none, or the errors of [`ask`](Self::ask).
+    pub fn constants(&mut self) -> Result<CircuitConstants> {
+        self.ask_plainly(&Request::Constants, constants)
+    }
+
+    /// Activates `constants` until the next restart.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] if the device refuses them, or the errors of [`ask`](Self::ask).
+    pub fn set_constants(&mut self, new: &CircuitConstants) -> Result<()> {
+        self.ask_plainly(&Request::SetConstants(new.for_link()), constants).map(|_| ())
+    }
+
+    /// Asks which settings are kept over restarts.
+    ///
+    /// # Errors
+    /// Errors of [`ask`](Self::ask), such as [`Error::NoAnswer`].
+    pub fn kept(&mut self) -> Result<Kept> {
+        self.ask_plainly(&Request::Kept, kept)
+    }
+
+    /// Keeps an active setting over restarts.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] if the device cannot keep it, or the errors of [`ask`](Self::ask).
+    pub fn keep(&mut self, setting: Setting) -> Result<Kept> {
+        self.write(&Request::Keep(setting))
+    }
+
+    /// Lets the device forget a setting: the next restart activates the image's.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] if the device cannot forget it, or the errors of [`ask`](Self::ask).
+    pub fn forget(&mut self, setting: Setting) -> Result<Kept> {
+        self.write(&Request::Forget(setting))
+    }
+
+    fn write(&mut self, request: &Request<'_>) -> Result<Kept> {
+        self.ask(request, self.patience.max(WRITING), kept)?.map_err(Error::Refused)
+    }
+}
+
+fn kept(report: &Report<'_>) -> Option<Kept> {
+    match report {
+        Report::Kept(kept) => Some(*kept),
+        _ => None,
+    }
+}
+
+fn constants(report: &Report<'_>) -> Option<CircuitConstants> {
+    match report {
+        Report::Constants(constants) => Some(constants.into()),
+        _ => None,
+    }
+}

@@ -1,0 +1,189 @@
+//! Actions `configure` and `settings`: what a device keeps over restarts.
+
+use clap::{Args, ValueEnum, value_parser};
+use firmware::link::message::{Configuration, Kept, Setting};
+use host_sim::Result;
+use serde::Serialize;
+use taxel_rig::calibration::CircuitConstants;
+use taxel_rig::device::{Device, Wire};
+
+use super::super::{Common, print};
+use super::tolerance;
+
+#[derive(Args)]
+#[group(required = true, multiple = true)]
+pub struct ConfigureArguments {
+    /// Time from one scan to the next; 0 never scans.
+    #[arg(long, value_name = "US", value_parser = value_parser!(u32).range(..=1_000_000_000))]
+    period_us: Option<u32>,
+    /// Wait after a row is driven.
+    #[arg(long, value_name = "US", value_parser = value_parser!(u32).range(..=10_000))]
+    settling_us: Option<u32>,
+    /// Samples averaged for a reading.
+    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=256))]
+    oversampling: Option<u16>,
+    /// Reports that are sent of each scan.
+    #[arg(long, value_enum, value_name = "WHAT")]
+    send: Option<Send>,
+    /// Reading below which a short circuit is assumed.
+    #[arg(long, value_name = "OHM")]
+    shorted_below_ohm: Option<f32>,
+    /// Reading above which a broken wire is assumed.
+    #[arg(long, value_name = "OHM")]
+    open_above_ohm: Option<f32>,
+    /// Relative change against the baseline that counts as contact.
+    #[arg(long, value_name = "SHARE")]
+    contact_threshold: Option<f32>,
+    /// Relative change within which a row counts as untouched and is not decoded; 0 decodes all rows.
+    #[arg(long, value_name = "SHARE", value_parser = tolerance, allow_negative_numbers = true)]
+    rest_tolerance: Option<f32>,
+}
+
+/// Reports of each scan.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Send {
+    Readings,
+    Estimates,
+    Both,
+    Nothing,
+}
+
+impl ConfigureArguments {
+    /// This configuration with the fields that are given.
+    fn changed(&self, mut c: Configuration) -> Configuration {
+        c.frame_period_us = self.period_us.unwrap_or(c.frame_period_us);
+        c.scan.settling_us = self.settling_us.unwrap_or(c.scan.settling_us);
+        c.scan.oversampling = self.oversampling.unwrap_or(c.scan.oversampling);
+        if let Some(send) = self.send {
+            c.send_readings = matches!(send, Send::Readings | Send::Both);
+            c.send_estimates = matches!(send, Send::Estimates | Send::Both);
+        }
+        c.shorted_below_ohm = self.shorted_below_ohm.unwrap_or(c.shorted_below_ohm);
+        c.open_above_ohm = self.open_above_ohm.unwrap_or(c.open_above_ohm);
+        c.contact_threshold = self.contact_threshold.unwrap_or(c.contact_threshold);
+        c.rest_tolerance = self.rest_tolerance.unwrap_or(c.rest_tolerance);
+        c
+    }
+}
+
+#[derive(Args)]
+pub struct SettingsArguments {
+    /// Setting to be forgotten: the next restart activates the image's.
+    #[arg(long, value_enum, value_name = "SETTING")]
+    forget: Option<Forget>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Forget {
+    Configuration,
+    Constants,
+    Baseline,
+    All,
+}
+
+#[derive(Serialize)]
+struct Settings {
+    configuration: Configuration,
+    /// Active constants of the circuit; none if the device has no such circuit.
+    constants: Option<CircuitConstants>,
+    kept: Kept,
+}
+
+pub fn configure<W: Wire>(
+    device: &mut Device<W>,
+    action: &ConfigureArguments,
+    common: &Common,
+) -> Result<()> {
+    let configuration = action.changed(device.configuration()?);
+    device.configure(configuration)?;
+    device.keep(Setting::Configuration)?;
+    show(device, common)
+}
+
+pub fn settings<W: Wire>(
+    device: &mut Device<W>,
+    action: &SettingsArguments,
+    common: &Common,
+) -> Result<()> {
+    let forget: &[Setting] = match action.forget {
+        None => &[],
+        Some(Forget::Configuration) => &[Setting::Configuration],
+        Some(Forget::Constants) => &[Setting::Constants],
+        Some(Forget::Baseline) => &[Setting::Baseline],
+        Some(Forget::All) => &Setting::ALL,
+    };
+    for setting in forget {
+        device.forget(*setting)?;
+    }
+    show(device, common)
+}
+
+/// Shows what is active, and what is kept.
+fn show<W: Wire>(device: &mut Device<W>, common: &Common) -> Result<()> {
+    let constants = match device.constants() {
+        Err(taxel_rig::Error::Refused(_)) => None,
+        constants => Some(constants?),
+    };
+    let settings =
+        Settings { configuration: device.configuration()?, constants, kept: device.kept()? };
+    if common.json {
+        return print::json(&settings);
+    }
+    let mut page = print::Page::default();
+    let (c, kept) = (&settings.configuration, &settings.kept);
+    let whether = match kept.configuration {
+        Some(kept) if kept == *c => "kept",
+        Some(_) => "another one is kept",
+        None => "none is kept",
+    };
+    page.line(format_args!("{:<17} {whether}", "configuration"));
+    page.line(format_args!(
+        "{:<17} a scan every {} µs, {} µs settling, {} samples a reading",
+        "", c.frame_period_us, c.scan.settling_us, c.scan.oversampling
+    ));
+    let yes = |sent: bool| if sent { "yes" } else { "no" };
+    page.line(format_args!(
+        "{:<17} readings {}, estimates {}",
+        "sent of each scan",
+        yes(c.send_readings),
+        yes(c.send_estimates)
+    ));
+    page.line(format_args!(
+        "{:<17} shorted below {} Ω, open above {} Ω, contact from {}, at rest within {}",
+        "limits", c.shorted_below_ohm, c.open_above_ohm, c.contact_threshold, c.rest_tolerance
+    ));
+    if let Some(constants) = &settings.constants {
+        let whether = if kept.constants { "kept" } else { "none are kept" };
+        page.line(format_args!("{:<17} {whether}", "constants"));
+        constants_lines(&mut page, constants);
+    }
+    match &kept.baseline {
+        Some(b) => page.line(format_args!(
+            "{:<17} kept: mean of {} frames of {} × {} readings",
+            "baseline", b.frames, b.rows, b.columns
+        )),
+        None => page.line(format_args!("{:<17} none is kept", "baseline")),
+    }
+    page.line(format_args!("{:<17} {} until the next restart", "writes left", kept.writes_left));
+    page.print()
+}
+
+/// Adds the circuit's constants.
+pub fn constants_lines(page: &mut print::Page, constants: &CircuitConstants) {
+    page.line(format_args!(
+        "{:<17} drive {:.5} V of {:.4} V",
+        "", constants.drive_v, constants.reference_v
+    ));
+    let lists = [
+        ("row source, Ω", &constants.row_source_ohm, 4),
+        ("feedback, Ω", &constants.feedback_ohm, 2),
+        ("series, Ω", &constants.series_ohm, 3),
+    ];
+    for (name, ohm, digits) in lists {
+        for (i, part) in ohm.chunks(9).enumerate() {
+            let name = if i == 0 { name } else { "" };
+            let numbers: Vec<String> = part.iter().map(|ohm| format!("{ohm:.digits$}")).collect();
+            page.line(format_args!("{name:<17} {}", numbers.join(" ")));
+        }
+    }
+}
