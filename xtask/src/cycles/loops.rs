@@ -29,7 +29,7 @@ impl Loop {
 /// # Errors
 /// Every loop that does not fit the cache, or a function of which no loop was executed.
 pub fn largest(code: &Code, loops: &[Loop]) -> Outcome<String> {
-    let mut lines = String::new();
+    let mut lines = Vec::new();
     let mut wrong = Vec::new();
     for function in FUNCTIONS {
         let range = code.functions().find(|(name, _)| *name == function).map(|(_, range)| range);
@@ -37,7 +37,7 @@ pub fn largest(code: &Code, loops: &[Loop]) -> Outcome<String> {
         let within = loops.iter().filter(|it| range.contains(&it.start));
         match within.map(|it| it.bytes()).max() {
             Some(bytes) if bytes <= CACHE_BYTES => {
-                lines += &format!("largest loop of {function:16} {bytes:5} bytes\n");
+                lines.push(format!("largest loop of {function:16} {bytes:5} bytes\n"));
             }
             Some(bytes) => wrong.push(format!(
                 "a loop of {function} has {bytes} bytes; {CACHE_BYTES} fit the instruction cache"
@@ -45,7 +45,7 @@ pub fn largest(code: &Code, loops: &[Loop]) -> Outcome<String> {
             None => wrong.push(format!("no loop of {function} was executed")),
         }
     }
-    if wrong.is_empty() { Ok(lines) } else { Err(wrong.join("; ")) }
+    if wrong.is_empty() { Ok(lines.concat()) } else { Err(wrong.join("; ")) }
 }
 
 #[cfg(test)]
