@@ -16,6 +16,8 @@ mod code;
 mod cost;
 mod untraced;
 
+mod loops;
+
 mod regions;
 
 mod figures;
@@ -24,6 +26,8 @@ mod trace;
 mod budget;
 mod machine;
 mod table;
+
+mod shapes;
 
 mod accepted;
 
@@ -41,6 +45,7 @@ use crate::toolchain::{Toolchain, elf};
 use accepted::{Accepted, Reference};
 use code::Code;
 use figures::Figure;
+use loops::Loop;
 use models::Blob;
 pub use options::Options;
 
@@ -62,14 +67,20 @@ pub fn run(options: &Options<'_>) -> Outcome {
     let image = elf(IMAGE);
     let code = Code::read(&image)?;
     let directory = target_dir().join("cycles");
+    if options.shapes {
+        let measured = shapes::measure(&image, &code, &directory)?;
+        print!("{}", shapes::markdown(&measured));
+        return shapes::held(&measured);
+    }
     let blobs = match options.model {
         Some(model) => models::of_file(Path::new(model), &directory)?,
         None => models::train(&directory)?,
     };
     // Images are measured on all cores at once, since QEMU runs an image on one.
-    let measured: Vec<Vec<Figure>> =
+    let measured: Vec<(Vec<Figure>, Vec<Loop>)> =
         blobs.par_iter().map(|blob| measure(&image, &code, blob)).collect::<Outcome<_>>()?;
-    let measured = chosen(in_order(measured.concat()), options)?;
+    let (measured, loops): (Vec<_>, Vec<_>) = measured.into_iter().unzip();
+    let (measured, loops) = (chosen(in_order(measured.concat()), options)?, loops.concat());
     if options.json {
         print!("{}", table::json(&measured));
     } else {
@@ -79,6 +90,7 @@ pub fn run(options: &Options<'_>) -> Outcome {
         let alike = blobs.iter().all(|blob| blob.rows_alike);
         return hold_model_to_accepted(&measured, alike, &toolchain.compiler()?, options.json);
     }
+    eprint!("{}", loops::largest(&code, &loops)?);
     let over_budget = budget::exceeded(&measured);
     if !over_budget.is_empty() {
         return Err(over_budget.join("; "));
@@ -89,16 +101,16 @@ pub fn run(options: &Options<'_>) -> Outcome {
     hold_to_accepted(&measured, &toolchain.compiler()?, options)
 }
 
-fn measure(image: &Path, code: &Code, blob: &Blob) -> Outcome<Vec<Figure>> {
+fn measure(image: &Path, code: &Code, blob: &Blob) -> Outcome<(Vec<Figure>, Vec<Loop>)> {
     let path = &blob.path;
     eprintln!("measuring {}", path.display());
-    let figures = machine::run(image, code, path)
-        .and_then(|run| figures::of_run(&run.log, &run.counts, blob.affine))
+    let (figures, loops) = machine::run(image, code, path)
+        .and_then(|run| Ok((figures::of_run(&run.log, &run.counts, blob.affine)?, run.loops)))
         .map_err(|cause| format!("{}: {cause}", path.display()))?;
     if figures.is_empty() {
         return Err(format!("{}: no kernel of the image decodes it", path.display()));
     }
-    Ok(figures)
+    Ok((figures, loops))
 }
 
 /// Sorts figures by kernel, in the order of their first appearance, and then by K.

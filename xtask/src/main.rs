@@ -57,6 +57,7 @@ Usage: cargo xtask COMMAND
                               there, up to 2 % more cycles are allowed
       --json                  prints a list of objects to stdout, and nothing else
       --accept                writes firmware/cycles.csv and the tables of docs/cycles.md instead of comparing
+      --shapes                measures one inference of networks of other shapes instead (12 → 5 and others, K = 64)
       --kernel NAME           shows this kernel only, and compares it with its budget only
       --model FILE            measures with this model, such as the chosen.bin of `host-sim trade`. Compares it
                               with the figures in firmware/cycles.csv for the same format, K and affine tail

@@ -325,9 +325,7 @@ fixed16_first_sums:
     .word fixed16_sums + 1
 
 @ A tail, fewer outputs, or more centres than a batch has. r2 = form
-4:
-    cmp r2, #1
-    bne 4f
+fixed16_affine:
     adr r2, 3f + 1
     vmov s20, r2
     add r0, r0, #18 * 9 * 4
@@ -336,10 +334,15 @@ fixed16_first_sums:
     add r0, r0, #18 * 9 * 4
     ldr r1, [sp, #FX18_CENTRES]
     b 2b
+6:
+    cmp r2, #1 @ AFFINE alone
+    beq fixed16_affine
+    movs r3, #18
+    b 7f
 4:
     lsrs r3, r2, #8
-    it eq
-    moveq r3, #18
+    beq 6b
+7:
     sub r0, r0, #36 * 4
     add r0, r0, r3, lsl #2
     str r0, [sp, #FX18_SCALE]
@@ -385,21 +388,21 @@ fixed16_summed_few:
     vmov lr, s25
     mov sp, lr
     ldm sp, {r1-r5} @ output, space, centres, form, scale
-    lsrs r6, r4, #8
+    lsrs r7, r4, #8
+    mov r4, r5
     it eq
-    moveq r6, #18
+    moveq r7, #18
     cmp r3, #FX_MOST
     bhi 1f
-    mov r4, r5
-    mov r7, r6
     bl fixed16_scale
     vmrs r0, fpscr
     add sp, #20
-    b fixed16_return
+    vpop {s16-s27}
+    pop {r4-r11, pc}
 1:
     sub r1, r3, #FX_MOST
     str r1, [sp, #FX18_CENTRES]
-    mov r3, r6
+    mov r3, r7
     bic r2, r2, #1
     ldmia r2, {r4-r12}
     vmov r0, s27
@@ -408,7 +411,22 @@ fixed16_summed_few:
 @ The first r7 of s0..s17 as numbers, times the scale at r4, to r1. r3 and s18..s22 are overwritten.
 fixed16_scale:
     cmp r7, #18
-    bne 2f
+    beq 2f
+    add r4, r4, r7, lsl #2
+    add r1, r1, r7, lsl #2
+    adr r3, 1f + 1
+    sub r3, r3, r7, lsl #4
+    bx r3
+    .balign 4
+    .irp i, 17,16,15,14,13,12,11,10,9,8,7,6,5,4,3,2,1,0
+    vcvt.f32.s32 s\i, s\i
+    vldmdb r4!, {s22}
+    vmul.f32 s\i, s\i, s22
+    vstmdb r1!, {s\i}
+    .endr
+1:
+    bx lr
+2:
     vcvt.f32.s32 s0, s0
     vcvt.f32.s32 s1, s1
     vcvt.f32.s32 s2, s2
@@ -452,21 +470,6 @@ fixed16_scale:
     vmul.f32 s17, s17, s19
     vstmia r1, {s0-s17}
     bx lr
-2:
-    add r4, r4, r7, lsl #2
-    add r1, r1, r7, lsl #2
-    adr r3, 1f + 1
-    sub r3, r3, r7, lsl #4
-    bx r3
-    .balign 4
-    .irp i, 17,16,15,14,13,12,11,10,9,8,7,6,5,4,3,2,1,0
-    vcvt.f32.s32 s\i, s\i
-    vldmdb r4!, {s22}
-    vmul.f32 s\i, s\i, s22
-    vstmdb r1!, {s\i}
-    .endr
-1:
-    bx lr
 
 @ Behind the sums of the one batch, 18 outputs
 fixed16_summed_18:
@@ -479,7 +482,6 @@ fixed16_summed_18:
     with_eighteen vmul, r5
     vmrs r0, fpscr
     vstmia r1, {s0-s17}
-fixed16_return:
     vpop {s16-s27}
     pop {r4-r11, pc}
 

@@ -98,6 +98,16 @@ impl Code {
         })
     }
 
+    /// Whether the instruction at `address` returns from a function: `bx lr`, or `pop` with the program counter.
+    pub fn returns(&self, address: u32) -> bool {
+        let second = self.halfword(address.wrapping_add(2)).unwrap_or(0);
+        match self.halfword(address) {
+            Some(0x4770 | 0xBD00..=0xBDFF) => true,
+            Some(0xE8BD) => second & 0x8000 != 0,
+            _ => false,
+        }
+    }
+
     fn halfword(&self, address: u32) -> Option<u16> {
         self.segments.iter().find_map(|(start, bytes)| {
             let at = address.checked_sub(*start)? as usize;

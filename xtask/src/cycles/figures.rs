@@ -119,6 +119,20 @@ impl<'f> Group<'f> {
     }
 }
 
+/// Cost of one inference, from a run in which nothing else was measured but what is known.
+///
+/// # Errors
+/// Another number of regions, or one of known cost was counted otherwise.
+pub fn of_inference(counts: &[Region]) -> Outcome<Count> {
+    let [empty, loops, inference] = counts else {
+        return Err(format!("{} regions instead of 3", counts.len()));
+    };
+    if empty.whole != EMPTY || without(loops.whole, EMPTY) != LOOP {
+        return Err(format!("the count is wrong: {empty:?}, {loops:?}"));
+    }
+    Ok(without(inference.whole, EMPTY))
+}
+
 /// Joins the `counts` of a run's regions with the names in its `log`. The run's model has an affine tail if
 /// `affine`; only models without one give figures for [`Scope::Inference`] and [`Scope::Exponential`].
 ///

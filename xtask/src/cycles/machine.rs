@@ -6,6 +6,7 @@ use std::thread;
 use std::time::Duration;
 
 use super::code::Code;
+use super::loops::Loop;
 use super::regions::{Region, Regions};
 use super::trace;
 use super::untraced::{self, Untraced};
@@ -29,6 +30,8 @@ const LIMIT: Duration = Duration::from_mins(5);
 pub struct Run {
     /// Counts of the program's regions, in their order.
     pub counts: Vec<Region>,
+    /// Loops that ran in the regions.
+    pub loops: Vec<Loop>,
     /// Log of the program.
     pub log: String,
 }
@@ -63,17 +66,18 @@ pub fn run(elf: &Path, code: &Code, model: &Path) -> Outcome<Run> {
             let regions = Regions::new(code, begin, end).watching(watched);
             let mut regions = regions.without(untraced);
             let complaints = trace::follow(BufReader::with_capacity(1 << 16, trace), &mut regions)?;
-            Ok::<_, String>((complaints, regions.finish()))
+            let loops = regions.loops();
+            Ok::<_, String>((complaints, regions.finish(), loops))
         });
         let status = wait(&mut child, LIMIT);
         (status, traced.join().unwrap_or_else(|_| Err("the trace's reader stopped".to_owned())))
     });
     let logged = logged.join().map_err(|_| format!("cannot read what {QEMU} writes"))?;
     let log = decode(&table, &logged);
-    let (complaints, counts) = traced?;
+    let (complaints, counts, loops) = traced?;
     eprint!("{complaints}");
     match status?.and_then(|status| status.code()) {
-        Some(0) => Ok(Run { counts: counts?, log }),
+        Some(0) => Ok(Run { counts: counts?, loops, log }),
         Some(_) => Err(format!("the image failed; it logged\n{log}")),
         None => Err(format!(
             "the image did not end by itself within {} s; it logged\n{log}",

@@ -70,6 +70,16 @@ pub fn train(directory: &Path) -> Outcome<Vec<Blob>> {
 pub fn of_file(path: &Path, directory: &Path) -> Outcome<Vec<Blob>> {
     let blob = ModelBlob::read(path).map_err(|cause| cause.to_string())?;
     let model = blob.parse();
+    let shape = model.shape();
+    if (shape.rows, shape.inputs, shape.outputs) != (8, 18, 18) {
+        return Err(format!(
+            "{}: it is for {} rows of {} readings and {} outputs; --model measures 8 rows of 18 and 18",
+            path.display(),
+            shape.rows,
+            shape.inputs,
+            shape.outputs
+        ));
+    }
     let affine = model.networks().any(|network| network.has_affine_tail());
     let rows_alike = rows_alike(&model);
     let given = Blob { path: path.to_owned(), affine, rows_alike };

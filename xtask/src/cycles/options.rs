@@ -7,6 +7,8 @@ pub struct Options<'a> {
     pub json: bool,
     /// Whether to write the accepted figures instead of comparing with them.
     pub accept: bool,
+    /// Whether to measure one inference of some other shapes instead.
+    pub shapes: bool,
     /// Blob to measure with, and to compare with the accepted figures of such models.
     pub model: Option<&'a str>,
     /// The only kernel to show; without a blob, it is compared with its budget only.
@@ -28,6 +30,7 @@ impl<'a> Options<'a> {
             match argument {
                 "--json" => options.json = true,
                 "--accept" => options.accept = true,
+                "--shapes" => options.shapes = true,
                 "--model" => options.model = Some(value("a file")?),
                 "--kernel" => options.kernel = Some(value("a name")?),
                 _ => return Err(format!("unknown option `{argument}`")),
@@ -37,6 +40,10 @@ impl<'a> Options<'a> {
         let part = options.model.map(|_| "--model").or(options.kernel.map(|_| "--kernel"));
         if let (true, Some(part)) = (options.accept, part) {
             return Err(format!("`--accept` needs all figures: leave out `{part}`"));
+        }
+        let alone = Self { shapes: true, ..Self::default() };
+        if options.shapes && options != alone {
+            return Err("`--shapes` goes with no other option".to_owned());
         }
         Ok(options)
     }
@@ -60,6 +67,7 @@ mod tests {
             (&["a.bin"], "`a.bin`"),
             (&["--model"], "`--model`"),
             (&["--accept", "--kernel", "f32"], "`--kernel`"),
+            (&["--shapes", "--json"], "`--shapes`"),
         ] {
             let message = Options::parse(arguments).unwrap_err();
             assert!(message.contains(named), "{message}");

@@ -3,12 +3,13 @@
 //! A region starts where a call of one function returns, and ends where another is called. The count of every
 //! region includes the call at its end, which the caller must subtract.
 
-use std::collections::HashMap;
 use std::collections::hash_map::Entry;
+use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
 use super::code::Code;
 use super::cost::cycles;
+use super::loops::Loop;
 use super::thumb::Instruction;
 use super::untraced::Untraced;
 use crate::process::Outcome;
@@ -60,6 +61,9 @@ pub struct Regions<'c> {
     previous: Option<Instruction>,
     count: Region,
     counted: Vec<Region>,
+    /// Last branch back in this region.
+    last_back: Option<Loop>,
+    loops: HashSet<Loop>,
 }
 
 impl<'c> Regions<'c> {
@@ -77,6 +81,8 @@ impl<'c> Regions<'c> {
             previous: None,
             count: Region::default(),
             counted: Vec::new(),
+            last_back: None,
+            loops: HashSet::new(),
         }
     }
 
@@ -117,6 +123,11 @@ impl<'c> Regions<'c> {
             self.place = Place::Starting;
         }
         Ok(())
+    }
+
+    /// Innermost loops of all regions so far: what was repeated by a branch that is neither a call nor a return.
+    pub fn loops(&self) -> Vec<Loop> {
+        self.loops.iter().copied().collect()
     }
 
     /// Ends counting, and returns the regions' counts in their order.
@@ -181,7 +192,14 @@ impl<'c> Regions<'c> {
             self.count.watched.add(cost);
         }
         self.previous = Some(instruction);
+        if branched && next <= address && !instruction.calls && !self.code.returns(address) {
+            let back = Loop { start: next, end: address.wrapping_add(instruction.bytes) };
+            if self.last_back.replace(back) == Some(back) {
+                self.loops.insert(back);
+            }
+        }
         if next == self.end {
+            self.last_back = None;
             self.counted.push(self.count);
             self.place = Place::Outside;
         }
