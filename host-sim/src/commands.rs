@@ -5,6 +5,7 @@ mod progress;
 mod arguments;
 mod scene_argument;
 mod check_arguments;
+mod interruption;
 
 pub mod run;
 pub mod synth;

@@ -213,6 +213,23 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
     }
 }
 
+impl<const ROWS: usize> Decoder<'_, ROWS> {
+    /// Number of inputs of decoded rows that were clamped, because they lie far beyond the training range: an eighth
+    /// of it or more. Such outputs are guesses; many clamped inputs mean a model of another sensor.
+    ///
+    /// `readings`, `scratch` and `status` are those of the last decoding, unchanged. Behind a [`Projection`] the
+    /// inputs are its features.
+    #[must_use]
+    pub fn count_clamped(&self, readings: &[f32], scratch: &[f32], status: &[RowStatus]) -> usize {
+        let ModelShape { inputs, .. } = self.model.shape();
+        let features = scratch.get(inputs..inputs.saturating_mul(2)).unwrap_or_default();
+        let inputs_of_rows = if self.model.projection().is_some() { features } else { readings };
+        let rows = self.row_sections.iter().zip(inputs_of_rows.chunks_exact(inputs.max(1)));
+        let decoded = rows.zip(status).filter(|(_, status)| **status == RowStatus::Decoded);
+        decoded.map(|((section, inputs), _)| section.count_clamped(inputs)).sum()
+    }
+}
+
 fn check_length<T>(what: &'static str, slice: &[T], expected: usize) -> Result<(), NetworkError> {
     let found = slice.len();
     if found == expected { Ok(()) } else { Err(NetworkError::Length { what, expected, found }) }

@@ -7,6 +7,8 @@ mod virtual_device;
 mod accuracy;
 mod device;
 mod gate;
+#[cfg(unix)]
+mod interruption;
 mod readout;
 mod refusals;
 mod scan;

@@ -20,8 +20,10 @@ pub struct Line {
 }
 
 /// Board whose serial line is `W`, whose reads must not block.
-struct Board<W> {
+struct Board<W, N> {
     wire: W,
+    /// Called with each request's last byte, before the device sees it.
+    notice: N,
     start: Instant,
     line: Line,
     random: Random,
@@ -32,7 +34,7 @@ struct Board<W> {
     gone: bool,
 }
 
-impl<W: Read + Write> Board<W> {
+impl<W: Read + Write, N> Board<W, N> {
     /// Byte as it arrives; `None` if it is lost.
     fn spoil(&mut self, byte: u8) -> Option<u8> {
         let Some(one_in) = self.line.one_in else { return Some(byte) };
@@ -52,7 +54,7 @@ impl<W: Read + Write> Board<W> {
     }
 }
 
-impl<W: Read + Write> Port for Board<W> {
+impl<W: Read + Write, N: FnMut()> Port for Board<W, N> {
     fn now_us(&mut self) -> u32 {
         self.start.elapsed().as_micros() as u32
     }
@@ -77,6 +79,9 @@ impl<W: Read + Write> Port for Board<W> {
         }
         let byte = *self.received.get(self.taken)?;
         self.taken += 1;
+        if byte == 0 {
+            (self.notice)();
+        }
         self.spoil(byte)
     }
 
@@ -91,7 +96,7 @@ impl<W: Read + Write> Port for Board<W> {
     }
 }
 
-impl<W: Read + Write> Platform for Board<W> {
+impl<W: Read + Write, N: FnMut()> Platform for Board<W, N> {
     const BOARD: &'static str = "virtual";
 
     fn feed_watchdog(&mut self) {}
@@ -123,6 +128,8 @@ impl FrameSource for Source {
 struct MemorySlot(Vec<u32>);
 
 impl Slot for MemorySlot {
+    const ERASE_INTERVAL_S: u32 = 0;
+
     fn bytes(&self) -> &[u8] {
         bytemuck::cast_slice(&self.0)
     }
@@ -150,15 +157,40 @@ pub fn run(
     run_with(wire, line, model, Source { frames, next: 0 });
 }
 
-/// Runs a device on `wire` that scans `source`, until the host goes. The device is restarted whenever it
-/// asks for that.
+/// Runs a device on `wire` that scans `source` when the host asks for it: see [`run_on_its_own`].
+pub fn run_with(
+    wire: impl Read + Write + Send + 'static,
+    line: Line,
+    model: &[u8],
+    source: impl FrameSource + Clone + Send + 'static,
+) {
+    let quiet = Configuration { frame_period_us: 0, ..Configuration::DEFAULT };
+    run_on_its_own(wire, line, model, source, quiet, || ());
+}
+
+/// Runs a device on `wire` that goes through `frames` by its `own` configuration, and calls `notice` with each
+/// request's last byte, before it is carried out.
+pub fn run_scanning(
+    wire: impl Read + Write + Send + 'static,
+    model: &[u8],
+    frames: Vec<[[f32; 18]; 8]>,
+    own: Configuration,
+    notice: impl FnMut() + Send + 'static,
+) {
+    run_on_its_own(wire, Line { one_in: None }, model, Source { frames, next: 0 }, own, notice);
+}
+
+/// Runs a device on `wire` that scans `source`, until the host goes. The device is restarted whenever it asks for
+/// that.
 ///
 /// `wire` must read without blocking.
-pub fn run_with(
+fn run_on_its_own(
     mut wire: impl Read + Write + Send + 'static,
     line: Line,
     model: &[u8],
     source: impl FrameSource + Clone + Send + 'static,
+    own: Configuration,
+    mut notice: impl FnMut() + Send + 'static,
 ) {
     let mut slots = [0, 1].map(|_| MemorySlot(vec![u32::MAX; 128 * 1024 / 4]));
     bytemuck::cast_slice_mut(&mut slots[0].0)[..model.len()].copy_from_slice(model);
@@ -168,6 +200,7 @@ pub fn run_with(
         for life in 0.. {
             let board = Board {
                 wire: &mut wire,
+                notice: &mut notice,
                 start: Instant::now(),
                 line,
                 random: Random::new(5, Stream::Test, Purpose::Damage, life, 2),
@@ -176,9 +209,8 @@ pub fn run_with(
                 to_send: Vec::new(),
                 gone: false,
             };
-            let quiet = Configuration { frame_period_us: 0, ..Configuration::DEFAULT };
             let mut buffers = Buffers::<8, 18, 18, { Capacity::PAPER.message_bytes() }>::new();
-            let mut app = App::new(board, source.clone(), quiet, &mut buffers);
+            let mut app = App::new(board, source.clone(), own, &mut buffers);
             app.run(&mut slots, &mut weights);
             app.platform().flush();
             if app.platform().gone {

@@ -11,6 +11,7 @@ use crate::projection::{self, Projection};
 use crate::rbf::{
     Cut, Format, Layout, Network, NetworkError, Packed, Shape, direct, expanded, fixed16,
 };
+use crate::scale::{CLAMP, UNITS};
 
 /// A model, borrowed from a blob whose every byte and value has been checked.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -79,6 +80,23 @@ impl<'a> Model<'a> {
         let prefix = checked_prefix(slot).ok()?;
         Some(u32::from_le_bytes(prefix.length) as usize)
     }
+
+    /// Length in bytes and shape that the blob starting with `head` declares; [`HEAD_BYTES`](Self::HEAD_BYTES) are
+    /// enough.
+    ///
+    /// `None` if `head` is no start of a blob of this version, or too short. Nothing else is checked.
+    #[must_use]
+    pub fn declared(head: &[u8]) -> Option<(usize, ModelShape)> {
+        let length = Self::declared_length(head)?;
+        let fields = take::<(u8, u16, u16)>(head.get(PREFIX_BYTES..)?, "shape");
+        let ((rows, inputs, outputs), _) = fields.ok()?;
+        let shape =
+            ModelShape { rows: rows.into(), inputs: inputs.into(), outputs: outputs.into() };
+        Some((length, shape))
+    }
+
+    /// Number of bytes at a blob's start that declare its length and its shape. Every blob has more.
+    pub const HEAD_BYTES: usize = PREFIX_BYTES + 1 + 3 + 3;
 
     /// The model's number of rows, and of inputs and outputs a row.
     #[must_use]
@@ -316,6 +334,22 @@ impl<'a> NetworkSection<'a> {
     /// The network's format.
     pub fn format(&self) -> Format {
         self.format
+    }
+
+    /// Number of `inputs` that are clamped, because they lie an eighth of the training range or more beyond it.
+    #[inline(never)]
+    pub fn count_clamped(&self, inputs: &[f32]) -> usize {
+        let [low, high] = match self.format {
+            Format::F32Direct => CLAMP,
+            Format::F32 | Format::Fixed16 => [-UNITS, UNITS],
+        };
+        // In every format the block starts with what is subtracted from each input, and then multiplied with it.
+        let Some((offsets, factors)) = self.block.split_at_checked(inputs.len()) else { return 0 };
+        let scaled =
+            inputs.iter().zip(offsets.iter().zip(factors)).map(|(input, (offset, factor))| {
+                (input - f32::from_bits(*offset)) * f32::from_bits(*factor)
+            });
+        scaled.filter(|x| *x < low || *x > high).count()
     }
 
     /// The section's network if its format is `f32-direct`; else an error.
