@@ -149,6 +149,8 @@ struct Kept {
     configuration: Configuration,
     /// Time at which a request was sent last.
     asked: Instant,
+    /// Number of the request that prolongs the lease, until it is answered.
+    waiting: Option<u16>,
 }
 
 /// Host's end of the line to a device.
@@ -230,10 +232,12 @@ impl<W: Wire> Device<W> {
 
     /// Prolongs the lease of the configuration that is kept, if it is time to.
     fn prolong(&mut self) -> Result<()> {
-        if let Some(Kept { configuration, asked }) = self.kept
-            && asked.elapsed() > self.lease / 3
-        {
-            self.send(&self.leased(configuration))?;
+        let Some(kept) = self.kept else { return Ok(()) };
+        // A device that is slow to answer is not sent more and more; but a request may be lost.
+        let patience = if kept.waiting.is_some() { self.lease } else { self.lease / 3 };
+        if kept.asked.elapsed() > patience {
+            let number = self.send(&self.leased(kept.configuration))?;
+            self.kept = Some(Kept { asked: Instant::now(), waiting: Some(number), ..kept });
         }
         Ok(())
     }
@@ -279,6 +283,9 @@ impl<W: Wire> Device<W> {
                 };
                 match report {
                     Ok(report) => {
+                        if let Some(kept) = &mut self.kept {
+                            kept.waiting = kept.waiting.filter(|number| *number != report.number);
+                        }
                         if let Some(answer) = read(report.number, &report.body) {
                             return Ok(Some(answer));
                         }
@@ -388,7 +395,7 @@ impl<W: Wire> Device<W> {
         self.ask_for_configuration(&self.leased(configuration))?;
         // Without scans there is nothing to listen to; and a device whose flash is erased may lose what is sent.
         let scans = configuration.frame_period_us > 0;
-        self.kept = scans.then(|| Kept { configuration, asked: Instant::now() });
+        self.kept = scans.then(|| Kept { configuration, asked: Instant::now(), waiting: None });
         Ok(())
     }
 
