@@ -386,7 +386,7 @@ mod serial_port {
         fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
             match self.0.read(bytes) {
                 // No program has the near end open at the moment.
-                Ok(0) => Err(std::io::ErrorKind::WouldBlock.into()),
+                Ok(0) => Err(std::io::ErrorKind::NotConnected.into()),
                 other => other,
             }
         }

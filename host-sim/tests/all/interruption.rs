@@ -26,7 +26,7 @@ struct Far(TTYPort);
 impl std::io::Read for Far {
     fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
         match self.0.read(bytes) {
-            Ok(0) => Err(std::io::ErrorKind::WouldBlock.into()),
+            Ok(0) => Err(std::io::ErrorKind::NotConnected.into()),
             other => other,
         }
     }
@@ -306,6 +306,7 @@ fn liar(frames: &'static [(u32, u64, usize)]) -> String {
         loop {
             let mut byte = [0];
             if far.read(&mut byte).is_err() {
+                std::thread::sleep(Duration::from_millis(1));
                 continue;
             }
             let Some(Received::Frame(bytes)) = receiver.push(byte[0]) else { continue };

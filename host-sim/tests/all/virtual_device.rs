@@ -1,6 +1,6 @@
 //! The firmware's application in a thread of this process.
-use std::io::{Read, Write};
-use std::time::Instant;
+use std::io::{ErrorKind, Read, Write};
+use std::time::{Duration, Instant};
 
 use firmware::app::{App, Buffers};
 use firmware::capacity::Capacity;
@@ -66,12 +66,19 @@ impl<W: Read + Write, N: FnMut()> Port for Board<W, N> {
             self.taken = 0;
             let count = match self.wire.read(&mut self.received) {
                 Ok(0) => {
+                    // The thread goes on as long as the tests do: it shall not take time from them.
+                    std::thread::sleep(Duration::from_millis(20));
                     self.gone = true;
                     0
                 }
                 Ok(count) => count,
-                Err(_) => {
+                Err(cause) if is_timeout(&cause) => {
                     std::thread::yield_now();
+                    0
+                }
+                // Nobody is there at the moment.
+                Err(_) => {
+                    std::thread::sleep(Duration::from_millis(1));
                     0
                 }
             };
@@ -104,6 +111,10 @@ impl<W: Read + Write, N: FnMut()> Platform for Board<W, N> {
     fn memory(&self) -> Memory {
         Memory { text: 20_000, bss: 3000, stack_high_water: 1000, ..Memory::default() }
     }
+}
+
+fn is_timeout(cause: &std::io::Error) -> bool {
+    matches!(cause.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut)
 }
 
 /// Sensor that goes through given frames again and again.
