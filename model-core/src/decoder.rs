@@ -214,19 +214,19 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
 }
 
 impl<const ROWS: usize> Decoder<'_, ROWS> {
-    /// Number of inputs of decoded rows that were clamped, because they lie far beyond the training range: an eighth
-    /// of it or more. Such outputs are guesses; many clamped inputs mean a model of another sensor.
+    /// Whether an input of a decoded row was clamped, because it lies far beyond the training range: an eighth of it
+    /// or more. Such outputs are guesses; on many frames they mean a model of another sensor.
     ///
     /// `readings`, `scratch` and `status` are those of the last decoding, unchanged. Behind a [`Projection`] the
     /// inputs are its features.
     #[must_use]
-    pub fn count_clamped(&self, readings: &[f32], scratch: &[f32], status: &[RowStatus]) -> usize {
+    pub fn has_clamped(&self, readings: &[f32], scratch: &[f32], status: &[RowStatus]) -> bool {
         let ModelShape { inputs, .. } = self.model.shape();
         let features = scratch.get(inputs..inputs.saturating_mul(2)).unwrap_or_default();
         let inputs_of_rows = if self.model.projection().is_some() { features } else { readings };
         let rows = self.row_sections.iter().zip(inputs_of_rows.chunks_exact(inputs.max(1)));
-        let decoded = rows.zip(status).filter(|(_, status)| **status == RowStatus::Decoded);
-        decoded.map(|((section, inputs), _)| section.count_clamped(inputs)).sum()
+        let mut decoded = rows.zip(status).filter(|(_, status)| **status == RowStatus::Decoded);
+        decoded.any(|((section, inputs), _)| section.clamps(inputs))
     }
 }
 

@@ -213,7 +213,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
     /// Whether a reading of the frame that was just decoded is far beyond the model's training range.
     fn has_clamped(&self, decoder: &Decoder<'_, ROWS>) -> bool {
         let frame = self.frame.get(..self.wires.readings()).unwrap_or_default();
-        decoder.count_clamped(frame, self.scratch, self.estimate.status) > 0
+        decoder.has_clamped(frame, self.scratch, self.estimate.status)
     }
 
     fn count_decoded(&mut self, decode_us: u32, decode_cycles: u32) {

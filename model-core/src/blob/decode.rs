@@ -11,7 +11,7 @@ use crate::projection::{self, Projection};
 use crate::rbf::{
     Cut, Format, Layout, Network, NetworkError, Packed, Shape, direct, expanded, fixed16,
 };
-use crate::scale::{CLAMP, UNITS};
+use crate::scale::{HALF_RANGE, UNITS};
 
 /// A model, borrowed from a blob whose every byte and value has been checked.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -336,20 +336,27 @@ impl<'a> NetworkSection<'a> {
         self.format
     }
 
-    /// Number of `inputs` that are clamped, because they lie an eighth of the training range or more beyond it.
+    /// Whether one of `inputs` is clamped, because it lies an eighth of the training range or more beyond it.
     #[inline(never)]
-    pub fn count_clamped(&self, inputs: &[f32]) -> usize {
-        let [low, high] = match self.format {
-            Format::F32Direct => CLAMP,
-            Format::F32 | Format::Fixed16 => [-UNITS, UNITS],
+    pub fn clamps(&self, inputs: &[f32]) -> bool {
+        // From UNITS on, an exponent carries into the sign; so there is no branch for each input.
+        const EXPONENT: u32 = 0x7F80_0000;
+        const TO_THE_SIGN: u32 = 0x8000_0000 - UNITS.to_bits();
+        // From scaled inputs to units about the middle of the range, where the clamp is at ±UNITS.
+        let (units, offset) = match self.format {
+            Format::F32Direct => (UNITS / HALF_RANGE, -0.5 * UNITS / HALF_RANGE),
+            Format::F32 | Format::Fixed16 => (1.0, 0.0),
         };
         // In every format the block starts with what is subtracted from each input, and then multiplied with it.
-        let Some((offsets, factors)) = self.block.split_at_checked(inputs.len()) else { return 0 };
-        let scaled =
-            inputs.iter().zip(offsets.iter().zip(factors)).map(|(input, (offset, factor))| {
-                (input - f32::from_bits(*offset)) * f32::from_bits(*factor)
-            });
-        scaled.filter(|x| *x < low || *x > high).count()
+        let Some((middles, factors)) = self.block.split_at_checked(inputs.len()) else {
+            return false;
+        };
+        let mut carry = 0;
+        for (input, (middle, factor)) in inputs.iter().zip(middles.iter().zip(factors)) {
+            let scaled = (input - f32::from_bits(*middle)) * f32::from_bits(*factor);
+            carry |= ((scaled * units + offset).to_bits() & EXPONENT) + TO_THE_SIGN;
+        }
+        carry >> 31 == 1
     }
 
     /// The section's network if its format is `f32-direct`; else an error.
