@@ -18,6 +18,7 @@ use crate::store::{Slot, Upload};
 mod buffers;
 mod configuration;
 mod frame_clock;
+mod lease;
 mod line;
 mod model;
 mod kept;
@@ -26,6 +27,7 @@ mod answer;
 
 pub use buffers::Buffers;
 use frame_clock::{FrameClock, LongClock};
+use lease::Lease;
 use line::Line;
 pub use session::{Leave, Session};
 
@@ -39,7 +41,11 @@ pub struct App<'m, P, F, const ROWS: usize> {
 struct Core<'m, P, F, const ROWS: usize> {
     line: Line<'m, P>,
     source: F,
+    /// The configuration in force.
     configuration: Configuration,
+    /// The device's own configuration, which is in force without a lease.
+    own_configuration: Configuration,
+    lease: Lease,
     statistics: Statistics,
     clock: FrameClock,
     time: LongClock,
@@ -65,16 +71,26 @@ struct Core<'m, P, F, const ROWS: usize> {
     baseline: Baseline<'m>,
     /// Whether the last scan gave at least one reading.
     sensor_answers: bool,
-    /// Number of the request that waits for the baseline, and number of frames still to be scanned for it.
-    capture: Option<(u16, u16)>,
+    capture: Option<Capture>,
     upload: Upload,
     /// Number of times that settings may still be written before the next restart.
     writes_left: u16,
 }
 
+/// A baseline that is being captured.
+#[derive(Clone, Copy)]
+struct Capture {
+    /// Number of the request that waits for it.
+    number: u16,
+    /// Number of frames asked for.
+    frames: u16,
+    /// Number of frames still to be scanned.
+    left: u16,
+}
+
 impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
-    /// Makes an application. It starts with the configuration and constants that are kept, else with
-    /// `configuration` and the constants of `source`.
+    /// Makes an application. Its own configuration and constants are those that are kept, else `configuration` and the
+    /// constants of `source`.
     pub fn new<const COLUMNS: usize, const OUTPUTS: usize, const BYTES: usize>(
         mut platform: P,
         source: F,
@@ -89,6 +105,8 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
             line: Line::new(platform, message),
             source,
             configuration,
+            own_configuration: configuration,
+            lease: Lease::NONE,
             statistics: Statistics::default(),
             clock: FrameClock::starting_at(now_us),
             time: LongClock::starting_at(now_us),

@@ -1,7 +1,8 @@
 //! Model slots in flash: one holds the model in force, the other is spare.
 //!
-//! A slot holds a blob at its start and, once the blob has been found sound, a record of 16 bytes at its
-//! end. The record is written last and in one go, so that a slot whose upload was interrupted is not chosen.
+//! A slot holds a blob at its start and, once the blob has been found sound, a record of 16 bytes at its end. The
+//! record's first word is written when an upload begins, and the others last and in one go: a slot whose upload was
+//! interrupted or aborted is not chosen.
 
 use model_core::blob::Model;
 use model_core::checksum::CRC_32;
@@ -19,10 +20,14 @@ pub struct FlashError;
 /// There are two, and the borrow checker keeps them apart: a decoder borrows the slot of its model
 /// while the other is written.
 pub trait Slot {
+    /// Mean time in s between erases that the medium endures for years; 0 if it does not wear. The first
+    /// [`ERASES_AT_ONCE`] erases after the start need not wait.
+    const ERASE_INTERVAL_S: u32 = 600;
+
     /// All bytes of the slot, at an address that is a multiple of four.
     fn bytes(&self) -> &[u8];
 
-    /// Sets every byte to 0xFF. May take seconds.
+    /// Sets every byte to 0xFF, the last word last. May take seconds.
     ///
     /// # Errors
     /// [`FlashError`]: the flash could not be erased.
@@ -59,8 +64,11 @@ pub fn blob_in_slot(slot: &[u8]) -> &[u8] {
 /// Length in bytes of the record at a slot's end.
 pub const RECORD_BYTES: usize = 16;
 
-/// First bytes of a record.
+/// First word of a record. Without the others it tells that an upload has begun.
 const RECORD_MAGIC: [u8; 4] = *b"SLOT";
+
+/// Number of erases after the start that need not wait for each other.
+pub const ERASES_AT_ONCE: u32 = 100;
 
 /// Largest blob that a slot holds, in bytes.
 #[must_use]
@@ -81,7 +89,7 @@ fn record(generation: u32, blob_crc: u32) -> [u8; RECORD_BYTES] {
 
 /// Generation of the model in `slot` number `index`: the larger, the more recent; `None` without a valid model.
 ///
-/// Uploaded models count from 1. Slot 0 may also hold a model without a record, flashed together with the
+/// Uploaded models count from 1. Slot 0 may also hold a model whose record is erased, flashed together with the
 /// firmware: its generation is 0. Slot 1 holds only uploaded models.
 #[must_use]
 pub fn generation(index: usize, slot: &[u8]) -> Option<u32> {
@@ -92,6 +100,6 @@ pub fn generation(index: usize, slot: &[u8]) -> Option<u32> {
     if *found == record(generation, u32::from_le_bytes(*blob_crc)) {
         Some(generation)
     } else {
-        (index == 0).then_some(0)
+        (index == 0 && *found == [0xFF; RECORD_BYTES]).then_some(0)
     }
 }

@@ -9,7 +9,8 @@ use firmware::link::message::{
 };
 use firmware::link::packet;
 use firmware::link::receive::{Received, Receiver};
-use model_core::blob::{Columns, Floats, Metadata, ModelParts, ModelShape, encode_to_vec};
+use model_core::blob::{Columns, Floats, Metadata, Model, ModelParts, ModelShape, encode_to_vec};
+use model_core::checksum::CRC_32;
 use model_core::rbf::Shape;
 use model_core::rbf::direct::{self, Parameters};
 use model_core::{Aligned, AlignedBytes, Decoder};
@@ -190,7 +191,7 @@ fn the_watchdog_is_fed_by_good_loops_only() {
     for _ in 0..2000 {
         session.step();
     }
-    ask(&mut session, &board, &Request::Configure(quiet()), |_| ());
+    ask(&mut session, &board, &configure(quiet()), |_| ());
     let fed = feeds();
     session.step();
     assert_eq!(feeds(), fed + 1);
@@ -230,7 +231,7 @@ fn a_baseline_is_captured_and_contact_is_told_against_it() {
 /// at rest within 2 %.
 fn capture(session: &mut TestSession<'_>, board: &Board, frames: u16) {
     let scanning = Configuration { frame_period_us: 100, ..quiet() };
-    ask(session, board, &Request::Configure(scanning), |_| ());
+    ask(session, board, &configure(scanning), |_| ());
     let request = request_bytes(9, &Request::CaptureBaseline { frames });
     board.0.borrow_mut().to_device.extend(request);
     board.0.borrow_mut().to_host.clear();
@@ -239,7 +240,7 @@ fn capture(session: &mut TestSession<'_>, board: &Board, frames: u16) {
         assert!(board.0.borrow().now_us < 1_000_000, "no answer");
     }
     let gating = Configuration { rest_tolerance: 0.02, ..quiet() };
-    ask(session, board, &Request::Configure(gating), |_| ());
+    ask(session, board, &configure(gating), |_| ());
 }
 
 #[test]
@@ -273,10 +274,10 @@ fn rows_at_rest_answer_as_the_baseline_and_the_others_as_without_a_gate() {
     assert_eq!(statistics(&mut session, &board).rows_at_rest, 2);
 
     // With the gate switched off, or while a new baseline is captured, every row is decoded.
-    ask(&mut session, &board, &Request::Configure(quiet()), |_| ());
+    ask(&mut session, &board, &configure(quiet()), |_| ());
     assert_eq!(decode(&mut session, &board, &touched).2, ungated);
     let scanning = Configuration { frame_period_us: 1_000_000, rest_tolerance: 0.02, ..quiet() };
-    ask(&mut session, &board, &Request::Configure(scanning), |_| ());
+    ask(&mut session, &board, &configure(scanning), |_| ());
     assert_eq!(decode(&mut session, &board, &rest).1, [3, 3]);
     let again = request_bytes(9, &Request::CaptureBaseline { frames: 1000 });
     board.0.borrow_mut().to_device.extend(again);
@@ -329,12 +330,12 @@ fn a_baseline_that_will_not_come_is_refused_and_one_that_comes_is_counted_once()
     say(&mut session, 10, &Request::CaptureBaseline { frames: 1000 });
     say(&mut session, 11, &Request::CaptureBaseline { frames: 1000 });
     assert_eq!(answer(10), [refused.as_str()]);
-    say(&mut session, 12, &Request::Configure(quiet()));
+    say(&mut session, 12, &configure(quiet()));
     assert_eq!(answer(11), [refused.as_str()]);
     say(&mut session, 13, &Request::CaptureBaseline { frames: 1 });
     assert_eq!(answer(13), [refused]);
     // The same request again goes on counting.
-    say(&mut session, 14, &Request::Configure(Configuration { frame_period_us: 100, ..quiet() }));
+    say(&mut session, 14, &configure(Configuration { frame_period_us: 100, ..quiet() }));
     say(&mut session, 15, &Request::CaptureBaseline { frames: 3 });
     say(&mut session, 15, &Request::CaptureBaseline { frames: 3 });
     while answer(15).is_empty() {
@@ -352,24 +353,257 @@ fn configurations_are_checked_and_a_bad_one_changes_nothing() {
     let mut slots = MockSlot::pair_with(&blob(3, 4));
     let mut bench = Bench::new(quiet());
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    let mut configure = |configuration| {
-        ask(&mut session, &bench.board, &Request::Configure(configuration), |report| match report {
-            Report::Configuration(configuration) => Ok(configuration),
+    let mut outcome = |configuration| {
+        ask(&mut session, &bench.board, &configure(configuration), |report| match report {
+            Report::Configuration { configuration, .. } => Ok(configuration),
             Report::Refused(refusal) => Err(refusal),
             other => panic!("{other:?}"),
         })
         .0
     };
     let good = Configuration { frame_period_us: 20_000, send_readings: true, ..quiet() };
-    assert_eq!(configure(good), Ok(good));
+    assert_eq!(outcome(good), Ok(good));
     let bad = Configuration { frame_period_us: 1, ..good };
     let refusal = Refusal::Configuration(ConfigurationField::FramePeriod);
-    assert_eq!(configure(bad), Err(refusal));
+    assert_eq!(outcome(bad), Err(refusal));
     let (in_force, _) = ask(&mut session, &bench.board, &Request::Configuration, |r| match r {
-        Report::Configuration(configuration) => configuration,
+        Report::Configuration { configuration, .. } => configuration,
         other => panic!("{other:?}"),
     });
     assert_eq!(in_force, good);
+}
+
+/// Configuration in force, and what is left of its lease in ms.
+fn in_force(session: &mut TestSession<'_>, board: &Board) -> (Configuration, u32) {
+    ask(session, board, &Request::Configuration, |report| match report {
+        Report::Configuration { configuration, lease_left_ms } => (configuration, lease_left_ms),
+        other => panic!("{other:?}"),
+    })
+    .0
+}
+
+#[test]
+fn a_leased_configuration_ends_with_the_hosts_silence_and_a_lasting_one_does_not() {
+    let own = Configuration { frame_period_us: 10_000, ..quiet() };
+    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut bench = Bench::new(own);
+    let board = bench.board.clone();
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let wait = |session: &mut TestSession<'_>, ms: u32| {
+        board.0.borrow_mut().now_us += 1000 * ms;
+        session.step();
+    };
+    let paused = Request::Configure { configuration: quiet(), lease_ms: 500 };
+    let left = |ms: u32| ms - 5..=ms; // some microseconds pass at each look
+    for _ in 0..2 {
+        ask(&mut session, &board, &paused, |_| ());
+        let scanned = statistics(&mut session, &board).frames_scanned;
+        wait(&mut session, 400);
+        // Who only asks does not prolong the lease; any other request does.
+        let (configuration, left_ms) = in_force(&mut session, &board);
+        assert_eq!(configuration, quiet());
+        assert!(left(101).contains(&left_ms), "{left_ms}");
+        decode(&mut session, &board, &frame_at_rest());
+        wait(&mut session, 400);
+        assert!(left(101).contains(&in_force(&mut session, &board).1));
+        assert_eq!(statistics(&mut session, &board).frames_scanned, scanned);
+        wait(&mut session, 100);
+        assert_eq!(in_force(&mut session, &board), (own, 0));
+        wait(&mut session, 10);
+        assert_eq!(statistics(&mut session, &board).frames_scanned, scanned + 1);
+    }
+    // A host that says goodbye need not be waited for.
+    ask(&mut session, &board, &paused, |_| ());
+    assert_eq!(ask(&mut session, &board, &Request::Resume, |_| ()).1, None);
+    assert_eq!(in_force(&mut session, &board), (own, 0));
+    // A configuration without a lease becomes the device's own.
+    let lasting = Configuration { frame_period_us: 20_000, ..quiet() };
+    ask(&mut session, &board, &configure(lasting), |_| ());
+    ask(&mut session, &board, &paused, |_| ());
+    wait(&mut session, 501);
+    assert_eq!(in_force(&mut session, &board), (lasting, 0));
+    wait(&mut session, 3_600_000);
+    assert_eq!(in_force(&mut session, &board), (lasting, 0));
+}
+
+#[test]
+fn a_request_that_waited_during_a_long_scan_prolongs_a_lease_in_time() {
+    let own = quiet();
+    let slow = Configuration { frame_period_us: 1000, ..quiet() };
+    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut bench = Bench::new(own);
+    let board = bench.board.clone();
+    let source = Source::new(&bench.frame, &board, 700_000);
+    bench.app = TestApp::new(board.clone(), source, own, buffers());
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let leased = Request::Configure { configuration: slow, lease_ms: 500 };
+    ask(&mut session, &board, &leased, |_| ());
+    board.0.borrow_mut().now_us += 1000;
+    for _ in 0..5 {
+        // It arrives at the start of a scan, and waits for the scan's end.
+        session.step();
+        board.0.borrow_mut().to_device.extend(request_bytes(5, &leased));
+    }
+    settle(&mut session, &board);
+    assert_eq!(in_force(&mut session, &board).0, slow);
+    for _ in 0..2 {
+        session.step();
+    }
+    assert_eq!(in_force(&mut session, &board).0, own);
+}
+
+#[test]
+fn a_lease_that_ends_gives_up_the_baseline_and_keeps_time() {
+    let own = Configuration { frame_period_us: 1_000_000, ..quiet() };
+    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut bench = Bench::new(own);
+    let board = bench.board.clone();
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let leased = Request::Configure {
+        configuration: Configuration { frame_period_us: 1000, ..quiet() },
+        lease_ms: 100,
+    };
+    ask(&mut session, &board, &leased, |_| ());
+    let request = request_bytes(9, &Request::CaptureBaseline { frames: 1000 });
+    board.0.borrow_mut().to_device.extend(request);
+    settle(&mut session, &board);
+    while board.0.borrow().now_us < 50_000 {
+        session.step();
+    }
+    // The same lease again changes nothing: frames stay in time, and the baseline goes on.
+    let before = statistics(&mut session, &board).frames_scanned;
+    for _ in 0..20 {
+        ask(&mut session, &board, &leased, |_| ());
+    }
+    let start_us = board.0.borrow().now_us;
+    while board.0.borrow().now_us < start_us + 20_000 {
+        session.step();
+        assert!(!reports(&board.0.borrow().to_host).iter().any(|(number, _)| *number == 9));
+    }
+    let scanned = statistics(&mut session, &board).frames_scanned - before;
+    assert!((20..=22).contains(&scanned), "{scanned}");
+    board.0.borrow_mut().to_host.clear();
+    while board.0.borrow().now_us < start_us + 150_000 {
+        session.step();
+    }
+    let refused = (9, format!("{:?}", Report::Refused(Refusal::Baseline)));
+    assert!(reports(&board.0.borrow().to_host).contains(&refused));
+    assert_eq!(in_force(&mut session, &board), (own, 0));
+}
+
+#[test]
+fn a_baseline_of_another_count_under_the_same_number_starts_anew() {
+    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut bench = Bench::new(Configuration { frame_period_us: 100, ..quiet() });
+    let board = bench.board.clone();
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    for frames in [1000, 3] {
+        let request = request_bytes(9, &Request::CaptureBaseline { frames });
+        board.0.borrow_mut().to_device.extend(request);
+        settle(&mut session, &board);
+    }
+    while board.0.borrow().now_us < 10_000 {
+        session.step();
+    }
+    let answers = reports(&board.0.borrow().to_host);
+    let answers: Vec<_> = answers.iter().filter(|(number, _)| *number == 9).collect();
+    assert_eq!(answers[0].1, format!("{:?}", Report::Refused(Refusal::Baseline)));
+    assert!(answers.len() == 2 && answers[1].1.starts_with("Baseline"), "{answers:?}");
+}
+
+/// Longest time in µs in which the watchdog is not fed, when a byte is taken every `gap_us` and each scan takes
+/// `scan_us`.
+fn longest_unfed_us(gap_us: u32, scan_us: u32) -> u32 {
+    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let scanning = Configuration { frame_period_us: 10_000, send_readings: true, ..quiet() };
+    let mut bench = Bench::new(scanning);
+    let board = bench.board.clone();
+    // A faulty reading, so that all kinds of reports are sent.
+    bench.frame.borrow_mut()[0][0] = f32::NAN;
+    let source = Source::new(&bench.frame, &board, scan_us);
+    bench.app = TestApp::new(board.clone(), source, scanning, buffers());
+    board.0.borrow_mut().gap_us = gap_us;
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let mut longest_us = 0;
+    for _ in 0..30 {
+        let request = request_bytes(5, &Request::Identify);
+        board.0.borrow_mut().to_device.extend(request);
+        let start_us = board.0.borrow().now_us;
+        session.step();
+        longest_us = longest_us.max(board.0.borrow().now_us - start_us);
+    }
+    longest_us
+}
+
+#[test]
+fn however_slowly_bytes_are_taken_the_watchdog_is_fed() {
+    // The fastest watchdog of the board waits 5.4 s; its longest scan, of 256 samples a reading, takes 1.66 s.
+    for gap_us in [0, 1_000, 10_000, 49_000, 1_000_000] {
+        for scan_us in [6_400, 1_660_000] {
+            let unfed_us = longest_unfed_us(gap_us, scan_us);
+            assert!(unfed_us < 2_060_000 + scan_us, "{gap_us} {scan_us}: {unfed_us}");
+        }
+    }
+    assert!(longest_unfed_us(49_000, 6_400) > 2_000_000, "the line is not slow");
+}
+
+#[test]
+fn readings_far_beyond_the_training_range_are_flagged_and_counted() {
+    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut bench = Bench::new(quiet());
+    let board = bench.board.clone();
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    // The training range is 50 to 70 Ω, and an eighth of it more on either side is not clamped.
+    for (reading, clamped) in
+        [(47.6, false), (72.4, false), (47.4, true), (72.6, true), (900.0, true)]
+    {
+        let mut frame = frame_at_rest();
+        frame[1][2] = reading;
+        let (flags, _, _) = decode(&mut session, &board, &frame);
+        assert_eq!(flags & EstimateReport::CLAMPED != 0, clamped, "{reading}");
+    }
+    assert_eq!(statistics(&mut session, &board).frames_clamped, 3);
+    // A row that is not decoded is not clamped.
+    let mut frame = frame_at_rest();
+    (frame[1][2], frame[1][0]) = (900.0, f32::NAN);
+    assert_eq!(decode(&mut session, &board, &frame).0, EstimateReport::FAULTY_READING);
+}
+
+#[test]
+fn the_identity_tells_what_the_model_was_trained_on() {
+    let network = |metadata: Metadata<'static>| {
+        let network = blob_of_one_row(3, 2);
+        let model = Model::decode(&network).unwrap();
+        let networks: Vec<_> = model.networks().collect();
+        let parts =
+            ModelParts { projection: None, networks: &networks, row_network: &[0], metadata };
+        encode_to_vec(&parts).unwrap()
+    };
+    let plain = Metadata::unnamed(ModelShape { rows: 1, inputs: 3, outputs: 2 });
+    let read = |metadata: Metadata<'static>| {
+        let mut slots = MockSlot::pair_with(&network(metadata));
+        let mut bench = Bench::new(quiet());
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        ask(&mut session, &bench.board, &Request::Identify, |report| match report {
+            Report::Identity(identity) => (identity.model_name.to_owned(), identity.model.unwrap()),
+            other => panic!("{other:?}"),
+        })
+        .0
+    };
+    let (name, model) = read(Metadata { name: "press", scene_digest: 7, ..plain });
+    assert_eq!((&name[..], model.scene_digest), ("press", 7));
+    let crc = |text: &str| CRC_32.checksum(text.as_bytes());
+    assert_eq!((model.inputs_crc_32, model.outputs_crc_32), (crc("x\nx\nx\n\n"), crc("y\ny\n")));
+    let (_, other) = read(Metadata { output_units: Columns("N\nN"), ..plain });
+    assert_eq!(other.inputs_crc_32, model.inputs_crc_32);
+    assert_eq!(other.outputs_crc_32, crc("y\nyN\nN"));
+    // A long name is cut between letters.
+    let long = "äöüßäöüßäöüßäöüßäöüßäöüß";
+    let (name, _) = read(Metadata { name: long, ..plain });
+    assert_eq!(name, &long[..40]);
+    let (name, _) =
+        read(Metadata { name: "xäöüßäöüßäöüßäöüßäöüßäöüß", ..plain });
+    assert_eq!(name.len(), 39);
 }
 
 #[test]

@@ -39,6 +39,50 @@ fn report_bytes(number: u16, report: &Report<'_>) -> Vec<u8> {
     bytes
 }
 
+type Example = (&'static str, Vec<u8>);
+
+/// Numbers of the examples: a reading, and a missing one.
+const OHM: [f32; 2] = [60.0, f32::NAN];
+
+fn requests() -> Vec<Example> {
+    let readings_ohm = Floats::of(&OHM);
+    // A blob of 1000 bytes for the paper's sensor, with one network for all rows.
+    let head = *b"TAXL\x01\xe8\x03\0\0\x08\x12\x12\x01\x08\0\0";
+    let configure = |configuration, lease_ms| Request::Configure { configuration, lease_ms };
+    let upload = |step| request_bytes(6, &Request::Upload(step));
+    vec![
+        ("identify", request_bytes(1, &Request::Identify)),
+        ("statistics?", request_bytes(2, &Request::Statistics)),
+        ("configuration?", request_bytes(3, &Request::Configuration)),
+        ("configure", request_bytes(300, &configure(Configuration::DEFAULT, 0))),
+        (
+            "configure: rest tolerance 0.0175, for 10 s",
+            request_bytes(
+                300,
+                &configure(
+                    Configuration { rest_tolerance: 0.0175, ..Configuration::DEFAULT },
+                    10_000,
+                ),
+            ),
+        ),
+        (
+            "capture baseline of 20 frames",
+            request_bytes(4, &Request::CaptureBaseline { frames: 20 }),
+        ),
+        (
+            "decode frame 300: 60 Ω, missing",
+            request_bytes(5, &Request::Decode { frame: 300, readings_ohm }),
+        ),
+        ("begin: 8 × 18 → 18, 1000 bytes", upload(UploadStep::Begin { head: &head })),
+        ("chunk at 512", upload(UploadStep::Chunk { offset: 512, bytes: &[0, 1, 0, 2] })),
+        ("commit", upload(UploadStep::Commit)),
+        ("abort", upload(UploadStep::Abort)),
+        ("restart", request_bytes(7, &Request::Restart)),
+        ("set baseline: 60 Ω, unknown", request_bytes(8, &Request::SetBaseline { readings_ohm })),
+        ("resume", request_bytes(8, &Request::Resume)),
+    ]
+}
+
 fn identity() -> Report<'static> {
     Report::Identity(Identity {
         board: "b",
@@ -55,7 +99,11 @@ fn identity() -> Report<'static> {
             inputs: 12,
             outputs: 5,
             in_ram: true,
+            scene_digest: 300,
+            inputs_crc_32: 0x1234_5678,
+            outputs_crc_32: 2,
         }),
+        model_name: "press",
         slot_bytes: 131_056,
         chunk_bytes: 512,
         memory: Memory { vector_table: 1024, stack_reserved: 300, ..Memory::default() },
@@ -86,11 +134,8 @@ fn about_settings() -> [(&'static str, Vec<u8>); 9] {
     ]
 }
 
-#[test]
-fn messages_give_the_specifications_worked_bytes() {
-    let identity = identity();
-    let floats = [60.0, f32::NAN];
-    let readings_ohm = Floats::of(&floats);
+fn reports() -> Vec<Example> {
+    let readings_ohm = Floats::of(&OHM);
     let estimate = EstimateReport {
         frame: 300,
         start_us: START_US,
@@ -110,42 +155,16 @@ fn messages_give_the_specifications_worked_bytes() {
         frames_scanned: 1,
         rows_at_rest: 8,
         longest_decode_us: 2,
+        slot_erases: 1,
         ..Statistics::default()
     };
-    let upload = |step| request_bytes(6, &Request::Upload(step));
+    let configuration =
+        Report::Configuration { configuration: Configuration::DEFAULT, lease_left_ms: 300 };
     let refused = |refusal| report_bytes(6, &Report::Refused(refusal));
-    let found = [
-        ("identify", request_bytes(1, &Request::Identify)),
-        ("statistics?", request_bytes(2, &Request::Statistics)),
-        ("configuration?", request_bytes(3, &Request::Configuration)),
-        ("configure", request_bytes(300, &Request::Configure(Configuration::DEFAULT))),
-        (
-            "configure: rest tolerance 0.0175",
-            request_bytes(
-                300,
-                &Request::Configure(Configuration {
-                    rest_tolerance: 0.0175,
-                    ..Configuration::DEFAULT
-                }),
-            ),
-        ),
-        (
-            "capture baseline of 20 frames",
-            request_bytes(4, &Request::CaptureBaseline { frames: 20 }),
-        ),
-        (
-            "decode frame 300: 60 Ω, missing",
-            request_bytes(5, &Request::Decode { frame: 300, readings_ohm }),
-        ),
-        ("begin, 1000 bytes", upload(UploadStep::Begin { length: 1000 })),
-        ("chunk at 512", upload(UploadStep::Chunk { offset: 512, bytes: &[0, 1, 0, 2] })),
-        ("commit", upload(UploadStep::Commit)),
-        ("abort", upload(UploadStep::Abort)),
-        ("restart", request_bytes(7, &Request::Restart)),
-        ("set baseline: 60 Ω, unknown", request_bytes(8, &Request::SetBaseline { readings_ohm })),
-        ("identity", report_bytes(1, &identity)),
+    vec![
+        ("identity", report_bytes(1, &identity())),
         ("statistics", report_bytes(2, &Report::Statistics(statistics))),
-        ("configuration", report_bytes(3, &Report::Configuration(Configuration::DEFAULT))),
+        ("configuration", report_bytes(3, &configuration)),
         ("baseline", report_bytes(4, &Report::Baseline { readings_ohm })),
         (
             "readings",
@@ -168,9 +187,14 @@ fn messages_give_the_specifications_worked_bytes() {
         ("refused: too large", refused(Refusal::TooLarge { slot_bytes: 131_056 })),
         ("refused: another shape", refused(Refusal::BadModel(ModelFault::Shape))),
         ("refused: flash", refused(Refusal::Flash)),
-    ];
-    let all = found.into_iter().chain(about_settings());
-    let found: Vec<_> = all.map(|(name, bytes)| (name, hex(&bytes))).collect();
+        ("refused: erased too often", refused(Refusal::TooSoon { wait_us: 600_000_000 })),
+    ]
+}
+
+#[test]
+fn messages_give_the_specifications_worked_bytes() {
+    let found = [requests(), reports(), about_settings().to_vec()].concat();
+    let found: Vec<_> = found.iter().map(|(name, bytes)| (*name, hex(bytes))).collect();
     let table: Vec<_> = found.iter().map(|(name, hex)| format!("| {name} | `{hex}` |")).collect();
     assert!(found == specified(), "docs/link.md should say\n{}", table.join("\n"));
 }
@@ -190,9 +214,11 @@ fn every_refusal_has_the_specified_number() {
         (Refusal::Flash, 9),
         (Refusal::Constants(ConstantsFault::Fixed), 10),
         (Refusal::Keep(KeepFault::Nothing), 11),
+        (Refusal::TooSoon { wait_us: 1 }, 12),
+        (Refusal::LastGeneration, 13),
     ];
     for (refusal, number) in refusals {
-        let mut buffer = [0; 8];
+        let mut buffer = [0; 16];
         assert_eq!(postcard::to_slice(&refusal, &mut buffer).unwrap()[0], number, "{refusal:?}");
     }
 }

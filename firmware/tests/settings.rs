@@ -68,7 +68,10 @@ fn every_setting_survives_a_restart_and_can_be_forgotten() {
             Report::Constants(found) => assert_eq!(Some(found), constants.constants()),
             other => panic!("{other:?}"),
         });
-        let capture = [Request::Configure(scanning), Request::CaptureBaseline { frames: 3 }];
+        let capture = [
+            Request::Configure { configuration: scanning, lease_ms: 0 },
+            Request::CaptureBaseline { frames: 3 },
+        ];
         for (number, request) in (1..).zip(&capture) {
             bench.board.0.borrow_mut().to_device.extend(request_bytes(number, request));
         }
@@ -95,7 +98,7 @@ fn every_setting_survives_a_restart_and_can_be_forgotten() {
         let mut bench = Bench::with_settings(quiet(), &settings);
         let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
         ask(&mut session, &bench.board, &Request::Configuration, |report| match report {
-            Report::Configuration(found) => assert_eq!(found, scanning),
+            Report::Configuration { configuration, .. } => assert_eq!(configuration, scanning),
             other => panic!("{other:?}"),
         });
         ask(&mut session, &bench.board, &Request::Constants, |report| match report {
@@ -218,7 +221,12 @@ fn writes_are_limited_between_restarts() {
         let refused = loop {
             let threshold = 0.001 + kept_times as f32 * 1e-5;
             let configuration = Configuration { contact_threshold: threshold, ..quiet() };
-            ask(&mut session, &bench.board, &Request::Configure(configuration), |_| ());
+            ask(
+                &mut session,
+                &bench.board,
+                &Request::Configure { configuration, lease_ms: 0 },
+                |_| (),
+            );
             let keep = Request::Keep(Setting::Configuration);
             let answer = ask(&mut session, &bench.board, &keep, |report| match report {
                 Report::Kept(kept) => Ok(kept.writes_left),

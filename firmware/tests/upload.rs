@@ -7,6 +7,8 @@ use firmware::app::{Leave, Session};
 use firmware::link::message::{
     Configuration, ModelFault, Refusal, Report, Request, UploadState, UploadStep,
 };
+use firmware::store::{ERASES_AT_ONCE, FlashError, Slot, Upload};
+use model_core::checksum::CRC_32;
 use model_core::rbf::Shape;
 use model_core::rbf::direct::{Network, Parameters};
 
@@ -83,9 +85,12 @@ fn the_watchdog_is_fed_just_before_a_slot_is_erased_even_if_the_sensor_is_silent
     }
     let feeds = || board.0.borrow().feeds;
     let fed = feeds();
-    for (length, more) in [(1 << 20, 0), (100, 1)] {
-        let (outcome, _) = upload(&mut session, &board, &[UploadStep::Begin { length }]);
-        assert_eq!((outcome.is_ok(), feeds() - fed), (more == 1, more), "{length} bytes");
+    let good = blob(4, 3);
+    let mut too_long = good.to_vec();
+    too_long[5..9].copy_from_slice(&(1_u32 << 20).to_le_bytes());
+    for (blob, more) in [(&too_long[..], 0), (&good[..], 1)] {
+        let (outcome, _) = upload(&mut session, &board, &[begin(blob)]);
+        assert_eq!((outcome.is_ok(), feeds() - fed), (more == 1, more));
     }
 }
 
@@ -150,6 +155,231 @@ fn the_power_may_go_in_the_middle_of_any_word() {
     }
 }
 
+/// Slots whose model in force is `old` in slot 1, so that slot 0 is spare: the one that may hold a model flashed with
+/// the firmware.
+fn slots_with_first_spare(old: &[u8]) -> [MockSlot; 2] {
+    let mut slots = MockSlot::pair_with(&blob(9, 1));
+    let mut bench = Bench::new(quiet());
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    upload(&mut session, &bench.board, &upload_steps(old, CHUNK)).0.unwrap();
+    let _ = session;
+    slots
+}
+
+/// CRC-32 of the model that is in force after a restart.
+fn after_restart(slots: &mut [MockSlot; 2]) -> Option<u32> {
+    let mut bench = Bench::new(quiet());
+    let mut session = Session::start(&mut bench.app, slots, &mut []);
+    model_crc(&mut session, &bench.board)
+}
+
+#[test]
+fn an_upload_that_was_not_committed_never_comes_into_force_even_if_the_other_slot_decays() {
+    let (old, new, next) = (blob(1, 3), blob(2, 5), blob(3, 2));
+    let steps = upload_steps(&new, CHUNK);
+    let whole = steps.len() - 1; // all but the commit
+    // The upload ends by an abort, by silence, or by a power cut at any word of what follows: another begin.
+    let ends = [Some(UploadStep::Abort), None, Some(begin(&next))];
+    for end in ends {
+        let mut operations = 0;
+        loop {
+            let mut slots = slots_with_first_spare(&old);
+            {
+                let mut bench = Bench::new(quiet());
+                let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+                upload(&mut session, &bench.board, &steps[..whole]).0.unwrap();
+            }
+            slots[0].cut_power_after(operations);
+            if let Some(end) = end {
+                // A restart in between, so that the begin erases.
+                let mut bench = Bench::new(quiet());
+                let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+                let _ = upload(&mut session, &bench.board, &[end]);
+            }
+            let cut = slots[0].power_on();
+            assert_eq!(after_restart(&mut slots), Some(crc_of(&old)), "{end:?} {operations}");
+            slots[1].decay(20, 4);
+            assert_eq!(after_restart(&mut slots), None, "{end:?} {operations}");
+            if !cut {
+                break;
+            }
+            operations += 1;
+        }
+        let expected = if end == Some(begin(&next)) { MockSlot::BYTES / 4 + 1 } else { 0 };
+        assert_eq!(operations, expected, "words of an erase, and the mark");
+    }
+}
+
+#[test]
+fn wherever_the_power_is_cut_a_decayed_slot_does_not_bring_half_an_upload_into_force() {
+    let (old, new) = (blob(1, 3), blob(2, 5));
+    let mut committed = 0;
+    for operations in 0.. {
+        let mut slots = slots_with_first_spare(&old);
+        slots[0].cut_power_after(operations);
+        {
+            let mut bench = Bench::new(quiet());
+            let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+            let _ = upload(&mut session, &bench.board, &upload_steps(&new, CHUNK));
+        }
+        let cut = slots[0].power_on();
+        slots[1].decay(20, 4);
+        let found = after_restart(&mut slots);
+        committed += usize::from(found == Some(crc_of(&new)));
+        if !cut {
+            break;
+        }
+        assert_eq!(found, None, "cut after {operations} words");
+    }
+    assert_eq!(committed, 1);
+}
+
+#[test]
+fn a_model_flashed_with_the_firmware_is_in_force_until_the_first_upload_begins_in_its_slot() {
+    let (flashed, first) = (blob(1, 3), blob(2, 4));
+    let mut slots = MockSlot::pair_with(&flashed);
+    {
+        let mut bench = Bench::new(quiet());
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        upload(&mut session, &bench.board, &upload_steps(&first, CHUNK)).0.unwrap();
+    }
+    assert_eq!(after_restart(&mut slots), Some(crc_of(&first)));
+    // It stands in for the uploaded model that has decayed.
+    slots[1].decay(20, 4);
+    assert_eq!(after_restart(&mut slots), Some(crc_of(&flashed)));
+}
+
+fn slot_erases(session: &mut TestSession<'_>, board: &Board) -> u32 {
+    let read = |report: Report<'_>| match report {
+        Report::Statistics(statistics) => statistics.slot_erases,
+        other => panic!("{other:?}"),
+    };
+    ask(session, board, &Request::Statistics, read).0
+}
+
+#[test]
+fn what_cannot_come_into_force_costs_no_erase_and_a_repeated_begin_costs_none_more() {
+    let mut slots = MockSlot::pair_with(&blob(1, 3));
+    {
+        let mut bench = Bench::new(quiet());
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        let board = bench.board.clone();
+        let good = blob(2, 4);
+        let mut rows = good.clone();
+        rows[9] = 3;
+        let mut inputs = good.clone();
+        inputs[10] = 4;
+        let mut version = good.clone();
+        version[4] = 9;
+        let fault = |fault| Err(Refusal::BadModel(fault));
+        for (head, refusal) in [
+            (&rows[..], fault(ModelFault::Shape)),
+            (&inputs, fault(ModelFault::Shape)),
+            (&version, fault(ModelFault::NotABlob)),
+            (&good[..11], fault(ModelFault::NotABlob)),
+            (&[], fault(ModelFault::NotABlob)),
+        ] {
+            let head = &head[..head.len().min(16)];
+            let (outcome, _) = upload(&mut session, &board, &[UploadStep::Begin { head }]);
+            assert_eq!(outcome, refusal, "{head:?}");
+        }
+        assert_eq!(slot_erases(&mut session, &board), 0);
+        for _ in 0..1000 {
+            upload(&mut session, &board, &[begin(&good)]).0.unwrap();
+        }
+        assert_eq!(slot_erases(&mut session, &board), 1);
+        // An empty slot takes the model, after an abort as well; one with a chunk must be erased.
+        let steps = upload_steps(&good, CHUNK);
+        upload(&mut session, &board, &[UploadStep::Abort, steps[0], steps[1], steps[0]]).0.unwrap();
+        assert_eq!(slot_erases(&mut session, &board), 2);
+        let (outcome, leave) = upload(&mut session, &board, &steps);
+        assert!(outcome.is_ok() && leave.is_some(), "{outcome:?}");
+        assert_eq!(slot_erases(&mut session, &board), 2);
+    }
+    assert_eq!((slots[0].erases, slots[1].erases), (0, 2));
+}
+
+/// A slot that wears.
+struct Flash(MockSlot);
+
+impl Slot for Flash {
+    fn bytes(&self) -> &[u8] {
+        self.0.bytes()
+    }
+
+    fn erase(&mut self) -> Result<(), FlashError> {
+        self.0.erase()
+    }
+
+    fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), FlashError> {
+        self.0.write(offset, bytes)
+    }
+}
+
+#[test]
+fn erases_are_limited_in_rate_and_the_watchdog_is_fed_before_each() {
+    const INTERVAL_US: u64 = 1_000_000 * Flash::ERASE_INTERVAL_S as u64;
+    let [slot, _] = MockSlot::pair();
+    let mut slot = Flash(slot);
+    let mut upload = Upload::new();
+    let mut fed = 0;
+    let mut begin_and_chunk = |now_us: u64| {
+        upload.begin(&mut slot, 100, now_us, || fed += 1)?;
+        upload.chunk(&mut slot, 0, &[1; 8])
+    };
+    let start_us = 5_000_000;
+    for _ in 0..ERASES_AT_ONCE {
+        begin_and_chunk(start_us).unwrap();
+    }
+    let wait = |wait_us| Err(Refusal::TooSoon { wait_us });
+    assert_eq!(begin_and_chunk(start_us), wait(INTERVAL_US));
+    assert_eq!(begin_and_chunk(start_us + INTERVAL_US - 1), wait(1));
+    assert_eq!(begin_and_chunk(start_us + INTERVAL_US), Ok(()));
+    assert_eq!(begin_and_chunk(start_us + INTERVAL_US), wait(INTERVAL_US));
+    // After a long rest there are as many again, and no more.
+    let late_us = 1000 * INTERVAL_US;
+    for _ in 0..ERASES_AT_ONCE {
+        begin_and_chunk(late_us).unwrap();
+    }
+    assert_eq!(begin_and_chunk(late_us), wait(INTERVAL_US));
+    assert_eq!(fed, 2 * ERASES_AT_ONCE + 1);
+    assert_eq!(slot.0.erases, fed as usize);
+}
+
+#[test]
+fn behind_the_largest_generation_no_model_is_taken() {
+    let old = blob(1, 3);
+    let mut slots = MockSlot::pair_with(&old);
+    let record = [&b"SLOT"[..], &[0xFF; 4], &crc_of(&old).to_le_bytes()].concat();
+    let record = [&record[..], &CRC_32.checksum(&record).to_le_bytes()].concat();
+    slots[0].write(MockSlot::BYTES - 16, &record).unwrap();
+    let mut bench = Bench::new(quiet());
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let (outcome, leave) = upload(&mut session, &bench.board, &upload_steps(&blob(2, 4), CHUNK));
+    assert_eq!((outcome, leave), (Err(Refusal::LastGeneration), None));
+    assert_eq!(slot_erases(&mut session, &bench.board), 0);
+}
+
+#[test]
+fn an_upload_without_requests_ends() {
+    let (old, new) = (blob(1, 3), blob(2, 4));
+    let steps = upload_steps(&new, CHUNK);
+    let mut slots = MockSlot::pair_with(&old);
+    let mut bench = Bench::new(quiet());
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let board = bench.board.clone();
+    upload(&mut session, &board, &steps[..2]).0.unwrap();
+    board.0.borrow_mut().now_us += 9_000_000;
+    // A request that only asks does not keep it.
+    slot_erases(&mut session, &board);
+    upload(&mut session, &board, &steps[2..3]).0.unwrap();
+    board.0.borrow_mut().now_us += 9_000_000;
+    slot_erases(&mut session, &board);
+    board.0.borrow_mut().now_us += 1_000_000;
+    session.step();
+    assert_eq!(upload(&mut session, &board, &steps[3..4]).0, Err(Refusal::NoUpload));
+}
+
 #[test]
 fn damage_of_any_bit_leaves_the_old_model() {
     let (old, new) = (blob(1, 3), blob(2, 4));
@@ -160,7 +390,15 @@ fn damage_of_any_bit_leaves_the_old_model() {
         let mut damaged = new.clone();
         damaged[bit / 8] ^= 1 << (bit % 8);
         let (outcome, leave) = upload(&mut session, &bench.board, &upload_steps(&damaged, CHUNK));
-        assert!(matches!(outcome, Err(Refusal::BadModel(_))), "bit {bit}: {outcome:?}");
+        let is_length = (5..9).contains(&(bit / 8));
+        assert!(
+            match outcome {
+                Err(Refusal::BadModel(_)) => true,
+                Err(Refusal::TooLarge { .. } | Refusal::OutOfPlace { .. }) => is_length,
+                _ => false,
+            },
+            "bit {bit}: {outcome:?}"
+        );
         assert_eq!(leave, None);
     }
     assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&old)));
@@ -187,16 +425,25 @@ fn each_fault_of_a_model_is_named() {
     let mut corrupt = old.clone();
     corrupt[40] ^= 1;
     let truncated = &old[..old.len() - 4];
-    for (blob, fault) in [
-        (&[0xFF; 64][..], ModelFault::NotABlob),
-        (truncated, ModelFault::Length),
-        (&[&old[..], &[0; 4]].concat(), ModelFault::Length),
-        (&corrupt, ModelFault::Corrupt),
-        (&blob_of(wide.unwrap().into()), ModelFault::Shape),
+    let received = |bytes: usize| Refusal::OutOfPlace { received: bytes as u32 };
+    let whole_chunks = old.len() / CHUNK * CHUNK;
+    for (blob, refusal) in [
+        (&[0xFF; 64][..], Refusal::BadModel(ModelFault::NotABlob)),
+        (truncated, received(truncated.len())),
+        (&[&old[..], &[0; 4]].concat(), received(whole_chunks)),
+        (&corrupt, Refusal::BadModel(ModelFault::Corrupt)),
+        (&blob_of(wide.unwrap().into()), Refusal::BadModel(ModelFault::Shape)),
     ] {
         let (outcome, _) = upload(&mut session, &bench.board, &upload_steps(blob, CHUNK));
-        assert_eq!(outcome, Err(Refusal::BadModel(fault)));
+        assert_eq!(outcome, Err(refusal));
     }
+    // A blob that says another length than its upload did.
+    let mut longer = old.clone();
+    longer[5] += 4;
+    let mut steps = upload_steps(&longer, CHUNK);
+    steps[0] = begin(&old);
+    let (outcome, _) = upload(&mut session, &bench.board, &steps);
+    assert_eq!(outcome, Err(Refusal::BadModel(ModelFault::Length)));
     assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&old)));
 }
 
@@ -213,8 +460,9 @@ fn steps_out_of_order_are_refused_and_repeated_ones_are_not() {
     assert_eq!(one(&steps[1]), Err(Refusal::NoUpload));
     assert_eq!(one(&UploadStep::Commit), Err(Refusal::NoUpload));
     let slot_bytes = MockSlot::BYTES as u32 - 16;
-    let too_long = UploadStep::Begin { length: slot_bytes + 1 };
-    assert_eq!(one(&too_long), Err(Refusal::TooLarge { slot_bytes }));
+    let mut too_long = new.clone();
+    too_long[5..9].copy_from_slice(&(slot_bytes + 1).to_le_bytes());
+    assert_eq!(one(&begin(&too_long)), Err(Refusal::TooLarge { slot_bytes }));
 
     assert_eq!(one(&steps[0]), Ok(UploadState::Receiving { received: 0 }));
     assert_eq!(one(&steps[2]), Err(Refusal::OutOfPlace { received: 0 }));

@@ -6,6 +6,7 @@ mod arguments;
 mod scene_argument;
 mod check_arguments;
 mod readings;
+mod interruption;
 
 pub mod run;
 pub mod synth;

@@ -15,7 +15,7 @@ use commands::{
 /// Simulate, train and evaluate resistive tactile sensors; write weight blobs for the device.
 ///
 /// Without a command: `run paper`. Results go to stdout, progress and remarks to stderr. Exit status: 0
-/// done, 1 failed, 2 bad usage or input.
+/// done, 1 failed, 2 bad usage or input, 130 interrupted.
 #[derive(Parser)]
 #[command(version)]
 struct Cli {
@@ -75,7 +75,7 @@ fn report(outcome: Result<()>) -> ExitCode {
     }
 }
 
-/// Exit status of an error: 1 for work that failed, 2 for bad usage or input.
+/// Exit status of an error: 1 for work that failed, 2 for bad usage or input, 130 for Ctrl-C.
 fn exit_status(error: &Error) -> u8 {
     use taxel_learn::Error as Learn;
     use taxel_rig::Error as Rig;
@@ -88,6 +88,7 @@ fn exit_status(error: &Error) -> u8 {
             _ => 1,
         },
         Error::Rig(cause) => match cause {
+            Rig::Interrupted => 130,
             Rig::Port { .. }
             | Rig::NoRoom { .. }
             | Rig::OtherReadout { .. }

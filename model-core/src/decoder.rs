@@ -244,6 +244,37 @@ fn divide(readings: &[f32], reciprocals: &[f32], ratios: &mut [f32]) {
     }
 }
 
+impl<const ROWS: usize> Decoder<'_, ROWS> {
+    /// Whether an input of a decoded row was clamped, because it lies far beyond the training range: an eighth of it
+    /// or more. Such outputs are guesses; on many frames they mean a model of another sensor.
+    ///
+    /// `frame`, `scratch` and `status` are those of the last decoding, unchanged. Behind a [`Projection`] the
+    /// inputs are its features.
+    #[must_use]
+    pub fn has_clamped(&self, frame: Frame<'_>, scratch: &mut [f32], status: &[RowStatus]) -> bool {
+        let ModelShape { inputs, .. } = self.model.shape();
+        let second = inputs..inputs.saturating_mul(2);
+        let more = scratch.get_mut(second).unwrap_or_default();
+        let rows = self.row_sections.iter().zip(status).enumerate();
+        let mut decoded = rows.filter(|(_, (_, status))| **status == RowStatus::Decoded);
+        if self.model.projection().is_some() {
+            return decoded.next().is_some_and(|(_, (section, _))| section.clamps(more));
+        }
+        let relative = self.model.metadata().relative_inputs;
+        decoded.any(|(row, (section, _))| {
+            let start = row.saturating_mul(inputs);
+            let readings = frame.readings_ohm.get(start..).unwrap_or_default();
+            let readings = readings.get(..inputs).unwrap_or_default();
+            if relative {
+                divide(readings, frame.reciprocals.get(start..).unwrap_or_default(), more);
+                section.clamps(more)
+            } else {
+                section.clamps(readings)
+            }
+        })
+    }
+}
+
 fn check_length<T>(what: &'static str, slice: &[T], expected: usize) -> Result<(), NetworkError> {
     let found = slice.len();
     if found == expected { Ok(()) } else { Err(NetworkError::Length { what, expected, found }) }

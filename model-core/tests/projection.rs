@@ -8,7 +8,7 @@ use model_core::gate::Rest;
 use model_core::projection::Projection;
 use model_core::rbf::direct::{self, Parameters};
 use model_core::rbf::{Network, Shape};
-use model_core::{Aligned, Decoder, Frame, Gate, OwnedEstimate, RowStatus};
+use model_core::{Aligned, Decoder, Estimate, Frame, Gate, OwnedEstimate, RowStatus};
 
 /// A projection block: the first feature is the mean of the four readings, the second the difference of the rows.
 const BLOCK: [f32; 10] = [0.0, 10.0, 0.25, 0.25, 0.25, 0.25, 0.25, -0.25, 0.25, -0.25];
@@ -60,6 +60,26 @@ fn the_features_of_a_whole_frame_decide_all_rows() {
     for (outputs, expected) in estimate.outputs.iter().zip(expected) {
         assert!((outputs - expected).abs() < 1e-6, "{outputs:?} {expected}");
     }
+}
+
+#[test]
+fn features_are_clamped_and_not_readings() {
+    let mut buffer = Aligned([0; 1024]);
+    let decoder = Decoder::<2>::load(array(&mut buffer.0)).unwrap();
+    let clamps = |frame: [f32; 4]| {
+        let (mut outputs, mut status) = ([0.0; 2], [RowStatus::MissingReading; 2]);
+        let mut scratch = [f32::MAX; 4];
+        let mut estimate = Estimate { outputs: &mut outputs, status: &mut status };
+        decoder.decode_into(Frame::from(&frame[..]), &mut scratch, &mut estimate).unwrap();
+        decoder.has_clamped(Frame::from(&frame[..]), &mut scratch, &status)
+    };
+    // In training the first feature was 50 to 58, and the second 5 to 15.
+    assert!(!clamps(NEAR_CENTRE));
+    assert!(!clamps([8.0, 100.0, 100.0, 8.0])); // far readings, but a usual mean
+    assert!(clamps([60.0, 60.0, 60.0, 60.0]));
+    assert!(clamps([10.0, 10.0, 90.0, 90.0])); // a usual mean
+    assert!(clamps([10.0, 10.0, 200.0, 200.0]));
+    assert!(!clamps([f32::NAN, 10.0, 90.0, 90.0]));
 }
 
 #[test]

@@ -3,9 +3,9 @@
 use model_core::blob::Floats;
 use model_core::exp::{ExpKernel, Polynomial};
 
-use super::Core;
 use super::model::{self, InForce};
 use super::session::{Leave, Session};
+use super::{Capture, Core};
 use crate::circuit::{Constants, ConstantsFault};
 use crate::link::message::{Configuration, Identity, Refusal, Report, Request, UploadStep};
 use crate::link::packet::{self, PROTOCOL_VERSION, PacketError};
@@ -58,12 +58,21 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             }
         };
         self.statistics.requests = self.statistics.requests.saturating_add(1);
+        if !request.only_asks() {
+            self.lease.hear(self.line.platform().now_us());
+        }
         let mut leave = None;
         let report = match request {
             Request::Identify => Ok(Report::Identity(self.identity(model, spare))),
             Request::Statistics => Ok(Report::Statistics(self.statistics)),
-            Request::Configuration => Ok(Report::Configuration(self.configuration)),
-            Request::Configure(configuration) => self.configure(configuration),
+            Request::Configuration => Ok(self.configuration()),
+            Request::Configure { configuration, lease_ms } => {
+                self.configure(configuration, lease_ms)
+            }
+            Request::Resume => {
+                self.resume();
+                Ok(self.configuration())
+            }
             Request::CaptureBaseline { frames } => match self.capture_baseline(number, frames) {
                 Ok(()) => return None,
                 Err(refusal) => Err(refusal),
@@ -144,7 +153,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         self.count_lost(sent);
     }
 
-    fn identity<S: Slot>(&mut self, model: &InForce<'_, ROWS>, spare: &S) -> Identity<'static> {
+    fn identity<'i, S: Slot>(&mut self, model: &'i InForce<'_, ROWS>, spare: &S) -> Identity<'i> {
         Identity {
             board: P::BOARD,
             firmware: env!("CARGO_PKG_VERSION"),
@@ -153,40 +162,78 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             outputs: self.capacity.outputs as u8,
             kernel: Polynomial::NAME,
             model: model.identity,
+            model_name: model.name(),
             slot_bytes: capacity(spare.bytes()) as u32,
             chunk_bytes: chunk_bytes(self.capacity.message_bytes()) as u16,
             memory: self.line.platform().memory(),
         }
     }
 
-    fn configure(&mut self, configuration: Configuration) -> Result<Report<'static>, Refusal> {
+    fn configuration(&mut self) -> Report<'static> {
+        let lease_left_ms = self.lease.left_ms(self.line.platform().now_us());
+        Report::Configuration { configuration: self.configuration, lease_left_ms }
+    }
+
+    fn configure(
+        &mut self,
+        configuration: Configuration,
+        lease_ms: u32,
+    ) -> Result<Report<'static>, Refusal> {
         configuration.check().map_err(Refusal::Configuration)?;
-        self.configuration = configuration;
-        if configuration.frame_period_us == 0 {
-            self.give_up_capture();
-            self.sensor_answers = true; // it is not scanned any more
+        if lease_ms == 0 {
+            self.own_configuration = configuration;
         }
+        self.lease.set(lease_ms);
+        self.put_in_force(configuration);
+        Ok(self.configuration())
+    }
+
+    /// Ends a lease: puts the device's own configuration in force.
+    fn resume(&mut self) {
+        self.lease.set(0);
+        self.put_in_force(self.own_configuration);
+    }
+
+    /// Ends what a host has begun and not gone on with, when the clock shows `now_us`.
+    pub(super) fn end_leases(&mut self, now_us: u32) {
+        if self.lease.has_ended(now_us) {
+            warning!("the host is silent: back to the own configuration");
+            self.resume();
+        }
+        if self.lease.has_upload_ended(now_us) {
+            self.upload.abort();
+        }
+    }
+
+    /// Scans by `configuration` from now on. Nothing changes if it is in force already.
+    fn put_in_force(&mut self, configuration: Configuration) {
+        if configuration == self.configuration {
+            return;
+        }
+        self.configuration = configuration;
+        self.give_up_capture();
+        self.sensor_answers |= configuration.frame_period_us == 0; // it is not scanned any more
         self.clock.restart(self.line.platform().now_us());
         info!("configured: a frame every {=u32} us", configuration.frame_period_us);
-        Ok(Report::Configuration(configuration))
     }
 
     fn capture_baseline(&mut self, number: u16, frames: u16) -> Result<(), Refusal> {
         if frames == 0 || self.configuration.frame_period_us == 0 {
             return Err(Refusal::Baseline);
         }
-        if self.capture.is_some_and(|(waiting, _)| waiting == number) {
-            return Ok(()); // the host repeats the request, because the answer takes a while
+        let is_repeated = |capture: Capture| (capture.number, capture.frames) == (number, frames);
+        if self.capture.is_some_and(is_repeated) {
+            return Ok(()); // the answer takes a while
         }
         self.give_up_capture();
         self.baseline.restart(self.wires.readings());
-        self.capture = Some((number, frames));
+        self.capture = Some(Capture { number, frames, left: frames });
         Ok(())
     }
 
     /// Refuses the request that waits for a baseline, if there is one: no baseline will come.
     pub(super) fn give_up_capture(&mut self) {
-        if let Some((number, _)) = self.capture.take() {
+        if let Some(Capture { number, .. }) = self.capture.take() {
             self.baseline.restart(self.wires.readings());
             let sent = self.line.send(number, &Report::Refused(Refusal::Baseline));
             self.count_lost(sent);
@@ -243,10 +290,18 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         leave: &mut Option<Leave>,
     ) -> Result<(), Refusal> {
         match step {
-            UploadStep::Begin { length } => {
-                info!("upload of {=u32} bytes begins", length);
-                let platform = self.line.platform();
-                self.upload.begin(spare, length, || platform.feed_watchdog())
+            UploadStep::Begin { head } => {
+                let length = model::check_head(self.capacity, head).map_err(Refusal::BadModel)?;
+                if model.generation() == u32::MAX {
+                    return Err(Refusal::LastGeneration);
+                }
+                info!("upload of {=usize} bytes begins", length);
+                let now_us = self.now_us();
+                let (platform, erases) = (self.line.platform(), &mut self.statistics.slot_erases);
+                self.upload.begin(spare, length, now_us, || {
+                    platform.feed_watchdog();
+                    *erases = erases.saturating_add(1);
+                })
             }
             UploadStep::Chunk { offset, bytes } => self.upload.chunk(spare, offset, bytes),
             UploadStep::Abort => {
@@ -260,8 +315,8 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                 let blob = self.upload.complete(spare)?;
                 match model::check(self.capacity, blob).map(|model| model.crc()) {
                     Ok(crc_32) => {
-                        let before = model.identity.map_or(0, |identity| identity.generation);
-                        self.upload.commit(spare, before.saturating_add(1), crc_32)?;
+                        let generation = model.generation().saturating_add(1);
+                        self.upload.commit(spare, generation, crc_32)?;
                         *leave = Some(Leave::NewModel);
                         Ok(())
                     }

@@ -38,7 +38,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         if let Some(configuration) =
             keeper.read(Setting::Configuration, buffer).and_then(configuration)
         {
-            self.configuration = configuration;
+            (self.configuration, self.own_configuration) = (configuration, configuration);
             info!("configuration as kept: a frame every {=u32} us", configuration.frame_period_us);
         }
         let (keeper, buffer) = self.line.settings();
@@ -93,6 +93,8 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         let (keeper, buffer) = self.line.settings();
         let written = match setting {
             Setting::Configuration => {
+                // What is kept is the device's own: a lease must not end with another one.
+                self.own_configuration = self.configuration;
                 let mut bytes = [0; CONFIGURATION_BYTES];
                 let fields = postcard::to_slice(&self.configuration, &mut bytes);
                 let fields = fields.map_err(|_| Refusal::Keep(KeepFault::TooLarge))?;

@@ -6,8 +6,9 @@ use crate::platform::{Platform, Port};
 
 /// Longest time in µs without progress of a report; then it is given up.
 const STALL_US: u32 = 50_000;
-/// Longest time in µs that a report may take in all: much less than a watchdog's period.
-const REPORT_US: u32 = 2_000_000;
+/// Longest time in µs that all reports of a turn of the loop may take together. With the longest scan it is less
+/// than a watchdog's period.
+const TURN_US: u32 = 2_000_000;
 
 /// The board's serial line, with room for one report.
 pub struct Line<'m, P> {
@@ -15,6 +16,8 @@ pub struct Line<'m, P> {
     buffer: &'m mut [u8],
     /// Whether the last report was given up in the middle, so that its frame must still be ended.
     cut: bool,
+    /// What is left of [`TURN_US`].
+    left_us: u32,
 }
 
 impl<P: Platform> Line<'_, P> {
@@ -26,7 +29,12 @@ impl<P: Platform> Line<'_, P> {
 
 impl<'m, P: Port> Line<'m, P> {
     pub fn new(platform: P, buffer: &'m mut [u8]) -> Self {
-        Self { platform, buffer, cut: false }
+        Self { platform, buffer, cut: false, left_us: TURN_US }
+    }
+
+    /// Begins a turn of the loop.
+    pub fn begin_turn(&mut self) {
+        self.left_us = TURN_US;
     }
 
     pub fn platform(&mut self) -> &mut P {
@@ -38,15 +46,16 @@ impl<'m, P: Port> Line<'m, P> {
     pub fn send(&mut self, number: u16, report: &Report<'_>) -> bool {
         let Some(bytes) = packet::encode(number, report, self.buffer) else { return false };
         let platform = &mut self.platform;
-        let start_us = platform.now_us();
-        let mut send = |byte| send_in_time(platform, byte, start_us);
+        let (start_us, left_us) = (platform.now_us(), self.left_us);
+        let mut send = |byte| send_in_time(platform, byte, start_us, left_us);
         let sent = (!self.cut || send(cobs::END)) && cobs::encode(bytes, send);
         self.cut = !sent;
+        self.left_us = left_us.saturating_sub(self.platform.now_us().wrapping_sub(start_us));
         sent
     }
 }
 
-fn send_in_time<P: Port>(platform: &mut P, byte: u8, report_start_us: u32) -> bool {
+fn send_in_time<P: Port>(platform: &mut P, byte: u8, start_us: u32, left_us: u32) -> bool {
     if platform.send(byte) {
         return true;
     }
@@ -54,7 +63,7 @@ fn send_in_time<P: Port>(platform: &mut P, byte: u8, report_start_us: u32) -> bo
     loop {
         let now_us = platform.now_us();
         if now_us.wrapping_sub(stall_start_us) >= STALL_US
-            || now_us.wrapping_sub(report_start_us) >= REPORT_US
+            || now_us.wrapping_sub(start_us) >= left_us
         {
             return false;
         }

@@ -1,6 +1,7 @@
 //! The model in force: which slot it comes from, and whether the image has room for it.
 
-use model_core::blob::{DecodeError, Model, ModelShape};
+use model_core::blob::{Columns, DecodeError, Model, ModelShape};
+use model_core::checksum::CRC_32;
 use model_core::{Decoder, RowWire};
 
 use crate::capacity::Capacity;
@@ -29,10 +30,49 @@ impl<'a, const ROWS: usize> InForce<'a, ROWS> {
                 inputs: shape.inputs as u16,
                 outputs: shape.outputs as u16,
                 in_ram,
+                scene_digest: decoder.metadata().scene_digest,
+                inputs_crc_32: crc_of(
+                    decoder.metadata().input_names,
+                    decoder.metadata().input_units,
+                ),
+                outputs_crc_32: crc_of(
+                    decoder.metadata().output_names,
+                    decoder.metadata().output_units,
+                ),
             }
         });
         Self { decoder, identity }
     }
+
+    /// Name of the model's scene or data set, cut after [`MOST_NAME_BYTES`].
+    pub fn name(&self) -> &str {
+        let name = self.decoder.as_ref().map_or("", |decoder| decoder.metadata().name);
+        let cut = (0..=MOST_NAME_BYTES.min(name.len())).rev().find_map(|end| name.get(..end));
+        cut.unwrap_or_default()
+    }
+
+    /// Generation of the model; 0 without one.
+    pub fn generation(&self) -> u32 {
+        self.identity.map_or(0, |identity| identity.generation)
+    }
+}
+
+/// Longest name of a model in an identity, in bytes: every image has room for such a report.
+const MOST_NAME_BYTES: usize = 40;
+
+/// CRC-32 of the columns' `names` and then of their `units`.
+fn crc_of(names: Columns<'_>, units: Columns<'_>) -> u32 {
+    let mut digest = CRC_32.digest();
+    digest.update(names.0.as_bytes());
+    digest.update(units.0.as_bytes());
+    digest.finalize()
+}
+
+/// Checks the `head` of a blob: that it is one, and that the image has room for a model of its shape. Returns the
+/// blob's length.
+pub fn check_head(capacity: Capacity, head: &[u8]) -> Result<usize, ModelFault> {
+    let (length, shape) = Model::declared(head).ok_or(ModelFault::NotABlob)?;
+    capacity.wires_for(shape).map(|_| length).ok_or(ModelFault::Shape)
 }
 
 /// Checks a blob from end to end, and that the image has room for its model.

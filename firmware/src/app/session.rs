@@ -78,10 +78,14 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
     /// The watchdog is fed at the end, unless the last scan gave no reading at all. A sensor that stays silent
     /// thus leads to a restart, which sets up its bus again.
     pub fn step(&mut self) -> Option<Leave> {
+        self.app.core.line.begin_turn();
         let leave = self.serve_link();
         let core = &mut self.app.core;
         let now_us = core.line.platform().now_us();
         core.time.at(now_us);
+        core.end_leases(now_us);
+        // A lease that has ended restarts the clock of frames.
+        let now_us = core.line.platform().now_us();
         if let Some(missed) = core.clock.due(now_us, core.configuration.frame_period_us) {
             core.sensor_answers = core.scan(missed, self.model.decoder.as_ref());
         }
@@ -138,7 +142,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         let scan_us = self.now_us().wrapping_sub(start_us) as u32;
 
         let s = &mut self.statistics;
-        s.frames_scanned = s.frames_scanned.saturating_add(1);
+        s.frames_scanned = s.frames_scanned.wrapping_add(1);
         s.frames_missed = s.frames_missed.saturating_add(missed);
         s.failed_samples = s.failed_samples.saturating_add(u32::from(report.failed_samples));
         s.longest_scan_us = s.longest_scan_us.max(scan_us);
@@ -221,7 +225,18 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         let decode_cycles = self.line.platform().cycles().wrapping_sub(start_cycles);
         let decode_us = self.line.platform().now_us().wrapping_sub(start_us);
         self.count_decoded(decode_us, decode_cycles);
+        if decoder.is_some_and(|decoder| self.has_clamped(decoder)) {
+            flags |= EstimateReport::CLAMPED;
+            self.statistics.frames_clamped = self.statistics.frames_clamped.saturating_add(1);
+        }
         (flags, health)
+    }
+
+    /// Whether a reading of the frame that was just decoded is far beyond the model's training range.
+    fn has_clamped(&mut self, decoder: &Decoder<'_, ROWS>) -> bool {
+        let readings_ohm = self.frame.get(..self.wires.readings()).unwrap_or_default();
+        let frame = Frame { readings_ohm, reciprocals: self.reciprocals, gate: None };
+        decoder.has_clamped(frame, self.scratch, self.estimate.status)
     }
 
     fn count_decoded(&mut self, decode_us: u32, decode_cycles: u32) {
@@ -259,10 +274,12 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
     /// Adds the frame to the baseline that is being captured, and answers the request when the baseline is
     /// complete.
     fn feed_baseline(&mut self, decoder: Option<&Decoder<'_, ROWS>>) {
-        let Some((number, left)) = self.capture else { return };
+        let Some(capture) = &mut self.capture else { return };
         self.baseline.add(self.frame);
-        self.capture = left.checked_sub(1).filter(|left| *left > 0).map(|left| (number, left));
-        if self.capture.is_none() {
+        capture.left = capture.left.saturating_sub(1);
+        let (number, left) = (capture.number, capture.left);
+        if left == 0 {
+            self.capture = None;
             self.decode_baseline(decoder);
             let report = Report::Baseline { readings_ohm: Floats::of(self.baseline.mean()) };
             let sent = self.line.send(number, &report);

@@ -19,9 +19,18 @@ pub enum Request<'a> {
     Statistics,
     /// Ask for the configuration in force. Answered by [`Report::Configuration`].
     Configuration,
-    /// Put a configuration in force until the next restart. Answered by [`Report::Configuration`], or by
-    /// [`Refusal::Configuration`], which leaves the previous one in force.
-    Configure(Configuration),
+    /// Put a configuration in force. Answered by [`Report::Configuration`], or by [`Refusal::Configuration`], which
+    /// leaves the previous one in force.
+    Configure {
+        /// The configuration.
+        configuration: Configuration,
+        /// Lease in ms: the device returns to its own configuration once no request has come for so long. With 0, the
+        /// configuration becomes the device's own one, until the next restart.
+        ///
+        /// Requests that only ask ([`Request::only_asks`]) do not count: whoever looks on does not keep the device
+        /// from its work.
+        lease_ms: u32,
+    },
     /// Average the next frames as the baseline, the sensor at rest. Answered by [`Report::Baseline`] when they
     /// have been scanned.
     CaptureBaseline {
@@ -58,15 +67,27 @@ pub enum Request<'a> {
     Keep(Setting),
     /// Keep a setting no longer; it stays in force until the next restart. Answered by [`Report::Kept`].
     Forget(Setting),
+    /// End a lease: put the device's own configuration in force. Answered by [`Report::Configuration`].
+    Resume,
+}
+
+impl Request<'_> {
+    /// Whether the request changes nothing, and so prolongs no lease.
+    #[must_use]
+    pub fn only_asks(&self) -> bool {
+        matches!(self, Self::Identify | Self::Statistics | Self::Configuration)
+    }
 }
 
 /// Steps of uploading a model, in their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum UploadStep<'a> {
-    /// Erase the spare slot for a blob of so many bytes. Takes up to seconds on a board.
+    /// Erase the spare slot for a blob. Takes up to seconds on a board.
     Begin {
-        /// Length of the whole blob in bytes.
-        length: u32,
+        /// The blob's first [`HEAD_BYTES`](model_core::blob::Model::HEAD_BYTES), which tell its length and its shape:
+        /// a model for which there is no room costs no erase. More bytes are ignored.
+        #[serde(borrow)]
+        head: &'a [u8],
     },
     /// Write the next bytes of the blob.
     Chunk {
@@ -106,7 +127,12 @@ pub enum Report<'a> {
     /// Counters since the start.
     Statistics(Statistics),
     /// The configuration in force.
-    Configuration(Configuration),
+    Configuration {
+        /// The configuration.
+        configuration: Configuration,
+        /// Time in ms until its lease ends if no request comes; 0 for the device's own configuration.
+        lease_left_ms: u32,
+    },
     /// The baseline: the sensor at rest.
     Baseline {
         /// Mean readings in Ω, row after row; NaN where one was missing.
@@ -115,7 +141,7 @@ pub enum Report<'a> {
     },
     /// Readings of one scan, before faulty ones are removed.
     Readings {
-        /// Number of the frame, from 1 at the start.
+        /// Number of the frame, from 1 at the start; after its largest value it wraps around to 0.
         frame: u32,
         /// Time in µs since the device's start at which the scan began.
         start_us: u64,
@@ -157,6 +183,8 @@ pub struct Identity<'a> {
     pub kernel: &'a str,
     /// The model in force; `None` if there is none.
     pub model: Option<ModelIdentity>,
+    /// Name of the scene or data set of the model in force, cut after 40 bytes; empty without a model.
+    pub model_name: &'a str,
     /// Largest blob that a slot holds, in bytes.
     pub slot_bytes: u32,
     /// Largest chunk of an upload in bytes, a multiple of four.
@@ -182,6 +210,12 @@ pub struct ModelIdentity {
     pub outputs: u16,
     /// Whether the weights are decoded from a copy in RAM; else from the slot.
     pub in_ram: bool,
+    /// CRC-64/XZ of the scene or data file that trained the model.
+    pub scene_digest: u64,
+    /// CRC-32 of the names of its readings, and then of their units.
+    pub inputs_crc_32: u32,
+    /// CRC-32 of the names of its outputs, and then of their units.
+    pub outputs_crc_32: u32,
 }
 
 /// Use of a device's memory, in bytes.
@@ -300,6 +334,9 @@ impl EstimateReport<'_> {
     pub const NO_BASELINE: u8 = 1 << 5;
     /// Flag: a baseline was captured, and a reading differs from it by more than the threshold.
     pub const CONTACT: u8 = 1 << 4;
+    /// Flag: at least one reading of a decoded row lies far beyond the range that the model was trained on, and was
+    /// clamped ([`model_core::Decoder::has_clamped`]).
+    pub const CLAMPED: u8 = 1 << 6;
 }
 
 /// Faulty readings of one frame.
@@ -319,10 +356,10 @@ pub struct HealthReport<'a> {
     pub faulty_columns: &'a [u8],
 }
 
-/// Counters since the start; each stops at its largest value.
+/// Counters since the start. Each stops at its largest value, except the number of frames scanned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Statistics {
-    /// Number of frames scanned.
+    /// Number of frames scanned, which numbers them. After its largest value it wraps around to 0.
     pub frames_scanned: u32,
     /// Number of frames decoded, scanned or on request.
     pub frames_decoded: u32,
@@ -348,6 +385,10 @@ pub struct Statistics {
     pub longest_decode_cycles: u32,
     /// Shortest decoding of one frame in cycles of the processor; 0 on a board that does not count them.
     pub shortest_decode_cycles: u32,
+    /// Number of decoded frames with [`EstimateReport::CLAMPED`].
+    pub frames_clamped: u32,
+    /// Number of times that a slot was erased.
+    pub slot_erases: u32,
 }
 
 /// Progress of uploading a model.
@@ -404,6 +445,13 @@ pub enum Refusal {
     Constants(ConstantsFault),
     /// The setting cannot be kept.
     Keep(KeepFault),
+    /// The flash was erased too often ([`ERASE_INTERVAL_S`](crate::store::Slot::ERASE_INTERVAL_S)).
+    TooSoon {
+        /// Time in µs until it may be erased again.
+        wait_us: u64,
+    },
+    /// The model in force has the largest generation, so no other can be more recent.
+    LastGeneration,
 }
 
 /// Why a setting cannot be kept.

@@ -1,6 +1,6 @@
 //! Upload of a blob in chunks.
 
-use super::{FlashError, Slot, capacity, record};
+use super::{ERASES_AT_ONCE, FlashError, RECORD_MAGIC, Slot, capacity, record};
 use crate::link::message::{Refusal, UploadState};
 
 /// State of an upload, whose bytes are in the spare slot.
@@ -9,6 +9,10 @@ pub struct Upload {
     state: UploadState,
     /// Announced length of the blob in bytes.
     length: usize,
+    /// Whether the spare slot was erased for an upload, and no chunk was written since.
+    is_empty: bool,
+    /// Time in µs until which the erases so far last, each for [`Slot::ERASE_INTERVAL_S`].
+    worn_until_us: u64,
 }
 
 impl Default for Upload {
@@ -21,7 +25,7 @@ impl Upload {
     /// Makes a state in which no upload is going on.
     #[must_use]
     pub const fn new() -> Self {
-        Self { state: UploadState::Idle, length: 0 }
+        Self { state: UploadState::Idle, length: 0, is_empty: false, worn_until_us: 0 }
     }
 
     /// Progress of the upload.
@@ -36,26 +40,45 @@ impl Upload {
         matches!(self.state, UploadState::Committed { .. })
     }
 
-    /// Erases `spare` for a blob of `length` bytes. Calls `feed` just before, so that the watchdog is not due while
-    /// the processor stands still: a sensor that is silent may not have let it be fed for a while.
+    /// Prepares `spare` for a blob of `length` bytes at the time `now_us` since the start. The slot is erased, and
+    /// marked as one with an upload, unless it still is from the last begin.
+    ///
+    /// Calls `prepare` just before the erase: it must feed the watchdog, since the processor may stand still.
     ///
     /// # Errors
-    /// [`Refusal::TooLarge`] if the blob does not fit, [`Refusal::Flash`] if erasing fails.
+    /// [`Refusal::TooLarge`] if the blob does not fit, [`Refusal::TooSoon`] after too many erases,
+    /// [`Refusal::Flash`] if erasing fails.
     pub fn begin<S: Slot>(
         &mut self,
         spare: &mut S,
-        length: u32,
-        feed: impl FnOnce(),
+        length: usize,
+        now_us: u64,
+        prepare: impl FnOnce(),
     ) -> Result<(), Refusal> {
         let capacity = capacity(spare.bytes());
-        let length = length as usize;
         if length > capacity {
             return Err(Refusal::TooLarge { slot_bytes: capacity as u32 });
         }
-        self.state = UploadState::Idle;
-        feed();
-        self.flash(spare.erase())?;
-        *self = Self { state: UploadState::Receiving { received: 0 }, length };
+        if !self.is_empty {
+            self.wear(now_us, S::ERASE_INTERVAL_S)?;
+            prepare();
+            let marked = spare.erase().and_then(|()| spare.write(capacity, &RECORD_MAGIC));
+            self.flash(marked)?;
+        }
+        self.is_empty = true;
+        (self.state, self.length) = (UploadState::Receiving { received: 0 }, length);
+        Ok(())
+    }
+
+    /// Takes note of an erase, unless there were too many: more than [`ERASES_AT_ONCE`] beyond one in each interval.
+    fn wear(&mut self, now_us: u64, interval_s: u32) -> Result<(), Refusal> {
+        let interval_us = u64::from(interval_s) * 1_000_000;
+        let worn_until_us = self.worn_until_us.max(now_us) + interval_us;
+        let allowed_us = now_us + u64::from(ERASES_AT_ONCE) * interval_us;
+        if worn_until_us > allowed_us {
+            return Err(Refusal::TooSoon { wait_us: worn_until_us - allowed_us });
+        }
+        self.worn_until_us = worn_until_us;
         Ok(())
     }
 
@@ -82,6 +105,7 @@ impl Upload {
         if offset != here || end > self.length || !whole_words {
             return Err(Refusal::OutOfPlace { received });
         }
+        self.is_empty = false;
         let (words, last) = bytes.as_chunks::<4>();
         let mut written = spare.write(offset, words.as_flattened());
         if !last.is_empty() {
@@ -118,20 +142,23 @@ impl Upload {
         generation: u32,
         crc_32: u32,
     ) -> Result<(), Refusal> {
-        let place = capacity(spare.bytes());
-        self.flash(spare.write(place, &record(generation, crc_32)))?;
+        let place = capacity(spare.bytes()) + RECORD_MAGIC.len();
+        let record = record(generation, crc_32);
+        let rest = record.get(RECORD_MAGIC.len()..).unwrap_or_default();
+        self.flash(spare.write(place, rest))?;
         self.state = UploadState::Committed { crc_32 };
         Ok(())
     }
 
-    /// Aborts the upload, and forgets the bytes received.
+    /// Ends the upload, and forgets the bytes received.
     pub fn abort(&mut self) {
-        *self = Self::new();
+        self.state = UploadState::Idle;
     }
 
     /// Converts an outcome of the flash; a failure ends the upload.
     fn flash(&mut self, outcome: Result<(), FlashError>) -> Result<(), Refusal> {
         outcome.map_err(|FlashError| {
+            self.is_empty = false;
             self.abort();
             Refusal::Flash
         })

@@ -14,7 +14,7 @@ use firmware::platform::{Platform, Port};
 use firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
 use firmware::store::{FlashError, Slot};
 use model_core::AlignedBytes;
-use model_core::blob::{Metadata, ModelParts, ModelShape, encode_to_vec};
+use model_core::blob::{Metadata, Model, ModelParts, ModelShape, encode_to_vec};
 use model_core::rbf::direct::{self, Parameters};
 use model_core::rbf::{Network, Shape};
 
@@ -40,6 +40,10 @@ pub struct Pins {
     pub feeds: u32,
     /// Number of bytes that the host's side still takes; `None` takes all.
     pub room: Option<usize>,
+    /// Least time in µs between two bytes that the host's side takes.
+    pub gap_us: u32,
+    /// When it took the last byte.
+    taken_us: u32,
 }
 
 #[derive(Clone, Default)]
@@ -58,6 +62,10 @@ impl Port for Board {
 
     fn send(&mut self, byte: u8) -> bool {
         let mut pins = self.0.borrow_mut();
+        if pins.now_us.wrapping_sub(pins.taken_us) < pins.gap_us {
+            return false;
+        }
+        pins.taken_us = pins.now_us;
         match &mut pins.room {
             Some(0) => return false,
             Some(room) => *room -= 1,
@@ -183,6 +191,11 @@ impl MockSlot {
         std::mem::take(&mut *self.power.borrow_mut()).gone
     }
 
+    /// Flips `bits` of word `place`, as an old cell does.
+    pub fn decay(&mut self, place: usize, bits: u32) {
+        self.words[place] ^= bits;
+    }
+
     fn operate(&self) -> Result<(), PowerCut> {
         operate(&self.power)
     }
@@ -203,6 +216,8 @@ fn operate(power: &RefCell<Power>) -> Result<(), PowerCut> {
 }
 
 impl Slot for MockSlot {
+    const ERASE_INTERVAL_S: u32 = 0;
+
     fn bytes(&self) -> &[u8] {
         bytemuck::cast_slice(&self.words)
     }
@@ -276,6 +291,11 @@ pub fn crc_of(blob: &[u8]) -> u32 {
 
 pub fn frame_at_rest() -> TestFrame {
     [[60.0, 61.0, 62.0], [63.0, 64.0, 65.0]]
+}
+
+/// A request for a configuration of the device's own.
+pub fn configure(configuration: Configuration) -> Request<'static> {
+    Request::Configure { configuration, lease_ms: 0 }
 }
 
 /// A configuration that scans only on request.
@@ -380,9 +400,14 @@ pub fn model_crc(session: &mut TestSession<'_>, board: &Board) -> Option<u32> {
     ask(session, board, &Request::Identify, read).0
 }
 
+/// The first step of an upload of `blob`.
+pub fn begin(blob: &[u8]) -> UploadStep<'_> {
+    UploadStep::Begin { head: &blob[..Model::HEAD_BYTES] }
+}
+
 /// The steps of an upload of `blob` in chunks of `chunk` bytes.
 pub fn upload_steps(blob: &[u8], chunk: usize) -> Vec<UploadStep<'_>> {
-    let mut steps = vec![UploadStep::Begin { length: blob.len() as u32 }];
+    let mut steps = vec![begin(blob)];
     steps.extend(
         blob.chunks(chunk)
             .enumerate()

@@ -5,8 +5,11 @@
 //! protocol.
 
 use std::collections::VecDeque;
+use std::hash::{BuildHasher, Hasher, RandomState};
 use std::io::{ErrorKind, Read, Write};
 use std::net::TcpStream;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use firmware::capacity::Capacity;
@@ -32,6 +35,8 @@ pub mod check;
 
 /// Longest time that a board takes to answer a request that erases no flash.
 const ANSWER: Duration = Duration::from_millis(500);
+/// Time without requests after which a device returns to its own configuration, unless told otherwise.
+pub const LEASE: Duration = Duration::from_secs(10);
 /// Time that a device takes to start.
 const START: Duration = Duration::from_millis(100);
 /// Number of times that a request is sent before the device is given up.
@@ -77,6 +82,8 @@ pub struct DeviceIdentity {
     pub kernel: String,
     /// Active model, if there is one.
     pub model: Option<ModelIdentity>,
+    /// Name of its scene or data set, cut after 40 bytes.
+    pub model_name: String,
     /// Largest blob that a slot holds, in bytes.
     pub slot_bytes: usize,
     /// Largest chunk of an upload, in bytes.
@@ -121,11 +128,31 @@ impl From<&Identity<'_>> for DeviceIdentity {
             outputs: identity.outputs.into(),
             kernel: identity.kernel.into(),
             model: identity.model,
+            model_name: identity.model_name.into(),
             slot_bytes: identity.slot_bytes as usize,
             chunk_bytes: identity.chunk_bytes.into(),
             memory: identity.memory,
         }
     }
+}
+
+/// Configuration that is active, and for how long.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ActiveConfiguration {
+    /// Configuration.
+    pub configuration: Configuration,
+    /// Time in ms after which the device returns to its own configuration if no request comes; 0 if this is its own.
+    pub lease_left_ms: u32,
+}
+
+/// Configuration that a host prolongs while it listens.
+#[derive(Clone, Copy)]
+struct Kept {
+    configuration: Configuration,
+    /// Time at which a request was sent last.
+    asked: Instant,
+    /// Number of the request that prolongs the lease, until it is answered.
+    waiting: Option<u16>,
 }
 
 /// Host's end of the line to a device.
@@ -135,6 +162,12 @@ pub struct Device<W> {
     /// Bytes that were read and not looked at yet.
     pending: VecDeque<u8>,
     number: u16,
+    /// Configuration that is prolonged while reports are heard.
+    kept: Option<Kept>,
+    /// Time without requests after which the device returns to its own configuration.
+    pub lease: Duration,
+    /// Flag that ends waiting with [`Error::Interrupted`] when it is set, if there is one.
+    pub stop: Option<Arc<AtomicBool>>,
     /// Longest time that an answer may take.
     pub patience: Duration,
     /// Number of frames of bytes that arrived damaged.
@@ -152,17 +185,31 @@ impl<W: Wire> Device<W> {
         wire.set_read_timeout(GLANCE)?;
         let receiver = Receiver::new(vec![0; MOST_REPORT_BYTES]);
         let pending = VecDeque::new();
-        Ok(Self { wire, receiver, pending, number: 0, patience: ANSWER, damaged: 0, repeated: 0 })
+        Ok(Self {
+            wire,
+            receiver,
+            pending,
+            // Answers to a host before this one may still come: they shall not have this one's numbers.
+            number: RandomState::new().build_hasher().finish() as u16,
+            kept: None,
+            lease: LEASE,
+            stop: None,
+            patience: ANSWER,
+            damaged: 0,
+            repeated: 0,
+        })
     }
 
     /// Sends `bytes` unframed, as they are.
     ///
     /// # Errors
-    /// [`Error::Line`] if the line fails, or takes no bytes for too long.
+    /// [`Error::Line`] if the line fails, or takes no bytes for too long; [`Error::Interrupted`].
     pub fn send_raw(&mut self, bytes: &[u8]) -> Result<()> {
         let (mut rest, start) = (bytes, Instant::now());
         while !rest.is_empty() {
+            self.check_stop()?;
             match self.wire.write(rest) {
+                Ok(0) => return Err(std::io::Error::from(ErrorKind::WriteZero).into()),
                 Ok(count) => rest = &rest[count..],
                 // A slow line takes them little by little.
                 Err(cause) if is_timeout(&cause) && start.elapsed() < SLOWEST_WRITE => {}
@@ -179,14 +226,49 @@ impl<W: Wire> Device<W> {
     pub fn send(&mut self, request: &Request<'_>) -> Result<u16> {
         self.number = self.number.checked_add(1).unwrap_or(packet::UNASKED + 1);
         self.send_raw(&request_bytes(self.number, request)?)?;
+        if let Some(kept) = &mut self.kept {
+            kept.asked = Instant::now();
+        }
         Ok(self.number)
+    }
+
+    /// Prolongs the lease of the configuration that is kept, if it is time to.
+    fn prolong(&mut self) -> Result<()> {
+        let Some(kept) = self.kept else { return Ok(()) };
+        // A device that is slow to answer is not sent more and more; but a request may be lost.
+        let patience = if kept.waiting.is_some() { self.lease } else { self.lease / 3 };
+        if kept.asked.elapsed() > patience {
+            let number = self.send(&self.leased(kept.configuration))?;
+            self.kept = Some(Kept { asked: Instant::now(), waiting: Some(number), ..kept });
+        }
+        Ok(())
+    }
+
+    /// Request for a leased configuration.
+    fn leased(&self, configuration: Configuration) -> Request<'static> {
+        let lease_ms = u32::try_from(self.lease.as_millis()).unwrap_or(u32::MAX).max(1);
+        Request::Configure { configuration, lease_ms }
+    }
+
+    /// Ends the work if somebody wants that.
+    fn check_stop(&self) -> Result<()> {
+        let stopped = self.stop.as_ref().is_some_and(|stop| stop.load(Ordering::Relaxed));
+        if stopped { Err(Error::Interrupted) } else { Ok(()) }
+    }
+
+    /// Runs `work`, which an interruption does not end.
+    fn uninterrupted<T>(&mut self, work: impl FnOnce(&mut Self) -> T) -> T {
+        let stop = self.stop.take();
+        let outcome = work(self);
+        self.stop = stop;
+        outcome
     }
 
     /// Passes reports with their numbers to `read` until it returns a value; `None` once `deadline` has
     /// passed.
     ///
     /// # Errors
-    /// [`Error::Line`] or [`Error::Closed`] if the line fails.
+    /// [`Error::Line`] or [`Error::Closed`] if the line fails; [`Error::Interrupted`].
     pub fn hear<T>(
         &mut self,
         deadline: Instant,
@@ -203,6 +285,9 @@ impl<W: Wire> Device<W> {
                 };
                 match report {
                     Ok(report) => {
+                        if let Some(kept) = &mut self.kept {
+                            kept.waiting = kept.waiting.filter(|number| *number != report.number);
+                        }
                         if let Some(answer) = read(report.number, &report.body) {
                             return Ok(Some(answer));
                         }
@@ -213,6 +298,8 @@ impl<W: Wire> Device<W> {
             if is_last_look {
                 return Ok(None);
             }
+            self.check_stop()?;
+            self.prolong()?;
             match self.wire.read(&mut bytes) {
                 Ok(0) => return Err(Error::Closed),
                 Ok(count) => self.pending.extend(&bytes[..count]),
@@ -295,20 +382,51 @@ impl<W: Wire> Device<W> {
     ///
     /// # Errors
     /// Errors of [`ask`](Self::ask), such as [`Error::NoAnswer`].
-    pub fn configuration(&mut self) -> Result<Configuration> {
-        self.ask_plainly(&Request::Configuration, |report| match report {
-            Report::Configuration(configuration) => Some(*configuration),
-            _ => None,
-        })
+    pub fn configuration(&mut self) -> Result<ActiveConfiguration> {
+        self.ask_for_configuration(&Request::Configuration)
     }
 
-    /// Sends `configuration` and makes it the active one.
+    /// Makes `configuration` the active one for as long as this host is there: until [`resume`](Self::resume), or
+    /// until the device has heard no request for [`lease`](Self::lease). While the device scans, listening to it
+    /// prolongs the lease.
     ///
     /// # Errors
     /// [`Error::Refused`] if the device refuses it, or the errors of [`ask`](Self::ask).
     pub fn configure(&mut self, configuration: Configuration) -> Result<()> {
-        self.ask_plainly(&Request::Configure(configuration), |report| {
-            matches!(report, Report::Configuration(_)).then_some(())
+        self.kept = None;
+        self.ask_for_configuration(&self.leased(configuration))?;
+        // Without scans there is nothing to listen to; and a device whose flash is erased may lose what is sent.
+        let scans = configuration.frame_period_us > 0;
+        self.kept = scans.then(|| Kept { configuration, asked: Instant::now(), waiting: None });
+        Ok(())
+    }
+
+    /// Makes `configuration` the device's own one, which it returns to, until its next restart.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] if the device refuses it, or the errors of [`ask`](Self::ask).
+    pub fn configure_until_restart(&mut self, configuration: Configuration) -> Result<()> {
+        self.kept = None;
+        self.ask_for_configuration(&Request::Configure { configuration, lease_ms: 0 })?;
+        Ok(())
+    }
+
+    /// Makes the device's own configuration the active one again.
+    ///
+    /// # Errors
+    /// Errors of [`ask`](Self::ask), such as [`Error::NoAnswer`].
+    pub fn resume(&mut self) -> Result<ActiveConfiguration> {
+        self.kept = None;
+        self.ask_for_configuration(&Request::Resume)
+    }
+
+    fn ask_for_configuration(&mut self, request: &Request<'_>) -> Result<ActiveConfiguration> {
+        self.ask_plainly(request, |report| match report {
+            Report::Configuration { configuration, lease_left_ms } => Some(ActiveConfiguration {
+                configuration: *configuration,
+                lease_left_ms: *lease_left_ms,
+            }),
+            _ => None,
         })
     }
 
@@ -321,8 +439,8 @@ impl<W: Wire> Device<W> {
         self.ask_plainly(&request, |report| matches!(report, Report::Baseline { .. }).then_some(()))
     }
 
-    /// Runs `work` while the device does not scan, so that no reports come unasked. The former
-    /// configuration is restored afterwards, even if the work failed.
+    /// Runs `work` while the device does not scan, so that no reports come unasked. Afterwards the device returns to
+    /// its own configuration, even if the work failed or was interrupted.
     ///
     /// # Errors
     /// Errors of [`ask`](Self::ask), or whatever error `work` returns.
@@ -330,14 +448,17 @@ impl<W: Wire> Device<W> {
         &mut self,
         work: impl FnOnce(&mut Self) -> std::result::Result<T, E>,
     ) -> std::result::Result<T, E> {
-        let before = self.configuration()?;
-        self.pause()?;
-        let outcome = work(self);
-        let restored = self.configure(before);
-        outcome.and_then(|value| Ok(restored.map(|()| value)?))
+        let outcome = match self.pause() {
+            Ok(()) => work(self),
+            Err(Error::Interrupted) => Err(Error::Interrupted.into()),
+            // A device that does not answer need not be asked to go on.
+            Err(cause) => return Err(cause.into()),
+        };
+        let resumed = self.uninterrupted(Self::resume);
+        outcome.and_then(|value| Ok(resumed.map(|_| value)?))
     }
 
-    /// Stops scanning.
+    /// Stops scanning, for as long as this host is there.
     pub(crate) fn pause(&mut self) -> Result<()> {
         self.configure(Configuration { frame_period_us: 0, ..Configuration::DEFAULT })
     }
@@ -350,6 +471,7 @@ impl<W: Wire> Device<W> {
         self.ask_plainly(&Request::Restart, |report| {
             matches!(report, Report::Restarting).then_some(())
         })?;
+        self.kept = None;
         // Bytes that arrive while it starts are lost, which is no fault of the line.
         let (patience, repeated) = (self.patience, self.repeated);
         let start = Instant::now();

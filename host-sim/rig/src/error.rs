@@ -30,6 +30,24 @@ pub enum Error {
         /// Ports that this computer has.
         known: String,
     },
+    /// Work that somebody ended.
+    #[error("interrupted; the device returns to its own configuration")]
+    Interrupted,
+    /// Device that takes models in chunks of a size that is no positive multiple of four.
+    #[error("the device offers chunks of {0} bytes; they must be a positive multiple of 4")]
+    ChunkSize(usize),
+    /// Report with another number of values than the model in force has.
+    #[error(
+        "frame {frame} has {found} values instead of {expected}; was the model exchanged meanwhile?"
+    )]
+    ReportLength {
+        /// Number of the frame.
+        frame: u32,
+        /// Number of values that it should have.
+        expected: usize,
+        /// Number of values that it has.
+        found: usize,
+    },
     /// Request longer than any device takes.
     #[error("a request longer than {most_bytes} bytes")]
     RequestTooLong {
@@ -170,6 +188,13 @@ fn why(refusal: Refusal) -> String {
         Refusal::Keep(KeepFault::TooLarge) => "it has no room to keep that".into(),
         Refusal::Keep(KeepFault::TooOften) => {
             "settings were written too often since its start, which wears its flash; restart it to go on".into()
+        }
+        Refusal::TooSoon { wait_us } => format!(
+            "its flash was erased too often; upload again in {} s",
+            wait_us.div_ceil(1_000_000)
+        ),
+        Refusal::LastGeneration => {
+            "the record of its model has the last number; flash a model with a debugger".into()
         }
     }
 }

@@ -16,10 +16,10 @@ use taxel_data::progress::Progress;
 use taxel_data::{csv_file, output};
 use taxel_learn::ModelBlob;
 use taxel_rig::device::check::check;
-use taxel_rig::device::{Device, DeviceIdentity, Wire, serial, upload};
+use taxel_rig::device::{ActiveConfiguration, Device, DeviceIdentity, LEASE, Wire, serial, upload};
 
 use super::check_arguments::{CheckArguments, Checked, conclude, memory_lines};
-use super::{Common, print};
+use super::{Common, interruption, print};
 
 /// Talk to a device on a serial port: identify, upload, record, calibrate.
 #[derive(Args)]
@@ -30,6 +30,9 @@ pub struct Arguments {
     /// Speed of the line in bits a second.
     #[arg(long, value_name = "BAUD", default_value_t = 921_600, value_parser = value_parser!(u32).range(1..))]
     baud: u32,
+    /// Time without requests after which the device returns to its own configuration, if this program is killed.
+    #[arg(long, value_name = "MS", default_value_t = LEASE.as_millis() as u32, value_parser = value_parser!(u32).range(100..=600_000))]
+    lease_ms: u32,
     #[command(subcommand)]
     action: Action,
 }
@@ -126,6 +129,8 @@ struct ScanArguments {
 #[derive(Serialize)]
 struct Status {
     device: DeviceIdentity,
+    #[serde(flatten)]
+    active: ActiveConfiguration,
     statistics: Statistics,
 }
 
@@ -148,18 +153,26 @@ fn tolerance(text: &str) -> std::result::Result<f32, String> {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let open = || Device::new(serial::open(&arguments.port, arguments.baud)?);
+    let open = || -> Result<_> {
+        let mut device = Device::new(serial::open(&arguments.port, arguments.baud)?)?;
+        device.lease = Duration::from_millis(arguments.lease_ms.into());
+        device.stop = Some(interruption::flag()?);
+        Ok(device)
+    };
     match &arguments.action {
         Action::Identify => {
             let mut device = open()?;
-            status(&Status { device: device.identify()?, statistics: device.statistics()? }, common)
+            status(&mut device, common)
         }
         Action::Upload(action) => {
             let model = ModelBlob::read(&action.model)?;
             let mut device = open()?;
+            let before = device.identify()?;
             let progress = Terminal::new();
-            device.while_paused(|device| upload::replace(device, model.bytes(), &progress))?;
-            status(&Status { device: device.identify()?, statistics: device.statistics()? }, common)
+            let after =
+                device.while_paused(|device| upload::replace(device, model.bytes(), &progress))?;
+            note_another_sensor(&before, &after);
+            status(&mut device, common)
         }
         Action::Record(action) => record(&mut open()?, action, common),
         Action::Baseline(action) => baseline(&mut open()?, action, common),
@@ -177,9 +190,54 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     }
 }
 
-fn status(status: &Status, common: &Common) -> Result<()> {
+/// Notes on stderr whatever tells that the new model may be one of another sensor.
+fn note_another_sensor(before: &DeviceIdentity, after: &DeviceIdentity) {
+    let (Some(old), Some(new)) = (&before.model, &after.model) else { return };
+    let mut differences = Vec::new();
+    if old.inputs_crc_32 != new.inputs_crc_32 {
+        differences.push("its readings had other names or units");
+    }
+    if old.outputs_crc_32 != new.outputs_crc_32 {
+        differences.push("its outputs had other names or units");
+    }
+    if old.scene_digest != new.scene_digest {
+        differences.push("it was trained on another scene or data set");
+    }
+    if !differences.is_empty() {
+        eprintln!(
+            "note: the previous model was {:?}, this one is {:?}: {}",
+            before.model_name,
+            after.model_name,
+            differences.join("; ")
+        );
+    }
+}
+
+/// What the device is doing, by its active configuration.
+fn scanning(active: &ActiveConfiguration) -> String {
+    let ActiveConfiguration { configuration, lease_left_ms } = active;
+    let left_s = f64::from(*lease_left_ms) / 1e3;
+    match (configuration.frame_period_us, lease_left_ms) {
+        (0, 0) => "not scanning: its own configuration has no frame period".into(),
+        (0, _) => {
+            format!("not scanning: paused by a host, for {left_s:.1} s more without requests")
+        }
+        (us, 0) => format!("a frame every {} ms", f64::from(us) / 1e3),
+        (us, _) => format!(
+            "a frame every {} ms, set by a host, for {left_s:.1} s more without requests",
+            f64::from(us) / 1e3
+        ),
+    }
+}
+
+fn status<W: Wire>(device: &mut Device<W>, common: &Common) -> Result<()> {
+    let status = Status {
+        device: device.identify()?,
+        active: device.configuration()?,
+        statistics: device.statistics()?,
+    };
     if common.json {
-        return print::json(status);
+        return print::json(&status);
     }
     let (d, s) = (&status.device, &status.statistics);
     let mut page = print::Page::default();
@@ -190,8 +248,9 @@ fn status(status: &Status, common: &Common) -> Result<()> {
     ));
     if let Some(m) = &d.model {
         page.line(format_args!(
-            "{:<17} CRC-32 {:08x}, slot {}, generation {}, weights in {}",
+            "{:<17} {:?}, CRC-32 {:08x}, slot {}, generation {}, weights in {}",
             "model",
+            d.model_name,
             m.crc_32,
             m.slot,
             m.generation,
@@ -204,6 +263,7 @@ fn status(status: &Status, common: &Common) -> Result<()> {
     } else {
         page.line(format_args!("{:<17} none: upload one", "model"));
     }
+    page.line(format_args!("{:<17} {}", "scanning", scanning(&status.active)));
     page.line(format_args!(
         "{:<17} {} scanned, {} decoded (except {} untouched rows), {} missed, {} samples failed",
         "frames",
@@ -223,10 +283,17 @@ fn status(status: &Status, common: &Common) -> Result<()> {
             "cycles", s.shortest_decode_cycles, s.longest_decode_cycles
         ));
     }
+    if s.frames_clamped > 0 {
+        page.line(format_args!(
+            "{:<17} {} frames had readings far beyond the model's training range",
+            "clamped", s.frames_clamped
+        ));
+    }
     page.line(format_args!(
         "{:<17} {} requests, {} bad packets, {} lost reports, {} bad loops",
         "link", s.requests, s.bad_packets, s.lost_reports, s.bad_loops
     ));
+    page.line(format_args!("{:<17} {} since the start", "slots erased", s.slot_erases));
     memory_lines(&mut page, &d.memory);
     page.print()
 }
@@ -292,12 +359,13 @@ fn record<W: Wire>(
     let patience = patience(&action.scan, &identity);
     let (frames, rows_at_rest) = device.while_paused(|device| -> Result<_> {
         configure(device, &action.scan, wanted, action.rest_tolerance)?;
-        hear_frames(device, action.scan.frames.into(), patience, wanted)
+        hear_frames(device, action.scan.frames.into(), patience, wanted, names.len())
     })?;
-    let missing = missing(frames.iter().flat_map(|(_, line)| line), wanted)?;
-    let lines = frames.iter().map(|(_, line)| line.iter().copied());
+    let missing = missing(frames.iter().flat_map(|frame| &frame.values), wanted)?;
+    let lines = frames.iter().map(|frame| frame.values.iter().copied());
     csv_file::write(&action.output, names.iter().map(String::as_str), lines)?;
-    let span = frames.last().zip(frames.first()).map_or(0, |(last, first)| last.0 - first.0 + 1);
+    let ends = frames.last().zip(frames.first());
+    let span = ends.map_or(0, |(last, first)| last.number.wrapping_sub(first.number) + 1);
     let frames_lost = span.saturating_sub(frames.len() as u32);
     let file = action.output.clone();
     let (frames, values_missing) = (frames.len(), missing);
@@ -335,35 +403,55 @@ fn reading_names(identity: &DeviceIdentity) -> Vec<String> {
     (1..=rows).flat_map(|m| (1..=columns).map(move |k| format!("r{m}c{k}_ohm"))).collect()
 }
 
-/// Number of a frame, and its readings or outputs.
-type NumberedFrame = (u32, Vec<f64>);
+/// Frame that the device scanned.
+struct Frame {
+    /// Number, which wraps around to 0.
+    number: u32,
+    /// Time at which its scan began.
+    start_us: u64,
+    /// Readings or outputs.
+    values: Vec<f64>,
+}
 
-/// Receives the frames that the device sends, with their numbers, and counts the untouched rows in all of
-/// them.
+impl Frame {
+    /// Whether the device has started anew between this frame and `next`.
+    fn is_from_before(&self, next: &Self) -> bool {
+        let frames = next.number.wrapping_sub(self.number).cast_signed();
+        frames <= 0 || next.start_us <= self.start_us
+    }
+}
+
+/// Receives the frames that the device sends, of `width` values each, and counts the untouched rows in all of them.
 fn hear_frames<W: Wire>(
     device: &mut Device<W>,
     count: usize,
     patience: Duration,
     wanted: Wanted,
-) -> Result<(Vec<NumberedFrame>, usize)> {
+    width: usize,
+) -> Result<(Vec<Frame>, usize)> {
     let progress = Terminal::new();
     progress.stage("recording", count);
-    let mut frames: Vec<NumberedFrame> = Vec::new();
+    let mut frames: Vec<Frame> = Vec::new();
     let mut rows_at_rest = 0;
     let enough = device.hear(Instant::now() + patience, |_, report| {
-        let (frame, values, status) = match report {
-            Report::Readings { frame, readings_ohm, .. } if wanted == Wanted::Readings => {
-                (*frame, *readings_ohm, &[][..])
+        let (number, start_us, values, status) = match report {
+            Report::Readings { frame, start_us, readings_ohm } if wanted == Wanted::Readings => {
+                (*frame, *start_us, *readings_ohm, &[][..])
             }
             Report::Estimate(estimate) if wanted == Wanted::Estimates => {
-                (estimate.frame, estimate.outputs, estimate.row_status)
+                (estimate.frame, estimate.start_us, estimate.outputs, estimate.row_status)
             }
             _ => return None,
         };
-        if frames.last().is_some_and(|(last, _)| *last >= frame) {
+        let values: Vec<f64> = values.iter().map(f64::from).collect();
+        if let Err(error) = check_length(number, &values, width) {
+            return Some(Err(error));
+        }
+        let frame = Frame { number, start_us, values };
+        if frames.last().is_some_and(|last| last.is_from_before(&frame)) {
             return Some(Err(Error::Failed("the device has restarted meanwhile".into())));
         }
-        frames.push((frame, values.iter().map(f64::from).collect()));
+        frames.push(frame);
         let at_rest = status.iter().filter(|status| **status == EstimateReport::ROW_AT_REST);
         rows_at_rest += at_rest.count();
         progress.step();
@@ -373,6 +461,15 @@ fn hear_frames<W: Wire>(
         Some(outcome) => outcome.map(|()| (frames, rows_at_rest)),
         None => Err(Error::Failed(format!("only {} of {count} frames came in time", frames.len()))),
     }
+}
+
+/// Checks the number of values in a frame.
+fn check_length(frame: u32, values: &[f64], expected: usize) -> Result<()> {
+    let found = values.len();
+    if found == expected {
+        return Ok(());
+    }
+    Err(taxel_rig::Error::ReportLength { frame, expected, found }.into())
 }
 
 fn baseline<W: Wire>(
@@ -396,6 +493,7 @@ fn baseline<W: Wire>(
     })?;
     let readings = answer.map_err(taxel_rig::Error::Refused)?;
     let names = reading_names(&identity);
+    check_length(0, &readings, names.len())?;
     let values_missing = missing(readings.iter(), Wanted::Readings)?;
     if action.store {
         device.keep(Setting::Baseline)?;

@@ -251,7 +251,7 @@ fn the_image_keeps_settings_over_restarts() {
     let mut device = Device::new(lines.link).unwrap();
     device.patience = Duration::from_mins(1);
     assert_eq!(device.kept().unwrap().configuration, None);
-    let quiet = device.configuration().unwrap();
+    let quiet = device.configuration().unwrap().configuration;
     let mut constants = device.constants().unwrap();
     // Enough writes for two exchanges of the pages.
     for life in 0..2 {
@@ -261,11 +261,11 @@ fn the_image_keeps_settings_over_restarts() {
             assert!(device.keep(Setting::Constants).unwrap().constants);
         }
         let configuration = Configuration { contact_threshold: 0.1 + life as f32, ..quiet };
-        device.configure(configuration).unwrap();
+        device.configure_until_restart(configuration).unwrap();
         device.keep(Setting::Configuration).unwrap();
         device.restart().unwrap();
         assert_eq!(device.constants().unwrap(), constants);
-        assert_eq!(device.configuration().unwrap(), configuration);
+        assert_eq!(device.configuration().unwrap().configuration, configuration);
         let kept = device.kept().unwrap();
         assert_eq!((kept.configuration, kept.constants), (Some(configuration), true));
         constants.drive_v += 0.01;

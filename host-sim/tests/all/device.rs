@@ -1,5 +1,6 @@
 //! The host's end of the link against the firmware's application, which runs here in a thread.
 
+use std::io::ErrorKind;
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::time::{Duration, Instant};
 
@@ -22,11 +23,11 @@ use taxel_simulate::{Synthesis, World, synthesise};
 
 const SOUND: Line = Line { one_in: None };
 
-fn press() -> World {
+pub fn press() -> World {
     World::press()
 }
 
-fn model(centres: usize) -> ModelBlob {
+pub fn model(centres: usize) -> ModelBlob {
     let mut scene = Experiment::load("press").unwrap();
     (scene.training.frames, scene.training.centres) = (500, centres);
     scene.train(&Silent).unwrap()
@@ -39,7 +40,7 @@ fn frames_of(frames: usize) -> Frames {
 }
 
 /// Ideal readings of a few frames, for a device that scans.
-fn frames() -> Vec<[[f32; 18]; 8]> {
+pub fn frames() -> Vec<[[f32; 18]; 8]> {
     let readings = synthesise(&press(), Stream::Test, 5).inputs;
     let frame = |line: &[f64]| {
         let mut frame = [[0.0; 18]; 8];
@@ -126,7 +127,7 @@ fn requests(new: &ModelBlob) -> Vec<(Vec<u8>, usize)> {
     }
     add(&Request::Decode { frame: 40, readings_ohm: Floats::of(&[60.0; 7]) });
     add(&Request::Upload(UploadStep::Chunk { offset: 0, bytes: &[1; 8] }));
-    add(&Request::Upload(UploadStep::Begin { length: new.bytes().len() as u32 }));
+    add(&Request::Upload(upload::begin(new.bytes())));
     for (index, bytes) in new.bytes().chunks(512).enumerate() {
         add(&Request::Upload(UploadStep::Chunk { offset: 512 * index as u32, bytes }));
     }
@@ -292,8 +293,9 @@ fn over_a_line_that_spoils_bytes_everything_still_arrives() {
 fn refusals_and_silence_are_told_apart() {
     let model = model(3);
     let mut device = device(SOUND, &model);
-    let length = u32::MAX;
-    let refusal = upload::step(&mut device, UploadStep::Begin { length }).unwrap();
+    let mut large = model.bytes().to_vec();
+    large[5..9].fill(0xFF);
+    let refusal = upload::step(&mut device, upload::begin(&large)).unwrap();
     assert_eq!(refusal, Err(Refusal::TooLarge { slot_bytes: 128 * 1024 - 16 }));
     // A report that does not belong to the request is no answer.
     let strange = device.ask_plainly(&Request::Statistics, |report| match report {
@@ -325,9 +327,75 @@ fn a_device_that_never_pauses_does_not_hold_the_host() {
     assert_eq!(heard.unwrap(), None);
     assert!(reports > 100, "{reports}");
     assert!(start.elapsed() < Duration::from_secs(5));
-    // The configuration that was active before a pause is active after it.
+    // The lease outlasts its length, because listening prolongs it.
+    device.lease = Duration::from_millis(100);
+    device.configure(busy).unwrap();
+    device.hear(Instant::now() + Duration::from_millis(500), |_, _| None::<()>).unwrap();
+    assert_eq!(device.configuration().unwrap().configuration, busy);
+    // Afterwards the device's own configuration is active, which has no scans here.
     device.while_paused(Device::identify).unwrap();
-    assert_eq!(device.configuration().unwrap(), busy);
+    let own = device.configuration().unwrap();
+    assert_eq!((own.configuration.frame_period_us, own.lease_left_ms), (0, 0));
+    // What is to last becomes the device's own.
+    let slow = Configuration { frame_period_us: 1_000_000, ..busy };
+    device.configure_until_restart(slow).unwrap();
+    device.while_paused(Device::identify).unwrap();
+    assert_eq!(device.configuration().unwrap().configuration, slow);
+}
+
+#[test]
+fn a_model_without_room_is_not_begun() {
+    let mut world = press();
+    world.readout.row_wires = Some(vec![4]);
+    let frames = synthesise(&world, Stream::Training, 100);
+    let options = taxel_learn::Options { centres: 2, ..taxel_learn::Options::default() };
+    let trained = taxel_learn::train::train(&frames, &options, &Silent).unwrap();
+    let origin = taxel_learn::Origin::of_data("row", 0, 1, &frames);
+    let mut blob = taxel_learn::pack(&trained, &frames, &origin).unwrap().bytes().to_vec();
+    blob[9] = 9; // rows
+    let mut device = device(SOUND, &model(3));
+    let outcome = upload::replace(&mut device, &blob, &Silent);
+    assert!(matches!(outcome, Err(Error::NoRoom { .. })), "{outcome:?}");
+    assert_eq!(device.statistics().unwrap().slot_erases, 0);
+}
+
+#[test]
+fn chunks_of_no_bytes_and_a_line_that_takes_none_are_told() {
+    let model = model(3);
+    let mut device = device(SOUND, &model);
+    for bytes in [0, 6] {
+        let outcome = upload::send(&mut device, model.bytes(), bytes, &Silent);
+        assert!(matches!(outcome, Err(Error::ChunkSize(size)) if size == bytes));
+    }
+    let mut full = Device::new(Full).unwrap();
+    assert!(
+        matches!(full.identify(), Err(Error::Line(cause)) if cause.kind() == ErrorKind::WriteZero)
+    );
+}
+
+/// Line that takes no bytes and says so.
+struct Full;
+
+impl std::io::Read for Full {
+    fn read(&mut self, _: &mut [u8]) -> std::io::Result<usize> {
+        Err(ErrorKind::WouldBlock.into())
+    }
+}
+
+impl std::io::Write for Full {
+    fn write(&mut self, _: &[u8]) -> std::io::Result<usize> {
+        Ok(0)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Wire for Full {
+    fn set_read_timeout(&mut self, _: Duration) -> std::io::Result<()> {
+        Ok(())
+    }
 }
 
 #[cfg(unix)]
@@ -362,7 +430,7 @@ pub mod serial_port {
         fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
             match self.0.read(bytes) {
                 // No program has the near end open at the moment.
-                Ok(0) => Err(std::io::ErrorKind::WouldBlock.into()),
+                Ok(0) => Err(std::io::ErrorKind::NotConnected.into()),
                 other => other,
             }
         }
@@ -390,6 +458,8 @@ pub mod serial_port {
         let page = folder.succeed(&["link", &port, "identify"]);
         assert!(page.contains("virtual, firmware"), "{page}");
         assert!(page.contains(&format!("CRC-32 {:08x}, slot 0", old.parse().crc())), "{page}");
+        assert!(page.contains("model             \"press\", "), "{page}");
+        assert!(page.contains("not scanning: its own configuration has no frame period"), "{page}");
 
         // Recording under another model's names is refused, before anything is written.
         let wrong = folder.run(&["link", &port, "record", new_file, "-o", "estimate.csv"]);

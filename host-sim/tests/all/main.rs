@@ -9,6 +9,8 @@ mod calibrate;
 mod device;
 mod drift;
 mod gate;
+#[cfg(unix)]
+mod interruption;
 mod readout;
 mod refusals;
 mod scan;

@@ -1,6 +1,6 @@
 //! The firmware's application in a thread of this process.
-use std::io::{Read, Write};
-use std::time::Instant;
+use std::io::{ErrorKind, Read, Write};
+use std::time::{Duration, Instant};
 
 use firmware::app::{App, Buffers};
 use firmware::capacity::Capacity;
@@ -20,9 +20,11 @@ pub struct Line {
 }
 
 /// Board whose serial line is `W`, whose reads must not block.
-struct Board<'s, W> {
+struct Board<'s, W, N> {
     wire: W,
     settings: &'s mut SettingPages<MemorySlot>,
+    /// Called with each request's last byte, before the device sees it.
+    notice: N,
     start: Instant,
     line: Line,
     random: Random,
@@ -33,7 +35,7 @@ struct Board<'s, W> {
     gone: bool,
 }
 
-impl<W: Read + Write> Board<'_, W> {
+impl<W: Read + Write, N> Board<'_, W, N> {
     /// Byte as it arrives; `None` if it is lost.
     fn spoil(&mut self, byte: u8) -> Option<u8> {
         let Some(one_in) = self.line.one_in else { return Some(byte) };
@@ -53,7 +55,7 @@ impl<W: Read + Write> Board<'_, W> {
     }
 }
 
-impl<W: Read + Write> Port for Board<'_, W> {
+impl<W: Read + Write, N: FnMut()> Port for Board<'_, W, N> {
     fn now_us(&mut self) -> u32 {
         self.start.elapsed().as_micros() as u32
     }
@@ -65,12 +67,19 @@ impl<W: Read + Write> Port for Board<'_, W> {
             self.taken = 0;
             let count = match self.wire.read(&mut self.received) {
                 Ok(0) => {
+                    // The thread goes on as long as the tests do: it shall not take time from them.
+                    std::thread::sleep(Duration::from_millis(20));
                     self.gone = true;
                     0
                 }
                 Ok(count) => count,
-                Err(_) => {
+                Err(cause) if is_timeout(&cause) => {
                     std::thread::yield_now();
+                    0
+                }
+                // Nobody is there at the moment.
+                Err(_) => {
+                    std::thread::sleep(Duration::from_millis(1));
                     0
                 }
             };
@@ -78,6 +87,9 @@ impl<W: Read + Write> Port for Board<'_, W> {
         }
         let byte = *self.received.get(self.taken)?;
         self.taken += 1;
+        if byte == 0 {
+            (self.notice)();
+        }
         self.spoil(byte)
     }
 
@@ -92,7 +104,7 @@ impl<W: Read + Write> Port for Board<'_, W> {
     }
 }
 
-impl<W: Read + Write> Platform for Board<'_, W> {
+impl<W: Read + Write, N: FnMut()> Platform for Board<'_, W, N> {
     type Settings = SettingPages<MemorySlot>;
 
     const BOARD: &'static str = "virtual";
@@ -106,6 +118,10 @@ impl<W: Read + Write> Platform for Board<'_, W> {
     fn settings(&mut self) -> &mut SettingPages<MemorySlot> {
         self.settings
     }
+}
+
+fn is_timeout(cause: &std::io::Error) -> bool {
+    matches!(cause.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut)
 }
 
 /// Sensor that goes through given frames again and again.
@@ -130,6 +146,8 @@ impl FrameSource for Source {
 struct MemorySlot(Vec<u32>);
 
 impl Slot for MemorySlot {
+    const ERASE_INTERVAL_S: u32 = 0;
+
     fn bytes(&self) -> &[u8] {
         bytemuck::cast_slice(&self.0)
     }
@@ -157,15 +175,40 @@ pub fn run(
     run_with(wire, line, model, Source { frames, next: 0 });
 }
 
-/// Runs a device on `wire` that scans `source`, until the host goes. The device is restarted whenever it
-/// asks for that.
+/// Runs a device on `wire` that scans `source` when the host asks for it: see [`run_on_its_own`].
+pub fn run_with(
+    wire: impl Read + Write + Send + 'static,
+    line: Line,
+    model: &[u8],
+    source: impl FrameSource + Clone + Send + 'static,
+) {
+    let quiet = Configuration { frame_period_us: 0, ..Configuration::DEFAULT };
+    run_on_its_own(wire, line, model, source, quiet, || ());
+}
+
+/// Runs a device on `wire` that goes through `frames` by its `own` configuration, and calls `notice` with each
+/// request's last byte, before it is carried out.
+pub fn run_scanning(
+    wire: impl Read + Write + Send + 'static,
+    model: &[u8],
+    frames: Vec<[[f32; 18]; 8]>,
+    own: Configuration,
+    notice: impl FnMut() + Send + 'static,
+) {
+    run_on_its_own(wire, Line { one_in: None }, model, Source { frames, next: 0 }, own, notice);
+}
+
+/// Runs a device on `wire` that scans `source`, until the host goes. The device is restarted whenever it asks for
+/// that.
 ///
 /// `wire` must read without blocking.
-pub fn run_with(
+fn run_on_its_own(
     mut wire: impl Read + Write + Send + 'static,
     line: Line,
     model: &[u8],
     source: impl FrameSource + Clone + Send + 'static,
+    own: Configuration,
+    mut notice: impl FnMut() + Send + 'static,
 ) {
     let mut slots = [0, 1].map(|_| MemorySlot(vec![u32::MAX; 128 * 1024 / 4]));
     bytemuck::cast_slice_mut(&mut slots[0].0)[..model.len()].copy_from_slice(model);
@@ -178,6 +221,7 @@ pub fn run_with(
             let board = Board {
                 wire: &mut wire,
                 settings: &mut settings,
+                notice: &mut notice,
                 start: Instant::now(),
                 line,
                 random: Random::new(5, Stream::Test, Purpose::Damage, life, 2),
@@ -186,9 +230,8 @@ pub fn run_with(
                 to_send: Vec::new(),
                 gone: false,
             };
-            let quiet = Configuration { frame_period_us: 0, ..Configuration::DEFAULT };
             let mut buffers = Buffers::<8, 18, 18, { Capacity::PAPER.message_bytes() }>::new();
-            let mut app = App::new(board, source.clone(), quiet, &mut buffers);
+            let mut app = App::new(board, source.clone(), own, &mut buffers);
             app.run(&mut slots, &mut weights);
             app.platform().flush();
             if app.platform().gone {

@@ -11,6 +11,7 @@ use crate::projection::{self, Projection};
 use crate::rbf::{
     Cut, Format, Layout, Network, NetworkError, Packed, Shape, direct, expanded, fixed16,
 };
+use crate::scale::{HALF_RANGE, UNITS};
 
 /// A model, borrowed from a blob whose every byte and value has been checked.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -80,6 +81,23 @@ impl<'a> Model<'a> {
         let prefix = checked_prefix(slot).ok()?;
         Some(u32::from_le_bytes(prefix.length) as usize)
     }
+
+    /// Length in bytes and shape that the blob starting with `head` declares; [`HEAD_BYTES`](Self::HEAD_BYTES) are
+    /// enough.
+    ///
+    /// `None` if `head` is no start of a blob of this version, or too short. Nothing else is checked.
+    #[must_use]
+    pub fn declared(head: &[u8]) -> Option<(usize, ModelShape)> {
+        let length = Self::declared_length(head)?;
+        let fields = take::<(u8, u16, u16)>(head.get(PREFIX_BYTES..)?, "shape");
+        let ((rows, inputs, outputs), _) = fields.ok()?;
+        let shape =
+            ModelShape { rows: rows.into(), inputs: inputs.into(), outputs: outputs.into() };
+        Some((length, shape))
+    }
+
+    /// Number of bytes at a blob's start that declare its length and its shape. Every blob has more.
+    pub const HEAD_BYTES: usize = PREFIX_BYTES + 1 + 3 + 3;
 
     /// The model's number of rows, and of inputs and outputs a row.
     #[must_use]
@@ -319,6 +337,29 @@ impl<'a> NetworkSection<'a> {
     /// The network's format.
     pub fn format(&self) -> Format {
         self.format
+    }
+
+    /// Whether one of `inputs` is clamped, because it lies an eighth of the training range or more beyond it.
+    #[inline(never)]
+    pub fn clamps(&self, inputs: &[f32]) -> bool {
+        // From UNITS on, an exponent carries into the sign; so there is no branch for each input.
+        const EXPONENT: u32 = 0x7F80_0000;
+        const TO_THE_SIGN: u32 = 0x8000_0000 - UNITS.to_bits();
+        // From scaled inputs to units about the middle of the range, where the clamp is at ±UNITS.
+        let (units, offset) = match self.format {
+            Format::F32Direct => (UNITS / HALF_RANGE, -0.5 * UNITS / HALF_RANGE),
+            Format::F32 | Format::Fixed16 => (1.0, 0.0),
+        };
+        // In every format the block starts with what is subtracted from each input, and then multiplied with it.
+        let Some((middles, factors)) = self.block.split_at_checked(inputs.len()) else {
+            return false;
+        };
+        let mut carry = 0;
+        for (input, (middle, factor)) in inputs.iter().zip(middles.iter().zip(factors)) {
+            let scaled = (input - f32::from_bits(*middle)) * f32::from_bits(*factor);
+            carry |= ((scaled * units + offset).to_bits() & EXPONENT) + TO_THE_SIGN;
+        }
+        carry >> 31 == 1
     }
 
     /// The section's network if its format is `f32-direct`; else an error.

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use firmware::link::message::{Refusal, Report, Request, UploadState, UploadStep};
-
+use model_core::blob::Model;
 use taxel_data::progress::Progress;
 
 use super::{Device, DeviceIdentity, Wire};
@@ -31,19 +31,28 @@ pub fn step<W: Wire>(
     })
 }
 
+/// First step of the upload of `blob`.
+#[must_use]
+pub fn begin(blob: &[u8]) -> UploadStep<'_> {
+    UploadStep::Begin { head: &blob[..blob.len().min(Model::HEAD_BYTES)] }
+}
+
 /// Sends `blob` from beginning to commit, until the device refuses a step.
 ///
 /// # Errors
-/// [`Error::NoAnswer`] if the device stops answering.
+/// [`Error::NoAnswer`] if the device stops answering, [`Error::ChunkSize`] if no chunk can be sent.
 pub fn send<W: Wire>(
     device: &mut Device<W>,
     blob: &[u8],
     chunk_bytes: usize,
     progress: &dyn Progress,
 ) -> Result<std::result::Result<UploadState, Refusal>> {
+    if chunk_bytes == 0 || !chunk_bytes.is_multiple_of(4) {
+        return Err(Error::ChunkSize(chunk_bytes));
+    }
     let chunks = blob.chunks(chunk_bytes);
     progress.stage("uploading the model", chunks.len());
-    let mut answer = step(device, UploadStep::Begin { length: blob.len() as u32 })?;
+    let mut answer = step(device, begin(blob))?;
     for (index, bytes) in chunks.enumerate() {
         if answer.is_err() {
             return Ok(answer);
@@ -58,15 +67,26 @@ pub fn send<W: Wire>(
 /// Uploads `blob`, makes it the active model, and checks that it is.
 ///
 /// # Errors
-/// [`Error`] if the device refuses it; its previous model then stays active.
+/// [`Error`] if the device refuses it or has no room for it, or the work is interrupted before the last step; its
+/// previous model then stays active.
 pub fn replace<W: Wire>(
     device: &mut Device<W>,
     blob: &[u8],
     progress: &dyn Progress,
 ) -> Result<DeviceIdentity> {
-    let chunk_bytes = device.identify()?.chunk_bytes;
-    let outcome = send(device, blob, chunk_bytes, progress)?;
-    let crc_32 = match outcome.map_err(Error::Refused)? {
+    let identity = device.identify()?;
+    let capacity = identity.capacity();
+    if let Some((_, shape)) = Model::declared(blob)
+        && capacity.wires_for(shape).is_none()
+    {
+        return Err(Error::NoRoom { capacity, shape });
+    }
+    let outcome = send(device, blob, identity.chunk_bytes, progress);
+    if matches!(outcome, Err(Error::Interrupted)) {
+        // The device has forgotten the upload when it resumes its work.
+        let _ = device.uninterrupted(|device| step(device, UploadStep::Abort));
+    }
+    let crc_32 = match outcome?.map_err(Error::Refused)? {
         UploadState::Committed { crc_32 } => crc_32,
         other => {
             let (request, answer) = ("a commit".into(), format!("{other:?}"));

@@ -26,6 +26,8 @@ impl VirtualBoard {
         loop {
             match line.read(&mut bytes) {
                 Ok(0) => return self.check(),
+                // The line was closed while bytes were on their way.
+                Err(cause) if cause.kind() == ErrorKind::ConnectionReset => return self.check(),
                 Ok(count) => pending.extend_from_slice(&bytes[..count]),
                 Err(cause) if cause.kind() == ErrorKind::Interrupted => continue,
                 Err(cause) => return Err(cause.into()),

@@ -94,8 +94,8 @@ pub fn configure<W: Wire>(
     action: &ConfigureArguments,
     common: &Common,
 ) -> Result<()> {
-    let configuration = action.changed(device.configuration()?);
-    device.configure(configuration)?;
+    let configuration = action.changed(device.configuration()?.configuration);
+    device.configure_until_restart(configuration)?;
     device.keep(Setting::Configuration)?;
     show(device, common)
 }
@@ -124,8 +124,11 @@ fn show<W: Wire>(device: &mut Device<W>, common: &Common) -> Result<()> {
         Err(taxel_rig::Error::Refused(_)) => None,
         constants => Some(constants?),
     };
-    let settings =
-        Settings { configuration: device.configuration()?, constants, kept: device.kept()? };
+    let settings = Settings {
+        configuration: device.configuration()?.configuration,
+        constants,
+        kept: device.kept()?,
+    };
     if common.json {
         return print::json(&settings);
     }

@@ -11,6 +11,7 @@ fn good() -> Findings {
         outputs: 1,
         kernel: "libm".into(),
         model: None,
+        model_name: String::new(),
         slot_bytes: 0,
         chunk_bytes: 0,
         memory: firmware::link::message::Memory::default(),

@@ -115,8 +115,7 @@ fn break_uploads_off<W: Wire>(
     progress.stage("breaking uploads off", chunks.len() + 1);
     let mut stayed = 0;
     for taken in 0..=chunks.len() {
-        let length = blob.len() as u32;
-        expect_receiving(upload::step(device, UploadStep::Begin { length })?)?;
+        expect_receiving(upload::step(device, upload::begin(blob))?)?;
         for (index, bytes) in chunks.iter().take(taken).enumerate() {
             let offset = (index * chunk_bytes) as u32;
             expect_receiving(upload::step(device, UploadStep::Chunk { offset, bytes })?)?;
@@ -202,7 +201,7 @@ fn upload_with_a_chunk_lost<W: Wire>(
     chunk_bytes: usize,
     random: &mut Random,
 ) -> Result<bool> {
-    expect_receiving(upload::step(device, UploadStep::Begin { length: blob.len() as u32 })?)?;
+    expect_receiving(upload::step(device, upload::begin(blob))?)?;
     let chunks: Vec<&[u8]> = blob.chunks(chunk_bytes).collect();
     let lost = random.below(chunks.len());
     for (index, bytes) in chunks.iter().enumerate() {

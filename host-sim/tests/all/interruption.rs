@@ -1,0 +1,382 @@
+//! The host is killed or interrupted while a device works for it: the device goes back to its own work.
+
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use crate::common::Folder;
+use crate::device::{frames, model};
+use crate::virtual_device;
+use firmware::link::message::{Configuration, Identity, Memory, Report, Request};
+use firmware::link::receive::{Received, Receiver};
+use firmware::link::{cobs, packet};
+use model_core::blob::Floats;
+use serialport::{SerialPort, TTYPort};
+use taxel_rig::device::{Device, serial};
+
+/// Length of the leases.
+const LEASE: Duration = Duration::from_millis(100);
+
+/// Time by which a busy computer may be late.
+const LATE: Duration = Duration::from_millis(1500);
+
+/// Far end of a pseudo-terminal, which is like a serial port: bytes that nobody reads are lost.
+struct Far(TTYPort);
+
+impl std::io::Read for Far {
+    fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
+        match self.0.read(bytes) {
+            Ok(0) => Err(std::io::ErrorKind::NotConnected.into()),
+            other => other,
+        }
+    }
+}
+
+impl std::io::Write for Far {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        Ok(self.0.write(bytes).unwrap_or(bytes.len()))
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+/// Far end of a new pseudo-terminal, and the name of the near end.
+fn terminal() -> (Far, String) {
+    let (mut far, near) = TTYPort::pair().unwrap();
+    far.set_timeout(Duration::from_millis(1)).unwrap();
+    (Far(far), near.name().unwrap())
+}
+
+/// How the host ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum End {
+    Kill,
+    Interrupt,
+    Terminate,
+}
+
+/// Host to be ended, and the number of requests until then.
+#[derive(Default)]
+struct Trap {
+    host: Option<Child>,
+    requests_left: usize,
+    end: Option<End>,
+}
+
+impl Trap {
+    /// Counts a request, and ends the host at the last one, before the device carries it out.
+    fn count(&mut self) {
+        self.requests_left = self.requests_left.saturating_sub(1);
+        if self.requests_left > 0 {
+            return;
+        }
+        let (Some(host), Some(end)) = (&mut self.host, self.end.take()) else { return };
+        match end {
+            End::Kill => {
+                host.kill().unwrap();
+                host.wait().unwrap();
+            }
+            End::Interrupt => signal(host, "-INT"),
+            End::Terminate => signal(host, "-TERM"),
+        }
+    }
+}
+
+fn signal(host: &Child, name: &str) {
+    let status = Command::new("kill").args([name, &host.id().to_string()]).status();
+    assert!(status.unwrap().success());
+}
+
+/// Device on a pseudo-terminal that scans all the time.
+struct Rig {
+    port: String,
+    lease: Duration,
+    trap: Arc<Mutex<Trap>>,
+    folder: Folder,
+}
+
+const OWN: Configuration = Configuration { frame_period_us: 5000, ..Configuration::DEFAULT };
+
+impl Rig {
+    fn new(name: &str, model: &[u8]) -> Self {
+        let (far, port) = terminal();
+        let trap = Arc::new(Mutex::new(Trap::default()));
+        let counter = trap.clone();
+        virtual_device::run_scanning(far, model, frames(), OWN, move || {
+            counter.lock().unwrap().count();
+        });
+        Self { port, lease: LEASE, trap, folder: Folder::new(name) }
+    }
+
+    /// Runs a command of `link`, and ends it at request number `requests`. Returns its status, and whether it was
+    /// ended.
+    fn end_at(&self, arguments: &[&str], requests: usize, end: End) -> (ExitStatus, bool) {
+        let lease = format!("--lease-ms={}", self.lease.as_millis());
+        {
+            let mut trap = self.trap.lock().unwrap();
+            let host = Command::new(env!("CARGO_BIN_EXE_host-sim"))
+                .args(["link", &lease, &self.port])
+                .args(arguments)
+                .current_dir(self.folder.path("."))
+                .stdout(Stdio::null())
+                .stderr(Stdio::null())
+                .spawn()
+                .unwrap();
+            *trap = Trap { host: Some(host), requests_left: requests, end: Some(end) };
+        }
+        loop {
+            let mut trap = self.trap.lock().unwrap();
+            if let Some(status) = trap.host.as_mut().unwrap().try_wait().unwrap() {
+                return (status, trap.end.take().is_none());
+            }
+            drop(trap);
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+
+    /// Waits until the device scans by its own configuration; returns whether it did so at once. Looking on does not
+    /// prolong a lease.
+    fn wait_for_own_scans(&self) -> bool {
+        let start = Instant::now();
+        let mut device = self.device();
+        let mut looks = 0;
+        while device.configuration().unwrap().lease_left_ms > 0 {
+            looks += 1;
+            assert!(start.elapsed() < self.lease + LATE, "the lease does not end");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        assert_eq!(device.configuration().unwrap().configuration, OWN);
+        let before = device.statistics().unwrap().frames_scanned;
+        while device.statistics().unwrap().frames_scanned == before {
+            assert!(start.elapsed() < self.lease + LATE, "the device does not scan");
+        }
+        looks == 0
+    }
+
+    /// Host of the device's own.
+    fn device(&self) -> Device<Box<dyn SerialPort>> {
+        let deadline = Instant::now() + Duration::from_secs(5);
+        loop {
+            // The port may still be held by a host that was just killed.
+            match serial::open(&self.port, 921_600) {
+                Ok(port) => return Device::new(port).unwrap(),
+                Err(cause) => assert!(Instant::now() < deadline, "{cause}"),
+            }
+        }
+    }
+
+    /// CRC-32 of the active model.
+    fn model(&self) -> u32 {
+        self.device().identify().unwrap().model.unwrap().crc_32
+    }
+}
+
+#[test]
+fn whenever_the_host_of_an_upload_dies_the_device_scans_on_with_the_old_model_or_the_new() {
+    let models = [model(3), model(4)];
+    let rig = Rig::new("killed", models[0].bytes());
+    let files = models.each_ref().map(|model| model.parse().crc());
+    for (name, model) in ["0.bin", "1.bin"].iter().zip(&models) {
+        rig.folder.write(name, model.bytes());
+    }
+    let (mut old, mut exchanged) = (0, 0);
+    for is_killed in [true, false] {
+        for requests in 1.. {
+            let new = 1 - old;
+            let end = match requests % 2 {
+                _ if is_killed => End::Kill,
+                0 => End::Interrupt,
+                _ => End::Terminate,
+            };
+            let (status, ended) = rig.end_at(&["upload", ["0.bin", "1.bin"][new]], requests, end);
+            if !ended {
+                assert!(status.success(), "{end:?} {requests}: {status}");
+                assert!(requests > 15, "only {requests} requests");
+                assert_eq!(rig.model(), files[new]);
+                old = new;
+                break;
+            }
+            if end == End::Kill {
+                assert_eq!(status.code(), None, "{requests}");
+            } else {
+                // The answer to the very last request may come before the host looks at the signal.
+                assert!([Some(130), Some(0)].contains(&status.code()), "{requests}: {status}");
+            }
+            let at_once = rig.wait_for_own_scans();
+            assert!(end == End::Kill || at_once, "{end:?} {requests}");
+            let found = rig.model();
+            assert!(files.contains(&found), "{end:?} {requests}: model {found:08x}");
+            if found == files[new] {
+                (old, exchanged) = (new, exchanged + 1);
+            }
+        }
+    }
+    assert!(exchanged > 3, "some died after the commit: {exchanged}");
+}
+
+#[test]
+#[ignore = "takes half a minute"]
+fn after_the_usual_lease_a_device_whose_host_was_killed_scans_on() {
+    let (old, new) = (model(3), model(4));
+    let rig = Rig { lease: taxel_rig::device::LEASE, ..Rig::new("usual", old.bytes()) };
+    rig.folder.write("new.bin", new.bytes());
+    for end in [End::Kill, End::Interrupt, End::Kill] {
+        // Request 9 is a chunk.
+        let (status, _) = rig.end_at(&["upload", "new.bin"], 9, end);
+        let start = Instant::now();
+        rig.wait_for_own_scans();
+        let took_s = start.elapsed().as_secs_f64();
+        println!("{end:?}: {status}; its own scans again after {took_s:.2} s");
+        let expected_s = if end == End::Kill { 9.5..10.5 } else { 0.0..0.5 };
+        assert!(expected_s.contains(&took_s), "{took_s}");
+        assert_eq!(rig.model(), old.parse().crc());
+    }
+}
+
+#[test]
+fn a_recording_that_is_interrupted_leaves_no_file_and_the_device_as_it_was() {
+    let rig = Rig::new("interrupted", model(3).bytes());
+    let commands = [
+        &["record", "-n", "50000", "-o", "x.csv", "--period-us", "1000"][..],
+        &["baseline", "-n", "50000", "-o", "x.csv", "--period-us", "1000"],
+    ];
+    for arguments in commands {
+        for end in [End::Interrupt, End::Kill] {
+            // Requests 4 and 5 prolong the lease, or are the baseline's: by then the device scans for the host.
+            let (status, ended) = rig.end_at(arguments, 5, end);
+            assert!(ended, "{arguments:?}");
+            assert_eq!(status.code(), (end == End::Interrupt).then_some(130), "{arguments:?}");
+            let at_once = rig.wait_for_own_scans();
+            assert!(end == End::Kill || at_once, "{arguments:?}");
+            assert!(rig.folder.names().is_empty(), "{:?}", rig.folder.names());
+        }
+    }
+}
+
+#[test]
+fn who_looks_on_sees_that_a_host_has_paused_the_device() {
+    let rig = Rig::new("looking", model(3).bytes());
+    let mut device = rig.device();
+    let paused = Configuration { frame_period_us: 0, ..Configuration::DEFAULT };
+    device.lease = Duration::from_millis(29_900);
+    device.configure(paused).unwrap();
+    drop(device);
+    let page = rig.folder.succeed(&["link", &rig.port, "identify"]);
+    assert!(page.contains("not scanning: paused by a host, for 29."), "{page}");
+    rig.device().resume().unwrap();
+    let page = rig.folder.succeed(&["link", &rig.port, "identify"]);
+    assert!(page.contains("scanning          a frame every 5 ms\n"), "{page}");
+}
+
+#[test]
+fn a_model_of_another_sensor_is_noted() {
+    let old = model(3);
+    let rig = Rig::new("another", old.bytes());
+    let lines: Vec<String> =
+        (0..40).map(|i| format!("{},{},{}", i % 7, i % 11, (i % 7) * (i % 11))).collect();
+    rig.folder.write("force.csv", format!("a_v,b_v,f_n\n{}\n", lines.join("\n")));
+    let train = ["train", "force.csv", "--inputs", "a_v,b_v", "--outputs", "f_n"];
+    rig.folder.succeed(&[&train[..], &["--centres", "3", "-o", "force.bin"]].concat());
+    rig.folder.write("press.bin", old.bytes());
+    for (file, notes) in [
+        (
+            "force.bin",
+            &["was \"press\", this one is \"force\"", "names or units", "another scene"][..],
+        ),
+        ("press.bin", &["was \"force\", this one is \"press\""]),
+        ("press.bin", &[]),
+    ] {
+        let output = rig.folder.run(&["link", &rig.port, "upload", file]);
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{message}");
+        assert_eq!(message.contains("note:"), !notes.is_empty(), "{message}");
+        assert!(notes.iter().all(|note| message.contains(note)), "{message}");
+    }
+}
+
+/// Device that answers as little as a recording needs, and then sends `frames`: each its number, the time of its
+/// scan, and its number of readings.
+fn liar(frames: &'static [(u32, u64, usize)]) -> String {
+    use std::io::{Read, Write};
+    let (mut far, port) = terminal();
+    let mut receiver = Receiver::new([0; 1024]);
+    std::thread::spawn(move || {
+        loop {
+            let mut byte = [0];
+            if far.read(&mut byte).is_err() {
+                std::thread::sleep(Duration::from_millis(1));
+                continue;
+            }
+            let Some(Received::Frame(bytes)) = receiver.push(byte[0]) else { continue };
+            let Ok(request) = packet::decode::<Request<'_>>(bytes) else { continue };
+            let mut send = |number, report: &Report<'_>| {
+                let mut buffer = [0; 1024];
+                let mut bytes = Vec::new();
+                cobs::encode(packet::encode(number, report, &mut buffer).unwrap(), |byte| {
+                    bytes.push(byte);
+                    true
+                });
+                far.write_all(&bytes).unwrap();
+            };
+            let identity = Identity {
+                board: "liar",
+                firmware: "0",
+                rows: 8,
+                columns: 18,
+                outputs: 18,
+                kernel: "polynomial",
+                model: None,
+                model_name: "",
+                slot_bytes: 1000,
+                chunk_bytes: 0,
+                memory: Memory::default(),
+            };
+            let (scans, configuration) = match request.body {
+                Request::Identify => {
+                    send(request.number, &Report::Identity(identity));
+                    continue;
+                }
+                Request::Configure { configuration, .. } => {
+                    (configuration.frame_period_us > 0, configuration)
+                }
+                _ => (false, Configuration::DEFAULT),
+            };
+            send(request.number, &Report::Configuration { configuration, lease_left_ms: 1 });
+            for (frame, start_us, readings) in frames.iter().take(if scans { 9 } else { 0 }) {
+                let readings = vec![60.0; *readings];
+                let readings_ohm = Floats::of(&readings);
+                let (frame, start_us) = (*frame, *start_us);
+                send(packet::UNASKED, &Report::Readings { frame, start_us, readings_ohm });
+            }
+        }
+    });
+    port
+}
+
+#[test]
+fn a_frame_of_another_length_is_refused_and_a_number_may_wrap_around() {
+    let folder = Folder::new("liar");
+    let port = liar(&[(1, 10, 144), (2, 20, 3), (3, 30, 144)]);
+    let output = folder.run(&["link", &port, "record", "-n", "3", "-o", "x.csv"]);
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(message.contains("frame 2 has 3 values instead of 144"), "{message}");
+
+    // A device that has restarted begins anew with its numbers, or at least with its time.
+    for restarted in [
+        &[(7_u32, 70_u64, 144_usize), (1, 10, 144), (2, 20, 144)],
+        &[(7, 70, 144), (8, 10, 144), (9, 20, 144)],
+    ] {
+        let output = folder.run(&["link", &liar(restarted), "record", "-n", "3", "-o", "x.csv"]);
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{message}");
+        assert!(message.contains("restarted"), "{message}");
+    }
+    assert!(folder.names().is_empty());
+
+    let port = liar(&[(u32::MAX - 1, 10, 144), (u32::MAX, 20, 144), (1, 40, 144)]);
+    let page = folder.succeed(&["link", &port, "record", "-n", "3", "-o", "x.csv"]);
+    assert!(page.contains("3 frames in x.csv, 1 lost"), "{page}");
+}
