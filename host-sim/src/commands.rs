@@ -4,8 +4,8 @@ mod print;
 mod progress;
 mod arguments;
 mod scene_argument;
-mod check_arguments;
 mod readings;
+mod check_arguments;
 mod interruption;
 
 pub mod run;

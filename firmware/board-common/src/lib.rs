@@ -49,8 +49,8 @@ pub type BoardBuffers = Buffers<
 #[cfg(target_os = "none")]
 struct Place(UnsafeCell<BoardBuffers>);
 
-// SAFETY: only `buffers` uses the place, and lends it once.
 #[cfg(target_os = "none")]
+// SAFETY: only `buffers` uses the place, and lends it once.
 unsafe impl Sync for Place {}
 
 /// Takes the application's buffers; `None` after the first call. They are zero at first, so that they need neither

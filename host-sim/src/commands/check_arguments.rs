@@ -13,9 +13,8 @@ use taxel_simulate::sensor::Precision;
 use taxel_simulate::synth::BASELINE_FRAMES;
 use taxel_simulate::{Synthesis, World, synthesise};
 
-use super::decode::model_inputs;
 use super::progress::Terminal;
-use super::readings::BaselineArgument;
+use super::readings::{BaselineArgument, model_inputs};
 use super::scene_argument::SceneArgument;
 use super::{Common, arguments, print};
 

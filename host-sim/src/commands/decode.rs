@@ -12,7 +12,7 @@ use taxel_learn::infer::is_missing;
 use taxel_learn::{Exponential, ModelBlob, PreparedModel};
 
 use super::arguments::exponential;
-use super::readings::{BaselineArgument, table_of};
+use super::readings::{BaselineArgument, model_inputs};
 use super::{Common, print};
 
 /// Decode readings from a CSV file, one line of estimates a line.
@@ -95,9 +95,4 @@ pub fn remark_on_range(model: &PreparedModel<'_>, readings: &Table) {
             100.0 * share
         );
     }
-}
-
-/// Columns of `file` with the model's readings.
-pub fn model_inputs(model: &PreparedModel<'_>, file: &CsvFile) -> Result<Table> {
-    table_of(file, model.model().metadata().input_names.iter())
 }

@@ -11,8 +11,8 @@ use taxel_learn::{Exponential, ModelBlob};
 
 use super::arguments::exponential;
 use super::decode::remark_on_range;
-use super::readings::{BaselineArgument, table_of};
-use super::{Common, decode, print};
+use super::readings::{BaselineArgument, model_inputs, table_of};
+use super::{Common, print};
 
 /// Evaluate a model on a CSV file of readings and true outputs.
 #[derive(Args)]
@@ -48,7 +48,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let blob = ModelBlob::read(&arguments.model)?;
     let model = arguments.baseline.apply(blob.prepare(arguments.exponential), &arguments.model)?;
     let file = CsvFile::read(&arguments.data)?;
-    let readings = decode::model_inputs(&model, &file)?;
+    let readings = model_inputs(&model, &file)?;
     let metadata = model.model().metadata();
     let mut truth = table_of(&file, metadata.output_names.iter())?;
     let estimate = model.decode_table(&readings);

@@ -89,6 +89,11 @@ fn unusable(baseline: &Table) -> Vec<String> {
     columns.filter(|(ratio, _)| ratio.is_nan()).map(|(_, name)| name.clone()).collect()
 }
 
+/// Columns of `file` with the model's readings.
+pub fn model_inputs(model: &PreparedModel<'_>, file: &CsvFile) -> Result<Table> {
+    table_of(file, model.model().metadata().input_names.iter())
+}
+
 /// Columns of `file` called `names`.
 pub fn table_of<'n>(file: &CsvFile, names: impl Iterator<Item = &'n str>) -> Result<Table> {
     let names: Vec<&str> = names.collect();

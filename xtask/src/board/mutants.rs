@@ -86,7 +86,7 @@ pub const MUTANTS: &[Mutant] = &[
     mutant(
         "not-fed-before-erase",
         "firmware/src/app/answer.rs",
-        Instead("|| platform.feed_watchdog()", "|| _ = platform"),
+        Instead("platform.feed_watchdog();", "_ = platform;"),
         ["slow-erase-bare", "resets by: watchdog"],
     ),
     mutant(
