@@ -18,7 +18,6 @@ pub(crate) const OUTPUTS: usize = 18;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Finite {
     /// All readings were finite.
-    #[cfg_attr(not(cortex_m4f), expect(dead_code, reason = "assembly alone tells on the side"))]
     Known,
     /// Some reading may have been NaN or infinite, or just beyond the clamp.
     Unknown,

@@ -8,14 +8,15 @@ use crate::gate::Gate;
 use crate::projection::Projection;
 use crate::rbf::expanded::Expanded;
 use crate::rbf::fixed16::Fixed16;
-use crate::rbf::{Format, NetworkError};
+use crate::rbf::{Format, NetworkError, Packed};
 use crate::relative::relative;
+use crate::scale::{HALF_RANGE, UNITS};
 
 /// RAM in bytes that a [`Decoder`] for at most so many `rows` takes on a 32-bit target, for any K: slices into the
 /// blob. The firmware's link check compares it with the compiler's own figure.
 #[must_use]
 pub const fn decoder_ram_bytes(rows: usize) -> usize {
-    136 + 16 * rows
+    136 + 28 * rows
 }
 
 /// A frame to be decoded, and what is known of the sensor at rest.
@@ -90,8 +91,42 @@ impl<'f> From<&'f [f32]> for Frame<'f> {
 #[derive(Debug, Clone, Copy)]
 pub struct Decoder<'a, const ROWS: usize> {
     model: Model<'a>,
-    /// The section of each row's network; rows beyond the model's have none.
-    row_sections: [NetworkSection<'a>; ROWS],
+    /// Each row's network; rows beyond the model's have none.
+    row_networks: [RowNetwork<'a>; ROWS],
+}
+
+/// The network of a row, made ready when the model is loaded.
+#[derive(Debug, Clone, Copy)]
+enum RowNetwork<'a> {
+    /// A network in `f32-direct`, which is large: it is cut from its section for each row.
+    F32Direct(NetworkSection<'a>),
+    /// A network in `f32`.
+    F32(Packed<'a, Expanded>),
+    /// A network in `fixed16`.
+    Fixed16(Packed<'a, Fixed16>),
+}
+
+impl<'a> RowNetwork<'a> {
+    /// No network: whatever it is given is missing.
+    const NONE: Self = Self::F32Direct(NetworkSection::EMPTY);
+
+    fn of(section: NetworkSection<'a>, shape: ModelShape) -> Result<Self, NetworkError> {
+        match section.format() {
+            Format::F32Direct => Ok(Self::F32Direct(section)),
+            Format::F32 => section.packed(shape).map(Self::F32),
+            Format::Fixed16 => section.packed(shape).map(Self::Fixed16),
+        }
+    }
+
+    /// Whether one of `inputs` is clamped, because it lies an eighth of the training range or more beyond it.
+    fn clamps(&self, inputs: &[f32]) -> bool {
+        let (format, words) = match self {
+            Self::F32Direct(section) => (Format::F32Direct, section.words()),
+            Self::F32(network) => (Format::F32, network.block()),
+            Self::Fixed16(network) => (Format::Fixed16, network.block()),
+        };
+        clamps(format, words, inputs)
+    }
 }
 
 impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
@@ -112,17 +147,16 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
         if rows > ROWS {
             return Err(DecodeError::TooManyRows { most: ROWS, found: rows });
         }
-        let mut row_sections = [NetworkSection::EMPTY; ROWS];
-        for (row, section) in row_sections.iter_mut().take(rows).enumerate() {
+        let mut row_networks = [RowNetwork::NONE; ROWS];
+        for (row, place) in row_networks.iter_mut().take(rows).enumerate() {
             // A sound model has a network for every row.
             let networks = model.network_count() as u8;
-            *section = model.section_of_row(row).ok_or(DecodeError::UnknownNetwork {
-                row,
-                network: networks,
-                networks,
-            })?;
+            let unknown = DecodeError::UnknownNetwork { row, network: networks, networks };
+            let section = model.section_of_row(row).ok_or(unknown)?;
+            *place = RowNetwork::of(section, model.network_shape())
+                .map_err(|cause| DecodeError::Network { index: row as u8, cause })?;
         }
-        Ok(Self { model, row_sections })
+        Ok(Self { model, row_networks })
     }
 
     /// The model that the decoder was made of.
@@ -205,16 +239,16 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
         let relative = self.model.metadata().relative_inputs;
         if let Some(projection) = self.model.projection() {
             let (features, ratios) = more.split_at_mut_checked(inputs).ok_or(too_short)?;
-            let Some(section) = self.row_sections.first() else { return Ok(()) };
-            let array = Array { projection, section, inputs, outputs, relative };
+            let Some(network) = self.row_networks.first() else { return Ok(()) };
+            let array = Array { projection, network, inputs, outputs, relative };
             array.decode(E::exp, frame, [scaled, features, ratios], estimate);
             return Ok(());
         }
         // A model has at least one input and one output a row; `max` tells the compiler.
-        let rows = self.row_sections.iter().zip(readings_ohm.chunks_exact(inputs.max(1)));
+        let rows = self.row_networks.iter().zip(readings_ohm.chunks_exact(inputs.max(1)));
         let outputs = estimate.outputs.chunks_exact_mut(outputs.max(1));
         let places = outputs.zip(estimate.status.iter_mut());
-        for (row, ((section, readings), (outputs, status))) in rows.zip(places).enumerate() {
+        for (row, ((network, readings), (outputs, status))) in rows.zip(places).enumerate() {
             if gate.is_some_and(|gate| gate.give_rest(row, readings, outputs)) {
                 *status = RowStatus::AtRest;
                 continue;
@@ -226,7 +260,7 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
             } else {
                 readings
             };
-            *status = decode_inputs(section, E::exp, given, scaled, outputs);
+            *status = decode_inputs(network, E::exp, given, scaled, outputs);
             if *status != RowStatus::Decoded {
                 outputs.fill(f32::NAN);
             }
@@ -255,21 +289,21 @@ impl<const ROWS: usize> Decoder<'_, ROWS> {
         let ModelShape { inputs, .. } = self.model.shape();
         let second = inputs..inputs.saturating_mul(2);
         let more = scratch.get_mut(second).unwrap_or_default();
-        let rows = self.row_sections.iter().zip(status).enumerate();
+        let rows = self.row_networks.iter().zip(status).enumerate();
         let mut decoded = rows.filter(|(_, (_, status))| **status == RowStatus::Decoded);
         if self.model.projection().is_some() {
-            return decoded.next().is_some_and(|(_, (section, _))| section.clamps(more));
+            return decoded.next().is_some_and(|(_, (network, _))| network.clamps(more));
         }
         let relative = self.model.metadata().relative_inputs;
-        decoded.any(|(row, (section, _))| {
+        decoded.any(|(row, (network, _))| {
             let start = row.saturating_mul(inputs);
             let readings = frame.readings_ohm.get(start..).unwrap_or_default();
             let readings = readings.get(..inputs).unwrap_or_default();
             if relative {
                 divide(readings, frame.reciprocals.get(start..).unwrap_or_default(), more);
-                section.clamps(more)
+                network.clamps(more)
             } else {
-                section.clamps(readings)
+                network.clamps(readings)
             }
         })
     }
@@ -319,7 +353,7 @@ impl<const ROWS: usize> Decoder<'_, ROWS> {
 /// One network for all rows, behind a projection.
 struct Array<'s, 'a> {
     projection: Projection<'a>,
-    section: &'s NetworkSection<'a>,
+    network: &'s RowNetwork<'a>,
     /// Readings of a row, and features of the projection.
     inputs: usize,
     /// Outputs of a row.
@@ -355,7 +389,7 @@ impl Array<'_, '_> {
                 frame.readings_ohm
             };
             self.projection.project(readings, features);
-            match decode_inputs(self.section, exp, features, scaled, estimate.outputs) {
+            match decode_inputs(self.network, exp, features, scaled, estimate.outputs) {
                 RowStatus::Decoded => RowStatus::Decoded,
                 other => {
                     estimate.outputs.fill(f32::NAN);
@@ -382,34 +416,24 @@ impl Array<'_, '_> {
     )
 )]
 fn decode_inputs(
-    section: &NetworkSection<'_>,
+    network: &RowNetwork<'_>,
     exp: fn(f32) -> f32,
     inputs: &[f32],
     scaled: &mut [f32],
     outputs: &mut [f32],
 ) -> RowStatus {
-    let shape = ModelShape { rows: 1, inputs: inputs.len(), outputs: outputs.len() };
-    let finite = match section.format() {
-        Format::F32Direct => return decode_direct(section, exp, inputs, scaled, outputs),
-        Format::F32 => {
-            section.packed::<Expanded>(shape).map(|it| it.infer(inputs, scaled, outputs))
+    let finite = match network {
+        RowNetwork::F32Direct(section) => {
+            return decode_direct(section, exp, inputs, scaled, outputs);
         }
-        Format::Fixed16 => {
-            section.packed::<Fixed16>(shape).map(|it| it.infer(inputs, scaled, outputs))
-        }
+        RowNetwork::F32(network) => network.infer(inputs, scaled, outputs),
+        RowNetwork::Fixed16(network) => network.infer(inputs, scaled, outputs),
     };
-    status_of(finite, inputs)
-}
-
-/// The status of a row in a format whose outputs cannot overflow; that is checked when a model is loaded.
-#[inline(always)]
-#[expect(clippy::inline_always, reason = "an enum that need not be made")]
-fn status_of(finite: Result<Finite, NetworkError>, inputs: &[f32]) -> RowStatus {
-    match finite {
-        Ok(Finite::Known) => RowStatus::Decoded,
-        Ok(Finite::Unknown) if all_finite(inputs) => RowStatus::Decoded,
-        // No error can occur: the network and its sizes were checked when the model was loaded.
-        Ok(Finite::Unknown) | Err(_) => RowStatus::MissingReading,
+    // Outputs cannot overflow in these formats; that is checked when a model is loaded.
+    if finite == Finite::Known || all_finite(inputs) {
+        RowStatus::Decoded
+    } else {
+        RowStatus::MissingReading
     }
 }
 
@@ -435,6 +459,27 @@ fn decode_direct(
     network.scale(inputs, scaled);
     network.infer_scaled(scaled, outputs, exp);
     if all_finite(outputs) { RowStatus::Decoded } else { RowStatus::Overflow }
+}
+
+/// Whether one of `inputs` is clamped by a network of this `format`, whose block has these `words`.
+#[inline(never)]
+fn clamps(format: Format, words: &[u32], inputs: &[f32]) -> bool {
+    // From UNITS on, an exponent carries into the sign; so there is no branch for each input.
+    const EXPONENT: u32 = 0x7F80_0000;
+    const TO_THE_SIGN: u32 = 0x8000_0000 - UNITS.to_bits();
+    // From scaled inputs to units about the middle of the range, where the clamp is at ±UNITS.
+    let (units, offset) = match format {
+        Format::F32Direct => (UNITS / HALF_RANGE, -0.5 * UNITS / HALF_RANGE),
+        Format::F32 | Format::Fixed16 => (1.0, 0.0),
+    };
+    // In every format the block starts with what is subtracted from each input, and then multiplied with it.
+    let Some((middles, factors)) = words.split_at_checked(inputs.len()) else { return false };
+    let mut carry = 0;
+    for (input, (middle, factor)) in inputs.iter().zip(middles.iter().zip(factors)) {
+        let scaled = (input - f32::from_bits(*middle)) * f32::from_bits(*factor);
+        carry |= ((scaled * units + offset).to_bits() & EXPONENT) + TO_THE_SIGN;
+    }
+    carry >> 31 == 1
 }
 
 /// Whether all `values` are finite, by the carry out of the exponent, without a branch for each.

@@ -11,7 +11,6 @@ use crate::projection::{self, Projection};
 use crate::rbf::{
     Cut, Format, Layout, Network, NetworkError, Packed, Shape, direct, expanded, fixed16,
 };
-use crate::scale::{HALF_RANGE, UNITS};
 
 /// A model, borrowed from a blob whose every byte and value has been checked.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -131,7 +130,7 @@ impl<'a> Model<'a> {
     }
 
     /// Inputs and outputs of each network; behind a projection, its features and the outputs of all rows.
-    fn network_shape(&self) -> ModelShape {
+    pub(crate) fn network_shape(&self) -> ModelShape {
         let ModelShape { rows, inputs, outputs } = self.shape;
         match self.projection {
             Some(_) => ModelShape { rows: 1, inputs, outputs: rows * outputs },
@@ -339,27 +338,9 @@ impl<'a> NetworkSection<'a> {
         self.format
     }
 
-    /// Whether one of `inputs` is clamped, because it lies an eighth of the training range or more beyond it.
-    #[inline(never)]
-    pub fn clamps(&self, inputs: &[f32]) -> bool {
-        // From UNITS on, an exponent carries into the sign; so there is no branch for each input.
-        const EXPONENT: u32 = 0x7F80_0000;
-        const TO_THE_SIGN: u32 = 0x8000_0000 - UNITS.to_bits();
-        // From scaled inputs to units about the middle of the range, where the clamp is at ±UNITS.
-        let (units, offset) = match self.format {
-            Format::F32Direct => (UNITS / HALF_RANGE, -0.5 * UNITS / HALF_RANGE),
-            Format::F32 | Format::Fixed16 => (1.0, 0.0),
-        };
-        // In every format the block starts with what is subtracted from each input, and then multiplied with it.
-        let Some((middles, factors)) = self.block.split_at_checked(inputs.len()) else {
-            return false;
-        };
-        let mut carry = 0;
-        for (input, (middle, factor)) in inputs.iter().zip(middles.iter().zip(factors)) {
-            let scaled = (input - f32::from_bits(*middle)) * f32::from_bits(*factor);
-            carry |= ((scaled * units + offset).to_bits() & EXPONENT) + TO_THE_SIGN;
-        }
-        carry >> 31 == 1
+    /// The network's block of words.
+    pub fn words(&self) -> &'a [u32] {
+        self.block
     }
 
     /// The section's network if its format is `f32-direct`; else an error.
