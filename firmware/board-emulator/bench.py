@@ -107,6 +107,14 @@ def protocol_version():
     return int(re.search(r"PROTOCOL_VERSION: u8 = (\d+);", PACKET.read_text())[1])
 
 
-def begin(length):
-    """The request that begins an upload of so many bytes."""
-    return b"\x06\x00" + varint(length)
+#: Number of a blob's first bytes that begin an upload, and the place of its length among them.
+HEAD_BYTES = 16
+LENGTH = slice(5, 9)
+
+
+def begin(blob, length=None):
+    """The request that begins the upload of a blob, or of one that says to be of another length."""
+    head = bytearray(blob[:HEAD_BYTES])
+    if length is not None:
+        head[LENGTH] = length.to_bytes(4, "little")
+    return b"\x06\x00" + varint(HEAD_BYTES) + bytes(head)

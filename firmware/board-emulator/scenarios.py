@@ -76,7 +76,7 @@ def slow_erase(make, files):
     """The slowest erase, with the watchdog at its fastest, while the sensor is scanned."""
     bench = make(lsi_hz=FASTEST_LSI_HZ, erase_s=SLOWEST_ERASE_S)
     bench.run_for(0.05)
-    answer, seconds = bench.ask(begin(files.model.stat().st_size), ERASE_PATIENCE_S)
+    answer, seconds = bench.ask(begin(files.model.read_bytes()), ERASE_PATIENCE_S)
     expect(answer[0] == UPLOAD and seconds > SLOWEST_ERASE_S, f"begin is answered by {answer.hex(' ')}")
     bench.run_for(0.1)
     bench.finish()
@@ -88,7 +88,7 @@ def slow_erase_bare(make, files):
     bench.run_for(0.03)
     bench.scan_every(10.0)
     bench.run_for(2.0)
-    answer, seconds = bench.ask(begin(files.model.stat().st_size), ERASE_PATIENCE_S)
+    answer, seconds = bench.ask(begin(files.model.read_bytes()), ERASE_PATIENCE_S)
     expect(answer[0] == UPLOAD and seconds > SLOWEST_ERASE_S, f"begin is answered by {answer.hex(' ')}")
     bench.run_for(0.1)
     bench.finish()
@@ -134,7 +134,7 @@ def log_abandoned(make, files):
     bench.board.rtt.abandon(room=8)
     for _ in range(4):
         # Too large: it is logged, refused, and erases nothing.
-        answer, _ = bench.ask(begin(1 << 20))
+        answer, _ = bench.ask(begin(files.model.read_bytes(), 1 << 20))
         expect(answer[0] == REFUSED, f"begin is answered by {answer.hex(' ')}")
     bench.finish()
 

@@ -25,8 +25,8 @@ pub struct Rest<'a> {
 
 /// Finds the rows of a frame that are at rest (untouched), and gives them the outputs at rest.
 ///
-/// [`Decoder::decode_gated`](crate::Decoder::decode_gated) skips these rows. The gate borrows baseline and outputs,
-/// so that a device keeps one copy of each.
+/// [`Decoder::decode_into`](crate::Decoder::decode_into) skips these rows. The gate borrows baseline and outputs, so
+/// that a device keeps one copy of each.
 ///
 /// ```
 /// use model_core::gate::{Gate, Rest};
