@@ -74,7 +74,7 @@ pub fn run(options: &Options<'_>) -> Outcome {
     }
     let blobs = match options.model {
         Some(model) => models::of_file(Path::new(model), &directory)?,
-        None => models::train(&directory)?,
+        None => models::train(&directory, options.kernel)?,
     };
     // Images are measured on all cores at once, since QEMU runs an image on one.
     let measured: Vec<(Vec<Figure>, Vec<Loop>)> =

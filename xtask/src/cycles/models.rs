@@ -32,12 +32,16 @@ pub struct Blob {
 /// All rows get the first row's network, so that the largest model fits the image's slot. A model that does not
 /// fit is left out.
 ///
+/// With a `kernel`, only its number format is trained; with one that no format has, all are.
+///
 /// # Errors
 /// Training fails, or makes another model than requested.
-pub fn train(directory: &Path) -> Outcome<Vec<Blob>> {
+pub fn train(directory: &Path, kernel: Option<&str>) -> Outcome<Vec<Blob>> {
     fs::create_dir_all(directory).map_err(|cause| failed(directory, &cause))?;
+    let only = kernel.and_then(format_of);
     let wanted: Vec<Wanted> = Format::ALL
         .into_iter()
+        .filter(|format| only.is_none_or(|only| only == *format))
         .flat_map(|format| CENTRES.map(|centres| (format, centres)))
         .flat_map(|(format, centres)| {
             [false, true].map(|whole_array| Wanted { format, centres, whole_array })
@@ -61,6 +65,15 @@ pub fn train(directory: &Path) -> Outcome<Vec<Blob>> {
         }
     }
     Ok(blobs)
+}
+
+/// The number format of a `kernel`, whose name starts with the format's.
+fn format_of(kernel: &str) -> Option<Format> {
+    let named = |format: &Format| {
+        let rest = kernel.strip_prefix(format.name());
+        rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
+    };
+    Format::ALL.into_iter().filter(named).max_by_key(|format| format.name().len())
 }
 
 /// The blob at `path` and, if it has an affine tail, a copy without it, written into `directory`.
@@ -191,6 +204,21 @@ fn failed(path: &Path, cause: &impl ToString) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_kernels_name_tells_its_format() {
+        for (kernel, format) in [
+            ("f32", Some(Format::F32)),
+            ("f32-portable", Some(Format::F32)),
+            ("f32-direct", Some(Format::F32Direct)),
+            ("f32-direct-libm", Some(Format::F32Direct)),
+            ("fixed16-portable", Some(Format::Fixed16)),
+            ("fixed", None),
+            ("f32x", None),
+        ] {
+            assert_eq!(format_of(kernel), format, "{kernel}");
+        }
+    }
 
     #[test]
     fn a_model_without_its_tail_is_otherwise_the_same() {
