@@ -247,7 +247,7 @@ pub fn projections(memory: &mut Memory) -> Option<Comparison> {
         let readings = if readings == 41 { 144 } else { readings };
         let block = last(memory.words, (1 + readings) * features);
         block.iter_mut().for_each(|word| *word = numbers.draw().to_bits());
-        let block = as_floats(block);
+        let block = bytemuck::cast_slice(block);
         let projection = Projection::new(readings, features, block).ok()?;
         let mut given = [0.0; MOST];
         given.fill_with(|| MIDDLE_OHM + 5.0 * numbers.draw());
@@ -260,12 +260,6 @@ pub fn projections(memory: &mut Memory) -> Option<Comparison> {
         comparison.add(same && found.is_untouched_from(features));
     }
     Some(comparison)
-}
-
-/// The same bits as floats.
-fn as_floats(words: &[u32]) -> &[f32] {
-    // SAFETY: both types have the same size and alignment, and any bits are numbers of either.
-    unsafe { slice::from_raw_parts(words.as_ptr().cast(), words.len()) }
 }
 
 /// Compares gates of rows with `COLS` readings and `OUTPUTS` outputs.

@@ -31,11 +31,6 @@ impl<D: RowDrive, S: ColumnSampler, T: DelayNs, C: Circuit, const COLUMNS: usize
         Self { drive, sampler, delay, circuit, idle: [f32::NAN; COLUMNS] }
     }
 
-    /// The circuit, whose constants may be set between scans.
-    pub fn circuit_mut(&mut self) -> &mut C {
-        &mut self.circuit
-    }
-
     fn release(&mut self, report: &mut ScanReport) -> bool {
         let released = self.drive.release().is_ok();
         count_failures(report, usize::from(!released));
