@@ -48,12 +48,6 @@ impl Scope {
         Self::ArrayAwakeFrame,
     ];
 
-    /// Scopes in which every kernel is measured, in the image's order.
-    const OF_IMAGE: [Self; 3] = [Self::Inference, Self::Row, Self::Frame];
-
-    /// Scopes of the gate, measured after all others, with the kernel that the firmware runs.
-    const OF_GATE: [Self; 2] = [Self::RestingFrame, Self::AwakeFrame];
-
     /// Name of the scope in the image's log and in the accepted figures.
     pub fn name(self) -> &'static str {
         match self {
@@ -119,108 +113,76 @@ impl<'f> Group<'f> {
     }
 }
 
-/// Cost of one inference, from a run in which nothing else was measured but what is known.
-///
-/// # Errors
-/// Another number of regions, or one of known cost was counted otherwise.
-pub fn of_inference(counts: &[Region]) -> Outcome<Count> {
-    let [empty, loops, inference] = counts else {
-        return Err(format!("{} regions instead of 3", counts.len()));
-    };
-    if empty.whole != EMPTY || without(loops.whole, EMPTY) != LOOP {
-        return Err(format!("the count is wrong: {empty:?}, {loops:?}"));
-    }
-    Ok(without(inference.whole, EMPTY))
+/// A region of a run, with the names of its kernel and scope.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Measured {
+    pub kernel: String,
+    pub scope: Scope,
+    pub counts: Region,
 }
 
-/// Joins the `counts` of a run's regions with the names in its `log`. The run's model has an affine tail if
-/// `affine`; only models without one give figures for [`Scope::Inference`] and [`Scope::Exponential`].
+/// Joins the `counts` of a run's regions with the names in its `log`. The call at the end of each is taken off.
 ///
 /// # Errors
 /// Counts and names do not fit each other, or a region of known cost was counted otherwise.
-pub fn of_run(log: &str, counts: &[Region], affine: bool) -> Outcome<Vec<Figure>> {
-    let named = |what: &'static str| {
-        log.lines().filter_map(move |line| line.strip_prefix("INFO ")?.strip_prefix(what))
-    };
-    let regions: Vec<&str> = named("region ").collect();
-    if regions.len() != counts.len() {
+pub fn measured(log: &str, counts: &[Region]) -> Outcome<Vec<Measured>> {
+    let names: Vec<&str> = named(log, "region ").collect();
+    if names.len() != counts.len() {
         return Err(format!(
             "{} regions were counted, {} named in the log:\n{log}",
             counts.len(),
-            regions.len()
+            names.len()
         ));
     }
-    let (Some((names, regions)), Some(([empty, loops], counts))) =
-        (regions.split_first_chunk(), counts.split_first_chunk())
+    let (Some((known, names)), Some(([empty, loops], counts))) =
+        (names.split_first_chunk(), counts.split_first_chunk())
     else {
         return Err(format!("the image did not calibrate; it logged\n{log}"));
     };
     let (empty, loops) = (empty.whole, without(loops.whole, EMPTY));
-    if *names != CALIBRATION || empty != EMPTY || loops != LOOP {
+    if *known != CALIBRATION || empty != EMPTY || loops != LOOP {
         return Err(format!(
             "the count is wrong: of an empty region {empty:?}, expected {EMPTY:?}; of a known loop \
              {loops:?}, expected {LOOP:?}"
         ));
     }
-    let centres = named("centres ").next().and_then(|centres| centres.parse().ok());
-    let centres = centres.ok_or_else(|| format!("the image names no centres:\n{log}"))?;
+    let region = |(name, counts): (&&str, &Region)| {
+        let (kernel, scope) = name.split_once(' ')?;
+        let counts = Region { whole: without(counts.whole, EMPTY), ..*counts };
+        Some(Measured { kernel: kernel.to_owned(), scope: Scope::named(scope)?, counts })
+    };
+    let regions = names.iter().zip(counts).map(region).collect::<Option<_>>();
+    regions.ok_or_else(|| format!("not understood: {}", names.join(", ")))
+}
 
-    if regions.first().is_some_and(|name| name.ends_with(Scope::ArrayFrame.name())) {
-        return of_array(regions, counts, centres, affine);
-    }
-    let first_of_gate = regions.iter().position(|name| name.ends_with(Scope::OF_GATE[0].name()));
-    let (regions, gate_regions) = regions.split_at(first_of_gate.unwrap_or(regions.len()));
-    let (counts, gate_counts) = counts.split_at(regions.len());
-    let (scopes, counts) = (regions.as_chunks::<3>(), counts.as_chunks::<3>());
-    if !scopes.1.is_empty() {
-        return Err(format!("a kernel lacks a scope:\n{log}"));
-    }
+/// Figures of a run. The run's model has an affine tail if `affine`; only models without one give figures for
+/// [`Scope::Inference`] and [`Scope::Exponential`].
+///
+/// # Errors
+/// As [`measured`], or the log names no number of centres.
+pub fn of_run(log: &str, counts: &[Region], affine: bool) -> Outcome<Vec<Figure>> {
+    let centres = named(log, "centres ").next().and_then(|centres| centres.parse().ok());
+    let centres = centres.ok_or_else(|| format!("the image names no centres:\n{log}"))?;
     let mut figures = Vec::new();
-    for (names, counts) in scopes.0.iter().zip(counts.0) {
-        let kernel = names[0].split(' ').next().unwrap_or_default();
-        if *names != Scope::OF_IMAGE.map(|scope| format!("{kernel} {}", scope.name())) {
-            let scopes = Scope::OF_IMAGE.map(Scope::name).join(", ");
-            return Err(format!("the scopes are not {scopes}:\n{log}"));
-        }
-        for scope in Scope::ALL {
-            let count = match scope {
-                Scope::Inference if !affine => without(counts[0].whole, EMPTY),
-                Scope::Exponential if !affine && counts[0].watched != Count::default() => {
-                    counts[0].watched
-                }
-                Scope::Row => without(counts[1].whole, EMPTY),
-                Scope::Frame => without(counts[2].whole, EMPTY),
-                _ => continue,
-            };
-            figures.push(Figure { kernel: kernel.to_owned(), centres, affine, scope, count });
+    for Measured { kernel, scope, counts } in measured(log, counts)? {
+        let mut add = |scope, count| {
+            figures.push(Figure { kernel: kernel.clone(), centres, affine, scope, count });
+        };
+        match scope {
+            Scope::Inference if affine => (),
+            Scope::Inference if counts.exponential != Count::default() => {
+                add(scope, counts.whole);
+                add(Scope::Exponential, counts.exponential);
+            }
+            _ => add(scope, counts.whole),
         }
     }
-    figures.extend(of_gate(gate_regions, gate_counts, centres, affine)?);
     Ok(figures)
 }
 
-/// Figures of one network for the whole array, from names of kernel and scope.
-fn of_array(names: &[&str], counts: &[Region], centres: u64, affine: bool) -> Outcome<Vec<Figure>> {
-    let figures = names.iter().zip(counts).map(|(name, count)| {
-        let (kernel, scope) = name.split_once(' ')?;
-        let (scope, count) = (Scope::named(scope)?, without(count.whole, EMPTY));
-        Some(Figure { kernel: kernel.to_owned(), centres, affine, scope, count })
-    });
-    figures.collect::<Option<_>>().ok_or_else(|| format!("not understood: {}", names.join(", ")))
-}
-
-/// Figures of the gate, if it was measured.
-fn of_gate(names: &[&str], counts: &[Region], centres: u64, affine: bool) -> Outcome<Vec<Figure>> {
-    let kernel = names.first().and_then(|name| name.split(' ').next()).unwrap_or_default();
-    let expected = Scope::OF_GATE.map(|scope| format!("{kernel} {}", scope.name()));
-    if !names.is_empty() && *names != expected {
-        return Err(format!("{} instead of {}", names.join(", "), expected.join(", ")));
-    }
-    let figures = Scope::OF_GATE.into_iter().zip(counts).map(|(scope, count)| {
-        let count = without(count.whole, EMPTY);
-        Figure { kernel: kernel.to_owned(), centres, affine, scope, count }
-    });
-    Ok(figures.collect())
+/// What stands behind `what` in the lines of the log that start with it.
+fn named<'l>(log: &'l str, what: &'static str) -> impl Iterator<Item = &'l str> {
+    log.lines().filter_map(move |line| line.strip_prefix("INFO ")?.strip_prefix(what))
 }
 
 fn without(count: Count, less: Count) -> Count {
@@ -258,7 +220,7 @@ mod tests {
         let expected = vec![inference.clone(), row.clone(), frame.clone()];
         assert_eq!(of_run(LOG, &counts, false), Ok(expected));
 
-        counts[2].watched = Count { instructions: 5, cycles: 10 };
+        counts[2].exponential = Count { instructions: 5, cycles: 10 };
         let expected = vec![inference, figure(false, Scope::Exponential, 5), row, frame];
         assert_eq!(of_run(LOG, &counts, false), Ok(expected));
 
@@ -267,23 +229,26 @@ mod tests {
     }
 
     #[test]
-    fn the_gate_is_the_kernels_that_it_is_measured_with() {
-        let log = format!("{LOG}INFO region b resting-frame\nINFO region b awake-frame\n");
+    fn regions_come_in_any_order_and_of_several_kernels() {
+        let log = format!("{LOG}INFO region b resting-frame\nINFO region a awake-frame\n");
         let known = [(1, 3), (2002, 4002), (1, 3), (1, 3), (1, 3)];
-        let all = counts(&[&known[..], &[(41, 83), (51, 103)]].concat());
-        let found = of_run(&log, &all, false).unwrap();
-        let figure = |scope, n| Figure {
-            kernel: "b".into(),
-            centres: 16,
-            affine: false,
+        let mut all = counts(&[&known[..], &[(41, 83), (51, 103)]].concat());
+        all[6].assembly = Count { instructions: 7, cycles: 8 };
+        let found = measured(&log, &all).unwrap();
+        let region = |kernel: &str, scope, n, assembly| Measured {
+            kernel: kernel.into(),
             scope,
-            count: Count { instructions: n, cycles: 2 * n },
+            counts: Region {
+                whole: Count { instructions: n, cycles: 2 * n },
+                assembly,
+                ..Region::default()
+            },
         };
-        let expected = [figure(Scope::RestingFrame, 40), figure(Scope::AwakeFrame, 50)];
+        let expected = [
+            region("b", Scope::RestingFrame, 40, Count::default()),
+            region("a", Scope::AwakeFrame, 50, all[6].assembly),
+        ];
         assert_eq!(found[3..], expected);
-        let cut = log.replace("INFO region b awake-frame\n", "");
-        let error = of_run(&cut, &all[..6], false).unwrap_err();
-        assert_eq!(error, "b resting-frame instead of b resting-frame, b awake-frame");
     }
 
     #[test]

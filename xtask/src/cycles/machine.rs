@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use super::code::Code;
 use super::loops::Loop;
-use super::regions::{Region, Regions};
+use super::regions::{Region, Regions, Watched};
 use super::trace;
 use super::untraced::{self, Untraced};
 use crate::emulate::qemu::{QEMU, decode, machine, reader, table, wait};
@@ -17,8 +17,11 @@ use crate::process::Outcome;
 const BEGIN: &str = "region_begin";
 const END: &str = "region_end";
 
-/// Symbols around the code that is watched: the powers of two of `taxel_f32` (`model-core/src/cortex_m4/f32.s`).
-const WATCHED: [&str; 2] = ["taxel_f32_powers", "taxel_f32_powers_end"];
+/// Symbols around the powers of two of `taxel_f32` (`model-core/src/cortex_m4/f32.s`).
+const POWERS: [&str; 2] = ["taxel_f32_powers", "taxel_f32_powers_end"];
+
+/// What the names of functions in assembly start with (`model-core/src/cortex_m4/*.s`).
+const ASSEMBLY: [&str; 2] = ["taxel_", "f32_"];
 
 /// Symbols around the slot in which the image expects a model.
 const SLOT: [&str; 2] = ["_slot_a_start", "_slot_a_end"];
@@ -48,7 +51,12 @@ pub fn run(elf: &Path, code: &Code, model: &Path) -> Outcome<Run> {
         return Err(format!("{length} bytes; the image's slot has room for {room}"));
     }
     let (begin, end) = (code.symbol(BEGIN)?, code.symbol(END)?);
-    let watched = code.symbol(WATCHED[0])?..code.symbol(WATCHED[1])?;
+    let in_assembly = |name: &str| ASSEMBLY.iter().any(|start| name.starts_with(start));
+    let assembly = code.functions().filter(|(name, _)| in_assembly(name)).map(|(_, range)| range);
+    let watched = Watched {
+        exponential: code.symbol(POWERS[0])?..code.symbol(POWERS[1])?,
+        assembly: assembly.filter(|range| !range.is_empty()).collect(),
+    };
     let table = table(elf)?;
 
     let mut command = machine(elf);

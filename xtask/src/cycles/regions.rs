@@ -33,8 +33,18 @@ impl Count {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Region {
     pub whole: Count,
-    /// Count of the part at the addresses of [`Regions::watching`].
-    pub watched: Count,
+    /// Count of the loop of exponentials, as [`Watched::exponential`] has it.
+    pub exponential: Count,
+    /// Count of all routines in assembly.
+    pub assembly: Count,
+}
+
+/// Addresses of code that is counted separately besides.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Watched {
+    pub exponential: Range<u32>,
+    /// Functions in assembly.
+    pub assembly: Vec<Range<u32>>,
 }
 
 /// Place of the program, relative to regions.
@@ -53,7 +63,7 @@ pub struct Regions<'c> {
     decoded: HashMap<u32, Instruction>,
     begin: u32,
     end: u32,
-    watched: Range<u32>,
+    watched: Watched,
     untraced: Untraced,
     place: Place,
     /// Last address executed; its cost depends on the next one.
@@ -74,7 +84,7 @@ impl<'c> Regions<'c> {
             decoded: HashMap::new(),
             begin,
             end,
-            watched: 0..0,
+            watched: Watched::default(),
             untraced: Untraced::default(),
             place: Place::Outside,
             pending: None,
@@ -86,8 +96,8 @@ impl<'c> Regions<'c> {
         }
     }
 
-    /// Also counts the code at the addresses `watched` separately.
-    pub fn watching(self, watched: Range<u32>) -> Self {
+    /// Also counts the code that is `watched` separately.
+    pub fn watching(self, watched: Watched) -> Self {
         Self { watched, ..self }
     }
 
@@ -188,8 +198,11 @@ impl<'c> Regions<'c> {
             )
         })?;
         self.count.whole.add(cost);
-        if self.watched.contains(&address) {
-            self.count.watched.add(cost);
+        if self.watched.exponential.contains(&address) {
+            self.count.exponential.add(cost);
+        }
+        if self.watched.assembly.iter().any(|range| range.contains(&address)) {
+            self.count.assembly.add(cost);
         }
         self.previous = Some(instruction);
         if branched && next <= address && !instruction.calls && !self.code.returns(address) {

@@ -9,8 +9,9 @@ use model_core::scale::UNITS;
 use rayon::prelude::*;
 
 use super::code::Code;
+use super::figures::{self, Scope};
+use super::machine;
 use super::regions::Count;
-use super::{figures, machine};
 use crate::process::Outcome;
 
 /// Number of centres K.
@@ -69,11 +70,19 @@ pub fn measure(image: &Path, code: &Code, directory: &Path) -> Outcome<Vec<Measu
         let run = blob(format, Shape { inputs, centres: CENTRES, outputs })
             .and_then(|blob| fs::write(&path, blob).map_err(|cause| cause.to_string()))
             .and_then(|()| machine::run(image, code, &path))
-            .and_then(|run| figures::of_inference(&run.counts));
+            .and_then(|run| figures::measured(&run.log, &run.counts))
+            .and_then(|regions| inference(&regions));
         let count = run.map_err(|cause| format!("{}: {cause}", path.display()))?;
         Ok(Measured { format, inputs, outputs, count, most })
     };
     wanted.par_iter().map(one).collect()
+}
+
+/// Cost of the run's inference.
+fn inference(regions: &[figures::Measured]) -> Outcome<Count> {
+    let inference = regions.iter().find(|region| region.scope == Scope::Inference);
+    let count = inference.map(|region| region.counts.whole);
+    count.ok_or_else(|| "no inference was measured".to_owned())
 }
 
 /// A blob with one network for one row, without an affine tail. Its numbers make no difference to the cost.

@@ -5,52 +5,56 @@ use model_core::projection::Projection;
 use model_core::rbf::Network;
 use qemu_image::checks::Numbers;
 
-use super::kernel::{COLS, Frame, ROWS};
+use super::BASELINE_OHM;
 
 /// Number of sweeps: enough for the important features to come near the wanted values.
 const SWEEPS: usize = 50;
 
-/// A frame in Ω within the training range of `model`: every row from random scaled inputs.
-pub fn frame(model: &Model<'_>, numbers: &mut Numbers) -> Frame {
+/// Fills `frame` with readings in Ω within the training range of `model`: every row from random inputs. `features` is
+/// working space of as many numbers as a row has readings.
+pub fn fill(model: &Model<'_>, frame: &mut [f32], features: &mut [f32], numbers: &mut Numbers) {
+    // A model with relative inputs takes readings over those of the baseline.
+    let unit_ohm = if model.metadata().relative_inputs { BASELINE_OHM } else { 1.0 };
     if let (Some(projection), Some(network)) = (model.projection(), model.networks().next()) {
-        return array_frame(projection, &network, numbers);
-    }
-    let mut frame = [[f32::NAN; COLS]; ROWS];
-    for (row, readings) in frame.iter_mut().enumerate() {
-        let inputs: [f32; COLS] = core::array::from_fn(|_| 0.5 + 0.5 * numbers.draw());
-        let network = model.network_of_row(row).and_then(|index| model.networks().nth(index));
-        let Some(network) = network else { continue };
-        for (input, (reading, x)) in readings.iter_mut().zip(inputs).enumerate() {
-            let [lowest, highest] = network.training_range(input);
-            *reading = lowest + x * (highest - lowest);
+        frame.fill(BASELINE_OHM / unit_ohm);
+        approach(projection, &network, frame, features, numbers);
+    } else {
+        for (row, inputs) in frame.chunks_exact_mut(features.len().max(1)).enumerate() {
+            let network = model.network_of_row(row).and_then(|index| model.networks().nth(index));
+            let Some(network) = network else { continue };
+            for (input, x) in inputs.iter_mut().enumerate() {
+                let [lowest, highest] = network.training_range(input);
+                *x = lowest + (0.5 + 0.5 * numbers.draw()) * (highest - lowest);
+            }
         }
     }
-    frame
+    frame.iter_mut().for_each(|x| *x *= unit_ohm);
 }
 
-/// A frame in Ω whose features are within the training range, nearest to readings of 60 Ω: by Kaczmarz's sweeps
-/// over the features.
+/// Changes `inputs` of a whole array to the nearest whose features are within the training range: by Kaczmarz's sweeps
+/// over the features. `wanted` is working space of one number a feature.
 #[inline(never)]
-fn array_frame(projection: Projection<'_>, network: &Network<'_>, numbers: &mut Numbers) -> Frame {
-    let wanted: [f32; COLS] = core::array::from_fn(|feature| {
+fn approach(
+    projection: Projection<'_>,
+    network: &Network<'_>,
+    inputs: &mut [f32],
+    wanted: &mut [f32],
+    numbers: &mut Numbers,
+) {
+    for (feature, wanted) in wanted.iter_mut().enumerate() {
         let [lowest, highest] = network.training_range(feature);
-        lowest + (0.5 + 0.25 * numbers.draw()) * (highest - lowest)
-    });
-    let Some((start, parts)) = projection.block().as_chunks::<COLS>().0.split_first() else {
-        return [[f32::NAN; COLS]; ROWS];
-    };
-    let mut frame = [[60.0; COLS]; ROWS];
+        *wanted = lowest + (0.5 + 0.25 * numbers.draw()) * (highest - lowest);
+    }
+    let (start, parts) = projection.block().split_at_checked(wanted.len()).unwrap_or_default();
+    let parts_of = |feature| parts.iter().skip(feature).step_by(start.len().max(1));
     for _ in 0..SWEEPS {
-        for feature in 0..COLS {
-            let readings = frame.as_flattened_mut();
-            let parts = || parts.iter().map(|parts| parts[feature]);
+        for (feature, (start, wanted)) in start.iter().zip(&*wanted).enumerate() {
             // Same bits as `Projection::project`, which is not called here: its code is measured.
-            let found = readings.iter().zip(parts());
-            let found = found.fold(start[feature], |sum, (reading, part)| sum + part * reading);
-            let square: f32 = parts().map(|part| part * part).sum();
-            let step = (wanted[feature] - found) / square.max(f32::MIN_POSITIVE);
-            readings.iter_mut().zip(parts()).for_each(|(reading, part)| *reading += step * part);
+            let found = inputs.iter().zip(parts_of(feature));
+            let found = found.fold(*start, |sum, (reading, part)| sum + part * reading);
+            let square: f32 = parts_of(feature).map(|part| part * part).sum();
+            let step = (wanted - found) / square.max(f32::MIN_POSITIVE);
+            inputs.iter_mut().zip(parts_of(feature)).for_each(|(x, part)| *x += step * part);
         }
     }
-    frame
 }

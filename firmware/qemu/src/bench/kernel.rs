@@ -1,61 +1,21 @@
-//! The kernels that are measured: number formats, each with an exponential or in portable Rust.
+//! The kernels of one row that are measured: number formats, each with an exponential or in portable Rust.
 
 use core::marker::PhantomData;
 
 use model_core::blob::Model;
 use model_core::exp::ExpKernel;
 use model_core::rbf::{Format, Network};
-use model_core::{Decoder, Estimate, Gate, RowStatus};
 
-/// Number of rows, as in the paper's sensor.
-pub const ROWS: usize = 8;
-/// Number of readings a row.
+/// Number of readings a row, as in the paper's sensor.
 pub const COLS: usize = 18;
 /// Number of outputs a row.
 pub const OUTPUTS: usize = 18;
 
-/// Readings in Ω, row after row.
-pub type Frame = [[f32; COLS]; ROWS];
-
-/// Outputs and status of all rows.
-#[derive(Clone, Copy)]
-pub struct Decoded {
-    pub outputs: [[f32; OUTPUTS]; ROWS],
-    pub status: [RowStatus; ROWS],
-}
-
-impl Decoded {
-    pub const NOTHING: Self =
-        Self { outputs: [[f32::NAN; OUTPUTS]; ROWS], status: [RowStatus::MissingReading; ROWS] };
-
-    /// Decodes `frame` as the firmware does.
-    #[inline(always)]
-    #[expect(clippy::inline_always, reason = "the firmware's call alone is measured")]
-    pub fn decode<E: ExpKernel>(
-        &mut self,
-        decoder: &Decoder<'_, ROWS>,
-        frame: &Frame,
-        gate: Option<Gate<'_>>,
-        scratch: &mut [f32],
-    ) {
-        let outputs = self.outputs.as_flattened_mut();
-        let mut estimate = Estimate { outputs, status: &mut self.status };
-        let frame = model_core::Frame { gate, ..frame.as_flattened().into() };
-        let _ = decoder.decode_with::<E>(frame, scratch, &mut estimate);
-    }
-}
-
-/// Number of floats of working space for any model.
-pub const SCRATCH: usize = 2 * COLS;
-
-/// One way to decode: a number format, with an exponential or in portable Rust. Every function only calls
+/// One way to infer a row: a number format, with an exponential or in portable Rust. Every function only calls
 /// what the firmware calls.
 pub trait Kernel {
-    /// The decoder of frames.
-    type Decoder<'a>;
-
-    /// The decoder of `model`, whose networks have `format`; `None` if this kernel is for another format.
-    fn of<'a>(model: &Model<'a>, format: Format) -> Option<Self::Decoder<'a>>;
+    /// The number format that this kernel is for.
+    const FORMAT: Format;
 
     /// Infers a row's outputs from scaled inputs, which are overwritten.
     fn infer(network: &Network<'_>, scaled: &mut [f32; COLS], outputs: &mut [f32; OUTPUTS]);
@@ -67,15 +27,6 @@ pub trait Kernel {
         scaled: &mut [f32; COLS],
         outputs: &mut [f32; OUTPUTS],
     );
-
-    /// Decodes a frame to the outputs of every row.
-    fn decode(decoder: &Self::Decoder<'_>, frame: &Frame, outcome: &mut Decoded);
-}
-
-/// The decoder of `model`; `None` if the model is for another sensor.
-#[inline(never)] // frees the stack that building the decoder needs
-pub fn decoder<'a>(model: &Model<'a>) -> Option<Decoder<'a, ROWS>> {
-    Decoder::of(*model).ok()
 }
 
 /// The number format `F`, with the exponential `E` if the format has a choice.
@@ -107,11 +58,7 @@ impl Which for Fixed16 {
 }
 
 impl<F: Which, E: ExpKernel> Kernel for Formatted<F, E> {
-    type Decoder<'a> = Decoder<'a, ROWS>;
-
-    fn of<'a>(model: &Model<'a>, format: Format) -> Option<Self::Decoder<'a>> {
-        if format == F::FORMAT { decoder(model) } else { None }
-    }
+    const FORMAT: Format = F::FORMAT;
 
     #[inline(never)]
     fn infer(network: &Network<'_>, scaled: &mut [f32; COLS], outputs: &mut [f32; OUTPUTS]) {
@@ -127,22 +74,13 @@ impl<F: Which, E: ExpKernel> Kernel for Formatted<F, E> {
     ) {
         let _ = network.infer_with::<E>(readings_ohm, scaled, outputs);
     }
-
-    #[inline(never)]
-    fn decode(decoder: &Self::Decoder<'_>, frame: &Frame, outcome: &mut Decoded) {
-        outcome.decode::<E>(decoder, frame, None, &mut [0.0; SCRATCH]);
-    }
 }
 
 /// The number format `F` in portable Rust: the compiled twin of its assembly routine.
 pub struct Portable<F>(PhantomData<F>);
 
 impl<F: Which> Kernel for Portable<F> {
-    type Decoder<'a> = Model<'a>;
-
-    fn of<'a>(model: &Model<'a>, format: Format) -> Option<Self::Decoder<'a>> {
-        (format == F::FORMAT && format != Format::F32Direct).then_some(*model)
-    }
+    const FORMAT: Format = F::FORMAT;
 
     #[inline(never)]
     fn infer(network: &Network<'_>, scaled: &mut [f32; COLS], outputs: &mut [f32; OUTPUTS]) {
@@ -163,17 +101,18 @@ impl<F: Which> Kernel for Portable<F> {
         let _ = network.scale(readings_ohm, scaled);
         Self::infer(network, scaled, outputs);
     }
+}
 
+impl<F: Which> Portable<F> {
+    /// Decodes a frame, row after row. It finds each row's network in the blob anew.
     #[inline(never)]
-    fn decode(model: &Self::Decoder<'_>, frame: &Frame, outcome: &mut Decoded) {
+    pub fn decode(model: &Model<'_>, frame: &[[f32; COLS]], outputs: &mut [[f32; OUTPUTS]]) {
         let mut scaled = [0.0; COLS];
-        let rows = frame.iter().zip(&mut outcome.outputs);
-        for (row, (readings, outputs)) in rows.enumerate() {
+        for (row, (readings, outputs)) in frame.iter().zip(outputs).enumerate() {
             let network = model.network_of_row(row).and_then(|index| model.networks().nth(index));
             if let Some(network) = network {
                 Self::infer_row(&network, readings, &mut scaled, outputs);
             }
         }
-        outcome.status = [RowStatus::Decoded; ROWS];
     }
 }

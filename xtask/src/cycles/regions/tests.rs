@@ -47,13 +47,18 @@ fn a_loop_is_counted_as_by_hand() {
 #[test]
 fn what_is_watched_is_counted_besides() {
     let code = code(&[0x3001, 0x3001, 0xF7FF, 0xFFFB]); // adds r0, #1, twice; bl end
-    let mut regions = Regions::new(&code, BEGIN, END).watching(START + 2..START + 4);
+    let watched = Watched {
+        exponential: START + 2..START + 4,
+        assembly: vec![START + 4..START + 6, START..START + 2],
+    };
+    let mut regions = Regions::new(&code, BEGIN, END).watching(watched);
     for address in [0x8, BEGIN, BEGIN + 2, START, START + 2, START + 4, END, START + 8] {
         regions.execute(&[address]).unwrap();
     }
     let whole = Count { instructions: 3, cycles: 5 };
-    let watched = Count { instructions: 1, cycles: 1 };
-    assert_eq!(regions.finish(), Ok(vec![Region { whole, watched }]));
+    let exponential = Count { instructions: 1, cycles: 1 };
+    let assembly = Count { instructions: 2, cycles: 4 };
+    assert_eq!(regions.finish(), Ok(vec![Region { whole, exponential, assembly }]));
 }
 
 #[test]

@@ -1,0 +1,153 @@
+//! Frames of any shape, without a gate and behind it.
+
+use core::hint::black_box;
+
+use defmt::{assert, unwrap};
+use model_core::blob::{Model, ModelShape};
+use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
+use model_core::gate::{Gate, Rest};
+use model_core::rbf::Format;
+use model_core::relative::reciprocal;
+use model_core::{Decoder, Estimate, RowStatus};
+use qemu_image::checks::Numbers;
+
+use super::region::region;
+use super::{BASELINE_OHM, inputs};
+
+/// Most rows of a model.
+const MOST_ROWS: usize = 32;
+
+/// Tolerance of the gate: 3.5 times a noise of 0.5 %.
+const REST_TOLERANCE: f32 = 0.0175;
+
+/// RAM of which slices are taken one after the other.
+pub struct Arena(pub &'static mut [f32]);
+
+impl Arena {
+    /// Takes so many `floats`, filled with 0.
+    pub fn take(&mut self, floats: usize) -> &'static mut [f32] {
+        let (taken, rest) = unwrap!(
+            core::mem::take(&mut self.0).split_at_mut_checked(floats),
+            "the model's frames are too large for the RAM"
+        );
+        self.0 = rest;
+        taken.fill(0.0);
+        taken
+    }
+}
+
+/// A frame in Ω within the training range of `model`, row after row.
+#[inline(never)]
+pub fn frame(model: &Model<'_>, arena: &mut Arena) -> &'static mut [f32] {
+    let ModelShape { rows, inputs, .. } = model.shape();
+    let (frame, features) = (arena.take(rows * inputs), arena.take(inputs));
+    inputs::fill(model, frame, features, &mut Numbers::new(3));
+    frame
+}
+
+/// Outputs and status of all rows.
+struct Outcome {
+    outputs: &'static mut [f32],
+    status: [RowStatus; MOST_ROWS],
+    rows: usize,
+}
+
+impl Outcome {
+    fn new(shape: ModelShape, arena: &mut Arena) -> Self {
+        let (rows, status) = (shape.rows, [RowStatus::MissingReading; MOST_ROWS]);
+        Self { outputs: arena.take(rows * shape.outputs), status, rows }
+    }
+
+    fn status(&self) -> &[RowStatus] {
+        self.status.get(..self.rows).unwrap_or_default()
+    }
+
+    /// Decodes `frame` as the firmware does.
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "the firmware's call alone is measured")]
+    fn decode<E: ExpKernel>(
+        &mut self,
+        decoder: &Decoder<'_, MOST_ROWS>,
+        frame: model_core::Frame<'_>,
+        scratch: &mut [f32],
+    ) {
+        let status = self.status.get_mut(..self.rows).unwrap_or_default();
+        let mut estimate = Estimate { outputs: self.outputs, status };
+        let _ = decoder.decode_with::<E>(frame, scratch, &mut estimate);
+    }
+}
+
+/// What is decoded in every scope.
+struct Bench<'a> {
+    decoder: Decoder<'a, MOST_ROWS>,
+    frame: &'a [f32],
+    /// The frame with all rows touched at their last readings, so that the gate looks at all readings; of one network
+    /// for all rows, with the last row touched.
+    awake: &'a [f32],
+    reciprocals: &'a [f32],
+    rest: Outcome,
+    outcome: Outcome,
+    scratch: &'a mut [f32],
+}
+
+/// Measures frames of `model` with every exponential that its format can have; behind the gate with the firmware's.
+#[inline(never)]
+pub fn measure(model: &Model<'_>, frame: &[f32], arena: &mut Arena) {
+    let mut bench = bench(model, frame, arena);
+    let format = unwrap!(model.networks().next()).format();
+    bench.measure::<Polynomial>(format.name(), true);
+    if format == Format::F32Direct {
+        bench.measure::<Libm>("f32-direct-libm", false);
+        bench.measure::<Micromath>("f32-direct-micromath", false);
+    }
+}
+
+#[inline(never)] // frees the stack that building the decoder needs
+fn bench<'a>(model: &Model<'a>, frame: &'a [f32], arena: &mut Arena) -> Bench<'a> {
+    let shape = model.shape();
+    let decoder = unwrap!(Decoder::of(*model).ok(), "the model has too many rows");
+    let awake = arena.take(frame.len());
+    awake.copy_from_slice(frame);
+    let rows = awake.chunks_exact_mut(shape.inputs).rev();
+    let touched = if model.projection().is_some() { 1 } else { shape.rows };
+    let last = rows.take(touched).filter_map(|row| row.last_mut());
+    last.for_each(|reading| *reading *= 1.0 + 2.0 * REST_TOLERANCE);
+    let relative = model.metadata().relative_inputs;
+    let reciprocals = arena.take(if relative { frame.len() } else { 0 });
+    reciprocals.fill(reciprocal(BASELINE_OHM));
+    let scratch = arena.take(decoder.scratch_floats());
+    let (rest, outcome) = (Outcome::new(shape, arena), Outcome::new(shape, arena));
+    Bench { decoder, frame, awake, reciprocals, rest, outcome, scratch }
+}
+
+impl Bench<'_> {
+    #[inline(never)] // so that the stack holds the values of one exponential at a time
+    fn measure<E: ExpKernel>(&mut self, name: &str, gated: bool) {
+        let Self { decoder, frame, awake, reciprocals, rest, outcome, scratch } = self;
+        let given = |readings_ohm, gate| model_core::Frame { readings_ohm, reciprocals, gate };
+        rest.decode::<E>(decoder, given(frame, None), scratch);
+        // What the sensor shows at rest, if the frame is its baseline.
+        let rest = Rest { baseline_ohm: frame, outputs: rest.outputs, status: rest.status() };
+        let gate = Gate::new(rest, REST_TOLERANCE);
+        let scopes = if decoder.model().projection().is_some() {
+            ["array-frame", "array-resting-frame", "array-awake-frame"]
+        } else {
+            ["frame", "resting-frame", "awake-frame"]
+        };
+        for (scope, frame, gate, status) in [
+            (scopes[0], &*frame, None, RowStatus::Decoded),
+            (scopes[1], &*frame, gate, RowStatus::AtRest),
+            (scopes[2], &*awake, gate, RowStatus::Decoded),
+        ] {
+            if gate.is_some() && !gated {
+                continue;
+            }
+            region(name, scope, || {
+                let frame = given(black_box(*frame), black_box(gate));
+                outcome.decode::<E>(black_box(decoder), frame, black_box(scratch));
+            });
+            let all = outcome.status().iter().all(|row| *row == status);
+            assert!(all, "a row is not as in {=str}", scope);
+        }
+    }
+}
