@@ -157,9 +157,6 @@ pub enum Error {
     /// Trade without a point within its bounds.
     #[error(transparent)]
     NoPoint(#[from] NoPoint),
-    /// File `firmware/cycles.csv` whose figures cannot be used.
-    #[error("firmware/cycles.csv: {0}; cargo xtask cycles --accept writes it anew")]
-    Cycles(String),
     /// File that is not what a command needs.
     #[error("{}: {message}", path.display())]
     Unfit {

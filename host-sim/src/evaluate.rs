@@ -1,7 +1,5 @@
 //! Evaluation: errors and costs of models, and the tables of these.
 
-pub mod cost;
-pub mod ram;
 pub mod gate;
 pub mod drift;
 pub mod readout;

@@ -81,7 +81,6 @@ fn exit_status(error: &Error) -> u8 {
     use taxel_rig::Error as Rig;
     match error {
         Error::Failed(_)
-        | Error::Cycles(_)
         | Error::Learn(Learn::NoRegression | Learn::ProjectionBeyondF32 | Learn::NotPacked(_)) => 1,
         Error::Simulate(cause) => match cause {
             taxel_simulate::Error::Setting(_) | taxel_simulate::Error::Data(_) => 2,

@@ -6,6 +6,7 @@ use taxel_data::dataset::Dataset;
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
 use taxel_data::table::Table;
+use taxel_learn::cost::{Cost, Design, Prices};
 use taxel_learn::decoders::BASELINES;
 use taxel_learn::train::train;
 use taxel_learn::{Decoder, Exponential, ModelBlob, PreparedModel, pack};
@@ -81,6 +82,8 @@ pub struct ModelSummary {
     pub blob_bytes: usize,
     /// CRC-32 of the blob, in hexadecimal.
     pub blob_crc: String,
+    /// What decoding a frame costs a Cortex-M4F, without a gate.
+    pub frame: Cost,
 }
 
 /// Errors of the network on one row-wire.
@@ -153,7 +156,7 @@ pub fn run(experiment: &Experiment, progress: &dyn Progress) -> Result<(RunResul
 
     let result = RunResult {
         scene: scene_summary(experiment),
-        model: model_summary(experiment, &network, &blob),
+        model: model_summary(experiment, &network, &blob)?,
         decoders,
         rows: by_row(world, &test, &estimate, &measure),
         example: example(world, &test, &estimate),
@@ -184,10 +187,11 @@ fn model_summary(
     experiment: &Experiment,
     prepared: &PreparedModel<'_>,
     blob: &ModelBlob,
-) -> ModelSummary {
+) -> Result<ModelSummary> {
     let (model, t) = (prepared.model(), &experiment.training);
     let shape = model.shape();
-    ModelSummary {
+    let frames = Prices::accepted()?.frames(&Design::of(blob), Exponential::default())?;
+    Ok(ModelSummary {
         training_frames: t.frames,
         test_frames: t.test_frames,
         networks: model.networks().count(),
@@ -200,7 +204,8 @@ fn model_summary(
         affine_tail: t.affine_tail,
         blob_bytes: blob.bytes().len(),
         blob_crc: format!("{:08x}", model.crc()),
-    }
+        frame: frames.ungated,
+    })
 }
 
 fn by_row(world: &World, test: &Dataset, estimate: &Table, measure: &Measure) -> Vec<RowErrors> {

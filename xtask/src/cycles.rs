@@ -9,6 +9,9 @@ mod options;
 mod training;
 
 mod models;
+mod synthetic;
+
+mod designs;
 
 mod thumb;
 
@@ -28,15 +31,19 @@ mod machine;
 mod table;
 
 mod shapes;
+mod told;
+mod fit;
 
 mod accepted;
 
-mod comparison;
+mod prices;
 
 use std::fs;
 use std::path::Path;
 
 use rayon::prelude::*;
+use taxel_learn::cost::{Cost, Design, Gating, Prices};
+use taxel_learn::{Exponential, ModelBlob};
 
 use crate::emulate::qemu;
 use crate::firmware::{BENCH, build_image};
@@ -48,6 +55,7 @@ use figures::Figure;
 use loops::Loop;
 use models::Blob;
 pub use options::Options;
+pub use regions::Count as Counted;
 
 /// Name of the image that is measured.
 const IMAGE: &str = "qemu-bench";
@@ -72,10 +80,10 @@ pub fn run(options: &Options<'_>) -> Outcome {
         print!("{}", shapes::markdown(&measured));
         return shapes::held(&measured);
     }
-    let blobs = match options.model {
-        Some(model) => models::of_file(Path::new(model), &directory)?,
-        None => models::train(&directory, options.kernel)?,
-    };
+    if let Some(model) = options.model {
+        return measure_model(Path::new(model), &image, &code, &toolchain.compiler()?, options);
+    }
+    let blobs = models::train(&directory, options.kernel)?;
     // Images are measured on all cores at once, since QEMU runs an image on one.
     let measured: Vec<(Vec<Figure>, Vec<Loop>)> =
         blobs.par_iter().map(|blob| measure(&image, &code, blob)).collect::<Outcome<_>>()?;
@@ -86,10 +94,6 @@ pub fn run(options: &Options<'_>) -> Outcome {
     } else {
         print!("{}", table::aligned(&measured));
     }
-    if options.model.is_some() {
-        let alike = blobs.iter().all(|blob| blob.rows_alike);
-        return hold_model_to_accepted(&measured, alike, &toolchain.compiler()?, options.json);
-    }
     eprint!("{}", loops::largest(&code, &loops)?);
     let over_budget = budget::exceeded(&measured);
     if !over_budget.is_empty() {
@@ -98,7 +102,15 @@ pub fn run(options: &Options<'_>) -> Outcome {
     if options.kernel.is_some() {
         return Ok(());
     }
-    hold_to_accepted(&measured, &toolchain.compiler()?, options)
+    let compiler = toolchain.compiler()?;
+    if options.accept {
+        prices::accept(&image, &code, &directory, &compiler)?;
+    }
+    hold_to_accepted(&measured, &compiler, options)?;
+    let checked = prices::check(&image, &code, &directory, &compiler)?;
+    // With --json, stdout has the objects only.
+    eprintln!("{checked}");
+    Ok(())
 }
 
 fn measure(image: &Path, code: &Code, blob: &Blob) -> Outcome<(Vec<Figure>, Vec<Loop>)> {
@@ -139,41 +151,40 @@ fn chosen(figures: Vec<Figure>, options: &Options<'_>) -> Outcome<Vec<Figure>> {
     Ok(chosen)
 }
 
-/// Compares the figures of a user's own model with the accepted ones of such models, which `host-sim trade` shows.
-fn hold_model_to_accepted(
-    measured: &[Figure],
-    rows_alike: bool,
+/// Measures frames of a user's own model, and prints what they cost beside what is told of them.
+fn measure_model(
+    path: &Path,
+    image: &Path,
+    code: &Code,
     compiler: &str,
-    json: bool,
+    options: &Options<'_>,
 ) -> Outcome {
-    if !rows_alike {
-        eprintln!("its rows have different numbers of centres or formats: compared with nothing");
-        return Ok(());
+    let blob = ModelBlob::read(path).map_err(|cause| cause.to_string())?;
+    let design = Design::of(&blob);
+    let mut frames = told::measure(&design, path, image, code)?;
+    if let Some(kernel) = options.kernel {
+        frames.retain(|frame| frame.kernel == kernel);
+        if frames.is_empty() {
+            return Err(format!("--kernel {kernel}: the model is not made for it"));
+        }
     }
-    let accepted = Accepted::parse(&read(DATA)?).map_err(|cause| format!("{DATA}: {cause}"))?;
-    let Some(reference) = accepted.reference(compiler) else {
-        eprintln!("{DATA} has no figures: compared with nothing");
-        return Ok(());
-    };
-    let comparison = comparison::of_model(reference.figures, measured);
-    if comparison.is_empty() {
-        eprintln!("{DATA} has no figures for such a model: compared with nothing");
-        return Ok(());
-    }
-    let table = comparison::table(&comparison);
-    // With --json, stdout has the objects only.
-    if json {
-        eprint!("{table}");
-    } else {
-        print!("\n{table}");
-    }
-    say_if_others(&reference, compiler, measured);
-    let beyond = comparison::beyond(&comparison, !reference.is_own);
-    if beyond.is_empty() {
-        eprintln!("it costs what {DATA} says for {}", reference.compiler);
-        return Ok(());
-    }
-    Err(format!("other than in {DATA} for {}:\n  {}", reference.compiler, beyond.join("\n  ")))
+    prices::compare_model(&frames, compiler, options.json)
+}
+
+/// What a frame of the model at `path`, which has this `design`, is told to cost without a gate, and what is counted.
+///
+/// # Errors
+/// The run fails, or the model costs something else than told.
+pub fn frame_of(design: &Design, path: &Path) -> Outcome<(Cost, Counted)> {
+    let image = elf(IMAGE);
+    let code = Code::read(&image)?;
+    let frames = told::measure(design, path, &image, &code)?;
+    let compiler = Toolchain::find()?.compiler()?;
+    prices::held_to(&frames, &compiler)?;
+    let frame = frames.first().ok_or("no frame was measured")?;
+    let prices = Prices::accepted().map_err(|cause| cause.to_string())?;
+    let told = prices.frame(design, Exponential::default(), Gating::Ungated);
+    Ok((told.map_err(|cause| cause.to_string())?, frame.whole))
 }
 
 /// Compares figures with the accepted ones, or writes them as accepted.
@@ -184,11 +195,10 @@ fn hold_to_accepted(measured: &[Figure], compiler: &str, options: &Options<'_>) 
         accepted.replace(compiler, measured);
         let document = read(DOCUMENT)?;
         let document = accepted.in_document(&document).map_err(|cause| of(DOCUMENT, cause))?;
-        return [(DATA, accepted.data()), (DOCUMENT, document)].into_iter().try_for_each(
-            |(file, text)| {
-                fs::write(root().join(file), text).map_err(|cause| of(file, cause.to_string()))
-            },
-        );
+        for (file, text) in [(DATA, accepted.data()), (DOCUMENT, document)] {
+            fs::write(root().join(file), text).map_err(|cause| of(file, cause.to_string()))?;
+        }
+        return Ok(());
     }
     let Some(reference) = accepted.reference(compiler) else {
         eprintln!(

@@ -14,6 +14,8 @@ mod board;
 
 mod cycles;
 
+mod sensors;
+
 mod ci;
 
 use std::env;
@@ -61,6 +63,10 @@ Usage: cargo xtask COMMAND
       --kernel NAME           shows this kernel only, and compares it with its budget only
       --model FILE            measures with this model, such as the chosen.bin of `host-sim trade`. Compares it
                               with the figures in firmware/cycles.csv for the same format, K and affine tail
+  sensors [--accept]          trains models of other sensors than the paper's (z only, one row, 4 × 4, 16 × 32, a CSV
+                              file and more), compares 1000 frames on the device with the host's, and prints what each
+                              model takes. Two minutes
+      --accept                writes the table into docs/sensors.md
   help                        prints this text
 
 `bash firmware/setup.sh` installs the tools for these commands on Debian.
@@ -90,6 +96,8 @@ fn main() -> ExitCode {
             Err(cause) => return wrong_usage(&format!("board: {cause}")),
         },
         ["size"] => size::run(),
+        ["sensors"] => sensors::run(false),
+        ["sensors", "--accept"] => sensors::run(true),
         ["structure"] => structure::run(),
         ["cycles", ref options @ ..] => match cycles::Options::parse(options) {
             Ok(options) => cycles::run(&options),
@@ -112,13 +120,14 @@ fn are_names(arguments: &[&str]) -> bool {
 
 /// Says why no command has these `arguments`.
 fn misunderstood(arguments: &[&str]) -> String {
-    const COMMANDS: [&str; 7] = ["ci", "structure", "firmware", "cores", "emulate", "log", "size"];
+    const COMMANDS: [&str; 8] =
+        ["ci", "structure", "firmware", "cores", "emulate", "log", "size", "sensors"];
     match arguments {
         [] => "cargo xtask needs a command".to_owned(),
         ["log"] => "log: needs a file behind it".to_owned(),
         [command, rest @ ..] if COMMANDS.contains(command) => {
             let options = || rest.iter().filter(|argument| argument.starts_with('-'));
-            let accepts = *command == "emulate" && rest.contains(&"--accept");
+            let accepts = ["emulate", "sensors"].contains(command) && rest.contains(&"--accept");
             match options().find(|option| !accepts || **option != "--accept") {
                 Some(option) => format!("{command}: unknown option `{option}`"),
                 None if accepts => {

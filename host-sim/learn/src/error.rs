@@ -64,4 +64,9 @@ pub enum Error {
     /// Model beyond what the blob's format holds.
     #[error("the model cannot be written: {0}")]
     NotPacked(EncodeError),
+    /// Price list of code that cannot be used.
+    #[error(
+        "prices of code (firmware/prices.csv): {0}; `cargo xtask cycles --accept` writes them anew"
+    )]
+    Prices(String),
 }

@@ -31,6 +31,7 @@ pub mod packing;
 pub mod prepared;
 pub mod decoders;
 pub mod select;
+pub mod cost;
 
 pub use decoder::{Decoder, Estimates, FrameDecoder};
 pub use error::{Error, Result};

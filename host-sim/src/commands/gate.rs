@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use super::progress::Terminal;
 use clap::Args;
-use host_sim::evaluate::cost::{Costs, Frames};
 use host_sim::evaluate::gate::{self, BASELINE_FRAMES, GateResult, Line, MISSED_OVER_MM, Settings};
 use host_sim::metrics::Errors;
 use host_sim::{Error, Result};
 use taxel_learn::Exponential;
+use taxel_learn::cost::{Cost, Design, Frames, Prices};
 
 use super::arguments::of_option;
 use super::scene_argument::{self, NoiseArgument, SceneArgument};
@@ -40,8 +40,7 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value_t = BASELINE_FRAMES)]
     baseline_frames: usize,
     /// Cycles of a frame without a gate, of one with all rows untouched (REST), and of one with all rows
-    /// touched (AWAKE). REST is below AWAKE. They replace those that `cargo xtask cycles` measured of such
-    /// models.
+    /// touched (AWAKE). REST is below AWAKE. They replace those that are told of the model (docs/cycles.md).
     #[arg(
         long,
         value_name = "FRAME,REST,AWAKE",
@@ -57,14 +56,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     arguments.noise.apply(&mut scene)?;
     scene.world.check_frames("--frames", arguments.frames)?;
     scene.world.check_frames("--baseline-frames", arguments.baseline_frames)?;
-    let mut settings = Settings {
-        k: arguments.k.clone(),
-        frames: arguments.frames,
-        baseline_frames: arguments.baseline_frames,
-        frame_cycles: given(&arguments.cycles)?,
-    };
     let options = [("k", "--k"), ("baseline-frames", "--baseline-frames")];
-    settings.check(&scene.world).map_err(|bad| of_option(bad, &options))?;
+    gate::check_settings(&scene.world, &arguments.k, arguments.baseline_frames)
+        .map_err(|bad| of_option(bad, &options))?;
+    let given = given(&arguments.cycles)?;
     let blob = scene_argument::model(arguments.model.as_deref(), &scene, &Terminal::new())?;
     let model = blob.prepare(Exponential::default());
     let own = f64::from(model.model().metadata().noise_level);
@@ -75,19 +70,27 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             percent(scene.world.noise.level, 2)
         );
     }
-    if settings.frame_cycles.is_none() {
-        let measured = Costs::measured()?.frames_of_model(model.model());
-        settings.frame_cycles = measured.map(|frames| frames.map(|cost| cost.cycles));
-    }
+    let frame_costs = match given {
+        Some(frames) => frames,
+        None => Prices::accepted()?.frames(&Design::of(&blob), Exponential::default())?,
+    };
+    let settings = Settings {
+        k: arguments.k.clone(),
+        frames: arguments.frames,
+        baseline_frames: arguments.baseline_frames,
+        frame_costs,
+    };
     let result = gate::measure(&scene, &model, &settings)?;
     if common.json { print::json(&result) } else { page_of(&result).print() }
 }
 
-fn given(cycles: &[u64]) -> Result<Option<Frames<u64>>> {
+/// The costs that the user gives: cycles alone, and the same from flash.
+fn given(cycles: &[u64]) -> Result<Option<Frames<Cost>>> {
     match *cycles {
         [] => Ok(None),
         [ungated, at_rest, awake] if ungated > 0 && (1..awake).contains(&at_rest) => {
-            Ok(Some(Frames { ungated, at_rest, awake }))
+            let cost = |cycles| Cost { instructions: 0, cycles, flash_cycles: cycles };
+            Ok(Some(Frames { ungated, at_rest, awake }.map(cost)))
         }
         _ => Err(Error::Usage(format!(
             "--cycles {cycles:?}: give three positive numbers, FRAME,REST,AWAKE with REST below AWAKE, as \
@@ -110,13 +113,7 @@ fn page_of(result: &GateResult) -> print::Page {
     ));
     rows(&mut page, result);
     errors(&mut page, result);
-    match &result.frame_cycles {
-        Some(frames) => frames_cost(&mut page, result, frames),
-        None => page.line(
-            "the cost of frames is not known: no model of this kind was measured (see firmware/cycles.csv); \
-             give --cycles\n",
-        ),
-    }
+    frames_cost(&mut page, result);
     page.line(
         "k: a row counts as untouched if every reading, and their sum, lies within k standard deviations of\n\
          the baseline. tolerance: k × noise, for a device's configuration.\n\
@@ -172,14 +169,23 @@ fn errors(page: &mut print::Page, result: &GateResult) {
     page.line("");
 }
 
-fn frames_cost(page: &mut print::Page, result: &GateResult, frames: &Frames<u64>) {
+fn frames_cost(page: &mut print::Page, result: &GateResult) {
+    let costs = result.frame_costs;
+    for (memory, cycles) in [
+        ("zero wait", costs.map(|cost| cost.cycles)),
+        ("from flash", costs.map(|cost| cost.flash_cycles)),
+    ] {
+        page.line(format_args!(
+            "cycles of a frame, {memory}: {} without a gate, {} with all rows untouched, {} with all touched",
+            cycles.ungated, cycles.at_rest, cycles.awake
+        ));
+    }
     page.line(format_args!(
-        "cycles of a frame: {} without a gate, {} with all rows untouched, {} with all touched.\n\
-         Mean cycles relative to no gate:\n{:>6} {:>10} {:>10}",
-        frames.ungated, frames.at_rest, frames.awake, "k", "scene", "untouched"
+        "Mean cycles at zero wait, relative to no gate:\n{:>6} {:>10} {:>10}",
+        "k", "scene", "untouched"
     ));
-    let part = |cost: Option<f64>| cost.map_or("-".into(), |cost| percent(cost, 1));
     for line in &result.lines {
+        let part = |cost: f64| percent(cost, 1);
         let (scene, untouched) = (part(line.relative_cost), part(line.relative_cost_untouched));
         page.line(format_args!("{:>6} {scene:>10} {untouched:>10}", line.k));
     }

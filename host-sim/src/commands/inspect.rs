@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use clap::Args;
 use firmware::capacity::WEIGHT_RAM_BYTES;
 use host_sim::Result;
-use host_sim::evaluate::ram::DecoderRam;
 use serde::Serialize;
-use taxel_learn::ModelBlob;
+use taxel_learn::cost::{Cost, DecoderRam, Design, Frames, Prices};
+use taxel_learn::{Exponential, ModelBlob};
 
 use super::{Common, print};
 
@@ -41,6 +41,8 @@ struct Summary {
     ram_bytes: DecoderRam,
     /// Whether the images have room in RAM for a copy of the blob.
     weights_in_ram: bool,
+    /// What decoding a frame costs a Cortex-M4F.
+    frame: Frames<Cost>,
     inputs: Vec<ColumnSummary>,
     outputs: Vec<OutputSummary>,
 }
@@ -82,15 +84,15 @@ struct OutputSummary {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let blob = ModelBlob::read(&arguments.model)?;
-    let summary = summarise(&blob);
+    let summary = summarise(&blob)?;
     if common.json {
         return print::json(&summary);
     }
     page_of(&summary).print()
 }
 
-fn summarise(blob: &ModelBlob) -> Summary {
-    let model = blob.parse();
+fn summarise(blob: &ModelBlob) -> Result<Summary> {
+    let (model, design) = (blob.parse(), Design::of(blob));
     let (shape, metadata) = (model.shape(), model.metadata());
     let networks = model.networks().map(|network| NetworkSummary {
         format: network.format().name(),
@@ -102,7 +104,7 @@ fn summarise(blob: &ModelBlob) -> Summary {
         |(name, unit): (&str, &str)| ColumnSummary { name: name.into(), unit: unit.into() };
     let errors = metadata.training_rmse.iter().zip(metadata.full_scale.iter());
     let outputs = metadata.output_names.iter().zip(metadata.output_units.iter()).zip(errors);
-    Summary {
+    Ok(Summary {
         format_version: model_core::blob::FORMAT_VERSION,
         name: metadata.name.into(),
         crc_32: format!("{:08x}", model.crc()),
@@ -118,8 +120,9 @@ fn summarise(blob: &ModelBlob) -> Summary {
         seed: metadata.seed,
         training_frames: metadata.training_frames,
         flash_bytes: blob.bytes().len(),
-        ram_bytes: DecoderRam::of(&model),
-        weights_in_ram: blob.bytes().len() <= WEIGHT_RAM_BYTES,
+        ram_bytes: DecoderRam::of(&design),
+        weights_in_ram: design.weights_in_ram,
+        frame: Prices::accepted()?.frames(&design, Exponential::default())?,
         inputs: metadata.input_names.iter().zip(metadata.input_units.iter()).map(column).collect(),
         outputs: outputs
             .map(|((name, unit), (training_rmse, full_scale))| OutputSummary {
@@ -129,7 +132,20 @@ fn summarise(blob: &ModelBlob) -> Summary {
                 full_scale,
             })
             .collect(),
-    }
+    })
+}
+
+/// Cost of a frame for people.
+fn costs(cost: Cost) -> String {
+    let at = |cycles: u64, clock_mhz: f64| cycles as f64 / clock_mhz;
+    format!(
+        "{} instructions, {} cycles ({:.0} µs at 168 MHz); from flash {} ({:.0} µs at 180 MHz)",
+        cost.instructions,
+        cost.cycles,
+        at(cost.cycles, 168.0),
+        cost.flash_cycles,
+        at(cost.flash_cycles, 180.0)
+    )
 }
 
 /// Digits of a width as it was given: the blob's rounded number lies a little beside.
@@ -196,6 +212,13 @@ fn page_of(s: &Summary) -> print::Page {
     };
     line("RAM", format!("{} bytes: {}", ram.bytes(), parts.join(", ")));
     line("weights", weights);
+    for (label, cost) in [
+        ("a frame", s.frame.ungated),
+        ("… all at rest", s.frame.at_rest),
+        ("… all touched", s.frame.awake),
+    ] {
+        line(label, costs(cost));
+    }
     let relative = if s.relative_inputs { "; relative to the baseline, R/R₀" } else { "" };
     let names = ends(&s.inputs.iter().map(|c| c.name.as_str()).collect::<Vec<_>>());
     line("inputs", format!("{names}{relative}"));

@@ -116,6 +116,10 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
         model.blob_bytes,
         model.blob_crc
     ));
+    page.line(format_args!(
+        "a frame on a Cortex-M4F: {} instructions, {} cycles at zero wait, {} from flash",
+        model.frame.instructions, model.frame.cycles, model.frame.flash_cycles
+    ));
     page.line("");
     let decoders: Vec<_> =
         result.decoders.iter().map(|d| (d.decoder.as_str(), d.errors.as_slice())).collect();

@@ -28,8 +28,8 @@ const FILES: [&str; 5] = ["trade.csv", "trade.json", "trade.svg", "trade.html", 
 /// Marks the Pareto front, and chooses the best point within your bounds.
 ///
 /// Writes trade.csv, trade.json, trade.svg and trade.html to out/<scene>/, and with a bound chosen.bin.
-/// `cargo xtask cycles` measured the instructions and cycles on the firmware's code. Behind a gate they are
-/// the mean over the test frames, by the share of untouched rows (docs/trade.md).
+/// Instructions and cycles are told by the price list of the firmware's code (docs/cycles.md). Behind a gate they
+/// are the mean over the test frames, by the share of untouched rows (docs/trade.md).
 #[derive(Args)]
 #[command(after_help = "Examples:
   host-sim trade press
@@ -231,7 +231,7 @@ fn write_files(folder: &Path, trade: &Trade) -> Result<()> {
 fn csv_of(trade: &Trade) -> String {
     let rmse = trade.groups().map(|(group, _)| format!("{group}_rmse,{group}_ratio_to_best"));
     let mut csv = format!(
-        "kernel,whole_array,centres,spread,affine_tail,samples_averaged,gate_k,{},instructions,cycles,frame_us,flash_bytes,ram_bytes,\
+        "kernel,whole_array,centres,spread,affine_tail,samples_averaged,gate_k,{},instructions,cycles,flash_cycles,frame_us,flash_bytes,ram_bytes,\
          on_front,chosen\n",
         rmse.collect::<Vec<_>>().join(",")
     );
@@ -240,7 +240,7 @@ fn csv_of(trade: &Trade) -> String {
         let errors = errors.map(|(e, ratio)| format!("{},{ratio}", e.rmse)).collect::<Vec<_>>();
         let _ = writeln!(
             csv,
-            "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+            "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
             p.arithmetic.name(),
             p.whole_array,
             p.centres,
@@ -251,6 +251,7 @@ fn csv_of(trade: &Trade) -> String {
             errors.join(","),
             p.frame.instructions,
             p.frame.cycles,
+            p.frame.flash_cycles,
             p.frame_us,
             p.flash_bytes,
             p.ram_bytes,
@@ -265,7 +266,7 @@ fn page_of(trade: &Trade, all: bool, folder: &Path) -> print::Page {
     let mut page = print::Page::default();
     page.line(format_args!(
         "{}: {} points, noise {} % a sample, {} test frames; cycles of a frame on a Cortex-M4F by the\n\
-         model of docs/cycles.md, zero wait states, code of {}",
+         model of docs/cycles.md, zero wait states and from flash, code of {}",
         trade.scene,
         trade.points.len(),
         (trade.noise_level * 1e6).round() / 1e4,
@@ -274,7 +275,7 @@ fn page_of(trade: &Trade, all: bool, folder: &Path) -> print::Page {
     ));
     let groups: Vec<String> = trade.groups().map(|(group, _)| format!("{group:>16}")).collect();
     page.line(format_args!(
-        "\n{:<28} {:>4} {:>5} {:>4} {:>4}{groups}{:>13} {:>9} {:>8} {:>8} {:>6}",
+        "\n{:<28} {:>4} {:>5} {:>4} {:>4}{groups}{:>13} {:>9} {:>10} {:>8} {:>8} {:>6}",
         "format",
         "K",
         "tail",
@@ -282,6 +283,7 @@ fn page_of(trade: &Trade, all: bool, folder: &Path) -> print::Page {
         "gate",
         "instructions",
         "cycles",
+        "from flash",
         "µs",
         "flash",
         "RAM",
@@ -355,7 +357,7 @@ fn line_of(point: &Point, chosen: bool) -> String {
         .collect();
     let errors = errors.concat();
     format!(
-        "{} {:<26} {:>4} {:>5} {:>4} {:>4}{errors}{:>13} {:>9} {:>8.1} {:>8} {:>6}{}",
+        "{} {:<26} {:>4} {:>5} {:>4} {:>4}{errors}{:>13} {:>9} {:>10} {:>8.1} {:>8} {:>6}{}",
         if point.on_front { "*" } else { " " },
         point.way(),
         point.centres,
@@ -364,6 +366,7 @@ fn line_of(point: &Point, chosen: bool) -> String {
         point.gate_k.map_or("-".into(), |k| k.to_string()),
         point.frame.instructions,
         point.frame.cycles,
+        point.frame.flash_cycles,
         point.frame_us,
         point.flash_bytes,
         point.ram_bytes,

@@ -5,13 +5,13 @@ use serde::Serialize;
 use taxel_data::BadValue;
 use taxel_data::random::Stream;
 use taxel_data::table::Table;
+use taxel_learn::cost::{Cost, Frames};
 use taxel_learn::{PreparedModel, relative};
 use taxel_simulate::noise::NoiseKind;
 use taxel_simulate::outputs::Outputs;
 pub use taxel_simulate::synth::BASELINE_FRAMES;
 use taxel_simulate::{Synthesis, World};
 
-use crate::evaluate::cost::Frames;
 use crate::experiment::Experiment;
 use crate::metrics::{self, Errors};
 
@@ -30,25 +30,23 @@ pub struct Settings {
     pub frames: usize,
     /// Number of frames of the untouched sensor whose mean is the baseline.
     pub baseline_frames: usize,
-    /// Cycles of a frame, if they are known.
-    pub frame_cycles: Option<Frames<u64>>,
+    /// What a frame costs.
+    pub frame_costs: Frames<Cost>,
 }
 
-impl Settings {
-    /// Checks that these settings make gates for `world`.
-    ///
-    /// # Errors
-    /// [`BadValue`] for the first setting that does not.
-    pub fn check(&self, world: &World) -> Result<(), BadValue> {
-        check(world, &self.k)?;
-        if self.baseline_frames == 0 {
-            return Err(BadValue::new("baseline-frames", 0, "give at least 1 frame to average"));
-        }
-        if self.k.is_empty() {
-            return Err(BadValue::new("k", "[]", "give at least one number, such as 3.5"));
-        }
-        Ok(())
+/// Checks that these tolerances `k` and `baseline_frames` make gates for `world`.
+///
+/// # Errors
+/// [`BadValue`] for the first setting that does not.
+pub fn check_settings(world: &World, k: &[f64], baseline_frames: usize) -> Result<(), BadValue> {
+    check(world, k)?;
+    if baseline_frames == 0 {
+        return Err(BadValue::new("baseline-frames", 0, "give at least 1 frame to average"));
     }
+    if k.is_empty() {
+        return Err(BadValue::new("k", "[]", "give at least one number, such as 3.5"));
+    }
+    Ok(())
 }
 
 /// Checks that `world` has noise that a gate's tolerance can be derived from.
@@ -123,10 +121,10 @@ pub struct Line {
     pub largest_missed_mm: Option<f64>,
     /// Errors over the scene with this gate.
     pub errors: Vec<Errors>,
-    /// Mean cost of a frame of the scene, relative to one without a gate.
-    pub relative_cost: Option<f64>,
-    /// Mean cost of a frame of the untouched sensor, relative to one without a gate.
-    pub relative_cost_untouched: Option<f64>,
+    /// Mean cycles of a frame of the scene at zero wait, relative to one without a gate.
+    pub relative_cost: f64,
+    /// Mean cycles of a frame of the untouched sensor at zero wait, relative to one without a gate.
+    pub relative_cost_untouched: f64,
 }
 
 /// Results of a scene behind gates of several tolerances.
@@ -146,8 +144,8 @@ pub struct GateResult {
     pub baseline_frames: usize,
     /// CRC-32 of the model, in hexadecimal.
     pub model_crc: String,
-    /// Cycles of a frame, if they are known.
-    pub frame_cycles: Option<Frames<u64>>,
+    /// What a frame costs.
+    pub frame_costs: Frames<Cost>,
     /// Errors over the scene without a gate.
     pub ungated_errors: Vec<Errors>,
     /// Errors of always predicting the mean of these frames.
@@ -181,7 +179,7 @@ pub fn measure(
     settings: &Settings,
 ) -> Result<GateResult, BadValue> {
     let world = &experiment.world;
-    settings.check(world)?;
+    check_settings(world, &settings.k, settings.baseline_frames)?;
     let whole_array = model.model().projection().is_some();
     let frames = Synthesis::of(world);
     let relative_inputs = model.model().metadata().relative_inputs;
@@ -215,7 +213,8 @@ pub fn measure(
             Missed { over_mm, rows: rows().count(), missed }
         });
         let sizes_at_rest = sizes_mm.iter().zip(&at_rest).filter(|(_, at_rest)| **at_rest);
-        let cost = |at_rest: f64| settings.frame_cycles.map(|frames| frames.relative(at_rest));
+        let cycles = settings.frame_costs.map(|cost| cost.cycles);
+        let cost = |at_rest: f64| cycles.relative(at_rest);
         Line {
             k,
             rest_tolerance,
@@ -237,7 +236,7 @@ pub fn measure(
         rows: world.read_rows.len(),
         baseline_frames: settings.baseline_frames,
         model_crc: format!("{:08x}", model.model().crc()),
-        frame_cycles: settings.frame_cycles,
+        frame_costs: settings.frame_costs,
         ungated_errors: errors(&ungated),
         mean_errors: errors(&touched.outputs.means().repeat(settings.frames)),
         lines: settings.k.iter().copied().map(line).collect(),

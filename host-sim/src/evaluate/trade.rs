@@ -1,8 +1,7 @@
 //! Trade between speed and accuracy: every setting of a scene's decoder, its errors and its cost.
 //!
-//! Errors are measured on test frames through the blob that a device would get. Instructions and cycles
-//! were measured on the firmware's own code ([`Costs`]), so only shapes that were measured can be
-//! traded.
+//! Errors are measured on test frames through the blob that a device would get. Instructions and cycles are told by
+//! the price list of the firmware's own code ([`Prices`]).
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -13,10 +12,10 @@ use taxel_data::BadValue;
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
 use taxel_learn::Exponential;
+use taxel_learn::cost::{Cost, Prices, kernel_name};
 use taxel_learn::decoders::{BASELINES, Baseline};
 use taxel_simulate::Synthesis;
 
-use super::cost::{Cost, Costs, MEASURED_SHAPE, kernel_name};
 use super::gate;
 use crate::error::{NoPoint, Result};
 use crate::experiment::Experiment;
@@ -212,21 +211,21 @@ impl Trade {
 /// `group`.
 ///
 /// # Errors
-/// [`Error`](crate::Error) for a scene of another shape than was measured, or a plan that was not measured.
+/// [`Error`](crate::Error) for a plan that cannot be carried out, or a scene that cannot be trained.
 pub fn compute(
     experiment: &Experiment,
     plan: &Plan,
     group: &str,
     progress: &dyn Progress,
 ) -> Result<Trade> {
-    let costs = Costs::measured()?;
-    check(experiment, plan, &costs)?;
+    let prices = Prices::accepted()?;
+    check(experiment, plan)?;
     let (world, t) = (&experiment.world, &experiment.training);
     // One network for each row, and one for the array.
     let networks = world.read_rows.len() + 1;
     progress.stage("trade", plan.samples_averaged.len() * plan.centres.len() * networks);
     let measure = experiment.measure();
-    let mut judge = Judge::new(experiment.options(), experiment.origin(), &measure, plan, costs);
+    let mut judge = Judge::new(experiment.options(), experiment.origin(), &measure, plan, prices);
     let mut baselines = Vec::new();
     for &samples in &plan.samples_averaged {
         let noise_level = world.noise.level / (samples as f64).sqrt();
@@ -260,14 +259,14 @@ pub fn compute(
             }
         }
     }
-    let Judge { costs, mut points, blobs, distinct, .. } = judge;
+    let Judge { prices, mut points, blobs, distinct, .. } = judge;
     compare(&mut points, group);
     let of_group = baselines.first().and_then(|b| b.errors.iter().find(|e| e.group == group));
     Ok(Trade {
         scene: experiment.name.clone(),
         noise_level: world.noise.level,
         test_frames: t.test_frames,
-        compiler: costs.compiler,
+        compiler: prices.compiler,
         clock_mhz: plan.clock_mhz,
         group: group.into(),
         unit: of_group.map_or(String::new(), |errors| errors.unit.clone()),
@@ -279,24 +278,8 @@ pub fn compute(
     })
 }
 
-fn check(experiment: &Experiment, plan: &Plan, costs: &Costs) -> std::result::Result<(), BadValue> {
+fn check(experiment: &Experiment, plan: &Plan) -> std::result::Result<(), BadValue> {
     let world = &experiment.world;
-    let outputs = world.sensor.electrodes_per_row_wire * world.outputs.axes.len();
-    let shape = [world.read_rows.len(), world.sensor.column_wires, outputs];
-    if shape != MEASURED_SHAPE {
-        let [rows, inputs, outputs] = shape;
-        let [r, i, o] = MEASURED_SHAPE;
-        return Err(BadValue::new(
-            "scene",
-            format!("{rows} rows of {inputs} readings and {outputs} outputs"),
-            format!("cycles are measured for {r} rows of {i} and {o}: give a scene of that shape"),
-        ));
-    }
-    let measured = costs.centres();
-    if let Some(centres) = plan.centres.iter().find(|centres| !measured.contains(centres)) {
-        let rule = format!("cycles are measured for {measured:?}");
-        return Err(BadValue::new("centres", centres, rule));
-    }
     if let Some(samples) =
         plan.samples_averaged.iter().find(|samples| !(1..=256).contains(*samples))
     {

@@ -115,7 +115,8 @@ fn header(result: &RunResult) -> String {
         "<header>\n<h1>Scene “{}”</h1>\n\
          <p>{} noise of {}{} · seed {} · {} training and {} test frames · scene digest {}</p>\n\
          <p>{} network{plural}: {inputs} → K = {} → {} outputs · spread {} · {tail} · \
-         {} bytes · CRC-32 {}</p>\n</header>\n",
+         {} bytes · CRC-32 {}</p>\n\
+         <p>A frame on a Cortex-M4F: {} cycles at zero wait, {} from flash (told, docs/cycles.md)</p>\n</header>\n",
         escape(&scene.name),
         escape(&scene.noise_kind),
         percent(scene.noise_level),
@@ -129,7 +130,9 @@ fn header(result: &RunResult) -> String {
         model.outputs,
         model.spread,
         grouped(model.blob_bytes),
-        escape(&model.blob_crc)
+        escape(&model.blob_crc),
+        grouped(model.frame.cycles as usize),
+        grouped(model.frame.flash_cycles as usize)
     )
 }
 

@@ -68,6 +68,11 @@ fn result(groups: &[&str]) -> RunResult {
             affine_tail: true,
             blob_bytes: 12_345,
             blob_crc: "deadbeef".into(),
+            frame: taxel_learn::cost::Cost {
+                instructions: 20_000,
+                cycles: 34_000,
+                flash_cycles: 36_000,
+            },
         },
         decoders: [("network", 0.1), ("linear", 0.2), ("mean", 0.3)]
             .map(|(name, rmse)| DecoderErrors {

@@ -166,7 +166,7 @@ fn table(trade: &Trade) -> String {
         let (group, unit) = (symbol(group), escape(unit));
         let _ = write!(html, "<th class=\"number\">RMSE of {group}, {unit}</th>");
     }
-    for head in ["instructions", "cycles", "µs", "flash, B", "RAM, B"] {
+    for head in ["instructions", "cycles", "from flash", "µs", "flash, B", "RAM, B"] {
         let _ = write!(html, "<th class=\"number\">{head}</th>");
     }
     html += "</tr></thead>\n<tbody>\n";
@@ -191,6 +191,7 @@ fn table(trade: &Trade) -> String {
         for number in [
             grouped(p.frame.instructions as usize),
             grouped(p.frame.cycles as usize),
+            grouped(p.frame.flash_cycles as usize),
             times,
             grouped(p.flash_bytes),
             grouped(p.ram_bytes),

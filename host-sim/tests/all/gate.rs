@@ -1,12 +1,12 @@
 //! Gating: how often noise wakes a row, and what accuracy it costs.
 
 use crate::common::{Folder, small_scene};
-use host_sim::evaluate::cost::Costs;
 use host_sim::evaluate::gate::{self, GateResult, Settings, woken_by_theory};
 use host_sim::experiment::Experiment;
 use host_sim::metrics::Errors;
 use taxel_data::progress::Silent;
 use taxel_learn::Exponential;
+use taxel_learn::cost::{Cost, Design, Frames, Prices};
 
 const READINGS: usize = 18;
 
@@ -24,8 +24,9 @@ fn noise_wakes_untouched_rows_as_often_as_theory_says() {
     let mut scene = Experiment::parse("small", &small_scene()).unwrap();
     scene.world.read_rows = vec![0, 3, 4, 7];
     let k = [2.5, 3.0, 3.5, 4.0];
-    let settings =
-        Settings { k: k.to_vec(), frames: 20_000, baseline_frames: 10_000, frame_cycles: None };
+    let none = Cost { instructions: 1, cycles: 1, flash_cycles: 1 };
+    let frame_costs = Frames { ungated: none, at_rest: none, awake: none };
+    let settings = Settings { k: k.to_vec(), frames: 20_000, baseline_frames: 10_000, frame_costs };
     let result = measured(&scene, &settings);
     let rows = (settings.frames * scene.world.read_rows.len()) as f64;
     for (line, k) in result.lines.iter().zip(k) {
@@ -46,9 +47,10 @@ fn press_loses_little_accuracy_and_saves_half_of_the_rows() {
     let scene = Experiment::load("press").unwrap();
     let blob = scene.train(&Silent).unwrap();
     let model = blob.prepare(Exponential::default());
-    let frames = Costs::measured().unwrap().frames_of_model(model.model()).unwrap();
-    let frame_cycles = Some(frames.map(|cost| cost.cycles));
-    let settings = Settings { k: vec![3.0, 3.5], frames: 4000, baseline_frames: 100, frame_cycles };
+    let prices = Prices::accepted().unwrap();
+    let frames = prices.frames(&Design::of(&blob), Exponential::default()).unwrap();
+    let (k, frame_costs) = (vec![3.0, 3.5], frames);
+    let settings = Settings { k, frames: 4000, baseline_frames: 100, frame_costs };
     let result = gate::measure(&scene, &model, &settings).unwrap();
     let [three, three_and_half] = &result.lines[..] else { panic!("two lines") };
     let worse = |errors: &[Errors]| z(errors) / z(&result.ungated_errors);
@@ -57,11 +59,11 @@ fn press_loses_little_accuracy_and_saves_half_of_the_rows() {
     assert!(worse(&three.errors) < 1.04 && worse(&three_and_half.errors) < 1.07);
     // Measured: 0.509 and 0.567.
     assert!(three.skipped > 0.48 && three_and_half.skipped > 0.54);
-    let cost = three.relative_cost.unwrap();
+    let cost = three.relative_cost;
     let rest_and_awake = [frames.at_rest, frames.awake].map(|cost| cost.cycles as f64);
     let mean = three.skipped * rest_and_awake[0] + (1.0 - three.skipped) * rest_and_awake[1];
     assert!((cost * frames.ungated.cycles as f64 / mean - 1.0).abs() < 1e-12, "{cost}");
-    assert!(cost < 0.57 && three_and_half.relative_cost.unwrap() < cost);
+    assert!(cost < 0.57 && three_and_half.relative_cost < cost);
     for group in ["dx_mm", "dy_mm"] {
         let of = |errors: &[Errors]| errors.iter().find(|e| e.group == group).unwrap().rmse;
         assert!(of(&three_and_half.errors) < 1.005 * of(&result.ungated_errors), "{group}");
@@ -85,8 +87,10 @@ fn the_command_prints_tables_and_json() {
     for part in ["1.750 %", "2.000 %", "without a gate", "predicting the mean", "k = 4 "] {
         assert!(text.contains(part), "{part:?} is not in {text}");
     }
-    // Costs of a model with two rows were not measured.
-    assert!(folder.succeed(&arguments[..6]).contains("not known: no model of this kind"));
+    assert!(text.contains("zero wait: 4000 without a gate, 400 with all rows untouched, 4250"));
+    // Without --cycles, the costs are told of the model.
+    let told = folder.succeed(&arguments[..6]);
+    assert!(told.contains("from flash: ") && !told.contains(": 4000 without"), "{told}");
     let json: serde_json::Value =
         serde_json::from_str(&folder.succeed(&[&arguments[..], &["--json"]].concat())).unwrap();
     assert_eq!(json["lines"][1]["k"], 4.0);

@@ -127,7 +127,8 @@ impl<'a> Network<'a> {
     }
 
     /// Number of words in the block of a network of this shape, with one width for all centres or one for each.
-    pub(crate) fn block_words(shape: Shape, common_width: bool, affine: bool) -> usize {
+    #[must_use]
+    pub fn block_words(shape: Shape, common_width: bool, affine: bool) -> usize {
         let Shape { inputs, centres, outputs } = shape;
         let decay = if common_width { 1 } else { centres };
         let affine = if affine { inputs.saturating_mul(outputs) } else { 0 };

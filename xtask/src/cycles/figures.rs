@@ -139,7 +139,7 @@ pub fn measured(log: &str, counts: &[Region]) -> Outcome<Vec<Measured>> {
     else {
         return Err(format!("the image did not calibrate; it logged\n{log}"));
     };
-    let (empty, loops) = (empty.whole, without(loops.whole, EMPTY));
+    let (empty, loops) = (empty.whole, loops.whole - EMPTY);
     if *known != CALIBRATION || empty != EMPTY || loops != LOOP {
         return Err(format!(
             "the count is wrong: of an empty region {empty:?}, expected {EMPTY:?}; of a known loop \
@@ -148,7 +148,7 @@ pub fn measured(log: &str, counts: &[Region]) -> Outcome<Vec<Measured>> {
     }
     let region = |(name, counts): (&&str, &Region)| {
         let (kernel, scope) = name.split_once(' ')?;
-        let counts = Region { whole: without(counts.whole, EMPTY), ..*counts };
+        let counts = Region { whole: counts.whole - EMPTY, ..*counts };
         Some(Measured { kernel: kernel.to_owned(), scope: Scope::named(scope)?, counts })
     };
     let regions = names.iter().zip(counts).map(region).collect::<Option<_>>();
@@ -183,13 +183,6 @@ pub fn of_run(log: &str, counts: &[Region], affine: bool) -> Outcome<Vec<Figure>
 /// What stands behind `what` in the lines of the log that start with it.
 fn named<'l>(log: &'l str, what: &'static str) -> impl Iterator<Item = &'l str> {
     log.lines().filter_map(move |line| line.strip_prefix("INFO ")?.strip_prefix(what))
-}
-
-fn without(count: Count, less: Count) -> Count {
-    Count {
-        instructions: count.instructions.saturating_sub(less.instructions),
-        cycles: count.cycles.saturating_sub(less.cycles),
-    }
 }
 
 #[cfg(test)]

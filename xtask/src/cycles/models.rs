@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 
 use model_core::blob::{Model, ModelParts, encode_to_vec};
 use model_core::rbf::{Format, Network, direct, expanded, fixed16};
-use taxel_learn::ModelBlob;
 
 use super::training::{self, Wanted};
 use crate::process::Outcome;
@@ -22,8 +21,6 @@ pub struct Blob {
     pub path: PathBuf,
     /// Whether it has an affine tail.
     pub affine: bool,
-    /// Whether all rows' networks have the same format and number of centres, and all or none have a tail.
-    pub rows_alike: bool,
 }
 
 /// Trains models of every format and size, with a network a row and with one for the whole array. Writes each into
@@ -60,8 +57,8 @@ pub fn train(directory: &Path, kernel: Option<&str>) -> Outcome<Vec<Blob>> {
         is_as_asked(&model, wanted.format, wanted.centres).map_err(refused)?;
         for (affine, suffix) in [(false, ""), (true, "-affine")] {
             let path = directory.join(format!("{stem}{suffix}.bin"));
-            write(&path, &rewritten(&model, Rows::AsTheFirst, affine)?)?;
-            blobs.push(Blob { path, affine, rows_alike: true });
+            write(&path, &of_first_network(&model, affine)?)?;
+            blobs.push(Blob { path, affine });
         }
     }
     Ok(blobs)
@@ -74,44 +71,6 @@ fn format_of(kernel: &str) -> Option<Format> {
         rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
     };
     Format::ALL.into_iter().filter(named).max_by_key(|format| format.name().len())
-}
-
-/// The blob at `path` and, if it has an affine tail, a copy without it, written into `directory`.
-///
-/// # Errors
-/// The file is not a sound blob.
-pub fn of_file(path: &Path, directory: &Path) -> Outcome<Vec<Blob>> {
-    let blob = ModelBlob::read(path).map_err(|cause| cause.to_string())?;
-    let model = blob.parse();
-    let shape = model.shape();
-    if (shape.rows, shape.inputs, shape.outputs) != (8, 18, 18) {
-        return Err(format!(
-            "{}: it is for {} rows of {} readings and {} outputs; --model measures 8 rows of 18 and 18",
-            path.display(),
-            shape.rows,
-            shape.inputs,
-            shape.outputs
-        ));
-    }
-    let affine = model.networks().any(|network| network.has_affine_tail());
-    let rows_alike = rows_alike(&model);
-    let given = Blob { path: path.to_owned(), affine, rows_alike };
-    if !affine {
-        return Ok(vec![given]);
-    }
-    fs::create_dir_all(directory).map_err(|cause| failed(directory, &cause))?;
-    let without = directory.join("without-tail.bin");
-    write(&without, &rewritten(&model, Rows::AsTheyAre, false)?)?;
-    Ok(vec![Blob { path: without, affine: false, rows_alike }, given])
-}
-
-fn rows_alike(model: &Model<'_>) -> bool {
-    let kind = |network: Network<'_>| {
-        (network.format(), network.shape().centres, network.has_affine_tail())
-    };
-    let mut kinds = model.networks().map(kind);
-    let first = kinds.next();
-    kinds.all(|other| Some(other) == first)
 }
 
 fn is_as_asked(model: &Model<'_>, format: Format, centres: usize) -> Outcome {
@@ -129,31 +88,14 @@ fn is_as_asked(model: &Model<'_>, format: Format, centres: usize) -> Outcome {
     }
 }
 
-/// Choice of the rows' networks.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Rows {
-    AsTheyAre,
-    AsTheFirst,
-}
-
-/// A blob of the model with other rows, or without its affine tail.
-fn rewritten(model: &Model<'_>, rows: Rows, affine: bool) -> Outcome<Vec<u8>> {
-    let count = if rows == Rows::AsTheFirst { 1 } else { model.network_count() };
-    let words: Vec<Vec<u32>> =
-        model.networks().take(count).map(|network| words(&network, affine)).collect();
-    let networks = model.networks().zip(&words);
-    let networks: Vec<Network<'_>> = networks
-        .map(|(network, words)| of_words(&network, affine, words))
-        .collect::<Outcome<_>>()?;
-    let row_network: Vec<u8> = (0..model.shape().rows)
-        .map(|row| {
-            if rows == Rows::AsTheFirst { 0 } else { model.network_of_row(row).unwrap_or(0) as u8 }
-        })
-        .collect();
+/// A blob of the model in which every row has the first network, with its affine tail or without.
+fn of_first_network(model: &Model<'_>, affine: bool) -> Outcome<Vec<u8>> {
+    let first = model.networks().next().ok_or("a model without networks")?;
+    let words = words(&first, affine);
     let parts = ModelParts {
         projection: model.projection(),
-        networks: &networks,
-        row_network: &row_network,
+        networks: &[of_words(&first, affine, &words)?],
+        row_network: &vec![0; model.shape().rows],
         metadata: *model.metadata(),
     };
     encode_to_vec(&parts).map(|bytes| bytes.to_vec()).map_err(|cause| cause.to_string())
@@ -203,6 +145,8 @@ fn failed(path: &Path, cause: &impl ToString) -> String {
 
 #[cfg(test)]
 mod tests {
+    use taxel_learn::ModelBlob;
+
     use super::*;
 
     #[test]
@@ -224,10 +168,10 @@ mod tests {
     fn a_model_without_its_tail_is_otherwise_the_same() {
         let blob = ModelBlob::read(&crate::process::root().join("testdata/hand-made.bin")).unwrap();
         let model = blob.parse();
-        let with = rewritten(&model, Rows::AsTheyAre, true).unwrap();
-        assert_eq!(with, blob.bytes());
+        let with = ModelBlob::of_bytes(&of_first_network(&model, true).unwrap()).unwrap();
+        assert_eq!(with.parse().networks().next(), model.networks().next());
 
-        let without = rewritten(&model, Rows::AsTheFirst, false).unwrap();
+        let without = of_first_network(&model, false).unwrap();
         let without = ModelBlob::of_bytes(&without).unwrap();
         let without = without.parse();
         assert_eq!((model.network_count(), without.network_count()), (2, 1));

@@ -5,7 +5,7 @@
 
 use std::collections::hash_map::Entry;
 use std::collections::{HashMap, HashSet};
-use std::ops::Range;
+use std::ops::{Range, Sub};
 
 use super::code::Code;
 use super::cost::cycles;
@@ -26,6 +26,17 @@ impl Count {
     fn add(&mut self, cycles: u64) {
         self.instructions += 1;
         self.cycles += cycles;
+    }
+}
+
+impl Sub for Count {
+    type Output = Self;
+
+    fn sub(self, less: Self) -> Self {
+        Self {
+            instructions: self.instructions.saturating_sub(less.instructions),
+            cycles: self.cycles.saturating_sub(less.cycles),
+        }
     }
 }
 

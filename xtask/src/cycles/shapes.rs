@@ -3,15 +3,15 @@
 use std::fs;
 use std::path::Path;
 
-use model_core::blob::{Metadata, ModelParts, ModelShape, encode_to_vec};
-use model_core::rbf::{Format, Network, Shape, expanded, fixed16};
-use model_core::scale::UNITS;
+use model_core::blob::ModelShape;
+use model_core::rbf::Format;
 use rayon::prelude::*;
+use taxel_learn::cost::Design;
 
 use super::code::Code;
 use super::figures::{self, Scope};
-use super::machine;
 use super::regions::Count;
+use super::{machine, synthetic};
 use crate::process::Outcome;
 
 /// Number of centres K.
@@ -67,7 +67,8 @@ pub fn measure(image: &Path, code: &Code, directory: &Path) -> Outcome<Vec<Measu
         .collect();
     let one = |&(format, (inputs, outputs), most): &(Format, (usize, usize), f64)| {
         let path = directory.join(format!("{}-{inputs}-to-{outputs}.bin", format.name()));
-        let run = blob(format, Shape { inputs, centres: CENTRES, outputs })
+        let shape = ModelShape { rows: 1, inputs, outputs };
+        let run = synthetic::blob(&Design::of_rows(shape, format, CENTRES, false))
             .and_then(|blob| fs::write(&path, blob).map_err(|cause| cause.to_string()))
             .and_then(|()| machine::run(image, code, &path))
             .and_then(|run| figures::measured(&run.log, &run.counts))
@@ -83,48 +84,6 @@ fn inference(regions: &[figures::Measured]) -> Outcome<Count> {
     let inference = regions.iter().find(|region| region.scope == Scope::Inference);
     let count = inference.map(|region| region.counts.whole);
     count.ok_or_else(|| "no inference was measured".to_owned())
-}
-
-/// A blob with one network for one row, without an affine tail. Its numbers make no difference to the cost.
-fn blob(format: Format, shape: Shape) -> Outcome<Vec<u8>> {
-    let Shape { inputs, centres, outputs } = shape;
-    let (middle, per_unit) = (vec![60.0; inputs], vec![1e8; inputs]);
-    let words: Vec<u32> = if format == Format::F32 {
-        let parameters = expanded::Parameters {
-            input_midpoint: &middle,
-            input_per_unit: &per_unit,
-            decay: 1.0 / inputs as f32 / UNITS / UNITS,
-            bias: &vec![0.5; outputs],
-            affine: &[],
-            exponents: &vec![0.0; centres * (1 + inputs)],
-            output_weights: &vec![0.25; centres * outputs],
-        };
-        parameters.words().collect()
-    } else {
-        let line = 1 + inputs.div_ceil(2);
-        let mut group = vec![0; fixed16::words_at_once(shape)];
-        let lines = group.chunks_exact_mut(line).take(fixed16::CENTRES_AT_ONCE);
-        lines.for_each(|line| line[0] = 1 << 26);
-        let parameters = fixed16::Parameters {
-            input_midpoint: &middle,
-            input_per_unit: &per_unit,
-            decay: 1 << 20,
-            bias: &vec![1; outputs],
-            output_scale: &vec![1e-6; outputs],
-            affine: &[],
-            centres: &group.repeat(centres / fixed16::CENTRES_AT_ONCE),
-        };
-        parameters.words().collect()
-    };
-    let network = if format == Format::F32 {
-        expanded::Network::try_new(shape, false, &words).map(Network::from)
-    } else {
-        fixed16::Network::try_new(shape, false, &words).map(Network::from)
-    };
-    let networks = [network.map_err(|cause| cause.to_string())?];
-    let metadata = Metadata::unnamed(ModelShape { rows: 1, inputs, outputs });
-    let parts = ModelParts { projection: None, networks: &networks, row_network: &[0], metadata };
-    encode_to_vec(&parts).map(|bytes| bytes.to_vec()).map_err(|cause| cause.to_string())
 }
 
 /// The figures as a table in Markdown.
@@ -183,14 +142,5 @@ mod tests {
         let all = [measured(18, 18, 36 * 64), measured(18, 6, 24 * 64 + 231)];
         assert_eq!(held(&all).unwrap_err(), "f32, 18 → 6: 1.150 times 18 → 18, 1.15 allowed");
         assert!(held(&all[1..]).is_err(), "nothing to compare with");
-    }
-
-    #[test]
-    fn every_shape_makes_a_sound_blob() {
-        for ((inputs, outputs), _) in SHAPES {
-            for format in [Format::F32, Format::Fixed16] {
-                assert!(blob(format, Shape { inputs, centres: CENTRES, outputs }).is_ok());
-            }
-        }
     }
 }

@@ -4,14 +4,13 @@ use model_core::rbf::Format;
 use rayon::prelude::*;
 use taxel_data::dataset::Dataset;
 use taxel_data::progress::Progress;
+use taxel_learn::cost::{Cost, DecoderRam, Design, Prices};
 use taxel_learn::train::{self, FittedNetwork, Samples, WHOLE_ARRAY_SPREAD, projection};
-use taxel_learn::{ModelBlob, Options, Origin, Trained, pack};
+use taxel_learn::{Exponential, ModelBlob, Options, Origin, Trained, pack};
 
-use super::super::cost::{Cost, Costs};
-use super::super::ram::DecoderRam;
 use super::gating::Gates;
 use super::{Arithmetic, Plan, Point, SLOT_BYTES};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::metrics::{self, Measure};
 
 /// Settings that distinguish points with the same frames, besides format, tail and gate.
@@ -63,7 +62,7 @@ pub(super) struct Judge<'s> {
     origin: Origin,
     measure: &'s Measure,
     plan: &'s Plan,
-    pub costs: Costs,
+    pub prices: Prices,
     pub points: Vec<Point>,
     /// Index of each point's blob among the distinct ones.
     pub blobs: Vec<usize>,
@@ -77,10 +76,10 @@ impl<'s> Judge<'s> {
         origin: Origin,
         measure: &'s Measure,
         plan: &'s Plan,
-        costs: Costs,
+        prices: Prices,
     ) -> Self {
         let (points, blobs, distinct) = (vec![], vec![], vec![]);
-        Self { options, origin, measure, plan, costs, points, blobs, distinct }
+        Self { options, origin, measure, plan, prices, points, blobs, distinct }
     }
 
     /// Trains and judges every format and tail with so many centres.
@@ -122,8 +121,6 @@ impl<'s> Judge<'s> {
             let blob = pack(&trained, sets.training, &origin)?;
             // A network that fell back to direct distances is the point of that format.
             let fell_back = trained.networks.iter().any(|network| network.format() != format);
-            // A blob of the array that fits no slot has no measured cycles; those of rows are measured
-            // by network.
             let fits = !knobs.whole_array || blob.bytes().len() <= SLOT_BYTES;
             if fell_back || !fits {
                 continue;
@@ -146,17 +143,11 @@ impl<'s> Judge<'s> {
         (knobs, affine_tail, spread): (Knobs, bool, f64),
     ) -> Result<()> {
         let Knobs { whole_array, centres, samples_averaged } = knobs;
-        let (kernel, test) = (arithmetic.name(), sets.test);
+        let test = sets.test;
         let model = blob.prepare(arithmetic.exponential).of_inputs();
-        let ram = DecoderRam::of(model.model());
-        // Fewer centres than asked for take at most the time of the measured number.
-        let kind = (kernel.as_str(), centres, affine_tail, whole_array);
-        let ungated = self.costs.frame(kind).ok_or_else(|| {
-            Error::Cycles(format!(
-                "no figure for {kernel}, K = {centres}, whole array: {whole_array}"
-            ))
-        })?;
-        let frames = self.costs.frames(kind);
+        let design = Design::of(blob);
+        let ram = DecoderRam::of(&design);
+        let frames = self.prices.frames(&design, arithmetic.exponential)?;
         let estimate = model.decode_lines(&test.inputs.values);
         let mut add = |gate_k: Option<f64>, frame: Cost, estimate: &[f64]| {
             self.points.push(Point {
@@ -177,8 +168,9 @@ impl<'s> Judge<'s> {
             });
             self.blobs.push(self.distinct.len());
         };
-        add(None, ungated, &estimate);
-        if let Some(frames) = frames {
+        add(None, frames.ungated, &estimate);
+        // Behind a gate with the firmware's exponential alone.
+        if arithmetic.exponential == Exponential::default() {
             let rest_outputs = model.decode_lines(&sets.gates.rest_inputs.values);
             for gate in sets.gates.iter() {
                 let frame = frames.mean_cost(gate.share);

@@ -1,13 +1,14 @@
 //! RAM for decoding on a 32-bit device.
 
-use model_core::blob::Model;
 use model_core::rbf::Format;
 use serde::Serialize;
 
-/// RAM in bytes by its use, including the larger buffers on the stack.
+use super::design::Design;
+
+/// RAM in bytes by its use, including the larger buffers on the stack. The weights are not counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct DecoderRam {
-    /// Pointers to each row's weights, which stay in flash.
+    /// Pointers to each row's weights.
     pub decoder: usize,
     /// Readings of all rows.
     pub frame: usize,
@@ -19,30 +20,35 @@ pub struct DecoderRam {
     pub features: usize,
     /// One over each reading of the baseline, and readings relative to it; 0 for a model of readings.
     pub relative_inputs: usize,
-    /// Activations of 128 centres, on the stack of f32 networks; 0 without a network of that format.
+    /// Exponents and activations of a batch of centres, on the stack.
     pub activations: usize,
 }
 
 impl DecoderRam {
-    /// RAM for decoding with `model`.
+    /// RAM for decoding with a model of this `design`.
     #[must_use]
-    pub fn of(model: &Model<'_>) -> Self {
-        let (shape, metadata) = (model.shape(), model.metadata());
+    pub fn of(design: &Design) -> Self {
+        let shape = design.shape;
         let float = size_of::<f32>();
         let readings = shape.inputs * float;
-        let f32_kernel = model.networks().any(|network| network.format() == Format::F32);
+        let batch = |format, centres: usize| match format {
+            Format::F32Direct => 0,
+            Format::F32 => 128,
+            Format::Fixed16 => centres.next_multiple_of(16).min(256),
+        };
+        let activations = design.networks.iter().map(|it| batch(it.format, it.shape.centres));
         Self {
             decoder: model_core::decoder_ram_bytes(shape.rows),
             frame: shape.rows * readings,
             estimate: shape.rows * (shape.outputs * float + 1),
             scaled_readings: readings,
-            features: model.projection().map_or(0, |_| readings),
-            relative_inputs: match (metadata.relative_inputs, model.projection()) {
+            features: if design.projection { readings } else { 0 },
+            relative_inputs: match (design.relative_inputs, design.projection) {
                 (false, _) => 0,
-                (true, None) => (shape.rows + 1) * readings,
-                (true, Some(_)) => 2 * shape.rows * readings,
+                (true, false) => (shape.rows + 1) * readings,
+                (true, true) => 2 * shape.rows * readings,
             },
-            activations: if f32_kernel { 128 * float } else { 0 },
+            activations: activations.max().unwrap_or(0) * float,
         }
     }
 

@@ -1,0 +1,130 @@
+//! What the cost of decoding depends on: sizes and options of a model, without its numbers.
+
+use firmware::capacity::WEIGHT_RAM_BYTES;
+use model_core::blob::ModelShape;
+use model_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
+
+use crate::packing::ModelBlob;
+
+/// Sizes and options of a model.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Design {
+    /// Rows, and inputs and outputs a row.
+    pub shape: ModelShape,
+    /// The network of every row; with a projection the one network for all rows.
+    pub networks: Vec<NetworkDesign>,
+    /// Number of distinct networks that the blob holds.
+    pub distinct: usize,
+    /// Whether one network decodes all rows, behind a projection of their readings to `shape.inputs` features.
+    pub projection: bool,
+    /// Whether inputs are relative to the baseline.
+    pub relative_inputs: bool,
+    /// Whether the images copy the weights to RAM. Else they stay in flash.
+    pub weights_in_ram: bool,
+}
+
+/// Sizes and options of one network.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NetworkDesign {
+    /// Number format.
+    pub format: Format,
+    /// Inputs, centres and outputs of the network.
+    pub shape: Shape,
+    /// Whether it has an affine tail.
+    pub affine_tail: bool,
+    /// Whether all centres share one width; in other formats than `f32-direct` they do.
+    pub common_width: bool,
+}
+
+impl Design {
+    /// The design of the model in `blob`.
+    #[must_use]
+    pub fn of(blob: &ModelBlob) -> Self {
+        let model = blob.parse();
+        let shape = model.shape();
+        let distinct: Vec<NetworkDesign> =
+            model.networks().map(|it| NetworkDesign::of(&it)).collect();
+        let projection = model.projection().is_some();
+        let rows = if projection { 1 } else { shape.rows };
+        // A sound model has a network for every row.
+        let networks =
+            (0..rows).filter_map(|row| distinct.get(model.network_of_row(row)?).copied()).collect();
+        Self {
+            shape,
+            networks,
+            distinct: distinct.len(),
+            projection,
+            relative_inputs: model.metadata().relative_inputs,
+            weights_in_ram: blob.bytes().len() <= WEIGHT_RAM_BYTES,
+        }
+    }
+
+    /// The design of a model with a network of its own for each row, which are all alike. `shape` is that of the
+    /// model.
+    #[must_use]
+    pub fn of_rows(shape: ModelShape, format: Format, centres: usize, affine_tail: bool) -> Self {
+        let ModelShape { rows, inputs, outputs } = shape;
+        let shape_of_row = Shape { inputs, centres, outputs };
+        let network =
+            NetworkDesign { format, shape: shape_of_row, affine_tail, common_width: true };
+        let networks = vec![network; rows];
+        let (distinct, projection, relative_inputs) = (rows, false, false);
+        Self { shape, networks, distinct, projection, relative_inputs, weights_in_ram: false }
+            .in_ram_if_it_fits()
+    }
+
+    /// The design of a model with one network for all rows, behind a projection. `shape` is that of the model.
+    #[must_use]
+    pub fn of_array(shape: ModelShape, format: Format, centres: usize, affine_tail: bool) -> Self {
+        let outputs = shape.rows * shape.outputs;
+        let one = ModelShape { rows: 1, outputs, ..shape };
+        let networks = Self::of_rows(one, format, centres, affine_tail).networks;
+        let (distinct, projection, relative_inputs) = (1, true, false);
+        Self { shape, networks, distinct, projection, relative_inputs, weights_in_ram: false }
+            .in_ram_if_it_fits()
+    }
+
+    fn in_ram_if_it_fits(self) -> Self {
+        Self { weights_in_ram: self.parameter_bytes() <= WEIGHT_RAM_BYTES, ..self }
+    }
+
+    /// Bytes of all parameters in a blob: networks and projection, without names and headers.
+    #[must_use]
+    pub fn parameter_bytes(&self) -> usize {
+        let network = self.networks.first().map_or(0, NetworkDesign::bytes);
+        network * self.distinct + self.projection_bytes()
+    }
+
+    /// Bytes of the projection's parameters in a blob; 0 without one.
+    #[must_use]
+    pub fn projection_bytes(&self) -> usize {
+        let readings = self.shape.rows * self.shape.inputs;
+        let floats = self.shape.inputs * (1 + readings);
+        if self.projection { floats * size_of::<f32>() } else { 0 }
+    }
+}
+
+impl NetworkDesign {
+    /// The design of `network`.
+    #[must_use]
+    pub fn of(network: &Network<'_>) -> Self {
+        Self {
+            format: network.format(),
+            shape: network.shape(),
+            affine_tail: network.has_affine_tail(),
+            common_width: network.shape().centres == 1 || network.widths().count() == 1,
+        }
+    }
+
+    /// Bytes of the network's parameters in a blob.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        let Self { format, shape, affine_tail, common_width } = *self;
+        let words = match format {
+            Format::F32Direct => direct::Network::block_words(shape, common_width, affine_tail),
+            Format::F32 => expanded::Network::block_words(shape, affine_tail),
+            Format::Fixed16 => fixed16::Network::block_words(shape, affine_tail),
+        };
+        words * size_of::<u32>()
+    }
+}

@@ -1,0 +1,184 @@
+//! The price list of code, `firmware/prices.csv`: made from many designs, and checked with others.
+
+use std::fs;
+use std::path::Path;
+
+use taxel_learn::cost::Prices;
+
+use super::accepted::OTHER_COMPILERS_PERCENT;
+use super::code::Code;
+use super::told::{self, Frame};
+use super::{designs, fit};
+use crate::process::{Outcome, root};
+
+/// File of the price list.
+const FILE: &str = "firmware/prices.csv";
+
+/// Largest error in per cent of what the list tells of a frame's instructions and cycles.
+const TOLERANCE_PERCENT: f64 = 2.0;
+
+/// Measures many designs, and writes the price list that fits them best.
+///
+/// # Errors
+/// A run fails, or no list fits.
+pub fn accept(image: &Path, code: &Code, directory: &Path, compiler: &str) -> Outcome {
+    let designs = designs::for_prices();
+    eprintln!("measuring {} designs for {FILE}", designs.len());
+    let frames = told::measure_designs(&designs, image, code, directory)?;
+    let text = Prices::text(compiler, &fit::prices(&frames)?);
+    fs::write(root().join(FILE), text).map_err(|cause| format!("{FILE}: {cause}"))
+}
+
+/// Measures other designs than those that the list was made from, and says how well it tells their costs. With another
+/// `compiler` than the list's, code in assembly must be told exactly, and nothing may take more than is told by more
+/// than a margin.
+///
+/// # Errors
+/// A run fails, or the list tells wrong costs.
+pub fn check(image: &Path, code: &Code, directory: &Path, compiler: &str) -> Outcome<String> {
+    let designs = designs::to_check();
+    let frames = told::measure_designs(&designs, image, code, directory)?;
+    let prices = prices()?;
+    let compared = compare(&frames, &prices)?;
+    let range = |of: fn(&Compared<'_>) -> f64| {
+        let errors = compared.iter().map(of);
+        let [least, most] =
+            errors.fold([0.0_f64; 2], |[least, most], it| [least.min(it), most.max(it)]);
+        format!("{least:+.2} to {most:+.2} %")
+    };
+    held(&compared, prices.compiler != compiler)?;
+    Ok(format!(
+        "{FILE} tells the costs of {} frames of {} random designs: of assembly exactly, all instructions to {}, \
+         cycles to {}",
+        compared.len(),
+        designs.len(),
+        range(|it| it.instructions_percent),
+        range(|it| it.cycles_percent),
+    ))
+}
+
+/// Prints what the list tells of a model's `frames` beside what was counted: a table, or a list of JSON objects.
+///
+/// # Errors
+/// The list tells wrong costs.
+pub fn compare_model(frames: &[Frame], compiler: &str, json: bool) -> Outcome {
+    let prices = prices()?;
+    let compared = compare(frames, &prices)?;
+    print!("{}", if json { objects(&compared) } else { table(&compared) });
+    held(&compared, prices.compiler != compiler)
+}
+
+/// Fails if the list tells wrong costs of `frames`.
+///
+/// # Errors
+/// The frames that cost something else than told.
+pub fn held_to(frames: &[Frame], compiler: &str) -> Outcome {
+    let prices = prices()?;
+    held(&compare(frames, &prices)?, prices.compiler != compiler)
+}
+
+/// A frame and what the list tells of it.
+struct Compared<'f> {
+    frame: &'f Frame,
+    told: [u64; 2],
+    assembly_is_exact: bool,
+    /// What is told over what was counted, less 100 %.
+    instructions_percent: f64,
+    cycles_percent: f64,
+}
+
+/// The price list: not that which was compiled in, since `accept` may have replaced it.
+fn prices() -> Outcome<Prices> {
+    let text = fs::read_to_string(root().join(FILE)).map_err(|cause| format!("{FILE}: {cause}"))?;
+    Prices::parse(&text).map_err(|cause| cause.to_string())
+}
+
+fn compare<'f>(frames: &'f [Frame], prices: &Prices) -> Outcome<Vec<Compared<'f>>> {
+    frames.iter().map(|frame| Compared::new(frame, prices)).collect()
+}
+
+impl<'f> Compared<'f> {
+    fn new(frame: &'f Frame, prices: &Prices) -> Outcome<Self> {
+        let [assembly, whole] = frame.told(prices)?;
+        let percent = |told: f64, counted: u64| 100.0 * (told / counted as f64 - 1.0);
+        Ok(Self {
+            frame,
+            told: [whole[0].round() as u64, whole[1].round() as u64],
+            assembly_is_exact: assembly[0].round() as u64 == frame.assembly.instructions,
+            instructions_percent: percent(whole[0], frame.whole.instructions),
+            cycles_percent: percent(whole[1], frame.whole.cycles),
+        })
+    }
+
+    /// Whether the costs are told well enough.
+    fn holds(&self, other_compiler: bool) -> bool {
+        let errors = [self.instructions_percent, self.cycles_percent];
+        let told = if other_compiler {
+            // Less than told is no fault then.
+            let margin = TOLERANCE_PERCENT + OTHER_COMPILERS_PERCENT as f64;
+            self.cycles_percent >= -margin
+        } else {
+            errors.iter().all(|error| error.abs() <= TOLERANCE_PERCENT)
+        };
+        self.assembly_is_exact && told
+    }
+}
+
+fn held(compared: &[Compared<'_>], other_compiler: bool) -> Outcome {
+    let wrong: Vec<String> = compared
+        .iter()
+        .filter(|it| !it.holds(other_compiler))
+        .map(|it| {
+            let (counted, exact) =
+                (it.frame.whole, if it.assembly_is_exact { "" } else { ", assembly not exact" });
+            format!(
+                "  {}: {} instructions and {} cycles told, {} and {} counted{exact}\n",
+                it.frame.what(),
+                it.told[0],
+                it.told[1],
+                counted.instructions,
+                counted.cycles
+            )
+        })
+        .collect();
+    if wrong.is_empty() {
+        return Ok(());
+    }
+    Err(format!(
+        "{FILE} tells wrong costs of\n{}if the code was changed on purpose, `cargo xtask cycles --accept`",
+        wrong.concat()
+    ))
+}
+
+fn table(compared: &[Compared<'_>]) -> String {
+    let line = |name: &str, cells: [&str; 4]| {
+        let [instructions, told_instructions, cycles, told_cycles] = cells;
+        format!(
+            "{name:42} | {instructions:>12} {told_instructions:>9} | {cycles:>9} {told_cycles:>9}\n"
+        )
+    };
+    let lines = compared.iter().map(|it| {
+        let counted = it.frame.whole;
+        let cells = [counted.instructions, it.told[0], counted.cycles, it.told[1]];
+        let [a, b, c, d] = cells.map(|number| number.to_string());
+        let name = format!("{} {}", it.frame.kernel, it.frame.scope.name());
+        line(&name, [&a, &b, &c, &d])
+    });
+    let head = line("kernel and scope", ["instructions", "told", "cycles", "told"]);
+    head + &lines.collect::<String>()
+}
+
+fn objects(compared: &[Compared<'_>]) -> String {
+    let object = |it: &Compared<'_>| {
+        serde_json::json!({
+            "kernel": it.frame.kernel,
+            "scope": it.frame.scope.name(),
+            "instructions": it.frame.whole.instructions,
+            "told_instructions": it.told[0],
+            "cycles": it.frame.whole.cycles,
+            "told_cycles": it.told[1],
+        })
+    };
+    let lines: Vec<String> = compared.iter().map(|it| object(it).to_string()).collect();
+    format!("[{}]\n", lines.join(",\n "))
+}

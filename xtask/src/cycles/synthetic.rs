@@ -1,0 +1,134 @@
+//! Blobs of any design, with numbers that make no difference to their cost.
+
+use model_core::blob::{Metadata, ModelParts, encode_to_vec};
+use model_core::projection::Projection;
+use model_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
+use model_core::scale::UNITS;
+use taxel_data::random::{Purpose, Random, Stream};
+use taxel_learn::cost::{Design, NetworkDesign};
+
+use crate::process::Outcome;
+
+/// Middle of every input's training range.
+const MIDDLE: f32 = 60.0;
+
+/// A blob of this `design`, whose rows are all alike and share one network.
+///
+/// # Errors
+/// The design is beyond what a format or the blob holds.
+pub fn blob(design: &Design) -> Outcome<Vec<u8>> {
+    let one = design.networks.first().ok_or("a design without networks")?;
+    let words = words(one);
+    let networks = [network(one, &words)?];
+    let (readings, features) = (design.shape.rows * design.shape.inputs, design.shape.inputs);
+    // Feature i is reading i of the first row.
+    let mut block = vec![0.0; features * (1 + readings)];
+    (0..features).for_each(|i| block[features * (1 + i) + i] = 1.0);
+    let projection =
+        Projection::new(readings, features, &block).map_err(|cause| cause.to_string())?;
+    let mut metadata = Metadata::unnamed(design.shape);
+    metadata.relative_inputs = design.relative_inputs;
+    let parts = ModelParts {
+        projection: design.projection.then_some(projection),
+        networks: &networks,
+        row_network: &vec![0; design.shape.rows],
+        metadata,
+    };
+    encode_to_vec(&parts).map(|bytes| bytes.to_vec()).map_err(|cause| cause.to_string())
+}
+
+/// The block of a network.
+fn words(design: &NetworkDesign) -> Vec<u32> {
+    let Shape { inputs, centres, outputs } = design.shape;
+    let (middle, per_unit) = (vec![MIDDLE; inputs], vec![1e8; inputs]);
+    let bias = vec![0.5; outputs];
+    let tail = if design.affine_tail { inputs * outputs } else { 0 };
+    match design.format {
+        Format::F32Direct => {
+            let widths = if design.common_width { 1 } else { centres };
+            // Exponentials branch by their arguments: these are spread as a trained network's are.
+            let mut random = Random::new(1, Stream::Training, Purpose::Centres, 0, 0);
+            let mut centre = |_| {
+                let spread = random.between([0.0, 3.0]);
+                (0..inputs).map(|_| (0.5 + spread * (random.unit() - 0.5)) as f32).collect()
+            };
+            let places: Vec<Vec<f32>> = (0..centres).map(&mut centre).collect();
+            let parameters = direct::Parameters {
+                input_minimum: &vec![MIDDLE - 10.0; inputs],
+                input_per_span: &vec![0.05; inputs],
+                centres: &places.concat(),
+                decay: &vec![12.0 / inputs as f32; widths],
+                output_weights: &vec![0.5; centres * outputs],
+                bias: &bias,
+                affine: &vec![0.25; tail],
+            };
+            parameters.words().collect()
+        }
+        Format::F32 => {
+            let stored = centres.next_multiple_of(expanded::CENTRES_AT_ONCE);
+            let parameters = expanded::Parameters {
+                input_midpoint: &middle,
+                input_per_unit: &per_unit,
+                decay: 1.0 / inputs as f32 / UNITS / UNITS,
+                bias: &bias,
+                affine: &vec![0.0; tail],
+                exponents: &vec![0.0; stored * (1 + inputs)],
+                output_weights: &vec![0.25; stored * outputs],
+            };
+            parameters.words().collect()
+        }
+        Format::Fixed16 => {
+            let mut group = vec![0; fixed16::words_at_once(design.shape)];
+            let lines = group.chunks_exact_mut(1 + inputs.div_ceil(2));
+            lines.take(fixed16::CENTRES_AT_ONCE).for_each(|line| line[0] = 1 << 26);
+            let tail = if design.affine_tail { inputs.div_ceil(2) * outputs } else { 0 };
+            let parameters = fixed16::Parameters {
+                input_midpoint: &middle,
+                input_per_unit: &per_unit,
+                decay: 1 << 20,
+                bias: &vec![1; outputs],
+                output_scale: &vec![1e-6; outputs],
+                affine: &vec![0; tail],
+                centres: &group.repeat(centres.div_ceil(fixed16::CENTRES_AT_ONCE)),
+            };
+            parameters.words().collect()
+        }
+    }
+}
+
+fn network<'w>(design: &NetworkDesign, words: &'w [u32]) -> Outcome<Network<'w>> {
+    let NetworkDesign { format, shape, affine_tail, common_width } = *design;
+    let network = match format {
+        Format::F32Direct => {
+            direct::Network::of_words(shape, common_width, affine_tail, words).map(Network::from)
+        }
+        Format::F32 => expanded::Network::try_new(shape, affine_tail, words).map(Network::from),
+        Format::Fixed16 => fixed16::Network::try_new(shape, affine_tail, words).map(Network::from),
+    };
+    network.map_err(|cause| format!("{format:?} {shape:?}: {cause}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use model_core::blob::ModelShape;
+    use taxel_learn::ModelBlob;
+
+    use super::*;
+
+    #[test]
+    fn a_blob_has_the_design_that_was_asked_for() {
+        let shape = ModelShape { rows: 3, inputs: 7, outputs: 5 };
+        for format in Format::ALL {
+            for affine_tail in [false, true] {
+                for design in [Design::of_rows, Design::of_array] {
+                    let mut design = design(shape, format, 21, affine_tail);
+                    (design.distinct, design.relative_inputs) = (1, affine_tail);
+                    let blob = ModelBlob::of_bytes(&blob(&design).unwrap()).unwrap();
+                    assert_eq!(Design::of(&blob), design);
+                    let names_and_headers = blob.bytes().len() - design.parameter_bytes();
+                    assert!(names_and_headers < 300, "{names_and_headers}");
+                }
+            }
+        }
+    }
+}
