@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 /// Rows, readings of a row and outputs of a row that `cargo xtask cycles` measures.
 pub const MEASURED_SHAPE: [usize; 3] = [8, 18, 18];
 
-/// Content of `firmware/cycles.csv`: compiler, kernel, centres, affine, scope, instructions, cycles.
+/// Content of `firmware/cycles.csv`: compiler, kernel, centres, affine, scope, instructions, cycles, flash_cycles.
 const MEASURED: &str = include_str!("../../../firmware/cycles.csv");
 
 /// Instructions, and cycles by the model of `docs/cycles.md` (zero wait states; not checked against
@@ -102,9 +102,9 @@ impl Costs {
         let mut compiler: Option<String> = None;
         let mut lines = Vec::new();
         for record in reader.deserialize() {
-            type Record = (String, String, usize, String, String, u64, u64);
+            type Record = (String, String, usize, String, String, u64, u64, u64);
             let record: Record = record.map_err(|cause| failed(cause.to_string()))?;
-            let (by, kernel, centres, affine, scope, instructions, cycles) = record;
+            let (by, kernel, centres, affine, scope, instructions, cycles, _) = record;
             let affine = match affine.as_str() {
                 "yes" => true,
                 "no" => false,
@@ -241,17 +241,17 @@ mod tests {
 
     #[test]
     fn a_file_without_figures_is_refused() {
-        let header = "compiler,kernel,centres,affine,scope,instructions,cycles\n";
+        let header = "compiler,kernel,centres,affine,scope,instructions,cycles,flash_cycles\n";
         let line = |line: &str| format!("{header}{line}\n");
         for text in [
             header.to_owned(),
-            line("rustc 1,f32,many,yes,frame,1,2"),
-            line("rustc 1,f32,16,perhaps,frame,1,2"),
+            line("rustc 1,f32,many,yes,frame,1,2,3"),
+            line("rustc 1,f32,16,perhaps,frame,1,2,3"),
         ] {
             let message = Costs::parse(&text).unwrap_err().to_string();
             assert!(message.contains("firmware/cycles.csv"), "{message}");
         }
-        let two = format!("{header}a,f32,16,yes,frame,1,2\nb,f32,32,no,frame,3,4\n");
+        let two = format!("{header}a,f32,16,yes,frame,1,2,3\nb,f32,32,no,frame,3,4,5\n");
         let costs = Costs::parse(&two).unwrap();
         assert_eq!((costs.compiler.as_str(), costs.centres()), ("a", vec![16]));
     }

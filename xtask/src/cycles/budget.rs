@@ -57,7 +57,7 @@ mod tests {
     use crate::cycles::regions::Count;
 
     fn figure(kernel: &str, scope: Scope, affine: bool, cycles: u64) -> Figure {
-        let count = Count { instructions: 1, cycles };
+        let count = Count { instructions: 1, cycles, flash_cycles: 2 * cycles };
         Figure { kernel: kernel.into(), centres: 16, affine, scope, count }
     }
 

@@ -1,6 +1,6 @@
 //! Comparison of a user's own model with the accepted figures of such models.
 
-use super::accepted::OTHER_COMPILERS_PERCENT;
+use super::accepted::{EXCESS, Excess, FLASH_EXCESS};
 use super::figures::{Figure, Scope};
 use super::regions::Count;
 
@@ -17,7 +17,7 @@ const DATA_DEPENDENT: [&str; 3] = ["f32-direct", "f32-direct-libm", "f32-direct-
 const CLAMPING: [&str; 2] = ["f32", "fixed16"];
 
 /// Largest cost of clamping, for a row.
-const CLAMPED_ROW: Count = Count { instructions: 60, cycles: 90 };
+const CLAMPED_ROW: Count = Count { instructions: 60, cycles: 90, flash_cycles: 130 };
 
 /// Number of rows of a frame.
 const ROWS: u64 = 8;
@@ -39,7 +39,7 @@ pub fn of_model<'f>(accepted: &'f [Figure], measured: &'f [Figure]) -> Vec<Pair<
 pub fn table(pairs: &[Pair<'_>]) -> String {
     let lines = pairs.iter().map(|(now, then)| {
         format!(
-            "{:22} {:4} {:>4} {:19} | {:>12} {:>9} | {:>8} {:>9}\n",
+            "{:22} {:4} {:>4} {:19} | {:>12} {:>9} | {:>8} {:>9} | {:>9} {:>9}\n",
             now.kernel,
             now.centres,
             if now.affine { "yes" } else { "no" },
@@ -47,11 +47,13 @@ pub fn table(pairs: &[Pair<'_>]) -> String {
             now.count.instructions,
             then.count.instructions,
             now.count.cycles,
-            then.count.cycles
+            then.count.cycles,
+            now.count.flash_cycles,
+            then.count.flash_cycles
         )
     });
     format!(
-        "{:22} {:>4} {:>4} {:19} | {:>12} {:>9} | {:>8} {:>9}\n{}",
+        "{:22} {:>4} {:>4} {:19} | {:>12} {:>9} | {:>8} {:>9} | {:>9} {:>9}\n{}",
         "kernel",
         "K",
         "tail",
@@ -59,6 +61,8 @@ pub fn table(pairs: &[Pair<'_>]) -> String {
         "instructions",
         "accepted",
         "cycles",
+        "accepted",
+        "in flash",
         "accepted",
         lines.collect::<String>()
     )
@@ -68,28 +72,34 @@ pub fn table(pairs: &[Pair<'_>]) -> String {
 /// only cycles are compared, and fewer are no fault.
 pub fn beyond(pairs: &[Pair<'_>], other_compiler: bool) -> Vec<String> {
     let apart = |(now, then): &Pair<'_>| {
-        let [mut instructions, mut cycles] = allowances(then);
+        let [mut instructions, mut cycles, mut flash_cycles] = allowances(then);
         if other_compiler {
-            instructions = [u64::MAX / 2; 2];
-            let more = (then.count.cycles * OTHER_COMPILERS_PERCENT).div_ceil(100);
-            cycles = [u64::MAX / 2, cycles[1] + more];
+            let less = u64::MAX / 2;
+            let more = |Excess { of, percent, .. }| (of(then.count) * percent).div_ceil(100);
+            instructions = [less; 2];
+            cycles = [less, cycles[1] + more(EXCESS)];
+            flash_cycles = [less, flash_cycles[1] + more(FLASH_EXCESS)];
         }
         let is_beyond =
             |now: u64, then: u64, [less, more]: [u64; 2]| now + less < then || now > then + more;
-        let part = |what, now, then, allowance| {
-            is_beyond(now, then, allowance).then(|| format!("{now} {what}, accepted are {then}"))
-        };
+        let parts = [
+            ("instructions", now.count.instructions, then.count.instructions, instructions),
+            ("cycles", now.count.cycles, then.count.cycles, cycles),
+            ("cycles from flash", now.count.flash_cycles, then.count.flash_cycles, flash_cycles),
+        ];
+        let mut parts = parts.into_iter();
+        let (what, now_has, then_had, _) =
+            parts.find(|(_, now, then, allowance)| is_beyond(*now, *then, *allowance))?;
         let name = format!("{}, K = {}, {}", now.kernel, now.centres, now.scope.name());
-        part("instructions", now.count.instructions, then.count.instructions, instructions)
-            .or_else(|| part("cycles", now.count.cycles, then.count.cycles, cycles))
-            .map(|difference| format!("{name}: {difference}"))
+        Some(format!("{name}: {now_has} {what}, accepted are {then_had}"))
     };
     pairs.iter().filter_map(apart).collect()
 }
 
-/// Numbers of instructions, and of cycles, by which a figure may be below and above the accepted one.
-fn allowances(accepted: &Figure) -> [[u64; 2]; 2] {
-    let Count { instructions, cycles } = accepted.count;
+/// Numbers of instructions, of cycles and of cycles from flash by which a figure may be below and above the accepted
+/// one.
+fn allowances(accepted: &Figure) -> [[u64; 2]; 3] {
+    let Count { instructions, cycles, flash_cycles } = accepted.count;
     let part = |count: u64| (count * TOLERANCE_PERCENT).div_ceil(100);
     let is_one_of = |kernels: &[&str]| kernels.contains(&accepted.kernel.as_str());
     // Rows at rest are skipped, so that nothing is clamped.
@@ -104,6 +114,7 @@ fn allowances(accepted: &Figure) -> [[u64; 2]; 2] {
     [
         [instructions, instructions + clamped_rows * CLAMPED_ROW.instructions],
         [part(cycles), part(cycles) + clamped_rows * CLAMPED_ROW.cycles],
+        [part(flash_cycles), part(flash_cycles) + clamped_rows * CLAMPED_ROW.flash_cycles],
     ]
 }
 
@@ -112,7 +123,7 @@ mod tests {
     use super::*;
 
     fn figure(kernel: &str, scope: Scope, instructions: u64, cycles: u64) -> Figure {
-        let count = Count { instructions, cycles };
+        let count = Count { instructions, cycles, flash_cycles: cycles + 100 };
         Figure { kernel: kernel.into(), centres: 64, affine: true, scope, count }
     }
 
@@ -142,6 +153,29 @@ mod tests {
             assert!(!holds(kernel, Scope::Frame, 1011, 2000));
             assert!(!holds(kernel, Scope::RestingFrame, 1001, 2000));
         }
+    }
+
+    #[test]
+    fn cycles_from_flash_are_compared_as_well() {
+        let of = |scope, flash_cycles| {
+            let count = Count { instructions: 1000, cycles: 2000, flash_cycles };
+            Figure { count, ..figure("fixed16", scope, 0, 0) }
+        };
+        let is_beyond = |scope, flash_cycles, other_compiler| {
+            let (accepted, measured) = ([of(scope, 3000)], [of(scope, flash_cycles)]);
+            beyond(&of_model(&accepted, &measured), other_compiler)
+        };
+        assert!(is_beyond(Scope::Frame, 3030, false).is_empty());
+        assert_eq!(
+            is_beyond(Scope::Frame, 3031, false),
+            ["fixed16, K = 64, frame: 3031 cycles from flash, accepted are 3000"]
+        );
+        // Eight clamped rows.
+        assert!(is_beyond(Scope::AwakeFrame, 3030 + 8 * 130, false).is_empty());
+        assert_eq!(is_beyond(Scope::AwakeFrame, 3031 + 8 * 130, false).len(), 1);
+        // One per cent for the model, and 16 for the compiler.
+        assert!(is_beyond(Scope::Frame, 3510, true).is_empty());
+        assert_eq!(is_beyond(Scope::Frame, 3511, true).len(), 1);
     }
 
     #[test]
