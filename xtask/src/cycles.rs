@@ -17,6 +17,7 @@ mod thumb;
 
 mod code;
 mod cost;
+mod flash;
 mod untraced;
 
 mod loops;
@@ -49,7 +50,7 @@ use crate::emulate::qemu;
 use crate::firmware::{BENCH, build_image};
 use crate::process::{Outcome, root, target_dir};
 use crate::toolchain::{Toolchain, elf};
-use accepted::{Accepted, Reference};
+use accepted::{Accepted, Excess, Reference};
 use code::Code;
 use figures::Figure;
 use loops::Loop;
@@ -228,13 +229,15 @@ fn say_if_others(reference: &Reference<'_>, compiler: &str, measured: &[Figure])
     if reference.is_own {
         return;
     }
-    let [least, most] = accepted::range_percent(reference, measured);
-    eprintln!(
-        "{DATA} is exact for {} alone; the compiler in use is {compiler}: its cycles differ by {least:+.1} % \
-         to {most:+.1} %, at most +{} % is allowed",
-        reference.compiler,
-        accepted::OTHER_COMPILERS_PERCENT
-    );
+    let others = &reference.compiler;
+    eprintln!("{DATA} is exact for {others} alone; the compiler in use is {compiler}");
+    for excess in [accepted::EXCESS, accepted::FLASH_EXCESS] {
+        let [least, most] = accepted::range_percent(reference, measured, &excess);
+        let Excess { what, percent, .. } = excess;
+        eprintln!(
+            "its {what} differ by {least:+.1} % to {most:+.1} %, at most +{percent} % is allowed"
+        );
+    }
 }
 
 fn read(file: &str) -> Outcome<String> {

@@ -67,7 +67,8 @@ struct Equation<'f> {
 
 impl<'f> Equation<'f> {
     fn new(pieces: &'f Pieces, count: Count, unit: f64) -> Self {
-        Self { pieces, costs: [count.instructions as f64, count.cycles as f64, 0.0], unit }
+        let Count { instructions, cycles, flash_cycles } = count;
+        Self { pieces, costs: [instructions, cycles, flash_cycles].map(|it| it as f64), unit }
     }
 }
 

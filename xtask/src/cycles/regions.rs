@@ -9,6 +9,7 @@ use std::ops::{Range, Sub};
 
 use super::code::Code;
 use super::cost::cycles;
+use super::flash::{Flash, Keeps};
 use super::loops::Loop;
 use super::thumb::Instruction;
 use super::untraced::Untraced;
@@ -18,14 +19,17 @@ use crate::process::Outcome;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Count {
     pub instructions: u64,
-    /// Cycles by the cost model.
+    /// Cycles by the cost model, with memory that never waits.
     pub cycles: u64,
+    /// The same with code in flash ([`Flash`]) and all data but literals in RAM.
+    pub flash_cycles: u64,
 }
 
 impl Count {
-    fn add(&mut self, cycles: u64) {
+    fn add(&mut self, cycles: u64, flash_cycles: u64) {
         self.instructions += 1;
         self.cycles += cycles;
+        self.flash_cycles += flash_cycles;
     }
 }
 
@@ -36,6 +40,7 @@ impl Sub for Count {
         Self {
             instructions: self.instructions.saturating_sub(less.instructions),
             cycles: self.cycles.saturating_sub(less.cycles),
+            flash_cycles: self.flash_cycles.saturating_sub(less.flash_cycles),
         }
     }
 }
@@ -80,7 +85,8 @@ pub struct Regions<'c> {
     /// Last address executed; its cost depends on the next one.
     pending: Option<u32>,
     previous: Option<Instruction>,
-    count: Region,
+    /// The region so far, with each way to read the flash's manual.
+    counts: [(Flash, Region); 2],
     counted: Vec<Region>,
     /// Last branch back in this region.
     last_back: Option<Loop>,
@@ -100,7 +106,7 @@ impl<'c> Regions<'c> {
             place: Place::Outside,
             pending: None,
             previous: None,
-            count: Region::default(),
+            counts: nothing(),
             counted: Vec::new(),
             last_back: None,
             loops: HashSet::new(),
@@ -184,7 +190,7 @@ impl<'c> Regions<'c> {
         if self.place == Place::Starting {
             if branched {
                 self.place = Place::Inside;
-                self.count = Region::default();
+                self.counts = nothing();
                 self.previous = None;
             }
             return Ok(());
@@ -208,12 +214,20 @@ impl<'c> Regions<'c> {
                 "the instruction at {address:#010x} has no place in a region: it stops the core"
             )
         })?;
-        self.count.whole.add(cost);
-        if self.watched.exponential.contains(&address) {
-            self.count.exponential.add(cost);
-        }
-        if self.watched.assembly.iter().any(|range| range.contains(&address)) {
-            self.count.assembly.add(cost);
+        let code = address..address.wrapping_add(instruction.bytes);
+        let literal = instruction.literal(address);
+        let in_assembly = self.watched.assembly.iter().any(|range| range.contains(&address));
+        for (flash, count) in &mut self.counts {
+            // The call at the end never waits, so that it costs the same in every region.
+            let is_end = next == self.end;
+            let flash_cost = if is_end { cost } else { flash.execute(&code, &literal, cost) };
+            count.whole.add(cost, flash_cost);
+            if self.watched.exponential.contains(&address) {
+                count.exponential.add(cost, flash_cost);
+            }
+            if in_assembly {
+                count.assembly.add(cost, flash_cost);
+            }
         }
         self.previous = Some(instruction);
         if branched && next <= address && !instruction.calls && !self.code.returns(address) {
@@ -224,11 +238,19 @@ impl<'c> Regions<'c> {
         }
         if next == self.end {
             self.last_back = None;
-            self.counted.push(self.count);
+            let [some, others] = self.counts.each_ref().map(|(_, count)| *count);
+            let more = some.whole.flash_cycles > others.whole.flash_cycles;
+            self.counted.push(if more { some } else { others });
             self.place = Place::Outside;
         }
         Ok(())
     }
+}
+
+/// The start of a region: no counts, and flash with empty caches, because what a device does between two frames
+/// replaces their lines.
+fn nothing() -> [(Flash, Region); 2] {
+    Keeps::ALL.map(|keeps| (Flash::cold(keeps), Region::default()))
 }
 
 #[cfg(test)]

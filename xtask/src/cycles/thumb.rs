@@ -9,6 +9,8 @@ mod float;
 mod memory;
 mod narrow;
 
+use std::ops::Range;
+
 /// Set of core registers: bit n is Rn.
 pub type CoreSet = u16;
 
@@ -83,6 +85,8 @@ pub struct Instruction {
     pub may_branch: bool,
     /// Whether the instruction is a call: BL, BLX.
     pub calls: bool,
+    /// Place of a load relative to the program counter, in bytes from [`Self::literal`]'s base.
+    literal: Option<i32>,
 }
 
 impl Instruction {
@@ -97,7 +101,21 @@ impl Instruction {
             fp_source: 0,
             may_branch,
             calls: false,
+            literal: None,
         }
+    }
+
+    /// Addresses from which the instruction at `address` loads relative to the program counter; empty if it does not.
+    /// The base is the instruction's address + 4, rounded down to a word (A5.1.2).
+    pub fn literal(&self, address: u32) -> Range<u32> {
+        let Some(distance) = self.literal else { return 0..0 };
+        let start = ((address.wrapping_add(4)) & !3).wrapping_add_signed(distance);
+        let words = match self.class {
+            Class::Double => 2,
+            Class::FpMemory { words } => words,
+            _ => 1,
+        };
+        start..start.wrapping_add(4 * words)
     }
 
     fn call() -> Self {
@@ -129,6 +147,13 @@ impl Instruction {
         if register != PC {
             self.address |= 1 << register;
         }
+        self
+    }
+
+    /// Adds that this loads from `units` of `unit` bytes behind the program counter, or before it unless `up`.
+    fn beside_code(mut self, units: u16, unit: i32, up: bool) -> Self {
+        let distance = i32::from(units) * unit;
+        self.literal = Some(if up { distance } else { -distance });
         self
     }
 

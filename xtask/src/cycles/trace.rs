@@ -176,8 +176,8 @@ mod tests {
     #[test]
     fn a_block_counts_from_its_first_instruction_to_its_last() {
         let trace = [BEGIN, &starts(0x10), MAIN, &starts(0x20), END, &starts(0x30), &starts(0x30)];
-        // adds: 1 each; bl: 1 + 2.
-        let whole = Count { instructions: 3, cycles: 5 };
+        // adds: 1 each; bl: 1 + 2. From flash, the first waits for its line.
+        let whole = Count { instructions: 3, cycles: 5, flash_cycles: 10 };
         let expected = (String::new(), vec![Region { whole, ..Region::default() }]);
         assert_eq!(counted(&trace.concat()), Ok(expected));
     }
@@ -198,7 +198,7 @@ mod tests {
             &starts(0x30),
             &starts(0x30),
         ];
-        let whole = Count { instructions: 3, cycles: 5 };
+        let whole = Count { instructions: 3, cycles: 5, flash_cycles: 10 };
         let expected = ("a complaint\n".to_owned(), vec![Region { whole, ..Region::default() }]);
         assert_eq!(counted(&trace.concat()), Ok(expected));
     }

@@ -1,3 +1,4 @@
+use super::super::flash::WAIT_STATES;
 use super::*;
 
 /// Code with `begin` at 0x10 (nop; bx lr), `end` at 0x14 (bx lr), and the program at 0x16.
@@ -26,7 +27,7 @@ const CALL: [u32; 3] = [0x8, BEGIN, BEGIN + 2];
 fn an_empty_region_is_the_call_at_its_end() {
     let code = code(&[0xF7FF, 0xFFFD]); // bl end
     let addresses = [CALL.as_slice(), &[START, END, START + 4]].concat();
-    let call = Count { instructions: 1, cycles: 3 };
+    let call = Count { instructions: 1, cycles: 3, flash_cycles: 3 };
     assert_eq!(count(&code, addresses.clone()), Ok(vec![call]));
     assert_eq!(count(&code, [addresses.clone(), addresses].concat()), Ok(vec![call, call]));
 }
@@ -40,8 +41,26 @@ fn a_loop_is_counted_as_by_hand() {
     let code = code(&[0xF44F, 0x707A, 0x3801, 0xD1FD, 0xF7FF, 0xFFF9]);
     let rounds = (0..1000).flat_map(|_| [START + 4, START + 6]);
     let addresses = CALL.into_iter().chain([START]).chain(rounds).chain([START + 8, END]);
-    let expected = Count { instructions: 1 + 2000 + 1, cycles: 1 + 1000 + 999 * 3 + 1 + 3 };
+    let cycles = 1 + 1000 + 999 * 3 + 1 + 3;
+    // The loop stands in one line of flash.
+    let expected = Count { instructions: 1 + 2000 + 1, cycles, flash_cycles: cycles + WAIT_STATES };
     assert_eq!(count(&code, addresses), Ok(vec![expected]));
+}
+
+#[test]
+fn every_region_starts_with_cold_caches_and_waits_as_the_manual_allows_at_most() {
+    // nop, four times                     line 1
+    // subs r0, #1; bne                    lines 1 and 2
+    // bl end
+    let code = code(&[0xBF00, 0xBF00, 0xBF00, 0xBF00, 0x3801, 0xD1FD, 0xF7FF, 0xFFF7]);
+    let rounds = [START + 8, START + 10].repeat(3);
+    let nops = [START, START + 2, START + 4, START + 6];
+    let region = [CALL.as_slice(), &nops, &rounds, &[START + 12, END]].concat();
+    // Line 1 comes after 5 cycles, line 2 after 11. The first round ends in cycle 14, when line 3 is read until 17.
+    // If line 2 is not kept, it is read from cycle 18 and, the next round, from 30 on. It comes after 23 and 35.
+    let flash_cycles = 35 + 1 + 3;
+    let expected = Count { instructions: 11, cycles: 4 + 2 * 4 + 2 + 3, flash_cycles };
+    assert_eq!(count(&code, region.repeat(2)), Ok(vec![expected; 2]));
 }
 
 #[test]
@@ -55,9 +74,9 @@ fn what_is_watched_is_counted_besides() {
     for address in [0x8, BEGIN, BEGIN + 2, START, START + 2, START + 4, END, START + 8] {
         regions.execute(&[address]).unwrap();
     }
-    let whole = Count { instructions: 3, cycles: 5 };
-    let exponential = Count { instructions: 1, cycles: 1 };
-    let assembly = Count { instructions: 2, cycles: 4 };
+    let whole = Count { instructions: 3, cycles: 5, flash_cycles: 5 + WAIT_STATES };
+    let exponential = Count { instructions: 1, cycles: 1, flash_cycles: 1 };
+    let assembly = Count { instructions: 2, cycles: 4, flash_cycles: 4 + WAIT_STATES };
     assert_eq!(regions.finish(), Ok(vec![Region { whole, exponential, assembly }]));
 }
 

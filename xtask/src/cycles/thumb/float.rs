@@ -47,7 +47,11 @@ pub fn memory(first: u16, second: u16) -> Option<Instruction> {
         (true, _) => return None,
     };
     let registers = run(start, words)?;
-    let access = Instruction::new(Class::FpMemory { words }).at(bits(first, 0, 4));
+    let base = bits(first, 0, 4);
+    let access = Instruction::new(Class::FpMemory { words }).at(base);
+    let is_literal = one && loads && base == PC;
+    let beside_code = || access.beside_code(bits(second, 0, 8), 4, up);
+    let access = if is_literal { beside_code() } else { access };
     Some(if loads { access.fp(registers, 0) } else { access.fp(0, registers) })
 }
 

@@ -17,7 +17,10 @@ pub fn multiple(first: u16, second: u16) -> Option<Instruction> {
 pub fn double_or_exclusive(first: u16, second: u16) -> Option<Instruction> {
     let base = bits(first, 0, 4);
     if bit(first, 8) || bit(first, 5) {
-        return Some(Instruction::new(Class::Double).at(base));
+        let access = Instruction::new(Class::Double).at(base);
+        let is_literal = bit(first, 4) && base == PC;
+        let beside_code = || access.beside_code(bits(second, 0, 8), 4, bit(first, 7));
+        return Some(if is_literal { beside_code() } else { access });
     }
     let exclusive = Some(Instruction::new(Class::Exclusive).at(base));
     match bits(first, 4, 4) {
@@ -47,6 +50,9 @@ pub fn single(first: u16, second: u16) -> Option<Instruction> {
     let (writes_base, index) = offset(first, second)?;
     let access = match (loads, writes_base || index.is_some()) {
         (true, _) if hint => Instruction::data(),
+        (true, _) if base == PC => {
+            Instruction::load().to(register).beside_code(bits(second, 0, 12), 1, bit(first, 7))
+        }
         (true, _) => Instruction::new(Class::Load { writes_base }).to(register),
         (false, false) => Instruction::new(Class::Store),
         (false, true) => Instruction::new(Class::StoreIndexed),

@@ -22,7 +22,7 @@ pub fn decode(h: u16) -> Option<Instruction> {
         },
         0b01000 => high_registers(h)?,
         // LDR from a place beside the code.
-        0b01001 => load.to(high),
+        0b01001 => load.to(high).beside_code(bits(h, 0, 8), 4, true),
         0b01010 | 0b01011 => {
             let access = if bits(h, 9, 3) < 3 {
                 Instruction::new(Class::StoreIndexed)

@@ -82,3 +82,24 @@ fn what_this_processor_has_not_is_refused() {
 fn an_instruction_cut_in_two_is_refused() {
     assert_eq!(decode(0xF000, None), None);
 }
+
+#[test]
+fn loads_beside_the_code_say_from_where() {
+    for (first, second, at, from, what) in [
+        (0x4902, None, 0x100, 0x10C..0x110, "ldr r1, [pc, #8]"),
+        (0x4902, None, 0x102, 0x10C..0x110, "ldr r1, [pc, #8] at an odd halfword"),
+        (0xF8DF, Some(0x1008), 0x102, 0x10C..0x110, "ldr.w r1, [pc, #8]"),
+        (0xF85F, Some(0x1008), 0x102, 0xFC..0x100, "ldr.w r1, [pc, #-8]"),
+        (0xE9DF, Some(0x0102), 0x102, 0x10C..0x114, "ldrd r0, r1, [pc, #8]"),
+        (0xE95F, Some(0x0102), 0x102, 0xFC..0x104, "ldrd r0, r1, [pc, #-8]"),
+        (0xED9F, Some(0x0A02), 0x102, 0x10C..0x110, "vldr s0, [pc, #8]"),
+        (0xED1F, Some(0x0B02), 0x102, 0xFC..0x104, "vldr d0, [pc, #-8]"),
+        (0x6809, None, 0x100, 0..0, "ldr r1, [r1]"),
+        (0xF8D1, Some(0x1008), 0x100, 0..0, "ldr.w r1, [r1, #8]"),
+        (0xE9D2, Some(0x0102), 0x100, 0..0, "ldrd r0, r1, [r2, #8]"),
+        (0xED91, Some(0x0A02), 0x100, 0..0, "vldr s0, [r1, #8]"),
+        (0xF89F, Some(0xF008), 0x100, 0..0, "pld [pc, #8]"),
+    ] {
+        assert_eq!(decode(first, second).unwrap().literal(at), from, "{what}");
+    }
+}
