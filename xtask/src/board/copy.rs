@@ -1,13 +1,15 @@
-//! A copy of the workspace in which an image can be built that differs from the project's in one place.
+//! A copy of the workspace in which variants of the board's image are built: with a fault in one place, or with room for
+//! a larger sensor.
 //!
 //! Both are built in one folder, so that the libraries of others are built once. So the copy's packages have another
 //! version: cargo would take packages of one name and version for the same, wherever they lie.
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use super::mutants::Mutant;
-use crate::process::{Outcome, root, target_dir, watch};
+use crate::process::{Outcome, root, run, target_dir, watch};
 use crate::toolchain::{Toolchain, elf};
 
 /// Folders and files that are not copied, besides hidden ones: what is built or written.
@@ -20,12 +22,15 @@ const MANIFESTS: [(&str, &str, &str); 2] = [
     (
         "firmware/nucleo-f446re/Cargo.toml",
         "[[bin]]\nname = \"nucleo-f446re\"",
-        "[[bin]]\nname = \"nucleo-mutant\"",
+        "[[bin]]\nname = \"nucleo-variant\"",
     ),
 ];
 
+/// Room in the wide image: more columns than three converters sample, and more rows than one register drives.
+const WIDE: &str = "16x32x18";
+
 const PACKAGE: &str = "nucleo-f446re";
-const IMAGE: &str = "nucleo-mutant";
+const IMAGE: &str = "nucleo-variant";
 
 /// The copy.
 pub struct Copy {
@@ -48,22 +53,39 @@ impl Copy {
     ///
     /// # Errors
     /// It does not build.
-    pub fn build(&self, toolchain: &Toolchain, mutant: &Mutant) -> Outcome<PathBuf> {
+    pub fn build_mutant(&self, toolchain: &Toolchain, mutant: &Mutant) -> Outcome<PathBuf> {
         let file = self.folder.join(mutant.file);
         let sound = read(&file)?;
         write_if_new(&file, mutant.apply(&sound)?.as_bytes())?;
-        let mut command = toolchain.build();
-        command.arg("--manifest-path").arg(self.folder.join("Cargo.toml"));
-        command.args(["--profile", "firmware", "--package", PACKAGE, "--bin", IMAGE]);
-        let built = watch(&mut command, false);
+        let built = watch(&mut self.command(toolchain), false);
         write_if_new(&file, sound.as_bytes())?;
         let built = built?;
         if built.success {
-            Ok(elf(IMAGE))
+            Ok(image())
         } else {
             Err(format!("mutant {} does not build:\n{}", mutant.name, built.messages))
         }
     }
+
+    /// Builds the image with room for [`WIDE`], as [`image`].
+    ///
+    /// # Errors
+    /// It does not build.
+    pub fn build_wide(&self, toolchain: &Toolchain) -> Outcome {
+        run(self.command(toolchain).env("TAXEL_CAPACITY", WIDE))
+    }
+
+    fn command(&self, toolchain: &Toolchain) -> Command {
+        let mut command = toolchain.build();
+        command.arg("--manifest-path").arg(self.folder.join("Cargo.toml"));
+        command.args(["--profile", "firmware", "--package", PACKAGE, "--bin", IMAGE]);
+        command
+    }
+}
+
+/// Path of the variant that was built last.
+pub fn image() -> PathBuf {
+    elf(IMAGE)
 }
 
 fn copy_folder(from: &Path, to: &Path) -> Outcome {
