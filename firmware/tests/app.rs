@@ -309,6 +309,59 @@ fn another_model_gives_its_own_answer_for_rest() {
 }
 
 #[test]
+fn a_frame_without_a_baseline_is_flagged_until_one_is_complete() {
+    let absolute = blob(3, 4);
+    let model = Model::decode(&absolute).unwrap();
+    let networks: Vec<_> = model.networks().collect();
+    let metadata = Metadata { relative_inputs: true, ..Metadata::unnamed(model.shape()) };
+    let parts =
+        ModelParts { projection: None, networks: &networks, row_network: &[0; ROWS], metadata };
+    let mut slots = MockSlot::pair_with(&encode_to_vec(&parts).unwrap());
+    let mut bench = Bench::new(quiet());
+    let board = bench.board.clone();
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let rest = frame_at_rest();
+    let without = (EstimateReport::NO_BASELINE, vec![1, 1]);
+    let read = |session: &mut TestSession<'_>| {
+        let (flags, status, _) = decode(session, &board, &rest);
+        (flags & EstimateReport::NO_BASELINE, status)
+    };
+    let begin = |session: &mut TestSession<'_>| {
+        let scanning = Configuration { frame_period_us: 100, ..quiet() };
+        ask(session, &board, &configure(scanning), |_| ());
+        let request = request_bytes(8, &Request::CaptureBaseline { frames: 1000 });
+        board.0.borrow_mut().to_device.extend(request);
+        settle(session, &board);
+    };
+    let scan_some = |session: &mut TestSession<'_>| {
+        let until_us = board.0.borrow().now_us + 1000;
+        while board.0.borrow().now_us < until_us {
+            assert_eq!(session.step(), None);
+        }
+    };
+    assert_eq!(read(&mut session), without);
+    begin(&mut session);
+    assert_eq!(read(&mut session), without);
+    scan_some(&mut session);
+    assert_eq!(read(&mut session), without);
+    capture(&mut session, &board, 2);
+    let decoded = (0, vec![0, 0]);
+    ask(&mut session, &board, &configure(quiet()), |_| ());
+    assert_eq!(read(&mut session), decoded);
+    // While another is captured, and if that is given up, readings are relative to the one before.
+    begin(&mut session);
+    assert_eq!(read(&mut session), decoded);
+    scan_some(&mut session);
+    assert_eq!(read(&mut session), decoded);
+    ask(&mut session, &board, &configure(quiet()), |_| ());
+    assert_eq!(read(&mut session), decoded);
+    // A baseline of no known reading is none.
+    let unknown = Request::SetBaseline { readings_ohm: Floats::of(&[f32::NAN; ROWS * COLS]) };
+    ask(&mut session, &board, &unknown, |_| ());
+    assert_eq!(read(&mut session), without);
+}
+
+#[test]
 fn a_baseline_that_will_not_come_is_refused_and_one_that_comes_is_counted_once() {
     let mut slots = MockSlot::pair_with(&blob(3, 4));
     let mut bench = Bench::new(Configuration { frame_period_us: 100, ..quiet() });

@@ -206,7 +206,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                 self.scratch,
                 &mut estimate,
             );
-            if decoder.metadata().relative_inputs && self.baseline.frames() == 0 {
+            if decoder.metadata().relative_inputs && !self.has_reciprocals {
                 flags |= EstimateReport::NO_BASELINE;
             }
             // The model's shape was found to fit when it came into force.
@@ -295,6 +295,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         {
             *place = reciprocal(*mean);
         }
+        self.has_reciprocals = self.reciprocals.iter().any(|reciprocal| !reciprocal.is_nan());
         let mut rest = cut(&mut self.rest, self.rows, self.outputs);
         let decoded = decoder.filter(|_| known).is_some_and(|decoder| {
             let readings_ohm = self.baseline.mean();
