@@ -152,8 +152,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         if self.configuration.send_readings {
             let readings = self.frame.get(..self.wires.readings()).unwrap_or_default();
             let report = Report::Readings { frame, start_us, readings_ohm: Floats::of(readings) };
-            let sent = self.line.send(UNASKED, &report);
-            self.count_lost(sent);
+            self.line.send(UNASKED, &report, &mut self.statistics);
         }
         let (flags, health) = self.decode(decoder);
         self.feed_baseline(decoder);
@@ -176,8 +175,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             open: health.open,
             faulty_columns: faulty.get(..self.wires.rows).unwrap_or_default().as_flattened(),
         };
-        let sent = self.line.send(UNASKED, &Report::Health(report));
-        self.count_lost(sent);
+        self.line.send(UNASKED, &Report::Health(report), &mut self.statistics);
     }
 
     /// Decodes the frame without its faulty readings.
@@ -267,8 +265,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         let row_status = codes.get(..self.rows).unwrap_or_default();
         let outputs = Floats::of(estimate.outputs);
         let report = EstimateReport { frame, start_us, flags, row_status, outputs };
-        let sent = self.line.send(number, &Report::Estimate(report));
-        self.count_lost(sent);
+        self.line.send(number, &Report::Estimate(report), &mut self.statistics);
     }
 
     /// Adds the frame to the baseline that is being captured, and answers the request when the baseline is
@@ -282,8 +279,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             self.capture = None;
             self.decode_baseline(decoder);
             let report = Report::Baseline { readings_ohm: Floats::of(self.baseline.mean()) };
-            let sent = self.line.send(number, &report);
-            self.count_lost(sent);
+            self.line.send(number, &report, &mut self.statistics);
         }
     }
 
@@ -304,12 +300,6 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         });
         if !decoded {
             rest.status.fill(RowStatus::MissingReading);
-        }
-    }
-
-    pub(super) fn count_lost(&mut self, sent: bool) {
-        if !sent {
-            self.statistics.lost_reports = self.statistics.lost_reports.saturating_add(1);
         }
     }
 
