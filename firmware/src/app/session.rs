@@ -6,7 +6,7 @@ use model_core::health::{Health, Limits};
 use model_core::relative::reciprocal;
 use model_core::{Decoder, Estimate, Frame, Gate, RowStatus, RowWire};
 
-use super::model::{InForce, check, choose, copy_to, row_wires};
+use super::model::{InForce, check_head, choose, copy_to, row_wires};
 use super::{App, Core};
 use crate::link::message::{EstimateReport, HealthReport, Report};
 use crate::link::packet::UNASKED;
@@ -62,10 +62,10 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
         } else {
             warning!("no model in either slot: readings only, until one is uploaded");
         }
-        // Behind an uploaded model in slot 1, the spare slot is slot 0.
+        // Behind an uploaded model in slot 1, the spare slot is slot 0. For a line of the log, the blob's head will do.
         if chosen.is_some_and(|(slot, _)| slot == 1)
             && generation(0, spare.bytes()) == Some(0)
-            && check(app.core.capacity, blob_in_slot(spare.bytes())).is_ok()
+            && check_head(app.core.capacity, blob_in_slot(spare.bytes())).is_ok()
         {
             info!("slot 0 holds a model that was flashed, not uploaded: it is not used");
         }
