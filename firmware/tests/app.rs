@@ -806,3 +806,30 @@ fn a_model_is_decoded_from_ram_where_it_fits() {
         assert_eq!(bytemuck::cast_slice::<u32, u8>(&weights).starts_with(&blob), in_ram);
     }
 }
+
+#[test]
+fn behind_a_damaged_model_the_other_slots_is_decoded_from_there() {
+    let (first, second) = (blob(3, 4), blob(5, 4));
+    let mut slots = MockSlot::pair_with(&first);
+    let mut weights = vec![0; second.len().div_ceil(4)];
+    let mut bench = Bench::new(quiet());
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut weights);
+    for step in upload_steps(&second, 64) {
+        ask(&mut session, &bench.board, &Request::Upload(step), |_| ());
+    }
+    let _ = session;
+    let mut in_force = |slots: &mut [MockSlot; 2]| {
+        let mut session = Session::start(&mut bench.app, slots, &mut weights);
+        let frame = frame_at_rest();
+        let (_, _, found) = decode(&mut session, &bench.board, &frame);
+        let read = |report: Report<'_>| match report {
+            Report::Identity(identity) => identity.model.map(|model| (model.slot, model.in_ram)),
+            other => panic!("{other:?}"),
+        };
+        (ask(&mut session, &bench.board, &Request::Identify, read).0, found)
+    };
+    let outputs = |blob: &[u8]| bits(expected(blob, &frame_at_rest()).into_iter().flatten());
+    assert_eq!(in_force(&mut slots), (Some((1, true)), outputs(&second)));
+    slots[1].decay(second.len() / 8, 1);
+    assert_eq!(in_force(&mut slots), (Some((0, false)), outputs(&first)));
+}

@@ -6,7 +6,7 @@ use model_core::health::{Health, Limits};
 use model_core::relative::reciprocal;
 use model_core::{Decoder, Estimate, Frame, Gate, RowStatus, RowWire};
 
-use super::model::{InForce, check_head, choose, copy_to, row_wires};
+use super::model::{InForce, by_generation, check_head, choose, copy_to, row_wires};
 use super::{App, Core};
 use crate::link::message::{EstimateReport, HealthReport, Report};
 use crate::link::packet::UNASKED;
@@ -34,26 +34,29 @@ pub struct Session<'a, 'm, P, F, S, const ROWS: usize> {
 impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
     Session<'a, 'm, P, F, S, ROWS>
 {
-    /// Starts a session with the most recent sound model in force. Its blob is copied to `weights` if it fits.
+    /// Starts a session with the most recent sound model in force. Its blob is copied to `weights` if it fits. Behind
+    /// one that fits and is damaged, the model of the other slot is decoded from there.
     #[inline(never)] // so that its stack is free again when the loop begins
     pub fn start(
         app: &'a mut App<'m, P, F, ROWS>,
         slots: &'a mut [S; 2],
         weights: &'a mut [u32],
     ) -> Self {
-        let chosen = choose(app.core.capacity, slots);
+        let capacity = app.core.capacity;
+        // Only the copy is checked, so the most recent model is looked at once.
+        let [newest, _] = by_generation(slots);
+        let copied = newest.and_then(|(slot, generation)| {
+            let copy = copy_to(weights, slots.get(slot)?.bytes())?;
+            InForce::load(capacity, copy, (slot, generation), true)
+        });
+        let chosen = if copied.is_some() { newest } else { choose(capacity, slots) };
         let [first, second] = slots;
         let (active, spare) = match chosen {
             Some((1, _)) => (&*second, first),
             _ => (&*first, second),
         };
-        let model = match chosen {
-            Some((slot, generation)) => match copy_to(weights, active.bytes()) {
-                Some(copy) => InForce::of(copy, slot, generation, true),
-                None => InForce::of(active.bytes(), slot, generation, false),
-            },
-            None => InForce::NONE,
-        };
+        let in_place = |chosen| InForce::load(capacity, active.bytes(), chosen, false);
+        let model = copied.or_else(|| chosen.and_then(in_place)).unwrap_or(InForce::NONE);
         if let Some(model) = &model.identity {
             info!(
                 "model {=u32:08x} in force, slot {=u8}, generation {=u32}, in RAM: {=bool}",
@@ -65,7 +68,7 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
         // Behind an uploaded model in slot 1, the spare slot is slot 0. For a line of the log, the blob's head will do.
         if chosen.is_some_and(|(slot, _)| slot == 1)
             && generation(0, spare.bytes()) == Some(0)
-            && check_head(app.core.capacity, blob_in_slot(spare.bytes())).is_ok()
+            && check_head(capacity, blob_in_slot(spare.bytes())).is_ok()
         {
             info!("slot 0 holds a model that was flashed, not uploaded: it is not used");
         }
