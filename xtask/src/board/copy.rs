@@ -4,9 +4,9 @@
 //! Both are built in one folder, so that the libraries of others are built once. So the copy's packages have another
 //! version: cargo would take packages of one name and version for the same, wherever they lie.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::{fs, io};
 
 use super::mutants::Mutant;
 use crate::process::{Outcome, root, run, target_dir, watch};
@@ -91,6 +91,7 @@ pub fn image() -> PathBuf {
 fn copy_folder(from: &Path, to: &Path) -> Outcome {
     let failed = |cause| format!("{}: {cause}", from.display());
     fs::create_dir_all(to).map_err(|cause| format!("{}: {cause}", to.display()))?;
+    remove_what_is_gone(from, to).map_err(|cause| format!("{}: {cause}", to.display()))?;
     for entry in fs::read_dir(from).map_err(failed)? {
         let entry = entry.map_err(failed)?;
         let name = entry.file_name();
@@ -103,6 +104,22 @@ fn copy_folder(from: &Path, to: &Path) -> Outcome {
         } else if !MANIFESTS.iter().any(|(file, ..)| entry.path() == root().join(file)) {
             let bytes = fs::read(entry.path()).map_err(failed)?;
             write_if_new(&to.join(name), &bytes)?;
+        }
+    }
+    Ok(())
+}
+
+/// Removes from the copy `to` what is not in `from` any more: cargo would find it, such as a test's file.
+fn remove_what_is_gone(from: &Path, to: &Path) -> io::Result<()> {
+    for entry in fs::read_dir(to)? {
+        let entry = entry?;
+        if from.join(entry.file_name()).exists() {
+            continue;
+        }
+        if entry.file_type()?.is_dir() {
+            fs::remove_dir_all(entry.path())?;
+        } else {
+            fs::remove_file(entry.path())?;
         }
     }
     Ok(())
@@ -123,6 +140,23 @@ fn write_if_new(file: &Path, bytes: &[u8]) -> Outcome {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_gone_is_removed_from_the_copy() {
+        let folder = std::env::temp_dir().join(format!("taxel-copy-{}", std::process::id()));
+        let (from, to) = (folder.join("from"), folder.join("to"));
+        fs::create_dir_all(from.join("app")).unwrap();
+        fs::write(from.join("app/main.rs"), "new").unwrap();
+        fs::create_dir_all(to.join("gone")).unwrap();
+        for file in ["app.rs", "gone/file.rs"] {
+            fs::write(to.join(file), "old").unwrap();
+        }
+        copy_folder(&from, &to).unwrap();
+        let left: Vec<_> = fs::read_dir(&to).unwrap().map(|entry| entry.unwrap().path()).collect();
+        assert_eq!(left, [to.join("app")]);
+        assert_eq!(read(&to.join("app/main.rs")).unwrap(), "new");
+        fs::remove_dir_all(folder).unwrap();
+    }
 
     #[test]
     fn what_differs_stands_once_in_its_manifest() {
