@@ -31,11 +31,14 @@ def expect(condition, text):
 
 
 class Bench:
-    """A board that runs `image`. `options` are those of `Board`. The resistances at its wires are known: `ohm`."""
+    """A board that runs `image`, with a sensor of `shape`: rows, columns. `options` are those of `Board`.
 
-    def __init__(self, image, host_sim, log, **options):
-        draw = random.Random(7)
-        self.ohm = [[draw.uniform(44.0, 68.0) for _ in range(18)] for _ in range(8)]
+    The resistances at its wires are known: `ohm`.
+    """
+
+    def __init__(self, image, host_sim, log, shape=(8, 18), **options):
+        draw, (rows, columns) = random.Random(7), shape
+        self.ohm = [[draw.uniform(44.0, 68.0) for _ in range(columns)] for _ in range(rows)]
         self.board = Board(image, self.ohm, log=log, **options)
         self._host_sim, self._log, self._number = host_sim, log, 0
 

@@ -17,6 +17,8 @@ from scenarios import SCENARIOS, serve
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--image", type=pathlib.Path, required=True, help="the board's image (ELF)")
+    parser.add_argument("--wide-image", type=pathlib.Path, required=True,
+                        help="the same with room for 16 rows and 32 columns, for the scenario `wide`")
     parser.add_argument("scenarios", nargs="*", metavar="scenario",
                         help=f"all, or some of: {', '.join(SCENARIOS)}; or serve")
     parser.add_argument("--host-sim", type=pathlib.Path, required=True, help="the program host-sim")
@@ -42,8 +44,8 @@ def run(name, scenario, files):
     def log(*words):
         print("  ", *words, flush=True)
 
-    def make(**options):
-        made.append(Bench(files.image, files.host_sim, log, **options))
+    def make(image=files.image, **options):
+        made.append(Bench(image, files.host_sim, log, **options))
         return made[-1]
 
     try:

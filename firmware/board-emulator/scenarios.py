@@ -20,6 +20,8 @@ SLOT_A, SLOT_B, RUBBISH = 0x40000, 0x60000, bytes(place % 251 for place in range
 IDENTITY, UPLOAD, RESTARTING, REFUSED = 0, 7, 8, 9
 #: Fastest clock of the watchdog in Hz, and the longest time in s to erase a slot (DS10693).
 FASTEST_LSI_HZ, SLOWEST_ERASE_S = 47_000, 4.0
+#: Pin that selects a fourth converter.
+FOURTH_SELECT = "C", 5
 
 
 def session(make, files):
@@ -43,13 +45,24 @@ def session(make, files):
     bench.ask(RESTART)
     bench.run_for(0.1)
     expect("slot 1, generation 1" in bench.host_sim("identify"), "the model is not in force any more")
+    expect(bench.board.untouched(*FOURTH_SELECT), "the pin of a fourth converter is not as after a reset")
     bench.finish(resets=["program"])
 
 
-def check_baseline(bench, files):
+def wide(make, files):
+    """An image for 16 rows and 32 columns: two row registers, four converters."""
+    bench = make(image=files.wide_image, shape=(16, 32))
+    bench.run_for(0.1)
+    said = bench.host_sim("identify")
+    expect("16 rows, 32 columns" in said and ", 0 samples failed" in said, "it does not read all columns")
+    check_baseline(bench, files, frames=3)
+    bench.finish()
+
+
+def check_baseline(bench, files, frames=10):
     """The readings at rest against the resistances at the wires."""
     file = files.directory / "baseline.csv"
-    bench.host_sim("baseline", "-n", 10, "-o", file)
+    bench.host_sim("baseline", "-n", frames, "-o", file)
     with open(file, newline="") as lines:
         (line,) = csv.DictReader(lines)
     errors = []
@@ -61,7 +74,8 @@ def check_baseline(bench, files):
     rms = math.sqrt(sum(error * error for error in errors) / len(errors))
     largest = max(map(abs, errors))
     bench.board.note(f"baseline: {len(errors)} readings, RMS error {100 * rms:.4f} %, largest {100 * largest:.4f} %")
-    expect(len(errors) == 144 and rms <= 0.0003, f"the baseline is {100 * rms:.3f} % off (RMS)")
+    readings = len(bench.ohm) * len(bench.ohm[0])
+    expect(len(errors) == readings and rms <= 0.0003, f"the baseline is {100 * rms:.3f} % off (RMS)")
 
 
 def check_scan_time(said):
@@ -166,5 +180,6 @@ def serve(make, files):
 
 SCENARIOS = {
     scenario.__name__.replace("_", "-"): scenario
-    for scenario in (session, slow_erase, slow_erase_bare, patience, silent_sensor, no_clock, log_abandoned, restart)
+    for scenario in (session, wide, slow_erase, slow_erase_bare, patience, silent_sensor, no_clock, log_abandoned,
+                     restart)
 }

@@ -59,8 +59,10 @@ struct Core<'m, P, F, const ROWS: usize> {
     outputs: usize,
     /// Room for the longest frame.
     frame: &'m mut [f32],
-    /// One over each reading of the baseline; NaN without one.
+    /// One over each reading of the last complete baseline; NaN without one.
     reciprocals: &'m mut [f32],
+    /// Whether at least one reading has a reciprocal, so that a model with relative inputs may decode.
+    has_reciprocals: bool,
     /// Working space of a decoder.
     scratch: &'m mut [f32],
     estimate: Estimate<'m>,
@@ -117,6 +119,7 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
             outputs: 0,
             frame: frame.as_flattened_mut(),
             reciprocals: reciprocals.as_flattened_mut(),
+            has_reciprocals: false,
             scratch: scratch.as_flattened_mut().as_flattened_mut(),
             estimate: estimate.whole(),
             rest: rest.whole(),

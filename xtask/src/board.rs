@@ -2,9 +2,9 @@
 //! fail them.
 
 mod options;
-mod emulator;
 mod mutants;
 mod copy;
+mod emulator;
 
 use std::fs;
 use std::time::Instant;
@@ -21,6 +21,9 @@ pub use options::Options;
 /// Name of the image.
 const IMAGE: &str = "nucleo-f446re";
 
+/// Scenario of an image with room for a larger sensor.
+const WIDE: &str = "wide";
+
 /// Texts that the log of a scenario must contain.
 const LOGGED: [(&str, &str); 3] = [
     ("session", "slot 0 holds a model that was flashed, not uploaded"),
@@ -35,10 +38,13 @@ pub fn run(options: &Options<'_>) -> Outcome {
     if options.mutants {
         return run_mutants(&emulator, &toolchain, &options.names);
     }
+    let run = |scenario: &str| options.names.is_empty() || options.names.contains(&scenario);
     build_image(&toolchain, NUCLEO)?;
+    if run(WIDE) {
+        Copy::make()?.build_wide(&toolchain)?;
+    }
     let image = elf(IMAGE);
     emulator.run(&image, &options.names)?;
-    let run = |scenario: &str| options.names.is_empty() || options.names.contains(&scenario);
     for (scenario, text) in LOGGED.iter().filter(|(scenario, _)| run(scenario)) {
         let log = decoded(&emulator::log(scenario), &image)?;
         if !log.contains(text) {
@@ -54,7 +60,7 @@ fn run_mutants(emulator: &Emulator, toolchain: &Toolchain, names: &[&str]) -> Ou
     let mut survived = Vec::new();
     for mutant in chosen {
         let start = Instant::now();
-        let image = copy.build(toolchain, mutant)?;
+        let image = copy.build_mutant(toolchain, mutant)?;
         let Said { out, err, outcome } = emulator.capture(&image, mutant.scenario);
         fs::remove_file(&image).map_err(|cause| format!("{}: {cause}", image.display()))?;
         let seconds = start.elapsed().as_secs_f64();

@@ -1,5 +1,7 @@
 """The whole board: the microcontroller, what hangs on its pins, and the loop that runs it."""
 
+import math
+
 from . import circuit, flash, gpio
 from .bus import Bus
 from .core import Core
@@ -27,12 +29,16 @@ SCK, MISO, MOSI, TX, RX = 13, 14, 15, 2, 3
 GLANCE_S = 0.2e-3
 #: Longest time in cycles from one look to the next at whether an interrupt can be taken.
 LONGEST_PATIENCE = 2048
-#: Chip selects: port, pin.
-SELECTS = (("B", 12), ("B", 1), ("C", 4))
+#: Chip selects: port, pin. The fourth is for columns beyond the 24th; without them nothing hangs on its pin.
+SELECTS = (("B", 12), ("B", 1), ("C", 4), ("C", 5))
+FEWEST_CONVERTERS = 3
+#: Inputs of a converter, and outputs of a shift register.
+CHIP_WIRES = 8
 
 
 class Board:
-    """A board that runs the image at `path`, with the resistances `ohm[row][column]` at its wires.
+    """A board that runs the image at `path`, with the resistances `ohm[row][column]` at its wires, and with as many
+    shift registers and converters as these need.
 
     `hse`: the ST-LINK gives its 8 MHz. `lsi_hz`: the watchdog's own clock. `erase_s`: how long erasing 128 KiB
     takes, whatever the data sheet says. `sensor`: the converters are there. `settling_us`: the wait after each
@@ -64,6 +70,10 @@ class Board:
         """Logs `text` with the time."""
         self._log(f"[{self.time.seconds():9.6f} s] {text}")
 
+    def untouched(self, port, pin):
+        """Whether a pin is as after a reset: an input."""
+        return self.ports[port].mode(pin) == gpio.INPUT
+
     def where(self):
         """The function that is executed."""
         return self.image.place(self.cpu.where())
@@ -82,12 +92,13 @@ class Board:
             "B": gpio.Port({gpio.MODER: 0x280, gpio.OSPEEDR: 0xC0, gpio.PUPDR: 0x100}),
             "C": gpio.Port(),
         }
-        self.register = ShiftRegister(time, rules)
+        rows, columns = len(self._ohm), len(self._ohm[0])
+        self.register = ShiftRegister(time, rules, outputs=CHIP_WIRES * math.ceil(rows / CHIP_WIRES))
         self.circuit = circuit.Circuit(time, rules, self.register, self._ohm)
         self.converters = [
             Mcp3208(time, rules, circuit.REFERENCE_V,
-                    lambda channel, cycle, first=8 * chip: self.circuit.volts(first + channel, cycle))
-            for chip in range(3)
+                    lambda channel, cycle, first=CHIP_WIRES * chip: self.circuit.volts(first + channel, cycle))
+            for chip in range(max(FEWEST_CONVERTERS, math.ceil(columns / CHIP_WIRES)))
         ]
         self.rcc = Rcc(bus, time, rules, self._hse, self._reset_flags, self._clocks_changed)
         self.flash = flash.Flash(self.content, rules, self._stall, self.cpu.uc.mem_write, self._erase_s)
@@ -108,7 +119,7 @@ class Board:
             bus.attach(0x20000 + 0x400 * index, port, f"GPIO{'ABC'[index]}")
         bus.attach(0x23800, self.rcc, "RCC", gated=False)
         bus.attach(0x23C00, self.flash, "FLASH", gated=False)
-        for chip, (port, pin) in enumerate(SELECTS):
+        for chip, (port, pin) in enumerate(SELECTS[:len(self.converters)]):
             self.ports[port].listeners[pin] = lambda high, chip=chip: self._select(chip, high)
         self.ports["C"].listeners.update({6: self.register.data, 8: self.register.clock, 9: self.register.latch})
         self._idles, self._pins_checked, self._next_glance, self._patience = False, False, 0, 1

@@ -3,7 +3,7 @@
 from .bus import Registers
 
 MODER, OSPEEDR, PUPDR, IDR, ODR, BSRR, AFRL = 0x00, 0x08, 0x0C, 0x10, 0x14, 0x18, 0x20
-OUTPUT, ALTERNATE = 1, 2
+INPUT, OUTPUT, ALTERNATE = 0, 1, 2
 LOW_SPEED, PULL_UP = 0, 1
 
 

@@ -1,14 +1,14 @@
-"""The 74HC595 that controls the rows' switches."""
+"""The 74HC595s that control the rows' switches."""
 
 #: Shortest time in ns of set-up and of each level at 3.3 V (between the data sheet's figures for 2 V and 4.5 V).
 SHORTEST_NS = 50
 
 
 class ShiftRegister:
-    """Eight outputs. They are undefined (`None`) until the first latch."""
+    """Registers in series with so many `outputs`. These are undefined (`None`) until the first latch."""
 
-    def __init__(self, time, rules):
-        self._time, self._rules = time, rules
+    def __init__(self, time, rules, outputs):
+        self._time, self._rules, self._mask = time, rules, (1 << outputs) - 1
         self.outputs = None
         #: Cycle at which the outputs changed.
         self.changed_at = 0
@@ -32,7 +32,7 @@ class ShiftRegister:
         if high:
             self._check("data", "SER before SRCLK")
             self._check("clock", "SRCLK low")
-            self._bits = (self._bits << 1 | self._data) & 0xFF
+            self._bits = (self._bits << 1 | self._data) & self._mask
         self._edge("clock")
 
     def latch(self, high):
@@ -40,7 +40,7 @@ class ShiftRegister:
         if high:
             self._check("clock", "SRCLK before RCLK")
             if self._bits & (self._bits - 1):
-                self._rules.breach("two-rows", f"{self._bits:08b}")
+                self._rules.breach("two-rows", f"{self._bits:b}")
             if self._bits != self.outputs:
                 self.outputs, self.changed_at = self._bits, self._time.now
         self._edge("latch")

@@ -4,6 +4,7 @@ use core::cell::RefCell;
 
 use embedded_hal::spi::MODE_0;
 use embedded_hal_bus::spi::{NoDelay, RefCellDevice};
+use heapless::Vec;
 use stm32f4xx_hal::gpio::{ErasedPin, Output, PinState, Pull, Speed};
 use stm32f4xx_hal::pac::Peripherals;
 use stm32f4xx_hal::prelude::*;
@@ -28,6 +29,9 @@ const WATCHDOG_MS: u32 = 8000;
 /// powers of two.
 pub const SPI_HZ: u32 = 703_125;
 
+/// Number of converters: three, and a fourth if the image has room for more than 24 columns.
+pub const CONVERTERS: usize = if board_common::CONVERTERS > 3 { 4 } else { 3 };
+
 /// One analogue-to-digital converter, an `embedded_hal::spi::SpiDevice`.
 pub type Converter = RefCellDevice<'static, Bus, Select, NoDelay>;
 
@@ -45,8 +49,8 @@ pub struct Board {
     pub oscillator: Oscillator,
     /// The green light LD2.
     pub led: ErasedPin<Output>,
-    /// Three MCP3208 converters on one bus: columns 1–8, 9–16, 17 and 18.
-    pub converters: [Converter; 3],
+    /// MCP3208 converters on one bus, of eight columns each.
+    pub converters: [Converter; CONVERTERS],
     /// Serial data of the 74HC595 that drives the rows.
     pub row_data: RowPin,
     /// Shift clock of the 74HC595.
@@ -109,15 +113,19 @@ impl Board {
         let clock = Clock::start(parts.TIM2, &mut rcc)?;
         let (slots, settings) = Slot::all(parts.FLASH);
         let high = PinState::High;
+        let selects = [
+            Some(gpiob.pb12.into_push_pull_output_in_state(high).erase()),
+            Some(gpiob.pb1.into_push_pull_output_in_state(high).erase()),
+            Some(gpioc.pc4.into_push_pull_output_in_state(high).erase()),
+            // Without a fourth converter the pin stays as it is.
+            (CONVERTERS > 3).then(|| gpioc.pc5.into_push_pull_output_in_state(high).erase()),
+        ];
+        let converters: Vec<_, CONVERTERS> = selects.into_iter().flatten().map(converter).collect();
         Some(Self {
             reset_cause,
             oscillator,
             led: gpioa.pa5.into_push_pull_output().erase(),
-            converters: [
-                converter(gpiob.pb12.into_push_pull_output_in_state(high).erase()),
-                converter(gpiob.pb1.into_push_pull_output_in_state(high).erase()),
-                converter(gpioc.pc4.into_push_pull_output_in_state(high).erase()),
-            ],
+            converters: converters.into_array().ok()?,
             row_data: gpioc.pc6.into_push_pull_output().erase().into(),
             row_clock: gpioc.pc8.into_push_pull_output().erase().into(),
             row_latch: gpioc.pc9.into_push_pull_output().erase().into(),

@@ -15,7 +15,7 @@ mod serial;
 mod slot;
 mod board;
 
-pub use board::{Board, Converter, RowPin, SPI_HZ, Select};
+pub use board::{Board, CONVERTERS, Converter, RowPin, SPI_HZ, Select};
 pub use board_common::memory;
 pub use bus::Bus;
 pub use clock::Clock;

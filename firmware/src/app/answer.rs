@@ -112,8 +112,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             Request::Keep(setting) => self.keep(setting).map(|()| Report::Kept(self.kept())),
             Request::Forget(setting) => self.forget(setting).map(|()| Report::Kept(self.kept())),
         };
-        let sent = self.line.send(number, &report.unwrap_or_else(Report::Refused));
-        self.count_lost(sent);
+        self.line.send(number, &report.unwrap_or_else(Report::Refused), &mut self.statistics);
         leave
     }
 
@@ -137,8 +136,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
     fn send_constants(&mut self, number: u16) {
         let constants = self.source.constants().ok_or(Refusal::Constants(ConstantsFault::Fixed));
         let report = constants.map_or_else(Report::Refused, Report::Constants);
-        let sent = self.line.send(number, &report);
-        self.count_lost(sent);
+        self.line.send(number, &report, &mut self.statistics);
     }
 
     /// Counts a frame that is no valid request, and refuses it if it is a whole packet.
@@ -149,8 +147,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             PacketError::OtherVersion { number } => (number, Refusal::Version(PROTOCOL_VERSION)),
             PacketError::NotAMessage { number } => (number, Refusal::Unknown),
         };
-        let sent = self.line.send(number, &Report::Refused(refusal));
-        self.count_lost(sent);
+        self.line.send(number, &Report::Refused(refusal), &mut self.statistics);
     }
 
     fn identity<'i, S: Slot>(&mut self, model: &'i InForce<'_, ROWS>, spare: &S) -> Identity<'i> {
@@ -235,8 +232,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
     pub(super) fn give_up_capture(&mut self) {
         if let Some(Capture { number, .. }) = self.capture.take() {
             self.baseline.restart(self.wires.readings());
-            let sent = self.line.send(number, &Report::Refused(Refusal::Baseline));
-            self.count_lost(sent);
+            self.line.send(number, &Report::Refused(Refusal::Baseline), &mut self.statistics);
         }
     }
 
@@ -253,8 +249,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         self.baseline.add(self.frame);
         self.decode_baseline(model.decoder.as_ref());
         let report = Report::Baseline { readings_ohm: Floats::of(self.baseline.mean()) };
-        let sent = self.line.send(number, &report);
-        self.count_lost(sent);
+        self.line.send(number, &report, &mut self.statistics);
         Ok(())
     }
 

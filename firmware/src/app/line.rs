@@ -1,6 +1,6 @@
 //! Sending reports to the host.
 
-use crate::link::message::Report;
+use crate::link::message::{Report, Statistics};
 use crate::link::{cobs, packet};
 use crate::platform::{Platform, Port};
 
@@ -41,9 +41,15 @@ impl<'m, P: Port> Line<'m, P> {
         &mut self.platform
     }
 
+    /// Sends one report. If the host's side takes no more bytes, it is lost, which `statistics` count.
+    pub fn send(&mut self, number: u16, report: &Report<'_>, statistics: &mut Statistics) {
+        if !self.try_send(number, report) {
+            statistics.lost_reports = statistics.lost_reports.saturating_add(1);
+        }
+    }
+
     /// Sends one report; returns `false` if the host's side takes no more bytes.
-    #[must_use]
-    pub fn send(&mut self, number: u16, report: &Report<'_>) -> bool {
+    fn try_send(&mut self, number: u16, report: &Report<'_>) -> bool {
         let Some(bytes) = packet::encode(number, report, self.buffer) else { return false };
         let platform = &mut self.platform;
         let (start_us, left_us) = (platform.now_us(), self.left_us);

@@ -17,31 +17,29 @@ pub struct InForce<'a, const ROWS: usize> {
 impl<'a, const ROWS: usize> InForce<'a, ROWS> {
     pub const NONE: Self = Self { decoder: None, identity: None };
 
-    /// The model in `bytes`, which start with a blob that was checked before.
-    pub fn of(bytes: &'a [u8], slot: usize, generation: u32, in_ram: bool) -> Self {
-        let decoder = Decoder::load(blob_in_slot(bytes)).ok();
-        let identity = decoder.as_ref().map(|decoder: &Decoder<'_, ROWS>| {
-            let shape = decoder.shape();
-            ModelIdentity {
-                crc_32: decoder.model_crc(),
-                slot: slot as u8,
-                generation,
-                rows: shape.rows as u8,
-                inputs: shape.inputs as u16,
-                outputs: shape.outputs as u16,
-                in_ram,
-                scene_digest: decoder.metadata().scene_digest,
-                inputs_crc_32: crc_of(
-                    decoder.metadata().input_names,
-                    decoder.metadata().input_units,
-                ),
-                outputs_crc_32: crc_of(
-                    decoder.metadata().output_names,
-                    decoder.metadata().output_units,
-                ),
-            }
-        });
-        Self { decoder, identity }
+    /// The model in `bytes`, which start with its blob; `None` if it is not sound, or there is no room for it.
+    pub fn load(
+        capacity: Capacity,
+        bytes: &'a [u8],
+        (slot, generation): (usize, u32),
+        in_ram: bool,
+    ) -> Option<Self> {
+        let model = check(capacity, blob_in_slot(bytes)).ok()?;
+        let decoder = Decoder::of(model).ok()?;
+        let (shape, metadata) = (decoder.shape(), decoder.metadata());
+        let identity = ModelIdentity {
+            crc_32: decoder.model_crc(),
+            slot: slot as u8,
+            generation,
+            rows: shape.rows as u8,
+            inputs: shape.inputs as u16,
+            outputs: shape.outputs as u16,
+            in_ram,
+            scene_digest: metadata.scene_digest,
+            inputs_crc_32: crc_of(metadata.input_names, metadata.input_units),
+            outputs_crc_32: crc_of(metadata.output_names, metadata.output_units),
+        };
+        Some(Self { decoder: Some(decoder), identity: Some(identity) })
     }
 
     /// Name of the model's scene or data set, cut after [`MOST_NAME_BYTES`].
@@ -114,15 +112,21 @@ fn row_of(name: &str) -> Option<RowWire> {
 
 /// Number and generation of the most recent slot whose model is sound and has room.
 pub fn choose<S: Slot>(capacity: Capacity, slots: &[S; 2]) -> Option<(usize, u32)> {
-    let [a, b] = slots.each_ref().map(Slot::bytes);
-    let mut candidates = [(0, generation(0, a), a), (1, generation(1, b), b)];
-    if candidates[1].1 > candidates[0].1 {
-        candidates.swap(0, 1);
-    }
-    candidates.into_iter().find_map(|(index, generation, bytes)| {
-        let sound = check(capacity, blob_in_slot(bytes)).is_ok();
-        generation.filter(|_| sound).map(|generation| (index, generation))
+    by_generation(slots).into_iter().flatten().find(|(index, _)| {
+        let slot = slots.get(*index);
+        slot.is_some_and(|slot| check(capacity, blob_in_slot(slot.bytes())).is_ok())
     })
+}
+
+/// Number and generation of each slot that has one, the most recent first.
+pub fn by_generation<S: Slot>([a, b]: &[S; 2]) -> [Option<(usize, u32)>; 2] {
+    let a = generation(0, a.bytes()).map(|generation| (0, generation));
+    let b = generation(1, b.bytes()).map(|generation| (1, generation));
+    if b.map(|(_, generation)| generation) > a.map(|(_, generation)| generation) {
+        [b, a]
+    } else {
+        [a, b]
+    }
 }
 
 /// Copies the blob at the start of `bytes` to `room`, if it fits; returns the copy.

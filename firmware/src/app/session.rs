@@ -6,7 +6,7 @@ use model_core::health::{Health, Limits};
 use model_core::relative::reciprocal;
 use model_core::{Decoder, Estimate, Frame, Gate, RowStatus, RowWire};
 
-use super::model::{InForce, check, choose, copy_to, row_wires};
+use super::model::{InForce, by_generation, check_head, choose, copy_to, row_wires};
 use super::{App, Core};
 use crate::link::message::{EstimateReport, HealthReport, Report};
 use crate::link::packet::UNASKED;
@@ -34,26 +34,29 @@ pub struct Session<'a, 'm, P, F, S, const ROWS: usize> {
 impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
     Session<'a, 'm, P, F, S, ROWS>
 {
-    /// Starts a session with the most recent sound model in force. Its blob is copied to `weights` if it fits.
+    /// Starts a session with the most recent sound model in force. Its blob is copied to `weights` if it fits. Behind
+    /// one that fits and is damaged, the model of the other slot is decoded from there.
     #[inline(never)] // so that its stack is free again when the loop begins
     pub fn start(
         app: &'a mut App<'m, P, F, ROWS>,
         slots: &'a mut [S; 2],
         weights: &'a mut [u32],
     ) -> Self {
-        let chosen = choose(app.core.capacity, slots);
+        let capacity = app.core.capacity;
+        // Only the copy is checked, so the most recent model is looked at once.
+        let [newest, _] = by_generation(slots);
+        let copied = newest.and_then(|(slot, generation)| {
+            let copy = copy_to(weights, slots.get(slot)?.bytes())?;
+            InForce::load(capacity, copy, (slot, generation), true)
+        });
+        let chosen = if copied.is_some() { newest } else { choose(capacity, slots) };
         let [first, second] = slots;
         let (active, spare) = match chosen {
             Some((1, _)) => (&*second, first),
             _ => (&*first, second),
         };
-        let model = match chosen {
-            Some((slot, generation)) => match copy_to(weights, active.bytes()) {
-                Some(copy) => InForce::of(copy, slot, generation, true),
-                None => InForce::of(active.bytes(), slot, generation, false),
-            },
-            None => InForce::NONE,
-        };
+        let in_place = |chosen| InForce::load(capacity, active.bytes(), chosen, false);
+        let model = copied.or_else(|| chosen.and_then(in_place)).unwrap_or(InForce::NONE);
         if let Some(model) = &model.identity {
             info!(
                 "model {=u32:08x} in force, slot {=u8}, generation {=u32}, in RAM: {=bool}",
@@ -62,10 +65,10 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
         } else {
             warning!("no model in either slot: readings only, until one is uploaded");
         }
-        // Behind an uploaded model in slot 1, the spare slot is slot 0.
+        // Behind an uploaded model in slot 1, the spare slot is slot 0. For a line of the log, the blob's head will do.
         if chosen.is_some_and(|(slot, _)| slot == 1)
             && generation(0, spare.bytes()) == Some(0)
-            && check(app.core.capacity, blob_in_slot(spare.bytes())).is_ok()
+            && check_head(capacity, blob_in_slot(spare.bytes())).is_ok()
         {
             info!("slot 0 holds a model that was flashed, not uploaded: it is not used");
         }
@@ -152,8 +155,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         if self.configuration.send_readings {
             let readings = self.frame.get(..self.wires.readings()).unwrap_or_default();
             let report = Report::Readings { frame, start_us, readings_ohm: Floats::of(readings) };
-            let sent = self.line.send(UNASKED, &report);
-            self.count_lost(sent);
+            self.line.send(UNASKED, &report, &mut self.statistics);
         }
         let (flags, health) = self.decode(decoder);
         self.feed_baseline(decoder);
@@ -176,8 +178,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             open: health.open,
             faulty_columns: faulty.get(..self.wires.rows).unwrap_or_default().as_flattened(),
         };
-        let sent = self.line.send(UNASKED, &Report::Health(report));
-        self.count_lost(sent);
+        self.line.send(UNASKED, &Report::Health(report), &mut self.statistics);
     }
 
     /// Decodes the frame without its faulty readings.
@@ -206,7 +207,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                 self.scratch,
                 &mut estimate,
             );
-            if decoder.metadata().relative_inputs && self.baseline.frames() == 0 {
+            if decoder.metadata().relative_inputs && !self.has_reciprocals {
                 flags |= EstimateReport::NO_BASELINE;
             }
             // The model's shape was found to fit when it came into force.
@@ -267,8 +268,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         let row_status = codes.get(..self.rows).unwrap_or_default();
         let outputs = Floats::of(estimate.outputs);
         let report = EstimateReport { frame, start_us, flags, row_status, outputs };
-        let sent = self.line.send(number, &Report::Estimate(report));
-        self.count_lost(sent);
+        self.line.send(number, &Report::Estimate(report), &mut self.statistics);
     }
 
     /// Adds the frame to the baseline that is being captured, and answers the request when the baseline is
@@ -282,8 +282,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             self.capture = None;
             self.decode_baseline(decoder);
             let report = Report::Baseline { readings_ohm: Floats::of(self.baseline.mean()) };
-            let sent = self.line.send(number, &report);
-            self.count_lost(sent);
+            self.line.send(number, &report, &mut self.statistics);
         }
     }
 
@@ -295,6 +294,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         {
             *place = reciprocal(*mean);
         }
+        self.has_reciprocals = self.reciprocals.iter().any(|reciprocal| !reciprocal.is_nan());
         let mut rest = cut(&mut self.rest, self.rows, self.outputs);
         let decoded = decoder.filter(|_| known).is_some_and(|decoder| {
             let readings_ohm = self.baseline.mean();
@@ -303,12 +303,6 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         });
         if !decoded {
             rest.status.fill(RowStatus::MissingReading);
-        }
-    }
-
-    pub(super) fn count_lost(&mut self, sent: bool) {
-        if !sent {
-            self.statistics.lost_reports = self.statistics.lost_reports.saturating_add(1);
         }
     }
 

@@ -330,7 +330,7 @@ impl EstimateReport<'_> {
     pub const OVERFLOW: u8 = 1 << 2;
     /// Flag: at least one frame before this one could not be scanned in time.
     pub const OVERRUN: u8 = 1 << 3;
-    /// Flag: the model takes readings relative to the baseline, and there is none: no row is decoded.
+    /// Flag: the model takes readings relative to the baseline, and none is complete: no row is decoded.
     pub const NO_BASELINE: u8 = 1 << 5;
     /// Flag: a baseline was captured, and a reading differs from it by more than the threshold.
     pub const CONTACT: u8 = 1 << 4;

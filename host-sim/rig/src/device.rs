@@ -1,8 +1,8 @@
 //! A device at the other end of a serial line, real or emulated.
 //!
 //! [`Device`] sends requests and receives reports; [`upload`] replaces its model; [`calibrate`] finds the constants
-//! of its circuit; [`stream`] lets it decode frames; [`check`] and [`scan`] compare it with the host. `docs/link.md` specifies the
-//! protocol.
+//! of its circuit; [`stream`] lets it decode frames; [`check`] and [`scan`] compare it with the host. `docs/link.md`
+//! specifies the protocol.
 
 use std::collections::VecDeque;
 use std::hash::{BuildHasher, Hasher, RandomState};
@@ -12,18 +12,15 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use firmware::capacity::Capacity;
-use firmware::link::message::{
-    Configuration, Identity, Memory, ModelIdentity, Refusal, Report, Request,
-};
+use firmware::link::message::{Refusal, Report, Request};
 use firmware::link::receive::{Received, Receiver};
 use firmware::link::{cobs, packet};
-use model_core::Wires;
-use model_core::blob::{Floats, ModelShape};
-use serde::Serialize;
+use model_core::blob::Floats;
 
 use crate::error::{Error, Result};
 
+mod identity;
+mod configuration;
 pub mod serial;
 mod settings;
 pub mod calibrate;
@@ -33,10 +30,12 @@ mod expected;
 pub mod scan;
 pub mod check;
 
+use configuration::Kept;
+pub use configuration::{ActiveConfiguration, LEASE};
+pub use identity::DeviceIdentity;
+
 /// Longest time that a board takes to answer a request that erases no flash.
 const ANSWER: Duration = Duration::from_millis(500);
-/// Time without requests after which a device returns to its own configuration, unless told otherwise.
-pub const LEASE: Duration = Duration::from_secs(10);
 /// Time that a device takes to start.
 const START: Duration = Duration::from_millis(100);
 /// Number of times that a request is sent before the device is given up.
@@ -63,96 +62,6 @@ impl Wire for TcpStream {
     fn set_read_timeout(&mut self, timeout: Duration) -> std::io::Result<()> {
         TcpStream::set_read_timeout(self, Some(timeout))
     }
-}
-
-/// Identity that a device reports.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct DeviceIdentity {
-    /// Name of the board.
-    pub board: String,
-    /// Version of its firmware.
-    pub firmware: String,
-    /// Largest number of row-wires.
-    pub rows: usize,
-    /// Largest number of readings in a row.
-    pub columns: usize,
-    /// Largest number of outputs of a row.
-    pub outputs: usize,
-    /// Name of the exponential that it decodes with.
-    pub kernel: String,
-    /// Active model, if there is one.
-    pub model: Option<ModelIdentity>,
-    /// Name of its scene or data set, cut after 40 bytes.
-    pub model_name: String,
-    /// Largest blob that a slot holds, in bytes.
-    pub slot_bytes: usize,
-    /// Largest chunk of an upload, in bytes.
-    pub chunk_bytes: usize,
-    /// Use of its flash and RAM.
-    pub memory: Memory,
-}
-
-impl DeviceIdentity {
-    /// Sensor and model that the device has room for.
-    #[must_use]
-    pub fn capacity(&self) -> Capacity {
-        Capacity { rows: self.rows, columns: self.columns, outputs: self.outputs }
-    }
-
-    /// Wires that the device scans: those of its model, or all without one.
-    #[must_use]
-    pub fn wires(&self) -> Wires {
-        let capacity = self.capacity();
-        let shape = self.model.map(|model| ModelShape {
-            rows: model.rows.into(),
-            inputs: model.inputs.into(),
-            outputs: model.outputs.into(),
-        });
-        shape.and_then(|shape| capacity.wires_for(shape)).unwrap_or(capacity.wires())
-    }
-
-    /// Whether the model with that CRC-32 is active.
-    #[must_use]
-    pub fn has_in_force(&self, crc_32: u32) -> bool {
-        self.model.is_some_and(|found| found.crc_32 == crc_32)
-    }
-}
-
-impl From<&Identity<'_>> for DeviceIdentity {
-    fn from(identity: &Identity<'_>) -> Self {
-        Self {
-            board: identity.board.into(),
-            firmware: identity.firmware.into(),
-            rows: identity.rows.into(),
-            columns: identity.columns.into(),
-            outputs: identity.outputs.into(),
-            kernel: identity.kernel.into(),
-            model: identity.model,
-            model_name: identity.model_name.into(),
-            slot_bytes: identity.slot_bytes as usize,
-            chunk_bytes: identity.chunk_bytes.into(),
-            memory: identity.memory,
-        }
-    }
-}
-
-/// Configuration that is active, and for how long.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct ActiveConfiguration {
-    /// Configuration.
-    pub configuration: Configuration,
-    /// Time in ms after which the device returns to its own configuration if no request comes; 0 if this is its own.
-    pub lease_left_ms: u32,
-}
-
-/// Configuration that a host prolongs while it listens.
-#[derive(Clone, Copy)]
-struct Kept {
-    configuration: Configuration,
-    /// Time at which a request was sent last.
-    asked: Instant,
-    /// Number of the request that prolongs the lease, until it is answered.
-    waiting: Option<u16>,
 }
 
 /// Host's end of the line to a device.
@@ -230,24 +139,6 @@ impl<W: Wire> Device<W> {
             kept.asked = Instant::now();
         }
         Ok(self.number)
-    }
-
-    /// Prolongs the lease of the configuration that is kept, if it is time to.
-    fn prolong(&mut self) -> Result<()> {
-        let Some(kept) = self.kept else { return Ok(()) };
-        // A device that is slow to answer is not sent more and more; but a request may be lost.
-        let patience = if kept.waiting.is_some() { self.lease } else { self.lease / 3 };
-        if kept.asked.elapsed() > patience {
-            let number = self.send(&self.leased(kept.configuration))?;
-            self.kept = Some(Kept { asked: Instant::now(), waiting: Some(number), ..kept });
-        }
-        Ok(())
-    }
-
-    /// Request for a leased configuration.
-    fn leased(&self, configuration: Configuration) -> Request<'static> {
-        let lease_ms = u32::try_from(self.lease.as_millis()).unwrap_or(u32::MAX).max(1);
-        Request::Configure { configuration, lease_ms }
     }
 
     /// Ends the work if somebody wants that.
@@ -378,58 +269,6 @@ impl<W: Wire> Device<W> {
         })
     }
 
-    /// Asks for the active configuration.
-    ///
-    /// # Errors
-    /// Errors of [`ask`](Self::ask), such as [`Error::NoAnswer`].
-    pub fn configuration(&mut self) -> Result<ActiveConfiguration> {
-        self.ask_for_configuration(&Request::Configuration)
-    }
-
-    /// Makes `configuration` the active one for as long as this host is there: until [`resume`](Self::resume), or
-    /// until the device has heard no request for [`lease`](Self::lease). While the device scans, listening to it
-    /// prolongs the lease.
-    ///
-    /// # Errors
-    /// [`Error::Refused`] if the device refuses it, or the errors of [`ask`](Self::ask).
-    pub fn configure(&mut self, configuration: Configuration) -> Result<()> {
-        self.kept = None;
-        self.ask_for_configuration(&self.leased(configuration))?;
-        // Without scans there is nothing to listen to; and a device whose flash is erased may lose what is sent.
-        let scans = configuration.frame_period_us > 0;
-        self.kept = scans.then(|| Kept { configuration, asked: Instant::now(), waiting: None });
-        Ok(())
-    }
-
-    /// Makes `configuration` the device's own one, which it returns to, until its next restart.
-    ///
-    /// # Errors
-    /// [`Error::Refused`] if the device refuses it, or the errors of [`ask`](Self::ask).
-    pub fn configure_until_restart(&mut self, configuration: Configuration) -> Result<()> {
-        self.kept = None;
-        self.ask_for_configuration(&Request::Configure { configuration, lease_ms: 0 })?;
-        Ok(())
-    }
-
-    /// Makes the device's own configuration the active one again.
-    ///
-    /// # Errors
-    /// Errors of [`ask`](Self::ask), such as [`Error::NoAnswer`].
-    pub fn resume(&mut self) -> Result<ActiveConfiguration> {
-        self.kept = None;
-        self.ask_for_configuration(&Request::Resume)
-    }
-
-    fn ask_for_configuration(&mut self, request: &Request<'_>) -> Result<ActiveConfiguration> {
-        self.ask_plainly(request, |report| match report {
-            Report::Configuration { configuration, lease_left_ms } => Some(ActiveConfiguration {
-                configuration: *configuration,
-                lease_left_ms: *lease_left_ms,
-            }),
-            _ => None,
-        })
-    }
-
     /// Gives the device a baseline in Ω, one number a reading of its model.
     ///
     /// # Errors
@@ -437,30 +276,6 @@ impl<W: Wire> Device<W> {
     pub fn set_baseline(&mut self, baseline_ohm: &[f32]) -> Result<()> {
         let request = Request::SetBaseline { readings_ohm: Floats::of(baseline_ohm) };
         self.ask_plainly(&request, |report| matches!(report, Report::Baseline { .. }).then_some(()))
-    }
-
-    /// Runs `work` while the device does not scan, so that no reports come unasked. Afterwards the device returns to
-    /// its own configuration, even if the work failed or was interrupted.
-    ///
-    /// # Errors
-    /// Errors of [`ask`](Self::ask), or whatever error `work` returns.
-    pub fn while_paused<T, E: From<Error>>(
-        &mut self,
-        work: impl FnOnce(&mut Self) -> std::result::Result<T, E>,
-    ) -> std::result::Result<T, E> {
-        let outcome = match self.pause() {
-            Ok(()) => work(self),
-            Err(Error::Interrupted) => Err(Error::Interrupted.into()),
-            // A device that does not answer need not be asked to go on.
-            Err(cause) => return Err(cause.into()),
-        };
-        let resumed = self.uninterrupted(Self::resume);
-        outcome.and_then(|value| Ok(resumed.map(|_| value)?))
-    }
-
-    /// Stops scanning, for as long as this host is there.
-    pub(crate) fn pause(&mut self) -> Result<()> {
-        self.configure(Configuration { frame_period_us: 0, ..Configuration::DEFAULT })
     }
 
     /// Restarts the device and waits until it answers again.

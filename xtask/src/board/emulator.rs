@@ -5,6 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use super::copy;
 use super::options::Options;
 use crate::process::{Outcome, Said, capture, cargo, first_line, root, run, target_dir};
 
@@ -45,7 +46,13 @@ impl Emulator {
             model
         };
         let frames = options.frames.unwrap_or(30).to_string();
-        let named = [("--host-sim", host_sim), ("--model", model), ("--directory", folder)];
+        let wide = copy::image();
+        let named = [
+            ("--host-sim", host_sim),
+            ("--model", model),
+            ("--directory", folder),
+            ("--wide-image", wide),
+        ];
         let mut arguments = vec![root().join(FOLDER).join("run.py").into_os_string()];
         for (name, value) in named {
             arguments.extend([name.into(), value.into_os_string()]);

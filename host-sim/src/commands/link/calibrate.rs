@@ -16,8 +16,8 @@ use taxel_rig::device::{Device, Wire};
 
 use super::super::progress::Terminal;
 use super::super::{Common, print};
+use super::scan::{ScanArguments, patience, reading_names};
 use super::settings::constants_lines;
-use super::{ScanArguments, patience, reading_names};
 
 #[derive(Args)]
 pub struct Arguments {

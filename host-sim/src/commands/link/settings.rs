@@ -8,7 +8,7 @@ use taxel_rig::calibration::CircuitConstants;
 use taxel_rig::device::{Device, Wire};
 
 use super::super::{Common, print};
-use super::tolerance;
+use super::scan::tolerance;
 
 #[derive(Args)]
 #[group(required = true, multiple = true)]

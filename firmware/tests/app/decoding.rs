@@ -1,0 +1,125 @@
+//! Readings from the host, and their estimates.
+
+use firmware::app::Session;
+use firmware::link::message::{Configuration, EstimateReport, Refusal, Report, Request};
+use model_core::blob::Floats;
+
+use crate::common::*;
+use crate::requests::{bits, capture, decode, expected, statistics};
+
+#[test]
+fn readings_from_the_host_are_decoded_as_model_core_does() {
+    let blob = blob(3, 4);
+    let mut slots = MockSlot::pair_with(&blob);
+    let mut bench = Bench::new(quiet());
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let frame = frame_at_rest();
+    let (flags, status, found) = decode(&mut session, &bench.board, &frame);
+    assert_eq!((flags, &status[..]), (0, &[0, 0][..]));
+    assert_eq!(found, bits(expected(&blob, &frame).into_iter().flatten()));
+}
+
+#[test]
+fn a_faulty_reading_spoils_its_row_alone_and_is_told() {
+    let blob = blob(3, 4);
+    let mut slots = MockSlot::pair_with(&blob);
+    let mut bench = Bench::new(quiet());
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let good = frame_at_rest();
+    for bad in [f32::NAN, 0.0, f32::INFINITY, 1.0, 2000.0, -60.0] {
+        let mut frame = good;
+        frame[0][2] = bad;
+        let (flags, status, found) = decode(&mut session, &bench.board, &frame);
+        assert_eq!((flags, &status[..]), (EstimateReport::FAULTY_READING, &[1, 0][..]), "{bad}");
+        assert!(found[..OUTPUTS].iter().all(|value| f32::from_bits(*value).is_nan()));
+        assert_eq!(found[OUTPUTS..], bits(expected(&blob, &good)[1].into_iter()));
+    }
+}
+
+#[test]
+fn without_a_model_the_answer_says_so() {
+    let mut slots = MockSlot::pair();
+    let mut bench = Bench::new(quiet());
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let (flags, status, found) = decode(&mut session, &bench.board, &frame_at_rest());
+    assert_eq!((flags, &status[..]), (EstimateReport::NO_MODEL, &[1, 1][..]));
+    assert!(found.is_empty());
+}
+
+#[test]
+fn a_frame_of_another_length_is_refused() {
+    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut bench = Bench::new(quiet());
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    for readings in [&[60.0; 5][..], &[60.0; 7], &[]] {
+        let request = Request::Decode { frame: 0, readings_ohm: Floats::of(readings) };
+        let (refused, _) = ask(&mut session, &bench.board, &request, |report| {
+            report == Report::Refused(Refusal::FrameLength { expected: 6 })
+        });
+        assert!(refused);
+    }
+}
+
+#[test]
+fn readings_far_beyond_the_training_range_are_flagged_and_counted() {
+    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut bench = Bench::new(quiet());
+    let board = bench.board.clone();
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    // The training range is 50 to 70 Ω, and an eighth of it more on either side is not clamped.
+    for (reading, clamped) in
+        [(47.6, false), (72.4, false), (47.4, true), (72.6, true), (900.0, true)]
+    {
+        let mut frame = frame_at_rest();
+        frame[1][2] = reading;
+        let (flags, _, _) = decode(&mut session, &board, &frame);
+        assert_eq!(flags & EstimateReport::CLAMPED != 0, clamped, "{reading}");
+    }
+    assert_eq!(statistics(&mut session, &board).frames_clamped, 3);
+    // A row that is not decoded is not clamped.
+    let mut frame = frame_at_rest();
+    (frame[1][2], frame[1][0]) = (900.0, f32::NAN);
+    assert_eq!(decode(&mut session, &board, &frame).0, EstimateReport::FAULTY_READING);
+}
+
+#[test]
+fn rows_at_rest_answer_as_the_baseline_and_the_others_as_without_a_gate() {
+    let blob = blob(3, 4);
+    let mut slots = MockSlot::pair_with(&blob);
+    let mut bench = Bench::new(Configuration { rest_tolerance: 0.02, ..quiet() });
+    let board = bench.board.clone();
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let rest = frame_at_rest();
+    let touched = [[60.5, 60.5, 62.5], [63.0, 64.0, 63.0]];
+    let row = |frame: &TestFrame, row: usize| bits(expected(&blob, frame)[row].into_iter());
+    let ungated = [row(&touched, 0), row(&touched, 1)].concat();
+
+    // Without a baseline there is no gate.
+    let (_, status, found) = decode(&mut session, &board, &touched);
+    assert_eq!((&status[..], &found), (&[0, 0][..], &ungated));
+    capture(&mut session, &board, 3);
+    assert_eq!(statistics(&mut session, &board).rows_at_rest, 0);
+
+    let (_, status, found) = decode(&mut session, &board, &touched);
+    assert_eq!(status, [3, 0]);
+    assert_eq!(found, [row(&rest, 0), row(&touched, 1)].concat());
+    assert_ne!(found, ungated);
+    assert_eq!(statistics(&mut session, &board).rows_at_rest, 1);
+
+    // A row with a faulty reading is not at rest.
+    let mut faulty = rest;
+    faulty[0][1] = f32::NAN;
+    assert_eq!(decode(&mut session, &board, &faulty).1, [1, 3]);
+    assert_eq!(statistics(&mut session, &board).rows_at_rest, 2);
+
+    // With the gate switched off, or while a new baseline is captured, every row is decoded.
+    ask(&mut session, &board, &configure(quiet()), |_| ());
+    assert_eq!(decode(&mut session, &board, &touched).2, ungated);
+    let scanning = Configuration { frame_period_us: 1_000_000, rest_tolerance: 0.02, ..quiet() };
+    ask(&mut session, &board, &configure(scanning), |_| ());
+    assert_eq!(decode(&mut session, &board, &rest).1, [3, 3]);
+    let again = request_bytes(9, &Request::CaptureBaseline { frames: 1000 });
+    board.0.borrow_mut().to_device.extend(again);
+    settle(&mut session, &board);
+    assert_eq!(decode(&mut session, &board, &rest).1, [0, 0]);
+}

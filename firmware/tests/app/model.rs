@@ -1,0 +1,209 @@
+//! The model in force: its identity, its shape, and the memory that it is decoded from.
+
+use firmware::app::Session;
+use firmware::link::message::{Configuration, Report, Request};
+use model_core::blob::{Columns, Floats, Metadata, Model, ModelParts, ModelShape, encode_to_vec};
+use model_core::checksum::CRC_32;
+use model_core::rbf::Shape;
+use model_core::rbf::direct::{self, Parameters};
+use model_core::{AlignedBytes, Decoder};
+
+use crate::common::*;
+use crate::requests::{bits, capture, decode, expected};
+
+#[test]
+fn the_identity_tells_what_the_model_was_trained_on() {
+    let network = |metadata: Metadata<'static>| {
+        let network = blob_of_one_row(3, 2);
+        let model = Model::decode(&network).unwrap();
+        let networks: Vec<_> = model.networks().collect();
+        let parts =
+            ModelParts { projection: None, networks: &networks, row_network: &[0], metadata };
+        encode_to_vec(&parts).unwrap()
+    };
+    let plain = Metadata::unnamed(ModelShape { rows: 1, inputs: 3, outputs: 2 });
+    let read = |metadata: Metadata<'static>| {
+        let mut slots = MockSlot::pair_with(&network(metadata));
+        let mut bench = Bench::new(quiet());
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        ask(&mut session, &bench.board, &Request::Identify, |report| match report {
+            Report::Identity(identity) => (identity.model_name.to_owned(), identity.model.unwrap()),
+            other => panic!("{other:?}"),
+        })
+        .0
+    };
+    let (name, model) = read(Metadata { name: "press", scene_digest: 7, ..plain });
+    assert_eq!((&name[..], model.scene_digest), ("press", 7));
+    let crc = |text: &str| CRC_32.checksum(text.as_bytes());
+    assert_eq!((model.inputs_crc_32, model.outputs_crc_32), (crc("x\nx\nx\n\n"), crc("y\ny\n")));
+    let (_, other) = read(Metadata { output_units: Columns("N\nN"), ..plain });
+    assert_eq!(other.inputs_crc_32, model.inputs_crc_32);
+    assert_eq!(other.outputs_crc_32, crc("y\nyN\nN"));
+    // A long name is cut between letters.
+    let long = "äöüßäöüßäöüßäöüßäöüßäöüß";
+    let (name, _) = read(Metadata { name: long, ..plain });
+    assert_eq!(name, &long[..40]);
+    let (name, _) =
+        read(Metadata { name: "xäöüßäöüßäöüßäöüßäöüßäöüß", ..plain });
+    assert_eq!(name.len(), 39);
+}
+
+/// A blob for one row of `inputs` readings and `outputs` outputs.
+fn blob_of_one_row(inputs: usize, outputs: usize) -> AlignedBytes {
+    let shape = ModelShape { rows: 1, inputs, outputs };
+    blob_with(shape, Metadata::unnamed(shape))
+}
+
+/// A blob of one network with this `shape` of one row.
+fn blob_with(shape: ModelShape, metadata: Metadata<'_>) -> AlignedBytes {
+    let ModelShape { inputs, outputs, .. } = shape;
+    let number = |i: usize| ((i * 37) % 101) as f32 / 50.0 - 1.0;
+    let list = |from: usize, count: usize| (from..from + count).map(number).collect::<Vec<_>>();
+    let (centre, weights, bias) = (list(1, inputs), list(2, outputs), list(3, outputs));
+    let (minimum, per_span) = (vec![50.0; inputs], vec![0.05; inputs]);
+    let network = direct::Network::try_new(
+        Shape { inputs, centres: 1, outputs },
+        Parameters {
+            input_minimum: &minimum,
+            input_per_span: &per_span,
+            centres: &centre,
+            decay: &[1.5],
+            output_weights: &weights,
+            bias: &bias,
+            affine: &[],
+        },
+    );
+    let networks = &[network.unwrap().into()];
+    encode_to_vec(&ModelParts { projection: None, networks, row_network: &[0], metadata }).unwrap()
+}
+
+#[test]
+fn the_model_says_what_is_scanned_and_decoded() {
+    let rest = frame_at_rest();
+    // A column and an output less; one network for all six readings; one output of one row.
+    for (inputs, outputs, wires) in [(2, 1, 2), (6, 4, 6), (3, 2, 3), (1, 1, 1)] {
+        let blob = blob_of_one_row(inputs, outputs);
+        let mut slots = MockSlot::pair_with(&blob);
+        let scanning = Configuration { frame_period_us: 1000, send_readings: true, ..quiet() };
+        let mut bench = Bench::new(scanning);
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        while bench.board.0.borrow().now_us < 1500 {
+            assert_eq!(session.step(), None);
+        }
+        let readings = &rest.as_flattened()[..wires];
+        let decoder = Decoder::<1>::load(&blob).unwrap();
+        let outputs = decoder.decode(readings).unwrap().outputs;
+        let all = reports(&bench.board.0.borrow().to_host);
+        let found = |debug: String| all.iter().any(|(_, text)| text.contains(&debug));
+        assert!(found(format!("readings_ohm: {:?}", Floats::of(readings))), "{all:?}");
+        let row = format!("row_status: [0], outputs: {:?}", Floats::of(&outputs));
+        assert!(found(row), "{all:?}");
+    }
+}
+
+#[test]
+fn the_names_of_readings_say_which_rows_are_scanned() {
+    let shape = ModelShape { rows: 1, inputs: 2, outputs: 1 };
+    for (names, row) in [("r1c1_ohm\nr1c2_ohm", 0), ("r2c1_ohm\nr2c2_ohm", 1), ("a\nb", 0)] {
+        let metadata = Metadata { input_names: Columns(names), ..Metadata::unnamed(shape) };
+        let mut slots = MockSlot::pair_with(&blob_with(shape, metadata));
+        let scanning = Configuration { frame_period_us: 1000, send_readings: true, ..quiet() };
+        let mut bench = Bench::new(scanning);
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        while bench.board.0.borrow().now_us < 1500 {
+            assert_eq!(session.step(), None);
+        }
+        let all = reports(&bench.board.0.borrow().to_host);
+        let expected = format!("readings_ohm: {:?}", Floats::of(&frame_at_rest()[row][..2]));
+        assert!(all[0].1.contains(&expected), "{names}: {all:?}");
+    }
+    let metadata =
+        Metadata { input_names: Columns("r3c1_ohm\nr3c2_ohm"), ..Metadata::unnamed(shape) };
+    let mut slots = MockSlot::pair_with(&blob_with(shape, metadata));
+    let mut bench = Bench::new(quiet());
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    assert_eq!(model_crc(&mut session, &bench.board), None, "there are two rows");
+}
+
+#[test]
+fn a_model_without_room_is_not_put_in_force() {
+    for (inputs, outputs) in [(4, 1), (7, 1), (3, 5)] {
+        let mut slots = MockSlot::pair_with(&blob_of_one_row(inputs, outputs));
+        let mut bench = Bench::new(quiet());
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        assert_eq!(model_crc(&mut session, &bench.board), None, "{inputs} {outputs}");
+    }
+}
+
+#[test]
+fn a_model_is_decoded_from_ram_where_it_fits() {
+    let blob = blob(3, 4);
+    let words = blob.len().div_ceil(4);
+    for (room, in_ram) in [(words, true), (words - 1, false)] {
+        let mut slots = MockSlot::pair_with(&blob);
+        let mut weights = vec![0; room];
+        let mut bench = Bench::new(quiet());
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut weights);
+        let read = |report: Report<'_>| match report {
+            Report::Identity(identity) => identity.model.map(|model| model.in_ram),
+            other => panic!("{other:?}"),
+        };
+        let found = ask(&mut session, &bench.board, &Request::Identify, read).0;
+        assert_eq!(found, Some(in_ram));
+        let frame = frame_at_rest();
+        let (_, _, found) = decode(&mut session, &bench.board, &frame);
+        assert_eq!(found, bits(expected(&blob, &frame).into_iter().flatten()));
+        let _ = session;
+        assert_eq!(bytemuck::cast_slice::<u32, u8>(&weights).starts_with(&blob), in_ram);
+    }
+}
+
+#[test]
+fn behind_a_damaged_model_the_other_slots_is_decoded_from_there() {
+    let (first, second) = (blob(3, 4), blob(5, 4));
+    let mut slots = MockSlot::pair_with(&first);
+    let mut weights = vec![0; second.len().div_ceil(4)];
+    let mut bench = Bench::new(quiet());
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut weights);
+    for step in upload_steps(&second, 64) {
+        ask(&mut session, &bench.board, &Request::Upload(step), |_| ());
+    }
+    let _ = session;
+    let mut in_force = |slots: &mut [MockSlot; 2]| {
+        let mut session = Session::start(&mut bench.app, slots, &mut weights);
+        let frame = frame_at_rest();
+        let (_, _, found) = decode(&mut session, &bench.board, &frame);
+        let read = |report: Report<'_>| match report {
+            Report::Identity(identity) => identity.model.map(|model| (model.slot, model.in_ram)),
+            other => panic!("{other:?}"),
+        };
+        (ask(&mut session, &bench.board, &Request::Identify, read).0, found)
+    };
+    let outputs = |blob: &[u8]| bits(expected(blob, &frame_at_rest()).into_iter().flatten());
+    assert_eq!(in_force(&mut slots), (Some((1, true)), outputs(&second)));
+    slots[1].decay(second.len() / 8, 1);
+    assert_eq!(in_force(&mut slots), (Some((0, false)), outputs(&first)));
+}
+
+#[test]
+fn another_model_gives_its_own_answer_for_rest() {
+    let (first, second) = (blob(3, 4), blob(5, 4));
+    let mut slots = MockSlot::pair_with(&first);
+    let mut bench = Bench::new(quiet());
+    let board = bench.board.clone();
+    let mut nearly = frame_at_rest();
+    nearly[1][2] = 64.5;
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    capture(&mut session, &board, 1);
+    let rest = |blob: &[u8]| bits(expected(blob, &frame_at_rest()).into_iter().flatten());
+    let (_, status, found) = decode(&mut session, &board, &nearly);
+    assert_eq!((&status[..], found), (&[3, 3][..], rest(&first)));
+    for step in upload_steps(&second, 64) {
+        ask(&mut session, &board, &Request::Upload(step), |_| ());
+    }
+    let _ = session;
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    assert_eq!(model_crc(&mut session, &board), Some(crc_of(&second)));
+    let (_, status, found) = decode(&mut session, &board, &nearly);
+    assert_eq!((&status[..], found), (&[3, 3][..], rest(&second)));
+}

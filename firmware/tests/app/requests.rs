@@ -1,0 +1,62 @@
+//! Requests that many tests make, and what their answers must be.
+
+use firmware::link::message::{Configuration, Report, Request, Statistics};
+use model_core::blob::Floats;
+use model_core::{Aligned, Decoder};
+
+use crate::common::*;
+
+pub fn statistics(session: &mut TestSession<'_>, board: &Board) -> Statistics {
+    ask(session, board, &Request::Statistics, |report| match report {
+        Report::Statistics(statistics) => statistics,
+        other => panic!("{other:?}"),
+    })
+    .0
+}
+
+/// Outputs of model-core itself.
+pub fn expected(blob: &[u8], frame: &TestFrame) -> [[f32; OUTPUTS]; ROWS] {
+    let mut aligned = Aligned([0; 2048]);
+    aligned.0[..blob.len()].copy_from_slice(blob);
+    let decoder = Decoder::<ROWS>::load(&aligned.0[..blob.len()]).unwrap();
+    let outputs = decoder.decode(frame.as_flattened()).unwrap().outputs;
+    std::array::from_fn(|row| outputs.as_chunks().0[row])
+}
+
+pub fn bits(values: impl Iterator<Item = f32>) -> Vec<u32> {
+    values.map(f32::to_bits).collect()
+}
+
+/// Asks for an estimate of `frame`, and returns its flags, row status and bits.
+pub fn decode(
+    session: &mut TestSession<'_>,
+    board: &Board,
+    frame: &TestFrame,
+) -> (u8, Vec<u8>, Vec<u32>) {
+    let readings_ohm = Floats::of(frame.as_flattened());
+    let request = Request::Decode { frame: 5, readings_ohm };
+    ask(session, board, &request, |report| match report {
+        Report::Estimate(e) => {
+            assert_eq!(e.frame, 5);
+            (e.flags, e.row_status.to_vec(), bits(e.outputs.iter()))
+        }
+        other => panic!("{other:?}"),
+    })
+    .0
+}
+
+/// Captures a baseline of `frames` scans. Then sets a configuration that scans only on request, in which rows are
+/// at rest within 2 %.
+pub fn capture(session: &mut TestSession<'_>, board: &Board, frames: u16) {
+    let scanning = Configuration { frame_period_us: 100, ..quiet() };
+    ask(session, board, &configure(scanning), |_| ());
+    let request = request_bytes(9, &Request::CaptureBaseline { frames });
+    board.0.borrow_mut().to_device.extend(request);
+    board.0.borrow_mut().to_host.clear();
+    while !reports(&board.0.borrow().to_host).iter().any(|(number, _)| *number == 9) {
+        assert_eq!(session.step(), None);
+        assert!(board.0.borrow().now_us < 1_000_000, "no answer");
+    }
+    let gating = Configuration { rest_tolerance: 0.02, ..quiet() };
+    ask(session, board, &configure(gating), |_| ());
+}

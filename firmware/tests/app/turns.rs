@@ -1,0 +1,173 @@
+//! Turns of the loop: scans in time, the watchdog, and a host that takes no bytes.
+
+use firmware::app::{Leave, Session};
+use firmware::link::message::{Configuration, EstimateReport, Report, Request};
+use firmware::link::packet;
+use firmware::link::receive::{Received, Receiver};
+
+use crate::common::*;
+use crate::requests::statistics;
+
+#[test]
+fn frames_are_scanned_on_time_numbered_and_reported() {
+    let blob = blob(3, 4);
+    let mut slots = MockSlot::pair_with(&blob);
+    let configuration = Configuration { frame_period_us: 1000, send_readings: true, ..quiet() };
+    let mut bench = Bench::new(configuration);
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    while bench.board.0.borrow().now_us < 5500 {
+        assert_eq!(session.step(), None);
+    }
+    let reports = reports(&bench.board.0.borrow().to_host);
+    assert_eq!(reports.len(), 10, "{reports:?}"); // readings and estimate, five times
+    for (i, (number, text)) in reports.iter().enumerate() {
+        assert_eq!(*number, 0);
+        let kind = if i % 2 == 0 { "Readings { " } else { "Estimate(EstimateReport { " };
+        let start = format!("{kind}frame: {}, start_us: {}", i / 2 + 1, i / 2 + 1);
+        assert!(text.starts_with(&start), "{text} instead of {start}");
+    }
+    let s = statistics(&mut session, &bench.board);
+    assert_eq!((s.frames_scanned, s.frames_decoded, s.frames_missed), (5, 5, 0));
+    assert!(s.longest_scan_us >= 10 && s.longest_scan_us < 20);
+}
+
+#[test]
+fn a_scan_longer_than_the_period_is_an_overrun() {
+    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let configuration = Configuration { frame_period_us: 100, ..quiet() };
+    let mut bench = Bench::new(configuration);
+    let board = bench.board.clone();
+    let source = Source::new(&bench.frame, &board, 250);
+    bench.app = TestApp::new(board.clone(), source, configuration, buffers());
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    while board.0.borrow().now_us < 2000 {
+        session.step();
+    }
+    let all = reports(&board.0.borrow().to_host);
+    let flagged =
+        |flag: u8| all.iter().filter(|(_, t)| t.contains(&format!("flags: {flag},"))).count();
+    assert_eq!(flagged(0), 1, "{all:?}"); // the first was on time
+    assert_eq!(flagged(EstimateReport::OVERRUN), all.len() - 1);
+    let s = statistics(&mut session, &board);
+    assert!(s.frames_missed >= s.frames_scanned - 1, "{s:?}");
+}
+
+#[test]
+fn the_watchdog_is_fed_by_good_loops_only() {
+    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut bench = Bench::new(Configuration { frame_period_us: 100, ..quiet() });
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let board = bench.board.clone();
+    let feeds = || board.0.borrow().feeds;
+    for _ in 0..50 {
+        let before = feeds();
+        session.step();
+        assert_eq!(feeds(), before + 1);
+    }
+    // With a converter that gives nothing, no loop is good from the next scan on, whether it scans or not.
+    *bench.frame.borrow_mut() = [[f32::NAN; COLS]; ROWS];
+    let scanned = statistics(&mut session, &board).frames_scanned;
+    while statistics(&mut session, &board).frames_scanned == scanned {
+        session.step();
+    }
+    let (fed, bad) = (feeds(), statistics(&mut session, &board).bad_loops);
+    for _ in 0..2000 {
+        session.step();
+    }
+    assert_eq!(feeds(), fed);
+    assert!(statistics(&mut session, &board).bad_loops >= bad + 2000);
+    // One reading is enough.
+    bench.frame.borrow_mut()[1][1] = 60.0;
+    let scanned = statistics(&mut session, &board).frames_scanned;
+    while statistics(&mut session, &board).frames_scanned == scanned {
+        session.step();
+    }
+    let fed = feeds();
+    for _ in 0..2000 {
+        session.step();
+    }
+    assert_eq!(feeds(), fed + 2000);
+    // Without scans, a silent sensor must not restart the device.
+    *bench.frame.borrow_mut() = [[f32::NAN; COLS]; ROWS];
+    for _ in 0..2000 {
+        session.step();
+    }
+    ask(&mut session, &board, &configure(quiet()), |_| ());
+    let fed = feeds();
+    session.step();
+    assert_eq!(feeds(), fed + 1);
+}
+
+/// Longest time in µs in which the watchdog is not fed, when a byte is taken every `gap_us` and each scan takes
+/// `scan_us`.
+fn longest_unfed_us(gap_us: u32, scan_us: u32) -> u32 {
+    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let scanning = Configuration { frame_period_us: 10_000, send_readings: true, ..quiet() };
+    let mut bench = Bench::new(scanning);
+    let board = bench.board.clone();
+    // A faulty reading, so that all kinds of reports are sent.
+    bench.frame.borrow_mut()[0][0] = f32::NAN;
+    let source = Source::new(&bench.frame, &board, scan_us);
+    bench.app = TestApp::new(board.clone(), source, scanning, buffers());
+    board.0.borrow_mut().gap_us = gap_us;
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let mut longest_us = 0;
+    for _ in 0..30 {
+        let request = request_bytes(5, &Request::Identify);
+        board.0.borrow_mut().to_device.extend(request);
+        let start_us = board.0.borrow().now_us;
+        session.step();
+        longest_us = longest_us.max(board.0.borrow().now_us - start_us);
+    }
+    longest_us
+}
+
+#[test]
+fn however_slowly_bytes_are_taken_the_watchdog_is_fed() {
+    // The fastest watchdog of the board waits 5.4 s; its longest scan, of 256 samples a reading, takes 1.66 s.
+    for gap_us in [0, 1_000, 10_000, 49_000, 1_000_000] {
+        for scan_us in [6_400, 1_660_000] {
+            let unfed_us = longest_unfed_us(gap_us, scan_us);
+            assert!(unfed_us < 2_060_000 + scan_us, "{gap_us} {scan_us}: {unfed_us}");
+        }
+    }
+    assert!(longest_unfed_us(49_000, 6_400) > 2_000_000, "the line is not slow");
+}
+
+#[test]
+fn a_host_that_takes_no_bytes_costs_a_report_but_not_the_device() {
+    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut bench = Bench::new(Configuration { frame_period_us: 1000, ..quiet() });
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let board = bench.board.clone();
+    board.0.borrow_mut().room = Some(10);
+    while board.0.borrow().now_us < 500_000 {
+        session.step();
+    }
+    // The report that was cut is a broken frame, which does not damage the next report.
+    board.0.borrow_mut().room = None;
+    board.0.borrow_mut().to_device.extend(request_bytes(7, &Request::Statistics));
+    settle(&mut session, &board);
+    let bytes = std::mem::take(&mut board.0.borrow_mut().to_host);
+    let mut receiver = Receiver::new([0; 1024]);
+    let mut numbers = Vec::new();
+    for byte in bytes {
+        numbers.extend(receiver.push(byte).map(|received| match received {
+            Received::Frame(bytes) => packet::decode::<Report<'_>>(bytes).map(|p| p.number).ok(),
+            _ => None,
+        }));
+    }
+    assert_eq!(numbers[..2], [None, Some(7)], "{numbers:?}");
+    let s = statistics(&mut session, &board);
+    assert!(s.lost_reports >= 5 && s.frames_missed > 0, "{s:?}");
+}
+
+#[test]
+fn a_restart_is_answered_and_ends_the_session() {
+    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut bench = Bench::new(quiet());
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let (answer, leave) =
+        ask(&mut session, &bench.board, &Request::Restart, |r| r == Report::Restarting);
+    assert_eq!((answer, leave), (true, Some(Leave::Restart)));
+}

@@ -1,0 +1,78 @@
+//! What a device says of itself.
+
+use firmware::capacity::Capacity;
+use firmware::link::message::{Identity, Memory, ModelIdentity};
+use model_core::Wires;
+use model_core::blob::ModelShape;
+use serde::Serialize;
+
+/// Identity that a device reports.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DeviceIdentity {
+    /// Name of the board.
+    pub board: String,
+    /// Version of its firmware.
+    pub firmware: String,
+    /// Largest number of row-wires.
+    pub rows: usize,
+    /// Largest number of readings in a row.
+    pub columns: usize,
+    /// Largest number of outputs of a row.
+    pub outputs: usize,
+    /// Name of the exponential that it decodes with.
+    pub kernel: String,
+    /// Active model, if there is one.
+    pub model: Option<ModelIdentity>,
+    /// Name of its scene or data set, cut after 40 bytes.
+    pub model_name: String,
+    /// Largest blob that a slot holds, in bytes.
+    pub slot_bytes: usize,
+    /// Largest chunk of an upload, in bytes.
+    pub chunk_bytes: usize,
+    /// Use of its flash and RAM.
+    pub memory: Memory,
+}
+
+impl DeviceIdentity {
+    /// Sensor and model that the device has room for.
+    #[must_use]
+    pub fn capacity(&self) -> Capacity {
+        Capacity { rows: self.rows, columns: self.columns, outputs: self.outputs }
+    }
+
+    /// Wires that the device scans: those of its model, or all without one.
+    #[must_use]
+    pub fn wires(&self) -> Wires {
+        let capacity = self.capacity();
+        let shape = self.model.map(|model| ModelShape {
+            rows: model.rows.into(),
+            inputs: model.inputs.into(),
+            outputs: model.outputs.into(),
+        });
+        shape.and_then(|shape| capacity.wires_for(shape)).unwrap_or(capacity.wires())
+    }
+
+    /// Whether the model with that CRC-32 is active.
+    #[must_use]
+    pub fn has_in_force(&self, crc_32: u32) -> bool {
+        self.model.is_some_and(|found| found.crc_32 == crc_32)
+    }
+}
+
+impl From<&Identity<'_>> for DeviceIdentity {
+    fn from(identity: &Identity<'_>) -> Self {
+        Self {
+            board: identity.board.into(),
+            firmware: identity.firmware.into(),
+            rows: identity.rows.into(),
+            columns: identity.columns.into(),
+            outputs: identity.outputs.into(),
+            kernel: identity.kernel.into(),
+            model: identity.model,
+            model_name: identity.model_name.into(),
+            slot_bytes: identity.slot_bytes as usize,
+            chunk_bytes: identity.chunk_bytes.into(),
+            memory: identity.memory,
+        }
+    }
+}

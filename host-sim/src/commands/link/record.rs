@@ -1,0 +1,149 @@
+//! `record` and `baseline`: frames of a device, saved.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use firmware::link::message::{Configuration, Report, Request, Setting};
+use host_sim::{Error, Result};
+use serde::Serialize;
+use taxel_data::{csv_file, output};
+use taxel_learn::ModelBlob;
+use taxel_rig::device::{Device, DeviceIdentity, Wire};
+
+use super::super::{Common, print};
+use super::frames::{hear_frames, missing};
+use super::scan::{
+    ScanArguments, Wanted, check_length, configure, patience, reading_names, tolerance,
+};
+
+#[derive(Args)]
+pub struct RecordArguments {
+    /// Weight blob that is active on the device: its estimates are saved. Without it, readings are.
+    model: Option<PathBuf>,
+    #[command(flatten)]
+    scan: ScanArguments,
+    /// Relative change within which a row counts as untouched and is not decoded, once the device has a
+    /// `baseline`; 0 decodes all rows (docs/gating.md).
+    #[arg(long, value_name = "SHARE", default_value_t = Configuration::DEFAULT.rest_tolerance, value_parser = tolerance, allow_negative_numbers = true)]
+    rest_tolerance: f32,
+    /// CSV file to write.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+}
+
+#[derive(Args)]
+pub struct BaselineArguments {
+    #[command(flatten)]
+    scan: ScanArguments,
+    /// Keep the baseline over restarts; otherwise it is active until the next one.
+    #[arg(long)]
+    store: bool,
+    /// CSV file to write.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+}
+
+#[derive(Serialize)]
+struct Saved {
+    frames: usize,
+    /// Frame numbers missing between the first frame and the last: lost on the line.
+    frames_lost: u32,
+    /// Readings or outputs that are empty.
+    values_missing: usize,
+    /// Rows that were untouched, and so were not decoded.
+    rows_at_rest: usize,
+    file: PathBuf,
+}
+
+pub fn record<W: Wire>(
+    device: &mut Device<W>,
+    action: &RecordArguments,
+    common: &Common,
+) -> Result<()> {
+    let model = action.model.as_ref().map(|path| ModelBlob::read(path)).transpose()?;
+    let inputs: Vec<&Path> = action.model.iter().map(PathBuf::as_path).collect();
+    output::check_writable(&action.output, &inputs)?;
+    let identity = device.identify()?;
+    let (wanted, names) = match &model {
+        Some(model) => (Wanted::Estimates, output_names(model, &identity)?),
+        None => (Wanted::Readings, reading_names(&identity)),
+    };
+    let patience = patience(&action.scan, &identity);
+    let (frames, rows_at_rest) = device.while_paused(|device| -> Result<_> {
+        configure(device, &action.scan, wanted, action.rest_tolerance)?;
+        hear_frames(device, action.scan.frames.into(), patience, wanted, names.len())
+    })?;
+    let missing = missing(frames.iter().flat_map(|frame| &frame.values), wanted)?;
+    let lines = frames.iter().map(|frame| frame.values.iter().copied());
+    csv_file::write(&action.output, names.iter().map(String::as_str), lines)?;
+    let ends = frames.last().zip(frames.first());
+    let span = ends.map_or(0, |(last, first)| last.number.wrapping_sub(first.number) + 1);
+    let frames_lost = span.saturating_sub(frames.len() as u32);
+    let file = action.output.clone();
+    let (frames, values_missing) = (frames.len(), missing);
+    saved(&Saved { frames, frames_lost, values_missing, rows_at_rest, file }, common)
+}
+
+/// Names of the model's outputs, if it is the active one.
+fn output_names(model: &ModelBlob, identity: &DeviceIdentity) -> Result<Vec<String>> {
+    let model = model.parse();
+    if !identity.has_in_force(model.crc()) {
+        return Err(Error::Usage(format!(
+            "MODEL {:08x}: {} is active on the device; `upload` this one, or name that one",
+            model.crc(),
+            identity.model.map_or("none".into(), |found| format!("{:08x}", found.crc_32))
+        )));
+    }
+    Ok(model.metadata().output_names.iter().map(String::from).collect())
+}
+
+pub fn baseline<W: Wire>(
+    device: &mut Device<W>,
+    action: &BaselineArguments,
+    common: &Common,
+) -> Result<()> {
+    output::check_writable(&action.output, &[])?;
+    let identity = device.identify()?;
+    let frames = action.scan.frames;
+    let request = Request::CaptureBaseline { frames };
+    let patience = patience(&action.scan, &identity);
+    let answer = device.while_paused(|device| {
+        configure(device, &action.scan, Wanted::Nothing, 0.0)?;
+        device.ask(&request, patience, |report| match report {
+            Report::Baseline { readings_ohm } => {
+                Some(readings_ohm.iter().map(f64::from).collect::<Vec<_>>())
+            }
+            _ => None,
+        })
+    })?;
+    let readings = answer.map_err(taxel_rig::Error::Refused)?;
+    let names = reading_names(&identity);
+    check_length(0, &readings, names.len())?;
+    let values_missing = missing(readings.iter(), Wanted::Readings)?;
+    if action.store {
+        device.keep(Setting::Baseline)?;
+    }
+    let lines = std::iter::once(readings.iter().copied());
+    csv_file::write(&action.output, names.iter().map(String::as_str), lines)?;
+    let file = action.output.clone();
+    let (frames, frames_lost, rows_at_rest) = (frames.into(), 0, 0);
+    saved(&Saved { frames, frames_lost, values_missing, rows_at_rest, file }, common)
+}
+
+fn saved(saved: &Saved, common: &Common) -> Result<()> {
+    if common.json {
+        return print::json(saved);
+    }
+    let mut page = print::Page::default();
+    page.line(format_args!(
+        "{} frames in {}, {} lost on the line, {} values missing",
+        saved.frames,
+        saved.file.display(),
+        saved.frames_lost,
+        saved.values_missing
+    ));
+    if saved.rows_at_rest > 0 {
+        page.line(format_args!("{} rows were untouched, and not decoded", saved.rows_at_rest));
+    }
+    page.print()
+}

@@ -1,0 +1,91 @@
+//! How a device is to scan for a command, and what it then sends.
+
+use std::time::Duration;
+
+use clap::{Args, value_parser};
+use firmware::link::message::Configuration;
+use firmware::timing::ScanPlan;
+use host_sim::Result;
+use model_core::Wires;
+use taxel_rig::device::{Device, DeviceIdentity, Wire};
+
+#[derive(Args)]
+pub struct ScanArguments {
+    /// Frames to scan.
+    #[arg(short = 'n', long, value_name = "N", default_value_t = 100, value_parser = value_parser!(u16).range(1..), allow_negative_numbers = true)]
+    pub frames: u16,
+    /// Time from one scan to the next.
+    #[arg(long, value_name = "US", default_value_t = Configuration::DEFAULT.frame_period_us, value_parser = value_parser!(u32).range(100..=1_000_000_000), allow_negative_numbers = true)]
+    pub period_us: u32,
+    /// Wait after a row is driven.
+    #[arg(long, value_name = "US", default_value_t = Configuration::DEFAULT.scan.settling_us, value_parser = value_parser!(u32).range(..=10_000), allow_negative_numbers = true)]
+    pub settling_us: u32,
+    /// Samples averaged for a reading.
+    #[arg(long, value_name = "N", default_value_t = Configuration::DEFAULT.scan.oversampling, value_parser = value_parser!(u16).range(1..=256), allow_negative_numbers = true)]
+    pub oversampling: u16,
+}
+
+/// Content that a device is to send of each scan.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Wanted {
+    Nothing,
+    Readings,
+    Estimates,
+}
+
+/// Tolerance within the range that a device accepts.
+pub fn tolerance(text: &str) -> std::result::Result<f32, String> {
+    let share = text.parse().ok().filter(|share| (0.0..1.0).contains(share));
+    share.ok_or_else(|| "give a share from 0 and below 1, such as 0.0175 for 3.5 × 0.5 %".into())
+}
+
+/// Activates a configuration for scanning.
+pub fn configure<W: Wire>(
+    device: &mut Device<W>,
+    scan: &ScanArguments,
+    wanted: Wanted,
+    rest_tolerance: f32,
+) -> taxel_rig::Result<()> {
+    let mut configuration = Configuration {
+        frame_period_us: scan.period_us,
+        send_readings: wanted == Wanted::Readings,
+        send_estimates: wanted == Wanted::Estimates,
+        rest_tolerance,
+        ..Configuration::DEFAULT
+    };
+    configuration.scan.settling_us = scan.settling_us;
+    configuration.scan.oversampling = scan.oversampling;
+    device.configure(configuration)
+}
+
+/// Longest time of a sample, with any converter that the readout is written for.
+const SLOWEST_SAMPLE_NS: u32 = 100_000;
+
+/// Time within which so many frames must have come.
+pub fn patience(scan: &ScanArguments, identity: &DeviceIdentity) -> Duration {
+    let wires = identity.wires();
+    let plan = ScanPlan {
+        rows: wires.rows as u16,
+        columns: wires.columns as u16,
+        idle_samples: true,
+        settling_us: scan.settling_us,
+        oversampling: scan.oversampling,
+        sample_ns: SLOWEST_SAMPLE_NS,
+    };
+    let period = Duration::from_micros(scan.period_us.max(plan.scan_us()).into());
+    Duration::from_secs(2) + 4 * u32::from(scan.frames) * period
+}
+
+pub fn reading_names(identity: &DeviceIdentity) -> Vec<String> {
+    let Wires { rows, columns } = identity.wires();
+    (1..=rows).flat_map(|m| (1..=columns).map(move |k| format!("r{m}c{k}_ohm"))).collect()
+}
+
+/// Checks the number of values in a frame.
+pub fn check_length(frame: u32, values: &[f64], expected: usize) -> Result<()> {
+    let found = values.len();
+    if found == expected {
+        return Ok(());
+    }
+    Err(taxel_rig::Error::ReportLength { frame, expected, found }.into())
+}

@@ -1,0 +1,102 @@
+//! `identify`: what a device is and does.
+
+use firmware::link::message::Statistics;
+use host_sim::Result;
+use serde::Serialize;
+use taxel_rig::device::{ActiveConfiguration, Device, DeviceIdentity, Wire};
+
+use super::super::check_arguments::memory_lines;
+use super::super::{Common, print};
+
+#[derive(Serialize)]
+struct Status {
+    device: DeviceIdentity,
+    #[serde(flatten)]
+    active: ActiveConfiguration,
+    statistics: Statistics,
+}
+
+pub fn show<W: Wire>(device: &mut Device<W>, common: &Common) -> Result<()> {
+    let status = Status {
+        device: device.identify()?,
+        active: device.configuration()?,
+        statistics: device.statistics()?,
+    };
+    if common.json {
+        return print::json(&status);
+    }
+    let (d, s) = (&status.device, &status.statistics);
+    let mut page = print::Page::default();
+    page.line(format_args!("{:<17} {}, firmware {}", "device", d.board, d.firmware));
+    page.line(format_args!(
+        "{:<17} {} rows, {} columns, {} outputs a row; {} exponential",
+        "room for", d.rows, d.columns, d.outputs, d.kernel
+    ));
+    if let Some(m) = &d.model {
+        page.line(format_args!(
+            "{:<17} {:?}, CRC-32 {:08x}, slot {}, generation {}, weights in {}",
+            "model",
+            d.model_name,
+            m.crc_32,
+            m.slot,
+            m.generation,
+            if m.in_ram { "RAM" } else { "flash" }
+        ));
+        page.line(format_args!(
+            "{:<17} {} × {} readings to {} × {} outputs",
+            "shape", m.rows, m.inputs, m.rows, m.outputs
+        ));
+    } else {
+        page.line(format_args!("{:<17} none: upload one", "model"));
+    }
+    page.line(format_args!("{:<17} {}", "scanning", scanning(&status.active)));
+    page.line(format_args!(
+        "{:<17} {} scanned, {} decoded (except {} untouched rows), {} missed, {} samples failed",
+        "frames",
+        s.frames_scanned,
+        s.frames_decoded,
+        s.rows_at_rest,
+        s.frames_missed,
+        s.failed_samples
+    ));
+    page.line(format_args!(
+        "{:<17} scan {} µs, decoding {} µs",
+        "longest", s.longest_scan_us, s.longest_decode_us
+    ));
+    if s.longest_decode_cycles > 0 {
+        page.line(format_args!(
+            "{:<17} decoding {} to {} of the processor",
+            "cycles", s.shortest_decode_cycles, s.longest_decode_cycles
+        ));
+    }
+    if s.frames_clamped > 0 {
+        page.line(format_args!(
+            "{:<17} {} frames had readings far beyond the model's training range",
+            "clamped", s.frames_clamped
+        ));
+    }
+    page.line(format_args!(
+        "{:<17} {} requests, {} bad packets, {} lost reports, {} bad loops",
+        "link", s.requests, s.bad_packets, s.lost_reports, s.bad_loops
+    ));
+    page.line(format_args!("{:<17} {} since the start", "slots erased", s.slot_erases));
+    memory_lines(&mut page, &d.memory);
+    page.print()
+}
+
+/// What the device is doing, by its active configuration.
+fn scanning(active: &ActiveConfiguration) -> String {
+    let ActiveConfiguration { configuration, lease_left_ms } = active;
+    let left_s = f64::from(*lease_left_ms) / 1e3;
+    match (configuration.frame_period_us, lease_left_ms) {
+        (0, 0) => "not scanning: its own configuration has no frame period".into(),
+        (0, _) => {
+            format!("not scanning: paused by a host, for {left_s:.1} s more without requests")
+        }
+        (us, 0) => format!("a frame every {} ms", f64::from(us) / 1e3),
+        (us, _) => format!(
+            "a frame every {} ms, set by a host, for {left_s:.1} s more without requests",
+            f64::from(us) / 1e3
+        ),
+    }
+}
