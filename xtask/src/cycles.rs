@@ -95,7 +95,6 @@ pub fn run(options: &Options<'_>) -> Outcome {
     } else {
         print!("{}", table::aligned(&measured));
     }
-    eprint!("{}", loops::largest(&code, &loops)?);
     let over_budget = budget::exceeded(&measured);
     if !over_budget.is_empty() {
         return Err(over_budget.join("; "));
@@ -108,9 +107,10 @@ pub fn run(options: &Options<'_>) -> Outcome {
         prices::accept(&image, &code, &directory, &compiler)?;
     }
     hold_to_accepted(&measured, &compiler, options)?;
-    let checked = prices::check(&image, &code, &directory, &compiler)?;
+    let (checked, others) = prices::check(&image, &code, &directory, &compiler)?;
     // With --json, stdout has the objects only.
     eprintln!("{checked}");
+    eprint!("{}", loops::largest(&code, &[loops, others].concat())?);
     Ok(())
 }
 
@@ -162,7 +162,7 @@ fn measure_model(
 ) -> Outcome {
     let blob = ModelBlob::read(path).map_err(|cause| cause.to_string())?;
     let design = Design::of(&blob);
-    let mut frames = told::measure(&design, path, image, code)?;
+    let (mut frames, _) = told::measure(&design, path, image, code)?;
     if let Some(kernel) = options.kernel {
         frames.retain(|frame| frame.kernel == kernel);
         if frames.is_empty() {
@@ -179,7 +179,7 @@ fn measure_model(
 pub fn frame_of(design: &Design, path: &Path) -> Outcome<(Cost, Counted)> {
     let image = elf(IMAGE);
     let code = Code::read(&image)?;
-    let frames = told::measure(design, path, &image, &code)?;
+    let (frames, _) = told::measure(design, path, &image, &code)?;
     let compiler = Toolchain::find()?.compiler()?;
     prices::held_to(&frames, &compiler)?;
     let frame = frames.first().ok_or("no frame was measured")?;

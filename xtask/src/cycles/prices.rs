@@ -6,6 +6,7 @@ use std::path::Path;
 use taxel_learn::cost::Prices;
 
 use super::code::Code;
+use super::loops::Loop;
 use super::told::{self, Frame};
 use super::{designs, fit};
 use crate::process::{Outcome, root};
@@ -27,20 +28,26 @@ const OTHER_COMPILERS_PERCENT: f64 = 4.0;
 pub fn accept(image: &Path, code: &Code, directory: &Path, compiler: &str) -> Outcome {
     let designs = designs::for_prices();
     eprintln!("measuring {} designs for {FILE}", designs.len());
-    let frames = told::measure_designs(&designs, image, code, directory)?;
+    let (frames, _) = told::measure_designs(&designs, image, code, directory)?;
     let text = Prices::text(compiler, &fit::prices(&frames)?);
     fs::write(root().join(FILE), text).map_err(|cause| format!("{FILE}: {cause}"))
 }
 
-/// Measures other designs than those that the list was made from, and says how well it tells their costs. With another
+/// Measures other designs than those that the list was made from, and says how well it tells their costs; also returns
+/// the loops in them. With another
 /// `compiler` than the list's, code in assembly must be told exactly, and nothing may take more than is told by more
 /// than a margin.
 ///
 /// # Errors
 /// A run fails, or the list tells wrong costs.
-pub fn check(image: &Path, code: &Code, directory: &Path, compiler: &str) -> Outcome<String> {
+pub fn check(
+    image: &Path,
+    code: &Code,
+    directory: &Path,
+    compiler: &str,
+) -> Outcome<(String, Vec<Loop>)> {
     let designs = designs::to_check();
-    let frames = told::measure_designs(&designs, image, code, directory)?;
+    let (frames, loops) = told::measure_designs(&designs, image, code, directory)?;
     let prices = prices()?;
     let compared = compare(&frames, &prices)?;
     let range = |of: fn(&Compared<'_>) -> f64| {
@@ -50,14 +57,15 @@ pub fn check(image: &Path, code: &Code, directory: &Path, compiler: &str) -> Out
         format!("{least:+.2} to {most:+.2} %")
     };
     held(&compared, prices.compiler != compiler)?;
-    Ok(format!(
+    let said = format!(
         "{FILE} tells the costs of {} frames of {} random designs: of assembly exactly, all instructions to {}, \
          cycles to {}",
         compared.len(),
         designs.len(),
         range(|it| it.instructions_percent),
         range(|it| it.cycles_percent),
-    ))
+    );
+    Ok((said, loops))
 }
 
 /// Prints what the list tells of a model's `frames` beside what was counted: a table, or a list of JSON objects.

@@ -10,6 +10,7 @@ use taxel_learn::cost::{Design, FramePieces, Gating, Price, Prices};
 
 use super::code::Code;
 use super::figures::{self, Scope};
+use super::loops::Loop;
 use super::regions::{Count, Region};
 use super::{machine, synthetic};
 use crate::process::Outcome;
@@ -24,7 +25,7 @@ pub struct Frame {
     pub assembly: Count,
 }
 
-/// Measures frames of every design, with blobs that are written into `directory` meanwhile.
+/// Measures frames of every design, and the loops in them, with blobs that are written into `directory` meanwhile.
 ///
 /// # Errors
 /// A run fails, or measures something else.
@@ -33,7 +34,7 @@ pub fn measure_designs(
     image: &Path,
     code: &Code,
     directory: &Path,
-) -> Outcome<Vec<Frame>> {
+) -> Outcome<(Vec<Frame>, Vec<Loop>)> {
     let directory = directory.join("designs");
     fs::create_dir_all(&directory).map_err(|cause| cause.to_string())?;
     let one = |(index, design): (usize, &Design)| {
@@ -44,19 +45,26 @@ pub fn measure_designs(
         let _ = fs::remove_file(&path);
         frames.map_err(|cause| format!("{}: {cause}", name_of(design)))
     };
-    let frames: Vec<Vec<Frame>> =
+    let runs: Vec<(Vec<Frame>, Vec<Loop>)> =
         designs.par_iter().enumerate().map(one).collect::<Outcome<_>>()?;
-    Ok(frames.into_iter().flatten().collect())
+    let (frames, loops): (Vec<_>, Vec<_>) = runs.into_iter().unzip();
+    Ok((frames.into_iter().flatten().collect(), loops.concat()))
 }
 
-/// Measures frames of the blob at `path`, whose model has this `design`.
+/// Measures frames of the blob at `path`, and the loops in them, whose model has this `design`.
 ///
 /// # Errors
 /// The run fails, or measures something else.
-pub fn measure(design: &Design, path: &Path, image: &Path, code: &Code) -> Outcome<Vec<Frame>> {
+pub fn measure(
+    design: &Design,
+    path: &Path,
+    image: &Path,
+    code: &Code,
+) -> Outcome<(Vec<Frame>, Vec<Loop>)> {
     let run = machine::run(image, code, path)?;
     let regions = figures::measured(&run.log, &run.counts)?;
-    Ok(regions.iter().filter_map(|region| frame(design, region)).collect())
+    let frames = regions.iter().filter_map(|region| frame(design, region)).collect();
+    Ok((frames, run.loops))
 }
 
 fn frame(design: &Design, region: &figures::Measured) -> Option<Frame> {

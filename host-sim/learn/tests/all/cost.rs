@@ -1,0 +1,103 @@
+//! Costs of decoding, told by the price list in the repository.
+
+use model_core::blob::ModelShape;
+use model_core::rbf::Format;
+use taxel_learn::Exponential;
+use taxel_learn::cost::{Cost, Design, Frames, Prices, kernel_name};
+
+const PAPER: ModelShape = ModelShape { rows: 8, inputs: 18, outputs: 18 };
+
+fn frames(prices: &Prices, design: &Design) -> Frames<Cost> {
+    prices.frames(design, Exponential::default()).unwrap()
+}
+
+#[test]
+fn every_shape_has_a_price_and_a_gate_saves_and_costs_something() {
+    let prices = Prices::accepted().unwrap();
+    let sizes = (1..=40).chain([63, 64, 100, 144, 200]);
+    for (inputs, outputs) in
+        sizes.clone().flat_map(|inputs| sizes.clone().map(move |m| (inputs, m)))
+    {
+        let shape = ModelShape { rows: 3, inputs, outputs };
+        for format in Format::ALL {
+            for centres in [1, 60, 300] {
+                for affine in [false, true] {
+                    for design in [Design::of_rows, Design::of_array] {
+                        let design = design(shape, format, centres, affine);
+                        for design in [design.clone(), design.with_relative_inputs()] {
+                            let Frames { ungated, at_rest, awake } = frames(&prices, &design);
+                            for cost in [ungated, at_rest, awake] {
+                                assert!(cost.instructions < cost.cycles, "{design:?}: {cost:?}");
+                                assert!(cost.cycles < cost.flash_cycles, "{design:?}: {cost:?}");
+                            }
+                            assert!(ungated.cycles < awake.cycles, "{design:?}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_left_out_costs_nothing() {
+    let prices = Prices::accepted().unwrap();
+    let cycles = |shape, format, centres, affine| {
+        frames(&prices, &Design::of_rows(shape, format, centres, affine)).ungated.cycles
+    };
+    for format in Format::ALL {
+        let all = cycles(PAPER, format, 64, true);
+        let [z_only, one_row, few_columns] = [
+            ModelShape { outputs: 6, ..PAPER },
+            ModelShape { rows: 1, ..PAPER },
+            ModelShape { inputs: 8, ..PAPER },
+        ]
+        .map(|shape| cycles(shape, format, 64, true));
+        assert!(z_only < all * 8 / 10 && few_columns < all * 8 / 10, "{format:?}");
+        assert!(one_row < all / 7, "{format:?}");
+        assert!(cycles(PAPER, format, 64, false) < all && cycles(PAPER, format, 32, true) < all);
+    }
+}
+
+/// The accepted figures are counts of trained models, which the price list was not made from.
+#[test]
+fn the_accepted_figures_of_trained_models_are_told() {
+    let prices = Prices::accepted().unwrap();
+    let figures = include_str!("../../../../firmware/cycles.csv");
+    let mut compared = 0;
+    for line in figures.lines().skip(1) {
+        let [compiler, kernel, centres, affine, scope, instructions, cycles, _] =
+            line.split(',').collect::<Vec<_>>()[..]
+        else {
+            panic!("{line}");
+        };
+        if compiler.replace(';', ",") != prices.compiler {
+            continue;
+        }
+        let exponential = Exponential::ALL.into_iter().find_map(|exponential| {
+            let named = |format: &Format| kernel_name(*format, exponential) == kernel;
+            Some((Format::ALL.into_iter().find(named)?, exponential))
+        });
+        let Some((format, exponential)) = exponential else { continue };
+        let centres = centres.parse().unwrap();
+        let (design, scope): (fn(_, _, _, _) -> Design, _) = match scope.strip_prefix("array-") {
+            Some(scope) => (Design::of_array, scope),
+            None => (Design::of_rows, scope),
+        };
+        let design = design(PAPER, format, centres, affine == "yes");
+        let frames = prices.frames(&design, exponential).unwrap();
+        let told = match scope {
+            "frame" => frames.ungated,
+            "resting-frame" => frames.at_rest,
+            "awake-frame" => frames.awake,
+            _ => continue,
+        };
+        let percent = |told: u64, counted: &str| {
+            100.0 * (told as f64 / counted.parse::<f64>().unwrap() - 1.0)
+        };
+        let errors = [percent(told.instructions, instructions), percent(told.cycles, cycles)];
+        assert!(errors.iter().all(|error| error.abs() < 2.0), "{line}: {errors:?} %");
+        compared += 1;
+    }
+    assert!(compared > 100, "{compared}");
+}
