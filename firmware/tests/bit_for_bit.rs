@@ -42,6 +42,16 @@ fn twins(format: Format) -> String {
     format!("INFO {format}: {different} of {decoded} rows differ from the twin's\n")
 }
 
+fn clamping(format: Format) -> String {
+    let format = format.name();
+    let counts = with_blob(&format!("kernels-{format}.bin"), checks::clamping);
+    let [frames, clamped, otherwise] = counts.expect("a model that clamps when it infers");
+    assert!(clamped > frames / 3 && clamped < frames / 3 * 2, "{clamped} of {frames} clamped");
+    format!(
+        "INFO clamp, {format}: {clamped} of {frames} frames clamped, {otherwise} otherwise than the twin's\n"
+    )
+}
+
 fn array(format: Format, tail: &str) -> String {
     let file =
         &format!("array-{}{}.bin", format.name(), if tail.is_empty() { "" } else { "-no-tail" });
@@ -101,6 +111,8 @@ fn every_kernel_decodes_many_frames_on_the_host_as_in_the_emulator() {
         decoding_many::<Micromath>(Format::F32Direct),
         twins(Format::F32),
         twins(Format::Fixed16),
+        clamping(Format::F32),
+        clamping(Format::Fixed16),
         gating(),
         array(Format::F32, ""),
         array(Format::F32, " without tail"),
@@ -110,7 +122,9 @@ fn every_kernel_decodes_many_frames_on_the_host_as_in_the_emulator() {
         "exit status 0\n".to_owned(),
     ];
     assert!(of_host.iter().all(|line| !line.contains("differ") || line.contains(" 0 of ")));
-    assert!(of_host.iter().all(|line| !line.contains("gate") || line.contains(", 0 otherwise")));
+    assert!(
+        of_host.iter().all(|line| !line.contains("otherwise") || line.contains(", 0 otherwise"))
+    );
     assert_eq!(of_host.concat(), expected_log("kernels"));
 }
 

@@ -14,15 +14,6 @@ pub(crate) const INPUTS: usize = 18;
 /// Outputs a row of the paper's sensor; inner loops are made for groups of this number.
 pub(crate) const OUTPUTS: usize = 18;
 
-/// Whether the readings of an inference were finite, as far as the inference itself has seen.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Finite {
-    /// All readings were finite.
-    Known,
-    /// Some reading may have been NaN or infinite, or just beyond the clamp.
-    Unknown,
-}
-
 /// A network's parameters as plain words, with the counts that tell how to read them. Assembly reads this, so that
 /// order and sizes are its own.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,7 +1,6 @@
 //! Decoding a frame to an estimate: the one entry point for a device.
 
 use crate::blob::{DecodeError, Metadata, Model, ModelShape, NetworkSection};
-use crate::cortex_m4::Finite;
 use crate::estimate::{Estimate, RowStatus};
 use crate::exp::{ExpKernel, Polynomial};
 use crate::gate::Gate;
@@ -10,7 +9,6 @@ use crate::rbf::expanded::Expanded;
 use crate::rbf::fixed16::Fixed16;
 use crate::rbf::{Format, NetworkError, Packed};
 use crate::relative::relative;
-use crate::scale::{HALF_RANGE, UNITS};
 
 /// RAM in bytes that a [`Decoder`] for at most so many `rows` takes on a 32-bit target, for any K: slices into the
 /// blob. The firmware's link check compares it with the compiler's own figure.
@@ -117,16 +115,6 @@ impl<'a> RowNetwork<'a> {
             Format::Fixed16 => section.packed(shape).map(Self::Fixed16),
         }
     }
-
-    /// Whether one of `inputs` is clamped, because it lies an eighth of the training range or more beyond it.
-    fn clamps(&self, inputs: &[f32]) -> bool {
-        let (format, words) = match self {
-            Self::F32Direct(section) => (Format::F32Direct, section.words()),
-            Self::F32(network) => (Format::F32, network.block()),
-            Self::Fixed16(network) => (Format::Fixed16, network.block()),
-        };
-        clamps(format, words, inputs)
-    }
 }
 
 impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
@@ -201,6 +189,10 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
     /// in the estimate's status and does not affect the other rows. Behind a [`Projection`] one missing reading marks
     /// all rows.
     ///
+    /// Returns whether an input of a decoded row was clamped, because it lies far beyond the training range: more than
+    /// an eighth of it below, or an eighth or more above. Such outputs are guesses; on many frames they mean a model of
+    /// another sensor. Behind a [`Projection`] the inputs are its features.
+    ///
     /// # Errors
     /// [`NetworkError::Length`] if a slice does not have the model's length, or `scratch` is too short; the estimate
     /// is then untouched.
@@ -210,7 +202,7 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
         frame: Frame<'_>,
         scratch: &mut [f32],
         estimate: &mut Estimate<'_>,
-    ) -> Result<(), NetworkError> {
+    ) -> Result<bool, NetworkError> {
         self.decode_with::<Polynomial>(frame, scratch, estimate)
     }
 
@@ -226,7 +218,7 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
         frame: Frame<'_>,
         scratch: &mut [f32],
         estimate: &mut Estimate<'_>,
-    ) -> Result<(), NetworkError> {
+    ) -> Result<bool, NetworkError> {
         let Frame { readings_ohm, reciprocals, gate } = frame;
         let ModelShape { rows, inputs, outputs } = self.model.shape();
         check_length("frame", readings_ohm, rows.saturating_mul(inputs))?;
@@ -239,11 +231,11 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
         let relative = self.model.metadata().relative_inputs;
         if let Some(projection) = self.model.projection() {
             let (features, ratios) = more.split_at_mut_checked(inputs).ok_or(too_short)?;
-            let Some(network) = self.row_networks.first() else { return Ok(()) };
+            let Some(network) = self.row_networks.first() else { return Ok(false) };
             let array = Array { projection, network, inputs, outputs, relative };
-            array.decode(E::exp, frame, [scaled, features, ratios], estimate);
-            return Ok(());
+            return Ok(array.decode(E::exp, frame, [scaled, features, ratios], estimate));
         }
+        let mut any_clamped = false;
         // A model has at least one input and one output a row; `max` tells the compiler.
         let rows = self.row_networks.iter().zip(readings_ohm.chunks_exact(inputs.max(1)));
         let outputs = estimate.outputs.chunks_exact_mut(outputs.max(1));
@@ -260,12 +252,14 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
             } else {
                 readings
             };
-            *status = decode_inputs(network, E::exp, given, scaled, outputs);
-            if *status != RowStatus::Decoded {
+            let (ended, clamped) = decode_inputs(network, E::exp, given, scaled, outputs);
+            *status = ended;
+            any_clamped |= clamped;
+            if ended != RowStatus::Decoded {
                 outputs.fill(f32::NAN);
             }
         }
-        Ok(())
+        Ok(any_clamped)
     }
 }
 
@@ -275,37 +269,6 @@ fn divide(readings: &[f32], reciprocals: &[f32], ratios: &mut [f32]) {
     ratios.fill(f32::NAN);
     for ((ratio, reading), reciprocal) in ratios.iter_mut().zip(readings).zip(reciprocals) {
         *ratio = relative(*reading, *reciprocal);
-    }
-}
-
-impl<const ROWS: usize> Decoder<'_, ROWS> {
-    /// Whether an input of a decoded row was clamped, because it lies far beyond the training range: an eighth of it
-    /// or more. Such outputs are guesses; on many frames they mean a model of another sensor.
-    ///
-    /// `frame`, `scratch` and `status` are those of the last decoding, unchanged. Behind a [`Projection`] the
-    /// inputs are its features.
-    #[must_use]
-    pub fn has_clamped(&self, frame: Frame<'_>, scratch: &mut [f32], status: &[RowStatus]) -> bool {
-        let ModelShape { inputs, .. } = self.model.shape();
-        let second = inputs..inputs.saturating_mul(2);
-        let more = scratch.get_mut(second).unwrap_or_default();
-        let rows = self.row_networks.iter().zip(status).enumerate();
-        let mut decoded = rows.filter(|(_, (_, status))| **status == RowStatus::Decoded);
-        if self.model.projection().is_some() {
-            return decoded.next().is_some_and(|(_, (network, _))| network.clamps(more));
-        }
-        let relative = self.model.metadata().relative_inputs;
-        decoded.any(|(row, (network, _))| {
-            let start = row.saturating_mul(inputs);
-            let readings = frame.readings_ohm.get(start..).unwrap_or_default();
-            let readings = readings.get(..inputs).unwrap_or_default();
-            if relative {
-                divide(readings, frame.reciprocals.get(start..).unwrap_or_default(), more);
-                network.clamps(more)
-            } else {
-                network.clamps(readings)
-            }
-        })
     }
 }
 
@@ -364,7 +327,8 @@ struct Array<'s, 'a> {
 
 impl Array<'_, '_> {
     /// Decodes all rows of a frame at once; `scratch` is room for scaled inputs, for features and for readings relative
-    /// to the baseline. Not inlined, because decoding by rows would need its stack too.
+    /// to the baseline. Returns whether a feature was clamped, and the rows were decoded. Not inlined, because decoding
+    /// by rows would need its stack too.
     #[inline(never)]
     fn decode(
         &self,
@@ -372,14 +336,14 @@ impl Array<'_, '_> {
         frame: Frame<'_>,
         scratch: [&mut [f32]; 3],
         estimate: &mut Estimate<'_>,
-    ) {
+    ) -> bool {
         let outputs = estimate.outputs.chunks_exact_mut(self.outputs.max(1));
         let mut rows = frame.readings_ohm.chunks_exact(self.inputs.max(1)).zip(outputs).enumerate();
         let at_rest = frame.gate.is_some_and(|gate| {
             rows.all(|(row, (readings, outputs))| gate.give_rest(row, readings, outputs))
         });
-        let status = if at_rest {
-            RowStatus::AtRest
+        let (status, clamped) = if at_rest {
+            (RowStatus::AtRest, false)
         } else {
             let [scaled, features, ratios] = scratch;
             let readings = if self.relative {
@@ -390,19 +354,21 @@ impl Array<'_, '_> {
             };
             self.projection.project(readings, features);
             match decode_inputs(self.network, exp, features, scaled, estimate.outputs) {
-                RowStatus::Decoded => RowStatus::Decoded,
-                other => {
+                (RowStatus::Decoded, clamped) => (RowStatus::Decoded, clamped),
+                (other, _) => {
                     estimate.outputs.fill(f32::NAN);
                     // Features can overflow although no reading is missing.
-                    if all_finite(readings) { RowStatus::Overflow } else { other }
+                    (if all_finite(readings) { RowStatus::Overflow } else { other }, false)
                 }
             }
         };
         estimate.status.fill(status);
+        clamped
     }
 }
 
-/// Infers the outputs of a row, or of all rows at once, and returns their status.
+/// Infers the outputs of a row, or of all rows at once. Returns their status, and whether an input was clamped if they
+/// were decoded.
 ///
 /// Neither generic nor inlined on a device: it is thus compiled with this crate, for speed, while the rest of an
 /// image is compiled for size.
@@ -421,8 +387,8 @@ fn decode_inputs(
     inputs: &[f32],
     scaled: &mut [f32],
     outputs: &mut [f32],
-) -> RowStatus {
-    let finite = match network {
+) -> (RowStatus, bool) {
+    let clamped = match network {
         RowNetwork::F32Direct(section) => {
             return decode_direct(section, exp, inputs, scaled, outputs);
         }
@@ -430,14 +396,14 @@ fn decode_inputs(
         RowNetwork::Fixed16(network) => network.infer(inputs, scaled, outputs),
     };
     // Outputs cannot overflow in these formats; that is checked when a model is loaded.
-    if finite == Finite::Known || all_finite(inputs) {
-        RowStatus::Decoded
+    if clamped && !all_finite(inputs) {
+        (RowStatus::MissingReading, false)
     } else {
-        RowStatus::MissingReading
+        (RowStatus::Decoded, clamped)
     }
 }
 
-/// Infers the outputs of a network in `f32-direct`, which has no assembly routine, and returns their status.
+/// Infers the outputs of a network in `f32-direct`, which has no assembly routine, as [`decode_inputs`] does.
 #[cfg_attr(cortex_m4f, inline(never))]
 #[cfg_attr(
     not(cortex_m4f),
@@ -450,36 +416,17 @@ fn decode_direct(
     inputs: &[f32],
     scaled: &mut [f32],
     outputs: &mut [f32],
-) -> RowStatus {
+) -> (RowStatus, bool) {
     let shape = ModelShape { rows: 1, inputs: inputs.len(), outputs: outputs.len() };
-    let Ok(network) = section.direct(shape) else { return RowStatus::MissingReading };
-    if !all_finite(inputs) {
-        return RowStatus::MissingReading;
-    }
-    network.scale(inputs, scaled);
-    network.infer_scaled(scaled, outputs, exp);
-    if all_finite(outputs) { RowStatus::Decoded } else { RowStatus::Overflow }
-}
-
-/// Whether one of `inputs` is clamped by a network of this `format`, whose block has these `words`.
-#[inline(never)]
-fn clamps(format: Format, words: &[u32], inputs: &[f32]) -> bool {
-    // From UNITS on, an exponent carries into the sign; so there is no branch for each input.
-    const EXPONENT: u32 = 0x7F80_0000;
-    const TO_THE_SIGN: u32 = 0x8000_0000 - UNITS.to_bits();
-    // From scaled inputs to units about the middle of the range, where the clamp is at ±UNITS.
-    let (units, offset) = match format {
-        Format::F32Direct => (UNITS / HALF_RANGE, -0.5 * UNITS / HALF_RANGE),
-        Format::F32 | Format::Fixed16 => (1.0, 0.0),
+    let Ok(network) = section.direct(shape) else {
+        return (RowStatus::MissingReading, false);
     };
-    // In every format the block starts with what is subtracted from each input, and then multiplied with it.
-    let Some((middles, factors)) = words.split_at_checked(inputs.len()) else { return false };
-    let mut carry = 0;
-    for (input, (middle, factor)) in inputs.iter().zip(middles.iter().zip(factors)) {
-        let scaled = (input - f32::from_bits(*middle)) * f32::from_bits(*factor);
-        carry |= ((scaled * units + offset).to_bits() & EXPONENT) + TO_THE_SIGN;
+    let clamped = network.scale(inputs, scaled);
+    if clamped && !all_finite(inputs) {
+        return (RowStatus::MissingReading, false);
     }
-    carry >> 31 == 1
+    network.infer_scaled(scaled, outputs, exp);
+    if all_finite(outputs) { (RowStatus::Decoded, clamped) } else { (RowStatus::Overflow, false) }
 }
 
 /// Whether all `values` are finite, by the carry out of the exponent, without a branch for each.

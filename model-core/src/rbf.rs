@@ -168,11 +168,11 @@ impl<'a> Network<'a> {
         self.check_buffers(scaled, output)?;
         match self {
             Self::F32Direct(inner) => {
-                inner.scale(reading, scaled);
+                let _ = inner.scale(reading, scaled);
                 inner.infer_scaled(scaled, output, E::exp);
             }
-            Self::F32(inner) => drop(inner.infer(reading, scaled, output)),
-            Self::Fixed16(inner) => drop(inner.infer(reading, scaled, output)),
+            Self::F32(inner) => _ = inner.infer(reading, scaled, output),
+            Self::Fixed16(inner) => _ = inner.infer(reading, scaled, output),
         }
         Ok(())
     }
@@ -186,7 +186,7 @@ impl<'a> Network<'a> {
     pub fn scale(&self, reading: &[f32], scaled: &mut [f32]) -> Result<(), NetworkError> {
         check_length("reading", reading, self.shape().inputs)?;
         check_length("scaled", scaled, self.shape().inputs)?;
-        each!(self, inner => inner.scale(reading, scaled));
+        let _ = each!(self, inner => inner.scale(reading, scaled));
         Ok(())
     }
 

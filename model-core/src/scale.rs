@@ -23,7 +23,16 @@ pub const CLAMP: [f32; 2] = [-0.125, 1.125];
 #[inline]
 #[must_use]
 pub fn scale(reading: f32, minimum: f32, per_span: f32) -> f32 {
-    ((reading - minimum) * per_span).clamp(CLAMP[0], CLAMP[1])
+    scale_and_tell(reading, minimum, per_span).0
+}
+
+/// Scales one `reading` as [`scale`] does, and tells whether it was clamped: whether it lies below the lower end of
+/// [`CLAMP`], or at the upper end or beyond. True for NaN.
+#[inline]
+#[must_use]
+pub(crate) fn scale_and_tell(reading: f32, minimum: f32, per_span: f32) -> (f32, bool) {
+    let scaled = (reading - minimum) * per_span;
+    (scaled.clamp(CLAMP[0], CLAMP[1]), !(CLAMP[0]..CLAMP[1]).contains(&scaled))
 }
 
 /// Half the width of [`CLAMP`], in spans of the training range.
@@ -38,6 +47,16 @@ pub const UNITS: f32 = 2_147_483_648.0;
 
 /// Number of [`UNITS`] in one step of the 16-bit format, whose inputs are the upper halves of these integers.
 pub const UNITS_PER_STEP: f32 = 65_536.0;
+
+/// Whether a scaled reading in [`UNITS`] is clamped: the conversion to `i32` saturates below −[`UNITS`], and at
+/// [`UNITS`] and above. True for NaN.
+///
+/// A Cortex-M4F tells at no cost: such a conversion leaves the flag of an invalid operation behind.
+#[inline]
+#[must_use]
+pub fn saturates(scaled: f32) -> bool {
+    !(-UNITS..UNITS).contains(&scaled)
+}
 
 /// Clamps a scaled reading in [`UNITS`] and drops fractions of a unit; NaN becomes 0.
 #[inline]

@@ -7,6 +7,7 @@ use model_core::exp::{ExpKernel, Polynomial};
 use model_core::gate::{Rest, is_at_rest};
 use model_core::rbf::Network;
 use model_core::rls::Rls;
+use model_core::scale::{CLAMP, saturates};
 use model_core::{Decoder, Estimate, Gate, RowStatus};
 
 /// Number of row-wires, as in the paper's sensor.
@@ -52,11 +53,16 @@ type Frame<const R: usize> = [[f32; COLS]; R];
 struct Decoded<const R: usize> {
     outputs: [[f32; OUTPUTS]; R],
     status: [RowStatus; R],
+    /// Whether an input was clamped.
+    clamped: bool,
 }
 
 impl<const R: usize> Decoded<R> {
-    const NOTHING: Self =
-        Self { outputs: [[0.0; OUTPUTS]; R], status: [RowStatus::MissingReading; R] };
+    const NOTHING: Self = Self {
+        outputs: [[0.0; OUTPUTS]; R],
+        status: [RowStatus::MissingReading; R],
+        clamped: false,
+    };
 
     /// Decodes `frame` into `self`; `None` if the model has another shape.
     fn decode<E: ExpKernel>(
@@ -69,7 +75,8 @@ impl<const R: usize> Decoded<R> {
         let mut estimate = Estimate { outputs, status: &mut self.status };
         let mut scratch = [0.0; 2 * COLS];
         let frame = model_core::Frame { gate, ..frame.as_flattened().into() };
-        decoder.decode_with::<E>(frame, &mut scratch, &mut estimate).ok()
+        self.clamped = decoder.decode_with::<E>(frame, &mut scratch, &mut estimate).ok()?;
+        Some(())
     }
 
     /// What `decoder` makes of `frame`.
@@ -125,7 +132,7 @@ fn one_of_many<const R: usize>(index: usize, numbers: &mut Numbers) -> Frame<R> 
     frame
 }
 
-/// CRC-32 of all bits that the model in `blob` decodes [`MANY`] frames to. `None` if the blob does not load.
+/// CRC-32 of all bits that the model in `blob` decodes [`MANY`] frames to, and of whether an input was clamped. `None` if the blob does not load.
 #[must_use]
 pub fn decoding_many<E: ExpKernel, const R: usize>(blob: &[u8]) -> Option<u32> {
     let decoder = Decoder::<R>::load(blob).ok()?;
@@ -139,6 +146,7 @@ pub fn decoding_many<E: ExpKernel, const R: usize>(blob: &[u8]) -> Option<u32> {
             outputs.iter().for_each(|value| digest.update(&value.to_bits().to_le_bytes()));
             digest.update(&[status as u8]);
         }
+        digest.update(&[u8::from(outcome.clamped)]);
     }
     Some(digest.finalize())
 }
@@ -165,7 +173,7 @@ pub fn twins(blob: &[u8]) -> Option<[usize; 2]> {
     let [mut compared, mut different] = [0; 2];
     for index in 0..MANY {
         let frame = one_of_many::<ROWS>(index, &mut numbers);
-        let Decoded { outputs, status } = Decoded::of(&decoder, &frame)?;
+        let Decoded { outputs, status, .. } = Decoded::of(&decoder, &frame)?;
         let rows = frame.iter().zip(&outputs).zip(status).enumerate();
         for (row, ((readings, outputs), status)) in rows {
             if status != RowStatus::Decoded {
@@ -181,6 +189,48 @@ pub fn twins(blob: &[u8]) -> Option<[usize; 2]> {
     Some([compared, different])
 }
 
+/// Number of frames with one reading within four steps of f32 of an end of the clamp, how many of them are said to be
+/// clamped, and how many otherwise than by portable arithmetic. `None` if the blob does not load, or its number format
+/// clamps before it infers.
+#[must_use]
+pub fn clamping(blob: &[u8]) -> Option<[usize; 3]> {
+    let decoder = Decoder::<ROWS>::load(blob).ok()?;
+    let model = Model::decode(blob).ok()?;
+    let network_of = |row| model.networks().nth(model.network_of_row(row)?);
+    let mut middle: Frame<ROWS> = [[f32::NAN; COLS]; ROWS];
+    for (row, readings) in middle.iter_mut().enumerate() {
+        let network = network_of(row)?;
+        for (input, reading) in readings.iter_mut().enumerate() {
+            let [low, high] = network.training_range(input);
+            *reading = 0.5 * (low + high);
+        }
+    }
+    let [mut frames, mut clamped, mut otherwise] = [0; 3];
+    for row in 0..ROWS {
+        let network = network_of(row)?;
+        if matches!(network, Network::F32Direct(_)) {
+            return None;
+        }
+        for (input, (end, step)) in (0..COLS)
+            .flat_map(|input| CLAMP.map(|end| (input, end)))
+            .flat_map(|(input, end)| (-4..=4).map(move |step| (input, (end, step))))
+        {
+            let [low, high] = network.training_range(input);
+            let reading = low + end * (high - low);
+            let mut frame = middle;
+            *frame.get_mut(row)?.get_mut(input)? =
+                f32::from_bits(reading.to_bits().wrapping_add_signed(step));
+            let mut scaled = [0.0; COLS];
+            network.scale(frame.get(row)?, &mut scaled).ok()?;
+            let found = Decoded::of(&decoder, &frame)?.clamped;
+            frames += 1;
+            clamped += usize::from(found);
+            otherwise += usize::from(found != scaled.into_iter().any(saturates));
+        }
+    }
+    Some([frames, clamped, otherwise])
+}
+
 /// Number of the [`MANY`] frames that the model in `blob` decodes behind a projection, and how many of them the
 /// compiled twins of projection and network decode to other bits. `None` if the blob does not load, or its number
 /// format has no twin.
@@ -193,7 +243,7 @@ pub fn array_twins(blob: &[u8]) -> Option<[usize; 2]> {
     let [mut compared, mut different] = [0; 2];
     for index in 0..MANY {
         let frame = one_of_many::<ARRAY_ROWS>(index, &mut numbers);
-        let Decoded { outputs, status } = Decoded::of(&decoder, &frame)?;
+        let Decoded { outputs, status, .. } = Decoded::of(&decoder, &frame)?;
         if status != [RowStatus::Decoded; ARRAY_ROWS] {
             continue;
         }

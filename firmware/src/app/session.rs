@@ -210,6 +210,10 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             if decoder.metadata().relative_inputs && !self.has_reciprocals {
                 flags |= EstimateReport::NO_BASELINE;
             }
+            if decoded == Ok(true) {
+                flags |= EstimateReport::CLAMPED;
+                self.statistics.frames_clamped = self.statistics.frames_clamped.saturating_add(1);
+            }
             // The model's shape was found to fit when it came into force.
             if decoded.is_err() || estimate.status.contains(&RowStatus::Overflow) {
                 flags |= EstimateReport::OVERFLOW;
@@ -226,18 +230,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         let decode_cycles = self.line.platform().cycles().wrapping_sub(start_cycles);
         let decode_us = self.line.platform().now_us().wrapping_sub(start_us);
         self.count_decoded(decode_us, decode_cycles);
-        if decoder.is_some_and(|decoder| self.has_clamped(decoder)) {
-            flags |= EstimateReport::CLAMPED;
-            self.statistics.frames_clamped = self.statistics.frames_clamped.saturating_add(1);
-        }
         (flags, health)
-    }
-
-    /// Whether a reading of the frame that was just decoded is far beyond the model's training range.
-    fn has_clamped(&mut self, decoder: &Decoder<'_, ROWS>) -> bool {
-        let readings_ohm = self.frame.get(..self.wires.readings()).unwrap_or_default();
-        let frame = Frame { readings_ohm, reciprocals: self.reciprocals, gate: None };
-        decoder.has_clamped(frame, self.scratch, self.estimate.status)
     }
 
     fn count_decoded(&mut self, decode_us: u32, decode_cycles: u32) {

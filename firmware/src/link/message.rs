@@ -335,7 +335,7 @@ impl EstimateReport<'_> {
     /// Flag: a baseline was captured, and a reading differs from it by more than the threshold.
     pub const CONTACT: u8 = 1 << 4;
     /// Flag: at least one reading of a decoded row lies far beyond the range that the model was trained on, and was
-    /// clamped ([`model_core::Decoder::has_clamped`]).
+    /// clamped ([`model_core::Decoder::decode_into`]).
     pub const CLAMPED: u8 = 1 << 6;
 }
 

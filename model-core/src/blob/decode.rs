@@ -338,11 +338,6 @@ impl<'a> NetworkSection<'a> {
         self.format
     }
 
-    /// The network's block of words.
-    pub fn words(&self) -> &'a [u32] {
-        self.block
-    }
-
     /// The section's network if its format is `f32-direct`; else an error.
     #[inline]
     pub fn direct(&self, shape: ModelShape) -> Result<direct::Network<'a>, NetworkError> {

@@ -4,7 +4,7 @@
 //! says what the caller must have checked.
 #![expect(unsafe_code, reason = "calls to assembly, which reads as many words as it is told to")]
 
-use super::{Block, Finite};
+use super::Block;
 
 core::arch::global_asm!(
     include_str!("common.s"),
@@ -78,41 +78,39 @@ unsafe extern "C" {
     ) -> u32;
 }
 
-impl Finite {
-    /// The verdict from the floating-point status after a routine. A conversion to an integer that saturates or
-    /// meets NaN is an invalid operation; no other operation of a routine is.
-    fn of_status(fpscr: u32) -> Self {
-        const INVALID_OPERATION: u32 = 1;
-        if fpscr & INVALID_OPERATION == 0 { Self::Known } else { Self::Unknown }
-    }
+/// Whether an input was clamped, NaN or infinite, from the floating-point status after a routine. The conversion of
+/// such an input to an integer is an invalid operation; no other operation on finite inputs is.
+fn has_clamped(fpscr: u32) -> bool {
+    const INVALID_OPERATION: u32 = 1;
+    fpscr & INVALID_OPERATION != 0
 }
 
-/// Infers the outputs of a network with expanded distances.
+/// Infers the outputs of a network with expanded distances. Returns whether an input was clamped, NaN or infinite.
 ///
 /// # Safety
 /// The caller must check that `block` has no count of 0 and all words of such a network, and that there are as many
 /// inputs, words of space, and outputs as it says.
 #[inline(always)]
 #[expect(clippy::inline_always, reason = "a call")]
-pub(crate) unsafe fn expanded(block: &Block<'_>, inputs: Inputs<'_>, output: &mut [f32]) -> Finite {
+pub(crate) unsafe fn expanded(block: &Block<'_>, inputs: Inputs<'_>, output: &mut [f32]) -> bool {
     debug_assert!(inputs.are(block.inputs) && output.len() == block.outputs);
     let (inputs, space) = inputs.addresses();
     // SAFETY: the caller has checked all lengths. The routine reads the inputs and the block's words, and writes the
     // space and the outputs.
-    Finite::of_status(unsafe { taxel_f32(block, inputs, output.as_mut_ptr(), space) })
+    has_clamped(unsafe { taxel_f32(block, inputs, output.as_mut_ptr(), space) })
 }
 
-/// Infers the outputs of a network in 16-bit fixed point.
+/// Infers the outputs of a network in 16-bit fixed point. Returns whether an input was clamped, NaN or infinite.
 ///
 /// # Safety
 /// As for [`expanded`].
 #[inline(always)]
 #[expect(clippy::inline_always, reason = "a call")]
-pub(crate) unsafe fn fixed16(block: &Block<'_>, inputs: Inputs<'_>, output: &mut [f32]) -> Finite {
+pub(crate) unsafe fn fixed16(block: &Block<'_>, inputs: Inputs<'_>, output: &mut [f32]) -> bool {
     debug_assert!(inputs.are(block.inputs) && output.len() == block.outputs);
     let (inputs, space) = inputs.addresses();
     // SAFETY: as in `expanded`.
-    Finite::of_status(unsafe { taxel_fixed16(block, inputs, output.as_mut_ptr(), space) })
+    has_clamped(unsafe { taxel_fixed16(block, inputs, output.as_mut_ptr(), space) })
 }
 
 /// Projects `readings` to `features`: the first numbers of `block`, one a feature, plus as many more for each

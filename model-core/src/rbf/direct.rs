@@ -7,7 +7,7 @@ use super::parameters::{
     Cut, NetworkError, Shape, accumulate, check_finite, check_length, check_spans,
 };
 use crate::cortex_m4::{INPUTS, OUTPUTS};
-use crate::scale::scale;
+use crate::scale::scale_and_tell;
 
 /// The parameters of one network, borrowed from where they lie.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -184,14 +184,19 @@ impl<'a> Network<'a> {
         [lowest, if per_span > 0.0 { lowest + 1.0 / per_span } else { lowest }]
     }
 
+    /// Scales readings to [0, 1], and clamps them. Returns whether one was clamped, NaN or infinite.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
-    pub(crate) fn scale(&self, reading: &[f32], scaled: &mut [f32]) {
+    pub(crate) fn scale(&self, reading: &[f32], scaled: &mut [f32]) -> bool {
         let p = &self.parameters;
         let limits = p.input_minimum.iter().zip(p.input_per_span);
+        let mut any_clamped = false;
         for ((x, &r), (&minimum, &per_span)) in scaled.iter_mut().zip(reading).zip(limits) {
-            *x = scale(r, minimum, per_span);
+            let (scaled, clamped) = scale_and_tell(r, minimum, per_span);
+            *x = scaled;
+            any_clamped |= clamped;
         }
+        any_clamped
     }
 
     /// Infers `output` from `scaled` inputs with the exponential `exp`. Not inlined on a device, so that other

@@ -19,7 +19,7 @@ use super::parameters::{
     Cut, NetworkError, Shape, accumulate, check_finite, check_spans, range_about, scale_about,
 };
 #[cfg(cortex_m4f)]
-use crate::cortex_m4::{self, Finite, Inputs};
+use crate::cortex_m4::{self, Inputs};
 use crate::exp::exp2;
 use crate::scale::{HALF_RANGE, UNITS, clamp_units};
 
@@ -134,9 +134,9 @@ impl Layout for Expanded {
         }
     }
 
-    fn scale(network: &Network<'_>, reading: &[f32], scaled: &mut [f32]) {
+    fn scale(network: &Network<'_>, reading: &[f32], scaled: &mut [f32]) -> bool {
         let p = network.parameters();
-        scale_about(p.input_midpoint, p.input_per_unit, reading, scaled);
+        scale_about(p.input_midpoint, p.input_per_unit, reading, scaled)
     }
 
     fn training_range(network: &Network<'_>, input: usize) -> [f32; 2] {
@@ -176,7 +176,7 @@ impl Layout for Expanded {
     #[cfg(cortex_m4f)]
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "a call")]
-    unsafe fn routine(network: &Network<'_>, inputs: Inputs<'_>, output: &mut [f32]) -> Finite {
+    unsafe fn routine(network: &Network<'_>, inputs: Inputs<'_>, output: &mut [f32]) -> bool {
         // SAFETY: the caller has compared the lengths with the shape. When the network was made, its block was found
         // to be as long as its shape asks for, and no dimension to be 0.
         unsafe { cortex_m4::expanded(network.counted(), inputs, output) }

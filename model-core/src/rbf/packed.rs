@@ -14,7 +14,7 @@ use core::marker::PhantomData;
 use super::parameters::{NetworkError, Shape, check_length};
 #[cfg(cortex_m4f)]
 use crate::cortex_m4::Inputs;
-use crate::cortex_m4::{Block, Finite, INPUTS, OUTPUTS};
+use crate::cortex_m4::{Block, INPUTS, OUTPUTS};
 
 /// A number format whose networks are one block of words.
 pub trait Layout: Copy + Debug + PartialEq {
@@ -46,8 +46,9 @@ pub trait Layout: Copy + Debug + PartialEq {
     /// The parameters of `network`.
     fn parameters<'a>(network: &Network<'a, Self>) -> Self::Parameters<'a>;
 
-    /// Converts readings to the format's unit of inputs, not clamped yet, in `scaled`.
-    fn scale(network: &Network<'_, Self>, reading: &[f32], scaled: &mut [f32]);
+    /// Converts readings to the format's unit of inputs, not clamped yet, in `scaled`. Returns whether one
+    /// [will be clamped](crate::scale::saturates), or is NaN.
+    fn scale(network: &Network<'_, Self>, reading: &[f32], scaled: &mut [f32]) -> bool;
 
     /// Lowest and highest reading of `input` in training, in its unit; NaN if there is no such input.
     fn training_range(network: &Network<'_, Self>, input: usize) -> [f32; 2];
@@ -58,16 +59,12 @@ pub trait Layout: Copy + Debug + PartialEq {
     /// Infers `output` from `scaled` inputs, which are overwritten, in Rust: the same bits as the routine's.
     fn infer_scaled_in_rust(network: &Network<'_, Self>, scaled: &mut [f32], output: &mut [f32]);
 
-    /// Infers `output` by the format's assembly routine.
+    /// Infers `output` by the format's assembly routine. Returns whether an input was clamped, NaN or infinite.
     ///
     /// # Safety
     /// The caller must check that there are as many `inputs`, with their space, and outputs as `network` has.
     #[cfg(cortex_m4f)]
-    unsafe fn routine(
-        network: &Network<'_, Self>,
-        inputs: Inputs<'_>,
-        output: &mut [f32],
-    ) -> Finite;
+    unsafe fn routine(network: &Network<'_, Self>, inputs: Inputs<'_>, output: &mut [f32]) -> bool;
 }
 
 /// A network whose parameters are one borrowed block of words, checked against its shape.
@@ -166,14 +163,15 @@ impl<'a, L: Layout> Network<'a, L> {
 
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "a call")]
-    pub(crate) fn scale(&self, reading: &[f32], scaled: &mut [f32]) {
-        L::scale(self, reading, scaled);
+    pub(crate) fn scale(&self, reading: &[f32], scaled: &mut [f32]) -> bool {
+        L::scale(self, reading, scaled)
     }
 
     /// Infers `output` from one row of readings; `scaled` is working space. All must have the lengths of the shape.
+    /// Returns whether a reading was clamped, NaN or infinite.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "callers rely on it for constant lengths")]
-    pub(crate) fn infer(&self, reading: &[f32], scaled: &mut [f32], output: &mut [f32]) -> Finite {
+    pub(crate) fn infer(&self, reading: &[f32], scaled: &mut [f32], output: &mut [f32]) -> bool {
         #[cfg(cortex_m4f)]
         if reading.len() == self.block.inputs && self.fit(scaled, output) {
             // SAFETY: the lengths are the network's, as was just checked.
@@ -181,10 +179,12 @@ impl<'a, L: Layout> Network<'a, L> {
         }
         #[cfg(not(cortex_m4f))]
         {
-            self.scale(reading, scaled);
+            let clamped = self.scale(reading, scaled);
             L::infer_scaled_in_rust(self, scaled, output);
+            clamped
         }
-        Finite::Unknown
+        #[cfg(cortex_m4f)]
+        true
     }
 
     /// Infers `output` from `scaled` inputs, which are overwritten. Both must have the lengths of the shape.

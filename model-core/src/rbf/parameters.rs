@@ -1,6 +1,6 @@
 //! Parts shared by all formats: the shape of a network, its errors, and cutting arrays from a block.
 
-use crate::scale::{HALF_RANGE, UNITS};
+use crate::scale::{HALF_RANGE, UNITS, saturates};
 
 /// Numbers of inputs, centres and outputs of one network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -91,12 +91,21 @@ pub(super) fn check_length<T>(
     }
 }
 
-/// Converts readings to units counted from the middle of the training range, not clamped yet.
-pub(super) fn scale_about(midpoint: &[f32], per_unit: &[f32], reading: &[f32], scaled: &mut [f32]) {
+/// Converts readings to units counted from the middle of the training range, not clamped yet. Returns whether one
+/// [will be clamped](saturates), or is NaN.
+pub(super) fn scale_about(
+    midpoint: &[f32],
+    per_unit: &[f32],
+    reading: &[f32],
+    scaled: &mut [f32],
+) -> bool {
     let limits = midpoint.iter().zip(per_unit);
+    let mut any_saturates = false;
     for ((x, &r), (&midpoint, &per_unit)) in scaled.iter_mut().zip(reading).zip(limits) {
         *x = (r - midpoint) * per_unit;
+        any_saturates |= saturates(*x);
     }
+    any_saturates
 }
 
 /// Lowest and highest reading, computed from the middle of the training range and the number of

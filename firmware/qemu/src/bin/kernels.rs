@@ -31,6 +31,17 @@ fn compare(format: Format, blob: &[u8]) {
     info!("{=str}: {=usize} of {=usize} rows differ from the twin's", format, different, compared);
 }
 
+fn clamp(format: Format, blob: &[u8]) {
+    let [frames, clamped, otherwise] = unwrap!(checks::clamping(blob));
+    info!(
+        "clamp, {=str}: {=usize} of {=usize} frames clamped, {=usize} otherwise than the twin's",
+        format.name(),
+        clamped,
+        frames,
+        otherwise
+    );
+}
+
 /// Decodes with one network for all rows, behind a projection.
 fn array(format: Format, tail: &str, blob: &[u8]) {
     let crc = unwrap!(checks::decoding_many::<Polynomial, { checks::ARRAY_ROWS }>(blob));
@@ -59,6 +70,8 @@ fn main() -> ! {
     decode::<Micromath>(Format::F32Direct, f32_direct);
     compare(Format::F32, f32);
     compare(Format::Fixed16, fixed16);
+    clamp(Format::F32, f32);
+    clamp(Format::Fixed16, fixed16);
     gate(fixed16);
     array(Format::F32, "", model!("array-f32.bin"));
     array(Format::F32, " without tail", model!("array-f32-no-tail.bin"));
