@@ -174,13 +174,7 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
     /// Number of floats of working space that decoding needs.
     #[must_use]
     pub fn scratch_floats(&self) -> usize {
-        let ModelShape { rows, inputs, .. } = self.model.shape();
-        let relative = self.model.metadata().relative_inputs;
-        match (self.model.projection().is_some(), relative) {
-            (false, false) => inputs,
-            (false, true) | (true, false) => inputs.saturating_mul(2),
-            (true, true) => inputs.saturating_mul(rows.saturating_add(2)),
-        }
+        scratch_floats(&self.model)
     }
 
     /// Decodes one frame to an estimate in the units of the model's outputs.
@@ -212,63 +206,133 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
     ///
     /// # Errors
     /// As [`decode_into`](Self::decode_into).
-    #[inline(never)] // one copy of inference in flash, whoever decodes
+    #[inline]
     pub fn decode_with<E: ExpKernel>(
         &self,
         frame: Frame<'_>,
         scratch: &mut [f32],
         estimate: &mut Estimate<'_>,
     ) -> Result<bool, NetworkError> {
-        let Frame { readings_ohm, reciprocals, gate } = frame;
-        let ModelShape { rows, inputs, outputs } = self.model.shape();
-        check_length("frame", readings_ohm, rows.saturating_mul(inputs))?;
-        check_length("outputs of the estimate", estimate.outputs, rows.saturating_mul(outputs))?;
-        check_length("status of the estimate", estimate.status, rows)?;
-        let (expected, found) = (self.scratch_floats(), scratch.len());
-        let too_short = NetworkError::Length { what: "scratch", expected, found };
-        let scratch = scratch.get_mut(..expected).ok_or(too_short)?;
-        let (scaled, more) = scratch.split_at_mut_checked(inputs).ok_or(too_short)?;
-        let relative = self.model.metadata().relative_inputs;
-        if let Some(projection) = self.model.projection() {
-            let (features, ratios) = more.split_at_mut_checked(inputs).ok_or(too_short)?;
-            let Some(network) = self.row_networks.first() else { return Ok(false) };
-            let array = Array { projection, network, inputs, outputs, relative };
-            return Ok(array.decode(E::exp, frame, [scaled, features, ratios], estimate));
+        decode(&self.model, &self.row_networks, E::exp, frame, scratch, estimate)
+    }
+}
+
+/// Decodes one frame as [`Decoder::decode_with`] does, with the networks of the rows.
+///
+/// Neither generic nor inlined on a device: it is thus compiled with this crate, for speed, while the rest of an
+/// image is compiled for size.
+#[cfg_attr(cortex_m4f, inline(never))]
+#[cfg_attr(
+    not(cortex_m4f),
+    inline(always),
+    expect(clippy::inline_always, reason = "so that the compiler knows the exponential")
+)]
+fn decode(
+    model: &Model<'_>,
+    networks: &[RowNetwork<'_>],
+    exp: fn(f32) -> f32,
+    frame: Frame<'_>,
+    scratch: &mut [f32],
+    estimate: &mut Estimate<'_>,
+) -> Result<bool, NetworkError> {
+    let ModelShape { rows, inputs, outputs } = model.shape();
+    // A model has a name for each, so that no product overflows.
+    check_length("frame", frame.readings_ohm, rows.wrapping_mul(inputs))?;
+    check_length("outputs of the estimate", estimate.outputs, rows.wrapping_mul(outputs))?;
+    check_length("status of the estimate", estimate.status, rows)?;
+    let (expected, found) = (scratch_floats(model), scratch.len());
+    let too_short = NetworkError::Length { what: "scratch", expected, found };
+    let scratch = scratch.get_mut(..expected).ok_or(too_short)?;
+    let (scaled, more) = scratch.split_at_mut_checked(inputs).ok_or(too_short)?;
+    let relative = model.metadata().relative_inputs;
+    let projection = model.projection();
+    if let Some(gate) = frame.gate {
+        let sizes = [inputs, outputs];
+        if gate.give_rest(frame.readings_ohm, sizes, estimate, projection.is_some()) == 0 {
+            return Ok(false);
         }
+    }
+    let Some(projection) = projection else {
+        let rows = Rows { networks, inputs, outputs, exp };
+        return Ok(if relative {
+            rows.decode::<true>(frame, [scaled, more], estimate)
+        } else {
+            rows.decode::<false>(frame, [scaled, more], estimate)
+        });
+    };
+    let (features, ratios) = more.split_at_mut_checked(inputs).ok_or(too_short)?;
+    let Some(network) = networks.first() else { return Ok(false) };
+    let array = Array { projection, network, relative };
+    Ok(array.decode(exp, frame, [scaled, features, ratios], estimate))
+}
+
+/// Networks that decode a frame row by row.
+struct Rows<'d, 'a> {
+    networks: &'d [RowNetwork<'a>],
+    /// Number of readings a row.
+    inputs: usize,
+    /// Number of outputs a row.
+    outputs: usize,
+    exp: fn(f32) -> f32,
+}
+
+impl Rows<'_, '_> {
+    /// Decodes the rows of a frame, but for those that a gate has marked as at rest. The scratch is room for scaled
+    /// inputs, and for readings relative to the baseline if the networks take them (`RELATIVE`). Returns whether an
+    /// input was clamped.
+    #[cfg_attr(cortex_m4f, inline(never))]
+    #[cfg_attr(
+        not(cortex_m4f),
+        inline(always),
+        expect(clippy::inline_always, reason = "so that the compiler knows the exponential")
+    )]
+    fn decode<const RELATIVE: bool>(
+        &self,
+        frame: Frame<'_>,
+        [scaled, ratios]: [&mut [f32]; 2],
+        estimate: &mut Estimate<'_>,
+    ) -> bool {
         let mut any_clamped = false;
+        let gated = frame.gate.is_some();
         // A model has at least one input and one output a row; `max` tells the compiler.
-        let rows = self.row_networks.iter().zip(readings_ohm.chunks_exact(inputs.max(1)));
-        let outputs = estimate.outputs.chunks_exact_mut(outputs.max(1));
+        let readings = frame.readings_ohm.chunks_exact(self.inputs.max(1));
+        let outputs = estimate.outputs.chunks_exact_mut(self.outputs.max(1));
         let places = outputs.zip(estimate.status.iter_mut());
-        for (row, ((network, readings), (outputs, status))) in rows.zip(places).enumerate() {
-            if gate.is_some_and(|gate| gate.give_rest(row, readings, outputs)) {
-                *status = RowStatus::AtRest;
+        let rows = self.networks.iter().zip(readings).zip(places);
+        for (row, ((network, readings), (outputs, status))) in rows.enumerate() {
+            if gated && *status == RowStatus::AtRest {
                 continue;
             }
-            let given = if relative {
-                let start = row.saturating_mul(inputs);
-                divide(readings, reciprocals.get(start..).unwrap_or_default(), more);
-                &*more
+            let given = if RELATIVE {
+                let start = row.saturating_mul(self.inputs);
+                divide(readings, frame.reciprocals.get(start..).unwrap_or_default(), ratios);
+                &*ratios
             } else {
                 readings
             };
-            let (ended, clamped) = decode_inputs(network, E::exp, given, scaled, outputs);
-            *status = ended;
-            any_clamped |= clamped;
-            if ended != RowStatus::Decoded {
-                outputs.fill(f32::NAN);
-            }
+            any_clamped |= decode_inputs(network, self.exp, given, scaled, outputs, status);
         }
-        Ok(any_clamped)
+        any_clamped
     }
 }
 
 /// Writes the `readings` relative to the baseline to `ratios`, from the baseline's `reciprocals`; NaN where there
 /// is none.
+#[cfg_attr(cortex_m4f, inline(never))]
 fn divide(readings: &[f32], reciprocals: &[f32], ratios: &mut [f32]) {
     ratios.fill(f32::NAN);
     for ((ratio, reading), reciprocal) in ratios.iter_mut().zip(readings).zip(reciprocals) {
         *ratio = relative(*reading, *reciprocal);
+    }
+}
+
+/// Number of floats of working space that decoding with `model` needs.
+fn scratch_floats(model: &Model<'_>) -> usize {
+    let ModelShape { rows, inputs, .. } = model.shape();
+    match (model.projection().is_some(), model.metadata().relative_inputs) {
+        (false, false) => inputs,
+        (false, true) | (true, false) => inputs.saturating_mul(2),
+        (true, true) => inputs.saturating_mul(rows.saturating_add(2)),
     }
 }
 
@@ -314,13 +378,9 @@ impl<const ROWS: usize> Decoder<'_, ROWS> {
 }
 
 /// One network for all rows, behind a projection.
-struct Array<'s, 'a> {
+struct Array<'d, 'a> {
     projection: Projection<'a>,
-    network: &'s RowNetwork<'a>,
-    /// Readings of a row, and features of the projection.
-    inputs: usize,
-    /// Outputs of a row.
-    outputs: usize,
+    network: &'d RowNetwork<'a>,
     /// Whether inputs are relative to the baseline.
     relative: bool,
 }
@@ -337,70 +397,47 @@ impl Array<'_, '_> {
         scratch: [&mut [f32]; 3],
         estimate: &mut Estimate<'_>,
     ) -> bool {
-        let outputs = estimate.outputs.chunks_exact_mut(self.outputs.max(1));
-        let mut rows = frame.readings_ohm.chunks_exact(self.inputs.max(1)).zip(outputs).enumerate();
-        let at_rest = frame.gate.is_some_and(|gate| {
-            rows.all(|(row, (readings, outputs))| gate.give_rest(row, readings, outputs))
-        });
-        let (status, clamped) = if at_rest {
-            (RowStatus::AtRest, false)
+        let [scaled, features, ratios] = scratch;
+        let readings = if self.relative {
+            divide(frame.readings_ohm, frame.reciprocals, ratios);
+            &*ratios
         } else {
-            let [scaled, features, ratios] = scratch;
-            let readings = if self.relative {
-                divide(frame.readings_ohm, frame.reciprocals, ratios);
-                &*ratios
-            } else {
-                frame.readings_ohm
-            };
-            self.projection.project(readings, features);
-            match decode_inputs(self.network, exp, features, scaled, estimate.outputs) {
-                (RowStatus::Decoded, clamped) => (RowStatus::Decoded, clamped),
-                (other, _) => {
-                    estimate.outputs.fill(f32::NAN);
-                    // Features can overflow although no reading is missing.
-                    (if all_finite(readings) { RowStatus::Overflow } else { other }, false)
-                }
-            }
+            frame.readings_ohm
         };
+        self.projection.project(readings, features);
+        let mut status = RowStatus::Decoded;
+        let network = self.network;
+        let clamped = decode_inputs(network, exp, features, scaled, estimate.outputs, &mut status);
+        // Features can overflow although no reading is missing.
+        if status == RowStatus::MissingReading && all_finite(readings) {
+            status = RowStatus::Overflow;
+        }
         estimate.status.fill(status);
         clamped
     }
 }
 
-/// Infers the outputs of a row, or of all rows at once. Returns their status, and whether an input was clamped if they
-/// were decoded.
-///
-/// Neither generic nor inlined on a device: it is thus compiled with this crate, for speed, while the rest of an
-/// image is compiled for size.
-#[cfg_attr(cortex_m4f, inline(never))]
-#[cfg_attr(
-    not(cortex_m4f),
-    inline(always),
-    expect(
-        clippy::inline_always,
-        reason = "so that the compiler knows lengths and the exponential"
-    )
-)]
+/// Infers the outputs of a row, or of all rows at once, and writes their `status`; outputs are NaN if they could not be
+/// decoded. Returns whether they were, and an input was clamped.
+#[inline(always)]
+#[expect(clippy::inline_always, reason = "so that the compiler knows lengths and the exponential")]
 fn decode_inputs(
     network: &RowNetwork<'_>,
     exp: fn(f32) -> f32,
     inputs: &[f32],
     scaled: &mut [f32],
     outputs: &mut [f32],
-) -> (RowStatus, bool) {
+    status: &mut RowStatus,
+) -> bool {
     let clamped = match network {
         RowNetwork::F32Direct(section) => {
-            return decode_direct(section, exp, inputs, scaled, outputs);
+            return decode_direct(section, exp, inputs, scaled, outputs, status);
         }
         RowNetwork::F32(network) => network.infer(inputs, scaled, outputs),
         RowNetwork::Fixed16(network) => network.infer(inputs, scaled, outputs),
     };
-    // Outputs cannot overflow in these formats; that is checked when a model is loaded.
-    if clamped && !all_finite(inputs) {
-        (RowStatus::MissingReading, false)
-    } else {
-        (RowStatus::Decoded, clamped)
-    }
+    *status = RowStatus::Decoded;
+    clamped && !is_missing(inputs, outputs, status)
 }
 
 /// Infers the outputs of a network in `f32-direct`, which has no assembly routine, as [`decode_inputs`] does.
@@ -416,17 +453,38 @@ fn decode_direct(
     inputs: &[f32],
     scaled: &mut [f32],
     outputs: &mut [f32],
-) -> (RowStatus, bool) {
+    status: &mut RowStatus,
+) -> bool {
     let shape = ModelShape { rows: 1, inputs: inputs.len(), outputs: outputs.len() };
     let Ok(network) = section.direct(shape) else {
-        return (RowStatus::MissingReading, false);
+        outputs.fill(f32::NAN);
+        *status = RowStatus::MissingReading;
+        return false;
     };
     let clamped = network.scale(inputs, scaled);
-    if clamped && !all_finite(inputs) {
-        return (RowStatus::MissingReading, false);
+    if clamped && is_missing(inputs, outputs, status) {
+        return false;
     }
     network.infer_scaled(scaled, outputs, exp);
-    if all_finite(outputs) { (RowStatus::Decoded, clamped) } else { (RowStatus::Overflow, false) }
+    // In the other formats outputs cannot overflow; that is checked when a model is loaded.
+    let finite = all_finite(outputs);
+    *status = if finite { RowStatus::Decoded } else { RowStatus::Overflow };
+    if !finite {
+        outputs.fill(f32::NAN);
+    }
+    finite && clamped
+}
+
+/// Whether one of `inputs` is missing; the outputs are NaN then, and their `status` says so.
+#[cold]
+#[inline(never)]
+fn is_missing(inputs: &[f32], outputs: &mut [f32], status: &mut RowStatus) -> bool {
+    let missing = !all_finite(inputs);
+    if missing {
+        outputs.fill(f32::NAN);
+        *status = RowStatus::MissingReading;
+    }
+    missing
 }
 
 /// Whether all `values` are finite, by the carry out of the exponent, without a branch for each.
@@ -434,8 +492,11 @@ fn decode_direct(
 fn all_finite(values: &[f32]) -> bool {
     const EXPONENT: u32 = 0x7F80_0000;
     const LAST_PLACE: u32 = 0x0080_0000;
-    let carries = |bits: u32| (bits & EXPONENT) + LAST_PLACE;
-    values.iter().fold(0, |carry, value| carry | carries(value.to_bits())) >> 31 == 0
+    let add = |carry, value: &f32| carry | ((value.to_bits() & EXPONENT) + LAST_PLACE);
+    // In groups, because the compiler does not unroll the loop for a device.
+    let (groups, rest) = values.as_chunks::<6>();
+    let carry = groups.iter().flatten().fold(0, add);
+    rest.iter().fold(carry, add) >> 31 == 0
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 /// How the decoding of one row of a frame ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)] // assembly reads and writes it
 pub enum RowStatus {
     /// The row was decoded; its outputs are valid.
     Decoded,

@@ -10,7 +10,7 @@
 
 #[cfg(cortex_m4f)]
 use crate::cortex_m4;
-use crate::estimate::RowStatus;
+use crate::estimate::{Estimate, RowStatus};
 
 /// What a gate compares frames with: the sensor at rest.
 #[derive(Debug, Clone, Copy)]
@@ -30,17 +30,23 @@ pub struct Rest<'a> {
 ///
 /// ```
 /// use model_core::gate::{Gate, Rest};
-/// use model_core::RowStatus;
+/// use model_core::{Estimate, RowStatus};
 /// // One row of two readings and one output; 0.01 is what the model decodes the baseline to.
 /// let (baseline_ohm, outputs, status) = ([50.0, 60.0], [0.01], [RowStatus::Decoded]);
 /// let rest = Rest { baseline_ohm: &baseline_ohm, outputs: &outputs, status: &status };
 /// let gate = Gate::new(rest, 0.02).unwrap();
-/// let mut outputs = [f32::NAN];
-/// assert!(!gate.give_rest(0, &[50.5, 58.0], &mut outputs)); // one is 3 % less
-/// assert!(!gate.give_rest(0, &[49.1, 59.0], &mut outputs)); // both are nearly 2 % less
-/// assert!(outputs[0].is_nan());
-/// assert!(gate.give_rest(0, &[50.5, 59.0], &mut outputs));
-/// assert_eq!(outputs, [0.01]);
+/// let (mut outputs, mut status) = ([f32::NAN], [RowStatus::Overflow]);
+/// let mut estimate = Estimate { outputs: &mut outputs, status: &mut status };
+/// for (readings, at_rest) in [
+///     ([50.5, 58.0], false), // one is 3 % less
+///     ([49.1, 59.0], false), // both are nearly 2 % less
+///     ([50.5, 59.0], true),
+/// ] {
+///     let awake = gate.give_rest(&readings, [2, 1], &mut estimate, false);
+///     assert_eq!(awake == 0, at_rest);
+///     assert_eq!(estimate.status[0] == RowStatus::AtRest, at_rest);
+///     assert_eq!(estimate.outputs[0] == 0.01, at_rest);
+/// }
 /// assert!(Gate::new(rest, 0.0).is_none());
 /// ```
 #[derive(Debug, Clone, Copy)]
@@ -59,26 +65,89 @@ impl<'a> Gate<'a> {
         (tolerance > 0.0 && tolerance < 1.0).then_some(Self { rest, tolerance })
     }
 
-    /// Copies the outputs at rest to `outputs` if the `readings` (Ω) of row `row` are at rest; returns whether
-    /// they are.
-    #[inline]
-    pub fn give_rest(&self, row: usize, readings: &[f32], outputs: &mut [f32]) -> bool {
-        let Rest { baseline_ohm, outputs: rest, status } = self.rest;
-        let baseline = row_of(baseline_ohm, row, readings.len());
-        let rest = row_of(rest, row, outputs.len());
-        match (baseline, rest, status.get(row)) {
-            (Some(baseline), Some(rest), Some(RowStatus::Decoded)) => {
-                give_rest(readings, baseline, self.tolerance, rest, outputs)
-            }
-            _ => false,
+    /// Gives the outputs at rest to the rows of a frame whose `readings` (Ω) are at rest, and marks these rows in the
+    /// estimate's status. Other rows are awake: they are marked as missing, until they are decoded. Returns how many
+    /// they are; with `until_awake`, it ends with the first one.
+    ///
+    /// `sizes` are the numbers of readings and of outputs a row. All rows are awake if the frame, the estimate or what
+    /// is known of the sensor at rest has another length.
+    #[cfg_attr(
+        cortex_m4f,
+        expect(unsafe_code, reason = "a call to assembly, whose condition is checked before")
+    )]
+    pub fn give_rest(
+        &self,
+        readings: &[f32],
+        sizes: [usize; 2],
+        estimate: &mut Estimate<'_>,
+        until_awake: bool,
+    ) -> usize {
+        if !self.suits(readings, sizes, estimate) {
+            estimate.status.fill(RowStatus::MissingReading);
+            return estimate.status.len().max(1);
         }
+        #[cfg(cortex_m4f)]
+        {
+            let Rest { baseline_ohm, outputs, status } = self.rest;
+            let rest = (baseline_ohm, outputs, status);
+            // SAFETY: all lengths were just checked.
+            unsafe {
+                cortex_m4::give_rest(readings, rest, self.tolerance, sizes, estimate, until_awake)
+            }
+        }
+        #[cfg(not(cortex_m4f))]
+        self.give_rest_in_rust(readings, sizes, estimate, until_awake)
     }
-}
 
-/// The numbers of `row` in a list of rows of `length` numbers.
-#[inline]
-fn row_of(rows: &[f32], row: usize, length: usize) -> Option<&[f32]> {
-    rows.get(row.checked_mul(length)?..)?.get(..length)
+    /// Whether everything has these sizes a row, and as many rows as the estimate's status, and none is empty.
+    #[inline]
+    fn suits(
+        &self,
+        readings: &[f32],
+        [inputs, outputs]: [usize; 2],
+        estimate: &Estimate<'_>,
+    ) -> bool {
+        let Rest { baseline_ohm, outputs: rest, status } = self.rest;
+        let rows = estimate.status.len();
+        let are = |count: usize, a: &[f32], b: &[f32]| {
+            !a.is_empty() && a.len() == b.len() && rows.checked_mul(count) == Some(a.len())
+        };
+        are(inputs, readings, baseline_ohm)
+            && are(outputs, rest, estimate.outputs)
+            && status.len() == rows
+    }
+
+    /// Gives rest as the assembly routine does, in portable Rust: its twin.
+    #[cfg(not(cortex_m4f))]
+    fn give_rest_in_rust(
+        &self,
+        readings: &[f32],
+        [inputs, outputs]: [usize; 2],
+        estimate: &mut Estimate<'_>,
+        until_awake: bool,
+    ) -> usize {
+        let Rest { baseline_ohm, outputs: rest, status: known } = self.rest;
+        let mut awake = 0;
+        let readings = readings.chunks_exact(inputs).zip(baseline_ohm.chunks_exact(inputs));
+        let outputs = estimate.outputs.chunks_exact_mut(outputs).zip(rest.chunks_exact(outputs));
+        let status = estimate.status.iter_mut().zip(known);
+        for (((readings, baseline), (outputs, rest)), (status, known)) in
+            readings.zip(outputs).zip(status)
+        {
+            let decoded = *known == RowStatus::Decoded;
+            if decoded && is_at_rest(readings, baseline, self.tolerance) {
+                outputs.copy_from_slice(rest);
+                *status = RowStatus::AtRest;
+            } else {
+                *status = RowStatus::MissingReading;
+                awake += 1;
+                if until_awake {
+                    return awake;
+                }
+            }
+        }
+        awake
+    }
 }
 
 /// Whether a row is at rest: each of its n `readings` is within `tolerance` (0 to 1) of its finite `baseline`,
@@ -102,44 +171,6 @@ pub fn is_at_rest(readings: &[f32], baseline: &[f32], tolerance: f32) -> bool {
     }
     let n = readings.len().min(baseline.len());
     change * change * n as f32 <= most_change * most_change
-}
-
-/// Copies `rest` to `outputs` if the `readings` [are at rest](is_at_rest); returns whether they are.
-///
-/// Inlined on a device, because the compiler's call would cost as much as the assembly's.
-#[cfg_attr(
-    cortex_m4f,
-    inline(always),
-    expect(clippy::inline_always, reason = "two comparisons and a call")
-)]
-fn give_rest(
-    readings: &[f32],
-    baseline: &[f32],
-    tolerance: f32,
-    rest: &[f32],
-    outputs: &mut [f32],
-) -> bool {
-    #[cfg(cortex_m4f)]
-    if let Some(at_rest) = cortex_m4::give_rest(readings, baseline, tolerance, rest, outputs) {
-        return at_rest;
-    }
-    give_rest_in_rust(readings, baseline, tolerance, rest, outputs)
-}
-
-/// Gives rest as [`give_rest`] does, in portable Rust: the compiled twin of the assembly.
-#[cfg_attr(cortex_m4f, inline(never))]
-fn give_rest_in_rust(
-    readings: &[f32],
-    baseline: &[f32],
-    tolerance: f32,
-    rest: &[f32],
-    outputs: &mut [f32],
-) -> bool {
-    let at_rest = is_at_rest(readings, baseline, tolerance);
-    if at_rest {
-        outputs.iter_mut().zip(rest).for_each(|(output, rest)| *output = *rest);
-    }
-    at_rest
 }
 
 #[cfg(test)]
@@ -208,12 +239,41 @@ mod tests {
         let rest =
             Rest { baseline_ohm: &[60.0; 4], outputs: &[1.0, 2.0, 3.0, 4.0], status: &status };
         let gate = Gate::new(rest, 0.02).unwrap();
-        let found = [0, 1, 2, 3, 4].map(|row| {
-            let mut outputs = [0.0];
-            (gate.give_rest(row, &[60.0], &mut outputs), outputs)
-        });
-        let untouched = (false, [0.0]);
-        assert_eq!(found, [(true, [1.0]), untouched, untouched, (true, [4.0]), untouched]);
+        let mut outputs = [0.0; 4];
+        let mut found = [RowStatus::Overflow; 4];
+        let mut estimate = Estimate { outputs: &mut outputs, status: &mut found };
+        assert_eq!(gate.give_rest(&[60.0; 4], [1, 1], &mut estimate, false), 2);
+        assert_eq!(gate.give_rest(&[60.0; 4], [1, 1], &mut estimate, true), 1);
+        let (rest, awake) = (RowStatus::AtRest, RowStatus::MissingReading);
+        assert_eq!((outputs, found), ([1.0, 0.0, 0.0, 4.0], [rest, awake, awake, rest]));
+    }
+
+    #[test]
+    fn a_frame_of_another_length_than_the_baseline_is_never_at_rest() {
+        let status = [RowStatus::Decoded; 2];
+        let rest = Rest { baseline_ohm: &[60.0; 4], outputs: &[1.0; 2], status: &status };
+        let gate = Gate::new(rest, 0.02).unwrap();
+        for (readings, rows, sizes, at_rest) in [
+            (4, 2, [2, 1], true),
+            (2, 2, [1, 1], false),
+            (6, 2, [3, 1], false),
+            (4, 2, [2, 2], false),
+            (4, 2, [2, 0], false),
+            (4, 2, [usize::MAX, 1], false),
+            (2, 1, [2, 1], false),
+            (6, 3, [2, 1], false),
+            (0, 0, [2, 1], false),
+        ] {
+            let mut outputs = [0.0; 6];
+            let outputs = &mut outputs[..(rows * sizes[1]).min(6)];
+            let mut found = [RowStatus::Overflow; 3];
+            let mut estimate = Estimate { outputs, status: &mut found[..rows] };
+            let awake = gate.give_rest(&[60.0; 6][..readings], sizes, &mut estimate, false);
+            let expected = if at_rest { RowStatus::AtRest } else { RowStatus::MissingReading };
+            assert_eq!(awake == 0, at_rest, "{readings} {sizes:?}");
+            assert!(found[..rows].iter().all(|status| *status == expected), "{readings} {sizes:?}");
+            assert!(found[rows..].iter().all(|status| *status == RowStatus::Overflow));
+        }
     }
 
     #[test]

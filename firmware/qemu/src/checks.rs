@@ -132,7 +132,8 @@ fn one_of_many<const R: usize>(index: usize, numbers: &mut Numbers) -> Frame<R> 
     frame
 }
 
-/// CRC-32 of all bits that the model in `blob` decodes [`MANY`] frames to, and of whether an input was clamped. `None` if the blob does not load.
+/// CRC-32 of all bits that the model in `blob` decodes [`MANY`] frames to, and of whether an input was clamped. `None`
+/// if the blob does not load.
 #[must_use]
 pub fn decoding_many<E: ExpKernel, const R: usize>(blob: &[u8]) -> Option<u32> {
     let decoder = Decoder::<R>::load(blob).ok()?;

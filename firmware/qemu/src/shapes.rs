@@ -11,7 +11,7 @@ use model_core::gate::{Rest, is_at_rest};
 use model_core::projection::Projection;
 use model_core::rbf::{Format, Network, Shape, expanded, fixed16};
 use model_core::scale::UNITS;
-use model_core::{Gate, RowStatus};
+use model_core::{Estimate, Gate, RowStatus};
 
 use crate::checks::Numbers;
 
@@ -262,7 +262,10 @@ pub fn projections(memory: &mut Memory) -> Option<Comparison> {
     Some(comparison)
 }
 
-/// Compares gates of rows with `COLS` readings and `OUTPUTS` outputs.
+/// Number of rows of a gated frame.
+const GATED_ROWS: usize = 3;
+
+/// Compares gates of frames whose rows have `COLS` readings and `OUTPUTS` outputs.
 #[inline(never)]
 fn gate<const COLS: usize, const OUTPUTS: usize>(
     comparison: &mut Comparison,
@@ -270,23 +273,47 @@ fn gate<const COLS: usize, const OUTPUTS: usize>(
 ) {
     const TOLERANCE: f32 = 0.02;
     for index in 0..8 * COLS.max(8) {
-        let row = [(); COLS].map(|()| MIDDLE_OHM + 5.0 * numbers.draw());
-        let outputs = [(); OUTPUTS].map(|()| numbers.draw());
-        let rest = Rest { baseline_ohm: &row, outputs: &outputs, status: &[RowStatus::Decoded] };
-        // Mostly at rest; now and then one reading is far off, or all are by a little.
-        let together = if index % 4 == 0 { 0.02 * numbers.draw() } else { 0.0 };
-        let mut readings = row.map(|ohm| ohm * (1.0 + together + 0.004 * numbers.draw()));
-        if let (1, Some(reading)) = (index % 4, readings.get_mut(index / 4 % COLS)) {
-            *reading *= [1.03, 0.97, f32::NAN, f32::INFINITY][index / 4 % 4];
+        let baseline =
+            [(); GATED_ROWS].map(|()| [(); COLS].map(|()| MIDDLE_OHM + 5.0 * numbers.draw()));
+        let outputs = [(); GATED_ROWS].map(|()| [(); OUTPUTS].map(|()| numbers.draw()));
+        let mut known = [RowStatus::Decoded; GATED_ROWS];
+        if let (0, Some(status)) = (index % 7, known.get_mut(index / 7 % GATED_ROWS)) {
+            *status = RowStatus::Overflow;
+        }
+        let rest = Rest {
+            baseline_ohm: baseline.as_flattened(),
+            outputs: outputs.as_flattened(),
+            status: &known,
+        };
+        // Mostly at rest; now and then one reading of a row is far off, or all are by a little.
+        let mut readings = baseline;
+        for (row, readings) in readings.iter_mut().enumerate() {
+            let index = index + row;
+            let together = if index % 4 == 0 { 0.02 * numbers.draw() } else { 0.0 };
+            readings.iter_mut().for_each(|ohm| *ohm *= 1.0 + together + 0.004 * numbers.draw());
+            if let (1, Some(reading)) = (index % 4, readings.get_mut(index / 4 % COLS)) {
+                *reading *= [1.03, 0.97, f32::NAN, f32::INFINITY][index / 4 % 4];
+            }
         }
         let Some(gate) = Gate::new(rest, TOLERANCE) else {
             return comparison.add(false);
         };
-        let mut found = [f32::from_bits(UNTOUCHED); OUTPUTS];
-        let at_rest = gate.give_rest(0, &readings, &mut found);
-        let expected = is_at_rest(&readings, &row, TOLERANCE);
-        let outputs = if expected { outputs } else { [f32::from_bits(UNTOUCHED); OUTPUTS] };
-        comparison.add(at_rest == expected && same_bits(&found, &outputs));
+        let mut found = [[f32::from_bits(UNTOUCHED); OUTPUTS]; GATED_ROWS];
+        let mut status = [RowStatus::Overflow; GATED_ROWS];
+        let mut estimate = Estimate { outputs: found.as_flattened_mut(), status: &mut status };
+        let awake = gate.give_rest(readings.as_flattened(), [COLS, OUTPUTS], &mut estimate, false);
+        let mut same = awake == status.iter().filter(|it| **it != RowStatus::AtRest).count();
+        for row in 0..GATED_ROWS {
+            let at_rest = known[row] == RowStatus::Decoded
+                && is_at_rest(&readings[row], &baseline[row], TOLERANCE);
+            let (expected, of_row) = if at_rest {
+                (RowStatus::AtRest, outputs[row])
+            } else {
+                (RowStatus::MissingReading, [f32::from_bits(UNTOUCHED); OUTPUTS])
+            };
+            same &= status[row] == expected && same_bits(&found[row], &of_row);
+        }
+        comparison.add(same);
     }
 }
 

@@ -88,7 +88,6 @@
     add r1, r1, r12
     vadd.f32 s17, s18, s21
     vldmia r1!, {s18-s22}
-    vstmia r2!, {s17}
     vmul.f32 s19, s19, s0
     vmul.f32 s20, s20, s1
     vmul.f32 s21, s21, s2
@@ -100,7 +99,7 @@
     subs r3, #1
     vadd.f32 s18, s18, s21
     add r1, r1, r12
-    vstmia r2!, {s18}
+    vstmia r2!, {s17-s18}
     .endm
 
 @ Exponents of two centres of 8 inputs, by turns.
@@ -125,7 +124,6 @@
     add r1, r1, r12
     vadd.f32 s17, s18, s21
     vldmia r1!, {s18-s26}
-    vstmia r2!, {s17}
     vmul.f32 s19, s19, s0
     vmul.f32 s20, s20, s1
     vmul.f32 s21, s21, s2
@@ -145,7 +143,7 @@
     subs r3, #1
     vadd.f32 s18, s18, s21
     add r1, r1, r12
-    vstmia r2!, {s18}
+    vstmia r2!, {s17-s18}
     .endm
 
 @ Exponents of two centres of 12 inputs, by turns.
@@ -178,7 +176,6 @@
     add r1, r1, r12
     vadd.f32 s17, s18, s21
     vldmia r1!, {s18-s30}
-    vstmia r2!, {s17}
     vmul.f32 s19, s19, s0
     vmul.f32 s20, s20, s1
     vmul.f32 s21, s21, s2
@@ -206,7 +203,7 @@
     subs r3, #1
     vadd.f32 s18, s18, s21
     add r1, r1, r12
-    vstmia r2!, {s18}
+    vstmia r2!, {s17-s18}
     .endm
 
 @ Exponents of two centres of 16 inputs, by turns.
@@ -248,7 +245,6 @@
     add r1, r1, r12
     vadd.f32 s17, s18, s28
     vldmia r1!, {s18-s26}
-    vstmia r2!, {s17}
     vmul.f32 s19, s19, s0
     vmul.f32 s20, s20, s1
     vmul.f32 s21, s21, s2
@@ -285,7 +281,7 @@
     subs r3, #1
     vadd.f32 s18, s18, s28
     add r1, r1, r12
-    vstmia r2!, {s18}
+    vstmia r2!, {s17-s18}
     .endm
 
 @ Four inputs from r12 on, for two centres at r1 and r8
@@ -1023,10 +1019,9 @@ f32_exponents_\inputs:
     vadd.f32 s18, s18, s19
     vadd.f32 s22, s22, s23
     vadd.f32 s16, s16, s18
-    vadd.f32 s20, s20, s22
+    vadd.f32 s17, s20, s22
     sub r1, r8, r11
-    vstmia r2!, {s16}
-    vstmia r2!, {s20}
+    vstmia r2!, {s16-s17}
     subs r3, #1
     bne 1b
     b.w f32_powers
@@ -1058,9 +1053,16 @@ f32_exponents_\inputs:
     lsrs r3, r3, #1
     .thumb_func
 f32_sums_of_18:
+    lsrs r3, r3, #1
+    bcc 2f
+    adds r3, #1
+    b 3f
+2:
+    f32_two_centres
+3:
     f32_two_centres
     subs r3, #1
-    bne f32_sums_of_18
+    bne 2b
     bx lr
 1:
     f32_sums 18

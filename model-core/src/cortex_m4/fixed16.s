@@ -2,8 +2,9 @@
 @ ---------------------------------------------------------------------------------------------------------
 @ 16-bit fixed point: two products an SMLAD, sixteen centres at a time.
 @
-@ A batch's exponents are pushed on the stack, the last centre's lowest. They are turned into activations in place,
-@ packed in pairs. The sums then take the centres from the last to the first, which makes no difference to integers.
+@ A batch's exponents are put on the stack, the last centre's lowest; by STR, because PUSH takes a cycle more. They
+@ are turned into activations in place, packed in pairs. The sums then take the centres from the last to the first,
+@ which makes no difference to integers.
 @ ---------------------------------------------------------------------------------------------------------
 
 @ Most centres of a batch: 1 KiB of stack
@@ -108,8 +109,8 @@
     .endif
     .endm
 
-@ Pushes the exponents of a batch, of up to eight pairs of inputs at r1, and goes on to the powers. r0 = the batch's
-@ words.
+@ Puts the exponents of a batch on the stack, of up to eight pairs of inputs at r1, and goes on to the powers.
+@ r0 = the batch's words.
     .macro fixed16_exponents pairs
     .irp i, 4,5,6,7,8,9,10,11
     .if \i < 4 + \pairs
@@ -120,16 +121,19 @@
     sub r1, sp, #16 * 4
     vmov s24, r1
 2:
-    fixed16_line \pairs
-    push {r1}
-    fixed16_line \pairs
-    push {r1}
     .if \pairs <= 4 || \pairs == 6
+    sub sp, #4 * 4
     fixed16_line \pairs
-    push {r1}
+    str r1, [sp, #12]
     fixed16_line \pairs
-    push {r1}
+    str r1, [sp, #8]
+    .else
+    sub sp, #2 * 4
     .endif
+    fixed16_line \pairs
+    str r1, [sp, #4]
+    fixed16_line \pairs
+    str r1, [sp]
     vmov r2, s24
     cmp sp, r2
     bne 2b
@@ -155,6 +159,16 @@
     smlad r1, r11, r7, r1
     .endm
     .equ FX_FOUR_PAIRS_BYTES, 44
+
+@ Begins two lines of many pairs at r0: r2 and r1 are their first numbers.
+    .macro fixed16_two_of_many
+    vmov r12, lr, s27, s28
+    vmov r4, r2, s29, s30
+    add r3, r0, r2
+    ldr r2, [r0], #4
+    ldr r1, [r3], #4
+    bx r4
+    .endm
 
 @ \pair = the high halves of two inputs, whose squares are added to \high:\low.
     .macro fixed16_input pair, even, odd, low, high
@@ -265,7 +279,15 @@
     str r0, [sp, #FX18_SCALE]
     adds r0, #18 * 4
     cbz r2, 2f
-    b 4f @ a tail, fewer outputs, or more than a batch
+    cmp r2, #1 @ AFFINE alone
+    bne 4f @ fewer outputs, or more than a batch
+    adr.w r2, 3f + 1
+    vmov s20, r2
+    add r0, r0, #18 * 9 * 4
+    b.w fixed16_tail
+3:
+    add r0, r0, #18 * 9 * 4
+    ldr r1, [sp, #FX18_CENTRES]
 2:
     adr r2, 9f
     vldmia r2, {s19-s22}
@@ -277,9 +299,10 @@ fixed16_start_of_18:
 
 @ Exponents of nine pairs of inputs, which are in r4..r12; r0 = the batch's words.
 fixed16_exponents_of_nine:
-    .rept 16
+    sub sp, #16 * 4
+    .irp place, 15,14,13,12,11,10,9,8,7,6,5,4,3,2,1,0
     fixed16_line 9
-    push {r1}
+    str r1, [sp, #\place * 4]
     .endr
     vmov r1, r2, s18, s19
     add r0, r0, r2
@@ -295,7 +318,7 @@ fixed16_powers:
     mov r0, sp
     mov r1, sp
 1:
-    .rept 4
+    .irp place, 0, 8, 16, 24
     ldmia r0!, {r4-r7}
     fixed16_power r4
     fixed16_power r5
@@ -303,8 +326,10 @@ fixed16_powers:
     fixed16_power r7
     pkhbt r4, r5, r4, lsl #16
     pkhbt r5, r7, r6, lsl #16
-    strd r4, r5, [r1], #8
+    str r4, [r1, #\place]
+    str r5, [r1, #\place + 4]
     .endr
+    adds r1, #32
     cmp r0, lr
     bne 1b
     vmov r0, s27
@@ -324,19 +349,8 @@ fixed16_first_sums:
     .word 16 * 10 * 4
     .word fixed16_sums + 1
 
-@ A tail, fewer outputs, or more centres than a batch has. r2 = form
-fixed16_affine:
-    adr r2, 3f + 1
-    vmov s20, r2
-    add r0, r0, #18 * 9 * 4
-    b.w fixed16_tail
-3:
-    add r0, r0, #18 * 9 * 4
-    ldr r1, [sp, #FX18_CENTRES]
-    b 2b
+@ Fewer outputs, or more centres than a batch has. r2 = form
 6:
-    cmp r2, #1 @ AFFINE alone
-    beq fixed16_affine
     movs r3, #18
     b 7f
 4:
@@ -806,13 +820,7 @@ fixed16_exponents_of_many:
 4:
     sub r1, sp, #16 * 4
     vmov s24, r1
-1:
-    vmov r12, lr, s27, s28
-    vmov r4, r2, s29, s30
-    add r3, r0, r2
-    ldr r2, [r0], #4
-    ldr r1, [r3], #4
-    bx r4
+    fixed16_two_of_many
     .balign 4
 2:
     fixed16_four_pairs
@@ -826,7 +834,9 @@ fixed16_exponents_of_many:
     sub r0, r3, r4
     vmov r4, s24
     cmp sp, r4
-    bne 1b
+    beq 3f
+    fixed16_two_of_many @ again, because a branch back to the first would take two cycles more
+3:
     vmov r1, r2, s18, s19
     add r0, r0, r2
     cmp sp, r1

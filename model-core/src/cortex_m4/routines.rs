@@ -5,6 +5,7 @@
 #![expect(unsafe_code, reason = "calls to assembly, which reads as many words as it is told to")]
 
 use super::Block;
+use crate::estimate::{Estimate, RowStatus};
 
 core::arch::global_asm!(
     include_str!("common.s"),
@@ -73,9 +74,13 @@ unsafe extern "C" {
         rest: *const f32,
         outputs: *mut f32,
         tolerance: f32,
-        reading_count: usize,
+        rest_status: *const RowStatus,
+        status: *mut RowStatus,
+        rows: usize,
+        inputs: usize,
         output_count: usize,
-    ) -> u32;
+        until_awake: u32,
+    ) -> usize;
 }
 
 /// Whether an input was clamped, NaN or infinite, from the floating-point status after a routine. The conversion of
@@ -129,26 +134,47 @@ pub(crate) unsafe fn project(block: &[f32], readings: &[f32], features: &mut [f3
     }
 }
 
-/// Copies `rest` to `outputs` if the `readings` are at rest; returns whether they are. `None` if readings and baseline,
-/// or the outputs, differ in length or are none.
+/// Gives rest to the rows of a frame, as [`Gate`](crate::gate::Gate) does: to all, or until one is awake. Returns
+/// the number of rows that are awake.
+///
+/// # Safety
+/// The caller must check that there is at least one row, with as many `inputs` and `outputs` (both at least 1) as
+/// `sizes` says, in readings, baseline, outputs at rest, estimate, and the status of each.
 #[inline(always)]
-#[expect(clippy::inline_always, reason = "two comparisons and a call")]
-pub(crate) fn give_rest(
+#[expect(clippy::inline_always, reason = "a call")]
+pub(crate) unsafe fn give_rest(
     readings: &[f32],
-    baseline: &[f32],
+    (baseline, rest, status): (&[f32], &[f32], &[RowStatus]),
     tolerance: f32,
-    rest: &[f32],
-    outputs: &mut [f32],
-) -> Option<bool> {
-    let empty = readings.is_empty() || rest.is_empty();
-    if empty || readings.len() != baseline.len() || rest.len() != outputs.len() {
-        return None;
+    [inputs, outputs]: [usize; 2],
+    estimate: &mut Estimate<'_>,
+    until_awake: bool,
+) -> usize {
+    let rows = estimate.status.len();
+    debug_assert!(rows > 0 && inputs > 0 && outputs > 0);
+    debug_assert!(readings.len() == rows * inputs && baseline.len() == readings.len());
+    debug_assert!(rest.len() == rows * outputs && estimate.outputs.len() == rest.len());
+    debug_assert!(status.len() == rows);
+    // SAFETY: the caller has checked the lengths. The routine writes a status that there is.
+    unsafe {
+        taxel_give_rest(
+            readings.as_ptr(),
+            baseline.as_ptr(),
+            rest.as_ptr(),
+            estimate.outputs.as_mut_ptr(),
+            tolerance,
+            status.as_ptr(),
+            estimate.status.as_mut_ptr(),
+            rows,
+            inputs,
+            outputs,
+            until_awake.into(),
+        )
     }
-    let (readings, count) = (readings.as_ptr(), readings.len());
-    let (rest, outputs, of) = (rest.as_ptr(), outputs.as_mut_ptr(), rest.len());
-    // SAFETY: the lengths were just compared, and none is 0. The routine reads and writes no more.
-    let at_rest = unsafe {
-        taxel_give_rest(readings, baseline.as_ptr(), rest, outputs, tolerance, count, of)
-    };
-    Some(at_rest != 0)
 }
+
+// What the assembly relies on.
+const _: () = {
+    assert!(RowStatus::Decoded as u8 == 0 && RowStatus::MissingReading as u8 == 1);
+    assert!(RowStatus::AtRest as u8 == 3);
+};

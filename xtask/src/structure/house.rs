@@ -30,7 +30,7 @@ pub const CRATES: &[(&str, Side)] = &[
 /// Files in which `unsafe` may stand, and folders in whose files it may.
 pub const UNSAFE: &[&str] = &[
     "model-core/src/cortex_m4/routines.rs",
-    "model-core/src/decoder.rs",
+    "model-core/src/gate.rs",
     "model-core/src/projection.rs",
     "model-core/src/rbf/expanded.rs",
     "model-core/src/rbf/fixed16.rs",

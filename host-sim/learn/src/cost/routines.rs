@@ -124,7 +124,7 @@ fn f32(network: &NetworkDesign, pieces: &mut Pieces) {
     if inputs == EIGHTEEN && outputs == EIGHTEEN && more_batches == 0 {
         add(if tail { "18 inputs, 18 outputs, tail" } else { "18 inputs, 18 outputs" }, 1);
         add("18 inputs: four centres", fours);
-        pieces.add("sums of 18, together: two lines", 2 * fours);
+        pieces.add("sums of 18, together: four lines", fours);
         return;
     }
     if inputs == EIGHTEEN {
@@ -266,6 +266,12 @@ impl Group {
 
     /// The loop over pairs of lines.
     fn sums(self, pairs: usize, together: bool, pieces: &mut Pieces) {
+        if together && self.width == EIGHTEEN {
+            // Four lines at once.
+            pieces.add("sums of 18, together: four lines", pairs / 2);
+            pieces.add("sums of 18, together: the two lines beyond fours", pairs % 2);
+            return;
+        }
         let how = if together { "together" } else { "apart" };
         pieces.add(format!("sums of {}, {how}: two lines", self.width), pairs);
     }
