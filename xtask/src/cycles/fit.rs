@@ -12,9 +12,6 @@ use crate::process::Outcome;
 /// Ratio of the least to the largest singular value from which on prices can be told apart.
 const LEAST_SINGULAR: f64 = 1e-9;
 
-/// Largest distance of a price of assembly from a whole number.
-const WHOLE: f64 = 1e-3;
-
 /// Digits behind the point of prices of compiled code, which are means.
 const MEAN_DIGITS: i32 = 3;
 
@@ -36,20 +33,36 @@ pub fn prices(frames: &[Frame]) -> Outcome<Vec<(String, Price)>> {
             Equation::new(&frame.pieces.compiled, frame.compiled(), unit)
         })
         .collect();
-    let exact = solve(&assembly)?.into_iter().map(|(name, price)| {
-        let whole = price.map(f64::round);
-        if (0..2).any(|cost| (whole[cost] - price[cost]).abs() > WHOLE) {
-            return Err(format!(
-                "{name}: {} instructions and {} cycles are no whole numbers; does the routine do what \
-                 host-sim/learn/src/cost/routines.rs says?",
-                price[0], price[1]
-            ));
-        }
-        Ok((name.to_owned(), [whole[0], whole[1], rounded(price[2])]))
-    });
+    let exact: Vec<(String, Price)> = solve(&assembly)?
+        .into_iter()
+        .map(|(name, [instructions, cycles, flash])| {
+            (name.to_owned(), [instructions.round(), cycles.round(), rounded(flash)])
+        })
+        .collect();
+    hold_exact(frames, &exact)?;
     let means = solve(&compiled)?;
-    let means = means.into_iter().map(|(name, price)| Ok((name.to_owned(), price.map(rounded))));
-    exact.chain(means).collect()
+    let means = means.into_iter().map(|(name, price)| (name.to_owned(), price.map(rounded)));
+    Ok(exact.into_iter().chain(means).collect())
+}
+
+/// Fails with the frame whose assembly executes most beside what these prices tell, if one does.
+fn hold_exact(frames: &[Frame], prices: &[(String, Price)]) -> Outcome {
+    let prices: BTreeMap<&str, Price> =
+        prices.iter().map(|(name, price)| (name.as_str(), *price)).collect();
+    let beside = |frame: &Frame| {
+        let parts = frame.pieces.assembly.iter();
+        let told: f64 = parts.map(|(name, times)| prices[name][0] * times as f64).sum();
+        told - frame.assembly.instructions as f64
+    };
+    let worst = frames.iter().map(|frame| (beside(frame), frame));
+    match worst.max_by(|(a, _), (b, _)| a.abs().total_cmp(&b.abs())) {
+        Some((by, frame)) if by != 0.0 => Err(format!(
+            "{}: its assembly is told by {by:+} instructions from what it executes; does \
+             host-sim/learn/src/cost/routines.rs have the pieces that it has?",
+            frame.what()
+        )),
+        _ => Ok(()),
+    }
 }
 
 fn rounded(price: f64) -> f64 {
