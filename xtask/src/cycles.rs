@@ -32,6 +32,7 @@ mod machine;
 mod table;
 
 mod shapes;
+mod equations;
 mod told;
 mod fit;
 

@@ -11,9 +11,9 @@ use serde::Serialize;
 use taxel_data::BadValue;
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
-use taxel_learn::Exponential;
 use taxel_learn::cost::{Cost, Prices, kernel_name};
 use taxel_learn::decoders::{BASELINES, Baseline};
+use taxel_learn::{Exponential, Options};
 use taxel_simulate::Synthesis;
 
 use super::gate;
@@ -280,6 +280,9 @@ pub fn compute(
 
 fn check(experiment: &Experiment, plan: &Plan) -> std::result::Result<(), BadValue> {
     let world = &experiment.world;
+    for &centres in &plan.centres {
+        Options { centres, ..experiment.options() }.check(experiment.training.frames)?;
+    }
     if let Some(samples) =
         plan.samples_averaged.iter().find(|samples| !(1..=256).contains(*samples))
     {

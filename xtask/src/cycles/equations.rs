@@ -1,0 +1,97 @@
+//! Linear equations for the prices of pieces of code: for each frame, how often it executes each.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{DMatrix, DVector};
+use taxel_learn::cost::Pieces;
+
+use crate::process::Outcome;
+
+/// Ratio of the least to the largest singular value from which on prices can be told apart.
+const LEAST_SINGULAR: f64 = 1e-9;
+
+/// Rounds over all prices after which those that are not negative have settled.
+const ROUNDS: usize = 3000;
+
+/// Equations whose unknowns are prices by the names of pieces.
+pub struct Equations<'f> {
+    names: Vec<&'f str>,
+    /// A line for each frame and a column for each piece, of length 1, so that pieces that are executed seldom count
+    /// as well.
+    matrix: DMatrix<f64>,
+    lengths: DVector<f64>,
+    units: DVector<f64>,
+}
+
+impl<'f> Equations<'f> {
+    /// Makes equations from the pieces of each frame. Its error counts in parts of its unit.
+    pub fn new(frames: impl IntoIterator<Item = (Vec<&'f Pieces>, f64)>) -> Self {
+        let frames: Vec<_> = frames.into_iter().collect();
+        let pieces = |frame: &(Vec<&'f Pieces>, f64)| -> Vec<(&'f str, u64)> {
+            frame.0.iter().flat_map(|pieces| pieces.iter()).collect()
+        };
+        let mut places: BTreeMap<&str, usize> = BTreeMap::new();
+        for (name, _) in frames.iter().flat_map(pieces) {
+            places.insert(name, 0);
+        }
+        places.values_mut().enumerate().for_each(|(index, place)| *place = index);
+        let mut matrix = DMatrix::zeros(frames.len(), places.len());
+        for (line, frame) in frames.iter().enumerate() {
+            for (name, times) in pieces(frame) {
+                matrix[(line, places[name])] += times as f64 / frame.1;
+            }
+        }
+        let lengths = DVector::from_fn(places.len(), |column, _| matrix.column(column).norm());
+        for (column, length) in lengths.iter().enumerate() {
+            matrix.column_mut(column).unscale_mut(*length);
+        }
+        let units = DVector::from_iterator(frames.len(), frames.iter().map(|frame| frame.1));
+        Self { names: places.into_keys().collect(), matrix, lengths, units }
+    }
+
+    /// The prices with the least squares of errors, for each kind of `costs`.
+    ///
+    /// # Errors
+    /// The frames do not tell the prices of some pieces apart.
+    pub fn least_squares<const N: usize>(
+        &self,
+        costs: &[[f64; N]],
+    ) -> Outcome<Vec<(&'f str, [f64; N])>> {
+        let decomposed = self.matrix.clone().svd(true, true);
+        let values = &decomposed.singular_values;
+        if values.min() < LEAST_SINGULAR * values.max() {
+            let direction = decomposed.v_t.as_ref().map(|v_t| v_t.row(values.imin()).into_owned());
+            let direction = direction.ok_or("the decomposition has no directions")?;
+            let parts = self.names.iter().zip(&direction).filter(|(_, part)| part.abs() > 1e-6);
+            let mixed: Vec<&str> = parts.map(|(name, _)| *name).collect();
+            return Err(format!(
+                "the designs do not tell the prices of these apart: {}",
+                mixed.join("; ")
+            ));
+        }
+        let right =
+            DMatrix::from_fn(costs.len(), N, |line, cost| costs[line][cost] / self.units[line]);
+        let solved = decomposed.solve(&right, 0.0)?;
+        let price = |column: usize| {
+            std::array::from_fn(|cost| solved[(column, cost)] / self.lengths[column])
+        };
+        Ok(self.names.iter().enumerate().map(|(column, name)| (*name, price(column))).collect())
+    }
+
+    /// The prices with the least squares of errors among those that are not negative, by coordinate descent on the
+    /// normal equations.
+    pub fn not_negative(&self, costs: &[f64]) -> BTreeMap<&'f str, f64> {
+        let right = DVector::from_iterator(costs.len(), costs.iter().copied());
+        let normal = self.matrix.tr_mul(&self.matrix);
+        let wanted = self.matrix.tr_mul(&right.component_div(&self.units));
+        let mut prices: DVector<f64> = DVector::zeros(self.names.len());
+        for _ in 0..ROUNDS {
+            for column in 0..prices.len() {
+                let error = normal.column(column).dot(&prices) - wanted[column];
+                prices[column] = (prices[column] - error / normal[(column, column)]).max(0.0);
+            }
+        }
+        prices.component_div_assign(&self.lengths);
+        self.names.iter().copied().zip(prices.iter().copied()).collect()
+    }
+}
