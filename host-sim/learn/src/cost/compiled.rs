@@ -28,7 +28,6 @@ pub(super) fn of_frame(design: &Design, exponential: Exponential, gating: Gating
     let readings = shape.rows * shape.inputs;
     let relative = design.relative_inputs;
     if design.projection {
-        pieces.add("frame of an array", 1);
         pieces.add("row of an array", shape.rows);
         pieces.add("array relative to the baseline", usize::from(relative));
         pieces.add(
@@ -43,8 +42,10 @@ pub(super) fn of_frame(design: &Design, exponential: Exponential, gating: Gating
     for network in &design.networks {
         if network.format == Format::F32Direct {
             direct(network, exponential, &mut pieces);
+            pieces.add("frame of an array in f32-direct", usize::from(design.projection));
         } else {
-            pieces.add(format!("network in {}", network.format.name()), 1);
+            let of = if design.projection { "frame of an array" } else { "row" };
+            pieces.add(format!("{of} in {}", network.format.name()), 1);
         }
     }
     pieces
