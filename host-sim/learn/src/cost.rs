@@ -25,9 +25,9 @@ use crate::infer::Exponential;
 /// The price list in the repository.
 const ACCEPTED: &str = include_str!("../../../firmware/prices.csv");
 
-/// Bytes of a line of an STM32F446's flash, and the cycles that reading one takes at 5 wait states.
+/// Bytes of a line of an STM32F446's flash, and the cycles that reading one waits at 180 MHz.
 const FLASH_LINE_BYTES: usize = 16;
-const FLASH_LINE_CYCLES: usize = 5;
+const WAIT_STATES: u64 = 5;
 
 /// What lies before decoding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -78,8 +78,14 @@ impl Prices {
         let (exact, mean) = (self.sum(&assembly)?, self.sum(&compiled)?);
         let [instructions, cycles, flash_cycles] =
             [0, 1, 2].map(|cost| (exact[cost] + mean[cost]).round() as u64);
-        let stalls = if gating == Gating::AtRest { 0 } else { weight_stalls(design) };
-        Ok(Cost { instructions, cycles, flash_cycles: flash_cycles + stalls })
+        let read = if gating == Gating::AtRest || design.weights_in_ram {
+            0
+        } else {
+            let networks: usize = design.row_networks().map(NetworkDesign::bytes).sum();
+            networks + design.projection_bytes()
+        };
+        let flash_cycles = flash_cycles + least_waiting_for_weights(read);
+        Ok(Cost { instructions, cycles, flash_cycles })
     }
 
     /// What a frame costs a model of this `design` without a gate, and behind gates.
@@ -95,12 +101,11 @@ impl Prices {
     }
 }
 
-/// Cycles at least that a frame waits for weights: none if they are in RAM.
-fn weight_stalls(design: &Design) -> u64 {
-    let bytes: usize = design.networks.iter().map(NetworkDesign::bytes).sum();
-    let read = bytes + design.projection_bytes();
-    let lines = if design.weights_in_ram { 0 } else { read.div_ceil(FLASH_LINE_BYTES) };
-    (lines * FLASH_LINE_CYCLES) as u64
+/// Least waiting in cycles for weights in flash of which so many `bytes` are read, once and in order: for every line, the
+/// wait states of one read. Weights are too many for the cache of data, and nothing prefetches data.
+#[must_use]
+pub fn least_waiting_for_weights(bytes: usize) -> u64 {
+    bytes.div_ceil(FLASH_LINE_BYTES) as u64 * WAIT_STATES
 }
 
 /// Name of a number format with an exponential, as `cargo xtask cycles` spells it.
@@ -111,5 +116,15 @@ pub fn kernel_name(format: Format, exponential: Exponential) -> String {
             format!("{}-{}", format.name(), exponential.name())
         }
         _ => format.name().into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::least_waiting_for_weights;
+
+    #[test]
+    fn each_line_of_flash_is_waited_for_once() {
+        assert_eq!([0, 1, 16, 17, 160].map(least_waiting_for_weights), [0, 5, 5, 10, 50]);
     }
 }

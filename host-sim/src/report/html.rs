@@ -116,7 +116,7 @@ fn header(result: &RunResult) -> String {
          <p>{} noise of {}{} · seed {} · {} training and {} test frames · scene digest {}</p>\n\
          <p>{} network{plural}: {inputs} → K = {} → {} outputs · spread {} · {tail} · \
          {} bytes · CRC-32 {}</p>\n\
-         <p>A frame on a Cortex-M4F: {} cycles at zero wait, {} from flash (told, docs/cycles.md)</p>\n</header>\n",
+         <p>A frame on a Cortex-M4F: {} cycles at zero wait, {} from flash (by the price list in docs/cycles.md)</p>\n</header>\n",
         escape(&scene.name),
         escape(&scene.noise_kind),
         percent(scene.noise_level),

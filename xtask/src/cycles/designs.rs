@@ -5,8 +5,9 @@ use model_core::rbf::Format;
 use taxel_data::random::{Purpose, Random, Stream};
 use taxel_learn::cost::Design;
 
-/// Most bytes of parameters: the image's slot holds 131,072 with names and headers.
-const MOST_BYTES: usize = 120_000;
+/// Most bytes of parameters: the image's slot holds 131,072, with names and headers, and a second network of half as
+/// many centres.
+const MOST_BYTES: usize = 80_000;
 
 /// Most readings, and most outputs, of a frame that the image has room for.
 const MOST_OF_FRAME: usize = 2000;
@@ -19,7 +20,7 @@ const FOR_PRICES: [(Format, usize); 3] =
     [(Format::F32, 360), (Format::Fixed16, 260), (Format::F32Direct, 180)];
 
 /// Number of designs that check the prices.
-pub const TO_CHECK: usize = 40;
+const TO_CHECK: usize = 40;
 
 /// Designs that bring out every branch of the code: sizes at which it changes are frequent.
 pub fn for_prices() -> Vec<Design> {
@@ -31,25 +32,44 @@ pub fn for_prices() -> Vec<Design> {
     const CENTRES: Ranges<'_> = &[(6, [1, 48]), (2, [120, 140]), (2, [250, 264]), (1, [500, 530])];
     // `f32-direct` has code of its own for 18 inputs and outputs.
     const MOSTLY_18: Ranges<'_> = &[(2, [18, 18]), (2, [1, 20]), (1, [21, 60])];
-    let designs = FOR_PRICES.iter().zip(0..).flat_map(|(&(format, count), part)| {
+    let drawn = FOR_PRICES.iter().zip(0..).flat_map(|(&(format, count), part)| {
         let [inputs, outputs] =
             if format == Format::F32Direct { [MOSTLY_18; 2] } else { [INPUTS, OUTPUTS] };
         let mut random = Random::new(1, Stream::Training, Purpose::Centres, 0, part);
         let ranges = [ROWS, inputs, outputs, CENTRES];
         (0..count).map(move |_| draw(format, ranges, &mut random))
     });
-    designs.collect()
+    // Projections to every group of features, of odd and even numbers of readings.
+    let features = (1..=24).flat_map(|inputs| [1, 2].map(|rows| (rows, inputs)));
+    let arrays = features.map(|(rows, inputs)| {
+        let shape = ModelShape { rows, inputs, outputs: 4 };
+        Design::of_array(shape, Format::Fixed16, 16, false)
+    });
+    drawn.chain(arrays).collect()
 }
 
-/// Designs as users have them, of all formats in turn.
+/// Designs as users have them, of all formats in turn. In every third, rows have two networks by turns.
 pub fn to_check() -> Vec<Design> {
     const SIZES: [Ranges<'_>; 4] =
         [&[(1, [1, 16])], &[(1, [1, 64])], &[(1, [1, 48])], &[(1, [4, 256])]];
     let mut random = Random::new(2, Stream::Test, Purpose::Centres, 0, 0);
-    (0..TO_CHECK).map(|i| draw(Format::ALL[i % Format::ALL.len()], SIZES, &mut random)).collect()
+    let design = |i: usize| {
+        let mut design = draw(Format::ALL[i % Format::ALL.len()], SIZES, &mut random);
+        if i.is_multiple_of(3) && !design.projection {
+            let mut other = design.networks[0];
+            other.format = Format::ALL[(i / 3) % Format::ALL.len()];
+            other.shape.centres = other.shape.centres.div_ceil(2);
+            (other.affine_tail, other.common_width) = (!other.affine_tail, true);
+            design.networks.push(other);
+            design.row_network = (0..design.shape.rows).map(|row| row % 2).collect();
+        }
+        design.in_ram_if_it_fits()
+    };
+    (0..TO_CHECK).map(design).collect()
 }
 
-/// A design of this `format`, with rows, inputs, outputs and centres from `ranges`, that fits the image.
+/// A design of this `format`, with rows, inputs, outputs and centres from `ranges`, that fits the image. Its rows share
+/// one network.
 fn draw(format: Format, ranges: [Ranges<'_>; 4], random: &mut Random) -> Design {
     loop {
         let [rows, inputs, outputs, centres] = ranges.map(|ranges| size(ranges, random));
@@ -57,15 +77,15 @@ fn draw(format: Format, ranges: [Ranges<'_>; 4], random: &mut Random) -> Design 
         let shape = ModelShape { rows, inputs, outputs };
         let design = if array { Design::of_array } else { Design::of_rows };
         let mut design = design(shape, format, centres, tail);
+        design.networks.truncate(1);
+        design.row_network.fill(0);
         design.relative_inputs = relative;
         if format == Format::F32Direct && widths && centres > 1 {
-            design.networks.iter_mut().for_each(|network| network.common_width = false);
+            design.networks[0].common_width = false;
         }
-        // The rows share one network.
-        design.distinct = 1;
         let fits = design.parameter_bytes() <= MOST_BYTES;
         if fits && rows * inputs <= MOST_OF_FRAME && rows * outputs <= MOST_OF_FRAME {
-            return design;
+            return design.in_ram_if_it_fits();
         }
     }
 }

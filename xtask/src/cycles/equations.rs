@@ -95,3 +95,66 @@ impl<'f> Equations<'f> {
         self.names.iter().copied().zip(prices.iter().copied()).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use model_core::blob::ModelShape;
+    use model_core::rbf::Format;
+    use taxel_learn::Exponential;
+    use taxel_learn::cost::{Design, FramePieces, Gating};
+
+    use super::*;
+
+    /// Pieces of one row of 18 inputs in `fixed16`: a start, and sixteen centres with as many outputs.
+    fn pieces(sixteens: usize, outputs: usize) -> Pieces {
+        let shape = ModelShape { rows: 1, inputs: 18, outputs };
+        let design = Design::of_rows(shape, Format::Fixed16, 16 * sixteens, false);
+        FramePieces::of(&design, Exponential::default(), Gating::Ungated).assembly
+    }
+
+    /// Pieces with several numbers of centres and outputs, and what they cost by these prices of each piece.
+    fn frames(price: impl Fn(&str) -> f64) -> (Vec<Pieces>, Vec<f64>) {
+        let sizes = (1..6).flat_map(|sixteens| [2, 5, 18].map(|outputs| (sixteens, outputs)));
+        let pieces: Vec<Pieces> =
+            sizes.map(|(sixteens, outputs)| pieces(sixteens, outputs)).collect();
+        let cost =
+            |pieces: &Pieces| pieces.iter().map(|(name, times)| price(name) * times as f64).sum();
+        let costs = pieces.iter().map(cost).collect();
+        (pieces, costs)
+    }
+
+    #[test]
+    fn prices_are_found_again() {
+        let price = |name: &str| name.len() as f64 - 20.0;
+        let (pieces, costs) = frames(price);
+        let equations = Equations::new(pieces.iter().map(|pieces| (vec![pieces], 7.0)));
+        let costs: Vec<[f64; 1]> = costs.into_iter().map(|cost| [cost]).collect();
+        let found = equations.least_squares(&costs).unwrap();
+        assert!(found.len() > 4, "{found:?}");
+        for (name, [found]) in found {
+            assert!((found - price(name)).abs() < 1e-6, "{name}: {found}");
+        }
+    }
+
+    #[test]
+    fn prices_that_cannot_be_negative_are_found_again_or_nothing() {
+        let price = |name: &str| if name.ends_with("an output") { 0.0 } else { 3.0 };
+        let (pieces, mut costs) = frames(price);
+        let equations = Equations::new(pieces.iter().map(|pieces| (vec![pieces], 1.0)));
+        for (name, found) in equations.not_negative(&costs) {
+            assert!((found - price(name)).abs() < 1e-3, "{name}: {found}");
+        }
+        costs.iter_mut().for_each(|cost| *cost = -1.0);
+        assert!(equations.not_negative(&costs).values().all(|price| *price == 0.0));
+    }
+
+    #[test]
+    fn pieces_that_always_come_together_are_named() {
+        // With 18 outputs alone, centres cannot be told from their outputs.
+        let pieces: Vec<Pieces> = (1..6).map(|sixteens| pieces(sixteens, 18)).collect();
+        let equations = Equations::new(pieces.iter().map(|pieces| (vec![pieces], 1.0)));
+        let error = equations.least_squares(&[[1.0]; 5]).unwrap_err();
+        assert!(error.contains("fixed16: sixteen centres, an output"), "{error}");
+        assert!(!error.contains("18 inputs, 18 outputs"), "{error}");
+    }
+}

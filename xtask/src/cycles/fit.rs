@@ -29,7 +29,7 @@ pub fn prices(frames: &[Frame]) -> Outcome<Vec<(String, Price)>> {
         exact.into_iter().map(|(name, price)| (name, price.map(f64::round))).collect();
     hold_exact(frames, &exact)?;
 
-    // What follows is told within a part of a frame's cost.
+    // Errors of what follows count relative to the frame's instructions.
     let unit = |frame: &Frame| frame.whole.instructions as f64;
     let equations = frames.iter().map(|frame| (vec![&frame.pieces.compiled], unit(frame)));
     let counted: Vec<_> = frames.iter().map(|frame| costs(frame.compiled())).collect();
@@ -54,21 +54,31 @@ fn costs(count: Count) -> [f64; 2] {
     [count.instructions as f64, count.cycles as f64]
 }
 
-/// Fails with the frame whose assembly executes most beside what these prices tell, if one does.
+/// Fails with the frame whose assembly costs most beside what these prices predict, if one does.
 fn hold_exact(frames: &[Frame], prices: &[(&str, [f64; 2])]) -> Outcome {
     let prices: BTreeMap<&str, [f64; 2]> = prices.iter().copied().collect();
     let beside = |frame: &Frame| {
-        let parts = frame.pieces.assembly.iter();
-        let told: f64 = parts.map(|(name, times)| prices[name][0] * times as f64).sum();
-        told - frame.assembly.instructions as f64
+        let counted = costs(frame.assembly);
+        let predicted = |cost: usize| -> f64 {
+            frame
+                .pieces
+                .assembly
+                .iter()
+                .map(|(name, times)| prices[name][cost] * times as f64)
+                .sum()
+        };
+        [0, 1].map(|cost| predicted(cost) - counted[cost])
     };
     let worst = frames.iter().map(|frame| (beside(frame), frame));
-    match worst.max_by(|(a, _), (b, _)| a.abs().total_cmp(&b.abs())) {
-        Some((by, frame)) if by != 0.0 => Err(format!(
-            "{}: its assembly is told by {by:+} instructions from what it executes; does \
-             host-sim/learn/src/cost/routines.rs have the pieces that it has?",
-            frame.what()
-        )),
+    let size = |[instructions, cycles]: [f64; 2]| instructions.abs() + cycles.abs();
+    match worst.max_by(|(a, _), (b, _)| size(*a).total_cmp(&size(*b))) {
+        Some(([instructions, cycles], frame)) if size([instructions, cycles]) != 0.0 => {
+            Err(format!(
+                "{}: its assembly costs other than its pieces, by {instructions:+} instructions and {cycles:+} cycles; \
+             does host-sim/learn/src/cost/routines.rs have the pieces that it executes?",
+                frame.what()
+            ))
+        }
         _ => Ok(()),
     }
 }

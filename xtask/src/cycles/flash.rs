@@ -163,11 +163,5 @@ impl<const LINES: usize> Cache<LINES> {
     }
 }
 
-/// Least waiting in cycles, if weights of `bytes` are read from flash once and in order: for every line, the wait
-/// states of one read. Weights are too many for the cache of data, and nothing prefetches data.
-pub fn least_waiting_for_weights(bytes: u64) -> u64 {
-    bytes.div_ceil(LINE_BYTES.into()) * WAIT_STATES
-}
-
 #[cfg(test)]
 mod tests;

@@ -3,9 +3,9 @@
 use std::fmt::Write as _;
 
 use model_core::rbf::{Shape, expanded, fixed16};
+use taxel_learn::cost::least_waiting_for_weights;
 
 use super::figures::{Figure, Group, Scope};
-use super::flash::least_waiting_for_weights;
 use super::regions::Count;
 
 /// Clock for which times at zero wait are given: the usual highest one of an STM32F4.
@@ -136,7 +136,7 @@ pub fn markdown(figures: &[Figure]) -> String {
 
 /// Bytes that an inference without tail reads of the paper's network with [`WEIGHTS_CENTRES`]: all but the scaling of
 /// its inputs. `None` for a kernel that is no assembly routine.
-fn bytes_of_weights(kernel: &str) -> Option<u64> {
+fn bytes_of_weights(kernel: &str) -> Option<usize> {
     let shape = Shape { inputs: 18, centres: WEIGHTS_CENTRES, outputs: 18 };
     let words = match kernel {
         "f32" => expanded::Network::block_words(shape, false),
@@ -144,7 +144,7 @@ fn bytes_of_weights(kernel: &str) -> Option<u64> {
         _ => return None,
     };
     let scaling = 2 * shape.inputs;
-    Some(4 * (words - scaling) as u64)
+    Some(4 * (words - scaling))
 }
 
 fn line(cells: &[String]) -> String {

@@ -39,7 +39,7 @@ pub(super) fn of_frame(design: &Design, exponential: Exponential, gating: Gating
         pieces.add("row relative to the baseline", if relative { shape.rows } else { 0 });
         pieces.add("reading relative to the baseline", if relative { readings } else { 0 });
     }
-    for network in &design.networks {
+    for network in design.row_networks() {
         if network.format == Format::F32Direct {
             direct(network, exponential, &mut pieces);
             pieces.add("frame of an array in f32-direct", usize::from(design.projection));

@@ -11,10 +11,10 @@ use crate::packing::ModelBlob;
 pub struct Design {
     /// Rows, and inputs and outputs a row.
     pub shape: ModelShape,
-    /// The network of every row; with a projection the one network for all rows.
+    /// The networks that the blob holds.
     pub networks: Vec<NetworkDesign>,
-    /// Number of distinct networks that the blob holds.
-    pub distinct: usize,
+    /// Index of the network that decodes each row; of the one for all rows behind a projection.
+    pub row_network: Vec<usize>,
     /// Whether one network decodes all rows, behind a projection of their readings to `shape.inputs` features.
     pub projection: bool,
     /// Whether inputs are relative to the baseline.
@@ -41,18 +41,12 @@ impl Design {
     #[must_use]
     pub fn of(blob: &ModelBlob) -> Self {
         let model = blob.parse();
-        let shape = model.shape();
-        let distinct: Vec<NetworkDesign> =
-            model.networks().map(|it| NetworkDesign::of(&it)).collect();
-        let projection = model.projection().is_some();
+        let (shape, projection) = (model.shape(), model.projection().is_some());
         let rows = if projection { 1 } else { shape.rows };
-        // A sound model has a network for every row.
-        let networks =
-            (0..rows).filter_map(|row| distinct.get(model.network_of_row(row)?).copied()).collect();
         Self {
             shape,
-            networks,
-            distinct: distinct.len(),
+            networks: model.networks().map(|network| NetworkDesign::of(&network)).collect(),
+            row_network: (0..rows).filter_map(|row| model.network_of_row(row)).collect(),
             projection,
             relative_inputs: model.metadata().relative_inputs,
             weights_in_ram: blob.bytes().len() <= WEIGHT_RAM_BYTES,
@@ -67,10 +61,15 @@ impl Design {
         let shape_of_row = Shape { inputs, centres, outputs };
         let network =
             NetworkDesign { format, shape: shape_of_row, affine_tail, common_width: true };
-        let networks = vec![network; rows];
-        let (distinct, projection, relative_inputs) = (rows, false, false);
-        Self { shape, networks, distinct, projection, relative_inputs, weights_in_ram: false }
-            .in_ram_if_it_fits()
+        let design = Self {
+            shape,
+            networks: vec![network; rows],
+            row_network: (0..rows).collect(),
+            projection: false,
+            relative_inputs: false,
+            weights_in_ram: false,
+        };
+        design.in_ram_if_it_fits()
     }
 
     /// The design of a model with one network for all rows, behind a projection. `shape` is that of the model.
@@ -78,21 +77,26 @@ impl Design {
     pub fn of_array(shape: ModelShape, format: Format, centres: usize, affine_tail: bool) -> Self {
         let outputs = shape.rows * shape.outputs;
         let one = ModelShape { rows: 1, outputs, ..shape };
-        let networks = Self::of_rows(one, format, centres, affine_tail).networks;
-        let (distinct, projection, relative_inputs) = (1, true, false);
-        Self { shape, networks, distinct, projection, relative_inputs, weights_in_ram: false }
-            .in_ram_if_it_fits()
+        let of_one = Self::of_rows(one, format, centres, affine_tail);
+        Self { shape, projection: true, ..of_one }.in_ram_if_it_fits()
     }
 
-    fn in_ram_if_it_fits(self) -> Self {
+    /// The same design with the weights where the images put them, going by its parameters alone.
+    #[must_use]
+    pub fn in_ram_if_it_fits(self) -> Self {
         Self { weights_in_ram: self.parameter_bytes() <= WEIGHT_RAM_BYTES, ..self }
     }
 
     /// Bytes of all parameters in a blob: networks and projection, without names and headers.
     #[must_use]
     pub fn parameter_bytes(&self) -> usize {
-        let network = self.networks.first().map_or(0, NetworkDesign::bytes);
-        network * self.distinct + self.projection_bytes()
+        let networks: usize = self.networks.iter().map(NetworkDesign::bytes).sum();
+        networks + self.projection_bytes()
+    }
+
+    /// The network of each row; with a projection the one for all rows.
+    pub fn row_networks(&self) -> impl Iterator<Item = &NetworkDesign> {
+        self.row_network.iter().filter_map(|index| self.networks.get(*index))
     }
 
     /// Bytes of the projection's parameters in a blob; 0 without one.

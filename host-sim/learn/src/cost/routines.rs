@@ -31,7 +31,7 @@ pub(super) fn of_frame(design: &Design, gating: Gating) -> Pieces {
         let readings = design.shape.rows * design.shape.inputs;
         project(readings, design.shape.inputs, &mut pieces);
     }
-    for network in &design.networks {
+    for network in design.row_networks() {
         match network.format {
             Format::Fixed16 => fixed16(network, &mut pieces),
             Format::F32 => f32(network, &mut pieces),

@@ -100,8 +100,3 @@ fn eight_lines_of_literals_are_kept() {
     // The ninth takes the place of 11, which was used least recently.
     assert_eq!((load(18), load(10), load(11)), (105, 100, 105));
 }
-
-#[test]
-fn weights_in_flash_cost_the_wait_states_of_each_of_their_lines() {
-    assert_eq!([0, 1, 16, 17, 160].map(least_waiting_for_weights), [0, 5, 5, 10, 50]);
-}
