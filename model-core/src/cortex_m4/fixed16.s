@@ -31,10 +31,11 @@
 @   s23 activations to come    s24 end of the activations
 @   s25 frame    s26 term that all exponents share
 @   s27 words behind the batch
+@ Until the powers, s27 is the batch's words, and s24 the end of sixteen exponents on the stack.
 @ For many inputs, which stream by, and until the powers:
-@   s27 pairs of inputs    s28 passes over four fours of them    s29 where the first pass begins
-@   s30 bytes of an exponent's line    s31 bytes that are read beyond it
-@ s24 is the end of sixteen exponents on the stack until the powers.
+@   s24 words behind the batch
+@   s28 end of the pairs of inputs    s29 bytes that the tail's lines are read too far; then pairs of inputs to come
+@   s30 bytes from the first eight pairs of a line to the next line    s31 and from eight pairs more
 
 @ r1 = one line at r0: a number, and as many pairs times those from r4 on. r2, r3, lr are overwritten, and the
 @ registers between the inputs and lr.
@@ -144,30 +145,23 @@
     b.w fixed16_powers
     .endm
 
-@ r2 and r1 += four pairs at r0, and at r3, times those at r12.
-    .macro fixed16_four_pairs
-    ldmia r12!, {r4-r7}
-    ldmia r0!, {r8-r11}
-    smlad r2, r8, r4, r2
-    smlad r2, r9, r5, r2
-    smlad r2, r10, r6, r2
-    smlad r2, r11, r7, r2
-    ldmia r3!, {r8-r11}
-    smlad r1, r8, r4, r1
-    smlad r1, r9, r5, r1
-    smlad r1, r10, r6, r1
-    smlad r1, r11, r7, r1
-    .endm
-    .equ FX_FOUR_PAIRS_BYTES, 44
-
-@ Begins two lines of many pairs at r0: r2 and r1 are their first numbers.
-    .macro fixed16_two_of_many
-    vmov r12, lr, s27, s28
-    vmov r4, r2, s29, s30
-    add r3, r0, r2
-    ldr r2, [r0], #4
-    ldr r1, [r3], #4
-    bx r4
+@ Adds the products of eight pairs at r0 and those in r4..r11 to an exponent, \place places before r12.
+    .macro fixed16_eight_more place
+    ldr r1, [r12, #-\place * 4]
+    ldmia r0!, {r2, r3, lr}
+    smlad r1, r2, r4, r1
+    smlad r1, r3, r5, r1
+    smlad r1, lr, r6, r1
+    ldmia r0!, {r2, r3, lr}
+    smlad r1, r2, r7, r1
+    smlad r1, r3, r8, r1
+    smlad r1, lr, r9, r1
+    ldmia r0!, {r2, r3}
+    smlad r1, r2, r10, r1
+    smlad r1, r3, r11, r1
+    vmov lr, s31
+    add r0, lr
+    str r1, [r12, #-\place * 4]
     .endm
 
 @ \pair = the high halves of two inputs, whose squares are added to \high:\low.
@@ -674,14 +668,16 @@ fixed16_any:
     lsrs r3, r3, #2
     lsls r8, r3, #4
     sub r8, r8, r5, lsl #2
-    adds r5, #1
+    add r9, r1, r3, lsl #4
+    vmov s28, s29, r9, r8
     lsls r5, r5, #2
+    subs r5, #32
+    adds r8, r5, #4
     vmov s30, s31, r5, r8
     ldr r2, [sp, #FX_FORM]
     lsls r2, r2, #31 @ AFFINE
     beq 5f
-    add r4, r1, r3, lsl #4
-    vmov s18, s19, r1, r4
+    vmov s18, r1
     mov r1, r7
     ldr r2, [sp, #FX_OUTPUT]
     mov r3, r6
@@ -695,10 +691,10 @@ fixed16_any:
     smlad lr, r9, r5, lr
     smlad lr, r10, r6, lr
     smlad lr, r11, r7, lr
-    vmov r4, s19
+    vmov r4, s28
     cmp r12, r4
     bne 3b
-    vmov r4, s31
+    vmov r4, s29
     sub r0, r0, r4
     str lr, [r2], #4
     subs r3, #1
@@ -805,42 +801,69 @@ fixed16_group:
     ldmia r1, {r4-r12}
     b.w fixed16_exponents_of_nine
 
-@ Exponents of ten or more pairs of inputs at r1, r2 of them, which stream by for two centres at once
+@ Exponents of ten or more pairs of inputs at r1: the first four or eight for all centres, then eight more at a time
 fixed16_exponents_of_many:
-    adds r2, #3
-    lsrs r2, r2, #2
-    adds r3, r2, #3
-    lsrs r3, r3, #2
-    vmov s27, s28, r1, r3
-    rsb r2, r2, r3, lsl #2
-    movs r1, #FX_FOUR_PAIRS_BYTES
-    adr r3, 2f + 1
-    mla r3, r2, r1, r3
-    vmov s29, r3
-4:
-    sub r1, sp, #16 * 4
-    vmov s24, r1
-    fixed16_two_of_many
-    .balign 4
+    vmov r3, s28
+    subs r3, r3, r1
+    ldmia r1!, {r4-r7}
+    lsls r3, r3, #27 @ fours odd in number?
+    bmi 3f
+    ldmia r1!, {r8-r11}
+    vmov s29, r1
 2:
-    fixed16_four_pairs
-    fixed16_four_pairs
-    fixed16_four_pairs
-    fixed16_four_pairs
-    subs lr, #1
+    sub sp, #16 * 4
+    .irp place, 15,14,13,12,11,10,9,8,7,6,5,4,3,2,1,0
+    fixed16_line 8
+    vmov lr, s30
+    add r0, lr
+    str r1, [sp, #\place * 4]
+    .endr
+    vmov r1, r2, s18, s19
+    add r0, r0, r2
+    cmp sp, r1
     bne 2b
-    push {r1, r2}
-    vmov r4, s31
-    sub r0, r3, r4
-    vmov r4, s24
-    cmp sp, r4
-    beq 3f
-    fixed16_two_of_many @ again, because a branch back to the first would take two cycles more
+    b 5f
 3:
+    vmov s29, r1
+    vmov r8, s30
+    adds r8, #16
+4:
+    sub sp, #16 * 4
+    .irp place, 15,14,13,12,11,10,9,8,7,6,5,4,3,2,1,0
+    fixed16_line 4
+    add r0, r8
+    str r1, [sp, #\place * 4]
+    .endr
     vmov r1, r2, s18, s19
     add r0, r0, r2
     cmp sp, r1
     bne 4b
+5:
+    vmov s24, r0
+6:
+    vmov r2, r1, s28, s29
+    cmp r1, r2
+    beq 8f
+    vmov r12, s25
+    vmov r0, s27
+    ldr r2, [r12, #FX_X]
+    adds r0, #4
+    subs r2, r1, r2
+    ldmia r1!, {r4-r11}
+    add r0, r0, r2
+    vmov s29, r1
+7:
+    .irp place, 1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16
+    fixed16_eight_more \place
+    .endr
+    vmov r1, r2, s18, s19
+    sub r12, r12, #16 * 4
+    add r0, r0, r2
+    cmp r12, r1
+    bne 7b
+    b 6b
+8:
+    vmov r0, s24
     b.w fixed16_powers
 
 @ A group's sums are complete for this batch.
