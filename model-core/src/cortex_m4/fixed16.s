@@ -37,76 +37,59 @@
 @   s28 end of the pairs of inputs    s29 bytes that the tail's lines are read too far; then pairs of inputs to come
 @   s30 bytes from the first eight pairs of a line to the next line    s31 and from eight pairs more
 
+@ r1 += the pairs in \weights, times those in r\first and the registers behind it (before it if \step is -1).
+    .macro fixed16_products first, step, weights:vararg
+    .altmacro
+    .set done, 0
+    .irp weight, \weights
+    fixed16_product \weight, %(\first + done)
+    .set done, done + \step
+    .endr
+    .noaltmacro
+    .endm
+
+    .macro fixed16_product weight, number
+    smlad r1, \weight, r\number, r1
+    .endm
+
 @ r1 = one line at r0: a number, and as many pairs times those from r4 on. r2, r3, lr are overwritten, and the
 @ registers between the inputs and lr.
     .macro fixed16_line pairs
     .if \pairs == 1
     ldmia r0!, {r1, r2}
-    smlad r1, r2, r4, r1
+    fixed16_products 4, 1, r2
     .elseif \pairs == 2
     ldmia r0!, {r1, r2, r3}
-    smlad r1, r2, r4, r1
-    smlad r1, r3, r5, r1
+    fixed16_products 4, 1, r2, r3
     .elseif \pairs == 3
     ldmia r0!, {r1, r2, r3, lr}
-    smlad r1, r2, r4, r1
-    smlad r1, r3, r5, r1
-    smlad r1, lr, r6, r1
+    fixed16_products 4, 1, r2, r3, lr
     .elseif \pairs == 4
     ldmia r0!, {r1, r2, r3, r12, lr}
-    smlad r1, r2, r4, r1
-    smlad r1, r3, r5, r1
-    smlad r1, r12, r6, r1
-    smlad r1, lr, r7, r1
+    fixed16_products 4, 1, r2, r3, r12, lr
     .elseif \pairs == 5
     ldmia r0!, {r1, r2, r3, r11, r12, lr}
-    smlad r1, r2, r4, r1
-    smlad r1, r3, r5, r1
-    smlad r1, r11, r6, r1
-    smlad r1, r12, r7, r1
-    smlad r1, lr, r8, r1
+    fixed16_products 4, 1, r2, r3, r11, r12, lr
     .elseif \pairs == 6
     ldmia r0!, {r1, r2, r3, r10, r11, r12, lr}
-    smlad r1, r2, r4, r1
-    smlad r1, r3, r5, r1
-    smlad r1, r10, r6, r1
-    smlad r1, r11, r7, r1
-    smlad r1, r12, r8, r1
-    smlad r1, lr, r9, r1
+    fixed16_products 4, 1, r2, r3, r10, r11, r12, lr
     .elseif \pairs == 7
     ldmia r0!, {r1, r2, r3, r11, r12, lr}
-    smlad r1, r2, r4, r1
-    smlad r1, r3, r5, r1
-    smlad r1, r11, r6, r1
-    smlad r1, r12, r7, r1
-    smlad r1, lr, r8, r1
+    fixed16_products 4, 1, r2, r3, r11, r12, lr
     ldmia r0!, {r2, r3}
-    smlad r1, r2, r9, r1
-    smlad r1, r3, r10, r1
+    fixed16_products 9, 1, r2, r3
     .elseif \pairs == 8
     ldmia r0!, {r1, r2, r3, r12, lr}
-    smlad r1, r2, r4, r1
-    smlad r1, r3, r5, r1
-    smlad r1, r12, r6, r1
-    smlad r1, lr, r7, r1
+    fixed16_products 4, 1, r2, r3, r12, lr
     ldmia r0!, {r2, r3, r12, lr}
-    smlad r1, r2, r8, r1
-    smlad r1, r3, r9, r1
-    smlad r1, r12, r10, r1
-    smlad r1, lr, r11, r1
+    fixed16_products 8, 1, r2, r3, r12, lr
     .elseif \pairs == 9
     ldmia r0!, {r1, r2, r3, lr}
-    smlad r1, r2, r4, r1
-    smlad r1, r3, r5, r1
-    smlad r1, lr, r6, r1
+    fixed16_products 4, 1, r2, r3, lr
     ldmia r0!, {r2, r3, lr}
-    smlad r1, r2, r7, r1
-    smlad r1, r3, r8, r1
-    smlad r1, lr, r9, r1
+    fixed16_products 7, 1, r2, r3, lr
     ldmia r0!, {r2, r3, lr}
-    smlad r1, r2, r10, r1
-    smlad r1, r3, r11, r1
-    smlad r1, lr, r12, r1
+    fixed16_products 10, 1, r2, r3, lr
     .endif
     .endm
 
@@ -149,16 +132,11 @@
     .macro fixed16_eight_more place
     ldr r1, [r12, #-\place * 4]
     ldmia r0!, {r2, r3, lr}
-    smlad r1, r2, r4, r1
-    smlad r1, r3, r5, r1
-    smlad r1, lr, r6, r1
+    fixed16_products 4, 1, r2, r3, lr
     ldmia r0!, {r2, r3, lr}
-    smlad r1, r2, r7, r1
-    smlad r1, r3, r8, r1
-    smlad r1, lr, r9, r1
+    fixed16_products 7, 1, r2, r3, lr
     ldmia r0!, {r2, r3}
-    smlad r1, r2, r10, r1
-    smlad r1, r3, r11, r1
+    fixed16_products 10, 1, r2, r3
     vmov lr, s31
     add r0, lr
     str r1, [r12, #-\place * 4]
@@ -186,15 +164,9 @@
     .macro fixed16_sum sum
     vmov r1, \sum
     ldmdb r0!, {r2, r3, r12, lr}
-    smlad r1, r2, r7, r1
-    smlad r1, r3, r6, r1
-    smlad r1, r12, r5, r1
-    smlad r1, lr, r4, r1
+    fixed16_products 7, -1, r2, r3, r12, lr
     ldmdb r0!, {r2, r3, r12, lr}
-    smlad r1, r2, r11, r1
-    smlad r1, r3, r10, r1
-    smlad r1, r12, r9, r1
-    smlad r1, lr, r8, r1
+    fixed16_products 11, -1, r2, r3, r12, lr
     vmov \sum, r1
     .endm
     .equ FX_SUM_BYTES, 48
@@ -203,17 +175,11 @@
     .macro fixed16_tail_of_nine sum
     vmov r1, \sum
     ldmdb r0!, {r2, r3, lr}
-    smlad r1, r2, r10, r1
-    smlad r1, r3, r11, r1
-    smlad r1, lr, r12, r1
+    fixed16_products 10, 1, r2, r3, lr
     ldmdb r0!, {r2, r3, lr}
-    smlad r1, r2, r7, r1
-    smlad r1, r3, r8, r1
-    smlad r1, lr, r9, r1
+    fixed16_products 7, 1, r2, r3, lr
     ldmdb r0!, {r2, r3, lr}
-    smlad r1, r2, r4, r1
-    smlad r1, r3, r5, r1
-    smlad r1, lr, r6, r1
+    fixed16_products 4, 1, r2, r3, lr
     vmov \sum, r1
     .endm
     .equ FX_TAIL_BYTES, 56
@@ -244,9 +210,7 @@
     with_eighteen vsub, r0
     with_eighteen vmul, r0
 1:
-    .irp i, 0,1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17
-    vcvt.s32.f32 s\i, s\i
-    .endr
+    convert 18, 0, s32, f32
     add r0, r8, #36 * 4
     vmov r1, r2, s0, s1
     pkhtb r4, r2, r1, asr #16
@@ -435,47 +399,14 @@ fixed16_scale:
 1:
     bx lr
 2:
-    vcvt.f32.s32 s0, s0
-    vcvt.f32.s32 s1, s1
-    vcvt.f32.s32 s2, s2
-    vcvt.f32.s32 s3, s3
+    .irp first, 0, 4, 8, 12
+    convert 4, \first, f32, s32
     vldmia r4!, {s18-s21}
-    vmul.f32 s0, s0, s18
-    vmul.f32 s1, s1, s19
-    vmul.f32 s2, s2, s20
-    vmul.f32 s3, s3, s21
-    vcvt.f32.s32 s4, s4
-    vcvt.f32.s32 s5, s5
-    vcvt.f32.s32 s6, s6
-    vcvt.f32.s32 s7, s7
-    vldmia r4!, {s18-s21}
-    vmul.f32 s4, s4, s18
-    vmul.f32 s5, s5, s19
-    vmul.f32 s6, s6, s20
-    vmul.f32 s7, s7, s21
-    vcvt.f32.s32 s8, s8
-    vcvt.f32.s32 s9, s9
-    vcvt.f32.s32 s10, s10
-    vcvt.f32.s32 s11, s11
-    vldmia r4!, {s18-s21}
-    vmul.f32 s8, s8, s18
-    vmul.f32 s9, s9, s19
-    vmul.f32 s10, s10, s20
-    vmul.f32 s11, s11, s21
-    vcvt.f32.s32 s12, s12
-    vcvt.f32.s32 s13, s13
-    vcvt.f32.s32 s14, s14
-    vcvt.f32.s32 s15, s15
-    vldmia r4!, {s18-s21}
-    vmul.f32 s12, s12, s18
-    vmul.f32 s13, s13, s19
-    vmul.f32 s14, s14, s20
-    vmul.f32 s15, s15, s21
-    vcvt.f32.s32 s16, s16
-    vcvt.f32.s32 s17, s17
+    each 4, vmul, \first, \first, 18
+    .endr
+    convert 2, 16, f32, s32
     vldmia r4!, {s18-s19}
-    vmul.f32 s16, s16, s18
-    vmul.f32 s17, s17, s19
+    each 2, vmul, 16, 16, 18
     vstmia r1, {s0-s17}
     bx lr
 
@@ -484,9 +415,7 @@ fixed16_summed_18:
     vmov lr, s25
     mov sp, lr
     pop {r1-r5} @ output, space, centres, form, scale
-    .irp i, 0,1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17
-    vcvt.f32.s32 s\i, s\i
-    .endr
+    convert 18, 0, f32, s32
     with_eighteen vmul, r5
     vmrs r0, fpscr
     vstmia r1, {s0-s17}
@@ -558,22 +487,10 @@ fixed16_any:
     cbnz r7, 3f
     vldmia r8!, {s6-s11}
     vldmia r3!, {s12-s17}
-    vsub.f32 s0, s0, s6
-    vsub.f32 s1, s1, s7
-    vsub.f32 s2, s2, s8
-    vsub.f32 s3, s3, s9
-    vsub.f32 s4, s4, s10
-    vsub.f32 s5, s5, s11
-    vmul.f32 s0, s0, s12
-    vmul.f32 s1, s1, s13
-    vmul.f32 s2, s2, s14
-    vmul.f32 s3, s3, s15
-    vmul.f32 s4, s4, s16
-    vmul.f32 s5, s5, s17
+    each 6, vsub, 0, 0, 6
+    each 6, vmul, 0, 0, 12
 3:
-    .irp i, 0,1,2,3,4,5
-    vcvt.s32.f32 s\i, s\i
-    .endr
+    convert 6, 0, s32, f32
     fixed16_input r5, s0, s1, r9, r10
     fixed16_input r6, s2, s3, r9, r10
     fixed16_input r11, s4, s5, r9, r10
