@@ -118,7 +118,7 @@ fn shapes() -> impl Iterator<Item = Shape> {
     });
     let outputs = (1..=40).map(|outputs| Shape { inputs: 7, centres: 16, outputs });
     let large = [1, 15, 16, 17, 128, 129, 257].into_iter().flat_map(|centres| {
-        let sizes = [(18, 18), (18, 6), (18, 36), (12, 5), (1, 1), (32, 24), (144, 6)];
+        let sizes = [(18, 18), (18, 6), (18, 36), (12, 5), (1, 1), (24, 3), (32, 24), (144, 6)];
         sizes.map(|(inputs, outputs)| Shape { inputs, centres, outputs })
     });
     let wide = [17, 63, 64, 127, 128, 144, 160]

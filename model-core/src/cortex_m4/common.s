@@ -28,28 +28,66 @@
 @ Bit of the FPSCR
     .equ INVALID_OPERATION, 1
 
+@ Runs of instructions on consecutive registers, which `done` counts. % computes an argument, behind .altmacro alone.
+
+@ s\to = s\left \operation s\right, and so on with the registers behind each: \count times.
+    .macro each count, operation, to, left, right
+    .altmacro
+    .set done, 0
+    .rept \count
+    each_one \operation, %(\to + done), %(\left + done), s, %(\right + done)
+    .set done, done + 1
+    .endr
+    .noaltmacro
+    .endm
+
+@ s\to = s\left \operation \right, and so on with the registers behind the first two: \count times.
+    .macro each_with count, operation, to, left, right
+    .altmacro
+    .set done, 0
+    .rept \count
+    each_one \operation, %(\to + done), %(\left + done), \right
+    .set done, done + 1
+    .endr
+    .noaltmacro
+    .endm
+
+    .macro each_one operation, to, left, right, number
+    \operation\().f32 s\to, s\left, \right\()\number
+    .endm
+
+@ Converts s\first and the registers behind it, \count in all, in place.
+    .macro convert count, first, to, from
+    .altmacro
+    .set done, 0
+    .rept \count
+    convert_one %(\first + done), \to, \from
+    .set done, done + 1
+    .endr
+    .noaltmacro
+    .endm
+
+    .macro convert_one number, to, from
+    vcvt.\to\().\from s\number, s\number
+    .endm
+
+@ Loads s18 and the registers behind it, \count in all, from \at, which moves past the numbers.
+    .macro load_from_18 count, at
+    .altmacro
+    load_to %(17 + \count), \at
+    .noaltmacro
+    .endm
+
+    .macro load_to last, at
+    vldmia \at!, {s18-s\last}
+    .endm
+
 @ s0..s17 = s0..s17 \operation the 18 numbers at \at; \at moves past them. s18..s27 are overwritten.
     .macro with_eighteen operation, at
     vldmia \at!, {s18-s27}
-    \operation\().f32 s0, s0, s18
-    \operation\().f32 s1, s1, s19
-    \operation\().f32 s2, s2, s20
-    \operation\().f32 s3, s3, s21
-    \operation\().f32 s4, s4, s22
-    \operation\().f32 s5, s5, s23
-    \operation\().f32 s6, s6, s24
-    \operation\().f32 s7, s7, s25
-    \operation\().f32 s8, s8, s26
-    \operation\().f32 s9, s9, s27
+    each 10, \operation, 0, 0, 18
     vldmia \at!, {s18-s25}
-    \operation\().f32 s10, s10, s18
-    \operation\().f32 s11, s11, s19
-    \operation\().f32 s12, s12, s20
-    \operation\().f32 s13, s13, s21
-    \operation\().f32 s14, s14, s22
-    \operation\().f32 s15, s15, s23
-    \operation\().f32 s16, s16, s24
-    \operation\().f32 s17, s17, s25
+    each 8, \operation, 10, 10, 18
     .endm
 
 @ The invalid-operation flag is cleared; it is set afterwards if an input was saturated or NaN. \scratch is overwritten.

@@ -21,45 +21,24 @@
     .equ F32_ACTIVATIONS, 36
     .equ F32_FRAME, F32_ACTIVATIONS + F32_MOST * 16
 
-@ First half of one centre of 18 inputs: s18..s21 become the four partial sums, 9 products taken in.
+@ Exponent of one centre of 18 inputs, but for the last addition, s18 + s19. The first half of its line is in s20..s29.
     .macro f32_first_half
-    vmul.f32 s21, s21, s0
-    vmul.f32 s22, s22, s1
-    vmul.f32 s23, s23, s2
-    vmul.f32 s24, s24, s3
-    vmul.f32 s25, s25, s4
-    vmul.f32 s26, s26, s5
-    vmul.f32 s27, s27, s6
-    vmul.f32 s28, s28, s7
-    vmul.f32 s29, s29, s8
+    each 9, vmul, 21, 21, 0
     .endm
 
+@ s18..s21 become the four partial sums.
     .macro f32_second_half
     vadd.f32 s18, s20, s21
     vadd.f32 s19, s31, s22
     vadd.f32 s20, s23, s27
     vadd.f32 s21, s24, s28
-    vadd.f32 s18, s18, s25
-    vadd.f32 s19, s19, s26
+    each 2, vadd, 18, 18, 25
     vadd.f32 s18, s18, s29
     vldmia r1!, {s22-s30}
-    vmul.f32 s22, s22, s9
-    vmul.f32 s23, s23, s10
-    vmul.f32 s24, s24, s11
-    vmul.f32 s25, s25, s12
-    vmul.f32 s26, s26, s13
-    vmul.f32 s27, s27, s14
-    vmul.f32 s28, s28, s15
-    vmul.f32 s29, s29, s16
-    vmul.f32 s30, s30, s17
-    vadd.f32 s19, s19, s22
-    vadd.f32 s20, s20, s23
-    vadd.f32 s21, s21, s24
-    vadd.f32 s18, s18, s25
-    vadd.f32 s19, s19, s26
-    vadd.f32 s20, s20, s27
-    vadd.f32 s18, s18, s29
-    vadd.f32 s19, s19, s30
+    each 9, vmul, 22, 22, 9
+    each 3, vadd, 19, 19, 22
+    each 3, vadd, 18, 18, 25
+    each 2, vadd, 18, 18, 29
     vadd.f32 s21, s21, s28
     vadd.f32 s18, s18, s19
     vadd.f32 s19, s20, s21
@@ -74,212 +53,62 @@
     f32_second_half
     .endm
 
-@ Exponents of two centres of 4 inputs, by turns.
-    .macro f32_centres_4
-    vldmia r1!, {s18-s22}
-    vmul.f32 s19, s19, s0
-    vmul.f32 s20, s20, s1
-    vmul.f32 s21, s21, s2
-    vmul.f32 s22, s22, s3
+@ Exponent of one centre of 4, 8 or 12 inputs, but for the last addition, s18 + s21.
+    .macro f32_centre inputs
+    load_from_18 1 + \inputs, r1
+    each \inputs, vmul, 19, 19, 0
     vadd.f32 s18, s18, s19
     vadd.f32 s20, s31, s20
-    vadd.f32 s21, s21, s22
-    vadd.f32 s18, s18, s20
-    add r1, r1, r12
-    vadd.f32 s17, s18, s21
-    vldmia r1!, {s18-s22}
-    vmul.f32 s19, s19, s0
-    vmul.f32 s20, s20, s1
-    vmul.f32 s21, s21, s2
-    vmul.f32 s22, s22, s3
-    vadd.f32 s18, s18, s19
-    vadd.f32 s20, s31, s20
-    vadd.f32 s21, s21, s22
-    vadd.f32 s18, s18, s20
-    subs r3, #1
-    vadd.f32 s18, s18, s21
-    add r1, r1, r12
-    vstmia r2!, {s17-s18}
-    .endm
-
-@ Exponents of two centres of 8 inputs, by turns.
-    .macro f32_centres_8
-    vldmia r1!, {s18-s26}
-    vmul.f32 s19, s19, s0
-    vmul.f32 s20, s20, s1
-    vmul.f32 s21, s21, s2
-    vmul.f32 s22, s22, s3
-    vmul.f32 s23, s23, s4
-    vmul.f32 s24, s24, s5
-    vmul.f32 s25, s25, s6
-    vmul.f32 s26, s26, s7
-    vadd.f32 s18, s18, s19
-    vadd.f32 s20, s31, s20
-    vadd.f32 s21, s21, s25
-    vadd.f32 s22, s22, s26
+    .if \inputs >= 8
+    each 2, vadd, 21, 21, 25
     vadd.f32 s18, s18, s23
     vadd.f32 s20, s20, s24
-    vadd.f32 s21, s21, s22
-    vadd.f32 s18, s18, s20
-    add r1, r1, r12
-    vadd.f32 s17, s18, s21
-    vldmia r1!, {s18-s26}
-    vmul.f32 s19, s19, s0
-    vmul.f32 s20, s20, s1
-    vmul.f32 s21, s21, s2
-    vmul.f32 s22, s22, s3
-    vmul.f32 s23, s23, s4
-    vmul.f32 s24, s24, s5
-    vmul.f32 s25, s25, s6
-    vmul.f32 s26, s26, s7
-    vadd.f32 s18, s18, s19
-    vadd.f32 s20, s31, s20
-    vadd.f32 s21, s21, s25
-    vadd.f32 s22, s22, s26
-    vadd.f32 s18, s18, s23
-    vadd.f32 s20, s20, s24
-    vadd.f32 s21, s21, s22
-    vadd.f32 s18, s18, s20
-    subs r3, #1
-    vadd.f32 s18, s18, s21
-    add r1, r1, r12
-    vstmia r2!, {s17-s18}
-    .endm
-
-@ Exponents of two centres of 12 inputs, by turns.
-    .macro f32_centres_12
-    vldmia r1!, {s18-s30}
-    vmul.f32 s19, s19, s0
-    vmul.f32 s20, s20, s1
-    vmul.f32 s21, s21, s2
-    vmul.f32 s22, s22, s3
-    vmul.f32 s23, s23, s4
-    vmul.f32 s24, s24, s5
-    vmul.f32 s25, s25, s6
-    vmul.f32 s26, s26, s7
-    vmul.f32 s27, s27, s8
-    vmul.f32 s28, s28, s9
-    vmul.f32 s29, s29, s10
-    vmul.f32 s30, s30, s11
-    vadd.f32 s18, s18, s19
-    vadd.f32 s20, s31, s20
-    vadd.f32 s21, s21, s25
-    vadd.f32 s22, s22, s26
-    vadd.f32 s18, s18, s23
-    vadd.f32 s20, s20, s24
-    vadd.f32 s21, s21, s29
-    vadd.f32 s22, s22, s30
+    .endif
+    .if \inputs == 12
+    each 2, vadd, 21, 21, 29
     vadd.f32 s18, s18, s27
     vadd.f32 s20, s20, s28
+    .endif
     vadd.f32 s21, s21, s22
     vadd.f32 s18, s18, s20
-    add r1, r1, r12
-    vadd.f32 s17, s18, s21
-    vldmia r1!, {s18-s30}
-    vmul.f32 s19, s19, s0
-    vmul.f32 s20, s20, s1
-    vmul.f32 s21, s21, s2
-    vmul.f32 s22, s22, s3
-    vmul.f32 s23, s23, s4
-    vmul.f32 s24, s24, s5
-    vmul.f32 s25, s25, s6
-    vmul.f32 s26, s26, s7
-    vmul.f32 s27, s27, s8
-    vmul.f32 s28, s28, s9
-    vmul.f32 s29, s29, s10
-    vmul.f32 s30, s30, s11
-    vadd.f32 s18, s18, s19
-    vadd.f32 s20, s31, s20
-    vadd.f32 s21, s21, s25
-    vadd.f32 s22, s22, s26
-    vadd.f32 s18, s18, s23
-    vadd.f32 s20, s20, s24
-    vadd.f32 s21, s21, s29
-    vadd.f32 s22, s22, s30
-    vadd.f32 s18, s18, s27
-    vadd.f32 s20, s20, s28
-    vadd.f32 s21, s21, s22
-    vadd.f32 s18, s18, s20
-    subs r3, #1
-    vadd.f32 s18, s18, s21
-    add r1, r1, r12
-    vstmia r2!, {s17-s18}
     .endm
 
-@ Exponents of two centres of 16 inputs, by turns.
-    .macro f32_centres_16
+@ Exponent of one centre of 16 inputs, but for the last addition, s18 + s28.
+    .macro f32_centre_of_16
     vldmia r1!, {s18-s26}
-    vmul.f32 s19, s19, s0
-    vmul.f32 s20, s20, s1
-    vmul.f32 s21, s21, s2
-    vmul.f32 s22, s22, s3
-    vmul.f32 s23, s23, s4
-    vmul.f32 s24, s24, s5
-    vmul.f32 s25, s25, s6
-    vmul.f32 s26, s26, s7
+    each 8, vmul, 19, 19, 0
     vadd.f32 s18, s18, s19
     vadd.f32 s27, s31, s20
-    vadd.f32 s28, s21, s25
-    vadd.f32 s29, s22, s26
+    each 2, vadd, 28, 21, 25
     vadd.f32 s18, s18, s23
     vadd.f32 s27, s27, s24
     vldmia r1!, {s19-s26}
-    vmul.f32 s19, s19, s8
-    vmul.f32 s20, s20, s9
-    vmul.f32 s21, s21, s10
-    vmul.f32 s22, s22, s11
-    vmul.f32 s23, s23, s12
-    vmul.f32 s24, s24, s13
-    vmul.f32 s25, s25, s14
-    vmul.f32 s26, s26, s15
+    each 8, vmul, 19, 19, 8
     vadd.f32 s18, s18, s19
-    vadd.f32 s27, s27, s20
-    vadd.f32 s28, s28, s21
-    vadd.f32 s29, s29, s22
+    each 3, vadd, 27, 27, 20
     vadd.f32 s18, s18, s23
-    vadd.f32 s27, s27, s24
-    vadd.f32 s28, s28, s25
-    vadd.f32 s29, s29, s26
+    each 3, vadd, 27, 27, 24
     vadd.f32 s28, s28, s29
     vadd.f32 s18, s18, s27
+    .endm
+
+@ Exponents of two centres, by turns.
+    .macro f32_centres inputs
+    .if \inputs == 16
+    f32_centre_of_16
     add r1, r1, r12
     vadd.f32 s17, s18, s28
-    vldmia r1!, {s18-s26}
-    vmul.f32 s19, s19, s0
-    vmul.f32 s20, s20, s1
-    vmul.f32 s21, s21, s2
-    vmul.f32 s22, s22, s3
-    vmul.f32 s23, s23, s4
-    vmul.f32 s24, s24, s5
-    vmul.f32 s25, s25, s6
-    vmul.f32 s26, s26, s7
-    vadd.f32 s18, s18, s19
-    vadd.f32 s27, s31, s20
-    vadd.f32 s28, s21, s25
-    vadd.f32 s29, s22, s26
-    vadd.f32 s18, s18, s23
-    vadd.f32 s27, s27, s24
-    vldmia r1!, {s19-s26}
-    vmul.f32 s19, s19, s8
-    vmul.f32 s20, s20, s9
-    vmul.f32 s21, s21, s10
-    vmul.f32 s22, s22, s11
-    vmul.f32 s23, s23, s12
-    vmul.f32 s24, s24, s13
-    vmul.f32 s25, s25, s14
-    vmul.f32 s26, s26, s15
-    vadd.f32 s18, s18, s19
-    vadd.f32 s27, s27, s20
-    vadd.f32 s28, s28, s21
-    vadd.f32 s29, s29, s22
-    vadd.f32 s18, s18, s23
-    vadd.f32 s27, s27, s24
-    vadd.f32 s28, s28, s25
-    vadd.f32 s29, s29, s26
-    vadd.f32 s28, s28, s29
-    vadd.f32 s18, s18, s27
+    f32_centre_of_16
     subs r3, #1
     vadd.f32 s18, s18, s28
+    .else
+    f32_centre \inputs
+    add r1, r1, r12
+    vadd.f32 s17, s18, s21
+    f32_centre \inputs
+    subs r3, #1
+    vadd.f32 s18, s18, s21
+    .endif
     add r1, r1, r12
     vstmia r2!, {s17-s18}
     .endm
@@ -289,81 +118,32 @@
     vldmia r12!, {s0-s3}
     vldmia r1!, {s4-s7}
     vldmia r8!, {s8-s11}
-    f32_four_products s0, s1, s2, s3
+    f32_four_products 0
     .endm
     .equ F32_FOUR_INPUTS_BYTES, 76
 
-    .macro f32_four_products a, b, c, d
-    vmul.f32 s4, s4, \a
-    vmul.f32 s5, s5, \b
-    vmul.f32 s6, s6, \c
-    vmul.f32 s7, s7, \d
-    vmul.f32 s8, s8, \a
-    vmul.f32 s9, s9, \b
-    vmul.f32 s10, s10, \c
-    vmul.f32 s11, s11, \d
-    vadd.f32 s16, s16, s4
-    vadd.f32 s17, s17, s5
-    vadd.f32 s18, s18, s6
-    vadd.f32 s19, s19, s7
-    vadd.f32 s20, s20, s8
-    vadd.f32 s21, s21, s9
-    vadd.f32 s22, s22, s10
-    vadd.f32 s23, s23, s11
+@ The same for four inputs in s\inputs and behind, whose coefficients are in s4..s11
+    .macro f32_four_products inputs
+    each 4, vmul, 4, 4, \inputs
+    each 4, vmul, 8, 8, \inputs
+    each 8, vadd, 16, 16, 4
     .endm
 
 @ s0.. += \outputs weights at r0, times \factor; r0 moves to the next line, r11 further.
     .macro f32_line outputs, factor
     .if \outputs == 18
     vldmia r0!, {s18-s29}
-    .irp i, 18,19,20,21,22,23,24,25,26,27,28,29
-    vmul.f32 s\i, s\i, \factor
-    .endr
-    f32_add_twelve
+    each_with 12, vmul, 18, 18, \factor
+    each 12, vadd, 0, 0, 18
     vldmia r0!, {s18-s23}
     add r0, r0, r11
-    .irp i, 18,19,20,21,22,23
-    vmul.f32 s\i, s\i, \factor
-    .endr
-    f32_add_six
+    each_with 6, vmul, 18, 18, \factor
+    each 6, vadd, 12, 12, 18
     .else
-    .if \outputs == 1
-    vldmia r0!, {s18}
-    .elseif \outputs == 2
-    vldmia r0!, {s18-s19}
-    .elseif \outputs == 3
-    vldmia r0!, {s18-s20}
-    .elseif \outputs == 4
-    vldmia r0!, {s18-s21}
-    .elseif \outputs == 5
-    vldmia r0!, {s18-s22}
-    .elseif \outputs == 6
-    vldmia r0!, {s18-s23}
-    .endif
+    load_from_18 \outputs, r0
     add r0, r0, r11
-    .irp i, 18,19,20,21,22,23
-    .if \i < 18 + \outputs
-    vmul.f32 s\i, s\i, \factor
-    .endif
-    .endr
-    .if \outputs > 0
-    vadd.f32 s0, s0, s18
-    .endif
-    .if \outputs > 1
-    vadd.f32 s1, s1, s19
-    .endif
-    .if \outputs > 2
-    vadd.f32 s2, s2, s20
-    .endif
-    .if \outputs > 3
-    vadd.f32 s3, s3, s21
-    .endif
-    .if \outputs > 4
-    vadd.f32 s4, s4, s22
-    .endif
-    .if \outputs > 5
-    vadd.f32 s5, s5, s23
-    .endif
+    each_with \outputs, vmul, 18, 18, \factor
+    each \outputs, vadd, 0, 0, 18
     .endif
     .endm
 
@@ -391,143 +171,31 @@
     lsrs r3, r3, #1
 1:
     vldmia r1!, {s30-s31}
-    .if \outputs == 4
-    vldmia r0!, {s18-s25}
-    vmul.f32 s18, s18, s30
-    vmul.f32 s19, s19, s30
-    vmul.f32 s20, s20, s30
-    vmul.f32 s21, s21, s30
-    vmul.f32 s22, s22, s31
-    vmul.f32 s23, s23, s31
-    vmul.f32 s24, s24, s31
-    vmul.f32 s25, s25, s31
-    vadd.f32 s0, s0, s18
-    vadd.f32 s1, s1, s19
-    vadd.f32 s2, s2, s20
-    vadd.f32 s3, s3, s21
-    vadd.f32 s0, s0, s22
-    vadd.f32 s1, s1, s23
-    vadd.f32 s2, s2, s24
-    vadd.f32 s3, s3, s25
-    .elseif \outputs == 5
-    vldmia r0!, {s18-s27}
-    vmul.f32 s18, s18, s30
-    vmul.f32 s19, s19, s30
-    vmul.f32 s20, s20, s30
-    vmul.f32 s21, s21, s30
-    vmul.f32 s22, s22, s30
-    vmul.f32 s23, s23, s31
-    vmul.f32 s24, s24, s31
-    vmul.f32 s25, s25, s31
-    vmul.f32 s26, s26, s31
-    vmul.f32 s27, s27, s31
-    vadd.f32 s0, s0, s18
-    vadd.f32 s1, s1, s19
-    vadd.f32 s2, s2, s20
-    vadd.f32 s3, s3, s21
-    vadd.f32 s4, s4, s22
-    vadd.f32 s0, s0, s23
-    vadd.f32 s1, s1, s24
-    vadd.f32 s2, s2, s25
-    vadd.f32 s3, s3, s26
-    vadd.f32 s4, s4, s27
-    .elseif \outputs == 6
-    vldmia r0!, {s18-s29}
-    vmul.f32 s18, s18, s30
-    vmul.f32 s19, s19, s30
-    vmul.f32 s20, s20, s30
-    vmul.f32 s21, s21, s30
-    vmul.f32 s22, s22, s30
-    vmul.f32 s23, s23, s30
-    vmul.f32 s24, s24, s31
-    vmul.f32 s25, s25, s31
-    vmul.f32 s26, s26, s31
-    vmul.f32 s27, s27, s31
-    vmul.f32 s28, s28, s31
-    vmul.f32 s29, s29, s31
-    vadd.f32 s0, s0, s18
-    vadd.f32 s1, s1, s19
-    vadd.f32 s2, s2, s20
-    vadd.f32 s3, s3, s21
-    vadd.f32 s4, s4, s22
-    vadd.f32 s5, s5, s23
-    vadd.f32 s0, s0, s24
-    vadd.f32 s1, s1, s25
-    vadd.f32 s2, s2, s26
-    vadd.f32 s3, s3, s27
-    vadd.f32 s4, s4, s28
-    vadd.f32 s5, s5, s29
-    .endif
+    load_from_18 2 * \outputs, r0
+    each_with \outputs, vmul, 18, 18, s30
+    each_with \outputs, vmul, 18 + \outputs, 18 + \outputs, s31
+    each \outputs, vadd, 0, 0, 18
+    each \outputs, vadd, 0, 0, 18 + \outputs
     subs r3, #1
     bne 1b
     bx lr
 3:
     .endm
 
-@ s0..s11 += s18..s29
-    .macro f32_add_twelve
-    vadd.f32 s0, s0, s18
-    vadd.f32 s1, s1, s19
-    vadd.f32 s2, s2, s20
-    vadd.f32 s3, s3, s21
-    vadd.f32 s4, s4, s22
-    vadd.f32 s5, s5, s23
-    vadd.f32 s6, s6, s24
-    vadd.f32 s7, s7, s25
-    vadd.f32 s8, s8, s26
-    vadd.f32 s9, s9, s27
-    vadd.f32 s10, s10, s28
-    vadd.f32 s11, s11, s29
-    .endm
-
-@ s12..s17 += s18..s23
-    .macro f32_add_six
-    vadd.f32 s12, s12, s18
-    vadd.f32 s13, s13, s19
-    vadd.f32 s14, s14, s20
-    vadd.f32 s15, s15, s21
-    vadd.f32 s16, s16, s22
-    vadd.f32 s17, s17, s23
-    .endm
-
 @ s0..s17 += two lines of 18 weights at r0, each times its factor at r1.
     .macro f32_two_centres
     vldmia r1!, {s30-s31}
     vldmia r0!, {s18-s29}
-    .irp i, 18,19,20,21,22,23,24,25,26,27,28,29
-    vmul.f32 s\i, s\i, s30
-    .endr
-    f32_add_twelve
+    each_with 12, vmul, 18, 18, s30
+    each 12, vadd, 0, 0, 18
     vldmia r0!, {s18-s29}
-    .irp i, 18,19,20,21,22,23
-    vmul.f32 s\i, s\i, s30
-    .endr
-    .irp i, 24,25,26,27,28,29
-    vmul.f32 s\i, s\i, s31
-    .endr
-    f32_add_six
-    vadd.f32 s0, s0, s24
-    vadd.f32 s1, s1, s25
-    vadd.f32 s2, s2, s26
-    vadd.f32 s3, s3, s27
-    vadd.f32 s4, s4, s28
-    vadd.f32 s5, s5, s29
+    each_with 6, vmul, 18, 18, s30
+    each_with 6, vmul, 24, 24, s31
+    each 6, vadd, 12, 12, 18
+    each 6, vadd, 0, 0, 24
     vldmia r0!, {s18-s29}
-    .irp i, 18,19,20,21,22,23,24,25,26,27,28,29
-    vmul.f32 s\i, s\i, s31
-    .endr
-    vadd.f32 s6, s6, s18
-    vadd.f32 s7, s7, s19
-    vadd.f32 s8, s8, s20
-    vadd.f32 s9, s9, s21
-    vadd.f32 s10, s10, s22
-    vadd.f32 s11, s11, s23
-    vadd.f32 s12, s12, s24
-    vadd.f32 s13, s13, s25
-    vadd.f32 s14, s14, s26
-    vadd.f32 s15, s15, s27
-    vadd.f32 s16, s16, s28
-    vadd.f32 s17, s17, s29
+    each_with 12, vmul, 18, 18, s31
+    each 12, vadd, 6, 6, 18
     .endm
 
 @ One input of an array whose length is no multiple of four: its square is added to \sum.
@@ -584,47 +252,19 @@ f32_eighteen:
     with_eighteen vsub, r8
     with_eighteen vmul, r8
 2:
-    .irp i, 0,1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17
-    vcvt.s32.f32 s\i, s\i
-    .endr
-    .irp i, 0,1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17
-    vcvt.f32.s32 s\i, s\i
-    .endr
+    convert 18, 0, s32, f32
+    convert 18, 0, f32, s32
     vldr s30, [r4]
 @ ‖x‖² in four partial sums
-    vmul.f32 s18, s0, s0
-    vmul.f32 s19, s1, s1
-    vmul.f32 s20, s2, s2
-    vmul.f32 s21, s3, s3
-    vmul.f32 s22, s4, s4
-    vmul.f32 s23, s5, s5
-    vmul.f32 s24, s6, s6
-    vmul.f32 s25, s7, s7
-    vadd.f32 s18, s18, s22
-    vadd.f32 s19, s19, s23
-    vadd.f32 s20, s20, s24
-    vadd.f32 s21, s21, s25
-    vmul.f32 s22, s8, s8
-    vmul.f32 s23, s9, s9
-    vmul.f32 s24, s10, s10
-    vmul.f32 s25, s11, s11
-    vadd.f32 s18, s18, s22
-    vadd.f32 s19, s19, s23
-    vadd.f32 s20, s20, s24
-    vadd.f32 s21, s21, s25
-    vmul.f32 s22, s12, s12
-    vmul.f32 s23, s13, s13
-    vmul.f32 s24, s14, s14
-    vmul.f32 s25, s15, s15
-    vadd.f32 s18, s18, s22
-    vadd.f32 s19, s19, s23
-    vadd.f32 s20, s20, s24
-    vadd.f32 s21, s21, s25
-    vmul.f32 s22, s16, s16
-    vmul.f32 s23, s17, s17
+    each 8, vmul, 18, 0, 0
+    each 4, vadd, 18, 18, 22
+    each 4, vmul, 22, 8, 8
+    each 4, vadd, 18, 18, 22
+    each 4, vmul, 22, 12, 12
+    each 4, vadd, 18, 18, 22
+    each 2, vmul, 22, 16, 16
     vadd.f32 s20, s20, s21
-    vadd.f32 s18, s18, s22
-    vadd.f32 s19, s19, s23
+    each 2, vadd, 18, 18, 22
     mov r1, r5
     vadd.f32 s18, s18, s19
     mov r0, #4 * 19 * 4
@@ -659,36 +299,15 @@ f32_powers:
 taxel_f32_powers: @ to its end: what one exponential costs is counted here
 4:
     vldmia r2, {s0-s3}
-    vadd.f32 s4, s0, s22
-    vadd.f32 s5, s1, s22
-    vadd.f32 s6, s2, s22
-    vadd.f32 s7, s3, s22
-    vsub.f32 s8, s4, s22
-    vsub.f32 s9, s5, s22
-    vsub.f32 s10, s6, s22
-    vsub.f32 s11, s7, s22
-    vsub.f32 s0, s0, s8
-    vsub.f32 s1, s1, s9
-    vsub.f32 s2, s2, s10
-    vsub.f32 s3, s3, s11
-    vmul.f32 s8, s0, s16
-    vmul.f32 s9, s1, s16
-    vmul.f32 s10, s2, s16
-    vmul.f32 s11, s3, s16
+    each_with 4, vadd, 4, 0, s22
+    each_with 4, vsub, 8, 4, s22
+    each 4, vsub, 0, 0, 8
+    each_with 4, vmul, 8, 0, s16
     .irp constant, s17, s18, s19, s20
-    vadd.f32 s8, s8, \constant
-    vadd.f32 s9, s9, \constant
-    vadd.f32 s10, s10, \constant
-    vadd.f32 s11, s11, \constant
-    vmul.f32 s8, s8, s0
-    vmul.f32 s9, s9, s1
-    vmul.f32 s10, s10, s2
-    vmul.f32 s11, s11, s3
+    each_with 4, vadd, 8, 8, \constant
+    each 4, vmul, 8, 8, 0
     .endr
-    vadd.f32 s8, s8, s21
-    vadd.f32 s9, s9, s21
-    vadd.f32 s10, s10, s21
-    vadd.f32 s11, s11, s21
+    each_with 4, vadd, 8, 8, s21
     vmov r0, r1, s8, s9
     vmov r12, lr, s4, s5
     add r0, r0, r12, lsl #23
@@ -882,29 +501,13 @@ f32_any:
     cbnz r3, 1f
     vldmia r8!, {s4-s7}
     vldmia r9!, {s8-s11}
-    vsub.f32 s0, s0, s4
-    vsub.f32 s1, s1, s5
-    vsub.f32 s2, s2, s6
-    vsub.f32 s3, s3, s7
-    vmul.f32 s0, s0, s8
-    vmul.f32 s1, s1, s9
-    vmul.f32 s2, s2, s10
-    vmul.f32 s3, s3, s11
+    each 4, vsub, 0, 0, 4
+    each 4, vmul, 0, 0, 8
 1:
-    .irp i, 0,1,2,3
-    vcvt.s32.f32 s\i, s\i
-    .endr
-    .irp i, 0,1,2,3
-    vcvt.f32.s32 s\i, s\i
-    .endr
-    vmul.f32 s4, s0, s0
-    vmul.f32 s5, s1, s1
-    vmul.f32 s6, s2, s2
-    vmul.f32 s7, s3, s3
-    vadd.f32 s24, s24, s4
-    vadd.f32 s25, s25, s5
-    vadd.f32 s26, s26, s6
-    vadd.f32 s27, s27, s7
+    convert 4, 0, s32, f32
+    convert 4, 0, f32, s32
+    each 4, vmul, 4, 0, 0
+    each 4, vadd, 24, 24, 4
     vstmia r12!, {s0-s3}
     subs r4, #4
     bhs 2b
@@ -956,7 +559,7 @@ f32_batch:
 @ Exponents of up to 16 inputs, filled up to a multiple of four
     .irp inputs, 16, 12, 8, 4
 f32_exponents_\inputs:
-    f32_centres_\inputs
+    f32_centres \inputs
     bne f32_exponents_\inputs
     b.w f32_powers
     .endr
@@ -1013,7 +616,7 @@ f32_exponents_\inputs:
     bne 2b
     vldmia r1!, {s4-s7}
     vldmia r8!, {s8-s11}
-    f32_four_products s24, s25, s26, s27
+    f32_four_products 24
     vadd.f32 s16, s16, s17
     vadd.f32 s20, s20, s21
     vadd.f32 s18, s18, s19

@@ -31,81 +31,65 @@
 @   s23 activations to come    s24 end of the activations
 @   s25 frame    s26 term that all exponents share
 @   s27 words behind the batch
+@ Until the powers, s27 is the batch's words, and s24 the end of sixteen exponents on the stack.
 @ For many inputs, which stream by, and until the powers:
-@   s27 pairs of inputs    s28 passes over four fours of them    s29 where the first pass begins
-@   s30 bytes of an exponent's line    s31 bytes that are read beyond it
-@ s24 is the end of sixteen exponents on the stack until the powers.
+@   s24 words behind the batch
+@   s28 end of the pairs of inputs    s29 bytes that the tail's lines are read too far; then pairs of inputs to come
+@   s30 bytes from the first eight pairs of a line to the next line    s31 and from eight pairs more
+
+@ r1 += the pairs in \weights, times those in r\first and the registers behind it (before it if \step is -1).
+    .macro fixed16_products first, step, weights:vararg
+    .altmacro
+    .set done, 0
+    .irp weight, \weights
+    fixed16_product \weight, %(\first + done)
+    .set done, done + \step
+    .endr
+    .noaltmacro
+    .endm
+
+    .macro fixed16_product weight, number
+    smlad r1, \weight, r\number, r1
+    .endm
 
 @ r1 = one line at r0: a number, and as many pairs times those from r4 on. r2, r3, lr are overwritten, and the
 @ registers between the inputs and lr.
     .macro fixed16_line pairs
     .if \pairs == 1
     ldmia r0!, {r1, r2}
-    smlad r1, r2, r4, r1
+    fixed16_products 4, 1, r2
     .elseif \pairs == 2
     ldmia r0!, {r1, r2, r3}
-    smlad r1, r2, r4, r1
-    smlad r1, r3, r5, r1
+    fixed16_products 4, 1, r2, r3
     .elseif \pairs == 3
     ldmia r0!, {r1, r2, r3, lr}
-    smlad r1, r2, r4, r1
-    smlad r1, r3, r5, r1
-    smlad r1, lr, r6, r1
+    fixed16_products 4, 1, r2, r3, lr
     .elseif \pairs == 4
     ldmia r0!, {r1, r2, r3, r12, lr}
-    smlad r1, r2, r4, r1
-    smlad r1, r3, r5, r1
-    smlad r1, r12, r6, r1
-    smlad r1, lr, r7, r1
+    fixed16_products 4, 1, r2, r3, r12, lr
     .elseif \pairs == 5
     ldmia r0!, {r1, r2, r3, r11, r12, lr}
-    smlad r1, r2, r4, r1
-    smlad r1, r3, r5, r1
-    smlad r1, r11, r6, r1
-    smlad r1, r12, r7, r1
-    smlad r1, lr, r8, r1
+    fixed16_products 4, 1, r2, r3, r11, r12, lr
     .elseif \pairs == 6
     ldmia r0!, {r1, r2, r3, r10, r11, r12, lr}
-    smlad r1, r2, r4, r1
-    smlad r1, r3, r5, r1
-    smlad r1, r10, r6, r1
-    smlad r1, r11, r7, r1
-    smlad r1, r12, r8, r1
-    smlad r1, lr, r9, r1
+    fixed16_products 4, 1, r2, r3, r10, r11, r12, lr
     .elseif \pairs == 7
     ldmia r0!, {r1, r2, r3, r11, r12, lr}
-    smlad r1, r2, r4, r1
-    smlad r1, r3, r5, r1
-    smlad r1, r11, r6, r1
-    smlad r1, r12, r7, r1
-    smlad r1, lr, r8, r1
+    fixed16_products 4, 1, r2, r3, r11, r12, lr
     ldmia r0!, {r2, r3}
-    smlad r1, r2, r9, r1
-    smlad r1, r3, r10, r1
+    fixed16_products 9, 1, r2, r3
     .elseif \pairs == 8
     ldmia r0!, {r1, r2, r3, r12, lr}
-    smlad r1, r2, r4, r1
-    smlad r1, r3, r5, r1
-    smlad r1, r12, r6, r1
-    smlad r1, lr, r7, r1
+    fixed16_products 4, 1, r2, r3, r12, lr
     ldmia r0!, {r2, r3, r12, lr}
-    smlad r1, r2, r8, r1
-    smlad r1, r3, r9, r1
-    smlad r1, r12, r10, r1
-    smlad r1, lr, r11, r1
+    fixed16_products 8, 1, r2, r3, r12, lr
     .elseif \pairs == 9
     ldmia r0!, {r1, r2, r3, lr}
-    smlad r1, r2, r4, r1
-    smlad r1, r3, r5, r1
-    smlad r1, lr, r6, r1
+    fixed16_products 4, 1, r2, r3, lr
     ldmia r0!, {r2, r3, lr}
-    smlad r1, r2, r7, r1
-    smlad r1, r3, r8, r1
-    smlad r1, lr, r9, r1
+    fixed16_products 7, 1, r2, r3, lr
     ldmia r0!, {r2, r3, lr}
-    smlad r1, r2, r10, r1
-    smlad r1, r3, r11, r1
-    smlad r1, lr, r12, r1
+    fixed16_products 10, 1, r2, r3, lr
     .endif
     .endm
 
@@ -144,30 +128,18 @@
     b.w fixed16_powers
     .endm
 
-@ r2 and r1 += four pairs at r0, and at r3, times those at r12.
-    .macro fixed16_four_pairs
-    ldmia r12!, {r4-r7}
-    ldmia r0!, {r8-r11}
-    smlad r2, r8, r4, r2
-    smlad r2, r9, r5, r2
-    smlad r2, r10, r6, r2
-    smlad r2, r11, r7, r2
-    ldmia r3!, {r8-r11}
-    smlad r1, r8, r4, r1
-    smlad r1, r9, r5, r1
-    smlad r1, r10, r6, r1
-    smlad r1, r11, r7, r1
-    .endm
-    .equ FX_FOUR_PAIRS_BYTES, 44
-
-@ Begins two lines of many pairs at r0: r2 and r1 are their first numbers.
-    .macro fixed16_two_of_many
-    vmov r12, lr, s27, s28
-    vmov r4, r2, s29, s30
-    add r3, r0, r2
-    ldr r2, [r0], #4
-    ldr r1, [r3], #4
-    bx r4
+@ Adds the products of eight pairs at r0 and those in r4..r11 to an exponent, \place places before r12.
+    .macro fixed16_eight_more place
+    ldr r1, [r12, #-\place * 4]
+    ldmia r0!, {r2, r3, lr}
+    fixed16_products 4, 1, r2, r3, lr
+    ldmia r0!, {r2, r3, lr}
+    fixed16_products 7, 1, r2, r3, lr
+    ldmia r0!, {r2, r3}
+    fixed16_products 10, 1, r2, r3
+    vmov lr, s31
+    add r0, lr
+    str r1, [r12, #-\place * 4]
     .endm
 
 @ \pair = the high halves of two inputs, whose squares are added to \high:\low.
@@ -192,15 +164,9 @@
     .macro fixed16_sum sum
     vmov r1, \sum
     ldmdb r0!, {r2, r3, r12, lr}
-    smlad r1, r2, r7, r1
-    smlad r1, r3, r6, r1
-    smlad r1, r12, r5, r1
-    smlad r1, lr, r4, r1
+    fixed16_products 7, -1, r2, r3, r12, lr
     ldmdb r0!, {r2, r3, r12, lr}
-    smlad r1, r2, r11, r1
-    smlad r1, r3, r10, r1
-    smlad r1, r12, r9, r1
-    smlad r1, lr, r8, r1
+    fixed16_products 11, -1, r2, r3, r12, lr
     vmov \sum, r1
     .endm
     .equ FX_SUM_BYTES, 48
@@ -209,17 +175,11 @@
     .macro fixed16_tail_of_nine sum
     vmov r1, \sum
     ldmdb r0!, {r2, r3, lr}
-    smlad r1, r2, r10, r1
-    smlad r1, r3, r11, r1
-    smlad r1, lr, r12, r1
+    fixed16_products 10, 1, r2, r3, lr
     ldmdb r0!, {r2, r3, lr}
-    smlad r1, r2, r7, r1
-    smlad r1, r3, r8, r1
-    smlad r1, lr, r9, r1
+    fixed16_products 7, 1, r2, r3, lr
     ldmdb r0!, {r2, r3, lr}
-    smlad r1, r2, r4, r1
-    smlad r1, r3, r5, r1
-    smlad r1, lr, r6, r1
+    fixed16_products 4, 1, r2, r3, lr
     vmov \sum, r1
     .endm
     .equ FX_TAIL_BYTES, 56
@@ -250,9 +210,7 @@
     with_eighteen vsub, r0
     with_eighteen vmul, r0
 1:
-    .irp i, 0,1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17
-    vcvt.s32.f32 s\i, s\i
-    .endr
+    convert 18, 0, s32, f32
     add r0, r8, #36 * 4
     vmov r1, r2, s0, s1
     pkhtb r4, r2, r1, asr #16
@@ -441,47 +399,14 @@ fixed16_scale:
 1:
     bx lr
 2:
-    vcvt.f32.s32 s0, s0
-    vcvt.f32.s32 s1, s1
-    vcvt.f32.s32 s2, s2
-    vcvt.f32.s32 s3, s3
+    .irp first, 0, 4, 8, 12
+    convert 4, \first, f32, s32
     vldmia r4!, {s18-s21}
-    vmul.f32 s0, s0, s18
-    vmul.f32 s1, s1, s19
-    vmul.f32 s2, s2, s20
-    vmul.f32 s3, s3, s21
-    vcvt.f32.s32 s4, s4
-    vcvt.f32.s32 s5, s5
-    vcvt.f32.s32 s6, s6
-    vcvt.f32.s32 s7, s7
-    vldmia r4!, {s18-s21}
-    vmul.f32 s4, s4, s18
-    vmul.f32 s5, s5, s19
-    vmul.f32 s6, s6, s20
-    vmul.f32 s7, s7, s21
-    vcvt.f32.s32 s8, s8
-    vcvt.f32.s32 s9, s9
-    vcvt.f32.s32 s10, s10
-    vcvt.f32.s32 s11, s11
-    vldmia r4!, {s18-s21}
-    vmul.f32 s8, s8, s18
-    vmul.f32 s9, s9, s19
-    vmul.f32 s10, s10, s20
-    vmul.f32 s11, s11, s21
-    vcvt.f32.s32 s12, s12
-    vcvt.f32.s32 s13, s13
-    vcvt.f32.s32 s14, s14
-    vcvt.f32.s32 s15, s15
-    vldmia r4!, {s18-s21}
-    vmul.f32 s12, s12, s18
-    vmul.f32 s13, s13, s19
-    vmul.f32 s14, s14, s20
-    vmul.f32 s15, s15, s21
-    vcvt.f32.s32 s16, s16
-    vcvt.f32.s32 s17, s17
+    each 4, vmul, \first, \first, 18
+    .endr
+    convert 2, 16, f32, s32
     vldmia r4!, {s18-s19}
-    vmul.f32 s16, s16, s18
-    vmul.f32 s17, s17, s19
+    each 2, vmul, 16, 16, 18
     vstmia r1, {s0-s17}
     bx lr
 
@@ -490,9 +415,7 @@ fixed16_summed_18:
     vmov lr, s25
     mov sp, lr
     pop {r1-r5} @ output, space, centres, form, scale
-    .irp i, 0,1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17
-    vcvt.f32.s32 s\i, s\i
-    .endr
+    convert 18, 0, f32, s32
     with_eighteen vmul, r5
     vmrs r0, fpscr
     vstmia r1, {s0-s17}
@@ -564,22 +487,10 @@ fixed16_any:
     cbnz r7, 3f
     vldmia r8!, {s6-s11}
     vldmia r3!, {s12-s17}
-    vsub.f32 s0, s0, s6
-    vsub.f32 s1, s1, s7
-    vsub.f32 s2, s2, s8
-    vsub.f32 s3, s3, s9
-    vsub.f32 s4, s4, s10
-    vsub.f32 s5, s5, s11
-    vmul.f32 s0, s0, s12
-    vmul.f32 s1, s1, s13
-    vmul.f32 s2, s2, s14
-    vmul.f32 s3, s3, s15
-    vmul.f32 s4, s4, s16
-    vmul.f32 s5, s5, s17
+    each 6, vsub, 0, 0, 6
+    each 6, vmul, 0, 0, 12
 3:
-    .irp i, 0,1,2,3,4,5
-    vcvt.s32.f32 s\i, s\i
-    .endr
+    convert 6, 0, s32, f32
     fixed16_input r5, s0, s1, r9, r10
     fixed16_input r6, s2, s3, r9, r10
     fixed16_input r11, s4, s5, r9, r10
@@ -674,14 +585,16 @@ fixed16_any:
     lsrs r3, r3, #2
     lsls r8, r3, #4
     sub r8, r8, r5, lsl #2
-    adds r5, #1
+    add r9, r1, r3, lsl #4
+    vmov s28, s29, r9, r8
     lsls r5, r5, #2
+    subs r5, #32
+    adds r8, r5, #4
     vmov s30, s31, r5, r8
     ldr r2, [sp, #FX_FORM]
     lsls r2, r2, #31 @ AFFINE
     beq 5f
-    add r4, r1, r3, lsl #4
-    vmov s18, s19, r1, r4
+    vmov s18, r1
     mov r1, r7
     ldr r2, [sp, #FX_OUTPUT]
     mov r3, r6
@@ -695,10 +608,10 @@ fixed16_any:
     smlad lr, r9, r5, lr
     smlad lr, r10, r6, lr
     smlad lr, r11, r7, lr
-    vmov r4, s19
+    vmov r4, s28
     cmp r12, r4
     bne 3b
-    vmov r4, s31
+    vmov r4, s29
     sub r0, r0, r4
     str lr, [r2], #4
     subs r3, #1
@@ -805,42 +718,69 @@ fixed16_group:
     ldmia r1, {r4-r12}
     b.w fixed16_exponents_of_nine
 
-@ Exponents of ten or more pairs of inputs at r1, r2 of them, which stream by for two centres at once
+@ Exponents of ten or more pairs of inputs at r1: the first four or eight for all centres, then eight more at a time
 fixed16_exponents_of_many:
-    adds r2, #3
-    lsrs r2, r2, #2
-    adds r3, r2, #3
-    lsrs r3, r3, #2
-    vmov s27, s28, r1, r3
-    rsb r2, r2, r3, lsl #2
-    movs r1, #FX_FOUR_PAIRS_BYTES
-    adr r3, 2f + 1
-    mla r3, r2, r1, r3
-    vmov s29, r3
-4:
-    sub r1, sp, #16 * 4
-    vmov s24, r1
-    fixed16_two_of_many
-    .balign 4
+    vmov r3, s28
+    subs r3, r3, r1
+    ldmia r1!, {r4-r7}
+    lsls r3, r3, #27 @ fours odd in number?
+    bmi 3f
+    ldmia r1!, {r8-r11}
+    vmov s29, r1
 2:
-    fixed16_four_pairs
-    fixed16_four_pairs
-    fixed16_four_pairs
-    fixed16_four_pairs
-    subs lr, #1
+    sub sp, #16 * 4
+    .irp place, 15,14,13,12,11,10,9,8,7,6,5,4,3,2,1,0
+    fixed16_line 8
+    vmov lr, s30
+    add r0, lr
+    str r1, [sp, #\place * 4]
+    .endr
+    vmov r1, r2, s18, s19
+    add r0, r0, r2
+    cmp sp, r1
     bne 2b
-    push {r1, r2}
-    vmov r4, s31
-    sub r0, r3, r4
-    vmov r4, s24
-    cmp sp, r4
-    beq 3f
-    fixed16_two_of_many @ again, because a branch back to the first would take two cycles more
+    b 5f
 3:
+    vmov s29, r1
+    vmov r8, s30
+    adds r8, #16
+4:
+    sub sp, #16 * 4
+    .irp place, 15,14,13,12,11,10,9,8,7,6,5,4,3,2,1,0
+    fixed16_line 4
+    add r0, r8
+    str r1, [sp, #\place * 4]
+    .endr
     vmov r1, r2, s18, s19
     add r0, r0, r2
     cmp sp, r1
     bne 4b
+5:
+    vmov s24, r0
+6:
+    vmov r2, r1, s28, s29
+    cmp r1, r2
+    beq 8f
+    vmov r12, s25
+    vmov r0, s27
+    ldr r2, [r12, #FX_X]
+    adds r0, #4
+    subs r2, r1, r2
+    ldmia r1!, {r4-r11}
+    add r0, r0, r2
+    vmov s29, r1
+7:
+    .irp place, 1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16
+    fixed16_eight_more \place
+    .endr
+    vmov r1, r2, s18, s19
+    sub r12, r12, #16 * 4
+    add r0, r0, r2
+    cmp r12, r1
+    bne 7b
+    b 6b
+8:
+    vmov r0, s24
     b.w fixed16_powers
 
 @ A group's sums are complete for this batch.

@@ -78,14 +78,20 @@ fn fixed16(network: &NetworkDesign, pieces: &mut Pieces) {
     }
     add("more than 63 inputs", usize::from(inputs > 63));
     let streams = inputs > EIGHTEEN;
-    let kind = if streams { "inputs that stream by".to_owned() } else { format!("{pairs} pairs") };
+    // Four or eight pairs come first, then eight at a time.
+    let (first, eights_more) = if pairs.div_ceil(4) % 2 == 1 {
+        ("four", pairs.div_ceil(4) / 2)
+    } else {
+        ("eight", pairs.div_ceil(4) / 2 - 1)
+    };
+    let kind =
+        if streams { format!("{first} pairs, then eights") } else { format!("{pairs} pairs") };
     add(&kind, 1);
     add(&format!("{kind}: a batch more"), more_batches);
     add(&format!("{kind}: sixteen centres"), sixteens);
     if streams {
-        let fours = pairs.div_ceil(4);
-        add("sixteen centres, four pairs that stream by", sixteens * fours);
-        add("sixteen centres, a pass over those", sixteens * fours.div_ceil(4));
+        add("a batch, eight pairs more", (1 + more_batches) * eights_more);
+        add("sixteen centres, eight pairs more", sixteens * eights_more);
     }
     match (tail, pairs) {
         (false, _) => (),
