@@ -23,7 +23,7 @@ pub struct Frame<'f> {
     /// `rows × inputs` readings in Ω, row after row; NaN is missing.
     pub readings_ohm: &'f [f32],
     /// [Reciprocals](crate::relative::reciprocal) of the baseline, one a reading, for a model with relative inputs.
-    /// Without them, or if their number is another, such a model finds every reading missing. Other models ignore
+    /// A reading without one is missing. Other models ignore
     /// them.
     pub reciprocals: &'f [f32],
     /// Gate that skips rows at rest: they get the outputs at rest. All other rows are decoded as without a gate, to

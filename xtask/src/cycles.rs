@@ -33,7 +33,7 @@ mod table;
 
 mod shapes;
 mod equations;
-mod told;
+mod predicted;
 mod fit;
 
 mod accepted;
@@ -103,6 +103,7 @@ pub fn run(options: &Options<'_>) -> Outcome {
     if options.kernel.is_some() {
         return Ok(());
     }
+    shapes::held(&shapes::measure(&image, &code, &directory)?)?;
     let compiler = toolchain.compiler()?;
     if options.accept {
         prices::accept(&image, &code, &directory, &compiler)?;
@@ -153,7 +154,7 @@ fn chosen(figures: Vec<Figure>, options: &Options<'_>) -> Outcome<Vec<Figure>> {
     Ok(chosen)
 }
 
-/// Measures frames of a user's own model, and prints what they cost beside what is told of them.
+/// Measures frames of a user's own model, and prints what they cost beside what is predicted of them.
 fn measure_model(
     path: &Path,
     image: &Path,
@@ -163,7 +164,7 @@ fn measure_model(
 ) -> Outcome {
     let blob = ModelBlob::read(path).map_err(|cause| cause.to_string())?;
     let design = Design::of(&blob);
-    let (mut frames, _) = told::measure(&design, path, image, code)?;
+    let (mut frames, _) = predicted::measure(&design, path, image, code)?;
     if let Some(kernel) = options.kernel {
         frames.retain(|frame| frame.kernel == kernel);
         if frames.is_empty() {
@@ -173,20 +174,20 @@ fn measure_model(
     prices::compare_model(&frames, compiler, options.json)
 }
 
-/// What a frame of the model at `path`, which has this `design`, is told to cost without a gate, and what is counted.
+/// What a frame of the model at `path`, which has this `design`, is predicted to cost without a gate, and what is counted.
 ///
 /// # Errors
-/// The run fails, or the model costs something else than told.
+/// The run fails, or the model costs something else than predicted.
 pub fn frame_of(design: &Design, path: &Path) -> Outcome<(Cost, Counted)> {
     let image = elf(IMAGE);
     let code = Code::read(&image)?;
-    let (frames, _) = told::measure(design, path, &image, &code)?;
+    let (frames, _) = predicted::measure(design, path, &image, &code)?;
     let compiler = Toolchain::find()?.compiler()?;
     prices::held_to(&frames, &compiler)?;
     let frame = frames.first().ok_or("no frame was measured")?;
     let prices = Prices::accepted().map_err(|cause| cause.to_string())?;
-    let told = prices.frame(design, Exponential::default(), Gating::Ungated);
-    Ok((told.map_err(|cause| cause.to_string())?, frame.whole))
+    let predicted = prices.frame(design, Exponential::default(), Gating::Ungated);
+    Ok((predicted.map_err(|cause| cause.to_string())?, frame.whole))
 }
 
 /// Compares figures with the accepted ones, or writes them as accepted.

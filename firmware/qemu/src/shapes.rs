@@ -302,7 +302,10 @@ fn gate<const COLS: usize, const OUTPUTS: usize>(
         let mut status = [RowStatus::Overflow; GATED_ROWS];
         let mut estimate = Estimate { outputs: found.as_flattened_mut(), status: &mut status };
         let awake = gate.give_rest(readings.as_flattened(), [COLS, OUTPUTS], &mut estimate, false);
-        let mut same = awake == status.iter().filter(|it| **it != RowStatus::AtRest).count();
+        let first_awake = status.iter().position(|it| *it != RowStatus::AtRest);
+        let until = until_awake(&gate, readings.as_flattened(), &found, status, first_awake);
+        let mut same =
+            until && awake == status.iter().filter(|it| **it != RowStatus::AtRest).count();
         for row in 0..GATED_ROWS {
             let at_rest = known[row] == RowStatus::Decoded
                 && is_at_rest(&readings[row], &baseline[row], TOLERANCE);
@@ -315,6 +318,33 @@ fn gate<const COLS: usize, const OUTPUTS: usize>(
         }
         comparison.add(same);
     }
+}
+
+/// Whether a gate that ends with the first row that is awake gives the same up to there as one for `all` rows, and
+/// leaves the others untouched.
+fn until_awake<const OUTPUTS: usize>(
+    gate: &Gate<'_>,
+    readings: &[f32],
+    all: &[[f32; OUTPUTS]; GATED_ROWS],
+    all_status: [RowStatus; GATED_ROWS],
+    first_awake: Option<usize>,
+) -> bool {
+    let mut found = [[f32::from_bits(UNTOUCHED); OUTPUTS]; GATED_ROWS];
+    let mut status = [RowStatus::Overflow; GATED_ROWS];
+    let mut estimate = Estimate { outputs: found.as_flattened_mut(), status: &mut status };
+    let sizes = [readings.len() / GATED_ROWS, OUTPUTS];
+    let awake = gate.give_rest(readings, sizes, &mut estimate, true);
+    let mut same = awake == usize::from(first_awake.is_some());
+    for row in 0..GATED_ROWS {
+        let reached = first_awake.is_none_or(|first| row <= first);
+        let (expected, of_row) = if reached {
+            (all_status[row], all[row])
+        } else {
+            (RowStatus::Overflow, [f32::from_bits(UNTOUCHED); OUTPUTS])
+        };
+        same &= status[row] == expected && same_bits(&found[row], &of_row);
+    }
+    same
 }
 
 /// Compares gates of rows of many sizes.

@@ -1,4 +1,4 @@
-//! What decoding costs on a Cortex-M4F, told from a model's [`Design`]: instructions, cycles, flash and RAM.
+//! What decoding costs on a Cortex-M4F, predicted from a model's [`Design`]: instructions, cycles, flash and RAM.
 //!
 //! Code is cut into *pieces*: the start of a routine, sixteen centres, one output of them, and so on. A design tells
 //! how often each is executed, a price list what one execution costs. `cargo xtask cycles --accept` finds the prices:

@@ -8,7 +8,7 @@ use host_sim::evaluate::gate::{self, BASELINE_FRAMES, GateResult, Line, MISSED_O
 use host_sim::metrics::Errors;
 use host_sim::{Error, Result};
 use taxel_learn::Exponential;
-use taxel_learn::cost::{Cost, Design, Frames, Prices};
+use taxel_learn::cost::{Design, Frames, Prices};
 
 use super::arguments::of_option;
 use super::scene_argument::{self, NoiseArgument, SceneArgument};
@@ -40,7 +40,7 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value_t = BASELINE_FRAMES)]
     baseline_frames: usize,
     /// Cycles of a frame without a gate, of one with all rows untouched (REST), and of one with all rows
-    /// touched (AWAKE). REST is below AWAKE. They replace those that are told of the model (docs/cycles.md).
+    /// touched (AWAKE). REST is below AWAKE. They replace those that are predicted of the model (docs/cycles.md).
     #[arg(
         long,
         value_name = "FRAME,REST,AWAKE",
@@ -70,27 +70,29 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             percent(scene.world.noise.level, 2)
         );
     }
-    let frame_costs = match given {
-        Some(frames) => frames,
-        None => Prices::accepted()?.frames(&Design::of(&blob), Exponential::default())?,
+    let (frame_cycles, flash_frame_cycles) = if let Some(frames) = given {
+        (frames, None)
+    } else {
+        let frames = Prices::accepted()?.frames(&Design::of(&blob), Exponential::default())?;
+        (frames.map(|cost| cost.cycles), Some(frames.map(|cost| cost.flash_cycles)))
     };
     let settings = Settings {
         k: arguments.k.clone(),
         frames: arguments.frames,
         baseline_frames: arguments.baseline_frames,
-        frame_costs,
+        frame_cycles,
+        flash_frame_cycles,
     };
     let result = gate::measure(&scene, &model, &settings)?;
     if common.json { print::json(&result) } else { page_of(&result).print() }
 }
 
-/// The costs that the user gives: cycles alone, and the same from flash.
-fn given(cycles: &[u64]) -> Result<Option<Frames<Cost>>> {
+/// The cycles that the user gives.
+fn given(cycles: &[u64]) -> Result<Option<Frames<u64>>> {
     match *cycles {
         [] => Ok(None),
         [ungated, at_rest, awake] if ungated > 0 && (1..awake).contains(&at_rest) => {
-            let cost = |cycles| Cost { instructions: 0, cycles, flash_cycles: cycles };
-            Ok(Some(Frames { ungated, at_rest, awake }.map(cost)))
+            Ok(Some(Frames { ungated, at_rest, awake }))
         }
         _ => Err(Error::Usage(format!(
             "--cycles {cycles:?}: give three positive numbers, FRAME,REST,AWAKE with REST below AWAKE, as \
@@ -170,11 +172,8 @@ fn errors(page: &mut print::Page, result: &GateResult) {
 }
 
 fn frames_cost(page: &mut print::Page, result: &GateResult) {
-    let costs = result.frame_costs;
-    for (memory, cycles) in [
-        ("zero wait", costs.map(|cost| cost.cycles)),
-        ("from flash", costs.map(|cost| cost.flash_cycles)),
-    ] {
+    let of_flash = result.flash_frame_cycles.map(|cycles| ("from flash", cycles));
+    for (memory, cycles) in [("zero wait", result.frame_cycles)].into_iter().chain(of_flash) {
         page.line(format_args!(
             "cycles of a frame, {memory}: {} without a gate, {} with all rows untouched, {} with all touched",
             cycles.ungated, cycles.at_rest, cycles.awake

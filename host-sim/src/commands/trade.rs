@@ -28,7 +28,7 @@ const FILES: [&str; 5] = ["trade.csv", "trade.json", "trade.svg", "trade.html", 
 /// Marks the Pareto front, and chooses the best point within your bounds.
 ///
 /// Writes trade.csv, trade.json, trade.svg and trade.html to out/<scene>/, and with a bound chosen.bin.
-/// Instructions and cycles are told by the price list of the firmware's code (docs/cycles.md). Behind a gate they
+/// Instructions and cycles are predicted by the price list of the firmware's code (docs/cycles.md). Behind a gate they
 /// are the mean over the test frames, by the share of untouched rows (docs/trade.md).
 #[derive(Args)]
 #[command(after_help = "Examples:

@@ -5,7 +5,7 @@ use serde::Serialize;
 use taxel_data::BadValue;
 use taxel_data::random::Stream;
 use taxel_data::table::Table;
-use taxel_learn::cost::{Cost, Frames};
+use taxel_learn::cost::Frames;
 use taxel_learn::{PreparedModel, relative};
 use taxel_simulate::noise::NoiseKind;
 use taxel_simulate::outputs::Outputs;
@@ -30,8 +30,10 @@ pub struct Settings {
     pub frames: usize,
     /// Number of frames of the untouched sensor whose mean is the baseline.
     pub baseline_frames: usize,
-    /// What a frame costs.
-    pub frame_costs: Frames<Cost>,
+    /// Cycles of a frame at zero wait.
+    pub frame_cycles: Frames<u64>,
+    /// Cycles of a frame from flash, if they are known.
+    pub flash_frame_cycles: Option<Frames<u64>>,
 }
 
 /// Checks that these tolerances `k` and `baseline_frames` make gates for `world`.
@@ -144,8 +146,10 @@ pub struct GateResult {
     pub baseline_frames: usize,
     /// CRC-32 of the model, in hexadecimal.
     pub model_crc: String,
-    /// What a frame costs.
-    pub frame_costs: Frames<Cost>,
+    /// Cycles of a frame at zero wait.
+    pub frame_cycles: Frames<u64>,
+    /// Cycles of a frame from flash, if they are known.
+    pub flash_frame_cycles: Option<Frames<u64>>,
     /// Errors over the scene without a gate.
     pub ungated_errors: Vec<Errors>,
     /// Errors of always predicting the mean of these frames.
@@ -213,8 +217,7 @@ pub fn measure(
             Missed { over_mm, rows: rows().count(), missed }
         });
         let sizes_at_rest = sizes_mm.iter().zip(&at_rest).filter(|(_, at_rest)| **at_rest);
-        let cycles = settings.frame_costs.map(|cost| cost.cycles);
-        let cost = |at_rest: f64| cycles.relative(at_rest);
+        let cost = |at_rest: f64| settings.frame_cycles.relative(at_rest);
         Line {
             k,
             rest_tolerance,
@@ -236,7 +239,8 @@ pub fn measure(
         rows: world.read_rows.len(),
         baseline_frames: settings.baseline_frames,
         model_crc: format!("{:08x}", model.model().crc()),
-        frame_costs: settings.frame_costs,
+        frame_cycles: settings.frame_cycles,
+        flash_frame_cycles: settings.flash_frame_cycles,
         ungated_errors: errors(&ungated),
         mean_errors: errors(&touched.outputs.means().repeat(settings.frames)),
         lines: settings.k.iter().copied().map(line).collect(),

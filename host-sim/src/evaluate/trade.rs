@@ -1,6 +1,6 @@
 //! Trade between speed and accuracy: every setting of a scene's decoder, its errors and its cost.
 //!
-//! Errors are measured on test frames through the blob that a device would get. Instructions and cycles are told by
+//! Errors are measured on test frames through the blob that a device would get. Instructions and cycles are predicted by
 //! the price list of the firmware's own code ([`Prices`]).
 
 use std::borrow::Cow;
@@ -221,8 +221,10 @@ pub fn compute(
     let prices = Prices::accepted()?;
     check(experiment, plan)?;
     let (world, t) = (&experiment.world, &experiment.training);
-    // One network for each row, and one for the array.
-    let networks = world.read_rows.len() + 1;
+    // One network for each row, and one for the array of several rows.
+    let rows = world.read_rows.len();
+    let arrays: &[bool] = if rows > 1 { &[false, true] } else { &[false] };
+    let networks = rows + arrays.len() - 1;
     progress.stage("trade", plan.samples_averaged.len() * plan.centres.len() * networks);
     let measure = experiment.measure();
     let mut judge = Judge::new(experiment.options(), experiment.origin(), &measure, plan, prices);
@@ -244,7 +246,7 @@ pub fn compute(
             };
             baselines = BASELINES.iter().map(judged).collect();
         }
-        for whole_array in [false, true] {
+        for &whole_array in arrays {
             let gates = Gates::new(
                 &frames,
                 noise_level,

@@ -9,7 +9,7 @@ use host_sim::experiment::Experiment;
 use host_sim::metrics::Errors;
 use taxel_data::progress::Silent;
 use taxel_learn::Exponential;
-use taxel_learn::cost::{Design, Prices};
+use taxel_learn::cost::Frames;
 use taxel_learn::decoders::linear;
 use taxel_simulate::drift::Drift;
 use taxel_simulate::readout::Circuit;
@@ -56,9 +56,13 @@ fn a_gate_and_a_trade_see_readings_and_baselines_of_the_same_session() {
     let measured = |scene: &Experiment| -> GateResult {
         let blob = scene.train(&Silent).unwrap();
         let model = blob.prepare(Exponential::default());
-        let prices = Prices::accepted().unwrap();
-        let frame_costs = prices.frames(&Design::of(&blob), Exponential::default()).unwrap();
-        let settings = Settings { k: vec![3.5], frames: 2000, baseline_frames: 100, frame_costs };
+        let settings = Settings {
+            k: vec![3.5],
+            frames: 2000,
+            baseline_frames: 100,
+            frame_cycles: Frames { ungated: 3, at_rest: 1, awake: 4 },
+            flash_frame_cycles: None,
+        };
         gate::measure(scene, &model, &settings).unwrap()
     };
     let scene_of = |gain: &str, relative_inputs: bool| {

@@ -135,7 +135,8 @@ fn behind_a_gate_points_have_the_errors_of_the_gates_rows_and_cost_their_share()
             k: vec![k],
             frames: scene.training.test_frames,
             baseline_frames: gate::BASELINE_FRAMES,
-            frame_costs: frames,
+            frame_cycles: frames.map(|cost| cost.cycles),
+            flash_frame_cycles: None,
         };
         let result = gate::measure(&scene, &model, &settings).unwrap();
         assert_eq!(point.errors, result.lines[0].errors);

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use taxel_learn::cost::{FramePieces, Price};
 
 use super::equations::Equations;
+use super::predicted::Frame;
 use super::regions::Count;
-use super::told::Frame;
 use crate::process::Outcome;
 
 /// Digits behind the point of prices that are means.

@@ -9,7 +9,7 @@ pub struct Options<'a> {
     pub accept: bool,
     /// Whether to measure one inference of some other shapes instead.
     pub shapes: bool,
-    /// Blob to measure with, and to compare with the accepted figures of such models.
+    /// Blob to measure, and to compare with what is predicted of it.
     pub model: Option<&'a str>,
     /// The only kernel to show; without a blob, it is compared with its budget only.
     pub kernel: Option<&'a str>,

@@ -102,7 +102,7 @@ impl Frame {
     ///
     /// # Errors
     /// The list lacks a piece.
-    pub fn told(&self, prices: &Prices) -> Outcome<[Price; 2]> {
+    pub fn predicted(&self, prices: &Prices) -> Outcome<[Price; 2]> {
         let sum = |pieces| prices.sum(pieces).map_err(|cause| cause.to_string());
         let [assembly, compiled] = [sum(&self.pieces.assembly)?, sum(&self.pieces.compiled)?];
         let mut whole = assembly;
