@@ -10,7 +10,7 @@ use crate::process::Outcome;
 /// Ratio of the least to the largest singular value from which on prices can be told apart.
 const LEAST_SINGULAR: f64 = 1e-9;
 
-/// Rounds over all prices after which those that are not negative have settled.
+/// Rounds over all prices after which those between bounds have settled.
 const ROUNDS: usize = 3000;
 
 /// Equations whose unknowns are prices by the names of pieces.
@@ -78,17 +78,21 @@ impl<'f> Equations<'f> {
         Ok(self.names.iter().enumerate().map(|(column, name)| (*name, price(column))).collect())
     }
 
-    /// The prices with the least squares of errors among those that are not negative, by coordinate descent on the
-    /// normal equations.
-    pub fn not_negative(&self, costs: &[f64]) -> BTreeMap<&'f str, f64> {
+    /// The prices with the least squares of errors among those from 0 to the `most` of each piece, by coordinate descent
+    /// on the normal equations.
+    pub fn bounded(&self, costs: &[f64], most: impl Fn(&str) -> f64) -> BTreeMap<&'f str, f64> {
         let right = DVector::from_iterator(costs.len(), costs.iter().copied());
         let normal = self.matrix.tr_mul(&self.matrix);
         let wanted = self.matrix.tr_mul(&right.component_div(&self.units));
+        let most = DVector::from_fn(self.names.len(), |column, _| {
+            most(self.names[column]) * self.lengths[column]
+        });
         let mut prices: DVector<f64> = DVector::zeros(self.names.len());
         for _ in 0..ROUNDS {
             for column in 0..prices.len() {
                 let error = normal.column(column).dot(&prices) - wanted[column];
-                prices[column] = (prices[column] - error / normal[(column, column)]).max(0.0);
+                let free = prices[column] - error / normal[(column, column)];
+                prices[column] = free.min(most[column]).max(0.0);
             }
         }
         prices.component_div_assign(&self.lengths);
@@ -137,15 +141,19 @@ mod tests {
     }
 
     #[test]
-    fn prices_that_cannot_be_negative_are_found_again_or_nothing() {
+    fn prices_between_bounds_are_found_again_or_end_there() {
         let price = |name: &str| if name.ends_with("an output") { 0.0 } else { 3.0 };
         let (pieces, mut costs) = frames(price);
         let equations = Equations::new(pieces.iter().map(|pieces| (vec![pieces], 1.0)));
-        for (name, found) in equations.not_negative(&costs) {
+        for (name, found) in equations.bounded(&costs, |_| 4.0) {
             assert!((found - price(name)).abs() < 1e-3, "{name}: {found}");
         }
         costs.iter_mut().for_each(|cost| *cost = -1.0);
-        assert!(equations.not_negative(&costs).values().all(|price| *price == 0.0));
+        assert!(equations.bounded(&costs, |_| 4.0).values().all(|price| *price == 0.0));
+        costs.iter_mut().for_each(|cost| *cost = 1e6);
+        assert!(
+            equations.bounded(&costs, |_| 4.0).values().all(|price| (*price - 4.0).abs() < 1e-9)
+        );
     }
 
     #[test]

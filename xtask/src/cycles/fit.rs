@@ -41,7 +41,10 @@ pub fn prices(frames: &[Frame]) -> Outcome<Vec<(String, Price)>> {
     });
     let waits = |frame: &Frame| (frame.whole.flash_cycles - frame.whole.cycles) as f64;
     let counted: Vec<f64> = frames.iter().map(waits).collect();
-    let waits = Equations::new(equations).not_negative(&counted);
+    // A piece waits no longer than it runs: a line of flash takes 5 cycles, and holds 4 to 8 instructions.
+    let runs: BTreeMap<&str, f64> =
+        exact.iter().chain(&means).map(|(name, [_, cycles])| (*name, *cycles)).collect();
+    let waits = Equations::new(equations).bounded(&counted, |name| runs[name].max(0.0));
 
     let priced = exact.into_iter().chain(means).map(|(name, [instructions, cycles])| {
         let price = [instructions, cycles, cycles + waits[name]];

@@ -81,9 +81,10 @@ impl Outcome {
 struct Bench<'a> {
     decoder: Decoder<'a, MOST_ROWS>,
     frame: &'a [f32],
-    /// The frame with all rows touched at their last readings, so that the gate looks at all readings; of one network
-    /// for all rows, with the last row touched.
-    awake: &'a [f32],
+    /// The baseline of a gate that finds all rows of the frame touched at their last readings, so that it looks at all
+    /// readings; of one network for all rows, with the last row touched. The frame itself stays within the training
+    /// range.
+    far_baseline: &'a [f32],
     reciprocals: &'a [f32],
     rest: Outcome,
     outcome: Outcome,
@@ -106,9 +107,9 @@ pub fn measure(model: &Model<'_>, frame: &[f32], arena: &mut Arena) {
 fn bench<'a>(model: &Model<'a>, frame: &'a [f32], arena: &mut Arena) -> Bench<'a> {
     let shape = model.shape();
     let decoder = unwrap!(Decoder::of(*model).ok(), "the model has too many rows");
-    let awake = arena.take(frame.len());
-    awake.copy_from_slice(frame);
-    let rows = awake.chunks_exact_mut(shape.inputs).rev();
+    let far_baseline = arena.take(frame.len());
+    far_baseline.copy_from_slice(frame);
+    let rows = far_baseline.chunks_exact_mut(shape.inputs).rev();
     let touched = if model.projection().is_some() { 1 } else { shape.rows };
     let last = rows.take(touched).filter_map(|row| row.last_mut());
     last.for_each(|reading| *reading *= 1.0 + 2.0 * REST_TOLERANCE);
@@ -117,27 +118,29 @@ fn bench<'a>(model: &Model<'a>, frame: &'a [f32], arena: &mut Arena) -> Bench<'a
     reciprocals.fill(reciprocal(BASELINE_OHM));
     let scratch = arena.take(decoder.scratch_floats());
     let (rest, outcome) = (Outcome::new(shape, arena), Outcome::new(shape, arena));
-    Bench { decoder, frame, awake, reciprocals, rest, outcome, scratch }
+    Bench { decoder, frame, far_baseline, reciprocals, rest, outcome, scratch }
 }
 
 impl Bench<'_> {
     #[inline(never)] // so that the stack holds the values of one exponential at a time
     fn measure<E: ExpKernel>(&mut self, name: &str, gated: bool) {
-        let Self { decoder, frame, awake, reciprocals, rest, outcome, scratch } = self;
+        let Self { decoder, frame, far_baseline, reciprocals, rest, outcome, scratch } = self;
         let given = |readings_ohm, gate| model_core::Frame { readings_ohm, reciprocals, gate };
         rest.decode::<E>(decoder, given(frame, None), scratch);
-        // What the sensor shows at rest, if the frame is its baseline.
-        let rest = Rest { baseline_ohm: frame, outputs: rest.outputs, status: rest.status() };
-        let gate = Gate::new(rest, REST_TOLERANCE);
+        // What the sensor shows at rest, if this is its baseline.
+        let gate = |baseline_ohm| {
+            let rest = Rest { baseline_ohm, outputs: rest.outputs, status: rest.status() };
+            Gate::new(rest, REST_TOLERANCE)
+        };
         let scopes = if decoder.model().projection().is_some() {
             ["array-frame", "array-resting-frame", "array-awake-frame"]
         } else {
             ["frame", "resting-frame", "awake-frame"]
         };
-        for (scope, frame, gate, status) in [
-            (scopes[0], &*frame, None, RowStatus::Decoded),
-            (scopes[1], &*frame, gate, RowStatus::AtRest),
-            (scopes[2], &*awake, gate, RowStatus::Decoded),
+        for (scope, gate, status) in [
+            (scopes[0], None, RowStatus::Decoded),
+            (scopes[1], gate(frame), RowStatus::AtRest),
+            (scopes[2], gate(far_baseline), RowStatus::Decoded),
         ] {
             if gate.is_some() && !gated {
                 continue;
