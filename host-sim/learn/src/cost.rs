@@ -78,14 +78,8 @@ impl Prices {
         let (exact, mean) = (self.sum(&assembly)?, self.sum(&compiled)?);
         let [instructions, cycles, flash_cycles] =
             [0, 1, 2].map(|cost| (exact[cost] + mean[cost]).round() as u64);
-        let read = if gating == Gating::AtRest || design.weights_in_ram {
-            0
-        } else {
-            let networks: usize = design.row_networks().map(NetworkDesign::bytes).sum();
-            networks + design.projection_bytes()
-        };
-        let flash_cycles = flash_cycles + least_waiting_for_weights(read);
-        Ok(Cost { instructions, cycles, flash_cycles })
+        let waiting = if gating == Gating::AtRest { 0 } else { design.least_waiting_for_weights() };
+        Ok(Cost { instructions, cycles, flash_cycles: flash_cycles + waiting })
     }
 
     /// What a frame costs a model of this `design` without a gate, and behind gates.
@@ -98,6 +92,18 @@ impl Prices {
             at_rest: self.frame(design, exponential, Gating::AtRest)?,
             awake: self.frame(design, exponential, Gating::Awake)?,
         })
+    }
+}
+
+impl Design {
+    /// Least waiting in cycles for the weights that one frame reads: 0 if they are in RAM.
+    #[must_use]
+    pub fn least_waiting_for_weights(&self) -> u64 {
+        if self.weights_in_ram {
+            return 0;
+        }
+        let networks: usize = self.row_networks().map(NetworkDesign::bytes).sum();
+        least_waiting_for_weights(networks + self.projection_bytes())
     }
 }
 

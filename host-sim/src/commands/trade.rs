@@ -66,7 +66,7 @@ pub struct Arguments {
     /// most accurate such point is chosen.
     #[arg(long, value_name = "CYCLES")]
     max_cycles: Option<u64>,
-    /// Choose within a blob of so many bytes [default, with another bound: a slot's 131072].
+    /// Choose within a blob of so many bytes [default, with another bound: a slot's 131056].
     #[arg(long, value_name = "BYTES")]
     max_flash: Option<usize>,
     /// Clock of the device, for times.
@@ -312,6 +312,9 @@ fn page_of(trade: &Trade, all: bool, folder: &Path) -> print::Page {
     } else {
         format!("{} more points with --all", trade.points.len() - shown.len())
     });
+    for note in &trade.left_out {
+        page.line(format_args!("left out: {note}"));
+    }
     if let Some(chosen) = trade.chosen {
         let point = &trade.points[chosen];
         page.line(format_args!(

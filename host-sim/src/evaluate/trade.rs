@@ -17,7 +17,7 @@ use taxel_learn::{Exponential, Options};
 use taxel_simulate::Synthesis;
 
 use super::gate;
-use crate::error::{NoPoint, Result};
+use crate::error::{Error, NoPoint, Result};
 use crate::experiment::Experiment;
 use crate::metrics::{self, DecoderErrors, Errors};
 
@@ -29,8 +29,8 @@ pub use choice::Bounds;
 use gating::Gates;
 use judge::{Judge, Knobs, Sets};
 
-/// Largest blob in bytes that a slot of the firmware's images holds.
-pub const SLOT_BYTES: usize = 131_072;
+/// Largest blob in bytes that a slot of the firmware's images holds: 128 KiB less the record behind it.
+pub const SLOT_BYTES: usize = 131_056;
 
 /// Settings that a trade varies.
 #[derive(Debug, Clone, PartialEq)]
@@ -168,6 +168,8 @@ pub struct Trade {
     pub baselines: Vec<DecoderErrors>,
     /// Every point that was judged.
     pub points: Vec<Point>,
+    /// Formats that cannot hold a network of some settings, and why.
+    pub left_out: Vec<String>,
     /// Index of the point that [`Trade::choose`] picked.
     pub chosen: Option<usize>,
     /// Index of every point's blob: points that differ only in the exponential share one.
@@ -261,7 +263,10 @@ pub fn compute(
             }
         }
     }
-    let Judge { prices, mut points, blobs, distinct, .. } = judge;
+    let Judge { prices, mut points, left_out, blobs, distinct, .. } = judge;
+    if let (true, Some(cause)) = (points.is_empty(), left_out.first()) {
+        return Err(Error::Failed(format!("no way to decode the scene can be trained: {cause}")));
+    }
     compare(&mut points, group);
     let of_group = baselines.first().and_then(|b| b.errors.iter().find(|e| e.group == group));
     Ok(Trade {
@@ -274,6 +279,7 @@ pub fn compute(
         unit: of_group.map_or(String::new(), |errors| errors.unit.clone()),
         baselines,
         points,
+        left_out,
         chosen: None,
         blobs,
         distinct_blobs: distinct,

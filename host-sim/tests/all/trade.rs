@@ -253,7 +253,7 @@ fn bounds_that_no_point_meets_and_plans_that_make_no_gate_are_refused() {
     let message = compute(&scene, bounds).unwrap_err().to_string();
     let near = least_error(&|point| point.frame.cycles <= cycles);
     for told in [
-        format!("max-error {error}, max-cycles {cycles}, a slot's 131072 bytes at once"),
+        format!("max-error {error}, max-cycles {cycles}, a slot's 131056 bytes at once"),
         format!("without max-error {error}, the smallest error is {near:.4} mm (dz_mm)"),
         format!("without max-cycles {cycles}, the fewest cycles are "),
     ] {
@@ -275,4 +275,26 @@ fn bounds_that_no_point_meets_and_plans_that_make_no_gate_are_refused() {
     let mut silent = scene.clone();
     silent.world.noise.level = 0.0;
     assert!(refusal(&silent, &plan).contains("noise level = 0"));
+}
+
+#[test]
+fn scenes_of_any_shape_are_traded_and_what_a_format_cannot_hold_is_named() {
+    let mut scene = press();
+    scene.world.read_rows = vec![3];
+    let plan =
+        Plan { centres: vec![20], samples_averaged: vec![1], gate_k: vec![], clock_mhz: 1.0 };
+    let one_row = compute_plan(&scene, &plan, Bounds::default()).unwrap();
+    assert!(one_row.points.len() >= 8 && one_row.left_out.is_empty());
+    assert!(one_row.points.iter().all(|point| !point.whole_array && point.centres == 20));
+
+    // One network for the array has half of the spread, which 16 bits cannot hold.
+    scene.world.read_rows = vec![3, 4];
+    scene.training.spread = 0.5;
+    let narrow = compute_plan(&scene, &plan, Bounds::default()).unwrap();
+    assert!(narrow.left_out.iter().all(|note| note.starts_with("fixed16 array, K = 20: ")));
+    let of_array = |trade: &Trade, name: &str| {
+        trade.points.iter().filter(|p| p.whole_array && p.arithmetic.name() == name).count()
+    };
+    assert!(!narrow.left_out.is_empty() && of_array(&narrow, "fixed16") == 0);
+    assert!(of_array(&narrow, "f32-direct") == 2);
 }

@@ -24,7 +24,7 @@ const TO_CHECK: usize = 40;
 
 /// Designs that bring out every branch of the code: sizes at which it changes are frequent.
 pub fn for_prices() -> Vec<Design> {
-    const ROWS: Ranges<'_> = &[(3, [1, 1]), (1, [2, 3])];
+    const ROWS: Ranges<'_> = &[(2, [1, 1]), (2, [2, 8])];
     const INPUTS: Ranges<'_> =
         &[(5, [1, 17]), (3, [18, 18]), (4, [19, 40]), (1, [60, 70]), (1, [100, 150])];
     const OUTPUTS: Ranges<'_> =

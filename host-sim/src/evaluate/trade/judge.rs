@@ -64,6 +64,8 @@ pub(super) struct Judge<'s> {
     plan: &'s Plan,
     pub prices: Prices,
     pub points: Vec<Point>,
+    /// Formats that cannot hold a network of these settings, and why.
+    pub left_out: Vec<String>,
     /// Index of each point's blob among the distinct ones.
     pub blobs: Vec<usize>,
     pub distinct: Vec<Vec<u8>>,
@@ -78,8 +80,8 @@ impl<'s> Judge<'s> {
         plan: &'s Plan,
         prices: Prices,
     ) -> Self {
-        let (points, blobs, distinct) = (vec![], vec![], vec![]);
-        Self { options, origin, measure, plan, prices, points, blobs, distinct }
+        let (points, left_out, blobs, distinct) = (vec![], vec![], vec![], vec![]);
+        Self { options, origin, measure, plan, prices, points, left_out, blobs, distinct }
     }
 
     /// Trains and judges every format and tail with so many centres.
@@ -98,7 +100,7 @@ impl<'s> Judge<'s> {
         let seen = sets.seen();
         options.check(seen.frames())?;
         // Centres are shared by all formats of a row.
-        let rows: Vec<Vec<FittedNetwork>> = (0..seen.rows)
+        let rows: Vec<Vec<taxel_learn::Result<FittedNetwork>>> = (0..seen.rows)
             .into_par_iter()
             .map(|row| {
                 let table = seen.row_table(row);
@@ -107,13 +109,24 @@ impl<'s> Judge<'s> {
                 let fit = |&(format, affine_tail): &(Format, bool)| {
                     samples.fit(&found, &Options { affine_tail, format, ..options })
                 };
-                let fitted = variants.par_iter().map(fit).collect::<taxel_learn::Result<_>>();
+                let fitted = variants.par_iter().map(fit).collect();
                 progress.step();
                 fitted
             })
-            .collect::<taxel_learn::Result<_>>()?;
+            .collect();
         for (variant, &(format, affine)) in variants.iter().enumerate() {
-            let networks = rows.iter().map(|row| row[variant].clone()).collect();
+            let of_rows = rows.iter().map(|row| row[variant].as_ref().cloned());
+            let networks = match of_rows.collect::<std::result::Result<_, _>>() {
+                Ok(networks) => networks,
+                Err(cause) => {
+                    let of = if knobs.whole_array { " array" } else { "" };
+                    let note = format!("{}{of}, K = {}: {cause}", format.name(), knobs.centres);
+                    if !self.left_out.contains(&note) {
+                        self.left_out.push(note);
+                    }
+                    continue;
+                }
+            };
             let projection = sets.projected.as_ref().map(|(parameters, _)| parameters.clone());
             let trained = Trained { projection, networks };
             let noise = (self.origin.noise.0, sets.noise_level);
