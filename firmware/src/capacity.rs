@@ -8,6 +8,10 @@ use model_core::health::MOST_COLUMNS;
 /// its slot.
 pub const WEIGHT_RAM_BYTES: usize = 96 * 1024;
 
+/// Most rows, and most outputs a row, that an image can be built for.
+const MOST_ROWS: usize = 255;
+const MOST_OUTPUTS: usize = 255;
+
 /// Largest sensor and model that an image has room for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Capacity {
@@ -50,9 +54,9 @@ impl Capacity {
             place += 1;
         }
         let [rows, columns, outputs] = numbers;
-        assert!(rows >= 2 && rows <= 255, "a capacity has 2 to 255 rows");
+        assert!(rows >= 2 && rows <= MOST_ROWS, "a capacity has 2 to 255 rows");
         assert!(columns >= 1 && columns <= MOST_COLUMNS, "a capacity has 1 to 32 columns");
-        assert!(outputs >= 1 && outputs <= 255, "a capacity has 1 to 255 outputs a row");
+        assert!(outputs >= 1 && outputs <= MOST_OUTPUTS, "a capacity has 1 to 255 outputs a row");
         Self { rows, columns, outputs }
     }
 
@@ -77,6 +81,26 @@ impl Capacity {
         let constants = 4 * (self.rows + 2 * self.columns) + 40;
         let longest = if frame > constants { frame } else { constants };
         if longest > 256 { longest } else { 256 }
+    }
+
+    /// This capacity, enlarged for models of this `shape`; `None` if no image can be built for them.
+    ///
+    /// ```
+    /// use firmware::capacity::Capacity;
+    /// use model_core::blob::ModelShape;
+    /// let enlarged = |rows, inputs| {
+    ///     Capacity::PAPER.enlarged_for(ModelShape { rows, inputs, outputs: 6 })
+    /// };
+    /// assert_eq!(enlarged(16, 4), Some(Capacity { rows: 16, columns: 18, outputs: 18 }));
+    /// assert_eq!(enlarged(1, 33), None);
+    /// ```
+    #[must_use]
+    pub fn enlarged_for(self, shape: ModelShape) -> Option<Self> {
+        let rows = self.rows.max(shape.rows);
+        let columns = self.columns.max(shape.inputs);
+        let outputs = self.outputs.max(shape.outputs);
+        let possible = rows <= MOST_ROWS && columns <= MOST_COLUMNS && outputs <= MOST_OUTPUTS;
+        possible.then_some(Self { rows, columns, outputs })
     }
 
     /// The wires to be scanned for a model of this `shape`; `None` if there is no room for it.

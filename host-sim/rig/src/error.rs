@@ -90,9 +90,9 @@ pub enum Error {
     /// Model that the device has no room for.
     #[error(
         "the model has {} rows of {} readings and {} outputs; the device has room for {} rows of {} readings and \
-         {} outputs: build its image with TAXEL_CAPACITY={}x{}x{} (docs/board.md)",
+         {} outputs: {}",
         shape.rows, shape.inputs, shape.outputs, capacity.rows, capacity.columns, capacity.outputs,
-        shape.rows.max(capacity.rows), shape.inputs.max(capacity.columns), shape.outputs.max(capacity.outputs)
+        image_for(*capacity, *shape)
     )]
     NoRoom {
         /// What the device has room for.
@@ -195,6 +195,22 @@ fn why(refusal: Refusal) -> String {
         ),
         Refusal::LastGeneration => {
             "the record of its model has the last number; flash a model with a debugger".into()
+        }
+    }
+}
+
+/// What image a model of this `shape` needs, if those of this `capacity` have no room for it.
+#[must_use]
+pub fn image_for(capacity: Capacity, shape: ModelShape) -> String {
+    match capacity.enlarged_for(shape) {
+        Some(Capacity { rows, columns, outputs }) => {
+            format!(
+                "build its image with TAXEL_CAPACITY={rows}x{columns}x{outputs} (docs/board.md)"
+            )
+        }
+        None => {
+            "no image can be built for it: 255 rows of 32 readings and 255 outputs are the most"
+                .to_owned()
         }
     }
 }

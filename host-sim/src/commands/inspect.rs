@@ -3,11 +3,14 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use firmware::capacity::WEIGHT_RAM_BYTES;
+use firmware::capacity::{Capacity, WEIGHT_RAM_BYTES};
 use host_sim::Result;
+use host_sim::evaluate::trade::SLOT_BYTES;
+use model_core::blob::ModelShape;
 use serde::Serialize;
 use taxel_learn::cost::{Cost, DecoderRam, Design, Frames, Prices};
 use taxel_learn::{Exponential, ModelBlob};
+use taxel_rig::error::image_for;
 
 use super::{Common, print};
 
@@ -41,6 +44,8 @@ struct Summary {
     ram_bytes: DecoderRam,
     /// Whether the images have room in RAM for a copy of the blob.
     weights_in_ram: bool,
+    /// Why the images as they are cannot decode the model.
+    needs: Vec<String>,
     /// What decoding a frame costs a Cortex-M4F.
     frame: Frames<Cost>,
     inputs: Vec<ColumnSummary>,
@@ -122,6 +127,7 @@ fn summarise(blob: &ModelBlob) -> Result<Summary> {
         flash_bytes: blob.bytes().len(),
         ram_bytes: DecoderRam::of(&design),
         weights_in_ram: design.weights_in_ram,
+        needs: needs(shape, blob.bytes().len()),
         frame: Prices::accepted()?.frames(&design, Exponential::default())?,
         inputs: metadata.input_names.iter().zip(metadata.input_units.iter()).map(column).collect(),
         outputs: outputs
@@ -135,11 +141,22 @@ fn summarise(blob: &ModelBlob) -> Result<Summary> {
     })
 }
 
+/// Why the images as they are cannot decode a model of this shape, with a blob of so many bytes.
+fn needs(shape: ModelShape, bytes: usize) -> Vec<String> {
+    let room = Capacity::PAPER;
+    let too_large = (bytes > SLOT_BYTES)
+        .then(|| format!("no device takes it: a slot of the images holds {SLOT_BYTES} bytes"));
+    let other_image = room.wires_for(shape).is_none().then(|| image_for(room, shape));
+    too_large.into_iter().chain(other_image).collect()
+}
+
 /// Cost of a frame for people.
-fn costs(cost: Cost) -> String {
+fn costs(cost: Cost, weights_in_ram: bool) -> String {
+    // What weights in flash cost is a lower bound.
+    let least = if weights_in_ram { "" } else { "at least " };
     let at = |cycles: u64, clock_mhz: f64| cycles as f64 / clock_mhz;
     format!(
-        "{} instructions, {} cycles ({:.0} µs at 168 MHz); from flash {} ({:.0} µs at 180 MHz)",
+        "{} instructions, {} cycles ({:.0} µs at 168 MHz); from flash {least}{} ({:.0} µs at 180 MHz)",
         cost.instructions,
         cost.cycles,
         at(cost.cycles, 168.0),
@@ -212,12 +229,15 @@ fn page_of(s: &Summary) -> print::Page {
     };
     line("RAM", format!("{} bytes: {}", ram.bytes(), parts.join(", ")));
     line("weights", weights);
+    for need in &s.needs {
+        line("device", need.clone());
+    }
     for (label, cost) in [
         ("a frame", s.frame.ungated),
-        ("… all at rest", s.frame.at_rest),
-        ("… all touched", s.frame.awake),
+        ("gated, at rest", s.frame.at_rest),
+        ("gated, touched", s.frame.awake),
     ] {
-        line(label, costs(cost));
+        line(label, costs(cost, s.weights_in_ram));
     }
     let relative = if s.relative_inputs { "; relative to the baseline, R/R₀" } else { "" };
     let names = ends(&s.inputs.iter().map(|c| c.name.as_str()).collect::<Vec<_>>());

@@ -289,3 +289,35 @@ fn readings_of_another_sensor_are_remarked_upon() {
     assert_eq!(remark("scene.toml"), "");
     assert!(remark("thicker.toml").contains("outside the range that the model was trained on"));
 }
+
+#[test]
+fn inspect_says_what_image_a_model_needs() {
+    let folder = Folder::new("needs");
+    // One row of so many readings, whose sum is the output.
+    let csv = |readings: usize| {
+        let names: Vec<String> = (1..=readings).map(|i| format!("ch{i}")).collect();
+        let mut csv = format!("{},f_n\n", names.join(","));
+        for line in 0..60 {
+            let values: Vec<usize> = (0..readings).map(|i| 50 + (line * (i + 3)) % 17).collect();
+            let sum: usize = values.iter().sum();
+            let values: Vec<String> = values.iter().map(usize::to_string).collect();
+            csv += &format!("{},{sum}\n", values.join(","));
+        }
+        csv
+    };
+    for (readings, says) in [
+        (18, None),
+        (20, Some("TAXEL_CAPACITY=8x20x18")),
+        (33, Some("no image can be built for it: 255 rows of 32 readings")),
+    ] {
+        folder.write("data.csv", csv(readings));
+        let train = ["train", "data.csv", "--inputs", "ch*", "--outputs", "f_n", "--centres", "8"];
+        folder.succeed(&[&train[..], &["-o", "m.bin"]].concat());
+        let printed = folder.succeed(&["inspect", "m.bin"]);
+        assert!(printed.contains("gated, at rest") && printed.contains("from flash"), "{printed}");
+        match says {
+            Some(says) => assert!(printed.contains(says), "{printed}"),
+            None => assert!(!printed.contains("\ndevice "), "{printed}"),
+        }
+    }
+}
