@@ -97,11 +97,12 @@
     vmsr fpscr, \scratch
     .endm
 
-@ Stores the first r2 of s0..s17 (1 to 18) at r1. r1 and r3 are overwritten.
-    function taxel_store
+@ A function that transfers the first r2 of s0..s17 (1 to 18) at r1. r1 and r3 are overwritten.
+    .macro transfers_first_of_18 name, transfer
+    function \name
     cmp r2, #18
     bne 1f
-    vstmia r1, {s0-s17}
+    \transfer\()ia r1, {s0-s17}
     bx lr
 1:
     adr.w r3, 2f + 1
@@ -109,26 +110,12 @@
     sub r3, r3, r2, lsl #2
     bx r3
     .irp i, 17,16,15,14,13,12,11,10,9,8,7,6,5,4,3,2,1,0
-    vstmdb r1!, {s\i}
+    \transfer\()db r1!, {s\i}
     .endr
 2:
     bx lr
-    .size taxel_store, . - taxel_store
+    .size \name, . - \name
+    .endm
 
-@ Loads the first r2 of s0..s17 (1 to 18) from r1. r1 and r3 are overwritten.
-    function taxel_load
-    cmp r2, #18
-    bne 1f
-    vldmia r1, {s0-s17}
-    bx lr
-1:
-    adr.w r3, 2f + 1
-    add r1, r1, r2, lsl #2
-    sub r3, r3, r2, lsl #2
-    bx r3
-    .irp i, 17,16,15,14,13,12,11,10,9,8,7,6,5,4,3,2,1,0
-    vldmdb r1!, {s\i}
-    .endr
-2:
-    bx lr
-    .size taxel_load, . - taxel_load
+    transfers_first_of_18 taxel_store, vstm
+    transfers_first_of_18 taxel_load, vldm
