@@ -118,7 +118,7 @@ pub fn html(trade: &Trade) -> String {
     let title = format!("Taxel: speed against accuracy, {}", trade.scene);
     let mut body = format!(
         "<header>\n<h1>{}</h1>\n<p>Noise {} a sample; {} test frames; cycles of a frame of a \
-         Cortex-M4F by the project's model at zero wait states (not checked against silicon), code of {}; \
+         Cortex-M4F by the project's models, at zero wait states and from flash (not checked against silicon), code of {}; \
          times at {} MHz.</p>\n</header>\n",
         escape(&title),
         percent(trade.noise_level),

@@ -1,5 +1,7 @@
 //! Work of users, from end to end, with the binary.
 
+use std::fmt::Write as _;
+
 use crate::common::{Folder, small_scene};
 
 fn json(text: &str) -> serde_json::Value {
@@ -301,7 +303,7 @@ fn inspect_says_what_image_a_model_needs() {
             let values: Vec<usize> = (0..readings).map(|i| 50 + (line * (i + 3)) % 17).collect();
             let sum: usize = values.iter().sum();
             let values: Vec<String> = values.iter().map(usize::to_string).collect();
-            csv += &format!("{},{sum}\n", values.join(","));
+            let _ = writeln!(csv, "{},{sum}", values.join(","));
         }
         csv
     };

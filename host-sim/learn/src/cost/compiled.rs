@@ -55,17 +55,17 @@ pub(super) fn of_frame(design: &Design, exponential: Exponential, gating: Gating
 fn direct(network: &NetworkDesign, exponential: Exponential, pieces: &mut Pieces) {
     let Shape { inputs, centres, outputs } = network.shape;
     let mut add = |name: &str, times: usize| pieces.add(format!("f32-direct: {name}"), times);
-    add(&format!("exponential by {}", exponential.name()), centres);
     add("input scaled", inputs);
     add("output checked", outputs);
     let tail = network.affine_tail;
     if (inputs, outputs) == UNROLLED {
         add("18 inputs, 18 outputs: network", 1);
-        add("18 inputs, 18 outputs: centre less", centres);
+        add(&format!("18 inputs, 18 outputs: centre, {}", exponential.name()), centres);
         add("18 inputs, 18 outputs: tail", usize::from(tail));
         return;
     }
     add("network", 1);
+    add(&format!("centre, {}", exponential.name()), centres);
     // The compiler takes four inputs and four outputs at a time.
     add("centre, four inputs", centres * (inputs / 4));
     add("centre, fewer than four inputs", if inputs < 4 { centres } else { 0 });

@@ -101,7 +101,9 @@ fn the_accepted_figures_of_trained_models_are_told() {
         let errors =
             [percent(predicted.instructions, instructions), percent(predicted.cycles, cycles)];
         assert!(errors.iter().all(|error| error.abs() < 2.0), "{line}: {errors:?} %");
-        let error = percent(predicted.flash_cycles, flash);
+        // The image that counts has all weights in RAM.
+        let waiting = if scope == "resting-frame" { 0 } else { design.least_waiting_for_weights() };
+        let error = percent(predicted.flash_cycles - waiting, flash);
         assert!(error.abs() < 10.0, "{line}: {error} % from flash");
         compared += 1;
     }
