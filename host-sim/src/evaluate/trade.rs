@@ -213,7 +213,7 @@ impl Trade {
 /// `group`.
 ///
 /// # Errors
-/// [`Error`](crate::Error) for a plan that cannot be carried out, or a scene that cannot be trained.
+/// [`Error`] for a plan that cannot be carried out, or a scene that cannot be trained.
 pub fn compute(
     experiment: &Experiment,
     plan: &Plan,
