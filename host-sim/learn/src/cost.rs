@@ -43,9 +43,9 @@ pub enum Gating {
 /// How often pieces of code are executed for one frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FramePieces {
-    /// Of routines in assembly.
+    /// Pieces of routines in assembly.
     pub assembly: Pieces,
-    /// Of compiled code.
+    /// Pieces of compiled code.
     pub compiled: Pieces,
 }
 

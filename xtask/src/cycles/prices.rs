@@ -17,10 +17,11 @@ const FILE: &str = "firmware/prices.csv";
 /// Largest error in per cent of what the list tells of a frame's instructions and cycles.
 const TOLERANCE_PERCENT: f64 = 2.0;
 
-/// The same for cycles from flash: how long code waits depends on what was executed before it.
+/// Largest error in per cent of cycles from flash: how long code waits depends on what was executed before it.
 const FLASH_TOLERANCE_PERCENT: f64 = 10.0;
 
-/// The same for exponentials that branch by their arguments, whose prices are those of one spread of arguments.
+/// Largest error in per cent with exponentials that branch by their arguments: their prices are those of one spread of
+/// arguments.
 const BRANCHING_PERCENT: f64 = 10.0;
 
 /// How many per cent more cycles than predicted a frame may take with another compiler: that error, and as much as accepted

@@ -21,7 +21,7 @@ pub struct Count {
     pub instructions: u64,
     /// Cycles by the cost model, with memory that never waits.
     pub cycles: u64,
-    /// The same with code in flash ([`Flash`]) and all data but literals in RAM.
+    /// Cycles with code in flash ([`Flash`]) and all data but literals in RAM.
     pub flash_cycles: u64,
 }
 

@@ -81,7 +81,7 @@ impl Design {
         Self { shape, projection: true, ..of_one }.in_ram_if_it_fits()
     }
 
-    /// The same design with the weights where the images put them, going by its parameters alone.
+    /// This design with the weights where the images put them, going by its parameters alone.
     #[must_use]
     pub fn in_ram_if_it_fits(self) -> Self {
         Self { weights_in_ram: self.parameter_bytes() <= WEIGHT_RAM_BYTES, ..self }
