@@ -44,8 +44,8 @@ use std::fs;
 use std::path::Path;
 
 use rayon::prelude::*;
-use taxel_learn::cost::{Cost, Design, Gating, Prices};
-use taxel_learn::{Exponential, ModelBlob};
+use taxel_learn::ModelBlob;
+use taxel_learn::cost::Design;
 
 use crate::emulate::qemu;
 use crate::firmware::{BENCH, build_image};
@@ -174,20 +174,18 @@ fn measure_model(
     prices::compare_model(&frames, compiler, options.json)
 }
 
-/// What a frame of the model at `path`, which has this `design`, is predicted to cost without a gate, and what is counted.
+/// Predicted and counted cost of a frame of the model at `path`, which has this `design`, without a gate and with all
+/// weights in RAM.
 ///
 /// # Errors
 /// The run fails, or the model costs something else than predicted.
-pub fn frame_of(design: &Design, path: &Path) -> Outcome<(Cost, Counted)> {
+pub fn frame_of(design: &Design, path: &Path) -> Outcome<[Counted; 2]> {
     let image = elf(IMAGE);
     let code = Code::read(&image)?;
     let (frames, _) = predicted::measure(design, path, &image, &code)?;
-    let compiler = Toolchain::find()?.compiler()?;
-    prices::held_to(&frames, &compiler)?;
-    let frame = frames.first().ok_or("no frame was measured")?;
-    let prices = Prices::accepted().map_err(|cause| cause.to_string())?;
-    let predicted = prices.frame(design, Exponential::default(), Gating::Ungated);
-    Ok((predicted.map_err(|cause| cause.to_string())?, frame.whole))
+    let predicted = prices::predicted(&frames, &Toolchain::find()?.compiler()?)?;
+    let first = predicted.first().zip(frames.first()).ok_or("no frame was measured")?;
+    Ok([*first.0, first.1.whole])
 }
 
 /// Compares figures with the accepted ones, or writes them as accepted.

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use model_core::blob::ModelShape;
 use taxel_learn::ModelBlob;
-use taxel_learn::cost::{Cost, DecoderRam, Design};
+use taxel_learn::cost::{DecoderRam, Design};
 
 use crate::cycles::Counted;
 use crate::emulate::qemu;
@@ -39,7 +39,7 @@ struct Figure {
     shape: ModelShape,
     blob_bytes: usize,
     ram_bytes: usize,
-    predicted: Cost,
+    predicted: Counted,
     counted: Counted,
 }
 
@@ -128,9 +128,11 @@ fn decode(data: &Path, model: &Path, image: &Path) -> Outcome {
 fn figure(sensor: &'static Sensor, format: &'static str, model: &Path) -> Outcome<Figure> {
     let blob = ModelBlob::read(model).map_err(|cause| cause.to_string())?;
     let design = Design::of(&blob);
-    let (predicted, mut counted) = crate::cycles::frame_of(&design, model)?;
-    // The image that counts has all weights in RAM.
-    counted.flash_cycles += design.least_waiting_for_weights();
+    let costs = crate::cycles::frame_of(&design, model)?;
+    let [predicted, counted] = costs.map(|cost| Counted {
+        flash_cycles: cost.flash_cycles + design.least_waiting_for_weights(),
+        ..cost
+    });
     Ok(Figure {
         sensor: sensor.title,
         format,

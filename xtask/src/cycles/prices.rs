@@ -8,6 +8,7 @@ use taxel_learn::cost::Prices;
 use super::code::Code;
 use super::loops::Loop;
 use super::predicted::{self, Frame};
+use super::regions::Count;
 use super::{designs, fit};
 use crate::process::{Outcome, root};
 
@@ -90,13 +91,19 @@ pub fn compare_model(frames: &[Frame], compiler: &str, json: bool) -> Outcome {
     held(&compared, prices.compiler != compiler)
 }
 
-/// Fails if the list tells wrong costs of `frames`.
+/// What the list predicts of each of `frames`, with all weights in RAM.
 ///
 /// # Errors
 /// The frames that cost something else than predicted.
-pub fn held_to(frames: &[Frame], compiler: &str) -> Outcome {
+pub fn predicted(frames: &[Frame], compiler: &str) -> Outcome<Vec<Count>> {
     let prices = prices()?;
-    held(&compare(frames, &prices)?, prices.compiler != compiler)
+    let compared = compare(frames, &prices)?;
+    held(&compared, prices.compiler != compiler)?;
+    let count = |it: &Compared<'_>| {
+        let [instructions, cycles, flash_cycles] = it.predicted;
+        Count { instructions, cycles, flash_cycles }
+    };
+    Ok(compared.iter().map(count).collect())
 }
 
 /// A frame and what the list tells of it.
