@@ -14,8 +14,8 @@ use taxel_data::digest::digest;
 use taxel_data::error::require;
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
-use taxel_learn::train::{check_spread, train};
-use taxel_learn::{ModelBlob, Options, Origin, pack, relative};
+use taxel_learn::train::{Examples, FreshFrames, Refinement, check_spread, train, train_refined};
+use taxel_learn::{ModelBlob, Options, Origin, Trained, pack, relative};
 use taxel_simulate::noise::NoiseKind;
 use taxel_simulate::synth::BASELINE_FRAMES;
 use taxel_simulate::world::check_noise_level;
@@ -52,6 +52,7 @@ pub struct Experiment {
 /// Settings of a model's training.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a field of a scene's file")]
 pub struct Training {
     /// Number of frames to train on.
     pub frames: usize,
@@ -72,6 +73,9 @@ pub struct Training {
     /// Whether inputs are readings relative to the baseline (R/R₀), and not readings as they are.
     #[serde(default)]
     pub relative_inputs: bool,
+    /// Whether centres, widths and the projection are refined after K-means.
+    #[serde(default = "yes")]
+    pub refine: bool,
 }
 
 /// Settings of the paper's Table 1.
@@ -92,6 +96,10 @@ pub struct Table1 {
     pub affine_tail: bool,
     /// Number of frames, and of centres, of the standard network (K = N).
     pub standard_frames: usize,
+}
+
+fn yes() -> bool {
+    true
 }
 
 fn default_format() -> Format {
@@ -182,11 +190,42 @@ impl Experiment {
     /// [`BASELINE_FRAMES`] frames of the untouched sensor. `synthesis` is one of the experiment's world.
     #[must_use]
     pub fn dataset(&self, synthesis: &Synthesis<'_>, stream: Stream, frames: usize) -> Dataset {
-        let readings = synthesis.frames(stream, frames);
+        self.dataset_from(synthesis, stream, 0, frames)
+    }
+
+    /// Data set from trajectory number `first` of `stream` on.
+    fn dataset_from(
+        &self,
+        synthesis: &Synthesis<'_>,
+        stream: Stream,
+        first: usize,
+        frames: usize,
+    ) -> Dataset {
+        let readings = synthesis.frames_from(stream, first, frames);
         if !self.training.relative_inputs {
             return readings;
         }
-        relative::dataset(readings, &synthesis.baselines(stream, frames, BASELINE_FRAMES))
+        let baselines = synthesis.baselines_from(stream, first, frames, BASELINE_FRAMES);
+        relative::dataset(readings, &baselines)
+    }
+
+    /// Trains on `frames`, a data set of `synthesis`, which refinement draws more frames from.
+    ///
+    /// # Errors
+    /// [`Error`] for training options that cannot be used.
+    pub fn train_on(
+        &self,
+        frames: &Dataset,
+        synthesis: &Synthesis<'_>,
+        progress: &dyn Progress,
+    ) -> Result<Trained> {
+        let options = self.options();
+        if !self.training.refine {
+            return Ok(train(frames, &options, progress)?);
+        }
+        let more = MoreFrames { experiment: self, synthesis };
+        let examples = Examples::Fresh(&more);
+        Ok(train_refined(frames, &options, &Refinement::default(), examples, progress)?)
     }
 
     /// Trains the model that the scene describes, like the command `train`.
@@ -196,7 +235,7 @@ impl Experiment {
     pub fn train(&self, progress: &dyn Progress) -> Result<ModelBlob> {
         let synthesis = Synthesis::of(&self.world);
         let frames = self.dataset(&synthesis, Stream::Training, self.training.frames);
-        let trained = train(&frames, &self.options(), progress)?;
+        let trained = self.train_on(&frames, &synthesis, progress)?;
         Ok(pack(&trained, &frames, &self.origin())?)
     }
 
@@ -216,6 +255,23 @@ impl Experiment {
             counts.extend([("table1.frames", t.frames), ("table1.test_frames", t.test_frames)]);
         }
         counts.into_iter().try_for_each(|(field, frames)| self.world.check_frames(field, frames))
+    }
+}
+
+/// Frames of an experiment that only refinement sees.
+#[derive(Debug, Clone, Copy)]
+pub struct MoreFrames<'e> {
+    /// Experiment whose data sets they are like.
+    pub experiment: &'e Experiment,
+    /// Synthesis of its world.
+    pub synthesis: &'e Synthesis<'e>,
+}
+
+impl FreshFrames for MoreFrames<'_> {
+    fn frames(&self, step: usize, count: usize) -> Dataset {
+        let trajectories = count.div_ceil(self.synthesis.steps());
+        let first = step * trajectories;
+        self.experiment.dataset_from(self.synthesis, Stream::Refinement, first, count)
     }
 }
 

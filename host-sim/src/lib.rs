@@ -15,6 +15,7 @@
 //! let mut experiment = Experiment::load("press")?;
 //! experiment.world.read_rows = vec![3]; // one row-wire: 18 readings, 18 outputs
 //! experiment.training.frames = 2000;
+//! experiment.training.refine = false; // stay with K-means, which is quick
 //! let blob = experiment.train(&Silent)?;
 //! let fresh = synthesise(&experiment.world, Stream::Test, 1000);
 //! let errors = metrics::judge(&blob.prepare(Exponential::default()), &fresh, &experiment.measure());

@@ -8,7 +8,6 @@ use taxel_data::random::Stream;
 use taxel_data::table::Table;
 use taxel_learn::cost::{Cost, Design, Prices};
 use taxel_learn::decoders::BASELINES;
-use taxel_learn::train::train;
 use taxel_learn::{Decoder, Exponential, ModelBlob, PreparedModel, pack};
 use taxel_simulate::{Synthesis, World};
 
@@ -74,8 +73,10 @@ pub struct ModelSummary {
     pub centres: usize,
     /// Number of outputs of each network.
     pub outputs: usize,
-    /// Width σ on scaled inputs.
+    /// Width σ on scaled inputs; after refinement the mean over the networks.
     pub spread: f64,
+    /// Whether centres, widths and the projection were refined after K-means.
+    pub refined: bool,
     /// Whether the networks add an affine tail A·x.
     pub affine_tail: bool,
     /// Size of the blob.
@@ -140,7 +141,7 @@ pub fn run(experiment: &Experiment, progress: &dyn Progress) -> Result<(RunResul
     let test = experiment.dataset(&synthesis, Stream::Test, t.test_frames);
     progress.step();
 
-    let trained = train(&training, &experiment.options(), progress)?;
+    let trained = experiment.train_on(&training, &synthesis, progress)?;
     let blob = pack(&trained, &training, &experiment.origin())?;
     let network = blob.prepare(Exponential::default()).of_inputs();
 
@@ -200,7 +201,8 @@ fn model_summary(
         relative_inputs: model.metadata().relative_inputs,
         centres: model.networks().map(|n| n.shape().centres).max().unwrap_or(0),
         outputs: model.networks().next().map_or(0, |n| n.shape().outputs),
-        spread: t.spread,
+        spread: if t.refine { blob.spread() } else { t.spread },
+        refined: t.refine,
         affine_tail: t.affine_tail,
         blob_bytes: blob.bytes().len(),
         blob_crc: format!("{:08x}", model.crc()),

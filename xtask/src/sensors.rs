@@ -112,7 +112,7 @@ fn host_sim(arguments: &[&str], paths: &[(&str, &Path)], data: &Path) -> Outcome
 fn train(sensor: &Sensor, data: &Path, format: &str, model: &Path) -> Outcome {
     eprintln!("training {} in {format}", sensor.name);
     let format = format!("--format={format}");
-    let arguments = [&["train", &format], sensor.training].concat();
+    let arguments = [&["train", "--no-refine", &format], sensor.training].concat();
     host_sim(&arguments, &[("--output", model)], data).map(drop)
 }
 

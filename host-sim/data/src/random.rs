@@ -50,6 +50,8 @@ pub enum Stream {
     Test = 2,
     /// Frames that measure each channel's span.
     Span = 3,
+    /// Frames that training is refined on, besides those it starts from.
+    Refinement = 4,
 }
 
 /// Seeded source of random draws.

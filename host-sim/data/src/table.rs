@@ -51,6 +51,24 @@ impl Table {
         sums.iter().map(|(sum, count)| sum / count).collect()
     }
 
+    /// Standard deviation of each column; 0 for one that does not change as far as f32 can tell.
+    #[must_use]
+    pub fn deviations(&self) -> Vec<f64> {
+        let means = self.means();
+        let mut squares = vec![0.0; means.len()];
+        for line in self.lines() {
+            for (square, (value, mean)) in squares.iter_mut().zip(line.iter().zip(&means)) {
+                *square += (value - mean) * (value - mean);
+            }
+        }
+        let resolved = |deviation: f64, [low, high]: [f64; 2]| {
+            let smallest = f64::from(f32::EPSILON) * low.abs().max(high.abs());
+            if deviation > smallest { deviation } else { 0.0 }
+        };
+        let deviations = squares.into_iter().map(|square| (square / self.len() as f64).sqrt());
+        deviations.zip(self.ranges()).map(|(d, range)| resolved(d, range)).collect()
+    }
+
     /// Sum Σ(estimate − value)² of each column, for `estimates` of the same shape, `lines × columns`.
     #[must_use]
     pub fn squared_errors(&self, estimates: &[f64]) -> Vec<f64> {

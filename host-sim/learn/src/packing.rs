@@ -144,6 +144,18 @@ impl ModelBlob {
         &self.bytes
     }
 
+    /// Mean width σ of all Gaussians, on inputs scaled to [0, 1], to four digits.
+    #[must_use]
+    pub fn spread(&self) -> f64 {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for network in self.parse().networks() {
+            for width in network.widths() {
+                (sum, count) = (sum + f64::from(width), count + 1.0);
+            }
+        }
+        (sum / count * 1e4).round() / 1e4
+    }
+
     /// Parses the model, which checks every byte: [prepare](Self::prepare) it once if it is used often.
     ///
     /// # Panics

@@ -4,13 +4,16 @@ use rayon::prelude::*;
 use serde::Serialize;
 use taxel_data::BadValue;
 use taxel_data::dataset::Dataset;
-use taxel_data::progress::Progress;
+use taxel_data::progress::{Progress, Silent};
 use taxel_data::random::{Purpose, Random, Stream};
 
 use crate::decoders::{BASELINES, Baseline};
 use crate::error::Result;
 use crate::infer::{Exponential, infer};
-use crate::train::{Options, Samples, check_spread};
+use crate::train::{
+    self, Examples, FittedNetwork, Layers, Options, Refinement, check_spread,
+    refine::{self, LEAST_FOLDS},
+};
 
 /// Result of one candidate on the folds that it was not trained on.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -88,10 +91,12 @@ pub fn smallest_training_part(fold_of: &[usize]) -> usize {
 
 /// Scores every pair of `centres` and `spreads` by cross-validation.
 ///
-/// `fold_of` gives each frame's fold, numbered from 0; all other options come from `options`.
+/// `fold_of` gives each frame's fold, numbered from 0; all other options come from `options`. With a `refinement`,
+/// spreads are where it starts, and it takes the folds that are not held out as its own.
 ///
 /// # Errors
-/// [`Error::Setting`](crate::Error::Setting) for fewer than two folds, no candidate, or a candidate that
+/// [`Error::Setting`](crate::Error::Setting) for fewer than two folds (with a refinement, one more than
+/// it needs), no candidate, or a candidate that
 /// does not fit the data; otherwise the errors of [`train`](crate::train::train).
 pub fn cross_validate(
     dataset: &Dataset,
@@ -99,11 +104,14 @@ pub fn cross_validate(
     centres: &[usize],
     spreads: &[f64],
     options: &Options,
+    refinement: Option<&Refinement>,
     progress: &dyn Progress,
 ) -> Result<Selection> {
     let folds = fold_of.iter().max().map_or(0, |last| last + 1);
-    if folds < 2 {
-        let rule = "cross-validation needs at least 2";
+    let least = if refinement.is_some() { LEAST_FOLDS + 1 } else { 2 };
+    if folds < least {
+        let of = if refinement.is_some() { " of refined training" } else { "" };
+        let rule = format!("cross-validation{of} needs at least {least}");
         return Err(BadValue::new("folds", folds, rule).into());
     }
     for fold in 0..folds {
@@ -122,13 +130,13 @@ pub fn cross_validate(
         .into_par_iter()
         .map(|(k, fold)| {
             let options = Options { centres: k, ..*options };
-            let squares = held_out_squares(dataset, fold_of, fold, spreads, &options);
+            let squares = held_out_squares(dataset, fold_of, fold, spreads, &options, refinement);
             progress.step();
             squares
         })
         .collect::<Result<_>>()?;
 
-    let deviations = standard_deviations(dataset);
+    let deviations = dataset.outputs.deviations();
     let mut scored = Vec::new();
     let root_mean = |squares: f64| (squares / dataset.frames() as f64).sqrt();
     let baselines = BASELINES.iter().map(|baseline| {
@@ -169,20 +177,32 @@ fn held_out_squares(
     fold: usize,
     spreads: &[f64],
     options: &Options,
+    refinement: Option<&Refinement>,
 ) -> Result<Vec<Vec<f64>>> {
     let (training, test) = split(dataset, fold_of, fold);
-    let mut squares = vec![Vec::new(); spreads.len()];
-    for row in 0..dataset.rows {
-        let (table, test) = (training.row_table(row), test.row_table(row));
-        let samples = Samples::new(&table);
-        let centres = samples.centres(options, row);
-        for (squares, &spread) in squares.iter_mut().zip(spreads) {
-            let fitted = samples.fit(&centres, &Options { spread, ..*options })?;
-            let predicted = infer(&fitted.network(), Exponential::default(), &test.inputs.values);
-            squares.extend(test.outputs.squared_errors(&predicted));
+    let others = fold_of.iter().filter(|f| **f != fold);
+    let inner: Vec<usize> = others.map(|f| if *f > fold { f - 1 } else { *f }).collect();
+    let start = Layers::start(&training, options)?;
+    let of_spread = |spread: &f64| {
+        let mut layers = start.clone();
+        layers.hidden.iter_mut().for_each(|layer| layer.spread = *spread);
+        let mut options = *options;
+        if let Some(settings) = refinement {
+            let examples = Examples::Folds(&inner);
+            layers = refine::refine(&training, &layers, &options, settings, examples, &Silent)?;
+            options = settings.options(&options, training.frames());
         }
-    }
-    Ok(squares)
+        let trained = train::fit(&training, layers, &options, &Silent)?;
+        let networks = trained.networks.iter().enumerate();
+        let of_row = |(row, network): (usize, &FittedNetwork)| {
+            let test = test.row_table(row);
+            let network = network.network();
+            let predicted = infer(&network, Exponential::default(), &test.inputs.values);
+            test.outputs.squared_errors(&predicted)
+        };
+        Ok(networks.flat_map(of_row).collect())
+    };
+    spreads.iter().map(of_spread).collect()
 }
 
 /// Sums of squared errors of a baseline on one fold, `[output]`, after fitting it to the others.
@@ -204,28 +224,9 @@ fn split(dataset: &Dataset, fold_of: &[usize], fold: usize) -> (Dataset, Dataset
     (dataset.subset(&kept), dataset.subset(&held))
 }
 
-/// Standard deviation of every output; 0 for one that does not change as far as f32 can tell.
-fn standard_deviations(dataset: &Dataset) -> Vec<f64> {
-    let means = dataset.outputs.means();
-    let mut squares = vec![0.0; means.len()];
-    for line in dataset.outputs.lines() {
-        for (square, (value, mean)) in squares.iter_mut().zip(line.iter().zip(&means)) {
-            *square += (value - mean) * (value - mean);
-        }
-    }
-    let resolved = |deviation: f64, [low, high]: [f64; 2]| {
-        let smallest = f64::from(f32::EPSILON) * low.abs().max(high.abs());
-        if deviation > smallest { deviation } else { 0.0 }
-    };
-    let ranges = dataset.outputs.ranges();
-    let deviations = squares.into_iter().map(|square| (square / dataset.frames() as f64).sqrt());
-    deviations.zip(ranges).map(|(deviation, range)| resolved(deviation, range)).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use taxel_data::progress::Silent;
     use taxel_data::table::Table;
 
     /// Data set whose output y follows two inputs, while `constant` never changes.
@@ -255,7 +256,7 @@ mod tests {
         let spreads = [0.05, 0.2, 3.0];
         let progress = Silent;
         let selection =
-            cross_validate(&dataset, &folds, &[20], &spreads, &options, &progress).unwrap();
+            cross_validate(&dataset, &folds, &[20], &spreads, &options, None, &progress).unwrap();
         assert_eq!(selection.scored.len(), 3);
         selection.best().spread
     }

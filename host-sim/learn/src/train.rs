@@ -19,8 +19,12 @@ pub mod kmeans;
 pub mod least_squares;
 pub mod format;
 pub mod projection;
+pub mod layers;
+pub mod refine;
 
 pub use format::FittedNetwork;
+pub use layers::{HiddenLayer, Layers};
+pub use refine::{Examples, FreshFrames, Refinement};
 
 /// Default of [`Options::initial_covariance`]: a penalty of 1e-6, too small to be felt.
 pub const INITIAL_COVARIANCE: f64 = 1e6;
@@ -245,12 +249,24 @@ pub struct Trained {
 /// [`Error`](crate::Error)s for data that does not fit the format.
 pub fn train(dataset: &Dataset, options: &Options, progress: &dyn Progress) -> Result<Trained> {
     options.check(dataset.frames())?;
-    if !options.whole_array {
-        return Ok(Trained { projection: None, networks: train_rows(dataset, options, progress)? });
-    }
-    let parameters = projection::fit(dataset)?;
-    let seen = projection::apply(view(&parameters, dataset), dataset);
-    Ok(Trained { networks: train_rows(&seen, options, progress)?, projection: Some(parameters) })
+    fit(dataset, Layers::start(dataset, options)?, options, progress)
+}
+
+/// Trains as [`train`] does, and refines centres, widths and the projection before the weights are fitted.
+///
+/// # Errors
+/// As [`train`] and [`refine`](refine::refine).
+pub fn train_refined(
+    dataset: &Dataset,
+    options: &Options,
+    settings: &Refinement,
+    examples: Examples<'_>,
+    progress: &dyn Progress,
+) -> Result<Trained> {
+    options.check(dataset.frames())?;
+    let start = Layers::start(dataset, options)?;
+    let layers = refine::refine(dataset, &start, options, settings, examples, progress)?;
+    fit(dataset, layers, &settings.options(options, dataset.frames()), progress)
 }
 
 /// Projection of `dataset`'s readings with the given `parameters`.
@@ -264,31 +280,37 @@ pub fn view<'b>(parameters: &'b [f32], dataset: &Dataset) -> Projection<'b> {
         .expect("a projection of these readings")
 }
 
-fn train_rows(
+/// Fits the output weights of networks with these `layers` to `dataset`.
+///
+/// # Errors
+/// [`Error`](crate::Error) for data or layers that the format does not hold.
+pub fn fit(
     dataset: &Dataset,
+    layers: Layers,
     options: &Options,
     progress: &dyn Progress,
-) -> Result<Vec<FittedNetwork>> {
-    progress.stage("train", dataset.rows);
+) -> Result<Trained> {
+    let seen = layers.seen(dataset);
     let fit_rows = |options: &Options| -> Result<Vec<FittedNetwork>> {
-        let rows = (0..dataset.rows).into_par_iter();
-        rows.map(|row| {
-            let table = dataset.row_table(row);
-            let samples = Samples::new(&table);
-            let centres = samples.centres(options, row);
-            let fitted = samples.fit(&centres, options);
+        let rows = layers.hidden.par_iter().enumerate();
+        rows.map(|(row, layer)| {
+            let table = seen.row_table(row);
+            let options = Options { spread: layer.spread, ..*options };
+            let fitted = Samples::new(&table).fit(&layer.centres, &options);
             progress.step();
             fitted
         })
         .collect()
     };
-    let fitted = fit_rows(options)?;
-    let formats = || fitted.iter().map(FittedNetwork::format);
-    if formats().all(|format| Some(format) == formats().next()) {
-        return Ok(fitted);
+    progress.stage("fit weights", layers.hidden.len());
+    let mut networks = fit_rows(options)?;
+    let formats = || networks.iter().map(FittedNetwork::format);
+    if !formats().all(|format| Some(format) == formats().next()) {
+        progress.stage("fit weights with direct distances", layers.hidden.len());
+        networks = fit_rows(&Options { format: Format::F32Direct, ..*options })?;
     }
-    progress.stage("train with direct distances", dataset.rows);
-    fit_rows(&Options { format: Format::F32Direct, ..*options })
+    drop(seen);
+    Ok(Trained { projection: layers.projection, networks })
 }
 
 /// Squared distance ‖a − b‖².

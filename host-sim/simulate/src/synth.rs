@@ -105,12 +105,24 @@ impl<'w> Synthesis<'w> {
         self
     }
 
+    /// Number of frames of a trajectory.
+    #[must_use]
+    pub fn steps(&self) -> usize {
+        self.motion.steps()
+    }
+
     /// Synthesises the first `frames` of `stream`: readings in Ω, and their true outputs.
     ///
     /// Frame n is the same however many frames are asked for. It is step n mod S of trajectory n div S,
     /// where S is the motion's number of steps.
     #[must_use]
     pub fn frames(&self, stream: Stream, frames: usize) -> Dataset {
+        self.frames_from(stream, 0, frames)
+    }
+
+    /// Synthesises `frames` of `stream` from trajectory number `first` on, as [`frames`](Self::frames) does.
+    #[must_use]
+    pub fn frames_from(&self, stream: Stream, first: usize, frames: usize) -> Dataset {
         let sensor = &self.world.sensor;
         let mut dataset = Dataset::empty(
             sensor.reading_names(&self.read_rows),
@@ -126,7 +138,7 @@ impl<'w> Synthesis<'w> {
         pieces.for_each_init(
             || synthesis.workspace(),
             |workspace, (piece, (readings, outputs))| {
-                synthesis.fill(workspace, piece * LANES, readings, outputs);
+                synthesis.fill(workspace, first + piece * LANES, readings, outputs);
             },
         );
         dataset
@@ -140,11 +152,24 @@ impl<'w> Synthesis<'w> {
     /// square root of that number, with draws of its own.
     #[must_use]
     pub fn baselines(&self, stream: Stream, frames: usize, averaged: usize) -> Table {
+        self.baselines_from(stream, 0, frames, averaged)
+    }
+
+    /// Synthesises the baselines of `frames` of `stream` from trajectory number `first` on, as
+    /// [`baselines`](Self::baselines) does.
+    #[must_use]
+    pub fn baselines_from(
+        &self,
+        stream: Stream,
+        first: usize,
+        frames: usize,
+        averaged: usize,
+    ) -> Table {
         let steps = self.motion.steps();
         let mut at_rest = self.clone().untouched();
         at_rest.noise.level /= (averaged as f64).sqrt();
         at_rest.noise_purpose = Purpose::Baseline;
-        let sessions = at_rest.frames(stream, frames.div_ceil(steps)).inputs;
+        let sessions = at_rest.frames_from(stream, first, frames.div_ceil(steps)).inputs;
         if steps == 1 {
             return sessions;
         }

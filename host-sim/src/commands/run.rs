@@ -10,7 +10,7 @@ use host_sim::{Error, Result, report};
 use taxel_data::output;
 use taxel_learn::ModelBlob;
 
-use super::scene_argument::{NoiseArgument, RelativeInputsArgument, SceneArgument};
+use super::scene_argument::{NoiseArgument, RefineArgument, RelativeInputsArgument, SceneArgument};
 use super::{Common, print};
 
 const DEFAULT_OUTPUT: &str = "out";
@@ -29,6 +29,8 @@ pub struct Arguments {
     noise: NoiseArgument,
     #[command(flatten)]
     relative_inputs: RelativeInputsArgument,
+    #[command(flatten)]
+    refine: RefineArgument,
     /// Folder that receives a folder named after the scene.
     #[arg(short, long, value_name = "DIR", default_value = DEFAULT_OUTPUT)]
     output: PathBuf,
@@ -40,6 +42,7 @@ impl Default for Arguments {
             scene: SceneArgument::default(),
             noise: NoiseArgument::default(),
             relative_inputs: RelativeInputsArgument::default(),
+            refine: RefineArgument::default(),
             output: DEFAULT_OUTPUT.into(),
         }
     }
@@ -49,6 +52,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let mut scene = arguments.scene.load(common)?;
     arguments.noise.apply(&mut scene)?;
     arguments.relative_inputs.apply(&mut scene);
+    scene.training.refine = arguments.refine.over(scene.training.refine);
     let folder = arguments.output.join(&scene.name);
     output::in_folder(&folder, || run_into(&folder, &scene, arguments.scene.path(), common))
 }
@@ -100,7 +104,7 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
         model.test_frames
     ));
     page.line(format_args!(
-        "model: {} network{}, {} -> K = {} -> {} outputs, spread {}, {} bytes, CRC-32 {}",
+        "model: {} network{}, {} -> K = {} -> {} outputs, spread {}{}, {} bytes, CRC-32 {}",
         model.networks,
         if model.networks == 1 { "" } else { "s" },
         {
@@ -113,6 +117,7 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
         model.centres,
         model.outputs,
         model.spread,
+        if model.refined { " (refined)" } else { "" },
         model.blob_bytes,
         model.blob_crc
     ));

@@ -16,7 +16,7 @@ use taxel_data::{columns, output};
 use taxel_simulate::World;
 
 use super::arguments::of_option;
-use super::scene_argument::{NoiseArgument, RelativeInputsArgument, SceneArgument};
+use super::scene_argument::{NoiseArgument, RefineArgument, RelativeInputsArgument, SceneArgument};
 use super::{Common, print};
 
 /// Names of all files that the command may write.
@@ -43,6 +43,8 @@ pub struct Arguments {
     noise: NoiseArgument,
     #[command(flatten)]
     relative_inputs: RelativeInputsArgument,
+    #[command(flatten)]
+    refine: RefineArgument,
     /// Folder that receives a folder named after the scene.
     #[arg(short, long, value_name = "DIR", default_value = "out")]
     output: PathBuf,
@@ -81,6 +83,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let mut scene = arguments.scene.load(common)?;
     arguments.noise.apply(&mut scene)?;
     arguments.relative_inputs.apply(&mut scene);
+    scene.training.refine = arguments.refine.over(scene.training.refine);
     let names = scene.world.output_names();
     let groups: Vec<&str> = columns::groups(&names).into_iter().map(|(group, _)| group).collect();
     let group = match &arguments.group {

@@ -4,23 +4,24 @@ use std::path::{Path, PathBuf};
 
 use super::progress::Terminal;
 use clap::Args;
-use host_sim::experiment::{EMBEDDED, Experiment};
+use host_sim::experiment::{EMBEDDED, Experiment, MoreFrames};
 use host_sim::{Error, Result};
 use model_core::rbf::Format;
 use serde::Serialize;
 use taxel_data::csv_file::CsvFile;
 use taxel_data::dataset::Dataset;
 use taxel_data::error::{Problem, Role};
+use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
 use taxel_data::{columns, output};
 use taxel_learn::select::{self, Selection};
-use taxel_learn::train::{WHOLE_ARRAY_SPREAD, train};
-use taxel_learn::{Options, Origin, pack};
+use taxel_learn::train::{Examples, Refinement, WHOLE_ARRAY_SPREAD, train, train_refined};
+use taxel_learn::{Options, Origin, Trained, pack};
 use taxel_simulate::Synthesis;
 
 use super::arguments::format;
 use super::readings;
-use super::scene_argument::{NoiseArgument, RelativeInputsArgument};
+use super::scene_argument::{NoiseArgument, RefineArgument, RelativeInputsArgument};
 use super::{Common, print};
 
 /// Train a model on a scene or a CSV file, and write its blob.
@@ -48,8 +49,8 @@ pub struct Arguments {
     /// Centres K; with --select, candidates [default: the scene's, or 64].
     #[arg(long, value_name = "K", value_delimiter = ',')]
     centres: Vec<usize>,
-    /// Width σ on scaled inputs; with --select, candidates [default: the scene's, or 0.8; half of that for
-    /// `--whole-array`].
+    /// Width σ on scaled inputs, where refinement starts; with --select, candidates [default: the scene's, or 0.8;
+    /// half of that for `--whole-array`].
     #[arg(long, value_name = "S", value_delimiter = ',')]
     spread: Vec<f64>,
     /// Train without the affine tail A·x.
@@ -71,11 +72,13 @@ pub struct Arguments {
     /// Choose K and spread among the candidates by cross-validation, and print every score.
     #[arg(long)]
     select: bool,
-    /// Folds of the cross-validation, drawn at random.
-    #[arg(long, value_name = "N", default_value_t = 5, requires = "select")]
-    folds: usize,
+    #[command(flatten)]
+    refine: RefineArgument,
+    /// Folds, drawn at random, for cross-validation and for refinement on a CSV file [default: 5].
+    #[arg(long, value_name = "N")]
+    folds: Option<usize>,
     /// Column of a CSV file that gives each line's fold (any numbers), instead of random folds.
-    #[arg(long, value_name = "NAME", requires = "select", conflicts_with = "folds")]
+    #[arg(long, value_name = "NAME", conflicts_with = "folds")]
     fold_column: Option<String>,
     #[command(flatten)]
     noise: NoiseArgument,
@@ -89,8 +92,33 @@ struct Source {
     dataset: Dataset,
     origin: Origin,
     defaults: Options,
-    /// Fold of each frame, if the data gives it.
-    fold_of: Option<Vec<usize>>,
+    /// Fold of each frame of measured data, or the scene that has more frames.
+    more: More,
+    /// Whether refinement is asked for.
+    refine: bool,
+}
+
+/// What refinement measures the error on.
+enum More {
+    Scene(Box<Experiment>),
+    Folds(Vec<usize>),
+}
+
+impl Source {
+    /// Trains on the data, refined if that is asked for.
+    fn train(&self, options: &Options, progress: &dyn Progress) -> Result<Trained> {
+        let settings = Refinement::default();
+        let refined =
+            |examples| train_refined(&self.dataset, options, &settings, examples, progress);
+        Ok(match &self.more {
+            _ if !self.refine => train(&self.dataset, options, progress)?,
+            More::Scene(experiment) => {
+                let synthesis = Synthesis::of(&experiment.world);
+                refined(Examples::Fresh(&MoreFrames { experiment, synthesis: &synthesis }))?
+            }
+            More::Folds(fold_of) => refined(Examples::Folds(fold_of))?,
+        })
+    }
 }
 
 #[derive(Serialize)]
@@ -100,7 +128,10 @@ struct Summary {
     blob_crc: String,
     training_frames: usize,
     centres: usize,
+    /// Width σ on scaled inputs; after refinement the mean over the networks.
     spread: f64,
+    /// Whether centres, widths and the projection were refined after K-means.
+    refined: bool,
     affine_tail: bool,
     /// Whether inputs are readings relative to the baseline.
     relative_inputs: bool,
@@ -150,7 +181,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         None
     };
 
-    let trained = train(&source.dataset, &options, &Terminal::new())?;
+    let trained = source.train(&options, &Terminal::new())?;
     let blob = pack(&trained, &source.dataset, &source.origin)?;
     output::write_bytes(&arguments.output, blob.bytes())?;
 
@@ -170,7 +201,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         blob_crc: format!("{:08x}", model.crc()),
         training_frames: source.dataset.frames(),
         centres: model.networks().map(|n| n.shape().centres).max().unwrap_or(0),
-        spread: options.spread,
+        spread: if source.refine { blob.spread() } else { options.spread },
+        refined: source.refine,
         affine_tail: options.affine_tail,
         relative_inputs: source.dataset.relative_inputs,
         formats: model.networks().map(|n| n.format().name()).collect(),
@@ -209,7 +241,8 @@ fn from_scene(arguments: &Arguments, common: &Common) -> Result<Source> {
         dataset: scene.dataset(&Synthesis::of(&scene.world), Stream::Training, frames),
         origin: scene.origin(),
         defaults: scene.options(),
-        fold_of: None,
+        refine: arguments.refine.over(scene.training.refine),
+        more: More::Scene(Box::new(scene)),
     })
 }
 
@@ -239,17 +272,18 @@ fn from_data(arguments: &Arguments, common: &Common) -> Result<Source> {
         Some(file) => readings::relative_to(dataset, file)?,
         None => dataset,
     };
-    let fold_of = match &arguments.fold_column {
-        Some(name) => Some(folds_from(&file, name, &kept.lines)?),
-        None => None,
-    };
     let seed = common.seed.unwrap_or(1);
+    let fold_of = match &arguments.fold_column {
+        Some(name) => folds_from(&file, name, &kept.lines)?,
+        None => random_folds(arguments, dataset.frames(), seed)?,
+    };
     let name = path.file_stem().map_or("data".into(), |stem| stem.to_string_lossy());
     Ok(Source {
         origin: Origin::of_data(&name, file.digest, seed, &dataset),
         defaults: Options { seed, ..Options::default() },
         dataset,
-        fold_of,
+        refine: arguments.refine.over(true),
+        more: More::Folds(fold_of),
     })
 }
 
@@ -285,6 +319,15 @@ fn folds_from(file: &CsvFile, name: &str, lines: &[usize]) -> Result<Vec<usize>>
     Ok(select::number_folds(&values))
 }
 
+/// Random folds, as many as asked for.
+fn random_folds(arguments: &Arguments, frames: usize, seed: u64) -> Result<Vec<usize>> {
+    let folds = arguments.folds.unwrap_or(frames.min(5));
+    if !(2..=frames).contains(&folds) {
+        return Err(Error::Usage(format!("--folds {folds}: give from 2 to {frames}")));
+    }
+    Ok(select::random_folds(frames, folds, seed))
+}
+
 fn one<T: Copy + std::fmt::Debug>(option: &str, given: &[T], default: T) -> Result<T> {
     match given {
         [] => Ok(default),
@@ -295,15 +338,9 @@ fn one<T: Copy + std::fmt::Debug>(option: &str, given: &[T], default: T) -> Resu
 
 fn choose(arguments: &Arguments, source: &Source, options: &mut Options) -> Result<Selection> {
     let frames = source.dataset.frames();
-    let fold_of = match &source.fold_of {
-        Some(folds) => folds.clone(),
-        None if (2..=frames).contains(&arguments.folds) => {
-            select::random_folds(frames, arguments.folds, options.seed)
-        }
-        None => {
-            let message = format!("--folds {}: give from 2 to {frames}", arguments.folds);
-            return Err(Error::Usage(message));
-        }
+    let fold_of = match &source.more {
+        More::Folds(folds) => folds.clone(),
+        More::Scene(_) => random_folds(arguments, frames, options.seed)?,
     };
     let centres = if arguments.centres.is_empty() {
         // K around the usual one, as far as the smallest training part allows.
@@ -315,7 +352,9 @@ fn choose(arguments: &Arguments, source: &Source, options: &mut Options) -> Resu
     } else {
         arguments.centres.clone()
     };
-    let spreads = if arguments.spread.is_empty() {
+    let spreads = if arguments.spread.is_empty() && source.refine {
+        vec![options.spread]
+    } else if arguments.spread.is_empty() {
         vec![0.2, 0.3, 0.5, 0.8, 1.2, 2.0]
     } else {
         arguments.spread.clone()
@@ -326,6 +365,7 @@ fn choose(arguments: &Arguments, source: &Source, options: &mut Options) -> Resu
         &centres,
         &spreads,
         options,
+        source.refine.then(Refinement::default).as_ref(),
         &Terminal::new(),
     )?;
     options.centres = selection.best().centres;
@@ -363,13 +403,14 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         }
     }
     page.line(format_args!(
-        "{}: {} bytes, CRC-32 {}, {}, K = {}, spread = {}, affine tail: {}, {} frames{}",
+        "{}: {} bytes, CRC-32 {}, {}, K = {}, spread = {}{}, affine tail: {}, {} frames{}",
         summary.file.display(),
         summary.blob_bytes,
         summary.blob_crc,
         summary.formats.first().unwrap_or(&""),
         summary.centres,
         summary.spread,
+        if summary.refined { " (refined)" } else { "" },
         if summary.affine_tail { "yes" } else { "no" },
         summary.training_frames,
         if summary.relative_inputs { ", inputs relative to the baseline" } else { "" }

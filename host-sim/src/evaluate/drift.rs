@@ -4,7 +4,6 @@ use serde::Serialize;
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
 use taxel_learn::decoders::{BASELINES, mean};
-use taxel_learn::train::train;
 use taxel_learn::{Decoder, Exponential, pack};
 use taxel_simulate::Synthesis;
 use taxel_simulate::drift::Drift;
@@ -83,7 +82,7 @@ pub fn measure(experiment: &Experiment, gain: f64, progress: &dyn Progress) -> R
         own.world.drift = if trained_with_drift { drift } else { None };
         let synthesis = Synthesis::of(&own.world);
         let training = own.dataset(&synthesis, Stream::Training, t.frames);
-        let trained = train(&training, &own.options(), progress)?;
+        let trained = own.train_on(&training, &synthesis, progress)?;
         let blob = pack(&trained, &training, &own.origin())?;
         let network = blob.prepare(Exponential::default()).of_inputs();
         let tests = [None, drift]

@@ -18,7 +18,7 @@ use taxel_simulate::Synthesis;
 
 use super::gate;
 use crate::error::{Error, NoPoint, Result};
-use crate::experiment::Experiment;
+use crate::experiment::{Experiment, MoreFrames};
 use crate::metrics::{self, DecoderErrors, Errors};
 
 mod choice;
@@ -256,7 +256,8 @@ pub fn compute(
                 &plan.gate_k,
                 (whole_array, t.relative_inputs),
             );
-            let sets = Sets::new(noise_level, &training, &test, &gates, whole_array)?;
+            let more = t.refine.then_some(MoreFrames { experiment, synthesis: &frames });
+            let sets = Sets::new(noise_level, [&training, &test], &gates, whole_array, more)?;
             for &centres in &plan.centres {
                 let knobs = Knobs { whole_array, centres, samples_averaged: samples };
                 judge.centres(&sets, knobs, progress)?;

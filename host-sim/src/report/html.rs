@@ -110,11 +110,12 @@ fn header(result: &RunResult) -> String {
         0.0 => String::new(),
         gain => format!(" · gain drift ±{}", percent(gain)),
     };
+    let refined = if model.refined { " (refined)" } else { "" };
     let plural = if model.networks == 1 { "" } else { "s" };
     format!(
         "<header>\n<h1>Scene “{}”</h1>\n\
          <p>{} noise of {}{} · seed {} · {} training and {} test frames · scene digest {}</p>\n\
-         <p>{} network{plural}: {inputs} → K = {} → {} outputs · spread {} · {tail} · \
+         <p>{} network{plural}: {inputs} → K = {} → {} outputs · spread {}{refined} · {tail} · \
          {} bytes · CRC-32 {}</p>\n\
          <p>A frame on a Cortex-M4F: {} cycles at zero wait, {} from flash (by the price list in docs/cycles.md)</p>\n</header>\n",
         escape(&scene.name),

@@ -65,6 +65,7 @@ fn result(groups: &[&str]) -> RunResult {
             centres: 9,
             outputs: groups.len() * PER_ROW,
             spread: 0.8,
+            refined: true,
             affine_tail: true,
             blob_bytes: 12_345,
             blob_crc: "deadbeef".into(),

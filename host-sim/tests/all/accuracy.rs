@@ -1,5 +1,6 @@
 //! Accuracy that the project promises, on the reference scene `press`.
 
+use crate::common::unrefined;
 use host_sim::evaluate::table1::{self, NETWORK};
 use host_sim::experiment::Experiment;
 use host_sim::metrics::{self, Definition, Errors};
@@ -11,7 +12,7 @@ use taxel_learn::decoders::{linear, mean};
 use taxel_simulate::synthesise;
 
 fn row_4(scene: &str, noise_level: f64) -> Experiment {
-    let mut scene = Experiment::load(scene).unwrap();
+    let mut scene = unrefined(scene);
     scene.world.read_rows = vec![3];
     scene.world.set_noise_level(noise_level).unwrap();
     scene.training.frames = 20_000;

@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use host_sim::experiment::Experiment;
+
 /// Folder that is removed after the test.
 pub struct Folder(PathBuf);
 
@@ -65,11 +67,19 @@ impl Drop for Folder {
     }
 }
 
-/// Scene that runs in a moment: rows 4 and 5 of `press`.
+/// Built-in scene without refinement, which takes tests too long.
+pub fn unrefined(scene: &str) -> Experiment {
+    let mut experiment = Experiment::load(scene).unwrap();
+    experiment.training.refine = false;
+    experiment
+}
+
+/// Scene that runs in a moment: rows 4 and 5 of `press`, without refinement.
 pub fn small_scene() -> String {
     let mut scene = include_str!("../../../scenes/press.toml").to_owned();
     for (from, to) in [
         ("name = \"press\"", "name = \"small\""),
+        ("[training]", "[training]\nrefine = false"),
         ("[outputs]", "[readout]\nrow_wires = [4, 5]\n\n[outputs]"),
         ("frames = 20000", "frames = 3000"),
         ("test_frames = 8000", "test_frames = 500"),

@@ -4,12 +4,11 @@ use std::io::ErrorKind;
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::time::{Duration, Instant};
 
-use crate::common::Folder;
+use crate::common::{Folder, unrefined};
 use crate::virtual_device::Line;
 use firmware::link::message::{
     Configuration, EstimateReport, Refusal, Report, Request, UploadStep,
 };
-use host_sim::experiment::Experiment;
 use model_core::blob::Floats;
 use taxel_data::progress::Silent;
 use taxel_data::random::Stream;
@@ -28,7 +27,7 @@ pub fn press() -> World {
 }
 
 pub fn model(centres: usize) -> ModelBlob {
-    let mut scene = Experiment::load("press").unwrap();
+    let mut scene = unrefined("press");
     (scene.training.frames, scene.training.centres) = (500, centres);
     scene.train(&Silent).unwrap()
 }
@@ -228,7 +227,7 @@ fn another_model_on_the_device_is_replaced_by_the_one_checked_with() {
 #[test]
 fn a_device_divides_by_its_baseline_as_the_host_does() {
     for whole_array in [false, true] {
-        let mut scene = Experiment::load("press").unwrap();
+        let mut scene = unrefined("press");
         (scene.training.frames, scene.training.centres) = (500, 5);
         (scene.training.relative_inputs, scene.training.whole_array) = (true, whole_array);
         let model = scene.train(&Silent).unwrap();

@@ -1,6 +1,6 @@
 //! A gain that drifts: what it costs models of readings, and that it costs relative inputs nothing.
 
-use crate::common::{Folder, small_scene};
+use crate::common::{Folder, small_scene, unrefined};
 use host_sim::evaluate::drift::{self, Line};
 use host_sim::evaluate::gate::{self, GateResult, Settings};
 use host_sim::evaluate::readout::{self, Stage};
@@ -26,7 +26,7 @@ fn small() -> Experiment {
 
 #[test]
 fn two_per_cent_of_drift_cost_readings_a_factor_and_relative_inputs_nothing() {
-    let mut scene = Experiment::load("press").unwrap();
+    let mut scene = unrefined("press");
     scene.world.read_rows = vec![3];
     (scene.training.frames, scene.training.test_frames) = (8000, 8000);
     let result = drift::measure(&scene, 0.02, &Silent).unwrap();
@@ -84,7 +84,7 @@ fn a_gate_and_a_trade_see_readings_and_baselines_of_the_same_session() {
     assert_eq!(readings.lines[0].skipped, b.skipped);
     assert!(z(&readings.ungated_errors) > 1.3 * z(&drifting.ungated_errors));
 
-    let mut scene = Experiment::load("press").unwrap();
+    let mut scene = unrefined("press");
     (scene.training.frames, scene.training.test_frames) = (1000, 300);
     scene.training.relative_inputs = true;
     let plan =

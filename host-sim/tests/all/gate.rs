@@ -1,6 +1,6 @@
 //! Gating: how often noise wakes a row, and what accuracy it costs.
 
-use crate::common::{Folder, small_scene};
+use crate::common::{Folder, small_scene, unrefined};
 use host_sim::evaluate::gate::{self, GateResult, Settings, woken_by_theory};
 use host_sim::experiment::Experiment;
 use host_sim::metrics::Errors;
@@ -48,7 +48,7 @@ fn noise_wakes_untouched_rows_as_often_as_theory_says() {
 
 #[test]
 fn press_loses_little_accuracy_and_saves_half_of_the_rows() {
-    let scene = Experiment::load("press").unwrap();
+    let scene = unrefined("press");
     let blob = scene.train(&Silent).unwrap();
     let model = blob.prepare(Exponential::default());
     let prices = Prices::accepted().unwrap();

@@ -1,7 +1,7 @@
 //! The firmware's readout on the virtual board: the errors that it adds, and the difference between
 //! circuits.
 
-use crate::common::{Folder, small_scene};
+use crate::common::{Folder, small_scene, unrefined};
 use crate::quantisation::{output_bounds, reading_bound_ohm};
 use host_sim::evaluate::readout::{self, ReadoutResult, Stage};
 use host_sim::experiment::Experiment;
@@ -17,7 +17,7 @@ const FRAMES: usize = 300;
 
 /// Scene and model of `run press`, with direct distances, for which the bound is derived.
 fn press() -> (Experiment, ModelBlob) {
-    let mut scene = Experiment::load("press").unwrap();
+    let mut scene = unrefined("press");
     scene.training.format = Format::F32Direct;
     let model = scene.train(&Silent).unwrap();
     (scene, model)

@@ -1,6 +1,6 @@
 //! The trade between speed and accuracy, on a small plan.
 
-use crate::common::Folder;
+use crate::common::{Folder, unrefined};
 use host_sim::Result;
 use host_sim::evaluate::gate::{self, Settings};
 use host_sim::evaluate::trade::{self, Bounds, Plan, Trade};
@@ -12,7 +12,7 @@ use taxel_learn::{Exponential, ModelBlob};
 use taxel_simulate::Synthesis;
 
 fn press() -> Experiment {
-    let mut scene = Experiment::load("press").unwrap();
+    let mut scene = unrefined("press");
     (scene.training.frames, scene.training.test_frames) = (1500, 500);
     scene
 }

@@ -18,7 +18,7 @@ const OWN_PYTHON: &str = "firmware/board-emulator/.venv/bin/python";
 const NEEDS: &str = "import elftools, unicorn; print(unicorn.__version__)";
 
 /// Arguments that train the model which scenarios upload, small enough that an upload takes seconds.
-const TRAIN: [&str; 4] = ["train", "press", "--centres=16", "--output"];
+const TRAIN: [&str; 5] = ["train", "press", "--no-refine", "--centres=16", "--output"];
 
 /// What a scenario needs besides the image.
 pub struct Emulator {

@@ -111,5 +111,5 @@ impl Check {
 
 fn train(options: &[&str], model: &OsStr) -> Outcome {
     let mut command = cargo(HOST_SIM);
-    run(command.args(["train", "press"]).args(options).arg("--output").arg(model))
+    run(command.args(["train", "press", "--no-refine"]).args(options).arg("--output").arg(model))
 }

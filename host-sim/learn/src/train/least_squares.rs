@@ -15,6 +15,7 @@ mod exp;
 mod gaussian;
 mod triangle;
 
+pub(crate) use exp::exponentiate_non_positive;
 pub use gaussian::{Gaussians, Regressors};
 use triangle::{NewRows, ROWS_AT_ONCE, Triangle};
 

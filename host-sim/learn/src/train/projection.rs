@@ -37,16 +37,28 @@ pub fn fit(dataset: &Dataset) -> Result<Vec<f32>> {
     let (readings, features) = (dataset.inputs.names.len(), features_of(dataset));
     let means = dataset.inputs.means();
     let parts = directions(dataset, &means, features)?;
+    let parts: Vec<f64> = (0..readings)
+        .flat_map(|reading| (0..features).map(move |feature| (reading, feature)))
+        .map(|place| parts[place])
+        .collect();
+    about_means(&parts, &means)
+}
+
+/// Parameters of the projection with these `parts` (`readings × features`), whose features are 0 at the `means`
+/// of the readings.
+///
+/// # Errors
+/// [`Error::ProjectionBeyondF32`].
+pub(super) fn about_means(parts: &[f64], means: &[f64]) -> Result<Vec<f32>> {
+    let features = parts.len() / means.len();
     // f₀ makes up for the means after rounding.
     let mut parameters = vec![0.0; features];
-    for (reading, mean) in means.iter().enumerate() {
-        for (feature, start) in parameters.iter_mut().enumerate() {
-            *start -= f64::from(parts[(reading, feature)] as f32) * mean;
+    for (parts, mean) in parts.chunks_exact(features).zip(means) {
+        for (start, part) in parameters.iter_mut().zip(parts) {
+            *start -= f64::from(*part as f32) * mean;
         }
     }
-    for reading in 0..readings {
-        parameters.extend((0..features).map(|feature| parts[(reading, feature)]));
-    }
+    parameters.extend(parts);
     let parameters: Vec<f32> = parameters.into_iter().map(|value| value as f32).collect();
     if parameters.iter().all(|value| value.is_finite()) {
         Ok(parameters)

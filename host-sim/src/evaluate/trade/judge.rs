@@ -3,14 +3,17 @@
 use model_core::rbf::Format;
 use rayon::prelude::*;
 use taxel_data::dataset::Dataset;
-use taxel_data::progress::Progress;
+use taxel_data::progress::{Progress, Silent};
 use taxel_learn::cost::{Cost, DecoderRam, Design, Prices};
-use taxel_learn::train::{self, FittedNetwork, Samples, WHOLE_ARRAY_SPREAD, projection};
+use taxel_learn::train::{
+    Examples, FittedNetwork, Layers, Refinement, Samples, WHOLE_ARRAY_SPREAD, projection, refine,
+};
 use taxel_learn::{Exponential, ModelBlob, Options, Origin, Trained, pack};
 
 use super::gating::Gates;
 use super::{Arithmetic, Plan, Point, SLOT_BYTES};
 use crate::error::Result;
+use crate::experiment::MoreFrames;
 use crate::metrics::{self, Measure};
 
 /// Settings that distinguish points with the same frames, besides format, tail and gate.
@@ -21,38 +24,40 @@ pub(super) struct Knobs {
     pub samples_averaged: usize,
 }
 
-/// Frames to train on and to test on, and the data derived from them alone.
+/// Frames to train on and to test on, and what is found on them for all K.
 pub(super) struct Sets<'s> {
     /// Noise level of the averaged readings, as a fraction.
     noise_level: f64,
     training: &'s Dataset,
     test: &'s Dataset,
     gates: &'s Gates,
-    /// Projection of the whole array, and the training frames behind it.
-    projected: Option<(Vec<f32>, Dataset)>,
+    /// Projection of the whole array.
+    projection: Option<Vec<f32>>,
+    /// Further frames, if training is to be refined.
+    more: Option<MoreFrames<'s>>,
 }
 
 impl<'s> Sets<'s> {
     pub fn new(
         noise_level: f64,
-        training: &'s Dataset,
-        test: &'s Dataset,
+        [training, test]: [&'s Dataset; 2],
         gates: &'s Gates,
         whole_array: bool,
+        more: Option<MoreFrames<'s>>,
     ) -> Result<Self> {
-        let projected = if whole_array {
-            let parameters = projection::fit(training)?;
-            let seen = projection::apply(train::view(&parameters, training), training);
-            Some((parameters, seen))
-        } else {
-            None
-        };
-        Ok(Self { noise_level, training, test, gates, projected })
+        let projection = if whole_array { Some(projection::fit(training)?) } else { None };
+        Ok(Self { noise_level, training, test, gates, projection, more })
     }
 
-    /// Data on which the networks are trained.
-    fn seen(&self) -> &Dataset {
-        self.projected.as_ref().map_or(self.training, |(_, seen)| seen)
+    /// Layers of networks trained with `options`, and the options for fitting their weights.
+    fn layers(&self, options: &Options, progress: &dyn Progress) -> Result<(Layers, Options)> {
+        let start = Layers { projection: self.projection.clone(), hidden: vec![] };
+        let start = start.with_centres(self.training, options);
+        let Some(more) = &self.more else { return Ok((start, *options)) };
+        let settings = Refinement::default();
+        let examples = Examples::Fresh(more);
+        let layers = refine::refine(self.training, &start, options, &settings, examples, progress)?;
+        Ok((layers, settings.options(options, self.training.frames())))
     }
 }
 
@@ -97,17 +102,21 @@ impl<'s> Judge<'s> {
         let defaults = self.options;
         let spread = if knobs.whole_array { WHOLE_ARRAY_SPREAD } else { 1.0 } * defaults.spread;
         let options = Options { centres: knobs.centres, spread, ..defaults };
-        let seen = sets.seen();
-        options.check(seen.frames())?;
-        // Centres are shared by all formats of a row.
-        let rows: Vec<Vec<taxel_learn::Result<FittedNetwork>>> = (0..seen.rows)
-            .into_par_iter()
-            .map(|row| {
+        options.check(sets.training.frames())?;
+        // Layers are shared by all formats and by networks with and without a tail.
+        let (layers, options) = sets.layers(&options, &Silent)?;
+        let seen = layers.seen(sets.training);
+        let rows: Vec<Vec<taxel_learn::Result<FittedNetwork>>> = layers
+            .hidden
+            .par_iter()
+            .enumerate()
+            .map(|(row, layer)| {
                 let table = seen.row_table(row);
                 let samples = Samples::new(&table);
-                let found = samples.centres(&options, row);
                 let fit = |&(format, affine_tail): &(Format, bool)| {
-                    samples.fit(&found, &Options { affine_tail, format, ..options })
+                    let spread = layer.spread;
+                    let options = Options { spread, affine_tail, format, ..options };
+                    samples.fit(&layer.centres, &options)
                 };
                 let fitted = variants.par_iter().map(fit).collect();
                 progress.step();
@@ -127,8 +136,7 @@ impl<'s> Judge<'s> {
                     continue;
                 }
             };
-            let projection = sets.projected.as_ref().map(|(parameters, _)| parameters.clone());
-            let trained = Trained { projection, networks };
+            let trained = Trained { projection: layers.projection.clone(), networks };
             let noise = (self.origin.noise.0, sets.noise_level);
             let origin = Origin { noise, ..self.origin.clone() };
             let blob = pack(&trained, sets.training, &origin)?;
@@ -139,7 +147,7 @@ impl<'s> Judge<'s> {
                 continue;
             }
             for arithmetic in Arithmetic::all().filter(|a| a.format == format) {
-                self.points(&blob, sets, arithmetic, (knobs, affine, spread))?;
+                self.points(&blob, sets, arithmetic, (knobs, affine))?;
             }
             self.distinct.push(blob.bytes().to_vec());
         }
@@ -153,7 +161,7 @@ impl<'s> Judge<'s> {
         blob: &ModelBlob,
         sets: &Sets<'_>,
         arithmetic: Arithmetic,
-        (knobs, affine_tail, spread): (Knobs, bool, f64),
+        (knobs, affine_tail): (Knobs, bool),
     ) -> Result<()> {
         let Knobs { whole_array, centres, samples_averaged } = knobs;
         let test = sets.test;
@@ -167,7 +175,7 @@ impl<'s> Judge<'s> {
                 arithmetic,
                 whole_array,
                 centres,
-                spread,
+                spread: blob.spread(),
                 affine_tail,
                 samples_averaged,
                 gate_k,

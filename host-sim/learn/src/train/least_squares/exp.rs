@@ -36,7 +36,7 @@ const SERIES: [f64; 14] = [
 /// then the series of e^r, times 2^k put together from its bits. The loop has no branch, so the compiler
 /// makes vectors of it, several at a time.
 #[inline(always)]
-pub(super) fn exponentiate_non_positive(values: &mut [f64]) {
+pub(crate) fn exponentiate_non_positive(values: &mut [f64]) {
     for value in values {
         let kept = if *value > LEAST { *value } else { LEAST };
         let shifted = kept * LOG2_E + ROUNDER;

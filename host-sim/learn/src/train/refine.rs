@@ -1,0 +1,176 @@
+//! Refined training: centres, widths and the projection move down the gradient of the error, from a K-means
+//! start.
+//!
+//! K-means puts centres where samples are; the best places are elsewhere. A device computes the same network,
+//! with better numbers. Output weights are not moved but solved for at every step: see [`Examples`] for what
+//! the error is measured on. `docs/training.md` has measurements.
+
+use std::collections::BTreeSet;
+
+use rayon::prelude::*;
+use taxel_data::BadValue;
+use taxel_data::dataset::Dataset;
+use taxel_data::error::require;
+use taxel_data::progress::Progress;
+
+use super::Options;
+use super::layers::Layers;
+use crate::error::Result;
+
+mod products;
+mod movable;
+mod loss;
+mod adam;
+mod turn;
+mod targets;
+mod sources;
+mod width;
+mod descent;
+mod folds;
+
+use descent::Descent;
+use movable::Piece;
+use sources::Sources;
+
+/// Source of frames that training has not seen.
+pub trait FreshFrames: Sync {
+    /// Frames of step number `step`: `count` of them, others at every step, the same in every run.
+    fn frames(&self, step: usize, count: usize) -> Dataset;
+}
+
+/// What the error is measured on.
+#[derive(Clone, Copy)]
+pub enum Examples<'e> {
+    /// Frames that are new at every step, where there is no end of them. Weights are solved on the same frames.
+    Fresh(&'e dyn FreshFrames),
+    /// The training frames themselves, in folds: each frame's fold is numbered from 0. One fold after the other is
+    /// held out, and the weights are solved on the others. A first descent, which leaves out the last fold, tells
+    /// after how many steps frames that were not looked at are decoded best, and the second one stops there. Both
+    /// keep centres from fitting noise.
+    Folds(&'e [usize]),
+}
+
+/// Least number of folds: one that tells when to stop, one that is held out, and the rest.
+pub const LEAST_FOLDS: usize = 3;
+
+/// Settings of refinement.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Refinement {
+    /// Number of steps down the gradient.
+    pub steps: usize,
+    /// Number of fresh frames that each step looks at.
+    pub frames: usize,
+    /// Rate of the descent at its start: about how far a number moves in a step. Inputs are scaled to [0, 1].
+    pub rate: f64,
+    /// Penalty on squared weights, for each frame: also that of the weights fitted at the end.
+    pub ridge: f64,
+}
+
+impl Default for Refinement {
+    fn default() -> Self {
+        Self { steps: 400, frames: 4096, rate: 0.02, ridge: 1e-7 }
+    }
+}
+
+impl Refinement {
+    /// Options for fitting weights to refined layers on so many `frames`: with this penalty.
+    #[must_use]
+    pub fn options(&self, options: &Options, frames: usize) -> Options {
+        Options { initial_covariance: 1.0 / (self.ridge * frames as f64), ..*options }
+    }
+
+    fn check(&self, examples: Examples<'_>, frames: usize) -> std::result::Result<(), BadValue> {
+        require(self.steps > 0, "steps", self.steps, || "give at least 1".into())?;
+        require(self.frames > 0, "frames", self.frames, || "give at least 1".into())?;
+        require(self.rate > 0.0 && self.rate < 1.0, "rate", self.rate, || {
+            "give a number between 0 and 1".into()
+        })?;
+        require(self.ridge > 0.0 && self.ridge < 1.0, "ridge", self.ridge, || {
+            "give a number between 0 and 1".into()
+        })?;
+        let Examples::Folds(fold_of) = examples else { return Ok(()) };
+        assert_eq!(fold_of.len(), frames, "a fold for every frame");
+        let distinct = fold_of.iter().collect::<BTreeSet<_>>().len();
+        require(distinct >= LEAST_FOLDS, "folds", distinct, || {
+            format!("refinement needs at least {LEAST_FOLDS}: give more, or leave it out")
+        })
+    }
+}
+
+/// Refines the `layers` that training on `dataset` starts from.
+///
+/// The same on any number of threads.
+///
+/// # Errors
+/// [`Error::Setting`](crate::Error::Setting) for settings that cannot be used;
+/// [`Error::NoRegression`](crate::Error::NoRegression) for samples without a regression;
+/// [`Error::ProjectionBeyondF32`](crate::Error::ProjectionBeyondF32).
+///
+/// # Panics
+/// If folds are not given for every frame, or fresh frames have other columns than the data set.
+pub fn refine(
+    dataset: &Dataset,
+    layers: &Layers,
+    options: &Options,
+    settings: &Refinement,
+    examples: Examples<'_>,
+    progress: &dyn Progress,
+) -> Result<Layers> {
+    settings.check(examples, dataset.frames())?;
+    let sources = Sources::of(dataset, layers);
+    let inputs = layers.seen(dataset).inputs.names.len() / layers.hidden.len();
+    let start = |layer| Descent::new(&sources, layer, inputs, options, settings);
+    let mut descents: Vec<Descent> = layers.hidden.iter().map(start).collect();
+    match examples {
+        Examples::Fresh(fresh) => {
+            progress.stage("refine", settings.steps);
+            for step in 0..settings.steps {
+                let frames = fresh.frames(step, settings.frames);
+                let networks = descents.par_iter_mut().enumerate();
+                networks.try_for_each(|(network, descent)| {
+                    descent.step(&sources.pieces(&frames, network).iter().collect::<Vec<_>>())
+                })?;
+                progress.step();
+            }
+        }
+        Examples::Folds(fold_of) => {
+            progress.stage("refine", folds::PASSES * settings.steps * descents.len());
+            let parts = parts(dataset, fold_of);
+            let networks = descents.par_iter_mut().enumerate();
+            networks.try_for_each(|(network, descent)| {
+                let pieces = |part| sources.pieces(part, network);
+                let folds: Vec<Vec<Piece>> = parts.iter().map(pieces).collect();
+                *descent = folds::descend(descent, &folds, settings.steps, progress)?;
+                Result::Ok(())
+            })?;
+        }
+    }
+    let mut refined = match (sources.projected(), descents.as_slice()) {
+        (Some(projected), [descent]) => {
+            let (layer, mix) = descent.layer();
+            projected.layers(dataset, mix, &layer)?
+        }
+        _ => Layers {
+            projection: None,
+            hidden: descents.iter().map(|descent| descent.layer().0).collect(),
+        },
+    };
+    for layer in &mut refined.hidden {
+        let least = width::least(options.format, &layer.centres, &vec![[0.0, 1.0]; inputs]);
+        layer.spread = layer.spread.max(least);
+    }
+    Ok(refined)
+}
+
+/// Frames of each fold.
+fn parts(dataset: &Dataset, fold_of: &[usize]) -> Vec<Dataset> {
+    let count = fold_of.iter().max().map_or(0, |last| last + 1);
+    let frames_of = |fold: usize| -> Vec<usize> {
+        (0..dataset.frames()).filter(|frame| fold_of[*frame] == fold).collect()
+    };
+    let parts = (0..count).map(|fold| dataset.subset(&frames_of(fold)));
+    parts.filter(|part| part.frames() > 0).collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,94 @@
+//! A network on its way down the gradient.
+
+use model_core::rbf::Format;
+
+use super::Refinement;
+use super::adam::Adam;
+use super::loss::{self, Loss};
+use super::movable::{Movable, Piece, Sizes};
+use super::sources::Sources;
+use super::width;
+use crate::error::Result;
+use crate::train::Options;
+use crate::train::layers::HiddenLayer;
+
+/// Factor on the ranges of features, which are seen on a few frames at a time and are wider on all.
+const UNSEEN_RANGE: f64 = 1.1;
+
+#[derive(Clone)]
+pub(super) struct Descent {
+    movable: Movable,
+    adam: Adam,
+    format: Format,
+    ridge: f64,
+}
+
+impl Descent {
+    /// Descent of one network, which starts from `layer`.
+    pub(super) fn new(
+        sources: &Sources,
+        layer: &HiddenLayer,
+        inputs: usize,
+        options: &Options,
+        settings: &Refinement,
+    ) -> Self {
+        let (layer, mix) = match sources.projected() {
+            Some(projected) => (projected.among_features(layer), projected.start()),
+            None => (layer.clone(), vec![]),
+        };
+        let sizes = Sizes {
+            inputs,
+            centres: layer.centres.len() / inputs,
+            sources: mix.len() / inputs,
+            affine_tail: options.affine_tail,
+        };
+        let movable = Movable::new(sizes, &layer.centres, layer.spread, &mix);
+        let adam = Adam::new(settings.rate, settings.steps, movable.values.len());
+        Self { movable, adam, format: options.format, ridge: settings.ridge }
+    }
+
+    /// One step on samples whose weights are solved on themselves.
+    pub(super) fn step(&mut self, pieces: &[&Piece]) -> Result<()> {
+        let loss = loss::on_same(&self.movable, pieces, self.ridge)?;
+        self.descend(&loss, pieces);
+        Ok(())
+    }
+
+    /// One step on samples `held_out`, whose weights are solved on the `rest`.
+    pub(super) fn step_held_out(&mut self, rest: &[&Piece], held_out: &[&Piece]) -> Result<()> {
+        let loss = loss::on_held_out(&self.movable, rest, held_out, self.ridge)?;
+        self.descend(&loss, rest);
+        Ok(())
+    }
+
+    /// Squared errors of samples `held_out`, whose weights are solved on the `rest`.
+    pub(super) fn errors(&self, rest: &[&Piece], held_out: &[&Piece]) -> Result<Vec<f64>> {
+        loss::held_out_errors(&self.movable, rest, held_out, self.ridge)
+    }
+
+    fn descend(&mut self, loss: &Loss, pieces: &[&Piece]) {
+        self.adam.descend(&mut self.movable.values, &loss.gradient);
+        let least = width::least(self.format, self.movable.centres(), &self.ranges(pieces));
+        self.movable.widen_to(least);
+    }
+
+    /// Ranges by which the network's inputs are going to be scaled.
+    fn ranges(&self, pieces: &[&Piece]) -> Vec<[f64; 2]> {
+        let Sizes { inputs, sources, .. } = self.movable.sizes;
+        if sources == 0 {
+            return vec![[0.0, 1.0]; inputs];
+        }
+        let widened = |[low, high]: [f64; 2]| {
+            let (middle, half) = (0.5 * (low + high), 0.5 * UNSEEN_RANGE * (high - low));
+            [middle - half, middle + half]
+        };
+        self.movable.ranges(pieces).into_iter().map(widened).collect()
+    }
+
+    /// Where the descent has come to: the hidden layer among mixed inputs, and the mix.
+    pub(super) fn layer(&self) -> (HiddenLayer, &[f64]) {
+        let movable = &self.movable;
+        let layer = HiddenLayer { centres: movable.centres().to_vec(), spread: movable.width() };
+        (layer, movable.mix())
+    }
+}

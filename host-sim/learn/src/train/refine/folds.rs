@@ -1,0 +1,65 @@
+//! Descent on measured data: on each fold in turn, with an end before it fits noise.
+
+use taxel_data::progress::Progress;
+
+use super::descent::Descent;
+use super::movable::Piece;
+use crate::error::Result;
+
+/// Steps between two looks at the fold that tells when to stop.
+const LOOK_EVERY: usize = 20;
+/// Standard errors by which a gain must exceed 0.
+const CERTAIN: f64 = 2.0;
+/// Descents in all: one to find the number of steps, one to take them.
+pub(super) const PASSES: usize = 2;
+
+/// Descends on `folds` from `start`, as many steps as a fold that is not looked at allows, at most so many `steps`.
+pub(super) fn descend(
+    start: &Descent,
+    folds: &[Vec<Piece>],
+    steps: usize,
+    progress: &dyn Progress,
+) -> Result<Descent> {
+    let Some((watched, others)) = folds.split_last() else { return Ok(start.clone()) };
+    let (all_others, watched): (Vec<&Piece>, Vec<&Piece>) =
+        (others.iter().flatten().collect(), watched.iter().collect());
+    let mut trial = start.clone();
+    let at_start = trial.errors(&all_others, &watched)?;
+    let (mut best, mut best_gain) = (0, 0.0);
+    for step in 0..steps {
+        step_on(&mut trial, others, step)?;
+        progress.step();
+        if (step + 1) % LOOK_EVERY == 0 || step + 1 == steps {
+            let gain = certain_gain(&at_start, &trial.errors(&all_others, &watched)?);
+            if gain > best_gain {
+                (best, best_gain) = (step + 1, gain);
+            }
+        }
+    }
+    let mut descent = start.clone();
+    for step in 0..best {
+        step_on(&mut descent, folds, step)?;
+        progress.step();
+    }
+    Ok(descent)
+}
+
+/// What the mean squared error has fallen by, less what may be chance: [`CERTAIN`] standard errors of the
+/// difference.
+fn certain_gain(before: &[f64], after: &[f64]) -> f64 {
+    let count = before.len() as f64;
+    let gains = || before.iter().zip(after).map(|(before, after)| before - after);
+    let mean = gains().sum::<f64>() / count;
+    let variance = gains().map(|gain| (gain - mean).powi(2)).sum::<f64>() / count;
+    mean - CERTAIN * (variance / count).sqrt()
+}
+
+/// Takes step number `step`: one fold is held out, weights are solved on the others.
+fn step_on(descent: &mut Descent, folds: &[Vec<Piece>], step: usize) -> Result<()> {
+    let held = step % folds.len();
+    let (held_out, rest): (Vec<_>, Vec<_>) =
+        folds.iter().enumerate().partition(|(fold, _)| *fold == held);
+    let [rest, held_out]: [Vec<&Piece>; 2] =
+        [rest, held_out].map(|part| part.into_iter().flat_map(|(_, pieces)| pieces).collect());
+    descent.step_held_out(&rest, &held_out)
+}

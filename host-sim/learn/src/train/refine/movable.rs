@@ -1,0 +1,229 @@
+//! What refinement moves: centres, the width and the mix of a network, as one list of numbers; activations for
+//! given samples, and the way back from a loss's derivative by regressors to that by these numbers.
+
+use taxel_data::simd::widest;
+
+use super::products::{Line, SIDE, add_combinations, add_products, transposed};
+use crate::train::least_squares::exponentiate_non_positive;
+
+/// Sizes of a network that is refined.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sizes {
+    /// Number of inputs that the network sees.
+    pub(super) inputs: usize,
+    pub(super) centres: usize,
+    /// Number of numbers that the inputs are mixed of; 0 if the network sees samples as they are.
+    pub(super) sources: usize,
+    pub(super) affine_tail: bool,
+}
+
+impl Sizes {
+    /// Number of regressors: activations, inputs if there is a tail, and 1.
+    pub(super) fn regressors(self) -> usize {
+        self.centres + if self.affine_tail { self.inputs } else { 0 } + 1
+    }
+}
+
+/// Centres (`centres × inputs`), the logarithm of the width, and the mix (`inputs × inputs`) if there is one.
+#[derive(Debug, Clone)]
+pub(super) struct Movable {
+    pub(super) sizes: Sizes,
+    pub(super) values: Vec<f64>,
+}
+
+impl Movable {
+    /// Start of a network with these `centres`, width and mix (empty for none).
+    pub(super) fn new(sizes: Sizes, centres: &[f64], width: f64, mix: &[f64]) -> Self {
+        Self { sizes, values: [centres, &[libm::log(width)], mix].concat() }
+    }
+
+    pub(super) fn centres(&self) -> &[f64] {
+        &self.values[..self.sizes.centres * self.sizes.inputs]
+    }
+
+    pub(super) fn width(&self) -> f64 {
+        libm::exp(self.values[self.width_place()])
+    }
+
+    /// What each input adds to each mixed input; empty without a mix.
+    pub(super) fn mix(&self) -> &[f64] {
+        &self.values[self.width_place() + 1..]
+    }
+
+    /// Makes the width at least so large.
+    pub(super) fn widen_to(&mut self, least: f64) {
+        let place = self.width_place();
+        if least > 0.0 {
+            self.values[place] = self.values[place].max(libm::log(least));
+        }
+    }
+
+    /// Ranges of the inputs that the network sees, over the samples of `pieces`.
+    pub(super) fn ranges(&self, pieces: &[&Piece]) -> Vec<[f64; 2]> {
+        let mut ranges = vec![[f64::INFINITY, f64::NEG_INFINITY]; self.sizes.inputs];
+        for piece in pieces {
+            for ([low, high], line) in ranges.iter_mut().zip(&self.mixed(piece)) {
+                for value in &line[..piece.samples] {
+                    (*low, *high) = (low.min(*value), high.max(*value));
+                }
+            }
+        }
+        ranges
+    }
+
+    /// Inputs that the network sees of the samples in `piece`.
+    fn mixed(&self, piece: &Piece) -> Vec<Line> {
+        if self.sizes.sources == 0 {
+            return piece.inputs.clone();
+        }
+        let mut mixed = vec![[0.0; SIDE]; self.sizes.inputs];
+        add_combinations(self.mix(), &piece.inputs, &mut mixed);
+        mixed
+    }
+
+    fn width_place(&self) -> usize {
+        self.sizes.centres * self.sizes.inputs
+    }
+
+    /// Computes the regressors of the samples in `piece`.
+    pub(super) fn activate(&self, piece: &Piece) -> Activated {
+        let Sizes { inputs, centres, affine_tail, .. } = self.sizes;
+        let mixed = self.mixed(piece);
+        let decay = 0.5 / self.width().powi(2);
+        let mut exponents = vec![[0.0; SIDE]; centres];
+        for (exponents, centre) in exponents.iter_mut().zip(self.centres().chunks_exact(inputs)) {
+            *exponents = exponents_of(&mixed, centre, decay);
+        }
+        let mut regressors = exponents.clone();
+        for line in &mut regressors {
+            widest(
+                #[inline(always)]
+                || exponentiate_non_positive(line),
+            );
+            line[piece.samples..].fill(0.0);
+        }
+        if affine_tail {
+            regressors.extend_from_slice(&mixed);
+        }
+        let mut ones = [0.0; SIDE];
+        ones[..piece.samples].fill(1.0);
+        regressors.push(ones);
+        Activated { mixed, exponents, regressors }
+    }
+
+    /// Adds to `gradient` what the derivative of a loss by the regressors, `by_regressors`, makes of it.
+    pub(super) fn add_gradient(
+        &self,
+        piece: &Piece,
+        activated: &Activated,
+        by_regressors: Vec<Line>,
+        gradient: &mut [f64],
+    ) {
+        let Sizes { inputs, centres, sources, affine_tail } = self.sizes;
+        let per_variance = self.width().powi(-2);
+        let mut by_exponents = by_regressors;
+        let by_tail = by_exponents.split_off(centres);
+        let mut by_log_width = 0.0;
+        let lines = by_exponents.iter_mut().zip(&activated.regressors).zip(&activated.exponents);
+        for ((by_exponent, activation), exponent) in lines {
+            let mut sums = [0.0; SIDE];
+            widest(
+                #[inline(always)]
+                || {
+                    for s in 0..SIDE {
+                        by_exponent[s] *= activation[s];
+                        sums[s] = -2.0 * exponent[s] * by_exponent[s];
+                    }
+                },
+            );
+            by_log_width += sums.iter().sum::<f64>();
+        }
+        gradient[self.width_place()] += by_log_width;
+
+        let ones = activated.regressors.last().expect("the bias's regressor");
+        let with_one: Vec<Line> = activated.mixed.iter().chain([ones]).copied().collect();
+        let mut sums = vec![0.0; centres * (inputs + 1)];
+        add_products(&by_exponents, &with_one, &mut sums);
+        let lines = self.centres().chunks_exact(inputs).zip(sums.chunks_exact(inputs + 1));
+        for ((centre, sums), place) in lines.zip(gradient.chunks_exact_mut(inputs)) {
+            for ((place, c), sum) in place.iter_mut().zip(centre).zip(sums) {
+                *place += (sum - c * sums[inputs]) * per_variance;
+            }
+        }
+
+        if sources > 0 {
+            let mut by_mixed = vec![[0.0; SIDE]; inputs];
+            add_combinations(self.centres(), &by_exponents, &mut by_mixed);
+            let mut total = [[0.0; SIDE]];
+            add_combinations(&vec![1.0; centres], &by_exponents, &mut total);
+            for (j, (by_mixed, mixed)) in by_mixed.iter_mut().zip(&activated.mixed).enumerate() {
+                for s in 0..SIDE {
+                    let by_tail = if affine_tail { by_tail[j][s] } else { 0.0 };
+                    by_mixed[s] = by_tail + (by_mixed[s] - mixed[s] * total[0][s]) * per_variance;
+                }
+            }
+            let place = self.width_place() + 1;
+            add_products(&piece.inputs, &by_mixed, &mut gradient[place..]);
+        }
+    }
+}
+
+/// Exponents −decay·‖x − c‖² of one centre, for all samples.
+fn exponents_of(inputs: &[Line], centre: &[f64], decay: f64) -> Line {
+    let mut sums = [0.0; SIDE];
+    widest(
+        #[inline(always)]
+        || {
+            for (x, c) in inputs.iter().zip(centre) {
+                for s in 0..SIDE {
+                    sums[s] += (x[s] - c) * (x[s] - c);
+                }
+            }
+            sums.iter_mut().for_each(|sum| *sum *= -decay);
+        },
+    );
+    sums
+}
+
+/// Samples side by side; lines beyond the last sample are 0.
+#[derive(Debug, Clone)]
+pub(super) struct Piece {
+    /// Scaled inputs, a line each.
+    pub(super) inputs: Vec<Line>,
+    /// What the outputs should be, a line each.
+    pub(super) targets: Vec<Line>,
+    /// Number of samples, at most [`SIDE`].
+    pub(super) samples: usize,
+}
+
+impl Piece {
+    /// Lays samples side by side: `inputs` (`samples × width`) with their `targets` (`samples × outputs`).
+    pub(super) fn all(inputs: &[f64], width: usize, targets: &[f64], outputs: usize) -> Vec<Self> {
+        let pieces = inputs.chunks(SIDE * width).zip(targets.chunks(SIDE * outputs));
+        pieces
+            .map(|(inputs, targets)| Self {
+                samples: inputs.len() / width,
+                inputs: side_by_side(inputs, width),
+                targets: side_by_side(targets, outputs),
+            })
+            .collect()
+    }
+}
+
+fn side_by_side(values: &[f64], width: usize) -> Vec<Line> {
+    let columns = transposed(values, width);
+    let line = |column: &[f64]| {
+        let mut line = [0.0; SIDE];
+        line[..column.len()].copy_from_slice(column);
+        line
+    };
+    columns.chunks_exact(values.len() / width).map(line).collect()
+}
+
+/// Regressors of the samples in a piece, and what the way back needs.
+#[derive(Debug, Clone)]
+pub(super) struct Activated {
+    mixed: Vec<Line>,
+    exponents: Vec<Line>,
+    pub(super) regressors: Vec<Line>,
+}

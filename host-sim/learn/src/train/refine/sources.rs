@@ -1,0 +1,187 @@
+//! The numbers that a network's inputs are made of, and the way back to layers.
+//!
+//! Without a projection these are a row's readings, scaled. With one they are the features that it starts with,
+//! and then all readings: inputs are a mix of both. Features then change as a whole as easily as single parts do.
+
+use taxel_data::dataset::Dataset;
+
+use super::movable::Piece;
+use super::targets::Targets;
+use super::turn;
+use crate::error::Result;
+use crate::train::layers::{HiddenLayer, Layers};
+use crate::train::{InputScale, projection, view};
+
+/// Size of a reading as a source: so many times a typical part of the projection, for a reading of one standard
+/// deviation. The larger, the faster single parts move.
+const READING_SCALE: f64 = 4.0;
+
+/// Numbers that the networks of a data set start from.
+pub(super) struct Sources {
+    inputs: Inputs,
+    targets: Targets,
+    /// Networks: one a row, or one in all.
+    pub(super) networks: usize,
+}
+
+enum Inputs {
+    /// Readings, by the scale of each row.
+    Rows(Vec<InputScale>),
+    /// Features and readings of the whole array.
+    Projected(Projected),
+}
+
+/// What the refinement of a projection starts from.
+pub(super) struct Projected {
+    /// f₀ of every feature, then each reading's part in every feature.
+    parameters: Vec<f32>,
+    pub(super) features: usize,
+    /// Low end of each feature's range, and the common span, by which centres are scaled.
+    lows: Vec<f64>,
+    span: f64,
+    /// Mean of every reading, and its scale as a source.
+    readings: Vec<(f64, f64)>,
+    /// Rotation of the features that the mix starts with, `features × features`.
+    turn: Vec<f64>,
+}
+
+impl Sources {
+    pub(super) fn of(dataset: &Dataset, layers: &Layers) -> Self {
+        let inputs = if let Some(parameters) = &layers.projection {
+            Inputs::Projected(Projected::of(dataset, parameters, &layers.seen(dataset)))
+        } else {
+            let scale = |row| InputScale::of(&dataset.row_table(row));
+            Inputs::Rows((0..dataset.rows).map(scale).collect())
+        };
+        let networks = layers.hidden.len();
+        Self { inputs, targets: Targets::of(dataset, networks), networks }
+    }
+
+    /// What the projection's refinement starts from, if there is one.
+    pub(super) fn projected(&self) -> Option<&Projected> {
+        match &self.inputs {
+            Inputs::Projected(projected) => Some(projected),
+            Inputs::Rows(_) => None,
+        }
+    }
+
+    /// Samples of network number `network`, side by side.
+    pub(super) fn pieces(&self, frames: &Dataset, network: usize) -> Vec<Piece> {
+        let (targets, outputs) = self.targets.of_network(&frames.outputs, network);
+        match &self.inputs {
+            Inputs::Rows(scales) => {
+                let width = frames.inputs.names.len() / self.networks;
+                let readings = frames.inputs.columns(network * width, width);
+                let scaled = scales[network].apply(&readings.values);
+                Piece::all(&scaled, width, &targets, outputs)
+            }
+            Inputs::Projected(projected) => {
+                let width = projected.features + projected.readings.len();
+                Piece::all(&projected.sources(frames), width, &targets, outputs)
+            }
+        }
+    }
+}
+
+impl Projected {
+    fn of(dataset: &Dataset, parameters: &[f32], seen: &Dataset) -> Self {
+        let features = seen.inputs.names.len();
+        let (lows, span) = scale_of(seen);
+        let parts = &parameters[features..];
+        let (means, deviations) = (dataset.inputs.means(), dataset.inputs.deviations());
+        let square = |part: &f32, deviation: &f64| (f64::from(*part) * deviation / span).powi(2);
+        let lines = parts.chunks_exact(features).zip(&deviations);
+        let squares: f64 =
+            lines.flat_map(|(line, d)| line.iter().map(move |part| square(part, d))).sum();
+        let typical = READING_SCALE * (squares / parts.len() as f64).sqrt();
+        let scale = |deviation: f64| if deviation > 0.0 { typical / deviation } else { 0.0 };
+        let readings = means.into_iter().zip(deviations).map(|(mean, d)| (mean, scale(d)));
+        Self {
+            parameters: parameters.to_vec(),
+            features,
+            lows,
+            span,
+            readings: readings.collect(),
+            turn: turn::evening(&seen.inputs.values, features),
+        }
+    }
+
+    /// Mix that a descent starts with, `sources × features`: the features rotated, and nothing of single readings.
+    pub(super) fn start(&self) -> Vec<f64> {
+        let mut mix = self.turn.clone();
+        mix.resize((self.features + self.readings.len()) * self.features, 0.0);
+        mix
+    }
+
+    /// Centres and width of `layer` among the features of the mix at the start.
+    pub(super) fn among_features(&self, layer: &HiddenLayer) -> HiddenLayer {
+        let scaled = layer.centres.chunks_exact(self.features);
+        let centres = scaled.flat_map(|centre| {
+            let feature = |(c, low): (&f64, &f64)| c + low / self.span;
+            centre.iter().zip(&self.lows).map(feature)
+        });
+        let centres: Vec<f64> = centres.collect();
+        HiddenLayer { centres: turn::turned(&centres, &self.turn, self.features), ..*layer }
+    }
+
+    /// Sources of all frames, line after line.
+    fn sources(&self, frames: &Dataset) -> Vec<f64> {
+        let count = self.readings.len();
+        let view = view(&self.parameters, frames);
+        let features = projection::features(view, self.features, count, &frames.inputs.values);
+        let lines = features.chunks_exact(self.features).zip(frames.inputs.lines());
+        let of_line = |(features, readings): (&[f64], &[f64])| -> Vec<f64> {
+            let readings = readings.iter().zip(&self.readings);
+            let readings = readings.map(|(r, (mean, scale))| (r - mean) * scale);
+            features.iter().map(|f| f / self.span).chain(readings).collect()
+        };
+        lines.flat_map(of_line).collect()
+    }
+
+    /// Projection and hidden layer that a descent has come to, with its `mix` and with a `layer` among the
+    /// mixed features.
+    ///
+    /// # Errors
+    /// [`Error::ProjectionBeyondF32`](crate::Error::ProjectionBeyondF32).
+    pub(super) fn layers(
+        &self,
+        dataset: &Dataset,
+        mix: &[f64],
+        layer: &HiddenLayer,
+    ) -> Result<Layers> {
+        let n = self.features;
+        let parts = self.parameters[n..].chunks_exact(n).zip(&self.readings);
+        let mixed =
+            parts.zip(mix[n * n..].chunks_exact(n)).flat_map(|((parts, (_, scale)), own)| {
+                let part = |j: usize| {
+                    let of_features: f64 =
+                        (0..n).map(|i| f64::from(parts[i]) * mix[i * n + j]).sum();
+                    of_features / self.span + scale * own[j]
+                };
+                (0..n).map(part).collect::<Vec<_>>()
+            });
+        let parts: Vec<f64> = mixed.collect();
+        let means: Vec<f64> = self.readings.iter().map(|(mean, _)| *mean).collect();
+        let parameters = projection::about_means(&parts, &means)?;
+        let turn = turn::evening(&apply(&parameters, dataset).inputs.values, n);
+        let parameters = projection::about_means(&turn::turned(&parts, &turn, n), &means)?;
+        let (lows, span) = scale_of(&apply(&parameters, dataset));
+        let centres = turn::turned(&layer.centres, &turn, n);
+        let scaled = centres
+            .chunks_exact(n)
+            .flat_map(|centre| centre.iter().zip(&lows).map(|(c, low)| (c - low) / span));
+        let layer = HiddenLayer { centres: scaled.collect(), spread: layer.spread / span };
+        Ok(Layers { projection: Some(parameters), hidden: vec![layer] })
+    }
+}
+
+fn apply(parameters: &[f32], dataset: &Dataset) -> Dataset {
+    projection::apply(view(parameters, dataset), dataset)
+}
+
+/// Low end of every feature's range, and their common span.
+fn scale_of(seen: &Dataset) -> (Vec<f64>, f64) {
+    let ranges = seen.row_table(0).input_ranges();
+    let span = ranges.first().map_or(1.0, |[low, high]| high - low);
+    (ranges.into_iter().map(|[low, _]| low).collect(), span)
+}

@@ -1,0 +1,43 @@
+//! What the outputs should be, on a scale on which they can be compared.
+
+use taxel_data::columns;
+use taxel_data::dataset::Dataset;
+use taxel_data::table::Table;
+
+/// Mean of every output, and the factor that its deviations are weighed by.
+///
+/// Outputs of one unit are compared as they are: an error of 1 mm counts alike in all of them. Those of another
+/// unit are compared by the largest standard deviation of each unit.
+pub(super) struct Targets {
+    means: Vec<f64>,
+    weights: Vec<f64>,
+    networks: usize,
+}
+
+impl Targets {
+    pub(super) fn of(dataset: &Dataset, networks: usize) -> Self {
+        let deviations = dataset.outputs.deviations();
+        let units: Vec<&str> =
+            dataset.outputs.names.iter().map(|name| columns::unit_of(name)).collect();
+        let weight = |unit: &&str| {
+            let same = units.iter().zip(&deviations).filter(|(other, _)| *other == unit);
+            let largest = same.map(|(_, deviation)| *deviation).fold(0.0, f64::max);
+            if largest > 0.0 { 1.0 / largest } else { 0.0 }
+        };
+        let weights = units.iter().map(weight).collect();
+        Self { means: dataset.outputs.means(), weights, networks }
+    }
+
+    /// Targets of network number `network`, frame after frame, and their number in each.
+    pub(super) fn of_network(&self, outputs: &Table, network: usize) -> (Vec<f64>, usize) {
+        let count = self.means.len() / self.networks;
+        let own = network * count..(network + 1) * count;
+        let (means, weights) = (&self.means[own.clone()], &self.weights[own.clone()]);
+        let weighed = |line: &[f64]| -> Vec<f64> {
+            let scales = means.iter().zip(weights);
+            let values = line[own.clone()].iter().zip(scales);
+            values.map(|(value, (mean, weight))| (value - mean) * weight).collect()
+        };
+        (outputs.lines().flat_map(weighed).collect(), count)
+    }
+}

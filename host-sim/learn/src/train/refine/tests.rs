@@ -1,0 +1,228 @@
+use model_core::rbf::Format;
+use taxel_data::progress::Silent;
+use taxel_data::random::{Purpose, Random, Stream};
+use taxel_simulate::{Synthesis, World};
+
+use super::loss::{Loss, on_held_out, on_same};
+use super::movable::{Movable, Piece, Sizes};
+use super::products::{Line, SIDE, add_combinations, add_products, add_squares};
+use super::*;
+use crate::infer::{Exponential, infer};
+use crate::train::{train, train_refined};
+
+fn draws(purpose: u64) -> impl FnMut() -> f64 {
+    let mut random = Random::new(11, Stream::Test, Purpose::Damage, purpose, 0);
+    move || random.between([-1.0, 1.0])
+}
+
+#[test]
+fn products_are_those_of_plain_loops() {
+    let mut draw = draws(0);
+    let mut lines = |count: usize| -> Vec<Line> {
+        (0..count).map(|_| std::array::from_fn(|_| draw())).collect()
+    };
+    for (m, n) in [(1, 1), (7, 17), (19, 16), (40, 33)] {
+        let (a, b) = (lines(m), lines(n));
+        let dot = |a: &Line, b: &Line| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
+        let close = |found: f64, exact: f64| assert!((found - exact).abs() < 1e-12, "{m} {n}");
+        let mut products = vec![1.0; m * n];
+        add_products(&a, &b, &mut products);
+        for (i, a) in a.iter().enumerate() {
+            for (j, b) in b.iter().enumerate() {
+                close(products[i * n + j], 1.0 + dot(a, b));
+            }
+        }
+        let mut squares = vec![0.0; m * m];
+        add_squares(&a, &mut squares);
+        for i in 0..m {
+            (i..m).for_each(|j| close(squares[i * m + j], dot(&a[i], &a[j])));
+        }
+        let mut combined = vec![[2.0; SIDE]; n];
+        add_combinations(&products, &a, &mut combined);
+        for (j, line) in combined.iter().enumerate() {
+            for (s, sum) in line.iter().enumerate() {
+                let exact: f64 = (0..m).map(|i| products[i * n + j] * a[i][s]).sum();
+                close(*sum, 2.0 + exact);
+            }
+        }
+    }
+}
+
+/// Pieces of random samples; the second one is not full.
+fn pieces(inputs: usize, outputs: usize, samples: usize, purpose: u64) -> Vec<Piece> {
+    let mut draw = draws(purpose);
+    let x: Vec<f64> = (0..samples * inputs).map(|_| draw()).collect();
+    let lines = x.chunks_exact(inputs);
+    let y: Vec<f64> = lines
+        .flat_map(|x| {
+            (0..outputs).map(|o| (2.0 * x[o % inputs] + o as f64).sin() * x[0]).collect::<Vec<_>>()
+        })
+        .map(|y| y + 0.1 * draw())
+        .collect();
+    Piece::all(&x, inputs, &y, outputs)
+}
+
+/// Compares every part of the gradient with a difference of losses.
+fn gradient_is_the_slope(sizes: Sizes, loss: &dyn Fn(&Movable) -> Loss) {
+    let mut draw = draws(5);
+    let centres: Vec<f64> = (0..sizes.centres * sizes.inputs).map(|_| draw()).collect();
+    let mix: Vec<f64> = (0..sizes.sources * sizes.inputs).map(|_| draw()).collect();
+    let movable = Movable::new(sizes, &centres, 0.8, &mix);
+    let found = loss(&movable).gradient;
+    assert_eq!(found.len(), movable.values.len());
+    let scale = found.iter().fold(0.0_f64, |most, slope| most.max(slope.abs()));
+    for (place, slope) in found.iter().enumerate() {
+        let at = |step: f64| {
+            let mut moved = movable.clone();
+            moved.values[place] += step;
+            loss(&moved).value
+        };
+        let difference = (at(1e-5) - at(-1e-5)) / 2e-5;
+        assert!((slope - difference).abs() < 1e-5 * scale, "{place}: {slope:e}, {difference:e}");
+    }
+}
+
+#[test]
+fn gradients_are_slopes_of_the_loss() {
+    for (sources, affine_tail) in [(0, true), (5, true), (5, false)] {
+        let sizes = Sizes { inputs: 3, centres: 6, sources, affine_tail };
+        let given = if sources > 0 { sources } else { 3 };
+        let (rest, held) = (pieces(given, 2, 300, 1), pieces(given, 2, 100, 2));
+        let [rest, held] = [&rest, &held].map(|pieces| pieces.iter().collect::<Vec<_>>());
+        gradient_is_the_slope(sizes, &|movable| on_same(movable, &rest, 1e-9).unwrap());
+        // The penalty has a part in the weights here, and all of it is derived.
+        gradient_is_the_slope(sizes, &|movable| on_held_out(movable, &rest, &held, 1e-3).unwrap());
+    }
+}
+
+struct Fresh<'w>(Synthesis<'w>);
+
+impl FreshFrames for Fresh<'_> {
+    fn frames(&self, step: usize, count: usize) -> Dataset {
+        self.0.frames_from(Stream::Refinement, step * count, count)
+    }
+}
+
+fn quick() -> Refinement {
+    Refinement { steps: 60, frames: 1024, ..Refinement::default() }
+}
+
+/// Root mean square of the errors in z of a model of one network on `test`.
+fn rmse(trained: &crate::train::Trained, test: &Dataset) -> f64 {
+    let layers = Layers { projection: trained.projection.clone(), hidden: vec![] };
+    let seen = layers.seen(test);
+    let network = trained.networks[0].network();
+    let estimate = infer(&network, Exponential::default(), &seen.inputs.values);
+    let squares: f64 = test.outputs.squared_errors(&estimate).iter().skip(2).step_by(3).sum();
+    (3.0 * squares / estimate.len() as f64).sqrt()
+}
+
+#[test]
+fn refined_models_are_better_and_the_same_on_any_number_of_threads() {
+    let whole = World::press();
+    let row = World { read_rows: vec![3], ..World::press() };
+    // Measured: 0.959 for a row in either format, 0.916 for the array.
+    for (world, whole_array, format, gain) in [
+        (&row, false, Format::F32, 0.97),
+        (&row, false, Format::Fixed16, 0.97),
+        (&whole, true, Format::Fixed16, 0.93),
+    ] {
+        let synthesis = Synthesis::of(world);
+        let (training, test) =
+            (synthesis.frames(Stream::Training, 3000), synthesis.frames(Stream::Test, 1000));
+        let spread = if whole_array { 0.4 } else { 0.8 };
+        let options = Options { centres: 12, spread, format, whole_array, ..Options::default() };
+        let fresh = Fresh(synthesis);
+        let refined = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let examples = Examples::Fresh(&fresh);
+            pool.install(|| {
+                train_refined(&training, &options, &quick(), examples, &Silent).unwrap()
+            })
+        };
+        let (one, three) = (refined(1), refined(3));
+        assert_eq!((&one.projection, &one.networks), (&three.projection, &three.networks));
+        assert_eq!(one.networks[0].format(), format);
+        let start = train(&training, &options, &Silent).unwrap();
+        let ratio = rmse(&one, &test) / rmse(&start, &test);
+        assert!(ratio < gain, "{format:?}, array: {whole_array}: {ratio}");
+    }
+}
+
+/// Few and noisy frames, where centres would only fit the noise, leave them where they are.
+#[test]
+fn refinement_on_folds_helps_with_many_frames_and_does_no_harm_with_few() {
+    let world = World { read_rows: vec![3], ..World::press() };
+    // Measured: 0.946 and 1.000.
+    for (noise, frames, most) in [(0.005, 6000, 0.96), (0.02, 600, 1.001)] {
+        let synthesis = Synthesis::of(&world).noise_level(noise);
+        let [training, test] = [(Stream::Training, frames), (Stream::Test, 2000)]
+            .map(|(stream, frames)| synthesis.frames(stream, frames));
+        let options = Options { centres: 12, ..Options::default() };
+        let fold_of: Vec<usize> = (0..frames).map(|frame| frame % 4).collect();
+        let examples = Examples::Folds(&fold_of);
+        let refined = train_refined(&training, &options, &quick(), examples, &Silent).unwrap();
+        let start = train(&training, &options, &Silent).unwrap();
+        let ratio = rmse(&refined, &test) / rmse(&start, &test);
+        assert!(ratio < most, "{noise}: {ratio}");
+    }
+}
+
+#[test]
+fn the_least_width_is_just_held_by_fixed16() {
+    let world = World { read_rows: vec![3], ..World::press() };
+    let training = Synthesis::of(&world).frames(Stream::Training, 500);
+    let options = Options { centres: 12, format: Format::Fixed16, ..Options::default() };
+    let start = Layers::start(&training, &options).unwrap();
+    let least = width::least(Format::Fixed16, &start.hidden[0].centres, &[[0.0, 1.0]; 18]);
+    let held = |spread: f64| {
+        let mut layers = start.clone();
+        layers.hidden[0].spread = spread;
+        crate::train::fit(&training, layers, &options, &Silent).is_ok()
+    };
+    assert!(held(least) && !held(0.999 * least), "{least}");
+}
+
+#[test]
+fn evened_features_are_rotated_and_span_less() {
+    let mut draw = draws(7);
+    // The first feature spans far more than the others.
+    let values: Vec<f64> =
+        (0..2000 * 4).map(|i| draw() * if i % 4 == 0 { 4.0 } else { 0.5 }).collect();
+    let rotation = turn::evening(&values, 4);
+    for i in 0..4 {
+        for j in 0..4 {
+            let dot: f64 = (0..4).map(|k| rotation[k * 4 + i] * rotation[k * 4 + j]).sum();
+            assert!((dot - if i == j { 1.0 } else { 0.0 }).abs() < 1e-12);
+        }
+    }
+    let widest = |values: &[f64]| -> f64 {
+        let span = |j: usize| {
+            let column = || values.iter().skip(j).step_by(4);
+            column().fold(f64::MIN, |m, x| m.max(*x)) - column().fold(f64::MAX, |m, x| m.min(*x))
+        };
+        (0..4).map(span).fold(0.0, f64::max)
+    };
+    let turned = turn::turned(&values, &rotation, 4);
+    assert!(widest(&turned) < 0.7 * widest(&values), "{}", widest(&turned));
+}
+
+#[test]
+fn settings_that_cannot_be_used_are_refused_by_name() {
+    let world = World { read_rows: vec![3], ..World::press() };
+    let training = Synthesis::of(&world).frames(Stream::Training, 50);
+    let options = Options { centres: 4, ..Options::default() };
+    let start = Layers::start(&training, &options).unwrap();
+    let refused = |settings: Refinement, folds: usize, field: &str| {
+        let fold_of: Vec<usize> = (0..50).map(|frame| frame % folds).collect();
+        let examples = Examples::Folds(&fold_of);
+        let refused = refine(&training, &start, &options, &settings, examples, &Silent);
+        let message = refused.unwrap_err().to_string();
+        assert!(message.starts_with(field), "{message}");
+    };
+    refused(Refinement { steps: 0, ..quick() }, 5, "steps = 0");
+    refused(Refinement { frames: 0, ..quick() }, 5, "frames = 0");
+    refused(Refinement { rate: f64::NAN, ..quick() }, 5, "rate = NaN");
+    refused(Refinement { ridge: 0.0, ..quick() }, 5, "ridge = 0");
+    refused(quick(), 2, "folds = 2");
+}
