@@ -127,6 +127,8 @@ fn a_network_of_few_components_takes_less_flash_and_says_so() {
     assert!(scene.contains("output_rank = 5") && scene.contains("centres = 40"));
     folder.write("few.toml", &scene);
     folder.succeed(&["train", "few.toml", "-n", "2000", "-o", "scene.bin"]);
+    let printed = folder.succeed(&["run", "few.toml"]);
+    assert!(printed.contains("K = 40 -> 5 components -> 36 outputs, "), "{printed}");
     folder.succeed(&["synth", "scene.toml", "-n", "100", "--seed", "9", "-o", "d.csv"]);
     for model in ["few", "scene"] {
         folder.succeed(&[
