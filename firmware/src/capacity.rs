@@ -72,6 +72,13 @@ impl Capacity {
         self.rows * self.outputs
     }
 
+    /// Number of floats of working space for decoding: more than the readings of a frame and of two rows. What these
+    /// leave is room for the components of an [`Expansion`](model_core::expansion::Expansion).
+    #[must_use]
+    pub const fn scratch_floats(self) -> usize {
+        2 * self.rows * self.columns
+    }
+
     /// Bytes of the longest message: a report of all readings or all outputs, the circuit's constants, or an
     /// identity.
     #[must_use]

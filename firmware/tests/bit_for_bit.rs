@@ -52,12 +52,16 @@ fn clamping(format: Format) -> String {
     )
 }
 
-fn array(format: Format, tail: &str) -> String {
-    let file =
-        &format!("array-{}{}.bin", format.name(), if tail.is_empty() { "" } else { "-no-tail" });
+fn array(format: Format, kind: &str) -> String {
+    let suffix = match kind {
+        " without tail" => "-no-tail",
+        " of components" => "-components",
+        _ => "",
+    };
+    let file = &format!("array-{}{suffix}.bin", format.name());
     let crc = with_blob(file, checks::decoding_many::<Polynomial, { checks::ARRAY_ROWS }>);
     let crc = crc.expect("the model loads");
-    let line = format!("INFO array, {}{tail}: {crc:08x}\n", format.name());
+    let line = format!("INFO array, {}{kind}: {crc:08x}\n", format.name());
     match with_blob(file, checks::array_twins) {
         Some([compared, different]) => {
             assert!(compared > checks::MANY / 2, "{compared} frames compared");
@@ -119,6 +123,9 @@ fn every_kernel_decodes_many_frames_on_the_host_as_in_the_emulator() {
         array(Format::Fixed16, ""),
         array(Format::Fixed16, " without tail"),
         array(Format::F32Direct, ""),
+        array(Format::F32, " of components"),
+        array(Format::Fixed16, " of components"),
+        array(Format::F32Direct, " of components"),
         "exit status 0\n".to_owned(),
     ];
     assert!(of_host.iter().all(|line| !line.contains("differ") || line.contains(" 0 of ")));

@@ -404,6 +404,29 @@ fn damage_of_any_bit_leaves_the_old_model() {
     assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&old)));
 }
 
+/// Working space has room for 12 numbers, of which two rows' inputs take 6.
+#[test]
+fn a_model_of_more_components_than_there_is_room_for_is_refused() {
+    let old = blob(1, 3);
+    let mut slots = MockSlot::pair_with(&old);
+    {
+        let mut bench = Bench::new(quiet());
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        let steps = |blob: &[u8]| upload_steps(blob, CHUNK).len();
+        let many = blob_of_components(7);
+        assert!(steps(&many) > 2);
+        let (outcome, _) = upload(&mut session, &bench.board, &upload_steps(&many, CHUNK));
+        assert_eq!(outcome, Err(Refusal::BadModel(ModelFault::Shape)));
+        assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&old)));
+        let few = blob_of_components(6);
+        let (outcome, leave) = upload(&mut session, &bench.board, &upload_steps(&few, CHUNK));
+        assert!(outcome.is_ok() && leave.is_some(), "{outcome:?}");
+    }
+    let mut bench = Bench::new(quiet());
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&blob_of_components(6))));
+}
+
 #[test]
 fn each_fault_of_a_model_is_named() {
     let old = blob(1, 3);

@@ -70,6 +70,8 @@ pub struct Training {
     /// Whether one network serves all rows, behind a projection of all readings, instead of one a row.
     #[serde(default)]
     pub whole_array: bool,
+    /// Number of components that this network computes, which are expanded to all outputs.
+    pub output_rank: Option<usize>,
     /// Whether inputs are readings relative to the baseline (R/R₀), and not readings as they are.
     #[serde(default)]
     pub relative_inputs: bool,
@@ -153,6 +155,7 @@ impl Experiment {
             seed: self.world.seed,
             format: t.format,
             whole_array: t.whole_array,
+            output_rank: t.output_rank,
             ..Options::default()
         }
     }

@@ -71,8 +71,10 @@ pub struct ModelSummary {
     pub relative_inputs: bool,
     /// Number of centres of each network (the largest).
     pub centres: usize,
-    /// Number of outputs of each network.
+    /// Number of outputs of each network: its row's outputs, those of all rows, or components of these.
     pub outputs: usize,
+    /// Number of outputs that such components are expanded to; 0 without an expansion.
+    pub expanded_outputs: usize,
     /// Width σ on scaled inputs; after refinement the mean over the networks.
     pub spread: f64,
     /// Whether centres, widths and the projection were refined after K-means.
@@ -201,6 +203,7 @@ fn model_summary(
         relative_inputs: model.metadata().relative_inputs,
         centres: model.networks().map(|n| n.shape().centres).max().unwrap_or(0),
         outputs: model.networks().next().map_or(0, |n| n.shape().outputs),
+        expanded_outputs: model.expansion().map_or(0, |expansion| expansion.outputs()),
         spread: if t.refine { blob.spread() } else { t.spread },
         refined: t.refine,
         affine_tail: t.affine_tail,

@@ -14,7 +14,7 @@ use crate::relative::relative;
 /// blob. The firmware's link check compares it with the compiler's own figure.
 #[must_use]
 pub const fn decoder_ram_bytes(rows: usize) -> usize {
-    136 + 28 * rows
+    144 + 28 * rows
 }
 
 /// A frame to be decoded, and what is known of the sensor at rest.
@@ -67,7 +67,7 @@ impl<'f> From<&'f [f32]> for Frame<'f> {
 /// # .unwrap();
 /// # let shape = ModelShape { rows: 1, inputs: 2, outputs: 1 };
 /// # let metadata = Metadata::unnamed(shape);
-/// # let parts = ModelParts { projection: None, networks: &[network.into()], row_network: &[0], metadata };
+/// # let parts = ModelParts { projection: None, expansion: None, networks: &[network.into()], row_network: &[0], metadata };
 /// # let mut buffer = Aligned([0; 512]);
 /// # let blob: &[u8] = encode(&parts, &mut buffer.0).unwrap();
 /// // `blob` holds a model of one row with two readings (Ω) and one output (mm), called `y`.
@@ -260,10 +260,22 @@ fn decode(
             rows.decode::<false>(frame, [scaled, more], estimate)
         });
     };
-    let (features, ratios) = more.split_at_mut_checked(inputs).ok_or(too_short)?;
+    let (features, more) = more.split_at_mut_checked(inputs).ok_or(too_short)?;
     let Some(network) = networks.first() else { return Ok(false) };
     let array = Array { projection, network, relative };
-    Ok(array.decode(exp, frame, [scaled, features, ratios], estimate))
+    let Some(expansion) = model.expansion() else {
+        return Ok(array.decode(exp, frame, [scaled, features, more], estimate));
+    };
+    let (components, ratios) =
+        more.split_at_mut_checked(expansion.components()).ok_or(too_short)?;
+    let mut inferred = Estimate { outputs: components, status: estimate.status };
+    let clamped = array.decode(exp, frame, [scaled, features, ratios], &mut inferred);
+    if inferred.status.first() == Some(&RowStatus::Decoded) {
+        expansion.expand(components, estimate.outputs);
+    } else {
+        estimate.outputs.fill(f32::NAN);
+    }
+    Ok(clamped)
 }
 
 /// Networks that decode a frame row by row.
@@ -327,13 +339,15 @@ fn divide(readings: &[f32], reciprocals: &[f32], ratios: &mut [f32]) {
 }
 
 /// Number of floats of working space that decoding with `model` needs.
-fn scratch_floats(model: &Model<'_>) -> usize {
+#[must_use]
+pub fn scratch_floats(model: &Model<'_>) -> usize {
     let ModelShape { rows, inputs, .. } = model.shape();
-    match (model.projection().is_some(), model.metadata().relative_inputs) {
+    let before = match (model.projection().is_some(), model.metadata().relative_inputs) {
         (false, false) => inputs,
         (false, true) | (true, false) => inputs.saturating_mul(2),
         (true, true) => inputs.saturating_mul(rows.saturating_add(2)),
-    }
+    };
+    before.saturating_add(model.components())
 }
 
 fn check_length<T>(what: &'static str, slice: &[T], expected: usize) -> Result<(), NetworkError> {
@@ -387,8 +401,8 @@ struct Array<'d, 'a> {
 
 impl Array<'_, '_> {
     /// Decodes all rows of a frame at once; `scratch` is room for scaled inputs, for features and for readings relative
-    /// to the baseline. Returns whether a feature was clamped, and the rows were decoded. Not inlined, because decoding
-    /// by rows would need its stack too.
+    /// to the baseline. The estimate's outputs are the network's. Returns whether a feature was clamped, and the rows
+    /// were decoded. Not inlined, because decoding by rows would need its stack too.
     #[inline(never)]
     fn decode(
         &self,

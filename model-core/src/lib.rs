@@ -33,6 +33,7 @@ pub mod health;
 pub mod gate;
 pub mod rbf;
 pub mod projection;
+pub mod expansion;
 pub mod blob;
 mod decoder;
 
@@ -41,7 +42,7 @@ pub use blob::Aligned;
 pub use blob::AlignedBytes;
 #[cfg(feature = "std")]
 pub use decoder::OwnedEstimate;
-pub use decoder::{Decoder, Frame, decoder_ram_bytes};
+pub use decoder::{Decoder, Frame, decoder_ram_bytes, scratch_floats};
 pub use estimate::{Estimate, RowStatus};
 pub use frame::{ColumnWire, RowWire, Wires};
 pub use gate::Gate;

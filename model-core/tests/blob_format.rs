@@ -58,6 +58,7 @@ fn small_model(buffer: &mut [u8]) -> &[u8] {
     encode(
         &ModelParts {
             projection: None,
+            expansion: None,
             networks: &networks,
             row_network: &[0, 0],
             metadata: metadata(),
@@ -104,8 +105,13 @@ fn relative_inputs_are_a_section_of_one_byte_before_all_others() {
     let (mut plain, mut relative) = (Aligned([0; 512]), Aligned([0; 512]));
     let networks = [network()];
     let metadata = Metadata { relative_inputs: true, ..metadata() };
-    let parts =
-        ModelParts { projection: None, networks: &networks, row_network: &[0, 0], metadata };
+    let parts = ModelParts {
+        projection: None,
+        expansion: None,
+        networks: &networks,
+        row_network: &[0, 0],
+        metadata,
+    };
     let blob = encode(&parts, &mut relative.0).unwrap();
     let model = Model::decode(blob).unwrap();
     assert_eq!(*model.metadata(), metadata);
@@ -150,6 +156,7 @@ fn readings_that_overflow_are_told_from_missing_ones() {
     let networks = [network_of(parameters)];
     let parts = ModelParts {
         projection: None,
+        expansion: None,
         networks: &networks,
         row_network: &[0, 0],
         metadata: metadata(),
@@ -176,6 +183,7 @@ fn what_does_not_fit_the_format_is_refused_when_written() {
     let networks = [network()];
     let parts = ModelParts {
         projection: None,
+        expansion: None,
         networks: &networks,
         row_network: &[0, 0],
         metadata: metadata(),

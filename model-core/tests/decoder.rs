@@ -63,6 +63,7 @@ fn blob(seed: usize, rows: usize) -> AlignedBytes {
     let row_network: Vec<u8> = (0..rows).map(|row| (row % 2) as u8).collect();
     let parts = ModelParts {
         projection: None,
+        expansion: None,
         networks: &[even.network(), odd.network()],
         row_network: &row_network,
         metadata,

@@ -32,6 +32,7 @@ mod machine;
 mod table;
 
 mod shapes;
+mod ranks;
 mod equations;
 mod predicted;
 mod fit;
@@ -57,6 +58,7 @@ use figures::Figure;
 use loops::Loop;
 use models::Blob;
 pub use options::Options;
+use options::Table;
 pub use regions::Count as Counted;
 
 /// Name of the image that is measured.
@@ -77,10 +79,18 @@ pub fn run(options: &Options<'_>) -> Outcome {
     let image = elf(IMAGE);
     let code = Code::read(&image)?;
     let directory = target_dir().join("cycles");
-    if options.shapes {
-        let measured = shapes::measure(&image, &code, &directory)?;
-        print!("{}", shapes::markdown(&measured));
-        return shapes::held(&measured);
+    match options.table {
+        Some(Table::Shapes) => {
+            let measured = shapes::measure(&image, &code, &directory)?;
+            print!("{}", shapes::markdown(&measured));
+            return shapes::held(&measured);
+        }
+        Some(Table::Ranks) => {
+            let measured = ranks::measure(&image, &code, &directory)?;
+            print!("{}", ranks::markdown(&measured));
+            return ranks::held(&measured);
+        }
+        None => (),
     }
     if let Some(model) = options.model {
         return measure_model(Path::new(model), &image, &code, &toolchain.compiler()?, options);
@@ -104,6 +114,7 @@ pub fn run(options: &Options<'_>) -> Outcome {
         return Ok(());
     }
     shapes::held(&shapes::measure(&image, &code, &directory)?)?;
+    ranks::held(&ranks::measure(&image, &code, &directory)?)?;
     let compiler = toolchain.compiler()?;
     if options.accept {
         prices::accept(&image, &code, &directory, &compiler)?;

@@ -22,7 +22,7 @@ fn exercise_decoding() {
     opaque(wires.place(RowWire(opaque(0)), ColumnWire(opaque(0))));
     let frame = opaque([60.0; 144]);
     let (mut outputs, mut status) = (opaque([0.0; 144]), [RowStatus::MissingReading; 8]);
-    let mut scratch = [0.0; 144];
+    let mut scratch = [0.0; 288];
     let length = |all: usize| opaque(all);
     let (Some(frame), Some(outputs)) = (frame.get(..length(144)), outputs.get_mut(..length(144)))
     else {

@@ -18,6 +18,8 @@ pub const COLS: usize = 18;
 pub const OUTPUTS: usize = 18;
 /// Number of row-wires of a small sensor that one network decodes, behind a projection.
 pub const ARRAY_ROWS: usize = 2;
+/// Number of components that such a network may compute, which are expanded to the outputs.
+pub const ARRAY_COMPONENTS: usize = 7;
 
 const FRAMES: usize = 6;
 const CRC: Crc<u32, Table<0>> = Crc::<u32, Table<0>>::new(&CRC_32_ISO_HDLC);
@@ -73,7 +75,7 @@ impl<const R: usize> Decoded<R> {
     ) -> Option<()> {
         let outputs = self.outputs.as_flattened_mut();
         let mut estimate = Estimate { outputs, status: &mut self.status };
-        let mut scratch = [0.0; 2 * COLS];
+        let mut scratch = [0.0; 2 * COLS + ARRAY_COMPONENTS];
         let frame = model_core::Frame { gate, ..frame.as_flattened().into() };
         self.clamped = decoder.decode_with::<E>(frame, &mut scratch, &mut estimate).ok()?;
         Some(())
@@ -233,7 +235,7 @@ pub fn clamping(blob: &[u8]) -> Option<[usize; 3]> {
 }
 
 /// Number of the [`MANY`] frames that the model in `blob` decodes behind a projection, and how many of them the
-/// compiled twins of projection and network decode to other bits. `None` if the blob does not load, or its number
+/// compiled twins of projection, network and expansion decode to other bits. `None` if the blob does not load, or its number
 /// format has no twin.
 #[must_use]
 pub fn array_twins(blob: &[u8]) -> Option<[usize; 2]> {
@@ -251,7 +253,14 @@ pub fn array_twins(blob: &[u8]) -> Option<[usize; 2]> {
         let mut features = [0.0; COLS];
         let mut of_twin = [[0.0; OUTPUTS]; ARRAY_ROWS];
         projection.project_portably(frame.as_flattened(), &mut features);
-        infer_by_twin(&network, &features, of_twin.as_flattened_mut())?;
+        match model.expansion() {
+            Some(expansion) => {
+                let mut components = [0.0; ARRAY_COMPONENTS];
+                infer_by_twin(&network, &features, &mut components)?;
+                expansion.expand_portably(&components, of_twin.as_flattened_mut());
+            }
+            None => infer_by_twin(&network, &features, of_twin.as_flattened_mut())?,
+        }
         let bits = |outputs: [[f32; OUTPUTS]; ARRAY_ROWS]| outputs.map(|row| row.map(f32::to_bits));
         compared += 1;
         different += usize::from(bits(outputs) != bits(of_twin));

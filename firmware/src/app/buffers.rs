@@ -18,7 +18,7 @@ pub struct Buffers<
     pub(super) baseline: [[f32; COLUMNS]; ROWS],
     /// One over each reading of the baseline.
     pub(super) reciprocals: [[f32; COLUMNS]; ROWS],
-    /// Working space of a decoder: more than a frame's readings and those of two rows.
+    /// Working space of a decoder ([`Capacity::scratch_floats`](crate::capacity::Capacity::scratch_floats)).
     pub(super) scratch: [[[f32; COLUMNS]; ROWS]; 2],
     pub(super) estimate: Outcome<ROWS, OUTPUTS>,
     pub(super) rest: Outcome<ROWS, OUTPUTS>,

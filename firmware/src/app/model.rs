@@ -2,7 +2,7 @@
 
 use model_core::blob::{Columns, DecodeError, Model, ModelShape};
 use model_core::checksum::CRC_32;
-use model_core::{Decoder, RowWire};
+use model_core::{Decoder, RowWire, scratch_floats};
 
 use crate::capacity::Capacity;
 use crate::link::message::{ModelFault, ModelIdentity};
@@ -78,8 +78,9 @@ pub fn check(capacity: Capacity, blob: &[u8]) -> Result<Model<'_>, ModelFault> {
     let model = Model::decode(blob).map_err(|error| fault(&error))?;
     let mut names = model.metadata().input_names.iter().step_by(model.shape().inputs.max(1));
     let driven = names.all(|name| row_of(name).is_none_or(|row| row.0 < capacity.rows));
+    let room = scratch_floats(&model) <= capacity.scratch_floats();
     match capacity.wires_for(model.shape()) {
-        Some(_) if driven => Ok(model),
+        Some(_) if driven && room => Ok(model),
         _ => Err(ModelFault::Shape),
     }
 }

@@ -43,8 +43,13 @@ fn a_frame_without_a_baseline_is_flagged_until_one_is_complete() {
     let model = Model::decode(&absolute).unwrap();
     let networks: Vec<_> = model.networks().collect();
     let metadata = Metadata { relative_inputs: true, ..Metadata::unnamed(model.shape()) };
-    let parts =
-        ModelParts { projection: None, networks: &networks, row_network: &[0; ROWS], metadata };
+    let parts = ModelParts {
+        projection: None,
+        expansion: None,
+        networks: &networks,
+        row_network: &[0; ROWS],
+        metadata,
+    };
     let mut slots = MockSlot::pair_with(&encode_to_vec(&parts).unwrap());
     let mut bench = Bench::new(quiet());
     let board = bench.board.clone();

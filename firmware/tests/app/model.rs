@@ -17,8 +17,13 @@ fn the_identity_tells_what_the_model_was_trained_on() {
         let network = blob_of_one_row(3, 2);
         let model = Model::decode(&network).unwrap();
         let networks: Vec<_> = model.networks().collect();
-        let parts =
-            ModelParts { projection: None, networks: &networks, row_network: &[0], metadata };
+        let parts = ModelParts {
+            projection: None,
+            expansion: None,
+            networks: &networks,
+            row_network: &[0],
+            metadata,
+        };
         encode_to_vec(&parts).unwrap()
     };
     let plain = Metadata::unnamed(ModelShape { rows: 1, inputs: 3, outputs: 2 });
@@ -74,7 +79,14 @@ fn blob_with(shape: ModelShape, metadata: Metadata<'_>) -> AlignedBytes {
         },
     );
     let networks = &[network.unwrap().into()];
-    encode_to_vec(&ModelParts { projection: None, networks, row_network: &[0], metadata }).unwrap()
+    encode_to_vec(&ModelParts {
+        projection: None,
+        expansion: None,
+        networks,
+        row_network: &[0],
+        metadata,
+    })
+    .unwrap()
 }
 
 #[test]

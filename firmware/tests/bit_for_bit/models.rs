@@ -2,6 +2,7 @@
 
 use model_core::AlignedBytes;
 use model_core::blob::{Metadata, ModelParts, ModelShape, encode_to_vec};
+use model_core::expansion::Expansion;
 use model_core::projection::Projection;
 use model_core::rbf::direct::Parameters;
 use model_core::rbf::fixed16::{
@@ -10,7 +11,7 @@ use model_core::rbf::fixed16::{
 use model_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
 use model_core::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP};
 
-use super::checks::{ARRAY_ROWS, COLS, Numbers, OUTPUTS};
+use super::checks::{ARRAY_COMPONENTS, ARRAY_ROWS, COLS, Numbers, OUTPUTS};
 
 /// Decay log₂e/(2σ²) for σ = 0.8.
 const DECAY_PER_SPAN_SQUARED: f64 = core::f64::consts::LOG2_E / (2.0 * 0.8 * 0.8);
@@ -18,17 +19,23 @@ const DECAY_PER_SPAN_SQUARED: f64 = core::f64::consts::LOG2_E / (2.0 * 0.8 * 0.8
 /// Function that makes a model's blob.
 type Maker = fn() -> AlignedBytes;
 
+/// Components of an array's network whose outputs are expanded.
+const COMPONENTS: Option<usize> = Some(ARRAY_COMPONENTS);
+
 /// Every model: the name of its file, and the function that makes it.
-pub const FILES: [(&str, Maker); 9] = [
+pub const FILES: [(&str, Maker); 12] = [
     ("hand-made.bin", hand_made),
     ("kernels-f32.bin", || of_format(Format::F32)),
     ("kernels-fixed16.bin", || of_format(Format::Fixed16)),
     ("kernels-f32-direct.bin", || of_format(Format::F32Direct)),
-    ("array-f32.bin", || of_array(Format::F32, 131, true)),
-    ("array-f32-no-tail.bin", || of_array(Format::F32, 130, false)),
-    ("array-fixed16.bin", || of_array(Format::Fixed16, 33, true)),
-    ("array-fixed16-no-tail.bin", || of_array(Format::Fixed16, 16, false)),
-    ("array-f32-direct.bin", || of_array(Format::F32Direct, 17, true)),
+    ("array-f32.bin", || of_array(Format::F32, 131, true, None)),
+    ("array-f32-no-tail.bin", || of_array(Format::F32, 130, false, None)),
+    ("array-fixed16.bin", || of_array(Format::Fixed16, 33, true, None)),
+    ("array-fixed16-no-tail.bin", || of_array(Format::Fixed16, 16, false, None)),
+    ("array-f32-direct.bin", || of_array(Format::F32Direct, 17, true, None)),
+    ("array-f32-components.bin", || of_array(Format::F32, 9, true, COMPONENTS)),
+    ("array-fixed16-components.bin", || of_array(Format::Fixed16, 17, false, COMPONENTS)),
+    ("array-f32-direct-components.bin", || of_array(Format::F32Direct, 6, true, COMPONENTS)),
 ];
 
 /// Calls `work` with the blob of the file of this name.
@@ -48,7 +55,7 @@ fn hand_made() -> AlignedBytes {
     let mut words = || direct_words(&mut numbers, shape, true, 12);
     let (even, odd) = (words(), words());
     let networks = [&even, &odd].map(|words| network(Format::F32Direct, shape, false, true, words));
-    encoded("hand-made", None, &networks, &[0, 1, 0, 1, 0, 1, 0, 1])
+    encoded("hand-made", (None, None), &networks, &[0, 1, 0, 1, 0, 1, 0, 1])
 }
 
 fn row_shape(centres: usize) -> Shape {
@@ -67,11 +74,17 @@ fn of_format(format: Format) -> AlignedBytes {
         let (centres, affine) = kinds[index];
         network(format, row_shape(centres), true, affine, &words[index])
     });
-    encoded(format.name(), None, &networks, &[0, 1, 0, 1, 0, 1, 0, 2])
+    encoded(format.name(), (None, None), &networks, &[0, 1, 0, 1, 0, 1, 0, 2])
 }
 
-/// A model of one network for all rows behind a projection, whose features vary about as much as single readings.
-fn of_array(format: Format, centres: usize, affine: bool) -> AlignedBytes {
+/// A model of one network for all rows behind a projection, whose features vary about as much as single readings. The
+/// network computes all outputs, or so many components of them.
+fn of_array(
+    format: Format,
+    centres: usize,
+    affine: bool,
+    components: Option<usize>,
+) -> AlignedBytes {
     let mut numbers = Numbers::new(6);
     let readings = ARRAY_ROWS * COLS;
     let parts = draw(&mut numbers, readings * COLS, 0.0, 0.35);
@@ -79,10 +92,15 @@ fn of_array(format: Format, centres: usize, affine: bool) -> AlignedBytes {
     let start = (0..COLS).map(|feature| 60.0 - 60.0 * sum(feature));
     let block: Vec<f32> = start.chain(parts.iter().copied()).collect();
     let projection = Projection::new(readings, COLS, &block).unwrap();
-    let shape = Shape { inputs: COLS, centres, outputs: ARRAY_ROWS * OUTPUTS };
+    let outputs = ARRAY_ROWS * OUTPUTS;
+    let shape = Shape { inputs: COLS, centres, outputs: components.unwrap_or(outputs) };
     let words = words_of(format, &mut numbers, shape, affine);
     let network = network(format, shape, true, affine, &words);
-    encoded(format.name(), Some(projection), &[network], &[0; ARRAY_ROWS])
+    let block = draw(&mut numbers, (1 + shape.outputs) * outputs, 0.0, 1.0);
+    let expansion =
+        components.map(|components| Expansion::new(components, outputs, &block).unwrap());
+    let linear = (Some(projection), expansion);
+    encoded(format.name(), linear, &[network], &[0; ARRAY_ROWS])
 }
 
 fn words_of(format: Format, numbers: &mut Numbers, shape: Shape, affine: bool) -> Vec<u32> {
@@ -210,7 +228,7 @@ fn pair(low: i32, high: i32) -> u32 {
 
 fn encoded(
     name: &str,
-    projection: Option<Projection<'_>>,
+    (projection, expansion): (Option<Projection<'_>>, Option<Expansion<'_>>),
     networks: &[Network<'_>],
     row_network: &[u8],
 ) -> AlignedBytes {
@@ -219,6 +237,6 @@ fn encoded(
     // In the files in testdata, the units have the same names as the columns.
     let (input_units, output_units) = (unnamed.input_names, unnamed.output_names);
     let metadata = Metadata { name, thickness_mm: 5.0, input_units, output_units, ..unnamed };
-    let parts = ModelParts { projection, networks, row_network, metadata };
+    let parts = ModelParts { projection, expansion, networks, row_network, metadata };
     encode_to_vec(&parts).unwrap()
 }

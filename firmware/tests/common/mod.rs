@@ -15,6 +15,8 @@ use firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
 use firmware::store::{FlashError, Slot};
 use model_core::AlignedBytes;
 use model_core::blob::{Metadata, Model, ModelParts, ModelShape, encode_to_vec};
+use model_core::expansion::Expansion;
+use model_core::projection::Projection;
 use model_core::rbf::direct::{self, Parameters};
 use model_core::rbf::{Network, Shape};
 
@@ -279,8 +281,46 @@ pub fn blob_of(network: Network<'_>) -> AlignedBytes {
     let shape = network.shape();
     let shape = ModelShape { rows: ROWS, inputs: shape.inputs, outputs: shape.outputs };
     let metadata = Metadata::unnamed(shape);
-    let parts =
-        ModelParts { projection: None, networks: &[network], row_network: &[0; ROWS], metadata };
+    let parts = ModelParts {
+        projection: None,
+        expansion: None,
+        networks: &[network],
+        row_network: &[0; ROWS],
+        metadata,
+    };
+    encode_to_vec(&parts).unwrap()
+}
+
+/// A blob whose one network for both rows computes so many `components`, which are expanded to all outputs.
+pub fn blob_of_components(components: usize) -> AlignedBytes {
+    let (readings, outputs) = (ROWS * COLS, ROWS * OUTPUTS);
+    let (weights, bias) = (vec![0.5; components], vec![0.25; components]);
+    let network = Network::from(
+        direct::Network::try_new(
+            Shape { inputs: COLS, centres: 1, outputs: components },
+            Parameters {
+                input_minimum: &[50.0; COLS],
+                input_per_span: &[0.05; COLS],
+                centres: &[0.5; COLS],
+                decay: &[1.5],
+                output_weights: &weights,
+                bias: &bias,
+                affine: &[],
+            },
+        )
+        .unwrap(),
+    );
+    // Every feature is the mean reading.
+    let mut projection = vec![1.0 / readings as f32; (1 + readings) * COLS];
+    projection[..COLS].fill(0.0);
+    let expansion = vec![0.125; (1 + components) * outputs];
+    let parts = ModelParts {
+        projection: Projection::new(readings, COLS, &projection).ok(),
+        expansion: Expansion::new(components, outputs, &expansion).ok(),
+        networks: &[network],
+        row_network: &[0; ROWS],
+        metadata: Metadata::unnamed(ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS }),
+    };
     encode_to_vec(&parts).unwrap()
 }
 

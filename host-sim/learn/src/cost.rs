@@ -103,7 +103,7 @@ impl Design {
             return 0;
         }
         let networks: usize = self.row_networks().map(NetworkDesign::bytes).sum();
-        least_waiting_for_weights(networks + self.projection_bytes())
+        least_waiting_for_weights(networks + self.projection_bytes() + self.expansion_bytes())
     }
 }
 

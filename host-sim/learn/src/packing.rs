@@ -6,6 +6,7 @@ use model_core::AlignedBytes;
 use model_core::blob::{
     self, Columns, DecodeError, Floats, Metadata, Model, ModelParts, NoiseKind,
 };
+use model_core::expansion::Expansion;
 use model_core::rbf::Network;
 use taxel_data::columns;
 use taxel_data::dataset::Dataset;
@@ -47,7 +48,7 @@ impl Origin {
     }
 }
 
-/// Packs the networks and projection `trained` on `dataset` into a blob.
+/// Packs the networks, projection and expansion `trained` on `dataset` into a blob.
 ///
 /// # Errors
 /// [`Error::NotPacked`] for a model beyond what the format holds.
@@ -72,13 +73,16 @@ pub fn pack(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<Mod
     } else {
         units(&dataset.inputs.names)
     };
+    // Behind a projection alone there is an expansion.
+    let expansion = trained.networks.first().and_then(FittedNetwork::expansion);
     let training_rmse = floats(&match projection {
-        Some(it) => training_rmse(&views, &train::projection::apply(it, dataset)),
-        None => training_rmse(&views, dataset),
+        Some(it) => training_rmse(&views, expansion, &train::projection::apply(it, dataset)),
+        None => training_rmse(&views, None, dataset),
     });
     let full_scale = floats(&origin.full_scale);
     let parts = ModelParts {
         projection,
+        expansion,
         networks: &views,
         row_network: &row_network,
         metadata: Metadata {
@@ -101,11 +105,19 @@ pub fn pack(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<Mod
     Ok(ModelBlob { bytes: blob::encode_to_vec(&parts).map_err(Error::NotPacked)? })
 }
 
-fn training_rmse(networks: &[Network<'_>], dataset: &Dataset) -> Vec<f64> {
+fn training_rmse(
+    networks: &[Network<'_>],
+    expansion: Option<Expansion<'_>>,
+    dataset: &Dataset,
+) -> Vec<f64> {
     let mut rmse = Vec::new();
     for (row, network) in networks.iter().enumerate() {
         let table = dataset.row_table(row);
-        let predicted = infer(network, Exponential::default(), &table.inputs.values);
+        let inferred = infer(network, Exponential::default(), &table.inputs.values);
+        let predicted = match expansion {
+            Some(expansion) => train::output_rank::expand(expansion, &inferred),
+            None => inferred,
+        };
         let squares = table.outputs.squared_errors(&predicted);
         rmse.extend(squares.iter().map(|s| (s / dataset.frames() as f64).sqrt()));
     }

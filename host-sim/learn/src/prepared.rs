@@ -12,7 +12,7 @@ use crate::decoder::{Estimates, FrameDecoder};
 use crate::infer::{Exponential, Prepared, is_missing};
 use crate::packing::ModelBlob;
 use crate::relative::{ratios, reciprocals};
-use crate::train::projection;
+use crate::train::{output_rank, projection};
 
 /// Model that was parsed and laid out, ready to decode. Clones share what was laid out.
 ///
@@ -114,7 +114,11 @@ impl<'b> PreparedModel<'b> {
     /// Decodes `readings` (`frames × inputs`) to outputs (`frames × outputs`), line after line.
     #[must_use]
     pub fn decode_lines(&self, readings: &[f64]) -> Vec<f64> {
-        self.networks.infer(&self.inputs_of_networks(readings))
+        let inferred = self.networks.infer(&self.inputs_of_networks(readings));
+        match self.model.expansion() {
+            Some(expansion) => output_rank::expand(expansion, &inferred),
+            None => inferred,
+        }
     }
 
     /// Inputs of the networks in turn: those of the model, or features of them.

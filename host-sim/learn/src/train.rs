@@ -17,8 +17,10 @@ use crate::error::Result;
 
 pub mod kmeans;
 pub mod least_squares;
+mod principal;
 pub mod format;
 pub mod projection;
+pub mod output_rank;
 pub mod layers;
 pub mod refine;
 
@@ -55,6 +57,9 @@ pub struct Options {
     /// Whether one network serves all rows, behind a projection of all readings, instead of one network
     /// a row.
     pub whole_array: bool,
+    /// Number of components that the network for all rows computes, which are expanded to its outputs; `None` for a
+    /// network that computes all outputs.
+    pub output_rank: Option<usize>,
 }
 
 impl Default for Options {
@@ -68,6 +73,7 @@ impl Default for Options {
             search: kmeans::Search::default(),
             format: Format::F32,
             whole_array: false,
+            output_rank: None,
         }
     }
 }
@@ -86,6 +92,10 @@ impl Options {
             return refused(format!(
                 "there must be fewer than the {frames} training frames; lower it or add data"
             ));
+        }
+        if let (Some(rank), false) = (self.output_rank, self.whole_array) {
+            let rule = "only one network for the whole array has outputs enough: leave it out";
+            return Err(BadValue::new("output_rank", rank, rule));
         }
         check_spread("spread", self.spread)
     }
@@ -221,12 +231,15 @@ impl<'b> Samples<'b> {
     }
 
     /// Fits output weights to the samples for given `centres` (`centres × inputs`, on scaled inputs), by
-    /// least squares, in the format that `options` ask for.
+    /// least squares, in the format and of the rank that `options` ask for.
     ///
     /// # Errors
     /// [`Error`](crate::Error) if the format does not hold the network.
     pub fn fit(&self, centres: &[f64], options: &Options) -> Result<FittedNetwork> {
-        format::fit(self, centres, options)
+        match options.output_rank {
+            Some(rank) => output_rank::fit(self, centres, rank, options),
+            None => format::fit(self, centres, options),
+        }
     }
 }
 

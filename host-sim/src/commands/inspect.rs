@@ -6,7 +6,8 @@ use clap::Args;
 use firmware::capacity::{Capacity, WEIGHT_RAM_BYTES};
 use host_sim::Result;
 use host_sim::evaluate::trade::SLOT_BYTES;
-use model_core::blob::ModelShape;
+use model_core::blob::Model;
+use model_core::scratch_floats;
 use serde::Serialize;
 use taxel_learn::cost::{Cost, DecoderRam, Design, Frames, Prices};
 use taxel_learn::{Exponential, ModelBlob};
@@ -35,6 +36,8 @@ struct Summary {
     relative_inputs: bool,
     /// Features that all readings are projected to, for one network of all rows; 0 without a projection.
     projected_features: usize,
+    /// Components that the one network computes and that are expanded to all outputs; 0 without an expansion.
+    expanded_components: usize,
     networks: Vec<NetworkSummary>,
     noise_kind: String,
     noise_level: f32,
@@ -119,6 +122,7 @@ fn summarise(blob: &ModelBlob) -> Result<Summary> {
         outputs_per_row: shape.outputs,
         relative_inputs: metadata.relative_inputs,
         projected_features: model.projection().map_or(0, |_| shape.inputs),
+        expanded_components: design.components.unwrap_or(0),
         networks: networks.collect(),
         noise_kind: format!("{:?}", metadata.noise_kind).to_lowercase(),
         noise_level: metadata.noise_level,
@@ -127,7 +131,7 @@ fn summarise(blob: &ModelBlob) -> Result<Summary> {
         flash_bytes: blob.bytes().len(),
         ram_bytes: DecoderRam::of(&design),
         weights_in_ram: design.weights_in_ram,
-        needs: needs(shape, blob.bytes().len()),
+        needs: needs(&model, blob.bytes().len()),
         frame: Prices::accepted()?.frames(&design, Exponential::default())?,
         inputs: metadata.input_names.iter().zip(metadata.input_units.iter()).map(column).collect(),
         outputs: outputs
@@ -141,13 +145,18 @@ fn summarise(blob: &ModelBlob) -> Result<Summary> {
     })
 }
 
-/// Why the images as they are cannot decode a model of this shape, with a blob of so many bytes.
-fn needs(shape: ModelShape, bytes: usize) -> Vec<String> {
-    let room = Capacity::PAPER;
+/// Why the images as they are cannot decode a `model`, with a blob of so many bytes.
+fn needs(model: &Model<'_>, bytes: usize) -> Vec<String> {
+    let (room, shape) = (Capacity::PAPER, model.shape());
     let too_large = (bytes > SLOT_BYTES)
         .then(|| format!("no device takes it: a slot of the images holds {SLOT_BYTES} bytes"));
     let other_image = room.wires_for(shape).is_none().then(|| image_for(room, shape));
-    too_large.into_iter().chain(other_image).collect()
+    let (needed, most) = (scratch_floats(model), room.scratch_floats());
+    let too_many = (other_image.is_none() && needed > most).then(|| {
+        let spare = needed - most;
+        format!("no device takes it: {spare} components fewer are the most there is room for")
+    });
+    too_large.into_iter().chain(other_image).chain(too_many).collect()
 }
 
 /// Cost of a frame for people.
@@ -192,6 +201,10 @@ fn page_of(s: &Summary) -> print::Page {
         let (readings, features) = (s.rows * s.inputs_per_row, s.projected_features);
         line("projection", format!("{readings} readings → {features} features for all rows"));
     }
+    if s.expanded_components > 0 {
+        let (components, outputs) = (s.expanded_components, s.rows * s.outputs_per_row);
+        line("expansion", format!("{components} components → {outputs} outputs of all rows"));
+    }
     let networks: Vec<String> = s.networks.iter().map(NetworkSummary::line).collect();
     let mut index = 0;
     for alike in networks.chunk_by(|a, b| a == b) {
@@ -212,6 +225,7 @@ fn page_of(s: &Summary) -> print::Page {
         ("estimate", ram.estimate),
         ("scaled readings", ram.scaled_readings),
         ("features", ram.features),
+        ("components", ram.components),
         ("relative inputs", ram.relative_inputs),
         ("activations", ram.activations),
     ];

@@ -104,7 +104,7 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
         model.test_frames
     ));
     page.line(format_args!(
-        "model: {} network{}, {} -> K = {} -> {} outputs, spread {}{}, {} bytes, CRC-32 {}",
+        "model: {} network{}, {} -> K = {} -> {}, spread {}{}, {} bytes, CRC-32 {}",
         model.networks,
         if model.networks == 1 { "" } else { "s" },
         {
@@ -115,7 +115,10 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
             }
         },
         model.centres,
-        model.outputs,
+        match model.expanded_outputs {
+            0 => format!("{} outputs", model.outputs),
+            all => format!("{} components -> {all} outputs", model.outputs),
+        },
         model.spread,
         if model.refined { " (refined)" } else { "" },
         model.blob_bytes,

@@ -51,6 +51,10 @@ pub struct Arguments {
     /// Centres K to try.
     #[arg(long, value_name = "K", value_delimiter = ',', default_value = "16,32,64,128,256")]
     centres: Vec<usize>,
+    /// Components that the network for the whole array computes instead of all outputs, to try where they take fewer
+    /// multiplications (docs/projection.md); `none` for networks that compute all outputs alone.
+    #[arg(long, value_name = "R,…", value_delimiter = ',', default_value = "24")]
+    output_rank: Vec<RankOption>,
     /// Numbers of samples averaged for each reading, to try.
     #[arg(long, value_name = "N", value_delimiter = ',', default_value = "1,4,16")]
     average: Vec<usize>,
@@ -100,6 +104,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     }
     let plan = Plan {
         centres: distinct("--centres", &arguments.centres)?,
+        output_ranks: output_ranks(&arguments.output_rank)?,
         samples_averaged: distinct("--average", &arguments.average)?,
         gate_k: gate_k(&arguments.gate, &scene.world)?,
         clock_mhz: arguments.clock_mhz,
@@ -134,7 +139,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 }
 
 /// Options by the settings that they set.
-const OPTIONS: [(&str, &str); 6] = [
+const OPTIONS: [(&str, &str); 7] = [
+    ("output-rank", "--output-rank"),
     ("centres", "--centres"),
     ("average", "--average"),
     ("gate", "--gate"),
@@ -168,6 +174,30 @@ impl FromStr for GateOption {
             k => k.parse().map(Self::K).map_err(|_| "give numbers, such as 3.5, or none".into()),
         }
     }
+}
+
+/// Value of `--output-rank`.
+#[derive(Clone, Copy)]
+struct RankOption(Option<usize>);
+
+impl FromStr for RankOption {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        match text {
+            "none" => Ok(Self(None)),
+            rank => match rank.parse() {
+                Ok(rank) => Ok(Self(Some(rank))),
+                Err(_) => Err("give whole numbers, such as 24, or none".into()),
+            },
+        }
+    }
+}
+
+/// Ranks that are asked for, in order; networks that compute all outputs there are always.
+fn output_ranks(given: &[RankOption]) -> Result<Vec<usize>> {
+    let ranks: Vec<usize> = given.iter().filter_map(|rank| rank.0).collect();
+    distinct("--output-rank", &ranks)
 }
 
 /// Gates that are asked for, or the one that docs/gating.md recommends where the noise allows one.
@@ -234,7 +264,7 @@ fn write_files(folder: &Path, trade: &Trade) -> Result<()> {
 fn csv_of(trade: &Trade) -> String {
     let rmse = trade.groups().map(|(group, _)| format!("{group}_rmse,{group}_ratio_to_best"));
     let mut csv = format!(
-        "kernel,whole_array,centres,spread,affine_tail,samples_averaged,gate_k,{},instructions,cycles,flash_cycles,frame_us,flash_bytes,ram_bytes,\
+        "kernel,whole_array,centres,spread,affine_tail,samples_averaged,gate_k,output_rank,{},instructions,cycles,flash_cycles,frame_us,flash_bytes,ram_bytes,\
          on_front,chosen\n",
         rmse.collect::<Vec<_>>().join(",")
     );
@@ -243,7 +273,7 @@ fn csv_of(trade: &Trade) -> String {
         let errors = errors.map(|(e, ratio)| format!("{},{ratio}", e.rmse)).collect::<Vec<_>>();
         let _ = writeln!(
             csv,
-            "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+            "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
             p.arithmetic.name(),
             p.whole_array,
             p.centres,
@@ -251,6 +281,7 @@ fn csv_of(trade: &Trade) -> String {
             p.affine_tail,
             p.samples_averaged,
             p.gate_k.map_or(String::new(), |k| k.to_string()),
+            p.output_rank.map_or(String::new(), |rank| rank.to_string()),
             errors.join(","),
             p.frame.instructions,
             p.frame.cycles,
@@ -278,9 +309,10 @@ fn page_of(trade: &Trade, all: bool, folder: &Path) -> print::Page {
     ));
     let groups: Vec<String> = trade.groups().map(|(group, _)| format!("{group:>16}")).collect();
     page.line(format_args!(
-        "\n{:<28} {:>4} {:>5} {:>4} {:>4}{groups}{:>13} {:>9} {:>10} {:>8} {:>8} {:>6}",
+        "\n{:<28} {:>4} {:>4} {:>5} {:>4} {:>4}{groups}{:>13} {:>9} {:>10} {:>8} {:>8} {:>6}",
         "format",
         "K",
+        "rank",
         "tail",
         "avg",
         "gate",
@@ -299,12 +331,13 @@ fn page_of(trade: &Trade, all: bool, folder: &Path) -> print::Page {
     for DecoderErrors { decoder, errors } in &trade.baselines {
         let errors: Vec<String> =
             errors.iter().map(|e| format!("{:>9.4}       ", e.rmse)).collect();
-        page.line(format_args!("  {decoder:<48}{}", errors.concat()));
+        page.line(format_args!("  {decoder:<53}{}", errors.concat()));
     }
     page.line(format_args!(
         "\nRMSE in {}; in brackets: relative to the smallest of all points\n\
          *: on the Pareto front (RMSE of {}, cycles, samples)\n\
          array: one network for all rows, behind a projection; not listed if larger than a slot (128 KiB)\n\
+         rank: components that the array's network computes, which are expanded to all outputs (docs/projection.md)\n\
          flash: no point larger than a slot is chosen unless --max-flash allows it\n\
          gate: k of a gate that skips untouched rows; its cycles are the mean over the test frames",
         trade.unit,
@@ -363,10 +396,11 @@ fn line_of(point: &Point, chosen: bool) -> String {
         .collect();
     let errors = errors.concat();
     format!(
-        "{} {:<26} {:>4} {:>5} {:>4} {:>4}{errors}{:>13} {:>9} {:>10} {:>8.1} {:>8} {:>6}{}",
+        "{} {:<26} {:>4} {:>4} {:>5} {:>4} {:>4}{errors}{:>13} {:>9} {:>10} {:>8.1} {:>8} {:>6}{}",
         if point.on_front { "*" } else { " " },
         point.way(),
         point.centres,
+        point.output_rank.map_or("-".into(), |rank| rank.to_string()),
         if point.affine_tail { "yes" } else { "no" },
         point.samples_averaged,
         point.gate_k.map_or("-".into(), |k| k.to_string()),

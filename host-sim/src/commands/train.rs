@@ -31,6 +31,7 @@ use super::{Common, print};
 #[derive(Args)]
 #[command(after_help = "Examples:
   host-sim train press -o press.bin
+  host-sim train press --whole-array --centres 256 --output-rank 24 --format fixed16 -o press.bin
   host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --centres 200 --spread 0.5 -o m.bin
   host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --select --fold-column fold -o m.bin
   host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --relative-inputs --baseline rest.csv -o m.bin")]
@@ -60,6 +61,10 @@ pub struct Arguments {
     /// more accurate, and faster from K = 64 on, but one missing reading leaves nothing to decode.
     #[arg(long)]
     whole_array: bool,
+    /// Let the network of --whole-array compute R components, which are expanded to all outputs once a frame. With many
+    /// centres that takes fewer cycles and less flash; a small R loses accuracy (docs/projection.md).
+    #[arg(long, value_name = "R")]
+    output_rank: Option<usize>,
     #[command(flatten)]
     relative_inputs: RelativeInputsArgument,
     /// CSV file with frames of the untouched sensor, whose mean is the baseline; a CSV file's --relative-inputs
@@ -133,6 +138,8 @@ struct Summary {
     /// Whether centres, widths and the projection were refined after K-means.
     refined: bool,
     affine_tail: bool,
+    /// Components that are expanded to all outputs; `None` if the networks compute the outputs themselves.
+    output_rank: Option<usize>,
     /// Whether inputs are readings relative to the baseline.
     relative_inputs: bool,
     /// Number formats of the networks, in their order.
@@ -166,6 +173,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         options.whole_array = true;
         options.spread *= WHOLE_ARRAY_SPREAD;
     }
+    options.output_rank = arguments.output_rank.or(options.output_rank);
     options.format = arguments.format.unwrap_or(options.format);
     if arguments.select && options.whole_array {
         return Err(Error::Usage(
@@ -204,6 +212,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         spread: if source.refine { blob.spread() } else { options.spread },
         refined: source.refine,
         affine_tail: options.affine_tail,
+        output_rank: model.expansion().map(|expansion| expansion.components()),
         relative_inputs: source.dataset.relative_inputs,
         formats: model.networks().map(|n| n.format().name()).collect(),
         outputs: source.dataset.outputs.names.clone(),
@@ -403,12 +412,13 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         }
     }
     page.line(format_args!(
-        "{}: {} bytes, CRC-32 {}, {}, K = {}, spread = {}{}, affine tail: {}, {} frames{}",
+        "{}: {} bytes, CRC-32 {}, {}, K = {}{}, spread = {}{}, affine tail: {}, {} frames{}",
         summary.file.display(),
         summary.blob_bytes,
         summary.blob_crc,
         summary.formats.first().unwrap_or(&""),
         summary.centres,
+        summary.output_rank.map_or(String::new(), |rank| format!(", rank {rank}")),
         summary.spread,
         if summary.refined { " (refined)" } else { "" },
         if summary.affine_tail { "yes" } else { "no" },

@@ -37,6 +37,9 @@ pub const SLOT_BYTES: usize = 131_056;
 pub struct Plan {
     /// Numbers of centres K of each network.
     pub centres: Vec<usize>,
+    /// Numbers of components that a network for the whole array may compute, which are expanded to its outputs. There
+    /// are always points that compute all outputs as well.
+    pub output_ranks: Vec<usize>,
     /// Numbers of samples averaged for each reading: white noise falls with the square root.
     pub samples_averaged: Vec<usize>,
     /// Tolerances of gates, in standard deviations of the averaged readings' noise. There are always
@@ -94,6 +97,8 @@ pub struct Point {
     pub whole_array: bool,
     /// Number of centres K of each network.
     pub centres: usize,
+    /// Number of components that the network computes, which are expanded to all outputs; `None` if it computes these.
+    pub output_rank: Option<usize>,
     /// Width σ on scaled inputs.
     pub spread: f64,
     /// Whether the networks have an affine tail.
@@ -143,7 +148,8 @@ impl Point {
             samples => format!(", {samples} samples"),
         };
         let gate = self.gate_k.map_or(String::new(), |k| format!(", gate k = {k}"));
-        format!("{}, K = {}{tail}{average}{gate}", self.way(), self.centres)
+        let rank = self.output_rank.map_or(String::new(), |rank| format!(", rank {rank}"));
+        format!("{}, K = {}{rank}{tail}{average}{gate}", self.way(), self.centres)
     }
 }
 
@@ -296,6 +302,9 @@ fn check(experiment: &Experiment, plan: &Plan) -> std::result::Result<(), BadVal
         plan.samples_averaged.iter().find(|samples| !(1..=256).contains(*samples))
     {
         return Err(BadValue::new("average", samples, "the firmware averages 1 to 256 samples"));
+    }
+    if plan.output_ranks.contains(&0) {
+        return Err(BadValue::new("output-rank", 0, "a network computes one component at least"));
     }
     if !plan.gate_k.is_empty() {
         // Averaging only lowers the noise.

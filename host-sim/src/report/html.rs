@@ -106,6 +106,10 @@ fn header(result: &RunResult) -> String {
         0 => format!("{} {readings}", model.inputs),
         count => format!("{count} {readings} → {} features", model.inputs),
     };
+    let outputs = match model.expanded_outputs {
+        0 => format!("{} outputs", model.outputs),
+        all => format!("{} components → {all} outputs", model.outputs),
+    };
     let drift = match scene.gain_drift {
         0.0 => String::new(),
         gain => format!(" · gain drift ±{}", percent(gain)),
@@ -115,7 +119,7 @@ fn header(result: &RunResult) -> String {
     format!(
         "<header>\n<h1>Scene “{}”</h1>\n\
          <p>{} noise of {}{} · seed {} · {} training and {} test frames · scene digest {}</p>\n\
-         <p>{} network{plural}: {inputs} → K = {} → {} outputs · spread {}{refined} · {tail} · \
+         <p>{} network{plural}: {inputs} → K = {} → {outputs} · spread {}{refined} · {tail} · \
          {} bytes · CRC-32 {}</p>\n\
          <p>A frame on a Cortex-M4F: {} cycles at zero wait, {} from flash (by the price list in docs/cycles.md)</p>\n</header>\n",
         escape(&scene.name),
@@ -128,7 +132,6 @@ fn header(result: &RunResult) -> String {
         escape(&scene.digest),
         model.networks,
         model.centres,
-        model.outputs,
         model.spread,
         grouped(model.blob_bytes),
         escape(&model.blob_crc),

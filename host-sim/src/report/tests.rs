@@ -64,6 +64,7 @@ fn result(groups: &[&str]) -> RunResult {
             relative_inputs: false,
             centres: 9,
             outputs: groups.len() * PER_ROW,
+            expanded_outputs: 0,
             spread: 0.8,
             refined: true,
             affine_tail: true,

@@ -130,7 +130,7 @@ pub fn html(trade: &Trade) -> String {
         body,
         "<figure id=\"figure-1\">\n{}<figcaption><b>Figure 1.</b> RMSE of {} in {} against cycles of a \
          frame, both logarithmic. Lines: the front, where nothing is better in one of RMSE, cycles and samples \
-         and worse in none. Array: one network for all rows, behind a projection; else one a row. {}RMSE of the baselines: {}.</figcaption>\n</figure>\n",
+         and worse in none. Array: one network for all rows, behind a projection; else one a row. Rank: components that this network computes, which are expanded to all outputs. {}RMSE of the baselines: {}.</figcaption>\n</figure>\n",
         chart.draw_responsive([920.0, 520.0], [480.0, 460.0]),
         symbol(&trade.group),
         escape(&trade.unit),
@@ -159,7 +159,7 @@ fn table(trade: &Trade) -> String {
         "<figure id=\"table-1\" class=\"table\">\n<figcaption><b>Table 1.</b> Every point; those on the \
          Pareto front are bold. In brackets: RMSE relative to the smallest of all points.</figcaption>\n<div class=\"scroll\" \
          tabindex=\"0\" role=\"region\" aria-label=\"Table 1\">\n<table>\n<thead><tr><th>format</th>\
-         <th class=\"number\">K</th><th class=\"after\">tail</th><th class=\"number\">samples</th>\
+         <th class=\"number\">K</th><th class=\"number\">rank</th><th class=\"after\">tail</th><th class=\"number\">samples</th>\
          <th class=\"number\">gate k</th>",
     );
     for (group, unit) in trade.groups() {
@@ -175,10 +175,11 @@ fn table(trade: &Trade) -> String {
         let mark = if trade.chosen == Some(i) { " (chosen)" } else { "" };
         let _ = write!(
             html,
-            "<tr><{cell}>{}{mark}</{cell}><td class=\"number\">{}</td><td class=\"after\">{}</td><td class=\"number\">{}</td>\
+            "<tr><{cell}>{}{mark}</{cell}><td class=\"number\">{}</td><td class=\"number\">{}</td><td class=\"after\">{}</td><td class=\"number\">{}</td>\
              <td class=\"number\">{}</td>",
             p.way(),
             p.centres,
+            p.output_rank.map_or("–".into(), |rank| rank.to_string()),
             if p.affine_tail { "yes" } else { "no" },
             p.samples_averaged,
             p.gate_k.map_or("–".into(), |k| k.to_string())

@@ -226,8 +226,9 @@ fn another_model_on_the_device_is_replaced_by_the_one_checked_with() {
 
 #[test]
 fn a_device_divides_by_its_baseline_as_the_host_does() {
-    for whole_array in [false, true] {
+    for (whole_array, output_rank) in [(false, None), (true, None), (true, Some(9))] {
         let mut scene = unrefined("press");
+        scene.training.output_rank = output_rank;
         (scene.training.frames, scene.training.centres) = (500, 5);
         (scene.training.relative_inputs, scene.training.whole_array) = (true, whole_array);
         let model = scene.train(&Silent).unwrap();

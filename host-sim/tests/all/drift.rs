@@ -87,8 +87,13 @@ fn a_gate_and_a_trade_see_readings_and_baselines_of_the_same_session() {
     let mut scene = unrefined("press");
     (scene.training.frames, scene.training.test_frames) = (1000, 300);
     scene.training.relative_inputs = true;
-    let plan =
-        Plan { centres: vec![16], samples_averaged: vec![1], gate_k: vec![3.5], clock_mhz: 168.0 };
+    let plan = Plan {
+        centres: vec![16],
+        output_ranks: vec![],
+        samples_averaged: vec![1],
+        gate_k: vec![3.5],
+        clock_mhz: 168.0,
+    };
     let trade = |scene: &Experiment| trade::compute(scene, &plan, "dz_mm", &Silent).unwrap();
     let still = trade(&scene);
     scene.world.drift = Some(Drift { gain: 0.02 });

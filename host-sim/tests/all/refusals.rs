@@ -124,7 +124,10 @@ fn bad_training_options() {
     train(&["-n", "10"], &["-n sets a scene's frames"]);
     train(&["--select", "--folds", "9", "--centres", "1"], &["--folds 9", "from 2 to 4"]);
     train(&["--select", "--fold-column", "day"], &["\"day\" is missing", "ch1, f_n, fold"]);
-    train(&["--select", "--fold-column", "fold", "--centres", "2"], &["centres = 2", "2 training"]);
+    let two_folds = ["--select", "--fold-column", "fold", "--centres", "2"];
+    train(&[&two_folds[..], &["--no-refine"]].concat(), &["centres = 2", "2 training"]);
+    train(&two_folds, &["folds = 2", "at least 4"]);
+    train(&two_folds[1..], &["folds = 2", "at least 3", "without refinement"]);
     refused(
         &folder,
         &["train", "press", "--inputs", "ch*", "-o", "m.bin"],

@@ -20,6 +20,7 @@ fn press() -> Experiment {
 fn plan() -> Plan {
     Plan {
         centres: vec![16, 64],
+        output_ranks: vec![24],
         samples_averaged: vec![1, 16],
         gate_k: vec![3.5],
         clock_mhz: 100.0,
@@ -43,13 +44,15 @@ fn every_knob_has_its_points_and_the_front_is_the_pareto_front() {
     assert_eq!(trade.chosen, None);
     let count = |name: &str| trade.points.iter().filter(|p| p.arithmetic.name() == name).count();
     for kernel in ["fixed16", "f32-direct"] {
-        assert_eq!(count(kernel), 2 * 2 * 2 * 2 * 2, "{kernel}"); // array, K, tail, samples, gate
+        // K, full or not, for rows or the array: K = 16 would take more multiplications with rank 24 than without.
+        let networks = 2 + 3;
+        assert_eq!(count(kernel), networks * 2 * 2 * 2, "{kernel}"); // tail, samples, gate
     }
     for kernel in ["f32-direct-libm", "f32-direct-micromath"] {
-        assert_eq!(count(kernel), 2 * 2 * 2 * 2, "{kernel}"); // the gate is not measured with them
+        assert_eq!(count(kernel), (2 + 3) * 2 * 2, "{kernel}"); // the gate is not measured with them
     }
     // Expanded distances appear only where their rounding is proved harmless.
-    assert!((1..32).contains(&count("f32")), "{}", count("f32"));
+    assert!((1..40).contains(&count("f32")), "{}", count("f32"));
 
     let rank = |p: &trade::Point| (p.frame.cycles, p.samples_averaged, p.rmse("dz_mm"));
     for point in &trade.points {
@@ -72,6 +75,7 @@ fn every_knob_has_its_points_and_the_front_is_the_pareto_front() {
         let wanted = |p: &&trade::Point| {
             (p.way().as_str(), p.centres, p.samples_averaged, p.affine_tail, p.gate_k)
                 == (kernel, centres, samples, true, None)
+                && p.output_rank.is_none()
         };
         trade.points.iter().find(wanted).unwrap()
     };
@@ -85,6 +89,13 @@ fn every_knob_has_its_points_and_the_front_is_the_pareto_front() {
     let array = find("fixed16 array", 64, 1);
     assert!(array.rmse("dz_mm") < 0.95 * fixed.rmse("dz_mm"), "{}", array.rmse("dz_mm"));
     assert!(array.frame.cycles < fixed.frame.cycles && array.flash_bytes < fixed.flash_bytes);
+    // So has one that computes few components, and it takes less flash.
+    let ranked: Vec<_> = trade.points.iter().filter(|p| p.output_rank == Some(24)).collect();
+    assert!(!ranked.is_empty() && ranked.iter().all(|p| p.whole_array && p.centres == 64));
+    let few = ranked.iter().find(|p| p.name() == array.name().replace("64", "64, rank 24"));
+    let few = few.unwrap();
+    assert!(few.rmse("dz_mm") < 1.03 * array.rmse("dz_mm"), "{}", few.rmse("dz_mm"));
+    assert!(few.flash_bytes < array.flash_bytes && few.ram_bytes > array.ram_bytes);
 }
 
 #[test]
@@ -116,8 +127,13 @@ fn the_chosen_blob_is_what_the_table_says() {
 #[test]
 fn behind_a_gate_points_have_the_errors_of_the_gates_rows_and_cost_their_share() {
     let mut scene = press();
-    let plan =
-        Plan { centres: vec![16], samples_averaged: vec![4], gate_k: vec![3.5], clock_mhz: 1.0 };
+    let plan = Plan {
+        centres: vec![16],
+        output_ranks: vec![],
+        samples_averaged: vec![4],
+        gate_k: vec![3.5],
+        clock_mhz: 1.0,
+    };
     let bounds = Bounds { cycles: Some(10_000), ..Bounds::default() };
     let trade = compute_plan(&scene, &plan, bounds).unwrap();
     let prices = Prices::accepted().unwrap();
@@ -269,7 +285,7 @@ fn bounds_that_no_point_meets_and_plans_that_make_no_gate_are_refused() {
         compute_plan(scene, plan, Bounds::default()).unwrap_err().to_string()
     };
     let (centres, samples_averaged, gate_k) = (vec![16], vec![1], vec![3.5, 200.0]);
-    let plan = Plan { centres, samples_averaged, gate_k, clock_mhz: 1.0 };
+    let plan = Plan { centres, output_ranks: vec![], samples_averaged, gate_k, clock_mhz: 1.0 };
     let message = refusal(&scene, &plan);
     assert!(message.contains("gate = 200") && message.contains("below 1"), "{message}");
     let mut silent = scene.clone();
@@ -281,11 +297,17 @@ fn bounds_that_no_point_meets_and_plans_that_make_no_gate_are_refused() {
 fn scenes_of_any_shape_are_traded_and_what_a_format_cannot_hold_is_named() {
     let mut scene = press();
     scene.world.read_rows = vec![3];
-    let plan =
-        Plan { centres: vec![20], samples_averaged: vec![1], gate_k: vec![], clock_mhz: 1.0 };
+    let plan = Plan {
+        centres: vec![20],
+        output_ranks: vec![4],
+        samples_averaged: vec![1],
+        gate_k: vec![],
+        clock_mhz: 1.0,
+    };
     let one_row = compute_plan(&scene, &plan, Bounds::default()).unwrap();
     assert!(one_row.points.len() >= 8 && one_row.left_out.is_empty());
     assert!(one_row.points.iter().all(|point| !point.whole_array && point.centres == 20));
+    assert!(one_row.points.iter().all(|point| point.output_rank.is_none()));
 
     // One network for the array has half of the spread, which 16 bits cannot hold.
     scene.world.read_rows = vec![3, 4];
@@ -296,5 +318,6 @@ fn scenes_of_any_shape_are_traded_and_what_a_format_cannot_hold_is_named() {
         trade.points.iter().filter(|p| p.whole_array && p.arithmetic.name() == name).count()
     };
     assert!(!narrow.left_out.is_empty() && of_array(&narrow, "fixed16") == 0);
-    assert!(of_array(&narrow, "f32-direct") == 2);
+    // With a tail and without, of full rank and of rank 4.
+    assert!(of_array(&narrow, "f32-direct") == 4);
 }

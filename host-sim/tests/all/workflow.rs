@@ -103,6 +103,57 @@ fn missing_readings_leave_their_rows_outputs_empty_and_no_line_out() {
 }
 
 #[test]
+fn a_network_of_few_components_takes_less_flash_and_says_so() {
+    let folder = Folder::new("components");
+    folder.write("scene.toml", small_scene());
+    let train = ["train", "scene.toml", "-n", "2000", "--whole-array", "--centres", "40"];
+    let to =
+        |model: &str, more: &[&str]| folder.succeed(&[&train[..], more, &["-o", model]].concat());
+    to("full.bin", &[]);
+    let printed = to("few.bin", &["--output-rank", "5"]);
+    assert!(printed.contains("K = 40, rank 5, "), "{printed}");
+    let printed = folder.succeed(&["inspect", "few.bin"]);
+    assert!(printed.contains("5 components → 36 outputs of all rows"), "{printed}");
+    assert!(printed.contains("components 20, "), "{printed}");
+    let bytes = |model: &str| std::fs::metadata(folder.path(model)).unwrap().len();
+    assert!(bytes("few.bin") < bytes("full.bin"));
+
+    // A scene asks for the same by its fields.
+    let fields = "affine_tail = true\nwhole_array = true\noutput_rank = 5";
+    let scene = small_scene()
+        .replace("affine_tail = true", fields)
+        .replace("spread = 0.8", "spread = 0.4")
+        .replace("centres = 12", "centres = 40");
+    assert!(scene.contains("output_rank = 5") && scene.contains("centres = 40"));
+    folder.write("few.toml", &scene);
+    folder.succeed(&["train", "few.toml", "-n", "2000", "-o", "scene.bin"]);
+    let printed = folder.succeed(&["run", "few.toml"]);
+    assert!(printed.contains("K = 40 -> 5 components -> 36 outputs, "), "{printed}");
+    folder.succeed(&["synth", "scene.toml", "-n", "100", "--seed", "9", "-o", "d.csv"]);
+    for model in ["few", "scene"] {
+        folder.succeed(&[
+            "decode",
+            &format!("{model}.bin"),
+            "d.csv",
+            "-o",
+            &format!("{model}.csv"),
+        ]);
+    }
+    let decoded = |model: &str| std::fs::read(folder.path(model)).unwrap();
+    assert_eq!(decoded("few.csv"), decoded("scene.csv"));
+
+    let refused = |arguments: &[&str], named: &str| {
+        let output = folder.run(arguments);
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.code() == Some(2) && said.contains(named), "{said}");
+    };
+    for (rank, named) in [("0", "1 to 35"), ("36", "1 to 35")] {
+        refused(&[&train[..], &["--output-rank", rank, "-o", "x.bin"]].concat(), named);
+    }
+    refused(&["train", "scene.toml", "--output-rank", "5", "-o", "x.bin"], "whole array");
+}
+
+#[test]
 fn one_network_for_the_whole_array_needs_every_reading_and_has_less_error() {
     let folder = Folder::new("array");
     folder.write("scene.toml", small_scene());

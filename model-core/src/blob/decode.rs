@@ -2,11 +2,13 @@
 
 use super::error::DecodeError;
 use super::format::{
-    CRC_BYTES, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection, PREFIX_BYTES, Prefix,
-    RbfHeader, ShapeField, TAG_METADATA, TAG_PROJECTION, TAG_RELATIVE_INPUTS,
+    CRC_BYTES, ExpansionHeader, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection,
+    PREFIX_BYTES, Prefix, RbfHeader, ShapeField, TAG_EXPANSION, TAG_METADATA, TAG_PROJECTION,
+    TAG_RELATIVE_INPUTS,
 };
 use super::metadata::{Columns, Floats, Metadata, ModelShape};
 use crate::checksum::CRC_32;
+use crate::expansion::Expansion;
 use crate::projection::{self, Projection};
 use crate::rbf::{
     Cut, Format, Layout, Network, NetworkError, Packed, Shape, direct, expanded, fixed16,
@@ -20,6 +22,9 @@ pub struct Model<'a> {
     row_network: &'a [u8],
     metadata: Metadata<'a>,
     projection: Option<&'a [f32]>,
+    expansion: Option<&'a [f32]>,
+    /// Components of the expansion; 0 without one.
+    components: u16,
     networks: u8,
     network_sections: &'a [u8],
 }
@@ -52,18 +57,36 @@ impl<'a> Model<'a> {
         let (section, rest) = take::<MetadataSection>(rest, "metadata")?;
         let (relative_inputs, rest) = take_relative_inputs(rest);
         let metadata = checked_metadata(&section, relative_inputs, shape)?;
-        let (projection, network_sections) = take_projection(rest, shape)?;
+        let (projection, rest) = take_projection(rest, shape)?;
         if projection.is_some() {
             check_count("networks behind a projection", 1, networks.into())?;
         }
+        let (expansion, network_sections) = match projection {
+            Some(_) => take_expansion(rest, shape)?,
+            None => (None, rest),
+        };
 
-        let model =
-            Self { shape, crc, row_network, metadata, projection, networks, network_sections };
+        let model = Self {
+            shape,
+            crc,
+            row_network,
+            metadata,
+            projection,
+            expansion: expansion.map(|it| it.block()),
+            // As in the blob.
+            components: expansion.map_or(0, |it| it.components() as u16),
+            networks,
+            network_sections,
+        };
         let mut rest = network_sections;
         for index in 0..networks {
             let (network, after) = take_network(rest, model.network_shape(), index)?;
             // Every value is looked at once, here; later reads only cut slices.
             network.check_values().map_err(|cause| DecodeError::Network { index, cause })?;
+            if model.expansion().is_some_and(|it| !it.stays_finite(network.largest_output())) {
+                let cause = NetworkError::NotFinite { what: "the largest output" };
+                return Err(DecodeError::Expansion { cause });
+            }
             rest = after;
         }
         if !rest.is_empty() {
@@ -123,18 +146,35 @@ impl<'a> Model<'a> {
     }
 
     /// The projection from a whole frame to the network's inputs; `None` if each row's readings are its network's
-    /// inputs. Behind a projection there is one network, and its outputs are those of all rows.
+    /// inputs. Behind a projection there is one network, and its outputs are those of all rows, or are
+    /// [expanded](Self::expansion) to these.
     #[must_use]
     pub fn projection(&self) -> Option<Projection<'a>> {
         self.projection.map(|block| Projection::of_checked(self.shape.inputs, block))
     }
 
-    /// Inputs and outputs of each network; behind a projection, its features and the outputs of all rows.
+    /// The expansion of the one network's outputs to those of all rows; `None` if a network's outputs are those of its
+    /// rows. It stands behind a projection alone.
+    #[must_use]
+    pub fn expansion(&self) -> Option<Expansion<'a>> {
+        let outputs = self.shape.rows.wrapping_mul(self.shape.outputs);
+        self.expansion.map(|block| Expansion::of_checked(self.components(), outputs, block))
+    }
+
+    /// Number of components that are [expanded](Self::expansion) to the outputs; 0 without an expansion.
+    #[must_use]
+    pub fn components(&self) -> usize {
+        self.components.into()
+    }
+
+    /// Inputs and outputs of each network; behind a projection, its features and the outputs of all rows, or the
+    /// components that are expanded to these.
     pub(crate) fn network_shape(&self) -> ModelShape {
         let ModelShape { rows, inputs, outputs } = self.shape;
-        match self.projection {
-            Some(_) => ModelShape { rows: 1, inputs, outputs: rows * outputs },
-            None => self.shape,
+        match (self.projection, self.components()) {
+            (Some(_), 0) => ModelShape { rows: 1, inputs, outputs: rows * outputs },
+            (Some(_), components) => ModelShape { rows: 1, inputs, outputs: components },
+            (None, _) => self.shape,
         }
     }
 
@@ -388,6 +428,27 @@ fn take_projection(
     Projection::new(readings, shape.inputs, block)
         .map_err(|cause| DecodeError::Projection { cause })?;
     Ok((Some(block), rest))
+}
+
+/// Cuts the expansion from the front of `bytes` if there is one, and checks it.
+fn take_expansion(
+    bytes: &[u8],
+    shape: ModelShape,
+) -> Result<(Option<Expansion<'_>>, &[u8]), DecodeError> {
+    const SECTION: &str = "expansion section";
+    if bytes.first() != Some(&TAG_EXPANSION) {
+        return Ok((None, bytes));
+    }
+    let (header, rest) = take::<ExpansionHeader>(bytes, SECTION)?;
+    let (block, rest) = take_block(rest, SECTION)?;
+    let (components, outputs) = (header.components.into(), shape.rows * shape.outputs);
+    let floats = projection::block_floats(components, outputs);
+    check_count("bytes of expansion", floats.saturating_mul(4), block.len())?;
+    let block = bytemuck::try_cast_slice::<u8, f32>(block)
+        .map_err(|_| DecodeError::Malformed { section: "padding" })?;
+    let expansion = Expansion::new(components, outputs, block)
+        .map_err(|cause| DecodeError::Expansion { cause })?;
+    Ok((Some(expansion), rest))
 }
 
 fn network_shape(shape: ModelShape, centres: u16) -> Shape {

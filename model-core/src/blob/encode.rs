@@ -7,11 +7,12 @@ use super::aligned::AlignedBytes;
 use super::decode::Model;
 use super::error::EncodeError;
 use super::format::{
-    CRC_BYTES, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection, Prefix, RbfHeader,
-    ShapeField, TAG_METADATA, TAG_PROJECTION, TAG_RELATIVE_INPUTS,
+    CRC_BYTES, ExpansionHeader, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection, Prefix,
+    RbfHeader, ShapeField, TAG_EXPANSION, TAG_METADATA, TAG_PROJECTION, TAG_RELATIVE_INPUTS,
 };
 use super::metadata::Metadata;
 use crate::checksum::CRC_32;
+use crate::expansion::Expansion;
 use crate::projection::Projection;
 use crate::rbf::Network;
 
@@ -20,6 +21,8 @@ use crate::rbf::Network;
 pub struct ModelParts<'a> {
     /// Projection from a frame to the inputs of one network for all rows; `None` with a network a row.
     pub projection: Option<Projection<'a>>,
+    /// Expansion of the one network's outputs, which are then components, to the outputs of all rows.
+    pub expansion: Option<Expansion<'a>>,
     /// The networks; all have the same number of inputs and of outputs.
     pub networks: &'a [Network<'a>],
     /// Index into `networks` for each row.
@@ -43,7 +46,8 @@ pub fn encoded_length_bound(parts: &ModelParts<'_>) -> usize {
     let numbers = m.training_rmse.0.len() + m.full_scale.0.len() + parts.row_network.len();
     let weights: usize = parts.networks.iter().map(|n| SECTION_FIELDS + block_bytes(n)).sum();
     let projection = parts.projection.map_or(0, |it| SECTION_FIELDS + it.block().len() * 4);
-    FIXED_FIELDS + text + numbers + projection + weights
+    let expansion = parts.expansion.map_or(0, |it| SECTION_FIELDS + it.block().len() * 4);
+    FIXED_FIELDS + text + numbers + projection + expansion + weights
 }
 
 fn block_bytes(network: &Network<'_>) -> usize {
@@ -66,6 +70,16 @@ pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u
         }
     }
 
+    if let Some(expansion) = parts.expansion {
+        if parts.projection.is_none() {
+            return Err(EncodeError::ExpansionWithoutProjection);
+        }
+        let components = expansion.components();
+        if outputs != components {
+            return Err(EncodeError::UnfitExpansion { outputs, components });
+        }
+        outputs = expansion.outputs();
+    }
     let rows = parts.row_network.len();
     if parts.projection.is_some() {
         // One network has the outputs of all rows.
@@ -107,6 +121,11 @@ pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u
     if let Some(projection) = parts.projection {
         writer.put(&TAG_PROJECTION)?;
         writer.put_block(&[bytemuck::cast_slice(projection.block())])?;
+    }
+    if let Some(expansion) = parts.expansion {
+        let components = fit("number of components", expansion.components(), u16::MAX)?;
+        writer.put(&ExpansionHeader { tag: TAG_EXPANSION, components })?;
+        writer.put_block(&[bytemuck::cast_slice(expansion.block())])?;
     }
     for (index, network) in parts.networks.iter().enumerate() {
         writer.put_network(fit("network index", index, u8::MAX)?, network)?;

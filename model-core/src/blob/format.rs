@@ -24,6 +24,7 @@ pub(super) const TAG_METADATA: u8 = 0;
 pub(super) const TAG_PROJECTION: u8 = 4;
 /// Tag of a section without fields: the model's inputs are relative to the baseline.
 pub(super) const TAG_RELATIVE_INPUTS: u8 = 5;
+pub(super) const TAG_EXPANSION: u8 = 6;
 
 /// Bytes 0..9, at fixed places, so that a blob's length is known before anything else is read.
 #[derive(Serialize, Deserialize)]
@@ -94,13 +95,21 @@ impl RbfHeader {
     }
 }
 
+/// Header of the expansion's section; padding and its floats follow.
+#[derive(Serialize, Deserialize)]
+pub(super) struct ExpansionHeader {
+    pub tag: u8,
+    /// Number of components, which the network infers instead of outputs.
+    pub components: u16,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn no_format_of_networks_has_the_tag_of_another_section() {
-        for tag in [TAG_METADATA, TAG_PROJECTION, TAG_RELATIVE_INPUTS] {
+        for tag in [TAG_METADATA, TAG_PROJECTION, TAG_RELATIVE_INPUTS, TAG_EXPANSION] {
             assert_eq!(Format::from_tag(tag), None);
         }
     }

@@ -16,7 +16,8 @@
 
 use super::packed::{self, Layout};
 use super::parameters::{
-    Cut, NetworkError, Shape, accumulate, check_finite, check_spans, range_about, scale_about,
+    Cut, NetworkError, Shape, accumulate, check_finite, check_spans, magnitudes, range_about,
+    scale_about,
 };
 #[cfg(cortex_m4f)]
 use crate::cortex_m4::{self, Inputs};
@@ -111,12 +112,16 @@ impl Layout for Expanded {
                 return Err(NetworkError::ExponentOutOfRange { centre });
             }
         }
-        // Activations stay below 2^(1/8): if this is finite, no output overflows.
-        let sum = |values: &[f32]| values.iter().map(|v| v.abs()).sum::<f32>();
-        if !(2.0 * (sum(p.output_weights) + sum(p.affine) * UNITS + sum(p.bias))).is_finite() {
+        if !network.largest_output().is_finite() {
             return Err(NetworkError::NotFinite { what: "the sum of weights" });
         }
         Ok(())
+    }
+
+    fn largest_output(network: &Network<'_>) -> f32 {
+        let p = network.parameters();
+        // Activations stay below 2^(1/8).
+        2.0 * (magnitudes(p.output_weights) + magnitudes(p.affine) * UNITS + magnitudes(p.bias))
     }
 
     fn parameters<'a>(network: &Network<'a>) -> Parameters<'a> {

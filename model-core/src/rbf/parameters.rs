@@ -124,6 +124,11 @@ pub(super) fn check_finite(arrays: &[(&'static str, &[f32])]) -> Result<(), Netw
     }
 }
 
+/// Sum of the magnitudes of `values`.
+pub(super) fn magnitudes(values: &[f32]) -> f32 {
+    values.iter().map(|value| value.abs()).sum()
+}
+
 pub(super) fn check_spans(per_span: &[f32]) -> Result<(), NetworkError> {
     match per_span.iter().position(|s| *s < 0.0) {
         Some(input) => Err(NetworkError::NegativeSpan { input }),

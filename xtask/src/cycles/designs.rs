@@ -45,7 +45,14 @@ pub fn for_prices() -> Vec<Design> {
         let shape = ModelShape { rows, inputs, outputs: 4 };
         Design::of_array(shape, Format::Fixed16, 16, false)
     });
-    drawn.chain(arrays).collect()
+    // Expansions, to outputs that are taken in groups of every size.
+    let expanded = (1..=24).flat_map(|outputs| [1, 2, 3].map(|rows| (rows, outputs)));
+    let expansions = expanded.map(|(rows, outputs)| {
+        let shape = ModelShape { rows, inputs: 18, outputs };
+        let format = Format::ALL[rows % Format::ALL.len()];
+        Design::of_array(shape, format, 16, false).with_components(1 + outputs % 5)
+    });
+    drawn.chain(arrays).chain(expansions).collect()
 }
 
 /// Designs as users have them, of all formats in turn. In every third, rows have two networks by turns.
@@ -80,6 +87,9 @@ fn draw(format: Format, ranges: [Ranges<'_>; 4], random: &mut Random) -> Design 
         design.networks.truncate(1);
         design.row_network.fill(0);
         design.relative_inputs = relative;
+        if array && widths {
+            design = design.with_components(1 + centres % (rows * outputs));
+        }
         if format == Format::F32Direct && widths && centres > 1 {
             design.networks[0].common_width = false;
         }

@@ -94,6 +94,7 @@ fn of_first_network(model: &Model<'_>, affine: bool) -> Outcome<Vec<u8>> {
     let words = words(&first, affine);
     let parts = ModelParts {
         projection: model.projection(),
+        expansion: model.expansion(),
         networks: &[of_words(&first, affine, &words)?],
         row_network: &vec![0; model.shape().rows],
         metadata: *model.metadata(),

@@ -1,5 +1,14 @@
 //! The options of `cargo xtask cycles`.
 
+/// Table of what is measured beside the kernels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Table {
+    /// One inference of networks of other shapes.
+    Shapes,
+    /// A frame of networks that compute few components.
+    Ranks,
+}
+
 /// Options from the command line.
 #[derive(Debug, PartialEq, Eq, Default)]
 pub struct Options<'a> {
@@ -7,8 +16,8 @@ pub struct Options<'a> {
     pub json: bool,
     /// Whether to write the accepted figures instead of comparing with them.
     pub accept: bool,
-    /// Whether to measure one inference of some other shapes instead.
-    pub shapes: bool,
+    /// Table to print instead, of what it measures.
+    pub table: Option<Table>,
     /// Blob to measure, and to compare with what is predicted of it.
     pub model: Option<&'a str>,
     /// The only kernel to show; without a blob, it is compared with its budget only.
@@ -30,7 +39,8 @@ impl<'a> Options<'a> {
             match argument {
                 "--json" => options.json = true,
                 "--accept" => options.accept = true,
-                "--shapes" => options.shapes = true,
+                "--shapes" => options.table = Some(Table::Shapes),
+                "--ranks" => options.table = Some(Table::Ranks),
                 "--model" => options.model = Some(value("a file")?),
                 "--kernel" => options.kernel = Some(value("a name")?),
                 _ => return Err(format!("unknown option `{argument}`")),
@@ -41,9 +51,13 @@ impl<'a> Options<'a> {
         if let (true, Some(part)) = (options.accept, part) {
             return Err(format!("`--accept` needs all figures: leave out `{part}`"));
         }
-        let alone = Self { shapes: true, ..Self::default() };
-        if options.shapes && options != alone {
-            return Err("`--shapes` goes with no other option".to_owned());
+        let alone = Self { table: options.table, ..Self::default() };
+        if let (Some(table), true) = (options.table, options != alone) {
+            let name = match table {
+                Table::Shapes => "--shapes",
+                Table::Ranks => "--ranks",
+            };
+            return Err(format!("`{name}` goes with no other option"));
         }
         Ok(options)
     }
@@ -68,6 +82,7 @@ mod tests {
             (&["--model"], "`--model`"),
             (&["--accept", "--kernel", "f32"], "`--kernel`"),
             (&["--shapes", "--json"], "`--shapes`"),
+            (&["--ranks", "--accept"], "`--ranks`"),
         ] {
             let message = Options::parse(arguments).unwrap_err();
             assert!(message.contains(named), "{message}");

@@ -122,12 +122,14 @@ pub fn name_of(design: &Design) -> String {
         (!network.common_width, "own widths"),
     ];
     let parts = parts.iter().filter(|(holds, _)| *holds).map(|(_, name)| format!(", {name}"));
+    let rank = design.components.map(|components| format!(", {components} components"));
     format!(
-        "{} × ({} → {}), K = {}{}",
+        "{} × ({} → {}), K = {}{}{}",
         shape.rows,
         shape.inputs,
         shape.outputs,
         network.shape.centres,
+        rank.unwrap_or_default(),
         parts.collect::<String>()
     )
 }

@@ -1,6 +1,7 @@
 //! Blobs of any design, with numbers that make no difference to their cost.
 
 use model_core::blob::{Metadata, ModelParts, encode_to_vec};
+use model_core::expansion::Expansion;
 use model_core::projection::Projection;
 use model_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
 use model_core::scale::UNITS;
@@ -32,10 +33,16 @@ pub fn blob(design: &Design) -> Outcome<Vec<u8>> {
     (0..features).for_each(|i| block[features * (1 + i) + i] = 1.0);
     let projection =
         Projection::new(readings, features, &block).map_err(|cause| cause.to_string())?;
+    let (components, outputs) =
+        (design.components.unwrap_or(1), design.shape.rows * design.shape.outputs);
+    let parts_of_components = vec![0.25; outputs * (1 + components)];
+    let expansion = Expansion::new(components, outputs, &parts_of_components)
+        .map_err(|cause| cause.to_string())?;
     let mut metadata = Metadata::unnamed(design.shape);
     metadata.relative_inputs = design.relative_inputs;
     let parts = ModelParts {
         projection: design.projection.then_some(projection),
+        expansion: design.components.map(|_| expansion),
         networks: &networks,
         row_network: &row_network,
         metadata,
@@ -121,6 +128,13 @@ mod tests {
 
     use super::*;
 
+    fn check(design: &Design) {
+        let blob = ModelBlob::of_bytes(&blob(design).unwrap()).unwrap();
+        assert_eq!(Design::of(&blob), *design);
+        let names_and_headers = blob.bytes().len() - design.parameter_bytes();
+        assert!(names_and_headers < 350, "{names_and_headers}");
+    }
+
     #[test]
     fn a_blob_has_the_design_that_was_asked_for() {
         let shape = ModelShape { rows: 3, inputs: 7, outputs: 5 };
@@ -129,10 +143,10 @@ mod tests {
                 for design in [Design::of_rows, Design::of_array] {
                     let mut design = design(shape, format, 21, affine_tail);
                     design.relative_inputs = affine_tail;
-                    let blob = ModelBlob::of_bytes(&blob(&design).unwrap()).unwrap();
-                    assert_eq!(Design::of(&blob), design);
-                    let names_and_headers = blob.bytes().len() - design.parameter_bytes();
-                    assert!(names_and_headers < 350, "{names_and_headers}");
+                    check(&design);
+                    if design.projection {
+                        check(&design.with_components(4));
+                    }
                 }
             }
         }

@@ -7,12 +7,13 @@ use super::code::Code;
 
 /// Parts of the symbols of these functions, which both ways to mangle names contain. If a region calls one of them
 /// after all, the measurement fails and names it.
-pub const FUNCTIONS: [&[&str]; 11] = [
+pub const FUNCTIONS: [&[&str]; 12] = [
     // Checking the blob, once: everything except the search for a row's network.
     &["10model_core8checksum"],
     &["10model_core4blob6decode", "5Model6decode"],
     &["10model_core4blob6decode4take"],
     &["10model_core4blob6decode15take_projection"],
+    &["10model_core4blob6decode14take_expansion"],
     &["10model_core4blob6decode16checked_metadata"],
     &["10model_core3rbf", "7Network12check_values"],
     &["4core3str8converts9from_utf8"],

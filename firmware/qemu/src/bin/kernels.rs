@@ -43,9 +43,9 @@ fn clamp(format: Format, blob: &[u8]) {
 }
 
 /// Decodes with one network for all rows, behind a projection.
-fn array(format: Format, tail: &str, blob: &[u8]) {
+fn array(format: Format, kind: &str, blob: &[u8]) {
     let crc = unwrap!(checks::decoding_many::<Polynomial, { checks::ARRAY_ROWS }>(blob));
-    info!("array, {=str}{=str}: {=u32:08x}", format.name(), tail, crc);
+    info!("array, {=str}{=str}: {=u32:08x}", format.name(), kind, crc);
     if let Some([compared, different]) = checks::array_twins(blob) {
         info!("{=usize} of {=usize} frames differ from the twins'", different, compared);
     }
@@ -78,5 +78,8 @@ fn main() -> ! {
     array(Format::Fixed16, "", model!("array-fixed16.bin"));
     array(Format::Fixed16, " without tail", model!("array-fixed16-no-tail.bin"));
     array(Format::F32Direct, "", model!("array-f32-direct.bin"));
+    array(Format::F32, " of components", model!("array-f32-components.bin"));
+    array(Format::Fixed16, " of components", model!("array-fixed16-components.bin"));
+    array(Format::F32Direct, " of components", model!("array-f32-direct-components.bin"));
     exit::success()
 }

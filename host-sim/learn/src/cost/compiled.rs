@@ -29,6 +29,7 @@ pub(super) fn of_frame(design: &Design, exponential: Exponential, gating: Gating
     let relative = design.relative_inputs;
     if design.projection {
         pieces.add("row of an array", shape.rows);
+        pieces.add("expansion", usize::from(design.components.is_some()));
         pieces.add("array relative to the baseline", usize::from(relative));
         pieces.add(
             "reading of an array relative to the baseline",

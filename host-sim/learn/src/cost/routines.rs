@@ -31,6 +31,10 @@ pub(super) fn of_frame(design: &Design, gating: Gating) -> Pieces {
         let readings = design.shape.rows * design.shape.inputs;
         project(readings, design.shape.inputs, &mut pieces);
     }
+    if let Some(components) = design.components {
+        // The projection's routine expands.
+        project(components, design.shape.rows * design.shape.outputs, &mut pieces);
+    }
     for network in design.row_networks() {
         match network.format {
             Format::Fixed16 => fixed16(network, &mut pieces),
@@ -185,7 +189,7 @@ fn project(readings: usize, features: usize, pieces: &mut Pieces) {
     // An odd number of readings has an odd last group, whose piece then holds this.
     pieces.add("projection: even readings", usize::from(!odd));
     for group in Group::all(features) {
-        if !group.is_usual() {
+        if !group.is_usual() || odd {
             pieces.add(format!("projection: a group, {}, {}", group.name(), parity(odd)), 1);
         }
         group.sums(readings / 2, group.together && !odd, pieces);

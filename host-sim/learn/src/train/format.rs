@@ -4,6 +4,7 @@
 //! resulting activations. That rounding then causes no error any more; only the weights are rounded
 //! last.
 
+use model_core::expansion::Expansion;
 use model_core::rbf::{Format, Network, NetworkError, Shape, direct, expanded, fixed16};
 
 use taxel_data::table::Table;
@@ -24,6 +25,7 @@ pub struct FittedNetwork {
     format: Format,
     affine: bool,
     words: Vec<u32>,
+    expansion: Option<Vec<f32>>,
 }
 
 impl FittedNetwork {
@@ -32,7 +34,7 @@ impl FittedNetwork {
     /// # Errors
     /// [`Error::NotHeld`] if a parameter does not fit the format.
     fn try_new(shape: Shape, format: Format, affine: bool, words: Vec<u32>) -> Result<Self> {
-        let fitted = Self { shape, format, affine, words };
+        let fitted = Self { shape, format, affine, words, expansion: None };
         match fitted.try_network() {
             Ok(_) => Ok(fitted),
             Err(cause) => Err(Error::NotHeld { format, cause }),
@@ -40,11 +42,29 @@ impl FittedNetwork {
     }
 
     fn try_network(&self) -> std::result::Result<Network<'_>, NetworkError> {
-        let Self { shape, format, affine, words } = self;
+        let Self { shape, format, affine, words, .. } = self;
         Ok(match format {
             Format::F32Direct => direct::Network::of_words(*shape, true, *affine, words)?.into(),
             Format::F32 => expanded::Network::try_new(*shape, *affine, words)?.into(),
             Format::Fixed16 => fixed16::Network::try_new(*shape, *affine, words)?.into(),
+        })
+    }
+
+    /// The network with an `expansion` of its outputs: means of all outputs, then each component's parts.
+    pub(super) fn expanded_by(self, expansion: Vec<f32>) -> Self {
+        Self { expansion: Some(expansion), ..self }
+    }
+
+    /// Expansion of the network's outputs, if these are components of other ones.
+    ///
+    /// # Panics
+    /// Never: an expansion was made for the network's number of outputs.
+    #[must_use]
+    pub fn expansion(&self) -> Option<Expansion<'_>> {
+        let components = self.shape.outputs;
+        self.expansion.as_ref().map(|block| {
+            let outputs = block.len() / (1 + components);
+            Expansion::new(components, outputs, block).expect("made for these components")
         })
     }
 
@@ -68,13 +88,13 @@ impl FittedNetwork {
 ///
 /// The means go into the bias. An offset would otherwise be spread over large weights that cancel, and
 /// cost digits.
-struct Targets {
-    deviations: Table,
-    means: Vec<f64>,
+pub(super) struct Targets {
+    pub deviations: Table,
+    pub means: Vec<f64>,
 }
 
 impl Targets {
-    fn of(outputs: &Table) -> Self {
+    pub fn of(outputs: &Table) -> Self {
         let means = outputs.means();
         let mut deviations = outputs.clone();
         for line in deviations.values.chunks_exact_mut(means.len()) {
@@ -83,7 +103,7 @@ impl Targets {
         Self { deviations, means }
     }
 
-    fn outputs(&self) -> usize {
+    pub fn outputs(&self) -> usize {
         self.means.len()
     }
 }

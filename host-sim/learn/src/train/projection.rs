@@ -9,12 +9,13 @@
 //! common changes of the readings that no output needs. `docs/projection.md` has measurements.
 
 use model_core::projection::Projection;
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 use taxel_data::dataset::Dataset;
 use taxel_data::simd;
 use taxel_data::table::Table;
 
+use super::principal;
 use crate::error::{Error, Result};
 
 /// Frames whose products are summed before the sum is added to those of others.
@@ -128,15 +129,10 @@ fn directions(dataset: &Dataset, means: &[f64], features: usize) -> Result<DMatr
     let regression = of_readings.cholesky().ok_or(Error::NoRegression)?.solve(&with_outputs);
     let predicted = with_outputs.tr_mul(&regression);
     let predicted = (&predicted + predicted.transpose()) * 0.5;
-    let eigen = SymmetricEigen::new(predicted);
-    let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
-    order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
     let mut parts = DMatrix::zeros(readings, features);
-    for (feature, place) in order.into_iter().take(features).enumerate() {
-        let direction = eigen.eigenvectors.column(place);
-        // Either sign would serve; the largest component is made positive.
-        let sign = if direction[direction.iamax()] < 0.0 { -1.0 } else { 1.0 };
-        parts.set_column(feature, &(&regression * direction * sign));
+    let directions = principal::directions(predicted, features);
+    for (mut part, direction) in parts.column_iter_mut().zip(directions.column_iter()) {
+        part.copy_from(&(&regression * direction));
     }
     Ok(parts)
 }

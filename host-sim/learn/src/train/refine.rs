@@ -92,7 +92,9 @@ impl Refinement {
         assert_eq!(fold_of.len(), frames, "a fold for every frame");
         let distinct = fold_of.iter().collect::<BTreeSet<_>>().len();
         require(distinct >= LEAST_FOLDS, "folds", distinct, || {
-            format!("refinement needs at least {LEAST_FOLDS}: give more, or leave it out")
+            format!(
+                "refinement needs at least {LEAST_FOLDS}; give more, or train without refinement"
+            )
         })
     }
 }

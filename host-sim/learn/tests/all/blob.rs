@@ -27,6 +27,22 @@ fn real_blob() -> Vec<u8> {
     pack(&trained, &dataset, &origin).unwrap().bytes().to_vec()
 }
 
+/// Blob of one network for both rows, which computes four components of their 12 outputs.
+fn blob_of_components(format: Format) -> Vec<u8> {
+    let dataset = synthesise(&world(), Stream::Training, 400);
+    let options = Options {
+        format,
+        centres: 8,
+        spread: 0.6,
+        whole_array: true,
+        output_rank: Some(4),
+        ..Options::default()
+    };
+    let trained = train(&dataset, &options, &Silent).unwrap();
+    let origin = Origin::of_data("press", 0, 1, &dataset);
+    pack(&trained, &dataset, &origin).unwrap().bytes().to_vec()
+}
+
 /// Calls `use_them` with a copy of `bytes` at an address that is a multiple of four.
 fn with_aligned<R>(bytes: &[u8], use_them: impl FnOnce(&[u8]) -> R) -> R {
     use_them(&AlignedBytes::copy_of(bytes))
@@ -80,7 +96,11 @@ fn changed(blob: &[u8], offset: usize, bytes: &[u8]) -> Vec<u8> {
 
 #[test]
 fn every_single_bit_flip_is_refused_with_its_error() {
-    let mut blob = real_blob();
+    each_bit_flip_is_refused(real_blob());
+    each_bit_flip_is_refused(blob_of_components(Format::Fixed16));
+}
+
+fn each_bit_flip_is_refused(mut blob: Vec<u8>) {
     assert_eq!(refusal(&blob), None);
     for offset in 0..blob.len() {
         for bit in 0..8 {
@@ -103,7 +123,11 @@ fn every_single_bit_flip_is_refused_with_its_error() {
 
 #[test]
 fn every_truncation_and_any_trailing_byte_is_refused() {
-    let blob = real_blob();
+    each_truncation_and_trailing_byte_is_refused(&real_blob());
+    each_truncation_and_trailing_byte_is_refused(&blob_of_components(Format::Fixed16));
+}
+
+fn each_truncation_and_trailing_byte_is_refused(blob: &[u8]) {
     for length in 0..blob.len() {
         let refused = refusal(&blob[..length]);
         let expected = if length < 9 { 13 } else { blob.len() };
@@ -111,7 +135,7 @@ fn every_truncation_and_any_trailing_byte_is_refused() {
     }
     for extra in [1, 2, 3, 4, 100] {
         for filler in [0_u8, 0xff] {
-            let mut longer = blob.clone();
+            let mut longer = blob.to_vec();
             longer.resize(blob.len() + extra, filler);
             assert_eq!(refusal(&longer), Some(DecodeError::TrailingBytes { extra }));
         }
@@ -232,11 +256,15 @@ fn a_blob_that_cannot_be_borrowed_or_has_another_shape_is_refused() {
 /// The device's entry point and the host's give the same bits.
 #[test]
 fn device_and_host_decode_alike() {
-    let blob = real_blob();
-    let loaded = ModelBlob::of_bytes(&blob).unwrap();
+    decodes_alike(&real_blob());
+    Format::ALL.into_iter().for_each(|format| decodes_alike(&blob_of_components(format)));
+}
+
+fn decodes_alike(blob: &[u8]) {
+    let loaded = ModelBlob::of_bytes(blob).unwrap();
     let test = synthesise(&world(), Stream::Test, 500);
     let host = loaded.prepare(Exponential::Polynomial).decode_table(&test.inputs);
-    with_aligned(&blob, |bytes| {
+    with_aligned(blob, |bytes| {
         let decoder = Decoder::<2>::load(bytes).unwrap();
         for (readings, expected) in test.inputs.lines().zip(host.lines()) {
             let frame: Vec<f32> = readings.iter().map(|reading| *reading as f32).collect();

@@ -97,10 +97,14 @@ impl<'s> Judge<'s> {
         progress: &dyn Progress,
     ) -> Result<()> {
         let formats = Format::ALL.into_iter().rev();
-        let variants: Vec<(Format, bool)> =
-            formats.flat_map(|format| [false, true].map(|affine| (format, affine))).collect();
-        let defaults = self.options;
-        let spread = if knobs.whole_array { WHOLE_ARRAY_SPREAD } else { 1.0 } * defaults.spread;
+        let ranks = self.ranks(sets, knobs);
+        let variants: Vec<(Format, bool, Option<usize>)> = formats
+            .flat_map(|format| [(format, false), (format, true)])
+            .flat_map(|(format, affine)| ranks.iter().map(move |rank| (format, affine, *rank)))
+            .collect();
+        let Knobs { whole_array, .. } = knobs;
+        let defaults = Options { whole_array, output_rank: None, ..self.options };
+        let spread = if whole_array { WHOLE_ARRAY_SPREAD } else { 1.0 } * defaults.spread;
         let options = Options { centres: knobs.centres, spread, ..defaults };
         options.check(sets.training.frames())?;
         // Layers are shared by all formats and by networks with and without a tail.
@@ -113,9 +117,9 @@ impl<'s> Judge<'s> {
             .map(|(row, layer)| {
                 let table = seen.row_table(row);
                 let samples = Samples::new(&table);
-                let fit = |&(format, affine_tail): &(Format, bool)| {
+                let fit = |&(format, affine_tail, output_rank): &(Format, bool, Option<usize>)| {
                     let spread = layer.spread;
-                    let options = Options { spread, affine_tail, format, ..options };
+                    let options = Options { spread, affine_tail, format, output_rank, ..options };
                     samples.fit(&layer.centres, &options)
                 };
                 let fitted = variants.par_iter().map(fit).collect();
@@ -123,13 +127,18 @@ impl<'s> Judge<'s> {
                 fitted
             })
             .collect();
-        for (variant, &(format, affine)) in variants.iter().enumerate() {
+        for (variant, &(format, affine, rank)) in variants.iter().enumerate() {
             let of_rows = rows.iter().map(|row| row[variant].as_ref().cloned());
             let networks = match of_rows.collect::<std::result::Result<_, _>>() {
                 Ok(networks) => networks,
                 Err(cause) => {
                     let of = if knobs.whole_array { " array" } else { "" };
-                    let note = format!("{}{of}, K = {}: {cause}", format.name(), knobs.centres);
+                    let note = |rank: &str| {
+                        format!("{}{of}, K = {}{rank}: {cause}", format.name(), knobs.centres)
+                    };
+                    // What holds for full rank need not be said again.
+                    let rank = rank.filter(|_| !self.left_out.contains(&note("")));
+                    let note = note(&rank.map_or(String::new(), |rank| format!(", rank {rank}")));
                     if !self.left_out.contains(&note) {
                         self.left_out.push(note);
                     }
@@ -147,11 +156,19 @@ impl<'s> Judge<'s> {
                 continue;
             }
             for arithmetic in Arithmetic::all().filter(|a| a.format == format) {
-                self.points(&blob, sets, arithmetic, (knobs, affine))?;
+                self.points(&blob, sets, arithmetic, (knobs, affine, rank))?;
             }
             self.distinct.push(blob.bytes().to_vec());
         }
         Ok(())
+    }
+
+    /// Ranks of the output weights: full, and for the whole array those of the plan that take fewer multiplications.
+    fn ranks(&self, sets: &Sets<'_>, knobs: Knobs) -> Vec<Option<usize>> {
+        let outputs = sets.training.outputs.names.len();
+        let fewer = |rank: &usize| rank * (knobs.centres + outputs) < knobs.centres * outputs;
+        let of_plan = self.plan.output_ranks.iter().copied().filter(fewer).map(Some);
+        [None].into_iter().chain(of_plan.filter(|_| knobs.whole_array)).collect()
     }
 
     /// Adds the points of a network: without a gate, and behind every gate that was measured with its
@@ -161,7 +178,7 @@ impl<'s> Judge<'s> {
         blob: &ModelBlob,
         sets: &Sets<'_>,
         arithmetic: Arithmetic,
-        (knobs, affine_tail): (Knobs, bool),
+        (knobs, affine_tail, output_rank): (Knobs, bool, Option<usize>),
     ) -> Result<()> {
         let Knobs { whole_array, centres, samples_averaged } = knobs;
         let test = sets.test;
@@ -175,6 +192,7 @@ impl<'s> Judge<'s> {
                 arithmetic,
                 whole_array,
                 centres,
+                output_rank,
                 spread: blob.spread(),
                 affine_tail,
                 samples_averaged,
