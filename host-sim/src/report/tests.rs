@@ -1,8 +1,10 @@
 //! Tests of whole pages, on results made by hand.
 
+use taxel_limit::Refusal;
+
 use super::html;
 use crate::evaluate::table1::{Column, Entry, NETWORK, Printed, Table1};
-use crate::metrics::{DecoderErrors, Errors};
+use crate::metrics::{DecoderErrors, Errors, LimitSummary};
 use crate::run::{Example, ExampleOutput, ModelSummary, RowErrors, RunResult, SceneSummary};
 
 const ROW_WIRES: usize = 3;
@@ -19,6 +21,8 @@ fn errors(group: &str, rmse: f64) -> Errors {
         positional_percent: (group == "dz_mm").then_some(10.0 * rmse),
         r_squared: Some(1.0 - rmse),
         mean_relative_percent: None,
+        ratio_to_limit: Some(1.0 + rmse),
+        ratio_standard_error: Some(0.02),
     }
 }
 
@@ -35,6 +39,7 @@ fn result(groups: &[&str]) -> RunResult {
         errors: of_groups(groups, rmse),
     };
     let column = |noise_level| Column {
+        limit: LimitSummary::of(&Err(Refusal::Drift)),
         noise_level,
         decoders: vec![
             entry("mean", None, 0.3),
@@ -80,6 +85,7 @@ fn result(groups: &[&str]) -> RunResult {
                 errors: of_groups(groups, rmse),
             })
             .to_vec(),
+        limit: LimitSummary::of(&Err(Refusal::Drift)),
         rows: (0..ROW_WIRES)
             .map(|row| RowErrors { row_wire: row + 2, errors: of_groups(groups, 0.1) })
             .collect(),
