@@ -20,6 +20,7 @@ pub mod trade;
 pub mod readout;
 pub mod gate;
 pub mod drift;
+pub mod limit;
 pub mod emulate;
 pub mod link;
 

@@ -3,5 +3,6 @@
 pub mod gate;
 pub mod drift;
 pub mod readout;
+pub mod limit;
 pub mod table1;
 pub mod trade;

@@ -16,13 +16,14 @@ use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
 use taxel_learn::train::{Examples, FreshFrames, Refinement, check_spread, train, train_refined};
 use taxel_learn::{ModelBlob, Options, Origin, Trained, pack, relative};
+use taxel_limit::Reference;
 use taxel_simulate::noise::NoiseKind;
 use taxel_simulate::synth::BASELINE_FRAMES;
 use taxel_simulate::world::check_noise_level;
 use taxel_simulate::{Synthesis, World};
 
 use crate::error::{Error, Result};
-use crate::metrics::Measure;
+use crate::metrics::{LimitSummary, Measure};
 
 mod file;
 
@@ -184,7 +185,27 @@ impl Experiment {
         Measure {
             full_scale: self.world.full_scales(),
             thickness_mm: Some(self.world.sensor.size_mm[2]),
+            limit: None,
         }
+    }
+
+    /// Measure for errors of the scene's outputs, and of their ratio to the limit at `noise_level`: that of all
+    /// readings of a frame. Ratios are formed on the first of so many `test_frames`.
+    ///
+    /// Where the limit is refused, its summary says why and there are no ratios.
+    #[must_use]
+    pub fn measure_beside_limit(
+        &self,
+        noise_level: f64,
+        test_frames: usize,
+        progress: &dyn Progress,
+    ) -> (Measure, LimitSummary) {
+        let mut world = self.world.clone();
+        world.noise.level = noise_level;
+        let frames = Reference::few_frames(&world).min(test_frames);
+        let limit = Reference::of(&world, frames, progress);
+        let summary = LimitSummary::of(&limit);
+        (Measure { limit: limit.ok(), ..self.measure() }, summary)
     }
 
     /// Data set of so many `frames` of `stream`, for training and for decoders that see what it saw.

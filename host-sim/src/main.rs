@@ -8,7 +8,7 @@ use host_sim::{Error, Result};
 mod commands;
 
 use commands::{
-    Common, decode, drift, emulate, eval, forward, gate, inspect, link, readout, run, synth,
+    Common, decode, drift, emulate, eval, forward, gate, inspect, limit, link, readout, run, synth,
     table1, trade, train,
 };
 
@@ -39,6 +39,7 @@ enum Command {
     Readout(readout::Arguments),
     Gate(gate::Arguments),
     Drift(drift::Arguments),
+    Limit(limit::Arguments),
     Emulate(emulate::Arguments),
     Link(link::Arguments),
 }
@@ -59,6 +60,7 @@ fn main() -> ExitCode {
         Command::Readout(arguments) => readout::execute(&arguments, &cli.common),
         Command::Gate(arguments) => gate::execute(&arguments, &cli.common),
         Command::Drift(arguments) => drift::execute(&arguments, &cli.common),
+        Command::Limit(arguments) => limit::execute(&arguments, &cli.common),
         Command::Emulate(arguments) => emulate::execute(&arguments, &cli.common),
         Command::Link(arguments) => link::execute(&arguments, &cli.common),
     };

@@ -6,6 +6,8 @@ use taxel_data::columns;
 use taxel_data::dataset::Dataset;
 use taxel_data::table::Table;
 use taxel_learn::Decoder;
+use taxel_limit::reference::GroupLimit;
+use taxel_limit::{Reference, Refusal};
 
 /// Share of full scale that the truth must exceed to count in the mean relative error.
 pub const RELATIVE_THRESHOLD: f64 = 0.1;
@@ -17,6 +19,8 @@ pub struct Measure {
     pub full_scale: Vec<f64>,
     /// Sensor thickness H in mm, for the positional error.
     pub thickness_mm: Option<f64>,
+    /// Limit on the first frames that are measured, for ratios to it.
+    pub limit: Option<Reference>,
 }
 
 /// Errors of one group of outputs (an axis, or a column of measured data).
@@ -41,6 +45,10 @@ pub struct Errors {
     /// Mean relative error mean|e|/|truth| over truths above [`RELATIVE_THRESHOLD`] of full scale, in
     /// per cent.
     pub mean_relative_percent: Option<f64>,
+    /// Ratio of the RMSE to the limit, formed on the frames of the [`Reference`]; scenes only.
+    pub ratio_to_limit: Option<f64>,
+    /// Standard error of that ratio.
+    pub ratio_standard_error: Option<f64>,
 }
 
 /// Errors of one decoder.
@@ -50,6 +58,48 @@ pub struct DecoderErrors {
     pub decoder: String,
     /// Errors by group.
     pub errors: Vec<Errors>,
+}
+
+/// Limit of a scene that results are given beside.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LimitSummary {
+    /// Number of frames that it was computed on, and ratios to it are formed on: the first test frames.
+    pub frames: usize,
+    /// Limit by group of outputs; empty if it was refused.
+    pub groups: Vec<GroupLimit>,
+    /// Reason why there is no limit.
+    pub refused: Option<String>,
+}
+
+impl LimitSummary {
+    /// Summary of `limit`, or of the reason why there is none.
+    #[must_use]
+    pub fn of(limit: &Result<Reference, Refusal>) -> Self {
+        match limit {
+            Ok(limit) => Self { frames: limit.frames(), groups: limit.limits(), refused: None },
+            Err(refusal) => {
+                Self { frames: 0, groups: Vec::new(), refused: Some(refusal.to_string()) }
+            }
+        }
+    }
+
+    /// Summary in one line, for below a table of errors.
+    #[must_use]
+    pub fn note(&self) -> String {
+        if let Some(refusal) = &self.refused {
+            return format!("No ratio to the least possible error: {refusal}.");
+        }
+        let limits = self.groups.iter().map(|limit| {
+            let [value, error] = [limit.limit, limit.limit_standard_error];
+            format!("{} {value:.4} ± {error:.4} {}", limit.group, limit.unit)
+        });
+        let limits: Vec<String> = limits.collect();
+        format!(
+            "Least possible RMSE of any decoder, from {} frames: {}.",
+            self.frames,
+            limits.join(", ")
+        )
+    }
 }
 
 /// Errors of `decoder` on the frames of `test`.
@@ -76,17 +126,20 @@ pub enum Definition {
     RSquared,
     /// Mean relative error: [`Errors::mean_relative_percent`].
     MeanRelativePercent,
+    /// Ratio of the RMSE to the limit: [`Errors::ratio_to_limit`].
+    RatioToLimit,
 }
 
 impl Definition {
     /// All definitions.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Rmse,
         Self::RelativeL2Percent,
         Self::FullScalePercent,
         Self::PositionalPercent,
         Self::RSquared,
         Self::MeanRelativePercent,
+        Self::RatioToLimit,
     ];
 
     /// Name of the definition in CSV and JSON.
@@ -99,6 +152,7 @@ impl Definition {
             Self::PositionalPercent => "positional_percent",
             Self::RSquared => "r_squared",
             Self::MeanRelativePercent => "mean_relative_percent",
+            Self::RatioToLimit => "ratio_to_limit",
         }
     }
 
@@ -112,6 +166,7 @@ impl Definition {
             Self::PositionalPercent => "positional = mean|e|/(H − Δz), %",
             Self::RSquared => "R² = 1 − Σe²/Σ(Δ − mean Δ)²",
             Self::MeanRelativePercent => "mean(|e|/|Δ|) where |Δ| > 10 % of full scale, %",
+            Self::RatioToLimit => "ratio = RMSE/least possible RMSE, on a part of the frames",
         }
     }
 
@@ -125,6 +180,7 @@ impl Definition {
             Self::PositionalPercent => errors.positional_percent,
             Self::RSquared => errors.r_squared,
             Self::MeanRelativePercent => errors.mean_relative_percent,
+            Self::RatioToLimit => errors.ratio_to_limit,
         }
     }
 }
@@ -204,6 +260,7 @@ fn of_columns(
         total.relative += sums.relative;
         total.relative_count += sums.relative_count;
     }
+    let ratio = measure.limit.as_ref().and_then(|limit| limit.ratio(truth, estimate, members));
     let count = total.count as f64;
     let finite = |value: f64| value.is_finite().then_some(value);
     Errors {
@@ -216,6 +273,8 @@ fn of_columns(
         positional_percent: thickness_mm.and_then(|_| finite(100.0 * total.positional / count)),
         r_squared: finite(1.0 - total.error_squares / deviation_squares),
         mean_relative_percent: finite(100.0 * total.relative / total.relative_count as f64),
+        ratio_to_limit: ratio.map(|ratio| ratio.ratio),
+        ratio_standard_error: ratio.map(|ratio| ratio.standard_error),
     }
 }
 
@@ -230,7 +289,7 @@ mod tests {
             values: vec![0.0, 1.0, 1.0, 1.0, -1.0, 0.5],
         };
         let estimate = [0.5, 1.0, 1.0, 1.0, -1.0, f64::NAN];
-        let measure = Measure { full_scale: vec![1.0; 3], thickness_mm: Some(5.0) };
+        let measure = Measure { full_scale: vec![1.0; 3], thickness_mm: Some(5.0), limit: None };
         let [z, x] = &by_group(&truth, &estimate, &measure)[..] else { panic!("two groups") };
         assert_eq!((z.group.as_str(), z.count, z.unit.as_str()), ("dz_mm", 3, "mm"));
         let close = |a: Option<f64>, b: f64| assert!((a.unwrap() - b).abs() < 1e-12, "{a:?} {b}");
@@ -249,7 +308,7 @@ mod tests {
             let values: Vec<f64> = (0..1000).map(|i| offset + f64::from(i % 37)).collect();
             let truth = Table { names: vec!["b".into()], values };
             let means = truth.means().repeat(truth.len());
-            let measure = Measure { full_scale: vec![1.0], thickness_mm: None };
+            let measure = Measure { full_scale: vec![1.0], thickness_mm: None, limit: None };
             let r_squared = by_group(&truth, &means, &measure)[0].r_squared.unwrap();
             assert!(r_squared.abs() < 1e-9, "offset {offset}: {r_squared}");
         }

@@ -4,6 +4,7 @@
 //! The figures are drawn here rather than by a chart crate because their colours are CSS classes:
 //! one page serves light and dark.
 
+use crate::evaluate::limit::LimitResult;
 use crate::evaluate::trade::Trade;
 use crate::run::RunResult;
 
@@ -16,6 +17,7 @@ mod tables;
 mod figures;
 mod html;
 mod trade;
+mod limit;
 
 /// Page for `result`: no script, no file beside it, the same bytes for the same result.
 #[must_use]
@@ -33,6 +35,24 @@ pub fn trade_html(trade: &Trade) -> String {
 #[must_use]
 pub fn trade_svg(trade: &Trade) -> String {
     trade::svg(trade)
+}
+
+/// Page for a limit: what the sensor can know, with pictures.
+#[must_use]
+pub fn limit_html(limit: &LimitResult) -> String {
+    limit::html(limit)
+}
+
+/// Picture of the directions that a sensor shows, as a file of its own: light or dark like the viewer.
+#[must_use]
+pub fn directions_svg(limit: &LimitResult) -> String {
+    limit::directions_svg(limit)
+}
+
+/// Picture of what is known of each electrode, as a file of its own: light or dark like the viewer.
+#[must_use]
+pub fn known_svg(limit: &LimitResult) -> String {
+    limit::known_svg(limit)
 }
 
 #[cfg(test)]

@@ -14,7 +14,7 @@ use taxel_simulate::{Synthesis, World};
 use crate::error::Result;
 use crate::evaluate::table1::{self, Table1};
 use crate::experiment::Experiment;
-use crate::metrics::{self, DecoderErrors, Errors, Measure};
+use crate::metrics::{self, DecoderErrors, Errors, LimitSummary, Measure};
 
 /// Results of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -25,6 +25,8 @@ pub struct RunResult {
     pub model: ModelSummary,
     /// Errors on the test frames, by decoder and group.
     pub decoders: Vec<DecoderErrors>,
+    /// Least possible errors, of a decoder that sees all readings of a frame.
+    pub limit: LimitSummary,
     /// Errors of the network by row-wire.
     pub rows: Vec<RowErrors>,
     /// One test frame, for a closer look.
@@ -147,8 +149,9 @@ pub fn run(experiment: &Experiment, progress: &dyn Progress) -> Result<(RunResul
     let blob = pack(&trained, &training, &experiment.origin())?;
     let network = blob.prepare(Exponential::default()).of_inputs();
 
+    let (measure, limit) =
+        experiment.measure_beside_limit(world.noise.level, t.test_frames, progress);
     progress.stage("decode and evaluate", 1);
-    let measure = experiment.measure();
     let baselines: Vec<Box<dyn Decoder>> = BASELINES.iter().map(|b| b.fit(&training)).collect();
     let decoders = std::iter::once(&network as &dyn Decoder)
         .chain(baselines.iter().map(AsRef::as_ref))
@@ -161,6 +164,7 @@ pub fn run(experiment: &Experiment, progress: &dyn Progress) -> Result<(RunResul
         scene: scene_summary(experiment),
         model: model_summary(experiment, &network, &blob)?,
         decoders,
+        limit,
         rows: by_row(world, &test, &estimate, &measure),
         example: example(world, &test, &estimate),
         table1: match experiment.table1 {
@@ -219,6 +223,7 @@ fn by_row(world: &World, test: &Dataset, estimate: &Table, measure: &Measure) ->
         let from = row * width;
         let measure = Measure {
             full_scale: measure.full_scale[from..from + width].to_vec(),
+            limit: measure.limit.as_ref().map(|limit| limit.columns(from, width)),
             ..measure.clone()
         };
         let estimate = estimate.columns(from, width).values;

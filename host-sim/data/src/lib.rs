@@ -14,5 +14,5 @@ pub mod csv_file;
 pub mod table;
 pub mod dataset;
 
-pub use elementary::{exp, sin_cos};
+pub use elementary::{exp, ln, normal_share_below, sin_cos};
 pub use error::{BadValue, Error, Result};

@@ -39,6 +39,8 @@ pub enum Purpose {
     Drift = 9,
     /// Noise that is left in the baseline of one session.
     Baseline = 10,
+    /// Samples from which the least possible error is computed.
+    Posterior = 11,
 }
 
 /// Set of frames that draws are for. Training and test frames are independent.

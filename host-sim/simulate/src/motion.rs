@@ -39,6 +39,29 @@ pub trait Motion: Debug + Send + Sync {
         0.0
     }
 
+    /// Number of independent standard normal numbers that fix a frame of so many `electrodes`: the *latents*
+    /// of the motion. Only for trajectories of one step.
+    fn latents(&self, electrodes: usize) -> usize;
+
+    /// Whether rows move independently, so that [`place`](Self::place) needs only the latents of one row's
+    /// electrodes.
+    fn has_independent_rows(&self) -> bool;
+
+    /// Writes the deformation in mm of the electrodes of row-wire `row` (from 0) that `latents` stand for, one
+    /// frame a lane, by electrode and axis.
+    ///
+    /// Standard normal latents give the distribution that [`start`](Self::start) draws from.
+    ///
+    /// # Panics
+    /// If there are not as many latents as [`latents`](Self::latents) says.
+    fn place(
+        &self,
+        sensor: &Sensor,
+        row: usize,
+        latents: &[Lanes],
+        deformation_mm: &mut [[Lanes; 3]],
+    );
+
     /// Draws the quantities that all rows and steps of a trajectory share, for
     /// [`LANES`](taxel_data::simd::LANES) trajectories of `sensor`.
     fn start<'m>(&'m self, sensor: &'m Sensor, draws: &mut Draws) -> Box<dyn Trajectories + 'm>;

@@ -153,6 +153,42 @@ impl Sensor {
         }
     }
 
+    /// Computes the derivatives of ln R in 1/mm, for row-wire `row` (from 0) with this deformation: one line a
+    /// column-wire, and in it one entry for each electrode and axis.
+    ///
+    /// With conductances 1/‖d‖ of the nodes, d = U − Δ − L, it is ∂ln R/∂Δ = −Σ d/‖d‖³ / Σ 1/‖d‖.
+    ///
+    /// # Panics
+    /// If `deformation_mm` has not one entry an electrode.
+    #[must_use]
+    pub fn log_resistance_derivatives(
+        &self,
+        row: usize,
+        deformation_mm: &[Vector3],
+    ) -> Vec<Vec<f64>> {
+        let upper = self.row_electrodes_mm(row);
+        assert_eq!(upper.len(), deformation_mm.len(), "one deformation an electrode");
+        let of_column = |column: &[Vector3]| {
+            let mut conductance_mm = 0.0;
+            let mut slopes: Vec<f64> = Vec::with_capacity(3 * upper.len());
+            for (u, delta) in upper.iter().zip(deformation_mm) {
+                let mut slope = [0.0; 3];
+                for l in column {
+                    let d = [0, 1, 2].map(|axis| u[axis] - delta[axis] - l[axis]);
+                    let node = 1.0 / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+                    conductance_mm += node;
+                    slope.iter_mut().zip(d).for_each(|(s, d)| *s += d * node.powi(3));
+                }
+                slopes.extend(slope);
+            }
+            slopes.iter().map(|slope| -slope / conductance_mm).collect()
+        };
+        self.lower_electrodes_mm
+            .chunks_exact(self.electrodes_per_column_wire)
+            .map(of_column)
+            .collect()
+    }
+
     /// Names `r{m}c{k}_ohm` of the readings of `rows` (from 0), row after row.
     #[must_use]
     pub fn reading_names(&self, rows: &[usize]) -> Vec<String> {
@@ -235,6 +271,26 @@ mod tests {
     }
 
     include!("sensor/cases.rs");
+
+    #[test]
+    fn derivatives_are_those_of_the_readings() {
+        let sensor = Sensor::paper();
+        let deformation_mm: Vec<Vector3> =
+            (0..6).map(|i| [0.1 * f64::from(i), -0.3, 0.15 * f64::from(i)]).collect();
+        let derivatives = sensor.log_resistance_derivatives(2, &deformation_mm);
+        for i in 0..18 {
+            let moved = |by: f64| {
+                let mut moved = deformation_mm.clone();
+                moved[i / 3][i % 3] += by;
+                readings(&sensor, 2, &moved)
+            };
+            for (k, (up, down)) in moved(1e-4).iter().zip(moved(-1e-4)).enumerate() {
+                let slope = (up / down).ln() / 2e-4;
+                let off = (derivatives[k][i] - slope).abs();
+                assert!(off < 1e-8, "column {k}, unknown {i}: {} {slope}", derivatives[k][i]);
+            }
+        }
+    }
 
     #[test]
     fn mirror_rows_read_alike_at_rest() {

@@ -191,7 +191,8 @@ impl<'w> Synthesis<'w> {
     }
 
     /// Span in Ω of every channel over the world, if its noise is relative to the span; otherwise empty.
-    fn noise_span_ohm(&self) -> Vec<f64> {
+    #[must_use]
+    pub fn noise_span_ohm(&self) -> Vec<f64> {
         if self.noise.kind == NoiseKind::Relative || self.noise.level == 0.0 {
             return Vec::new();
         }

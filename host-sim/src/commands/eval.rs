@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use host_sim::metrics::{self, Errors, Measure};
+use host_sim::metrics::{self, Errors, LimitSummary, Measure};
 use host_sim::{Error, Result};
 use serde::Serialize;
 use taxel_data::csv_file::CsvFile;
 use taxel_learn::{Exponential, ModelBlob};
+use taxel_limit::Refusal;
 
 use super::arguments::exponential;
 use super::decode::remark_on_range;
@@ -56,6 +57,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let measure = Measure {
         full_scale: metadata.full_scale.iter().map(f64::from).collect(),
         thickness_mm: (thickness_mm > 0.0).then_some(thickness_mm),
+        limit: None,
     };
     // The mean is judged on the same pairs as the model, and computed from them.
     for (truth, estimate) in truth.values.iter_mut().zip(&estimate.values) {
@@ -91,5 +93,6 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     }
     print::errors(&mut page, &[("model", &summary.errors), ("mean", &summary.mean_errors)]);
     print::errors_legend(&mut page);
+    page.line(LimitSummary::of(&Err(Refusal::Measured)).note());
     page.print()
 }

@@ -83,7 +83,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         frame_cycles,
         flash_frame_cycles,
     };
-    let result = gate::measure(&scene, &model, &settings)?;
+    let result = gate::measure(&scene, &model, &settings, &Terminal::new())?;
     if common.json { print::json(&result) } else { page_of(&result).print() }
 }
 
@@ -125,7 +125,8 @@ fn page_of(result: &GateResult) -> print::Page {
          network decodes the whole array, rows wake together: the bound is multiplied by their number.\n\
          missed: share of skipped rows among those with an electrode that moved by more than this, ‖Δ‖.\n\
          largest: the largest ‖Δ‖ in a skipped row.\n\
-         RMSE: √mean(e²) over all rows of the scene, skipped or not.",
+         RMSE: √mean(e²) over all rows of the scene, skipped or not.\n\
+         × limit: relative to the least possible RMSE of any decoder of the whole frame.",
     );
     page
 }
@@ -157,10 +158,13 @@ fn rows(page: &mut print::Page, result: &GateResult) {
 }
 
 fn errors(page: &mut print::Page, result: &GateResult) {
-    let header = result.ungated_errors.iter().map(|group| format!(" {:>13}", group.group));
+    let header = result.ungated_errors.iter();
+    let header = header.map(|group| format!(" {:>10}    {:>12}", group.group, "× limit"));
     page.line(format_args!("{:<19}{}", "RMSE", header.collect::<String>()));
     let mut line = |what: String, errors: &[Errors]| {
-        let cells = errors.iter().map(|group| format!(" {:>10.4} {:<2}", group.rmse, group.unit));
+        let cells = errors.iter().map(|group| {
+            format!(" {:>10.4} {:<2} {:>12}", group.rmse, group.unit, print::ratio(group))
+        });
         page.line(format_args!("{what:<19}{}", cells.collect::<String>().trim_end()));
     };
     line("without a gate".into(), &result.ungated_errors);
@@ -168,6 +172,7 @@ fn errors(page: &mut print::Page, result: &GateResult) {
         line(format!("k = {k}"), errors);
     }
     line("predicting the mean".into(), &result.mean_errors);
+    page.line(result.limit.note());
     page.line("");
 }
 

@@ -44,8 +44,8 @@ pub fn json(value: &impl Serialize) -> Result<()> {
 /// Adds one line a decoder and group, under a header of definitions.
 pub fn errors(page: &mut Page, decoders: &[(&str, &[Errors])]) {
     page.line(format_args!(
-        "{:<8} {:<10} {:>9}    {:>8} {:>7} {:>9} {:>8} {:>9}",
-        "decoder", "output", "RMSE", "rel. L2", "%FS", "position", "R²", "mean rel"
+        "{:<8} {:<10} {:>9}    {:>12} {:>8} {:>7} {:>9} {:>8} {:>9}",
+        "decoder", "output", "RMSE", "× limit", "rel. L2", "%FS", "position", "R²", "mean rel"
     ));
     for (decoder, groups) in decoders {
         for group in *groups {
@@ -53,11 +53,12 @@ pub fn errors(page: &mut Page, decoders: &[(&str, &[Errors])]) {
                 definition.of(group).map_or("-".into(), |value| format!("{value:.2} %"))
             };
             page.line(format_args!(
-                "{:<8} {:<10} {:>9} {:<2} {:>8} {:>7} {:>9} {:>8} {:>9}",
+                "{:<8} {:<10} {:>9} {:<2} {:>12} {:>8} {:>7} {:>9} {:>8} {:>9}",
                 decoder,
                 group.group,
                 number(group.rmse),
                 group.unit,
+                ratio(group),
                 percent(Definition::RelativeL2Percent),
                 percent(Definition::FullScalePercent),
                 percent(Definition::PositionalPercent),
@@ -68,6 +69,14 @@ pub fn errors(page: &mut Page, decoders: &[(&str, &[Errors])]) {
                 percent(Definition::MeanRelativePercent)
             ));
         }
+    }
+}
+
+/// Ratio of an error to the limit with its standard error; a dash where there is no limit.
+pub fn ratio(errors: &Errors) -> String {
+    match (errors.ratio_to_limit, errors.ratio_standard_error) {
+        (Some(ratio), Some(error)) => format!("{ratio:.2} ± {error:.2}"),
+        _ => "-".into(),
     }
 }
 
@@ -84,6 +93,6 @@ fn number(value: f64) -> String {
 pub fn errors_legend(page: &mut Page) {
     page.line(format_args!(
         "rel. L2 = ‖e‖/‖Δ‖; %FS = mean|e|/full scale; position = mean|e|/(H − Δz); \
-         mean rel = mean(|e|/|Δ|) where |Δ| > 10 % FS;\nfull scale (FS): the largest deformation that the scene allows, or a measured column's range"
+         mean rel = mean(|e|/|Δ|) where |Δ| > 10 % FS;\nfull scale (FS): the largest deformation that the scene allows, or a measured column's range;\n× limit = RMSE/least possible RMSE"
     ));
 }

@@ -133,6 +133,7 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
         result.decoders.iter().map(|d| (d.decoder.as_str(), d.errors.as_slice())).collect();
     print::errors(&mut page, &decoders);
     print::errors_legend(&mut page);
+    page.line(result.limit.note());
     let wires: Vec<String> = result.rows.iter().map(|row| row.row_wire.to_string()).collect();
     page.line(format_args!("\nnetwork RMSE by row-wire ({}):", wires.join(", ")));
     for group in result.rows.first().map_or(&[][..], |row| &row.errors) {

@@ -105,6 +105,10 @@ fn page_of(table: &Table1, group: &str) -> print::Page {
             page.line(format_args!("{decoder:<16}{}", cells.collect::<String>().trim_end()));
         }
     }
+    page.line("");
+    for column in &table.columns {
+        page.line(format_args!("noise {}: {}", percent(column.noise_level), column.limit.note()));
+    }
     if !table.printed.is_empty() {
         page.line("\nas the paper prints it, for z, %");
         for Printed { spread, noise_level, percent: printed } in &table.printed {
@@ -135,6 +139,7 @@ fn number(definition: Definition, value: Option<f64>) -> String {
     match (value, definition) {
         (None, _) => "-".into(),
         (Some(v), _) if v.abs() >= 1e4 => format!("{v:.1e}"),
+        (Some(v), Definition::RatioToLimit) => format!("{v:.3}"),
         (Some(v), Definition::Rmse | Definition::RSquared) => format!("{v:.4}"),
         (Some(v), _) => format!("{v:.2}"),
     }

@@ -10,7 +10,7 @@ use clap::Args;
 use host_sim::error::Bounded;
 use host_sim::evaluate::gate::{self, RECOMMENDED_K};
 use host_sim::evaluate::trade::{self, Bounds, Plan, Point, Trade};
-use host_sim::metrics::DecoderErrors;
+use host_sim::metrics::{DecoderErrors, Errors};
 use host_sim::{Error, Result, report};
 use taxel_data::{columns, output};
 use taxel_simulate::World;
@@ -262,7 +262,9 @@ fn write_files(folder: &Path, trade: &Trade) -> Result<()> {
 }
 
 fn csv_of(trade: &Trade) -> String {
-    let rmse = trade.groups().map(|(group, _)| format!("{group}_rmse,{group}_ratio_to_best"));
+    let rmse = trade
+        .groups()
+        .map(|(group, _)| format!("{group}_rmse,{group}_ratio_to_best,{group}_ratio_to_limit"));
     let mut csv = format!(
         "kernel,whole_array,centres,spread,affine_tail,samples_averaged,gate_k,output_rank,{},instructions,cycles,flash_cycles,frame_us,flash_bytes,ram_bytes,\
          on_front,chosen\n",
@@ -270,7 +272,9 @@ fn csv_of(trade: &Trade) -> String {
     );
     for (i, p) in trade.points.iter().enumerate() {
         let errors = p.errors.iter().zip(&p.ratio_to_best);
-        let errors = errors.map(|(e, ratio)| format!("{},{ratio}", e.rmse)).collect::<Vec<_>>();
+        let to_limit = |e: &Errors| e.ratio_to_limit.map_or(String::new(), |r| r.to_string());
+        let errors = errors.map(|(e, ratio)| format!("{},{ratio},{}", e.rmse, to_limit(e)));
+        let errors = errors.collect::<Vec<_>>();
         let _ = writeln!(
             csv,
             "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
@@ -309,13 +313,14 @@ fn page_of(trade: &Trade, all: bool, folder: &Path) -> print::Page {
     ));
     let groups: Vec<String> = trade.groups().map(|(group, _)| format!("{group:>16}")).collect();
     page.line(format_args!(
-        "\n{:<28} {:>4} {:>4} {:>5} {:>4} {:>4}{groups}{:>13} {:>9} {:>10} {:>8} {:>8} {:>6}",
+        "\n{:<28} {:>4} {:>4} {:>5} {:>4} {:>4}{groups} {:>7} {:>12} {:>9} {:>10} {:>8} {:>8} {:>6}",
         "format",
         "K",
         "rank",
         "tail",
         "avg",
         "gate",
+        "× limit",
         "instructions",
         "cycles",
         "from flash",
@@ -326,7 +331,7 @@ fn page_of(trade: &Trade, all: bool, folder: &Path) -> print::Page {
     ));
     let shown = shown(trade, all);
     for i in &shown {
-        page.line(line_of(&trade.points[*i], trade.chosen == Some(*i)));
+        page.line(line_of(&trade.points[*i], &trade.group, trade.chosen == Some(*i)));
     }
     for DecoderErrors { decoder, errors } in &trade.baselines {
         let errors: Vec<String> =
@@ -335,14 +340,19 @@ fn page_of(trade: &Trade, all: bool, folder: &Path) -> print::Page {
     }
     page.line(format_args!(
         "\nRMSE in {}; in brackets: relative to the smallest of all points\n\
+         × limit: RMSE of {} relative to the least possible one with as many samples a reading\n\
          *: on the Pareto front (RMSE of {}, cycles, samples)\n\
          array: one network for all rows, behind a projection; not listed if larger than a slot (128 KiB)\n\
          rank: components that the array's network computes, which are expanded to all outputs (docs/projection.md)\n\
          flash: no point larger than a slot is chosen unless --max-flash allows it\n\
          gate: k of a gate that skips untouched rows; its cycles are the mean over the test frames",
         trade.unit,
+        trade.group,
         trade.group
     ));
+    if let Some(limit) = &trade.limit {
+        page.line(limit.note());
+    }
     page.line(if all {
         "f32 is not listed where its distances may not be expanded (docs/formats.md): see f32-direct there".into()
     } else {
@@ -389,14 +399,15 @@ fn shown(trade: &Trade, all: bool) -> Vec<usize> {
     shown
 }
 
-fn line_of(point: &Point, chosen: bool) -> String {
+fn line_of(point: &Point, group: &str, chosen: bool) -> String {
     let errors = point.errors.iter().zip(&point.ratio_to_best);
     let errors: Vec<String> = errors
         .map(|(e, ratio)| format!("{:>9.4} {:<6}", e.rmse, format!("({ratio:.2})")))
         .collect();
     let errors = errors.concat();
+    let ratio = point.ratio_to_limit(group).map_or("-".into(), |ratio| format!("{ratio:.2}"));
     format!(
-        "{} {:<26} {:>4} {:>4} {:>5} {:>4} {:>4}{errors}{:>13} {:>9} {:>10} {:>8.1} {:>8} {:>6}{}",
+        "{} {:<26} {:>4} {:>4} {:>5} {:>4} {:>4}{errors} {ratio:>7} {:>12} {:>9} {:>10} {:>8.1} {:>8} {:>6}{}",
         if point.on_front { "*" } else { " " },
         point.way(),
         point.centres,

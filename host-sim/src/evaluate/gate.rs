@@ -3,6 +3,7 @@
 use model_core::gate::is_at_rest;
 use serde::Serialize;
 use taxel_data::BadValue;
+use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
 use taxel_data::table::Table;
 use taxel_learn::cost::Frames;
@@ -13,7 +14,7 @@ pub use taxel_simulate::synth::BASELINE_FRAMES;
 use taxel_simulate::{Synthesis, World};
 
 use crate::experiment::Experiment;
-use crate::metrics::{self, Errors};
+use crate::metrics::{self, Errors, LimitSummary};
 
 /// Deformations in mm beyond which a row that is skipped counts as missed.
 pub const MISSED_OVER_MM: [f64; 4] = [0.02, 0.05, 0.1, 0.2];
@@ -150,6 +151,8 @@ pub struct GateResult {
     pub frame_cycles: Frames<u64>,
     /// Cycles of a frame from flash, if they are known.
     pub flash_frame_cycles: Option<Frames<u64>>,
+    /// Least possible errors, of a decoder that sees all readings of a frame.
+    pub limit: LimitSummary,
     /// Errors over the scene without a gate.
     pub ungated_errors: Vec<Errors>,
     /// Errors of always predicting the mean of these frames.
@@ -181,6 +184,7 @@ pub fn measure(
     experiment: &Experiment,
     model: &PreparedModel<'_>,
     settings: &Settings,
+    progress: &dyn Progress,
 ) -> Result<GateResult, BadValue> {
     let world = &experiment.world;
     check_settings(world, &settings.k, settings.baseline_frames)?;
@@ -203,7 +207,8 @@ pub fn measure(
     let sizes_mm = largest_deformations_mm(world, settings.frames);
     let untouched_readings = frames.untouched().frames(Stream::Test, settings.frames).inputs;
     let ungated = decode(&touched.inputs);
-    let measure = experiment.measure();
+    let (measure, limit) =
+        experiment.measure_beside_limit(world.noise.level, settings.frames, progress);
     let errors = |estimate: &[f64]| metrics::by_group(&touched.outputs, estimate, &measure);
 
     let line = |k: f64| {
@@ -241,6 +246,7 @@ pub fn measure(
         model_crc: format!("{:08x}", model.model().crc()),
         frame_cycles: settings.frame_cycles,
         flash_frame_cycles: settings.flash_frame_cycles,
+        limit,
         ungated_errors: errors(&ungated),
         mean_errors: errors(&touched.outputs.means().repeat(settings.frames)),
         lines: settings.k.iter().copied().map(line).collect(),

@@ -18,7 +18,7 @@ use taxel_simulate::Synthesis;
 
 use crate::error::{Error, Result};
 use crate::experiment::{Experiment, Table1 as Settings};
-use crate::metrics::{self, Definition, Errors, Measure};
+use crate::metrics::{self, Definition, Errors, LimitSummary, Measure};
 
 /// Name of the K-centre network in tables and results.
 pub const NETWORK: &str = "network";
@@ -84,6 +84,8 @@ impl Printed {
 pub struct Column {
     /// Noise level p, as a fraction.
     pub noise_level: f64,
+    /// Least possible errors, of a decoder that sees all readings of a frame.
+    pub limit: LimitSummary,
     /// Baselines, then the networks, spread after spread. A standard network (K = N) is omitted where
     /// its interpolation matrix is singular.
     pub decoders: Vec<Entry>,
@@ -136,16 +138,17 @@ pub fn compute(experiment: &Experiment, progress: &dyn Progress) -> Result<Table
         scene: experiment.name.clone(),
         message: "it has no [table1]: add one, or use a scene that has (paper, press)".into(),
     })?;
-    let measure = experiment.measure();
-    progress.stage("table 1", settings.noise_levels.len() * experiment.world.read_rows.len());
     let columns = settings.noise_levels.iter().map(|&level| {
         let frames = Synthesis::of(&experiment.world).noise_level(level);
         let training = experiment.dataset(&frames, Stream::Training, settings.frames);
         let test = experiment.dataset(&frames, Stream::Test, settings.test_frames);
+        let (measure, limit) =
+            experiment.measure_beside_limit(level, settings.test_frames, progress);
+        progress.stage(&format!("table 1, noise {level}"), experiment.world.read_rows.len());
         let decoders = decoders(settings, experiment.world.seed, &training, progress)?;
         let judged = |(spread, decoder): &Spread| entry(decoder.as_ref(), *spread, &test, &measure);
         let decoders = decoders.iter().map(judged).collect();
-        Ok(Column { noise_level: level, decoders })
+        Ok(Column { noise_level: level, limit, decoders })
     });
     Ok(Table1 {
         centres: settings.centres,

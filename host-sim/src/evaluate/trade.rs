@@ -19,7 +19,7 @@ use taxel_simulate::Synthesis;
 use super::gate;
 use crate::error::{Error, NoPoint, Result};
 use crate::experiment::{Experiment, MoreFrames};
-use crate::metrics::{self, DecoderErrors, Errors};
+use crate::metrics::{self, DecoderErrors, Errors, LimitSummary};
 
 mod choice;
 mod gating;
@@ -133,6 +133,12 @@ impl Point {
         self.errors.iter().find(|e| e.group == group).map_or(f64::NAN, |e| e.rmse)
     }
 
+    /// Ratio of the RMSE of a group to the limit, where that is known.
+    #[must_use]
+    pub fn ratio_to_limit(&self, group: &str) -> Option<f64> {
+        self.errors.iter().find(|e| e.group == group)?.ratio_to_limit
+    }
+
     /// Arithmetic of the point, and whether it decodes the whole array at once.
     #[must_use]
     pub fn way(&self) -> String {
@@ -170,6 +176,9 @@ pub struct Trade {
     pub group: String,
     /// Unit of that group.
     pub unit: String,
+    /// Least possible errors with the first number of samples a reading, of a decoder that sees all readings of a frame.
+    /// Ratios to the limit are to that of the point's own number of samples.
+    pub limit: Option<LimitSummary>,
     /// Errors of the baselines, from one sample a reading.
     pub baselines: Vec<DecoderErrors>,
     /// Every point that was judged.
@@ -233,15 +242,18 @@ pub fn compute(
     let rows = world.read_rows.len();
     let arrays: &[bool] = if rows > 1 { &[false, true] } else { &[false] };
     let networks = rows + arrays.len() - 1;
-    progress.stage("trade", plan.samples_averaged.len() * plan.centres.len() * networks);
-    let measure = experiment.measure();
-    let mut judge = Judge::new(experiment.options(), experiment.origin(), &measure, plan, prices);
+    let mut judge =
+        Judge::new(experiment.options(), experiment.origin(), experiment.measure(), plan, prices);
+    let mut limit = None;
     let mut baselines = Vec::new();
     for &samples in &plan.samples_averaged {
         let noise_level = world.noise.level / (samples as f64).sqrt();
         let frames = Synthesis::of(world).noise_level(noise_level);
         let training = experiment.dataset(&frames, Stream::Training, t.frames);
         let test = experiment.dataset(&frames, Stream::Test, t.test_frames);
+        let (measure, summary) =
+            experiment.measure_beside_limit(noise_level, t.test_frames, progress);
+        limit.get_or_insert(summary);
         // The gate compares readings in Ω.
         let readings_ohm = if t.relative_inputs {
             Cow::Owned(frames.frames(Stream::Test, t.test_frames).inputs)
@@ -254,6 +266,8 @@ pub fn compute(
             };
             baselines = BASELINES.iter().map(judged).collect();
         }
+        judge.measure = measure;
+        progress.stage(&format!("trade, {samples} averaged"), plan.centres.len() * networks);
         for &whole_array in arrays {
             let gates = Gates::new(
                 &frames,
@@ -284,6 +298,7 @@ pub fn compute(
         clock_mhz: plan.clock_mhz,
         group: group.into(),
         unit: of_group.map_or(String::new(), |errors| errors.unit.clone()),
+        limit,
         baselines,
         points,
         left_out,

@@ -7,6 +7,7 @@ use super::svg::Shape;
 use super::tables::rmse;
 use super::ticks;
 use taxel_learn::decoders::{linear, mean, standard};
+use taxel_limit::limit;
 
 use crate::evaluate::table1::{Column, NETWORK, Table1};
 use crate::run::{Example, ExampleOutput, RunResult};
@@ -273,6 +274,7 @@ fn line_style(decoder: &str) -> (&'static str, Mark) {
         NETWORK => ("c1", Mark::LineAnd(Shape::Circle)),
         // A broken line, so that it can be seen together with a network that is no better.
         linear::NAME => ("c3 broken", Mark::LineAnd(Shape::Triangle)),
+        limit::NAME => ("truth", Mark::Dotted),
         _ => ("c4", Mark::LineAnd(Shape::Diamond)),
     }
 }
@@ -283,17 +285,28 @@ pub fn error_by_noise(table: &Table1, group: &str, unit: &str) -> Figure {
     let points = |decoder: &str| -> Vec<[f64; 2]> {
         positive().map(|column| [column.noise_level, best(column, decoder, group)]).collect()
     };
-    let lines: Vec<(&str, Vec<[f64; 2]>)> =
+    let mut lines: Vec<(&str, Vec<[f64; 2]>)> =
         decoder_names(table).into_iter().map(|name| (name, points(name))).collect();
+    let least = positive().filter_map(|column| {
+        let limit = column.limit.groups.iter().find(|limit| limit.group == group)?;
+        Some([column.noise_level, limit.limit])
+    });
+    let least: Vec<[f64; 2]> = least.collect();
+    let known = if least.is_empty() {
+        ""
+    } else {
+        lines.push((limit::NAME, least));
+        " Limit: the least possible RMSE of any decoder of the whole frame."
+    };
     let heights = |of_standard: bool| {
         let lines = lines.iter().filter(move |(name, _)| (*name == standard::NAME) == of_standard);
         lines.flat_map(|(_, points)| points.iter().map(|[_, y]| *y))
     };
     // The standard network's error may be larger by orders of magnitude; the others must stay apart.
-    let limit = 2.0 * ticks::extent(heights(false)).map_or(f64::INFINITY, |(_, high)| high);
-    let near = heights(true).filter(|y| *y <= limit);
+    let most = 2.0 * ticks::extent(heights(false)).map_or(f64::INFINITY, |(_, high)| high);
+    let near = heights(true).filter(|y| *y <= most);
     let y = ticks::linear(heights(false).chain(near).chain([0.0]), 5);
-    let clipped = heights(true).any(|y| y > limit);
+    let clipped = heights(true).any(|y| y > most);
 
     let name = symbol(group);
     let noise = ticks::logarithmic_percent(positive().map(|column| column.noise_level));
@@ -335,7 +348,7 @@ pub fn error_by_noise(table: &Table1, group: &str, unit: &str) -> Figure {
              centres{tail}, {} training frames. Standard: the standard RBF network, one centre for \
              each of its {} training frames. Both are shown at their best spread of the table, \
              chosen on the test frames. Linear: the best linear decoder. Mean: always the training \
-             mean.{clipped}{silent}",
+             mean.{known}{clipped}{silent}",
             table.centres,
             super::format::grouped(table.training_frames),
             table.standard_frames

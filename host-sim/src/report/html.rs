@@ -62,7 +62,7 @@ pub fn page(result: &RunResult) -> String {
             grouped(result.model.test_frames)
         ),
         &tables::errors(result),
-        &tables::legend(),
+        &format!("{}<p class=\"note\">{}</p>\n", tables::legend(), escape(&result.limit.note())),
     );
 
     body.heading("One test frame");
@@ -157,6 +157,14 @@ fn summary(result: &RunResult) -> String {
             "<div><dt>{}</dt><dd>{} <span>{}</span></dd></div>",
             escape(tables::decoder_name(decoder)),
             significant(tables::rmse(&decoder.errors, group), 3),
+            escape(unit)
+        );
+    }
+    if let Some(limit) = result.limit.groups.iter().find(|limit| limit.group == *group) {
+        let _ = writeln!(
+            html,
+            "<div><dt>Least possible</dt><dd>{} <span>{}</span></dd></div>",
+            significant(limit.limit, 3),
             escape(unit)
         );
     }

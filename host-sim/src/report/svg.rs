@@ -49,6 +49,19 @@ pub fn text_width(text: &str) -> f64 {
     text.chars().count() as f64 * TEXT_PX * 0.62
 }
 
+/// Drawing as a file of its own, in this size: light or dark like the viewer.
+pub fn standalone(drawing: &str, [width, height]: [f64; 2]) -> String {
+    let open = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" role=\"img\""
+    );
+    let css = format!(
+        "<style>\n{}svg {{ background: var(--paper); font-family: system-ui, \"Segoe UI\", Arial, sans-serif; }}\n</style>\n",
+        include_str!("style.css")
+    );
+    let drawing = drawing.replacen("<svg role=\"img\"", &open, 1);
+    drawing.replacen("<title>", &format!("{css}<title>"), 1)
+}
+
 /// Drawing under construction.
 #[derive(Debug, Clone)]
 pub struct Svg {

@@ -39,6 +39,7 @@ fn heading(definition: Definition) -> &'static str {
         Definition::PositionalPercent => "Positional",
         Definition::RSquared => "R²",
         Definition::MeanRelativePercent => "Mean relative",
+        Definition::RatioToLimit => "× limit",
     }
 }
 
@@ -52,6 +53,10 @@ fn value(definition: Definition, errors: &Errors, rmse_decimals: usize) -> Strin
             format!("{}\u{a0}{}", fixed(value, rmse_decimals), escape(&errors.unit))
         }
         Definition::RSquared => fixed(value, 3),
+        Definition::RatioToLimit => match errors.ratio_standard_error {
+            Some(error) => format!("{}\u{a0}± {}", fixed(value, 2), fixed(error, 2)),
+            None => fixed(value, 2),
+        },
         Definition::RelativeL2Percent | Definition::MeanRelativePercent => {
             format!("{}\u{a0}%", fixed(value, 1))
         }

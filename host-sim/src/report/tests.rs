@@ -1,8 +1,11 @@
 //! Tests of whole pages, on results made by hand.
 
+use taxel_limit::Refusal;
+use taxel_limit::reference::GroupLimit;
+
 use super::html;
 use crate::evaluate::table1::{Column, Entry, NETWORK, Printed, Table1};
-use crate::metrics::{DecoderErrors, Errors};
+use crate::metrics::{DecoderErrors, Errors, LimitSummary};
 use crate::run::{Example, ExampleOutput, ModelSummary, RowErrors, RunResult, SceneSummary};
 
 const ROW_WIRES: usize = 3;
@@ -19,6 +22,8 @@ fn errors(group: &str, rmse: f64) -> Errors {
         positional_percent: (group == "dz_mm").then_some(10.0 * rmse),
         r_squared: Some(1.0 - rmse),
         mean_relative_percent: None,
+        ratio_to_limit: Some(1.0 + rmse),
+        ratio_standard_error: Some(0.02),
     }
 }
 
@@ -35,6 +40,7 @@ fn result(groups: &[&str]) -> RunResult {
         errors: of_groups(groups, rmse),
     };
     let column = |noise_level| Column {
+        limit: LimitSummary::of(&Err(Refusal::Drift)),
         noise_level,
         decoders: vec![
             entry("mean", None, 0.3),
@@ -82,6 +88,7 @@ fn result(groups: &[&str]) -> RunResult {
                 errors: of_groups(groups, rmse),
             })
             .to_vec(),
+        limit: LimitSummary::of(&Err(Refusal::Drift)),
         rows: (0..ROW_WIRES)
             .map(|row| RowErrors { row_wire: row + 2, errors: of_groups(groups, 0.1) })
             .collect(),
@@ -216,6 +223,31 @@ fn forces_have_no_positional_error() {
     assert!(table.contains("%FS = mean|e|/full scale"));
     assert!(!table.contains("positional"));
     assert!(page.contains("the force of its electrodes"));
+}
+
+#[test]
+fn the_limit_is_a_line_where_it_is_known() {
+    let mut result = result(&["dz_mm"]);
+    assert!(!html(&result).contains("Limit: the least possible"));
+    let limit = GroupLimit {
+        group: "dz_mm".into(),
+        unit: "mm".into(),
+        limit: 0.07,
+        limit_standard_error: 0.001,
+        rmse: 0.08,
+        rmse_standard_error: 0.002,
+        prior_rmse: 0.3,
+        monte_carlo_share: 0.01,
+    };
+    let summary = LimitSummary { frames: 20, groups: vec![limit], refused: None };
+    result.limit = summary.clone();
+    for column in &mut result.table1.as_mut().unwrap().columns {
+        column.limit = summary.clone();
+    }
+    let page = html(&result);
+    assert!(is_drawable(&page) && page.contains("Limit: the least possible"));
+    assert!(page.contains("Least possible</dt><dd>0.0700"));
+    assert_eq!(page.matches("truth name\">limit</text>").count(), 2, "wide and narrow");
 }
 
 #[test]

@@ -7,10 +7,10 @@ use model_core::rbf::Format;
 use super::chart::{Axis, Chart, Mark, Series};
 use super::format::{grouped, percent, significant, symbol};
 use super::html::document;
-use super::svg::{Shape, escape};
+use super::svg::{Shape, escape, standalone};
 use super::{tables, ticks};
 use crate::evaluate::trade::{Arithmetic, Point, Trade};
-use crate::metrics::DecoderErrors;
+use crate::metrics::{DecoderErrors, LimitSummary};
 
 /// Style of an arithmetic's points: two classes for networks of a row, two for networks of the whole
 /// array, and the shape of both. The second of two classes is for points behind a gate.
@@ -101,15 +101,8 @@ fn grouped_cycles(cycles: f64) -> String {
 
 /// Picture of a trade, as a file of its own.
 pub fn svg(trade: &Trade) -> String {
-    let drawing = chart(trade).draw([960.0, 560.0]);
-    let open =
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"960\" height=\"560\" role=\"img\"";
-    let drawing = drawing.replacen("<svg role=\"img\"", open, 1);
-    let css = format!(
-        "<style>\n{}svg {{ background: var(--paper); }}\n</style>\n",
-        include_str!("style.css")
-    );
-    drawing.replacen("<title>", &format!("{css}<title>"), 1)
+    let size = [960.0, 560.0];
+    standalone(&chart(trade).draw(size), size)
 }
 
 /// Page of a trade.
@@ -155,17 +148,22 @@ fn baselines(trade: &Trade) -> String {
 }
 
 fn table(trade: &Trade) -> String {
-    let mut html = String::from(
+    let note = trade.limit.as_ref().map_or(String::new(), LimitSummary::note);
+    let mut html = format!(
         "<figure id=\"table-1\" class=\"table\">\n<figcaption><b>Table 1.</b> Every point; those on the \
-         Pareto front are bold. In brackets: RMSE relative to the smallest of all points.</figcaption>\n<div class=\"scroll\" \
+         Pareto front are bold. In brackets: RMSE relative to the smallest of all points. × limit: that of {} relative to the least \
+         possible one with as many samples a reading. {}</figcaption>\n<div class=\"scroll\" \
          tabindex=\"0\" role=\"region\" aria-label=\"Table 1\">\n<table>\n<thead><tr><th>format</th>\
          <th class=\"number\">K</th><th class=\"number\">rank</th><th class=\"after\">tail</th><th class=\"number\">samples</th>\
          <th class=\"number\">gate k</th>",
+        symbol(&trade.group),
+        escape(&note),
     );
     for (group, unit) in trade.groups() {
         let (group, unit) = (symbol(group), escape(unit));
         let _ = write!(html, "<th class=\"number\">RMSE of {group}, {unit}</th>");
     }
+    html += "<th class=\"number\">× limit</th>";
     for head in ["instructions", "cycles", "from flash", "µs", "flash, B", "RAM, B"] {
         let _ = write!(html, "<th class=\"number\">{head}</th>");
     }
@@ -188,6 +186,9 @@ fn table(trade: &Trade) -> String {
             let _ =
                 write!(html, "<td class=\"number\">{} ({ratio:.2})</td>", significant(e.rmse, 3));
         }
+        let ratio = p.ratio_to_limit(&trade.group);
+        let ratio = ratio.map_or("–".into(), |ratio| format!("{ratio:.2}"));
+        let _ = write!(html, "<td class=\"number\">{ratio}</td>");
         let times = significant(p.frame_us, 3);
         for number in [
             grouped(p.frame.instructions as usize),

@@ -63,7 +63,7 @@ fn a_gate_and_a_trade_see_readings_and_baselines_of_the_same_session() {
             frame_cycles: Frames { ungated: 3, at_rest: 1, awake: 4 },
             flash_frame_cycles: None,
         };
-        gate::measure(scene, &model, &settings).unwrap()
+        gate::measure(scene, &model, &settings, &Silent).unwrap()
     };
     let scene_of = |gain: &str, relative_inputs: bool| {
         let drift = format!("[drift]\ngain = {gain}\n\n[noise]");

@@ -12,7 +12,7 @@ const READINGS: usize = 18;
 
 fn measured(scene: &Experiment, settings: &Settings) -> GateResult {
     let blob = scene.train(&Silent).unwrap();
-    gate::measure(scene, &blob.prepare(Exponential::default()), settings).unwrap()
+    gate::measure(scene, &blob.prepare(Exponential::default()), settings, &Silent).unwrap()
 }
 
 fn z(errors: &[Errors]) -> f64 {
@@ -60,7 +60,7 @@ fn press_loses_little_accuracy_and_saves_half_of_the_rows() {
         frame_cycles: frames.map(|cost| cost.cycles),
         flash_frame_cycles: None,
     };
-    let result = gate::measure(&scene, &model, &settings).unwrap();
+    let result = gate::measure(&scene, &model, &settings, &Silent).unwrap();
     let [three, three_and_half] = &result.lines[..] else { panic!("two lines") };
     let worse = |errors: &[Errors]| z(errors) / z(&result.ungated_errors);
     // Measured: 1.029 and 1.055.

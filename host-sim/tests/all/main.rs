@@ -11,6 +11,7 @@ mod drift;
 mod gate;
 #[cfg(unix)]
 mod interruption;
+mod limit;
 mod readout;
 mod refusals;
 mod scan;

@@ -154,7 +154,7 @@ fn behind_a_gate_points_have_the_errors_of_the_gates_rows_and_cost_their_share()
             frame_cycles: frames.map(|cost| cost.cycles),
             flash_frame_cycles: None,
         };
-        let result = gate::measure(&scene, &model, &settings).unwrap();
+        let result = gate::measure(&scene, &model, &settings, &Silent).unwrap();
         assert_eq!(point.errors, result.lines[0].errors);
         assert_eq!(without.errors, result.ungated_errors);
         let skipped = result.lines[0].skipped;

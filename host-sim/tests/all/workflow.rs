@@ -294,8 +294,8 @@ fn run_writes_a_whole_folder_and_its_blob_is_the_one_that_train_writes() {
     let metrics = json(&std::fs::read_to_string(out.join("metrics.json")).unwrap());
     assert_eq!(metrics, printed);
     let table = std::fs::read_to_string(out.join("table1.csv")).unwrap();
-    // 4 noise levels × (2 baselines + 10 spreads × 2 networks) × 3 axes × 6 definitions.
-    assert_eq!(table.lines().count(), 1 + 4 * (2 + 20) * 3 * 6);
+    // 4 noise levels × (2 baselines + 10 spreads × 2 networks) × 3 axes × 7 definitions.
+    assert_eq!(table.lines().count(), 1 + 4 * (2 + 20) * 3 * 7);
     let before = folder.names();
     folder.succeed(&["run", "scene.toml"]); // again, over what is there
     assert_eq!(folder.names(), before);

@@ -21,6 +21,7 @@ pub const CRATES: &[(&str, Side)] = &[
     ("taxel-data", Side::Host),
     ("taxel-simulate", Side::Host),
     ("taxel-learn", Side::Host),
+    ("taxel-limit", Side::Host),
     ("taxel-rig", Side::Host),
     ("host-sim", Side::Host),
     ("xtask", Side::Host),

@@ -1,9 +1,9 @@
 //! Motion of each electrode independently of all others.
 
 use serde::Deserialize;
-use taxel_data::BadValue;
 use taxel_data::random::Purpose;
 use taxel_data::simd::{self, Lanes};
+use taxel_data::{BadValue, normal_share_below};
 
 use super::{Draws, Motion, Trajectories, check_range};
 use crate::sensor::Sensor;
@@ -29,6 +29,30 @@ impl Motion for Independent {
         check_range("dx_mm", self.dx_mm)?;
         check_range("dy_mm", self.dy_mm)?;
         check_range("dz_mm", self.dz_mm)
+    }
+
+    fn latents(&self, electrodes: usize) -> usize {
+        3 * electrodes
+    }
+
+    fn has_independent_rows(&self) -> bool {
+        true
+    }
+
+    fn place(&self, _: &Sensor, _row: usize, latents: &[Lanes], deformation_mm: &mut [[Lanes; 3]]) {
+        let ranges_mm = self.range_mm();
+        simd::widest(
+            #[inline(always)]
+            || {
+                for (delta, latents) in deformation_mm.iter_mut().zip(latents.chunks_exact(3)) {
+                    for ((delta, latents), range) in delta.iter_mut().zip(latents).zip(ranges_mm) {
+                        for (delta, latent) in delta.iter_mut().zip(latents) {
+                            *delta = range[0] + (range[1] - range[0]) * normal_share_below(*latent);
+                        }
+                    }
+                }
+            },
+        );
     }
 
     fn start<'m>(&'m self, _: &'m Sensor, _: &mut Draws) -> Box<dyn Trajectories + 'm> {

@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 use serde::Deserialize;
 use taxel_data::random::{Purpose, RandomLanes};
 use taxel_data::simd::{self, LANES, Lanes};
-use taxel_data::{BadValue, exp, sin_cos};
+use taxel_data::{BadValue, exp, normal_share_below, sin_cos};
 
 use super::{Draws, Motion, Trajectories, check_range};
 use crate::sensor::{Sensor, Vector3};
@@ -59,6 +59,33 @@ impl Motion for Press {
         check_range("dent_radius_mm", self.dent_radius_mm)?;
         check_range("dent_depth_mm", self.dent_depth_mm)?;
         check_range("shear_ratio", self.shear_ratio)
+    }
+
+    fn latents(&self, _electrodes: usize) -> usize {
+        6
+    }
+
+    fn has_independent_rows(&self) -> bool {
+        false
+    }
+
+    fn place(
+        &self,
+        sensor: &Sensor,
+        row: usize,
+        latents: &[Lanes],
+        deformation_mm: &mut [[Lanes; 3]],
+    ) {
+        let electrodes_mm = sensor.row_electrodes_mm(row);
+        simd::widest(
+            #[inline(always)]
+            || {
+                let contact = Contact::of_latents(latents, &sensor.size_mm, self);
+                for (delta, electrode_mm) in deformation_mm.iter_mut().zip(electrodes_mm) {
+                    contact.deform(electrode_mm, delta);
+                }
+            },
+        );
     }
 
     fn start<'m>(&'m self, sensor: &'m Sensor, draws: &mut Draws) -> Box<dyn Trajectories + 'm> {
@@ -126,6 +153,33 @@ impl Contact {
             shear[0][frame] = ratios[frame] * cosine;
             shear[1][frame] = ratios[frame] * sine;
         }
+        Self { centre_mm: [x_mm, y_mm], dent_radius_mm, dent_depth_mm, shear }
+    }
+
+    /// Contacts that `latents` stand for: one each for the centre's x and y, the dent's radius and depth, and two
+    /// for the shear. These two are a vector in the shear's direction, so nothing jumps at θ = 2π.
+    #[inline(always)]
+    fn of_latents(latents: &[Lanes], size_mm: &Vector3, press: &Press) -> Self {
+        let ranges =
+            [[0.0, size_mm[0]], [0.0, size_mm[1]], press.dent_radius_mm, press.dent_depth_mm];
+        let mut uniform = [[0.0; LANES]; 4];
+        let mut shear = [[0.0; LANES]; 2];
+        for (i, [low, high]) in ranges.into_iter().enumerate() {
+            for frame in 0..LANES {
+                uniform[i][frame] = low + (high - low) * normal_share_below(latents[i][frame]);
+            }
+        }
+        let [low, high] = press.shear_ratio;
+        for frame in 0..LANES {
+            let (x, y) = (latents[4][frame], latents[5][frame]);
+            let squared = x * x + y * y;
+            // 1 − exp(−½r²) is uniform; the square is kept from 0, where the direction does not exist.
+            let ratio = low + (high - low) * (1.0 - exp(-0.5 * squared));
+            let factor = ratio / squared.max(1e-300).sqrt();
+            shear[0][frame] = factor * x;
+            shear[1][frame] = factor * y;
+        }
+        let [x_mm, y_mm, dent_radius_mm, dent_depth_mm] = uniform;
         Self { centre_mm: [x_mm, y_mm], dent_radius_mm, dent_depth_mm, shear }
     }
 

@@ -65,7 +65,8 @@ impl<'s> Sets<'s> {
 pub(super) struct Judge<'s> {
     options: Options,
     origin: Origin,
-    measure: &'s Measure,
+    /// Measure of the errors of the points to come.
+    pub measure: Measure,
     plan: &'s Plan,
     pub prices: Prices,
     pub points: Vec<Point>,
@@ -81,7 +82,7 @@ impl<'s> Judge<'s> {
     pub fn new(
         options: Options,
         origin: Origin,
-        measure: &'s Measure,
+        measure: Measure,
         plan: &'s Plan,
         prices: Prices,
     ) -> Self {
@@ -197,7 +198,7 @@ impl<'s> Judge<'s> {
                 affine_tail,
                 samples_averaged,
                 gate_k,
-                errors: metrics::by_group(&test.outputs, estimate, self.measure),
+                errors: metrics::by_group(&test.outputs, estimate, &self.measure),
                 ratio_to_best: vec![],
                 frame,
                 frame_us: frame.cycles as f64 / self.plan.clock_mhz,

@@ -1,0 +1,59 @@
+//! Reasons for giving no limit.
+
+/// Reason why a limit cannot be computed, or why its figure would not be sound.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Refusal {
+    /// World whose gain drifts.
+    #[error("a drift of the gain is not modelled")]
+    Drift,
+    /// World without noise, in which nothing limits a decoder but the sensor itself.
+    #[error("there is no noise, so there is no posterior to sample")]
+    NoNoise,
+    /// Motion whose frames follow one another in time.
+    #[error("frames that follow one another in time are not modelled")]
+    Steps,
+    /// Motion with more latents than the sampler can handle.
+    #[error("{latents} unknowns at once are more than the {most} that the sampler is made for")]
+    TooManyLatents {
+        /// Number of latents that are sampled together.
+        latents: usize,
+        /// Largest number of latents.
+        most: usize,
+    },
+    /// Posteriors with too few effective samples.
+    #[error(
+        "{thin} of {of} posteriors have fewer than {least} effective samples: the sample does not carry the figure"
+    )]
+    Thin {
+        /// Number of posteriors with too few.
+        thin: usize,
+        /// Number of posteriors.
+        of: usize,
+        /// Smallest effective sample size that counts.
+        least: f64,
+    },
+    /// Posterior means whose own Monte Carlo error is too large a part of their error.
+    #[error(
+        "{share_percent:.1} % of the squared error of {group} is the sample's own: the sample does not carry the figure"
+    )]
+    MonteCarlo {
+        /// Group of outputs.
+        group: String,
+        /// Share of the mean squared error, in per cent.
+        share_percent: f64,
+    },
+    /// Errors that are larger than the posteriors say: samples that missed a part of the posterior.
+    #[error(
+        "the errors of {group} and the posteriors' own deviations differ by {standard_errors:.1} standard errors: the \
+         sample does not carry the figure"
+    )]
+    Inconsistent {
+        /// Group of outputs.
+        group: String,
+        /// Difference of the mean squares, in standard errors.
+        standard_errors: f64,
+    },
+    /// Measured data, of which neither the sensor nor the prior is known.
+    #[error("the sensor and the prior of measured data are not known")]
+    Measured,
+}

@@ -1,0 +1,34 @@
+//! What a sensor can know: the least possible error of any decoder, and the directions that its noise hides.
+//!
+//! The least mean square error of all decoders is that of the posterior mean E[Δ | readings]. A [`Limit`] computes it
+//! by adaptive importance sampling, for worlds whose prior and noise are known; a [`Reference`] compares decoders
+//! with it. `docs/what-the-sensor-knows.md` explains both. Modules stand from the ground up; each imports only what
+//! stands before it.
+//!
+//! ```
+//! use taxel_data::progress::Silent;
+//! use taxel_limit::Reference;
+//! use taxel_simulate::World;
+//!
+//! let world = World { read_rows: vec![3], ..World::press() }; // one row-wire
+//! let reference = Reference::of(&world, 100, &Silent)?;
+//! let z = &reference.limits()[2];
+//! assert!((z.limit - 0.0456).abs() < 3.0 * z.limit_standard_error.hypot(0.0016), "{} mm", z.limit);
+//! # Ok::<(), taxel_limit::Refusal>(())
+//! ```
+
+pub mod error;
+mod target;
+mod weights;
+mod samples;
+mod mixture;
+mod population;
+mod frame;
+pub mod limit;
+pub mod reference;
+pub mod identify;
+pub mod geometry;
+
+pub use error::Refusal;
+pub use limit::Limit;
+pub use reference::{Ratio, Reference};

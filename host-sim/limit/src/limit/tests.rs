@@ -1,0 +1,128 @@
+//! The limit against figures that were computed independently, and against what must not change it.
+
+use taxel_learn::Decoder;
+use taxel_simulate::motion::Press;
+use taxel_simulate::noise::NoiseKind;
+use taxel_simulate::{drift::Drift, synthesise};
+
+use super::*;
+use crate::reference::Reference;
+use crate::target::Target;
+
+/// Limits of z on scene `press` in mm, by an independent program: noise level, RMSE, and its standard error.
+const ARRAY: [(f64, f64, f64); 4] = [
+    (0.005, 0.0314, 0.0011),
+    (0.01, 0.0415, 0.0013),
+    (0.05, 0.1056, 0.0024),
+    (0.1, 0.1339, 0.0031),
+];
+const ROW_4: [(f64, f64, f64); 4] = [
+    (0.005, 0.0456, 0.0016),
+    (0.01, 0.0639, 0.0022),
+    (0.05, 0.1314, 0.0046),
+    (0.1, 0.1536, 0.0054),
+];
+
+#[test]
+fn limits_agree_with_independent_figures_within_two_standard_errors() {
+    for (read_rows, figures) in [((0..8).collect::<Vec<_>>(), ARRAY), (vec![3], ROW_4)] {
+        for (level, expected, standard_error) in figures {
+            let mut world = World { read_rows: read_rows.clone(), ..World::press() };
+            world.noise.level = level;
+            let z = &Reference::of(&world, 150, &Silent).unwrap().limits()[2];
+            let allowed = 2.0 * standard_error.hypot(z.limit_standard_error);
+            let off = z.limit - expected;
+            assert!(off.abs() < allowed, "noise {level}, {} rows: {z:?}", read_rows.len());
+            assert!(z.limit_standard_error < 0.06 * z.limit, "{z:?}");
+        }
+    }
+}
+
+#[test]
+fn a_frame_is_decoded_alike_wherever_it_stands() {
+    let world = World { read_rows: vec![2, 3], ..World::press() };
+    let frames = synthesise(&world, Stream::Test, 6);
+    let limit = Limit::of(&world).unwrap();
+    let all = limit.decode_all(&frames.inputs.values, 1);
+    let width = FrameDecoder::inputs(&limit);
+    let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let later = one_thread.install(|| limit.decode_all(&frames.inputs.values[4 * width..], 1));
+    let outputs = all.values.len() / 6;
+    assert_eq!(later.values, all.values[4 * outputs..]);
+    assert_eq!(later.deviation.unwrap(), all.deviation.unwrap()[4 * outputs..]);
+}
+
+#[test]
+fn noise_of_a_span_is_modelled() {
+    // Two scenes with nearly the same noise: one relative to the reading, one to the span.
+    let mut world = World { read_rows: vec![3], ..World::press() };
+    let limit = |world: &World| Reference::of(world, 100, &Silent).unwrap().limits()[2].clone();
+    let relative = limit(&world);
+    let frames = Synthesis::of(&world).ideal().frames(Stream::Test, 2000).inputs;
+    let spans: f64 = frames.ranges().iter().map(|[low, high]| high - low).sum();
+    let span_of_mean = spans / frames.means().iter().sum::<f64>();
+    world.noise.kind = NoiseKind::Span;
+    world.noise.level = 0.005 / span_of_mean;
+    let of_span = limit(&world);
+    let ratio = of_span.limit / relative.limit;
+    assert!((0.85..1.15).contains(&ratio), "{relative:?} {of_span:?}");
+}
+
+#[test]
+fn what_is_not_modelled_is_refused() {
+    let refusal = |world: &World| Limit::of(world).unwrap_err();
+    let drift = Some(Drift { gain: 0.02 });
+    assert_eq!(refusal(&World { drift, ..World::press() }), Refusal::Drift);
+    let mut quiet = World::press();
+    quiet.noise.level = 0.0;
+    assert_eq!(refusal(&quiet), Refusal::NoNoise);
+    let mut long = World::paper();
+    long.sensor.electrodes_per_row_wire = 11;
+    assert!(matches!(refusal(&long), Refusal::TooManyLatents { latents: 33, .. }));
+}
+
+#[test]
+fn latents_have_the_distribution_that_frames_are_drawn_from() {
+    let press =
+        Press { dent_radius_mm: [2.0, 5.0], dent_depth_mm: [0.2, 1.0], shear_ratio: [0.1, 0.5] };
+    let mut world = World { read_rows: vec![1], ..World::of_motion(press) };
+    for motion in [world.motion.clone(), World::paper().motion] {
+        world.motion = motion;
+        let drawn = Synthesis::of(&world).frames(Stream::Test, 20_000).outputs;
+        let prior = prior(&world, &[1]);
+        let rows = Rows {
+            world: &world,
+            model: LaneModel::new(&world.sensor),
+            wires: &[1],
+            deviation_ohm: &[],
+        };
+        let (frame, mut memory) = (Frame { rows: &rows, readings_ohm: &[] }, rows.memory());
+        let mut sums = vec![[0.0; 2]; drawn.names.len()];
+        let mut values = vec![[0.0; LANES]; sums.len()];
+        for places in prior.samples.places.chunks_exact(LANES * rows.latents()) {
+            let mut latents = vec![[0.0; LANES]; rows.latents()];
+            for (lane, place) in places.chunks_exact(rows.latents()).enumerate() {
+                latents.iter_mut().zip(place).for_each(|(latent, x)| latent[lane] = *x);
+            }
+            frame.outputs(&latents, &mut memory, &mut values);
+            for ([sum, squares], value) in sums.iter_mut().zip(values.as_flattened().chunks(LANES))
+            {
+                *sum += value.iter().sum::<f64>();
+                *squares += value.iter().map(|v| v * v).sum::<f64>();
+            }
+        }
+        let count = prior.samples.len() as f64;
+        for (i, [sum, squares]) in sums.into_iter().enumerate() {
+            let values: Vec<f64> = drawn.lines().map(|line| line[i]).collect();
+            let n = values.len() as f64;
+            let mean = values.iter().sum::<f64>() / n;
+            let square = values.iter().map(|v| v * v).sum::<f64>() / n;
+            let fourth = values.iter().map(|v| v.powi(4)).sum::<f64>() / n;
+            let both = (1.0 / n + 1.0 / count).sqrt();
+            let off = (sum / count - mean) / (both * (square - mean * mean).sqrt());
+            assert!(off.abs() < 4.0, "{}: mean off by {off}", drawn.names[i]);
+            let off = (squares / count - square) / (both * (fourth - square * square).sqrt());
+            assert!(off.abs() < 4.0, "{}: square off by {off}", drawn.names[i]);
+        }
+    }
+}

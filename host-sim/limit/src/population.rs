@@ -1,0 +1,148 @@
+//! Adaptive importance sampling: a population that moves from the prior to the posterior.
+//!
+//! Population Monte Carlo (Cappé et al., 2004) with a tempered likelihood. In each round, samples are weighted by the
+//! prior times a power of the likelihood; a mixture is fitted to them, and the next samples are drawn from it. The
+//! power is the largest that leaves enough effective samples. Once it is 1, samples are kept. Their weight is
+//! likelihood × prior / proposal, whatever the earlier rounds did.
+
+use taxel_data::random::Random;
+use taxel_data::simd::{LANES, Lanes};
+
+use crate::mixture::Mixture;
+use crate::samples::Samples;
+use crate::target::Target;
+use crate::weights::{effective, largest_power, normalised, tempered};
+
+/// Earlier rounds whose samples are weighted again with those of the last one.
+const REMEMBERED: usize = 3;
+
+/// Work that is done for one posterior.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Effort {
+    /// Number of samples of a round, a multiple of [`LANES`].
+    pub round: usize,
+    /// Effective sample size from which a proposal is fitted.
+    pub fitted: f64,
+    /// Effective sample size at which sampling ends.
+    pub wanted: f64,
+    /// Largest number of rounds.
+    pub rounds: usize,
+}
+
+impl Effort {
+    /// Effort for so many `latents`: a covariance needs several samples for each.
+    pub fn of(latents: usize) -> Self {
+        let round = (25 * latents * latents).max(1024).next_multiple_of(LANES);
+        let fitted = (10 * latents / 3).max(10) as f64;
+        Self { round, fitted, wanted: 100.0, rounds: 40 }
+    }
+}
+
+/// Moments of a posterior.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Moments {
+    /// Effective sample size.
+    pub effective: f64,
+    /// Mean of each output.
+    pub mean: Vec<f64>,
+    /// Variance of each output.
+    pub variance: Vec<f64>,
+}
+
+/// Samples the posterior `target`, from samples of the prior with their likelihoods.
+///
+/// The result has the latest samples at the power 1: few or none if the population did not get there.
+pub fn sample<T: Target>(
+    target: &T,
+    prior: Samples,
+    effort: &Effort,
+    random: &mut Random,
+    memory: &mut T::Memory,
+) -> Samples {
+    let mut population = prior;
+    let mut kept = Samples::new(target.latents());
+    for round in 0..effort.rounds {
+        let power = largest_power(&population.log_prior, &population.log_likelihood, effort.fitted);
+        let log = tempered(&population.log_prior, &population.log_likelihood, power);
+        let mixture = Mixture::fit(&population, &normalised(&log), random);
+        let drawn = draw(target, &mixture, effort.round, random, memory);
+        if power < 1.0 {
+            // Samples of the prior are too far apart to be of use later.
+            if round == 0 {
+                population = drawn;
+            } else {
+                population.append(&drawn);
+                population.keep_last(REMEMBERED * effort.round);
+            }
+            continue;
+        }
+        kept.append(&drawn);
+        let log = tempered(&kept.log_prior, &kept.log_likelihood, 1.0);
+        if effective(&normalised(&log)) >= effort.wanted {
+            break;
+        }
+        population = kept.clone();
+    }
+    kept
+}
+
+fn draw<T: Target>(
+    target: &T,
+    mixture: &Mixture,
+    count: usize,
+    random: &mut Random,
+    memory: &mut T::Memory,
+) -> Samples {
+    let mut samples = Samples::new(target.latents());
+    let mut latents = vec![[0.0; LANES]; target.latents()];
+    for first in (0..count).step_by(LANES) {
+        mixture.draw(first, random, &mut latents);
+        samples.log_prior.extend(mixture.log_prior_over_density(&latents));
+        samples.log_likelihood.extend(target.log_likelihood(&latents, memory));
+        for lane in 0..LANES {
+            samples.places.extend(latents.iter().map(|latent| latent[lane]));
+        }
+    }
+    samples
+}
+
+/// Posterior mean and variance of every output of `target`, from weighted `samples`.
+///
+/// The variance is that of the weights times n/(n − 1), with the effective sample size n.
+pub fn moments<T: Target>(target: &T, samples: &Samples, memory: &mut T::Memory) -> Moments {
+    let weights = normalised(&tempered(&samples.log_prior, &samples.log_likelihood, 1.0));
+    let outputs = target.output_count();
+    let mut sums = vec![[0.0; 2]; outputs];
+    let mut latents: Vec<Lanes> = vec![[0.0; LANES]; samples.latents];
+    let mut values = vec![[0.0; LANES]; outputs];
+    let places = samples.places.chunks_exact(LANES * samples.latents);
+    for (places, weights) in places.zip(weights.chunks_exact(LANES)) {
+        if weights.iter().all(|weight| *weight < NEGLIGIBLE) {
+            continue;
+        }
+        for (lane, place) in places.chunks_exact(samples.latents).enumerate() {
+            latents.iter_mut().zip(place).for_each(|(latent, x)| latent[lane] = *x);
+        }
+        target.outputs(&latents, memory, &mut values);
+        for ([sum, squares], values) in sums.iter_mut().zip(&values) {
+            for (weight, value) in weights.iter().zip(values) {
+                *sum += weight * value;
+                *squares += weight * value * value;
+            }
+        }
+    }
+    let effective = effective(&weights);
+    let unbiased = if effective > 1.0 { effective / (effective - 1.0) } else { f64::NAN };
+    let variance = |[mean, squares]: &[f64; 2]| (squares - mean * mean).max(0.0) * unbiased;
+    Moments {
+        effective,
+        mean: sums.iter().map(|[mean, _]| *mean).collect(),
+        variance: sums.iter().map(variance).collect(),
+    }
+}
+
+/// Share of a weight in the sum below which it is left out.
+const NEGLIGIBLE: f64 = 1e-14;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,131 @@
+//! The sampler against posteriors that are known exactly.
+
+use nalgebra::{DMatrix, DVector};
+use taxel_data::random::{Purpose, Stream};
+
+use super::*;
+
+/// Data y = slope·x + noise of standard deviation `deviation`; the outputs are the latents x.
+struct Linear {
+    slope: DMatrix<f64>,
+    data: DVector<f64>,
+    deviation: f64,
+}
+
+impl Target for Linear {
+    type Memory = ();
+
+    fn latents(&self) -> usize {
+        self.slope.ncols()
+    }
+
+    fn output_count(&self) -> usize {
+        self.slope.ncols()
+    }
+
+    fn log_likelihood(&self, latents: &[Lanes], (): &mut ()) -> Lanes {
+        std::array::from_fn(|lane| {
+            let x = DVector::from_iterator(latents.len(), latents.iter().map(|l| l[lane]));
+            -0.5 * (&self.data - &self.slope * x).norm_squared() / self.deviation.powi(2)
+        })
+    }
+
+    fn outputs(&self, latents: &[Lanes], (): &mut (), outputs: &mut [Lanes]) {
+        outputs.copy_from_slice(latents);
+    }
+}
+
+/// One latent x, of which the data is x² with noise: two modes.
+struct Square {
+    data: f64,
+    deviation: f64,
+}
+
+impl Target for Square {
+    type Memory = ();
+
+    fn latents(&self) -> usize {
+        1
+    }
+
+    fn output_count(&self) -> usize {
+        2
+    }
+
+    fn log_likelihood(&self, latents: &[Lanes], (): &mut ()) -> Lanes {
+        latents[0].map(|x| -0.5 * ((self.data - x * x) / self.deviation).powi(2))
+    }
+
+    fn outputs(&self, latents: &[Lanes], (): &mut (), outputs: &mut [Lanes]) {
+        outputs[0] = latents[0];
+        outputs[1] = latents[0].map(f64::abs);
+    }
+}
+
+fn posterior<T: Target<Memory = ()>>(target: &T, effort: &Effort, index: u64) -> Moments {
+    let mut random = Random::new(1, Stream::Test, Purpose::Posterior, index, 0);
+    let mut prior = Samples::new(target.latents());
+    for _ in 0..32 {
+        let mut latents = vec![[0.0; LANES]; target.latents()];
+        latents.as_flattened_mut().fill_with(|| random.normal());
+        prior.log_likelihood.extend(target.log_likelihood(&latents, &mut ()));
+        prior.log_prior.extend([0.0; LANES]);
+        for lane in 0..LANES {
+            prior.places.extend(latents.iter().map(|latent| latent[lane]));
+        }
+    }
+    let samples = sample(target, prior, effort, &mut random, &mut ());
+    moments(target, &samples, &mut ())
+}
+
+#[test]
+fn a_linear_posterior_is_the_exact_one() {
+    let mut random = Random::new(2, Stream::Test, Purpose::Noise, 0, 0);
+    for (index, deviation) in [1.0, 0.1, 0.01].into_iter().enumerate() {
+        let slope = DMatrix::from_fn(8, 4, |_, _| random.normal());
+        let truth = DVector::from_fn(4, |_, _| random.normal());
+        let noise = DVector::from_fn(8, |_, _| deviation * random.normal());
+        let target = Linear { data: &slope * truth + noise, slope, deviation };
+        let precision =
+            DMatrix::identity(4, 4) + target.slope.transpose() * &target.slope / deviation.powi(2);
+        let covariance = precision.try_inverse().unwrap();
+        let exact = &covariance * target.slope.transpose() * &target.data / deviation.powi(2);
+        let effort = Effort { wanted: 2000.0, ..Effort::of(4) };
+        let found = posterior(&target, &effort, index as u64);
+        assert!(found.effective >= 2000.0, "{}", found.effective);
+        for i in 0..4 {
+            let standard_error = (covariance[(i, i)] / found.effective).sqrt();
+            let off = (found.mean[i] - exact[i]) / standard_error;
+            assert!(off.abs() < 4.0, "deviation {deviation}, latent {i}: {off} standard errors");
+            let ratio = found.variance[i] / covariance[(i, i)];
+            assert!((ratio - 1.0).abs() < 4.0 * (2.0 / found.effective).sqrt(), "{ratio}");
+        }
+    }
+}
+
+#[test]
+fn a_posterior_with_two_modes_is_that_of_a_fine_grid() {
+    let target = Square { data: 1.2, deviation: 0.05 };
+    let [mut sum, mut sums] = [0.0, 0.0];
+    for i in -60_000..60_000 {
+        let x = (f64::from(i) + 0.5) * 1e-4;
+        let off: f64 = (target.data - x * x) / target.deviation;
+        let density = (-0.5 * (x * x + off * off)).exp();
+        sum += density;
+        sums += density * x.abs();
+    }
+    let effort = Effort { wanted: 1000.0, ..Effort::of(1) };
+    let found = posterior(&target, &effort, 0);
+    for (i, exact) in [0.0, sums / sum].into_iter().enumerate() {
+        let standard_error = (found.variance[i] / found.effective).sqrt();
+        assert!((found.mean[i] - exact).abs() < 4.0 * standard_error, "{} {exact}", found.mean[i]);
+    }
+}
+
+#[test]
+fn a_population_that_does_not_arrive_says_so() {
+    let data = DVector::from_element(3, 3.0);
+    let target = Linear { slope: DMatrix::identity(3, 3), data, deviation: 1e-6 };
+    let found = posterior(&target, &Effort { rounds: 2, ..Effort::of(3) }, 0);
+    assert!(found.effective < 2.0, "{}", found.effective);
+}

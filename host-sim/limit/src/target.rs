@@ -1,0 +1,21 @@
+//! Interface of what is sampled: latents with a standard normal prior, a likelihood, and outputs.
+
+use taxel_data::simd::Lanes;
+
+/// Posterior distribution of independent standard normal latents, given data.
+pub trait Target: Sync {
+    /// Working memory of one thread.
+    type Memory;
+
+    /// Number of latents.
+    fn latents(&self) -> usize;
+
+    /// Number of outputs whose posterior mean is wanted.
+    fn output_count(&self) -> usize;
+
+    /// Natural logarithm of the data's likelihood at the `latents` of each lane, but for a constant.
+    fn log_likelihood(&self, latents: &[Lanes], memory: &mut Self::Memory) -> Lanes;
+
+    /// Writes the outputs at the `latents` of each lane, one entry an output.
+    fn outputs(&self, latents: &[Lanes], memory: &mut Self::Memory, outputs: &mut [Lanes]);
+}

@@ -1,0 +1,66 @@
+//! Importance weights: their effective number, and tempering.
+
+use taxel_data::exp;
+
+/// Weights proportional to the exponentials of `logarithms`, with a sum of 1; all 0 if no logarithm is finite.
+pub fn normalised(logarithms: &[f64]) -> Vec<f64> {
+    let most = logarithms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if !most.is_finite() {
+        return vec![0.0; logarithms.len()];
+    }
+    let mut weights: Vec<f64> =
+        logarithms.iter().map(|logarithm| exp((logarithm - most).min(0.0))).collect();
+    let sum: f64 = weights.iter().sum();
+    weights.iter_mut().for_each(|weight| *weight /= sum);
+    weights
+}
+
+/// Effective sample size of `weights`: (Σw)²/Σw² (Kong, 1992).
+pub fn effective(weights: &[f64]) -> f64 {
+    let [sum, squares] = weights.iter().fold([0.0, 0.0], |[s, q], w| [s + w, q + w * w]);
+    if squares > 0.0 { sum * sum / squares } else { 0.0 }
+}
+
+/// Logarithms of the weights when the likelihood is raised to `power`; `prior` is that over the proposal.
+pub fn tempered(prior: &[f64], likelihood: &[f64], power: f64) -> Vec<f64> {
+    prior.iter().zip(likelihood).map(|(prior, likelihood)| prior + power * likelihood).collect()
+}
+
+/// Largest power of the likelihood, up to 1, at which at least `wanted` samples are effective.
+///
+/// `prior` and `likelihood` are logarithms. Where hardly any power is small enough, the result is nearly 0.
+pub fn largest_power(prior: &[f64], likelihood: &[f64], wanted: f64) -> f64 {
+    let is_enough =
+        |power: f64| effective(&normalised(&tempered(prior, likelihood, power))) >= wanted;
+    if is_enough(1.0) {
+        return 1.0;
+    }
+    let [mut low, mut high] = [-40.0, 0.0]; // logarithms of the power
+    for _ in 0..16 {
+        let middle = f64::midpoint(low, high);
+        *if is_enough(f64::exp(middle)) { &mut low } else { &mut high } = middle;
+    }
+    f64::exp(low)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_weights_are_all_effective_and_one_weight_is_one() {
+        assert!((effective(&normalised(&[-3.0; 10])) - 10.0).abs() < 1e-12);
+        assert!((effective(&normalised(&[0.0, -800.0, -900.0])) - 1.0).abs() < 1e-12);
+        assert_eq!(effective(&normalised(&[f64::NEG_INFINITY; 3])), 0.0);
+    }
+
+    #[test]
+    fn the_power_leaves_as_many_samples_as_wanted() {
+        let likelihood: Vec<f64> = (0..1000).map(|i| -f64::from(i)).collect();
+        let prior = vec![0.0; 1000];
+        let power = largest_power(&prior, &likelihood, 100.0);
+        let left = effective(&normalised(&tempered(&prior, &likelihood, power)));
+        assert!((100.0..101.0).contains(&left), "{left}");
+        assert_eq!(largest_power(&prior, &vec![0.0; 1000], 100.0), 1.0);
+    }
+}

@@ -1,0 +1,282 @@
+//! Command `limit`: the least possible error of any decoder, and what the sensor shows at all.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use host_sim::evaluate::limit::{self, Figures, Level, LimitResult, Plan};
+use host_sim::{Error, Result, report};
+use taxel_data::output;
+use taxel_limit::identify::Observability;
+
+use super::progress::Terminal;
+use super::scene_argument::SceneArgument;
+use super::{Common, print};
+
+/// Names of all files that `-o` writes.
+const FILES: [&str; 4] = ["limit.json", "limit.html", "directions.svg", "known.svg"];
+/// Singular values that are printed of each row.
+const PRINTED_VALUES: usize = 6;
+
+/// Compute the least possible error of any decoder, and which directions the sensor shows.
+///
+/// The least RMSE is that of the posterior mean E[Δ | readings]. It is sampled for a number of test frames, from the
+/// scene's own prior and noise, for ideal readings: a drift of the gain, circuits and time are not modelled. A figure
+/// that the sample does not carry is refused (docs/what-the-sensor-knows.md).
+#[derive(Args)]
+#[command(after_help = "Example: host-sim limit press --row 4 --noise 0.005,0.01 -o out/limit")]
+pub struct Arguments {
+    #[command(flatten)]
+    scene: SceneArgument,
+    /// Noise levels as fractions (0.01 is 1 %), instead of the scene's.
+    #[arg(long, value_name = "LEVEL,…", value_delimiter = ',', allow_negative_numbers = true)]
+    noise: Vec<f64>,
+    /// Row-wire (from 1) that is read, instead of all that the scene reads.
+    #[arg(long, value_name = "ROW", allow_negative_numbers = true)]
+    row: Option<usize>,
+    /// Test frames [default: 400, or 400 posteriors of rows where rows move independently].
+    #[arg(short = 'n', long, value_name = "N", allow_negative_numbers = true)]
+    frames: Option<usize>,
+    /// Try other pitches, heights, and numbers of wires: the directions that each shows.
+    #[arg(long)]
+    geometry: bool,
+    /// Folder that receives limit.json, a page limit.html with pictures, and two pictures by themselves.
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+}
+
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+    let mut scene = arguments.scene.load(common)?;
+    let world = &mut scene.world;
+    if let Some(row) = arguments.row {
+        world.read_rows = vec![row.wrapping_sub(1)];
+        if !(1..=world.sensor.row_wires).contains(&row) {
+            let most = world.sensor.row_wires;
+            return Err(Error::Usage(format!("--row {row}: the scene has rows 1 to {most}")));
+        }
+    }
+    let own = [world.noise.level];
+    let noise_levels = if arguments.noise.is_empty() { &own[..] } else { &arguments.noise };
+    for level in noise_levels {
+        world.clone().set_noise_level(*level).map_err(|bad| of_noise(*level, &bad.rule))?;
+        if *level == 0.0 {
+            return Err(of_noise(
+                0.0,
+                "without noise there is no posterior; give a positive level",
+            ));
+        }
+    }
+    let frames = arguments.frames.unwrap_or_else(|| limit::usual_frames(world));
+    if frames < 2 {
+        return Err(Error::Usage(format!("--frames {frames}: give at least 2")));
+    }
+    world.check_frames("--frames", frames)?;
+    let plan = Plan { noise_levels: noise_levels.to_vec(), frames, geometry: arguments.geometry };
+    let compute = || {
+        let result = limit::compute(&scene, &plan, &Terminal::new())?;
+        if let Some(folder) = &arguments.output {
+            write_files(folder, &result)?;
+        }
+        if common.json {
+            print::json(&result)?;
+        } else {
+            page_of(&result, arguments.output.as_deref()).print()?;
+        }
+        refusal(&result)
+    };
+    match &arguments.output {
+        Some(folder) => output::in_folder(folder, || {
+            for file in FILES {
+                output::check_writable(&folder.join(file), &[arguments.scene.path()])?;
+            }
+            compute()
+        }),
+        None => compute(),
+    }
+}
+
+fn of_noise(level: f64, rule: &str) -> Error {
+    Error::Usage(format!("--noise {level}: {rule}"))
+}
+
+/// Failure if no figure could be given at all.
+fn refusal(result: &LimitResult) -> Result<()> {
+    let mut all = result.levels.iter().flat_map(|level| &level.limits);
+    let first = all.clone().find_map(|figures| figures.refused.as_ref());
+    match first {
+        Some(refused) if all.all(|figures| figures.refused.is_some()) => {
+            Err(Error::Failed(format!("no limit can be given: {refused}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn write_files(folder: &Path, result: &LimitResult) -> Result<()> {
+    let json = serde_json::to_string_pretty(result)
+        .map_err(|cause| Error::Failed(format!("cannot write JSON: {cause}")))?;
+    let [json_file, page, directions, known] = FILES.map(|file| folder.join(file));
+    output::write_bytes(&json_file, (json + "\n").as_bytes())?;
+    output::write_bytes(&page, report::limit_html(result).as_bytes())?;
+    output::write_bytes(&directions, report::directions_svg(result).as_bytes())?;
+    Ok(output::write_bytes(&known, report::known_svg(result).as_bytes())?)
+}
+
+fn page_of(result: &LimitResult, folder: Option<&Path>) -> print::Page {
+    let mut page = print::Page::default();
+    page.line(format_args!(
+        "{}: {} noise, seed {}, {} test frames\n",
+        result.scene, result.noise_kind, result.seed, result.frames
+    ));
+    limits(&mut page, result);
+    page.line(
+        "\nDirections of the deformation. Observable ones move the readings by more than the noise for one standard\n\
+         deviation of the prior: their signal-to-noise ratio is above 1. known: share of the prior's variance that\n\
+         readings take away, and RMSE that is left, for a sensor linearised at the mean deformation.",
+    );
+    for level in &result.levels {
+        directions(&mut page, level);
+    }
+    if !result.geometry.is_empty() {
+        geometry(&mut page, result);
+    }
+    if let Some(folder) = folder {
+        page.line(format_args!("\nwritten to {}: {}", folder.display(), FILES.join(", ")));
+    }
+    page
+}
+
+fn limits(page: &mut print::Page, result: &LimitResult) {
+    let mut all = result.levels.iter().flat_map(|level| &level.limits);
+    let groups = all.find(|figures| figures.refused.is_none()).map(|figures| &figures.groups);
+    let names = groups
+        .into_iter()
+        .flatten()
+        .map(|g| format!(" {:^26}", format!("{}, {}", g.group, g.unit)));
+    page.line(format_args!(
+        "{:>7} {:<8}{} {:>12} {:>7}",
+        "noise",
+        "readings",
+        names.collect::<String>(),
+        "ESS",
+        "MC"
+    ));
+    for level in &result.levels {
+        for figures in &level.limits {
+            page.line(limit_line(level, figures, result));
+        }
+    }
+    let priors = groups.into_iter().flatten().map(|g| format!("{:>9.4}{:18}", g.prior_rmse, ""));
+    page.line(format_args!("{:>7} {:<8}{}", "", "prior", priors.collect::<String>().trim_end()));
+    page.line(
+        "Least possible RMSE, ± its standard error over the frames: root of the posteriors' mean variance. In brackets:\n\
+         RMSE of the posterior means on these frames. prior: always predicting the mean. ESS: effective samples of a\n\
+         posterior, fewest and median. MC: largest share of the squared error that is the sample's own; it is subtracted.",
+    );
+}
+
+fn limit_line(level: &Level, figures: &Figures, result: &LimitResult) -> String {
+    let start = format!("{:>7} {:<8}", percent(level.noise_level), name(figures, result));
+    let Some(effective) = figures.effective_samples else {
+        let refused = figures.refused.as_deref().unwrap_or_default();
+        return format!("{start}  not given: {refused}");
+    };
+    let cells = figures
+        .groups
+        .iter()
+        .map(|g| format!(" {:>8.4} ± {:.4} ({:.4})", g.limit, g.limit_standard_error, g.rmse));
+    let sizes = format!("{:.0}, {:.0}", effective.least, effective.median);
+    let own = figures.groups.iter().map(|g| g.monte_carlo_share).fold(0.0, f64::max);
+    format!(
+        "{start}{} {sizes:>12} {:>7}",
+        cells.collect::<String>(),
+        format!("{:.2} %", 100.0 * own)
+    )
+}
+
+fn directions(page: &mut print::Page, level: &Level) {
+    page.line(format_args!(
+        "\n{:<8} {:>10} {:>9}   {:^18} {:^24}   signal-to-noise ratios of the first directions",
+        percent(level.noise_level),
+        "observable",
+        "unknowns",
+        "known: dx, dy, dz",
+        "RMSE in mm"
+    ));
+    let all = std::iter::once(("all".to_owned(), &level.observability));
+    let rows = level.rows.iter().map(|row| (row_name(&row.row_wires), row));
+    for (name, seen) in all.chain(rows) {
+        page.line(line_of(&name, seen));
+    }
+}
+
+fn line_of(name: &str, seen: &Observability) -> String {
+    let known: Vec<String> =
+        seen.axes.iter().map(|axis| format!("{:>4.0} %", 100.0 * axis.known)).collect();
+    let rmse: Vec<String> = seen.axes.iter().map(|axis| format!("{:.4}", axis.rmse_mm)).collect();
+    let ratios: Vec<String> = seen
+        .signal_to_noise
+        .iter()
+        .take(PRINTED_VALUES)
+        .map(|ratio| format!(" {ratio:>6.2}"))
+        .collect();
+    format!(
+        "{name:<8} {:>10} {:>9}   {} {:>24}  {}",
+        seen.observable,
+        seen.unknowns,
+        known.concat(),
+        rmse.join(" "),
+        ratios.concat()
+    )
+}
+
+fn geometry(page: &mut print::Page, result: &LimitResult) {
+    page.line(format_args!(
+        "\nOther geometries at noise {}: what all readings would show\n{:<28} {:>8} {:>9} {:>10} {:>7}   {:^18} {:>24}",
+        percent(result.levels.first().map_or(f64::NAN, |level| level.noise_level)),
+        "sensor",
+        "readings",
+        "unknowns",
+        "observable",
+        "a row",
+        "known: dx, dy, dz",
+        "RMSE in mm"
+    ));
+    for variant in &result.geometry {
+        let start =
+            format!("{:<28} {:>8} {:>9}", variant.change, variant.readings, variant.unknowns);
+        if let Some(refused) = &variant.refused {
+            page.line(format_args!("{start}  -  {refused}"));
+        }
+        let Some(seen) = &variant.observability else { continue };
+        let known: Vec<String> =
+            seen.axes.iter().map(|axis| format!("{:>4.0} %", 100.0 * axis.known)).collect();
+        let rmse: Vec<String> =
+            seen.axes.iter().map(|axis| format!("{:.4}", axis.rmse_mm)).collect();
+        page.line(format_args!(
+            "{start} {:>10} {:>7.1}   {} {:>24}",
+            seen.observable,
+            seen.observable as f64 / seen.row_wires.len() as f64,
+            known.concat(),
+            rmse.join(" ")
+        ));
+    }
+}
+
+/// Name of the readings that figures are from.
+fn name(figures: &Figures, result: &LimitResult) -> String {
+    if figures.row_wires.len() == result.row_wires && result.row_wires > 1 {
+        "array".into()
+    } else {
+        row_name(&figures.row_wires)
+    }
+}
+
+fn row_name(row_wires: &[usize]) -> String {
+    match row_wires {
+        [row] => format!("row {row}"),
+        rows => format!("{} rows", rows.len()),
+    }
+}
+
+fn percent(share: f64) -> String {
+    format!("{} %", (share * 1e6).round() / 1e4)
+}

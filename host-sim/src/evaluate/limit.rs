@@ -1,0 +1,146 @@
+//! Limit of a scene: the least possible error by noise level, for the array and for each row alone, and what the
+//! sensor shows of its deformation at all.
+
+use serde::Serialize;
+use taxel_data::progress::Progress;
+use taxel_limit::geometry::{self, Variant};
+use taxel_limit::identify::{self, Observability, Prior};
+use taxel_limit::reference::{EffectiveSamples, GroupLimit};
+use taxel_limit::{Reference, Refusal};
+use taxel_simulate::World;
+
+use crate::error::Result;
+use crate::experiment::Experiment;
+
+/// What to compute.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// Noise levels, as fractions.
+    pub noise_levels: Vec<f64>,
+    /// Number of test frames.
+    pub frames: usize,
+    /// Whether other geometries are tried.
+    pub geometry: bool,
+}
+
+/// Number of test frames, unless a user says otherwise: as many posteriors of rows where rows move independently.
+#[must_use]
+pub fn usual_frames(world: &World) -> usize {
+    if world.motion.has_independent_rows() { 400 / world.read_rows.len().min(400) } else { 400 }
+}
+
+/// Limit of a scene.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LimitResult {
+    /// Name of the scene.
+    pub scene: String,
+    /// Seed of every random draw.
+    pub seed: u64,
+    /// Kind of noise: `relative` or `span`.
+    pub noise_kind: String,
+    /// Number of test frames.
+    pub frames: usize,
+    /// Extent of the sensor in mm.
+    pub size_mm: [f64; 3],
+    /// Number of row-wires of the sensor, read or not.
+    pub row_wires: usize,
+    /// Results by noise level.
+    pub levels: Vec<Level>,
+    /// Other geometries at the first noise level, if asked for.
+    pub geometry: Vec<Variant>,
+}
+
+/// Limit at one noise level.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Level {
+    /// Noise level p, as a fraction.
+    pub noise_level: f64,
+    /// Limits: of all readings together, then of each row from its own readings if there are several.
+    pub limits: Vec<Figures>,
+    /// What all readings show.
+    pub observability: Observability,
+    /// What each row's readings show.
+    pub rows: Vec<Observability>,
+}
+
+/// Limit of the electrodes of some rows, from the readings of these rows.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Figures {
+    /// Row-wires, from 1.
+    pub row_wires: Vec<usize>,
+    /// Limit by group of outputs; empty if it is refused.
+    pub groups: Vec<GroupLimit>,
+    /// Effective sample sizes of the posteriors.
+    pub effective_samples: Option<EffectiveSamples>,
+    /// Reason for refusing the figures.
+    pub refused: Option<String>,
+}
+
+impl Figures {
+    fn of(row_wires: &[usize], reference: &std::result::Result<Reference, Refusal>) -> Self {
+        Self {
+            row_wires: row_wires.iter().map(|row| row + 1).collect(),
+            groups: reference.as_ref().map_or(Vec::new(), Reference::limits),
+            effective_samples: reference.as_ref().ok().map(Reference::effective),
+            refused: reference.as_ref().err().map(ToString::to_string),
+        }
+    }
+}
+
+/// Computes the limit of the experiment's scene.
+///
+/// # Errors
+/// [`Error`](crate::Error) for a scene without noise.
+pub fn compute(
+    experiment: &Experiment,
+    plan: &Plan,
+    progress: &dyn Progress,
+) -> Result<LimitResult> {
+    let world = &experiment.world;
+    let prior = Prior::of(world);
+    let levels = plan.noise_levels.iter().map(|noise_level| {
+        let mut world = world.clone();
+        world.set_noise_level(*noise_level)?;
+        level(&world, &prior, plan.frames, progress)
+    });
+    let levels = levels.collect::<Result<Vec<Level>>>()?;
+    let geometry = if plan.geometry {
+        let mut world = world.clone();
+        plan.noise_levels.first().map_or(Ok(()), |level| world.set_noise_level(*level))?;
+        geometry::sweep(&world)
+    } else {
+        Vec::new()
+    };
+    Ok(LimitResult {
+        scene: experiment.name.clone(),
+        seed: world.seed,
+        noise_kind: world.noise.kind.name().into(),
+        frames: plan.frames,
+        size_mm: world.sensor.size_mm,
+        row_wires: world.sensor.row_wires,
+        levels,
+        geometry,
+    })
+}
+
+fn level(world: &World, prior: &Prior, frames: usize, progress: &dyn Progress) -> Result<Level> {
+    let seen = |rows: &[usize]| {
+        identify::observability(world, prior, rows)
+            .map_err(|refusal| crate::Error::Usage(format!("noise 0: {refusal}")))
+    };
+    let observability = seen(&world.read_rows)?;
+    let rows = world.read_rows.iter().map(|row| seen(&[*row])).collect::<Result<_>>()?;
+    let all = Reference::of(world, frames, progress);
+    let mut limits = vec![Figures::of(&world.read_rows, &all)];
+    let width = world.output_names().len() / world.read_rows.len();
+    for (place, &row) in world.read_rows.iter().enumerate().filter(|_| world.read_rows.len() > 1) {
+        // A row that moves by itself is known from its own readings alone.
+        let own = if world.motion.has_independent_rows() {
+            all.as_ref().map(|all| all.columns(place * width, width)).map_err(Clone::clone)
+        } else {
+            Reference::of(&World { read_rows: vec![row], ..world.clone() }, frames, progress)
+        };
+        limits.push(Figures::of(&[row], &own));
+    }
+    Ok(Level { noise_level: world.noise.level, limits, observability, rows })
+}

@@ -1,0 +1,283 @@
+//! Page of a limit: what a sensor can know, with pictures.
+
+use std::fmt::Write as _;
+
+use taxel_limit::identify::Observability;
+
+use super::chart::{Axis, Chart, Mark, Series};
+use super::format::{percent, significant, symbol, with_unit};
+use super::heat_map::{ColourScale, HeatMap};
+use super::html::document;
+use super::svg::{Shape, Svg, escape, standalone};
+use super::ticks;
+use crate::evaluate::limit::{Figures, Level, LimitResult};
+
+/// Signal-to-noise ratios below this are not drawn.
+const LEAST_RATIO: f64 = 1e-3;
+/// Directions that are drawn at most.
+const MOST_DIRECTIONS: usize = 60;
+
+/// Chart of the signal-to-noise ratio of every direction, against the noise.
+fn directions(level: &Level) -> Chart {
+    let line = |seen: &Observability| -> Vec<[f64; 2]> {
+        let ratios = seen.signal_to_noise.iter().take(MOST_DIRECTIONS).enumerate();
+        ratios.filter(|(_, r)| **r > LEAST_RATIO).map(|(i, r)| [i as f64 + 1.0, *r]).collect()
+    };
+    let mut series = Vec::new();
+    for (i, row) in level.rows.iter().enumerate() {
+        let name = if i == 0 { "each row by itself" } else { "" };
+        let mut row = Series::new(name, "c2", Mark::LineAnd(Shape::Circle), line(row));
+        row.opacity = 0.45;
+        series.push(row);
+    }
+    if level.rows.len() > 1 {
+        let all = line(&level.observability);
+        series.push(Series::new("all readings", "c1", Mark::LineAnd(Shape::Square), all));
+    }
+    let most = series.iter().map(|s| s.points.len()).max().unwrap_or(1) as f64;
+    series.push(Series::new(
+        "the noise",
+        "muted",
+        Mark::Dashed,
+        vec![[0.5, 1.0], [most + 0.5, 1.0]],
+    ));
+    let ratios = series.iter().flat_map(|s| s.points.iter().map(|[_, ratio]| *ratio));
+    let y = ticks::logarithmic(ratios, |ratio| significant(ratio, 1));
+    let mut x = ticks::linear([0.0, most], 8);
+    (x.low, x.high) = (0.5, most + 0.5);
+    x.at.retain(|(value, _)| (1.0..=most).contains(value));
+    Chart {
+        title: "Signal-to-noise ratio of every direction of the deformation".into(),
+        x: Axis::linear("direction, the best visible one first", x),
+        y: Axis { label: "signal-to-noise ratio".into(), ticks: y, logarithmic: true },
+        series,
+        bands: vec![],
+        notes: vec![],
+        end_labels: false,
+    }
+}
+
+/// Picture of the directions at the first noise level, as a file of its own.
+pub fn directions_svg(result: &LimitResult) -> String {
+    let size = [920.0, 400.0];
+    result.levels.first().map_or(String::new(), |l| standalone(&directions(l).draw(size), size))
+}
+
+/// Page of a limit.
+pub fn html(result: &LimitResult) -> String {
+    let title = format!("Taxel: what the sensor can know, {}", result.scene);
+    let mut body = format!(
+        "<header>\n<h1>{}</h1>\n<p>{} noise; {} test frames; seed {}</p>\n</header>\n",
+        escape(&title),
+        escape(&result.noise_kind),
+        result.frames,
+        result.seed
+    );
+    body += &limits(result);
+    if result.levels.len() > 1 {
+        let _ = write!(
+            body,
+            "<figure>\n{}<figcaption>Least possible RMSE from all readings against the noise, both logarithmic. \
+             Dashed: predicting the mean.</figcaption>\n</figure>\n",
+            by_noise(result).draw_responsive([920.0, 400.0], [480.0, 400.0])
+        );
+    }
+    for level in &result.levels {
+        let seen = &level.observability;
+        let noise = percent(level.noise_level);
+        let _ = write!(
+            body,
+            "<h2>What {noise} noise leaves visible</h2>\n<figure>\n{}<figcaption>Signal-to-noise ratio of every \
+             direction: how far one standard deviation of the prior moves the readings, in standard deviations of \
+             the noise. {} of {} directions are observable, above the dashed line. Ratios below {LEAST_RATIO} are \
+             not drawn.</figcaption>\n</figure>\n",
+            directions(level).draw_responsive([920.0, 400.0], [480.0, 400.0]),
+            seen.observable,
+            seen.unknowns
+        );
+        body += &maps(result, seen);
+    }
+    body += &geometry(result);
+    document(&title, &body)
+}
+
+/// Table of the limits.
+fn limits(result: &LimitResult) -> String {
+    let mut html = String::from(
+        "<figure class=\"table\">\n<figcaption>Least possible RMSE of any decoder, ± its standard error. ESS: smallest \
+         and median effective sample size of the posteriors.</figcaption>\n<div class=\"scroll\" tabindex=\"0\" \
+         role=\"region\" aria-label=\"Limits\">\n<table>\n<thead><tr><th>noise</th><th>readings</th>",
+    );
+    let groups =
+        result.levels.iter().flat_map(|level| &level.limits).map(|figures| &figures.groups);
+    let groups = groups.max_by_key(|groups| groups.len());
+    for group in groups.into_iter().flatten() {
+        let name = escape(&with_unit(&symbol(&group.group), &group.unit));
+        let _ = write!(html, "<th class=\"number\">{name}</th>");
+    }
+    html += "<th class=\"number\">ESS</th></tr></thead>\n<tbody>\n";
+    for level in &result.levels {
+        for figures in &level.limits {
+            let noise = percent(level.noise_level);
+            let _ = write!(html, "<tr><td>{noise}</td><td>{}</td>", name(figures));
+            if let Some(refused) = &figures.refused {
+                let _ = write!(
+                    html,
+                    "<td colspan=\"4\" style=\"white-space: normal\">not given: {}</td>",
+                    escape(refused)
+                );
+            }
+            for g in &figures.groups {
+                let _ = write!(
+                    html,
+                    "<td class=\"number\">{:.4} ± {:.4}</td>",
+                    g.limit, g.limit_standard_error
+                );
+            }
+            if let Some(e) = figures.effective_samples {
+                let _ = write!(html, "<td class=\"number\">{:.0}, {:.0}</td>", e.least, e.median);
+            }
+            html += "</tr>\n";
+        }
+    }
+    html + "</tbody>\n</table>\n</div>\n</figure>\n"
+}
+
+fn name(figures: &Figures) -> String {
+    match &figures.row_wires[..] {
+        [row] => format!("row {row}"),
+        rows => format!("all {} rows", rows.len()),
+    }
+}
+
+/// Chart of the limit against the noise level.
+fn by_noise(result: &LimitResult) -> Chart {
+    const STYLES: [(&str, Shape); 3] =
+        [("c1", Shape::Circle), ("c2", Shape::Square), ("c3", Shape::Triangle)];
+    let of_array = || result.levels.iter().filter_map(|l| Some((l.noise_level, l.limits.first()?)));
+    let names = of_array().map(|(_, figures)| &figures.groups).max_by_key(|groups| groups.len());
+    let mut series = Vec::new();
+    for (group, (class, shape)) in names.into_iter().flatten().zip(STYLES) {
+        let line = |of: &dyn Fn(&taxel_limit::reference::GroupLimit) -> f64| {
+            let mut points: Vec<[f64; 2]> = of_array()
+                .filter_map(|(noise, f)| {
+                    f.groups.iter().find(|g| g.group == group.group).map(|g| [noise, of(g)])
+                })
+                .collect();
+            points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+            points
+        };
+        series.push(Series::new("", class, Mark::Dashed, line(&|g| g.prior_rmse)));
+        series.push(Series::new(
+            &symbol(&group.group),
+            class,
+            Mark::LineAnd(shape),
+            line(&|g| g.limit),
+        ));
+    }
+    let all = |axis: usize| series.iter().flat_map(move |s| s.points.iter().map(move |p| p[axis]));
+    let (x, y) = (
+        ticks::logarithmic_percent(all(0)),
+        ticks::logarithmic(all(1), |value| significant(value, 1)),
+    );
+    Chart {
+        title: "Least possible RMSE against the noise".into(),
+        x: Axis { label: "noise".into(), ticks: x, logarithmic: true },
+        y: Axis { label: "least possible RMSE (mm)".into(), ticks: y, logarithmic: true },
+        series,
+        bands: vec![],
+        notes: vec![],
+        end_labels: true,
+    }
+}
+
+/// Colour scale of shares.
+fn share_scale() -> ColourScale {
+    ColourScale::new([0.0, 1.0])
+}
+
+/// Maps of what is known of each electrode, one an axis.
+fn known(result: &LimitResult, seen: &Observability) -> [String; 3] {
+    let per_row = seen.electrodes.len() / seen.row_wires.len().max(1);
+    let rows = seen.row_wires.iter().zip(seen.electrodes.chunks(per_row.max(1)));
+    let [x_mm, y_mm, _] = result.size_mm;
+    [0, 1, 2].map(|axis| {
+        let letter = ['x', 'y', 'z'][axis];
+        let map = HeatMap {
+            title: format!("Map over the face of what the readings tell about Δ{letter}"),
+            heading: format!("Δ{letter}: share known"),
+            face_mm: [x_mm, y_mm],
+            cell_mm: [x_mm / per_row.max(1) as f64, y_mm / result.row_wires.max(1) as f64],
+            cells: seen.electrodes.iter().map(|e| (e.position_mm, e.known[axis])).collect(),
+            row_wires: rows.clone().map(|(row, e)| (*row, e[0].position_mm[1])).collect(),
+        };
+        map.draw(&share_scale())
+    })
+}
+
+/// Picture of what is known of each electrode at the first noise level, as a file of its own.
+pub fn known_svg(result: &LimitResult) -> String {
+    const MAP: [f64; 2] = [310.0, 320.0];
+    let Some(level) = result.levels.first() else { return String::new() };
+    let mut picture = Svg::new(3.0 * MAP[0] + 40.0, MAP[1], "What the readings tell");
+    for (i, map) in known(result, &level.observability).iter().enumerate() {
+        // The drawing without its own frame.
+        let inside = map.split_once('>').map_or("", |(_, inside)| inside);
+        let inside = inside.rsplit_once("</svg>").map_or("", |(inside, _)| inside);
+        picture.add(format_args!(
+            "<g transform=\"translate({} 0)\">{inside}</g>",
+            i as f64 * (MAP[0] + 20.0)
+        ));
+    }
+    standalone(&picture.finish(), [3.0 * MAP[0] + 40.0, MAP[1]])
+}
+
+/// Figure of what is known of each electrode, by axis.
+fn maps(result: &LimitResult, seen: &Observability) -> String {
+    format!(
+        "<figure>\n<div class=\"panels\">\n{}</div>\n<div class=\"scale\">\n{}</div>\n<figcaption>Share of the \
+         prior's variance of each electrode's Δx, Δy and Δz that all readings take away, for a sensor linearised at the \
+         mean deformation: 0 is invisible, 1 is known.</figcaption>\n</figure>\n",
+        known(result, seen).concat(),
+        share_scale().draw_bar("Colour scale of the share known", "share of the prior's variance")
+    )
+}
+
+/// Table of other geometries.
+fn geometry(result: &LimitResult) -> String {
+    if result.geometry.is_empty() {
+        return String::new();
+    }
+    let mut html = String::from(
+        "<h2>Other geometries</h2>\n<figure class=\"table\">\n<figcaption>Observable directions of other sensors in the \
+         same scene, and the RMSE that would be left if all were linear and normal.</figcaption>\n<div class=\"scroll\" \
+         tabindex=\"0\" role=\"region\" aria-label=\"Other geometries\">\n<table>\n<thead><tr><th>sensor</th>\
+         <th class=\"number\">readings</th><th class=\"number\">unknowns</th><th class=\"number\">observable</th>\
+         <th class=\"number\">Δx, mm</th><th class=\"number\">Δy, mm</th><th class=\"number\">Δz, mm</th></tr></thead>\n\
+         <tbody>\n",
+    );
+    for variant in &result.geometry {
+        let _ = write!(
+            html,
+            "<tr><td>{}</td><td class=\"number\">{}</td><td class=\"number\">{}</td>",
+            escape(&variant.change),
+            variant.readings,
+            variant.unknowns
+        );
+        if let Some(refused) = &variant.refused {
+            let _ = write!(
+                html,
+                "<td colspan=\"4\" style=\"white-space: normal; padding-left: 16px\">{}</td>",
+                escape(refused)
+            );
+        }
+        if let Some(seen) = &variant.observability {
+            let _ = write!(html, "<td class=\"number\">{}</td>", seen.observable);
+            for axis in &seen.axes {
+                let _ = write!(html, "<td class=\"number\">{:.4}</td>", axis.rmse_mm);
+            }
+        }
+        html += "</tr>\n";
+    }
+    html + "</tbody>\n</table>\n</div>\n</figure>\n"
+}

@@ -1,0 +1,118 @@
+//! The limit from the command line, and beside the errors of decoders.
+
+use host_sim::evaluate::limit::{Plan, compute};
+use host_sim::experiment::Experiment;
+use host_sim::{metrics, report};
+use taxel_data::progress::Silent;
+use taxel_data::random::Stream;
+use taxel_learn::decoders::BASELINES;
+use taxel_limit::Limit;
+use taxel_simulate::Synthesis;
+
+use crate::common::{Folder, small_scene};
+
+fn json(text: &str) -> serde_json::Value {
+    serde_json::from_str(text).unwrap()
+}
+
+#[test]
+fn the_command_prints_the_same_bytes_on_any_number_of_threads_and_writes_its_files() {
+    let folder = Folder::new("limit");
+    folder.write("scene.toml", small_scene());
+    let arguments =
+        ["limit", "scene.toml", "-n", "20", "--noise", "0.01,0.1", "--json", "-o", "out"];
+    let printed = folder.succeed(&arguments);
+    let alone = folder.run_with_threads(&arguments, 1).stdout;
+    assert_eq!(printed.as_bytes(), alone);
+    let result = json(&printed);
+    let levels = result["levels"].as_array().unwrap();
+    for level in levels {
+        // Both rows together, and each by itself.
+        let limits = level["limits"].as_array().unwrap();
+        assert_eq!(limits.len(), 3);
+        let z = |of: usize| limits[of]["groups"][2]["limit"].as_f64().unwrap();
+        let apart = (0.5 * (z(1).powi(2) + z(2).powi(2))).sqrt();
+        assert!(z(0) < apart, "two rows tell more than one: {limits:?}");
+        assert!(limits[0]["effective_samples"]["least"].as_f64().unwrap() > 30.0);
+        assert_eq!(level["rows"].as_array().unwrap().len(), 2);
+    }
+    let z = |level: usize| levels[level]["limits"][0]["groups"][2]["limit"].as_f64().unwrap();
+    assert!(z(0) < z(1), "less noise, less error");
+    let page = std::fs::read_to_string(folder.path("out/limit.html")).unwrap();
+    assert!(page.contains("observable, above the dashed line") && !page.contains("NaN"));
+    for picture in ["out/directions.svg", "out/known.svg"] {
+        let picture = std::fs::read_to_string(folder.path(picture)).unwrap();
+        assert!(picture.starts_with("<svg xmlns=") && picture.ends_with("</svg>\n"));
+        assert_eq!(picture.matches("<svg").count(), 1);
+    }
+}
+
+#[test]
+fn what_cannot_be_computed_is_refused() {
+    let folder = Folder::new("limit-refused");
+    folder.write("drift.toml", format!("{}\n[drift]\ngain = 0.02\n", small_scene()));
+    let cases: [(&[&str], i32, &str); 5] = [
+        (&["limit", "drift.toml", "-n", "5"], 1, "a drift of the gain is not modelled"),
+        (&["limit", "press", "--row", "9"], 2, "--row 9: the scene has rows 1 to 8"),
+        (&["limit", "press", "--noise", "0"], 2, "--noise 0: without noise"),
+        (&["limit", "press", "-n", "1"], 2, "--frames 1: give at least 2"),
+        // So little noise that no sample reaches the posterior.
+        (&["limit", "press", "--row", "4", "--noise", "1e-7", "-n", "4"], 1, "does not carry"),
+    ];
+    for (arguments, status, message) in cases {
+        let output = folder.run(arguments);
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(status), "{arguments:?}: {error}");
+        assert!(error.contains(message), "{arguments:?}: {error}");
+    }
+}
+
+#[test]
+fn errors_are_given_beside_the_limit_and_its_own_ratio_is_one() {
+    let mut experiment = Experiment::load("press").unwrap();
+    experiment.world.read_rows = vec![3, 4];
+    let world = &experiment.world;
+    let (measure, summary) = experiment.measure_beside_limit(world.noise.level, 60, &Silent);
+    assert_eq!((summary.frames, summary.refused.as_ref()), (60, None));
+    let test = Synthesis::of(world).frames(Stream::Test, 60);
+    let training = Synthesis::of(world).frames(Stream::Training, 2000);
+    let own = metrics::judge(&Limit::of(world).unwrap(), &test, &measure);
+    for (errors, limit) in own.errors.iter().zip(&summary.groups) {
+        assert_eq!(errors.ratio_to_limit, Some(1.0));
+        let off = (errors.rmse - limit.rmse).abs();
+        assert!(off < 0.02 * limit.rmse, "{errors:?} {limit:?}");
+    }
+    for baseline in BASELINES {
+        let errors = metrics::judge(baseline.fit(&training).as_ref(), &test, &measure).errors;
+        for (errors, limit) in errors.iter().zip(&summary.groups) {
+            let (ratio, error) =
+                (errors.ratio_to_limit.unwrap(), errors.ratio_standard_error.unwrap());
+            assert!(ratio > 1.0 && error < 0.3 * ratio, "{errors:?}");
+            // The plain ratio of the two RMSE has a larger error, but is the same.
+            let plain = errors.rmse / limit.limit;
+            assert!((plain / ratio - 1.0).abs() < 0.35, "{} {plain} {ratio}", errors.group);
+        }
+    }
+}
+
+#[test]
+fn a_drifting_scene_is_run_without_a_limit_and_says_why() {
+    let folder = Folder::new("limit-drift");
+    let scene = small_scene() + "\n[drift]\ngain = 0.02\n";
+    folder.write("scene.toml", scene);
+    let page = folder.succeed(&["run", "scene.toml"]);
+    assert!(page.contains("No ratio to the least possible error: a drift"), "{page}");
+    let metrics = std::fs::read_to_string(folder.path("out/small/metrics.json")).unwrap();
+    assert!(json(&metrics)["decoders"][0]["errors"][0]["ratio_to_limit"].is_null());
+}
+
+#[test]
+fn the_page_tells_of_other_geometries() {
+    let mut experiment = Experiment::load("paper").unwrap();
+    experiment.world.read_rows = vec![0, 3];
+    let plan = Plan { noise_levels: vec![0.05], frames: 3, geometry: true };
+    let result = compute(&experiment, &plan, &Silent).unwrap();
+    assert!(result.geometry.len() > 10);
+    let page = report::limit_html(&result);
+    assert!(page.contains("36 column-wires") && page.contains("sensor model holds up to 20 %"));
+}
