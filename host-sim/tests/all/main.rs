@@ -12,6 +12,7 @@ mod gate;
 #[cfg(unix)]
 mod interruption;
 mod readout;
+mod recalibrate;
 mod refusals;
 mod scan;
 mod trade;
