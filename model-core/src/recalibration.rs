@@ -34,6 +34,8 @@ const DIAGONAL: f32 = 4.0;
 pub const GUESSES: u16 = 20;
 /// Most outputs of a network whose shifts are guessed.
 const MOST_GUESSED: usize = 32;
+/// Most centres that the regression takes, evenly spread: each costs an inference.
+const MOST_CENTRES: usize = 64;
 /// Root of the ridge penalty of the regression that guesses, for outputs in training errors.
 const RIDGE: f32 = 3.0;
 /// The same for its intercept, which is not to be penalised.
@@ -492,7 +494,8 @@ impl State<'_> {
         triangle.iter_mut().rev().take(1).for_each(|intercept| *intercept = NO_RIDGE);
         projection.fill(0.0);
         let at_once = values.len().max(1);
-        for k in 0..network.centres() {
+        let every = network.centres().div_ceil(MOST_CENTRES).max(1);
+        for k in (0..network.centres()).step_by(every) {
             for (i, place) in target.iter_mut().enumerate() {
                 *place = network.centre(k, i);
             }

@@ -102,6 +102,11 @@ impl Drifted {
             self.gains.len(),
             after / fresh
         );
+        let memory = device.identify().unwrap().memory;
+        println!("stack: {} of {} bytes", memory.stack_high_water, memory.stack_reserved);
+        // A virtual device reserves no stack.
+        let most = memory.stack_reserved / 4 * 3;
+        assert!(most == 0 || memory.stack_high_water <= most, "{memory:?}");
         // A restart keeps the new model; an undo brings the old one back, for good.
         device.restart().unwrap();
         assert_eq!(decoded(device, &test.inputs), mended);

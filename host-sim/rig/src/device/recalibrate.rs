@@ -14,6 +14,9 @@ use super::upload::ERASE;
 use super::{Device, Wire};
 use crate::error::{Error, Result};
 
+/// Longest time in which a board learns from a press that it has read.
+const LEARNING: Duration = Duration::from_secs(1);
+
 /// What became of reference presses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outcome {
@@ -35,7 +38,7 @@ impl<W: Wire> Device<W> {
     ) -> Result<std::result::Result<RecalibrationReport, Refusal>> {
         let timeout = match step {
             RecalibrationStep::Commit => ERASE.max(self.patience),
-            RecalibrationStep::Press { .. } => self.patience + patience,
+            RecalibrationStep::Press { .. } => self.patience + LEARNING + patience,
             _ => self.patience,
         };
         self.ask(&Request::Recalibrate(step), timeout, |report| match report {
