@@ -20,16 +20,20 @@ mod configuration;
 mod frame_clock;
 mod lease;
 mod line;
+mod leave;
 mod model;
 mod kept;
+mod recalibrate;
 mod session;
 mod answer;
 
 pub use buffers::Buffers;
 use frame_clock::{FrameClock, LongClock};
 use lease::Lease;
+pub use leave::Leave;
 use line::Line;
-pub use session::{Leave, Session};
+use recalibrate::Pressing;
+pub use session::Session;
 
 /// The application's state, except the model in force. `ROWS` is the largest number of rows.
 pub struct App<'m, P, F, const ROWS: usize> {
@@ -77,6 +81,12 @@ struct Core<'m, P, F, const ROWS: usize> {
     upload: Upload,
     /// Number of times that settings may still be written before the next restart.
     writes_left: u16,
+    /// A reference press that is being read.
+    pressing: Pressing<'m>,
+    /// CRC-32 of the model that the last recalibration committed, if none has begun since.
+    recalibrated: Option<u32>,
+    /// Number of the request to begin a recalibration for which the next session is to leave the model in its slot.
+    begins: Option<u16>,
 }
 
 /// A baseline that is being captured.
@@ -99,8 +109,18 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
         configuration: Configuration,
         buffers: &'m mut Buffers<ROWS, COLUMNS, OUTPUTS, BYTES>,
     ) -> Self {
-        let Buffers { received, message, frame, baseline, reciprocals, scratch, estimate, rest } =
-            buffers;
+        let Buffers {
+            received,
+            message,
+            frame,
+            baseline,
+            reciprocals,
+            scratch,
+            estimate,
+            rest,
+            press,
+            stated,
+        } = buffers;
         let capacity = Buffers::<ROWS, COLUMNS, OUTPUTS, BYTES>::CAPACITY;
         let now_us = platform.now_us();
         let mut core = Core {
@@ -129,6 +149,9 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
             capture: None,
             upload: Upload::new(),
             writes_left: kept::MOST_WRITES,
+            pressing: Pressing::new(press.as_flattened_mut(), stated.as_flattened_mut()),
+            recalibrated: None,
+            begins: None,
         };
         core.load_settings();
         Self { receiver: Receiver::new(received), core }
@@ -137,7 +160,7 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
     /// Runs until the host asks for a restart. When another model is committed, it replaces the one in force.
     ///
     /// A model that fits into `weights` is copied there from its slot, and decoded from there: on most boards RAM is
-    /// faster than flash. It may be empty.
+    /// faster than flash. It may be empty. A recalibration takes what is left, or all of it.
     pub fn run<S: Slot>(&mut self, slots: &mut [S; 2], weights: &mut [u32]) {
         loop {
             let mut session = Session::start(self, slots, weights);
@@ -147,7 +170,7 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
                 }
             };
             match leave {
-                Leave::NewModel => info!("model exchanged"),
+                Leave::NewModel | Leave::MakeRoom => info!("another session begins"),
                 Leave::Restart => return,
             }
         }

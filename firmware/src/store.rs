@@ -3,6 +3,9 @@
 //! A slot holds a blob at its start and, once the blob has been found sound, a record of 16 bytes at its end. The
 //! record's first word is written when an upload begins, and the others last and in one go: a slot whose upload was
 //! interrupted or aborted is not chosen.
+//!
+//! To put the previous model in force again, another record with a higher generation is written before those of its
+//! slot ([`reinstate`]).
 
 use model_core::blob::Model;
 use model_core::checksum::CRC_32;
@@ -87,19 +90,54 @@ fn record(generation: u32, blob_crc: u32) -> [u8; RECORD_BYTES] {
     record
 }
 
+/// Number of records that a slot has room for behind its blob, at most: the first, and one for each time that its model
+/// comes into force again.
+pub const MOST_RECORDS: usize = 8;
+
+/// Places of the records in a slot, if its blob leaves room for them: the first is at the end.
+fn record_places(slot: &[u8]) -> impl Iterator<Item = usize> {
+    let (length, blob) = (slot.len(), blob_in_slot(slot).len());
+    let places = (1..=MOST_RECORDS).map(move |number| length.checked_sub(number * RECORD_BYTES));
+    places.map_while(move |place| place.filter(|place| *place >= blob))
+}
+
+fn record_at(slot: &[u8], place: usize) -> Option<&[u8; RECORD_BYTES]> {
+    slot.get(place..)?.first_chunk()
+}
+
+/// Writes another record for the model in `slot`, which must have been found sound: it comes into force again as
+/// `generation`. Power that fails meanwhile leaves the other slot's model in force.
+///
+/// # Errors
+/// `None` if no place for a record is left; [`FlashError`] if writing fails.
+pub fn reinstate<S: Slot>(slot: &mut S, generation: u32) -> Option<Result<(), FlashError>> {
+    let bytes = slot.bytes();
+    let is_empty = |place: &usize| record_at(bytes, *place) == Some(&[0xFF; RECORD_BYTES]);
+    // The first record's place is erased in a slot that was flashed with the firmware, and stays so.
+    let place = record_places(bytes).skip(1).find(is_empty)?;
+    let (_, blob_crc) = blob_in_slot(bytes).split_last_chunk::<4>()?;
+    let record = record(generation, u32::from_le_bytes(*blob_crc));
+    Some(slot.write(place, &record))
+}
+
 /// Generation of the model in `slot` number `index`: the larger, the more recent; `None` without a valid model.
 ///
 /// Uploaded models count from 1. Slot 0 may also hold a model whose record is erased, flashed together with the
 /// firmware: its generation is 0. Slot 1 holds only uploaded models.
 #[must_use]
 pub fn generation(index: usize, slot: &[u8]) -> Option<u32> {
-    let (_, found) = slot.split_last_chunk::<RECORD_BYTES>()?;
-    let [_, generation, ..] = found.as_chunks::<4>().0 else { return None };
-    let generation = u32::from_le_bytes(*generation);
     let (_, blob_crc) = blob_in_slot(slot).split_last_chunk::<4>()?;
-    if *found == record(generation, u32::from_le_bytes(*blob_crc)) {
-        Some(generation)
-    } else {
-        (index == 0 && *found == [0xFF; RECORD_BYTES]).then_some(0)
-    }
+    let blob_crc = u32::from_le_bytes(*blob_crc);
+    let valid = |found: &[u8; RECORD_BYTES]| {
+        let [_, generation, ..] = found.as_chunks::<4>().0 else { return None };
+        let generation = u32::from_le_bytes(*generation);
+        (*found == record(generation, blob_crc)).then_some(generation)
+    };
+    let places = record_places(slot).filter_map(|place| record_at(slot, place));
+    let newest = places.filter_map(valid).max();
+    let flashed = || {
+        let (_, first) = slot.split_last_chunk::<RECORD_BYTES>()?;
+        (index == 0 && *first == [0xFF; RECORD_BYTES]).then_some(0)
+    };
+    newest.or_else(flashed)
 }

@@ -7,7 +7,8 @@ use firmware::circuit::{Circuit, ConstantsFault, ZeroPotential};
 use firmware::link::cobs;
 use firmware::link::message::{
     Configuration, ConfigurationField, EstimateReport, HealthReport, Identity, KeepFault, Kept,
-    KeptBaseline, Memory, ModelFault, ModelIdentity, Refusal, Report, Request, Setting, Statistics,
+    KeptBaseline, Memory, ModelFault, ModelIdentity, RecalibrationFault, RecalibrationReport,
+    RecalibrationState, RecalibrationStep, Refusal, Report, Request, Setting, Statistics,
     UploadState, UploadStep,
 };
 use firmware::link::packet::{self, PROTOCOL_VERSION};
@@ -134,6 +135,40 @@ fn about_settings() -> [(&'static str, Vec<u8>); 9] {
     ]
 }
 
+/// Messages about a recalibration.
+fn about_recalibration() -> [Example; 7] {
+    let outputs = Floats::of(&[0.25, -1.0]);
+    let step = |step| request_bytes(10, &Request::Recalibrate(step));
+    let report = RecalibrationReport {
+        state: RecalibrationState::Collecting,
+        presses: 200,
+        networks: 8,
+        excited: 7,
+        error_before: 8.0,
+        error_after: 1.25,
+    };
+    let in_force = RecalibrationState::InForce { crc_32: 0x1234_5678 };
+    let refused = |fault| report_bytes(10, &Report::Refused(Refusal::Recalibration(fault)));
+    [
+        ("recalibrate: begin", step(RecalibrationStep::Begin)),
+        (
+            "press after 3 others, 20 frames: 0.25, −1",
+            step(RecalibrationStep::Press { before: 3, frames: 20, outputs }),
+        ),
+        ("undo", step(RecalibrationStep::Undo { crc_32: 0x1234_5678 })),
+        ("recalibration", report_bytes(10, &Report::Recalibration(report))),
+        (
+            "recalibrated",
+            report_bytes(
+                10,
+                &Report::Recalibration(RecalibrationReport { state: in_force, ..report }),
+            ),
+        ),
+        ("refused: row 2 not excited", refused(RecalibrationFault::NotExcited { row: 1 })),
+        ("refused: nothing to undo", refused(RecalibrationFault::NothingToUndo)),
+    ]
+}
+
 fn reports() -> Vec<Example> {
     let readings_ohm = Floats::of(&OHM);
     let estimate = EstimateReport {
@@ -193,7 +228,8 @@ fn reports() -> Vec<Example> {
 
 #[test]
 fn messages_give_the_specifications_worked_bytes() {
-    let found = [requests(), reports(), about_settings().to_vec()].concat();
+    let found =
+        [requests(), reports(), about_settings().to_vec(), about_recalibration().to_vec()].concat();
     let found: Vec<_> = found.iter().map(|(name, bytes)| (*name, hex(bytes))).collect();
     let table: Vec<_> = found.iter().map(|(name, hex)| format!("| {name} | `{hex}` |")).collect();
     assert!(found == specified(), "docs/link.md should say\n{}", table.join("\n"));
@@ -216,6 +252,7 @@ fn every_refusal_has_the_specified_number() {
         (Refusal::Keep(KeepFault::Nothing), 11),
         (Refusal::TooSoon { wait_us: 1 }, 12),
         (Refusal::LastGeneration, 13),
+        (Refusal::Recalibration(RecalibrationFault::NoModel), 14),
     ];
     for (refusal, number) in refusals {
         let mut buffer = [0; 16];

@@ -1,7 +1,7 @@
 //! Recursive least squares in square-root information form.
 //!
-//! Minimises Σ_t λ^(T−t)·‖y_t − Wᵀh_t‖² + λ^T·‖W‖²/δ, one sample at a time, by keeping the upper
-//! triangular R with RᵀR = Σ λ^(T−t) h hᵀ + λ^T I/δ and the transformed targets z. Each sample is
+//! Minimises Σ_t λ^(T−t)·‖y_t − Wᵀh_t‖² + ‖W‖²/δ, one sample at a time, by keeping the upper
+//! triangular R with RᵀR = Σ λ^(T−t) h hᵀ + I/δ and the transformed targets z. Each sample is
 //! rotated into (R, z) by Givens rotations (Gentleman, "Least squares computations by Givens
 //! transformations without square roots", J. Inst. Maths Applics 12, 1973; Haykin, Adaptive
 //! Filter Theory, QRD-RLS). The covariance RLS of the paper (its eq. 14–16) solves the same
@@ -9,13 +9,19 @@
 //! it squares the condition number and loses symmetry. This form does neither, and λ = 1 makes it
 //! equal to ridge regression with penalty 1/δ.
 //!
-//! The free functions work on slices, for sizes known when they run; [`Rls`] wraps them for
-//! sizes known when compiled.
+//! **Leakage.** With λ < 1 alone, what was known of a direction that no sample excites fades away, and noise takes its
+//! place: a sensor at rest drove weights to 1e19 in f32. So every update gives back the share of I/δ that it forgets
+//! (Gunnarsson, "Combining tracking and regularization in recursive least squares identification", CDC 1996). Weights
+//! and R stay bounded for any number of samples, and unexcited directions fade towards weight 0.
 //!
-//! The trainer of host-sim calls [`solve`] alone, and gets R and z from a QR decomposition of many samples at
-//! once. [`start`], [`update`] and [`Rls`] are for recalibration on the device, which no firmware does yet. Tests
-//! compare them with batch ridge regression and the host with the emulator; the link check proves that they
-//! cannot panic.
+//! **Unusable samples** change nothing: one NaN in R would stay for good.
+//!
+//! The trainer of host-sim calls [`solve`] alone, on a square R, and gets R and z from a QR decomposition of many
+//! samples at once. All else keeps R's upper triangle alone, row after row, and serves the device
+//! (`recalibration.rs`).
+//!
+//! Without forgetting (λ = 1) the sums outgrow f32: rounding makes the error 1.05 times that in f64 after 1e6 samples,
+//! 1.4 times after 1e7. Choose λ < 1 for recursions that never end.
 
 use core::ops::{Add, Div, Mul, Sub};
 
@@ -34,6 +40,8 @@ pub trait Real:
     const ONE: Self;
     /// √(smallest normal number): the square of a smaller diagonal or entry is not a normal number.
     const NEGLIGIBLE: Self;
+    /// Largest entry of a sample: sums of many squares of it are still finite.
+    const LARGEST: Self;
     /// Square root of the number.
     #[must_use]
     fn sqrt(self) -> Self;
@@ -42,11 +50,12 @@ pub trait Real:
 }
 
 macro_rules! real {
-    ($float:ident, $sqrt:path, $negligible:expr) => {
+    ($float:ident, $sqrt:path, $negligible:expr, $largest:expr) => {
         impl Real for $float {
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
             const NEGLIGIBLE: Self = $negligible;
+            const LARGEST: Self = $largest;
             #[inline]
             fn sqrt(self) -> Self {
                 $sqrt(self)
@@ -58,79 +67,115 @@ macro_rules! real {
         }
     };
 }
-real!(f32, libm::sqrtf, 1.084_202_2e-19);
-real!(f64, libm::sqrt, 1.491_668_146_240_041_3e-154);
+real!(f32, libm::sqrtf, 1.084_202_2e-19, 1e15);
+real!(f64, libm::sqrt, 1.491_668_146_240_041_3e-154, 1e150);
 
-/// Why a recursion cannot be started.
+/// Why a recursion cannot be started, or a sample cannot be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum RlsError {
-    /// The initial covariance δ is not a positive finite number.
+    /// The initial covariance δ is not a positive finite number, or 1/δ is none.
     #[error("initial covariance must be a positive finite number (ridge penalty is 1 over it)")]
     InitialCovariance,
     /// The forgetting factor λ is not in (0, 1].
     #[error("forgetting factor must be above 0 and at most 1")]
     ForgettingFactor,
+    /// The memory does not have the length that the numbers of regressors and outputs ask for.
+    #[error("memory of {found} numbers; the recursion needs {expected}")]
+    Memory {
+        /// Number of values that the recursion needs.
+        expected: usize,
+        /// Number of values given.
+        found: usize,
+    },
+    /// The sample holds a number that is not finite or too large, or another number of values. It changed nothing.
+    #[error(
+        "the sample holds a number that is not finite or too large, or another number of values"
+    )]
+    UnusableSample,
 }
 
-/// Starts a recursion: `information_root` (R, `n × n` row-major) becomes I/√δ and `projection`
-/// (z, `n × outputs`) becomes 0.
-///
-/// # Errors
-/// [`RlsError::InitialCovariance`] for a δ that is not positive and finite.
-pub fn start<T: Real>(
-    information_root: &mut [T],
-    projection: &mut [T],
-    n: usize,
-    initial_covariance: T,
-) -> Result<(), RlsError> {
-    if !(initial_covariance > T::ZERO && initial_covariance.is_finite()) {
-        return Err(RlsError::InitialCovariance);
-    }
-    let diagonal = T::ONE / initial_covariance.sqrt();
-    for (i, row) in information_root.chunks_exact_mut(n.max(1)).enumerate() {
-        for (j, r) in row.iter_mut().enumerate() {
-            *r = if i == j { diagonal } else { T::ZERO };
-        }
-    }
-    projection.fill(T::ZERO);
-    Ok(())
+/// Number of values in the upper triangle of R for `n` regressors.
+#[must_use]
+pub const fn triangle_values(n: usize) -> usize {
+    n.saturating_mul(n.saturating_add(1)) / 2
 }
 
-/// Updates R and z with one sample. `regressor` (h, `n`) and `target` (y, `outputs`) are working space and
-/// hold rotated values afterwards: `target` the rotated residual.
+/// Rows of a triangle for `n` regressors: the first has n values, the last one.
+fn rows_mut<T>(triangle: &mut [T], n: usize) -> impl Iterator<Item = &mut [T]> {
+    let mut rest = triangle;
+    (0..n).map_while(move |i| {
+        let (row, after) = core::mem::take(&mut rest).split_at_mut_checked(n - i)?;
+        rest = after;
+        Some(row)
+    })
+}
+
+/// Makes a triangle that of R = I·`diagonal`.
+pub fn start<T: Real>(triangle: &mut [T], n: usize, diagonal: T) {
+    for row in rows_mut(triangle, n) {
+        row.fill(T::ZERO);
+        row.iter_mut().take(1).for_each(|place| *place = diagonal);
+    }
+}
+
+/// Forgets: multiplies R and z by `root_forgetting`, √λ.
+pub fn forget<T: Real>(triangle: &mut [T], projection: &mut [T], root_forgetting: T) {
+    let values = triangle.iter_mut().chain(projection);
+    values.for_each(|value| *value = *value * root_forgetting);
+}
+
+/// Whether every value of a sample is finite, and not so large that its square would not be.
+#[must_use]
+pub fn is_usable<T: Real>(sample: &[T]) -> bool {
+    sample.iter().all(|&value| value <= T::LARGEST && T::ZERO - value <= T::LARGEST)
+}
+
+/// Rotates one sample into R and z. `regressor` (h, n) and `target` (y, one value an output) must be
+/// [usable](is_usable); they hold rotated values afterwards.
 ///
-/// `root_forgetting` is √λ. Work: 3n² + 6n·outputs floating-point operations.
-#[inline]
-pub fn update<T: Real>(
-    information_root: &mut [T],
+/// Work: 3n² + 6n·outputs floating-point operations. Leading zeros of h take none.
+pub fn rotate<T: Real>(
+    triangle: &mut [T],
     projection: &mut [T],
     regressor: &mut [T],
     target: &mut [T],
-    root_forgetting: T,
 ) {
-    let n = regressor.len().max(1);
     let outputs = target.len().max(1);
-    let rows = information_root.chunks_exact_mut(n).zip(projection.chunks_exact_mut(outputs));
-    for (i, (r_row, z_row)) in rows.enumerate() {
-        let Some((_, r)) = r_row.split_at_mut_checked(i) else { return };
+    let rows = rows_mut(triangle, regressor.len()).zip(projection.chunks_exact_mut(outputs));
+    for (i, (row, z_row)) in rows.enumerate() {
         let Some((_, h)) = regressor.split_at_mut_checked(i) else { return };
-        let (Some(&pivot), Some(&entry)) = (r.first(), h.first()) else { return };
-        let pivot = pivot * root_forgetting;
+        let (Some(&pivot), Some(&entry)) = (row.first(), h.first()) else { return };
         let length = (pivot * pivot + entry * entry).sqrt();
-        let (cosine, sine) =
-            if length > T::ZERO { (pivot / length, entry / length) } else { (T::ONE, T::ZERO) };
-        // √λ belongs to the old row only; fold it into the two factors that meet that row.
-        let (old_cosine, old_sine) = (cosine * root_forgetting, sine * root_forgetting);
-        for (r, h) in r.iter_mut().zip(h.iter_mut()) {
-            (*r, *h) = (old_cosine * *r + sine * *h, cosine * *h - old_sine * *r);
+        if entry == T::ZERO || length <= T::ZERO {
+            continue;
+        }
+        let (cosine, sine) = (pivot / length, entry / length);
+        for (r, h) in row.iter_mut().zip(h) {
+            (*r, *h) = (cosine * *r + sine * *h, cosine * *h - sine * *r);
         }
         for (z, y) in z_row.iter_mut().zip(target.iter_mut()) {
-            (*z, *y) = (old_cosine * *z + sine * *y, cosine * *y - old_sine * *z);
+            (*z, *y) = (cosine * *z + sine * *y, cosine * *y - sine * *z);
         }
     }
 }
 
-/// Solves R·W = z by back substitution into `weights` (`n × outputs` row-major).
+/// Solves R·W = z as [`solve`] does, with the `triangle` of `n` regressors.
+pub fn solve_triangle<T: Real>(triangle: &[T], projection: &[T], n: usize, weights: &mut [T]) {
+    let outputs = (weights.len() / n.max(1)).max(1);
+    let (mut above, mut z_above) = (triangle, projection);
+    for i in (0..n).rev() {
+        let Some((rest, row)) = above.split_at_checked(above.len().saturating_sub(n - i)) else {
+            return;
+        };
+        let Some((z_rest, z_row)) = z_above.split_at_checked(i * outputs) else { return };
+        (above, z_above) = (rest, z_rest);
+        let Some((head, solved)) = weights.split_at_mut_checked((i + 1) * outputs) else { return };
+        let Some((_, w_row)) = head.split_at_mut_checked(i * outputs) else { return };
+        solve_row(row, z_row, w_row, solved);
+    }
+}
+
+/// Solves R·W = z by back substitution into `weights` (`n × outputs` row-major), with a square R (`n × n` row-major).
 ///
 /// A direction that was never excited, and whose information forgetting has faded to nothing, gets weight 0.
 pub fn solve<T: Real>(information_root: &[T], projection: &[T], n: usize, weights: &mut [T]) {
@@ -141,94 +186,169 @@ pub fn solve<T: Real>(information_root: &[T], projection: &[T], n: usize, weight
         let Some((head, solved)) = weights.split_at_mut_checked((i + 1) * outputs) else { return };
         let Some((_, w_row)) = head.split_at_mut_checked(i * outputs) else { return };
         let Some((_, r)) = r_row.split_at_checked(i) else { return };
-        let Some((&pivot, r_rest)) = r.split_first() else { return };
-        if pivot <= T::NEGLIGIBLE {
-            w_row.fill(T::ZERO);
-            continue;
-        }
-        for (w, &z) in w_row.iter_mut().zip(z_row) {
-            *w = z;
-        }
-        for (&r, later) in r_rest.iter().zip(solved.chunks_exact(outputs)) {
-            for (w, &l) in w_row.iter_mut().zip(later) {
-                *w = *w - r * l;
-            }
-        }
-        for w in w_row.iter_mut() {
-            *w = *w / pivot;
-        }
+        solve_row(r, z_row, w_row, solved);
     }
 }
 
-/// Recursive least squares with sizes known at compile time, for use on the device.
-///
-/// `REGRESSORS` counts activations, affine inputs and the bias's 1. RAM: `REGRESSORS` ×
-/// (`REGRESSORS` + `OUTPUTS`) values.
-///
-/// ```
-/// use model_core::rls::Rls;
-/// let mut rls = Rls::<f32, 2, 1>::try_new(1e6, 1.0)?;
-/// for t in 0..100 {
-///     let x = t as f32 / 100.0;
-///     rls.update([x, 1.0], [3.0 * x - 1.0]); // y = 3x − 1
-/// }
-/// let weights = rls.output_weights();
-/// assert!((weights[0][0] - 3.0).abs() < 1e-4 && (weights[1][0] + 1.0).abs() < 1e-4);
-/// # Ok::<(), model_core::rls::RlsError>(())
-/// ```
-#[derive(Debug, Clone, PartialEq)]
-pub struct Rls<T, const REGRESSORS: usize, const OUTPUTS: usize> {
-    information_root: [[T; REGRESSORS]; REGRESSORS],
-    projection: [[T; OUTPUTS]; REGRESSORS],
-    root_forgetting: T,
+/// Solves one row of R·W = z into `w_row`; `r` begins with the diagonal, and later rows are `solved`.
+fn solve_row<T: Real>(r: &[T], z_row: &[T], w_row: &mut [T], solved: &[T]) {
+    let Some((&pivot, r_rest)) = r.split_first() else { return };
+    if pivot <= T::NEGLIGIBLE {
+        w_row.fill(T::ZERO);
+        return;
+    }
+    for (w, &z) in w_row.iter_mut().zip(z_row) {
+        *w = z;
+    }
+    for (&r, later) in r_rest.iter().zip(solved.chunks_exact(w_row.len().max(1))) {
+        for (w, &l) in w_row.iter_mut().zip(later) {
+            *w = *w - r * l;
+        }
+    }
+    for w in w_row.iter_mut() {
+        *w = *w / pivot;
+    }
 }
 
-impl<T: Real, const REGRESSORS: usize, const OUTPUTS: usize> Rls<T, REGRESSORS, OUTPUTS> {
-    /// Starts with weights 0, covariance δ·I and forgetting factor λ (1 forgets nothing).
+/// Recursive least squares in memory that the caller lends.
+///
+/// There are as many regressors as activations, affine inputs and the bias's 1 together. A never-ending recursion
+/// needs λ < 1; [`is_excited`](Self::is_excited) tells whether its weights are worth anything.
+///
+/// ```
+/// use model_core::rls::{Rls, RlsError};
+/// let mut memory = [0.0_f32; Rls::<f32>::values(2, 1)];
+/// let mut rls = Rls::try_new(&mut memory, [2, 1], 1e6, 0.999)?;
+/// for t in 0..100 {
+///     let x = t as f32 / 100.0;
+///     rls.update(&mut [x, 1.0], &mut [3.0 * x - 1.0])?; // y = 3x − 1
+/// }
+/// let mut weights = [0.0; 2];
+/// rls.weights(&mut weights);
+/// assert!((weights[0] - 3.0).abs() < 1e-3 && (weights[1] + 1.0).abs() < 1e-3);
+/// assert!(rls.is_excited(1e3));
+/// assert_eq!(rls.update(&mut [f32::NAN, 1.0], &mut [0.0]), Err(RlsError::UnusableSample));
+/// # Ok::<(), RlsError>(())
+/// ```
+#[derive(Debug, PartialEq)]
+pub struct Rls<'m, T> {
+    triangle: &'m mut [T],
+    projection: &'m mut [T],
+    /// Room for the sample that gives back what is forgotten of one direction.
+    leak: &'m mut [T],
+    outputs: usize,
+    root_forgetting: T,
+    /// 1/√δ.
+    diagonal: T,
+    /// What a direction gets back at its turn, once in as many updates as there are regressors.
+    share: T,
+    turn: usize,
+}
+
+impl<'m, T: Real> Rls<'m, T> {
+    /// Number of values of memory for so many `regressors` and `outputs`.
+    #[must_use]
+    pub const fn values(regressors: usize, outputs: usize) -> usize {
+        triangle_values(regressors)
+            .saturating_add(regressors.saturating_mul(outputs))
+            .saturating_add(regressors)
+            .saturating_add(outputs)
+    }
+
+    /// Starts with weights 0, covariance δ·I and forgetting factor λ (1 forgets nothing), in memory of
+    /// [`values`](Self::values).
     ///
     /// # Errors
-    /// [`RlsError`]: δ is not positive and finite, or λ is not in (0, 1].
-    pub fn try_new(initial_covariance: T, forgetting_factor: T) -> Result<Self, RlsError> {
+    /// [`RlsError`]: δ is not positive and finite, λ is not in (0, 1], or the memory has another length.
+    pub fn try_new(
+        memory: &'m mut [T],
+        [regressors, outputs]: [usize; 2],
+        initial_covariance: T,
+        forgetting_factor: T,
+    ) -> Result<Self, RlsError> {
+        let diagonal = T::ONE / initial_covariance.sqrt();
+        let is_number = initial_covariance > T::ZERO && initial_covariance.is_finite();
+        if !(is_number && diagonal <= T::LARGEST && diagonal > T::NEGLIGIBLE) {
+            return Err(RlsError::InitialCovariance);
+        }
         if !(forgetting_factor > T::ZERO && forgetting_factor <= T::ONE) {
             return Err(RlsError::ForgettingFactor);
         }
-        let mut rls = Self {
-            information_root: [[T::ZERO; REGRESSORS]; REGRESSORS],
-            projection: [[T::ZERO; OUTPUTS]; REGRESSORS],
-            root_forgetting: forgetting_factor.sqrt(),
-        };
-        start(
-            rls.information_root.as_flattened_mut(),
-            rls.projection.as_flattened_mut(),
-            REGRESSORS,
-            initial_covariance,
-        )?;
-        Ok(rls)
+        let (expected, found) = (Self::values(regressors, outputs), memory.len());
+        let wrong = RlsError::Memory { expected, found };
+        if expected != found {
+            return Err(wrong);
+        }
+        memory.fill(T::ZERO);
+        let (triangle, rest) =
+            memory.split_at_mut_checked(triangle_values(regressors)).ok_or(wrong)?;
+        let (projection, leak) = rest.split_at_mut_checked(regressors * outputs).ok_or(wrong)?;
+        start(triangle, regressors, diagonal);
+        // What λ leaves of the information 1/δ in as many updates as there are regressors.
+        let left = (0..regressors).fold(T::ONE, |left, _| left * forgetting_factor);
+        let share = diagonal * (T::ONE - left).sqrt();
+        let root_forgetting = forgetting_factor.sqrt();
+        Ok(Self { triangle, projection, leak, outputs, root_forgetting, diagonal, share, turn: 0 })
     }
 
-    /// Updates the recursion with one sample: the network's `regressor`s and the true `target`.
-    pub fn update(&mut self, mut regressor: [T; REGRESSORS], mut target: [T; OUTPUTS]) {
-        update(
-            self.information_root.as_flattened_mut(),
-            self.projection.as_flattened_mut(),
-            &mut regressor,
-            &mut target,
-            self.root_forgetting,
-        );
+    /// Updates the recursion with one sample: the network's `regressor`s and the true `target`. Both are working space,
+    /// and hold other values afterwards.
+    ///
+    /// # Errors
+    /// [`RlsError::UnusableSample`]: the sample changed nothing.
+    pub fn update(&mut self, regressor: &mut [T], target: &mut [T]) -> Result<(), RlsError> {
+        let regressors = self.leak.len().saturating_sub(self.outputs);
+        let fits = regressor.len() == regressors && target.len() == self.outputs;
+        if !(fits && is_usable(regressor) && is_usable(target)) {
+            return Err(RlsError::UnusableSample);
+        }
+        forget(self.triangle, self.projection, self.root_forgetting);
+        rotate(self.triangle, self.projection, regressor, target);
+        if self.share > T::ZERO {
+            self.leak.fill(T::ZERO);
+            if let Some(place) = self.leak.get_mut(self.turn) {
+                *place = self.share;
+            }
+            if let Some((h, y)) = self.leak.split_at_mut_checked(regressors) {
+                rotate(self.triangle, self.projection, h, y);
+            }
+            self.turn = if self.turn + 1 < regressors { self.turn + 1 } else { 0 };
+        }
+        Ok(())
     }
 
-    /// The weights that fit all samples so far best, in the least-squares sense: `[regressor][output]`.
+    /// Writes the weights that fit all samples so far best, in the least-squares sense: regressor after regressor,
+    /// one value an output.
+    pub fn weights(&self, weights: &mut [T]) {
+        let regressors = self.leak.len().saturating_sub(self.outputs);
+        solve_triangle(self.triangle, self.projection, regressors, weights);
+    }
+
+    /// Whether the samples so far say at least `times` as much about every weight as the initial 1/δ does, if the
+    /// weights after it were known. Where they do not, weights are the starting point, not knowledge.
     #[must_use]
-    pub fn output_weights(&self) -> [[T; OUTPUTS]; REGRESSORS] {
-        let mut weights = [[T::ZERO; OUTPUTS]; REGRESSORS];
-        solve(
-            self.information_root.as_flattened(),
-            self.projection.as_flattened(),
-            REGRESSORS,
-            weights.as_flattened_mut(),
-        );
-        weights
+    pub fn is_excited(&self, times: T) -> bool {
+        is_excited(
+            self.triangle,
+            self.leak.len().saturating_sub(self.outputs),
+            self.diagonal,
+            times,
+        )
     }
+}
+
+/// Whether every diagonal of R, squared, is at least `times` that of the start, `diagonal`².
+#[must_use]
+pub fn is_excited<T: Real>(triangle: &[T], n: usize, diagonal: T, times: T) -> bool {
+    let least = diagonal * times.sqrt();
+    let mut rest = triangle;
+    (0..n).all(|i| match rest.split_at_checked(n - i) {
+        Some((row, after)) => {
+            rest = after;
+            row.first().is_some_and(|&pivot| pivot >= least)
+        }
+        None => false,
+    })
 }
 
 #[cfg(test)]

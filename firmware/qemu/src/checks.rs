@@ -335,17 +335,21 @@ pub fn gating(blob: &[u8]) -> Option<[usize; 3]> {
 /// CRC-32 of all bits of the weights that recursive least squares has after each of 200 samples.
 #[must_use]
 pub fn recalibration() -> Option<u32> {
-    let mut rls = Rls::<f32, 9, 3>::try_new(1e4, 0.99).ok()?;
+    let mut memory = [0.0; Rls::<f32>::values(9, 3)];
+    let mut rls = Rls::try_new(&mut memory, [9, 3], 1e4, 0.99).ok()?;
     let crc = CRC;
     let mut digest = crc.digest();
     let mut numbers = Numbers::new(2);
     for _ in 0..200 {
-        let regressor: [f32; 9] =
+        let mut regressor: [f32; 9] =
             core::array::from_fn(|i| if i == 8 { 1.0 } else { numbers.draw() });
         let noise = 1e-3 * numbers.draw();
         let (first, last) = (regressor[0] - 0.5 * regressor[1], 0.25 * regressor[7]);
-        rls.update(regressor, [first + noise, last - noise, 2.0 * first * last]);
-        add(&mut digest, rls.output_weights().as_flattened());
+        let mut target = [first + noise, last - noise, 2.0 * first * last];
+        rls.update(&mut regressor, &mut target).ok()?;
+        let mut weights = [0.0; 27];
+        rls.weights(&mut weights);
+        add(&mut digest, &weights);
     }
     Some(digest.finalize())
 }

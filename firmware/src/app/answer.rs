@@ -3,8 +3,10 @@
 use model_core::blob::Floats;
 use model_core::exp::{ExpKernel, Polynomial};
 
+use super::leave::Leave;
 use super::model::{self, InForce};
-use super::session::{Leave, Session};
+use super::recalibrate::Recalibrating;
+use super::session::Session;
 use super::{Capture, Core};
 use crate::circuit::{Constants, ConstantsFault};
 use crate::link::message::{Configuration, Identity, Refusal, Report, Request, UploadStep};
@@ -32,7 +34,8 @@ impl<P: Platform, F: FrameSource, S: Slot, const ROWS: usize> Session<'_, '_, P,
         for _ in 0..app.core.capacity.message_bytes() {
             let byte = app.core.line.platform().receive()?;
             if let Some(received) = app.receiver.push(byte) {
-                return app.core.answer(received, &self.model, self.spare);
+                let recalibrating = &mut self.recalibrating;
+                return app.core.answer(received, &self.model, self.spare, recalibrating);
             }
         }
         None
@@ -45,6 +48,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         received: Received<'_>,
         model: &InForce<'_, ROWS>,
         spare: &mut S,
+        recalibrating: &mut Recalibrating<'_>,
     ) -> Option<Leave> {
         let packet = match received {
             Received::Frame(bytes) => packet::decode::<Request<'_>>(bytes),
@@ -92,6 +96,14 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             Request::Upload(step) => self
                 .upload_step(step, model, spare, &mut leave)
                 .map(|()| Report::Upload(self.upload.state())),
+            Request::Recalibrate(step) => {
+                let step = (number, step);
+                match self.recalibrate(step, model, spare, recalibrating, &mut leave) {
+                    Ok(Some(report)) => Ok(report),
+                    Ok(None) => return leave,
+                    Err(refusal) => Err(refusal),
+                }
+            }
             Request::Restart => {
                 info!("restart asked for");
                 leave = Some(Leave::Restart);
@@ -209,6 +221,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         }
         self.configuration = configuration;
         self.give_up_capture();
+        self.give_up_press();
         self.sensor_answers |= configuration.frame_period_us == 0; // it is not scanned any more
         self.clock.restart(self.line.platform().now_us());
         info!("configured: a frame every {=u32} us", configuration.frame_period_us);

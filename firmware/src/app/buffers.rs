@@ -22,6 +22,9 @@ pub struct Buffers<
     pub(super) scratch: [[[f32; COLUMNS]; ROWS]; 2],
     pub(super) estimate: Outcome<ROWS, OUTPUTS>,
     pub(super) rest: Outcome<ROWS, OUTPUTS>,
+    /// Mean readings of a reference press, and its stated outputs.
+    pub(super) press: [[f32; COLUMNS]; ROWS],
+    pub(super) stated: [[f32; OUTPUTS]; ROWS],
 }
 
 /// Outputs of all rows, and their status.
@@ -68,10 +71,20 @@ impl<const ROWS: usize, const COLUMNS: usize, const OUTPUTS: usize, const BYTES:
             scratch: [[[0.0; COLUMNS]; ROWS]; 2],
             estimate: Outcome::NOTHING,
             rest: Outcome::NOTHING,
+            press: [[0.0; COLUMNS]; ROWS],
+            stated: [[0.0; OUTPUTS]; ROWS],
         }
     }
 
     /// Sensor and model that these buffers have room for.
     pub const CAPACITY: crate::capacity::Capacity =
         crate::capacity::Capacity { rows: ROWS, columns: COLUMNS, outputs: OUTPUTS };
+}
+
+/// The part of an estimate's memory that the model in force uses.
+pub fn cut<'e>(whole: &'e mut Estimate<'_>, rows: usize, outputs: usize) -> Estimate<'e> {
+    Estimate {
+        outputs: whole.outputs.get_mut(..outputs).unwrap_or_default(),
+        status: whole.status.get_mut(..rows).unwrap_or_default(),
+    }
 }

@@ -12,10 +12,12 @@ use crate::store::{Slot, blob_in_slot, generation};
 pub struct InForce<'a, const ROWS: usize> {
     pub decoder: Option<Decoder<'a, ROWS>>,
     pub identity: Option<ModelIdentity>,
+    /// Its blob, which the decoder borrows.
+    pub blob: &'a [u8],
 }
 
 impl<'a, const ROWS: usize> InForce<'a, ROWS> {
-    pub const NONE: Self = Self { decoder: None, identity: None };
+    pub const NONE: Self = Self { decoder: None, identity: None, blob: &[] };
 
     /// The model in `bytes`, which start with its blob; `None` if it is not sound, or there is no room for it.
     pub fn load(
@@ -24,7 +26,8 @@ impl<'a, const ROWS: usize> InForce<'a, ROWS> {
         (slot, generation): (usize, u32),
         in_ram: bool,
     ) -> Option<Self> {
-        let model = check(capacity, blob_in_slot(bytes)).ok()?;
+        let blob = blob_in_slot(bytes);
+        let model = check(capacity, blob).ok()?;
         let decoder = Decoder::of(model).ok()?;
         let (shape, metadata) = (decoder.shape(), decoder.metadata());
         let identity = ModelIdentity {
@@ -39,7 +42,7 @@ impl<'a, const ROWS: usize> InForce<'a, ROWS> {
             inputs_crc_32: crc_of(metadata.input_names, metadata.input_units),
             outputs_crc_32: crc_of(metadata.output_names, metadata.output_units),
         };
-        Some(Self { decoder: Some(decoder), identity: Some(identity) })
+        Some(Self { decoder: Some(decoder), identity: Some(identity), blob })
     }
 
     /// Name of the model's scene or data set, cut after [`MOST_NAME_BYTES`].
@@ -128,6 +131,17 @@ pub fn by_generation<S: Slot>([a, b]: &[S; 2]) -> [Option<(usize, u32)>; 2] {
     } else {
         [a, b]
     }
+}
+
+/// Cuts room for a copy of the blob at the start of `bytes` from `room`, if it fits; returns it, and what is left.
+pub fn cut_room<'r>(room: &'r mut [u32], bytes: &[u8]) -> (Option<&'r mut [u32]>, &'r mut [u32]) {
+    let words = blob_in_slot(bytes).len().div_ceil(4);
+    // Whether it fits is asked first, so that the compiler sees one borrow alone.
+    if words > room.len() {
+        return (None, room);
+    }
+    let (copy, rest) = room.split_at_mut_checked(words).unwrap_or_default();
+    (Some(copy), rest)
 }
 
 /// Copies the blob at the start of `bytes` to `room`, if it fits; returns the copy.

@@ -4,9 +4,12 @@ use model_core::blob::Floats;
 use model_core::gate::Rest;
 use model_core::health::{Health, Limits};
 use model_core::relative::reciprocal;
-use model_core::{Decoder, Estimate, Frame, Gate, RowStatus, RowWire};
+use model_core::{Decoder, Frame, Gate, RowStatus, RowWire};
 
-use super::model::{InForce, by_generation, check_head, choose, copy_to, row_wires};
+use super::buffers::cut;
+use super::leave::Leave;
+use super::model::{InForce, by_generation, check_head, choose, copy_to, cut_room, row_wires};
+use super::recalibrate::Recalibrating;
 use super::{App, Core};
 use crate::link::message::{EstimateReport, HealthReport, Report};
 use crate::link::packet::UNASKED;
@@ -15,20 +18,12 @@ use crate::platform::Platform;
 use crate::readout::{FrameSource, Selection};
 use crate::store::{Slot, blob_in_slot, generation};
 
-/// Why a session ends.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Leave {
-    /// Another model was committed, and must be put in force.
-    NewModel,
-    /// The host asked for a restart.
-    Restart,
-}
-
 /// The application with the model in force, whose memory it borrows, and with the spare slot.
 pub struct Session<'a, 'm, P, F, S, const ROWS: usize> {
     pub(super) app: &'a mut App<'m, P, F, ROWS>,
     pub(super) model: InForce<'a, ROWS>,
     pub(super) spare: &'a mut S,
+    pub(super) recalibrating: Recalibrating<'a>,
 }
 
 impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
@@ -45,10 +40,11 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
         let capacity = app.core.capacity;
         // Only the copy is checked, so the most recent model is looked at once.
         let [newest, _] = by_generation(slots);
-        let copied = newest.and_then(|(slot, generation)| {
-            let copy = copy_to(weights, slots.get(slot)?.bytes())?;
-            InForce::load(capacity, copy, (slot, generation), true)
-        });
+        let bytes = newest.and_then(|(slot, _)| slots.get(slot)).map_or(&[][..], S::bytes);
+        let (room, left) =
+            if app.core.begins.is_some() { (None, weights) } else { cut_room(weights, bytes) };
+        let copied =
+            newest.and_then(|chosen| InForce::load(capacity, copy_to(room?, bytes)?, chosen, true));
         let chosen = if copied.is_some() { newest } else { choose(capacity, slots) };
         let [first, second] = slots;
         let (active, spare) = match chosen {
@@ -73,7 +69,9 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
             info!("slot 0 holds a model that was flashed, not uploaded: it is not used");
         }
         app.core.take_shape_of(model.decoder.as_ref());
-        Self { app, model, spare }
+        let mut recalibrating = Recalibrating::new(left);
+        app.core.begin_in_place(model.decoder.as_ref(), &mut recalibrating);
+        Self { app, model, spare, recalibrating }
     }
 
     /// Runs one turn of the loop: answers at most one request, and scans a frame if one is due.
@@ -90,7 +88,8 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
         // A lease that has ended restarts the clock of frames.
         let now_us = core.line.platform().now_us();
         if let Some(missed) = core.clock.due(now_us, core.configuration.frame_period_us) {
-            core.sensor_answers = core.scan(missed, self.model.decoder.as_ref());
+            core.sensor_answers =
+                core.scan(missed, self.model.decoder.as_ref(), &mut self.recalibrating);
         }
         if core.sensor_answers {
             core.line.platform().feed_watchdog();
@@ -105,6 +104,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
     /// Makes frames and estimates as long as the model's, and decodes the baseline with it. A baseline of other
     /// wires is replaced by the one that is kept, if that fits.
     fn take_shape_of(&mut self, decoder: Option<&Decoder<'_, ROWS>>) {
+        self.give_up_press();
         let before = (self.wires, self.row_wires);
         let shape = decoder.map(Decoder::shape);
         self.wires =
@@ -135,7 +135,12 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
     }
 
     /// Scans a frame and reports on it; returns whether it has at least one reading.
-    fn scan(&mut self, missed: u32, decoder: Option<&Decoder<'_, ROWS>>) -> bool {
+    fn scan(
+        &mut self,
+        missed: u32,
+        decoder: Option<&Decoder<'_, ROWS>>,
+        recalibrating: &mut Recalibrating<'_>,
+    ) -> bool {
         let start_us = self.now_us();
         let frame = self.frame.get_mut(..self.wires.readings()).unwrap_or_default();
         let rows = self.row_wires.get(..self.wires.rows).unwrap_or_default();
@@ -165,6 +170,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         if self.configuration.send_estimates {
             self.send_estimate(UNASKED, frame, start_us, flags | overrun);
         }
+        self.feed_press(decoder, recalibrating);
         any
     }
 
@@ -304,13 +310,5 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         let frame = self.readings();
         frame.fill(f32::NAN);
         frame.iter_mut().zip(readings).for_each(|(place, reading)| *place = reading);
-    }
-}
-
-/// The part of an estimate's memory that the model in force uses.
-fn cut<'e>(whole: &'e mut Estimate<'_>, rows: usize, outputs: usize) -> Estimate<'e> {
-    Estimate {
-        outputs: whole.outputs.get_mut(..outputs).unwrap_or_default(),
-        status: whole.status.get_mut(..rows).unwrap_or_default(),
     }
 }

@@ -1,7 +1,7 @@
 //! A device at the other end of a serial line, real or emulated.
 //!
-//! [`Device`] sends requests and receives reports; [`upload`] replaces its model; [`calibrate`] finds the constants
-//! of its circuit; [`stream`] lets it decode frames; [`check`] and [`scan`] compare it with the host. `docs/link.md`
+//! [`Device`] sends requests and receives reports; [`upload`] replaces its model, and [`recalibrate`] lets it mend its
+//! own; [`calibrate`] finds the constants of its circuit; [`stream`] lets it decode frames; [`check`] and [`scan`] compare it with the host. `docs/link.md`
 //! specifies the protocol.
 
 use std::collections::VecDeque;
@@ -26,6 +26,7 @@ mod settings;
 pub mod calibrate;
 pub mod stream;
 pub mod upload;
+pub mod recalibrate;
 mod expected;
 pub mod scan;
 pub mod check;

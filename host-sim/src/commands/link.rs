@@ -13,7 +13,7 @@ use super::check_arguments::{CheckArguments, Checked, conclude};
 use super::progress::Terminal;
 use super::{Common, interruption};
 
-/// Talk to a device on a serial port: identify, upload, record, calibrate.
+/// Talk to a device on a serial port: identify, upload, record, calibrate, recalibrate.
 #[derive(Args)]
 #[command(after_help = "Example: host-sim link /dev/ttyACM0 upload press.bin")]
 pub struct Arguments {
@@ -36,6 +36,7 @@ mod frames;
 mod record;
 mod settings;
 mod calibrate;
+mod recalibrate;
 
 #[derive(Subcommand)]
 enum Action {
@@ -63,6 +64,15 @@ enum Action {
     /// Asks for one arrangement of resistors after the other. docs/readout.md says which ones tell the constants.
     #[command(after_help = "Example: host-sim link /dev/ttyACM0 calibrate known.csv --store")]
     Calibrate(calibrate::Arguments),
+    /// Let the device mend its model after the sensor has changed, from reference presses.
+    ///
+    /// Each line of PRESSES tells what the outputs truly are. With columns of the readings as well, the device takes
+    /// these; otherwise it scans, and you are asked for one press after the other. docs/recalibration.md says more.
+    #[command(after_help = "Example: host-sim link /dev/ttyACM0 recalibrate press.bin presses.csv")]
+    Recalibrate(recalibrate::Arguments),
+    /// Return to the model that was active before the last recalibration or upload.
+    #[command(after_help = "Example: host-sim link /dev/ttyACM0 undo")]
+    Undo,
     /// Show configuration, constants and baseline, and what of them is kept over restarts.
     #[command(after_help = "Example: host-sim link /dev/ttyACM0 settings")]
     Settings(settings::SettingsArguments),
@@ -105,6 +115,12 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         Action::Baseline(action) => record::baseline(&mut open()?, action, common),
         Action::Configure(action) => settings::configure(&mut open()?, action, common),
         Action::Calibrate(action) => calibrate::execute(&mut open()?, action, common),
+        Action::Recalibrate(action) => recalibrate::execute(&mut open()?, action, common),
+        Action::Undo => {
+            let mut device = open()?;
+            device.undo()?;
+            status::show(&mut device, common)
+        }
         Action::Settings(action) => settings::settings(&mut open()?, action, common),
         Action::Check(action) => {
             let Checked { frames, model, .. } = action.load(common)?;

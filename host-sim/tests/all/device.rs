@@ -447,6 +447,43 @@ pub mod serial_port {
     }
 
     #[test]
+    fn a_device_is_recalibrated_from_the_command_line() {
+        let folder = Folder::new("recalibrated");
+        let old = model(16);
+        folder.write("old.bin", old.bytes());
+        let (port, near) = port(&old);
+        drop(near);
+        // 5 % more of every reading, and other columns besides.
+        let synth = ["synth", "press", "--seed", "5", "-n", "60", "--scale", "1.05"];
+        folder.succeed(&[&synth[..], &["-o", "presses.csv"]].concat());
+        let page = folder.succeed(&["link", &port, "recalibrate", "old.bin", "presses.csv"]);
+        assert!(page.contains("60 used, 0 unusable"), "{page}");
+        let is_old = format!("CRC-32 {:08x}", old.parse().crc());
+        let page = folder.succeed(&["link", &port, "identify"]);
+        assert!(page.contains("slot 1") && !page.contains(&is_old), "{page}");
+        // The old blob names the new model's outputs, if that is said.
+        let record = ["link", &port, "record", "old.bin", "-n", "2", "-o", "estimate.csv"];
+        assert_eq!(folder.run(&record).status.code(), Some(2));
+        folder.succeed(&[&record[..], &["--recalibrated"]].concat());
+
+        let page = folder.succeed(&["link", &port, "undo"]);
+        assert!(page.contains(&is_old) && page.contains("slot 0"), "{page}");
+
+        // A file without outputs, and presses that are all alike.
+        let text = std::fs::read_to_string(folder.path("presses.csv")).unwrap();
+        let mut lines = text.lines();
+        let (header, first) = (lines.next().unwrap(), lines.next().unwrap());
+        let alike = std::iter::once(header).chain(std::iter::repeat_n(first, 30));
+        folder.write("alike.csv", alike.collect::<Vec<_>>().join("\n").as_bytes());
+        let alike = folder.run(&["link", &port, "recalibrate", "old.bin", "alike.csv"]);
+        let said = String::from_utf8_lossy(&alike.stderr).into_owned();
+        assert!(alike.status.code() == Some(1) && said.contains("too alike"), "{said}");
+        folder.write("missing.csv", b"r1e1_dx_mm\n0\n");
+        let missing = folder.run(&["link", &port, "recalibrate", "old.bin", "missing.csv"]);
+        assert_eq!(missing.status.code(), Some(2));
+    }
+
+    #[test]
     fn a_device_is_used_from_the_command_line() {
         let folder = Folder::new("link");
         let (old, new) = (model(3), model(4));

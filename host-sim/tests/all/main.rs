@@ -13,6 +13,7 @@ mod gate;
 mod interruption;
 mod limit;
 mod readout;
+mod recalibrate;
 mod refusals;
 mod scan;
 mod trade;

@@ -50,12 +50,22 @@ fn ridge(samples: &[([f64; N], f64)], initial_covariance: f64) -> DVector<f64> {
     h.svd(true, true).solve(&y, 0.0).unwrap()
 }
 
+/// Memory of a recursion for N regressors and one output.
+type Memory<T> = [T; Rls::<f64>::values(N, 1)];
+
+fn weights<T: Real>(rls: &Rls<'_, T>) -> [T; N] {
+    let mut weights = [T::ZERO; N];
+    rls.weights(&mut weights);
+    weights
+}
+
 fn fit(samples: &[([f64; N], f64)], initial_covariance: f64) -> DVector<f64> {
-    let mut rls = Rls::<f64, N, 1>::try_new(initial_covariance, 1.0).unwrap();
+    let mut memory: Memory<f64> = [0.0; _];
+    let mut rls = Rls::try_new(&mut memory, [N, 1], initial_covariance, 1.0).unwrap();
     for (h, y) in samples {
-        rls.update(*h, [*y]);
+        rls.update(&mut h.clone(), &mut [*y]).unwrap();
     }
-    DVector::from_iterator(N, rls.output_weights().into_iter().map(|[w]| w))
+    DVector::from_iterator(N, weights(&rls))
 }
 
 #[test]
@@ -94,15 +104,16 @@ fn predictions_equal_batch_ridge_on_an_ill_conditioned_set() {
 /// RMSE on fresh samples after `updates`, in f32 and in f64.
 fn errors_after(updates: usize, width: f64, delta: f64, forgetting: f64) -> (f64, f64) {
     let mut source = Source::new(width);
-    let mut narrow = Rls::<f32, N, 1>::try_new(delta as f32, forgetting as f32).unwrap();
-    let mut wide = Rls::<f64, N, 1>::try_new(delta, forgetting).unwrap();
+    let (mut narrow, mut wide): (Memory<f32>, Memory<f64>) = ([0.0; _], [0.0; _]);
+    let mut narrow = Rls::try_new(&mut narrow, [N, 1], delta as f32, forgetting as f32).unwrap();
+    let mut wide = Rls::try_new(&mut wide, [N, 1], delta, forgetting).unwrap();
     for _ in 0..updates {
         let (h, y) = source.sample(0.05);
-        narrow.update(h.map(|h| h as f32), [y as f32]);
-        wide.update(h, [y]);
+        narrow.update(&mut h.map(|h| h as f32), &mut [y as f32]).unwrap();
+        wide.update(&mut h.clone(), &mut [y]).unwrap();
     }
-    let (narrow, wide) = (narrow.output_weights(), wide.output_weights());
-    assert!(narrow.iter().all(|[w]| w.is_finite()) && wide.iter().all(|[w]| w.is_finite()));
+    let (narrow, wide) = (weights(&narrow), weights(&wide));
+    assert!(narrow.iter().all(|w| w.is_finite()) && wide.iter().all(|w| w.is_finite()));
     let mut squares = (0.0, 0.0);
     let fresh = 20_000;
     for _ in 0..fresh {
@@ -110,15 +121,15 @@ fn errors_after(updates: usize, width: f64, delta: f64, forgetting: f64) -> (f64
         let error = |w: &dyn Fn(usize) -> f64| {
             (h.iter().enumerate().map(|(i, h)| h * w(i)).sum::<f64>() - y).powi(2)
         };
-        squares.0 += error(&|i| f64::from(narrow[i][0]));
-        squares.1 += error(&|i| wide[i][0]);
+        squares.0 += error(&|i| f64::from(narrow[i]));
+        squares.1 += error(&|i| wide[i]);
     }
     ((squares.0 / f64::from(fresh)).sqrt(), (squares.1 / f64::from(fresh)).sqrt())
 }
 
 #[test]
 fn f32_stays_within_a_tenth_of_f64_after_a_million_updates() {
-    for (delta, forgetting) in [(1e3, 1.0), (1e6, 1.0), (1e3, 0.99), (1e6, 0.99)] {
+    for (delta, forgetting) in [(1e3, 1.0), (1e6, 1.0), (1e5, 0.99), (1e6, 0.99)] {
         let (narrow, wide) = errors_after(1_000_000, 0.3, delta, forgetting);
         assert!(wide < 0.2, "the fit itself must work: {wide}");
         let ratio = narrow / wide;
@@ -129,23 +140,111 @@ fn f32_stays_within_a_tenth_of_f64_after_a_million_updates() {
     }
 }
 
+/// Gaussians of a small network for the long test, and the bias's 1.
+const FEW: usize = 5;
+
+/// Regressors of the scalar input x.
+fn few(x: f32) -> [f32; FEW] {
+    core::array::from_fn(|i| match i {
+        4 => 1.0,
+        _ => libm::expf(-(x - i as f32 / 3.0).powi(2) / 0.18),
+    })
+}
+
 #[test]
-fn unexcited_directions_fade_to_weight_zero() {
-    let mut rls = Rls::<f32, 2, 1>::try_new(1e3, 0.9).unwrap();
-    for _ in 0..100_000 {
-        rls.update([1.0, 0.0], [2.0]);
+fn a_resting_noisy_sensor_does_no_harm_in_ten_million_updates() {
+    let truth = |x: f32| (3.0 * x).sin();
+    for forgetting in [0.9, 0.99, 0.999, 0.9999] {
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(11);
+        let mut noise = || 0.17 * (uniform(&mut random) + uniform(&mut random) - 1.0) as f32;
+        let mut memory = [0.0_f32; Rls::<f32>::values(FEW, 1)];
+        let mut rls = Rls::try_new(&mut memory, [FEW, 1], 1e3, forgetting).unwrap();
+        for i in 0..20_000 {
+            let x = (i * 7919 % 1000) as f32 / 1000.0;
+            rls.update(&mut few(x), &mut [truth(x) + noise()]).unwrap();
+        }
+        assert!(rls.is_excited(4.0), "λ = {forgetting}");
+        let rest = few(0.4);
+        for _ in 0..10_000_000 {
+            rls.update(&mut rest.clone(), &mut [truth(0.4) + noise()]).unwrap();
+        }
+        let mut weights = [0.0; FEW];
+        rls.weights(&mut weights);
+        let predict = |x: f32| few(x).iter().zip(&weights).map(|(h, w)| h * w).sum::<f32>();
+        // The mean of the last 1/(1 − λ) targets, with noise of 0.07.
+        let error = (predict(0.4) - truth(0.4)).abs();
+        assert!(error < 0.07, "λ = {forgetting}: {error} at rest");
+        // It was 1e19.
+        let largest = weights.iter().fold(0.0_f32, |most, w| most.max(w.abs()));
+        assert!(largest < 1.5, "λ = {forgetting}: {weights:?}");
+        assert!(rls.triangle.iter().all(|r| r.abs() <= 1.01 * (10.0 / (1.0 - forgetting)).sqrt()));
+        assert!(!rls.is_excited(4.0), "a resting sensor excites one direction: λ = {forgetting}");
+        // It learns again as soon as there is something to learn.
+        for i in 0..20_000 {
+            let x = (i * 7919 % 1000) as f32 / 1000.0;
+            rls.update(&mut few(x), &mut [truth(x) + noise()]).unwrap();
+        }
+        rls.weights(&mut weights);
+        let predict = |x: f32| few(x).iter().zip(&weights).map(|(h, w)| h * w).sum::<f32>();
+        let worst = (0..=10).map(|i| (predict(i as f32 / 10.0) - truth(i as f32 / 10.0)).abs());
+        let worst = worst.fold(0.0, f32::max);
+        assert!(worst < 0.15, "λ = {forgetting}: {worst} after presses");
     }
-    let weights = rls.output_weights();
-    assert!((weights[0][0] - 2.0).abs() < 1e-5, "{weights:?}");
-    assert_eq!(weights[1][0], 0.0);
+}
+
+#[test]
+fn an_unusable_sample_is_refused_and_changes_nothing() {
+    let mut memory = [0.0_f32; Rls::<f32>::values(2, 1)];
+    let mut rls = Rls::try_new(&mut memory, [2, 1], 1e3, 0.99).unwrap();
+    rls.update(&mut [1.0, 2.0], &mut [3.0]).unwrap();
+    let before = (rls.triangle.to_vec(), rls.projection.to_vec(), rls.turn);
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e20, -1e20, f32::MAX] {
+        for (h, y) in [([bad, 0.0], 0.0), ([0.0, bad], 0.0), ([1.0, 1.0], bad)] {
+            assert_eq!(rls.update(&mut h.clone(), &mut [y]), Err(RlsError::UnusableSample));
+        }
+    }
+    assert_eq!(rls.update(&mut [1.0], &mut [1.0]), Err(RlsError::UnusableSample));
+    assert_eq!(rls.update(&mut [1.0; 2], &mut [1.0; 2]), Err(RlsError::UnusableSample));
+    assert_eq!((rls.triangle.to_vec(), rls.projection.to_vec(), rls.turn), before);
+    // The largest usable numbers still give finite weights.
+    for _ in 0..1000 {
+        rls.update(&mut [1e15, -1e15], &mut [1e15]).unwrap();
+    }
+    let mut weights = [0.0; 2];
+    rls.weights(&mut weights);
+    assert!(weights.iter().all(|w| w.is_finite()), "{weights:?}");
+}
+
+#[test]
+fn unexcited_directions_fade_towards_weight_zero_and_are_told() {
+    let mut memory = [0.0_f32; Rls::<f32>::values(2, 1)];
+    let mut rls = Rls::try_new(&mut memory, [2, 1], 1e3, 0.9).unwrap();
+    let mut weights = [0.0; 2];
+    for _ in 0..100 {
+        rls.update(&mut [0.0, 1.0], &mut [5.0]).unwrap();
+        rls.update(&mut [1.0, 0.0], &mut [2.0]).unwrap();
+    }
+    rls.weights(&mut weights);
+    assert!((weights[1] - 5.0).abs() < 0.01 && rls.is_excited(10.0), "{weights:?}");
+    for _ in 0..100_000 {
+        rls.update(&mut [1.0, 0.0], &mut [2.0]).unwrap();
+    }
+    rls.weights(&mut weights);
+    assert!((weights[0] - 2.0).abs() < 1e-3 && weights[1].abs() < 1e-6, "{weights:?}");
+    assert!(!rls.is_excited(10.0) && rls.is_excited(0.5));
 }
 
 #[test]
 fn hopeless_settings_are_refused() {
-    for delta in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-        assert_eq!(Rls::<f32, 2, 1>::try_new(delta, 1.0), Err(RlsError::InitialCovariance));
+    let mut memory = [0.0_f32; Rls::<f32>::values(2, 1)];
+    for delta in [0.0, -1.0, f32::NAN, f32::INFINITY, 1e-39] {
+        let refused = Rls::try_new(&mut memory, [2, 1], delta, 1.0);
+        assert_eq!(refused, Err(RlsError::InitialCovariance), "{delta}");
     }
     for forgetting in [0.0, -0.5, 1.001, f32::NAN] {
-        assert_eq!(Rls::<f32, 2, 1>::try_new(1.0, forgetting), Err(RlsError::ForgettingFactor));
+        let refused = Rls::try_new(&mut memory, [2, 1], 1.0, forgetting);
+        assert_eq!(refused, Err(RlsError::ForgettingFactor));
     }
+    let refused = Rls::try_new(&mut memory[1..], [2, 1], 1.0, 1.0);
+    assert_eq!(refused, Err(RlsError::Memory { expected: 8, found: 7 }));
 }

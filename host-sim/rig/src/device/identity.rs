@@ -3,7 +3,8 @@
 use firmware::capacity::Capacity;
 use firmware::link::message::{Identity, Memory, ModelIdentity};
 use model_core::Wires;
-use model_core::blob::ModelShape;
+use model_core::blob::{Columns, Model, ModelShape};
+use model_core::checksum::CRC_32;
 use serde::Serialize;
 
 /// Identity that a device reports.
@@ -50,6 +51,23 @@ impl DeviceIdentity {
             outputs: model.outputs.into(),
         });
         shape.and_then(|shape| capacity.wires_for(shape)).unwrap_or(capacity.wires())
+    }
+
+    /// Whether the active model has the columns of `model` and was trained on the same: it is that model, or one that the
+    /// device made of it by recalibration.
+    #[must_use]
+    pub fn is_made_of(&self, model: &Model<'_>) -> bool {
+        let metadata = model.metadata();
+        let crc = |names: Columns<'_>, units: Columns<'_>| {
+            let mut digest = CRC_32.digest();
+            [names, units].iter().for_each(|columns| digest.update(columns.0.as_bytes()));
+            digest.finalize()
+        };
+        self.model.is_some_and(|found| {
+            found.scene_digest == metadata.scene_digest
+                && found.inputs_crc_32 == crc(metadata.input_names, metadata.input_units)
+                && found.outputs_crc_32 == crc(metadata.output_names, metadata.output_units)
+        })
     }
 
     /// Whether the model with that CRC-32 is active.

@@ -10,7 +10,7 @@ use super::{Device, DeviceIdentity, Wire};
 use crate::error::{Error, Result};
 
 /// Longest time for erasing flash: a sector of 128 KiB takes up to 4 s on an STM32F4.
-const ERASE: Duration = Duration::from_secs(6);
+pub(super) const ERASE: Duration = Duration::from_secs(6);
 
 /// Sends one step of an upload and returns the device's answer.
 ///

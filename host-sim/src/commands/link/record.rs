@@ -20,6 +20,9 @@ use super::scan::{
 pub struct RecordArguments {
     /// Weight blob that is active on the device: its estimates are saved. Without it, readings are.
     model: Option<PathBuf>,
+    /// MODEL is the one that the device has recalibrated since: one of the same columns and scene is active.
+    #[arg(long, requires = "model")]
+    recalibrated: bool,
     #[command(flatten)]
     scan: ScanArguments,
     /// Relative change within which a row counts as untouched and is not decoded, once the device has a
@@ -65,7 +68,7 @@ pub fn record<W: Wire>(
     output::check_writable(&action.output, &inputs)?;
     let identity = device.identify()?;
     let (wanted, names) = match &model {
-        Some(model) => (Wanted::Estimates, output_names(model, &identity)?),
+        Some(model) => (Wanted::Estimates, output_names(model, &identity, action.recalibrated)?),
         None => (Wanted::Readings, reading_names(&identity)),
     };
     let patience = patience(&action.scan, &identity);
@@ -84,10 +87,16 @@ pub fn record<W: Wire>(
     saved(&Saved { frames, frames_lost, values_missing, rows_at_rest, file }, common)
 }
 
-/// Names of the model's outputs, if it is the active one.
-fn output_names(model: &ModelBlob, identity: &DeviceIdentity) -> Result<Vec<String>> {
+/// Names of the model's outputs, if it is the active one, or was before it was `recalibrated`.
+fn output_names(
+    model: &ModelBlob,
+    identity: &DeviceIdentity,
+    recalibrated: bool,
+) -> Result<Vec<String>> {
     let model = model.parse();
-    if !identity.has_in_force(model.crc()) {
+    let is_it =
+        if recalibrated { identity.is_made_of(&model) } else { identity.has_in_force(model.crc()) };
+    if !is_it {
         return Err(Error::Usage(format!(
             "MODEL {:08x}: {} is active on the device; `upload` this one, or name that one",
             model.crc(),

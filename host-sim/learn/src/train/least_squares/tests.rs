@@ -36,12 +36,20 @@ pub(in super::super) fn fit_batch(
 /// Oracle by recursion: every sample through the device's own recursive least squares.
 fn recursive(design: &impl Design, targets: &[f64], outputs: usize, covariance: f64) -> Factor {
     let n = design.regressors();
-    let (mut root, mut projection) = (vec![0.0; n * n], vec![0.0; n * outputs]);
-    rls::start(&mut root, &mut projection, n, covariance).unwrap();
+    let (mut triangle, mut projection) =
+        (vec![0.0; rls::triangle_values(n)], vec![0.0; n * outputs]);
+    rls::start(&mut triangle, n, 1.0 / covariance.sqrt());
     let mut h = vec![0.0; n];
     for (i, target) in targets.chunks_exact(outputs).enumerate() {
         design.fill(i..i + 1, &mut h);
-        rls::update(&mut root, &mut projection, &mut h, &mut target.to_vec(), 1.0);
+        rls::rotate(&mut triangle, &mut projection, &mut h, &mut target.to_vec());
+    }
+    let mut root = vec![0.0; n * n];
+    let mut rest = &triangle[..];
+    for (i, line) in root.chunks_exact_mut(n).enumerate() {
+        let (row, after) = rest.split_at(n - i);
+        line[i..].copy_from_slice(row);
+        rest = after;
     }
     Factor { root, projection, regressors: n, outputs }
 }

@@ -1,0 +1,471 @@
+//! Recalibration over the link: what is learned comes into force whole or not at all, and can be undone.
+
+mod common;
+
+use common::*;
+use firmware::app::{Leave, Session};
+use firmware::link::message::{
+    Configuration, RecalibrationFault, RecalibrationReport, RecalibrationState, RecalibrationStep,
+    Refusal, Report, Request, UploadState,
+};
+use firmware::store::{MOST_RECORDS, Slot};
+use model_core::blob::{Floats, Metadata, ModelParts, ModelShape, encode_to_vec};
+use model_core::rbf::Shape;
+use model_core::rbf::direct::{Network, Parameters};
+use model_core::recalibration::Recalibration;
+use model_core::{AlignedBytes, Decoder};
+
+const ALL: usize = ROWS * OUTPUTS;
+/// Training error of every output.
+const ERROR: f32 = 0.02;
+/// How far the sensor's readings have moved since training, in Ω.
+const SHIFTS: TestFrame = [[4.0, -3.0, 5.0], [-6.0, 2.0, 3.0]];
+
+/// A model of readings from 50 Ω to 70 Ω, with a network for each row.
+fn trained() -> AlignedBytes {
+    let number = |i: usize| ((i * 37) % 101) as f32 / 50.0 - 1.0;
+    let list = |from: usize, count: usize| (from..from + count).map(number).collect::<Vec<_>>();
+    let [centres, weights, affine] = [list(60, 12), list(20, 8), list(40, 6)];
+    let network = |bias: &'static [f32; OUTPUTS]| {
+        let parameters = Parameters {
+            input_minimum: &[50.0; COLS],
+            input_per_span: &[0.05; COLS],
+            centres: &centres,
+            decay: &[0.5],
+            output_weights: &weights,
+            bias,
+            affine: &affine,
+        };
+        let shape = Shape { inputs: COLS, centres: 4, outputs: OUTPUTS };
+        Network::try_new(shape, parameters).unwrap().into()
+    };
+    let shape = ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS };
+    let errors = [ERROR; ALL];
+    let metadata = Metadata { training_rmse: Floats::of(&errors), ..Metadata::unnamed(shape) };
+    let networks = &[network(&[0.5, -0.5]), network(&[1.0, 2.0])];
+    encode_to_vec(&ModelParts {
+        projection: None,
+        expansion: None,
+        networks,
+        row_network: &[0, 1],
+        metadata,
+    })
+    .unwrap()
+}
+
+/// What the sensor read in training for press number `i`.
+fn press(i: usize) -> TestFrame {
+    let part = |seed: usize| ((i * seed) % 97) as f32 / 97.0;
+    let seeds = [[13, 29, 31], [37, 41, 53]];
+    seeds.map(|row| row.map(|seed| 50.0 + 20.0 * part(seed)))
+}
+
+/// What it reads for a frame today.
+fn today(frame: &TestFrame) -> TestFrame {
+    core::array::from_fn(|m| core::array::from_fn(|k| frame[m][k] + SHIFTS[m][k]))
+}
+
+fn outputs(blob: &[u8], frame: &TestFrame) -> [f32; ALL] {
+    let decoder = Decoder::<ROWS>::load(blob).unwrap();
+    decoder.decode(frame.as_flattened()).unwrap().outputs.try_into().unwrap()
+}
+
+/// Memory for the weights, and for a recalibration behind them.
+fn memory() -> Vec<u32> {
+    let blob = trained();
+    let model = model_core::blob::Model::decode(&blob).unwrap();
+    let floats =
+        Recalibration::floats(&model).unwrap() + Recalibration::scratch_floats(&model).unwrap();
+    vec![0; blob.len().div_ceil(4) + floats]
+}
+
+type Answer = Result<RecalibrationReport, Refusal>;
+
+fn step(
+    session: &mut TestSession<'_>,
+    board: &Board,
+    step: RecalibrationStep<'_>,
+) -> (Answer, Option<Leave>) {
+    ask(session, board, &Request::Recalibrate(step), |report| match report {
+        Report::Recalibration(report) => Ok(report),
+        Report::Refused(refusal) => Err(refusal),
+        other => panic!("{other:?}"),
+    })
+}
+
+/// Lets the device decode a frame, as if it had been scanned.
+fn show(session: &mut TestSession<'_>, board: &Board, frame: &TestFrame) -> [f32; ALL] {
+    let readings_ohm = Floats::of(frame.as_flattened());
+    let request = Request::Decode { frame: 1, readings_ohm };
+    ask(session, board, &request, |report| match report {
+        Report::Estimate(estimate) => {
+            estimate.outputs.iter().collect::<Vec<_>>().try_into().unwrap()
+        }
+        other => panic!("{other:?}"),
+    })
+    .0
+}
+
+/// Begins, and adds so many presses that the device does not scan but is shown.
+fn add_presses(session: &mut TestSession<'_>, board: &Board, presses: usize) {
+    let blob = trained();
+    step(session, board, RecalibrationStep::Begin).0.unwrap();
+    for i in 0..presses {
+        show(session, board, &today(&press(i)));
+        let stated = outputs(&blob, &press(i));
+        let outputs = Floats::of(&stated);
+        let added = RecalibrationStep::Press { before: i as u16, frames: 0, outputs };
+        assert_eq!(step(session, board, added).0.unwrap().presses, i as u16 + 1);
+    }
+}
+
+/// Largest error of the outputs on other presses.
+fn largest_error(session: &mut TestSession<'_>, board: &Board) -> f32 {
+    let blob = trained();
+    let mut largest = 0.0_f32;
+    for i in 1000..1020 {
+        let found = show(session, board, &today(&press(i)));
+        let pairs = found.iter().zip(outputs(&blob, &press(i)));
+        largest = pairs.fold(largest, |most, (a, b)| most.max((a - b).abs()));
+    }
+    largest
+}
+
+/// CRC-32 of the model that is in force after a restart.
+fn after_restart(slots: &mut [MockSlot; 2]) -> Option<u32> {
+    let mut bench = Bench::new(quiet());
+    let mut session = Session::start(&mut bench.app, slots, &mut []);
+    model_crc(&mut session, &bench.board)
+}
+
+/// Recalibrates by 60 presses, as far as the power lasts; returns the new model's CRC-32.
+fn recalibrate(slots: &mut [MockSlot; 2]) -> Result<u32, Refusal> {
+    let (mut bench, mut memory) = (Bench::new(quiet()), memory());
+    let mut session = Session::start(&mut bench.app, slots, &mut memory);
+    add_presses(&mut session, &bench.board, 60);
+    match step(&mut session, &bench.board, RecalibrationStep::Commit) {
+        (Ok(RecalibrationReport { state: RecalibrationState::InForce { crc_32 }, .. }), leave) => {
+            assert_eq!(leave, Some(Leave::NewModel));
+            Ok(crc_32)
+        }
+        (Ok(other), _) => panic!("{other:?}"),
+        (Err(refusal), leave) => {
+            assert_eq!(leave, None);
+            Err(refusal)
+        }
+    }
+}
+
+/// Leaves the model with the CRC-32 `left`.
+fn undo(slots: &mut [MockSlot; 2], left: u32) -> Result<u32, Refusal> {
+    let mut bench = Bench::new(quiet());
+    let mut session = Session::start(&mut bench.app, slots, &mut []);
+    let (answer, _) = step(&mut session, &bench.board, RecalibrationStep::Undo { crc_32: left });
+    answer.map(|report| match report.state {
+        RecalibrationState::InForce { crc_32 } => crc_32,
+        other => panic!("{other:?}"),
+    })
+}
+
+fn upload(slots: &mut [MockSlot; 2], blob: &[u8]) {
+    let mut bench = Bench::new(quiet());
+    let mut session = Session::start(&mut bench.app, slots, &mut []);
+    for upload in upload_steps(blob, 60) {
+        let request = Request::Upload(upload);
+        let taken = ask(&mut session, &bench.board, &request, |report| match report {
+            Report::Upload(state) => state != UploadState::Idle,
+            other => panic!("{other:?}"),
+        });
+        assert!(taken.0);
+    }
+}
+
+#[test]
+fn a_recalibration_takes_the_memory_of_the_weights_where_it_must() {
+    let blob = trained();
+    let mut slots = MockSlot::pair_with(&blob);
+    let (mut bench, mut memory) = (Bench::new(quiet()), memory());
+    let board = bench.board.clone();
+    let less = memory.len() - 1;
+    let is_in_ram = |session: &mut TestSession<'_>| {
+        let read = |report: Report<'_>| match report {
+            Report::Identity(identity) => identity.model.map(|model| model.in_ram),
+            other => panic!("{other:?}"),
+        };
+        ask(session, &board, &Request::Identify, read).0
+    };
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut memory[..less]);
+    assert_eq!(is_in_ram(&mut session), Some(true));
+    let outputs_before = show(&mut session, &board, &press(3));
+    board.0.borrow_mut().to_host.clear();
+    let begin = Request::Recalibrate(RecalibrationStep::Begin);
+    board.0.borrow_mut().to_device.extend(request_bytes(9, &begin));
+    assert_eq!(settle(&mut session, &board), Some(Leave::MakeRoom));
+    assert!(board.0.borrow().to_host.is_empty(), "the next session answers");
+    let _ = session;
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut memory[..less]);
+    let answers = reports(&board.0.borrow().to_host);
+    assert!(answers.len() == 1 && answers[0].0 == 9, "{answers:?}");
+    assert!(answers[0].1.contains("state: Collecting"), "{answers:?}");
+    assert_eq!(is_in_ram(&mut session), Some(false));
+    assert_eq!(show(&mut session, &board, &press(3)), outputs_before);
+    let (answer, leave) = step(&mut session, &board, RecalibrationStep::Abort);
+    assert_eq!(answer.unwrap().state, RecalibrationState::Idle);
+    assert_eq!(leave, Some(Leave::MakeRoom));
+    let _ = session;
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut memory[..less]);
+    assert_eq!(is_in_ram(&mut session), Some(true));
+}
+
+#[test]
+fn presses_bring_a_changed_sensor_back_and_the_previous_model_can_be_had_again() {
+    let old = trained();
+    let mut slots = MockSlot::pair_with(&old);
+    let (mut bench, mut memory) = (Bench::new(quiet()), memory());
+    let board = bench.board.clone();
+    let crc_32 = {
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut memory);
+        assert!(largest_error(&mut session, &board) > 10.0 * ERROR);
+        add_presses(&mut session, &board, 100);
+        let progress = step(&mut session, &board, RecalibrationStep::Status).0.unwrap();
+        assert_eq!((progress.networks, progress.excited), (2, 2));
+        assert!(progress.error_before > 5.0 && progress.error_after < 1.0, "{progress:?}");
+        let (answer, leave) = step(&mut session, &board, RecalibrationStep::Commit);
+        assert_eq!(leave, Some(Leave::NewModel));
+        match answer.unwrap().state {
+            RecalibrationState::InForce { crc_32 } => crc_32,
+            other => panic!("{other:?}"),
+        }
+    };
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut memory);
+    assert_eq!(model_crc(&mut session, &board), Some(crc_32));
+    assert!(largest_error(&mut session, &board) < ERROR);
+    // The answer to the commit was lost: the same again changes nothing.
+    let (again, leave) = step(&mut session, &board, RecalibrationStep::Commit);
+    assert_eq!(again.unwrap().state, RecalibrationState::InForce { crc_32 });
+    assert_eq!(leave, None);
+    let _ = session;
+    assert_eq!(after_restart(&mut slots), Some(crc_32));
+
+    let old_crc = crc_of(&old);
+    assert_eq!(undo(&mut slots, crc_32), Ok(old_crc));
+    assert_eq!(after_restart(&mut slots), Some(old_crc));
+    // Repeated, it is done already. The other way, it is the next undo.
+    assert_eq!(undo(&mut slots, crc_32), Ok(old_crc));
+    assert_eq!(after_restart(&mut slots), Some(old_crc));
+    assert_eq!(undo(&mut slots, old_crc), Ok(crc_32));
+    assert_eq!(after_restart(&mut slots), Some(crc_32));
+    let nothing = Err(Refusal::Recalibration(RecalibrationFault::NothingToUndo));
+    assert_eq!(undo(&mut slots, 7), nothing);
+    // Every change takes a record; at last there is no place for one.
+    let mut in_force = [crc_32, old_crc];
+    for _ in 0..2 * (MOST_RECORDS - 1) - 2 {
+        assert_eq!(undo(&mut slots, in_force[0]), Ok(in_force[1]));
+        in_force.reverse();
+    }
+    assert_eq!(undo(&mut slots, in_force[0]), nothing);
+    assert_eq!(after_restart(&mut slots), Some(in_force[0]));
+    // Uploads make room: one in each slot.
+    let [next, last] = [common::blob(2, 5), common::blob(3, 2)];
+    upload(&mut slots, &next);
+    upload(&mut slots, &last);
+    assert_eq!(undo(&mut slots, crc_of(&last)), Ok(crc_of(&next)));
+}
+
+#[test]
+fn a_power_cut_at_any_word_of_a_recalibration_leaves_the_old_or_the_new_model() {
+    let old = trained();
+    let mut cuts = 0;
+    let mut new = None;
+    for operations in 0.. {
+        let mut slots = MockSlot::pair_with(&old);
+        slots[0].cut_power_after(operations);
+        let outcome = recalibrate(&mut slots);
+        let cut = slots[0].power_on();
+        let found = after_restart(&mut slots);
+        if !cut {
+            assert_eq!(found, outcome.ok());
+            new = found;
+            break;
+        }
+        assert_eq!(outcome, Err(Refusal::Flash), "cut after {operations} words");
+        assert_eq!(found, Some(crc_of(&old)), "cut after {operations} words");
+        cuts += 1;
+    }
+    assert!(new.is_some_and(|new| new != crc_of(&old)));
+    // The power was cut at every word of the erase, the blob and the record.
+    assert_eq!(cuts, MockSlot::BYTES / 4 + old.len().div_ceil(4) + 4);
+}
+
+#[test]
+fn a_power_cut_at_any_word_of_an_undo_leaves_the_old_or_the_new_model() {
+    let old = crc_of(&trained());
+    let mut cuts = 0;
+    for operations in 0.. {
+        let mut slots = MockSlot::pair_with(&trained());
+        let new = recalibrate(&mut slots).unwrap();
+        slots[0].cut_power_after(operations);
+        let outcome = undo(&mut slots, new);
+        let cut = slots[0].power_on();
+        let found = after_restart(&mut slots);
+        if !cut {
+            assert_eq!((outcome, found), (Ok(old), Some(old)));
+            break;
+        }
+        assert_eq!((outcome, found), (Err(Refusal::Flash), Some(new)), "{operations}");
+        // It can be done again: there is place for other records.
+        assert_eq!(undo(&mut slots, new), Ok(old));
+        assert_eq!(after_restart(&mut slots), Some(old));
+        cuts += 1;
+    }
+    assert_eq!(cuts, 4, "words of a record");
+}
+
+#[test]
+fn a_press_is_the_mean_of_frames_and_counts_once_however_often_it_is_sent() {
+    let blob = trained();
+    let mut slots = MockSlot::pair_with(&blob);
+    let scanning = Configuration { frame_period_us: 1000, send_estimates: false, ..quiet() };
+    let (mut bench, mut memory) = (Bench::new(scanning), memory());
+    let board = bench.board.clone();
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut memory);
+    step(&mut session, &board, RecalibrationStep::Begin).0.unwrap();
+    let mut wait = |request: &Request<'_>, number: u16, times: usize| {
+        board.0.borrow_mut().to_host.clear();
+        for _ in 0..times {
+            board.0.borrow_mut().to_device.extend(request_bytes(number, request));
+        }
+        let until = board.0.borrow().now_us + 10_000;
+        while board.0.borrow().now_us < until {
+            assert_eq!(session.step(), None);
+        }
+        reports(&board.0.borrow().to_host)
+    };
+    for i in 0..80 {
+        let stated = outputs(&blob, &press(i));
+        *bench.frame.borrow_mut() = today(&press(i));
+        let outputs = Floats::of(&stated);
+        let added = RecalibrationStep::Press { before: i as u16, frames: 3, outputs };
+        // Sent three times before the frames are scanned, and once more later.
+        let all = wait(&Request::Recalibrate(added), 100 + i as u16, 3);
+        assert_eq!(all.len(), 1, "{all:?}");
+        let presses = format!("presses: {},", i + 1);
+        assert!(all[0].0 == 100 + i as u16 && all[0].1.contains(&presses), "{all:?}");
+        let all = wait(&Request::Recalibrate(added), 200 + i as u16, 1);
+        assert!(all[0].1.contains(&presses), "{all:?}");
+    }
+    let all = wait(&Request::Recalibrate(RecalibrationStep::Commit), 300, 0);
+    assert!(all.is_empty());
+    let (answer, leave) = step(&mut session, &board, RecalibrationStep::Commit);
+    let report = answer.unwrap();
+    assert!(report.error_after < 0.2 * report.error_before, "{report:?}");
+    assert_eq!(leave, Some(Leave::NewModel));
+}
+
+#[test]
+fn another_request_that_ends_a_press_refuses_it() {
+    let blob = trained();
+    let mut slots = MockSlot::pair_with(&blob);
+    let scanning = Configuration { frame_period_us: 1000, send_estimates: false, ..quiet() };
+    let (mut bench, mut memory) = (Bench::new(scanning), memory());
+    let board = bench.board.clone();
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut memory);
+    step(&mut session, &board, RecalibrationStep::Begin).0.unwrap();
+    let stated = outputs(&blob, &press(1));
+    let outputs = Floats::of(&stated);
+    let added = RecalibrationStep::Press { before: 0, frames: 1000, outputs };
+    board.0.borrow_mut().to_host.clear();
+    board.0.borrow_mut().to_device.extend(request_bytes(5, &Request::Recalibrate(added)));
+    settle(&mut session, &board);
+    board.0.borrow_mut().to_device.extend(request_bytes(6, &configure(quiet())));
+    settle(&mut session, &board);
+    let all = reports(&board.0.borrow().to_host);
+    assert!(all[0].0 == 5 && all[0].1.contains("Recalibration(Frames)"), "{all:?}");
+    assert_eq!(step(&mut session, &board, RecalibrationStep::Status).0.unwrap().presses, 0);
+}
+
+#[test]
+fn what_cannot_be_done_is_refused_by_name() {
+    let blob = trained();
+    let mut slots = MockSlot::pair_with(&blob);
+    let (mut bench, mut memory) = (Bench::new(quiet()), memory());
+    let board = bench.board.clone();
+    let fault = |fault| Err(Refusal::Recalibration(fault));
+    let stated = outputs(&blob, &press(1));
+    let added = |before: u16, frames: u16| {
+        let outputs = Floats::of(&stated);
+        RecalibrationStep::Press { before, frames, outputs }
+    };
+    {
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut memory);
+        let mut one = |wanted: RecalibrationStep<'_>| step(&mut session, &board, wanted).0;
+        assert_eq!(one(added(0, 0)), fault(RecalibrationFault::NotBegun));
+        assert_eq!(one(RecalibrationStep::Commit), fault(RecalibrationFault::NotBegun));
+        assert_eq!(one(RecalibrationStep::Status).unwrap().state, RecalibrationState::Idle);
+        let nothing = fault(RecalibrationFault::NothingToUndo);
+        assert_eq!(one(RecalibrationStep::Undo { crc_32: crc_of(&blob) }), nothing);
+
+        let begun = one(RecalibrationStep::Begin).unwrap();
+        assert_eq!((begun.state, begun.presses), (RecalibrationState::Collecting, 0));
+        assert_eq!(one(added(1, 0)), fault(RecalibrationFault::OutOfPlace { presses: 0 }));
+        assert_eq!(one(added(0, 5)), fault(RecalibrationFault::Frames)); // nothing is scanned
+        let short = RecalibrationStep::Press { before: 0, frames: 0, outputs: Floats(&[0; 8]) };
+        assert_eq!(one(short), fault(RecalibrationFault::Outputs { expected: ALL as u16 }));
+        // Nothing was shown yet: readings of 0 Ω.
+        assert_eq!(one(added(0, 0)), fault(RecalibrationFault::UnusablePress));
+        assert_eq!(
+            one(RecalibrationStep::Commit),
+            fault(RecalibrationFault::NotExcited { row: 0 })
+        );
+        let bad = [f32::NAN; ALL];
+        let outputs = Floats::of(&bad);
+        let bad = RecalibrationStep::Press { before: 0, frames: 0, outputs };
+        assert_eq!(one(bad), fault(RecalibrationFault::UnusablePress));
+        let aborted = one(RecalibrationStep::Abort).unwrap();
+        assert_eq!(aborted.state, RecalibrationState::Idle);
+        assert_eq!(one(added(0, 0)), fault(RecalibrationFault::NotBegun));
+    }
+    // The same press again and again teaches nothing.
+    {
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut memory);
+        step(&mut session, &board, RecalibrationStep::Begin).0.unwrap();
+        show(&mut session, &board, &today(&press(1)));
+        for before in 0..100 {
+            step(&mut session, &board, added(before, 0)).0.unwrap();
+        }
+        let (answer, leave) = step(&mut session, &board, RecalibrationStep::Commit);
+        assert_eq!((answer, leave), (fault(RecalibrationFault::NotExcited { row: 0 }), None));
+    }
+    // Without memory, for a model whose rows share a network, and without a model.
+    let floats = memory.len() - blob.len().div_ceil(4);
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let begun = step(&mut session, &board, RecalibrationStep::Begin).0;
+    let bytes = 4 * floats as u32;
+    assert_eq!(begun, fault(RecalibrationFault::NoRoom { bytes, free_bytes: 0 }));
+    let _ = session;
+    let mut shared = MockSlot::pair_with(&common::blob(1, 3));
+    let mut session = Session::start(&mut bench.app, &mut shared, &mut memory);
+    let begun = step(&mut session, &board, RecalibrationStep::Begin).0;
+    assert_eq!(begun, fault(RecalibrationFault::SharedNetworks));
+    let _ = session;
+    let mut empty = MockSlot::pair();
+    let mut session = Session::start(&mut bench.app, &mut empty, &mut memory);
+    let begun = step(&mut session, &board, RecalibrationStep::Begin).0;
+    assert_eq!(begun, fault(RecalibrationFault::NoModel));
+}
+
+#[test]
+fn an_undo_brings_back_the_model_before_an_upload_too() {
+    let (old, new) = (trained(), common::blob(2, 5));
+    let mut slots = MockSlot::pair_with(&old);
+    upload(&mut slots, &new);
+    assert_eq!(after_restart(&mut slots), Some(crc_of(&new)));
+    assert_eq!(undo(&mut slots, crc_of(&new)), Ok(crc_of(&old)));
+    // A model that decayed does not come back.
+    slots[1].decay(20, 4);
+    let nothing = Err(Refusal::Recalibration(RecalibrationFault::NothingToUndo));
+    assert_eq!(undo(&mut slots, crc_of(&old)), nothing);
+    // The bytes of a blob that fills its slot are no records.
+    assert!(slots[0].bytes().len() == MockSlot::BYTES);
+    assert_eq!(after_restart(&mut slots), Some(crc_of(&old)));
+}
