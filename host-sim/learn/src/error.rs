@@ -56,7 +56,9 @@ pub enum Error {
     )]
     OneRow,
     /// Readings without any regression on which a projection could be based.
-    #[error("the readings have no regression: some are no numbers")]
+    #[error(
+        "the readings have no regression: some are no numbers, or so large that sums of their squares lose all digits"
+    )]
     NoRegression,
     /// Projection of the readings with numbers beyond f32.
     #[error("the projection of these readings is beyond f32")]

@@ -79,6 +79,17 @@ impl Default for Options {
 }
 
 impl Options {
+    /// Checks the rank against the number of a network's `outputs`.
+    fn check_rank(&self, outputs: usize) -> std::result::Result<(), BadValue> {
+        match self.output_rank {
+            Some(rank) if self.whole_array && !(1..outputs).contains(&rank) => {
+                let rule = format!("give from 1 to {}, fewer than there are outputs", outputs - 1);
+                Err(BadValue::new("output_rank", rank, rule))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Checks the options against the number of training `frames`.
     ///
     /// # Errors
@@ -137,6 +148,11 @@ impl InputScale {
             minimum: ranges.iter().map(|[low, _]| f64::from(*low)).collect(),
             per_span: ranges.iter().map(per_span).collect(),
         }
+    }
+
+    /// Whether each input never changes; it is scaled to 0.
+    fn never_changes(&self) -> impl Iterator<Item = bool> {
+        self.per_span.iter().map(|per_span| *per_span == 0.0)
     }
 
     /// Scales `readings` (`samples × inputs`) to [0, 1], and clamps them like the device does.
@@ -262,6 +278,7 @@ pub struct Trained {
 /// [`Error`](crate::Error)s for data that does not fit the format.
 pub fn train(dataset: &Dataset, options: &Options, progress: &dyn Progress) -> Result<Trained> {
     options.check(dataset.frames())?;
+    options.check_rank(dataset.outputs.names.len())?;
     fit(dataset, Layers::start(dataset, options)?, options, progress)
 }
 
@@ -277,6 +294,7 @@ pub fn train_refined(
     progress: &dyn Progress,
 ) -> Result<Trained> {
     options.check(dataset.frames())?;
+    options.check_rank(dataset.outputs.names.len())?;
     let start = Layers::start(dataset, options)?;
     let layers = refine::refine(dataset, &start, options, settings, examples, progress)?;
     fit(dataset, layers, &settings.options(options, dataset.frames()), progress)

@@ -113,8 +113,9 @@ impl Source {
     /// Trains on the data, refined if that is asked for.
     fn train(&self, options: &Options, progress: &dyn Progress) -> Result<Trained> {
         let settings = Refinement::default();
-        let refined =
-            |examples| train_refined(&self.dataset, options, &settings, examples, progress);
+        let refined = |examples| {
+            train_refined(&self.dataset, options, &settings, examples, progress).map_err(of_folds)
+        };
         Ok(match &self.more {
             _ if !self.refine => train(&self.dataset, options, progress)?,
             More::Scene(experiment) => {
@@ -282,16 +283,18 @@ fn from_data(arguments: &Arguments, common: &Common) -> Result<Source> {
         None => dataset,
     };
     let seed = common.seed.unwrap_or(1);
+    let refine = arguments.refine.over(true);
     let fold_of = match &arguments.fold_column {
         Some(name) => folds_from(&file, name, &kept.lines)?,
-        None => random_folds(arguments, dataset.frames(), seed)?,
+        None if refine || arguments.select => random_folds(arguments, dataset.frames(), seed)?,
+        None => vec![],
     };
     let name = path.file_stem().map_or("data".into(), |stem| stem.to_string_lossy());
     Ok(Source {
         origin: Origin::of_data(&name, file.digest, seed, &dataset),
         defaults: Options { seed, ..Options::default() },
         dataset,
-        refine: arguments.refine.over(true),
+        refine,
         more: More::Folds(fold_of),
     })
 }
@@ -326,6 +329,16 @@ fn folds_from(file: &CsvFile, name: &str, lines: &[usize]) -> Result<Vec<usize>>
         return Err(taxel_data::Error::file(&file.path, problem).into());
     }
     Ok(select::number_folds(&values))
+}
+
+/// Error that names the options which choose folds.
+fn of_folds(error: taxel_learn::Error) -> Error {
+    match error {
+        taxel_learn::Error::Setting(bad) if bad.field == "folds" => {
+            Error::Usage(format!("{bad} (--folds or --fold-column, --no-refine)"))
+        }
+        other => other.into(),
+    }
 }
 
 /// Random folds, as many as asked for.
@@ -376,7 +389,8 @@ fn choose(arguments: &Arguments, source: &Source, options: &mut Options) -> Resu
         options,
         source.refine.then(Refinement::default).as_ref(),
         &Terminal::new(),
-    )?;
+    )
+    .map_err(of_folds)?;
     options.centres = selection.best().centres;
     options.spread = selection.best().spread;
     Ok(selection)

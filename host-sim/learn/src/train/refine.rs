@@ -7,6 +7,7 @@
 
 use std::collections::BTreeSet;
 
+use model_core::rbf::Format;
 use rayon::prelude::*;
 use taxel_data::BadValue;
 use taxel_data::dataset::Dataset;
@@ -52,6 +53,9 @@ pub enum Examples<'e> {
 
 /// Least number of folds: one that tells when to stop, one that is held out, and the rest.
 pub const LEAST_FOLDS: usize = 3;
+
+/// Most measured frames that are looked at in each step.
+const MOST_MEASURED: usize = 16_384;
 
 /// Settings of refinement.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -122,7 +126,7 @@ pub fn refine(
     let sources = Sources::of(dataset, layers);
     let inputs = layers.seen(dataset).inputs.names.len() / layers.hidden.len();
     let start = |layer| Descent::new(&sources, layer, inputs, options, settings);
-    let mut descents: Vec<Descent> = layers.hidden.iter().map(start).collect();
+    let mut descents: Vec<Descent> = layers.hidden.iter().enumerate().map(start).collect();
     match examples {
         Examples::Fresh(fresh) => {
             progress.stage("refine", settings.steps);
@@ -157,21 +161,31 @@ pub fn refine(
             hidden: descents.iter().map(|descent| descent.layer().0).collect(),
         },
     };
-    for layer in &mut refined.hidden {
-        let least = width::least(options.format, &layer.centres, &vec![[0.0, 1.0]; inputs]);
-        layer.spread = layer.spread.max(least);
+    for (network, layer) in refined.hidden.iter_mut().enumerate() {
+        // As the blob holds them.
+        layer.centres.iter_mut().for_each(|c| *c = f64::from(*c as f32));
+        if options.format == Format::Fixed16 {
+            let ranges = match sources.ranges(network) {
+                ranges if ranges.is_empty() => vec![[0.0, 1.0]; inputs],
+                ranges => ranges,
+            };
+            layer.spread = layer.spread.max(width::least(&layer.centres, &ranges));
+        }
     }
     Ok(refined)
 }
 
-/// Frames of each fold.
+/// Frames of each fold, the largest fold last: that one tells when to stop. Of many frames an even selection is taken.
 fn parts(dataset: &Dataset, fold_of: &[usize]) -> Vec<Dataset> {
     let count = fold_of.iter().max().map_or(0, |last| last + 1);
+    let step = dataset.frames().div_ceil(MOST_MEASURED);
     let frames_of = |fold: usize| -> Vec<usize> {
-        (0..dataset.frames()).filter(|frame| fold_of[*frame] == fold).collect()
+        (0..dataset.frames()).filter(|frame| fold_of[*frame] == fold).step_by(step).collect()
     };
     let parts = (0..count).map(|fold| dataset.subset(&frames_of(fold)));
-    parts.filter(|part| part.frames() > 0).collect()
+    let mut parts: Vec<Dataset> = parts.filter(|part| part.frames() > 0).collect();
+    parts.sort_by_key(Dataset::frames);
+    parts
 }
 
 #[cfg(test)]

@@ -1,7 +1,5 @@
 //! A network on its way down the gradient.
 
-use model_core::rbf::Format;
-
 use super::Refinement;
 use super::adam::Adam;
 use super::loss::{self, Loss};
@@ -19,7 +17,10 @@ const UNSEEN_RANGE: f64 = 1.1;
 pub(super) struct Descent {
     movable: Movable,
     adam: Adam,
-    format: Format,
+    /// Largest floor that the width is kept above.
+    floor_at_most: f64,
+    /// Ranges that rows' inputs are scaled by, or empty for features, whose ranges change.
+    ranges: Vec<[f64; 2]>,
     ridge: f64,
 }
 
@@ -27,7 +28,7 @@ impl Descent {
     /// Descent of one network, which starts from `layer`.
     pub(super) fn new(
         sources: &Sources,
-        layer: &HiddenLayer,
+        (network, layer): (usize, &HiddenLayer),
         inputs: usize,
         options: &Options,
         settings: &Refinement,
@@ -44,7 +45,13 @@ impl Descent {
         };
         let movable = Movable::new(sizes, &layer.centres, layer.spread, &mix);
         let adam = Adam::new(settings.rate, settings.steps, movable.values.len());
-        Self { movable, adam, format: options.format, ridge: settings.ridge }
+        Self {
+            movable,
+            adam,
+            floor_at_most: width::floor_at_most(options.format, layer.spread),
+            ranges: sources.ranges(network),
+            ridge: settings.ridge,
+        }
     }
 
     /// One step on samples whose weights are solved on themselves.
@@ -68,15 +75,21 @@ impl Descent {
 
     fn descend(&mut self, loss: &Loss, pieces: &[&Piece]) {
         self.adam.descend(&mut self.movable.values, &loss.gradient);
-        let least = width::least(self.format, self.movable.centres(), &self.ranges(pieces));
-        self.movable.widen_to(least);
+        self.hold(pieces);
+    }
+
+    /// Makes the width so large that the format holds it.
+    pub(super) fn hold(&mut self, pieces: &[&Piece]) {
+        if self.floor_at_most > 0.0 {
+            let least = width::least(self.movable.centres(), &self.ranges(pieces));
+            self.movable.widen_to(least.min(self.floor_at_most));
+        }
     }
 
     /// Ranges by which the network's inputs are going to be scaled.
     fn ranges(&self, pieces: &[&Piece]) -> Vec<[f64; 2]> {
-        let Sizes { inputs, sources, .. } = self.movable.sizes;
-        if sources == 0 {
-            return vec![[0.0, 1.0]; inputs];
+        if !self.ranges.is_empty() {
+            return self.ranges.clone();
         }
         let widened = |[low, high]: [f64; 2]| {
             let (middle, half) = (0.5 * (low + high), 0.5 * UNSEEN_RANGE * (high - low));

@@ -10,6 +10,8 @@ use crate::error::Result;
 const LOOK_EVERY: usize = 20;
 /// Standard errors by which a gain must exceed 0.
 const CERTAIN: f64 = 2.0;
+/// Least number of samples that tell a gain from chance.
+const LEAST_SAMPLES: usize = 30;
 /// Descents in all: one to find the number of steps, one to take them.
 pub(super) const PASSES: usize = 2;
 
@@ -23,6 +25,8 @@ pub(super) fn descend(
     let Some((watched, others)) = folds.split_last() else { return Ok(start.clone()) };
     let (all_others, watched): (Vec<&Piece>, Vec<&Piece>) =
         (others.iter().flatten().collect(), watched.iter().collect());
+    let mut start = start.clone();
+    start.hold(&all_others);
     let mut trial = start.clone();
     let at_start = trial.errors(&all_others, &watched)?;
     let (mut best, mut best_gain) = (0, 0.0);
@@ -36,7 +40,7 @@ pub(super) fn descend(
             }
         }
     }
-    let mut descent = start.clone();
+    let mut descent = start;
     for step in 0..best {
         step_on(&mut descent, folds, step)?;
         progress.step();
@@ -45,12 +49,15 @@ pub(super) fn descend(
 }
 
 /// What the mean squared error has fallen by, less what may be chance: [`CERTAIN`] standard errors of the
-/// difference.
+/// difference. Nothing is certain with few samples.
 fn certain_gain(before: &[f64], after: &[f64]) -> f64 {
+    if before.len() < LEAST_SAMPLES {
+        return 0.0;
+    }
     let count = before.len() as f64;
     let gains = || before.iter().zip(after).map(|(before, after)| before - after);
     let mean = gains().sum::<f64>() / count;
-    let variance = gains().map(|gain| (gain - mean).powi(2)).sum::<f64>() / count;
+    let variance = gains().map(|gain| (gain - mean).powi(2)).sum::<f64>() / (count - 1.0);
     mean - CERTAIN * (variance / count).sqrt()
 }
 

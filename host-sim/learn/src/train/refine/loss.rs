@@ -61,7 +61,7 @@ impl Solved {
 
 /// Mean squared error on `pieces` with the weights solved on the same samples.
 ///
-/// By the weights its derivative is 0, so they count as constants.
+/// By the weights the derivative is 0, but for the penalty's small part, so they count as constants.
 pub(super) fn on_same(movable: &Movable, pieces: &[&Piece], ridge: f64) -> Result<Loss> {
     let solved = Solved::new(movable, pieces, ridge)?;
     let back = transposed(&solved.weights, pieces[0].targets.len());
@@ -158,7 +158,7 @@ fn through(
     gradient
 }
 
-/// Sums of squared errors and half their gradients, of all pieces in order, as a mean over the samples.
+/// Sum of the pieces' squared errors and halves of their gradients, in order, as a mean over the samples.
 fn sum_up(
     movable: &Movable,
     pieces: &[&Piece],

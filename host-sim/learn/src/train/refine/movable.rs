@@ -24,7 +24,7 @@ impl Sizes {
     }
 }
 
-/// Centres (`centres × inputs`), the logarithm of the width, and the mix (`inputs × inputs`) if there is one.
+/// Centres (`centres × inputs`), the logarithm of the width, and the mix (`sources × inputs`) if there is one.
 #[derive(Debug, Clone)]
 pub(super) struct Movable {
     pub(super) sizes: Sizes,

@@ -65,6 +65,17 @@ impl Sources {
         }
     }
 
+    /// Ranges that the inputs of a row's network are scaled by; empty for features.
+    ///
+    /// The format puts the centres of an input that never changes, which are 0, into its middle.
+    pub(super) fn ranges(&self, network: usize) -> Vec<[f64; 2]> {
+        let range = |still: bool| if still { [-0.5, 0.5] } else { [0.0, 1.0] };
+        match &self.inputs {
+            Inputs::Rows(scales) => scales[network].never_changes().map(range).collect(),
+            Inputs::Projected(_) => vec![],
+        }
+    }
+
     /// Samples of network number `network`, side by side.
     pub(super) fn pieces(&self, frames: &Dataset, network: usize) -> Vec<Piece> {
         let (targets, outputs) = self.targets.of_network(&frames.outputs, network);
@@ -182,6 +193,7 @@ fn apply(parameters: &[f32], dataset: &Dataset) -> Dataset {
 /// Low end of every feature's range, and their common span.
 fn scale_of(seen: &Dataset) -> (Vec<f64>, f64) {
     let ranges = seen.row_table(0).input_ranges();
-    let span = ranges.first().map_or(1.0, |[low, high]| high - low);
+    let span = ranges.first().map(|[low, high]| high - low);
+    let span = span.filter(|span| *span > 0.0).unwrap_or(1.0);
     (ranges.into_iter().map(|[low, _]| low).collect(), span)
 }

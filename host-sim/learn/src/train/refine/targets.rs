@@ -7,7 +7,7 @@ use taxel_data::table::Table;
 /// Mean of every output, and the factor that its deviations are weighed by.
 ///
 /// Outputs of one unit are compared as they are: an error of 1 mm counts alike in all of them. Those of another
-/// unit are compared by the largest standard deviation of each unit.
+/// unit are compared by the largest standard deviation of each unit, and those without a known one by their own.
 pub(super) struct Targets {
     means: Vec<f64>,
     weights: Vec<f64>,
@@ -19,12 +19,15 @@ impl Targets {
         let deviations = dataset.outputs.deviations();
         let units: Vec<&str> =
             dataset.outputs.names.iter().map(|name| columns::unit_of(name)).collect();
-        let weight = |unit: &&str| {
+        let largest = |unit: &&str| {
             let same = units.iter().zip(&deviations).filter(|(other, _)| *other == unit);
-            let largest = same.map(|(_, deviation)| *deviation).fold(0.0, f64::max);
-            if largest > 0.0 { 1.0 / largest } else { 0.0 }
+            same.map(|(_, deviation)| *deviation).fold(0.0, f64::max)
         };
-        let weights = units.iter().map(weight).collect();
+        let weight = |(unit, own): (&&str, &f64)| {
+            let scale = if unit.is_empty() { *own } else { largest(unit) };
+            if scale > 0.0 { 1.0 / scale } else { 0.0 }
+        };
+        let weights = units.iter().zip(&deviations).map(weight).collect();
         Self { means: dataset.outputs.means(), weights, networks }
     }
 

@@ -174,7 +174,7 @@ fn the_least_width_is_just_held_by_fixed16() {
     let training = Synthesis::of(&world).frames(Stream::Training, 500);
     let options = Options { centres: 12, format: Format::Fixed16, ..Options::default() };
     let start = Layers::start(&training, &options).unwrap();
-    let least = width::least(Format::Fixed16, &start.hidden[0].centres, &[[0.0, 1.0]; 18]);
+    let least = width::least(&start.hidden[0].centres, &[[0.0, 1.0]; 18]);
     let held = |spread: f64| {
         let mut layers = start.clone();
         layers.hidden[0].spread = spread;
@@ -225,4 +225,31 @@ fn settings_that_cannot_be_used_are_refused_by_name() {
     refused(Refinement { rate: f64::NAN, ..quick() }, 5, "rate = NaN");
     refused(Refinement { ridge: 0.0, ..quick() }, 5, "ridge = 0");
     refused(quick(), 2, "folds = 2");
+}
+
+/// Narrow Gaussians that the data needs, and columns without any information, which must not widen them.
+#[test]
+fn refinement_leaves_narrow_gaussians_narrow() {
+    let mut draw = draws(9);
+    let x: Vec<f64> = (0..2000).map(|_| draw()).collect();
+    let names = |count: usize| (0..count).map(|i| format!("c{i}")).collect::<Vec<_>>();
+    for constants in [0, 20] {
+        let mut data = Dataset::empty(names(1 + constants), vec!["y_n".into()], 1, x.len());
+        for (line, x) in data.inputs.values.chunks_exact_mut(1 + constants).zip(&x) {
+            line[0] = *x;
+        }
+        data.outputs.values = x.iter().map(|x| libm::sin(30.0 * x) + 0.02 * draw()).collect();
+        let options = Options { centres: 40, spread: 0.03, ..Options::default() };
+        let fold_of: Vec<usize> = (0..x.len()).map(|frame| frame % 5).collect();
+        let examples = Examples::Folds(&fold_of);
+        let refined = train_refined(&data, &options, &quick(), examples, &Silent).unwrap();
+        let start = train(&data, &options, &Silent).unwrap();
+        let error = |trained: &crate::train::Trained| {
+            let network = trained.networks[0].network();
+            let estimate = infer(&network, Exponential::default(), &data.inputs.values);
+            (data.outputs.squared_errors(&estimate)[0] / x.len() as f64).sqrt()
+        };
+        let (before, after) = (error(&start), error(&refined));
+        assert!(after < 1.1 * before, "{constants} constants: {before} -> {after}");
+    }
 }

@@ -10,14 +10,21 @@ const MARGIN: f64 = 2e-4;
 /// narrower Gaussians need large weights, and then its fast distances are not accurate enough.
 const LARGEST_EXPONENT: f64 = 64.0;
 
-/// Least width σ with which `format` holds Gaussians at `centres` (`centres × inputs`); 0 for no limit.
+/// Width to which a width that starts at `start` may shrink, at most: the least that the format needs. Networks in
+/// f32 may stay narrower if they start so, with exact distances where fast ones do not serve.
+pub(super) fn floor_at_most(format: Format, start: f64) -> f64 {
+    match format {
+        Format::F32Direct => 0.0,
+        Format::F32 => start,
+        Format::Fixed16 => f64::INFINITY,
+    }
+}
+
+/// Least width σ with which the formats of 16-bit exponents hold Gaussians at `centres` (`centres × inputs`).
 ///
 /// Inputs are clamped to a box about the middle of their training `ranges`, which all have the widest one's span
 /// and the clamp's margin. In a corner of it log₂e·‖x − c‖²/2σ² must not pass [`LARGEST_EXPONENT`].
-pub(super) fn least(format: Format, centres: &[f64], ranges: &[[f64; 2]]) -> f64 {
-    if format == Format::F32Direct {
-        return 0.0;
-    }
+pub(super) fn least(centres: &[f64], ranges: &[[f64; 2]]) -> f64 {
     let span = ranges.iter().map(|[low, high]| high - low).fold(0.0, f64::max);
     let half = f64::from(HALF_RANGE) * span;
     let reach = |centre: &[f64]| -> f64 {
