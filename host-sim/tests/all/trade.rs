@@ -183,7 +183,7 @@ fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
         .replace("frames = 20000", "frames = 400")
         .replace("test_frames = 8000", "test_frames = 100");
     folder.write("few.toml", scene);
-    let few = ["trade", "few.toml", "--centres", "16", "--average", "1"];
+    let few = ["trade", "few.toml", "--no-refine", "--centres", "16", "--average", "1"];
     let cycles_of = |page: &str| -> Vec<u64> {
         let points = page.lines().filter(|line| line.contains(" (1."));
         let cycles = points.map(|line| line.split_whitespace().rev().nth(4).unwrap());
@@ -196,7 +196,7 @@ fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
     assert!(front.contains(&format!("\n{} more points with --all", every.len() - shown.len())));
     assert!(!all.contains("--all"), "{all}");
     let averages =
-        ["trade", "few.toml", "--centres", "16", "--average", "1,4,16", "--gate", "none"];
+        ["trade", "few.toml", "--no-refine", "--centres=16", "--average=1,4,16", "--gate=none"];
     folder.succeed(&averages);
     let svg = std::fs::read_to_string(folder.path("out/few/trade.svg")).unwrap();
     assert!(svg.contains("front line dashed") && svg.contains("front line dotted"));

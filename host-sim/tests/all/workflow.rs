@@ -248,6 +248,7 @@ fn same_seed_same_bytes_on_one_thread_and_on_two() {
                 "train",
                 "d.2",
                 "--select",
+                "--no-refine",
                 "--centres",
                 "8,12",
                 "--spread",
