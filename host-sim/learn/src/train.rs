@@ -82,10 +82,7 @@ impl Options {
     /// Checks the rank against the number of a network's `outputs`.
     fn check_rank(&self, outputs: usize) -> std::result::Result<(), BadValue> {
         match self.output_rank {
-            Some(rank) if self.whole_array && !(1..outputs).contains(&rank) => {
-                let rule = format!("give from 1 to {}, fewer than there are outputs", outputs - 1);
-                Err(BadValue::new("output_rank", rank, rule))
-            }
+            Some(rank) if self.whole_array => output_rank::check(rank, outputs),
             _ => Ok(()),
         }
     }

@@ -40,10 +40,7 @@ pub(super) fn fit(
 ) -> Result<FittedNetwork> {
     let outputs = &samples.table.outputs;
     let count = outputs.names.len();
-    if rank == 0 || rank >= count {
-        let rule = format!("give from 1 to {}, fewer than there are outputs", count - 1);
-        return Err(BadValue::new("output_rank", rank, rule).into());
-    }
+    check(rank, count)?;
     let expansion = expansion(samples, centres, rank, options);
     let table = RowTable {
         inputs: samples.table.inputs.clone(),
@@ -54,6 +51,15 @@ pub(super) fn fit(
         Samples { scale: samples.scale.clone(), scaled: samples.scaled.clone(), table: &table };
     let network = format::fit(&of_components, centres, options)?;
     Ok(network.expanded_by(expansion))
+}
+
+/// Checks a rank against the number of `outputs`.
+pub(super) fn check(rank: usize, outputs: usize) -> std::result::Result<(), BadValue> {
+    if (1..outputs).contains(&rank) {
+        return Ok(());
+    }
+    let rule = format!("give from 1 to {}, fewer than there are outputs", outputs - 1);
+    Err(BadValue::new("output_rank", rank, rule))
 }
 
 /// Means of the outputs, then their parts of each component (`rank × outputs`), rounded.

@@ -105,7 +105,7 @@ impl Refinement {
 
 /// Refines the `layers` that training on `dataset` starts from.
 ///
-/// The same on any number of threads.
+/// The refined layers are the same on any number of threads.
 ///
 /// # Errors
 /// [`Error::Setting`](crate::Error::Setting) for settings that cannot be used;
@@ -124,8 +124,7 @@ pub fn refine(
 ) -> Result<Layers> {
     settings.check(examples, dataset.frames())?;
     let sources = Sources::of(dataset, layers);
-    let inputs = layers.seen(dataset).inputs.names.len() / layers.hidden.len();
-    let start = |layer| Descent::new(&sources, layer, inputs, options, settings);
+    let start = |layer| Descent::new(&sources, layer, options, settings);
     let mut descents: Vec<Descent> = layers.hidden.iter().enumerate().map(start).collect();
     match examples {
         Examples::Fresh(fresh) => {
@@ -165,10 +164,7 @@ pub fn refine(
         // As the blob holds them.
         layer.centres.iter_mut().for_each(|c| *c = f64::from(*c as f32));
         if options.format == Format::Fixed16 {
-            let ranges = match sources.ranges(network) {
-                ranges if ranges.is_empty() => vec![[0.0, 1.0]; inputs],
-                ranges => ranges,
-            };
+            let ranges = sources.ranges(network);
             layer.spread = layer.spread.max(width::least(&layer.centres, &ranges));
         }
     }

@@ -19,7 +19,7 @@ pub(super) struct Descent {
     adam: Adam,
     /// Largest floor that the width is kept above.
     floor_at_most: f64,
-    /// Ranges that rows' inputs are scaled by, or empty for features, whose ranges change.
+    /// Ranges that inputs are scaled by, unless they are mixed: those change.
     ranges: Vec<[f64; 2]>,
     ridge: f64,
 }
@@ -29,7 +29,6 @@ impl Descent {
     pub(super) fn new(
         sources: &Sources,
         (network, layer): (usize, &HiddenLayer),
-        inputs: usize,
         options: &Options,
         settings: &Refinement,
     ) -> Self {
@@ -37,6 +36,8 @@ impl Descent {
             Some(projected) => (projected.among_features(layer), projected.start()),
             None => (layer.clone(), vec![]),
         };
+        let ranges = sources.ranges(network);
+        let inputs = ranges.len();
         let sizes = Sizes {
             inputs,
             centres: layer.centres.len() / inputs,
@@ -49,7 +50,7 @@ impl Descent {
             movable,
             adam,
             floor_at_most: width::floor_at_most(options.format, layer.spread),
-            ranges: sources.ranges(network),
+            ranges,
             ridge: settings.ridge,
         }
     }
@@ -88,7 +89,7 @@ impl Descent {
 
     /// Ranges by which the network's inputs are going to be scaled.
     fn ranges(&self, pieces: &[&Piece]) -> Vec<[f64; 2]> {
-        if !self.ranges.is_empty() {
+        if self.movable.sizes.sources == 0 {
             return self.ranges.clone();
         }
         let widened = |[low, high]: [f64; 2]| {

@@ -65,11 +65,14 @@ impl Solved {
 pub(super) fn on_same(movable: &Movable, pieces: &[&Piece], ridge: f64) -> Result<Loss> {
     let solved = Solved::new(movable, pieces, ridge)?;
     let back = transposed(&solved.weights, pieces[0].targets.len());
-    Ok(sum_up(movable, pieces, |piece, index| {
-        let activated = &solved.activated[index];
+    let of_piece = |(piece, activated): (&&Piece, &Activated)| {
         let (errors, square) = errors(&solved.weights, activated, piece);
         (square, through(movable, piece, activated, &back, &errors))
-    }))
+    };
+    let parts: Vec<(f64, Vec<f64>)> =
+        pieces.par_iter().zip(&solved.activated).map(of_piece).collect();
+    let squares = parts.iter().map(|(square, _)| *square);
+    Ok(mean(movable, pieces, squares, parts.iter().map(|(_, gradient)| gradient)))
 }
 
 /// Mean squared error on the pieces `held_out`, with the weights solved on the `rest`.
@@ -114,15 +117,9 @@ pub(super) fn on_held_out(
             gradient
         })
         .collect();
-    let mean = 1.0 / samples(held_out) as f64;
-    let mut loss = Loss { value: 0.0, gradient: vec![0.0; movable.values.len()] };
-    for (square, gradient, _) in &parts {
-        loss.value += square * mean;
-        add(&mut loss.gradient, gradient);
-    }
-    through_rest.iter().for_each(|gradient| add(&mut loss.gradient, gradient));
-    loss.gradient.iter_mut().for_each(|slope| *slope *= 2.0 * mean);
-    Ok(loss)
+    let squares = parts.iter().map(|(square, ..)| *square);
+    let gradients = parts.iter().map(|(_, gradient, _)| gradient).chain(&through_rest);
+    Ok(mean(movable, held_out, squares, gradients))
 }
 
 /// Squared error of every sample in the pieces `held_out`, with the weights solved on the `rest`.
@@ -158,20 +155,17 @@ fn through(
     gradient
 }
 
-/// Sum of the pieces' squared errors and halves of their gradients, in order, as a mean over the samples.
-fn sum_up(
+/// Mean over the samples of `pieces`, of squared errors and of halves of their gradients, which are summed in order.
+fn mean<'g>(
     movable: &Movable,
     pieces: &[&Piece],
-    of_piece: impl Fn(&Piece, usize) -> (f64, Vec<f64>) + Sync,
+    squares: impl Iterator<Item = f64>,
+    gradients: impl Iterator<Item = &'g Vec<f64>>,
 ) -> Loss {
-    let indexed = pieces.par_iter().enumerate();
-    let parts: Vec<(f64, Vec<f64>)> = indexed.map(|(i, piece)| of_piece(piece, i)).collect();
-    let mut loss = Loss { value: 0.0, gradient: vec![0.0; movable.values.len()] };
     let mean = 1.0 / samples(pieces) as f64;
-    for (square, gradient) in &parts {
-        loss.value += square * mean;
-        add(&mut loss.gradient, gradient);
-    }
+    let mut loss = Loss { value: 0.0, gradient: vec![0.0; movable.values.len()] };
+    squares.for_each(|square| loss.value += square * mean);
+    gradients.for_each(|gradient| add(&mut loss.gradient, gradient));
     loss.gradient.iter_mut().for_each(|slope| *slope *= 2.0 * mean);
     loss
 }

@@ -65,14 +65,14 @@ impl Sources {
         }
     }
 
-    /// Ranges that the inputs of a row's network are scaled by; empty for features.
+    /// Ranges of the inputs that layers are scaled by.
     ///
     /// The format puts the centres of an input that never changes, which are 0, into its middle.
     pub(super) fn ranges(&self, network: usize) -> Vec<[f64; 2]> {
         let range = |still: bool| if still { [-0.5, 0.5] } else { [0.0, 1.0] };
         match &self.inputs {
             Inputs::Rows(scales) => scales[network].never_changes().map(range).collect(),
-            Inputs::Projected(_) => vec![],
+            Inputs::Projected(projected) => vec![[0.0, 1.0]; projected.features],
         }
     }
 
