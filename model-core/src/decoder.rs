@@ -14,7 +14,7 @@ use crate::relative::relative;
 /// blob. The firmware's link check compares it with the compiler's own figure.
 #[must_use]
 pub const fn decoder_ram_bytes(rows: usize) -> usize {
-    144 + 28 * rows
+    156 + 28 * rows
 }
 
 /// A frame to be decoded, and what is known of the sensor at rest.
@@ -67,7 +67,7 @@ impl<'f> From<&'f [f32]> for Frame<'f> {
 /// # .unwrap();
 /// # let shape = ModelShape { rows: 1, inputs: 2, outputs: 1 };
 /// # let metadata = Metadata::unnamed(shape);
-/// # let parts = ModelParts { projection: None, expansion: None, networks: &[network.into()], row_network: &[0], metadata };
+/// # let parts = ModelParts { projection: None, expansion: None, confidence: None, networks: &[network.into()], row_network: &[0], metadata };
 /// # let mut buffer = Aligned([0; 512]);
 /// # let blob: &[u8] = encode(&parts, &mut buffer.0).unwrap();
 /// // `blob` holds a model of one row with two readings (Ω) and one output (mm), called `y`.
@@ -171,7 +171,7 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
         self.model.crc()
     }
 
-    /// Number of floats of working space that decoding needs.
+    /// Number of floats of working space that decoding and assessing need.
     #[must_use]
     pub fn scratch_floats(&self) -> usize {
         scratch_floats(&self.model)
@@ -198,6 +198,36 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
         estimate: &mut Estimate<'_>,
     ) -> Result<bool, NetworkError> {
         self.decode_with::<Polynomial>(frame, scratch, estimate)
+    }
+
+    /// Tells how far off the outputs of a frame may be, and how novel the frame is, by the model's
+    /// [confidence](crate::confidence). Returns its novelty in nats: above 0, it is unlike the frames of training. `None`
+    /// if the model has no confidence; nothing is written then.
+    ///
+    /// `deviation` takes a standard deviation for each of the `rows × outputs` outputs, in their units: they hold
+    /// whether or not a gate skips rows. If a reading of the frame is missing, all of them and the novelty are NaN.
+    /// `scratch` is working space of [`scratch_floats`](Self::scratch_floats).
+    ///
+    /// # Errors
+    /// [`NetworkError::Length`] if a slice does not have the model's length, or `scratch` is too short; nothing is
+    /// written then.
+    pub fn assess_into(
+        &self,
+        frame: Frame<'_>,
+        scratch: &mut [f32],
+        deviation: &mut [f32],
+    ) -> Result<Option<f32>, NetworkError> {
+        let Some(confidence) = self.model.confidence() else { return Ok(None) };
+        check_length("frame", frame.readings_ohm, confidence.sizes().readings)?;
+        let readings = frame.readings_ohm.iter().copied();
+        let novelty = if self.metadata().relative_inputs {
+            check_length("reciprocals", frame.reciprocals, confidence.sizes().readings)?;
+            let ratios = readings.zip(frame.reciprocals).map(|(r, of)| relative(r, *of));
+            confidence.assess(ratios, scratch, deviation)
+        } else {
+            confidence.assess(readings, scratch, deviation)
+        };
+        novelty.map(Some)
     }
 
     /// Decodes one frame as [`decode_into`](Self::decode_into) does, with the [exponential](crate::exp) `E` for
@@ -338,7 +368,7 @@ fn divide(readings: &[f32], reciprocals: &[f32], ratios: &mut [f32]) {
     }
 }
 
-/// Number of floats of working space that decoding with `model` needs.
+/// Number of floats of working space that decoding with `model` needs, and assessing its outputs.
 #[must_use]
 pub fn scratch_floats(model: &Model<'_>) -> usize {
     let ModelShape { rows, inputs, .. } = model.shape();
@@ -347,7 +377,8 @@ pub fn scratch_floats(model: &Model<'_>) -> usize {
         (false, true) | (true, false) => inputs.saturating_mul(2),
         (true, true) => inputs.saturating_mul(rows.saturating_add(2)),
     };
-    before.saturating_add(model.components())
+    let assessing = model.confidence().map_or(0, |it| it.sizes().scratch_floats());
+    before.saturating_add(model.components()).max(assessing)
 }
 
 fn check_length<T>(what: &'static str, slice: &[T], expected: usize) -> Result<(), NetworkError> {

@@ -85,7 +85,7 @@ impl<'a> Projection<'a> {
 }
 
 /// Number of floats in the block of a projection.
-pub(crate) fn block_floats(readings: usize, features: usize) -> usize {
+pub(crate) const fn block_floats(readings: usize, features: usize) -> usize {
     readings.saturating_add(1).saturating_mul(features)
 }
 

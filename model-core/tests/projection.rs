@@ -36,7 +36,14 @@ fn encoded<'b>(
 ) -> Result<&'b [u8], EncodeError> {
     let projection = Projection::new(4, 2, block).ok();
     let metadata = Metadata::unnamed(ModelShape { rows: 2, inputs: 2, outputs: 1 });
-    let parts = ModelParts { projection, expansion: None, networks, row_network, metadata };
+    let parts = ModelParts {
+        projection,
+        expansion: None,
+        confidence: None,
+        networks,
+        row_network,
+        metadata,
+    };
     assert!(encoded_length_bound(&parts) <= buffer.len());
     encode(&parts, buffer)
 }

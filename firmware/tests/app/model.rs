@@ -20,6 +20,7 @@ fn the_identity_tells_what_the_model_was_trained_on() {
         let parts = ModelParts {
             projection: None,
             expansion: None,
+            confidence: None,
             networks: &networks,
             row_network: &[0],
             metadata,
@@ -82,6 +83,7 @@ fn blob_with(shape: ModelShape, metadata: Metadata<'_>) -> AlignedBytes {
     encode_to_vec(&ModelParts {
         projection: None,
         expansion: None,
+        confidence: None,
         networks,
         row_network: &[0],
         metadata,

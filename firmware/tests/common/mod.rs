@@ -284,6 +284,7 @@ pub fn blob_of(network: Network<'_>) -> AlignedBytes {
     let parts = ModelParts {
         projection: None,
         expansion: None,
+        confidence: None,
         networks: &[network],
         row_network: &[0; ROWS],
         metadata,
@@ -317,6 +318,7 @@ pub fn blob_of_components(components: usize) -> AlignedBytes {
     let parts = ModelParts {
         projection: Projection::new(readings, COLS, &projection).ok(),
         expansion: Expansion::new(components, outputs, &expansion).ok(),
+        confidence: None,
         networks: &[network],
         row_network: &[0; ROWS],
         metadata: Metadata::unnamed(ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS }),

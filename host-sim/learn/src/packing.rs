@@ -83,6 +83,7 @@ pub fn pack(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<Mod
     let parts = ModelParts {
         projection,
         expansion,
+        confidence: None,
         networks: &views,
         row_network: &row_network,
         metadata: Metadata {

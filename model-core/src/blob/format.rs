@@ -25,6 +25,7 @@ pub(super) const TAG_PROJECTION: u8 = 4;
 /// Tag of a section without fields: the model's inputs are relative to the baseline.
 pub(super) const TAG_RELATIVE_INPUTS: u8 = 5;
 pub(super) const TAG_EXPANSION: u8 = 6;
+pub(super) const TAG_CONFIDENCE: u8 = 7;
 
 /// Bytes 0..9, at fixed places, so that a blob's length is known before anything else is read.
 #[derive(Serialize, Deserialize)]
@@ -103,13 +104,24 @@ pub(super) struct ExpansionHeader {
     pub components: u16,
 }
 
+/// Header of the confidence's section; padding and its floats follow.
+#[derive(Serialize, Deserialize)]
+pub(super) struct ConfidenceHeader {
+    pub tag: u8,
+    /// Number of directions that readings are projected to.
+    pub directions: u16,
+    /// Number of components of the mixture.
+    pub components: u16,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn no_format_of_networks_has_the_tag_of_another_section() {
-        for tag in [TAG_METADATA, TAG_PROJECTION, TAG_RELATIVE_INPUTS, TAG_EXPANSION] {
+        let others = [TAG_METADATA, TAG_PROJECTION, TAG_RELATIVE_INPUTS, TAG_EXPANSION];
+        for tag in others.into_iter().chain([TAG_CONFIDENCE]) {
             assert_eq!(Format::from_tag(tag), None);
         }
     }

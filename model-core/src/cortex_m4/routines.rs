@@ -178,3 +178,18 @@ const _: () = {
     assert!(RowStatus::Decoded as u8 == 0 && RowStatus::MissingReading as u8 == 1);
     assert!(RowStatus::AtRest as u8 == 3);
 };
+
+/// Square root of a number that is not negative, rounded correctly.
+pub fn sqrt(value: f32) -> f32 {
+    let root;
+    // SAFETY: the instruction reads and writes floating-point registers alone.
+    unsafe {
+        core::arch::asm!(
+            "vsqrt.f32 {root}, {value}",
+            root = lateout(sreg) root,
+            value = in(sreg) value,
+            options(pure, nomem, nostack, preserves_flags),
+        );
+    }
+    root
+}

@@ -43,6 +43,7 @@ pub fn blob(design: &Design) -> Outcome<Vec<u8>> {
     let parts = ModelParts {
         projection: design.projection.then_some(projection),
         expansion: design.components.map(|_| expansion),
+        confidence: None,
         networks: &networks,
         row_network: &row_network,
         metadata,

@@ -1,0 +1,295 @@
+//! Confidence: how far off a frame's outputs may be, and how novel the frame is.
+//!
+//! A mixture of Gaussians describes the frames of training: the classic density model for novelty (Bishop, "Novelty
+//! detection and neural network validation", IEE Proc. Vis. Image Signal Process. 141, 1994). Readings r are
+//! standardised to z = (r − m)·s. Features are f = Σ_j z_j·p_j along orthonormal directions p, and one more: the length
+//! √(‖z‖² − ‖f‖²) of what they leave out. For component k, ln π_k·N(f | μ_k, Σ_k) = c_k − ½‖W_k·f − o_k‖², with W_k the
+//! inverse of Σ_k's Cholesky factor and o_k = W_k·μ_k.
+//!
+//! - **Novelty** is −ln p(f) minus its threshold, in nats: above 0, the frame is less probable than nearly all frames of
+//!   training.
+//! - The **deviation** of an output is √(Σ_k γ_k·v_k): v_k is the output's mean squared error on frames of component k,
+//!   calibrated, and γ_k the component's probability given f. Of the components, the [`MOST_PROBABLE`] count.
+//!
+//! It knows nothing of the networks, and decodes nothing: estimates are the same bits with it and without.
+//! `docs/confidence.md` has what it finds and what it costs.
+
+#[cfg(cortex_m4f)]
+use crate::cortex_m4;
+use crate::exp::{ExpKernel, Polynomial};
+use crate::projection::{self, Projection};
+use crate::rbf::NetworkError;
+
+/// Number of components that deviations are formed of: the most probable ones.
+pub const MOST_PROBABLE: usize = 4;
+
+/// Sizes of a [`Confidence`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sizes {
+    /// Number of readings in a frame.
+    pub readings: usize,
+    /// Number of directions that readings are projected to, at most the number of readings. Features are one more.
+    pub directions: usize,
+    /// Number of components of the mixture.
+    pub components: usize,
+    /// Number of outputs of all rows.
+    pub outputs: usize,
+}
+
+impl Sizes {
+    /// Number of features: the directions, and what they leave out.
+    #[must_use]
+    pub const fn features(self) -> usize {
+        self.directions.saturating_add(1)
+    }
+
+    /// Number of floats that one component takes: c, o and W.
+    const fn component_floats(self) -> usize {
+        let features = self.features();
+        let triangle = features.saturating_mul(features.saturating_add(1)) / 2;
+        features.saturating_add(1).saturating_add(triangle)
+    }
+
+    /// Number of floats of working space that [`Confidence::assess`] needs.
+    #[must_use]
+    pub const fn scratch_floats(self) -> usize {
+        self.readings.saturating_add(self.features()).saturating_add(self.components)
+    }
+
+    /// Number of floats in the block.
+    #[must_use]
+    pub const fn block_floats(self) -> usize {
+        let scale = self.readings.saturating_mul(2);
+        let projection = projection::block_floats(self.readings, self.directions);
+        let mixture = self.components.saturating_mul(self.component_floats());
+        let outputs = self.components.saturating_add(1).saturating_mul(self.outputs);
+        let all = scale.saturating_add(projection).saturating_add(mixture);
+        all.saturating_add(outputs).saturating_add(1)
+    }
+}
+
+/// Confidence of a model, borrowed from a blob.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Confidence<'a> {
+    sizes: Sizes,
+    block: &'a [f32],
+}
+
+/// The arrays of a block, in their order.
+#[derive(Debug, Clone, Copy, Default)]
+struct Arrays<'a> {
+    mean: &'a [f32],
+    scale: &'a [f32],
+    /// A zero for each direction, then p of every direction for one reading after the other.
+    projection: &'a [f32],
+    /// c, o and the rows of the lower triangle W, for one component after the other.
+    mixture: &'a [f32],
+    /// v of every output, for one component after the other.
+    variances: &'a [f32],
+    /// Half of an output's 95 % interval, in deviations.
+    ratios_95: &'a [f32],
+    threshold: f32,
+}
+
+impl<'a> Arrays<'a> {
+    fn cut(sizes: Sizes, block: &'a [f32]) -> Option<Self> {
+        let Sizes { readings, directions, components, outputs } = sizes;
+        let (mean, rest) = block.split_at_checked(readings)?;
+        let (scale, rest) = rest.split_at_checked(readings)?;
+        let projected = projection::block_floats(readings, directions);
+        let (projection, rest) = rest.split_at_checked(projected)?;
+        let mixed = components.checked_mul(sizes.component_floats())?;
+        let (mixture, rest) = rest.split_at_checked(mixed)?;
+        let (variances, rest) = rest.split_at_checked(components.checked_mul(outputs)?)?;
+        let (ratios_95, rest) = rest.split_at_checked(outputs)?;
+        let [threshold] = *rest else { return None };
+        Some(Self { mean, scale, projection, mixture, variances, ratios_95, threshold })
+    }
+}
+
+impl<'a> Confidence<'a> {
+    /// Makes a confidence of a block, whose arrays are in this order: m and s of every reading; a zero for each
+    /// direction, then p of every direction for one reading after the other; c, o and the rows of the lower triangle W
+    /// for one component after the other; v of every output (in its unit, squared) for one component after the other;
+    /// half the 95 % interval of every output, in deviations; the threshold of −ln p(f).
+    ///
+    /// # Errors
+    /// [`NetworkError::Empty`] if a size is 0, [`NetworkError::Length`] for a block of another length,
+    /// [`NetworkError::NotFinite`] for a number that is NaN or infinite, [`NetworkError::NotPositive`] for a scale,
+    /// variance or ratio that is negative, or a diagonal of W that is not positive.
+    pub fn new(sizes: Sizes, block: &'a [f32]) -> Result<Self, NetworkError> {
+        let Sizes { readings, directions, components, outputs } = sizes;
+        if [readings, directions, components, outputs].contains(&0) {
+            return Err(NetworkError::Empty);
+        }
+        let (what, expected, found) = ("confidence", sizes.block_floats(), block.len());
+        let length = NetworkError::Length { what, expected, found };
+        if expected != found || directions > readings {
+            return Err(length);
+        }
+        if !block.iter().all(|value| value.is_finite()) {
+            return Err(NetworkError::NotFinite { what });
+        }
+        let arrays = Arrays::cut(sizes, block).ok_or(length)?;
+        // So that no sum of variances leaves f32.
+        if arrays.variances.iter().any(|v| *v > f32::MAX / MOST_PROBABLE as f32) {
+            return Err(NetworkError::NotFinite { what });
+        }
+        let mut not_negative = [arrays.scale, arrays.variances, arrays.ratios_95].into_iter();
+        let usable = |values: &[f32]| values.iter().all(|value| *value >= 0.0);
+        let mut components = arrays.mixture.chunks_exact(sizes.component_floats());
+        let positive = |component: &[f32]| {
+            triangle(sizes, component).all(|row| row.last().is_some_and(|last| *last > 0.0))
+        };
+        if !not_negative.all(usable) || !components.all(positive) {
+            return Err(NetworkError::NotPositive { what });
+        }
+        Ok(Self { sizes, block })
+    }
+
+    /// Makes a confidence of a block that [`new`](Self::new) has checked before.
+    pub(crate) fn of_checked(sizes: Sizes, block: &'a [f32]) -> Self {
+        Self { sizes, block }
+    }
+
+    /// The confidence's sizes.
+    #[must_use]
+    pub fn sizes(&self) -> Sizes {
+        self.sizes
+    }
+
+    /// The confidence's numbers, as [`new`](Self::new) takes them.
+    #[must_use]
+    pub fn block(&self) -> &'a [f32] {
+        self.block
+    }
+
+    /// Half of each output's 95 % interval, in deviations. Half of its 68 % interval is one deviation.
+    #[must_use]
+    pub fn ratios_95(&self) -> &'a [f32] {
+        self.arrays().ratios_95
+    }
+
+    fn arrays(&self) -> Arrays<'a> {
+        Arrays::cut(self.sizes, self.block).unwrap_or_default()
+    }
+
+    /// Writes the deviation of every output (in its unit) to `deviation`, and returns the frame's novelty in nats.
+    ///
+    /// `readings` are those of the whole frame in the model's unit, or relative to the baseline for a model that takes
+    /// them so. If one is missing (NaN), all results are NaN. A frame so far from all of training that its density
+    /// leaves f32 has the novelty [`f32::MAX`], and NaN for deviations.
+    ///
+    /// # Errors
+    /// [`NetworkError::Length`] if `deviation` is not as long as there are outputs, or `scratch` shorter than
+    /// [`scratch_floats`](Sizes::scratch_floats); nothing is written then.
+    pub fn assess(
+        &self,
+        readings: impl Iterator<Item = f32>,
+        scratch: &mut [f32],
+        deviation: &mut [f32],
+    ) -> Result<f32, NetworkError> {
+        let Sizes { readings: count, components, outputs, .. } = self.sizes;
+        let length = |what, expected, found| NetworkError::Length { what, expected, found };
+        if deviation.len() != outputs {
+            return Err(length("deviation", outputs, deviation.len()));
+        }
+        let (expected, found) = (self.sizes.scratch_floats(), scratch.len());
+        let too_short = length("scratch", expected, found);
+        let (z, rest) = scratch.split_at_mut_checked(count).ok_or(too_short)?;
+        let (features, rest) = rest.split_at_mut_checked(self.sizes.features()).ok_or(too_short)?;
+        let densities = rest.get_mut(..components).ok_or(too_short)?;
+        let arrays = self.arrays();
+        for (((z, reading), mean), scale) in
+            z.iter_mut().zip(readings).zip(arrays.mean).zip(arrays.scale)
+        {
+            *z = (reading - mean) * scale;
+        }
+        let missing = z.iter().any(|z| z.is_nan());
+        let best = if missing { f32::NAN } else { self.densities(z, features, densities) };
+        if !best.is_finite() {
+            deviation.fill(f32::NAN);
+            return Ok(if missing { f32::NAN } else { f32::MAX });
+        }
+        let sum: f32 = densities.iter().map(|density| Polynomial::exp(density - best)).sum();
+        deviations(densities, best, arrays.variances, deviation);
+        Ok(-(best + libm::logf(sum)) - arrays.threshold)
+    }
+
+    /// Writes ln π_k·N(f | μ_k, Σ_k) of every component; returns the largest, or what is not finite if it leaves f32.
+    fn densities(&self, z: &[f32], features: &mut [f32], densities: &mut [f32]) -> f32 {
+        let arrays = self.arrays();
+        let Some((left_out, directions)) = features.split_last_mut() else { return f32::NAN };
+        Projection::of_checked(self.sizes.directions, arrays.projection).project(z, directions);
+        let square = |values: &[f32]| values.iter().map(|value| value * value).sum::<f32>();
+        *left_out = sqrt((square(z) - square(directions)).max(0.0));
+        let size = self.sizes.component_floats().max(1);
+        let mut best = f32::NEG_INFINITY;
+        for (density, component) in densities.iter_mut().zip(arrays.mixture.chunks_exact(size)) {
+            let (constant, offsets) = component.split_first().unwrap_or((&0.0, &[]));
+            let mut distance = 0.0;
+            for (row, offset) in triangle(self.sizes, component).zip(offsets) {
+                let product = row.iter().zip(features.iter()).map(|(w, f)| w * f).sum::<f32>();
+                distance += (product - offset) * (product - offset);
+            }
+            *density = constant - 0.5 * distance;
+            // Not `max`, which passes NaN over.
+            if density.is_nan() || *density > best {
+                best = *density;
+            }
+        }
+        best
+    }
+}
+
+/// Rows of a component's lower triangle: one number, then two, and so on.
+fn triangle(sizes: Sizes, component: &[f32]) -> impl Iterator<Item = &[f32]> {
+    let mut rest = component.get(sizes.features().saturating_add(1)..).unwrap_or_default();
+    (1..=sizes.features()).map_while(move |length| {
+        let (row, after) = rest.split_at_checked(length)?;
+        rest = after;
+        Some(row)
+    })
+}
+
+/// Writes √(Σ γ·v) of every output, over the most probable components. Their `densities` are used up.
+fn deviations(densities: &mut [f32], best: f32, variances: &[f32], deviation: &mut [f32]) {
+    deviation.fill(0.0);
+    let mut sum = 0.0;
+    for _ in 0..MOST_PROBABLE {
+        let mut chosen = (0, f32::NEG_INFINITY);
+        for (index, density) in densities.iter().enumerate() {
+            if *density > chosen.1 {
+                chosen = (index, *density);
+            }
+        }
+        let probability = Polynomial::exp(chosen.1 - best);
+        if probability == 0.0 {
+            break;
+        }
+        if let Some(density) = densities.get_mut(chosen.0) {
+            *density = f32::NEG_INFINITY;
+        }
+        sum += probability;
+        let start = chosen.0.saturating_mul(deviation.len());
+        for (place, variance) in
+            deviation.iter_mut().zip(variances.get(start..).unwrap_or_default())
+        {
+            *place += probability * variance;
+        }
+    }
+    // The best component alone makes the sum 1 at least.
+    let per_sum = 1.0 / sum;
+    deviation.iter_mut().for_each(|place| *place = sqrt(*place * per_sum));
+}
+
+/// Square root, rounded correctly.
+fn sqrt(value: f32) -> f32 {
+    #[cfg(cortex_m4f)]
+    return cortex_m4::sqrt(value);
+    #[cfg(not(cortex_m4f))]
+    return libm::sqrtf(value);
+}
+
+#[cfg(test)]
+mod tests;
