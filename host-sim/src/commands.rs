@@ -13,6 +13,7 @@ pub mod synth;
 pub mod forward;
 pub mod train;
 pub mod decode;
+pub mod confidence;
 pub mod eval;
 pub mod inspect;
 pub mod table1;

@@ -14,6 +14,7 @@ use taxel_data::digest::digest;
 use taxel_data::error::require;
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
+use taxel_learn::confidence::{self, HeldOut};
 use taxel_learn::train::{Examples, FreshFrames, Refinement, check_spread, train, train_refined};
 use taxel_learn::{ModelBlob, Options, Origin, Trained, pack, relative};
 use taxel_limit::Reference;
@@ -79,6 +80,9 @@ pub struct Training {
     /// Whether centres, widths and the projection are refined after K-means.
     #[serde(default = "yes")]
     pub refine: bool,
+    /// Whether the model tells how far off its outputs may be, and how novel a frame is.
+    #[serde(default)]
+    pub confidence: bool,
 }
 
 /// Settings of the paper's Table 1.
@@ -260,7 +264,33 @@ impl Experiment {
         let synthesis = Synthesis::of(&self.world);
         let frames = self.dataset(&synthesis, Stream::Training, self.training.frames);
         let trained = self.train_on(&frames, &synthesis, progress)?;
-        Ok(pack(&trained, &frames, &self.origin())?)
+        let blob = pack(&trained, &frames, &self.origin())?;
+        if self.training.confidence {
+            self.with_confidence(&blob, &frames, &synthesis, progress)
+        } else {
+            Ok(blob)
+        }
+    }
+
+    /// Adds a confidence to the model in `blob`, trained on `frames` of `synthesis`. It is calibrated on as many other
+    /// frames.
+    ///
+    /// # Errors
+    /// [`Error`] for a model that cannot be packed.
+    pub fn with_confidence(
+        &self,
+        blob: &ModelBlob,
+        frames: &Dataset,
+        synthesis: &Synthesis<'_>,
+        progress: &dyn Progress,
+    ) -> Result<ModelBlob> {
+        progress.stage("fit confidence", 1);
+        let mut held_out = HeldOut::default();
+        held_out.add(blob, &self.dataset(synthesis, Stream::Calibration, frames.frames()));
+        let settings = confidence::Settings { seed: self.world.seed, ..Default::default() };
+        let blob = confidence::add(blob, frames, &held_out, &settings)?;
+        progress.step();
+        Ok(blob)
     }
 
     fn check(&self) -> Check {

@@ -9,7 +9,7 @@ use model_core::scale::CLAMP;
 use taxel_data::table::Table;
 
 use crate::decoder::{Estimates, FrameDecoder};
-use crate::infer::{Exponential, Prepared, is_missing};
+use crate::infer::{Exponential, Prepared, assess_lines, is_missing};
 use crate::packing::ModelBlob;
 use crate::relative::{ratios, reciprocals};
 use crate::train::{output_rank, projection};
@@ -133,6 +133,17 @@ impl<'b> PreparedModel<'b> {
         }
     }
 
+    /// Standard deviations of the outputs for `readings` (`frames × inputs`), `frames × outputs` in their units, and the
+    /// novelty of each frame in nats, above 0 for a novel one; `None` if the model has no confidence.
+    ///
+    /// A missing reading makes all of its frame's NaN.
+    #[must_use]
+    pub fn assess(&self, readings: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
+        let confidence = self.model.confidence()?;
+        let (deviations, novelty) = assess_lines(confidence, &self.model_inputs(readings));
+        Some((deviations.into_iter().map(f64::from).collect(), novelty))
+    }
+
     /// Share of the inputs for `readings`, or of their features behind a projection, that inference clamps: those
     /// outside the training range by more than an eighth of it.
     ///
@@ -176,6 +187,7 @@ impl FrameDecoder for PreparedModel<'_> {
     }
 
     fn decode(&self, (): &mut (), readings: &[f64]) -> Estimates {
-        Estimates::of_values(self.decode_lines(readings))
+        let (deviation, novelty) = self.assess(readings).unzip();
+        Estimates { values: self.decode_lines(readings), deviation, novelty }
     }
 }

@@ -17,7 +17,7 @@ use crate::error::Result;
 
 pub mod kmeans;
 pub mod least_squares;
-mod principal;
+pub(crate) mod principal;
 pub mod format;
 pub mod projection;
 pub mod output_rank;

@@ -14,9 +14,10 @@ use taxel_data::error::{Problem, Role};
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
 use taxel_data::{columns, output};
+use taxel_learn::confidence::{self, HeldOut};
 use taxel_learn::select::{self, Selection};
 use taxel_learn::train::{Examples, Refinement, WHOLE_ARRAY_SPREAD, train, train_refined};
-use taxel_learn::{Options, Origin, Trained, pack};
+use taxel_learn::{ModelBlob, Options, Origin, Trained, pack};
 use taxel_simulate::Synthesis;
 
 use super::arguments::format;
@@ -79,6 +80,10 @@ pub struct Arguments {
     select: bool,
     #[command(flatten)]
     refine: RefineArgument,
+    /// Let the model tell how far off each output may be, and how novel a frame is (docs/confidence.md). Estimates stay
+    /// the same. On a CSV file, it trains once more for every fold.
+    #[arg(long)]
+    confidence: bool,
     /// Folds, drawn at random, for cross-validation and for refinement on a CSV file [default: 5].
     #[arg(long, value_name = "N")]
     folds: Option<usize>,
@@ -101,6 +106,8 @@ struct Source {
     more: More,
     /// Whether refinement is asked for.
     refine: bool,
+    /// Whether the model is to have a confidence.
+    confidence: bool,
 }
 
 /// What refinement measures the error on.
@@ -112,18 +119,67 @@ enum More {
 impl Source {
     /// Trains on the data, refined if that is asked for.
     fn train(&self, options: &Options, progress: &dyn Progress) -> Result<Trained> {
-        let settings = Refinement::default();
-        let refined = |examples| {
-            train_refined(&self.dataset, options, &settings, examples, progress).map_err(of_folds)
-        };
-        Ok(match &self.more {
-            _ if !self.refine => train(&self.dataset, options, progress)?,
+        match &self.more {
+            More::Scene(experiment) if self.refine => {
+                let synthesis = Synthesis::of(&experiment.world);
+                let more = MoreFrames { experiment, synthesis: &synthesis };
+                self.train_on(&self.dataset, Some(Examples::Fresh(&more)), options, progress)
+            }
+            More::Folds(fold_of) if self.refine => {
+                self.train_on(&self.dataset, Some(Examples::Folds(fold_of)), options, progress)
+            }
+            _ => self.train_on(&self.dataset, None, options, progress),
+        }
+    }
+
+    /// Trains on `dataset`, refined if there are `examples`.
+    fn train_on(
+        &self,
+        dataset: &Dataset,
+        examples: Option<Examples<'_>>,
+        options: &Options,
+        progress: &dyn Progress,
+    ) -> Result<Trained> {
+        Ok(match examples {
+            None => train(dataset, options, progress)?,
+            Some(examples) => {
+                train_refined(dataset, options, &Refinement::default(), examples, progress)
+                    .map_err(of_folds)?
+            }
+        })
+    }
+
+    /// Adds a confidence to the model in `blob`. Measured data is held out fold by fold.
+    fn with_confidence(
+        &self,
+        blob: &ModelBlob,
+        options: &Options,
+        progress: &dyn Progress,
+    ) -> Result<ModelBlob> {
+        let fold_of = match &self.more {
             More::Scene(experiment) => {
                 let synthesis = Synthesis::of(&experiment.world);
-                refined(Examples::Fresh(&MoreFrames { experiment, synthesis: &synthesis }))?
+                return experiment.with_confidence(blob, &self.dataset, &synthesis, progress);
             }
-            More::Folds(fold_of) => refined(Examples::Folds(fold_of))?,
-        })
+            More::Folds(fold_of) => fold_of,
+        };
+        let mut held_out = HeldOut::default();
+        for fold in 0..fold_of.iter().max().map_or(0, |last| last + 1) {
+            let frames_where = |held: bool| -> Vec<usize> {
+                (0..fold_of.len()).filter(|frame| (fold_of[*frame] == fold) == held).collect()
+            };
+            let rest = frames_where(false);
+            let (seen, folds) = (
+                self.dataset.subset(&rest),
+                rest.iter().map(|frame| fold_of[*frame]).collect::<Vec<_>>(),
+            );
+            let examples = self.refine.then_some(Examples::Folds(&folds));
+            let trained = self.train_on(&seen, examples, options, progress)?;
+            let of_rest = pack(&trained, &seen, &self.origin)?;
+            held_out.add(&of_rest, &self.dataset.subset(&frames_where(true)));
+        }
+        let settings = confidence::Settings { seed: options.seed, ..Default::default() };
+        Ok(confidence::add(blob, &self.dataset, &held_out, &settings)?)
     }
 }
 
@@ -143,6 +199,8 @@ struct Summary {
     output_rank: Option<usize>,
     /// Whether inputs are readings relative to the baseline.
     relative_inputs: bool,
+    /// Whether the model tells deviations and novelty.
+    confidence: bool,
     /// Number formats of the networks, in their order.
     formats: Vec<&'static str>,
     outputs: Vec<String>,
@@ -190,8 +248,12 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         None
     };
 
-    let trained = source.train(&options, &Terminal::new())?;
-    let blob = pack(&trained, &source.dataset, &source.origin)?;
+    let progress = Terminal::new();
+    let trained = source.train(&options, &progress)?;
+    let mut blob = pack(&trained, &source.dataset, &source.origin)?;
+    if source.confidence {
+        blob = source.with_confidence(&blob, &options, &progress)?;
+    }
     output::write_bytes(&arguments.output, blob.bytes())?;
 
     let model = blob.parse();
@@ -215,6 +277,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         affine_tail: options.affine_tail,
         output_rank: model.expansion().map(|expansion| expansion.components()),
         relative_inputs: source.dataset.relative_inputs,
+        confidence: model.confidence().is_some(),
         formats: model.networks().map(|n| n.format().name()).collect(),
         outputs: source.dataset.outputs.names.clone(),
         training_rmse: model.metadata().training_rmse.iter().map(f64::from).collect(),
@@ -252,6 +315,7 @@ fn from_scene(arguments: &Arguments, common: &Common) -> Result<Source> {
         origin: scene.origin(),
         defaults: scene.options(),
         refine: arguments.refine.over(scene.training.refine),
+        confidence: arguments.confidence || scene.training.confidence,
         more: More::Scene(Box::new(scene)),
     })
 }
@@ -286,7 +350,9 @@ fn from_data(arguments: &Arguments, common: &Common) -> Result<Source> {
     let refine = arguments.refine.over(true);
     let fold_of = match &arguments.fold_column {
         Some(name) => folds_from(&file, name, &kept.lines)?,
-        None if refine || arguments.select => random_folds(arguments, dataset.frames(), seed)?,
+        None if refine || arguments.select || arguments.confidence => {
+            random_folds(arguments, dataset.frames(), seed)?
+        }
         None => vec![],
     };
     let name = path.file_stem().map_or("data".into(), |stem| stem.to_string_lossy());
@@ -295,6 +361,7 @@ fn from_data(arguments: &Arguments, common: &Common) -> Result<Source> {
         defaults: Options { seed, ..Options::default() },
         dataset,
         refine,
+        confidence: arguments.confidence,
         more: More::Folds(fold_of),
     })
 }
@@ -426,7 +493,7 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         }
     }
     page.line(format_args!(
-        "{}: {} bytes, CRC-32 {}, {}, K = {}{}, spread = {}{}, affine tail: {}, {} frames{}",
+        "{}: {} bytes, CRC-32 {}, {}, K = {}{}, spread = {}{}, affine tail: {}, {} frames{}{}",
         summary.file.display(),
         summary.blob_bytes,
         summary.blob_crc,
@@ -437,7 +504,8 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         if summary.refined { " (refined)" } else { "" },
         if summary.affine_tail { "yes" } else { "no" },
         summary.training_frames,
-        if summary.relative_inputs { ", inputs relative to the baseline" } else { "" }
+        if summary.relative_inputs { ", inputs relative to the baseline" } else { "" },
+        if summary.confidence { ", with confidence" } else { "" }
     ));
     if summary.centres < asked {
         page.line(format_args!(

@@ -1,0 +1,108 @@
+use model_core::Decoder;
+use taxel_data::progress::Silent;
+use taxel_data::random::Stream;
+use taxel_simulate::{World, synthesise};
+
+use super::*;
+use crate::packing::{Origin, pack};
+use crate::train::{Options, train};
+
+/// A model of row 4 with a confidence, and what it was fitted to.
+fn row_4() -> (World, Dataset, ModelBlob, ModelBlob) {
+    let world = World { read_rows: vec![3], ..World::press() };
+    let training = synthesise(&world, Stream::Training, 4000);
+    let options = Options { centres: 16, ..Options::default() };
+    let trained = train(&training, &options, &Silent).unwrap();
+    let blob = pack(&trained, &training, &Origin::of_data("row 4", 0, 1, &training)).unwrap();
+    let mut held_out = HeldOut::default();
+    held_out.add(&blob, &synthesise(&world, Stream::Calibration, 4000));
+    let settings = Settings { components: 8, ..Settings::default() };
+    let with = add(&blob, &training, &held_out, &settings).unwrap();
+    (world, training, blob, with)
+}
+
+#[test]
+fn intervals_cover_the_errors_of_frames_that_nothing_was_fitted_to() {
+    let (world, _, _, blob) = row_4();
+    let test = synthesise(&world, Stream::Test, 4000);
+    let model = blob.prepare(Exponential::default());
+    let decoded = model.decode_table(&test.inputs).values;
+    let (deviations, novelty) = model.assess(&test.inputs.values).unwrap();
+    let ratios = blob.parse().confidence().unwrap().ratios_95();
+    for output in 0..18 {
+        let share = |ratio: f64| {
+            let within = (output..decoded.len()).step_by(18).filter(|at| {
+                (decoded[*at] - test.outputs.values[*at]).abs() <= ratio * deviations[*at]
+            });
+            within.count() as f64 / 4000.0
+        };
+        let (one, most) = (share(1.0), share(f64::from(ratios[output])));
+        // Four standard errors of a share of so many frames.
+        assert!((one - 0.6827).abs() < 0.03 && (most - 0.95).abs() < 0.014, "{one} {most}");
+    }
+    let alarms = novelty.iter().filter(|novelty| **novelty > 0.0).count() as f64 / 4000.0;
+    assert!(alarms < 0.01, "{alarms}");
+    // Errors grow with the dent, and deviations tell so: those of the first electrode's z differ by far.
+    let mut of_first: Vec<f64> = deviations.iter().copied().skip(2).step_by(18).collect();
+    of_first.sort_by(f64::total_cmp);
+    assert!(of_first[3600] > 3.0 * of_first[400], "{} {}", of_first[400], of_first[3600]);
+}
+
+#[test]
+fn frames_that_the_sensor_cannot_give_are_novel() {
+    let (world, _, _, blob) = row_4();
+    let mut frames = synthesise(&world, Stream::Test, 500).inputs.values;
+    for frame in frames.chunks_exact_mut(18) {
+        // Two neighbouring column-wires are one.
+        let both = 1.0 / (1.0 / frame[7] + 1.0 / frame[8]);
+        frame[7..9].fill(both);
+    }
+    let (_, novelty) = blob.prepare(Exponential::default()).assess(&frames).unwrap();
+    assert!(novelty.iter().all(|novelty| *novelty > 10.0));
+}
+
+#[test]
+fn a_confidence_changes_no_estimate_and_a_device_finds_the_same_bits() {
+    let (world, training, without, with) = row_4();
+    let test = synthesise(&world, Stream::Test, 50);
+    let prepared = with.prepare(Exponential::default());
+    let decoded =
+        |blob: &ModelBlob| blob.prepare(Exponential::default()).decode_table(&test.inputs).values;
+    assert_eq!(decoded(&with), decoded(&without));
+    let (deviations, novelty) = prepared.assess(&test.inputs.values).unwrap();
+    let decoder = Decoder::<1>::load(with.bytes()).unwrap();
+    let mut scratch = vec![0.0; decoder.scratch_floats()];
+    for (frame, line) in test.inputs.lines().enumerate() {
+        let readings: Vec<f32> = line.iter().map(|reading| *reading as f32).collect();
+        let mut deviation = [0.0; 18];
+        let found = decoder.assess_into((&readings[..]).into(), &mut scratch, &mut deviation);
+        assert_eq!(found.unwrap().map(f64::from), Some(novelty[frame]));
+        assert_eq!(deviation.map(f64::from), deviations[frame * 18..][..18]);
+    }
+    // Fitting again gives the same bytes.
+    let mut held_out = HeldOut::default();
+    held_out.add(&without, &synthesise(&world, Stream::Calibration, 4000));
+    let settings = Settings { components: 8, ..Settings::default() };
+    assert_eq!(add(&without, &training, &held_out, &settings).unwrap().bytes(), with.bytes());
+}
+
+#[test]
+fn outputs_and_readings_that_never_change_are_no_obstacle() {
+    let names = |kind: &str, count: usize| (0..count).map(|i| format!("{kind}{i}")).collect();
+    let mut dataset = Dataset::empty(names("in", 3), names("out", 2), 1, 200);
+    for (frame, line) in dataset.inputs.values.chunks_exact_mut(3).enumerate() {
+        line.copy_from_slice(&[frame as f64, 7.0, (frame % 7) as f64]);
+    }
+    for (frame, line) in dataset.outputs.values.chunks_exact_mut(2).enumerate() {
+        line[0] = (0.1 * frame as f64).sin();
+    }
+    let options = Options { centres: 4, ..Options::default() };
+    let trained = train(&dataset, &options, &Silent).unwrap();
+    let blob = pack(&trained, &dataset, &Origin::of_data("few", 0, 1, &dataset)).unwrap();
+    let mut held_out = HeldOut::default();
+    held_out.add(&blob, &dataset);
+    let blob = add(&blob, &dataset, &held_out, &Settings::default()).unwrap();
+    let (deviations, novelty) =
+        blob.prepare(Exponential::default()).assess(&dataset.inputs.values).unwrap();
+    assert!(deviations.iter().all(|d| d.is_finite()) && novelty.iter().all(|n| n.is_finite()));
+}
