@@ -14,7 +14,7 @@ use taxel_data::digest::digest;
 use taxel_data::error::require;
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
-use taxel_learn::confidence::{self, HeldOut};
+use taxel_learn::confidence::{self, Density, HeldOut};
 use taxel_learn::train::{Examples, FreshFrames, Refinement, check_spread, train, train_refined};
 use taxel_learn::{ModelBlob, Options, Origin, Trained, pack, relative};
 use taxel_limit::Reference;
@@ -285,10 +285,12 @@ impl Experiment {
         progress: &dyn Progress,
     ) -> Result<ModelBlob> {
         progress.stage("fit confidence", 1);
-        let mut held_out = HeldOut::default();
-        held_out.add(blob, &self.dataset(synthesis, Stream::Calibration, frames.frames()));
         let settings = confidence::Settings { seed: self.world.seed, ..Default::default() };
-        let blob = confidence::add(blob, frames, &held_out, &settings)?;
+        let density = Density::fit(frames, &settings);
+        let mut held_out = HeldOut::default();
+        let others = self.dataset(synthesis, Stream::Calibration, frames.frames());
+        held_out.add(blob, &density, &others);
+        let blob = confidence::add(blob, &density, &held_out)?;
         progress.step();
         Ok(blob)
     }

@@ -1,7 +1,7 @@
 //! Confidence of a trained model: fitting of what [`model_core::confidence`] assesses frames with.
 //!
 //! The density of frames is fitted to those of training. Deviations and the threshold of novelty are calibrated on
-//! frames that training did not see: errors on its own frames would be too small.
+//! frames that training did not see.
 
 use model_core::confidence::{Confidence, Sizes};
 use rayon::prelude::*;
@@ -41,31 +41,67 @@ impl Default for Settings {
     }
 }
 
-/// Frames that a model was not trained on, with the errors of its outputs.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct HeldOut {
-    /// Inputs of the model: `frames × readings`.
-    pub inputs: Vec<f64>,
-    /// Errors of its outputs, in their units: `frames × outputs`.
-    pub errors: Vec<f64>,
+/// Density of a data set's inputs: a mixture of Gaussians over a few features of theirs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Density {
+    features: Features,
+    mixture: Mixture,
 }
 
-impl HeldOut {
-    /// Adds the frames of `dataset`, decoded by the model of `blob`, which was not trained on them.
-    ///
-    /// # Panics
-    /// If the data set has other columns than the model.
-    pub fn add(&mut self, blob: &ModelBlob, dataset: &Dataset) {
-        let decoded =
-            blob.prepare(Exponential::default()).of_inputs().decode_table(&dataset.inputs);
-        self.inputs.extend(&dataset.inputs.values);
-        let errors = decoded.values.iter().zip(&dataset.outputs.values);
-        self.errors.extend(errors.map(|(estimate, truth)| estimate - truth));
+impl Density {
+    /// Fits the density of the inputs of `dataset`, which has frames.
+    #[must_use]
+    pub fn fit(dataset: &Dataset, settings: &Settings) -> Self {
+        let readings = dataset.inputs.names.len();
+        let features = Features::of(&dataset.inputs, settings.directions.clamp(1, readings));
+        let most = dataset.frames() / (FRAMES_A_FEATURE * features.count());
+        let mixture = Mixture::fit(
+            &features.apply(&dataset.inputs.values),
+            features.count(),
+            settings.components.min(most).max(1),
+            settings.seed,
+        );
+        Self { features, mixture }
+    }
+
+    /// −ln p of every frame of `inputs` (`frames × readings`).
+    fn surprises(&self, inputs: &[f64]) -> Vec<f64> {
+        let points = self.features.apply(inputs);
+        let of_point = |point: &[f64]| -self.mixture.probabilities(&point.to_vec().into()).1;
+        points.par_chunks_exact(self.features.count()).map(of_point).collect()
     }
 }
 
-/// Makes a blob of the model in `blob` with a confidence, fitted to the inputs of the `training` data set and calibrated
-/// on frames that were `held_out`.
+/// Frames that neither a model nor a density was fitted to: errors on the frames of training would be too small, and
+/// their density too large.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct HeldOut {
+    /// Inputs of the model: `frames × readings`.
+    inputs: Vec<f64>,
+    /// Errors of its outputs, in their units: `frames × outputs`.
+    errors: Vec<f64>,
+    /// −ln p of each frame.
+    surprises: Vec<f64>,
+}
+
+impl HeldOut {
+    /// Adds the frames of `dataset`, decoded by the model of `blob`, and seen by a `density`, neither of which was
+    /// fitted to them.
+    ///
+    /// # Panics
+    /// If the data set has other columns than the model.
+    pub fn add(&mut self, blob: &ModelBlob, density: &Density, dataset: &Dataset) {
+        let decoded =
+            blob.prepare(Exponential::default()).of_inputs().decode_table(&dataset.inputs);
+        let errors = decoded.values.iter().zip(&dataset.outputs.values);
+        self.errors.extend(errors.map(|(estimate, truth)| estimate - truth));
+        self.surprises.extend(density.surprises(&dataset.inputs.values));
+        self.inputs.extend(&dataset.inputs.values);
+    }
+}
+
+/// Makes a blob of the model in `blob` with a confidence: the `density` of its training frames, calibrated on frames that
+/// were `held_out`.
 ///
 /// # Errors
 /// [`Error::NoRegression`] for inputs whose density is beyond f32; [`Error::NotPacked`] for a model beyond what the
@@ -73,37 +109,26 @@ impl HeldOut {
 ///
 /// # Panics
 /// If frames are not those of the model, or none was held out.
-pub fn add(
-    blob: &ModelBlob,
-    training: &Dataset,
-    held_out: &HeldOut,
-    settings: &Settings,
-) -> Result<ModelBlob> {
-    let (readings, outputs) = (training.inputs.names.len(), training.outputs.names.len());
-    let frames = held_out.inputs.len() / readings;
-    assert!(frames > 0 && held_out.errors.len() == frames * outputs, "an error for every output");
-    let directions = settings.directions.clamp(1, readings);
-    let features = Features::of(&training.inputs, directions);
-    let most = training.frames() / (FRAMES_A_FEATURE * features.count());
-    let mixture = Mixture::fit(
-        &features.apply(&training.inputs.values),
-        features.count(),
-        settings.components.min(most).max(1),
-        settings.seed,
-    );
-    let variances = variances(&features, &mixture, held_out, outputs);
-    let sizes = Sizes { readings, directions, components: mixture.components.len(), outputs };
-    let uncalibrated = block(&features, &mixture, &variances, &vec![1.0; outputs], 0.0);
-    let assessed = assess(sizes, &uncalibrated, &held_out.inputs)?;
-    let ratios = ratios(&assessed.deviations, &held_out.errors, outputs);
+pub fn add(blob: &ModelBlob, density: &Density, held_out: &HeldOut) -> Result<ModelBlob> {
+    let Density { features, mixture } = density;
+    let (frames, readings) = (held_out.surprises.len(), features.mean.len());
+    let outputs = held_out.errors.len() / frames;
+    assert!(frames > 0 && held_out.inputs.len() == frames * readings, "frames of the model");
+    let variances = variances(features, mixture, held_out, outputs);
+    let (directions, components) = (features.directions(), mixture.components.len());
+    let sizes = Sizes { readings, directions, components, outputs };
+    let uncalibrated = block(features, mixture, &variances, &vec![1.0; outputs], 0.0);
+    let confidence = Confidence::new(sizes, &uncalibrated).map_err(|_| Error::NoRegression)?;
+    let (deviations, _) = assess_lines(confidence, &held_out.inputs);
+    let ratios = ratios(&deviations, &held_out.errors, outputs);
     let calibrated: Vec<f64> = variances
         .chunks_exact(outputs)
         .flat_map(|of_component| of_component.iter().zip(&ratios))
         .map(|(variance, [one, _])| variance * one * one)
         .collect();
     let ratios_95: Vec<f64> = ratios.iter().map(|[one, most]| most / one).collect();
-    let threshold = quantile(&mut assessed.novelty.clone(), 1.0 - FALSE_ALARMS);
-    let block = block(&features, &mixture, &calibrated, &ratios_95, threshold);
+    let threshold = quantile(&mut held_out.surprises.clone(), 1.0 - FALSE_ALARMS);
+    let block = block(features, mixture, &calibrated, &ratios_95, threshold);
     let confidence = Confidence::new(sizes, &block).map_err(|_| Error::NoRegression)?;
     blob.with_confidence(confidence)
 }
@@ -152,20 +177,6 @@ fn variances(
     }
     let lines = squares.chunks_exact(outputs).zip(weights);
     lines.flat_map(|(squares, weight)| squares.iter().map(move |s| s / weight)).collect()
-}
-
-/// What a confidence makes of frames.
-struct Assessed {
-    /// Deviation of every output, `frames × outputs`.
-    deviations: Vec<f32>,
-    /// Novelty of every frame, in nats.
-    novelty: Vec<f64>,
-}
-
-fn assess(sizes: Sizes, block: &[f32], inputs: &[f64]) -> Result<Assessed> {
-    let confidence = Confidence::new(sizes, block).map_err(|_| Error::NoRegression)?;
-    let (deviations, novelty) = assess_lines(confidence, inputs);
-    Ok(Assessed { deviations, novelty })
 }
 
 /// Ratios of each output's errors to its deviations that the [`SHARES`] of them are within; 1 where deviations are 0.

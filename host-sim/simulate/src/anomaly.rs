@@ -73,12 +73,11 @@ pub fn frames(world: &World, anomaly: Anomaly, frames: usize) -> Option<Anomalou
     let sensor = &world.sensor;
     let neighbours = world.read_rows.windows(2).any(|rows| rows[1] == rows[0] + 1);
     let possible = match anomaly {
-        Anomaly::None => true,
         Anomaly::BrokenRowWire => sensor.electrodes_per_row_wire > 1,
         Anomaly::BrokenColumnWire => sensor.electrodes_per_column_wire > 1,
         Anomaly::ShortedRowWires => neighbours,
         Anomaly::ShortedColumnWires => sensor.column_wires > 1,
-        Anomaly::TwoContacts => true,
+        Anomaly::None | Anomaly::TwoContacts => true,
     };
     if !possible {
         return None;
@@ -231,4 +230,86 @@ fn two_contacts(world: &World, press: &Press, frames: usize) -> (Vec<f64>, Vec<[
         }
     }
     (deformations_mm, contacts_mm)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::noise::Noise;
+
+    fn ideal() -> World {
+        let noise = Noise { kind: NoiseKind::Relative, level: 0.0 };
+        World { noise, ..World::press() }
+    }
+
+    fn readings(anomaly: Anomaly) -> Vec<f64> {
+        frames(&ideal(), anomaly, 40).unwrap().readings_ohm
+    }
+
+    #[test]
+    fn usual_frames_are_those_of_synthesis() {
+        let synthesised = Synthesis::of(&ideal()).frames(Stream::Anomaly, 40).inputs.values;
+        for (found, of) in readings(Anomaly::None).iter().zip(synthesised) {
+            assert!((found / of - 1.0).abs() < 1e-12, "{found} {of}");
+        }
+    }
+
+    #[test]
+    fn a_fault_strikes_one_wire_or_two_neighbours_of_each_frame() {
+        let usual = readings(Anomaly::None);
+        let frame = |readings: &[f64], index: usize| readings[index * 144..][..144].to_vec();
+        for (anomaly, wires) in [
+            (Anomaly::BrokenRowWire, 1),
+            (Anomaly::BrokenColumnWire, 1),
+            (Anomaly::ShortedRowWires, 2),
+            (Anomaly::ShortedColumnWires, 2),
+        ] {
+            let faulty = readings(anomaly);
+            let by_row = matches!(anomaly, Anomaly::BrokenRowWire | Anomaly::ShortedRowWires);
+            let mut struck = std::collections::BTreeSet::new();
+            for index in 0..40 {
+                let (a, b) = (frame(&usual, index), frame(&faulty, index));
+                let changed: Vec<usize> =
+                    (0..144).filter(|at| (a[*at] / b[*at] - 1.0).abs() > 1e-9).collect();
+                let of = |at: usize| if by_row { at / 18 } else { at % 18 };
+                let of_wires: std::collections::BTreeSet<usize> =
+                    changed.iter().map(|at| of(*at)).collect();
+                let all = wires * if by_row { 18 } else { 8 };
+                assert_eq!((of_wires.len(), changed.len()), (wires, all), "{anomaly:?}");
+                // A broken wire conducts less, wires in parallel more.
+                let less = changed.iter().all(|at| (b[*at] > a[*at]) == (wires == 1));
+                assert!(less, "{anomaly:?}");
+                let (first, last) = (of_wires.first().unwrap(), of_wires.last().unwrap());
+                assert_eq!(last - first, wires - 1, "{anomaly:?}");
+                struck.insert(*first);
+            }
+            assert!(struck.len() > 3, "{anomaly:?} strikes {struck:?}");
+        }
+    }
+
+    #[test]
+    fn two_contacts_are_no_deeper_than_one_may_be_and_lie_where_they_say() {
+        let drawn = frames(&World::press(), Anomaly::TwoContacts, 500).unwrap();
+        assert_eq!((drawn.contacts_mm.len(), drawn.readings_ohm.len()), (500, 500 * 144));
+        let farthest_mm = 20.0_f64.hypot(18.0);
+        for [apart_mm, depth_mm] in &drawn.contacts_mm {
+            assert!((0.0..farthest_mm).contains(apart_mm) && (0.0..=1.0).contains(depth_mm));
+        }
+        // Uniform centres are 9.9 mm apart on average; the lesser depth of frames that are let through is below ⅓.
+        let mean = |of: usize| drawn.contacts_mm.iter().map(|c| c[of]).sum::<f64>() / 500.0;
+        assert!(
+            (mean(0) - 10.2).abs() < 1.0 && (0.2..0.34).contains(&mean(1)),
+            "{} {}",
+            mean(0),
+            mean(1)
+        );
+        let press = motion::Kind::from(Press {
+            dent_radius_mm: [2.0, 5.0],
+            dent_depth_mm: [0.9, 1.0],
+            shear_ratio: [0.0, 0.1],
+        });
+        let deep = frames(&World::of_motion(press), Anomaly::TwoContacts, 500).unwrap();
+        assert!(deep.contacts_mm.iter().all(|[_, depth_mm]| *depth_mm >= 0.9));
+        assert!(frames(&World::paper(), Anomaly::TwoContacts, 5).is_none());
+    }
 }

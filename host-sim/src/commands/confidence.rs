@@ -48,9 +48,6 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let mut scene = arguments.scene.load(common)?;
     arguments.noise.apply(&mut scene)?;
     scene.world.check_frames("--frames", arguments.frames)?;
-    if arguments.frames == 0 {
-        return Err(Error::Usage("--frames 0: give at least 1".into()));
-    }
     scene.training.confidence = true;
     let blob = scene_argument::model(arguments.model.as_deref(), &scene, &Terminal::new())?;
     let model = blob.prepare(Exponential::default());

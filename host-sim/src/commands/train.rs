@@ -4,20 +4,18 @@ use std::path::{Path, PathBuf};
 
 use super::progress::Terminal;
 use clap::Args;
-use host_sim::experiment::{EMBEDDED, Experiment, MoreFrames};
+use host_sim::experiment::{EMBEDDED, Experiment};
 use host_sim::{Error, Result};
 use model_core::rbf::Format;
 use serde::Serialize;
 use taxel_data::csv_file::CsvFile;
 use taxel_data::dataset::Dataset;
 use taxel_data::error::{Problem, Role};
-use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
 use taxel_data::{columns, output};
-use taxel_learn::confidence::{self, HeldOut};
 use taxel_learn::select::{self, Selection};
-use taxel_learn::train::{Examples, Refinement, WHOLE_ARRAY_SPREAD, train, train_refined};
-use taxel_learn::{ModelBlob, Options, Origin, Trained, pack};
+use taxel_learn::train::{Refinement, WHOLE_ARRAY_SPREAD};
+use taxel_learn::{Options, Origin, pack};
 use taxel_simulate::Synthesis;
 
 use super::arguments::format;
@@ -25,11 +23,16 @@ use super::readings;
 use super::scene_argument::{NoiseArgument, RefineArgument, RelativeInputsArgument};
 use super::{Common, print};
 
+mod source;
+
+use source::{More, Source, of_folds};
+
 /// Train a model on a scene or a CSV file, and write its blob.
 ///
 /// A CSV file trains one network for all selected columns. If the columns have the project's own names
 /// (r4c17_ohm, r4e2_dz_mm), it trains one for each row-wire.
 #[derive(Args)]
+#[expect(clippy::struct_excessive_bools, reason = "each is an option")]
 #[command(after_help = "Examples:
   host-sim train press -o press.bin
   host-sim train press --whole-array --centres 256 --output-rank 24 --format fixed16 -o press.bin
@@ -97,93 +100,8 @@ pub struct Arguments {
     frames: Option<usize>,
 }
 
-/// Data that a model is trained on.
-struct Source {
-    dataset: Dataset,
-    origin: Origin,
-    defaults: Options,
-    /// Fold of each frame of measured data, or the scene that has more frames.
-    more: More,
-    /// Whether refinement is asked for.
-    refine: bool,
-    /// Whether the model is to have a confidence.
-    confidence: bool,
-}
-
-/// What refinement measures the error on.
-enum More {
-    Scene(Box<Experiment>),
-    Folds(Vec<usize>),
-}
-
-impl Source {
-    /// Trains on the data, refined if that is asked for.
-    fn train(&self, options: &Options, progress: &dyn Progress) -> Result<Trained> {
-        match &self.more {
-            More::Scene(experiment) if self.refine => {
-                let synthesis = Synthesis::of(&experiment.world);
-                let more = MoreFrames { experiment, synthesis: &synthesis };
-                self.train_on(&self.dataset, Some(Examples::Fresh(&more)), options, progress)
-            }
-            More::Folds(fold_of) if self.refine => {
-                self.train_on(&self.dataset, Some(Examples::Folds(fold_of)), options, progress)
-            }
-            _ => self.train_on(&self.dataset, None, options, progress),
-        }
-    }
-
-    /// Trains on `dataset`, refined if there are `examples`.
-    fn train_on(
-        &self,
-        dataset: &Dataset,
-        examples: Option<Examples<'_>>,
-        options: &Options,
-        progress: &dyn Progress,
-    ) -> Result<Trained> {
-        Ok(match examples {
-            None => train(dataset, options, progress)?,
-            Some(examples) => {
-                train_refined(dataset, options, &Refinement::default(), examples, progress)
-                    .map_err(of_folds)?
-            }
-        })
-    }
-
-    /// Adds a confidence to the model in `blob`. Measured data is held out fold by fold.
-    fn with_confidence(
-        &self,
-        blob: &ModelBlob,
-        options: &Options,
-        progress: &dyn Progress,
-    ) -> Result<ModelBlob> {
-        let fold_of = match &self.more {
-            More::Scene(experiment) => {
-                let synthesis = Synthesis::of(&experiment.world);
-                return experiment.with_confidence(blob, &self.dataset, &synthesis, progress);
-            }
-            More::Folds(fold_of) => fold_of,
-        };
-        let mut held_out = HeldOut::default();
-        for fold in 0..fold_of.iter().max().map_or(0, |last| last + 1) {
-            let frames_where = |held: bool| -> Vec<usize> {
-                (0..fold_of.len()).filter(|frame| (fold_of[*frame] == fold) == held).collect()
-            };
-            let rest = frames_where(false);
-            let (seen, folds) = (
-                self.dataset.subset(&rest),
-                rest.iter().map(|frame| fold_of[*frame]).collect::<Vec<_>>(),
-            );
-            let examples = self.refine.then_some(Examples::Folds(&folds));
-            let trained = self.train_on(&seen, examples, options, progress)?;
-            let of_rest = pack(&trained, &seen, &self.origin)?;
-            held_out.add(&of_rest, &self.dataset.subset(&frames_where(true)));
-        }
-        let settings = confidence::Settings { seed: options.seed, ..Default::default() };
-        Ok(confidence::add(blob, &self.dataset, &held_out, &settings)?)
-    }
-}
-
 #[derive(Serialize)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a field of the JSON")]
 struct Summary {
     file: PathBuf,
     blob_bytes: usize,
@@ -396,16 +314,6 @@ fn folds_from(file: &CsvFile, name: &str, lines: &[usize]) -> Result<Vec<usize>>
         return Err(taxel_data::Error::file(&file.path, problem).into());
     }
     Ok(select::number_folds(&values))
-}
-
-/// Error that names the options which choose folds.
-fn of_folds(error: taxel_learn::Error) -> Error {
-    match error {
-        taxel_learn::Error::Setting(bad) if bad.field == "folds" => {
-            Error::Usage(format!("{bad} (--folds or --fold-column, --no-refine)"))
-        }
-        other => other.into(),
-    }
 }
 
 /// Random folds, as many as asked for.

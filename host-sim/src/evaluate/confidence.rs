@@ -143,13 +143,12 @@ pub fn detections(scene: &Experiment, model: &PreparedModel<'_>, frames: usize) 
         let side_mm = world.sensor.size_mm[0].max(world.sensor.size_mm[1]);
         for [depth, apart] in CONDITIONS {
             let (depth_mm, apart_mm) = (depth * most_mm, apart * side_mm);
-            let mut text = kind.description().to_owned();
-            if depth > 0.0 {
-                text += &format!(", {depth_mm:.1} mm deep or more");
-            }
-            if apart > 0.0 {
-                text += &format!(", {apart_mm:.0} mm apart or more");
-            }
+            let depth_text = format!(", {depth_mm:.1} mm deep or more");
+            let apart_text = format!(", {apart_mm:.0} mm apart or more");
+            let parts = [(depth > 0.0, &depth_text), (apart > 0.0, &apart_text)];
+            let given =
+                parts.into_iter().filter(|(given, _)| *given).map(|(_, text)| text.as_str());
+            let text: String = [kind.description()].into_iter().chain(given).collect();
             let pairs = novelty.iter().zip(&drawn.contacts_mm);
             let mut chosen = pairs
                 .filter(|(_, [apart, depth])| *apart >= apart_mm && *depth >= depth_mm)

@@ -1,6 +1,7 @@
 //! Every integration test in one program: it is linked once.
 
 mod common;
+mod confidence;
 mod quantisation;
 mod virtual_device;
 

@@ -7,6 +7,14 @@ use super::*;
 use crate::packing::{Origin, pack};
 use crate::train::{Options, train};
 
+/// The model of `blob` with a confidence.
+fn fitted(world: &World, training: &Dataset, blob: &ModelBlob) -> ModelBlob {
+    let density = Density::fit(training, &Settings { components: 8, ..Settings::default() });
+    let mut held_out = HeldOut::default();
+    held_out.add(blob, &density, &synthesise(world, Stream::Calibration, 4000));
+    add(blob, &density, &held_out).unwrap()
+}
+
 /// A model of row 4 with a confidence, and what it was fitted to.
 fn row_4() -> (World, Dataset, ModelBlob, ModelBlob) {
     let world = World { read_rows: vec![3], ..World::press() };
@@ -14,10 +22,7 @@ fn row_4() -> (World, Dataset, ModelBlob, ModelBlob) {
     let options = Options { centres: 16, ..Options::default() };
     let trained = train(&training, &options, &Silent).unwrap();
     let blob = pack(&trained, &training, &Origin::of_data("row 4", 0, 1, &training)).unwrap();
-    let mut held_out = HeldOut::default();
-    held_out.add(&blob, &synthesise(&world, Stream::Calibration, 4000));
-    let settings = Settings { components: 8, ..Settings::default() };
-    let with = add(&blob, &training, &held_out, &settings).unwrap();
+    let with = fitted(&world, &training, &blob);
     (world, training, blob, with)
 }
 
@@ -29,14 +34,14 @@ fn intervals_cover_the_errors_of_frames_that_nothing_was_fitted_to() {
     let decoded = model.decode_table(&test.inputs).values;
     let (deviations, novelty) = model.assess(&test.inputs.values).unwrap();
     let ratios = blob.parse().confidence().unwrap().ratios_95();
-    for output in 0..18 {
+    for (output, ratio) in ratios.iter().enumerate() {
         let share = |ratio: f64| {
             let within = (output..decoded.len()).step_by(18).filter(|at| {
                 (decoded[*at] - test.outputs.values[*at]).abs() <= ratio * deviations[*at]
             });
             within.count() as f64 / 4000.0
         };
-        let (one, most) = (share(1.0), share(f64::from(ratios[output])));
+        let (one, most) = (share(1.0), share(f64::from(*ratio)));
         // Four standard errors of a share of so many frames.
         assert!((one - 0.6827).abs() < 0.03 && (most - 0.95).abs() < 0.014, "{one} {most}");
     }
@@ -80,10 +85,7 @@ fn a_confidence_changes_no_estimate_and_a_device_finds_the_same_bits() {
         assert_eq!(deviation.map(f64::from), deviations[frame * 18..][..18]);
     }
     // Fitting again gives the same bytes.
-    let mut held_out = HeldOut::default();
-    held_out.add(&without, &synthesise(&world, Stream::Calibration, 4000));
-    let settings = Settings { components: 8, ..Settings::default() };
-    assert_eq!(add(&without, &training, &held_out, &settings).unwrap().bytes(), with.bytes());
+    assert_eq!(fitted(&world, &training, &without).bytes(), with.bytes());
 }
 
 #[test]
@@ -99,9 +101,10 @@ fn outputs_and_readings_that_never_change_are_no_obstacle() {
     let options = Options { centres: 4, ..Options::default() };
     let trained = train(&dataset, &options, &Silent).unwrap();
     let blob = pack(&trained, &dataset, &Origin::of_data("few", 0, 1, &dataset)).unwrap();
+    let density = Density::fit(&dataset, &Settings::default());
     let mut held_out = HeldOut::default();
-    held_out.add(&blob, &dataset);
-    let blob = add(&blob, &dataset, &held_out, &Settings::default()).unwrap();
+    held_out.add(&blob, &density, &dataset);
+    let blob = add(&blob, &density, &held_out).unwrap();
     let (deviations, novelty) =
         blob.prepare(Exponential::default()).assess(&dataset.inputs.values).unwrap();
     assert!(deviations.iter().all(|d| d.is_finite()) && novelty.iter().all(|n| n.is_finite()));
