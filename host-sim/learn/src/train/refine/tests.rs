@@ -1,3 +1,5 @@
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use model_core::rbf::Format;
 use taxel_data::progress::Silent;
 use taxel_data::random::{Purpose, Random, Stream};
@@ -146,6 +148,30 @@ fn refined_models_are_better_and_the_same_on_any_number_of_threads() {
         let start = train(&training, &options, &Silent).unwrap();
         let ratio = rmse(&one, &test) / rmse(&start, &test);
         assert!(ratio < gain, "{format:?}, array: {whole_array}: {ratio}");
+    }
+}
+
+/// Source of frames that remembers the largest number asked for.
+struct Counted<'w>(Fresh<'w>, AtomicUsize);
+
+impl FreshFrames for Counted<'_> {
+    fn frames(&self, step: usize, count: usize) -> Dataset {
+        self.1.fetch_max(count, Ordering::Relaxed);
+        self.0.frames(step, count)
+    }
+}
+
+#[test]
+fn steps_look_at_more_frames_the_more_centres_there_are() {
+    let world = World { read_rows: vec![3], ..World::press() };
+    let training = Synthesis::of(&world).frames(Stream::Training, 200);
+    for (centres, frames) in [(8, 300), (40, 640)] {
+        let fresh = Counted(Fresh(Synthesis::of(&world)), AtomicUsize::new(0));
+        let options = Options { centres, ..Options::default() };
+        let settings = Refinement { steps: 2, frames: 300, ..Refinement::default() };
+        let examples = Examples::Fresh(&fresh);
+        train_refined(&training, &options, &settings, examples, &Silent).unwrap();
+        assert_eq!(fresh.1.into_inner(), frames, "{centres} centres");
     }
 }
 
