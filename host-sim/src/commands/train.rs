@@ -219,6 +219,10 @@ fn from_scene(arguments: &Arguments, common: &Common) -> Result<Source> {
             return Err(Error::Usage(message));
         }
     }
+    if arguments.folds.is_some() && !arguments.select {
+        let message = "--folds holds out frames of a CSV file, or with --select; a scene has fresh frames: leave it out";
+        return Err(Error::Usage(message.into()));
+    }
     if arguments.baseline.is_some() {
         let message = "--baseline is for a CSV file; a scene synthesises its own: leave it out";
         return Err(Error::Usage(message.into()));

@@ -128,6 +128,12 @@ fn bad_training_options() {
     train(&[&two_folds[..], &["--no-refine"]].concat(), &["centres = 2", "2 training"]);
     train(&two_folds, &["folds = 2", "at least 4"]);
     train(&two_folds[1..], &["folds = 2", "at least 3", "without refinement"]);
+    train(
+        &["--whole-array", "--centres", "2", "--no-refine"],
+        &["one: leave it out (--whole-array)"],
+    );
+    let of_scene = ["train", "press", "--folds", "4", "-o", "m.bin"];
+    refused(&folder, &of_scene, &["--folds", "a scene has fresh frames: leave it out"]);
     refused(
         &folder,
         &["train", "press", "--inputs", "ch*", "-o", "m.bin"],
