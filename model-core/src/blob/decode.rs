@@ -3,8 +3,8 @@
 use super::error::DecodeError;
 use super::format::{
     CRC_BYTES, ExpansionHeader, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection,
-    PREFIX_BYTES, Prefix, RbfHeader, ShapeField, TAG_EXPANSION, TAG_METADATA, TAG_PROJECTION,
-    TAG_RELATIVE_INPUTS,
+    PREFIX_BYTES, Prefix, ProjectionHeader, RbfHeader, ShapeField, TAG_EXPANSION, TAG_METADATA,
+    TAG_PROJECTION, TAG_PROJECTION_TO, TAG_RELATIVE_INPUTS,
 };
 use super::metadata::{Columns, Floats, Metadata, ModelShape};
 use crate::checksum::CRC_32;
@@ -21,7 +21,7 @@ pub struct Model<'a> {
     crc: u32,
     row_network: &'a [u8],
     metadata: Metadata<'a>,
-    projection: Option<&'a [f32]>,
+    projection: Option<Projection<'a>>,
     expansion: Option<&'a [f32]>,
     /// Components of the expansion; 0 without one.
     components: u16,
@@ -150,7 +150,7 @@ impl<'a> Model<'a> {
     /// [expanded](Self::expansion) to these.
     #[must_use]
     pub fn projection(&self) -> Option<Projection<'a>> {
-        self.projection.map(|block| Projection::of_checked(self.shape.inputs, block))
+        self.projection
     }
 
     /// The expansion of the one network's outputs to those of all rows; `None` if a network's outputs are those of its
@@ -170,12 +170,13 @@ impl<'a> Model<'a> {
     /// Inputs and outputs of each network; behind a projection, its features and the outputs of all rows, or the
     /// components that are expanded to these.
     pub(crate) fn network_shape(&self) -> ModelShape {
-        let ModelShape { rows, inputs, outputs } = self.shape;
-        match (self.projection, self.components()) {
-            (Some(_), 0) => ModelShape { rows: 1, inputs, outputs: rows * outputs },
-            (Some(_), components) => ModelShape { rows: 1, inputs, outputs: components },
-            (None, _) => self.shape,
-        }
+        let ModelShape { rows, outputs, .. } = self.shape;
+        let Some(projection) = self.projection else { return self.shape };
+        let outputs = match self.components() {
+            0 => rows * outputs,
+            components => components,
+        };
+        ModelShape { rows: 1, inputs: projection.features(), outputs }
     }
 
     /// The networks, in the order of the blob.
@@ -417,17 +418,25 @@ fn take_relative_inputs(bytes: &[u8]) -> (bool, &[u8]) {
 fn take_projection(
     bytes: &[u8],
     shape: ModelShape,
-) -> Result<(Option<&[f32]>, &[u8]), DecodeError> {
-    let Some((&TAG_PROJECTION, rest)) = bytes.split_first() else { return Ok((None, bytes)) };
-    let (block, rest) = take_block(rest, "projection section")?;
+) -> Result<(Option<Projection<'_>>, &[u8]), DecodeError> {
+    const SECTION: &str = "projection section";
+    let (features, rest) = match bytes.split_first() {
+        Some((&TAG_PROJECTION, rest)) => (shape.inputs, rest),
+        Some((&TAG_PROJECTION_TO, _)) => {
+            let (header, rest) = take::<ProjectionHeader>(bytes, SECTION)?;
+            (header.features.into(), rest)
+        }
+        _ => return Ok((None, bytes)),
+    };
+    let (block, rest) = take_block(rest, SECTION)?;
     let readings = shape.rows * shape.inputs;
-    let floats = projection::block_floats(readings, shape.inputs);
+    let floats = projection::block_floats(readings, features);
     check_count("bytes of projection", floats.saturating_mul(4), block.len())?;
     let block = bytemuck::try_cast_slice::<u8, f32>(block)
         .map_err(|_| DecodeError::Malformed { section: "padding" })?;
-    Projection::new(readings, shape.inputs, block)
+    let projection = Projection::new(readings, features, block)
         .map_err(|cause| DecodeError::Projection { cause })?;
-    Ok((Some(block), rest))
+    Ok((Some(projection), rest))
 }
 
 /// Cuts the expansion from the front of `bytes` if there is one, and checks it.
