@@ -1,0 +1,91 @@
+//! Scenes that ask for the contact alone: one small network for the whole array.
+
+use serde_json::Value;
+
+use crate::common::Folder;
+
+/// The scene `contact` with few frames, which is quick to train.
+fn small_contact() -> String {
+    include_str!("../../../scenes/contact.toml")
+        .replace("frames = 20000", "frames = 3000")
+        .replace("test_frames = 8000", "test_frames = 500")
+        .replace("centres = 64", "centres = 24\nrefine = false")
+}
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).unwrap()
+}
+
+fn rmse(errors: &Value, group: &str) -> f64 {
+    let of_group = errors.as_array().unwrap().iter().find(|errors| errors["group"] == group);
+    of_group.unwrap()["rmse"].as_f64().unwrap()
+}
+
+#[test]
+fn the_contact_is_trained_evaluated_inspected_and_run() {
+    let folder = Folder::new("contact");
+    folder.write("scene.toml", small_contact());
+    folder.succeed(&["synth", "scene.toml", "-n", "500", "--seed", "9", "-o", "test.csv"]);
+    let header = std::fs::read_to_string(folder.path("test.csv")).unwrap();
+    let header = header.lines().next().unwrap();
+    let columns = "r8c18_ohm,contact_x_mm,contact_y_mm,contact_depth_mm,contact_force_n";
+    assert!(header.ends_with(columns), "{header}");
+
+    let train = ["train", "scene.toml", "--format", "fixed16", "-o", "m.bin"];
+    folder.succeed(&train);
+    let evaluated = json(&folder.succeed(&["eval", "m.bin", "test.csv", "--json"]));
+    for (group, most) in [
+        ("contact_x_mm", 3.5),
+        ("contact_y_mm", 3.0),
+        ("contact_depth_mm", 0.16),
+        ("contact_force_n", 1.2),
+    ] {
+        let found = rmse(&evaluated["errors"], group);
+        assert!(
+            found < most && found < 0.7 * rmse(&evaluated["mean_errors"], group),
+            "{group}: {found}"
+        );
+    }
+    let ranges = evaluated["by_depth"].as_array().unwrap();
+    let x = |range: &Value| rmse(&range["errors"], "contact_x_mm");
+    let (shallow, deep) = (&ranges[0], &ranges[ranges.len() - 2]);
+    assert!(x(shallow) > 2.0 * x(deep), "where a shallow contact is can hardly be known");
+
+    let model = json(&folder.succeed(&["inspect", "m.bin", "--json"]));
+    let shape = ["rows", "inputs_per_row", "outputs_per_row", "projected_features"];
+    assert_eq!(shape.map(|field| model[field].as_u64().unwrap()), [1, 144, 4, 10]);
+    assert!(model["flash_bytes"].as_u64().unwrap() < 10_000);
+    assert_eq!(model["needs"].as_array().unwrap().len(), 0, "the images take it");
+
+    let printed = folder.succeed(&["run", "scene.toml"]);
+    assert!(printed.contains("RMSE by depth of the contact") && !printed.contains("row-wire"));
+    assert!(printed.contains("144 readings -> 10 features -> K = 24 -> 4 outputs"), "{printed}");
+    let page = std::fs::read_to_string(folder.path("out/contact/report.html")).unwrap();
+    assert!(page.contains("by the true depth of the contact") && !page.contains("NaN"));
+}
+
+#[test]
+fn a_file_of_contacts_trains_the_same_kind_of_model() {
+    let folder = Folder::new("contact-csv");
+    folder.write("scene.toml", small_contact());
+    folder.succeed(&["synth", "scene.toml", "-n", "600", "-o", "data.csv"]);
+    let train =
+        ["train", "data.csv", "--whole-array", "--features", "6", "--no-refine", "-o", "m.bin"];
+    let printed = json(&folder.succeed(&[&train[..], &["--centres", "12", "--json"]].concat()));
+    assert_eq!(printed["outputs"][3], "contact_force_n");
+    let model = json(&folder.succeed(&["inspect", "m.bin", "--json"]));
+    assert_eq!((model["rows"].as_u64(), model["projected_features"].as_u64()), (Some(1), Some(6)));
+}
+
+#[test]
+fn the_limit_of_a_contact_is_below_any_decoders_error() {
+    let folder = Folder::new("contact-limit");
+    folder.write("scene.toml", small_contact());
+    let limit = json(&folder.succeed(&["limit", "scene.toml", "-n", "20", "--json"]));
+    let groups = &limit["levels"][0]["limits"][0]["groups"];
+    assert_eq!(groups.as_array().unwrap().len(), 4);
+    for group in groups.as_array().unwrap() {
+        let [limit, prior] = ["limit", "prior_rmse"].map(|field| group[field].as_f64().unwrap());
+        assert!(limit > 0.0 && limit < 0.6 * prior, "{group}");
+    }
+}
