@@ -245,8 +245,6 @@ fn decode(
     let scratch = scratch.get_mut(..expected).ok_or(too_short)?;
     let relative = model.metadata().relative_inputs;
     let projection = model.projection();
-    let of_network = projection.map_or(inputs, |projection| projection.features());
-    let (scaled, more) = scratch.split_at_mut_checked(of_network).ok_or(too_short)?;
     if let Some(gate) = frame.gate {
         let sizes = [inputs, outputs];
         if gate.give_rest(frame.readings_ohm, sizes, estimate, projection.is_some()) == 0 {
@@ -254,6 +252,7 @@ fn decode(
         }
     }
     let Some(projection) = projection else {
+        let (scaled, more) = scratch.split_at_mut_checked(inputs).ok_or(too_short)?;
         let rows = Rows { networks, inputs, outputs, exp };
         return Ok(if relative {
             rows.decode::<true>(frame, [scaled, more], estimate)
@@ -261,6 +260,8 @@ fn decode(
             rows.decode::<false>(frame, [scaled, more], estimate)
         });
     };
+    let of_network = projection.features();
+    let (scaled, more) = scratch.split_at_mut_checked(of_network).ok_or(too_short)?;
     let (features, more) = more.split_at_mut_checked(of_network).ok_or(too_short)?;
     let Some(network) = networks.first() else { return Ok(false) };
     let array = Array { projection, network, relative };
