@@ -19,6 +19,7 @@ use taxel_learn::train::{Examples, FreshFrames, Refinement, check_spread, train,
 use taxel_learn::{ModelBlob, Options, Origin, Trained, pack, relative};
 use taxel_limit::Reference;
 use taxel_simulate::noise::NoiseKind;
+use taxel_simulate::outputs::Outputs;
 use taxel_simulate::synth::BASELINE_FRAMES;
 use taxel_simulate::world::check_noise_level;
 use taxel_simulate::{Synthesis, World};
@@ -31,9 +32,10 @@ mod file;
 type Check = std::result::Result<(), BadValue>;
 
 /// Names and texts of the scenes that are part of the program.
-pub const EMBEDDED: [(&str, &str); 2] = [
+pub const EMBEDDED: [(&str, &str); 3] = [
     ("paper", include_str!("../../scenes/paper.toml")),
     ("press", include_str!("../../scenes/press.toml")),
+    ("contact", include_str!("../../scenes/contact.toml")),
 ];
 
 /// Experiment of a scene, checked.
@@ -72,6 +74,8 @@ pub struct Training {
     /// Whether one network serves all rows, behind a projection of all readings, instead of one a row.
     #[serde(default)]
     pub whole_array: bool,
+    /// Number of features that this network sees.
+    pub features: Option<usize>,
     /// Number of components that this network computes, which are expanded to all outputs.
     pub output_rank: Option<usize>,
     /// Whether inputs are readings relative to the baseline (R/R₀), and not readings as they are.
@@ -160,6 +164,7 @@ impl Experiment {
             seed: self.world.seed,
             format: t.format,
             whole_array: t.whole_array,
+            features: t.features,
             output_rank: t.output_rank,
             ..Options::default()
         }
@@ -295,6 +300,14 @@ impl Experiment {
         Ok(blob)
     }
 
+    /// Checks what outputs of the contact, which belong to no row-wire, ask of training and of Table 1.
+    fn check_outputs(&self) -> Check {
+        let Outputs::Contact(_) = self.world.outputs else { return Ok(()) };
+        require(self.table1.is_none(), "table1", "[table1]", || {
+            "the table is for outputs of electrodes; leave it out, or ask for outputs.quantity and outputs.axes".into()
+        })
+    }
+
     fn check(&self) -> Check {
         let name_ok = !self.name.is_empty()
             && self.name.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_');
@@ -304,6 +317,7 @@ impl Experiment {
         self.world.check()?;
         check_training(&self.training)?;
         self.table1.as_ref().map_or(Ok(()), check_table1)?;
+        self.check_outputs()?;
         let t = &self.training;
         let mut counts =
             vec![("training.frames", t.frames), ("training.test_frames", t.test_frames)];

@@ -14,7 +14,7 @@ use crate::relative::relative;
 /// blob. The firmware's link check compares it with the compiler's own figure.
 #[must_use]
 pub const fn decoder_ram_bytes(rows: usize) -> usize {
-    156 + 28 * rows
+    160 + 28 * rows
 }
 
 /// A frame to be decoded, and what is known of the sensor at rest.
@@ -273,7 +273,6 @@ fn decode(
     let (expected, found) = (scratch_floats(model), scratch.len());
     let too_short = NetworkError::Length { what: "scratch", expected, found };
     let scratch = scratch.get_mut(..expected).ok_or(too_short)?;
-    let (scaled, more) = scratch.split_at_mut_checked(inputs).ok_or(too_short)?;
     let relative = model.metadata().relative_inputs;
     let projection = model.projection();
     if let Some(gate) = frame.gate {
@@ -283,6 +282,7 @@ fn decode(
         }
     }
     let Some(projection) = projection else {
+        let (scaled, more) = scratch.split_at_mut_checked(inputs).ok_or(too_short)?;
         let rows = Rows { networks, inputs, outputs, exp };
         return Ok(if relative {
             rows.decode::<true>(frame, [scaled, more], estimate)
@@ -290,7 +290,9 @@ fn decode(
             rows.decode::<false>(frame, [scaled, more], estimate)
         });
     };
-    let (features, more) = more.split_at_mut_checked(inputs).ok_or(too_short)?;
+    let of_network = projection.features();
+    let (scaled, more) = scratch.split_at_mut_checked(of_network).ok_or(too_short)?;
+    let (features, more) = more.split_at_mut_checked(of_network).ok_or(too_short)?;
     let Some(network) = networks.first() else { return Ok(false) };
     let array = Array { projection, network, relative };
     let Some(expansion) = model.expansion() else {
@@ -372,13 +374,14 @@ fn divide(readings: &[f32], reciprocals: &[f32], ratios: &mut [f32]) {
 #[must_use]
 pub fn scratch_floats(model: &Model<'_>) -> usize {
     let ModelShape { rows, inputs, .. } = model.shape();
-    let before = match (model.projection().is_some(), model.metadata().relative_inputs) {
-        (false, false) => inputs,
-        (false, true) | (true, false) => inputs.saturating_mul(2),
-        (true, true) => inputs.saturating_mul(rows.saturating_add(2)),
+    let relative = model.metadata().relative_inputs;
+    let (scaled, given) = match model.projection() {
+        Some(projection) => (projection.features().saturating_mul(2), inputs.saturating_mul(rows)),
+        None => (inputs, inputs),
     };
-    let assessing = model.confidence().map_or(0, |it| it.sizes().scratch_floats());
-    before.saturating_add(model.components()).max(assessing)
+    let extra = if relative { given } else { 0 };
+    let decoding = scaled.saturating_add(extra).saturating_add(model.components());
+    decoding.max(model.confidence().map_or(0, |it| it.sizes().scratch_floats()))
 }
 
 fn check_length<T>(what: &'static str, slice: &[T], expected: usize) -> Result<(), NetworkError> {

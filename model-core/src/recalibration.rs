@@ -147,9 +147,9 @@ impl<'a> Units<'a> {
     fn of(model: &Model<'a>) -> Result<Self, RecalibrationError> {
         let ModelShape { rows, inputs, outputs } = model.shape();
         let projection = model.projection();
-        let (count, outputs) = match projection {
-            Some(_) => (1, rows.saturating_mul(outputs)),
-            None => (rows, outputs),
+        let (count, inputs, outputs) = match projection {
+            Some(projection) => (1, projection.features(), rows.saturating_mul(outputs)),
+            None => (rows, inputs, outputs),
         };
         let network = |row| model.network_of_row(row);
         let shared = |row: usize| (0..row).any(|before| network(before) == network(row));

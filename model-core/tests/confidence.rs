@@ -130,7 +130,7 @@ fn every_damage_of_the_section_has_its_own_error() {
         DecodeError::CountMismatch { what, expected, found: 64 }
     };
     let network = DecodeError::Malformed { section: "network section" };
-    assert_eq!(changed(start, &[8]), network);
+    assert_eq!(changed(start, &[9]), network);
     // Two directions take 4·(1 + 2 + 1 + 3) bytes more; two components 4·(1 + 2 + 3 + 1).
     assert_eq!(changed(start + 1, &[2]), count(92));
     assert_eq!(changed(start + 2, &[2]), count(92));

@@ -111,8 +111,9 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             shape.and_then(|shape| self.capacity.wires_for(shape)).unwrap_or(self.capacity.wires());
         self.rows = shape.map_or(self.wires.rows, |shape| shape.rows);
         self.outputs = shape.map_or(0, |shape| shape.rows.saturating_mul(shape.outputs));
-        self.row_wires =
-            decoder.map_or(core::array::from_fn(RowWire), |decoder| row_wires(decoder.model()));
+        let columns = self.wires.columns;
+        self.row_wires = decoder
+            .map_or(core::array::from_fn(RowWire), |decoder| row_wires(decoder.model(), columns));
         if (self.wires, self.row_wires) != before {
             self.give_up_capture();
             self.baseline.restart(self.wires.readings());

@@ -126,7 +126,7 @@ impl<'b> PreparedModel<'b> {
         let inputs = self.model_inputs(readings);
         match self.model.projection() {
             Some(projection) => {
-                let features = self.model.shape().inputs;
+                let features = projection.features();
                 Cow::Owned(projection::features(projection, features, self.inputs(), &inputs))
             }
             None => inputs,

@@ -17,6 +17,7 @@
 pub mod error;
 mod kinds;
 pub mod sensor;
+pub mod contact;
 pub mod motion;
 pub mod rubber;
 pub mod noise;

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use host_sim::by_depth::{DepthErrors, by_depth};
 use host_sim::evaluate::confidence::{Coverage, coverage};
 use host_sim::metrics::{self, Errors, LimitSummary, Measure};
 use host_sim::{Error, Result};
@@ -45,6 +46,8 @@ struct Summary {
     errors: Vec<Errors>,
     /// Errors of always predicting the mean of these outputs.
     mean_errors: Vec<Errors>,
+    /// Errors of the model by the depth of the contact, if that is an output.
+    by_depth: Vec<DepthErrors>,
     /// What the intervals of a model with a confidence cover; empty without one.
     coverage: Vec<Coverage>,
     /// Share of the frames without missing readings that a model with a confidence finds novel.
@@ -95,6 +98,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         exponential: arguments.exponential,
         errors,
         mean_errors: metrics::by_group(&truth, &means, &measure),
+        by_depth: by_depth(&truth, &estimate.values, &measure),
     };
     if common.json {
         return print::json(&summary);
@@ -110,6 +114,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     print::errors(&mut page, &[("model", &summary.errors), ("mean", &summary.mean_errors)]);
     print::errors_legend(&mut page);
     page.line(LimitSummary::of(&Err(Refusal::Measured)).note());
+    print::by_depth(&mut page, &summary.by_depth);
     if let Some(percent) = summary.percent_novel {
         page.line("");
         page.line("Errors that the model's intervals of 68.3 % and 95 % cover:");

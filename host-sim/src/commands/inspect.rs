@@ -135,7 +135,7 @@ fn summarise(blob: &ModelBlob) -> Result<Summary> {
             bytes: 4 * it.block().len(),
         }),
         relative_inputs: metadata.relative_inputs,
-        projected_features: model.projection().map_or(0, |_| shape.inputs),
+        projected_features: model.projection().map_or(0, |it| it.features()),
         expanded_components: design.components.unwrap_or(0),
         networks: networks.collect(),
         noise_kind: format!("{:?}", metadata.noise_kind).to_lowercase(),

@@ -40,7 +40,7 @@ use source::{More, Source, of_folds};
   host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --select --fold-column fold -o m.bin
   host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --relative-inputs --baseline rest.csv -o m.bin")]
 pub struct Arguments {
-    /// A built-in scene (paper, press), a scene file (.toml) or a CSV file.
+    /// A built-in scene (paper, press, contact), a scene file (.toml) or a CSV file.
     source: String,
     /// Blob to write.
     #[arg(short, long, value_name = "FILE")]
@@ -48,7 +48,7 @@ pub struct Arguments {
     /// Reading columns of a CSV file: names with * and ?, comma-separated [default: r*c*_ohm].
     #[arg(long, value_name = "GLOB")]
     inputs: Option<String>,
-    /// Output columns of a CSV file [default: r*e*_d?_mm and r*e*_f?_n].
+    /// Output columns of a CSV file [default: r*e*_d?_mm, r*e*_f?_n and contact_*].
     #[arg(long, value_name = "GLOB")]
     outputs: Option<String>,
     /// Centres K; with --select, candidates [default: the scene's, or 64].
@@ -65,6 +65,10 @@ pub struct Arguments {
     /// more accurate, and faster from K = 64 on, but one missing reading leaves nothing to decode.
     #[arg(long)]
     whole_array: bool,
+    /// Features that --whole-array projects all readings to [default: as many as a row has readings, or 18 for outputs
+    /// that belong to no row].
+    #[arg(long, value_name = "F", allow_negative_numbers = true)]
+    features: Option<usize>,
     /// Let the network of --whole-array compute R components, which are expanded to all outputs once a frame. With many
     /// centres that takes fewer cycles and less flash; a small R loses accuracy (docs/projection.md).
     #[arg(long, value_name = "R")]
@@ -150,6 +154,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         options.whole_array = true;
         options.spread *= WHOLE_ARRAY_SPREAD;
     }
+    options.features = arguments.features.or(options.features);
     options.output_rank = arguments.output_rank.or(options.output_rank);
     options.format = arguments.format.unwrap_or(options.format);
     if arguments.select && options.whole_array {

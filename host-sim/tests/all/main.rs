@@ -7,6 +7,7 @@ mod virtual_device;
 
 mod accuracy;
 mod calibrate;
+mod contact;
 mod device;
 mod drift;
 mod gate;

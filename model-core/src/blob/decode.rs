@@ -25,7 +25,7 @@ pub struct Model<'a> {
     crc: u32,
     row_network: &'a [u8],
     metadata: Metadata<'a>,
-    projection: Option<&'a [f32]>,
+    projection: Option<Projection<'a>>,
     expansion: Option<&'a [f32]>,
     /// Components of the expansion; 0 without one.
     components: u16,
@@ -161,7 +161,7 @@ impl<'a> Model<'a> {
     /// [expanded](Self::expansion) to these.
     #[must_use]
     pub fn projection(&self) -> Option<Projection<'a>> {
-        self.projection.map(|block| Projection::of_checked(self.shape.inputs, block))
+        self.projection
     }
 
     /// The expansion of the one network's outputs to those of all rows; `None` if a network's outputs are those of its
@@ -191,12 +191,13 @@ impl<'a> Model<'a> {
     /// Inputs and outputs of each network; behind a projection, its features and the outputs of all rows, or the
     /// components that are expanded to these.
     pub(crate) fn network_shape(&self) -> ModelShape {
-        let ModelShape { rows, inputs, outputs } = self.shape;
-        match (self.projection, self.components()) {
-            (Some(_), 0) => ModelShape { rows: 1, inputs, outputs: rows * outputs },
-            (Some(_), components) => ModelShape { rows: 1, inputs, outputs: components },
-            (None, _) => self.shape,
-        }
+        let ModelShape { rows, outputs, .. } = self.shape;
+        let Some(projection) = self.projection else { return self.shape };
+        let outputs = match self.components() {
+            0 => rows * outputs,
+            components => components,
+        };
+        ModelShape { rows: 1, inputs: projection.features(), outputs }
     }
 
     /// The networks, in the order of the blob.

@@ -8,8 +8,8 @@ use super::decode::Model;
 use super::error::EncodeError;
 use super::format::{
     CRC_BYTES, ConfidenceHeader, ExpansionHeader, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC,
-    MetadataSection, Prefix, RbfHeader, ShapeField, TAG_CONFIDENCE, TAG_EXPANSION, TAG_METADATA,
-    TAG_PROJECTION, TAG_RELATIVE_INPUTS,
+    MetadataSection, Prefix, ProjectionHeader, RbfHeader, ShapeField, TAG_CONFIDENCE,
+    TAG_EXPANSION, TAG_METADATA, TAG_PROJECTION, TAG_PROJECTION_TO, TAG_RELATIVE_INPUTS,
 };
 use super::metadata::Metadata;
 use crate::checksum::CRC_32;
@@ -68,7 +68,7 @@ fn block_bytes(network: &Network<'_>) -> usize {
 /// Every variant of [`EncodeError`].
 pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u8], EncodeError> {
     let first = parts.networks.first().map(Network::shape);
-    let (inputs, mut outputs) = first.map_or((0, 0), |s| (s.inputs, s.outputs));
+    let (mut inputs, mut outputs) = first.map_or((0, 0), |s| (s.inputs, s.outputs));
     for (index, network) in parts.networks.iter().enumerate() {
         if (network.shape().inputs, network.shape().outputs) != (inputs, outputs) {
             return Err(EncodeError::UnequalNetworks { index });
@@ -86,8 +86,9 @@ pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u
         outputs = expansion.outputs();
     }
     let rows = parts.row_network.len();
-    if parts.projection.is_some() {
-        // One network has the outputs of all rows.
+    if let Some(projection) = parts.projection {
+        // One network has the outputs of all rows, and features for inputs.
+        inputs = projection.readings() / rows.max(1);
         if !outputs.is_multiple_of(rows.max(1)) {
             return Err(EncodeError::UnevenRows { outputs, rows });
         }
@@ -124,7 +125,12 @@ pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u
         writer.put(&TAG_RELATIVE_INPUTS)?;
     }
     if let Some(projection) = parts.projection {
-        writer.put(&TAG_PROJECTION)?;
+        if projection.features() == inputs {
+            writer.put(&TAG_PROJECTION)?;
+        } else {
+            let features = fit("number of features", projection.features(), u16::MAX)?;
+            writer.put(&ProjectionHeader { tag: TAG_PROJECTION_TO, features })?;
+        }
         writer.put_block(&[bytemuck::cast_slice(projection.block())])?;
     }
     if let Some(expansion) = parts.expansion {

@@ -26,6 +26,8 @@ pub(super) const TAG_PROJECTION: u8 = 4;
 pub(super) const TAG_RELATIVE_INPUTS: u8 = 5;
 pub(super) const TAG_EXPANSION: u8 = 6;
 pub(super) const TAG_CONFIDENCE: u8 = 7;
+/// Tag of a projection to another number of features than a row has readings.
+pub(super) const TAG_PROJECTION_TO: u8 = 8;
 
 /// Bytes 0..9, at fixed places, so that a blob's length is known before anything else is read.
 #[derive(Serialize, Deserialize)]
@@ -96,6 +98,14 @@ impl RbfHeader {
     }
 }
 
+/// Header of the section of a projection to any number of features; padding and its floats follow.
+#[derive(Serialize, Deserialize)]
+pub(super) struct ProjectionHeader {
+    pub tag: u8,
+    /// Number of features, which are the network's inputs.
+    pub features: u16,
+}
+
 /// Header of the expansion's section; padding and its floats follow.
 #[derive(Serialize, Deserialize)]
 pub(super) struct ExpansionHeader {
@@ -121,7 +131,7 @@ mod tests {
     #[test]
     fn no_format_of_networks_has_the_tag_of_another_section() {
         let others = [TAG_METADATA, TAG_PROJECTION, TAG_RELATIVE_INPUTS, TAG_EXPANSION];
-        for tag in others.into_iter().chain([TAG_CONFIDENCE]) {
+        for tag in others.into_iter().chain([TAG_CONFIDENCE, TAG_PROJECTION_TO]) {
             assert_eq!(Format::from_tag(tag), None);
         }
     }

@@ -2,8 +2,8 @@
 
 use super::error::DecodeError;
 use super::format::{
-    ConfidenceHeader, ExpansionHeader, FLOAT_ALIGNMENT, TAG_CONFIDENCE, TAG_EXPANSION,
-    TAG_PROJECTION, TAG_RELATIVE_INPUTS,
+    ConfidenceHeader, ExpansionHeader, FLOAT_ALIGNMENT, ProjectionHeader, TAG_CONFIDENCE,
+    TAG_EXPANSION, TAG_PROJECTION, TAG_PROJECTION_TO, TAG_RELATIVE_INPUTS,
 };
 use super::metadata::ModelShape;
 use crate::confidence::{Confidence, Sizes};
@@ -55,17 +55,25 @@ pub(super) fn take_relative_inputs(bytes: &[u8]) -> (bool, &[u8]) {
 pub(super) fn take_projection(
     bytes: &[u8],
     shape: ModelShape,
-) -> Result<(Option<&[f32]>, &[u8]), DecodeError> {
-    let Some((&TAG_PROJECTION, rest)) = bytes.split_first() else { return Ok((None, bytes)) };
-    let (block, rest) = take_block(rest, "projection section")?;
+) -> Result<(Option<Projection<'_>>, &[u8]), DecodeError> {
+    const SECTION: &str = "projection section";
+    let (features, rest) = match bytes.split_first() {
+        Some((&TAG_PROJECTION, rest)) => (shape.inputs, rest),
+        Some((&TAG_PROJECTION_TO, _)) => {
+            let (header, rest) = take::<ProjectionHeader>(bytes, SECTION)?;
+            (header.features.into(), rest)
+        }
+        _ => return Ok((None, bytes)),
+    };
+    let (block, rest) = take_block(rest, SECTION)?;
     let readings = shape.rows * shape.inputs;
-    let floats = projection::block_floats(readings, shape.inputs);
+    let floats = projection::block_floats(readings, features);
     check_count("bytes of projection", floats.saturating_mul(4), block.len())?;
     let block = bytemuck::try_cast_slice::<u8, f32>(block)
         .map_err(|_| DecodeError::Malformed { section: "padding" })?;
-    Projection::new(readings, shape.inputs, block)
+    let projection = Projection::new(readings, features, block)
         .map_err(|cause| DecodeError::Projection { cause })?;
-    Ok((Some(block), rest))
+    Ok((Some(projection), rest))
 }
 
 /// Cuts the expansion from the front of `bytes` if there is one, and checks it.

@@ -27,7 +27,8 @@ pub fn blob(design: &Design) -> Outcome<Vec<u8>> {
     } else {
         design.row_network.iter().map(|index| *index as u8).collect()
     };
-    let (readings, features) = (design.shape.rows * design.shape.inputs, design.shape.inputs);
+    let readings = design.shape.rows * design.shape.inputs;
+    let features = if design.projection { design.features() } else { design.shape.inputs };
     // Feature i is reading i of the first row.
     let mut block = vec![0.0; features * (1 + readings)];
     (0..features).for_each(|i| block[features * (1 + i) + i] = 1.0);

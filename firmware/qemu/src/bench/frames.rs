@@ -40,7 +40,8 @@ impl Arena {
 #[inline(never)]
 pub fn frame(model: &Model<'_>, arena: &mut Arena) -> &'static mut [f32] {
     let ModelShape { rows, inputs, .. } = model.shape();
-    let (frame, features) = (arena.take(rows * inputs), arena.take(inputs));
+    let features = model.projection().map_or(inputs, |projection| projection.features());
+    let (frame, features) = (arena.take(rows * inputs), arena.take(features));
     inputs::fill(model, frame, features, &mut Numbers::new(3));
     frame
 }

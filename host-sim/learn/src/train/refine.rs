@@ -170,7 +170,7 @@ pub fn refine(
         layer.centres.iter_mut().for_each(|c| *c = f64::from(*c as f32));
         if options.format == Format::Fixed16 {
             let ranges = sources.ranges(network);
-            layer.spread = layer.spread.max(width::least(&layer.centres, &ranges));
+            layer.spread = layer.spread.max(width::least(options.format, &layer.centres, &ranges));
         }
     }
     Ok(refined)

@@ -200,11 +200,31 @@ fn the_least_width_is_just_held_by_fixed16() {
     let training = Synthesis::of(&world).frames(Stream::Training, 500);
     let options = Options { centres: 12, format: Format::Fixed16, ..Options::default() };
     let start = Layers::start(&training, &options).unwrap();
-    let least = width::least(&start.hidden[0].centres, &[[0.0, 1.0]; 18]);
+    let least = width::least(Format::Fixed16, &start.hidden[0].centres, &[[0.0, 1.0]; 18]);
     let held = |spread: f64| {
         let mut layers = start.clone();
         layers.hidden[0].spread = spread;
         crate::train::fit(&training, layers, &options, &Silent).is_ok()
+    };
+    assert!(held(least) && !held(0.999 * least), "{least}");
+}
+
+/// Few inputs are near each other: there the decay's 32 bits are what ends.
+#[test]
+fn the_least_width_of_few_inputs_is_just_held_by_fixed16() {
+    let mut draw = draws(5);
+    let names = |count: usize| (0..count).map(|i| format!("c{i}")).collect::<Vec<_>>();
+    let mut data = Dataset::empty(names(2), vec!["y_n".into()], 1, 300);
+    data.inputs.values.fill_with(&mut draw);
+    data.outputs.values.fill_with(&mut draw);
+    let options = Options { centres: 12, format: Format::Fixed16, ..Options::default() };
+    let start = Layers::start(&data, &options).unwrap();
+    let least = width::least(Format::Fixed16, &start.hidden[0].centres, &[[0.0, 1.0]; 2]);
+    assert!(least > width::least(Format::F32, &start.hidden[0].centres, &[[0.0, 1.0]; 2]));
+    let held = |spread: f64| {
+        let mut layers = start.clone();
+        layers.hidden[0].spread = spread;
+        crate::train::fit(&data, layers, &options, &Silent).is_ok()
     };
     assert!(held(least) && !held(0.999 * least), "{least}");
 }
