@@ -23,6 +23,10 @@ use crate::rbf::NetworkError;
 /// Number of components that deviations are formed of: the most probable ones.
 pub const MOST_PROBABLE: usize = 4;
 
+/// Nats below the most probable component from which another one does not count: all of them together are below what
+/// an f32 resolves.
+const NEGLIGIBLE: f32 = 24.0;
+
 /// Sizes of a [`Confidence`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sizes {
@@ -43,11 +47,8 @@ impl Sizes {
         self.directions.saturating_add(1)
     }
 
-    /// Number of floats that one component takes: c, o and W.
     const fn component_floats(self) -> usize {
-        let features = self.features();
-        let triangle = features.saturating_mul(features.saturating_add(1)) / 2;
-        features.saturating_add(1).saturating_add(triangle)
+        component_floats(self.features())
     }
 
     /// Number of floats of working space that [`Confidence::assess`] needs.
@@ -66,6 +67,12 @@ impl Sizes {
         let all = scale.saturating_add(projection).saturating_add(mixture);
         all.saturating_add(outputs).saturating_add(1)
     }
+}
+
+/// Number of floats that a component of so many `features` takes: c, o and W.
+const fn component_floats(features: usize) -> usize {
+    let triangle = features.saturating_mul(features.saturating_add(1)) / 2;
+    features.saturating_add(1).saturating_add(triangle)
 }
 
 /// Confidence of a model, borrowed from a blob.
@@ -139,7 +146,8 @@ impl<'a> Confidence<'a> {
         let usable = |values: &[f32]| values.iter().all(|value| *value >= 0.0);
         let mut components = arrays.mixture.chunks_exact(sizes.component_floats());
         let positive = |component: &[f32]| {
-            triangle(sizes, component).all(|row| row.last().is_some_and(|last| *last > 0.0))
+            triangle(sizes.features(), component)
+                .all(|row| row.last().is_some_and(|last| *last > 0.0))
         };
         if !not_negative.all(usable) || !components.all(positive) {
             return Err(NetworkError::NotPositive { what });
@@ -200,87 +208,133 @@ impl<'a> Confidence<'a> {
         let (features, rest) = rest.split_at_mut_checked(self.sizes.features()).ok_or(too_short)?;
         let densities = rest.get_mut(..components).ok_or(too_short)?;
         let arrays = self.arrays();
+        let mut square = 0.0;
         for (((z, reading), mean), scale) in
             z.iter_mut().zip(readings).zip(arrays.mean).zip(arrays.scale)
         {
             *z = (reading - mean) * scale;
+            square += *z * *z;
         }
-        let missing = z.iter().any(|z| z.is_nan());
-        let best = if missing { f32::NAN } else { self.densities(z, features, densities) };
+        // No sum of squares is NaN but one of a NaN.
+        let missing = square.is_nan();
+        let best = if missing { f32::NAN } else { self.densities(z, square, features, densities) };
         if !best.is_finite() {
             deviation.fill(f32::NAN);
             return Ok(if missing { f32::NAN } else { f32::MAX });
         }
-        let sum: f32 = densities.iter().map(|density| Polynomial::exp(density - best)).sum();
-        deviations(densities, best, arrays.variances, deviation);
+        let mut sum = 0.0;
+        for density in densities.iter_mut() {
+            *density = Polynomial::exp(*density - best);
+            sum += *density;
+        }
+        deviations(densities, arrays.variances, deviation);
         Ok(-(best + libm::logf(sum)) - arrays.threshold)
     }
 
     /// Writes ln π_k·N(f | μ_k, Σ_k) of every component; returns the largest, or what is not finite if it leaves f32.
-    fn densities(&self, z: &[f32], features: &mut [f32], densities: &mut [f32]) -> f32 {
+    /// `square` is ‖z‖².
+    fn densities(
+        &self,
+        z: &[f32],
+        square: f32,
+        features: &mut [f32],
+        densities: &mut [f32],
+    ) -> f32 {
         let arrays = self.arrays();
         let Some((left_out, directions)) = features.split_last_mut() else { return f32::NAN };
         Projection::of_checked(self.sizes.directions, arrays.projection).project(z, directions);
-        let square = |values: &[f32]| values.iter().map(|value| value * value).sum::<f32>();
-        *left_out = sqrt((square(z) - square(directions)).max(0.0));
+        let along = directions.iter().map(|value| value * value).sum::<f32>();
+        *left_out = sqrt((square - along).max(0.0));
         let size = self.sizes.component_floats().max(1);
         let mut best = f32::NEG_INFINITY;
-        for (density, component) in densities.iter_mut().zip(arrays.mixture.chunks_exact(size)) {
-            let (constant, offsets) = component.split_first().unwrap_or((&0.0, &[]));
-            let mut distance = 0.0;
-            for (row, offset) in triangle(self.sizes, component).zip(offsets) {
-                let product = row.iter().zip(features.iter()).map(|(w, f)| w * f).sum::<f32>();
-                distance += (product - offset) * (product - offset);
-            }
-            *density = constant - 0.5 * distance;
+        for (place, component) in densities.iter_mut().zip(arrays.mixture.chunks_exact(size)) {
+            let density = density(component, features, best - NEGLIGIBLE);
+            *place = density;
             // Not `max`, which passes NaN over.
-            if density.is_nan() || *density > best {
-                best = *density;
+            if density.is_nan() || density > best {
+                best = density;
             }
         }
         best
     }
 }
 
+/// ln π·N(f | μ, Σ) of a `component` that fits the `features`; NaN of one that does not. Below `floor` it may be any number
+/// that is.
+#[cfg_attr(
+    cortex_m4f,
+    expect(unsafe_code, reason = "a call to assembly, whose condition is checked before")
+)]
+fn density(component: &[f32], features: &[f32], floor: f32) -> f32 {
+    #[cfg(cortex_m4f)]
+    if !features.is_empty() && component.len() == component_floats(features.len()) {
+        // SAFETY: the condition.
+        return unsafe { cortex_m4::density(component, features, floor) };
+    }
+    density_portably(component, features, floor)
+}
+
+/// Density as [`density`] tells it, to the bit, in portable Rust: the compiled twin of the assembly.
+fn density_portably(component: &[f32], features: &[f32], floor: f32) -> f32 {
+    let Some((constant, offsets)) = component.split_first() else { return f32::NAN };
+    let mut density = *constant;
+    for (row, offset) in triangle(features.len(), component).zip(offsets) {
+        let whitened = product(row, features) - offset;
+        density -= 0.5 * (whitened * whitened);
+        // It only falls.
+        if density < floor {
+            break;
+        }
+    }
+    density
+}
+
 /// Rows of a component's lower triangle: one number, then two, and so on.
-fn triangle(sizes: Sizes, component: &[f32]) -> impl Iterator<Item = &[f32]> {
-    let mut rest = component.get(sizes.features().saturating_add(1)..).unwrap_or_default();
-    (1..=sizes.features()).map_while(move |length| {
+fn triangle(features: usize, component: &[f32]) -> impl Iterator<Item = &[f32]> {
+    let mut rest = component.get(features.saturating_add(1)..).unwrap_or_default();
+    (1..=features).map_while(move |length| {
         let (row, after) = rest.split_at_checked(length)?;
         rest = after;
         Some(row)
     })
 }
 
-/// Writes √(Σ γ·v) of every output, over the most probable components. Their `densities` are used up.
-fn deviations(densities: &mut [f32], best: f32, variances: &[f32], deviation: &mut [f32]) {
-    deviation.fill(0.0);
+/// Product of a `row` with as many of the first `features`.
+fn product(row: &[f32], features: &[f32]) -> f32 {
+    // In groups, because the compiler does not unroll the loop for a device.
+    let (groups, rest) = row.as_chunks::<4>();
+    let (features, last) =
+        features.split_at_checked(groups.as_flattened().len()).unwrap_or_default();
     let mut sum = 0.0;
-    for _ in 0..MOST_PROBABLE {
-        let mut chosen = (0, f32::NEG_INFINITY);
-        for (index, density) in densities.iter().enumerate() {
-            if *density > chosen.1 {
-                chosen = (index, *density);
+    for ([a, b, c, d], [e, f, g, h]) in groups.iter().zip(features.as_chunks().0) {
+        sum += (a * e + b * f) + (c * g + d * h);
+    }
+    rest.iter().zip(last).fold(sum, |sum, (w, f)| sum + w * f)
+}
+
+/// Writes √(Σ γ·v) of every output, over the most probable components. `probabilities` need not sum to 1.
+fn deviations(probabilities: &[f32], variances: &[f32], deviation: &mut [f32]) {
+    // The most probable components, each with its probability; the best first.
+    let mut chosen = [(0, 0.0); MOST_PROBABLE];
+    for (index, probability) in probabilities.iter().enumerate() {
+        let mut next = (index, *probability);
+        for place in &mut chosen {
+            if next.1 > place.1 {
+                core::mem::swap(&mut next, place);
             }
         }
-        let probability = Polynomial::exp(chosen.1 - best);
-        if probability == 0.0 {
-            break;
-        }
-        if let Some(density) = densities.get_mut(chosen.0) {
-            *density = f32::NEG_INFINITY;
-        }
-        sum += probability;
-        let start = chosen.0.saturating_mul(deviation.len());
-        for (place, variance) in
-            deviation.iter_mut().zip(variances.get(start..).unwrap_or_default())
-        {
-            *place += probability * variance;
-        }
     }
-    // The best component alone makes the sum 1 at least.
-    let per_sum = 1.0 / sum;
-    deviation.iter_mut().for_each(|place| *place = sqrt(*place * per_sum));
+    // The best component alone makes the sum 1.
+    let per_sum = 1.0 / chosen.iter().map(|(_, probability)| probability).sum::<f32>();
+    let [(a, of_a), (b, of_b), (c, of_c), (d, of_d)] =
+        chosen.map(|(index, probability)| (index, probability * per_sum));
+    let of = |index: usize| {
+        variances.get(index.saturating_mul(deviation.len())..).unwrap_or_default().iter()
+    };
+    let variances = of(a).zip(of(b)).zip(of(c)).zip(of(d));
+    for (place, (((a, b), c), d)) in deviation.iter_mut().zip(variances) {
+        *place = sqrt((of_a * a + of_b * b) + (of_c * c + of_d * d));
+    }
 }
 
 /// Square root, rounded correctly.

@@ -14,7 +14,7 @@ use crate::relative::relative;
 /// blob. The firmware's link check compares it with the compiler's own figure.
 #[must_use]
 pub const fn decoder_ram_bytes(rows: usize) -> usize {
-    160 + 28 * rows
+    156 + 28 * rows
 }
 
 /// A frame to be decoded, and what is known of the sensor at rest.
@@ -217,17 +217,7 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
         scratch: &mut [f32],
         deviation: &mut [f32],
     ) -> Result<Option<f32>, NetworkError> {
-        let Some(confidence) = self.model.confidence() else { return Ok(None) };
-        check_length("frame", frame.readings_ohm, confidence.sizes().readings)?;
-        let readings = frame.readings_ohm.iter().copied();
-        let novelty = if self.metadata().relative_inputs {
-            check_length("reciprocals", frame.reciprocals, confidence.sizes().readings)?;
-            let ratios = readings.zip(frame.reciprocals).map(|(r, of)| relative(r, *of));
-            confidence.assess(ratios, scratch, deviation)
-        } else {
-            confidence.assess(readings, scratch, deviation)
-        };
-        novelty.map(Some)
+        assess(&self.model, frame, scratch, deviation)
     }
 
     /// Decodes one frame as [`decode_into`](Self::decode_into) does, with the [exponential](crate::exp) `E` for
@@ -245,6 +235,29 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
     ) -> Result<bool, NetworkError> {
         decode(&self.model, &self.row_networks, E::exp, frame, scratch, estimate)
     }
+}
+
+/// Assesses one frame as [`Decoder::assess_into`] does.
+///
+/// Not inlined on a device, for the same reason as [`decode`].
+#[cfg_attr(cortex_m4f, inline(never))]
+fn assess(
+    model: &Model<'_>,
+    frame: Frame<'_>,
+    scratch: &mut [f32],
+    deviation: &mut [f32],
+) -> Result<Option<f32>, NetworkError> {
+    let Some(confidence) = model.confidence() else { return Ok(None) };
+    check_length("frame", frame.readings_ohm, confidence.sizes().readings)?;
+    let readings = frame.readings_ohm.iter().copied();
+    let novelty = if model.metadata().relative_inputs {
+        check_length("reciprocals", frame.reciprocals, confidence.sizes().readings)?;
+        let ratios = readings.zip(frame.reciprocals).map(|(r, of)| relative(r, *of));
+        confidence.assess(ratios, scratch, deviation)
+    } else {
+        confidence.assess(readings, scratch, deviation)
+    };
+    novelty.map(Some)
 }
 
 /// Decodes one frame as [`Decoder::decode_with`] does, with the networks of the rows.

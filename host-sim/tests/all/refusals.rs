@@ -163,10 +163,7 @@ fn bad_training_options() {
     train(&[&two_folds[..], &["--no-refine"]].concat(), &["centres = 2", "2 training"]);
     train(&two_folds, &["folds = 2", "at least 4"]);
     train(&two_folds[1..], &["folds = 2", "at least 3", "without refinement"]);
-    train(
-        &["--whole-array", "--centres", "2", "--no-refine"],
-        &["leave it out (--whole-array)"],
-    );
+    train(&["--whole-array", "--centres", "2", "--no-refine"], &["leave it out (--whole-array)"]);
     let of_scene = ["train", "press", "--folds", "4", "-o", "m.bin"];
     refused(&folder, &of_scene, &["--folds", "a scene has fresh frames: leave it out"]);
     refused(

@@ -70,10 +70,26 @@ fn far_away_frames_are_novel_and_missing_readings_have_no_novelty() {
 fn the_most_probable_components_count() {
     // Six equal components, of which the last is a little less probable than four of them.
     let variances = [1.0, 2.0, 3.0, 4.0, 100.0, 200.0];
-    let mut densities = [-1.0, -1.0, -1.0, -1.0, -1.5, -50.0];
     let mut deviation = [0.0];
-    deviations(&mut densities, -1.0, &variances, &mut deviation);
+    deviations(&[1.0, 1.0, 1.0, 1.0, 0.6, 1e-9], &variances, &mut deviation);
     assert!((deviation[0] - 2.5_f32.sqrt()).abs() < 1e-6, "{}", deviation[0]);
+    deviations(&[1e-9, 0.6, 1.0, 1.0, 1.0, 1.0], &variances, &mut deviation);
+    assert!((deviation[0] - (307.0_f32 / 4.0).sqrt()).abs() < 1e-5, "{}", deviation[0]);
+    // Fewer components than may count, and one alone that does.
+    deviations(&[0.5, 1.0], &variances[..2], &mut deviation);
+    assert!((deviation[0] - (2.5_f32 / 1.5).sqrt()).abs() < 1e-6, "{}", deviation[0]);
+    deviations(&[0.0, 0.0, 1.0, 0.0], &variances, &mut deviation);
+    assert!((deviation[0] - 3_f32.sqrt()).abs() < 1e-6, "{}", deviation[0]);
+}
+
+#[test]
+fn a_row_is_multiplied_with_as_many_features() {
+    let features: Vec<f32> = (1..=11).map(|f| f as f32).collect();
+    for length in 1..=11 {
+        let row: Vec<f32> = (0..length).map(|w| (w + 2) as f32).collect();
+        let expected: usize = (1..=length).map(|f| f * (f + 1)).sum();
+        assert_eq!(product(&row, &features), expected as f32, "{length}");
+    }
 }
 
 #[test]

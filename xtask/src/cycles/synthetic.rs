@@ -1,6 +1,7 @@
 //! Blobs of any design, with numbers that make no difference to their cost.
 
 use model_core::blob::{Metadata, ModelParts, encode_to_vec};
+use model_core::confidence::Confidence;
 use model_core::expansion::Expansion;
 use model_core::projection::Projection;
 use model_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
@@ -18,6 +19,14 @@ const MIDDLE: f32 = 60.0;
 /// # Errors
 /// The design is beyond what a format or the blob holds.
 pub fn blob(design: &Design) -> Outcome<Vec<u8>> {
+    blob_with(design, None)
+}
+
+/// A blob of this `design`, with a `confidence`.
+///
+/// # Errors
+/// The design is beyond what a format or the blob holds, or the confidence is not for such a model.
+pub fn blob_with(design: &Design, confidence: Option<Confidence<'_>>) -> Outcome<Vec<u8>> {
     let words: Vec<Vec<u32>> = design.networks.iter().map(words).collect();
     let networks = design.networks.iter().zip(&words);
     let networks: Vec<Network<'_>> =
@@ -44,7 +53,7 @@ pub fn blob(design: &Design) -> Outcome<Vec<u8>> {
     let parts = ModelParts {
         projection: design.projection.then_some(projection),
         expansion: design.components.map(|_| expansion),
-        confidence: None,
+        confidence,
         networks: &networks,
         row_network: &row_network,
         metadata,
