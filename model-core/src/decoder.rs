@@ -14,7 +14,7 @@ use crate::relative::relative;
 /// blob. The firmware's link check compares it with the compiler's own figure.
 #[must_use]
 pub const fn decoder_ram_bytes(rows: usize) -> usize {
-    156 + 28 * rows
+    160 + 28 * rows
 }
 
 /// A frame to be decoded, and what is known of the sensor at rest.
