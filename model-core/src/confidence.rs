@@ -131,8 +131,12 @@ impl<'a> Confidence<'a> {
         }
         let (what, expected, found) = ("confidence", sizes.block_floats(), block.len());
         let length = NetworkError::Length { what, expected, found };
-        if expected != found || directions > readings {
+        if expected != found {
             return Err(length);
+        }
+        if directions > readings {
+            let (what, expected, found) = ("directions", readings, directions);
+            return Err(NetworkError::Length { what, expected, found });
         }
         if !block.iter().all(|value| value.is_finite()) {
             return Err(NetworkError::NotFinite { what });
@@ -185,7 +189,8 @@ impl<'a> Confidence<'a> {
     /// Writes the deviation of every output (in its unit) to `deviation`, and returns the frame's novelty in nats.
     ///
     /// `readings` are those of the whole frame in the model's unit, or relative to the baseline for a model that takes
-    /// them so. If one is missing (NaN), all results are NaN. A frame so far from all of training that its density
+    /// them so: as many as the sizes say. If one is missing (NaN, or infinite where training saw no change), all results
+    /// are NaN. A frame so far from all of training that its density
     /// leaves f32 has the novelty [`f32::MAX`], and NaN for deviations.
     ///
     /// # Errors
@@ -208,16 +213,9 @@ impl<'a> Confidence<'a> {
         let (features, rest) = rest.split_at_mut_checked(self.sizes.features()).ok_or(too_short)?;
         let densities = rest.get_mut(..components).ok_or(too_short)?;
         let arrays = self.arrays();
-        let mut square = 0.0;
-        for (((z, reading), mean), scale) in
-            z.iter_mut().zip(readings).zip(arrays.mean).zip(arrays.scale)
-        {
-            *z = (reading - mean) * scale;
-            square += *z * *z;
-        }
-        // No sum of squares is NaN but one of a NaN.
-        let missing = square.is_nan();
-        let best = if missing { f32::NAN } else { self.densities(z, square, features, densities) };
+        let scaling = [arrays.mean, arrays.scale];
+        let missing = !project(readings, scaling, arrays.projection, z, features);
+        let best = if missing { f32::NAN } else { self.densities(features, densities) };
         if !best.is_finite() {
             deviation.fill(f32::NAN);
             return Ok(if missing { f32::NAN } else { f32::MAX });
@@ -228,23 +226,12 @@ impl<'a> Confidence<'a> {
             sum += *density;
         }
         deviations(densities, arrays.variances, deviation);
-        Ok(-(best + libm::logf(sum)) - arrays.threshold)
+        Ok((-(best + libm::logf(sum)) - arrays.threshold).clamp(f32::MIN, f32::MAX))
     }
 
     /// Writes ln π_k·N(f | μ_k, Σ_k) of every component; returns the largest, or what is not finite if it leaves f32.
-    /// `square` is ‖z‖².
-    fn densities(
-        &self,
-        z: &[f32],
-        square: f32,
-        features: &mut [f32],
-        densities: &mut [f32],
-    ) -> f32 {
+    fn densities(&self, features: &[f32], densities: &mut [f32]) -> f32 {
         let arrays = self.arrays();
-        let Some((left_out, directions)) = features.split_last_mut() else { return f32::NAN };
-        Projection::of_checked(self.sizes.directions, arrays.projection).project(z, directions);
-        let along = directions.iter().map(|value| value * value).sum::<f32>();
-        *left_out = sqrt((square - along).max(0.0));
         let size = self.sizes.component_floats().max(1);
         let mut best = f32::NEG_INFINITY;
         for (place, component) in densities.iter_mut().zip(arrays.mixture.chunks_exact(size)) {
@@ -259,8 +246,32 @@ impl<'a> Confidence<'a> {
     }
 }
 
-/// ln π·N(f | μ, Σ) of a `component` that fits the `features`; NaN of one that does not. Below `floor` it may be any number
-/// that is.
+/// Writes the features of a frame, as [`Confidence::assess`] computes them: training needs the very same bits.
+///
+/// `z` takes the standardised readings. `scaling` is m and s of every reading, `projection` the zeros and p of a
+/// [block](Confidence::new). Returns whether no reading is missing (NaN, or infinite where s is 0).
+pub fn project(
+    readings: impl Iterator<Item = f32>,
+    [mean, scale]: [&[f32]; 2],
+    projection: &[f32],
+    z: &mut [f32],
+    features: &mut [f32],
+) -> bool {
+    let mut square = 0.0;
+    let places = z.iter_mut().zip(readings).zip(mean.iter().zip(scale));
+    for ((z, reading), (mean, scale)) in places {
+        *z = (reading - mean) * scale;
+        square += *z * *z;
+    }
+    let Some((left_out, directions)) = features.split_last_mut() else { return false };
+    Projection::of_checked(directions.len(), projection).project(z, directions);
+    let along = directions.iter().map(|value| value * value).sum::<f32>();
+    *left_out = sqrt((square - along).max(0.0));
+    !square.is_nan()
+}
+
+/// ln π·N(f | μ, Σ) of a `component` that fits the `features`; NaN of one that does not. If it is below `floor`, the
+/// result may be any number below `floor`.
 #[cfg_attr(
     cortex_m4f,
     expect(unsafe_code, reason = "a call to assembly, whose condition is checked before")

@@ -112,8 +112,8 @@ impl HeldOut {
 pub fn add(blob: &ModelBlob, density: &Density, held_out: &HeldOut) -> Result<ModelBlob> {
     let Density { features, mixture } = density;
     let (frames, readings) = (held_out.surprises.len(), features.mean.len());
-    let outputs = held_out.errors.len() / frames;
     assert!(frames > 0 && held_out.inputs.len() == frames * readings, "frames of the model");
+    let outputs = held_out.errors.len() / frames;
     let variances = variances(features, mixture, held_out, outputs);
     let (directions, components) = (features.directions(), mixture.components.len());
     let sizes = Sizes { readings, directions, components, outputs };

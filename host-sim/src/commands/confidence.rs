@@ -55,9 +55,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let test = scene.dataset(&Synthesis::of(&scene.world), Stream::Test, arguments.frames);
     let of_inputs = model.clone().of_inputs();
     let Some((deviations, _)) = of_inputs.assess(&test.inputs.values) else {
-        return Err(Error::Usage(
-            "--model: this model has no confidence; train it with `train --confidence`".into(),
-        ));
+        let path = arguments.model.clone().unwrap_or_default();
+        let message = "this model has no confidence: train it with --confidence".into();
+        return Err(Error::Unfit { path, message });
     };
     let ratios_95 = model.model().confidence().map_or(&[][..], |it| it.ratios_95());
     let estimates = of_inputs.decode_lines(&test.inputs.values);
@@ -89,12 +89,13 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 
 /// Adds one line a group: all errors, and those of the surest and of the least sure quarter.
 pub fn page(page: &mut print::Page, coverage: &[Coverage]) {
+    let widest = coverage.iter().map(|group| group.group.len()).max().unwrap_or(0).max(10);
     page.line(format_args!(
-        "{:<10} {:>24}   {:>24}   {:>24}",
+        "{:<widest$} {:>24}   {:>24}   {:>24}",
         "", "all outputs", "surest quarter", "least sure quarter"
     ));
     let header = format!("{:>8} {:>7} {:>7}", "RMSE", "in 68 %", "in 95 %");
-    page.line(format_args!("{:<10} {header}   {header}   {header}", "output"));
+    page.line(format_args!("{:<widest$} {header}   {header}   {header}", "output"));
     for group in coverage {
         let of = |covered: Covered| {
             format!(
@@ -103,7 +104,7 @@ pub fn page(page: &mut print::Page, coverage: &[Coverage]) {
             )
         };
         page.line(format_args!(
-            "{:<10} {}   {}   {}",
+            "{:<widest$} {}   {}   {}",
             group.group,
             of(group.all),
             of(group.surest_quarter),

@@ -168,7 +168,12 @@ fn needs(model: &Model<'_>, bytes: usize) -> Vec<String> {
     let (needed, most) = (scratch_floats(model), room.scratch_floats());
     let too_many = (other_image.is_none() && needed > most).then(|| {
         let spare = needed - most;
-        format!("no device takes it: {spare} components fewer are the most there is room for")
+        let fewer = if model.components() > spare {
+            format!("{spare} components fewer are the most there is room for")
+        } else {
+            format!("it needs room for {spare} numbers too many: give fewer features")
+        };
+        format!("no device takes it: {fewer}")
     });
     too_large.into_iter().chain(other_image).chain(too_many).collect()
 }

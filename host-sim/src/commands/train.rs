@@ -88,7 +88,8 @@ pub struct Arguments {
     #[command(flatten)]
     refine: RefineArgument,
     /// Let the model tell how far off each output may be, and how novel a frame is (docs/confidence.md). Estimates stay
-    /// the same. On a CSV file, it trains once more for every fold.
+    /// the same. On a CSV file, it trains once more for every fold; give folds of whole places or days (--fold-column),
+    /// because frames of one resemble each other.
     #[arg(long)]
     confidence: bool,
     /// Folds, drawn at random, for cross-validation and for refinement on a CSV file [default: 5].

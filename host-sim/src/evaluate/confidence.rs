@@ -131,8 +131,11 @@ pub fn detections(scene: &Experiment, model: &PreparedModel<'_>, frames: usize) 
         let Some((_, novelty)) = model.assess(&drawn.readings_ohm) else { continue };
         let mut add = |anomaly: String, chosen: &mut dyn Iterator<Item = &f64>| {
             let novel: Vec<bool> = chosen.map(|novelty| *novelty > 0.0).collect();
+            if novel.is_empty() {
+                return;
+            }
             let count = novel.iter().filter(|novel| **novel).count() as f64;
-            let percent_novel = 100.0 * count / novel.len().max(1) as f64;
+            let percent_novel = 100.0 * count / novel.len() as f64;
             detections.push(Detection { anomaly, frames: novel.len(), percent_novel });
         };
         if kind != Anomaly::TwoContacts {

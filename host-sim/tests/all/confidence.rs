@@ -80,10 +80,10 @@ fn measured_data_is_held_out_fold_by_fold() {
     let line = |i: i32| {
         let (a, b) = (f64::from(i % 20), f64::from((i * 7) % 23));
         let noise = f64::from((i * 7919) % 101) / 101.0 - 0.5;
-        format!("{a},{b},{},{}\n", (0.2 * a).sin() + 0.1 * b + 0.3 * noise, i % 5)
+        format!("{a},{b},{},{},1\n", (0.2 * a).sin() + 0.1 * b + 0.3 * noise, i % 5)
     };
     let lines: String = (0..400).map(line).collect();
-    folder.write("measured.csv", format!("a,b,y,place\n{lines}"));
+    folder.write("measured.csv", format!("a,b,y,place,one\n{lines}"));
     let train = |more: &[&str]| {
         let columns = ["train", "measured.csv", "--inputs", "a,b", "--outputs", "y", "-o", "m.bin"];
         folder.run(&[&columns[..], &["--centres", "8", "--no-refine"], more].concat())
@@ -94,6 +94,12 @@ fn measured_data_is_held_out_fold_by_fold() {
     let covered = &evaluated["coverage"][0]["all"];
     assert!((covered["percent_within_68"].as_f64().unwrap() - 68.3).abs() < 6.0, "{covered}");
     assert!(covered["percent_within_95"].as_f64().unwrap() > 92.0, "{covered}");
+
+    assert!(evaluated["percent_novel"].as_f64().unwrap() < 2.0, "{evaluated}");
+
+    let alone = train(&["--confidence", "--fold-column", "one"]);
+    assert_eq!(alone.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&alone.stderr).contains("there is one alone: give more"));
 
     let one = train(&["--confidence", "--folds", "1"]);
     assert_eq!(one.status.code(), Some(2));

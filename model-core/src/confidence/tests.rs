@@ -118,6 +118,22 @@ fn what_cannot_be_a_confidence_is_refused() {
 }
 
 #[test]
+fn a_novelty_beyond_f32_stays_a_number_and_directions_are_at_most_readings() {
+    let mut block = block();
+    let last = block.len() - 1;
+    (block[10], block[16], block[last]) = (-3e38, -3e38, -3e38);
+    let confidence = Confidence::new(SIZES, &block).unwrap();
+    let frame = [12.0, 21.0, 30.2].into_iter();
+    let novelty = confidence.assess(frame, &mut [0.0; 7], &mut [0.0; 2]).unwrap();
+    assert_eq!(novelty, f32::MAX);
+
+    let sizes = Sizes { readings: 1, directions: 2, components: 1, outputs: 1 };
+    let block = vec![1.0; sizes.block_floats()];
+    let too_many = NetworkError::Length { what: "directions", expected: 1, found: 2 };
+    assert_eq!(Confidence::new(sizes, &block), Err(too_many));
+}
+
+#[test]
 fn slices_of_other_lengths_are_refused() {
     let block = block();
     let confidence = Confidence::new(SIZES, &block).unwrap();

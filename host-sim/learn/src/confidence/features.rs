@@ -1,5 +1,6 @@
 //! Features that the density of frames is modelled in: directions of the largest variance, and what they leave out.
 
+use model_core::confidence::project;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use taxel_data::table::Table;
@@ -67,21 +68,16 @@ impl Features {
         sum / readings.len() as f64
     }
 
-    /// Features of every line of `readings`, `lines × features`.
+    /// Features of every line of `readings`, `lines × features`: the bits that a device computes. Where directions leave
+    /// nothing out, the last feature is rounding alone.
     pub fn apply(&self, readings: &[f64]) -> Vec<f64> {
-        let (size, directions) = (self.mean.len(), self.directions());
+        let size = self.mean.len();
+        let projection = [&vec![0.0; self.directions()], &self.parts[..]].concat();
         let of_frame = |frame: &[f64]| {
-            let mut features = vec![0.0; self.count()];
-            let mut square = 0.0;
-            for (z, parts) in self.standardised(frame).zip(self.parts.chunks_exact(directions)) {
-                square += z * z;
-                for (feature, part) in features.iter_mut().zip(parts) {
-                    *feature += z * f64::from(*part);
-                }
-            }
-            let seen: f64 = features.iter().map(|feature| feature * feature).sum();
-            features[directions] = (square - seen).max(0.0).sqrt();
-            features
+            let (mut z, mut features) = (vec![0.0; size], vec![0.0; self.count()]);
+            let frame = frame.iter().map(|reading| *reading as f32);
+            project(frame, [&self.mean, &self.scale], &projection, &mut z, &mut features);
+            features.into_iter().map(f64::from)
         };
         readings.par_chunks_exact(size).flat_map_iter(of_frame).collect()
     }

@@ -111,8 +111,16 @@ impl Mixture {
         let of_sums = |sums: &[Sums]| {
             // Fewer points make no covariance.
             let enough = sums.iter().filter(|sums| sums.weight > size as f64);
-            let components = enough.filter_map(|sums| sums.component(count, floor)).collect();
-            Self { components }
+            let kept: Vec<(f64, Component)> = enough
+                .filter_map(|sums| Some((sums.weight, sums.component(count, floor)?)))
+                .collect();
+            // Components that are left out take no weight with them.
+            let left: f64 = kept.iter().map(|(weight, _)| weight / count as f64).sum();
+            let with_all = |(_, component): (f64, Component)| Component {
+                constant: component.constant - left.ln(),
+                ..component
+            };
+            Self { components: kept.into_iter().map(with_all).collect() }
         };
         let mut mixture = of_sums(&sums);
         if mixture.components.is_empty() {

@@ -1,6 +1,6 @@
 use model_core::Decoder;
 use taxel_data::progress::Silent;
-use taxel_data::random::Stream;
+use taxel_data::random::{Purpose, Random, Stream};
 use taxel_simulate::{World, synthesise};
 
 use super::*;
@@ -88,24 +88,48 @@ fn a_confidence_changes_no_estimate_and_a_device_finds_the_same_bits() {
     assert_eq!(fitted(&world, &training, &without).bytes(), with.bytes());
 }
 
-#[test]
-fn outputs_and_readings_that_never_change_are_no_obstacle() {
+/// A model of measured data without noise on its one output, with a confidence calibrated on the second half of the
+/// lines; tells the share of these that it finds novel.
+fn share_novel(readings: usize, reading: impl Fn(usize, usize) -> f64) -> f64 {
     let names = |kind: &str, count: usize| (0..count).map(|i| format!("{kind}{i}")).collect();
-    let mut dataset = Dataset::empty(names("in", 3), names("out", 2), 1, 200);
-    for (frame, line) in dataset.inputs.values.chunks_exact_mut(3).enumerate() {
-        line.copy_from_slice(&[frame as f64, 7.0, (frame % 7) as f64]);
-    }
-    for (frame, line) in dataset.outputs.values.chunks_exact_mut(2).enumerate() {
-        line[0] = (0.1 * frame as f64).sin();
-    }
+    let half = |first: usize| {
+        let mut dataset = Dataset::empty(names("in", readings), names("out", 2), 1, 2000);
+        for (frame, line) in dataset.inputs.values.chunks_exact_mut(readings).enumerate() {
+            line.iter_mut().enumerate().for_each(|(i, place)| *place = reading(first + frame, i));
+        }
+        let first_readings = dataset.inputs.values.iter().step_by(readings);
+        for (line, r) in dataset.outputs.values.chunks_exact_mut(2).zip(first_readings) {
+            line[0] = (0.1 * r).sin();
+        }
+        dataset
+    };
+    let (seen, others) = (half(0), half(2000));
     let options = Options { centres: 4, ..Options::default() };
-    let trained = train(&dataset, &options, &Silent).unwrap();
-    let blob = pack(&trained, &dataset, &Origin::of_data("few", 0, 1, &dataset)).unwrap();
-    let density = Density::fit(&dataset, &Settings::default());
+    let trained = train(&seen, &options, &Silent).unwrap();
+    let blob = pack(&trained, &seen, &Origin::of_data("data", 0, 1, &seen)).unwrap();
+    let density = Density::fit(&seen, &Settings::default());
     let mut held_out = HeldOut::default();
-    held_out.add(&blob, &density, &dataset);
+    held_out.add(&blob, &density, &others);
     let blob = add(&blob, &density, &held_out).unwrap();
-    let (deviations, novelty) =
-        blob.prepare(Exponential::default()).assess(&dataset.inputs.values).unwrap();
+    let model = blob.prepare(Exponential::default());
+    let (deviations, novelty) = model.assess(&others.inputs.values).unwrap();
     assert!(deviations.iter().all(|d| d.is_finite()) && novelty.iter().all(|n| n.is_finite()));
+    novelty.iter().filter(|novelty| **novelty > 0.0).count() as f64 / 2000.0
+}
+
+#[test]
+fn novelty_holds_where_directions_leave_out_nothing_but_rounding() {
+    let normal = |frame: usize, i: usize| {
+        Random::new(5, Stream::Training, Purpose::Noise, frame as u64, i as u64).normal()
+    };
+    let check = |readings: usize, reading: &dyn Fn(usize, usize) -> f64| {
+        let share = share_novel(readings, reading);
+        assert!(share < 0.01, "{readings} readings: {share}");
+    };
+    check(1, &|frame, i| 60.0 + normal(frame, i));
+    check(3, &|frame, i| [1e4 + normal(frame, 0), 1e4 + normal(frame, 1), 7.0][i]);
+    check(8, &|frame, i| 60.0 + normal(frame, i));
+    check(12, &|frame, i| 60.0 + normal(frame, i));
+    // Four sums, without noise, in all readings.
+    check(12, &|frame, i| 1e4 + normal(frame, i % 4) + 0.5 * normal(frame, (i + 1) % 4));
 }

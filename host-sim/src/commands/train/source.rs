@@ -58,6 +58,11 @@ impl Source {
             }
             More::Folds(fold_of) => fold_of,
         };
+        if fold_of.iter().all(|fold| *fold == 0) {
+            let message = "--confidence holds out one fold after the other, and there is one alone: give more \
+                           (--folds or --fold-column)";
+            return Err(Error::Usage(message.into()));
+        }
         let settings = confidence::Settings { seed: options.seed, ..Default::default() };
         let mut held_out = HeldOut::default();
         for fold in 0..fold_of.iter().max().map_or(0, |last| last + 1) {
