@@ -79,15 +79,22 @@ impl Capacity {
         2 * self.rows * self.columns
     }
 
-    /// Bytes of the longest message: a report of all readings or all outputs, the circuit's constants, or an
-    /// identity.
+    /// Bytes of the longest message: a report of all readings, or of all outputs and their deviations, the circuit's
+    /// constants, or an identity.
     #[must_use]
     pub const fn message_bytes(self) -> usize {
-        let widest = if self.columns > self.outputs { self.columns } else { self.outputs };
-        let frame = 4 * self.rows * widest + self.rows + 40;
+        let readings = 4 * self.rows * self.columns + 40;
+        let estimate = 4 * 2 * self.all_outputs() + self.rows + 48;
         let constants = 4 * (self.rows + 2 * self.columns) + 40;
-        let longest = if frame > constants { frame } else { constants };
-        if longest > 256 { longest } else { 256 }
+        let parts = [readings, estimate, constants, 256];
+        let (mut longest, mut part) = (0, 0);
+        while part < parts.len() {
+            if parts[part] > longest {
+                longest = parts[part];
+            }
+            part += 1;
+        }
+        longest
     }
 
     /// This capacity, enlarged for models of this `shape`; `None` if no image can be built for them.

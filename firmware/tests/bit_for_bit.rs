@@ -78,6 +78,15 @@ fn gating() -> String {
     format!("INFO gate: {at_rest} of {rows} rows at rest, {otherwise} otherwise than the twin's\n")
 }
 
+fn assessing(what: &str, assessed: Option<checks::Assessed>) -> String {
+    let checks::Assessed { crc, novel, far, missing } = assessed.expect("a confidence");
+    let many = checks::MANY;
+    assert!(novel > many / 10 && novel < many * 9 / 10 && far > 0 && missing > 0, "{novel} novel");
+    format!(
+        "INFO confidence, {what}: {crc:08x}, {novel} frames novel, {far} of them far, {missing} missing\n"
+    )
+}
+
 #[test]
 fn the_models_in_testdata_are_those_made_here() {
     for (name, blob) in FILES {
@@ -126,6 +135,8 @@ fn every_kernel_decodes_many_frames_on_the_host_as_in_the_emulator() {
         array(Format::F32, " of components"),
         array(Format::Fixed16, " of components"),
         array(Format::F32Direct, " of components"),
+        assessing("assess_into", with_blob("array-fixed16-confidence.bin", checks::assessing_many)),
+        assessing("1 to 12 directions", checks::assessing_sizes()),
         "exit status 0\n".to_owned(),
     ];
     assert!(of_host.iter().all(|line| !line.contains("differ") || line.contains(" 0 of ")));

@@ -177,6 +177,15 @@ fn reports() -> Vec<Example> {
         flags: 2,
         row_status: &[3, 1],
         outputs: readings_ohm,
+        novelty: None,
+        deviation: Floats(&[]),
+    };
+    let novel = EstimateReport {
+        flags: 128,
+        outputs: Floats::of(&[0.25, -1.0]),
+        novelty: Some(2.5),
+        deviation: Floats::of(&[0.03125, 0.5]),
+        ..estimate
     };
     let health = HealthReport {
         frame: 300,
@@ -206,6 +215,7 @@ fn reports() -> Vec<Example> {
             report_bytes(0, &Report::Readings { frame: 300, start_us: START_US, readings_ohm }),
         ),
         ("estimate", report_bytes(5, &Report::Estimate(estimate))),
+        ("estimate with confidence", report_bytes(5, &Report::Estimate(novel))),
         ("health", report_bytes(0, &Report::Health(health))),
         ("idle", report_bytes(6, &Report::Upload(UploadState::Idle))),
         ("receiving", report_bytes(6, &Report::Upload(UploadState::Receiving { received: 512 }))),

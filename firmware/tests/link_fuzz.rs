@@ -4,7 +4,7 @@ mod common;
 
 use common::*;
 use firmware::app::Session;
-use firmware::link::message::{Configuration, Request, UploadStep};
+use firmware::link::message::{ConfidenceSent, Configuration, Request, UploadStep};
 use model_core::blob::Floats;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -57,9 +57,10 @@ fn spoil(random: &mut Xoshiro256PlusPlus, requests: &[Vec<u8>]) -> Vec<u8> {
 
 #[test]
 fn no_bytes_stop_the_device_and_the_second_request_after_them_is_answered() {
-    let model = blob(3, 4);
+    let model = blob_with_confidence(false);
     let mut slots = MockSlot::pair_with(&model);
-    let mut bench = Bench::new(Configuration { frame_period_us: 50_000, ..quiet() });
+    let confidence = ConfidenceSent::Deviations;
+    let mut bench = Bench::new(Configuration { frame_period_us: 50_000, confidence, ..quiet() });
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let mut random = Xoshiro256PlusPlus::seed_from_u64(11);

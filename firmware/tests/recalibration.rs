@@ -46,6 +46,7 @@ fn trained() -> AlignedBytes {
     encode_to_vec(&ModelParts {
         projection: None,
         expansion: None,
+        confidence: None,
         networks,
         row_network: &[0, 1],
         metadata,

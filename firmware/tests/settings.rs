@@ -148,6 +148,31 @@ fn every_setting_survives_a_restart_and_can_be_forgotten() {
 }
 
 #[test]
+fn a_configuration_of_another_version_is_not_believed_and_constants_are() {
+    let mut settings = SharedSettings::default();
+    let mut slots = MockSlot::pair_with(&blob(1, 3));
+    {
+        let mut bench = Bench::with_settings(quiet(), &settings);
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        for setting in [Setting::Configuration, Setting::Constants] {
+            ask(&mut session, &bench.board, &Request::Keep(setting), |_| ());
+        }
+    }
+    let kept_now = |slots: &mut [MockSlot; 2], settings: &SharedSettings| {
+        let mut bench = Bench::with_settings(quiet(), settings);
+        let mut session = Session::start(&mut bench.app, slots, &mut []);
+        ask(&mut session, &bench.board, &Request::Kept, |report| kept(&report)).0
+    };
+    let found = kept_now(&mut slots, &settings);
+    assert_eq!((found.configuration, found.constants), (Some(quiet()), true));
+    // As the firmware before kept it: without what is sent of a confidence.
+    let before = b"\x01\x90\x4e\x64\x01\0\x01\0\0\xa0\x40\0\0\x7a\x44\x0a\xd7\xa3\x3c\0\0\0\0";
+    settings.keep_bytes(Setting::Configuration, before).unwrap();
+    let found = kept_now(&mut slots, &settings);
+    assert_eq!((found.configuration, found.constants), (None, true));
+}
+
+#[test]
 fn a_baseline_of_other_wires_is_ignored_until_a_model_of_its_wires_comes() {
     let mut settings = SharedSettings::default();
     let readings: Vec<u8> = [60.0_f32; 4].iter().flat_map(|ohm| ohm.to_le_bytes()).collect();

@@ -13,6 +13,7 @@ pub mod synth;
 pub mod forward;
 pub mod train;
 pub mod decode;
+pub mod confidence;
 pub mod eval;
 pub mod inspect;
 pub mod table1;
@@ -41,6 +42,7 @@ pub struct Common {
 pub fn advice(error: &Error) -> &'static str {
     use taxel_data::Error as Data;
     match error {
+        Error::Learn(taxel_learn::Error::OneRow { .. }) => " (--whole-array)",
         Error::Data(Data::Write { .. } | Data::WrittenOverInput { .. }) => " (-o)",
         Error::Rig(taxel_rig::Error::OtherReadout { .. }) => " (--scans)",
         Error::Rig(taxel_rig::Error::NoQemu { .. } | taxel_rig::Error::NoStart { .. }) => {

@@ -4,5 +4,6 @@ pub mod gate;
 pub mod drift;
 pub mod readout;
 pub mod limit;
+pub mod confidence;
 pub mod table1;
 pub mod trade;

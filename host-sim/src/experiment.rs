@@ -14,10 +14,12 @@ use taxel_data::digest::digest;
 use taxel_data::error::require;
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
+use taxel_learn::confidence::{self, Density, HeldOut};
 use taxel_learn::train::{Examples, FreshFrames, Refinement, check_spread, train, train_refined};
 use taxel_learn::{ModelBlob, Options, Origin, Trained, pack, relative};
 use taxel_limit::Reference;
 use taxel_simulate::noise::NoiseKind;
+use taxel_simulate::outputs::Outputs;
 use taxel_simulate::synth::BASELINE_FRAMES;
 use taxel_simulate::world::check_noise_level;
 use taxel_simulate::{Synthesis, World};
@@ -30,9 +32,10 @@ mod file;
 type Check = std::result::Result<(), BadValue>;
 
 /// Names and texts of the scenes that are part of the program.
-pub const EMBEDDED: [(&str, &str); 2] = [
+pub const EMBEDDED: [(&str, &str); 3] = [
     ("paper", include_str!("../../scenes/paper.toml")),
     ("press", include_str!("../../scenes/press.toml")),
+    ("contact", include_str!("../../scenes/contact.toml")),
 ];
 
 /// Experiment of a scene, checked.
@@ -71,6 +74,8 @@ pub struct Training {
     /// Whether one network serves all rows, behind a projection of all readings, instead of one a row.
     #[serde(default)]
     pub whole_array: bool,
+    /// Number of features that this network sees.
+    pub features: Option<usize>,
     /// Number of components that this network computes, which are expanded to all outputs.
     pub output_rank: Option<usize>,
     /// Whether inputs are readings relative to the baseline (R/R₀), and not readings as they are.
@@ -79,6 +84,9 @@ pub struct Training {
     /// Whether centres, widths and the projection are refined after K-means.
     #[serde(default = "yes")]
     pub refine: bool,
+    /// Whether the model tells how far off its outputs may be, and how novel a frame is.
+    #[serde(default)]
+    pub confidence: bool,
 }
 
 /// Settings of the paper's Table 1.
@@ -156,6 +164,7 @@ impl Experiment {
             seed: self.world.seed,
             format: t.format,
             whole_array: t.whole_array,
+            features: t.features,
             output_rank: t.output_rank,
             ..Options::default()
         }
@@ -260,7 +269,43 @@ impl Experiment {
         let synthesis = Synthesis::of(&self.world);
         let frames = self.dataset(&synthesis, Stream::Training, self.training.frames);
         let trained = self.train_on(&frames, &synthesis, progress)?;
-        Ok(pack(&trained, &frames, &self.origin())?)
+        let blob = pack(&trained, &frames, &self.origin())?;
+        if self.training.confidence {
+            self.with_confidence(&blob, &frames, &synthesis, progress)
+        } else {
+            Ok(blob)
+        }
+    }
+
+    /// Adds a confidence to the model in `blob`, trained on `frames` of `synthesis`. It is calibrated on as many other
+    /// frames.
+    ///
+    /// # Errors
+    /// [`Error`] for a model that cannot be packed.
+    pub fn with_confidence(
+        &self,
+        blob: &ModelBlob,
+        frames: &Dataset,
+        synthesis: &Synthesis<'_>,
+        progress: &dyn Progress,
+    ) -> Result<ModelBlob> {
+        progress.stage("fit confidence", 1);
+        let settings = confidence::Settings { seed: self.world.seed, ..Default::default() };
+        let density = Density::fit(frames, &settings);
+        let mut held_out = HeldOut::default();
+        let others = self.dataset(synthesis, Stream::Calibration, frames.frames());
+        held_out.add(blob, &density, &others);
+        let blob = confidence::add(blob, &density, &held_out)?;
+        progress.step();
+        Ok(blob)
+    }
+
+    /// Checks what outputs of the contact, which belong to no row-wire, ask of training and of Table 1.
+    fn check_outputs(&self) -> Check {
+        let Outputs::Contact(_) = self.world.outputs else { return Ok(()) };
+        require(self.table1.is_none(), "table1", "[table1]", || {
+            "the table is for outputs of electrodes; leave it out, or ask for outputs.quantity and outputs.axes".into()
+        })
     }
 
     fn check(&self) -> Check {
@@ -272,6 +317,7 @@ impl Experiment {
         self.world.check()?;
         check_training(&self.training)?;
         self.table1.as_ref().map_or(Ok(()), check_table1)?;
+        self.check_outputs()?;
         let t = &self.training;
         let mut counts =
             vec![("training.frames", t.frames), ("training.test_frames", t.test_frames)];

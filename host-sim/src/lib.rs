@@ -25,6 +25,7 @@
 
 pub mod error;
 pub mod metrics;
+pub mod by_depth;
 pub mod experiment;
 pub mod evaluate;
 pub mod run;

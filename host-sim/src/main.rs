@@ -8,8 +8,8 @@ use host_sim::{Error, Result};
 mod commands;
 
 use commands::{
-    Common, decode, drift, emulate, eval, forward, gate, inspect, limit, link, readout, run, synth,
-    table1, trade, train,
+    Common, confidence, decode, drift, emulate, eval, forward, gate, inspect, limit, link, readout,
+    run, synth, table1, trade, train,
 };
 
 /// Simulate, train and evaluate resistive tactile sensors; write weight blobs for the device.
@@ -40,6 +40,7 @@ enum Command {
     Gate(gate::Arguments),
     Drift(drift::Arguments),
     Limit(limit::Arguments),
+    Confidence(confidence::Arguments),
     Emulate(emulate::Arguments),
     Link(link::Arguments),
 }
@@ -61,6 +62,7 @@ fn main() -> ExitCode {
         Command::Gate(arguments) => gate::execute(&arguments, &cli.common),
         Command::Drift(arguments) => drift::execute(&arguments, &cli.common),
         Command::Limit(arguments) => limit::execute(&arguments, &cli.common),
+        Command::Confidence(arguments) => confidence::execute(&arguments, &cli.common),
         Command::Emulate(arguments) => emulate::execute(&arguments, &cli.common),
         Command::Link(arguments) => link::execute(&arguments, &cli.common),
     };

@@ -9,8 +9,10 @@ use taxel_data::table::Table;
 use taxel_learn::cost::{Cost, Design, Prices};
 use taxel_learn::decoders::BASELINES;
 use taxel_learn::{Decoder, Exponential, ModelBlob, PreparedModel, pack};
+use taxel_simulate::outputs::Outputs;
 use taxel_simulate::{Synthesis, World};
 
+use crate::by_depth::{DepthErrors, by_depth};
 use crate::error::Result;
 use crate::evaluate::table1::{self, Table1};
 use crate::experiment::Experiment;
@@ -27,7 +29,9 @@ pub struct RunResult {
     pub decoders: Vec<DecoderErrors>,
     /// Least possible errors, of a decoder that sees all readings of a frame.
     pub limit: LimitSummary,
-    /// Errors of the network by row-wire.
+    /// Errors of the network by the depth of the contact, if that is an output.
+    pub by_depth: Vec<DepthErrors>,
+    /// Errors of the network by row-wire; nothing for outputs that belong to no row-wire.
     pub rows: Vec<RowErrors>,
     /// One test frame, for a closer look.
     pub example: Example,
@@ -111,7 +115,8 @@ pub struct Example {
     pub row_wires: usize,
     /// Outputs of the frame by group.
     pub outputs: Vec<ExampleOutput>,
-    /// Row-wire (from 1) whose readings are shown: the most disturbed one.
+    /// Row-wire (from 1) whose readings are shown: that of the largest output, or else the one whose readings change
+    /// most.
     pub reading_row_wire: usize,
     /// Readings of that row-wire without noise, in Ω, by column-wire.
     pub ideal_ohm: Vec<f64>,
@@ -165,6 +170,7 @@ pub fn run(experiment: &Experiment, progress: &dyn Progress) -> Result<(RunResul
         model: model_summary(experiment, &network, &blob)?,
         decoders,
         limit,
+        by_depth: by_depth(&test.outputs, &estimate.values, &measure),
         rows: by_row(world, &test, &estimate, &measure),
         example: example(world, &test, &estimate),
         table1: match experiment.table1 {
@@ -202,7 +208,7 @@ fn model_summary(
         training_frames: t.frames,
         test_frames: t.test_frames,
         networks: model.networks().count(),
-        inputs: shape.inputs,
+        inputs: model.projection().map_or(shape.inputs, |it| it.features()),
         projected_readings: model.projection().map_or(0, |_| shape.rows * shape.inputs),
         relative_inputs: model.metadata().relative_inputs,
         centres: model.networks().map(|n| n.shape().centres).max().unwrap_or(0),
@@ -218,6 +224,9 @@ fn model_summary(
 }
 
 fn by_row(world: &World, test: &Dataset, estimate: &Table, measure: &Measure) -> Vec<RowErrors> {
+    if let Outputs::Contact(_) = world.outputs {
+        return vec![];
+    }
     let width = test.outputs.names.len() / test.rows;
     let errors = |row: usize| {
         let from = row * width;
@@ -233,8 +242,27 @@ fn by_row(world: &World, test: &Dataset, estimate: &Table, measure: &Measure) ->
     rows.map(|(row, wire)| RowErrors { row_wire: wire + 1, errors: errors(row) }).collect()
 }
 
+/// Row (from 0, of those that are read) with the largest of the `truth` of a frame. Where outputs belong to no row, it
+/// is the one whose `ideal` readings differ most from the `untouched` ones.
+fn most_disturbed_row(world: &World, truth: &[f64], [ideal, untouched]: [&[f64]; 2]) -> usize {
+    let rows = world.read_rows.len();
+    let changes: Vec<f64> = ideal.iter().zip(untouched).map(|(a, b)| a / b - 1.0).collect();
+    let by_row = match world.outputs {
+        Outputs::Electrodes(_) => truth,
+        Outputs::Contact(_) => &changes,
+    };
+    let peak = |row: &usize| {
+        let width = by_row.len() / rows;
+        largest(&by_row[row * width..(row + 1) * width])
+    };
+    (0..rows).max_by(|a, b| peak(a).total_cmp(&peak(b))).unwrap_or(0)
+}
+
+fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0_f64, |a, b| a.max(b.abs()))
+}
+
 fn example(world: &World, test: &Dataset, estimate: &Table) -> Example {
-    let largest = |line: &[f64]| line.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
     let frame = (0..test.frames())
         .max_by(|a, b| {
             let peak = |i: usize| largest(test.outputs.lines().nth(i).unwrap_or_default());
@@ -252,17 +280,13 @@ fn example(world: &World, test: &Dataset, estimate: &Table) -> Example {
     });
     let synthesis = Synthesis::of(world);
     let noisy = synthesis.readings_of(Stream::Test, frame);
-    let ideal = synthesis.ideal().readings_of(Stream::Test, frame);
+    let synthesis = synthesis.ideal();
+    let ideal = synthesis.readings_of(Stream::Test, frame);
     let column_wires = world.sensor.column_wires;
     let of_row =
         |line: &[f64], row: usize| line[row * column_wires..(row + 1) * column_wires].to_vec();
-    let width = truth.len() / world.read_rows.len();
-    let row = (0..world.read_rows.len())
-        .max_by(|a, b| {
-            let peak = |row: usize| largest(&truth[row * width..(row + 1) * width]);
-            peak(*a).total_cmp(&peak(*b))
-        })
-        .unwrap_or(0);
+    let untouched = synthesis.untouched().readings_of(Stream::Test, frame);
+    let row = most_disturbed_row(world, truth, [&ideal, &untouched]);
     Example {
         frame,
         electrodes_mm: world

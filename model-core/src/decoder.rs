@@ -14,7 +14,7 @@ use crate::relative::relative;
 /// blob. The firmware's link check compares it with the compiler's own figure.
 #[must_use]
 pub const fn decoder_ram_bytes(rows: usize) -> usize {
-    144 + 28 * rows
+    160 + 28 * rows
 }
 
 /// A frame to be decoded, and what is known of the sensor at rest.
@@ -67,7 +67,7 @@ impl<'f> From<&'f [f32]> for Frame<'f> {
 /// # .unwrap();
 /// # let shape = ModelShape { rows: 1, inputs: 2, outputs: 1 };
 /// # let metadata = Metadata::unnamed(shape);
-/// # let parts = ModelParts { projection: None, expansion: None, networks: &[network.into()], row_network: &[0], metadata };
+/// # let parts = ModelParts { projection: None, expansion: None, confidence: None, networks: &[network.into()], row_network: &[0], metadata };
 /// # let mut buffer = Aligned([0; 512]);
 /// # let blob: &[u8] = encode(&parts, &mut buffer.0).unwrap();
 /// // `blob` holds a model of one row with two readings (Ω) and one output (mm), called `y`.
@@ -171,7 +171,7 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
         self.model.crc()
     }
 
-    /// Number of floats of working space that decoding needs.
+    /// Number of floats of working space that decoding and assessing need.
     #[must_use]
     pub fn scratch_floats(&self) -> usize {
         scratch_floats(&self.model)
@@ -200,6 +200,26 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
         self.decode_with::<Polynomial>(frame, scratch, estimate)
     }
 
+    /// Tells how far off the outputs of a frame may be, and how novel the frame is, by the model's
+    /// [confidence](crate::confidence). Returns its novelty in nats: above 0, it is unlike the frames of training. `None`
+    /// if the model has no confidence; nothing is written then.
+    ///
+    /// `deviation` takes a standard deviation for each of the `rows × outputs` outputs, in their units: they hold
+    /// whether or not a gate skips rows. If a reading of the frame is missing, all of them and the novelty are NaN.
+    /// `scratch` is working space of [`scratch_floats`](Self::scratch_floats).
+    ///
+    /// # Errors
+    /// [`NetworkError::Length`] if a slice does not have the model's length, or `scratch` is too short; nothing is
+    /// written then.
+    pub fn assess_into(
+        &self,
+        frame: Frame<'_>,
+        scratch: &mut [f32],
+        deviation: &mut [f32],
+    ) -> Result<Option<f32>, NetworkError> {
+        assess(&self.model, frame, scratch, deviation)
+    }
+
     /// Decodes one frame as [`decode_into`](Self::decode_into) does, with the [exponential](crate::exp) `E` for
     /// networks of the format `f32-direct`. It serves to measure what an exponential costs; other formats have one
     /// of their own.
@@ -215,6 +235,29 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
     ) -> Result<bool, NetworkError> {
         decode(&self.model, &self.row_networks, E::exp, frame, scratch, estimate)
     }
+}
+
+/// Assesses one frame as [`Decoder::assess_into`] does.
+///
+/// Not inlined on a device, for the same reason as [`decode`].
+#[cfg_attr(cortex_m4f, inline(never))]
+fn assess(
+    model: &Model<'_>,
+    frame: Frame<'_>,
+    scratch: &mut [f32],
+    deviation: &mut [f32],
+) -> Result<Option<f32>, NetworkError> {
+    let Some(confidence) = model.confidence() else { return Ok(None) };
+    check_length("frame", frame.readings_ohm, confidence.sizes().readings)?;
+    let readings = frame.readings_ohm.iter().copied();
+    let novelty = if model.metadata().relative_inputs {
+        check_length("reciprocals", frame.reciprocals, confidence.sizes().readings)?;
+        let ratios = readings.zip(frame.reciprocals).map(|(r, of)| relative(r, *of));
+        confidence.assess(ratios, scratch, deviation)
+    } else {
+        confidence.assess(readings, scratch, deviation)
+    };
+    novelty.map(Some)
 }
 
 /// Decodes one frame as [`Decoder::decode_with`] does, with the networks of the rows.
@@ -243,7 +286,6 @@ fn decode(
     let (expected, found) = (scratch_floats(model), scratch.len());
     let too_short = NetworkError::Length { what: "scratch", expected, found };
     let scratch = scratch.get_mut(..expected).ok_or(too_short)?;
-    let (scaled, more) = scratch.split_at_mut_checked(inputs).ok_or(too_short)?;
     let relative = model.metadata().relative_inputs;
     let projection = model.projection();
     if let Some(gate) = frame.gate {
@@ -253,6 +295,7 @@ fn decode(
         }
     }
     let Some(projection) = projection else {
+        let (scaled, more) = scratch.split_at_mut_checked(inputs).ok_or(too_short)?;
         let rows = Rows { networks, inputs, outputs, exp };
         return Ok(if relative {
             rows.decode::<true>(frame, [scaled, more], estimate)
@@ -260,7 +303,9 @@ fn decode(
             rows.decode::<false>(frame, [scaled, more], estimate)
         });
     };
-    let (features, more) = more.split_at_mut_checked(inputs).ok_or(too_short)?;
+    let of_network = projection.features();
+    let (scaled, more) = scratch.split_at_mut_checked(of_network).ok_or(too_short)?;
+    let (features, more) = more.split_at_mut_checked(of_network).ok_or(too_short)?;
     let Some(network) = networks.first() else { return Ok(false) };
     let array = Array { projection, network, relative };
     let Some(expansion) = model.expansion() else {
@@ -338,16 +383,18 @@ fn divide(readings: &[f32], reciprocals: &[f32], ratios: &mut [f32]) {
     }
 }
 
-/// Number of floats of working space that decoding with `model` needs.
+/// Number of floats of working space that decoding with `model` needs, and assessing its outputs.
 #[must_use]
 pub fn scratch_floats(model: &Model<'_>) -> usize {
     let ModelShape { rows, inputs, .. } = model.shape();
-    let before = match (model.projection().is_some(), model.metadata().relative_inputs) {
-        (false, false) => inputs,
-        (false, true) | (true, false) => inputs.saturating_mul(2),
-        (true, true) => inputs.saturating_mul(rows.saturating_add(2)),
+    let relative = model.metadata().relative_inputs;
+    let (scaled, given) = match model.projection() {
+        Some(projection) => (projection.features().saturating_mul(2), inputs.saturating_mul(rows)),
+        None => (inputs, inputs),
     };
-    before.saturating_add(model.components())
+    let extra = if relative { given } else { 0 };
+    let decoding = scaled.saturating_add(extra).saturating_add(model.components());
+    decoding.max(model.confidence().map_or(0, |it| it.sizes().scratch_floats()))
 }
 
 fn check_length<T>(what: &'static str, slice: &[T], expected: usize) -> Result<(), NetworkError> {

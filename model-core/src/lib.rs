@@ -34,6 +34,7 @@ pub mod gate;
 pub mod rbf;
 pub mod projection;
 pub mod expansion;
+pub mod confidence;
 pub mod blob;
 mod decoder;
 pub mod recalibration;

@@ -1,7 +1,7 @@
-//! Projection of a whole frame to a few features: as many as one row has readings.
+//! Projection of a whole frame to a few features.
 //!
 //! f = f₀ + Σ_j r_j·p_j over all readings r of a frame, in Ω. It is linear, so that white noise averages out over
-//! the array. There are as many features as a row has readings, so that the same inner loops serve both. The
+//! the array. Usually there are as many features as a row has readings, so that the same inner loops serve both. The
 //! directions p come from training; `docs/projection.md` explains how.
 
 #[cfg(cortex_m4f)]
@@ -48,6 +48,18 @@ impl<'a> Projection<'a> {
         self.block
     }
 
+    /// Number of features.
+    #[must_use]
+    pub fn features(&self) -> usize {
+        self.features
+    }
+
+    /// Number of readings.
+    #[must_use]
+    pub fn readings(&self) -> usize {
+        self.block.len().checked_div(self.features).unwrap_or(0).saturating_sub(1)
+    }
+
     /// Projects `readings` (Ω) to `features`; all features are NaN if a reading is NaN.
     ///
     /// Readings and features beyond the projection's sizes are ignored.
@@ -85,7 +97,7 @@ impl<'a> Projection<'a> {
 }
 
 /// Number of floats in the block of a projection.
-pub(crate) fn block_floats(readings: usize, features: usize) -> usize {
+pub(crate) const fn block_floats(readings: usize, features: usize) -> usize {
     readings.saturating_add(1).saturating_mul(features)
 }
 
@@ -97,6 +109,7 @@ mod tests {
     fn features_are_the_sums_of_the_readings_parts() {
         let block = [1.0, -1.0, 2.0, 0.0, 0.5, 4.0];
         let projection = Projection::new(2, 2, &block).unwrap();
+        assert_eq!((projection.readings(), projection.features()), (2, 2));
         let mut features = [f32::NAN; 2];
         projection.project(&[10.0, 100.0], &mut features);
         assert_eq!(features, [1.0 + 20.0 + 50.0, -1.0 + 400.0]);

@@ -61,9 +61,9 @@ pub enum RecalibrationError {
     /// Rows share a network, whose inputs can be shifted for all of them alone.
     #[error("rows of the model share a network; train one a row")]
     SharedNetworks,
-    /// The outputs of the model are not those of its networks, or its training errors are all zero.
+    /// The model expands few components to its outputs, has a confidence, or tells no training errors.
     #[error(
-        "the model tells no training errors, or computes outputs that recalibration does not know"
+        "the model has an output rank, a confidence, or training errors of 0: train one without"
     )]
     Unsuitable,
     /// There is too little memory.
@@ -147,9 +147,9 @@ impl<'a> Units<'a> {
     fn of(model: &Model<'a>) -> Result<Self, RecalibrationError> {
         let ModelShape { rows, inputs, outputs } = model.shape();
         let projection = model.projection();
-        let (count, outputs) = match projection {
-            Some(_) => (1, rows.saturating_mul(outputs)),
-            None => (rows, outputs),
+        let (count, inputs, outputs) = match projection {
+            Some(projection) => (1, projection.features(), rows.saturating_mul(outputs)),
+            None => (rows, inputs, outputs),
         };
         let network = |row| model.network_of_row(row);
         let shared = |row: usize| (0..row).any(|before| network(before) == network(row));
@@ -163,6 +163,7 @@ impl<'a> Units<'a> {
                 shape.is_some_and(|shape| (shape.inputs, shape.outputs) == (inputs, outputs));
             if !fits
                 || model.expansion().is_some()
+                || model.confidence().is_some()
                 || !(0..outputs).any(|o| units.error_of(unit, o) > 0.0)
             {
                 return Err(RecalibrationError::Unsuitable);

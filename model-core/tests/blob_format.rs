@@ -59,6 +59,7 @@ fn small_model(buffer: &mut [u8]) -> &[u8] {
         &ModelParts {
             projection: None,
             expansion: None,
+            confidence: None,
             networks: &networks,
             row_network: &[0, 0],
             metadata: metadata(),
@@ -108,6 +109,7 @@ fn relative_inputs_are_a_section_of_one_byte_before_all_others() {
     let parts = ModelParts {
         projection: None,
         expansion: None,
+        confidence: None,
         networks: &networks,
         row_network: &[0, 0],
         metadata,
@@ -157,6 +159,7 @@ fn readings_that_overflow_are_told_from_missing_ones() {
     let parts = ModelParts {
         projection: None,
         expansion: None,
+        confidence: None,
         networks: &networks,
         row_network: &[0, 0],
         metadata: metadata(),
@@ -184,6 +187,7 @@ fn what_does_not_fit_the_format_is_refused_when_written() {
     let parts = ModelParts {
         projection: None,
         expansion: None,
+        confidence: None,
         networks: &networks,
         row_network: &[0, 0],
         metadata: metadata(),

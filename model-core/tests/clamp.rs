@@ -84,6 +84,7 @@ fn blob(format: Format, (from, by): &Scaling, relative_inputs: bool) -> AlignedB
     encode_to_vec(&ModelParts {
         projection: None,
         expansion: None,
+        confidence: None,
         networks,
         row_network: &[0; ROWS],
         metadata,

@@ -64,6 +64,7 @@ fn blob(seed: usize, rows: usize) -> AlignedBytes {
     let parts = ModelParts {
         projection: None,
         expansion: None,
+        confidence: None,
         networks: &[even.network(), odd.network()],
         row_network: &row_network,
         metadata,

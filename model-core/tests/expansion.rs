@@ -45,7 +45,14 @@ fn encoded<'b>(
     let expansion = Some(Expansion::new(components, outputs, block).unwrap());
     let metadata = Metadata::unnamed(ModelShape { rows: 2, inputs: 2, outputs: 1 });
     let networks = &[network];
-    let parts = ModelParts { projection, expansion, networks, row_network: &[0, 0], metadata };
+    let parts = ModelParts {
+        projection,
+        expansion,
+        confidence: None,
+        networks,
+        row_network: &[0, 0],
+        metadata,
+    };
     assert!(encoded_length_bound(&parts) <= buffer.len());
     encode(&parts, buffer)
 }
@@ -128,7 +135,7 @@ fn every_damage_of_the_section_has_its_own_error() {
         Model::decode(&damaged.0[..length]).map(drop).unwrap_err()
     };
     // With any other tag these are no fields of a network, whose section must follow.
-    for tag in [0, 1, 3, 4, 5, 7, 0xff] {
+    for tag in [0, 1, 3, 4, 5, 8, 0xff] {
         assert_eq!(damaged(0, tag), DecodeError::Malformed { section: "network section" });
     }
     let count = |expected, found| DecodeError::CountMismatch {

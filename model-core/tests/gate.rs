@@ -33,6 +33,7 @@ fn with_decoder(check: impl FnOnce(&TestDecoder<'_>)) {
     let parts = ModelParts {
         projection: None,
         expansion: None,
+        confidence: None,
         networks: &[network],
         row_network: &[0; ROWS],
         metadata,

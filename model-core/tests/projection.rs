@@ -36,7 +36,14 @@ fn encoded<'b>(
 ) -> Result<&'b [u8], EncodeError> {
     let projection = Projection::new(4, 2, block).ok();
     let metadata = Metadata::unnamed(ModelShape { rows: 2, inputs: 2, outputs: 1 });
-    let parts = ModelParts { projection, expansion: None, networks, row_network, metadata };
+    let parts = ModelParts {
+        projection,
+        expansion: None,
+        confidence: None,
+        networks,
+        row_network,
+        metadata,
+    };
     assert!(encoded_length_bound(&parts) <= buffer.len());
     encode(&parts, buffer)
 }
@@ -126,6 +133,59 @@ fn an_array_is_at_rest_as_a_whole_or_not_at_all() {
     decoder.decode_into(gated, &mut scratch, &mut estimate.borrowed()).unwrap();
     assert_eq!(estimate, decoder.decode(&frame[..]).unwrap());
     assert_eq!(estimate.status, [RowStatus::Decoded; 2]);
+}
+
+/// A model of one row: four readings, two features, three outputs.
+fn of_one_row(buffer: &mut [u8]) -> &[u8] {
+    let projection = Projection::new(4, 2, &BLOCK).ok();
+    let metadata = Metadata::unnamed(ModelShape { rows: 1, inputs: 4, outputs: 3 });
+    let networks = &[network(3)];
+    let parts = ModelParts {
+        projection,
+        expansion: None,
+        confidence: None,
+        networks,
+        row_network: &[0],
+        metadata,
+    };
+    encode(&parts, buffer).unwrap()
+}
+
+#[test]
+fn a_projection_may_have_another_number_of_features_than_a_row_has_readings() {
+    let mut buffer = Aligned([0; 1024]);
+    let decoder = Decoder::<1>::load(of_one_row(&mut buffer.0)).unwrap();
+    assert_eq!(decoder.shape(), ModelShape { rows: 1, inputs: 4, outputs: 3 });
+    assert_eq!(decoder.scratch_floats(), 4);
+    let estimate = decoder.decode(&NEAR_CENTRE[..]).unwrap();
+    assert_eq!(estimate.status, [RowStatus::Decoded]);
+    // As the array of two rows, and one output more.
+    let activation = (-2.0_f32 * 0.0625).exp();
+    let expected = [1.5 * activation - 0.5, 3.0 * activation - 1.0, 4.5 * activation];
+    for (output, expected) in estimate.outputs.iter().zip(expected) {
+        assert!((output - expected).abs() < 1e-6, "{output} {expected}");
+    }
+}
+
+#[test]
+fn the_number_of_features_stands_in_the_blob_and_is_checked() {
+    let mut buffer = Aligned([0; 1024]);
+    let length = of_one_row(&mut buffer.0).len();
+    let floats: Vec<u8> = BLOCK.iter().flat_map(|value| value.to_le_bytes()).collect();
+    let blob = &buffer.0[..length];
+    let start = blob.windows(floats.len()).position(|window| window == floats).unwrap();
+    // Before the floats stand the tag, the number of features, the padding and the floats' length.
+    let tag = blob[..start].iter().rposition(|byte| *byte == 8).unwrap();
+    assert_eq!(&blob[tag..tag + 2], [8, 2]);
+    for (features, what) in [(1, "bytes of projection"), (3, "bytes of projection")] {
+        let mut damaged = buffer;
+        damaged.0[tag + 1] = features;
+        let crc = CRC_32.checksum(&damaged.0[..length - 4]);
+        damaged.0[length - 4..length].copy_from_slice(&crc.to_le_bytes());
+        let refused = Model::decode(&damaged.0[..length]);
+        let expected = usize::from(features) * 5 * 4;
+        assert_eq!(refused, Err(DecodeError::CountMismatch { what, expected, found: 40 }));
+    }
 }
 
 #[test]

@@ -33,6 +33,7 @@ mod table;
 
 mod shapes;
 mod ranks;
+mod confidence;
 mod equations;
 mod predicted;
 mod fit;
@@ -90,6 +91,11 @@ pub fn run(options: &Options<'_>) -> Outcome {
             print!("{}", ranks::markdown(&measured));
             return ranks::held(&measured);
         }
+        Some(Table::Confidence) => {
+            let measured = confidence::measure(&image, &code, &directory)?;
+            print!("{}", confidence::markdown(&measured));
+            return confidence::held(&measured);
+        }
         None => (),
     }
     if let Some(model) = options.model {
@@ -115,6 +121,7 @@ pub fn run(options: &Options<'_>) -> Outcome {
     }
     shapes::held(&shapes::measure(&image, &code, &directory)?)?;
     ranks::held(&ranks::measure(&image, &code, &directory)?)?;
+    confidence::held(&confidence::measure(&image, &code, &directory)?)?;
     let compiler = toolchain.compiler()?;
     if options.accept {
         prices::accept(&image, &code, &directory, &compiler)?;

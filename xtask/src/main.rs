@@ -63,6 +63,7 @@ Usage: cargo xtask COMMAND
                               the price list firmware/prices.csv, from which `host-sim` tells any model's cost
       --shapes                measures one inference of networks of other shapes instead (12 → 5 and others, K = 64)
       --ranks                 measures a frame of networks of few components instead (16 to 32, K = 64 and 256)
+      --confidence            measures deviations and novelty of a frame instead (16 and 32 Gaussians)
       --kernel NAME           shows this kernel only, and compares it with its budget only
       --model FILE            measures frames of this model, of any shape, such as the chosen.bin of `host-sim trade`,
                               beside what firmware/prices.csv tells of it. Fails if they differ

@@ -30,6 +30,10 @@ fn exercise_decoding() {
     };
     let mut estimate = Estimate { outputs, status: &mut status };
     opaque(decoder.decode_into(frame.into(), &mut scratch, &mut estimate).is_ok());
+    let mut deviation = opaque([0.0; 144]);
+    let Some(of_outputs) = deviation.get_mut(..length(144)) else { return };
+    opaque(decoder.assess_into(frame.into(), &mut scratch, of_outputs).is_ok());
+    opaque(deviation);
     opaque((decoder.shape(), decoder.scratch_floats()));
 
     let metadata = decoder.metadata();

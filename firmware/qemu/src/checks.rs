@@ -3,6 +3,7 @@
 
 use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
 use model_core::blob::Model;
+use model_core::confidence::{Confidence, Sizes};
 use model_core::exp::{ExpKernel, Polynomial};
 use model_core::gate::{Rest, is_at_rest};
 use model_core::rbf::Network;
@@ -266,6 +267,117 @@ pub fn array_twins(blob: &[u8]) -> Option<[usize; 2]> {
         different += usize::from(bits(outputs) != bits(of_twin));
     }
     Some([compared, different])
+}
+
+/// Sizes of the confidence of a model of the small sensor.
+pub const ARRAY_CONFIDENCE: Sizes = Sizes {
+    readings: ARRAY_ROWS * COLS,
+    directions: 10,
+    components: 6,
+    outputs: ARRAY_ROWS * OUTPUTS,
+};
+
+/// Fills `block` with the numbers of a confidence of these `sizes`, for readings about 60 Ω.
+pub fn write_confidence(sizes: Sizes, block: &mut [f32], numbers: &mut Numbers) {
+    let Sizes { readings, directions, components, outputs } = sizes;
+    let mut places = block.iter_mut();
+    let mut put = |count: usize, middle: f32, reach: f32| {
+        places.by_ref().take(count).for_each(|place| *place = middle + reach * numbers.draw());
+    };
+    put(readings, 60.0, 1.0);
+    put(readings, 0.2, 0.02);
+    put(directions, 0.0, 0.0);
+    put(directions * readings, 0.0, 0.3);
+    for _ in 0..components {
+        put(1, -3.0, 1.0);
+        put(sizes.features(), 0.0, 2.0);
+        for row in 0..sizes.features() {
+            put(row, 0.0, 0.2);
+            put(1, 0.5, 0.3);
+        }
+    }
+    put(components * outputs, 1.0, 0.9);
+    put(outputs, 2.0, 0.5);
+    put(1, 8.0, 0.0);
+}
+
+/// CRC-32 of all bits of the novelty and the deviations of frames, and how many frames are novel, how many of these too
+/// far off to tell, and how many have no novelty.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Assessed {
+    /// CRC-32.
+    pub crc: u32,
+    /// Frames that are novel.
+    pub novel: usize,
+    /// Novel frames that are too far off to tell how novel.
+    pub far: usize,
+    /// Frames with a missing reading.
+    pub missing: usize,
+}
+
+impl Assessed {
+    /// Counts a frame of this `novelty`.
+    fn count(&mut self, novelty: f32) {
+        self.novel += usize::from(novelty > 0.0);
+        self.far += usize::from(novelty >= f32::MAX);
+        self.missing += usize::from(novelty.is_nan());
+    }
+
+    const NONE: Self = Self { crc: 0, novel: 0, far: 0, missing: 0 };
+}
+
+/// What [`MANY`] frames are by the confidence of the model in `blob`. `None` if the blob does not load, or has none.
+#[must_use]
+pub fn assessing_many(blob: &[u8]) -> Option<Assessed> {
+    let decoder = Decoder::<ARRAY_ROWS>::load(blob).ok()?;
+    let crc = QUICK_CRC;
+    let (mut digest, mut assessed) = (crc.digest(), Assessed::NONE);
+    let mut numbers = Numbers::new(4);
+    let mut scratch = [0.0; ARRAY_CONFIDENCE.scratch_floats()];
+    for index in 0..MANY {
+        let frame = one_of_many::<ARRAY_ROWS>(index, &mut numbers);
+        let mut deviation = [0.0; ARRAY_CONFIDENCE.outputs];
+        let frame = frame.as_flattened().into();
+        let novelty = decoder.assess_into(frame, &mut scratch, &mut deviation).ok()??;
+        for value in deviation.into_iter().chain([novelty]) {
+            digest.update(&value.to_bits().to_le_bytes());
+        }
+        assessed.count(novelty);
+    }
+    Some(Assessed { crc: digest.finalize(), ..assessed })
+}
+
+/// Most directions of the confidences that [`assessing_sizes`] makes.
+const MOST_DIRECTIONS: usize = 12;
+/// Sizes of these confidences.
+const fn few_outputs(directions: usize) -> Sizes {
+    Sizes { readings: COLS, directions, components: 5, outputs: 7 }
+}
+
+/// What frames of one row are by confidences of 1 to 12 directions. `None` if one is unsound.
+#[must_use]
+pub fn assessing_sizes() -> Option<Assessed> {
+    let crc = QUICK_CRC;
+    let (mut digest, mut assessed) = (crc.digest(), Assessed::NONE);
+    let mut numbers = Numbers::new(7);
+    for directions in 1..=MOST_DIRECTIONS {
+        let sizes = few_outputs(directions);
+        let mut block = [0.0; few_outputs(MOST_DIRECTIONS).block_floats()];
+        let block = block.get_mut(..sizes.block_floats())?;
+        write_confidence(sizes, block, &mut numbers);
+        let confidence = Confidence::new(sizes, block).ok()?;
+        let mut scratch = [0.0; few_outputs(MOST_DIRECTIONS).scratch_floats()];
+        for index in 0..MANY / 20 {
+            let [row] = one_of_many::<1>(index, &mut numbers);
+            let mut deviation = [0.0; few_outputs(1).outputs];
+            let novelty = confidence.assess(row.into_iter(), &mut scratch, &mut deviation).ok()?;
+            for value in deviation.into_iter().chain([novelty]) {
+                digest.update(&value.to_bits().to_le_bytes());
+            }
+            assessed.count(novelty);
+        }
+    }
+    Some(Assessed { crc: digest.finalize(), ..assessed })
 }
 
 /// Tolerance of the gate, relative to the baseline.

@@ -9,7 +9,9 @@ use super::recalibrate::Recalibrating;
 use super::session::Session;
 use super::{Capture, Core};
 use crate::circuit::{Constants, ConstantsFault};
-use crate::link::message::{Configuration, Identity, Refusal, Report, Request, UploadStep};
+use crate::link::message::{
+    ConfidenceSent, Configuration, Identity, Refusal, Report, Request, UploadStep,
+};
 use crate::link::packet::{self, PROTOCOL_VERSION, PacketError};
 use crate::link::receive::Received;
 use crate::log::{info, warning};
@@ -285,8 +287,11 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
     ) -> Result<(), Refusal> {
         self.check_length(readings_ohm)?;
         self.set_frame(readings_ohm.iter());
-        let (flags, _) = self.decode(model.decoder.as_ref());
-        self.send_estimate(number, frame, 0, flags);
+        let decoder = model.decoder.as_ref();
+        let (mut flags, _) = self.decode(decoder);
+        let sent = ConfidenceSent::Deviations;
+        let novelty = self.assess(decoder, sent, &mut flags);
+        self.send_estimate(number, frame, 0, flags, (novelty, sent));
         Ok(())
     }
 

@@ -22,6 +22,8 @@ pub struct Buffers<
     pub(super) scratch: [[[f32; COLUMNS]; ROWS]; 2],
     pub(super) estimate: Outcome<ROWS, OUTPUTS>,
     pub(super) rest: Outcome<ROWS, OUTPUTS>,
+    /// Standard deviations of the outputs.
+    pub(super) deviation: [[f32; OUTPUTS]; ROWS],
     /// Mean readings of a reference press, and its stated outputs.
     pub(super) press: [[f32; COLUMNS]; ROWS],
     pub(super) stated: [[f32; OUTPUTS]; ROWS],
@@ -71,6 +73,7 @@ impl<const ROWS: usize, const COLUMNS: usize, const OUTPUTS: usize, const BYTES:
             scratch: [[[0.0; COLUMNS]; ROWS]; 2],
             estimate: Outcome::NOTHING,
             rest: Outcome::NOTHING,
+            deviation: [[0.0; OUTPUTS]; ROWS],
             press: [[0.0; COLUMNS]; ROWS],
             stated: [[0.0; OUTPUTS]; ROWS],
         }

@@ -1,18 +1,19 @@
 //! Default and ranges of a configuration.
 
-use crate::link::message::{Configuration, ConfigurationField};
+use crate::link::message::{ConfidenceSent, Configuration, ConfigurationField};
 use crate::readout::ScanSettings;
 
 /// Range of frame periods in µs.
 const FRAME_PERIOD_US: core::ops::RangeInclusive<u32> = 100..=1_000_000_000;
 impl Configuration {
-    /// The default configuration: 100 frames a second, estimates are sent, limits for rubber of about 60 Ω, and
-    /// every row is decoded.
+    /// The default configuration: 100 frames a second, estimates are sent without confidence, limits for rubber of about
+    /// 60 Ω, and every row is decoded.
     pub const DEFAULT: Self = Self {
         frame_period_us: 10_000,
         scan: ScanSettings { settling_us: 100, oversampling: 1 },
         send_readings: false,
         send_estimates: true,
+        confidence: ConfidenceSent::Nothing,
         shorted_below_ohm: 5.0,
         open_above_ohm: 1000.0,
         contact_threshold: 0.02,

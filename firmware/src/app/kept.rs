@@ -1,6 +1,6 @@
 //! Settings that are kept over restarts, as bytes.
 //!
-//! The first byte is the version of what follows; content of another version is not believed.
+//! The first byte is the version of what follows, of each setting its own; content of another version is not believed.
 //!
 //! - Configuration: postcard fields, as in the link.
 //! - Constants: number of rows and of columns; reference and drive voltage; then source by row, feedback by column
@@ -22,8 +22,14 @@ use crate::platform::Platform;
 use crate::readout::FrameSource;
 use crate::settings::{KeepError, Keeper};
 
-/// Version of what is kept. Whoever changes the fields of a setting must raise it.
-const VERSION: u8 = 1;
+/// Version of what is kept for `setting`. Whoever changes the setting's fields must raise it.
+const fn version(setting: Setting) -> u8 {
+    match setting {
+        // Before version 2 it did not tell what is sent of a model's confidence.
+        Setting::Configuration => 2,
+        Setting::Constants | Setting::Baseline => 1,
+    }
+}
 
 /// Most writes between two restarts: flash wears, and a host may be in an endless loop.
 pub const MOST_WRITES: u16 = 100;
@@ -91,6 +97,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         }
         let constants_crc = self.constants_crc();
         let (keeper, buffer) = self.line.settings();
+        let version = version(setting);
         let written = match setting {
             Setting::Configuration => {
                 // What is kept is the device's own: a lease must not end with another one.
@@ -98,13 +105,13 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                 let mut bytes = [0; CONFIGURATION_BYTES];
                 let fields = postcard::to_slice(&self.configuration, &mut bytes);
                 let fields = fields.map_err(|_| Refusal::Keep(KeepFault::TooLarge))?;
-                keeper.keep(setting, &[&[VERSION], fields], buffer)
+                keeper.keep(setting, &[&[version], fields], buffer)
             }
             Setting::Constants => {
                 let Some(c) = self.source.constants() else { return Err(NOTHING) };
                 let (rows, columns) = (c.row_source_ohm.0.len() / 4, c.feedback_ohm.0.len() / 4);
                 let parts: [&[u8]; 6] = [
-                    &[VERSION, rows as u8, columns as u8],
+                    &[version, rows as u8, columns as u8],
                     &c.reference_v.to_le_bytes(),
                     &c.drive_v.to_le_bytes(),
                     c.row_source_ohm.0,
@@ -119,7 +126,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                     return Err(NOTHING);
                 }
                 let [low, high] = frames.to_le_bytes();
-                let head = [VERSION, self.wires.rows as u8, self.wires.columns as u8, low, high];
+                let head = [version, self.wires.rows as u8, self.wires.columns as u8, low, high];
                 let readings = Floats::of(self.baseline.mean()).0;
                 keeper.keep(setting, &[&head, &constants_crc.to_le_bytes(), readings], buffer)
             }
@@ -160,13 +167,14 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
     }
 }
 
-/// What follows the version, if it is ours.
-fn content(bytes: &[u8]) -> Option<&[u8]> {
-    bytes.split_first().filter(|(version, _)| **version == VERSION).map(|(_, content)| content)
+/// What follows the version, if it is the `setting`'s.
+fn content(setting: Setting, bytes: &[u8]) -> Option<&[u8]> {
+    let (found, content) = bytes.split_first()?;
+    (*found == version(setting)).then_some(content)
 }
 
 fn configuration(bytes: &[u8]) -> Option<Configuration> {
-    match postcard::take_from_bytes::<Configuration>(content(bytes)?) {
+    match postcard::take_from_bytes::<Configuration>(content(Setting::Configuration, bytes)?) {
         Ok((configuration, [])) => configuration.check().is_ok().then_some(configuration),
         _ => None,
     }
@@ -174,7 +182,7 @@ fn configuration(bytes: &[u8]) -> Option<Configuration> {
 
 /// Constants of the numbers of rows and columns that they say; each number in its range.
 fn constants(bytes: &[u8]) -> Option<Constants<'_>> {
-    let (&[rows, columns], numbers) = content(bytes)?.split_first_chunk()?;
+    let (&[rows, columns], numbers) = content(Setting::Constants, bytes)?.split_first_chunk()?;
     let (reference, numbers) = numbers.split_first_chunk()?;
     let (drive, numbers) = numbers.split_first_chunk()?;
     let wires = Wires { rows: rows.into(), columns: columns.into() };
@@ -199,7 +207,8 @@ struct Baseline<'b> {
 }
 
 fn baseline(bytes: &[u8]) -> Option<Baseline<'_>> {
-    let (&[rows, columns, low, high], rest) = content(bytes)?.split_first_chunk()?;
+    let (&[rows, columns, low, high], rest) =
+        content(Setting::Baseline, bytes)?.split_first_chunk()?;
     let (constants_crc, readings) = rest.split_first_chunk()?;
     let wires = Wires { rows: rows.into(), columns: columns.into() };
     let frames = u16::from_le_bytes([low, high]);

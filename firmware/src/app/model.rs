@@ -1,6 +1,6 @@
 //! The model in force: which slot it comes from, and whether the image has room for it.
 
-use model_core::blob::{Columns, DecodeError, Model, ModelShape};
+use model_core::blob::{Columns, DecodeError, Model};
 use model_core::checksum::CRC_32;
 use model_core::{Decoder, RowWire, scratch_floats};
 
@@ -79,8 +79,8 @@ pub fn check_head(capacity: Capacity, head: &[u8]) -> Result<usize, ModelFault> 
 /// Checks a blob from end to end, and that the image has room for its model.
 pub fn check(capacity: Capacity, blob: &[u8]) -> Result<Model<'_>, ModelFault> {
     let model = Model::decode(blob).map_err(|error| fault(&error))?;
-    let mut names = model.metadata().input_names.iter().step_by(model.shape().inputs.max(1));
-    let driven = names.all(|name| row_of(name).is_none_or(|row| row.0 < capacity.rows));
+    let driven =
+        model.metadata().input_names.iter().filter_map(row_of).all(|row| row.0 < capacity.rows);
     let room = scratch_floats(&model) <= capacity.scratch_floats();
     match capacity.wires_for(model.shape()) {
         Some(_) if driven && room => Ok(model),
@@ -88,16 +88,14 @@ pub fn check(capacity: Capacity, blob: &[u8]) -> Result<Model<'_>, ModelFault> {
     }
 }
 
-/// Row-wires of a model, one for each of its rows.
+/// Row-wires of a model in the order of its readings, of which each wire has so many `columns`.
 ///
 /// A reading's name tells its wires: `r4c1_ohm` is row-wire 4 with column-wire 1, both counted from 1. A model with
-/// other names, or of one row with the readings of several wires, takes the first row-wires in their order.
-pub fn row_wires<const ROWS: usize>(model: &Model<'_>) -> [RowWire; ROWS] {
-    let ModelShape { rows, inputs, .. } = model.shape();
+/// other names takes the first row-wires in their order.
+pub fn row_wires<const ROWS: usize>(model: &Model<'_>, columns: usize) -> [RowWire; ROWS] {
     let in_order = core::array::from_fn(RowWire);
-    let names = model.metadata().input_names;
     let mut wires = in_order;
-    let first_names = names.iter().step_by(inputs.max(1)).take(rows);
+    let first_names = model.metadata().input_names.iter().step_by(columns.max(1));
     for (wire, name) in wires.iter_mut().zip(first_names) {
         match row_of(name) {
             Some(row) => *wire = row,

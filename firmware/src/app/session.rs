@@ -11,7 +11,7 @@ use super::leave::Leave;
 use super::model::{InForce, by_generation, check_head, choose, copy_to, cut_room, row_wires};
 use super::recalibrate::Recalibrating;
 use super::{App, Core};
-use crate::link::message::{EstimateReport, HealthReport, Report};
+use crate::link::message::{ConfidenceSent, EstimateReport, HealthReport, Report};
 use crate::link::packet::UNASKED;
 use crate::log::{info, warning};
 use crate::platform::Platform;
@@ -111,8 +111,9 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             shape.and_then(|shape| self.capacity.wires_for(shape)).unwrap_or(self.capacity.wires());
         self.rows = shape.map_or(self.wires.rows, |shape| shape.rows);
         self.outputs = shape.map_or(0, |shape| shape.rows.saturating_mul(shape.outputs));
-        self.row_wires =
-            decoder.map_or(core::array::from_fn(RowWire), |decoder| row_wires(decoder.model()));
+        let columns = self.wires.columns;
+        self.row_wires = decoder
+            .map_or(core::array::from_fn(RowWire), |decoder| row_wires(decoder.model(), columns));
         if (self.wires, self.row_wires) != before {
             self.give_up_capture();
             self.baseline.restart(self.wires.readings());
@@ -162,13 +163,16 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             let report = Report::Readings { frame, start_us, readings_ohm: Floats::of(readings) };
             self.line.send(UNASKED, &report, &mut self.statistics);
         }
-        let (flags, health) = self.decode(decoder);
+        let (mut flags, health) = self.decode(decoder);
+        let sent = self.configuration.confidence;
+        let novelty = self.assess(decoder, sent, &mut flags);
         self.feed_baseline(decoder);
         if !health.is_good() {
             self.send_health(frame, start_us, health);
         }
         if self.configuration.send_estimates {
-            self.send_estimate(UNASKED, frame, start_us, flags | overrun);
+            let flags = flags | overrun;
+            self.send_estimate(UNASKED, frame, start_us, flags, (novelty, sent));
         }
         self.feed_press(decoder, recalibrating);
         any
@@ -252,8 +256,46 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         }
     }
 
-    /// Sends the estimate, either as the answer to request `number` or unasked.
-    pub(super) fn send_estimate(&mut self, number: u16, frame: u32, start_us: u64, flags: u8) {
+    /// Computes the confidence of the frame that was decoded last, unless nothing of it is `wanted`. Returns the frame's
+    /// novelty if the model has a confidence, and adds to the `flags` whether it is novel.
+    pub(super) fn assess(
+        &mut self,
+        decoder: Option<&Decoder<'_, ROWS>>,
+        wanted: ConfidenceSent,
+        flags: &mut u8,
+    ) -> Option<f32> {
+        let decoder = decoder.filter(|_| wanted != ConfidenceSent::Nothing)?;
+        let start_us = self.line.platform().now_us();
+        let start_cycles = self.line.platform().cycles();
+        let readings = self.wires.readings();
+        let readings_ohm = self.frame.get(..readings).unwrap_or_default();
+        let reciprocals = self.reciprocals.get(..readings).unwrap_or_default();
+        let frame = Frame { readings_ohm, reciprocals, gate: None };
+        let deviation = self.deviation.get_mut(..self.outputs).unwrap_or_default();
+        // The model's sizes were found to fit when it came into force.
+        let novelty = decoder.assess_into(frame, self.scratch, deviation).ok().flatten()?;
+        let cycles = self.line.platform().cycles().wrapping_sub(start_cycles);
+        let us = self.line.platform().now_us().wrapping_sub(start_us);
+        let s = &mut self.statistics;
+        s.longest_confidence_us = s.longest_confidence_us.max(us);
+        s.longest_confidence_cycles = s.longest_confidence_cycles.max(cycles);
+        if novelty > 0.0 {
+            *flags |= EstimateReport::NOVEL;
+            s.frames_novel = s.frames_novel.saturating_add(1);
+        }
+        Some(novelty)
+    }
+
+    /// Sends the estimate, either as the answer to request `number` or unasked, with the frame's novelty if there is one,
+    /// and the deviations if they are to be sent.
+    pub(super) fn send_estimate(
+        &mut self,
+        number: u16,
+        frame: u32,
+        start_us: u64,
+        flags: u8,
+        (novelty, sent): (Option<f32>, ConfidenceSent),
+    ) {
         let estimate = cut(&mut self.estimate, self.rows, self.outputs);
         let mut codes = [0; ROWS];
         for (code, status) in codes.iter_mut().zip(estimate.status.iter()) {
@@ -266,7 +308,11 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         }
         let row_status = codes.get(..self.rows).unwrap_or_default();
         let outputs = Floats::of(estimate.outputs);
-        let report = EstimateReport { frame, start_us, flags, row_status, outputs };
+        let with_deviations = novelty.is_some() && sent == ConfidenceSent::Deviations;
+        let deviations = if with_deviations { self.outputs } else { 0 };
+        let deviation = Floats::of(self.deviation.get(..deviations).unwrap_or_default());
+        let report =
+            EstimateReport { frame, start_us, flags, row_status, outputs, novelty, deviation };
         self.line.send(number, &Report::Estimate(report), &mut self.statistics);
     }
 

@@ -305,6 +305,8 @@ pub struct Configuration {
     pub send_readings: bool,
     /// Whether every scan's estimate is sent.
     pub send_estimates: bool,
+    /// What of the model's confidence is computed for every scan, and sent with its estimate.
+    pub confidence: ConfidenceSent,
     /// A reading below this in Ω is taken for a short circuit.
     pub shorted_below_ohm: f32,
     /// A reading above this in Ω is taken for a broken wire.
@@ -315,6 +317,19 @@ pub struct Configuration {
     /// rest. Such a row is skipped, and gets the outputs of the baseline. With 0, or without a baseline, every row
     /// is decoded.
     pub rest_tolerance: f32,
+}
+
+/// What is sent of a model's [confidence](model_core::confidence) with the estimate of a scan. An answer to
+/// [`Request::Decode`] has all of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum ConfidenceSent {
+    /// Nothing, and nothing is computed.
+    #[default]
+    Nothing,
+    /// The frame's novelty.
+    Novelty,
+    /// The frame's novelty, and a deviation for each output.
+    Deviations,
 }
 
 /// Settings that are kept over restarts.
@@ -356,6 +371,14 @@ pub struct EstimateReport<'a> {
     /// model.
     #[serde(borrow)]
     pub outputs: Floats<'a>,
+    /// Novelty of the frame in nats: above 0, it is unlike the frames of training. NaN if a reading is missing, and the
+    /// largest number of f32 if the frame is too far off to tell. `None` if the model has no confidence, or it was not
+    /// asked for.
+    pub novelty: Option<f32>,
+    /// Standard deviation of every output, in its unit; NaN if a reading is missing. None at all if the model has no
+    /// confidence, or they were not asked for.
+    #[serde(borrow)]
+    pub deviation: Floats<'a>,
 }
 
 impl EstimateReport<'_> {
@@ -376,6 +399,8 @@ impl EstimateReport<'_> {
     /// Flag: at least one reading of a decoded row lies far beyond the range that the model was trained on, and was
     /// clamped ([`model_core::Decoder::decode_into`]).
     pub const CLAMPED: u8 = 1 << 6;
+    /// Flag: the frame's novelty was computed and is above 0.
+    pub const NOVEL: u8 = 1 << 7;
 }
 
 /// Faulty readings of one frame.
@@ -428,6 +453,12 @@ pub struct Statistics {
     pub frames_clamped: u32,
     /// Number of times that a slot was erased.
     pub slot_erases: u32,
+    /// Number of frames with [`EstimateReport::NOVEL`].
+    pub frames_novel: u32,
+    /// Longest time in µs of computing a frame's confidence.
+    pub longest_confidence_us: u32,
+    /// Longest time of the same in cycles of the processor; 0 on a board that does not count them.
+    pub longest_confidence_cycles: u32,
 }
 
 /// Progress of uploading a model.

@@ -46,6 +46,7 @@ fn a_frame_without_a_baseline_is_flagged_until_one_is_complete() {
     let parts = ModelParts {
         projection: None,
         expansion: None,
+        confidence: None,
         networks: &networks,
         row_network: &[0; ROWS],
         metadata,

@@ -6,6 +6,7 @@ mod common;
 mod requests;
 
 mod baseline;
+mod confidence;
 mod configuration;
 mod decoding;
 mod model;

@@ -20,6 +20,7 @@ fn the_identity_tells_what_the_model_was_trained_on() {
         let parts = ModelParts {
             projection: None,
             expansion: None,
+            confidence: None,
             networks: &networks,
             row_network: &[0],
             metadata,
@@ -82,6 +83,7 @@ fn blob_with(shape: ModelShape, metadata: Metadata<'_>) -> AlignedBytes {
     encode_to_vec(&ModelParts {
         projection: None,
         expansion: None,
+        confidence: None,
         networks,
         row_network: &[0],
         metadata,
@@ -129,6 +131,21 @@ fn the_names_of_readings_say_which_rows_are_scanned() {
         let expected = format!("readings_ohm: {:?}", Floats::of(&frame_at_rest()[row][..2]));
         assert!(all[0].1.contains(&expected), "{names}: {all:?}");
     }
+    // One row of the model with the readings of both row-wires, in the other order.
+    let names = "r2c1_ohm\nr2c2_ohm\nr2c3_ohm\nr1c1_ohm\nr1c2_ohm\nr1c3_ohm";
+    let both = ModelShape { rows: 1, inputs: 6, outputs: 1 };
+    let metadata = Metadata { input_names: Columns(names), ..Metadata::unnamed(both) };
+    let mut slots = MockSlot::pair_with(&blob_with(both, metadata));
+    let mut bench =
+        Bench::new(Configuration { frame_period_us: 1000, send_readings: true, ..quiet() });
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    while bench.board.0.borrow().now_us < 1500 {
+        assert_eq!(session.step(), None);
+    }
+    let [first, second] = frame_at_rest();
+    let expected = format!("readings_ohm: {:?}", Floats::of(&[second, first].concat()));
+    let all = reports(&bench.board.0.borrow().to_host);
+    assert!(all[0].1.contains(&expected), "{all:?}");
     let metadata =
         Metadata { input_names: Columns("r3c1_ohm\nr3c2_ohm"), ..Metadata::unnamed(shape) };
     let mut slots = MockSlot::pair_with(&blob_with(shape, metadata));

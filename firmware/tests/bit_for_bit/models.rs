@@ -2,6 +2,7 @@
 
 use model_core::AlignedBytes;
 use model_core::blob::{Metadata, ModelParts, ModelShape, encode_to_vec};
+use model_core::confidence::Confidence;
 use model_core::expansion::Expansion;
 use model_core::projection::Projection;
 use model_core::rbf::direct::Parameters;
@@ -11,7 +12,9 @@ use model_core::rbf::fixed16::{
 use model_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
 use model_core::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP};
 
-use super::checks::{ARRAY_COMPONENTS, ARRAY_ROWS, COLS, Numbers, OUTPUTS};
+use super::checks::{
+    ARRAY_COMPONENTS, ARRAY_CONFIDENCE, ARRAY_ROWS, COLS, Numbers, OUTPUTS, write_confidence,
+};
 
 /// Decay log₂e/(2σ²) for σ = 0.8.
 const DECAY_PER_SPAN_SQUARED: f64 = core::f64::consts::LOG2_E / (2.0 * 0.8 * 0.8);
@@ -23,7 +26,7 @@ type Maker = fn() -> AlignedBytes;
 const COMPONENTS: Option<usize> = Some(ARRAY_COMPONENTS);
 
 /// Every model: the name of its file, and the function that makes it.
-pub const FILES: [(&str, Maker); 12] = [
+pub const FILES: [(&str, Maker); 13] = [
     ("hand-made.bin", hand_made),
     ("kernels-f32.bin", || of_format(Format::F32)),
     ("kernels-fixed16.bin", || of_format(Format::Fixed16)),
@@ -35,6 +38,7 @@ pub const FILES: [(&str, Maker); 12] = [
     ("array-f32-direct.bin", || of_array(Format::F32Direct, 17, true, None)),
     ("array-f32-components.bin", || of_array(Format::F32, 9, true, COMPONENTS)),
     ("array-fixed16-components.bin", || of_array(Format::Fixed16, 17, false, COMPONENTS)),
+    ("array-fixed16-confidence.bin", of_confidence),
     ("array-f32-direct-components.bin", || of_array(Format::F32Direct, 6, true, COMPONENTS)),
 ];
 
@@ -226,17 +230,39 @@ fn pair(low: i32, high: i32) -> u32 {
     (low as u32 & 0xFFFF) | (high as u32) << 16
 }
 
+/// A small model of the small sensor, with a confidence.
+fn of_confidence() -> AlignedBytes {
+    let mut numbers = Numbers::new(8);
+    let shape = row_shape(1);
+    let words = words_of(Format::Fixed16, &mut numbers, shape, false);
+    let network = network(Format::Fixed16, shape, true, false, &words);
+    let mut block = vec![0.0; ARRAY_CONFIDENCE.block_floats()];
+    write_confidence(ARRAY_CONFIDENCE, &mut block, &mut numbers);
+    let confidence = Confidence::new(ARRAY_CONFIDENCE, &block).unwrap();
+    encoded_with("confidence", (None, None), &[network], &[0; ARRAY_ROWS], Some(confidence))
+}
+
 fn encoded(
+    name: &str,
+    linear: (Option<Projection<'_>>, Option<Expansion<'_>>),
+    networks: &[Network<'_>],
+    row_network: &[u8],
+) -> AlignedBytes {
+    encoded_with(name, linear, networks, row_network, None)
+}
+
+fn encoded_with(
     name: &str,
     (projection, expansion): (Option<Projection<'_>>, Option<Expansion<'_>>),
     networks: &[Network<'_>],
     row_network: &[u8],
+    confidence: Option<Confidence<'_>>,
 ) -> AlignedBytes {
     let shape = ModelShape { rows: row_network.len(), inputs: COLS, outputs: OUTPUTS };
     let unnamed = Metadata::unnamed(shape);
     // In the files in testdata, the units have the same names as the columns.
     let (input_units, output_units) = (unnamed.input_names, unnamed.output_names);
     let metadata = Metadata { name, thickness_mm: 5.0, input_units, output_units, ..unnamed };
-    let parts = ModelParts { projection, expansion, networks, row_network, metadata };
+    let parts = ModelParts { projection, expansion, confidence, networks, row_network, metadata };
     encode_to_vec(&parts).unwrap()
 }

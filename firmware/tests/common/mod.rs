@@ -15,6 +15,7 @@ use firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
 use firmware::store::{FlashError, Slot};
 use model_core::AlignedBytes;
 use model_core::blob::{Metadata, Model, ModelParts, ModelShape, encode_to_vec};
+use model_core::confidence::{Confidence, Sizes};
 use model_core::expansion::Expansion;
 use model_core::projection::Projection;
 use model_core::rbf::direct::{self, Parameters};
@@ -278,12 +279,44 @@ pub fn blob(seed: usize, centres: usize) -> AlignedBytes {
 
 /// A blob with `network` for both rows.
 pub fn blob_of(network: Network<'_>) -> AlignedBytes {
+    blob_with(network, None, false)
+}
+
+/// The blob of [`blob`] with a confidence, for readings relative to the baseline if `relative_inputs`. Its one component
+/// is of frames near 62 Ω, or near the baseline.
+pub fn blob_with_confidence(relative_inputs: bool) -> AlignedBytes {
+    let (readings, outputs) = (ROWS * COLS, ROWS * OUTPUTS);
+    let [middle, scale] = if relative_inputs { [1.0, 20.0] } else { [62.0, 0.5] };
+    let block = [
+        vec![middle; readings],
+        vec![scale; readings],
+        vec![0.0],                            // start of the projection
+        vec![0.408_248_3; readings],          // direction: the mean
+        vec![-1.0, 0.0, 0.5, 1.0, 0.25, 0.5], // c, o and W
+        vec![0.01, 0.0625, 4.0, 0.25],        // variances
+        vec![2.0; outputs],                   // ratios
+        vec![5.0],                            // threshold
+    ]
+    .concat();
+    let sizes = Sizes { readings, directions: 1, components: 1, outputs };
+    let confidence = Confidence::new(sizes, &block).unwrap();
+    let blob = blob(3, 4);
+    let model = Model::decode(&blob).unwrap();
+    blob_with(model.networks().next().unwrap(), Some(confidence), relative_inputs)
+}
+
+fn blob_with(
+    network: Network<'_>,
+    confidence: Option<Confidence<'_>>,
+    relative_inputs: bool,
+) -> AlignedBytes {
     let shape = network.shape();
     let shape = ModelShape { rows: ROWS, inputs: shape.inputs, outputs: shape.outputs };
-    let metadata = Metadata::unnamed(shape);
+    let metadata = Metadata { relative_inputs, ..Metadata::unnamed(shape) };
     let parts = ModelParts {
         projection: None,
         expansion: None,
+        confidence,
         networks: &[network],
         row_network: &[0; ROWS],
         metadata,
@@ -317,6 +350,7 @@ pub fn blob_of_components(components: usize) -> AlignedBytes {
     let parts = ModelParts {
         projection: Projection::new(readings, COLS, &projection).ok(),
         expansion: Expansion::new(components, outputs, &expansion).ok(),
+        confidence: None,
         networks: &[network],
         row_network: &[0; ROWS],
         metadata: Metadata::unnamed(ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS }),

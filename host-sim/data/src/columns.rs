@@ -51,6 +51,19 @@ pub fn groups(names: &[String]) -> Vec<(&str, Vec<usize>)> {
     groups
 }
 
+/// Quantity that an output measures: outputs of one quantity are compared as they are, those of different ones by
+/// their spread. It is the unit, but that the contact's place, depth and shear are three quantities in mm. "" for a
+/// name that states none.
+#[must_use]
+pub fn quantity_of(name: &str) -> &str {
+    match name {
+        "contact_x_mm" | "contact_y_mm" => "contact_centre",
+        "contact_depth_mm" => "contact_depth",
+        "contact_shear_x_mm" | "contact_shear_y_mm" => "contact_shear",
+        _ => unit_of(name),
+    }
+}
+
 /// Whether `group` is compression in mm, the only one with a positional error.
 #[must_use]
 pub fn is_compression(group: &str) -> bool {
@@ -110,6 +123,9 @@ mod tests {
         assert_eq!(unit_of("r12c3_ohm"), "Ω");
         assert_eq!(unit_of("fx_n"), "N");
         assert_eq!(unit_of("ch1"), "");
+        assert_eq!(quantity_of("contact_x_mm"), quantity_of("contact_y_mm"));
+        assert_ne!(quantity_of("contact_x_mm"), quantity_of("contact_depth_mm"));
+        assert_eq!(quantity_of("r4e2_dz_mm"), quantity_of("x_mm"));
     }
 
     #[test]

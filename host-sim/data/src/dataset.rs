@@ -181,7 +181,7 @@ impl RowTable {
 fn chosen(file: &CsvFile, pattern: Option<&str>, role: Role) -> Result<Vec<usize>> {
     let usual = match role {
         Role::Inputs => "r*c*_ohm",
-        Role::Outputs => "r*e*_d?_mm,r*e*_f?_n",
+        Role::Outputs => "r*e*_d?_mm,r*e*_f?_n,contact_*",
     };
     let known = || columns::some_names(&file.header);
     let selected = columns::select(&file.header, pattern.unwrap_or(usual));

@@ -41,6 +41,10 @@ pub enum Purpose {
     Baseline = 10,
     /// Samples from which the least possible error is computed.
     Posterior = 11,
+    /// Start of a mixture of Gaussians.
+    Mixture = 12,
+    /// What is wrong with a frame that a model should find novel.
+    Anomaly = 13,
 }
 
 /// Set of frames that draws are for. Training and test frames are independent.
@@ -54,6 +58,10 @@ pub enum Stream {
     Span = 3,
     /// Frames that training is refined on, besides those it starts from.
     Refinement = 4,
+    /// Frames that a model's confidence is calibrated on.
+    Calibration = 5,
+    /// Frames that a model should find novel.
+    Anomaly = 6,
 }
 
 /// Seeded source of random draws.

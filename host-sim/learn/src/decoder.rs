@@ -14,7 +14,7 @@ pub struct Estimates {
     /// Standard deviation of each value, in its unit, `frames × outputs`; only from decoders that
     /// compute it.
     pub deviation: Option<Vec<f64>>,
-    /// Novelty of each frame, only from decoders that compute it: 1 is as usual as anything in training.
+    /// Novelty of each frame in nats, only from decoders that compute it: above 0, it is unlike the frames of training.
     pub novelty: Option<Vec<f64>>,
 }
 

@@ -50,11 +50,17 @@ pub enum Error {
         /// Number format of the network.
         format: Format,
     },
-    /// Network for the whole array asked for, while the data has readings of one row-wire only.
+    /// Network for the whole array asked for, while the data has few readings, of one row-wire only.
     #[error(
-        "whole-array input needs the readings of two row-wires or more; the data has one: leave it out"
+        "whole-array input needs the readings of two row-wires or more, or more than {least} readings; the data has \
+         {readings} of one: leave it out"
     )]
-    OneRow,
+    OneRow {
+        /// Number of readings in a frame.
+        readings: usize,
+        /// Number of readings that is not enough: that of the features.
+        least: usize,
+    },
     /// Readings without any regression on which a projection could be based.
     #[error(
         "the readings have no regression: some are no numbers, or so large that sums of their squares lose all digits"

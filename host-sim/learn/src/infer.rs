@@ -1,5 +1,6 @@
 //! Inference over whole tables, by the same code that runs on the device.
 
+use model_core::confidence::{Confidence, Sizes};
 use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
 use model_core::rbf::{Network, Shape};
 use rayon::prelude::*;
@@ -154,4 +155,23 @@ fn infer_with<E: ExpKernel>(network: &Network<'_>, readings: &[f64], outputs: &m
     let overflow = inferred.iter().any(|value| !value.is_finite());
     let values = inferred.into_iter().map(|value| if overflow { f32::NAN } else { value });
     outputs.iter_mut().zip(values).for_each(|(place, value)| *place = f64::from(value));
+}
+
+/// Deviations (`lines × outputs`) and novelty of every line of `inputs`, as a device computes them.
+pub(crate) fn assess_lines(confidence: Confidence<'_>, inputs: &[f64]) -> (Vec<f32>, Vec<f64>) {
+    let Sizes { readings, outputs, .. } = confidence.sizes();
+    let mut deviations = vec![0.0; inputs.len() / readings * outputs];
+    let novelty = inputs
+        .par_chunks_exact(readings)
+        .zip(deviations.par_chunks_exact_mut(outputs))
+        .map_init(
+            || vec![0.0; confidence.sizes().scratch_floats()],
+            |scratch, (line, deviation)| {
+                let line = line.iter().map(|reading| *reading as f32);
+                let novelty = confidence.assess(line, scratch, deviation);
+                f64::from(novelty.expect("lengths of the confidence"))
+            },
+        )
+        .collect();
+    (deviations, novelty)
 }

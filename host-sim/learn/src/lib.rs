@@ -29,6 +29,7 @@ pub mod relative;
 pub mod train;
 pub mod packing;
 pub mod prepared;
+pub mod confidence;
 pub mod decoders;
 pub mod select;
 pub mod cost;

@@ -6,6 +6,7 @@ use model_core::AlignedBytes;
 use model_core::blob::{
     self, Columns, DecodeError, Floats, Metadata, Model, ModelParts, NoiseKind,
 };
+use model_core::confidence::Confidence;
 use model_core::expansion::Expansion;
 use model_core::rbf::Network;
 use taxel_data::columns;
@@ -83,6 +84,7 @@ pub fn pack(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<Mod
     let parts = ModelParts {
         projection,
         expansion,
+        confidence: None,
         networks: &views,
         row_network: &row_network,
         metadata: Metadata {
@@ -154,6 +156,26 @@ impl ModelBlob {
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
+    }
+
+    /// Blob of this model with the given confidence, or another one instead of its own.
+    ///
+    /// # Errors
+    /// [`Error::NotPacked`] for a confidence of another model, or a blob that becomes too large.
+    pub fn with_confidence(&self, confidence: Confidence<'_>) -> Result<Self> {
+        let model = self.parse();
+        let networks: Vec<Network<'_>> = model.networks().collect();
+        let of_row = |row| model.network_of_row(row).map(|network| network as u8);
+        let row_network: Vec<u8> = (0..model.shape().rows).filter_map(of_row).collect();
+        let parts = ModelParts {
+            projection: model.projection(),
+            expansion: model.expansion(),
+            confidence: Some(confidence),
+            networks: &networks,
+            row_network: &row_network,
+            metadata: *model.metadata(),
+        };
+        Ok(Self { bytes: blob::encode_to_vec(&parts).map_err(Error::NotPacked)? })
     }
 
     /// Mean width σ of all Gaussians, on inputs scaled to [0, 1], to four digits.

@@ -9,7 +9,7 @@ use model_core::scale::CLAMP;
 use taxel_data::table::Table;
 
 use crate::decoder::{Estimates, FrameDecoder};
-use crate::infer::{Exponential, Prepared, is_missing};
+use crate::infer::{Exponential, Prepared, assess_lines, is_missing};
 use crate::packing::ModelBlob;
 use crate::relative::{ratios, reciprocals};
 use crate::train::{output_rank, projection};
@@ -126,11 +126,22 @@ impl<'b> PreparedModel<'b> {
         let inputs = self.model_inputs(readings);
         match self.model.projection() {
             Some(projection) => {
-                let features = self.model.shape().inputs;
+                let features = projection.features();
                 Cow::Owned(projection::features(projection, features, self.inputs(), &inputs))
             }
             None => inputs,
         }
+    }
+
+    /// Standard deviations of the outputs for `readings` (`frames × inputs`), `frames × outputs` in their units, and the
+    /// novelty of each frame in nats, above 0 for a novel one; `None` if the model has no confidence.
+    ///
+    /// A missing reading makes all of its frame's NaN.
+    #[must_use]
+    pub fn assess(&self, readings: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
+        let confidence = self.model.confidence()?;
+        let (deviations, novelty) = assess_lines(confidence, &self.model_inputs(readings));
+        Some((deviations.into_iter().map(f64::from).collect(), novelty))
     }
 
     /// Share of the inputs for `readings`, or of their features behind a projection, that inference clamps: those
@@ -176,6 +187,7 @@ impl FrameDecoder for PreparedModel<'_> {
     }
 
     fn decode(&self, (): &mut (), readings: &[f64]) -> Estimates {
+        // What a confidence tells is asked for apart (`assess`): tables of errors do not need it.
         Estimates::of_values(self.decode_lines(readings))
     }
 }

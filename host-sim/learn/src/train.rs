@@ -17,7 +17,7 @@ use crate::error::Result;
 
 pub mod kmeans;
 pub mod least_squares;
-mod principal;
+pub(crate) mod principal;
 pub mod format;
 pub mod projection;
 pub mod output_rank;
@@ -57,6 +57,8 @@ pub struct Options {
     /// Whether one network serves all rows, behind a projection of all readings, instead of one network
     /// a row.
     pub whole_array: bool,
+    /// Number of features that all readings are projected to; `None` for the usual one ([`projection::fit`]).
+    pub features: Option<usize>,
     /// Number of components that the network for all rows computes, which are expanded to its outputs; `None` for a
     /// network that computes all outputs.
     pub output_rank: Option<usize>,
@@ -73,6 +75,7 @@ impl Default for Options {
             search: kmeans::Search::default(),
             format: Format::F32,
             whole_array: false,
+            features: None,
             output_rank: None,
         }
     }
@@ -104,6 +107,11 @@ impl Options {
         if let (Some(rank), false) = (self.output_rank, self.whole_array) {
             let rule = "only one network for the whole array has outputs enough: leave it out";
             return Err(BadValue::new("output_rank", rank, rule));
+        }
+        if let (Some(features), false) = (self.features, self.whole_array) {
+            let rule =
+                "only one network for the whole array has a projection to features: leave it out";
+            return Err(BadValue::new("features", features, rule));
         }
         check_spread("spread", self.spread)
     }
@@ -304,7 +312,7 @@ pub fn train_refined(
 #[must_use]
 pub fn view<'b>(parameters: &'b [f32], dataset: &Dataset) -> Projection<'b> {
     let readings = dataset.inputs.names.len();
-    Projection::new(readings, readings / dataset.rows, parameters)
+    Projection::new(readings, parameters.len() / (readings + 1), parameters)
         .expect("a projection of these readings")
 }
 

@@ -5,6 +5,7 @@
 use taxel_data::ln;
 use taxel_data::simd::{self, LANES, Lanes};
 use taxel_simulate::World;
+use taxel_simulate::outputs::Outputs;
 use taxel_simulate::sensor::{LaneModel, Precision, Scratch};
 
 use crate::target::Target;
@@ -53,7 +54,7 @@ impl Rows<'_> {
     /// Number of outputs.
     pub fn outputs(&self) -> usize {
         let world = self.world;
-        self.wires.len() * world.sensor.electrodes_per_row_wire * world.outputs.axes.len()
+        world.outputs.count(&world.sensor, self.wires.len())
     }
 
     /// Ideal readings in Ω at the `latents` of each lane, within 1e-6.
@@ -157,7 +158,16 @@ impl Target for Frame<'_> {
 
     fn outputs(&self, latents: &[Lanes], memory: &mut Memory, outputs: &mut [Lanes]) {
         let Rows { world, wires, .. } = self.rows;
-        let (sensor, wanted) = (&world.sensor, &world.outputs);
+        let sensor = &world.sensor;
+        let wanted = match &world.outputs {
+            Outputs::Electrodes(wanted) => wanted,
+            Outputs::Contact(wanted) => {
+                let contact = world.motion.place_contact(sensor, latents);
+                let columns = wanted.iter().flat_map(|it| it.of(contact.as_ref(), sensor));
+                outputs.iter_mut().zip(columns).for_each(|(output, lanes)| *output = lanes);
+                return;
+            }
+        };
         let factors = wanted.axes.iter().map(|axis| (axis.index(), wanted.per_mm(sensor, *axis)));
         let factors: Vec<(usize, f64)> = factors.collect();
         let of_rows = outputs.chunks_exact_mut(sensor.electrodes_per_row_wire * factors.len());

@@ -17,6 +17,7 @@
 pub mod error;
 mod kinds;
 pub mod sensor;
+pub mod contact;
 pub mod motion;
 pub mod rubber;
 pub mod noise;
@@ -25,6 +26,7 @@ pub mod outputs;
 pub mod readout;
 pub mod world;
 pub mod synth;
+pub mod anomaly;
 pub mod forward;
 pub mod virtual_board;
 

@@ -9,6 +9,7 @@ use taxel_data::BadValue;
 use taxel_data::random::{Purpose, RandomLanes, Stream};
 use taxel_data::simd::Lanes;
 
+use crate::contact::Contact;
 use crate::kinds::kinds;
 use crate::sensor::Sensor;
 
@@ -62,6 +63,20 @@ pub trait Motion: Debug + Send + Sync {
         deformation_mm: &mut [[Lanes; 3]],
     );
 
+    /// Contact in the middle of the face of `sensor` with the largest radius, depth and shear; `None` for a motion
+    /// that is no single contact.
+    fn largest_contact(&self, _sensor: &Sensor) -> Option<Contact> {
+        None
+    }
+
+    /// Contact that `latents` stand for, one frame a lane; `None` for a motion that is no single contact.
+    ///
+    /// # Panics
+    /// If there are not as many latents as [`latents`](Self::latents) says.
+    fn place_contact(&self, _sensor: &Sensor, _latents: &[Lanes]) -> Option<Contact> {
+        None
+    }
+
     /// Draws the quantities that all rows and steps of a trajectory share, for
     /// [`LANES`](taxel_data::simd::LANES) trajectories of `sensor`.
     fn start<'m>(&'m self, sensor: &'m Sensor, draws: &mut Draws) -> Box<dyn Trajectories + 'm>;
@@ -80,6 +95,11 @@ pub trait Trajectories {
         draws: &mut Draws,
         deformation_mm: &mut [[Lanes; 3]],
     );
+
+    /// Contact at `step`; `None` where nothing touches, or for a motion that is no single contact.
+    fn contact(&self, _step: usize) -> Option<&Contact> {
+        None
+    }
 }
 
 /// Random sources of consecutive trajectories, one a lane.

@@ -117,6 +117,14 @@ impl Sensor {
         }
     }
 
+    /// Stiffness along z of the rubber as an elastic foundation, in N/mm³: force per area and compression. Every upper
+    /// electrode stands for an equal part of the face.
+    #[must_use]
+    pub fn foundation_n_per_mm3(&self) -> f64 {
+        let [x_mm, y_mm, _] = self.size_mm;
+        self.stiffness_n_per_mm[2] * self.upper_electrodes_mm.len() as f64 / (x_mm * y_mm)
+    }
+
     /// Upper electrodes of row-wire `row` (from 0), at rest, in mm.
     #[must_use]
     pub fn row_electrodes_mm(&self, row: usize) -> &[Vector3] {

@@ -127,7 +127,7 @@ impl<'w> Synthesis<'w> {
         let mut dataset = Dataset::empty(
             sensor.reading_names(&self.read_rows),
             self.outputs.names(sensor, &self.read_rows),
-            self.read_rows.len(),
+            self.outputs.row_tables(self.read_rows.len()),
             frames,
         );
         let (n, o) = (dataset.inputs.names.len(), dataset.outputs.names.len());
@@ -184,7 +184,7 @@ impl<'w> Synthesis<'w> {
     pub fn readings_of(&self, stream: Stream, frame: usize) -> Vec<f64> {
         let sensor = &self.world.sensor;
         let mut readings = vec![0.0; self.read_rows.len() * sensor.column_wires];
-        let mut outputs = vec![0.0; self.outputs.names(sensor, &self.read_rows).len()];
+        let mut outputs = vec![0.0; self.outputs.count(sensor, self.read_rows.len())];
         let synthesis = LaneSynthesis::new(self, stream, self.noise_span_ohm());
         synthesis.fill(&mut synthesis.workspace(), frame, &mut readings, &mut outputs);
         readings

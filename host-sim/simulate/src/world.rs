@@ -7,10 +7,10 @@ use taxel_data::error::require;
 use crate::drift::Drift;
 use crate::motion::{self, Independent, Press};
 use crate::noise::{Noise, NoiseKind};
-use crate::outputs::Outputs;
+use crate::outputs::{ContactOutput, ElectrodeOutputs, Outputs};
 use crate::readout::Readout;
 use crate::rubber;
-use crate::sensor::{Axis, Precision, Sensor};
+use crate::sensor::{Precision, Sensor};
 
 type Check = std::result::Result<(), BadValue>;
 
@@ -72,6 +72,13 @@ impl World {
         })
     }
 
+    /// World of the scene `contact`: that of `press`, whose outputs are the contact's centre, depth and force.
+    #[must_use]
+    pub fn contact() -> Self {
+        let wanted = vec![ContactOutput::Centre, ContactOutput::Depth, ContactOutput::Force];
+        Self { outputs: Outputs::Contact(wanted), ..Self::press() }
+    }
+
     /// World of the scene `paper`: every electrode moves independently.
     #[must_use]
     pub fn paper() -> Self {
@@ -85,29 +92,36 @@ impl World {
         self.sensor.reading_names(&self.read_rows)
     }
 
-    /// Names of the outputs that are wanted, row after row.
+    /// Names of the outputs that are wanted, row after row, or of the contact.
     #[must_use]
     pub fn output_names(&self) -> Vec<String> {
         self.outputs.names(&self.sensor, &self.read_rows)
     }
 
-    /// Full scale of the outputs along `axis`, in their unit.
-    ///
-    /// It is the largest deformation magnitude of any axis, as in the paper (1 mm in both reference
-    /// scenes), times the stiffness for forces.
-    #[must_use]
-    pub fn full_scale(&self, axis: Axis) -> f64 {
-        let range_mm = self.motion.range_mm();
-        let largest_mm = range_mm.as_flattened().iter().fold(0.0_f64, |a, b| a.max(b.abs()));
-        largest_mm * self.outputs.per_mm(&self.sensor, axis)
-    }
-
     /// Full scale of every output in its unit, in the order of [`output_names`](Self::output_names).
+    ///
+    /// Of an electrode it is the largest deformation magnitude of any axis, as in the paper (1 mm in both
+    /// reference scenes), times the stiffness for forces. Of the contact it is the extent of the face, or what the
+    /// [largest contact](motion::Motion::largest_contact) has.
     #[must_use]
     pub fn full_scales(&self) -> Vec<f64> {
-        let electrodes = self.read_rows.len() * self.sensor.electrodes_per_row_wire;
-        let of_one = self.outputs.axes.iter().map(|axis| self.full_scale(*axis));
-        of_one.collect::<Vec<_>>().repeat(electrodes)
+        match &self.outputs {
+            Outputs::Electrodes(outputs) => {
+                let range_mm = self.motion.range_mm();
+                let largest_mm =
+                    range_mm.as_flattened().iter().fold(0.0_f64, |a, b| a.max(b.abs()));
+                let axes = outputs.axes.iter();
+                let of_one = axes.map(|axis| largest_mm * outputs.per_mm(&self.sensor, *axis));
+                let electrodes = self.read_rows.len() * self.sensor.electrodes_per_row_wire;
+                of_one.collect::<Vec<_>>().repeat(electrodes)
+            }
+            Outputs::Contact(wanted) => {
+                let Some(largest) = self.motion.largest_contact(&self.sensor) else {
+                    return vec![f64::NAN; self.outputs.count(&self.sensor, 0)];
+                };
+                wanted.iter().flat_map(|it| it.full_scales(&largest, &self.sensor)).collect()
+            }
+        }
     }
 
     /// Changes the noise level, a fraction (0.005 is 0.5 %).
@@ -131,7 +145,10 @@ impl World {
         self.drift.map_or(Ok(()), |drift| check_gain("drift.gain", drift.gain))?;
         rows(self)?;
         readout(&self.readout)?;
-        outputs(&self.outputs)
+        match &self.outputs {
+            Outputs::Electrodes(wanted) => outputs_of_electrodes(wanted),
+            Outputs::Contact(wanted) => outputs_of_contact(wanted, self),
+        }
     }
 
     /// Checks that so many `frames` fit in memory; `field` names them in the message.
@@ -139,8 +156,8 @@ impl World {
     /// # Errors
     /// [`BadValue`] for too many frames, or none.
     pub fn check_frames(&self, field: &str, frames: usize) -> Check {
-        let of_an_electrode = self.sensor.electrodes_per_row_wire * self.outputs.axes.len();
-        let of_a_frame = self.read_rows.len() * (self.sensor.column_wires + of_an_electrode);
+        let rows = self.read_rows.len();
+        let of_a_frame = rows * self.sensor.column_wires + self.outputs.count(&self.sensor, rows);
         let most = MOST_VALUES / of_a_frame;
         require((1..=most).contains(&frames), field, frames, || {
             format!(
@@ -295,11 +312,27 @@ fn readout(r: &Readout) -> Check {
     Ok(())
 }
 
-fn outputs(outputs: &Outputs) -> Check {
+fn outputs_of_electrodes(outputs: &ElectrodeOutputs) -> Check {
     let axes = &outputs.axes;
     let ascending = axes.windows(2).all(|pair| pair[0].index() < pair[1].index());
     let letters: Vec<char> = axes.iter().map(|axis| axis.letter()).collect();
     require(!axes.is_empty() && ascending, "outputs.axes", format!("{letters:?}"), || {
         "list at least one of \"x\", \"y\", \"z\", each once, always in the order x, y, z".into()
+    })
+}
+
+fn outputs_of_contact(wanted: &[ContactOutput], world: &World) -> Check {
+    let names: Vec<String> = wanted.iter().map(|it| format!("{it:?}").to_lowercase()).collect();
+    let ascending = wanted.windows(2).all(|pair| pair[0] < pair[1]);
+    require(!wanted.is_empty() && ascending, "outputs.contact", format!("{names:?}"), || {
+        "list at least one of \"centre\", \"depth\", \"shear\", \"force\", each once, always in this \
+         order"
+            .into()
+    })?;
+    let has_contact = world.motion.largest_contact(&world.sensor).is_some();
+    require(has_contact, "outputs.contact", format!("{names:?}"), || {
+        "electrodes that move on their own have no contact; set deformation.kind = \"press\", or ask for \
+         outputs.quantity and outputs.axes"
+            .into()
     })
 }

@@ -1,9 +1,9 @@
 //! Command `decode`: readings to estimates, with a trained model.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
-use host_sim::Result;
+use host_sim::{Error, Result};
 use serde::Serialize;
 use taxel_data::csv_file::{self, CsvFile};
 use taxel_data::output;
@@ -22,6 +22,7 @@ use super::{Common, print};
 #[derive(Args)]
 #[command(after_help = "Examples:
   host-sim decode press.bin readings.csv -o estimate.csv
+  host-sim decode press.bin readings.csv --confidence -o estimate.csv
   host-sim decode relative.bin readings.csv --baseline rest.csv -o estimate.csv")]
 pub struct Arguments {
     /// Weight blob.
@@ -31,6 +32,10 @@ pub struct Arguments {
     /// CSV file to write, with the model's output columns.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
+    /// Also write a column NAME_deviation for each output NAME, and novelty_nats, of a model with a confidence: 68 % of
+    /// errors are within one deviation, and above 0 a frame is novel (docs/confidence.md).
+    #[arg(long)]
+    confidence: bool,
     #[command(flatten)]
     baseline: BaselineArgument,
     /// Exponential of the activations.
@@ -42,6 +47,8 @@ pub struct Arguments {
 struct Summary {
     frames: usize,
     frames_with_missing_readings: usize,
+    /// Number of novel frames, if confidence was asked for.
+    novel_frames: Option<usize>,
     exponential: Exponential,
     file: PathBuf,
 }
@@ -55,14 +62,23 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let readings = model_inputs(&model, &file)?;
     remark_on_range(&model, &readings);
     let estimate = model.decode_table(&readings);
-    let names = estimate.names.iter().map(String::as_str);
-    csv_file::write(&arguments.output, names, estimate.lines().map(|l| l.iter().copied()))?;
+    let assessed = arguments.confidence.then(|| model.assess(&readings.values));
+    let assessed = match assessed {
+        Some(None) => {
+            let message = "it has no confidence: train it with --confidence".into();
+            return Err(Error::Unfit { path: arguments.model.clone(), message });
+        }
+        Some(assessed) => assessed,
+        None => None,
+    };
+    write(&arguments.output, &estimate, assessed.as_ref())?;
     let inputs = model.model_inputs(&readings.values);
     let frames = inputs.chunks_exact(readings.names.len());
     let incomplete = frames.filter(|frame| frame.iter().any(|v| is_missing(*v))).count();
     let summary = Summary {
         frames: estimate.len(),
         frames_with_missing_readings: incomplete,
+        novel_frames: assessed.map(|(_, novelty)| novelty.iter().filter(|n| **n > 0.0).count()),
         exponential: arguments.exponential,
         file: arguments.output.clone(),
     };
@@ -71,6 +87,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     }
     let mut page = print::Page::default();
     page.line(format_args!("{} frames decoded into {}", summary.frames, summary.file.display()));
+    if let Some(novel) = summary.novel_frames {
+        page.line(format_args!("{novel} of them are novel: unlike the frames of training"));
+    }
     if incomplete > 0 {
         let lost = if model.model().projection().is_some() {
             "all outputs are empty there"
@@ -80,6 +99,22 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         page.line(format_args!("{incomplete} of them miss a reading: {lost}"));
     }
     page.print()
+}
+
+/// Writes the estimates, and what was `assessed` of them: deviations and the novelty of each frame.
+fn write(path: &Path, estimate: &Table, assessed: Option<&(Vec<f64>, Vec<f64>)>) -> Result<()> {
+    let names = estimate.names.iter().cloned();
+    let Some((deviations, novelty)) = assessed else {
+        let lines = estimate.lines().map(|line| line.iter().copied());
+        return Ok(csv_file::write(path, estimate.names.iter().map(String::as_str), lines)?);
+    };
+    let of_deviations = estimate.names.iter().map(|name| format!("{name}_deviation"));
+    let names: Vec<String> = names.chain(of_deviations).chain(["novelty_nats".into()]).collect();
+    let lines = estimate.lines().zip(deviations.chunks_exact(estimate.names.len())).zip(novelty);
+    let lines = lines.map(|((values, deviations), novelty)| {
+        values.iter().chain(deviations).chain([novelty]).copied()
+    });
+    Ok(csv_file::write(path, names.iter().map(String::as_str), lines)?)
 }
 
 /// Share of clamped readings above which the model probably belongs to another sensor.

@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use host_sim::by_depth::{DepthErrors, by_depth};
+use host_sim::evaluate::confidence::{Coverage, coverage};
 use host_sim::metrics::{self, Errors, LimitSummary, Measure};
 use host_sim::{Error, Result};
 use serde::Serialize;
@@ -11,6 +13,7 @@ use taxel_learn::{Exponential, ModelBlob};
 use taxel_limit::Refusal;
 
 use super::arguments::exponential;
+use super::confidence;
 use super::decode::remark_on_range;
 use super::readings::{BaselineArgument, model_inputs, table_of};
 use super::{Common, print};
@@ -43,6 +46,12 @@ struct Summary {
     errors: Vec<Errors>,
     /// Errors of always predicting the mean of these outputs.
     mean_errors: Vec<Errors>,
+    /// Errors of the model by the depth of the contact, if that is an output.
+    by_depth: Vec<DepthErrors>,
+    /// What the intervals of a model with a confidence cover; empty without one.
+    coverage: Vec<Coverage>,
+    /// Share of the frames without missing readings that a model with a confidence finds novel.
+    percent_novel: Option<f64>,
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
@@ -72,13 +81,24 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             message: "no line has both the model's readings and a true output; fill them in".into(),
         });
     }
+    let (deviations, novelty) = model.assess(&readings.values).unzip();
+    let ratios_95 = model.model().confidence().map_or(&[][..], |it| it.ratios_95());
+    let percent_novel = novelty.as_deref().map(|novelty: &[f64]| {
+        let told = novelty.iter().filter(|novelty| !novelty.is_nan()).count();
+        100.0 * novelty.iter().filter(|novelty| **novelty > 0.0).count() as f64 / told.max(1) as f64
+    });
     let summary = Summary {
+        coverage: deviations.map_or(vec![], |deviations: Vec<f64>| {
+            coverage(&truth, &estimate.values, &deviations, ratios_95)
+        }),
+        percent_novel,
         frames: readings.len(),
         values: truth.values.len(),
         values_evaluated: errors.iter().map(|group| group.count).sum(),
         exponential: arguments.exponential,
         errors,
         mean_errors: metrics::by_group(&truth, &means, &measure),
+        by_depth: by_depth(&truth, &estimate.values, &measure),
     };
     if common.json {
         return print::json(&summary);
@@ -94,5 +114,14 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     print::errors(&mut page, &[("model", &summary.errors), ("mean", &summary.mean_errors)]);
     print::errors_legend(&mut page);
     page.line(LimitSummary::of(&Err(Refusal::Measured)).note());
+    print::by_depth(&mut page, &summary.by_depth);
+    if let Some(percent) = summary.percent_novel {
+        page.line("");
+        page.line("Errors that the model's intervals of 68.3 % and 95 % cover:");
+        confidence::page(&mut page, &summary.coverage);
+        page.line(format_args!(
+            "novel, unlike the frames of training: {percent:.2} % of the frames"
+        ));
+    }
     page.print()
 }

@@ -38,6 +38,8 @@ struct Summary {
     projected_features: usize,
     /// Components that the one network computes and that are expanded to all outputs; 0 without an expansion.
     expanded_components: usize,
+    /// What tells deviations and novelty; `None` for a model without a confidence.
+    confidence: Option<ConfidenceSummary>,
     networks: Vec<NetworkSummary>,
     noise_kind: String,
     noise_level: f32,
@@ -53,6 +55,13 @@ struct Summary {
     frame: Frames<Cost>,
     inputs: Vec<ColumnSummary>,
     outputs: Vec<OutputSummary>,
+}
+
+#[derive(Serialize)]
+struct ConfidenceSummary {
+    directions: usize,
+    components: usize,
+    bytes: usize,
 }
 
 #[derive(Serialize)]
@@ -120,8 +129,13 @@ fn summarise(blob: &ModelBlob) -> Result<Summary> {
         rows: shape.rows,
         inputs_per_row: shape.inputs,
         outputs_per_row: shape.outputs,
+        confidence: model.confidence().map(|it| ConfidenceSummary {
+            directions: it.sizes().directions,
+            components: it.sizes().components,
+            bytes: 4 * it.block().len(),
+        }),
         relative_inputs: metadata.relative_inputs,
-        projected_features: model.projection().map_or(0, |_| shape.inputs),
+        projected_features: model.projection().map_or(0, |it| it.features()),
         expanded_components: design.components.unwrap_or(0),
         networks: networks.collect(),
         noise_kind: format!("{:?}", metadata.noise_kind).to_lowercase(),
@@ -154,7 +168,12 @@ fn needs(model: &Model<'_>, bytes: usize) -> Vec<String> {
     let (needed, most) = (scratch_floats(model), room.scratch_floats());
     let too_many = (other_image.is_none() && needed > most).then(|| {
         let spare = needed - most;
-        format!("no device takes it: {spare} components fewer are the most there is room for")
+        let fewer = if model.components() > spare {
+            format!("{spare} components fewer are the most there is room for")
+        } else {
+            format!("it needs room for {spare} numbers too many: give fewer features")
+        };
+        format!("no device takes it: {fewer}")
     });
     too_large.into_iter().chain(other_image).chain(too_many).collect()
 }
@@ -204,6 +223,12 @@ fn page_of(s: &Summary) -> print::Page {
     if s.expanded_components > 0 {
         let (components, outputs) = (s.expanded_components, s.rows * s.outputs_per_row);
         line("expansion", format!("{components} components → {outputs} outputs of all rows"));
+    }
+    if let Some(ConfidenceSummary { directions, components, bytes }) = s.confidence {
+        line(
+            "confidence",
+            format!("{components} components in {directions} directions, {bytes} bytes"),
+        );
     }
     let networks: Vec<String> = s.networks.iter().map(NetworkSummary::line).collect();
     let mut index = 0;

@@ -3,9 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use host_sim::evaluate::limit::{self, Figures, Level, LimitResult, Plan};
+use host_sim::evaluate::limit::{self, Candidate, Figures, Level, LimitResult, Plan};
+use host_sim::metrics::DecoderErrors;
 use host_sim::{Error, Result, report};
 use taxel_data::output;
+use taxel_learn::ModelBlob;
 use taxel_limit::identify::Observability;
 
 use super::progress::Terminal;
@@ -23,7 +25,9 @@ const PRINTED_VALUES: usize = 6;
 /// scene's own prior and noise, for ideal readings: a drift of the gain, circuits and time are not modelled. A figure
 /// that the sample does not carry is refused (docs/what-the-sensor-knows.md).
 #[derive(Args)]
-#[command(after_help = "Example: host-sim limit press --row 4 --noise 0.005,0.01 -o out/limit")]
+#[command(after_help = "Examples:
+  host-sim limit press --row 4 --noise 0.005,0.01 -o out/limit
+  host-sim limit press --model m.bin -n 2000")]
 pub struct Arguments {
     #[command(flatten)]
     scene: SceneArgument,
@@ -39,6 +43,9 @@ pub struct Arguments {
     /// Try other pitches, heights, and numbers of wires: the directions that each shows.
     #[arg(long)]
     geometry: bool,
+    /// Models of the scene to judge on the same frames: their errors, and the ratios of these to the limit.
+    #[arg(long, value_name = "FILE,…", value_delimiter = ',')]
+    model: Vec<PathBuf>,
     /// Folder that receives limit.json, a page limit.html with pictures, and two pictures by themselves.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
@@ -70,7 +77,12 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         return Err(Error::Usage(format!("--frames {frames}: give at least 2")));
     }
     world.check_frames("--frames", frames)?;
-    let plan = Plan { noise_levels: noise_levels.to_vec(), frames, geometry: arguments.geometry };
+    let models = arguments.model.iter().map(|file| {
+        let model = Candidate { file: file.clone(), blob: ModelBlob::read(file)? };
+        model.check(world).map(|()| model)
+    });
+    let models: Vec<Candidate> = models.collect::<Result<_>>()?;
+    let plan = Plan { noise_levels, frames, geometry: arguments.geometry, models: &models };
     let compute = || {
         let result = limit::compute(&scene, &plan, &Terminal::new())?;
         if let Some(folder) = &arguments.output {
@@ -163,6 +175,7 @@ fn limits(page: &mut print::Page, result: &LimitResult) {
         for figures in &level.limits {
             page.line(limit_line(level, figures, result));
         }
+        level.models.iter().for_each(|model| page.line(model_line(level, model)));
     }
     let priors = groups.into_iter().flatten().map(|g| format!("{:>9.4}{:18}", g.prior_rmse, ""));
     page.line(format_args!("{:>7} {:<8}{}", "", "prior", priors.collect::<String>().trim_end()));
@@ -171,6 +184,23 @@ fn limits(page: &mut print::Page, result: &LimitResult) {
          RMSE of the posterior means on these frames. prior: always predicting the mean. ESS: effective samples of a\n\
          posterior, fewest and median. MC: largest share of the squared error that is the sample's own; it is subtracted.",
     );
+    if result.levels.iter().any(|level| !level.models.is_empty()) {
+        page.line(
+            "Models: RMSE on these frames, and the ratio to the limit of all readings ± its standard error.",
+        );
+    }
+}
+
+fn model_line(level: &Level, model: &DecoderErrors) -> String {
+    let cells = model.errors.iter().map(|errors| {
+        let ratio = match (errors.ratio_to_limit, errors.ratio_standard_error) {
+            (Some(ratio), Some(error)) => format!("{ratio:.3} ± {error:.3} ×"),
+            _ => "–".into(),
+        };
+        format!(" {:>8.4} {ratio:>17}", errors.rmse)
+    });
+    let cells: String = cells.collect();
+    format!("{:>7} {:<8}{cells}   {}", percent(level.noise_level), "model", model.decoder)
 }
 
 fn limit_line(level: &Level, figures: &Figures, result: &LimitResult) -> String {

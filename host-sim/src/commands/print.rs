@@ -3,6 +3,7 @@
 use std::fmt::{Display, Write as _};
 use std::io::Write as _;
 
+use host_sim::by_depth::DepthErrors;
 use host_sim::metrics::{Definition, Errors};
 use host_sim::{Error, Result};
 use serde::Serialize;
@@ -43,8 +44,10 @@ pub fn json(value: &impl Serialize) -> Result<()> {
 
 /// Adds one line a decoder and group, under a header of definitions.
 pub fn errors(page: &mut Page, decoders: &[(&str, &[Errors])]) {
+    let names = decoders.iter().flat_map(|(_, groups)| groups.iter().map(|e| e.group.len()));
+    let width = names.max().unwrap_or(0).max(10);
     page.line(format_args!(
-        "{:<8} {:<10} {:>9}    {:>12} {:>8} {:>7} {:>9} {:>8} {:>9}",
+        "{:<8} {:<width$} {:>9}    {:>12} {:>8} {:>7} {:>9} {:>8} {:>9}",
         "decoder", "output", "RMSE", "× limit", "rel. L2", "%FS", "position", "R²", "mean rel"
     ));
     for (decoder, groups) in decoders {
@@ -53,7 +56,7 @@ pub fn errors(page: &mut Page, decoders: &[(&str, &[Errors])]) {
                 definition.of(group).map_or("-".into(), |value| format!("{value:.2} %"))
             };
             page.line(format_args!(
-                "{:<8} {:<10} {:>9} {:<2} {:>12} {:>8} {:>7} {:>9} {:>8} {:>9}",
+                "{:<8} {:<width$} {:>9} {:<2} {:>12} {:>8} {:>7} {:>9} {:>8} {:>9}",
                 decoder,
                 group.group,
                 number(group.rmse),
@@ -69,6 +72,27 @@ pub fn errors(page: &mut Page, decoders: &[(&str, &[Errors])]) {
                 percent(Definition::MeanRelativePercent)
             ));
         }
+    }
+}
+
+/// Adds a table of RMSE by the depth of the contact, if there is one.
+pub fn by_depth(page: &mut Page, ranges: &[DepthErrors]) {
+    let Some(first) = ranges.first() else { return };
+    let groups =
+        first.errors.iter().map(|e| format!(" {:>19}", format!("{}, {}", e.group, e.unit)));
+    let groups: String = groups.collect();
+    page.line(format_args!(
+        "\nRMSE by depth of the contact\n{:<16} {:>7}{groups}",
+        "depth", "frames"
+    ));
+    for range in ranges {
+        let errors = range.errors.iter().map(|e| format!(" {:>19}", number(e.rmse)));
+        page.line(format_args!(
+            "{:<16} {:>7}{}",
+            range.range(),
+            range.frames,
+            errors.collect::<String>()
+        ));
     }
 }
 

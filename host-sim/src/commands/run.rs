@@ -134,8 +134,12 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
     print::errors(&mut page, &decoders);
     print::errors_legend(&mut page);
     page.line(result.limit.note());
-    let wires: Vec<String> = result.rows.iter().map(|row| row.row_wire.to_string()).collect();
-    page.line(format_args!("\nnetwork RMSE by row-wire ({}):", wires.join(", ")));
+    print::by_depth(&mut page, &result.by_depth);
+    if !result.rows.is_empty() {
+        let wires = result.rows.iter().map(|row| row.row_wire.to_string());
+        let wires: Vec<String> = wires.collect();
+        page.line(format_args!("\nnetwork RMSE by row-wire ({}):", wires.join(", ")));
+    }
     for group in result.rows.first().map_or(&[][..], |row| &row.errors) {
         let of_row = |errors: &run::RowErrors| {
             let found = errors.errors.iter().find(|e| e.group == group.group);

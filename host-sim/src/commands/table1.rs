@@ -42,7 +42,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     arguments.relative_inputs.apply(&mut scene);
     let names = scene.world.output_names();
     let groups: Vec<&str> = columns::groups(&names).into_iter().map(|(group, _)| group).collect();
-    if !groups.contains(&arguments.group.as_str()) {
+    if scene.table1.is_some() && !groups.contains(&arguments.group.as_str()) {
         let message = format!("--group {}: the scene has {}", arguments.group, groups.join(", "));
         return Err(Error::Usage(message));
     }

@@ -4,19 +4,18 @@ use std::path::{Path, PathBuf};
 
 use super::progress::Terminal;
 use clap::Args;
-use host_sim::experiment::{EMBEDDED, Experiment, MoreFrames};
+use host_sim::experiment::{EMBEDDED, Experiment};
 use host_sim::{Error, Result};
 use model_core::rbf::Format;
 use serde::Serialize;
 use taxel_data::csv_file::CsvFile;
 use taxel_data::dataset::Dataset;
 use taxel_data::error::{Problem, Role};
-use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
 use taxel_data::{columns, output};
 use taxel_learn::select::{self, Selection};
-use taxel_learn::train::{Examples, Refinement, WHOLE_ARRAY_SPREAD, train, train_refined};
-use taxel_learn::{Options, Origin, Trained, pack};
+use taxel_learn::train::{Refinement, WHOLE_ARRAY_SPREAD};
+use taxel_learn::{Options, Origin, pack};
 use taxel_simulate::Synthesis;
 
 use super::arguments::format;
@@ -24,11 +23,16 @@ use super::readings;
 use super::scene_argument::{NoiseArgument, RefineArgument, RelativeInputsArgument};
 use super::{Common, print};
 
+mod source;
+
+use source::{More, Source, of_folds};
+
 /// Train a model on a scene or a CSV file, and write its blob.
 ///
 /// A CSV file trains one network for all selected columns. If the columns have the project's own names
 /// (r4c17_ohm, r4e2_dz_mm), it trains one for each row-wire.
 #[derive(Args)]
+#[expect(clippy::struct_excessive_bools, reason = "each is an option")]
 #[command(after_help = "Examples:
   host-sim train press -o press.bin
   host-sim train press --whole-array --centres 256 --output-rank 24 --format fixed16 -o press.bin
@@ -36,7 +40,7 @@ use super::{Common, print};
   host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --select --fold-column fold -o m.bin
   host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --relative-inputs --baseline rest.csv -o m.bin")]
 pub struct Arguments {
-    /// A built-in scene (paper, press), a scene file (.toml) or a CSV file.
+    /// A built-in scene (paper, press, contact), a scene file (.toml) or a CSV file.
     source: String,
     /// Blob to write.
     #[arg(short, long, value_name = "FILE")]
@@ -44,7 +48,7 @@ pub struct Arguments {
     /// Reading columns of a CSV file: names with * and ?, comma-separated [default: r*c*_ohm].
     #[arg(long, value_name = "GLOB")]
     inputs: Option<String>,
-    /// Output columns of a CSV file [default: r*e*_d?_mm and r*e*_f?_n].
+    /// Output columns of a CSV file [default: r*e*_d?_mm, r*e*_f?_n and contact_*].
     #[arg(long, value_name = "GLOB")]
     outputs: Option<String>,
     /// Centres K; with --select, candidates [default: the scene's, or 64].
@@ -61,6 +65,10 @@ pub struct Arguments {
     /// more accurate, and faster from K = 64 on, but one missing reading leaves nothing to decode.
     #[arg(long)]
     whole_array: bool,
+    /// Features that --whole-array projects all readings to [default: as many as a row has readings, or 18 for outputs
+    /// that belong to no row].
+    #[arg(long, value_name = "F", allow_negative_numbers = true)]
+    features: Option<usize>,
     /// Let the network of --whole-array compute R components, which are expanded to all outputs once a frame. With many
     /// centres that takes fewer cycles and less flash; a small R loses accuracy (docs/projection.md).
     #[arg(long, value_name = "R")]
@@ -79,6 +87,11 @@ pub struct Arguments {
     select: bool,
     #[command(flatten)]
     refine: RefineArgument,
+    /// Let the model tell how far off each output may be, and how novel a frame is (docs/confidence.md). Estimates stay
+    /// the same. On a CSV file, it trains once more for every fold; give folds of whole places or days (--fold-column),
+    /// because frames of one resemble each other.
+    #[arg(long)]
+    confidence: bool,
     /// Folds, drawn at random, for cross-validation and for refinement on a CSV file [default: 5].
     #[arg(long, value_name = "N")]
     folds: Option<usize>,
@@ -92,42 +105,8 @@ pub struct Arguments {
     frames: Option<usize>,
 }
 
-/// Data that a model is trained on.
-struct Source {
-    dataset: Dataset,
-    origin: Origin,
-    defaults: Options,
-    /// Fold of each frame of measured data, or the scene that has more frames.
-    more: More,
-    /// Whether refinement is asked for.
-    refine: bool,
-}
-
-/// What refinement measures the error on.
-enum More {
-    Scene(Box<Experiment>),
-    Folds(Vec<usize>),
-}
-
-impl Source {
-    /// Trains on the data, refined if that is asked for.
-    fn train(&self, options: &Options, progress: &dyn Progress) -> Result<Trained> {
-        let settings = Refinement::default();
-        let refined = |examples| {
-            train_refined(&self.dataset, options, &settings, examples, progress).map_err(of_folds)
-        };
-        Ok(match &self.more {
-            _ if !self.refine => train(&self.dataset, options, progress)?,
-            More::Scene(experiment) => {
-                let synthesis = Synthesis::of(&experiment.world);
-                refined(Examples::Fresh(&MoreFrames { experiment, synthesis: &synthesis }))?
-            }
-            More::Folds(fold_of) => refined(Examples::Folds(fold_of))?,
-        })
-    }
-}
-
 #[derive(Serialize)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a field of the JSON")]
 struct Summary {
     file: PathBuf,
     blob_bytes: usize,
@@ -143,6 +122,8 @@ struct Summary {
     output_rank: Option<usize>,
     /// Whether inputs are readings relative to the baseline.
     relative_inputs: bool,
+    /// Whether the model tells deviations and novelty.
+    confidence: bool,
     /// Number formats of the networks, in their order.
     formats: Vec<&'static str>,
     outputs: Vec<String>,
@@ -174,6 +155,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         options.whole_array = true;
         options.spread *= WHOLE_ARRAY_SPREAD;
     }
+    options.features = arguments.features.or(options.features);
     options.output_rank = arguments.output_rank.or(options.output_rank);
     options.format = arguments.format.unwrap_or(options.format);
     if arguments.select && options.whole_array {
@@ -190,8 +172,12 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         None
     };
 
-    let trained = source.train(&options, &Terminal::new())?;
-    let blob = pack(&trained, &source.dataset, &source.origin)?;
+    let progress = Terminal::new();
+    let trained = source.train(&options, &progress)?;
+    let mut blob = pack(&trained, &source.dataset, &source.origin)?;
+    if source.confidence {
+        blob = source.with_confidence(&blob, &options, &progress)?;
+    }
     output::write_bytes(&arguments.output, blob.bytes())?;
 
     let model = blob.parse();
@@ -215,6 +201,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         affine_tail: options.affine_tail,
         output_rank: model.expansion().map(|expansion| expansion.components()),
         relative_inputs: source.dataset.relative_inputs,
+        confidence: model.confidence().is_some(),
         formats: model.networks().map(|n| n.format().name()).collect(),
         outputs: source.dataset.outputs.names.clone(),
         training_rmse: model.metadata().training_rmse.iter().map(f64::from).collect(),
@@ -238,6 +225,10 @@ fn from_scene(arguments: &Arguments, common: &Common) -> Result<Source> {
             return Err(Error::Usage(message));
         }
     }
+    if arguments.folds.is_some() && !arguments.select {
+        let message = "--folds holds out frames of a CSV file, or with --select; a scene has fresh frames: leave it out";
+        return Err(Error::Usage(message.into()));
+    }
     if arguments.baseline.is_some() {
         let message = "--baseline is for a CSV file; a scene synthesises its own: leave it out";
         return Err(Error::Usage(message.into()));
@@ -252,6 +243,7 @@ fn from_scene(arguments: &Arguments, common: &Common) -> Result<Source> {
         origin: scene.origin(),
         defaults: scene.options(),
         refine: arguments.refine.over(scene.training.refine),
+        confidence: arguments.confidence || scene.training.confidence,
         more: More::Scene(Box::new(scene)),
     })
 }
@@ -286,7 +278,9 @@ fn from_data(arguments: &Arguments, common: &Common) -> Result<Source> {
     let refine = arguments.refine.over(true);
     let fold_of = match &arguments.fold_column {
         Some(name) => folds_from(&file, name, &kept.lines)?,
-        None if refine || arguments.select => random_folds(arguments, dataset.frames(), seed)?,
+        None if refine || arguments.select || arguments.confidence => {
+            random_folds(arguments, dataset.frames(), seed)?
+        }
         None => vec![],
     };
     let name = path.file_stem().map_or("data".into(), |stem| stem.to_string_lossy());
@@ -295,6 +289,7 @@ fn from_data(arguments: &Arguments, common: &Common) -> Result<Source> {
         defaults: Options { seed, ..Options::default() },
         dataset,
         refine,
+        confidence: arguments.confidence,
         more: More::Folds(fold_of),
     })
 }
@@ -329,16 +324,6 @@ fn folds_from(file: &CsvFile, name: &str, lines: &[usize]) -> Result<Vec<usize>>
         return Err(taxel_data::Error::file(&file.path, problem).into());
     }
     Ok(select::number_folds(&values))
-}
-
-/// Error that names the options which choose folds.
-fn of_folds(error: taxel_learn::Error) -> Error {
-    match error {
-        taxel_learn::Error::Setting(bad) if bad.field == "folds" => {
-            Error::Usage(format!("{bad} (--folds or --fold-column, --no-refine)"))
-        }
-        other => other.into(),
-    }
 }
 
 /// Random folds, as many as asked for.
@@ -426,7 +411,7 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         }
     }
     page.line(format_args!(
-        "{}: {} bytes, CRC-32 {}, {}, K = {}{}, spread = {}{}, affine tail: {}, {} frames{}",
+        "{}: {} bytes, CRC-32 {}, {}, K = {}{}, spread = {}{}, affine tail: {}, {} frames{}{}",
         summary.file.display(),
         summary.blob_bytes,
         summary.blob_crc,
@@ -437,7 +422,8 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         if summary.refined { " (refined)" } else { "" },
         if summary.affine_tail { "yes" } else { "no" },
         summary.training_frames,
-        if summary.relative_inputs { ", inputs relative to the baseline" } else { "" }
+        if summary.relative_inputs { ", inputs relative to the baseline" } else { "" },
+        if summary.confidence { ", with confidence" } else { "" }
     ));
     if summary.centres < asked {
         page.line(format_args!(

@@ -241,7 +241,7 @@ pub fn measure(
         seed: world.seed,
         noise_level: world.noise.level,
         frames: settings.frames,
-        rows: world.read_rows.len(),
+        rows: world.read_rows.len() / rows_of_a_model_row(world),
         baseline_frames: settings.baseline_frames,
         model_crc: format!("{:08x}", model.model().crc()),
         frame_cycles: settings.frame_cycles,
@@ -253,13 +253,19 @@ pub fn measure(
     })
 }
 
+/// Number of row-wires in a row of the model: all, if outputs belong to none of them.
+fn rows_of_a_model_row(world: &World) -> usize {
+    let rows = world.read_rows.len();
+    rows / world.outputs.row_tables(rows)
+}
+
 /// Largest ‖Δ‖ in mm of each row of each test frame, whatever the world's outputs are.
 fn largest_deformations_mm(world: &World, frames: usize) -> Vec<f64> {
     let synthesis = Synthesis::of(world).ideal().outputs(Outputs::all_deformations());
     let deformations_mm = synthesis.frames(Stream::Test, frames).outputs.values;
     let length = |delta: &[f64]| delta.iter().map(|d| d * d).sum::<f64>().sqrt();
     deformations_mm
-        .chunks_exact(3 * world.sensor.electrodes_per_row_wire)
+        .chunks_exact(3 * world.sensor.electrodes_per_row_wire * rows_of_a_model_row(world))
         .map(|row| row.chunks_exact(3).map(length).fold(0.0, f64::max))
         .collect()
 }
@@ -294,7 +300,9 @@ impl Gate {
             let at_rest = frames.clone().untouched().frames(Stream::Training, baseline_frames);
             Table { values: at_rest.inputs.means(), names: at_rest.inputs.names }
         };
-        Self { baseline, readings: frames.world().sensor.column_wires, whole_array }
+        let world = frames.world();
+        let readings = rows_of_a_model_row(world) * world.sensor.column_wires;
+        Self { baseline, readings, whole_array }
     }
 
     /// Upper bound by [`woken_by_theory`]; the array wakes with any of its rows.

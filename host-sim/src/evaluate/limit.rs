@@ -1,26 +1,63 @@
-//! Limit of a scene: the least possible error by noise level, for the array and for each row alone, and what the
-//! sensor shows of its deformation at all.
+//! Limit of a scene: the least possible error by noise level, for the array and for each row alone, how near to it
+//! models come, and what the sensor shows of its deformation at all.
+
+use std::path::PathBuf;
 
 use serde::Serialize;
 use taxel_data::progress::Progress;
+use taxel_data::random::Stream;
+use taxel_learn::{Exponential, ModelBlob};
 use taxel_limit::geometry::{self, Variant};
 use taxel_limit::identify::{self, Observability, Prior};
 use taxel_limit::reference::{EffectiveSamples, GroupLimit};
 use taxel_limit::{Reference, Refusal};
-use taxel_simulate::World;
+use taxel_simulate::{Synthesis, World};
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::experiment::Experiment;
+use crate::metrics::{self, DecoderErrors, Measure};
 
 /// What to compute.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Plan {
+#[derive(Debug, Clone, Copy)]
+pub struct Plan<'p> {
     /// Noise levels, as fractions.
-    pub noise_levels: Vec<f64>,
+    pub noise_levels: &'p [f64],
     /// Number of test frames.
     pub frames: usize,
     /// Whether other geometries are tried.
     pub geometry: bool,
+    /// Models to judge beside the limit.
+    pub models: &'p [Candidate],
+}
+
+/// Model that is judged beside the limit.
+#[derive(Debug)]
+pub struct Candidate {
+    /// File that it was read from.
+    pub file: PathBuf,
+    /// The model.
+    pub blob: ModelBlob,
+}
+
+impl Candidate {
+    /// Checks that it decodes the readings of `world` to its outputs.
+    ///
+    /// # Errors
+    /// [`Error::Unfit`] names the file.
+    pub fn check(&self, world: &World) -> Result<()> {
+        let model = self.blob.parse();
+        let metadata = model.metadata();
+        let inputs = metadata.input_names.iter().eq(world.reading_names().iter());
+        let outputs = metadata.output_names.iter().eq(world.output_names().iter());
+        if inputs && outputs {
+            return Ok(());
+        }
+        let what = if inputs { "outputs" } else { "readings" };
+        let message = format!(
+            "the model has other {what} than the scene; train it on this scene and the same rows"
+        );
+        Err(Error::Unfit { path: self.file.clone(), message })
+    }
 }
 
 /// Number of test frames, unless a user says otherwise: as many posteriors of rows where rows move independently.
@@ -57,6 +94,8 @@ pub struct Level {
     pub noise_level: f64,
     /// Limits: of all readings together, then of each row from its own readings if there are several.
     pub limits: Vec<Figures>,
+    /// Errors of the plan's models on the same frames, with their ratios to the limit of all readings.
+    pub models: Vec<DecoderErrors>,
     /// What all readings show.
     pub observability: Observability,
     /// What each row's readings show.
@@ -90,18 +129,19 @@ impl Figures {
 /// Computes the limit of the experiment's scene.
 ///
 /// # Errors
-/// [`Error`](crate::Error) for a scene without noise.
+/// [`Error`] for a scene without noise, or a model of another scene.
 pub fn compute(
     experiment: &Experiment,
-    plan: &Plan,
+    plan: &Plan<'_>,
     progress: &dyn Progress,
 ) -> Result<LimitResult> {
     let world = &experiment.world;
+    plan.models.iter().try_for_each(|model| model.check(world))?;
     let prior = Prior::of(world);
     let levels = plan.noise_levels.iter().map(|noise_level| {
-        let mut world = world.clone();
-        world.set_noise_level(*noise_level)?;
-        level(&world, &prior, plan.frames, progress)
+        let mut experiment = experiment.clone();
+        experiment.world.set_noise_level(*noise_level)?;
+        level(&experiment, &prior, plan, progress)
     });
     let levels = levels.collect::<Result<Vec<Level>>>()?;
     let geometry = if plan.geometry {
@@ -123,10 +163,16 @@ pub fn compute(
     })
 }
 
-fn level(world: &World, prior: &Prior, frames: usize, progress: &dyn Progress) -> Result<Level> {
+fn level(
+    experiment: &Experiment,
+    prior: &Prior,
+    plan: &Plan<'_>,
+    progress: &dyn Progress,
+) -> Result<Level> {
+    let (world, frames) = (&experiment.world, plan.frames);
     let seen = |rows: &[usize]| {
         identify::observability(world, prior, rows)
-            .map_err(|refusal| crate::Error::Usage(format!("noise 0: {refusal}")))
+            .map_err(|refusal| Error::Usage(format!("noise 0: {refusal}")))
     };
     let observability = seen(&world.read_rows)?;
     let rows = world.read_rows.iter().map(|row| seen(&[*row])).collect::<Result<_>>()?;
@@ -142,5 +188,25 @@ fn level(world: &World, prior: &Prior, frames: usize, progress: &dyn Progress) -
         };
         limits.push(Figures::of(&[row], &own));
     }
-    Ok(Level { noise_level: world.noise.level, limits, observability, rows })
+    let measure = Measure { limit: all.ok(), ..experiment.measure() };
+    let models = plan.models.iter().map(|model| judge(model, experiment, frames, &measure));
+    let models = models.collect();
+    Ok(Level { noise_level: world.noise.level, limits, models, observability, rows })
+}
+
+/// Errors of a model on the experiment's first test frames.
+fn judge(
+    model: &Candidate,
+    experiment: &Experiment,
+    frames: usize,
+    measure: &Measure,
+) -> DecoderErrors {
+    let decoder = model.blob.prepare(Exponential::default()).of_inputs();
+    let mut experiment = experiment.clone();
+    experiment.training.relative_inputs = decoder.model().metadata().relative_inputs;
+    let test = experiment.dataset(&Synthesis::of(&experiment.world), Stream::Test, frames);
+    DecoderErrors {
+        decoder: model.file.display().to_string(),
+        ..metrics::judge(&decoder, &test, measure)
+    }
 }

@@ -15,6 +15,7 @@ use taxel_learn::cost::{Cost, Prices, kernel_name};
 use taxel_learn::decoders::{BASELINES, Baseline};
 use taxel_learn::{Exponential, Options};
 use taxel_simulate::Synthesis;
+use taxel_simulate::outputs::Outputs;
 
 use super::gate;
 use crate::error::{Error, NoPoint, Result};
@@ -238,10 +239,14 @@ pub fn compute(
     let prices = Prices::accepted()?;
     check(experiment, plan)?;
     let (world, t) = (&experiment.world, &experiment.training);
-    // One network for each row, and one for the array of several rows.
+    // One network for each row, and one for the array of several rows; that alone where outputs belong to no row.
     let rows = world.read_rows.len();
-    let arrays: &[bool] = if rows > 1 { &[false, true] } else { &[false] };
-    let networks = rows + arrays.len() - 1;
+    let arrays: &[bool] = match world.outputs {
+        Outputs::Contact(_) => &[true],
+        Outputs::Electrodes(_) if rows > 1 => &[false, true],
+        Outputs::Electrodes(_) => &[false],
+    };
+    let networks = arrays.iter().map(|array| if *array { 1 } else { rows }).sum::<usize>();
     let mut judge =
         Judge::new(experiment.options(), experiment.origin(), experiment.measure(), plan, prices);
     let mut limit = None;
@@ -277,7 +282,13 @@ pub fn compute(
                 (whole_array, t.relative_inputs),
             );
             let more = t.refine.then_some(MoreFrames { experiment, synthesis: &frames });
-            let sets = Sets::new(noise_level, [&training, &test], &gates, whole_array, more)?;
+            let sets = Sets::new(
+                noise_level,
+                [&training, &test],
+                &gates,
+                (whole_array, t.features),
+                more,
+            )?;
             for &centres in &plan.centres {
                 let knobs = Knobs { whole_array, centres, samples_averaged: samples };
                 judge.centres(&sets, knobs, progress)?;

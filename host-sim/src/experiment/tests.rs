@@ -1,5 +1,5 @@
 use taxel_simulate::readout::{Circuit, Readout};
-use taxel_simulate::sensor::{Axis, Sensor};
+use taxel_simulate::sensor::Sensor;
 use taxel_simulate::synthesise;
 
 use super::*;
@@ -11,14 +11,15 @@ fn embedded_scenes_are_sound_and_named_as_they_are_called() {
         assert_eq!(scene.name, name);
         assert_eq!(scene.world.read_rows, (0..8).collect::<Vec<_>>());
         assert_eq!(scene.world.readout, Readout::default());
-        assert_eq!(scene.world.full_scale(Axis::Z), 1.0);
         assert_eq!(scene.world.sensor, Sensor::paper());
     }
 }
 
 #[test]
 fn worlds_in_code_are_those_of_the_embedded_scenes() {
-    for (name, world) in [("paper", World::paper()), ("press", World::press())] {
+    let worlds =
+        [("paper", World::paper()), ("press", World::press()), ("contact", World::contact())];
+    for (name, world) in worlds {
         assert_eq!(Experiment::load(name).unwrap().world, world);
     }
 }
@@ -58,10 +59,22 @@ fn forces_have_their_own_full_scale_and_values() {
         .replace("quantity = \"deformation\"", "quantity = \"force\"")
         .replace("axes = [\"x\", \"y\", \"z\"]", "axes = [\"x\", \"z\"]");
     let scene = Experiment::parse("test", &text).unwrap().world;
-    assert_eq!((scene.full_scale(Axis::X), scene.full_scale(Axis::Z)), (1.0, 2.0));
-    let outputs: Vec<f64> = scene.outputs.of_electrode(&scene.sensor, [0.25, 9.0, 0.5]).collect();
+    assert_eq!(scene.full_scales()[..3], [1.0, 2.0, 1.0]);
+    let Outputs::Electrodes(outputs) = &scene.outputs else { panic!("outputs of electrodes") };
+    let outputs: Vec<f64> = outputs.of_electrode(&scene.sensor, [0.25, 9.0, 0.5]).collect();
     assert_eq!(outputs, [0.25, 1.0]);
     assert_eq!(scene.output_names()[1], "r1e1_fz_n");
+}
+
+#[test]
+fn full_scales_of_a_contact_are_the_face_and_the_largest_contact() {
+    let scene = Experiment::load("contact").unwrap();
+    let [x, y, depth, force] = scene.world.full_scales()[..] else { panic!("four outputs") };
+    assert_eq!((x, y, depth), (20.0, 18.0, 1.0));
+    // The largest dent, 1 mm deep and 5 mm in radius, in the middle of the face: 0.2667 N/mm³ × 157 mm³, less what
+    // lies beyond the face, 4.55 % along x and 7.19 % along y.
+    let whole = 2.0 * 48.0 / 360.0 * std::f64::consts::TAU * 25.0;
+    assert!((force / whole - (1.0 - 0.0455) * (1.0 - 0.0719)).abs() < 1e-4, "{force}");
 }
 
 #[test]

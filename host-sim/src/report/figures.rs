@@ -26,7 +26,7 @@ const WIDE_SINGLE: [f64; 2] = [920.0, 340.0];
 const NARROW: [f64; 2] = [360.0, 270.0];
 
 /// Choice of the example frame in words, for captions.
-fn chosen(result: &RunResult) -> String {
+pub fn chosen(result: &RunResult) -> String {
     format!("test frame {} (from 0), the one with the largest output", result.example.frame)
 }
 

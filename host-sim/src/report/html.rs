@@ -67,11 +67,17 @@ pub fn page(result: &RunResult) -> String {
 
     body.heading("One test frame");
     body.figure(&figures::readings(result));
-    body.figure(&figures::by_electrode(result));
-    body.figure(&figures::error_by_electrode(result));
+    let of_electrodes = !result.rows.is_empty();
     let shown = figures::shown(&result.example);
-    if let Some(output) = shown {
-        body.figure(&figures::maps(result, output));
+    if of_electrodes {
+        body.figure(&figures::by_electrode(result));
+        body.figure(&figures::error_by_electrode(result));
+        if let Some(output) = shown {
+            body.figure(&figures::maps(result, output));
+        }
+    } else {
+        let caption = format!("Outputs of {}, true and decoded.", figures::chosen(result));
+        body.table(&caption, &tables::example(result), "");
     }
     if let (Some(table), Some(output)) = (&result.table1, shown) {
         body.heading("Noise and spread");
@@ -80,8 +86,16 @@ pub fn page(result: &RunResult) -> String {
         let caption = tables::table1_caption(table, &output.group);
         body.table(&caption, &tables::table1(table, &output.group), "");
     }
-    body.heading("By row-wire");
-    body.figure(&figures::by_row_wire(result));
+    if !result.by_depth.is_empty() {
+        body.heading("By depth");
+        let caption = "RMSE of the network by the true depth of the contact. The last line holds all frames that \
+                       are not shallow.";
+        body.table(caption, &tables::by_depth(result), "");
+    }
+    if of_electrodes {
+        body.heading("By row-wire");
+        body.figure(&figures::by_row_wire(result));
+    }
 
     document(&format!("Taxel: {}", result.scene.name), &body.html)
 }
@@ -147,8 +161,12 @@ fn summary(result: &RunResult) -> String {
     let name = escape(&symbol(group));
     let mut html = format!(
         "<section class=\"summary\">\n<p>A network decodes the sensor’s row–column resistances to \
-         the {} of its electrodes. RMSE of {name} over {} test frames:</p>\n<dl>\n",
-        quantity(group),
+         {}. RMSE of {name} over {} test frames:</p>\n<dl>\n",
+        if result.rows.is_empty() {
+            "few numbers of the whole array".to_owned()
+        } else {
+            format!("the {} of its electrodes", quantity(group))
+        },
         grouped(result.model.test_frames)
     );
     for decoder in &result.decoders {

@@ -11,6 +11,7 @@ use super::html::document;
 use super::svg::{Shape, Svg, escape, standalone};
 use super::ticks;
 use crate::evaluate::limit::{Figures, Level, LimitResult};
+use crate::metrics::DecoderErrors;
 
 /// Signal-to-noise ratios below this are not drawn.
 const LEAST_RATIO: f64 = 1e-3;
@@ -101,11 +102,23 @@ pub fn html(result: &LimitResult) -> String {
     document(&title, &body)
 }
 
+/// Line of the table for a model: its errors, and their ratios to the limit.
+fn model_row(level: &Level, model: &DecoderErrors) -> String {
+    let noise = percent(level.noise_level);
+    let mut html = format!("<tr><td>{noise}</td><td>model {}</td>", escape(&model.decoder));
+    for errors in &model.errors {
+        let ratio = errors.ratio_to_limit.map_or(String::new(), |r| format!(" ({r:.3} ×)"));
+        let _ = write!(html, "<td class=\"number\">{:.4}{ratio}</td>", errors.rmse);
+    }
+    html + "<td></td></tr>\n"
+}
+
 /// Table of the limits.
 fn limits(result: &LimitResult) -> String {
     let mut html = String::from(
         "<figure class=\"table\">\n<figcaption>Least possible RMSE of any decoder, ± its standard error. ESS: smallest \
-         and median effective sample size of the posteriors.</figcaption>\n<div class=\"scroll\" tabindex=\"0\" \
+         and median effective sample size of the posteriors. Of a model: RMSE on these frames, and its ratio to the \
+         limit of all readings.</figcaption>\n<div class=\"scroll\" tabindex=\"0\" \
          role=\"region\" aria-label=\"Limits\">\n<table>\n<thead><tr><th>noise</th><th>readings</th>",
     );
     let groups =
@@ -138,6 +151,9 @@ fn limits(result: &LimitResult) -> String {
                 let _ = write!(html, "<td class=\"number\">{:.0}, {:.0}</td>", e.least, e.median);
             }
             html += "</tr>\n";
+        }
+        for model in &level.models {
+            html += &model_row(level, model);
         }
     }
     html + "</tbody>\n</table>\n</div>\n</figure>\n"

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use taxel_learn::decoders::{linear, mean};
 
-use super::format::{UNDEFINED, decimals, fixed, percent, symbol, with_unit};
+use super::format::{UNDEFINED, decimals, fixed, grouped, percent, significant, symbol, with_unit};
 use super::svg::escape;
 use super::ticks;
 use crate::evaluate::table1::{Column, NETWORK, PAPER_PRINTED_PERCENT, Table1};
@@ -96,6 +96,47 @@ pub fn errors(result: &RunResult) -> String {
         html += "</tbody>\n";
     }
     html + "</table>\n"
+}
+
+/// Table of the example's outputs, true and decoded, for outputs that belong to no electrode.
+pub fn example(result: &RunResult) -> String {
+    let mut html = String::from(
+        "<table>\n<thead><tr><th>Output</th><th class=\"number\">True</th>\
+         <th class=\"number\">Decoded</th></tr></thead>\n<tbody>\n",
+    );
+    for output in &result.example.outputs {
+        let name = escape(&with_unit(&symbol(&output.group), &output.unit));
+        for (truth, estimate) in output.truth.iter().zip(&output.estimate) {
+            let [truth, estimate] = [truth, estimate].map(|value| fixed(*value, 3));
+            let _ = writeln!(
+                html,
+                "<tr><th scope=\"row\">{name}</th><td class=\"number\">{truth}</td>\
+                 <td class=\"number\">{estimate}</td></tr>"
+            );
+        }
+    }
+    html + "</tbody>\n</table>\n"
+}
+
+/// Table of the network's RMSE by depth of the contact (lines) and output (columns).
+pub fn by_depth(result: &RunResult) -> String {
+    let mut html =
+        String::from("<table>\n<thead><tr><th>Depth</th><th class=\"number\">Frames</th>");
+    for errors in result.by_depth.first().map_or(&[][..], |range| &range.errors) {
+        let name = escape(&with_unit(&symbol(&errors.group), &errors.unit));
+        let _ = write!(html, "<th class=\"number\">{name}</th>");
+    }
+    html += "</tr></thead>\n<tbody>\n";
+    for range in &result.by_depth {
+        let (depth, frames) = (escape(&range.range()), grouped(range.frames));
+        let _ =
+            write!(html, "<tr><th scope=\"row\">{depth}</th><td class=\"number\">{frames}</td>");
+        for errors in &range.errors {
+            let _ = write!(html, "<td class=\"number\">{}</td>", significant(errors.rmse, 3));
+        }
+        html += "</tr>\n";
+    }
+    html + "</tbody>\n</table>\n"
 }
 
 /// List of the formulas of all definitions.

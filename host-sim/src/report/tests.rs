@@ -89,6 +89,7 @@ fn result(groups: &[&str]) -> RunResult {
             })
             .to_vec(),
         limit: LimitSummary::of(&Err(Refusal::Drift)),
+        by_depth: vec![],
         rows: (0..ROW_WIRES)
             .map(|row| RowErrors { row_wire: row + 2, errors: of_groups(groups, 0.1) })
             .collect(),

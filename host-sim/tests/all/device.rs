@@ -9,7 +9,8 @@ use crate::virtual_device::Line;
 use firmware::link::message::{
     Configuration, EstimateReport, Refusal, Report, Request, UploadStep,
 };
-use model_core::blob::Floats;
+use model_core::blob::{Floats, ModelParts, encode_to_vec};
+use model_core::confidence::{Confidence, Sizes};
 use taxel_data::progress::Silent;
 use taxel_data::random::Stream;
 use taxel_data::table::Table;
@@ -30,6 +31,37 @@ pub fn model(centres: usize) -> ModelBlob {
     let mut scene = unrefined("press");
     (scene.training.frames, scene.training.centres) = (500, centres);
     scene.train(&Silent).unwrap()
+}
+
+/// The model with a confidence: of the mean reading and what that leaves out, with two components.
+fn with_confidence(model: &ModelBlob) -> ModelBlob {
+    let model = model.parse();
+    let sizes = Sizes { readings: 144, directions: 1, components: 2, outputs: 144 };
+    let component = |offset: f32| vec![-1.0, offset, 0.5, 1.0, 0.25, 0.5];
+    let variances = (0..2 * 144).map(|i| 0.01 + i as f32 / 1000.0).collect();
+    let block = [
+        vec![60.0; 144],       // mean
+        vec![0.5; 144],        // scale
+        vec![0.0],             // start
+        vec![1.0 / 12.0; 144], // direction
+        component(0.0),
+        component(1.0),
+        variances,
+        vec![2.0; 144], // ratios
+        vec![20.0],     // threshold
+    ]
+    .concat();
+    let networks: Vec<_> = model.networks().collect();
+    let row_network: Vec<u8> = (0..8).map(|row| model.network_of_row(row).unwrap() as u8).collect();
+    let parts = ModelParts {
+        projection: model.projection(),
+        expansion: model.expansion(),
+        confidence: Some(Confidence::new(sizes, &block).unwrap()),
+        networks: &networks,
+        row_network: &row_network,
+        metadata: *model.metadata(),
+    };
+    ModelBlob::of_bytes(&encode_to_vec(&parts).unwrap()).unwrap()
 }
 
 /// So many test frames, for a model that needs no baseline.
@@ -254,6 +286,22 @@ fn a_device_divides_by_its_baseline_as_the_host_does() {
         let findings = check(&mut device, &frames, &model, &plan, &Silent).unwrap();
         assert!(findings.all_good(), "{findings:#?}");
     }
+}
+
+#[test]
+fn a_device_tells_novelty_and_deviations_as_the_host_does() {
+    let model = with_confidence(&model(3));
+    let mut device = device(SOUND, &model);
+    let plan =
+        Plan { seed: 1, damaged_uploads: 0, interruptions: false, garbage_bytes: 0, window: 1 };
+    let mut frames = frames_of(30);
+    // One is far from all others, and one lacks a reading.
+    frames.readings.values[..144].fill(900.0);
+    frames.readings.values[144] = f64::NAN;
+    let findings = check(&mut device, &frames, &model, &plan, &Silent).unwrap();
+    assert!(findings.all_good(), "{findings:#?}");
+    let novel = findings.statistics.frames_novel;
+    assert!(novel > 0 && novel < 30, "{novel}");
 }
 
 #[test]
@@ -484,6 +532,34 @@ pub mod serial_port {
     }
 
     #[test]
+    fn novelty_and_deviations_are_recorded_from_the_command_line() {
+        let folder = Folder::new("confidence");
+        let model = with_confidence(&model(3));
+        folder.write("model.bin", model.bytes());
+        let (port, near) = port(&model);
+        drop(near);
+        let record = ["link", &port, "record", "model.bin", "-n", "3", "-o", "estimate.csv"];
+        let header = |folder: &Folder| {
+            let text = std::fs::read_to_string(folder.path("estimate.csv")).unwrap();
+            let lines: Vec<&str> = text.lines().collect();
+            assert_eq!(lines.len(), 4);
+            let last: f64 = lines[1].rsplit(',').next().unwrap().parse().unwrap();
+            assert!(last.is_finite());
+            lines[0].to_owned()
+        };
+        folder.succeed(&record);
+        let outputs = header(&folder);
+        folder.succeed(&[&record[..], &["--confidence", "novelty"]].concat());
+        assert_eq!(header(&folder), format!("{outputs},novelty_nats"));
+        folder.succeed(&[&record[..], &["--confidence", "deviations"]].concat());
+        let deviations: Vec<String> =
+            outputs.split(',').map(|name| format!("{name}_deviation")).collect();
+        assert_eq!(header(&folder), format!("{outputs},{},novelty_nats", deviations.join(",")));
+        let page = folder.succeed(&["link", &port, "configure", "--confidence", "novelty"]);
+        assert!(page.contains("estimates yes, of confidence novelty\n"), "{page}");
+    }
+
+    #[test]
     fn a_device_is_used_from_the_command_line() {
         let folder = Folder::new("link");
         let (old, new) = (model(3), model(4));
@@ -562,6 +638,10 @@ pub mod serial_port {
             (&["baseline", "-o", "x.csv", "-n", "0"], "0 is not in 1..="),
             (&["baseline", "-o", "x.csv", "-n", "-3"], "'-3' for '--frames <N>'"),
             (&["upload", "none.bin"], "none.bin"),
+            (
+                &["record", new_file, "-o", "x.csv", "--confidence", "novelty"],
+                "--confidence: MODEL has none",
+            ),
         ] {
             let output = folder.run(&[&["link", &port][..], arguments].concat());
             let message = String::from_utf8_lossy(&output.stderr);

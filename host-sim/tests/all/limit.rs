@@ -68,6 +68,37 @@ fn what_cannot_be_computed_is_refused() {
 }
 
 #[test]
+fn models_are_judged_on_the_frames_of_the_limit() {
+    let folder = Folder::new("limit-models");
+    folder.write("scene.toml", small_scene());
+    folder.succeed(&["train", "scene.toml", "-o", "m.bin"]);
+    folder.succeed(&["train", "scene.toml", "--relative-inputs", "-o", "relative.bin"]);
+    let models = ["limit", "scene.toml", "-n", "60", "--model", "m.bin,relative.bin"];
+    let result = json(&folder.succeed(&[&models[..], &["--json"]].concat()));
+    let level = &result["levels"][0];
+    let limit = level["limits"][0]["groups"][2]["limit"].as_f64().unwrap();
+    for (model, file) in level["models"].as_array().unwrap().iter().zip(["m.bin", "relative.bin"]) {
+        assert_eq!(model["decoder"], file);
+        let errors = &model["errors"][2];
+        let number = |name: &str| errors[name].as_f64().unwrap();
+        let (ratio, error) = (number("ratio_to_limit"), number("ratio_standard_error"));
+        assert!(ratio > 1.0 + 2.0 * error, "{file}: {ratio} ± {error}");
+        // The plain ratio of the two RMSE is the same, but for chance: these are 60 frames.
+        let plain = number("rmse") / limit;
+        assert!((plain / ratio - 1.0).abs() < 0.2, "{file}: {plain} and {ratio}");
+    }
+    let page = folder.succeed(&[&models[..], &["-o", "out"]].concat());
+    assert!(page.contains(" ×   m.bin") && page.contains(" ×   relative.bin"), "{page}");
+    let page = std::fs::read_to_string(folder.path("out/limit.html")).unwrap();
+    assert!(page.contains("model m.bin") && page.contains("model relative.bin"));
+
+    let output = folder.run(&["limit", "press", "-n", "2", "--model", "m.bin"]);
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{error}");
+    assert!(error.contains("m.bin") && error.contains("other readings than the scene"), "{error}");
+}
+
+#[test]
 fn errors_are_given_beside_the_limit_and_its_own_ratio_is_one() {
     let mut experiment = Experiment::load("press").unwrap();
     experiment.world.read_rows = vec![3, 4];
@@ -110,7 +141,7 @@ fn a_drifting_scene_is_run_without_a_limit_and_says_why() {
 fn the_page_tells_of_other_geometries() {
     let mut experiment = Experiment::load("paper").unwrap();
     experiment.world.read_rows = vec![0, 3];
-    let plan = Plan { noise_levels: vec![0.05], frames: 3, geometry: true };
+    let plan = Plan { noise_levels: &[0.05], frames: 3, geometry: true, models: &[] };
     let result = compute(&experiment, &plan, &Silent).unwrap();
     assert!(result.geometry.len() > 10);
     let page = report::limit_html(&result);

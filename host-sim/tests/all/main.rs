@@ -1,11 +1,13 @@
 //! Every integration test in one program: it is linked once.
 
 mod common;
+mod confidence;
 mod quantisation;
 mod virtual_device;
 
 mod accuracy;
 mod calibrate;
+mod contact;
 mod device;
 mod drift;
 mod gate;

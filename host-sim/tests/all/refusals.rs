@@ -50,6 +50,14 @@ fn bad_scenes() {
         ("row_wires = [4, 5]", "row_wires = [5, 4]", &["ascending"]),
         ("axes = [\"x\", \"y\", \"z\"]", "axes = [\"z\", \"x\"]", &["outputs.axes", "order"]),
         ("axes = [\"x\", \"y\", \"z\"]", "axes = []", &["outputs.axes"]),
+        ("axes = [\"x\", \"y\", \"z\"]", "", &["[outputs]", "missing field `axes`"]),
+        ("quantity = \"deformation\"", "", &["[outputs]", "missing field `quantity`", "`contact`"]),
+        ("[outputs]", "[outputs]\ncontact = [\"depth\"]", &["`contact` stands alone", "leave out"]),
+        (
+            "[outputs]",
+            "[outputs]\ncontact = [\"torque\"]",
+            &["unknown variant `torque`", "`centre`"],
+        ),
         ("centres = 12", "centres = 0", &["training.centres = 0"]),
         ("centres = 12", "centres = 3000", &["training.centres = 3000", "fewer centres than"]),
         ("spread = 0.8", "spread = 0.0", &["training.spread = 0", "positive"]),
@@ -68,6 +76,33 @@ fn bad_scenes() {
         says.push("scene.toml");
         refused(&folder, &["synth", scene.to_str().unwrap(), "-o", "data.csv"], &says);
     }
+    let contact = include_str!("../../../scenes/contact.toml");
+    for (from, to, says) in [
+        ("\"depth\", \"force\"", "\"force\", \"depth\"", &["outputs.contact", "in this order"][..]),
+        (
+            "kind = \"press\"\ndent_radius_mm = [2.0, 5.0]\ndent_depth_mm = [0.0, 1.0]\nshear_ratio = [0.0, 0.5]",
+            "kind = \"independent\"\ndx_mm = [0.0, 1.0]\ndy_mm = [0.0, 1.0]\ndz_mm = [0.0, 1.0]",
+            &["outputs.contact = [\"centre\"", "deformation.kind = \"press\""],
+        ),
+        (
+            "[training]",
+            "[table1]\nspreads = [0.5]\nnoise_levels = [0.01]\nframes = 100\ntest_frames = 100\ncentres = 5\n\
+             affine_tail = true\nstandard_frames = 10\n\n[training]",
+            &["table1", "outputs of electrodes", "leave it out"],
+        ),
+    ] {
+        assert!(contact.contains(from), "{from}");
+        let scene = folder.write("scene.toml", contact.replacen(from, to, 1));
+        refused(&folder, &["synth", scene.to_str().unwrap(), "-o", "data.csv"], says);
+    }
+    let contact = |more: &[&'static str]| [&["train", "contact", "-o", "m.bin"], more].concat();
+    refused(&folder, &contact(&["--features", "144"]), &["features = 144", "from 1 to 143"]);
+    refused(
+        &folder,
+        &["train", "press", "-o", "m.bin", "--features", "5"],
+        &["features = 5", "leave it out"],
+    );
+    refused(&folder, &["table1", "contact"], &["no [table1]"]);
     refused(&folder, &["run", "no-such.toml"], &["no-such.toml", "paper, press"]);
     refused(&folder, &["train", "pres", "-o", "m.bin"], &["pres:", "paper, press"]);
 }
@@ -128,6 +163,9 @@ fn bad_training_options() {
     train(&[&two_folds[..], &["--no-refine"]].concat(), &["centres = 2", "2 training"]);
     train(&two_folds, &["folds = 2", "at least 4"]);
     train(&two_folds[1..], &["folds = 2", "at least 3", "without refinement"]);
+    train(&["--whole-array", "--centres", "2", "--no-refine"], &["leave it out (--whole-array)"]);
+    let of_scene = ["train", "press", "--folds", "4", "-o", "m.bin"];
+    refused(&folder, &of_scene, &["--folds", "a scene has fresh frames: leave it out"]);
     refused(
         &folder,
         &["train", "press", "--inputs", "ch*", "-o", "m.bin"],

@@ -2,14 +2,18 @@
 
 use super::error::DecodeError;
 use super::format::{
-    CRC_BYTES, ExpansionHeader, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection,
-    PREFIX_BYTES, Prefix, RbfHeader, ShapeField, TAG_EXPANSION, TAG_METADATA, TAG_PROJECTION,
-    TAG_RELATIVE_INPUTS,
+    CRC_BYTES, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection, PREFIX_BYTES, Prefix,
+    RbfHeader, ShapeField, TAG_METADATA,
 };
 use super::metadata::{Columns, Floats, Metadata, ModelShape};
+use super::sections::{
+    check_count, take, take_block, take_confidence, take_expansion, take_projection,
+    take_relative_inputs,
+};
 use crate::checksum::CRC_32;
+use crate::confidence::{Confidence, Sizes};
 use crate::expansion::Expansion;
-use crate::projection::{self, Projection};
+use crate::projection::Projection;
 use crate::rbf::{
     Cut, Format, Layout, Network, NetworkError, Packed, Shape, direct, expanded, fixed16,
 };
@@ -21,10 +25,13 @@ pub struct Model<'a> {
     crc: u32,
     row_network: &'a [u8],
     metadata: Metadata<'a>,
-    projection: Option<&'a [f32]>,
+    projection: Option<Projection<'a>>,
     expansion: Option<&'a [f32]>,
     /// Components of the expansion; 0 without one.
     components: u16,
+    confidence: Option<&'a [f32]>,
+    /// Directions and components of the confidence.
+    confidence_sizes: [u16; 2],
     networks: u8,
     network_sections: &'a [u8],
 }
@@ -61,10 +68,11 @@ impl<'a> Model<'a> {
         if projection.is_some() {
             check_count("networks behind a projection", 1, networks.into())?;
         }
-        let (expansion, network_sections) = match projection {
+        let (expansion, rest) = match projection {
             Some(_) => take_expansion(rest, shape)?,
             None => (None, rest),
         };
+        let (confidence, network_sections) = take_confidence(rest, shape)?;
 
         let model = Self {
             shape,
@@ -75,6 +83,9 @@ impl<'a> Model<'a> {
             expansion: expansion.map(|it| it.block()),
             // As in the blob.
             components: expansion.map_or(0, |it| it.components() as u16),
+            confidence: confidence.map(|it| it.block()),
+            confidence_sizes: confidence
+                .map_or([0; 2], |it| [it.sizes().directions as u16, it.sizes().components as u16]),
             networks,
             network_sections,
         };
@@ -150,7 +161,7 @@ impl<'a> Model<'a> {
     /// [expanded](Self::expansion) to these.
     #[must_use]
     pub fn projection(&self) -> Option<Projection<'a>> {
-        self.projection.map(|block| Projection::of_checked(self.shape.inputs, block))
+        self.projection
     }
 
     /// The expansion of the one network's outputs to those of all rows; `None` if a network's outputs are those of its
@@ -167,15 +178,26 @@ impl<'a> Model<'a> {
         self.components.into()
     }
 
+    /// The model's confidence in its outputs; `None` if it has none.
+    #[must_use]
+    pub fn confidence(&self) -> Option<Confidence<'a>> {
+        let ModelShape { rows, inputs, outputs } = self.shape;
+        let [directions, components] = self.confidence_sizes.map(usize::from);
+        let (readings, outputs) = (rows.wrapping_mul(inputs), rows.wrapping_mul(outputs));
+        let sizes = Sizes { readings, directions, components, outputs };
+        self.confidence.map(|block| Confidence::of_checked(sizes, block))
+    }
+
     /// Inputs and outputs of each network; behind a projection, its features and the outputs of all rows, or the
     /// components that are expanded to these.
     pub(crate) fn network_shape(&self) -> ModelShape {
-        let ModelShape { rows, inputs, outputs } = self.shape;
-        match (self.projection, self.components()) {
-            (Some(_), 0) => ModelShape { rows: 1, inputs, outputs: rows * outputs },
-            (Some(_), components) => ModelShape { rows: 1, inputs, outputs: components },
-            (None, _) => self.shape,
-        }
+        let ModelShape { rows, outputs, .. } = self.shape;
+        let Some(projection) = self.projection else { return self.shape };
+        let outputs = match self.components() {
+            0 => rows * outputs,
+            components => components,
+        };
+        ModelShape { rows: 1, inputs: projection.features(), outputs }
     }
 
     /// The networks, in the order of the blob.
@@ -252,23 +274,8 @@ fn checked_body(blob: &[u8]) -> Result<(&[u8], u32), DecodeError> {
     }
 }
 
-fn take<'a, T: serde::Deserialize<'a>>(
-    bytes: &'a [u8],
-    section: &'static str,
-) -> Result<(T, &'a [u8]), DecodeError> {
-    postcard::take_from_bytes(bytes).map_err(|_| DecodeError::Malformed { section })
-}
-
 fn check_tag(expected: u8, found: u8) -> Result<(), DecodeError> {
     if expected == found { Ok(()) } else { Err(DecodeError::SectionOrder { expected, found }) }
-}
-
-fn check_count(what: &'static str, expected: usize, found: usize) -> Result<(), DecodeError> {
-    if expected == found {
-        Ok(())
-    } else {
-        Err(DecodeError::CountMismatch { what, expected, found })
-    }
 }
 
 fn checked_metadata<'a>(
@@ -391,64 +398,6 @@ impl<'a> NetworkSection<'a> {
         let shape = network_shape(shape, self.centres);
         Packed::with_length_checked(shape, self.affine, self.block)
     }
-}
-
-/// Cuts padding, length and the block of words from the front of `bytes`.
-fn take_block<'a>(
-    bytes: &'a [u8],
-    section: &'static str,
-) -> Result<(&'a [u8], &'a [u8]), DecodeError> {
-    let (padding, rest) = take::<&[u8]>(bytes, section)?;
-    if padding.len() >= FLOAT_ALIGNMENT || padding.iter().any(|&byte| byte != 0) {
-        return Err(DecodeError::Malformed { section: "padding" });
-    }
-    take::<&[u8]>(rest, section)
-}
-
-/// Cuts the section of relative inputs from the front of `bytes`; returns whether there is one.
-fn take_relative_inputs(bytes: &[u8]) -> (bool, &[u8]) {
-    match bytes.split_first() {
-        Some((&TAG_RELATIVE_INPUTS, rest)) => (true, rest),
-        _ => (false, bytes),
-    }
-}
-
-/// Cuts the projection from the front of `bytes` if there is one, and checks it.
-fn take_projection(
-    bytes: &[u8],
-    shape: ModelShape,
-) -> Result<(Option<&[f32]>, &[u8]), DecodeError> {
-    let Some((&TAG_PROJECTION, rest)) = bytes.split_first() else { return Ok((None, bytes)) };
-    let (block, rest) = take_block(rest, "projection section")?;
-    let readings = shape.rows * shape.inputs;
-    let floats = projection::block_floats(readings, shape.inputs);
-    check_count("bytes of projection", floats.saturating_mul(4), block.len())?;
-    let block = bytemuck::try_cast_slice::<u8, f32>(block)
-        .map_err(|_| DecodeError::Malformed { section: "padding" })?;
-    Projection::new(readings, shape.inputs, block)
-        .map_err(|cause| DecodeError::Projection { cause })?;
-    Ok((Some(block), rest))
-}
-
-/// Cuts the expansion from the front of `bytes` if there is one, and checks it.
-fn take_expansion(
-    bytes: &[u8],
-    shape: ModelShape,
-) -> Result<(Option<Expansion<'_>>, &[u8]), DecodeError> {
-    const SECTION: &str = "expansion section";
-    if bytes.first() != Some(&TAG_EXPANSION) {
-        return Ok((None, bytes));
-    }
-    let (header, rest) = take::<ExpansionHeader>(bytes, SECTION)?;
-    let (block, rest) = take_block(rest, SECTION)?;
-    let (components, outputs) = (header.components.into(), shape.rows * shape.outputs);
-    let floats = projection::block_floats(components, outputs);
-    check_count("bytes of expansion", floats.saturating_mul(4), block.len())?;
-    let block = bytemuck::try_cast_slice::<u8, f32>(block)
-        .map_err(|_| DecodeError::Malformed { section: "padding" })?;
-    let expansion = Expansion::new(components, outputs, block)
-        .map_err(|cause| DecodeError::Expansion { cause })?;
-    Ok((Some(expansion), rest))
 }
 
 fn network_shape(shape: ModelShape, centres: u16) -> Shape {

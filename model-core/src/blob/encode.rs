@@ -7,11 +7,13 @@ use super::aligned::AlignedBytes;
 use super::decode::Model;
 use super::error::EncodeError;
 use super::format::{
-    CRC_BYTES, ExpansionHeader, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection, Prefix,
-    RbfHeader, ShapeField, TAG_EXPANSION, TAG_METADATA, TAG_PROJECTION, TAG_RELATIVE_INPUTS,
+    CRC_BYTES, ConfidenceHeader, ExpansionHeader, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC,
+    MetadataSection, Prefix, ProjectionHeader, RbfHeader, ShapeField, TAG_CONFIDENCE,
+    TAG_EXPANSION, TAG_METADATA, TAG_PROJECTION, TAG_PROJECTION_TO, TAG_RELATIVE_INPUTS,
 };
 use super::metadata::Metadata;
 use crate::checksum::CRC_32;
+use crate::confidence::Confidence;
 use crate::expansion::Expansion;
 use crate::projection::Projection;
 use crate::rbf::Network;
@@ -23,6 +25,8 @@ pub struct ModelParts<'a> {
     pub projection: Option<Projection<'a>>,
     /// Expansion of the one network's outputs, which are then components, to the outputs of all rows.
     pub expansion: Option<Expansion<'a>>,
+    /// Confidence in the outputs.
+    pub confidence: Option<Confidence<'a>>,
     /// The networks; all have the same number of inputs and of outputs.
     pub networks: &'a [Network<'a>],
     /// Index into `networks` for each row.
@@ -47,7 +51,8 @@ pub fn encoded_length_bound(parts: &ModelParts<'_>) -> usize {
     let weights: usize = parts.networks.iter().map(|n| SECTION_FIELDS + block_bytes(n)).sum();
     let projection = parts.projection.map_or(0, |it| SECTION_FIELDS + it.block().len() * 4);
     let expansion = parts.expansion.map_or(0, |it| SECTION_FIELDS + it.block().len() * 4);
-    FIXED_FIELDS + text + numbers + projection + expansion + weights
+    let confidence = parts.confidence.map_or(0, |it| SECTION_FIELDS + it.block().len() * 4);
+    FIXED_FIELDS + text + numbers + projection + expansion + confidence + weights
 }
 
 fn block_bytes(network: &Network<'_>) -> usize {
@@ -63,7 +68,7 @@ fn block_bytes(network: &Network<'_>) -> usize {
 /// Every variant of [`EncodeError`].
 pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u8], EncodeError> {
     let first = parts.networks.first().map(Network::shape);
-    let (inputs, mut outputs) = first.map_or((0, 0), |s| (s.inputs, s.outputs));
+    let (mut inputs, mut outputs) = first.map_or((0, 0), |s| (s.inputs, s.outputs));
     for (index, network) in parts.networks.iter().enumerate() {
         if (network.shape().inputs, network.shape().outputs) != (inputs, outputs) {
             return Err(EncodeError::UnequalNetworks { index });
@@ -81,8 +86,9 @@ pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u
         outputs = expansion.outputs();
     }
     let rows = parts.row_network.len();
-    if parts.projection.is_some() {
-        // One network has the outputs of all rows.
+    if let Some(projection) = parts.projection {
+        // One network has the outputs of all rows, and features for inputs.
+        inputs = projection.readings() / rows.max(1);
         if !outputs.is_multiple_of(rows.max(1)) {
             return Err(EncodeError::UnevenRows { outputs, rows });
         }
@@ -119,13 +125,25 @@ pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u
         writer.put(&TAG_RELATIVE_INPUTS)?;
     }
     if let Some(projection) = parts.projection {
-        writer.put(&TAG_PROJECTION)?;
+        if projection.features() == inputs {
+            writer.put(&TAG_PROJECTION)?;
+        } else {
+            let features = fit("number of features", projection.features(), u16::MAX)?;
+            writer.put(&ProjectionHeader { tag: TAG_PROJECTION_TO, features })?;
+        }
         writer.put_block(&[bytemuck::cast_slice(projection.block())])?;
     }
     if let Some(expansion) = parts.expansion {
         let components = fit("number of components", expansion.components(), u16::MAX)?;
         writer.put(&ExpansionHeader { tag: TAG_EXPANSION, components })?;
         writer.put_block(&[bytemuck::cast_slice(expansion.block())])?;
+    }
+    if let Some(confidence) = parts.confidence {
+        let sizes = confidence.sizes();
+        let directions = fit("number of directions", sizes.directions, u16::MAX)?;
+        let components = fit("number of components", sizes.components, u16::MAX)?;
+        writer.put(&ConfidenceHeader { tag: TAG_CONFIDENCE, directions, components })?;
+        writer.put_block(&[bytemuck::cast_slice(confidence.block())])?;
     }
     for (index, network) in parts.networks.iter().enumerate() {
         writer.put_network(fit("network index", index, u8::MAX)?, network)?;

@@ -101,6 +101,12 @@ pub enum DecodeError {
         /// What is wrong with the expansion.
         cause: NetworkError,
     },
+    /// The confidence's parameters are not valid.
+    #[error("confidence: {cause}")]
+    Confidence {
+        /// What is wrong with the confidence.
+        cause: NetworkError,
+    },
     /// The parameters of a network are not valid.
     #[error("network {index}: {cause}")]
     Network {

@@ -25,6 +25,9 @@ pub(super) const TAG_PROJECTION: u8 = 4;
 /// Tag of a section without fields: the model's inputs are relative to the baseline.
 pub(super) const TAG_RELATIVE_INPUTS: u8 = 5;
 pub(super) const TAG_EXPANSION: u8 = 6;
+pub(super) const TAG_CONFIDENCE: u8 = 7;
+/// Tag of a projection to another number of features than a row has readings.
+pub(super) const TAG_PROJECTION_TO: u8 = 8;
 
 /// Bytes 0..9, at fixed places, so that a blob's length is known before anything else is read.
 #[derive(Serialize, Deserialize)]
@@ -95,11 +98,29 @@ impl RbfHeader {
     }
 }
 
+/// Header of the section of a projection to any number of features; padding and its floats follow.
+#[derive(Serialize, Deserialize)]
+pub(super) struct ProjectionHeader {
+    pub tag: u8,
+    /// Number of features, which are the network's inputs.
+    pub features: u16,
+}
+
 /// Header of the expansion's section; padding and its floats follow.
 #[derive(Serialize, Deserialize)]
 pub(super) struct ExpansionHeader {
     pub tag: u8,
     /// Number of components, which the network infers instead of outputs.
+    pub components: u16,
+}
+
+/// Header of the confidence's section; padding and its floats follow.
+#[derive(Serialize, Deserialize)]
+pub(super) struct ConfidenceHeader {
+    pub tag: u8,
+    /// Number of directions that readings are projected to.
+    pub directions: u16,
+    /// Number of components of the mixture.
     pub components: u16,
 }
 
@@ -109,7 +130,8 @@ mod tests {
 
     #[test]
     fn no_format_of_networks_has_the_tag_of_another_section() {
-        for tag in [TAG_METADATA, TAG_PROJECTION, TAG_RELATIVE_INPUTS, TAG_EXPANSION] {
+        let others = [TAG_METADATA, TAG_PROJECTION, TAG_RELATIVE_INPUTS, TAG_EXPANSION];
+        for tag in others.into_iter().chain([TAG_CONFIDENCE, TAG_PROJECTION_TO]) {
             assert_eq!(Format::from_tag(tag), None);
         }
     }

@@ -9,6 +9,7 @@ mod aligned;
 mod metadata;
 mod error;
 mod format;
+mod sections;
 mod decode;
 mod encode;
 

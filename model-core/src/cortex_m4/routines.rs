@@ -12,6 +12,7 @@ core::arch::global_asm!(
     include_str!("f32.s"),
     include_str!("fixed16.s"),
     include_str!("gate.s"),
+    include_str!("mixture.s"),
     options(raw)
 );
 
@@ -68,6 +69,7 @@ unsafe extern "C" {
         count: usize,
         features: usize,
     );
+    fn taxel_density(component: *const f32, features: *const f32, count: usize, floor: f32) -> f32;
     fn taxel_give_rest(
         readings: *const f32,
         baseline: *const f32,
@@ -134,6 +136,20 @@ pub(crate) unsafe fn project(block: &[f32], readings: &[f32], features: &mut [f3
     }
 }
 
+/// Density of a mixture's component at `features`, as
+/// [`Confidence`](crate::confidence::Confidence) computes it; below `floor` it may be any number that is.
+///
+/// # Safety
+/// The caller must check that there are features, and that `component` has 1 + n + n · (n + 1) / 2 numbers for n features.
+#[inline(always)]
+#[expect(clippy::inline_always, reason = "a call")]
+pub(crate) unsafe fn density(component: &[f32], features: &[f32], floor: f32) -> f32 {
+    let count = features.len();
+    debug_assert!(count > 0 && component.len() == 1 + count + count * (count + 1) / 2);
+    // SAFETY: the caller has checked the lengths.
+    unsafe { taxel_density(component.as_ptr(), features.as_ptr(), count, floor) }
+}
+
 /// Gives rest to the rows of a frame, as [`Gate`](crate::gate::Gate) does: to all, or until one is awake. Returns
 /// the number of rows that are awake.
 ///
@@ -178,3 +194,23 @@ const _: () = {
     assert!(RowStatus::Decoded as u8 == 0 && RowStatus::MissingReading as u8 == 1);
     assert!(RowStatus::AtRest as u8 == 3);
 };
+
+/// Square root of a number that is not negative, rounded correctly.
+#[inline(always)]
+#[expect(clippy::inline_always, reason = "one instruction, and moves to its register and back")]
+pub(crate) fn sqrt(value: f32) -> f32 {
+    let mut bits = value.to_bits();
+    // SAFETY: the instructions read and write these two registers alone. The compiler offers no floating-point register
+    // for operands, since it asks for double precision first.
+    unsafe {
+        core::arch::asm!(
+            "vmov s0, {bits}",
+            "vsqrt.f32 s0, s0",
+            "vmov {bits}, s0",
+            bits = inout(reg) bits,
+            out("s0") _,
+            options(pure, nomem, nostack, preserves_flags),
+        );
+    }
+    f32::from_bits(bits)
+}

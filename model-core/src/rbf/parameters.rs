@@ -35,6 +35,12 @@ pub enum NetworkError {
         /// Name of the array.
         what: &'static str,
     },
+    /// A number that must be positive is not.
+    #[error("{what} holds a number that is negative, or 0 where it must be positive")]
+    NotPositive {
+        /// Name of the array.
+        what: &'static str,
+    },
     /// A width is zero, negative or without bound: its decay 1/(2σ²) is not a positive number.
     #[error("width of centre {centre} is not a positive finite number")]
     InvalidWidth {

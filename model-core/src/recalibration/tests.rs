@@ -42,6 +42,7 @@ fn blob(row_network: &[u8], errors: [f32; ALL]) -> AlignedBytes {
     let parts = ModelParts {
         projection: None,
         expansion: None,
+        confidence: None,
         networks: &networks[..count],
         row_network,
         metadata,

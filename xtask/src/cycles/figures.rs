@@ -41,10 +41,12 @@ pub enum Scope {
     ArrayRestingFrame,
     /// All rows' outputs by one network, behind a gate that finds the array awake by its last reading.
     ArrayAwakeFrame,
+    /// Deviations of all outputs and the novelty of a frame, without decoding it.
+    Confidence,
 }
 
 impl Scope {
-    const ALL: [Self; 9] = [
+    const ALL: [Self; 10] = [
         Self::Inference,
         Self::Exponential,
         Self::Row,
@@ -54,6 +56,7 @@ impl Scope {
         Self::ArrayFrame,
         Self::ArrayRestingFrame,
         Self::ArrayAwakeFrame,
+        Self::Confidence,
     ];
 
     /// Name of the scope in the image's log and in the accepted figures.
@@ -68,6 +71,7 @@ impl Scope {
             Self::ArrayFrame => "array-frame",
             Self::ArrayRestingFrame => "array-resting-frame",
             Self::ArrayAwakeFrame => "array-awake-frame",
+            Self::Confidence => "confidence",
         }
     }
 

@@ -95,6 +95,7 @@ fn of_first_network(model: &Model<'_>, affine: bool) -> Outcome<Vec<u8>> {
     let parts = ModelParts {
         projection: model.projection(),
         expansion: model.expansion(),
+        confidence: None,
         networks: &[of_words(&first, affine, &words)?],
         row_network: &vec![0; model.shape().rows],
         metadata: *model.metadata(),

@@ -7,6 +7,8 @@ pub enum Table {
     Shapes,
     /// A frame of networks that compute few components.
     Ranks,
+    /// Deviations and novelty of a frame.
+    Confidence,
 }
 
 /// Options from the command line.
@@ -41,6 +43,7 @@ impl<'a> Options<'a> {
                 "--accept" => options.accept = true,
                 "--shapes" => options.table = Some(Table::Shapes),
                 "--ranks" => options.table = Some(Table::Ranks),
+                "--confidence" => options.table = Some(Table::Confidence),
                 "--model" => options.model = Some(value("a file")?),
                 "--kernel" => options.kernel = Some(value("a name")?),
                 _ => return Err(format!("unknown option `{argument}`")),
@@ -56,6 +59,7 @@ impl<'a> Options<'a> {
             let name = match table {
                 Table::Shapes => "--shapes",
                 Table::Ranks => "--ranks",
+                Table::Confidence => "--confidence",
             };
             return Err(format!("`{name}` goes with no other option"));
         }
@@ -83,6 +87,7 @@ mod tests {
             (&["--accept", "--kernel", "f32"], "`--kernel`"),
             (&["--shapes", "--json"], "`--shapes`"),
             (&["--ranks", "--accept"], "`--ranks`"),
+            (&["--confidence", "--json"], "`--confidence`"),
         ] {
             let message = Options::parse(arguments).unwrap_err();
             assert!(message.contains(named), "{message}");

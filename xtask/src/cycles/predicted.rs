@@ -72,7 +72,7 @@ fn frame(design: &Design, region: &figures::Measured) -> Option<Frame> {
         Scope::Frame | Scope::ArrayFrame => Gating::Ungated,
         Scope::RestingFrame | Scope::ArrayRestingFrame => Gating::AtRest,
         Scope::AwakeFrame | Scope::ArrayAwakeFrame => Gating::Awake,
-        Scope::Inference | Scope::Exponential | Scope::Row => return None,
+        Scope::Inference | Scope::Exponential | Scope::Row | Scope::Confidence => return None,
     };
     let named = region.kernel.strip_prefix(&format!("{}-", Format::F32Direct.name()));
     let exponential = match named {

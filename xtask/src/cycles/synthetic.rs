@@ -1,6 +1,7 @@
 //! Blobs of any design, with numbers that make no difference to their cost.
 
 use model_core::blob::{Metadata, ModelParts, encode_to_vec};
+use model_core::confidence::Confidence;
 use model_core::expansion::Expansion;
 use model_core::projection::Projection;
 use model_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
@@ -18,6 +19,14 @@ const MIDDLE: f32 = 60.0;
 /// # Errors
 /// The design is beyond what a format or the blob holds.
 pub fn blob(design: &Design) -> Outcome<Vec<u8>> {
+    blob_with(design, None)
+}
+
+/// A blob of this `design`, with a `confidence`.
+///
+/// # Errors
+/// The design is beyond what a format or the blob holds, or the confidence is not for such a model.
+pub fn blob_with(design: &Design, confidence: Option<Confidence<'_>>) -> Outcome<Vec<u8>> {
     let words: Vec<Vec<u32>> = design.networks.iter().map(words).collect();
     let networks = design.networks.iter().zip(&words);
     let networks: Vec<Network<'_>> =
@@ -27,7 +36,8 @@ pub fn blob(design: &Design) -> Outcome<Vec<u8>> {
     } else {
         design.row_network.iter().map(|index| *index as u8).collect()
     };
-    let (readings, features) = (design.shape.rows * design.shape.inputs, design.shape.inputs);
+    let readings = design.shape.rows * design.shape.inputs;
+    let features = if design.projection { design.features() } else { design.shape.inputs };
     // Feature i is reading i of the first row.
     let mut block = vec![0.0; features * (1 + readings)];
     (0..features).for_each(|i| block[features * (1 + i) + i] = 1.0);
@@ -43,6 +53,7 @@ pub fn blob(design: &Design) -> Outcome<Vec<u8>> {
     let parts = ModelParts {
         projection: design.projection.then_some(projection),
         expansion: design.components.map(|_| expansion),
+        confidence,
         networks: &networks,
         row_network: &row_network,
         metadata,

@@ -40,7 +40,8 @@ impl Arena {
 #[inline(never)]
 pub fn frame(model: &Model<'_>, arena: &mut Arena) -> &'static mut [f32] {
     let ModelShape { rows, inputs, .. } = model.shape();
-    let (frame, features) = (arena.take(rows * inputs), arena.take(inputs));
+    let features = model.projection().map_or(inputs, |projection| projection.features());
+    let (frame, features) = (arena.take(rows * inputs), arena.take(features));
     inputs::fill(model, frame, features, &mut Numbers::new(3));
     frame
 }
@@ -101,6 +102,9 @@ pub fn measure(model: &Model<'_>, frame: &[f32], arena: &mut Arena) {
         bench.measure::<Libm>("f32-direct-libm", false);
         bench.measure::<Micromath>("f32-direct-micromath", false);
     }
+    if model.confidence().is_some() {
+        bench.assess(format.name(), arena);
+    }
 }
 
 #[inline(never)] // frees the stack that building the decoder needs
@@ -152,5 +156,24 @@ impl Bench<'_> {
             let all = outcome.status().iter().all(|row| *row == status);
             assert!(all, "a row is not as in {=str}", scope);
         }
+    }
+
+    /// Measures how far off the frame's outputs may be, and how novel it is.
+    #[inline(never)]
+    fn assess(&mut self, name: &str, arena: &mut Arena) {
+        let deviation = arena.take(self.rest.outputs.len());
+        let frame = model_core::Frame {
+            readings_ohm: self.frame,
+            reciprocals: self.reciprocals,
+            gate: None,
+        };
+        let mut novelty = None;
+        region(name, "confidence", || {
+            let frame = black_box(frame);
+            novelty =
+                self.decoder.assess_into(frame, black_box(self.scratch), deviation).ok().flatten();
+        });
+        let sound = novelty.is_some_and(|nats| nats > -1e3 && nats < 1e3);
+        assert!(sound && deviation.iter().all(|value| *value > 0.0), "the frame is not near");
     }
 }

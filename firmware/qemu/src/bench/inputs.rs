@@ -11,7 +11,7 @@ use super::BASELINE_OHM;
 const SWEEPS: usize = 50;
 
 /// Fills `frame` with readings in Ω within the training range of `model`: every row from random inputs. `features` is
-/// working space of as many numbers as a row has readings.
+/// working space of as many numbers as a network has inputs.
 pub fn fill(model: &Model<'_>, frame: &mut [f32], features: &mut [f32], numbers: &mut Numbers) {
     // A model with relative inputs takes readings over those of the baseline.
     let unit_ohm = if model.metadata().relative_inputs { BASELINE_OHM } else { 1.0 };

@@ -1,5 +1,5 @@
 //! Decodes 10,000 frames with every number format and exponential, with readings within and far beyond the
-//! training range, and gates as many. `firmware/tests/bit_for_bit.rs` checks that the host gives the same bits.
+//! training range, gates as many, and tells their novelty and deviations. `firmware/tests/bit_for_bit.rs` checks that the host gives the same bits.
 //! Assembly routines and their compiled twins agree here.
 #![no_std]
 #![no_main]
@@ -9,6 +9,7 @@ use defmt::{info, unwrap};
 use model_core::Aligned;
 use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
 use model_core::rbf::Format;
+use qemu_image::checks::Assessed;
 use qemu_image::{checks, exit};
 
 /// Bytes of a model in testdata, aligned.
@@ -59,6 +60,15 @@ fn gate(blob: &[u8]) {
     );
 }
 
+/// Prints what frames are by a confidence, or several.
+fn assess(what: &str, assessed: Option<Assessed>) {
+    let Assessed { crc, novel, far, missing } = unwrap!(assessed);
+    info!(
+        "confidence, {=str}: {=u32:08x}, {=usize} frames novel, {=usize} of them far, {=usize} missing",
+        what, crc, novel, far, missing
+    );
+}
+
 #[entry]
 fn main() -> ! {
     let (f32, fixed16) = (model!("kernels-f32.bin"), model!("kernels-fixed16.bin"));
@@ -81,5 +91,7 @@ fn main() -> ! {
     array(Format::F32, " of components", model!("array-f32-components.bin"));
     array(Format::Fixed16, " of components", model!("array-fixed16-components.bin"));
     array(Format::F32Direct, " of components", model!("array-f32-direct-components.bin"));
+    assess("assess_into", checks::assessing_many(model!("array-fixed16-confidence.bin")));
+    assess("1 to 12 directions", checks::assessing_sizes());
     exit::success()
 }

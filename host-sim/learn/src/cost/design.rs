@@ -15,7 +15,7 @@ pub struct Design {
     pub networks: Vec<NetworkDesign>,
     /// Index of the network that decodes each row; of the one for all rows behind a projection.
     pub row_network: Vec<usize>,
-    /// Whether one network decodes all rows, behind a projection of their readings to `shape.inputs` features.
+    /// Whether one network decodes all rows, behind a projection of their readings to its inputs.
     pub projection: bool,
     /// Number of components that the one network behind a projection computes, if they are expanded to the outputs.
     pub components: Option<usize>,
@@ -76,7 +76,8 @@ impl Design {
         design.in_ram_if_it_fits()
     }
 
-    /// The design of a model with one network for all rows, behind a projection. `shape` is that of the model.
+    /// The design of a model with one network for all rows, behind a projection to as many features as a row has
+    /// inputs. `shape` is that of the model.
     #[must_use]
     pub fn of_array(shape: ModelShape, format: Format, centres: usize, affine_tail: bool) -> Self {
         let outputs = shape.rows * shape.outputs;
@@ -115,8 +116,14 @@ impl Design {
     #[must_use]
     pub fn projection_bytes(&self) -> usize {
         let readings = self.shape.rows * self.shape.inputs;
-        let floats = self.shape.inputs * (1 + readings);
-        if self.projection { floats * size_of::<f32>() } else { 0 }
+        self.features() * (1 + readings) * size_of::<f32>()
+    }
+
+    /// Number of features that the readings are projected to; 0 without a projection.
+    #[must_use]
+    pub fn features(&self) -> usize {
+        let inputs = self.networks.first().map_or(0, |network| network.shape.inputs);
+        if self.projection { inputs } else { 0 }
     }
 
     /// Bytes of the expansion's parameters in a blob; 0 without one.

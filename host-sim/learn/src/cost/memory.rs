@@ -14,7 +14,7 @@ pub struct DecoderRam {
     pub frame: usize,
     /// Outputs of all rows, and their status.
     pub estimate: usize,
-    /// Scaled readings of one row, on the stack.
+    /// Scaled readings of one row, or scaled features, on the stack.
     pub scaled_readings: usize,
     /// Features of the whole array, on the stack; 0 without a projection.
     pub features: usize,
@@ -33,6 +33,7 @@ impl DecoderRam {
         let shape = design.shape;
         let float = size_of::<f32>();
         let readings = shape.inputs * float;
+        let features = design.features() * float;
         let batch = |format, centres: usize| match format {
             Format::F32Direct => 0,
             Format::F32 => 128,
@@ -43,8 +44,8 @@ impl DecoderRam {
             decoder: model_core::decoder_ram_bytes(shape.rows),
             frame: shape.rows * readings,
             estimate: shape.rows * (shape.outputs * float + 1),
-            scaled_readings: readings,
-            features: if design.projection { readings } else { 0 },
+            scaled_readings: if design.projection { features } else { readings },
+            features,
             components: design.components.unwrap_or(0) * float,
             relative_inputs: match (design.relative_inputs, design.projection) {
                 (false, _) => 0,

@@ -29,7 +29,7 @@ pub(super) fn of_frame(design: &Design, gating: Gating) -> Pieces {
     }
     if design.projection {
         let readings = design.shape.rows * design.shape.inputs;
-        project(readings, design.shape.inputs, &mut pieces);
+        project(readings, design.features(), &mut pieces);
     }
     if let Some(components) = design.components {
         // The projection's routine expands.

@@ -33,7 +33,8 @@ impl Layers {
     /// # Errors
     /// [`Error`](crate::Error) for data without a projection.
     pub fn start(dataset: &Dataset, options: &Options) -> Result<Self> {
-        let projection = if options.whole_array { Some(projection::fit(dataset)?) } else { None };
+        let fit = || projection::fit(dataset, options.features);
+        let projection = options.whole_array.then(fit).transpose()?;
         let start = Self { projection, hidden: vec![] };
         Ok(start.with_centres(dataset, options))
     }

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, SymmetricEigen};
 
 /// First `count` eigenvectors of the symmetric matrix `covariance`, one a column, by falling eigenvalues. There are
 /// fewer columns if the matrix has fewer.
-pub(super) fn directions(covariance: DMatrix<f64>, count: usize) -> DMatrix<f64> {
+pub fn directions(covariance: DMatrix<f64>, count: usize) -> DMatrix<f64> {
     let size = covariance.nrows();
     let eigen = SymmetricEigen::new(covariance);
     let mut order: Vec<usize> = (0..size).collect();

@@ -7,11 +7,17 @@
 //!
 //! The features are x·B·V, in the outputs' unit. Principal components would also spend directions on
 //! common changes of the readings that no output needs. `docs/projection.md` has measurements.
+//!
+//! Few outputs have few such directions, and readings tell more of them than any linear map: where a contact is, is a
+//! ratio of sums. So with fewer outputs than features, their products are regressed on as well.
+
+use std::borrow::Cow;
 
 use model_core::projection::Projection;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use taxel_data::dataset::Dataset;
+use taxel_data::error::require;
 use taxel_data::simd;
 use taxel_data::table::Table;
 
@@ -23,21 +29,38 @@ const FRAMES_AT_ONCE: usize = 1024;
 /// White noise added to every reading, relative to its standard deviation. Without it, directions in
 /// which readings hardly move would be amplified beyond f32.
 const NOISE_FLOOR: f64 = 1e-3;
+/// Number of features for outputs that belong to no row-wire, unless a user says otherwise. The device's routines keep
+/// so many inputs in registers.
+pub const USUAL_FEATURES: usize = 18;
+/// Largest degree of the products of outputs.
+const MOST_FACTORS: usize = 3;
 
-/// Fits the projection of `dataset`'s readings to as many features as one of its rows has readings.
+/// Fits the projection of `dataset`'s readings to so many `features`. By default they are as many as one of its rows
+/// has readings, or [`USUAL_FEATURES`] for data of a single row table.
 ///
-/// Returns f₀, then each reading's part in every feature (`readings × features`), as [`Projection::new`]
-/// takes them.
+/// There are never more features than outputs and products of these. Returns f₀, then each reading's part in every
+/// feature (`readings × features`), as [`Projection::new`] takes them.
 ///
 /// # Errors
-/// [`Error`] for data of a single row-wire, without a regression, or with a projection beyond f32.
-pub fn fit(dataset: &Dataset) -> Result<Vec<f32>> {
-    if dataset.rows < 2 {
-        return Err(Error::OneRow);
-    }
-    let (readings, features) = (dataset.inputs.names.len(), features_of(dataset));
+/// [`Error`] for a number of features that is not below that of the readings, for data without a regression, or with a
+/// projection beyond f32.
+pub fn fit(dataset: &Dataset, features: Option<usize>) -> Result<Vec<f32>> {
+    let readings = dataset.inputs.names.len();
+    let features = match features {
+        Some(features) => {
+            require((1..readings).contains(&features), "features", features, || {
+                format!("give from 1 to {}, fewer than the {readings} readings", readings - 1)
+            })?;
+            features
+        }
+        None if dataset.rows > 1 => readings / dataset.rows,
+        None if readings > USUAL_FEATURES => USUAL_FEATURES,
+        None => return Err(Error::OneRow { readings, least: USUAL_FEATURES }),
+    };
+    let targets = targets(&dataset.outputs, features);
+    let features = features.min(targets.names.len());
     let means = dataset.inputs.means();
-    let parts = directions(dataset, &means, features)?;
+    let parts = directions(&dataset.inputs, &targets, &means, features)?;
     let parts: Vec<f64> = (0..readings)
         .flat_map(|reading| (0..features).map(move |feature| (reading, feature)))
         .map(|place| parts[place])
@@ -72,7 +95,7 @@ pub(super) fn about_means(parts: &[f64], means: &[f64]) -> Result<Vec<f32>> {
 /// all scaled by the largest span of any.
 #[must_use]
 pub fn apply(projection: Projection<'_>, dataset: &Dataset) -> Dataset {
-    let (width, count) = (dataset.inputs.names.len(), features_of(dataset));
+    let (width, count) = (dataset.inputs.names.len(), projection.features());
     let names = (1..=count).map(|feature| format!("feature{feature}")).collect();
     let values = features(projection, count, width, &dataset.inputs.values);
     Dataset {
@@ -106,16 +129,58 @@ pub fn features(
     values.concat()
 }
 
-fn features_of(dataset: &Dataset) -> usize {
-    dataset.inputs.names.len() / dataset.rows
+/// What the projection has to tell: the `outputs`, and where these are fewer than `features`, their products of two
+/// or three factors. Then all are about their means and have a standard deviation of 1.
+fn targets(outputs: &Table, features: usize) -> Cow<'_, Table> {
+    let count = outputs.names.len();
+    if count >= features {
+        return Cow::Borrowed(outputs);
+    }
+    let mut products: Vec<Vec<usize>> = vec![vec![]];
+    let mut all: Vec<Vec<usize>> = Vec::new();
+    for factors in 1..=MOST_FACTORS {
+        // Every product once: its factors in ascending order.
+        let longer = products.iter().flat_map(|product| {
+            let least = product.last().copied().unwrap_or(0);
+            (least..count).map(|factor| [product.as_slice(), &[factor]].concat())
+        });
+        products = longer.collect();
+        all.extend_from_slice(&products);
+        if factors > 1 && all.len() >= features {
+            break;
+        }
+    }
+    let outputs = standardised(outputs);
+    let of_line = |line: &[f64]| -> Vec<f64> {
+        let product = |factors: &Vec<usize>| factors.iter().map(|factor| line[*factor]).product();
+        all.iter().map(product).collect()
+    };
+    let values = outputs.lines().flat_map(of_line).collect();
+    let names = (1..=all.len()).map(|product| format!("product{product}")).collect();
+    Cow::Owned(standardised(&Table { names, values }))
 }
 
-/// Each reading's part in every feature, one feature a column; columns beyond the number of outputs are
-/// 0.
-fn directions(dataset: &Dataset, means: &[f64], features: usize) -> Result<DMatrix<f64>> {
+/// Columns of `table` about their means, with standard deviations of 1; those that never change are 0.
+fn standardised(table: &Table) -> Table {
+    let scale = |deviation: f64| if deviation > 0.0 { 1.0 / deviation } else { 0.0 };
+    let scales: Vec<(f64, f64)> =
+        table.means().into_iter().zip(table.deviations().into_iter().map(scale)).collect();
+    let values = table.lines().flat_map(|line| {
+        line.iter().zip(&scales).map(|(value, (mean, scale))| (value - mean) * scale)
+    });
+    Table { names: table.names.clone(), values: values.collect() }
+}
+
+/// Each reading's part in every feature, one feature a column.
+fn directions(
+    inputs: &Table,
+    outputs: &Table,
+    means: &[f64],
+    features: usize,
+) -> Result<DMatrix<f64>> {
     let readings = means.len();
-    let products = products(dataset, means);
-    let width = readings + dataset.outputs.names.len();
+    let products = products(inputs, outputs, means);
+    let width = readings + outputs.names.len();
     let mut of_readings =
         DMatrix::from_fn(readings, readings, |i, j| products[i.min(j) * width + i.max(j)]);
     for reading in 0..readings {
@@ -139,12 +204,12 @@ fn directions(dataset: &Dataset, means: &[f64], features: usize) -> Result<DMatr
 
 /// Sums Σ zᵢ·zⱼ over all frames for every i ≤ j, with z the readings and then the outputs, about their
 /// means. Pieces are added in their order, whatever the number of threads.
-fn products(dataset: &Dataset, means: &[f64]) -> Vec<f64> {
-    let means = [means, &dataset.outputs.means()].concat();
+fn products(readings: &Table, targets: &Table, means: &[f64]) -> Vec<f64> {
+    let means = [means, &targets.means()].concat();
     let width = means.len();
-    let (inputs, outputs) = (dataset.inputs.names.len(), dataset.outputs.names.len());
-    let pieces = dataset.inputs.values.par_chunks(FRAMES_AT_ONCE * inputs);
-    let pieces = pieces.zip(dataset.outputs.values.par_chunks(FRAMES_AT_ONCE * outputs));
+    let (inputs, outputs) = (readings.names.len(), targets.names.len());
+    let pieces = readings.values.par_chunks(FRAMES_AT_ONCE * inputs);
+    let pieces = pieces.zip(targets.values.par_chunks(FRAMES_AT_ONCE * outputs));
     let sums: Vec<Vec<f64>> = pieces
         .map(|(inputs_of_piece, outputs_of_piece)| {
             let mut sums = vec![0.0; width * width];

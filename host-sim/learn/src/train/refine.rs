@@ -54,6 +54,10 @@ pub enum Examples<'e> {
 /// Least number of folds: one that tells when to stop, one that is held out, and the rest.
 pub const LEAST_FOLDS: usize = 3;
 
+/// Least number of fresh frames for each centre in a step: with fewer, weights fit the noise of their step's frames, and
+/// centres follow.
+const FRAMES_A_CENTRE: usize = 16;
+
 /// Most measured frames that are looked at in each step.
 const MOST_MEASURED: usize = 16_384;
 
@@ -62,7 +66,7 @@ const MOST_MEASURED: usize = 16_384;
 pub struct Refinement {
     /// Number of steps down the gradient.
     pub steps: usize,
-    /// Number of fresh frames that each step looks at.
+    /// Least number of fresh frames that each step looks at. Networks of many centres take more: 16 for each centre.
     pub frames: usize,
     /// Rate of the descent at its start: about how far a number moves in a step. Inputs are scaled to [0, 1].
     pub rate: f64,
@@ -129,8 +133,9 @@ pub fn refine(
     match examples {
         Examples::Fresh(fresh) => {
             progress.stage("refine", settings.steps);
+            let count = settings.frames.max(FRAMES_A_CENTRE * options.centres);
             for step in 0..settings.steps {
-                let frames = fresh.frames(step, settings.frames);
+                let frames = fresh.frames(step, count);
                 let networks = descents.par_iter_mut().enumerate();
                 networks.try_for_each(|(network, descent)| {
                     descent.step(&sources.pieces(&frames, network).iter().collect::<Vec<_>>())
@@ -165,7 +170,7 @@ pub fn refine(
         layer.centres.iter_mut().for_each(|c| *c = f64::from(*c as f32));
         if options.format == Format::Fixed16 {
             let ranges = sources.ranges(network);
-            layer.spread = layer.spread.max(width::least(&layer.centres, &ranges));
+            layer.spread = layer.spread.max(width::least(options.format, &layer.centres, &ranges));
         }
     }
     Ok(refined)

@@ -7,15 +7,15 @@ use taxel_data::progress::Silent;
 use taxel_data::random::Stream;
 use taxel_learn::train::train;
 use taxel_learn::{Exponential, ModelBlob, Options, Origin, pack};
-use taxel_simulate::outputs::Outputs;
+use taxel_simulate::outputs::{ElectrodeOutputs, Quantity};
 use taxel_simulate::sensor::Axis;
 use taxel_simulate::{World, synthesise};
 
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
 fn world() -> World {
-    let outputs = Outputs { axes: vec![Axis::Z], ..Outputs::all_deformations() };
-    World { outputs, read_rows: vec![3, 4], ..World::press() }
+    let outputs = ElectrodeOutputs { quantity: Quantity::Deformation, axes: vec![Axis::Z] };
+    World { outputs: outputs.into(), read_rows: vec![3, 4], ..World::press() }
 }
 
 /// Blob of a model trained on `press`: two rows, 18 readings to 6 outputs, K = 8.

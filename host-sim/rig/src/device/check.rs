@@ -92,7 +92,7 @@ impl Findings {
 pub struct FrameFindings {
     /// Number of frames sent.
     pub frames: usize,
-    /// Number of frames in which every output has the bits that the host computes.
+    /// Number of frames in which every output has the bits that the host computes, and so have novelty and deviations.
     pub bit_identical: usize,
     /// Frames a second, the line included.
     pub frames_per_s: f64,
@@ -135,9 +135,8 @@ fn check_paused<W: Wire>(
 ) -> Result<Findings> {
     let exponential = prepare(device, blob, progress)?;
 
-    let model = blob.prepare(exponential);
     let Frames { readings, baseline_ohm } = frames;
-    let expected = Expected::new(model, readings, baseline_ohm.as_deref());
+    let expected = Expected::new(blob, exponential, readings, baseline_ohm.as_deref());
     let frames = readings.len();
     let crc_32 = blob.parse().crc();
     let (bit_identical, time) = expected.count_same(device, frames, plan.window, progress)?;

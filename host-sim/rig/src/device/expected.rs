@@ -2,11 +2,13 @@
 
 use std::time::Duration;
 
-use firmware::link::message::Configuration;
+use firmware::link::message::{Configuration, EstimateReport};
 use model_core::blob::Model;
+use model_core::relative::reciprocal;
+use model_core::{Decoder, Frame};
 use taxel_data::progress::Progress;
 use taxel_data::table::Table;
-use taxel_learn::{Exponential, ModelBlob, PreparedModel};
+use taxel_learn::{Exponential, ModelBlob};
 
 use super::{Device, DeviceIdentity, Wire, stream, upload};
 use crate::error::{Error, Result};
@@ -16,30 +18,35 @@ pub(super) struct Expected {
     readings_ohm: Vec<f32>,
     outputs: Vec<f32>,
     per_frame: [usize; 2],
+    /// Novelty and deviations of every frame; none without a confidence.
+    confidence: Vec<(f32, Vec<f32>)>,
     /// Baseline that the device needs, in Ω.
     baseline_ohm: Option<Vec<f32>>,
 }
 
 impl Expected {
-    /// Answers of `model` to `readings`, with the exponential that it was prepared with, and with this baseline if
-    /// its inputs are relative.
+    /// Answers of the model of `blob` to `readings`, with this exponential, and with this baseline if its inputs are
+    /// relative.
     pub(super) fn new(
-        model: PreparedModel<'_>,
+        blob: &ModelBlob,
+        exponential: Exponential,
         readings: &Table,
         baseline_ohm: Option<&[f64]>,
     ) -> Self {
+        let model = blob.prepare(exponential);
         let model = match baseline_ohm {
             Some(baseline) => model.with_baseline(baseline),
             None => model,
         };
         let outputs = model.decode_table(readings);
-        let f32s = |values: &[f64]| values.iter().map(|value| *value as f32).collect();
-        Self {
-            baseline_ohm: baseline_ohm.map(f32s),
-            readings_ohm: f32s(&readings.values),
-            outputs: f32s(&outputs.values),
-            per_frame: [readings.names.len(), outputs.names.len()],
-        }
+        let f32s =
+            |values: &[f64]| -> Vec<f32> { values.iter().map(|value| *value as f32).collect() };
+        let (baseline_ohm, readings_ohm) = (baseline_ohm.map(f32s), f32s(&readings.values));
+        let per_frame = [readings.names.len(), outputs.names.len()];
+        let confidence =
+            confidence(&blob.parse(), &readings_ohm, per_frame, baseline_ohm.as_deref());
+        let outputs = f32s(&outputs.values);
+        Self { readings_ohm, outputs, per_frame, confidence, baseline_ohm }
     }
 
     /// Gives the device the baseline that it needs, if any.
@@ -72,9 +79,14 @@ impl Expected {
         Self::is_line(&self.readings_ohm, frame, self.per_frame[0], readings)
     }
 
-    /// Whether these are the outputs of frame number `frame`.
-    pub(super) fn is_same(&self, frame: u32, outputs: impl Iterator<Item = f32>) -> bool {
-        Self::is_line(&self.outputs, frame, self.per_frame[1], outputs)
+    /// Whether the `estimate` has the outputs of frame number `frame`, and its novelty and deviations.
+    pub(super) fn is_same(&self, frame: u32, estimate: &EstimateReport<'_>) -> bool {
+        let confidence = self.confidence.get(frame as usize);
+        let expected = confidence.map_or(&[][..], |(_, deviation)| deviation);
+        let deviation = estimate.deviation.iter().map(f32::to_bits);
+        estimate.novelty.map(f32::to_bits) == confidence.map(|(novelty, _)| novelty.to_bits())
+            && deviation.eq(expected.iter().map(|value| value.to_bits()))
+            && Self::is_line(&self.outputs, frame, self.per_frame[1], estimate.outputs.iter())
     }
 
     fn is_line(all: &[f32], line: u32, width: usize, found: impl Iterator<Item = f32>) -> bool {
@@ -102,12 +114,33 @@ impl Expected {
             self.per_frame[0],
             window,
             |frame, estimate| {
-                same += usize::from(self.is_same(frame, estimate.outputs.iter()));
+                same += usize::from(self.is_same(frame, estimate));
                 progress.step();
             },
         )?;
         Ok((same, time))
     }
+}
+
+/// Novelty and deviations of all frames by `model`, if it has a confidence.
+fn confidence(
+    model: &Model<'_>,
+    readings_ohm: &[f32],
+    [inputs, outputs]: [usize; 2],
+    baseline_ohm: Option<&[f32]>,
+) -> Vec<(f32, Vec<f32>)> {
+    let Ok(decoder) = Decoder::<{ u8::MAX as usize }>::of(*model) else { return Vec::new() };
+    let unknown = vec![f32::NAN; inputs];
+    let reciprocals: Vec<f32> =
+        baseline_ohm.unwrap_or(&unknown).iter().map(|ohm| reciprocal(*ohm)).collect();
+    let mut scratch = vec![0.0; decoder.scratch_floats()];
+    let frames = readings_ohm.chunks_exact(inputs.max(1)).map(|readings_ohm| {
+        let frame = Frame { readings_ohm, reciprocals: &reciprocals, gate: None };
+        let mut deviation = vec![0.0; outputs];
+        let novelty = decoder.assess_into(frame, &mut scratch, &mut deviation).ok()??;
+        Some((novelty, deviation))
+    });
+    frames.map_while(|frame| frame).collect()
 }
 
 /// Activates the model of `blob` unless it is active already, and returns the exponential that the
@@ -138,7 +171,22 @@ fn fitting_exponential(identity: &DeviceIdentity, model: &Model<'_>) -> Result<E
 
 #[cfg(test)]
 mod tests {
+    use model_core::blob::Floats;
+
     use super::*;
+
+    fn estimate<'a>(outputs: &'a [f32], deviation: &'a [f32]) -> EstimateReport<'a> {
+        let novelty = deviation.first().map(|_| -2.5);
+        EstimateReport {
+            frame: 1,
+            start_us: 0,
+            flags: 0,
+            row_status: &[0],
+            outputs: Floats::of(outputs),
+            novelty,
+            deviation: Floats::of(deviation),
+        }
+    }
 
     #[test]
     fn one_bit_of_one_output_makes_a_frame_another() {
@@ -146,13 +194,33 @@ mod tests {
             readings_ohm: vec![60.0; 4],
             outputs: vec![0.5, -0.25, 0.0, 1.0],
             per_frame: [2, 2],
+            confidence: Vec::new(),
             baseline_ohm: None,
         };
-        assert!(expected.is_same(1, [0.0, 1.0].into_iter()));
+        assert!(expected.is_same(1, &estimate(&[0.0, 1.0], &[])));
+        assert!(!expected.is_same(1, &estimate(&[0.0, 1.0], &[0.5, 0.5])));
         let next = f32::from_bits(1.0_f32.to_bits() + 1);
         for wrong in [&[0.0, next][..], &[-0.0, 1.0], &[0.0], &[0.0, 1.0, 2.0], &[0.5, -0.25]] {
-            assert!(!expected.is_same(1, wrong.iter().copied()), "{wrong:?}");
+            assert!(!expected.is_same(1, &estimate(wrong, &[])), "{wrong:?}");
         }
-        assert!(!expected.is_same(2, std::iter::empty()));
+        assert!(!expected.is_same(2, &estimate(&[], &[])));
+    }
+
+    #[test]
+    fn one_bit_of_its_confidence_makes_a_frame_another() {
+        let expected = Expected {
+            readings_ohm: vec![60.0; 4],
+            outputs: vec![0.5, -0.25, 0.0, 1.0],
+            per_frame: [2, 2],
+            confidence: vec![(0.5, vec![1.0, 1.0]), (-2.5, vec![0.125, 0.25])],
+            baseline_ohm: None,
+        };
+        let good = estimate(&[0.0, 1.0], &[0.125, 0.25]);
+        assert!(expected.is_same(1, &good));
+        assert!(!expected.is_same(1, &EstimateReport { novelty: Some(-2.25), ..good }));
+        assert!(!expected.is_same(1, &EstimateReport { novelty: None, ..good }));
+        for wrong in [&[0.125, 0.5][..], &[0.125], &[]] {
+            assert!(!expected.is_same(1, &estimate(&[0.0, 1.0], wrong)), "{wrong:?}");
+        }
     }
 }

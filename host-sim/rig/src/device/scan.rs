@@ -5,7 +5,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use firmware::circuit::ZeroPotential;
-use firmware::link::message::{Configuration, Report};
+use firmware::link::message::{ConfidenceSent, Configuration, Report};
 use serde::Serialize;
 use taxel_data::progress::Progress;
 use taxel_data::table::Table;
@@ -30,7 +30,7 @@ pub struct ScanFindings {
     pub scans: usize,
     /// Number of scans in which every reading has the same bits as the host's scan.
     pub bit_identical_readings: usize,
-    /// Number of scans in which every output has the bits that the host computes.
+    /// Number of scans in which every output has the bits that the host computes, and so have novelty and deviations.
     pub bit_identical_estimates: usize,
     /// Number of samples that the device did not get.
     pub failed_samples: u32,
@@ -93,12 +93,12 @@ pub fn check<W: Wire>(
 ) -> Result<ScanFindings> {
     let world = with_parts_of_image(world)?;
     device.pause()?;
-    let model = blob.prepare(prepare(device, blob, progress)?);
+    let exponential = prepare(device, blob, progress)?;
 
     let readings = all_readings(&world, scans);
     let board = VirtualBoard::new(&world)?;
     let scanned = virtual_board::scan(&board, series_of_image(), &readings)?;
-    let expected = Expected::new(model, &scanned, baseline_ohm);
+    let expected = Expected::new(blob, exponential, &scanned, baseline_ohm);
     expected.set_baseline(device)?;
     let scan = board.scan_settings();
     let configuration = Configuration {
@@ -106,6 +106,7 @@ pub fn check<W: Wire>(
         scan,
         send_readings: true,
         send_estimates: true,
+        confidence: ConfidenceSent::Deviations,
         ..Configuration::DEFAULT
     };
     let wires = board.wires();
@@ -187,7 +188,7 @@ fn count_same<W: Wire>(
             }
             Report::Estimate(estimate) => {
                 let index = index(estimate.frame);
-                let same = expected.is_same(index, estimate.outputs.iter());
+                let same = expected.is_same(index, estimate);
                 findings.bit_identical_estimates += usize::from(same);
                 Some(index as usize + 1)
             }

@@ -10,6 +10,7 @@ use taxel_data::simd::{self, LANES, Lanes};
 use taxel_data::{BadValue, exp, normal_share_below, sin_cos};
 
 use super::{Draws, Motion, Trajectories, check_range};
+use crate::contact::Contact;
 use crate::sensor::{Sensor, Vector3};
 
 /// One contact, centred anywhere on the face.
@@ -80,7 +81,7 @@ impl Motion for Press {
         simd::widest(
             #[inline(always)]
             || {
-                let contact = Contact::of_latents(latents, &sensor.size_mm, self);
+                let contact = self.contact_of(latents, &sensor.size_mm);
                 for (delta, electrode_mm) in deformation_mm.iter_mut().zip(electrodes_mm) {
                     contact.deform(electrode_mm, delta);
                 }
@@ -88,10 +89,29 @@ impl Motion for Press {
         );
     }
 
+    fn largest_contact(&self, sensor: &Sensor) -> Option<Contact> {
+        let [x_mm, y_mm, _] = sensor.size_mm;
+        let [radius_mm, depth_mm, ratio] =
+            [self.dent_radius_mm, self.dent_depth_mm, self.shear_ratio].map(|[_, high]| high);
+        Some(Contact {
+            centre_mm: [[0.5 * x_mm; LANES], [0.5 * y_mm; LANES]],
+            dent_radius_mm: [radius_mm; LANES],
+            dent_depth_mm: [depth_mm; LANES],
+            shear: [[ratio; LANES]; 2],
+        })
+    }
+
+    fn place_contact(&self, sensor: &Sensor, latents: &[Lanes]) -> Option<Contact> {
+        Some(simd::widest(
+            #[inline(always)]
+            || self.contact_of(latents, &sensor.size_mm),
+        ))
+    }
+
     fn start<'m>(&'m self, sensor: &'m Sensor, draws: &mut Draws) -> Box<dyn Trajectories + 'm> {
         let contact = simd::widest(
             #[inline(always)]
-            || Contact::draw(draws.of(Purpose::Contact, 0), &sensor.size_mm, self),
+            || self.draw(draws.of(Purpose::Contact, 0), &sensor.size_mm),
         );
         Box::new(Contacts { sensor, contact })
     }
@@ -121,27 +141,22 @@ impl Trajectories for Contacts<'_> {
             },
         );
     }
+
+    fn contact(&self, _step: usize) -> Option<&Contact> {
+        Some(&self.contact)
+    }
 }
 
-/// Contact in each lane.
-struct Contact {
-    centre_mm: [Lanes; 2],
-    dent_radius_mm: Lanes,
-    dent_depth_mm: Lanes,
-    /// Shear along x and y: Δx/Δz and Δy/Δz.
-    shear: [Lanes; 2],
-}
-
-impl Contact {
+impl Press {
     /// Draws one contact a lane, its centre uniform over the face.
     #[inline(always)]
-    fn draw(random: &mut RandomLanes, size_mm: &Vector3, press: &Press) -> Self {
+    fn draw(&self, random: &mut RandomLanes, size_mm: &Vector3) -> Contact {
         let ranges = [
             [0.0, size_mm[0]],
             [0.0, size_mm[1]],
-            press.dent_radius_mm,
-            press.dent_depth_mm,
-            press.shear_ratio,
+            self.dent_radius_mm,
+            self.dent_depth_mm,
+            self.shear_ratio,
             [0.0, 1.0],
         ];
         let mut drawn = [[0.0; LANES]; 6];
@@ -153,15 +168,15 @@ impl Contact {
             shear[0][frame] = ratios[frame] * cosine;
             shear[1][frame] = ratios[frame] * sine;
         }
-        Self { centre_mm: [x_mm, y_mm], dent_radius_mm, dent_depth_mm, shear }
+        Contact { centre_mm: [x_mm, y_mm], dent_radius_mm, dent_depth_mm, shear }
     }
 
     /// Contacts that `latents` stand for: one each for the centre's x and y, the dent's radius and depth, and two
     /// for the shear. These two are a vector in the shear's direction, so nothing jumps at θ = 2π.
     #[inline(always)]
-    fn of_latents(latents: &[Lanes], size_mm: &Vector3, press: &Press) -> Self {
+    fn contact_of(&self, latents: &[Lanes], size_mm: &Vector3) -> Contact {
         let ranges =
-            [[0.0, size_mm[0]], [0.0, size_mm[1]], press.dent_radius_mm, press.dent_depth_mm];
+            [[0.0, size_mm[0]], [0.0, size_mm[1]], self.dent_radius_mm, self.dent_depth_mm];
         let mut uniform = [[0.0; LANES]; 4];
         let mut shear = [[0.0; LANES]; 2];
         for (i, [low, high]) in ranges.into_iter().enumerate() {
@@ -169,7 +184,7 @@ impl Contact {
                 uniform[i][frame] = low + (high - low) * normal_share_below(latents[i][frame]);
             }
         }
-        let [low, high] = press.shear_ratio;
+        let [low, high] = self.shear_ratio;
         for frame in 0..LANES {
             let (x, y) = (latents[4][frame], latents[5][frame]);
             let squared = x * x + y * y;
@@ -180,24 +195,6 @@ impl Contact {
             shear[1][frame] = factor * y;
         }
         let [x_mm, y_mm, dent_radius_mm, dent_depth_mm] = uniform;
-        Self { centre_mm: [x_mm, y_mm], dent_radius_mm, dent_depth_mm, shear }
-    }
-
-    #[inline(always)]
-    fn deform(&self, electrode_mm: &Vector3, [dx_mm, dy_mm, dz_mm]: &mut [Lanes; 3]) {
-        let mut exponents = [0.0; LANES];
-        for frame in 0..LANES {
-            let x = electrode_mm[0] - self.centre_mm[0][frame];
-            let y = electrode_mm[1] - self.centre_mm[1][frame];
-            let radius = self.dent_radius_mm[frame];
-            exponents[frame] = -(x * x + y * y) / (2.0 * radius * radius);
-        }
-        for frame in 0..LANES {
-            dz_mm[frame] = self.dent_depth_mm[frame] * exp(exponents[frame]);
-        }
-        for frame in 0..LANES {
-            dx_mm[frame] = self.shear[0][frame] * dz_mm[frame];
-            dy_mm[frame] = self.shear[1][frame] * dz_mm[frame];
-        }
+        Contact { centre_mm: [x_mm, y_mm], dent_radius_mm, dent_depth_mm, shear }
     }
 }

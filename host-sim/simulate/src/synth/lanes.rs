@@ -5,7 +5,9 @@ use taxel_data::random::{RandomLanes, Stream};
 use taxel_data::simd::{self, LANES, Lanes};
 
 use super::Synthesis;
+use crate::contact::Contact;
 use crate::motion::Draws;
+use crate::outputs::{ContactOutput, Outputs};
 use crate::rubber::Response;
 use crate::sensor::{LaneModel, Scratch};
 
@@ -18,6 +20,8 @@ pub(super) struct LaneSynthesis<'s> {
     span_ohm: Vec<f64>,
     /// Index of each output of a row among electrodes and axes, and factor on its deformation.
     outputs: Vec<(usize, f64)>,
+    /// Quantities of the contact, if they are the outputs.
+    of_contact: &'s [ContactOutput],
 }
 
 /// Working memory that the trajectories of one thread use in turn.
@@ -35,15 +39,22 @@ impl<'s> LaneSynthesis<'s> {
     /// Synthesis of frames of `stream`, with noise relative to `span_ohm` where that is not empty.
     pub(super) fn new(synthesis: &'s Synthesis<'s>, stream: Stream, span_ohm: Vec<f64>) -> Self {
         let sensor = &synthesis.world.sensor;
-        let of_an_electrode = |electrode: usize| {
-            let axes = synthesis.outputs.axes.iter();
-            axes.map(move |axis| {
-                (3 * electrode + axis.index(), synthesis.outputs.per_mm(sensor, *axis))
-            })
-        };
-        let outputs = (0..sensor.electrodes_per_row_wire).flat_map(of_an_electrode);
-        let (model, outputs) = (LaneModel::new(sensor), outputs.collect());
-        Self { synthesis, stream, model, span_ohm, outputs }
+        let (mut outputs, mut of_contact) = (Vec::new(), &[][..]);
+        match &*synthesis.outputs {
+            Outputs::Electrodes(wanted) => {
+                for electrode in 0..sensor.electrodes_per_row_wire {
+                    let axes = wanted.axes.iter();
+                    outputs.extend(
+                        axes.map(|axis| {
+                            (3 * electrode + axis.index(), wanted.per_mm(sensor, *axis))
+                        }),
+                    );
+                }
+            }
+            Outputs::Contact(wanted) => of_contact = wanted.as_slice(),
+        }
+        let model = LaneModel::new(sensor);
+        Self { synthesis, stream, model, span_ohm, outputs, of_contact }
     }
 
     /// Working memory for one thread.
@@ -83,6 +94,7 @@ impl<'s> LaneSynthesis<'s> {
                     || self.read_row(workspace, (first, step), (place, row), readings, outputs),
                 );
             }
+            self.write_contact(trajectories.contact(step), step, outputs);
         }
     }
 
@@ -120,12 +132,32 @@ impl<'s> LaneSynthesis<'s> {
                 *place = lanes[lane];
             }
         }
+        if self.outputs.is_empty() {
+            return;
+        }
         let (width, of_electrodes) = (self.outputs.len(), deformation_mm.as_flattened());
         let lines = outputs.chunks_exact_mut(width);
         let line_of_lanes = lines.skip(step * rows + place).step_by(steps * rows);
         for (lane, outputs) in line_of_lanes.enumerate() {
             for (output, (place, factor)) in outputs.iter_mut().zip(&self.outputs) {
                 *output = factor * of_electrodes[*place][lane];
+            }
+        }
+    }
+
+    /// Lays out the quantities of the contact at one step, if they are wanted.
+    fn write_contact(&self, contact: Option<&Contact>, step: usize, outputs: &mut [f64]) {
+        let sensor = &self.synthesis.world.sensor;
+        let columns: Vec<Lanes> =
+            self.of_contact.iter().flat_map(|quantity| quantity.of(contact, sensor)).collect();
+        if columns.is_empty() {
+            return;
+        }
+        let lines = outputs.chunks_exact_mut(columns.len());
+        let line_of_lanes = lines.skip(step).step_by(self.synthesis.motion.steps());
+        for (lane, outputs) in line_of_lanes.enumerate() {
+            for (output, lanes) in outputs.iter_mut().zip(&columns) {
+                *output = lanes[lane];
             }
         }
     }

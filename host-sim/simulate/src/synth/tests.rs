@@ -1,6 +1,7 @@
 use taxel_data::digest::digest;
 
 use super::*;
+use crate::outputs::ContactOutput;
 use crate::sensor::{Precision, Sensor};
 
 fn world(name: &str) -> World {
@@ -203,12 +204,95 @@ fn readings_are_those_of_the_sensors_equations() {
     }
 }
 
+/// World of one press whose outputs are all quantities of the contact.
+fn world_of_contact() -> World {
+    World { outputs: Outputs::Contact(ContactOutput::ALL.to_vec()), ..World::press() }
+}
+
+#[test]
+fn the_contact_is_the_one_that_moves_the_electrodes() {
+    let (of_contact, press) = (world_of_contact(), World::press());
+    let frames = 300;
+    let [contact, press] =
+        [&of_contact, &press].map(|world| synthesise(world, Stream::Training, frames));
+    assert_eq!(contact.inputs, press.inputs, "the same readings, to the bit");
+    assert_eq!((contact.rows, contact.frames()), (1, frames));
+    let names = [
+        "contact_x_mm",
+        "contact_y_mm",
+        "contact_depth_mm",
+        "contact_shear_x_mm",
+        "contact_shear_y_mm",
+        "contact_force_n",
+    ];
+    assert_eq!(contact.outputs.names, names);
+    let electrodes = &of_contact.sensor.upper_electrodes_mm;
+    for (contact, deformation) in contact.outputs.lines().zip(press.outputs.lines()) {
+        let [x, y, depth, shear_x, shear_y, force] = contact[..] else { panic!("six outputs") };
+        assert!((0.0..=20.0).contains(&x) && (0.0..=18.0).contains(&y));
+        let delta = |electrode: usize| &deformation[3 * electrode..][..3];
+        // ln Δz falls with the squared distance: the radius from one electrode, and then all others.
+        let square = |e: usize| (electrodes[e][0] - x).powi(2) + (electrodes[e][1] - y).powi(2);
+        let decay = libm::log(depth / delta(20)[2]) / square(20);
+        for electrode in 0..48 {
+            let expected = depth * libm::exp(-decay * square(electrode));
+            let found = delta(electrode);
+            assert!((found[2] - expected).abs() < 1e-9, "{} {expected}", found[2]);
+            assert!((found[0] * depth - shear_x * found[2]).abs() < 1e-12);
+            assert!((found[1] * depth - shear_y * found[2]).abs() < 1e-12);
+        }
+        // The force on the face is about that of all electrodes, each on its cell.
+        let of_electrodes: f64 = (0..48).map(|e| 2.0 * delta(e)[2]).sum();
+        assert!((force / of_electrodes - 1.0).abs() < 0.2, "{force} {of_electrodes}");
+    }
+}
+
+#[test]
+fn a_contact_is_the_same_however_many_frames_and_rows_are_read() {
+    let whole = synthesise(&world_of_contact(), Stream::Training, 200);
+    let few = World { read_rows: vec![2, 6], ..world_of_contact() };
+    let few = synthesise(&few, Stream::Training, 70);
+    assert_eq!(few.inputs.names.len(), 36);
+    assert_eq!(few.outputs.values, whole.outputs.values[..70 * 6]);
+    let later = Synthesis::of(&world_of_contact()).frames_from(Stream::Training, 64, 20);
+    assert_eq!(later.outputs.values, whole.outputs.values[64 * 6..84 * 6]);
+}
+
+#[test]
+fn nothing_touches_an_untouched_sensor() {
+    let world = world_of_contact();
+    let untouched = Synthesis::of(&world).untouched().frames(Stream::Training, 3);
+    for line in untouched.outputs.lines() {
+        assert!(line[..2].iter().all(|centre| centre.is_nan()));
+        assert_eq!(line[2..], [0.0; 4]);
+    }
+}
+
+#[test]
+fn contacts_of_motions_without_one_are_refused() {
+    let refused = |world: World| world.check().unwrap_err().to_string();
+    let contact = |wanted: &[ContactOutput]| Outputs::Contact(wanted.to_vec());
+    let message = refused(World { outputs: contact(&ContactOutput::ALL), ..World::paper() });
+    assert!(message.contains("outputs.contact = [\"centre\", \"depth\", \"shear\", \"force\"]"));
+    assert!(message.contains("set deformation.kind = \"press\""), "{message}");
+    for wanted in
+        [&[][..], &[ContactOutput::Force, ContactOutput::Centre], &[ContactOutput::Depth; 2]]
+    {
+        let message = refused(World { outputs: contact(wanted), ..World::press() });
+        assert!(message.contains("always in this order"), "{message}");
+    }
+}
+
 /// Synthesised bytes are the same on every platform and in every release, until the changelog says
 /// otherwise.
 #[test]
 fn synthesised_numbers_are_fixed_for_all_time() {
-    for (name, pinned) in [("paper", 0xa286_1098_286b_610f_u64), ("press", 0xd4e0_e1f1_2618_58b2)] {
-        let dataset = synthesise(&world(name), Stream::Training, 10);
+    for (name, world, pinned) in [
+        ("paper", World::paper(), 0xa286_1098_286b_610f_u64),
+        ("press", World::press(), 0xd4e0_e1f1_2618_58b2),
+        ("contact", world_of_contact(), 0xe323_4ae1_9a97_57e4),
+    ] {
+        let dataset = synthesise(&world, Stream::Training, 10);
         let values = dataset.inputs.values.iter().chain(&dataset.outputs.values);
         let bytes: Vec<u8> = values.flat_map(|v| v.to_le_bytes()).collect();
         assert_eq!(digest(&bytes), pinned, "{name}");

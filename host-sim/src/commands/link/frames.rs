@@ -16,11 +16,23 @@ pub struct Frame {
     pub number: u32,
     /// Time at which its scan began.
     pub start_us: u64,
-    /// Readings or outputs.
+    /// Readings; or outputs, their deviations and the frame's novelty, as far as they are sent.
     pub values: Vec<f64>,
+    /// Whether it is unlike those of training, as far as the device has computed it.
+    pub novel: bool,
 }
 
 impl Frame {
+    fn of(estimate: &EstimateReport<'_>) -> Self {
+        let values = estimate.outputs.iter().chain(estimate.deviation.iter());
+        Self {
+            number: estimate.frame,
+            start_us: estimate.start_us,
+            values: values.chain(estimate.novelty).map(f64::from).collect(),
+            novel: estimate.flags & EstimateReport::NOVEL != 0,
+        }
+    }
+
     /// Whether the device has started anew between this frame and `next`.
     fn is_from_before(&self, next: &Self) -> bool {
         let frames = next.number.wrapping_sub(self.number).cast_signed();
@@ -41,20 +53,21 @@ pub fn hear_frames<W: Wire>(
     let mut frames: Vec<Frame> = Vec::new();
     let mut rows_at_rest = 0;
     let enough = device.hear(Instant::now() + patience, |_, report| {
-        let (number, start_us, values, status) = match report {
+        let mut status: &[u8] = &[];
+        let frame = match report {
             Report::Readings { frame, start_us, readings_ohm } if wanted == Wanted::Readings => {
-                (*frame, *start_us, *readings_ohm, &[][..])
+                let values = readings_ohm.iter().map(f64::from).collect();
+                Frame { number: *frame, start_us: *start_us, values, novel: false }
             }
             Report::Estimate(estimate) if wanted == Wanted::Estimates => {
-                (estimate.frame, estimate.start_us, estimate.outputs, estimate.row_status)
+                status = estimate.row_status;
+                Frame::of(estimate)
             }
             _ => return None,
         };
-        let values: Vec<f64> = values.iter().map(f64::from).collect();
-        if let Err(error) = check_length(number, &values, width) {
+        if let Err(error) = check_length(frame.number, &frame.values, width) {
             return Some(Err(error));
         }
-        let frame = Frame { number, start_us, values };
         if frames.last().is_some_and(|last| last.is_from_before(&frame)) {
             return Some(Err(Error::Failed("the device has restarted meanwhile".into())));
         }

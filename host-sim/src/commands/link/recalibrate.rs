@@ -15,7 +15,7 @@ use taxel_rig::device::{Device, Wire};
 use super::super::progress::Terminal;
 use super::super::readings::table_of;
 use super::super::{Common, print};
-use super::scan::{ScanArguments, Wanted, configure, patience};
+use super::scan::{Confidence, ScanArguments, Wanted, configure, patience};
 
 #[derive(Args)]
 pub struct Arguments {
@@ -74,7 +74,7 @@ pub fn execute<W: Wire>(
     } else {
         let patience = patience(&arguments.scan, &identity);
         device.while_paused(|device| -> Result<_> {
-            configure(device, &arguments.scan, Wanted::Nothing, 0.0)?;
+            configure(device, &arguments.scan, Wanted::Nothing, 0.0, Confidence::Nothing)?;
             let show = |_: &mut Device<W>, number: usize| ask_for_press(number, &outputs);
             let frames = arguments.scan.frames;
             recalibrate(device, &outputs, frames, patience, show, &Terminal::new())

@@ -13,7 +13,7 @@ use taxel_rig::device::{Device, DeviceIdentity, Wire};
 use super::super::{Common, print};
 use super::frames::{hear_frames, missing};
 use super::scan::{
-    ScanArguments, Wanted, check_length, configure, patience, reading_names, tolerance,
+    Confidence, ScanArguments, Wanted, check_length, configure, patience, reading_names, tolerance,
 };
 
 #[derive(Args)]
@@ -29,6 +29,10 @@ pub struct RecordArguments {
     /// `baseline`; 0 decodes all rows (docs/gating.md).
     #[arg(long, value_name = "SHARE", default_value_t = Configuration::DEFAULT.rest_tolerance, value_parser = tolerance, allow_negative_numbers = true)]
     rest_tolerance: f32,
+    /// What is saved of the MODEL's confidence: columns NAME_deviation for each output, and novelty_nats
+    /// (docs/confidence.md).
+    #[arg(long, value_enum, value_name = "WHAT", default_value = "nothing", requires = "model")]
+    confidence: Confidence,
     /// CSV file to write.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
@@ -55,6 +59,8 @@ struct Saved {
     values_missing: usize,
     /// Rows that were untouched, and so were not decoded.
     rows_at_rest: usize,
+    /// Frames that are unlike those of training, as far as the device was to tell.
+    frames_novel: usize,
     file: PathBuf,
 }
 
@@ -67,24 +73,29 @@ pub fn record<W: Wire>(
     let inputs: Vec<&Path> = action.model.iter().map(PathBuf::as_path).collect();
     output::check_writable(&action.output, &inputs)?;
     let identity = device.identify()?;
-    let (wanted, names) = match &model {
+    let (wanted, mut names) = match &model {
         Some(model) => (Wanted::Estimates, output_names(model, &identity, action.recalibrated)?),
         None => (Wanted::Readings, reading_names(&identity)),
     };
+    let values = names.len();
+    if let Some(model) = &model {
+        names.extend(confidence_names(model, action.confidence, &names)?);
+    }
     let patience = patience(&action.scan, &identity);
     let (frames, rows_at_rest) = device.while_paused(|device| -> Result<_> {
-        configure(device, &action.scan, wanted, action.rest_tolerance)?;
+        configure(device, &action.scan, wanted, action.rest_tolerance, action.confidence)?;
         hear_frames(device, action.scan.frames.into(), patience, wanted, names.len())
     })?;
-    let missing = missing(frames.iter().flat_map(|frame| &frame.values), wanted)?;
+    let missing = missing(frames.iter().flat_map(|frame| &frame.values[..values]), wanted)?;
     let lines = frames.iter().map(|frame| frame.values.iter().copied());
     csv_file::write(&action.output, names.iter().map(String::as_str), lines)?;
     let ends = frames.last().zip(frames.first());
     let span = ends.map_or(0, |(last, first)| last.number.wrapping_sub(first.number) + 1);
     let frames_lost = span.saturating_sub(frames.len() as u32);
+    let frames_novel = frames.iter().filter(|frame| frame.novel).count();
     let file = action.output.clone();
     let (frames, values_missing) = (frames.len(), missing);
-    saved(&Saved { frames, frames_lost, values_missing, rows_at_rest, file }, common)
+    saved(&Saved { frames, frames_lost, values_missing, rows_at_rest, frames_novel, file }, common)
 }
 
 /// Names of the model's outputs, if it is the active one, or was before it was `recalibrated`.
@@ -106,6 +117,28 @@ fn output_names(
     Ok(model.metadata().output_names.iter().map(String::from).collect())
 }
 
+/// Names of the columns for what is `wanted` of the model's confidence, beside those of its `outputs`.
+fn confidence_names(
+    model: &ModelBlob,
+    wanted: Confidence,
+    outputs: &[String],
+) -> Result<Vec<String>> {
+    if wanted == Confidence::Nothing {
+        return Ok(Vec::new());
+    }
+    if model.parse().confidence().is_none() {
+        return Err(Error::Usage(
+            "--confidence: MODEL has none; leave the option out, or train one that has".into(),
+        ));
+    }
+    let mut names = Vec::new();
+    if wanted == Confidence::Deviations {
+        names.extend(outputs.iter().map(|name| format!("{name}_deviation")));
+    }
+    names.push("novelty_nats".into());
+    Ok(names)
+}
+
 pub fn baseline<W: Wire>(
     device: &mut Device<W>,
     action: &BaselineArguments,
@@ -117,7 +150,7 @@ pub fn baseline<W: Wire>(
     let request = Request::CaptureBaseline { frames };
     let patience = patience(&action.scan, &identity);
     let answer = device.while_paused(|device| {
-        configure(device, &action.scan, Wanted::Nothing, 0.0)?;
+        configure(device, &action.scan, Wanted::Nothing, 0.0, Confidence::Nothing)?;
         device.ask(&request, patience, |report| match report {
             Report::Baseline { readings_ohm } => {
                 Some(readings_ohm.iter().map(f64::from).collect::<Vec<_>>())
@@ -135,8 +168,8 @@ pub fn baseline<W: Wire>(
     let lines = std::iter::once(readings.iter().copied());
     csv_file::write(&action.output, names.iter().map(String::as_str), lines)?;
     let file = action.output.clone();
-    let (frames, frames_lost, rows_at_rest) = (frames.into(), 0, 0);
-    saved(&Saved { frames, frames_lost, values_missing, rows_at_rest, file }, common)
+    let (frames, frames_lost, rows_at_rest, frames_novel) = (frames.into(), 0, 0, 0);
+    saved(&Saved { frames, frames_lost, values_missing, rows_at_rest, frames_novel, file }, common)
 }
 
 fn saved(saved: &Saved, common: &Common) -> Result<()> {
@@ -153,6 +186,9 @@ fn saved(saved: &Saved, common: &Common) -> Result<()> {
     ));
     if saved.rows_at_rest > 0 {
         page.line(format_args!("{} rows were untouched, and not decoded", saved.rows_at_rest));
+    }
+    if saved.frames_novel > 0 {
+        page.line(format_args!("{} frames were unlike those of training", saved.frames_novel));
     }
     page.print()
 }

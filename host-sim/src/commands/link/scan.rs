@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use clap::{Args, value_parser};
-use firmware::link::message::Configuration;
+use clap::{Args, ValueEnum, value_parser};
+use firmware::link::message::{ConfidenceSent, Configuration};
 use firmware::timing::ScanPlan;
 use host_sim::Result;
 use model_core::Wires;
@@ -33,6 +33,27 @@ pub enum Wanted {
     Estimates,
 }
 
+/// Part of a model's confidence that a device is to send with each estimate.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Confidence {
+    /// Nothing, and nothing is computed.
+    Nothing,
+    /// The frame's novelty.
+    Novelty,
+    /// The frame's novelty, and a deviation for each output: twice the bytes.
+    Deviations,
+}
+
+impl From<Confidence> for ConfidenceSent {
+    fn from(confidence: Confidence) -> Self {
+        match confidence {
+            Confidence::Nothing => Self::Nothing,
+            Confidence::Novelty => Self::Novelty,
+            Confidence::Deviations => Self::Deviations,
+        }
+    }
+}
+
 /// Tolerance within the range that a device accepts.
 pub fn tolerance(text: &str) -> std::result::Result<f32, String> {
     let share = text.parse().ok().filter(|share| (0.0..1.0).contains(share));
@@ -45,12 +66,14 @@ pub fn configure<W: Wire>(
     scan: &ScanArguments,
     wanted: Wanted,
     rest_tolerance: f32,
+    confidence: Confidence,
 ) -> taxel_rig::Result<()> {
     let mut configuration = Configuration {
         frame_period_us: scan.period_us,
         send_readings: wanted == Wanted::Readings,
         send_estimates: wanted == Wanted::Estimates,
         rest_tolerance,
+        confidence: confidence.into(),
         ..Configuration::DEFAULT
     };
     configuration.scan.settling_us = scan.settling_us;

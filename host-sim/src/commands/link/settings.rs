@@ -1,14 +1,14 @@
 //! Actions `configure` and `settings`: what a device keeps over restarts.
 
 use clap::{Args, ValueEnum, value_parser};
-use firmware::link::message::{Configuration, Kept, Setting};
+use firmware::link::message::{ConfidenceSent, Configuration, Kept, Setting};
 use host_sim::Result;
 use serde::Serialize;
 use taxel_rig::calibration::CircuitConstants;
 use taxel_rig::device::{Device, Wire};
 
 use super::super::{Common, print};
-use super::scan::tolerance;
+use super::scan::{Confidence, tolerance};
 
 #[derive(Args)]
 #[group(required = true, multiple = true)]
@@ -25,6 +25,9 @@ pub struct ConfigureArguments {
     /// Reports that are sent of each scan.
     #[arg(long, value_enum, value_name = "WHAT")]
     send: Option<Send>,
+    /// What is computed and sent of the model's confidence with each estimate (docs/confidence.md).
+    #[arg(long, value_enum, value_name = "WHAT")]
+    confidence: Option<Confidence>,
     /// Reading below which a short circuit is assumed.
     #[arg(long, value_name = "OHM")]
     shorted_below_ohm: Option<f32>,
@@ -58,6 +61,7 @@ impl ConfigureArguments {
             c.send_readings = matches!(send, Send::Readings | Send::Both);
             c.send_estimates = matches!(send, Send::Estimates | Send::Both);
         }
+        c.confidence = self.confidence.map_or(c.confidence, ConfidenceSent::from);
         c.shorted_below_ohm = self.shorted_below_ohm.unwrap_or(c.shorted_below_ohm);
         c.open_above_ohm = self.open_above_ohm.unwrap_or(c.open_above_ohm);
         c.contact_threshold = self.contact_threshold.unwrap_or(c.contact_threshold);
@@ -146,10 +150,15 @@ fn show<W: Wire>(device: &mut Device<W>, common: &Common) -> Result<()> {
     ));
     let yes = |sent: bool| if sent { "yes" } else { "no" };
     page.line(format_args!(
-        "{:<17} readings {}, estimates {}",
+        "{:<17} readings {}, estimates {}, of confidence {}",
         "sent of each scan",
         yes(c.send_readings),
-        yes(c.send_estimates)
+        yes(c.send_estimates),
+        match c.confidence {
+            ConfidenceSent::Nothing => "nothing",
+            ConfidenceSent::Novelty => "novelty",
+            ConfidenceSent::Deviations => "novelty and deviations",
+        }
     ));
     page.line(format_args!(
         "{:<17} shorted below {} Ω, open above {} Ω, contact from {}, at rest within {}",

@@ -75,6 +75,12 @@ pub fn show<W: Wire>(device: &mut Device<W>, common: &Common) -> Result<()> {
             "clamped", s.frames_clamped
         ));
     }
+    if s.longest_confidence_us > 0 {
+        page.line(format_args!(
+            "{:<17} {} novel frames; computed in {} µs at most",
+            "confidence", s.frames_novel, s.longest_confidence_us
+        ));
+    }
     page.line(format_args!(
         "{:<17} {} requests, {} bad packets, {} lost reports, {} bad loops",
         "link", s.requests, s.bad_packets, s.lost_reports, s.bad_loops

@@ -38,14 +38,16 @@ pub(super) struct Sets<'s> {
 }
 
 impl<'s> Sets<'s> {
+    /// Sets of frames; for networks of the whole array with a projection to so many `features`, or the usual number.
     pub fn new(
         noise_level: f64,
         [training, test]: [&'s Dataset; 2],
         gates: &'s Gates,
-        whole_array: bool,
+        (whole_array, features): (bool, Option<usize>),
         more: Option<MoreFrames<'s>>,
     ) -> Result<Self> {
-        let projection = if whole_array { Some(projection::fit(training)?) } else { None };
+        let projection = whole_array.then(|| projection::fit(training, features));
+        let projection = projection.transpose()?;
         Ok(Self { noise_level, training, test, gates, projection, more })
     }
 
@@ -104,8 +106,13 @@ impl<'s> Judge<'s> {
             .flat_map(|(format, affine)| ranks.iter().map(move |rank| (format, affine, *rank)))
             .collect();
         let Knobs { whole_array, .. } = knobs;
-        let defaults = Options { whole_array, output_rank: None, ..self.options };
-        let spread = if whole_array { WHOLE_ARRAY_SPREAD } else { 1.0 } * defaults.spread;
+        let features = self.options.features.filter(|_| whole_array);
+        let defaults = Options { whole_array, features, output_rank: None, ..self.options };
+        let spread = match (self.options.whole_array, whole_array) {
+            (false, true) => WHOLE_ARRAY_SPREAD * defaults.spread,
+            (true, false) => defaults.spread / WHOLE_ARRAY_SPREAD,
+            _ => defaults.spread,
+        };
         let options = Options { centres: knobs.centres, spread, ..defaults };
         options.check(sets.training.frames())?;
         // Layers are shared by all formats and by networks with and without a tail.

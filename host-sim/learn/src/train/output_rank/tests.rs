@@ -59,7 +59,7 @@ fn each_rank_comes_nearer_to_the_full_network_in_every_format() {
 #[test]
 fn no_other_directions_fit_better() {
     let data = press(Stream::Training, 2000);
-    let parameters = train::projection::fit(&data).unwrap();
+    let parameters = train::projection::fit(&data, None).unwrap();
     let seen = train::projection::apply(train::view(&parameters, &data), &data);
     let table = seen.row_table(0);
     let samples = Samples::new(&table);

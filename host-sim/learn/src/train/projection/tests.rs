@@ -23,13 +23,13 @@ fn known(frames: usize, noise: f64) -> Dataset {
 }
 
 fn projection<'b>(dataset: &Dataset, parameters: &'b [f32]) -> Projection<'b> {
-    Projection::new(dataset.inputs.names.len(), features_of(dataset), parameters).unwrap()
+    crate::train::view(parameters, dataset)
 }
 
 #[test]
 fn features_carry_all_that_outputs_take_from_readings() {
     let data = known(400, 0.01);
-    let parameters = fit(&data).unwrap();
+    let parameters = fit(&data, None).unwrap();
     let seen = apply(projection(&data, &parameters), &data);
     assert_eq!((seen.rows, seen.inputs.names.len(), seen.inputs.len()), (1, 3, 400));
     // Two sums decide all outputs: two features follow them to the noise, and the third is noise.
@@ -51,7 +51,7 @@ fn the_projection_does_not_depend_on_the_number_of_threads() {
     let data = synthesise(&World::press(), Stream::Training, 3000);
     let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| fit(&data).unwrap())
+        pool.install(|| fit(&data, None).unwrap())
     };
     let parameters = with(1);
     assert_eq!(parameters, with(3));
@@ -63,7 +63,7 @@ fn the_projection_does_not_depend_on_the_number_of_threads() {
 fn a_line_is_projected_as_on_the_device_and_nan_where_a_reading_is_missing() {
     let mut data = known(20, 0.0);
     data.inputs.values[7] = f64::NAN;
-    let parameters = fit(&known(20, 0.0)).unwrap();
+    let parameters = fit(&known(20, 0.0), None).unwrap();
     let seen = features(projection(&data, &parameters), 3, 6, &data.inputs.values);
     let line: Vec<f32> = data.inputs.values[..6].iter().map(|r| *r as f32).collect();
     let mut expected = [0.0; 3];
@@ -73,8 +73,44 @@ fn a_line_is_projected_as_on_the_device_and_nan_where_a_reading_is_missing() {
 }
 
 #[test]
-fn data_of_one_row_is_refused() {
+fn few_readings_of_one_row_are_refused() {
     let data = Dataset { rows: 1, ..known(20, 0.0) };
-    let message = fit(&data).unwrap_err().to_string();
+    let message = fit(&data, None).unwrap_err().to_string();
     assert!(message.contains("two row-wires or more"), "{message}");
+    assert!(message.contains("the data has 6 of one"), "{message}");
+    for features in [0, 6] {
+        let message = fit(&data, Some(features)).unwrap_err().to_string();
+        assert!(message.contains(&format!("features = {features}: give from 1 to 5")), "{message}");
+    }
+}
+
+#[test]
+fn few_outputs_are_told_by_features_of_their_products() {
+    let data = synthesise(&World::contact(), Stream::Training, 3000);
+    let parameters = fit(&data, None).unwrap();
+    assert_eq!(parameters.len(), USUAL_FEATURES * 145);
+    let seen = apply(projection(&data, &parameters), &data);
+    let spans: Vec<f64> = seen.inputs.ranges().iter().map(|[low, high]| high - low).collect();
+    assert!(spans.iter().all(|span| *span > 0.0), "{spans:?}");
+    // One output has three powers, and there are no more features than that.
+    let depth = Dataset { outputs: data.outputs.columns(2, 1), ..data.clone() };
+    assert_eq!(fit(&depth, None).unwrap().len(), MOST_FACTORS * 145);
+    assert_eq!(fit(&data, Some(5)).unwrap().len(), 5 * 145);
+}
+
+#[test]
+fn products_are_those_of_standardised_outputs() {
+    let names = ["a", "b"].map(String::from).to_vec();
+    let outputs = Table { names, values: vec![1.0, 10.0, 3.0, 10.0, 5.0, 40.0, 7.0, 0.0] };
+    let targets = targets(&outputs, 5);
+    // a, b, aa, ab, bb.
+    assert_eq!(targets.names.len(), 5);
+    let z = |line: usize| [(2 * line) as f64 - 3.0, outputs.values[2 * line + 1] - 15.0];
+    let products: Vec<f64> = (0..4).map(|line| z(line)[0] * z(line)[1]).collect();
+    let mean = products.iter().sum::<f64>() / 4.0;
+    let variance = products.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / 4.0;
+    for (line, product) in products.iter().enumerate() {
+        let expected = (product - mean) / variance.sqrt();
+        assert!((targets.values[5 * line + 3] - expected).abs() < 1e-12);
+    }
 }

@@ -1,5 +1,7 @@
 //! A network on its way down the gradient.
 
+use model_core::rbf::Format;
+
 use super::Refinement;
 use super::adam::Adam;
 use super::loss::{self, Loss};
@@ -19,6 +21,7 @@ pub(super) struct Descent {
     adam: Adam,
     /// Largest floor that the width is kept above.
     floor_at_most: f64,
+    format: Format,
     /// Ranges that inputs are scaled by, unless they are mixed: those change.
     ranges: Vec<[f64; 2]>,
     ridge: f64,
@@ -50,6 +53,7 @@ impl Descent {
             movable,
             adam,
             floor_at_most: width::floor_at_most(options.format, layer.spread),
+            format: options.format,
             ranges,
             ridge: settings.ridge,
         }
@@ -82,7 +86,7 @@ impl Descent {
     /// Makes the width so large that the format holds it.
     pub(super) fn hold(&mut self, pieces: &[&Piece]) {
         if self.floor_at_most > 0.0 {
-            let least = width::least(self.movable.centres(), &self.ranges(pieces));
+            let least = width::least(self.format, self.movable.centres(), &self.ranges(pieces));
             self.movable.widen_to(least.min(self.floor_at_most));
         }
     }

@@ -6,8 +6,9 @@ use taxel_data::table::Table;
 
 /// Mean of every output, and the factor that its deviations are weighed by.
 ///
-/// Outputs of one unit are compared as they are: an error of 1 mm counts alike in all of them. Those of another
-/// unit are compared by the largest standard deviation of each unit, and those without a known one by their own.
+/// Outputs of one [quantity](columns::quantity_of) are compared as they are: an error of 1 mm counts alike in all of
+/// them. Those of different ones are compared by the largest standard deviation of each quantity, and those without a
+/// known one by their own.
 pub(super) struct Targets {
     means: Vec<f64>,
     weights: Vec<f64>,
@@ -17,17 +18,17 @@ pub(super) struct Targets {
 impl Targets {
     pub(super) fn of(dataset: &Dataset, networks: usize) -> Self {
         let deviations = dataset.outputs.deviations();
-        let units: Vec<&str> =
-            dataset.outputs.names.iter().map(|name| columns::unit_of(name)).collect();
-        let largest = |unit: &&str| {
-            let same = units.iter().zip(&deviations).filter(|(other, _)| *other == unit);
+        let quantities: Vec<&str> =
+            dataset.outputs.names.iter().map(|name| columns::quantity_of(name)).collect();
+        let largest = |quantity: &&str| {
+            let same = quantities.iter().zip(&deviations).filter(|(other, _)| *other == quantity);
             same.map(|(_, deviation)| *deviation).fold(0.0, f64::max)
         };
-        let weight = |(unit, own): (&&str, &f64)| {
-            let scale = if unit.is_empty() { *own } else { largest(unit) };
+        let weight = |(quantity, own): (&&str, &f64)| {
+            let scale = if quantity.is_empty() { *own } else { largest(quantity) };
             if scale > 0.0 { 1.0 / scale } else { 0.0 }
         };
-        let weights = units.iter().zip(&deviations).map(weight).collect();
+        let weights = quantities.iter().zip(&deviations).map(weight).collect();
         Self { means: dataset.outputs.means(), weights, networks }
     }
 

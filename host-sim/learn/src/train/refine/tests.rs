@@ -1,3 +1,5 @@
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use model_core::rbf::Format;
 use taxel_data::progress::Silent;
 use taxel_data::random::{Purpose, Random, Stream};
@@ -149,6 +151,30 @@ fn refined_models_are_better_and_the_same_on_any_number_of_threads() {
     }
 }
 
+/// Source of frames that remembers the largest number asked for.
+struct Counted<'w>(Fresh<'w>, AtomicUsize);
+
+impl FreshFrames for Counted<'_> {
+    fn frames(&self, step: usize, count: usize) -> Dataset {
+        self.1.fetch_max(count, Ordering::Relaxed);
+        self.0.frames(step, count)
+    }
+}
+
+#[test]
+fn steps_look_at_more_frames_the_more_centres_there_are() {
+    let world = World { read_rows: vec![3], ..World::press() };
+    let training = Synthesis::of(&world).frames(Stream::Training, 200);
+    for (centres, frames) in [(8, 300), (40, 640)] {
+        let fresh = Counted(Fresh(Synthesis::of(&world)), AtomicUsize::new(0));
+        let options = Options { centres, ..Options::default() };
+        let settings = Refinement { steps: 2, frames: 300, ..Refinement::default() };
+        let examples = Examples::Fresh(&fresh);
+        train_refined(&training, &options, &settings, examples, &Silent).unwrap();
+        assert_eq!(fresh.1.into_inner(), frames, "{centres} centres");
+    }
+}
+
 /// Few and noisy frames, where centres would only fit the noise, leave them where they are.
 #[test]
 fn refinement_on_folds_helps_with_many_frames_and_does_no_harm_with_few() {
@@ -174,11 +200,31 @@ fn the_least_width_is_just_held_by_fixed16() {
     let training = Synthesis::of(&world).frames(Stream::Training, 500);
     let options = Options { centres: 12, format: Format::Fixed16, ..Options::default() };
     let start = Layers::start(&training, &options).unwrap();
-    let least = width::least(&start.hidden[0].centres, &[[0.0, 1.0]; 18]);
+    let least = width::least(Format::Fixed16, &start.hidden[0].centres, &[[0.0, 1.0]; 18]);
     let held = |spread: f64| {
         let mut layers = start.clone();
         layers.hidden[0].spread = spread;
         crate::train::fit(&training, layers, &options, &Silent).is_ok()
+    };
+    assert!(held(least) && !held(0.999 * least), "{least}");
+}
+
+/// Few inputs are near each other: there the decay's 32 bits are what ends.
+#[test]
+fn the_least_width_of_few_inputs_is_just_held_by_fixed16() {
+    let mut draw = draws(5);
+    let names = |count: usize| (0..count).map(|i| format!("c{i}")).collect::<Vec<_>>();
+    let mut data = Dataset::empty(names(2), vec!["y_n".into()], 1, 300);
+    data.inputs.values.fill_with(&mut draw);
+    data.outputs.values.fill_with(&mut draw);
+    let options = Options { centres: 12, format: Format::Fixed16, ..Options::default() };
+    let start = Layers::start(&data, &options).unwrap();
+    let least = width::least(Format::Fixed16, &start.hidden[0].centres, &[[0.0, 1.0]; 2]);
+    assert!(least > width::least(Format::F32, &start.hidden[0].centres, &[[0.0, 1.0]; 2]));
+    let held = |spread: f64| {
+        let mut layers = start.clone();
+        layers.hidden[0].spread = spread;
+        crate::train::fit(&data, layers, &options, &Silent).is_ok()
     };
     assert!(held(least) && !held(0.999 * least), "{least}");
 }

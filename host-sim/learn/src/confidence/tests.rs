@@ -1,0 +1,135 @@
+use model_core::Decoder;
+use taxel_data::progress::Silent;
+use taxel_data::random::{Purpose, Random, Stream};
+use taxel_simulate::{World, synthesise};
+
+use super::*;
+use crate::packing::{Origin, pack};
+use crate::train::{Options, train};
+
+/// The model of `blob` with a confidence.
+fn fitted(world: &World, training: &Dataset, blob: &ModelBlob) -> ModelBlob {
+    let density = Density::fit(training, &Settings { components: 8, ..Settings::default() });
+    let mut held_out = HeldOut::default();
+    held_out.add(blob, &density, &synthesise(world, Stream::Calibration, 4000));
+    add(blob, &density, &held_out).unwrap()
+}
+
+/// A model of row 4 with a confidence, and what it was fitted to.
+fn row_4() -> (World, Dataset, ModelBlob, ModelBlob) {
+    let world = World { read_rows: vec![3], ..World::press() };
+    let training = synthesise(&world, Stream::Training, 4000);
+    let options = Options { centres: 16, ..Options::default() };
+    let trained = train(&training, &options, &Silent).unwrap();
+    let blob = pack(&trained, &training, &Origin::of_data("row 4", 0, 1, &training)).unwrap();
+    let with = fitted(&world, &training, &blob);
+    (world, training, blob, with)
+}
+
+#[test]
+fn intervals_cover_the_errors_of_frames_that_nothing_was_fitted_to() {
+    let (world, _, _, blob) = row_4();
+    let test = synthesise(&world, Stream::Test, 4000);
+    let model = blob.prepare(Exponential::default());
+    let decoded = model.decode_table(&test.inputs).values;
+    let (deviations, novelty) = model.assess(&test.inputs.values).unwrap();
+    let ratios = blob.parse().confidence().unwrap().ratios_95();
+    for (output, ratio) in ratios.iter().enumerate() {
+        let share = |ratio: f64| {
+            let within = (output..decoded.len()).step_by(18).filter(|at| {
+                (decoded[*at] - test.outputs.values[*at]).abs() <= ratio * deviations[*at]
+            });
+            within.count() as f64 / 4000.0
+        };
+        let (one, most) = (share(1.0), share(f64::from(*ratio)));
+        // Four standard errors of a share of so many frames.
+        assert!((one - 0.6827).abs() < 0.03 && (most - 0.95).abs() < 0.014, "{one} {most}");
+    }
+    let alarms = novelty.iter().filter(|novelty| **novelty > 0.0).count() as f64 / 4000.0;
+    assert!(alarms < 0.01, "{alarms}");
+    // Errors grow with the dent, and deviations tell so: those of the first electrode's z differ by far.
+    let mut of_first: Vec<f64> = deviations.iter().copied().skip(2).step_by(18).collect();
+    of_first.sort_by(f64::total_cmp);
+    assert!(of_first[3600] > 3.0 * of_first[400], "{} {}", of_first[400], of_first[3600]);
+}
+
+#[test]
+fn frames_that_the_sensor_cannot_give_are_novel() {
+    let (world, _, _, blob) = row_4();
+    let mut frames = synthesise(&world, Stream::Test, 500).inputs.values;
+    for frame in frames.chunks_exact_mut(18) {
+        // Two neighbouring column-wires are one.
+        let both = 1.0 / (1.0 / frame[7] + 1.0 / frame[8]);
+        frame[7..9].fill(both);
+    }
+    let (_, novelty) = blob.prepare(Exponential::default()).assess(&frames).unwrap();
+    assert!(novelty.iter().all(|novelty| *novelty > 10.0));
+}
+
+#[test]
+fn a_confidence_changes_no_estimate_and_a_device_finds_the_same_bits() {
+    let (world, training, without, with) = row_4();
+    let test = synthesise(&world, Stream::Test, 50);
+    let prepared = with.prepare(Exponential::default());
+    let decoded =
+        |blob: &ModelBlob| blob.prepare(Exponential::default()).decode_table(&test.inputs).values;
+    assert_eq!(decoded(&with), decoded(&without));
+    let (deviations, novelty) = prepared.assess(&test.inputs.values).unwrap();
+    let decoder = Decoder::<1>::load(with.bytes()).unwrap();
+    let mut scratch = vec![0.0; decoder.scratch_floats()];
+    for (frame, line) in test.inputs.lines().enumerate() {
+        let readings: Vec<f32> = line.iter().map(|reading| *reading as f32).collect();
+        let mut deviation = [0.0; 18];
+        let found = decoder.assess_into((&readings[..]).into(), &mut scratch, &mut deviation);
+        assert_eq!(found.unwrap().map(f64::from), Some(novelty[frame]));
+        assert_eq!(deviation.map(f64::from), deviations[frame * 18..][..18]);
+    }
+    // Fitting again gives the same bytes.
+    assert_eq!(fitted(&world, &training, &without).bytes(), with.bytes());
+}
+
+/// A model of measured data without noise on its one output, with a confidence calibrated on the second half of the
+/// lines; tells the share of these that it finds novel.
+fn share_novel(readings: usize, reading: impl Fn(usize, usize) -> f64) -> f64 {
+    let names = |kind: &str, count: usize| (0..count).map(|i| format!("{kind}{i}")).collect();
+    let half = |first: usize| {
+        let mut dataset = Dataset::empty(names("in", readings), names("out", 2), 1, 2000);
+        for (frame, line) in dataset.inputs.values.chunks_exact_mut(readings).enumerate() {
+            line.iter_mut().enumerate().for_each(|(i, place)| *place = reading(first + frame, i));
+        }
+        let first_readings = dataset.inputs.values.iter().step_by(readings);
+        for (line, r) in dataset.outputs.values.chunks_exact_mut(2).zip(first_readings) {
+            line[0] = (0.1 * r).sin();
+        }
+        dataset
+    };
+    let (seen, others) = (half(0), half(2000));
+    let options = Options { centres: 4, ..Options::default() };
+    let trained = train(&seen, &options, &Silent).unwrap();
+    let blob = pack(&trained, &seen, &Origin::of_data("data", 0, 1, &seen)).unwrap();
+    let density = Density::fit(&seen, &Settings::default());
+    let mut held_out = HeldOut::default();
+    held_out.add(&blob, &density, &others);
+    let blob = add(&blob, &density, &held_out).unwrap();
+    let model = blob.prepare(Exponential::default());
+    let (deviations, novelty) = model.assess(&others.inputs.values).unwrap();
+    assert!(deviations.iter().all(|d| d.is_finite()) && novelty.iter().all(|n| n.is_finite()));
+    novelty.iter().filter(|novelty| **novelty > 0.0).count() as f64 / 2000.0
+}
+
+#[test]
+fn novelty_holds_where_directions_leave_out_nothing_but_rounding() {
+    let normal = |frame: usize, i: usize| {
+        Random::new(5, Stream::Training, Purpose::Noise, frame as u64, i as u64).normal()
+    };
+    let check = |readings: usize, reading: &dyn Fn(usize, usize) -> f64| {
+        let share = share_novel(readings, reading);
+        assert!(share < 0.01, "{readings} readings: {share}");
+    };
+    check(1, &|frame, i| 60.0 + normal(frame, i));
+    check(3, &|frame, i| [1e4 + normal(frame, 0), 1e4 + normal(frame, 1), 7.0][i]);
+    check(8, &|frame, i| 60.0 + normal(frame, i));
+    check(12, &|frame, i| 60.0 + normal(frame, i));
+    // Four sums, without noise, in all readings.
+    check(12, &|frame, i| 1e4 + normal(frame, i % 4) + 0.5 * normal(frame, (i + 1) % 4));
+}

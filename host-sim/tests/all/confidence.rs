@@ -1,0 +1,130 @@
+//! Confidence from the command line: training, evaluation, and what is refused.
+
+use crate::common::{Folder, small_scene};
+
+fn json(text: &str) -> serde_json::Value {
+    serde_json::from_str(text).unwrap()
+}
+
+#[test]
+fn a_scenes_model_covers_its_errors_and_finds_faults_novel() {
+    let folder = Folder::new("confidence");
+    folder.write("scene.toml", small_scene());
+    folder.succeed(&["train", "scene.toml", "--confidence", "-o", "model.bin"]);
+    folder.succeed(&["train", "scene.toml", "-o", "without.bin"]);
+    let result = folder.succeed(&[
+        "confidence",
+        "scene.toml",
+        "--model",
+        "model.bin",
+        "-n",
+        "2000",
+        "--json",
+    ]);
+    let result = json(&result);
+    for group in result["coverage"].as_array().unwrap() {
+        let of = |field: &str| group["all"][field].as_f64().unwrap();
+        assert!((of("percent_within_68") - 68.3).abs() < 3.0, "{group}");
+        assert!((of("percent_within_95") - 95.0).abs() < 2.0, "{group}");
+        let rmse = |quarter: &str| group[quarter]["rmse"].as_f64().unwrap();
+        assert!(rmse("least_sure_quarter") > 2.0 * rmse("surest_quarter"), "{group}");
+    }
+    let detections = result["detections"].as_array().unwrap();
+    assert_eq!(detections.len(), 10);
+    let novel = |at: usize| detections[at]["percent_novel"].as_f64().unwrap();
+    assert!(novel(0) < 1.5, "{}", detections[0]);
+    assert!((1..5).all(|at| novel(at) > 95.0), "{detections:?}");
+
+    // Training without `--model` makes the same model.
+    let trained = folder.succeed(&["confidence", "scene.toml", "-n", "2000", "--json"]);
+    assert_eq!(json(&trained), result);
+
+    folder.succeed(&["synth", "scene.toml", "-n", "300", "--seed", "9", "-o", "test.csv"]);
+    let evaluated = json(&folder.succeed(&["eval", "model.bin", "test.csv", "--json"]));
+    assert_eq!(evaluated["coverage"].as_array().unwrap().len(), 3);
+    assert!(evaluated["percent_novel"].as_f64().unwrap() < 4.0);
+    let page = folder.succeed(&["eval", "model.bin", "test.csv"]);
+    assert!(page.contains("surest quarter") && page.contains("novel, unlike"));
+    let without = json(&folder.succeed(&["eval", "without.bin", "test.csv", "--json"]));
+    assert!(
+        without["coverage"].as_array().unwrap().is_empty() && without["percent_novel"].is_null()
+    );
+    assert_eq!(without["errors"], evaluated["errors"]);
+    assert!(folder.succeed(&["inspect", "model.bin"]).contains("confidence"));
+}
+
+#[test]
+fn deviations_and_novelty_are_written_beside_the_outputs() {
+    let folder = Folder::new("confidence-decode");
+    folder.write("scene.toml", small_scene());
+    folder.succeed(&["train", "scene.toml", "--confidence", "-o", "model.bin"]);
+    folder.succeed(&["synth", "scene.toml", "-n", "50", "--seed", "9", "-o", "test.csv"]);
+    let plain = ["decode", "model.bin", "test.csv", "-o", "plain.csv"];
+    folder.succeed(&plain);
+    folder.succeed(&["decode", "model.bin", "test.csv", "--confidence", "-o", "with.csv"]);
+    let read = |name: &str| std::fs::read_to_string(folder.path(name)).unwrap();
+    let (plain, with) = (read("plain.csv"), read("with.csv"));
+    let header: Vec<&str> = with.lines().next().unwrap().split(',').collect();
+    assert_eq!(header.len(), 36 + 36 + 1);
+    assert_eq!((header[36], header[72]), ("r4e1_dx_mm_deviation", "novelty_nats"));
+    for (plain, with) in plain.lines().zip(with.lines()) {
+        assert!(with.starts_with(plain));
+        let last = with.split(',').skip(36);
+        assert!(with == header.join(",") || last.clone().all(|value| value.parse::<f64>().is_ok()));
+    }
+}
+
+#[test]
+fn measured_data_is_held_out_fold_by_fold() {
+    let folder = Folder::new("confidence-measured");
+    let line = |i: i32| {
+        let (a, b) = (f64::from(i % 20), f64::from((i * 7) % 23));
+        let noise = f64::from((i * 7919) % 101) / 101.0 - 0.5;
+        format!("{a},{b},{},{},1\n", (0.2 * a).sin() + 0.1 * b + 0.3 * noise, i % 5)
+    };
+    let lines: String = (0..400).map(line).collect();
+    folder.write("measured.csv", format!("a,b,y,place,one\n{lines}"));
+    let train = |more: &[&str]| {
+        let columns = ["train", "measured.csv", "--inputs", "a,b", "--outputs", "y", "-o", "m.bin"];
+        folder.run(&[&columns[..], &["--centres", "8", "--no-refine"], more].concat())
+    };
+    assert!(train(&["--confidence", "--fold-column", "place"]).status.success());
+    let evaluated = json(&folder.succeed(&["eval", "m.bin", "measured.csv", "--json"]));
+    // The noise is uniform: one deviation holds 68 % of it, and so do held-out folds.
+    let covered = &evaluated["coverage"][0]["all"];
+    assert!((covered["percent_within_68"].as_f64().unwrap() - 68.3).abs() < 6.0, "{covered}");
+    assert!(covered["percent_within_95"].as_f64().unwrap() > 92.0, "{covered}");
+
+    assert!(evaluated["percent_novel"].as_f64().unwrap() < 2.0, "{evaluated}");
+
+    let alone = train(&["--confidence", "--fold-column", "one"]);
+    assert_eq!(alone.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&alone.stderr).contains("there is one alone: give more"));
+
+    let one = train(&["--confidence", "--folds", "1"]);
+    assert_eq!(one.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&one.stderr).contains("--folds 1: give from 2"));
+}
+
+#[test]
+fn a_model_without_a_confidence_is_refused_where_it_is_asked_for() {
+    let folder = Folder::new("confidence-refused");
+    folder.write("scene.toml", small_scene());
+    folder.succeed(&["train", "scene.toml", "-o", "without.bin"]);
+    folder.succeed(&["synth", "scene.toml", "-n", "5", "-o", "test.csv"]);
+    let cases: [(&[&str], &str); 3] = [
+        (
+            &["decode", "without.bin", "test.csv", "--confidence", "-o", "out.csv"],
+            "it has no confidence: train it with --confidence",
+        ),
+        (&["confidence", "scene.toml", "--model", "without.bin"], "this model has no confidence"),
+        (&["confidence", "scene.toml", "-n", "0"], "--frames = 0: give from 1"),
+    ];
+    for (arguments, message) in cases {
+        let output = folder.run(arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert!(error.contains(message), "{arguments:?}: {error}");
+    }
+    assert!(!folder.names().contains(&"out.csv".into()));
+}

@@ -1,0 +1,123 @@
+//! Cutting sections from the front of a blob's bytes: each is checked, then borrowed.
+
+use super::error::DecodeError;
+use super::format::{
+    ConfidenceHeader, ExpansionHeader, FLOAT_ALIGNMENT, ProjectionHeader, TAG_CONFIDENCE,
+    TAG_EXPANSION, TAG_PROJECTION, TAG_PROJECTION_TO, TAG_RELATIVE_INPUTS,
+};
+use super::metadata::ModelShape;
+use crate::confidence::{Confidence, Sizes};
+use crate::expansion::Expansion;
+use crate::projection::{self, Projection};
+
+/// Takes the postcard fields `T` of a `section` from the front of `bytes`.
+pub(super) fn take<'a, T: serde::Deserialize<'a>>(
+    bytes: &'a [u8],
+    section: &'static str,
+) -> Result<(T, &'a [u8]), DecodeError> {
+    postcard::take_from_bytes(bytes).map_err(|_| DecodeError::Malformed { section })
+}
+
+/// Checks the length of a list against the shape.
+pub(super) fn check_count(
+    what: &'static str,
+    expected: usize,
+    found: usize,
+) -> Result<(), DecodeError> {
+    if expected == found {
+        Ok(())
+    } else {
+        Err(DecodeError::CountMismatch { what, expected, found })
+    }
+}
+
+/// Cuts padding, length and the block of words from the front of `bytes`.
+pub(super) fn take_block<'a>(
+    bytes: &'a [u8],
+    section: &'static str,
+) -> Result<(&'a [u8], &'a [u8]), DecodeError> {
+    let (padding, rest) = take::<&[u8]>(bytes, section)?;
+    if padding.len() >= FLOAT_ALIGNMENT || padding.iter().any(|&byte| byte != 0) {
+        return Err(DecodeError::Malformed { section: "padding" });
+    }
+    take::<&[u8]>(rest, section)
+}
+
+/// Cuts the section of relative inputs from the front of `bytes`; returns whether there is one.
+pub(super) fn take_relative_inputs(bytes: &[u8]) -> (bool, &[u8]) {
+    match bytes.split_first() {
+        Some((&TAG_RELATIVE_INPUTS, rest)) => (true, rest),
+        _ => (false, bytes),
+    }
+}
+
+/// Cuts the projection from the front of `bytes` if there is one, and checks it.
+pub(super) fn take_projection(
+    bytes: &[u8],
+    shape: ModelShape,
+) -> Result<(Option<Projection<'_>>, &[u8]), DecodeError> {
+    const SECTION: &str = "projection section";
+    let (features, rest) = match bytes.split_first() {
+        Some((&TAG_PROJECTION, rest)) => (shape.inputs, rest),
+        Some((&TAG_PROJECTION_TO, _)) => {
+            let (header, rest) = take::<ProjectionHeader>(bytes, SECTION)?;
+            (header.features.into(), rest)
+        }
+        _ => return Ok((None, bytes)),
+    };
+    let (block, rest) = take_block(rest, SECTION)?;
+    let readings = shape.rows * shape.inputs;
+    let floats = projection::block_floats(readings, features);
+    check_count("bytes of projection", floats.saturating_mul(4), block.len())?;
+    let block = bytemuck::try_cast_slice::<u8, f32>(block)
+        .map_err(|_| DecodeError::Malformed { section: "padding" })?;
+    let projection = Projection::new(readings, features, block)
+        .map_err(|cause| DecodeError::Projection { cause })?;
+    Ok((Some(projection), rest))
+}
+
+/// Cuts the expansion from the front of `bytes` if there is one, and checks it.
+pub(super) fn take_expansion(
+    bytes: &[u8],
+    shape: ModelShape,
+) -> Result<(Option<Expansion<'_>>, &[u8]), DecodeError> {
+    const SECTION: &str = "expansion section";
+    if bytes.first() != Some(&TAG_EXPANSION) {
+        return Ok((None, bytes));
+    }
+    let (header, rest) = take::<ExpansionHeader>(bytes, SECTION)?;
+    let (block, rest) = take_block(rest, SECTION)?;
+    let (components, outputs) = (header.components.into(), shape.rows * shape.outputs);
+    let floats = projection::block_floats(components, outputs);
+    check_count("bytes of expansion", floats.saturating_mul(4), block.len())?;
+    let block = bytemuck::try_cast_slice::<u8, f32>(block)
+        .map_err(|_| DecodeError::Malformed { section: "padding" })?;
+    let expansion = Expansion::new(components, outputs, block)
+        .map_err(|cause| DecodeError::Expansion { cause })?;
+    Ok((Some(expansion), rest))
+}
+
+/// Cuts the confidence from the front of `bytes` if there is one, and checks it.
+pub(super) fn take_confidence(
+    bytes: &[u8],
+    shape: ModelShape,
+) -> Result<(Option<Confidence<'_>>, &[u8]), DecodeError> {
+    const SECTION: &str = "confidence section";
+    if bytes.first() != Some(&TAG_CONFIDENCE) {
+        return Ok((None, bytes));
+    }
+    let (header, rest) = take::<ConfidenceHeader>(bytes, SECTION)?;
+    let (block, rest) = take_block(rest, SECTION)?;
+    let sizes = Sizes {
+        readings: shape.rows * shape.inputs,
+        directions: header.directions.into(),
+        components: header.components.into(),
+        outputs: shape.rows * shape.outputs,
+    };
+    check_count("bytes of confidence", sizes.block_floats().saturating_mul(4), block.len())?;
+    let block = bytemuck::try_cast_slice::<u8, f32>(block)
+        .map_err(|_| DecodeError::Malformed { section: "padding" })?;
+    let confidence =
+        Confidence::new(sizes, block).map_err(|cause| DecodeError::Confidence { cause })?;
+    Ok((Some(confidence), rest))
+}
