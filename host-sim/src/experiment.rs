@@ -268,10 +268,23 @@ impl Experiment {
     pub fn train(&self, progress: &dyn Progress) -> Result<ModelBlob> {
         let synthesis = Synthesis::of(&self.world);
         let frames = self.dataset(&synthesis, Stream::Training, self.training.frames);
-        let trained = self.train_on(&frames, &synthesis, progress)?;
-        let blob = pack(&trained, &frames, &self.origin())?;
+        self.train_blob(&frames, &synthesis, progress)
+    }
+
+    /// Trains on `frames`, a data set of `synthesis`, and packs the model, with a confidence if the scene asks for it.
+    ///
+    /// # Errors
+    /// [`Error`] for training options that cannot be used, or a model that cannot be packed.
+    pub fn train_blob(
+        &self,
+        frames: &Dataset,
+        synthesis: &Synthesis<'_>,
+        progress: &dyn Progress,
+    ) -> Result<ModelBlob> {
+        let trained = self.train_on(frames, synthesis, progress)?;
+        let blob = pack(&trained, frames, &self.origin())?;
         if self.training.confidence {
-            self.with_confidence(&blob, &frames, &synthesis, progress)
+            self.with_confidence(&blob, frames, synthesis, progress)
         } else {
             Ok(blob)
         }

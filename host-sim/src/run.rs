@@ -8,7 +8,7 @@ use taxel_data::random::Stream;
 use taxel_data::table::Table;
 use taxel_learn::cost::{Cost, Design, Prices};
 use taxel_learn::decoders::BASELINES;
-use taxel_learn::{Decoder, Exponential, ModelBlob, PreparedModel, pack};
+use taxel_learn::{Decoder, Exponential, ModelBlob, PreparedModel};
 use taxel_simulate::outputs::Outputs;
 use taxel_simulate::{Synthesis, World};
 
@@ -150,8 +150,7 @@ pub fn run(experiment: &Experiment, progress: &dyn Progress) -> Result<(RunResul
     let test = experiment.dataset(&synthesis, Stream::Test, t.test_frames);
     progress.step();
 
-    let trained = experiment.train_on(&training, &synthesis, progress)?;
-    let blob = pack(&trained, &training, &experiment.origin())?;
+    let blob = experiment.train_blob(&training, &synthesis, progress)?;
     let network = blob.prepare(Exponential::default()).of_inputs();
 
     let (measure, limit) =

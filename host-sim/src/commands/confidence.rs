@@ -51,6 +51,14 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     scene.training.confidence = true;
     let blob = scene_argument::model(arguments.model.as_deref(), &scene, &Terminal::new())?;
     let model = blob.prepare(Exponential::default());
+    let own = f64::from(model.model().metadata().noise_level);
+    if (own - scene.world.noise.level).abs() > 1e-3 * scene.world.noise.level {
+        eprintln!(
+            "note: the model was trained for noise of {:.2} %, and is judged at the scene's {:.2} %; see --noise",
+            100.0 * own,
+            100.0 * scene.world.noise.level
+        );
+    }
     scene.training.relative_inputs = model.model().metadata().relative_inputs;
     let test = scene.dataset(&Synthesis::of(&scene.world), Stream::Test, arguments.frames);
     let of_inputs = model.clone().of_inputs();

@@ -119,9 +119,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         page.line("");
         page.line("Errors that the model's intervals of 68.3 % and 95 % cover:");
         confidence::page(&mut page, &summary.coverage);
-        page.line(format_args!(
-            "novel, unlike the frames of training: {percent:.2} % of the frames"
-        ));
+        page.line(format_args!("{percent:.2} % of the frames are novel: unlike those of training"));
     }
     page.print()
 }

@@ -35,6 +35,11 @@ fn a_scenes_model_covers_its_errors_and_finds_faults_novel() {
     assert!(novel(0) < 1.5, "{}", detections[0]);
     assert!((1..5).all(|at| novel(at) > 95.0), "{detections:?}");
 
+    // `run` makes the same model, if the scene asks for a confidence.
+    folder.write("asks.toml", small_scene().replace("[training]", "[training]\nconfidence = true"));
+    folder.succeed(&["run", "asks.toml", "-o", "out"]);
+    let inspected = folder.succeed(&["inspect", "out/small/model.bin"]);
+    assert!(inspected.contains("confidence"), "{inspected}");
     // Training without `--model` makes the same model.
     let trained = folder.succeed(&["confidence", "scene.toml", "-n", "2000", "--json"]);
     assert_eq!(json(&trained), result);
@@ -44,7 +49,7 @@ fn a_scenes_model_covers_its_errors_and_finds_faults_novel() {
     assert_eq!(evaluated["coverage"].as_array().unwrap().len(), 3);
     assert!(evaluated["percent_novel"].as_f64().unwrap() < 4.0);
     let page = folder.succeed(&["eval", "model.bin", "test.csv"]);
-    assert!(page.contains("surest quarter") && page.contains("novel, unlike"));
+    assert!(page.contains("surest quarter") && page.contains("are novel: unlike"));
     let without = json(&folder.succeed(&["eval", "without.bin", "test.csv", "--json"]));
     assert!(
         without["coverage"].as_array().unwrap().is_empty() && without["percent_novel"].is_null()
