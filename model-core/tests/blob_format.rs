@@ -1,5 +1,8 @@
 //! The blob format, compared with its specification in `docs/blob.md`.
 
+mod common;
+
+use common::worked_bytes;
 use model_core::blob::{
     Columns, DecodeError, EncodeError, Floats, Metadata, Model, ModelParts, NoiseKind, encode,
     encoded_length_bound,
@@ -8,8 +11,6 @@ use model_core::rbf::direct::{self, Parameters};
 use model_core::rbf::{Network, Shape};
 use model_core::{Aligned, Decoder, RowStatus};
 use proptest::prelude::*;
-
-const SPECIFICATION: &str = include_str!("../../docs/blob.md");
 
 fn parameters() -> Parameters<'static> {
     Parameters {
@@ -69,26 +70,12 @@ fn small_model(buffer: &mut [u8]) -> &[u8] {
     .unwrap()
 }
 
-/// Hexadecimal bytes of the specification's worked example: lines like `| 0 | 54 41 … | … |`.
-fn worked_bytes() -> Vec<u8> {
-    let table = SPECIFICATION.split("<!-- worked example -->").nth(1).expect("the marked table");
-    let mut bytes = Vec::new();
-    for line in table.lines().filter(|line| line.starts_with('|')) {
-        let mut cells = line.split('|').map(str::trim).skip(1);
-        let (Some(offset), Some(hex)) = (cells.next(), cells.next()) else { continue };
-        let Ok(offset) = offset.parse::<usize>() else { continue };
-        assert_eq!(offset, bytes.len(), "offset of the line {line:?}");
-        bytes.extend(hex.split_whitespace().map(|byte| u8::from_str_radix(byte, 16).unwrap()));
-    }
-    bytes
-}
-
 #[test]
 fn encoding_gives_the_specifications_worked_bytes() {
     let mut buffer = Aligned([0; 512]);
     let encoded = small_model(&mut buffer.0);
     let hex = |bytes: &[u8]| bytes.iter().map(|b| format!("{b:02x}")).collect::<Vec<_>>().join(" ");
-    assert_eq!(hex(encoded), hex(&worked_bytes()));
+    assert_eq!(hex(encoded), hex(&worked_bytes("worked example")));
 }
 
 #[test]

@@ -1,15 +1,15 @@
 //! Confidence of a model: its section of the blob, and how a decoder assesses frames with it.
 
+mod common;
+
+use common::{seal, worked_bytes};
 use model_core::blob::{DecodeError, EncodeError, Metadata, Model, ModelParts, ModelShape, encode};
-use model_core::checksum::CRC_32;
 use model_core::confidence::{Confidence, Sizes};
 use model_core::rbf::direct::{self, Parameters};
 use model_core::rbf::{NetworkError, Shape};
 use model_core::relative::reciprocal;
 use model_core::{Aligned, Decoder, Frame};
 use proptest::prelude::*;
-
-const SPECIFICATION: &str = include_str!("../../docs/blob.md");
 
 const SIZES: Sizes = Sizes { readings: 2, directions: 1, components: 1, outputs: 1 };
 const BLOCK: [f32; 16] =
@@ -48,11 +48,6 @@ fn small(relative_inputs: bool) -> (Aligned<[u8; 512]>, usize) {
     let mut buffer = Aligned([0; 512]);
     let length = encoded(SIZES, &BLOCK, relative_inputs, &mut buffer.0).unwrap();
     (buffer, length)
-}
-
-fn sealed(bytes: &mut [u8]) {
-    let (body, crc) = bytes.split_last_chunk_mut::<4>().unwrap();
-    *crc = CRC_32.checksum(body).to_le_bytes();
 }
 
 /// Where the section starts.
@@ -122,7 +117,7 @@ fn every_damage_of_the_section_has_its_own_error() {
         let mut damaged = buffer;
         damaged.0[place..place + bytes.len()].copy_from_slice(bytes);
         assert!(matches!(Model::decode(&damaged.0[..length]), Err(DecodeError::Corrupt { .. })));
-        sealed(&mut damaged.0[..length]);
+        seal(&mut damaged.0[..length]);
         Model::decode(&damaged.0[..length]).map(drop).unwrap_err()
     };
     let count = |expected| {
@@ -158,15 +153,7 @@ fn a_blob_that_is_cut_off_is_refused_wherever_it_ends() {
 #[test]
 fn the_section_has_the_specifications_worked_bytes() {
     let (buffer, length) = small(false);
-    let table = SPECIFICATION.split("<!-- worked confidence -->").nth(1).expect("the marked table");
-    let mut bytes = Vec::new();
-    for line in table.lines().filter(|line| line.starts_with('|')) {
-        let mut cells = line.split('|').map(str::trim).skip(1);
-        let (Some(offset), Some(hex)) = (cells.next(), cells.next()) else { continue };
-        let Ok(offset) = offset.parse::<usize>() else { continue };
-        assert_eq!(offset, bytes.len(), "offset of the line {line:?}");
-        bytes.extend(hex.split_whitespace().map(|byte| u8::from_str_radix(byte, 16).unwrap()));
-    }
+    let bytes = worked_bytes("worked confidence");
     let start = section(&buffer.0[..length]);
     assert_eq!(buffer.0[start..start + bytes.len()], bytes);
 }
@@ -183,7 +170,7 @@ proptest! {
         for (offset, byte) in changes {
             buffer.0[9 + offset % (length - 4 - 9)] = byte;
         }
-        sealed(&mut buffer.0[..length]);
+        seal(&mut buffer.0[..length]);
         let Ok(decoder) = Decoder::<1>::load(&buffer.0[..length]) else { return Ok(()) };
         let Some(confidence) = decoder.model().confidence() else { return Ok(()) };
         let mut deviation = vec![0.0; confidence.sizes().outputs];

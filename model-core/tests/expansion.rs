@@ -1,18 +1,18 @@
 //! Expansion of a network's few components to the outputs of all rows: its section of the blob, and how a decoder
 //! decodes with it.
 
+mod common;
+
+use common::{seal, worked_bytes};
 use model_core::blob::{
     DecodeError, EncodeError, Metadata, Model, ModelParts, ModelShape, encode, encoded_length_bound,
 };
-use model_core::checksum::CRC_32;
 use model_core::expansion::Expansion;
 use model_core::projection::Projection;
 use model_core::rbf::direct::{self, Parameters};
 use model_core::rbf::{Network, NetworkError, Shape};
 use model_core::{Aligned, Decoder, RowStatus};
 use proptest::prelude::*;
-
-const SPECIFICATION: &str = include_str!("../../docs/blob.md");
 
 /// A projection block: the first feature is the mean of the four readings, the second the difference of the rows.
 const PROJECTION: [f32; 10] = [0.0, 10.0, 0.25, 0.25, 0.25, 0.25, 0.25, -0.25, 0.25, -0.25];
@@ -60,12 +60,6 @@ fn encoded<'b>(
 fn small(buffer: &mut [u8]) -> &[u8] {
     let projection = Projection::new(4, 2, &PROJECTION).ok();
     encoded(projection, (1, 2, &EXPANSION), network(1, 1.5), buffer).unwrap()
-}
-
-/// Bytes with a CRC that fits them.
-fn sealed(bytes: &mut [u8]) {
-    let (body, crc) = bytes.split_last_chunk_mut::<4>().unwrap();
-    *crc = CRC_32.checksum(body).to_le_bytes();
 }
 
 /// Where the section starts.
@@ -131,7 +125,7 @@ fn every_damage_of_the_section_has_its_own_error() {
         let mut damaged = buffer;
         damaged.0[start + place] = byte;
         assert!(matches!(Model::decode(&damaged.0[..length]), Err(DecodeError::Corrupt { .. })));
-        sealed(&mut damaged.0[..length]);
+        seal(&mut damaged.0[..length]);
         Model::decode(&damaged.0[..length]).map(drop).unwrap_err()
     };
     // With any other tag these are no fields of a network, whose section must follow.
@@ -153,7 +147,7 @@ fn every_damage_of_the_section_has_its_own_error() {
         let mut damaged = buffer;
         let place = start + first + 4 * number;
         damaged.0[place..place + 4].copy_from_slice(&f32::NEG_INFINITY.to_le_bytes());
-        sealed(&mut damaged.0[..length]);
+        seal(&mut damaged.0[..length]);
         let cause = NetworkError::NotFinite { what: "expansion" };
         let refused = Model::decode(&damaged.0[..length]).map(drop);
         assert_eq!(refused, Err(DecodeError::Expansion { cause }), "number {number}");
@@ -161,7 +155,7 @@ fn every_damage_of_the_section_has_its_own_error() {
     // 3e38 is a number, but outputs would leave f32.
     let mut damaged = buffer;
     damaged.0[start + first + 8..][..4].copy_from_slice(&3e38_f32.to_le_bytes());
-    sealed(&mut damaged.0[..length]);
+    seal(&mut damaged.0[..length]);
     let cause = NetworkError::NotFinite { what: "the largest output" };
     let refused = Model::decode(&damaged.0[..length]).map(drop);
     assert_eq!(refused, Err(DecodeError::Expansion { cause }));
@@ -180,15 +174,7 @@ fn a_blob_that_is_cut_off_is_refused_wherever_it_ends() {
 fn the_section_has_the_specifications_worked_bytes() {
     let mut buffer = Aligned([0; 1024]);
     let length = small(&mut buffer.0).len();
-    let table = SPECIFICATION.split("<!-- worked expansion -->").nth(1).expect("the marked table");
-    let mut bytes = Vec::new();
-    for line in table.lines().filter(|line| line.starts_with('|')) {
-        let mut cells = line.split('|').map(str::trim).skip(1);
-        let (Some(offset), Some(hex)) = (cells.next(), cells.next()) else { continue };
-        let Ok(offset) = offset.parse::<usize>() else { continue };
-        assert_eq!(offset, bytes.len(), "offset of the line {line:?}");
-        bytes.extend(hex.split_whitespace().map(|byte| u8::from_str_radix(byte, 16).unwrap()));
-    }
+    let bytes = worked_bytes("worked expansion");
     let start = section(&buffer.0[..length]);
     assert_eq!(buffer.0[start..start + bytes.len()], bytes);
 }
@@ -206,7 +192,7 @@ proptest! {
         for (offset, byte) in changes {
             buffer.0[9 + offset % (length - 4 - 9)] = byte;
         }
-        sealed(&mut buffer.0[..length]);
+        seal(&mut buffer.0[..length]);
         let Ok(decoder) = Decoder::<2>::load(&buffer.0[..length]) else { return Ok(()) };
         let Ok(estimate) = decoder.decode(&frame[..]) else { return Ok(()) };
         for (output, status) in estimate.outputs.iter().zip(&estimate.status) {
