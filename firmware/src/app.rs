@@ -72,8 +72,6 @@ struct Core<'m, P, F, const ROWS: usize> {
     estimate: Estimate<'m>,
     /// The baseline, decoded by the model in force; valid once a baseline is captured.
     rest: Estimate<'m>,
-    /// Room for the deviations of all outputs.
-    deviation: &'m mut [f32],
     /// Bits of the last frame's faulty readings, a word a row.
     faulty_columns: [u32; ROWS],
     baseline: Baseline<'m>,
@@ -120,7 +118,6 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
             scratch,
             estimate,
             rest,
-            deviation,
             press,
             stated,
         } = buffers;
@@ -146,7 +143,6 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
             scratch: scratch.as_flattened_mut().as_flattened_mut(),
             estimate: estimate.whole(),
             rest: rest.whole(),
-            deviation: deviation.as_flattened_mut(),
             faulty_columns: [0; ROWS],
             baseline: Baseline::new(baseline.as_flattened_mut()),
             sensor_answers: true,

@@ -63,7 +63,8 @@ impl<'a> Recalibrating<'a> {
 /// A reference press that is being read.
 pub struct Pressing<'m> {
     mean: Baseline<'m>,
-    stated: &'m mut [f32],
+    /// Also the room for standard deviations, of a model that is not recalibrated.
+    pub(super) stated: &'m mut [f32],
     /// Number of the request that waits for it, and of frames to be scanned; `None` if there is none.
     waiting: Option<(u16, u16)>,
 }

@@ -271,7 +271,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         let readings_ohm = self.frame.get(..readings).unwrap_or_default();
         let reciprocals = self.reciprocals.get(..readings).unwrap_or_default();
         let frame = Frame { readings_ohm, reciprocals, gate: None };
-        let deviation = self.deviation.get_mut(..self.outputs).unwrap_or_default();
+        let deviation = self.pressing.stated.get_mut(..self.outputs).unwrap_or_default();
         // The model's sizes were found to fit when it came into force.
         let novelty = decoder.assess_into(frame, self.scratch, deviation).ok().flatten()?;
         let cycles = self.line.platform().cycles().wrapping_sub(start_cycles);
@@ -310,7 +310,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         let outputs = Floats::of(estimate.outputs);
         let with_deviations = novelty.is_some() && sent == ConfidenceSent::Deviations;
         let deviations = if with_deviations { self.outputs } else { 0 };
-        let deviation = Floats::of(self.deviation.get(..deviations).unwrap_or_default());
+        let deviation = Floats::of(self.pressing.stated.get(..deviations).unwrap_or_default());
         let report =
             EstimateReport { frame, start_us, flags, row_status, outputs, novelty, deviation };
         self.line.send(number, &Report::Estimate(report), &mut self.statistics);
