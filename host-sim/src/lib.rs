@@ -26,6 +26,7 @@
 pub mod error;
 pub mod metrics;
 pub mod by_depth;
+pub mod verdict;
 pub mod experiment;
 pub mod training_set;
 pub mod measurements;

@@ -5,6 +5,7 @@ use std::io::Write as _;
 
 use host_sim::by_depth::DepthErrors;
 use host_sim::metrics::{Definition, Errors};
+use host_sim::verdict::Verdict;
 use host_sim::{Error, Result};
 use serde::Serialize;
 
@@ -73,6 +74,34 @@ pub fn errors(page: &mut Page, decoders: &[(&str, &[Errors])]) {
             ));
         }
     }
+}
+
+/// Adds the verdict on a model, and its warnings. `judged_on` names the frames that it was judged on.
+pub fn verdict(page: &mut Page, judged_on: Option<&str>, verdict: &Verdict) {
+    page.line("");
+    match judged_on {
+        Some(frames) => wrapped(page, &format!("{frames}: {}", verdict.sentence)),
+        None => wrapped(page, &verdict.sentence),
+    }
+    for warning in &verdict.warnings {
+        wrapped(page, &warning.to_string());
+    }
+}
+
+/// Adds text in lines of at most 110 characters.
+fn wrapped(page: &mut Page, text: &str) {
+    let mut line = String::new();
+    for word in text.split(' ') {
+        if !line.is_empty() && line.chars().count() + 1 + word.chars().count() > 110 {
+            page.line(&line);
+            line.clear();
+        }
+        if !line.is_empty() {
+            line.push(' ');
+        }
+        line += word;
+    }
+    page.line(&line);
 }
 
 /// Adds a table of RMSE by the depth of the contact, if there is one.

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::progress::Terminal;
 use clap::Args;
+use host_sim::evaluate::worth::Worth;
 use host_sim::subject::Subject;
 use host_sim::training_set::TrainingSet;
 use host_sim::{Error, Result};
@@ -101,6 +102,8 @@ struct Summary {
     outputs: Vec<String>,
     training_rmse: Vec<f64>,
     selection: Option<Selection>,
+    /// What the model is worth, beside the baselines.
+    worth: Worth,
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
@@ -161,6 +164,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         formats: model.networks().map(|n| n.format().name()).collect(),
         outputs: set.frames.outputs.names.clone(),
         training_rmse: model.metadata().training_rmse.iter().map(f64::from).collect(),
+        worth: Worth::of(&subject, &set, &blob, selection.as_ref()),
         selection,
     };
     if common.json {
@@ -296,5 +300,7 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
             "  ({asked} centres were asked for; the data has fewer distinct samples)"
         ));
     }
+    let Worth { judged_on, verdict, .. } = &summary.worth;
+    print::verdict(&mut page, Some(judged_on.words()), verdict);
     page
 }

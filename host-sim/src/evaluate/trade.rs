@@ -21,6 +21,7 @@ use super::gate;
 use crate::error::{Error, NoPoint, Result};
 use crate::experiment::{Experiment, MoreFrames};
 use crate::metrics::{self, DecoderErrors, Errors, LimitSummary};
+pub use crate::verdict::SLOT_BYTES;
 
 mod choice;
 mod gating;
@@ -29,9 +30,6 @@ mod judge;
 pub use choice::Bounds;
 use gating::Gates;
 use judge::{Judge, Knobs, Sets};
-
-/// Largest blob in bytes that a slot of the firmware's images holds: 128 KiB less the record behind it.
-pub const SLOT_BYTES: usize = 131_056;
 
 /// Settings that a trade varies.
 #[derive(Debug, Clone, PartialEq)]
