@@ -4,14 +4,18 @@ use std::path::PathBuf;
 
 use super::progress::Terminal;
 use clap::Args;
-use host_sim::evaluate::gate::{self, BASELINE_FRAMES, GateResult, Line, MISSED_OVER_MM, Settings};
+use host_sim::evaluate::gate::{
+    self, BASELINE_FRAMES, GateResult, Line, MISSED_OVER_MM, RECOMMENDED_K, Settings,
+};
 use host_sim::metrics::Errors;
+use host_sim::subject::Subject;
+use host_sim::verdict::{Verdict, Warning};
 use host_sim::{Error, Result};
-use taxel_learn::Exponential;
 use taxel_learn::cost::{Design, Frames, Prices};
+use taxel_learn::{Exponential, PreparedModel};
 
 use super::arguments::of_option;
-use super::scene_argument::{self, NoiseArgument, SceneArgument};
+use super::subject_argument::{self, SubjectArgument};
 use super::{Common, print};
 
 /// Skip untouched rows: work saved, touches missed, and errors.
@@ -21,24 +25,24 @@ use super::{Common, print};
 /// row takes the model's estimate for the baseline. Gate and model compute like on the device
 /// (docs/gating.md).
 #[derive(Args)]
-#[command(after_help = "Example: host-sim gate press --k 3,3.5,4 --noise 0.01")]
+#[command(after_help = "Examples:
+  host-sim gate press --k 3,3.5,4 --noise 0.01
+  host-sim gate measured.csv --inputs 'ch*' --outputs 'f?_n' --baseline rest.csv")]
 pub struct Arguments {
     #[command(flatten)]
-    scene: SceneArgument,
-    #[command(flatten)]
-    noise: NoiseArgument,
-    /// Frames of the scene, and as many of the untouched sensor.
-    #[arg(short = 'n', long, value_name = "N", default_value_t = 4000)]
-    frames: usize,
-    /// Weight blob of this scene, instead of training one.
+    subject: SubjectArgument,
+    /// Frames of a scene, and as many of the untouched sensor [default: 4000].
+    #[arg(short = 'n', long, value_name = "N")]
+    frames: Option<usize>,
+    /// Weight blob for this scene or CSV file, instead of training one.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// Tolerances, in standard deviations of a reading's noise.
     #[arg(long, value_name = "K,…", value_delimiter = ',', default_values_t = [3.0, 3.5, 4.0, 5.0, 6.0], allow_negative_numbers = true)]
     k: Vec<f64>,
-    /// Frames that the baseline averages.
-    #[arg(long, value_name = "N", default_value_t = BASELINE_FRAMES)]
-    baseline_frames: usize,
+    /// Frames that a scene's baseline averages [default: 100].
+    #[arg(long, value_name = "N")]
+    baseline_frames: Option<usize>,
     /// Cycles of a frame without a gate, of one with all rows untouched (REST), and of one with all rows
     /// touched (AWAKE). REST is below AWAKE. They replace those that are predicted of the model (docs/cycles.md).
     #[arg(
@@ -52,23 +56,15 @@ pub struct Arguments {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let mut scene = arguments.scene.load(common)?;
-    arguments.noise.apply(&mut scene)?;
-    scene.world.check_frames("--frames", arguments.frames)?;
-    scene.world.check_frames("--baseline-frames", arguments.baseline_frames)?;
-    let options = [("k", "--k"), ("baseline-frames", "--baseline-frames")];
-    gate::check_settings(&scene.world, &arguments.k, arguments.baseline_frames)
-        .map_err(|bad| of_option(bad, &options))?;
+    let subject = arguments.subject.load(common)?;
+    let frames = arguments.frames.unwrap_or(FRAMES);
+    let baseline_frames = arguments.baseline_frames.unwrap_or(BASELINE_FRAMES);
+    check(arguments, &subject, [frames, baseline_frames])?;
     let given = given(&arguments.cycles)?;
-    let blob = scene_argument::model(arguments.model.as_deref(), &scene, &Terminal::new())?;
+    let blob = subject_argument::model(arguments.model.as_deref(), &subject, &Terminal::new())?;
     let model = blob.prepare(Exponential::default());
-    let own = f64::from(model.model().metadata().noise_level);
-    if (own - scene.world.noise.level).abs() > 1e-3 * scene.world.noise.level {
-        eprintln!(
-            "note: the model was trained for noise of {}, and is judged at the scene's {}; see --noise",
-            percent(own, 2),
-            percent(scene.world.noise.level, 2)
-        );
+    if let Subject::Scene(scene) = &subject {
+        remark_on_noise(&model, scene.world.noise.level);
     }
     let (frame_cycles, flash_frame_cycles) = if let Some(frames) = given {
         (frames, None)
@@ -78,13 +74,62 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     };
     let settings = Settings {
         k: arguments.k.clone(),
-        frames: arguments.frames,
-        baseline_frames: arguments.baseline_frames,
+        frames,
+        baseline_frames,
         frame_cycles,
         flash_frame_cycles,
     };
-    let result = gate::measure(&scene, &model, &settings, &Terminal::new())?;
+    let result = match &subject {
+        Subject::Scene(scene) => gate::measure(scene, &model, &settings, &Terminal::new()),
+        Subject::Measured(data) => gate::measure_data(data, &model, &settings, &Terminal::new()),
+    };
+    let result = result.map_err(|bad| of_option(bad, &OPTIONS))?;
     if common.json { print::json(&result) } else { page_of(&result).print() }
+}
+
+/// Frames of a scene unless a user says otherwise.
+const FRAMES: usize = 4000;
+
+/// Options by the settings that they set.
+const OPTIONS: [(&str, &str); 2] = [("k", "--k"), ("baseline-frames", "--baseline-frames")];
+
+/// Checks what can be checked before a model is trained.
+fn check(arguments: &Arguments, subject: &Subject, numbers: [usize; 2]) -> Result<()> {
+    let [frames, baseline_frames] = numbers;
+    match subject {
+        Subject::Scene(scene) => {
+            scene.world.check_frames("--frames", frames)?;
+            scene.world.check_frames("--baseline-frames", baseline_frames)?;
+            let settings = gate::check_settings(&scene.world, &arguments.k, baseline_frames);
+            Ok(settings.map_err(|bad| of_option(bad, &OPTIONS))?)
+        }
+        Subject::Measured(_) => {
+            for (option, given) in [
+                ("--frames", arguments.frames.is_some()),
+                ("--baseline-frames", arguments.baseline_frames.is_some()),
+            ] {
+                if given {
+                    let message = format!(
+                        "{option} is for a scene; a CSV file has its own frames: leave it out"
+                    );
+                    return Err(Error::Usage(message));
+                }
+            }
+            Ok(())
+        }
+    }
+}
+
+/// Remarks on stderr if the model was trained for other noise than the scene's `level`.
+fn remark_on_noise(model: &PreparedModel<'_>, level: f64) {
+    let own = f64::from(model.model().metadata().noise_level);
+    if (own - level).abs() > 1e-3 * level {
+        eprintln!(
+            "note: the model was trained for noise of {}, and is judged at the scene's {}; see --noise",
+            percent(own, 2),
+            percent(level, 2)
+        );
+    }
 }
 
 /// The cycles that the user gives.
@@ -104,10 +149,12 @@ fn given(cycles: &[u64]) -> Result<Option<Frames<u64>>> {
 fn page_of(result: &GateResult) -> print::Page {
     let mut page = print::Page::default();
     page.line(format_args!(
-        "{}: {} frames of {} rows, and as many untouched; noise {}; baseline of {} frames; seed {}, model {}\n",
+        "{}: {} frames of {} row{}, {} untouched; noise {}; baseline of {} frames; seed {}, model {}\n",
         result.scene,
         result.frames,
         result.rows,
+        if result.rows == 1 { "" } else { "s" },
+        result.untouched_frames,
         percent(result.noise_level, 2),
         result.baseline_frames,
         result.seed,
@@ -116,8 +163,9 @@ fn page_of(result: &GateResult) -> print::Page {
     rows(&mut page, result);
     errors(&mut page, result);
     frames_cost(&mut page, result);
+    print::verdict(&mut page, None, &verdict(result));
     page.line(
-        "k: a row counts as untouched if every reading, and their sum, lies within k standard deviations of\n\
+        "\nk: a row counts as untouched if every reading, and their sum, lies within k standard deviations of\n\
          the baseline. tolerance: k × noise, for a device's configuration.\n\
          skipped: share of the scene's rows that count as untouched, and are not decoded.\n\
          woken: share of the untouched sensor's rows that do not. theory: its upper bound\n\
@@ -132,9 +180,13 @@ fn page_of(result: &GateResult) -> print::Page {
 }
 
 fn rows(page: &mut print::Page, result: &GateResult) {
-    let sizes = MISSED_OVER_MM.map(|mm| format!(" {:>9}", format!("> {mm} mm"))).concat();
+    let sizes = result.lines.first().map_or(&[][..], |line| &line.missed);
+    if sizes.is_empty() {
+        return rows_of_unknown_size(page, result);
+    }
+    let over = MISSED_OVER_MM.map(|mm| format!(" {:>9}", format!("> {mm} mm"))).concat();
     page.line(format_args!(
-        "{:>6} {:>10} {:>9} {:>9} {:>9}   missed:{sizes} {:>9}",
+        "{:>6} {:>10} {:>9} {:>9} {:>9}   missed:{over} {:>9}",
         "k", "tolerance", "skipped", "woken", "(theory)", "largest"
     ));
     for line in &result.lines {
@@ -152,9 +204,49 @@ fn rows(page: &mut print::Page, result: &GateResult) {
             line.largest_missed_mm.map_or("-".into(), |mm| format!("{mm:.3} mm"))
         ));
     }
-    let sizes = result.lines.first().map_or(&[][..], |line| &line.missed);
     let rows: Vec<String> = sizes.iter().map(|size| format!(" {:>9}", size.rows)).collect();
     page.line(format_args!("{:>47}   of rows:{}\n", "", rows.concat()));
+}
+
+/// Shares of rows without those that are missed: how far the electrodes moved is not known.
+fn rows_of_unknown_size(page: &mut print::Page, result: &GateResult) {
+    page.line(format_args!(
+        "{:>6} {:>10} {:>9} {:>9} {:>9}",
+        "k", "tolerance", "skipped", "woken", "(theory)"
+    ));
+    for line in &result.lines {
+        page.line(format_args!(
+            "{:>6} {:>10} {:>9} {:>9} {:>9}",
+            line.k,
+            percent(line.rest_tolerance, 3),
+            percent(line.skipped, 2),
+            percent(line.woken, 3),
+            format!("({})", percent(line.woken_by_theory, 3))
+        ));
+    }
+    page.line("");
+}
+
+/// What the gate with the tolerance nearest to the recommended one is worth.
+fn verdict(result: &GateResult) -> Verdict {
+    let near = |line: &&Line| (line.k - RECOMMENDED_K).abs();
+    let Some(line) = result.lines.iter().min_by(|a, b| near(a).total_cmp(&near(b))) else {
+        return Verdict { sentence: String::new(), warnings: vec![] };
+    };
+    let worse = line.errors.iter().zip(&result.ungated_errors).map(|(gated, ungated)| {
+        format!("{} by {:.1} %", gated.group, 100.0 * (gated.rmse / ungated.rmse - 1.0))
+    });
+    let worse: Vec<String> = worse.collect();
+    let sentence = format!(
+        "With k = {} the gate skips {} of the rows, and a frame takes {} of the cycles. Errors change: {}.",
+        line.k,
+        percent(line.skipped, 0),
+        percent(line.relative_cost, 0),
+        worse.join(", ")
+    );
+    let cycles = result.frame_cycles.ungated as f64;
+    let costly = Warning::costly_gate(line.relative_cost * cycles, cycles);
+    Verdict { sentence, warnings: costly.into_iter().collect() }
 }
 
 fn errors(page: &mut print::Page, result: &GateResult) {

@@ -9,12 +9,16 @@ use taxel_data::table::Table;
 use taxel_learn::cost::Frames;
 use taxel_learn::{PreparedModel, relative};
 use taxel_simulate::noise::NoiseKind;
-use taxel_simulate::outputs::Outputs;
 pub use taxel_simulate::synth::BASELINE_FRAMES;
 use taxel_simulate::{Synthesis, World};
 
 use crate::experiment::Experiment;
+use crate::measurements::Measurements;
 use crate::metrics::{self, Errors, LimitSummary};
+
+mod frames;
+
+use frames::GateFrames;
 
 /// Deformations in mm beyond which a row that is skipped counts as missed.
 pub const MISSED_OVER_MM: [f64; 4] = [0.02, 0.05, 0.1, 0.2];
@@ -74,7 +78,11 @@ pub fn check_noise(world: &World) -> Result<(), BadValue> {
 /// [`BadValue`] for the first tolerance that does not.
 pub fn check(world: &World, k: &[f64]) -> Result<(), BadValue> {
     check_noise(world)?;
-    let level = world.noise.level;
+    check_tolerances(world.noise.level, k)
+}
+
+/// Checks tolerances `k`, in standard deviations of a reading's relative noise `level`.
+fn check_tolerances(level: f64, k: &[f64]) -> Result<(), BadValue> {
     match k.iter().find(|k| !(**k > 0.0 && *k * level < 1.0)) {
         Some(k) => {
             let rule = format!(
@@ -118,7 +126,7 @@ pub struct Line {
     pub woken: f64,
     /// Upper bound on that share, [by theory](woken_by_theory).
     pub woken_by_theory: f64,
-    /// Rows of the scene that are missed, by [`MISSED_OVER_MM`].
+    /// Rows of the scene that are missed, by [`MISSED_OVER_MM`]; empty where deformations are not known.
     pub missed: Vec<Missed>,
     /// Largest ‖Δ‖ in mm of a row that was not decoded.
     pub largest_missed_mm: Option<f64>,
@@ -133,14 +141,16 @@ pub struct Line {
 /// Results of a scene behind gates of several tolerances.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GateResult {
-    /// Name of the scene.
+    /// Name of the scene or data.
     pub scene: String,
     /// Seed of every random draw.
     pub seed: u64,
     /// Relative noise of a reading, as a fraction.
     pub noise_level: f64,
-    /// Number of frames of the scene, and as many of the untouched sensor.
+    /// Number of frames of the touched sensor.
     pub frames: usize,
+    /// Number of frames of the untouched sensor.
+    pub untouched_frames: usize,
     /// Number of rows in a frame.
     pub rows: usize,
     /// Number of frames whose mean is the baseline.
@@ -186,13 +196,26 @@ pub fn measure(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<GateResult, BadValue> {
-    let world = &experiment.world;
-    check_settings(world, &settings.k, settings.baseline_frames)?;
-    let whole_array = model.model().projection().is_some();
-    let frames = Synthesis::of(world);
+    Ok(judge(GateFrames::of_scene(experiment, model, settings, progress)?, model, settings))
+}
+
+/// Puts every row of measured test frames, and of frames at rest, through gates for `settings`, which number neither of
+/// them.
+///
+/// # Errors
+/// [`BadValue`] for a tolerance that makes no gate, or a sensor that is not known at rest.
+pub fn measure_data(
+    data: &Measurements,
+    model: &PreparedModel<'_>,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<GateResult, BadValue> {
+    Ok(judge(GateFrames::of_measurements(data, model, settings, progress)?, model, settings))
+}
+
+fn judge(frames: GateFrames, model: &PreparedModel<'_>, settings: &Settings) -> GateResult {
+    let gate = &frames.gate;
     let relative_inputs = model.model().metadata().relative_inputs;
-    let sessions = has_sessions(world, relative_inputs).then_some(settings.frames);
-    let gate = Gate::new(&frames, settings.baseline_frames, whole_array, sessions);
     let model = model.clone().of_inputs();
     let decode = |readings: &Table| {
         if relative_inputs {
@@ -202,72 +225,65 @@ pub fn measure(
         }
     };
     let rest_outputs = decode(&gate.baseline);
-
-    let touched = frames.frames(Stream::Test, settings.frames);
-    let sizes_mm = largest_deformations_mm(world, settings.frames);
-    let untouched_readings = frames.untouched().frames(Stream::Test, settings.frames).inputs;
-    let ungated = decode(&touched.inputs);
-    let (measure, limit) =
-        experiment.measure_beside_limit(world.noise.level, settings.frames, progress);
-    let errors = |estimate: &[f64]| metrics::by_group(&touched.outputs, estimate, &measure);
-
+    let ungated = decode(&frames.readings);
+    let errors = |estimate: &[f64]| metrics::by_group(&frames.outputs, estimate, &frames.measure);
     let line = |k: f64| {
-        let rest_tolerance = k * world.noise.level;
-        let at_rest = gate.at_rest(&touched.inputs, rest_tolerance);
-        let untouched_at_rest = gate.at_rest(&untouched_readings, rest_tolerance);
+        let rest_tolerance = k * frames.noise_level;
+        let at_rest = gate.at_rest(&frames.readings, rest_tolerance);
+        let untouched_at_rest = gate.at_rest(&frames.untouched, rest_tolerance);
         let skipped = share(&at_rest);
-        let missed = MISSED_OVER_MM.map(|over_mm| {
-            let rows = || sizes_mm.iter().zip(&at_rest).filter(|(size_mm, _)| **size_mm > over_mm);
-            let missed = rows().filter(|(_, at_rest)| **at_rest).count();
-            Missed { over_mm, rows: rows().count(), missed }
-        });
-        let sizes_at_rest = sizes_mm.iter().zip(&at_rest).filter(|(_, at_rest)| **at_rest);
+        let sizes_mm = frames.sizes_mm.as_deref();
         let cost = |at_rest: f64| settings.frame_cycles.relative(at_rest);
+        let sizes_at_rest =
+            sizes_mm.unwrap_or(&[]).iter().zip(&at_rest).filter(|(_, at_rest)| **at_rest);
         Line {
             k,
             rest_tolerance,
             skipped,
             woken: 1.0 - share(&untouched_at_rest),
-            woken_by_theory: gate.woken_by_theory(k, settings.baseline_frames),
-            missed: missed.to_vec(),
+            woken_by_theory: gate.woken_by_theory(k, frames.baseline_frames),
+            missed: sizes_mm.map_or(vec![], |sizes_mm| missed(sizes_mm, &at_rest)),
             largest_missed_mm: sizes_at_rest.map(|(size_mm, _)| *size_mm).reduce(f64::max),
             errors: errors(&gated(&ungated, &rest_outputs, &at_rest)),
             relative_cost: cost(skipped),
             relative_cost_untouched: cost(share(&untouched_at_rest)),
         }
     };
-    Ok(GateResult {
-        scene: experiment.name.clone(),
-        seed: world.seed,
-        noise_level: world.noise.level,
-        frames: settings.frames,
-        rows: world.read_rows.len() / rows_of_a_model_row(world),
-        baseline_frames: settings.baseline_frames,
+    let means = frames.outputs.means().repeat(frames.outputs.len());
+    let lines = settings.k.iter().copied().map(line).collect();
+    let (ungated_errors, mean_errors) = (errors(&ungated), errors(&means));
+    GateResult {
+        lines,
+        ungated_errors,
+        mean_errors,
+        frames: frames.outputs.len(),
+        untouched_frames: frames.untouched.len(),
+        scene: frames.name,
+        seed: frames.seed,
+        noise_level: frames.noise_level,
+        rows: frames.rows,
+        baseline_frames: frames.baseline_frames,
         model_crc: format!("{:08x}", model.model().crc()),
         frame_cycles: settings.frame_cycles,
         flash_frame_cycles: settings.flash_frame_cycles,
-        limit,
-        ungated_errors: errors(&ungated),
-        mean_errors: errors(&touched.outputs.means().repeat(settings.frames)),
-        lines: settings.k.iter().copied().map(line).collect(),
-    })
+        limit: frames.limit,
+    }
+}
+
+/// Touched rows that are missed, by [`MISSED_OVER_MM`].
+fn missed(sizes_mm: &[f64], at_rest: &[bool]) -> Vec<Missed> {
+    let over = MISSED_OVER_MM.map(|over_mm| {
+        let rows = || sizes_mm.iter().zip(at_rest).filter(|(size_mm, _)| **size_mm > over_mm);
+        let missed = rows().filter(|(_, at_rest)| **at_rest).count();
+        Missed { over_mm, rows: rows().count(), missed }
+    });
+    over.to_vec()
 }
 
 /// Number of row-wires in a row of the model: all, if outputs belong to none of them.
 fn rows_of_a_model_row(world: &World) -> usize {
     let rows = world.read_rows.len();
     rows / world.outputs.row_tables(rows)
-}
-
-/// Largest ‖Δ‖ in mm of each row of each test frame, whatever the world's outputs are.
-fn largest_deformations_mm(world: &World, frames: usize) -> Vec<f64> {
-    let synthesis = Synthesis::of(world).ideal().outputs(Outputs::all_deformations());
-    let deformations_mm = synthesis.frames(Stream::Test, frames).outputs.values;
-    let length = |delta: &[f64]| delta.iter().map(|d| d * d).sum::<f64>().sqrt();
-    deformations_mm
-        .chunks_exact(3 * world.sensor.electrodes_per_row_wire * rows_of_a_model_row(world))
-        .map(|row| row.chunks_exact(3).map(length).fold(0.0, f64::max))
-        .collect()
 }
 
 /// Whether each session has a baseline of its own, which a gate must use. Without it, one baseline serves all.

@@ -49,6 +49,14 @@ impl Folder {
             .unwrap()
     }
 
+    /// Runs the program, which must end with this exit `status`, and returns what it says on stderr.
+    pub fn fail(&self, arguments: &[&str], status: i32) -> String {
+        let output = self.run(arguments);
+        let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(status), "{arguments:?}: {stderr}");
+        stderr
+    }
+
     /// Runs `host-sim` and expects success; returns stdout.
     pub fn succeed(&self, arguments: &[&str]) -> String {
         let output = self.run(arguments);

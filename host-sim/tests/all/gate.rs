@@ -5,6 +5,7 @@ use host_sim::evaluate::gate::{self, GateResult, Settings, woken_by_theory};
 use host_sim::experiment::Experiment;
 use host_sim::metrics::Errors;
 use taxel_data::progress::Silent;
+use taxel_data::random::{Purpose, Random, Stream};
 use taxel_learn::Exponential;
 use taxel_learn::cost::{Design, Frames, Prices};
 
@@ -137,4 +138,38 @@ fn what_makes_no_gate_is_refused() {
         }
         assert!(output.stdout.is_empty());
     }
+}
+
+#[test]
+fn a_csv_file_with_frames_at_rest_has_a_gate() {
+    let folder = Folder::new("gate-csv");
+    let mut random = Random::new(5, Stream::Test, Purpose::Noise, 0, 0);
+    let mut line = |force_n: f64| {
+        let noise = |random: &mut Random| 1.0 + 0.005 * random.normal();
+        let [a, b] = [60.0 * (1.0 - 0.1 * force_n), 30.0 * (1.0 + 0.2 * force_n)];
+        format!("{},{},{force_n}\n", a * noise(&mut random), b * noise(&mut random))
+    };
+    // Half of the frames are at rest.
+    let touched: String = (0..600).map(|i| line(f64::from(i % 10 - 4).max(0.0) / 5.0)).collect();
+    let rest: String = (0..400).map(|_| line(0.0)).collect();
+    folder.write("touched.csv", format!("ch1,ch2,f_n\n{touched}"));
+    folder.write("rest.csv", format!("ch1,ch2,f_n\n{rest}"));
+    let gate =
+        ["gate", "touched.csv", "--inputs", "ch*", "--outputs", "f_n", "--no-refine", "--k", "3.5"];
+    let missing = folder.fail(&gate, 2);
+    assert!(missing.contains("--baseline FILE"), "{missing}");
+    let both = [&gate[..], &["--baseline", "rest.csv"]].concat();
+    let result: serde_json::Value =
+        serde_json::from_str(&folder.succeed(&[&both[..], &["--json"]].concat())).unwrap();
+    let noise = result["noise_level"].as_f64().unwrap();
+    assert!((0.0045..0.0055).contains(&noise), "{noise}");
+    let line = &result["lines"][0];
+    let of = |key: &str| line[key].as_f64().unwrap();
+    // Five of ten frames are untouched.
+    assert!((0.48..0.52).contains(&of("skipped")), "{line}");
+    assert!(of("woken") < 0.01 && line["missed"].as_array().unwrap().is_empty(), "{line}");
+    let page = folder.succeed(&both);
+    assert!(page.contains("With k = 3.5 the gate skips 50 % of the rows"), "{page}");
+    let frames = folder.fail(&[&both[..], &["-n", "10"]].concat(), 2);
+    assert!(frames.contains("--frames is for a scene"), "{frames}");
 }

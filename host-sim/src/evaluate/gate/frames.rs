@@ -1,0 +1,131 @@
+//! Frames that gates are measured on: of a scene, or measured.
+
+use taxel_data::BadValue;
+use taxel_data::progress::Progress;
+use taxel_data::random::Stream;
+use taxel_data::table::Table;
+use taxel_learn::PreparedModel;
+use taxel_simulate::outputs::Outputs;
+use taxel_simulate::{Synthesis, World};
+
+use super::{Gate, Settings, check_settings, check_tolerances, has_sessions, rows_of_a_model_row};
+use crate::experiment::Experiment;
+use crate::measurements::Measurements;
+use crate::metrics::{LimitSummary, Measure};
+use crate::subject::Subject;
+
+/// Frames of a sensor that is touched, and of the same sensor at rest.
+pub(super) struct GateFrames {
+    pub name: String,
+    pub seed: u64,
+    /// Relative noise of a reading, as a fraction.
+    pub noise_level: f64,
+    /// Number of frames whose mean is the baseline.
+    pub baseline_frames: usize,
+    /// Number of rows in a frame.
+    pub rows: usize,
+    pub gate: Gate,
+    /// Readings and outputs while the sensor is touched.
+    pub readings: Table,
+    pub outputs: Table,
+    /// Readings of the untouched sensor that the baseline does not contain.
+    pub untouched: Table,
+    /// Largest ‖Δ‖ in mm of each row of each touched frame, where deformations are known.
+    pub sizes_mm: Option<Vec<f64>>,
+    pub measure: Measure,
+    pub limit: LimitSummary,
+}
+
+impl GateFrames {
+    /// Test frames of a scene, and as many of the untouched sensor.
+    pub fn of_scene(
+        experiment: &Experiment,
+        model: &PreparedModel<'_>,
+        settings: &Settings,
+        progress: &dyn Progress,
+    ) -> Result<Self, BadValue> {
+        let world = &experiment.world;
+        check_settings(world, &settings.k, settings.baseline_frames)?;
+        let frames = Synthesis::of(world);
+        let relative_inputs = model.model().metadata().relative_inputs;
+        let sessions = has_sessions(world, relative_inputs).then_some(settings.frames);
+        let whole_array = model.model().projection().is_some();
+        let touched = frames.frames(Stream::Test, settings.frames);
+        let (measure, limit) =
+            experiment.measure_beside_limit(world.noise.level, settings.frames, progress);
+        Ok(Self {
+            name: experiment.name.clone(),
+            seed: world.seed,
+            noise_level: world.noise.level,
+            baseline_frames: settings.baseline_frames,
+            rows: world.read_rows.len() / rows_of_a_model_row(world),
+            gate: Gate::new(&frames, settings.baseline_frames, whole_array, sessions),
+            readings: touched.inputs,
+            outputs: touched.outputs,
+            untouched: frames.untouched().frames(Stream::Test, settings.frames).inputs,
+            sizes_mm: Some(largest_deformations_mm(world, settings.frames)),
+            measure,
+            limit,
+        })
+    }
+
+    /// Measured test frames. The first half of the frames at rest makes the baseline, the second half tells how often
+    /// noise wakes a row.
+    pub fn of_measurements(
+        data: &Measurements,
+        model: &PreparedModel<'_>,
+        settings: &Settings,
+        progress: &dyn Progress,
+    ) -> Result<Self, BadValue> {
+        let rule = "a gate compares readings with those at rest: give --baseline FILE, with two frames of the \
+                    untouched sensor or more, and no channel that is zero at rest";
+        let at_rest = data.rest.as_ref().filter(|rest| rest.len() > 1);
+        let (Some(rest), Some(noise_level)) = (at_rest, data.noise_level()) else {
+            let frames = data.rest.as_ref().map_or(0, Table::len);
+            return Err(BadValue::new("frames at rest", frames, rule));
+        };
+        if noise_level <= 0.0 {
+            let rule =
+                "the gate's tolerance is k times it: give frames at rest with the sensor's noise";
+            return Err(BadValue::new("noise at rest", noise_level, rule));
+        }
+        check_tolerances(noise_level, &settings.k)?;
+        let columns = rest.names.len();
+        let baseline_frames = rest.len() / 2;
+        let (first, second) = rest.values.split_at(baseline_frames * columns);
+        let table = |values: &[f64]| Table { names: rest.names.clone(), values: values.to_vec() };
+        let first = table(first);
+        let baseline = Table { values: first.means(), names: first.names };
+        let (measure, limit) = Subject::Measured(Box::new(data.clone())).measure(1, progress);
+        let rows = data.test.rows;
+        Ok(Self {
+            name: data.name.clone(),
+            seed: data.options.seed,
+            noise_level,
+            baseline_frames,
+            rows,
+            gate: Gate {
+                baseline,
+                readings: columns / rows,
+                whole_array: model.model().projection().is_some(),
+            },
+            readings: data.test_readings.clone(),
+            outputs: data.test.outputs.clone(),
+            untouched: table(second),
+            sizes_mm: None,
+            measure,
+            limit,
+        })
+    }
+}
+
+/// Largest ‖Δ‖ in mm of each row of each test frame, whatever the world's outputs are.
+fn largest_deformations_mm(world: &World, frames: usize) -> Vec<f64> {
+    let synthesis = Synthesis::of(world).ideal().outputs(Outputs::all_deformations());
+    let deformations_mm = synthesis.frames(Stream::Test, frames).outputs.values;
+    let length = |delta: &[f64]| delta.iter().map(|d| d * d).sum::<f64>().sqrt();
+    deformations_mm
+        .chunks_exact(3 * world.sensor.electrodes_per_row_wire * rows_of_a_model_row(world))
+        .map(|row| row.chunks_exact(3).map(length).fold(0.0, f64::max))
+        .collect()
+}
