@@ -8,7 +8,7 @@ use host_sim::experiment::{EMBEDDED, Experiment};
 use host_sim::{Error, Result};
 use model_core::rbf::Format;
 use serde::Serialize;
-use taxel_data::csv_file::CsvFile;
+use taxel_data::data_file::DataFile;
 use taxel_data::dataset::Dataset;
 use taxel_data::error::{Problem, Role};
 use taxel_data::random::Stream;
@@ -263,7 +263,7 @@ fn from_data(arguments: &Arguments, common: &Common) -> Result<Source> {
         ));
     }
     let path = Path::new(&arguments.source);
-    let file = CsvFile::read(path)?;
+    let file = DataFile::read(path)?;
     let (inputs, outputs) = (arguments.inputs.as_deref(), arguments.outputs.as_deref());
     let (dataset, kept) = Dataset::from_file(&file, inputs, outputs).map_err(with_options)?;
     if kept.lines.len() < kept.of {
@@ -315,7 +315,7 @@ fn with_options(error: taxel_data::Error) -> Error {
 }
 
 /// Folds from column `name`.
-fn folds_from(file: &CsvFile, name: &str, lines: &[usize]) -> Result<Vec<usize>> {
+fn folds_from(file: &DataFile, name: &str, lines: &[usize]) -> Result<Vec<usize>> {
     let column = file.column(name)?;
     let values: Vec<f64> = lines.iter().map(|line| file.value(*line, column)).collect();
     if let Some(place) = values.iter().position(|value| value.is_nan()) {
