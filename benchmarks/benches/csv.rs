@@ -5,7 +5,8 @@ use std::path::Path;
 
 use benchmarks::{csv_of, frames_of};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use taxel_data::csv_file::{self, CsvFile};
+use taxel_data::csv_file;
+use taxel_data::data_file::DataFile;
 
 /// Frames in the file: 288 numbers each, 24 MB together.
 const FRAMES: usize = 4096;
@@ -20,7 +21,7 @@ fn csv(criterion: &mut Criterion) {
         bencher.iter(|| std::fs::read(black_box(&path)).expect("the file written above"));
     });
     group.bench_function("read", |bencher| {
-        bencher.iter(|| CsvFile::read(black_box(&path)).expect("the file written above"));
+        bencher.iter(|| DataFile::read(black_box(&path)).expect("the file written above"));
     });
     let table = frames_of("press", FRAMES).inputs;
     let lines = || table.lines().map(|line| line.iter().copied());

@@ -1,211 +1,156 @@
-//! CSV files: a header of names, then one frame a line.
+//! CSV files that are written: a header of names, then one frame a line.
+//!
+//! Numbers are formatted on all cores, in pieces that are written in turn.
 
-use std::collections::HashSet;
-use std::path::{Path, PathBuf};
+use std::io::Write;
+use std::path::Path;
 
-use crate::columns;
-use crate::error::{Error, Problem, Result};
+use rayon::prelude::*;
 
-mod body;
-mod write;
+use crate::error::{Error, Result};
+use crate::output;
 
-pub use write::write;
+/// Numbers formatted as one piece, and pieces formatted at a time.
+const PIECE: usize = 16 * 1024;
+const PIECES: usize = 64;
 
-/// CSV file that was read whole. Empty fields and NaN are missing values, held as NaN.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CsvFile {
-    /// Path of the file, for messages.
-    pub path: PathBuf,
-    /// Column names.
-    pub header: Vec<String>,
-    /// CRC-64/XZ of the file's bytes.
-    pub digest: u64,
+/// Writes a CSV file: a header of `names`, then `lines`. Every number reads back as the same f64; NaN
+/// becomes an empty field.
+///
+/// # Errors
+/// [`Error::Write`] if the file cannot be written; whatever stood at `path` then stays.
+pub fn write<'n, L: IntoIterator<Item = f64>>(
+    path: &Path,
+    names: impl IntoIterator<Item = &'n str>,
+    lines: impl IntoIterator<Item = L>,
+) -> Result<()> {
+    let error = |cause| Error::write(path, cause);
+    output::write_whole(path, |file| {
+        let mut header = csv::Writer::from_writer(&mut *file);
+        let header_written = header.write_record(names).and_then(|()| Ok(header.flush()?));
+        drop(header);
+        header_written.map_err(|e| error(e.into()))?;
+        let mut lines = lines.into_iter();
+        let mut pieces = vec![Piece::default(); PIECES];
+        loop {
+            let mut filled = 0;
+            while filled < PIECES && pieces[filled].fill(&mut lines) {
+                filled += 1;
+            }
+            pieces[..filled].par_iter_mut().for_each(Piece::write_text);
+            for piece in &pieces[..filled] {
+                file.write_all(&piece.text).map_err(error)?;
+            }
+            if filled < PIECES {
+                return Ok(());
+            }
+        }
+    })
+}
+
+/// Lines to be written together, as numbers and as text.
+#[derive(Clone, Default)]
+struct Piece {
     values: Vec<f64>,
-    /// Line number in the file (from 1) of each line of data.
-    line_numbers: Vec<u64>,
+    /// Index in the values at which each line ends.
+    line_ends: Vec<usize>,
+    text: Vec<u8>,
 }
 
-impl CsvFile {
-    /// Reads the CSV file at `path`.
-    ///
-    /// # Errors
-    /// [`Error::Read`] if the file cannot be read. [`Error::File`] for an empty file, a missing or
-    /// repeated column name, a line with too few or too many fields, or a field that is not a number.
-    pub fn read(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|cause| Error::read(path, cause))?;
-        Self::parse(path, &bytes)
-    }
-
-    /// Parses the bytes of a CSV file; `path` names it in messages.
-    ///
-    /// # Errors
-    /// [`Error::File`] for content that [`read`](Self::read) rejects.
-    pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self> {
-        let error = |problem| Error::file(path, problem);
-        let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(bytes);
-        let header =
-            reader.headers().map_err(|e| error(Problem::Header { cause: e.to_string() }))?;
-        let header: Vec<String> = header.iter().map(|name| name.trim().to_owned()).collect();
-        if header.is_empty() {
-            return Err(error(Problem::Empty));
-        }
-        if header.len() == 1
-            && let Some(line) = blank_line(bytes)
+impl Piece {
+    /// Takes the next lines; returns false if none are left.
+    fn fill<L: IntoIterator<Item = f64>>(&mut self, lines: &mut impl Iterator<Item = L>) -> bool {
+        self.values.clear();
+        self.line_ends.clear();
+        while self.values.len() < PIECE
+            && let Some(line) = lines.next()
         {
-            return Err(error(Problem::BlankLine { line }));
+            self.values.extend(line);
+            self.line_ends.push(self.values.len());
         }
-        let mut seen = HashSet::new();
-        for (index, name) in header.iter().enumerate() {
-            let column = index + 1;
-            if name.is_empty() || name.contains(char::is_control) {
-                return Err(error(Problem::UnusableName { column, name: name.clone() }));
+        !self.line_ends.is_empty()
+    }
+
+    fn write_text(&mut self) {
+        self.text.clear();
+        let mut from = 0;
+        for end in &self.line_ends {
+            let line = &self.values[from..*end];
+            from = *end;
+            for (place, value) in line.iter().enumerate() {
+                if place > 0 {
+                    self.text.push(b',');
+                }
+                write_number(&mut self.text, *value);
             }
-            if !seen.insert(name) {
-                return Err(error(Problem::RepeatedName { name: name.clone() }));
+            if let [value] = line
+                && value.is_nan()
+            {
+                self.text.extend_from_slice(b"NaN"); // a blank line would be no line
             }
+            self.text.push(b'\n');
         }
-        let lines = lines_of_data(bytes, reader.position());
-        let (digest, values) = rayon::join(
-            || crate::digest::digest(bytes),
-            || lines.and_then(|(_, lines)| body::read(lines, header.len())),
-        );
-        if let (Some((first, _)), Some(values)) = (lines, values)
-            && !values.is_empty()
-        {
-            let line_numbers = (first..).take(values.len() / header.len()).collect();
-            return Ok(Self { path: path.into(), header, digest, values, line_numbers });
-        }
-        let (values, line_numbers) = Self::read_carefully(path, bytes, &mut reader, &header)?;
-        Ok(Self { path: path.into(), header, digest, values, line_numbers })
-    }
-
-    /// Reads the lines after the header one by one, quotes and blank lines included.
-    fn read_carefully(
-        path: &Path,
-        bytes: &[u8],
-        reader: &mut csv::Reader<&[u8]>,
-        header: &[String],
-    ) -> Result<(Vec<f64>, Vec<u64>)> {
-        let error = |problem| Error::file(path, problem);
-        let mut values = Vec::new();
-        let mut line_numbers = Vec::new();
-        let mut lines = LineCount { bytes, at: 0, line: 1 };
-        let mut record = csv::ByteRecord::new();
-        let read_error = |e: csv::Error| error(Problem::Line { cause: e.to_string() });
-        while reader.read_byte_record(&mut record).map_err(read_error)? {
-            let line = lines.of_record_at(record.position().map_or(0, csv::Position::byte));
-            if record.len() != header.len() {
-                let (fields, columns) = (record.len(), header.len());
-                return Err(error(Problem::FieldCount { line, fields, columns }));
-            }
-            for (field, name) in record.iter().zip(header) {
-                let value = number(field).ok_or_else(|| {
-                    let field = String::from_utf8_lossy(field).into_owned();
-                    error(Problem::NotANumber { line, column: name.clone(), field })
-                })?;
-                values.push(value);
-            }
-            line_numbers.push(line);
-        }
-        if values.is_empty() {
-            return Err(error(Problem::NoLines));
-        }
-        Ok((values, line_numbers))
-    }
-
-    /// Number of lines of data.
-    #[must_use]
-    pub fn lines(&self) -> usize {
-        self.values.len() / self.header.len()
-    }
-
-    /// Value at `line` (from 0, header not counted) and `column` (from 0); NaN if missing.
-    ///
-    /// # Panics
-    /// If the file has no such line.
-    #[must_use]
-    pub fn value(&self, line: usize, column: usize) -> f64 {
-        self.values[line * self.header.len() + column]
-    }
-
-    /// Number in the file (from 1, header included) of the line of data `line` (from 0), for messages.
-    #[must_use]
-    pub fn line_number(&self, line: usize) -> u64 {
-        self.line_numbers[line]
-    }
-
-    /// Index (from 0) of the column called `name`.
-    ///
-    /// # Errors
-    /// [`Error::File`] if there is no such column.
-    pub fn column(&self, name: &str) -> Result<usize> {
-        self.header.iter().position(|n| n == name).ok_or_else(|| {
-            let known = columns::some_names(&self.header);
-            Error::file(&self.path, Problem::MissingColumn { name: name.into(), known })
-        })
-    }
-
-    /// Indices (from 0) of the columns called `names`.
-    ///
-    /// # Errors
-    /// [`Error::File`] for the first name without a column.
-    pub fn columns<'n>(&self, names: impl IntoIterator<Item = &'n str>) -> Result<Vec<usize>> {
-        names.into_iter().map(|name| self.column(name)).collect()
     }
 }
 
-/// Count of lines; the CSV reader's own count is one short where lines end in CR LF.
-struct LineCount<'b> {
-    bytes: &'b [u8],
-    at: usize,
-    line: u64,
-}
-
-impl LineCount<'_> {
-    /// Number (from 1) of the line on which the record after byte `position` begins. `position` never
-    /// decreases.
-    fn of_record_at(&mut self, position: u64) -> u64 {
-        let is_end = |byte: u8| matches!(byte, b'\r' | b'\n');
-        while let Some(&byte) = self.bytes.get(self.at)
-            && ((self.at as u64) < position || is_end(byte))
-        {
-            self.at += 1;
-            let ends = byte == b'\n' || byte == b'\r' && self.bytes.get(self.at) != Some(&b'\n');
-            self.line += u64::from(ends);
-        }
-        self.line
+/// Appends the shortest digits that read back as the same number, as `Display` writes them.
+fn write_number(text: &mut Vec<u8>, value: f64) {
+    if value.is_nan() {
+        return;
+    }
+    let mut buffer = zmij::Buffer::new();
+    let digits = buffer.format(value);
+    if digits.contains('e') || lies_in_the_middle(value, digits) {
+        let _ = write!(text, "{value}"); // a vector takes anything
+    } else {
+        text.extend_from_slice(digits.strip_suffix(".0").unwrap_or(digits).as_bytes());
     }
 }
 
-/// Number (from 1) of the first line after the header, and those lines; `None` where the header's end is
-/// not certain.
-fn lines_of_data<'b>(bytes: &'b [u8], position: &csv::Position) -> Option<(u64, &'b [u8])> {
-    let (header, lines) = bytes.split_at_checked(usize::try_from(position.byte()).ok()?)?;
-    let (end, lines) = match (header.last()?, lines.strip_prefix(b"\n")) {
-        (b'\n', _) => (0, lines),
-        (b'\r', Some(lines)) => (1, lines),
-        _ => return None,
-    };
-    let ended = memchr::memchr_iter(b'\n', header).count() + end;
-    Some((ended as u64 + 1, lines))
-}
-
-/// Number (from 1) of the first blank line that a line of text follows.
-fn blank_line(bytes: &[u8]) -> Option<usize> {
-    let is_blank = |line: &[u8]| line.iter().all(u8::is_ascii_whitespace);
-    let lines: Vec<&[u8]> = bytes.split(|byte| *byte == b'\n').collect();
-    let last = lines.iter().rposition(|line| !is_blank(line))?;
-    lines[..last].iter().position(|line| is_blank(line)).map(|index| index + 1)
-}
-
-/// Number in a field; NaN if it is empty or NaN. `None` for text and infinities.
-fn number(field: &[u8]) -> Option<f64> {
-    let text = std::str::from_utf8(field).ok()?.trim();
-    if text.is_empty() {
-        return Some(f64::NAN);
-    }
-    text.parse::<f64>().ok().filter(|value| !value.is_infinite())
+/// Whether a number may lie exactly between `digits` and the next number of as many digits. `Display`
+/// then rounds up, and zmij to even. Such a number is a multiple of 2^-(decimals + 1).
+fn lies_in_the_middle(value: f64, digits: &str) -> bool {
+    const UNAMBIGUOUS: usize = 15; // digits of which no two numbers are the same f64
+    let decimals = digits.find('.').map_or(0, |point| digits.len() - point - 1);
+    let multiple = value * f64::from_bits((1023 + 1 + decimals as u64) << 52);
+    digits.len() > UNAMBIGUOUS + 1 && multiple == multiple.trunc()
 }
 
 #[cfg(test)]
-mod tests;
+mod tests {
+    use super::*;
+    use crate::random::{Purpose, Random, Stream};
+
+    #[test]
+    fn numbers_are_written_as_display_writes_them() {
+        let mut random = Random::new(1, Stream::Test, Purpose::Damage, 0, 0);
+        let drawn =
+            (0..200_000).map(|_| (random.unit() - 0.5) * 10_f64.powf(40.0 * random.unit() - 20.0));
+        let odd =
+            [0.0, -0.0, 1.0, -1e15, 1e16, 1e17, 1e300, 5e-324, 0.1, 1e-5, 1e-4, f64::INFINITY];
+        let drawn: Vec<f64> = drawn.collect();
+        let rounded: Vec<f64> = drawn.iter().map(|value| f64::from(*value as f32)).collect();
+        for value in drawn.into_iter().chain(rounded).chain(odd) {
+            let mut text = Vec::new();
+            write_number(&mut text, value);
+            assert_eq!(String::from_utf8(text).unwrap(), value.to_string());
+        }
+    }
+
+    #[test]
+    fn lines_keep_their_order_over_many_pieces() {
+        let folder = std::env::temp_dir().join(format!("taxel-write-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let path = folder.join("data.csv");
+        let count = 3 * PIECE * PIECES / 2;
+        write(&path, ["a", "b"], (0..count).map(|i| [i as f64, f64::NAN])).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        std::fs::remove_dir_all(&folder).unwrap();
+        let mut lines = text.lines();
+        assert_eq!(lines.next(), Some("a,b"));
+        for i in 0..count {
+            assert_eq!(lines.next(), Some(&*format!("{i},")));
+        }
+        assert_eq!(lines.next(), None);
+    }
+}

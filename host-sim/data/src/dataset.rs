@@ -1,7 +1,7 @@
 //! Data sets: tables of readings and of the outputs that a decoder should predict from them.
 
 use crate::columns;
-use crate::csv_file::CsvFile;
+use crate::data_file::DataFile;
 use crate::error::{Error, Problem, Result, Role};
 use crate::table::Table;
 
@@ -71,7 +71,7 @@ impl Dataset {
     /// [`Error::File`] for a pattern without a column, a column that is input and output, a value that
     /// is too large, or a file without a complete frame.
     pub fn from_file(
-        file: &CsvFile,
+        file: &DataFile,
         inputs: Option<&str>,
         outputs: Option<&str>,
     ) -> Result<(Self, Kept)> {
@@ -178,7 +178,7 @@ impl RowTable {
 }
 
 /// Indices of the columns of `file` that match `pattern`, or that have the project's own names.
-fn chosen(file: &CsvFile, pattern: Option<&str>, role: Role) -> Result<Vec<usize>> {
+fn chosen(file: &DataFile, pattern: Option<&str>, role: Role) -> Result<Vec<usize>> {
     let usual = match role {
         Role::Inputs => "r*c*_ohm",
         Role::Outputs => "r*e*_d?_mm,r*e*_f?_n,contact_*",

@@ -178,6 +178,18 @@ pub enum Problem {
         /// Columns in the header.
         columns: usize,
     },
+    /// Line with more or fewer fields than the first one, in a file without a header.
+    #[error(
+        "line {line} has {fields} fields; the first line has {columns}; mend or remove the line"
+    )]
+    UnevenLine {
+        /// Number of the line.
+        line: u64,
+        /// Fields in the line.
+        fields: usize,
+        /// Fields in the first line.
+        columns: usize,
+    },
     /// Field that is not a number.
     #[error(
         "line {line}, column {column:?}: {field:?} is not a number; leave the field empty if the value is missing"
@@ -189,6 +201,20 @@ pub enum Problem {
         column: String,
         /// Text of the field.
         field: String,
+    },
+    /// Value of an array that is infinite.
+    #[error("line {line}, column {column:?}: the value is infinite; write NaN if it is missing")]
+    Infinite {
+        /// Number of the line.
+        line: u64,
+        /// Name of the column.
+        column: String,
+    },
+    /// File of arrays that is no table of numbers.
+    #[error("{cause}; save arrays of numbers, lines × columns, by numpy.save or numpy.savez")]
+    Array {
+        /// Reason.
+        cause: String,
     },
     /// Column that is needed and missing.
     #[error("column {name:?} is missing; the file has: {known}")]
@@ -266,5 +292,41 @@ pub enum Problem {
         line: u64,
         /// Values that every line needs, for the message.
         rule: String,
+    },
+    /// Time stamp before that of the line before.
+    #[error(
+        "line {line}, column {column:?}: {value} is earlier than {before} before it; sort the lines by time, or split \
+         the file where the clock was set back"
+    )]
+    ClockSetBack {
+        /// Number of the line.
+        line: u64,
+        /// Name of the column.
+        column: String,
+        /// Time stamp of the line.
+        value: f64,
+        /// Latest time stamp before it.
+        before: f64,
+    },
+    /// Log of which no line has a partner in another one.
+    #[error(
+        "no time stamp is within tolerance = {tolerance} of one in {other}: the nearest are {distance} apart; raise the \
+         tolerance, set the lag between the clocks, or check which columns hold the time"
+    )]
+    NoPartner {
+        /// Path of the other log.
+        other: String,
+        /// Largest distance that was allowed.
+        tolerance: f64,
+        /// Smallest distance of two time stamps.
+        distance: f64,
+    },
+    /// Logs of which one has no time stamp.
+    #[error(
+        "this file or {other} has no time stamp: the column is empty; check which columns hold the time"
+    )]
+    NoTimeStamp {
+        /// Path of the other log.
+        other: String,
     },
 }

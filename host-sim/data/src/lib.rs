@@ -1,4 +1,4 @@
-//! The ground floor of Taxel's host side: tables of measurements, CSV files, seeded random numbers.
+//! The ground floor of Taxel's host side: tables of measurements, data files, seeded random numbers.
 //!
 //! Modules stand from the ground up; each imports only what stands before it.
 
@@ -11,6 +11,8 @@ pub mod progress;
 pub mod output;
 pub mod columns;
 pub mod csv_file;
+pub mod data_file;
+pub mod join;
 pub mod table;
 pub mod dataset;
 

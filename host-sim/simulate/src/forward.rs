@@ -1,7 +1,7 @@
 //! Forward model over a file: deformations in, ideal readings out.
 
 use rayon::prelude::*;
-use taxel_data::csv_file::CsvFile;
+use taxel_data::data_file::DataFile;
 use taxel_data::error::Problem;
 use taxel_data::simd::{self, LANES};
 
@@ -16,7 +16,7 @@ use crate::world::World;
 /// # Errors
 /// [`Error::File`](taxel_data::Error::File) for a column that is missing, or a deformation for which the
 /// model does not hold.
-pub fn forward(world: &World, file: &CsvFile) -> taxel_data::Result<Vec<f64>> {
+pub fn forward(world: &World, file: &DataFile) -> taxel_data::Result<Vec<f64>> {
     let sensor = &world.sensor;
     let mut columns = Vec::new();
     for row in &world.read_rows {
@@ -57,7 +57,7 @@ pub fn forward(world: &World, file: &CsvFile) -> taxel_data::Result<Vec<f64>> {
 
 struct Forward<'a> {
     world: &'a World,
-    file: &'a CsvFile,
+    file: &'a DataFile,
     /// Indices in the file of each row's deformations, by electrode and axis.
     columns: &'a [Vec<usize>],
     model: LaneModel<'a>,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use firmware::link::message::Memory;
 use host_sim::{Error, Result};
-use taxel_data::csv_file::CsvFile;
+use taxel_data::data_file::DataFile;
 use taxel_data::random::Stream;
 use taxel_learn::{Exponential, ModelBlob};
 use taxel_rig::device::check::{Findings, Frames, Plan};
@@ -109,7 +109,7 @@ impl CheckArguments {
             )));
         };
         let model = ModelBlob::read(path)?;
-        let file = CsvFile::read(Path::new(&self.source))?;
+        let file = DataFile::read(Path::new(&self.source))?;
         let readings = model_inputs(&model.prepare(Exponential::default()), &file)?;
         let baseline_ohm = self.baseline.values(model.parse().metadata(), path)?;
         let frames = Frames { readings: readings.cycled(self.frames.max(1)), baseline_ohm };

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use host_sim::measurements::{Judged, Measurements, Split, relative_to};
 use host_sim::{Error, Result};
-use taxel_data::csv_file::CsvFile;
+use taxel_data::data_file::DataFile;
 use taxel_data::dataset::Dataset;
 use taxel_data::error::{Problem, Role};
 use taxel_learn::{Options, select};
@@ -105,7 +105,7 @@ impl DataArguments {
                     .into(),
             ));
         }
-        let file = CsvFile::read(path)?;
+        let file = DataFile::read(path)?;
         let (frames, lines) = self.frames(&file)?;
         let given_folds =
             self.fold_column.as_ref().map(|name| folds_from(&file, name, &lines)).transpose()?;
@@ -144,7 +144,7 @@ impl DataArguments {
     }
 
     /// Frames of `file`, and the indices of their lines.
-    fn frames(&self, file: &CsvFile) -> Result<(Dataset, Vec<usize>)> {
+    fn frames(&self, file: &DataFile) -> Result<(Dataset, Vec<usize>)> {
         let (inputs, outputs) = (self.inputs.as_deref(), self.outputs.as_deref());
         let (frames, kept) = Dataset::from_file(file, inputs, outputs).map_err(with_options)?;
         if kept.lines.len() < kept.of {
@@ -165,7 +165,7 @@ impl DataArguments {
             JudgedBy::HeldOut => return Ok(Judged::HeldOut),
             JudgedBy::File(path) => path,
         };
-        let (own, _) = self.frames(&CsvFile::read(path)?)?;
+        let (own, _) = self.frames(&DataFile::read(path)?)?;
         let names = |frames: &Dataset| (frames.inputs.names.clone(), frames.outputs.names.clone());
         if names(&own) != names(frames) {
             let message = "its columns are not those of the frames to train on: give a file with the same columns, \
@@ -197,7 +197,7 @@ fn with_options(error: taxel_data::Error) -> Error {
 }
 
 /// Folds from column `name`, numbered from 0.
-fn folds_from(file: &CsvFile, name: &str, lines: &[usize]) -> Result<Vec<usize>> {
+fn folds_from(file: &DataFile, name: &str, lines: &[usize]) -> Result<Vec<usize>> {
     let column = file.column(name)?;
     let values: Vec<f64> = lines.iter().map(|line| file.value(*line, column)).collect();
     if let Some(place) = values.iter().position(|value| value.is_nan()) {

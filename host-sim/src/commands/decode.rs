@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use host_sim::{Error, Result};
 use serde::Serialize;
-use taxel_data::csv_file::{self, CsvFile};
+use taxel_data::csv_file;
+use taxel_data::data_file::DataFile;
 use taxel_data::output;
 use taxel_data::table::Table;
 use taxel_learn::infer::is_missing;
@@ -58,7 +59,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     output::check_writable(&arguments.output, &[&arguments.model, &arguments.readings, baseline])?;
     let blob = ModelBlob::read(&arguments.model)?;
     let model = arguments.baseline.apply(blob.prepare(arguments.exponential), &arguments.model)?;
-    let file = CsvFile::read(&arguments.readings)?;
+    let file = DataFile::read(&arguments.readings)?;
     let readings = model_inputs(&model, &file)?;
     remark_on_range(&model, &readings);
     let estimate = model.decode_table(&readings);

@@ -8,7 +8,7 @@ use host_sim::evaluate::confidence::{Coverage, coverage};
 use host_sim::metrics::{self, Errors, LimitSummary, Measure};
 use host_sim::{Error, Result};
 use serde::Serialize;
-use taxel_data::csv_file::CsvFile;
+use taxel_data::data_file::DataFile;
 use taxel_learn::{Exponential, ModelBlob};
 use taxel_limit::Refusal;
 
@@ -57,7 +57,7 @@ struct Summary {
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let blob = ModelBlob::read(&arguments.model)?;
     let model = arguments.baseline.apply(blob.prepare(arguments.exponential), &arguments.model)?;
-    let file = CsvFile::read(&arguments.data)?;
+    let file = DataFile::read(&arguments.data)?;
     let readings = model_inputs(&model, &file)?;
     let metadata = model.model().metadata();
     let mut truth = table_of(&file, metadata.output_names.iter())?;

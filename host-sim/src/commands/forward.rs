@@ -6,7 +6,8 @@ use clap::Args;
 use host_sim::Result;
 use host_sim::experiment::Experiment;
 use serde::Serialize;
-use taxel_data::csv_file::{self, CsvFile};
+use taxel_data::csv_file;
+use taxel_data::data_file::DataFile;
 use taxel_data::output;
 use taxel_simulate::forward::forward;
 
@@ -34,7 +35,7 @@ struct Summary {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let scene = Experiment::load(&arguments.scene)?;
-    let file = CsvFile::read(&arguments.deformation)?;
+    let file = DataFile::read(&arguments.deformation)?;
     output::check_writable(&arguments.output, &[&arguments.deformation, arguments.scene.as_ref()])?;
     let readings = forward(&scene.world, &file)?;
     let names = scene.world.reading_names();

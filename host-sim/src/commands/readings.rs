@@ -6,7 +6,7 @@ use clap::Args;
 use host_sim::{Error, Result};
 use model_core::blob::Metadata;
 use taxel_data::columns;
-use taxel_data::csv_file::CsvFile;
+use taxel_data::data_file::DataFile;
 use taxel_data::table::Table;
 use taxel_learn::{PreparedModel, relative};
 
@@ -61,7 +61,7 @@ impl BaselineArgument {
 
 /// Readings of the untouched sensor in `file`, in the columns of `inputs`, of which every one has a mean to divide by.
 pub fn at_rest(file: &Path, inputs: &Table) -> Result<Table> {
-    let rest = table_of(&CsvFile::read(file)?, inputs.names.iter().map(String::as_str))?;
+    let rest = table_of(&DataFile::read(file)?, inputs.names.iter().map(String::as_str))?;
     let missing = unusable(&Table { names: rest.names.clone(), values: rest.means() });
     if missing.is_empty() {
         return Ok(rest);
@@ -76,7 +76,7 @@ pub fn at_rest(file: &Path, inputs: &Table) -> Result<Table> {
 
 /// One line: the mean of each of the columns called `names` in `file`.
 fn baseline<'n>(file: &Path, names: impl Iterator<Item = &'n str>) -> Result<Table> {
-    let frames = table_of(&CsvFile::read(file)?, names)?;
+    let frames = table_of(&DataFile::read(file)?, names)?;
     Ok(Table { values: frames.means(), names: frames.names })
 }
 
@@ -88,12 +88,12 @@ fn unusable(baseline: &Table) -> Vec<String> {
 }
 
 /// Columns of `file` with the model's readings.
-pub fn model_inputs(model: &PreparedModel<'_>, file: &CsvFile) -> Result<Table> {
+pub fn model_inputs(model: &PreparedModel<'_>, file: &DataFile) -> Result<Table> {
     table_of(file, model.model().metadata().input_names.iter())
 }
 
 /// Columns of `file` called `names`.
-pub fn table_of<'n>(file: &CsvFile, names: impl Iterator<Item = &'n str>) -> Result<Table> {
+pub fn table_of<'n>(file: &DataFile, names: impl Iterator<Item = &'n str>) -> Result<Table> {
     let names: Vec<&str> = names.collect();
     let columns = file.columns(names.iter().copied())?;
     let lines = 0..file.lines();

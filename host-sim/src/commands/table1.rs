@@ -7,7 +7,7 @@ use clap::Args;
 use host_sim::evaluate::table1::{self, Entry, NETWORK, PAPER_PRINTED_PERCENT, Printed, Table1};
 use host_sim::metrics::{Definition, Errors};
 use host_sim::{Error, Result};
-use taxel_data::csv_file::CsvFile;
+use taxel_data::data_file::DataFile;
 use taxel_data::{columns, output};
 use taxel_learn::decoders::{mean, standard};
 use taxel_simulate::sensor::Precision;
@@ -57,7 +57,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         output::check_writable(path, &[argument.path(), printed])?;
     }
     let printed = match &arguments.printed {
-        Some(path) => Printed::from_file(&CsvFile::read(path)?)?,
+        Some(path) => Printed::from_file(&DataFile::read(path)?)?,
         None => Vec::new(),
     };
     let mut table = table1::compute(&scene, &Terminal::new())?;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 use serde::Serialize;
-use taxel_data::csv_file::CsvFile;
+use taxel_data::data_file::DataFile;
 use taxel_data::dataset::Dataset;
 use taxel_data::error::Problem;
 use taxel_data::output;
@@ -62,7 +62,7 @@ impl Printed {
     ///
     /// # Errors
     /// [`Error`] for a file that cannot be read, or a column or value that is missing.
-    pub fn from_file(file: &CsvFile) -> taxel_data::Result<Vec<Self>> {
+    pub fn from_file(file: &DataFile) -> taxel_data::Result<Vec<Self>> {
         let columns = file.columns(["spread", "noise_level", "percent"])?;
         let cell = |line: usize| {
             let value = |column: usize| file.value(line, columns[column]);

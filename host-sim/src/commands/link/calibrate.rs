@@ -9,7 +9,7 @@ use firmware::readout::ScanSettings;
 use host_sim::{Error, Result};
 use model_core::Wires;
 use serde::{Deserialize, Serialize};
-use taxel_data::csv_file::CsvFile;
+use taxel_data::data_file::DataFile;
 use taxel_rig::calibration::{CircuitConstants, Fit};
 use taxel_rig::device::calibrate::{Reading, calibrate as find};
 use taxel_rig::device::{Device, Wire};
@@ -166,7 +166,7 @@ fn ask_to_connect(number: usize, known: &[Vec<f64>], wires: Wires) -> Result<()>
 
 /// Resistors of each line of a file, for all places `names`; NaN is not connected.
 fn read_known(path: &Path, names: &[String], wires: Wires) -> Result<Vec<Vec<f64>>> {
-    let file = CsvFile::read(path)?;
+    let file = DataFile::read(path)?;
     let bad = |what: String| Error::Usage(format!("{}: {what}", path.display()));
     if let Some(name) = file.header.iter().find(|name| !names.contains(name)) {
         let Wires { rows, columns } = wires;

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use host_sim::{Error, Result};
 use serde::Serialize;
-use taxel_data::csv_file::CsvFile;
+use taxel_data::data_file::DataFile;
 use taxel_data::table::Table;
 use taxel_learn::ModelBlob;
 use taxel_rig::device::recalibrate::{Outcome, recalibrate, recalibrate_from_readings};
@@ -47,7 +47,7 @@ pub fn execute<W: Wire>(
     let blob = ModelBlob::read(&arguments.model)?;
     let model = blob.parse();
     let metadata = model.metadata();
-    let file = CsvFile::read(&arguments.presses)?;
+    let file = DataFile::read(&arguments.presses)?;
     let outputs = table_of(&file, metadata.output_names.iter())?;
     let unfit = |message: String| Error::Unfit { path: arguments.presses.clone(), message };
     if outputs.is_empty() {

@@ -4,7 +4,7 @@ use super::*;
 fn carefully(bytes: &[u8]) -> Result<(Vec<f64>, Vec<u64>)> {
     let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(bytes);
     let header: Vec<String> = reader.headers().unwrap().iter().map(str::to_owned).collect();
-    CsvFile::read_carefully(Path::new("test.csv"), bytes, &mut reader, &header)
+    read_carefully(Path::new("test.csv"), bytes, &mut reader, &header)
 }
 
 fn bits(values: &[f64]) -> Vec<u64> {
@@ -33,7 +33,7 @@ fn the_quick_reader_reads_what_the_careful_one_reads() {
         ("\u{feff}a,b\n1,2\n", true),
         ("a,b\n\u{a0}1,2\n", true),
     ] {
-        let file = CsvFile::parse(Path::new("test.csv"), text.as_bytes()).unwrap();
+        let file = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap();
         let (values, line_numbers) = carefully(text.as_bytes()).unwrap();
         assert_eq!(bits(&file.values), bits(&values), "{text:?}");
         assert_eq!(file.line_numbers, line_numbers, "{text:?}");
@@ -55,7 +55,7 @@ fn lines_are_counted_as_an_editor_counts_them() {
         ("\n\na,b\n\"1\",2\n3,x", 5),
         ("\u{feff}a,b\n1,2\n3,x\n", 3),
     ] {
-        let message = CsvFile::parse(Path::new("test.csv"), text.as_bytes()).unwrap_err();
+        let message = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap_err();
         assert!(message.to_string().contains(&format!("line {line}")), "{text:?}: {message}");
     }
 }
@@ -72,7 +72,7 @@ fn what_is_wrong_is_left_to_the_careful_reader() {
         "a,b\n1,2 3\n",
         "a,b\n1,\u{ff12}\n",
     ] {
-        let message = CsvFile::parse(Path::new("test.csv"), text.as_bytes()).unwrap_err();
+        let message = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap_err();
         let careful = carefully(text.as_bytes()).unwrap_err();
         assert_eq!(message.to_string(), careful.to_string(), "{text:?}");
     }
@@ -87,7 +87,7 @@ fn files_of_many_pieces_are_read_whole_and_faults_in_them_found() {
         text += &[value, -value * 1e-7, f64::from(line)].map(|v| v.to_string()).join(",");
         text += "\n";
     }
-    let file = CsvFile::parse(Path::new("test.csv"), text.as_bytes()).unwrap();
+    let file = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap();
     assert_eq!(file.lines(), lines as usize);
     for line in 0..lines {
         let value = f64::from(line).sqrt();
@@ -96,6 +96,42 @@ fn files_of_many_pieces_are_read_whole_and_faults_in_them_found() {
         assert_eq!(file.line_number(line as usize), line as u64 + 2);
     }
     text += "1,2,three\n";
-    let message = CsvFile::parse(Path::new("test.csv"), text.as_bytes()).unwrap_err().to_string();
+    let message = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap_err().to_string();
     assert!(message.contains("line 60002, column \"c\": \"three\" is not a number"), "{message}");
+}
+
+#[test]
+fn a_first_line_of_numbers_is_data() {
+    let path = Path::new("test.csv");
+    for (text, header, lines, first_line) in [
+        ("1,2\n3,4\n", vec!["c1", "c2"], 2, 1),
+        ("1743486221.590758,,-1e-3\r\n2,3,4\r\n", vec!["c1", "c2", "c3"], 2, 1),
+        ("\u{feff}1,2\n3,4", vec!["c1", "c2"], 2, 1),
+        ("\n\n1,2\n3,4\n", vec!["c1", "c2"], 2, 3),
+        ("\"1\",2\n\n3,4\n", vec!["c1", "c2"], 2, 1),
+        (" 1 , NaN\n3,4\n", vec!["c1", "c2"], 2, 1),
+        ("7\n8\n", vec!["c1"], 2, 1),
+    ] {
+        let file = parse(path, text.as_bytes(), false).unwrap();
+        assert_eq!(file.header, header, "{text:?}");
+        assert!(!file.names_columns, "{text:?}");
+        assert_eq!((file.lines(), file.line_number(0)), (lines, first_line), "{text:?}");
+    }
+    let named = parse(path, b"1,2\n3,4\n", true).unwrap();
+    assert_eq!((&*named.header, named.lines()), (&["1".into(), "2".into()][..], 1));
+    for text in ["a,2\n3,4\n", "nan,inf\n1,2\n", "1,inf\n1,2\n"] {
+        assert!(parse(path, text.as_bytes(), false).unwrap().names_columns, "{text:?}");
+    }
+}
+
+#[test]
+fn lines_of_a_file_without_a_header_are_counted_from_its_first() {
+    for (text, says) in [
+        ("1,2\n3,x\n", "line 2, column \"c2\": \"x\" is not a number"),
+        ("1,2\n3,4\n5\n", "line 3 has 1 fields; the first line has 2"),
+        ("1\n\n2\n", "line 2 is blank"),
+    ] {
+        let message = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap_err().to_string();
+        assert!(message.contains(says), "{message}");
+    }
 }

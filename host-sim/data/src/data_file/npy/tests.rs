@@ -1,0 +1,106 @@
+use std::io::Write;
+
+use npyz::WriterBuilder;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipWriter};
+
+use super::*;
+
+/// Bytes of a `.npy` file of this shape.
+fn array<T: npyz::AutoSerialize + Copy>(shape: &[u64], order: Order, elements: &[T]) -> Vec<u8> {
+    let mut bytes = vec![];
+    let options = npyz::WriteOptions::new().default_dtype().shape(shape).order(order);
+    let mut writer = options.writer(&mut bytes).begin_nd().unwrap();
+    writer.extend(elements.iter().copied()).unwrap();
+    writer.finish().unwrap();
+    bytes
+}
+
+fn archive(arrays: &[(&str, Vec<u8>)], method: CompressionMethod) -> Vec<u8> {
+    let mut zip = ZipWriter::new(Cursor::new(vec![]));
+    for (name, bytes) in arrays {
+        let options = SimpleFileOptions::default().compression_method(method);
+        zip.start_file(format!("{name}.npy"), options).unwrap();
+        zip.write_all(bytes).unwrap();
+    }
+    zip.finish().unwrap().into_inner()
+}
+
+fn lines(file: &DataFile) -> Vec<Vec<f64>> {
+    file.rows().map(<[f64]>::to_vec).collect()
+}
+
+#[test]
+fn arrays_of_either_order_and_of_any_number_are_read_line_by_line() {
+    let path = Path::new("test.npy");
+    let expected = vec![vec![1.0, 2.0, 3.0], vec![4.0, 5.0, 6.0]];
+    for bytes in [
+        array(&[2, 3], Order::C, &[1.0_f64, 2.0, 3.0, 4.0, 5.0, 6.0]),
+        array(&[2, 3], Order::Fortran, &[1.0_f64, 4.0, 2.0, 5.0, 3.0, 6.0]),
+        array(&[2, 3], Order::C, &[1.0_f32, 2.0, 3.0, 4.0, 5.0, 6.0]),
+        array(&[2, 3], Order::C, &[1_i64, 2, 3, 4, 5, 6]),
+        array(&[2, 3], Order::C, &[1_i16, 2, 3, 4, 5, 6]),
+        array(&[2, 3], Order::C, &[1_u8, 2, 3, 4, 5, 6]),
+        array(&[2, 3], Order::C, &[1_u32, 2, 3, 4, 5, 6]),
+    ] {
+        let file = parse_array(path, &bytes).unwrap();
+        assert_eq!(file.header, ["c1", "c2", "c3"]);
+        assert!(!file.names_columns);
+        assert_eq!(lines(&file), expected);
+        assert_eq!(file.line_number(1), 2);
+    }
+    let time = [1_743_486_221.590_758, f64::NAN];
+    let column = parse_array(path, &array(&[2], Order::C, &time)).unwrap();
+    assert_eq!(column.header, ["c1"]);
+    assert_eq!(column.value(0, 0).to_bits(), time[0].to_bits());
+    assert!(column.value(1, 0).is_nan());
+    let flags = parse_array(path, &array(&[2], Order::C, &[true, false])).unwrap();
+    assert_eq!(lines(&flags), [[1.0], [0.0]]);
+}
+
+#[test]
+fn arrays_of_an_archive_stand_side_by_side() {
+    let arrays = [
+        ("time_s", array(&[2], Order::C, &[0.5_f64, 1.5])),
+        ("ch", array(&[2, 2], Order::C, &[1_i32, 2, 3, 4])),
+    ];
+    for method in [CompressionMethod::Stored, CompressionMethod::Deflated] {
+        let file = parse_archive(Path::new("test.npz"), &archive(&arrays, method)).unwrap();
+        assert_eq!(file.header, ["time_s", "ch1", "ch2"]);
+        assert!(file.names_columns);
+        assert_eq!(lines(&file), [[0.5, 1.0, 2.0], [1.5, 3.0, 4.0]]);
+    }
+}
+
+#[test]
+fn what_is_no_table_of_numbers_is_refused() {
+    let path = Path::new("test.npy");
+    let whole = array(&[2, 2], Order::C, &[1.0_f64, 2.0, 3.0, 4.0]);
+    let infinite = [1.0, 2.0, 3.0, f64::INFINITY];
+    for (bytes, says) in [
+        (b"a,b\n1,2\n".to_vec(), "not a .npy file"),
+        (whole[..whole.len() - 1].to_vec(), "cannot be read to its end"),
+        (array(&[1, 2, 2], Order::C, &[1.0_f64; 4]), "3 dimensions"),
+        (array(&[], Order::C, &[1.0_f64]), "0 dimensions"),
+        (array(&[0, 2], Order::C, &[0.0_f64; 0]), "holds no number"),
+        (array(&[2, 2], Order::C, &infinite), "line 2, column \"c2\": the value is infinite"),
+    ] {
+        let message = parse_array(path, &bytes).unwrap_err().to_string();
+        assert!(message.contains(says), "{message}");
+    }
+    let stored = |arrays: &[(&str, Vec<u8>)]| archive(arrays, CompressionMethod::Stored);
+    let one = array(&[2], Order::C, &[1.0_f64, 2.0]);
+    for (bytes, says) in [
+        (whole.clone(), "not a .npz file"),
+        (stored(&[]), "holds no number"),
+        (stored(&[("a", one.clone()), ("b", b"text".to_vec())]), "array \"b\": not a .npy file"),
+        (stored(&[("a1", one.clone()), ("a", whole.clone())]), "column \"a1\" stands twice"),
+        (
+            stored(&[("a", whole), ("b", array(&[3], Order::C, &[1_u8, 2, 3]))]),
+            "array \"b\" has 3 lines, and the first array 2",
+        ),
+    ] {
+        let message = parse_archive(Path::new("test.npz"), &bytes).unwrap_err().to_string();
+        assert!(message.contains(says), "{message}");
+    }
+}

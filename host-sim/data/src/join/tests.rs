@@ -1,0 +1,106 @@
+use std::path::Path;
+
+use super::*;
+
+fn log(path: &str, header: &[&str], lines: &[&[f64]]) -> DataFile {
+    DataFile {
+        path: Path::new(path).into(),
+        header: header.iter().map(|name| (*name).to_owned()).collect(),
+        names_columns: true,
+        digest: 1,
+        values: lines.concat(),
+        line_numbers: (2..).take(lines.len()).collect(),
+    }
+}
+
+fn on_time(tolerance: f64, lag: f64) -> Join {
+    Join { on: ["t".into(), "t".into()], tolerance, lag }
+}
+
+fn rows(joined: &Joined) -> Vec<&[f64]> {
+    joined.file.rows().collect()
+}
+
+#[test]
+fn each_line_finds_the_nearest_time_stamp_within_the_tolerance() {
+    let first = log("a.csv", &["t", "x"], &[&[0.0, 1.0], &[1.0, 2.0], &[2.0, 3.0], &[9.0, 4.0]]);
+    let second =
+        log("b.csv", &["t", "y"], &[&[0.1, 10.0], &[0.9, 20.0], &[1.2, 30.0], &[2.5, 40.0]]);
+    let joined = on_time(0.5, 0.0).join(&first, &second).unwrap();
+    assert_eq!(joined.file.header, ["t", "x", "b.t", "y"]);
+    let expected = [[0.0, 1.0, 0.1, 10.0], [1.0, 2.0, 0.9, 20.0], [2.0, 3.0, 2.5, 40.0]];
+    assert_eq!(rows(&joined), expected);
+    assert_eq!((joined.left_out, joined.repeated, joined.largest_distance), (1, 0, 0.5));
+    assert_eq!(joined.file.line_number(2), 4);
+    assert!(joined.file.path.display().to_string().contains("a.csv joined with b.csv"));
+}
+
+#[test]
+fn the_lag_is_added_to_the_second_log() {
+    let first = log("a.csv", &["t"], &[&[10.0], &[11.0]]);
+    let second = log("b.csv", &["t", "y"], &[&[7.0, 1.0], &[8.0, 2.0], &[9.0, 3.0]]);
+    let joined = on_time(0.1, 3.0).join(&first, &second).unwrap();
+    assert_eq!(rows(&joined), [[10.0, 7.0, 1.0], [11.0, 8.0, 2.0]]);
+    let refused = on_time(0.1, -3.5).join(&first, &second).unwrap_err().to_string();
+    assert!(refused.contains("tolerance = 0.1") && refused.contains("4.5 apart"), "{refused}");
+}
+
+#[test]
+fn of_equally_near_lines_the_first_is_taken() {
+    let first = log("a.csv", &["t"], &[&[1.0], &[1.0], &[2.0]]);
+    let second = log("b.csv", &["t", "y"], &[&[0.5, 1.0], &[0.5, 2.0], &[1.5, 3.0], &[1.5, 4.0]]);
+    let joined = on_time(1.0, 0.0).join(&first, &second).unwrap();
+    assert_eq!(rows(&joined), [[1.0, 0.5, 1.0], [1.0, 0.5, 1.0], [2.0, 1.5, 3.0]]);
+    assert_eq!(joined.repeated, 2);
+}
+
+#[test]
+fn lines_without_a_time_stamp_are_left_out() {
+    let first = log("a.csv", &["t"], &[&[0.0], &[f64::NAN], &[1.0]]);
+    let second = log("b.csv", &["t", "y"], &[&[f64::NAN, 1.0], &[0.0, 2.0], &[1.0, f64::NAN]]);
+    let joined = on_time(0.0, 0.0).join(&first, &second).unwrap();
+    assert_eq!(joined.left_out, 1);
+    assert_eq!(rows(&joined)[0], [0.0, 0.0, 2.0]);
+    assert!(rows(&joined)[1][2].is_nan());
+    let empty = log("b.csv", &["t", "y"], &[&[f64::NAN, 1.0]]);
+    let refused = on_time(1.0, 0.0).join(&first, &empty).unwrap_err().to_string();
+    assert!(refused.contains("no time stamp"), "{refused}");
+}
+
+#[test]
+fn a_clock_that_was_set_back_is_refused() {
+    let first = log("a.csv", &["t"], &[&[0.0], &[1.0]]);
+    let second = log("b.csv", &["t"], &[&[0.0], &[5.0], &[f64::NAN], &[4.5]]);
+    let refused = on_time(1.0, 0.0).join(&first, &second).unwrap_err().to_string();
+    assert!(refused.contains("b.csv: line 5, column \"t\": 4.5 is earlier than 5"), "{refused}");
+    assert!(on_time(1.0, 0.0).join(&second, &first).is_err());
+}
+
+#[test]
+fn names_that_exist_already_get_a_prefix_as_often_as_needed() {
+    let first = log("a.csv", &["c1", "b.c1"], &[&[0.0, 1.0]]);
+    let second = log("b.csv", &["c1", "c2"], &[&[0.0, 2.0]]);
+    let join = Join { on: ["c1".into(), "c1".into()], tolerance: 0.0, lag: 0.0 };
+    assert_eq!(join.join(&first, &second).unwrap().file.header, ["c1", "b.c1", "b.b.c1", "c2"]);
+}
+
+#[test]
+fn times_of_day_keep_their_microseconds() {
+    let start = 1_743_486_221.590_758;
+    let first = log("a.csv", &["t"], &[&[start], &[start + 1e-4]]);
+    let second = log("b.csv", &["t", "y"], &[&[start - 4e-5, 1.0], &[start + 6.2e-5, 2.0]]);
+    let joined = on_time(1e-4, 0.0).join(&first, &second).unwrap();
+    assert_eq!(rows(&joined).iter().map(|row| row[2]).collect::<Vec<_>>(), [1.0, 2.0]);
+}
+
+#[test]
+fn tolerances_and_lags_that_are_no_times_are_refused() {
+    for (join, field) in [
+        (on_time(-1.0, 0.0), "tolerance"),
+        (on_time(f64::NAN, 0.0), "tolerance"),
+        (on_time(1.0, f64::INFINITY), "lag"),
+    ] {
+        assert_eq!(join.check().unwrap_err().field, field);
+    }
+    assert_eq!(on_time(0.0, -2.5).check(), Ok(()));
+}
