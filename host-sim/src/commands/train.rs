@@ -58,6 +58,11 @@ pub struct Arguments {
     /// half of that for `--whole-array`].
     #[arg(long, value_name = "S", value_delimiter = ',')]
     spread: Vec<f64>,
+    /// Ridge penalty on squared weights, for each frame: 1 is as strong as an input that is always 1. More of it
+    /// generalises better from few or noisy frames. With --select, candidates [default: 1e-6 for all frames together,
+    /// or 1e-7 a frame if refined].
+    #[arg(long, value_name = "P", value_delimiter = ',', allow_negative_numbers = true)]
+    penalty: Vec<f64>,
     /// Train without the affine tail A·x.
     #[arg(long)]
     no_affine: bool,
@@ -95,6 +100,10 @@ pub struct Arguments {
     /// Folds, drawn at random, for cross-validation and for refinement on a CSV file [default: 5].
     #[arg(long, value_name = "N")]
     folds: Option<usize>,
+    /// Folds of successive lines of a CSV file, instead of random ones. Use it for a log, whose neighbouring lines
+    /// resemble each other, to judge how well a model does on another log.
+    #[arg(long, value_name = "N", conflicts_with_all = ["folds", "fold_column"])]
+    fold_blocks: Option<usize>,
     /// Column of a CSV file that gives each line's fold (any numbers), instead of random folds.
     #[arg(long, value_name = "NAME", conflicts_with = "folds")]
     fold_column: Option<String>,
@@ -169,6 +178,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     } else {
         options.centres = one("--centres", &arguments.centres, options.centres)?;
         options.spread = one("--spread", &arguments.spread, options.spread)?;
+        if !arguments.penalty.is_empty() {
+            options.penalty = Some(one("--penalty", &arguments.penalty, 0.0)?);
+        }
         None
     };
 
@@ -219,6 +231,7 @@ fn from_scene(arguments: &Arguments, common: &Common) -> Result<Source> {
         ("--inputs", arguments.inputs.is_some()),
         ("--outputs", arguments.outputs.is_some()),
         ("--fold-column", arguments.fold_column.is_some()),
+        ("--fold-blocks", arguments.fold_blocks.is_some()),
     ] {
         if given {
             let message = format!("{option} picks columns of a CSV file; a scene has its own");
@@ -328,6 +341,12 @@ fn folds_from(file: &CsvFile, name: &str, lines: &[usize]) -> Result<Vec<usize>>
 
 /// Random folds, as many as asked for.
 fn random_folds(arguments: &Arguments, frames: usize, seed: u64) -> Result<Vec<usize>> {
+    if let Some(folds) = arguments.fold_blocks {
+        if !(2..=frames).contains(&folds) {
+            return Err(Error::Usage(format!("--fold-blocks {folds}: give from 2 to {frames}")));
+        }
+        return Ok(select::block_folds(frames, folds));
+    }
     let folds = arguments.folds.unwrap_or(frames.min(5));
     if !(2..=frames).contains(&folds) {
         return Err(Error::Usage(format!("--folds {folds}: give from 2 to {frames}")));
@@ -366,11 +385,18 @@ fn choose(arguments: &Arguments, source: &Source, options: &mut Options) -> Resu
     } else {
         arguments.spread.clone()
     };
+    let penalties: Vec<Option<f64>> = if arguments.penalty.is_empty() && source.refine {
+        vec![None]
+    } else if arguments.penalty.is_empty() {
+        [1e-9, 1e-8, 1e-7, 1e-6, 1e-5].map(Some).to_vec()
+    } else {
+        arguments.penalty.iter().copied().map(Some).collect()
+    };
+    let candidates = select::Candidates { centres, spreads, penalties, most_steps: 0 };
     let selection = select::cross_validate(
         &source.dataset,
         &fold_of,
-        &centres,
-        &spreads,
+        &candidates,
         options,
         source.refine.then(Refinement::default).as_ref(),
         &Terminal::new(),
@@ -378,6 +404,7 @@ fn choose(arguments: &Arguments, source: &Source, options: &mut Options) -> Resu
     .map_err(of_folds)?;
     options.centres = selection.best().centres;
     options.spread = selection.best().spread;
+    options.penalty = selection.best().penalty;
     Ok(selection)
 }
 
@@ -398,9 +425,10 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         for (i, scored) in selection.scored.iter().enumerate() {
             let mark = if i == selection.best { "  <- chosen" } else { "" };
             page.line(format_args!(
-                "  K = {:<4} spread = {:<5} score {:.4}: {}{mark}",
+                "  K = {:<4} spread = {:<5} penalty = {:<7} score {:.4}: {}{mark}",
                 scored.centres,
                 scored.spread,
+                scored.penalty.map_or("usual".into(), |penalty| format!("{penalty:e}")),
                 scored.score,
                 pooled(&scored.rmse)
             ));
