@@ -281,7 +281,7 @@ pub fn compute(
                 &plan.gate_k,
                 (whole_array, t.relative_inputs),
             );
-            let more = t.refine.then_some(MoreFrames { experiment, synthesis: &frames });
+            let more = t.refine.then_some(MoreFrames { experiment, synthesis: frames.clone() });
             let sets = Sets::new(
                 noise_level,
                 [&training, &test],
