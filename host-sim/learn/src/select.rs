@@ -287,6 +287,33 @@ mod tests {
         }
     }
 
+    /// Noisy outputs of few frames: a penalty keeps many centres from fitting the noise.
+    #[test]
+    fn a_penalty_is_chosen_where_data_are_noisy_and_the_grid_grows_to_it() {
+        let mut dataset = dataset(&["y"]).subset(&(0..150).collect::<Vec<_>>());
+        let mut random = Random::new(8, Stream::Training, Purpose::Noise, 0, 0);
+        dataset.outputs.values.iter_mut().for_each(|y| *y += 0.3 * random.normal());
+        let folds = block_folds(dataset.frames(), 4);
+        let options = Options { centres: 1, spread: 1.0, ..Options::default() };
+        let select = |penalties: &[f64], most_steps: usize| {
+            let penalties = penalties.iter().copied().map(Some).collect();
+            let candidates =
+                Candidates { centres: vec![60], spreads: vec![0.2], penalties, most_steps };
+            cross_validate(&dataset, &folds, &candidates, &options, None, &Silent).unwrap()
+        };
+        let wide = select(&[1e-9, 1e-7, 1e-5, 1e-3, 1e-1], 0);
+        let chosen = wide.best().penalty.unwrap();
+        assert!((1e-5..=1e-2).contains(&chosen) && wide.edges.is_empty(), "{wide:?}");
+        assert!(wide.best().score < 0.8 * wide.scored[0].score, "{wide:?}");
+        let narrow = select(&[1e-9, 1e-7], 0);
+        let edge = Edge { setting: "penalty", value: 1e-7, largest: true };
+        assert_eq!((narrow.scored.len(), narrow.edges.as_slice()), (2, &[edge][..]));
+        let grown = select(&[1e-9, 1e-7], 6);
+        assert!(grown.edges.is_empty(), "{grown:?}");
+        let grown_to = grown.best().penalty.unwrap();
+        assert!((grown_to / chosen - 1.0).abs() < 1e-9, "{grown_to} {chosen}");
+    }
+
     fn best_spread(outputs: &[&str]) -> f64 {
         let dataset = dataset(outputs);
         let folds = random_folds(dataset.frames(), 4, 1);

@@ -328,12 +328,13 @@ mod tests {
             let centres = samples.centres(&options, 3);
             let targets = Targets::of(&table.outputs);
             let rounded = Rounded::new(&samples, &centres, &options);
-            let regressors = rounded.regressors(&options).count();
+            let regressors = rounded.regressors().count();
             let all = &targets.deviations;
             assert!(all.len() >= FEW * SAMPLES_A_WEIGHT * regressors);
             let scaled = rounded.scale.apply(&table);
             let share = |scaled: &[f64], deviations: &[f64]| {
-                let fitted = rounded.network(scaled, deviations, &targets, &options).unwrap();
+                let decomposed = rounded.decompose(scaled, deviations, &targets);
+                let fitted = rounded.network(&decomposed, &targets, 1e6).unwrap();
                 worst_share(&fitted, &table)
             };
             let few = share(&every(&scaled, 18), &every(&all.values, targets.outputs()));
