@@ -9,8 +9,8 @@
 //! - At most three lines, or one of 200 if that is more, are as far out. A second cluster, such as 30 % of the lines, is
 //!   no outlier.
 //! - The gap to the next value is at least three times the range of all values below it (more for fewer than 333 lines),
-//!   and wider than the outliers' own range. Tails of real data are not that sparse: in recordings of 1860 to 4805
-//!   lines the widest such gap is 0.5 ranges.
+//!   and wider than the outliers' own range. Tails of real data are not that sparse: in five recordings of 1860 to
+//!   4805 lines the widest such gap is 0.16 ranges, and in 3000 simulated frames of presses it is 0.44.
 //! - The line is no rare press. A log may be at rest for 99 % of its lines, where every press stands far out. What tells
 //!   a press is that readings and outputs leave their rest together: in such a line, a column of the other kind is far
 //!   from its own bulk too, as it is in some other lines.
@@ -75,7 +75,7 @@ struct Column {
     rest: Option<[f64; 2]>,
 }
 
-/// Finds the outliers of `dataset`. `line_number` gives the number of a frame's line, for messages.
+/// Finds the outliers of `dataset`; a missing value (NaN) is none. `line_number` gives the number of a frame's line, for messages.
 #[must_use]
 pub fn find(dataset: &Dataset, line_number: impl Fn(usize) -> u64) -> Outliers {
     let frames = dataset.frames();
@@ -123,10 +123,10 @@ fn is_outside(value: f64, [low, high]: [f64; 2]) -> bool {
     value < low || value > high
 }
 
-/// Values of column number `column`, in ascending order.
+/// Values of column number `column` in ascending order, without those that are missing.
 fn values(table: &Table, column: usize) -> Vec<f64> {
-    let mut values: Vec<f64> =
-        table.values.iter().skip(column).step_by(table.names.len()).copied().collect();
+    let all = table.values.iter().skip(column).step_by(table.names.len()).copied();
+    let mut values: Vec<f64> = all.filter(|value| !value.is_nan()).collect();
     values.sort_by(f64::total_cmp);
     values
 }

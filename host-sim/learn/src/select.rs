@@ -10,7 +10,7 @@ use crate::decoders::{BASELINES, Baseline};
 use crate::error::Result;
 use crate::infer::{Exponential, infer};
 use crate::train::{
-    self, Examples, FittedNetwork, Layers, Options, Refinement, Trained,
+    self, Examples, FittedNetwork, Layers, Options, Refinement,
     refine::{self, LEAST_FOLDS},
 };
 
@@ -185,8 +185,8 @@ impl<'d> Judge<'d> {
     ) -> Result<Vec<Vec<f64>>> {
         let (training, test) = split(self.dataset, self.fold_of, fold);
         let start = Layers::start(&training, options)?;
-        let squares = |trained: &Trained| -> Vec<f64> {
-            let networks = trained.networks.iter().enumerate();
+        let squares = |networks: &Vec<FittedNetwork>| -> Vec<f64> {
+            let networks = networks.iter().enumerate();
             let of_row = |(row, network): (usize, &FittedNetwork)| {
                 let test = test.row_table(row);
                 let network = network.network();
@@ -200,8 +200,8 @@ impl<'d> Judge<'d> {
             let mut layers = start.clone();
             layers.hidden.iter_mut().for_each(|layer| layer.spread = *spread);
             let Some(settings) = self.refinement else {
-                let trained = train::fit_each(&training, layers, options, penalties, &Silent)?;
-                all.extend(trained.iter().map(squares));
+                let models = train::fit_each(&training, &layers, options, penalties, &Silent)?;
+                all.extend(models.iter().map(squares));
                 continue;
             };
             let others = self.fold_of.iter().filter(|f| **f != fold);
@@ -213,7 +213,7 @@ impl<'d> Judge<'d> {
                 let layers =
                     refine::refine(&training, &layers, &options, settings, examples, &Silent)?;
                 let options = settings.options(&options);
-                all.push(squares(&train::fit(&training, layers, &options, &Silent)?));
+                all.push(squares(&train::fit(&training, layers, &options, &Silent)?.networks));
             }
         }
         Ok(all)
@@ -295,10 +295,11 @@ mod tests {
         dataset.outputs.values.iter_mut().for_each(|y| *y += 0.3 * random.normal());
         let folds = block_folds(dataset.frames(), 4);
         let options = Options { centres: 1, spread: 1.0, ..Options::default() };
-        let select = |penalties: &[f64], most_steps: usize| {
+        let select = |penalties: &[f64], most_penalties: usize| {
             let penalties = penalties.iter().copied().map(Some).collect();
+            let (centres, spreads) = (vec![60], vec![0.2]);
             let candidates =
-                Candidates { centres: vec![60], spreads: vec![0.2], penalties, most_steps };
+                Candidates { centres, spreads, penalties, most_spreads: 0, most_penalties };
             cross_validate(&dataset, &folds, &candidates, &options, None, &Silent).unwrap()
         };
         let wide = select(&[1e-9, 1e-7, 1e-5, 1e-3, 1e-1], 0);
@@ -322,7 +323,8 @@ mod tests {
             centres: vec![20],
             spreads: vec![0.05, 0.2, 3.0],
             penalties: vec![None],
-            most_steps: 0,
+            most_spreads: 0,
+            most_penalties: 0,
         };
         let selection =
             cross_validate(&dataset, &folds, &candidates, &options, None, &Silent).unwrap();

@@ -370,22 +370,20 @@ pub fn fit(
     options: &Options,
     progress: &dyn Progress,
 ) -> Result<Trained> {
-    let trained = fit_each(dataset, layers, options, &[options.penalty], progress)?;
-    Ok(trained.into_iter().next().expect("one model a penalty"))
+    let mut models = fit_each(dataset, &layers, options, &[options.penalty], progress)?;
+    let networks = models.pop().expect("one model a penalty");
+    Ok(Trained { projection: layers.projection, networks })
 }
 
-/// Fits output weights as [`fit`] does, with each of `penalties` instead of the options' own: one model each. They
-/// share the decomposition of the samples.
-///
-/// # Errors
-/// As [`fit`].
-pub fn fit_each(
+/// Fits output weights as [`fit`] does, with each of `penalties` instead of the options' own: the networks of one model
+/// for each. They share the decomposition of the samples.
+pub(crate) fn fit_each(
     dataset: &Dataset,
-    layers: Layers,
+    layers: &Layers,
     options: &Options,
     penalties: &[Option<f64>],
     progress: &dyn Progress,
-) -> Result<Vec<Trained>> {
+) -> Result<Vec<Vec<FittedNetwork>>> {
     let seen = layers.seen(dataset);
     // One list of networks a row-wire, one network a penalty.
     let fit_rows = |options: &Options, penalties: &[Option<f64>]| {
@@ -410,7 +408,7 @@ pub fn fit_each(
             let direct = Options { format: Format::F32Direct, ..*options };
             networks = fit_rows(&direct, &[*penalty])?.into_iter().flatten().collect();
         }
-        models.push(Trained { projection: layers.projection.clone(), networks });
+        models.push(networks);
     }
     Ok(models)
 }

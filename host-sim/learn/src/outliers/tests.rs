@@ -162,3 +162,14 @@ fn outliers_cost_less_than_a_twentieth_of_the_error() {
         }
     }
 }
+
+#[test]
+fn missing_values_and_tables_without_outputs_are_no_obstacle() {
+    let mut data = measured(300, 1);
+    data.inputs.values.iter_mut().step_by(7).for_each(|value| *value = f64::NAN);
+    data.inputs.values[6 * 200 + 1] = -1e5;
+    let rest = Dataset { inputs: data.inputs, ..Dataset::empty(vec![], vec![], 1, 0) };
+    let found = outliers(&rest).found;
+    assert_eq!(found.len(), 1);
+    assert_eq!((found[0].line, found[0].column.as_str()), (202, "ch2"));
+}

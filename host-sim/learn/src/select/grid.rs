@@ -15,9 +15,11 @@ pub struct Candidates {
     pub spreads: Vec<f64>,
     /// Penalties on squared weights, for each frame; `None` for the usual one.
     pub penalties: Vec<Option<f64>>,
-    /// Most values that spreads and penalties are extended by together, while the best one is the smallest or largest
-    /// of at least two. Numbers of centres are never extended, because a device pays for them.
-    pub most_steps: usize,
+    /// Most values that spreads are extended by, while the best one is the smallest or largest of at least two.
+    /// Numbers of centres are never extended, because a device pays for them.
+    pub most_spreads: usize,
+    /// Most values that penalties are extended by likewise.
+    pub most_penalties: usize,
 }
 
 /// Setting whose best value is the smallest or largest of those tried.
@@ -48,14 +50,16 @@ impl Candidates {
     /// Adds one value beyond the edge that the `best` candidate is at: the spread and penalty to try next. `None` if it
     /// is at no edge, the steps are used up, or nothing lies beyond.
     pub(super) fn grow(&mut self, best: &Scored) -> Option<(f64, Option<f64>)> {
-        self.most_steps = self.most_steps.checked_sub(1)?;
         let penalties = self.numbers();
-        if let Some(penalty) = best.penalty.and_then(|best| beyond(&penalties, best))
+        if self.most_penalties > 0
+            && let Some(penalty) = best.penalty.and_then(|best| beyond(&penalties, best))
             && check_penalty(penalty).is_ok()
         {
+            self.most_penalties -= 1;
             self.penalties.push(Some(penalty));
             return Some((best.spread, Some(penalty)));
         }
+        self.most_spreads = self.most_spreads.checked_sub(1)?;
         let spread = beyond(&self.spreads, best.spread)?;
         check_spread("spread", spread).ok()?;
         self.spreads.push(spread);
@@ -109,12 +113,13 @@ fn beyond(values: &[f64], best: f64) -> Option<f64> {
 mod tests {
     use super::*;
 
-    fn candidates(most_steps: usize) -> Candidates {
+    fn candidates(most: usize) -> Candidates {
         Candidates {
             centres: vec![32, 64],
             spreads: vec![0.2, 0.4, 0.8],
             penalties: [1e-8, 1e-7, 1e-6].map(Some).to_vec(),
-            most_steps,
+            most_spreads: most,
+            most_penalties: most,
         }
     }
 
@@ -124,7 +129,7 @@ mod tests {
 
     #[test]
     fn a_grid_grows_beyond_its_best_edge_one_value_at_a_time() {
-        let mut grid = candidates(3);
+        let mut grid = Candidates { most_spreads: 1, ..candidates(2) };
         let near = |(spread, penalty): (f64, Option<f64>), wanted: (f64, f64)| {
             let penalty = penalty.unwrap();
             assert!((spread / wanted.0 - 1.0).abs() < 1e-9, "{spread}");
