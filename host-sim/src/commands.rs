@@ -4,6 +4,7 @@ mod print;
 mod progress;
 mod arguments;
 mod scene_argument;
+mod data_notes;
 mod readings;
 mod data_argument;
 mod subject_argument;

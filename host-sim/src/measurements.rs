@@ -2,6 +2,7 @@
 
 use taxel_data::dataset::Dataset;
 use taxel_data::table::Table;
+use taxel_learn::outliers::Outliers;
 use taxel_learn::{Options, Origin, relative};
 
 /// Measured frames, and how a model is trained on them.
@@ -21,6 +22,9 @@ pub struct Measurements {
     pub test_readings: Table,
     /// How the test frames were chosen, in words.
     pub test_choice: String,
+    /// Values of the file that are far from all others in their column. Training frames are without them, unless they
+    /// are to be kept.
+    pub outliers: Outliers,
     /// Readings of the untouched sensor, in the readings' columns, if they are known.
     pub rest: Option<Table>,
     /// Options of training.
@@ -94,6 +98,14 @@ impl Measurements {
     #[must_use]
     pub fn origin(&self) -> Origin {
         Origin::of_data(&self.name, self.digest, self.options.seed, &self.training)
+    }
+
+    /// Names of the inputs that never change in the training frames.
+    #[must_use]
+    pub fn constant_inputs(&self) -> Vec<String> {
+        let inputs = &self.training.inputs;
+        let columns = inputs.names.iter().zip(inputs.deviations());
+        columns.filter(|(_, deviation)| *deviation == 0.0).map(|(name, _)| name.clone()).collect()
     }
 
     /// Relative noise of a reading at rest, as a fraction: the root of the mean over columns of (standard

@@ -44,6 +44,15 @@ impl Subject {
         }
     }
 
+    /// Measurements, if it is not a scene.
+    #[must_use]
+    pub fn measurements(&self) -> Option<&Measurements> {
+        match self {
+            Self::Scene(_) => None,
+            Self::Measured(data) => Some(data),
+        }
+    }
+
     /// Options for training its model.
     #[must_use]
     pub fn options(&self) -> Options {

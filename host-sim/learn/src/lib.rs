@@ -26,6 +26,7 @@ pub mod error;
 pub mod decoder;
 pub mod infer;
 pub mod relative;
+pub mod outliers;
 pub mod train;
 pub mod packing;
 pub mod prepared;

@@ -1,19 +1,24 @@
-//! Selection of K and spread by k-fold cross-validation.
+//! Selection of K, spread and ridge penalty by k-fold cross-validation.
 
 use rayon::prelude::*;
 use serde::Serialize;
 use taxel_data::BadValue;
 use taxel_data::dataset::Dataset;
 use taxel_data::progress::{Progress, Silent};
-use taxel_data::random::{Purpose, Random, Stream};
 
 use crate::decoders::{BASELINES, Baseline};
 use crate::error::Result;
 use crate::infer::{Exponential, infer};
 use crate::train::{
-    self, Examples, FittedNetwork, Layers, Options, Refinement, check_spread,
+    self, Examples, FittedNetwork, Layers, Options, Refinement,
     refine::{self, LEAST_FOLDS},
 };
+
+mod folds;
+mod grid;
+
+pub use folds::{block_folds, number_folds, random_folds, smallest_training_part};
+pub use grid::{Candidates, Edge};
 
 /// Result of one candidate on the folds that it was not trained on.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -22,6 +27,8 @@ pub struct Scored {
     pub centres: usize,
     /// Width σ on scaled inputs.
     pub spread: f64,
+    /// Penalty on squared weights for each frame ([`Options::penalty`]); `None` for the usual one.
+    pub penalty: Option<f64>,
     /// RMSE of each output over all held-out samples, in the output's unit.
     pub rmse: Vec<f64>,
     /// Mean over the outputs of RMSE/standard deviation: the quantity that selection minimises. Outputs
@@ -32,10 +39,12 @@ pub struct Scored {
 /// Results of every candidate, and the best one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Selection {
-    /// All candidates, by K and then spread.
+    /// All candidates, by K, then spread, then penalty; then those that the grid was extended by.
     pub scored: Vec<Scored>,
     /// Index in `scored` of the lowest score (the first among equals).
     pub best: usize,
+    /// Settings whose best value is the smallest or largest tried, where a better one may lie beyond.
+    pub edges: Vec<Edge>,
     /// Baselines on the same folds, for comparison.
     pub baselines: Vec<BaselineScore>,
 }
@@ -57,42 +66,12 @@ impl Selection {
     }
 }
 
-/// Assigns `frames` to `folds` at random, in equal numbers: the fold of each frame, from 0.
-#[must_use]
-pub fn random_folds(frames: usize, folds: usize, seed: u64) -> Vec<usize> {
-    let mut assigned: Vec<usize> = (0..frames).map(|i| i % folds).collect();
-    let mut random = Random::new(seed, Stream::Training, Purpose::Folds, 0, 0);
-    for i in (1..frames).rev() {
-        assigned.swap(i, random.below(i + 1)); // Fisher–Yates
-    }
-    assigned
-}
-
-/// Folds by `values`: frames with equal values share a fold; folds are numbered from 0 by ascending
-/// value.
-#[must_use]
-pub fn number_folds(values: &[f64]) -> Vec<usize> {
-    let mut distinct = values.to_vec();
-    distinct.sort_by(f64::total_cmp);
-    distinct.dedup();
-    values.iter().map(|value| distinct.partition_point(|d| d.total_cmp(value).is_lt())).collect()
-}
-
-fn training_part(fold_of: &[usize], fold: usize) -> usize {
-    fold_of.iter().filter(|f| **f != fold).count()
-}
-
-/// Number of training frames left by the largest fold.
-#[must_use]
-pub fn smallest_training_part(fold_of: &[usize]) -> usize {
-    let folds = fold_of.iter().max().map_or(0, |last| last + 1);
-    (0..folds).map(|fold| training_part(fold_of, fold)).min().unwrap_or(0)
-}
-
-/// Scores every pair of `centres` and `spreads` by cross-validation.
+/// Scores every combination of `candidates` by cross-validation.
 ///
 /// `fold_of` gives each frame's fold, numbered from 0; all other options come from `options`. With a `refinement`,
 /// spreads are where it starts, and it takes the folds that are not held out as its own.
+///
+/// A grid is extended one value at a time, at the best values of the other settings.
 ///
 /// # Errors
 /// [`Error::Setting`](crate::Error::Setting) for fewer than two folds (with a refinement, one more than
@@ -101,108 +80,166 @@ pub fn smallest_training_part(fold_of: &[usize]) -> usize {
 pub fn cross_validate(
     dataset: &Dataset,
     fold_of: &[usize],
-    centres: &[usize],
-    spreads: &[f64],
+    candidates: &Candidates,
     options: &Options,
     refinement: Option<&Refinement>,
     progress: &dyn Progress,
 ) -> Result<Selection> {
-    let folds = fold_of.iter().max().map_or(0, |last| last + 1);
-    let least = if refinement.is_some() { LEAST_FOLDS + 1 } else { 2 };
-    if folds < least {
-        let of = if refinement.is_some() { " of refined training" } else { "" };
-        let rule = format!("cross-validation{of} needs at least {least}");
-        return Err(BadValue::new("folds", folds, rule).into());
+    let judge = Judge::new(dataset, fold_of, options, refinement)?;
+    candidates.check(|options| options.check(judge.smallest_training_part()), options)?;
+    let Candidates { centres, spreads, penalties, .. } = candidates;
+    let mut scored = judge.scores(centres, spreads, penalties, progress)?;
+    let mut best = lowest(&scored)
+        .ok_or_else(|| BadValue::new("candidates", 0, "give at least one value of each setting"))?;
+    let mut grown = candidates.clone();
+    while let Some((spread, penalty)) = grown.grow(&scored[best]) {
+        let more = judge.scores(&[scored[best].centres], &[spread], &[penalty], progress)?;
+        scored.extend(more);
+        best = lowest(&scored).unwrap_or(best);
     }
-    for fold in 0..folds {
-        let training = training_part(fold_of, fold);
-        for (&centres, &spread) in centres.iter().zip(spreads.iter().cycle()) {
-            Options { centres, spread, ..*options }.check(training)?;
-        }
-    }
-    for &spread in spreads {
-        check_spread("spread", spread)?;
-    }
-    let tasks: Vec<(usize, usize)> =
-        centres.iter().flat_map(|k| (0..folds).map(move |fold| (*k, fold))).collect();
-    progress.stage("cross-validate", tasks.len());
-    let squares: Vec<Vec<Vec<f64>>> = tasks
-        .into_par_iter()
-        .map(|(k, fold)| {
-            let options = Options { centres: k, ..*options };
-            let squares = held_out_squares(dataset, fold_of, fold, spreads, &options, refinement);
-            progress.step();
-            squares
-        })
-        .collect::<Result<_>>()?;
-
-    let deviations = dataset.outputs.deviations();
-    let mut scored = Vec::new();
-    let root_mean = |squares: f64| (squares / dataset.frames() as f64).sqrt();
-    let baselines = BASELINES.iter().map(|baseline| {
-        let squares: Vec<Vec<f64>> = (0..folds)
-            .into_par_iter()
-            .map(|fold| baseline_squares(baseline, dataset, fold_of, fold))
-            .collect();
-        let rmse = |output: usize| root_mean(squares.iter().map(|fold| fold[output]).sum());
-        BaselineScore { decoder: baseline.name, rmse: (0..deviations.len()).map(rmse).collect() }
-    });
-    let baselines = baselines.collect();
-    for (k, of_folds) in centres.iter().zip(squares.chunks_exact(folds)) {
-        for (s, spread) in spreads.iter().enumerate() {
-            let rmse: Vec<f64> = (0..deviations.len())
-                .map(|output| root_mean(of_folds.iter().map(|fold| fold[s][output]).sum()))
-                .collect();
-            let relative: Vec<f64> = rmse
-                .iter()
-                .zip(&deviations)
-                .filter(|(_, deviation)| **deviation > 0.0)
-                .map(|(rmse, deviation)| rmse / deviation)
-                .collect();
-            let score = relative.iter().sum::<f64>() / relative.len().max(1) as f64;
-            scored.push(Scored { centres: *k, spread: *spread, rmse, score });
-        }
-    }
-    let best =
-        (0..scored.len()).min_by(|a, b| scored[*a].score.total_cmp(&scored[*b].score)).ok_or_else(
-            || BadValue::new("candidates", 0, "give at least one value of K and of spread"),
-        )?;
-    Ok(Selection { scored, best, baselines })
+    let edges = grown.edges(&scored[best]);
+    Ok(Selection { edges, best, scored, baselines: judge.baselines() })
 }
 
-/// Sums of squared errors on one fold, `[spread][output]`, after training on the others.
-fn held_out_squares(
-    dataset: &Dataset,
-    fold_of: &[usize],
-    fold: usize,
-    spreads: &[f64],
-    options: &Options,
-    refinement: Option<&Refinement>,
-) -> Result<Vec<Vec<f64>>> {
-    let (training, test) = split(dataset, fold_of, fold);
-    let others = fold_of.iter().filter(|f| **f != fold);
-    let inner: Vec<usize> = others.map(|f| if *f > fold { f - 1 } else { *f }).collect();
-    let start = Layers::start(&training, options)?;
-    let of_spread = |spread: &f64| {
-        let mut layers = start.clone();
-        layers.hidden.iter_mut().for_each(|layer| layer.spread = *spread);
-        let mut options = *options;
-        if let Some(settings) = refinement {
-            let examples = Examples::Folds(&inner);
-            layers = refine::refine(&training, &layers, &options, settings, examples, &Silent)?;
-            options = settings.options(&options, training.frames());
+/// Index of the lowest score, the first among equals.
+fn lowest(scored: &[Scored]) -> Option<usize> {
+    (0..scored.len()).min_by(|a, b| scored[*a].score.total_cmp(&scored[*b].score))
+}
+
+/// Frames in folds, on which candidates are judged.
+struct Judge<'d> {
+    dataset: &'d Dataset,
+    fold_of: &'d [usize],
+    folds: usize,
+    options: &'d Options,
+    refinement: Option<&'d Refinement>,
+}
+
+impl<'d> Judge<'d> {
+    fn new(
+        dataset: &'d Dataset,
+        fold_of: &'d [usize],
+        options: &'d Options,
+        refinement: Option<&'d Refinement>,
+    ) -> Result<Self> {
+        let folds = fold_of.iter().max().map_or(0, |last| last + 1);
+        let least = if refinement.is_some() { LEAST_FOLDS + 1 } else { 2 };
+        if folds < least {
+            let of = if refinement.is_some() { " of refined training" } else { "" };
+            let rule = format!("cross-validation{of} needs at least {least}");
+            return Err(BadValue::new("folds", folds, rule).into());
         }
-        let trained = train::fit(&training, layers, &options, &Silent)?;
-        let networks = trained.networks.iter().enumerate();
-        let of_row = |(row, network): (usize, &FittedNetwork)| {
-            let test = test.row_table(row);
-            let network = network.network();
-            let predicted = infer(&network, Exponential::default(), &test.inputs.values);
-            test.outputs.squared_errors(&predicted)
+        Ok(Self { dataset, fold_of, folds, options, refinement })
+    }
+
+    fn smallest_training_part(&self) -> usize {
+        smallest_training_part(self.fold_of)
+    }
+
+    /// Scores of all combinations, by K, then spread, then penalty.
+    fn scores(
+        &self,
+        centres: &[usize],
+        spreads: &[f64],
+        penalties: &[Option<f64>],
+        progress: &dyn Progress,
+    ) -> Result<Vec<Scored>> {
+        let of_k = |k: &usize| (0..self.folds).map(|fold| (*k, fold)).collect::<Vec<_>>();
+        let tasks: Vec<(usize, usize)> = centres.iter().flat_map(of_k).collect();
+        progress.stage("cross-validate", tasks.len());
+        let squares: Vec<Vec<Vec<f64>>> = tasks
+            .into_par_iter()
+            .map(|(centres, fold)| {
+                let options = Options { centres, ..*self.options };
+                let squares = self.held_out_squares(fold, spreads, penalties, &options);
+                progress.step();
+                squares
+            })
+            .collect::<Result<_>>()?;
+        let deviations = self.dataset.outputs.deviations();
+        let mut scored = Vec::new();
+        for (k, of_folds) in centres.iter().zip(squares.chunks_exact(self.folds)) {
+            let pairs = spreads.iter().flat_map(|s| penalties.iter().map(move |p| (*s, *p)));
+            for (place, (spread, penalty)) in pairs.enumerate() {
+                let sum = |output: usize| of_folds.iter().map(|fold| fold[place][output]).sum();
+                let rmse: Vec<f64> =
+                    (0..deviations.len()).map(|output| self.root_mean(sum(output))).collect();
+                let score = score(&rmse, &deviations);
+                scored.push(Scored { centres: *k, spread, penalty, rmse, score });
+            }
+        }
+        Ok(scored)
+    }
+
+    fn root_mean(&self, squares: f64) -> f64 {
+        (squares / self.dataset.frames() as f64).sqrt()
+    }
+
+    /// Sums of squared errors on one fold, `[spread · penalty][output]`, after training on the others.
+    fn held_out_squares(
+        &self,
+        fold: usize,
+        spreads: &[f64],
+        penalties: &[Option<f64>],
+        options: &Options,
+    ) -> Result<Vec<Vec<f64>>> {
+        let (training, test) = split(self.dataset, self.fold_of, fold);
+        let start = Layers::start(&training, options)?;
+        let squares = |networks: &Vec<FittedNetwork>| -> Vec<f64> {
+            let networks = networks.iter().enumerate();
+            let of_row = |(row, network): (usize, &FittedNetwork)| {
+                let test = test.row_table(row);
+                let network = network.network();
+                let predicted = infer(&network, Exponential::default(), &test.inputs.values);
+                test.outputs.squared_errors(&predicted)
+            };
+            networks.flat_map(of_row).collect()
         };
-        Ok(networks.flat_map(of_row).collect())
-    };
-    spreads.iter().map(of_spread).collect()
+        let mut all = Vec::new();
+        for spread in spreads {
+            let mut layers = start.clone();
+            layers.hidden.iter_mut().for_each(|layer| layer.spread = *spread);
+            let Some(settings) = self.refinement else {
+                let models = train::fit_each(&training, &layers, options, penalties, &Silent)?;
+                all.extend(models.iter().map(squares));
+                continue;
+            };
+            let others = self.fold_of.iter().filter(|f| **f != fold);
+            let inner: Vec<usize> = others.map(|f| if *f > fold { f - 1 } else { *f }).collect();
+            let examples = Examples::Folds(&inner);
+            for penalty in penalties {
+                // Where centres move to depends on the penalty.
+                let options = Options { penalty: *penalty, ..*options };
+                let layers =
+                    refine::refine(&training, &layers, &options, settings, examples, &Silent)?;
+                let options = settings.options(&options);
+                all.push(squares(&train::fit(&training, layers, &options, &Silent)?.networks));
+            }
+        }
+        Ok(all)
+    }
+
+    /// Baselines on the same folds.
+    fn baselines(&self) -> Vec<BaselineScore> {
+        let score = |baseline: &Baseline| {
+            let squares: Vec<Vec<f64>> = (0..self.folds)
+                .into_par_iter()
+                .map(|fold| baseline_squares(baseline, self.dataset, self.fold_of, fold))
+                .collect();
+            let rmse =
+                |output: usize| self.root_mean(squares.iter().map(|fold| fold[output]).sum());
+            let outputs = self.dataset.outputs.names.len();
+            BaselineScore { decoder: baseline.name, rmse: (0..outputs).map(rmse).collect() }
+        };
+        BASELINES.iter().map(score).collect()
+    }
+}
+
+/// Mean over the outputs of RMSE/standard deviation. Outputs that never change do not count.
+fn score(rmse: &[f64], deviations: &[f64]) -> f64 {
+    let changing = rmse.iter().zip(deviations).filter(|(_, deviation)| **deviation > 0.0);
+    let relative: Vec<f64> = changing.map(|(rmse, deviation)| rmse / deviation).collect();
+    relative.iter().sum::<f64>() / relative.len().max(1) as f64
 }
 
 /// Sums of squared errors of a baseline on one fold, `[output]`, after fitting it to the others.
@@ -227,6 +264,7 @@ fn split(dataset: &Dataset, fold_of: &[usize], fold: usize) -> (Dataset, Dataset
 #[cfg(test)]
 mod tests {
     use super::*;
+    use taxel_data::random::{Purpose, Random, Stream};
     use taxel_data::table::Table;
 
     /// Data set whose output y follows two inputs, while `constant` never changes.
@@ -249,14 +287,47 @@ mod tests {
         }
     }
 
+    /// Noisy outputs of few frames: a penalty keeps many centres from fitting the noise.
+    #[test]
+    fn a_penalty_is_chosen_where_data_are_noisy_and_the_grid_grows_to_it() {
+        let mut dataset = dataset(&["y"]).subset(&(0..150).collect::<Vec<_>>());
+        let mut random = Random::new(8, Stream::Training, Purpose::Noise, 0, 0);
+        dataset.outputs.values.iter_mut().for_each(|y| *y += 0.3 * random.normal());
+        let folds = block_folds(dataset.frames(), 4);
+        let options = Options { centres: 1, spread: 1.0, ..Options::default() };
+        let select = |penalties: &[f64], most_penalties: usize| {
+            let penalties = penalties.iter().copied().map(Some).collect();
+            let (centres, spreads) = (vec![60], vec![0.2]);
+            let candidates =
+                Candidates { centres, spreads, penalties, most_spreads: 0, most_penalties };
+            cross_validate(&dataset, &folds, &candidates, &options, None, &Silent).unwrap()
+        };
+        let wide = select(&[1e-9, 1e-7, 1e-5, 1e-3, 1e-1], 0);
+        let chosen = wide.best().penalty.unwrap();
+        assert!((1e-5..=1e-2).contains(&chosen) && wide.edges.is_empty(), "{wide:?}");
+        assert!(wide.best().score < 0.8 * wide.scored[0].score, "{wide:?}");
+        let narrow = select(&[1e-9, 1e-7], 0);
+        let edge = Edge { setting: "penalty", value: 1e-7, largest: true };
+        assert_eq!((narrow.scored.len(), narrow.edges.as_slice()), (2, &[edge][..]));
+        let grown = select(&[1e-9, 1e-7], 6);
+        assert!(grown.edges.is_empty(), "{grown:?}");
+        let grown_to = grown.best().penalty.unwrap();
+        assert!((grown_to / chosen - 1.0).abs() < 1e-9, "{grown_to} {chosen}");
+    }
+
     fn best_spread(outputs: &[&str]) -> f64 {
         let dataset = dataset(outputs);
         let folds = random_folds(dataset.frames(), 4, 1);
         let options = Options { centres: 1, spread: 1.0, ..Options::default() };
-        let spreads = [0.05, 0.2, 3.0];
-        let progress = Silent;
+        let candidates = Candidates {
+            centres: vec![20],
+            spreads: vec![0.05, 0.2, 3.0],
+            penalties: vec![None],
+            most_spreads: 0,
+            most_penalties: 0,
+        };
         let selection =
-            cross_validate(&dataset, &folds, &[20], &spreads, &options, None, &progress).unwrap();
+            cross_validate(&dataset, &folds, &candidates, &options, None, &Silent).unwrap();
         assert_eq!(selection.scored.len(), 3);
         selection.best().spread
     }
@@ -265,22 +336,5 @@ mod tests {
     fn the_better_spread_is_chosen_whatever_stands_beside() {
         assert_eq!(best_spread(&["y"]), 0.2);
         assert_eq!(best_spread(&["y", "constant"]), 0.2);
-    }
-
-    #[test]
-    fn equal_values_share_a_fold() {
-        assert_eq!(number_folds(&[7.0, -1.0, 7.0, 0.5]), [2, 0, 2, 1]);
-        assert_eq!(smallest_training_part(&[2, 0, 2, 1]), 2);
-    }
-
-    #[test]
-    fn random_folds_are_equal_in_number_and_seeded() {
-        let folds = random_folds(103, 5, 7);
-        for fold in 0..5 {
-            let count = folds.iter().filter(|f| **f == fold).count();
-            assert!((20..=21).contains(&count));
-        }
-        assert_eq!(folds, random_folds(103, 5, 7));
-        assert_ne!(folds, random_folds(103, 5, 8));
     }
 }

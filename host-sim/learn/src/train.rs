@@ -10,6 +10,7 @@ use model_core::scale::{CLAMP, HALF_RANGE, UNITS, clamp_units};
 use rayon::prelude::*;
 use taxel_data::BadValue;
 use taxel_data::dataset::{Dataset, RowTable};
+use taxel_data::error::require;
 use taxel_data::progress::Progress;
 use taxel_data::random::{Purpose, Random, Stream};
 
@@ -28,7 +29,8 @@ pub use format::FittedNetwork;
 pub use layers::{HiddenLayer, Layers};
 pub use refine::{Examples, FreshFrames, Refinement};
 
-/// Default of [`Options::initial_covariance`]: a penalty of 1e-6, too small to be felt.
+/// Initial covariance δ of the recursive least squares where no penalty is chosen. The penalty on squared weights is
+/// 1/δ for all frames together, too small to be felt.
 pub const INITIAL_COVARIANCE: f64 = 1e6;
 
 /// Factor on the spread for networks of a whole array, relative to those of a row.
@@ -46,8 +48,10 @@ pub struct Options {
     pub spread: f64,
     /// Whether the network adds an affine tail A·x.
     pub affine_tail: bool,
-    /// Initial covariance δ of the recursive least squares: the penalty on squared weights is 1/δ.
-    pub initial_covariance: f64,
+    /// Ridge penalty on squared weights, for each training frame: at 1 it is as strong as an input that is always 1,
+    /// and as strong as all activations that are fully on. `None` for the usual one: 1/[`INITIAL_COVARIANCE`] for all
+    /// frames together, or [`Refinement::ridge`] if training is refined.
+    pub penalty: Option<f64>,
     /// Seed of the K-means starts.
     pub seed: u64,
     /// Effort of the search for centres.
@@ -70,7 +74,7 @@ impl Default for Options {
             centres: 64,
             spread: 0.8,
             affine_tail: true,
-            initial_covariance: INITIAL_COVARIANCE,
+            penalty: None,
             seed: 1,
             search: kmeans::Search::default(),
             format: Format::F32,
@@ -88,6 +92,13 @@ impl Options {
             Some(rank) if self.whole_array => output_rank::check(rank, outputs),
             _ => Ok(()),
         }
+    }
+
+    /// Initial covariance δ of the recursive least squares on so many `frames`: one over the penalty on squared
+    /// weights.
+    #[must_use]
+    pub fn initial_covariance(&self, frames: usize) -> f64 {
+        self.penalty.map_or(INITIAL_COVARIANCE, |penalty| 1.0 / (penalty * frames as f64))
     }
 
     /// Checks the options against the number of training `frames`.
@@ -113,8 +124,19 @@ impl Options {
                 "only one network for the whole array has a projection to features: leave it out";
             return Err(BadValue::new("features", features, rule));
         }
+        self.penalty.map_or(Ok(()), check_penalty)?;
         check_spread("spread", self.spread)
     }
+}
+
+/// Checks a penalty on squared weights for each frame.
+///
+/// # Errors
+/// [`BadValue`] for a penalty beyond 1e-15 to 1.
+pub fn check_penalty(penalty: f64) -> std::result::Result<(), BadValue> {
+    require((1e-15..=1.0).contains(&penalty), "penalty", format!("{penalty:?}"), || {
+        "give a number from 1e-15 to 1, such as 1e-7".into()
+    })
 }
 
 /// Checks a width σ on scaled inputs; `field` names it in the message.
@@ -256,11 +278,30 @@ impl<'b> Samples<'b> {
     ///
     /// # Errors
     /// [`Error`](crate::Error) if the format does not hold the network.
+    ///
+    /// # Panics
+    /// Never: one penalty gives one network.
     pub fn fit(&self, centres: &[f64], options: &Options) -> Result<FittedNetwork> {
-        match options.output_rank {
-            Some(rank) => output_rank::fit(self, centres, rank, options),
-            None => format::fit(self, centres, options),
+        let fitted = self.fit_each(centres, options, &[options.penalty])?;
+        Ok(fitted.into_iter().next().expect("one network a penalty"))
+    }
+
+    /// Fits output weights as [`fit`](Self::fit) does, with each of `penalties` instead of the options' own.
+    fn fit_each(
+        &self,
+        centres: &[f64],
+        options: &Options,
+        penalties: &[Option<f64>],
+    ) -> Result<Vec<FittedNetwork>> {
+        let frames = self.table.inputs.len();
+        let with = |penalty: &Option<f64>| Options { penalty: *penalty, ..*options };
+        if let Some(rank) = options.output_rank {
+            let fit = |penalty| output_rank::fit(self, centres, rank, &with(penalty));
+            return penalties.iter().map(fit).collect();
         }
+        let covariances: Vec<f64> =
+            penalties.iter().map(|penalty| with(penalty).initial_covariance(frames)).collect();
+        format::fit(self, centres, options, &covariances)
     }
 }
 
@@ -302,7 +343,7 @@ pub fn train_refined(
     options.check_rank(dataset.outputs.names.len())?;
     let start = Layers::start(dataset, options)?;
     let layers = refine::refine(dataset, &start, options, settings, examples, progress)?;
-    fit(dataset, layers, &settings.options(options, dataset.frames()), progress)
+    fit(dataset, layers, &settings.options(options), progress)
 }
 
 /// Projection of `dataset`'s readings with the given `parameters`.
@@ -320,33 +361,56 @@ pub fn view<'b>(parameters: &'b [f32], dataset: &Dataset) -> Projection<'b> {
 ///
 /// # Errors
 /// [`Error`](crate::Error) for data or layers that the format does not hold.
+///
+/// # Panics
+/// Never: one penalty gives one model.
 pub fn fit(
     dataset: &Dataset,
     layers: Layers,
     options: &Options,
     progress: &dyn Progress,
 ) -> Result<Trained> {
+    let mut models = fit_each(dataset, &layers, options, &[options.penalty], progress)?;
+    let networks = models.pop().expect("one model a penalty");
+    Ok(Trained { projection: layers.projection, networks })
+}
+
+/// Fits output weights as [`fit`] does, with each of `penalties` instead of the options' own: the networks of one model
+/// for each. They share the decomposition of the samples.
+pub(crate) fn fit_each(
+    dataset: &Dataset,
+    layers: &Layers,
+    options: &Options,
+    penalties: &[Option<f64>],
+    progress: &dyn Progress,
+) -> Result<Vec<Vec<FittedNetwork>>> {
     let seen = layers.seen(dataset);
-    let fit_rows = |options: &Options| -> Result<Vec<FittedNetwork>> {
+    // One list of networks a row-wire, one network a penalty.
+    let fit_rows = |options: &Options, penalties: &[Option<f64>]| {
         let rows = layers.hidden.par_iter().enumerate();
-        rows.map(|(row, layer)| {
+        let fitted = rows.map(|(row, layer)| {
             let table = seen.row_table(row);
             let options = Options { spread: layer.spread, ..*options };
-            let fitted = Samples::new(&table).fit(&layer.centres, &options);
+            let fitted = Samples::new(&table).fit_each(&layer.centres, &options, penalties);
             progress.step();
             fitted
-        })
-        .collect()
+        });
+        fitted.collect::<Result<Vec<Vec<FittedNetwork>>>>()
     };
     progress.stage("fit weights", layers.hidden.len());
-    let mut networks = fit_rows(options)?;
-    let formats = || networks.iter().map(FittedNetwork::format);
-    if !formats().all(|format| Some(format) == formats().next()) {
-        progress.stage("fit weights with direct distances", layers.hidden.len());
-        networks = fit_rows(&Options { format: Format::F32Direct, ..*options })?;
+    let mut rows: Vec<_> = fit_rows(options, penalties)?.into_iter().map(Vec::into_iter).collect();
+    let mut models = Vec::with_capacity(penalties.len());
+    for penalty in penalties {
+        let mut networks: Vec<FittedNetwork> = rows.iter_mut().filter_map(Iterator::next).collect();
+        let formats = || networks.iter().map(FittedNetwork::format);
+        if !formats().all(|format| Some(format) == formats().next()) {
+            progress.stage("fit weights with direct distances", layers.hidden.len());
+            let direct = Options { format: Format::F32Direct, ..*options };
+            networks = fit_rows(&direct, &[*penalty])?.into_iter().flatten().collect();
+        }
+        models.push(networks);
     }
-    drop(seen);
-    Ok(Trained { projection: layers.projection, networks })
+    Ok(models)
 }
 
 /// Squared distance ‖a − b‖².

@@ -8,9 +8,13 @@ use host_sim::{Error, Result};
 use taxel_data::data_file::DataFile;
 use taxel_data::dataset::Dataset;
 use taxel_data::error::{Problem, Role};
+use taxel_learn::outliers::{self, Outliers};
 use taxel_learn::{Options, select};
 
-use super::readings;
+use super::{data_notes, readings};
+
+/// Least number of frames for each centre of the usual number of centres.
+const FRAMES_A_CENTRE: usize = 10;
 
 /// What a CSV file's columns are.
 #[derive(Args, Default)]
@@ -27,6 +31,13 @@ pub struct DataArguments {
     /// Folds, drawn at random, for cross-validation and for refinement on a CSV file [default: 5].
     #[arg(long, value_name = "N")]
     folds: Option<usize>,
+    /// Folds of successive lines of a CSV file, instead of random ones. Use them for a log: neighbouring lines resemble
+    /// each other, and random folds would judge a model by frames that it nearly knows.
+    #[arg(long, value_name = "N", conflicts_with_all = ["folds", "fold_column"])]
+    fold_blocks: Option<usize>,
+    /// Train on the lines of a CSV file that hold an outlier, too: a value far from all others in its column.
+    #[arg(long)]
+    keep_outliers: bool,
     /// CSV file with frames of the untouched sensor, whose mean is the baseline; a CSV file's --relative-inputs
     /// needs it.
     #[arg(long, value_name = "FILE")]
@@ -60,13 +71,15 @@ pub enum JudgedBy<'p> {
 impl DataArguments {
     /// Error if an option was given that is for CSV files alone.
     pub fn refuse_for_scene(&self) -> Result<()> {
-        for (option, given) in [
-            ("--inputs", self.inputs.is_some()),
-            ("--outputs", self.outputs.is_some()),
-            ("--fold-column", self.fold_column.is_some()),
+        for (option, picked, given) in [
+            ("--inputs", "columns", self.inputs.is_some()),
+            ("--outputs", "columns", self.outputs.is_some()),
+            ("--fold-column", "columns", self.fold_column.is_some()),
+            ("--fold-blocks", "lines", self.fold_blocks.is_some()),
+            ("--keep-outliers", "lines", self.keep_outliers),
         ] {
             if given {
-                let message = format!("{option} picks columns of a CSV file; a scene has its own");
+                let message = format!("{option} picks {picked} of a CSV file; a scene has its own");
                 return Err(Error::Usage(message));
             }
         }
@@ -87,8 +100,16 @@ impl DataArguments {
         self.baseline.as_deref()
     }
 
-    /// Folds of `frames`, drawn at random, as many as were asked for.
-    pub fn random_folds(&self, frames: usize, seed: u64) -> Result<Vec<usize>> {
+    /// Folds of `frames`, as many as were asked for: of successive frames, or drawn at random.
+    pub fn folds_of(&self, frames: usize, seed: u64) -> Result<Vec<usize>> {
+        if let Some(folds) = self.fold_blocks {
+            if !(2..=frames).contains(&folds) {
+                return Err(Error::Usage(format!(
+                    "--fold-blocks {folds}: give from 2 to {frames}"
+                )));
+            }
+            return Ok(select::block_folds(frames, folds));
+        }
         let folds = self.folds.unwrap_or(frames.min(5));
         if !(2..=frames).contains(&folds) {
             return Err(Error::Usage(format!("--folds {folds}: give from 2 to {frames}")));
@@ -109,7 +130,11 @@ impl DataArguments {
         let (frames, lines) = self.frames(&file)?;
         let given_folds =
             self.fold_column.as_ref().map(|name| folds_from(&file, name, &lines)).transpose()?;
-        let split = Split::of(&frames, given_folds.as_deref(), self.judged(judged, &frames)?);
+        let outliers = self.outliers(&frames, |frame| file.line_number(lines[frame]));
+        let left_out = "training (--keep-outliers keeps them)";
+        data_notes::print_outliers(&outliers, path, frames.frames(), left_out);
+        let mut split = Split::of(&frames, given_folds.as_deref(), self.judged(judged, &frames)?);
+        split.training.retain(|frame| outliers.kept.binary_search(frame).is_ok());
         if split.training.is_empty() {
             let message = "holding out frames leaves none to train on: give more, or --test FILE";
             return Err(Error::Unfit { path: path.into(), message: message.into() });
@@ -118,7 +143,7 @@ impl DataArguments {
         let fold_of = match given_folds {
             Some(folds) => split.training.iter().map(|frame| folds[*frame]).collect(),
             None if training.frames() < 2 && self.folds.is_none() => vec![0; training.frames()],
-            None => self.random_folds(training.frames(), how.seed)?,
+            None => self.folds_of(training.frames(), how.seed)?,
         };
         let rest = self.baseline.as_deref().map(|file| readings::at_rest(file, &training.inputs));
         let rest = rest.transpose()?;
@@ -128,7 +153,8 @@ impl DataArguments {
             _ => frames,
         });
         let name = path.file_stem().map_or("data".into(), |stem| stem.to_string_lossy());
-        Ok(Measurements {
+        let centres = Options::default().centres.min((training.frames() / FRAMES_A_CENTRE).max(1));
+        let measurements = Measurements {
             name: name.into_owned(),
             digest: file.digest,
             training,
@@ -136,11 +162,23 @@ impl DataArguments {
             test,
             test_readings,
             test_choice: split.choice,
+            outliers,
             rest,
-            options: Options { seed: how.seed, ..Options::default() },
+            options: Options { seed: how.seed, centres, ..Options::default() },
             refine: how.refine,
             confidence: how.confidence,
-        })
+        };
+        data_notes::print_constant(&measurements.constant_inputs(), path);
+        Ok(measurements)
+    }
+
+    /// Outliers of `frames`, which are left out unless they are to be kept.
+    fn outliers(&self, frames: &Dataset, line_number: impl Fn(usize) -> u64) -> Outliers {
+        let outliers = outliers::find(frames, line_number);
+        if !self.keep_outliers {
+            return outliers;
+        }
+        Outliers { left_out: false, kept: (0..frames.frames()).collect(), ..outliers }
     }
 
     /// Frames of `file`, and the indices of their lines.

@@ -7,8 +7,11 @@ use host_sim::{Error, Result};
 use model_core::blob::Metadata;
 use taxel_data::columns;
 use taxel_data::data_file::DataFile;
+use taxel_data::dataset::Dataset;
 use taxel_data::table::Table;
-use taxel_learn::{PreparedModel, relative};
+use taxel_learn::{PreparedModel, outliers, relative};
+
+use super::data_notes;
 
 /// Baseline of the sensor that readings are from.
 #[derive(Args)]
@@ -61,7 +64,7 @@ impl BaselineArgument {
 
 /// Readings of the untouched sensor in `file`, in the columns of `inputs`, of which every one has a mean to divide by.
 pub fn at_rest(file: &Path, inputs: &Table) -> Result<Table> {
-    let rest = table_of(&DataFile::read(file)?, inputs.names.iter().map(String::as_str))?;
+    let rest = usual_lines(file, inputs.names.iter().map(String::as_str))?;
     let missing = unusable(&Table { names: rest.names.clone(), values: rest.means() });
     if missing.is_empty() {
         return Ok(rest);
@@ -76,8 +79,19 @@ pub fn at_rest(file: &Path, inputs: &Table) -> Result<Table> {
 
 /// One line: the mean of each of the columns called `names` in `file`.
 fn baseline<'n>(file: &Path, names: impl Iterator<Item = &'n str>) -> Result<Table> {
-    let frames = table_of(&DataFile::read(file)?, names)?;
+    let frames = usual_lines(file, names)?;
     Ok(Table { values: frames.means(), names: frames.names })
+}
+
+/// Columns called `names` of the lines of `file` that hold no outlier, which would move the mean.
+fn usual_lines<'n>(file: &Path, names: impl Iterator<Item = &'n str>) -> Result<Table> {
+    let file = DataFile::read(file)?;
+    let inputs = table_of(&file, names)?;
+    let empty = Dataset::empty(vec![], vec![], 1, 0);
+    let frames = Dataset { inputs, ..empty };
+    let outliers = outliers::find(&frames, |line| file.line_number(line));
+    data_notes::print_outliers(&outliers, &file.path, frames.frames(), "the baseline");
+    Ok(frames.subset(&outliers.kept).inputs)
 }
 
 /// Names of the columns of `baseline` that no reading can be divided by.

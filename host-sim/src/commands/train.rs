@@ -5,20 +5,22 @@ use std::path::{Path, PathBuf};
 use super::progress::Terminal;
 use clap::Args;
 use host_sim::evaluate::worth::Worth;
+use host_sim::measurements::Measurements;
 use host_sim::subject::Subject;
-use host_sim::training_set::TrainingSet;
 use host_sim::{Error, Result};
 use model_core::rbf::Format;
 use serde::Serialize;
 use taxel_data::{columns, output};
-use taxel_learn::Options;
-use taxel_learn::select::{self, Selection};
-use taxel_learn::train::{Refinement, WHOLE_ARRAY_SPREAD};
+use taxel_learn::outliers::Outliers;
+use taxel_learn::select::Selection;
+use taxel_learn::train::WHOLE_ARRAY_SPREAD;
 
 use super::arguments::format;
 use super::data_argument::JudgedBy;
 use super::subject_argument::SubjectOptions;
 use super::{Common, print};
+
+mod choice;
 
 /// Train a model on a scene or a CSV file, and write its blob.
 ///
@@ -45,6 +47,11 @@ pub struct Arguments {
     /// half of that for `--whole-array`].
     #[arg(long, value_name = "S", value_delimiter = ',')]
     spread: Vec<f64>,
+    /// Ridge penalty on squared weights, for each frame: 1 is as strong as an input that is always 1. More of it
+    /// generalises better from few or noisy frames, or to another day. With --select, candidates [default: 1e-6 for all
+    /// frames together, or 1e-7 a frame if refined].
+    #[arg(long, value_name = "P", value_delimiter = ',', allow_negative_numbers = true)]
+    penalty: Vec<f64>,
     /// Train without the affine tail A·x.
     #[arg(long)]
     no_affine: bool,
@@ -63,7 +70,8 @@ pub struct Arguments {
     /// Number format of the weights [default: the scene's, or f32].
     #[arg(long, value_name = "FORMAT", value_parser = format())]
     format: Option<Format>,
-    /// Choose K and spread among the candidates by cross-validation, and print every score.
+    /// Choose K, spread and penalty among the candidates by cross-validation, and print every score. Best values at
+    /// an edge of default spreads and penalties are looked beyond; other edges are named.
     #[arg(long)]
     select: bool,
     /// Let the model tell how far off each output may be, and how novel a frame is (docs/confidence.md). Estimates stay
@@ -88,6 +96,8 @@ struct Summary {
     centres: usize,
     /// Width σ on scaled inputs; after refinement the mean over the networks.
     spread: f64,
+    /// Penalty on squared weights, for each frame; `None` for the usual one.
+    penalty: Option<f64>,
     /// Whether centres, widths and the projection were refined after K-means.
     refined: bool,
     affine_tail: bool,
@@ -104,6 +114,10 @@ struct Summary {
     selection: Option<Selection>,
     /// What the model is worth, beside the baselines.
     worth: Worth,
+    /// Values far from all others in their column; `None` for a scene.
+    outliers: Option<Outliers>,
+    /// Inputs that never change in training; a network cannot use them.
+    constant_inputs: Vec<String>,
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
@@ -123,17 +137,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     options.format = arguments.format.unwrap_or(options.format);
     if arguments.select && options.whole_array {
         return Err(Error::Usage(
-            "--select chooses K and spread for one network a row: give --centres and --spread with --whole-array"
-                .into(),
+            "--select chooses for one network a row: give --centres, --spread and --penalty with --whole-array".into(),
         ));
     }
-    let selection = if arguments.select {
-        Some(choose(arguments, &subject, &set, &mut options)?)
-    } else {
-        options.centres = one("--centres", &arguments.centres, options.centres)?;
-        options.spread = one("--spread", &arguments.spread, options.spread)?;
-        None
-    };
+    let selection = choice::choose(arguments, &subject, &set, &mut options)?;
 
     let progress = Terminal::new();
     let blob = set.blob(&options, &progress)?;
@@ -156,6 +163,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         training_frames: set.frames.frames(),
         centres: model.networks().map(|n| n.shape().centres).max().unwrap_or(0),
         spread: if set.refine { blob.spread() } else { options.spread },
+        penalty: options.penalty,
         refined: set.refine,
         affine_tail: options.affine_tail,
         output_rank: model.expansion().map(|expansion| expansion.components()),
@@ -166,6 +174,11 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         training_rmse: model.metadata().training_rmse.iter().map(f64::from).collect(),
         worth: Worth::of(&subject, &set, &blob, selection.as_ref()),
         selection,
+        outliers: subject.measurements().map(|data| data.outliers.clone()),
+        constant_inputs: subject
+            .measurements()
+            .map(Measurements::constant_inputs)
+            .unwrap_or_default(),
     };
     if common.json {
         return print::json(&summary);
@@ -200,57 +213,6 @@ fn load(arguments: &Arguments, common: &Common) -> Result<Subject> {
     Ok(subject)
 }
 
-fn one<T: Copy + std::fmt::Debug>(option: &str, given: &[T], default: T) -> Result<T> {
-    match given {
-        [] => Ok(default),
-        [value] => Ok(*value),
-        _ => Err(Error::Usage(format!("{option} {given:?}: give one value, or add --select"))),
-    }
-}
-
-fn choose(
-    arguments: &Arguments,
-    subject: &Subject,
-    set: &TrainingSet<'_>,
-    options: &mut Options,
-) -> Result<Selection> {
-    let fold_of = match subject {
-        Subject::Measured(data) => data.fold_of.clone(),
-        Subject::Scene(_) => {
-            arguments.subject.data.random_folds(set.frames.frames(), options.seed)?
-        }
-    };
-    let centres = if arguments.centres.is_empty() {
-        // K around the usual one, as far as the smallest training part allows.
-        let largest = select::smallest_training_part(&fold_of).saturating_sub(1).max(1);
-        let usual = [options.centres / 2, options.centres, options.centres * 2];
-        let mut candidates = usual.map(|k| k.clamp(1, largest)).to_vec();
-        candidates.dedup();
-        candidates
-    } else {
-        arguments.centres.clone()
-    };
-    let spreads = if arguments.spread.is_empty() && set.refine {
-        vec![options.spread]
-    } else if arguments.spread.is_empty() {
-        vec![0.2, 0.3, 0.5, 0.8, 1.2, 2.0]
-    } else {
-        arguments.spread.clone()
-    };
-    let selection = select::cross_validate(
-        &set.frames,
-        &fold_of,
-        &centres,
-        &spreads,
-        options,
-        set.refine.then(Refinement::default).as_ref(),
-        &Terminal::new(),
-    )?;
-    options.centres = selection.best().centres;
-    options.spread = selection.best().spread;
-    Ok(selection)
-}
-
 fn page_of(summary: &Summary, asked: usize) -> print::Page {
     let mut page = print::Page::default();
     if let Some(selection) = &summary.selection {
@@ -265,19 +227,16 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
             };
             groups.iter().map(|(_, members)| of_group(members)).collect::<Vec<_>>().join(" ")
         };
-        for (i, scored) in selection.scored.iter().enumerate() {
+        let settings = selection.scored.iter().map(choice::settings).collect::<Vec<_>>();
+        let width = settings.iter().map(String::len).max().unwrap_or(0);
+        for (i, (scored, settings)) in selection.scored.iter().zip(&settings).enumerate() {
             let mark = if i == selection.best { "  <- chosen" } else { "" };
-            page.line(format_args!(
-                "  K = {:<4} spread = {:<5} score {:.4}: {}{mark}",
-                scored.centres,
-                scored.spread,
-                scored.score,
-                pooled(&scored.rmse)
-            ));
+            let (score, errors) = (scored.score, pooled(&scored.rmse));
+            page.line(format_args!("  {settings:<width$} score {score:.4}: {errors}{mark}"));
         }
         for baseline in &selection.baselines {
             let label = format!("{}:", baseline.decoder);
-            page.line(format_args!("  {label:<36} {}", pooled(&baseline.rmse)));
+            page.line(format_args!("  {label:<0$} {1}", width + 14, pooled(&baseline.rmse)));
         }
     }
     page.line(format_args!(

@@ -14,6 +14,7 @@ mod gate;
 #[cfg(unix)]
 mod interruption;
 mod limit;
+mod measured;
 mod readout;
 mod recalibrate;
 mod refusals;

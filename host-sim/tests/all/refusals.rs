@@ -154,6 +154,8 @@ fn bad_training_options() {
     train(&["--centres", "2", "--spread", "0"], &["spread = 0"]);
     train(&["--centres", "2", "--spread", "nan"], &["spread = NaN"]);
     train(&["--centres", "2", "--spread", "1e-30"], &["spread = 1e-30", "f32"]);
+    train(&["--centres", "2", "--penalty", "2"], &["penalty = 2", "1e-15 to 1"]);
+    train(&["--fold-blocks", "5", "--centres", "1"], &["--fold-blocks 5", "from 2 to 4"]);
     train(&["--centres", "1,2"], &["--centres [1, 2]", "--select"]);
     train(&["--fast"], &["unexpected argument '--fast'"]);
     train(&["-n", "10"], &["-n sets a scene's frames"]);

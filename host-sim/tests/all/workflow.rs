@@ -59,6 +59,8 @@ fn columns_with_any_names_train_one_network() {
         "4,16",
         "--spread",
         "0.3,0.6",
+        "--penalty",
+        "1e-7",
         "-o",
         "m.bin",
         "--json",

@@ -4,6 +4,8 @@
 //! resulting activations. That rounding then causes no error any more; only the weights are rounded
 //! last.
 
+use std::cell::LazyCell;
+
 use model_core::expansion::Expansion;
 use model_core::rbf::{Format, Network, NetworkError, Shape, direct, expanded, fixed16};
 
@@ -130,22 +132,37 @@ impl Weights {
     }
 }
 
-/// Fits `samples` with the given `centres` (`centres × inputs`, on inputs scaled to [0, 1]).
+/// Fits `samples` with the given `centres` (`centres × inputs`, on inputs scaled to [0, 1]): one network for each of
+/// `initial_covariances`. They share one decomposition.
 ///
 /// # Errors
-/// [`Error`](crate::Error) if the format does not hold the network.
+/// [`Error`](crate::Error) if the format does not hold a network.
 pub(super) fn fit(
     samples: &Samples<'_>,
     centres: &[f64],
     options: &Options,
-) -> Result<FittedNetwork> {
+    initial_covariances: &[f64],
+) -> Result<Vec<FittedNetwork>> {
     let targets = Targets::of(&samples.table.outputs);
+    let covariances = initial_covariances.iter();
+    let direct = || direct_f32::Fit::new(samples, centres, options, &targets);
     match options.format {
-        Format::F32Direct => direct_f32::fit(samples, centres, options, &targets),
-        Format::F32 => match expanded_f32::fit(samples, centres, options, &targets) {
-            Some(fitted) => Ok(fitted),
-            None => direct_f32::fit(samples, centres, options, &targets),
-        },
-        Format::Fixed16 => fixed_point::fit(samples, centres, options, &targets),
+        Format::F32Direct => {
+            let direct = direct();
+            covariances.map(|covariance| direct.network(*covariance)).collect()
+        }
+        Format::F32 => {
+            let expanded = expanded_f32::Fit::new(samples, centres, options, &targets);
+            let direct = LazyCell::new(direct);
+            let of = |covariance: &f64| match expanded.network(*covariance) {
+                Some(fitted) => Ok(fitted),
+                None => direct.network(*covariance),
+            };
+            covariances.map(of).collect()
+        }
+        Format::Fixed16 => {
+            let fixed = fixed_point::Fit::new(samples, centres, options, &targets)?;
+            covariances.map(|covariance| fixed.network(*covariance)).collect()
+        }
     }
 }

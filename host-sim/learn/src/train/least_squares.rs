@@ -45,12 +45,58 @@ pub struct Factor {
     pub outputs: usize,
 }
 
-impl Factor {
-    /// Decomposes the samples of `design` with their `targets` (`samples × outputs`), with a
-    /// penalty of 1/`initial_covariance` on squared weights.
+/// Samples decomposed piece by piece, before a penalty is chosen: fits with several penalties share it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Decomposed {
+    pieces: Vec<Triangle>,
+    regressors: usize,
+    outputs: usize,
+}
+
+impl Decomposed {
+    /// Decomposes the samples of `design` with their `targets` (`samples × outputs`).
     ///
     /// Work: 2n² + 4n·outputs operations a sample. The result is the same on any number of threads:
     /// pieces, and the order in which they are put together, depend on the shapes alone.
+    ///
+    /// # Panics
+    /// If `outputs` is 0.
+    #[must_use]
+    pub fn new(design: &impl Design, targets: &[f64], outputs: usize) -> Self {
+        let regressors = design.regressors();
+        let samples = targets.len() / outputs;
+        let piece = piece(samples, regressors);
+        let starts: Vec<usize> = (0..samples).step_by(piece).collect();
+        let pieces = starts
+            .into_par_iter()
+            .map(|start| decompose(design, targets, outputs, start..samples.min(start + piece)))
+            .collect();
+        Self { pieces, regressors, outputs }
+    }
+
+    /// Factor of all samples, with a penalty of 1/`initial_covariance` on squared weights. It takes about an eighth
+    /// of the decomposition's work, or less.
+    ///
+    /// # Panics
+    /// If `initial_covariance` is not positive and finite.
+    #[must_use]
+    pub fn factor(&self, initial_covariance: f64) -> Factor {
+        assert!(
+            initial_covariance > 0.0 && initial_covariance.is_finite(),
+            "the initial covariance must be positive and finite"
+        );
+        let (regressors, outputs) = (self.regressors, self.outputs);
+        let mut whole = Triangle::new(regressors, outputs);
+        whole.set_diagonal(1.0 / initial_covariance.sqrt());
+        self.pieces.iter().for_each(|piece| whole.merge(piece));
+        let (root, projection) = whole.into_root_and_projection();
+        Factor { root, projection, regressors, outputs }
+    }
+}
+
+impl Factor {
+    /// Decomposes the samples of `design` with their `targets` (`samples × outputs`), with a
+    /// penalty of 1/`initial_covariance` on squared weights; see [`Decomposed`].
     ///
     /// # Panics
     /// If `initial_covariance` is not positive and finite, or `outputs` is 0.
@@ -61,23 +107,7 @@ impl Factor {
         outputs: usize,
         initial_covariance: f64,
     ) -> Self {
-        assert!(
-            initial_covariance > 0.0 && initial_covariance.is_finite(),
-            "the initial covariance must be positive and finite"
-        );
-        let n = design.regressors();
-        let samples = targets.len() / outputs;
-        let piece = piece(samples, n);
-        let starts: Vec<usize> = (0..samples).step_by(piece).collect();
-        let parts: Vec<Triangle> = starts
-            .into_par_iter()
-            .map(|start| decompose(design, targets, outputs, start..samples.min(start + piece)))
-            .collect();
-        let mut whole = Triangle::new(n, outputs);
-        whole.set_diagonal(1.0 / initial_covariance.sqrt());
-        parts.iter().for_each(|part| whole.merge(part));
-        let (root, projection) = whole.into_root_and_projection();
-        Self { root, projection, regressors: n, outputs }
+        Decomposed::new(design, targets, outputs).factor(initial_covariance)
     }
 
     /// Weights, `regressors × outputs`, by back substitution.

@@ -49,7 +49,9 @@ pub(super) fn fit(
     };
     let of_components =
         Samples { scale: samples.scale.clone(), scaled: samples.scaled.clone(), table: &table };
-    let network = format::fit(&of_components, centres, options)?;
+    let covariance = options.initial_covariance(outputs.len());
+    let mut networks = format::fit(&of_components, centres, options, &[covariance])?;
+    let network = networks.pop().expect("one network");
     Ok(network.expanded_by(expansion))
 }
 
@@ -74,7 +76,8 @@ fn expansion(samples: &Samples<'_>, centres: &[f64], rank: usize, options: &Opti
     let design = regressors.of(&samples.scaled);
     let outputs = targets.outputs();
     let deviations = &targets.deviations.values;
-    let factor = Factor::new(&design, deviations, outputs, options.initial_covariance);
+    let covariance = options.initial_covariance(samples.table.outputs.len());
+    let factor = Factor::new(&design, deviations, outputs, covariance);
     // With the triangle R of the regressors and weights W, predictions have the covariance (R·W)ᵀ·(R·W), but for their
     // number; and R·W is what the factor holds.
     let predicted = DMatrix::from_row_slice(factor.regressors, outputs, &factor.projection);

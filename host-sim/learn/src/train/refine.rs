@@ -70,7 +70,8 @@ pub struct Refinement {
     pub frames: usize,
     /// Rate of the descent at its start: about how far a number moves in a step. Inputs are scaled to [0, 1].
     pub rate: f64,
-    /// Penalty on squared weights, for each frame: also that of the weights fitted at the end.
+    /// Penalty on squared weights, for each frame, where [`Options::penalty`] gives none: also that of the weights
+    /// fitted at the end.
     pub ridge: f64,
 }
 
@@ -81,10 +82,10 @@ impl Default for Refinement {
 }
 
 impl Refinement {
-    /// Options for fitting weights to refined layers on so many `frames`: with this penalty.
+    /// Options for fitting weights to refined layers: with this penalty, if `options` give none.
     #[must_use]
-    pub fn options(&self, options: &Options, frames: usize) -> Options {
-        Options { initial_covariance: 1.0 / (self.ridge * frames as f64), ..*options }
+    pub fn options(&self, options: &Options) -> Options {
+        Options { penalty: Some(options.penalty.unwrap_or(self.ridge)), ..*options }
     }
 
     fn check(&self, examples: Examples<'_>, frames: usize) -> std::result::Result<(), BadValue> {

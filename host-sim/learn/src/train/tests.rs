@@ -156,3 +156,32 @@ fn an_offset_of_the_outputs_costs_no_more_than_f32_itself() {
         assert!(rmse <= 1.01 * without + half_an_ulp, "offset {offset}: {rmse} and {without}");
     }
 }
+
+#[test]
+fn penalties_that_share_a_decomposition_give_the_networks_that_each_gives_alone() {
+    let table = table(3000, 0.05);
+    let samples = Samples::new(&table);
+    let penalties = [None, Some(1e-9), Some(1e-5), Some(1e-2)];
+    for format in Format::ALL {
+        let options = Options { centres: 12, spread: 0.4, format, ..Options::default() };
+        let centres = samples.centres(&options, 0);
+        let together = samples.fit_each(&centres, &options, &penalties).unwrap();
+        for (penalty, fitted) in penalties.iter().zip(&together) {
+            let options = Options { penalty: *penalty, ..options };
+            assert_eq!(*fitted, samples.fit(&centres, &options).unwrap(), "{format:?} {penalty:?}");
+        }
+        assert_ne!(together[0], together[3]);
+    }
+}
+
+#[test]
+fn a_penalty_is_for_each_frame() {
+    let with = |penalty| Options { penalty, ..Options::default() };
+    assert!((with(Some(1e-7)).initial_covariance(2000) * 2e-4 - 1.0).abs() < 1e-12);
+    assert_eq!(with(None).initial_covariance(2000), INITIAL_COVARIANCE);
+    for penalty in [0.0, -1e-7, 2.0, f64::NAN] {
+        let message = with(Some(penalty)).check(1000).unwrap_err().to_string();
+        assert!(message.starts_with("penalty = "), "{message}");
+    }
+    with(Some(1e-7)).check(1000).unwrap();
+}

@@ -39,7 +39,7 @@ fn in_f64(training: &RowTable, centres: &[f64], options: &Options, test: &RowTab
         &regressors,
         &scale.apply(&training.inputs.values),
         &training.outputs,
-        options.initial_covariance,
+        options.initial_covariance(training.inputs.len()),
     );
     let mut values = vec![0.0; regressors.count()];
     let outputs = training.outputs.names.len();

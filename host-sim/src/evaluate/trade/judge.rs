@@ -59,7 +59,7 @@ impl<'s> Sets<'s> {
         let settings = Refinement::default();
         let examples = Examples::Fresh(more);
         let layers = refine::refine(self.training, &start, options, &settings, examples, progress)?;
-        Ok((layers, settings.options(options, self.training.frames())))
+        Ok((layers, settings.options(options)))
     }
 }
 

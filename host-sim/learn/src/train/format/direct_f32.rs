@@ -3,44 +3,59 @@
 use model_core::rbf::direct::Parameters;
 use model_core::rbf::{Format, Shape};
 
-use super::super::least_squares::{self, Regressors};
+use super::super::least_squares::{Decomposed, Regressors};
 use super::super::{Options, Samples};
 use super::{FittedNetwork, Targets, Weights};
 use crate::error::Result;
 
-pub(super) fn fit(
-    samples: &Samples<'_>,
-    centres: &[f64],
-    options: &Options,
-    targets: &Targets,
-) -> Result<FittedNetwork> {
-    let inputs = samples.inputs();
-    let regressors = Regressors {
-        centres,
-        inputs,
-        // The decay in f32, as the device will use it, so that weights fit the device's activations.
-        decay: f64::from((1.0 / (2.0 * options.spread * options.spread)) as f32),
-        affine_tail: options.affine_tail,
-    };
-    let weights = least_squares::fit(
-        &regressors,
-        &samples.scaled,
-        &targets.deviations,
-        options.initial_covariance,
-    );
-    let count = centres.len() / inputs;
-    let weights = Weights::split(weights, count, targets);
-    let round = |values: &[f64]| values.iter().map(|v| *v as f32).collect::<Vec<_>>();
-    let parameters = Parameters {
-        input_minimum: &round(&samples.scale.minimum),
-        input_per_span: &round(&samples.scale.per_span),
-        centres: &round(centres),
-        decay: &[regressors.decay as f32],
-        output_weights: &round(&weights.centres),
-        bias: &round(&weights.bias),
-        affine: &round(&weights.affine),
-    };
-    let shape = Shape { inputs, centres: count, outputs: targets.outputs() };
-    let words = parameters.words().collect();
-    FittedNetwork::try_new(shape, Format::F32Direct, options.affine_tail, words)
+/// Samples decomposed for this format.
+pub(super) struct Fit<'s> {
+    samples: &'s Samples<'s>,
+    targets: &'s Targets,
+    regressors: Regressors<'s>,
+    decomposed: Decomposed,
+}
+
+impl<'s> Fit<'s> {
+    pub(super) fn new(
+        samples: &'s Samples<'s>,
+        centres: &'s [f64],
+        options: &Options,
+        targets: &'s Targets,
+    ) -> Self {
+        let regressors = Regressors {
+            centres,
+            inputs: samples.inputs(),
+            // The decay in f32, as the device will use it, so that weights fit the device's activations.
+            decay: f64::from((1.0 / (2.0 * options.spread * options.spread)) as f32),
+            affine_tail: options.affine_tail,
+        };
+        let design = regressors.of(&samples.scaled);
+        let decomposed = Decomposed::new(&design, &targets.deviations.values, targets.outputs());
+        Self { samples, targets, regressors, decomposed }
+    }
+
+    /// Network whose weights have a penalty of 1/`initial_covariance`.
+    ///
+    /// # Errors
+    /// [`Error`](crate::Error) if the format does not hold the network.
+    pub(super) fn network(&self, initial_covariance: f64) -> Result<FittedNetwork> {
+        let Regressors { centres, inputs, affine_tail, .. } = self.regressors;
+        let count = centres.len() / inputs;
+        let weights = self.decomposed.factor(initial_covariance).weights();
+        let weights = Weights::split(weights, count, self.targets);
+        let round = |values: &[f64]| values.iter().map(|v| *v as f32).collect::<Vec<_>>();
+        let parameters = Parameters {
+            input_minimum: &round(&self.samples.scale.minimum),
+            input_per_span: &round(&self.samples.scale.per_span),
+            centres: &round(centres),
+            decay: &[self.regressors.decay as f32],
+            output_weights: &round(&weights.centres),
+            bias: &round(&weights.bias),
+            affine: &round(&weights.affine),
+        };
+        let shape = Shape { inputs, centres: count, outputs: self.targets.outputs() };
+        let words = parameters.words().collect();
+        FittedNetwork::try_new(shape, Format::F32Direct, affine_tail, words)
+    }
 }

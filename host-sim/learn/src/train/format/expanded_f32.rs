@@ -1,10 +1,12 @@
 //! Fit of networks in f32 with expanded distances, where their rounding is proved harmless.
 
+use std::cell::OnceCell;
+
 use model_core::rbf::expanded::{CENTRES_AT_ONCE, Parameters};
 use model_core::rbf::{Format, Network, Shape};
 use model_core::scale::{HALF_RANGE, UNITS};
 
-use super::super::least_squares::{Factor, Regressors};
+use super::super::least_squares::{Decomposed, Regressors};
 use super::super::{CentredScale, Options, Samples};
 use super::{FittedNetwork, Targets, Weights};
 use crate::infer::{Exponential, infer};
@@ -26,35 +28,61 @@ const HOPELESS: f64 = 2.0 * HARMLESS;
 /// One unit of inputs, in spans of the training range.
 const UNIT: f64 = HALF_RANGE as f64 / UNITS as f64;
 
-/// Fits a network, or returns `None` if its rounding is not proved harmless.
-///
-/// That is so if an exponent could leave its range, or the [bound](rounding_bounds) of an output exceeds
-/// a tenth of its training RMSE.
-pub(super) fn fit(
-    samples: &Samples<'_>,
-    centres: &[f64],
-    options: &Options,
-    targets: &Targets,
-) -> Option<FittedNetwork> {
-    let rounded = Rounded::new(samples, centres, options);
-    let scaled = rounded.scale.apply(samples.table);
-    let all = &targets.deviations;
-    // A first fit finds most unsuitable networks in an eighth of the time.
-    if all.len() >= FEW * SAMPLES_A_WEIGHT * rounded.regressors(options).count() {
-        let deviations = every(&all.values, targets.outputs());
-        let scaled = every(&scaled, samples.inputs());
-        let few = rounded.network(&scaled, &deviations, targets, options)?;
-        if worst_share(&few, samples.table) > HOPELESS {
-            return None;
-        }
+/// Samples decomposed for this format.
+pub(super) struct Fit<'s> {
+    samples: &'s Samples<'s>,
+    targets: &'s Targets,
+    rounded: Rounded,
+    scaled: Vec<f64>,
+    /// Decomposition of one in [`FEW`] samples; `None` where samples are too few for that.
+    few: Option<Decomposed>,
+    all: OnceCell<Decomposed>,
+}
+
+impl<'s> Fit<'s> {
+    pub(super) fn new(
+        samples: &'s Samples<'s>,
+        centres: &[f64],
+        options: &Options,
+        targets: &'s Targets,
+    ) -> Self {
+        let rounded = Rounded::new(samples, centres, options);
+        let scaled = rounded.scale.apply(samples.table);
+        let all = &targets.deviations;
+        // A first fit finds most unsuitable networks in an eighth of the time.
+        let first = all.len() >= FEW * SAMPLES_A_WEIGHT * rounded.regressors().count();
+        let few = first.then(|| {
+            let deviations = every(&all.values, targets.outputs());
+            rounded.decompose(&every(&scaled, samples.inputs()), &deviations, targets)
+        });
+        Self { samples, targets, rounded, scaled, few, all: OnceCell::new() }
     }
-    let fitted = rounded.network(&scaled, &all.values, targets, options)?;
-    (worst_share(&fitted, samples.table) <= HARMLESS).then_some(fitted)
+
+    /// Network whose weights have a penalty of 1/`initial_covariance`, or `None` if its rounding is not proved
+    /// harmless.
+    ///
+    /// That is so if an exponent could leave its range, or the [bound](rounding_bounds) of an output exceeds
+    /// a tenth of its training RMSE.
+    pub(super) fn network(&self, initial_covariance: f64) -> Option<FittedNetwork> {
+        let Self { samples, targets, rounded, .. } = self;
+        if let Some(few) = &self.few {
+            let few = rounded.network(few, targets, initial_covariance)?;
+            if worst_share(&few, samples.table) > HOPELESS {
+                return None;
+            }
+        }
+        let all = self
+            .all
+            .get_or_init(|| rounded.decompose(&self.scaled, &targets.deviations.values, targets));
+        let fitted = rounded.network(all, targets, initial_covariance)?;
+        (worst_share(&fitted, samples.table) <= HARMLESS).then_some(fitted)
+    }
 }
 
 /// Centres and width, rounded.
 struct Rounded {
     inputs: usize,
+    affine_tail: bool,
     scale: CentredScale,
     decay: f32,
     /// Parameters b and a of every centre, K' of them.
@@ -85,32 +113,35 @@ impl Rounded {
             }
             line[0] = -(f64::from(decay) * square) as f32;
         }
-        Self { inputs, scale, decay, exponents, centres: rounded }
+        let affine_tail = options.affine_tail;
+        Self { inputs, affine_tail, scale, decay, exponents, centres: rounded }
     }
 
-    fn regressors(&self, options: &Options) -> Regressors<'_> {
+    fn regressors(&self) -> Regressors<'_> {
         Regressors {
             centres: &self.centres,
             inputs: self.inputs,
             decay: f64::from(self.decay) * core::f64::consts::LN_2 / (UNIT * UNIT),
-            affine_tail: options.affine_tail,
+            affine_tail: self.affine_tail,
         }
     }
 
-    /// Network whose weights fit `scaled` inputs to `deviations`, or `None` if an exponent could leave
-    /// its range.
+    /// Decomposes samples with `scaled` inputs, whose targets are `deviations`.
+    fn decompose(&self, scaled: &[f64], deviations: &[f64], targets: &Targets) -> Decomposed {
+        let regressors = self.regressors();
+        Decomposed::new(&regressors.of(scaled), deviations, targets.outputs())
+    }
+
+    /// Network whose weights fit the `decomposed` samples, or `None` if an exponent could leave its range.
     fn network(
         &self,
-        scaled: &[f64],
-        deviations: &[f64],
+        decomposed: &Decomposed,
         targets: &Targets,
-        options: &Options,
+        initial_covariance: f64,
     ) -> Option<FittedNetwork> {
         let (inputs, outputs) = (self.inputs, targets.outputs());
         let count = self.centres.len() / inputs;
-        let regressors = self.regressors(options);
-        let design = regressors.of(scaled);
-        let factor = Factor::new(&design, deviations, outputs, options.initial_covariance);
+        let factor = decomposed.factor(initial_covariance);
         let mut weights = Weights::split(factor.weights(), count, targets);
         // The tail acts on inputs about their middle.
         for row in weights.affine.chunks_exact_mut(outputs) {
@@ -131,7 +162,7 @@ impl Rounded {
         };
         let shape = Shape { inputs, centres: count, outputs };
         let words = parameters.words().collect();
-        FittedNetwork::try_new(shape, Format::F32, options.affine_tail, words).ok()
+        FittedNetwork::try_new(shape, Format::F32, self.affine_tail, words).ok()
     }
 }
 
@@ -297,12 +328,13 @@ mod tests {
             let centres = samples.centres(&options, 3);
             let targets = Targets::of(&table.outputs);
             let rounded = Rounded::new(&samples, &centres, &options);
-            let regressors = rounded.regressors(&options).count();
+            let regressors = rounded.regressors().count();
             let all = &targets.deviations;
             assert!(all.len() >= FEW * SAMPLES_A_WEIGHT * regressors);
             let scaled = rounded.scale.apply(&table);
             let share = |scaled: &[f64], deviations: &[f64]| {
-                let fitted = rounded.network(scaled, deviations, &targets, &options).unwrap();
+                let decomposed = rounded.decompose(scaled, deviations, &targets);
+                let fitted = rounded.network(&decomposed, &targets, 1e6).unwrap();
                 worst_share(&fitted, &table)
             };
             let few = share(&every(&scaled, 18), &every(&all.values, targets.outputs()));

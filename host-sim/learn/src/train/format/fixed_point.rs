@@ -15,7 +15,7 @@ use model_core::rbf::{Format, NetworkError, Shape};
 use model_core::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP, clamp_steps};
 use taxel_data::BadValue;
 
-use super::super::least_squares::{Design, Factor};
+use super::super::least_squares::{Decomposed, Design, Factor};
 use super::super::{CentredScale, Options, Samples, squared_distance};
 use super::{FittedNetwork, Targets};
 use crate::error::{Error, Result};
@@ -229,27 +229,49 @@ impl Rounded {
     }
 }
 
-pub(super) fn fit(
-    samples: &Samples<'_>,
-    centres: &[f64],
-    options: &Options,
-    targets: &Targets,
-) -> Result<FittedNetwork> {
-    let outputs = targets.outputs();
-    let exponents = Exponents::new(samples, centres, options, outputs)?;
-    let shape = exponents.shape;
-    let without_weights = exponents.words(None);
-    let refused = |cause| Error::NotHeld { format: Format::Fixed16, cause };
-    let design = FixedDesign {
-        network: Network::try_new(shape, false, &without_weights).map_err(refused)?,
-        steps: exponents.scale.units(samples.table).map(clamp_steps).collect(),
-        affine: options.affine_tail,
-    };
-    let factor =
-        Factor::new(&design, &targets.deviations.values, outputs, options.initial_covariance);
-    let rounded = round(&factor, &exponents, targets, options.affine_tail)?;
-    let words = exponents.words(Some(&rounded));
-    FittedNetwork::try_new(shape, Format::Fixed16, options.affine_tail, words)
+/// Samples decomposed for this format.
+pub(super) struct Fit<'s> {
+    targets: &'s Targets,
+    exponents: Exponents,
+    affine_tail: bool,
+    decomposed: Decomposed,
+}
+
+impl<'s> Fit<'s> {
+    /// Decomposes `samples` with the given `centres`.
+    ///
+    /// # Errors
+    /// [`Error`] if the format does not hold the Gaussians.
+    pub(super) fn new(
+        samples: &Samples<'_>,
+        centres: &[f64],
+        options: &Options,
+        targets: &'s Targets,
+    ) -> Result<Self> {
+        let outputs = targets.outputs();
+        let exponents = Exponents::new(samples, centres, options, outputs)?;
+        let without_weights = exponents.words(None);
+        let refused = |cause| Error::NotHeld { format: Format::Fixed16, cause };
+        let design = FixedDesign {
+            network: Network::try_new(exponents.shape, false, &without_weights).map_err(refused)?,
+            steps: exponents.scale.units(samples.table).map(clamp_steps).collect(),
+            affine: options.affine_tail,
+        };
+        let decomposed = Decomposed::new(&design, &targets.deviations.values, outputs);
+        Ok(Self { targets, exponents, affine_tail: options.affine_tail, decomposed })
+    }
+
+    /// Network whose weights have a penalty of 1/`initial_covariance`.
+    ///
+    /// # Errors
+    /// [`Error`] if the format does not hold the network.
+    pub(super) fn network(&self, initial_covariance: f64) -> Result<FittedNetwork> {
+        let (exponents, affine) = (&self.exponents, self.affine_tail);
+        let factor = self.decomposed.factor(initial_covariance);
+        let rounded = round(&factor, exponents, self.targets, affine)?;
+        let words = exponents.words(Some(&rounded));
+        FittedNetwork::try_new(exponents.shape, Format::Fixed16, affine, words)
+    }
 }
 
 /// Rounds the solution of `factor`, with the finest scale that each output's weights and sums fit.

@@ -72,7 +72,7 @@ fn no_other_directions_fit_better() {
         let of_components =
             RowTable { outputs: components(block, 6, &table.outputs), ..table.clone() };
         let samples = Samples { table: &of_components, ..samples.clone() };
-        let fitted = format::fit(&samples, &centres, &options).unwrap();
+        let fitted = samples.fit(&centres, &Options { output_rank: None, ..options }).unwrap();
         let inferred =
             crate::infer::infer(&fitted.network(), Exponential::default(), &table.inputs.values);
         let predicted = expand(Expansion::new(6, outputs, block).unwrap(), &inferred);

@@ -55,7 +55,7 @@ impl Descent {
             floor_at_most: width::floor_at_most(options.format, layer.spread),
             format: options.format,
             ranges,
-            ridge: settings.ridge,
+            ridge: options.penalty.unwrap_or(settings.ridge),
         }
     }
 

@@ -1,0 +1,175 @@
+use taxel_data::progress::Silent;
+use taxel_data::random::{Purpose, Random, Stream};
+
+use super::*;
+use crate::decoders::linear;
+use crate::packing::{Origin, pack};
+use crate::train::{Options, train};
+use crate::{Decoder as _, Exponential};
+
+/// Readings of six channels and two outputs that follow them, in so many lines.
+fn measured(lines: usize, seed: u64) -> Dataset {
+    let mut random = Random::new(seed, Stream::Training, Purpose::Noise, 0, 0);
+    let names = |name: &str, count: usize| (1..=count).map(|i| format!("{name}{i}")).collect();
+    let mut data = Dataset::empty(names("ch", 6), names("f", 2), 1, lines);
+    let frames =
+        data.inputs.values.chunks_exact_mut(6).zip(data.outputs.values.chunks_exact_mut(2));
+    for (inputs, outputs) in frames {
+        let (x, y) = (random.unit(), random.unit());
+        for (channel, value) in inputs.iter_mut().enumerate() {
+            let phase = channel as f64;
+            *value = 40.0 + 9.0 * (2.0 * x + phase).sin() + 5.0 * (3.0 * y - phase).cos();
+            *value += 0.05 * random.normal();
+        }
+        outputs.copy_from_slice(&[x, 2.0 * y - x]);
+    }
+    data
+}
+
+/// Log at rest but for `pressed`: lines in which some channels and the force are up.
+fn log(lines: usize, pressed: impl Fn(usize) -> bool) -> Dataset {
+    let mut random = Random::new(4, Stream::Training, Purpose::Noise, 0, 0);
+    let names = |name: &str, count: usize| (1..=count).map(|i| format!("{name}{i}")).collect();
+    let mut data = Dataset::empty(names("ch", 4), names("f", 1), 1, lines);
+    let frames = data.inputs.values.chunks_exact_mut(4).zip(&mut data.outputs.values);
+    for (line, (inputs, force)) in frames.enumerate() {
+        *force = if pressed(line) { 1.0 + random.unit() } else { 0.001 * random.normal() };
+        for (channel, value) in inputs.iter_mut().enumerate() {
+            let reacts = channel == line % 4;
+            *value = 100.0 + if reacts { 50.0 * *force } else { 0.0 } + 0.02 * random.normal();
+        }
+    }
+    data
+}
+
+fn outliers(data: &Dataset) -> Outliers {
+    find(data, |frame| frame as u64 + 2)
+}
+
+fn assert_none(data: &Dataset) {
+    let outliers = outliers(data);
+    assert_eq!(outliers.found, [], "{} lines", data.frames());
+    assert_eq!(outliers.kept.len(), data.frames());
+    assert!(!outliers.left_out);
+}
+
+#[test]
+fn data_without_outliers_keeps_every_line() {
+    for lines in [1, 5, 25, 100, 1000, 3000] {
+        assert_none(&measured(lines, 1));
+    }
+}
+
+#[test]
+fn a_wild_line_is_named_and_left_out() {
+    let mut data = measured(3000, 1);
+    data.inputs.values[6 * 1500..6 * 1501].fill(1e6);
+    let outliers = outliers(&data);
+    assert_eq!((outliers.found.len(), outliers.lines, outliers.left_out), (6, 1, true));
+    let first = &outliers.found[0];
+    assert_eq!((first.line, first.column.as_str(), first.value), (1502, "ch1", 1e6));
+    assert!(first.usual[0] > 20.0 && first.usual[1] < 60.0, "{:?}", first.usual);
+    assert_eq!(outliers.kept.len(), 2999);
+    assert!(!outliers.kept.contains(&1500));
+}
+
+#[test]
+fn outliers_of_any_size_and_on_both_sides_are_found() {
+    let mut data = measured(3000, 1);
+    for (line, value) in [(10, 1e3), (20, 1e4), (30, 1e6), (40, -1e6), (50, -1e3)] {
+        data.inputs.values[6 * line] = value;
+    }
+    data.outputs.values[2 * 60] = -40.0;
+    let lines: Vec<u64> = outliers(&data).found.iter().map(|outlier| outlier.line).collect();
+    assert_eq!(lines, [12, 22, 32, 42, 52, 62]);
+}
+
+#[test]
+fn rare_presses_of_a_log_at_rest_are_no_outliers() {
+    assert_none(&log(3000, |line| line % 100 == 0));
+    assert_none(&log(400, |line| line % 100 == 0));
+    assert_none(&log(20_000, |line| line % 600 == 0));
+    assert_none(&log(20_000, |line| (7000..7200).contains(&line)));
+}
+
+#[test]
+fn a_broken_wire_is_found_in_a_log_at_rest() {
+    let mut data = log(3000, |line| line % 100 == 0);
+    data.inputs.values[4 * 77 + 2] = 1000.0;
+    let found = outliers(&data).found;
+    assert_eq!(found.len(), 1);
+    assert_eq!((found[0].line, found[0].column.as_str()), (79, "ch3"));
+}
+
+#[test]
+fn a_channel_that_is_constant_but_for_one_line_counts_that_line() {
+    let mut data = measured(500, 1);
+    data.inputs.values.iter_mut().step_by(6).for_each(|value| *value = 77.0);
+    assert_none(&data);
+    data.inputs.values[6 * 123] = 77.5;
+    let outliers = outliers(&data);
+    assert_eq!(outliers.found.len(), 1);
+    assert_eq!((outliers.found[0].line, outliers.found[0].usual), (125, [77.0, 77.0]));
+    assert_eq!(data.subset(&outliers.kept).inputs.ranges()[0], [77.0, 77.0]);
+}
+
+#[test]
+fn two_clusters_are_no_outliers() {
+    let mut data = measured(1000, 1);
+    let column = data.inputs.values.iter_mut().step_by(6);
+    column.enumerate().filter(|(line, _)| line % 10 < 3).for_each(|(_, value)| *value += 1e5);
+    assert_none(&data);
+}
+
+#[test]
+fn lines_that_are_too_many_for_outliers_are_reported_and_kept() {
+    let mut data = measured(1000, 1);
+    for line in 0..12 {
+        data.inputs.values[6 * (80 * line) + line % 6] = 1e4;
+    }
+    let outliers = outliers(&data);
+    assert_eq!((outliers.found.len(), outliers.lines, outliers.left_out), (12, 12, false));
+    assert_eq!(outliers.kept.len(), 1000);
+}
+
+/// RMSE on `test` of a network and of the linear decoder, trained on what is kept of `training`.
+fn errors(training: &Dataset, test: &Dataset) -> [f64; 2] {
+    let kept = training.subset(&outliers(training).kept);
+    let options = Options { centres: 20, spread: 0.5, ..Options::default() };
+    let trained = train(&kept, &options, &Silent).unwrap();
+    let blob = pack(&trained, &kept, &Origin::of_data("data", 0, 1, &kept)).unwrap();
+    let network = blob.prepare(Exponential::default()).decode_lines(&test.inputs.values);
+    let linear = linear::fit(&kept).decode_all(&test.inputs.values, 1).values;
+    [network, linear].map(|predicted| {
+        let squares: f64 = test.outputs.squared_errors(&predicted).iter().sum();
+        (squares / test.outputs.values.len() as f64).sqrt()
+    })
+}
+
+#[test]
+fn outliers_cost_less_than_a_twentieth_of_the_error() {
+    let (clean, test) = (measured(3000, 1), measured(1000, 2));
+    let at_best = errors(&clean, &test);
+    let mut wild = clean.clone();
+    wild.inputs.values[6 * 1500..6 * 1501].fill(1e6);
+    let mut open = clean.clone();
+    (0..15).for_each(|i| open.inputs.values[6 * (200 * i + 7) + i % 6] = 1000.0);
+    let mut output = clean.clone();
+    output.outputs.values[2 * 99] = 1e5;
+    for data in [wild, open, output] {
+        for (error, best) in errors(&data, &test).into_iter().zip(at_best) {
+            assert!((error / best - 1.0).abs() < 0.05, "{error} {best}");
+        }
+    }
+}
+
+#[test]
+fn missing_values_and_tables_without_outputs_are_no_obstacle() {
+    let mut data = measured(300, 1);
+    data.inputs.values.iter_mut().step_by(7).for_each(|value| *value = f64::NAN);
+    data.inputs.values[6 * 200 + 1] = -1e5;
+    let rest = Dataset { inputs: data.inputs, ..Dataset::empty(vec![], vec![], 1, 0) };
+    let found = outliers(&rest).found;
+    assert_eq!(found.len(), 1);
+    assert_eq!((found[0].line, found[0].column.as_str()), (202, "ch2"));
+}

@@ -1,0 +1,78 @@
+//! Folds of measured frames, for cross-validation and for refinement.
+
+use taxel_data::random::{Purpose, Random, Stream};
+
+/// Assigns `frames` to `folds` at random, in equal numbers: the fold of each frame, from 0.
+#[must_use]
+pub fn random_folds(frames: usize, folds: usize, seed: u64) -> Vec<usize> {
+    let mut assigned: Vec<usize> = (0..frames).map(|i| i % folds).collect();
+    let mut random = Random::new(seed, Stream::Training, Purpose::Folds, 0, 0);
+    for i in (1..frames).rev() {
+        assigned.swap(i, random.below(i + 1)); // Fisher–Yates
+    }
+    assigned
+}
+
+/// Assigns `frames` to `folds` in their order, in equal numbers: the first ones to fold 0, and so on.
+///
+/// Neighbours of a log resemble each other. With random folds each held-out frame has neighbours in training, so that
+/// errors look smaller than they are on a new log; with blocks only the ends of a block have any.
+#[must_use]
+pub fn block_folds(frames: usize, folds: usize) -> Vec<usize> {
+    (0..frames).map(|frame| frame * folds / frames).collect()
+}
+
+/// Folds by `values`: frames with equal values share a fold; folds are numbered from 0 by ascending
+/// value.
+#[must_use]
+pub fn number_folds(values: &[f64]) -> Vec<usize> {
+    let mut distinct = values.to_vec();
+    distinct.sort_by(f64::total_cmp);
+    distinct.dedup();
+    values.iter().map(|value| distinct.partition_point(|d| d.total_cmp(value).is_lt())).collect()
+}
+
+/// Number of frames outside `fold`.
+fn training_part(fold_of: &[usize], fold: usize) -> usize {
+    fold_of.iter().filter(|f| **f != fold).count()
+}
+
+/// Number of training frames left by the largest fold.
+#[must_use]
+pub fn smallest_training_part(fold_of: &[usize]) -> usize {
+    let folds = fold_of.iter().max().map_or(0, |last| last + 1);
+    (0..folds).map(|fold| training_part(fold_of, fold)).min().unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_are_equal_in_number_and_follow_one_another() {
+        assert_eq!(block_folds(7, 3), [0, 0, 0, 1, 1, 2, 2]);
+        let folds = block_folds(1003, 5);
+        assert!(folds.is_sorted());
+        for fold in 0..5 {
+            let count = folds.iter().filter(|f| **f == fold).count();
+            assert!((200..=201).contains(&count));
+        }
+    }
+
+    #[test]
+    fn equal_values_share_a_fold() {
+        assert_eq!(number_folds(&[7.0, -1.0, 7.0, 0.5]), [2, 0, 2, 1]);
+        assert_eq!(smallest_training_part(&[2, 0, 2, 1]), 2);
+    }
+
+    #[test]
+    fn random_folds_are_equal_in_number_and_seeded() {
+        let folds = random_folds(103, 5, 7);
+        for fold in 0..5 {
+            let count = folds.iter().filter(|f| **f == fold).count();
+            assert!((20..=21).contains(&count));
+        }
+        assert_eq!(folds, random_folds(103, 5, 7));
+        assert_ne!(folds, random_folds(103, 5, 8));
+    }
+}

@@ -1,0 +1,117 @@
+//! Notes on what measured data hold, on stderr.
+
+use std::path::Path;
+
+use taxel_data::columns;
+use taxel_learn::outliers::{Outlier, Outliers};
+
+/// Most lines with outliers that are named.
+const MOST_NAMED: usize = 5;
+
+/// Names the `outliers` of the file at `path`, which has so many usable `lines`, and says what they are `left_out` of.
+pub fn print_outliers(outliers: &Outliers, path: &Path, lines: usize, left_out: &str) {
+    notes_on_outliers(outliers, &path.display().to_string(), lines, left_out)
+        .iter()
+        .for_each(|note| eprintln!("{note}"));
+}
+
+/// Names the columns of the file at `path` that never change.
+pub fn print_constant(columns: &[String], path: &Path) {
+    if let Some(note) = note_on_constant(columns, &path.display().to_string()) {
+        eprintln!("{note}");
+    }
+}
+
+fn notes_on_outliers(outliers: &Outliers, name: &str, lines: usize, left_out: &str) -> Vec<String> {
+    if outliers.found.is_empty() {
+        return vec![];
+    }
+    let count = match outliers.lines {
+        1 => format!("1 of {lines} lines of {name} holds"),
+        count => format!("{count} of {lines} lines of {name} hold"),
+    };
+    let done = if outliers.left_out {
+        format!("left out of {left_out}")
+    } else {
+        "used all the same: check them, and mend or remove the lines".into()
+    };
+    let mut notes =
+        vec![format!("note: {count} a value far from all others of its column; {done}:")];
+    let of_lines = outliers.found.chunk_by(|a, b| a.line == b.line);
+    notes.extend(of_lines.take(MOST_NAMED).map(name_line));
+    if outliers.lines > MOST_NAMED {
+        notes.push(format!("  and {} more lines", outliers.lines - MOST_NAMED));
+    }
+    notes
+}
+
+/// Names the first outlier of a line, and counts the others.
+fn name_line(outliers: &[Outlier]) -> String {
+    let Outlier { line, column, value, usual: [low, high] } = &outliers[0];
+    let more = match outliers.len() {
+        1 => String::new(),
+        2 => ", and 1 more column".into(),
+        count => format!(", and {} more columns", count - 1),
+    };
+    format!("  line {line}: {column} = {value}, where others are {low} to {high}{more}")
+}
+
+fn note_on_constant(constant: &[String], name: &str) -> Option<String> {
+    let which = match constant.len() {
+        0 => return None,
+        1 => format!("{} never changes", constant[0]),
+        count => format!("{count} inputs never change: {}", columns::some_names(constant)),
+    };
+    Some(format!(
+        "note: {which} in {name}; the model ignores what never changed in training, whatever it does later"
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn outliers(lines: &[u64], left_out: bool) -> Outliers {
+        let outlier = |line: &u64| Outlier {
+            line: *line,
+            column: "ch1".into(),
+            value: 1e6,
+            usual: [20.5, 60.0],
+        };
+        let mut distinct = lines.to_vec();
+        distinct.dedup();
+        let found = lines.iter().map(outlier).collect();
+        Outliers { found, lines: distinct.len(), left_out, kept: vec![] }
+    }
+
+    #[test]
+    fn outliers_are_named_by_line_and_column_and_then_counted() {
+        assert_eq!(notes_on_outliers(&outliers(&[], false), "m.csv", 100, "training"), [""; 0]);
+        let notes = notes_on_outliers(&outliers(&[7, 7, 7], true), "m.csv", 100, "training");
+        assert!(notes[0].starts_with("note: 1 of 100 lines of m.csv holds a value"), "{notes:?}");
+        assert!(notes[0].contains("left out of training"));
+        let named = "  line 7: ch1 = 1000000, where others are 20.5 to 60, and 2 more columns";
+        assert_eq!(notes[1..], [named]);
+        let notes = notes_on_outliers(
+            &outliers(&[1, 2, 3, 4, 5, 6, 7, 8], false),
+            "m.csv",
+            100,
+            "training",
+        );
+        assert!(
+            notes[0].contains("8 of 100 lines of m.csv hold") && notes[0].contains("check them")
+        );
+        assert_eq!((notes.len(), notes[6].as_str()), (7, "  and 3 more lines"));
+    }
+
+    #[test]
+    fn columns_that_never_change_are_named() {
+        assert_eq!(note_on_constant(&[], "m.csv"), None);
+        let note = |names: &[&str]| {
+            let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
+            note_on_constant(&names, "m.csv").unwrap()
+        };
+        assert!(note(&["ch3"]).starts_with("note: ch3 never changes in m.csv"));
+        assert!(note(&["ch3", "ch4"]).starts_with("note: 2 inputs never change: ch3, ch4 in"));
+    }
+}

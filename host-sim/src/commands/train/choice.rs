@@ -1,0 +1,140 @@
+//! Centres, spread and penalty: as given, or chosen among candidates by cross-validation.
+
+use host_sim::subject::Subject;
+use host_sim::training_set::TrainingSet;
+use host_sim::{Error, Result};
+use taxel_learn::Options;
+use taxel_learn::select::{self, Candidates, Edge, Scored, Selection};
+use taxel_learn::train::Refinement;
+
+use super::Arguments;
+use crate::commands::progress::Terminal;
+
+/// Spreads that are tried for centres of K-means. Refinement moves the width itself.
+const SPREADS: [f64; 6] = [0.2, 0.3, 0.5, 0.8, 1.2, 2.0];
+/// Penalties that are tried for centres of K-means, besides the usual one.
+const PENALTIES: [f64; 6] = [1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5];
+/// Most values beyond these grids that are tried.
+const MOST_STEPS: usize = 4;
+
+/// Sets `options` as the `arguments` say; with `--select` by cross-validation, which is returned.
+pub fn choose(
+    arguments: &Arguments,
+    subject: &Subject,
+    set: &TrainingSet<'_>,
+    options: &mut Options,
+) -> Result<Option<Selection>> {
+    let usual = Options::default().centres;
+    if arguments.centres.is_empty() && subject.scene().is_none() && options.centres < usual {
+        let (frames, centres) = (set.frames.frames(), options.centres);
+        eprintln!(
+            "note: {frames} lines are few for {usual} centres, so {centres} are the default, one for ten lines; \
+             choose with --centres"
+        );
+    }
+    if !arguments.select {
+        options.centres = one("--centres", &arguments.centres)?.unwrap_or(options.centres);
+        options.spread = one("--spread", &arguments.spread)?.unwrap_or(options.spread);
+        options.penalty = one("--penalty", &arguments.penalty)?.or(options.penalty);
+        return Ok(None);
+    }
+    let fold_of = match subject {
+        Subject::Measured(data) => data.fold_of.clone(),
+        Subject::Scene(_) => arguments.subject.data.folds_of(set.frames.frames(), options.seed)?,
+    };
+    let selection = select::cross_validate(
+        &set.frames,
+        &fold_of,
+        &candidates(arguments, &fold_of, set.refine, options),
+        options,
+        set.refine.then(Refinement::default).as_ref(),
+        &Terminal::new(),
+    )?;
+    let best = selection.best();
+    (options.centres, options.spread) = (best.centres, best.spread);
+    options.penalty = best.penalty;
+    selection.edges.iter().for_each(|edge| eprintln!("note: {}", beyond(edge)));
+    Ok(Some(selection))
+}
+
+/// The one value of an option, if it was given.
+fn one<T: Copy + std::fmt::Debug>(option: &str, given: &[T]) -> Result<Option<T>> {
+    match given {
+        [] => Ok(None),
+        [value] => Ok(Some(*value)),
+        _ => Err(Error::Usage(format!("{option} {given:?}: give one value, or add --select"))),
+    }
+}
+
+/// Candidates as given, and usual ones for the rest. Only grids of usual ones grow.
+fn candidates(
+    arguments: &Arguments,
+    fold_of: &[usize],
+    refine: bool,
+    options: &Options,
+) -> Candidates {
+    let centres = if arguments.centres.is_empty() {
+        // K around the usual one, as far as the smallest training part allows.
+        let largest = select::smallest_training_part(fold_of).saturating_sub(1).max(1);
+        let usual = [options.centres / 2, options.centres, options.centres * 2];
+        let mut candidates = usual.map(|k| k.clamp(1, largest)).to_vec();
+        candidates.dedup();
+        candidates
+    } else {
+        arguments.centres.clone()
+    };
+    let usual_spreads = arguments.spread.is_empty();
+    let spreads = match (usual_spreads, refine) {
+        (false, _) => arguments.spread.clone(),
+        (true, true) => vec![options.spread],
+        (true, false) => SPREADS.to_vec(),
+    };
+    let usual_penalties = arguments.penalty.is_empty();
+    let penalties = match (usual_penalties, refine) {
+        (false, _) => arguments.penalty.iter().copied().map(Some).collect(),
+        (true, true) => vec![options.penalty],
+        (true, false) => {
+            [options.penalty].into_iter().chain(PENALTIES.map(Some)).collect::<Vec<_>>()
+        }
+    };
+    let most_steps = |usual: bool| if usual && !refine { MOST_STEPS } else { 0 };
+    Candidates {
+        centres,
+        spreads,
+        penalties,
+        most_spreads: most_steps(usual_spreads),
+        most_penalties: most_steps(usual_penalties),
+    }
+}
+
+/// A candidate's settings, for people.
+pub fn settings(scored: &Scored) -> String {
+    let Scored { centres, spread, penalty, .. } = scored;
+    let penalty = penalty.map_or(String::new(), |penalty| format!(" penalty = {penalty:.0e}"));
+    format!("K = {centres:<4} spread = {spread:<5}{penalty}")
+}
+
+/// Note on a best value at an edge.
+fn beyond(edge: &Edge) -> String {
+    let Edge { setting, value, largest } = edge;
+    let (which, more) = if *largest { ("largest", "larger") } else { ("smallest", "smaller") };
+    let value = if *setting == "penalty" { format!("{value:e}") } else { value.to_string() };
+    format!(
+        "the best {setting}, {value}, is the {which} that was tried: try {more} ones (--{setting})"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_edge_is_named_with_its_option() {
+        let edge = Edge { setting: "centres", value: 128.0, largest: true };
+        let note =
+            "the best centres, 128, is the largest that was tried: try larger ones (--centres)";
+        assert_eq!(beyond(&edge), note);
+        let edge = Edge { setting: "penalty", value: 1e-9, largest: false };
+        assert!(beyond(&edge).contains("1e-9, is the smallest"));
+    }
+}

@@ -1,0 +1,113 @@
+//! What `train` makes of measured data as they are: outliers, few lines, columns that never change.
+
+use crate::common::Folder;
+
+fn json(text: &str) -> serde_json::Value {
+    serde_json::from_str(text).unwrap_or_else(|e| panic!("{e}: {text}"))
+}
+
+/// Lines of two channels and an output that follows them.
+fn lines(count: usize) -> Vec<[f64; 3]> {
+    let line = |i: usize| {
+        let (a, b) = ((i * 37 % 101) as f64 / 101.0, (i * 53 % 97) as f64 / 97.0);
+        [40.0 + 10.0 * a, 60.0 - 5.0 * b, (3.0 * a).sin() + b]
+    };
+    (0..count).map(line).collect()
+}
+
+fn write(folder: &Folder, name: &str, lines: &[[f64; 3]]) {
+    let line = |[a, b, y]: &[f64; 3]| format!("{a},{b},{y}\n");
+    folder.write(name, format!("a,b,y\n{}", lines.iter().map(line).collect::<String>()));
+}
+
+/// Trains on a file and returns stdout and stderr.
+fn train(folder: &Folder, name: &str, more: &[&str]) -> (String, String) {
+    let usual = ["train", name, "--inputs", "a,b", "--outputs", "y", "--no-refine", "-o", "m.bin"];
+    let output = folder.run(&[&usual[..], more].concat());
+    let [stdout, stderr] = [output.stdout, output.stderr].map(|b| String::from_utf8(b).unwrap());
+    assert!(output.status.success(), "{stderr}");
+    (stdout, stderr)
+}
+
+#[test]
+fn outliers_are_named_left_out_and_listed_in_json() {
+    let folder = Folder::new("measured-outliers");
+    let clean = lines(400);
+    write(&folder, "clean.csv", &clean);
+    let mut wild = clean.clone();
+    wild[99] = [1e6, 1e6, 0.5];
+    wild[299][2] = -500.0;
+    write(&folder, "wild.csv", &wild);
+
+    let (_, notes) = train(&folder, "clean.csv", &["--centres", "8"]);
+    assert!(!notes.contains("far from all others"), "{notes}");
+    let (printed, notes) = train(&folder, "wild.csv", &["--centres", "8", "--json"]);
+    assert!(notes.contains("2 of 400 lines of wild.csv hold a value far"), "{notes}");
+    assert!(notes.contains("line 101: a = 1000000, where others are 40 to"), "{notes}");
+    assert!(notes.contains("line 301: y = -500"), "{notes}");
+    let summary = json(&printed);
+    assert_eq!(summary["training_frames"], 398);
+    assert_eq!(summary["outliers"]["found"][1]["column"], "b");
+    assert_eq!(summary["outliers"]["lines"], 2);
+
+    let rmse = |name: &str, more: &[&str]| {
+        train(&folder, name, &[&["--centres", "8"], more].concat());
+        let evaluated = json(&folder.succeed(&["eval", "m.bin", "clean.csv", "--json"]));
+        evaluated["errors"][0]["rmse"].as_f64().unwrap()
+    };
+    let (of_clean, of_wild) = (rmse("clean.csv", &[]), rmse("wild.csv", &[]));
+    assert!((of_wild / of_clean - 1.0).abs() < 0.05, "{of_wild} {of_clean}");
+    assert!(rmse("wild.csv", &["--keep-outliers"]) > 2.0 * of_clean);
+}
+
+#[test]
+fn few_lines_get_few_centres_and_say_so() {
+    let folder = Folder::new("measured-few");
+    write(&folder, "few.csv", &lines(50));
+    let (printed, notes) = train(&folder, "few.csv", &["--json"]);
+    assert_eq!(json(&printed)["centres"], 5);
+    assert!(notes.contains("50 lines are few for 64 centres") && notes.contains("--centres"));
+    let (_, notes) = train(&folder, "few.csv", &["--centres", "5"]);
+    assert!(!notes.contains("are few"), "{notes}");
+    write(&folder, "many.csv", &lines(640));
+    let (_, notes) = train(&folder, "many.csv", &["--format", "fixed16"]);
+    assert!(!notes.contains("are few"), "{notes}");
+}
+
+#[test]
+fn a_column_that_never_changes_is_named() {
+    let folder = Folder::new("measured-constant");
+    let mut constant = lines(60);
+    constant.iter_mut().for_each(|line| line[1] = 7.0);
+    write(&folder, "constant.csv", &constant);
+    write(&folder, "changing.csv", &lines(60));
+    let (printed, notes) = train(&folder, "constant.csv", &["--json"]);
+    assert!(notes.contains("note: b never changes in constant.csv"), "{notes}");
+    assert_eq!(json(&printed)["constant_inputs"], serde_json::json!(["b"]));
+    let (_, notes) = train(&folder, "changing.csv", &[]);
+    assert!(!notes.contains("never changes"), "{notes}");
+}
+
+#[test]
+fn selection_prints_penalties_and_names_the_edge() {
+    let folder = Folder::new("measured-select");
+    write(&folder, "log.csv", &lines(200));
+    let select = |more: &[&str]| {
+        train(&folder, "log.csv", &[&["--select", "--fold-blocks", "4", "--json"], more].concat())
+    };
+    let given = ["--centres", "4,8", "--spread", "0.5", "--penalty", "1e-3,1e-2,1e-1"];
+    let (printed, notes) = select(&given);
+    let summary = json(&printed);
+    assert_eq!(summary["selection"]["scored"].as_array().unwrap().len(), 6);
+    assert_eq!((&summary["penalty"], &summary["centres"]), (&1e-3.into(), &8.into()));
+    assert!(notes.contains("the best penalty, 1e-3, is the smallest that was tried"), "{notes}");
+    assert!(notes.contains("the best centres, 8, is the largest that was tried"), "{notes}");
+    let (_, notes) = select(&["--centres", "8", "--spread", "0.5", "--penalty", "1e-7"]);
+    assert!(!notes.contains("that was tried"), "{notes}");
+    let refused = folder.run(&["train", "press", "--fold-blocks", "3", "-o", "m.bin"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(
+        String::from_utf8_lossy(&refused.stderr)
+            .contains("--fold-blocks picks lines of a CSV file")
+    );
+}
