@@ -30,6 +30,8 @@ pub mod link;
 
 use host_sim::Error;
 
+pub use print::begin;
+
 /// Options of every command.
 #[derive(clap::Args)]
 pub struct Common {

@@ -45,9 +45,34 @@ enum Command {
     Link(link::Arguments),
 }
 
+impl Command {
+    /// Name of the command, as it is typed.
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Run(_) => "run",
+            Self::Synth(_) => "synth",
+            Self::Forward(_) => "forward",
+            Self::Train(_) => "train",
+            Self::Decode(_) => "decode",
+            Self::Eval(_) => "eval",
+            Self::Inspect(_) => "inspect",
+            Self::Table1(_) => "table1",
+            Self::Trade(_) => "trade",
+            Self::Readout(_) => "readout",
+            Self::Gate(_) => "gate",
+            Self::Drift(_) => "drift",
+            Self::Limit(_) => "limit",
+            Self::Confidence(_) => "confidence",
+            Self::Emulate(_) => "emulate",
+            Self::Link(_) => "link",
+        }
+    }
+}
+
 fn main() -> ExitCode {
     let cli = Cli::parse();
     let command = cli.command.unwrap_or_else(|| Command::Run(run::Arguments::default()));
+    commands::begin(command.name());
     let outcome = match command {
         Command::Run(arguments) => run::execute(&arguments, &cli.common),
         Command::Synth(arguments) => synth::execute(&arguments, &cli.common),

@@ -27,7 +27,7 @@ pub struct Arguments {
 struct Summary {
     format_version: u8,
     name: String,
-    crc_32: String,
+    model_crc: String,
     scene_digest: String,
     rows: usize,
     inputs_per_row: usize,
@@ -124,7 +124,7 @@ fn summarise(blob: &ModelBlob) -> Result<Summary> {
     Ok(Summary {
         format_version: model_core::blob::FORMAT_VERSION,
         name: metadata.name.into(),
-        crc_32: format!("{:08x}", model.crc()),
+        model_crc: format!("{:08x}", model.crc()),
         scene_digest: format!("{:016x}", metadata.scene_digest),
         rows: shape.rows,
         inputs_per_row: shape.inputs,
@@ -205,7 +205,7 @@ const SHOWN: usize = 24;
 fn page_of(s: &Summary) -> print::Page {
     let mut page = print::Page::default();
     let mut line = |label: &str, value: String| page.line(format_args!("{label:<17} {value}"));
-    line("model", format!("{:?}, format {}, CRC-32 {}", s.name, s.format_version, s.crc_32));
+    line("model", format!("{:?}, format {}, CRC-32 {}", s.name, s.format_version, s.model_crc));
     line("trained on", format!("{} frames, digest {}", s.training_frames, s.scene_digest));
     let noise = match s.noise_kind.as_str() {
         "none" => "none added".to_owned(),

@@ -2,6 +2,8 @@
 
 use std::fmt::{Display, Write as _};
 use std::io::Write as _;
+use std::sync::OnceLock;
+use std::time::Instant;
 
 use host_sim::by_depth::DepthErrors;
 use host_sim::metrics::{Definition, Errors};
@@ -36,11 +38,47 @@ fn to_stdout(text: &str) -> Result<()> {
     }
 }
 
-/// Prints `value` as JSON.
-pub fn json(value: &impl Serialize) -> Result<()> {
-    let text = serde_json::to_string_pretty(value)
-        .map_err(|cause| Error::Failed(format!("cannot write JSON: {cause}")))?;
-    to_stdout(&(text + "\n"))
+/// Command that runs, and when it began.
+static BEGUN: OnceLock<(&'static str, Instant)> = OnceLock::new();
+
+/// Notes that `command` begins, for what [`json`] says of it.
+pub fn begin(command: &'static str) {
+    // A program runs one command.
+    let _ = BEGUN.set((command, Instant::now()));
+}
+
+/// Result of a command with what all of them say (docs/json.md).
+#[derive(Serialize)]
+struct Document<'r, R> {
+    version: &'static str,
+    command: &'static str,
+    /// Time since the command began; `None` in files, which are the same whenever they are written.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    seconds: Option<f64>,
+    #[serde(flatten)]
+    result: &'r R,
+}
+
+/// Result as JSON for a file.
+pub fn json_text(result: &impl Serialize) -> Result<String> {
+    document(result, false)
+}
+
+fn document(result: &impl Serialize, timed: bool) -> Result<String> {
+    let &(command, begun) = BEGUN.get_or_init(|| ("", Instant::now()));
+    let document = Document {
+        version: env!("CARGO_PKG_VERSION"),
+        command,
+        seconds: timed.then(|| begun.elapsed().as_secs_f64()),
+        result,
+    };
+    let text = serde_json::to_string_pretty(&document);
+    Ok(text.map_err(|cause| Error::Failed(format!("cannot write JSON: {cause}")))? + "\n")
+}
+
+/// Prints the result of the command as JSON.
+pub fn json(result: &impl Serialize) -> Result<()> {
+    to_stdout(&document(result, true)?)
 }
 
 /// Adds one line a decoder and group, under a header of definitions.

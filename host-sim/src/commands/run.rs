@@ -64,9 +64,8 @@ fn run_into(folder: &Path, scene: &Experiment, inputs: &[&Path], common: &Common
 fn write_files(folder: &Path, result: &RunResult, blob: &ModelBlob) -> Result<Vec<&'static str>> {
     let mut files = vec!["model.bin", "metrics.json"];
     output::write_bytes(&folder.join("model.bin"), blob.bytes())?;
-    let metrics = serde_json::to_vec_pretty(result)
-        .map_err(|cause| Error::Failed(format!("cannot write JSON: {cause}")))?;
-    output::write_bytes(&folder.join("metrics.json"), &metrics)?;
+    let metrics = print::json_text(result)?;
+    output::write_bytes(&folder.join("metrics.json"), metrics.as_bytes())?;
     if let Some(table) = &result.table1 {
         table.write_csv(&folder.join("table1.csv"))?;
         files.push("table1.csv");

@@ -240,12 +240,11 @@ fn distinct<T: Copy + PartialOrd + std::fmt::Display>(
 }
 
 fn write_files(folder: &Path, trade: &Trade) -> Result<()> {
-    let json = serde_json::to_string_pretty(trade)
-        .map_err(|cause| Error::Failed(format!("cannot write JSON: {cause}")))?;
+    let json = print::json_text(trade)?;
     let csv = csv_of(trade);
     let texts = [
         ("trade.csv", csv),
-        ("trade.json", json + "\n"),
+        ("trade.json", json),
         ("trade.svg", report::trade_svg(trade)),
         ("trade.html", report::trade_html(trade)),
     ];

@@ -91,7 +91,7 @@ pub struct Arguments {
 struct Summary {
     file: PathBuf,
     blob_bytes: usize,
-    blob_crc: String,
+    model_crc: String,
     training_frames: usize,
     centres: usize,
     /// Width σ on scaled inputs; after refinement the mean over the networks.
@@ -113,6 +113,7 @@ struct Summary {
     training_rmse: Vec<f64>,
     selection: Option<Selection>,
     /// What the model is worth, beside the baselines.
+    #[serde(flatten)]
     worth: Worth,
     /// Values far from all others in their column; `None` for a scene.
     outliers: Option<Outliers>,
@@ -159,7 +160,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let summary = Summary {
         file: arguments.output.clone(),
         blob_bytes: blob.bytes().len(),
-        blob_crc: format!("{:08x}", model.crc()),
+        model_crc: format!("{:08x}", model.crc()),
         training_frames: set.frames.frames(),
         centres: model.networks().map(|n| n.shape().centres).max().unwrap_or(0),
         spread: if set.refine { blob.spread() } else { options.spread },
@@ -243,7 +244,7 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         "{}: {} bytes, CRC-32 {}, {}, K = {}{}, spread = {}{}, affine tail: {}, {} frames{}{}",
         summary.file.display(),
         summary.blob_bytes,
-        summary.blob_crc,
+        summary.model_crc,
         summary.formats.first().unwrap_or(&""),
         summary.centres,
         summary.output_rank.map_or(String::new(), |rank| format!(", rank {rank}")),

@@ -5,7 +5,7 @@ use firmware::link::message::{Identity, Memory, ModelIdentity};
 use model_core::Wires;
 use model_core::blob::{Columns, Model, ModelShape};
 use model_core::checksum::CRC_32;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 /// Identity that a device reports.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -22,7 +22,8 @@ pub struct DeviceIdentity {
     pub outputs: usize,
     /// Name of the exponential that it decodes with.
     pub kernel: String,
-    /// Active model, if there is one.
+    /// Active model, if there is one; checksums are text in JSON, as hexadecimal digits.
+    #[serde(serialize_with = "model_with_text")]
     pub model: Option<ModelIdentity>,
     /// Name of its scene or data set, cut after 40 bytes.
     pub model_name: String,
@@ -32,6 +33,40 @@ pub struct DeviceIdentity {
     pub chunk_bytes: usize,
     /// Use of its flash and RAM.
     pub memory: Memory,
+}
+
+/// Serialises a model's identity with checksums as text: programs read large numbers as floats, which round them.
+#[expect(clippy::ref_option, reason = "serde passes a reference")]
+fn model_with_text<S: Serializer>(
+    model: &Option<ModelIdentity>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct WithText {
+        model_crc: String,
+        slot: u8,
+        generation: u32,
+        rows: u8,
+        inputs: u16,
+        outputs: u16,
+        in_ram: bool,
+        scene_digest: String,
+        inputs_crc: String,
+        outputs_crc: String,
+    }
+    let with_text = model.map(|model| WithText {
+        model_crc: format!("{:08x}", model.crc_32),
+        slot: model.slot,
+        generation: model.generation,
+        rows: model.rows,
+        inputs: model.inputs,
+        outputs: model.outputs,
+        in_ram: model.in_ram,
+        scene_digest: format!("{:016x}", model.scene_digest),
+        inputs_crc: format!("{:08x}", model.inputs_crc_32),
+        outputs_crc: format!("{:08x}", model.outputs_crc_32),
+    });
+    with_text.serialize(serializer)
 }
 
 impl DeviceIdentity {

@@ -35,8 +35,8 @@ struct Summary {
     /// Root mean square errors on the last presses, in training errors of each output.
     error_before: f32,
     error_after: f32,
-    /// CRC-32 of the model that is active now.
-    model: u32,
+    /// CRC-32 of the model that is active now, in hexadecimal.
+    model_crc: String,
 }
 
 pub fn execute<W: Wire>(
@@ -85,21 +85,21 @@ pub fn execute<W: Wire>(
 
 fn conclude<W: Wire>(device: &mut Device<W>, outcome: Outcome, common: &Common) -> Result<()> {
     let Outcome { report, unusable } = outcome;
-    let model = device.identify()?.model.map_or(0, |model| model.crc_32);
+    let model_crc = format!("{:08x}", device.identify()?.model.map_or(0, |model| model.crc_32));
     let summary = Summary {
         presses: report.presses,
         presses_unusable: unusable,
         networks: report.networks,
         error_before: report.error_before,
         error_after: report.error_after,
-        model,
+        model_crc: model_crc.clone(),
     };
     if common.json {
         return print::json(&summary);
     }
     let mut page = print::Page::default();
     page.line(format_args!(
-        "The device has mended its model: {model:08x} is active, also after a restart. `undo` returns to the previous one."
+        "The device has mended its model: {model_crc} is active, also after a restart. `undo` returns to the previous one."
     ));
     page.line(format_args!(
         "{:<17} {} used, {unusable} unusable (a reading missing, or far out of range)",
