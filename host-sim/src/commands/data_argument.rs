@@ -10,20 +10,26 @@ use taxel_data::dataset::Dataset;
 use taxel_data::error::{Problem, Role};
 use taxel_learn::{Options, select};
 
+use super::data_file::DataFileArguments;
 use super::readings;
 
 /// What a CSV file's columns are.
 #[derive(Args, Default)]
 pub struct DataArguments {
-    /// Reading columns of a CSV file: names with * and ?, comma-separated [default: r*c*_ohm].
+    /// Reading columns of a data file: names with * and ?, and ranges such as c2..c16, comma-separated [default:
+    /// r*c*_ohm].
     #[arg(long, value_name = "GLOB")]
     inputs: Option<String>,
-    /// Output columns of a CSV file [default: r*e*_d?_mm, r*e*_f?_n and contact_*].
+    /// Output columns of a data file, in the same way [default: r*e*_d?_mm, r*e*_f?_n and contact_*].
     #[arg(long, value_name = "GLOB")]
     outputs: Option<String>,
     /// Column of a CSV file that gives each line's fold (any numbers), instead of random folds.
     #[arg(long, value_name = "NAME", conflicts_with = "folds")]
     fold_column: Option<String>,
+    /// Folds that are N blocks of neighbouring lines of a data file, instead of random folds. In a log, neighbours
+    /// resemble each other: random folds make held-out errors look small.
+    #[arg(long, value_name = "N", conflicts_with_all = ["folds", "fold_column"])]
+    fold_blocks: Option<usize>,
     /// Folds, drawn at random, for cross-validation and for refinement on a CSV file [default: 5].
     #[arg(long, value_name = "N")]
     folds: Option<usize>,
@@ -31,6 +37,8 @@ pub struct DataArguments {
     /// needs it.
     #[arg(long, value_name = "FILE")]
     baseline: Option<PathBuf>,
+    #[command(flatten)]
+    pub file: DataFileArguments,
 }
 
 /// How a model is trained on a CSV file, besides its columns.
@@ -64,6 +72,7 @@ impl DataArguments {
             ("--inputs", self.inputs.is_some()),
             ("--outputs", self.outputs.is_some()),
             ("--fold-column", self.fold_column.is_some()),
+            ("--fold-blocks", self.fold_blocks.is_some()),
         ] {
             if given {
                 let message = format!("{option} picks columns of a CSV file; a scene has its own");
@@ -74,7 +83,7 @@ impl DataArguments {
             let message = "--baseline is for a CSV file; a scene synthesises its own: leave it out";
             return Err(Error::Usage(message.into()));
         }
-        Ok(())
+        self.file.refuse_for_scene()
     }
 
     /// Number of random folds, if it was given.
@@ -96,6 +105,15 @@ impl DataArguments {
         Ok(select::random_folds(frames, folds, seed))
     }
 
+    /// Folds of `frames` where no column gives them.
+    fn folds_of(&self, frames: usize, seed: u64) -> Result<Vec<usize>> {
+        let Some(blocks) = self.fold_blocks else { return self.random_folds(frames, seed) };
+        if !(2..=frames).contains(&blocks) {
+            return Err(Error::Usage(format!("--fold-blocks {blocks}: give from 2 to {frames}")));
+        }
+        Ok((0..frames).map(|frame| frame * blocks / frames).collect())
+    }
+
     /// Measurements in the CSV file at `path`.
     pub fn load(&self, path: &Path, how: HowToTrain, judged: JudgedBy<'_>) -> Result<Measurements> {
         if how.relative_inputs && self.baseline.is_none() {
@@ -105,7 +123,7 @@ impl DataArguments {
                     .into(),
             ));
         }
-        let file = DataFile::read(path)?;
+        let file = self.file.read(path)?;
         let (frames, lines) = self.frames(&file)?;
         let given_folds =
             self.fold_column.as_ref().map(|name| folds_from(&file, name, &lines)).transpose()?;
@@ -118,9 +136,12 @@ impl DataArguments {
         let fold_of = match given_folds {
             Some(folds) => split.training.iter().map(|frame| folds[*frame]).collect(),
             None if training.frames() < 2 && self.folds.is_none() => vec![0; training.frames()],
-            None => self.random_folds(training.frames(), how.seed)?,
+            None => self.folds_of(training.frames(), how.seed)?,
         };
-        let rest = self.baseline.as_deref().map(|file| readings::at_rest(file, &training.inputs));
+        let rest = self
+            .baseline
+            .as_deref()
+            .map(|path| readings::at_rest(&self.file.fields().read(path)?, &training.inputs));
         let rest = rest.transpose()?;
         let test_readings = split.test.inputs.clone();
         let [training, test] = [training, split.test].map(|frames| match &rest {
@@ -165,7 +186,7 @@ impl DataArguments {
             JudgedBy::HeldOut => return Ok(Judged::HeldOut),
             JudgedBy::File(path) => path,
         };
-        let (own, _) = self.frames(&DataFile::read(path)?)?;
+        let (own, _) = self.frames(&self.file.fields().read(path)?)?;
         let names = |frames: &Dataset| (frames.inputs.names.clone(), frames.outputs.names.clone());
         if names(&own) != names(frames) {
             let message = "its columns are not those of the frames to train on: give a file with the same columns, \
