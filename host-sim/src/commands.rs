@@ -5,6 +5,7 @@ mod progress;
 mod arguments;
 mod scene_argument;
 mod data_notes;
+mod data_file;
 mod readings;
 mod data_argument;
 mod subject_argument;
@@ -19,6 +20,7 @@ pub mod decode;
 pub mod confidence;
 pub mod eval;
 pub mod inspect;
+pub mod join;
 pub mod table1;
 pub mod trade;
 pub mod readout;
@@ -46,6 +48,7 @@ pub struct Common {
 /// Advice on options for an error that a library reported without knowing them.
 pub fn advice(error: &Error) -> &'static str {
     use taxel_data::Error as Data;
+    use taxel_data::error::Problem;
     match error {
         Error::Learn(taxel_learn::Error::OneRow { .. }) => " (--whole-array)",
         Error::Setting(bad) | Error::Learn(taxel_learn::Error::Setting(bad))
@@ -54,6 +57,13 @@ pub fn advice(error: &Error) -> &'static str {
             " (--folds or --fold-column, --no-refine)"
         }
         Error::Data(Data::Write { .. } | Data::WrittenOverInput { .. }) => " (-o)",
+        Error::Data(Data::File { problem: Problem::NoPartner { .. }, .. }) => {
+            " (--tolerance, --lag, --on)"
+        }
+        Error::Data(Data::File {
+            problem: Problem::ClockSetBack { .. } | Problem::NoTimeStamp { .. },
+            ..
+        }) => " (--on)",
         Error::Rig(taxel_rig::Error::OtherReadout { .. }) => " (--scans)",
         Error::Rig(taxel_rig::Error::NoQemu { .. } | taxel_rig::Error::NoStart { .. }) => {
             " (--qemu)"

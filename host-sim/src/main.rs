@@ -8,8 +8,8 @@ use host_sim::{Error, Result};
 mod commands;
 
 use commands::{
-    Common, confidence, decode, drift, emulate, eval, forward, gate, inspect, limit, link, readout,
-    run, synth, table1, trade, train,
+    Common, confidence, decode, drift, emulate, eval, forward, gate, inspect, join, limit, link,
+    readout, run, synth, table1, trade, train,
 };
 
 /// Simulate, train and evaluate resistive tactile sensors; write weight blobs for the device.
@@ -31,6 +31,7 @@ enum Command {
     Synth(synth::Arguments),
     Forward(forward::Arguments),
     Train(train::Arguments),
+    Join(join::Arguments),
     Decode(decode::Arguments),
     Eval(eval::Arguments),
     Inspect(inspect::Arguments),
@@ -65,6 +66,7 @@ impl Command {
             Self::Confidence(_) => "confidence",
             Self::Emulate(_) => "emulate",
             Self::Link(_) => "link",
+            Self::Join(_) => "join",
         }
     }
 }
@@ -78,6 +80,7 @@ fn main() -> ExitCode {
         Command::Synth(arguments) => synth::execute(&arguments, &cli.common),
         Command::Forward(arguments) => forward::execute(&arguments, &cli.common),
         Command::Train(arguments) => train::execute(&arguments, &cli.common),
+        Command::Join(arguments) => join::execute(&arguments, &cli.common),
         Command::Decode(arguments) => decode::execute(&arguments, &cli.common),
         Command::Eval(arguments) => eval::execute(&arguments, &cli.common),
         Command::Inspect(arguments) => inspect::execute(&arguments, &cli.common),

@@ -71,17 +71,37 @@ pub fn is_compression(group: &str) -> bool {
 }
 
 /// Indices of the columns of `header` that match `pattern`, in the header's order. A pattern is a
-/// comma-separated list of names in which `*` stands for any characters and `?` for one.
+/// comma-separated list of names in which `*` stands for any characters and `?` for one, and of ranges: `c2..c16`
+/// stands for all columns from `c2` to `c16`.
 #[must_use]
 pub fn select(header: &[String], pattern: &str) -> Vec<usize> {
-    let globs: Vec<&str> = pattern.split(',').map(str::trim).collect();
-    (0..header.len()).filter(|i| globs.iter().any(|g| matches(g, &header[*i]))).collect()
+    let mut selected: Vec<usize> =
+        pattern.split(',').flat_map(|part| part_of(header, part)).collect();
+    selected.sort_unstable();
+    selected.dedup();
+    selected
+}
+
+/// Indices of the columns of `header` that one part of a pattern stands for.
+fn part_of(header: &[String], part: &str) -> Vec<usize> {
+    let glob = part.trim();
+    let matching: Vec<usize> = (0..header.len()).filter(|i| matches(glob, &header[*i])).collect();
+    if let Some((first, last)) = glob.split_once("..")
+        && matching.is_empty()
+    {
+        let place = |name: &str| header.iter().position(|known| known == name.trim());
+        return match (place(first), place(last)) {
+            (Some(first), Some(last)) => (first..=last).collect(),
+            _ => vec![],
+        };
+    }
+    matching
 }
 
 /// First part of a comma-separated `pattern` that no column of `header` matches.
 #[must_use]
 pub fn unmatched<'p>(header: &[String], pattern: &'p str) -> Option<&'p str> {
-    pattern.split(',').map(str::trim).find(|glob| !header.iter().any(|name| matches(glob, name)))
+    pattern.split(',').map(str::trim).find(|part| part_of(header, part).is_empty())
 }
 
 /// First names of a header, as a list for messages.
@@ -136,5 +156,17 @@ mod tests {
         assert_eq!(select(&header, "ch?"), [0]);
         assert_eq!(unmatched(&header, "ch*,fy_n"), Some("fy_n"));
         assert_eq!(unmatched(&header, "ch*"), None);
+    }
+
+    #[test]
+    fn ranges_select_columns_from_one_to_another() {
+        let header = ["c1", "c2", "c3", "b.c1", "b.c2", "a..b"].map(String::from);
+        assert_eq!(select(&header, "c2..c3"), [1, 2]);
+        assert_eq!(select(&header, "b.c2, c3..b.c1,c3"), [2, 3, 4]);
+        assert_eq!(select(&header, "c1..c1"), [0]);
+        assert_eq!(select(&header, "a..b"), [5]);
+        for nothing in ["c2..c9", "c3..c2", "..", "c2.."] {
+            assert_eq!(unmatched(&header, nothing), Some(nothing));
+        }
     }
 }

@@ -14,6 +14,27 @@ use crate::output;
 const PIECE: usize = 16 * 1024;
 const PIECES: usize = 64;
 
+/// Column of a CSV file that is written: its name, and whether its numbers are those of an f32.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Column<'n> {
+    name: &'n str,
+    is_f32: bool,
+}
+
+impl<'n> Column<'n> {
+    /// Column called `name`, whose numbers read back as the same f64.
+    #[must_use]
+    pub fn f64(name: &'n str) -> Self {
+        Self { name, is_f32: false }
+    }
+
+    /// Column called `name` whose numbers were computed in f32: they get the digits that read back as the same f32.
+    #[must_use]
+    pub fn f32(name: &'n str) -> Self {
+        Self { name, is_f32: true }
+    }
+}
+
 /// Writes a CSV file: a header of `names`, then `lines`. Every number reads back as the same f64; NaN
 /// becomes an empty field.
 ///
@@ -24,10 +45,25 @@ pub fn write<'n, L: IntoIterator<Item = f64>>(
     names: impl IntoIterator<Item = &'n str>,
     lines: impl IntoIterator<Item = L>,
 ) -> Result<()> {
+    write_columns(path, names.into_iter().map(Column::f64), lines)
+}
+
+/// Writes a CSV file as [`write`] does, but with fewer digits where a column needs no more.
+///
+/// # Errors
+/// [`Error::Write`] if the file cannot be written; whatever stood at `path` then stays.
+pub fn write_columns<'n, L: IntoIterator<Item = f64>>(
+    path: &Path,
+    columns: impl IntoIterator<Item = Column<'n>>,
+    lines: impl IntoIterator<Item = L>,
+) -> Result<()> {
+    let columns: Vec<Column<'n>> = columns.into_iter().collect();
     let error = |cause| Error::write(path, cause);
     output::write_whole(path, |file| {
         let mut header = csv::Writer::from_writer(&mut *file);
-        let header_written = header.write_record(names).and_then(|()| Ok(header.flush()?));
+        let header_written = header
+            .write_record(columns.iter().map(|column| column.name))
+            .and_then(|()| Ok(header.flush()?));
         drop(header);
         header_written.map_err(|e| error(e.into()))?;
         let mut lines = lines.into_iter();
@@ -37,7 +73,7 @@ pub fn write<'n, L: IntoIterator<Item = f64>>(
             while filled < PIECES && pieces[filled].fill(&mut lines) {
                 filled += 1;
             }
-            pieces[..filled].par_iter_mut().for_each(Piece::write_text);
+            pieces[..filled].par_iter_mut().for_each(|piece| piece.write_text(&columns));
             for piece in &pieces[..filled] {
                 file.write_all(&piece.text).map_err(error)?;
             }
@@ -71,7 +107,7 @@ impl Piece {
         !self.line_ends.is_empty()
     }
 
-    fn write_text(&mut self) {
+    fn write_text(&mut self, columns: &[Column<'_>]) {
         self.text.clear();
         let mut from = 0;
         for end in &self.line_ends {
@@ -81,7 +117,8 @@ impl Piece {
                 if place > 0 {
                     self.text.push(b',');
                 }
-                write_number(&mut self.text, *value);
+                let write = if columns[place].is_f32 { write_f32 } else { write_number };
+                write(&mut self.text, *value);
             }
             if let [value] = line
                 && value.is_nan()
@@ -102,6 +139,21 @@ fn write_number(text: &mut Vec<u8>, value: f64) {
     let digits = buffer.format(value);
     if digits.contains('e') || lies_in_the_middle(value, digits) {
         let _ = write!(text, "{value}"); // a vector takes anything
+    } else {
+        text.extend_from_slice(digits.strip_suffix(".0").unwrap_or(digits).as_bytes());
+    }
+}
+
+/// Appends the shortest digits that read back as the same f32; those of the f64 if it is none.
+fn write_f32(text: &mut Vec<u8>, value: f64) {
+    let single = value as f32;
+    if f64::from(single) != value {
+        return write_number(text, value);
+    }
+    let mut buffer = zmij::Buffer::new();
+    let digits = buffer.format(single);
+    if digits.contains('e') {
+        let _ = write!(text, "{single}"); // a vector takes anything
     } else {
         text.extend_from_slice(digits.strip_suffix(".0").unwrap_or(digits).as_bytes());
     }
@@ -134,6 +186,33 @@ mod tests {
             let mut text = Vec::new();
             write_number(&mut text, value);
             assert_eq!(String::from_utf8(text).unwrap(), value.to_string());
+        }
+    }
+
+    #[test]
+    fn numbers_of_an_f32_get_its_shortest_digits() {
+        let text = |value: f64| {
+            let mut text = Vec::new();
+            write_f32(&mut text, value);
+            String::from_utf8(text).unwrap()
+        };
+        for (value, digits) in [
+            (0.007_460_668_f32, "0.007460668"),
+            (0.1, "0.1"),
+            (-3.0, "-3"),
+            (16_777_216.0, "16777216"),
+            (1e-9, "0.000000001"),
+        ] {
+            assert_eq!(text(f64::from(value)), digits);
+        }
+        assert_eq!(text(f64::NAN), "");
+        assert_eq!(text(1_743_486_221.590_758), "1743486221.590758"); // no f32
+        let mut random = Random::new(2, Stream::Test, Purpose::Damage, 0, 0);
+        for _ in 0..100_000 {
+            let value = ((random.unit() - 0.5) * 10_f64.powf(20.0 * random.unit() - 10.0)) as f32;
+            let digits = text(f64::from(value));
+            assert_eq!(digits.parse::<f32>().unwrap().to_bits(), value.to_bits());
+            assert!(digits.len() <= value.to_string().len(), "{digits} for {value}");
         }
     }
 

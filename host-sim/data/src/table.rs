@@ -22,6 +22,15 @@ impl Table {
         self.len() == 0
     }
 
+    /// Line number `line` (from 0), one value a column.
+    ///
+    /// # Panics
+    /// If the table has columns, and no such line.
+    #[must_use]
+    pub fn line(&self, line: usize) -> &[f64] {
+        &self.values[line * self.names.len()..(line + 1) * self.names.len()]
+    }
+
     /// Lines of the table in turn, each a slice of one value a column.
     pub fn lines(&self) -> std::slice::ChunksExact<'_, f64> {
         self.values.chunks_exact(self.names.len().max(1))

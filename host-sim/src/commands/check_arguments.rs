@@ -13,6 +13,7 @@ use taxel_simulate::sensor::Precision;
 use taxel_simulate::synth::BASELINE_FRAMES;
 use taxel_simulate::{Synthesis, World, synthesise};
 
+use super::data_file::FieldArguments;
 use super::progress::Terminal;
 use super::readings::{BaselineArgument, model_inputs};
 use super::scene_argument::{DEFAULT_SCENE, SceneArgument};
@@ -111,7 +112,8 @@ impl CheckArguments {
         let model = ModelBlob::read(path)?;
         let file = DataFile::read(Path::new(&self.source))?;
         let readings = model_inputs(&model.prepare(Exponential::default()), &file)?;
-        let baseline_ohm = self.baseline.values(model.parse().metadata(), path)?;
+        let baseline_ohm =
+            self.baseline.values(model.parse().metadata(), path, &FieldArguments::default())?;
         let frames = Frames { readings: readings.cycled(self.frames.max(1)), baseline_ohm };
         Ok(Checked { frames, model, world: None })
     }
@@ -146,7 +148,7 @@ impl CheckArguments {
             let session = Synthesis::of(&scene.world).drift(None);
             Some(session.baselines(Stream::Test, 1, BASELINE_FRAMES).values)
         } else {
-            self.baseline.values(metadata, path)?
+            self.baseline.values(metadata, path, &FieldArguments::default())?
         };
         let readings = synthesise(&scene.world, Stream::Test, self.frames.max(1)).inputs;
         let frames = Frames { readings, baseline_ohm };

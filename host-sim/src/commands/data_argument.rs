@@ -11,6 +11,7 @@ use taxel_data::error::{Problem, Role};
 use taxel_learn::outliers::{self, Outliers};
 use taxel_learn::{Options, select};
 
+use super::data_file::DataFileArguments;
 use super::{data_notes, readings};
 
 /// Least number of frames for each centre of the usual number of centres.
@@ -19,10 +20,11 @@ const FRAMES_A_CENTRE: usize = 10;
 /// What a CSV file's columns are.
 #[derive(Args, Default)]
 pub struct DataArguments {
-    /// Reading columns of a CSV file: names with * and ?, comma-separated [default: r*c*_ohm].
+    /// Reading columns of a data file: names with * and ?, and ranges such as c2..c16, comma-separated [default:
+    /// r*c*_ohm].
     #[arg(long, value_name = "GLOB")]
     inputs: Option<String>,
-    /// Output columns of a CSV file [default: r*e*_d?_mm, r*e*_f?_n and contact_*].
+    /// Output columns of a data file, in the same way [default: r*e*_d?_mm, r*e*_f?_n and contact_*].
     #[arg(long, value_name = "GLOB")]
     outputs: Option<String>,
     /// Column of a CSV file that gives each line's fold (any numbers), instead of random folds.
@@ -42,6 +44,8 @@ pub struct DataArguments {
     /// needs it.
     #[arg(long, value_name = "FILE")]
     baseline: Option<PathBuf>,
+    #[command(flatten)]
+    pub file: DataFileArguments,
 }
 
 /// How a model is trained on a CSV file, besides its columns.
@@ -87,7 +91,7 @@ impl DataArguments {
             let message = "--baseline is for a CSV file; a scene synthesises its own: leave it out";
             return Err(Error::Usage(message.into()));
         }
-        Ok(())
+        self.file.refuse_for_scene()
     }
 
     /// Number of random folds, if it was given.
@@ -126,7 +130,7 @@ impl DataArguments {
                     .into(),
             ));
         }
-        let file = DataFile::read(path)?;
+        let file = self.file.read(path)?;
         let (frames, lines) = self.frames(&file)?;
         let given_folds =
             self.fold_column.as_ref().map(|name| folds_from(&file, name, &lines)).transpose()?;
@@ -145,7 +149,10 @@ impl DataArguments {
             None if training.frames() < 2 && self.folds.is_none() => vec![0; training.frames()],
             None => self.folds_of(training.frames(), how.seed)?,
         };
-        let rest = self.baseline.as_deref().map(|file| readings::at_rest(file, &training.inputs));
+        let rest = self
+            .baseline
+            .as_deref()
+            .map(|path| readings::at_rest(&self.file.fields().read(path)?, &training.inputs));
         let rest = rest.transpose()?;
         let test_readings = split.test.inputs.clone();
         let [training, test] = [training, split.test].map(|frames| match &rest {
@@ -203,7 +210,7 @@ impl DataArguments {
             JudgedBy::HeldOut => return Ok(Judged::HeldOut),
             JudgedBy::File(path) => path,
         };
-        let (own, _) = self.frames(&DataFile::read(path)?)?;
+        let (own, _) = self.frames(&self.file.fields().read(path)?)?;
         let names = |frames: &Dataset| (frames.inputs.names.clone(), frames.outputs.names.clone());
         if names(&own) != names(frames) {
             let message = "its columns are not those of the frames to train on: give a file with the same columns, \

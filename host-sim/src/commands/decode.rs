@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use host_sim::{Error, Result};
 use serde::Serialize;
-use taxel_data::csv_file;
+use taxel_data::csv_file::{self, Column};
 use taxel_data::data_file::DataFile;
 use taxel_data::output;
 use taxel_data::table::Table;
@@ -13,26 +13,33 @@ use taxel_learn::infer::is_missing;
 use taxel_learn::{Exponential, ModelBlob, PreparedModel};
 
 use super::arguments::exponential;
-use super::readings::{BaselineArgument, model_inputs};
+use super::data_file::DataFileArguments;
+use super::readings::{BaselineArgument, model_inputs, table_of};
 use super::{Common, print};
 
-/// Decode readings from a CSV file, one line of estimates a line.
+/// Decode readings from a data file, one line of estimates a line.
 ///
 /// Where a reading is missing, the outputs of its row-wire are left empty. If one network decodes the whole
-/// array, all outputs of the line are.
+/// array, all outputs of the line are. Estimates are written with the digits that tell an f32 from its neighbours.
 #[derive(Args)]
 #[command(after_help = "Examples:
   host-sim decode press.bin readings.csv -o estimate.csv
   host-sim decode press.bin readings.csv --confidence -o estimate.csv
-  host-sim decode relative.bin readings.csv --baseline rest.csv -o estimate.csv")]
+  host-sim decode relative.bin readings.csv --baseline rest.csv -o estimate.csv
+  host-sim decode m.bin log.csv --keep time_s,frame -o estimate.csv")]
 pub struct Arguments {
     /// Weight blob.
     model: PathBuf,
-    /// CSV file with the model's reading columns, in any order, among others.
+    /// CSV file, .npy or .npz with the model's reading columns, in any order, among others.
     readings: PathBuf,
+    #[command(flatten)]
+    file: DataFileArguments,
     /// CSV file to write, with the model's output columns.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
+    /// Columns of the readings' file that are written too, in front of the estimates, such as the time.
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
+    keep: Vec<String>,
     /// Also write a column NAME_deviation for each output NAME, and novelty_nats, of a model with a confidence: 68 % of
     /// errors are within one deviation, and above 0 a frame is novel (docs/confidence.md).
     #[arg(long)]
@@ -56,13 +63,17 @@ struct Summary {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let baseline = arguments.baseline.baseline.as_ref().unwrap_or(&arguments.readings);
-    output::check_writable(&arguments.output, &[&arguments.model, &arguments.readings, baseline])?;
+    let joined = arguments.file.join().unwrap_or(&arguments.readings);
+    let read = [&*arguments.model, &arguments.readings, baseline, joined];
+    output::check_writable(&arguments.output, &read)?;
     let blob = ModelBlob::read(&arguments.model)?;
-    let model = arguments.baseline.apply(blob.prepare(arguments.exponential), &arguments.model)?;
-    let file = DataFile::read(&arguments.readings)?;
+    let model = blob.prepare(arguments.exponential);
+    let model = arguments.baseline.apply(model, &arguments.model, arguments.file.fields())?;
+    let file = arguments.file.read(&arguments.readings)?;
     let readings = model_inputs(&model, &file)?;
     remark_on_range(&model, &readings);
     let estimate = model.decode_table(&readings);
+    let keep = kept(&arguments.keep, &file, &estimate)?;
     let assessed = arguments.confidence.then(|| model.assess(&readings.values));
     let assessed = match assessed {
         Some(None) => {
@@ -72,7 +83,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         Some(assessed) => assessed,
         None => None,
     };
-    write(&arguments.output, &estimate, assessed.as_ref())?;
+    write(&arguments.output, &keep, &estimate, assessed.as_ref())?;
     let inputs = model.model_inputs(&readings.values);
     let frames = inputs.chunks_exact(readings.names.len());
     let incomplete = frames.filter(|frame| frame.iter().any(|v| is_missing(*v))).count();
@@ -102,20 +113,51 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     page.print()
 }
 
-/// Writes the estimates, and what was `assessed` of them: deviations and the novelty of each frame.
-fn write(path: &Path, estimate: &Table, assessed: Option<&(Vec<f64>, Vec<f64>)>) -> Result<()> {
-    let names = estimate.names.iter().cloned();
+/// Writes the columns to `keep`, the estimates, and what was `assessed` of them: deviations and the novelty of each
+/// frame.
+fn write(
+    path: &Path,
+    keep: &Table,
+    estimate: &Table,
+    assessed: Option<&(Vec<f64>, Vec<f64>)>,
+) -> Result<()> {
+    let outputs = estimate.names.len();
+    let kept = keep.names.iter().map(|name| Column::f64(name));
+    let estimated = estimate.names.iter().map(|name| Column::f32(name));
+    let lines = (0..estimate.len()).map(|line| [keep.line(line), estimate.line(line)]);
     let Some((deviations, novelty)) = assessed else {
-        let lines = estimate.lines().map(|line| line.iter().copied());
-        return Ok(csv_file::write(path, estimate.names.iter().map(String::as_str), lines)?);
+        let lines = lines.map(|parts| parts.into_iter().flatten().copied());
+        return Ok(csv_file::write_columns(path, kept.chain(estimated), lines)?);
     };
-    let of_deviations = estimate.names.iter().map(|name| format!("{name}_deviation"));
-    let names: Vec<String> = names.chain(of_deviations).chain(["novelty_nats".into()]).collect();
-    let lines = estimate.lines().zip(deviations.chunks_exact(estimate.names.len())).zip(novelty);
-    let lines = lines.map(|((values, deviations), novelty)| {
-        values.iter().chain(deviations).chain([novelty]).copied()
+    let names: Vec<String> =
+        estimate.names.iter().map(|name| format!("{name}_deviation")).collect();
+    let columns = kept.chain(estimated).chain(names.iter().map(|name| Column::f32(name)));
+    let columns = columns.chain([Column::f64("novelty_nats")]);
+    let lines = lines.zip(deviations.chunks_exact(outputs)).zip(novelty);
+    let lines = lines.map(|((parts, deviations), novelty)| {
+        parts.into_iter().flatten().chain(deviations).chain([novelty]).copied()
     });
-    Ok(csv_file::write(path, names.iter().map(String::as_str), lines)?)
+    Ok(csv_file::write_columns(path, columns, lines)?)
+}
+
+/// Columns of `file` to write in front of the `outputs`.
+fn kept(keep: &[String], file: &DataFile, outputs: &Table) -> Result<Table> {
+    let names = || keep.iter().map(|name| name.trim());
+    if let Some(name) = names().find(|name| outputs.names.iter().any(|output| output == name)) {
+        let message =
+            format!("--keep {name}: the model has an output of that name; rename the column");
+        return Err(Error::Usage(message));
+    }
+    let repeated = |place: usize| names().take(place).any(|name| name == keep[place].trim());
+    if let Some(place) = (0..keep.len()).find(|place| repeated(*place)) {
+        return Err(Error::Usage(format!("--keep {}: name each column once", keep[place])));
+    }
+    match table_of(file, names()) {
+        Err(Error::Data(taxel_data::Error::File { path, problem })) => {
+            Err(Error::Unfit { path, message: format!("{problem} (--keep)") })
+        }
+        other => other,
+    }
 }
 
 /// Share of clamped readings above which the model probably belongs to another sensor.

@@ -8,12 +8,12 @@ use host_sim::evaluate::confidence::{Coverage, coverage};
 use host_sim::metrics::{self, Errors, LimitSummary, Measure};
 use host_sim::{Error, Result};
 use serde::Serialize;
-use taxel_data::data_file::DataFile;
 use taxel_learn::{Exponential, ModelBlob};
 use taxel_limit::Refusal;
 
 use super::arguments::exponential;
 use super::confidence;
+use super::data_file::DataFileArguments;
 use super::decode::remark_on_range;
 use super::readings::{BaselineArgument, model_inputs, table_of};
 use super::{Common, print};
@@ -22,12 +22,15 @@ use super::{Common, print};
 #[derive(Args)]
 #[command(after_help = "Examples:
   host-sim eval press.bin test.csv
-  host-sim eval relative.bin test.csv --baseline rest.csv")]
+  host-sim eval relative.bin test.csv --baseline rest.csv
+  host-sim eval m.bin sensor.csv --join robot.csv --on c1 --tolerance 0.01 --missing -1 --last-share 0.2")]
 pub struct Arguments {
     /// Weight blob.
     model: PathBuf,
-    /// CSV file with the model's reading and output columns.
+    /// CSV file, .npy or .npz with the model's reading and output columns.
     data: PathBuf,
+    #[command(flatten)]
+    file: DataFileArguments,
     #[command(flatten)]
     baseline: BaselineArgument,
     /// Exponential of the activations.
@@ -56,8 +59,9 @@ struct Summary {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let blob = ModelBlob::read(&arguments.model)?;
-    let model = arguments.baseline.apply(blob.prepare(arguments.exponential), &arguments.model)?;
-    let file = DataFile::read(&arguments.data)?;
+    let model = blob.prepare(arguments.exponential);
+    let model = arguments.baseline.apply(model, &arguments.model, arguments.file.fields())?;
+    let file = arguments.file.read(&arguments.data)?;
     let readings = model_inputs(&model, &file)?;
     let metadata = model.model().metadata();
     let mut truth = table_of(&file, metadata.output_names.iter())?;

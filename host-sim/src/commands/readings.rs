@@ -13,6 +13,8 @@ use taxel_learn::{PreparedModel, outliers, relative};
 
 use super::data_notes;
 
+use super::data_file::FieldArguments;
+
 /// Baseline of the sensor that readings are from.
 #[derive(Args)]
 pub struct BaselineArgument {
@@ -23,17 +25,27 @@ pub struct BaselineArgument {
 }
 
 impl BaselineArgument {
-    /// Gives the baseline to `model`, which was read from `path`.
-    pub fn apply<'b>(&self, model: PreparedModel<'b>, path: &Path) -> Result<PreparedModel<'b>> {
-        Ok(match self.values(model.model().metadata(), path)? {
+    /// Gives the baseline to `model`, which was read from `path`. `fields` says how the baseline's file is read.
+    pub fn apply<'b>(
+        &self,
+        model: PreparedModel<'b>,
+        path: &Path,
+        fields: &FieldArguments,
+    ) -> Result<PreparedModel<'b>> {
+        Ok(match self.values(model.model().metadata(), path, fields)? {
             Some(baseline) => model.with_baseline(&baseline),
             None => model,
         })
     }
 
     /// Baseline in the readings' units, for the model with this `metadata`, which was read from `path`; `None` for a
-    /// model that needs none.
-    pub fn values(&self, metadata: &Metadata<'_>, path: &Path) -> Result<Option<Vec<f64>>> {
+    /// model that needs none. `fields` says how its file is read.
+    pub fn values(
+        &self,
+        metadata: &Metadata<'_>,
+        path: &Path,
+        fields: &FieldArguments,
+    ) -> Result<Option<Vec<f64>>> {
         let unfit =
             |message: &str| Err(Error::Unfit { path: path.into(), message: message.into() });
         match (&self.baseline, metadata.relative_inputs) {
@@ -46,7 +58,7 @@ impl BaselineArgument {
                 "its inputs are readings as they are: leave --baseline out, or train with --relative-inputs",
             ),
             (Some(file), true) => {
-                let baseline = baseline(file, metadata.input_names.iter())?;
+                let baseline = baseline(&fields.read(file)?, metadata.input_names.iter())?;
                 let missing = unusable(&baseline);
                 if !missing.is_empty() {
                     eprintln!(
@@ -63,7 +75,7 @@ impl BaselineArgument {
 }
 
 /// Readings of the untouched sensor in `file`, in the columns of `inputs`, of which every one has a mean to divide by.
-pub fn at_rest(file: &Path, inputs: &Table) -> Result<Table> {
+pub fn at_rest(file: &DataFile, inputs: &Table) -> Result<Table> {
     let rest = usual_lines(file, inputs.names.iter().map(String::as_str))?;
     let missing = unusable(&Table { names: rest.names.clone(), values: rest.means() });
     if missing.is_empty() {
@@ -74,19 +86,18 @@ pub fn at_rest(file: &Path, inputs: &Table) -> Result<Table> {
         "no baseline for {names}: a mean that is missing or zero; give frames in which every input has a reading, \
          or choose others with --inputs"
     );
-    Err(Error::Unfit { path: file.into(), message })
+    Err(Error::Unfit { path: file.path.clone(), message })
 }
 
 /// One line: the mean of each of the columns called `names` in `file`.
-fn baseline<'n>(file: &Path, names: impl Iterator<Item = &'n str>) -> Result<Table> {
+fn baseline<'n>(file: &DataFile, names: impl Iterator<Item = &'n str>) -> Result<Table> {
     let frames = usual_lines(file, names)?;
     Ok(Table { values: frames.means(), names: frames.names })
 }
 
 /// Columns called `names` of the lines of `file` that hold no outlier, which would move the mean.
-fn usual_lines<'n>(file: &Path, names: impl Iterator<Item = &'n str>) -> Result<Table> {
-    let file = DataFile::read(file)?;
-    let inputs = table_of(&file, names)?;
+fn usual_lines<'n>(file: &DataFile, names: impl Iterator<Item = &'n str>) -> Result<Table> {
+    let inputs = table_of(file, names)?;
     let empty = Dataset::empty(vec![], vec![], 1, 0);
     let frames = Dataset { inputs, ..empty };
     let outliers = outliers::find(&frames, |line| file.line_number(line));

@@ -33,9 +33,11 @@ mod choice;
   host-sim train press --whole-array --centres 256 --output-rank 24 --format fixed16 -o press.bin
   host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --centres 200 --spread 0.5 -o m.bin
   host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --select --fold-column fold -o m.bin
-  host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --relative-inputs --baseline rest.csv -o m.bin")]
+  host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --relative-inputs --baseline rest.csv -o m.bin
+  host-sim train sensor.csv --join robot.csv --on c1 --tolerance 0.01 --missing -1 --first-share 0.8 \\
+      --inputs c2..c16 --outputs b.c5 --fold-blocks 10 -o m.bin")]
 pub struct Arguments {
-    /// A built-in scene (paper, press, contact), a scene file (.toml) or a CSV file.
+    /// A built-in scene (paper, press, contact), a scene file (.toml) or a data file (CSV, .npy, .npz).
     source: String,
     /// Blob to write.
     #[arg(short, long, value_name = "FILE")]
@@ -124,7 +126,8 @@ struct Summary {
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let source = Path::new(&arguments.source);
     let baseline = arguments.subject.data.baseline().unwrap_or(source);
-    output::check_writable(&arguments.output, &[source, baseline])?;
+    let joined = arguments.subject.data.file.join().unwrap_or(source);
+    output::check_writable(&arguments.output, &[source, baseline, joined])?;
     let subject = load(arguments, common)?;
     let mut options = subject.options();
     let set = subject.training_set(1);

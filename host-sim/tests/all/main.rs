@@ -8,6 +8,7 @@ mod virtual_device;
 mod accuracy;
 mod calibrate;
 mod contact;
+mod data_files;
 mod device;
 mod drift;
 mod gate;
