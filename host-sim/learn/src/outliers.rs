@@ -13,7 +13,7 @@
 //!   4805 lines the widest such gap is 0.16 ranges, and in 3000 simulated frames of presses it is 0.44.
 //! - The line is no rare press. A log may be at rest for 99 % of its lines, where every press stands far out. What tells
 //!   a press is that readings and outputs leave their rest together: in such a line, a column of the other kind is far
-//!   from its own bulk too, as it is in some other lines.
+//!   from its own bulk too, as it is in some other lines. A value that is far out even among presses is an outlier.
 //!
 //! If more lines than one of 200 have such a value, they are left in and only reported: that is how a sensor with
 //! separate cells looks, each of which is rarely touched.
@@ -66,8 +66,10 @@ pub struct Outliers {
     pub kept: Vec<usize>,
 }
 
-/// Values of a column in a form that outliers can be told from.
+/// What is usual for a column.
 struct Column {
+    /// Value in the middle.
+    median: f64,
     /// Range of the values that are no outliers.
     usual: [f64; 2],
     /// Range beyond which a value has left its rest; `None` if the column has no rest, or is not at rest in too few
@@ -83,21 +85,16 @@ pub fn find(dataset: &Dataset, line_number: impl Fn(usize) -> u64) -> Outliers {
     let columns = tables.map(|table| -> Vec<Column> {
         (0..table.names.len()).map(|c| Column::of(values(table, c))).collect()
     });
+    let pressed =
+        [0, 1].map(|t| Pressed::of(tables[t], &columns[t], tables[1 - t], &columns[1 - t]));
     let mut found = Vec::new();
     let (mut kept, mut lines) = (Vec::with_capacity(frames), 0);
     for frame in 0..frames {
-        let in_table = |t: usize| {
-            let (table, count) = (tables[t], tables[t].names.len());
-            let values = &table.values[frame * count..][..count];
-            table.names.iter().zip(values).zip(&columns[t])
+        let far = |t: usize| {
+            let named = tables[t].names.iter().zip(line(tables[t], frame)).zip(&columns[t]);
+            named.filter(|((_, value), column)| is_outside(**value, column.usual))
         };
-        let far =
-            |t: usize| in_table(t).filter(|((_, value), column)| is_outside(**value, column.usual));
-        let moved = |t: usize| {
-            in_table(t).any(|((_, v), column)| column.rest.is_some_and(|rest| is_outside(*v, rest)))
-        };
-        let is_press = |t: usize| moved(1 - t);
-        let of_line = (0..2).filter(|t| !is_press(*t)).flat_map(far);
+        let of_line = (0..2).filter(|t| !pressed[*t].explains(frame)).flat_map(far);
         let before = found.len();
         found.extend(of_line.map(|((name, value), column)| Outlier {
             line: line_number(frame),
@@ -136,23 +133,69 @@ impl Column {
     fn of(mut values: Vec<f64>) -> Self {
         let count = values.len();
         if count < LEAST_LINES {
-            return Self { usual: [f64::NEG_INFINITY, f64::INFINITY], rest: None };
+            let usual = [f64::NEG_INFINITY, f64::INFINITY];
+            return Self { median: 0.0, usual, rest: None };
         }
-        let rest = rest(&values);
-        let high = values[count - 1 - far_above(&values)];
+        let (rest, median) = (rest(&values), values[count / 2]);
+        // As many of the smallest values may be outliers themselves.
+        let high = values[count - 1 - far_above(&values, values[most(count)])];
         values.reverse();
         values.iter_mut().for_each(|value| *value = -*value);
-        let low = -values[count - 1 - far_above(&values)];
-        Self { usual: [low, high], rest }
+        let low = -values[count - 1 - far_above(&values, values[most(count)])];
+        Self { median, usual: [low, high], rest }
     }
 }
 
-/// Number of the largest values that are far above all others, of values in ascending order.
-fn far_above(values: &[f64]) -> usize {
+/// Lines in which another table has left its rest: presses, where values far from all others are right.
+struct Pressed {
+    /// For each line, how far any value is from its column's middle; 0 if the line is no press.
+    distances: Vec<f64>,
+    /// Distance beyond which even a press does not explain a value.
+    largest: f64,
+}
+
+impl Pressed {
+    /// Presses that `other` shows, and the distances of `table` in them.
+    fn of(table: &Table, columns: &[Column], other: &Table, of_other: &[Column]) -> Self {
+        let moved = |frame: usize| {
+            let mut values = line(other, frame).iter().zip(of_other);
+            values.any(|(v, column)| column.rest.is_some_and(|rest| is_outside(*v, rest)))
+        };
+        let distance = |frame: usize| {
+            let values = line(table, frame).iter().zip(columns);
+            values.map(|(value, column)| (value - column.median).abs()).fold(0.0, f64::max)
+        };
+        let distances: Vec<f64> = (0..table.len())
+            .map(|frame| if moved(frame) { distance(frame) } else { 0.0 })
+            .collect();
+        let mut sorted: Vec<f64> = distances.iter().copied().filter(|d| *d > 0.0).collect();
+        sorted.sort_by(f64::total_cmp);
+        let largest = if sorted.len() < LEAST_LINES {
+            f64::INFINITY
+        } else {
+            sorted[sorted.len() - 1 - far_above(&sorted, 0.0)]
+        };
+        Self { distances, largest }
+    }
+
+    /// Whether a press explains what stands far out in a line.
+    fn explains(&self, frame: usize) -> bool {
+        let distance = self.distances.get(frame).copied().unwrap_or(0.0);
+        distance > 0.0 && distance <= self.largest
+    }
+}
+
+/// Values of a line.
+fn line(table: &Table, frame: usize) -> &[f64] {
+    let count = table.names.len();
+    &table.values[frame * count..][..count]
+}
+
+/// Number of the largest values that are far above all others, of values in ascending order. The others begin at `low`.
+fn far_above(values: &[f64], low: f64) -> usize {
     let (count, most) = (values.len(), most(values.len()));
     let gap_factor = GAP.max(GAP_LINES / count as f64);
-    // As many of the smallest values may be outliers themselves.
-    let (low, mut far) = (values[most], 0);
+    let mut far = 0;
     for m in 1..=most {
         let (next, first) = (values[count - 1 - m], values[count - m]);
         let own_range = values[count - 1 - far] - first;

@@ -47,7 +47,8 @@ fn notes_on_outliers(outliers: &Outliers, name: &str, lines: usize, left_out: &s
 
 /// Names the first outlier of a line, and counts the others.
 fn name_line(outliers: &[Outlier]) -> String {
-    let Outlier { line, column, value, usual: [low, high] } = &outliers[0];
+    let Outlier { line, column, value, usual } = &outliers[0];
+    let [low, high] = usual.map(|value| value as f32); // no more digits than tell something
     let more = match outliers.len() {
         1 => String::new(),
         2 => ", and 1 more column".into(),

@@ -244,7 +244,7 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         }
     }
     page.line(format_args!(
-        "{}: {} bytes, CRC-32 {}, {}, K = {}{}, spread = {}{}, affine tail: {}, {} frames{}{}",
+        "{}: {} bytes, CRC-32 {}, {}, K = {}{}, spread = {}{}{}, affine tail: {}, {} frames{}{}",
         summary.file.display(),
         summary.blob_bytes,
         summary.model_crc,
@@ -253,6 +253,7 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         summary.output_rank.map_or(String::new(), |rank| format!(", rank {rank}")),
         summary.spread,
         if summary.refined { " (refined)" } else { "" },
+        summary.penalty.map_or(String::new(), |p| format!(", penalty = {}", choice::short(p))),
         if summary.affine_tail { "yes" } else { "no" },
         summary.training_frames,
         if summary.relative_inputs { ", inputs relative to the baseline" } else { "" },

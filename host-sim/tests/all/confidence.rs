@@ -104,7 +104,7 @@ fn measured_data_is_held_out_fold_by_fold() {
 
     let alone = train(&["--confidence", "--fold-column", "one"]);
     assert_eq!(alone.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&alone.stderr).contains("there is one alone: give more"));
+    assert!(String::from_utf8_lossy(&alone.stderr).contains("holds out one fold after the other; give at least 2"));
 
     let one = train(&["--confidence", "--folds", "1"]);
     assert_eq!(one.status.code(), Some(2));

@@ -99,6 +99,19 @@ fn a_broken_wire_is_found_in_a_log_at_rest() {
     let found = outliers(&data).found;
     assert_eq!(found.len(), 1);
     assert_eq!((found[0].line, found[0].column.as_str()), (79, "ch3"));
+    // During a press, where only the other presses tell.
+    data.inputs.values[4 * 300 + 1] = 1e4;
+    let found = outliers(&data).found;
+    assert_eq!(found.iter().map(|outlier| outlier.line).collect::<Vec<_>>(), [79, 302]);
+}
+
+#[test]
+fn a_channel_that_few_presses_reach_is_no_outlier() {
+    let mut data = log(3000, |line| line % 100 == 0);
+    let channel = data.inputs.values.iter_mut().skip(1).step_by(4);
+    channel.enumerate().filter(|(line, _)| *line != 500).for_each(|(_, value)| *value = 100.0);
+    data.inputs.values[4 * 500 + 1] = 160.0;
+    assert_none(&data);
 }
 
 #[test]

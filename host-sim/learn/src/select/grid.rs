@@ -18,7 +18,8 @@ pub struct Candidates {
     /// Most values that spreads are extended by, while the best one is the smallest or largest of at least two.
     /// Numbers of centres are never extended, because a device pays for them.
     pub most_spreads: usize,
-    /// Most values that penalties are extended by likewise.
+    /// Most values that penalties are extended by likewise, but only to larger ones. Smaller ones hardly differ, and
+    /// look best wherever a held-out frame has a twin in training.
     pub most_penalties: usize,
 }
 
@@ -53,6 +54,7 @@ impl Candidates {
         let penalties = self.numbers();
         if self.most_penalties > 0
             && let Some(penalty) = best.penalty.and_then(|best| beyond(&penalties, best))
+            && Some(penalty) > best.penalty
             && check_penalty(penalty).is_ok()
         {
             self.most_penalties -= 1;
@@ -142,6 +144,7 @@ mod tests {
         near(grid.grow(&best(32, 0.8, penalty)).unwrap(), (1.6, 1e-5));
         assert_eq!(grid.grow(&best(32, 1.6, 1e-5)), None, "no step is left");
         assert_eq!(candidates(3).grow(&best(32, 0.4, 1e-7)), None, "no edge");
+        assert_eq!(candidates(3).grow(&best(32, 0.4, 1e-8)), None, "no smaller penalties");
     }
 
     #[test]

@@ -110,15 +110,27 @@ fn candidates(
 /// A candidate's settings, for people.
 pub fn settings(scored: &Scored) -> String {
     let Scored { centres, spread, penalty, .. } = scored;
-    let penalty = penalty.map_or(String::new(), |penalty| format!(" penalty = {penalty:.0e}"));
+    let penalty = penalty.map_or(String::new(), |value| format!(" penalty = {}", short(value)));
     format!("K = {centres:<4} spread = {spread:<5}{penalty}")
+}
+
+/// A penalty with as many digits as matter.
+pub fn short(penalty: f64) -> String {
+    let text = format!("{penalty:.2e}");
+    text.parse::<f64>().map_or(text, |rounded| format!("{rounded:e}"))
 }
 
 /// Note on a best value at an edge.
 fn beyond(edge: &Edge) -> String {
     let Edge { setting, value, largest } = edge;
     let (which, more) = if *largest { ("largest", "larger") } else { ("smallest", "smaller") };
-    let value = if *setting == "penalty" { format!("{value:e}") } else { value.to_string() };
+    let value = if *setting == "penalty" { short(*value) } else { value.to_string() };
+    if *setting == "penalty" && !largest {
+        return format!(
+            "the best penalty, {value}, is the smallest that was tried: try smaller ones (--penalty); if the lines are \
+             a log, give --fold-blocks, because random folds favour small penalties"
+        );
+    }
     format!(
         "the best {setting}, {value}, is the {which} that was tried: try {more} ones (--{setting})"
     )
@@ -136,5 +148,6 @@ mod tests {
         assert_eq!(beyond(&edge), note);
         let edge = Edge { setting: "penalty", value: 1e-9, largest: false };
         assert!(beyond(&edge).contains("1e-9, is the smallest"));
+        assert_eq!([short(1e-10 * 0.1), short(2.5e-7)], ["1e-11", "2.5e-7"]);
     }
 }
