@@ -1,5 +1,6 @@
 //! Evaluation: errors and costs of models, and the tables of these.
 
+pub mod distribution;
 pub mod gate;
 pub mod drift;
 pub mod readout;
@@ -7,3 +8,4 @@ pub mod limit;
 pub mod confidence;
 pub mod table1;
 pub mod trade;
+pub mod device_cost;

@@ -28,6 +28,7 @@ pub mod metrics;
 pub mod by_depth;
 pub mod experiment;
 pub mod evaluate;
+pub mod verdict;
 pub mod run;
 pub mod report;
 

@@ -1,7 +1,6 @@
 //! Main job: synthesise, train, write the blob, read it back, decode, evaluate.
 
 use serde::Serialize;
-use taxel_data::columns;
 use taxel_data::dataset::Dataset;
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
@@ -14,17 +13,28 @@ use taxel_simulate::{Synthesis, World};
 
 use crate::by_depth::{DepthErrors, by_depth};
 use crate::error::Result;
+use crate::evaluate::device_cost::DeviceCost;
+use crate::evaluate::distribution::{Distribution, Reference};
 use crate::evaluate::table1::{self, Table1};
 use crate::experiment::Experiment;
 use crate::metrics::{self, DecoderErrors, Errors, LimitSummary, Measure};
+use crate::verdict::Verdict;
+
+mod sketch;
+
+pub use sketch::{RowWire, SensorSketch};
 
 /// Results of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RunResult {
-    /// Scene that was run.
+    /// What the model is worth, in words.
+    pub verdict: Verdict,
+    /// Scene that was run, and all that only a scene knows.
     pub scene: SceneSummary,
     /// Model that was trained.
     pub model: ModelSummary,
+    /// What the model asks of a device.
+    pub device: DeviceCost,
     /// Errors on the test frames, by decoder and group.
     pub decoders: Vec<DecoderErrors>,
     /// Least possible errors, of a decoder that sees all readings of a frame.
@@ -33,8 +43,8 @@ pub struct RunResult {
     pub by_depth: Vec<DepthErrors>,
     /// Errors of the network by row-wire; nothing for outputs that belong to no row-wire.
     pub rows: Vec<RowErrors>,
-    /// One test frame, for a closer look.
-    pub example: Example,
+    /// Distribution of the network's errors on the test frames, and frames to look at.
+    pub distribution: Distribution,
     /// Table 1, if the scene asks for it.
     pub table1: Option<Table1>,
 }
@@ -58,6 +68,11 @@ pub struct SceneSummary {
     pub size_mm: [f64; 3],
     /// Number of row-wires of the sensor, read or not.
     pub row_wires: usize,
+    /// Wires and electrodes of the sensor; `None` for too many to draw.
+    pub sensor: Option<SensorSketch>,
+    /// Changes of the readings without noise in the shown frames, ΔR/R₀ in per cent: those of
+    /// [`ShownFrame`](crate::evaluate::distribution::ShownFrame) have it.
+    pub ideal_changes: Vec<Vec<f64>>,
 }
 
 /// Summary of the model that was trained.
@@ -104,39 +119,6 @@ pub struct RowErrors {
     pub errors: Vec<Errors>,
 }
 
-/// Example: the test frame with the largest output of all.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Example {
-    /// Index of the frame (from 0) among the test frames.
-    pub frame: usize,
-    /// Position x and y at rest of every electrode that is decoded, in mm, row-wire after row-wire.
-    pub electrodes_mm: Vec<[f64; 2]>,
-    /// Number of row-wires that are read.
-    pub row_wires: usize,
-    /// Outputs of the frame by group.
-    pub outputs: Vec<ExampleOutput>,
-    /// Row-wire (from 1) whose readings are shown: that of the largest output, or else the one whose readings change
-    /// most.
-    pub reading_row_wire: usize,
-    /// Readings of that row-wire without noise, in Ω, by column-wire.
-    pub ideal_ohm: Vec<f64>,
-    /// Readings of that row-wire as they were decoded, in Ω, by column-wire.
-    pub noisy_ohm: Vec<f64>,
-}
-
-/// One component of the example's outputs, electrode after electrode.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ExampleOutput {
-    /// Name of the group, such as `dz_mm`.
-    pub group: String,
-    /// Unit of the values.
-    pub unit: String,
-    /// True values.
-    pub truth: Vec<f64>,
-    /// Decoded values.
-    pub estimate: Vec<f64>,
-}
-
 /// Runs `experiment` and returns its results and the blob.
 ///
 /// # Errors
@@ -159,19 +141,26 @@ pub fn run(experiment: &Experiment, progress: &dyn Progress) -> Result<(RunResul
     let baselines: Vec<Box<dyn Decoder>> = BASELINES.iter().map(|b| b.fit(&training)).collect();
     let decoders = std::iter::once(&network as &dyn Decoder)
         .chain(baselines.iter().map(AsRef::as_ref))
-        .map(|decoder| metrics::judge(decoder, &test, &measure))
-        .collect();
+        .map(|decoder| metrics::judge(decoder, &test, &measure));
+    let decoders: Vec<DecoderErrors> = decoders.collect();
     let estimate = network.decode_table(&test.inputs);
     progress.step();
 
+    let at_rest = readings_at_rest(world);
+    let reference =
+        if test.relative_inputs { Reference::Relative } else { Reference::Rest(&at_rest) };
+    let distribution = Distribution::of(&test.outputs, &estimate, &test.inputs, reference);
+    let group = distribution.main_group().map_or("", |group| &group.group);
     let result = RunResult {
-        scene: scene_summary(experiment),
+        verdict: Verdict::of(group, &decoders, &limit),
+        scene: scene_summary(experiment, &distribution),
         model: model_summary(experiment, &network, &blob)?,
+        device: DeviceCost::of(&blob)?,
         decoders,
         limit,
         by_depth: by_depth(&test.outputs, &estimate.values, &measure),
         rows: by_row(world, &test, &estimate, &measure),
-        example: example(world, &test, &estimate),
+        distribution,
         table1: match experiment.table1 {
             Some(_) => Some(table1::compute(experiment, progress)?),
             None => None,
@@ -181,7 +170,25 @@ pub fn run(experiment: &Experiment, progress: &dyn Progress) -> Result<(RunResul
     Ok((result, blob))
 }
 
-fn scene_summary(experiment: &Experiment) -> SceneSummary {
+/// Readings in Ω of the untouched sensor, without noise and drift.
+fn readings_at_rest(world: &World) -> Vec<f64> {
+    Synthesis::of(world).ideal().drift(None).untouched().readings_of(Stream::Test, 0)
+}
+
+/// Changes of the readings of the shown frames without noise, ΔR/R₀ in per cent.
+fn ideal_changes(world: &World, shown: &Distribution) -> Vec<Vec<f64>> {
+    let ideal = Synthesis::of(world).ideal();
+    let untouched = Synthesis::of(world).ideal().untouched();
+    let of_frame = |frame: usize| {
+        let readings = ideal.readings_of(Stream::Test, frame);
+        // The gain of the frame's session is in both, and cancels.
+        let at_rest = untouched.readings_of(Stream::Test, frame);
+        readings.iter().zip(at_rest).map(|(r, at_rest)| 100.0 * (r / at_rest - 1.0)).collect()
+    };
+    shown.frames.iter().map(|frame| of_frame(frame.frame)).collect()
+}
+
+fn scene_summary(experiment: &Experiment, shown: &Distribution) -> SceneSummary {
     let world = &experiment.world;
     SceneSummary {
         name: experiment.name.clone(),
@@ -192,6 +199,8 @@ fn scene_summary(experiment: &Experiment) -> SceneSummary {
         gain_drift: world.drift.map_or(0.0, |drift| drift.gain),
         size_mm: world.sensor.size_mm,
         row_wires: world.sensor.row_wires,
+        sensor: SensorSketch::of(world),
+        ideal_changes: ideal_changes(world, shown),
     }
 }
 
@@ -239,65 +248,4 @@ fn by_row(world: &World, test: &Dataset, estimate: &Table, measure: &Measure) ->
     };
     let rows = world.read_rows.iter().enumerate();
     rows.map(|(row, wire)| RowErrors { row_wire: wire + 1, errors: errors(row) }).collect()
-}
-
-/// Row (from 0, of those that are read) with the largest of the `truth` of a frame. Where outputs belong to no row, it
-/// is the one whose `ideal` readings differ most from the `untouched` ones.
-fn most_disturbed_row(world: &World, truth: &[f64], [ideal, untouched]: [&[f64]; 2]) -> usize {
-    let rows = world.read_rows.len();
-    let changes: Vec<f64> = ideal.iter().zip(untouched).map(|(a, b)| a / b - 1.0).collect();
-    let by_row = match world.outputs {
-        Outputs::Electrodes(_) => truth,
-        Outputs::Contact(_) => &changes,
-    };
-    let peak = |row: &usize| {
-        let width = by_row.len() / rows;
-        largest(&by_row[row * width..(row + 1) * width])
-    };
-    (0..rows).max_by(|a, b| peak(a).total_cmp(&peak(b))).unwrap_or(0)
-}
-
-fn largest(values: &[f64]) -> f64 {
-    values.iter().fold(0.0_f64, |a, b| a.max(b.abs()))
-}
-
-fn example(world: &World, test: &Dataset, estimate: &Table) -> Example {
-    let frame = (0..test.frames())
-        .max_by(|a, b| {
-            let peak = |i: usize| largest(test.outputs.lines().nth(i).unwrap_or_default());
-            peak(*a).total_cmp(&peak(*b))
-        })
-        .unwrap_or(0);
-    let truth = test.outputs.lines().nth(frame).unwrap_or_default();
-    let decoded = estimate.lines().nth(frame).unwrap_or_default();
-    let groups = columns::groups(&test.outputs.names).into_iter();
-    let outputs = groups.map(|(group, members)| ExampleOutput {
-        group: group.into(),
-        unit: columns::unit_of(group).into(),
-        truth: members.iter().map(|column| truth[*column]).collect(),
-        estimate: members.iter().map(|column| decoded[*column]).collect(),
-    });
-    let synthesis = Synthesis::of(world);
-    let noisy = synthesis.readings_of(Stream::Test, frame);
-    let synthesis = synthesis.ideal();
-    let ideal = synthesis.readings_of(Stream::Test, frame);
-    let column_wires = world.sensor.column_wires;
-    let of_row =
-        |line: &[f64], row: usize| line[row * column_wires..(row + 1) * column_wires].to_vec();
-    let untouched = synthesis.untouched().readings_of(Stream::Test, frame);
-    let row = most_disturbed_row(world, truth, [&ideal, &untouched]);
-    Example {
-        frame,
-        electrodes_mm: world
-            .read_rows
-            .iter()
-            .flat_map(|row| world.sensor.row_electrodes_mm(*row))
-            .map(|[x, y, _]| [*x, *y])
-            .collect(),
-        row_wires: world.read_rows.len(),
-        outputs: outputs.collect(),
-        reading_row_wire: world.read_rows[row] + 1,
-        ideal_ohm: of_row(&ideal, row),
-        noisy_ohm: of_row(&noisy, row),
-    }
 }

@@ -1,18 +1,23 @@
 //! Command `eval`: a model's errors on data whose outputs are known.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use host_sim::by_depth::{DepthErrors, by_depth};
 use host_sim::evaluate::confidence::{Coverage, coverage};
-use host_sim::metrics::{self, Errors, LimitSummary, Measure};
+use host_sim::evaluate::device_cost::DeviceCost;
+use host_sim::evaluate::distribution::{Distribution, Reference};
+use host_sim::metrics::{self, DecoderErrors, Errors, LimitSummary, Measure};
+use host_sim::report::{self, Made, View};
+use host_sim::verdict::Verdict;
 use host_sim::{Error, Result};
 use serde::Serialize;
 use taxel_data::csv_file::CsvFile;
+use taxel_data::output;
 use taxel_learn::{Exponential, ModelBlob};
 use taxel_limit::Refusal;
 
-use super::arguments::exponential;
+use super::arguments::{exponential, quoted};
 use super::confidence;
 use super::decode::remark_on_range;
 use super::readings::{BaselineArgument, model_inputs, table_of};
@@ -21,7 +26,7 @@ use super::{Common, print};
 /// Evaluate a model on a CSV file of readings and true outputs.
 #[derive(Args)]
 #[command(after_help = "Examples:
-  host-sim eval press.bin test.csv
+  host-sim eval press.bin test.csv --html report.html
   host-sim eval relative.bin test.csv --baseline rest.csv")]
 pub struct Arguments {
     /// Weight blob.
@@ -33,6 +38,9 @@ pub struct Arguments {
     /// Exponential of the activations.
     #[arg(long, alias = "kernel", value_parser = exponential(), default_value = "polynomial")]
     exponential: Exponential,
+    /// Write a page with the same figures as run's.
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
 }
 
 #[derive(Serialize)]
@@ -55,6 +63,12 @@ struct Summary {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+    if let Some(html) = &arguments.html {
+        let inputs =
+            [Some(&arguments.model), Some(&arguments.data), arguments.baseline.baseline.as_ref()];
+        let inputs: Vec<&Path> = inputs.into_iter().flatten().map(PathBuf::as_path).collect();
+        output::check_writable(html, &inputs)?;
+    }
     let blob = ModelBlob::read(&arguments.model)?;
     let model = arguments.baseline.apply(blob.prepare(arguments.exponential), &arguments.model)?;
     let file = CsvFile::read(&arguments.data)?;
@@ -100,6 +114,13 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         mean_errors: metrics::by_group(&truth, &means, &measure),
         by_depth: by_depth(&truth, &estimate.values, &measure),
     };
+    if let Some(html) = &arguments.html {
+        let at_rest = arguments.baseline.values(metadata, &arguments.model)?;
+        let reference = at_rest.as_deref().map_or(Reference::Median, Reference::Rest);
+        let distribution = Distribution::of(&truth, &estimate, &readings, reference);
+        let page = page_of(arguments, &blob, &summary, &distribution)?;
+        output::write_bytes(html, page.as_bytes())?;
+    }
     if common.json {
         return print::json(&summary);
     }
@@ -122,4 +143,67 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         page.line(format_args!("{percent:.2} % of the frames are novel: unlike those of training"));
     }
     page.print()
+}
+
+/// Page of the evaluation.
+fn page_of(
+    arguments: &Arguments,
+    blob: &ModelBlob,
+    summary: &Summary,
+    distribution: &Distribution,
+) -> Result<String> {
+    let decoder = |name: &str, errors: &[Errors]| DecoderErrors {
+        decoder: name.into(),
+        errors: errors.to_vec(),
+    };
+    let decoders = [decoder("network", &summary.errors), decoder("mean", &summary.mean_errors)];
+    let limit = LimitSummary::of(&Err(Refusal::Measured));
+    let group = distribution.main_group().map_or("", |group| &group.group);
+    let model = blob.parse();
+    let name_of = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let [model_file, data_file] = [&arguments.model, &arguments.data].map(|path| name_of(path));
+    let facts = vec![
+        ("Data", format!("{data_file}: {} frames", summary.frames)),
+        (
+            "Values",
+            format!("{} of {} true outputs count", summary.values_evaluated, summary.values),
+        ),
+        (
+            "Model",
+            format!(
+                "{model_file}, trained on {:?}, {} frames",
+                model.metadata().name,
+                model.metadata().training_frames
+            ),
+        ),
+        ("Blob", format!("{} bytes, CRC-32 {:08x}", blob.bytes().len(), model.crc())),
+    ];
+    let mut command = vec!["host-sim eval".to_owned()];
+    command.extend([&arguments.model, &arguments.data].map(|path| quoted(&path.to_string_lossy())));
+    if let Some(baseline) = &arguments.baseline.baseline {
+        command.push(format!("--baseline {}", quoted(&baseline.to_string_lossy())));
+    }
+    if arguments.exponential != Exponential::default() {
+        command.push(format!("--exponential {}", arguments.exponential.name()));
+    }
+    command.extend(
+        arguments.html.as_ref().map(|html| format!("--html {}", quoted(&html.to_string_lossy()))),
+    );
+    let view = View {
+        title: format!("{model_file} on {data_file}"),
+        facts,
+        verdict: &Verdict::of(group, &decoders, &limit),
+        device: &DeviceCost::of(blob)?,
+        decoders: &decoders,
+        limit: &limit,
+        by_depth: &summary.by_depth,
+        distribution,
+        frames: summary.frames,
+        sensor: None,
+        ideal_changes: &[],
+        noise: None,
+        table1: None,
+        made: &Made { command: command.join(" "), files: vec![] },
+    };
+    Ok(report::view_html(&view))
 }

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use super::progress::Terminal;
 use clap::Args;
 use host_sim::experiment::Experiment;
+use host_sim::report::{self, Made};
 use host_sim::run::{self, RunResult};
-use host_sim::{Error, Result, report};
+use host_sim::{Error, Result};
 use taxel_data::output;
 use taxel_learn::ModelBlob;
 
@@ -54,16 +55,35 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     arguments.relative_inputs.apply(&mut scene);
     scene.training.refine = arguments.refine.over(scene.training.refine);
     let folder = arguments.output.join(&scene.name);
-    output::in_folder(&folder, || run_into(&folder, &scene, arguments.scene.path(), common))
+    output::in_folder(&folder, || run_into(&folder, &scene, arguments, common))
 }
 
-fn run_into(folder: &Path, scene: &Experiment, scene_path: &Path, common: &Common) -> Result<()> {
+/// Command line that makes the same results again: the seed is always in it, the folder never.
+fn command_line(arguments: &Arguments, scene: &Experiment) -> String {
+    let mut words = vec!["host-sim run".to_owned(), arguments.scene.on_the_command_line()];
+    words.push(format!("--seed {}", scene.world.seed));
+    if arguments.noise.is_given() {
+        words.push(format!("--noise {}", scene.world.noise.level));
+    }
+    if arguments.relative_inputs.relative_inputs {
+        words.push("--relative-inputs".into());
+    }
+    words.extend(arguments.refine.on_the_command_line().map(String::from));
+    words.join(" ")
+}
+
+fn run_into(
+    folder: &Path,
+    scene: &Experiment,
+    arguments: &Arguments,
+    common: &Common,
+) -> Result<()> {
     for file in FILES {
-        output::check_writable(&folder.join(file), &[scene_path])?;
+        output::check_writable(&folder.join(file), &[arguments.scene.path()])?;
     }
     let started = std::time::Instant::now();
     let (result, blob) = run::run(scene, &Terminal::new())?;
-    let files = write_files(folder, &result, &blob)?;
+    let files = write_files(folder, &result, &blob, command_line(arguments, scene))?;
     if common.json {
         return print::json(&result);
     }
@@ -72,7 +92,12 @@ fn run_into(folder: &Path, scene: &Experiment, scene_path: &Path, common: &Commo
     Ok(())
 }
 
-fn write_files(folder: &Path, result: &RunResult, blob: &ModelBlob) -> Result<Vec<&'static str>> {
+fn write_files(
+    folder: &Path,
+    result: &RunResult,
+    blob: &ModelBlob,
+    command: String,
+) -> Result<Vec<&'static str>> {
     let mut files = vec!["model.bin", "metrics.json"];
     output::write_bytes(&folder.join("model.bin"), blob.bytes())?;
     let metrics = serde_json::to_vec_pretty(result)
@@ -82,7 +107,8 @@ fn write_files(folder: &Path, result: &RunResult, blob: &ModelBlob) -> Result<Ve
         table.write_csv(&folder.join("table1.csv"))?;
         files.push("table1.csv");
     }
-    output::write_bytes(&folder.join("report.html"), report::html(result).as_bytes())?;
+    let made = Made { command, files: files.iter().map(|file| (*file).to_owned()).collect() };
+    output::write_bytes(&folder.join("report.html"), report::html(result, &made).as_bytes())?;
     files.push("report.html");
     Ok(files)
 }

@@ -124,14 +124,17 @@ fn a_baseline_that_was_scanned_with_the_same_series_resistance_cancels_it() {
 }
 
 #[test]
-fn a_run_with_relative_inputs_says_so_and_shows_readings_in_ohms() {
+fn a_run_with_relative_inputs_says_so_and_shows_changes_from_rest() {
     let mut scene = small();
     scene.training.relative_inputs = true;
     scene.world.drift = Some(Drift { gain: 0.02 });
     let (result, blob) = host_sim::run::run(&scene, &Silent).unwrap();
     assert!(blob.parse().metadata().relative_inputs && result.model.relative_inputs);
     assert_eq!(result.scene.gain_drift, 0.02);
-    assert!(result.example.noisy_ohm.iter().all(|ohm| (30.0..100.0).contains(ohm)));
+    for (frame, ideal) in result.distribution.frames.iter().zip(&result.scene.ideal_changes) {
+        // Relative noise of half a per cent on readings and baseline is all that differs.
+        assert!(frame.change.iter().zip(ideal).all(|(noisy, ideal)| (noisy - ideal).abs() < 4.0));
+    }
     let rmse = |decoder: usize| z(&result.decoders[decoder].errors);
     assert!(rmse(0) < rmse(1) && rmse(1) < 0.6 * rmse(2), "network, linear, mean");
     // Table 1 is computed on the same inputs: at little noise its best network is far below the mean.
@@ -139,7 +142,7 @@ fn a_run_with_relative_inputs_says_so_and_shows_readings_in_ohms() {
     let best = column.decoders.iter().filter(|entry| entry.spread.is_some());
     let best = best.map(|entry| z(&entry.errors)).fold(f64::INFINITY, f64::min);
     assert!(best < 0.5 * z(column.errors("mean", None)), "{best}");
-    let page = host_sim::report::html(&result);
+    let page = host_sim::report::html(&result, &host_sim::report::Made::default());
     assert!(page.contains("18 relative readings") && page.contains("gain drift ±2"), "report");
 }
 
