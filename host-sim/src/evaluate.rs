@@ -1,6 +1,7 @@
 //! Evaluation: errors and costs of models, and the tables of these.
 
 pub mod distribution;
+pub mod device_cost;
 pub mod gate;
 pub mod drift;
 pub mod readout;
@@ -8,4 +9,3 @@ pub mod limit;
 pub mod confidence;
 pub mod table1;
 pub mod trade;
-pub mod device_cost;

@@ -26,9 +26,9 @@
 pub mod error;
 pub mod metrics;
 pub mod by_depth;
+pub mod verdict;
 pub mod experiment;
 pub mod evaluate;
-pub mod verdict;
 pub mod run;
 pub mod report;
 

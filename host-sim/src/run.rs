@@ -150,9 +150,8 @@ pub fn run(experiment: &Experiment, progress: &dyn Progress) -> Result<(RunResul
     let reference =
         if test.relative_inputs { Reference::Relative } else { Reference::Rest(&at_rest) };
     let distribution = Distribution::of(&test.outputs, &estimate, &test.inputs, reference);
-    let group = distribution.main_group().map_or("", |group| &group.group);
     let result = RunResult {
-        verdict: Verdict::of(group, &decoders, &limit),
+        verdict: Verdict::of(&decoders, &limit).of_blob(&blob, t.frames),
         scene: scene_summary(experiment, &distribution),
         model: model_summary(experiment, &network, &blob)?,
         device: DeviceCost::of(&blob)?,

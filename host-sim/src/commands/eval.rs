@@ -158,7 +158,6 @@ fn page_of(
     };
     let decoders = [decoder("network", &summary.errors), decoder("mean", &summary.mean_errors)];
     let limit = LimitSummary::of(&Err(Refusal::Measured));
-    let group = distribution.main_group().map_or("", |group| &group.group);
     let model = blob.parse();
     let name_of = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let [model_file, data_file] = [&arguments.model, &arguments.data].map(|path| name_of(path));
@@ -192,7 +191,7 @@ fn page_of(
     let view = View {
         title: format!("{model_file} on {data_file}"),
         facts,
-        verdict: &Verdict::of(group, &decoders, &limit),
+        verdict: &Verdict::of(&decoders, &limit),
         device: &DeviceCost::of(blob)?,
         decoders: &decoders,
         limit: &limit,

@@ -5,7 +5,7 @@ use taxel_learn::cost::{DecoderRam, Design, Prices};
 use taxel_learn::{Exponential, ModelBlob};
 
 use crate::error::Result;
-use crate::evaluate::trade::SLOT_BYTES;
+use crate::verdict::SLOT_BYTES;
 
 /// Clock of the STM32F446 at which its flash makes it wait as `flash_cycles` count.
 const CLOCK_MHZ: f64 = 180.0;

@@ -60,8 +60,7 @@ impl ColourScale {
             let (class, opacity) = self.colour(self.low + share * (self.high - self.low));
             let fill = format!(r#" fill-opacity="{opacity:.2}""#);
             let corner = [left + strip as f64 * width, top];
-            // Neighbours overlap a little, so that no seam shows.
-            svg.rect(corner, [width + 0.2, height], &format!("{class} strip"), &fill);
+            svg.rect(corner, [width, height], &format!("{class} strip"), &fill);
         }
         svg.rect([left, top], [right - left, height], "outline", "");
         let Ticks { mut at, .. } = ticks::linear([self.low, self.high], 4);

@@ -54,9 +54,9 @@ pub fn readings(view: &View<'_>) -> Option<Figure> {
             "Readings relative to the median of each over all frames, in %; the sensor at rest is not known",
         ),
         RelativeTo::MedianInDeviations => (
-            "change from median (standard deviations)",
-            "Readings relative to the median of each over all frames, in its standard deviations; the sensor at rest \
-             is not known",
+            "change from median (σ)",
+            "Readings relative to the median of each over all frames, in its standard deviations σ; the sensor at \
+             rest is not known",
         ),
     };
     let unit = if shown.relative_to == RelativeTo::MedianInDeviations { "" } else { "%" };
@@ -106,7 +106,7 @@ fn channels(view: &View<'_>, label: &str, words: &str) -> Option<Figure> {
                 ticks::Ticks { low: 0.5, high: count as f64 + 0.5, at: at.clone() },
             ),
             y: Axis::linear(
-                format!("{}, {}", name(frame), label),
+                format!("{}: {label}", name(frame)),
                 ticks::linear(all().chain([0.0]), 4),
             ),
             series: vec![Series::new("", "c1", Mark::Bars(0.7), points)],
@@ -240,7 +240,7 @@ pub fn places(view: &View<'_>) -> Option<Figure> {
     };
     let caption = format!(
         "Place of the contact, true and decoded, seen from above. A line joins the two. {face_of} A place beyond \
-         the frame is drawn at its edge. {ORDER}"
+         the frame is drawn at its edge."
     );
     (!panels.is_empty()).then(|| Figure::of_panels(caption, &panels))
 }

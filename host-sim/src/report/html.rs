@@ -151,7 +151,7 @@ fn header(view: &View<'_>) -> String {
     if !view.verdict.warnings.is_empty() {
         html += "<ul class=\"warnings\">\n";
         for warning in &view.verdict.warnings {
-            let _ = writeln!(html, "<li>{}</li>", escape(warning));
+            let _ = writeln!(html, "<li>{}</li>", escape(&named(view, &warning.text)));
         }
         html += "</ul>\n";
     }

@@ -11,7 +11,7 @@ use crate::evaluate::distribution::{Distribution, Reference};
 use crate::evaluate::table1::{Column, Entry, NETWORK, Printed, Table1};
 use crate::metrics::{DecoderErrors, Errors, LimitSummary};
 use crate::run::{ModelSummary, RowErrors, RowWire, RunResult, SceneSummary, SensorSketch};
-use crate::verdict::Verdict;
+use crate::verdict::{Verdict, Warning};
 
 fn made() -> Made {
     let files = ["model.bin", "metrics.json"].map(String::from).to_vec();
@@ -131,7 +131,7 @@ fn result(groups: &[&str]) -> RunResult {
         },
         verdict: Verdict {
             sentence: "It is a <good> model of dz_mm.".into(),
-            warnings: vec!["Few frames.".into()],
+            warnings: vec![Warning { name: "few-frames", text: "Few frames for dz_mm.".into() }],
         },
         model: ModelSummary {
             projected_readings: 0,
@@ -203,7 +203,7 @@ fn the_page_is_whole_self_contained_and_always_the_same() {
         "number 9 (from 0)",
         "6.5–11.4 %",
         "It is a &lt;good&gt; model of Δz.",
-        "<li>Few frames.</li>",
+        "<li>Few frames for Δz.</li>",
         "200 <span>µs</span>",
         "14\u{202f}345 <span>B</span>",
         "fits a slot of 131\u{202f}056 B",

@@ -26,7 +26,17 @@ fn a_csv_file_trains_decodes_and_evaluates() {
     assert_eq!(inspected["networks"][1]["centres"], 24);
     assert_eq!(inspected["outputs"][0]["unit"], "mm");
 
-    let evaluated = json(&folder.succeed(&["eval", "m.bin", "test.csv", "--json"]));
+    let command = ["eval", "m.bin", "test.csv", "--html", "page.html"];
+    let evaluated = json(&folder.succeed(&[&command[..], &["--json"]].concat()));
+    let page = std::fs::read_to_string(folder.path("page.html")).unwrap();
+    for text in [
+        "m.bin on test.csv",
+        "host-sim eval m.bin test.csv --html page.html",
+        "<title>row-wire 4, electrode 1: ",
+        "relative to the median",
+    ] {
+        assert!(page.contains(text), "{text}");
+    }
     let rmse = |errors: &str| {
         let groups = evaluated[errors].as_array().unwrap();
         let z = groups.iter().find(|g| g["group"] == "dz_mm").unwrap();
@@ -297,6 +307,8 @@ fn run_writes_a_whole_folder_and_its_blob_is_the_one_that_train_writes() {
     let table = std::fs::read_to_string(out.join("table1.csv")).unwrap();
     // 4 noise levels × (2 baselines + 10 spreads × 2 networks) × 3 axes × 7 definitions.
     assert_eq!(table.lines().count(), 1 + 4 * (2 + 20) * 3 * 7);
+    let page = std::fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(page.contains("<code>host-sim run scene.toml --seed ") && page.contains("table1.csv"));
     let before = folder.names();
     folder.succeed(&["run", "scene.toml"]); // again, over what is there
     assert_eq!(folder.names(), before);
