@@ -39,12 +39,6 @@ fn one_of<T: Copy + Send + Sync + 'static, const N: usize>(
     })
 }
 
-/// Word of a command line, in quotes where a shell needs them.
-pub fn quoted(word: &str) -> String {
-    let plain = |c: char| c.is_alphanumeric() || "-_./".contains(c);
-    if word.chars().all(plain) { word.into() } else { format!("'{}'", word.replace('\'', "'\\''")) }
-}
-
 /// Error that names the option which sets `bad`'s field, if one of `options` (field, option) does.
 pub fn of_option(bad: BadValue, options: &[(&str, &str)]) -> Error {
     match options.iter().find(|(field, _)| *field == bad.field) {

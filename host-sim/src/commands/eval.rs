@@ -17,11 +17,11 @@ use taxel_data::output;
 use taxel_learn::{Exponential, ModelBlob};
 use taxel_limit::Refusal;
 
-use super::arguments::{exponential, quoted};
+use super::arguments::exponential;
 use super::confidence;
 use super::decode::remark_on_range;
 use super::readings::{BaselineArgument, model_inputs, table_of};
-use super::{Common, print};
+use super::{Common, command_line, print};
 
 /// Evaluate a model on a CSV file of readings and true outputs.
 #[derive(Args)]
@@ -177,17 +177,6 @@ fn page_of(
         ),
         ("Blob", format!("{} bytes, CRC-32 {:08x}", blob.bytes().len(), model.crc())),
     ];
-    let mut command = vec!["host-sim eval".to_owned()];
-    command.extend([&arguments.model, &arguments.data].map(|path| quoted(&path.to_string_lossy())));
-    if let Some(baseline) = &arguments.baseline.baseline {
-        command.push(format!("--baseline {}", quoted(&baseline.to_string_lossy())));
-    }
-    if arguments.exponential != Exponential::default() {
-        command.push(format!("--exponential {}", arguments.exponential.name()));
-    }
-    command.extend(
-        arguments.html.as_ref().map(|html| format!("--html {}", quoted(&html.to_string_lossy()))),
-    );
     let view = View {
         title: format!("{model_file} on {data_file}"),
         facts,
@@ -202,7 +191,7 @@ fn page_of(
         ideal_changes: &[],
         noise: None,
         table1: None,
-        made: &Made { command: command.join(" "), files: vec![] },
+        made: &Made { command: command_line::of_this_process("eval", &[], None), files: vec![] },
     };
     Ok(report::view_html(&view))
 }

@@ -12,7 +12,7 @@ use taxel_data::output;
 use taxel_learn::ModelBlob;
 
 use super::scene_argument::{NoiseArgument, RefineArgument, RelativeInputsArgument, SceneArgument};
-use super::{Common, print};
+use super::{Common, command_line, print};
 
 const DEFAULT_OUTPUT: &str = "out";
 /// Names of all files that a run may write.
@@ -55,35 +55,17 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     arguments.relative_inputs.apply(&mut scene);
     scene.training.refine = arguments.refine.over(scene.training.refine);
     let folder = arguments.output.join(&scene.name);
-    output::in_folder(&folder, || run_into(&folder, &scene, arguments, common))
+    output::in_folder(&folder, || run_into(&folder, &scene, arguments.scene.path(), common))
 }
 
-/// Command line that makes the same results again: the seed is always in it, the folder never.
-fn command_line(arguments: &Arguments, scene: &Experiment) -> String {
-    let mut words = vec!["host-sim run".to_owned(), arguments.scene.on_the_command_line()];
-    words.push(format!("--seed {}", scene.world.seed));
-    if arguments.noise.is_given() {
-        words.push(format!("--noise {}", scene.world.noise.level));
-    }
-    if arguments.relative_inputs.relative_inputs {
-        words.push("--relative-inputs".into());
-    }
-    words.extend(arguments.refine.on_the_command_line().map(String::from));
-    words.join(" ")
-}
-
-fn run_into(
-    folder: &Path,
-    scene: &Experiment,
-    arguments: &Arguments,
-    common: &Common,
-) -> Result<()> {
+fn run_into(folder: &Path, scene: &Experiment, scene_path: &Path, common: &Common) -> Result<()> {
     for file in FILES {
-        output::check_writable(&folder.join(file), &[arguments.scene.path()])?;
+        output::check_writable(&folder.join(file), &[scene_path])?;
     }
     let started = std::time::Instant::now();
     let (result, blob) = run::run(scene, &Terminal::new())?;
-    let files = write_files(folder, &result, &blob, command_line(arguments, scene))?;
+    let command = command_line::of_this_process("run", &["-o", "--output"], Some(scene.world.seed));
+    let files = write_files(folder, &result, &blob, command)?;
     if common.json {
         return print::json(&result);
     }

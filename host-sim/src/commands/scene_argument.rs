@@ -45,16 +45,6 @@ impl SceneArgument {
         Ok(scene)
     }
 
-    /// Scene and overrides as they were given, for a command line that repeats a run.
-    pub fn on_the_command_line(&self) -> String {
-        let scene = arguments::quoted(&self.scene);
-        match self.precision {
-            Some(Precision::F32) => format!("{scene} --precision f32"),
-            Some(Precision::F64) => format!("{scene} --precision f64"),
-            None => scene,
-        }
-    }
-
     /// Path of the scene, as an input that must not be replaced.
     pub fn path(&self) -> &Path {
         Path::new(&self.scene)
@@ -94,15 +84,6 @@ pub struct RefineArgument {
 }
 
 impl RefineArgument {
-    /// Option as it was given.
-    pub fn on_the_command_line(&self) -> Option<&'static str> {
-        match (self.refine, self.no_refine) {
-            (true, _) => Some("--refine"),
-            (false, true) => Some("--no-refine"),
-            (false, false) => None,
-        }
-    }
-
     /// Whether to refine, where `default` is what holds without an option.
     pub fn over(&self, default: bool) -> bool {
         self.refine || (default && !self.no_refine)
