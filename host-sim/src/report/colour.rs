@@ -12,8 +12,8 @@ pub struct ColourScale {
     diverging: bool,
 }
 
-/// Strips that a bar is drawn of.
-const STRIPS: usize = 32;
+/// Strips that a bar is drawn of: in the maps they are 8 px wide, so that no rounding makes them overlap.
+const STRIPS: usize = 31;
 
 impl ColourScale {
     /// Scale of values above and below zero: it covers zero and all `values` that are finite.
