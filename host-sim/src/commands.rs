@@ -3,6 +3,7 @@
 mod print;
 mod progress;
 mod arguments;
+mod command_line;
 mod scene_argument;
 mod data_notes;
 mod data_file;

@@ -1,5 +1,7 @@
 //! Evaluation: errors and costs of models, and the tables of these.
 
+pub mod distribution;
+pub mod device_cost;
 pub mod gate;
 pub mod drift;
 pub mod readout;

@@ -1,5 +1,4 @@
-//! Report of a run as one self-contained page: tables and figures, drawn from [`RunResult`] and nothing
-//! else.
+//! Reports as self-contained pages: tables and figures, drawn from result structs and nothing else.
 //!
 //! The figures are drawn here rather than by a chart crate because their colours are CSS classes:
 //! one page serves light and dark.
@@ -13,16 +12,34 @@ mod ticks;
 mod svg;
 mod chart;
 mod heat_map;
-mod tables;
+mod colour;
+mod voronoi;
+mod view;
+mod face;
+mod face_map;
+mod plot;
 mod figures;
+mod errors;
+mod frames;
+mod sketch;
+mod tables;
+mod sweep;
 mod html;
 mod trade;
 mod limit;
 
+pub use view::{Made, View};
+
 /// Page for `result`: no script, no file beside it, the same bytes for the same result.
 #[must_use]
-pub fn html(result: &RunResult) -> String {
-    html::page(result)
+pub fn html(result: &RunResult, made: &Made) -> String {
+    html::page(&View::of_run(result, made))
+}
+
+/// Page for a model, whatever its result is from: as [`html`].
+#[must_use]
+pub fn view_html(view: &View<'_>) -> String {
+    html::page(view)
 }
 
 /// Page for a trade between speed and accuracy.

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use host_sim::verdict::Warning;
 use host_sim::{Error, Result};
 use serde::Serialize;
 use taxel_data::csv_file::{self, Column};
@@ -160,17 +161,9 @@ fn kept(keep: &[String], file: &DataFile, outputs: &Table) -> Result<Table> {
     }
 }
 
-/// Share of clamped readings above which the model probably belongs to another sensor.
-const SUSPICIOUS: f64 = 0.01;
-
 /// Remarks on stderr if many readings lie outside the range that the model was trained on.
-pub fn remark_on_range(model: &PreparedModel<'_>, readings: &Table) {
-    let share = model.share_out_of_range(&readings.values);
-    if share > SUSPICIOUS {
-        eprintln!(
-            "note: {:.1} % of the readings lie outside the range that the model was trained on, and \
-             are clamped; is it the right model for this sensor?",
-            100.0 * share
-        );
+fn remark_on_range(model: &PreparedModel<'_>, readings: &Table) {
+    if let Some(warning) = Warning::out_of_range(model.share_out_of_range(&readings.values)) {
+        eprintln!("{warning}");
     }
 }

@@ -1,27 +1,31 @@
 //! Command `eval`: a model's errors on data whose outputs are known.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use host_sim::by_depth::{DepthErrors, by_depth};
 use host_sim::evaluate::confidence::{Coverage, coverage};
-use host_sim::metrics::{self, Errors, LimitSummary, Measure};
+use host_sim::evaluate::device_cost::DeviceCost;
+use host_sim::evaluate::distribution::{Distribution, Reference};
+use host_sim::metrics::{self, DecoderErrors, Errors, LimitSummary, Measure};
+use host_sim::report::{self, Made, View};
+use host_sim::verdict::{Verdict, Warning};
 use host_sim::{Error, Result};
 use serde::Serialize;
+use taxel_data::output;
 use taxel_learn::{Exponential, ModelBlob};
 use taxel_limit::Refusal;
 
 use super::arguments::exponential;
 use super::confidence;
 use super::data_file::DataFileArguments;
-use super::decode::remark_on_range;
 use super::readings::{BaselineArgument, model_inputs, table_of};
-use super::{Common, print};
+use super::{Common, command_line, print};
 
 /// Evaluate a model on a CSV file of readings and true outputs.
 #[derive(Args)]
 #[command(after_help = "Examples:
-  host-sim eval press.bin test.csv
+  host-sim eval press.bin test.csv --html report.html
   host-sim eval relative.bin test.csv --baseline rest.csv
   host-sim eval m.bin sensor.csv --join robot.csv --on c1 --tolerance 0.01 --missing -1 --last-share 0.2")]
 pub struct Arguments {
@@ -36,19 +40,26 @@ pub struct Arguments {
     /// Exponential of the activations.
     #[arg(long, alias = "kernel", value_parser = exponential(), default_value = "polynomial")]
     exponential: Exponential,
+    /// Write a page with the same figures as run's.
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
 }
 
 #[derive(Serialize)]
 struct Summary {
+    model: PathBuf,
+    model_crc: String,
+    data: PathBuf,
+    /// What the model is worth, in words.
+    verdict: Verdict,
     frames: usize,
     /// Number of true outputs in the file.
     values: usize,
     /// Number of these that count: neither they nor a reading they need is missing.
     values_evaluated: usize,
     exponential: Exponential,
-    errors: Vec<Errors>,
-    /// Errors of always predicting the mean of these outputs.
-    mean_errors: Vec<Errors>,
+    /// Errors of the model, and of always predicting the mean of these outputs.
+    decoders: Vec<DecoderErrors>,
     /// Errors of the model by the depth of the contact, if that is an output.
     by_depth: Vec<DepthErrors>,
     /// What the intervals of a model with a confidence cover; empty without one.
@@ -58,6 +69,12 @@ struct Summary {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+    if let Some(html) = &arguments.html {
+        let inputs =
+            [Some(&arguments.model), Some(&arguments.data), arguments.baseline.baseline.as_ref()];
+        let inputs: Vec<&Path> = inputs.into_iter().flatten().map(PathBuf::as_path).collect();
+        output::check_writable(html, &inputs)?;
+    }
     let blob = ModelBlob::read(&arguments.model)?;
     let model = blob.prepare(arguments.exponential);
     let model = arguments.baseline.apply(model, &arguments.model, arguments.file.fields())?;
@@ -77,7 +94,6 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         *truth = if estimate.is_nan() { f64::NAN } else { *truth };
     }
     let means = truth.means().repeat(truth.len());
-    remark_on_range(&model, &readings);
     let errors = metrics::by_group(&truth, &estimate.values, &measure);
     if errors.iter().all(|group| group.count == 0) {
         return Err(Error::Unfit {
@@ -91,19 +107,36 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         let told = novelty.iter().filter(|novelty| !novelty.is_nan()).count();
         100.0 * novelty.iter().filter(|novelty| **novelty > 0.0).count() as f64 / told.max(1) as f64
     });
+    let values_evaluated = errors.iter().map(|group| group.count).sum();
+    let of = |decoder: &str, errors| DecoderErrors { decoder: decoder.into(), errors };
+    let mean_errors = metrics::by_group(&truth, &means, &measure);
+    let decoders = vec![of("network", errors), of("mean", mean_errors)];
+    let verdict = Verdict::of(&decoders, &LimitSummary::of(&Err(Refusal::Measured)))
+        .with(Warning::out_of_range(model.share_out_of_range(&readings.values)));
     let summary = Summary {
+        model: arguments.model.clone(),
+        model_crc: format!("{:08x}", model.model().crc()),
+        data: arguments.data.clone(),
+        verdict,
+        decoders,
         coverage: deviations.map_or(vec![], |deviations: Vec<f64>| {
             coverage(&truth, &estimate.values, &deviations, ratios_95)
         }),
         percent_novel,
         frames: readings.len(),
         values: truth.values.len(),
-        values_evaluated: errors.iter().map(|group| group.count).sum(),
+        values_evaluated,
         exponential: arguments.exponential,
-        errors,
-        mean_errors: metrics::by_group(&truth, &means, &measure),
         by_depth: by_depth(&truth, &estimate.values, &measure),
     };
+    if let Some(html) = &arguments.html {
+        let fields = arguments.file.fields();
+        let at_rest = arguments.baseline.values(metadata, &arguments.model, fields)?;
+        let reference = at_rest.as_deref().map_or(Reference::Median, Reference::Rest);
+        let distribution = Distribution::of(&truth, &estimate, &readings, reference);
+        let page = page_of(arguments, &blob, &summary, &distribution)?;
+        output::write_bytes(html, page.as_bytes())?;
+    }
     if common.json {
         return print::json(&summary);
     }
@@ -115,7 +148,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             summary.values_evaluated, summary.values
         ));
     }
-    print::errors(&mut page, &[("model", &summary.errors), ("mean", &summary.mean_errors)]);
+    let decoders: Vec<(&str, &[Errors])> =
+        summary.decoders.iter().map(|it| (it.decoder.as_str(), it.errors.as_slice())).collect();
+    print::errors(&mut page, &decoders);
     print::errors_legend(&mut page);
     page.line(LimitSummary::of(&Err(Refusal::Measured)).note());
     print::by_depth(&mut page, &summary.by_depth);
@@ -125,5 +160,52 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         confidence::page(&mut page, &summary.coverage);
         page.line(format_args!("{percent:.2} % of the frames are novel: unlike those of training"));
     }
+    print::verdict(&mut page, None, &summary.verdict);
     page.print()
+}
+
+/// Page of the evaluation.
+fn page_of(
+    arguments: &Arguments,
+    blob: &ModelBlob,
+    summary: &Summary,
+    distribution: &Distribution,
+) -> Result<String> {
+    let limit = LimitSummary::of(&Err(Refusal::Measured));
+    let model = blob.parse();
+    let name_of = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let [model_file, data_file] = [&arguments.model, &arguments.data].map(|path| name_of(path));
+    let facts = vec![
+        ("Data", format!("{data_file}: {} frames", summary.frames)),
+        (
+            "Values",
+            format!("{} of {} true outputs count", summary.values_evaluated, summary.values),
+        ),
+        (
+            "Model",
+            format!(
+                "{model_file}, trained on {:?}, {} frames",
+                model.metadata().name,
+                model.metadata().training_frames
+            ),
+        ),
+        ("Blob", format!("{} bytes, CRC-32 {:08x}", blob.bytes().len(), model.crc())),
+    ];
+    let view = View {
+        title: format!("{model_file} on {data_file}"),
+        facts,
+        verdict: &summary.verdict,
+        device: &DeviceCost::of(blob)?,
+        decoders: &summary.decoders,
+        limit: &limit,
+        by_depth: &summary.by_depth,
+        distribution,
+        frames: summary.frames,
+        sensor: None,
+        ideal_changes: &[],
+        noise: None,
+        table1: None,
+        made: &Made { command: command_line::of_this_process("eval", &[], None), files: vec![] },
+    };
+    Ok(report::view_html(&view))
 }

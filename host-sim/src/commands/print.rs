@@ -127,7 +127,7 @@ pub fn verdict(page: &mut Page, judged_on: Option<&str>, verdict: &Verdict) {
 }
 
 /// Adds text in lines of at most 110 characters.
-fn wrapped(page: &mut Page, text: &str) {
+pub fn wrapped(page: &mut Page, text: &str) {
     let mut line = String::new();
     for word in text.split(' ') {
         if !line.is_empty() && line.chars().count() + 1 + word.chars().count() > 110 {
@@ -180,10 +180,11 @@ fn number(value: f64) -> String {
     }
 }
 
-/// Explains the columns of [`errors`] in one line.
+/// Explains the columns of [`errors`].
 pub fn errors_legend(page: &mut Page) {
-    page.line(format_args!(
-        "rel. L2 = ‖e‖/‖Δ‖; %FS = mean|e|/full scale; position = mean|e|/(H − Δz); \
-         mean rel = mean(|e|/|Δ|) where |Δ| > 10 % FS;\nfull scale (FS): the largest deformation that the scene allows, or a measured column's range;\n× limit = RMSE/least possible RMSE"
-    ));
+    page.line(
+        "rel. L2 = ‖e‖/‖Δ‖; %FS = mean|e|/full scale; position = mean|e|/(H − Δz);\n\
+         mean rel = mean(|e|/|Δ|) where |Δ| > 10 % FS; × limit = RMSE/least possible RMSE;\n\
+         full scale (FS): the largest deformation that the scene allows, or a measured column's range",
+    );
 }

@@ -4,24 +4,28 @@ use std::path::{Path, PathBuf};
 
 use super::progress::Terminal;
 use clap::Args;
-use host_sim::experiment::Experiment;
+use host_sim::Result;
+use host_sim::report::{self, Made};
 use host_sim::run::{self, RunResult};
-use host_sim::{Error, Result, report};
+use host_sim::subject::Subject;
 use taxel_data::output;
 use taxel_learn::ModelBlob;
 
 use super::subject_argument::SubjectArgument;
-use super::{Common, print};
+use super::{Common, command_line, print};
 
 const DEFAULT_OUTPUT: &str = "out";
 /// Names of all files that a run may write.
 const FILES: [&str; 4] = ["model.bin", "metrics.json", "table1.csv", "report.html"];
 
-/// Run a scene: synthesise, train, write the blob, evaluate, report.
+/// Do the whole job for a scene or a CSV file: train, write the blob, evaluate, report.
 ///
-/// Writes model.bin, metrics.json, table1.csv and report.html to out/<scene>/.
+/// Writes model.bin, metrics.json, table1.csv and report.html to out/<name>/. Frames of a scene are synthesised. Of a
+/// CSV file, the last fifth is held out to judge by.
 #[derive(Args)]
-#[command(after_help = "Example: host-sim run press --noise 0.01 -o out/noise-1")]
+#[command(after_help = "Examples:
+  host-sim run press --noise 0.01 -o out/noise-1
+  host-sim run measured.csv --inputs 'ch*' --outputs 'f?_n' --fold-column fold")]
 pub struct Arguments {
     #[command(flatten)]
     subject: SubjectArgument,
@@ -38,21 +42,18 @@ impl Default for Arguments {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let subject = arguments.subject.load(common)?;
-    let Some(scene) = subject.scene() else {
-        let message = format!("run {}: give a scene, and train on a CSV file", subject.name());
-        return Err(Error::Usage(message));
-    };
-    let folder = arguments.output.join(&scene.name);
-    output::in_folder(&folder, || run_into(&folder, scene, &arguments.subject.paths(), common))
+    let folder = arguments.output.join(subject.name());
+    output::in_folder(&folder, || run_into(&folder, &subject, &arguments.subject.paths(), common))
 }
 
-fn run_into(folder: &Path, scene: &Experiment, inputs: &[&Path], common: &Common) -> Result<()> {
+fn run_into(folder: &Path, subject: &Subject, inputs: &[&Path], common: &Common) -> Result<()> {
     for file in FILES {
         output::check_writable(&folder.join(file), inputs)?;
     }
     let started = std::time::Instant::now();
-    let (result, blob) = run::run(scene, &Terminal::new())?;
-    let files = write_files(folder, &result, &blob)?;
+    let (result, blob) = run::run(subject, &Terminal::new())?;
+    let command = command_line::of_this_process("run", &["-o", "--output"], Some(result.seed));
+    let files = write_files(folder, &result, &blob, command)?;
     if common.json {
         return print::json(&result);
     }
@@ -61,7 +62,12 @@ fn run_into(folder: &Path, scene: &Experiment, inputs: &[&Path], common: &Common
     Ok(())
 }
 
-fn write_files(folder: &Path, result: &RunResult, blob: &ModelBlob) -> Result<Vec<&'static str>> {
+fn write_files(
+    folder: &Path,
+    result: &RunResult,
+    blob: &ModelBlob,
+    command: String,
+) -> Result<Vec<&'static str>> {
     let mut files = vec!["model.bin", "metrics.json"];
     output::write_bytes(&folder.join("model.bin"), blob.bytes())?;
     let metrics = print::json_text(result)?;
@@ -70,27 +76,35 @@ fn write_files(folder: &Path, result: &RunResult, blob: &ModelBlob) -> Result<Ve
         table.write_csv(&folder.join("table1.csv"))?;
         files.push("table1.csv");
     }
-    output::write_bytes(&folder.join("report.html"), report::html(result).as_bytes())?;
+    let made = Made { command, files: files.iter().map(|file| (*file).to_owned()).collect() };
+    output::write_bytes(&folder.join("report.html"), report::html(result, &made).as_bytes())?;
     files.push("report.html");
     Ok(files)
 }
 
 fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
     let mut page = print::Page::default();
-    let (scene, model) = (&result.scene, &result.model);
-    page.line(format_args!(
-        "{}: {} noise {} %{}, seed {}, {} training and {} test frames",
-        scene.name,
-        scene.noise_kind,
-        scene.noise_level * 100.0,
-        match scene.gain_drift {
-            0.0 => String::new(),
-            gain => format!(", gain drift ±{} %", gain * 100.0),
-        },
-        scene.seed,
-        model.training_frames,
-        model.test_frames
-    ));
+    let model = &result.model;
+    let from = match (&result.scene, &result.data) {
+        (Some(scene), _) => format!(
+            "{} noise {} %{}, {} training and {} test frames",
+            scene.noise_kind,
+            scene.noise_level * 100.0,
+            match scene.gain_drift {
+                0.0 => String::new(),
+                gain => format!(", gain drift ±{} %", gain * 100.0),
+            },
+            model.training_frames,
+            model.test_frames
+        ),
+        (None, data) => format!(
+            "{} training frames, {} test frames: {}",
+            model.training_frames,
+            model.test_frames,
+            data.as_ref().map_or("", |data| data.test_frames.as_str())
+        ),
+    };
+    page.line(format_args!("{}: {from}, seed {}", result.subject, result.seed));
     page.line(format_args!(
         "model: {} network{}, {} -> K = {} -> {}, spread {}{}, {} bytes, CRC-32 {}",
         model.networks,
@@ -110,7 +124,7 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
         model.spread,
         if model.refined { " (refined)" } else { "" },
         model.blob_bytes,
-        model.blob_crc
+        model.model_crc
     ));
     page.line(format_args!(
         "a frame on a Cortex-M4F: {} instructions, {} cycles at zero wait, {} from flash",
@@ -121,7 +135,7 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
         result.decoders.iter().map(|d| (d.decoder.as_str(), d.errors.as_slice())).collect();
     print::errors(&mut page, &decoders);
     print::errors_legend(&mut page);
-    page.line(result.limit.note());
+    print::wrapped(&mut page, &result.limit.note());
     print::by_depth(&mut page, &result.by_depth);
     if !result.rows.is_empty() {
         let wires = result.rows.iter().map(|row| row.row_wire.to_string());
@@ -145,5 +159,10 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
         }
     }
     page.line(format_args!("\nwritten to {}: {}", folder.display(), files.join(", ")));
+    print::verdict(&mut page, None, &result.verdict);
+    page.line(format_args!("\nNext: open {}", folder.join("report.html").display()));
+    if result.scene.is_some() && result.subject == "press" {
+        page.line("The paper's own scene is `run paper`, and its Table 1 `table1`.");
+    }
     page
 }

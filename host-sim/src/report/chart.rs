@@ -21,8 +21,6 @@ pub enum Mark {
     Points(Shape),
     /// Bars from zero, this wide on the x axis.
     Bars(f64),
-    /// Thin vertical lines from these values to the points.
-    From(Vec<f64>),
 }
 
 /// Series of values.
@@ -107,6 +105,8 @@ struct Frame<'c> {
 
 const LINE_PX: f64 = TEXT_PX + 7.0;
 const SWATCH_PX: f64 = 24.0;
+/// Room between the end of a line and its name, in px.
+const LEADER_PX: f64 = 26.0;
 /// Largest width of a bar, in px.
 const BAR_PX: f64 = 30.0;
 
@@ -117,7 +117,7 @@ impl Chart {
         let tick_width =
             |ticks: &Ticks| ticks.at.iter().map(|(_, label)| text_width(label)).fold(0.0, f64::max);
         let named = self.series.iter().filter(|series| !series.name.is_empty());
-        let end_width = named.map(|s| text_width(&s.name)).fold(0.0, f64::max) + 12.0;
+        let end_width = named.map(|s| text_width(&s.name)).fold(0.0, f64::max) + LEADER_PX;
         // Charts that stand above each other are aligned unless a label is long.
         let left = tick_width(&self.y.ticks).max(5.0 * text_width("0")) + 10.0;
         let mut frame = Frame {
@@ -218,7 +218,7 @@ fn swatch(svg: &mut Svg, series: &Series, [x, y]: [f64; 2]) {
         Mark::Points(shape) => {
             svg.path(&shape.path(middle, 1.0), &format!("{} mark", series.class));
         }
-        Mark::Bars(_) | Mark::From(_) => {
+        Mark::Bars(_) => {
             let class = format!("{} mark", series.class);
             svg.rect([x + 3.0, y - 5.0], [11.0, 10.0], &class, "");
         }
@@ -287,13 +287,6 @@ impl Frame<'_> {
                     svg.rect(corner, [px, (a - b).abs()], &class("mark"), "");
                 }
             }
-            Mark::From(others) => {
-                let pairs = series.points.iter().zip(others);
-                for ([x, y], other) in pairs.filter(|(p, other)| present(p) && other.is_finite()) {
-                    let x = self.x(*x);
-                    svg.line([x, self.y(*other)], [x, self.y(*y)], &class("thin"));
-                }
-            }
         }
     }
 
@@ -338,28 +331,49 @@ impl Frame<'_> {
     fn draw_end_labels(&self, svg: &mut Svg) {
         const GAP: f64 = TEXT_PX + 3.0;
         let named = self.chart.series.iter().filter(|series| !series.name.is_empty());
-        let mut labels: Vec<(f64, &Series)> = named
+        // Place of the line's end, height of its name, and the series.
+        let mut labels: Vec<([f64; 2], f64, &Series)> = named
             .filter_map(|series| {
-                let [_, y] = series.points.iter().rev().find(|[_, y]| y.is_finite())?;
-                Some((self.y(y.min(self.chart.y.ticks.high)), series))
+                let [x, y] = series.points.iter().rev().find(|[_, y]| y.is_finite())?;
+                let y = self.y(y.min(self.chart.y.ticks.high));
+                Some(([self.x(*x), y], y, series))
             })
             .collect();
-        labels.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut free = f64::NEG_INFINITY;
-        for (y, _) in &mut labels {
-            *y = y.max(free);
-            free = *y + GAP;
+        labels.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let heights: Vec<f64> = labels.iter().map(|label| label.1).collect();
+        let heights = apart(&heights, GAP, [self.top, self.bottom]);
+        for (label, height) in labels.iter_mut().zip(heights) {
+            label.1 = height;
         }
-        let mut limit = self.bottom;
-        for (y, _) in labels.iter_mut().rev() {
-            *y = y.min(limit);
-            limit = *y - GAP;
-        }
-        for (y, series) in labels {
+        for ([x, end], y, series) in labels {
+            // A thin line leads from the end of the line to its name.
+            let from = [x + 6.0, end];
+            let to = [self.right + LEADER_PX - 4.0, y];
+            svg.line(from, to, &format!("{} thin", series.class.replace(" broken", "")));
             let class = format!("{} name", series.class);
-            svg.text(self.right + 8.0, y + TEXT_PX * 0.35, Anchor::Start, &class, &series.name);
+            let x = self.right + LEADER_PX;
+            svg.text(x, y + TEXT_PX * 0.35, Anchor::Start, &class, &series.name);
         }
     }
+}
+
+/// Places as near to the `wanted` ones (ascending) as they can be with this `gap` between them, and within `bounds` if
+/// there is room.
+fn apart(wanted: &[f64], gap: f64, [low, high]: [f64; 2]) -> Vec<f64> {
+    // Neighbours that are too close share what is moved: pools of a mean place, and their number.
+    let mut pools: Vec<(f64, usize)> = Vec::new();
+    for (i, place) in wanted.iter().enumerate() {
+        pools.push((place - gap * i as f64, 1));
+        while let [.., (a, n), (b, m)] = pools[..]
+            && a > b
+        {
+            pools.truncate(pools.len() - 2);
+            pools.push(((a * n as f64 + b * m as f64) / (n + m) as f64, n + m));
+        }
+    }
+    let most = high - gap * wanted.len().saturating_sub(1) as f64;
+    let levels = pools.iter().flat_map(|(level, count)| std::iter::repeat_n(*level, *count));
+    levels.enumerate().map(|(i, level)| level.max(low).min(most) + gap * i as f64).collect()
 }
 
 #[cfg(test)]
@@ -389,8 +403,6 @@ mod tests {
         assert_eq!(path.matches('L').count(), 1, "{path}");
         let bars = chart(Mark::Bars(0.8), &values).draw([400.0, 200.0]);
         assert_eq!(bars.matches("<rect").count(), 3);
-        let from = chart(Mark::From(vec![0.0, 0.0, f64::NAN, 0.0, 0.0]), &values);
-        assert_eq!(from.draw([400.0, 200.0]).matches("c1 thin").count(), 2);
         let points = chart(Mark::Points(Shape::Square), &values[..4]).draw([400.0, 200.0]);
         assert_eq!(points.matches("c1 mark").count(), 3);
     }
@@ -399,6 +411,14 @@ mod tests {
     fn a_value_off_the_scale_is_marked_with_its_number() {
         let svg = chart(Mark::LineAnd(Shape::Circle), &[0.5, 37.0]).draw([400.0, 200.0]);
         assert!(svg.contains(">37</text>"), "{svg}");
+    }
+
+    #[test]
+    fn places_move_apart_by_as_little_as_they_can() {
+        assert_eq!(apart(&[10.0, 40.0], 15.0, [0.0, 100.0]), [10.0, 40.0]);
+        assert_eq!(apart(&[50.0, 50.0, 90.0], 10.0, [0.0, 100.0]), [45.0, 55.0, 90.0]);
+        assert_eq!(apart(&[98.0, 99.0], 10.0, [0.0, 100.0]), [90.0, 100.0]);
+        assert_eq!(apart(&[1.0, 2.0], 10.0, [0.0, 100.0]), [0.0, 10.0]);
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! Numbers and names as people read them.
 
+use taxel_data::columns::unit_of;
+
 /// Text for a value that is not defined.
 pub const UNDEFINED: &str = "–";
 
@@ -47,21 +49,15 @@ pub fn percent(fraction: f64) -> String {
     format!("{}\u{a0}%", (fraction * 1e8).round() / 1e6)
 }
 
-/// Symbol of a group of outputs: Δz for `dz_mm`.
+/// Symbol of a group of outputs, without its unit: Δz for `dz_mm`, and words for a column's name.
 pub fn symbol(group: &str) -> String {
     match axis(group) {
         Some(axis) if group.starts_with('d') => format!("Δ{axis}"),
         Some(axis) => format!("F{axis}"),
-        None => group.into(),
-    }
-}
-
-/// Quantity that a group of outputs measures: deformation for `dz_mm`.
-pub fn quantity(group: &str) -> &'static str {
-    match axis(group) {
-        Some(_) if group.starts_with('d') => "deformation",
-        Some(_) => "force",
-        None => "output",
+        None => {
+            let ending = if unit_of(group).is_empty() { None } else { group.rsplit_once('_') };
+            ending.map_or(group, |(name, _)| name).replace('_', " ")
+        }
     }
 }
 
@@ -104,8 +100,8 @@ mod tests {
 
     #[test]
     fn groups_are_written_by_their_symbols() {
-        assert_eq!((symbol("dz_mm").as_str(), quantity("dz_mm")), ("Δz", "deformation"));
-        assert_eq!((symbol("fx_n").as_str(), quantity("fx_n")), ("Fx", "force"));
-        assert_eq!((symbol("depth_mm").as_str(), quantity("depth_mm")), ("depth_mm", "output"));
+        let names = ["dz_mm", "fx_n", "contact_depth_mm", "x_mm", "ch1", "b"];
+        let symbols = ["Δz", "Fx", "contact depth", "x", "ch1", "b"];
+        assert_eq!(names.map(symbol), symbols);
     }
 }

@@ -2,16 +2,18 @@
 
 use std::fmt::{Display, Write as _};
 
-use super::figures::{self, Figure};
-use super::format::{grouped, percent, quantity, significant, symbol};
+use super::face::Face;
+use super::figures::Figure;
+use super::format::{grouped, significant, symbol};
 use super::svg::escape;
-use super::tables;
-use crate::run::RunResult;
+use super::view::View;
+use super::{errors, frames, sketch, sweep, tables};
 
-/// Body of a page, which numbers its figures and tables.
+/// Body of a page, which numbers its figures and tables, and lists its headings.
 #[derive(Default)]
 struct Body {
     html: String,
+    headings: Vec<(&'static str, &'static str)>,
     figures: usize,
     tables: usize,
 }
@@ -22,8 +24,9 @@ impl Body {
         let _ = write!(self.html, "{html}");
     }
 
-    fn heading(&mut self, text: &str) {
-        self.add(format_args!("<h2>{}</h2>\n", escape(text)));
+    fn heading(&mut self, id: &'static str, text: &'static str) {
+        self.headings.push((id, text));
+        self.add(format_args!("<h2 id=\"{id}\">{}</h2>\n", escape(text)));
     }
 
     fn figure(&mut self, figure: &Figure) {
@@ -48,56 +51,82 @@ impl Body {
     }
 }
 
-/// Whole page of a run.
-pub fn page(result: &RunResult) -> String {
+/// Whole page of a model.
+pub fn page(view: &View<'_>) -> String {
     let mut body = Body::default();
-    body.html += &header(result);
-    body.html += &summary(result);
+    let face = Face::of_electrodes(view.distribution, view.sensor);
+    error_section(&mut body, view, face.as_ref());
+    frame_section(&mut body, view, face.as_ref());
+    if let Some(sensor) = view.sensor {
+        body.heading("sensor", "The sensor");
+        body.figure(&sketch::figure(sensor));
+    }
+    if let (Some(table), Some(group)) = (view.table1, view.distribution.main_group()) {
+        body.heading("noise", "Noise and spread");
+        body.figure(&sweep::error_by_noise(table, &group.group, &group.unit));
+        body.figure(&sweep::error_by_spread(table, &group.group, &group.unit));
+        body.add("<details>\n<summary>Table 1 of the paper, in the paper’s metric</summary>\n");
+        let caption = tables::table1_caption(table, &group.group);
+        body.table(&caption, &tables::table1(table, &group.group), "");
+        body.add("</details>\n");
+    }
+    body.heading("made", "How this was made");
+    body.html += &made(view);
+    let top = header(view) + &contents(&body.headings);
+    document(&format!("Taxel: {}", view.title), &(top + &body.html))
+}
 
-    body.heading("Errors");
+fn error_section(body: &mut Body, view: &View<'_>, face: Option<&Face>) {
+    body.heading("errors", "Errors");
     body.table(
         &format!(
-            "Errors on {} test frames, by output and decoder. No definition stands alone: they \
-             differ by more than the decoders do.",
-            grouped(result.model.test_frames)
+            "Errors on {} frames, by output and decoder. No definition stands alone: they differ by more than the \
+             decoders do.",
+            grouped(view.frames)
         ),
-        &tables::errors(result),
-        &format!("{}<p class=\"note\">{}</p>\n", tables::legend(), escape(&result.limit.note())),
+        &tables::errors(view.decoders),
+        &format!(
+            "{}<p class=\"note\">{}</p>\n",
+            tables::legend(view.decoders),
+            escape(&named(view, &view.limit.note()))
+        ),
     );
+    body.figure(&errors::density(view));
+    body.figure(&errors::histogram(view));
+    if let Some(face) = face {
+        body.figure(&errors::by_electrode(view, face));
+    }
+    if !view.by_depth.is_empty() {
+        let caption = "RMSE of the model by the true depth of the contact. The last line holds all frames that are \
+                       not shallow.";
+        body.table(caption, &tables::by_depth(view.by_depth), "");
+    }
+}
 
-    body.heading("One test frame");
-    body.figure(&figures::readings(result));
-    let of_electrodes = !result.rows.is_empty();
-    let shown = figures::shown(&result.example);
-    if of_electrodes {
-        body.figure(&figures::by_electrode(result));
-        body.figure(&figures::error_by_electrode(result));
-        if let Some(output) = shown {
-            body.figure(&figures::maps(result, output));
+fn frame_section(body: &mut Body, view: &View<'_>, face: Option<&Face>) {
+    if view.distribution.frames.is_empty() {
+        return;
+    }
+    body.heading("frames", "Three frames: median, 95 % and worst");
+    if let Some(readings) = frames::readings(view) {
+        body.figure(&readings);
+    }
+    if let Some(face) = face {
+        for frame in &view.distribution.frames {
+            if let Some(maps) = frames::maps(view, face, frame) {
+                body.figure(&maps);
+            }
+        }
+        if let Some(arrows) = frames::arrows(view, face) {
+            body.figure(&arrows);
         }
     } else {
-        let caption = format!("Outputs of {}, true and decoded.", figures::chosen(result));
-        body.table(&caption, &tables::example(result), "");
+        if let Some(places) = frames::places(view) {
+            body.figure(&places);
+        }
+        let caption = "Outputs of these frames, true and decoded; in brackets the number of the frame, from 0.";
+        body.table(caption, &tables::frames(view), "");
     }
-    if let (Some(table), Some(output)) = (&result.table1, shown) {
-        body.heading("Noise and spread");
-        body.figure(&figures::error_by_noise(table, &output.group, &output.unit));
-        body.figure(&figures::error_by_spread(table, &output.group, &output.unit));
-        let caption = tables::table1_caption(table, &output.group);
-        body.table(&caption, &tables::table1(table, &output.group), "");
-    }
-    if !result.by_depth.is_empty() {
-        body.heading("By depth");
-        let caption = "RMSE of the network by the true depth of the contact. The last line holds all frames that \
-                       are not shallow.";
-        body.table(caption, &tables::by_depth(result), "");
-    }
-    if of_electrodes {
-        body.heading("By row-wire");
-        body.figure(&figures::by_row_wire(result));
-    }
-
-    document(&format!("Taxel: {}", result.scene.name), &body.html)
 }
 
 /// Page with this title around `body`, which is HTML: no script, no file beside it.
@@ -112,80 +141,94 @@ pub fn document(title: &str, body: &str) -> String {
     )
 }
 
-fn header(result: &RunResult) -> String {
-    let (scene, model) = (&result.scene, &result.model);
-    let tail = if model.affine_tail { "affine tail" } else { "no affine tail" };
-    let readings = if model.relative_inputs { "relative readings" } else { "readings" };
-    let inputs = match model.projected_readings {
-        0 => format!("{} {readings}", model.inputs),
-        count => format!("{count} {readings} → {} features", model.inputs),
+/// Top of the page: the verdict, the cost, and the errors in short.
+fn header(view: &View<'_>) -> String {
+    let mut html = format!(
+        "<header>\n<h1>{}</h1>\n<p class=\"verdict\">{}</p>\n",
+        escape(&view.title),
+        escape(&named(view, &view.verdict.sentence))
+    );
+    if !view.verdict.warnings.is_empty() {
+        html += "<ul class=\"warnings\">\n";
+        for warning in &view.verdict.warnings {
+            let _ = writeln!(html, "<li>{}</li>", escape(&named(view, &warning.text)));
+        }
+        html += "</ul>\n";
+    }
+    html += &cost(view);
+    html += &tables::headline(view);
+    let limit = if view.limit.groups.is_empty() {
+        ""
+    } else {
+        " Least possible: the limit that no decoder of these readings can pass; × limit: the network’s ratio to it."
     };
-    let outputs = match model.expanded_outputs {
-        0 => format!("{} outputs", model.outputs),
-        all => format!("{} components → {all} outputs", model.outputs),
+    let linear = if view.decoders.iter().any(|decoder| decoder.decoder == "linear") {
+        " Linear: the best linear decoder, which shows how much needs no network."
+    } else {
+        ""
     };
-    let drift = match scene.gain_drift {
-        0.0 => String::new(),
-        gain => format!(" · gain drift ±{}", percent(gain)),
+    let _ = writeln!(
+        html,
+        "<p class=\"note\">Root mean square errors on {} frames. Mean: always predicting the mean, which ignores the \
+         readings: a decoder that is no better has learnt nothing.{linear}{limit}</p>\n</header>",
+        grouped(view.frames)
+    );
+    html
+}
+
+/// Sentence in which groups of outputs have their symbols.
+fn named(view: &View<'_>, sentence: &str) -> String {
+    let groups = view.distribution.groups.iter();
+    groups
+        .fold(sentence.to_owned(), |text, group| text.replace(&group.group, &symbol(&group.group)))
+}
+
+/// What decoding costs a device.
+fn cost(view: &View<'_>) -> String {
+    let device = view.device;
+    let weights = if device.weights_in_ram { device.blob_bytes } else { 0 };
+    let ram = grouped(device.ram_bytes + weights);
+    let of_ram = match weights {
+        0 => "weights stay in flash".to_owned(),
+        bytes => format!("{} of them weights", grouped(bytes)),
     };
-    let refined = if model.refined { " (refined)" } else { "" };
-    let plural = if model.networks == 1 { "" } else { "s" };
+    let fits = if device.fits_slot { "fits" } else { "does not fit" };
+    let least = if device.weights_in_ram { "" } else { "at least " };
     format!(
-        "<header>\n<h1>Scene “{}”</h1>\n\
-         <p>{} noise of {}{} · seed {} · {} training and {} test frames · scene digest {}</p>\n\
-         <p>{} network{plural}: {inputs} → K = {} → {outputs} · spread {}{refined} · {tail} · \
-         {} bytes · CRC-32 {}</p>\n\
-         <p>A frame on a Cortex-M4F: {} cycles at zero wait, {} from flash (by the price list in docs/cycles.md)</p>\n</header>\n",
-        escape(&scene.name),
-        escape(&scene.noise_kind),
-        percent(scene.noise_level),
-        drift,
-        scene.seed,
-        grouped(model.training_frames),
-        grouped(model.test_frames),
-        escape(&scene.digest),
-        model.networks,
-        model.centres,
-        model.spread,
-        grouped(model.blob_bytes),
-        escape(&model.blob_crc),
-        grouped(model.frame.cycles as usize),
-        grouped(model.frame.flash_cycles as usize)
+        "<dl>\n<div><dt>Decoding a frame</dt><dd>{least}{} <span>µs</span></dd><dd class=\"small\">{least}{} cycles \
+         from flash at 180 MHz; {} without waiting</dd></div>\n\
+         <div><dt>RAM</dt><dd>{ram} <span>B</span></dd><dd class=\"small\">{of_ram}</dd></div>\n\
+         <div><dt>Blob</dt><dd>{} <span>B</span></dd><dd class=\"small\">{fits} a slot of {} B</dd></div>\n</dl>\n",
+        significant(device.flash_us, 3),
+        grouped(device.flash_cycles as usize),
+        grouped(device.cycles as usize),
+        grouped(device.blob_bytes),
+        grouped(device.slot_bytes)
     )
 }
 
-/// Headline: one output, every decoder.
-fn summary(result: &RunResult) -> String {
-    let Some(output) = figures::shown(&result.example) else { return String::new() };
-    let (group, unit) = (&output.group, &output.unit);
-    let name = escape(&symbol(group));
-    let mut html = format!(
-        "<section class=\"summary\">\n<p>A network decodes the sensor’s row–column resistances to \
-         {}. RMSE of {name} over {} test frames:</p>\n<dl>\n",
-        if result.rows.is_empty() {
-            "few numbers of the whole array".to_owned()
-        } else {
-            format!("the {} of its electrodes", quantity(group))
-        },
-        grouped(result.model.test_frames)
-    );
-    for decoder in &result.decoders {
-        let _ = writeln!(
-            html,
-            "<div><dt>{}</dt><dd>{} <span>{}</span></dd></div>",
-            escape(tables::decoder_name(decoder)),
-            significant(tables::rmse(&decoder.errors, group), 3),
-            escape(unit)
-        );
+fn contents(headings: &[(&str, &str)]) -> String {
+    let links = headings.iter().map(|(id, text)| format!("<a href=\"#{id}\">{}</a>", escape(text)));
+    format!("<nav aria-label=\"Contents\">{}</nav>\n", links.collect::<Vec<_>>().join(" "))
+}
+
+/// Command, files and facts.
+fn made(view: &View<'_>) -> String {
+    let mut html = String::new();
+    if !view.made.command.is_empty() {
+        let _ = writeln!(html, "<pre><code>{}</code></pre>", escape(&view.made.command));
     }
-    if let Some(limit) = result.limit.groups.iter().find(|limit| limit.group == *group) {
-        let _ = writeln!(
-            html,
-            "<div><dt>Least possible</dt><dd>{} <span>{}</span></dd></div>",
-            significant(limit.limit, 3),
-            escape(unit)
-        );
+    html += "<dl class=\"facts\">\n";
+    for (name, value) in &view.facts {
+        let _ = writeln!(html, "<div><dt>{name}</dt><dd>{}</dd></div>", escape(value));
     }
-    html + "</dl>\n<p>The training mean ignores the readings: a decoder has learnt nothing unless \
-            it is better. The best linear decoder shows how much needs no network.</p>\n</section>\n"
+    if !view.made.files.is_empty() {
+        let link = |file: &String| format!("<a href=\"{0}\">{0}</a>", escape(file));
+        let links: Vec<String> = view.made.files.iter().map(link).collect();
+        let _ = writeln!(html, "<div><dt>Files</dt><dd>{}</dd></div>", links.join(", "));
+    }
+    let version = env!("CARGO_PKG_VERSION");
+    let _ = writeln!(html, "<div><dt>Program</dt><dd>host-sim {version}</dd></div>\n</dl>");
+    html + "<p class=\"note\">Cycles and RAM are those of a Cortex-M4F by the price list in docs/cycles.md, without a \
+            gate.</p>\n"
 }

@@ -112,6 +112,21 @@ impl Svg {
         ));
     }
 
+    /// Adds a rectangle with a text that is shown while the pointer is over it.
+    pub fn hovered_rect(
+        &mut self,
+        [x, y]: [f64; 2],
+        [width, height]: [f64; 2],
+        class: &str,
+        hover: &str,
+    ) {
+        let (x, y, width, height) = (Px(x), Px(y), Px(width), Px(height));
+        let hover = escape(hover);
+        self.add(format_args!(
+            r#"<rect x="{x}" y="{y}" width="{width}" height="{height}" class="{class}"><title>{hover}</title></rect>"#
+        ));
+    }
+
     /// Adds a path.
     pub fn path(&mut self, d: &str, class: &str) {
         self.add(format_args!(r#"<path d="{d}" class="{class}"/>"#));

@@ -7,9 +7,10 @@ use taxel_learn::decoders::{linear, mean};
 use super::format::{UNDEFINED, decimals, fixed, grouped, percent, significant, symbol, with_unit};
 use super::svg::escape;
 use super::ticks;
+use super::view::View;
+use crate::by_depth::DepthErrors;
 use crate::evaluate::table1::{Column, NETWORK, PAPER_PRINTED_PERCENT, Table1};
 use crate::metrics::{DecoderErrors, Definition, Errors};
-use crate::run::RunResult;
 
 /// Errors of one group, if it is among `errors`.
 pub fn of_group<'e>(errors: &'e [Errors], group: &str) -> Option<&'e Errors> {
@@ -26,20 +27,41 @@ pub fn decoder_name(decoder: &DecoderErrors) -> &str {
     match decoder.decoder.as_str() {
         NETWORK => "Network",
         linear::NAME => "Best linear decoder",
-        mean::NAME => "Training mean",
+        mean::NAME => "Always the mean",
         other => other,
     }
 }
 
+/// Short name of a decoder, for the head of a column.
+fn short_name(decoder: &DecoderErrors) -> &str {
+    match decoder.decoder.as_str() {
+        NETWORK => "Network",
+        linear::NAME => "Linear",
+        mean::NAME => "Mean",
+        other => other,
+    }
+}
+
+/// Definitions in the order of the table: those that matter most come first, where narrow windows show them.
+const ORDER: [Definition; 7] = [
+    Definition::Rmse,
+    Definition::RatioToLimit,
+    Definition::RSquared,
+    Definition::FullScalePercent,
+    Definition::RelativeL2Percent,
+    Definition::PositionalPercent,
+    Definition::MeanRelativePercent,
+];
+
 fn heading(definition: Definition) -> &'static str {
     match definition {
         Definition::Rmse => "RMSE",
-        Definition::RelativeL2Percent => "Relative L2",
-        Definition::FullScalePercent => "% FS",
-        Definition::PositionalPercent => "Positional",
+        Definition::RelativeL2Percent => "Relative L2, %",
+        Definition::FullScalePercent => "%FS",
+        Definition::PositionalPercent => "Positional, %",
         Definition::RSquared => "R²",
-        Definition::MeanRelativePercent => "Mean relative",
-        Definition::RatioToLimit => "× limit",
+        Definition::MeanRelativePercent => "Mean relative, %",
+        Definition::RatioToLimit => "×\u{a0}limit",
     }
 }
 
@@ -49,46 +71,86 @@ fn value(definition: Definition, errors: &Errors, rmse_decimals: usize) -> Strin
         return UNDEFINED.into();
     };
     match definition {
-        Definition::Rmse => {
-            format!("{}\u{a0}{}", fixed(value, rmse_decimals), escape(&errors.unit))
-        }
+        Definition::Rmse => fixed(value, rmse_decimals),
         Definition::RSquared => fixed(value, 3),
         Definition::RatioToLimit => match errors.ratio_standard_error {
-            Some(error) => format!("{}\u{a0}± {}", fixed(value, 2), fixed(error, 2)),
+            Some(error) => format!("{}\u{a0}±\u{a0}{}", fixed(value, 2), fixed(error, 2)),
             None => fixed(value, 2),
         },
-        Definition::RelativeL2Percent | Definition::MeanRelativePercent => {
-            format!("{}\u{a0}%", fixed(value, 1))
-        }
-        Definition::FullScalePercent | Definition::PositionalPercent => {
-            format!("{}\u{a0}%", fixed(value, 2))
-        }
+        Definition::RelativeL2Percent | Definition::MeanRelativePercent => fixed(value, 1),
+        Definition::FullScalePercent | Definition::PositionalPercent => fixed(value, 2),
     }
 }
 
+/// Names of the groups of outputs with their units.
+fn groups(decoders: &[DecoderErrors]) -> &[Errors] {
+    decoders.first().map_or(&[][..], |decoder| &decoder.errors)
+}
+
+/// Decimals with which the RMSE of all decoders have at least three digits.
+fn rmse_decimals(decoders: &[DecoderErrors], group: &str) -> usize {
+    let all = decoders.iter().map(|decoder| rmse(&decoder.errors, group));
+    ticks::extent(all).map_or(0, |(least, _)| decimals(least, 3))
+}
+
+/// Small table of RMSE by group and decoder, beside the least possible one.
+pub fn headline(view: &View<'_>) -> String {
+    let mut html = String::from("<table class=\"headline\">\n<thead><tr><th>RMSE</th>");
+    for decoder in view.decoders {
+        let _ = write!(html, "<th class=\"number\">{}</th>", escape(short_name(decoder)));
+    }
+    let limits = &view.limit.groups;
+    if !limits.is_empty() {
+        html += "<th class=\"number\">Least possible</th><th class=\"number\">×\u{a0}limit</th>";
+    }
+    html += "</tr></thead>\n<tbody>\n";
+    for group in groups(view.decoders) {
+        let name = escape(&with_unit(&symbol(&group.group), &group.unit));
+        let _ = write!(html, "<tr><th scope=\"row\">{name}</th>");
+        let decimals = rmse_decimals(view.decoders, &group.group);
+        for decoder in view.decoders {
+            let text = fixed(rmse(&decoder.errors, &group.group), decimals);
+            let _ = write!(html, "<td class=\"number\">{text}</td>");
+        }
+        if !limits.is_empty() {
+            let limit = limits.iter().find(|limit| limit.group == group.group);
+            let limit = limit.map_or(UNDEFINED.into(), |limit| fixed(limit.limit, decimals));
+            let ratio = group.ratio_to_limit.map_or(UNDEFINED.into(), |ratio| fixed(ratio, 2));
+            let _ =
+                write!(html, "<td class=\"number\">{limit}</td><td class=\"number\">{ratio}</td>");
+        }
+        html += "</tr>\n";
+    }
+    html + "</tbody>\n</table>\n"
+}
+
+/// Definitions that have a column: those by which any error is defined.
+fn defined(decoders: &[DecoderErrors]) -> Vec<Definition> {
+    let all = || decoders.iter().flat_map(|decoder| &decoder.errors);
+    ORDER.into_iter().filter(|it| all().any(|errors| it.of(errors).is_some())).collect()
+}
+
 /// Table of errors by axis, decoder and definition.
-pub fn errors(result: &RunResult) -> String {
-    let mut html = String::from("<table>\n<thead><tr><th>Output</th><th>Decoder</th>");
-    for definition in Definition::ALL {
-        let _ = write!(html, "<th class=\"number\">{}</th>", heading(definition));
+pub fn errors(decoders: &[DecoderErrors]) -> String {
+    let shown = defined(decoders);
+    let mut html = String::from("<table>\n<thead><tr><th>Decoder</th>");
+    for definition in &shown {
+        let _ = write!(html, "<th class=\"number\">{}</th>", heading(*definition));
     }
     html += "</tr></thead>\n";
-    let groups = result.decoders.first().map_or(&[][..], |decoder| &decoder.errors);
-    for group in groups {
-        html += "<tbody>\n";
-        let all = result.decoders.iter().map(|decoder| rmse(&decoder.errors, &group.group));
-        let rmse_decimals = ticks::extent(all).map_or(0, |(least, _)| decimals(least, 3));
-        for (i, decoder) in result.decoders.iter().enumerate() {
+    for group in groups(decoders) {
+        let name = escape(&with_unit(&symbol(&group.group), &group.unit));
+        let columns = shown.len() + 1;
+        let _ = writeln!(
+            html,
+            "<tbody>\n<tr><th class=\"group\" scope=\"rowgroup\" colspan=\"{columns}\">{name}</th></tr>"
+        );
+        let decimals = rmse_decimals(decoders, &group.group);
+        for decoder in decoders {
             let Some(errors) = of_group(&decoder.errors, &group.group) else { continue };
-            html += "<tr>";
-            if i == 0 {
-                let name = escape(&with_unit(&symbol(&group.group), &group.unit));
-                let rows = result.decoders.len();
-                let _ = write!(html, "<th scope=\"rowgroup\" rowspan=\"{rows}\">{name}</th>");
-            }
-            let _ = write!(html, "<td>{}</td>", escape(decoder_name(decoder)));
-            for definition in Definition::ALL {
-                let value = value(definition, errors, rmse_decimals);
+            let _ = write!(html, "<tr><td>{}</td>", escape(short_name(decoder)));
+            for definition in &shown {
+                let value = value(*definition, errors, decimals);
                 let _ = write!(html, "<td class=\"number\">{value}</td>");
             }
             html += "</tr>\n";
@@ -98,36 +160,51 @@ pub fn errors(result: &RunResult) -> String {
     html + "</table>\n"
 }
 
-/// Table of the example's outputs, true and decoded, for outputs that belong to no electrode.
-pub fn example(result: &RunResult) -> String {
-    let mut html = String::from(
-        "<table>\n<thead><tr><th>Output</th><th class=\"number\">True</th>\
-         <th class=\"number\">Decoded</th></tr></thead>\n<tbody>\n",
-    );
-    for output in &result.example.outputs {
-        let name = escape(&with_unit(&symbol(&output.group), &output.unit));
-        for (truth, estimate) in output.truth.iter().zip(&output.estimate) {
-            let [truth, estimate] = [truth, estimate].map(|value| fixed(*value, 3));
-            let _ = writeln!(
-                html,
-                "<tr><th scope=\"row\">{name}</th><td class=\"number\">{truth}</td>\
-                 <td class=\"number\">{estimate}</td></tr>"
-            );
-        }
+/// Outputs that a table lists at most.
+const MOST_OUTPUTS: usize = 24;
+
+/// Table of the outputs of the shown frames, true and decoded, for outputs that belong to no electrode.
+pub fn frames(view: &View<'_>) -> String {
+    let shown = view.distribution;
+    let mut html = String::from("<table>\n<thead><tr><th rowspan=\"2\">Output</th>");
+    for frame in &shown.frames {
+        let name = super::frames::name(frame);
+        let number = frame.frame;
+        let _ = write!(html, "<th class=\"span\" colspan=\"2\">{name} ({number})</th>");
     }
-    html + "</tbody>\n</table>\n"
+    html += "</tr>\n<tr>";
+    for _ in &shown.frames {
+        html += "<th class=\"number\">True</th><th class=\"number\">Decoded</th>";
+    }
+    html += "</tr></thead>\n<tbody>\n";
+    for (column, output) in shown.outputs.iter().enumerate().take(MOST_OUTPUTS) {
+        let name = escape(&with_unit(&symbol(&output.name), &output.unit));
+        let _ = write!(html, "<tr><th scope=\"row\">{name}</th>");
+        let places = decimals(output.rmse, 2);
+        for frame in &shown.frames {
+            for line in [&frame.truth, &frame.estimate] {
+                let _ = write!(html, "<td class=\"number\">{}</td>", fixed(line[column], places));
+            }
+        }
+        html += "</tr>\n";
+    }
+    html += "</tbody>\n</table>\n";
+    match shown.outputs.len().saturating_sub(MOST_OUTPUTS) {
+        0 => html,
+        more => html + &format!("<p class=\"note\">{more} more outputs are not listed.</p>\n"),
+    }
 }
 
 /// Table of the network's RMSE by depth of the contact (lines) and output (columns).
-pub fn by_depth(result: &RunResult) -> String {
+pub fn by_depth(ranges: &[DepthErrors]) -> String {
     let mut html =
         String::from("<table>\n<thead><tr><th>Depth</th><th class=\"number\">Frames</th>");
-    for errors in result.by_depth.first().map_or(&[][..], |range| &range.errors) {
+    for errors in ranges.first().map_or(&[][..], |range| &range.errors) {
         let name = escape(&with_unit(&symbol(&errors.group), &errors.unit));
         let _ = write!(html, "<th class=\"number\">{name}</th>");
     }
     html += "</tr></thead>\n<tbody>\n";
-    for range in &result.by_depth {
+    for range in ranges {
         let (depth, frames) = (escape(&range.range()), grouped(range.frames));
         let _ =
             write!(html, "<tr><th scope=\"row\">{depth}</th><td class=\"number\">{frames}</td>");
@@ -139,14 +216,20 @@ pub fn by_depth(result: &RunResult) -> String {
     html + "</tbody>\n</table>\n"
 }
 
-/// List of the formulas of all definitions.
-pub fn legend() -> String {
-    let formulas =
-        Definition::ALL.map(|definition| format!("<li>{}</li>", escape(definition.formula())));
+/// List of the formulas of the definitions that have a column.
+pub fn legend(decoders: &[DecoderErrors]) -> String {
+    let shown = defined(decoders);
+    let formulas: Vec<String> =
+        shown.iter().map(|it| format!("<li>{}</li>", escape(it.formula()))).collect();
+    let formulas = formulas.concat();
+    let thickness = if shown.contains(&Definition::PositionalPercent) {
+        "; H is the thickness of the sensor"
+    } else {
+        ""
+    };
     format!(
-        "<ul class=\"formulas\">{}</ul>\n<p class=\"note\">e = decoded − true; Δ stands for the \
-         true output; H is the thickness of the sensor. “{UNDEFINED}”: not defined.</p>\n",
-        formulas.concat()
+        "<ul class=\"formulas\">{formulas}</ul>\n<p class=\"note\">e = decoded − true; Δ stands for the true \
+         output{thickness}. “{UNDEFINED}”: not defined.</p>\n"
     )
 }
 

@@ -3,13 +3,28 @@
 use taxel_limit::Refusal;
 use taxel_limit::reference::GroupLimit;
 
-use super::html;
+use taxel_data::table::Table as Values;
+
+use super::{Made, View};
+use crate::evaluate::device_cost::DeviceCost;
+use crate::evaluate::distribution::{Distribution, Reference};
 use crate::evaluate::table1::{Column, Entry, NETWORK, Printed, Table1};
 use crate::metrics::{DecoderErrors, Errors, LimitSummary};
-use crate::run::{Example, ExampleOutput, ModelSummary, RowErrors, RunResult, SceneSummary};
+use crate::run::{ModelSummary, RowErrors, RowWire, RunResult, SceneSummary, SensorSketch};
+use crate::verdict::{Verdict, Warning};
+
+fn made() -> Made {
+    let files = ["model.bin", "metrics.json"].map(String::from).to_vec();
+    Made { command: "host-sim run 'by <hand>.toml' --seed 7".into(), files }
+}
+
+fn html(result: &RunResult) -> String {
+    super::html(result, &made())
+}
 
 const ROW_WIRES: usize = 3;
 const PER_ROW: usize = 2;
+const ELECTRODES: usize = ROW_WIRES * PER_ROW;
 
 fn errors(group: &str, rmse: f64) -> Errors {
     Errors {
@@ -31,9 +46,50 @@ fn of_groups(groups: &[&str], rmse: f64) -> Vec<Errors> {
     groups.iter().map(|group| errors(group, rmse)).collect()
 }
 
+/// Outputs of so many `frames`, and readings of two column-wires: row-wires 2 to 4, of five.
+fn tables(groups: &[&str], frames: usize) -> [Values; 3] {
+    let rows = 2..2 + ROW_WIRES;
+    let electrodes = rows.clone().flat_map(|row| (1..=PER_ROW).map(move |e| (row, e)));
+    let names = electrodes.flat_map(|(row, electrode)| {
+        groups.iter().map(move |group| format!("r{row}e{electrode}_{group}"))
+    });
+    let names: Vec<String> = names.collect();
+    let truth: Vec<f64> =
+        (0..frames * names.len()).map(|i| 0.1 * (i % 7) as f64 + 0.001 * (i % 3) as f64).collect();
+    // Frame n is off by n·0.01 everywhere.
+    let off = |(i, truth): (usize, &f64)| truth + 0.01 * (i / names.len()) as f64;
+    let estimate = truth.iter().enumerate().map(off).collect();
+    let readings: Vec<String> =
+        rows.flat_map(|row| (1..=2).map(move |k| format!("r{row}c{k}_ohm"))).collect();
+    let ohm = (0..frames * readings.len()).map(|i| 50.0 - 0.1 * (i % 11) as f64).collect();
+    [
+        Values { names: names.clone(), values: truth },
+        Values { names, values: estimate },
+        Values { names: readings, values: ohm },
+    ]
+}
+
+fn distribution(groups: &[&str]) -> Distribution {
+    let [truth, estimate, readings] = tables(groups, 20);
+    Distribution::of(&truth, &estimate, &readings, Reference::Rest(&[50.0; 2 * ROW_WIRES]))
+}
+
+fn sensor() -> SensorSketch {
+    let row = |row: usize| RowWire {
+        read: (1..=ROW_WIRES).contains(&row),
+        electrodes_mm: (0..PER_ROW)
+            .map(|i| [5.0 + 10.0 * i as f64, 2.0 + 3.5 * row as f64])
+            .collect(),
+    };
+    SensorSketch {
+        face_mm: [20.0, 18.0],
+        row_wires: (0..5).map(row).collect(),
+        column_wires_mm: vec![vec![[5.0, 4.0], [5.0, 14.0]], vec![[15.0, 4.0], [15.0, 14.0]]],
+    }
+}
+
 fn result(groups: &[&str]) -> RunResult {
-    let electrodes = ROW_WIRES * PER_ROW;
-    let values = |shift: f64| (0..electrodes).map(|i| 0.1 * i as f64 + shift).collect();
+    let distribution = distribution(groups);
     let entry = |decoder: &str, spread: Option<f64>, rmse: f64| Entry {
         decoder: decoder.into(),
         spread,
@@ -51,15 +107,32 @@ fn result(groups: &[&str]) -> RunResult {
         ],
     };
     RunResult {
-        scene: SceneSummary {
-            name: "by <hand>".into(),
-            digest: "0123".into(),
-            seed: 7,
+        subject: "by <hand>".into(),
+        digest: "0123".into(),
+        seed: 7,
+        data: None,
+        scene: Some(SceneSummary {
             noise_kind: "relative".into(),
             noise_level: 0.005,
             gain_drift: 0.0,
             size_mm: [20.0, 18.0, 5.0],
-            row_wires: 8,
+            row_wires: 5,
+            sensor: Some(sensor()),
+            ideal_changes: distribution.frames.iter().map(|frame| frame.change.clone()).collect(),
+        }),
+        device: DeviceCost {
+            cycles: 34_000,
+            flash_cycles: 36_000,
+            flash_us: 200.0,
+            ram_bytes: 2000,
+            weights_in_ram: true,
+            blob_bytes: 12_345,
+            slot_bytes: 131_056,
+            fits_slot: true,
+        },
+        verdict: Verdict {
+            sentence: "It is a <good> model of dz_mm.".into(),
+            warnings: vec![Warning { name: "few-frames", text: "Few frames for dz_mm.".into() }],
         },
         model: ModelSummary {
             projected_readings: 0,
@@ -75,7 +148,7 @@ fn result(groups: &[&str]) -> RunResult {
             refined: true,
             affine_tail: true,
             blob_bytes: 12_345,
-            blob_crc: "deadbeef".into(),
+            model_crc: "deadbeef".into(),
             frame: taxel_learn::cost::Cost {
                 instructions: 20_000,
                 cycles: 34_000,
@@ -93,25 +166,7 @@ fn result(groups: &[&str]) -> RunResult {
         rows: (0..ROW_WIRES)
             .map(|row| RowErrors { row_wire: row + 2, errors: of_groups(groups, 0.1) })
             .collect(),
-        example: Example {
-            frame: 42,
-            electrodes_mm: (0..electrodes)
-                .map(|i| [5.0 + 10.0 * (i % PER_ROW) as f64, 3.375 + 2.25 * (i / PER_ROW) as f64])
-                .collect(),
-            row_wires: ROW_WIRES,
-            outputs: groups
-                .iter()
-                .map(|group| ExampleOutput {
-                    group: (*group).into(),
-                    unit: taxel_data::columns::unit_of(group).into(),
-                    truth: values(0.0),
-                    estimate: values(-0.05),
-                })
-                .collect(),
-            reading_row_wire: 3,
-            ideal_ohm: vec![50.0, 51.0, 52.0, 53.0],
-            noisy_ohm: vec![50.1, 50.9, 52.3, 52.8],
-        },
+        distribution,
         table1: Some(Table1 {
             centres: 48,
             affine_tail: false,
@@ -139,11 +194,24 @@ fn the_page_is_whole_self_contained_and_always_the_same() {
     let page = html(&result);
     assert_eq!(page, html(&result));
     assert!(is_drawable(&page));
-    assert_eq!((figures(&page), page.matches("<figure id=\"table-").count()), (7, 2));
-    assert_eq!(page.matches("<figcaption>").count(), 9);
-    for text in
-        ["seed 7", "K = 9", "12\u{202f}345 bytes", "deadbeef", "frame 42 (from 0)", "6.5–11.4 %"]
-    {
+    // Density, histogram, by electrode; readings, three frames, arrows; sensor; two of Table 1.
+    assert_eq!((figures(&page), page.matches("<figure id=\"table-").count()), (11, 2));
+    for text in [
+        "seed 7",
+        "K = 9",
+        "12\u{202f}345 bytes",
+        "deadbeef",
+        "number 9 (from 0)",
+        "6.5–11.4 %",
+        "It is a &lt;good&gt; model of Δz.",
+        "<li>Few frames for Δz.</li>",
+        "200 <span>µs</span>",
+        "14\u{202f}345 <span>B</span>",
+        "fits a slot of 131\u{202f}056 B",
+        "host-sim run &#39;by &lt;hand&gt;.toml&#39; --seed 7",
+        "<a href=\"model.bin\">model.bin</a>",
+        env!("CARGO_PKG_VERSION"),
+    ] {
         assert!(page.contains(text), "{text}");
     }
     for outside in ["http", "<script", "src=", "@import", "url(//"] {
@@ -152,57 +220,124 @@ fn the_page_is_whole_self_contained_and_always_the_same() {
     for drawing in page.split("<svg ").skip(1) {
         assert!(drawing.starts_with("role=\"img\"") && drawing.contains("<title>"));
     }
+    for link in page.split("<nav").nth(1).unwrap().split("href=\"#").skip(1) {
+        let id = link.split('"').next().unwrap();
+        assert!(page.contains(&format!("<h2 id=\"{id}\">")), "{id}");
+    }
 }
 
 #[test]
-fn one_chart_for_every_group_of_outputs() {
-    for groups in [&["dz_mm"][..], &["dx_mm", "dy_mm", "dz_mm"], &["fx_n", "fz_n"]] {
+fn one_panel_for_every_group_of_outputs() {
+    for (groups, arrows) in
+        [(&["dz_mm"][..], 0), (&["dx_mm", "dy_mm", "dz_mm"], 3), (&["fx_n", "fz_n"], 0)]
+    {
         let page = html(&result(groups));
-        let titled = |end: &str| page.matches(end).count();
-        // Every chart appears twice: for wide and for narrow windows.
-        assert_eq!(titled("by electrode, true and decoded</title>"), 2 * groups.len());
-        assert_eq!(titled("<title>Error of"), 2 * groups.len());
-        assert_eq!(titled("by row-wire, at most"), groups.len());
-        assert_eq!(titled("<title>Map of"), 3, "one group is mapped");
+        let titled = |title: &str| page.matches(title).count();
+        for title in ["<title>Decoded against true", "<title>Histogram of", "<title>RMSE of "] {
+            // The sweeps have titles of their own, twice: for wide and for narrow windows.
+            let sweeps = if title == "<title>RMSE of " { 4 } else { 0 };
+            assert_eq!(titled(title), groups.len() + sweeps, "{title}");
+        }
+        assert_eq!(titled("<title>Map of"), 9, "one group, three frames");
+        assert_eq!(titled("<title>Readings of"), 6, "as read and without noise");
+        assert_eq!(titled("<title>Arrows of"), arrows);
     }
 }
 
 #[test]
 fn maps_and_sweeps_show_z_or_else_the_last_group() {
-    assert!(html(&result(&["dz_mm", "dx_mm"])).contains("Map of Δz over the face, true"));
+    assert!(html(&result(&["dz_mm", "dx_mm"])).contains("Map of Δz, true, median frame"));
     assert!(html(&result(&["fx_n", "fz_n"])).contains("RMSE of Fz (N)"));
-    assert!(html(&result(&["dx_mm", "dy_mm"])).contains("Map of Δy over the face, true"));
+    assert!(html(&result(&["dx_mm", "dy_mm"])).contains("Map of Δy, true, median frame"));
+}
+
+#[test]
+fn what_is_under_the_pointer_is_told() {
+    let page = html(&result(&["dz_mm"]));
+    assert!(page.contains("<title>row-wire 2, electrode 1: "));
+    assert!(page.contains("<title>row-wire 4, column-wire 2: "));
+    assert!(page.contains("<title>row-wire 5, electrode 2, not read</title>"), "sketch");
+    assert!(!page.contains("<title>row-wire 5, electrode 2: "), "it has no value");
 }
 
 #[test]
 fn a_missing_value_is_drawn_nowhere() {
     let mut result = result(&["dz_mm"]);
     let whole = html(&result);
-    result.example.outputs[0].estimate[1] = f64::NAN;
-    result.example.noisy_ohm[2] = f64::NAN;
-    result.rows[0].errors[0].rmse = f64::NAN;
+    let frame = &mut result.distribution.frames[0];
+    frame.estimate[1] = f64::NAN;
+    frame.change[2] = f64::NAN;
+    result.distribution.outputs[0].rmse = f64::NAN;
     let page = html(&result);
     assert!(is_drawable(&page));
-    let fewer = |mark: &str| whole.matches(mark).count() - page.matches(mark).count();
-    // One dot fewer on both layouts, and one dot of the reading.
-    assert_eq!(fewer("c1 mark\"/>"), 2 * 3 + 1, "two dots and a bar of noise twice, a bar by row");
-    assert_eq!(fewer("c2 mark\"/>"), 2, "its error");
-    assert_eq!(page.matches(">×</text>").count(), 2, "its cells, decoded and difference");
+    let count = |page: &str| page.matches("cell-of-map").count();
+    let styles = 1;
+    assert_eq!(count(&whole) - styles, 3 * 3 * ELECTRODES + ELECTRODES + 6 * 6);
+    assert_eq!(count(&whole) - count(&page), 2 + 1 + 1, "decoded, difference, reading, RMSE");
+    assert_eq!(page.matches(": missing ").count(), 4);
 }
 
 #[test]
 fn a_scene_without_a_sweep_has_a_page_without_it() {
     let mut result = result(&["dz_mm"]);
     result.table1 = None;
-    result.rows.truncate(1);
-    result.example.electrodes_mm.truncate(PER_ROW);
-    result.example.outputs[0].truth.truncate(PER_ROW);
-    result.example.outputs[0].estimate.truncate(PER_ROW);
+    result.scene.as_mut().unwrap().sensor = None;
     let page = html(&result);
     assert!(is_drawable(&page));
-    assert_eq!((figures(&page), page.matches("<figure id=\"table-").count()), (5, 1));
-    assert!(page.contains("electrode of row-wire 2</text>"));
-    assert!(!page.contains("Noise and spread"));
+    assert_eq!((figures(&page), page.matches("<figure id=\"table-").count()), (7, 1));
+    assert!(page.contains("drawn in a grid") && !page.contains("Noise and spread"));
+}
+
+/// View of outputs and readings of a file, without a scene.
+fn view<'a>(distribution: &'a Distribution, result: &'a RunResult, made: &'a Made) -> View<'a> {
+    View {
+        distribution,
+        sensor: None,
+        ideal_changes: &[],
+        noise: None,
+        table1: None,
+        ..View::of_run(result, made)
+    }
+}
+
+#[test]
+fn outputs_of_no_electrode_have_a_table_and_places_are_drawn() {
+    let [_, _, readings] = tables(&["dz_mm"], 4);
+    let result = result(&["dz_mm"]);
+    let of = |names: &[&str], readings: &Values| {
+        let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
+        let truth: Vec<f64> = (0..4 * names.len()).map(|i| (i * i % 17) as f64).collect();
+        let estimate = truth.iter().enumerate().map(|(i, truth)| truth + i as f64).collect();
+        let [truth, estimate] =
+            [truth, estimate].map(|values| Values { names: names.clone(), values });
+        let distribution = Distribution::of(&truth, &estimate, readings, Reference::Median);
+        super::view_html(&view(&distribution, &result, &made()))
+    };
+    let page = of(&["contact_x_mm", "contact_y_mm", "contact_depth_mm"], &readings);
+    assert!(is_drawable(&page));
+    assert_eq!(
+        page.matches("<title>Place in the").count(),
+        2,
+        "of four frames, the worst is at 95 %, too"
+    );
+    assert!(page.contains("relative to the median") && page.contains("decoded: "));
+    assert!(page.contains("<th scope=\"row\">contact depth (mm)</th>"), "unit once");
+    let channels = Values { names: vec!["ch1".into()], ..readings };
+    let channels = Values { values: channels.values[..4].to_vec(), ..channels };
+    let page = of(&["fx_n", "fz_n"], &channels);
+    assert!(is_drawable(&page) && !page.contains("Place in the"));
+    assert!(page.contains("in its standard deviations") && page.contains(">ch1</text>"));
+    assert_eq!(page.matches("<title>Map of").count(), 0);
+}
+
+#[test]
+fn electrodes_beside_the_face_and_at_one_place_are_drawn() {
+    let mut result = result(&["dx_mm", "dy_mm", "dz_mm"]);
+    let rows = &mut result.scene.as_mut().unwrap().sensor.as_mut().unwrap().row_wires;
+    rows[1].electrodes_mm[0] = [-3.0, 20.0];
+    let other = rows[2].electrodes_mm[1];
+    rows[3].electrodes_mm[1] = other;
+    assert!(is_drawable(&html(&result)));
 }
 
 #[test]
@@ -223,7 +358,6 @@ fn forces_have_no_positional_error() {
     let table = page.split("<figure id=\"table-2\"").nth(1).unwrap();
     assert!(table.contains("%FS = mean|e|/full scale"));
     assert!(!table.contains("positional"));
-    assert!(page.contains("the force of its electrodes"));
 }
 
 #[test]
@@ -247,14 +381,15 @@ fn the_limit_is_a_line_where_it_is_known() {
     }
     let page = html(&result);
     assert!(is_drawable(&page) && page.contains("Limit: the least possible"));
-    assert!(page.contains("Least possible</dt><dd>0.0700"));
+    assert!(page.contains("<td class=\"number\">0.070</td><td class=\"number\">1.10</td>"));
     assert_eq!(page.matches("truth name\">limit</text>").count(), 2, "wide and narrow");
 }
 
 #[test]
 fn names_are_escaped() {
     let mut result = result(&["dz_mm"]);
-    result.example.outputs[0].group = "<b>\"&".into();
+    result.distribution.groups[0].group = "<b>\"&".into();
+    result.distribution.readings.names[0] = "<b>\"&".into();
     result.decoders[0].decoder = "<i>".into();
     let page = html(&result);
     assert!(page.contains("by &lt;hand&gt;") && !page.contains("<hand>"));

@@ -66,6 +66,17 @@ pub fn logarithmic(values: impl IntoIterator<Item = f64>, label: impl Fn(f64) ->
     Ticks { low, high, at: at.collect() }
 }
 
+/// Step from one written label to the next: the least with which neighbours are `apart` enough, from the `places` of all
+/// ticks on the screen.
+pub fn written(places: &[f64], apart: impl Fn(usize, usize) -> f64) -> usize {
+    let fits = |step: &usize| {
+        let written: Vec<usize> = (0..places.len()).step_by(*step).collect();
+        let pairs = written.windows(2);
+        pairs.into_iter().all(|p| (places[p[1]] - places[p[0]]).abs() >= apart(p[0], p[1]))
+    };
+    (1..=places.len()).find(fits).unwrap_or(1)
+}
+
 /// Least and greatest of all finite values.
 pub fn extent(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
     values.into_iter().filter(|value| value.is_finite()).fold(None, |extent, value| {
@@ -98,6 +109,15 @@ mod tests {
             let ticks = linear(values.clone(), 4);
             assert!(ticks.high > ticks.low && ticks.at.len() >= 2, "{values:?}: {ticks:?}");
         }
+    }
+
+    #[test]
+    fn labels_are_written_in_equal_steps() {
+        let places = [0.0, 10.0, 20.0, 30.0, 40.0];
+        assert_eq!(written(&places, |_, _| 10.0), 1);
+        assert_eq!(written(&places, |_, _| 11.0), 2);
+        assert_eq!(written(&places, |_, _| 1000.0), 5, "one is always written");
+        assert_eq!(written(&[], |_, _| 1.0), 1);
     }
 
     #[test]

@@ -1,3 +1,4 @@
+use taxel_learn::outliers::Outliers;
 use taxel_limit::reference::GroupLimit;
 
 use super::*;
@@ -24,6 +25,10 @@ fn decoders(of: &[(&str, &[(&str, f64)])]) -> Vec<DecoderErrors> {
         errors: groups.iter().map(|(name, rmse)| group(name, *rmse, None)).collect(),
     };
     of.iter().map(decoder).collect()
+}
+
+fn outliers(lines: usize) -> Outliers {
+    Outliers { found: vec![], lines, left_out: true, kept: vec![] }
 }
 
 fn no_limit() -> LimitSummary {
@@ -108,6 +113,7 @@ fn every_warning_is_raised_and_left_out() {
         (Warning::out_of_range(0.0101), "readings-out-of-range"),
         (Warning::larger_than_slot(131_057), "larger-than-slot"),
         (Warning::padded_centres(8, 16), "padded-centres"),
+        (Warning::outliers(&outliers(1)), "outliers"),
         (Warning::costly_gate(101.0, 100.0), "gate-costs-more"),
     ];
     for (warning, name) in raised {
@@ -121,9 +127,10 @@ fn every_warning_is_raised_and_left_out() {
         Warning::out_of_range(0.0099),
         Warning::larger_than_slot(131_056),
         Warning::padded_centres(16, 16),
+        Warning::outliers(&outliers(0)),
         Warning::costly_gate(99.0, 100.0),
     ];
-    assert_eq!(left_out, [const { None }; 5]);
+    assert_eq!(left_out, [const { None }; 6]);
 }
 
 #[test]

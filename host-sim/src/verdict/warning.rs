@@ -1,6 +1,7 @@
 //! Warnings, each by a name of its own.
 
 use serde::Serialize;
+use taxel_learn::outliers::Outliers;
 
 /// Largest blob in bytes that a slot of the firmware's images holds: 128 KiB less the record behind it.
 pub const SLOT_BYTES: usize = 131_056;
@@ -75,6 +76,20 @@ impl Warning {
                 "{:.1} % of the readings lie outside the range that the model was trained on, and are clamped; is it \
                  the right model for this sensor?",
                 100.0 * share
+            )
+        })
+    }
+
+    /// Lines of the data with values far from all others.
+    #[must_use]
+    pub fn outliers(outliers: &Outliers) -> Option<Self> {
+        Self::when(outliers.lines > 0, "outliers", || {
+            let done = if outliers.left_out { "left out of training" } else { "kept" };
+            let plural = if outliers.lines == 1 { " holds" } else { "s hold" };
+            format!(
+                "{} line{plural} values far from all others, and {} {done}: look at the wiring and the log",
+                outliers.lines,
+                if outliers.lines == 1 { "is" } else { "are" }
             )
         })
     }

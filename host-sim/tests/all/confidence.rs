@@ -54,7 +54,7 @@ fn a_scenes_model_covers_its_errors_and_finds_faults_novel() {
     assert!(
         without["coverage"].as_array().unwrap().is_empty() && without["percent_novel"].is_null()
     );
-    assert_eq!(without["errors"], evaluated["errors"]);
+    assert_eq!(without["decoders"], evaluated["decoders"]);
     assert!(folder.succeed(&["inspect", "model.bin"]).contains("confidence"));
 }
 
@@ -104,7 +104,10 @@ fn measured_data_is_held_out_fold_by_fold() {
 
     let alone = train(&["--confidence", "--fold-column", "one"]);
     assert_eq!(alone.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&alone.stderr).contains("holds out one fold after the other; give at least 2"));
+    assert!(
+        String::from_utf8_lossy(&alone.stderr)
+            .contains("holds out one fold after the other; give at least 2")
+    );
 
     let one = train(&["--confidence", "--folds", "1"]);
     assert_eq!(one.status.code(), Some(2));

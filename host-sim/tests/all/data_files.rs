@@ -118,7 +118,7 @@ fn training_joins_as_the_command_does_and_decoding_keeps_the_time() {
     let errors = |model: &str, data: &[&str]| {
         let text = folder.succeed(&[&["eval", model, "--json"], data].concat());
         let summary: serde_json::Value = serde_json::from_str(&text).unwrap();
-        summary["errors"][0]["rmse"].as_f64().unwrap()
+        summary["decoders"][0]["errors"][0]["rmse"].as_f64().unwrap()
     };
     let direct = errors("direct.bin", &[&["sensor.csv"], &read[..]].concat());
     assert_eq!(direct.to_bits(), errors("joined.bin", &["j.csv"]).to_bits());

@@ -7,6 +7,7 @@ use host_sim::evaluate::readout::{self, Stage};
 use host_sim::evaluate::trade::{self, Plan};
 use host_sim::experiment::Experiment;
 use host_sim::metrics::Errors;
+use host_sim::subject::Subject;
 use taxel_data::progress::Silent;
 use taxel_learn::Exponential;
 use taxel_learn::cost::Frames;
@@ -124,14 +125,19 @@ fn a_baseline_that_was_scanned_with_the_same_series_resistance_cancels_it() {
 }
 
 #[test]
-fn a_run_with_relative_inputs_says_so_and_shows_readings_in_ohms() {
+fn a_run_with_relative_inputs_says_so_and_shows_changes_from_rest() {
     let mut scene = small();
     scene.training.relative_inputs = true;
     scene.world.drift = Some(Drift { gain: 0.02 });
-    let (result, blob) = host_sim::run::run(&scene, &Silent).unwrap();
+    let (result, blob) =
+        host_sim::run::run(&Subject::Scene(Box::new(scene.clone())), &Silent).unwrap();
     assert!(blob.parse().metadata().relative_inputs && result.model.relative_inputs);
-    assert_eq!(result.scene.gain_drift, 0.02);
-    assert!(result.example.noisy_ohm.iter().all(|ohm| (30.0..100.0).contains(ohm)));
+    let summary = result.scene.as_ref().unwrap();
+    assert_eq!(summary.gain_drift, 0.02);
+    for (frame, ideal) in result.distribution.frames.iter().zip(&summary.ideal_changes) {
+        // Relative noise of half a per cent on readings and baseline is all that differs.
+        assert!(frame.change.iter().zip(ideal).all(|(noisy, ideal)| (noisy - ideal).abs() < 4.0));
+    }
     let rmse = |decoder: usize| z(&result.decoders[decoder].errors);
     assert!(rmse(0) < rmse(1) && rmse(1) < 0.6 * rmse(2), "network, linear, mean");
     // Table 1 is computed on the same inputs: at little noise its best network is far below the mean.
@@ -139,7 +145,7 @@ fn a_run_with_relative_inputs_says_so_and_shows_readings_in_ohms() {
     let best = column.decoders.iter().filter(|entry| entry.spread.is_some());
     let best = best.map(|entry| z(&entry.errors)).fold(f64::INFINITY, f64::min);
     assert!(best < 0.5 * z(column.errors("mean", None)), "{best}");
-    let page = host_sim::report::html(&result);
+    let page = host_sim::report::html(&result, &host_sim::report::Made::default());
     assert!(page.contains("18 relative readings") && page.contains("gain drift ±2"), "report");
 }
 
@@ -166,7 +172,7 @@ fn a_user_trains_on_a_csv_file_and_decodes_a_drifted_sensor_with_its_own_baselin
     let rmse = |arguments: &[&str]| {
         let result = folder.succeed(&[&["eval", "--json"], arguments].concat());
         let result: serde_json::Value = serde_json::from_str(&result).unwrap();
-        let groups = result["errors"].as_array().unwrap().clone();
+        let groups = result["decoders"][0]["errors"].as_array().unwrap().clone();
         groups.iter().find(|group| group["group"] == "dz_mm").unwrap()["rmse"].as_f64().unwrap()
     };
     let of_relative = rmse(&["relative.bin", "drifted.csv", "--baseline", "drifted_rest.csv"]);

@@ -53,7 +53,7 @@ fn outliers_are_named_left_out_and_listed_in_json() {
     let rmse = |name: &str, more: &[&str]| {
         train(&folder, name, &[&["--centres", "8"], more].concat());
         let evaluated = json(&folder.succeed(&["eval", "m.bin", "clean.csv", "--json"]));
-        evaluated["errors"][0]["rmse"].as_f64().unwrap()
+        evaluated["decoders"][0]["errors"][0]["rmse"].as_f64().unwrap()
     };
     let (of_clean, of_wild) = (rmse("clean.csv", &[]), rmse("wild.csv", &[]));
     assert!((of_wild / of_clean - 1.0).abs() < 0.05, "{of_wild} {of_clean}");

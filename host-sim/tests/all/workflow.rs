@@ -26,13 +26,23 @@ fn a_csv_file_trains_decodes_and_evaluates() {
     assert_eq!(inspected["networks"][1]["centres"], 24);
     assert_eq!(inspected["outputs"][0]["unit"], "mm");
 
-    let evaluated = json(&folder.succeed(&["eval", "m.bin", "test.csv", "--json"]));
-    let rmse = |errors: &str| {
-        let groups = evaluated[errors].as_array().unwrap();
+    let command = ["eval", "m.bin", "test.csv", "--html", "page.html"];
+    let evaluated = json(&folder.succeed(&[&command[..], &["--json"]].concat()));
+    let page = std::fs::read_to_string(folder.path("page.html")).unwrap();
+    for text in [
+        "m.bin on test.csv",
+        "host-sim eval m.bin test.csv --html page.html",
+        "<title>row-wire 4, electrode 1: ",
+        "relative to the median",
+    ] {
+        assert!(page.contains(text), "{text}");
+    }
+    let rmse = |decoder: usize| {
+        let groups = evaluated["decoders"][decoder]["errors"].as_array().unwrap();
         let z = groups.iter().find(|g| g["group"] == "dz_mm").unwrap();
         z["rmse"].as_f64().unwrap()
     };
-    assert!(rmse("errors") < 0.4 * rmse("mean_errors"), "{evaluated}");
+    assert!(rmse(0) < 0.4 * rmse(1), "{evaluated}");
 }
 
 #[test]
@@ -170,7 +180,7 @@ fn one_network_for_the_whole_array_needs_every_reading_and_has_less_error() {
     folder.succeed(&["synth", "scene.toml", "-n", "1000", "--seed", "9", "-o", "d.csv"]);
     let rmse = |model: &str| {
         let result = json(&folder.succeed(&["eval", model, "d.csv", "--json"]));
-        let groups = result["errors"].as_array().unwrap().iter();
+        let groups = result["decoders"][0]["errors"].as_array().unwrap().iter();
         groups.map(|group| group["rmse"].as_f64().unwrap()).sum::<f64>()
     };
     let (of_array, of_rows) = (rmse("array.bin"), rmse("rows.bin"));
@@ -287,7 +297,9 @@ fn same_seed_same_bytes_on_one_thread_and_on_two() {
 fn run_writes_a_whole_folder_and_its_blob_is_the_one_that_train_writes() {
     let folder = Folder::new("run");
     folder.write("scene.toml", small_scene());
-    let printed = json(&folder.succeed(&["run", "scene.toml", "--json"]));
+    let mut printed = json(&folder.succeed(&["run", "scene.toml", "--json"]));
+    // The file is the same whenever it is written.
+    assert!(printed.as_object_mut().unwrap().remove("seconds").unwrap().as_f64().unwrap() > 0.0);
     folder.succeed(&["train", "scene.toml", "-o", "m.bin"]);
     let out = folder.path("out/small");
     assert_eq!(
@@ -299,6 +311,8 @@ fn run_writes_a_whole_folder_and_its_blob_is_the_one_that_train_writes() {
     let table = std::fs::read_to_string(out.join("table1.csv")).unwrap();
     // 4 noise levels × (2 baselines + 10 spreads × 2 networks) × 3 axes × 7 definitions.
     assert_eq!(table.lines().count(), 1 + 4 * (2 + 20) * 3 * 7);
+    let page = std::fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(page.contains("<code>host-sim run scene.toml --seed ") && page.contains("table1.csv"));
     let before = folder.names();
     folder.succeed(&["run", "scene.toml"]); // again, over what is there
     assert_eq!(folder.names(), before);

@@ -1,0 +1,54 @@
+//! What a model asks of a device: time, memory, and whether a slot holds it.
+
+use serde::Serialize;
+use taxel_learn::cost::{DecoderRam, Design, Prices};
+use taxel_learn::{Exponential, ModelBlob};
+
+use crate::error::Result;
+use crate::verdict::SLOT_BYTES;
+
+/// Clock of the STM32F446 at which its flash makes it wait as `flash_cycles` count.
+const CLOCK_MHZ: f64 = 180.0;
+
+/// Cost of decoding a frame on a Cortex-M4F without a gate, and the memory that a model takes.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DeviceCost {
+    /// Cycles with memory that never waits.
+    pub cycles: u64,
+    /// Cycles with code in an STM32F446's flash at 180 MHz.
+    pub flash_cycles: u64,
+    /// Time in µs that these take at 180 MHz.
+    pub flash_us: f64,
+    /// RAM in bytes for decoding, without weights.
+    pub ram_bytes: usize,
+    /// Whether the images copy the weights to RAM, which takes as many bytes more as the blob has.
+    pub weights_in_ram: bool,
+    /// Size of the blob in bytes.
+    pub blob_bytes: usize,
+    /// Size of a slot for models in flash, in bytes.
+    pub slot_bytes: usize,
+    /// Whether a slot holds the blob.
+    pub fits_slot: bool,
+}
+
+impl DeviceCost {
+    /// Cost of the model in `blob`, by the price list in the repository.
+    ///
+    /// # Errors
+    /// [`Error`](crate::Error) for a price list that lacks a piece.
+    pub fn of(blob: &ModelBlob) -> Result<Self> {
+        let design = Design::of(blob);
+        let frame = Prices::accepted()?.frames(&design, Exponential::default())?.ungated;
+        let blob_bytes = blob.bytes().len();
+        Ok(Self {
+            cycles: frame.cycles,
+            flash_cycles: frame.flash_cycles,
+            flash_us: frame.flash_cycles as f64 / CLOCK_MHZ,
+            ram_bytes: DecoderRam::of(&design).bytes(),
+            weights_in_ram: design.weights_in_ram,
+            blob_bytes,
+            slot_bytes: SLOT_BYTES,
+            fits_slot: blob_bytes <= SLOT_BYTES,
+        })
+    }
+}

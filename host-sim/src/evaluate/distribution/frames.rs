@@ -1,0 +1,111 @@
+//! Frames to look at: of median, high and largest error.
+
+use serde::Serialize;
+use taxel_data::columns;
+use taxel_data::table::Table;
+
+use super::{nearest_rank, pairs};
+
+/// Place of a frame among all frames, in the order of their errors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Rank {
+    /// Half of the frames have no larger error.
+    Median,
+    /// 95 % of the frames have no larger error.
+    High,
+    /// No frame has a larger error.
+    Worst,
+}
+
+impl Rank {
+    const ALL: [(Self, f64); 3] = [(Self::Median, 0.5), (Self::High, 0.95), (Self::Worst, 1.0)];
+}
+
+/// Frame to look at.
+///
+/// Frames are ordered by the root mean square of the errors of their outputs. Outputs of one quantity are compared as
+/// they are; where there are several quantities, each is divided by the standard deviation of its true values.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ShownFrame {
+    /// Place among all frames.
+    pub rank: Rank,
+    /// Index of the frame, from 0.
+    pub frame: usize,
+    /// RMSE in this frame by group of outputs, in the group's unit; NaN for a group without a value.
+    pub rmse: Vec<f64>,
+    /// True outputs, in the order of the columns.
+    pub truth: Vec<f64>,
+    /// Decoded outputs, in the order of the columns.
+    pub estimate: Vec<f64>,
+    /// Readings relative to their reference: see [`RelativeTo`](super::RelativeTo).
+    pub change: Vec<f64>,
+}
+
+/// Frames of median, high and largest error, without their readings.
+pub(super) fn shown(
+    truth: &Table,
+    estimate: &Table,
+    groups: &[(&str, Vec<usize>)],
+) -> Vec<ShownFrame> {
+    let spreads = spreads(truth, estimate);
+    let errors = truth.lines().zip(estimate.lines()).map(|(truth, estimate)| {
+        let errors = truth.iter().zip(estimate).zip(&spreads);
+        root_mean_square(errors.map(|((truth, value), spread)| (value - truth) / spread))
+    });
+    let mut order: Vec<(f64, usize)> =
+        errors.enumerate().filter(|(_, e)| !e.is_nan()).map(|(frame, e)| (e, frame)).collect();
+    order.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut frames: Vec<ShownFrame> = Vec::new();
+    for (rank, share) in Rank::ALL {
+        let Some(place) = nearest_rank(order.len(), share) else { continue };
+        let frame = order[place].1;
+        let line = |table: &Table| table.lines().nth(frame).unwrap_or_default().to_vec();
+        let (truth, estimate) = (line(truth), line(estimate));
+        let of_group = |(_, columns): &(&str, Vec<usize>)| {
+            root_mean_square(columns.iter().map(|column| estimate[*column] - truth[*column]))
+        };
+        let rmse = groups.iter().map(of_group).collect();
+        // Of few frames one may have two ranks: the higher one counts.
+        frames.retain(|known| known.frame != frame);
+        frames.push(ShownFrame { rank, frame, rmse, truth, estimate, change: vec![] });
+    }
+    frames
+}
+
+/// Root mean square of all values that are not missing; NaN without one.
+fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values
+        .filter(|value| !value.is_nan())
+        .fold((0.0, 0.0), |(sum, count), value| (sum + value * value, count + 1.0));
+    f64::sqrt(sum / count)
+}
+
+/// What the errors of each column are divided by: the standard deviation of its quantity, or 1 where all columns are
+/// of one quantity, or this one does not change.
+fn spreads(truth: &Table, estimate: &Table) -> Vec<f64> {
+    let quantities: Vec<&str> = truth.names.iter().map(|name| columns::quantity_of(name)).collect();
+    if quantities.windows(2).all(|pair| pair[0] == pair[1] && !pair[0].is_empty()) {
+        return vec![1.0; quantities.len()];
+    }
+    let variance = |column: usize| {
+        let values: Vec<f64> = pairs(&[column], truth, estimate).map(|[truth, _]| truth).collect();
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>()
+            / values.len() as f64
+    };
+    let variances: Vec<f64> = (0..quantities.len()).map(variance).collect();
+    let spread = |column: usize| {
+        // A name that states no quantity stands for itself.
+        let alike = |other: &usize| {
+            *other == column
+                || (quantities[*other] == quantities[column] && !quantities[column].is_empty())
+        };
+        let alike = (0..quantities.len()).filter(alike).map(|other| variances[other]);
+        let (sum, count) =
+            alike.filter(|v| !v.is_nan()).fold((0.0, 0.0), |(sum, n), v| (sum + v, n + 1.0));
+        let spread = f64::sqrt(sum / count);
+        if spread > 0.0 { spread } else { 1.0 }
+    };
+    (0..quantities.len()).map(spread).collect()
+}

@@ -1,0 +1,106 @@
+//! Colour scales: what colour a value has, and the bar that explains it.
+
+use super::svg::{Anchor, Svg, text_width};
+use super::ticks::{self, Ticks};
+
+/// Colour scale in one or two hues, ever fuller towards its ends.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ColourScale {
+    low: f64,
+    high: f64,
+    /// Whether zero has no colour, and values below it have a hue of their own.
+    diverging: bool,
+}
+
+/// Strips that a bar is drawn of: in the maps they are 8 px wide, so that no rounding makes them overlap.
+const STRIPS: usize = 31;
+
+impl ColourScale {
+    /// Scale of values above and below zero: it covers zero and all `values` that are finite.
+    pub fn diverging(values: impl IntoIterator<Item = f64>) -> Self {
+        let (low, high) = ticks::extent(values.into_iter().chain([0.0])).unwrap_or((0.0, 1.0));
+        let (low, high) = if high > low { (low, high) } else { (0.0, 1.0) };
+        Self { low, high, diverging: true }
+    }
+
+    /// Scale from the least to the greatest of `values`, so that small differences show.
+    pub fn sequential(values: impl IntoIterator<Item = f64>) -> Self {
+        let (low, high) = ticks::extent(values).unwrap_or((0.0, 1.0));
+        let (low, high) = if high > low { (low, high) } else { (low - 0.5, low + 0.5) };
+        Self { low, high, diverging: false }
+    }
+
+    /// CSS class and opacity for `value`.
+    pub fn colour(&self, value: f64) -> (&'static str, f64) {
+        if self.diverging {
+            let most = self.low.abs().max(self.high.abs());
+            (if value < 0.0 { "below" } else { "above" }, (value.abs() / most).min(1.0))
+        } else {
+            let place = ((value - self.low) / (self.high - self.low)).clamp(0.0, 1.0);
+            ("above", 0.06 + 0.94 * place)
+        }
+    }
+
+    /// Decimals with which values of the scale are told apart, and are not longer than cells are wide.
+    pub fn decimals(&self) -> usize {
+        match self.low.abs().max(self.high.abs()) {
+            most if most < 0.1 => 3,
+            most if most < 10.0 => 2,
+            most if most < 100.0 => 1,
+            _ => 0,
+        }
+    }
+
+    /// Draws the bar from `left` to `right` below `top`, in a height of 52 px; `label` names the quantity and its unit.
+    pub fn draw_bar(&self, svg: &mut Svg, [left, right]: [f64; 2], top: f64, label: &str) {
+        let height = 12.0;
+        let width = (right - left) / STRIPS as f64;
+        for strip in 0..STRIPS {
+            let share = (strip as f64 + 0.5) / STRIPS as f64;
+            let (class, opacity) = self.colour(self.low + share * (self.high - self.low));
+            let fill = format!(r#" fill-opacity="{opacity:.2}""#);
+            let corner = [left + strip as f64 * width, top];
+            svg.rect(corner, [width, height], &format!("{class} strip"), &fill);
+        }
+        svg.rect([left, top], [right - left, height], "outline", "");
+        let Ticks { mut at, .. } = ticks::linear([self.low, self.high], 4);
+        let slack = 1e-9 * (self.high - self.low);
+        at.retain(|(value, _)| (self.low - slack..=self.high + slack).contains(value));
+        let place =
+            |value: f64| left + (value - self.low) / (self.high - self.low) * (right - left);
+        let places: Vec<f64> = at.iter().map(|(value, _)| place(*value)).collect();
+        let half = |i: usize| text_width(&at[i].1) / 2.0;
+        let step = ticks::written(&places, |a, b| half(a) + half(b) + 3.0);
+        for (i, ((_, tick), x)) in at.iter().zip(&places).enumerate() {
+            svg.line([*x, top + height], [*x, top + height + 4.0], "axis");
+            if i % step == 0 {
+                svg.text(*x, top + height + 17.0, Anchor::Middle, "tick", tick);
+            }
+        }
+        svg.text(f64::midpoint(left, right), top + height + 36.0, Anchor::Middle, "tick", label);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn zero_has_no_colour_and_the_farthest_value_the_fullest() {
+        let scale = ColourScale::diverging([0.5, -0.1, f64::NAN]);
+        assert_eq!(scale.colour(0.0).1, 0.0);
+        assert_eq!(scale.colour(0.5), ("above", 1.0));
+        assert_eq!(scale.colour(-0.1), ("below", 0.2));
+        let scale = ColourScale::sequential([0.04, 0.06]);
+        assert_eq!(scale.colour(0.06), ("above", 1.0));
+        assert!(scale.colour(0.04).1 < 0.1);
+        for empty in [ColourScale::diverging([]), ColourScale::sequential([f64::NAN])] {
+            assert!(empty.colour(0.3).1.is_finite());
+        }
+        let mut svg = Svg::new(310.0, 60.0, "bar");
+        scale.draw_bar(&mut svg, [20.0, 290.0], 0.0, "RMSE (mm)");
+        let svg = svg.finish();
+        assert_eq!(svg.matches("above strip").count(), STRIPS);
+        assert!(svg.contains(">0.040</text>"), "{svg}");
+    }
+}

@@ -1,0 +1,272 @@
+//! Maps over a face: coloured cells with their numbers, or arrows.
+
+use std::fmt::Write as _;
+
+use super::colour::ColourScale;
+use super::face::Face;
+use super::format::{fixed, significant};
+use super::svg::{Anchor, Px, Svg, TEXT_PX, escape, text_width};
+use super::ticks;
+use super::voronoi;
+
+/// Width of a map in px.
+pub const WIDTH: f64 = 310.0;
+/// Cells that have a hover text at most: more would make the page large.
+const MOST_HOVERS: usize = 600;
+/// Width of a number in a cell relative to other text.
+const SMALL: f64 = 11.0 / TEXT_PX;
+
+/// Drawing of a face, to which values are added.
+pub struct Map<'f> {
+    face: &'f Face,
+    svg: Svg,
+    left: f64,
+    right: f64,
+    top: f64,
+    bottom: f64,
+}
+
+/// Values over a face.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Values<'v> {
+    /// Value of each cell; one that is not finite leaves its cell empty.
+    pub of_cells: &'v [f64],
+    /// Colours.
+    pub scale: &'v ColourScale,
+    /// Quantity with its unit, for the bar below the map.
+    pub label: &'v str,
+    /// Unit, for hover texts.
+    pub unit: &'v str,
+}
+
+impl<'f> Map<'f> {
+    /// Empty map of `face`. Screen readers read out `title`; `heading` stands above.
+    pub fn new(face: &'f Face, title: &str, heading: &str, below: f64) -> Self {
+        let (left, right, top) = (34.0, WIDTH - 28.0, 42.0);
+        let bottom = top + (right - left) * face.height_over_width;
+        let mut svg = Svg::new(WIDTH, bottom + 46.0 + below, title);
+        svg.text(left, TEXT_PX, Anchor::Start, "label", heading);
+        svg.text(0.0, top - 9.0, Anchor::Start, "tick", face.labels[1]);
+        let mut map = Self { face, svg, left, right, top, bottom };
+        if let Some([x, y]) = face.outline {
+            let (corner, end) = (map.place([0.0, y]), map.place([x, 0.0]));
+            map.svg.rect(corner, [end[0] - corner[0], end[1] - corner[1]], "face", "");
+        }
+        map
+    }
+
+    /// Place of a point in px.
+    pub fn place(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let Face { low, high, .. } = self.face;
+        let [x, y] = [(x - low[0]) / (high[0] - low[0]), (y - low[1]) / (high[1] - low[1])];
+        [self.left + x * (self.right - self.left), self.bottom - y * (self.bottom - self.top)]
+    }
+
+    /// Drawing to which marks are added.
+    pub fn svg(&mut self) -> &mut Svg {
+        &mut self.svg
+    }
+
+    /// Draws coloured cells, and the bar of their colours below.
+    pub fn values(mut self, values: &Values<'_>) -> String {
+        let decimals = values.scale.decimals();
+        let hover = self.face.cells.len() <= MOST_HOVERS;
+        for (cell, value) in self.face.cells.iter().zip(values.of_cells) {
+            let outline: Vec<[f64; 2]> = cell.outline.iter().map(|p| self.place(*p)).collect();
+            let middle = self.place(cell.middle);
+            let title = if hover {
+                let value =
+                    if value.is_finite() { significant(*value, 3) } else { "missing".into() };
+                format!("<title>{}: {value} {}</title>", escape(&cell.name), escape(values.unit))
+            } else {
+                String::new()
+            };
+            if !value.is_finite() {
+                self.svg.add(format_args!(
+                    r#"<text x="{}" y="{}" text-anchor="middle" class="tick">×{title}</text>"#,
+                    Px(middle[0]),
+                    Px(middle[1] + TEXT_PX * 0.35)
+                ));
+                continue;
+            }
+            let (class, opacity) = values.scale.colour(*value);
+            let mut d = String::new();
+            for (i, [x, y]) in outline.iter().enumerate() {
+                // Writing to a string cannot fail.
+                let _ = write!(d, "{}{} {}", if i == 0 { 'M' } else { 'L' }, Px(*x), Px(*y));
+            }
+            self.svg.add(format_args!(
+                r#"<path d="{d}Z" class="{class} cell-of-map" fill-opacity="{opacity:.2}">{title}</path>"#
+            ));
+            self.number(&outline, middle, &fixed(*value, decimals), opacity);
+        }
+        self.axes();
+        let (left, right, top) = (self.left, self.right, self.bottom + 50.0);
+        values.scale.draw_bar(&mut self.svg, [left, right], top, values.label);
+        self.svg.finish()
+    }
+
+    /// Writes the number of a cell where it fits into the outline.
+    fn number(&mut self, outline: &[[f64; 2]], middle: [f64; 2], number: &str, opacity: f64) {
+        let Some([left, right]) = voronoi::chord(outline, middle, 0) else { return };
+        let x = f64::midpoint(left, right);
+        let Some([above, below]) = voronoi::chord(outline, [x, middle[1]], 1) else { return };
+        if right - left < SMALL * text_width(number) + 3.0 || below - above < TEXT_PX {
+            return;
+        }
+        let y = middle[1].clamp(above + 7.0, below - 6.0) + TEXT_PX * 0.3;
+        let class = if opacity > 0.68 { "cell full" } else { "cell" };
+        self.svg.text(x, y, Anchor::Middle, class, number);
+    }
+
+    /// Draws an arrow for each cell and finishes the map: one of `truth` and one of `estimate`, x and y. The `longest`
+    /// of all is as long as neighbours are apart.
+    pub fn arrows(
+        mut self,
+        [truth, estimate]: [[&[f64]; 2]; 2],
+        longest: f64,
+        unit: &str,
+    ) -> String {
+        let px_per_mm = (self.right - self.left) / (self.face.high[0] - self.face.low[0]);
+        let scale = 0.95 * self.face.spacing() * px_per_mm / longest;
+        let scale = scale * self.room([truth, estimate], scale);
+        let hover = self.face.cells.len() <= MOST_HOVERS;
+        for (i, cell) in self.face.cells.iter().enumerate() {
+            let from = self.place(cell.middle);
+            let mut vectors = vec![];
+            for ([x, y], class) in [(truth, "truth"), (estimate, "c1")] {
+                if (x[i] + y[i]).is_finite() {
+                    let [dx, dy] = [scale * x[i], -scale * y[i]];
+                    self.arrow([from[0] - dx / 2.0, from[1] - dy / 2.0], [dx, dy], class);
+                    vectors.push(format!("{}, {}", significant(x[i], 2), significant(y[i], 2)));
+                }
+            }
+            if hover && let [truth, estimate] = &vectors[..] {
+                let text =
+                    escape(&format!("{}: true {truth}; decoded {estimate} {unit}", cell.name));
+                self.svg.add(format_args!(
+                    r#"<circle cx="{}" cy="{}" r="9" class="sensitive"><title>{text}</title></circle>"#,
+                    Px(from[0]),
+                    Px(from[1])
+                ));
+            }
+        }
+        self.axes();
+        let y = self.bottom + 60.0;
+        let mut x = self.left;
+        for (name, class) in [("true", "truth"), ("decoded", "c1")] {
+            self.arrow([x, y], [20.0, 0.0], class);
+            self.svg.text(x + 25.0, y + TEXT_PX * 0.35, Anchor::Start, "tick", name);
+            x += 36.0 + 0.8 * text_width(name);
+        }
+        let length = format!("{} {unit}", significant(longest, 2));
+        let full = scale * longest;
+        let start = self.right + 20.0 - text_width(&length) - full - 4.0;
+        self.svg.line([start, y - 4.0], [start, y + 4.0], "axis");
+        self.svg.line([start, y], [start + full, y], "axis");
+        self.svg.line([start + full, y - 4.0], [start + full, y + 4.0], "axis");
+        self.svg.text(self.right + 20.0, y + TEXT_PX * 0.35, Anchor::End, "tick", &length);
+        self.svg.finish()
+    }
+
+    /// Factor, at most 1, with which all arrows of this `scale` in px end inside the map; never less than a half, lest one
+    /// electrode at the edge make all arrows short.
+    fn room(&self, vectors: [[&[f64]; 2]; 2], scale: f64) -> f64 {
+        let mut room: f64 = 1.0;
+        for (i, cell) in self.face.cells.iter().enumerate() {
+            let [x, y] = self.place(cell.middle);
+            let sides = [(x - self.left).min(self.right - x), (y - self.top).min(self.bottom - y)];
+            for vector in &vectors {
+                for (component, side) in vector.iter().zip(sides) {
+                    let half = 0.5 * scale * component[i].abs();
+                    // A missing component compares as false.
+                    if half > side {
+                        room = room.min(side / half);
+                    }
+                }
+            }
+        }
+        room.max(0.5)
+    }
+
+    fn arrow(&mut self, [x, y]: [f64; 2], [dx, dy]: [f64; 2], class: &str) {
+        let length = dx.hypot(dy);
+        if length < 1.5 {
+            // Too short for an arrow: a dot.
+            self.svg.add(format_args!(
+                r#"<circle cx="{}" cy="{}" r="1.2" class="{class} mark"/>"#,
+                Px(x),
+                Px(y)
+            ));
+            return;
+        }
+        let (end, head) = ([x + dx, y + dy], (0.35 * length).clamp(2.0, 5.0));
+        let (along, across) = ([dx / length, dy / length], [-dy / length, dx / length]);
+        let corner = |side: f64| {
+            let at =
+                |axis: usize| end[axis] - head * along[axis] + side * 0.5 * head * across[axis];
+            format!("{} {}", Px(at(0)), Px(at(1)))
+        };
+        self.svg.add(format_args!(
+            r#"<path d="M{} {}L{} {}M{}L{} {}L{}" class="{class} arrow"/>"#,
+            Px(x),
+            Px(y),
+            Px(end[0]),
+            Px(end[1]),
+            corner(1.0),
+            Px(end[0]),
+            Px(end[1]),
+            corner(-1.0)
+        ));
+    }
+
+    /// Draws the outline, ticks and labels.
+    pub fn axes(&mut self) {
+        let Face { low, high, outline, labels, ticks, row_wires, .. } = self.face;
+        let (corner, end) = match outline {
+            Some([x, y]) => (self.place([0.0, *y]), self.place([*x, 0.0])),
+            None => (self.place([low[0], high[1]]), self.place([high[0], low[1]])),
+        };
+        self.svg.rect(corner, [end[0] - corner[0], end[1] - corner[1]], "outline", "");
+        let (left, right, bottom) = (self.left, self.right, self.bottom);
+        let places: Vec<f64> =
+            ticks[0].iter().map(|(at, _)| self.place([*at, low[1]])[0]).collect();
+        let half = |i: usize| text_width(&ticks[0][i].1) / 2.0;
+        let step = ticks::written(&places, |a, b| half(a) + half(b) + 3.0);
+        for (i, ((_, label), x)) in ticks[0].iter().zip(places).enumerate() {
+            self.svg.line([x, bottom], [x, bottom + 4.0], "axis");
+            if i % step == 0 {
+                self.svg.text(x, bottom + 18.0, Anchor::Middle, "tick", label);
+            }
+        }
+        let places: Vec<f64> =
+            ticks[1].iter().map(|(at, _)| self.place([low[0], *at])[1]).collect();
+        let step = ticks::written(&places, |_, _| 0.8 * TEXT_PX);
+        for (i, ((_, label), y)) in ticks[1].iter().zip(places).enumerate() {
+            self.svg.line([left - 4.0, y], [left, y], "axis");
+            if i % step == 0 {
+                self.svg.text(left - 7.0, y + TEXT_PX * 0.35, Anchor::End, "tick", label);
+            }
+        }
+        if !row_wires.is_empty() {
+            self.svg.text(WIDTH, self.top - 9.0, Anchor::End, "tick", "row-wire");
+        }
+        let mut free = f64::INFINITY;
+        for (number, at) in row_wires {
+            let y = self.place([low[0], *at])[1];
+            if y + TEXT_PX * 0.5 < free {
+                let number = number.to_string();
+                self.svg.text(right + 8.0, y + TEXT_PX * 0.35, Anchor::Start, "tick", &number);
+                free = y - TEXT_PX * 0.5;
+            }
+        }
+        let middle = f64::midpoint(left, right);
+        self.svg.text(middle, bottom + 36.0, Anchor::Middle, "tick", labels[0]);
+    }
+
+    /// Finishes a map whose marks were added by hand.
+    pub fn finish(mut self) -> String {
+        self.axes();
+        self.svg.finish()
+    }
+}

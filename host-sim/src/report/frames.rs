@@ -1,0 +1,267 @@
+//! Figures of single frames: of median, high and largest error.
+
+use super::colour::ColourScale;
+use super::errors::BAR_PX;
+use super::face::Face;
+use super::face_map::{Map, Values};
+use super::figures::Figure;
+use super::format::{fixed, significant, symbol, with_unit};
+use super::svg::{Anchor, Px, TEXT_PX};
+use super::ticks;
+use super::view::View;
+use crate::evaluate::distribution::{Rank, RelativeTo, ShownFrame};
+
+/// Columns that are a place on the face.
+const PLACES: [[&str; 2]; 2] = [["contact_x_mm", "contact_y_mm"], ["x_mm", "y_mm"]];
+
+/// Name of a frame in headings.
+pub fn name(frame: &ShownFrame) -> &'static str {
+    match frame.rank {
+        Rank::Median => "median frame",
+        Rank::High => "95 % frame",
+        Rank::Worst => "worst frame",
+    }
+}
+
+/// Words about a frame for captions: its number, its rank, and its error.
+fn described(view: &View<'_>, frame: &ShownFrame) -> String {
+    let rank = match frame.rank {
+        Rank::Median => "The frame of median error",
+        Rank::High => "The frame with a larger error than 95 % of all",
+        Rank::Worst => "The frame with the largest error",
+    };
+    let errors = view.distribution.groups.iter().zip(&frame.rmse);
+    let errors: Vec<String> = errors
+        .filter(|(_, rmse)| rmse.is_finite())
+        .map(|(g, rmse)| format!("{} {} {}", symbol(&g.group), significant(*rmse, 2), g.unit))
+        .collect();
+    format!("{rank}: number {} (from 0), RMSE {}.", frame.frame, errors.join(", "))
+}
+
+/// How frames are ordered, for a caption.
+pub const ORDER: &str = "Frames are ordered by the root mean square of their errors over all outputs; outputs of \
+                         different quantities are divided by their standard deviations first.";
+
+/// Figure of the readings of all shown frames, as they were read and without noise.
+pub fn readings(view: &View<'_>) -> Option<Figure> {
+    let shown = &view.distribution.readings;
+    let (label, words) = match shown.relative_to {
+        RelativeTo::Rest => {
+            ("ΔR/R₀ (%)", "Change of the readings from the sensor at rest, ΔR/R₀ in %")
+        }
+        RelativeTo::Median => (
+            "change from median (%)",
+            "Readings relative to the median of each over all frames, in %; the sensor at rest is not known",
+        ),
+        RelativeTo::MedianInDeviations => (
+            "change from median (σ)",
+            "Readings relative to the median of each over all frames, in its standard deviations σ; the sensor at \
+             rest is not known",
+        ),
+    };
+    let unit = if shown.relative_to == RelativeTo::MedianInDeviations { "" } else { "%" };
+    let Some(face) = Face::of_readings(shown) else { return channels(view, label, words) };
+    let changes = || view.distribution.frames.iter().map(|frame| &frame.change);
+    let scale = ColourScale::diverging(changes().chain(view.ideal_changes).flatten().copied());
+    let map = |frame: &ShownFrame, what: &str, values: &[f64]| {
+        let heading = format!("{}, {what}", name(frame));
+        let title = format!("Readings of the {heading}");
+        let values = Values { of_cells: values, scale: &scale, label, unit };
+        Map::new(&face, &title, &heading, BAR_PX).values(&values)
+    };
+    let frames = &view.distribution.frames;
+    let read = frames.iter().map(|frame| map(frame, "as read", &frame.change));
+    let ideal = frames.iter().zip(view.ideal_changes);
+    let ideal = ideal.map(|(frame, ideal)| map(frame, "without noise", ideal));
+    let panels: Vec<String> = read.chain(ideal).collect();
+    let below = match &view.noise {
+        Some(noise) if !view.ideal_changes.is_empty() => {
+            format!(" Above as the model received them, with {noise}; below without it.")
+        }
+        _ => String::new(),
+    };
+    let caption = format!("{words}. All maps share one scale.{below} {ORDER}");
+    Some(Figure::of_panels(caption, &panels))
+}
+
+/// Figure of readings whose names tell no wires: bars in the order of the columns.
+fn channels(view: &View<'_>, label: &str, words: &str) -> Option<Figure> {
+    use super::chart::{Axis, Chart, Mark, Series};
+    let shown = &view.distribution.readings;
+    let count = shown.names.len();
+    let frames = &view.distribution.frames;
+    let all = || frames.iter().flat_map(|frame| frame.change.iter().copied());
+    let short = count <= 16 && shown.names.iter().all(|name| name.chars().count() <= 5);
+    let names = shown.names.iter().enumerate();
+    let at = names
+        .map(|(i, name)| (i as f64 + 1.0, if short { name.clone() } else { (i + 1).to_string() }));
+    let at: Vec<(f64, String)> = at.collect();
+    let axis = if short { "reading" } else { "reading, in the order of the model's inputs" };
+    let panel = |frame: &ShownFrame| {
+        let points = frame.change.iter().enumerate().map(|(i, y)| [i as f64 + 1.0, *y]).collect();
+        Chart {
+            title: format!("Readings of the {}", name(frame)),
+            x: Axis::linear(
+                axis,
+                ticks::Ticks { low: 0.5, high: count as f64 + 0.5, at: at.clone() },
+            ),
+            y: Axis::linear(
+                format!("{}: {label}", name(frame)),
+                ticks::linear(all().chain([0.0]), 4),
+            ),
+            series: vec![Series::new("", "c1", Mark::Bars(0.7), points)],
+            bands: vec![],
+            notes: vec![],
+            end_labels: false,
+        }
+        .draw([310.0, 230.0])
+    };
+    let panels: Vec<String> = frames.iter().map(panel).collect();
+    (!panels.is_empty())
+        .then(|| Figure::of_panels(format!("{words}. All axes share one scale. {ORDER}"), &panels))
+}
+
+/// Figure of maps of a frame: true, decoded and their difference, of one group of outputs.
+pub fn maps(view: &View<'_>, face: &Face, frame: &ShownFrame) -> Option<Figure> {
+    let group = view.distribution.main_group()?;
+    let (symbol, unit) = (symbol(&group.group), &group.unit);
+    let of_line = |line: &[f64]| face.values(view.distribution, &group.group, line);
+    let (truth, estimate) = (of_line(&frame.truth), of_line(&frame.estimate));
+    let error: Vec<f64> = estimate.iter().zip(&truth).map(|(a, b)| a - b).collect();
+    let signal = ColourScale::diverging(truth.iter().chain(&estimate).copied());
+    let of_error = ColourScale::diverging(error.iter().copied());
+    let panel = |what: &str, values: &[f64], scale: &ColourScale, label: &str| {
+        let title = format!("Map of {symbol}, {what}, {}", name(frame));
+        let label = with_unit(label, unit);
+        let values = Values { of_cells: values, scale, label: &label, unit };
+        Map::new(face, &title, &format!("{}: {symbol}, {what}", name(frame)), BAR_PX)
+            .values(&values)
+    };
+    let panels = [
+        panel("true", &truth, &signal, &symbol),
+        panel("decoded", &estimate, &signal, &symbol),
+        panel("decoded − true", &error, &of_error, &format!("error of {symbol}")),
+    ];
+    let caption = format!(
+        "{} Maps of {symbol}: true and decoded on one scale, their difference on its own.",
+        described(view, frame)
+    );
+    Some(Figure::of_panels(caption, &panels))
+}
+
+/// Figure of x and y of all shown frames as arrows, true and decoded. `None` if they are not decoded both.
+pub fn arrows(view: &View<'_>, face: &Face) -> Option<Figure> {
+    let groups = &view.distribution.groups;
+    let [x, y] = [["dx_mm", "dy_mm"], ["fx_n", "fy_n"]]
+        .into_iter()
+        .find(|names| names.iter().all(|name| groups.iter().any(|g| g.group == *name)))?;
+    let unit = taxel_data::columns::unit_of(x);
+    let vectors: Vec<[[Vec<f64>; 2]; 2]> = view
+        .distribution
+        .frames
+        .iter()
+        .map(|frame| {
+            [&frame.truth, &frame.estimate]
+                .map(|line| [x, y].map(|group| face.values(view.distribution, group, line)))
+        })
+        .collect();
+    let panel = |(frame, [truth, estimate]): (&ShownFrame, &[[Vec<f64>; 2]; 2])| {
+        let lengths = [truth, estimate].into_iter().flat_map(|[x, y]| x.iter().zip(y));
+        let longest = lengths.map(|(x, y)| x.hypot(*y)).filter(|l| l.is_finite());
+        let longest = longest.fold(0.0, f64::max);
+        let longest = if longest > 0.0 { longest } else { 1.0 };
+        let heading = format!("{} and {}, {}", symbol(x), symbol(y), name(frame));
+        let slices = [truth, estimate].map(|[x, y]| [x.as_slice(), y.as_slice()]);
+        Map::new(face, &format!("Arrows of {heading}"), &heading, 28.0)
+            .arrows(slices, longest, unit)
+    };
+    let panels: Vec<String> = view.distribution.frames.iter().zip(&vectors).map(panel).collect();
+    let caption = format!(
+        "{} and {} of every electrode in the same frames, as arrows: true and decoded. Each panel has a scale of its \
+         own, which the bar below it gives.",
+        symbol(x),
+        symbol(y)
+    );
+    (!panels.is_empty()).then(|| Figure::of_panels(caption, &panels))
+}
+
+/// Figure of true and decoded places in the shown frames. `None` for outputs without a place.
+pub fn places(view: &View<'_>) -> Option<Figure> {
+    let outputs = &view.distribution.outputs;
+    let column = |name: &str| outputs.iter().position(|output| output.name == name);
+    let [x, y] = PLACES.into_iter().find_map(|[x, y]| Some([column(x)?, column(y)?]))?;
+    let face = if let Some(sensor) = view.sensor {
+        Face::blank([0.0, 0.0], sensor.face_mm, Some(sensor.face_mm))
+    } else {
+        let group = |column: usize| {
+            let name = &outputs[column].group;
+            view.distribution.groups.iter().find(|group| group.group == *name)
+        };
+        let [x, y] = [group(x)?, group(y)?].map(|group| &group.density);
+        Face::blank([x.low, y.low], [x.high, y.high], None)
+    };
+    let panel = |frame: &ShownFrame| {
+        let heading = name(frame).to_owned();
+        let mut map = Map::new(&face, &format!("Place in the {heading}"), &heading, 46.0);
+        for row in view.sensor.into_iter().flat_map(|sensor| &sensor.row_wires) {
+            for electrode in &row.electrodes_mm {
+                let [x, y] = map.place(*electrode);
+                map.svg().add(format_args!(
+                    r#"<circle cx="{}" cy="{}" r="1.6" class="muted mark pale"/>"#,
+                    Px(x),
+                    Px(y)
+                ));
+            }
+        }
+        // A place that is decoded beside the face is drawn at its edge.
+        let clamped = |[x, y]: [f64; 2]| {
+            [x.clamp(face.low[0], face.high[0]), y.clamp(face.low[1], face.high[1])]
+        };
+        let of_line = |line: &[f64]| [line[x], line[y]];
+        let (truth, estimate) = (of_line(&frame.truth), of_line(&frame.estimate));
+        if truth.iter().chain(&estimate).all(|value| value.is_finite()) {
+            let [from, to] = [truth, estimate].map(|point| map.place(clamped(point)));
+            let [hover_true, hover_decoded] = [("true", truth), ("decoded", estimate)]
+                .map(|(what, [x, y])| format!("{what}: {x:.2}, {y:.2} mm"));
+            map.svg().line(from, to, "truth thin");
+            mark(&mut map, from, "truth mark", 5.0, &hover_true);
+            mark(&mut map, to, "c1 ring", 7.0, &hover_decoded);
+        }
+        let depth =
+            column("contact_depth_mm").map(|depth| [frame.truth[depth], frame.estimate[depth]]);
+        legend(&mut map, &face, depth);
+        map.finish()
+    };
+    let panels: Vec<String> = view.distribution.frames.iter().map(panel).collect();
+    let face_of = if view.sensor.is_some() {
+        "Small dots are the upper electrodes."
+    } else {
+        "The frame is the range of true places."
+    };
+    let caption = format!(
+        "Place of the contact, true and decoded, seen from above. A line joins the two. {face_of} A place beyond \
+         the frame is drawn at its edge."
+    );
+    (!panels.is_empty()).then(|| Figure::of_panels(caption, &panels))
+}
+
+fn mark(map: &mut Map<'_>, [x, y]: [f64; 2], class: &str, radius: f64, hover: &str) {
+    map.svg().add(format_args!(
+        r#"<circle cx="{}" cy="{}" r="{radius}" class="{class}"><title>{hover}</title></circle>"#,
+        Px(x),
+        Px(y)
+    ));
+}
+
+fn legend(map: &mut Map<'_>, face: &Face, depth_mm: Option<[f64; 2]>) {
+    let [x, y] = map.place(face.low);
+    if let Some([truth, estimate]) = depth_mm {
+        let depth = format!("depth {} mm, decoded {} mm", fixed(truth, 2), fixed(estimate, 2));
+        map.svg().text(x, y + 82.0, Anchor::Start, "tick", &depth);
+    }
+    let y = y + 58.0;
+    mark(map, [x + 6.0, y], "truth mark", 5.0, "true");
+    map.svg().text(x + 18.0, y + TEXT_PX * 0.35, Anchor::Start, "tick", "true");
+    mark(map, [x + 76.0, y], "c1 ring", 7.0, "decoded");
+    map.svg().text(x + 90.0, y + TEXT_PX * 0.35, Anchor::Start, "tick", "decoded");
+}

@@ -1,0 +1,162 @@
+//! Sketch of a sensor in plan view: wires and electrodes.
+
+use std::fmt::Write as _;
+
+use super::face;
+use super::figures::Figure;
+use super::svg::{Anchor, Px, Svg, TEXT_PX, text_width};
+use crate::run::SensorSketch;
+
+/// Draws the sensor in this width, in px.
+fn draw(sensor: &SensorSketch, width: f64) -> String {
+    let (low, high) = face::extent(sensor);
+    let (left, right, top) = (44.0, width - 34.0, 74.0);
+    let px_per_mm = ((right - left) / (high[0] - low[0])).min(460.0 / (high[1] - low[1]));
+    let right = left + px_per_mm * (high[0] - low[0]);
+    let bottom = top + px_per_mm * (high[1] - low[1]);
+    let place =
+        |[x, y]: [f64; 2]| [left + px_per_mm * (x - low[0]), bottom - px_per_mm * (y - low[1])];
+    let mut svg = Svg::new(width, bottom + 46.0, "Row-wires, column-wires and electrodes");
+    let [x_mm, y_mm] = sensor.face_mm;
+    let corner = place([0.0, y_mm]);
+    svg.rect(corner, [px_per_mm * x_mm, px_per_mm * y_mm], "face", "");
+    let unread = sensor.row_wires.iter().any(|row| !row.read);
+    legend(&mut svg, unread);
+
+    let dense = sensor.column_wires_mm.iter().map(Vec::len).sum::<usize>() > 300;
+    let size = if dense { 2.0 } else { 3.0 };
+    for (k, column) in sensor.column_wires_mm.iter().enumerate() {
+        let points: Vec<[f64; 2]> = column.iter().map(|p| place(*p)).collect();
+        wire(&mut svg, &points, "c2 wire");
+        for [x, y] in points {
+            let text = format!("column-wire {}", k + 1);
+            svg.hovered_rect([x - size, y - size], [2.0 * size, 2.0 * size], "c2 mark", &text);
+        }
+    }
+    for (m, row) in sensor.row_wires.iter().enumerate() {
+        let class = if row.read { "c1" } else { "muted" };
+        let points: Vec<[f64; 2]> = row.electrodes_mm.iter().map(|p| place(*p)).collect();
+        wire(&mut svg, &points, if row.read { "c1 wire" } else { "muted wire broken" });
+        for (i, [x, y]) in points.iter().enumerate() {
+            let read = if row.read { "" } else { ", not read" };
+            svg.add(format_args!(
+                r#"<circle cx="{}" cy="{}" r="{}" class="{class} mark"><title>row-wire {}, electrode {}{read}</title></circle>"#,
+                Px(*x),
+                Px(*y),
+                1.5 * size,
+                m + 1,
+                i + 1
+            ));
+        }
+    }
+    // Numbers stand at the ends of wires, as far as they do not overlap.
+    let mut rows: Vec<(f64, usize)> = Vec::new();
+    for (m, row) in sensor.row_wires.iter().enumerate() {
+        let last = row.electrodes_mm.iter().max_by(|a, b| a[0].total_cmp(&b[0]));
+        rows.extend(last.map(|last| (place(*last)[1], m + 1)));
+    }
+    let numbers = spread_out(rows, TEXT_PX);
+    for (y, m) in numbers {
+        svg.text(right + 8.0, y + TEXT_PX * 0.35, Anchor::Start, "c1 name", &m.to_string());
+    }
+    let mut columns: Vec<(f64, usize)> = Vec::new();
+    for (k, column) in sensor.column_wires_mm.iter().enumerate() {
+        let last = column.iter().max_by(|a, b| a[1].total_cmp(&b[1]));
+        columns.extend(last.map(|last| (place(*last)[0], k + 1)));
+    }
+    for (x, k) in spread_out(columns, text_width("00") + 3.0) {
+        svg.text(x, top - 7.0, Anchor::Middle, "c2 name", &k.to_string());
+    }
+    svg.rect(corner, [px_per_mm * x_mm, px_per_mm * y_mm], "outline", "");
+    for (value, label) in face::inside(0.0, x_mm) {
+        let x = place([value, 0.0])[0];
+        svg.line([x, bottom], [x, bottom + 4.0], "axis");
+        svg.text(x, bottom + 18.0, Anchor::Middle, "tick", &label);
+    }
+    for (value, label) in face::inside(0.0, y_mm) {
+        let y = place([0.0, value])[1];
+        svg.line([left - 4.0, y], [left, y], "axis");
+        svg.text(left - 7.0, y + TEXT_PX * 0.35, Anchor::End, "tick", &label);
+    }
+    svg.text(f64::midpoint(left, right), bottom + 38.0, Anchor::Middle, "tick", "x (mm)");
+    svg.text(0.0, top - 22.0, Anchor::Start, "tick", "y (mm)");
+    svg.finish()
+}
+
+fn wire(svg: &mut Svg, points: &[[f64; 2]], class: &str) {
+    let mut d = String::new();
+    for (i, [x, y]) in points.iter().enumerate() {
+        // Writing to a string cannot fail.
+        let _ = write!(d, "{}{} {}", if i == 0 { 'M' } else { 'L' }, Px(*x), Px(*y));
+    }
+    svg.path(&d, class);
+}
+
+/// Numbers at places that are at least `apart`: those for which there is no room are left out.
+fn spread_out(mut numbers: Vec<(f64, usize)>, apart: f64) -> Vec<(f64, usize)> {
+    numbers.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let mut free = f64::NEG_INFINITY;
+    numbers.retain(|(at, _)| {
+        let fits = *at >= free;
+        if fits {
+            free = at + apart;
+        }
+        fits
+    });
+    numbers
+}
+
+fn legend(svg: &mut Svg, unread: bool) {
+    let (mut x, mut y) = (0.0, TEXT_PX);
+    let entries = [("row-wire, upper layer", "c1"), ("column-wire, lower layer", "c2")];
+    let unread = unread.then_some(("row-wire that is not read", "muted"));
+    for (words, class) in entries.into_iter().chain(unread) {
+        let width = 26.0 + 0.85 * text_width(words) + 16.0;
+        if x > 0.0 && x + width > 410.0 {
+            (x, y) = (0.0, y + TEXT_PX + 6.0);
+        }
+        let at = y - TEXT_PX * 0.35;
+        let broken = if class == "muted" { " broken" } else { "" };
+        svg.line([x, at], [x + 20.0, at], &format!("{class} wire{broken}"));
+        if class == "c2" {
+            svg.rect([x + 7.0, at - 3.0], [6.0, 6.0], "c2 mark", "");
+        } else {
+            let class = format!("{class} mark");
+            svg.add(format_args!(
+                r#"<circle cx="{}" cy="{at}" r="4.5" class="{class}"/>"#,
+                x + 10.0
+            ));
+        }
+        svg.text(x + 26.0, y, Anchor::Start, "tick", words);
+        x += width;
+    }
+}
+
+/// Figure of the sensor.
+pub fn figure(sensor: &SensorSketch) -> Figure {
+    let read = sensor.row_wires.iter().filter(|row| row.read).count();
+    let all = sensor.row_wires.len();
+    let rows = match all - read {
+        0 => format!("{all} row-wires"),
+        _ => format!("{read} of {all} row-wires, which are read"),
+    };
+    Figure {
+        caption: format!(
+            "The sensor from above, at rest: {rows}, and {} column-wires below them. Dots are the upper electrodes, \
+             which move; squares the lower ones. A reading is the resistance between a row-wire and a column-wire.",
+            sensor.column_wires_mm.len()
+        ),
+        drawing: format!("<div class=\"sketch\">\n{}</div>\n", draw(sensor, 480.0)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_that_would_overlap_are_left_out() {
+        let numbers = vec![(30.0, 3), (0.0, 1), (8.0, 2), (30.0, 4)];
+        assert_eq!(spread_out(numbers, 10.0), [(0.0, 1), (30.0, 3)]);
+    }
+}

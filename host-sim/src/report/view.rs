@@ -1,0 +1,124 @@
+//! What the page of a model shows, whichever result it is from.
+
+use crate::by_depth::DepthErrors;
+use crate::evaluate::device_cost::DeviceCost;
+use crate::evaluate::distribution::Distribution;
+use crate::evaluate::table1::Table1;
+use crate::metrics::{DecoderErrors, LimitSummary};
+use crate::run::{RunResult, SensorSketch};
+use crate::verdict::Verdict;
+
+use super::format::{grouped, percent};
+
+/// How a page was made, so that it can be made again.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Made {
+    /// Command line.
+    pub command: String,
+    /// Files beside the page that belong to it.
+    pub files: Vec<String>,
+}
+
+/// Parts of a result that its page shows. What only a scene knows may be missing.
+#[derive(Debug, Clone)]
+pub struct View<'a> {
+    /// Heading of the page.
+    pub title: String,
+    /// Facts about data and model: name and value.
+    pub facts: Vec<(&'static str, String)>,
+    /// What the model is worth.
+    pub verdict: &'a Verdict,
+    /// What it asks of a device.
+    pub device: &'a DeviceCost,
+    /// Errors of the model, and of decoders beside it.
+    pub decoders: &'a [DecoderErrors],
+    /// Least possible errors.
+    pub limit: &'a LimitSummary,
+    /// Errors by the depth of the contact; empty for other outputs.
+    pub by_depth: &'a [DepthErrors],
+    /// Distribution of the model's errors.
+    pub distribution: &'a Distribution,
+    /// Number of frames that were decoded.
+    pub frames: usize,
+    /// Wires and electrodes of the sensor.
+    pub sensor: Option<&'a SensorSketch>,
+    /// Changes of the readings of the shown frames without noise; empty where they are not known.
+    pub ideal_changes: &'a [Vec<f64>],
+    /// Noise on the readings in words, if it is known.
+    pub noise: Option<String>,
+    /// Errors by noise and spread.
+    pub table1: Option<&'a Table1>,
+    /// How the page was made.
+    pub made: &'a Made,
+}
+
+impl<'a> View<'a> {
+    /// View of a run.
+    #[must_use]
+    pub fn of_run(result: &'a RunResult, made: &'a Made) -> Self {
+        let scene = result.scene.as_ref();
+        let noise =
+            scene.map(|it| format!("{} noise of {}", it.noise_kind, percent(it.noise_level)));
+        let kind = if scene.is_some() { "Scene" } else { "Data" };
+        Self {
+            title: format!("{kind} “{}”", result.subject),
+            facts: facts(result, noise.as_deref()),
+            verdict: &result.verdict,
+            device: &result.device,
+            decoders: &result.decoders,
+            limit: &result.limit,
+            by_depth: &result.by_depth,
+            distribution: &result.distribution,
+            frames: result.model.test_frames,
+            sensor: scene.and_then(|scene| scene.sensor.as_ref()),
+            ideal_changes: scene.map_or(&[], |scene| &scene.ideal_changes),
+            noise,
+            table1: result.table1.as_ref(),
+            made,
+        }
+    }
+}
+
+fn facts(result: &RunResult, noise: Option<&str>) -> Vec<(&'static str, String)> {
+    let (scene, model) = (&result.scene, &result.model);
+    let tail = if model.affine_tail { "affine tail" } else { "no affine tail" };
+    let readings = if model.relative_inputs { "relative readings" } else { "readings" };
+    let inputs = match model.projected_readings {
+        0 => format!("{} {readings}", model.inputs),
+        count => format!("{count} {readings} → {} features", model.inputs),
+    };
+    let outputs = match model.expanded_outputs {
+        0 => format!("{} outputs", model.outputs),
+        all => format!("{} components → {all} outputs", model.outputs),
+    };
+    let drift = match scene.as_ref().map_or(0.0, |scene| scene.gain_drift) {
+        0.0 => String::new(),
+        gain => format!(", gain drift ±{}", percent(gain)),
+    };
+    let kind = if scene.is_some() { "Scene" } else { "Data" };
+    let others = result.data.as_ref().map_or("new ones", |data| data.test_frames.as_str());
+    let refined = if model.refined { " (refined)" } else { "" };
+    let plural = if model.networks == 1 { "" } else { "s" };
+    vec![
+        (kind, format!("{}, digest {}, seed {}", result.subject, result.digest, result.seed)),
+        ("Readings", format!("{}{drift}", noise.unwrap_or("as measured"))),
+        (
+            "Frames",
+            format!(
+                "{} to train on, {} ({others}) to test",
+                grouped(model.training_frames),
+                grouped(model.test_frames)
+            ),
+        ),
+        (
+            "Model",
+            format!(
+                "{} network{plural}: {inputs} → K = {} → {outputs}; spread {}{refined}; {tail}",
+                model.networks,
+                model.centres,
+                super::format::significant(model.spread, 3)
+            ),
+        ),
+        ("Blob", format!("{} bytes, CRC-32 {}", grouped(model.blob_bytes), model.model_crc)),
+    ]
+}
