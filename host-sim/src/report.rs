@@ -25,10 +25,10 @@ pub fn html(result: &RunResult) -> String {
     html::page(result)
 }
 
-/// Page for a trade between speed and accuracy.
+/// Page for a trade between speed and accuracy, with the `command` that computed it.
 #[must_use]
-pub fn trade_html(trade: &Trade) -> String {
-    trade::html(trade)
+pub fn trade_html(trade: &Trade, command: &str) -> String {
+    trade::html(trade, command)
 }
 
 /// Picture of a trade, as a file of its own: light or dark like the viewer.

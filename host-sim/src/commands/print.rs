@@ -19,6 +19,23 @@ impl Page {
         let _ = writeln!(self.0, "{line}");
     }
 
+    /// Adds text, broken between words into lines of at most 118 characters.
+    pub fn wrapped(&mut self, text: &str) {
+        const WIDTH: usize = 118;
+        let mut line = String::new();
+        for word in text.split_whitespace() {
+            if !line.is_empty() && line.chars().count() + 1 + word.chars().count() > WIDTH {
+                self.line(&line);
+                line.clear();
+            }
+            if !line.is_empty() {
+                line.push(' ');
+            }
+            line += word;
+        }
+        self.line(line);
+    }
+
     /// Prints the page.
     pub fn print(self) -> Result<()> {
         to_stdout(&self.0)

@@ -106,7 +106,7 @@ pub fn svg(trade: &Trade) -> String {
 }
 
 /// Page of a trade.
-pub fn html(trade: &Trade) -> String {
+pub fn html(trade: &Trade, _command: &str) -> String {
     let chart = chart(trade);
     let title = format!("Taxel: speed against accuracy, {}", trade.scene);
     let mut body = format!(
@@ -117,7 +117,7 @@ pub fn html(trade: &Trade) -> String {
         percent(trade.noise_level),
         grouped(trade.test_frames),
         escape(&trade.compiler),
-        trade.clock_mhz
+        trade.device.clock_mhz
     );
     let _ = write!(
         body,
@@ -189,7 +189,7 @@ fn table(trade: &Trade) -> String {
         let ratio = p.ratio_to_limit(&trade.group);
         let ratio = ratio.map_or("–".into(), |ratio| format!("{ratio:.2}"));
         let _ = write!(html, "<td class=\"number\">{ratio}</td>");
-        let times = significant(p.frame_us, 3);
+        let times = significant(p.times.decode_ms, 3);
         for number in [
             grouped(p.frame.instructions as usize),
             grouped(p.frame.cycles as usize),
