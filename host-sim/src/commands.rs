@@ -5,6 +5,8 @@ mod progress;
 mod arguments;
 mod scene_argument;
 mod readings;
+mod data_argument;
+mod subject_argument;
 mod check_arguments;
 mod interruption;
 
@@ -43,6 +45,11 @@ pub fn advice(error: &Error) -> &'static str {
     use taxel_data::Error as Data;
     match error {
         Error::Learn(taxel_learn::Error::OneRow { .. }) => " (--whole-array)",
+        Error::Setting(bad) | Error::Learn(taxel_learn::Error::Setting(bad))
+            if bad.field == "folds" =>
+        {
+            " (--folds or --fold-column, --no-refine)"
+        }
         Error::Data(Data::Write { .. } | Data::WrittenOverInput { .. }) => " (-o)",
         Error::Rig(taxel_rig::Error::OtherReadout { .. }) => " (--scans)",
         Error::Rig(taxel_rig::Error::NoQemu { .. } | taxel_rig::Error::NoStart { .. }) => {

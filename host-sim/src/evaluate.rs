@@ -3,6 +3,7 @@
 pub mod gate;
 pub mod drift;
 pub mod readout;
+pub mod worth;
 pub mod limit;
 pub mod confidence;
 pub mod table1;

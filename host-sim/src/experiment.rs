@@ -14,9 +14,8 @@ use taxel_data::digest::digest;
 use taxel_data::error::require;
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
-use taxel_learn::confidence::{self, Density, HeldOut};
-use taxel_learn::train::{Examples, FreshFrames, Refinement, check_spread, train, train_refined};
-use taxel_learn::{ModelBlob, Options, Origin, Trained, pack, relative};
+use taxel_learn::train::{FreshFrames, check_spread};
+use taxel_learn::{Options, Origin, relative};
 use taxel_limit::Reference;
 use taxel_simulate::noise::NoiseKind;
 use taxel_simulate::outputs::Outputs;
@@ -242,77 +241,6 @@ impl Experiment {
         relative::dataset(readings, &baselines)
     }
 
-    /// Trains on `frames`, a data set of `synthesis`, which refinement draws more frames from.
-    ///
-    /// # Errors
-    /// [`Error`] for training options that cannot be used.
-    pub fn train_on(
-        &self,
-        frames: &Dataset,
-        synthesis: &Synthesis<'_>,
-        progress: &dyn Progress,
-    ) -> Result<Trained> {
-        let options = self.options();
-        if !self.training.refine {
-            return Ok(train(frames, &options, progress)?);
-        }
-        let more = MoreFrames { experiment: self, synthesis };
-        let examples = Examples::Fresh(&more);
-        Ok(train_refined(frames, &options, &Refinement::default(), examples, progress)?)
-    }
-
-    /// Trains the model that the scene describes, like the command `train`.
-    ///
-    /// # Errors
-    /// [`Error`] for training options that cannot be used, or a model that cannot be packed.
-    pub fn train(&self, progress: &dyn Progress) -> Result<ModelBlob> {
-        let synthesis = Synthesis::of(&self.world);
-        let frames = self.dataset(&synthesis, Stream::Training, self.training.frames);
-        self.train_blob(&frames, &synthesis, progress)
-    }
-
-    /// Trains on `frames`, a data set of `synthesis`, and packs the model, with a confidence if the scene asks for it.
-    ///
-    /// # Errors
-    /// [`Error`] for training options that cannot be used, or a model that cannot be packed.
-    pub fn train_blob(
-        &self,
-        frames: &Dataset,
-        synthesis: &Synthesis<'_>,
-        progress: &dyn Progress,
-    ) -> Result<ModelBlob> {
-        let trained = self.train_on(frames, synthesis, progress)?;
-        let blob = pack(&trained, frames, &self.origin())?;
-        if self.training.confidence {
-            self.with_confidence(&blob, frames, synthesis, progress)
-        } else {
-            Ok(blob)
-        }
-    }
-
-    /// Adds a confidence to the model in `blob`, trained on `frames` of `synthesis`. It is calibrated on as many other
-    /// frames.
-    ///
-    /// # Errors
-    /// [`Error`] for a model that cannot be packed.
-    pub fn with_confidence(
-        &self,
-        blob: &ModelBlob,
-        frames: &Dataset,
-        synthesis: &Synthesis<'_>,
-        progress: &dyn Progress,
-    ) -> Result<ModelBlob> {
-        progress.stage("fit confidence", 1);
-        let settings = confidence::Settings { seed: self.world.seed, ..Default::default() };
-        let density = Density::fit(frames, &settings);
-        let mut held_out = HeldOut::default();
-        let others = self.dataset(synthesis, Stream::Calibration, frames.frames());
-        held_out.add(blob, &density, &others);
-        let blob = confidence::add(blob, &density, &held_out)?;
-        progress.step();
-        Ok(blob)
-    }
-
     /// Checks what outputs of the contact, which belong to no row-wire, ask of training and of Table 1.
     fn check_outputs(&self) -> Check {
         let Outputs::Contact(_) = self.world.outputs else { return Ok(()) };
@@ -342,19 +270,19 @@ impl Experiment {
 }
 
 /// Frames of an experiment that only refinement sees.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct MoreFrames<'e> {
     /// Experiment whose data sets they are like.
     pub experiment: &'e Experiment,
     /// Synthesis of its world.
-    pub synthesis: &'e Synthesis<'e>,
+    pub synthesis: Synthesis<'e>,
 }
 
 impl FreshFrames for MoreFrames<'_> {
     fn frames(&self, step: usize, count: usize) -> Dataset {
         let trajectories = count.div_ceil(self.synthesis.steps());
         let first = step * trajectories;
-        self.experiment.dataset_from(self.synthesis, Stream::Refinement, first, count)
+        self.experiment.dataset_from(&self.synthesis, Stream::Refinement, first, count)
     }
 }
 

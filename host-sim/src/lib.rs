@@ -26,7 +26,11 @@
 pub mod error;
 pub mod metrics;
 pub mod by_depth;
+pub mod verdict;
 pub mod experiment;
+pub mod training_set;
+pub mod measurements;
+pub mod subject;
 pub mod evaluate;
 pub mod run;
 pub mod report;

@@ -14,7 +14,7 @@ use commands::{
 
 /// Simulate, train and evaluate resistive tactile sensors; write weight blobs for the device.
 ///
-/// Without a command: `run paper`. Results go to stdout, progress and remarks to stderr. Exit status: 0
+/// Without a command: `run press`. Results go to stdout, progress and remarks to stderr. Exit status: 0
 /// done, 1 failed, 2 bad usage or input, 130 interrupted.
 #[derive(Parser)]
 #[command(version)]

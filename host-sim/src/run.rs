@@ -17,6 +17,7 @@ use crate::error::Result;
 use crate::evaluate::table1::{self, Table1};
 use crate::experiment::Experiment;
 use crate::metrics::{self, DecoderErrors, Errors, LimitSummary, Measure};
+use crate::training_set::TrainingSet;
 
 /// Results of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -145,18 +146,19 @@ pub fn run(experiment: &Experiment, progress: &dyn Progress) -> Result<(RunResul
     let (world, t) = (&experiment.world, &experiment.training);
     progress.stage("synthesise", 2);
     let synthesis = Synthesis::of(world);
-    let training = experiment.dataset(&synthesis, Stream::Training, t.frames);
+    let training = TrainingSet::of_scene(experiment, synthesis.clone());
     progress.step();
     let test = experiment.dataset(&synthesis, Stream::Test, t.test_frames);
     progress.step();
 
-    let blob = experiment.train_blob(&training, &synthesis, progress)?;
+    let blob = training.blob(&experiment.options(), progress)?;
     let network = blob.prepare(Exponential::default()).of_inputs();
 
     let (measure, limit) =
         experiment.measure_beside_limit(world.noise.level, t.test_frames, progress);
     progress.stage("decode and evaluate", 1);
-    let baselines: Vec<Box<dyn Decoder>> = BASELINES.iter().map(|b| b.fit(&training)).collect();
+    let baselines: Vec<Box<dyn Decoder>> =
+        BASELINES.iter().map(|b| b.fit(&training.frames)).collect();
     let decoders = std::iter::once(&network as &dyn Decoder)
         .chain(baselines.iter().map(AsRef::as_ref))
         .map(|decoder| metrics::judge(decoder, &test, &measure))

@@ -15,14 +15,14 @@ use taxel_simulate::{Synthesis, World, synthesise};
 
 use super::progress::Terminal;
 use super::readings::{BaselineArgument, model_inputs};
-use super::scene_argument::SceneArgument;
+use super::scene_argument::{DEFAULT_SCENE, SceneArgument};
 use super::{Common, arguments, print};
 
 /// Options of a check.
 #[derive(Args)]
 pub struct CheckArguments {
     /// A built-in scene (paper, press), the path of a scene file, or of a CSV file with the readings of --model.
-    #[arg(default_value = "paper", value_name = "SCENE|CSV")]
+    #[arg(default_value = DEFAULT_SCENE, value_name = "SCENE|CSV")]
     source: String,
     /// Precision of the sensor's readings, instead of the scene's.
     #[arg(long, value_parser = arguments::precision())]

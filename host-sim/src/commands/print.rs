@@ -5,6 +5,7 @@ use std::io::Write as _;
 
 use host_sim::by_depth::DepthErrors;
 use host_sim::metrics::{Definition, Errors};
+use host_sim::verdict::Verdict;
 use host_sim::{Error, Result};
 use serde::Serialize;
 
@@ -17,23 +18,6 @@ impl Page {
     pub fn line(&mut self, line: impl Display) {
         // Writing to a string cannot fail.
         let _ = writeln!(self.0, "{line}");
-    }
-
-    /// Adds text, broken between words into lines of at most 118 characters.
-    pub fn wrapped(&mut self, text: &str) {
-        const WIDTH: usize = 118;
-        let mut line = String::new();
-        for word in text.split_whitespace() {
-            if !line.is_empty() && line.chars().count() + 1 + word.chars().count() > WIDTH {
-                self.line(&line);
-                line.clear();
-            }
-            if !line.is_empty() {
-                line.push(' ');
-            }
-            line += word;
-        }
-        self.line(line);
     }
 
     /// Prints the page.
@@ -90,6 +74,34 @@ pub fn errors(page: &mut Page, decoders: &[(&str, &[Errors])]) {
             ));
         }
     }
+}
+
+/// Adds the verdict on a model, and its warnings. `judged_on` names the frames that it was judged on.
+pub fn verdict(page: &mut Page, judged_on: Option<&str>, verdict: &Verdict) {
+    page.line("");
+    match judged_on {
+        Some(frames) => wrapped(page, &format!("{frames}: {}", verdict.sentence)),
+        None => wrapped(page, &verdict.sentence),
+    }
+    for warning in &verdict.warnings {
+        wrapped(page, &warning.to_string());
+    }
+}
+
+/// Adds text in lines of at most 110 characters.
+pub fn wrapped(page: &mut Page, text: &str) {
+    let mut line = String::new();
+    for word in text.split(' ') {
+        if !line.is_empty() && line.chars().count() + 1 + word.chars().count() > 110 {
+            page.line(&line);
+            line.clear();
+        }
+        if !line.is_empty() {
+            line.push(' ');
+        }
+        line += word;
+    }
+    page.line(&line);
 }
 
 /// Adds a table of RMSE by the depth of the contact, if there is one.

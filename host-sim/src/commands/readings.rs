@@ -7,7 +7,6 @@ use host_sim::{Error, Result};
 use model_core::blob::Metadata;
 use taxel_data::columns;
 use taxel_data::csv_file::CsvFile;
-use taxel_data::dataset::Dataset;
 use taxel_data::table::Table;
 use taxel_learn::{PreparedModel, relative};
 
@@ -60,13 +59,12 @@ impl BaselineArgument {
     }
 }
 
-/// Makes the inputs of `dataset` relative to the baseline in `file`, of which every input needs one.
-pub fn relative_to(dataset: Dataset, file: &Path) -> Result<Dataset> {
-    let names: Vec<String> = dataset.inputs.names.clone();
-    let baseline = baseline(file, names.iter().map(String::as_str))?;
-    let missing = unusable(&baseline);
+/// Readings of the untouched sensor in `file`, in the columns of `inputs`, of which every one has a mean to divide by.
+pub fn at_rest(file: &Path, inputs: &Table) -> Result<Table> {
+    let rest = table_of(&CsvFile::read(file)?, inputs.names.iter().map(String::as_str))?;
+    let missing = unusable(&Table { names: rest.names.clone(), values: rest.means() });
     if missing.is_empty() {
-        return Ok(relative::dataset(dataset, &baseline));
+        return Ok(rest);
     }
     let names = columns::some_names(&missing);
     let message = format!(

@@ -10,7 +10,7 @@ use host_sim::{Error, Result, report};
 use taxel_data::output;
 use taxel_learn::ModelBlob;
 
-use super::scene_argument::{NoiseArgument, RefineArgument, RelativeInputsArgument, SceneArgument};
+use super::subject_argument::SubjectArgument;
 use super::{Common, print};
 
 const DEFAULT_OUTPUT: &str = "out";
@@ -24,13 +24,7 @@ const FILES: [&str; 4] = ["model.bin", "metrics.json", "table1.csv", "report.htm
 #[command(after_help = "Example: host-sim run press --noise 0.01 -o out/noise-1")]
 pub struct Arguments {
     #[command(flatten)]
-    scene: SceneArgument,
-    #[command(flatten)]
-    noise: NoiseArgument,
-    #[command(flatten)]
-    relative_inputs: RelativeInputsArgument,
-    #[command(flatten)]
-    refine: RefineArgument,
+    subject: SubjectArgument,
     /// Folder that receives a folder named after the scene.
     #[arg(short, long, value_name = "DIR", default_value = DEFAULT_OUTPUT)]
     output: PathBuf,
@@ -38,28 +32,23 @@ pub struct Arguments {
 
 impl Default for Arguments {
     fn default() -> Self {
-        Self {
-            scene: SceneArgument::default(),
-            noise: NoiseArgument::default(),
-            relative_inputs: RelativeInputsArgument::default(),
-            refine: RefineArgument::default(),
-            output: DEFAULT_OUTPUT.into(),
-        }
+        Self { subject: SubjectArgument::default(), output: DEFAULT_OUTPUT.into() }
     }
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let mut scene = arguments.scene.load(common)?;
-    arguments.noise.apply(&mut scene)?;
-    arguments.relative_inputs.apply(&mut scene);
-    scene.training.refine = arguments.refine.over(scene.training.refine);
+    let subject = arguments.subject.load(common)?;
+    let Some(scene) = subject.scene() else {
+        let message = format!("run {}: give a scene, and train on a CSV file", subject.name());
+        return Err(Error::Usage(message));
+    };
     let folder = arguments.output.join(&scene.name);
-    output::in_folder(&folder, || run_into(&folder, &scene, arguments.scene.path(), common))
+    output::in_folder(&folder, || run_into(&folder, scene, &arguments.subject.paths(), common))
 }
 
-fn run_into(folder: &Path, scene: &Experiment, scene_path: &Path, common: &Common) -> Result<()> {
+fn run_into(folder: &Path, scene: &Experiment, inputs: &[&Path], common: &Common) -> Result<()> {
     for file in FILES {
-        output::check_writable(&folder.join(file), &[scene_path])?;
+        output::check_writable(&folder.join(file), inputs)?;
     }
     let started = std::time::Instant::now();
     let (result, blob) = run::run(scene, &Terminal::new())?;

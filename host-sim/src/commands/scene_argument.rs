@@ -11,7 +11,8 @@ use taxel_simulate::sensor::Precision;
 
 use super::{Common, arguments};
 
-const DEFAULT_SCENE: &str = "paper";
+/// Scene that stands for none.
+pub const DEFAULT_SCENE: &str = "press";
 
 /// Scene, with the settings that are changed in it.
 #[derive(Args)]

@@ -10,9 +10,10 @@ use host_sim::{Error, Result};
 use taxel_data::csv_file::CsvFile;
 use taxel_data::{columns, output};
 use taxel_learn::decoders::{mean, standard};
+use taxel_simulate::sensor::Precision;
 
 use super::scene_argument::{RelativeInputsArgument, SceneArgument};
-use super::{Common, print};
+use super::{Common, arguments, print};
 
 /// Compute the paper's Table 1: errors by spread and noise.
 ///
@@ -21,8 +22,12 @@ use super::{Common, print};
 #[derive(Args)]
 #[command(after_help = "Example: host-sim table1 paper -o table1.csv")]
 pub struct Arguments {
-    #[command(flatten)]
-    scene: SceneArgument,
+    /// A built-in scene (paper, press) or the path of a scene file.
+    #[arg(default_value = "paper")]
+    scene: String,
+    /// Precision of the sensor's readings, instead of the scene's.
+    #[arg(long, value_parser = arguments::precision())]
+    precision: Option<Precision>,
     #[command(flatten)]
     relative_inputs: RelativeInputsArgument,
     /// CSV file to write, with all axes, decoders and definitions.
@@ -38,7 +43,8 @@ pub struct Arguments {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let mut scene = arguments.scene.load(common)?;
+    let argument = SceneArgument::new(&arguments.scene, arguments.precision);
+    let mut scene = argument.load(common)?;
     arguments.relative_inputs.apply(&mut scene);
     let names = scene.world.output_names();
     let groups: Vec<&str> = columns::groups(&names).into_iter().map(|(group, _)| group).collect();
@@ -47,8 +53,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         return Err(Error::Usage(message));
     }
     if let Some(path) = &arguments.output {
-        let printed = arguments.printed.as_deref().unwrap_or(arguments.scene.path());
-        output::check_writable(path, &[arguments.scene.path(), printed])?;
+        let printed = arguments.printed.as_deref().unwrap_or(argument.path());
+        output::check_writable(path, &[argument.path(), printed])?;
     }
     let printed = match &arguments.printed {
         Some(path) => Printed::from_file(&CsvFile::read(path)?)?,

@@ -8,13 +8,13 @@ use clap::{Args, ValueEnum};
 use host_sim::error::Bounded;
 use host_sim::evaluate::gate::{self, RECOMMENDED_K};
 use host_sim::evaluate::trade::{self, BOARD_CLOCK_MHZ, Bounds, Device, Memory, Plan};
+use host_sim::subject::Subject;
 use host_sim::{Error, Result};
 use taxel_data::{columns, output};
-use taxel_simulate::World;
 
 use super::arguments::of_option;
 use super::progress::Terminal;
-use super::scene_argument::{NoiseArgument, RefineArgument, RelativeInputsArgument, SceneArgument};
+use super::subject_argument::SubjectArgument;
 use super::{Common, print};
 
 mod files;
@@ -35,17 +35,12 @@ mod page;
   host-sim trade press --frame-rate 100
   host-sim trade press --max-error 0.045
   host-sim trade press --max-cycles 40000 --max-flash 40000
-  host-sim trade press --average 1,4,16 --max-latency-ms 25")]
+  host-sim trade press --average 1,4,16 --max-latency-ms 25
+  host-sim trade measured.csv --inputs 'ch*' --outputs 'f?_n' --fold-column place --scan-ms 2")]
 pub struct Arguments {
     #[command(flatten)]
-    scene: SceneArgument,
-    #[command(flatten)]
-    noise: NoiseArgument,
-    #[command(flatten)]
-    relative_inputs: RelativeInputsArgument,
-    #[command(flatten)]
-    refine: RefineArgument,
-    /// Folder that receives a folder named after the scene.
+    subject: SubjectArgument,
+    /// Folder that receives a folder named after the scene or the CSV file.
     #[arg(short, long, value_name = "DIR", default_value = "out")]
     output: PathBuf,
     /// Centres K to try.
@@ -69,7 +64,7 @@ pub struct Arguments {
     #[arg(long, value_name = "RMSE", allow_negative_numbers = true)]
     max_error: Option<f64>,
     /// Choose within so many cycles a frame, at zero wait (behind a gate: on average). Unless --max-error is given,
-    /// the most accurate point within all bounds is chosen.
+    /// the most accurate point within all bounds is chosen (of errors within 0.5 %, the cheapest).
     #[arg(long, value_name = "CYCLES")]
     max_cycles: Option<u64>,
     /// Choose within a blob of so many bytes [default, with another bound: a slot's 131056].
@@ -97,16 +92,13 @@ pub struct Arguments {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let mut scene = arguments.scene.load(common)?;
-    arguments.noise.apply(&mut scene)?;
-    arguments.relative_inputs.apply(&mut scene);
-    scene.training.refine = arguments.refine.over(scene.training.refine);
-    let names = scene.world.output_names();
+    let subject = arguments.subject.load(common)?;
+    let names = subject.output_names();
     let groups: Vec<&str> = columns::groups(&names).into_iter().map(|(group, _)| group).collect();
     let group = match &arguments.group {
         Some(group) if groups.contains(&group.as_str()) => group.as_str(),
         Some(group) => {
-            let message = format!("--group {group}: the scene has {}", groups.join(", "));
+            let message = format!("--group {group}: the outputs are {}", groups.join(", "));
             return Err(Error::Usage(message));
         }
         None => groups.last().copied().unwrap_or_default(),
@@ -121,7 +113,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         centres: distinct("--centres", &arguments.centres)?,
         output_ranks: output_ranks(&arguments.output_rank)?,
         samples_averaged: distinct("--average", &arguments.average)?,
-        gate_k: gate_k(&arguments.gate, &scene.world)?,
+        gate_k: gate_k(&arguments.gate, &subject)?,
         device,
     };
     let bounds = Bounds {
@@ -132,12 +124,12 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         latency_ms: arguments.max_latency_ms,
     };
     bounds.check().map_err(|bad| of_option(bad, &OPTIONS))?;
-    let folder = arguments.output.join(&scene.name);
+    let folder = arguments.output.join(subject.name());
     let (trade, choice) = output::in_folder(&folder, || {
         for file in files::FILES {
-            output::check_writable(&folder.join(file), &[arguments.scene.path()])?;
+            output::check_writable(&folder.join(file), &arguments.subject.paths())?;
         }
-        let computed = trade::compute(&scene, &plan, group, &bounds, &Terminal::new());
+        let computed = trade::compute(&subject, &plan, group, &bounds, &Terminal::new());
         let mut trade = computed.map_err(|error| match error {
             Error::Setting(bad) => of_option(bad, &OPTIONS),
             Error::NoPoint(cause) => Error::Usage(cause.text(option)),
@@ -255,9 +247,10 @@ fn output_ranks(given: &[RankOption]) -> Result<Vec<usize>> {
 }
 
 /// Gates that are asked for, or the one that docs/gating.md recommends where the noise allows one.
-fn gate_k(given: &[GateOption], world: &World) -> Result<Vec<f64>> {
+fn gate_k(given: &[GateOption], subject: &Subject) -> Result<Vec<f64>> {
     if given.is_empty() {
-        return Ok(match gate::check_noise(world) {
+        let Some(scene) = subject.scene() else { return Ok(vec![]) };
+        return Ok(match gate::check_noise(&scene.world) {
             Ok(()) => vec![RECOMMENDED_K],
             Err(cause) => {
                 eprintln!("note: no points behind a gate: {cause}");

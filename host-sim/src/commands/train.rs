@@ -4,28 +4,21 @@ use std::path::{Path, PathBuf};
 
 use super::progress::Terminal;
 use clap::Args;
-use host_sim::experiment::{EMBEDDED, Experiment};
+use host_sim::evaluate::worth::Worth;
+use host_sim::subject::Subject;
+use host_sim::training_set::TrainingSet;
 use host_sim::{Error, Result};
 use model_core::rbf::Format;
 use serde::Serialize;
-use taxel_data::csv_file::CsvFile;
-use taxel_data::dataset::Dataset;
-use taxel_data::error::{Problem, Role};
-use taxel_data::random::Stream;
 use taxel_data::{columns, output};
+use taxel_learn::Options;
 use taxel_learn::select::{self, Selection};
 use taxel_learn::train::{Refinement, WHOLE_ARRAY_SPREAD};
-use taxel_learn::{Options, Origin, pack};
-use taxel_simulate::Synthesis;
 
 use super::arguments::format;
-use super::readings;
-use super::scene_argument::{NoiseArgument, RefineArgument, RelativeInputsArgument};
+use super::data_argument::JudgedBy;
+use super::subject_argument::SubjectOptions;
 use super::{Common, print};
-
-mod source;
-
-use source::{More, Source, of_folds};
 
 /// Train a model on a scene or a CSV file, and write its blob.
 ///
@@ -45,12 +38,6 @@ pub struct Arguments {
     /// Blob to write.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Reading columns of a CSV file: names with * and ?, comma-separated [default: r*c*_ohm].
-    #[arg(long, value_name = "GLOB")]
-    inputs: Option<String>,
-    /// Output columns of a CSV file [default: r*e*_d?_mm, r*e*_f?_n and contact_*].
-    #[arg(long, value_name = "GLOB")]
-    outputs: Option<String>,
     /// Centres K; with --select, candidates [default: the scene's, or 64].
     #[arg(long, value_name = "K", value_delimiter = ',')]
     centres: Vec<usize>,
@@ -73,33 +60,19 @@ pub struct Arguments {
     /// centres that takes fewer cycles and less flash; a small R loses accuracy (docs/projection.md).
     #[arg(long, value_name = "R")]
     output_rank: Option<usize>,
-    #[command(flatten)]
-    relative_inputs: RelativeInputsArgument,
-    /// CSV file with frames of the untouched sensor, whose mean is the baseline; a CSV file's --relative-inputs
-    /// needs it.
-    #[arg(long, value_name = "FILE", requires = "relative_inputs")]
-    baseline: Option<PathBuf>,
     /// Number format of the weights [default: the scene's, or f32].
     #[arg(long, value_name = "FORMAT", value_parser = format())]
     format: Option<Format>,
     /// Choose K and spread among the candidates by cross-validation, and print every score.
     #[arg(long)]
     select: bool,
-    #[command(flatten)]
-    refine: RefineArgument,
     /// Let the model tell how far off each output may be, and how novel a frame is (docs/confidence.md). Estimates stay
     /// the same. On a CSV file, it trains once more for every fold; give folds of whole places or days (--fold-column),
     /// because frames of one resemble each other.
     #[arg(long)]
     confidence: bool,
-    /// Folds, drawn at random, for cross-validation and for refinement on a CSV file [default: 5].
-    #[arg(long, value_name = "N")]
-    folds: Option<usize>,
-    /// Column of a CSV file that gives each line's fold (any numbers), instead of random folds.
-    #[arg(long, value_name = "NAME", conflicts_with = "folds")]
-    fold_column: Option<String>,
     #[command(flatten)]
-    noise: NoiseArgument,
+    subject: SubjectOptions,
     /// Frames to synthesise from a scene, instead of the scene's number.
     #[arg(short = 'n', long, value_name = "N")]
     frames: Option<usize>,
@@ -129,27 +102,17 @@ struct Summary {
     outputs: Vec<String>,
     training_rmse: Vec<f64>,
     selection: Option<Selection>,
-}
-
-/// Whether `source` is a scene, or otherwise a CSV file. A name without a file and an extension is a
-/// mistyped scene.
-fn names_a_scene(source: &str) -> bool {
-    let path = Path::new(source);
-    EMBEDDED.iter().any(|(name, _)| *name == source)
-        || path.extension().map_or(!path.exists(), |extension| extension == "toml")
+    /// What the model is worth, beside the baselines.
+    worth: Worth,
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let source = Path::new(&arguments.source);
-    let baseline = arguments.baseline.as_deref().unwrap_or(source);
+    let baseline = arguments.subject.data.baseline().unwrap_or(source);
     output::check_writable(&arguments.output, &[source, baseline])?;
-    let source = if names_a_scene(&arguments.source) {
-        from_scene(arguments, common)?
-    } else {
-        from_data(arguments, common)?
-    };
-
-    let mut options = source.defaults;
+    let subject = load(arguments, common)?;
+    let mut options = subject.options();
+    let set = subject.training_set(1);
     options.affine_tail &= !arguments.no_affine;
     if arguments.whole_array && !options.whole_array {
         options.whole_array = true;
@@ -165,7 +128,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         ));
     }
     let selection = if arguments.select {
-        Some(choose(arguments, &source, &mut options)?)
+        Some(choose(arguments, &subject, &set, &mut options)?)
     } else {
         options.centres = one("--centres", &arguments.centres, options.centres)?;
         options.spread = one("--spread", &arguments.spread, options.spread)?;
@@ -173,11 +136,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     };
 
     let progress = Terminal::new();
-    let trained = source.train(&options, &progress)?;
-    let mut blob = pack(&trained, &source.dataset, &source.origin)?;
-    if source.confidence {
-        blob = source.with_confidence(&blob, &options, &progress)?;
-    }
+    let blob = set.blob(&options, &progress)?;
     output::write_bytes(&arguments.output, blob.bytes())?;
 
     let model = blob.parse();
@@ -194,17 +153,18 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         file: arguments.output.clone(),
         blob_bytes: blob.bytes().len(),
         blob_crc: format!("{:08x}", model.crc()),
-        training_frames: source.dataset.frames(),
+        training_frames: set.frames.frames(),
         centres: model.networks().map(|n| n.shape().centres).max().unwrap_or(0),
-        spread: if source.refine { blob.spread() } else { options.spread },
-        refined: source.refine,
+        spread: if set.refine { blob.spread() } else { options.spread },
+        refined: set.refine,
         affine_tail: options.affine_tail,
         output_rank: model.expansion().map(|expansion| expansion.components()),
-        relative_inputs: source.dataset.relative_inputs,
+        relative_inputs: set.frames.relative_inputs,
         confidence: model.confidence().is_some(),
         formats: model.networks().map(|n| n.format().name()).collect(),
-        outputs: source.dataset.outputs.names.clone(),
+        outputs: set.frames.outputs.names.clone(),
         training_rmse: model.metadata().training_rmse.iter().map(f64::from).collect(),
+        worth: Worth::of(&subject, &set, &blob, selection.as_ref()),
         selection,
     };
     if common.json {
@@ -213,126 +173,31 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     page_of(&summary, options.centres).print()
 }
 
-fn from_scene(arguments: &Arguments, common: &Common) -> Result<Source> {
-    let mut scene = Experiment::load(&arguments.source)?;
-    for (option, given) in [
-        ("--inputs", arguments.inputs.is_some()),
-        ("--outputs", arguments.outputs.is_some()),
-        ("--fold-column", arguments.fold_column.is_some()),
-    ] {
-        if given {
-            let message = format!("{option} picks columns of a CSV file; a scene has its own");
-            return Err(Error::Usage(message));
-        }
-    }
-    if arguments.folds.is_some() && !arguments.select {
-        let message = "--folds holds out frames of a CSV file, or with --select; a scene has fresh frames: leave it out";
+/// Scene or CSV file that is trained on, with all frames.
+fn load(arguments: &Arguments, common: &Common) -> Result<Subject> {
+    let options = &arguments.subject;
+    if options.data.baseline().is_some() && !options.relative_inputs.relative_inputs {
+        let message = "--baseline is what --relative-inputs divides by: give both, or neither";
         return Err(Error::Usage(message.into()));
     }
-    if arguments.baseline.is_some() {
-        let message = "--baseline is for a CSV file; a scene synthesises its own: leave it out";
-        return Err(Error::Usage(message.into()));
-    }
-    scene.world.seed = common.seed.unwrap_or(scene.world.seed);
-    arguments.relative_inputs.apply(&mut scene);
-    arguments.noise.apply(&mut scene)?;
-    let frames = arguments.frames.unwrap_or(scene.training.frames);
-    scene.world.check_frames("-n", frames)?;
-    Ok(Source {
-        dataset: scene.dataset(&Synthesis::of(&scene.world), Stream::Training, frames),
-        origin: scene.origin(),
-        defaults: scene.options(),
-        refine: arguments.refine.over(scene.training.refine),
-        confidence: arguments.confidence || scene.training.confidence,
-        more: More::Scene(Box::new(scene)),
-    })
-}
-
-fn from_data(arguments: &Arguments, common: &Common) -> Result<Source> {
-    if arguments.frames.is_some() {
-        return Err(Error::Usage("-n sets a scene's frames; a CSV file has its own".into()));
-    }
-    if arguments.noise.is_given() {
-        return Err(Error::Usage("--noise adds noise to a scene; a CSV file has its own".into()));
-    }
-    if arguments.relative_inputs.relative_inputs && arguments.baseline.is_none() {
-        return Err(Error::Usage(
-            "--relative-inputs: a CSV file does not tell the baseline; give --baseline FILE, with frames of the \
-             untouched sensor"
-                .into(),
-        ));
-    }
-    let path = Path::new(&arguments.source);
-    let file = CsvFile::read(path)?;
-    let (inputs, outputs) = (arguments.inputs.as_deref(), arguments.outputs.as_deref());
-    let (dataset, kept) = Dataset::from_file(&file, inputs, outputs).map_err(with_options)?;
-    if kept.lines.len() < kept.of {
-        let left_out = kept.of - kept.lines.len();
-        eprintln!("note: {left_out} of {} lines have a missing value and are skipped", kept.of);
-    }
-    let dataset = match &arguments.baseline {
-        Some(file) => readings::relative_to(dataset, file)?,
-        None => dataset,
-    };
-    let seed = common.seed.unwrap_or(1);
-    let refine = arguments.refine.over(true);
-    let fold_of = match &arguments.fold_column {
-        Some(name) => folds_from(&file, name, &kept.lines)?,
-        None if refine || arguments.select || arguments.confidence => {
-            random_folds(arguments, dataset.frames(), seed)?
+    let mut subject =
+        options.load(&arguments.source, common, JudgedBy::None, arguments.confidence)?;
+    match &mut subject {
+        Subject::Scene(_) if options.data.folds().is_some() && !arguments.select => {
+            let message = "--folds holds out frames of a CSV file, or with --select; a scene has fresh frames: leave it out";
+            return Err(Error::Usage(message.into()));
         }
-        None => vec![],
-    };
-    let name = path.file_stem().map_or("data".into(), |stem| stem.to_string_lossy());
-    Ok(Source {
-        origin: Origin::of_data(&name, file.digest, seed, &dataset),
-        defaults: Options { seed, ..Options::default() },
-        dataset,
-        refine,
-        confidence: arguments.confidence,
-        more: More::Folds(fold_of),
-    })
-}
-
-/// Error that names the options which choose columns.
-fn with_options(error: taxel_data::Error) -> Error {
-    let option = |role| match role {
-        Role::Inputs => "--inputs",
-        Role::Outputs => "--outputs",
-    };
-    match error {
-        taxel_data::Error::File { path, problem } => match problem {
-            Problem::NoMatch { role, .. } | Problem::NoUsualNames { role, .. } => {
-                Error::Unfit { path, message: format!("{problem} ({})", option(role)) }
-            }
-            Problem::InputAndOutput { .. } => {
-                Error::Unfit { path, message: format!("{problem} (--inputs, --outputs)") }
-            }
-            problem => taxel_data::Error::File { path, problem }.into(),
-        },
-        other => other.into(),
+        Subject::Scene(scene) => {
+            let frames = arguments.frames.unwrap_or(scene.training.frames);
+            scene.world.check_frames("-n", frames)?;
+            scene.training.frames = frames;
+        }
+        Subject::Measured(_) if arguments.frames.is_some() => {
+            return Err(Error::Usage("-n sets a scene's frames; a CSV file has its own".into()));
+        }
+        Subject::Measured(_) => {}
     }
-}
-
-/// Folds from column `name`.
-fn folds_from(file: &CsvFile, name: &str, lines: &[usize]) -> Result<Vec<usize>> {
-    let column = file.column(name)?;
-    let values: Vec<f64> = lines.iter().map(|line| file.value(*line, column)).collect();
-    if let Some(place) = values.iter().position(|value| value.is_nan()) {
-        let rule = format!("column {name:?}: every line needs a fold; fill it in");
-        let problem = Problem::MissingValue { line: file.line_number(lines[place]), rule };
-        return Err(taxel_data::Error::file(&file.path, problem).into());
-    }
-    Ok(select::number_folds(&values))
-}
-
-/// Random folds, as many as asked for.
-fn random_folds(arguments: &Arguments, frames: usize, seed: u64) -> Result<Vec<usize>> {
-    let folds = arguments.folds.unwrap_or(frames.min(5));
-    if !(2..=frames).contains(&folds) {
-        return Err(Error::Usage(format!("--folds {folds}: give from 2 to {frames}")));
-    }
-    Ok(select::random_folds(frames, folds, seed))
+    Ok(subject)
 }
 
 fn one<T: Copy + std::fmt::Debug>(option: &str, given: &[T], default: T) -> Result<T> {
@@ -343,11 +208,17 @@ fn one<T: Copy + std::fmt::Debug>(option: &str, given: &[T], default: T) -> Resu
     }
 }
 
-fn choose(arguments: &Arguments, source: &Source, options: &mut Options) -> Result<Selection> {
-    let frames = source.dataset.frames();
-    let fold_of = match &source.more {
-        More::Folds(folds) => folds.clone(),
-        More::Scene(_) => random_folds(arguments, frames, options.seed)?,
+fn choose(
+    arguments: &Arguments,
+    subject: &Subject,
+    set: &TrainingSet<'_>,
+    options: &mut Options,
+) -> Result<Selection> {
+    let fold_of = match subject {
+        Subject::Measured(data) => data.fold_of.clone(),
+        Subject::Scene(_) => {
+            arguments.subject.data.random_folds(set.frames.frames(), options.seed)?
+        }
     };
     let centres = if arguments.centres.is_empty() {
         // K around the usual one, as far as the smallest training part allows.
@@ -359,7 +230,7 @@ fn choose(arguments: &Arguments, source: &Source, options: &mut Options) -> Resu
     } else {
         arguments.centres.clone()
     };
-    let spreads = if arguments.spread.is_empty() && source.refine {
+    let spreads = if arguments.spread.is_empty() && set.refine {
         vec![options.spread]
     } else if arguments.spread.is_empty() {
         vec![0.2, 0.3, 0.5, 0.8, 1.2, 2.0]
@@ -367,15 +238,14 @@ fn choose(arguments: &Arguments, source: &Source, options: &mut Options) -> Resu
         arguments.spread.clone()
     };
     let selection = select::cross_validate(
-        &source.dataset,
+        &set.frames,
         &fold_of,
         &centres,
         &spreads,
         options,
-        source.refine.then(Refinement::default).as_ref(),
+        set.refine.then(Refinement::default).as_ref(),
         &Terminal::new(),
-    )
-    .map_err(of_folds)?;
+    )?;
     options.centres = selection.best().centres;
     options.spread = selection.best().spread;
     Ok(selection)
@@ -430,5 +300,7 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
             "  ({asked} centres were asked for; the data has fewer distinct samples)"
         ));
     }
+    let Worth { judged_on, verdict, .. } = &summary.worth;
+    print::verdict(&mut page, Some(judged_on.words()), verdict);
     page
 }

@@ -4,7 +4,7 @@ use serde::Serialize;
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
 use taxel_learn::decoders::{BASELINES, mean};
-use taxel_learn::{Decoder, Exponential, pack};
+use taxel_learn::{Decoder, Exponential};
 use taxel_simulate::Synthesis;
 use taxel_simulate::drift::Drift;
 use taxel_simulate::world::check_gain;
@@ -12,6 +12,7 @@ use taxel_simulate::world::check_gain;
 use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::metrics::{self, Errors};
+use crate::training_set::TrainingSet;
 
 /// Largest relative change of the gain, unless the scene or a user says otherwise.
 pub const TYPICAL_GAIN: f64 = 0.02;
@@ -81,16 +82,16 @@ pub fn measure(experiment: &Experiment, gain: f64, progress: &dyn Progress) -> R
         own.training.relative_inputs = relative_inputs;
         own.world.drift = if trained_with_drift { drift } else { None };
         let synthesis = Synthesis::of(&own.world);
-        let training = own.dataset(&synthesis, Stream::Training, t.frames);
-        let trained = own.train_on(&training, &synthesis, progress)?;
-        let blob = pack(&trained, &training, &own.origin())?;
+        let mut training = TrainingSet::of_scene(&own, synthesis.clone());
+        training.confidence = false;
+        let blob = training.blob(&own.options(), progress)?;
         let network = blob.prepare(Exponential::default()).of_inputs();
         let tests = [None, drift]
             .map(|drift| own.dataset(&synthesis.clone().drift(drift), Stream::Test, t.test_frames));
 
         let first = lines.is_empty();
         let baselines = BASELINES.iter().filter(|baseline| first || baseline.name != mean::NAME);
-        let baselines: Vec<Box<dyn Decoder>> = baselines.map(|b| b.fit(&training)).collect();
+        let baselines: Vec<Box<dyn Decoder>> = baselines.map(|b| b.fit(&training.frames)).collect();
         let measure = own.measure();
         let decoders =
             std::iter::once(&network as &dyn Decoder).chain(baselines.iter().map(AsRef::as_ref));

@@ -1,4 +1,4 @@
-//! Trade between speed and accuracy: every setting of a scene's decoder, its errors and its cost.
+//! Trade between speed and accuracy: every setting of a subject's decoder, its errors and its cost.
 //!
 //! Errors are measured on test frames through the blob that a device would get. Instructions and cycles are predicted by
 //! the price list of the firmware's own code ([`Prices`]), the time of a scan by the firmware's own plan ([`Device`]).
@@ -8,15 +8,16 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use taxel_data::progress::Progress;
 use taxel_data::{BadValue, columns};
-use taxel_learn::Options;
 use taxel_learn::cost::Prices;
 use taxel_learn::decoders::BASELINES;
+use taxel_learn::{ModelBlob, Options};
 use taxel_simulate::outputs::Outputs;
 
 use super::gate;
 use crate::error::{Error, NoPoint, Result};
-use crate::experiment::Experiment;
-use crate::metrics::{self, DecoderErrors, LimitSummary};
+use crate::metrics::{self, DecoderErrors, Errors, LimitSummary};
+use crate::subject::Subject;
+use crate::verdict::Verdict;
 
 mod progress;
 mod device;
@@ -34,8 +35,7 @@ use frames::Frames;
 use judge::Judge;
 pub use point::{Arithmetic, Point};
 
-/// Largest blob in bytes that a slot of the firmware's images holds: 128 KiB less the record behind it.
-pub const SLOT_BYTES: usize = 131_056;
+pub use crate::verdict::SLOT_BYTES;
 
 /// Standard errors by which an error must lie below the limit to be called impossible.
 const CERTAIN: f64 = 3.0;
@@ -57,15 +57,19 @@ pub struct Plan {
     pub device: Device,
 }
 
-/// Trade of a scene: every point, and the one chosen.
+/// Trade of a subject: every point, and the one chosen.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Trade {
-    /// Name of the scene.
+    /// Name of the scene, or of the data.
     pub scene: String,
-    /// Noise level of one sample, as a fraction.
+    /// Noise level of one sample, as a fraction; 0 for measured data, which has its own.
     pub noise_level: f64,
+    /// Number of frames to train on.
+    pub training_frames: usize,
     /// Number of test frames.
     pub test_frames: usize,
+    /// How test frames were chosen among measured ones, in words.
+    pub test_choice: Option<String>,
     /// Compiler of the code whose costs are given.
     pub compiler: String,
     /// Device whose times are given.
@@ -121,11 +125,33 @@ impl Trade {
         front
     }
 
-    /// RMSE of a baseline decoder for the chosen group.
+    /// Verdict on a point by the errors of the chosen group, with what its blob gives reason to beware of.
+    ///
+    /// # Panics
+    /// If there is no such point.
     #[must_use]
-    pub fn baseline_rmse(&self, decoder: &str) -> Option<f64> {
-        let baseline = self.baselines.iter().find(|baseline| baseline.decoder == decoder)?;
-        Some(baseline.errors.iter().find(|errors| errors.group == self.group)?.rmse)
+    pub fn verdict(&self, point: usize) -> Verdict {
+        let of_group = |errors: &[Errors]| -> Vec<Errors> {
+            errors.iter().filter(|errors| errors.group == self.group).cloned().collect()
+        };
+        let Point { errors, samples_averaged, .. } = &self.points[point];
+        let network = DecoderErrors { decoder: "network".into(), errors: of_group(errors) };
+        let baselines = self.baselines.iter().map(|baseline| DecoderErrors {
+            decoder: baseline.decoder.clone(),
+            errors: of_group(&baseline.errors),
+        });
+        let decoders: Vec<DecoderErrors> = std::iter::once(network).chain(baselines).collect();
+        // The limit is that of the first number of samples.
+        let first = self.points.first().map(|point| point.samples_averaged);
+        let limit = self.limit.as_ref().filter(|_| first == Some(*samples_averaged));
+        let groups = limit.map_or(vec![], |limit| limit.groups.clone());
+        let groups = groups.into_iter().filter(|limit| limit.group == self.group).collect();
+        let limit = LimitSummary { frames: 0, groups, refused: None };
+        let verdict = Verdict::of(&decoders, &limit);
+        match ModelBlob::of_bytes(self.blob(point)) {
+            Ok(blob) => verdict.of_blob(&blob, self.training_frames),
+            Err(_) => verdict,
+        }
     }
 
     /// Limit of the chosen group with the first number of samples a reading.
@@ -154,33 +180,26 @@ impl Trade {
     }
 }
 
-/// Trains and judges every point of `plan` for the scene. The front is determined by the RMSE of `group` and the time of
+/// Trains and judges every point of `plan` for the subject. The front is determined by the RMSE of `group` and the time of
 /// a frame.
 ///
 /// # Errors
-/// [`Error`] for a plan that cannot be carried out, or a scene that cannot be trained; [`Error::NoPoint`] for `bounds`
+/// [`Error`] for a plan that cannot be carried out, or a subject that cannot be trained; [`Error::NoPoint`] for `bounds`
 /// that nothing can meet, before anything is trained.
 pub fn compute(
-    experiment: &Experiment,
+    subject: &Subject,
     plan: &Plan,
     group: &str,
     bounds: &Bounds,
     progress: &dyn Progress,
 ) -> Result<Trade> {
     let prices = Prices::accepted()?;
-    check(experiment, plan)?;
-    let world = &experiment.world;
-    let wires = Wires { rows: world.read_rows.len(), columns: world.sensor.column_wires };
-    let wires = Some(wires);
-    // One network for each row, and one for the array of several rows; that alone where outputs belong to no row.
-    let arrays: &[bool] = match world.outputs {
-        Outputs::Contact(_) => &[true],
-        Outputs::Electrodes(_) if world.read_rows.len() > 1 => &[false, true],
-        Outputs::Electrodes(_) => &[false],
-    };
-    progress.stage("synthesise", plan.samples_averaged.len());
+    check(subject, plan)?;
+    let wires = wires_of(subject);
+    let arrays = kinds(subject);
+    progress.stage("prepare frames", plan.samples_averaged.len());
     let synthesised = plan.samples_averaged.iter().map(|&samples| {
-        let frames = Frames::of(experiment, samples, arrays, plan);
+        let frames = Frames::of(subject, samples, arrays, plan);
         progress.step();
         frames
     });
@@ -195,12 +214,12 @@ pub fn compute(
         Ok::<_, Error>(bounds.check_possible(&offers, &named(unit, group))?)
     };
     possible(&frames, &vec![0.0; frames.len()])?;
-    let limit = |frames: &mut Frames<'_>| frames.measure_beside_limit(experiment, progress);
+    let limit = |frames: &mut Frames<'_>| frames.measure_beside_limit(subject, progress);
     let limits: Vec<LimitSummary> = frames.iter_mut().map(limit).collect();
     let least = |limit| least_error(limit, group).map_or(0.0, |[limit, se]| limit - CERTAIN * se);
     possible(&frames, &limits.iter().map(least).collect::<Vec<_>>())?;
 
-    let mut judge = Judge::new(experiment.options(), experiment.origin(), plan, wires, &prices);
+    let mut judge = Judge::new(subject.options(), plan, wires, &prices);
     let settings = |frames: &Frames<'_>| -> usize {
         let of_inputs = frames.inputs.iter().flat_map(|inputs| {
             plan.centres.iter().map(|centres| judge::steps(frames, inputs, *centres))
@@ -217,17 +236,22 @@ pub fn compute(
     }
     let Judge { mut points, left_out, blobs, distinct, .. } = judge;
     if let (true, Some(cause)) = (points.is_empty(), left_out.first()) {
-        return Err(Error::Failed(format!("no way to decode the scene can be trained: {cause}")));
+        return Err(Error::Failed(format!("no way to decode can be trained: {cause}")));
     }
     compare(&mut points, group);
     let baselines = frames.first().map_or(vec![], |frames| {
-        let fitted = BASELINES.iter().map(|baseline| baseline.fit(&frames.training));
+        let fitted = BASELINES.iter().map(|baseline| baseline.fit(frames.training()));
         fitted.map(|it| metrics::judge(it.as_ref(), &frames.test, &frames.measure)).collect()
     });
     Ok(Trade {
-        scene: experiment.name.clone(),
-        noise_level: world.noise.level,
-        test_frames: experiment.training.test_frames,
+        scene: subject.name().into(),
+        noise_level: subject.scene().map_or(0.0, |scene| scene.world.noise.level),
+        training_frames: subject.training_frames(),
+        test_frames: subject.test_frames(),
+        test_choice: match subject {
+            Subject::Scene(_) => None,
+            Subject::Measured(data) => Some(data.test_choice.clone()),
+        },
         compiler: prices.compiler,
         device: plan.device,
         wires,
@@ -255,10 +279,9 @@ fn least_error(limit: &LimitSummary, group: &str) -> Option<[f64; 2]> {
     Some([limit.limit, limit.limit_standard_error])
 }
 
-fn check(experiment: &Experiment, plan: &Plan) -> std::result::Result<(), BadValue> {
-    let world = &experiment.world;
+fn check(subject: &Subject, plan: &Plan) -> std::result::Result<(), BadValue> {
     for &centres in &plan.centres {
-        Options { centres, ..experiment.options() }.check(experiment.training.frames)?;
+        Options { centres, ..subject.options() }.check(subject.training_frames())?;
     }
     if let Some(samples) =
         plan.samples_averaged.iter().find(|samples| !(1..=256).contains(*samples))
@@ -269,12 +292,48 @@ fn check(experiment: &Experiment, plan: &Plan) -> std::result::Result<(), BadVal
         return Err(BadValue::new("output-rank", 0, "a network computes one component at least"));
     }
     plan.device.check()?;
+    let Subject::Scene(experiment) = subject else { return check_measured(plan) };
     if !plan.gate_k.is_empty() {
         // Averaging only lowers the noise.
-        gate::check(world, &plan.gate_k)
+        gate::check(&experiment.world, &plan.gate_k)
             .map_err(|bad| if bad.field == "k" { bad.named("gate") } else { bad })?;
     }
     Ok(())
+}
+
+/// Checks what can be varied of measured frames, which are as they are.
+fn check_measured(plan: &Plan) -> std::result::Result<(), BadValue> {
+    if let Some(samples) = plan.samples_averaged.iter().find(|samples| **samples != 1) {
+        let rule = "measured readings are averaged already: give 1, or a scene";
+        return Err(BadValue::new("average", samples, rule));
+    }
+    if let Some(k) = plan.gate_k.first() {
+        let rule = "only a scene tells the noise of readings that a gate needs: give none";
+        return Err(BadValue::new("gate", k, rule));
+    }
+    Ok(())
+}
+
+/// Networks to try: one for each row, and one for the array of several rows; that alone where outputs belong to no row.
+fn kinds(subject: &Subject) -> &'static [bool] {
+    let of_array =
+        subject.scene().is_some_and(|scene| matches!(scene.world.outputs, Outputs::Contact(_)));
+    match (of_array, subject.rows()) {
+        (true, _) => &[true],
+        (false, 1) => &[false],
+        (false, _) => &[false, true],
+    }
+}
+
+/// Wires that a scan reads: those of the scene, or those that measured columns are named after.
+fn wires_of(subject: &Subject) -> Option<Wires> {
+    match subject {
+        Subject::Scene(scene) => {
+            let (rows, columns) = (scene.world.read_rows.len(), scene.world.sensor.column_wires);
+            Some(Wires { rows, columns })
+        }
+        Subject::Measured(data) => Wires::named(&data.training.inputs.names),
+    }
 }
 
 /// Fills in the fields that compare points with each other.

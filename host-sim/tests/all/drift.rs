@@ -7,6 +7,7 @@ use host_sim::evaluate::readout::{self, Stage};
 use host_sim::evaluate::trade::{self, Bounds, Device, Plan};
 use host_sim::experiment::Experiment;
 use host_sim::metrics::Errors;
+use host_sim::subject::Subject;
 use taxel_data::progress::Silent;
 use taxel_learn::Exponential;
 use taxel_learn::cost::Frames;
@@ -95,7 +96,8 @@ fn a_gate_and_a_trade_see_readings_and_baselines_of_the_same_session() {
         device: Device::default(),
     };
     let trade = |scene: &Experiment| {
-        trade::compute(scene, &plan, "dz_mm", &Bounds::default(), &Silent).unwrap()
+        let subject = Subject::Scene(Box::new(scene.clone()));
+        trade::compute(&subject, &plan, "dz_mm", &Bounds::default(), &Silent).unwrap()
     };
     let still = trade(&scene);
     scene.world.drift = Some(Drift { gain: 0.02 });

@@ -1,10 +1,11 @@
 //! The trade between speed and accuracy, on a small plan.
 
-use crate::common::{Folder, unrefined};
+use crate::common::{Folder, small_scene, unrefined};
 use host_sim::Result;
 use host_sim::evaluate::gate::{self, Settings};
 use host_sim::evaluate::trade::{self, Bounds, Device, Memory, Plan, Trade};
 use host_sim::experiment::Experiment;
+use host_sim::subject::Subject;
 use taxel_data::progress::Silent;
 use taxel_data::random::Stream;
 use taxel_learn::cost::{Design, Prices};
@@ -33,7 +34,8 @@ fn compute(scene: &Experiment, bounds: Bounds) -> Result<Trade> {
 
 fn compute_plan(scene: &Experiment, plan: &Plan, bounds: Bounds) -> Result<Trade> {
     bounds.check()?;
-    let mut trade = trade::compute(scene, plan, "dz_mm", &bounds, &Silent)?;
+    let subject = Subject::Scene(Box::new(scene.clone()));
+    let mut trade = trade::compute(&subject, plan, "dz_mm", &bounds, &Silent)?;
     trade.choose(&bounds)?;
     Ok(trade)
 }
@@ -202,7 +204,8 @@ fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
     assert!(shown.len() > 1 && shown.is_sorted(), "{front}");
     assert!(front.contains(&format!("\n{} more points with --all", every.len() - shown.len())));
     assert!(front.lines().chain(all.lines()).all(|line| line.chars().count() <= 120), "{all}");
-    assert!(front.contains("The most accurate: ") && front.contains("always predicting the mean"));
+    let words = front.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(words.contains("The most accurate: ") && words.contains("always predicting the mean"));
     assert!(front.ends_with("\nopen out/few/trade.html\n"), "{front}");
     assert!(!all.contains("--all"), "{all}");
     let page = folder.succeed(&[&few[..], &["--gate", "3,4", "--max-cycles", "10000"]].concat());
@@ -225,13 +228,24 @@ fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
     assert_eq!(json["points"][0]["gate_k"], serde_json::Value::Null);
     assert_eq!(json["points"][1]["gate_k"], 3.0);
     assert!(read("out/few/trade.svg").contains("c1 hollow mark"));
-    assert!(read("out/few/trade.html").contains("gate k</th>"));
+    let html = read("out/few/trade.html");
+    assert!(html.contains("gate k</th>") && !html.contains("<script"));
+    // Each point of the front tells its settings, in the wide picture and in the narrow one.
+    let front = json["points"].as_array().unwrap().iter().filter(|p| p["on_front"] == true).count();
+    assert_eq!(
+        html.matches("<title>fixed16").count() + html.matches("<title>f32").count(),
+        2 * front
+    );
+    assert!(html.matches("<tr class=\"chosen-row\">").count() == 1 && html.contains(">chosen: K"));
+    assert!(html.contains("host-sim trade few.toml --no-refine --centres 16"), "the command");
+    assert!(html.contains("at most 10\u{202f}000 cycles at zero wait"), "the bound");
 
     assert!(folder.path("out/few/chosen.bin").exists());
     // Measurements are kept where no point is chosen, and another run's choice is not left beside them.
     let output = folder.run(&[&few[..], &["--gate", "none", "--max-error", "0.032"]].concat());
     let stderr = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.code() == Some(2) && stderr.contains("--max-error 0.032"), "{stderr}");
+    assert!(stderr.contains("train and measure …\n"), "a log shows what runs: {stderr}");
     let page = String::from_utf8(output.stdout).unwrap();
     assert!(page.contains("\n* fixed16 ") && !page.contains("Chosen:"), "{page}");
     assert!(!read("out/few/trade.svg").contains("c1 hollow mark"), "{page}");
@@ -352,4 +366,70 @@ fn scenes_of_any_shape_are_traded_and_what_a_format_cannot_hold_is_named() {
     assert!(!narrow.left_out.is_empty() && of_array(&narrow, "fixed16") == 0);
     // With a tail and without, of full rank and of rank 4.
     assert!(of_array(&narrow, "f32-direct") == 4);
+}
+
+#[test]
+fn a_pad_for_pressure_alone_and_a_contact_are_traded() {
+    let plan = Plan {
+        centres: vec![16],
+        output_ranks: vec![],
+        samples_averaged: vec![1],
+        gate_k: vec![3.5],
+        device: Device::default(),
+    };
+    let small = |scene: &str| -> Experiment {
+        let mut scene = Experiment::parse("small", scene).unwrap();
+        scene.training.refine = false;
+        (scene.training.frames, scene.training.test_frames) = (400, 100);
+        scene
+    };
+    let pad = include_str!("../../../scenes/press.toml")
+        .replace("row_wires = 8", "row_wires = 4")
+        .replace("electrodes_per_row_wire = 6", "electrodes_per_row_wire = 4")
+        .replace("column_wires = 18", "column_wires = 4")
+        .replace("axes = [\"x\", \"y\", \"z\"]", "axes = [\"z\"]");
+    let pad = compute_plan(&small(&pad), &plan, Bounds::default()).unwrap();
+    // 5 × 4 samples of 34.1 µs and 5 waits of 100 µs.
+    assert!(pad.points.iter().all(|point| point.times.scan_ms == Some(1.183)));
+    assert!(pad.points.iter().any(|point| point.whole_array && point.gate_k.is_some()));
+
+    let contact = Subject::Scene(Box::new(small(include_str!("../../../scenes/contact.toml"))));
+    let bounds = Bounds { frame_rate_hz: Some(100.0), ..Bounds::default() };
+    let mut contact =
+        trade::compute(&contact, &plan, "contact_depth_mm", &bounds, &Silent).unwrap();
+    contact.choose(&bounds).unwrap();
+    assert!(contact.points.iter().all(|point| point.whole_array));
+    assert!(contact.points[contact.chosen.unwrap()].times.frames_per_second > 140.0);
+}
+
+#[test]
+fn measurements_are_traded_as_they_are() {
+    let folder = Folder::new("trade-measured");
+    folder.write("small.toml", small_scene());
+    folder.succeed(&["synth", "small.toml", "-n", "400", "-o", "data.csv"]);
+    let few = ["--no-refine", "--centres", "16"];
+    // Readings that are named after wires: three rows, one of them idle.
+    let page = folder.succeed(&[&["trade", "data.csv", "--max-flash", "40000"], &few[..]].concat());
+    assert!(page.contains("80 measured test frames (the last fifth)"), "{page}");
+    assert!(page.contains("2.144 ms to scan") && page.contains("2 × 18 wires"), "{page}");
+    assert!(folder.path("out/data/chosen.bin").exists());
+
+    let csv = std::fs::read_to_string(folder.path("data.csv")).unwrap();
+    folder.write("other.csv", csv.replace("r4c", "a").replace("r5c", "b"));
+    let columns = ["--inputs", "a*_ohm,b*_ohm", "--outputs", "r4e*_dz_mm"];
+    let other = [&["trade", "other.csv"], &few[..], &columns].concat();
+    let page = folder.succeed(&other);
+    assert!(
+        page.contains("the scan's is unknown (--scan-ms)") && page.contains("besides its scan")
+    );
+    let page = folder.succeed(&[&other[..], &["--scan-ms", "2", "--frame-rate", "400"]].concat());
+    assert!(page.contains("(2.000 ms to scan"), "{page}");
+    for (option, value) in
+        [("--average", "4"), ("--gate", "3"), ("--scan-ms", "0"), ("--frame-rate", "0")]
+    {
+        let output = folder.run(&[&other[..], &[option, value]].concat());
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{stderr}");
+        assert!(stderr.contains(&format!("{option} {value}: ")), "{stderr}");
+    }
 }

@@ -3,19 +3,22 @@
 use std::path::Path;
 
 use host_sim::evaluate::trade::{Memory, Point, Trade};
-use taxel_learn::decoders::{linear, mean};
 
-use crate::commands::print::Page;
+use crate::commands::print::{Page, wrapped};
 
 /// Page of the front, or of `all` points; the last lines say what was chosen and what to open.
 pub fn of(trade: &Trade, all: bool, folder: &Path) -> Page {
     let mut page = Page::default();
+    let tested = if let Some(choice) = &trade.test_choice {
+        format!("{} measured test frames ({choice})", trade.test_frames)
+    } else {
+        let percent = (trade.noise_level * 1e6).round() / 1e4;
+        format!("noise {percent} % a sample, {} test frames", trade.test_frames)
+    };
     page.line(format_args!(
-        "{}: {} ways to decode, noise {} % a sample, {} test frames; RMSE of {}{}",
+        "{}: {} ways to decode, {tested}; RMSE of {}{}",
         trade.scene,
         trade.points.len(),
-        (trade.noise_level * 1e6).round() / 1e4,
-        trade.test_frames,
         trade.group,
         if trade.unit.is_empty() { String::new() } else { format!(" in {}", trade.unit) }
     ));
@@ -47,10 +50,10 @@ pub fn of(trade: &Trade, all: bool, folder: &Path) -> Page {
     }
     page.line(format_args!("\n{}", legend(trade, all)));
     if let Some(limit) = &trade.limit {
-        page.wrapped(&limit.note());
+        wrapped(&mut page, &limit.note());
     }
     for note in &trade.left_out {
-        page.wrapped(&format!("left out: {note}"));
+        wrapped(&mut page, &format!("left out: {note}"));
     }
     if !all && trade.points.len() > shown.len() {
         let more = trade.points.len() - shown.len();
@@ -154,10 +157,13 @@ fn line_of(trade: &Trade, i: usize) -> String {
 /// The chosen point in words, and what to do with it.
 fn choice(page: &mut Page, trade: &Trade, chosen: usize, folder: &Path) {
     let point = &trade.points[chosen];
-    page.wrapped(&format!("Chosen: {}. {}", point.name(), worth(trade, point)));
-    page.wrapped(&cost(point));
-    let blob = folder.join("chosen.bin");
-    page.line(format_args!("The blob is {}", blob.display()));
+    let verdict = trade.verdict(chosen);
+    wrapped(page, &format!("Chosen: {}. {}", point.name(), verdict.sentence));
+    wrapped(page, &cost(point));
+    for warning in &verdict.warnings {
+        wrapped(page, &warning.to_string());
+    }
+    page.line(format_args!("the blob: {}", folder.join("chosen.bin").display()));
     let oversampling =
         (point.samples_averaged > 1).then(|| format!(" --oversampling {}", point.samples_averaged));
     let tolerance = trade
@@ -169,42 +175,18 @@ fn choice(page: &mut Page, trade: &Trade, chosen: usize, folder: &Path) {
     }
 }
 
-/// What the ends of the front are worth, where nothing was asked for.
+/// What the ends of the front are worth, where nothing is chosen.
 fn no_choice(page: &mut Page, trade: &Trade) {
     let front = trade.front();
     let (Some(fastest), Some(best)) = (front.first(), front.last()) else { return };
-    let best = &trade.points[*best];
-    page.wrapped(&format!("The most accurate: {}. {}", best.name(), worth(trade, best)));
-    page.wrapped(&cost(best));
-    let fastest = &trade.points[*fastest];
-    page.wrapped(&format!("The fastest: {}. {}", fastest.name(), worth(trade, fastest)));
-    if !trade.bounds.any() {
-        page.line("To choose one, give a bound: --max-error, --frame-rate, --max-latency-ms, --max-cycles, --max-flash");
+    for (end, i) in [("The fastest", *fastest), ("The most accurate", *best)] {
+        let point = &trade.points[i];
+        let sentence = trade.verdict(i).sentence;
+        wrapped(page, &format!("{end}: {}. {sentence} {}", point.name(), cost(point)));
     }
-}
-
-/// What a point is worth beside decoders that need no network, and beside the limit.
-fn worth(trade: &Trade, point: &Point) -> String {
-    let rmse = point.rmse(&trade.group);
-    let beside = |name: &str, words: &str| {
-        let other = trade.baseline_rmse(name)?;
-        let less = (1.0 - rmse / other) * 100.0;
-        Some(if less >= 0.5 {
-            format!("{less:.0} % less than {words} ({})", error(other))
-        } else {
-            format!("no less than {words} ({})", error(other))
-        })
-    };
-    let parts = [
-        beside(mean::NAME, "always predicting the mean"),
-        beside(linear::NAME, "the best linear decoder"),
-        point.ratio_to_limit(&trade.group).map(|ratio| {
-            format!("{ratio:.2} times the least possible with as many samples a reading")
-        }),
-    ];
-    let parts: Vec<String> = parts.into_iter().flatten().collect();
-    let unit = if trade.unit.is_empty() { String::new() } else { format!(" {}", trade.unit) };
-    format!("Its RMSE of {} is {}{unit}: {}.", trade.group, error(rmse), parts.join(", "))
+    if !trade.bounds.any() {
+        page.line("To choose one, give a bound: --max-error, --frame-rate, --max-latency-ms, --max-cycles or --max-flash");
+    }
 }
 
 /// What a point costs a device.

@@ -7,6 +7,9 @@ use super::SLOT_BYTES;
 use super::device::Times;
 use crate::error::{Bounded, NoPoint, Unmet};
 
+/// Ratio of errors that test frames do not tell apart: RMSEs of thousands of frames scatter by more.
+const SAME_ERROR: f64 = 1.005;
+
 /// Bounds that a user sets for the chosen point.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Bounds {
@@ -53,8 +56,9 @@ impl Bounds {
 
     /// Index of the best offer within all bounds; `None` if no bound was given.
     ///
-    /// With a bound on the error, the best offer is the cheapest: it takes the least time for scan and decoding. Otherwise
-    /// it has the smallest error. Among equals, it takes the least time, the fewest cycles, then the least flash.
+    /// The best offer is the cheapest one within the bound on the error; without such a bound, the cheapest of those whose
+    /// errors are the smallest, or so near that nobody could tell ([`SAME_ERROR`]). The cheapest takes the least time for
+    /// scan and decoding; among equals, the fewest cycles, then the least flash.
     ///
     /// # Errors
     /// [`NoPoint`] if no offer is within the bounds, with the nearest that offers come to them.
@@ -63,22 +67,20 @@ impl Bounds {
             return Ok(None);
         }
         let bounds = self.each();
-        let key = |offer: &Offer| {
-            let cost = [offer.times.frame_ms, offer.cycles as f64, offer.flash_bytes as f64];
-            let [time, cycles, flash] = cost;
-            if self.error.is_some() {
-                [time, cycles, flash, offer.rmse]
-            } else {
-                [offer.rmse, time, cycles, flash]
-            }
+        let within = |i: &usize| within(&bounds, &offers[*i], None);
+        let least = (0..offers.len()).filter(within).map(|i| offers[i].rmse).reduce(f64::min);
+        let most =
+            if self.error.is_some() { f64::INFINITY } else { SAME_ERROR * least.unwrap_or(0.0) };
+        let key = |i: usize| {
+            let Offer { rmse, cycles, flash_bytes, times } = offers[i];
+            [times.frame_ms, cycles as f64, flash_bytes as f64, rmse]
         };
-        let compare = |a: &[f64; 4], b: &[f64; 4]| {
-            let ordered = a.iter().zip(b).map(|(a, b)| a.total_cmp(b));
+        let compare = |a: &usize, b: &usize| {
+            let ordered = key(*a).into_iter().zip(key(*b)).map(|(a, b)| a.total_cmp(&b));
             ordered.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
         };
-        let best = (0..offers.len())
-            .filter(|i| within(&bounds, &offers[*i], None))
-            .min_by(|a, b| compare(&key(&offers[*a]), &key(&offers[*b])));
+        let near = |i: &usize| within(i) && offers[*i].rmse <= most;
+        let best = (0..offers.len()).filter(near).min_by(compare);
         best.map(Some).ok_or_else(|| refusal(&bounds, offers, unit, false))
     }
 
@@ -185,6 +187,14 @@ mod tests {
         assert_eq!(chosen(Bounds { frame_rate_hz: Some(100.0), ..Bounds::default() }), Some(0));
         assert_eq!(chosen(Bounds { frame_rate_hz: Some(43.0), ..Bounds::default() }), Some(2));
         assert_eq!(chosen(Bounds { latency_ms: Some(6.2), ..Bounds::default() }), Some(0));
+    }
+
+    #[test]
+    fn nobody_pays_for_an_error_that_is_smaller_by_next_to_nothing() {
+        let offers =
+            [offer(0.0404, 6.0, 9000), offer(0.0401, 6.0, 36_000), offer(0.04, 6.0, 90_000)];
+        let rate = Bounds { frame_rate_hz: Some(100.0), ..Bounds::default() };
+        assert_eq!(rate.choose(&offers, "mm").unwrap(), Some(1));
     }
 
     #[test]

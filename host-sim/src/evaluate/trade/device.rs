@@ -1,5 +1,7 @@
 //! Times of a frame on a device, which scans it and then decodes it.
 
+use std::collections::BTreeSet;
+
 use firmware::timing::ScanPlan;
 use serde::Serialize;
 use taxel_data::BadValue;
@@ -44,6 +46,22 @@ pub struct Wires {
     pub rows: usize,
     /// Number of column-wires.
     pub columns: usize,
+}
+
+impl Wires {
+    /// Wires that readings are named after, such as `r4c17_ohm`; `None` if any has another name.
+    #[must_use]
+    pub fn named(readings: &[String]) -> Option<Self> {
+        let wires = readings.iter().map(|name| {
+            let (row, column) = name.strip_suffix("_ohm")?.strip_prefix('r')?.split_once('c')?;
+            Some((row.parse::<usize>().ok()?, column.parse::<usize>().ok()?))
+        });
+        let wires: Vec<(usize, usize)> = wires.collect::<Option<_>>()?;
+        let count =
+            |of: fn(&(usize, usize)) -> usize| wires.iter().map(of).collect::<BTreeSet<_>>().len();
+        (!wires.is_empty())
+            .then(|| Self { rows: count(|wire| wire.0), columns: count(|wire| wire.1) })
+    }
 }
 
 /// Times of one frame. The firmware's loop scans, decodes, and only then scans again.
@@ -123,6 +141,22 @@ mod tests {
         let ram = Device { memory: Memory::Ram, clock_mhz: 90.0, ..board };
         assert_eq!(ram.times(None, &cost).frame_ms, 0.2);
         assert_eq!(ram.times(None, &cost).frames_per_second, 5000.0);
+    }
+
+    #[test]
+    fn wires_are_told_by_the_names_of_readings() {
+        let named = |names: &[&str]| {
+            Wires::named(&names.iter().map(|name| (*name).into()).collect::<Vec<String>>())
+        };
+        assert_eq!(named(&["r4c1_ohm", "r4c2_ohm"]), Some(Wires { rows: 1, columns: 2 }));
+        assert_eq!(
+            named(&["r1c1_ohm", "r1c2_ohm", "r2c1_ohm", "r2c2_ohm"]),
+            Some(Wires { rows: 2, columns: 2 })
+        );
+        assert_eq!(
+            (named(&["ch1", "ch2"]), named(&["r1c1_ohm", "rest"]), named(&[])),
+            (None, None, None)
+        );
     }
 
     #[test]

@@ -5,28 +5,28 @@ use std::borrow::Cow;
 use taxel_data::dataset::Dataset;
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
-use taxel_learn::train::{Examples, projection};
+use taxel_learn::train::projection;
 use taxel_simulate::Synthesis;
 
 use super::Plan;
 use super::gating::Gates;
 use crate::error::Result;
-use crate::experiment::{Experiment, MoreFrames};
+use crate::experiment::Experiment;
 use crate::metrics::{LimitSummary, Measure};
+use crate::subject::Subject;
+use crate::training_set::TrainingSet;
 
 /// Training and test frames with one number of samples a reading.
-pub(super) struct Frames<'e> {
+pub(super) struct Frames<'s> {
     pub samples_averaged: usize,
-    /// Noise level of the averaged readings, as a fraction.
+    /// Noise level of the averaged readings, as a fraction; 0 for measured ones.
     pub noise_level: f64,
-    pub training: Dataset,
-    pub test: Dataset,
+    pub set: TrainingSet<'s>,
+    pub test: Cow<'s, Dataset>,
     /// Networks that see a row each, and networks that see the whole array.
     pub inputs: Vec<Inputs>,
-    /// Measure of errors, with the limit once that is [known](Self::measure_beside_limit).
+    /// Measure of errors, once it is [known](Self::measure_beside_limit).
     pub measure: Measure,
-    /// Source of more frames, if training is to be refined.
-    more: Option<More<'e>>,
 }
 
 /// What networks see of a frame.
@@ -36,9 +36,6 @@ pub(super) struct Inputs {
     pub gates: Gates,
 }
 
-/// Frames that only refinement sees.
-pub(super) struct More<'e>(&'e Experiment, Synthesis<'e>);
-
 impl Inputs {
     /// Whether one network sees the whole array.
     pub fn whole_array(&self) -> bool {
@@ -46,53 +43,63 @@ impl Inputs {
     }
 }
 
-impl<'e> Frames<'e> {
-    /// Frames of a scene with so many samples a reading, for networks of a row each, of the whole array, or both.
+impl<'s> Frames<'s> {
+    /// Frames of a subject with so many samples a reading, for networks of a row each, of the whole array, or both.
     pub fn of(
-        experiment: &'e Experiment,
+        subject: &'s Subject,
         samples_averaged: usize,
         arrays: &[bool],
         plan: &Plan,
     ) -> Result<Self> {
-        let (world, t) = (&experiment.world, &experiment.training);
-        let noise_level = world.noise.level / (samples_averaged as f64).sqrt();
-        let frames = Synthesis::of(world).noise_level(noise_level);
-        let training = experiment.dataset(&frames, Stream::Training, t.frames);
-        let test = experiment.dataset(&frames, Stream::Test, t.test_frames);
-        // The gate compares readings in Ω.
-        let readings_ohm = if t.relative_inputs {
-            Cow::Owned(frames.frames(Stream::Test, t.test_frames).inputs)
-        } else {
-            Cow::Borrowed(&test.inputs)
-        };
-        let inputs = |whole_array: &bool| {
-            let projection = whole_array.then(|| projection::fit(&training, t.features));
-            let kind = (*whole_array, t.relative_inputs);
-            let gates = Gates::new(&frames, noise_level, &readings_ohm, &plan.gate_k, kind);
+        let set = subject.training_set(samples_averaged);
+        let test = subject.test_set(samples_averaged);
+        let level = subject.scene().map_or(0.0, |scene| scene.world.noise.level);
+        let noise_level = level / (samples_averaged as f64).sqrt();
+        let features = subject.options().features;
+        let inputs = |&whole_array: &bool| {
+            let projection = whole_array.then(|| projection::fit(&set.frames, features));
+            let gates = match subject.scene().filter(|_| !plan.gate_k.is_empty()) {
+                Some(scene) => gates(scene, noise_level, &test, (whole_array, &plan.gate_k)),
+                None => Gates::none(&test),
+            };
             Ok(Inputs { projection: projection.transpose()?, gates })
         };
         let inputs = arrays.iter().map(inputs).collect::<Result<_>>()?;
-        let more = t.refine.then(|| More(experiment, frames.clone()));
-        let measure = experiment.measure();
-        Ok(Self { samples_averaged, noise_level, training, test, inputs, measure, more })
+        let measure = Measure { full_scale: vec![], thickness_mm: None, limit: None };
+        Ok(Self { samples_averaged, noise_level, set, test, inputs, measure })
     }
 
-    /// Finds the limit, which errors are then measured beside.
+    /// Frames to train on.
+    pub fn training(&self) -> &Dataset {
+        &self.set.frames
+    }
+
+    /// Finds the measure of errors, and the limit that they are measured beside.
     pub fn measure_beside_limit(
         &mut self,
-        experiment: &Experiment,
+        subject: &Subject,
         progress: &dyn Progress,
     ) -> LimitSummary {
-        let (measure, summary) =
-            experiment.measure_beside_limit(self.noise_level, self.test.frames(), progress);
+        let (measure, summary) = subject.measure(self.samples_averaged, progress);
         self.measure = measure;
         summary
     }
+}
 
-    /// Calls `refine` with what refinement measures its error on; `None` unless training is to be refined.
-    pub fn refined<T>(&self, refine: impl FnOnce(Examples<'_>) -> T) -> Option<T> {
-        let More(experiment, synthesis) = self.more.as_ref()?;
-        let more = MoreFrames { experiment, synthesis };
-        Some(refine(Examples::Fresh(&more)))
-    }
+/// Gates of a scene with these tolerances, for its `test` frames.
+fn gates(
+    scene: &Experiment,
+    noise_level: f64,
+    test: &Dataset,
+    (whole_array, k): (bool, &[f64]),
+) -> Gates {
+    let synthesis = Synthesis::of(&scene.world).noise_level(noise_level);
+    let t = &scene.training;
+    // The gate compares readings in Ω.
+    let readings_ohm = if t.relative_inputs {
+        Cow::Owned(synthesis.frames(Stream::Test, t.test_frames).inputs)
+    } else {
+        Cow::Borrowed(&test.inputs)
+    };
+    Gates::new(&synthesis, noise_level, &readings_ohm, k, (whole_array, t.relative_inputs))
 }

@@ -4,7 +4,9 @@ use model_core::rbf::Format;
 use rayon::prelude::*;
 use taxel_data::progress::Progress;
 use taxel_learn::cost::{Cost, DecoderRam, Design, Prices};
-use taxel_learn::train::{FittedNetwork, Layers, Refinement, Samples, WHOLE_ARRAY_SPREAD, refine};
+use taxel_learn::train::{
+    Examples, FittedNetwork, Layers, Refinement, Samples, WHOLE_ARRAY_SPREAD, refine,
+};
 use taxel_learn::{Exponential, ModelBlob, Options, Origin, Trained, pack};
 
 use super::device::Wires;
@@ -17,7 +19,6 @@ use crate::metrics;
 /// Collector of points, and of the blobs that they decode with.
 pub(super) struct Judge<'s> {
     options: Options,
-    origin: Origin,
     plan: &'s Plan,
     wires: Option<Wires>,
     prices: &'s Prices,
@@ -34,15 +35,9 @@ type Variant = (Format, bool, Option<usize>);
 
 impl<'s> Judge<'s> {
     /// Judge of networks trained with `options`, except for the settings that the plan varies. A scan reads `wires`.
-    pub fn new(
-        options: Options,
-        origin: Origin,
-        plan: &'s Plan,
-        wires: Option<Wires>,
-        prices: &'s Prices,
-    ) -> Self {
+    pub fn new(options: Options, plan: &'s Plan, wires: Option<Wires>, prices: &'s Prices) -> Self {
         let (points, left_out, blobs, distinct) = (vec![], vec![], vec![], vec![]);
-        Self { options, origin, plan, wires, prices, points, left_out, blobs, distinct }
+        Self { options, plan, wires, prices, points, left_out, blobs, distinct }
     }
 
     /// Trains and judges every format and tail with so many centres.
@@ -53,7 +48,7 @@ impl<'s> Judge<'s> {
         progress: &dyn Progress,
     ) -> Result<()> {
         let whole_array = inputs.whole_array();
-        let ranks = predict::ranks(self.plan, &frames.training, whole_array, centres);
+        let ranks = predict::ranks(self.plan, frames.training(), whole_array, centres);
         let variants: Vec<Variant> = (Format::ALL.into_iter().rev())
             .flat_map(|format| [(format, false), (format, true)])
             .flat_map(|(format, affine)| ranks.iter().map(move |rank| (format, affine, *rank)))
@@ -66,7 +61,7 @@ impl<'s> Judge<'s> {
             _ => defaults.spread,
         };
         let options = Options { centres, spread, ..defaults };
-        options.check(frames.training.frames())?;
+        options.check(frames.training().frames())?;
         let [refining, fitting] =
             parts(frames, inputs).map(|steps| Part::new(progress, steps, weight(centres)));
         // Layers are shared by all formats and by networks with and without a tail.
@@ -84,9 +79,10 @@ impl<'s> Judge<'s> {
                 }
             };
             let trained = Trained { projection: layers.projection.clone(), networks };
-            let noise = (self.origin.noise.0, frames.noise_level);
-            let origin = Origin { noise, ..self.origin.clone() };
-            let blob = pack(&trained, &frames.training, &origin)?;
+            let origin = &frames.set.origin;
+            let noise = (origin.noise.0, frames.noise_level);
+            let origin = Origin { noise, ..origin.clone() };
+            let blob = pack(&trained, frames.training(), &origin)?;
             // A network that fell back to direct distances is the point of that format.
             let fell_back = trained.networks.iter().any(|network| network.format() != format);
             let fits = !whole_array || blob.bytes().len() <= SLOT_BYTES;
@@ -174,14 +170,20 @@ pub(super) fn steps(frames: &Frames<'_>, inputs: &Inputs, centres: usize) -> usi
 
 /// Steps of refinement, and of fitting weights, which take about as long each.
 fn parts(frames: &Frames<'_>, inputs: &Inputs) -> [usize; 2] {
-    let networks = if inputs.whole_array() { 1 } else { frames.training.rows };
-    let refining = frames.refined(|_| Refinement::default().steps).unwrap_or(0);
+    let networks = if inputs.whole_array() { 1 } else { frames.training().rows };
+    let steps = Refinement::default().steps;
+    let refining = match frames.set.examples() {
+        None => 0,
+        Some(Examples::Fresh(_)) => steps,
+        Some(Examples::Folds(_)) => refine::fold_steps(steps, networks),
+    };
     [refining, networks]
 }
 
-/// Steps of progress that a step with so many centres is worth: about its share of the time.
+/// Steps of progress that a step with so many centres is worth: about its share of the time, which for many centres
+/// grows with their square.
 fn weight(centres: usize) -> usize {
-    centres.div_ceil(16)
+    8 + centres * centres / 640
 }
 
 /// Layers of networks trained with `options`, and the options for fitting their weights.
@@ -192,15 +194,12 @@ fn layers(
     progress: &dyn Progress,
 ) -> Result<(Layers, Options)> {
     let start = Layers { projection: inputs.projection.clone(), hidden: vec![] };
-    let start = start.with_centres(&frames.training, options);
+    let start = start.with_centres(frames.training(), options);
     let settings = Refinement::default();
-    let refined = frames.refined(|examples| {
-        refine::refine(&frames.training, &start, options, &settings, examples, progress)
-    });
-    match refined {
-        Some(layers) => Ok((layers?, settings.options(options, frames.training.frames()))),
-        None => Ok((start, *options)),
-    }
+    let Some(examples) = frames.set.examples() else { return Ok((start, *options)) };
+    let dataset = frames.training();
+    let layers = refine::refine(dataset, &start, options, &settings, examples, progress)?;
+    Ok((layers, settings.options(options, dataset.frames())))
 }
 
 /// Networks of every variant on the same layers, for every row.
@@ -211,7 +210,7 @@ fn fit(
     variants: &[Variant],
     progress: &dyn Progress,
 ) -> Vec<Vec<taxel_learn::Result<FittedNetwork>>> {
-    let seen = layers.seen(&frames.training);
+    let seen = layers.seen(frames.training());
     let rows = layers.hidden.par_iter().enumerate();
     rows.map(|(row, layer)| {
         let table = seen.row_table(row);

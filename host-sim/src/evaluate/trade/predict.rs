@@ -66,7 +66,7 @@ pub(super) fn offers(
     prices: &Prices,
     least_error: f64,
 ) -> Result<Vec<Offer>> {
-    let dataset = &frames.training;
+    let dataset = frames.training();
     let columns = dataset.inputs.names.iter().chain(&dataset.outputs.names);
     let names_bytes: usize = columns.map(|name| name.len() + 1).sum();
     let scan_ms = plan.device.scan_ms(wires, frames.samples_averaged);

@@ -1,0 +1,209 @@
+//! Measurements from a CSV file: which columns are used, and which frames are held out.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use host_sim::measurements::{Judged, Measurements, Split, relative_to};
+use host_sim::{Error, Result};
+use taxel_data::csv_file::CsvFile;
+use taxel_data::dataset::Dataset;
+use taxel_data::error::{Problem, Role};
+use taxel_learn::{Options, select};
+
+use super::readings;
+
+/// What a CSV file's columns are.
+#[derive(Args, Default)]
+pub struct DataArguments {
+    /// Reading columns of a CSV file: names with * and ?, comma-separated [default: r*c*_ohm].
+    #[arg(long, value_name = "GLOB")]
+    inputs: Option<String>,
+    /// Output columns of a CSV file [default: r*e*_d?_mm, r*e*_f?_n and contact_*].
+    #[arg(long, value_name = "GLOB")]
+    outputs: Option<String>,
+    /// Column of a CSV file that gives each line's fold (any numbers), instead of random folds.
+    #[arg(long, value_name = "NAME", conflicts_with = "folds")]
+    fold_column: Option<String>,
+    /// Folds, drawn at random, for cross-validation and for refinement on a CSV file [default: 5].
+    #[arg(long, value_name = "N")]
+    folds: Option<usize>,
+    /// CSV file with frames of the untouched sensor, whose mean is the baseline; a CSV file's --relative-inputs
+    /// needs it.
+    #[arg(long, value_name = "FILE")]
+    baseline: Option<PathBuf>,
+}
+
+/// How a model is trained on a CSV file, besides its columns.
+#[derive(Clone, Copy)]
+pub struct HowToTrain {
+    /// Seed of every random draw.
+    pub seed: u64,
+    /// Whether inputs are relative to the baseline.
+    pub relative_inputs: bool,
+    /// Whether training is refined.
+    pub refine: bool,
+    /// Whether the model is to have a confidence.
+    pub confidence: bool,
+}
+
+/// Frames that a model is judged by.
+#[derive(Clone, Copy)]
+pub enum JudgedBy<'p> {
+    /// None: all frames are trained on.
+    None,
+    /// Frames of the file that are held out.
+    HeldOut,
+    /// Another file.
+    File(&'p Path),
+}
+
+impl DataArguments {
+    /// Error if an option was given that is for CSV files alone.
+    pub fn refuse_for_scene(&self) -> Result<()> {
+        for (option, given) in [
+            ("--inputs", self.inputs.is_some()),
+            ("--outputs", self.outputs.is_some()),
+            ("--fold-column", self.fold_column.is_some()),
+        ] {
+            if given {
+                let message = format!("{option} picks columns of a CSV file; a scene has its own");
+                return Err(Error::Usage(message));
+            }
+        }
+        if self.baseline.is_some() {
+            let message = "--baseline is for a CSV file; a scene synthesises its own: leave it out";
+            return Err(Error::Usage(message.into()));
+        }
+        Ok(())
+    }
+
+    /// Number of random folds, if it was given.
+    pub fn folds(&self) -> Option<usize> {
+        self.folds
+    }
+
+    /// File with frames of the untouched sensor, if it was given.
+    pub fn baseline(&self) -> Option<&Path> {
+        self.baseline.as_deref()
+    }
+
+    /// Folds of `frames`, drawn at random, as many as were asked for.
+    pub fn random_folds(&self, frames: usize, seed: u64) -> Result<Vec<usize>> {
+        let folds = self.folds.unwrap_or(frames.min(5));
+        if !(2..=frames).contains(&folds) {
+            return Err(Error::Usage(format!("--folds {folds}: give from 2 to {frames}")));
+        }
+        Ok(select::random_folds(frames, folds, seed))
+    }
+
+    /// Measurements in the CSV file at `path`.
+    pub fn load(&self, path: &Path, how: HowToTrain, judged: JudgedBy<'_>) -> Result<Measurements> {
+        if how.relative_inputs && self.baseline.is_none() {
+            return Err(Error::Usage(
+                "--relative-inputs: a CSV file does not tell the baseline; give --baseline FILE, with frames of the \
+                 untouched sensor"
+                    .into(),
+            ));
+        }
+        let file = CsvFile::read(path)?;
+        let (frames, lines) = self.frames(&file)?;
+        let given_folds =
+            self.fold_column.as_ref().map(|name| folds_from(&file, name, &lines)).transpose()?;
+        let split = Split::of(&frames, given_folds.as_deref(), self.judged(judged, &frames)?);
+        if split.training.is_empty() {
+            let message = "holding out frames leaves none to train on: give more, or --test FILE";
+            return Err(Error::Unfit { path: path.into(), message: message.into() });
+        }
+        let training = frames.subset(&split.training);
+        let fold_of = match given_folds {
+            Some(folds) => split.training.iter().map(|frame| folds[*frame]).collect(),
+            None if training.frames() < 2 && self.folds.is_none() => vec![0; training.frames()],
+            None => self.random_folds(training.frames(), how.seed)?,
+        };
+        let rest = self.baseline.as_deref().map(|file| readings::at_rest(file, &training.inputs));
+        let rest = rest.transpose()?;
+        let test_readings = split.test.inputs.clone();
+        let [training, test] = [training, split.test].map(|frames| match &rest {
+            Some(rest) if how.relative_inputs => relative_to(frames, rest),
+            _ => frames,
+        });
+        let name = path.file_stem().map_or("data".into(), |stem| stem.to_string_lossy());
+        Ok(Measurements {
+            name: name.into_owned(),
+            digest: file.digest,
+            training,
+            fold_of,
+            test,
+            test_readings,
+            test_choice: split.choice,
+            rest,
+            options: Options { seed: how.seed, ..Options::default() },
+            refine: how.refine,
+            confidence: how.confidence,
+        })
+    }
+
+    /// Frames of `file`, and the indices of their lines.
+    fn frames(&self, file: &CsvFile) -> Result<(Dataset, Vec<usize>)> {
+        let (inputs, outputs) = (self.inputs.as_deref(), self.outputs.as_deref());
+        let (frames, kept) = Dataset::from_file(file, inputs, outputs).map_err(with_options)?;
+        if kept.lines.len() < kept.of {
+            let left_out = kept.of - kept.lines.len();
+            let name = file.path.display();
+            eprintln!(
+                "note: {left_out} of {} lines of {name} have a missing value and are skipped",
+                kept.of
+            );
+        }
+        Ok((frames, kept.lines))
+    }
+
+    /// Frames that the model trained on some of `frames` is judged by.
+    fn judged(&self, judged: JudgedBy<'_>, frames: &Dataset) -> Result<Judged> {
+        let path = match judged {
+            JudgedBy::None => return Ok(Judged::None),
+            JudgedBy::HeldOut => return Ok(Judged::HeldOut),
+            JudgedBy::File(path) => path,
+        };
+        let (own, _) = self.frames(&CsvFile::read(path)?)?;
+        let names = |frames: &Dataset| (frames.inputs.names.clone(), frames.outputs.names.clone());
+        if names(&own) != names(frames) {
+            let message = "its columns are not those of the frames to train on: give a file with the same columns, \
+                           in the same order (--test)";
+            return Err(Error::Unfit { path: path.into(), message: message.into() });
+        }
+        Ok(Judged::File { frames: own, name: path.display().to_string() })
+    }
+}
+
+/// Error that names the options which choose columns.
+fn with_options(error: taxel_data::Error) -> Error {
+    let option = |role| match role {
+        Role::Inputs => "--inputs",
+        Role::Outputs => "--outputs",
+    };
+    match error {
+        taxel_data::Error::File { path, problem } => match problem {
+            Problem::NoMatch { role, .. } | Problem::NoUsualNames { role, .. } => {
+                Error::Unfit { path, message: format!("{problem} ({})", option(role)) }
+            }
+            Problem::InputAndOutput { .. } => {
+                Error::Unfit { path, message: format!("{problem} (--inputs, --outputs)") }
+            }
+            problem => taxel_data::Error::File { path, problem }.into(),
+        },
+        other => other.into(),
+    }
+}
+
+/// Folds from column `name`, numbered from 0.
+fn folds_from(file: &CsvFile, name: &str, lines: &[usize]) -> Result<Vec<usize>> {
+    let column = file.column(name)?;
+    let values: Vec<f64> = lines.iter().map(|line| file.value(*line, column)).collect();
+    if let Some(place) = values.iter().position(|value| value.is_nan()) {
+        let rule = format!("column {name:?}: every line needs a fold; fill it in");
+        let problem = Problem::MissingValue { line: file.line_number(lines[place]), rule };
+        return Err(taxel_data::Error::file(&file.path, problem).into());
+    }
+    Ok(select::number_folds(&values))
+}

@@ -1,0 +1,119 @@
+//! Scene or CSV file that a model is trained on, with what both leave open.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use host_sim::experiment::{EMBEDDED, Experiment};
+use host_sim::subject::Subject;
+use host_sim::{Error, Result};
+use taxel_simulate::sensor::Precision;
+
+use super::data_argument::{DataArguments, HowToTrain, JudgedBy};
+use super::scene_argument::{DEFAULT_SCENE, NoiseArgument, RefineArgument, RelativeInputsArgument};
+use super::{Common, arguments};
+
+/// Scene or CSV file to train and to judge on.
+#[derive(Args, Default)]
+pub struct SubjectArgument {
+    /// A built-in scene (paper, press, contact), a scene file (.toml) or a CSV file [default: press].
+    source: Option<String>,
+    /// CSV file with frames to judge by, in the same columns [default: the last fifth of the lines is held out, or the
+    /// last fold of --fold-column].
+    #[arg(long, value_name = "FILE")]
+    test: Option<PathBuf>,
+    /// Precision of the scene's readings, instead of its own.
+    #[arg(long, value_parser = arguments::precision())]
+    precision: Option<Precision>,
+    #[command(flatten)]
+    options: SubjectOptions,
+}
+
+/// Options for scenes and CSV files.
+#[derive(Args, Default)]
+pub struct SubjectOptions {
+    #[command(flatten)]
+    pub data: DataArguments,
+    #[command(flatten)]
+    pub noise: NoiseArgument,
+    #[command(flatten)]
+    pub relative_inputs: RelativeInputsArgument,
+    #[command(flatten)]
+    pub refine: RefineArgument,
+}
+
+/// Whether `source` is a scene, or otherwise a CSV file. A name without a file and an extension is a
+/// mistyped scene.
+fn names_a_scene(source: &str) -> bool {
+    let path = Path::new(source);
+    EMBEDDED.iter().any(|(name, _)| *name == source)
+        || path.extension().map_or(!path.exists(), |extension| extension == "toml")
+}
+
+impl SubjectArgument {
+    /// Loads the scene or the CSV file.
+    pub fn load(&self, common: &Common) -> Result<Subject> {
+        let source = self.source.as_deref().unwrap_or(DEFAULT_SCENE);
+        let judged = self.test.as_deref().map_or(JudgedBy::HeldOut, JudgedBy::File);
+        let mut subject = self.options.load(source, common, judged, false)?;
+        match &mut subject {
+            Subject::Scene(_) if self.test.is_some() => {
+                let message =
+                    "--test is for a CSV file; a scene has test frames of its own: leave it out";
+                return Err(Error::Usage(message.into()));
+            }
+            Subject::Scene(scene) => {
+                scene.world.precision = self.precision.unwrap_or(scene.world.precision);
+            }
+            Subject::Measured(_) if self.precision.is_some() => {
+                let message = "--precision is for a scene; a CSV file's readings are as they are: leave it out";
+                return Err(Error::Usage(message.into()));
+            }
+            Subject::Measured(_) => {}
+        }
+        Ok(subject)
+    }
+
+    /// Paths of all files that are read, which must not be replaced.
+    pub fn paths(&self) -> Vec<&Path> {
+        let source = Path::new(self.source.as_deref().unwrap_or(DEFAULT_SCENE));
+        [source]
+            .into_iter()
+            .chain(self.test.as_deref())
+            .chain(self.options.data.baseline())
+            .collect()
+    }
+}
+
+impl SubjectOptions {
+    /// Loads the scene or CSV file called `source`. `confidence` asks for one, whatever a scene says.
+    pub fn load(
+        &self,
+        source: &str,
+        common: &Common,
+        judged: JudgedBy<'_>,
+        confidence: bool,
+    ) -> Result<Subject> {
+        if names_a_scene(source) {
+            let mut scene = Experiment::load(source)?;
+            self.data.refuse_for_scene()?;
+            scene.world.seed = common.seed.unwrap_or(scene.world.seed);
+            self.relative_inputs.apply(&mut scene);
+            self.noise.apply(&mut scene)?;
+            scene.training.refine = self.refine.over(scene.training.refine);
+            scene.training.confidence |= confidence;
+            return Ok(Subject::Scene(Box::new(scene)));
+        }
+        if self.noise.is_given() {
+            let message = "--noise adds noise to a scene; a CSV file has its own";
+            return Err(Error::Usage(message.into()));
+        }
+        let how = HowToTrain {
+            seed: common.seed.unwrap_or(1),
+            relative_inputs: self.relative_inputs.relative_inputs,
+            refine: self.refine.over(true),
+            confidence,
+        };
+        let data = self.data.load(Path::new(source), how, judged)?;
+        Ok(Subject::Measured(Box::new(data)))
+    }
+}

@@ -1,0 +1,125 @@
+//! Worth of a model that was just trained: its errors beside those of the baselines, on the fairest frames there are.
+
+use serde::Serialize;
+use taxel_data::columns;
+use taxel_data::dataset::Dataset;
+use taxel_data::random::Stream;
+use taxel_learn::decoders::BASELINES;
+use taxel_learn::select::Selection;
+use taxel_learn::{Exponential, ModelBlob};
+use taxel_limit::Refusal;
+use taxel_simulate::Synthesis;
+
+use crate::metrics::{self, DecoderErrors, Errors, LimitSummary, Measure};
+use crate::subject::Subject;
+use crate::training_set::TrainingSet;
+use crate::verdict::Verdict;
+
+/// Most frames of a scene that are synthesised for it.
+const FRESH_FRAMES: usize = 2000;
+
+/// Frames that errors were measured on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum JudgedOn {
+    /// Frames of the scene that nothing was trained on.
+    FreshFrames,
+    /// Folds of the training frames, one after the other held out.
+    HeldOutFolds,
+    /// The training frames themselves, which flatter a model.
+    TrainingFrames,
+}
+
+impl JudgedOn {
+    /// Frames in words.
+    #[must_use]
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::FreshFrames => "On fresh frames",
+            Self::HeldOutFolds => "On folds that were held out",
+            Self::TrainingFrames => {
+                "On the frames that it was trained on, which flatters it (`run` holds frames out)"
+            }
+        }
+    }
+}
+
+/// Errors of a model and of the baselines, and what they mean.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Worth {
+    /// Frames that errors were measured on.
+    pub judged_on: JudgedOn,
+    /// Errors of the network, then of the baselines, by group.
+    pub decoders: Vec<DecoderErrors>,
+    /// What they mean.
+    pub verdict: Verdict,
+}
+
+impl Worth {
+    /// Worth of the model in `blob`, trained on `set` of `subject`. A `selection` of
+    /// its options has errors on held-out folds.
+    #[must_use]
+    pub fn of(
+        subject: &Subject,
+        set: &TrainingSet<'_>,
+        blob: &ModelBlob,
+        selection: Option<&Selection>,
+    ) -> Self {
+        let (judged_on, decoders) = match (selection, subject) {
+            (Some(selection), _) => (JudgedOn::HeldOutFolds, on_folds(selection, set)),
+            (None, Subject::Scene(scene)) => {
+                let frames = scene.training.test_frames.min(FRESH_FRAMES);
+                let test = scene.dataset(&Synthesis::of(&scene.world), Stream::Test, frames);
+                (JudgedOn::FreshFrames, on_frames(blob, set, &test, &scene.measure()))
+            }
+            (None, Subject::Measured(_)) => {
+                let full_scale = set.origin.full_scale.clone();
+                let measure = Measure { full_scale, thickness_mm: None, limit: None };
+                (JudgedOn::TrainingFrames, on_frames(blob, set, &set.frames, &measure))
+            }
+        };
+        let no_limit = LimitSummary::of(&Err(Refusal::Measured));
+        let verdict = Verdict::of(&decoders, &no_limit).of_blob(blob, set.frames.frames());
+        Self { judged_on, decoders, verdict }
+    }
+}
+
+fn on_frames(
+    blob: &ModelBlob,
+    set: &TrainingSet<'_>,
+    frames: &Dataset,
+    measure: &Measure,
+) -> Vec<DecoderErrors> {
+    let model = blob.prepare(Exponential::default()).of_inputs();
+    let network = metrics::judge(&model, frames, measure);
+    let baselines = BASELINES.iter();
+    let baselines =
+        baselines.map(|it| metrics::judge(it.fit(&set.frames).as_ref(), frames, measure));
+    std::iter::once(network).chain(baselines).collect()
+}
+
+/// Errors of the best candidate and of the baselines on folds that were held out.
+fn on_folds(selection: &Selection, set: &TrainingSet<'_>) -> Vec<DecoderErrors> {
+    let names = &set.frames.outputs.names;
+    let of = |decoder: &str, rmse: &[f64]| {
+        let errors = columns::groups(names).into_iter().map(|(group, members)| {
+            let squares: f64 = members.iter().map(|column| rmse[*column].powi(2)).sum();
+            Errors {
+                group: group.into(),
+                unit: columns::unit_of(group).into(),
+                count: members.len() * set.frames.frames(),
+                rmse: (squares / members.len() as f64).sqrt(),
+                relative_l2_percent: None,
+                full_scale_percent: None,
+                positional_percent: None,
+                r_squared: None,
+                mean_relative_percent: None,
+                ratio_to_limit: None,
+                ratio_standard_error: None,
+            }
+        });
+        DecoderErrors { decoder: decoder.into(), errors: errors.collect() }
+    };
+    let baselines = selection.baselines.iter().map(|it| of(it.decoder, &it.rmse));
+    std::iter::once(of("network", &selection.best().rmse)).chain(baselines).collect()
+}

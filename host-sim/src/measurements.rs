@@ -1,0 +1,166 @@
+//! Measurements of a real sensor: frames to train on, and frames to judge by.
+
+use taxel_data::dataset::Dataset;
+use taxel_data::table::Table;
+use taxel_learn::{Options, Origin, relative};
+
+/// Measured frames, and how a model is trained on them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measurements {
+    /// Name of the data, which names the output folder and the model.
+    pub name: String,
+    /// CRC-64/XZ of the file.
+    pub digest: u64,
+    /// Frames to train on.
+    pub training: Dataset,
+    /// Fold of each training frame, numbered from 0.
+    pub fold_of: Vec<usize>,
+    /// Frames to judge by, which nothing is trained on.
+    pub test: Dataset,
+    /// Readings of the test frames as they were measured, whatever the model's inputs are.
+    pub test_readings: Table,
+    /// How the test frames were chosen, in words.
+    pub test_choice: String,
+    /// Readings of the untouched sensor, in the readings' columns, if they are known.
+    pub rest: Option<Table>,
+    /// Options of training.
+    pub options: Options,
+    /// Whether centres, widths and the projection are refined after K-means.
+    pub refine: bool,
+    /// Whether the model tells how far off its outputs may be, and how novel a frame is.
+    pub confidence: bool,
+}
+
+/// Frames that a model is judged by.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Judged {
+    /// None: all frames are trained on.
+    None,
+    /// The last fifth of the frames, or the last fold where folds are given. Frames close in time resemble each
+    /// other, so that frames drawn at random would flatter a model.
+    HeldOut,
+    /// Frames of a file of its own.
+    File {
+        /// Its frames, with the columns of the frames to train on.
+        frames: Dataset,
+        /// Its name, for people.
+        name: String,
+    },
+}
+
+/// Share of the frames that are held out: one of so many.
+const HELD_OUT: usize = 5;
+
+/// Frames to train on and frames to judge by.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Split {
+    /// Indices of the frames to train on.
+    pub training: Vec<usize>,
+    /// Frames to judge by.
+    pub test: Dataset,
+    /// How these were chosen, in words.
+    pub choice: String,
+}
+
+impl Split {
+    /// Splits `frames` into those to train on and those to judge by. `fold_of` gives the fold of each frame, if its
+    /// user told it.
+    #[must_use]
+    pub fn of(frames: &Dataset, fold_of: Option<&[usize]>, judged: Judged) -> Self {
+        let all = 0..frames.frames();
+        let last_fold = fold_of.and_then(|folds| folds.iter().max());
+        let (training, test): (Vec<usize>, Vec<usize>) = match (&judged, last_fold, fold_of) {
+            (Judged::HeldOut, Some(last), Some(folds)) => {
+                all.partition(|frame| folds[*frame] != *last)
+            }
+            (Judged::HeldOut, ..) => {
+                let kept = frames.frames() - frames.frames() / HELD_OUT;
+                all.partition(|frame| *frame < kept)
+            }
+            _ => (all.collect(), vec![]),
+        };
+        let (test, choice) = match (judged, last_fold) {
+            (Judged::File { frames, name }, _) => (frames, format!("all of {name}")),
+            (Judged::HeldOut, Some(_)) => (frames.subset(&test), "the last fold".into()),
+            (Judged::HeldOut, None) => (frames.subset(&test), "the last fifth".into()),
+            (Judged::None, _) => (frames.subset(&test), "none".into()),
+        };
+        Self { training, test, choice }
+    }
+}
+
+impl Measurements {
+    /// Origin of the frames, for the model's metadata.
+    #[must_use]
+    pub fn origin(&self) -> Origin {
+        Origin::of_data(&self.name, self.digest, self.options.seed, &self.training)
+    }
+
+    /// Relative noise of a reading at rest, as a fraction: the root of the mean over columns of (standard
+    /// deviation/mean)². `None` if the sensor at rest is not known, or a column's mean is zero.
+    #[must_use]
+    pub fn noise_level(&self) -> Option<f64> {
+        let rest = self.rest.as_ref()?;
+        let columns = rest.names.len();
+        let relative = rest.deviations().into_iter().zip(rest.means());
+        let squares: f64 = relative.map(|(deviation, mean)| (deviation / mean).powi(2)).sum();
+        Some((squares / columns as f64).sqrt()).filter(|level| level.is_finite())
+    }
+
+    /// Mean of the readings at rest on one line, if they are known.
+    #[must_use]
+    pub fn baseline(&self) -> Option<Table> {
+        let rest = self.rest.as_ref()?;
+        Some(Table { names: rest.names.clone(), values: rest.means() })
+    }
+}
+
+/// Makes the inputs of `frames` relative to the mean of `rest`, the readings of the untouched sensor.
+#[must_use]
+pub fn relative_to(frames: Dataset, rest: &Table) -> Dataset {
+    let baseline = Table { names: rest.names.clone(), values: rest.means() };
+    relative::dataset(frames, &baseline)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Frames numbered from 0 in their one reading.
+    fn numbered(frames: usize) -> Dataset {
+        let mut numbered = Dataset::empty(vec!["ch1".into()], vec!["f_n".into()], 1, frames);
+        for (value, number) in numbered.inputs.values.iter_mut().zip(0..) {
+            *value = f64::from(number);
+        }
+        numbered
+    }
+
+    #[test]
+    fn the_last_fifth_is_held_out() {
+        let split = Split::of(&numbered(11), None, Judged::HeldOut);
+        assert_eq!(split.training, (0..9).collect::<Vec<_>>());
+        assert_eq!(
+            (split.test.inputs.values, split.choice.as_str()),
+            (vec![9.0, 10.0], "the last fifth")
+        );
+    }
+
+    #[test]
+    fn the_last_fold_is_held_out_where_folds_are_given() {
+        let split = Split::of(&numbered(5), Some(&[2, 0, 1, 2, 0]), Judged::HeldOut);
+        assert_eq!(split.training, [1, 2, 4]);
+        assert_eq!(
+            (split.test.inputs.values, split.choice.as_str()),
+            (vec![0.0, 3.0], "the last fold")
+        );
+    }
+
+    #[test]
+    fn a_file_of_its_own_leaves_all_frames_to_train_on() {
+        let judged = Judged::File { frames: numbered(3), name: "test.csv".into() };
+        let split = Split::of(&numbered(5), None, judged);
+        assert_eq!((split.training.len(), split.test.frames()), (5, 3));
+        assert_eq!(split.choice, "all of test.csv");
+        assert_eq!(Split::of(&numbered(5), None, Judged::None).test.frames(), 0);
+    }
+}

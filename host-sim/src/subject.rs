@@ -1,0 +1,175 @@
+//! Subjects: what a model is for. A scene, which is simulated, or measurements of a real sensor.
+
+use std::borrow::Cow;
+
+use taxel_data::columns;
+use taxel_data::dataset::Dataset;
+use taxel_data::progress::Progress;
+use taxel_data::random::Stream;
+use taxel_learn::{Options, Origin};
+use taxel_limit::Refusal;
+use taxel_simulate::Synthesis;
+use taxel_simulate::outputs::Outputs;
+
+use crate::experiment::Experiment;
+use crate::measurements::Measurements;
+use crate::metrics::{LimitSummary, Measure};
+use crate::training_set::TrainingSet;
+
+/// Scene or measurements that a model is trained and judged on.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Subject {
+    /// Scene, whose frames are synthesised.
+    Scene(Box<Experiment>),
+    /// Measured frames.
+    Measured(Box<Measurements>),
+}
+
+impl Subject {
+    /// Name, which names the output folder and the model.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Scene(scene) => &scene.name,
+            Self::Measured(data) => &data.name,
+        }
+    }
+
+    /// Scene, if it is one.
+    #[must_use]
+    pub fn scene(&self) -> Option<&Experiment> {
+        match self {
+            Self::Scene(scene) => Some(scene),
+            Self::Measured(_) => None,
+        }
+    }
+
+    /// Options for training its model.
+    #[must_use]
+    pub fn options(&self) -> Options {
+        match self {
+            Self::Scene(scene) => scene.options(),
+            Self::Measured(data) => data.options,
+        }
+    }
+
+    /// Origin of its frames, for the model's metadata.
+    #[must_use]
+    pub fn origin(&self) -> Origin {
+        match self {
+            Self::Scene(scene) => scene.origin(),
+            Self::Measured(data) => data.origin(),
+        }
+    }
+
+    /// Names of the outputs, in the model's order.
+    #[must_use]
+    pub fn output_names(&self) -> Vec<String> {
+        match self {
+            Self::Scene(scene) => scene.world.output_names(),
+            Self::Measured(data) => data.training.outputs.names.clone(),
+        }
+    }
+
+    /// Number of frames to train on.
+    #[must_use]
+    pub fn training_frames(&self) -> usize {
+        match self {
+            Self::Scene(scene) => scene.training.frames,
+            Self::Measured(data) => data.training.frames(),
+        }
+    }
+
+    /// Number of frames to judge by.
+    #[must_use]
+    pub fn test_frames(&self) -> usize {
+        match self {
+            Self::Scene(scene) => scene.training.test_frames,
+            Self::Measured(data) => data.test.frames(),
+        }
+    }
+
+    /// Number of row tables, each with a network of its own unless one serves the whole array.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        match self {
+            Self::Scene(scene) => scene.world.outputs.row_tables(scene.world.read_rows.len()),
+            Self::Measured(data) => data.training.rows,
+        }
+    }
+
+    /// Row-wire (from 1) of each row table, where outputs belong to row-wires.
+    #[must_use]
+    pub fn row_wires(&self) -> Vec<usize> {
+        match self {
+            Self::Scene(scene) => match scene.world.outputs {
+                Outputs::Contact(_) => vec![],
+                Outputs::Electrodes(_) => scene.world.read_rows.iter().map(|row| row + 1).collect(),
+            },
+            Self::Measured(data) => {
+                let names = &data.training.outputs.names;
+                let of_rows = names.chunks_exact(names.len() / data.training.rows);
+                let wire = |names: &[String]| {
+                    let wire = columns::row_of(&names[0])?;
+                    names.iter().all(|name| columns::row_of(name) == Some(wire)).then_some(wire)
+                };
+                of_rows.map(wire).collect::<Option<_>>().unwrap_or_default()
+            }
+        }
+    }
+
+    /// Synthesis of a scene's frames, with the noise that is left in the mean of so many samples a reading.
+    fn synthesis(scene: &Experiment, samples_averaged: usize) -> Synthesis<'_> {
+        let level = scene.world.noise.level / (samples_averaged as f64).sqrt();
+        Synthesis::of(&scene.world).noise_level(level)
+    }
+
+    /// Frames to train on, whose readings are means of so many samples. Measurements are as they are.
+    #[must_use]
+    pub fn training_set(&self, samples_averaged: usize) -> TrainingSet<'_> {
+        match self {
+            Self::Scene(scene) => {
+                TrainingSet::of_scene(scene, Self::synthesis(scene, samples_averaged))
+            }
+            Self::Measured(data) => {
+                let mut set = TrainingSet::of_folds(&data.training, &data.fold_of, data.origin());
+                (set.refine, set.confidence) = (data.refine, data.confidence);
+                set
+            }
+        }
+    }
+
+    /// Frames to judge by, whose readings are means of so many samples. Measurements are as they are.
+    #[must_use]
+    pub fn test_set(&self, samples_averaged: usize) -> Cow<'_, Dataset> {
+        match self {
+            Self::Scene(scene) => {
+                let synthesis = Self::synthesis(scene, samples_averaged);
+                let frames = scene.training.test_frames;
+                Cow::Owned(scene.dataset(&synthesis, Stream::Test, frames))
+            }
+            Self::Measured(data) => Cow::Borrowed(&data.test),
+        }
+    }
+
+    /// Measure for errors on the test frames, with the limit at so many samples a reading where it is known, and a
+    /// summary of that limit or the reason why there is none.
+    #[must_use]
+    pub fn measure(
+        &self,
+        samples_averaged: usize,
+        progress: &dyn Progress,
+    ) -> (Measure, LimitSummary) {
+        match self {
+            Self::Scene(scene) => {
+                let level = scene.world.noise.level / (samples_averaged as f64).sqrt();
+                scene.measure_beside_limit(level, scene.training.test_frames, progress)
+            }
+            Self::Measured(data) => {
+                let full_scale = data.origin().full_scale;
+                let measure = Measure { full_scale, thickness_mm: None, limit: None };
+                (measure, LimitSummary::of(&Err(Refusal::Measured)))
+            }
+        }
+    }
+}

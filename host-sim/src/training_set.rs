@@ -1,0 +1,156 @@
+//! Training sets: frames to train on, more of them for refinement, and the model that comes of both.
+
+use std::borrow::Cow;
+
+use taxel_data::BadValue;
+use taxel_data::dataset::Dataset;
+use taxel_data::progress::Progress;
+use taxel_data::random::Stream;
+use taxel_learn::confidence::{self, Density, HeldOut};
+use taxel_learn::train::{Examples, Refinement, train, train_refined};
+use taxel_learn::{ModelBlob, Options, Origin, Trained, pack};
+use taxel_simulate::Synthesis;
+
+use crate::error::Result;
+use crate::experiment::{Experiment, MoreFrames};
+
+/// Frames to train on, and what refinement measures the error on.
+pub struct TrainingSet<'s> {
+    /// Frames to train on.
+    pub frames: Cow<'s, Dataset>,
+    /// Origin of the frames, for the model's metadata.
+    pub origin: Origin,
+    /// Whether centres, widths and the projection are refined after K-means.
+    pub refine: bool,
+    /// Whether the model tells how far off its outputs may be, and how novel a frame is.
+    pub confidence: bool,
+    more: More<'s>,
+}
+
+/// Frames that are looked at besides those that weights are fitted to.
+enum More<'s> {
+    /// New frames of a scene, where there is no end of them.
+    Scene(Box<MoreFrames<'s>>),
+    /// The fold of each training frame: one fold after the other is held out.
+    Folds(&'s [usize]),
+}
+
+impl<'s> TrainingSet<'s> {
+    /// Training frames of a scene, from `synthesis` of its world.
+    #[must_use]
+    pub fn of_scene(experiment: &'s Experiment, synthesis: Synthesis<'s>) -> Self {
+        let t = &experiment.training;
+        Self {
+            frames: Cow::Owned(experiment.dataset(&synthesis, Stream::Training, t.frames)),
+            origin: experiment.origin(),
+            refine: t.refine,
+            confidence: t.confidence,
+            more: More::Scene(Box::new(MoreFrames { experiment, synthesis })),
+        }
+    }
+
+    /// Measured `frames`, with the fold of each, numbered from 0. It neither refines nor adds a confidence unless the
+    /// fields ask for it.
+    #[must_use]
+    pub fn of_folds(frames: &'s Dataset, fold_of: &'s [usize], origin: Origin) -> Self {
+        let (frames, more) = (Cow::Borrowed(frames), More::Folds(fold_of));
+        Self { frames, origin, refine: false, confidence: false, more }
+    }
+
+    /// What refinement measures the error on; `None` if it is not asked for.
+    #[must_use]
+    pub fn examples(&self) -> Option<Examples<'_>> {
+        self.refine.then(|| match &self.more {
+            More::Scene(more) => Examples::Fresh(more.as_ref()),
+            More::Folds(fold_of) => Examples::Folds(fold_of),
+        })
+    }
+
+    /// Trains with `options`, refined if that is asked for.
+    ///
+    /// # Errors
+    /// [`Error`](crate::Error) for options that cannot be used with these frames.
+    pub fn train(&self, options: &Options, progress: &dyn Progress) -> Result<Trained> {
+        Ok(match self.examples() {
+            None => train(&self.frames, options, progress)?,
+            Some(examples) => {
+                train_refined(&self.frames, options, &Refinement::default(), examples, progress)?
+            }
+        })
+    }
+
+    /// Trains with `options` and packs the model, with a confidence if that is asked for.
+    ///
+    /// # Errors
+    /// [`Error`](crate::Error) for options that cannot be used with these frames, or a model that cannot be packed.
+    pub fn blob(&self, options: &Options, progress: &dyn Progress) -> Result<ModelBlob> {
+        let blob = pack(&self.train(options, progress)?, &self.frames, &self.origin)?;
+        if self.confidence { self.with_confidence(&blob, options, progress) } else { Ok(blob) }
+    }
+
+    /// Adds a confidence to the model in `blob`, calibrated on frames that it was not trained on: as many other frames
+    /// of a scene, or one fold after the other of measured data.
+    fn with_confidence(
+        &self,
+        blob: &ModelBlob,
+        options: &Options,
+        progress: &dyn Progress,
+    ) -> Result<ModelBlob> {
+        let settings = confidence::Settings { seed: options.seed, ..Default::default() };
+        let mut held_out = HeldOut::default();
+        match &self.more {
+            More::Scene(more) => {
+                progress.stage("fit confidence", 1);
+                let density = Density::fit(&self.frames, &settings);
+                let (synthesis, frames) = (&more.synthesis, self.frames.frames());
+                let others = more.experiment.dataset(synthesis, Stream::Calibration, frames);
+                held_out.add(blob, &density, &others);
+                let blob = confidence::add(blob, &density, &held_out)?;
+                progress.step();
+                Ok(blob)
+            }
+            More::Folds(fold_of) => {
+                let folds = fold_of.iter().max().map_or(0, |last| last + 1);
+                if folds < 2 {
+                    let rule = "a confidence holds out one fold after the other; give at least 2";
+                    return Err(BadValue::new("folds", folds, rule).into());
+                }
+                for fold in 0..folds {
+                    self.hold_out(fold, fold_of, options, &mut held_out, progress)?;
+                }
+                Ok(confidence::add(blob, &Density::fit(&self.frames, &settings), &held_out)?)
+            }
+        }
+    }
+
+    /// Trains on all folds but `fold`, and adds what the model makes of that one to `held_out`.
+    fn hold_out(
+        &self,
+        fold: usize,
+        fold_of: &[usize],
+        options: &Options,
+        held_out: &mut HeldOut,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let (held, rest): (Vec<usize>, Vec<usize>) =
+            (0..fold_of.len()).partition(|frame| fold_of[*frame] == fold);
+        let seen = self.frames.subset(&rest);
+        let folds: Vec<usize> = rest.iter().map(|frame| fold_of[*frame]).collect();
+        let mut of_rest = TrainingSet::of_folds(&seen, &folds, self.origin.clone());
+        of_rest.refine = self.refine;
+        let blob = of_rest.blob(options, progress)?;
+        let settings = confidence::Settings { seed: options.seed, ..Default::default() };
+        held_out.add(&blob, &Density::fit(&seen, &settings), &self.frames.subset(&held));
+        Ok(())
+    }
+}
+
+impl Experiment {
+    /// Trains the model that the scene describes, like the command `train`.
+    ///
+    /// # Errors
+    /// [`Error`](crate::Error) for training options that cannot be used, or a model that cannot be packed.
+    pub fn train(&self, progress: &dyn Progress) -> Result<ModelBlob> {
+        TrainingSet::of_scene(self, Synthesis::of(&self.world)).blob(&self.options(), progress)
+    }
+}

@@ -1,0 +1,245 @@
+//! Verdict on a model in plain words: what it is worth, and what to beware of.
+
+use model_core::rbf::{Format, Shape, expanded, fixed16};
+use serde::Serialize;
+use taxel_learn::ModelBlob;
+use taxel_learn::decoders::{linear, mean};
+
+use crate::metrics::{DecoderErrors, Errors, LimitSummary};
+
+mod warning;
+
+pub use warning::{FRAMES_A_WEIGHT, OUT_OF_RANGE, SLOT_BYTES, Warning};
+
+/// Share of the mean's RMSE above which an output counts as hardly decoded.
+const HARDLY: f64 = 0.85;
+
+/// Share of the mean's RMSE above which nothing is gained over always predicting it.
+const NO_GAIN: f64 = 0.98;
+
+/// Ratio to the limit below which no decoder could be much better.
+const AT_LIMIT: f64 = 1.1;
+
+/// What a model is worth.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Verdict {
+    /// One or two sentences.
+    pub sentence: String,
+    /// What to beware of.
+    pub warnings: Vec<Warning>,
+}
+
+impl Verdict {
+    /// Verdict on the first of `decoders`, beside those of the others that are the mean and the best linear decoder,
+    /// and the `limit`. It warns of outputs without a gain over these.
+    ///
+    /// Without the mean among `decoders` there is nothing to compare with, and the sentence tells errors alone.
+    #[must_use]
+    pub fn of(decoders: &[DecoderErrors], limit: &LimitSummary) -> Self {
+        let Some(model) = decoders.first() else {
+            return Self { sentence: String::new(), warnings: vec![] };
+        };
+        let others = Others::among(decoders);
+        let (decoded, hardly): (Vec<&Errors>, Vec<&Errors>) = model
+            .errors
+            .iter()
+            .filter(|group| group.rmse.is_finite())
+            .partition(|group| others.of_mean(group).is_none_or(|share| share <= HARDLY));
+        let mut sentences = Vec::new();
+        if !decoded.is_empty() {
+            sentences.push(format!(
+                "The model decodes {}{}.",
+                listed(&decoded.iter().map(|group| with_error(group)).collect::<Vec<_>>()),
+                others.gains(&decoded)
+            ));
+            sentences.extend(least_possible(&decoded, limit));
+        }
+        if !hardly.is_empty() {
+            let shares = hardly.iter().filter_map(|group| others.of_mean(group));
+            let least = shares.fold(f64::INFINITY, f64::min);
+            let within = match below(least) {
+                0 => "it is no better than always predicting the mean".to_owned(),
+                percent => {
+                    format!("at best {percent} % below the error of always predicting the mean")
+                }
+            };
+            let names: Vec<&str> = hardly.iter().map(|group| group.group.as_str()).collect();
+            let names = listed(&names);
+            sentences.push(if decoded.is_empty() {
+                format!("The model has learnt next to nothing of {names}: {within}.")
+            } else {
+                format!("It tells little of {names}: {within}.")
+            });
+            sentences.extend(nobody_can(&hardly));
+        }
+        // What is no better than the mean need not be compared with the linear decoder.
+        let useless = others.without_gain(model, |it| it.mean);
+        let mut plain = others.without_gain(model, |it| it.linear);
+        plain.retain(|group| !useless.contains(group));
+        let warnings = [Warning::no_gain_over_mean(&useless), Warning::no_gain_over_linear(&plain)];
+        Self { sentence: sentences.join(" "), warnings: warnings.into_iter().flatten().collect() }
+    }
+
+    /// Adds what a blob, trained on so many `frames`, gives reason to beware of: too few frames, centres that the format
+    /// pads, a size beyond a slot.
+    #[must_use]
+    pub fn of_blob(self, blob: &ModelBlob, frames: usize) -> Self {
+        let model = blob.parse();
+        let of_networks = |size: fn(Shape) -> usize| {
+            model.networks().map(|network| size(network.shape())).max().unwrap_or(0)
+        };
+        let (used, inputs) = (of_networks(|it| it.centres), of_networks(|it| it.inputs));
+        let stored = model.networks().map(|network| stored_centres(network.format(), used)).max();
+        self.with(Warning::few_frames(frames, used, inputs))
+            .with(Warning::padded_centres(used, stored.unwrap_or(used)))
+            .with(Warning::larger_than_slot(blob.bytes().len()))
+    }
+
+    /// Adds a warning, if there is one.
+    #[must_use]
+    pub fn with(mut self, warning: Option<Warning>) -> Self {
+        self.warnings.extend(warning);
+        self
+    }
+}
+
+/// Number of centres that a network of so many takes room and time for.
+fn stored_centres(format: Format, centres: usize) -> usize {
+    match format {
+        Format::F32Direct => centres,
+        Format::F32 => centres.next_multiple_of(expanded::CENTRES_AT_ONCE),
+        Format::Fixed16 => centres.next_multiple_of(fixed16::CENTRES_AT_ONCE),
+    }
+}
+
+/// Errors of the decoders that a model is compared with.
+#[derive(Clone, Copy)]
+struct Others<'e> {
+    mean: Option<&'e [Errors]>,
+    linear: Option<&'e [Errors]>,
+}
+
+impl<'e> Others<'e> {
+    fn among(decoders: &'e [DecoderErrors]) -> Self {
+        let called = |name: &str| {
+            let found = decoders.iter().skip(1).find(|decoder| decoder.decoder == name);
+            found.map(|decoder| decoder.errors.as_slice())
+        };
+        Self { mean: called(mean::NAME), linear: called(linear::NAME) }
+    }
+
+    /// RMSE of a group as a share of the mean's.
+    fn of_mean(&self, group: &Errors) -> Option<f64> {
+        share(group, self.mean)
+    }
+
+    /// Gains over the mean and the linear decoder, in words after the errors of `groups`.
+    fn gains(&self, groups: &[&Errors]) -> String {
+        let gain = |of: Option<&[Errors]>, name: &str| {
+            let shares: Vec<f64> = groups.iter().filter_map(|group| share(group, of)).collect();
+            let low = shares.iter().copied().fold(f64::INFINITY, f64::min);
+            let high = shares.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            if shares.is_empty() {
+                return None;
+            }
+            let (most, least) = (below(low), below(high));
+            Some(match (least, most) {
+                (0, 0) => format!("no better than {name}"),
+                (least, most) if least == most => format!("{most} % below {name}"),
+                (least, most) => format!("{least} to {most} % below {name}"),
+            })
+        };
+        let gains = [
+            gain(self.mean, "always predicting the mean"),
+            gain(self.linear, "the best linear decoder"),
+        ];
+        let gains: Vec<String> = gains.into_iter().flatten().collect();
+        if gains.is_empty() { String::new() } else { format!(": {}", gains.join(", and ")) }
+    }
+
+    /// Groups of `model` without a gain over the decoder that `other` picks.
+    fn without_gain(
+        &self,
+        model: &'e DecoderErrors,
+        other: impl Fn(&Self) -> Option<&'e [Errors]>,
+    ) -> Vec<&'e str> {
+        let groups = model.errors.iter();
+        let gained_nothing =
+            |group: &&Errors| share(group, other(self)).is_some_and(|share| share > NO_GAIN);
+        groups.filter(gained_nothing).map(|group| group.group.as_str()).collect()
+    }
+}
+
+/// RMSE of `group` as a share of that of the same group among `others`.
+fn share(group: &Errors, others: Option<&[Errors]>) -> Option<f64> {
+    let other = others?.iter().find(|other| other.group == group.group)?;
+    Some(group.rmse / other.rmse).filter(|share| share.is_finite())
+}
+
+/// Whole per cent that a share is below 1; 0 for one that is not.
+fn below(share: f64) -> u32 {
+    (100.0 * (1.0 - share)).round().max(0.0) as u32
+}
+
+/// Group with its RMSE, such as `dz_mm to 0.047 mm`.
+fn with_error(group: &Errors) -> String {
+    let rmse = significant(group.rmse);
+    let unit = if group.unit.is_empty() { String::new() } else { format!(" {}", group.unit) };
+    format!("{} to {rmse}{unit}", group.group)
+}
+
+/// Number with three significant digits.
+fn significant(value: f64) -> String {
+    if value == 0.0 || !(1e-4..1e6).contains(&value.abs()) {
+        return format!("{value:.2e}");
+    }
+    let decimals = (2 - value.abs().log10().floor() as i32).max(0) as usize;
+    format!("{value:.decimals$}")
+}
+
+/// Words in a row: `a`, `a and b`, `a, b and c`.
+fn listed(words: &[impl AsRef<str>]) -> String {
+    match words {
+        [] => String::new(),
+        [only] => only.as_ref().to_owned(),
+        [first @ .., last] => {
+            let first: Vec<&str> = first.iter().map(AsRef::as_ref).collect();
+            format!("{} and {}", first.join(", "), last.as_ref())
+        }
+    }
+}
+
+/// How near the errors of `groups` come to the `limit`, where it is known.
+fn least_possible(groups: &[&Errors], limit: &LimitSummary) -> Option<String> {
+    let known = groups.iter().filter_map(|group| {
+        let limit = limit.groups.iter().find(|limit| limit.group == group.group)?;
+        Some((limit, group.ratio_to_limit?))
+    });
+    let known: Vec<_> = known.collect();
+    let (limit, ratio) = known.first()?;
+    Some(if known.len() == 1 {
+        format!(
+            "The least possible error is {} {} (× {ratio:.2}).",
+            significant(limit.limit),
+            limit.unit
+        )
+    } else {
+        let ratios = || known.iter().map(|(_, ratio)| *ratio);
+        let (low, high) =
+            (ratios().fold(f64::INFINITY, f64::min), ratios().fold(f64::NEG_INFINITY, f64::max));
+        format!("That is {low:.2} to {high:.2} times the least possible error.")
+    })
+}
+
+/// Says so if no decoder could tell much more of `groups`.
+fn nobody_can(groups: &[&Errors]) -> Option<String> {
+    let ratios: Option<Vec<f64>> = groups.iter().map(|group| group.ratio_to_limit).collect();
+    let most = ratios?.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    (most < AT_LIMIT).then(|| {
+        let more = (100.0 * (1.0 - 1.0 / most)).ceil().max(1.0);
+        format!("The readings hold no more: no decoder could be better by more than {more} %.")
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,142 @@
+use taxel_limit::reference::GroupLimit;
+
+use super::*;
+
+fn group(name: &str, rmse: f64, ratio_to_limit: Option<f64>) -> Errors {
+    Errors {
+        group: name.into(),
+        unit: "mm".into(),
+        count: 1,
+        rmse,
+        relative_l2_percent: None,
+        full_scale_percent: None,
+        positional_percent: None,
+        r_squared: None,
+        mean_relative_percent: None,
+        ratio_to_limit,
+        ratio_standard_error: None,
+    }
+}
+
+fn decoders(of: &[(&str, &[(&str, f64)])]) -> Vec<DecoderErrors> {
+    let decoder = |(name, groups): &(&str, &[(&str, f64)])| DecoderErrors {
+        decoder: (*name).into(),
+        errors: groups.iter().map(|(name, rmse)| group(name, *rmse, None)).collect(),
+    };
+    of.iter().map(decoder).collect()
+}
+
+fn no_limit() -> LimitSummary {
+    LimitSummary { frames: 0, groups: vec![], refused: Some("measured".into()) }
+}
+
+fn names(verdict: &Verdict) -> Vec<&str> {
+    verdict.warnings.iter().map(|warning| warning.name).collect()
+}
+
+#[test]
+fn a_good_model_is_told_beside_mean_and_linear() {
+    let all = decoders(&[
+        ("network", &[("dz_mm", 0.047)]),
+        ("mean", &[("dz_mm", 0.152)]),
+        ("linear", &[("dz_mm", 0.060)]),
+    ]);
+    let verdict = Verdict::of(&all, &no_limit());
+    assert_eq!(
+        verdict.sentence,
+        "The model decodes dz_mm to 0.0470 mm: 69 % below always predicting the mean, and 22 % below the best linear \
+         decoder."
+    );
+    assert_eq!(verdict.warnings, []);
+}
+
+#[test]
+fn the_limit_is_named_where_it_is_known() {
+    let mut all = decoders(&[("network", &[("dz_mm", 0.047)]), ("mean", &[("dz_mm", 0.152)])]);
+    all[0].errors[0].ratio_to_limit = Some(1.5);
+    let groups = vec![GroupLimit {
+        group: "dz_mm".into(),
+        unit: "mm".into(),
+        limit: 0.031,
+        limit_standard_error: 0.001,
+        rmse: 0.031,
+        rmse_standard_error: 0.001,
+        prior_rmse: 0.152,
+        monte_carlo_share: 0.01,
+    }];
+    let limit = LimitSummary { frames: 10, groups, refused: None };
+    let sentence = Verdict::of(&all, &limit).sentence;
+    assert!(sentence.ends_with("The least possible error is 0.0310 mm (× 1.50)."), "{sentence}");
+}
+
+#[test]
+fn outputs_that_are_hardly_decoded_are_told_apart() {
+    let all = decoders(&[
+        ("network", &[("dx_mm", 0.030), ("dz_mm", 0.047)]),
+        ("mean", &[("dx_mm", 0.035), ("dz_mm", 0.152)]),
+    ]);
+    let verdict = Verdict::of(&all, &no_limit());
+    assert!(verdict.sentence.starts_with("The model decodes dz_mm to 0.0470 mm"), "{verdict:?}");
+    let hardly =
+        "It tells little of dx_mm: at best 14 % below the error of always predicting the mean.";
+    assert!(verdict.sentence.ends_with(hardly), "{verdict:?}");
+    assert_eq!(verdict.warnings, []);
+}
+
+#[test]
+fn a_model_that_has_learnt_nothing_is_called_that() {
+    let mut all = decoders(&[
+        ("network", &[("dx_mm", 0.37), ("dy_mm", 0.56)]),
+        ("mean", &[("dx_mm", 0.37), ("dy_mm", 0.56)]),
+        ("linear", &[("dx_mm", 0.37), ("dy_mm", 0.56)]),
+    ]);
+    let verdict = Verdict::of(&all, &no_limit());
+    assert_eq!(
+        verdict.sentence,
+        "The model has learnt next to nothing of dx_mm and dy_mm: it is no better than always predicting the mean."
+    );
+    assert_eq!(names(&verdict), ["no-gain-over-mean"]);
+    all[0].errors.iter_mut().for_each(|group| group.ratio_to_limit = Some(1.02));
+    let sentence = Verdict::of(&all, &no_limit()).sentence;
+    assert!(sentence.ends_with("no decoder could be better by more than 2 %."), "{sentence}");
+}
+
+#[test]
+fn every_warning_is_raised_and_left_out() {
+    let raised = [
+        (Warning::few_frames(829, 64, 18), "few-frames"),
+        (Warning::out_of_range(0.0101), "readings-out-of-range"),
+        (Warning::larger_than_slot(131_057), "larger-than-slot"),
+        (Warning::padded_centres(8, 16), "padded-centres"),
+        (Warning::costly_gate(101.0, 100.0), "gate-costs-more"),
+    ];
+    for (warning, name) in raised {
+        let warning = warning.unwrap();
+        assert_eq!(warning.name, name);
+        assert!(warning.to_string().starts_with("warning: "), "{warning}");
+        assert!(warning.to_string().ends_with(&format!("({name})")), "{warning}");
+    }
+    let left_out = [
+        Warning::few_frames(830, 64, 18),
+        Warning::out_of_range(0.0099),
+        Warning::larger_than_slot(131_056),
+        Warning::padded_centres(16, 16),
+        Warning::costly_gate(99.0, 100.0),
+    ];
+    assert_eq!(left_out, [const { None }; 5]);
+}
+
+#[test]
+fn a_model_that_is_as_good_as_linear_is_warned_of() {
+    let all = decoders(&[
+        ("network", &[("f_n", 0.25), ("g_n", 0.10)]),
+        ("mean", &[("f_n", 1.0), ("g_n", 1.0)]),
+        ("linear", &[("f_n", 0.25), ("g_n", 0.30)]),
+    ]);
+    let verdict = Verdict::of(&all, &no_limit());
+    assert_eq!(names(&verdict), ["no-gain-over-linear"]);
+    assert!(verdict.warnings[0].text.starts_with("f_n:"), "{verdict:?}");
+    let gains =
+        "75 to 90 % below always predicting the mean, and 0 to 67 % below the best linear decoder";
+    assert!(verdict.sentence.contains(gains), "{verdict:?}");
+}

@@ -1,0 +1,111 @@
+//! Warnings, each by a name of its own.
+
+use serde::Serialize;
+
+/// Largest blob in bytes that a slot of the firmware's images holds: 128 KiB less the record behind it.
+pub const SLOT_BYTES: usize = 131_056;
+
+/// Frames for each weight of a network below which a warning is due.
+pub const FRAMES_A_WEIGHT: usize = 10;
+
+/// Share of readings outside the training range above which a warning is due.
+pub const OUT_OF_RANGE: f64 = 0.01;
+
+/// What to beware of, in words.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Warning {
+    /// Name, the same wherever the warning appears.
+    pub name: &'static str,
+    /// What is wrong, and what to do.
+    pub text: String,
+}
+
+impl std::fmt::Display for Warning {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "warning: {} ({})", self.text, self.name)
+    }
+}
+
+impl Warning {
+    fn when(due: bool, name: &'static str, text: impl FnOnce() -> String) -> Option<Self> {
+        due.then(|| Self { name, text: text() })
+    }
+
+    /// Groups of outputs that are decoded no better than by always predicting the mean.
+    #[must_use]
+    pub fn no_gain_over_mean(groups: &[&str]) -> Option<Self> {
+        Self::when(!groups.is_empty(), "no-gain-over-mean", || {
+            let groups = groups.join(", ");
+            format!(
+                "{groups}: no better than always predicting the mean; do not use these estimates"
+            )
+        })
+    }
+
+    /// Groups of outputs that a linear decoder decodes as well.
+    #[must_use]
+    pub fn no_gain_over_linear(groups: &[&str]) -> Option<Self> {
+        Self::when(!groups.is_empty(), "no-gain-over-linear", || {
+            let groups = groups.join(", ");
+            format!(
+                "{groups}: the best linear decoder is as good; fewer centres would do for these"
+            )
+        })
+    }
+
+    /// Fewer than [`FRAMES_A_WEIGHT`] training `frames` for each of the weights that an output of a network has: one
+    /// for each of its `centres`, one for each of its `inputs` behind the affine tail, and the bias.
+    #[must_use]
+    pub fn few_frames(frames: usize, centres: usize, inputs: usize) -> Option<Self> {
+        let weights = centres + inputs + 1;
+        let needed = FRAMES_A_WEIGHT * weights;
+        Self::when(frames < needed, "few-frames", || {
+            format!(
+                "{frames} training frames are few for {weights} weights an output (K = {centres}): give {needed} or \
+                 more, or lower --centres"
+            )
+        })
+    }
+
+    /// More than [`OUT_OF_RANGE`] of the readings outside the range that a model was trained on.
+    #[must_use]
+    pub fn out_of_range(share: f64) -> Option<Self> {
+        Self::when(share > OUT_OF_RANGE, "readings-out-of-range", || {
+            format!(
+                "{:.1} % of the readings lie outside the range that the model was trained on, and are clamped; is it \
+                 the right model for this sensor?",
+                100.0 * share
+            )
+        })
+    }
+
+    /// Blob of more `bytes` than a slot holds.
+    #[must_use]
+    pub fn larger_than_slot(bytes: usize) -> Option<Self> {
+        Self::when(bytes > SLOT_BYTES, "larger-than-slot", || {
+            format!(
+                "the blob takes {bytes} bytes, and a slot of the firmware's images holds {SLOT_BYTES}: lower \
+                 --centres, or use --format fixed16"
+            )
+        })
+    }
+
+    /// Number of `centres` that was asked for, and the larger one that the number format `stored`.
+    #[must_use]
+    pub fn padded_centres(centres: usize, stored: usize) -> Option<Self> {
+        Self::when(stored > centres, "padded-centres", || {
+            format!("K = {centres} is stored as {stored}: K = {stored} costs a device no more")
+        })
+    }
+
+    /// Gate whose mean cycles of a frame, `gated`, are no fewer than those `ungated`.
+    #[must_use]
+    pub fn costly_gate(gated: f64, ungated: f64) -> Option<Self> {
+        Self::when(gated >= ungated, "gate-costs-more", || {
+            format!(
+                "the gate costs more than it saves: {gated:.0} cycles a frame with it, {ungated:.0} without; leave it \
+                 off for motions like these"
+            )
+        })
+    }
+}
