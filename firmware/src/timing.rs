@@ -2,6 +2,15 @@
 //!
 //! Waiting times are rounded up; a time that does not fit its type becomes the type's largest number.
 
+use crate::link::message::Configuration;
+
+/// Clock of the converters' bus on the NUCLEO-F446RE in Hz: 45 MHz/64. An MCP3208 takes at most 1 MHz at 3.3 V, and the
+/// divider has powers of two.
+pub const NUCLEO_SPI_HZ: u32 = 703_125;
+
+/// Bytes that a sample of an MCP3208 takes on its bus.
+const MCP3208_BYTES: u32 = 3;
+
 /// Time constant in ns of a resistance (Ω) that charges a capacitance (pF).
 ///
 /// ```
@@ -57,6 +66,23 @@ pub struct ScanPlan {
 }
 
 impl ScanPlan {
+    /// Plan of the NUCLEO-F446RE's image for so many wires: its converters' bus, and its first configuration's wait.
+    ///
+    /// ```
+    /// assert_eq!(firmware::timing::ScanPlan::of_nucleo(8, 18, 1).scan_us(), 6_430);
+    /// ```
+    #[must_use]
+    pub fn of_nucleo(rows: u16, columns: u16, oversampling: u16) -> Self {
+        Self {
+            rows,
+            columns,
+            idle_samples: true,
+            settling_us: Configuration::DEFAULT.scan.settling_us,
+            oversampling,
+            sample_ns: spi_transfer_ns(MCP3208_BYTES, NUCLEO_SPI_HZ),
+        }
+    }
+
     /// Time of the whole scan in µs.
     ///
     /// ```
@@ -110,7 +136,6 @@ impl ScanPlan {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::link::message::Configuration;
 
     const PLAN: ScanPlan = ScanPlan {
         rows: 8,
@@ -156,16 +181,8 @@ mod tests {
 
     #[test]
     fn the_boards_scan_leaves_a_third_of_the_period() {
-        // The NUCLEO-F446RE's SPI clock, and its application's first configuration.
         let Configuration { frame_period_us, scan, .. } = Configuration::DEFAULT;
-        let plan = ScanPlan {
-            rows: 8,
-            columns: 18,
-            idle_samples: true,
-            settling_us: scan.settling_us,
-            oversampling: scan.oversampling,
-            sample_ns: spi_transfer_ns(3, 703_125),
-        };
+        let plan = ScanPlan::of_nucleo(8, 18, scan.oversampling);
         assert_eq!(plan.scan_us(), 6_430);
         assert!(plan.scan_us() * 3 <= frame_period_us * 2);
         assert_eq!(plan.most_oversampling(frame_period_us), Some(1));

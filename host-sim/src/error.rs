@@ -17,6 +17,10 @@ pub enum Bounded {
     Cycles,
     /// Bytes of the blob.
     Flash,
+    /// Frames in a second: the only bound from below.
+    FrameRate,
+    /// Time of scan and decoding in ms.
+    Latency,
 }
 
 impl Bounded {
@@ -27,24 +31,43 @@ impl Bounded {
             Self::Error => "max-error",
             Self::Cycles => "max-cycles",
             Self::Flash => "max-flash",
+            Self::FrameRate => "frame-rate",
+            Self::Latency => "max-latency-ms",
         }
+    }
+
+    /// Whether `value` is within `bound`.
+    #[must_use]
+    pub fn allows(self, value: f64, bound: f64) -> bool {
+        if self == Self::FrameRate { value >= bound } else { value <= bound }
+    }
+
+    /// The one of two values that is nearer to being within a bound.
+    #[must_use]
+    pub fn nearer(self, a: f64, b: f64) -> f64 {
+        if self == Self::FrameRate { a.max(b) } else { a.min(b) }
+    }
+
+    /// Verb for making a bound easier to meet.
+    fn relax(self) -> &'static str {
+        if self == Self::FrameRate { "lower" } else { "raise" }
     }
 }
 
-/// Bound of a trade, and the least value that points come down to.
+/// Bound of a trade, and the nearest value that points come to it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unmet {
     /// Bounded quantity.
     pub bounded: Bounded,
-    /// Largest value that the user allows.
-    pub most: f64,
+    /// Most, or least, that the user allows.
+    pub bound: f64,
     /// Whether the bound is a slot's size, which applies if no bound on flash was given.
     pub is_slot: bool,
-    /// Least value of all points, or of those within the other bounds.
-    pub least: f64,
+    /// Best value of all points, or of those within the other bounds.
+    pub nearest: f64,
 }
 
-/// Reason why no point of a trade is within its bounds.
+/// Reason why no point of a trade is within its bounds. It is `predicted` if it was known before anything was trained.
 #[derive(Debug, Clone, PartialEq)]
 pub enum NoPoint {
     /// Some bounds that no point meets.
@@ -53,6 +76,8 @@ pub enum NoPoint {
         unmet: Vec<Unmet>,
         /// Unit and group of the error, such as `mm (dz_mm)`.
         unit: String,
+        /// Whether nothing was trained.
+        predicted: bool,
     },
     /// Bounds that points meet one by one, but no point meets together.
     Together {
@@ -60,6 +85,8 @@ pub enum NoPoint {
         bounds: Vec<(Unmet, bool)>,
         /// Unit and group of the error, such as `mm (dz_mm)`.
         unit: String,
+        /// Whether nothing was trained.
+        predicted: bool,
     },
 }
 
@@ -67,21 +94,31 @@ impl Unmet {
     /// Bound in words.
     fn bound(&self, name: impl Fn(Bounded) -> &'static str) -> String {
         if self.is_slot {
-            format!("a slot's {} bytes", self.most)
+            format!("a slot's {} bytes", self.bound)
         } else {
-            format!("{} {}", name(self.bounded), self.most)
+            format!("{} {}", name(self.bounded), self.bound)
         }
     }
 
-    /// Least value in words.
-    fn least(&self, unit: &str) -> String {
+    /// Nearest value in words, rounded to a bound that can be met. Errors and blobs that are predicted are lower bounds.
+    fn nearest(&self, unit: &str, predicted: bool) -> String {
+        let least = if predicted { "at least " } else { "" };
         match self.bounded {
-            // The error is rounded up, to a bound that can be met.
             Bounded::Error => {
-                format!("the smallest error is {:.4} {unit}", (self.least * 1e4).ceil() / 1e4)
+                format!(
+                    "the smallest error is {least}{:.4} {unit}",
+                    (self.nearest * 1e4).ceil() / 1e4
+                )
             }
-            Bounded::Cycles => format!("the fewest cycles are {}", self.least),
-            Bounded::Flash => format!("the smallest blob takes {} bytes", self.least),
+            Bounded::Cycles => format!("the fewest cycles are {}", self.nearest),
+            Bounded::Flash => format!("the smallest blob takes {least}{} bytes", self.nearest),
+            Bounded::FrameRate => {
+                let most = (self.nearest * 10.0).floor() / 10.0;
+                format!("the highest rate is {most:.1} frames a second")
+            }
+            Bounded::Latency => {
+                format!("the shortest time is {:.3} ms", (self.nearest * 1e3).ceil() / 1e3)
+            }
         }
     }
 }
@@ -97,23 +134,39 @@ impl fmt::Display for NoPoint {
 impl NoPoint {
     /// Message, with bounds called by `name`.
     pub fn text(&self, name: impl Fn(Bounded) -> &'static str + Copy) -> String {
+        let untrained = |predicted: bool| if predicted { "; nothing was trained" } else { "" };
         match self {
-            Self::Each { unmet, unit } => {
+            Self::Each { unmet, unit, predicted } => {
+                let verb = match unmet.as_slice() {
+                    [first, rest @ ..]
+                        if rest.iter().all(|u| u.bounded.relax() == first.bounded.relax()) =>
+                    {
+                        first.bounded.relax()
+                    }
+                    _ => "relax",
+                };
+                let plural = if unmet.len() == 1 { "" } else { "s" };
                 let unmet: Vec<String> = unmet
                     .iter()
-                    .map(|u| format!("{} ({})", u.bound(name), u.least(unit)))
+                    .map(|u| format!("{} ({})", u.bound(name), u.nearest(unit, *predicted)))
                     .collect();
-                format!("no point is within {}: raise the bound", unmet.join(", nor within "))
+                let (unmet, untrained) = (unmet.join(", nor within "), untrained(*predicted));
+                format!("no point is within {unmet}: {verb} the bound{plural}{untrained}")
             }
-            Self::Together { bounds, unit } => {
+            Self::Together { bounds, unit, predicted } => {
                 let names: Vec<String> = bounds.iter().map(|(b, _)| b.bound(name)).collect();
                 let nearest: Vec<String> = bounds
                     .iter()
                     .filter(|(_, any)| *any)
-                    .map(|(b, _)| format!("without {}, {}", b.bound(name), b.least(unit)))
+                    .map(|(b, _)| {
+                        format!("without {}, {}", b.bound(name), b.nearest(unit, *predicted))
+                    })
                     .collect();
                 let (names, nearest) = (names.join(", "), nearest.join("; "));
-                format!("no point is within {names} at once: {nearest}; raise one of these bounds")
+                let untrained = untrained(*predicted);
+                format!(
+                    "no point is within {names} at once: {nearest}; relax one of these bounds{untrained}"
+                )
             }
         }
     }

@@ -42,10 +42,10 @@ pub fn view_html(view: &View<'_>) -> String {
     html::page(view)
 }
 
-/// Page for a trade between speed and accuracy.
+/// Page for a trade between speed and accuracy, with the `command` that computed it.
 #[must_use]
-pub fn trade_html(trade: &Trade) -> String {
-    trade::html(trade)
+pub fn trade_html(trade: &Trade, command: &str) -> String {
+    trade::html(trade, command)
 }
 
 /// Picture of a trade, as a file of its own: light or dark like the viewer.

@@ -25,9 +25,8 @@ use crate::slot::Slot;
 /// may be up to 50 % too fast.
 const WATCHDOG_MS: u32 = 8000;
 
-/// Clock of the converters' bus in Hz: 45 MHz/64. An MCP3208 takes at most 1 MHz at 3.3 V, and the divider has
-/// powers of two.
-pub const SPI_HZ: u32 = 703_125;
+/// Clock of the converters' bus in Hz.
+pub const SPI_HZ: u32 = firmware::timing::NUCLEO_SPI_HZ;
 
 /// Number of converters: three, and a fourth if the image has room for more than 24 columns.
 pub const CONVERTERS: usize = if board_common::CONVERTERS > 3 { 4 } else { 3 };

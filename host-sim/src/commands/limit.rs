@@ -123,10 +123,9 @@ fn refusal(result: &LimitResult) -> Result<()> {
 }
 
 fn write_files(folder: &Path, result: &LimitResult) -> Result<()> {
-    let json = serde_json::to_string_pretty(result)
-        .map_err(|cause| Error::Failed(format!("cannot write JSON: {cause}")))?;
+    let json = print::json_text(result)?;
     let [json_file, page, directions, known] = FILES.map(|file| folder.join(file));
-    output::write_bytes(&json_file, (json + "\n").as_bytes())?;
+    output::write_bytes(&json_file, json.as_bytes())?;
     output::write_bytes(&page, report::limit_html(result).as_bytes())?;
     output::write_bytes(&directions, report::directions_svg(result).as_bytes())?;
     Ok(output::write_bytes(&known, report::known_svg(result).as_bytes())?)

@@ -1,42 +1,122 @@
-//! Progress on stderr, on a terminal only.
+//! Progress on stderr: a bar on a terminal, now and then a line elsewhere.
 
-use std::time::Duration;
+use std::collections::BTreeSet;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use taxel_data::progress::Progress;
 
-/// Display of the stage that runs and how far it is; silent where stderr is no terminal.
-#[derive(Debug, Clone)]
-pub struct Terminal(ProgressBar);
+/// Least time between two lines of the same stage.
+const LINE_EVERY: Duration = Duration::from_secs(10);
+
+/// Display of the stage that runs, how far it is, and how long it may take.
+pub enum Terminal {
+    /// Bar that is drawn in place.
+    Bar(ProgressBar),
+    /// Lines in a log, where stderr is no terminal.
+    Log(Mutex<Log>),
+}
+
+/// Stage that runs, for lines in a log.
+pub struct Log {
+    stage: String,
+    steps: usize,
+    done: usize,
+    started: Instant,
+    written: Instant,
+    /// Stages that were named in a line. Those that come again and again are named once.
+    known: BTreeSet<String>,
+}
 
 impl Terminal {
     /// Display of progress on stderr.
     pub fn new() -> Self {
+        if ProgressDrawTarget::stderr().is_hidden() {
+            return Self::Log(Mutex::new(Log::new(Instant::now())));
+        }
         let bar = ProgressBar::new(0);
-        let style = ProgressStyle::with_template("{msg:<28} {bar:32} {pos}/{len} {elapsed}");
-        if let Ok(style) = style {
+        let template = "{msg:<28} {bar:32} {percent:>3} %  {elapsed}, {eta} left";
+        if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
         bar.enable_steady_tick(Duration::from_millis(100));
-        Self(bar)
+        Self::Bar(bar)
     }
+}
+
+/// The log, also after a panic of another thread that held it.
+fn locked(log: &Mutex<Log>) -> MutexGuard<'_, Log> {
+    log.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Progress for Terminal {
     fn stage(&self, name: &str, steps: usize) {
-        self.0.set_length(steps as u64);
-        self.0.set_position(0);
-        self.0.set_message(name.to_owned());
-        self.0.tick();
+        match self {
+            Self::Bar(bar) => {
+                bar.reset();
+                bar.set_length(steps as u64);
+                bar.set_message(name.to_owned());
+                bar.tick();
+            }
+            Self::Log(log) => {
+                if let Some(line) = locked(log).stage(name, steps, Instant::now()) {
+                    eprintln!("{line}");
+                }
+            }
+        }
     }
 
     fn step(&self) {
-        self.0.inc(1);
+        match self {
+            Self::Bar(bar) => bar.inc(1),
+            Self::Log(log) => {
+                if let Some(line) = locked(log).step(Instant::now()) {
+                    eprintln!("{line}");
+                }
+            }
+        }
     }
 }
 
 impl Drop for Terminal {
     fn drop(&mut self) {
-        self.0.finish_and_clear();
+        if let Self::Bar(bar) = self {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+impl Log {
+    fn new(now: Instant) -> Self {
+        let known = BTreeSet::new();
+        Self { stage: String::new(), steps: 0, done: 0, started: now, written: now, known }
+    }
+
+    /// Begins a stage; the line to write, if it is the first of that name.
+    fn stage(&mut self, name: &str, steps: usize, now: Instant) -> Option<String> {
+        (self.stage, self.steps, self.done, self.started) = (name.into(), steps, 0, now);
+        if !self.known.insert(name.into()) {
+            return None;
+        }
+        self.written = now;
+        Some(format!("{name} …"))
+    }
+
+    /// Counts a step; the line to write, if the last one was long ago.
+    fn step(&mut self, now: Instant) -> Option<String> {
+        self.done += 1;
+        if now.duration_since(self.written) < LINE_EVERY || self.done > self.steps {
+            return None;
+        }
+        self.written = now;
+        let done = self.done as f64 / self.steps as f64;
+        let elapsed_s = now.duration_since(self.started).as_secs_f64();
+        Some(format!(
+            "{}: {:.0} %, {elapsed_s:.0} s, about {:.0} s left",
+            self.stage,
+            100.0 * done,
+            elapsed_s / done - elapsed_s
+        ))
     }
 }

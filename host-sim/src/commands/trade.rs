@@ -1,51 +1,46 @@
 //! Command `trade`: speed against accuracy, every setting measured.
 
 use std::cmp::Ordering;
-use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::str::FromStr;
 
-use super::progress::Terminal;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use host_sim::error::Bounded;
 use host_sim::evaluate::gate::{self, RECOMMENDED_K};
-use host_sim::evaluate::trade::{self, Bounds, Plan, Point, Trade};
-use host_sim::metrics::{DecoderErrors, Errors};
-use host_sim::{Error, Result, report};
+use host_sim::evaluate::trade::{self, BOARD_CLOCK_MHZ, Bounds, Device, Memory, Plan};
+use host_sim::subject::Subject;
+use host_sim::{Error, Result};
 use taxel_data::{columns, output};
-use taxel_simulate::World;
 
 use super::arguments::of_option;
-use super::scene_argument::{NoiseArgument, RefineArgument, RelativeInputsArgument, SceneArgument};
+use super::progress::Terminal;
+use super::subject_argument::SubjectArgument;
 use super::{Common, print};
 
-/// Names of all files that the command may write.
-const FILES: [&str; 5] = ["trade.csv", "trade.json", "trade.svg", "trade.html", "chosen.bin"];
+mod files;
+mod page;
 
 /// Trade speed for accuracy: measure every decoder, and choose the best.
 ///
 /// Trains and judges every number format, exponential, K, affine tail, number of samples averaged and gate.
-/// Marks the Pareto front, and chooses the best point within your bounds.
+/// Marks the Pareto front of error and time of a frame, and chooses the best point within your bounds.
 ///
 /// Writes trade.csv, trade.json, trade.svg and trade.html to out/<scene>/, and with a bound chosen.bin.
-/// Instructions and cycles are predicted by the price list of the firmware's code (docs/cycles.md). Behind a gate they
-/// are the mean over the test frames, by the share of untouched rows (docs/trade.md).
+/// The time of a frame is that of the scan, by the plan of the board's firmware (docs/board.md), and of decoding, by
+/// the price list of the firmware's code (docs/cycles.md). Behind a gate cycles are the mean over the test frames, by the
+/// share of untouched rows (docs/trade.md). Bounds that nothing can meet are refused before anything is trained.
 #[derive(Args)]
 #[command(after_help = "Examples:
   host-sim trade press
-  host-sim trade press --max-error 0.05
-  host-sim trade press --max-cycles 40000 --max-flash 40000 --average 1
-  host-sim trade press --gate 3,3.5 --max-cycles 20000")]
+  host-sim trade press --frame-rate 100
+  host-sim trade press --max-error 0.045
+  host-sim trade press --max-cycles 40000 --max-flash 40000
+  host-sim trade press --average 1,4,16 --max-latency-ms 25
+  host-sim trade measured.csv --inputs 'ch*' --outputs 'f?_n' --fold-column place --scan-ms 2")]
 pub struct Arguments {
     #[command(flatten)]
-    scene: SceneArgument,
-    #[command(flatten)]
-    noise: NoiseArgument,
-    #[command(flatten)]
-    relative_inputs: RelativeInputsArgument,
-    #[command(flatten)]
-    refine: RefineArgument,
-    /// Folder that receives a folder named after the scene.
+    subject: SubjectArgument,
+    /// Folder that receives a folder named after the scene or the CSV file.
     #[arg(short, long, value_name = "DIR", default_value = "out")]
     output: PathBuf,
     /// Centres K to try.
@@ -55,8 +50,8 @@ pub struct Arguments {
     /// multiplications (docs/projection.md); `none` for networks that compute all outputs alone.
     #[arg(long, value_name = "R,…", value_delimiter = ',', default_value = "24")]
     output_rank: Vec<RankOption>,
-    /// Numbers of samples averaged for each reading, to try.
-    #[arg(long, value_name = "N", value_delimiter = ',', default_value = "1,4,16")]
+    /// Numbers of samples averaged for each reading, to try: more lower the noise, and make the scan longer.
+    #[arg(long, value_name = "N", value_delimiter = ',', default_value = "1")]
     average: Vec<usize>,
     /// Gates to try besides none: tolerances in standard deviations of the averaged noise; `none` for no
     /// gate [default: 3.5 if the scene's noise is relative].
@@ -68,85 +63,118 @@ pub struct Arguments {
     /// Choose the cheapest point with an RMSE of at most this, in the group's unit.
     #[arg(long, value_name = "RMSE", allow_negative_numbers = true)]
     max_error: Option<f64>,
-    /// Choose within so many cycles a frame (behind a gate: on average). Unless --max-error is given, the
-    /// most accurate such point is chosen.
+    /// Choose within so many cycles a frame, at zero wait (behind a gate: on average). Unless --max-error is given,
+    /// the most accurate point within all bounds is chosen (of errors within 0.5 %, the cheapest).
     #[arg(long, value_name = "CYCLES")]
     max_cycles: Option<u64>,
     /// Choose within a blob of so many bytes [default, with another bound: a slot's 131056].
     #[arg(long, value_name = "BYTES")]
     max_flash: Option<usize>,
-    /// Clock of the device, for times.
-    #[arg(long, value_name = "MHZ", default_value_t = 168.0, allow_negative_numbers = true)]
+    /// Choose among points that scan and decode at least so many frames a second.
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    frame_rate: Option<f64>,
+    /// Choose among points that take at most so many ms, from the start of a scan to its estimate.
+    #[arg(long, value_name = "MS", allow_negative_numbers = true)]
+    max_latency_ms: Option<f64>,
+    /// Clock of the device.
+    #[arg(long, value_name = "MHZ", default_value_t = BOARD_CLOCK_MHZ, allow_negative_numbers = true)]
     clock_mhz: f64,
+    /// Memory that the device runs its code from: flash with the wait states of an STM32F446 at 180 MHz, or memory
+    /// that never waits.
+    #[arg(long, value_enum, default_value_t = MemoryOption::Flash)]
+    memory: MemoryOption,
+    /// Time of a scan in ms with one sample a reading, instead of that of the board's readout.
+    #[arg(long, value_name = "MS", allow_negative_numbers = true)]
+    scan_ms: Option<f64>,
     /// Print all points, not only the front and the chosen one (files have all of them).
     #[arg(long)]
     all: bool,
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let mut scene = arguments.scene.load(common)?;
-    arguments.noise.apply(&mut scene)?;
-    arguments.relative_inputs.apply(&mut scene);
-    scene.training.refine = arguments.refine.over(scene.training.refine);
-    let names = scene.world.output_names();
+    let subject = arguments.subject.load(common)?;
+    let names = subject.output_names();
     let groups: Vec<&str> = columns::groups(&names).into_iter().map(|(group, _)| group).collect();
     let group = match &arguments.group {
         Some(group) if groups.contains(&group.as_str()) => group.as_str(),
         Some(group) => {
-            let message = format!("--group {group}: the scene has {}", groups.join(", "));
+            let message = format!("--group {group}: the outputs are {}", groups.join(", "));
             return Err(Error::Usage(message));
         }
         None => groups.last().copied().unwrap_or_default(),
     };
-    if !(arguments.clock_mhz.is_finite() && arguments.clock_mhz > 0.0) {
-        let message = format!("--clock-mhz {}: give a positive number", arguments.clock_mhz);
-        return Err(Error::Usage(message));
-    }
+    let device = Device {
+        clock_mhz: arguments.clock_mhz,
+        memory: arguments.memory.into(),
+        scan_ms: arguments.scan_ms,
+    };
+    device.check().map_err(|bad| of_option(bad, &OPTIONS))?;
     let plan = Plan {
         centres: distinct("--centres", &arguments.centres)?,
         output_ranks: output_ranks(&arguments.output_rank)?,
         samples_averaged: distinct("--average", &arguments.average)?,
-        gate_k: gate_k(&arguments.gate, &scene.world)?,
-        clock_mhz: arguments.clock_mhz,
+        gate_k: gate_k(&arguments.gate, &subject)?,
+        device,
     };
     let bounds = Bounds {
         error: arguments.max_error,
         cycles: arguments.max_cycles,
         flash_bytes: arguments.max_flash,
+        frame_rate_hz: arguments.frame_rate,
+        latency_ms: arguments.max_latency_ms,
     };
     bounds.check().map_err(|bad| of_option(bad, &OPTIONS))?;
-    let folder = arguments.output.join(&scene.name);
+    let folder = arguments.output.join(subject.name());
     let (trade, choice) = output::in_folder(&folder, || {
-        for file in FILES {
-            output::check_writable(&folder.join(file), &[arguments.scene.path()])?;
+        for file in files::FILES {
+            output::check_writable(&folder.join(file), &arguments.subject.paths())?;
         }
-        let computed = trade::compute(&scene, &plan, group, &Terminal::new());
+        let computed = trade::compute(&subject, &plan, group, &bounds, &Terminal::new());
         let mut trade = computed.map_err(|error| match error {
             Error::Setting(bad) => of_option(bad, &OPTIONS),
+            Error::NoPoint(cause) => Error::Usage(cause.text(option)),
             other => other,
         })?;
         let choice = trade.choose(&bounds);
-        write_files(&folder, &trade)?;
+        files::write(&folder, &trade, &command())?;
         Ok::<_, Error>((trade, choice))
     })?;
     if common.json {
         print::json(&trade)?;
     } else {
-        page_of(&trade, arguments.all, &folder).print()?;
+        page::of(&trade, arguments.all, &folder).print()?;
     }
     // Measurements are kept and shown even if no point is within the bounds.
     choice.map_err(|cause| Error::Usage(cause.text(option)))
 }
 
+/// The command that is running, as it can be typed again.
+fn command() -> String {
+    let quoted = |argument: String| {
+        let plain = |c: char| c.is_ascii_alphanumeric() || "-_./,=+:@%".contains(c);
+        if !argument.is_empty() && argument.chars().all(plain) {
+            argument
+        } else {
+            format!("'{}'", argument.replace('\'', r"'\''"))
+        }
+    };
+    let arguments = std::env::args_os().skip(1).map(|a| quoted(a.to_string_lossy().into_owned()));
+    std::iter::once("host-sim".into()).chain(arguments).collect::<Vec<String>>().join(" ")
+}
+
 /// Options by the settings that they set.
-const OPTIONS: [(&str, &str); 7] = [
+const OPTIONS: [(&str, &str); 11] = [
     ("output-rank", "--output-rank"),
+    ("clock-mhz", "--clock-mhz"),
+    ("scan-ms", "--scan-ms"),
     ("centres", "--centres"),
     ("average", "--average"),
     ("gate", "--gate"),
     ("max-error", option(Bounded::Error)),
     ("max-cycles", option(Bounded::Cycles)),
     ("max-flash", option(Bounded::Flash)),
+    ("frame-rate", option(Bounded::FrameRate)),
+    ("max-latency-ms", option(Bounded::Latency)),
 ];
 
 /// Option that sets a bound.
@@ -155,6 +183,24 @@ const fn option(bounded: Bounded) -> &'static str {
         Bounded::Error => "--max-error",
         Bounded::Cycles => "--max-cycles",
         Bounded::Flash => "--max-flash",
+        Bounded::FrameRate => "--frame-rate",
+        Bounded::Latency => "--max-latency-ms",
+    }
+}
+
+/// Value of `--memory`.
+#[derive(Clone, Copy, ValueEnum)]
+enum MemoryOption {
+    Flash,
+    Ram,
+}
+
+impl From<MemoryOption> for Memory {
+    fn from(option: MemoryOption) -> Self {
+        match option {
+            MemoryOption::Flash => Self::Flash,
+            MemoryOption::Ram => Self::Ram,
+        }
     }
 }
 
@@ -201,9 +247,10 @@ fn output_ranks(given: &[RankOption]) -> Result<Vec<usize>> {
 }
 
 /// Gates that are asked for, or the one that docs/gating.md recommends where the noise allows one.
-fn gate_k(given: &[GateOption], world: &World) -> Result<Vec<f64>> {
+fn gate_k(given: &[GateOption], subject: &Subject) -> Result<Vec<f64>> {
     if given.is_empty() {
-        return Ok(match gate::check_noise(world) {
+        let Some(scene) = subject.scene() else { return Ok(vec![]) };
+        return Ok(match gate::check_noise(&scene.world) {
             Ok(()) => vec![RECOMMENDED_K],
             Err(cause) => {
                 eprintln!("note: no points behind a gate: {cause}");
@@ -237,189 +284,4 @@ fn distinct<T: Copy + PartialOrd + std::fmt::Display>(
         Some(pair) => Err(Error::Usage(format!("{option} gives {} twice; give it once", pair[0]))),
         None => Ok(sorted),
     }
-}
-
-fn write_files(folder: &Path, trade: &Trade) -> Result<()> {
-    let json = print::json_text(trade)?;
-    let csv = csv_of(trade);
-    let texts = [
-        ("trade.csv", csv),
-        ("trade.json", json),
-        ("trade.svg", report::trade_svg(trade)),
-        ("trade.html", report::trade_html(trade)),
-    ];
-    for (name, text) in texts {
-        output::write_bytes(&folder.join(name), text.as_bytes())?;
-    }
-    let chosen = folder.join("chosen.bin");
-    match trade.chosen {
-        Some(point) => output::write_bytes(&chosen, trade.blob(point))?,
-        // A blob from an earlier run would lie beside figures that are not its own.
-        None => output::remove(&chosen)?,
-    }
-    Ok(())
-}
-
-fn csv_of(trade: &Trade) -> String {
-    let rmse = trade
-        .groups()
-        .map(|(group, _)| format!("{group}_rmse,{group}_ratio_to_best,{group}_ratio_to_limit"));
-    let mut csv = format!(
-        "kernel,whole_array,centres,spread,affine_tail,samples_averaged,gate_k,output_rank,{},instructions,cycles,flash_cycles,frame_us,flash_bytes,ram_bytes,\
-         on_front,chosen\n",
-        rmse.collect::<Vec<_>>().join(",")
-    );
-    for (i, p) in trade.points.iter().enumerate() {
-        let errors = p.errors.iter().zip(&p.ratio_to_best);
-        let to_limit = |e: &Errors| e.ratio_to_limit.map_or(String::new(), |r| r.to_string());
-        let errors = errors.map(|(e, ratio)| format!("{},{ratio},{}", e.rmse, to_limit(e)));
-        let errors = errors.collect::<Vec<_>>();
-        let _ = writeln!(
-            csv,
-            "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
-            p.arithmetic.name(),
-            p.whole_array,
-            p.centres,
-            p.spread,
-            p.affine_tail,
-            p.samples_averaged,
-            p.gate_k.map_or(String::new(), |k| k.to_string()),
-            p.output_rank.map_or(String::new(), |rank| rank.to_string()),
-            errors.join(","),
-            p.frame.instructions,
-            p.frame.cycles,
-            p.frame.flash_cycles,
-            p.frame_us,
-            p.flash_bytes,
-            p.ram_bytes,
-            p.on_front,
-            trade.chosen == Some(i)
-        );
-    }
-    csv
-}
-
-fn page_of(trade: &Trade, all: bool, folder: &Path) -> print::Page {
-    let mut page = print::Page::default();
-    page.line(format_args!(
-        "{}: {} points, noise {} % a sample, {} test frames; cycles of a frame on a Cortex-M4F by the\n\
-         model of docs/cycles.md, zero wait states and from flash, code of {}",
-        trade.scene,
-        trade.points.len(),
-        (trade.noise_level * 1e6).round() / 1e4,
-        trade.test_frames,
-        trade.compiler
-    ));
-    let groups: Vec<String> = trade.groups().map(|(group, _)| format!("{group:>16}")).collect();
-    page.line(format_args!(
-        "\n{:<28} {:>4} {:>4} {:>5} {:>4} {:>4}{groups} {:>7} {:>12} {:>9} {:>10} {:>8} {:>8} {:>6}",
-        "format",
-        "K",
-        "rank",
-        "tail",
-        "avg",
-        "gate",
-        "× limit",
-        "instructions",
-        "cycles",
-        "from flash",
-        "µs",
-        "flash",
-        "RAM",
-        groups = groups.concat()
-    ));
-    let shown = shown(trade, all);
-    for i in &shown {
-        page.line(line_of(&trade.points[*i], &trade.group, trade.chosen == Some(*i)));
-    }
-    for DecoderErrors { decoder, errors } in &trade.baselines {
-        let errors: Vec<String> =
-            errors.iter().map(|e| format!("{:>9.4}       ", e.rmse)).collect();
-        page.line(format_args!("  {decoder:<53}{}", errors.concat()));
-    }
-    page.line(format_args!(
-        "\nRMSE in {}; in brackets: relative to the smallest of all points\n\
-         × limit: RMSE of {} relative to the least possible one with as many samples a reading\n\
-         *: on the Pareto front (RMSE of {}, cycles, samples)\n\
-         array: one network for all rows, behind a projection; not listed if larger than a slot (128 KiB)\n\
-         rank: components that the array's network computes, which are expanded to all outputs (docs/projection.md)\n\
-         flash: no point larger than a slot is chosen unless --max-flash allows it\n\
-         gate: k of a gate that skips untouched rows; its cycles are the mean over the test frames",
-        trade.unit,
-        trade.group,
-        trade.group
-    ));
-    if let Some(limit) = &trade.limit {
-        page.line(limit.note());
-    }
-    page.line(if all {
-        "f32 is not listed where its distances may not be expanded (docs/formats.md): see f32-direct there".into()
-    } else {
-        format!("{} more points with --all", trade.points.len() - shown.len())
-    });
-    for note in &trade.left_out {
-        page.line(format_args!("left out: {note}"));
-    }
-    if let Some(chosen) = trade.chosen {
-        let point = &trade.points[chosen];
-        page.line(format_args!(
-            "chosen: {}: {:.4} {} at {} cycles -> {}",
-            point.name(),
-            point.rmse(&trade.group),
-            trade.unit,
-            point.frame.cycles,
-            folder.join("chosen.bin").display()
-        ));
-        let oversampling = (point.samples_averaged > 1).then(|| {
-            format!(" --oversampling {}, which makes a scan longer", point.samples_averaged)
-        });
-        let tolerance = trade
-            .rest_tolerance(chosen)
-            .map(|tolerance| format!(" --rest-tolerance {tolerance}, once it has a baseline"));
-        let options: Vec<String> = oversampling.into_iter().chain(tolerance).collect();
-        if !options.is_empty() {
-            page.line(format_args!("on a device, `host-sim link`:{}", options.join(";")));
-        }
-    }
-    page.line(format_args!("all points, and the curve: {}", folder.join("trade.html").display()));
-    page
-}
-
-/// Indices of the points to print: all as they were measured, or the front from cheap to dear for each
-/// number of samples.
-fn shown(trade: &Trade, all: bool) -> Vec<usize> {
-    let numbers = 0..trade.points.len();
-    if all {
-        return numbers.collect();
-    }
-    let mut shown: Vec<usize> =
-        numbers.filter(|i| trade.points[*i].on_front || trade.chosen == Some(*i)).collect();
-    shown.sort_by_key(|i| (trade.points[*i].samples_averaged, trade.points[*i].frame.cycles));
-    shown
-}
-
-fn line_of(point: &Point, group: &str, chosen: bool) -> String {
-    let errors = point.errors.iter().zip(&point.ratio_to_best);
-    let errors: Vec<String> = errors
-        .map(|(e, ratio)| format!("{:>9.4} {:<6}", e.rmse, format!("({ratio:.2})")))
-        .collect();
-    let errors = errors.concat();
-    let ratio = point.ratio_to_limit(group).map_or("-".into(), |ratio| format!("{ratio:.2}"));
-    format!(
-        "{} {:<26} {:>4} {:>4} {:>5} {:>4} {:>4}{errors} {ratio:>7} {:>12} {:>9} {:>10} {:>8.1} {:>8} {:>6}{}",
-        if point.on_front { "*" } else { " " },
-        point.way(),
-        point.centres,
-        point.output_rank.map_or("-".into(), |rank| rank.to_string()),
-        if point.affine_tail { "yes" } else { "no" },
-        point.samples_averaged,
-        point.gate_k.map_or("-".into(), |k| k.to_string()),
-        point.frame.instructions,
-        point.frame.cycles,
-        point.frame.flash_cycles,
-        point.frame_us,
-        point.flash_bytes,
-        point.ram_bytes,
-        if chosen { "  <- chosen" } else { "" }
-    )
 }

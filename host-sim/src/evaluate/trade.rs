@@ -1,35 +1,44 @@
-//! Trade between speed and accuracy: every setting of a scene's decoder, its errors and its cost.
+//! Trade between speed and accuracy: every setting of a subject's decoder, its errors and its cost.
 //!
 //! Errors are measured on test frames through the blob that a device would get. Instructions and cycles are predicted by
-//! the price list of the firmware's own code ([`Prices`]).
+//! the price list of the firmware's own code ([`Prices`]), the time of a scan by the firmware's own plan ([`Device`]).
 
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use model_core::rbf::Format;
 use serde::Serialize;
-use taxel_data::BadValue;
 use taxel_data::progress::Progress;
-use taxel_data::random::Stream;
-use taxel_learn::cost::{Cost, Prices, kernel_name};
-use taxel_learn::decoders::{BASELINES, Baseline};
-use taxel_learn::{Exponential, Options};
-use taxel_simulate::Synthesis;
+use taxel_data::{BadValue, columns};
+use taxel_learn::cost::Prices;
+use taxel_learn::decoders::BASELINES;
+use taxel_learn::{ModelBlob, Options};
 use taxel_simulate::outputs::Outputs;
 
 use super::gate;
 use crate::error::{Error, NoPoint, Result};
-use crate::experiment::{Experiment, MoreFrames};
 use crate::metrics::{self, DecoderErrors, Errors, LimitSummary};
-pub use crate::verdict::SLOT_BYTES;
+use crate::subject::Subject;
+use crate::verdict::Verdict;
 
+mod progress;
+mod device;
 mod choice;
+mod point;
 mod gating;
+mod frames;
+mod predict;
 mod judge;
 
 pub use choice::Bounds;
-use gating::Gates;
-use judge::{Judge, Knobs, Sets};
+use choice::Offer;
+pub use device::{BOARD_CLOCK_MHZ, Device, Memory, Times, Wires};
+use frames::Frames;
+use judge::Judge;
+pub use point::{Arithmetic, Point};
+
+pub use crate::verdict::SLOT_BYTES;
+
+/// Standard errors by which an error must lie below the limit to be called impossible.
+const CERTAIN: f64 = 3.0;
 
 /// Settings that a trade varies.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,133 +53,29 @@ pub struct Plan {
     /// Tolerances of gates, in standard deviations of the averaged readings' noise. There are always
     /// points without a gate as well.
     pub gate_k: Vec<f64>,
-    /// Clock of the device, for times.
-    pub clock_mhz: f64,
+    /// Device whose times are given.
+    pub device: Device,
 }
 
-/// Number format and exponential with which networks are decoded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Arithmetic {
-    /// Number format.
-    pub format: Format,
-    /// Exponential.
-    pub exponential: Exponential,
-}
-
-impl Arithmetic {
-    /// Every arithmetic of the points, the cheapest format first.
-    ///
-    /// Direct distances are decoded with every exponential, the other formats with their own.
-    pub fn all() -> impl Iterator<Item = Self> {
-        Format::ALL.into_iter().rev().flat_map(|format| {
-            let all: &[Exponential] = match format {
-                Format::F32Direct => &Exponential::ALL,
-                _ => &[Exponential::Polynomial],
-            };
-            all.iter().map(move |&exponential| Self { format, exponential })
-        })
-    }
-
-    /// Name of the arithmetic, as `cargo xtask cycles` spells it.
-    #[must_use]
-    pub fn name(self) -> String {
-        kernel_name(self.format, self.exponential)
-    }
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
-fn by_name<S: serde::Serializer>(
-    arithmetic: &Arithmetic,
-    serializer: S,
-) -> std::result::Result<S::Ok, S::Error> {
-    serializer.serialize_str(&arithmetic.name())
-}
-
-/// Way to decode, with its cost and its errors.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Point {
-    /// Format and exponential.
-    #[serde(rename = "kernel", serialize_with = "by_name")]
-    pub arithmetic: Arithmetic,
-    /// Whether one network decodes all rows, behind a projection, instead of one a row.
-    pub whole_array: bool,
-    /// Number of centres K of each network.
-    pub centres: usize,
-    /// Number of components that the network computes, which are expanded to all outputs; `None` if it computes these.
-    pub output_rank: Option<usize>,
-    /// Width σ on scaled inputs.
-    pub spread: f64,
-    /// Whether the networks have an affine tail.
-    pub affine_tail: bool,
-    /// Number of samples averaged for each reading.
-    pub samples_averaged: usize,
-    /// Tolerance of the gate, in standard deviations of the averaged readings' noise; `None` without a gate.
-    pub gate_k: Option<f64>,
-    /// Errors on the test frames, by group.
-    pub errors: Vec<Errors>,
-    /// Ratio of the RMSE to the smallest of all points, by group.
-    pub ratio_to_best: Vec<f64>,
-    /// Cost of one frame on a Cortex-M4F; behind a gate, the mean over the test frames.
-    #[serde(flatten)]
-    pub frame: Cost,
-    /// Time of one frame in µs, at the plan's clock.
-    pub frame_us: f64,
-    /// Size of the blob.
-    pub flash_bytes: usize,
-    /// Size of decoder, frame, estimate and working memory; for a gate also the baseline and its
-    /// estimate.
-    pub ram_bytes: usize,
-    /// Whether the point is on the Pareto front: no other point is at least as good in cycles, samples
-    /// and the RMSE of the chosen group, and better in one.
-    pub on_front: bool,
-}
-
-impl Point {
-    /// RMSE of a group, in its unit.
-    #[must_use]
-    pub fn rmse(&self, group: &str) -> f64 {
-        self.errors.iter().find(|e| e.group == group).map_or(f64::NAN, |e| e.rmse)
-    }
-
-    /// Ratio of the RMSE of a group to the limit, where that is known.
-    #[must_use]
-    pub fn ratio_to_limit(&self, group: &str) -> Option<f64> {
-        self.errors.iter().find(|e| e.group == group)?.ratio_to_limit
-    }
-
-    /// Arithmetic of the point, and whether it decodes the whole array at once.
-    #[must_use]
-    pub fn way(&self) -> String {
-        format!("{}{}", self.arithmetic.name(), if self.whole_array { " array" } else { "" })
-    }
-
-    /// Settings of the point in a few words.
-    #[must_use]
-    pub fn name(&self) -> String {
-        let tail = if self.affine_tail { " + tail" } else { "" };
-        let average = match self.samples_averaged {
-            1 => String::new(),
-            samples => format!(", {samples} samples"),
-        };
-        let gate = self.gate_k.map_or(String::new(), |k| format!(", gate k = {k}"));
-        let rank = self.output_rank.map_or(String::new(), |rank| format!(", rank {rank}"));
-        format!("{}, K = {}{rank}{tail}{average}{gate}", self.way(), self.centres)
-    }
-}
-
-/// Trade of a scene: every point, and the one chosen.
+/// Trade of a subject: every point, and the one chosen.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Trade {
-    /// Name of the scene.
+    /// Name of the scene, or of the data.
     pub scene: String,
-    /// Noise level of one sample, as a fraction.
+    /// Noise level of one sample, as a fraction; 0 for measured data, which has its own.
     pub noise_level: f64,
+    /// Number of frames to train on.
+    pub training_frames: usize,
     /// Number of test frames.
     pub test_frames: usize,
+    /// How test frames were chosen among measured ones, in words.
+    pub test_choice: Option<String>,
     /// Compiler of the code whose costs are given.
     pub compiler: String,
-    /// Clock for times.
-    pub clock_mhz: f64,
+    /// Device whose times are given.
+    pub device: Device,
+    /// Wires that a scan reads; `None` if the readings are not those of wires.
+    pub wires: Option<Wires>,
     /// Group of outputs by which front and choice are determined.
     pub group: String,
     /// Unit of that group.
@@ -184,6 +89,8 @@ pub struct Trade {
     pub points: Vec<Point>,
     /// Formats that cannot hold a network of some settings, and why.
     pub left_out: Vec<String>,
+    /// Bounds that [`Trade::choose`] was given.
+    pub bounds: Bounds,
     /// Index of the point that [`Trade::choose`] picked.
     pub chosen: Option<usize>,
     /// Index of every point's blob: points that differ only in the exponential share one.
@@ -199,8 +106,58 @@ impl Trade {
     /// # Errors
     /// [`NoPoint`] if no point is within them.
     pub fn choose(&mut self, bounds: &Bounds) -> std::result::Result<(), NoPoint> {
-        self.chosen = bounds.choose(&self.points, &self.group, &self.unit)?;
+        let offers: Vec<Offer> = self.points.iter().map(|p| p.offer(&self.group)).collect();
+        self.bounds = *bounds;
+        self.chosen = bounds.choose(&offers, &named(&self.unit, &self.group))?;
         Ok(())
+    }
+
+    /// Points of the front from fast to slow.
+    #[must_use]
+    pub fn front(&self) -> Vec<usize> {
+        let mut front: Vec<usize> =
+            (0..self.points.len()).filter(|i| self.points[*i].on_front).collect();
+        let key = |i: usize| (self.points[i].times.frame_ms, self.points[i].rmse(&self.group));
+        front.sort_by(|a, b| {
+            let ((time_a, error_a), (time_b, error_b)) = (key(*a), key(*b));
+            time_a.total_cmp(&time_b).then(error_b.total_cmp(&error_a))
+        });
+        front
+    }
+
+    /// Verdict on a point by the errors of the chosen group, with what its blob gives reason to beware of.
+    ///
+    /// # Panics
+    /// If there is no such point.
+    #[must_use]
+    pub fn verdict(&self, point: usize) -> Verdict {
+        let of_group = |errors: &[Errors]| -> Vec<Errors> {
+            errors.iter().filter(|errors| errors.group == self.group).cloned().collect()
+        };
+        let Point { errors, samples_averaged, .. } = &self.points[point];
+        let network = DecoderErrors { decoder: "network".into(), errors: of_group(errors) };
+        let baselines = self.baselines.iter().map(|baseline| DecoderErrors {
+            decoder: baseline.decoder.clone(),
+            errors: of_group(&baseline.errors),
+        });
+        let decoders: Vec<DecoderErrors> = std::iter::once(network).chain(baselines).collect();
+        // The limit is that of the first number of samples.
+        let first = self.points.first().map(|point| point.samples_averaged);
+        let limit = self.limit.as_ref().filter(|_| first == Some(*samples_averaged));
+        let groups = limit.map_or(vec![], |limit| limit.groups.clone());
+        let groups = groups.into_iter().filter(|limit| limit.group == self.group).collect();
+        let limit = LimitSummary { frames: 0, groups, refused: None };
+        let verdict = Verdict::of(&decoders, &limit);
+        match ModelBlob::of_bytes(self.blob(point)) {
+            Ok(blob) => verdict.of_blob(&blob, self.training_frames),
+            Err(_) => verdict,
+        }
+    }
+
+    /// Limit of the chosen group with the first number of samples a reading.
+    #[must_use]
+    pub fn limit_rmse(&self) -> Option<f64> {
+        least_error(self.limit.as_ref()?, &self.group).map(|[limit, _]| limit)
     }
 
     /// Groups of outputs, with their units.
@@ -223,104 +180,108 @@ impl Trade {
     }
 }
 
-/// Trains and judges every point of `plan` for the scene. The front is determined by the RMSE of
-/// `group`.
+/// Trains and judges every point of `plan` for the subject. The front is determined by the RMSE of `group` and the time of
+/// a frame.
 ///
 /// # Errors
-/// [`Error`] for a plan that cannot be carried out, or a scene that cannot be trained.
+/// [`Error`] for a plan that cannot be carried out, or a subject that cannot be trained; [`Error::NoPoint`] for `bounds`
+/// that nothing can meet, before anything is trained.
 pub fn compute(
-    experiment: &Experiment,
+    subject: &Subject,
     plan: &Plan,
     group: &str,
+    bounds: &Bounds,
     progress: &dyn Progress,
 ) -> Result<Trade> {
     let prices = Prices::accepted()?;
-    check(experiment, plan)?;
-    let (world, t) = (&experiment.world, &experiment.training);
-    // One network for each row, and one for the array of several rows; that alone where outputs belong to no row.
-    let rows = world.read_rows.len();
-    let arrays: &[bool] = match world.outputs {
-        Outputs::Contact(_) => &[true],
-        Outputs::Electrodes(_) if rows > 1 => &[false, true],
-        Outputs::Electrodes(_) => &[false],
-    };
-    let networks = arrays.iter().map(|array| if *array { 1 } else { rows }).sum::<usize>();
-    let mut judge =
-        Judge::new(experiment.options(), experiment.origin(), experiment.measure(), plan, prices);
-    let mut limit = None;
-    let mut baselines = Vec::new();
-    for &samples in &plan.samples_averaged {
-        let noise_level = world.noise.level / (samples as f64).sqrt();
-        let frames = Synthesis::of(world).noise_level(noise_level);
-        let training = experiment.dataset(&frames, Stream::Training, t.frames);
-        let test = experiment.dataset(&frames, Stream::Test, t.test_frames);
-        let (measure, summary) =
-            experiment.measure_beside_limit(noise_level, t.test_frames, progress);
-        limit.get_or_insert(summary);
-        // The gate compares readings in Ω.
-        let readings_ohm = if t.relative_inputs {
-            Cow::Owned(frames.frames(Stream::Test, t.test_frames).inputs)
-        } else {
-            Cow::Borrowed(&test.inputs)
-        };
-        if baselines.is_empty() {
-            let judged = |baseline: &Baseline| {
-                metrics::judge(baseline.fit(&training).as_ref(), &test, &measure)
-            };
-            baselines = BASELINES.iter().map(judged).collect();
+    check(subject, plan)?;
+    let wires = wires_of(subject);
+    let arrays = kinds(subject);
+    progress.stage("prepare frames", plan.samples_averaged.len());
+    let synthesised = plan.samples_averaged.iter().map(|&samples| {
+        let frames = Frames::of(subject, samples, arrays, plan);
+        progress.step();
+        frames
+    });
+    let mut frames: Vec<Frames<'_>> = synthesised.collect::<Result<_>>()?;
+    // What nothing can meet is refused at once: costs first, then errors, since the limit takes some seconds.
+    let unit = columns::unit_of(group);
+    let possible = |frames: &[Frames<'_>], least_errors: &[f64]| {
+        let mut offers = Vec::new();
+        for (frames, least_error) in frames.iter().zip(least_errors) {
+            offers.extend(predict::offers(frames, plan, wires, &prices, *least_error)?);
         }
-        judge.measure = measure;
-        progress.stage(&format!("trade, {samples} averaged"), plan.centres.len() * networks);
-        for &whole_array in arrays {
-            let gates = Gates::new(
-                &frames,
-                noise_level,
-                &readings_ohm,
-                &plan.gate_k,
-                (whole_array, t.relative_inputs),
-            );
-            let more = t.refine.then_some(MoreFrames { experiment, synthesis: frames.clone() });
-            let sets = Sets::new(
-                noise_level,
-                [&training, &test],
-                &gates,
-                (whole_array, t.features),
-                more,
-            )?;
+        Ok::<_, Error>(bounds.check_possible(&offers, &named(unit, group))?)
+    };
+    possible(&frames, &vec![0.0; frames.len()])?;
+    let limit = |frames: &mut Frames<'_>| frames.measure_beside_limit(subject, progress);
+    let limits: Vec<LimitSummary> = frames.iter_mut().map(limit).collect();
+    let least = |limit| least_error(limit, group).map_or(0.0, |[limit, se]| limit - CERTAIN * se);
+    possible(&frames, &limits.iter().map(least).collect::<Vec<_>>())?;
+
+    let mut judge = Judge::new(subject.options(), plan, wires, &prices);
+    let settings = |frames: &Frames<'_>| -> usize {
+        let of_inputs = frames.inputs.iter().flat_map(|inputs| {
+            plan.centres.iter().map(|centres| judge::steps(frames, inputs, *centres))
+        });
+        of_inputs.sum()
+    };
+    progress.stage("train and measure", frames.iter().map(settings).sum());
+    for frames in &frames {
+        for inputs in &frames.inputs {
             for &centres in &plan.centres {
-                let knobs = Knobs { whole_array, centres, samples_averaged: samples };
-                judge.centres(&sets, knobs, progress)?;
+                judge.centres((frames, inputs), centres, progress)?;
             }
         }
     }
-    let Judge { prices, mut points, left_out, blobs, distinct, .. } = judge;
+    let Judge { mut points, left_out, blobs, distinct, .. } = judge;
     if let (true, Some(cause)) = (points.is_empty(), left_out.first()) {
-        return Err(Error::Failed(format!("no way to decode the scene can be trained: {cause}")));
+        return Err(Error::Failed(format!("no way to decode can be trained: {cause}")));
     }
     compare(&mut points, group);
-    let of_group = baselines.first().and_then(|b| b.errors.iter().find(|e| e.group == group));
+    let baselines = frames.first().map_or(vec![], |frames| {
+        let fitted = BASELINES.iter().map(|baseline| baseline.fit(frames.training()));
+        fitted.map(|it| metrics::judge(it.as_ref(), &frames.test, &frames.measure)).collect()
+    });
     Ok(Trade {
-        scene: experiment.name.clone(),
-        noise_level: world.noise.level,
-        test_frames: t.test_frames,
+        scene: subject.name().into(),
+        noise_level: subject.scene().map_or(0.0, |scene| scene.world.noise.level),
+        training_frames: subject.training_frames(),
+        test_frames: subject.test_frames(),
+        test_choice: match subject {
+            Subject::Scene(_) => None,
+            Subject::Measured(data) => Some(data.test_choice.clone()),
+        },
         compiler: prices.compiler,
-        clock_mhz: plan.clock_mhz,
+        device: plan.device,
+        wires,
         group: group.into(),
-        unit: of_group.map_or(String::new(), |errors| errors.unit.clone()),
-        limit,
+        unit: unit.into(),
+        limit: limits.into_iter().next(),
         baselines,
         points,
         left_out,
+        bounds: Bounds::default(),
         chosen: None,
         blobs,
         distinct_blobs: distinct,
     })
 }
 
-fn check(experiment: &Experiment, plan: &Plan) -> std::result::Result<(), BadValue> {
-    let world = &experiment.world;
+/// Unit and group of an error, for messages.
+fn named(unit: &str, group: &str) -> String {
+    format!("{unit} ({group})").trim_start().into()
+}
+
+/// Limit of a group and its standard error, if they are known.
+fn least_error(limit: &LimitSummary, group: &str) -> Option<[f64; 2]> {
+    let limit = limit.groups.iter().find(|limit| limit.group == group)?;
+    Some([limit.limit, limit.limit_standard_error])
+}
+
+fn check(subject: &Subject, plan: &Plan) -> std::result::Result<(), BadValue> {
     for &centres in &plan.centres {
-        Options { centres, ..experiment.options() }.check(experiment.training.frames)?;
+        Options { centres, ..subject.options() }.check(subject.training_frames())?;
     }
     if let Some(samples) =
         plan.samples_averaged.iter().find(|samples| !(1..=256).contains(*samples))
@@ -330,12 +291,49 @@ fn check(experiment: &Experiment, plan: &Plan) -> std::result::Result<(), BadVal
     if plan.output_ranks.contains(&0) {
         return Err(BadValue::new("output-rank", 0, "a network computes one component at least"));
     }
+    plan.device.check()?;
+    let Subject::Scene(experiment) = subject else { return check_measured(plan) };
     if !plan.gate_k.is_empty() {
         // Averaging only lowers the noise.
-        gate::check(world, &plan.gate_k)
+        gate::check(&experiment.world, &plan.gate_k)
             .map_err(|bad| if bad.field == "k" { bad.named("gate") } else { bad })?;
     }
     Ok(())
+}
+
+/// Checks what can be varied of measured frames, which are as they are.
+fn check_measured(plan: &Plan) -> std::result::Result<(), BadValue> {
+    if let Some(samples) = plan.samples_averaged.iter().find(|samples| **samples != 1) {
+        let rule = "measured readings are averaged already: give 1, or a scene";
+        return Err(BadValue::new("average", samples, rule));
+    }
+    if let Some(k) = plan.gate_k.first() {
+        let rule = "only a scene tells the noise of readings that a gate needs: give none";
+        return Err(BadValue::new("gate", k, rule));
+    }
+    Ok(())
+}
+
+/// Networks to try: one for each row, and one for the array of several rows; that alone where outputs belong to no row.
+fn kinds(subject: &Subject) -> &'static [bool] {
+    let of_array =
+        subject.scene().is_some_and(|scene| matches!(scene.world.outputs, Outputs::Contact(_)));
+    match (of_array, subject.rows()) {
+        (true, _) => &[true],
+        (false, 1) => &[false],
+        (false, _) => &[false, true],
+    }
+}
+
+/// Wires that a scan reads: those of the scene, or those that measured columns are named after.
+fn wires_of(subject: &Subject) -> Option<Wires> {
+    match subject {
+        Subject::Scene(scene) => {
+            let (rows, columns) = (scene.world.read_rows.len(), scene.world.sensor.column_wires);
+            Some(Wires { rows, columns })
+        }
+        Subject::Measured(data) => Wires::named(&data.training.inputs.names),
+    }
 }
 
 /// Fills in the fields that compare points with each other.
@@ -345,13 +343,11 @@ fn compare(points: &mut [Point], group: &str) {
         let least = best.entry(errors.group.clone()).or_insert(f64::INFINITY);
         *least = least.min(errors.rmse);
     }
-    let rank = |point: &Point| (point.frame.cycles, point.samples_averaged, point.rmse(group));
+    let rank = |point: &Point| (point.times.frame_ms, point.rmse(group));
     let ranks: Vec<_> = points.iter().map(rank).collect();
     for (point, own) in points.iter_mut().zip(&ranks) {
         point.ratio_to_best = point.errors.iter().map(|e| e.rmse / best[&e.group]).collect();
-        let beaten = |other: &(u64, usize, f64)| {
-            other != own && other.0 <= own.0 && other.1 <= own.1 && other.2 <= own.2
-        };
+        let beaten = |other: &(f64, f64)| other != own && other.0 <= own.0 && other.1 <= own.1;
         point.on_front = !ranks.iter().any(beaten);
     }
 }

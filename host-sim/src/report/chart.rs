@@ -9,16 +9,12 @@ use super::ticks::Ticks;
 /// Mark of a series.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Mark {
-    /// Line through the points; a missing value is a gap.
-    Line,
-    /// Line with a shape at every point.
+    /// Line through the points with a shape at every one; a missing value is a gap.
     LineAnd(Shape),
     /// Dashed line.
     Dashed,
     /// Dotted line.
     Dotted,
-    /// Shape at every point.
-    Points(Shape),
     /// Bars from zero, this wide on the x axis.
     Bars(f64),
 }
@@ -208,14 +204,10 @@ fn swatch(svg: &mut Svg, series: &Series, [x, y]: [f64; 2]) {
         svg.line([x, y], [x + SWATCH_PX - 6.0, y], &format!("{} {style}", series.class));
     };
     match &series.mark {
-        Mark::Line => line(svg, "line"),
         Mark::Dashed => line(svg, "line dashed"),
         Mark::Dotted => line(svg, "line dotted"),
         Mark::LineAnd(shape) => {
             line(svg, "line");
-            svg.path(&shape.path(middle, 1.0), &format!("{} mark", series.class));
-        }
-        Mark::Points(shape) => {
             svg.path(&shape.path(middle, 1.0), &format!("{} mark", series.class));
         }
         Mark::Bars(_) => {
@@ -271,14 +263,12 @@ impl Frame<'_> {
         let class = |style: &str| format!("{} {style}", series.class);
         let present = |[_, y]: &&[f64; 2]| y.is_finite();
         match &series.mark {
-            Mark::Line => self.draw_line(svg, series, &class("line")),
             Mark::Dashed => self.draw_line(svg, series, &class("line dashed")),
             Mark::Dotted => self.draw_line(svg, series, &class("line dotted")),
             Mark::LineAnd(shape) => {
                 self.draw_line(svg, series, &class("line"));
                 self.draw_points(svg, series, *shape, &class("mark"));
             }
-            Mark::Points(shape) => self.draw_points(svg, series, *shape, &class("mark")),
             Mark::Bars(width) => {
                 for [x, y] in series.points.iter().filter(present) {
                     let px = (self.x(width / 2.0) - self.x(-width / 2.0)).min(BAR_PX);
@@ -397,13 +387,13 @@ mod tests {
     #[test]
     fn a_missing_value_is_a_gap_and_never_zero() {
         let values = [0.5, f64::NAN, 0.5, 1.0, f64::INFINITY];
-        let line = chart(Mark::Line, &values).draw([400.0, 200.0]);
+        let line = chart(Mark::Dashed, &values).draw([400.0, 200.0]);
         let path = line.split("<path d=\"").nth(1).unwrap().split('"').next().unwrap();
         assert_eq!(path.matches('M').count(), 2, "{path}");
         assert_eq!(path.matches('L').count(), 1, "{path}");
         let bars = chart(Mark::Bars(0.8), &values).draw([400.0, 200.0]);
         assert_eq!(bars.matches("<rect").count(), 3);
-        let points = chart(Mark::Points(Shape::Square), &values[..4]).draw([400.0, 200.0]);
+        let points = chart(Mark::LineAnd(Shape::Square), &values[..4]).draw([400.0, 200.0]);
         assert_eq!(points.matches("c1 mark").count(), 3);
     }
 
@@ -423,10 +413,10 @@ mod tests {
 
     #[test]
     fn labels_at_line_ends_do_not_overlap() {
-        let mut chart = chart(Mark::Line, &[]);
+        let mut chart = chart(Mark::Dashed, &[]);
         chart.end_labels = true;
         chart.series = ["a", "b", "c", "d"]
-            .map(|name| Series::new(name, "c1", Mark::Line, vec![[4.0, -1.0]]))
+            .map(|name| Series::new(name, "c1", Mark::Dashed, vec![[4.0, -1.0]]))
             .to_vec();
         let svg = chart.draw([400.0, 200.0]);
         let mut heights: Vec<f64> = svg

@@ -171,8 +171,6 @@ pub enum Shape {
     Triangle,
     /// Square on its corner.
     Diamond,
-    /// Short level bar.
-    Dash,
     /// Circle around another mark.
     Ring,
 }
@@ -202,7 +200,6 @@ impl Shape {
                 let r = px(4.6);
                 format!("{}l{r} {r}l-{r} {r}l-{r} -{r}Z", start(0.0, -4.6))
             }
-            Self::Dash => format!("{}h{}v2.4h-{}Z", start(-4.5, -1.2 / size), px(9.0), px(9.0)),
         }
     }
 }

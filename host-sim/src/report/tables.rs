@@ -22,16 +22,6 @@ pub fn rmse(errors: &[Errors], group: &str) -> f64 {
     of_group(errors, group).map_or(f64::NAN, |errors| errors.rmse)
 }
 
-/// Name of a decoder on the page.
-pub fn decoder_name(decoder: &DecoderErrors) -> &str {
-    match decoder.decoder.as_str() {
-        NETWORK => "Network",
-        linear::NAME => "Best linear decoder",
-        mean::NAME => "Always the mean",
-        other => other,
-    }
-}
-
 /// Short name of a decoder, for the head of a column.
 fn short_name(decoder: &DecoderErrors) -> &str {
     match decoder.decoder.as_str() {

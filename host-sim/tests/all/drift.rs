@@ -4,7 +4,7 @@ use crate::common::{Folder, small_scene, unrefined};
 use host_sim::evaluate::drift::{self, Line};
 use host_sim::evaluate::gate::{self, GateResult, Settings};
 use host_sim::evaluate::readout::{self, Stage};
-use host_sim::evaluate::trade::{self, Plan};
+use host_sim::evaluate::trade::{self, Bounds, Device, Plan};
 use host_sim::experiment::Experiment;
 use host_sim::metrics::Errors;
 use host_sim::subject::Subject;
@@ -93,9 +93,12 @@ fn a_gate_and_a_trade_see_readings_and_baselines_of_the_same_session() {
         output_ranks: vec![],
         samples_averaged: vec![1],
         gate_k: vec![3.5],
-        clock_mhz: 168.0,
+        device: Device::default(),
     };
-    let trade = |scene: &Experiment| trade::compute(scene, &plan, "dz_mm", &Silent).unwrap();
+    let trade = |scene: &Experiment| {
+        let subject = Subject::Scene(Box::new(scene.clone()));
+        trade::compute(&subject, &plan, "dz_mm", &Bounds::default(), &Silent).unwrap()
+    };
     let still = trade(&scene);
     scene.world.drift = Some(Drift { gain: 0.02 });
     let drifting = trade(&scene);

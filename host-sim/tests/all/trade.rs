@@ -1,10 +1,11 @@
 //! The trade between speed and accuracy, on a small plan.
 
-use crate::common::{Folder, unrefined};
+use crate::common::{Folder, small_scene, unrefined};
 use host_sim::Result;
 use host_sim::evaluate::gate::{self, Settings};
-use host_sim::evaluate::trade::{self, Bounds, Plan, Trade};
+use host_sim::evaluate::trade::{self, Bounds, Device, Memory, Plan, Trade};
 use host_sim::experiment::Experiment;
+use host_sim::subject::Subject;
 use taxel_data::progress::Silent;
 use taxel_data::random::Stream;
 use taxel_learn::cost::{Design, Prices};
@@ -23,7 +24,7 @@ fn plan() -> Plan {
         output_ranks: vec![24],
         samples_averaged: vec![1, 16],
         gate_k: vec![3.5],
-        clock_mhz: 100.0,
+        device: Device { clock_mhz: 100.0, memory: Memory::Ram, ..Device::default() },
     }
 }
 
@@ -33,7 +34,8 @@ fn compute(scene: &Experiment, bounds: Bounds) -> Result<Trade> {
 
 fn compute_plan(scene: &Experiment, plan: &Plan, bounds: Bounds) -> Result<Trade> {
     bounds.check()?;
-    let mut trade = trade::compute(scene, plan, "dz_mm", &Silent)?;
+    let subject = Subject::Scene(Box::new(scene.clone()));
+    let mut trade = trade::compute(&subject, plan, "dz_mm", &bounds, &Silent)?;
     trade.choose(&bounds)?;
     Ok(trade)
 }
@@ -54,15 +56,20 @@ fn every_knob_has_its_points_and_the_front_is_the_pareto_front() {
     // Expanded distances appear only where their rounding is proved harmless.
     assert!((1..40).contains(&count("f32")), "{}", count("f32"));
 
-    let rank = |p: &trade::Point| (p.frame.cycles, p.samples_averaged, p.rmse("dz_mm"));
+    let rank = |p: &trade::Point| (p.times.frame_ms, p.rmse("dz_mm"));
     for point in &trade.points {
         let own = rank(point);
-        let beaten =
-            trade.points.iter().map(rank).any(|other| {
-                other != own && other.0 <= own.0 && other.1 <= own.1 && other.2 <= own.2
-            });
+        let beaten = trade
+            .points
+            .iter()
+            .map(rank)
+            .any(|other| other != own && other.0 <= own.0 && other.1 <= own.1);
         assert_eq!(point.on_front, !beaten, "{}", point.name());
-        assert_eq!(point.frame_us, point.frame.cycles as f64 / 100.0);
+        // The board's scan of 9 × 18 samples, and zero wait at 100 MHz.
+        let scan_ms = if point.samples_averaged == 1 { 6.43 } else { 89.376 };
+        assert_eq!(point.times.scan_ms, Some(scan_ms));
+        assert_eq!(point.times.decode_ms, point.frame.cycles as f64 / 100_000.0);
+        assert_eq!(point.times.frame_ms, scan_ms + point.times.decode_ms);
         assert!(point.ratio_to_best.iter().all(|ratio| *ratio >= 1.0));
     }
     for group in 0..3 {
@@ -132,7 +139,7 @@ fn behind_a_gate_points_have_the_errors_of_the_gates_rows_and_cost_their_share()
         output_ranks: vec![],
         samples_averaged: vec![4],
         gate_k: vec![3.5],
-        clock_mhz: 1.0,
+        device: Device::default(),
     };
     let bounds = Bounds { cycles: Some(10_000), ..Bounds::default() };
     let trade = compute_plan(&scene, &plan, bounds).unwrap();
@@ -184,22 +191,23 @@ fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
         .replace("test_frames = 8000", "test_frames = 100");
     folder.write("few.toml", scene);
     let few = ["trade", "few.toml", "--no-refine", "--centres", "16", "--average", "1"];
-    let cycles_of = |page: &str| -> Vec<u64> {
-        let points = page.lines().filter(|line| line.contains(" (1."));
-        let cycles = points.map(|line| line.split_whitespace().rev().nth(4).unwrap());
-        cycles.map(|cycles| cycles.parse().unwrap()).collect()
+    let times_of = |page: &str| -> Vec<f64> {
+        let points =
+            page.lines().filter(|line| line.contains(" fixed16 ") || line.contains(" f32"));
+        let points = points.filter(|line| line.starts_with(['*', ' ']));
+        let times = points.map(|line| line.split_whitespace().rev().nth(5).unwrap());
+        times.map(|ms| ms.parse().unwrap()).collect()
     };
     let front = folder.succeed(&few);
     let all = folder.succeed(&[&few[..], &["--all"]].concat());
-    let (shown, every) = (cycles_of(&front), cycles_of(&all));
+    let (shown, every) = (times_of(&front), times_of(&all));
     assert!(shown.len() > 1 && shown.is_sorted(), "{front}");
     assert!(front.contains(&format!("\n{} more points with --all", every.len() - shown.len())));
+    assert!(front.lines().chain(all.lines()).all(|line| line.chars().count() <= 120), "{all}");
+    let words = front.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(words.contains("The most accurate: ") && words.contains("always predicting the mean"));
+    assert!(front.ends_with("\nopen out/few/trade.html\n"), "{front}");
     assert!(!all.contains("--all"), "{all}");
-    let averages =
-        ["trade", "few.toml", "--no-refine", "--centres=16", "--average=1,4,16", "--gate=none"];
-    folder.succeed(&averages);
-    let svg = std::fs::read_to_string(folder.path("out/few/trade.svg")).unwrap();
-    assert!(svg.contains("front line dashed") && svg.contains("front line dotted"));
     let page = folder.succeed(&[&few[..], &["--gate", "3,4", "--max-cycles", "10000"]].concat());
     assert!(page.contains(" avg gate "), "{page}");
     assert!(page.contains("--rest-tolerance 0.015") || page.contains("--rest-tolerance 0.02"));
@@ -220,15 +228,26 @@ fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
     assert_eq!(json["points"][0]["gate_k"], serde_json::Value::Null);
     assert_eq!(json["points"][1]["gate_k"], 3.0);
     assert!(read("out/few/trade.svg").contains("c1 hollow mark"));
-    assert!(read("out/few/trade.html").contains("gate k</th>"));
+    let html = read("out/few/trade.html");
+    assert!(html.contains("gate k</th>") && !html.contains("<script"));
+    // Each point of the front tells its settings, in the wide picture and in the narrow one.
+    let front = json["points"].as_array().unwrap().iter().filter(|p| p["on_front"] == true).count();
+    assert_eq!(
+        html.matches("<title>fixed16").count() + html.matches("<title>f32").count(),
+        2 * front
+    );
+    assert!(html.matches("<tr class=\"chosen-row\">").count() == 1 && html.contains(">chosen: K"));
+    assert!(html.contains("host-sim trade few.toml --no-refine --centres 16"), "the command");
+    assert!(html.contains("at most 10\u{202f}000 cycles at zero wait"), "the bound");
 
     assert!(folder.path("out/few/chosen.bin").exists());
     // Measurements are kept where no point is chosen, and another run's choice is not left beside them.
-    let output = folder.run(&[&few[..], &["--gate", "none", "--max-cycles", "100"]].concat());
+    let output = folder.run(&[&few[..], &["--gate", "none", "--max-error", "0.032"]].concat());
     let stderr = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.code() == Some(2) && stderr.contains("--max-cycles 100"), "{stderr}");
+    assert!(output.status.code() == Some(2) && stderr.contains("--max-error 0.032"), "{stderr}");
+    assert!(stderr.contains("train and measure …\n"), "a log shows what runs: {stderr}");
     let page = String::from_utf8(output.stdout).unwrap();
-    assert!(page.contains("\n* fixed16 ") && !page.contains("chosen:"), "{page}");
+    assert!(page.contains("\n* fixed16 ") && !page.contains("Chosen:"), "{page}");
     assert!(!read("out/few/trade.svg").contains("c1 hollow mark"), "{page}");
     assert!(!folder.path("out/few/chosen.bin").exists());
     // Without noise there is no gate, and the note gives the reason.
@@ -248,25 +267,28 @@ fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
 #[test]
 fn bounds_that_no_point_meets_and_plans_that_make_no_gate_are_refused() {
     let scene = press();
-    let bounds = Bounds { error: Some(1e-6), cycles: Some(20_000), flash_bytes: None };
-    let message = compute(&scene, bounds).unwrap_err().to_string();
     let all = compute(&scene, Bounds::default()).unwrap();
+    let chosen = |bounds: &Bounds| {
+        let mut trade = all.clone();
+        trade.choose(bounds).map(|()| trade.chosen.unwrap()).map_err(|cause| cause.to_string())
+    };
     let least_error = |within: &dyn Fn(&trade::Point) -> bool| {
         let within = all.points.iter().filter(|point| within(point));
         let least = within.map(|point| point.rmse("dz_mm")).fold(f64::MAX, f64::min);
         (least * 1e4).ceil() / 1e4
     };
     let error = least_error(&|_| true);
+    let bounds = Bounds { error: Some(0.01), cycles: Some(20_000), ..Bounds::default() };
     let told = format!(
-        "no point is within max-error 0.000001 (the smallest error is {error:.4} mm (dz_mm)): raise the bound"
+        "no point is within max-error 0.01 (the smallest error is {error:.4} mm (dz_mm)): raise the bound"
     );
-    assert_eq!(message, told);
+    assert_eq!(chosen(&bounds).unwrap_err(), told);
     // The error in the message can be asked for.
-    compute(&scene, Bounds { error: Some(error), ..Bounds::default() }).unwrap();
+    chosen(&Bounds { error: Some(error), ..Bounds::default() }).unwrap();
     // Each bound can be met, but not both.
     let cycles = all.points.iter().map(|point| point.frame.cycles).min().unwrap();
-    let bounds = Bounds { error: Some(error), cycles: Some(cycles), flash_bytes: None };
-    let message = compute(&scene, bounds).unwrap_err().to_string();
+    let bounds = Bounds { error: Some(error), cycles: Some(cycles), ..Bounds::default() };
+    let message = chosen(&bounds).unwrap_err();
     let near = least_error(&|point| point.frame.cycles <= cycles);
     for told in [
         format!("max-error {error}, max-cycles {cycles}, a slot's 131056 bytes at once"),
@@ -275,6 +297,29 @@ fn bounds_that_no_point_meets_and_plans_that_make_no_gate_are_refused() {
     ] {
         assert!(message.contains(&told), "{message}");
     }
+    // Sixteen samples a reading have less error, but a scan of them takes 89 ms.
+    let rate = Bounds { frame_rate_hz: Some(100.0), ..Bounds::default() };
+    let best = |bounds: &Bounds| all.points[chosen(bounds).unwrap()].samples_averaged;
+    assert_eq!(
+        (best(&Bounds { flash_bytes: Some(131_056), ..Bounds::default() }), best(&rate)),
+        (16, 1)
+    );
+    let slowest = all.points.iter().map(|p| p.times.frames_per_second).fold(f64::MAX, f64::min);
+    assert!(slowest < 12.0);
+
+    // What nothing can meet is known before anything is trained: costs, and errors below the limit.
+    let refused = |bounds: Bounds| {
+        let message = compute(&scene, bounds).unwrap_err().to_string();
+        assert!(message.ends_with("; nothing was trained"), "{message}");
+        message
+    };
+    let rate = refused(Bounds { frame_rate_hz: Some(1000.0), ..Bounds::default() });
+    let most = all.points.iter().map(|p| p.times.frames_per_second).fold(0.0, f64::max);
+    assert!(rate.contains(&format!("is {:.1} frames", (most * 10.0).floor() / 10.0)), "{rate}");
+    let fewest = refused(Bounds { cycles: Some(100), ..Bounds::default() });
+    assert!(fewest.contains(&format!("the fewest cycles are {cycles}")), "{fewest}");
+    let error = refused(Bounds { error: Some(1e-6), ..Bounds::default() });
+    assert!(error.contains("the smallest error is at least 0.0"), "{error}");
     for error in [0.0, -1.0, f64::NAN] {
         let bounds = Bounds { error: Some(error), ..Bounds::default() };
         let message = compute(&scene, bounds).unwrap_err().to_string();
@@ -285,7 +330,8 @@ fn bounds_that_no_point_meets_and_plans_that_make_no_gate_are_refused() {
         compute_plan(scene, plan, Bounds::default()).unwrap_err().to_string()
     };
     let (centres, samples_averaged, gate_k) = (vec![16], vec![1], vec![3.5, 200.0]);
-    let plan = Plan { centres, output_ranks: vec![], samples_averaged, gate_k, clock_mhz: 1.0 };
+    let plan =
+        Plan { centres, output_ranks: vec![], samples_averaged, gate_k, device: Device::default() };
     let message = refusal(&scene, &plan);
     assert!(message.contains("gate = 200") && message.contains("below 1"), "{message}");
     let mut silent = scene.clone();
@@ -302,7 +348,7 @@ fn scenes_of_any_shape_are_traded_and_what_a_format_cannot_hold_is_named() {
         output_ranks: vec![4],
         samples_averaged: vec![1],
         gate_k: vec![],
-        clock_mhz: 1.0,
+        device: Device::default(),
     };
     let one_row = compute_plan(&scene, &plan, Bounds::default()).unwrap();
     assert!(one_row.points.len() >= 8 && one_row.left_out.is_empty());
@@ -320,4 +366,70 @@ fn scenes_of_any_shape_are_traded_and_what_a_format_cannot_hold_is_named() {
     assert!(!narrow.left_out.is_empty() && of_array(&narrow, "fixed16") == 0);
     // With a tail and without, of full rank and of rank 4.
     assert!(of_array(&narrow, "f32-direct") == 4);
+}
+
+#[test]
+fn a_pad_for_pressure_alone_and_a_contact_are_traded() {
+    let plan = Plan {
+        centres: vec![16],
+        output_ranks: vec![],
+        samples_averaged: vec![1],
+        gate_k: vec![3.5],
+        device: Device::default(),
+    };
+    let small = |scene: &str| -> Experiment {
+        let mut scene = Experiment::parse("small", scene).unwrap();
+        scene.training.refine = false;
+        (scene.training.frames, scene.training.test_frames) = (400, 100);
+        scene
+    };
+    let pad = include_str!("../../../scenes/press.toml")
+        .replace("row_wires = 8", "row_wires = 4")
+        .replace("electrodes_per_row_wire = 6", "electrodes_per_row_wire = 4")
+        .replace("column_wires = 18", "column_wires = 4")
+        .replace("axes = [\"x\", \"y\", \"z\"]", "axes = [\"z\"]");
+    let pad = compute_plan(&small(&pad), &plan, Bounds::default()).unwrap();
+    // 5 × 4 samples of 34.1 µs and 5 waits of 100 µs.
+    assert!(pad.points.iter().all(|point| point.times.scan_ms == Some(1.183)));
+    assert!(pad.points.iter().any(|point| point.whole_array && point.gate_k.is_some()));
+
+    let contact = Subject::Scene(Box::new(small(include_str!("../../../scenes/contact.toml"))));
+    let bounds = Bounds { frame_rate_hz: Some(100.0), ..Bounds::default() };
+    let mut contact =
+        trade::compute(&contact, &plan, "contact_depth_mm", &bounds, &Silent).unwrap();
+    contact.choose(&bounds).unwrap();
+    assert!(contact.points.iter().all(|point| point.whole_array));
+    assert!(contact.points[contact.chosen.unwrap()].times.frames_per_second > 140.0);
+}
+
+#[test]
+fn measurements_are_traded_as_they_are() {
+    let folder = Folder::new("trade-measured");
+    folder.write("small.toml", small_scene());
+    folder.succeed(&["synth", "small.toml", "-n", "400", "-o", "data.csv"]);
+    let few = ["--no-refine", "--centres", "16"];
+    // Readings that are named after wires: three rows, one of them idle.
+    let page = folder.succeed(&[&["trade", "data.csv", "--max-flash", "40000"], &few[..]].concat());
+    assert!(page.contains("80 measured test frames (the last fifth)"), "{page}");
+    assert!(page.contains("2.144 ms to scan") && page.contains("2 × 18 wires"), "{page}");
+    assert!(folder.path("out/data/chosen.bin").exists());
+
+    let csv = std::fs::read_to_string(folder.path("data.csv")).unwrap();
+    folder.write("other.csv", csv.replace("r4c", "a").replace("r5c", "b"));
+    let columns = ["--inputs", "a*_ohm,b*_ohm", "--outputs", "r4e*_dz_mm"];
+    let other = [&["trade", "other.csv"], &few[..], &columns].concat();
+    let page = folder.succeed(&other);
+    assert!(
+        page.contains("the scan's is unknown (--scan-ms)") && page.contains("besides its scan")
+    );
+    let page = folder.succeed(&[&other[..], &["--scan-ms", "2", "--frame-rate", "400"]].concat());
+    assert!(page.contains("(2.000 ms to scan"), "{page}");
+    for (option, value) in
+        [("--average", "4"), ("--gate", "3"), ("--scan-ms", "0"), ("--frame-rate", "0")]
+    {
+        let output = folder.run(&[&other[..], &[option, value]].concat());
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{stderr}");
+        assert!(stderr.contains(&format!("{option} {value}: ")), "{stderr}");
+    }
 }

@@ -245,7 +245,7 @@ pub const MUTANTS: &[Mutant] = &[
     mutant(
         "converter-speed",
         BOARD,
-        Instead("SPI_HZ: u32 = 703_125", "SPI_HZ: u32 = 1_406_250"),
+        Instead("SPI_HZ: u32 = firmware::timing::NUCLEO_SPI_HZ", "SPI_HZ: u32 = 1_406_250"),
         ["restart", "BREACH converter-speed"],
     ),
     mutant(

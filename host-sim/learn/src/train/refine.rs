@@ -145,7 +145,7 @@ pub fn refine(
             }
         }
         Examples::Folds(fold_of) => {
-            progress.stage("refine", folds::PASSES * settings.steps * descents.len());
+            progress.stage("refine", fold_steps(settings.steps, descents.len()));
             let parts = parts(dataset, fold_of);
             let networks = descents.par_iter_mut().enumerate();
             networks.try_for_each(|(network, descent)| {
@@ -175,6 +175,12 @@ pub fn refine(
         }
     }
     Ok(refined)
+}
+
+/// Most steps of progress that refinement of so many `networks` takes on folds. Descents that end sooner take fewer.
+#[must_use]
+pub fn fold_steps(steps: usize, networks: usize) -> usize {
+    folds::PASSES * steps * networks
 }
 
 /// Frames of each fold, the largest fold last: that one tells when to stop. Of many frames an even selection is taken.

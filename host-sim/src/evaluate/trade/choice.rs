@@ -1,19 +1,37 @@
 //! Choice of one point within the user's bounds.
 
+use serde::Serialize;
 use taxel_data::BadValue;
 
-use super::Point;
+use super::SLOT_BYTES;
+use super::device::Times;
 use crate::error::{Bounded, NoPoint, Unmet};
 
+/// Ratio of errors that test frames do not tell apart: RMSEs of thousands of frames scatter by more.
+const SAME_ERROR: f64 = 1.005;
+
 /// Bounds that a user sets for the chosen point.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Bounds {
     /// Largest RMSE of the group, in its unit; the cheapest point within it is chosen.
     pub error: Option<f64>,
-    /// Largest number of cycles of a frame.
+    /// Largest number of cycles of a frame, at zero wait.
     pub cycles: Option<u64>,
-    /// Largest size of the blob; a slot's ([`SLOT_BYTES`](super::SLOT_BYTES)) unless given.
+    /// Largest size of the blob; a slot's ([`SLOT_BYTES`]) unless given.
     pub flash_bytes: Option<usize>,
+    /// Least number of frames a second.
+    pub frame_rate_hz: Option<f64>,
+    /// Longest time of scan and decoding.
+    pub latency_ms: Option<f64>,
+}
+
+/// What a way to decode has to offer: everything that can be bounded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Offer {
+    pub rmse: f64,
+    pub cycles: u64,
+    pub flash_bytes: usize,
+    pub times: Times,
 }
 
 impl Bounds {
@@ -22,120 +40,189 @@ impl Bounds {
     /// # Errors
     /// [`BadValue`] for a bound that is not a positive number.
     pub fn check(&self) -> Result<(), BadValue> {
-        let bounds = [
-            (Bounded::Error, self.error),
-            (Bounded::Cycles, self.cycles.map(|cycles| cycles as f64)),
-            (Bounded::Flash, self.flash_bytes.map(|bytes| bytes as f64)),
-        ];
-        for (bounded, bound) in bounds {
-            if let Some(bound) = bound.filter(|bound| !(bound.is_finite() && *bound > 0.0)) {
+        for Unmet { bounded, bound, .. } in self.each() {
+            if !(bound.is_finite() && bound > 0.0) {
                 return Err(BadValue::new(bounded.name(), bound, "give a positive number"));
             }
         }
         Ok(())
     }
 
-    fn any(&self) -> bool {
-        self.error.is_some() || self.cycles.is_some() || self.flash_bytes.is_some()
+    /// Whether any bound is given.
+    #[must_use]
+    pub fn any(&self) -> bool {
+        *self != Self::default()
     }
 
-    /// Index of the best point within all bounds; `None` if no bound was given.
+    /// Index of the best offer within all bounds; `None` if no bound was given.
     ///
-    /// With a bound on the error, the best point takes the fewest cycles; otherwise it has the smallest
-    /// error. Among equals, it needs the fewest samples, then the least flash.
+    /// The best offer is the cheapest one within the bound on the error; without such a bound, the cheapest of those whose
+    /// errors are the smallest, or so near that nobody could tell ([`SAME_ERROR`]). The cheapest takes the least time for
+    /// scan and decoding; among equals, the fewest cycles, then the least flash.
     ///
     /// # Errors
-    /// [`NoPoint`] if no point is within the bounds, with the nearest that points come to them.
-    pub(super) fn choose(
-        &self,
-        points: &[Point],
-        group: &str,
-        unit: &str,
-    ) -> Result<Option<usize>, NoPoint> {
+    /// [`NoPoint`] if no offer is within the bounds, with the nearest that offers come to them.
+    pub(super) fn choose(&self, offers: &[Offer], unit: &str) -> Result<Option<usize>, NoPoint> {
         if !self.any() {
             return Ok(None);
         }
-        let key = |point: &Point| {
-            let (cycles, error) = (point.frame.cycles as f64, point.rmse(group));
-            let first = if self.error.is_some() { [cycles, error] } else { [error, cycles] };
-            let rest = [point.samples_averaged as f64, point.flash_bytes as f64];
-            [first[0], rest[0], rest[1], first[1]]
+        let bounds = self.each();
+        let within = |i: &usize| within(&bounds, &offers[*i], None);
+        let least = (0..offers.len()).filter(within).map(|i| offers[i].rmse).reduce(f64::min);
+        let most =
+            if self.error.is_some() { f64::INFINITY } else { SAME_ERROR * least.unwrap_or(0.0) };
+        let key = |i: usize| {
+            let Offer { rmse, cycles, flash_bytes, times } = offers[i];
+            [times.frame_ms, cycles as f64, flash_bytes as f64, rmse]
         };
-        let compare = |a: &[f64; 4], b: &[f64; 4]| {
-            let ordered = a.iter().zip(b).map(|(a, b)| a.total_cmp(b));
+        let compare = |a: &usize, b: &usize| {
+            let ordered = key(*a).into_iter().zip(key(*b)).map(|(a, b)| a.total_cmp(&b));
             ordered.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
         };
-        let best = (0..points.len())
-            .filter(|i| self.allow(&points[*i], group))
-            .min_by(|a, b| compare(&key(&points[*a]), &key(&points[*b])));
-        best.map(Some).ok_or_else(|| self.refusal(points, group, unit))
+        let near = |i: &usize| within(i) && offers[*i].rmse <= most;
+        let best = (0..offers.len()).filter(near).min_by(compare);
+        best.map(Some).ok_or_else(|| refusal(&bounds, offers, unit, false))
     }
 
-    fn allow(&self, point: &Point, group: &str) -> bool {
-        self.error.is_none_or(|most| point.rmse(group) <= most)
-            && self.cycles.is_none_or(|most| point.frame.cycles <= most)
-            && point.flash_bytes <= self.flash_bytes.unwrap_or(super::SLOT_BYTES)
-    }
-
-    /// Bounds that no point meets. If each can be met, the nearest that points within the others come to
-    /// it.
-    fn refusal(&self, points: &[Point], group: &str, unit: &str) -> NoPoint {
-        let unit = format!("{unit} ({group})");
-        let least = |within: Self, bound: &Bound| {
-            let within = points.iter().filter(|point| within.allow(point, group));
-            within.map(|point| (bound.of)(point, group)).reduce(f64::min)
-        };
-        let bounds = self.each();
-        let unmet: Vec<Unmet> = bounds
-            .iter()
-            .filter_map(|bound| {
-                let least = least(NONE, bound).filter(|least| *least > bound.unmet.most)?;
-                Some(Unmet { least, ..bound.unmet })
-            })
-            .collect();
-        if !unmet.is_empty() {
-            return NoPoint::Each { unmet, unit };
+    /// Checks that the bounds can be met by any of the `offers` that are known before anything is trained: the least that
+    /// each way to decode can come down to.
+    ///
+    /// # Errors
+    /// [`NoPoint`] if none is within the bounds.
+    pub(super) fn check_possible(&self, offers: &[Offer], unit: &str) -> Result<(), NoPoint> {
+        let bounds = if self.any() { self.each() } else { vec![] };
+        if offers.is_empty() || offers.iter().any(|offer| within(&bounds, offer, None)) {
+            return Ok(());
         }
-        let near = bounds.iter().map(|bound| {
-            let least = least(bound.others, bound);
-            (Unmet { least: least.unwrap_or(f64::NAN), ..bound.unmet }, least.is_some())
-        });
-        NoPoint::Together { bounds: near.collect(), unit }
+        Err(refusal(&bounds, offers, unit, true))
     }
 
-    /// Every bound that applies.
-    fn each(&self) -> Vec<Bound> {
-        let unmet = |bounded, most| Unmet { bounded, most, is_slot: false, least: f64::NAN };
-        let error = self.error.map(|most| Bound {
-            unmet: unmet(Bounded::Error, most),
-            others: Self { error: None, ..*self },
-            of: |point, group| point.rmse(group),
-        });
-        let cycles = self.cycles.map(|most| Bound {
-            unmet: unmet(Bounded::Cycles, most as f64),
-            others: Self { cycles: None, ..*self },
-            of: |point, _| point.frame.cycles as f64,
-        });
-        let most = self.flash_bytes.unwrap_or(super::SLOT_BYTES);
+    /// Every bound that applies, without the nearest value.
+    fn each(&self) -> Vec<Unmet> {
+        let unmet = |bounded, bound| Unmet { bounded, bound, is_slot: false, nearest: f64::NAN };
+        let given = [
+            (Bounded::Error, self.error),
+            (Bounded::Cycles, self.cycles.map(|cycles| cycles as f64)),
+            (Bounded::FrameRate, self.frame_rate_hz),
+            (Bounded::Latency, self.latency_ms),
+        ];
+        let given = given.into_iter().filter_map(|(of, bound)| Some(unmet(of, bound?)));
+        let most = self.flash_bytes.unwrap_or(SLOT_BYTES) as f64;
         let is_slot = self.flash_bytes.is_none();
-        let flash = Bound {
-            unmet: Unmet { is_slot, ..unmet(Bounded::Flash, most as f64) },
-            others: Self { flash_bytes: NONE.flash_bytes, ..*self },
-            of: |point, _| point.flash_bytes as f64,
-        };
-        error.into_iter().chain(cycles).chain([flash]).collect()
+        given.chain([Unmet { is_slot, ..unmet(Bounded::Flash, most) }]).collect()
     }
 }
 
-/// Bounds that every point is within.
-const NONE: Bounds = Bounds { error: None, cycles: None, flash_bytes: Some(usize::MAX) };
+impl Offer {
+    /// Quantity that can be bounded.
+    fn of(&self, bounded: Bounded) -> f64 {
+        match bounded {
+            Bounded::Error => self.rmse,
+            Bounded::Cycles => self.cycles as f64,
+            Bounded::Flash => self.flash_bytes as f64,
+            Bounded::FrameRate => self.times.frames_per_second,
+            Bounded::Latency => self.times.frame_ms,
+        }
+    }
+}
 
-/// One of several bounds.
-struct Bound {
-    /// Description of the bound, with the least value still to be filled in.
-    unmet: Unmet,
-    /// All bounds but this one.
-    others: Bounds,
-    /// Quantity of a point that is bounded.
-    of: fn(&Point, &str) -> f64,
+/// Whether an offer is within all bounds, but for one of them.
+fn within(bounds: &[Unmet], offer: &Offer, but_for: Option<Bounded>) -> bool {
+    let mut others = bounds.iter().filter(|unmet| Some(unmet.bounded) != but_for);
+    others.all(|unmet| unmet.bounded.allows(offer.of(unmet.bounded), unmet.bound))
+}
+
+/// Bounds that no offer meets. If each can be met, the nearest that offers within the others come to it.
+fn refusal(bounds: &[Unmet], offers: &[Offer], unit: &str, predicted: bool) -> NoPoint {
+    let nearest = |bounded: Bounded, offers: &mut dyn Iterator<Item = &Offer>| {
+        offers.map(|offer| offer.of(bounded)).reduce(|a, b| bounded.nearer(a, b))
+    };
+    let unmet = bounds.iter().filter_map(|bound| {
+        let nearest = nearest(bound.bounded, &mut offers.iter())?;
+        let missed = !bound.bounded.allows(nearest, bound.bound);
+        missed.then_some(Unmet { nearest, ..*bound })
+    });
+    let (unmet, unit): (Vec<Unmet>, String) = (unmet.collect(), unit.into());
+    if !unmet.is_empty() {
+        return NoPoint::Each { unmet, unit, predicted };
+    }
+    let near = bounds.iter().map(|bound| {
+        let mut others = offers.iter().filter(|o| within(bounds, o, Some(bound.bounded)));
+        let nearest = nearest(bound.bounded, &mut others);
+        (Unmet { nearest: nearest.unwrap_or(f64::NAN), ..*bound }, nearest.is_some())
+    });
+    NoPoint::Together { bounds: near.collect(), unit, predicted }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn offer(rmse: f64, scan_ms: f64, cycles: u64) -> Offer {
+        let decode_ms = cycles as f64 / 180_000.0;
+        let frame_ms = scan_ms + decode_ms;
+        let times = Times {
+            scan_ms: Some(scan_ms),
+            decode_ms,
+            frame_ms,
+            frames_per_second: 1000.0 / frame_ms,
+        };
+        Offer { rmse, cycles, flash_bytes: 1000, times }
+    }
+
+    /// One sample a reading and many centres; four samples and few centres; four samples and many centres.
+    fn offers() -> [Offer; 3] {
+        [offer(0.04, 6.0, 36_000), offer(0.04, 23.0, 18_000), offer(0.03, 23.0, 36_000)]
+    }
+
+    #[test]
+    fn the_cheapest_point_takes_the_least_time_for_scan_and_decoding() {
+        let chosen = |bounds: Bounds| bounds.choose(&offers(), "mm").unwrap();
+        assert_eq!(chosen(Bounds::default()), None);
+        // Fewer cycles do not make up for a longer scan.
+        assert_eq!(chosen(Bounds { error: Some(0.045), ..Bounds::default() }), Some(0));
+        assert_eq!(chosen(Bounds { error: Some(0.035), ..Bounds::default() }), Some(2));
+        assert_eq!(chosen(Bounds { cycles: Some(50_000), ..Bounds::default() }), Some(2));
+        assert_eq!(chosen(Bounds { cycles: Some(20_000), ..Bounds::default() }), Some(1));
+        assert_eq!(chosen(Bounds { frame_rate_hz: Some(100.0), ..Bounds::default() }), Some(0));
+        assert_eq!(chosen(Bounds { frame_rate_hz: Some(43.0), ..Bounds::default() }), Some(2));
+        assert_eq!(chosen(Bounds { latency_ms: Some(6.2), ..Bounds::default() }), Some(0));
+    }
+
+    #[test]
+    fn nobody_pays_for_an_error_that_is_smaller_by_next_to_nothing() {
+        let offers =
+            [offer(0.0404, 6.0, 9000), offer(0.0401, 6.0, 36_000), offer(0.04, 6.0, 90_000)];
+        let rate = Bounds { frame_rate_hz: Some(100.0), ..Bounds::default() };
+        assert_eq!(rate.choose(&offers, "mm").unwrap(), Some(1));
+    }
+
+    #[test]
+    fn a_refusal_names_the_nearest_value_which_can_be_asked_for() {
+        let refused = |bounds: Bounds| bounds.choose(&offers(), "mm").unwrap_err().to_string();
+        let rate = refused(Bounds { frame_rate_hz: Some(500.0), ..Bounds::default() });
+        assert!(
+            rate.contains("frame-rate 500 (the highest rate is 161.2 frames a second)"),
+            "{rate}"
+        );
+        assert!(rate.ends_with("lower the bound"), "{rate}");
+        let latency = refused(Bounds { latency_ms: Some(1.0), ..Bounds::default() });
+        assert!(latency.contains("max-latency-ms 1 (the shortest time is 6.200 ms)"), "{latency}");
+        assert!(latency.ends_with("raise the bound"), "{latency}");
+        let both = Bounds { error: Some(0.035), frame_rate_hz: Some(100.0), ..Bounds::default() };
+        let both = refused(both);
+        assert!(both.contains("at once: without max-error 0.035, the smallest error is 0.0400 mm"));
+        assert!(both.contains("without frame-rate 100, the highest rate is 43.1 frames"), "{both}");
+    }
+
+    #[test]
+    fn only_bounds_that_nothing_can_meet_are_refused_beforehand() {
+        let check = |bounds: Bounds| bounds.check_possible(&offers(), "mm");
+        assert!(check(Bounds::default()).is_ok());
+        assert!(check(Bounds { frame_rate_hz: Some(160.0), ..Bounds::default() }).is_ok());
+        let refused = check(Bounds { flash_bytes: Some(999), ..Bounds::default() }).unwrap_err();
+        let refused = refused.to_string();
+        assert!(refused.contains("the smallest blob takes at least 1000 bytes"), "{refused}");
+        assert!(refused.ends_with("raise the bound; nothing was trained"), "{refused}");
+    }
 }

@@ -1,5 +1,6 @@
 //! Points behind a gate: untouched rows are not decoded but take the outputs of the baseline.
 
+use taxel_data::dataset::Dataset;
 use taxel_data::table::Table;
 use taxel_learn::relative;
 use taxel_simulate::Synthesis;
@@ -45,6 +46,12 @@ impl Gates {
             gate.baseline
         };
         Self { rest_inputs, gates }
+    }
+
+    /// No gate, for frames with the columns of `test`.
+    pub fn none(test: &Dataset) -> Self {
+        let rest_inputs = Table { names: test.inputs.names.clone(), values: vec![] };
+        Self { rest_inputs, gates: vec![] }
     }
 
     /// Untouched rows for each k.

@@ -1,0 +1,79 @@
+//! Files that the command writes.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use host_sim::evaluate::trade::Trade;
+use host_sim::metrics::Errors;
+use host_sim::{Result, report};
+use taxel_data::output;
+
+use super::super::print;
+
+/// Names of all files that the command may write.
+pub const FILES: [&str; 5] = ["trade.csv", "trade.json", "trade.svg", "trade.html", "chosen.bin"];
+
+/// Writes all of them to `folder`; `command` is what the user typed.
+pub fn write(folder: &Path, trade: &Trade, command: &str) -> Result<()> {
+    let json = print::json_text(trade)?;
+    let csv = csv_of(trade);
+    let texts = [
+        ("trade.csv", csv),
+        ("trade.json", json),
+        ("trade.svg", report::trade_svg(trade)),
+        ("trade.html", report::trade_html(trade, command)),
+    ];
+    for (name, text) in texts {
+        output::write_bytes(&folder.join(name), text.as_bytes())?;
+    }
+    let chosen = folder.join("chosen.bin");
+    match trade.chosen {
+        Some(point) => output::write_bytes(&chosen, trade.blob(point))?,
+        // A blob from an earlier run would lie beside figures that are not its own.
+        None => output::remove(&chosen)?,
+    }
+    Ok(())
+}
+
+/// Table of all points.
+fn csv_of(trade: &Trade) -> String {
+    let rmse = trade
+        .groups()
+        .map(|(group, _)| format!("{group}_rmse,{group}_ratio_to_best,{group}_ratio_to_limit"));
+    let mut csv = format!(
+        "kernel,whole_array,centres,spread,affine_tail,samples_averaged,gate_k,output_rank,{},instructions,cycles,flash_cycles,scan_ms,decode_ms,frame_ms,frames_per_second,flash_bytes,ram_bytes,\
+         on_front,chosen\n",
+        rmse.collect::<Vec<_>>().join(",")
+    );
+    for (i, p) in trade.points.iter().enumerate() {
+        let errors = p.errors.iter().zip(&p.ratio_to_best);
+        let to_limit = |e: &Errors| e.ratio_to_limit.map_or(String::new(), |r| r.to_string());
+        let errors = errors.map(|(e, ratio)| format!("{},{ratio},{}", e.rmse, to_limit(e)));
+        let errors = errors.collect::<Vec<_>>();
+        let _ = writeln!(
+            csv,
+            "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+            p.arithmetic.name(),
+            p.whole_array,
+            p.centres,
+            p.spread,
+            p.affine_tail,
+            p.samples_averaged,
+            p.gate_k.map_or(String::new(), |k| k.to_string()),
+            p.output_rank.map_or(String::new(), |rank| rank.to_string()),
+            errors.join(","),
+            p.frame.instructions,
+            p.frame.cycles,
+            p.frame.flash_cycles,
+            p.times.scan_ms.map_or(String::new(), |ms| ms.to_string()),
+            p.times.decode_ms,
+            p.times.frame_ms,
+            p.times.frames_per_second,
+            p.flash_bytes,
+            p.ram_bytes,
+            p.on_front,
+            trade.chosen == Some(i)
+        );
+    }
+    csv
+}

@@ -1,0 +1,231 @@
+//! What the command prints: the front, and the choice in words.
+
+use std::path::Path;
+
+use host_sim::evaluate::trade::{Memory, Point, Trade};
+
+use crate::commands::print::{Page, wrapped};
+
+/// Page of the front, or of `all` points; the last lines say what was chosen and what to open.
+pub fn of(trade: &Trade, all: bool, folder: &Path) -> Page {
+    let mut page = Page::default();
+    let tested = if let Some(choice) = &trade.test_choice {
+        format!("{} measured test frames ({choice})", trade.test_frames)
+    } else {
+        let percent = (trade.noise_level * 1e6).round() / 1e4;
+        format!("noise {percent} % a sample, {} test frames", trade.test_frames)
+    };
+    page.line(format_args!(
+        "{}: {} ways to decode, {tested}; RMSE of {}{}",
+        trade.scene,
+        trade.points.len(),
+        trade.group,
+        if trade.unit.is_empty() { String::new() } else { format!(" in {}", trade.unit) }
+    ));
+    page.line(format_args!(
+        "\n  {:<26} {:>4} {:>4} {:>4} {:>3} {:>4} {:>7} {:>7} {:>7} {:>8} {:>8} {:>10} {:>7} {:>6}",
+        "format",
+        "K",
+        "rank",
+        "tail",
+        "avg",
+        "gate",
+        "RMSE",
+        "× limit",
+        "ms",
+        "frames/s",
+        "cycles",
+        "from flash",
+        "blob",
+        "RAM"
+    ));
+    let shown = shown(trade, all);
+    for i in &shown {
+        page.line(line_of(trade, *i));
+    }
+    for baseline in &trade.baselines {
+        let rmse = baseline.errors.iter().find(|errors| errors.group == trade.group);
+        let rmse = rmse.map_or(f64::NAN, |errors| errors.rmse);
+        page.line(format_args!("  {:<50} {:>7}", baseline.decoder, error(rmse)));
+    }
+    page.line(format_args!("\n{}", legend(trade, all)));
+    if let Some(limit) = &trade.limit {
+        wrapped(&mut page, &limit.note());
+    }
+    for note in &trade.left_out {
+        wrapped(&mut page, &format!("left out: {note}"));
+    }
+    if !all && trade.points.len() > shown.len() {
+        let more = trade.points.len() - shown.len();
+        page.line(format_args!("{more} more points with --all, and in trade.csv"));
+    }
+    page.line("");
+    match trade.chosen {
+        Some(chosen) => choice(&mut page, trade, chosen, folder),
+        None => no_choice(&mut page, trade),
+    }
+    page.line(format_args!("open {}", folder.join("trade.html").display()));
+    page
+}
+
+/// Explanation of the columns.
+fn legend(trade: &Trade, all: bool) -> String {
+    let scan = match (trade.device.scan_ms, trade.wires) {
+        (Some(ms), _) => {
+            format!("ms: time of a frame, scan ({ms} ms a sample, as given) and decoding")
+        }
+        (None, Some(wires)) => format!(
+            "ms: time of a frame, scan (by the board's plan for {} × {} wires) and decoding",
+            wires.rows, wires.columns
+        ),
+        (None, None) => {
+            "ms: time of decoding a frame alone; the scan's is unknown (--scan-ms)".into()
+        }
+    };
+    let memory = match trade.device.memory {
+        Memory::Flash => "from flash",
+        Memory::Ram => "at zero wait",
+    };
+    let mut lines = vec![
+        format!("{scan}, {memory} at {} MHz", trade.device.clock_mhz),
+        "cycles: of decoding on a Cortex-M4F, at zero wait and from flash (docs/cycles.md); blob, RAM: bytes".into(),
+        "× limit: RMSE relative to the least possible one with as many samples a reading; avg: samples a reading".into(),
+    ];
+    if all {
+        lines.push("*: on the Pareto front (RMSE, time of a frame); >: chosen".into());
+    } else {
+        lines.push(
+            "All are on the Pareto front (RMSE, time of a frame) but perhaps the one chosen (>)"
+                .into(),
+        );
+    }
+    let has = |of: fn(&Point) -> bool| trade.points.iter().any(of);
+    if has(|point| point.whole_array) {
+        lines.push("array: one network for all rows, behind a projection; not listed if larger than a slot".into());
+    }
+    if has(|point| point.output_rank.is_some()) {
+        lines.push(
+            "rank: components that this network computes, which are expanded to all outputs".into(),
+        );
+    }
+    if has(|point| point.gate_k.is_some()) {
+        lines.push("gate: k of a gate that skips untouched rows; its cycles are the mean over the test frames".into());
+    }
+    lines.join("\n")
+}
+
+/// Indices of the points to print: all as they were measured, or the front and the chosen one from fast to slow.
+fn shown(trade: &Trade, all: bool) -> Vec<usize> {
+    if all {
+        return (0..trade.points.len()).collect();
+    }
+    let mut shown = trade.front();
+    if let Some(chosen) = trade.chosen.filter(|chosen| !shown.contains(chosen)) {
+        let time = |i: usize| trade.points[i].times.frame_ms;
+        let place = shown.partition_point(|i| time(*i) <= time(chosen));
+        shown.insert(place, chosen);
+    }
+    shown
+}
+
+fn line_of(trade: &Trade, i: usize) -> String {
+    let point = &trade.points[i];
+    let mark = match (trade.chosen == Some(i), point.on_front) {
+        (true, _) => ">",
+        (false, true) => "*",
+        (false, false) => " ",
+    };
+    let ratio = point.ratio_to_limit(&trade.group).map_or("-".into(), |r| format!("{r:.2}"));
+    format!(
+        "{mark} {:<26} {:>4} {:>4} {:>4} {:>3} {:>4} {:>7} {ratio:>7} {:>7} {:>8} {:>8} {:>10} {:>7} {:>6}",
+        point.way(),
+        point.centres,
+        point.output_rank.map_or("-".into(), |rank| rank.to_string()),
+        if point.affine_tail { "yes" } else { "no" },
+        point.samples_averaged,
+        point.gate_k.map_or("-".into(), |k| k.to_string()),
+        error(point.rmse(&trade.group)),
+        ms(point.times.frame_ms),
+        rate(point.times.frames_per_second),
+        point.frame.cycles,
+        point.frame.flash_cycles,
+        point.flash_bytes,
+        point.ram_bytes,
+    )
+}
+
+/// The chosen point in words, and what to do with it.
+fn choice(page: &mut Page, trade: &Trade, chosen: usize, folder: &Path) {
+    let point = &trade.points[chosen];
+    let verdict = trade.verdict(chosen);
+    wrapped(page, &format!("Chosen: {}. {}", point.name(), verdict.sentence));
+    wrapped(page, &cost(point));
+    for warning in &verdict.warnings {
+        wrapped(page, &warning.to_string());
+    }
+    page.line(format_args!("the blob: {}", folder.join("chosen.bin").display()));
+    let oversampling =
+        (point.samples_averaged > 1).then(|| format!(" --oversampling {}", point.samples_averaged));
+    let tolerance = trade
+        .rest_tolerance(chosen)
+        .map(|tolerance| format!(" --rest-tolerance {tolerance}, once it has a baseline"));
+    let options: Vec<String> = oversampling.into_iter().chain(tolerance).collect();
+    if !options.is_empty() {
+        page.line(format_args!("on a device, `host-sim link`:{}", options.join(";")));
+    }
+}
+
+/// What the ends of the front are worth, where nothing is chosen.
+fn no_choice(page: &mut Page, trade: &Trade) {
+    let front = trade.front();
+    let (Some(fastest), Some(best)) = (front.first(), front.last()) else { return };
+    for (end, i) in [("The fastest", *fastest), ("The most accurate", *best)] {
+        let point = &trade.points[i];
+        let sentence = trade.verdict(i).sentence;
+        wrapped(page, &format!("{end}: {}. {sentence} {}", point.name(), cost(point)));
+    }
+    if !trade.bounds.any() {
+        page.line("To choose one, give a bound: --max-error, --frame-rate, --max-latency-ms, --max-cycles or --max-flash");
+    }
+}
+
+/// What a point costs a device.
+fn cost(point: &Point) -> String {
+    let times = &point.times;
+    let time = match times.scan_ms {
+        Some(scan_ms) => format!(
+            "A frame takes {} ms ({} ms to scan, {} ms to decode), so at most {} frames a second",
+            ms(times.frame_ms),
+            ms(scan_ms),
+            ms(times.decode_ms),
+            rate(times.frames_per_second)
+        ),
+        None => format!("Decoding a frame takes {} ms, besides its scan", ms(times.decode_ms)),
+    };
+    format!(
+        "{time}; {} cycles ({} from flash), {} bytes of flash, {} bytes of RAM.",
+        point.frame.cycles, point.frame.flash_cycles, point.flash_bytes, point.ram_bytes
+    )
+}
+
+/// Text of an RMSE.
+fn error(rmse: f64) -> String {
+    match rmse {
+        rmse if (0.001..1000.0).contains(&rmse) => format!("{rmse:.4}"),
+        rmse => format!("{rmse:.2e}"),
+    }
+}
+
+/// Text of a time in ms with three significant digits, or in µs' steps.
+fn ms(time: f64) -> String {
+    if time < 100.0 { format!("{time:.3}") } else { format!("{time:.1}") }
+}
+
+/// Text of a rate.
+fn rate(frames_per_second: f64) -> String {
+    if frames_per_second < 1000.0 {
+        format!("{frames_per_second:.1}")
+    } else {
+        format!("{frames_per_second:.0}")
+    }
+}

@@ -1,0 +1,176 @@
+//! Times of a frame on a device, which scans it and then decodes it.
+
+use std::collections::BTreeSet;
+
+use firmware::timing::ScanPlan;
+use serde::Serialize;
+use taxel_data::BadValue;
+use taxel_learn::cost::Cost;
+
+/// Clock of the NUCLEO-F446RE in MHz.
+pub const BOARD_CLOCK_MHZ: f64 = 180.0;
+
+/// Memory that a device runs its code from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Memory {
+    /// Flash with the wait states of an STM32F446 at 180 MHz ([`Cost::flash_cycles`]).
+    #[default]
+    Flash,
+    /// Memory that never waits ([`Cost::cycles`]).
+    Ram,
+}
+
+/// Device whose times are given.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Device {
+    /// Clock of the processor.
+    pub clock_mhz: f64,
+    /// Memory that its code runs from.
+    pub memory: Memory,
+    /// Time of a scan with one sample a reading, instead of the board's own readout.
+    pub scan_ms: Option<f64>,
+}
+
+impl Default for Device {
+    /// The NUCLEO-F446RE.
+    fn default() -> Self {
+        Self { clock_mhz: BOARD_CLOCK_MHZ, memory: Memory::default(), scan_ms: None }
+    }
+}
+
+/// Wires that a scan reads: rows, one after the other, and columns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Wires {
+    /// Number of row-wires.
+    pub rows: usize,
+    /// Number of column-wires.
+    pub columns: usize,
+}
+
+impl Wires {
+    /// Wires that readings are named after, such as `r4c17_ohm`; `None` if any has another name.
+    #[must_use]
+    pub fn named(readings: &[String]) -> Option<Self> {
+        let wires = readings.iter().map(|name| {
+            let (row, column) = name.strip_suffix("_ohm")?.strip_prefix('r')?.split_once('c')?;
+            Some((row.parse::<usize>().ok()?, column.parse::<usize>().ok()?))
+        });
+        let wires: Vec<(usize, usize)> = wires.collect::<Option<_>>()?;
+        let count =
+            |of: fn(&(usize, usize)) -> usize| wires.iter().map(of).collect::<BTreeSet<_>>().len();
+        (!wires.is_empty())
+            .then(|| Self { rows: count(|wire| wire.0), columns: count(|wire| wire.1) })
+    }
+}
+
+/// Times of one frame. The firmware's loop scans, decodes, and only then scans again.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Times {
+    /// Time of the scan; `None` if it is unknown.
+    pub scan_ms: Option<f64>,
+    /// Time of decoding; behind a gate, the mean over the test frames.
+    pub decode_ms: f64,
+    /// Time of both; of decoding alone if the scan's is unknown.
+    pub frame_ms: f64,
+    /// Frames in a second, at most: one over the time of a frame.
+    pub frames_per_second: f64,
+}
+
+impl Device {
+    /// Checks that the numbers are positive.
+    ///
+    /// # Errors
+    /// [`BadValue`] for the first that is not.
+    pub fn check(&self) -> Result<(), BadValue> {
+        let numbers = [("clock-mhz", Some(self.clock_mhz)), ("scan-ms", self.scan_ms)];
+        for (name, number) in numbers {
+            if let Some(number) = number.filter(|number| !(number.is_finite() && *number > 0.0)) {
+                return Err(BadValue::new(name, number, "give a positive number"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Time of a scan of `wires` with so many `samples` a reading in ms; `None` if nothing tells it.
+    ///
+    /// A time that the user gives is taken once for every sample.
+    #[must_use]
+    pub fn scan_ms(&self, wires: Option<Wires>, samples: usize) -> Option<f64> {
+        let short = |number: usize| u16::try_from(number).unwrap_or(u16::MAX);
+        let of_board = |Wires { rows, columns }| {
+            let plan = ScanPlan::of_nucleo(short(rows), short(columns), short(samples));
+            f64::from(plan.scan_us()) / 1000.0
+        };
+        self.scan_ms.map(|once| once * samples as f64).or(wires.map(of_board))
+    }
+
+    /// Cycles of a frame with this `cost` in the device's memory.
+    #[must_use]
+    pub fn cycles(&self, cost: &Cost) -> u64 {
+        match self.memory {
+            Memory::Flash => cost.flash_cycles,
+            Memory::Ram => cost.cycles,
+        }
+    }
+
+    /// Times of a frame whose decoding has this `cost`.
+    #[must_use]
+    pub fn times(&self, scan_ms: Option<f64>, cost: &Cost) -> Times {
+        let decode_ms = self.cycles(cost) as f64 / (self.clock_mhz * 1000.0);
+        let frame_ms = scan_ms.unwrap_or(0.0) + decode_ms;
+        Times { scan_ms, decode_ms, frame_ms, frames_per_second: 1000.0 / frame_ms }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_frame_takes_its_scan_and_then_its_decoding() {
+        let board = Device::default();
+        let cost = Cost { instructions: 1, cycles: 18_000, flash_cycles: 36_000 };
+        let paper = Some(Wires { rows: 8, columns: 18 });
+        // docs/board.md: 6.4 ms with one sample a reading, 23 ms with four.
+        let scans = [1, 4].map(|samples| board.scan_ms(paper, samples).unwrap());
+        assert_eq!(scans, [6.43, 23.019]);
+        let times = board.times(Some(6.43), &cost);
+        assert_eq!((times.decode_ms, times.frame_ms), (0.2, 6.63));
+        assert!((times.frames_per_second - 150.8).abs() < 0.1);
+        let ram = Device { memory: Memory::Ram, clock_mhz: 90.0, ..board };
+        assert_eq!(ram.times(None, &cost).frame_ms, 0.2);
+        assert_eq!(ram.times(None, &cost).frames_per_second, 5000.0);
+    }
+
+    #[test]
+    fn wires_are_told_by_the_names_of_readings() {
+        let named = |names: &[&str]| {
+            Wires::named(&names.iter().map(|name| (*name).into()).collect::<Vec<String>>())
+        };
+        assert_eq!(named(&["r4c1_ohm", "r4c2_ohm"]), Some(Wires { rows: 1, columns: 2 }));
+        assert_eq!(
+            named(&["r1c1_ohm", "r1c2_ohm", "r2c1_ohm", "r2c2_ohm"]),
+            Some(Wires { rows: 2, columns: 2 })
+        );
+        assert_eq!(
+            (named(&["ch1", "ch2"]), named(&["r1c1_ohm", "rest"]), named(&[])),
+            (None, None, None)
+        );
+    }
+
+    #[test]
+    fn a_scan_is_as_long_as_the_user_says_or_unknown() {
+        let given = Device { scan_ms: Some(2.5), ..Device::default() };
+        assert_eq!(given.scan_ms(Some(Wires { rows: 8, columns: 18 }), 1), Some(2.5));
+        assert_eq!(given.scan_ms(None, 4), Some(10.0));
+        assert_eq!(Device::default().scan_ms(None, 1), None);
+        assert!(given.check().is_ok());
+        for bad in [0.0, -1.0, f64::NAN] {
+            let message = Device { scan_ms: Some(bad), ..given }.check().unwrap_err().to_string();
+            assert!(message.contains("scan-ms"), "{message}");
+            let message = Device { clock_mhz: bad, ..given }.check().unwrap_err().to_string();
+            assert!(message.contains("clock-mhz"), "{message}");
+        }
+    }
+}

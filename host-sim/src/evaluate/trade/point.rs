@@ -1,0 +1,131 @@
+//! Points: ways to decode, with their errors and their cost.
+
+use model_core::rbf::Format;
+use serde::Serialize;
+use taxel_learn::Exponential;
+use taxel_learn::cost::{Cost, kernel_name};
+
+use super::choice::Offer;
+use super::device::Times;
+use crate::metrics::Errors;
+
+/// Number format and exponential with which networks are decoded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Arithmetic {
+    /// Number format.
+    pub format: Format,
+    /// Exponential.
+    pub exponential: Exponential,
+}
+
+impl Arithmetic {
+    /// Every arithmetic of the points, the cheapest format first.
+    ///
+    /// Direct distances are decoded with every exponential, the other formats with their own.
+    pub fn all() -> impl Iterator<Item = Self> {
+        Format::ALL.into_iter().rev().flat_map(|format| {
+            let all: &[Exponential] = match format {
+                Format::F32Direct => &Exponential::ALL,
+                _ => &[Exponential::Polynomial],
+            };
+            all.iter().map(move |&exponential| Self { format, exponential })
+        })
+    }
+
+    /// Name of the arithmetic, as `cargo xtask cycles` spells it.
+    #[must_use]
+    pub fn name(self) -> String {
+        kernel_name(self.format, self.exponential)
+    }
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn by_name<S: serde::Serializer>(
+    arithmetic: &Arithmetic,
+    serializer: S,
+) -> std::result::Result<S::Ok, S::Error> {
+    serializer.serialize_str(&arithmetic.name())
+}
+
+/// Way to decode, with its cost and its errors.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Point {
+    /// Format and exponential.
+    #[serde(rename = "kernel", serialize_with = "by_name")]
+    pub arithmetic: Arithmetic,
+    /// Whether one network decodes all rows, behind a projection, instead of one a row.
+    pub whole_array: bool,
+    /// Number of centres K of each network.
+    pub centres: usize,
+    /// Number of components that the network computes, which are expanded to all outputs; `None` if it computes these.
+    pub output_rank: Option<usize>,
+    /// Width σ on scaled inputs.
+    pub spread: f64,
+    /// Whether the networks have an affine tail.
+    pub affine_tail: bool,
+    /// Number of samples averaged for each reading.
+    pub samples_averaged: usize,
+    /// Tolerance of the gate, in standard deviations of the averaged readings' noise; `None` without a gate.
+    pub gate_k: Option<f64>,
+    /// Errors on the test frames, by group.
+    pub errors: Vec<Errors>,
+    /// Ratio of the RMSE to the smallest of all points, by group.
+    pub ratio_to_best: Vec<f64>,
+    /// Cost of one frame on a Cortex-M4F; behind a gate, the mean over the test frames.
+    #[serde(flatten)]
+    pub frame: Cost,
+    /// Times of one frame on the plan's device.
+    #[serde(flatten)]
+    pub times: Times,
+    /// Size of the blob.
+    pub flash_bytes: usize,
+    /// Size of decoder, frame, estimate and working memory; for a gate also the baseline and its
+    /// estimate.
+    pub ram_bytes: usize,
+    /// Whether the point is on the Pareto front: no other point is at least as good in the time of a frame and the RMSE
+    /// of the chosen group, and better in one.
+    pub on_front: bool,
+}
+
+impl Point {
+    /// RMSE of a group, in its unit.
+    #[must_use]
+    pub fn rmse(&self, group: &str) -> f64 {
+        self.errors.iter().find(|e| e.group == group).map_or(f64::NAN, |e| e.rmse)
+    }
+
+    /// Ratio of the RMSE of a group to the limit, where that is known.
+    #[must_use]
+    pub fn ratio_to_limit(&self, group: &str) -> Option<f64> {
+        self.errors.iter().find(|e| e.group == group)?.ratio_to_limit
+    }
+
+    /// Arithmetic of the point, and whether it decodes the whole array at once.
+    #[must_use]
+    pub fn way(&self) -> String {
+        format!("{}{}", self.arithmetic.name(), if self.whole_array { " array" } else { "" })
+    }
+
+    /// Settings of the point in a few words.
+    #[must_use]
+    pub fn name(&self) -> String {
+        let tail = if self.affine_tail { " + tail" } else { "" };
+        let average = match self.samples_averaged {
+            1 => String::new(),
+            samples => format!(", {samples} samples"),
+        };
+        let gate = self.gate_k.map_or(String::new(), |k| format!(", gate k = {k}"));
+        let rank = self.output_rank.map_or(String::new(), |rank| format!(", rank {rank}"));
+        format!("{}, K = {}{rank}{tail}{average}{gate}", self.way(), self.centres)
+    }
+
+    /// What the point has to offer by the error of a group.
+    pub(super) fn offer(&self, group: &str) -> Offer {
+        Offer {
+            rmse: self.rmse(group),
+            cycles: self.frame.cycles,
+            flash_bytes: self.flash_bytes,
+            times: self.times,
+        }
+    }
+}

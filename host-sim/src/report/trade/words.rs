@@ -1,0 +1,64 @@
+//! Points in words.
+
+use crate::evaluate::trade::{Bounds, Point, Times, Trade};
+use crate::report::format::{fixed, grouped, significant, symbol};
+
+/// Text of a rate.
+pub fn rate(frames_per_second: f64) -> String {
+    if frames_per_second < 1000.0 {
+        fixed(frames_per_second, 1)
+    } else {
+        grouped(frames_per_second.round() as usize)
+    }
+}
+
+/// Text of an error with its unit.
+pub fn error(trade: &Trade, rmse: f64) -> String {
+    format!("{} {}", significant(rmse, 3), trade.unit).trim_end().into()
+}
+
+/// Times of a frame.
+pub fn times(times: &Times) -> String {
+    let decoding = format!("{} ms to decode", fixed(times.decode_ms, 3));
+    match times.scan_ms {
+        Some(scan_ms) => format!(
+            "{} ms a frame ({} ms to scan, {decoding}), {} frames/s",
+            fixed(times.frame_ms, 3),
+            fixed(scan_ms, 3),
+            rate(times.frames_per_second)
+        ),
+        None => format!("{decoding}, besides its scan"),
+    }
+}
+
+/// All settings, the error and the cost of a point.
+pub fn in_full(trade: &Trade, point: &Point) -> String {
+    format!(
+        "{}: RMSE of {} {}; {}; {} cycles, {} from flash; blob {} B, RAM {} B",
+        point.name(),
+        symbol(&trade.group),
+        error(trade, point.rmse(&trade.group)),
+        times(&point.times),
+        grouped(point.frame.cycles as usize),
+        grouped(point.frame.flash_cycles as usize),
+        grouped(point.flash_bytes),
+        grouped(point.ram_bytes)
+    )
+}
+
+/// The chosen point in few words.
+pub fn chosen(trade: &Trade, point: &Point) -> String {
+    format!("chosen: K {}, {}", point.centres, error(trade, point.rmse(&trade.group)))
+}
+
+/// Bounds that are given.
+pub fn bounds(bounds: &Bounds) -> String {
+    let given = [
+        bounds.error.map(|most| format!("an error of at most {most}")),
+        bounds.cycles.map(|most| format!("at most {} cycles at zero wait", grouped(most as usize))),
+        bounds.flash_bytes.map(|most| format!("a blob of at most {} bytes", grouped(most))),
+        bounds.frame_rate_hz.map(|least| format!("at least {least} frames a second")),
+        bounds.latency_ms.map(|most| format!("at most {most} ms for scan and decoding")),
+    ];
+    given.into_iter().flatten().collect::<Vec<_>>().join(", ")
+}
