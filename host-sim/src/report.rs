@@ -3,9 +3,9 @@
 //! The figures are drawn here rather than by a chart crate because their colours are CSS classes:
 //! one page serves light and dark.
 
-use crate::evaluate::limit::LimitResult;
-use crate::evaluate::trade::Trade;
-use crate::run::RunResult;
+use taxel_evaluate::evaluate::limit::LimitResult;
+use taxel_evaluate::evaluate::trade::Trade;
+use taxel_evaluate::run::RunResult;
 
 mod format;
 mod ticks;

@@ -48,7 +48,7 @@ pub fn write<'n, L: IntoIterator<Item = f64>>(
     write_columns(path, names.into_iter().map(Column::f64), lines)
 }
 
-/// Writes a CSV file as [`write`] does, but with fewer digits where a column needs no more.
+/// Writes a CSV file as [`write()`] does, but with fewer digits where a column needs no more.
 ///
 /// # Errors
 /// [`Error::Write`] if the file cannot be written; whatever stood at `path` then stays.

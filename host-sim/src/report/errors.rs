@@ -52,7 +52,7 @@ pub fn histogram(view: &View<'_>) -> Figure {
 /// Figure of RMSE by electrode, one map a group.
 pub fn by_electrode(view: &View<'_>, face: &Face) -> Figure {
     let rmse: Vec<f64> = view.distribution.outputs.iter().map(|output| output.rmse).collect();
-    let map = |group: &crate::evaluate::distribution::GroupDistribution| {
+    let map = |group: &taxel_evaluate::evaluate::distribution::GroupDistribution| {
         let values = face.values(view.distribution, &group.group, &rmse);
         let scale = ColourScale::sequential(values.iter().copied());
         let name = format!("RMSE of {}", symbol(&group.group));

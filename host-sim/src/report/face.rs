@@ -1,7 +1,7 @@
 //! Faces: where values are drawn in maps, over the sensor or over its wires.
 
-use crate::evaluate::distribution::{Distribution, ShownReadings};
-use crate::run::SensorSketch;
+use taxel_evaluate::evaluate::distribution::{Distribution, ShownReadings};
+use taxel_evaluate::run::SensorSketch;
 
 use super::ticks;
 use super::voronoi::{self, Polygon};

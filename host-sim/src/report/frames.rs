@@ -9,7 +9,7 @@ use super::format::{fixed, significant, symbol, with_unit};
 use super::svg::{Anchor, Px, TEXT_PX};
 use super::ticks;
 use super::view::View;
-use crate::evaluate::distribution::{Rank, RelativeTo, ShownFrame};
+use taxel_evaluate::evaluate::distribution::{Rank, RelativeTo, ShownFrame};
 
 /// Columns that are a place on the face.
 const PLACES: [[&str; 2]; 2] = [["contact_x_mm", "contact_y_mm"], ["x_mm", "y_mm"]];

@@ -10,8 +10,8 @@ use super::heat_map::{ColourScale, HeatMap};
 use super::html::document;
 use super::svg::{Shape, Svg, escape, standalone};
 use super::ticks;
-use crate::evaluate::limit::{Figures, Level, LimitResult};
-use crate::metrics::DecoderErrors;
+use taxel_evaluate::evaluate::limit::{Figures, Level, LimitResult};
+use taxel_evaluate::metrics::DecoderErrors;
 
 /// Signal-to-noise ratios below this are not drawn.
 const LEAST_RATIO: f64 = 1e-3;

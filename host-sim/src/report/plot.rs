@@ -3,7 +3,7 @@
 use super::format::{fixed, grouped, significant, symbol, with_unit};
 use super::svg::{Anchor, Svg, TEXT_PX, text_width};
 use super::ticks::{self, Ticks};
-use crate::evaluate::distribution::GroupDistribution;
+use taxel_evaluate::evaluate::distribution::GroupDistribution;
 
 const WIDTH: f64 = 310.0;
 

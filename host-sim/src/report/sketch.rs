@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::face;
 use super::figures::Figure;
 use super::svg::{Anchor, Px, Svg, TEXT_PX, text_width};
-use crate::run::SensorSketch;
+use taxel_evaluate::run::SensorSketch;
 
 /// Draws the sensor in this width, in px.
 fn draw(sensor: &SensorSketch, width: f64) -> String {

@@ -9,7 +9,7 @@ use super::format::{percent, symbol, with_unit};
 use super::svg::Shape;
 use super::tables::rmse;
 use super::ticks;
-use crate::evaluate::table1::{Column, NETWORK, Table1};
+use taxel_evaluate::evaluate::table1::{Column, NETWORK, Table1};
 
 const WIDE: [f64; 2] = [920.0, 340.0];
 const NARROW: [f64; 2] = [360.0, 270.0];

@@ -8,9 +8,9 @@ use super::format::{UNDEFINED, decimals, fixed, grouped, percent, significant, s
 use super::svg::escape;
 use super::ticks;
 use super::view::View;
-use crate::by_depth::DepthErrors;
-use crate::evaluate::table1::{Column, NETWORK, PAPER_PRINTED_PERCENT, Table1};
-use crate::metrics::{DecoderErrors, Definition, Errors};
+use taxel_evaluate::by_depth::DepthErrors;
+use taxel_evaluate::evaluate::table1::{Column, NETWORK, PAPER_PRINTED_PERCENT, Table1};
+use taxel_evaluate::metrics::{DecoderErrors, Definition, Errors};
 
 /// Errors of one group, if it is among `errors`.
 pub fn of_group<'e>(errors: &'e [Errors], group: &str) -> Option<&'e Errors> {

@@ -6,12 +6,14 @@ use taxel_limit::reference::GroupLimit;
 use taxel_data::table::Table as Values;
 
 use super::{Made, View};
-use crate::evaluate::device_cost::DeviceCost;
-use crate::evaluate::distribution::{Distribution, Reference};
-use crate::evaluate::table1::{Column, Entry, NETWORK, Printed, Table1};
-use crate::metrics::{DecoderErrors, Errors, LimitSummary};
-use crate::run::{ModelSummary, RowErrors, RowWire, RunResult, SceneSummary, SensorSketch};
-use crate::verdict::{Verdict, Warning};
+use taxel_evaluate::evaluate::device_cost::DeviceCost;
+use taxel_evaluate::evaluate::distribution::{Distribution, Reference};
+use taxel_evaluate::evaluate::table1::{Column, Entry, NETWORK, Printed, Table1};
+use taxel_evaluate::metrics::{DecoderErrors, Errors, LimitSummary};
+use taxel_evaluate::run::{
+    ModelSummary, RowErrors, RowWire, RunResult, SceneSummary, SensorSketch,
+};
+use taxel_evaluate::verdict::{Verdict, Warning};
 
 fn made() -> Made {
     let files = ["model.bin", "metrics.json"].map(String::from).to_vec();

@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use super::format::{fixed, grouped, percent, significant, symbol};
 use super::html::document;
 use super::svg::{escape, standalone};
-use crate::evaluate::trade::{Memory, Trade};
-use crate::metrics::LimitSummary;
+use taxel_evaluate::evaluate::trade::{Memory, Trade};
+use taxel_evaluate::metrics::LimitSummary;
 
 mod axes;
 mod labels;
@@ -117,7 +117,7 @@ fn answer(trade: &Trade) -> String {
 
 /// Bounds that the picture cannot show.
 fn hidden_bounds(trade: &Trade) -> String {
-    let bounds = crate::evaluate::trade::Bounds {
+    let bounds = taxel_evaluate::evaluate::trade::Bounds {
         cycles: trade.bounds.cycles,
         flash_bytes: trade.bounds.flash_bytes,
         ..Default::default()

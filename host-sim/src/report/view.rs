@@ -1,12 +1,12 @@
 //! What the page of a model shows, whichever result it is from.
 
-use crate::by_depth::DepthErrors;
-use crate::evaluate::device_cost::DeviceCost;
-use crate::evaluate::distribution::Distribution;
-use crate::evaluate::table1::Table1;
-use crate::metrics::{DecoderErrors, LimitSummary};
-use crate::run::{RunResult, SensorSketch};
-use crate::verdict::Verdict;
+use taxel_evaluate::by_depth::DepthErrors;
+use taxel_evaluate::evaluate::device_cost::DeviceCost;
+use taxel_evaluate::evaluate::distribution::Distribution;
+use taxel_evaluate::evaluate::table1::Table1;
+use taxel_evaluate::metrics::{DecoderErrors, LimitSummary};
+use taxel_evaluate::run::{RunResult, SensorSketch};
+use taxel_evaluate::verdict::Verdict;
 
 use super::format::{grouped, percent};
 

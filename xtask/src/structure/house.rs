@@ -23,6 +23,7 @@ pub const CRATES: &[(&str, Side)] = &[
     ("taxel-learn", Side::Host),
     ("taxel-limit", Side::Host),
     ("taxel-rig", Side::Host),
+    ("taxel-evaluate", Side::Host),
     ("host-sim", Side::Host),
     ("xtask", Side::Host),
     ("benchmarks", Side::Host),

@@ -2,10 +2,10 @@
 
 use taxel_learn::decoders::{linear, mean};
 
-use crate::evaluate::trade::{Point, Times, Trade};
 use crate::report::format::{grouped, significant};
 use crate::report::tables;
 use crate::report::ticks::{self, extent};
+use taxel_evaluate::evaluate::trade::{Point, Times, Trade};
 
 /// Factor by which what is no point of the front may lie beyond it and still be shown.
 const BEYOND: f64 = 4.0;

@@ -7,9 +7,9 @@ use model_core::rbf::Format;
 use super::axes::Axes;
 use super::labels::Labels;
 use super::words;
-use crate::evaluate::trade::{Point, Trade};
 use crate::report::format::symbol;
 use crate::report::svg::{Anchor, Px, Shape, Svg, TEXT_PX, escape, text_width};
+use taxel_evaluate::evaluate::trade::{Point, Trade};
 
 const LINE_PX: f64 = TEXT_PX + 7.0;
 

@@ -3,9 +3,9 @@
 use std::fmt::Write as _;
 
 use super::words::rate;
-use crate::evaluate::trade::{Point, Trade};
 use crate::report::format::{UNDEFINED, fixed, grouped, significant, symbol, with_unit};
 use crate::report::svg::escape;
+use taxel_evaluate::evaluate::trade::{Point, Trade};
 
 /// Points of the front from fast to slow, and the chosen one.
 pub fn of_front(trade: &Trade) -> String {

@@ -1,7 +1,7 @@
 //! Points in words.
 
-use crate::evaluate::trade::{Bounds, Point, Times, Trade};
 use crate::report::format::{fixed, grouped, significant, symbol};
+use taxel_evaluate::evaluate::trade::{Bounds, Point, Times, Trade};
 
 /// Text of a rate.
 pub fn rate(frames_per_second: f64) -> String {

@@ -32,9 +32,9 @@ type Check = std::result::Result<(), BadValue>;
 
 /// Names and texts of the scenes that are part of the program.
 pub const EMBEDDED: [(&str, &str); 3] = [
-    ("paper", include_str!("../../scenes/paper.toml")),
-    ("press", include_str!("../../scenes/press.toml")),
-    ("contact", include_str!("../../scenes/contact.toml")),
+    ("paper", include_str!("../../../scenes/paper.toml")),
+    ("press", include_str!("../../../scenes/press.toml")),
+    ("contact", include_str!("../../../scenes/contact.toml")),
 ];
 
 /// Experiment of a scene, checked.
