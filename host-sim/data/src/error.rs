@@ -130,6 +130,14 @@ impl Role {
 /// Problem with a data file. Lines and columns count from 1; the header is line 1.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Problem {
+    /// Separator between fields that is no comma.
+    #[error(
+        "line 1: fields seem to be separated by {separator:?}; save the file with commas, and points in numbers"
+    )]
+    Separator {
+        /// Separator that was found.
+        separator: char,
+    },
     /// Header that cannot be read.
     #[error("line 1: {cause}; save as UTF-8")]
     Header {
@@ -137,7 +145,7 @@ pub enum Problem {
         cause: String,
     },
     /// File without content.
-    #[error("the file is empty: line 1 must name the columns")]
+    #[error("the file is empty: write numbers into it, with names of the columns on line 1")]
     Empty,
     /// File with a header and nothing else.
     #[error("the file has a header but no line of data")]

@@ -171,6 +171,7 @@ pub fn run(
     let distribution = Distribution::of(&test.outputs, &estimate, &test.inputs, reference);
     let verdict = Verdict::of(&decoders, &limit)
         .of_blob(&blob, training.frames.frames())
+        .of_frames(subject.measurements().map(|data| &data.outliers), test.frames())
         .with(Warning::out_of_range(network.share_out_of_range(&test.inputs.values)));
     let mut result = RunResult {
         verdict,
@@ -196,7 +197,6 @@ pub fn run(
             }
         }
         Subject::Measured(data) => {
-            result.verdict = result.verdict.with(Warning::outliers(&data.outliers));
             result.data = Some(DataSummary {
                 test_frames: data.test_choice.clone(),
                 outliers: data.outliers.clone(),

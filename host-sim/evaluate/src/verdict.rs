@@ -4,6 +4,7 @@ use model_core::rbf::{Format, Shape, expanded, fixed16};
 use serde::Serialize;
 use taxel_learn::ModelBlob;
 use taxel_learn::decoders::{linear, mean};
+use taxel_learn::outliers::Outliers;
 
 use crate::metrics::{DecoderErrors, Errors, LimitSummary};
 
@@ -40,10 +41,12 @@ impl Verdict {
             return Self { sentence: String::new(), warnings: vec![] };
         };
         let others = Others::among(decoders);
-        let (decoded, hardly): (Vec<&Errors>, Vec<&Errors>) = model
-            .errors
-            .iter()
-            .filter(|group| group.rmse.is_finite())
+        let (told, missing): (Vec<&Errors>, Vec<&Errors>) =
+            model.errors.iter().partition(|group| group.rmse.is_finite());
+        let (constant, told): (Vec<&Errors>, Vec<&Errors>) =
+            told.into_iter().partition(|group| others.mean_is_exact(group));
+        let (decoded, hardly): (Vec<&Errors>, Vec<&Errors>) = told
+            .into_iter()
             .partition(|group| others.of_mean(group).is_none_or(|share| share <= HARDLY));
         let mut sentences = Vec::new();
         if !decoded.is_empty() {
@@ -72,12 +75,25 @@ impl Verdict {
             });
             sentences.extend(nobody_can(&hardly));
         }
+        for (groups, why) in [
+            (&constant, "does not change in these frames: there is nothing to decode"),
+            (&missing, "has no frame to judge by"),
+        ] {
+            let names: Vec<&str> = groups.iter().map(|group| group.group.as_str()).collect();
+            sentences.extend(names.iter().map(|name| format!("{name} {why}.")));
+        }
         // What is no better than the mean need not be compared with the linear decoder.
         let useless = others.without_gain(model, |it| it.mean);
         let mut plain = others.without_gain(model, |it| it.linear);
         plain.retain(|group| !useless.contains(group));
         let warnings = [Warning::no_gain_over_mean(&useless), Warning::no_gain_over_linear(&plain)];
         Self { sentence: sentences.join(" "), warnings: warnings.into_iter().flatten().collect() }
+    }
+
+    /// Adds what frames give reason to beware of: outliers of measured ones, and too few to judge by.
+    #[must_use]
+    pub fn of_frames(self, outliers: Option<&Outliers>, test_frames: usize) -> Self {
+        self.with(Warning::few_test_frames(test_frames)).with(outliers.and_then(Warning::outliers))
     }
 
     /// Adds what a blob, trained on so many `frames`, gives reason to beware of: too few frames, centres that the format
@@ -131,6 +147,12 @@ impl<'e> Others<'e> {
     /// RMSE of a group as a share of the mean's.
     fn of_mean(&self, group: &Errors) -> Option<f64> {
         share(group, self.mean)
+    }
+
+    /// Whether always predicting the mean makes no error: the output does not change.
+    fn mean_is_exact(&self, group: &Errors) -> bool {
+        let mean = self.mean.and_then(|mean| mean.iter().find(|it| it.group == group.group));
+        mean.is_some_and(|mean| mean.rmse <= 0.0)
     }
 
     /// Gains over the mean and the linear decoder, in words after the errors of `groups`.
@@ -211,24 +233,16 @@ fn listed(words: &[impl AsRef<str>]) -> String {
 
 /// How near the errors of `groups` come to the `limit`, where it is known.
 fn least_possible(groups: &[&Errors], limit: &LimitSummary) -> Option<String> {
-    let known = groups.iter().filter_map(|group| {
-        let limit = limit.groups.iter().find(|limit| limit.group == group.group)?;
-        Some((limit, group.ratio_to_limit?))
-    });
-    let known: Vec<_> = known.collect();
-    let (limit, ratio) = known.first()?;
-    Some(if known.len() == 1 {
-        format!(
-            "The least possible error is {} {} (× {ratio:.2}).",
-            significant(limit.limit),
-            limit.unit
-        )
-    } else {
-        let ratios = || known.iter().map(|(_, ratio)| *ratio);
-        let (low, high) =
-            (ratios().fold(f64::INFINITY, f64::min), ratios().fold(f64::NEG_INFINITY, f64::max));
-        format!("That is {low:.2} to {high:.2} times the least possible error.")
-    })
+    let known = groups.iter().filter(|group| limit.groups.iter().any(|it| it.group == group.group));
+    let ratios: Vec<f64> = known.filter_map(|group| group.ratio_to_limit).collect();
+    let low = ratios.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = ratios.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    // Ratios are formed on the limit's own frames: no other error may stand beside them.
+    match ratios.len() {
+        0 => None,
+        1 => Some(format!("That is {low:.2} times the least possible error.")),
+        _ => Some(format!("That is {low:.2} to {high:.2} times the least possible error.")),
+    }
 }
 
 /// Says so if no decoder could tell much more of `groups`.

@@ -4,18 +4,17 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use host_sim::measurements::{Judged, Measurements, Split, relative_to};
+use host_sim::verdict::Warning;
 use host_sim::{Error, Result};
 use taxel_data::data_file::DataFile;
 use taxel_data::dataset::Dataset;
 use taxel_data::error::{Problem, Role};
 use taxel_learn::outliers::{self, Outliers};
+use taxel_learn::train::refine::LEAST_FOLDS;
 use taxel_learn::{Options, select};
 
 use super::data_file::DataFileArguments;
 use super::{data_notes, readings};
-
-/// Least number of frames for each centre of the usual number of centres.
-const FRAMES_A_CENTRE: usize = 10;
 
 /// What a CSV file's columns are.
 #[derive(Args, Default)]
@@ -131,14 +130,11 @@ impl DataArguments {
             ));
         }
         let file = self.file.read(path)?;
-        let (frames, lines) = self.frames(&file)?;
+        let (frames, lines, outliers) = self.usual_frames(&file)?;
         let given_folds =
             self.fold_column.as_ref().map(|name| folds_from(&file, name, &lines)).transpose()?;
-        let outliers = self.outliers(&frames, |frame| file.line_number(lines[frame]));
-        let left_out = "training (--keep-outliers keeps them)";
-        data_notes::print_outliers(&outliers, path, frames.frames(), left_out);
-        let mut split = Split::of(&frames, given_folds.as_deref(), self.judged(judged, &frames)?);
-        split.training.retain(|frame| outliers.kept.binary_search(frame).is_ok());
+        let split =
+            Split::of(&frames, given_folds.as_deref(), self.judged(judged, &frames, file.digest)?);
         if split.training.is_empty() {
             let message = "holding out frames leaves none to train on: give more, or --test FILE";
             return Err(Error::Unfit { path: path.into(), message: message.into() });
@@ -149,7 +145,12 @@ impl DataArguments {
         }
         let training = frames.subset(&split.training);
         let fold_of = match given_folds {
-            Some(folds) => split.training.iter().map(|frame| folds[*frame]).collect(),
+            Some(folds) => {
+                let rest: Vec<usize> = split.training.iter().map(|frame| folds[*frame]).collect();
+                let held_out = !matches!(judged, JudgedBy::None);
+                check_folds(&rest, held_out && how.refine)?;
+                rest
+            }
             None if training.frames() < 2 && self.folds.is_none() => vec![0; training.frames()],
             None => self.folds_of(training.frames(), how.seed)?,
         };
@@ -164,7 +165,9 @@ impl DataArguments {
             _ => frames,
         });
         let name = path.file_stem().map_or("data".into(), |stem| stem.to_string_lossy());
-        let centres = Options::default().centres.min((training.frames() / FRAMES_A_CENTRE).max(1));
+        let inputs = training.inputs.names.len() / training.rows;
+        let centres = Warning::enough_frames_for(training.frames(), inputs);
+        let centres = Options::default().centres.min(centres);
         let measurements = Measurements {
             name: name.into_owned(),
             digest: file.digest,
@@ -192,6 +195,16 @@ impl DataArguments {
         Outliers { left_out: false, kept: (0..frames.frames()).collect(), ..outliers }
     }
 
+    /// Frames of `file` without outliers, the indices of their lines, and the outliers.
+    fn usual_frames(&self, file: &DataFile) -> Result<(Dataset, Vec<usize>, Outliers)> {
+        let (frames, lines) = self.frames(file)?;
+        let outliers = self.outliers(&frames, |frame| file.line_number(lines[frame]));
+        let left_out = "training and judging (--keep-outliers keeps them)";
+        data_notes::print_outliers(&outliers, &file.path, frames.frames(), left_out);
+        let lines = outliers.kept.iter().map(|frame| lines[*frame]).collect();
+        Ok((frames.subset(&outliers.kept), lines, outliers))
+    }
+
     /// Frames of `file`, and the indices of their lines.
     fn frames(&self, file: &DataFile) -> Result<(Dataset, Vec<usize>)> {
         let (inputs, outputs) = (self.inputs.as_deref(), self.outputs.as_deref());
@@ -207,14 +220,19 @@ impl DataArguments {
         Ok((frames, kept.lines))
     }
 
-    /// Frames that the model trained on some of `frames` is judged by.
-    fn judged(&self, judged: JudgedBy<'_>, frames: &Dataset) -> Result<Judged> {
+    /// Frames that the model trained on some of `frames` is judged by. `digest` is that of their file.
+    fn judged(&self, judged: JudgedBy<'_>, frames: &Dataset, digest: u64) -> Result<Judged> {
         let path = match judged {
             JudgedBy::None => return Ok(Judged::None),
             JudgedBy::HeldOut => return Ok(Judged::HeldOut),
             JudgedBy::File(path) => path,
         };
-        let (own, _) = self.frames(&self.file.fields().read(path)?)?;
+        let file = self.file.fields().read(path)?;
+        if file.digest == digest {
+            let message = "it is the file that is trained on, which would flatter the model: give other frames (--test)";
+            return Err(Error::Unfit { path: path.into(), message: message.into() });
+        }
+        let (own, _, _) = self.usual_frames(&file)?;
         let names = |frames: &Dataset| (frames.inputs.names.clone(), frames.outputs.names.clone());
         if names(&own) != names(frames) {
             let message = "its columns are not those of the frames to train on: give a file with the same columns, \
@@ -243,6 +261,18 @@ fn with_options(error: taxel_data::Error) -> Error {
         },
         other => other.into(),
     }
+}
+
+/// Checks the folds that are left for refinement, `if_refined` after one of them was held out to judge by.
+fn check_folds(folds: &[usize], if_refined: bool) -> Result<()> {
+    let count = folds.iter().max().map_or(0, |last| last + 1);
+    if !if_refined || count >= LEAST_FOLDS {
+        return Ok(());
+    }
+    Err(Error::Usage(format!(
+        "--fold-column: the last fold is held out to judge by, which leaves {count}, and refinement needs {LEAST_FOLDS}: \
+         give --test FILE, a column with more folds, or --no-refine"
+    )))
 }
 
 /// Folds from column `name`, numbered from 0.

@@ -106,6 +106,11 @@ impl DataFileArguments {
         self.join.as_deref()
     }
 
+    /// Whether a part of the file's lines is taken, so that the file alone does not tell which.
+    pub fn takes_a_share(&self) -> bool {
+        self.first_share.is_some() || self.last_share.is_some()
+    }
+
     /// Error if an option was given: they are for data files alone.
     pub fn refuse_for_scene(&self) -> Result<()> {
         for (option, given) in [

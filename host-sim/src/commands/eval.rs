@@ -53,6 +53,8 @@ struct Summary {
     /// What the model is worth, in words.
     verdict: Verdict,
     frames: usize,
+    /// Number of frames with a value that counts.
+    frames_evaluated: usize,
     /// Number of true outputs in the file.
     values: usize,
     /// Number of these that count: neither they nor a reading they need is missing.
@@ -107,11 +109,20 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         let told = novelty.iter().filter(|novelty| !novelty.is_nan()).count();
         100.0 * novelty.iter().filter(|novelty| **novelty > 0.0).count() as f64 / told.max(1) as f64
     });
+    // A frame counts if any of its values does.
+    let counts = |(truth, estimate): (&[f64], &[f64])| {
+        truth.iter().zip(estimate).any(|(a, b)| !(a - b).is_nan())
+    };
+    let frames_evaluated =
+        truth.lines().zip(estimate.lines()).filter(|(a, b)| counts((a, b))).count();
+    let same_file = metadata.scene_digest == file.digest && !arguments.file.takes_a_share();
     let values_evaluated = errors.iter().map(|group| group.count).sum();
     let of = |decoder: &str, errors| DecoderErrors { decoder: decoder.into(), errors };
     let mean_errors = metrics::by_group(&truth, &means, &measure);
     let decoders = vec![of("network", errors), of("mean", mean_errors)];
     let verdict = Verdict::of(&decoders, &LimitSummary::of(&Err(Refusal::Measured)))
+        .of_frames(None, frames_evaluated)
+        .with(Warning::trained_on(same_file))
         .with(Warning::out_of_range(model.share_out_of_range(&readings.values)));
     let summary = Summary {
         model: arguments.model.clone(),
@@ -124,6 +135,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         }),
         percent_novel,
         frames: readings.len(),
+        frames_evaluated,
         values: truth.values.len(),
         values_evaluated,
         exponential: arguments.exponential,
@@ -140,8 +152,13 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if common.json {
         return print::json(&summary);
     }
+    text_of(&summary).print()
+}
+
+/// Result for people.
+fn text_of(summary: &Summary) -> print::Page {
     let mut page = print::Page::default();
-    page.line(format_args!("{} frames of {}", summary.frames, arguments.data.display()));
+    page.line(format_args!("{} frames of {}", summary.frames, summary.data.display()));
     if summary.values_evaluated < summary.values {
         page.line(format_args!(
             "{} of {} values count; the others, or readings they need, are missing",
@@ -161,7 +178,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         page.line(format_args!("{percent:.2} % of the frames are novel: unlike those of training"));
     }
     print::verdict(&mut page, None, &summary.verdict);
-    page.print()
+    page
 }
 
 /// Page of the evaluation.
@@ -200,7 +217,7 @@ fn page_of(
         limit: &limit,
         by_depth: &summary.by_depth,
         distribution,
-        frames: summary.frames,
+        frames: summary.frames_evaluated,
         sensor: None,
         ideal_changes: &[],
         noise: None,

@@ -88,7 +88,7 @@ fn answer(trade: &Trade) -> String {
         return format!("<section class=\"summary\">\n<p>{}</p>\n</section>\n", escape(&why));
     };
     let point = &trade.points[chosen];
-    let verdict = trade.verdict(chosen);
+    let verdict = trade.verdict_on(chosen);
     let times = &point.times;
     let mut html = format!(
         "<section class=\"summary\">\n<p><b>Chosen for {}: {}.</b> {}</p>\n<dl>\n",

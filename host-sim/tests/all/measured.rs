@@ -63,13 +63,16 @@ fn outliers_are_named_left_out_and_listed_in_json() {
 #[test]
 fn few_lines_get_few_centres_and_say_so() {
     let folder = Folder::new("measured-few");
-    write(&folder, "few.csv", &lines(50));
+    write(&folder, "few.csv", &lines(150));
     let (printed, notes) = train(&folder, "few.csv", &["--json"]);
-    assert_eq!(json(&printed)["centres"], 5);
-    assert!(notes.contains("50 lines are few for 64 centres") && notes.contains("--centres"));
-    let (_, notes) = train(&folder, "few.csv", &["--centres", "5"]);
+    assert_eq!(json(&printed)["centres"], 12);
+    assert!(notes.contains("150 lines are few for 64 centres") && notes.contains("--centres"));
+    // The default raises no warning of its own.
+    assert_eq!(json(&printed)["verdict"]["warnings"], serde_json::json!([]));
+    let (printed, notes) = train(&folder, "few.csv", &["--centres", "16", "--json"]);
     assert!(!notes.contains("are few"), "{notes}");
-    write(&folder, "many.csv", &lines(640));
+    assert_eq!(json(&printed)["verdict"]["warnings"][0]["name"], "few-frames");
+    write(&folder, "many.csv", &lines(670));
     let (_, notes) = train(&folder, "many.csv", &["--format", "fixed16"]);
     assert!(!notes.contains("are few"), "{notes}");
 }

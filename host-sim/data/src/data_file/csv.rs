@@ -22,6 +22,11 @@ pub(super) fn parse(path: &Path, bytes: &[u8], has_header: bool) -> Result<DataF
     if header.is_empty() {
         return Err(error(Problem::Empty));
     }
+    if let [only] = &header[..]
+        && let Some(separator) = only.chars().find(|c| matches!(c, ';' | '\t'))
+    {
+        return Err(error(Problem::Separator { separator }));
+    }
     if header.len() == 1
         && let Some(line) = blank_line(text)
     {

@@ -10,6 +10,7 @@ use taxel_data::progress::Progress;
 use taxel_data::{BadValue, columns};
 use taxel_learn::cost::Prices;
 use taxel_learn::decoders::BASELINES;
+use taxel_learn::outliers::Outliers;
 use taxel_learn::{ModelBlob, Options};
 use taxel_simulate::outputs::Outputs;
 
@@ -29,7 +30,7 @@ mod predict;
 mod judge;
 
 pub use choice::Bounds;
-use choice::Offer;
+use choice::{Offer, SAME_ERROR};
 pub use device::{BOARD_CLOCK_MHZ, Device, Memory, Times, Wires};
 use frames::Frames;
 use judge::Judge;
@@ -70,6 +71,8 @@ pub struct Trade {
     pub test_frames: usize,
     /// How test frames were chosen among measured ones, in words.
     pub test_choice: Option<String>,
+    /// Outliers among measured frames; `None` for a scene.
+    pub outliers: Option<Outliers>,
     /// Compiler of the code whose costs are given.
     pub compiler: String,
     /// Device whose times are given.
@@ -93,6 +96,8 @@ pub struct Trade {
     pub bounds: Bounds,
     /// Index of the point that [`Trade::choose`] picked.
     pub chosen: Option<usize>,
+    /// What that point is worth.
+    pub verdict: Option<Verdict>,
     /// Index of every point's blob: points that differ only in the exponential share one.
     #[serde(skip)]
     blobs: Vec<usize>,
@@ -109,6 +114,7 @@ impl Trade {
         let offers: Vec<Offer> = self.points.iter().map(|p| p.offer(&self.group)).collect();
         self.bounds = *bounds;
         self.chosen = bounds.choose(&offers, &named(&self.unit, &self.group))?;
+        self.verdict = self.chosen.map(|point| self.verdict_on(point));
         Ok(())
     }
 
@@ -125,12 +131,21 @@ impl Trade {
         front
     }
 
+    /// Fastest point with the smallest error, or one so near to it that it counts as equal.
+    #[must_use]
+    pub fn most_accurate(&self) -> Option<usize> {
+        let rmse = |i: &usize| self.points[*i].rmse(&self.group);
+        let front = self.front();
+        let least = front.iter().map(rmse).fold(f64::INFINITY, f64::min);
+        front.into_iter().find(|i| rmse(i) <= SAME_ERROR * least)
+    }
+
     /// Verdict on a point by the errors of the chosen group, with what its blob gives reason to beware of.
     ///
     /// # Panics
     /// If there is no such point.
     #[must_use]
-    pub fn verdict(&self, point: usize) -> Verdict {
+    pub fn verdict_on(&self, point: usize) -> Verdict {
         let of_group = |errors: &[Errors]| -> Vec<Errors> {
             errors.iter().filter(|errors| errors.group == self.group).cloned().collect()
         };
@@ -152,6 +167,7 @@ impl Trade {
             Ok(blob) => verdict.of_blob(&blob, self.training_frames),
             Err(_) => verdict,
         }
+        .of_frames(self.outliers.as_ref(), self.test_frames)
     }
 
     /// Limit of the chosen group with the first number of samples a reading.
@@ -255,6 +271,7 @@ pub fn compute(
             Subject::Scene(_) => None,
             Subject::Measured(data) => Some(data.test_choice.clone()),
         },
+        outliers: subject.measurements().map(|data| data.outliers.clone()),
         compiler: prices.compiler,
         device: plan.device,
         wires,
@@ -266,6 +283,7 @@ pub fn compute(
         left_out,
         bounds: Bounds::default(),
         chosen: None,
+        verdict: None,
         blobs,
         distinct_blobs: distinct,
     })

@@ -79,7 +79,9 @@ impl Worth {
             }
         };
         let no_limit = LimitSummary::of(&Err(Refusal::Measured));
-        let verdict = Verdict::of(&decoders, &no_limit).of_blob(blob, set.frames.frames());
+        let verdict = Verdict::of(&decoders, &no_limit)
+            .of_blob(blob, set.frames.frames())
+            .of_frames(subject.measurements().map(|data| &data.outliers), set.frames.frames());
         Self { judged_on, decoders, verdict }
     }
 }

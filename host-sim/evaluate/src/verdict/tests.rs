@@ -71,7 +71,7 @@ fn the_limit_is_named_where_it_is_known() {
     }];
     let limit = LimitSummary { frames: 10, groups, refused: None };
     let sentence = Verdict::of(&all, &limit).sentence;
-    assert!(sentence.ends_with("The least possible error is 0.0310 mm (× 1.50)."), "{sentence}");
+    assert!(sentence.ends_with("That is 1.50 times the least possible error."), "{sentence}");
 }
 
 #[test]
@@ -110,6 +110,8 @@ fn a_model_that_has_learnt_nothing_is_called_that() {
 fn every_warning_is_raised_and_left_out() {
     let raised = [
         (Warning::few_frames(829, 64, 18), "few-frames"),
+        (Warning::few_test_frames(29), "few-test-frames"),
+        (Warning::trained_on(true), "judged-by-training-data"),
         (Warning::out_of_range(0.0101), "readings-out-of-range"),
         (Warning::larger_than_slot(131_057), "larger-than-slot"),
         (Warning::padded_centres(8, 16), "padded-centres"),
@@ -124,13 +126,15 @@ fn every_warning_is_raised_and_left_out() {
     }
     let left_out = [
         Warning::few_frames(830, 64, 18),
+        Warning::few_test_frames(30),
+        Warning::trained_on(false),
         Warning::out_of_range(0.0099),
         Warning::larger_than_slot(131_056),
         Warning::padded_centres(16, 16),
         Warning::outliers(&outliers(0)),
         Warning::costly_gate(99.0, 100.0),
     ];
-    assert_eq!(left_out, [const { None }; 6]);
+    assert_eq!(left_out, [const { None }; 8]);
 }
 
 #[test]
@@ -146,4 +150,28 @@ fn a_model_that_is_as_good_as_linear_is_warned_of() {
     let gains =
         "75 to 90 % below always predicting the mean, and 0 to 67 % below the best linear decoder";
     assert!(verdict.sentence.contains(gains), "{verdict:?}");
+}
+
+#[test]
+fn outputs_that_do_not_change_or_have_no_frames_are_named() {
+    let all = decoders(&[
+        ("network", &[("f_n", 0.0), ("g_n", f64::NAN), ("h_n", 0.1)]),
+        ("mean", &[("f_n", 0.0), ("g_n", f64::NAN), ("h_n", 1.0)]),
+    ]);
+    assert_eq!(
+        Verdict::of(&all, &no_limit()).sentence,
+        "The model decodes h_n to 0.100 mm: 90 % below always predicting the mean. f_n does not change in these \
+         frames: there is nothing to decode. g_n has no frame to judge by."
+    );
+}
+
+#[test]
+fn centres_are_as_many_as_frames_allow_without_a_warning() {
+    for (frames, inputs, centres) in
+        [(640, 2, 60), (300, 12, 16), (50, 12, 4), (3, 2, 2), (9999, 18, 980)]
+    {
+        assert_eq!(Warning::enough_frames_for(frames, inputs), centres, "{frames}");
+        let few = Warning::few_frames(frames, centres, inputs);
+        assert_eq!(few.is_some(), centres <= 4, "{frames}");
+    }
 }

@@ -9,6 +9,9 @@ pub const SLOT_BYTES: usize = 131_056;
 /// Frames for each weight of a network below which a warning is due.
 pub const FRAMES_A_WEIGHT: usize = 10;
 
+/// Number of frames to judge by below which a warning is due.
+pub const FEW_TEST_FRAMES: usize = 30;
+
 /// Share of readings outside the training range above which a warning is due.
 pub const OUT_OF_RANGE: f64 = 0.01;
 
@@ -38,7 +41,7 @@ impl Warning {
         Self::when(!groups.is_empty(), "no-gain-over-mean", || {
             let groups = groups.join(", ");
             format!(
-                "{groups}: no better than always predicting the mean; do not use these estimates"
+                "{groups}: at most 2 % better than always predicting the mean; do not use these estimates"
             )
         })
     }
@@ -49,8 +52,36 @@ impl Warning {
         Self::when(!groups.is_empty(), "no-gain-over-linear", || {
             let groups = groups.join(", ");
             format!(
-                "{groups}: the best linear decoder is as good; fewer centres would do for these"
+                "{groups}: a linear decoder is as good or better, so a network gains nothing there"
             )
+        })
+    }
+
+    /// Most centres for which so many training `frames` of `inputs` raise no [warning](Self::few_frames): a multiple of
+    /// four, which f32 does not pad; four at least.
+    #[must_use]
+    pub fn enough_frames_for(frames: usize, inputs: usize) -> usize {
+        let centres = (frames / FRAMES_A_WEIGHT).saturating_sub(inputs + 1);
+        (centres / 4 * 4).max(4).min(frames.saturating_sub(1).max(1))
+    }
+
+    /// Fewer than [`FEW_TEST_FRAMES`] frames to judge by.
+    #[must_use]
+    pub fn few_test_frames(frames: usize) -> Option<Self> {
+        Self::when(frames < FEW_TEST_FRAMES, "few-test-frames", || {
+            let plural = if frames == 1 { " is" } else { "s are" };
+            format!(
+                "{frames} frame{plural} few to judge by, and the errors may say nothing of others: give \
+                 {FEW_TEST_FRAMES} or more"
+            )
+        })
+    }
+
+    /// Model that is judged by the file that it was trained on.
+    #[must_use]
+    pub fn trained_on(same_file: bool) -> Option<Self> {
+        Self::when(same_file, "judged-by-training-data", || {
+            "the model was trained on this file, which flatters it: judge it by other frames".into()
         })
     }
 
@@ -63,7 +94,8 @@ impl Warning {
         Self::when(frames < needed, "few-frames", || {
             format!(
                 "{frames} training frames are few for {weights} weights an output (K = {centres}): give {needed} or \
-                 more, or lower --centres"
+                 more{}",
+                if centres > 4 { ", or lower --centres" } else { "" }
             )
         })
     }

@@ -157,7 +157,7 @@ fn line_of(trade: &Trade, i: usize) -> String {
 /// The chosen point in words, and what to do with it.
 fn choice(page: &mut Page, trade: &Trade, chosen: usize, folder: &Path) {
     let point = &trade.points[chosen];
-    let verdict = trade.verdict(chosen);
+    let verdict = trade.verdict_on(chosen);
     wrapped(page, &format!("Chosen: {}. {}", point.name(), verdict.sentence));
     wrapped(page, &cost(point));
     for warning in &verdict.warnings {
@@ -178,10 +178,10 @@ fn choice(page: &mut Page, trade: &Trade, chosen: usize, folder: &Path) {
 /// What the ends of the front are worth, where nothing is chosen.
 fn no_choice(page: &mut Page, trade: &Trade) {
     let front = trade.front();
-    let (Some(fastest), Some(best)) = (front.first(), front.last()) else { return };
-    for (end, i) in [("The fastest", *fastest), ("The most accurate", *best)] {
+    let (Some(fastest), Some(best)) = (front.first(), trade.most_accurate()) else { return };
+    for (end, i) in [("The fastest", *fastest), ("The most accurate", best)] {
         let point = &trade.points[i];
-        let sentence = trade.verdict(i).sentence;
+        let sentence = trade.verdict_on(i).sentence;
         wrapped(page, &format!("{end}: {}. {sentence} {}", point.name(), cost(point)));
     }
     if !trade.bounds.any() {

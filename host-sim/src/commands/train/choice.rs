@@ -28,7 +28,7 @@ pub fn choose(
     if arguments.centres.is_empty() && subject.scene().is_none() && options.centres < usual {
         let (frames, centres) = (set.frames.frames(), options.centres);
         eprintln!(
-            "note: {frames} lines are few for {usual} centres, so {centres} are the default, one for ten lines; \
+            "note: {frames} lines are few for {usual} centres, so the default is {centres}; \
              choose with --centres"
         );
     }

@@ -135,3 +135,13 @@ fn lines_of_a_file_without_a_header_are_counted_from_its_first() {
         assert!(message.contains(says), "{message}");
     }
 }
+
+#[test]
+fn other_separators_are_named() {
+    for (text, separator) in [("a;b\n1;2\n", ';'), ("a\tb\n1\t2\n", '\t')] {
+        let refused = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap_err();
+        let named = matches!(&refused, Error::File { problem: Problem::Separator { separator: s }, .. } if *s == separator);
+        assert!(named, "{text:?}: {refused}");
+    }
+    assert!(parse(Path::new("test.csv"), b"a\n1\n", false).is_ok());
+}

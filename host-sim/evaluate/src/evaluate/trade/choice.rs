@@ -8,7 +8,7 @@ use super::device::Times;
 use crate::error::{Bounded, NoPoint, Unmet};
 
 /// Ratio of errors that test frames do not tell apart: RMSEs of thousands of frames scatter by more.
-const SAME_ERROR: f64 = 1.005;
+pub(super) const SAME_ERROR: f64 = 1.005;
 
 /// Bounds that a user sets for the chosen point.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
