@@ -4,6 +4,7 @@ mod print;
 mod progress;
 mod arguments;
 mod command_line;
+mod model_outputs;
 mod scene_argument;
 mod data_notes;
 mod data_file;

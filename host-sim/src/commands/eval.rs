@@ -47,9 +47,9 @@ pub struct Arguments {
 
 #[derive(Serialize)]
 struct Summary {
-    model: PathBuf,
+    model_file: PathBuf,
     model_crc: String,
-    data: PathBuf,
+    data_file: PathBuf,
     /// What the model is worth, in words.
     verdict: Verdict,
     frames: usize,
@@ -114,9 +114,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let verdict = Verdict::of(&decoders, &LimitSummary::of(&Err(Refusal::Measured)))
         .with(Warning::out_of_range(model.share_out_of_range(&readings.values)));
     let summary = Summary {
-        model: arguments.model.clone(),
+        model_file: arguments.model.clone(),
         model_crc: format!("{:08x}", model.model().crc()),
-        data: arguments.data.clone(),
+        data_file: arguments.data.clone(),
         verdict,
         decoders,
         coverage: deviations.map_or(vec![], |deviations: Vec<f64>| {

@@ -61,7 +61,9 @@ pub struct Plan {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Trade {
     /// Name of the scene, or of the data.
-    pub scene: String,
+    pub subject: String,
+    /// Seed of every random draw.
+    pub seed: u64,
     /// Noise level of one sample, as a fraction; 0 for measured data, which has its own.
     pub noise_level: f64,
     /// Number of frames to train on.
@@ -84,7 +86,7 @@ pub struct Trade {
     /// Ratios to the limit are to that of the point's own number of samples.
     pub limit: Option<LimitSummary>,
     /// Errors of the baselines, from one sample a reading.
-    pub baselines: Vec<DecoderErrors>,
+    pub decoders: Vec<DecoderErrors>,
     /// Every point that was judged.
     pub points: Vec<Point>,
     /// Formats that cannot hold a network of some settings, and why.
@@ -93,6 +95,8 @@ pub struct Trade {
     pub bounds: Bounds,
     /// Index of the point that [`Trade::choose`] picked.
     pub chosen: Option<usize>,
+    /// What the chosen point is worth, in words.
+    pub verdict: Option<Verdict>,
     /// Index of every point's blob: points that differ only in the exponential share one.
     #[serde(skip)]
     blobs: Vec<usize>,
@@ -109,6 +113,7 @@ impl Trade {
         let offers: Vec<Offer> = self.points.iter().map(|p| p.offer(&self.group)).collect();
         self.bounds = *bounds;
         self.chosen = bounds.choose(&offers, &named(&self.unit, &self.group))?;
+        self.verdict = self.chosen.map(|point| self.verdict(point));
         Ok(())
     }
 
@@ -136,7 +141,7 @@ impl Trade {
         };
         let Point { errors, samples_averaged, .. } = &self.points[point];
         let network = DecoderErrors { decoder: "network".into(), errors: of_group(errors) };
-        let baselines = self.baselines.iter().map(|baseline| DecoderErrors {
+        let baselines = self.decoders.iter().map(|baseline| DecoderErrors {
             decoder: baseline.decoder.clone(),
             errors: of_group(&baseline.errors),
         });
@@ -162,7 +167,7 @@ impl Trade {
 
     /// Groups of outputs, with their units.
     pub fn groups(&self) -> impl Iterator<Item = (&str, &str)> {
-        let errors = self.baselines.first().map_or(&[][..], |baseline| &baseline.errors);
+        let errors = self.decoders.first().map_or(&[][..], |baseline| &baseline.errors);
         errors.iter().map(|errors| (errors.group.as_str(), errors.unit.as_str()))
     }
 
@@ -244,7 +249,8 @@ pub fn compute(
         fitted.map(|it| metrics::judge(it.as_ref(), &frames.test, &frames.measure)).collect()
     });
     Ok(Trade {
-        scene: subject.name().into(),
+        subject: subject.name().into(),
+        seed: subject.origin().seed,
         noise_level: subject.scene().map_or(0.0, |scene| scene.world.noise.level),
         training_frames: subject.training_frames(),
         test_frames: subject.test_frames(),
@@ -258,11 +264,12 @@ pub fn compute(
         group: group.into(),
         unit: unit.into(),
         limit: limits.into_iter().next(),
-        baselines,
+        decoders: baselines,
         points,
         left_out,
         bounds: Bounds::default(),
         chosen: None,
+        verdict: None,
         blobs,
         distinct_blobs: distinct,
     })
