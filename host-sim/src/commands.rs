@@ -3,6 +3,7 @@
 mod print;
 mod progress;
 mod arguments;
+mod model_argument;
 mod command_line;
 mod model_outputs;
 mod scene_argument;

@@ -8,7 +8,7 @@ use taxel_data::table::Table;
 use taxel_learn::cost::{Cost, Design, Prices};
 use taxel_learn::decoders::BASELINES;
 use taxel_learn::outliers::Outliers;
-use taxel_learn::{Decoder, Exponential, ModelBlob, PreparedModel};
+use taxel_learn::{Decoder, Exponential, ModelBlob, Options, PreparedModel};
 use taxel_simulate::{Synthesis, World};
 
 use crate::by_depth::{DepthErrors, by_depth};
@@ -133,18 +133,22 @@ pub struct RowErrors {
     pub errors: Vec<Errors>,
 }
 
-/// Trains on `subject`, judges the model and returns its results and the blob.
+/// Trains on `subject` with `options`, judges the model and returns its results and the blob.
 ///
 /// # Errors
 /// [`Error`](crate::Error) for a subject whose model cannot be trained or packed.
-pub fn run(subject: &Subject, progress: &dyn Progress) -> Result<(RunResult, ModelBlob)> {
+pub fn run(
+    subject: &Subject,
+    options: &Options,
+    progress: &dyn Progress,
+) -> Result<(RunResult, ModelBlob)> {
     progress.stage("read or synthesise", 2);
     let training = subject.training_set(1);
     progress.step();
     let test = subject.test_set(1);
     progress.step();
 
-    let blob = training.blob(&subject.options(), progress)?;
+    let blob = training.blob(options, progress)?;
     let network = blob.prepare(Exponential::default()).of_inputs();
 
     let (measure, limit) = subject.measure(1, progress);
@@ -175,7 +179,7 @@ pub fn run(subject: &Subject, progress: &dyn Progress) -> Result<(RunResult, Mod
         seed: training.origin.seed,
         scene: None,
         data: None,
-        model: model_summary(subject, &training, &network, &blob)?,
+        model: model_summary(&training, (options, test.frames()), &network, &blob)?,
         device_cost: DeviceCost::of(&blob)?,
         decoders,
         limit,
@@ -242,17 +246,17 @@ fn scene_summary(world: &World, shown: &Distribution) -> SceneSummary {
 }
 
 fn model_summary(
-    subject: &Subject,
     training: &TrainingSet<'_>,
+    (options, test_frames): (&Options, usize),
     prepared: &PreparedModel<'_>,
     blob: &ModelBlob,
 ) -> Result<ModelSummary> {
-    let (model, options) = (prepared.model(), subject.options());
+    let model = prepared.model();
     let shape = model.shape();
     let frames = Prices::accepted()?.frames(&Design::of(blob), Exponential::default())?;
     Ok(ModelSummary {
         training_frames: training.frames.frames(),
-        test_frames: subject.test_frames(),
+        test_frames,
         networks: model.networks().count(),
         inputs_per_network: model.projection().map_or(shape.inputs, |it| it.features()),
         projected_readings: model.projection().map_or(0, |_| shape.rows * shape.inputs),

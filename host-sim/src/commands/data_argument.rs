@@ -143,6 +143,10 @@ impl DataArguments {
             let message = "holding out frames leaves none to train on: give more, or --test FILE";
             return Err(Error::Unfit { path: path.into(), message: message.into() });
         }
+        if split.test.frames() == 0 && !matches!(judged, JudgedBy::None) {
+            let message = "there is no frame to judge by: give five lines or more, or --test FILE";
+            return Err(Error::Unfit { path: path.into(), message: message.into() });
+        }
         let training = frames.subset(&split.training);
         let fold_of = match given_folds {
             Some(folds) => split.training.iter().map(|frame| folds[*frame]).collect(),

@@ -9,8 +9,9 @@ use host_sim::report::{self, Made};
 use host_sim::run::{self, RunResult};
 use host_sim::subject::Subject;
 use taxel_data::output;
-use taxel_learn::ModelBlob;
+use taxel_learn::{ModelBlob, Options};
 
+use super::model_argument::ModelArguments;
 use super::subject_argument::SubjectArgument;
 use super::{Common, command_line, print};
 
@@ -29,6 +30,18 @@ const FILES: [&str; 4] = ["model.bin", "metrics.json", "table1.csv", "report.htm
 pub struct Arguments {
     #[command(flatten)]
     subject: SubjectArgument,
+    /// Centres K of each network [default: the scene's, or 64].
+    #[arg(long, value_name = "K")]
+    centres: Option<usize>,
+    /// Width σ on scaled inputs, where refinement starts [default: the scene's, or 0.8; half of that for
+    /// `--whole-array`].
+    #[arg(long, value_name = "S")]
+    spread: Option<f64>,
+    /// Ridge penalty on squared weights, for each frame, as `train` takes it.
+    #[arg(long, value_name = "P", allow_negative_numbers = true)]
+    penalty: Option<f64>,
+    #[command(flatten)]
+    model: ModelArguments,
     /// Folder that receives a folder named after the scene.
     #[arg(short, long, value_name = "DIR", default_value = DEFAULT_OUTPUT)]
     output: PathBuf,
@@ -36,22 +49,36 @@ pub struct Arguments {
 
 impl Default for Arguments {
     fn default() -> Self {
-        Self { subject: SubjectArgument::default(), output: DEFAULT_OUTPUT.into() }
+        Self {
+            subject: SubjectArgument::default(),
+            centres: None,
+            spread: None,
+            penalty: None,
+            model: ModelArguments::default(),
+            output: DEFAULT_OUTPUT.into(),
+        }
     }
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let subject = arguments.subject.load(common)?;
+    let mut options = arguments.model.over(subject.options());
+    options.centres = arguments.centres.unwrap_or(options.centres);
+    options.spread = arguments.spread.unwrap_or(options.spread);
+    options.penalty = arguments.penalty.or(options.penalty);
+    options.check(subject.training_frames())?;
     let folder = arguments.output.join(subject.name());
-    output::in_folder(&folder, || run_into(&folder, &subject, &arguments.subject.paths(), common))
+    output::in_folder(&folder, || {
+        for file in FILES {
+            output::check_writable(&folder.join(file), &arguments.subject.paths())?;
+        }
+        run_into(&folder, &subject, &options, common)
+    })
 }
 
-fn run_into(folder: &Path, subject: &Subject, inputs: &[&Path], common: &Common) -> Result<()> {
-    for file in FILES {
-        output::check_writable(&folder.join(file), inputs)?;
-    }
+fn run_into(folder: &Path, subject: &Subject, options: &Options, common: &Common) -> Result<()> {
     let started = std::time::Instant::now();
-    let (result, blob) = run::run(subject, &Terminal::new())?;
+    let (result, blob) = run::run(subject, options, &Terminal::new())?;
     let command = command_line::of_this_process("run", &["-o", "--output"], Some(result.seed));
     let files = write_files(folder, &result, &blob, command)?;
     if common.json {

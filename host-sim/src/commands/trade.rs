@@ -54,7 +54,7 @@ pub struct Arguments {
     #[arg(long, value_name = "N", value_delimiter = ',', default_value = "1")]
     average: Vec<usize>,
     /// Gates to try besides none: tolerances in standard deviations of the averaged noise; `none` for no
-    /// gate [default: 3.5 if the scene's noise is relative].
+    /// gate [default: 3.5 if the scene's noise is relative, or a CSV file has a --baseline].
     #[arg(long, value_name = "K,…", value_delimiter = ',', allow_negative_numbers = true)]
     gate: Vec<GateOption>,
     /// Outputs that determine the front and the choice, such as dz_mm [default: the last].
@@ -249,8 +249,12 @@ fn output_ranks(given: &[RankOption]) -> Result<Vec<usize>> {
 /// Gates that are asked for, or the one that docs/gating.md recommends where the noise allows one.
 fn gate_k(given: &[GateOption], subject: &Subject) -> Result<Vec<f64>> {
     if given.is_empty() {
-        let Some(scene) = subject.scene() else { return Ok(vec![]) };
-        return Ok(match gate::check_noise(&scene.world) {
+        let usual = match subject {
+            Subject::Scene(scene) => gate::check_noise(&scene.world),
+            Subject::Measured(data) if data.rest.is_none() => return Ok(vec![]),
+            Subject::Measured(data) => gate::Rest::of(data, &[RECOMMENDED_K]).map(|_| ()),
+        };
+        return Ok(match usual {
             Ok(()) => vec![RECOMMENDED_K],
             Err(cause) => {
                 eprintln!("note: no points behind a gate: {cause}");

@@ -13,10 +13,9 @@ use serde::Serialize;
 use taxel_data::{columns, output};
 use taxel_learn::outliers::Outliers;
 use taxel_learn::select::Selection;
-use taxel_learn::train::WHOLE_ARRAY_SPREAD;
 
-use super::arguments::format;
 use super::data_argument::JudgedBy;
+use super::model_argument::ModelArguments;
 use super::model_outputs::{self, ModelOutput};
 use super::subject_argument::SubjectOptions;
 use super::{Common, print};
@@ -28,7 +27,6 @@ mod choice;
 /// A CSV file trains one network for all selected columns. If the columns have the project's own names
 /// (r4c17_ohm, r4e2_dz_mm), it trains one for each row-wire.
 #[derive(Args)]
-#[expect(clippy::struct_excessive_bools, reason = "each is an option")]
 #[command(after_help = "Examples:
   host-sim train press -o press.bin
   host-sim train press --whole-array --centres 256 --output-rank 24 --format fixed16 -o press.bin
@@ -55,24 +53,8 @@ pub struct Arguments {
     /// frames together, or 1e-7 a frame if refined].
     #[arg(long, value_name = "P", value_delimiter = ',', allow_negative_numbers = true)]
     penalty: Vec<f64>,
-    /// Train without the affine tail A·x.
-    #[arg(long)]
-    no_affine: bool,
-    /// Train one network for all rows, behind a projection of all readings, instead of one a row. It is
-    /// more accurate, and faster from K = 64 on, but one missing reading leaves nothing to decode.
-    #[arg(long)]
-    whole_array: bool,
-    /// Features that --whole-array projects all readings to [default: as many as a row has readings, or 18 for outputs
-    /// that belong to no row].
-    #[arg(long, value_name = "F", allow_negative_numbers = true)]
-    features: Option<usize>,
-    /// Let the network of --whole-array compute R components, which are expanded to all outputs once a frame. With many
-    /// centres that takes fewer cycles and less flash; a small R loses accuracy (docs/projection.md).
-    #[arg(long, value_name = "R")]
-    output_rank: Option<usize>,
-    /// Number format of the weights [default: the scene's, or f32].
-    #[arg(long, value_name = "FORMAT", value_parser = format())]
-    format: Option<Format>,
+    #[command(flatten)]
+    model: ModelArguments,
     /// Choose K, spread and penalty among the candidates by cross-validation, and print every score. Best values at
     /// an edge of default spreads and penalties are looked beyond; other edges are named.
     #[arg(long)]
@@ -131,16 +113,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let joined = arguments.subject.data.file.join().unwrap_or(source);
     output::check_writable(&arguments.output, &[source, baseline, joined])?;
     let subject = load(arguments, common)?;
-    let mut options = subject.options();
+    let mut options = arguments.model.over(subject.options());
     let set = subject.training_set(1);
-    options.affine_tail &= !arguments.no_affine;
-    if arguments.whole_array && !options.whole_array {
-        options.whole_array = true;
-        options.spread *= WHOLE_ARRAY_SPREAD;
-    }
-    options.features = arguments.features.or(options.features);
-    options.output_rank = arguments.output_rank.or(options.output_rank);
-    options.format = arguments.format.unwrap_or(options.format);
     if arguments.select && options.whole_array {
         return Err(Error::Usage(
             "--select chooses for one network a row: give --centres, --spread and --penalty with --whole-array".into(),

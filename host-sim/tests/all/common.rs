@@ -75,6 +75,14 @@ impl Drop for Folder {
     }
 }
 
+/// Printed JSON without the time that the command took, which differs from run to run.
+pub fn untimed(json: &str) -> String {
+    let lines = json.lines().filter(|line| !line.starts_with("  \"seconds\": "));
+    let untimed = lines.collect::<Vec<_>>().join("\n");
+    assert!(untimed.lines().count() < json.lines().count(), "no time in {json}");
+    untimed
+}
+
 /// Built-in scene without refinement, which takes tests too long.
 pub fn unrefined(scene: &str) -> Experiment {
     let mut experiment = Experiment::load(scene).unwrap();

@@ -133,7 +133,8 @@ fn a_run_with_relative_inputs_says_so_and_shows_changes_from_rest() {
     scene.training.relative_inputs = true;
     scene.world.drift = Some(Drift { gain: 0.02 });
     let (result, blob) =
-        host_sim::run::run(&Subject::Scene(Box::new(scene.clone())), &Silent).unwrap();
+        host_sim::run::run(&Subject::Scene(Box::new(scene.clone())), &scene.options(), &Silent)
+            .unwrap();
     assert!(blob.parse().metadata().relative_inputs && result.model.relative_inputs);
     let summary = result.scene.as_ref().unwrap();
     assert_eq!(summary.gain_drift, 0.02);

@@ -170,6 +170,17 @@ fn a_csv_file_with_frames_at_rest_has_a_gate() {
     assert!(of("woken") < 0.01 && line["missed"].as_array().unwrap().is_empty(), "{line}");
     let page = folder.succeed(&both);
     assert!(page.contains("With k = 3.5 the gate skips 50 % of the rows"), "{page}");
+    // A trade judges the same gate.
+    let trade = ["trade", "touched.csv", "--inputs", "ch*", "--outputs", "f_n", "--no-refine"];
+    let options = ["--baseline", "rest.csv", "--centres", "8", "--scan-ms", "1", "--json"];
+    let traded: serde_json::Value =
+        serde_json::from_str(&folder.succeed(&[&trade[..], &options].concat())).unwrap();
+    let points = traded["points"].as_array().unwrap();
+    let cycles = |gated: bool| {
+        let of = points.iter().filter(|point| point["gate_k"].is_null() != gated);
+        of.map(|point| point["cycles"].as_u64().unwrap()).min().unwrap()
+    };
+    assert!(cycles(true) < cycles(false), "{points:?}");
     let frames = folder.fail(&[&both[..], &["-n", "10"]].concat(), 2);
     assert!(frames.contains("--frames is for a scene"), "{frames}");
 }

@@ -111,3 +111,48 @@ fn selection_prints_penalties_and_names_the_edge() {
             .contains("--fold-blocks picks lines of a CSV file")
     );
 }
+
+#[test]
+fn run_judges_a_csv_file_by_its_last_fifth_or_fold_or_another_file() {
+    let folder = Folder::new("measured-run");
+    let all = lines(500);
+    write(&folder, "all.csv", &all);
+    write(&folder, "test.csv", &all[..80]);
+    write(&folder, "short.csv", &all[..4]);
+    let run = |file: &'static str, more: &[&'static str]| {
+        let usual =
+            ["run", file, "--inputs", "a,b", "--outputs", "y", "--no-refine", "--centres", "8"];
+        [&usual[..], more].concat()
+    };
+    let result = json(&folder.succeed(&run("all.csv", &["--json"])));
+    assert_eq!(
+        (&result["model"]["training_frames"], &result["model"]["test_frames"]),
+        (&400.into(), &100.into())
+    );
+    assert_eq!(result["data"]["test_frames"], "the last fifth");
+    let rmse = |decoder: usize| result["decoders"][decoder]["errors"][0]["rmse"].as_f64().unwrap();
+    assert!(rmse(0) < 0.5 * rmse(1) && rmse(1) < rmse(2), "{result}");
+    // The same frames, trained and judged by the other commands.
+    write(&folder, "first.csv", &all[..400]);
+    write(&folder, "last.csv", &all[400..]);
+    train(&folder, "first.csv", &["--centres", "8"]);
+    let evaluated = json(&folder.succeed(&["eval", "m.bin", "last.csv", "--json"]));
+    assert_eq!(evaluated["decoders"][0]["errors"][0]["rmse"].as_f64(), Some(rmse(0)));
+    let page = std::fs::read_to_string(folder.path("out/all/report.html")).unwrap();
+    assert!(page.contains("Data “all”") && page.contains("the last fifth"), "{page}");
+
+    let told = json(&folder.succeed(&run("all.csv", &["--test", "test.csv", "--json"])));
+    assert_eq!(
+        (&told["model"]["training_frames"], &told["model"]["test_frames"]),
+        (&500.into(), &80.into())
+    );
+    let words = folder.succeed(&run("all.csv", &[]));
+    assert!(
+        words.contains("The model decodes y to ") && words.contains("Next: open out"),
+        "{words}"
+    );
+    let none = folder.fail(&run("short.csv", &[]), 2);
+    assert!(none.contains("no frame to judge by"), "{none}");
+    let other = folder.fail(&run("all.csv", &["--test", "m.bin"]), 2);
+    assert!(other.contains("m.bin"), "{other}");
+}

@@ -20,6 +20,7 @@ use crate::metrics::{self, DecoderErrors, Errors, LimitSummary, NETWORK};
 mod frames;
 
 use frames::GateFrames;
+pub use frames::Rest;
 
 /// Deformations in mm beyond which a row that is skipped counts as missed.
 pub const MISSED_OVER_MM: [f64; 4] = [0.02, 0.05, 0.1, 0.2];
@@ -334,6 +335,11 @@ impl Gate {
         let world = frames.world();
         let readings = rows_of_a_model_row(world) * world.sensor.column_wires;
         Self { baseline, readings, whole_array }
+    }
+
+    /// Gate of measured frames of so many `rows`, with this `baseline` on one line.
+    pub fn at(baseline: Table, rows: usize, whole_array: bool) -> Self {
+        Self { readings: baseline.names.len() / rows, baseline, whole_array }
     }
 
     /// Upper bound by [`woken_by_theory`]; the array wakes with any of its rows.

@@ -251,7 +251,10 @@ pub fn compute(
     Ok(Trade {
         subject: subject.name().into(),
         seed: subject.origin().seed,
-        noise_level: subject.scene().map_or(0.0, |scene| scene.world.noise.level),
+        noise_level: match subject {
+            Subject::Scene(scene) => scene.world.noise.level,
+            Subject::Measured(data) => data.noise_level().unwrap_or(0.0),
+        },
         training_frames: subject.training_frames(),
         test_frames: subject.test_frames(),
         test_choice: match subject {
@@ -299,26 +302,21 @@ fn check(subject: &Subject, plan: &Plan) -> std::result::Result<(), BadValue> {
         return Err(BadValue::new("output-rank", 0, "a network computes one component at least"));
     }
     plan.device.check()?;
-    let Subject::Scene(experiment) = subject else { return check_measured(plan) };
-    if !plan.gate_k.is_empty() {
-        // Averaging only lowers the noise.
-        gate::check(&experiment.world, &plan.gate_k)
-            .map_err(|bad| if bad.field == "k" { bad.named("gate") } else { bad })?;
-    }
-    Ok(())
-}
-
-/// Checks what can be varied of measured frames, which are as they are.
-fn check_measured(plan: &Plan) -> std::result::Result<(), BadValue> {
-    if let Some(samples) = plan.samples_averaged.iter().find(|samples| **samples != 1) {
+    if let Subject::Measured(_) = subject
+        && let Some(samples) = plan.samples_averaged.iter().find(|samples| **samples != 1)
+    {
         let rule = "measured readings are averaged already: give 1, or a scene";
         return Err(BadValue::new("average", samples, rule));
     }
-    if let Some(k) = plan.gate_k.first() {
-        let rule = "only a scene tells the noise of readings that a gate needs: give none";
-        return Err(BadValue::new("gate", k, rule));
+    if plan.gate_k.is_empty() {
+        return Ok(());
     }
-    Ok(())
+    let gates = match subject {
+        // Averaging only lowers the noise.
+        Subject::Scene(scene) => gate::check(&scene.world, &plan.gate_k),
+        Subject::Measured(data) => gate::Rest::of(data, &plan.gate_k).map(|_| ()),
+    };
+    gates.map_err(|bad| if bad.field == "k" { bad.named("gate") } else { bad })
 }
 
 /// Networks to try: one for each row, and one for the array of several rows; that alone where outputs belong to no row.

@@ -186,3 +186,32 @@ fn missing_values_and_tables_without_outputs_are_no_obstacle() {
     assert_eq!(found.len(), 1);
     assert_eq!((found[0].line, found[0].column.as_str()), (202, "ch2"));
 }
+
+#[test]
+fn wild_values_do_not_hide_each_other() {
+    let clean = measured(1000, 1);
+    for ratio in [1.01, 1.5, 2.5, 4.0, 30.0] {
+        let mut two = clean.clone();
+        two.inputs.values[6 * 17] = 1e6;
+        two.inputs.values[6 * 530] = 1e6 / ratio;
+        let lines: Vec<u64> = outliers(&two).found.iter().map(|outlier| outlier.line).collect();
+        assert_eq!(lines, [19, 532], "ratio {ratio}");
+    }
+    let mut random = Random::new(9, Stream::Test, Purpose::Noise, 0, 0);
+    for draw in 0..20 {
+        let mut three = clean.clone();
+        for line in [3, 400, 999] {
+            three.inputs.values[6 * line] = random.between([1000.0, 65_535.0]);
+        }
+        assert_eq!(outliers(&three).found.len(), 3, "draw {draw}");
+    }
+}
+
+#[test]
+fn a_rare_event_of_an_output_that_is_else_constant_stays() {
+    let mut slips = measured(1000, 1);
+    for (line, outputs) in slips.outputs.values.chunks_exact_mut(2).enumerate() {
+        outputs[1] = if line % 250 == 3 { 1.0 } else { 0.0 };
+    }
+    assert_none(&slips);
+}

@@ -77,6 +77,45 @@ impl GateFrames {
         settings: &Settings,
         progress: &dyn Progress,
     ) -> Result<Self, BadValue> {
+        let rest = Rest::of(data, &settings.k)?;
+        let (measure, limit) = Subject::Measured(Box::new(data.clone())).measure(1, progress);
+        let rows = data.test.rows;
+        Ok(Self {
+            name: data.name.clone(),
+            seed: data.options.seed,
+            noise_level: rest.noise_level,
+            baseline_frames: rest.baseline_frames,
+            rows,
+            gate: Gate::at(rest.baseline, rows, model.model().projection().is_some()),
+            readings: data.test_readings.clone(),
+            outputs: data.test.outputs.clone(),
+            untouched: rest.untouched,
+            sizes_mm: None,
+            measure,
+            limit,
+        })
+    }
+}
+
+/// What measured frames of the untouched sensor tell.
+pub struct Rest {
+    /// Relative noise of a reading, as a fraction.
+    pub noise_level: f64,
+    /// Mean of the first half of the frames, on one line.
+    pub(in super::super) baseline: Table,
+    /// Number of frames of that half.
+    pub(super) baseline_frames: usize,
+    /// Readings of the second half.
+    pub(super) untouched: Table,
+}
+
+impl Rest {
+    /// Frames of `data` at rest, which must allow gates with tolerances `k` in standard deviations of the noise.
+    ///
+    /// # Errors
+    /// [`BadValue`] for a sensor that is not known at rest or has no noise there, or the first tolerance that makes no
+    /// gate.
+    pub fn of(data: &Measurements, k: &[f64]) -> Result<Self, BadValue> {
         let rule = "a gate compares readings with those at rest: give --baseline FILE, with two frames of the \
                     untouched sensor or more, and no channel that is zero at rest";
         let at_rest = data.rest.as_ref().filter(|rest| rest.len() > 1);
@@ -89,33 +128,13 @@ impl GateFrames {
                 "the gate's tolerance is k times it: give frames at rest with the sensor's noise";
             return Err(BadValue::new("noise at rest", noise_level, rule));
         }
-        check_tolerances(noise_level, &settings.k)?;
-        let columns = rest.names.len();
+        check_tolerances(noise_level, k)?;
         let baseline_frames = rest.len() / 2;
-        let (first, second) = rest.values.split_at(baseline_frames * columns);
+        let (first, second) = rest.values.split_at(baseline_frames * rest.names.len());
         let table = |values: &[f64]| Table { names: rest.names.clone(), values: values.to_vec() };
         let first = table(first);
         let baseline = Table { values: first.means(), names: first.names };
-        let (measure, limit) = Subject::Measured(Box::new(data.clone())).measure(1, progress);
-        let rows = data.test.rows;
-        Ok(Self {
-            name: data.name.clone(),
-            seed: data.options.seed,
-            noise_level,
-            baseline_frames,
-            rows,
-            gate: Gate {
-                baseline,
-                readings: columns / rows,
-                whole_array: model.model().projection().is_some(),
-            },
-            readings: data.test_readings.clone(),
-            outputs: data.test.outputs.clone(),
-            untouched: table(second),
-            sizes_mm: None,
-            measure,
-            limit,
-        })
+        Ok(Self { noise_level, baseline, baseline_frames, untouched: table(second) })
     }
 }
 

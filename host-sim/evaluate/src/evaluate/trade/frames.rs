@@ -58,9 +58,12 @@ impl<'s> Frames<'s> {
         let features = subject.options().features;
         let inputs = |&whole_array: &bool| {
             let projection = whole_array.then(|| projection::fit(&set.frames, features));
-            let gates = match subject.scene().filter(|_| !plan.gate_k.is_empty()) {
-                Some(scene) => gates(scene, noise_level, &test, (whole_array, &plan.gate_k)),
-                None => Gates::none(&test),
+            let gates = match subject {
+                _ if plan.gate_k.is_empty() => Gates::none(&test),
+                Subject::Scene(scene) => {
+                    gates(scene, noise_level, &test, (whole_array, &plan.gate_k))
+                }
+                Subject::Measured(data) => Gates::measured(data, &plan.gate_k, whole_array)?,
             };
             Ok(Inputs { projection: projection.transpose()?, gates })
         };

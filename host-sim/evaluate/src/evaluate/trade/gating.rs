@@ -1,11 +1,13 @@
 //! Points behind a gate: untouched rows are not decoded but take the outputs of the baseline.
 
+use taxel_data::BadValue;
 use taxel_data::dataset::Dataset;
 use taxel_data::table::Table;
 use taxel_learn::relative;
 use taxel_simulate::Synthesis;
 
-use super::super::gate::{BASELINE_FRAMES, Gate, gated, has_sessions, share};
+use super::super::gate::{BASELINE_FRAMES, Gate, Rest, gated, has_sessions, share};
+use crate::measurements::Measurements;
 
 /// Untouched rows of the test frames for every k. They depend on the readings alone, not on the decoder.
 pub(super) struct Gates {
@@ -35,6 +37,27 @@ impl Gates {
     ) -> Self {
         let sessions = has_sessions(frames.world(), relative_inputs).then_some(readings.len());
         let gate = Gate::new(frames, BASELINE_FRAMES, whole_array, sessions);
+        Self::behind(gate, noise_level, readings, k, relative_inputs)
+    }
+
+    /// Gates of measured test frames with these tolerances `k`.
+    ///
+    /// # Errors
+    /// [`BadValue`] for a sensor that is not known at rest.
+    pub fn measured(data: &Measurements, k: &[f64], whole_array: bool) -> Result<Self, BadValue> {
+        let rest = Rest::of(data, k)?;
+        let gate = Gate::at(rest.baseline, data.test.rows, whole_array);
+        let relative_inputs = data.test.relative_inputs;
+        Ok(Self::behind(gate, rest.noise_level, &data.test_readings, k, relative_inputs))
+    }
+
+    fn behind(
+        gate: Gate,
+        noise_level: f64,
+        readings: &Table,
+        k: &[f64],
+        relative_inputs: bool,
+    ) -> Self {
         let at_rest = |&k: &f64| {
             let rows = gate.at_rest(readings, k * noise_level);
             AtRest { k, share: share(&rows), rows }

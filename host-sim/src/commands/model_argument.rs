@@ -1,0 +1,46 @@
+//! Options of a model, over those of its scene or the usual ones.
+
+use clap::Args;
+use model_core::rbf::Format;
+use taxel_learn::Options;
+use taxel_learn::train::WHOLE_ARRAY_SPREAD;
+
+use super::arguments::format;
+
+/// What a model computes, and how its numbers are held.
+#[derive(Args, Default)]
+pub struct ModelArguments {
+    /// Train without the affine tail A·x.
+    #[arg(long)]
+    no_affine: bool,
+    /// Train one network for all rows, behind a projection of all readings, instead of one a row. It is
+    /// more accurate, and faster from K = 64 on, but one missing reading leaves nothing to decode.
+    #[arg(long)]
+    whole_array: bool,
+    /// Features that --whole-array projects all readings to [default: as many as a row has readings, or 18 for outputs
+    /// that belong to no row].
+    #[arg(long, value_name = "F", allow_negative_numbers = true)]
+    features: Option<usize>,
+    /// Let the network of --whole-array compute R components, which are expanded to all outputs once a frame. With many
+    /// centres that takes fewer cycles and less flash; a small R loses accuracy (docs/projection.md).
+    #[arg(long, value_name = "R")]
+    output_rank: Option<usize>,
+    /// Number format of the weights [default: the scene's, or f32].
+    #[arg(long, value_name = "FORMAT", value_parser = format())]
+    format: Option<Format>,
+}
+
+impl ModelArguments {
+    /// `options` with what was given.
+    pub fn over(&self, mut options: Options) -> Options {
+        options.affine_tail &= !self.no_affine;
+        if self.whole_array && !options.whole_array {
+            options.whole_array = true;
+            options.spread *= WHOLE_ARRAY_SPREAD;
+        }
+        options.features = self.features.or(options.features);
+        options.output_rank = self.output_rank.or(options.output_rank);
+        options.format = self.format.unwrap_or(options.format);
+        options
+    }
+}
