@@ -5,6 +5,7 @@ mod progress;
 mod arguments;
 mod model_argument;
 mod command_line;
+mod model_outputs;
 mod scene_argument;
 mod data_notes;
 mod data_file;

@@ -47,9 +47,10 @@ enum Command {
 }
 
 impl Command {
-    /// Name of the command, as it is typed.
-    fn name(&self) -> &'static str {
-        match self {
+    /// Name of the command, as it is typed; with the action of `link`.
+    fn name(&self) -> String {
+        let name = match self {
+            Self::Link(arguments) => return format!("link {}", arguments.action_name()),
             Self::Run(_) => "run",
             Self::Synth(_) => "synth",
             Self::Forward(_) => "forward",
@@ -65,16 +66,16 @@ impl Command {
             Self::Limit(_) => "limit",
             Self::Confidence(_) => "confidence",
             Self::Emulate(_) => "emulate",
-            Self::Link(_) => "link",
             Self::Join(_) => "join",
-        }
+        };
+        name.into()
     }
 }
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
     let command = cli.command.unwrap_or_else(|| Command::Run(run::Arguments::default()));
-    commands::begin(command.name());
+    commands::begin(&command.name());
     let outcome = match command {
         Command::Run(arguments) => run::execute(&arguments, &cli.common),
         Command::Synth(arguments) => synth::execute(&arguments, &cli.common),

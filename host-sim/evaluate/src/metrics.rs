@@ -51,6 +51,9 @@ pub struct Errors {
     pub ratio_standard_error: Option<f64>,
 }
 
+/// Name of the trained network in results.
+pub const NETWORK: &str = "network";
+
 /// Errors of one decoder.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DecoderErrors {
@@ -58,6 +61,20 @@ pub struct DecoderErrors {
     pub decoder: String,
     /// Errors by group.
     pub errors: Vec<Errors>,
+}
+
+impl DecoderErrors {
+    /// Errors of the decoder of that name.
+    #[must_use]
+    pub fn new(decoder: &str, errors: Vec<Errors>) -> Self {
+        Self { decoder: decoder.into(), errors }
+    }
+}
+
+/// Errors of one of the `decoders`, by its name; empty if it is not among them.
+#[must_use]
+pub fn of_decoder<'d>(decoders: &'d [DecoderErrors], name: &str) -> &'d [Errors] {
+    decoders.iter().find(|it| it.decoder == name).map_or(&[], |it| &it.errors)
 }
 
 /// Limit of a scene that results are given beside.

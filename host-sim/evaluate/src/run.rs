@@ -33,7 +33,7 @@ pub struct RunResult {
     /// Name of the scene or data set.
     pub subject: String,
     /// CRC-64/XZ of its file, in hexadecimal.
-    pub digest: String,
+    pub scene_digest: String,
     /// Seed of every random draw.
     pub seed: u64,
     /// What only a scene knows; `None` for measurements.
@@ -43,7 +43,7 @@ pub struct RunResult {
     /// Model that was trained.
     pub model: ModelSummary,
     /// What the model asks of a device.
-    pub device: DeviceCost,
+    pub device_cost: DeviceCost,
     /// Errors on the test frames, by decoder and group.
     pub decoders: Vec<DecoderErrors>,
     /// Least possible errors, of a decoder that sees all readings of a frame.
@@ -51,7 +51,7 @@ pub struct RunResult {
     /// Errors of the network by the depth of the contact, if that is an output.
     pub by_depth: Vec<DepthErrors>,
     /// Errors of the network by row-wire; nothing for outputs that belong to no row-wire.
-    pub rows: Vec<RowErrors>,
+    pub by_row: Vec<RowErrors>,
     /// Distribution of the network's errors on the test frames, and frames to look at.
     pub distribution: Distribution,
     /// Table 1, if the scene asks for it.
@@ -62,7 +62,7 @@ pub struct RunResult {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DataSummary {
     /// How the test frames were chosen, in words.
-    pub test_frames: String,
+    pub test_choice: String,
     /// Values far from all others in their column.
     pub outliers: Outliers,
     /// Inputs that never change in training; a network cannot use them.
@@ -99,7 +99,7 @@ pub struct ModelSummary {
     /// Number of networks in the blob.
     pub networks: usize,
     /// Number of inputs of each network: its row's readings, or features of all readings.
-    pub inputs: usize,
+    pub inputs_per_network: usize,
     /// Number of readings that are projected to these features; 0 without a projection.
     pub projected_readings: usize,
     /// Whether inputs are readings relative to the baseline.
@@ -107,7 +107,7 @@ pub struct ModelSummary {
     /// Number of centres of each network (the largest).
     pub centres: usize,
     /// Number of outputs of each network: its row's outputs, those of all rows, or components of these.
-    pub outputs: usize,
+    pub outputs_per_network: usize,
     /// Number of outputs that such components are expanded to; 0 without an expansion.
     pub expanded_outputs: usize,
     /// Width σ on scaled inputs; after refinement the mean over the networks.
@@ -121,7 +121,7 @@ pub struct ModelSummary {
     /// CRC-32 of the blob, in hexadecimal.
     pub model_crc: String,
     /// What decoding a frame costs a Cortex-M4F, without a gate.
-    pub frame: Cost,
+    pub frame_cost: Cost,
 }
 
 /// Errors of the network on one row-wire.
@@ -176,16 +176,16 @@ pub fn run(
     let mut result = RunResult {
         verdict,
         subject: subject.name().into(),
-        digest: format!("{:016x}", training.origin.digest),
+        scene_digest: format!("{:016x}", training.origin.digest),
         seed: training.origin.seed,
         scene: None,
         data: None,
         model: model_summary(&training, (options, test.frames()), &network, &blob)?,
-        device: DeviceCost::of(&blob)?,
+        device_cost: DeviceCost::of(&blob)?,
         decoders,
         limit,
         by_depth: by_depth(&test.outputs, &estimate.values, &measure),
-        rows: by_row(subject, &test, &estimate, &measure),
+        by_row: by_row(subject, &test, &estimate, &measure),
         distribution,
         table1: None,
     };
@@ -198,7 +198,7 @@ pub fn run(
         }
         Subject::Measured(data) => {
             result.data = Some(DataSummary {
-                test_frames: data.test_choice.clone(),
+                test_choice: data.test_choice.clone(),
                 outliers: data.outliers.clone(),
                 constant_inputs: data.constant_inputs(),
             });
@@ -258,18 +258,18 @@ fn model_summary(
         training_frames: training.frames.frames(),
         test_frames,
         networks: model.networks().count(),
-        inputs: model.projection().map_or(shape.inputs, |it| it.features()),
+        inputs_per_network: model.projection().map_or(shape.inputs, |it| it.features()),
         projected_readings: model.projection().map_or(0, |_| shape.rows * shape.inputs),
         relative_inputs: model.metadata().relative_inputs,
         centres: model.networks().map(|n| n.shape().centres).max().unwrap_or(0),
-        outputs: model.networks().next().map_or(0, |n| n.shape().outputs),
+        outputs_per_network: model.networks().next().map_or(0, |n| n.shape().outputs),
         expanded_outputs: model.expansion().map_or(0, |expansion| expansion.outputs()),
         spread: if training.refine { blob.spread() } else { options.spread },
         refined: training.refine,
         affine_tail: options.affine_tail,
         blob_bytes: blob.bytes().len(),
         model_crc: format!("{:08x}", model.crc()),
-        frame: frames.ungated,
+        frame_cost: frames.ungated,
     })
 }
 

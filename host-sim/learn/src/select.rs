@@ -42,7 +42,7 @@ pub struct Selection {
     /// All candidates, by K, then spread, then penalty; then those that the grid was extended by.
     pub scored: Vec<Scored>,
     /// Index in `scored` of the lowest score (the first among equals).
-    pub best: usize,
+    pub chosen: usize,
     /// Settings whose best value is the smallest or largest tried, where a better one may lie beyond.
     pub edges: Vec<Edge>,
     /// Baselines on the same folds, for comparison.
@@ -62,7 +62,7 @@ impl Selection {
     /// Candidate with the lowest score.
     #[must_use]
     pub fn best(&self) -> &Scored {
-        &self.scored[self.best]
+        &self.scored[self.chosen]
     }
 }
 
@@ -98,7 +98,7 @@ pub fn cross_validate(
         best = lowest(&scored).unwrap_or(best);
     }
     let edges = grown.edges(&scored[best]);
-    Ok(Selection { edges, best, scored, baselines: judge.baselines() })
+    Ok(Selection { edges, chosen: best, scored, baselines: judge.baselines() })
 }
 
 /// Index of the lowest score, the first among equals.

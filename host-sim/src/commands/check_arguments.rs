@@ -209,7 +209,7 @@ fn page_of(f: &Findings) -> print::Page {
             ),
         );
     }
-    line("exponential", d.kernel.clone());
+    line("exponential", d.exponential.clone());
     line(
         "frames",
         format!(

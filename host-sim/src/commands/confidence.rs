@@ -38,7 +38,9 @@ pub struct Arguments {
 
 #[derive(Serialize)]
 struct Summary {
-    scene: String,
+    subject: String,
+    seed: u64,
+    model_crc: String,
     frames: usize,
     coverage: Vec<Coverage>,
     detections: Vec<Detection>,
@@ -70,7 +72,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let ratios_95 = model.model().confidence().map_or(&[][..], |it| it.ratios_95());
     let estimates = of_inputs.decode_lines(&test.inputs.values);
     let summary = Summary {
-        scene: scene.name.clone(),
+        subject: scene.name.clone(),
+        seed: scene.world.seed,
+        model_crc: format!("{:08x}", model.model().crc()),
         frames: arguments.frames,
         coverage: coverage(&test.outputs, &estimates, &deviations, ratios_95),
         detections: detections(&scene, &model, arguments.frames),
@@ -81,7 +85,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let mut page = print::Page::default();
     page.line(format_args!(
         "{} test frames of scene {}; intervals should cover 68.3 % and 95 % of the errors",
-        summary.frames, summary.scene
+        summary.frames, summary.subject
     ));
     self::page(&mut page, &summary.coverage);
     page.line("");

@@ -54,10 +54,11 @@ pub struct Arguments {
 
 #[derive(Serialize)]
 struct Summary {
+    model_crc: String,
     frames: usize,
     frames_with_missing_readings: usize,
     /// Number of novel frames, if confidence was asked for.
-    novel_frames: Option<usize>,
+    frames_novel: Option<usize>,
     exponential: Exponential,
     file: PathBuf,
 }
@@ -89,9 +90,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let frames = inputs.chunks_exact(readings.names.len());
     let incomplete = frames.filter(|frame| frame.iter().any(|v| is_missing(*v))).count();
     let summary = Summary {
+        model_crc: format!("{:08x}", model.model().crc()),
         frames: estimate.len(),
         frames_with_missing_readings: incomplete,
-        novel_frames: assessed.map(|(_, novelty)| novelty.iter().filter(|n| **n > 0.0).count()),
+        frames_novel: assessed.map(|(_, novelty)| novelty.iter().filter(|n| **n > 0.0).count()),
         exponential: arguments.exponential,
         file: arguments.output.clone(),
     };
@@ -100,7 +102,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     }
     let mut page = print::Page::default();
     page.line(format_args!("{} frames decoded into {}", summary.frames, summary.file.display()));
-    if let Some(novel) = summary.novel_frames {
+    if let Some(novel) = summary.frames_novel {
         page.line(format_args!("{novel} of them are novel: unlike the frames of training"));
     }
     if incomplete > 0 {

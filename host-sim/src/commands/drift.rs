@@ -43,7 +43,7 @@ fn page_of(result: &DriftResult) -> print::Page {
     let mut page = print::Page::default();
     page.line(format_args!(
         "{}: gain drift ±{} %, seed {}, {} training and {} test frames",
-        result.scene,
+        result.subject,
         (result.gain * 1e6).round() / 1e4,
         result.seed,
         result.training_frames,

@@ -47,9 +47,9 @@ pub struct Arguments {
 
 #[derive(Serialize)]
 struct Summary {
-    model: PathBuf,
+    model_file: PathBuf,
     model_crc: String,
-    data: PathBuf,
+    data_file: PathBuf,
     /// What the model is worth, in words.
     verdict: Verdict,
     frames: usize,
@@ -125,9 +125,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         .with(Warning::trained_on(same_file))
         .with(Warning::out_of_range(model.share_out_of_range(&readings.values)));
     let summary = Summary {
-        model: arguments.model.clone(),
+        model_file: arguments.model.clone(),
         model_crc: format!("{:08x}", model.model().crc()),
-        data: arguments.data.clone(),
+        data_file: arguments.data.clone(),
         verdict,
         decoders,
         coverage: deviations.map_or(vec![], |deviations: Vec<f64>| {
@@ -158,7 +158,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 /// Result for people.
 fn text_of(summary: &Summary) -> print::Page {
     let mut page = print::Page::default();
-    page.line(format_args!("{} frames of {}", summary.frames, summary.data.display()));
+    page.line(format_args!("{} frames of {}", summary.frames, summary.data_file.display()));
     if summary.values_evaluated < summary.values {
         page.line(format_args!(
             "{} of {} values count; the others, or readings they need, are missing",

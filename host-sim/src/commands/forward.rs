@@ -28,6 +28,7 @@ pub struct Arguments {
 
 #[derive(Serialize)]
 struct Summary {
+    subject: String,
     frames: usize,
     readings: usize,
     file: PathBuf,
@@ -41,8 +42,12 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let names = scene.world.reading_names();
     let lines = readings.chunks_exact(names.len()).map(|line| line.iter().copied());
     csv_file::write(&arguments.output, names.iter().map(String::as_str), lines)?;
-    let summary =
-        Summary { frames: file.lines(), readings: names.len(), file: arguments.output.clone() };
+    let summary = Summary {
+        subject: scene.name.clone(),
+        frames: file.lines(),
+        readings: names.len(),
+        file: arguments.output.clone(),
+    };
     if common.json {
         return print::json(&summary);
     }

@@ -11,6 +11,7 @@ use host_sim::metrics::Errors;
 use host_sim::subject::Subject;
 use host_sim::verdict::{Verdict, Warning};
 use host_sim::{Error, Result};
+use serde::Serialize;
 use taxel_learn::cost::{Design, Frames, Prices};
 use taxel_learn::{Exponential, PreparedModel};
 
@@ -84,7 +85,17 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         Subject::Measured(data) => gate::measure_data(data, &model, &settings, &Terminal::new()),
     };
     let result = result.map_err(|bad| of_option(bad, &OPTIONS))?;
-    if common.json { print::json(&result) } else { page_of(&result).print() }
+    let verdict = verdict(&result);
+    let summary = Summary { result, verdict };
+    if common.json { print::json(&summary) } else { page_of(&summary).print() }
+}
+
+#[derive(Serialize)]
+struct Summary {
+    #[serde(flatten)]
+    result: GateResult,
+    /// What the recommended gate saves, and costs in accuracy.
+    verdict: Verdict,
 }
 
 /// Frames of a scene unless a user says otherwise.
@@ -146,11 +157,12 @@ fn given(cycles: &[u64]) -> Result<Option<Frames<u64>>> {
     }
 }
 
-fn page_of(result: &GateResult) -> print::Page {
+fn page_of(summary: &Summary) -> print::Page {
+    let Summary { result, verdict } = summary;
     let mut page = print::Page::default();
     page.line(format_args!(
         "{}: {} frames of {} row{}, {} untouched; noise {}; baseline of {} frames; seed {}, model {}\n",
-        result.scene,
+        result.subject,
         result.frames,
         result.rows,
         if result.rows == 1 { "" } else { "s" },
@@ -163,7 +175,7 @@ fn page_of(result: &GateResult) -> print::Page {
     rows(&mut page, result);
     errors(&mut page, result);
     frames_cost(&mut page, result);
-    print::verdict(&mut page, None, &verdict(result));
+    print::verdict(&mut page, None, verdict);
     page.line(
         "\nk: a row counts as untouched if every reading, and their sum, lies within k standard deviations of\n\
          the baseline. tolerance: k × noise, for a device's configuration.\n\
@@ -233,7 +245,7 @@ fn verdict(result: &GateResult) -> Verdict {
     let Some(line) = result.lines.iter().min_by(|a, b| near(a).total_cmp(&near(b))) else {
         return Verdict { sentence: String::new(), warnings: vec![] };
     };
-    let worse = line.errors.iter().zip(&result.ungated_errors).map(|(gated, ungated)| {
+    let worse = line.errors.iter().zip(result.ungated_errors()).map(|(gated, ungated)| {
         format!("{} by {:.1} %", gated.group, 100.0 * (gated.rmse / ungated.rmse - 1.0))
     });
     let worse: Vec<String> = worse.collect();
@@ -250,7 +262,7 @@ fn verdict(result: &GateResult) -> Verdict {
 }
 
 fn errors(page: &mut print::Page, result: &GateResult) {
-    let header = result.ungated_errors.iter();
+    let header = result.ungated_errors().iter();
     let header = header.map(|group| format!(" {:>10}    {:>12}", group.group, "× limit"));
     page.line(format_args!("{:<19}{}", "RMSE", header.collect::<String>()));
     let mut line = |what: String, errors: &[Errors]| {
@@ -259,11 +271,11 @@ fn errors(page: &mut print::Page, result: &GateResult) {
         });
         page.line(format_args!("{what:<19}{}", cells.collect::<String>().trim_end()));
     };
-    line("without a gate".into(), &result.ungated_errors);
+    line("without a gate".into(), result.ungated_errors());
     for Line { k, errors, .. } in &result.lines {
         line(format!("k = {k}"), errors);
     }
-    line("predicting the mean".into(), &result.mean_errors);
+    line("predicting the mean".into(), result.mean_errors());
     page.line(result.limit.note());
     page.line("");
 }

@@ -13,6 +13,7 @@ use taxel_learn::cost::{Cost, DecoderRam, Design, Frames, Prices};
 use taxel_learn::{Exponential, ModelBlob};
 use taxel_rig::error::image_for;
 
+use super::model_outputs::{self, ModelOutput};
 use super::{Common, print};
 
 /// Show a blob's shape, origin, training errors and needs on a device.
@@ -25,8 +26,8 @@ pub struct Arguments {
 
 #[derive(Serialize)]
 struct Summary {
+    subject: String,
     format_version: u8,
-    name: String,
     model_crc: String,
     scene_digest: String,
     rows: usize,
@@ -45,16 +46,18 @@ struct Summary {
     noise_level: f32,
     seed: u64,
     training_frames: u32,
-    flash_bytes: usize,
-    ram_bytes: DecoderRam,
+    blob_bytes: usize,
+    /// Memory that decoding takes, and its parts.
+    ram_bytes: usize,
+    ram_parts_bytes: DecoderRam,
     /// Whether the images have room in RAM for a copy of the blob.
     weights_in_ram: bool,
     /// Why the images as they are cannot decode the model.
     needs: Vec<String>,
     /// What decoding a frame costs a Cortex-M4F.
-    frame: Frames<Cost>,
+    frame_costs: Frames<Cost>,
     inputs: Vec<ColumnSummary>,
-    outputs: Vec<OutputSummary>,
+    outputs: Vec<ModelOutput>,
 }
 
 #[derive(Serialize)]
@@ -68,7 +71,8 @@ struct ConfidenceSummary {
 struct NetworkSummary {
     format: &'static str,
     centres: usize,
-    width: Vec<f32>,
+    /// Widths σ of the centres on scaled inputs; one for all of them, or one each.
+    spread: Vec<f64>,
     affine_tail: bool,
 }
 
@@ -76,12 +80,12 @@ impl NetworkSummary {
     /// Line for people.
     fn line(&self) -> String {
         let (low, high) = self
-            .width
+            .spread
             .iter()
-            .fold((f32::INFINITY, 0.0_f32), |(low, high), w| (low.min(*w), high.max(*w)));
-        let width = if low == high { digits(low) } else { digits(low) + "…" + &digits(high) };
+            .fold((f64::INFINITY, 0.0_f64), |(low, high), w| (low.min(*w), high.max(*w)));
+        let spread = if low == high { digits(low) } else { digits(low) + "…" + &digits(high) };
         let tail = if self.affine_tail { ", affine tail" } else { "" };
-        format!("{}, K = {}, width {width}{tail}", self.format, self.centres)
+        format!("{}, K = {}, spread {spread}{tail}", self.format, self.centres)
     }
 }
 
@@ -89,14 +93,6 @@ impl NetworkSummary {
 struct ColumnSummary {
     name: String,
     unit: String,
-}
-
-#[derive(Serialize)]
-struct OutputSummary {
-    name: String,
-    unit: String,
-    training_rmse: f32,
-    full_scale: f32,
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
@@ -114,16 +110,15 @@ fn summarise(blob: &ModelBlob) -> Result<Summary> {
     let networks = model.networks().map(|network| NetworkSummary {
         format: network.format().name(),
         centres: network.shape().centres,
-        width: network.widths().collect(),
+        spread: network.widths().map(as_given).collect(),
         affine_tail: network.has_affine_tail(),
     });
     let column =
         |(name, unit): (&str, &str)| ColumnSummary { name: name.into(), unit: unit.into() };
-    let errors = metadata.training_rmse.iter().zip(metadata.full_scale.iter());
-    let outputs = metadata.output_names.iter().zip(metadata.output_units.iter()).zip(errors);
+    let ram = DecoderRam::of(&design);
     Ok(Summary {
+        subject: metadata.name.into(),
         format_version: model_core::blob::FORMAT_VERSION,
-        name: metadata.name.into(),
         model_crc: format!("{:08x}", model.crc()),
         scene_digest: format!("{:016x}", metadata.scene_digest),
         rows: shape.rows,
@@ -142,20 +137,14 @@ fn summarise(blob: &ModelBlob) -> Result<Summary> {
         noise_level: metadata.noise_level,
         seed: metadata.seed,
         training_frames: metadata.training_frames,
-        flash_bytes: blob.bytes().len(),
-        ram_bytes: DecoderRam::of(&design),
+        blob_bytes: blob.bytes().len(),
+        ram_bytes: ram.bytes(),
+        ram_parts_bytes: ram,
         weights_in_ram: design.weights_in_ram,
         needs: needs(&model, blob.bytes().len()),
-        frame: Prices::accepted()?.frames(&design, Exponential::default())?,
+        frame_costs: Prices::accepted()?.frames(&design, Exponential::default())?,
         inputs: metadata.input_names.iter().zip(metadata.input_units.iter()).map(column).collect(),
-        outputs: outputs
-            .map(|((name, unit), (training_rmse, full_scale))| OutputSummary {
-                name: name.into(),
-                unit: unit.into(),
-                training_rmse,
-                full_scale,
-            })
-            .collect(),
+        outputs: model_outputs::of(&model),
     })
 }
 
@@ -193,8 +182,14 @@ fn costs(cost: Cost, weights_in_ram: bool) -> String {
     )
 }
 
-/// Digits of a width as it was given: the blob's rounded number lies a little beside.
-fn digits(width: f32) -> String {
+/// Width with the digits that f32 surely holds: the blob's number lies a little beside the one that was given.
+fn as_given(width: f32) -> f64 {
+    let digits = format!("{width:.5e}").parse();
+    digits.unwrap_or(width.into())
+}
+
+/// Four decimals of a width at most.
+fn digits(width: f64) -> String {
     let text = format!("{width:.4}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
@@ -205,7 +200,7 @@ const SHOWN: usize = 24;
 fn page_of(s: &Summary) -> print::Page {
     let mut page = print::Page::default();
     let mut line = |label: &str, value: String| page.line(format_args!("{label:<17} {value}"));
-    line("model", format!("{:?}, format {}, CRC-32 {}", s.name, s.format_version, s.model_crc));
+    line("model", format!("{:?}, format {}, CRC-32 {}", s.subject, s.format_version, s.model_crc));
     line("trained on", format!("{} frames, digest {}", s.training_frames, s.scene_digest));
     let noise = match s.noise_kind.as_str() {
         "none" => "none added".to_owned(),
@@ -242,8 +237,8 @@ fn page_of(s: &Summary) -> print::Page {
         line(&label, alike[0].clone());
         index = last + 1;
     }
-    line("flash", format!("{} bytes", s.flash_bytes));
-    let ram = &s.ram_bytes;
+    line("flash", format!("{} bytes", s.blob_bytes));
+    let ram = &s.ram_parts_bytes;
     let parts = [
         ("decoder", ram.decoder),
         ("frame", ram.frame),
@@ -260,21 +255,21 @@ fn page_of(s: &Summary) -> print::Page {
         .map(|(name, bytes)| format!("{name} {bytes}"))
         .collect();
     let weights = if s.weights_in_ram {
-        format!("the images copy the blob's {} bytes to RAM, and decode there", s.flash_bytes)
+        format!("the images copy the blob's {} bytes to RAM, and decode there", s.blob_bytes)
     } else {
         format!(
             "decoded from flash: the blob does not fit into the images' {WEIGHT_RAM_BYTES} bytes"
         )
     };
-    line("RAM", format!("{} bytes: {}", ram.bytes(), parts.join(", ")));
+    line("RAM", format!("{} bytes: {}", s.ram_bytes, parts.join(", ")));
     line("weights", weights);
     for need in &s.needs {
         line("device", need.clone());
     }
     for (label, cost) in [
-        ("a frame", s.frame.ungated),
-        ("gated, at rest", s.frame.at_rest),
-        ("gated, touched", s.frame.awake),
+        ("a frame", s.frame_costs.ungated),
+        ("gated, at rest", s.frame_costs.at_rest),
+        ("gated, touched", s.frame_costs.awake),
     ] {
         line(label, costs(cost, s.weights_in_ram));
     }
@@ -283,7 +278,7 @@ fn page_of(s: &Summary) -> print::Page {
     line("inputs", format!("{names}{relative}"));
     page.line(format_args!("{:<17} {:>13} {:>11}", "output", "training RMSE", "full scale"));
     for output in s.outputs.iter().take(SHOWN) {
-        let OutputSummary { name, unit, training_rmse, full_scale } = output;
+        let ModelOutput { name, unit, training_rmse, full_scale } = output;
         page.line(format_args!("{name:<17} {training_rmse:>13.4} {full_scale:>11.4} {unit}"));
     }
     if s.outputs.len() > SHOWN {

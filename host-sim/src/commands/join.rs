@@ -35,10 +35,10 @@ pub struct Arguments {
 
 #[derive(Serialize)]
 struct Summary {
-    lines: usize,
+    frames: usize,
     columns: usize,
-    /// Lines of the first log without a partner.
-    left_out: usize,
+    /// Frames of the first log without a partner in the second.
+    frames_without_partner: usize,
     file: PathBuf,
 }
 
@@ -50,9 +50,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let lines = joined.rows().map(|row| row.iter().copied());
     csv_file::write(&arguments.output, joined.header.iter().map(String::as_str), lines)?;
     let summary = Summary {
-        lines: joined.lines(),
+        frames: joined.lines(),
         columns: joined.header.len(),
-        left_out: first.lines() - joined.lines(),
+        frames_without_partner: first.lines() - joined.lines(),
         file: arguments.output.clone(),
     };
     if common.json {
@@ -61,7 +61,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let mut page = print::Page::default();
     page.line(format_args!(
         "{} lines of {} columns in {}",
-        summary.lines,
+        summary.frames,
         summary.columns,
         summary.file.display()
     ));

@@ -135,7 +135,7 @@ fn page_of(result: &LimitResult, folder: Option<&Path>) -> print::Page {
     let mut page = print::Page::default();
     page.line(format_args!(
         "{}: {} noise, seed {}, {} test frames\n",
-        result.scene, result.noise_kind, result.seed, result.frames
+        result.subject, result.noise_kind, result.seed, result.frames
     ));
     limits(&mut page, result);
     page.line(
@@ -174,7 +174,7 @@ fn limits(page: &mut print::Page, result: &LimitResult) {
         for figures in &level.limits {
             page.line(limit_line(level, figures, result));
         }
-        level.models.iter().for_each(|model| page.line(model_line(level, model)));
+        level.decoders.iter().for_each(|model| page.line(model_line(level, model)));
     }
     let priors = groups.into_iter().flatten().map(|g| format!("{:>9.4}{:18}", g.prior_rmse, ""));
     page.line(format_args!("{:>7} {:<8}{}", "", "prior", priors.collect::<String>().trim_end()));
@@ -183,7 +183,7 @@ fn limits(page: &mut print::Page, result: &LimitResult) {
          RMSE of the posterior means on these frames. prior: always predicting the mean. ESS: effective samples of a\n\
          posterior, fewest and median. MC: largest share of the squared error that is the sample's own; it is subtracted.",
     );
-    if result.levels.iter().any(|level| !level.models.is_empty()) {
+    if result.levels.iter().any(|level| !level.decoders.is_empty()) {
         page.line(
             "Models: RMSE on these frames, and the ratio to the limit of all readings ± its standard error.",
         );
@@ -231,7 +231,7 @@ fn directions(page: &mut print::Page, level: &Level) {
         "RMSE in mm"
     ));
     let all = std::iter::once(("all".to_owned(), &level.observability));
-    let rows = level.rows.iter().map(|row| (row_name(&row.row_wires), row));
+    let rows = level.by_row.iter().map(|row| (row_name(&row.row_wires), row));
     for (name, seen) in all.chain(rows) {
         page.line(line_of(&name, seen));
     }

@@ -83,6 +83,24 @@ enum Action {
     Check(CheckArguments),
 }
 
+impl Arguments {
+    /// Name of the action, as it is typed.
+    pub fn action_name(&self) -> &'static str {
+        match self.action {
+            Action::Identify => "identify",
+            Action::Upload(_) => "upload",
+            Action::Record(_) => "record",
+            Action::Baseline(_) => "baseline",
+            Action::Configure(_) => "configure",
+            Action::Calibrate(_) => "calibrate",
+            Action::Recalibrate(_) => "recalibrate",
+            Action::Undo => "undo",
+            Action::Settings(_) => "settings",
+            Action::Check(_) => "check",
+        }
+    }
+}
+
 #[derive(Args)]
 struct UploadArguments {
     /// Weight blob.

@@ -39,19 +39,19 @@ fn to_stdout(text: &str) -> Result<()> {
 }
 
 /// Command that runs, and when it began.
-static BEGUN: OnceLock<(&'static str, Instant)> = OnceLock::new();
+static BEGUN: OnceLock<(String, Instant)> = OnceLock::new();
 
 /// Notes that `command` begins, for what [`json`] says of it.
-pub fn begin(command: &'static str) {
+pub fn begin(command: &str) {
     // A program runs one command.
-    let _ = BEGUN.set((command, Instant::now()));
+    let _ = BEGUN.set((command.into(), Instant::now()));
 }
 
 /// Result of a command with what all of them say (docs/json.md).
 #[derive(Serialize)]
 struct Document<'r, R> {
     version: &'static str,
-    command: &'static str,
+    command: &'r str,
     /// Time since the command began; `None` in files, which are the same whenever they are written.
     #[serde(skip_serializing_if = "Option::is_none")]
     seconds: Option<f64>,
@@ -65,7 +65,7 @@ pub fn json_text(result: &impl Serialize) -> Result<String> {
 }
 
 fn document(result: &impl Serialize, timed: bool) -> Result<String> {
-    let &(command, begun) = BEGUN.get_or_init(|| ("", Instant::now()));
+    let (command, begun) = BEGUN.get_or_init(|| (String::new(), Instant::now()));
     let document = Document {
         version: env!("CARGO_PKG_VERSION"),
         command,

@@ -46,14 +46,14 @@ fn page_of(result: &ReadoutResult) -> print::Page {
     let mut page = print::Page::default();
     page.line(format_args!(
         "{}: {} frames without noise, seed {}, model {}",
-        result.scene, result.frames, result.seed, result.model_crc
+        result.subject, result.frames, result.seed, result.model_crc
     ));
     page.line("error of readings: scanned/ideal − 1; RMSE: decoded against true\n");
     let cells = |of_group: fn(&Errors) -> String, errors: &[Errors]| {
         errors.iter().map(of_group).collect::<Vec<_>>().concat()
     };
     let header =
-        cells(|group| format!(" {:>13}", format!("{} RMSE", group.group)), &result.ideal_errors);
+        cells(|group| format!(" {:>13}", format!("{} RMSE", group.group)), result.ideal_errors());
     let rmse = |errors: &[Errors]| {
         cells(|group| format!(" {:>10.4} {:<2}", group.rmse, group.unit), errors)
     };
@@ -64,7 +64,7 @@ fn page_of(result: &ReadoutResult) -> print::Page {
     let without = |what: &str, errors: &[Errors]| {
         format!("{:<15} {what:<31} {:>9} {:>9} {:>8}{}", "-", "-", "-", "-", rmse(errors))
     };
-    page.line(without("ideal readings", &result.ideal_errors));
+    page.line(without("ideal readings", result.ideal_errors()));
     for line in &result.lines {
         page.line(format_args!(
             "{:<15} {:<31} {:>7.3} % {:>7.3} % {:>8}{}",
@@ -76,7 +76,7 @@ fn page_of(result: &ReadoutResult) -> print::Page {
             rmse(&line.errors)
         ));
     }
-    page.line(without("predicting the mean", &result.mean_errors));
+    page.line(without("predicting the mean", result.mean_errors()));
     if let Some(conclusion) = conclusion(result) {
         page.line(conclusion);
     }
@@ -92,7 +92,7 @@ fn conclusion(result: &ReadoutResult) -> Option<String> {
     let divider = of(Circuit::Divider, Stage::Everything)?;
     let zero_potential = of(Circuit::ZeroPotential, Stage::Everything)?;
     let miscalibrated = of(Circuit::ZeroPotential, Stage::Miscalibrated)?;
-    let (ideal, mean) = (z(&result.ideal_errors)?, z(&result.mean_errors)?);
+    let (ideal, mean) = (z(result.ideal_errors())?, z(result.mean_errors())?);
     (divider > mean && zero_potential < mean).then(|| {
         format!(
             "\nWith all faults the divider decodes z with {:.1} times the error of the mean; zero \

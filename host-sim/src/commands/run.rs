@@ -128,7 +128,7 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
             "{} training frames, {} test frames: {}",
             model.training_frames,
             model.test_frames,
-            data.as_ref().map_or("", |data| data.test_frames.as_str())
+            data.as_ref().map_or("", |data| data.test_choice.as_str())
         ),
     };
     page.line(format_args!("{}: {from}, seed {}", result.subject, result.seed));
@@ -139,14 +139,14 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
         {
             let readings = if model.relative_inputs { "relative readings" } else { "readings" };
             match model.projected_readings {
-                0 => format!("{} {readings}", model.inputs),
-                count => format!("{count} {readings} -> {} features", model.inputs),
+                0 => format!("{} {readings}", model.inputs_per_network),
+                count => format!("{count} {readings} -> {} features", model.inputs_per_network),
             }
         },
         model.centres,
         match model.expanded_outputs {
-            0 => format!("{} outputs", model.outputs),
-            all => format!("{} components -> {all} outputs", model.outputs),
+            0 => format!("{} outputs", model.outputs_per_network),
+            all => format!("{} components -> {all} outputs", model.outputs_per_network),
         },
         model.spread,
         if model.refined { " (refined)" } else { "" },
@@ -155,7 +155,7 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
     ));
     page.line(format_args!(
         "a frame on a Cortex-M4F: {} instructions, {} cycles at zero wait, {} from flash",
-        model.frame.instructions, model.frame.cycles, model.frame.flash_cycles
+        model.frame_cost.instructions, model.frame_cost.cycles, model.frame_cost.flash_cycles
     ));
     page.line("");
     let decoders: Vec<_> =
@@ -164,17 +164,17 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
     print::errors_legend(&mut page);
     print::wrapped(&mut page, &result.limit.note());
     print::by_depth(&mut page, &result.by_depth);
-    if !result.rows.is_empty() {
-        let wires = result.rows.iter().map(|row| row.row_wire.to_string());
+    if !result.by_row.is_empty() {
+        let wires = result.by_row.iter().map(|row| row.row_wire.to_string());
         let wires: Vec<String> = wires.collect();
         page.line(format_args!("\nnetwork RMSE by row-wire ({}):", wires.join(", ")));
     }
-    for group in result.rows.first().map_or(&[][..], |row| &row.errors) {
+    for group in result.by_row.first().map_or(&[][..], |row| &row.errors) {
         let of_row = |errors: &run::RowErrors| {
             let found = errors.errors.iter().find(|e| e.group == group.group);
             found.map_or(String::new(), |e| format!(" {:.4}", e.rmse))
         };
-        let rows: String = result.rows.iter().map(of_row).collect();
+        let rows: String = result.by_row.iter().map(of_row).collect();
         page.line(format_args!("  {:<7}{rows} {}", group.group, group.unit));
     }
     if let Some(table) = &result.table1 {

@@ -40,6 +40,7 @@ pub struct Arguments {
 
 #[derive(Serialize)]
 struct Summary {
+    subject: String,
     frames: usize,
     readings: usize,
     outputs: usize,
@@ -67,6 +68,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let lines = lines.map(|(readings, outputs)| readings.iter().chain(outputs).copied());
     csv_file::write(&arguments.output, names, lines)?;
     let summary = Summary {
+        subject: scene.name.clone(),
         frames: dataset.frames(),
         readings: dataset.inputs.names.len(),
         outputs: dataset.outputs.names.len(),

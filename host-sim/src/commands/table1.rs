@@ -7,6 +7,7 @@ use clap::Args;
 use host_sim::evaluate::table1::{self, Entry, NETWORK, PAPER_PRINTED_PERCENT, Printed, Table1};
 use host_sim::metrics::{Definition, Errors};
 use host_sim::{Error, Result};
+use serde::Serialize;
 use taxel_data::data_file::DataFile;
 use taxel_data::{columns, output};
 use taxel_learn::decoders::{mean, standard};
@@ -42,6 +43,14 @@ pub struct Arguments {
     group: String,
 }
 
+#[derive(Serialize)]
+struct Summary {
+    subject: String,
+    seed: u64,
+    #[serde(flatten)]
+    table: Table1,
+}
+
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let argument = SceneArgument::new(&arguments.scene, arguments.precision);
     let mut scene = argument.load(common)?;
@@ -66,7 +75,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         table.write_csv(path)?;
     }
     if common.json {
-        return print::json(&table);
+        return print::json(&Summary { subject: scene.name, seed: scene.world.seed, table });
     }
     page_of(&table, &arguments.group).print()
 }

@@ -119,7 +119,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let bounds = Bounds {
         error: arguments.max_error,
         cycles: arguments.max_cycles,
-        flash_bytes: arguments.max_flash,
+        blob_bytes: arguments.max_flash,
         frame_rate_hz: arguments.frame_rate,
         latency_ms: arguments.max_latency_ms,
     };

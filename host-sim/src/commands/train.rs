@@ -16,6 +16,7 @@ use taxel_learn::select::Selection;
 
 use super::data_argument::JudgedBy;
 use super::model_argument::ModelArguments;
+use super::model_outputs::{self, ModelOutput};
 use super::subject_argument::SubjectOptions;
 use super::{Common, print};
 
@@ -73,6 +74,8 @@ pub struct Arguments {
 #[derive(Serialize)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a field of the JSON")]
 struct Summary {
+    subject: String,
+    seed: u64,
     file: PathBuf,
     blob_bytes: usize,
     model_crc: String,
@@ -93,8 +96,7 @@ struct Summary {
     confidence: bool,
     /// Number formats of the networks, in their order.
     formats: Vec<&'static str>,
-    outputs: Vec<String>,
-    training_rmse: Vec<f64>,
+    outputs: Vec<ModelOutput>,
     selection: Option<Selection>,
     /// What the model is worth, beside the baselines.
     #[serde(flatten)]
@@ -135,6 +137,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         );
     }
     let summary = Summary {
+        subject: subject.name().into(),
+        seed: set.origin.seed,
         file: arguments.output.clone(),
         blob_bytes: blob.bytes().len(),
         model_crc: format!("{:08x}", model.crc()),
@@ -148,8 +152,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         relative_inputs: set.frames.relative_inputs,
         confidence: model.confidence().is_some(),
         formats: model.networks().map(|n| n.format().name()).collect(),
-        outputs: set.frames.outputs.names.clone(),
-        training_rmse: model.metadata().training_rmse.iter().map(f64::from).collect(),
+        outputs: model_outputs::of(&model),
         worth: Worth::of(&subject, &set, &blob, selection.as_ref()),
         selection,
         outliers: subject.measurements().map(|data| data.outliers.clone()),
@@ -194,7 +197,8 @@ fn load(arguments: &Arguments, common: &Common) -> Result<Subject> {
 fn page_of(summary: &Summary, asked: usize) -> print::Page {
     let mut page = print::Page::default();
     if let Some(selection) = &summary.selection {
-        let groups = columns::groups(&summary.outputs);
+        let outputs: Vec<String> = summary.outputs.iter().map(|it| it.name.clone()).collect();
+        let groups = columns::groups(&outputs);
         let names: Vec<&str> = groups.iter().map(|(group, _)| *group).collect();
         page.line(format_args!("cross-validated RMSE of {}:", names.join(", ")));
         page.line("(score: mean over the outputs of RMSE/standard deviation; 1 is the mean's)");
@@ -208,7 +212,7 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         let settings = selection.scored.iter().map(choice::settings).collect::<Vec<_>>();
         let width = settings.iter().map(String::len).max().unwrap_or(0);
         for (i, (scored, settings)) in selection.scored.iter().zip(&settings).enumerate() {
-            let mark = if i == selection.best { "  <- chosen" } else { "" };
+            let mark = if i == selection.chosen { "  <- chosen" } else { "" };
             let (score, errors) = (scored.score, pooled(&scored.rmse));
             page.line(format_args!("  {settings:<width$} score {score:.4}: {errors}{mark}"));
         }

@@ -25,13 +25,13 @@ fn directions(level: &Level) -> Chart {
         ratios.filter(|(_, r)| **r > LEAST_RATIO).map(|(i, r)| [i as f64 + 1.0, *r]).collect()
     };
     let mut series = Vec::new();
-    for (i, row) in level.rows.iter().enumerate() {
+    for (i, row) in level.by_row.iter().enumerate() {
         let name = if i == 0 { "each row by itself" } else { "" };
         let mut row = Series::new(name, "c2", Mark::LineAnd(Shape::Circle), line(row));
         row.opacity = 0.45;
         series.push(row);
     }
-    if level.rows.len() > 1 {
+    if level.by_row.len() > 1 {
         let all = line(&level.observability);
         series.push(Series::new("all readings", "c1", Mark::LineAnd(Shape::Square), all));
     }
@@ -66,7 +66,7 @@ pub fn directions_svg(result: &LimitResult) -> String {
 
 /// Page of a limit.
 pub fn html(result: &LimitResult) -> String {
-    let title = format!("Taxel: what the sensor can know, {}", result.scene);
+    let title = format!("Taxel: what the sensor can know, {}", result.subject);
     let mut body = format!(
         "<header>\n<h1>{}</h1>\n<p>{} noise; {} test frames; seed {}</p>\n</header>\n",
         escape(&title),
@@ -152,7 +152,7 @@ fn limits(result: &LimitResult) -> String {
             }
             html += "</tr>\n";
         }
-        for model in &level.models {
+        for model in &level.decoders {
             html += &model_row(level, model);
         }
     }

@@ -110,7 +110,7 @@ fn result(groups: &[&str]) -> RunResult {
     };
     RunResult {
         subject: "by <hand>".into(),
-        digest: "0123".into(),
+        scene_digest: "0123".into(),
         seed: 7,
         data: None,
         scene: Some(SceneSummary {
@@ -122,7 +122,7 @@ fn result(groups: &[&str]) -> RunResult {
             sensor: Some(sensor()),
             ideal_changes: distribution.frames.iter().map(|frame| frame.change.clone()).collect(),
         }),
-        device: DeviceCost {
+        device_cost: DeviceCost {
             cycles: 34_000,
             flash_cycles: 36_000,
             flash_us: 200.0,
@@ -141,17 +141,17 @@ fn result(groups: &[&str]) -> RunResult {
             training_frames: 1000,
             test_frames: 100,
             networks: ROW_WIRES,
-            inputs: 4,
+            inputs_per_network: 4,
             relative_inputs: false,
             centres: 9,
-            outputs: groups.len() * PER_ROW,
+            outputs_per_network: groups.len() * PER_ROW,
             expanded_outputs: 0,
             spread: 0.8,
             refined: true,
             affine_tail: true,
             blob_bytes: 12_345,
             model_crc: "deadbeef".into(),
-            frame: taxel_learn::cost::Cost {
+            frame_cost: taxel_learn::cost::Cost {
                 instructions: 20_000,
                 cycles: 34_000,
                 flash_cycles: 36_000,
@@ -165,7 +165,7 @@ fn result(groups: &[&str]) -> RunResult {
             .to_vec(),
         limit: LimitSummary::of(&Err(Refusal::Drift)),
         by_depth: vec![],
-        rows: (0..ROW_WIRES)
+        by_row: (0..ROW_WIRES)
             .map(|row| RowErrors { row_wire: row + 2, errors: of_groups(groups, 0.1) })
             .collect(),
         distribution,

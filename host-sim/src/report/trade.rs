@@ -22,7 +22,7 @@ pub fn svg(trade: &Trade) -> String {
 
 /// Page of a trade, with the `command` that computed it.
 pub fn html(trade: &Trade, command: &str) -> String {
-    let title = format!("Taxel: speed against accuracy, {}", trade.scene);
+    let title = format!("Taxel: speed against accuracy, {}", trade.subject);
     let tested = match &trade.test_choice {
         Some(choice) => format!("{} measured test frames ({choice})", grouped(trade.test_frames)),
         None => format!(
@@ -103,11 +103,11 @@ fn answer(trade: &Trade) -> String {
     let rmse = significant(point.rmse(&trade.group), 3);
     fact(&format!("RMSE of {}", symbol(&trade.group)), rmse, &trade.unit);
     if let Some(scan_ms) = times.scan_ms {
-        fact("Frames a second, at most", words::rate(times.frames_per_second), "");
+        fact("Frames a second, at most", words::rate(times.frames_per_s), "");
         fact("Scan", fixed(scan_ms, 2), "ms");
     }
     fact("Decoding", significant(1000.0 * times.decode_ms, 3), "µs");
-    fact("Blob", significant(point.flash_bytes as f64 / 1000.0, 3), "kB");
+    fact("Blob", significant(point.blob_bytes as f64 / 1000.0, 3), "kB");
     html += "</dl>\n";
     for warning in &verdict.warnings {
         let _ = writeln!(html, "<p class=\"note\">{}</p>", escape(&warning.to_string()));
@@ -119,7 +119,7 @@ fn answer(trade: &Trade) -> String {
 fn hidden_bounds(trade: &Trade) -> String {
     let bounds = taxel_evaluate::evaluate::trade::Bounds {
         cycles: trade.bounds.cycles,
-        flash_bytes: trade.bounds.flash_bytes,
+        blob_bytes: trade.bounds.blob_bytes,
         ..Default::default()
     };
     if bounds.any() {

@@ -64,7 +64,7 @@ impl<'a> View<'a> {
             title: format!("{kind} “{}”", result.subject),
             facts: facts(result, noise.as_deref()),
             verdict: &result.verdict,
-            device: &result.device,
+            device: &result.device_cost,
             decoders: &result.decoders,
             limit: &result.limit,
             by_depth: &result.by_depth,
@@ -84,23 +84,23 @@ fn facts(result: &RunResult, noise: Option<&str>) -> Vec<(&'static str, String)>
     let tail = if model.affine_tail { "affine tail" } else { "no affine tail" };
     let readings = if model.relative_inputs { "relative readings" } else { "readings" };
     let inputs = match model.projected_readings {
-        0 => format!("{} {readings}", model.inputs),
-        count => format!("{count} {readings} → {} features", model.inputs),
+        0 => format!("{} {readings}", model.inputs_per_network),
+        count => format!("{count} {readings} → {} features", model.inputs_per_network),
     };
     let outputs = match model.expanded_outputs {
-        0 => format!("{} outputs", model.outputs),
-        all => format!("{} components → {all} outputs", model.outputs),
+        0 => format!("{} outputs", model.outputs_per_network),
+        all => format!("{} components → {all} outputs", model.outputs_per_network),
     };
     let drift = match scene.as_ref().map_or(0.0, |scene| scene.gain_drift) {
         0.0 => String::new(),
         gain => format!(", gain drift ±{}", percent(gain)),
     };
     let kind = if scene.is_some() { "Scene" } else { "Data" };
-    let others = result.data.as_ref().map_or("new ones", |data| data.test_frames.as_str());
+    let others = result.data.as_ref().map_or("new ones", |data| data.test_choice.as_str());
     let refined = if model.refined { " (refined)" } else { "" };
     let plural = if model.networks == 1 { "" } else { "s" };
     vec![
-        (kind, format!("{}, digest {}, seed {}", result.subject, result.digest, result.seed)),
+        (kind, format!("{}, digest {}, seed {}", result.subject, result.scene_digest, result.seed)),
         ("Readings", format!("{}{drift}", noise.unwrap_or("as measured"))),
         (
             "Frames",

@@ -65,7 +65,7 @@ fn the_contact_is_trained_evaluated_inspected_and_run() {
     let model = json(&folder.succeed(&["inspect", "m.bin", "--json"]));
     let shape = ["rows", "inputs_per_row", "outputs_per_row", "projected_features"];
     assert_eq!(shape.map(|field| model[field].as_u64().unwrap()), [1, 144, 4, 10]);
-    assert!(model["flash_bytes"].as_u64().unwrap() < 10_000);
+    assert!(model["blob_bytes"].as_u64().unwrap() < 10_000);
     assert_eq!(model["needs"].as_array().unwrap().len(), 0, "the images take it");
 
     let printed = folder.succeed(&["run", "scene.toml"]);
@@ -83,7 +83,7 @@ fn a_file_of_contacts_trains_the_same_kind_of_model() {
     let train =
         ["train", "data.csv", "--whole-array", "--features", "6", "--no-refine", "-o", "m.bin"];
     let printed = json(&folder.succeed(&[&train[..], &["--centres", "12", "--json"]].concat()));
-    assert_eq!(printed["outputs"][3], "contact_force_n");
+    assert_eq!(printed["outputs"][3]["name"], "contact_force_n");
     let model = json(&folder.succeed(&["inspect", "m.bin", "--json"]));
     assert_eq!((model["rows"].as_u64(), model["projected_features"].as_u64()), (Some(1), Some(6)));
 }

@@ -21,7 +21,7 @@ use taxel_rig::device::{Device, Wire, request_bytes, upload};
 use taxel_rig::emulator::{self, Emulator};
 use taxel_simulate::{Synthesis, World, synthesise};
 
-const SOUND: Line = Line { one_in: None };
+pub const SOUND: Line = Line { one_in: None };
 
 pub fn press() -> World {
     World::press()
@@ -65,7 +65,7 @@ fn with_confidence(model: &ModelBlob) -> ModelBlob {
 }
 
 /// So many test frames, for a model that needs no baseline.
-fn frames_of(frames: usize) -> Frames {
+pub fn frames_of(frames: usize) -> Frames {
     let readings = synthesise(&press(), Stream::Test, frames).inputs;
     Frames { readings, baseline_ohm: None }
 }
@@ -83,7 +83,7 @@ pub fn frames() -> Vec<[[f32; 18]; 8]> {
 }
 
 /// Device with `model`, at the other end of a socket.
-fn device(line: Line, model: &ModelBlob) -> Device<TcpStream> {
+pub fn device(line: Line, model: &ModelBlob) -> Device<TcpStream> {
     Device::new(socket(line, model)).unwrap()
 }
 

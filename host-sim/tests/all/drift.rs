@@ -77,13 +77,13 @@ fn a_gate_and_a_trade_see_readings_and_baselines_of_the_same_session() {
     let (a, b) = (&still.lines[0], &drifting.lines[0]);
     assert_eq!((a.skipped, a.woken, &a.missed), (b.skipped, b.woken, &b.missed));
     assert!((z(&b.errors) / z(&a.errors) - 1.0).abs() < 0.005, "{} {}", z(&a.errors), z(&b.errors));
-    assert!(z(&b.errors) < 1.2 * z(&drifting.ungated_errors));
+    assert!(z(&b.errors) < 1.2 * z(drifting.ungated_errors()));
     // Rows at rest take the outputs for their session's baseline, and wake no more often than noise tells.
     assert!(b.skipped > 0.4 && b.woken < 1.5 * b.woken_by_theory);
     // Models of readings are behind the same gate.
     let readings = measured(&scene_of("0.05", false));
     assert_eq!(readings.lines[0].skipped, b.skipped);
-    assert!(z(&readings.ungated_errors) > 1.3 * z(&drifting.ungated_errors));
+    assert!(z(readings.ungated_errors()) > 1.3 * z(drifting.ungated_errors()));
 
     let mut scene = unrefined("press");
     (scene.training.frames, scene.training.test_frames) = (1000, 300);
@@ -120,7 +120,7 @@ fn a_baseline_that_was_scanned_with_the_same_series_resistance_cancels_it() {
         let result = readout::measure(&scene, &blob.prepare(Exponential::default()), 20).unwrap();
         let line = result.line(Circuit::ZeroPotential, Stage::Series).unwrap();
         assert!(line.readings.rms_percent > 10.0);
-        z(&line.errors) / z(&result.ideal_errors)
+        z(&line.errors) / z(result.ideal_errors())
     };
     let (readings, relative) = (at(false), at(true));
     println!("z RMSE relative to ideal readings: {readings:.2} and {relative:.2}");

@@ -34,7 +34,7 @@ fn the_command_prints_the_same_bytes_on_any_number_of_threads_and_writes_its_fil
         let apart = (0.5 * (z(1).powi(2) + z(2).powi(2))).sqrt();
         assert!(z(0) < apart, "two rows tell more than one: {limits:?}");
         assert!(limits[0]["effective_samples"]["least"].as_f64().unwrap() > 30.0);
-        assert_eq!(level["rows"].as_array().unwrap().len(), 2);
+        assert_eq!(level["by_row"].as_array().unwrap().len(), 2);
     }
     let z = |level: usize| levels[level]["limits"][0]["groups"][2]["limit"].as_f64().unwrap();
     assert!(z(0) < z(1), "less noise, less error");
@@ -77,7 +77,8 @@ fn models_are_judged_on_the_frames_of_the_limit() {
     let result = json(&folder.succeed(&[&models[..], &["--json"]].concat()));
     let level = &result["levels"][0];
     let limit = level["limits"][0]["groups"][2]["limit"].as_f64().unwrap();
-    for (model, file) in level["models"].as_array().unwrap().iter().zip(["m.bin", "relative.bin"]) {
+    for (model, file) in level["decoders"].as_array().unwrap().iter().zip(["m.bin", "relative.bin"])
+    {
         assert_eq!(model["decoder"], file);
         let errors = &model["errors"][2];
         let number = |name: &str| errors[name].as_f64().unwrap();

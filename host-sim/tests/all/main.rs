@@ -14,6 +14,7 @@ mod drift;
 mod gate;
 #[cfg(unix)]
 mod interruption;
+mod json_schema;
 mod limit;
 mod measured;
 mod readout;

@@ -132,7 +132,7 @@ fn run_judges_a_csv_file_by_its_last_fifth_or_fold_or_another_file() {
         (&result["model"]["training_frames"], &result["model"]["test_frames"]),
         (&400.into(), &100.into())
     );
-    assert_eq!(result["data"]["test_frames"], "the last fifth");
+    assert_eq!(result["data"]["test_choice"], "the last fifth");
     let rmse = |decoder: usize| result["decoders"][decoder]["errors"][0]["rmse"].as_f64().unwrap();
     assert!(rmse(0) < 0.5 * rmse(1) && rmse(1) < rmse(2), "{result}");
     // The same frames, trained and judged by the other commands.

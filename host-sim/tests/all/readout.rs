@@ -106,7 +106,7 @@ fn cross_talk_ruins_the_divider_and_spares_zero_potential() {
     let of_z = |errors: &[host_sim::metrics::Errors]| {
         errors.iter().find(|errors| errors.group == "dz_mm").unwrap().rmse
     };
-    let (ideal_mm, mean_mm) = (of_z(&result.ideal_errors), of_z(&result.mean_errors));
+    let (ideal_mm, mean_mm) = (of_z(result.ideal_errors()), of_z(result.mean_errors()));
     let (divider, zero_potential) = (Circuit::Divider, Circuit::ZeroPotential);
 
     // Measured: 6.5 % against 0.014 %, and 0.022 % once all series resistance is known.

@@ -91,18 +91,18 @@ fn every_knob_has_its_points_and_the_front_is_the_pareto_front() {
     let (fixed, float) = (find("fixed16", 64, 1), find("f32-direct", 64, 1));
     assert!(fixed.rmse("dz_mm") < 1.01 * float.rmse("dz_mm"));
     assert!(fixed.frame.cycles < float.frame.cycles / 3);
-    assert!(fixed.flash_bytes < 6 * float.flash_bytes / 10);
+    assert!(fixed.blob_bytes < 6 * float.blob_bytes / 10);
     // One network for the array has less error, in fewer cycles.
     let array = find("fixed16 array", 64, 1);
     assert!(array.rmse("dz_mm") < 0.95 * fixed.rmse("dz_mm"), "{}", array.rmse("dz_mm"));
-    assert!(array.frame.cycles < fixed.frame.cycles && array.flash_bytes < fixed.flash_bytes);
+    assert!(array.frame.cycles < fixed.frame.cycles && array.blob_bytes < fixed.blob_bytes);
     // So has one that computes few components, and it takes less flash.
     let ranked: Vec<_> = trade.points.iter().filter(|p| p.output_rank == Some(24)).collect();
     assert!(!ranked.is_empty() && ranked.iter().all(|p| p.whole_array && p.centres == 64));
     let few = ranked.iter().find(|p| p.name() == array.name().replace("64", "64, rank 24"));
     let few = few.unwrap();
     assert!(few.rmse("dz_mm") < 1.03 * array.rmse("dz_mm"), "{}", few.rmse("dz_mm"));
-    assert!(few.flash_bytes < array.flash_bytes && few.ram_bytes > array.ram_bytes);
+    assert!(few.blob_bytes < array.blob_bytes && few.ram_bytes > array.ram_bytes);
 }
 
 #[test]
@@ -119,7 +119,7 @@ fn the_chosen_blob_is_what_the_table_says() {
         assert!(!cheaper, "{} is cheaper", other.name());
     }
     let model = ModelBlob::of_bytes(trade.blob(chosen)).unwrap();
-    assert_eq!(model.bytes().len(), point.flash_bytes);
+    assert_eq!(model.bytes().len(), point.blob_bytes);
     let level = scene.world.noise.level / (point.samples_averaged as f64).sqrt();
     let frames = Synthesis::of(&scene.world).noise_level(level);
     let test = frames.frames(Stream::Test, scene.training.test_frames);
@@ -163,7 +163,7 @@ fn behind_a_gate_points_have_the_errors_of_the_gates_rows_and_cost_their_share()
         };
         let result = gate::measure(&scene, &model, &settings, &Silent).unwrap();
         assert_eq!(point.errors, result.lines[0].errors);
-        assert_eq!(without.errors, result.ungated_errors);
+        assert_eq!(without.errors, result.ungated_errors());
         let skipped = result.lines[0].skipped;
         // A press wakes some row, and with it the whole array.
         let expected = if point.whole_array { 0.0..0.4 } else { 0.4..0.8 };
@@ -301,10 +301,10 @@ fn bounds_that_no_point_meets_and_plans_that_make_no_gate_are_refused() {
     let rate = Bounds { frame_rate_hz: Some(100.0), ..Bounds::default() };
     let best = |bounds: &Bounds| all.points[chosen(bounds).unwrap()].samples_averaged;
     assert_eq!(
-        (best(&Bounds { flash_bytes: Some(131_056), ..Bounds::default() }), best(&rate)),
+        (best(&Bounds { blob_bytes: Some(131_056), ..Bounds::default() }), best(&rate)),
         (16, 1)
     );
-    let slowest = all.points.iter().map(|p| p.times.frames_per_second).fold(f64::MAX, f64::min);
+    let slowest = all.points.iter().map(|p| p.times.frames_per_s).fold(f64::MAX, f64::min);
     assert!(slowest < 12.0);
 
     // What nothing can meet is known before anything is trained: costs, and errors below the limit.
@@ -314,7 +314,7 @@ fn bounds_that_no_point_meets_and_plans_that_make_no_gate_are_refused() {
         message
     };
     let rate = refused(Bounds { frame_rate_hz: Some(1000.0), ..Bounds::default() });
-    let most = all.points.iter().map(|p| p.times.frames_per_second).fold(0.0, f64::max);
+    let most = all.points.iter().map(|p| p.times.frames_per_s).fold(0.0, f64::max);
     assert!(rate.contains(&format!("is {:.1} frames", (most * 10.0).floor() / 10.0)), "{rate}");
     let fewest = refused(Bounds { cycles: Some(100), ..Bounds::default() });
     assert!(fewest.contains(&format!("the fewest cycles are {cycles}")), "{fewest}");
@@ -399,7 +399,7 @@ fn a_pad_for_pressure_alone_and_a_contact_are_traded() {
         trade::compute(&contact, &plan, "contact_depth_mm", &bounds, &Silent).unwrap();
     contact.choose(&bounds).unwrap();
     assert!(contact.points.iter().all(|point| point.whole_array));
-    assert!(contact.points[contact.chosen.unwrap()].times.frames_per_second > 140.0);
+    assert!(contact.points[contact.chosen.unwrap()].times.frames_per_s > 140.0);
 }
 
 #[test]
@@ -424,12 +424,12 @@ fn measurements_are_traded_as_they_are() {
     );
     let page = folder.succeed(&[&other[..], &["--scan-ms", "2", "--frame-rate", "400"]].concat());
     assert!(page.contains("(2.000 ms to scan"), "{page}");
-    for (option, value) in
-        [("--average", "4"), ("--gate", "3"), ("--scan-ms", "0"), ("--frame-rate", "0")]
-    {
+    for (option, value) in [("--average", "4"), ("--scan-ms", "0"), ("--frame-rate", "0")] {
         let output = folder.run(&[&other[..], &[option, value]].concat());
         let stderr = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(2), "{stderr}");
         assert!(stderr.contains(&format!("{option} {value}: ")), "{stderr}");
     }
+    let gated = folder.fail(&[&other[..], &["--gate", "3"]].concat(), 2);
+    assert!(gated.contains("--baseline FILE"), "{gated}");
 }

@@ -36,7 +36,7 @@ pub struct Line {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DriftResult {
     /// Name of the scene.
-    pub scene: String,
+    pub subject: String,
     /// Seed of every random draw.
     pub seed: u64,
     /// Largest relative change of the gain.
@@ -108,7 +108,7 @@ pub fn measure(experiment: &Experiment, gain: f64, progress: &dyn Progress) -> R
         }));
     }
     Ok(DriftResult {
-        scene: experiment.name.clone(),
+        subject: experiment.name.clone(),
         seed: experiment.world.seed,
         gain,
         training_frames: t.frames,

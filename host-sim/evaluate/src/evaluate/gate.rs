@@ -7,6 +7,7 @@ use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
 use taxel_data::table::Table;
 use taxel_learn::cost::Frames;
+use taxel_learn::decoders::mean;
 use taxel_learn::{PreparedModel, relative};
 use taxel_simulate::noise::NoiseKind;
 pub use taxel_simulate::synth::BASELINE_FRAMES;
@@ -14,7 +15,7 @@ use taxel_simulate::{Synthesis, World};
 
 use crate::experiment::Experiment;
 use crate::measurements::Measurements;
-use crate::metrics::{self, Errors, LimitSummary};
+use crate::metrics::{self, DecoderErrors, Errors, LimitSummary, NETWORK};
 
 mod frames;
 
@@ -143,7 +144,7 @@ pub struct Line {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GateResult {
     /// Name of the scene or data.
-    pub scene: String,
+    pub subject: String,
     /// Seed of every random draw.
     pub seed: u64,
     /// Relative noise of a reading, as a fraction.
@@ -164,12 +165,24 @@ pub struct GateResult {
     pub flash_frame_cycles: Option<Frames<u64>>,
     /// Least possible errors, of a decoder that sees all readings of a frame.
     pub limit: LimitSummary,
-    /// Errors over the scene without a gate.
-    pub ungated_errors: Vec<Errors>,
-    /// Errors of always predicting the mean of these frames.
-    pub mean_errors: Vec<Errors>,
+    /// Errors over the scene: of the network without a gate, then of always predicting the mean of these frames.
+    pub decoders: Vec<DecoderErrors>,
     /// Results by tolerance.
     pub lines: Vec<Line>,
+}
+
+impl GateResult {
+    /// Errors of the network without a gate.
+    #[must_use]
+    pub fn ungated_errors(&self) -> &[Errors] {
+        metrics::of_decoder(&self.decoders, NETWORK)
+    }
+
+    /// Errors of always predicting the mean.
+    #[must_use]
+    pub fn mean_errors(&self) -> &[Errors] {
+        metrics::of_decoder(&self.decoders, mean::NAME)
+    }
 }
 
 /// Upper bound on the share of untouched rows of n `readings` that noise alone wakes: 1 − (1 −
@@ -252,14 +265,16 @@ fn judge(frames: GateFrames, model: &PreparedModel<'_>, settings: &Settings) -> 
     };
     let means = frames.outputs.means().repeat(frames.outputs.len());
     let lines = settings.k.iter().copied().map(line).collect();
-    let (ungated_errors, mean_errors) = (errors(&ungated), errors(&means));
+    let decoders = vec![
+        DecoderErrors::new(NETWORK, errors(&ungated)),
+        DecoderErrors::new(mean::NAME, errors(&means)),
+    ];
     GateResult {
         lines,
-        ungated_errors,
-        mean_errors,
+        decoders,
         frames: frames.outputs.len(),
         untouched_frames: frames.untouched.len(),
-        scene: frames.name,
+        subject: frames.name,
         seed: frames.seed,
         noise_level: frames.noise_level,
         rows: frames.rows,

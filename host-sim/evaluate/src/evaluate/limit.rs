@@ -70,7 +70,7 @@ pub fn usual_frames(world: &World) -> usize {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LimitResult {
     /// Name of the scene.
-    pub scene: String,
+    pub subject: String,
     /// Seed of every random draw.
     pub seed: u64,
     /// Kind of noise: `relative` or `span`.
@@ -95,11 +95,11 @@ pub struct Level {
     /// Limits: of all readings together, then of each row from its own readings if there are several.
     pub limits: Vec<Figures>,
     /// Errors of the plan's models on the same frames, with their ratios to the limit of all readings.
-    pub models: Vec<DecoderErrors>,
+    pub decoders: Vec<DecoderErrors>,
     /// What all readings show.
     pub observability: Observability,
     /// What each row's readings show.
-    pub rows: Vec<Observability>,
+    pub by_row: Vec<Observability>,
 }
 
 /// Limit of the electrodes of some rows, from the readings of these rows.
@@ -152,7 +152,7 @@ pub fn compute(
         Vec::new()
     };
     Ok(LimitResult {
-        scene: experiment.name.clone(),
+        subject: experiment.name.clone(),
         seed: world.seed,
         noise_kind: world.noise.kind.name().into(),
         frames: plan.frames,
@@ -175,7 +175,7 @@ fn level(
             .map_err(|refusal| Error::Usage(format!("noise 0: {refusal}")))
     };
     let observability = seen(&world.read_rows)?;
-    let rows = world.read_rows.iter().map(|row| seen(&[*row])).collect::<Result<_>>()?;
+    let by_row = world.read_rows.iter().map(|row| seen(&[*row])).collect::<Result<_>>()?;
     let all = Reference::of(world, frames, progress);
     let mut limits = vec![Figures::of(&world.read_rows, &all)];
     let width = world.output_names().len() / world.read_rows.len();
@@ -189,9 +189,9 @@ fn level(
         limits.push(Figures::of(&[row], &own));
     }
     let measure = Measure { limit: all.ok(), ..experiment.measure() };
-    let models = plan.models.iter().map(|model| judge(model, experiment, frames, &measure));
-    let models = models.collect();
-    Ok(Level { noise_level: world.noise.level, limits, models, observability, rows })
+    let decoders = plan.models.iter().map(|model| judge(model, experiment, frames, &measure));
+    let decoders = decoders.collect();
+    Ok(Level { noise_level: world.noise.level, limits, decoders, observability, by_row })
 }
 
 /// Errors of a model on the experiment's first test frames.

@@ -4,13 +4,14 @@ use serde::Serialize;
 use taxel_data::random::Stream;
 use taxel_data::table::Table;
 use taxel_learn::PreparedModel;
+use taxel_learn::decoders::mean;
 use taxel_simulate::Synthesis;
 use taxel_simulate::readout::{Circuit, Readout};
 use taxel_simulate::synth::BASELINE_FRAMES;
 use taxel_simulate::virtual_board::{VirtualBoard, all_readings, scan, untouched_readings};
 
 use crate::experiment::Experiment;
-use crate::metrics::{self, Errors};
+use crate::metrics::{self, DecoderErrors, Errors, NETWORK};
 
 /// Fault of a readout, together with all faults before it. Parts that a scene does not set have these
 /// typical values.
@@ -102,22 +103,32 @@ pub struct Line {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReadoutResult {
     /// Name of the scene.
-    pub scene: String,
+    pub subject: String,
     /// Seed of every random draw.
     pub seed: u64,
     /// Number of frames that were scanned, without the scene's noise.
     pub frames: usize,
     /// CRC-32 of the model, in hexadecimal.
     pub model_crc: String,
-    /// Errors of decoding the ideal readings.
-    pub ideal_errors: Vec<Errors>,
-    /// Errors of always predicting the mean of these frames.
-    pub mean_errors: Vec<Errors>,
+    /// Errors of the network on ideal readings, then of always predicting the mean of these frames.
+    pub decoders: Vec<DecoderErrors>,
     /// Results by circuit and stage.
     pub lines: Vec<Line>,
 }
 
 impl ReadoutResult {
+    /// Errors of the network on ideal readings.
+    #[must_use]
+    pub fn ideal_errors(&self) -> &[Errors] {
+        metrics::of_decoder(&self.decoders, NETWORK)
+    }
+
+    /// Errors of always predicting the mean.
+    #[must_use]
+    pub fn mean_errors(&self) -> &[Errors] {
+        metrics::of_decoder(&self.decoders, mean::NAME)
+    }
+
     /// Result of a circuit at a stage.
     #[must_use]
     pub fn line(&self, circuit: Circuit, stage: Stage) -> Option<&Line> {
@@ -172,12 +183,14 @@ pub fn measure(
         }
     }
     Ok(ReadoutResult {
-        scene: experiment.name.clone(),
+        subject: experiment.name.clone(),
         seed: world.seed,
         frames,
         model_crc: format!("{:08x}", model.model().crc()),
-        ideal_errors: errors(&decode(&ideal.inputs, &ideal_baseline.values)),
-        mean_errors: errors(&ideal.outputs.means().repeat(frames)),
+        decoders: vec![
+            DecoderErrors::new(NETWORK, errors(&decode(&ideal.inputs, &ideal_baseline.values))),
+            DecoderErrors::new(mean::NAME, errors(&ideal.outputs.means().repeat(frames))),
+        ],
         lines,
     })
 }

@@ -20,8 +20,7 @@ use crate::error::{Error, Result};
 use crate::experiment::{Experiment, Table1 as Settings};
 use crate::metrics::{self, Definition, Errors, LimitSummary, Measure};
 
-/// Name of the K-centre network in tables and results.
-pub const NETWORK: &str = "network";
+pub use crate::metrics::NETWORK;
 
 /// Lowest and highest cell of the paper's printed Table 1, in per cent. The paper does not state its
 /// definition of the error.

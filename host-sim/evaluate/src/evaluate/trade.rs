@@ -62,7 +62,9 @@ pub struct Plan {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Trade {
     /// Name of the scene, or of the data.
-    pub scene: String,
+    pub subject: String,
+    /// Seed of every random draw.
+    pub seed: u64,
     /// Noise level of one sample, as a fraction; 0 for measured data, which has its own.
     pub noise_level: f64,
     /// Number of frames to train on.
@@ -87,7 +89,7 @@ pub struct Trade {
     /// Ratios to the limit are to that of the point's own number of samples.
     pub limit: Option<LimitSummary>,
     /// Errors of the baselines, from one sample a reading.
-    pub baselines: Vec<DecoderErrors>,
+    pub decoders: Vec<DecoderErrors>,
     /// Every point that was judged.
     pub points: Vec<Point>,
     /// Formats that cannot hold a network of some settings, and why.
@@ -151,7 +153,7 @@ impl Trade {
         };
         let Point { errors, samples_averaged, .. } = &self.points[point];
         let network = DecoderErrors { decoder: "network".into(), errors: of_group(errors) };
-        let baselines = self.baselines.iter().map(|baseline| DecoderErrors {
+        let baselines = self.decoders.iter().map(|baseline| DecoderErrors {
             decoder: baseline.decoder.clone(),
             errors: of_group(&baseline.errors),
         });
@@ -178,7 +180,7 @@ impl Trade {
 
     /// Groups of outputs, with their units.
     pub fn groups(&self) -> impl Iterator<Item = (&str, &str)> {
-        let errors = self.baselines.first().map_or(&[][..], |baseline| &baseline.errors);
+        let errors = self.decoders.first().map_or(&[][..], |baseline| &baseline.errors);
         errors.iter().map(|errors| (errors.group.as_str(), errors.unit.as_str()))
     }
 
@@ -260,7 +262,8 @@ pub fn compute(
         fitted.map(|it| metrics::judge(it.as_ref(), &frames.test, &frames.measure)).collect()
     });
     Ok(Trade {
-        scene: subject.name().into(),
+        subject: subject.name().into(),
+        seed: subject.origin().seed,
         noise_level: match subject {
             Subject::Scene(scene) => scene.world.noise.level,
             Subject::Measured(data) => data.noise_level().unwrap_or(0.0),
@@ -278,7 +281,7 @@ pub fn compute(
         group: group.into(),
         unit: unit.into(),
         limit: limits.into_iter().next(),
-        baselines,
+        decoders: baselines,
         points,
         left_out,
         bounds: Bounds::default(),

@@ -165,8 +165,8 @@ fn fitting_exponential(identity: &DeviceIdentity, model: &Model<'_>) -> Result<E
     if capacity.wires_for(shape).is_none() {
         return Err(Error::NoRoom { capacity, shape });
     }
-    Exponential::by_name(&identity.kernel)
-        .ok_or_else(|| Error::UnknownExponential(identity.kernel.clone()))
+    Exponential::by_name(&identity.exponential)
+        .ok_or_else(|| Error::UnknownExponential(identity.exponential.clone()))
 }
 
 #[cfg(test)]

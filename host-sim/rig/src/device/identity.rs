@@ -21,7 +21,7 @@ pub struct DeviceIdentity {
     /// Largest number of outputs of a row.
     pub outputs: usize,
     /// Name of the exponential that it decodes with.
-    pub kernel: String,
+    pub exponential: String,
     /// Active model, if there is one; checksums are text in JSON, as hexadecimal digits.
     #[serde(serialize_with = "model_with_text")]
     pub model: Option<ModelIdentity>,
@@ -120,7 +120,7 @@ impl From<&Identity<'_>> for DeviceIdentity {
             rows: identity.rows.into(),
             columns: identity.columns.into(),
             outputs: identity.outputs.into(),
-            kernel: identity.kernel.into(),
+            exponential: identity.kernel.into(),
             model: identity.model,
             model_name: identity.model_name.into(),
             slot_bytes: identity.slot_bytes as usize,

@@ -30,7 +30,7 @@ pub fn show<W: Wire>(device: &mut Device<W>, common: &Common) -> Result<()> {
     page.line(format_args!("{:<17} {}, firmware {}", "device", d.board, d.firmware));
     page.line(format_args!(
         "{:<17} {} rows, {} columns, {} outputs a row; {} exponential",
-        "room for", d.rows, d.columns, d.outputs, d.kernel
+        "room for", d.rows, d.columns, d.outputs, d.exponential
     ));
     if let Some(m) = &d.model {
         page.line(format_args!(

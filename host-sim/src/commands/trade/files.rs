@@ -41,7 +41,7 @@ fn csv_of(trade: &Trade) -> String {
         .groups()
         .map(|(group, _)| format!("{group}_rmse,{group}_ratio_to_best,{group}_ratio_to_limit"));
     let mut csv = format!(
-        "kernel,whole_array,centres,spread,affine_tail,samples_averaged,gate_k,output_rank,{},instructions,cycles,flash_cycles,scan_ms,decode_ms,frame_ms,frames_per_second,flash_bytes,ram_bytes,\
+        "kernel,whole_array,centres,spread,affine_tail,samples_averaged,gate_k,output_rank,{},instructions,cycles,flash_cycles,scan_ms,decode_ms,frame_ms,frames_per_s,blob_bytes,ram_bytes,\
          on_front,chosen\n",
         rmse.collect::<Vec<_>>().join(",")
     );
@@ -68,8 +68,8 @@ fn csv_of(trade: &Trade) -> String {
             p.times.scan_ms.map_or(String::new(), |ms| ms.to_string()),
             p.times.decode_ms,
             p.times.frame_ms,
-            p.times.frames_per_second,
-            p.flash_bytes,
+            p.times.frames_per_s,
+            p.blob_bytes,
             p.ram_bytes,
             p.on_front,
             trade.chosen == Some(i)

@@ -17,7 +17,7 @@ pub fn of(trade: &Trade, all: bool, folder: &Path) -> Page {
     };
     page.line(format_args!(
         "{}: {} ways to decode, {tested}; RMSE of {}{}",
-        trade.scene,
+        trade.subject,
         trade.points.len(),
         trade.group,
         if trade.unit.is_empty() { String::new() } else { format!(" in {}", trade.unit) }
@@ -43,7 +43,7 @@ pub fn of(trade: &Trade, all: bool, folder: &Path) -> Page {
     for i in &shown {
         page.line(line_of(trade, *i));
     }
-    for baseline in &trade.baselines {
+    for baseline in &trade.decoders {
         let rmse = baseline.errors.iter().find(|errors| errors.group == trade.group);
         let rmse = rmse.map_or(f64::NAN, |errors| errors.rmse);
         page.line(format_args!("  {:<50} {:>7}", baseline.decoder, error(rmse)));
@@ -146,10 +146,10 @@ fn line_of(trade: &Trade, i: usize) -> String {
         point.gate_k.map_or("-".into(), |k| k.to_string()),
         error(point.rmse(&trade.group)),
         ms(point.times.frame_ms),
-        rate(point.times.frames_per_second),
+        rate(point.times.frames_per_s),
         point.frame.cycles,
         point.frame.flash_cycles,
-        point.flash_bytes,
+        point.blob_bytes,
         point.ram_bytes,
     )
 }
@@ -198,13 +198,13 @@ fn cost(point: &Point) -> String {
             ms(times.frame_ms),
             ms(scan_ms),
             ms(times.decode_ms),
-            rate(times.frames_per_second)
+            rate(times.frames_per_s)
         ),
         None => format!("Decoding a frame takes {} ms, besides its scan", ms(times.decode_ms)),
     };
     format!(
         "{time}; {} cycles ({} from flash), {} bytes of flash, {} bytes of RAM.",
-        point.frame.cycles, point.frame.flash_cycles, point.flash_bytes, point.ram_bytes
+        point.frame.cycles, point.frame.flash_cycles, point.blob_bytes, point.ram_bytes
     )
 }
 
@@ -222,10 +222,6 @@ fn ms(time: f64) -> String {
 }
 
 /// Text of a rate.
-fn rate(frames_per_second: f64) -> String {
-    if frames_per_second < 1000.0 {
-        format!("{frames_per_second:.1}")
-    } else {
-        format!("{frames_per_second:.0}")
-    }
+fn rate(frames_per_s: f64) -> String {
+    if frames_per_s < 1000.0 { format!("{frames_per_s:.1}") } else { format!("{frames_per_s:.0}") }
 }

@@ -71,7 +71,7 @@ impl Axes {
         let error_of = |point: &Point| point.rmse(&trade.group);
         let [least, most] = range(shown().map(error_of));
         // Lines that lie near are shown as well.
-        let lines = trade.baselines.iter().map(|it| tables::rmse(&it.errors, &trade.group));
+        let lines = trade.decoders.iter().map(|it| tables::rmse(&it.errors, &trade.group));
         let lines = lines.chain(trade.bounds.error).chain(trade.limit_rmse());
         let near = lines.filter(|y| *y > least / 2.0 && *y < most * 1.6);
         let [least, most] = range(near.chain([least, most]));
@@ -136,7 +136,7 @@ impl Axes {
     /// Lines across the picture: what they are, and their errors.
     pub fn levels(trade: &Trade) -> Vec<(String, f64, &'static str)> {
         let named = |name: &str, words: &str, class| {
-            let rmse = trade.baselines.iter().find(|baseline| baseline.decoder == name)?;
+            let rmse = trade.decoders.iter().find(|baseline| baseline.decoder == name)?;
             let rmse = tables::rmse(&rmse.errors, &trade.group);
             Some((format!("{words} {}", significant(rmse, 3)), rmse, class))
         };

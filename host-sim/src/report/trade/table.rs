@@ -71,10 +71,10 @@ fn columns(trade: &Trade) -> Vec<Column> {
             })
         }),
         Some(number(time, |_, p| fixed(p.times.frame_ms, 3))),
-        Some(number("frames/s", |_, p| rate(p.times.frames_per_second))),
+        Some(number("frames/s", |_, p| rate(p.times.frames_per_s))),
         Some(number("cycles", |_, p| grouped(p.frame.cycles as usize))),
         Some(number("from flash", |_, p| grouped(p.frame.flash_cycles as usize))),
-        Some(number("blob, B", |_, p| grouped(p.flash_bytes))),
+        Some(number("blob, B", |_, p| grouped(p.blob_bytes))),
         Some(number("RAM, B", |_, p| grouped(p.ram_bytes))),
     ];
     columns.into_iter().flatten().collect()

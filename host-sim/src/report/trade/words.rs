@@ -4,11 +4,11 @@ use crate::report::format::{fixed, grouped, significant, symbol};
 use taxel_evaluate::evaluate::trade::{Bounds, Point, Times, Trade};
 
 /// Text of a rate.
-pub fn rate(frames_per_second: f64) -> String {
-    if frames_per_second < 1000.0 {
-        fixed(frames_per_second, 1)
+pub fn rate(frames_per_s: f64) -> String {
+    if frames_per_s < 1000.0 {
+        fixed(frames_per_s, 1)
     } else {
-        grouped(frames_per_second.round() as usize)
+        grouped(frames_per_s.round() as usize)
     }
 }
 
@@ -25,7 +25,7 @@ pub fn times(times: &Times) -> String {
             "{} ms a frame ({} ms to scan, {decoding}), {} frames/s",
             fixed(times.frame_ms, 3),
             fixed(scan_ms, 3),
-            rate(times.frames_per_second)
+            rate(times.frames_per_s)
         ),
         None => format!("{decoding}, besides its scan"),
     }
@@ -41,7 +41,7 @@ pub fn in_full(trade: &Trade, point: &Point) -> String {
         times(&point.times),
         grouped(point.frame.cycles as usize),
         grouped(point.frame.flash_cycles as usize),
-        grouped(point.flash_bytes),
+        grouped(point.blob_bytes),
         grouped(point.ram_bytes)
     )
 }
@@ -56,7 +56,7 @@ pub fn bounds(bounds: &Bounds) -> String {
     let given = [
         bounds.error.map(|most| format!("an error of at most {most}")),
         bounds.cycles.map(|most| format!("at most {} cycles at zero wait", grouped(most as usize))),
-        bounds.flash_bytes.map(|most| format!("a blob of at most {} bytes", grouped(most))),
+        bounds.blob_bytes.map(|most| format!("a blob of at most {} bytes", grouped(most))),
         bounds.frame_rate_hz.map(|least| format!("at least {least} frames a second")),
         bounds.latency_ms.map(|most| format!("at most {most} ms for scan and decoding")),
     ];

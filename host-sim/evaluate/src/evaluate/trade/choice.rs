@@ -18,7 +18,7 @@ pub struct Bounds {
     /// Largest number of cycles of a frame, at zero wait.
     pub cycles: Option<u64>,
     /// Largest size of the blob; a slot's ([`SLOT_BYTES`]) unless given.
-    pub flash_bytes: Option<usize>,
+    pub blob_bytes: Option<usize>,
     /// Least number of frames a second.
     pub frame_rate_hz: Option<f64>,
     /// Longest time of scan and decoding.
@@ -30,7 +30,7 @@ pub struct Bounds {
 pub(super) struct Offer {
     pub rmse: f64,
     pub cycles: u64,
-    pub flash_bytes: usize,
+    pub blob_bytes: usize,
     pub times: Times,
 }
 
@@ -72,8 +72,8 @@ impl Bounds {
         let most =
             if self.error.is_some() { f64::INFINITY } else { SAME_ERROR * least.unwrap_or(0.0) };
         let key = |i: usize| {
-            let Offer { rmse, cycles, flash_bytes, times } = offers[i];
-            [times.frame_ms, cycles as f64, flash_bytes as f64, rmse]
+            let Offer { rmse, cycles, blob_bytes, times } = offers[i];
+            [times.frame_ms, cycles as f64, blob_bytes as f64, rmse]
         };
         let compare = |a: &usize, b: &usize| {
             let ordered = key(*a).into_iter().zip(key(*b)).map(|(a, b)| a.total_cmp(&b));
@@ -107,8 +107,8 @@ impl Bounds {
             (Bounded::Latency, self.latency_ms),
         ];
         let given = given.into_iter().filter_map(|(of, bound)| Some(unmet(of, bound?)));
-        let most = self.flash_bytes.unwrap_or(SLOT_BYTES) as f64;
-        let is_slot = self.flash_bytes.is_none();
+        let most = self.blob_bytes.unwrap_or(SLOT_BYTES) as f64;
+        let is_slot = self.blob_bytes.is_none();
         given.chain([Unmet { is_slot, ..unmet(Bounded::Flash, most) }]).collect()
     }
 }
@@ -119,8 +119,8 @@ impl Offer {
         match bounded {
             Bounded::Error => self.rmse,
             Bounded::Cycles => self.cycles as f64,
-            Bounded::Flash => self.flash_bytes as f64,
-            Bounded::FrameRate => self.times.frames_per_second,
+            Bounded::Flash => self.blob_bytes as f64,
+            Bounded::FrameRate => self.times.frames_per_s,
             Bounded::Latency => self.times.frame_ms,
         }
     }
@@ -161,13 +161,9 @@ mod tests {
     fn offer(rmse: f64, scan_ms: f64, cycles: u64) -> Offer {
         let decode_ms = cycles as f64 / 180_000.0;
         let frame_ms = scan_ms + decode_ms;
-        let times = Times {
-            scan_ms: Some(scan_ms),
-            decode_ms,
-            frame_ms,
-            frames_per_second: 1000.0 / frame_ms,
-        };
-        Offer { rmse, cycles, flash_bytes: 1000, times }
+        let times =
+            Times { scan_ms: Some(scan_ms), decode_ms, frame_ms, frames_per_s: 1000.0 / frame_ms };
+        Offer { rmse, cycles, blob_bytes: 1000, times }
     }
 
     /// One sample a reading and many centres; four samples and few centres; four samples and many centres.
@@ -220,7 +216,7 @@ mod tests {
         let check = |bounds: Bounds| bounds.check_possible(&offers(), "mm");
         assert!(check(Bounds::default()).is_ok());
         assert!(check(Bounds { frame_rate_hz: Some(160.0), ..Bounds::default() }).is_ok());
-        let refused = check(Bounds { flash_bytes: Some(999), ..Bounds::default() }).unwrap_err();
+        let refused = check(Bounds { blob_bytes: Some(999), ..Bounds::default() }).unwrap_err();
         let refused = refused.to_string();
         assert!(refused.contains("the smallest blob takes at least 1000 bytes"), "{refused}");
         assert!(refused.ends_with("raise the bound; nothing was trained"), "{refused}");

@@ -74,7 +74,7 @@ pub struct Times {
     /// Time of both; of decoding alone if the scan's is unknown.
     pub frame_ms: f64,
     /// Frames in a second, at most: one over the time of a frame.
-    pub frames_per_second: f64,
+    pub frames_per_s: f64,
 }
 
 impl Device {
@@ -119,7 +119,7 @@ impl Device {
     pub fn times(&self, scan_ms: Option<f64>, cost: &Cost) -> Times {
         let decode_ms = self.cycles(cost) as f64 / (self.clock_mhz * 1000.0);
         let frame_ms = scan_ms.unwrap_or(0.0) + decode_ms;
-        Times { scan_ms, decode_ms, frame_ms, frames_per_second: 1000.0 / frame_ms }
+        Times { scan_ms, decode_ms, frame_ms, frames_per_s: 1000.0 / frame_ms }
     }
 }
 
@@ -137,10 +137,10 @@ mod tests {
         assert_eq!(scans, [6.43, 23.019]);
         let times = board.times(Some(6.43), &cost);
         assert_eq!((times.decode_ms, times.frame_ms), (0.2, 6.63));
-        assert!((times.frames_per_second - 150.8).abs() < 0.1);
+        assert!((times.frames_per_s - 150.8).abs() < 0.1);
         let ram = Device { memory: Memory::Ram, clock_mhz: 90.0, ..board };
         assert_eq!(ram.times(None, &cost).frame_ms, 0.2);
-        assert_eq!(ram.times(None, &cost).frames_per_second, 5000.0);
+        assert_eq!(ram.times(None, &cost).frames_per_s, 5000.0);
     }
 
     #[test]

@@ -144,7 +144,7 @@ impl<'s> Judge<'s> {
                 ratio_to_best: vec![],
                 frame,
                 times: self.plan.device.times(scan_ms, &frame),
-                flash_bytes: blob.bytes().len(),
+                blob_bytes: blob.bytes().len(),
                 ram_bytes: if gate_k.is_some() { ram.gated_bytes() } else { ram.bytes() },
                 on_front: false,
             });

@@ -78,7 +78,7 @@ pub struct Point {
     #[serde(flatten)]
     pub times: Times,
     /// Size of the blob.
-    pub flash_bytes: usize,
+    pub blob_bytes: usize,
     /// Size of decoder, frame, estimate and working memory; for a gate also the baseline and its
     /// estimate.
     pub ram_bytes: usize,
@@ -124,7 +124,7 @@ impl Point {
         Offer {
             rmse: self.rmse(group),
             cycles: self.frame.cycles,
-            flash_bytes: self.flash_bytes,
+            blob_bytes: self.blob_bytes,
             times: self.times,
         }
     }

@@ -77,15 +77,15 @@ pub(super) fn offers(
                 for Arithmetic { format, exponential } in Arithmetic::all() {
                     for affine_tail in [false, true] {
                         let design = design(dataset, inputs, (format, centres), affine_tail, rank);
-                        let flash_bytes = names_bytes + design.parameter_bytes();
-                        if inputs.whole_array() && flash_bytes > SLOT_BYTES {
+                        let blob_bytes = names_bytes + design.parameter_bytes();
+                        if inputs.whole_array() && blob_bytes > SLOT_BYTES {
                             continue;
                         }
                         let costs = prices.frames(&design, exponential)?;
                         let mut offer = |cost: Cost| {
                             let times = plan.device.times(scan_ms, &cost);
                             let cycles = cost.cycles;
-                            offers.push(Offer { rmse: least_error, cycles, flash_bytes, times });
+                            offers.push(Offer { rmse: least_error, cycles, blob_bytes, times });
                         };
                         offer(costs.ungated);
                         if exponential == Exponential::default() {

@@ -9,7 +9,7 @@ fn good() -> Findings {
         rows: 1,
         columns: 1,
         outputs: 1,
-        kernel: "libm".into(),
+        exponential: "libm".into(),
         model: None,
         model_name: String::new(),
         slot_bytes: 0,
