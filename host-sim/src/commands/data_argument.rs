@@ -214,6 +214,10 @@ impl DataArguments {
             JudgedBy::HeldOut => return Ok(Judged::HeldOut),
             JudgedBy::File(path) => path,
         };
+        if self.file.join().is_some() {
+            let message = "--test with --join: join the test file first with `join`, and give the joined files";
+            return Err(Error::Usage(message.into()));
+        }
         let (own, _) = self.frames(&self.file.fields().read(path)?)?;
         let names = |frames: &Dataset| (frames.inputs.names.clone(), frames.outputs.names.clone());
         if names(&own) != names(frames) {
