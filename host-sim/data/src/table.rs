@@ -60,21 +60,25 @@ impl Table {
         sums.iter().map(|(sum, count)| sum / count).collect()
     }
 
-    /// Standard deviation of each column; 0 for one that does not change as far as f32 can tell.
+    /// Standard deviation of each column; NaN is skipped. 0 for a column that does not change as far as f32 can tell,
+    /// or holds NaN alone.
     #[must_use]
     pub fn deviations(&self) -> Vec<f64> {
         let means = self.means();
-        let mut squares = vec![0.0; means.len()];
+        let mut sums = vec![(0.0, 0.0); means.len()];
         for line in self.lines() {
-            for (square, (value, mean)) in squares.iter_mut().zip(line.iter().zip(&means)) {
+            let values = line.iter().zip(&means).filter(|(value, _)| !value.is_nan());
+            for ((square, count), (value, mean)) in sums.iter_mut().zip(values) {
                 *square += (value - mean) * (value - mean);
+                *count += 1.0;
             }
         }
         let resolved = |deviation: f64, [low, high]: [f64; 2]| {
             let smallest = f64::from(f32::EPSILON) * low.abs().max(high.abs());
             if deviation > smallest { deviation } else { 0.0 }
         };
-        let deviations = squares.into_iter().map(|square| (square / self.len() as f64).sqrt());
+        let deviations =
+            sums.into_iter().map(|(square, count): (f64, f64)| (square / count).sqrt());
         deviations.zip(self.ranges()).map(|(d, range)| resolved(d, range)).collect()
     }
 
@@ -107,5 +111,21 @@ impl Table {
         let names = self.names[from..from + count].to_vec();
         let values = self.lines().flat_map(|line| line[from..from + count].to_vec()).collect();
         Self { names, values }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn means_and_deviations_skip_missing_values() {
+        let nan = f64::NAN;
+        let names = ["a", "b", "c"].map(String::from).to_vec();
+        let values = vec![1.0, 2.0, nan, nan, 4.0, nan, 3.0, nan, nan];
+        let table = Table { names, values };
+        assert_eq!(table.means()[..2], [2.0, 3.0]);
+        assert!(table.means()[2].is_nan());
+        assert_eq!(table.deviations(), [1.0, 1.0, 0.0]);
     }
 }

@@ -227,6 +227,10 @@ impl DataArguments {
             JudgedBy::HeldOut => return Ok(Judged::HeldOut),
             JudgedBy::File(path) => path,
         };
+        if self.file.join().is_some() {
+            let message = "--test with --join: join the test file first with `join`, and give the joined files";
+            return Err(Error::Usage(message.into()));
+        }
         let file = self.file.fields().read(path)?;
         if file.digest == digest {
             let message = "it is the file that is trained on, which would flatter the model: give other frames (--test)";

@@ -72,9 +72,11 @@ struct Summary {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if let Some(html) = &arguments.html {
-        let inputs =
-            [Some(&arguments.model), Some(&arguments.data), arguments.baseline.baseline.as_ref()];
-        let inputs: Vec<&Path> = inputs.into_iter().flatten().map(PathBuf::as_path).collect();
+        let others = [arguments.baseline.baseline.as_deref(), arguments.file.join()];
+        let inputs: Vec<&Path> = [arguments.model.as_path(), arguments.data.as_path()]
+            .into_iter()
+            .chain(others.into_iter().flatten())
+            .collect();
         output::check_writable(html, &inputs)?;
     }
     let blob = ModelBlob::read(&arguments.model)?;

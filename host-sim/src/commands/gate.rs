@@ -114,7 +114,7 @@ fn check(arguments: &Arguments, subject: &Subject, numbers: [usize; 2]) -> Resul
             let settings = gate::check_settings(&scene.world, &arguments.k, baseline_frames);
             Ok(settings.map_err(|bad| of_option(bad, &OPTIONS))?)
         }
-        Subject::Measured(_) => {
+        Subject::Measured(data) => {
             for (option, given) in [
                 ("--frames", arguments.frames.is_some()),
                 ("--baseline-frames", arguments.baseline_frames.is_some()),
@@ -126,6 +126,7 @@ fn check(arguments: &Arguments, subject: &Subject, numbers: [usize; 2]) -> Resul
                     return Err(Error::Usage(message));
                 }
             }
+            gate::Rest::of(data, &arguments.k).map_err(|bad| of_option(bad, &OPTIONS))?;
             Ok(())
         }
     }

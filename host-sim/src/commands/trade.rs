@@ -43,8 +43,8 @@ pub struct Arguments {
     /// Folder that receives a folder named after the scene or the CSV file.
     #[arg(short, long, value_name = "DIR", default_value = "out")]
     output: PathBuf,
-    /// Centres K to try.
-    #[arg(long, value_name = "K", value_delimiter = ',', default_value = "16,32,64,128,256")]
+    /// Centres K to try [default: 16,32,64,128,256, of a CSV file those that are fewer than its training frames].
+    #[arg(long, value_name = "K", value_delimiter = ',')]
     centres: Vec<usize>,
     /// Components that the network for the whole array computes instead of all outputs, to try where they take fewer
     /// multiplications (docs/projection.md); `none` for networks that compute all outputs alone.
@@ -110,7 +110,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     };
     device.check().map_err(|bad| of_option(bad, &OPTIONS))?;
     let plan = Plan {
-        centres: distinct("--centres", &arguments.centres)?,
+        centres: centres(&arguments.centres, &subject)?,
         output_ranks: output_ranks(&arguments.output_rank)?,
         samples_averaged: distinct("--average", &arguments.average)?,
         gate_k: gate_k(&arguments.gate, &subject)?,
@@ -240,6 +240,32 @@ impl FromStr for RankOption {
     }
 }
 
+/// Centres to try unless a user says otherwise.
+const CENTRES: [usize; 5] = [16, 32, 64, 128, 256];
+
+/// Centres that are asked for, or of the usual ones those that so many training frames allow.
+fn centres(given: &[usize], subject: &Subject) -> Result<Vec<usize>> {
+    if !given.is_empty() {
+        return distinct("--centres", given);
+    }
+    let frames = subject.training_frames();
+    let (fit, too_many): (Vec<usize>, Vec<usize>) = CENTRES.iter().partition(|k| **k < frames);
+    if fit.is_empty() {
+        let message = format!(
+            "{frames} training frames are fewer than usual for a trade: give --centres below their number"
+        );
+        return Err(Error::Usage(message));
+    }
+    if !too_many.is_empty() {
+        let names: Vec<String> = too_many.iter().map(ToString::to_string).collect();
+        let names = names.join(", ");
+        eprintln!(
+            "note: K = {names} is not tried: there must be fewer centres than the {frames} training frames"
+        );
+    }
+    Ok(fit)
+}
+
 /// Ranks that are asked for, in order; networks that compute all outputs there are always.
 fn output_ranks(given: &[RankOption]) -> Result<Vec<usize>> {
     let ranks: Vec<usize> = given.iter().filter_map(|rank| rank.0).collect();
@@ -267,6 +293,13 @@ fn gate_k(given: &[GateOption], subject: &Subject) -> Result<Vec<f64>> {
         .filter_map(|gate| if let GateOption::K(k) = gate { Some(*k) } else { None })
         .collect();
     if k.len() == given.len() {
+        if let Subject::Measured(data) = subject
+            && let Err(bad) = gate::Rest::of(data, &k)
+            && bad.field != "k"
+        {
+            let k: Vec<String> = k.iter().map(ToString::to_string).collect();
+            return Err(Error::Usage(format!("--gate {}: {bad}", k.join(","))));
+        }
         return distinct("--gate", &k);
     }
     if given.len() > 1 {

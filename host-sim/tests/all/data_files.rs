@@ -245,6 +245,13 @@ fn wrong_usage_of_data_files_is_refused() {
         refused(&folder, &scene, &[option[0], "data files", "leave it out"]);
     }
     folder.succeed(&[&train(&["--centres", "4"])[..], &[]].concat());
+    let joined = [&["--join", "scale.csv"], &BY_TIME[..]].concat();
+    let page = [&["eval", "m.bin", "sensor.csv", "--html", "scale.csv"], &joined[..]].concat();
+    refused(&folder, &page, &["scale.csv"]);
+    assert!(std::fs::read_to_string(folder.path("scale.csv")).unwrap().contains(','));
+    let test = [&["run", "sensor.csv", "--test", "scale.csv"], &joined[..]].concat();
+    let columns = ["--inputs", "c2..c4", "--outputs", "b.c2", "--no-refine"];
+    refused(&folder, &[&test[..], &columns].concat(), &["--test with --join", "`join`"]);
     let decode = ["decode", "m.bin", "sensor.csv", "-o", "e.csv", "--keep"];
     refused(&folder, &[&decode[..], &["time"]].concat(), &["\"time\" is missing", "--keep"]);
     refused(&folder, &[&decode[..], &["c1"]].concat(), &["--keep c1", "output of that name"]);

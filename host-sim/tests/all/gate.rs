@@ -184,3 +184,46 @@ fn a_csv_file_with_frames_at_rest_has_a_gate() {
     let frames = folder.fail(&[&both[..], &["-n", "10"]].concat(), 2);
     assert!(frames.contains("--frames is for a scene"), "{frames}");
 }
+
+#[test]
+fn frames_at_rest_that_make_no_gate_are_refused_before_training() {
+    let folder = Folder::new("gate-rest");
+    let mut random = Random::new(6, Stream::Test, Purpose::Noise, 0, 0);
+    let mut lines = |middle: f64, count: usize| -> Vec<String> {
+        let mut reading = || middle + 0.1 * random.normal();
+        (0..count).map(|i| format!("{},{},{}", reading(), reading(), i % 5)).collect()
+    };
+    let table = |lines: &[String]| format!("ch1,ch2,f_n\n{}\n", lines.join("\n"));
+    let subtracted = lines(0.01, 60);
+    let mut holed = lines(50.0, 60);
+    folder.write("whole.csv", table(&holed));
+    for (i, line) in holed.iter_mut().enumerate().skip(20) {
+        let fields: Vec<&str> = line.split(',').collect();
+        *line = match i % 2 {
+            0 => format!(",{},{}", fields[1], fields[2]),
+            _ => format!("{},,{}", fields[0], fields[2]),
+        };
+    }
+    folder.write("subtracted.csv", table(&subtracted));
+    folder.write("holed.csv", table(&holed));
+    folder.write("holes.csv", table(&holed[20..]));
+    let gate = |data: &'static str, rest: &'static str, k: &'static str| {
+        let columns = ["--inputs", "ch*", "--outputs", "f_n", "--no-refine", "--json"];
+        [&["gate", data, "--baseline", rest, "--k", k], &columns[..]].concat()
+    };
+    for (arguments, says) in [
+        (gate("subtracted.csv", "subtracted.csv", "3.5"), "readings are near zero at rest"),
+        (gate("whole.csv", "holes.csv", "3.5"), "complete frames at rest = 0"),
+        (gate("whole.csv", "whole.csv", "-1"), "--k -1"),
+    ] {
+        let stderr = folder.fail(&arguments, 2);
+        assert!(stderr.contains(says) && !stderr.contains("train:"), "{stderr}");
+    }
+    // The first 20 frames at rest are complete.
+    let result: serde_json::Value =
+        serde_json::from_str(&folder.succeed(&gate("whole.csv", "holed.csv", "3.5"))).unwrap();
+    assert_eq!(result["baseline_frames"], 10);
+    assert_eq!(result["untouched_frames"], 10);
+    let noise = result["noise_level"].as_f64().unwrap();
+    assert!((0.0015..0.0025).contains(&noise), "{noise}");
+}

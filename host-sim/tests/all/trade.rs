@@ -1,5 +1,7 @@
 //! The trade between speed and accuracy, on a small plan.
 
+use std::collections::BTreeSet;
+
 use crate::common::{Folder, small_scene, unrefined};
 use host_sim::Result;
 use host_sim::evaluate::gate::{self, Settings};
@@ -432,4 +434,36 @@ fn measurements_are_traded_as_they_are() {
     }
     let gated = folder.fail(&[&other[..], &["--gate", "3"]].concat(), 2);
     assert!(gated.contains("--baseline FILE"), "{gated}");
+}
+
+#[test]
+fn few_frames_are_traded_with_the_usual_centres_that_they_allow() {
+    let folder = Folder::new("trade-few");
+    let line = |i: u32| {
+        let x = f64::from(i * i % 37) / 37.0;
+        format!("{},{},{x}\n", 60.0 - 9.0 * x * x, 30.0 + x)
+    };
+    let lines: Vec<String> = (0..45).map(line).collect();
+    folder.write("few.csv", format!("ch1,ch2,f_n\n{}", lines.concat()));
+    let columns = ["--inputs", "ch*", "--outputs", "f_n", "--no-refine", "--scan-ms", "1"];
+    let output = folder.run(&[&["trade", "few.csv", "--json"], &columns[..]].concat());
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{stderr}");
+    assert!(stderr.contains("K = 64, 128, 256 is not tried") && stderr.contains("36"), "{stderr}");
+    let trade: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    // x² modulo 37 has 19 values, which are all that the training frames hold.
+    let points = trade["points"].as_array().unwrap();
+    let of = |point: &serde_json::Value, field: &str| point[field].as_u64().unwrap();
+    let centres: BTreeSet<u64> = points.iter().map(|point| of(point, "centres")).collect();
+    assert_eq!(centres, BTreeSet::from([16, 19]));
+    // A bound that the network can meet, whose K is lower than asked for, is not refused early.
+    let all = points.iter().filter(|point| of(point, "centres") == 19);
+    let bound = all.map(|point| of(point, "cycles")).min().unwrap().to_string();
+    let ask = ["trade", "few.csv", "--centres", "32", "--max-cycles", &bound];
+    folder.succeed(&[&ask, &columns[..]].concat());
+    let few = folder.fail(&[&ask[..3], &["99"], &columns[..]].concat(), 2);
+    assert!(few.contains("--centres 99") && few.contains("36 training frames"), "{few}");
+    folder.write("one.csv", format!("ch1,ch2,f_n\n{}", lines[..12].concat()));
+    let one = folder.fail(&[&["trade", "one.csv"], &columns[..]].concat(), 2);
+    assert!(one.contains("give --centres"), "{one}");
 }

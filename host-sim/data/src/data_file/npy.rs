@@ -30,10 +30,15 @@ pub(super) fn parse_archive(path: &Path, bytes: &[u8]) -> Result<DataFile> {
     let mut header: Vec<String> = vec![];
     let mut arrays: Vec<Array> = vec![];
     for index in 0..archive.len() {
-        let entry = archive.by_index(index).map_err(|cause| unusable(path, cause.to_string()))?;
+        let mut entry =
+            archive.by_index(index).map_err(|cause| unusable(path, cause.to_string()))?;
         let name = entry.name().map_err(|cause| unusable(path, cause.to_string()))?.into_owned();
         let name = name.strip_suffix(".npy").unwrap_or(&name).to_owned();
-        let array = Array::parse(entry)
+        let mut stored = vec![];
+        let array = entry
+            .read_to_end(&mut stored)
+            .map_err(|cause| format!("it cannot be read to its end: {cause}"))
+            .and_then(|_| Array::parse(&stored))
             .map_err(|cause| unusable(path, format!("array {name:?}: {cause}")))?;
         if let Some(first) = arrays.first()
             && first.lines != array.lines
@@ -82,6 +87,21 @@ fn data_file(
     Ok(DataFile { path: path.into(), header, names_columns, digest, values, line_numbers })
 }
 
+/// Said of a shape whose number of elements no computer can count.
+const TOO_LARGE: &str = "its shape has more elements than any memory";
+
+/// Checks the shape in the header of a `.npy` file, since the parser multiplies its sizes unchecked.
+fn check_shape(bytes: &[u8]) -> std::result::Result<(), String> {
+    // The dictionary stands on the first line, after the format's version and the line's length.
+    let line = String::from_utf8_lossy(bytes.split(|byte| *byte == b'\n').next().unwrap_or(bytes));
+    let sizes = line.split_once("shape").and_then(|(_, rest)| rest.split_once('('));
+    let sizes = sizes.and_then(|(_, rest)| rest.split_once(')')).map_or("", |(sizes, _)| sizes);
+    let sizes = sizes.split(',').map(str::trim).filter(|size| !size.is_empty());
+    let sizes: Vec<u64> = sizes.map_while(|size| size.parse().ok()).collect();
+    let count = sizes.iter().try_fold(1_u64, |count, size| count.checked_mul((*size).max(1)));
+    count.map(|_| ()).ok_or_else(|| TOO_LARGE.into())
+}
+
 /// Array of numbers.
 struct Array {
     dimensions: usize,
@@ -93,7 +113,8 @@ struct Array {
 
 impl Array {
     /// Parses an array; the error says what it is instead.
-    fn parse(bytes: impl Read) -> std::result::Result<Self, String> {
+    fn parse(bytes: &[u8]) -> std::result::Result<Self, String> {
+        check_shape(bytes)?;
         let file = NpyFile::new(bytes).map_err(|cause| format!("not a .npy file: {cause}"))?;
         let shape: Option<Vec<usize>> =
             file.shape().iter().map(|size| usize::try_from(*size).ok()).collect();
@@ -103,6 +124,10 @@ impl Array {
             Some([lines, columns]) => (*lines, *columns),
             _ => return Err(format!("it has {dimensions} dimensions and not 1 or 2")),
         };
+        let count = lines.checked_mul(columns).ok_or(TOO_LARGE)?;
+        if count == 0 {
+            return Err("it holds no number".into());
+        }
         let (order, kind) = (file.order(), file.dtype().descr());
         let values = elements::<f64, _>(file, |value| value)
             .or_else(|file| elements::<f32, _>(file, f64::from))
@@ -115,8 +140,16 @@ impl Array {
             .or_else(|file| elements::<u16, _>(file, f64::from))
             .or_else(|file| elements::<u8, _>(file, f64::from))
             .or_else(|file| elements::<bool, _>(file, f64::from))
-            .map_err(|_| format!("its elements are {kind} and not numbers of 1 to 8 bytes"))?
+            .map_err(|_| {
+                format!(
+                    "its elements are {kind}; those that are read are float32 and float64, integers of 8 to 64 bits, \
+                     and bool"
+                )
+            })?
             .map_err(|cause| format!("it cannot be read to its end: {cause}"))?;
+        if values.len() != count {
+            return Err(format!("it holds {} numbers, and its shape {count}", values.len()));
+        }
         let values = match order {
             Order::C => values,
             Order::Fortran => {

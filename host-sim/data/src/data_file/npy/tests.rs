@@ -104,3 +104,41 @@ fn what_is_no_table_of_numbers_is_refused() {
         assert!(message.contains(says), "{message}");
     }
 }
+
+/// Bytes of a `.npy` file whose header says this, followed by one f64.
+fn with_header(descr: &str, order: &str, shape: &str) -> Vec<u8> {
+    let text = format!("{{'descr': '{descr}', 'fortran_order': {order}, 'shape': {shape}, }}");
+    let text = format!("{text:<117}\n");
+    let length = u16::try_from(text.len()).unwrap().to_le_bytes();
+    [b"\x93NUMPY\x01\x00", &length[..], text.as_bytes(), &1.0_f64.to_le_bytes()].concat()
+}
+
+#[test]
+fn shapes_that_the_elements_cannot_fill_are_refused_at_once() {
+    let path = Path::new("test.npy");
+    let fits = parse_array(path, &with_header("<f8", "False", "(1, 1)")).unwrap();
+    assert_eq!(lines(&fits), [[1.0]]);
+    for (shape, says) in [
+        ("(4294967296, 4294967296)", "more elements than any memory"),
+        ("(9223372036854775808, 2)", "more elements than any memory"),
+        ("(9223372036854775809, 2)", "more elements than any memory"),
+        ("(0, 9223372036854775808, 2)", "more elements than any memory"),
+        ("(1000000000000, 0)", "holds no number"),
+        ("(0, 1000000000000)", "holds no number"),
+        ("(2, 1000000000000)", "cannot be read to its end"),
+    ] {
+        for order in ["False", "True"] {
+            let array = with_header("<f8", order, shape);
+            let message = parse_array(path, &array).unwrap_err().to_string();
+            assert!(message.contains(says), "{shape}: {message}");
+            let archive = archive(&[("a", array)], CompressionMethod::Stored);
+            let message = parse_archive(path, &archive).unwrap_err().to_string();
+            assert!(message.contains(says), "{shape}: {message}");
+        }
+    }
+    for kind in ["<f2", "<c16", "<U2"] {
+        let array = with_header(kind, "False", "(1, 1)");
+        let message = parse_array(path, &array).unwrap_err().to_string();
+        assert!(message.contains(kind) && message.contains("float32 and float64"), "{message}");
+    }
+}

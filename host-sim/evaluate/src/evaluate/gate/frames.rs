@@ -110,23 +110,30 @@ pub struct Rest {
 }
 
 impl Rest {
-    /// Frames of `data` at rest, which must allow gates with tolerances `k` in standard deviations of the noise.
+    /// Complete frames of `data` at rest, which must allow gates with tolerances `k` in standard deviations of the
+    /// noise.
     ///
     /// # Errors
-    /// [`BadValue`] for a sensor that is not known at rest or has no noise there, or the first tolerance that makes no
-    /// gate.
+    /// [`BadValue`] for a sensor that is not known at rest, has no noise there or readings near zero, or the first
+    /// tolerance that makes no gate.
     pub fn of(data: &Measurements, k: &[f64]) -> Result<Self, BadValue> {
         let rule = "a gate compares readings with those at rest: give --baseline FILE, with two frames of the \
-                    untouched sensor or more, and no channel that is zero at rest";
-        let at_rest = data.rest.as_ref().filter(|rest| rest.len() > 1);
-        let (Some(rest), Some(noise_level)) = (at_rest, data.noise_level()) else {
-            let frames = data.rest.as_ref().map_or(0, Table::len);
-            return Err(BadValue::new("frames at rest", frames, rule));
+                    untouched sensor or more without a missing reading, and no channel that is zero at rest";
+        let at_rest = data.rest.as_ref().map(complete).filter(|rest| rest.len() > 1);
+        let (Some(rest), Some(noise_level)) = (&at_rest, data.noise_level()) else {
+            let frames = data.rest.as_ref().map_or(0, |rest| complete(rest).len());
+            return Err(BadValue::new("complete frames at rest", frames, rule));
         };
         if noise_level <= 0.0 {
             let rule =
                 "the gate's tolerance is k times it: give frames at rest with the sensor's noise";
             return Err(BadValue::new("noise at rest", noise_level, rule));
+        }
+        if noise_level >= 1.0 {
+            let rule = "readings are near zero at rest, so that a tolerance relative to them makes no gate: give readings \
+                        from which no baseline is subtracted";
+            let percent = format!("{:.0} %", 100.0 * noise_level);
+            return Err(BadValue::new("noise relative to the readings at rest", percent, rule));
         }
         check_tolerances(noise_level, k)?;
         let baseline_frames = rest.len() / 2;
@@ -136,6 +143,12 @@ impl Rest {
         let baseline = Table { values: first.means(), names: first.names };
         Ok(Self { noise_level, baseline, baseline_frames, untouched: table(second) })
     }
+}
+
+/// Lines of `table` without a missing value.
+fn complete(table: &Table) -> Table {
+    let lines = table.lines().filter(|line| !line.iter().any(|value| value.is_nan()));
+    Table { names: table.names.clone(), values: lines.flatten().copied().collect() }
 }
 
 /// Largest ‖Δ‖ in mm of each row of each test frame, whatever the world's outputs are.

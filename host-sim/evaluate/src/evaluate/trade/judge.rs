@@ -90,7 +90,7 @@ impl<'s> Judge<'s> {
                 continue;
             }
             for arithmetic in Arithmetic::all().filter(|a| a.format == format) {
-                self.points(&blob, (frames, inputs), arithmetic, (centres, affine, rank))?;
+                self.points(&blob, (frames, inputs), arithmetic, (affine, rank))?;
             }
             self.distinct.push(blob.bytes().to_vec());
         }
@@ -121,12 +121,15 @@ impl<'s> Judge<'s> {
         blob: &ModelBlob,
         (frames, inputs): (&Frames<'_>, &Inputs),
         arithmetic: Arithmetic,
-        (centres, affine_tail, output_rank): (usize, bool, Option<usize>),
+        (affine_tail, output_rank): (bool, Option<usize>),
     ) -> Result<()> {
         let test = &frames.test;
         let model = blob.prepare(arithmetic.exponential).of_inputs();
         let design = Design::of(blob);
         let ram = DecoderRam::of(&design);
+        // Fewer than asked for where there are fewer distinct samples.
+        let centres = design.networks.iter().map(|network| network.shape.centres).max();
+        let centres = centres.unwrap_or_default();
         let costs = self.prices.frames(&design, arithmetic.exponential)?;
         let estimate = model.decode_lines(&test.inputs.values);
         let scan_ms = self.plan.device.scan_ms(self.wires, frames.samples_averaged);

@@ -1,10 +1,13 @@
 //! Costs that are known before anything is trained: they depend on the sizes of a model, not on its numbers.
 
+use std::collections::HashSet;
+
 use model_core::blob::ModelShape;
 use model_core::rbf::Format;
 use taxel_data::dataset::Dataset;
 use taxel_learn::Exponential;
 use taxel_learn::cost::{Cost, Design, Prices};
+use taxel_learn::train::Layers;
 
 use super::choice::Offer;
 use super::device::Wires;
@@ -26,10 +29,31 @@ pub(super) fn ranks(
     [None].into_iter().chain(of_plan.filter(|_| whole_array)).collect()
 }
 
-/// Design of the model that training with these settings gives.
+/// Number of distinct samples of each network's inputs, counted up to `most`: networks have no more centres.
+fn distinct_samples(dataset: &Dataset, inputs: &Inputs, most: usize) -> Vec<usize> {
+    let layers = Layers { projection: inputs.projection.clone(), hidden: vec![] };
+    let seen = layers.seen(dataset);
+    let of_row = seen.inputs.names.len() / seen.rows;
+    let distinct = |row: usize| {
+        let mut found: HashSet<Vec<u32>> = HashSet::new();
+        for line in seen.inputs.lines() {
+            let sample = &line[row * of_row..][..of_row];
+            // Zero of either sign is one number.
+            found.insert(sample.iter().map(|value| (*value as f32 + 0.0).to_bits()).collect());
+            if found.len() == most {
+                break;
+            }
+        }
+        found.len()
+    };
+    (0..seen.rows).map(distinct).collect()
+}
+
+/// Design of the model that training with these settings gives, with at most as many centres as `distinct` samples of
+/// each network.
 fn design(
     dataset: &Dataset,
-    inputs: &Inputs,
+    (inputs, distinct): (&Inputs, &[usize]),
     (format, centres): (Format, usize),
     affine_tail: bool,
     output_rank: Option<usize>,
@@ -53,6 +77,9 @@ fn design(
             }
         }
     };
+    for (network, most) in design.networks.iter_mut().zip(distinct) {
+        network.shape.centres = centres.min(*most);
+    }
     design.relative_inputs = dataset.relative_inputs;
     design.in_ram_if_it_fits()
 }
@@ -71,12 +98,16 @@ pub(super) fn offers(
     let names_bytes: usize = columns.map(|name| name.len() + 1).sum();
     let scan_ms = plan.device.scan_ms(wires, frames.samples_averaged);
     let mut offers = Vec::new();
+    let most_centres = plan.centres.iter().copied().max().unwrap_or(0);
     for inputs in &frames.inputs {
+        let distinct = distinct_samples(dataset, inputs, most_centres);
         for &centres in &plan.centres {
             for rank in ranks(plan, dataset, inputs.whole_array(), centres) {
                 for Arithmetic { format, exponential } in Arithmetic::all() {
                     for affine_tail in [false, true] {
-                        let design = design(dataset, inputs, (format, centres), affine_tail, rank);
+                        let of_inputs = (inputs, &distinct[..]);
+                        let settings = (format, centres);
+                        let design = design(dataset, of_inputs, settings, affine_tail, rank);
                         let blob_bytes = names_bytes + design.parameter_bytes();
                         if inputs.whole_array() && blob_bytes > SLOT_BYTES {
                             continue;
