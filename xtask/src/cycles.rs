@@ -55,7 +55,7 @@ use crate::process::{Outcome, root, target_dir};
 use crate::toolchain::{Toolchain, elf};
 use accepted::{Accepted, Excess, Reference};
 use code::Code;
-use figures::Figure;
+use figures::{Figure, Scope};
 use loops::Loop;
 use models::Blob;
 pub use options::Options;
@@ -183,6 +183,12 @@ fn measure_model(
     let blob = ModelBlob::read(path).map_err(|cause| cause.to_string())?;
     let design = Design::of(&blob);
     let (mut frames, _) = predicted::measure(&design, path, image, code)?;
+    if frames.iter().all(|frame| matches!(frame.scope, Scope::Frame | Scope::ArrayFrame)) {
+        eprintln!(
+            "note: no frame behind a gate was measured: a gate compares relative to readings at rest, and needs a \
+             training range that reaches above 0 in every input"
+        );
+    }
     if let Some(kernel) = options.kernel {
         frames.retain(|frame| frame.kernel == kernel);
         if frames.is_empty() {
