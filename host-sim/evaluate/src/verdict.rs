@@ -10,7 +10,7 @@ use crate::metrics::{DecoderErrors, Errors, LimitSummary};
 
 mod warning;
 
-pub use warning::{FRAMES_A_WEIGHT, OUT_OF_RANGE, SLOT_BYTES, Warning};
+pub use warning::{FEW_TEST_FRAMES, FRAMES_A_WEIGHT, OUT_OF_RANGE, SLOT_BYTES, Warning};
 
 /// Share of the mean's RMSE above which an output counts as hardly decoded.
 const HARDLY: f64 = 0.85;
