@@ -133,10 +133,13 @@ pub fn density(group: &GroupDistribution) -> String {
     let mut plot = Plot::new(&title, [ticks(), ticks()], 310.0, 24.0);
     // Both axes have one scale.
     let side = (plot.right - plot.left).min(plot.bottom - plot.top);
+    // Bins of whole pixels leave no gaps between each other.
+    let bin = (side / density.bins as f64).floor();
+    let side = bin * density.bins as f64;
+    (plot.left, plot.bottom) = (plot.left.round(), plot.bottom.round());
     plot.right = plot.left + side;
     plot.top = plot.bottom - side;
     let most = density.counts.iter().copied().max().unwrap_or(0).max(1) as f64;
-    let bin = side / density.bins as f64;
     for (i, count) in density.counts.iter().enumerate().filter(|(_, count)| **count > 0) {
         let (x, y) = ((i % density.bins) as f64, (i / density.bins) as f64);
         // By orders of magnitude: most frames hardly move most electrodes.
