@@ -60,6 +60,12 @@ impl Table {
         sums.iter().map(|(sum, count)| sum / count).collect()
     }
 
+    /// One line with the mean of each column, which [`means`](Self::means) gives.
+    #[must_use]
+    pub fn mean_line(&self) -> Self {
+        Self { names: self.names.clone(), values: self.means() }
+    }
+
     /// Standard deviation of each column; NaN is skipped. 0 for a column that does not change as far as f32 can tell,
     /// or holds NaN alone.
     #[must_use]

@@ -5,6 +5,8 @@ use taxel_data::table::Table;
 use taxel_learn::outliers::Outliers;
 use taxel_learn::{Options, Origin, relative};
 
+use crate::metrics::Measure;
+
 /// Measured frames, and how a model is trained on them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measurements {
@@ -122,16 +124,20 @@ impl Measurements {
     /// Mean of the readings at rest on one line, if they are known.
     #[must_use]
     pub fn baseline(&self) -> Option<Table> {
-        let rest = self.rest.as_ref()?;
-        Some(Table { names: rest.names.clone(), values: rest.means() })
+        self.rest.as_ref().map(Table::mean_line)
+    }
+
+    /// Measure for errors on the test frames.
+    #[must_use]
+    pub fn measure(&self) -> Measure {
+        Measure { full_scale: self.origin().full_scale, thickness_mm: None, limit: None }
     }
 }
 
 /// Makes the inputs of `frames` relative to the mean of `rest`, the readings of the untouched sensor.
 #[must_use]
 pub fn relative_to(frames: Dataset, rest: &Table) -> Dataset {
-    let baseline = Table { names: rest.names.clone(), values: rest.means() };
-    relative::dataset(frames, &baseline)
+    relative::dataset(frames, &rest.mean_line())
 }
 
 #[cfg(test)]

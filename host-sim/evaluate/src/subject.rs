@@ -174,11 +174,7 @@ impl Subject {
                 let level = scene.world.noise.level / (samples_averaged as f64).sqrt();
                 scene.measure_beside_limit(level, scene.training.test_frames, progress)
             }
-            Self::Measured(data) => {
-                let full_scale = data.origin().full_scale;
-                let measure = Measure { full_scale, thickness_mm: None, limit: None };
-                (measure, LimitSummary::of(&Err(Refusal::Measured)))
-            }
+            Self::Measured(data) => (data.measure(), LimitSummary::of(&Err(Refusal::Measured))),
         }
     }
 }

@@ -82,7 +82,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     };
     let result = match &subject {
         Subject::Scene(scene) => gate::measure(scene, &model, &settings, &Terminal::new()),
-        Subject::Measured(data) => gate::measure_data(data, &model, &settings, &Terminal::new()),
+        Subject::Measured(data) => gate::measure_data(data, &model, &settings),
     };
     let result = result.map_err(|bad| of_option(bad, &OPTIONS))?;
     let verdict = verdict(&result);
@@ -192,44 +192,24 @@ fn page_of(summary: &Summary) -> print::Page {
     page
 }
 
+/// Shares of rows by tolerance; those that are missed where it is known how far the electrodes moved.
 fn rows(page: &mut print::Page, result: &GateResult) {
     let sizes = result.lines.first().map_or(&[][..], |line| &line.missed);
-    if sizes.is_empty() {
-        return rows_of_unknown_size(page, result);
-    }
-    let over = MISSED_OVER_MM.map(|mm| format!(" {:>9}", format!("> {mm} mm"))).concat();
+    let sizes_are_known = !sizes.is_empty();
+    let head = if sizes_are_known {
+        let over = MISSED_OVER_MM.map(|mm| format!(" {:>9}", format!("> {mm} mm"))).concat();
+        format!("   missed:{over} {:>9}", "largest")
+    } else {
+        String::new()
+    };
     page.line(format_args!(
-        "{:>6} {:>10} {:>9} {:>9} {:>9}   missed:{over} {:>9}",
-        "k", "tolerance", "skipped", "woken", "(theory)", "largest"
-    ));
-    for line in &result.lines {
-        let missed = line.missed.iter().map(|missed| {
-            format!(" {:>9}", missed.share().map_or("-".into(), |share| percent(share, 2)))
-        });
-        page.line(format_args!(
-            "{:>6} {:>10} {:>9} {:>9} {:>9}          {} {:>9}",
-            line.k,
-            percent(line.rest_tolerance, 3),
-            percent(line.skipped, 2),
-            percent(line.woken, 3),
-            format!("({})", percent(line.woken_by_theory, 3)),
-            missed.collect::<String>(),
-            line.largest_missed_mm.map_or("-".into(), |mm| format!("{mm:.3} mm"))
-        ));
-    }
-    let rows: Vec<String> = sizes.iter().map(|size| format!(" {:>9}", size.rows)).collect();
-    page.line(format_args!("{:>47}   of rows:{}\n", "", rows.concat()));
-}
-
-/// Shares of rows without those that are missed: how far the electrodes moved is not known.
-fn rows_of_unknown_size(page: &mut print::Page, result: &GateResult) {
-    page.line(format_args!(
-        "{:>6} {:>10} {:>9} {:>9} {:>9}",
+        "{:>6} {:>10} {:>9} {:>9} {:>9}{head}",
         "k", "tolerance", "skipped", "woken", "(theory)"
     ));
     for line in &result.lines {
+        let missed = if sizes_are_known { missed(line) } else { String::new() };
         page.line(format_args!(
-            "{:>6} {:>10} {:>9} {:>9} {:>9}",
+            "{:>6} {:>10} {:>9} {:>9} {:>9}{missed}",
             line.k,
             percent(line.rest_tolerance, 3),
             percent(line.skipped, 2),
@@ -237,7 +217,20 @@ fn rows_of_unknown_size(page: &mut print::Page, result: &GateResult) {
             format!("({})", percent(line.woken_by_theory, 3))
         ));
     }
+    if sizes_are_known {
+        let rows: Vec<String> = sizes.iter().map(|size| format!(" {:>9}", size.rows)).collect();
+        page.line(format_args!("{:>47}   of rows:{}", "", rows.concat()));
+    }
     page.line("");
+}
+
+/// Shares of touched rows that a tolerance misses, by how far they moved, and the largest of them.
+fn missed(line: &Line) -> String {
+    let shares = line.missed.iter().map(|missed| {
+        format!(" {:>9}", missed.share().map_or("-".into(), |share| percent(share, 2)))
+    });
+    let largest = line.largest_missed_mm.map_or("-".into(), |mm| format!("{mm:.3} mm"));
+    format!("          {} {largest:>9}", shares.collect::<Vec<_>>().concat())
 }
 
 /// What the gate with the tolerance nearest to the recommended one is worth.

@@ -77,7 +77,7 @@ impl BaselineArgument {
 /// Readings of the untouched sensor in `file`, in the columns of `inputs`, of which every one has a mean to divide by.
 pub fn at_rest(file: &DataFile, inputs: &Table) -> Result<Table> {
     let rest = usual_lines(file, inputs.names.iter().map(String::as_str))?;
-    let missing = unusable(&Table { names: rest.names.clone(), values: rest.means() });
+    let missing = unusable(&rest.mean_line());
     if missing.is_empty() {
         return Ok(rest);
     }

@@ -222,9 +222,8 @@ pub fn measure_data(
     data: &Measurements,
     model: &PreparedModel<'_>,
     settings: &Settings,
-    progress: &dyn Progress,
 ) -> Result<GateResult, BadValue> {
-    Ok(judge(GateFrames::of_measurements(data, model, settings, progress)?, model, settings))
+    Ok(judge(GateFrames::of_measurements(data, model, settings)?, model, settings))
 }
 
 fn judge(frames: GateFrames, model: &PreparedModel<'_>, settings: &Settings) -> GateResult {

@@ -72,10 +72,8 @@ impl Worth {
                 let test = scene.dataset(&Synthesis::of(&scene.world), Stream::Test, frames);
                 (JudgedOn::FreshFrames, on_frames(blob, set, &test, &scene.measure()))
             }
-            (None, Subject::Measured(_)) => {
-                let full_scale = set.origin.full_scale.clone();
-                let measure = Measure { full_scale, thickness_mm: None, limit: None };
-                (JudgedOn::TrainingFrames, on_frames(blob, set, &set.frames, &measure))
+            (None, Subject::Measured(data)) => {
+                (JudgedOn::TrainingFrames, on_frames(blob, set, &set.frames, &data.measure()))
             }
         };
         let no_limit = LimitSummary::of(&Err(Refusal::Measured));

@@ -5,6 +5,7 @@ use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
 use taxel_data::table::Table;
 use taxel_learn::PreparedModel;
+use taxel_limit::Refusal;
 use taxel_simulate::outputs::Outputs;
 use taxel_simulate::{Synthesis, World};
 
@@ -12,7 +13,6 @@ use super::{Gate, Settings, check_settings, check_tolerances, has_sessions, rows
 use crate::experiment::Experiment;
 use crate::measurements::Measurements;
 use crate::metrics::{LimitSummary, Measure};
-use crate::subject::Subject;
 
 /// Frames of a sensor that is touched, and of the same sensor at rest.
 pub(super) struct GateFrames {
@@ -75,10 +75,8 @@ impl GateFrames {
         data: &Measurements,
         model: &PreparedModel<'_>,
         settings: &Settings,
-        progress: &dyn Progress,
     ) -> Result<Self, BadValue> {
         let rest = Rest::of(data, &settings.k)?;
-        let (measure, limit) = Subject::Measured(Box::new(data.clone())).measure(1, progress);
         let rows = data.test.rows;
         Ok(Self {
             name: data.name.clone(),
@@ -91,8 +89,8 @@ impl GateFrames {
             outputs: data.test.outputs.clone(),
             untouched: rest.untouched,
             sizes_mm: None,
-            measure,
-            limit,
+            measure: data.measure(),
+            limit: LimitSummary::of(&Err(Refusal::Measured)),
         })
     }
 }
