@@ -16,6 +16,8 @@ mod cycles;
 
 mod sensors;
 
+mod torture;
+
 mod ci;
 
 use std::env;
@@ -71,6 +73,12 @@ Usage: cargo xtask COMMAND
                               file and more), compares 1000 frames on the device with the host's, and prints what each
                               model takes. Two minutes
       --accept                writes the table into docs/sensors.md
+  torture [OPTION…] [NAME…]   puts every promise of reliability to the test, or those of these names, and prints a
+                              table: promise, cases, worst found, bound, verdict, seed. `torture --help` has all options
+      --minutes N             takes so long (20); some promises take longer
+      --short                 tests the least number of cases, in at most two minutes
+      --seed S                starts from this seed: that of the table repeats the worst case of a promise
+      --self-test             plants a fault under every promise instead, and fails if one is not found
   help                        prints this text
 
 `bash firmware/setup.sh` installs the tools for these commands on Debian.
@@ -82,6 +90,7 @@ fn main() -> ExitCode {
     let arguments: Vec<String> = env::args().skip(1).collect();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let outcome = match arguments[..] {
+        ["torture", ref options @ ..] => torture::run(options),
         ["help" | "--help" | "-h"] | [_, "--help" | "-h"] => {
             print!("{HELP}");
             Ok(())

@@ -25,6 +25,7 @@ pub const CRATES: &[(&str, Side)] = &[
     ("taxel-rig", Side::Host),
     ("taxel-evaluate", Side::Host),
     ("host-sim", Side::Host),
+    ("torture", Side::Host),
     ("xtask", Side::Host),
     ("benchmarks", Side::Host),
 ];

@@ -1,0 +1,98 @@
+//! How much a test does: from which seed on, for how long, and whether with a planted fault.
+
+use std::any::Any;
+use std::panic::{self, AssertUnwindSafe};
+use std::time::{Duration, Instant};
+
+use rayon::iter::{IntoParallelIterator, ParallelIterator};
+
+use crate::found::Found;
+
+/// How much a test does.
+#[derive(Debug, Clone, Copy)]
+pub struct Effort {
+    seed: u64,
+    end: Instant,
+    planted: bool,
+}
+
+/// The worst case so far.
+#[derive(Debug, Clone)]
+struct Worst {
+    value: f64,
+    seed: u64,
+    note: String,
+}
+
+impl Effort {
+    /// Effort from `seed` on, for `time` from now.
+    #[must_use]
+    pub fn new(seed: u64, time: Duration, planted: bool) -> Self {
+        Self { seed, end: Instant::now() + time, planted }
+    }
+
+    /// Seed of the first case.
+    #[allow(dead_code)]
+    #[must_use]
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// Whether the test must plant a fault, and find it.
+    #[must_use]
+    pub fn is_planted(&self) -> bool {
+        self.planted
+    }
+
+    /// Whether the time for further cases is over.
+    #[must_use]
+    pub fn is_over(&self) -> bool {
+        Instant::now() >= self.end
+    }
+
+    /// Runs `case` for one seed after another, on all cores: for the first `least`, and for more up to `most` while
+    /// there is time. A case gives its value, the larger the worse, or says what failed. A panic is a failure.
+    ///
+    /// The caller compares the worst value with `bound`, both in `unit`.
+    pub fn worst(
+        &self,
+        (least, most): (u64, u64),
+        (bound, unit): (f64, &'static str),
+        case: impl Fn(u64) -> Result<f64, String> + Sync,
+    ) -> Found {
+        let mut worst = Worst { value: f64::NEG_INFINITY, seed: self.seed, note: String::new() };
+        let mut cases = 0;
+        while cases < least || (cases < most && !self.is_over()) {
+            let several =
+                if cases < least { least - cases } else { least.max(16).min(most - cases) };
+            let first = self.seed.wrapping_add(cases);
+            let seeds = (0..several).into_par_iter().map(|offset| first.wrapping_add(offset));
+            let tested = seeds.map(|seed| tested(seed, &case));
+            worst = tested.reduce(|| worst.clone(), worse);
+            cases += several;
+        }
+        let Worst { value, seed, note } = worst;
+        Found { cases, worst: value, bound, unit, seed, note }
+    }
+}
+
+fn tested(seed: u64, case: impl Fn(u64) -> Result<f64, String>) -> Worst {
+    let outcome = panic::catch_unwind(AssertUnwindSafe(|| case(seed)));
+    match outcome.unwrap_or_else(|cause| Err(format!("panic: {}", said(&*cause)))) {
+        // NaN is worse than any number.
+        Ok(value) if value.is_nan() => Worst { value: f64::INFINITY, seed, note: "NaN".to_owned() },
+        Ok(value) => Worst { value, seed, note: String::new() },
+        Err(note) => Worst { value: f64::INFINITY, seed, note },
+    }
+}
+
+/// The worse of two cases; of equals that of the lower seed, so that the number of cores does not matter.
+fn worse(one: Worst, other: Worst) -> Worst {
+    let is_other = other.value > one.value || (other.value == one.value && other.seed < one.seed);
+    if is_other { other } else { one }
+}
+
+fn said(cause: &(dyn Any + Send)) -> &str {
+    let text = cause.downcast_ref::<String>().map(String::as_str);
+    text.or_else(|| cause.downcast_ref::<&str>().copied()).unwrap_or("without a message")
+}

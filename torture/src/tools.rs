@@ -1,0 +1,38 @@
+//! Programs that promises are tested with, besides the libraries.
+
+use std::path::{Path, PathBuf};
+
+/// Programs built by `cargo xtask torture`.
+#[allow(dead_code)]
+#[derive(Debug)]
+pub struct Tools {
+    /// Program of host-sim.
+    pub program: Option<PathBuf>,
+    /// Folder of the emulator's images.
+    pub images: Option<PathBuf>,
+}
+
+#[allow(dead_code)]
+impl Tools {
+    /// The program of host-sim.
+    ///
+    /// # Errors
+    /// It was not given.
+    pub fn program(&self) -> Result<&Path, String> {
+        self.program.as_deref().ok_or_else(|| missing("host-sim"))
+    }
+
+    /// The emulator's image of this name.
+    ///
+    /// # Errors
+    /// The folder of images was not given.
+    pub fn image(&self, name: &str) -> Result<PathBuf, String> {
+        let images = self.images.as_ref().ok_or_else(|| missing(name))?;
+        Ok(images.join(name))
+    }
+}
+
+#[allow(dead_code)]
+fn missing(name: &str) -> String {
+    format!("{name} is not built; run this by `cargo xtask torture`")
+}
