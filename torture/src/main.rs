@@ -87,13 +87,16 @@ fn run(arguments: &Arguments) -> Result<bool, Box<dyn Error>> {
     let mut entries = Vec::new();
     for promise in chosen {
         if io::stderr().is_terminal() {
-            eprint!("{}: {} …\x1b[K\r", promise.name, promise.text);
+            eprint!("\r{}: {} …\x1b[K", promise.name, promise.text);
         }
         let time = Duration::from_secs_f64(given_s * f64::from(promise.share) / shares);
         let effort = Effort::new(arguments.seed, time, arguments.self_test);
         let start = Instant::now();
         let outcome = (promise.check)(&effort, &tools);
         entries.push(Tested { promise, outcome, time: start.elapsed() });
+    }
+    if io::stderr().is_terminal() {
+        eprint!("\r\x1b[K");
     }
     if arguments.json {
         println!("{}", table::json(&entries, arguments.self_test)?);

@@ -7,40 +7,63 @@ use serde_json::{Value, json};
 use crate::found::Found;
 use crate::promise::Tested;
 
-/// The table in at most 120 columns, and a line that sums it up.
+/// The head of the table, in the columns of [`row`].
+const HEAD: [&str; 7] = ["promise", "cases", "worst", "bound", "verdict", "seed", "name"];
+
+/// The table in at most 120 columns, notes, and a line that sums it up.
 #[must_use]
 pub fn text(entries: &[Tested], self_test: bool) -> String {
-    let mut table = format!(
-        "{:<22}{:>14} {:>12} {:>10} {:<8} {:<8}{:>12}{:>8}  promise\n",
-        "", "cases", "worst", "bound", "unit", "verdict", "seed", "s"
-    );
+    let mut table = row(&HEAD.map(str::to_owned));
     for entry in entries {
-        let (name, text) = (entry.promise.name, entry.promise.text);
-        let seconds = entry.time.as_secs_f64();
-        // Writing to a String cannot fail.
-        let _ = match &entry.outcome {
-            Ok(found) => writeln!(
-                table,
-                "{name:<22}{:>14} {:>12.4e} {:>10.3e} {:<8} {:<8}{:>12}{seconds:>8.1}  {text}",
-                found.cases,
-                found.worst,
-                found.bound,
-                found.unit,
-                verdict(entry, self_test),
-                found.seed,
-            ),
-            Err(cause) => writeln!(table, "{name:<22} not tested: {cause}"),
+        table.push_str(&row(&cells(entry, self_test)));
+    }
+    for entry in entries {
+        let note = match &entry.outcome {
+            Ok(found) => &found.note,
+            Err(cause) => cause,
         };
-        if let Ok(found) = &entry.outcome
-            && !found.note.is_empty()
-        {
-            let _ = writeln!(table, "{:<24}{}", "", found.note);
+        if !note.is_empty() {
+            // Writing to a String cannot fail.
+            let _ = writeln!(table, "{}: {note}", entry.promise.name);
         }
     }
-    let good = entries.iter().filter(|entry| entry.is_as_it_should_be(self_test)).count();
+    let bad = || entries.iter().filter(|entry| !entry.is_as_it_should_be(self_test));
     let what = if self_test { "planted faults found" } else { "promises kept" };
-    let _ = writeln!(table, "\n{good} of {} {what}", entries.len());
+    let good = entries.len() - bad().count();
+    let _ = write!(table, "\n{good} of {} {what}", entries.len());
+    for (entry, found) in bad().filter_map(|entry| Some((entry, entry.outcome.as_ref().ok()?))) {
+        let (name, seed) = (entry.promise.name, found.seed);
+        let plant = if self_test { " --self-test" } else { "" };
+        let _ = write!(table, "\nagain: cargo xtask torture --short{plant} --seed {seed} {name}");
+    }
+    table.push('\n');
     table
+}
+
+fn row([promise, cases, worst, bound, verdict, seed, name]: &[String; 7]) -> String {
+    format!("{promise:<54}{cases:>9} {worst:>12} {bound:>10} {verdict:<8} {seed:>6}  {name}\n")
+}
+
+fn cells(entry: &Tested, self_test: bool) -> [String; 7] {
+    let (name, text) = (entry.promise.name.to_owned(), entry.promise.text.to_owned());
+    let verdict = verdict(entry, self_test).to_owned();
+    let Ok(found) = &entry.outcome else {
+        let none = String::new;
+        return [text, none(), none(), none(), verdict, none(), name];
+    };
+    let Found { cases, worst, bound, unit, seed, .. } = found;
+    let worst = format!("{} {unit}", short(*worst));
+    [text, short(*cases as f64), worst, short(*bound), verdict, seed.to_string(), name]
+}
+
+/// A number in at most nine characters, with three digits.
+fn short(number: f64) -> String {
+    match number.abs() {
+        0.0 => "0".to_owned(),
+        size if size < 100_000.0 && number.fract() == 0.0 => format!("{number}"),
+        size if (0.01..1000.0).contains(&size) => format!("{number:.3}"),
+        _ => format!("{number:.2e}"),
+    }
 }
 
 /// The table as JSON.
