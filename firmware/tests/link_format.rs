@@ -1,8 +1,5 @@
 //! The link's bytes, compared with those in `docs/link.md`.
 
-mod common;
-
-use common::request_bytes;
 use firmware::circuit::{Circuit, ConstantsFault, ZeroPotential};
 use firmware::link::cobs;
 use firmware::link::message::{
@@ -12,6 +9,7 @@ use firmware::link::message::{
     UploadState, UploadStep,
 };
 use firmware::link::packet::{self, PROTOCOL_VERSION};
+use mock_board::request_bytes;
 use model_core::blob::Floats;
 
 const START_US: u64 = 3_000_000;

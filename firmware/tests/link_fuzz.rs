@@ -1,10 +1,8 @@
 //! Ten million random and mutated bytes, sent to the running application.
 
-mod common;
-
-use common::*;
 use firmware::app::Session;
 use firmware::link::message::{ConfidenceSent, Configuration, Request, UploadStep};
+use mock_board::*;
 use model_core::blob::Floats;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -75,15 +73,15 @@ fn no_bytes_stop_the_device_and_the_second_request_after_them_is_answered() {
             burst.extend(spoil(&mut random, &requests));
         }
         given += burst.len();
-        board.0.borrow_mut().to_device.extend(burst);
+        board.pins.borrow_mut().to_device.extend(burst);
         assert_eq!(settle(&mut session, &board), None);
-        board.0.borrow_mut().to_host.clear();
+        board.pins.borrow_mut().to_host.clear();
         for number in [60_001, 60_002] {
             let request = request_bytes(number, &Request::Identify);
-            board.0.borrow_mut().to_device.extend(request);
+            board.pins.borrow_mut().to_device.extend(request);
         }
         assert_eq!(settle(&mut session, &board), None);
-        let reports = reports(&board.0.borrow().to_host);
+        let reports = reports(&board.pins.borrow().to_host);
         let answered = |n: u16| {
             let identity =
                 |(number, text): &&(u16, String)| *number == n && text.starts_with("Identity");

@@ -1,14 +1,12 @@
 //! Recalibration over the link: what is learned comes into force whole or not at all, and can be undone.
 
-mod common;
-
-use common::*;
 use firmware::app::{Leave, Session};
 use firmware::link::message::{
     Configuration, RecalibrationFault, RecalibrationReport, RecalibrationState, RecalibrationStep,
     Refusal, Report, Request, UploadState,
 };
 use firmware::store::{MOST_RECORDS, Slot};
+use mock_board::*;
 use model_core::blob::{Floats, Metadata, ModelParts, ModelShape, encode_to_vec};
 use model_core::rbf::Shape;
 use model_core::rbf::direct::{Network, Parameters};
@@ -198,14 +196,14 @@ fn a_recalibration_takes_the_memory_of_the_weights_where_it_must() {
     let mut session = Session::start(&mut bench.app, &mut slots, &mut memory[..less]);
     assert_eq!(is_in_ram(&mut session), Some(true));
     let outputs_before = show(&mut session, &board, &press(3));
-    board.0.borrow_mut().to_host.clear();
+    board.pins.borrow_mut().to_host.clear();
     let begin = Request::Recalibrate(RecalibrationStep::Begin);
-    board.0.borrow_mut().to_device.extend(request_bytes(9, &begin));
+    board.pins.borrow_mut().to_device.extend(request_bytes(9, &begin));
     assert_eq!(settle(&mut session, &board), Some(Leave::MakeRoom));
-    assert!(board.0.borrow().to_host.is_empty(), "the next session answers");
+    assert!(board.pins.borrow().to_host.is_empty(), "the next session answers");
     let _ = session;
     let mut session = Session::start(&mut bench.app, &mut slots, &mut memory[..less]);
-    let answers = reports(&board.0.borrow().to_host);
+    let answers = reports(&board.pins.borrow().to_host);
     assert!(answers.len() == 1 && answers[0].0 == 9, "{answers:?}");
     assert!(answers[0].1.contains("state: Collecting"), "{answers:?}");
     assert_eq!(is_in_ram(&mut session), Some(false));
@@ -267,7 +265,7 @@ fn presses_bring_a_changed_sensor_back_and_the_previous_model_can_be_had_again()
     assert_eq!(undo(&mut slots, in_force[0]), nothing);
     assert_eq!(after_restart(&mut slots), Some(in_force[0]));
     // Uploads make room: one in each slot.
-    let [next, last] = [common::blob(2, 5), common::blob(3, 2)];
+    let [next, last] = [blob(2, 5), blob(3, 2)];
     upload(&mut slots, &next);
     upload(&mut slots, &last);
     assert_eq!(undo(&mut slots, crc_of(&last)), Ok(crc_of(&next)));
@@ -332,15 +330,15 @@ fn a_press_is_the_mean_of_frames_and_counts_once_however_often_it_is_sent() {
     let mut session = Session::start(&mut bench.app, &mut slots, &mut memory);
     step(&mut session, &board, RecalibrationStep::Begin).0.unwrap();
     let mut wait = |request: &Request<'_>, number: u16, times: usize| {
-        board.0.borrow_mut().to_host.clear();
+        board.pins.borrow_mut().to_host.clear();
         for _ in 0..times {
-            board.0.borrow_mut().to_device.extend(request_bytes(number, request));
+            board.pins.borrow_mut().to_device.extend(request_bytes(number, request));
         }
-        let until = board.0.borrow().now_us + 10_000;
-        while board.0.borrow().now_us < until {
+        let until = board.pins.borrow().now_us + 10_000;
+        while board.pins.borrow().now_us < until {
             assert_eq!(session.step(), None);
         }
-        reports(&board.0.borrow().to_host)
+        reports(&board.pins.borrow().to_host)
     };
     for i in 0..80 {
         let stated = outputs(&blob, &press(i));
@@ -375,12 +373,12 @@ fn another_request_that_ends_a_press_refuses_it() {
     let stated = outputs(&blob, &press(1));
     let outputs = Floats::of(&stated);
     let added = RecalibrationStep::Press { before: 0, frames: 1000, outputs };
-    board.0.borrow_mut().to_host.clear();
-    board.0.borrow_mut().to_device.extend(request_bytes(5, &Request::Recalibrate(added)));
+    board.pins.borrow_mut().to_host.clear();
+    board.pins.borrow_mut().to_device.extend(request_bytes(5, &Request::Recalibrate(added)));
     settle(&mut session, &board);
-    board.0.borrow_mut().to_device.extend(request_bytes(6, &configure(quiet())));
+    board.pins.borrow_mut().to_device.extend(request_bytes(6, &configure(quiet())));
     settle(&mut session, &board);
-    let all = reports(&board.0.borrow().to_host);
+    let all = reports(&board.pins.borrow().to_host);
     assert!(all[0].0 == 5 && all[0].1.contains("Recalibration(Frames)"), "{all:?}");
     assert_eq!(step(&mut session, &board, RecalibrationStep::Status).0.unwrap().presses, 0);
 }
@@ -444,7 +442,7 @@ fn what_cannot_be_done_is_refused_by_name() {
     let bytes = 4 * floats as u32;
     assert_eq!(begun, fault(RecalibrationFault::NoRoom { bytes, free_bytes: 0 }));
     let _ = session;
-    let mut shared = MockSlot::pair_with(&common::blob(1, 3));
+    let mut shared = MockSlot::pair_with(&mock_board::blob(1, 3));
     let mut session = Session::start(&mut bench.app, &mut shared, &mut memory);
     let begun = step(&mut session, &board, RecalibrationStep::Begin).0;
     assert_eq!(begun, fault(RecalibrationFault::SharedNetworks));
@@ -457,7 +455,7 @@ fn what_cannot_be_done_is_refused_by_name() {
 
 #[test]
 fn an_undo_brings_back_the_model_before_an_upload_too() {
-    let (old, new) = (trained(), common::blob(2, 5));
+    let (old, new) = (trained(), blob(2, 5));
     let mut slots = MockSlot::pair_with(&old);
     upload(&mut slots, &new);
     assert_eq!(after_restart(&mut slots), Some(crc_of(&new)));

@@ -1,15 +1,12 @@
 //! Settings survive restarts, power cuts at any word, and pages that hold anything.
 
-mod common;
-
-use common::pages::SharedSettings;
-use common::*;
 use firmware::app::Session;
 use firmware::circuit::{Circuit, Constants, ConstantsFault, ZeroPotential};
 use firmware::link::message::{
     Configuration, KeepFault, Kept, KeptBaseline, Refusal, Report, Request, Setting,
 };
 use firmware::settings::{KeepError, Keeper, PAGE_BYTES};
+use mock_board::*;
 use model_core::blob::Floats;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -73,7 +70,7 @@ fn every_setting_survives_a_restart_and_can_be_forgotten() {
             Request::CaptureBaseline { frames: 3 },
         ];
         for (number, request) in (1..).zip(&capture) {
-            bench.board.0.borrow_mut().to_device.extend(request_bytes(number, request));
+            bench.board.pins.borrow_mut().to_device.extend(request_bytes(number, request));
         }
         for _ in 0..10_000 {
             session.step();

@@ -1,9 +1,7 @@
 //! Loading blobs from slots of flash.
 
-mod common;
-
-use common::{ROWS, blob, frame_at_rest};
 use firmware::store::blob_in_slot;
+use mock_board::{ROWS, blob, frame_at_rest};
 use model_core::blob::DecodeError;
 use model_core::{AlignedBytes, Decoder};
 

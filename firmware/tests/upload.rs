@@ -1,13 +1,11 @@
 //! Uploading a model: sound models come into force, and nothing else ever does.
 
-mod common;
-
-use common::*;
 use firmware::app::{Leave, Session};
 use firmware::link::message::{
     Configuration, ModelFault, Refusal, Report, Request, UploadState, UploadStep,
 };
 use firmware::store::{ERASES_AT_ONCE, FlashError, Slot, Upload};
+use mock_board::*;
 use model_core::checksum::CRC_32;
 use model_core::rbf::Shape;
 use model_core::rbf::direct::{Network, Parameters};
@@ -83,7 +81,7 @@ fn the_watchdog_is_fed_just_before_a_slot_is_erased_even_if_the_sensor_is_silent
     for _ in 0..2000 {
         session.step();
     }
-    let feeds = || board.0.borrow().feeds;
+    let feeds = || board.pins.borrow().feeds;
     let fed = feeds();
     let good = blob(4, 3);
     let mut too_long = good.to_vec();
@@ -369,13 +367,13 @@ fn an_upload_without_requests_ends() {
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let board = bench.board.clone();
     upload(&mut session, &board, &steps[..2]).0.unwrap();
-    board.0.borrow_mut().now_us += 9_000_000;
+    board.pins.borrow_mut().now_us += 9_000_000;
     // A request that only asks does not keep it.
     slot_erases(&mut session, &board);
     upload(&mut session, &board, &steps[2..3]).0.unwrap();
-    board.0.borrow_mut().now_us += 9_000_000;
+    board.pins.borrow_mut().now_us += 9_000_000;
     slot_erases(&mut session, &board);
-    board.0.borrow_mut().now_us += 1_000_000;
+    board.pins.borrow_mut().now_us += 1_000_000;
     session.step();
     assert_eq!(upload(&mut session, &board, &steps[3..4]).0, Err(Refusal::NoUpload));
 }

@@ -4,8 +4,8 @@ use firmware::app::Session;
 use firmware::link::message::{Configuration, EstimateReport, Refusal, Report, Request};
 use model_core::blob::{Floats, Metadata, Model, ModelParts, encode_to_vec};
 
-use crate::common::*;
 use crate::requests::{capture, decode};
+use mock_board::*;
 
 #[test]
 fn a_baseline_is_captured_and_contact_is_told_against_it() {
@@ -14,15 +14,15 @@ fn a_baseline_is_captured_and_contact_is_told_against_it() {
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let board = bench.board.clone();
     board
-        .0
+        .pins
         .borrow_mut()
         .to_device
         .extend(request_bytes(9, &Request::CaptureBaseline { frames: 4 }));
-    while !reports(&board.0.borrow().to_host).iter().any(|(number, _)| *number == 9) {
+    while !reports(&board.pins.borrow().to_host).iter().any(|(number, _)| *number == 9) {
         session.step();
-        assert!(board.0.borrow().now_us < 10_000, "no answer");
+        assert!(board.pins.borrow().now_us < 10_000, "no answer");
     }
-    let all = reports(&board.0.borrow().to_host);
+    let all = reports(&board.pins.borrow().to_host);
     let baseline = &all.iter().find(|(number, _)| *number == 9).unwrap().1;
     let rest = Floats::of(&[60.0, 61.0, 62.0, 63.0, 64.0, 65.0]);
     assert_eq!(*baseline, format!("{:?}", Report::Baseline { readings_ohm: rest }));
@@ -65,12 +65,12 @@ fn a_frame_without_a_baseline_is_flagged_until_one_is_complete() {
         let scanning = Configuration { frame_period_us: 100, ..quiet() };
         ask(session, &board, &configure(scanning), |_| ());
         let request = request_bytes(8, &Request::CaptureBaseline { frames: 1000 });
-        board.0.borrow_mut().to_device.extend(request);
+        board.pins.borrow_mut().to_device.extend(request);
         settle(session, &board);
     };
     let scan_some = |session: &mut TestSession<'_>| {
-        let until_us = board.0.borrow().now_us + 1000;
-        while board.0.borrow().now_us < until_us {
+        let until_us = board.pins.borrow().now_us + 1000;
+        while board.pins.borrow().now_us < until_us {
             assert_eq!(session.step(), None);
         }
     };
@@ -103,12 +103,12 @@ fn a_baseline_that_will_not_come_is_refused_and_one_that_comes_is_counted_once()
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let board = bench.board.clone();
     let say = |session: &mut TestSession<'_>, number: u16, request: &Request<'_>| {
-        board.0.borrow_mut().to_device.extend(request_bytes(number, request));
+        board.pins.borrow_mut().to_device.extend(request_bytes(number, request));
         settle(session, &board);
     };
     let refused = format!("{:?}", Report::Refused(Refusal::Baseline));
     let answer = |number: u16| {
-        let all = reports(&board.0.borrow().to_host);
+        let all = reports(&board.pins.borrow().to_host);
         all.into_iter()
             .filter(|(found, _)| *found == number)
             .map(|(_, text)| text)
@@ -127,7 +127,7 @@ fn a_baseline_that_will_not_come_is_refused_and_one_that_comes_is_counted_once()
     say(&mut session, 15, &Request::CaptureBaseline { frames: 3 });
     say(&mut session, 15, &Request::CaptureBaseline { frames: 3 });
     while answer(15).is_empty() {
-        assert!(board.0.borrow().now_us < 100_000, "no answer");
+        assert!(board.pins.borrow().now_us < 100_000, "no answer");
         session.step();
     }
     for _ in 0..2000 {
@@ -144,13 +144,13 @@ fn a_baseline_of_another_count_under_the_same_number_starts_anew() {
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     for frames in [1000, 3] {
         let request = request_bytes(9, &Request::CaptureBaseline { frames });
-        board.0.borrow_mut().to_device.extend(request);
+        board.pins.borrow_mut().to_device.extend(request);
         settle(&mut session, &board);
     }
-    while board.0.borrow().now_us < 10_000 {
+    while board.pins.borrow().now_us < 10_000 {
         session.step();
     }
-    let answers = reports(&board.0.borrow().to_host);
+    let answers = reports(&board.pins.borrow().to_host);
     let answers: Vec<_> = answers.iter().filter(|(number, _)| *number == 9).collect();
     assert_eq!(answers[0].1, format!("{:?}", Report::Refused(Refusal::Baseline)));
     assert!(answers.len() == 2 && answers[1].1.starts_with("Baseline"), "{answers:?}");

@@ -8,8 +8,8 @@ use model_core::blob::Floats;
 use model_core::relative::reciprocal;
 use model_core::{Decoder, Frame};
 
-use crate::common::*;
 use crate::requests::{bits, statistics};
+use mock_board::*;
 
 /// What an estimate has of a confidence, as bits, and whether it is flagged as novel.
 #[derive(Debug, PartialEq)]
@@ -57,14 +57,14 @@ fn decode(session: &mut TestSession<'_>, board: &Board, frame: &TestFrame) -> (S
 fn scanned(session: &mut TestSession<'_>, board: &Board, confidence: ConfidenceSent) -> Vec<Sent> {
     let scanning = Configuration { frame_period_us: 1000, confidence, ..quiet() };
     ask(session, board, &configure(scanning), |_| ());
-    board.0.borrow_mut().to_host.clear();
-    let until_us = board.0.borrow().now_us + 2500;
-    while board.0.borrow().now_us < until_us {
+    board.pins.borrow_mut().to_host.clear();
+    let until_us = board.pins.borrow().now_us + 2500;
+    while board.pins.borrow().now_us < until_us {
         assert_eq!(session.step(), None);
     }
     let mut receiver = Receiver::new([0; 1024]);
     let mut found = Vec::new();
-    for byte in std::mem::take(&mut board.0.borrow_mut().to_host) {
+    for byte in std::mem::take(&mut board.pins.borrow_mut().to_host) {
         if let Some(Received::Frame(bytes)) = receiver.push(byte) {
             match packet::decode::<Report<'_>>(bytes).expect("a whole report").body {
                 Report::Estimate(estimate) => found.push(Sent::of(&estimate)),

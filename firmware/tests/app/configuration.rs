@@ -3,8 +3,8 @@
 use firmware::app::Session;
 use firmware::link::message::{Configuration, ConfigurationField, Refusal, Report, Request};
 
-use crate::common::*;
 use crate::requests::{decode, statistics};
+use mock_board::*;
 
 #[test]
 fn configurations_are_checked_and_a_bad_one_changes_nothing() {
@@ -48,7 +48,7 @@ fn a_leased_configuration_ends_with_the_hosts_silence_and_a_lasting_one_does_not
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let wait = |session: &mut TestSession<'_>, ms: u32| {
-        board.0.borrow_mut().now_us += 1000 * ms;
+        board.pins.borrow_mut().now_us += 1000 * ms;
         session.step();
     };
     let paused = Request::Configure { configuration: quiet(), lease_ms: 500 };
@@ -89,18 +89,16 @@ fn a_request_that_waited_during_a_long_scan_prolongs_a_lease_in_time() {
     let own = quiet();
     let slow = Configuration { frame_period_us: 1000, ..quiet() };
     let mut slots = MockSlot::pair_with(&blob(3, 4));
-    let mut bench = Bench::new(own);
+    let mut bench = Bench::new(own).restarted(own, 700_000);
     let board = bench.board.clone();
-    let source = Source::new(&bench.frame, &board, 700_000);
-    bench.app = TestApp::new(board.clone(), source, own, buffers());
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let leased = Request::Configure { configuration: slow, lease_ms: 500 };
     ask(&mut session, &board, &leased, |_| ());
-    board.0.borrow_mut().now_us += 1000;
+    board.pins.borrow_mut().now_us += 1000;
     for _ in 0..5 {
         // It arrives at the start of a scan, and waits for the scan's end.
         session.step();
-        board.0.borrow_mut().to_device.extend(request_bytes(5, &leased));
+        board.pins.borrow_mut().to_device.extend(request_bytes(5, &leased));
     }
     settle(&mut session, &board);
     assert_eq!(in_force(&mut session, &board).0, slow);
@@ -123,9 +121,9 @@ fn a_lease_that_ends_gives_up_the_baseline_and_keeps_time() {
     };
     ask(&mut session, &board, &leased, |_| ());
     let request = request_bytes(9, &Request::CaptureBaseline { frames: 1000 });
-    board.0.borrow_mut().to_device.extend(request);
+    board.pins.borrow_mut().to_device.extend(request);
     settle(&mut session, &board);
-    while board.0.borrow().now_us < 50_000 {
+    while board.pins.borrow().now_us < 50_000 {
         session.step();
     }
     // The same lease again changes nothing: frames stay in time, and the baseline goes on.
@@ -133,18 +131,18 @@ fn a_lease_that_ends_gives_up_the_baseline_and_keeps_time() {
     for _ in 0..20 {
         ask(&mut session, &board, &leased, |_| ());
     }
-    let start_us = board.0.borrow().now_us;
-    while board.0.borrow().now_us < start_us + 20_000 {
+    let start_us = board.pins.borrow().now_us;
+    while board.pins.borrow().now_us < start_us + 20_000 {
         session.step();
-        assert!(!reports(&board.0.borrow().to_host).iter().any(|(number, _)| *number == 9));
+        assert!(!reports(&board.pins.borrow().to_host).iter().any(|(number, _)| *number == 9));
     }
     let scanned = statistics(&mut session, &board).frames_scanned - before;
     assert!((20..=22).contains(&scanned), "{scanned}");
-    board.0.borrow_mut().to_host.clear();
-    while board.0.borrow().now_us < start_us + 150_000 {
+    board.pins.borrow_mut().to_host.clear();
+    while board.pins.borrow().now_us < start_us + 150_000 {
         session.step();
     }
     let refused = (9, format!("{:?}", Report::Refused(Refusal::Baseline)));
-    assert!(reports(&board.0.borrow().to_host).contains(&refused));
+    assert!(reports(&board.pins.borrow().to_host).contains(&refused));
     assert_eq!(in_force(&mut session, &board), (own, 0));
 }

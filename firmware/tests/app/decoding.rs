@@ -4,8 +4,8 @@ use firmware::app::Session;
 use firmware::link::message::{Configuration, EstimateReport, Refusal, Report, Request};
 use model_core::blob::Floats;
 
-use crate::common::*;
 use crate::requests::{bits, capture, decode, expected, statistics};
+use mock_board::*;
 
 #[test]
 fn readings_from_the_host_are_decoded_as_model_core_does() {
@@ -119,7 +119,7 @@ fn rows_at_rest_answer_as_the_baseline_and_the_others_as_without_a_gate() {
     ask(&mut session, &board, &configure(scanning), |_| ());
     assert_eq!(decode(&mut session, &board, &rest).1, [3, 3]);
     let again = request_bytes(9, &Request::CaptureBaseline { frames: 1000 });
-    board.0.borrow_mut().to_device.extend(again);
+    board.pins.borrow_mut().to_device.extend(again);
     settle(&mut session, &board);
     assert_eq!(decode(&mut session, &board, &rest).1, [0, 0]);
 }

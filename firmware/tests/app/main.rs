@@ -1,8 +1,5 @@
 //! The application loop on a virtual board.
 
-#[path = "../common/mod.rs"]
-mod common;
-
 mod requests;
 
 mod baseline;

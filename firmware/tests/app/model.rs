@@ -8,8 +8,8 @@ use model_core::rbf::Shape;
 use model_core::rbf::direct::{self, Parameters};
 use model_core::{AlignedBytes, Decoder};
 
-use crate::common::*;
 use crate::requests::{bits, capture, decode, expected};
+use mock_board::*;
 
 #[test]
 fn the_identity_tells_what_the_model_was_trained_on() {
@@ -101,13 +101,13 @@ fn the_model_says_what_is_scanned_and_decoded() {
         let scanning = Configuration { frame_period_us: 1000, send_readings: true, ..quiet() };
         let mut bench = Bench::new(scanning);
         let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-        while bench.board.0.borrow().now_us < 1500 {
+        while bench.board.pins.borrow().now_us < 1500 {
             assert_eq!(session.step(), None);
         }
         let readings = &rest.as_flattened()[..wires];
         let decoder = Decoder::<1>::load(&blob).unwrap();
         let outputs = decoder.decode(readings).unwrap().outputs;
-        let all = reports(&bench.board.0.borrow().to_host);
+        let all = reports(&bench.board.pins.borrow().to_host);
         let found = |debug: String| all.iter().any(|(_, text)| text.contains(&debug));
         assert!(found(format!("readings_ohm: {:?}", Floats::of(readings))), "{all:?}");
         let row = format!("row_status: [0], outputs: {:?}", Floats::of(&outputs));
@@ -124,10 +124,10 @@ fn the_names_of_readings_say_which_rows_are_scanned() {
         let scanning = Configuration { frame_period_us: 1000, send_readings: true, ..quiet() };
         let mut bench = Bench::new(scanning);
         let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-        while bench.board.0.borrow().now_us < 1500 {
+        while bench.board.pins.borrow().now_us < 1500 {
             assert_eq!(session.step(), None);
         }
-        let all = reports(&bench.board.0.borrow().to_host);
+        let all = reports(&bench.board.pins.borrow().to_host);
         let expected = format!("readings_ohm: {:?}", Floats::of(&frame_at_rest()[row][..2]));
         assert!(all[0].1.contains(&expected), "{names}: {all:?}");
     }
@@ -139,12 +139,12 @@ fn the_names_of_readings_say_which_rows_are_scanned() {
     let mut bench =
         Bench::new(Configuration { frame_period_us: 1000, send_readings: true, ..quiet() });
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    while bench.board.0.borrow().now_us < 1500 {
+    while bench.board.pins.borrow().now_us < 1500 {
         assert_eq!(session.step(), None);
     }
     let [first, second] = frame_at_rest();
     let expected = format!("readings_ohm: {:?}", Floats::of(&[second, first].concat()));
-    let all = reports(&bench.board.0.borrow().to_host);
+    let all = reports(&bench.board.pins.borrow().to_host);
     assert!(all[0].1.contains(&expected), "{all:?}");
     let metadata =
         Metadata { input_names: Columns("r3c1_ohm\nr3c2_ohm"), ..Metadata::unnamed(shape) };

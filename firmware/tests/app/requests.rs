@@ -4,7 +4,7 @@ use firmware::link::message::{Configuration, Report, Request, Statistics};
 use model_core::blob::Floats;
 use model_core::{Aligned, Decoder};
 
-use crate::common::*;
+use mock_board::*;
 
 pub fn statistics(session: &mut TestSession<'_>, board: &Board) -> Statistics {
     ask(session, board, &Request::Statistics, |report| match report {
@@ -51,11 +51,11 @@ pub fn capture(session: &mut TestSession<'_>, board: &Board, frames: u16) {
     let scanning = Configuration { frame_period_us: 100, ..quiet() };
     ask(session, board, &configure(scanning), |_| ());
     let request = request_bytes(9, &Request::CaptureBaseline { frames });
-    board.0.borrow_mut().to_device.extend(request);
-    board.0.borrow_mut().to_host.clear();
-    while !reports(&board.0.borrow().to_host).iter().any(|(number, _)| *number == 9) {
+    board.pins.borrow_mut().to_device.extend(request);
+    board.pins.borrow_mut().to_host.clear();
+    while !reports(&board.pins.borrow().to_host).iter().any(|(number, _)| *number == 9) {
         assert_eq!(session.step(), None);
-        assert!(board.0.borrow().now_us < 1_000_000, "no answer");
+        assert!(board.pins.borrow().now_us < 1_000_000, "no answer");
     }
     let gating = Configuration { rest_tolerance: 0.02, ..quiet() };
     ask(session, board, &configure(gating), |_| ());

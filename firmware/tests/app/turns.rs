@@ -5,8 +5,8 @@ use firmware::link::message::{Configuration, EstimateReport, Report, Request};
 use firmware::link::packet;
 use firmware::link::receive::{Received, Receiver};
 
-use crate::common::*;
 use crate::requests::statistics;
+use mock_board::*;
 
 #[test]
 fn frames_are_scanned_on_time_numbered_and_reported() {
@@ -15,10 +15,10 @@ fn frames_are_scanned_on_time_numbered_and_reported() {
     let configuration = Configuration { frame_period_us: 1000, send_readings: true, ..quiet() };
     let mut bench = Bench::new(configuration);
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    while bench.board.0.borrow().now_us < 5500 {
+    while bench.board.pins.borrow().now_us < 5500 {
         assert_eq!(session.step(), None);
     }
-    let reports = reports(&bench.board.0.borrow().to_host);
+    let reports = reports(&bench.board.pins.borrow().to_host);
     assert_eq!(reports.len(), 10, "{reports:?}"); // readings and estimate, five times
     for (i, (number, text)) in reports.iter().enumerate() {
         assert_eq!(*number, 0);
@@ -35,15 +35,13 @@ fn frames_are_scanned_on_time_numbered_and_reported() {
 fn a_scan_longer_than_the_period_is_an_overrun() {
     let mut slots = MockSlot::pair_with(&blob(3, 4));
     let configuration = Configuration { frame_period_us: 100, ..quiet() };
-    let mut bench = Bench::new(configuration);
+    let mut bench = Bench::new(configuration).restarted(configuration, 250);
     let board = bench.board.clone();
-    let source = Source::new(&bench.frame, &board, 250);
-    bench.app = TestApp::new(board.clone(), source, configuration, buffers());
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    while board.0.borrow().now_us < 2000 {
+    while board.pins.borrow().now_us < 2000 {
         session.step();
     }
-    let all = reports(&board.0.borrow().to_host);
+    let all = reports(&board.pins.borrow().to_host);
     let flagged =
         |flag: u8| all.iter().filter(|(_, t)| t.contains(&format!("flags: {flag},"))).count();
     assert_eq!(flagged(0), 1, "{all:?}"); // the first was on time
@@ -58,7 +56,7 @@ fn the_watchdog_is_fed_by_good_loops_only() {
     let mut bench = Bench::new(Configuration { frame_period_us: 100, ..quiet() });
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let board = bench.board.clone();
-    let feeds = || board.0.borrow().feeds;
+    let feeds = || board.pins.borrow().feeds;
     for _ in 0..50 {
         let before = feeds();
         session.step();
@@ -103,21 +101,19 @@ fn the_watchdog_is_fed_by_good_loops_only() {
 fn longest_unfed_us(gap_us: u32, scan_us: u32) -> u32 {
     let mut slots = MockSlot::pair_with(&blob(3, 4));
     let scanning = Configuration { frame_period_us: 10_000, send_readings: true, ..quiet() };
-    let mut bench = Bench::new(scanning);
+    let mut bench = Bench::new(scanning).restarted(scanning, scan_us);
     let board = bench.board.clone();
     // A faulty reading, so that all kinds of reports are sent.
     bench.frame.borrow_mut()[0][0] = f32::NAN;
-    let source = Source::new(&bench.frame, &board, scan_us);
-    bench.app = TestApp::new(board.clone(), source, scanning, buffers());
-    board.0.borrow_mut().gap_us = gap_us;
+    board.pins.borrow_mut().gap_us = gap_us;
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let mut longest_us = 0;
     for _ in 0..30 {
         let request = request_bytes(5, &Request::Identify);
-        board.0.borrow_mut().to_device.extend(request);
-        let start_us = board.0.borrow().now_us;
+        board.pins.borrow_mut().to_device.extend(request);
+        let start_us = board.pins.borrow().now_us;
         session.step();
-        longest_us = longest_us.max(board.0.borrow().now_us - start_us);
+        longest_us = longest_us.max(board.pins.borrow().now_us - start_us);
     }
     longest_us
 }
@@ -140,15 +136,15 @@ fn a_host_that_takes_no_bytes_costs_a_report_but_not_the_device() {
     let mut bench = Bench::new(Configuration { frame_period_us: 1000, ..quiet() });
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let board = bench.board.clone();
-    board.0.borrow_mut().room = Some(10);
-    while board.0.borrow().now_us < 500_000 {
+    board.pins.borrow_mut().room = Some(10);
+    while board.pins.borrow().now_us < 500_000 {
         session.step();
     }
     // The report that was cut is a broken frame, which does not damage the next report.
-    board.0.borrow_mut().room = None;
-    board.0.borrow_mut().to_device.extend(request_bytes(7, &Request::Statistics));
+    board.pins.borrow_mut().room = None;
+    board.pins.borrow_mut().to_device.extend(request_bytes(7, &Request::Statistics));
     settle(&mut session, &board);
-    let bytes = std::mem::take(&mut board.0.borrow_mut().to_host);
+    let bytes = std::mem::take(&mut board.pins.borrow_mut().to_host);
     let mut receiver = Receiver::new([0; 1024]);
     let mut numbers = Vec::new();
     for byte in bytes {

@@ -4,7 +4,7 @@ use super::house::Side;
 use super::workspace::{Kind, Package};
 
 /// Breaches of the `declared` order, which goes from the ground up. Dependencies of tests are free, except that a
-/// crate for the device is not tested with crates for the host.
+/// crate for the device is not tested with crates for the host. It may be tested with mocks, and is never built of them.
 pub fn broken(packages: &[Package], declared: &[(&str, Side)]) -> Vec<String> {
     let place = |name: &str| declared.iter().position(|(declared, _)| *declared == name);
     let mut broken = Vec::new();
@@ -17,7 +17,12 @@ pub fn broken(packages: &[Package], declared: &[(&str, Side)]) -> Vec<String> {
         for dependency in &package.dependencies {
             // An undeclared dependency is reported as a package, or is not part of the workspace.
             let Some(other) = place(&dependency.name) else { continue };
-            let climbs = declared[own].1 == Side::Device && declared[other].1 == Side::Host;
+            let climbs = declared[own].1 == Side::Device
+                && match declared[other].1 {
+                    Side::Device => false,
+                    Side::Mock => dependency.kind != Kind::Dev,
+                    Side::Host => true,
+                };
             if climbs || (dependency.kind != Kind::Dev && other >= own) {
                 broken.push(format!(
                     "{}/Cargo.toml: {name} depends on {}, which stands above it",
@@ -77,6 +82,17 @@ mod tests {
         assert_eq!(
             broken(&[package("board", &[("desk", Kind::Dev)])], DECLARED),
             ["board/Cargo.toml: board depends on desk, which stands above it"]
+        );
+    }
+
+    #[test]
+    fn a_device_is_tested_with_mocks_and_not_built_of_them() {
+        let declared = &[("mock", Side::Mock), ("board", Side::Device)];
+        let board = |kind| [package("board", &[("mock", kind)]), package("mock", &[])];
+        assert!(broken(&board(Kind::Dev), declared).is_empty());
+        assert_eq!(
+            broken(&board(Kind::Normal), declared),
+            ["board/Cargo.toml: board depends on mock, which stands above it"]
         );
     }
 

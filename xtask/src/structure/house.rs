@@ -5,6 +5,8 @@
 pub enum Side {
     /// The crate runs on a device, or is linked into an image that does.
     Device,
+    /// The crate stands in for a device in tests of crates of the device. It runs on the host only.
+    Mock,
     /// The crate runs on the host only.
     Host,
 }
@@ -13,6 +15,7 @@ pub enum Side {
 pub const CRATES: &[(&str, Side)] = &[
     ("model-core", Side::Device),
     ("firmware", Side::Device),
+    ("mock-board", Side::Mock),
     ("remote-readout", Side::Device),
     ("board-common", Side::Device),
     ("link-check", Side::Device),

@@ -7,15 +7,18 @@ use firmware::link::message::Setting;
 use firmware::settings::{KeepError, Keeper, PAGE_BYTES, SettingPages};
 use firmware::store::{FlashError, Slot};
 
-use super::{Power, operate};
+use crate::power::{Power, operate};
 
 /// A page that programming can only clear bits of.
 pub struct MockPage {
     words: Vec<u32>,
+    /// Power of both pages.
     power: Rc<RefCell<Power>>,
     /// Bits of a word that are left as they were when the power is cut while it is programmed or erased.
     untouched: u32,
+    /// Number of erases that were begun.
     pub erases: usize,
+    /// Number of words whose programming was begun.
     pub words_written: usize,
 }
 
@@ -31,6 +34,8 @@ impl MockPage {
         })
     }
 
+    /// All bytes of the page, to be changed without regard to what flash can do.
+    #[must_use]
     pub fn bytes_mut(&mut self) -> &mut [u8] {
         bytemuck::cast_slice_mut(&mut self.words)
     }
@@ -53,6 +58,8 @@ impl Slot for MockPage {
         Ok(())
     }
 
+    /// # Panics
+    /// A word is not whole.
     fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), FlashError> {
         assert!(offset.is_multiple_of(4) && bytes.len().is_multiple_of(4), "whole words");
         let place = self.words.get_mut(offset / 4..(offset + bytes.len()) / 4).ok_or(FlashError)?;
@@ -73,17 +80,51 @@ impl Slot for MockPage {
 }
 
 /// Settings that several boards share, one after the other: a board before a restart and after it.
-#[derive(Clone)]
-pub struct SharedSettings(pub Rc<RefCell<SettingPages<MockPage>>>);
+pub struct SharedSettings<S = MockPage>(
+    /// The pages.
+    pub Rc<RefCell<SettingPages<S>>>,
+);
+
+impl<S> Clone for SharedSettings<S> {
+    fn clone(&self) -> Self {
+        Self(self.0.clone())
+    }
+}
 
 impl Default for SharedSettings {
     fn default() -> Self {
-        Self(Rc::new(RefCell::new(SettingPages::new(MockPage::pair()))))
+        Self::in_pages(MockPage::pair())
+    }
+}
+
+impl<S: Slot> SharedSettings<S> {
+    /// Settings in these pages.
+    #[must_use]
+    pub fn in_pages(pages: [S; 2]) -> Self {
+        Self(Rc::new(RefCell::new(SettingPages::new(pages))))
+    }
+
+    /// The bytes that are kept for `setting`.
+    #[must_use]
+    pub fn read_owned(&mut self, setting: Setting) -> Option<Vec<u8>> {
+        self.read(setting, &mut [0; 1024]).map(<[u8]>::to_vec)
+    }
+
+    /// Keeps `bytes` for `setting`; returns whether something was written.
+    ///
+    /// # Errors
+    /// Every variant of [`KeepError`].
+    pub fn keep_bytes(&mut self, setting: Setting, bytes: &[u8]) -> Result<bool, KeepError> {
+        self.keep(setting, &[bytes], &mut [0; 1024])
     }
 }
 
 impl SharedSettings {
     /// Pages that hold these bytes.
+    ///
+    /// # Panics
+    /// The bytes are not as many as a page has.
+    #[must_use]
     pub fn holding(pages: [&[u8]; 2]) -> Self {
         let settings = Self::default();
         for (page, bytes) in settings.0.borrow_mut().pages().iter_mut().zip(pages) {
@@ -93,40 +134,39 @@ impl SharedSettings {
     }
 
     /// What both pages hold.
+    #[must_use]
     pub fn bytes(&self) -> [Vec<u8>; 2] {
         self.0.borrow_mut().pages().each_ref().map(|page| page.bytes().to_vec())
     }
 
+    /// Cuts the power after so many `operations` on words. The word that is cut keeps its bits in `untouched`.
     pub fn cut_power_after(&self, operations: usize, untouched: u32) {
         for page in self.0.borrow_mut().pages() {
             page.untouched = untouched;
-            *page.power.borrow_mut() = Power { left: Some(operations), gone: false };
+            *page.power.borrow_mut() = Power::cut_after(operations);
         }
     }
 
     /// Switches the power on; returns whether it had been cut.
+    #[must_use]
     pub fn power_on(&self) -> bool {
-        std::mem::take(&mut *self.0.borrow_mut().pages()[0].power.borrow_mut()).gone
+        self.0.borrow_mut().pages()[0].power.borrow_mut().on()
     }
 
+    /// Number of erases of both pages.
+    #[must_use]
     pub fn erases(&self) -> usize {
         self.0.borrow_mut().pages().iter().map(|page| page.erases).sum()
     }
 
+    /// Number of words of both pages whose programming was begun.
+    #[must_use]
     pub fn words_written(&self) -> usize {
         self.0.borrow_mut().pages().iter().map(|page| page.words_written).sum()
     }
-
-    pub fn read_owned(&mut self, setting: Setting) -> Option<Vec<u8>> {
-        self.read(setting, &mut [0; 1024]).map(<[u8]>::to_vec)
-    }
-
-    pub fn keep_bytes(&mut self, setting: Setting, bytes: &[u8]) -> Result<bool, KeepError> {
-        self.keep(setting, &[bytes], &mut [0; 1024])
-    }
 }
 
-impl Keeper for SharedSettings {
+impl<S: Slot> Keeper for SharedSettings<S> {
     fn read<'b>(&mut self, setting: Setting, buffer: &'b mut [u8]) -> Option<&'b [u8]> {
         self.0.borrow_mut().read(setting, buffer)
     }

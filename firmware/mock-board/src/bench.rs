@@ -1,0 +1,81 @@
+//! An application on its board.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use firmware::app::{App, Buffers, Session};
+use firmware::link::message::Configuration;
+
+use crate::board::{AnyKeeper, Board};
+use crate::pages::SharedSettings;
+use crate::shape::{COLS, MESSAGE_BYTES, OUTPUTS, ROWS, TestFrame, frame_at_rest};
+use crate::slot::MockSlot;
+use crate::source::Source;
+
+/// Memory of an application.
+pub type Memory = Buffers<ROWS, COLS, OUTPUTS, MESSAGE_BYTES>;
+
+/// An application on the mock board.
+pub type TestApp<'m> = App<'m, Board, Source, ROWS>;
+
+/// A session of an application whose memory is never freed, with slots of type `S`.
+pub type TestSession<'a, S = MockSlot> = Session<'a, 'static, Board, Source, S, ROWS>;
+
+/// Time in µs that a scan takes on a bench.
+const SCAN_US: u32 = 10;
+
+/// A configuration that scans only on request.
+#[must_use]
+pub fn quiet() -> Configuration {
+    Configuration { frame_period_us: 0, ..Configuration::DEFAULT }
+}
+
+/// An application, and the host's ends of everything it is connected to.
+pub struct Bench<'m> {
+    /// The application. A session borrows it.
+    pub app: TestApp<'m>,
+    /// Its board.
+    pub board: Board,
+    /// The frame that its sensor shows, in Ω.
+    pub frame: Rc<RefCell<TestFrame>>,
+}
+
+impl Bench<'static> {
+    /// An application on a new board. Its memory, half a kilobyte, is never freed: whoever makes many uses
+    /// [`Bench::within`].
+    #[must_use]
+    pub fn new(configuration: Configuration) -> Self {
+        Self::with_settings(configuration, &SharedSettings::default())
+    }
+
+    /// As [`Bench::new`], on a board on which these settings are kept.
+    pub fn with_settings(configuration: Configuration, settings: impl Into<AnyKeeper>) -> Self {
+        Self::within(Box::leak(Box::new(Memory::new())), configuration, settings)
+    }
+}
+
+impl<'m> Bench<'m> {
+    /// An application in this `memory`, which is cleared, on a new board on which these settings are kept: what a
+    /// restart leaves. The memory can be used again when the bench is dropped.
+    pub fn within(
+        memory: &'m mut Memory,
+        configuration: Configuration,
+        settings: impl Into<AnyKeeper>,
+    ) -> Self {
+        *memory = Memory::new();
+        let board = Board::with_settings(settings);
+        let frame = Rc::new(RefCell::new(frame_at_rest()));
+        let source = Source::new(&frame, &board, SCAN_US);
+        Self { app: App::new(board.clone(), source, configuration, memory), board, frame }
+    }
+
+    /// Restarts the application with another `configuration` and `scan_us` µs a scan, on the same board, in memory that
+    /// is never freed.
+    #[must_use]
+    pub fn restarted(self, configuration: Configuration, scan_us: u32) -> Bench<'static> {
+        let Self { board, frame, .. } = self;
+        let source = Source::new(&frame, &board, scan_us);
+        let memory = Box::leak(Box::new(Memory::new()));
+        Bench { app: App::new(board.clone(), source, configuration, memory), board, frame }
+    }
+}

@@ -1,0 +1,117 @@
+//! The board: clock, serial line and watchdog, and the memory of its settings.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::rc::Rc;
+
+use firmware::link::message::{Memory, Setting};
+use firmware::platform::{Platform, Port};
+use firmware::settings::{KeepError, Keeper};
+use firmware::store::Slot;
+
+use crate::pages::SharedSettings;
+
+/// State of the board, which a test can see while the application owns the board.
+#[derive(Default)]
+pub struct Pins {
+    /// Bytes that the device has not received yet.
+    pub to_device: VecDeque<u8>,
+    /// Bytes that the device has sent. Whoever runs it for long must empty this.
+    pub to_host: Vec<u8>,
+    /// The clock in µs. Each look at it takes one.
+    pub now_us: u32,
+    /// Number of times that the watchdog was fed.
+    pub feeds: u32,
+    /// Number of bytes that the host's side still takes; `None` takes all.
+    pub room: Option<usize>,
+    /// Least time in µs between two bytes that the host's side takes.
+    pub gap_us: u32,
+    /// When it took the last byte.
+    taken_us: u32,
+}
+
+/// Settings in any memory, shared with whoever restarts the board.
+#[derive(Clone)]
+pub struct AnyKeeper(Rc<RefCell<dyn Keeper>>);
+
+impl<S: Slot + 'static> From<&SharedSettings<S>> for AnyKeeper {
+    fn from(settings: &SharedSettings<S>) -> Self {
+        Self(settings.0.clone())
+    }
+}
+
+impl Keeper for AnyKeeper {
+    fn read<'b>(&mut self, setting: Setting, buffer: &'b mut [u8]) -> Option<&'b [u8]> {
+        self.0.borrow_mut().read(setting, buffer)
+    }
+
+    fn keep(
+        &mut self,
+        setting: Setting,
+        parts: &[&[u8]],
+        buffer: &mut [u8],
+    ) -> Result<bool, KeepError> {
+        self.0.borrow_mut().keep(setting, parts, buffer)
+    }
+}
+
+/// A board. Clones are the same board.
+#[derive(Clone)]
+pub struct Board {
+    /// Clock, serial line and watchdog.
+    pub pins: Rc<RefCell<Pins>>,
+    settings: AnyKeeper,
+}
+
+impl Board {
+    /// A board on which these settings are kept.
+    pub fn with_settings(settings: impl Into<AnyKeeper>) -> Self {
+        Self { pins: Rc::default(), settings: settings.into() }
+    }
+}
+
+impl Port for Board {
+    fn now_us(&mut self) -> u32 {
+        let mut pins = self.pins.borrow_mut();
+        pins.now_us = pins.now_us.wrapping_add(1);
+        pins.now_us
+    }
+
+    fn receive(&mut self) -> Option<u8> {
+        self.pins.borrow_mut().to_device.pop_front()
+    }
+
+    fn send(&mut self, byte: u8) -> bool {
+        let mut pins = self.pins.borrow_mut();
+        if pins.now_us.wrapping_sub(pins.taken_us) < pins.gap_us {
+            return false;
+        }
+        pins.taken_us = pins.now_us;
+        match &mut pins.room {
+            Some(0) => return false,
+            Some(room) => *room -= 1,
+            None => {}
+        }
+        pins.to_host.push(byte);
+        true
+    }
+}
+
+impl Platform for Board {
+    type Settings = AnyKeeper;
+
+    const BOARD: &'static str = "test";
+
+    fn feed_watchdog(&mut self) {
+        let mut pins = self.pins.borrow_mut();
+        pins.feeds = pins.feeds.wrapping_add(1);
+    }
+
+    fn memory(&self) -> Memory {
+        Memory { stack_reserved: 1024, ..Memory::default() }
+    }
+
+    fn settings(&mut self) -> &mut AnyKeeper {
+        &mut self.settings
+    }
+}

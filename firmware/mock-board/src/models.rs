@@ -1,0 +1,139 @@
+//! Small models for this sensor.
+
+use model_core::AlignedBytes;
+use model_core::blob::{Metadata, Model, ModelParts, ModelShape, encode_to_vec};
+use model_core::confidence::{Confidence, Sizes};
+use model_core::expansion::Expansion;
+use model_core::projection::Projection;
+use model_core::rbf::direct::{self, Parameters};
+use model_core::rbf::{Network, Shape};
+
+use crate::shape::{COLS, OUTPUTS, ROWS};
+
+/// A blob for this sensor, with `centres` centres and numbers that depend on `seed`.
+///
+/// # Panics
+/// There are no centres, or more than a blob can hold.
+#[must_use]
+pub fn blob(seed: usize, centres: usize) -> AlignedBytes {
+    let number = |i: usize| ((i * 37 + seed * 11) % 101) as f32 / 50.0 - 1.0;
+    let list = |from: usize, count: usize| (from..from + count).map(number).collect::<Vec<_>>();
+    let (centre, weights) = (list(1, centres * COLS), list(2, centres * OUTPUTS));
+    let (bias, affine) = (list(3, OUTPUTS), list(4, COLS * OUTPUTS));
+    let network = direct::Network::try_new(
+        Shape { inputs: COLS, centres, outputs: OUTPUTS },
+        Parameters {
+            input_minimum: &[50.0; COLS],
+            input_per_span: &[0.05; COLS],
+            centres: &centre,
+            decay: &[1.5],
+            output_weights: &weights,
+            bias: &bias,
+            affine: &affine,
+        },
+    )
+    .unwrap();
+    blob_of(network.into())
+}
+
+/// A blob with `network` for both rows.
+///
+/// # Panics
+/// The network is of another shape than a blob can hold.
+#[must_use]
+pub fn blob_of(network: Network<'_>) -> AlignedBytes {
+    blob_with(network, None, false)
+}
+
+/// The blob of [`blob`] with a confidence, for readings relative to the baseline if `relative_inputs`. Its one component
+/// is of frames near 62 Ω, or near the baseline.
+///
+/// # Panics
+/// Never, as long as the block below fits its sizes.
+#[must_use]
+pub fn blob_with_confidence(relative_inputs: bool) -> AlignedBytes {
+    let (readings, outputs) = (ROWS * COLS, ROWS * OUTPUTS);
+    let [middle, scale] = if relative_inputs { [1.0, 20.0] } else { [62.0, 0.5] };
+    let block = [
+        vec![middle; readings],
+        vec![scale; readings],
+        vec![0.0],                            // start of the projection
+        vec![0.408_248_3; readings],          // direction: the mean
+        vec![-1.0, 0.0, 0.5, 1.0, 0.25, 0.5], // c, o and W
+        vec![0.01, 0.0625, 4.0, 0.25],        // variances
+        vec![2.0; outputs],                   // ratios
+        vec![5.0],                            // threshold
+    ]
+    .concat();
+    let sizes = Sizes { readings, directions: 1, components: 1, outputs };
+    let confidence = Confidence::new(sizes, &block).unwrap();
+    let blob = blob(3, 4);
+    let model = Model::decode(&blob).unwrap();
+    blob_with(model.networks().next().unwrap(), Some(confidence), relative_inputs)
+}
+
+fn blob_with(
+    network: Network<'_>,
+    confidence: Option<Confidence<'_>>,
+    relative_inputs: bool,
+) -> AlignedBytes {
+    let shape = network.shape();
+    let shape = ModelShape { rows: ROWS, inputs: shape.inputs, outputs: shape.outputs };
+    let metadata = Metadata { relative_inputs, ..Metadata::unnamed(shape) };
+    let parts = ModelParts {
+        projection: None,
+        expansion: None,
+        confidence,
+        networks: &[network],
+        row_network: &[0; ROWS],
+        metadata,
+    };
+    encode_to_vec(&parts).unwrap()
+}
+
+/// A blob whose one network for both rows computes so many `components`, which are expanded to all outputs.
+///
+/// # Panics
+/// There are no components, or more than a blob can hold.
+#[must_use]
+pub fn blob_of_components(components: usize) -> AlignedBytes {
+    let (readings, outputs) = (ROWS * COLS, ROWS * OUTPUTS);
+    let (weights, bias) = (vec![0.5; components], vec![0.25; components]);
+    let network = Network::from(
+        direct::Network::try_new(
+            Shape { inputs: COLS, centres: 1, outputs: components },
+            Parameters {
+                input_minimum: &[50.0; COLS],
+                input_per_span: &[0.05; COLS],
+                centres: &[0.5; COLS],
+                decay: &[1.5],
+                output_weights: &weights,
+                bias: &bias,
+                affine: &[],
+            },
+        )
+        .unwrap(),
+    );
+    // Every feature is the mean reading.
+    let mut projection = vec![1.0 / readings as f32; (1 + readings) * COLS];
+    projection[..COLS].fill(0.0);
+    let expansion = vec![0.125; (1 + components) * outputs];
+    let parts = ModelParts {
+        projection: Projection::new(readings, COLS, &projection).ok(),
+        expansion: Expansion::new(components, outputs, &expansion).ok(),
+        confidence: None,
+        networks: &[network],
+        row_network: &[0; ROWS],
+        metadata: Metadata::unnamed(ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS }),
+    };
+    encode_to_vec(&parts).unwrap()
+}
+
+/// The CRC-32 that closes a blob.
+///
+/// # Panics
+/// The blob is shorter than four bytes.
+#[must_use]
+pub fn crc_of(blob: &[u8]) -> u32 {
+    u32::from_le_bytes(*blob.last_chunk().unwrap())
+}

@@ -1,0 +1,61 @@
+//! The sensor and its circuit.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use firmware::circuit::{Circuit, Constants, ConstantsFault, ZeroPotential};
+use firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
+
+use crate::board::Board;
+use crate::shape::{COLS, ROWS, TestFrame};
+
+/// A sensor that shows the same frame until it is given another. Its circuit's constants change nothing.
+#[derive(Clone)]
+pub struct Source {
+    circuit: ZeroPotential<ROWS, COLS>,
+    frame: Rc<RefCell<TestFrame>>,
+    board: Board,
+    scan_us: u32,
+}
+
+impl Source {
+    /// A sensor with this `frame`, whose scan takes `scan_us` µs of the board's clock.
+    #[must_use]
+    pub fn new(frame: &Rc<RefCell<TestFrame>>, board: &Board, scan_us: u32) -> Self {
+        Self {
+            circuit: ZeroPotential::TYPICAL,
+            frame: frame.clone(),
+            board: board.clone(),
+            scan_us,
+        }
+    }
+}
+
+impl FrameSource for Source {
+    /// # Panics
+    /// No samples are asked for, or `frame` has not the length of `wires`.
+    fn scan(
+        &mut self,
+        settings: ScanSettings,
+        wires: Selection<'_>,
+        frame: &mut [f32],
+    ) -> ScanReport {
+        assert!(settings.oversampling > 0, "a scan without samples");
+        assert_eq!(frame.len(), wires.rows.len() * wires.columns);
+        for (to, row) in frame.chunks_mut(wires.columns).zip(wires.rows) {
+            to.copy_from_slice(&self.frame.borrow()[row.0][..wires.columns]);
+        }
+        let mut pins = self.board.pins.borrow_mut();
+        pins.now_us = pins.now_us.wrapping_add(self.scan_us);
+        let missing = frame.iter();
+        ScanReport { failed_samples: missing.filter(|reading| reading.is_nan()).count() as u16 }
+    }
+
+    fn constants(&self) -> Option<Constants<'_>> {
+        self.circuit.constants()
+    }
+
+    fn set_constants(&mut self, constants: Constants<'_>) -> Result<(), ConstantsFault> {
+        self.circuit.set_constants(constants)
+    }
+}
