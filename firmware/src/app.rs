@@ -23,6 +23,7 @@ mod line;
 mod leave;
 mod model;
 mod kept;
+mod guard;
 mod recalibrate;
 mod recheck;
 mod trial;
@@ -31,6 +32,7 @@ mod answer;
 
 pub use buffers::Buffers;
 use frame_clock::{FrameClock, LongClock};
+use guard::Guard;
 use lease::Lease;
 pub use leave::Leave;
 use line::Line;
@@ -83,6 +85,7 @@ struct Core<'m, P, F, const ROWS: usize> {
     capture: Option<Capture>,
     upload: Upload,
     trial: Trial,
+    guard: Guard,
     /// Number of times that settings may still be written before the next restart.
     writes_left: u16,
     /// A reference press that is being read.
@@ -127,6 +130,7 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
         } = buffers;
         let capacity = Buffers::<ROWS, COLUMNS, OUTPUTS, BYTES>::CAPACITY;
         let now_us = platform.now_us();
+        let guard = Guard::new(platform.key_area().bytes());
         let mut core = Core {
             line: Line::new(platform, message),
             source,
@@ -153,6 +157,7 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
             capture: None,
             upload: Upload::new(),
             trial: Trial::default(),
+            guard,
             writes_left: kept::MOST_WRITES,
             pressing: Pressing::new(press.as_flattened_mut(), stated.as_flattened_mut()),
             recalibrated: None,

@@ -11,6 +11,7 @@
 
 // From the ground up: a module imports only what is declared before it.
 mod log;
+pub mod seal;
 pub mod circuit;
 pub mod readout;
 pub mod link;

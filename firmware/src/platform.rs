@@ -2,6 +2,7 @@
 
 use crate::link::message::Memory;
 use crate::settings::Keeper;
+use crate::store::Slot;
 
 /// A serial line, and a clock for time limits on it. No function may wait.
 pub trait Port {
@@ -21,6 +22,9 @@ pub trait Platform: Port {
     /// Memory that keeps settings over restarts.
     type Settings: Keeper;
 
+    /// Flash that holds the device's key, and nothing else. It is not erased once a key is set.
+    type KeyArea: Slot;
+
     /// Name of the board, as the link reports it.
     const BOARD: &'static str;
 
@@ -32,6 +36,9 @@ pub trait Platform: Port {
 
     /// The memory that keeps settings.
     fn settings(&mut self) -> &mut Self::Settings;
+
+    /// The flash that holds the key.
+    fn key_area(&mut self) -> &mut Self::KeyArea;
 
     /// Count of the processor's cycles, which wraps around; always 0 on a board without a counter.
     fn cycles(&self) -> u32 {

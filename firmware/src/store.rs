@@ -4,14 +4,20 @@
 //! record's first word is written when an upload begins, and the others last and in one go: a slot whose upload was
 //! interrupted or aborted is not chosen.
 //!
+//! With a key on the device, a seal stands behind the blob ([`DeviceKey`], [`Seal`]).
+//!
 //! To put the previous model in force again, another record with a higher generation is written before those of its
 //! slot ([`reinstate`]).
 
 use model_core::blob::Model;
 use model_core::checksum::CRC_32;
 
+use crate::seal::Seal;
+
+mod key;
 mod upload;
 
+pub use key::DeviceKey;
 pub use upload::Upload;
 
 /// Error of a flash that could not be erased or written.
@@ -73,10 +79,29 @@ const RECORD_MAGIC: [u8; 4] = *b"SLOT";
 /// Number of erases after the start that need not wait for each other.
 pub const ERASES_AT_ONCE: u32 = 100;
 
-/// Largest blob that a slot holds, in bytes.
+/// Length in bytes of a seal behind a blob: mark, version, tag.
+pub const SEAL_BYTES: usize = 40;
+
+/// First word of a seal.
+const SEAL_MARK: [u8; 4] = *b"SEAL";
+
+/// Largest blob that a slot holds, in bytes; with a seal, [`SEAL_BYTES`] less. The first record stands behind it.
 #[must_use]
 pub fn capacity(slot: &[u8]) -> usize {
     slot.len().saturating_sub(RECORD_BYTES)
+}
+
+/// Place of the seal in a slot: the first word behind its blob.
+fn seal_place(slot: &[u8]) -> usize {
+    blob_in_slot(slot).len().saturating_add(3) & !3
+}
+
+/// The seal behind the blob in `slot`, right or wrong.
+#[must_use]
+pub fn seal_in_slot(slot: &[u8]) -> Option<Seal> {
+    let rest = slot.get(seal_place(slot)..)?.strip_prefix(&SEAL_MARK)?;
+    let (version, rest) = rest.split_first_chunk()?;
+    Some(Seal { version: u32::from_le_bytes(*version), tag: *rest.first_chunk()? })
 }
 
 /// The record that commits a blob: magic, generation, the blob's CRC-32, and the CRC-32 of these
@@ -96,9 +121,10 @@ pub const MOST_RECORDS: usize = 8;
 
 /// Places of the records in a slot, if its blob leaves room for them: the first is at the end.
 fn record_places(slot: &[u8]) -> impl Iterator<Item = usize> {
-    let (length, blob) = (slot.len(), blob_in_slot(slot).len());
+    let seal = if seal_in_slot(slot).is_some() { SEAL_BYTES } else { 0 };
+    let (length, content) = (slot.len(), seal_place(slot).saturating_add(seal));
     let places = (1..=MOST_RECORDS).map(move |number| length.checked_sub(number * RECORD_BYTES));
-    places.map_while(move |place| place.filter(|place| *place >= blob))
+    places.map_while(move |place| place.filter(|place| *place >= content))
 }
 
 fn record_at(slot: &[u8], place: usize) -> Option<&[u8; RECORD_BYTES]> {

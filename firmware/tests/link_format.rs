@@ -4,11 +4,12 @@ use firmware::circuit::{Circuit, ConstantsFault, ZeroPotential};
 use firmware::link::cobs;
 use firmware::link::message::{
     Configuration, ConfigurationField, EstimateReport, HealthReport, Identity, KeepFault, Kept,
-    KeptBaseline, Memory, ModelFault, ModelIdentity, RecalibrationFault, RecalibrationReport,
-    RecalibrationState, RecalibrationStep, Refusal, Report, Request, Setting, Statistics,
-    UploadState, UploadStep,
+    KeptBaseline, KeyState, Memory, ModelFault, ModelIdentity, RecalibrationFault,
+    RecalibrationReport, RecalibrationState, RecalibrationStep, Refusal, Report, Request,
+    SealFault, Setting, Statistics, UploadState, UploadStep,
 };
 use firmware::link::packet::{self, PROTOCOL_VERSION};
+use firmware::seal::{Key, Seal};
 use mock_board::request_bytes;
 use model_core::blob::Floats;
 
@@ -39,6 +40,10 @@ fn report_bytes(number: u16, report: &Report<'_>) -> Vec<u8> {
 }
 
 type Example = (&'static str, Vec<u8>);
+
+/// A key of the examples, and a seal.
+const KEY: Key = [0xA5; 32];
+const SEAL: Seal = Seal { version: 300, tag: [0x5A; 32] };
 
 /// Numbers of the examples: a reading, and a missing one.
 const OHM: [f32; 2] = [60.0, f32::NAN];
@@ -74,10 +79,12 @@ fn requests() -> Vec<Example> {
         ),
         ("begin: 8 × 18 → 18, 1000 bytes", upload(UploadStep::Begin { head: &head })),
         ("chunk at 512", upload(UploadStep::Chunk { offset: 512, bytes: &[0, 1, 0, 2] })),
-        ("try", upload(UploadStep::Try)),
+        ("try", upload(UploadStep::Try { seal: None })),
+        ("try, sealed as version 300", upload(UploadStep::Try { seal: Some(SEAL) })),
         ("abort", upload(UploadStep::Abort)),
         ("confirm", upload(UploadStep::Confirm)),
         ("restart", request_bytes(7, &Request::Restart)),
+        ("provision", request_bytes(7, &Request::Provision { key: KEY })),
         ("set baseline: 60 Ω, unknown", request_bytes(8, &Request::SetBaseline { readings_ohm })),
         ("resume", request_bytes(8, &Request::Resume)),
     ]
@@ -103,11 +110,14 @@ fn identity() -> Report<'static> {
             inputs_crc_32: 0x1234_5678,
             outputs_crc_32: 2,
             on_trial: true,
+            version: Some(300),
         }),
         model_name: "press",
         slot_bytes: 131_056,
         chunk_bytes: 512,
         memory: Memory { vector_table: 1024, stack_reserved: 300, ..Memory::default() },
+        key: KeyState::Set,
+        highest_version: Some(299),
     })
 }
 
@@ -228,6 +238,7 @@ fn reports() -> Vec<Example> {
             "confirmed",
             report_bytes(6, &Report::Upload(UploadState::Confirmed { crc_32: 0x1234_5678 })),
         ),
+        ("provisioned", report_bytes(7, &Report::Provisioned)),
         ("restarting", report_bytes(7, &Report::Restarting)),
         ("refused: version", refused(Refusal::Version(PROTOCOL_VERSION))),
         (
@@ -236,6 +247,10 @@ fn reports() -> Vec<Example> {
         ),
         ("refused: too large", refused(Refusal::TooLarge { slot_bytes: 131_056 })),
         ("refused: another shape", refused(Refusal::BadModel(ModelFault::Shape))),
+        (
+            "refused: older than version 300",
+            refused(Refusal::Seal(SealFault::Outdated { highest: 300 })),
+        ),
         ("refused: flash", refused(Refusal::Flash)),
         ("refused: erased too often", refused(Refusal::TooSoon { wait_us: 600_000_000 })),
     ]
@@ -269,6 +284,7 @@ fn every_refusal_has_the_specified_number() {
         (Refusal::LastGeneration, 13),
         (Refusal::Recalibration(RecalibrationFault::NoModel), 14),
         (Refusal::OnTrial, 15),
+        (Refusal::Seal(SealFault::Missing), 16),
     ];
     for (refusal, number) in refusals {
         let mut buffer = [0; 16];

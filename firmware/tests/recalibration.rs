@@ -3,11 +3,13 @@
 use firmware::app::{Leave, Session};
 use firmware::link::message::{
     Configuration, RecalibrationFault, RecalibrationReport, RecalibrationState, RecalibrationStep,
-    Refusal, Report, Request,
+    Refusal, Report, Request, UploadStep,
 };
+use firmware::seal::{Key, Seal};
 use firmware::store::{MOST_RECORDS, Slot};
 use mock_board::*;
 use model_core::blob::{Floats, Metadata, ModelParts, ModelShape, encode_to_vec};
+use model_core::checksum::CRC_32;
 use model_core::rbf::Shape;
 use model_core::rbf::direct::{Network, Parameters};
 use model_core::recalibration::Recalibration;
@@ -263,6 +265,21 @@ fn presses_bring_a_changed_sensor_back_and_the_previous_model_can_be_had_again()
 }
 
 #[test]
+fn behind_the_largest_generation_no_recalibration_and_no_undo_comes_into_force() {
+    let old = trained();
+    let mut slots = MockSlot::pair_with(&old);
+    upload(&mut slots, &blob(2, 5));
+    upload(&mut slots, &old);
+    // Another record of the model in force, in slot 0, with the largest generation.
+    let record = [&b"SLOT"[..], &[0xFF; 4], &crc_of(&old).to_le_bytes()].concat();
+    let record = [&record[..], &CRC_32.checksum(&record).to_le_bytes()].concat();
+    slots[0].write(MockSlot::BYTES - 32, &record).unwrap();
+    assert_eq!(undo(&mut slots, crc_of(&old)), Err(Refusal::LastGeneration));
+    assert_eq!(recalibrate(&mut slots), Err(Refusal::LastGeneration));
+    assert_eq!(after_restart(&mut slots), Some(crc_of(&old)));
+}
+
+#[test]
 fn a_power_cut_at_any_word_of_a_recalibration_leaves_the_old_or_the_new_model() {
     let old = trained();
     let mut cuts = 0;
@@ -309,6 +326,38 @@ fn a_power_cut_at_any_word_of_an_undo_leaves_the_old_or_the_new_model() {
         cuts += 1;
     }
     assert_eq!(cuts, 4, "words of a record");
+}
+
+#[test]
+fn with_a_key_the_device_seals_the_model_that_it_makes_and_can_return_to_the_one_before() {
+    const KEY: Key = [9; 32];
+    let (old, key) = (trained(), KeyArea::with(&KEY));
+    let mut slots = MockSlot::pair();
+    let mut steps = upload_steps(&old, 60);
+    steps.pop();
+    let seal = Some(Seal::of(&KEY, 5, &old));
+    steps.extend([UploadStep::Try { seal }, UploadStep::Confirm]);
+    mock_board::upload(&mut Bench::with_key(quiet(), &key), &mut slots, &mut [], &steps).unwrap();
+    let (mut bench, mut memory) = (Bench::with_key(quiet(), &key), memory());
+    let board = bench.board.clone();
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut memory);
+    add_presses(&mut session, &board, 60);
+    step(&mut session, &board, RecalibrationStep::Commit).0.unwrap();
+    let _ = session;
+    let in_force = |slots: &mut [MockSlot; 2]| {
+        let mut bench = Bench::with_key(quiet(), &key);
+        let mut session = Session::start(&mut bench.app, slots, &mut []);
+        let model = ask(&mut session, &bench.board, &Request::Identify, |report| match report {
+            Report::Identity(identity) => identity.model.unwrap(),
+            other => panic!("{other:?}"),
+        });
+        let undo = RecalibrationStep::Undo { crc_32: model.0.crc_32 };
+        (model.0, step(&mut session, &bench.board, undo).0)
+    };
+    let (new, undone) = in_force(&mut slots);
+    assert_eq!((new.generation, new.version), (2, Some(5)));
+    assert!(undone.is_ok() && new.crc_32 != crc_of(&old));
+    assert_eq!(in_force(&mut slots).0.crc_32, crc_of(&old));
 }
 
 #[test]

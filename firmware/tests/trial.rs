@@ -66,7 +66,7 @@ fn a_model_on_trial_is_decoded_with_and_gone_after_a_restart() {
 fn a_confirmed_model_stays_and_a_repeated_confirmation_does_no_harm() {
     let (old, new) = (blob(1, 3), blob(2, 5));
     let (mut slots, mut bench) = on_trial(&old, &new);
-    let confirm = [UploadStep::Try, UploadStep::Confirm, UploadStep::Confirm];
+    let confirm = [UploadStep::Try { seal: None }, UploadStep::Confirm, UploadStep::Confirm];
     let state = upload(&mut bench, &mut slots, &mut [], &confirm);
     assert_eq!(state, Ok(UploadState::Confirmed { crc_32: crc_of(&new) }));
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);

@@ -1,4 +1,4 @@
-//! Memory regions of the model slots, of settings, and of weights in RAM, as the linker placed them.
+//! Memory regions of the model slots, of settings and key, and of weights in RAM, as the linker placed them.
 
 use core::{ptr, slice};
 
@@ -10,6 +10,8 @@ unsafe extern "C" {
     static mut _slot_b_end: u8;
     static mut _settings_start: u8;
     static mut _settings_end: u8;
+    static mut _key_start: u8;
+    static mut _key_end: u8;
     static mut _weights_start: u32;
     static mut _weights_end: u32;
 }
@@ -32,7 +34,10 @@ pub unsafe fn take_weights() -> &'static mut [u32] {
     }
 }
 
-/// Memory of one model slot or one page of settings, with exclusive access.
+/// Regions of the model slots, of the pages of settings, and of the key.
+pub type Regions = ([Region; 2], [Region; 2], Region);
+
+/// Memory of one model slot, one page of settings, or the key, with exclusive access.
 #[derive(Debug)]
 pub struct Region {
     start: usize,
@@ -40,12 +45,12 @@ pub struct Region {
 }
 
 impl Region {
-    /// Takes the regions of both slots, and of both pages of settings.
+    /// Takes the regions of both slots, of both pages of settings, and of the key.
     ///
     /// # Safety
     /// The caller must ensure that this is called only once: no two values may be the same region.
     #[must_use]
-    pub unsafe fn take() -> ([Self; 2], [Self; 2]) {
+    pub unsafe fn take() -> Regions {
         let region = |start: *const u8, end: *const u8| Self {
             start: start.expose_provenance(),
             length: end.addr() - start.addr(),
@@ -56,7 +61,8 @@ impl Region {
         ];
         let settings = region(&raw const _settings_start, &raw const _settings_end);
         let length = settings.length / 2;
-        (slots, [0, length].map(|offset| Self { start: settings.start + offset, length }))
+        let pages = [0, length].map(|offset| Self { start: settings.start + offset, length });
+        (slots, pages, region(&raw const _key_start, &raw const _key_end))
     }
 
     /// Address of the region's first byte.

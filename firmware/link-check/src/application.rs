@@ -11,7 +11,7 @@ use firmware::store::{FlashError, Slot};
 
 use crate::opaque::{opaque, slot};
 
-struct Board(Settings);
+struct Board(Settings, Flash);
 
 /// A memory that may hold anything. It stands for the images' `SettingPages`: that calls a library whose panics the
 /// compiler cannot rule out.
@@ -50,6 +50,7 @@ impl Port for Board {
 
 impl Platform for Board {
     type Settings = Settings;
+    type KeyArea = Flash;
 
     const BOARD: &'static str = "link-check";
 
@@ -63,6 +64,10 @@ impl Platform for Board {
 
     fn settings(&mut self) -> &mut Settings {
         &mut self.0
+    }
+
+    fn key_area(&mut self) -> &mut Flash {
+        &mut self.1
     }
 }
 
@@ -110,7 +115,7 @@ pub fn exercise() {
     let mut buffers = Buffers::<8, 18, 18, { Capacity::PAPER.message_bytes() }>::new();
     let configuration = opaque(Configuration::DEFAULT);
     let sensor = Sensor(opaque(ZeroPotential::TYPICAL));
-    let mut app = App::new(Board(Settings), sensor, configuration, &mut buffers);
+    let mut app = App::new(Board(Settings, Flash), sensor, configuration, &mut buffers);
     let mut weights = [0; 1024];
     app.run(&mut [Flash, Flash], &mut weights);
     opaque(weights);

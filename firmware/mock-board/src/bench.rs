@@ -7,6 +7,7 @@ use firmware::app::{App, Buffers, Session};
 use firmware::link::message::Configuration;
 
 use crate::board::{AnyKeeper, Board};
+use crate::key_area::KeyArea;
 use crate::pages::SharedSettings;
 use crate::shape::{COLS, MESSAGE_BYTES, OUTPUTS, ROWS, TestFrame, frame_at_rest};
 use crate::slot::MockSlot;
@@ -52,6 +53,12 @@ impl Bench<'static> {
     pub fn with_settings(configuration: Configuration, settings: impl Into<AnyKeeper>) -> Self {
         Self::within(Box::leak(Box::new(Memory::new())), configuration, settings)
     }
+
+    /// As [`Bench::new`], on a board whose flash for the key is `key`.
+    #[must_use]
+    pub fn with_key(configuration: Configuration, key: &KeyArea) -> Self {
+        Self::within_with_key(Box::leak(Box::new(Memory::new())), configuration, key)
+    }
 }
 
 impl<'m> Bench<'m> {
@@ -62,8 +69,23 @@ impl<'m> Bench<'m> {
         configuration: Configuration,
         settings: impl Into<AnyKeeper>,
     ) -> Self {
+        Self::on(Board::with_settings(settings), memory, configuration)
+    }
+
+    /// As [`Bench::within`], on a board without settings whose flash for the key is `key`.
+    #[must_use]
+    pub fn within_with_key(
+        memory: &'m mut Memory,
+        configuration: Configuration,
+        key: &KeyArea,
+    ) -> Self {
+        let mut board = Board::with_settings(&SharedSettings::default());
+        board.key = key.clone();
+        Self::on(board, memory, configuration)
+    }
+
+    fn on(board: Board, memory: &'m mut Memory, configuration: Configuration) -> Self {
         *memory = Memory::new();
-        let board = Board::with_settings(settings);
         let frame = Rc::new(RefCell::new(frame_at_rest()));
         let source = Source::new(&frame, &board, SCAN_US);
         Self { app: App::new(board.clone(), source, configuration, memory), board, frame }

@@ -9,6 +9,7 @@ use firmware::platform::{Platform, Port};
 use firmware::settings::{KeepError, Keeper};
 use firmware::store::Slot;
 
+use crate::key_area::KeyArea;
 use crate::pages::SharedSettings;
 
 /// State of the board, which a test can see while the application owns the board.
@@ -61,12 +62,14 @@ pub struct Board {
     /// Clock, serial line and watchdog.
     pub pins: Rc<RefCell<Pins>>,
     settings: AnyKeeper,
+    /// The flash of its key; that of a clone is another one.
+    pub key: KeyArea,
 }
 
 impl Board {
     /// A board on which these settings are kept.
     pub fn with_settings(settings: impl Into<AnyKeeper>) -> Self {
-        Self { pins: Rc::default(), settings: settings.into() }
+        Self { pins: Rc::default(), settings: settings.into(), key: KeyArea::erased() }
     }
 }
 
@@ -99,6 +102,7 @@ impl Port for Board {
 
 impl Platform for Board {
     type Settings = AnyKeeper;
+    type KeyArea = KeyArea;
 
     const BOARD: &'static str = "test";
 
@@ -113,5 +117,9 @@ impl Platform for Board {
 
     fn settings(&mut self) -> &mut AnyKeeper {
         &mut self.settings
+    }
+
+    fn key_area(&mut self) -> &mut KeyArea {
+        &mut self.key
     }
 }

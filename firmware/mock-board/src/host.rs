@@ -121,8 +121,8 @@ pub fn begin(blob: &[u8]) -> UploadStep<'_> {
     UploadStep::Begin { head: &blob[..Model::HEAD_BYTES] }
 }
 
-/// The steps of an upload of `blob` in chunks of `chunk` bytes, until it is on trial. [`install`] goes on to the
-/// confirmation.
+/// The steps of an upload of `blob` in chunks of `chunk` bytes, until it is on trial without a seal. [`install`] goes on
+/// to the confirmation.
 ///
 /// # Panics
 /// The blob is shorter than its head, or `chunk` is 0.
@@ -134,7 +134,7 @@ pub fn upload_steps(blob: &[u8], chunk: usize) -> Vec<UploadStep<'_>> {
             .enumerate()
             .map(|(i, bytes)| UploadStep::Chunk { offset: (i * chunk) as u32, bytes }),
     );
-    steps.push(UploadStep::Try);
+    steps.push(UploadStep::Try { seal: None });
     steps
 }
 

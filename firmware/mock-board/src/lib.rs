@@ -19,6 +19,7 @@ mod shape;
 mod power;
 mod slot;
 mod pages;
+mod key_area;
 mod board;
 mod source;
 mod models;
@@ -30,6 +31,7 @@ pub use board::{AnyKeeper, Board, Pins};
 pub use host::{
     ask, begin, configure, install, model_crc, reports, request_bytes, settle, upload, upload_steps,
 };
+pub use key_area::KeyArea;
 pub use models::{blob, blob_of, blob_of_components, blob_with_confidence, crc_of};
 pub use pages::{MockPage, SharedSettings};
 pub use shape::{COLS, MESSAGE_BYTES, OUTPUTS, ROWS, TestFrame, frame_at_rest};

@@ -66,6 +66,8 @@ pub struct Board {
     pub slots: [Slot; 2],
     /// The two pages of settings.
     pub settings: [Slot; 2],
+    /// Flash for the key.
+    pub key: Slot,
     /// Watchdog, already running; it restarts the program if it is not fed for 8 s.
     pub watchdog: IndependentWatchdog,
 }
@@ -110,7 +112,7 @@ impl Board {
 
         let serial = Serial::start(parts.USART2, gpioa.pa2, gpioa.pa3, &mut rcc)?;
         let clock = Clock::start(parts.TIM2, &mut rcc)?;
-        let (slots, settings) = Slot::all(parts.FLASH);
+        let (slots, settings, key) = Slot::all(parts.FLASH);
         let high = PinState::High;
         let selects = [
             Some(gpiob.pb12.into_push_pull_output_in_state(high).erase()),
@@ -134,6 +136,7 @@ impl Board {
             delay: Timer::syst(core.SYST, &rcc.clocks).delay(),
             slots,
             settings,
+            key,
             watchdog,
         })
     }

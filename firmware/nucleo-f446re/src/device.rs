@@ -24,6 +24,7 @@ struct Nucleo {
     watchdog: IndependentWatchdog,
     led: ErasedPin<Output>,
     settings: SettingPages<Slot>,
+    key: Slot,
 }
 
 impl Port for Nucleo {
@@ -42,6 +43,7 @@ impl Port for Nucleo {
 
 impl Platform for Nucleo {
     type Settings = SettingPages<Slot>;
+    type KeyArea = Slot;
 
     const BOARD: &'static str = "nucleo-f446re";
 
@@ -62,6 +64,10 @@ impl Platform for Nucleo {
 
     fn settings(&mut self) -> &mut SettingPages<Slot> {
         &mut self.settings
+    }
+
+    fn key_area(&mut self) -> &mut Slot {
+        &mut self.key
     }
 }
 
@@ -90,6 +96,7 @@ fn main() -> ! {
         watchdog: board.watchdog,
         led: board.led,
         settings: SettingPages::new(board.settings),
+        key: board.key,
     };
     let buffers = unwrap!(buffers());
     let mut app = BoardApp::<_, _>::new(nucleo, scanner, Configuration::DEFAULT, buffers);

@@ -91,6 +91,7 @@ struct Board<'c> {
     watchdog: Watchdog,
     fed_us: u32,
     settings: SettingPages<Slot>,
+    key: Slot,
 }
 
 impl Port for Board<'_> {
@@ -109,6 +110,7 @@ impl Port for Board<'_> {
 
 impl Platform for Board<'_> {
     type Settings = SettingPages<Slot>;
+    type KeyArea = Slot;
 
     const BOARD: &'static str = "qemu mps2-an386";
 
@@ -128,6 +130,10 @@ impl Platform for Board<'_> {
     fn settings(&mut self) -> &mut SettingPages<Slot> {
         &mut self.settings
     }
+
+    fn key_area(&mut self) -> &mut Slot {
+        &mut self.key
+    }
 }
 
 #[entry]
@@ -145,12 +151,13 @@ fn main() -> ! {
     let scanner =
         Scanner::<_, _, _, _, { CAPACITY.columns }>::new(drive, sampler, remote.delay(), CIRCUIT);
     // SAFETY: the slots are taken here only.
-    let (mut slots, pages) = unsafe { Slot::take() };
+    let (mut slots, pages, key) = unsafe { Slot::take() };
     let board = Board {
         line: Line { carrier: link, clock: &clock },
         watchdog: Watchdog::start(WATCHDOG_MS),
         fed_us: 0,
         settings: SettingPages::new(pages),
+        key,
     };
     // The host says when to scan, because its virtual hardware may be missing.
     let configuration = Configuration { frame_period_us: 0, ..Configuration::DEFAULT };

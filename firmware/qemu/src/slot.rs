@@ -16,19 +16,19 @@ pub enum SlotError {
     NotErased,
 }
 
-/// Memory for one model, or one page of settings. Erasing sets all its bits to 1; writing can only set bits to 0.
+/// Memory for one model, one page of settings, or the key. Erasing sets all its bits to 1; writing can only set bits to 0.
 pub struct Slot(Region);
 
 impl Slot {
-    /// Takes both model slots, and both pages of settings.
+    /// Takes both model slots, both pages of settings, and the flash for the key.
     ///
     /// # Safety
     /// The caller must ensure that this is called only once: no two values may be the same slot.
     #[must_use]
-    pub unsafe fn take() -> ([Self; 2], [Self; 2]) {
+    pub unsafe fn take() -> ([Self; 2], [Self; 2], Self) {
         // SAFETY: the caller ensures that this is called only once.
-        let (slots, pages) = unsafe { Region::take() };
-        (slots.map(Self), pages.map(Self))
+        let (slots, pages, key) = unsafe { Region::take() };
+        (slots.map(Self), pages.map(Self), Self(key))
     }
 
     /// All bytes of the slot.

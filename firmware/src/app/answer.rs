@@ -10,14 +10,16 @@ use super::session::Session;
 use super::{Capture, Core};
 use crate::circuit::{Constants, ConstantsFault};
 use crate::link::message::{
-    ConfidenceSent, Configuration, Identity, Refusal, Report, Request, UploadState, UploadStep,
+    ConfidenceSent, Configuration, Identity, KeyState, Refusal, Report, Request, UploadState,
+    UploadStep,
 };
 use crate::link::packet::{self, PROTOCOL_VERSION, PacketError};
 use crate::link::receive::Received;
 use crate::log::{info, warning};
 use crate::platform::Platform;
 use crate::readout::FrameSource;
-use crate::store::{Slot, capacity};
+use crate::seal::Key;
+use crate::store::Slot;
 
 /// Largest chunk of an upload in bytes: it leaves room for the rest of the message, and every board can keep it
 /// while it writes the previous chunk.
@@ -129,9 +131,31 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             Request::Kept => Ok(Report::Kept(self.kept())),
             Request::Keep(setting) => self.keep(setting).map(|()| Report::Kept(self.kept())),
             Request::Forget(setting) => self.forget(setting).map(|()| Report::Kept(self.kept())),
+            Request::Provision { key } => self.provision(&key, &mut leave),
         };
         self.line.send(number, &report.unwrap_or_else(Report::Refused), &mut self.statistics);
         leave
+    }
+
+    /// Sets the device's key. Models without a seal are left at once, and not only at the next restart.
+    fn provision(
+        &mut self,
+        key: &Key,
+        leave: &mut Option<Leave>,
+    ) -> Result<Report<'static>, Refusal> {
+        if self.trial.is_going_on() {
+            return Err(Refusal::OnTrial);
+        }
+        let had_none = self.guard.key_state() == KeyState::None;
+        let platform = self.line.platform();
+        platform.feed_watchdog(); // it may erase flash
+        self.guard.provision(platform.key_area(), key)?;
+        if had_none {
+            info!("the device has a key from now on");
+            self.upload.forget();
+            *leave = Some(Leave::NewModel);
+        }
+        Ok(Report::Provisioned)
     }
 
     /// Puts constants in force. A baseline that was read with others means nothing any more.
@@ -178,9 +202,11 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             kernel: Polynomial::NAME,
             model: model.identity,
             model_name: model.name(),
-            slot_bytes: capacity(spare.bytes()) as u32,
+            slot_bytes: self.guard.capacity(spare.bytes()) as u32,
             chunk_bytes: chunk_bytes(self.capacity.message_bytes()) as u16,
             memory: self.line.platform().memory(),
+            key: self.guard.key_state(),
+            highest_version: self.guard.highest(),
         }
     }
 
@@ -315,6 +341,10 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                 if model.generation() == u32::MAX {
                     return Err(Refusal::LastGeneration);
                 }
+                let most = self.guard.capacity(spare.bytes());
+                if length > most {
+                    return Err(Refusal::TooLarge { slot_bytes: most as u32 });
+                }
                 info!("upload of {=usize} bytes begins", length);
                 let now_us = self.now_us();
                 let (platform, erases) = (self.line.platform(), &mut self.statistics.slot_erases);
@@ -331,26 +361,29 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                 self.upload.abort();
                 Ok(())
             }
-            UploadStep::Try => {
+            UploadStep::Try { seal } => {
                 if self.trial.is_going_on() {
                     return Ok(()); // the host repeats the request, because the answer was lost
                 }
                 let blob = self.upload.complete(spare)?;
-                match model::check(self.capacity, blob).map(|model| model.crc()) {
-                    Ok(crc_32) => {
-                        info!("model {=u32:08x} on trial", crc_32);
-                        self.upload.begin_trial(crc_32);
-                        // Without a model, slot 1 is the spare one.
-                        self.trial.begin(model.identity.map_or(1, |model| 1 - model.slot.min(1)));
-                        *leave = Some(Leave::NewModel);
-                        Ok(())
-                    }
-                    Err(fault) => {
-                        warning!("uploaded model refused");
-                        self.upload.abort();
-                        Err(Refusal::BadModel(fault))
-                    }
+                let checked = model::check(self.capacity, blob).map_err(Refusal::BadModel);
+                let checked = checked.and_then(|model| {
+                    self.guard.check(blob, seal)?;
+                    Ok(model.crc())
+                });
+                let crc_32 = checked.inspect_err(|_| {
+                    warning!("uploaded model refused");
+                    self.upload.abort();
+                })?;
+                if let Some(seal) = seal {
+                    self.upload.seal(spare, &seal)?;
                 }
+                info!("model {=u32:08x} on trial", crc_32);
+                self.upload.begin_trial(crc_32);
+                // Without a model, slot 1 is the spare one.
+                self.trial.begin(model.identity.map_or(1, |model| 1 - model.slot.min(1)));
+                *leave = Some(Leave::NewModel);
+                Ok(())
             }
             // Nothing is on trial. The answer was lost, if it was confirmed.
             UploadStep::Confirm => match self.upload.state() {

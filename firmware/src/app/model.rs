@@ -42,6 +42,7 @@ impl<'a, const ROWS: usize> InForce<'a, ROWS> {
             inputs_crc_32: crc_of(metadata.input_names, metadata.input_units),
             outputs_crc_32: crc_of(metadata.output_names, metadata.output_units),
             on_trial,
+            version: None,
         };
         Some(Self { decoder: Some(decoder), identity: Some(identity), blob })
     }

@@ -305,8 +305,13 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             self.upload.chunk(spare, offset as u32, piece)?;
         }
         let new = self.upload.complete(spare)?;
+        let slot = in_force.identity.map_or(0, |identity| identity.slot.into());
+        let seal = self.guard.seal(new, slot);
         match model::check(self.capacity, new).map(|model| model.crc()) {
             Ok(crc_32) => {
+                if let Some(seal) = seal {
+                    self.upload.seal(spare, &seal)?;
+                }
                 self.upload.commit(spare, in_force.generation().saturating_add(1), crc_32)?;
                 info!("recalibrated model {=u32:08x} committed", crc_32);
                 Ok(crc_32)
@@ -337,11 +342,13 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             // The answer was lost, if the model that was to be left is the spare one.
             return if previous == left { Ok(crc_32) } else { Err(NOTHING) };
         }
-        generation(1 - usize::from(identity.slot.min(1)), spare.bytes()).ok_or(NOTHING)?;
+        let slot = 1 - usize::from(identity.slot.min(1));
+        generation(slot, spare.bytes()).ok_or(NOTHING)?;
         if self.end_trial() {
             *leave = Some(Leave::NewModel);
             return Ok(previous);
         }
+        self.guard.check_undo(slot)?;
         let next = identity.generation.checked_add(1).ok_or(Refusal::LastGeneration)?;
         self.give_up_press();
         match reinstate(spare, next) {

@@ -43,8 +43,11 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
     ) -> Self {
         app.core.confirm(slots);
         let capacity = app.core.capacity;
-        let candidates = candidates(slots, app.core.trial.slot());
-        let [best, ..] = candidates;
+        let guard = &mut app.core.guard;
+        guard.see(slots);
+        let candidates = candidates(slots, app.core.trial.slot())
+            .map(|candidate| candidate.filter(|found| guard.trusts(found.slot)));
+        let best = candidates.into_iter().flatten().next();
         // Only the copy is checked, so the best model is looked at once.
         let bytes = best.and_then(|best| slots.get(best.slot)).map_or(&[][..], S::bytes);
         let (room, left) =
@@ -57,7 +60,11 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
         let [first, second] = slots;
         let (active, spare) = if slot == Some(1) { (&*second, first) } else { (&*first, second) };
         let in_place = |chosen| InForce::load(capacity, active.bytes(), chosen, false);
-        let model = copied.or_else(|| chosen.and_then(in_place)).unwrap_or(InForce::NONE);
+        let mut model = copied.or_else(|| chosen.and_then(in_place)).unwrap_or(InForce::NONE);
+        if let Some(identity) = &mut model.identity {
+            let seal = app.core.guard.seal_of(identity.slot.into());
+            identity.version = seal.map(|seal| seal.version);
+        }
         if let Some(model) = &model.identity {
             info!(
                 "model {=u32:08x} in force, slot {=u8}, generation {=u32}, in RAM: {=bool}",
@@ -192,11 +199,10 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         let scan_us = self.now_us().wrapping_sub(start_us) as u32;
 
         let s = &mut self.statistics;
-        s.frames_scanned = s.frames_scanned.wrapping_add(1);
+        let frame = s.number_frame();
         s.frames_missed = s.frames_missed.saturating_add(missed);
         s.failed_samples = s.failed_samples.saturating_add(u32::from(report.failed_samples));
         s.longest_scan_us = s.longest_scan_us.max(scan_us);
-        let frame = s.frames_scanned;
         let overrun = if missed > 0 { EstimateReport::OVERRUN } else { 0 };
 
         if self.configuration.send_readings {

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::circuit::{Constants, ConstantsFault};
 use crate::readout::ScanSettings;
+use crate::seal::{Key, Seal};
 
 /// A request of the host. The device answers each with one [`Report`] that repeats the request's number. Every
 /// request may be repeated without harm.
@@ -71,6 +72,12 @@ pub enum Request<'a> {
     Resume,
     /// Carry out one step of a recalibration. Answered by [`Report::Recalibration`].
     Recalibrate(#[serde(borrow)] RecalibrationStep<'a>),
+    /// Set the device's key: from now on only models with a seal made by it come into force. It can be set once.
+    /// Answered by [`Report::Provisioned`].
+    Provision {
+        /// The key.
+        key: Key,
+    },
 }
 
 impl Request<'_> {
@@ -107,7 +114,10 @@ pub enum UploadStep<'a> {
     },
     /// Check the blob from end to end, and put it in force on trial if it is sound: until it is confirmed, a restart
     /// brings the previous model back.
-    Try,
+    Try {
+        /// The blob's seal, for a device with a key.
+        seal: Option<Seal>,
+    },
     /// Abort the upload, and forget the bytes received. A model on trial is left for the previous one.
     Abort,
     /// Confirm the model on trial: it stays in force over restarts.
@@ -205,6 +215,8 @@ pub enum Report<'a> {
     Kept(Kept),
     /// How far a recalibration is.
     Recalibration(RecalibrationReport),
+    /// The device has this key.
+    Provisioned,
 }
 
 /// Identity of the device, and of the model in force.
@@ -233,6 +245,21 @@ pub struct Identity<'a> {
     pub chunk_bytes: u16,
     /// Use of flash and RAM.
     pub memory: Memory,
+    /// Whether the device has a key.
+    pub key: KeyState,
+    /// Highest version of a seal that was confirmed, as far as the slots tell.
+    pub highest_version: Option<u32>,
+}
+
+/// Whether a device has a key.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum KeyState {
+    /// It has none, and takes any sound model.
+    None,
+    /// It has one, and takes models with a seal made by it.
+    Set,
+    /// It had one, which has decayed, and takes no model.
+    Damaged,
 }
 
 /// Identity of the model in force.
@@ -260,6 +287,8 @@ pub struct ModelIdentity {
     pub outputs_crc_32: u32,
     /// Whether the model is on trial: not confirmed, and gone with the next restart.
     pub on_trial: bool,
+    /// Version of its seal, if it has one and the device has a key.
+    pub version: Option<u32>,
 }
 
 /// Use of a device's memory, in bytes.
@@ -472,6 +501,14 @@ pub struct Statistics {
     pub slot_damages: u32,
 }
 
+impl Statistics {
+    /// Counts a scanned frame; returns its number. Behind the largest comes 0.
+    pub fn number_frame(&mut self) -> u32 {
+        self.frames_scanned = self.frames_scanned.wrapping_add(1);
+        self.frames_scanned
+    }
+}
+
 /// Progress of uploading a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum UploadState {
@@ -574,6 +611,28 @@ pub enum Refusal {
     Recalibration(RecalibrationFault),
     /// A model is on trial: it must be confirmed or aborted first.
     OnTrial,
+    /// The device's key forbids it.
+    Seal(SealFault),
+}
+
+/// What the device's key has against a request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum SealFault {
+    /// The model has no seal, and the device has a key.
+    Missing,
+    /// The seal was not made of this blob, with this version and this key.
+    Forged,
+    /// The version is lower than one that was confirmed, or the same for another blob.
+    Outdated {
+        /// Highest version that was confirmed.
+        highest: u32,
+    },
+    /// The model has a seal, and the device has no key.
+    NoKey,
+    /// The device has another key.
+    KeyIsSet,
+    /// The device's key has decayed.
+    KeyDamaged,
 }
 
 /// Why a step of a recalibration was not carried out.
@@ -661,4 +720,15 @@ pub enum ModelFault {
     Invalid,
     /// The device has no room for a model of this shape.
     Shape,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_numbered_on_behind_the_largest_number() {
+        let mut s = Statistics { frames_scanned: u32::MAX - 1, ..Statistics::default() };
+        assert_eq!([(); 3].map(|()| s.number_frame()), [u32::MAX, 0, 1]);
+    }
 }

@@ -1,7 +1,11 @@
 //! Upload of a blob in chunks.
 
-use super::{ERASES_AT_ONCE, FlashError, RECORD_MAGIC, Slot, capacity, record};
+use super::{
+    ERASES_AT_ONCE, FlashError, RECORD_MAGIC, SEAL_BYTES, SEAL_MARK, Slot, capacity, record,
+    seal_place,
+};
 use crate::link::message::{Refusal, UploadState};
+use crate::seal::Seal;
 
 /// State of an upload, whose bytes are in the spare slot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -129,6 +133,22 @@ impl Upload {
         };
         let whole = (received as usize == self.length).then(|| spare.bytes().get(..self.length));
         whole.flatten().ok_or(Refusal::OutOfPlace { received })
+    }
+
+    /// Writes the seal of the blob in `spare` behind it.
+    ///
+    /// # Errors
+    /// [`Refusal::TooLarge`] if the blob leaves no room, [`Refusal::Flash`] if writing fails.
+    pub fn seal<S: Slot>(&mut self, spare: &mut S, seal: &Seal) -> Result<(), Refusal> {
+        let (place, most) = (seal_place(spare.bytes()), capacity(spare.bytes()));
+        if place.saturating_add(SEAL_BYTES) > most {
+            self.abort();
+            return Err(Refusal::TooLarge { slot_bytes: most.saturating_sub(SEAL_BYTES) as u32 });
+        }
+        let head = [SEAL_MARK, seal.version.to_le_bytes()];
+        // The mark and the version last: without them there is no seal.
+        let tag = spare.write(place + head.as_flattened().len(), &seal.tag);
+        self.flash(tag.and_then(|()| spare.write(place, head.as_flattened())))
     }
 
     /// Notes that the blob, which must have been found sound, is on trial.

@@ -25,6 +25,7 @@ pub mod serial;
 mod settings;
 pub mod calibrate;
 pub mod stream;
+mod key;
 pub mod upload;
 pub mod recalibrate;
 mod expected;
@@ -34,6 +35,7 @@ pub mod check;
 use configuration::Kept;
 pub use configuration::{ActiveConfiguration, LEASE};
 pub use identity::DeviceIdentity;
+pub use key::Sealing;
 
 /// Longest time that a board takes to answer a request that erases no flash.
 const ANSWER: Duration = Duration::from_millis(500);

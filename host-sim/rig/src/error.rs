@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use firmware::capacity::Capacity;
 use firmware::circuit::ConstantsFault;
-use firmware::link::message::{KeepFault, ModelFault, RecalibrationFault, Refusal};
+use firmware::link::message::{KeepFault, ModelFault, RecalibrationFault, Refusal, SealFault};
 use model_core::blob::ModelShape;
 
 /// Result of the functions of this crate.
@@ -87,6 +87,15 @@ pub enum Error {
         /// Active model, as it reports it.
         in_force: String,
     },
+    /// Model without a seal, for a device with a key.
+    #[error("the device takes sealed models only: give its key, `upload --key FILE`")]
+    NeedsSeal,
+    /// Seal for a device without a key.
+    #[error("the device has no key, and takes any model: `provision` it first, or leave --key out")]
+    HasNoKey,
+    /// Device whose key has decayed.
+    #[error("the device's key has decayed, so it takes no model: erase its flash with a debugger")]
+    KeyDamaged,
     /// Device that does not decode with a model on trial.
     #[error("the device is back at its previous model: {0}")]
     NotDecoding(String),
@@ -207,7 +216,22 @@ fn why(refusal: Refusal) -> String {
             "the record of its model has the last number; flash a model with a debugger".into()
         }
         Refusal::Recalibration(fault) => why_not_recalibrated(fault),
+        Refusal::Seal(fault) => why_not_trusted(fault),
         Refusal::OnTrial => "its model is on trial; `confirm` or `undo` it first".into(),
+    }
+}
+
+/// Reason why the device's key forbids something, in words.
+fn why_not_trusted(fault: SealFault) -> String {
+    match fault {
+        SealFault::Missing => "it takes sealed models only; give its key with --key".into(),
+        SealFault::Forged => "the seal was made with another key".into(),
+        SealFault::Outdated { highest } => format!(
+            "it had a model of version {highest}; seal this one as a higher version (--model-version), if you mean it"
+        ),
+        SealFault::NoKey => Error::HasNoKey.to_string(),
+        SealFault::KeyIsSet => "it has another key; a debugger can erase it".into(),
+        SealFault::KeyDamaged => Error::KeyDamaged.to_string(),
     }
 }
 

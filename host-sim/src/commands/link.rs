@@ -1,13 +1,14 @@
 //! Command `link`: a device on a serial port.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::{Args, Subcommand, value_parser};
-use host_sim::Result;
+use firmware::seal::Key;
+use host_sim::{Error, Result};
 use taxel_learn::ModelBlob;
 use taxel_rig::device::check::check;
-use taxel_rig::device::{Device, DeviceIdentity, LEASE, serial, upload};
+use taxel_rig::device::{Device, DeviceIdentity, LEASE, Sealing, serial, upload};
 
 use super::check_arguments::{CheckArguments, Checked, conclude};
 use super::progress::Terminal;
@@ -49,6 +50,13 @@ enum Action {
     /// previous one, whatever caused it.
     #[command(after_help = "Example: host-sim link /dev/ttyACM0 upload press.bin")]
     Upload(UploadArguments),
+    /// Give the device its key, once: from then on it takes models only that are sealed with it.
+    ///
+    /// The key is 32 random bytes, as bytes or as 64 hexadecimal digits: `openssl rand -hex 32`. Keep it secret. A model
+    /// that is on the device already has no seal, and is left: upload it with --key. Only erasing the flash with a
+    /// debugger removes a key (docs/reliability.md).
+    #[command(after_help = "Example: host-sim link /dev/ttyACM0 provision --key device.key")]
+    Provision(ProvisionArguments),
     /// Confirm the model that `upload --trial` left on trial: it stays active over restarts.
     #[command(after_help = "Example: host-sim link /dev/ttyACM0 confirm")]
     Confirm,
@@ -95,6 +103,7 @@ impl Arguments {
         match self.action {
             Action::Identify => "identify",
             Action::Upload(_) => "upload",
+            Action::Provision(_) => "provision",
             Action::Confirm => "confirm",
             Action::Record(_) => "record",
             Action::Baseline(_) => "baseline",
@@ -115,6 +124,26 @@ struct UploadArguments {
     /// Leave the model on trial, until `confirm` or the next restart, which returns to the previous one.
     #[arg(long)]
     trial: bool,
+    /// File with the device's key, if it was provisioned: the model is sealed with it.
+    #[arg(long, value_name = "FILE")]
+    key: Option<PathBuf>,
+    /// Version that the model is sealed as; a device takes no lower one again [default: the device's next one].
+    #[arg(long, value_name = "N", requires = "key")]
+    model_version: Option<u32>,
+}
+
+#[derive(Args)]
+struct ProvisionArguments {
+    /// File with the key.
+    #[arg(long, value_name = "FILE")]
+    key: PathBuf,
+}
+
+/// Reads a device's key.
+fn read_key(path: &Path) -> Result<Key> {
+    let content = std::fs::read(path).map_err(|cause| taxel_data::Error::read(path, cause))?;
+    Sealing::key(&content)
+        .map_err(|bad| Error::Unfit { path: path.to_owned(), message: bad.to_string() })
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
@@ -131,16 +160,25 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         }
         Action::Upload(action) => {
             let model = ModelBlob::read(&action.model)?;
+            let key = action.key.as_deref().map(read_key).transpose()?;
+            let sealing = key.map(|key| Sealing { key, version: action.model_version });
             let mut device = open()?;
             let before = device.identify()?;
             let progress = Terminal::new();
+            let (bytes, sealing) = (model.bytes(), sealing.as_ref());
             let after = device
-                .while_paused(|device| upload::start_trial(device, model.bytes(), &progress))?;
+                .while_paused(|device| upload::start_trial(device, bytes, sealing, &progress))?;
             note_another_sensor(&before, &after);
             upload::see_frames(&mut device)?;
             if !action.trial {
                 upload::confirm(&mut device)?;
             }
+            status::show(&mut device, common)
+        }
+        Action::Provision(action) => {
+            let key = read_key(&action.key)?;
+            let mut device = open()?;
+            device.provision(&key)?;
             status::show(&mut device, common)
         }
         Action::Confirm => {

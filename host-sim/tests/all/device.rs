@@ -162,7 +162,7 @@ fn requests(new: &ModelBlob) -> Vec<(Vec<u8>, usize)> {
     for (index, bytes) in new.bytes().chunks(512).enumerate() {
         add(&Request::Upload(UploadStep::Chunk { offset: 512 * index as u32, bytes }));
     }
-    add(&Request::Upload(UploadStep::Try));
+    add(&Request::Upload(UploadStep::Try { seal: None }));
     add(&Request::Identify);
     let again = Floats::of(readings[0].as_flattened());
     add(&Request::Decode { frame: 41, readings_ohm: again });
@@ -412,7 +412,7 @@ fn chunks_of_no_bytes_and_a_line_that_takes_none_are_told() {
     let model = model(3);
     let mut device = device(SOUND, &model);
     for bytes in [0, 6] {
-        let outcome = upload::send(&mut device, model.bytes(), bytes, &Silent);
+        let outcome = upload::send(&mut device, (model.bytes(), None), bytes, &Silent);
         assert!(matches!(outcome, Err(Error::ChunkSize(size)) if size == bytes));
     }
     let mut full = Device::new(Full).unwrap();

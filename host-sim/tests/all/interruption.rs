@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use crate::common::Folder;
 use crate::device::{frames, model};
 use crate::virtual_device;
-use firmware::link::message::{Configuration, Identity, Memory, Report, Request};
+use firmware::link::message::{Configuration, Identity, KeyState, Memory, Report, Request};
 use firmware::link::receive::{Received, Receiver};
 use firmware::link::{cobs, packet};
 use model_core::blob::Floats;
@@ -247,6 +247,42 @@ fn a_model_on_trial_is_left_by_a_restart_unless_it_is_confirmed() {
 }
 
 #[test]
+fn with_a_key_a_device_takes_models_that_are_sealed_with_it_and_no_older_ones() {
+    let (old, new) = (model(3), model(4));
+    let rig = Rig::new("sealed", old.bytes());
+    rig.folder.write("old.bin", old.bytes());
+    rig.folder.write("new.bin", new.bytes());
+    let digits = |first: u8| (0..32).map(|i| format!("{:02x}", first + i)).collect::<String>();
+    rig.folder.write("device.key", digits(3));
+    rig.folder.write("other.key", digits(7));
+    rig.folder.write("short.key", "0123");
+    let link = |arguments: &[&str], status: i32, text: &str| {
+        let output = rig.folder.run(&[&["link", &rig.port][..], arguments].concat());
+        let said = [output.stdout, output.stderr].map(|said| String::from_utf8(said).unwrap());
+        assert_eq!(output.status.code(), Some(status), "{arguments:?}: {said:?}");
+        assert!(said.concat().contains(text), "{arguments:?}: {said:?}");
+    };
+    let sealed = |name: &'static str, key: &'static str| ["upload", name, "--key", key];
+    link(&sealed("new.bin", "device.key"), 1, "has no key");
+    link(&["provision", "--key", "short.key"], 2, "64 hexadecimal digits");
+    link(&["provision", "--key", "device.key"], 0, "upload a model with --key");
+    link(&["provision", "--key", "device.key"], 0, "none: upload one");
+    link(&["provision", "--key", "other.key"], 1, "it has another key");
+    link(&["upload", "new.bin"], 1, "takes sealed models only");
+    link(&sealed("new.bin", "other.key"), 1, "made with another key");
+    link(&sealed("old.bin", "device.key"), 0, "this one is version 1");
+    link(&sealed("new.bin", "device.key"), 0, "this one is version 2");
+    link(&sealed("new.bin", "device.key"), 0, "this one is version 2");
+    let version =
+        |n: &'static str| [&sealed("old.bin", "device.key")[..], &["--model-version", n]].concat();
+    link(&version("1"), 1, "it had a model of version 2");
+    link(&version("2"), 1, "it had a model of version 2");
+    link(&["undo"], 1, "the device refused");
+    assert_eq!(rig.device().restart().unwrap().model.unwrap().crc_32, new.parse().crc());
+    link(&version("9"), 0, "this one is version 9");
+}
+
+#[test]
 #[ignore = "takes half a minute"]
 fn after_the_usual_lease_a_device_whose_host_was_killed_scans_on() {
     let (old, new) = (model(3), model(4));
@@ -362,6 +398,8 @@ fn liar(frames: &'static [(u32, u64, usize)]) -> String {
                 slot_bytes: 1000,
                 chunk_bytes: 0,
                 memory: Memory::default(),
+                key: KeyState::None,
+                highest_version: None,
             };
             let (scans, configuration) = match request.body {
                 Request::Identify => {

@@ -23,6 +23,7 @@ pub struct Line {
 struct Board<'s, W, N> {
     wire: W,
     settings: &'s mut SettingPages<MemorySlot>,
+    key: &'s mut MemorySlot,
     /// Called with each request's last byte, before the device sees it.
     notice: N,
     start: Instant,
@@ -106,6 +107,7 @@ impl<W: Read + Write, N: FnMut()> Port for Board<'_, W, N> {
 
 impl<W: Read + Write, N: FnMut()> Platform for Board<'_, W, N> {
     type Settings = SettingPages<MemorySlot>;
+    type KeyArea = MemorySlot;
 
     const BOARD: &'static str = "virtual";
 
@@ -117,6 +119,10 @@ impl<W: Read + Write, N: FnMut()> Platform for Board<'_, W, N> {
 
     fn settings(&mut self) -> &mut SettingPages<MemorySlot> {
         self.settings
+    }
+
+    fn key_area(&mut self) -> &mut MemorySlot {
+        self.key
     }
 }
 
@@ -214,6 +220,7 @@ fn run_on_its_own(
     bytemuck::cast_slice_mut(&mut slots[0].0)[..model.len()].copy_from_slice(model);
     let mut settings =
         SettingPages::new([0, 1].map(|_| MemorySlot(vec![u32::MAX; PAGE_BYTES / 4])));
+    let mut key = MemorySlot(vec![u32::MAX; 1024]);
     // Half of a large model fits: both ways are taken.
     let mut weights = vec![0; 8 * 1024];
     std::thread::spawn(move || {
@@ -221,6 +228,7 @@ fn run_on_its_own(
             let board = Board {
                 wire: &mut wire,
                 settings: &mut settings,
+                key: &mut key,
                 notice: &mut notice,
                 start: Instant::now(),
                 line,

@@ -91,7 +91,7 @@ impl Bench<'_> {
 fn main() -> ! {
     calibrate();
     // SAFETY: the slots, and the RAM for weights, are taken here only.
-    let (([slot, _], _), ram) = unsafe { (Slot::take(), take_weights()) };
+    let (([slot, _], ..), ram) = unsafe { (Slot::take(), take_weights()) };
     let mut arena = Arena(bytemuck::cast_slice_mut(ram));
     let length = unwrap!(Model::declared_length(slot.bytes()), "slot A holds no model");
     let blob = unwrap!(slot.bytes().get(..length), "the model in slot A is cut off");

@@ -19,7 +19,7 @@ fn take_a_kilobyte() {
 
 fn slots() {
     // SAFETY: the slots are taken only here.
-    let ([mut a, mut b], _) = unsafe { Slot::take() };
+    let ([mut a, mut b], ..) = unsafe { Slot::take() };
     assert_eq!((a.bytes().len(), b.bytes().len()), (0x2_0000, 0x2_0000));
     assert_eq!(a.bytes().as_ptr_range().end, b.bytes().as_ptr_range().start);
 

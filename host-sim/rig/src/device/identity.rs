@@ -1,7 +1,7 @@
 //! What a device says of itself.
 
 use firmware::capacity::Capacity;
-use firmware::link::message::{Identity, Memory, ModelIdentity};
+use firmware::link::message::{Identity, KeyState, Memory, ModelIdentity};
 use model_core::Wires;
 use model_core::blob::{Columns, Model, ModelShape};
 use model_core::checksum::CRC_32;
@@ -33,6 +33,21 @@ pub struct DeviceIdentity {
     pub chunk_bytes: usize,
     /// Use of its flash and RAM.
     pub memory: Memory,
+    /// Whether it has a key, and takes sealed models only.
+    #[serde(serialize_with = "key_with_text")]
+    pub key: KeyState,
+    /// Highest version of a sealed model that was confirmed.
+    pub highest_version: Option<u32>,
+}
+
+/// Serialises whether there is a key as text.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn key_with_text<S: Serializer>(key: &KeyState, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(match key {
+        KeyState::None => "none",
+        KeyState::Set => "set",
+        KeyState::Damaged => "damaged",
+    })
 }
 
 /// Serialises a model's identity with checksums as text: programs read large numbers as floats, which round them.
@@ -54,6 +69,7 @@ fn model_with_text<S: Serializer>(
         inputs_crc: String,
         outputs_crc: String,
         on_trial: bool,
+        version: Option<u32>,
     }
     let with_text = model.map(|model| WithText {
         model_crc: format!("{:08x}", model.crc_32),
@@ -67,6 +83,7 @@ fn model_with_text<S: Serializer>(
         inputs_crc: format!("{:08x}", model.inputs_crc_32),
         outputs_crc: format!("{:08x}", model.outputs_crc_32),
         on_trial: model.on_trial,
+        version: model.version,
     });
     with_text.serialize(serializer)
 }
@@ -128,6 +145,8 @@ impl From<&Identity<'_>> for DeviceIdentity {
             slot_bytes: identity.slot_bytes as usize,
             chunk_bytes: identity.chunk_bytes.into(),
             memory: identity.memory,
+            key: identity.key,
+            highest_version: identity.highest_version,
         }
     }
 }

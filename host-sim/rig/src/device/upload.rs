@@ -3,9 +3,11 @@
 use std::time::{Duration, Instant};
 
 use firmware::link::message::{EstimateReport, Refusal, Report, Request, UploadState, UploadStep};
+use firmware::seal::Seal;
 use model_core::blob::{Floats, Model};
 use taxel_data::progress::Progress;
 
+use super::key::{Sealing, seal_for};
 use super::{Device, DeviceIdentity, Wire};
 use crate::error::{Error, Result};
 
@@ -42,13 +44,13 @@ pub fn begin(blob: &[u8]) -> UploadStep<'_> {
     UploadStep::Begin { head: &blob[..blob.len().min(Model::HEAD_BYTES)] }
 }
 
-/// Sends `blob` and puts it on trial, until the device refuses a step. A trial that is going on ends.
+/// Sends `blob` and puts it on trial with this `seal`, until the device refuses a step. A trial that is going on ends.
 ///
 /// # Errors
 /// [`Error::NoAnswer`] if the device stops answering, [`Error::ChunkSize`] if no chunk can be sent.
 pub fn send<W: Wire>(
     device: &mut Device<W>,
-    blob: &[u8],
+    (blob, seal): (&[u8], Option<Seal>),
     chunk_bytes: usize,
     progress: &dyn Progress,
 ) -> Result<std::result::Result<UploadState, Refusal>> {
@@ -70,18 +72,19 @@ pub fn send<W: Wire>(
         answer = step(device, UploadStep::Chunk { offset, bytes })?;
         progress.step();
     }
-    if answer.is_err() { Ok(answer) } else { step(device, UploadStep::Try) }
+    if answer.is_err() { Ok(answer) } else { step(device, UploadStep::Try { seal }) }
 }
 
 /// Uploads `blob` and makes it the active model, on trial, and checks that the device decodes with it. Until
-/// [`confirm`] a restart brings the previous model back.
+/// [`confirm`] a restart brings the previous model back. A device with a key needs a `sealing`.
 ///
 /// # Errors
-/// [`Error`] if the device refuses it, has no room for it or does not decode with it, or the work is interrupted; its
+/// [`Error`] if the device refuses it, needs a seal, has no room for it or does not decode with it, or the work is interrupted; its
 /// previous model is then active again.
 pub fn start_trial<W: Wire>(
     device: &mut Device<W>,
     blob: &[u8],
+    sealing: Option<&Sealing>,
     progress: &dyn Progress,
 ) -> Result<DeviceIdentity> {
     let identity = device.identify()?;
@@ -91,8 +94,9 @@ pub fn start_trial<W: Wire>(
     {
         return Err(Error::NoRoom { capacity, shape });
     }
+    let seal = seal_for(&identity, blob, sealing)?;
     or_abort(device, |device| {
-        let outcome = send(device, blob, identity.chunk_bytes, progress)?;
+        let outcome = send(device, (blob, seal), identity.chunk_bytes, progress)?;
         let crc_32 = match outcome.map_err(Error::Refused)? {
             UploadState::OnTrial { crc_32 } => crc_32,
             other => return Err(unexpected("a trial", &other)),
@@ -180,7 +184,7 @@ pub fn confirm<W: Wire>(device: &mut Device<W>) -> Result<DeviceIdentity> {
     }
 }
 
-/// Uploads `blob`, makes it the active model, checks that the device decodes with it, and confirms it.
+/// Uploads `blob` without a seal, makes it the active model, checks that the device decodes with it, and confirms it.
 ///
 /// # Errors
 /// As [`start_trial`] and [`confirm`].
@@ -189,7 +193,7 @@ pub fn replace<W: Wire>(
     blob: &[u8],
     progress: &dyn Progress,
 ) -> Result<DeviceIdentity> {
-    start_trial(device, blob, progress)?;
+    start_trial(device, blob, None, progress)?;
     or_abort(device, confirm)
 }
 

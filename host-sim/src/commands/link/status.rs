@@ -1,6 +1,6 @@
 //! `identify`: what a device is and does.
 
-use firmware::link::message::Statistics;
+use firmware::link::message::{KeyState, Statistics};
 use host_sim::Result;
 use serde::Serialize;
 use taxel_rig::device::{ActiveConfiguration, Device, DeviceIdentity, Wire};
@@ -55,6 +55,9 @@ pub fn show<W: Wire>(device: &mut Device<W>, common: &Common) -> Result<()> {
     } else {
         page.line(format_args!("{:<17} none: upload one", "model"));
     }
+    if let Some(said) = sealed(d) {
+        page.line(format_args!("{:<17} {said}", "key"));
+    }
     page.line(format_args!("{:<17} {}", "scanning", scanning(&status.active)));
     page.line(format_args!(
         "{:<17} {} scanned, {} decoded (except {} untouched rows), {} missed, {} samples failed",
@@ -98,6 +101,19 @@ pub fn show<W: Wire>(device: &mut Device<W>, common: &Common) -> Result<()> {
     ));
     memory_lines(&mut page, &d.memory);
     page.print()
+}
+
+/// What the device's key means, if it has one.
+fn sealed(device: &DeviceIdentity) -> Option<String> {
+    let version = device.model.and_then(|model| model.version);
+    match (device.key, version) {
+        (KeyState::None, _) => None,
+        (KeyState::Damaged, _) => Some("damaged: the device takes no model".into()),
+        (KeyState::Set, None) => Some("set: upload a model with --key".into()),
+        (KeyState::Set, Some(version)) => {
+            Some(format!("set: sealed models only; this one is version {version}"))
+        }
+    }
 }
 
 /// What the device is doing, by its active configuration.

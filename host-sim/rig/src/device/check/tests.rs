@@ -15,6 +15,8 @@ fn good() -> Findings {
         slot_bytes: 0,
         chunk_bytes: 0,
         memory: firmware::link::message::Memory::default(),
+        key: firmware::link::message::KeyState::None,
+        highest_version: None,
     };
     let uploads = UploadFindings {
         blob_bytes: 1,

@@ -1,0 +1,128 @@
+//! Which models the device's key lets come into force.
+
+use crate::link::message::{KeyState, Refusal, SealFault};
+use crate::seal::{Key, Seal};
+use crate::store::{DeviceKey, SEAL_BYTES, Slot, blob_in_slot, capacity, generation, seal_in_slot};
+
+/// The device's key, and the seals that it has made or found good.
+pub struct Guard {
+    key: DeviceKey,
+    /// Good seals in the slots when the session began.
+    seals: [Option<Seal>; 2],
+    /// Highest version that was ever confirmed, as far as the slots tell.
+    highest: Option<u32>,
+}
+
+impl Guard {
+    /// A guard with the key in this `area` of flash.
+    pub fn new(area: &[u8]) -> Self {
+        Self { key: DeviceKey::find(area), seals: [None; 2], highest: None }
+    }
+
+    /// Looks at the seals in both slots.
+    pub fn see<S: Slot>(&mut self, slots: &[S; 2]) {
+        let DeviceKey::Set(key) = &self.key else { return };
+        for ((index, slot), seal) in slots.iter().enumerate().zip(&mut self.seals) {
+            let bytes = slot.bytes();
+            *seal = seal_in_slot(bytes).filter(|seal| seal.fits(key, blob_in_slot(bytes)));
+            if generation(index, bytes).is_some() {
+                self.highest = self.highest.max(seal.map(|seal| seal.version));
+            }
+        }
+    }
+
+    /// Whether the model in `slot` may come into force.
+    pub fn trusts(&self, slot: usize) -> bool {
+        match self.key {
+            DeviceKey::None => true,
+            DeviceKey::Set(_) => self.seal_of(slot).is_some(),
+            DeviceKey::Damaged => false,
+        }
+    }
+
+    /// Good seal in `slot`.
+    pub fn seal_of(&self, slot: usize) -> Option<Seal> {
+        self.seals.get(slot).copied().flatten()
+    }
+
+    /// Largest blob for `slot`, in bytes.
+    pub fn capacity(&self, slot: &[u8]) -> usize {
+        let seal = if matches!(self.key, DeviceKey::None) { 0 } else { SEAL_BYTES };
+        capacity(slot).saturating_sub(seal)
+    }
+
+    /// Whether there is a key.
+    pub fn key_state(&self) -> KeyState {
+        match self.key {
+            DeviceKey::None => KeyState::None,
+            DeviceKey::Set(_) => KeyState::Set,
+            DeviceKey::Damaged => KeyState::Damaged,
+        }
+    }
+
+    /// Highest version that was confirmed.
+    pub fn highest(&self) -> Option<u32> {
+        self.highest
+    }
+
+    /// Checks whether `blob` may come into force with this `seal`. The same seal again is no step back.
+    pub fn check(&self, blob: &[u8], seal: Option<Seal>) -> Result<(), Refusal> {
+        let fault = match (&self.key, seal) {
+            (DeviceKey::None, None) => return Ok(()),
+            (DeviceKey::None, Some(_)) => SealFault::NoKey,
+            (DeviceKey::Damaged, _) => SealFault::KeyDamaged,
+            (DeviceKey::Set(_), None) => SealFault::Missing,
+            (DeviceKey::Set(key), Some(seal)) if !seal.fits(key, blob) => SealFault::Forged,
+            (DeviceKey::Set(_), Some(seal)) => return self.check_version(seal),
+        };
+        Err(Refusal::Seal(fault))
+    }
+
+    /// Checks that a good `seal` leads to no older model.
+    fn check_version(&self, seal: Seal) -> Result<(), Refusal> {
+        match self.highest {
+            Some(highest) if seal.version < highest || self.is_another_of(seal, highest) => {
+                Err(Refusal::Seal(SealFault::Outdated { highest }))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether `seal` has the version `highest`, and is not the one that was confirmed.
+    fn is_another_of(&self, seal: Seal, highest: u32) -> bool {
+        seal.version == highest && !self.seals.contains(&Some(seal))
+    }
+
+    /// Checks that going back to the model in `slot` is no step to a lower version.
+    pub fn check_undo(&self, slot: usize) -> Result<(), Refusal> {
+        match (&self.key, self.seal_of(slot)) {
+            (DeviceKey::None, _) => Ok(()),
+            (DeviceKey::Damaged, _) => Err(Refusal::Seal(SealFault::KeyDamaged)),
+            (DeviceKey::Set(_), None) => Err(Refusal::Seal(SealFault::Missing)),
+            (DeviceKey::Set(_), Some(seal)) => self.check_version(seal),
+        }
+    }
+
+    /// A seal for `blob`, which the device has made of the model in `slot`.
+    pub fn seal(&self, blob: &[u8], slot: usize) -> Option<Seal> {
+        let DeviceKey::Set(key) = &self.key else { return None };
+        Some(Seal::of(key, self.seal_of(slot)?.version, blob))
+    }
+
+    /// Sets the key for good. The same key again does no harm.
+    pub fn provision<S: Slot>(&mut self, area: &mut S, key: &Key) -> Result<(), Refusal> {
+        match &self.key {
+            DeviceKey::None => {
+                DeviceKey::set(area, key).map_err(|_| Refusal::Flash)?;
+                self.key = DeviceKey::find(area.bytes());
+                if matches!(self.key, DeviceKey::Set(_)) { Ok(()) } else { Err(Refusal::Flash) }
+            }
+            // No early exit: the time tells nothing of the key.
+            DeviceKey::Set(old) if old.iter().zip(key).fold(0, |d, (a, b)| d | (a ^ b)) == 0 => {
+                Ok(())
+            }
+            DeviceKey::Set(_) => Err(Refusal::Seal(SealFault::KeyIsSet)),
+            DeviceKey::Damaged => Err(Refusal::Seal(SealFault::KeyDamaged)),
+        }
+    }
+}

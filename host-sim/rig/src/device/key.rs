@@ -1,0 +1,106 @@
+//! Keys of devices, and seals made with them.
+
+use firmware::link::message::{KeyState, Report, Request};
+use firmware::seal::{Key, Seal};
+use model_core::blob::Model;
+use taxel_data::BadValue;
+
+use super::upload::ERASE;
+use super::{Device, DeviceIdentity, Wire};
+use crate::error::{Error, Result};
+
+/// What a model is sealed with.
+#[derive(Clone, Copy)]
+pub struct Sealing {
+    /// Key of the device.
+    pub key: Key,
+    /// Version of the model; if not given, the next one of the device.
+    pub version: Option<u32>,
+}
+
+impl Sealing {
+    /// Reads a key from the content of a file: 32 bytes, or 64 hexadecimal digits and white space.
+    ///
+    /// # Errors
+    /// [`BadValue`] for anything else, and for a key whose bytes are all alike.
+    pub fn key(content: &[u8]) -> std::result::Result<Key, BadValue> {
+        let bad = |rule: &str| BadValue::new("key", format!("of {} bytes", content.len()), rule);
+        let key = Key::try_from(content).ok().or_else(|| of_digits(content));
+        let key = key.ok_or_else(|| {
+            bad("must be 32 bytes or 64 hexadecimal digits; `openssl rand -hex 32` makes one")
+        })?;
+        if key.iter().all(|byte| *byte == key[0]) {
+            return Err(bad("must not be one byte again and again"));
+        }
+        Ok(key)
+    }
+
+    /// The seal of `blob` for the device of this `identity`. A blob that the device has in force keeps its version.
+    fn seal(&self, identity: &DeviceIdentity, blob: &[u8]) -> Seal {
+        let same = || {
+            let model = identity.model?;
+            let is_same = Model::decode(blob).is_ok_and(|new| new.crc() == model.crc_32);
+            model.version.filter(|_| is_same)
+        };
+        let next = || identity.highest_version.map_or(1, |highest| highest.saturating_add(1));
+        let version = self.version.or_else(same).unwrap_or_else(next);
+        Seal::of(&self.key, version, blob)
+    }
+}
+
+/// The key that these hexadecimal digits are.
+fn of_digits(text: &[u8]) -> Option<Key> {
+    let digits = text.iter().filter(|byte| !byte.is_ascii_whitespace());
+    let digits: Option<Vec<u8>> =
+        digits.map(|byte| Some(char::from(*byte).to_digit(16)? as u8)).collect();
+    let bytes: Vec<u8> =
+        digits?.chunks(2).map(|pair| pair.iter().fold(0, |b, d| b << 4 | d)).collect();
+    let whole = text.iter().filter(|byte| !byte.is_ascii_whitespace()).count() == 2 * bytes.len();
+    Key::try_from(bytes).ok().filter(|_| whole)
+}
+
+/// The seal that the device of this `identity` needs for `blob`, if any.
+pub(super) fn seal_for(
+    identity: &DeviceIdentity,
+    blob: &[u8],
+    sealing: Option<&Sealing>,
+) -> Result<Option<Seal>> {
+    match (identity.key, sealing) {
+        (KeyState::None, None) => Ok(None),
+        (KeyState::Set, Some(sealing)) => Ok(Some(sealing.seal(identity, blob))),
+        (KeyState::Set, None) => Err(Error::NeedsSeal),
+        (KeyState::None, Some(_)) => Err(Error::HasNoKey),
+        (KeyState::Damaged, _) => Err(Error::KeyDamaged),
+    }
+}
+
+impl<W: Wire> Device<W> {
+    /// Sets the device's key, once and for all.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] if it has another one, or the errors of [`ask`](Self::ask).
+    pub fn provision(&mut self, key: &Key) -> Result<()> {
+        let request = Request::Provision { key: *key };
+        let timeout = ERASE.max(self.patience);
+        let answer = self
+            .ask(&request, timeout, |report| matches!(report, Report::Provisioned).then_some(()));
+        answer?.map_err(Error::Refused)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_key_is_bytes_or_digits() {
+        let bytes: Vec<u8> = (0..32).collect();
+        let digits: String = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
+        let key = Sealing::key(&bytes).unwrap();
+        assert_eq!(key.to_vec(), bytes);
+        assert_eq!(Sealing::key(format!("{digits}\n").as_bytes()).unwrap(), key);
+        for bad in [&bytes[1..], &digits.as_bytes()[1..], b"", &[7; 32], &[b'z'; 64], &[b'0'; 64]] {
+            assert!(Sealing::key(bad).is_err(), "{bad:?}");
+        }
+    }
+}
