@@ -4,8 +4,17 @@
 #![allow(clippy::unnecessary_wraps)]
 
 mod exponentials;
+mod power;
 
 use crate::promise::Promise;
 
 /// Every promise. Exact tests stand first, then those that draw their cases.
-pub const PROMISES: &[Promise] = &[exponentials::POLYNOMIAL];
+pub const PROMISES: &[Promise] = &[
+    exponentials::POLYNOMIAL,
+    power::UPLOAD,
+    power::UNDO,
+    power::RECALIBRATION,
+    power::SETTINGS,
+    power::DECAY,
+    power::WORN,
+];
