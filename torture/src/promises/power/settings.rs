@@ -123,6 +123,7 @@ impl Case {
             if self.read(setting).as_ref() != Some(&next) {
                 return Err(format!("{place}: it cannot be kept any more"));
             }
+            self.expect(setting, &[&next], &format!("{place}, mended"))?;
             second += 1 + self.below(STRIDE);
         }
     }
