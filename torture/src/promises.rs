@@ -4,8 +4,20 @@
 #![allow(clippy::unnecessary_wraps)]
 
 mod exponentials;
+mod flips;
+mod power;
 
 use crate::promise::Promise;
 
 /// Every promise. Exact tests stand first, then those that draw their cases.
-pub const PROMISES: &[Promise] = &[exponentials::POLYNOMIAL];
+pub const PROMISES: &[Promise] = &[
+    exponentials::POLYNOMIAL,
+    flips::ONE,
+    flips::TWO,
+    power::UPLOAD,
+    power::UNDO,
+    power::RECALIBRATION,
+    power::SETTINGS,
+    power::DECAY,
+    power::WORN,
+];
