@@ -24,6 +24,8 @@ mod leave;
 mod model;
 mod kept;
 mod recalibrate;
+mod recheck;
+mod trial;
 mod session;
 mod answer;
 
@@ -34,6 +36,7 @@ pub use leave::Leave;
 use line::Line;
 use recalibrate::Pressing;
 pub use session::Session;
+use trial::Trial;
 
 /// The application's state, except the model in force. `ROWS` is the largest number of rows.
 pub struct App<'m, P, F, const ROWS: usize> {
@@ -79,6 +82,7 @@ struct Core<'m, P, F, const ROWS: usize> {
     sensor_answers: bool,
     capture: Option<Capture>,
     upload: Upload,
+    trial: Trial,
     /// Number of times that settings may still be written before the next restart.
     writes_left: u16,
     /// A reference press that is being read.
@@ -148,6 +152,7 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
             sensor_answers: true,
             capture: None,
             upload: Upload::new(),
+            trial: Trial::default(),
             writes_left: kept::MOST_WRITES,
             pressing: Pressing::new(press.as_flattened_mut(), stated.as_flattened_mut()),
             recalibrated: None,
@@ -157,7 +162,7 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
         Self { receiver: Receiver::new(received), core }
     }
 
-    /// Runs until the host asks for a restart. When another model is committed, it replaces the one in force.
+    /// Runs until the host asks for a restart. When another model comes into force, another session begins.
     ///
     /// A model that fits into `weights` is copied there from its slot, and decoded from there: on most boards RAM is
     /// faster than flash. It may be empty. A recalibration takes what is left, or all of it.
@@ -169,10 +174,10 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
                     break leave;
                 }
             };
-            match leave {
-                Leave::NewModel | Leave::MakeRoom => info!("another session begins"),
-                Leave::Restart => return,
+            if leave == Leave::Restart {
+                return;
             }
+            info!("another session begins");
         }
     }
 

@@ -74,8 +74,9 @@ fn requests() -> Vec<Example> {
         ),
         ("begin: 8 × 18 → 18, 1000 bytes", upload(UploadStep::Begin { head: &head })),
         ("chunk at 512", upload(UploadStep::Chunk { offset: 512, bytes: &[0, 1, 0, 2] })),
-        ("commit", upload(UploadStep::Commit)),
+        ("try", upload(UploadStep::Try)),
         ("abort", upload(UploadStep::Abort)),
+        ("confirm", upload(UploadStep::Confirm)),
         ("restart", request_bytes(7, &Request::Restart)),
         ("set baseline: 60 Ω, unknown", request_bytes(8, &Request::SetBaseline { readings_ohm })),
         ("resume", request_bytes(8, &Request::Resume)),
@@ -101,6 +102,7 @@ fn identity() -> Report<'static> {
             scene_digest: 300,
             inputs_crc_32: 0x1234_5678,
             outputs_crc_32: 2,
+            on_trial: true,
         }),
         model_name: "press",
         slot_bytes: 131_056,
@@ -198,6 +200,7 @@ fn reports() -> Vec<Example> {
         rows_at_rest: 8,
         longest_decode_us: 2,
         slot_erases: 1,
+        model_checks: 300,
         ..Statistics::default()
     };
     let configuration =
@@ -218,8 +221,12 @@ fn reports() -> Vec<Example> {
         ("idle", report_bytes(6, &Report::Upload(UploadState::Idle))),
         ("receiving", report_bytes(6, &Report::Upload(UploadState::Receiving { received: 512 }))),
         (
-            "committed",
-            report_bytes(6, &Report::Upload(UploadState::Committed { crc_32: 0x1234_5678 })),
+            "on trial",
+            report_bytes(6, &Report::Upload(UploadState::OnTrial { crc_32: 0x1234_5678 })),
+        ),
+        (
+            "confirmed",
+            report_bytes(6, &Report::Upload(UploadState::Confirmed { crc_32: 0x1234_5678 })),
         ),
         ("restarting", report_bytes(7, &Report::Restarting)),
         ("refused: version", refused(Refusal::Version(PROTOCOL_VERSION))),
@@ -261,6 +268,7 @@ fn every_refusal_has_the_specified_number() {
         (Refusal::TooSoon { wait_us: 1 }, 12),
         (Refusal::LastGeneration, 13),
         (Refusal::Recalibration(RecalibrationFault::NoModel), 14),
+        (Refusal::OnTrial, 15),
     ];
     for (refusal, number) in refusals {
         let mut buffer = [0; 16];

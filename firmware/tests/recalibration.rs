@@ -3,7 +3,7 @@
 use firmware::app::{Leave, Session};
 use firmware::link::message::{
     Configuration, RecalibrationFault, RecalibrationReport, RecalibrationState, RecalibrationStep,
-    Refusal, Report, Request, UploadState,
+    Refusal, Report, Request,
 };
 use firmware::store::{MOST_RECORDS, Slot};
 use mock_board::*;
@@ -167,16 +167,7 @@ fn undo(slots: &mut [MockSlot; 2], left: u32) -> Result<u32, Refusal> {
 }
 
 fn upload(slots: &mut [MockSlot; 2], blob: &[u8]) {
-    let mut bench = Bench::new(quiet());
-    let mut session = Session::start(&mut bench.app, slots, &mut []);
-    for upload in upload_steps(blob, 60) {
-        let request = Request::Upload(upload);
-        let taken = ask(&mut session, &bench.board, &request, |report| match report {
-            Report::Upload(state) => state != UploadState::Idle,
-            other => panic!("{other:?}"),
-        });
-        assert!(taken.0);
-    }
+    install(&mut Bench::new(quiet()), slots, &mut [], (blob, 60)).unwrap();
 }
 
 #[test]

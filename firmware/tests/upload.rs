@@ -32,18 +32,18 @@ fn upload(
     last
 }
 
+/// Uploads and confirms `blob` on a device that starts for this.
+fn installed(slots: &mut [MockSlot; 2], blob: &[u8]) -> Result<UploadState, Refusal> {
+    install(&mut Bench::new(quiet()), slots, &mut [], (blob, CHUNK))
+}
+
 #[test]
 fn a_good_model_comes_into_force_and_stays_through_restarts() {
     let mut slots = MockSlot::pair_with(&blob(1, 3));
     for generation in 1..=5_u32 {
         let next = blob(1 + generation as usize, 2 + generation as usize);
-        {
-            let mut bench = Bench::new(quiet());
-            let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-            let (outcome, leave) = upload(&mut session, &bench.board, &upload_steps(&next, CHUNK));
-            assert_eq!(outcome, Ok(UploadState::Committed { crc_32: crc_of(&next) }));
-            assert_eq!(leave, Some(Leave::NewModel));
-        }
+        let outcome = installed(&mut slots, &next);
+        assert_eq!(outcome, Ok(UploadState::Confirmed { crc_32: crc_of(&next) }));
         let mut bench = Bench::new(quiet());
         let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
         let (identity, _) = ask(&mut session, &bench.board, &Request::Identify, |r| match r {
@@ -69,6 +69,11 @@ fn a_device_without_a_model_takes_one() {
     }
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&new)));
+    let _ = session;
+    // It was on trial.
+    assert_eq!(after_restart(&mut slots), None);
+    installed(&mut slots, &new).unwrap();
+    assert_eq!(after_restart(&mut slots), Some(crc_of(&new)));
 }
 
 #[test]
@@ -122,17 +127,11 @@ fn the_power_may_go_in_the_middle_of_any_word() {
         loop {
             let mut slots = MockSlot::pair_with(if old_uploaded { &new } else { &old });
             if old_uploaded {
-                let mut bench = Bench::new(quiet());
-                let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-                upload(&mut session, &bench.board, &upload_steps(&old, CHUNK)).0.unwrap();
+                installed(&mut slots, &old).unwrap();
             }
             slots[0].cut_power_after(operations);
-            {
-                let mut bench = Bench::new(quiet());
-                let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-                let (outcome, _) = upload(&mut session, &bench.board, &upload_steps(&new, CHUNK));
-                assert!(matches!(outcome, Ok(UploadState::Committed { .. }) | Err(Refusal::Flash)));
-            }
+            let outcome = installed(&mut slots, &new);
+            assert!(matches!(outcome, Ok(UploadState::Confirmed { .. }) | Err(Refusal::Flash)));
             let cut = slots[0].power_on();
             let mut bench = Bench::new(quiet());
             let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
@@ -142,9 +141,10 @@ fn the_power_may_go_in_the_middle_of_any_word() {
                 break;
             }
             assert_eq!(found, Some(crc_of(&old)), "cut after {operations} words");
+            let _ = session;
             // The device still takes an upload.
-            let mended = upload(&mut session, &bench.board, &upload_steps(&new, CHUNK)).0;
-            assert_eq!(mended, Ok(UploadState::Committed { crc_32: crc_of(&new) }));
+            let mended = install(&mut bench, &mut slots, &mut [], (&new, CHUNK));
+            assert_eq!(mended, Ok(UploadState::Confirmed { crc_32: crc_of(&new) }));
             operations += 1;
             cuts += 1;
         }
@@ -157,10 +157,7 @@ fn the_power_may_go_in_the_middle_of_any_word() {
 /// the firmware.
 fn slots_with_first_spare(old: &[u8]) -> [MockSlot; 2] {
     let mut slots = MockSlot::pair_with(&blob(9, 1));
-    let mut bench = Bench::new(quiet());
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    upload(&mut session, &bench.board, &upload_steps(old, CHUNK)).0.unwrap();
-    let _ = session;
+    installed(&mut slots, old).unwrap();
     slots
 }
 
@@ -175,7 +172,7 @@ fn after_restart(slots: &mut [MockSlot; 2]) -> Option<u32> {
 fn an_upload_that_was_not_committed_never_comes_into_force_even_if_the_other_slot_decays() {
     let (old, new, next) = (blob(1, 3), blob(2, 5), blob(3, 2));
     let steps = upload_steps(&new, CHUNK);
-    let whole = steps.len() - 1; // all but the commit
+    let whole = steps.len() - 1; // all but the trial
     // The upload ends by an abort, by silence, or by a power cut at any word of what follows: another begin.
     let ends = [Some(UploadStep::Abort), None, Some(begin(&next))];
     for end in ends {
@@ -215,11 +212,7 @@ fn wherever_the_power_is_cut_a_decayed_slot_does_not_bring_half_an_upload_into_f
     for operations in 0.. {
         let mut slots = slots_with_first_spare(&old);
         slots[0].cut_power_after(operations);
-        {
-            let mut bench = Bench::new(quiet());
-            let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-            let _ = upload(&mut session, &bench.board, &upload_steps(&new, CHUNK));
-        }
+        let _ = installed(&mut slots, &new);
         let cut = slots[0].power_on();
         slots[1].decay(20, 4);
         let found = after_restart(&mut slots);
@@ -236,11 +229,7 @@ fn wherever_the_power_is_cut_a_decayed_slot_does_not_bring_half_an_upload_into_f
 fn a_model_flashed_with_the_firmware_is_in_force_until_the_first_upload_begins_in_its_slot() {
     let (flashed, first) = (blob(1, 3), blob(2, 4));
     let mut slots = MockSlot::pair_with(&flashed);
-    {
-        let mut bench = Bench::new(quiet());
-        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-        upload(&mut session, &bench.board, &upload_steps(&first, CHUNK)).0.unwrap();
-    }
+    installed(&mut slots, &first).unwrap();
     assert_eq!(after_restart(&mut slots), Some(crc_of(&first)));
     // It stands in for the uploaded model that has decayed.
     slots[1].decay(20, 4);
@@ -420,9 +409,9 @@ fn a_model_of_more_components_than_there_is_room_for_is_refused() {
         let (outcome, leave) = upload(&mut session, &bench.board, &upload_steps(&few, CHUNK));
         assert!(outcome.is_ok() && leave.is_some(), "{outcome:?}");
     }
-    let mut bench = Bench::new(quiet());
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&blob_of_components(6))));
+    let few = blob_of_components(6);
+    installed(&mut slots, &few).unwrap();
+    assert_eq!(after_restart(&mut slots), Some(crc_of(&few)));
 }
 
 #[test]
@@ -479,7 +468,8 @@ fn steps_out_of_order_are_refused_and_repeated_ones_are_not() {
     let mut one = |step: &UploadStep<'_>| upload(&mut session, &board, &[*step]).0;
 
     assert_eq!(one(&steps[1]), Err(Refusal::NoUpload));
-    assert_eq!(one(&UploadStep::Commit), Err(Refusal::NoUpload));
+    assert_eq!(one(&UploadStep::Try), Err(Refusal::NoUpload));
+    assert_eq!(one(&UploadStep::Confirm), Err(Refusal::NoUpload));
     let slot_bytes = MockSlot::BYTES as u32 - 16;
     let mut too_long = new.clone();
     too_long[5..9].copy_from_slice(&(slot_bytes + 1).to_le_bytes());
@@ -491,7 +481,8 @@ fn steps_out_of_order_are_refused_and_repeated_ones_are_not() {
     for _ in 0..2 {
         assert_eq!(one(&steps[1]), Ok(UploadState::Receiving { received })); // doubled
     }
-    assert_eq!(one(&UploadStep::Commit), Err(Refusal::OutOfPlace { received }));
+    assert_eq!(one(&UploadStep::Try), Err(Refusal::OutOfPlace { received }));
+    assert_eq!(one(&UploadStep::Confirm), Err(Refusal::NoUpload));
     for bytes in [&[1; 3][..], &[1; 100]] {
         let chunk = UploadStep::Chunk { offset: received, bytes };
         let beyond = received as usize + bytes.len() > new.len() || bytes.len() == 3;
@@ -502,6 +493,6 @@ fn steps_out_of_order_are_refused_and_repeated_ones_are_not() {
     for step in &steps[2..] {
         one(step).unwrap();
     }
-    let committed = UploadState::Committed { crc_32: crc_of(&new) };
-    assert_eq!(one(&UploadStep::Commit), Ok(committed)); // the answer was lost
+    let on_trial = UploadState::OnTrial { crc_32: crc_of(&new) };
+    assert_eq!(one(&UploadStep::Try), Ok(on_trial)); // the answer was lost
 }

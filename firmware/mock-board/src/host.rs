@@ -1,12 +1,13 @@
 //! The host's side of the link.
 
 use firmware::app::{Leave, Session};
-use firmware::link::message::{Configuration, Report, Request, UploadStep};
+use firmware::link::message::{Configuration, Refusal, Report, Request, UploadState, UploadStep};
 use firmware::link::receive::{Received, Receiver};
 use firmware::link::{cobs, packet};
 use firmware::store::Slot;
 use model_core::blob::Model;
 
+use crate::bench::Bench;
 use crate::board::Board;
 use crate::shape::ROWS;
 use crate::source::Source;
@@ -120,7 +121,8 @@ pub fn begin(blob: &[u8]) -> UploadStep<'_> {
     UploadStep::Begin { head: &blob[..Model::HEAD_BYTES] }
 }
 
-/// The steps of an upload of `blob` in chunks of `chunk` bytes.
+/// The steps of an upload of `blob` in chunks of `chunk` bytes, until it is on trial. [`install`] goes on to the
+/// confirmation.
 ///
 /// # Panics
 /// The blob is shorter than its head, or `chunk` is 0.
@@ -132,6 +134,78 @@ pub fn upload_steps(blob: &[u8], chunk: usize) -> Vec<UploadStep<'_>> {
             .enumerate()
             .map(|(i, bytes)| UploadStep::Chunk { offset: (i * chunk) as u32, bytes }),
     );
-    steps.push(UploadStep::Commit);
+    steps.push(UploadStep::Try);
     steps
+}
+
+/// Carries out steps of an upload in one session after the other, until the device refuses one; returns the last
+/// answer.
+///
+/// # Panics
+/// The device does not answer, or a session ends for another reason than the upload.
+pub fn upload<S: Slot>(
+    bench: &mut Bench<'_>,
+    slots: &mut [S; 2],
+    weights: &mut [u32],
+    steps: &[UploadStep<'_>],
+) -> Result<UploadState, Refusal> {
+    let board = bench.board.clone();
+    let mut steps = steps.iter();
+    let mut last = Ok(UploadState::Idle);
+    let mut left = None;
+    board.pins.borrow_mut().to_host.clear();
+    loop {
+        let mut session = Session::start(&mut bench.app, slots, weights);
+        if left == Some(Leave::Confirm) {
+            last = answer(&board);
+        }
+        loop {
+            let Some(step) = steps.next().filter(|_| last.is_ok()) else { return last };
+            board.pins.borrow_mut().to_host.clear();
+            board.pins.borrow_mut().to_device.extend(request_bytes(ASKED, &Request::Upload(*step)));
+            left = settle(&mut session, &board);
+            match left {
+                Some(Leave::Confirm) => break,
+                None | Some(Leave::NewModel) => last = answer(&board),
+                Some(other) => panic!("{step:?} leads to {other:?}"),
+            }
+            if left.is_some() {
+                break;
+            }
+        }
+    }
+}
+
+/// The answer to a step of an upload, among all that the device has sent.
+fn answer(board: &Board) -> Result<UploadState, Refusal> {
+    let bytes = std::mem::take(&mut board.pins.borrow_mut().to_host);
+    let mut receiver = Receiver::new([0; 1024]);
+    for byte in &bytes {
+        let Some(Received::Frame(bytes)) = receiver.push(*byte) else { continue };
+        let packet = packet::decode::<Report<'_>>(bytes).expect("a whole report");
+        match packet.body {
+            Report::Upload(state) if packet.number == ASKED => return Ok(state),
+            Report::Refused(refusal) if packet.number == ASKED => return Err(refusal),
+            _ => {}
+        }
+    }
+    panic!("no answer in {:?}", reports(&bytes));
+}
+
+/// Uploads `blob` in chunks of `chunk` bytes and confirms it.
+///
+/// # Errors
+/// What the device refused.
+///
+/// # Panics
+/// As [`upload`].
+pub fn install<S: Slot>(
+    bench: &mut Bench<'_>,
+    slots: &mut [S; 2],
+    weights: &mut [u32],
+    (blob, chunk): (&[u8], usize),
+) -> Result<UploadState, Refusal> {
+    let mut steps = upload_steps(blob, chunk);
+    steps.push(UploadStep::Confirm);
+    upload(bench, slots, weights, &steps)
 }

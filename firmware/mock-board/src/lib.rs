@@ -27,7 +27,9 @@ mod host;
 
 pub use bench::{Bench, Memory, TestApp, TestSession, quiet};
 pub use board::{AnyKeeper, Board, Pins};
-pub use host::{ask, begin, configure, model_crc, reports, request_bytes, settle, upload_steps};
+pub use host::{
+    ask, begin, configure, install, model_crc, reports, request_bytes, settle, upload, upload_steps,
+};
 pub use models::{blob, blob_of, blob_of_components, blob_with_confidence, crc_of};
 pub use pages::{MockPage, SharedSettings};
 pub use shape::{COLS, MESSAGE_BYTES, OUTPUTS, ROWS, TestFrame, frame_at_rest};

@@ -10,7 +10,7 @@ use super::session::Session;
 use super::{Capture, Core};
 use crate::circuit::{Constants, ConstantsFault};
 use crate::link::message::{
-    ConfidenceSent, Configuration, Identity, Refusal, Report, Request, UploadStep,
+    ConfidenceSent, Configuration, Identity, Refusal, Report, Request, UploadState, UploadStep,
 };
 use crate::link::packet::{self, PROTOCOL_VERSION, PacketError};
 use crate::link::receive::Received;
@@ -94,6 +94,10 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                     Ok(()) => return None,
                     Err(refusal) => Err(refusal),
                 }
+            }
+            Request::Upload(UploadStep::Confirm) if self.trial.is_going_on() => {
+                self.trial.confirm(number);
+                return Some(Leave::Confirm);
             }
             Request::Upload(step) => self
                 .upload_step(step, model, spare, &mut leave)
@@ -211,7 +215,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             warning!("the host is silent: back to the own configuration");
             self.resume();
         }
-        if self.lease.has_upload_ended(now_us) {
+        if self.lease.has_upload_ended(now_us) && self.upload.is_receiving() {
             self.upload.abort();
         }
     }
@@ -304,6 +308,9 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
     ) -> Result<(), Refusal> {
         match step {
             UploadStep::Begin { head } => {
+                if self.trial.is_going_on() {
+                    return Err(Refusal::OnTrial); // the spare slot has the previous model
+                }
                 let length = model::check_head(self.capacity, head).map_err(Refusal::BadModel)?;
                 if model.generation() == u32::MAX {
                     return Err(Refusal::LastGeneration);
@@ -318,18 +325,23 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             }
             UploadStep::Chunk { offset, bytes } => self.upload.chunk(spare, offset, bytes),
             UploadStep::Abort => {
+                if self.end_trial() {
+                    *leave = Some(Leave::NewModel);
+                }
                 self.upload.abort();
                 Ok(())
             }
-            UploadStep::Commit => {
-                if self.upload.is_committed() {
+            UploadStep::Try => {
+                if self.trial.is_going_on() {
                     return Ok(()); // the host repeats the request, because the answer was lost
                 }
                 let blob = self.upload.complete(spare)?;
                 match model::check(self.capacity, blob).map(|model| model.crc()) {
                     Ok(crc_32) => {
-                        let generation = model.generation().saturating_add(1);
-                        self.upload.commit(spare, generation, crc_32)?;
+                        info!("model {=u32:08x} on trial", crc_32);
+                        self.upload.begin_trial(crc_32);
+                        // Without a model, slot 1 is the spare one.
+                        self.trial.begin(model.identity.map_or(1, |model| 1 - model.slot.min(1)));
                         *leave = Some(Leave::NewModel);
                         Ok(())
                     }
@@ -340,6 +352,11 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                     }
                 }
             }
+            // Nothing is on trial. The answer was lost, if it was confirmed.
+            UploadStep::Confirm => match self.upload.state() {
+                UploadState::Confirmed { .. } => Ok(()),
+                _ => Err(Refusal::NoUpload),
+            },
         }
     }
 }

@@ -3,10 +3,14 @@
 /// Why a session ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Leave {
-    /// Another model was committed, and must be put in force.
+    /// Another model must be put in force.
     NewModel,
+    /// The model on trial must be confirmed, which takes its slot.
+    Confirm,
     /// The memory for weights is needed for a recalibration, or is free again.
     MakeRoom,
+    /// What is decoded from is damaged: a sound model must be put in force.
+    Damaged,
     /// The host asked for a restart.
     Restart,
 }

@@ -23,7 +23,7 @@ impl<'a, const ROWS: usize> InForce<'a, ROWS> {
     pub fn load(
         capacity: Capacity,
         bytes: &'a [u8],
-        (slot, generation): (usize, u32),
+        Candidate { slot, generation, on_trial }: Candidate,
         in_ram: bool,
     ) -> Option<Self> {
         let blob = blob_in_slot(bytes);
@@ -41,6 +41,7 @@ impl<'a, const ROWS: usize> InForce<'a, ROWS> {
             scene_digest: metadata.scene_digest,
             inputs_crc_32: crc_of(metadata.input_names, metadata.input_units),
             outputs_crc_32: crc_of(metadata.output_names, metadata.output_units),
+            on_trial,
         };
         Some(Self { decoder: Some(decoder), identity: Some(identity), blob })
     }
@@ -112,23 +113,42 @@ fn row_of(name: &str) -> Option<RowWire> {
     row.checked_sub(1).map(RowWire)
 }
 
-/// Number and generation of the most recent slot whose model is sound and has room.
-pub fn choose<S: Slot>(capacity: Capacity, slots: &[S; 2]) -> Option<(usize, u32)> {
-    by_generation(slots).into_iter().flatten().find(|(index, _)| {
-        let slot = slots.get(*index);
+/// A slot whose model may come into force, if it is sound.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Candidate {
+    pub slot: usize,
+    /// Generation that it has, or that it gets when it is confirmed.
+    pub generation: u32,
+    pub on_trial: bool,
+}
+
+/// The first of the `candidates` whose model is sound and has room.
+pub fn choose<S: Slot>(
+    capacity: Capacity,
+    slots: &[S; 2],
+    candidates: [Option<Candidate>; 3],
+) -> Option<Candidate> {
+    candidates.into_iter().flatten().find(|candidate| {
+        let slot = slots.get(candidate.slot);
         slot.is_some_and(|slot| check(capacity, blob_in_slot(slot.bytes())).is_ok())
     })
 }
 
-/// Number and generation of each slot that has one, the most recent first.
-pub fn by_generation<S: Slot>([a, b]: &[S; 2]) -> [Option<(usize, u32)>; 2] {
-    let a = generation(0, a.bytes()).map(|generation| (0, generation));
-    let b = generation(1, b.bytes()).map(|generation| (1, generation));
-    if b.map(|(_, generation)| generation) > a.map(|(_, generation)| generation) {
-        [b, a]
-    } else {
-        [a, b]
-    }
+/// The slots that may be in force, in the order in which they are tried: the one `on_trial`, and then those with a
+/// generation, the most recent first.
+pub fn candidates<S: Slot>(slots: &[S; 2], on_trial: Option<usize>) -> [Option<Candidate>; 3] {
+    let [a, b] = slots;
+    let committed = |slot, bytes| {
+        let generation = generation(slot, bytes)?;
+        Some(Candidate { slot, generation, on_trial: false })
+    };
+    let (a, b) = (committed(0, a.bytes()), committed(1, b.bytes()));
+    let generation = |candidate: Option<Candidate>| candidate.map(|found| found.generation);
+    let [newest, older] = if generation(b) > generation(a) { [b, a] } else { [a, b] };
+    let next = generation(newest).unwrap_or(0).saturating_add(1);
+    let tried = on_trial.map(|slot| Candidate { slot, generation: next, on_trial: true });
+    // None first would be taken for an empty slot.
+    if tried.is_some() { [tried, newest, older] } else { [newest, older, None] }
 }
 
 /// Cuts room for a copy of the blob at the start of `bytes` from `room`, if it fits; returns it, and what is left.

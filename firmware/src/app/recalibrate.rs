@@ -89,6 +89,12 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         const NO_MODEL: Refusal = Refusal::Recalibration(RecalibrationFault::NoModel);
         let decoder = in_force.decoder.as_ref().ok_or(NO_MODEL)?;
         let crc_32 = decoder.model_crc();
+        // The new model would go where the previous one is.
+        if self.trial.is_going_on()
+            && matches!(step, RecalibrationStep::Begin | RecalibrationStep::Commit)
+        {
+            return Err(Refusal::OnTrial);
+        }
         let report = match step {
             RecalibrationStep::Begin => {
                 self.give_up_press();
@@ -332,6 +338,10 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             return if previous == left { Ok(crc_32) } else { Err(NOTHING) };
         }
         generation(1 - usize::from(identity.slot.min(1)), spare.bytes()).ok_or(NOTHING)?;
+        if self.end_trial() {
+            *leave = Some(Leave::NewModel);
+            return Ok(previous);
+        }
         let next = identity.generation.checked_add(1).ok_or(Refusal::LastGeneration)?;
         self.give_up_press();
         match reinstate(spare, next) {

@@ -8,8 +8,9 @@ use model_core::{Decoder, Frame, Gate, RowStatus, RowWire};
 
 use super::buffers::cut;
 use super::leave::Leave;
-use super::model::{InForce, by_generation, check_head, choose, copy_to, cut_room, row_wires};
+use super::model::{InForce, candidates, check_head, choose, copy_to, cut_room, row_wires};
 use super::recalibrate::Recalibrating;
+use super::recheck::{Checked, Recheck};
 use super::{App, Core};
 use crate::link::message::{ConfidenceSent, EstimateReport, HealthReport, Report};
 use crate::link::packet::UNASKED;
@@ -24,6 +25,9 @@ pub struct Session<'a, 'm, P, F, S, const ROWS: usize> {
     pub(super) model: InForce<'a, ROWS>,
     pub(super) spare: &'a mut S,
     pub(super) recalibrating: Recalibrating<'a>,
+    recheck: Recheck,
+    /// The model's blob in its slot, while that is sound, if it is decoded from a copy.
+    stored: Option<&'a [u8]>,
 }
 
 impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
@@ -37,20 +41,21 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
         slots: &'a mut [S; 2],
         weights: &'a mut [u32],
     ) -> Self {
+        app.core.confirm(slots);
         let capacity = app.core.capacity;
-        // Only the copy is checked, so the most recent model is looked at once.
-        let [newest, _] = by_generation(slots);
-        let bytes = newest.and_then(|(slot, _)| slots.get(slot)).map_or(&[][..], S::bytes);
+        let candidates = candidates(slots, app.core.trial.slot());
+        let [best, ..] = candidates;
+        // Only the copy is checked, so the best model is looked at once.
+        let bytes = best.and_then(|best| slots.get(best.slot)).map_or(&[][..], S::bytes);
         let (room, left) =
             if app.core.begins.is_some() { (None, weights) } else { cut_room(weights, bytes) };
         let copied =
-            newest.and_then(|chosen| InForce::load(capacity, copy_to(room?, bytes)?, chosen, true));
-        let chosen = if copied.is_some() { newest } else { choose(capacity, slots) };
+            best.and_then(|best| InForce::load(capacity, copy_to(room?, bytes)?, best, true));
+        let chosen = if copied.is_some() { best } else { choose(capacity, slots, candidates) };
+        app.core.end_trial_unless(chosen.is_some_and(|chosen| chosen.on_trial));
+        let slot = chosen.map(|chosen| chosen.slot);
         let [first, second] = slots;
-        let (active, spare) = match chosen {
-            Some((1, _)) => (&*second, first),
-            _ => (&*first, second),
-        };
+        let (active, spare) = if slot == Some(1) { (&*second, first) } else { (&*first, second) };
         let in_place = |chosen| InForce::load(capacity, active.bytes(), chosen, false);
         let model = copied.or_else(|| chosen.and_then(in_place)).unwrap_or(InForce::NONE);
         if let Some(model) = &model.identity {
@@ -62,7 +67,7 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
             warning!("no model in either slot: readings only, until one is uploaded");
         }
         // Behind an uploaded model in slot 1, the spare slot is slot 0. For a line of the log, the blob's head will do.
-        if chosen.is_some_and(|(slot, _)| slot == 1)
+        if slot == Some(1)
             && generation(0, spare.bytes()) == Some(0)
             && check_head(capacity, blob_in_slot(spare.bytes())).is_ok()
         {
@@ -71,7 +76,9 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
         app.core.take_shape_of(model.decoder.as_ref());
         let mut recalibrating = Recalibrating::new(left);
         app.core.begin_in_place(model.decoder.as_ref(), &mut recalibrating);
-        Self { app, model, spare, recalibrating }
+        let is_copy = model.identity.is_some_and(|identity| identity.in_ram);
+        let stored = active.bytes().get(..model.blob.len()).filter(|_| is_copy);
+        Self { app, model, spare, recalibrating, recheck: Recheck::new(), stored }
     }
 
     /// Runs one turn of the loop: answers at most one request, and scans a frame if one is due.
@@ -96,7 +103,41 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
         } else {
             core.statistics.bad_loops = core.statistics.bad_loops.saturating_add(1);
         }
-        leave
+        leave.or_else(|| self.recheck())
+    }
+
+    /// Checks another piece of the model in force. A copy in RAM is decoded from even if the slot is damaged.
+    fn recheck(&mut self) -> Option<Leave> {
+        let model = self.model.identity?;
+        let (blob, stored) = (self.model.blob, self.stored.unwrap_or_default());
+        let copies = [blob, stored];
+        let copies = if self.stored.is_some() { &copies[..] } else { copies.get(..1)? };
+        let core = &mut self.app.core;
+        let s = &mut core.statistics;
+        match self.recheck.step(copies, model.crc_32) {
+            Checked::Piece => None,
+            Checked::All => {
+                s.model_checks = s.model_checks.saturating_add(1);
+                None
+            }
+            Checked::Damaged(0) => {
+                warning!("model {=u32:08x} is damaged where it is decoded from", model.crc_32);
+                s.model_damages = s.model_damages.saturating_add(1);
+                if !core.trial.is_going_on() {
+                    core.upload.forget(); // the spare slot may be the other one now
+                }
+                Some(Leave::Damaged)
+            }
+            Checked::Damaged(_) => {
+                warning!(
+                    "slot {=u8} is damaged: its model is in RAM until the restart",
+                    model.slot
+                );
+                s.slot_damages = s.slot_damages.saturating_add(1);
+                self.stored = None;
+                None
+            }
+        }
     }
 }
 

@@ -105,10 +105,13 @@ pub enum UploadStep<'a> {
         #[serde(borrow)]
         bytes: &'a [u8],
     },
-    /// Check the blob from end to end, and put it in force if it is sound.
-    Commit,
-    /// Abort the upload, and forget the bytes received.
+    /// Check the blob from end to end, and put it in force on trial if it is sound: until it is confirmed, a restart
+    /// brings the previous model back.
+    Try,
+    /// Abort the upload, and forget the bytes received. A model on trial is left for the previous one.
     Abort,
+    /// Confirm the model on trial: it stays in force over restarts.
+    Confirm,
 }
 
 /// Steps of a recalibration ([`model_core::recalibration`]).
@@ -239,7 +242,7 @@ pub struct ModelIdentity {
     pub crc_32: u32,
     /// Slot of the model, 0 or 1.
     pub slot: u8,
-    /// Number of models committed to this device up to this one; 0 if the model was not uploaded.
+    /// Number of models confirmed on this device up to this one; 0 if the model was not uploaded.
     pub generation: u32,
     /// Number of rows.
     pub rows: u8,
@@ -255,6 +258,8 @@ pub struct ModelIdentity {
     pub inputs_crc_32: u32,
     /// CRC-32 of the names of its outputs, and then of their units.
     pub outputs_crc_32: u32,
+    /// Whether the model is on trial: not confirmed, and gone with the next restart.
+    pub on_trial: bool,
 }
 
 /// Use of a device's memory, in bytes.
@@ -459,6 +464,12 @@ pub struct Statistics {
     pub longest_confidence_us: u32,
     /// Longest time of the same in cycles of the processor; 0 on a board that does not count them.
     pub longest_confidence_cycles: u32,
+    /// Number of times that the model in force was checked from end to end in the background.
+    pub model_checks: u32,
+    /// Number of times that the bytes that are decoded from were found damaged, and another copy or model replaced them.
+    pub model_damages: u32,
+    /// Number of times that a model that is decoded from RAM was found damaged in its slot.
+    pub slot_damages: u32,
 }
 
 /// Progress of uploading a model.
@@ -471,8 +482,13 @@ pub enum UploadState {
         /// Number of bytes received from the start without a gap: the offset of the next chunk.
         received: u32,
     },
-    /// The blob is sound and in force.
-    Committed {
+    /// The blob is sound and in force, until the next restart.
+    OnTrial {
+        /// CRC-32 of the blob.
+        crc_32: u32,
+    },
+    /// The blob is in force, over restarts as well.
+    Confirmed {
         /// CRC-32 of the blob.
         crc_32: u32,
     },
@@ -531,9 +547,9 @@ pub enum Refusal {
         /// Largest blob that fits, in bytes.
         slot_bytes: u32,
     },
-    /// A chunk or a commit came without a begin.
+    /// A chunk or a trial was asked for without a begin, or a confirmation without a trial.
     NoUpload,
-    /// A chunk leaves a gap, is not a multiple of four, or goes beyond the announced length; or a commit came
+    /// A chunk leaves a gap, is not a multiple of four, or goes beyond the announced length; or a trial was asked for
     /// before all bytes were received.
     OutOfPlace {
         /// Number of bytes received from the start without a gap: the offset of the next chunk.
@@ -556,6 +572,8 @@ pub enum Refusal {
     LastGeneration,
     /// A step of a recalibration.
     Recalibration(RecalibrationFault),
+    /// A model is on trial: it must be confirmed or aborted first.
+    OnTrial,
 }
 
 /// Why a step of a recalibration was not carried out.

@@ -34,10 +34,10 @@ impl Upload {
         self.state
     }
 
-    /// Whether the last upload was committed, and none has begun since.
+    /// Whether chunks are expected.
     #[must_use]
-    pub fn is_committed(&self) -> bool {
-        matches!(self.state, UploadState::Committed { .. })
+    pub fn is_receiving(&self) -> bool {
+        matches!(self.state, UploadState::Receiving { .. })
     }
 
     /// Prepares `spare` for a blob of `length` bytes at the time `now_us` since the start. The slot is erased, and
@@ -131,28 +131,38 @@ impl Upload {
         whole.flatten().ok_or(Refusal::OutOfPlace { received })
     }
 
-    /// Commits the blob in `spare`, which must have been found sound: writes the record that makes it the most
+    /// Notes that the blob, which must have been found sound, is on trial.
+    pub fn begin_trial(&mut self, crc_32: u32) {
+        self.state = UploadState::OnTrial { crc_32 };
+    }
+
+    /// Commits the blob in `slot`, which must have been found sound: writes the record that makes it the most
     /// recent.
     ///
     /// # Errors
     /// [`Refusal::Flash`] if writing fails.
     pub fn commit<S: Slot>(
         &mut self,
-        spare: &mut S,
+        slot: &mut S,
         generation: u32,
         crc_32: u32,
     ) -> Result<(), Refusal> {
-        let place = capacity(spare.bytes()) + RECORD_MAGIC.len();
+        let place = capacity(slot.bytes()) + RECORD_MAGIC.len();
         let record = record(generation, crc_32);
         let rest = record.get(RECORD_MAGIC.len()..).unwrap_or_default();
-        self.flash(spare.write(place, rest))?;
-        self.state = UploadState::Committed { crc_32 };
+        self.flash(slot.write(place, rest))?;
+        self.state = UploadState::Confirmed { crc_32 };
         Ok(())
     }
 
     /// Ends the upload, and forgets the bytes received.
     pub fn abort(&mut self) {
         self.state = UploadState::Idle;
+    }
+
+    /// Forgets all but the wear: the spare slot may be another one now.
+    pub fn forget(&mut self) {
+        *self = Self { worn_until_us: self.worn_until_us, ..Self::new() };
     }
 
     /// Converts an outcome of the flash; a failure ends the upload.

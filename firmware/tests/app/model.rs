@@ -193,11 +193,7 @@ fn behind_a_damaged_model_the_other_slots_is_decoded_from_there() {
     let mut slots = MockSlot::pair_with(&first);
     let mut weights = vec![0; second.len().div_ceil(4)];
     let mut bench = Bench::new(quiet());
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut weights);
-    for step in upload_steps(&second, 64) {
-        ask(&mut session, &bench.board, &Request::Upload(step), |_| ());
-    }
-    let _ = session;
+    install(&mut bench, &mut slots, &mut weights, (&second, 64)).unwrap();
     let mut in_force = |slots: &mut [MockSlot; 2]| {
         let mut session = Session::start(&mut bench.app, slots, &mut weights);
         let frame = frame_at_rest();

@@ -87,6 +87,9 @@ pub enum Error {
         /// Active model, as it reports it.
         in_force: String,
     },
+    /// Device that does not decode with a model on trial.
+    #[error("the device is back at its previous model: {0}")]
+    NotDecoding(String),
     /// Model that the device has no room for.
     #[error(
         "the model has {} rows of {} readings and {} outputs; the device has room for {} rows of {} readings and \
@@ -161,6 +164,13 @@ pub enum Error {
     File(#[from] taxel_data::Error),
 }
 
+impl Error {
+    /// Whether the device goes on, and must be told to leave the model that it got.
+    pub(crate) fn is_settled_by_abort(&self) -> bool {
+        matches!(self, Self::Interrupted | Self::NotDecoding(_) | Self::NotInForce { .. })
+    }
+}
+
 /// Reason of a refusal, in words.
 fn why(refusal: Refusal) -> String {
     match refusal {
@@ -170,7 +180,7 @@ fn why(refusal: Refusal) -> String {
         Refusal::Configuration(field) => format!("{field:?} of the configuration is out of range"),
         Refusal::Baseline => "it scans nothing, or another baseline was asked for".into(),
         Refusal::TooLarge { slot_bytes } => format!("a model may have {slot_bytes} bytes at most"),
-        Refusal::NoUpload => "no upload has begun".into(),
+        Refusal::NoUpload => "no upload has begun, or no model is on trial".into(),
         Refusal::OutOfPlace { received } => format!("it has {received} bytes of the upload so far"),
         Refusal::BadModel(ModelFault::Shape) => "it has no room for a model of this shape".into(),
         Refusal::BadModel(fault) => {
@@ -197,6 +207,7 @@ fn why(refusal: Refusal) -> String {
             "the record of its model has the last number; flash a model with a debugger".into()
         }
         Refusal::Recalibration(fault) => why_not_recalibrated(fault),
+        Refusal::OnTrial => "its model is on trial; `confirm` or `undo` it first".into(),
     }
 }
 

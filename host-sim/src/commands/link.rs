@@ -44,8 +44,14 @@ enum Action {
     #[command(after_help = "Example: host-sim link /dev/ttyACM0 identify")]
     Identify,
     /// Upload a model and activate it; if refused, the previous one stays.
+    ///
+    /// The model is on trial until the device is seen to decode and scan with it. Until then a restart returns to the
+    /// previous one, whatever caused it.
     #[command(after_help = "Example: host-sim link /dev/ttyACM0 upload press.bin")]
     Upload(UploadArguments),
+    /// Confirm the model that `upload --trial` left on trial: it stays active over restarts.
+    #[command(after_help = "Example: host-sim link /dev/ttyACM0 confirm")]
+    Confirm,
     /// Let the device scan, and save readings or estimates as CSV.
     #[command(
         after_help = "Example: host-sim link /dev/ttyACM0 record press.bin -n 1000 -o estimates.csv"
@@ -70,7 +76,7 @@ enum Action {
     /// these; otherwise it scans, and you are asked for one press after the other. docs/recalibration.md says more.
     #[command(after_help = "Example: host-sim link /dev/ttyACM0 recalibrate press.bin presses.csv")]
     Recalibrate(recalibrate::Arguments),
-    /// Return to the model that was active before the last recalibration or upload.
+    /// Return to the model that was active before the last recalibration or upload, or before the trial.
     #[command(after_help = "Example: host-sim link /dev/ttyACM0 undo")]
     Undo,
     /// Show configuration, constants and baseline, and what of them is kept over restarts.
@@ -89,6 +95,7 @@ impl Arguments {
         match self.action {
             Action::Identify => "identify",
             Action::Upload(_) => "upload",
+            Action::Confirm => "confirm",
             Action::Record(_) => "record",
             Action::Baseline(_) => "baseline",
             Action::Configure(_) => "configure",
@@ -105,6 +112,9 @@ impl Arguments {
 struct UploadArguments {
     /// Weight blob.
     model: PathBuf,
+    /// Leave the model on trial, until `confirm` or the next restart, which returns to the previous one.
+    #[arg(long)]
+    trial: bool,
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
@@ -124,9 +134,18 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             let mut device = open()?;
             let before = device.identify()?;
             let progress = Terminal::new();
-            let after =
-                device.while_paused(|device| upload::replace(device, model.bytes(), &progress))?;
+            let after = device
+                .while_paused(|device| upload::start_trial(device, model.bytes(), &progress))?;
             note_another_sensor(&before, &after);
+            upload::see_frames(&mut device)?;
+            if !action.trial {
+                upload::confirm(&mut device)?;
+            }
+            status::show(&mut device, common)
+        }
+        Action::Confirm => {
+            let mut device = open()?;
+            upload::confirm(&mut device)?;
             status::show(&mut device, common)
         }
         Action::Record(action) => record::record(&mut open()?, action, common),

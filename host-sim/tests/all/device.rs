@@ -162,7 +162,7 @@ fn requests(new: &ModelBlob) -> Vec<(Vec<u8>, usize)> {
     for (index, bytes) in new.bytes().chunks(512).enumerate() {
         add(&Request::Upload(UploadStep::Chunk { offset: 512 * index as u32, bytes }));
     }
-    add(&Request::Upload(UploadStep::Commit));
+    add(&Request::Upload(UploadStep::Try));
     add(&Request::Identify);
     let again = Floats::of(readings[0].as_flattened());
     add(&Request::Decode { frame: 41, readings_ohm: again });

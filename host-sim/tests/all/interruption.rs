@@ -217,6 +217,36 @@ fn whenever_the_host_of_an_upload_dies_the_device_scans_on_with_the_old_model_or
 }
 
 #[test]
+fn a_model_on_trial_is_left_by_a_restart_unless_it_is_confirmed() {
+    let (old, new) = (model(3), model(4));
+    let [old_crc, new_crc] = [&old, &new].map(|model| model.parse().crc());
+    let rig = Rig::new("trial", old.bytes());
+    rig.folder.write("new.bin", new.bytes());
+    let link =
+        |arguments: &[&str]| rig.folder.succeed(&[&["link", &rig.port][..], arguments].concat());
+    for ends in [true, false] {
+        let page = link(&["upload", "new.bin", "--trial"]);
+        let is_new = format!("CRC-32 {new_crc:08x}");
+        assert!(page.contains(&is_new) && page.contains("until `confirm`"), "{page}");
+        if ends {
+            // A restart, and then an undo.
+            assert_eq!(rig.device().restart().unwrap().model.unwrap().crc_32, old_crc);
+            link(&["upload", "new.bin", "--trial"]);
+            let page = link(&["undo"]);
+            assert!(page.contains(&format!("CRC-32 {old_crc:08x}")), "{page}");
+        }
+    }
+    let page = link(&["confirm"]);
+    assert!(!page.contains("until `confirm`"), "{page}");
+    assert_eq!(rig.device().restart().unwrap().model.unwrap().crc_32, new_crc);
+    // Nothing is on trial.
+    let output = rig.folder.run(&["link", &rig.port, "confirm"]);
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(message.contains("no model is on trial"), "{message}");
+}
+
+#[test]
 #[ignore = "takes half a minute"]
 fn after_the_usual_lease_a_device_whose_host_was_killed_scans_on() {
     let (old, new) = (model(3), model(4));

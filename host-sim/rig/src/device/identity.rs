@@ -53,6 +53,7 @@ fn model_with_text<S: Serializer>(
         scene_digest: String,
         inputs_crc: String,
         outputs_crc: String,
+        on_trial: bool,
     }
     let with_text = model.map(|model| WithText {
         model_crc: format!("{:08x}", model.crc_32),
@@ -65,6 +66,7 @@ fn model_with_text<S: Serializer>(
         scene_digest: format!("{:016x}", model.scene_digest),
         inputs_crc: format!("{:08x}", model.inputs_crc_32),
         outputs_crc: format!("{:08x}", model.outputs_crc_32),
+        on_trial: model.on_trial,
     });
     with_text.serialize(serializer)
 }

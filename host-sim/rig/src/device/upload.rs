@@ -1,9 +1,9 @@
 //! Upload of models to a device.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use firmware::link::message::{Refusal, Report, Request, UploadState, UploadStep};
-use model_core::blob::Model;
+use firmware::link::message::{EstimateReport, Refusal, Report, Request, UploadState, UploadStep};
+use model_core::blob::{Floats, Model};
 use taxel_data::progress::Progress;
 
 use super::{Device, DeviceIdentity, Wire};
@@ -11,6 +11,11 @@ use crate::error::{Error, Result};
 
 /// Longest time for erasing flash: a sector of 128 KiB takes up to 4 s on an STM32F4.
 pub(super) const ERASE: Duration = Duration::from_secs(6);
+
+/// Longest time between scans that is waited for.
+const SLOWEST_SCANS: Duration = Duration::from_secs(5);
+/// Reading in Ω that no configuration is likely to find faulty.
+const ANY_OHM: f32 = 60.0;
 
 /// Sends one step of an upload and returns the device's answer.
 ///
@@ -37,7 +42,7 @@ pub fn begin(blob: &[u8]) -> UploadStep<'_> {
     UploadStep::Begin { head: &blob[..blob.len().min(Model::HEAD_BYTES)] }
 }
 
-/// Sends `blob` from beginning to commit, until the device refuses a step.
+/// Sends `blob` and puts it on trial, until the device refuses a step. A trial that is going on ends.
 ///
 /// # Errors
 /// [`Error::NoAnswer`] if the device stops answering, [`Error::ChunkSize`] if no chunk can be sent.
@@ -53,6 +58,10 @@ pub fn send<W: Wire>(
     let chunks = blob.chunks(chunk_bytes);
     progress.stage("uploading the model", chunks.len());
     let mut answer = step(device, begin(blob))?;
+    if answer == Err(Refusal::OnTrial) {
+        step(device, UploadStep::Abort)?.map_err(Error::Refused)?;
+        answer = step(device, begin(blob))?;
+    }
     for (index, bytes) in chunks.enumerate() {
         if answer.is_err() {
             return Ok(answer);
@@ -61,15 +70,16 @@ pub fn send<W: Wire>(
         answer = step(device, UploadStep::Chunk { offset, bytes })?;
         progress.step();
     }
-    if answer.is_err() { Ok(answer) } else { step(device, UploadStep::Commit) }
+    if answer.is_err() { Ok(answer) } else { step(device, UploadStep::Try) }
 }
 
-/// Uploads `blob`, makes it the active model, and checks that it is.
+/// Uploads `blob` and makes it the active model, on trial, and checks that the device decodes with it. Until
+/// [`confirm`] a restart brings the previous model back.
 ///
 /// # Errors
-/// [`Error`] if the device refuses it or has no room for it, or the work is interrupted before the last step; its
-/// previous model then stays active.
-pub fn replace<W: Wire>(
+/// [`Error`] if the device refuses it, has no room for it or does not decode with it, or the work is interrupted; its
+/// previous model is then active again.
+pub fn start_trial<W: Wire>(
     device: &mut Device<W>,
     blob: &[u8],
     progress: &dyn Progress,
@@ -81,21 +91,108 @@ pub fn replace<W: Wire>(
     {
         return Err(Error::NoRoom { capacity, shape });
     }
-    let outcome = send(device, blob, identity.chunk_bytes, progress);
-    if matches!(outcome, Err(Error::Interrupted)) {
+    or_abort(device, |device| {
+        let outcome = send(device, blob, identity.chunk_bytes, progress)?;
+        let crc_32 = match outcome.map_err(Error::Refused)? {
+            UploadState::OnTrial { crc_32 } => crc_32,
+            other => return Err(unexpected("a trial", &other)),
+        };
+        see_estimate(device, crc_32)
+    })
+}
+
+/// Runs `work` on an upload. If it is interrupted, or the device does not decode with the model, the device leaves the
+/// model.
+fn or_abort<W: Wire, T>(
+    device: &mut Device<W>,
+    work: impl FnOnce(&mut Device<W>) -> Result<T>,
+) -> Result<T> {
+    let outcome = work(device);
+    let abort = Error::is_settled_by_abort;
+    if outcome.as_ref().is_err_and(abort) {
         // The device has forgotten the upload when it resumes its work.
         let _ = device.uninterrupted(|device| step(device, UploadStep::Abort));
     }
-    let crc_32 = match outcome?.map_err(Error::Refused)? {
-        UploadState::Committed { crc_32 } => crc_32,
-        other => {
-            let (request, answer) = ("a commit".into(), format!("{other:?}"));
-            return Err(Error::Unexpected { request, answer });
-        }
-    };
+    outcome
+}
+
+/// Checks that the model with this CRC-32 is active, and that the device decodes a frame with it.
+fn see_estimate<W: Wire>(device: &mut Device<W>, crc_32: u32) -> Result<DeviceIdentity> {
     let identity = device.identify()?;
-    match identity.model {
-        Some(model) if model.crc_32 == crc_32 => Ok(identity),
-        other => Err(Error::NotInForce { committed: crc_32, in_force: format!("{other:?}") }),
+    if !identity.has_in_force(crc_32) {
+        let in_force = format!("{:08x?}", identity.model.map(|model| model.crc_32));
+        return Err(Error::NotInForce { committed: crc_32, in_force });
     }
+    let frame = vec![ANY_OHM; identity.wires().readings()];
+    let request = Request::Decode { frame: 0, readings_ohm: Floats::of(&frame) };
+    let flags = device.ask_plainly(&request, |report| match report {
+        Report::Estimate(estimate) => Some(estimate.flags),
+        _ => None,
+    })?;
+    if flags & EstimateReport::NO_MODEL != 0 {
+        return Err(Error::NotDecoding("it decodes no frame with the new model".into()));
+    }
+    Ok(identity)
+}
+
+/// Waits until the device, by its own configuration, has scanned and decoded two frames. Ends at once if it does not
+/// scan, or less often than every five seconds.
+///
+/// # Errors
+/// [`Error::NotDecoding`] if no frames come, and errors of [`ask`](Device::ask); the device has then left a model on
+/// trial.
+pub fn see_frames<W: Wire>(device: &mut Device<W>) -> Result<()> {
+    or_abort(device, |device| {
+        let period_us = device.configuration()?.configuration.frame_period_us;
+        let period = Duration::from_micros(period_us.into());
+        if period_us == 0 || period > SLOWEST_SCANS {
+            return Ok(());
+        }
+        let deadline = Instant::now() + 2 * period + SLOWEST_SCANS;
+        let before = device.statistics()?.frames_decoded;
+        while device.statistics()?.frames_decoded.wrapping_sub(before) < 2 {
+            if Instant::now() > deadline {
+                return Err(Error::NotDecoding("it scans no frames with the new model".into()));
+            }
+            // Looking on all the time would keep a slow line busy.
+            std::thread::sleep(period.min(Duration::from_millis(50)));
+        }
+        Ok(())
+    })
+}
+
+/// Confirms the model on trial, so that it stays active over restarts.
+///
+/// # Errors
+/// [`Error::Refused`] if there is none, or the errors of [`ask`](Device::ask).
+pub fn confirm<W: Wire>(device: &mut Device<W>) -> Result<DeviceIdentity> {
+    match step(device, UploadStep::Confirm)?.map_err(Error::Refused)? {
+        UploadState::Confirmed { crc_32 } => {
+            let identity = device.identify()?;
+            match identity.model {
+                Some(model) if model.crc_32 == crc_32 && !model.on_trial => Ok(identity),
+                other => {
+                    Err(Error::NotInForce { committed: crc_32, in_force: format!("{other:?}") })
+                }
+            }
+        }
+        other => Err(unexpected("a confirmation", &other)),
+    }
+}
+
+/// Uploads `blob`, makes it the active model, checks that the device decodes with it, and confirms it.
+///
+/// # Errors
+/// As [`start_trial`] and [`confirm`].
+pub fn replace<W: Wire>(
+    device: &mut Device<W>,
+    blob: &[u8],
+    progress: &dyn Progress,
+) -> Result<DeviceIdentity> {
+    start_trial(device, blob, progress)?;
+    or_abort(device, confirm)
+}
+
+fn unexpected(request: &str, answer: &UploadState) -> Error {
+    Error::Unexpected { request: request.into(), answer: format!("{answer:?}") }
 }

@@ -46,6 +46,12 @@ pub fn show<W: Wire>(device: &mut Device<W>, common: &Common) -> Result<()> {
             "{:<17} {} × {} readings to {} × {} outputs",
             "shape", m.rows, m.inputs, m.rows, m.outputs
         ));
+        if m.on_trial {
+            page.line(format_args!(
+                "{:<17} until `confirm`; a restart or `undo` returns to the previous model",
+                "on trial"
+            ));
+        }
     } else {
         page.line(format_args!("{:<17} none: upload one", "model"));
     }
@@ -86,6 +92,10 @@ pub fn show<W: Wire>(device: &mut Device<W>, common: &Common) -> Result<()> {
         "link", s.requests, s.bad_packets, s.lost_reports, s.bad_loops
     ));
     page.line(format_args!("{:<17} {} since the start", "slots erased", s.slot_erases));
+    page.line(format_args!(
+        "{:<17} {} times, damaged {} times where it is decoded from, {} times in its slot",
+        "model checked", s.model_checks, s.model_damages, s.slot_damages
+    ));
     memory_lines(&mut page, &d.memory);
     page.print()
 }

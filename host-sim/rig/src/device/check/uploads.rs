@@ -102,8 +102,8 @@ pub(super) fn check_uploads<W: Wire>(
     })
 }
 
-/// Breaks an upload off before its first chunk and after each. Returns how often, and how often the
-/// model with CRC-32 `crc_32` was active afterwards and after a restart.
+/// Breaks an upload off before its first chunk, after each, and on trial. Returns how often, and how often the
+/// model with CRC-32 `crc_32` was active afterwards (unless another one is on trial) and after a restart.
 fn break_uploads_off<W: Wire>(
     device: &mut Device<W>,
     blob: &[u8],
@@ -112,21 +112,25 @@ fn break_uploads_off<W: Wire>(
     progress: &dyn Progress,
 ) -> Result<(usize, usize)> {
     let chunks: Vec<&[u8]> = blob.chunks(chunk_bytes).collect();
-    progress.stage("breaking uploads off", chunks.len() + 1);
+    progress.stage("breaking uploads off", chunks.len() + 2);
     let mut stayed = 0;
-    for taken in 0..=chunks.len() {
+    for taken in 0..=chunks.len() + 1 {
         expect_receiving(upload::step(device, upload::begin(blob))?)?;
         for (index, bytes) in chunks.iter().take(taken).enumerate() {
             let offset = (index * chunk_bytes) as u32;
             expect_receiving(upload::step(device, UploadStep::Chunk { offset, bytes })?)?;
         }
-        let before = device.identify()?.has_in_force(crc_32);
+        let is_tried = taken > chunks.len();
+        if is_tried {
+            upload::step(device, UploadStep::Try)?.map_err(Error::Refused)?;
+        }
+        let before = device.identify()?.has_in_force(crc_32) != is_tried;
         device.restart()?;
         device.pause()?;
         stayed += usize::from(before && device.identify()?.has_in_force(crc_32));
         progress.step();
     }
-    Ok((chunks.len() + 1, stayed))
+    Ok((chunks.len() + 2, stayed))
 }
 
 fn expect_receiving(answer: std::result::Result<UploadState, Refusal>) -> Result<()> {
@@ -217,7 +221,7 @@ fn upload_with_a_chunk_lost<W: Wire>(
             return Ok(false);
         }
     }
-    Ok(upload::step(device, UploadStep::Commit)?.is_err())
+    Ok(upload::step(device, UploadStep::Try)?.is_err())
 }
 
 #[cfg(test)]

@@ -1,0 +1,169 @@
+//! A new model is on trial until it is confirmed: until then every restart brings the previous one back.
+
+use firmware::app::{Leave, Session};
+use firmware::link::message::{
+    ModelIdentity, RecalibrationFault, RecalibrationState, RecalibrationStep, Refusal, Report,
+    Request, UploadState, UploadStep,
+};
+use mock_board::*;
+
+const CHUNK: usize = 60;
+
+fn identity(session: &mut TestSession<'_>, board: &Board) -> Option<ModelIdentity> {
+    let read = |report: Report<'_>| match report {
+        Report::Identity(identity) => identity.model,
+        other => panic!("{other:?}"),
+    };
+    ask(session, board, &Request::Identify, read).0
+}
+
+/// The model that is in force after a restart.
+fn after_restart(slots: &mut [MockSlot; 2]) -> Option<ModelIdentity> {
+    let mut bench = Bench::new(quiet());
+    let mut session = Session::start(&mut bench.app, slots, &mut []);
+    identity(&mut session, &bench.board)
+}
+
+/// Carries out a step of a recalibration.
+fn recalibrate(
+    session: &mut TestSession<'_>,
+    board: &Board,
+    step: RecalibrationStep<'_>,
+) -> (Result<RecalibrationState, Refusal>, Option<Leave>) {
+    ask(session, board, &Request::Recalibrate(step), |report| match report {
+        Report::Recalibration(report) => Ok(report.state),
+        Report::Refused(refusal) => Err(refusal),
+        other => panic!("{other:?}"),
+    })
+}
+
+/// Slots with the model `old`, and what is in force while `new` is on trial.
+fn on_trial(old: &[u8], new: &[u8]) -> ([MockSlot; 2], Bench<'static>) {
+    let mut slots = MockSlot::pair_with(old);
+    let mut bench = Bench::new(quiet());
+    let state = upload(&mut bench, &mut slots, &mut [], &upload_steps(new, CHUNK));
+    assert_eq!(state, Ok(UploadState::OnTrial { crc_32: crc_of(new) }));
+    (slots, bench)
+}
+
+#[test]
+fn a_model_on_trial_is_decoded_with_and_gone_after_a_restart() {
+    let (old, new) = (blob(1, 3), blob(2, 5));
+    for words in [0, 512] {
+        let (mut slots, mut bench) = on_trial(&old, &new);
+        let mut weights = vec![0; words];
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut weights);
+        let tried = identity(&mut session, &bench.board).unwrap();
+        assert_eq!((tried.crc_32, tried.slot, tried.generation), (crc_of(&new), 1, 1));
+        assert_eq!((tried.on_trial, tried.in_ram), (true, words > 0));
+        let _ = session;
+        let left = after_restart(&mut slots).unwrap();
+        assert_eq!((left.crc_32, left.on_trial), (crc_of(&old), false));
+    }
+}
+
+#[test]
+fn a_confirmed_model_stays_and_a_repeated_confirmation_does_no_harm() {
+    let (old, new) = (blob(1, 3), blob(2, 5));
+    let (mut slots, mut bench) = on_trial(&old, &new);
+    let confirm = [UploadStep::Try, UploadStep::Confirm, UploadStep::Confirm];
+    let state = upload(&mut bench, &mut slots, &mut [], &confirm);
+    assert_eq!(state, Ok(UploadState::Confirmed { crc_32: crc_of(&new) }));
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let found = identity(&mut session, &bench.board).unwrap();
+    assert_eq!((found.crc_32, found.generation, found.on_trial), (crc_of(&new), 1, false));
+    let _ = session;
+    assert_eq!(after_restart(&mut slots), Some(found));
+}
+
+#[test]
+fn whenever_the_power_goes_while_a_model_is_confirmed_the_old_or_the_new_one_is_in_force() {
+    let (old, new) = (blob(1, 3), blob(2, 5));
+    let mut cuts = 0;
+    for operations in 0.. {
+        let (mut slots, mut bench) = on_trial(&old, &new);
+        slots[0].cut_power_after(operations);
+        let state = upload(&mut bench, &mut slots, &mut [], &[UploadStep::Confirm]);
+        if !slots[0].power_on() {
+            assert_eq!(after_restart(&mut slots).unwrap().crc_32, crc_of(&new));
+            break;
+        }
+        assert_eq!(state, Err(Refusal::Flash), "{operations}");
+        // The device itself has left it too.
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&old)), "{operations}");
+        let _ = session;
+        assert_eq!(after_restart(&mut slots).unwrap().crc_32, crc_of(&old), "{operations}");
+        let mended = install(&mut bench, &mut slots, &mut [], (&new, CHUNK));
+        assert_eq!(mended, Ok(UploadState::Confirmed { crc_32: crc_of(&new) }));
+        cuts += 1;
+    }
+    assert_eq!(cuts, 3, "words of a record behind its mark");
+}
+
+#[test]
+fn an_abort_and_an_undo_end_a_trial_without_touching_the_flash() {
+    let (old, new) = (blob(1, 3), blob(2, 5));
+    let (mut slots, mut bench) = on_trial(&old, &new);
+    let writes = [slots[0].writes, slots[1].writes];
+    upload(&mut bench, &mut slots, &mut [], &[UploadStep::Abort]).unwrap();
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&old)));
+    let _ = session;
+    assert_eq!([slots[0].writes, slots[1].writes], writes);
+    let refused = upload(&mut bench, &mut slots, &mut [], &[UploadStep::Confirm]);
+    assert_eq!(refused, Err(Refusal::NoUpload), "nothing is on trial any more");
+
+    let (mut slots, mut bench) = on_trial(&old, &new);
+    let board = bench.board.clone();
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let undo = RecalibrationStep::Undo { crc_32: crc_of(&new) };
+    let is_old = Ok(RecalibrationState::InForce { crc_32: crc_of(&old) });
+    assert_eq!(recalibrate(&mut session, &board, undo), (is_old, Some(Leave::NewModel)));
+    let _ = session;
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    assert_eq!(recalibrate(&mut session, &board, undo), (is_old, None), "the answer was lost");
+    let _ = session;
+    assert_eq!([slots[0].writes, slots[1].writes], writes);
+    // The model that was tried never had a record: there is no way back to it.
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let undo = RecalibrationStep::Undo { crc_32: crc_of(&old) };
+    let nothing = Err(Refusal::Recalibration(RecalibrationFault::NothingToUndo));
+    assert_eq!(recalibrate(&mut session, &board, undo).0, nothing);
+}
+
+#[test]
+fn on_trial_nothing_overwrites_the_previous_model() {
+    let (old, new) = (blob(1, 3), blob(2, 5));
+    let (mut slots, mut bench) = on_trial(&old, &new);
+    let refused = upload(&mut bench, &mut slots, &mut [], &upload_steps(&old, CHUNK));
+    assert_eq!(refused, Err(Refusal::OnTrial));
+    let board = bench.board.clone();
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    for step in [RecalibrationStep::Begin, RecalibrationStep::Commit] {
+        assert_eq!(recalibrate(&mut session, &board, step), (Err(Refusal::OnTrial), None));
+    }
+    // Silence ends no trial.
+    board.pins.borrow_mut().now_us += 20_000_000;
+    session.step();
+    assert_eq!(model_crc(&mut session, &board), Some(crc_of(&new)));
+    let _ = session;
+    let state = upload(&mut bench, &mut slots, &mut [], &[UploadStep::Confirm]);
+    assert_eq!(state, Ok(UploadState::Confirmed { crc_32: crc_of(&new) }));
+}
+
+#[test]
+fn a_model_that_decays_on_trial_is_left() {
+    let (old, new) = (blob(1, 3), blob(2, 5));
+    for words in [0, 512] {
+        let (mut slots, mut bench) = on_trial(&old, &new);
+        slots[1].decay(20, 4);
+        let mut weights = vec![0; words];
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut weights);
+        let found = identity(&mut session, &bench.board).unwrap();
+        assert_eq!((found.crc_32, found.on_trial), (crc_of(&old), false));
+        let _ = session;
+        let refused = upload(&mut bench, &mut slots, &mut [], &[UploadStep::Confirm]);
+        assert_eq!(refused, Err(Refusal::NoUpload));
+    }
+}
