@@ -66,7 +66,7 @@ impl Case {
     /// Ends an upload of the new model in one of many ways; returns which.
     fn end_upload(&mut self) -> &'static str {
         let new = self.new.clone();
-        let whole = Device::steps_to_commit(&new);
+        let whole = Device::steps_to_trial(&new);
         match self.below(4) {
             0 => {
                 self.device.upload(&new, whole, None);

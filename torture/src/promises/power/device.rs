@@ -90,22 +90,21 @@ impl Device {
         self.session(None, model_crc)
     }
 
-    /// Uploads the first steps of `blob`, as many as `steps`; all of them commit it.
+    /// Uploads the first steps of `blob`, as many as `steps`; all of them confirm it.
     pub fn upload(&mut self, blob: &[u8], steps: usize, cut_after: Option<u64>) -> Outcome {
-        let supply = self.supply.clone();
-        self.session(cut_after, |session, board| {
-            let mut last = Outcome::GoingOn;
-            for step in upload_steps(blob, CHUNK).into_iter().take(steps) {
-                last = upload_step(session, board, step);
-                if supply.borrow().gone {
-                    return Outcome::Cut;
-                }
-                if matches!(last, Outcome::Refused(_)) {
-                    break;
-                }
-            }
-            last
-        })
+        let mut all = upload_steps(blob, CHUNK);
+        all.push(UploadStep::Confirm);
+        all.truncate(steps);
+        self.slots.iter_mut().for_each(Flash::settle);
+        self.supply.borrow_mut().on(cut_after);
+        let mut bench = Bench::within(&mut self.memory, quiet(), &self.settings);
+        let last = mock_board::upload(&mut bench, &mut self.slots, &mut self.weights, &all);
+        match last {
+            _ if self.supply.borrow().gone => Outcome::Cut,
+            Ok(UploadState::Confirmed { crc_32 }) => Outcome::InForce(crc_32),
+            Ok(_) => Outcome::GoingOn,
+            Err(refusal) => Outcome::Refused(refusal),
+        }
     }
 
     /// Uploads the first steps of `blob`, as many as `steps`, and does `work` in the same session.
@@ -123,8 +122,8 @@ impl Device {
         });
     }
 
-    /// Number of steps of an upload of `blob`, without the commit.
-    pub fn steps_to_commit(blob: &[u8]) -> usize {
+    /// Number of steps of an upload of `blob` before its trial.
+    pub fn steps_to_trial(blob: &[u8]) -> usize {
         1 + blob.len().div_ceil(CHUNK)
     }
 
@@ -149,10 +148,9 @@ impl Device {
     }
 }
 
-/// Carries out one step of an upload.
+/// Carries out one step of an upload that ends no session.
 pub fn upload_step(session: &mut Running<'_, '_>, board: &Board, step: UploadStep<'_>) -> Outcome {
     ask(session, board, &Request::Upload(step), |report| match report {
-        Report::Upload(UploadState::Committed { crc_32 }) => Outcome::InForce(crc_32),
         Report::Upload(_) => Outcome::GoingOn,
         Report::Refused(refusal) => Outcome::Refused(refusal),
         other => panic!("{other:?}"),
