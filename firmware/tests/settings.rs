@@ -322,7 +322,7 @@ fn the_power_may_go_in_the_middle_of_any_word_also_while_pages_are_exchanged() {
 }
 
 #[test]
-fn an_erase_that_was_cut_may_leave_a_second_page_that_seems_in_use() {
+fn an_erase_that_was_cut_may_leave_a_page_that_seems_in_use() {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(5);
     let mut settings = SharedSettings::default();
     let mut torn = [0, 0];
@@ -337,16 +337,22 @@ fn an_erase_that_was_cut_may_leave_a_second_page_that_seems_in_use() {
         // The last step of an exchange is the erase of the full page, which was cut.
         let after = settings.bytes();
         let erased = usize::from(after[0].iter().any(|byte| *byte != 0xFF));
-        let mut pages = after.clone();
-        pages[erased] = before[erased].iter().map(|b| b | random.next_u32() as u8).collect();
-        pages[erased][0] = 0x54;
-        *pages[erased].last_mut().unwrap() = 0x75;
-        let mut cut = SharedSettings::holding([&pages[0], &pages[1]]);
         let mut expected = Setting::ALL.map(|setting| settings.read_owned(setting));
-        assert_eq!(Setting::ALL.map(|setting| cut.read_owned(setting)), expected, "{erased}");
-        assert_eq!(cut.keep_bytes(setting, b"next"), Ok(true));
-        expected[setting as usize] = Some(b"next".to_vec());
-        assert_eq!(Setting::ALL.map(|setting| cut.read_owned(setting)), expected, "{erased}");
+        // The full page's marks are half gone, or all there, and items are damaged.
+        for (density, marks) in [(1, Some([0x54, 0x75])), (7, None)] {
+            let mut few = || (0..density).fold(0xFF, |bits, _| bits & random.next_u32() as u8);
+            let mut pages = after.clone();
+            pages[erased] = before[erased].iter().map(|byte| byte | few()).collect();
+            let [first, last] = marks.unwrap_or([0, 0]);
+            pages[erased][0] = first;
+            *pages[erased].last_mut().unwrap() = last;
+            let mut cut = SharedSettings::holding([&pages[0], &pages[1]]);
+            assert_eq!(Setting::ALL.map(|setting| cut.read_owned(setting)), expected, "{erased}");
+            assert_eq!(cut.keep_bytes(setting, &[density]), Ok(true));
+            expected[setting as usize] = Some(vec![density]);
+            assert_eq!(Setting::ALL.map(|setting| cut.read_owned(setting)), expected, "{erased}");
+            expected[setting as usize] = settings.read_owned(setting);
+        }
         torn[erased] += 1;
     }
     assert!(torn[0] >= 1 && torn[1] >= 1, "{torn:?}");

@@ -3,6 +3,7 @@
 
 mod found;
 mod effort;
+mod tally;
 mod tools;
 
 mod promise;

@@ -5,6 +5,7 @@
 
 mod exponentials;
 mod flips;
+mod load;
 mod power;
 
 use crate::promise::Promise;
@@ -20,4 +21,7 @@ pub const PROMISES: &[Promise] = &[
     power::SETTINGS,
     power::DECAY,
     power::WORN,
+    load::FRAMES,
+    load::LINK,
+    load::WATCHDOG,
 ];

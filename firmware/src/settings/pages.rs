@@ -54,27 +54,32 @@ impl<S: Slot> SettingPages<S> {
         MapStorage::new(Pages { slots: &mut self.0, hidden }, config, Cache::new_uncached())
     }
 
-    /// Number of the page whose erase was cut, if that left it with the mark of a page in use.
+    /// Number of the page that an exchange was about to erase when the power was cut, if it still counts as in use.
     ///
-    /// An erase that is cut may leave any bits set. If they make up a page that is in use and not full, there are two of
-    /// these, and the map would take the wrong one. No item in it can be read.
-    fn torn(&mut self, buffer: &mut [u8]) -> Option<usize> {
-        let is_partial = |page: &S| {
+    /// An erase that is cut leaves any bits set. The map would take the page for the one that is written to, or would
+    /// move its items, damaged as they are, once more. The other page has every setting that can be read.
+    fn left_over(&mut self, buffer: &mut [u8]) -> Option<usize> {
+        let marks = self.0.each_ref().map(|page| {
             let bytes = page.bytes().get(..PAGE_BYTES).unwrap_or_default();
-            is_marked(bytes.first()) && !is_marked(bytes.last())
-        };
-        if !self.0.iter().all(is_partial) {
+            (is_marked(bytes.first()), is_marked(bytes.last()))
+        });
+        if marks == [(true, true); 2] || marks.iter().any(|(start, _)| !start) {
             return None;
         }
-        let mut has_items = |hidden| {
-            let mut settings = Setting::ALL.iter();
-            settings.any(|setting| self.fetch(*setting, Some(hidden), buffer).is_some())
+        let mut readable = |hidden| {
+            Setting::ALL.map(|setting| self.fetch(setting, Some(hidden), buffer).is_some())
         };
-        match (has_items(1), has_items(0)) {
-            (true, false) => Some(1),
-            (false, true) => Some(0),
-            _ => None,
-        }
+        let of_page = [readable(1), readable(0)];
+        let may_go = |page: &usize| {
+            let (Some(own), Some(other)) = (of_page.get(*page), of_page.get(1 - page)) else {
+                return false;
+            };
+            let is_partial = marks.get(1 - page) == Some(&(true, false));
+            is_partial
+                && other.contains(&true)
+                && own.iter().zip(other).all(|(own, other)| own <= other)
+        };
+        [0, 1].into_iter().find(may_go)
     }
 
     fn fetch<'b>(
@@ -103,13 +108,13 @@ impl<S: Slot> SettingPages<S> {
         }
     }
 
-    /// Erases pages that count as free without being blank, and one that is torn: something else left them, or an erase
-    /// that was cut.
+    /// Erases pages that count as free without being blank, and one that is left over: something else left them, or an
+    /// erase that was cut.
     fn blank_free_pages(&mut self, buffer: &mut [u8]) -> Result<(), KeepError> {
-        let torn = self.torn(buffer);
+        let left_over = self.left_over(buffer);
         for (number, page) in self.0.iter_mut().enumerate() {
             let bytes = page.bytes().get(..PAGE_BYTES).ok_or(KeepError::Failed)?;
-            let in_use = is_marked(bytes.first()) && torn != Some(number);
+            let in_use = is_marked(bytes.first()) && left_over != Some(number);
             if !in_use && bytes.iter().any(|byte| *byte != 0xFF) {
                 page.erase().map_err(|FlashError| KeepError::Failed)?;
             }
@@ -120,8 +125,8 @@ impl<S: Slot> SettingPages<S> {
 
 impl<S: Slot> Keeper for SettingPages<S> {
     fn read<'b>(&mut self, setting: Setting, buffer: &'b mut [u8]) -> Option<&'b [u8]> {
-        let torn = self.torn(buffer);
-        self.fetch(setting, torn, buffer)
+        let left_over = self.left_over(buffer);
+        self.fetch(setting, left_over, buffer)
     }
 
     fn keep(

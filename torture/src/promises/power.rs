@@ -4,7 +4,6 @@
 mod device;
 mod flash;
 mod presses;
-mod tally;
 
 mod cuts;
 mod decay;

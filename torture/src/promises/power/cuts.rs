@@ -6,10 +6,10 @@ use model_core::AlignedBytes;
 use super::device::{Device, Outcome};
 use super::flash::Torn;
 use super::presses;
-use super::tally::Tally;
 use crate::effort::Effort;
 use crate::found::Found;
 use crate::promise::Promise;
+use crate::tally::Tally;
 use crate::tools::Tools;
 
 pub const UPLOAD: Promise = Promise {

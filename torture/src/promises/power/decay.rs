@@ -9,10 +9,10 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::device::{Device, Outcome, SLOT_WORDS, upload_step};
 use super::flash::{Torn, Worn};
-use super::tally::Tally;
 use crate::effort::Effort;
 use crate::found::Found;
 use crate::promise::Promise;
+use crate::tally::Tally;
 use crate::tools::Tools;
 
 pub const DECAY: Promise = Promise {

@@ -10,10 +10,10 @@ use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::flash::{Cells, Flash, Supply, Torn};
-use super::tally::Tally;
 use crate::effort::Effort;
 use crate::found::Found;
 use crate::promise::Promise;
+use crate::tally::Tally;
 use crate::tools::Tools;
 
 pub const SETTINGS: Promise = Promise {

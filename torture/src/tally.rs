@@ -19,6 +19,11 @@ impl<const N: usize> Tally<N> {
         self.counts[index].fetch_add(more, Ordering::Relaxed);
     }
 
+    /// The count number `index`.
+    pub fn count(&self, index: usize) -> u64 {
+        self.counts[index].load(Ordering::Relaxed)
+    }
+
     /// The sum of all counts.
     pub fn sum(&self) -> u64 {
         self.counts.iter().map(|count| count.load(Ordering::Relaxed)).sum()
