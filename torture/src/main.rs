@@ -4,6 +4,8 @@
 mod found;
 mod effort;
 mod tools;
+mod scratch;
+mod jobs;
 
 mod promise;
 mod promises;
