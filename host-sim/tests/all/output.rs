@@ -142,7 +142,7 @@ fn a_signal_leaves_the_old_file_and_no_temporary_and_a_kill_one_that_the_next_ru
     assert_eq!(folder.names(), ["y.csv"]);
 
     // Whoever starts it may want a signal to be ignored, as `nohup` does.
-    let script = "trap '' INT HUP; exec \"$0\" synth press -n 20000 -o y.csv";
+    let script = "trap '' INT HUP; exec \"$0\" synth press -n 3000 -o y.csv";
     let mut child = shell(&folder, script).stdout(Stdio::null()).spawn().unwrap();
     wait_for_more(&folder, 1);
     signal(&child, "-INT");

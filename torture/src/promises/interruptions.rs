@@ -91,7 +91,7 @@ fn ended(
     }
     let output = child.wait_with_output().map_err(|cause| format!("wait: {cause}"))?;
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    Ok(Outcome { status: output.status, message })
+    Ok(Outcome { status: output.status, message, may_panic: false })
 }
 
 fn is_running(child: &mut Child) -> Result<bool, String> {

@@ -42,12 +42,11 @@ impl FileSet {
             permissions(&path).map_err(|cause| Error::write(&path, cause))?;
             super::check_no_input(&path, inputs)?;
         }
-        let begun = || {
-            let _made = Made::folder(&System, folder)?;
-            let _held = self.hold(&System, folder)?;
-            Hidden::inside(&System, folder, self.name).map(drop)
-        };
-        begun().map_err(|cause| Error::write(folder, cause))
+        // A folder that is not there is made at the end: what is stopped before then leaves none.
+        let there = folder.ancestors().find(|path| path.exists()).unwrap_or(Path::new("."));
+        let _held = self.hold(&System, there).map_err(|cause| Error::write(folder, cause))?;
+        let begun = Hidden::inside(&System, there, self.name);
+        begun.map(drop).map_err(|cause| Error::write(folder, cause))
     }
 
     /// Writes files, by name and content, to `folder`, which is made if it is not there. Other files of the set

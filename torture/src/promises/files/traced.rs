@@ -72,7 +72,8 @@ fn traced(job: &Job, fault: &str) -> Result<(bool, Result<(), String>), String> 
     let is_signal = fault.contains("signal=");
     let struck = text.contains("INJECTED") || (is_signal && is_killed(&text));
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    Ok((struck, job.judge(&place, &Outcome { status: output.status, message })))
+    let may_panic = fault.starts_with("close:error");
+    Ok((struck, job.judge(&place, &Outcome { status: output.status, message, may_panic })))
 }
 
 fn is_killed(log: &str) -> bool {
