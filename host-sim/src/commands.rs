@@ -35,6 +35,7 @@ pub mod link;
 
 use host_sim::Error;
 
+pub use interruption::{end as end_interrupted, watch as watch_signals};
 pub use print::begin;
 
 /// Options of every command.

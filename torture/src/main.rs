@@ -5,6 +5,8 @@ mod found;
 mod effort;
 mod tally;
 mod tools;
+mod scratch;
+mod jobs;
 
 mod promise;
 mod promises;

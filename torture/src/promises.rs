@@ -4,7 +4,9 @@
 #![allow(clippy::unnecessary_wraps)]
 
 mod exponentials;
+mod files;
 mod flips;
+mod interruptions;
 mod load;
 mod power;
 
@@ -24,4 +26,6 @@ pub const PROMISES: &[Promise] = &[
     load::FRAMES,
     load::LINK,
     load::WATCHDOG,
+    files::FAULTS,
+    interruptions::JOBS,
 ];
