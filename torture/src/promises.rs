@@ -4,8 +4,15 @@
 #![allow(clippy::unnecessary_wraps)]
 
 mod exponentials;
+mod hostile_bytes;
+mod size_bombs;
 
 use crate::promise::Promise;
 
 /// Every promise. Exact tests stand first, then those that draw their cases.
-pub const PROMISES: &[Promise] = &[exponentials::POLYNOMIAL];
+pub const PROMISES: &[Promise] = &[
+    exponentials::POLYNOMIAL,
+    size_bombs::SIZE_BOMBS,
+    hostile_bytes::HOSTILE_BYTES,
+    hostile_bytes::RESIGNED_BLOBS,
+];
