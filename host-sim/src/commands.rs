@@ -60,6 +60,11 @@ pub fn advice(error: &Error) -> &'static str {
         {
             " (--folds or --fold-column, --no-refine)"
         }
+        Error::Setting(bad) | Error::Learn(taxel_learn::Error::Setting(bad))
+            if bad.field == "memory" =>
+        {
+            " (--centres, --no-affine, --most-memory)"
+        }
         Error::Data(Data::Write { .. } | Data::WrittenOverInput { .. }) => " (-o)",
         Error::Data(Data::File { problem: Problem::NoPartner { .. }, .. }) => {
             " (--tolerance, --lag, --on)"

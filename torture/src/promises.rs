@@ -9,6 +9,8 @@ mod flips;
 mod interruptions;
 mod load;
 mod power;
+mod hostile_bytes;
+mod size_bombs;
 
 use crate::promise::Promise;
 
@@ -28,4 +30,7 @@ pub const PROMISES: &[Promise] = &[
     load::WATCHDOG,
     files::FAULTS,
     interruptions::JOBS,
+    size_bombs::SIZE_BOMBS,
+    hostile_bytes::HOSTILE_BYTES,
+    hostile_bytes::RESIGNED_BLOBS,
 ];
