@@ -322,6 +322,43 @@ fn the_power_may_go_in_the_middle_of_any_word_also_while_pages_are_exchanged() {
 }
 
 #[test]
+fn an_erase_that_was_cut_may_leave_a_page_that_seems_in_use() {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(5);
+    let mut settings = SharedSettings::default();
+    let mut torn = [0, 0];
+    for seed in 0..200 {
+        let erases = settings.erases();
+        let setting = Setting::ALL[seed % 3];
+        let before = settings.bytes();
+        settings.keep_bytes(setting, &bytes_of(setting, seed)).unwrap();
+        if settings.erases() == erases || seed < 3 {
+            continue;
+        }
+        // The last step of an exchange is the erase of the full page, which was cut.
+        let after = settings.bytes();
+        let erased = usize::from(after[0].iter().any(|byte| *byte != 0xFF));
+        let mut expected = Setting::ALL.map(|setting| settings.read_owned(setting));
+        // The full page's marks are half gone, or all there, and items are damaged.
+        for (density, marks) in [(1, Some([0x54, 0x75])), (7, None)] {
+            let mut few = || (0..density).fold(0xFF, |bits, _| bits & random.next_u32() as u8);
+            let mut pages = after.clone();
+            pages[erased] = before[erased].iter().map(|byte| byte | few()).collect();
+            let [first, last] = marks.unwrap_or([0, 0]);
+            pages[erased][0] = first;
+            *pages[erased].last_mut().unwrap() = last;
+            let mut cut = SharedSettings::holding([&pages[0], &pages[1]]);
+            assert_eq!(Setting::ALL.map(|setting| cut.read_owned(setting)), expected, "{erased}");
+            assert_eq!(cut.keep_bytes(setting, &[density]), Ok(true));
+            expected[setting as usize] = Some(vec![density]);
+            assert_eq!(Setting::ALL.map(|setting| cut.read_owned(setting)), expected, "{erased}");
+            expected[setting as usize] = settings.read_owned(setting);
+        }
+        torn[erased] += 1;
+    }
+    assert!(torn[0] >= 1 && torn[1] >= 1, "{torn:?}");
+}
+
+#[test]
 fn pages_that_hold_anything_are_no_harm_and_can_be_used() {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(11);
     let mut full = SharedSettings::default();

@@ -35,6 +35,7 @@ pub mod link;
 
 use host_sim::Error;
 
+pub use interruption::{end as end_interrupted, watch as watch_signals};
 pub use print::begin;
 
 /// Options of every command.
@@ -58,6 +59,11 @@ pub fn advice(error: &Error) -> &'static str {
             if bad.field == "folds" =>
         {
             " (--folds or --fold-column, --no-refine)"
+        }
+        Error::Setting(bad) | Error::Learn(taxel_learn::Error::Setting(bad))
+            if bad.field == "memory" =>
+        {
+            " (--centres, --no-affine, --most-memory)"
         }
         Error::Data(Data::Write { .. } | Data::WrittenOverInput { .. }) => " (-o)",
         Error::Data(Data::File { problem: Problem::NoPartner { .. }, .. }) => {

@@ -1,5 +1,12 @@
 //! `host-sim`: from a scene or a CSV file to a trained, checked weight blob.
 
+/// Prints to stderr as the standard macro does, but never panics: a log on a full disk must not end the work.
+macro_rules! eprintln {
+    ($($text:tt)*) => {{
+        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("{}\n", format_args!($($text)*)));
+    }};
+}
+
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -15,7 +22,10 @@ use commands::{
 /// Simulate, train and evaluate resistive tactile sensors; write weight blobs for the device.
 ///
 /// Without a command: `run press`. Results go to stdout, progress and remarks to stderr. Exit status: 0
-/// done, 1 failed, 2 bad usage or input, 130 interrupted.
+/// done, 1 failed, 2 bad usage or input, 130 interrupted by Ctrl-C, 143 by SIGTERM.
+///
+/// Files appear whole or not at all: after an error or an interruption the old ones are there, and nothing else. `-o -`
+/// writes to stdout, and results then go to stderr. A link is followed, a read-only file is refused.
 #[derive(Parser)]
 #[command(version)]
 struct Cli {
@@ -76,26 +86,32 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     let command = cli.command.unwrap_or_else(|| Command::Run(run::Arguments::default()));
     commands::begin(&command.name());
-    let outcome = match command {
-        Command::Run(arguments) => run::execute(&arguments, &cli.common),
-        Command::Synth(arguments) => synth::execute(&arguments, &cli.common),
-        Command::Forward(arguments) => forward::execute(&arguments, &cli.common),
-        Command::Train(arguments) => train::execute(&arguments, &cli.common),
-        Command::Join(arguments) => join::execute(&arguments, &cli.common),
-        Command::Decode(arguments) => decode::execute(&arguments, &cli.common),
-        Command::Eval(arguments) => eval::execute(&arguments, &cli.common),
-        Command::Inspect(arguments) => inspect::execute(&arguments, &cli.common),
-        Command::Table1(arguments) => table1::execute(&arguments, &cli.common),
-        Command::Trade(arguments) => trade::execute(&arguments, &cli.common),
-        Command::Readout(arguments) => readout::execute(&arguments, &cli.common),
-        Command::Gate(arguments) => gate::execute(&arguments, &cli.common),
-        Command::Drift(arguments) => drift::execute(&arguments, &cli.common),
-        Command::Limit(arguments) => limit::execute(&arguments, &cli.common),
-        Command::Confidence(arguments) => confidence::execute(&arguments, &cli.common),
-        Command::Emulate(arguments) => emulate::execute(&arguments, &cli.common),
-        Command::Link(arguments) => link::execute(&arguments, &cli.common),
-    };
+    let outcome = commands::watch_signals()
+        .map_err(|cause| Error::Failed(format!("cannot watch for Ctrl-C: {cause}")))
+        .and_then(|()| execute(command, &cli.common));
     report(outcome)
+}
+
+fn execute(command: Command, common: &Common) -> Result<()> {
+    match command {
+        Command::Run(arguments) => run::execute(&arguments, common),
+        Command::Synth(arguments) => synth::execute(&arguments, common),
+        Command::Forward(arguments) => forward::execute(&arguments, common),
+        Command::Train(arguments) => train::execute(&arguments, common),
+        Command::Join(arguments) => join::execute(&arguments, common),
+        Command::Decode(arguments) => decode::execute(&arguments, common),
+        Command::Eval(arguments) => eval::execute(&arguments, common),
+        Command::Inspect(arguments) => inspect::execute(&arguments, common),
+        Command::Table1(arguments) => table1::execute(&arguments, common),
+        Command::Trade(arguments) => trade::execute(&arguments, common),
+        Command::Readout(arguments) => readout::execute(&arguments, common),
+        Command::Gate(arguments) => gate::execute(&arguments, common),
+        Command::Drift(arguments) => drift::execute(&arguments, common),
+        Command::Limit(arguments) => limit::execute(&arguments, common),
+        Command::Confidence(arguments) => confidence::execute(&arguments, common),
+        Command::Emulate(arguments) => emulate::execute(&arguments, common),
+        Command::Link(arguments) => link::execute(&arguments, common),
+    }
 }
 
 fn report(outcome: Result<()>) -> ExitCode {
@@ -103,12 +119,15 @@ fn report(outcome: Result<()>) -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}{}", commands::advice(&error));
+            if matches!(error, Error::Rig(taxel_rig::Error::Interrupted)) {
+                commands::end_interrupted();
+            }
             ExitCode::from(exit_status(&error))
         }
     }
 }
 
-/// Exit status of an error: 1 for work that failed, 2 for bad usage or input, 130 for Ctrl-C.
+/// Exit status of an error: 1 for work that failed, 2 for bad usage or input.
 fn exit_status(error: &Error) -> u8 {
     use taxel_learn::Error as Learn;
     use taxel_rig::Error as Rig;
@@ -120,7 +139,6 @@ fn exit_status(error: &Error) -> u8 {
             _ => 1,
         },
         Error::Rig(cause) => match cause {
-            Rig::Interrupted => 130,
             Rig::Port { .. }
             | Rig::NoRoom { .. }
             | Rig::OtherReadout { .. }

@@ -3,7 +3,10 @@
 
 mod found;
 mod effort;
+mod tally;
 mod tools;
+mod scratch;
+mod jobs;
 
 mod promise;
 mod promises;

@@ -4,8 +4,33 @@
 #![allow(clippy::unnecessary_wraps)]
 
 mod exponentials;
+mod files;
+mod flips;
+mod interruptions;
+mod load;
+mod power;
+mod hostile_bytes;
+mod size_bombs;
 
 use crate::promise::Promise;
 
 /// Every promise. Exact tests stand first, then those that draw their cases.
-pub const PROMISES: &[Promise] = &[exponentials::POLYNOMIAL];
+pub const PROMISES: &[Promise] = &[
+    exponentials::POLYNOMIAL,
+    flips::ONE,
+    flips::TWO,
+    power::UPLOAD,
+    power::UNDO,
+    power::RECALIBRATION,
+    power::SETTINGS,
+    power::DECAY,
+    power::WORN,
+    load::FRAMES,
+    load::LINK,
+    load::WATCHDOG,
+    files::FAULTS,
+    interruptions::JOBS,
+    size_bombs::SIZE_BOMBS,
+    hostile_bytes::HOSTILE_BYTES,
+    hostile_bytes::RESIGNED_BLOBS,
+];

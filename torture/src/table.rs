@@ -52,7 +52,8 @@ fn cells(entry: &Tested, self_test: bool) -> [String; 7] {
         return [text, none(), none(), none(), verdict, none(), name];
     };
     let Found { cases, worst, bound, unit, seed, .. } = found;
-    let worst = format!("{} {unit}", short(*worst));
+    let worst =
+        if worst.is_finite() { format!("{} {unit}", short(*worst)) } else { "failed".into() };
     [text, short(*cases as f64), worst, short(*bound), verdict, seed.to_string(), name]
 }
 

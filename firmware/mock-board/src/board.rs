@@ -19,10 +19,18 @@ pub struct Pins {
     pub to_device: VecDeque<u8>,
     /// Bytes that the device has sent. Whoever runs it for long must empty this.
     pub to_host: Vec<u8>,
-    /// The clock in µs. Each look at it takes one.
+    /// The clock in µs. Each look at it takes one, and [`Pins::look_us`] more.
     pub now_us: u32,
+    /// Time in µs that each look at the clock takes besides. It makes waiting short for tests of slow lines.
+    pub look_us: u32,
+    /// Time in µs that a scan takes besides that of its [`Source`](crate::Source).
+    pub scan_us: u32,
     /// Number of times that the watchdog was fed.
     pub feeds: u32,
+    /// Longest time in µs between two feeds, the first of which is at 0.
+    pub longest_unfed_us: u32,
+    /// When the watchdog was fed last.
+    fed_us: u32,
     /// Number of bytes that the host's side still takes; `None` takes all.
     pub room: Option<usize>,
     /// Least time in µs between two bytes that the host's side takes.
@@ -76,7 +84,7 @@ impl Board {
 impl Port for Board {
     fn now_us(&mut self) -> u32 {
         let mut pins = self.pins.borrow_mut();
-        pins.now_us = pins.now_us.wrapping_add(1);
+        pins.now_us = pins.now_us.wrapping_add(1 + pins.look_us);
         pins.now_us
     }
 
@@ -109,6 +117,9 @@ impl Platform for Board {
     fn feed_watchdog(&mut self) {
         let mut pins = self.pins.borrow_mut();
         pins.feeds = pins.feeds.wrapping_add(1);
+        let unfed_us = pins.now_us.wrapping_sub(pins.fed_us);
+        pins.longest_unfed_us = pins.longest_unfed_us.max(unfed_us);
+        pins.fed_us = pins.now_us;
     }
 
     fn memory(&self) -> Memory {

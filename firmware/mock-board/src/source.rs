@@ -46,7 +46,7 @@ impl FrameSource for Source {
             to.copy_from_slice(&self.frame.borrow()[row.0][..wires.columns]);
         }
         let mut pins = self.board.pins.borrow_mut();
-        pins.now_us = pins.now_us.wrapping_add(self.scan_us);
+        pins.now_us = pins.now_us.wrapping_add(self.scan_us).wrapping_add(pins.scan_us);
         let missing = frame.iter();
         ScanReport { failed_samples: missing.filter(|reading| reading.is_nan()).count() as u16 }
     }

@@ -348,10 +348,15 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                 info!("upload of {=usize} bytes begins", length);
                 let now_us = self.now_us();
                 let (platform, erases) = (self.line.platform(), &mut self.statistics.slot_erases);
-                self.upload.begin(spare, length, now_us, || {
+                let begun = self.upload.begin(spare, length, now_us, || {
                     platform.feed_watchdog();
                     *erases = erases.saturating_add(1);
-                })
+                });
+                // Erasing may have taken half of the watchdog's period; reports and a scan come before the next feed.
+                if begun.is_ok() {
+                    self.line.platform().feed_watchdog();
+                }
+                begun
             }
             UploadStep::Chunk { offset, bytes } => self.upload.chunk(spare, offset, bytes),
             UploadStep::Abort => {

@@ -48,9 +48,49 @@ impl<S: Slot> SettingPages<S> {
         &mut self.0
     }
 
-    fn map(&mut self) -> Map<'_, S> {
+    /// The map, which takes the page number `hidden` for blank, if there is one.
+    fn map(&mut self, hidden: Option<usize>) -> Map<'_, S> {
         let config = const { MapConfig::new(0..2 * PAGE_BYTES as u32) };
-        MapStorage::new(Pages(&mut self.0), config, Cache::new_uncached())
+        MapStorage::new(Pages { slots: &mut self.0, hidden }, config, Cache::new_uncached())
+    }
+
+    /// Number of the page that an exchange was about to erase when the power was cut, if it still counts as in use.
+    ///
+    /// An erase that is cut leaves any bits set. The map would take the page for the one that is written to, or would
+    /// move its items, damaged as they are, once more. The other page has every setting that can be read.
+    fn left_over(&mut self, buffer: &mut [u8]) -> Option<usize> {
+        let marks = self.0.each_ref().map(|page| {
+            let bytes = page.bytes().get(..PAGE_BYTES).unwrap_or_default();
+            (is_marked(bytes.first()), is_marked(bytes.last()))
+        });
+        if marks == [(true, true); 2] || marks.iter().any(|(start, _)| !start) {
+            return None;
+        }
+        let mut readable = |hidden| {
+            Setting::ALL.map(|setting| self.fetch(setting, Some(hidden), buffer).is_some())
+        };
+        let of_page = [readable(1), readable(0)];
+        let may_go = |page: &usize| {
+            let (Some(own), Some(other)) = (of_page.get(*page), of_page.get(1 - page)) else {
+                return false;
+            };
+            let is_partial = marks.get(1 - page) == Some(&(true, false));
+            is_partial
+                && other.contains(&true)
+                && own.iter().zip(other).all(|(own, other)| own <= other)
+        };
+        [0, 1].into_iter().find(may_go)
+    }
+
+    fn fetch<'b>(
+        &mut self,
+        setting: Setting,
+        hidden: Option<usize>,
+        buffer: &'b mut [u8],
+    ) -> Option<&'b [u8]> {
+        let mut map = self.map(hidden);
+        let fetched = at_once(map.fetch_item::<&[u8]>(buffer, &(setting as u8)));
+        fetched?.ok()?.filter(|bytes| !bytes.is_empty())
     }
 
     fn store(
@@ -59,7 +99,7 @@ impl<S: Slot> SettingPages<S> {
         parts: &[&[u8]],
         buffer: &mut [u8],
     ) -> Result<(), KeepError> {
-        match at_once(self.map().store_item(buffer, &(setting as u8), &Parts(parts))) {
+        match at_once(self.map(None).store_item(buffer, &(setting as u8), &Parts(parts))) {
             Some(Ok(())) => Ok(()),
             Some(Err(Error::SerializationError(_) | Error::ItemTooBig | Error::FullStorage)) => {
                 Err(KeepError::TooLarge)
@@ -68,11 +108,13 @@ impl<S: Slot> SettingPages<S> {
         }
     }
 
-    /// Erases pages that count as free without being blank: something else left them, or an erase that was cut.
-    fn blank_free_pages(&mut self) -> Result<(), KeepError> {
-        for page in &mut self.0 {
+    /// Erases pages that count as free without being blank, and one that is left over: something else left them, or an
+    /// erase that was cut.
+    fn blank_free_pages(&mut self, buffer: &mut [u8]) -> Result<(), KeepError> {
+        let left_over = self.left_over(buffer);
+        for (number, page) in self.0.iter_mut().enumerate() {
             let bytes = page.bytes().get(..PAGE_BYTES).ok_or(KeepError::Failed)?;
-            let in_use = bytes.first().is_some_and(|mark| mark.count_zeros() >= 4);
+            let in_use = is_marked(bytes.first()) && left_over != Some(number);
             if !in_use && bytes.iter().any(|byte| *byte != 0xFF) {
                 page.erase().map_err(|FlashError| KeepError::Failed)?;
             }
@@ -83,8 +125,8 @@ impl<S: Slot> SettingPages<S> {
 
 impl<S: Slot> Keeper for SettingPages<S> {
     fn read<'b>(&mut self, setting: Setting, buffer: &'b mut [u8]) -> Option<&'b [u8]> {
-        let fetched = at_once(self.map().fetch_item::<&[u8]>(buffer, &(setting as u8)));
-        fetched?.ok()?.filter(|bytes| !bytes.is_empty())
+        let left_over = self.left_over(buffer);
+        self.fetch(setting, left_over, buffer)
     }
 
     fn keep(
@@ -97,7 +139,7 @@ impl<S: Slot> Keeper for SettingPages<S> {
         if kept.iter().eq(parts.iter().copied().flatten()) {
             return Ok(false);
         }
-        self.blank_free_pages()?;
+        self.blank_free_pages(buffer)?;
         let mut stored = Err(KeepError::Failed);
         for _ in 0..ATTEMPTS {
             if stored == Err(KeepError::Failed) {
@@ -108,11 +150,16 @@ impl<S: Slot> Keeper for SettingPages<S> {
             && Setting::ALL.iter().all(|setting| self.read(*setting, buffer).is_none())
         {
             // Nothing can be lost.
-            at_once(self.map().erase_all()).and_then(Result::ok).ok_or(KeepError::Failed)?;
+            at_once(self.map(None).erase_all()).and_then(Result::ok).ok_or(KeepError::Failed)?;
             stored = self.store(setting, parts, buffer);
         }
         stored.map(|()| true)
     }
+}
+
+/// Whether the byte of a mark counts as marked: half of its bits are programmed. `sequential-storage` says so.
+fn is_marked(byte: Option<&u8>) -> bool {
+    byte.is_some_and(|mark| mark.count_zeros() >= 4)
 }
 
 /// The output of `future`, which waits for nothing.
@@ -147,7 +194,11 @@ impl<'a> Value<'a> for Parts<'a> {
 }
 
 /// Two pages, one behind the other, as flash for `sequential-storage`.
-struct Pages<'s, S>(&'s mut [S; 2]);
+struct Pages<'s, S> {
+    slots: &'s mut [S; 2],
+    /// Number of a page that reads as blank.
+    hidden: Option<usize>,
+}
 
 impl NorFlashError for FlashError {
     fn kind(&self) -> NorFlashErrorKind {
@@ -163,8 +214,12 @@ impl<S: Slot> ReadNorFlash for Pages<'_, S> {
     const READ_SIZE: usize = 1;
 
     async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
-        let (page, place) = place(offset);
-        let page = self.0.get(page).ok_or(FlashError)?;
+        let (number, place) = place(offset);
+        if self.hidden == Some(number) {
+            bytes.fill(0xFF);
+            return Ok(());
+        }
+        let page = self.slots.get(number).ok_or(FlashError)?;
         let source = page.bytes().get(place..).and_then(|rest| rest.get(..bytes.len()));
         source.map(|source| bytes.copy_from_slice(source)).ok_or(FlashError)
     }
@@ -179,7 +234,7 @@ impl<S: Slot> NorFlash for Pages<'_, S> {
     const ERASE_SIZE: usize = PAGE_BYTES;
 
     async fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
-        for (page, start) in self.0.iter_mut().zip((0..).step_by(PAGE_BYTES)) {
+        for (page, start) in self.slots.iter_mut().zip((0..).step_by(PAGE_BYTES)) {
             if (from..to).contains(&start) {
                 page.erase()?;
             }
@@ -189,7 +244,7 @@ impl<S: Slot> NorFlash for Pages<'_, S> {
 
     async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
         let (page, place) = place(offset);
-        self.0.get_mut(page).ok_or(FlashError)?.write(place, bytes)
+        self.slots.get_mut(page).ok_or(FlashError)?.write(place, bytes)
     }
 }
 

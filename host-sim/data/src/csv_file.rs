@@ -60,12 +60,11 @@ pub fn write_columns<'n, L: IntoIterator<Item = f64>>(
     let columns: Vec<Column<'n>> = columns.into_iter().collect();
     let error = |cause| Error::write(path, cause);
     output::write_whole(path, |file| {
-        let mut header = csv::Writer::from_writer(&mut *file);
-        let header_written = header
-            .write_record(columns.iter().map(|column| column.name))
-            .and_then(|()| Ok(header.flush()?));
-        drop(header);
-        header_written.map_err(|e| error(e.into()))?;
+        let mut header = csv::Writer::from_writer(Vec::new());
+        let header_written = header.write_record(columns.iter().map(|column| column.name));
+        header_written.map_err(|cause| error(cause.into()))?;
+        let header = header.into_inner().map_err(|cause| error(cause.into_error()))?;
+        file.write_all(&header).map_err(error)?;
         let mut lines = lines.into_iter();
         let mut pieces = vec![Piece::default(); PIECES];
         loop {

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::columns;
 use crate::error::{Error, Problem, Result};
+use crate::input;
 
 mod csv;
 mod npy;
@@ -33,11 +34,12 @@ impl DataFile {
     /// `c1`, `c2`, …
     ///
     /// # Errors
-    /// [`Error::Read`] if the file cannot be read. [`Error::File`] for an empty file, a missing or
+    /// [`Error::Read`] if the file cannot be read. [`Error::File`] for a file beyond
+    /// [`input::MOST_DATA_BYTES`], an empty file, a missing or
     /// repeated column name, a line with too few or too many fields, or a field that is not a number. Also for arrays
     /// of more than two dimensions, of other elements than numbers, or of different lengths.
     pub fn read(path: &Path) -> Result<Self> {
-        Self::read_bytes(path, false)
+        Self::parse(path, &input::read(path, input::MOST_DATA_BYTES)?, false)
     }
 
     /// Reads the file at `path` as [`read`](Self::read) does, but for the first line of a CSV file: it is a header even
@@ -46,19 +48,23 @@ impl DataFile {
     /// # Errors
     /// As [`read`](Self::read).
     pub fn read_with_header(path: &Path) -> Result<Self> {
-        Self::read_bytes(path, true)
+        Self::parse(path, &input::read(path, input::MOST_DATA_BYTES)?, true)
     }
 
-    fn read_bytes(path: &Path, has_header: bool) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|cause| Error::read(path, cause))?;
+    /// Parses `bytes` as [`read`](Self::read) does those of the file at `path`, whose extension tells what they are. The
+    /// first line of a CSV file is a header even if it holds numbers alone, if it `has_header`.
+    ///
+    /// # Errors
+    /// [`Error::File`] as [`read`](Self::read).
+    pub fn parse(path: &Path, bytes: &[u8], has_header: bool) -> Result<Self> {
         let ends_in =
             |kind: &str| path.extension().is_some_and(|end| end.eq_ignore_ascii_case(kind));
         if ends_in("npy") {
-            npy::parse_array(path, &bytes)
+            npy::parse_array(path, bytes)
         } else if ends_in("npz") {
-            npy::parse_archive(path, &bytes)
+            npy::parse_archive(path, bytes)
         } else {
-            csv::parse(path, &bytes, has_header)
+            csv::parse(path, bytes, has_header)
         }
     }
 

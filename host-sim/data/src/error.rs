@@ -107,6 +107,17 @@ impl Error {
     }
 }
 
+/// Number of bytes in the unit that people use for it.
+#[must_use]
+pub fn in_words(bytes: u64) -> String {
+    match bytes {
+        0..1_000 => format!("{bytes} bytes"),
+        1_000..1_000_000 => format!("{} kB", bytes / 1_000),
+        1_000_000..1_000_000_000 => format!("{} MB", bytes / 1_000_000),
+        _ => format!("{:.1} GB", bytes as f64 / 1e9),
+    }
+}
+
 /// Role of the columns that a pattern selects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
@@ -150,6 +161,12 @@ pub enum Problem {
     /// File with a header and nothing else.
     #[error("the file has a header but no line of data")]
     NoLines,
+    /// File larger than any that is read.
+    #[error("it has more than {}; check the path", in_words(*most_bytes))]
+    FileTooLarge {
+        /// Largest size that is read, in bytes.
+        most_bytes: u64,
+    },
     /// Blank line in a file of one column, where it could be a missing value.
     #[error("line {line} is blank; in a file of one column write NaN for a missing value")]
     BlankLine {

@@ -8,6 +8,7 @@ mod elementary;
 pub mod random;
 pub mod digest;
 pub mod progress;
+pub mod input;
 pub mod output;
 pub mod columns;
 pub mod csv_file;

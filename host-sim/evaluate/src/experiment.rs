@@ -8,12 +8,12 @@ use std::path::Path;
 use model_core::blob::NoiseKind as BlobNoiseKind;
 use model_core::rbf::Format;
 use serde::Deserialize;
-use taxel_data::BadValue;
 use taxel_data::dataset::Dataset;
 use taxel_data::digest::digest;
 use taxel_data::error::require;
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
+use taxel_data::{BadValue, input};
 use taxel_learn::train::{FreshFrames, check_spread};
 use taxel_learn::{Options, Origin, relative};
 use taxel_limit::Reference;
@@ -127,11 +127,14 @@ impl Experiment {
             return Self::parse(name_or_path, text);
         }
         let path = Path::new(name_or_path);
-        let text = std::fs::read_to_string(path).map_err(|cause| {
-            let names: Vec<_> = EMBEDDED.iter().map(|(name, _)| *name).collect();
-            let known = names.join(", ");
-            let hint = format!("{cause}; built-in scenes are: {known}");
-            taxel_data::Error::read(path, std::io::Error::new(cause.kind(), hint))
+        let text = input::read_text(path).map_err(|error| match error {
+            taxel_data::Error::Read { path, cause } => {
+                let names: Vec<_> = EMBEDDED.iter().map(|(name, _)| *name).collect();
+                let known = names.join(", ");
+                let hint = format!("{cause}; built-in scenes are: {known}");
+                taxel_data::Error::read(&path, std::io::Error::new(cause.kind(), hint))
+            }
+            other => other,
         })?;
         Self::parse(name_or_path, &text)
     }
@@ -146,10 +149,9 @@ impl Experiment {
             message: cause.to_string().trim_end().to_owned(),
         })?;
         let experiment = file.into_experiment(digest(text.as_bytes()));
-        match experiment.check() {
-            Ok(()) => Ok(experiment),
-            Err(cause) => Err(Error::Scene { scene: origin.into(), cause }),
-        }
+        experiment
+            .and_then(|experiment| experiment.check().map(|()| experiment))
+            .map_err(|cause| Error::Scene { scene: origin.into(), cause })
     }
 
     /// Options for training the scene's model.

@@ -9,12 +9,15 @@ use model_core::blob::{
 use model_core::confidence::Confidence;
 use model_core::expansion::Expansion;
 use model_core::rbf::Network;
-use taxel_data::columns;
 use taxel_data::dataset::Dataset;
+use taxel_data::{columns, input};
 
 use crate::error::{Error, Result};
 use crate::infer::{Exponential, infer};
 use crate::train::{self, FittedNetwork, Trained};
+
+/// Largest blob in bytes that is read: 256 MB.
+pub const MOST_BLOB_BYTES: u64 = 256_000_000;
 
 /// Origin of a model's training data, for the blob's metadata.
 #[derive(Debug, Clone, PartialEq)]
@@ -136,9 +139,9 @@ impl ModelBlob {
     /// Reads and checks the blob at `path`.
     ///
     /// # Errors
-    /// [`Error::Data`] for a file that cannot be read, [`Error::Blob`] for a blob that is rejected.
+    /// [`Error::Data`] for a file that cannot be read or is larger than [`MOST_BLOB_BYTES`], [`Error::Blob`] for a blob that is rejected.
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|cause| taxel_data::Error::read(path, cause))?;
+        let bytes = input::read(path, MOST_BLOB_BYTES)?;
         Self::of_bytes(&bytes).map_err(|cause| Error::Blob { path: path.into(), cause })
     }
 

@@ -22,6 +22,7 @@ pub(crate) mod principal;
 pub mod format;
 pub mod projection;
 pub mod output_rank;
+pub mod memory;
 pub mod layers;
 pub mod refine;
 
@@ -66,7 +67,12 @@ pub struct Options {
     /// Number of components that the network for all rows computes, which are expanded to its outputs; `None` for a
     /// network that computes all outputs.
     pub output_rank: Option<usize>,
+    /// Memory in bytes that training may take, about. More is refused before it is taken.
+    pub most_memory_bytes: u64,
 }
+
+/// Memory in bytes that training may take unless a user says otherwise: 8 GB.
+pub const USUAL_MEMORY_BYTES: u64 = 8_000_000_000;
 
 impl Default for Options {
     fn default() -> Self {
@@ -81,6 +87,7 @@ impl Default for Options {
             whole_array: false,
             features: None,
             output_rank: None,
+            most_memory_bytes: USUAL_MEMORY_BYTES,
         }
     }
 }

@@ -3,6 +3,7 @@
 use firmware::readout::ScanSettings;
 use taxel_data::BadValue;
 use taxel_data::error::require;
+use taxel_data::input::MOST_VALUES;
 
 use crate::drift::Drift;
 use crate::motion::{self, Independent, Press};
@@ -13,9 +14,6 @@ use crate::rubber;
 use crate::sensor::{Precision, Sensor};
 
 type Check = std::result::Result<(), BadValue>;
-
-/// Largest number of values that one data set may hold: 4 GB.
-const MOST_VALUES: usize = 500_000_000;
 
 /// World to be simulated, and the part of it that is wanted.
 #[derive(Debug, Clone, PartialEq)]
@@ -164,6 +162,15 @@ impl World {
                 "give from 1 to {most} frames; a frame has {of_a_frame} numbers, and a data set of more \
                  than {MOST_VALUES} does not fit in memory"
             )
+        })?;
+        let nodes =
+            rows * self.sensor.electrodes_per_row_wire * self.sensor.lower_electrodes_mm.len();
+        let most = MOST_NODES_OF_FRAMES / nodes;
+        require(frames <= most, field, frames, || {
+            format!(
+                "give at most {most} frames; a frame has {nodes} pairs of an upper and a lower electrode, and more \
+                 than {MOST_NODES_OF_FRAMES} take hours"
+            )
         })
     }
 }
@@ -198,11 +205,36 @@ fn count(field: &str, value: usize, most: usize) -> Check {
     require((1..=most).contains(&value), field, value, || format!("it must be from 1 to {most}"))
 }
 
+/// Most nodes of a sensor: pairs of an upper and a lower electrode. A frame of so many takes some 0.1 s of a core.
+const MOST_NODES: usize = 100_000_000;
+/// Most nodes in all frames of a data set: some 20 minutes of a core.
+const MOST_NODES_OF_FRAMES: usize = 1_000_000_000_000;
+
+/// Checks the numbers of a sensor's wires and of the electrodes on each, before anything is laid out.
+///
+/// # Errors
+/// [`BadValue`] for the first number that is not held, and for more than 100 million nodes: pairs of an upper and a
+/// lower electrode.
+pub fn check_counts(
+    (row_wires, electrodes_per_row_wire): (usize, usize),
+    (column_wires, electrodes_per_column_wire): (usize, usize),
+) -> Check {
+    count("sensor.row_wires", row_wires, 255)?;
+    count("sensor.electrodes_per_row_wire", electrodes_per_row_wire, 1000)?;
+    count("sensor.column_wires", column_wires, 10_000)?;
+    count("sensor.electrodes_per_column_wire", electrodes_per_column_wire, 1000)?;
+    let (upper, lower) =
+        (row_wires * electrodes_per_row_wire, column_wires * electrodes_per_column_wire);
+    require(upper * lower <= MOST_NODES, "sensor", format!("{upper} × {lower} electrodes"), || {
+        format!(
+            "a frame may have at most {MOST_NODES} pairs of an upper and a lower electrode; give fewer electrodes"
+        )
+    })
+}
+
 fn sensor(sensor: &Sensor) -> Check {
-    count("sensor.row_wires", sensor.row_wires, 255)?;
-    count("sensor.electrodes_per_row_wire", sensor.electrodes_per_row_wire, 1000)?;
-    count("sensor.column_wires", sensor.column_wires, 10_000)?;
-    count("sensor.electrodes_per_column_wire", sensor.electrodes_per_column_wire, 1000)?;
+    let of_rows = (sensor.row_wires, sensor.electrodes_per_row_wire);
+    check_counts(of_rows, (sensor.column_wires, sensor.electrodes_per_column_wire))?;
     for (axis, value) in ["x", "y", "z"].iter().zip(sensor.size_mm) {
         positive(&format!("sensor.size_mm ({axis})"), value)?;
     }

@@ -8,7 +8,6 @@ use host_sim::{Error, Result};
 use serde::Serialize;
 use taxel_data::csv_file::{self, Column};
 use taxel_data::data_file::DataFile;
-use taxel_data::output;
 use taxel_data::table::Table;
 use taxel_learn::infer::is_missing;
 use taxel_learn::{Exponential, ModelBlob, PreparedModel};
@@ -67,7 +66,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let baseline = arguments.baseline.baseline.as_ref().unwrap_or(&arguments.readings);
     let joined = arguments.file.join().unwrap_or(&arguments.readings);
     let read = [&*arguments.model, &arguments.readings, baseline, joined];
-    output::check_writable(&arguments.output, &read)?;
+    print::check_output(&arguments.output, &read)?;
     let blob = ModelBlob::read(&arguments.model)?;
     let model = blob.prepare(arguments.exponential);
     let model = arguments.baseline.apply(model, &arguments.model, arguments.file.fields())?;

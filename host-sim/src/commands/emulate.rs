@@ -11,9 +11,9 @@ use taxel_rig::device::check::{Findings, check};
 use taxel_rig::device::scan;
 use taxel_rig::emulator::{self, Emulator};
 
-use super::Common;
 use super::check_arguments::{CheckArguments, Checked, conclude};
 use super::progress::Terminal;
+use super::{Common, print};
 
 /// Frames on their way at a time: either line holds bytes back while the device is busy.
 const WINDOW: usize = 4;
@@ -67,14 +67,17 @@ pub struct Arguments {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if let Some(log) = &arguments.log {
-        output::check_writable(log, &[&arguments.image])?;
+        print::check_output(log, &[&arguments.image])?;
     }
+    let scratch = output::Scratch::new();
+    let scratch =
+        scratch.map_err(|cause| taxel_data::Error::write(&std::env::temp_dir(), cause))?;
     let options = emulator::Options {
         qemu: arguments.qemu.clone(),
         image: arguments.image.clone(),
         model: None,
-        log: arguments.log.is_some().then(|| temporary("log.defmt")),
-        mailbox: (arguments.line == Line::Mailbox).then(|| temporary("mailbox.ram")),
+        log: arguments.log.is_some().then(|| scratch.path().join("log.defmt")),
+        mailbox: (arguments.line == Line::Mailbox).then(|| scratch.path().join("mailbox.ram")),
         readout: arguments.scans > 0,
     };
     options.check()?;
@@ -91,7 +94,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     };
 
     // QEMU puts the blob at the place where a board has it in flash.
-    let blob = temporary("model.bin");
+    let blob = scratch.path().join("model.bin");
     let written = std::fs::write(&blob, model.bytes());
     written.map_err(|cause| taxel_data::Error::write(&blob, cause))?;
     let log = options.log.clone();
@@ -109,18 +112,11 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         let plan = arguments.check.plan(WINDOW, common);
         Ok(Findings { scans, ..check(&mut device, &frames, &model, &plan, &progress)? })
     });
-    // Only killing the program leaves these files behind.
-    let _ = std::fs::remove_file(&blob);
     if let Some((temporary, wanted)) = log.zip(arguments.log.as_ref()) {
         let logged = std::fs::read(&temporary).unwrap_or_default();
-        let _ = std::fs::remove_file(&temporary);
         if !logged.is_empty() {
             output::write_bytes(wanted, &logged)?;
         }
     }
     conclude(&outcome?, &arguments.check.limits, common)
-}
-
-fn temporary(name: &str) -> PathBuf {
-    std::env::temp_dir().join(format!("taxel-{}-{name}", std::process::id()))
 }

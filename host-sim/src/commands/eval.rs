@@ -77,7 +77,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             .into_iter()
             .chain(others.into_iter().flatten())
             .collect();
-        output::check_writable(html, &inputs)?;
+        print::check_output(html, &inputs)?;
     }
     let blob = ModelBlob::read(&arguments.model)?;
     let model = blob.prepare(arguments.exponential);

@@ -8,7 +8,6 @@ use host_sim::experiment::Experiment;
 use serde::Serialize;
 use taxel_data::csv_file;
 use taxel_data::data_file::DataFile;
-use taxel_data::output;
 use taxel_simulate::forward::forward;
 
 use super::{Common, print};
@@ -37,7 +36,7 @@ struct Summary {
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let scene = Experiment::load(&arguments.scene)?;
     let file = DataFile::read(&arguments.deformation)?;
-    output::check_writable(&arguments.output, &[&arguments.deformation, arguments.scene.as_ref()])?;
+    print::check_output(&arguments.output, &[&arguments.deformation, arguments.scene.as_ref()])?;
     let readings = forward(&scene.world, &file)?;
     let names = scene.world.reading_names();
     let lines = readings.chunks_exact(names.len()).map(|line| line.iter().copied());

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use host_sim::Result;
 use serde::Serialize;
-use taxel_data::{csv_file, output};
+use taxel_data::csv_file;
 
 use super::data_file::{FieldArguments, JoinArguments};
 use super::{Common, print};
@@ -43,7 +43,7 @@ struct Summary {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    output::check_writable(&arguments.output, &[&arguments.first, &arguments.second])?;
+    print::check_output(&arguments.output, &[&arguments.first, &arguments.second])?;
     let first = arguments.fields.read(&arguments.first)?;
     let second = arguments.fields.read(&arguments.second)?;
     let joined = arguments.how.join(&first, &second)?;

@@ -6,7 +6,7 @@ use clap::Args;
 use host_sim::evaluate::limit::{self, Candidate, Figures, Level, LimitResult, Plan};
 use host_sim::metrics::DecoderErrors;
 use host_sim::{Error, Result, report};
-use taxel_data::output;
+use taxel_data::output::FileSet;
 use taxel_learn::ModelBlob;
 use taxel_limit::identify::Observability;
 
@@ -14,8 +14,9 @@ use super::progress::Terminal;
 use super::scene_argument::SceneArgument;
 use super::{Common, print};
 
-/// Names of all files that `-o` writes.
-const FILES: [&str; 4] = ["limit.json", "limit.html", "directions.svg", "known.svg"];
+/// All files that `-o` writes.
+const FILES: FileSet =
+    FileSet { name: "limit", files: &["limit.json", "limit.html", "directions.svg", "known.svg"] };
 /// Singular values that are printed of each row.
 const PRINTED_VALUES: usize = 6;
 
@@ -83,27 +84,19 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     });
     let models: Vec<Candidate> = models.collect::<Result<_>>()?;
     let plan = Plan { noise_levels, frames, geometry: arguments.geometry, models: &models };
-    let compute = || {
-        let result = limit::compute(&scene, &plan, &Terminal::new())?;
-        if let Some(folder) = &arguments.output {
-            write_files(folder, &result)?;
-        }
-        if common.json {
-            print::json(&result)?;
-        } else {
-            page_of(&result, arguments.output.as_deref()).print()?;
-        }
-        refusal(&result)
-    };
-    match &arguments.output {
-        Some(folder) => output::in_folder(folder, || {
-            for file in FILES {
-                output::check_writable(&folder.join(file), &[arguments.scene.path()])?;
-            }
-            compute()
-        }),
-        None => compute(),
+    if let Some(folder) = &arguments.output {
+        FILES.check(folder, &[arguments.scene.path()])?;
     }
+    let result = limit::compute(&scene, &plan, &Terminal::new())?;
+    if let Some(folder) = &arguments.output {
+        write_files(folder, &result)?;
+    }
+    if common.json {
+        print::json(&result)?;
+    } else {
+        page_of(&result, arguments.output.as_deref()).print()?;
+    }
+    refusal(&result)
 }
 
 fn of_noise(level: f64, rule: &str) -> Error {
@@ -124,11 +117,11 @@ fn refusal(result: &LimitResult) -> Result<()> {
 
 fn write_files(folder: &Path, result: &LimitResult) -> Result<()> {
     let json = print::json_text(result)?;
-    let [json_file, page, directions, known] = FILES.map(|file| folder.join(file));
-    output::write_bytes(&json_file, json.as_bytes())?;
-    output::write_bytes(&page, report::limit_html(result).as_bytes())?;
-    output::write_bytes(&directions, report::directions_svg(result).as_bytes())?;
-    Ok(output::write_bytes(&known, report::known_svg(result).as_bytes())?)
+    let page = report::limit_html(result);
+    let (directions, known) = (report::directions_svg(result), report::known_svg(result));
+    let contents = [&json, &page, &directions, &known].map(String::as_bytes);
+    let files: Vec<(&str, &[u8])> = FILES.files.iter().copied().zip(contents).collect();
+    Ok(FILES.write(folder, &files)?)
 }
 
 fn page_of(result: &LimitResult, folder: Option<&Path>) -> print::Page {
@@ -150,7 +143,7 @@ fn page_of(result: &LimitResult, folder: Option<&Path>) -> print::Page {
         geometry(&mut page, result);
     }
     if let Some(folder) = folder {
-        page.line(format_args!("\nwritten to {}: {}", folder.display(), FILES.join(", ")));
+        page.line(format_args!("\nwritten to {}: {}", folder.display(), FILES.files.join(", ")));
     }
     page
 }

@@ -150,7 +150,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let open = || -> Result<_> {
         let mut device = Device::new(serial::open(&arguments.port, arguments.baud)?)?;
         device.lease = Duration::from_millis(arguments.lease_ms.into());
-        device.stop = Some(interruption::flag()?);
+        device.stop = Some(interruption::flag());
         Ok(device)
     };
     match &arguments.action {

@@ -28,6 +28,9 @@ pub struct ModelArguments {
     /// Number format of the weights [default: the scene's, or f32].
     #[arg(long, value_name = "FORMAT", value_parser = format())]
     format: Option<Format>,
+    /// Memory in GB that training may take; where it would take more, it is refused at once [default: 8].
+    #[arg(long, value_name = "GB")]
+    most_memory: Option<u32>,
 }
 
 impl ModelArguments {
@@ -40,6 +43,9 @@ impl ModelArguments {
         }
         options.features = self.features.or(options.features);
         options.output_rank = self.output_rank.or(options.output_rank);
+        if let Some(most_gb) = self.most_memory {
+            options.most_memory_bytes = u64::from(most_gb) * 1_000_000_000;
+        }
         options.format = self.format.unwrap_or(options.format);
         options
     }

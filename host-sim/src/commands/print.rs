@@ -1,8 +1,10 @@
 //! Printing of results on stdout: aligned tables for people, JSON for programs.
 
 use std::fmt::{Display, Write as _};
-use std::io::Write as _;
+use std::io::{ErrorKind, Write as _};
+use std::path::Path;
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use host_sim::by_depth::DepthErrors;
@@ -10,6 +12,7 @@ use host_sim::metrics::{Definition, Errors};
 use host_sim::verdict::Verdict;
 use host_sim::{Error, Result};
 use serde::Serialize;
+use taxel_data::output;
 
 /// Page of text for people, printed as a whole.
 #[derive(Default)]
@@ -24,15 +27,32 @@ impl Page {
 
     /// Prints the page.
     pub fn print(self) -> Result<()> {
-        to_stdout(&self.0)
+        show(&self.0)
     }
 }
 
-/// Writes to stdout; a reader who has seen enough (`| head`) is no failure.
-fn to_stdout(text: &str) -> Result<()> {
-    match std::io::stdout().write_all(text.as_bytes()) {
-        Err(cause) if cause.kind() != std::io::ErrorKind::BrokenPipe => {
-            Err(Error::Failed(format!("cannot write to stdout: {cause}")))
+/// Whether stdout is taken by an output, so that results go to stderr.
+static STDOUT_IS_TAKEN: AtomicBool = AtomicBool::new(false);
+
+/// Checks before long work that an output can be written to `path`, and would replace none of the `inputs`. If it is
+/// stdout, results go to stderr from now on.
+pub fn check_output(path: &Path, inputs: &[&Path]) -> Result<()> {
+    if output::is_stdout(path) {
+        STDOUT_IS_TAKEN.store(true, Ordering::Relaxed);
+    }
+    Ok(output::check_writable(path, inputs)?)
+}
+
+/// Shows a result; a reader who has seen enough (`| head`) is no failure.
+fn show(text: &str) -> Result<()> {
+    let (place, written) = if STDOUT_IS_TAKEN.load(Ordering::Relaxed) {
+        ("stderr", std::io::stderr().write_all(text.as_bytes()))
+    } else {
+        ("stdout", std::io::stdout().write_all(text.as_bytes()))
+    };
+    match written {
+        Err(cause) if cause.kind() != ErrorKind::BrokenPipe => {
+            Err(Error::Failed(format!("cannot write to {place}: {cause}")))
         }
         _ => Ok(()),
     }
@@ -78,7 +98,7 @@ fn document(result: &impl Serialize, timed: bool) -> Result<String> {
 
 /// Prints the result of the command as JSON.
 pub fn json(result: &impl Serialize) -> Result<()> {
-    to_stdout(&document(result, true)?)
+    show(&document(result, true)?)
 }
 
 /// Adds one line a decoder and group, under a header of definitions.

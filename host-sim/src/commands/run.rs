@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use super::progress::Terminal;
 use clap::Args;
 use host_sim::Result;
+use host_sim::evaluate::table1::Table1;
 use host_sim::report::{self, Made};
 use host_sim::run::{self, RunResult};
 use host_sim::subject::Subject;
-use taxel_data::output;
+use taxel_data::output::FileSet;
 use taxel_learn::{ModelBlob, Options};
 
 use super::model_argument::ModelArguments;
@@ -16,12 +17,14 @@ use super::subject_argument::SubjectArgument;
 use super::{Common, command_line, print};
 
 const DEFAULT_OUTPUT: &str = "out";
-/// Names of all files that a run may write.
-const FILES: [&str; 4] = ["model.bin", "metrics.json", "table1.csv", "report.html"];
+/// All files that a run may write.
+const FILES: FileSet =
+    FileSet { name: "run", files: &["model.bin", "metrics.json", "table1.csv", "report.html"] };
 
 /// Do the whole job for a scene or a CSV file: train, write the blob, evaluate, report.
 ///
-/// Writes model.bin, metrics.json, table1.csv and report.html to out/<name>/. Frames of a scene are synthesised. Of a
+/// Writes model.bin, metrics.json, table1.csv and report.html to out/<name>/, all together at the end; those of an
+/// earlier run go. Frames of a scene are synthesised. Of a
 /// CSV file, the last fifth is held out to judge by.
 #[derive(Args)]
 #[command(after_help = "Examples:
@@ -68,12 +71,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     options.penalty = arguments.penalty.or(options.penalty);
     options.check(subject.training_frames())?;
     let folder = arguments.output.join(subject.name());
-    output::in_folder(&folder, || {
-        for file in FILES {
-            output::check_writable(&folder.join(file), &arguments.subject.paths())?;
-        }
-        run_into(&folder, &subject, &options, common)
-    })
+    FILES.check(&folder, &arguments.subject.paths())?;
+    run_into(&folder, &subject, &options, common)
 }
 
 fn run_into(folder: &Path, subject: &Subject, options: &Options, common: &Common) -> Result<()> {
@@ -95,18 +94,17 @@ fn write_files(
     blob: &ModelBlob,
     command: String,
 ) -> Result<Vec<&'static str>> {
-    let mut files = vec!["model.bin", "metrics.json"];
-    output::write_bytes(&folder.join("model.bin"), blob.bytes())?;
     let metrics = print::json_text(result)?;
-    output::write_bytes(&folder.join("metrics.json"), metrics.as_bytes())?;
-    if let Some(table) = &result.table1 {
-        table.write_csv(&folder.join("table1.csv"))?;
-        files.push("table1.csv");
-    }
-    let made = Made { command, files: files.iter().map(|file| (*file).to_owned()).collect() };
-    output::write_bytes(&folder.join("report.html"), report::html(result, &made).as_bytes())?;
-    files.push("report.html");
-    Ok(files)
+    let table = result.table1.as_ref().map(Table1::to_csv);
+    let mut files = vec![("model.bin", blob.bytes()), ("metrics.json", metrics.as_bytes())];
+    files.extend(table.as_ref().map(|table| ("table1.csv", table.as_bytes())));
+    let mut names: Vec<&str> = files.iter().map(|(name, _)| *name).collect();
+    let made = Made { command, files: names.iter().map(|name| (*name).to_owned()).collect() };
+    let page = report::html(result, &made);
+    files.push(("report.html", page.as_bytes()));
+    names.push("report.html");
+    FILES.write(folder, &files)?;
+    Ok(names)
 }
 
 fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {

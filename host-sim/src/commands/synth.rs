@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use host_sim::{Error, Result};
 use serde::Serialize;
+use taxel_data::csv_file;
 use taxel_data::random::Stream;
-use taxel_data::{csv_file, output};
 use taxel_simulate::Synthesis;
 
 use super::scene_argument::{NoiseArgument, SceneArgument};
@@ -52,7 +52,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let mut scene = arguments.scene.load(common)?;
     arguments.noise.apply(&mut scene)?;
     scene.world.check_frames("-n", arguments.frames)?;
-    output::check_writable(&arguments.output, &[arguments.scene.path()])?;
+    print::check_output(&arguments.output, &[arguments.scene.path()])?;
     if !(arguments.scale.is_finite() && arguments.scale > 0.0) {
         let message = format!("--scale {}: give a positive number, such as 1.02", arguments.scale);
         return Err(Error::Usage(message));

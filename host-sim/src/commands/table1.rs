@@ -63,7 +63,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     }
     if let Some(path) = &arguments.output {
         let printed = arguments.printed.as_deref().unwrap_or(argument.path());
-        output::check_writable(path, &[argument.path(), printed])?;
+        print::check_output(path, &[argument.path(), printed])?;
     }
     let printed = match &arguments.printed {
         Some(path) => Printed::from_file(&DataFile::read(path)?)?,
@@ -72,7 +72,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let mut table = table1::compute(&scene, &Terminal::new())?;
     table.printed = printed;
     if let Some(path) = &arguments.output {
-        table.write_csv(path)?;
+        output::write_bytes(path, table.to_csv().as_bytes())?;
     }
     if common.json {
         return print::json(&Summary { subject: scene.name, seed: scene.world.seed, table });

@@ -10,7 +10,7 @@ use host_sim::evaluate::gate::{self, RECOMMENDED_K};
 use host_sim::evaluate::trade::{self, BOARD_CLOCK_MHZ, Bounds, Device, Memory, Plan};
 use host_sim::subject::Subject;
 use host_sim::{Error, Result};
-use taxel_data::{columns, output};
+use taxel_data::columns;
 
 use super::arguments::of_option;
 use super::progress::Terminal;
@@ -25,7 +25,8 @@ mod page;
 /// Trains and judges every number format, exponential, K, affine tail, number of samples averaged and gate.
 /// Marks the Pareto front of error and time of a frame, and chooses the best point within your bounds.
 ///
-/// Writes trade.csv, trade.json, trade.svg and trade.html to out/<scene>/, and with a bound chosen.bin.
+/// Writes trade.csv, trade.json, trade.svg and trade.html to out/<scene>/, and with a bound chosen.bin, all together at
+/// the end; those of an earlier trade go.
 /// The time of a frame is that of the scan, by the plan of the board's firmware (docs/board.md), and of decoding, by
 /// the price list of the firmware's code (docs/cycles.md). Behind a gate cycles are the mean over the test frames, by the
 /// share of untouched rows (docs/trade.md). Bounds that nothing can meet are refused before anything is trained.
@@ -125,20 +126,15 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     };
     bounds.check().map_err(|bad| of_option(bad, &OPTIONS))?;
     let folder = arguments.output.join(subject.name());
-    let (trade, choice) = output::in_folder(&folder, || {
-        for file in files::FILES {
-            output::check_writable(&folder.join(file), &arguments.subject.paths())?;
-        }
-        let computed = trade::compute(&subject, &plan, group, &bounds, &Terminal::new());
-        let mut trade = computed.map_err(|error| match error {
-            Error::Setting(bad) => of_option(bad, &OPTIONS),
-            Error::NoPoint(cause) => Error::Usage(cause.text(option)),
-            other => other,
-        })?;
-        let choice = trade.choose(&bounds);
-        files::write(&folder, &trade, &command())?;
-        Ok::<_, Error>((trade, choice))
+    files::FILES.check(&folder, &arguments.subject.paths())?;
+    let computed = trade::compute(&subject, &plan, group, &bounds, &Terminal::new());
+    let mut trade = computed.map_err(|error| match error {
+        Error::Setting(bad) => of_option(bad, &OPTIONS),
+        Error::NoPoint(cause) => Error::Usage(cause.text(option)),
+        other => other,
     })?;
+    let choice = trade.choose(&bounds);
+    files::write(&folder, &trade, &command())?;
     if common.json {
         print::json(&trade)?;
     } else {

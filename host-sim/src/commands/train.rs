@@ -111,7 +111,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let source = Path::new(&arguments.source);
     let baseline = arguments.subject.data.baseline().unwrap_or(source);
     let joined = arguments.subject.data.file.join().unwrap_or(source);
-    output::check_writable(&arguments.output, &[source, baseline, joined])?;
+    print::check_output(&arguments.output, &[source, baseline, joined])?;
     let subject = load(arguments, common)?;
     let mut options = arguments.model.over(subject.options());
     let set = subject.training_set(1);

@@ -1,7 +1,7 @@
 //! Runs of the binary as by a user, in a folder of the test's own.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, ExitStatus, Output};
 
 use host_sim::experiment::Experiment;
 
@@ -73,6 +73,13 @@ impl Drop for Folder {
     fn drop(&mut self) {
         let _ = std::fs::remove_dir_all(&self.0);
     }
+}
+
+/// Status as a shell tells it: 128 and the signal, if one ended the program.
+#[cfg(unix)]
+pub fn shell_status(status: ExitStatus) -> Option<i32> {
+    use std::os::unix::process::ExitStatusExt;
+    status.code().or(status.signal().map(|signal| 128 + signal))
 }
 
 /// Printed JSON without the time that the command took, which differs from run to run.

@@ -17,6 +17,8 @@ mod interruption;
 mod json_schema;
 mod limit;
 mod measured;
+#[cfg(unix)]
+mod output;
 mod readout;
 mod recalibrate;
 mod refusals;

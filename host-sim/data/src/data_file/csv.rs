@@ -145,13 +145,12 @@ impl LineCount<'_> {
 /// not certain.
 fn lines_of_data<'b>(bytes: &'b [u8], position: &csv::Position) -> Option<(u64, &'b [u8])> {
     let (header, lines) = bytes.split_at_checked(usize::try_from(position.byte()).ok()?)?;
-    let (end, lines) = match (header.last()?, lines.strip_prefix(b"\n")) {
-        (b'\n', _) => (0, lines),
-        (b'\r', Some(lines)) => (1, lines),
+    let lines = match (header.last()?, lines.strip_prefix(b"\n")) {
+        (b'\n', _) => lines,
+        (b'\r', Some(lines)) => lines,
         _ => return None,
     };
-    let ended = memchr::memchr_iter(b'\n', header).count() + end;
-    Some((ended as u64 + 1, lines))
+    Some((LineCount { bytes, at: 0, line: 1 }.of_record_at(position.byte()), lines))
 }
 
 /// Number (from 1) of the first blank line that a line of text follows.

@@ -7,7 +7,8 @@ use npyz::{Deserialize, NpyFile, Order};
 use zip::ZipArchive;
 
 use super::{DataFile, numbered};
-use crate::error::{Error, Problem, Result};
+use crate::error::{Error, Problem, Result, in_words};
+use crate::input::{MOST_DATA_BYTES, MOST_VALUES};
 
 /// Parses one array, `lines × columns` or `lines`, whose columns are called `c1`, `c2`, …
 ///
@@ -29,17 +30,28 @@ pub(super) fn parse_archive(path: &Path, bytes: &[u8]) -> Result<DataFile> {
         .map_err(|cause| unusable(path, format!("not a .npz file: {cause}")))?;
     let mut header: Vec<String> = vec![];
     let mut arrays: Vec<Array> = vec![];
+    let mut left_bytes = MOST_DATA_BYTES;
+    let too_large = || format!("unpacked, the file has more than {}", in_words(MOST_DATA_BYTES));
     for index in 0..archive.len() {
         let mut entry =
             archive.by_index(index).map_err(|cause| unusable(path, cause.to_string()))?;
         let name = entry.name().map_err(|cause| unusable(path, cause.to_string()))?.into_owned();
         let name = name.strip_suffix(".npy").unwrap_or(&name).to_owned();
         let mut stored = vec![];
-        let array = entry
-            .read_to_end(&mut stored)
+        // What is packed may be a thousand times as large as the file.
+        let read = (&mut entry).take(left_bytes + 1).read_to_end(&mut stored);
+        let array = read
             .map_err(|cause| format!("it cannot be read to its end: {cause}"))
-            .and_then(|_| Array::parse(&stored))
+            .and_then(|bytes| {
+                left_bytes = left_bytes.checked_sub(bytes as u64).ok_or_else(too_large)?;
+                Array::parse(&stored)
+            })
             .map_err(|cause| unusable(path, format!("array {name:?}: {cause}")))?;
+        let values = arrays.iter().map(|array| array.values.len()).sum::<usize>();
+        if values + array.values.len() > MOST_VALUES {
+            let cause = format!("its arrays have more than {MOST_VALUES} numbers together");
+            return Err(unusable(path, cause));
+        }
         if let Some(first) = arrays.first()
             && first.lines != array.lines
         {
@@ -90,15 +102,39 @@ fn data_file(
 /// Said of a shape whose number of elements no computer can count.
 const TOO_LARGE: &str = "its shape has more elements than any memory";
 
-/// Checks the shape in the header of a `.npy` file, since the parser multiplies its sizes unchecked.
-fn check_shape(bytes: &[u8]) -> std::result::Result<(), String> {
-    // The dictionary stands on the first line, after the format's version and the line's length.
-    let line = String::from_utf8_lossy(bytes.split(|byte| *byte == b'\n').next().unwrap_or(bytes));
-    let sizes = line.split_once("shape").and_then(|(_, rest)| rest.split_once('('));
-    let sizes = sizes.and_then(|(_, rest)| rest.split_once(')')).map_or("", |(sizes, _)| sizes);
-    let sizes = sizes.split(',').map(str::trim).filter(|size| !size.is_empty());
-    let sizes: Vec<u64> = sizes.map_while(|size| size.parse().ok()).collect();
-    let count = sizes.iter().try_fold(1_u64, |count, size| count.checked_mul((*size).max(1)));
+/// Longest header of a `.npy` file that is read, in bytes: that of numpy itself.
+const MOST_HEADER_BYTES: usize = 10_000;
+/// Deepest nesting of brackets in a header. The dictionary around the shape has two.
+const MOST_BRACKETS: usize = 8;
+
+/// Checks the header of a `.npy` file before the parser sees it, which takes memory for the length that is claimed,
+/// calls itself for every bracket, and multiplies sizes unchecked.
+fn check_header(bytes: &[u8]) -> std::result::Result<(), String> {
+    let Some((head, rest)) = bytes.split_at_checked(8) else { return Ok(()) };
+    let of_length = if head[6] == 1 { 2 } else { 4 };
+    let Some((length, rest)) = rest.split_at_checked(of_length) else { return Ok(()) };
+    let length = length.iter().rev().fold(0_usize, |length, byte| length << 8 | usize::from(*byte));
+    if length > MOST_HEADER_BYTES {
+        return Err(format!(
+            "its header claims {length} bytes and not at most {MOST_HEADER_BYTES}"
+        ));
+    }
+    let header = &rest[..length.min(rest.len())];
+    let open = header.iter().filter(|byte| matches!(byte, b'(' | b'[' | b'{')).count();
+    if open > MOST_BRACKETS {
+        return Err(format!("its header has {open} brackets and not at most {MOST_BRACKETS}"));
+    }
+    let has_sum = header.contains(&b'+');
+    let odd = |pair: &[u8]| {
+        pair[0].is_ascii_digit() && (pair[1].is_ascii_alphabetic() || pair[1] == b'_')
+    };
+    if has_sum || header.windows(2).any(odd) {
+        return Err("its header has other numbers than plain decimal ones".into());
+    }
+    // Every number counts, whether it is a size or not: others are small.
+    let numbers = header.split(|byte| !byte.is_ascii_digit()).filter(|digits| !digits.is_empty());
+    let mut sizes = numbers.map(|digits| str::from_utf8(digits).ok()?.parse::<u64>().ok());
+    let count = sizes.try_fold(1_u64, |count, size| count.checked_mul(size?.max(1)));
     count.map(|_| ()).ok_or_else(|| TOO_LARGE.into())
 }
 
@@ -114,7 +150,7 @@ struct Array {
 impl Array {
     /// Parses an array; the error says what it is instead.
     fn parse(bytes: &[u8]) -> std::result::Result<Self, String> {
-        check_shape(bytes)?;
+        check_header(bytes)?;
         let file = NpyFile::new(bytes).map_err(|cause| format!("not a .npy file: {cause}"))?;
         let shape: Option<Vec<usize>> =
             file.shape().iter().map(|size| usize::try_from(*size).ok()).collect();
@@ -127,6 +163,9 @@ impl Array {
         let count = lines.checked_mul(columns).ok_or(TOO_LARGE)?;
         if count == 0 {
             return Err("it holds no number".into());
+        }
+        if count > MOST_VALUES {
+            return Err(format!("it has {count} numbers and not at most {MOST_VALUES}"));
         }
         let (order, kind) = (file.order(), file.dtype().descr());
         let values = elements::<f64, _>(file, |value| value)

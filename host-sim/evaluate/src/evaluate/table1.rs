@@ -1,13 +1,10 @@
 //! Table 1 of the paper: errors by spread and noise, by every definition.
 
-use std::path::Path;
-
 use rayon::prelude::*;
 use serde::Serialize;
 use taxel_data::data_file::DataFile;
 use taxel_data::dataset::Dataset;
 use taxel_data::error::Problem;
-use taxel_data::output;
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
 use taxel_learn::decoders::standard::{self, StandardNetwork};
@@ -253,14 +250,6 @@ impl Table1 {
             let _ = writeln!(csv, "{noise_level},paper,{spread},dz_mm,as_printed,{percent}");
         }
         csv
-    }
-
-    /// Writes [`to_csv`](Self::to_csv) to `path`.
-    ///
-    /// # Errors
-    /// [`Error`] for a file that cannot be written.
-    pub fn write_csv(&self, path: &Path) -> taxel_data::Result<()> {
-        output::write_bytes(path, self.to_csv().as_bytes())
     }
 
     /// Groups of outputs that the table covers.

@@ -1,6 +1,7 @@
 //! Scene as it stands in its file, before defaults are filled in.
 
 use serde::Deserialize;
+use taxel_data::BadValue;
 use taxel_simulate::World;
 use taxel_simulate::drift::Drift;
 use taxel_simulate::motion;
@@ -9,6 +10,7 @@ use taxel_simulate::outputs::Outputs;
 use taxel_simulate::readout::Readout;
 use taxel_simulate::rubber;
 use taxel_simulate::sensor::{self, Precision, Sensor, Vector3};
+use taxel_simulate::world::check_counts;
 
 use super::{Experiment, Table1, Training};
 
@@ -70,8 +72,14 @@ pub(super) mod format {
 }
 
 impl SceneFile {
-    pub(super) fn into_experiment(self, digest: u64) -> Experiment {
+    /// The experiment, with all defaults.
+    ///
+    /// # Errors
+    /// [`BadValue`] for counts of wires and electrodes that are not held: memory is taken for as many.
+    pub(super) fn into_experiment(self, digest: u64) -> Result<Experiment, BadValue> {
         let s = self.sensor;
+        let of_columns = (s.column_wires, s.electrodes_per_column_wire);
+        check_counts((s.row_wires, s.electrodes_per_row_wire), of_columns)?;
         let sensor = Sensor {
             upper_electrodes_mm: s.upper_electrodes_mm.unwrap_or_else(|| {
                 sensor::default_upper_electrodes_mm(
@@ -101,7 +109,7 @@ impl SceneFile {
             Some(rows) => rows.into_iter().map(|row| row.wrapping_sub(1)).collect(),
             None => (0..sensor.row_wires).collect(),
         };
-        Experiment {
+        Ok(Experiment {
             name: self.name,
             digest,
             world: World {
@@ -118,6 +126,6 @@ impl SceneFile {
             },
             training: self.training,
             table1: self.table1,
-        }
+        })
     }
 }

@@ -97,3 +97,39 @@ fn a_readout_changes_nothing_that_is_synthesised() {
     let frames = |world| synthesise(world, Stream::Training, 20);
     assert_eq!(frames(&scene), frames(&plain));
 }
+
+#[test]
+fn counts_are_checked_before_memory_is_taken_for_them() {
+    let (row, column) = ("electrodes_per_row_wire = 6", "electrodes_per_column_wire = 3");
+    for (field, count, huge) in [
+        ("sensor.row_wires", "\nrow_wires = 8", "1000000000"),
+        ("sensor.electrodes_per_row_wire", row, "6666666666666666662"),
+        ("sensor.electrodes_per_row_wire", row, "100000000000"),
+        ("sensor.column_wires", "\ncolumn_wires = 18", "10001"),
+        ("sensor.electrodes_per_column_wire", column, "1001"),
+    ] {
+        let name = count.split(" = ").next().unwrap();
+        let text = EMBEDDED[1].1.replace(count, &format!("{name} = {huge}"));
+        let refused = Experiment::parse("test", &text).unwrap_err().to_string();
+        assert!(refused.contains(&format!("{field} = {huge}: it must be from 1 to")), "{refused}");
+    }
+}
+
+#[test]
+fn electrodes_and_frames_whose_computing_takes_hours_are_refused() {
+    let of_columns = "\ncolumn_wires = 18\nelectrodes_per_column_wire = 3";
+    let wires = |electrodes: u32| {
+        format!("\ncolumn_wires = 10000\nelectrodes_per_column_wire = {electrodes}")
+    };
+    let huge = EMBEDDED[1].1.replace(of_columns, &wires(1000));
+    let refused = Experiment::parse("test", &huge).unwrap_err().to_string();
+    assert!(refused.contains("48 × 10000000 electrodes"), "{refused}");
+    let one = huge.replace("\nrow_wires = 8", "\nrow_wires = 1");
+    let refused = Experiment::parse("test", &one).unwrap_err().to_string();
+    assert!(refused.contains("training.frames") && refused.contains("take hours"), "{refused}");
+    let large = one.replace(&wires(1000), &wires(100));
+    let scene = Experiment::parse("test", &large).unwrap();
+    // Laid out in linear time: a second where a look at all pairs takes many.
+    let frames = Synthesis::of(&scene.world).frames(Stream::Test, 1);
+    assert!(frames.inputs.values.iter().all(|reading| *reading > 0.0));
+}

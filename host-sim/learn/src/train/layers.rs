@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use rayon::prelude::*;
 use taxel_data::dataset::Dataset;
 
-use super::{Options, Samples, projection, view};
+use super::{Options, Samples, memory, projection, view};
 use crate::error::Result;
 
 /// Hidden layer of a network: its Gaussians.
@@ -31,8 +31,9 @@ impl Layers {
     /// projection by regression.
     ///
     /// # Errors
-    /// [`Error`](crate::Error) for data without a projection.
+    /// [`Error`](crate::Error) for data without a projection, or training that takes more memory than is allowed.
     pub fn start(dataset: &Dataset, options: &Options) -> Result<Self> {
+        memory::check(dataset, options, None)?;
         let fit = || projection::fit(dataset, options.features);
         let projection = options.whole_array.then(fit).transpose()?;
         let start = Self { projection, hidden: vec![] };

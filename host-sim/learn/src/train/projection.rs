@@ -68,6 +68,15 @@ pub fn fit(dataset: &Dataset, features: Option<usize>) -> Result<Vec<f32>> {
     about_means(&parts, &means)
 }
 
+/// Number of features that the readings of `dataset` are projected to, unless there are fewer products of outputs.
+pub(super) fn features_of(dataset: &Dataset, features: Option<usize>) -> usize {
+    let usual = match dataset.rows {
+        1 => USUAL_FEATURES,
+        rows => dataset.inputs.names.len() / rows,
+    };
+    features.unwrap_or(usual)
+}
+
 /// Parameters of the projection with these `parts` (`readings × features`), whose features are 0 at the `means`
 /// of the readings.
 ///

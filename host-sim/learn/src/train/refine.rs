@@ -14,8 +14,8 @@ use taxel_data::dataset::Dataset;
 use taxel_data::error::require;
 use taxel_data::progress::Progress;
 
-use super::Options;
 use super::layers::Layers;
+use super::{Options, memory};
 use crate::error::Result;
 
 mod products;
@@ -88,6 +88,22 @@ impl Refinement {
         Options { penalty: Some(options.penalty.unwrap_or(self.ridge)), ..*options }
     }
 
+    /// Number of pieces in which the samples of a step are held, each with the square of all weights.
+    pub(super) fn pieces(&self, frames: usize, centres: usize, examples: Examples<'_>) -> usize {
+        match examples {
+            Examples::Fresh(_) => self.fresh_frames(centres).div_ceil(products::SIDE),
+            Examples::Folds(fold_of) => {
+                let folds = fold_of.iter().max().map_or(0, |last| last + 1);
+                frames.min(MOST_MEASURED).div_ceil(products::SIDE) + folds
+            }
+        }
+    }
+
+    /// Number of fresh frames that each step looks at.
+    fn fresh_frames(&self, centres: usize) -> usize {
+        self.frames.max(FRAMES_A_CENTRE * centres)
+    }
+
     fn check(&self, examples: Examples<'_>, frames: usize) -> std::result::Result<(), BadValue> {
         require(self.steps > 0, "steps", self.steps, || "give at least 1".into())?;
         require(self.frames > 0, "frames", self.frames, || "give at least 1".into())?;
@@ -113,7 +129,7 @@ impl Refinement {
 /// The refined layers are the same on any number of threads.
 ///
 /// # Errors
-/// [`Error::Setting`](crate::Error::Setting) for settings that cannot be used;
+/// [`Error::Setting`](crate::Error::Setting) for settings that cannot be used, or more memory than is allowed;
 /// [`Error::NoRegression`](crate::Error::NoRegression) for samples without a regression;
 /// [`Error::ProjectionBeyondF32`](crate::Error::ProjectionBeyondF32).
 ///
@@ -128,13 +144,15 @@ pub fn refine(
     progress: &dyn Progress,
 ) -> Result<Layers> {
     settings.check(examples, dataset.frames())?;
+    let pieces = settings.pieces(dataset.frames(), options.centres, examples);
+    memory::check(dataset, options, Some(pieces))?;
     let sources = Sources::of(dataset, layers);
     let start = |layer| Descent::new(&sources, layer, options, settings);
     let mut descents: Vec<Descent> = layers.hidden.iter().enumerate().map(start).collect();
     match examples {
         Examples::Fresh(fresh) => {
             progress.stage("refine", settings.steps);
-            let count = settings.frames.max(FRAMES_A_CENTRE * options.centres);
+            let count = settings.fresh_frames(options.centres);
             for step in 0..settings.steps {
                 let frames = fresh.frames(step, count);
                 let networks = descents.par_iter_mut().enumerate();

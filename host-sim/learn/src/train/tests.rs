@@ -6,6 +6,7 @@ use super::*;
 use crate::decoders::RowDecoder;
 use crate::decoders::standard::StandardNetwork;
 use crate::infer::{Exponential, infer};
+use taxel_data::progress::Silent;
 
 /// Table of `frames` of a smooth function of two inputs, with a little noise.
 fn table(frames: usize, noise: f64) -> RowTable {
@@ -184,4 +185,27 @@ fn a_penalty_is_for_each_frame() {
         assert!(message.starts_with("penalty = "), "{message}");
     }
     with(Some(1e-7)).check(1000).unwrap();
+}
+
+#[test]
+fn training_that_takes_more_memory_than_is_allowed_is_refused_before_it_is_taken() {
+    let names = |count: usize| (0..count).map(|column| format!("c{column}")).collect();
+    let wide = Dataset::empty(names(20_000), vec!["y".into()], 1, 60);
+    let options = Options { centres: 10, ..Options::default() };
+    let refused = train(&wide, &options, &Silent).unwrap_err().to_string();
+    assert!(
+        refused.starts_with("memory = about 12.8 GB: training may take at most 8.0 GB"),
+        "{refused}"
+    );
+    // More may be allowed; and without an affine tail only the linear baseline is as wide.
+    let more = Options { most_memory_bytes: 13_000_000_000, ..options };
+    assert!(super::memory::check(&wide, &more, None).is_ok());
+    // Refinement holds the square of all weights for every piece of the samples.
+    let narrow = Dataset::empty(names(10), vec!["y".into()], 1, 50_000);
+    let many = Options { centres: 4000, ..options };
+    assert!(super::memory::check(&narrow, &many, None).is_ok());
+    assert!(super::memory::check(&narrow, &many, Some(250)).is_err());
+    let fewest = Options { most_memory_bytes: 1_000_000, ..options };
+    let refused = train(&Dataset::empty(names(4), names(1), 1, 50_000), &fewest, &Silent);
+    assert!(refused.unwrap_err().to_string().contains("at most 1 MB"));
 }

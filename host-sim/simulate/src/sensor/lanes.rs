@@ -9,6 +9,8 @@
 
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays are indexed alike")]
 
+use std::collections::HashMap;
+
 use serde::{Deserialize, Serialize};
 use taxel_data::simd::{LANES, Lanes};
 
@@ -67,12 +69,14 @@ impl<'s> LaneModel<'s> {
     /// Prepares `sensor`.
     #[must_use]
     pub fn new(sensor: &'s Sensor) -> Self {
-        let (mut x_mm, mut yz_mm, mut places) = (Vec::new(), Vec::new(), Vec::new());
-        for &[x, y, z] in &sensor.lower_electrodes_mm {
-            places.push([place_of(x, &mut x_mm), place_of([y, z], &mut yz_mm)]);
+        let (mut x, mut yz, mut places) = (Distinct::default(), Distinct::default(), Vec::new());
+        for electrode in &sensor.lower_electrodes_mm {
+            let [at_x, y, z] = *electrode;
+            places.push([x.place_of([at_x]), yz.place_of([y, z])]);
         }
         let is_moderate = has_moderate_distances(sensor);
-        Self { sensor, x_mm, yz_mm, places, is_moderate }
+        let x_mm = x.values.into_iter().flatten().collect();
+        Self { sensor, x_mm, yz_mm: yz.values, places, is_moderate }
     }
 
     /// Computes the resistances in Ω between row-wire `row` and every column-wire.
@@ -254,12 +258,29 @@ fn twice_refined(x: f64, estimate: f32) -> f64 {
     y * (3.0 - x * y * y)
 }
 
-/// Index of `value` in `known`, to which it is added if it is new.
-fn place_of<T: PartialEq>(value: T, known: &mut Vec<T>) -> usize {
-    known.iter().position(|other| *other == value).unwrap_or_else(|| {
-        known.push(value);
-        known.len() - 1
-    })
+/// Distinct coordinates, in the order in which they came.
+struct Distinct<const N: usize> {
+    values: Vec<[f64; N]>,
+    /// Place of each among the values, by its bits.
+    places: HashMap<[u64; N], usize>,
+}
+
+impl<const N: usize> Default for Distinct<N> {
+    fn default() -> Self {
+        Self { values: Vec::new(), places: HashMap::new() }
+    }
+}
+
+impl<const N: usize> Distinct<N> {
+    /// Index of `value`, which is added if it is new.
+    fn place_of(&mut self, value: [f64; N]) -> usize {
+        // Adding 0 makes −0 and 0 the same bits.
+        let bits = value.map(|coordinate| (coordinate + 0.0).to_bits());
+        *self.places.entry(bits).or_insert_with(|| {
+            self.values.push(value);
+            self.values.len() - 1
+        })
+    }
 }
 
 /// Whether all distances between electrodes stay within [`MODERATE_MM`], however these are deformed.

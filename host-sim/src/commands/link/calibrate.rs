@@ -10,6 +10,7 @@ use host_sim::{Error, Result};
 use model_core::Wires;
 use serde::{Deserialize, Serialize};
 use taxel_data::data_file::DataFile;
+use taxel_data::input;
 use taxel_rig::calibration::{CircuitConstants, Fit};
 use taxel_rig::device::calibrate::{Reading, calibrate as find};
 use taxel_rig::device::{Device, Wire};
@@ -193,8 +194,7 @@ fn read_known(path: &Path, names: &[String], wires: Wires) -> Result<Vec<Vec<f64
 
 /// Constants of a file, in place of those `before`.
 fn read_constants(path: &Path, before: &CircuitConstants) -> Result<CircuitConstants> {
-    let text = std::fs::read_to_string(path)
-        .map_err(|cause| taxel_data::Error::Read { path: path.into(), cause })?;
+    let text = input::read_text(path)?;
     let file: File = toml::from_str(&text)
         .map_err(|cause| Error::Usage(format!("{}: {cause}", path.display())))?;
     let mut constants = before.clone();

@@ -6,7 +6,7 @@ use clap::Args;
 use firmware::link::message::{Configuration, Report, Request, Setting};
 use host_sim::{Error, Result};
 use serde::Serialize;
-use taxel_data::{csv_file, output};
+use taxel_data::csv_file;
 use taxel_learn::ModelBlob;
 use taxel_rig::device::{Device, DeviceIdentity, Wire};
 
@@ -71,7 +71,7 @@ pub fn record<W: Wire>(
 ) -> Result<()> {
     let model = action.model.as_ref().map(|path| ModelBlob::read(path)).transpose()?;
     let inputs: Vec<&Path> = action.model.iter().map(PathBuf::as_path).collect();
-    output::check_writable(&action.output, &inputs)?;
+    print::check_output(&action.output, &inputs)?;
     let identity = device.identify()?;
     let (wanted, mut names) = match &model {
         Some(model) => (Wanted::Estimates, output_names(model, &identity, action.recalibrated)?),
@@ -144,7 +144,7 @@ pub fn baseline<W: Wire>(
     action: &BaselineArguments,
     common: &Common,
 ) -> Result<()> {
-    output::check_writable(&action.output, &[])?;
+    print::check_output(&action.output, &[])?;
     let identity = device.identify()?;
     let frames = action.scan.frames;
     let request = Request::CaptureBaseline { frames };

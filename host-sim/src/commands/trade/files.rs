@@ -6,33 +6,30 @@ use std::path::Path;
 use host_sim::evaluate::trade::Trade;
 use host_sim::metrics::Errors;
 use host_sim::{Result, report};
-use taxel_data::output;
+use taxel_data::output::FileSet;
 
 use super::super::print;
 
-/// Names of all files that the command may write.
-pub const FILES: [&str; 5] = ["trade.csv", "trade.json", "trade.svg", "trade.html", "chosen.bin"];
+/// All files that the command may write.
+pub const FILES: FileSet = FileSet {
+    name: "trade",
+    files: &["trade.csv", "trade.json", "trade.svg", "trade.html", "chosen.bin"],
+};
 
-/// Writes all of them to `folder`; `command` is what the user typed.
+/// Writes them to `folder`; `command` is what the user typed.
 pub fn write(folder: &Path, trade: &Trade, command: &str) -> Result<()> {
-    let json = print::json_text(trade)?;
     let csv = csv_of(trade);
-    let texts = [
-        ("trade.csv", csv),
-        ("trade.json", json),
-        ("trade.svg", report::trade_svg(trade)),
-        ("trade.html", report::trade_html(trade, command)),
+    let json = print::json_text(trade)?;
+    let picture = report::trade_svg(trade);
+    let page = report::trade_html(trade, command);
+    let mut files = vec![
+        ("trade.csv", csv.as_bytes()),
+        ("trade.json", json.as_bytes()),
+        ("trade.svg", picture.as_bytes()),
+        ("trade.html", page.as_bytes()),
     ];
-    for (name, text) in texts {
-        output::write_bytes(&folder.join(name), text.as_bytes())?;
-    }
-    let chosen = folder.join("chosen.bin");
-    match trade.chosen {
-        Some(point) => output::write_bytes(&chosen, trade.blob(point))?,
-        // A blob from an earlier run would lie beside figures that are not its own.
-        None => output::remove(&chosen)?,
-    }
-    Ok(())
+    files.extend(trade.chosen.map(|point| ("chosen.bin", trade.blob(point))));
+    Ok(FILES.write(folder, &files)?)
 }
 
 /// Table of all points.

@@ -53,6 +53,8 @@ fn lines_are_counted_as_an_editor_counts_them() {
         ("a,b\r1,2\r3,x\r", 3),
         ("a,b\n\n1,2\n\n\n3,x\n", 6),
         ("\n\na,b\n\"1\",2\n3,x", 5),
+        ("\r\ra,b\n1,2\n3,x\n", 5),
+        ("\r\n\ra,b\r\n1,2\r\n3,x\r\n", 5),
         ("\u{feff}a,b\n1,2\n3,x\n", 3),
     ] {
         let message = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap_err();
@@ -144,4 +146,12 @@ fn other_separators_are_named() {
         assert!(named, "{text:?}: {refused}");
     }
     assert!(parse(Path::new("test.csv"), b"a\n1\n", false).is_ok());
+}
+
+#[test]
+fn a_lone_cr_before_the_header_is_a_line_of_its_own() {
+    for text in ["\r\ra,b\n1,2\n3,4\n", "\r\n\ra,b\r\n1,2\r\n3,4\r\n", "\n\ra,b\n1,2\n3,4\n"] {
+        let file = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap();
+        assert_eq!(file.line_numbers, [4, 5], "{text:?}");
+    }
 }

@@ -125,7 +125,8 @@ fn shapes_that_the_elements_cannot_fill_are_refused_at_once() {
         ("(0, 9223372036854775808, 2)", "more elements than any memory"),
         ("(1000000000000, 0)", "holds no number"),
         ("(0, 1000000000000)", "holds no number"),
-        ("(2, 1000000000000)", "cannot be read to its end"),
+        ("(2, 1000000000000)", "2000000000000 numbers and not at most 500000000"),
+        ("(2, 1000000)", "cannot be read to its end"),
     ] {
         for order in ["False", "True"] {
             let array = with_header("<f8", order, shape);
@@ -140,5 +141,30 @@ fn shapes_that_the_elements_cannot_fill_are_refused_at_once() {
         let array = with_header(kind, "False", "(1, 1)");
         let message = parse_array(path, &array).unwrap_err().to_string();
         assert!(message.contains(kind) && message.contains("float32 and float64"), "{message}");
+    }
+}
+
+/// Header of a `.npy` file of version 2 that claims so many bytes.
+fn claiming(length: u32, text: &[u8]) -> Vec<u8> {
+    [b"\x93NUMPY\x02\x00", &length.to_le_bytes()[..], text].concat()
+}
+
+#[test]
+fn what_a_header_claims_is_checked_before_memory_is_taken_for_it() {
+    let path = Path::new("test.npy");
+    for (bytes, says) in [
+        (claiming(u32::MAX, b"{"), "claims 4294967295 bytes"),
+        (claiming(9_000, &[b'['; 9_000]), "9000 brackets"),
+        (claiming(9_000, &[b'9'; 9_000]), "more elements than any memory"),
+        (with_header("<f8", "False", "[4294967296, 4294967296]"), "more elements than any memory"),
+        (with_header("<f8", "False", "(0xffffffffffffffff, 2)"), "plain decimal"),
+        (with_header("<f8", "False", "(9223372036854775807 + 1, 2)"), "plain decimal"),
+        (with_header("|u1", "False", "(1, 500000001)"), "500000001 numbers and not at most"),
+    ] {
+        let message = parse_array(path, &bytes).unwrap_err().to_string();
+        assert!(message.contains(says), "{message}");
+        let packed = archive(&[("a", bytes)], CompressionMethod::Deflated);
+        let message = parse_archive(path, &packed).unwrap_err().to_string();
+        assert!(message.contains(says), "{message}");
     }
 }

@@ -1,0 +1,72 @@
+//! Input files, read whole up to a size that is told when it is exceeded: not every path names a file that ends.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use crate::error::{Error, Problem, Result};
+
+/// Largest data file in bytes: 2 GB.
+pub const MOST_DATA_BYTES: u64 = 2_000_000_000;
+/// Most bytes that are read of what is no file and may have no end, such as a device or a pipe: 256 MB.
+pub const MOST_STREAM_BYTES: u64 = 256_000_000;
+/// Most numbers that a data file may hold, and a data set of a scene: 4 GB.
+pub const MOST_VALUES: usize = 500_000_000;
+/// Largest text file with settings in bytes, such as a scene's: 16 MB.
+pub const MOST_TEXT_BYTES: u64 = 16_000_000;
+
+/// Reads the file at `path` whole, if it has at most `most_bytes`.
+///
+/// # Errors
+/// [`Error::Read`] if the file cannot be read, [`Error::File`] if it is larger.
+pub fn read(path: &Path, most_bytes: u64) -> Result<Vec<u8>> {
+    let error = |cause| Error::read(path, cause);
+    let file = File::open(path).map_err(error)?;
+    let metadata = file.metadata().map_err(error)?;
+    let most_bytes =
+        if metadata.is_file() { most_bytes } else { most_bytes.min(MOST_STREAM_BYTES) };
+    let too_large = || Error::file(path, Problem::FileTooLarge { most_bytes });
+    // That of a device or a pipe is 0.
+    let length = metadata.len();
+    if length > most_bytes {
+        return Err(too_large());
+    }
+    let mut bytes = Vec::with_capacity(usize::try_from(length).unwrap_or(0));
+    file.take(most_bytes + 1).read_to_end(&mut bytes).map_err(error)?;
+    if bytes.len() as u64 > most_bytes { Err(too_large()) } else { Ok(bytes) }
+}
+
+/// Reads the text file at `path` whole, if it has at most [`MOST_TEXT_BYTES`].
+///
+/// # Errors
+/// As [`read`]; and [`Error::Read`] for bytes that are not UTF-8.
+pub fn read_text(path: &Path) -> Result<String> {
+    String::from_utf8(read(path, MOST_TEXT_BYTES)?).map_err(|cause| {
+        Error::read(path, std::io::Error::new(std::io::ErrorKind::InvalidData, cause.utf8_error()))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_read_up_to_the_size_that_is_allowed() {
+        let name = format!("taxel-input-{}", std::process::id());
+        let path = std::env::temp_dir().join(name);
+        std::fs::write(&path, b"12345").unwrap();
+        assert_eq!(read(&path, 5).unwrap(), b"12345");
+        let refused = read(&path, 4).unwrap_err().to_string();
+        std::fs::remove_file(&path).unwrap();
+        assert!(refused.ends_with("more than 4 bytes; check the path"), "{refused}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_file_without_end_is_refused() {
+        let refused = read(Path::new("/dev/zero"), 1_000_000).unwrap_err().to_string();
+        assert!(refused.contains("/dev/zero") && refused.contains("1 MB"), "{refused}");
+        let refused = read_text(Path::new("/dev/zero")).unwrap_err().to_string();
+        assert!(refused.contains("16 MB"), "{refused}");
+    }
+}

@@ -1,0 +1,61 @@
+//! Memory that training takes at its peak, estimated before it is taken: it grows with the square of the number of
+//! weights, so that a small file may ask for more than a machine has.
+
+use taxel_data::BadValue;
+use taxel_data::dataset::Dataset;
+use taxel_data::error::{in_words, require};
+
+use super::{Options, projection};
+
+/// Copies of the samples that are held at once: as read, by row-wire, scaled, and as features.
+const COPIES: f64 = 4.0;
+/// Triangles of the weights that are held at once while these are fitted: a decomposition, the sum of several, and the
+/// factor that comes of it. Where a number format falls back to another one, there are two decompositions.
+const TRIANGLES: f64 = 4.0;
+/// Matrices as large as all readings and outputs squared that a projection takes.
+const MATRICES: f64 = 4.0;
+/// Bytes of a number.
+const F64: f64 = 8.0;
+
+/// Bytes that training on `dataset` with `options` takes at its peak, about. Refinement holds its samples in so many
+/// `pieces`, each with the square of all weights.
+#[must_use]
+pub fn peak_bytes(dataset: &Dataset, options: &Options, pieces: Option<usize>) -> u64 {
+    let [frames, readings, all_outputs, rows] =
+        [dataset.frames(), dataset.inputs.names.len(), dataset.outputs.names.len(), dataset.rows]
+            .map(|count| count as f64);
+    let features = || projection::features_of(dataset, options.features) as f64;
+    let (networks, inputs) =
+        if options.whole_array { (1.0, features()) } else { (rows, readings / rows) };
+    let outputs = all_outputs / networks;
+    let weights = options.centres as f64 + 1.0 + if options.affine_tail { inputs } else { 0.0 };
+    let at_once = networks.min(rayon::current_num_threads() as f64);
+    let square = weights * (weights + outputs);
+    let fit = TRIANGLES * square * F64;
+    let of_refinement = pieces.map_or(0.0, |pieces| (pieces as f64 + 3.0) * square * F64);
+    let projected = if options.whole_array { (readings + all_outputs).powi(2) } else { 0.0 };
+    // The linear decoder that every model is judged beside.
+    let linear = (readings / rows + 1.0).powi(2) * TRIANGLES * F64;
+    let samples = COPIES * frames * (readings + all_outputs) * F64;
+    let most = [at_once * fit, at_once * of_refinement, MATRICES * projected * F64, linear];
+    (samples + most.into_iter().fold(0.0, f64::max)) as u64
+}
+
+/// Checks that training takes no more memory than the options allow.
+///
+/// # Errors
+/// [`BadValue`] that tells how much it would take.
+pub(super) fn check(
+    dataset: &Dataset,
+    options: &Options,
+    pieces: Option<usize>,
+) -> Result<(), BadValue> {
+    let (needed, most) = (peak_bytes(dataset, options, pieces), options.most_memory_bytes);
+    require(needed <= most, "memory", format!("about {}", in_words(needed)), || {
+        format!(
+            "training may take at most {}; memory grows with the square of the number of centres and, with an affine \
+             tail, of inputs: give fewer, leave out the affine tail, or allow more memory",
+            in_words(most)
+        )
+    })
+}

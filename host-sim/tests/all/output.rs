@@ -1,0 +1,221 @@
+//! Where outputs go, and what is left when the work is interrupted or the disk is full.
+
+use std::fs::{self, File, OpenOptions, Permissions};
+use std::os::unix::fs::{PermissionsExt, symlink};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use crate::common::{Folder, shell_status, small_scene};
+
+/// The program, with the folder of its work.
+fn host(folder: &Folder, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_host-sim"));
+    command
+        .args(arguments)
+        .current_dir(folder.path("."))
+        .stdout(Stdio::null())
+        .stderr(Stdio::null());
+    command
+}
+
+/// Command of a shell that ends as the program, `"$0"`.
+fn shell(folder: &Folder, script: &str) -> Command {
+    let mut command = Command::new("sh");
+    command.args(["-c", script, env!("CARGO_BIN_EXE_host-sim")]).current_dir(folder.path("."));
+    command
+}
+
+fn signal(child: &Child, name: &str) {
+    let status = Command::new("kill").args([name, &child.id().to_string()]).status();
+    assert!(status.unwrap().success());
+}
+
+/// Waits until something is in the folder besides `known` files.
+fn wait_for_more(folder: &Folder, known: usize) {
+    let start = Instant::now();
+    while folder.names().len() <= known {
+        assert!(start.elapsed() < Duration::from_mins(1), "no file appears");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+#[test]
+fn stdout_as_output_is_a_stream_and_results_go_to_stderr() {
+    let folder = Folder::new("stdout");
+    folder.write("scene.toml", small_scene());
+    let fifo = folder.path("fifo");
+    assert!(Command::new("mkfifo").arg(&fifo).status().unwrap().success());
+    let synth = ["synth", "scene.toml", "-n", "2", "-o"];
+    let waiting = host(&folder, &[&synth[..], &["fifo"]].concat()).stderr(Stdio::piped()).spawn();
+
+    for path in ["-", "/dev/stdout", "/dev/fd/1", "link"] {
+        if path == "link" {
+            symlink("/dev/stdout", folder.path(path)).unwrap();
+        }
+        // A file that is appended to keeps what it has.
+        folder.write("log.csv", "precious\n");
+        let log = OpenOptions::new().append(true).open(folder.path("log.csv")).unwrap();
+        let arguments = [&["--json"], &synth[..], &[path]].concat();
+        let output = host(&folder, &arguments).stdout(log).stderr(Stdio::piped()).output().unwrap();
+        assert!(output.status.success(), "{path}");
+        let text = fs::read_to_string(folder.path("log.csv")).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        assert!(lines[0] == "precious" && lines[1].starts_with("r4c1_ohm,"), "{path}: {text}");
+        assert_eq!(lines.len(), 4, "{path}");
+        let summary: serde_json::Value = serde_json::from_slice(&output.stderr).unwrap();
+        assert_eq!(summary["frames"], 2);
+    }
+    // Another file that the shell has open.
+    folder.write("log.csv", "precious\n");
+    let script = "exec 3>> log.csv; exec \"$0\" synth scene.toml -n 2 -o /dev/fd/3";
+    assert!(shell(&folder, script).stdout(Stdio::null()).status().unwrap().success());
+    let text = fs::read_to_string(folder.path("log.csv")).unwrap();
+    assert!(text.starts_with("precious\nr4c1_ohm,") && text.lines().count() == 4, "{text}");
+    assert!(!folder.names().contains(&"-".to_owned()));
+
+    // Somebody who has seen enough.
+    let script = "\"$0\" synth scene.toml -n 3000 -o -; echo $? >&2";
+    let mut child =
+        shell(&folder, script).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    drop(child.stdout.take());
+    let told = String::from_utf8(child.wait_with_output().unwrap().stderr).unwrap();
+    assert!(told.ends_with("frames of 36 readings and 36 outputs in -\n0\n"), "{told}");
+    let full = File::create("/dev/full").unwrap();
+    let mut command = host(&folder, &[&synth[..], &["-"]].concat());
+    let output = command.stdout(full).stderr(Stdio::piped()).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8(output.stderr).unwrap().contains("No space left"));
+    // A log that cannot be written is no reason to stop.
+    let full = File::create("/dev/full").unwrap();
+    let status = host(&folder, &["run", "scene.toml"]).stderr(full).status().unwrap();
+    assert_eq!(status.code(), Some(0));
+
+    let output = waiting.unwrap().wait_with_output().unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(message.contains("cannot write fifo: nobody reads this pipe"), "{message}");
+    let reader = Command::new("cat").arg(&fifo).stdout(Stdio::piped()).spawn().unwrap();
+    folder.succeed(&[&synth[..], &["fifo"]].concat());
+    assert!(reader.wait_with_output().unwrap().stdout.starts_with(b"r4c1_ohm,"));
+}
+
+#[test]
+fn read_only_files_stay_and_links_with_guessed_names_are_not_followed() {
+    let folder = Folder::new("read_only");
+    folder.write("scene.toml", small_scene());
+    for name in ["golden.bin", "victim"] {
+        folder.write(name, "golden");
+    }
+    fs::set_permissions(folder.path("golden.bin"), Permissions::from_mode(0o444)).unwrap();
+    let message = folder.fail(&["train", "scene.toml", "-o", "golden.bin"], 2);
+    assert!(message.contains("cannot write golden.bin: the file is read-only"), "{message}");
+    let script = "ln -s victim .x.csv.$$.tmp; exec \"$0\" synth scene.toml -n 1 -o x.csv";
+    assert!(shell(&folder, script).stdout(Stdio::null()).status().unwrap().success());
+    for name in ["golden.bin", "victim"] {
+        assert_eq!(fs::read_to_string(folder.path(name)).unwrap(), "golden");
+    }
+    symlink("made.csv", folder.path("dangling.csv")).unwrap();
+    folder.succeed(&["synth", "scene.toml", "-n", "1", "-o", "dangling.csv"]);
+    assert!(folder.path("dangling.csv").is_symlink() && folder.path("made.csv").is_file());
+}
+
+#[test]
+fn a_signal_leaves_the_old_file_and_no_temporary_and_a_kill_one_that_the_next_run_removes() {
+    let folder = Folder::new("signals");
+    folder.write("y.csv", "old");
+    let synth = ["synth", "press", "-n", "20000", "-o", "y.csv"];
+    for (name, status) in [("-INT", 130), ("-TERM", 143), ("-HUP", 129), ("-KILL", 137)] {
+        let mut child = host(&folder, &synth).spawn().unwrap();
+        wait_for_more(&folder, 1);
+        // Past the check, which removes its temporary at once.
+        while !folder.names().iter().any(|name| is_large(&folder.path(name))) {
+            assert!(child.try_wait().unwrap().is_none(), "too late for {name}");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        signal(&child, name);
+        assert_eq!(shell_status(child.wait().unwrap()), Some(status), "{name}");
+        assert_eq!(fs::read_to_string(folder.path("y.csv")).unwrap(), "old");
+        assert_eq!(folder.names().len(), if status == 137 { 2 } else { 1 }, "{name}");
+    }
+    folder.succeed(&["synth", "press", "-n", "2", "-o", "y.csv"]);
+    assert_eq!(folder.names(), ["y.csv"]);
+
+    // Whoever starts it may want a signal to be ignored, as `nohup` does.
+    let script = "trap '' INT HUP; exec \"$0\" synth press -n 3000 -o y.csv";
+    let mut child = shell(&folder, script).stdout(Stdio::null()).spawn().unwrap();
+    wait_for_more(&folder, 1);
+    signal(&child, "-INT");
+    signal(&child, "-HUP");
+    assert!(child.wait().unwrap().success());
+    assert!(is_large(&folder.path("y.csv")) && folder.names() == ["y.csv"]);
+}
+
+fn is_large(path: &Path) -> bool {
+    fs::metadata(path).is_ok_and(|found| found.len() > 100_000)
+}
+
+#[test]
+fn an_interrupted_run_leaves_no_folder_and_an_emulator_no_file() {
+    let folder = Folder::new("empty_folder");
+    for (arguments, name) in [(["run", "press"], "-INT"), (["trade", "press"], "-TERM")] {
+        let child = host(&folder, &arguments).stderr(Stdio::piped()).spawn().unwrap();
+        // The check comes before anything is told.
+        std::thread::sleep(Duration::from_millis(300));
+        signal(&child, name);
+        let output = child.wait_with_output().unwrap();
+        assert_ne!(output.status.code(), Some(0));
+        assert!(folder.names().is_empty(), "{:?}", folder.names());
+    }
+    folder.write("small.toml", small_scene());
+    folder.write("image.elf", "\x7FELF, or so it says");
+    let qemu = folder.write("qemu", "#!/bin/sh\nexec sleep 2\n");
+    fs::set_permissions(qemu, Permissions::from_mode(0o755)).unwrap();
+    fs::create_dir(folder.path("tmp")).unwrap();
+    let arguments = ["emulate", "small.toml", "--image", "image.elf", "--qemu", "./qemu"];
+    let temporary = || fs::read_dir(folder.path("tmp")).unwrap().count();
+    let mut child = host(&folder, &arguments).env("TMPDIR", folder.path("tmp")).spawn().unwrap();
+    let start = Instant::now();
+    while temporary() == 0 {
+        assert!(start.elapsed() < Duration::from_mins(1), "no file appears");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    signal(&child, "-TERM");
+    assert_eq!(shell_status(child.wait().unwrap()), Some(143));
+    assert_eq!(temporary(), 0);
+}
+
+#[test]
+fn a_folder_has_the_files_of_one_run_also_when_the_disk_is_full() {
+    let folder = Folder::new("one_run");
+    let scene = small_scene();
+    let (before, table) = scene.split_at(scene.find("[table1]").unwrap());
+    folder.write("with.toml", format!("{before}{table}"));
+    folder.write("without.toml", before);
+    let names = || {
+        let entries = fs::read_dir(folder.path("out/small")).unwrap();
+        let mut names: Vec<String> =
+            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    };
+    folder.succeed(&["run", "with.toml"]);
+    assert_eq!(names(), ["metrics.json", "model.bin", "report.html", "table1.csv"]);
+    let contents = || {
+        names()
+            .iter()
+            .map(|name| fs::read(folder.path("out/small").join(name)).unwrap())
+            .collect::<Vec<_>>()
+    };
+    let old = contents();
+    // The model and the figures fit, the report does not.
+    let largest = fs::metadata(folder.path("out/small/metrics.json")).unwrap().len();
+    let script = format!("ulimit -f {}; exec \"$0\" run without.toml", largest / 512 + 2);
+    let output = shell(&folder, &script).output().unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains("cannot write out/small/report.html: File too large"), "{message}");
+    assert!(contents() == old);
+    folder.succeed(&["run", "without.toml"]);
+    assert_eq!(names(), ["metrics.json", "model.bin", "report.html"]);
+}

@@ -1,0 +1,155 @@
+//! A blob whose CRC is right, whatever its body is: everything behind the CRC is reached.
+//!
+//! A model that is taken for sound must decode any frame to numbers or to a status that says why not, the same on a
+//! host and on a device, to the bit.
+
+use model_core::blob::Model;
+use model_core::exp::{ExpKernel, Libm, Micromath};
+use model_core::relative::reciprocal;
+use model_core::{Decoder, Estimate, Frame, RowStatus};
+use taxel_learn::{Exponential, ModelBlob};
+
+use crate::draws::Draws;
+use crate::seal;
+
+/// Most rows of a model that is loaded, as on the devices.
+const ROWS: usize = 8;
+/// Most readings and outputs of a frame that is decoded.
+const MOST_NUMBERS: usize = 4096;
+/// Frames that each model decodes.
+const FRAMES: usize = 3;
+
+/// Readings that a sensor may show, in Ω, and those that a fault or an attacker may.
+const READINGS: [f32; 16] = [
+    60.0,
+    55.3,
+    61.0,
+    57.5,
+    0.0,
+    -0.0,
+    -60.0,
+    1e-45,
+    -1e-38,
+    1e30,
+    -1e30,
+    f32::MAX,
+    f32::MIN,
+    f32::NAN,
+    f32::INFINITY,
+    f32::NEG_INFINITY,
+];
+
+/// Body of a blob, to which prefix and CRC are added.
+pub fn check(body: &[u8], is_planted: bool) -> bool {
+    let bytes = seal::blob(body);
+    let Ok(model) = Model::decode(&bytes) else {
+        assert!(Decoder::<ROWS>::load(&bytes).is_err(), "loaded, though no model");
+        return false;
+    };
+    look_at(&model);
+    let Ok(decoder) = Decoder::<ROWS>::of(model) else { return true };
+    let shape = model.shape();
+    let (readings, outputs) = (shape.rows * shape.inputs, shape.rows * shape.outputs);
+    if readings > MOST_NUMBERS || outputs > MOST_NUMBERS {
+        return true;
+    }
+    let mut draws = Draws::new(u64::from(model.crc()));
+    let baseline: Vec<f64> =
+        (0..readings).map(|_| f64::from(draws.one_of(&READINGS[..8]))).collect();
+    let reciprocals: Vec<f32> = baseline.iter().map(|ohm| reciprocal(*ohm as f32)).collect();
+    let frames: Vec<f32> =
+        (0..FRAMES).flat_map(|number| readings_of(number, readings, &mut draws)).collect();
+    let mut on_device = Vec::new();
+    for readings_ohm in frames.chunks_exact(readings) {
+        let frame = Frame { readings_ohm, reciprocals: &reciprocals, gate: None };
+        let mut estimate = decoder.decode(frame).expect("a frame of the model's shape");
+        let decoded = estimate.status.iter().position(|status| *status == RowStatus::Decoded);
+        if let (true, Some(row)) = (is_planted, decoded) {
+            estimate.outputs[row * shape.outputs] = f32::NAN;
+        }
+        check_estimate(&model, readings_ohm, &estimate.borrowed());
+        on_device.extend(estimate.outputs.iter().map(|output| f64::from(*output)));
+        with_exponential::<Libm>(&decoder, frame);
+        with_exponential::<Micromath>(&decoder, frame);
+        assess(&decoder, frame, outputs);
+    }
+    let blob = ModelBlob::of_bytes(&bytes).expect("a model, as the device says");
+    let host = blob.prepare(Exponential::Polynomial).with_baseline(&baseline);
+    let frames: Vec<f64> = frames.into_iter().map(f64::from).collect();
+    for (device, host) in on_device.iter().zip(host.decode_lines(&frames)) {
+        let same = device.to_bits() == host.to_bits() || (device.is_nan() && host.is_nan());
+        assert!(same, "the device says {device:e}, and the host {host:e}");
+    }
+    true
+}
+
+/// Uses everything that a model offers.
+fn look_at(model: &Model<'_>) {
+    let networks = model.network_count();
+    assert_eq!(model.networks().count(), networks, "as many networks as it says");
+    for network in model.networks() {
+        for input in 0..network.shape().inputs {
+            let _ = network.training_range(input);
+        }
+        assert!(network.widths().all(|width| !width.is_nan()), "a width that is no number");
+    }
+    for row in 0..model.shape().rows {
+        assert!(model.network_of_row(row).is_some_and(|network| network < networks), "row {row}");
+    }
+    let metadata = model.metadata();
+    assert_eq!(metadata.output_names.iter().count(), metadata.output_units.iter().count());
+}
+
+/// Readings of a frame: usual ones with a few others, any of the list, or any bits.
+fn readings_of(number: usize, count: usize, draws: &mut Draws) -> Vec<f32> {
+    let mut draw = || match number % 3 {
+        0 if draws.below(40) > 0 => 50.0 + draws.below(2000) as f32 / 100.0,
+        0 | 1 => draws.one_of(&READINGS),
+        _ => f32::from_bits(draws.bits() as u32),
+    };
+    (0..count).map(|_| draw()).collect()
+}
+
+fn check_estimate(model: &Model<'_>, readings: &[f32], estimate: &Estimate<'_>) {
+    let shape = model.shape();
+    let whole_array = model.projection().is_some();
+    for (row, status) in estimate.status.iter().enumerate() {
+        let outputs = &estimate.outputs[row * shape.outputs..(row + 1) * shape.outputs];
+        let of_row = row * shape.inputs..(row + 1) * shape.inputs;
+        let seen = if whole_array { readings } else { &readings[of_row] };
+        let is_complete = seen.iter().all(|reading| reading.is_finite());
+        match status {
+            RowStatus::Decoded => {
+                assert!(outputs.iter().all(|y| y.is_finite()), "decoded to {outputs:?}");
+                assert!(is_complete, "decoded without a reading");
+            }
+            RowStatus::AtRest => panic!("at rest without a gate"),
+            RowStatus::Overflow | RowStatus::MissingReading => {
+                assert!(outputs.iter().all(|y| y.is_nan()), "{status:?}, and {outputs:?}");
+                let relative = model.metadata().relative_inputs;
+                let is_missing = *status == RowStatus::MissingReading;
+                assert!(relative || !is_missing || !is_complete, "missing in a whole frame");
+            }
+        }
+    }
+}
+
+fn with_exponential<E: ExpKernel>(decoder: &Decoder<'_, ROWS>, frame: Frame<'_>) {
+    let shape = decoder.shape();
+    let mut outputs = vec![f32::NAN; shape.rows * shape.outputs];
+    let mut status = vec![RowStatus::MissingReading; shape.rows];
+    let mut scratch = vec![0.0; decoder.scratch_floats()];
+    let mut estimate = Estimate { outputs: &mut outputs, status: &mut status };
+    decoder.decode_with::<E>(frame, &mut scratch, &mut estimate).expect("the model's shape");
+    check_estimate(decoder.model(), frame.readings_ohm, &estimate);
+}
+
+/// Confidence: a variance is never negative, so a deviation is a number from 0 on, or missing.
+fn assess(decoder: &Decoder<'_, ROWS>, frame: Frame<'_>, outputs: usize) {
+    let (mut deviation, mut scratch) = (vec![0.0; outputs], vec![0.0; decoder.scratch_floats()]);
+    let novelty = decoder.assess_into(frame, &mut scratch, &mut deviation);
+    let novelty = novelty.expect("the model's shape");
+    if novelty.is_some_and(f32::is_finite) {
+        assert!(!deviation.iter().any(|deviation| *deviation < 0.0), "{deviation:?}");
+    }
+}

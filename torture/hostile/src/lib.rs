@@ -1,0 +1,48 @@
+//! What must hold for any bytes that reach Taxel, whoever sends them: one target a way in.
+//!
+//! A target takes bytes, gives them to the subject as an attacker would, and panics where the subject breaks a
+//! promise. libFuzzer runs targets on bytes that it finds by coverage (`fuzz/README.md`), and `cargo xtask torture` on
+//! the committed corpus and on [mutants](mutate::mutate) of it.
+
+// From the ground up: a module imports only what is declared before it.
+mod draws;
+pub mod mutate;
+pub mod seal;
+mod blob;
+mod packet;
+mod settings;
+mod link;
+mod csv_file;
+mod npy;
+mod scene;
+
+/// A way in for hostile bytes.
+#[derive(Debug, Clone, Copy)]
+pub struct Target {
+    /// Name, which is that of its corpus.
+    pub name: &'static str,
+    /// Gives bytes to the subject; returns whether the subject took them for sound. Panics where a promise is broken.
+    ///
+    /// With a fault planted, something that the subject said is spoilt before it is checked.
+    pub check: fn(bytes: &[u8], is_planted: bool) -> bool,
+}
+
+/// All targets.
+pub const TARGETS: &[Target] = &[
+    Target { name: "blob", check: blob::check },
+    Target { name: "packet", check: packet::check },
+    Target { name: "settings", check: settings::check },
+    Target { name: "link", check: link::check },
+    Target { name: "csv", check: csv_file::check },
+    Target { name: "npy", check: npy::check },
+    Target { name: "scene", check: scene::check },
+];
+
+/// The target called `name`.
+///
+/// # Panics
+/// There is none.
+#[must_use]
+pub fn target(name: &str) -> Target {
+    *TARGETS.iter().find(|target| target.name == name).expect("the name of a target")
+}

@@ -1,0 +1,172 @@
+//! The whole device, at the end of a line that says anything at any time, and loses its power at any time.
+//!
+//! Bytes are steps, each an operation, a length and so many bytes of it: raw bytes, sealed packets, steps of an upload,
+//! passing time, a host that does not read, readings, restarts and power cuts. Whatever came before, a device that has
+//! power answers, and has a model in force.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use firmware::app::{Leave, Session};
+use firmware::link::cobs;
+use firmware::link::message::Request;
+use firmware::link::packet::PROTOCOL_VERSION;
+use mock_board::{
+    Bench, Board, Memory, MockSlot, ROWS, SharedSettings, Source, TestFrame, blob, model_crc,
+    quiet, request_bytes, upload_steps,
+};
+use model_core::AlignedBytes;
+
+use crate::seal;
+
+/// Most starts of the device in one run.
+const MOST_STARTS: usize = 12;
+/// Most turns of the loop for the bytes of one step: far more than are needed.
+const MOST_TURNS: usize = 20_000;
+/// Length in bytes of the chunks of an upload.
+const CHUNK: usize = 60;
+/// Number of the requests of an upload.
+const NUMBER: u16 = 9;
+
+/// Steps, as bytes.
+pub fn check(bytes: &[u8], is_planted: bool) -> bool {
+    let models = [blob(3, 4), blob(4, 3), blob(5, 6)];
+    let mut slots = MockSlot::pair_with(&models[0]);
+    if is_planted {
+        slots[0].decay(20, 1);
+    }
+    let settings = SharedSettings::default();
+    let mut memory = Memory::new();
+    let mut steps = Steps(bytes);
+    let mut cut_after = None;
+    let mut has_taken = false;
+    for _ in 0..MOST_STARTS {
+        if let Some(operations) = cut_after.take() {
+            slots[0].cut_power_after(operations);
+            settings.cut_power_after(operations, 0x0F0F_0F0F);
+        }
+        let mut bench = Bench::within(&mut memory, quiet(), &settings);
+        let mut device = Device {
+            board: bench.board.clone(),
+            frame: bench.frame.clone(),
+            session: Session::start(&mut bench.app, &mut slots, &mut []),
+        };
+        device.answers();
+        loop {
+            let Some((operation, bytes)) = steps.next() else { return has_taken };
+            match operation % 12 {
+                10 => break,
+                11 => {
+                    cut_after = Some(number_of(bytes) as usize % 4096);
+                    break;
+                }
+                operation => {
+                    let leave = device.step(operation, bytes, &models);
+                    has_taken |= matches!(leave, Some(Leave::NewModel));
+                    if leave.is_some() {
+                        break;
+                    }
+                }
+            }
+        }
+        drop(device);
+        let _ = (slots[0].power_on(), settings.power_on());
+    }
+    has_taken
+}
+
+/// Steps that are left.
+struct Steps<'b>(&'b [u8]);
+
+impl<'b> Iterator for Steps<'b> {
+    type Item = (u8, &'b [u8]);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let (operation, rest) = self.0.split_first()?;
+        let (length, rest) = rest.split_first().unwrap_or((&0, rest));
+        let (bytes, rest) = rest.split_at(rest.len().min(usize::from(*length)));
+        self.0 = rest;
+        Some((*operation, bytes))
+    }
+}
+
+/// A device that runs.
+struct Device<'d> {
+    session: Session<'d, 'd, Board, Source, MockSlot, ROWS>,
+    board: Board,
+    frame: Rc<RefCell<TestFrame>>,
+}
+
+impl Device<'_> {
+    /// Takes a step; returns why the session ended, if it did.
+    fn step(&mut self, operation: u8, bytes: &[u8], models: &[AlignedBytes; 3]) -> Option<Leave> {
+        match operation {
+            0 => self.send(bytes.to_vec()),
+            1..=4 => {
+                // A packet of this protocol, whatever message the bytes are.
+                let covered = [&[PROTOCOL_VERSION, operation], bytes].concat();
+                let mut line = Vec::new();
+                cobs::encode(&seal::packet(&covered), |byte| {
+                    line.push(byte);
+                    true
+                });
+                self.send(line)
+            }
+            5 | 6 => {
+                let mut choices = bytes.iter().map(|byte| usize::from(*byte));
+                let model = &models[choices.next().unwrap_or(0) % models.len()];
+                let (from, count) = (choices.next().unwrap_or(0), choices.next().unwrap_or(255));
+                let steps = upload_steps(model, CHUNK).into_iter().skip(from).take(count);
+                steps.map(Request::Upload).find_map(|it| self.send(request_bytes(NUMBER, &it)))
+            }
+            7 => {
+                let mut pins = self.board.pins.borrow_mut();
+                pins.now_us = pins.now_us.wrapping_add(number_of(bytes));
+                drop(pins);
+                self.session.step()
+            }
+            8 => {
+                // A host that takes a few bytes more, and then reads on.
+                self.board.pins.borrow_mut().room = Some(number_of(bytes) as usize % 512);
+                let leave = self.send(request_bytes(NUMBER, &Request::Statistics));
+                self.board.pins.borrow_mut().room = None;
+                leave
+            }
+            _ => {
+                let mut frame = self.frame.borrow_mut();
+                let readings = frame.as_flattened_mut().iter_mut();
+                readings
+                    .zip(bytes.as_chunks().0)
+                    .for_each(|(ohm, it)| *ohm = f32::from_le_bytes(*it));
+                drop(frame);
+                self.session.step()
+            }
+        }
+    }
+
+    /// Sends bytes, and runs until the device has read them.
+    fn send(&mut self, bytes: Vec<u8>) -> Option<Leave> {
+        self.board.pins.borrow_mut().to_device.extend(bytes);
+        let mut turns = 0;
+        while !self.board.pins.borrow().to_device.is_empty() {
+            if let Some(leave) = self.session.step() {
+                return Some(leave);
+            }
+            turns += 1;
+            assert!(turns < MOST_TURNS, "the device reads no more");
+        }
+        self.board.pins.borrow_mut().to_host.clear();
+        None
+    }
+
+    /// Checks that the device answers, and has a model in force.
+    fn answers(&mut self) {
+        let crc = model_crc(&mut self.session, &self.board);
+        assert!(crc.is_some(), "no model in force");
+    }
+}
+
+/// The first four bytes as a number.
+fn number_of(bytes: &[u8]) -> u32 {
+    bytes.iter().take(4).fold(0, |number, byte| number << 8 | u32::from(*byte))
+}

@@ -1,0 +1,14 @@
+//! Power that is cut at every operation of the flash, and again while the device recovers: always the old or the new
+//! model is in force.
+
+mod device;
+mod flash;
+mod presses;
+
+mod cuts;
+mod decay;
+mod settings;
+
+pub use cuts::{RECALIBRATION, UNDO, UPLOAD};
+pub use decay::{DECAY, WORN};
+pub use settings::SETTINGS;

@@ -1,0 +1,179 @@
+//! Cuts while a setting is kept.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use firmware::link::message::Setting;
+use firmware::settings::PAGE_BYTES;
+use mock_board::SharedSettings;
+use rand_core::{Rng, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use super::flash::{Cells, Flash, Supply, Torn};
+use crate::effort::Effort;
+use crate::found::Found;
+use crate::promise::Promise;
+use crate::tally::Tally;
+use crate::tools::Tools;
+
+pub const SETTINGS: Promise = Promise {
+    name: "cut-settings",
+    text: "power cut while a setting is kept: the old or the new",
+    share: 8,
+    check,
+};
+
+/// A case is one first cut, and some of the second cuts behind it.
+const LEAST: u64 = 160;
+const MOST: u64 = 1 << 40;
+
+/// Longest distance between second cuts that are tried.
+const STRIDE: u64 = 16;
+
+fn check(effort: &Effort, _: &Tools) -> Result<Found, String> {
+    let cuts = Tally::new(Torn::ALL.map(Torn::name));
+    let planted = effort.is_planted();
+    let least = if planted { LEAST / 4 } else { LEAST };
+    let mut found = effort.worst((least, MOST), (0.0, "losses"), |seed| {
+        Case::new(seed, planted)?.run(&cuts).map(|()| 0.0)
+    });
+    found.cases = cuts.sum();
+    if found.note.is_empty() {
+        found.note = format!("cuts by erase: {}", cuts.text());
+    }
+    Ok(found)
+}
+
+/// What each setting holds.
+type Contents = [Option<Vec<u8>>; 3];
+
+struct Case {
+    seed: u64,
+    random: Xoshiro256PlusPlus,
+    supply: Rc<RefCell<Supply>>,
+    settings: SharedSettings<Flash>,
+    /// What is kept before the cut.
+    old: Contents,
+    planted: bool,
+}
+
+impl Case {
+    /// Pages after some settings were kept, up to several exchanges of the pages.
+    fn new(seed: u64, planted: bool) -> Result<Self, String> {
+        let supply = Supply::new(seed);
+        let torn = Torn::ALL[(seed % 5) as usize];
+        let page = || Flash::erased(PAGE_BYTES / 4, &supply, torn);
+        let settings = SharedSettings::in_pages([page(), page()]);
+        let random = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let mut case = Self { seed, random, supply, settings, old: [None, None, None], planted };
+        for number in 0..case.below(60) {
+            let setting = case.setting();
+            let bytes = case.content(setting, number);
+            let kept = case.settings.keep_bytes(setting, &bytes);
+            if kept.is_err() {
+                return Err(format!("write {number} before the cut: {kept:?}"));
+            }
+            case.old[setting as usize] = Some(bytes);
+        }
+        Ok(case)
+    }
+
+    fn below(&mut self, end: u64) -> u64 {
+        self.random.next_u64() % end
+    }
+
+    fn setting(&mut self) -> Setting {
+        Setting::ALL[self.below(3) as usize]
+    }
+
+    /// Content for `setting` of a length that it may have, different for each `number`.
+    fn content(&mut self, setting: Setting, number: u64) -> Vec<u8> {
+        let length = [40, 187, 585][setting as usize];
+        let mut bytes = vec![0; length];
+        self.random.fill_bytes(&mut bytes);
+        bytes[0] = number as u8;
+        bytes
+    }
+
+    fn run(mut self, cuts: &Tally<5>) -> Result<(), String> {
+        let setting = self.setting();
+        let new = self.content(setting, 200);
+        let before = self.cells();
+        self.keep(setting, &new, None);
+        let operations = self.supply.borrow().operations;
+        let first = self.below(operations);
+        self.restore(&before);
+        self.keep(setting, &new, Some(first));
+        let kind = (self.seed % 5) as usize;
+        cuts.add(kind, 1);
+        let place = format!("{setting:?}, operation {first} of {operations}");
+        self.expect(setting, &[&new], &place)?;
+        let after = self.cells();
+        let next = self.content(setting, 201);
+        let mut second = self.below(STRIDE);
+        loop {
+            self.restore(&after);
+            if !self.keep(setting, &next, Some(second)) {
+                return Ok(());
+            }
+            cuts.add(kind, 1);
+            let place = format!("{place}, then operation {second}");
+            self.expect(setting, &[&new, &next], &place)?;
+            self.keep(setting, &next, None);
+            if self.read(setting).as_ref() != Some(&next) {
+                return Err(format!("{place}: it cannot be kept any more"));
+            }
+            self.expect(setting, &[&next], &format!("{place}, mended"))?;
+            second += 1 + self.below(STRIDE);
+        }
+    }
+
+    /// Keeps `bytes` as far as the power lasts; returns whether it was cut.
+    fn keep(&mut self, setting: Setting, bytes: &[u8], cut_after: Option<u64>) -> bool {
+        self.settle();
+        self.supply.borrow_mut().on(cut_after);
+        let kept = self.settings.keep_bytes(setting, bytes);
+        let gone = self.supply.borrow().gone;
+        assert!(kept.is_ok() || gone, "{setting:?}: {kept:?}");
+        if self.planted && gone {
+            // The processor runs on while the voltage falls, and writes a wild word to each page.
+            self.settings.0.borrow_mut().pages().iter_mut().for_each(|page| page.decay(1, 0xFFFF));
+        }
+        gone
+    }
+
+    /// Lets weak bits settle, as at a start.
+    fn settle(&mut self) {
+        self.settings.0.borrow_mut().pages().iter_mut().for_each(Flash::settle);
+        self.supply.borrow_mut().on(None);
+    }
+
+    fn read(&mut self, setting: Setting) -> Option<Vec<u8>> {
+        self.settings.read_owned(setting)
+    }
+
+    /// At each start `setting` must hold what it held before the cut or one of `new`, the others what they held.
+    fn expect(&mut self, setting: Setting, new: &[&Vec<u8>], place: &str) -> Result<(), String> {
+        for _ in 0..3 {
+            self.settle();
+            for other in Setting::ALL {
+                let found = self.read(other);
+                let is_new = other == setting && found.as_ref().is_some_and(|b| new.contains(&b));
+                if found != self.old[other as usize] && !is_new {
+                    let length = found.map(|bytes| bytes.len());
+                    return Err(format!("{place}: {other:?} holds other bytes: {length:?}"));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn cells(&self) -> [Cells; 2] {
+        self.settings.0.borrow_mut().pages().each_ref().map(Flash::cells)
+    }
+
+    fn restore(&mut self, cells: &[Cells; 2]) {
+        let mut settings = self.settings.0.borrow_mut();
+        settings.pages().iter_mut().zip(cells).for_each(|(page, cells)| page.restore(cells));
+    }
+}
