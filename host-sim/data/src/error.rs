@@ -27,13 +27,23 @@ impl BadValue {
     /// Describes a setting `field` whose `value` breaks `rule`.
     #[expect(clippy::needless_pass_by_value, reason = "callers give literals and numbers")]
     pub fn new(field: impl Into<String>, value: impl ToString, rule: impl Into<String>) -> Self {
-        Self { field: field.into(), value: value.to_string(), rule: rule.into() }
+        Self { field: field.into(), value: short(value.to_string()), rule: rule.into() }
     }
 
     /// Returns the same problem under another name, such as that of a command's option.
     #[must_use]
     pub fn named(self, field: impl Into<String>) -> Self {
         Self { field: field.into(), ..self }
+    }
+}
+
+/// Value as text; a number of many digits as one with a power of ten.
+fn short(value: String) -> String {
+    /// Length from which a number is hard to read.
+    const LONG: usize = 24;
+    match value.parse::<f64>() {
+        Ok(number) if value.len() > LONG => format!("{number:e}"),
+        _ => value,
     }
 }
 
@@ -279,7 +289,7 @@ pub enum Problem {
     },
     /// Value too large to train on.
     #[error(
-        "line {line}, column {column:?}: {value} is beyond {bound:e}, the largest number that a decoder in f32 is trained on; give the column another unit"
+        "line {line}, column {column:?}: {value:?} is beyond {bound:e}, the largest number that a decoder in f32 is trained on; give the column another unit"
     )]
     TooLarge {
         /// Number of the line.
@@ -295,7 +305,9 @@ pub enum Problem {
     #[error("no line has a value in every chosen column; check the columns")]
     NoCompleteLine,
     /// Value beyond a physical bound.
-    #[error("line {line}, column {column:?}: {value} {unit} is beyond {bound_of} ({bound} {unit})")]
+    #[error(
+        "line {line}, column {column:?}: {value:?} {unit} is beyond {bound_of} ({bound:?} {unit})"
+    )]
     OutOfBound {
         /// Number of the line.
         line: u64,
@@ -354,4 +366,20 @@ pub enum Problem {
         /// Path of the other log.
         other: String,
     },
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_message_has_hundreds_of_digits() {
+        let refused = |value: f64| BadValue::new("k", value, "give less").to_string();
+        assert_eq!(refused(1e300), "k = 1e300: give less");
+        assert_eq!(refused(-1e-300), "k = -1e-300: give less");
+        assert_eq!(refused(0.125), "k = 0.125: give less");
+        let column = "ch1".to_owned();
+        let problem = Problem::TooLarge { line: 2, column, value: 1.5e308, bound: 1e30 };
+        assert!(problem.to_string().contains("1.5e308"), "{problem}");
+    }
 }

@@ -48,7 +48,8 @@ impl Table {
         ranges
     }
 
-    /// Mean of each column; NaN is skipped.
+    /// Mean of each column; NaN is skipped. Rounding moves it out of no column's range, so that the mean of equal values
+    /// is that value.
     #[must_use]
     pub fn means(&self) -> Vec<f64> {
         let mut sums = vec![(0.0, 0.0); self.names.len()];
@@ -57,7 +58,10 @@ impl Table {
                 (*sum, *count) = (*sum + value, *count + 1.0);
             }
         }
-        sums.iter().map(|(sum, count)| sum / count).collect()
+        let clamped = |((sum, count), [low, high]): (&(f64, f64), [f64; 2])| {
+            if low <= high { (sum / count).clamp(low, high) } else { f64::NAN }
+        };
+        sums.iter().zip(self.ranges()).map(clamped).collect()
     }
 
     /// One line with the mean of each column, which [`means`](Self::means) gives.
@@ -123,6 +127,13 @@ impl Table {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_mean_of_equal_values_is_that_value() {
+        // Three times 0.1 is more than 0.3.
+        let table = Table { names: vec!["a".into()], values: vec![0.1; 3] };
+        assert_eq!((table.means(), table.deviations()), (vec![0.1], vec![0.0]));
+    }
 
     #[test]
     fn means_and_deviations_skip_missing_values() {

@@ -12,6 +12,9 @@ use taxel_limit::{Reference, Refusal};
 /// Share of full scale that the truth must exceed to count in the mean relative error.
 pub const RELATIVE_THRESHOLD: f64 = 0.1;
 
+/// Range of true values, relative to them, that rounding explains: they do not change.
+const CONSTANT: f64 = 4.0 * f64::EPSILON;
+
 /// Measure for errors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measure {
@@ -244,11 +247,13 @@ fn of_columns(
     for &column in members {
         let full_scale = measure.full_scale[column];
         let mut sums = Sums::default();
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         for (truth, estimate) in truth.lines().zip(estimate.chunks_exact(truth.names.len())) {
             let (truth, error) = (truth[column], estimate[column] - truth[column]);
             if error.is_nan() {
                 continue;
             }
+            (low, high) = (low.min(truth), high.max(truth));
             sums.count += 1;
             sums.error_squares += error * error;
             sums.truth += truth;
@@ -264,8 +269,10 @@ fn of_columns(
         }
         // A second pass: Σtruth² − n·mean² would cancel for outputs with an offset.
         let mean = sums.truth / sums.count as f64;
+        // What rounding alone makes of equal values is no variance that could be explained.
+        let changes = high - low > CONSTANT * low.abs().max(high.abs());
         for (truth, estimate) in truth.lines().zip(estimate.chunks_exact(truth.names.len())) {
-            if !(estimate[column] - truth[column]).is_nan() {
+            if changes && !(estimate[column] - truth[column]).is_nan() {
                 deviation_squares += (truth[column] - mean) * (truth[column] - mean);
             }
         }
@@ -317,6 +324,20 @@ mod tests {
         close(z.r_squared, 1.0 - 0.25 / 0.5); // means are 0.5 and 1
         close(z.mean_relative_percent, 0.0); // the wrong one has truth 0
         assert_eq!((x.rmse, x.positional_percent), (0.0, None));
+    }
+
+    #[test]
+    fn there_is_no_r_squared_of_values_that_only_rounding_tells_apart() {
+        for values in [vec![0.1; 300], vec![0.1, 0.1_f64.next_up(), 0.1]] {
+            let estimate: Vec<f64> = values.iter().map(|value| value + 0.01).collect();
+            let truth = Table { names: vec!["b".into()], values };
+            let measure = Measure { full_scale: vec![1.0], thickness_mm: None, limit: None };
+            assert_eq!(by_group(&truth, &estimate, &measure)[0].r_squared, None);
+            assert_eq!(
+                by_group(&truth, &truth.means().repeat(truth.len()), &measure)[0].r_squared,
+                None
+            );
+        }
     }
 
     #[test]

@@ -172,7 +172,8 @@ pub fn run(
     let verdict = Verdict::of(&decoders, &limit)
         .of_blob(&blob, training.frames.frames())
         .of_frames(subject.measurements().map(|data| &data.outliers), test.frames())
-        .with(Warning::out_of_range(network.share_out_of_range(&test.inputs.values)));
+        .with(Warning::out_of_range(network.share_out_of_range(&test.inputs.values)))
+        .with(subject.scene().and_then(|_| Warning::not_positive(&test.inputs)));
     let mut result = RunResult {
         verdict,
         subject: subject.name().into(),

@@ -149,10 +149,11 @@ impl<'e> Others<'e> {
         share(group, self.mean)
     }
 
-    /// Whether always predicting the mean makes no error: the output does not change.
+    /// Whether always predicting the mean makes no error, or one of rounding alone, which has no R²: the output does
+    /// not change.
     fn mean_is_exact(&self, group: &Errors) -> bool {
         let mean = self.mean.and_then(|mean| mean.iter().find(|it| it.group == group.group));
-        mean.is_some_and(|mean| mean.rmse <= 0.0)
+        mean.is_some_and(|mean| mean.rmse <= 0.0 || mean.r_squared.is_none())
     }
 
     /// Gains over the mean and the linear decoder, in words after the errors of `groups`.

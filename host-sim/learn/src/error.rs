@@ -5,9 +5,58 @@ use std::path::PathBuf;
 use model_core::blob::{DecodeError, EncodeError};
 use model_core::rbf::{Format, NetworkError};
 use taxel_data::BadValue;
+use taxel_data::error::Role;
 
 /// Result of the functions of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
+
+/// Why f32 does not hold a column.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Unresolved {
+    /// Values beyond the largest magnitude that training accepts.
+    TooLarge {
+        /// That magnitude.
+        bound: f64,
+    },
+    /// Range below the least one that inputs can be scaled by.
+    TooNarrow {
+        /// Least range.
+        bound: f64,
+    },
+    /// Values so far from zero that rounding blurs them.
+    TooFarFromZero {
+        /// Distance between neighbouring numbers in f32 there.
+        step: f64,
+    },
+}
+
+impl Unresolved {
+    /// What is wrong with values in the range from `low` to `high`, and what to do.
+    fn words(self, role: Role, [low, high]: [f64; 2]) -> String {
+        let scale = |size: f64| format!("1e{}", -size.log10().floor());
+        let leave = match role {
+            Role::Inputs => ", or leave it out of the inputs",
+            Role::Outputs => "",
+        };
+        match self {
+            Self::TooLarge { bound } => format!(
+                "values beyond {bound:e} are too large for f32, which devices compute in: multiply it by {}{leave}",
+                scale(low.abs().max(high.abs()))
+            ),
+            Self::TooNarrow { bound } => format!(
+                "a range below {bound:e} is lost in f32, which devices compute in: multiply it by {}{leave}",
+                scale(high - low)
+            ),
+            Self::TooFarFromZero { step } => {
+                let unit = 10_f64.powf((high - low).log10().floor());
+                format!(
+                    "numbers in f32, which devices compute in, are {step:?} apart there: subtract {} from it{leave}",
+                    (low / unit).floor() * unit
+                )
+            }
+        }
+    }
+}
 
 /// Failure of training, selection or packing.
 #[derive(Debug, thiserror::Error)]
@@ -25,6 +74,34 @@ pub enum Error {
         path: PathBuf,
         /// Reason.
         cause: DecodeError,
+    },
+    /// Column of which f32 would leave too little ([`resolution`](crate::train::resolution)).
+    #[error("column {column:?} goes from {:?} to {:?}, and {}", range[0], range[1], why.words(*role, *range))]
+    Column {
+        /// Name of the column.
+        column: String,
+        /// Whether it is an input or an output.
+        role: Role,
+        /// Its smallest and largest value.
+        range: [f64; 2],
+        /// Reason.
+        why: Unresolved,
+    },
+    /// Output that a format decodes clearly worse than the same weights in f64.
+    #[error(
+        "the format {} loses the output {output:?}: R² on the training frames would be {lost:.3} lower than with the same \
+         centres in f64. Subtract {mean:?}, its mean, from the output; or choose another format ({}) or a smaller spread",
+        format.name(), Format::F32.name()
+    )]
+    OutputLost {
+        /// Number format of the network.
+        format: Format,
+        /// Name of the output.
+        output: String,
+        /// By how much R² is lower.
+        lost: f64,
+        /// Mean of the output.
+        mean: f64,
     },
     /// More inputs than a format has room for.
     #[error("{inputs} inputs a row: the format {} holds at most {most}; give another format ({})", format.name(), Format::F32.name())]

@@ -239,7 +239,8 @@ impl<'d> Judge<'d> {
 fn score(rmse: &[f64], deviations: &[f64]) -> f64 {
     let changing = rmse.iter().zip(deviations).filter(|(_, deviation)| **deviation > 0.0);
     let relative: Vec<f64> = changing.map(|(rmse, deviation)| rmse / deviation).collect();
-    relative.iter().sum::<f64>() / relative.len().max(1) as f64
+    // The empty sum of floats is −0.
+    (relative.iter().sum::<f64>() + 0.0) / relative.len().max(1) as f64
 }
 
 /// Sums of squared errors of a baseline on one fold, `[output]`, after fitting it to the others.
@@ -264,6 +265,11 @@ fn split(dataset: &Dataset, fold_of: &[usize], fold: usize) -> (Dataset, Dataset
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn without_an_output_that_changes_the_score_is_0_and_not_minus_0() {
+        assert!(score(&[0.5], &[0.0]).is_sign_positive());
+    }
     use taxel_data::random::{Purpose, Random, Stream};
     use taxel_data::table::Table;
 

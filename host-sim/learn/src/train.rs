@@ -16,6 +16,7 @@ use taxel_data::random::{Purpose, Random, Stream};
 
 use crate::error::Result;
 
+pub mod resolution;
 pub mod kmeans;
 pub mod least_squares;
 pub(crate) mod principal;
@@ -327,11 +328,11 @@ pub struct Trained {
 /// ones is not proved harmless for every row.
 ///
 /// # Errors
-/// [`Error::Setting`](crate::Error::Setting) for options that do not fit the data; other
+/// [`Error::Setting`](crate::Error::Setting) for options that do not fit the data,
+/// [`Error::Column`](crate::Error::Column) for a column that f32 does not hold, and other
 /// [`Error`](crate::Error)s for data that does not fit the format.
 pub fn train(dataset: &Dataset, options: &Options, progress: &dyn Progress) -> Result<Trained> {
-    options.check(dataset.frames())?;
-    options.check_rank(dataset.outputs.names.len())?;
+    check(dataset, options)?;
     fit(dataset, Layers::start(dataset, options)?, options, progress)
 }
 
@@ -346,11 +347,17 @@ pub fn train_refined(
     examples: Examples<'_>,
     progress: &dyn Progress,
 ) -> Result<Trained> {
-    options.check(dataset.frames())?;
-    options.check_rank(dataset.outputs.names.len())?;
+    check(dataset, options)?;
     let start = Layers::start(dataset, options)?;
     let layers = refine::refine(dataset, &start, options, settings, examples, progress)?;
     fit(dataset, layers, &settings.options(options), progress)
+}
+
+/// Checks the options against the data, and the data against f32.
+fn check(dataset: &Dataset, options: &Options) -> Result<()> {
+    options.check(dataset.frames())?;
+    options.check_rank(dataset.outputs.names.len())?;
+    resolution::check(dataset)
 }
 
 /// Projection of `dataset`'s readings with the given `parameters`.

@@ -15,6 +15,9 @@ use crate::sensor::{Precision, Sensor};
 
 type Check = std::result::Result<(), BadValue>;
 
+/// Largest length in mm, stiffness in N/mm and resistance in Ω/mm of a sensor; one over it is the least.
+const MOST: f64 = 1e9;
+
 /// World to be simulated, and the part of it that is wanted.
 #[derive(Debug, Clone, PartialEq)]
 pub struct World {
@@ -201,6 +204,14 @@ fn positive(field: &str, value: f64) -> Check {
     })
 }
 
+/// Checks a length, stiffness or resistance: anything that a sensor could have, so that readings fit f32.
+fn of_a_sensor(field: &str, value: f64) -> Check {
+    positive(field, value)?;
+    require((1.0 / MOST..=MOST).contains(&value), field, format!("{value:?}"), || {
+        format!("it must be from {:e} to {MOST:e}", 1.0 / MOST)
+    })
+}
+
 fn count(field: &str, value: usize, most: usize) -> Check {
     require((1..=most).contains(&value), field, value, || format!("it must be from 1 to {most}"))
 }
@@ -236,12 +247,12 @@ fn sensor(sensor: &Sensor) -> Check {
     let of_rows = (sensor.row_wires, sensor.electrodes_per_row_wire);
     check_counts(of_rows, (sensor.column_wires, sensor.electrodes_per_column_wire))?;
     for (axis, value) in ["x", "y", "z"].iter().zip(sensor.size_mm) {
-        positive(&format!("sensor.size_mm ({axis})"), value)?;
+        of_a_sensor(&format!("sensor.size_mm ({axis})"), value)?;
     }
     for (axis, value) in ["x", "y", "z"].iter().zip(sensor.stiffness_n_per_mm) {
-        positive(&format!("sensor.stiffness_n_per_mm ({axis})"), value)?;
+        of_a_sensor(&format!("sensor.stiffness_n_per_mm ({axis})"), value)?;
     }
-    positive("sensor.resistance_ohm_per_mm", sensor.resistance_ohm_per_mm)?;
+    of_a_sensor("sensor.resistance_ohm_per_mm", sensor.resistance_ohm_per_mm)?;
     for (field, list, expected, of) in [
         (
             "sensor.upper_electrodes_mm",
@@ -258,9 +269,9 @@ fn sensor(sensor: &Sensor) -> Check {
     ] {
         let listed = format!("a list of {} positions", list.len());
         require(list.len() == expected, field, listed, || format!("{of} asks for {expected}"))?;
-        let stray = list.as_flattened().iter().find(|value| !value.is_finite());
+        let stray = list.as_flattened().iter().find(|value| !(-MOST..=MOST).contains(*value));
         require(stray.is_none(), field, stray.unwrap_or(&0.0), || {
-            "give every position in mm as a finite number".into()
+            format!("give every position in mm as a finite number of at most {MOST:e}")
         })?;
     }
     Ok(())

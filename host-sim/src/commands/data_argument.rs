@@ -11,6 +11,7 @@ use taxel_data::dataset::Dataset;
 use taxel_data::error::{Problem, Role};
 use taxel_learn::outliers::{self, Outliers};
 use taxel_learn::train::refine::LEAST_FOLDS;
+use taxel_learn::train::resolution;
 use taxel_learn::{Options, select};
 
 use super::data_file::DataFileArguments;
@@ -154,6 +155,9 @@ impl DataArguments {
             None if training.frames() < 2 && self.folds.is_none() => vec![0; training.frames()],
             None => self.folds_of(training.frames(), how.seed)?,
         };
+        // Readings themselves, even if the model is given their ratios to the baseline.
+        resolution::check(&training)
+            .map_err(|refusal| Error::Unfit { path: path.into(), message: refusal.to_string() })?;
         let rest = self
             .baseline
             .as_deref()

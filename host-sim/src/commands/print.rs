@@ -124,10 +124,7 @@ pub fn errors(page: &mut Page, decoders: &[(&str, &[Errors])]) {
                 percent(Definition::RelativeL2Percent),
                 percent(Definition::FullScalePercent),
                 percent(Definition::PositionalPercent),
-                // Adding 0 after rounding turns −0 into 0.
-                group
-                    .r_squared
-                    .map_or("-".into(), |r| format!("{:.4}", (r * 1e4).round() / 1e4 + 0.0)),
+                r_squared(group),
                 percent(Definition::MeanRelativePercent)
             ));
         }
@@ -188,6 +185,16 @@ pub fn ratio(errors: &Errors) -> String {
     match (errors.ratio_to_limit, errors.ratio_standard_error) {
         (Some(ratio), Some(error)) => format!("{ratio:.2} ± {error:.2}"),
         _ => "-".into(),
+    }
+}
+
+/// R² with four decimals, or in powers of ten where it is far below 0; a dash where there is none.
+pub fn r_squared(errors: &Errors) -> String {
+    match errors.r_squared {
+        None => "-".into(),
+        Some(value) if value < -999.0 => format!("{value:.1e}"),
+        // Adding 0 after rounding turns −0 into 0.
+        Some(value) => format!("{:.4}", (value * 1e4).round() / 1e4 + 0.0),
     }
 }
 

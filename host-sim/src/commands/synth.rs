@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use host_sim::verdict::Warning;
 use host_sim::{Error, Result};
 use serde::Serialize;
 use taxel_data::csv_file;
@@ -67,6 +68,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let lines = dataset.inputs.lines().zip(dataset.outputs.lines());
     let lines = lines.map(|(readings, outputs)| readings.iter().chain(outputs).copied());
     csv_file::write(&arguments.output, names, lines)?;
+    if let Some(warning) = Warning::not_positive(&dataset.inputs) {
+        eprintln!("{warning}");
+    }
     let summary = Summary {
         subject: scene.name.clone(),
         frames: dataset.frames(),

@@ -6,6 +6,7 @@ use super::progress::Terminal;
 use clap::Args;
 use host_sim::evaluate::worth::Worth;
 use host_sim::measurements::Measurements;
+use host_sim::metrics::{self, Errors, NETWORK};
 use host_sim::subject::Subject;
 use host_sim::{Error, Result};
 use model_core::rbf::Format;
@@ -244,5 +245,9 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
     }
     let Worth { judged_on, verdict, .. } = &summary.worth;
     print::verdict(&mut page, Some(judged_on.words()), verdict);
+    let network = metrics::of_decoder(&summary.worth.decoders, NETWORK);
+    let of = |errors: &Errors| format!("{} {}", errors.group, print::r_squared(errors));
+    let r_squared: Vec<String> = network.iter().map(of).collect();
+    print::wrapped(&mut page, &format!("R² there: {}", r_squared.join(", ")));
     page
 }

@@ -27,6 +27,17 @@ fn bad_scenes() {
         ("[20.0, 18.0, 5.0]", "[20.0, 18.0, -5.0]", &["sensor.size_mm (z) = -5", "positive"]),
         ("[20.0, 18.0, 5.0]", "[20.0, nan, 5.0]", &["sensor.size_mm (y) = NaN"]),
         (
+            "[20.0, 18.0, 5.0]",
+            "[20.0, 1e-300, 5.0]",
+            &["sensor.size_mm (y) = 1e-300", "1e-9 to 1e9"],
+        ),
+        ("[20.0, 18.0, 5.0]", "[1e300, 18.0, 5.0]", &["sensor.size_mm (x) = 1e300", "1e-9 to 1e9"]),
+        (
+            "resistance_ohm_per_mm = 100.0",
+            "resistance_ohm_per_mm = 1e-34",
+            &["sensor.resistance_ohm_per_mm = 1e-34", "1e-9 to 1e9"],
+        ),
+        (
             "resistance_ohm_per_mm = 100.0",
             "resistance_ohm_per_mm = 0.0",
             &["sensor.resistance_ohm_per_mm = 0"],
@@ -313,6 +324,74 @@ fn what_cannot_be_done_is_found_before_anything_is_written() {
     std::fs::create_dir_all(folder.path("out/small/report.html")).unwrap();
     refused(&folder, &["run", "scene.toml"], &["cannot write", "report.html"]);
     assert_eq!(std::fs::read_dir(folder.path("out/small")).unwrap().count(), 1);
+}
+
+/// Lines of two inputs and an output that follows from them. Names stand before what becomes of their values.
+fn columns(first: fn(f64) -> f64, output: fn(f64) -> f64) -> String {
+    let line = |i: i32| {
+        let (a, b) = (f64::from(i * 37 % 101) / 101.0, f64::from(i * 53 % 97) / 97.0);
+        let y = (3.0 * a).sin() * (2.0 * b).cos();
+        format!("{:?},{b:?},{:?}\n", first(a), output(y))
+    };
+    format!("a,b,y\n{}", (0..200).map(line).collect::<String>())
+}
+
+#[test]
+fn a_column_that_f32_does_not_hold_is_named() {
+    let folder = Folder::new("scale");
+    let train = |content: String, more: &[&'static str]| {
+        folder.write("d.csv", content);
+        let usual = ["train", "d.csv", "--inputs", "a,b", "--outputs", "y", "--centres", "12"];
+        [&usual[..], &["--no-refine", "-o", "m.bin"], more].concat()
+    };
+    for (content, says) in [
+        (columns(|a| a * 1e-30, |y| y), &["d.csv: column \"a\"", "multiply it by 1e31"][..]),
+        (columns(|a| a * 1e-300, |y| y), &["d.csv: column \"a\"", "range below 1e-28"]),
+        (columns(|a| a + 1e8, |y| y), &["d.csv: column \"a\"", "8.0 apart", "subtract 100000000"]),
+        (columns(|a| a, |y| y * 1e-36), &["d.csv: column \"y\"", "range below 1e-28"]),
+        (columns(|a| a, |y| y + 1e9), &["d.csv: column \"y\"", "64.0 apart", "subtract 99999999"]),
+        (columns(|a| a * 1e300, |y| y), &["column \"a\"", "beyond 1e30", "e299"]),
+    ] {
+        refused(&folder, &train(content, &[]), says);
+    }
+    let offset = train(columns(|a| a, |y| y + 1e5), &["--format", "fixed16"]);
+    refused(&folder, &offset, &["fixed16 loses the output \"y\"", "Subtract 100000", "f32"]);
+    let wide = train(columns(|a| a, |y| y), &["--format", "fixed16", "--spread", "1e6"]);
+    refused(&folder, &wide, &["spread = 1000000", "give a smaller spread"]);
+    // At any scale in between, nothing is lost, and `train` says how good the model is.
+    for content in [columns(|a| a * 1e-27, |y| y * 1e29), columns(|a| a * 1e30, |y| y * 1e-27)] {
+        let page = folder.succeed(&train(content, &[]));
+        assert!(page.contains("R² there: y 0.99"), "{page}");
+    }
+}
+
+#[test]
+fn lines_that_are_all_equal_have_no_r_squared() {
+    let folder = Folder::new("equal");
+    folder.write("d.csv", columns(|a| a, |y| y));
+    let inputs = ["--inputs", "a,b", "--outputs", "y", "--centres", "8", "--no-refine"];
+    folder.succeed(&[&["train", "d.csv", "-o", "m.bin"], &inputs[..]].concat());
+    folder.write("equal.csv", format!("a,b,y\n{}", "0.3,0.3,0.1\n".repeat(300)));
+    let page = folder.succeed(&["eval", "m.bin", "equal.csv"]);
+    let line = page.lines().find(|line| line.starts_with("network")).unwrap();
+    let r_squared = line.split_whitespace().rev().nth(2).unwrap();
+    assert_eq!(r_squared, "-", "{page}");
+    assert!(page.contains("y does not change in these frames"), "{page}");
+}
+
+#[test]
+fn what_a_scene_makes_doubtful_is_said() {
+    let folder = Folder::new("doubtful");
+    // Noise as large as the readings.
+    folder.write("noise.toml", small_scene().replace("level = 0.005", "level = 1.0"));
+    let output = folder.run(&["synth", "noise.toml", "-n", "100", "-o", "d.csv"]);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && said.contains("(readings-not-positive)"), "{said}");
+    // Too few frames for what is to be learnt: fresh frames show it.
+    folder.write("few.toml", small_scene().replace("level = 0.005", "level = 0.0"));
+    let few = ["train", "few.toml", "-n", "300", "--centres", "8", "-o", "m.bin"];
+    let page = folder.succeed(&few);
+    assert!(page.contains("On fresh frames") && page.contains("(no-gain-over-mean)"), "{page}");
 }
 
 #[test]

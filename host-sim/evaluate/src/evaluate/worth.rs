@@ -4,7 +4,7 @@ use serde::Serialize;
 use taxel_data::columns;
 use taxel_data::dataset::Dataset;
 use taxel_data::random::Stream;
-use taxel_learn::decoders::BASELINES;
+use taxel_learn::decoders::{BASELINES, mean};
 use taxel_learn::select::Selection;
 use taxel_learn::{Exponential, ModelBlob};
 use taxel_limit::Refusal;
@@ -13,7 +13,7 @@ use taxel_simulate::Synthesis;
 use crate::metrics::{self, DecoderErrors, Errors, LimitSummary, Measure};
 use crate::subject::Subject;
 use crate::training_set::TrainingSet;
-use crate::verdict::Verdict;
+use crate::verdict::{Verdict, Warning};
 
 /// Most frames of a scene that are synthesised for it.
 const FRESH_FRAMES: usize = 2000;
@@ -79,7 +79,8 @@ impl Worth {
         let no_limit = LimitSummary::of(&Err(Refusal::Measured));
         let verdict = Verdict::of(&decoders, &no_limit)
             .of_blob(blob, set.frames.frames())
-            .of_frames(subject.measurements().map(|data| &data.outliers), set.frames.frames());
+            .of_frames(subject.measurements().map(|data| &data.outliers), set.frames.frames())
+            .with(subject.scene().and_then(|_| Warning::not_positive(&set.frames.inputs)));
         Self { judged_on, decoders, verdict }
     }
 }
@@ -101,9 +102,14 @@ fn on_frames(
 /// Errors of the best candidate and of the baselines on folds that were held out.
 fn on_folds(selection: &Selection, set: &TrainingSet<'_>) -> Vec<DecoderErrors> {
     let names = &set.frames.outputs.names;
+    let mean = selection.baselines.iter().find(|it| it.decoder == mean::NAME);
     let of = |decoder: &str, rmse: &[f64]| {
         let errors = columns::groups(names).into_iter().map(|(group, members)| {
-            let squares: f64 = members.iter().map(|column| rmse[*column].powi(2)).sum();
+            let squares_of =
+                |rmse: &[f64]| members.iter().map(|column| rmse[*column].powi(2)).sum::<f64>();
+            let squares = squares_of(rmse);
+            // Against the mean of the frames that are not held out.
+            let r_squared = mean.map(|mean| 1.0 - squares / squares_of(&mean.rmse));
             Errors {
                 group: group.into(),
                 unit: columns::unit_of(group).into(),
@@ -112,7 +118,7 @@ fn on_folds(selection: &Selection, set: &TrainingSet<'_>) -> Vec<DecoderErrors> 
                 relative_l2_percent: None,
                 full_scale_percent: None,
                 positional_percent: None,
-                r_squared: None,
+                r_squared: r_squared.filter(|it| it.is_finite()),
                 mean_relative_percent: None,
                 ratio_to_limit: None,
                 ratio_standard_error: None,

@@ -12,7 +12,7 @@ fn group(name: &str, rmse: f64, ratio_to_limit: Option<f64>) -> Errors {
         relative_l2_percent: None,
         full_scale_percent: None,
         positional_percent: None,
-        r_squared: None,
+        r_squared: Some(0.0),
         mean_relative_percent: None,
         ratio_to_limit,
         ratio_standard_error: None,
@@ -25,6 +25,14 @@ fn decoders(of: &[(&str, &[(&str, f64)])]) -> Vec<DecoderErrors> {
         errors: groups.iter().map(|(name, rmse)| group(name, *rmse, None)).collect(),
     };
     of.iter().map(decoder).collect()
+}
+
+#[test]
+fn an_output_that_only_rounding_changes_has_nothing_to_decode() {
+    let mut decoders = decoders(&[("network", &[("y", 1e-17)]), ("mean", &[("y", 1e-17)])]);
+    decoders[1].errors[0].r_squared = None;
+    let sentence = Verdict::of(&decoders, &no_limit()).sentence;
+    assert!(sentence.starts_with("y does not change"), "{sentence}");
 }
 
 fn outliers(lines: usize) -> Outliers {

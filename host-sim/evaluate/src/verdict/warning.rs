@@ -1,6 +1,7 @@
 //! Warnings, each by a name of its own.
 
 use serde::Serialize;
+use taxel_data::table::Table;
 use taxel_learn::outliers::Outliers;
 
 /// Largest blob in bytes that a slot of the firmware's images holds: 128 KiB less the record behind it.
@@ -14,6 +15,9 @@ pub const FEW_TEST_FRAMES: usize = 30;
 
 /// Share of readings outside the training range above which a warning is due.
 pub const OUT_OF_RANGE: f64 = 0.01;
+
+/// Share of simulated readings at or below zero above which a warning is due.
+const NOT_POSITIVE: f64 = 1e-4;
 
 /// What to beware of, in words.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -107,6 +111,19 @@ impl Warning {
             format!(
                 "{:.1} % of the readings lie outside the range that the model was trained on, and are clamped; is it \
                  the right model for this sensor?",
+                100.0 * share
+            )
+        })
+    }
+
+    /// Simulated resistances that noise made zero or negative, which no sensor reads.
+    #[must_use]
+    pub fn not_positive(readings: &Table) -> Option<Self> {
+        let count = readings.values.iter().filter(|reading| **reading <= 0.0).count();
+        let share = count as f64 / readings.values.len().max(1) as f64;
+        Self::when(share > NOT_POSITIVE, "readings-not-positive", || {
+            format!(
+                "noise makes {:.2} % of the readings zero or negative, which no sensor reads: lower noise.level",
                 100.0 * share
             )
         })

@@ -11,14 +11,22 @@ use model_core::rbf::{Format, Network, NetworkError, Shape, direct, expanded, fi
 
 use taxel_data::table::Table;
 
+use super::least_squares::Factor;
 use super::{Options, Samples};
 use crate::error::{Error, Result};
+use crate::infer::{Exponential, infer};
 
 mod direct_f32;
 mod expanded_f32;
 mod fixed_point;
 
 pub use expanded_f32::rounding_bounds;
+
+/// Most that a format may take from the R² of an output on the training frames, unless its squared error grows by no
+/// more than [`MOST_GROWTH`].
+pub const MOST_LOST: f64 = 0.01;
+/// Factor on squared errors that rounding may cost where an output is hard to decode: its RMSE doubles.
+pub const MOST_GROWTH: f64 = 4.0;
 
 /// Trained network with its parameters as the blob will hold them, owned.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,6 +49,39 @@ impl FittedNetwork {
             Ok(_) => Ok(fitted),
             Err(cause) => Err(Error::NotHeld { format, cause }),
         }
+    }
+
+    /// The network, if it decodes each output of `samples` as well as the solution of `factor` in f64, which it was
+    /// rounded from.
+    ///
+    /// # Errors
+    /// [`Error::OutputLost`] if R² of an output is lower by more than [`MOST_LOST`], and its squared error larger by more
+    /// than [`MOST_GROWTH`].
+    fn unless_lost(
+        self,
+        samples: &Samples<'_>,
+        targets: &Targets,
+        factor: &Factor,
+    ) -> Result<Self> {
+        let outputs = &samples.table.outputs;
+        let predicted =
+            infer(&self.network(), Exponential::default(), &samples.table.inputs.values);
+        let found = outputs.squared_errors(&predicted);
+        for (output, (found, mean)) in found.into_iter().zip(&targets.means).enumerate() {
+            let squares = |values: &[f64]| {
+                values.iter().skip(output).step_by(targets.outputs()).map(|v| v * v).sum::<f64>()
+            };
+            let total = squares(&targets.deviations.values);
+            // What the fit leaves: the squares of the targets without those along the regressors.
+            let left = (total - squares(&factor.projection)).max(0.0);
+            let lost = (found - left) / total;
+            let rounding = outputs.len() as f64 * (4.0 * f64::EPSILON * mean).powi(2);
+            if total > rounding && lost > MOST_LOST && found > MOST_GROWTH * left {
+                let (format, output) = (self.format, outputs.names[output].clone());
+                return Err(Error::OutputLost { format, output, lost, mean: *mean });
+            }
+        }
+        Ok(self)
     }
 
     fn try_network(&self) -> std::result::Result<Network<'_>, NetworkError> {

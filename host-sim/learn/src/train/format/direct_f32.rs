@@ -42,8 +42,8 @@ impl<'s> Fit<'s> {
     pub(super) fn network(&self, initial_covariance: f64) -> Result<FittedNetwork> {
         let Regressors { centres, inputs, affine_tail, .. } = self.regressors;
         let count = centres.len() / inputs;
-        let weights = self.decomposed.factor(initial_covariance).weights();
-        let weights = Weights::split(weights, count, self.targets);
+        let factor = self.decomposed.factor(initial_covariance);
+        let weights = Weights::split(factor.weights(), count, self.targets);
         let round = |values: &[f64]| values.iter().map(|v| *v as f32).collect::<Vec<_>>();
         let parameters = Parameters {
             input_minimum: &round(&self.samples.scale.minimum),
@@ -56,6 +56,10 @@ impl<'s> Fit<'s> {
         };
         let shape = Shape { inputs, centres: count, outputs: self.targets.outputs() };
         let words = parameters.words().collect();
-        FittedNetwork::try_new(shape, Format::F32Direct, affine_tail, words)
+        FittedNetwork::try_new(shape, Format::F32Direct, affine_tail, words)?.unless_lost(
+            self.samples,
+            self.targets,
+            &factor,
+        )
     }
 }

@@ -6,7 +6,7 @@ use model_core::rbf::expanded::{CENTRES_AT_ONCE, Parameters};
 use model_core::rbf::{Format, Network, Shape};
 use model_core::scale::{HALF_RANGE, UNITS};
 
-use super::super::least_squares::{Decomposed, Regressors};
+use super::super::least_squares::{Decomposed, Factor, Regressors};
 use super::super::{CentredScale, Options, Samples};
 use super::{FittedNetwork, Targets, Weights};
 use crate::infer::{Exponential, infer};
@@ -61,12 +61,12 @@ impl<'s> Fit<'s> {
     /// Network whose weights have a penalty of 1/`initial_covariance`, or `None` if its rounding is not proved
     /// harmless.
     ///
-    /// That is so if an exponent could leave its range, or the [bound](rounding_bounds) of an output exceeds
-    /// a tenth of its training RMSE.
+    /// That is so if an exponent could leave its range, the [bound](rounding_bounds) of an output exceeds
+    /// a tenth of its training RMSE, or an output is lost.
     pub(super) fn network(&self, initial_covariance: f64) -> Option<FittedNetwork> {
         let Self { samples, targets, rounded, .. } = self;
         if let Some(few) = &self.few {
-            let few = rounded.network(few, targets, initial_covariance)?;
+            let few = rounded.network(&few.factor(initial_covariance), targets)?;
             if worst_share(&few, samples.table) > HOPELESS {
                 return None;
             }
@@ -74,8 +74,11 @@ impl<'s> Fit<'s> {
         let all = self
             .all
             .get_or_init(|| rounded.decompose(&self.scaled, &targets.deviations.values, targets));
-        let fitted = rounded.network(all, targets, initial_covariance)?;
-        (worst_share(&fitted, samples.table) <= HARMLESS).then_some(fitted)
+        let factor = all.factor(initial_covariance);
+        let fitted = rounded.network(&factor, targets)?;
+        let is_harmless = worst_share(&fitted, samples.table) <= HARMLESS;
+        // What this format loses, direct distances may hold.
+        is_harmless.then(|| fitted.unless_lost(samples, targets, &factor).ok()).flatten()
     }
 }
 
@@ -132,16 +135,10 @@ impl Rounded {
         Decomposed::new(&regressors.of(scaled), deviations, targets.outputs())
     }
 
-    /// Network whose weights fit the `decomposed` samples, or `None` if an exponent could leave its range.
-    fn network(
-        &self,
-        decomposed: &Decomposed,
-        targets: &Targets,
-        initial_covariance: f64,
-    ) -> Option<FittedNetwork> {
+    /// Network with the weights of `factor`, or `None` if an exponent could leave its range.
+    fn network(&self, factor: &Factor, targets: &Targets) -> Option<FittedNetwork> {
         let (inputs, outputs) = (self.inputs, targets.outputs());
         let count = self.centres.len() / inputs;
-        let factor = decomposed.factor(initial_covariance);
         let mut weights = Weights::split(factor.weights(), count, targets);
         // The tail acts on inputs about their middle.
         for row in weights.affine.chunks_exact_mut(outputs) {
@@ -334,7 +331,7 @@ mod tests {
             let scaled = rounded.scale.apply(&table);
             let share = |scaled: &[f64], deviations: &[f64]| {
                 let decomposed = rounded.decompose(scaled, deviations, &targets);
-                let fitted = rounded.network(&decomposed, &targets, 1e6).unwrap();
+                let fitted = rounded.network(&decomposed.factor(1e6), &targets).unwrap();
                 worst_share(&fitted, &table)
             };
             let few = share(&every(&scaled, 18), &every(&all.values, targets.outputs()));

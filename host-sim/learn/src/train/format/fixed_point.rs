@@ -62,10 +62,13 @@ impl Exponents {
         let exponent_per_step = LOG2_E / (2.0 * options.spread.powi(2)) * STEP * STEP;
         let bits = EXPONENT_FRACTION_BITS + DECAY_FRACTION_BITS;
         let decay = (exponent_per_step * 2_f64.powi(bits.cast_signed())).round();
-        if !(1.0..=f64::from(u32::MAX)).contains(&decay) {
-            return Err(refused(
-                "the format fixed16 does not hold so narrow or wide a Gaussian".into(),
-            ));
+        if decay < 1.0 {
+            let rule = "the format fixed16 does not hold so wide a Gaussian; give a smaller spread, or another format \
+                        (f32)";
+            return Err(BadValue::new("spread", options.spread, rule).into());
+        }
+        if decay > f64::from(u32::MAX) {
+            return Err(refused("the format fixed16 does not hold so narrow a Gaussian".into()));
         }
         let scale = CentredScale::of(samples.table);
         let per_step = decay / 2_f64.powi(DECAY_FRACTION_BITS.cast_signed());
@@ -231,6 +234,7 @@ impl Rounded {
 
 /// Samples decomposed for this format.
 pub(super) struct Fit<'s> {
+    samples: &'s Samples<'s>,
     targets: &'s Targets,
     exponents: Exponents,
     affine_tail: bool,
@@ -243,7 +247,7 @@ impl<'s> Fit<'s> {
     /// # Errors
     /// [`Error`] if the format does not hold the Gaussians.
     pub(super) fn new(
-        samples: &Samples<'_>,
+        samples: &'s Samples<'s>,
         centres: &[f64],
         options: &Options,
         targets: &'s Targets,
@@ -258,7 +262,7 @@ impl<'s> Fit<'s> {
             affine: options.affine_tail,
         };
         let decomposed = Decomposed::new(&design, &targets.deviations.values, outputs);
-        Ok(Self { targets, exponents, affine_tail: options.affine_tail, decomposed })
+        Ok(Self { samples, targets, exponents, affine_tail: options.affine_tail, decomposed })
     }
 
     /// Network whose weights have a penalty of 1/`initial_covariance`.
@@ -270,7 +274,11 @@ impl<'s> Fit<'s> {
         let factor = self.decomposed.factor(initial_covariance);
         let rounded = round(&factor, exponents, self.targets, affine)?;
         let words = exponents.words(Some(&rounded));
-        FittedNetwork::try_new(exponents.shape, Format::Fixed16, affine, words)
+        FittedNetwork::try_new(exponents.shape, Format::Fixed16, affine, words)?.unless_lost(
+            self.samples,
+            self.targets,
+            &factor,
+        )
     }
 }
 

@@ -1,0 +1,114 @@
+//! What f32 leaves of a data set's columns: a device is given readings in f32, and gives estimates in f32.
+//!
+//! A column is refused by its name where little would be left of it, so that no input or output is lost in silence.
+
+use taxel_data::dataset::Dataset;
+use taxel_data::error::Role;
+use taxel_data::table::Table;
+
+use crate::error::{Error, Result, Unresolved};
+
+/// Largest root mean square of what rounding to f32 adds to a column, as a share of the column's standard deviation.
+pub const MOST_ROUNDING: f64 = 0.05;
+/// Least range of a column that changes: one over a smaller one, in the units that readings are scaled to, is beyond
+/// f32.
+pub const LEAST_RANGE: f64 = 1e-28;
+/// Largest magnitude of a value: its square, and sums of squares, stay far inside f64, and ranges stay inside f32.
+pub const LARGEST: f64 = 1e30;
+/// Range, relative to the values, that rounding in f64 explains: such a column does not change.
+const CONSTANT: f64 = 4.0 * f64::EPSILON;
+
+/// Checks that f32 holds every column of `dataset` that changes.
+///
+/// # Errors
+/// [`Error::Column`] for the first column that it does not hold.
+pub fn check(dataset: &Dataset) -> Result<()> {
+    for (role, table) in [(Role::Inputs, &dataset.inputs), (Role::Outputs, &dataset.outputs)] {
+        let rounding = rounding(table);
+        let columns = table.names.iter().zip(table.ranges()).zip(rounding);
+        for ((name, range), rounding) in columns {
+            if let Some(why) = refused(range, rounding) {
+                return Err(Error::Column { column: name.clone(), role, range, why });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Why a column cannot be used, from its `range` and what `rounding` adds to it.
+fn refused([low, high]: [f64; 2], rounding: f64) -> Option<Unresolved> {
+    let (span, largest) = (high - low, low.abs().max(high.abs()));
+    if largest > LARGEST {
+        return Some(Unresolved::TooLarge { bound: LARGEST });
+    }
+    // A column without a value has a negative span.
+    if span <= CONSTANT * largest {
+        return None;
+    }
+    if span < LEAST_RANGE {
+        return Some(Unresolved::TooNarrow { bound: LEAST_RANGE });
+    }
+    let step = f64::from((largest as f32).next_up()) - f64::from(largest as f32);
+    (rounding > MOST_ROUNDING).then_some(Unresolved::TooFarFromZero { step })
+}
+
+/// Root mean square of what rounding to f32 adds to each column, as a share of its standard deviation.
+fn rounding(table: &Table) -> Vec<f64> {
+    let mut squares = vec![[0.0; 2]; table.names.len()];
+    let means = table.means();
+    for line in table.lines() {
+        for (([added, own], mean), value) in squares.iter_mut().zip(&means).zip(line) {
+            if !value.is_nan() {
+                *added += (f64::from(*value as f32) - value).powi(2);
+                *own += (value - mean).powi(2);
+            }
+        }
+    }
+    squares.into_iter().map(|[added, own]: [f64; 2]| (added / own).sqrt()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Result for a data set whose input is from `low` to `high` in 100 steps, and whose output is `scale` times that.
+    fn checked([low, high]: [f64; 2], scale: f64) -> std::result::Result<(), String> {
+        let mut data = Dataset::empty(vec!["ch1".into()], vec!["f_n".into()], 1, 101);
+        for (step, value) in data.inputs.values.iter_mut().enumerate() {
+            *value = low + (high - low) * step as f64 / 100.0;
+        }
+        data.outputs.values = data.inputs.values.iter().map(|value| value * scale).collect();
+        check(&data).map_err(|refusal| refusal.to_string())
+    }
+
+    #[test]
+    fn columns_that_f32_holds_pass() {
+        for range in [[0.0, 1.0], [-1e30, 1e30], [0.0, 1e-27], [1e5, 1e5 + 1.0], [1e9, 1.1e9]] {
+            assert_eq!(checked(range, 1.0), Ok(()), "{range:?}");
+        }
+    }
+
+    #[test]
+    fn columns_that_do_not_change_pass_for_they_are_noted_elsewhere() {
+        for value in [0.0, 1e-300, 0.1, 1e29] {
+            assert_eq!(checked([value; 2], 1.0), Ok(()), "{value:e}");
+        }
+        assert_eq!(checked([0.1, 0.1_f64.next_up()], 1.0), Ok(()));
+    }
+
+    #[test]
+    fn what_f32_would_lose_is_refused_by_name_with_the_fix() {
+        for (range, scale, words) in [
+            ([1e8, 1e8 + 1.0], 1.0, ["ch1", "8.0 apart", "subtract 100000000"]),
+            ([1e6, 1e6 + 1.0], 1.0, ["ch1", "0.0625 apart", "subtract 1000000"]),
+            ([0.0, 1e-29], 1.0, ["ch1", "1e-28", "multiply it by 1e29"]),
+            ([0.0, 1e-300], 1.0, ["ch1", "1e-28", "multiply it by 1e300"]),
+            ([0.0, 1e31], 1.0, ["ch1", "1e30", "multiply it by 1e-31"]),
+            ([0.0, 1.0], 1e-30, ["f_n", "1e-28", "multiply it by 1e30"]),
+            ([0.0, 1.0], 1e300, ["f_n", "1e30", "multiply it by 1e-300"]),
+        ] {
+            let refusal = checked(range, scale).expect_err("refused");
+            assert!(words.iter().all(|word| refusal.contains(word)), "{range:?}: {refusal}");
+        }
+    }
+}
