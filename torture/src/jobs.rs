@@ -4,7 +4,8 @@ mod device;
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitStatus, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::thread;
 use std::time::{Duration, Instant};
 
 use crate::scratch::{Files, Folder, files_of};
@@ -15,6 +16,9 @@ const DATA: &str = "data";
 
 const SCENE: &str = include_str!("jobs/scene.toml");
 const TABLE1: &str = include_str!("jobs/table1.toml");
+
+/// The longest time of a job that does not hang.
+const PATIENCE: Duration = Duration::from_mins(1);
 
 /// Exit status of a Rust program that panics.
 const PANICKED: i32 = 101;
@@ -202,6 +206,7 @@ impl Job {
         let port = place.device.as_ref().map_or("", Device::port);
         let arguments = self.arguments.iter().map(|it| if *it == "PORT" { port } else { *it });
         command.args(arguments).current_dir(place.path()).env("RAYON_NUM_THREADS", "1");
+        command.env("RUST_BACKTRACE", "0");
         command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
         command
     }
@@ -247,6 +252,33 @@ impl Job {
         }
         Ok(())
     }
+}
+
+/// Waits until a job has ended.
+///
+/// # Errors
+/// It hangs, or cannot be waited for.
+pub fn wait(mut child: Child, may_panic: bool) -> Result<Outcome, String> {
+    let start = Instant::now();
+    while is_running(&mut child)? {
+        if start.elapsed() > PATIENCE {
+            let _ = child.kill();
+            let _ = child.wait();
+            return Err("it hangs".into());
+        }
+        thread::sleep(Duration::from_millis(1));
+    }
+    let output = child.wait_with_output().map_err(|cause| format!("wait: {cause}"))?;
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    Ok(Outcome { status: output.status, message, may_panic })
+}
+
+/// Whether a job has not ended yet.
+///
+/// # Errors
+/// That cannot be told.
+pub fn is_running(child: &mut Child) -> Result<bool, String> {
+    child.try_wait().map(|status| status.is_none()).map_err(|cause| format!("wait: {cause}"))
 }
 
 fn is_killed(status: ExitStatus) -> bool {

@@ -2,11 +2,11 @@
 
 use std::process::{Child, Command, Stdio};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use crate::effort::Effort;
 use crate::found::Found;
-use crate::jobs::{Job, Outcome, Place};
+use crate::jobs::{Job, Outcome, Place, is_running, wait};
 use crate::promise::Promise;
 use crate::tools::Tools;
 
@@ -16,9 +16,6 @@ pub const JOBS: Promise = Promise {
     share: 8,
     check: jobs,
 };
-
-/// The longest time of a job that does not hang.
-const PATIENCE: Duration = Duration::from_mins(1);
 
 /// How a job is ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,14 +60,13 @@ fn ended(
     shell.args(["-c", &format!("ulimit -f {blocks}; {first}exec \"$0\" \"$@\"")]);
     let mut child =
         job.under(shell, place, true).spawn().map_err(|cause| format!("sh: {cause}"))?;
-    let start = Instant::now();
     let whole_us = job.took().as_micros() as u64;
     // Half of all moments are spread over the job; the others are soon after it begins to write.
     if draws.below(2) == 0 {
         thread::sleep(Duration::from_micros(draws.below(whole_us + whole_us / 5)));
     } else {
         thread::sleep(Duration::from_micros(draws.below(whole_us)));
-        while !place.has_temporary() && is_running(&mut child)? && start.elapsed() < PATIENCE {
+        while !place.has_temporary() && is_running(&mut child)? {
             thread::yield_now();
         }
         thread::sleep(Duration::from_micros(draws.below(2000)));
@@ -81,21 +77,7 @@ fn ended(
         End::Terminate => signal(&mut child, "-TERM")?,
         End::Full => {}
     }
-    while is_running(&mut child)? {
-        if start.elapsed() > PATIENCE {
-            let _ = child.kill();
-            let _ = child.wait();
-            return Err("it hangs".into());
-        }
-        thread::sleep(Duration::from_millis(1));
-    }
-    let output = child.wait_with_output().map_err(|cause| format!("wait: {cause}"))?;
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    Ok(Outcome { status: output.status, message, may_panic: false })
-}
-
-fn is_running(child: &mut Child) -> Result<bool, String> {
-    child.try_wait().map(|status| status.is_none()).map_err(|cause| format!("wait: {cause}"))
+    wait(child, false)
 }
 
 fn signal(child: &mut Child, name: &str) -> Result<(), String> {

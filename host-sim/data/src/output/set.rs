@@ -7,9 +7,11 @@
 //!
 //! Whoever is killed in between leaves files of one run. One process at a time does this in a folder, which it locks.
 
-use std::fs::{self, File};
+use std::fs::{self, File, TryLockError};
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
+use std::thread;
+use std::time::{Duration, Instant};
 
 use super::disk::{Disk, Sink, System};
 use super::pending;
@@ -21,6 +23,9 @@ use crate::error::{Error, Result};
 const BEGUN: &str = ".tmp";
 const READY: &str = ".ready";
 const MOVING: &str = ".moving";
+
+/// Time for another program to move its files.
+const PATIENCE: Duration = Duration::from_secs(10);
 
 /// Files that belong together.
 #[derive(Debug, Clone, Copy)]
@@ -95,8 +100,18 @@ impl FileSet {
     /// Locks the folder against other processes as long as the result lives, and completes what killed ones have begun.
     /// Where folders cannot be locked, nothing is done: others may be at work.
     fn hold(&self, disk: &dyn Disk, folder: &Path) -> io::Result<Option<File>> {
-        let locked = File::open(folder).and_then(|opened| opened.lock().map(|()| opened));
-        let Ok(locked) = locked else { return Ok(None) };
+        let Ok(folder_file) = File::open(folder) else { return Ok(None) };
+        let start = Instant::now();
+        loop {
+            match folder_file.try_lock() {
+                Ok(()) => break,
+                Err(TryLockError::Error(_)) => return Ok(None),
+                Err(TryLockError::WouldBlock) if start.elapsed() > PATIENCE => {
+                    return Err(io::Error::other("another program writes to it"));
+                }
+                Err(TryLockError::WouldBlock) => thread::sleep(Duration::from_millis(1)),
+            }
+        }
         let found: Vec<PathBuf> = entries(folder).map(|entry| entry.path()).collect();
         for path in found {
             let name = path.file_name().unwrap_or_default();
@@ -107,7 +122,7 @@ impl FileSet {
                 discard(disk, &path);
             }
         }
-        Ok(Some(locked))
+        Ok(Some(folder_file))
     }
 
     /// Puts the files of a hidden folder that is `ready`, or was and is moving now, in their places.

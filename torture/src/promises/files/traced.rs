@@ -3,9 +3,11 @@
 use std::fs;
 use std::process::{Command, Stdio};
 
+use rayon::iter::{IntoParallelIterator, ParallelIterator};
+
 use crate::effort::Effort;
 use crate::found::Found;
-use crate::jobs::{Job, Outcome};
+use crate::jobs::{Job, wait};
 use crate::tools::Tools;
 
 /// Calls to the system, and what they are made to do.
@@ -32,26 +34,31 @@ pub fn test(effort: &Effort, tools: &Tools, found: &mut Found) -> Result<(), Str
         found.note += "not tested: calls of the program itself, for which strace is missing";
         return Ok(());
     }
-    let program = tools.program()?;
-    for job in Job::of_each_kind(program)? {
-        for (call, faults) in FAULTS {
-            for fault in *faults {
-                for number in 1.. {
-                    if effort.is_over() {
-                        return Ok(());
-                    }
-                    let (struck, outcome) = traced(&job, &format!("{call}:{fault}:when={number}"))?;
-                    if !struck {
-                        break;
-                    }
-                    found.cases += 1;
-                    let at = format!("{} with {call} {number}, {fault}", job.name());
-                    if let Err(cause) = outcome {
-                        found.worst = f64::INFINITY;
-                        found.note = format!("{at}: {cause}");
-                    }
-                }
+    let jobs = Job::of_each_kind(tools.program()?)?;
+    let kinds =
+        FAULTS.iter().flat_map(|(call, faults)| faults.iter().map(move |fault| (call, fault)));
+    let kinds =
+        jobs.iter().flat_map(|job| kinds.clone().map(move |(call, fault)| (job, call, fault)));
+    let tested = kinds.collect::<Vec<_>>().into_par_iter().map(|(job, call, fault)| {
+        let mut failed = None;
+        for number in 1.. {
+            if effort.is_over() {
+                return Ok((number - 1, failed));
             }
+            let (struck, outcome) = traced(job, &format!("{call}:{fault}:when={number}"))?;
+            if !struck {
+                return Ok((number - 1, failed));
+            }
+            let at = format!("{} with {call} {number}, {fault}", job.name());
+            failed = outcome.err().map(|cause| format!("{at}: {cause}")).or(failed);
+        }
+        Ok((0, failed))
+    });
+    for (cases, failed) in tested.collect::<Result<Vec<(u64, Option<String>)>, String>>()? {
+        found.cases += cases;
+        if let Some(cause) = failed {
+            found.worst = f64::INFINITY;
+            found.note = cause;
         }
     }
     Ok(())
@@ -65,15 +72,14 @@ fn traced(job: &Job, fault: &str) -> Result<(bool, Result<(), String>), String> 
     let mut command = Command::new("strace");
     command.args(["-f", "-qq", "-o"]).arg(&log).args(["-e", &format!("trace={call}")]);
     command.args(["-e", &format!("inject={fault}"), "--"]);
-    let output = job.under(command, &place, true).output();
-    let output = output.map_err(|cause| format!("strace: {cause}"))?;
+    let child = job.under(command, &place, true).spawn();
+    let may_panic = fault.starts_with("close:error");
+    let outcome = wait(child.map_err(|cause| format!("strace: {cause}"))?, may_panic)?;
     let text = fs::read_to_string(&log).unwrap_or_default();
     let _ = fs::remove_file(&log);
     let is_signal = fault.contains("signal=");
     let struck = text.contains("INJECTED") || (is_signal && is_killed(&text));
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    let may_panic = fault.starts_with("close:error");
-    Ok((struck, job.judge(&place, &Outcome { status: output.status, message, may_panic })))
+    Ok((struck, job.judge(&place, &outcome)))
 }
 
 fn is_killed(log: &str) -> bool {
