@@ -141,6 +141,9 @@ pub fn upload_steps(blob: &[u8], chunk: usize) -> Vec<UploadStep<'_>> {
 /// Carries out steps of an upload in one session after the other, until the device refuses one; returns the last
 /// answer.
 ///
+/// # Errors
+/// What the device refused.
+///
 /// # Panics
 /// The device does not answer, or a session ends for another reason than the upload.
 pub fn upload<S: Slot>(

@@ -99,7 +99,7 @@ pub fn start_trial<W: Wire>(
         let outcome = send(device, (blob, seal), identity.chunk_bytes, progress)?;
         let crc_32 = match outcome.map_err(Error::Refused)? {
             UploadState::OnTrial { crc_32 } => crc_32,
-            other => return Err(unexpected("a trial", &other)),
+            other => return Err(unexpected("a trial", other)),
         };
         see_estimate(device, crc_32)
     })
@@ -180,7 +180,7 @@ pub fn confirm<W: Wire>(device: &mut Device<W>) -> Result<DeviceIdentity> {
                 }
             }
         }
-        other => Err(unexpected("a confirmation", &other)),
+        other => Err(unexpected("a confirmation", other)),
     }
 }
 
@@ -197,6 +197,6 @@ pub fn replace<W: Wire>(
     or_abort(device, confirm)
 }
 
-fn unexpected(request: &str, answer: &UploadState) -> Error {
+fn unexpected(request: &str, answer: UploadState) -> Error {
     Error::Unexpected { request: request.into(), answer: format!("{answer:?}") }
 }
