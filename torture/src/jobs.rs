@@ -229,7 +229,8 @@ impl Job {
             let whole = seen == self.new && hidden.is_empty();
             return if whole { Ok(()) } else { Err(format!("done, but left {}", names())) };
         }
-        let is_killed = is_killed(*status);
+        // A panic where one is expected is like a kill.
+        let is_killed = is_killed(*status) || status.code() == Some(PANICKED);
         let is_of = |run: &Files| seen.iter().all(|(name, bytes)| run.get(name) == Some(bytes));
         let is_one_run = seen == self.old || seen == self.new;
         // The next run completes it.

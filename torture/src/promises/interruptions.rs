@@ -1,6 +1,7 @@
 //! Jobs that are killed, interrupted, or find the disk full, at moments drawn by the seed.
 
 use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 use std::time::Duration;
 
@@ -30,16 +31,24 @@ enum End {
 fn jobs(effort: &Effort, tools: &Tools) -> Result<Found, String> {
     let jobs = Job::all(tools.program()?)?;
     let least = if effort.is_planted() { 10 } else { 40 };
-    Ok(effort.worst((least, 2000), (0.0, "broken"), |seed| {
+    let ended_early = AtomicU64::new(0);
+    let mut found = effort.worst((least, 2000), (0.0, "broken"), |seed| {
         let mut draws = Draws(seed);
         let job = &jobs[(seed % jobs.len() as u64) as usize];
         let end = [End::Kill, End::Interrupt, End::Terminate, End::Full]
             [(seed / jobs.len() as u64 % 4) as usize];
         let place = job.place()?;
         let outcome = ended(job, &place, end, effort.is_planted(), &mut draws)?;
+        ended_early.fetch_add(u64::from(!outcome.status.success()), Ordering::Relaxed);
         let judged = job.judge(&place, &outcome);
         judged.map(|()| 0.0).map_err(|cause| format!("{}, {end:?}: {cause}", job.name()))
-    }))
+    });
+    if found.note.is_empty() {
+        let ended_early = ended_early.into_inner();
+        found.note =
+            format!("{ended_early} of {} jobs were ended before they were done", found.cases);
+    }
+    Ok(found)
 }
 
 /// Begins a job, and ends it at some moment.
