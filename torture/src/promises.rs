@@ -3,6 +3,7 @@
 // Every test has the same type, whether it can fail to run or not.
 #![allow(clippy::unnecessary_wraps)]
 
+mod authenticity;
 mod exponentials;
 mod files;
 mod flips;
@@ -25,6 +26,7 @@ pub const PROMISES: &[Promise] = &[
     power::SETTINGS,
     power::DECAY,
     power::WORN,
+    authenticity::FORGED,
     load::FRAMES,
     load::LINK,
     load::WATCHDOG,

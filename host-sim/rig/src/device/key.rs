@@ -1,13 +1,17 @@
 //! Keys of devices, and seals made with them.
 
+use std::time::Duration;
+
 use firmware::link::message::{KeyState, Report, Request};
 use firmware::seal::{Key, Seal};
 use model_core::blob::Model;
 use taxel_data::BadValue;
 
-use super::upload::ERASE;
 use super::{Device, DeviceIdentity, Wire};
 use crate::error::{Error, Result};
+
+/// Longest time in which a board sets a key: it may erase flash.
+const SETTING: Duration = Duration::from_secs(5);
 
 /// What a model is sealed with.
 #[derive(Clone, Copy)]
@@ -81,7 +85,7 @@ impl<W: Wire> Device<W> {
     /// [`Error::Refused`] if it has another one, or the errors of [`ask`](Self::ask).
     pub fn provision(&mut self, key: &Key) -> Result<()> {
         let request = Request::Provision { key: *key };
-        let timeout = ERASE.max(self.patience);
+        let timeout = SETTING.max(self.patience);
         let answer = self
             .ask(&request, timeout, |report| matches!(report, Report::Provisioned).then_some(()));
         answer?.map_err(Error::Refused)
