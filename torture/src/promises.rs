@@ -7,6 +7,7 @@ mod exponentials;
 mod flips;
 mod load;
 mod power;
+mod ram;
 
 use crate::promise::Promise;
 
@@ -21,6 +22,7 @@ pub const PROMISES: &[Promise] = &[
     power::SETTINGS,
     power::DECAY,
     power::WORN,
+    ram::RAM,
     load::FRAMES,
     load::LINK,
     load::WATCHDOG,
