@@ -26,6 +26,8 @@ mod kept;
 mod recalibrate;
 mod session;
 mod answer;
+#[cfg(test)]
+mod tests;
 
 pub use buffers::Buffers;
 use frame_clock::{FrameClock, LongClock};
