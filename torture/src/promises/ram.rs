@@ -66,19 +66,15 @@ fn check(effort: &Effort, tools: &Tools) -> Result<Found, String> {
         }
     }
     let of = |harm: Harm| counts.iter().map(|region| region[harm as usize]).sum::<u64>();
-    let silent = counts.map(|region| region[Harm::Silent as usize]);
     let (share, [low, high]) = share_percent(of(Harm::Silent), flips);
     let note = format!(
-        "unharmed {}, checks {}, fault {}, watchdog {}, silent {} = {share:.1} % ({low:.1} to {high:.1}): \
-         stack {}, variables {}, model {}",
+        "{} unharmed, {} told, {} faults, {} watchdog, {} silent: {share:.1} % ({low:.1}–{high:.1}), {} in the model",
         of(Harm::None),
         of(Harm::Told),
         of(Harm::Fault),
         of(Harm::Watchdog),
         of(Harm::Silent),
-        silent[0],
-        silent[1],
-        silent[2]
+        counts[2][Harm::Silent as usize],
     );
     let note = if for_good.is_empty() { note } else { for_good };
     Ok(Found {
