@@ -10,6 +10,7 @@ mod flips;
 mod interruptions;
 mod load;
 mod power;
+mod ram;
 mod hostile_bytes;
 mod size_bombs;
 
@@ -27,6 +28,7 @@ pub const PROMISES: &[Promise] = &[
     power::DECAY,
     power::WORN,
     authenticity::FORGED,
+    ram::RAM,
     load::FRAMES,
     load::LINK,
     load::WATCHDOG,

@@ -12,12 +12,12 @@ pub struct Tools {
     pub images: Option<PathBuf>,
 }
 
-#[allow(dead_code)]
 impl Tools {
     /// The program of host-sim.
     ///
     /// # Errors
     /// It was not given.
+    #[allow(dead_code)]
     pub fn program(&self) -> Result<&Path, String> {
         self.program.as_deref().ok_or_else(|| missing("host-sim"))
     }
@@ -32,7 +32,6 @@ impl Tools {
     }
 }
 
-#[allow(dead_code)]
 fn missing(name: &str) -> String {
     format!("{name} is not built; run this by `cargo xtask torture`")
 }

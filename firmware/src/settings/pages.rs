@@ -15,6 +15,7 @@ use core::task::{Context, Poll, Waker};
 use embedded_storage_async::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
 };
+use model_core::checksum::CRC_32;
 use sequential_storage::Error;
 use sequential_storage::cache::{Cache, Uncached};
 use sequential_storage::map::{MapConfig, MapStorage, SerializationError, Value};
@@ -54,32 +55,33 @@ impl<S: Slot> SettingPages<S> {
         MapStorage::new(Pages { slots: &mut self.0, hidden }, config, Cache::new_uncached())
     }
 
-    /// Number of the page that an exchange was about to erase when the power was cut, if it still counts as in use.
+    /// Number of the page that was being erased at the end of an exchange when the power was cut, if it still counts as
+    /// in use.
     ///
-    /// An erase that is cut leaves any bits set. The map would take the page for the one that is written to, or would
-    /// move its items, damaged as they are, once more. The other page has every setting that can be read.
+    /// Such a page may have any bits set. The map would take it for the one that is written to, or would move its items,
+    /// damaged as they are, once more. Until an erase begins, no item of the new page differs from the old page's.
     fn left_over(&mut self, buffer: &mut [u8]) -> Option<usize> {
         let marks = self.0.each_ref().map(|page| {
             let bytes = page.bytes().get(..PAGE_BYTES).unwrap_or_default();
             (is_marked(bytes.first()), is_marked(bytes.last()))
         });
-        if marks == [(true, true); 2] || marks.iter().any(|(start, _)| !start) {
+        if marks.iter().any(|(start, _)| !start) {
             return None;
         }
-        let mut readable = |hidden| {
-            Setting::ALL.map(|setting| self.fetch(setting, Some(hidden), buffer).is_some())
+        let mut alone = |hidden| {
+            Setting::ALL.map(|setting| {
+                self.fetch(setting, Some(hidden), buffer).map(|bytes| CRC_32.checksum(bytes))
+            })
         };
-        let of_page = [readable(1), readable(0)];
-        let may_go = |page: &usize| {
-            let (Some(own), Some(other)) = (of_page.get(*page), of_page.get(1 - page)) else {
-                return false;
-            };
-            let is_partial = marks.get(1 - page) == Some(&(true, false));
-            is_partial
-                && other.contains(&true)
-                && own.iter().zip(other).all(|(own, other)| own <= other)
+        let [first, second] = [alone(1), alone(0)];
+        let differs = |old: &[Option<u32>; 3], new: &[Option<u32>; 3]| {
+            old.iter().zip(new).any(|(old, new)| new.is_some() && old != new)
         };
-        [0, 1].into_iter().find(may_go)
+        match marks {
+            [_, (_, false)] if differs(&first, &second) => Some(0),
+            [(_, false), _] if differs(&second, &first) => Some(1),
+            _ => None,
+        }
     }
 
     fn fetch<'b>(
@@ -90,7 +92,7 @@ impl<S: Slot> SettingPages<S> {
     ) -> Option<&'b [u8]> {
         let mut map = self.map(hidden);
         let fetched = at_once(map.fetch_item::<&[u8]>(buffer, &(setting as u8)));
-        fetched?.ok()?.filter(|bytes| !bytes.is_empty())
+        fetched?.ok()?
     }
 
     fn store(
@@ -126,7 +128,7 @@ impl<S: Slot> SettingPages<S> {
 impl<S: Slot> Keeper for SettingPages<S> {
     fn read<'b>(&mut self, setting: Setting, buffer: &'b mut [u8]) -> Option<&'b [u8]> {
         let left_over = self.left_over(buffer);
-        self.fetch(setting, left_over, buffer)
+        self.fetch(setting, left_over, buffer).filter(|bytes| !bytes.is_empty())
     }
 
     fn keep(

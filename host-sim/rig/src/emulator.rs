@@ -149,6 +149,14 @@ impl Emulator {
     /// [`Error::NoQemu`], [`Error::NoImage`] or [`Error::NotElf`] if a file is missing or wrong,
     /// [`Error::Mailbox`] if its file cannot be made, or [`Error::NoStart`].
     pub fn start(options: &Options) -> Result<(Self, Lines)> {
+        Self::start_with(options, &[])
+    }
+
+    /// Starts QEMU with further `arguments`, and connects to the image's serial lines.
+    ///
+    /// # Errors
+    /// Those of [`start`](Self::start).
+    pub fn start_with(options: &Options, arguments: &[&str]) -> Result<(Self, Lines)> {
         options.check()?;
         let failed = |cause| Error::NoStart { qemu: options.qemu.clone(), cause };
         let listen = || {
@@ -165,7 +173,7 @@ impl Emulator {
         command.args(machine(options.mailbox.as_deref()));
         command.args(["-cpu", "cortex-m4", "-display", "none"]);
         command.args(["-monitor", "none", "-semihosting-config", "enable=on,target=native"]);
-        command.args(["-serial", &uart_serial]);
+        command.args(["-serial", &uart_serial]).args(arguments);
         if let Some((_, readout_serial)) = &readout {
             command.args(["-serial", readout_serial]);
         }

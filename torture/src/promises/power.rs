@@ -1,8 +1,8 @@
 //! Power that is cut at every operation of the flash, and again while the device recovers: always the old or the new
 //! model is in force.
 
-mod device;
 mod flash;
+mod device;
 mod presses;
 
 mod cuts;

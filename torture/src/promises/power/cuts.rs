@@ -57,7 +57,7 @@ fn check(job: Job, effort: &Effort, _: &Tools) -> Result<Found, String> {
     });
     found.cases = cuts.sum();
     if found.note.is_empty() {
-        found.note = format!("cuts by erase: {}", cuts.text());
+        found.note = cuts.text();
     }
     Ok(found)
 }

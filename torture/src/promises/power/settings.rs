@@ -39,7 +39,7 @@ fn check(effort: &Effort, _: &Tools) -> Result<Found, String> {
     });
     found.cases = cuts.sum();
     if found.note.is_empty() {
-        found.note = format!("cuts by erase: {}", cuts.text());
+        found.note = cuts.text();
     }
     Ok(found)
 }

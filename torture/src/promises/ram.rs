@@ -1,0 +1,97 @@
+//! Flipped bits of the RAM of a device in QEMU, while it decodes.
+
+mod gdb;
+mod victim;
+
+use std::path::Path;
+
+use model_core::AlignedBytes;
+use rand_core::{Rng, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use crate::effort::Effort;
+use crate::found::Found;
+use crate::promise::Promise;
+use crate::tools::Tools;
+use victim::{Harm, Victim};
+
+pub const RAM: Promise = Promise {
+    name: "ram-flip",
+    text: "a flipped bit of RAM stops no device for good",
+    share: 12,
+    check,
+};
+
+/// Flips of the short form, and the most.
+const LEAST: u64 = 24;
+const MOST: u64 = 20_000;
+
+/// The model that is decoded.
+const MODEL: &str = "kernels-fixed16.bin";
+
+/// First address and length in bytes of what is flipped: stack, variables, and the copy of the model.
+///
+/// The addresses are those of the emulator's image. It takes 8.5 KB of variables (`firmware/budget.txt`).
+const STACK: (u32, u32) = (0x2000_0000, 8 * 1024);
+const VARIABLES: (u32, u32) = (0x2000_2000, 8_500);
+const COPY: u32 = 0x2000_8000;
+
+fn check(effort: &Effort, tools: &Tools) -> Result<Found, String> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../testdata").join(MODEL);
+    let blob = std::fs::read(&path).map_err(|cause| format!("{}: {cause}", path.display()))?;
+    let regions =
+        [("stack", STACK), ("variables", VARIABLES), ("model", (COPY, blob.len() as u32))];
+    let bytes: u32 = regions.iter().map(|(_, (_, length))| length).sum();
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(effort.seed());
+    let mut victim = Victim::new(&tools.image("qemu-app")?, &AlignedBytes::copy_of(&blob))?;
+    let mut counts = [[0_u64; Harm::ALL.len()]; 3];
+    let mut flips = 0;
+    let mut for_good = String::new();
+    while flips < LEAST || (flips < MOST && !effort.is_over()) {
+        let mut offset = random.next_u32() % bytes;
+        let mut region = 0;
+        while offset >= regions[region].1.1 {
+            offset -= regions[region].1.1;
+            region += 1;
+        }
+        let address = regions[region].1.0 + offset;
+        let harm = victim.flip(address, random.next_u32() % 8, &mut random, effort.is_planted())?;
+        counts[region][harm as usize] += 1;
+        flips += 1;
+        if harm == Harm::ForGood && for_good.is_empty() {
+            for_good = format!("flip {flips} at {address:#010x} ({})", regions[region].0);
+            if effort.is_planted() {
+                break;
+            }
+        }
+    }
+    let of = |harm: Harm| counts.iter().map(|region| region[harm as usize]).sum::<u64>();
+    let (share, [low, high]) = share_percent(of(Harm::Silent), flips);
+    let note = format!(
+        "{} unharmed, {} told, {} faults, {} watchdog, {} silent: {share:.1} % ({low:.1}–{high:.1}), {} in the model",
+        of(Harm::None),
+        of(Harm::Told),
+        of(Harm::Fault),
+        of(Harm::Watchdog),
+        of(Harm::Silent),
+        counts[2][Harm::Silent as usize],
+    );
+    let note = if for_good.is_empty() { note } else { for_good };
+    Ok(Found {
+        cases: flips,
+        worst: of(Harm::ForGood) as f64,
+        bound: 0.0,
+        unit: "devices",
+        seed: effort.seed(),
+        note,
+    })
+}
+
+/// Share in per cent, with Wilson's interval of 95 %.
+fn share_percent(count: u64, all: u64) -> (f64, [f64; 2]) {
+    let (share, all, z) = (count as f64 / all as f64, all as f64, 1.96);
+    let middle = share + z * z / (2.0 * all);
+    let half = z * (share * (1.0 - share) / all + z * z / (4.0 * all * all)).sqrt();
+    let scale = 100.0 / (1.0 + z * z / all);
+    (100.0 * share, [scale * (middle - half), scale * (middle + half)])
+}

@@ -1,0 +1,243 @@
+//! A device in QEMU whose memory is damaged while it decodes.
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use firmware::link::message::{EstimateReport, Report, Request};
+use model_core::blob::Floats;
+use model_core::{AlignedBytes, Decoder};
+use rand_core::Rng;
+use taxel_rig::Error;
+use taxel_rig::device::Device;
+use taxel_rig::emulator::{Emulator, Link, Options};
+
+use super::gdb::Gdb;
+
+/// What a flipped bit does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Harm {
+    /// All estimates are right.
+    None,
+    /// The device tells: by a flag, a refusal, or a model that is not in force any more.
+    Told,
+    /// The processor faults, and the device restarts.
+    Fault,
+    /// The device stands still, and its watchdog is not fed.
+    Watchdog,
+    /// Estimates are wrong, and nothing tells.
+    Silent,
+    /// The device answers no more, although its watchdog is fed.
+    ForGood,
+}
+
+impl Harm {
+    /// Every kind.
+    pub const ALL: [Self; 6] =
+        [Self::None, Self::Told, Self::Fault, Self::Watchdog, Self::Silent, Self::ForGood];
+}
+
+/// Bytes of a slot of the emulator's image.
+const SLOT_BYTES: usize = 128 * 1024;
+/// Rows of the emulator's image.
+const ROWS: usize = 8;
+/// Frames that are decoded behind a flip.
+const FRAMES: usize = 24;
+/// Longest time that an answer takes.
+const ANSWER: Duration = Duration::from_millis(200);
+/// Register with the count of the watchdog, which falls until it is fed.
+const WATCHDOG: u32 = 0x4000_8004;
+
+/// A frame, and what must be decoded of it.
+struct Case {
+    readings_ohm: Vec<f32>,
+    outputs: Vec<f32>,
+}
+
+/// A device, in an emulator that may have to be started anew.
+pub struct Victim {
+    options: Options,
+    socket: PathBuf,
+    cases: Vec<Case>,
+    crc_32: u32,
+    running: Option<Running>,
+}
+
+struct Running {
+    // Dropped first, so that QEMU ends.
+    _emulator: Emulator,
+    gdb: Gdb,
+    device: Device<Link>,
+}
+
+impl Drop for Victim {
+    fn drop(&mut self) {
+        // The emulator removes the mailbox's file. Files that are gone already are no loss.
+        self.options.model.iter().chain([&self.socket]).for_each(|file| {
+            let _ = std::fs::remove_file(file);
+        });
+    }
+}
+
+impl Victim {
+    /// A device with the emulator's `image` and the model `blob`.
+    pub fn new(image: &Path, blob: &AlignedBytes) -> Result<Self, String> {
+        let place = std::env::temp_dir().join(format!("taxel-torture-{}", std::process::id()));
+        let slot = place.with_extension("slot");
+        let mut bytes = blob.to_vec();
+        bytes.resize(SLOT_BYTES, 0xFF);
+        std::fs::write(&slot, bytes).map_err(|cause| format!("{}: {cause}", slot.display()))?;
+        let options = Options {
+            qemu: "qemu-system-arm".into(),
+            image: image.to_owned(),
+            model: Some(slot),
+            log: None,
+            mailbox: Some(place.with_extension("mailbox")),
+            readout: false,
+        };
+        let decoder = Decoder::<ROWS>::load(blob).map_err(|cause| cause.to_string())?;
+        let inputs = decoder.shape().inputs * decoder.shape().rows;
+        let case = |number: usize| {
+            let reading = |i: usize| 40.0 + ((i * 37 + number * 101) % 997) as f32 * 0.04;
+            let readings_ohm: Vec<f32> = (0..inputs).map(reading).collect();
+            let estimate = decoder.decode(&readings_ohm[..]).map_err(|cause| cause.to_string())?;
+            Ok(Case { readings_ohm, outputs: estimate.outputs })
+        };
+        let cases = (0..FRAMES).map(case).collect::<Result<_, String>>()?;
+        let socket = place.with_extension("gdb");
+        Ok(Self { options, socket, cases, crc_32: decoder.model_crc(), running: None })
+    }
+
+    /// Flips a bit while the device decodes, and looks what becomes of it. The device is as new before.
+    ///
+    /// With `planted`, the processor stands still behind it, and no watchdog is there.
+    pub fn flip(
+        &mut self,
+        address: u32,
+        bit: u32,
+        random: &mut impl Rng,
+        planted: bool,
+    ) -> Result<Harm, String> {
+        let mut running = self.renewed()?;
+        let case = &self.cases[0];
+        let request = Request::Decode { frame: 0, readings_ohm: Floats::of(&case.readings_ohm) };
+        let failed = |cause: &dyn std::fmt::Display| format!("the emulator: {cause}");
+        running.device.send(&request).map_err(|cause| failed(&cause))?;
+        let (start, wait) = (Instant::now(), Duration::from_micros(random.next_u64() % 300));
+        while start.elapsed() < wait {}
+        running.gdb.stop().map_err(|cause| failed(&cause))?;
+        running.gdb.flip(address, bit).map_err(|cause| failed(&cause))?;
+        if !planted {
+            running.gdb.run().map_err(|cause| failed(&cause))?;
+        }
+        let harm = self.look(&mut running, planted);
+        if matches!(harm, Harm::None | Harm::Silent | Harm::Told) {
+            self.running = Some(running); // else QEMU may have ended, or stand still
+        }
+        Ok(harm)
+    }
+
+    /// The device after a reset, whose estimates are right.
+    fn renewed(&mut self) -> Result<Running, String> {
+        if let Some(mut running) = self.running.take()
+            && running.gdb.stop().and_then(|()| running.gdb.reset()).is_ok()
+            && running.gdb.run().is_ok()
+            && self.is_sound(&mut running)
+        {
+            return Ok(running);
+        }
+        let mut running = self.start()?;
+        if self.is_sound(&mut running) {
+            return Ok(running);
+        }
+        Err("the device in the emulator does not decode as the host does".to_owned())
+    }
+
+    fn start(&self) -> Result<Running, String> {
+        let _ = std::fs::remove_file(&self.socket); // of an emulator before this one
+        let stub = format!("unix:{},server=on,wait=off", self.socket.display());
+        let started = Emulator::start_with(&self.options, &["-gdb", &stub]);
+        let (emulator, lines) = started.map_err(|cause| cause.to_string())?;
+        let mut gdb =
+            Gdb::connect(&self.socket).map_err(|cause| format!("QEMU's debugger stub: {cause}"))?;
+        gdb.run().map_err(|cause| cause.to_string())?;
+        let device = Device::new(lines.link).map_err(|cause| cause.to_string())?;
+        Ok(Running { _emulator: emulator, gdb, device })
+    }
+
+    fn is_sound(&self, running: &mut Running) -> bool {
+        let start = Instant::now();
+        while running.device.identify().is_err() {
+            if start.elapsed() > Duration::from_secs(5) {
+                return false;
+            }
+        }
+        self.cases.iter().take(2).all(|case| decoded(&mut running.device, case) == Ok(Harm::None))
+    }
+
+    /// Looks at estimates, and where none come at the watchdog.
+    fn look(&self, running: &mut Running, stands: bool) -> Harm {
+        let mut worst = Harm::None;
+        for case in &self.cases {
+            match decoded(&mut running.device, case) {
+                Ok(Harm::Told) => return Harm::Told,
+                Ok(Harm::Silent) => worst = Harm::Silent,
+                Ok(_) => {}
+                Err(is_closed) if is_closed => return Harm::Fault,
+                Err(_) if stands => return Harm::ForGood,
+                Err(_) => {
+                    return if is_fed(&mut running.gdb) { Harm::ForGood } else { Harm::Watchdog };
+                }
+            }
+        }
+        match running.device.identify() {
+            Ok(identity) if identity.has_in_force(self.crc_32) => worst,
+            Ok(_) => Harm::Told,
+            Err(Error::Closed) => Harm::Fault,
+            Err(_) if is_fed(&mut running.gdb) => Harm::ForGood,
+            Err(_) => Harm::Watchdog,
+        }
+    }
+}
+
+/// Whether the watchdog is fed within a second, in which its count would fall otherwise.
+fn is_fed(gdb: &mut Gdb) -> bool {
+    let mut last = u32::MAX;
+    for _ in 0..20 {
+        let Ok(count) = gdb.stop().and_then(|()| gdb.word(WATCHDOG)) else { return false };
+        if gdb.run().is_err() {
+            return false;
+        }
+        if count > last {
+            return true;
+        }
+        last = count;
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    false
+}
+
+/// Lets the device decode a frame. An error tells whether the emulator has ended.
+fn decoded(device: &mut Device<Link>, case: &Case) -> Result<Harm, bool> {
+    let request = Request::Decode { frame: 0, readings_ohm: Floats::of(&case.readings_ohm) };
+    let answer = device.ask(&request, ANSWER, |report| match report {
+        Report::Estimate(estimate) => Some(judged(estimate, case)),
+        _ => None,
+    });
+    match answer {
+        Ok(Ok(harm)) => Ok(harm),
+        Ok(Err(_)) | Err(Error::Unexpected { .. }) => Ok(Harm::Told),
+        Err(Error::NoAnswer { .. }) => Err(false),
+        Err(_) => Err(true),
+    }
+}
+
+fn judged(estimate: &EstimateReport<'_>, case: &Case) -> Harm {
+    if estimate.flags & !EstimateReport::CLAMPED != 0 || estimate.row_status.iter().any(|s| *s != 0)
+    {
+        return Harm::Told;
+    }
+    let same = |(found, right): (f32, &f32)| found.to_bits() == right.to_bits();
+    let all = estimate.outputs.0.len() == 4 * case.outputs.len();
+    let is_right = all && estimate.outputs.iter().zip(&case.outputs).all(same);
+    if is_right { Harm::None } else { Harm::Silent }
+}
