@@ -283,7 +283,8 @@ fn decode(
     check_length("frame", frame.readings_ohm, rows.wrapping_mul(inputs))?;
     check_length("outputs of the estimate", estimate.outputs, rows.wrapping_mul(outputs))?;
     check_length("status of the estimate", estimate.status, rows)?;
-    let (expected, found) = (scratch_floats(model), scratch.len());
+    // No more than that: what is left behind the parts below is readings relative to the baseline, to the last one.
+    let (expected, found) = (decoding_floats(model), scratch.len());
     let too_short = NetworkError::Length { what: "scratch", expected, found };
     let scratch = scratch.get_mut(..expected).ok_or(too_short)?;
     let relative = model.metadata().relative_inputs;
@@ -386,6 +387,12 @@ fn divide(readings: &[f32], reciprocals: &[f32], ratios: &mut [f32]) {
 /// Number of floats of working space that decoding with `model` needs, and assessing its outputs.
 #[must_use]
 pub fn scratch_floats(model: &Model<'_>) -> usize {
+    let assessing = model.confidence().map_or(0, |it| it.sizes().scratch_floats());
+    decoding_floats(model).max(assessing)
+}
+
+/// Number of floats of working space that decoding with `model` needs.
+fn decoding_floats(model: &Model<'_>) -> usize {
     let ModelShape { rows, inputs, .. } = model.shape();
     let relative = model.metadata().relative_inputs;
     let (scaled, given) = match model.projection() {
@@ -393,8 +400,7 @@ pub fn scratch_floats(model: &Model<'_>) -> usize {
         None => (inputs, inputs),
     };
     let extra = if relative { given } else { 0 };
-    let decoding = scaled.saturating_add(extra).saturating_add(model.components());
-    decoding.max(model.confidence().map_or(0, |it| it.sizes().scratch_floats()))
+    scaled.saturating_add(extra).saturating_add(model.components())
 }
 
 fn check_length<T>(what: &'static str, slice: &[T], expected: usize) -> Result<(), NetworkError> {

@@ -84,7 +84,7 @@ fn run(arguments: &Arguments) -> Result<bool, Box<dyn Error>> {
         return Err(format!("--minutes is {given}, but must be from 0 to a million").into());
     }
     let tools = Tools { program: arguments.program.clone(), images: arguments.images.clone() };
-    let shares: f64 = chosen.iter().map(|promise| f64::from(promise.share)).sum();
+    let shares: f64 = chosen.iter().map(|promise| f64::from(promise.share)).sum::<f64>().max(1.0);
     let given_s =
         if arguments.short || arguments.self_test { 0.0 } else { arguments.minutes * 60.0 };
     let mut entries = Vec::new();

@@ -146,7 +146,7 @@ impl Experiment {
     pub fn parse(origin: &str, text: &str) -> Result<Self> {
         let file: file::SceneFile = toml::from_str(text).map_err(|cause| Error::Syntax {
             scene: origin.into(),
-            message: cause.to_string().trim_end().to_owned(),
+            message: shortened(cause.to_string().trim_end()),
         })?;
         let experiment = file.into_experiment(digest(text.as_bytes()));
         experiment
@@ -286,6 +286,16 @@ impl FreshFrames for MoreFrames<'_> {
         let first = step * trajectories;
         self.experiment.dataset_from(&self.synthesis, Stream::Refinement, first, count)
     }
+}
+
+/// A message that quotes lines of a file, each cut to a length that people read.
+fn shortened(message: &str) -> String {
+    const MOST_CHARS: usize = 160;
+    let cut = |line: &str| match line.char_indices().nth(MOST_CHARS) {
+        Some((end, _)) => format!("{} …", &line[..end]),
+        None => line.to_owned(),
+    };
+    message.lines().map(cut).collect::<Vec<_>>().join("\n")
 }
 
 fn check_training(t: &Training) -> Check {

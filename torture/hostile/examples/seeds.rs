@@ -4,13 +4,14 @@ use std::error::Error;
 use std::fs;
 use std::path::Path;
 
+use firmware::app::Session;
 use firmware::link::cobs;
 use firmware::link::message::{Configuration, Report, Request, Setting};
 use firmware::link::packet;
 use hostile::seal;
 use mock_board::{
-    SharedSettings, blob, blob_of_components, blob_with_confidence, quiet, request_bytes,
-    upload_steps,
+    Bench, MockSlot, SharedSettings, ask, blob, blob_of_components, blob_with_confidence,
+    configure, quiet, request_bytes, upload_steps,
 };
 use model_core::blob::Floats;
 use model_core::rbf::Format;
@@ -140,6 +141,22 @@ fn settings() -> Vec<Vec<u8>> {
         let _ = kept.keep_bytes(setting, bytes);
         seeds.push([&[1], bytes].concat());
     }
+    let [page, _] = kept.bytes();
+    seeds.push([&[0], &page[..512.min(page.len())]].concat());
+    // What a device keeps by itself.
+    let mut kept = SharedSettings::default();
+    let model = blob(1, 3);
+    let mut slots = MockSlot::pair_with(&model);
+    let mut bench = Bench::with_settings(quiet(), &kept);
+    let board = bench.board.clone();
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let other = Configuration { frame_period_us: 20_000, ..quiet() };
+    for request in [configure(other), Request::Keep(Setting::Configuration)] {
+        ask(&mut session, &board, &request, |_| ());
+    }
+    drop(session);
+    let bytes = kept.read_owned(Setting::Configuration).unwrap_or_default();
+    seeds.push([&[1], &bytes[..]].concat());
     let [page, _] = kept.bytes();
     seeds.push([&[0], &page[..512.min(page.len())]].concat());
     seeds

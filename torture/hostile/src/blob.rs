@@ -153,3 +153,23 @@ fn assess(decoder: &Decoder<'_, ROWS>, frame: Frame<'_>, outputs: usize) {
         assert!(!deviation.iter().any(|deviation| *deviation < 0.0), "{deviation:?}");
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The confidence needs more working space than decoding does, which must not be taken for readings.
+    #[test]
+    fn a_model_with_relative_inputs_and_a_confidence_decodes_whole_frames() {
+        let blob = mock_board::blob_with_confidence(true);
+        let decoder = Decoder::<2>::load(&blob).unwrap();
+        for reading in [60.0, 1e6] {
+            let (readings_ohm, reciprocals) = ([reading; 6], [reciprocal(60.0); 6]);
+            let frame =
+                Frame { readings_ohm: &readings_ohm, reciprocals: &reciprocals, gate: None };
+            let estimate = decoder.decode(frame).unwrap();
+            assert_eq!(estimate.status, [RowStatus::Decoded; 2], "{reading} Ω");
+        }
+        assert!(check(seal::body(&blob), false));
+    }
+}

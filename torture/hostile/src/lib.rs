@@ -46,3 +46,28 @@ pub const TARGETS: &[Target] = &[
 pub fn target(name: &str) -> Target {
     *TARGETS.iter().find(|target| target.name == name).expect("the name of a target")
 }
+
+#[cfg(test)]
+mod tests {
+    use std::panic::{AssertUnwindSafe, catch_unwind};
+    use std::path::Path;
+
+    use super::*;
+
+    #[test]
+    fn every_target_holds_on_its_corpus_and_finds_what_is_planted() {
+        let corpora = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus");
+        for target in TARGETS {
+            let seeds: Vec<Vec<u8>> = std::fs::read_dir(corpora.join(target.name))
+                .unwrap()
+                .map(|entry| std::fs::read(entry.unwrap().path()).unwrap())
+                .collect();
+            let sound = seeds.iter().filter(|seed| (target.check)(seed, false)).count();
+            assert!(sound > 0, "{}: no seed is sound", target.name);
+            let finds = |seed: &Vec<u8>| {
+                catch_unwind(AssertUnwindSafe(|| (target.check)(seed, true))).is_err()
+            };
+            assert!(seeds.iter().any(finds), "{}: what is planted is not found", target.name);
+        }
+    }
+}

@@ -133,3 +133,10 @@ fn electrodes_and_frames_whose_computing_takes_hours_are_refused() {
     let frames = Synthesis::of(&scene.world).frames(Stream::Test, 1);
     assert!(frames.inputs.values.iter().all(|reading| *reading > 0.0));
 }
+
+#[test]
+fn deep_nesting_is_refused_and_quoted_in_part_only() {
+    let refused = Experiment::parse("test", &format!("name = {}", "[".repeat(200_000)));
+    let refused = refused.unwrap_err().to_string();
+    assert!(refused.contains("recurs") && refused.len() < 1000, "{} bytes", refused.len());
+}
