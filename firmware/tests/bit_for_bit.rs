@@ -147,6 +147,18 @@ fn every_kernel_decodes_many_frames_on_the_host_as_in_the_emulator() {
 }
 
 #[test]
+fn readings_that_no_sensor_gives_decode_alike_with_subnormals_and_without() {
+    let of_format = |format: Format| {
+        let name = format!("kernels-{}.bin", format.name());
+        let crc = with_blob(&name, checks::decoding_extremes::<{ checks::ROWS }>);
+        format!("INFO {}: {:08x}\n", format.name(), crc.expect("the model loads"))
+    };
+    let of_all = [Format::F32, Format::Fixed16, Format::F32Direct].map(of_format).concat();
+    let modes = ["kept", "flushed to zero"].map(|mode| format!("INFO subnormals {mode}\n{of_all}"));
+    assert_eq!(modes.concat() + "exit status 0\n", expected_log("flush_to_zero"));
+}
+
+#[test]
 fn recursive_least_squares_learns_on_the_host_as_in_the_emulator() {
     let crc = checks::recalibration().expect("sound parameters");
     let of_host = format!("INFO recalibration: {crc:08x}\nexit status 0\n");

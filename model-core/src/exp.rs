@@ -6,8 +6,9 @@
 
 /// An exponential of non-positive numbers.
 ///
-/// The activation's argument −‖x − c‖²/(2σ²) is never positive, so no other argument is needed. The result for
-/// NaN is not defined ([`Decoder`](crate::Decoder) marks rows with NaN readings instead).
+/// The activation's argument −‖x − c‖²/(2σ²) is never positive, so no other argument is needed. The results for
+/// positive numbers and for NaN are not defined, but none panics ([`Decoder`](crate::Decoder) marks rows with NaN
+/// readings instead).
 pub trait ExpKernel: Copy + Default {
     /// Name of the exponential, as users choose it.
     const NAME: &'static str;
@@ -84,7 +85,7 @@ impl ExpKernel for Polynomial {
         let n = (x * core::f32::consts::LOG2_E + ROUND) - ROUND;
         let r = (x - n * high) - n * low;
         let mantissa = (((((c6 * r + c5) * r + c4) * r + c3) * r + c2) * r + c1) * r + c0;
-        mantissa * f32::from_bits(((n as i32 + 127) as u32) << 23)
+        mantissa * f32::from_bits(((n as i32).wrapping_add(127) as u32) << 23)
     }
 }
 
@@ -153,6 +154,14 @@ mod tests {
             }
         }
         assert_eq!(Polynomial::exp(0.0), 1.0);
+    }
+
+    #[test]
+    fn no_argument_panics() {
+        for x in [f32::NAN, f32::INFINITY, f32::MAX, 1e10, 89.0] {
+            let results = [Libm::exp(x), Micromath::exp(x), Polynomial::exp(x), exp2(x)];
+            assert!(results[0].is_nan() || results[0].is_infinite() || x < 90.0, "{results:?}");
+        }
     }
 
     #[test]

@@ -3,22 +3,43 @@
 // Every test has the same type, whether it can fail to run or not.
 #![allow(clippy::unnecessary_wraps)]
 
-mod authenticity;
 mod exponentials;
-mod files;
+mod inference;
+mod training;
+pub mod scale;
+mod least_squares;
+pub mod rls;
+mod forward;
+
 mod flips;
-mod interruptions;
-mod load;
 mod power;
 mod ram;
-mod hostile_bytes;
+mod authenticity;
+mod load;
+
 mod size_bombs;
+mod hostile_bytes;
+mod files;
+mod interruptions;
 
 use crate::promise::Promise;
 
-/// Every promise. Exact tests stand first, then those that draw their cases.
+/// Every promise: numbers, device, hostile input, files.
 pub const PROMISES: &[Promise] = &[
     exponentials::POLYNOMIAL,
+    exponentials::LIBM,
+    exponentials::MICROMATH,
+    exponentials::EXP2,
+    exponentials::MONOTONE,
+    exponentials::ANY_NUMBER,
+    inference::F32,
+    inference::FIXED16,
+    training::EXTREMES,
+    scale::SCALE,
+    least_squares::RESIDUAL,
+    rls::FORGETTING,
+    rls::WITHOUT_FORGETTING,
+    forward::TOUCHING,
     flips::ONE,
     flips::TWO,
     power::UPLOAD,
@@ -27,14 +48,14 @@ pub const PROMISES: &[Promise] = &[
     power::SETTINGS,
     power::DECAY,
     power::WORN,
-    authenticity::FORGED,
     ram::RAM,
+    authenticity::FORGED,
     load::FRAMES,
     load::LINK,
     load::WATCHDOG,
-    files::FAULTS,
-    interruptions::JOBS,
     size_bombs::SIZE_BOMBS,
     hostile_bytes::HOSTILE_BYTES,
     hostile_bytes::RESIGNED_BLOBS,
+    files::FAULTS,
+    interruptions::JOBS,
 ];

@@ -139,13 +139,42 @@ fn one_of_many<const R: usize>(index: usize, numbers: &mut Numbers) -> Frame<R> 
 /// if the blob does not load.
 #[must_use]
 pub fn decoding_many<E: ExpKernel, const R: usize>(blob: &[u8]) -> Option<u32> {
+    decoding_all::<E, R>(blob, MANY, one_of_many)
+}
+
+/// Readings that no sensor gives: the ends of f32, subnormal numbers, and zeros.
+const EXTREMES: [f32; 10] =
+    [f32::MAX, f32::MIN, 1e30, -1e30, f32::MIN_POSITIVE, 1e-39, -1e-39, 1e-45, 0.0, -0.0];
+
+/// Frame number `index` of those with [`EXTREMES`] among readings around the training range.
+fn one_of_extremes<const R: usize>(index: usize, numbers: &mut Numbers) -> Frame<R> {
+    let mut frame = one_of_many(index, numbers);
+    for reading in frame.as_flattened_mut() {
+        let place = (8.0 * (numbers.draw() + 1.0)) as usize;
+        *reading = EXTREMES.get(place).copied().unwrap_or(*reading);
+    }
+    frame
+}
+
+/// CRC-32 as of [`decoding_many`], of a tenth as many frames with readings that no sensor gives.
+#[must_use]
+pub fn decoding_extremes<const R: usize>(blob: &[u8]) -> Option<u32> {
+    decoding_all::<Polynomial, R>(blob, MANY / 10, one_of_extremes)
+}
+
+/// CRC-32 of all bits that the model in `blob` decodes so many `frames` to, and of whether an input was clamped.
+fn decoding_all<E: ExpKernel, const R: usize>(
+    blob: &[u8],
+    frames: usize,
+    frame: fn(usize, &mut Numbers) -> Frame<R>,
+) -> Option<u32> {
     let decoder = Decoder::<R>::load(blob).ok()?;
     let crc = QUICK_CRC;
     let mut digest = crc.digest();
     let mut numbers = Numbers::new(4);
     let mut outcome = Decoded::NOTHING;
-    for index in 0..MANY {
-        outcome.decode::<E>(&decoder, &one_of_many::<R>(index, &mut numbers), None)?;
+    for index in 0..frames {
+        outcome.decode::<E>(&decoder, &frame(index, &mut numbers), None)?;
         for (outputs, status) in outcome.outputs.iter().zip(outcome.status) {
             outputs.iter().for_each(|value| digest.update(&value.to_bits().to_le_bytes()));
             digest.update(&[status as u8]);

@@ -7,7 +7,7 @@ use taxel_data::dataset::Dataset;
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
 use taxel_learn::confidence::{self, Density, HeldOut};
-use taxel_learn::train::{Examples, Refinement, train, train_refined};
+use taxel_learn::train::{Examples, Refinement, resolution, train, train_refined};
 use taxel_learn::{ModelBlob, Options, Origin, Trained, pack};
 use taxel_simulate::Synthesis;
 
@@ -84,6 +84,9 @@ impl<'s> TrainingSet<'s> {
     /// # Errors
     /// [`Error`](crate::Error) for options that cannot be used with these frames, or a model that cannot be packed.
     pub fn blob(&self, options: &Options, progress: &dyn Progress) -> Result<ModelBlob> {
+        if self.confidence {
+            resolution::check_squares(&self.frames)?;
+        }
         let blob = pack(&self.train(options, progress)?, &self.frames, &self.origin)?;
         if self.confidence { self.with_confidence(&blob, options, progress) } else { Ok(blob) }
     }

@@ -23,6 +23,13 @@ pub enum Unresolved {
         /// Least range.
         bound: f64,
     },
+    /// Range whose square, which a confidence holds, f32 does not hold.
+    SquareLost {
+        /// Least range.
+        least: f64,
+        /// Largest range.
+        most: f64,
+    },
     /// Values so far from zero that rounding blurs them.
     TooFarFromZero {
         /// Distance between neighbouring numbers in f32 there.
@@ -45,6 +52,11 @@ impl Unresolved {
             ),
             Self::TooNarrow { bound } => format!(
                 "a range below {bound:e} is lost in f32, which devices compute in: multiply it by {}{leave}",
+                scale(high - low)
+            ),
+            Self::SquareLost { least, most } => format!(
+                "a confidence, which holds squares in f32, needs a range from {least:e} to {most:e}: multiply it by {}, \
+                 or leave the confidence out",
                 scale(high - low)
             ),
             Self::TooFarFromZero { step } => {

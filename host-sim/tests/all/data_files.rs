@@ -222,7 +222,7 @@ fn wrong_usage_of_data_files_is_refused() {
     }
     assert!(!folder.path("j.csv").exists());
     let train = |more: &[&'static str]| {
-        let columns = ["--inputs", "c2..c4", "--outputs", "c1", "-o", "m.bin", "--no-refine"];
+        let columns = ["--inputs", "c2..c3", "--outputs", "c4", "-o", "m.bin", "--no-refine"];
         [&["train", "sensor.csv"], &columns[..], more].concat()
     };
     for (options, says) in [
@@ -254,7 +254,7 @@ fn wrong_usage_of_data_files_is_refused() {
     refused(&folder, &[&test[..], &columns].concat(), &["--test with --join", "`join`"]);
     let decode = ["decode", "m.bin", "sensor.csv", "-o", "e.csv", "--keep"];
     refused(&folder, &[&decode[..], &["time"]].concat(), &["\"time\" is missing", "--keep"]);
-    refused(&folder, &[&decode[..], &["c1"]].concat(), &["--keep c1", "output of that name"]);
+    refused(&folder, &[&decode[..], &["c4"]].concat(), &["--keep c4", "output of that name"]);
     refused(&folder, &[&decode[..], &["c2,c2"]].concat(), &["--keep c2", "once"]);
     folder.write("d.npy", "1,2\n");
     let array = ["train", "d.npy", "--inputs", "c1", "--outputs", "c2", "-o", "x.bin"];

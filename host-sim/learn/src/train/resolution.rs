@@ -15,6 +15,8 @@ pub const MOST_ROUNDING: f64 = 0.05;
 pub const LEAST_RANGE: f64 = 1e-28;
 /// Largest magnitude of a value: its square, and sums of squares, stay far inside f64, and ranges stay inside f32.
 pub const LARGEST: f64 = 1e30;
+/// Least and largest range of an output whose deviations a confidence tells: it holds their squares.
+pub const RANGE_OF_SQUARES: [f64; 2] = [1e-15, 1e15];
 /// Range, relative to the values, that rounding in f64 explains: such a column does not change.
 const CONSTANT: f64 = 4.0 * f64::EPSILON;
 
@@ -30,6 +32,24 @@ pub fn check(dataset: &Dataset) -> Result<()> {
             if let Some(why) = refused(range, rounding) {
                 return Err(Error::Column { column: name.clone(), role, range, why });
             }
+        }
+    }
+    Ok(())
+}
+
+/// Checks that f32 holds the squares of all outputs of `dataset` that change, as a confidence needs them.
+///
+/// # Errors
+/// [`Error::Column`] for the first output whose squares it does not hold.
+pub fn check_squares(dataset: &Dataset) -> Result<()> {
+    let [least, most] = RANGE_OF_SQUARES;
+    let outputs = dataset.outputs.names.iter().zip(dataset.outputs.ranges());
+    for (name, range) in outputs {
+        let span = range[1] - range[0];
+        if span > 0.0 && !(least..=most).contains(&span) {
+            let (column, role) = (name.clone(), Role::Outputs);
+            let why = Unresolved::SquareLost { least, most };
+            return Err(Error::Column { column, role, range, why });
         }
     }
     Ok(())

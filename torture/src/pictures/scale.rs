@@ -1,0 +1,73 @@
+//! Error of a model against the scale and the offset of a column, through the program.
+
+use super::chart::{Chart, Line};
+use crate::promises::scale::{Change, FORMATS, Outcome, folder, path_of, run};
+use crate::tools::Tools;
+
+/// Picture of the error against the factor on a column.
+pub fn by_factor(tools: &Tools) -> Result<String, String> {
+    let factors: Vec<f64> = (-40..=40).map(|power| 10_f64.powi(power)).collect();
+    let chart = Chart {
+        title: "What a model leaves unexplained against the scale of a column",
+        x_label: "factor on the column; beyond the crosses it is refused by its name",
+        y_label: "1 − R² on the training lines",
+        x: [1e-40, 1e40],
+        y: [1e-4, 1.0],
+        steps: [10, 1],
+        lines: lines(tools, &factors, Change::times)?,
+    };
+    Ok(chart.draw())
+}
+
+/// Picture of the error against the offset of a column.
+pub fn by_offset(tools: &Tools) -> Result<String, String> {
+    let offsets: Vec<f64> = (0..=48).map(|step| 10_f64.powf(f64::from(step) / 6.0)).collect();
+    let chart = Chart {
+        title: "What a model leaves unexplained against the offset of a column",
+        x_label: "offset of the column, in ranges of it; beyond the crosses it is refused by its name",
+        y_label: "1 − R² on the training lines",
+        x: [1.0, 1e8],
+        y: [1e-4, 1.0],
+        steps: [1, 1],
+        lines: lines(tools, &offsets, Change::plus)?,
+    };
+    Ok(chart.draw())
+}
+
+/// Lines of f32 and fixed16, for changes of an input and of the output.
+fn lines(tools: &Tools, values: &[f64], change: fn(f64) -> Change) -> Result<Vec<Line>, String> {
+    let program = &path_of(tools)?;
+    let folder = folder(0)?;
+    let mut lines = Vec::new();
+    for (name, colour, dashed, format, is_output) in [
+        ("f32, an input", 1, false, FORMATS[0], false),
+        ("f32, an output", 3, false, FORMATS[0], true),
+        ("fixed16, an input", 2, true, FORMATS[2], false),
+        ("fixed16, an output", 4, true, FORMATS[2], true),
+    ] {
+        let (mut points, mut crosses) = (Vec::new(), Vec::new());
+        let mut was_refused = false;
+        for value in values {
+            let changed = change(*value);
+            let changes = if is_output { [Change::NONE, changed] } else { [changed, Change::NONE] };
+            let here = match run(program, &folder, format, changes, false)? {
+                Outcome::Accepted(r_squared) => Some([*value, 1.0 - r_squared]),
+                Outcome::Refused | Outcome::Noted => None,
+            };
+            match here {
+                Some(point) => {
+                    if was_refused && points.is_empty() {
+                        crosses.push(point);
+                    }
+                    points.push(point);
+                }
+                None if !was_refused => crosses.extend(points.last().copied()),
+                None => {}
+            }
+            was_refused = here.is_none();
+        }
+        lines.push(Line { name, colour, dashed, points, crosses });
+    }
+    let _ = std::fs::remove_dir_all(&folder);
+    Ok(lines)
+}

@@ -1,0 +1,188 @@
+//! Columns of any scale and offset, through train, blob, decode and eval of the program.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+use taxel_data::random::{Purpose, Random, Stream};
+
+use crate::effort::Effort;
+use crate::found::Found;
+use crate::promise::Promise;
+use crate::tools::Tools;
+
+pub const SCALE: Promise = Promise {
+    name: "scale-sweep",
+    text: "1e-300 to 1e300: R² as at scale 1, or named and refused",
+    share: 2,
+    check: sweep,
+};
+
+/// Time after which a command hangs.
+const PATIENCE: Duration = Duration::from_mins(1);
+const LINES: usize = 150;
+
+/// What becomes of a column: its values times a factor, plus an offset.
+#[derive(Debug, Clone, Copy)]
+pub struct Change {
+    factor: f64,
+    offset: f64,
+}
+
+impl Change {
+    pub const NONE: Self = Self { factor: 1.0, offset: 0.0 };
+
+    pub fn times(factor: f64) -> Self {
+        Self { factor, ..Self::NONE }
+    }
+
+    pub fn plus(offset: f64) -> Self {
+        Self { offset, ..Self::NONE }
+    }
+
+    fn of(self, value: f64) -> f64 {
+        value * self.factor + self.offset
+    }
+}
+
+/// How a command ended.
+pub enum Outcome {
+    /// R² of the model on its training lines.
+    Accepted(f64),
+    /// The message named the column.
+    Refused,
+    /// The column does not change in f64, and the program says so.
+    Noted,
+}
+
+fn sweep(effort: &Effort, tools: &Tools) -> Result<Found, String> {
+    let program = &path_of(tools)?;
+    let folder = folder(effort.seed())?;
+    let planted = effort.is_planted();
+    let base: Result<Vec<f64>, String> = FORMATS
+        .iter()
+        .map(|format| match run(program, &folder.join(format), format, [Change::NONE; 2], false)? {
+            Outcome::Accepted(r_squared) => Ok(r_squared),
+            _ => Err("the moderate case is refused".into()),
+        })
+        .collect();
+    let base = base?;
+    let found = effort.worst((48, 20_000), (0.02, "R² lost"), |seed| {
+        let mut random = Random::new(seed, Stream::Test, Purpose::Noise, 0, 0);
+        let format = random.below(FORMATS.len());
+        let size = 10_f64.powf(random.between([-300.0, 300.0]));
+        // Offsets that matter are from 1 to 1e18.
+        let most = [18.0, 300.0][random.below(2)];
+        let offset = 10_f64.powf(random.between([0.0, most]));
+        let change = match seed % 4 {
+            0 | 1 => Change::times([size, size.powf(0.1)][random.below(2)]),
+            _ => Change::plus(offset),
+        };
+        let changes =
+            if seed.is_multiple_of(2) { [change, Change::NONE] } else { [Change::NONE, change] };
+        let case = folder.join(seed.to_string());
+        let outcome = run(program, &case, FORMATS[format], changes, planted);
+        let _ = fs::remove_dir_all(&case);
+        match outcome {
+            Ok(Outcome::Accepted(r_squared)) => Ok(base[format] - r_squared),
+            Ok(Outcome::Refused | Outcome::Noted) => Ok(0.0),
+            Err(why) => Err(format!("{}, {changes:?}: {why}", FORMATS[format])),
+        }
+    });
+    let _ = fs::remove_dir_all(&folder);
+    Ok(found)
+}
+
+pub const FORMATS: [&str; 3] = ["f32", "f32-direct", "fixed16"];
+
+/// Path of the program from any folder.
+pub fn path_of(tools: &Tools) -> Result<PathBuf, String> {
+    let program = tools.program()?;
+    program.canonicalize().map_err(|cause| format!("{}: {cause}", program.display()))
+}
+
+/// Empty folder for the files of a test.
+pub fn folder(seed: u64) -> Result<PathBuf, String> {
+    let path = std::env::temp_dir().join(format!("taxel-scale-{}-{seed}", std::process::id()));
+    fs::create_dir_all(&path).map_err(|cause| format!("{}: {cause}", path.display()))?;
+    Ok(path)
+}
+
+/// Trains on lines whose first input and whose output are changed, decodes and evaluates them.
+pub fn run(
+    program: &Path,
+    folder: &Path,
+    format: &str,
+    changes: [Change; 2],
+    planted: bool,
+) -> Result<Outcome, String> {
+    fs::create_dir_all(folder).map_err(|cause| cause.to_string())?;
+    fs::write(folder.join("d.csv"), csv(changes, planted)).map_err(|cause| cause.to_string())?;
+    let train = ["train", "d.csv", "--inputs", "a,b", "--outputs", "y", "--centres", "14"];
+    let train = [&train[..], &["--no-refine", "--format", format, "-o", "m.bin"]].concat();
+    let trained = command(program, folder, &train)?;
+    let said = String::from_utf8_lossy(&[trained.stdout, trained.stderr].concat()).into_owned();
+    match trained.status.code() {
+        Some(0) => {}
+        Some(2) if said.contains("\"a\"") || said.contains("\"y\"") => return Ok(Outcome::Refused),
+        code => return Err(format!("train ends with {code:?}: {said}")),
+    }
+    if said.contains("a never changes") || said.contains("y does not change") {
+        return Ok(Outcome::Noted);
+    }
+    let decoded = command(program, folder, &["decode", "m.bin", "d.csv", "-o", "e.csv"])?;
+    let estimates = fs::read_to_string(folder.join("e.csv")).unwrap_or_default();
+    let numbers = estimates.lines().skip(1).filter_map(|line| line.parse::<f64>().ok());
+    if !decoded.status.success() || numbers.filter(|y| y.is_finite()).count() != LINES {
+        return Err("decode gives no number for every line".into());
+    }
+    let evaluated = command(program, folder, &["--json", "eval", "m.bin", "d.csv"])?;
+    let result: Value = serde_json::from_slice(&evaluated.stdout)
+        .map_err(|cause| format!("eval prints no JSON: {cause}"))?;
+    let r_squared = result["decoders"][0]["errors"][0]["r_squared"].as_f64();
+    match r_squared {
+        Some(r_squared) => Ok(Outcome::Accepted(r_squared)),
+        // What hardly differs in f64 does not change.
+        None if String::from_utf8_lossy(&evaluated.stdout).contains("y does not change") => {
+            Ok(Outcome::Noted)
+        }
+        None => Err("eval gives no R²".into()),
+    }
+}
+
+/// Lines of two inputs and an output. Planted: values are rounded to f32 before anybody looks at them.
+fn csv(changes: [Change; 2], planted: bool) -> String {
+    let round = |value: f64| if planted { f64::from(value as f32) } else { value };
+    let mut random = Random::new(1, Stream::Training, Purpose::Noise, 0, 0);
+    let line = |_| {
+        let (a, b) = (random.unit(), random.unit());
+        let y = (3.0 * a).sin() * (2.0 * b).cos() + 0.5 * b * b;
+        format!("{:e},{b:e},{:e}\n", round(changes[0].of(a)), round(changes[1].of(y)))
+    };
+    format!("a,b,y\n{}", (0..LINES).map(line).collect::<String>())
+}
+
+/// Output of a command, which must end in time.
+fn command(program: &Path, folder: &Path, arguments: &[&str]) -> Result<Output, String> {
+    let mut child = Command::new(program)
+        .args(arguments)
+        .current_dir(folder)
+        .env("RAYON_NUM_THREADS", "1")
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .map_err(|cause| format!("{}: {cause}", program.display()))?;
+    let start = Instant::now();
+    while child.try_wait().map_err(|cause| cause.to_string())?.is_none() {
+        if start.elapsed() > PATIENCE {
+            let _ = child.kill();
+            return Err(format!("{arguments:?} hangs"));
+        }
+        sleep(Duration::from_millis(2));
+    }
+    child.wait_with_output().map_err(|cause| cause.to_string())
+}
