@@ -4,8 +4,10 @@
 #![allow(clippy::unnecessary_wraps)]
 
 mod exponentials;
+mod sensor;
 
 use crate::promise::Promise;
 
 /// Every promise. Exact tests stand first, then those that draw their cases.
-pub const PROMISES: &[Promise] = &[exponentials::POLYNOMIAL];
+pub const PROMISES: &[Promise] =
+    &[exponentials::POLYNOMIAL, sensor::NAMED, sensor::NOTICED, sensor::SILENT, sensor::FILLED];
