@@ -88,7 +88,7 @@ impl Analogue {
 
     /// Potentials in V of all wires with these ties, after the faults have changed them.
     fn potentials_v(&self, mut rows: [Tie; ROWS], mut columns: [Tie; COLUMNS]) -> Vec<f64> {
-        self.faults.iter().for_each(|fault| fault.change(&mut rows, &mut columns));
+        self.faults.iter().for_each(|fault| fault.change(reference_v(), &mut rows, &mut columns));
         let links: Vec<_> = self.faults.iter().filter_map(|fault| fault.link()).collect();
         potentials_v(&self.conductance_s, &rows, &columns, &links)
     }
@@ -153,7 +153,7 @@ impl Analogue {
         let potentials = self.potentials_v(rows, columns);
         let links: Vec<_> = self.faults.iter().filter_map(|fault| fault.link()).collect();
         std::array::from_fn(|k| {
-            let stuck = self.faults.iter().find_map(|fault| fault.op_amp_v(k));
+            let stuck = self.faults.iter().find_map(|fault| fault.op_amp_v(k, reference_v()));
             if let Some(volt) = stuck {
                 return volt;
             }

@@ -1,6 +1,5 @@
 //! Faults of wires and converters, for boards that are to have some.
 
-use super::analogue::reference_v;
 use super::network::Tie;
 use super::{COLUMNS, ROWS};
 
@@ -38,16 +37,21 @@ pub enum BoardFault {
 }
 
 impl BoardFault {
-    /// Changes the ties of the wires.
-    pub(super) fn change(self, rows: &mut [Tie; ROWS], columns: &mut [Tie; COLUMNS]) {
+    /// Changes the ties of the wires, on a board with this supply.
+    pub(super) fn change(
+        self,
+        supply_v: f64,
+        rows: &mut [Tie; ROWS],
+        columns: &mut [Tie; COLUMNS],
+    ) {
         let held = |volt| Tie::Held { volt, through_ohm: 0.0 };
         match self {
             Self::RowOpen(row) => rows[row] = Tie::Floating,
             Self::RowAtGround(row) => rows[row] = held(0.0),
-            Self::RowAtSupply(row) => rows[row] = held(reference_v()),
+            Self::RowAtSupply(row) => rows[row] = held(supply_v),
             Self::ColumnOpen(column) => columns[column] = Tie::Floating,
             Self::ColumnAtGround(column) => columns[column] = held(0.0),
-            Self::ColumnAtSupply(column) => columns[column] = held(reference_v()),
+            Self::ColumnAtSupply(column) => columns[column] = held(supply_v),
             Self::RowsTouch(_) | Self::ColumnsTouch(_) | Self::Stuck { .. } => {}
         }
     }
@@ -62,9 +66,9 @@ impl BoardFault {
     }
 
     /// Voltage at which the op-amp of `column` is stuck, because its wire is held at another than its own.
-    pub(super) fn op_amp_v(self, column: usize) -> Option<f64> {
+    pub(super) fn op_amp_v(self, column: usize, supply_v: f64) -> Option<f64> {
         match self {
-            Self::ColumnAtGround(wire) if wire == column => Some(reference_v()),
+            Self::ColumnAtGround(wire) if wire == column => Some(supply_v),
             Self::ColumnAtSupply(wire) if wire == column => Some(0.0),
             _ => None,
         }
