@@ -47,6 +47,7 @@ fn trained() -> AlignedBytes {
         projection: None,
         expansion: None,
         confidence: None,
+        fill: None,
         networks,
         row_network: &[0, 1],
         metadata,

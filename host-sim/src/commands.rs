@@ -10,6 +10,7 @@ mod scene_argument;
 mod data_notes;
 mod data_file;
 mod readings;
+mod health;
 mod data_argument;
 mod subject_argument;
 mod check_arguments;

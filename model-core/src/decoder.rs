@@ -67,7 +67,7 @@ impl<'f> From<&'f [f32]> for Frame<'f> {
 /// # .unwrap();
 /// # let shape = ModelShape { rows: 1, inputs: 2, outputs: 1 };
 /// # let metadata = Metadata::unnamed(shape);
-/// # let parts = ModelParts { projection: None, expansion: None, confidence: None, networks: &[network.into()], row_network: &[0], metadata };
+/// # let parts = ModelParts { projection: None, expansion: None, confidence: None, fill: None, networks: &[network.into()], row_network: &[0], metadata };
 /// # let mut buffer = Aligned([0; 512]);
 /// # let blob: &[u8] = encode(&parts, &mut buffer.0).unwrap();
 /// // `blob` holds a model of one row with two readings (Ω) and one output (mm), called `y`.
@@ -198,6 +198,13 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
         estimate: &mut Estimate<'_>,
     ) -> Result<bool, NetworkError> {
         self.decode_with::<Polynomial>(frame, scratch, estimate)
+    }
+
+    /// Replaces missing readings of a frame (Ω) by those expected of the others, if the model can
+    /// ([`fill`](crate::fill)). Returns the number of readings that were filled. `scratch` is working space of
+    /// [`scratch_floats`](Self::scratch_floats).
+    pub fn fill(&self, readings_ohm: &mut [f32], scratch: &mut [f32]) -> usize {
+        self.model.fill().map_or(0, |fill| fill.fill(readings_ohm, scratch))
     }
 
     /// Tells how far off the outputs of a frame may be, and how novel the frame is, by the model's
@@ -384,11 +391,12 @@ fn divide(readings: &[f32], reciprocals: &[f32], ratios: &mut [f32]) {
     }
 }
 
-/// Number of floats of working space that decoding with `model` needs, and assessing its outputs.
+/// Number of floats of working space that decoding with `model` needs, assessing its outputs, and filling its readings.
 #[must_use]
 pub fn scratch_floats(model: &Model<'_>) -> usize {
     let assessing = model.confidence().map_or(0, |it| it.sizes().scratch_floats());
-    decoding_floats(model).max(assessing)
+    let filling = model.fill().map_or(0, |it| it.scratch_floats());
+    decoding_floats(model).max(assessing).max(filling)
 }
 
 /// Number of floats of working space that decoding with `model` needs.

@@ -9,6 +9,42 @@ pub struct Limits {
     pub open_above_ohm: f32,
 }
 
+impl Limits {
+    /// Limits for rubber of about 60 Ω: those of a device until it is configured otherwise.
+    pub const USUAL: Self = Self { shorted_below_ohm: 5.0, open_above_ohm: 1000.0 };
+
+    /// The fault of a `reading` in Ω; `None` if it can be believed.
+    ///
+    /// ```
+    /// use model_core::health::{Fault, Limits};
+    /// assert_eq!(Limits::USUAL.fault(60.0), None);
+    /// assert_eq!(Limits::USUAL.fault(f32::INFINITY), Some(Fault::Open));
+    /// ```
+    #[must_use]
+    pub fn fault(self, reading: f32) -> Option<Fault> {
+        if reading.is_nan() {
+            Some(Fault::Missing)
+        } else if reading < self.shorted_below_ohm {
+            Some(Fault::Shorted)
+        } else if reading > self.open_above_ohm {
+            Some(Fault::Open)
+        } else {
+            None
+        }
+    }
+}
+
+/// What is wrong with a reading.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fault {
+    /// It was not taken (NaN).
+    Missing,
+    /// It is below the limits.
+    Shorted,
+    /// It is above the limits.
+    Open,
+}
+
 /// Largest number of column-wires whose faults can be told apart.
 pub const MOST_COLUMNS: usize = 32;
 
@@ -63,14 +99,11 @@ impl Health {
     fn check_row(&mut self, row: &mut [f32], limits: Limits) -> u32 {
         let mut faulty = 0;
         for (column, reading) in row.iter_mut().enumerate() {
-            let count = if reading.is_nan() {
-                &mut self.missing
-            } else if *reading < limits.shorted_below_ohm {
-                &mut self.shorted
-            } else if *reading > limits.open_above_ohm {
-                &mut self.open
-            } else {
-                continue;
+            let count = match limits.fault(*reading) {
+                Some(Fault::Missing) => &mut self.missing,
+                Some(Fault::Shorted) => &mut self.shorted,
+                Some(Fault::Open) => &mut self.open,
+                None => continue,
             };
             *count = count.saturating_add(1);
             faulty |= 1_u32.checked_shl(column as u32).unwrap_or(0);

@@ -1,6 +1,6 @@
 //! Inference for resistive tactile sensors: from row–column resistances to deformation.
 //!
-//! Readings travel one way: frame (Ω, a slice) → [`health`] → [`gate`] → ([`relative`] →) ([`projection`] →)
+//! Readings travel one way: frame (Ω, a slice) → [`health`] → ([`fill`] →) [`gate`] → ([`relative`] →) ([`projection`] →)
 //! [`scale`] → [`rbf`] (and its affine tail) → [`Estimate`]. The network's weights are read where the [`blob`] lies, in flash or in a
 //! file's buffer: nothing is copied, nothing is allocated, and no release code path of [`Decoder`] panics.
 //! [`recalibration`] fits a model to a sensor that has changed, press by press, by [`rls`].
@@ -35,6 +35,7 @@ pub mod rbf;
 pub mod projection;
 pub mod expansion;
 pub mod confidence;
+pub mod fill;
 pub mod blob;
 mod decoder;
 pub mod recalibration;

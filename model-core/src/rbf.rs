@@ -197,6 +197,17 @@ impl<'a> Network<'a> {
         Ok(())
     }
 
+    /// Whether inference clamps one of the `reading`s, because it lies far beyond the training range
+    /// ([`Decoder::decode_into`](crate::Decoder::decode_into)), or is missing. `scaled` is working space.
+    ///
+    /// # Errors
+    /// [`NetworkError::Length`] if a buffer does not fit the shape.
+    pub fn clamps(&self, reading: &[f32], scaled: &mut [f32]) -> Result<bool, NetworkError> {
+        check_length("reading", reading, self.shape().inputs)?;
+        check_length("scaled", scaled, self.shape().inputs)?;
+        Ok(each!(self, inner => inner.scale(reading, scaled)))
+    }
+
     /// Infers `output` from inputs that [`scale`](Self::scale) gave: the second half of [`infer`](Self::infer).
     /// `scaled` is overwritten.
     ///

@@ -61,9 +61,9 @@ pub enum RecalibrationError {
     /// Rows share a network, whose inputs can be shifted for all of them alone.
     #[error("rows of the model share a network; train one a row")]
     SharedNetworks,
-    /// The model expands few components to its outputs, has a confidence, or tells no training errors.
+    /// The model expands few components to its outputs, has a confidence, fills missing readings, or tells no training errors.
     #[error(
-        "the model has an output rank, a confidence, or training errors of 0: train one without"
+        "the model has an output rank, a confidence, a fill, or training errors of 0: train one without"
     )]
     Unsuitable,
     /// There is too little memory.
@@ -164,6 +164,7 @@ impl<'a> Units<'a> {
             if !fits
                 || model.expansion().is_some()
                 || model.confidence().is_some()
+                || model.fill().is_some()
                 || !(0..outputs).any(|o| units.error_of(unit, o) > 0.0)
             {
                 return Err(RecalibrationError::Unsuitable);

@@ -85,6 +85,7 @@ fn blob(format: Format, (from, by): &Scaling, relative_inputs: bool) -> AlignedB
         projection: None,
         expansion: None,
         confidence: None,
+        fill: None,
         networks,
         row_network: &[0; ROWS],
         metadata,

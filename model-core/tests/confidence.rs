@@ -37,6 +37,7 @@ fn encoded(
         projection: None,
         expansion: None,
         confidence: Some(Confidence::new(sizes, block).unwrap()),
+        fill: None,
         networks: &[network],
         row_network: &[0],
         metadata: Metadata { relative_inputs, ..unnamed },
@@ -125,7 +126,7 @@ fn every_damage_of_the_section_has_its_own_error() {
         DecodeError::CountMismatch { what, expected, found: 64 }
     };
     let network = DecodeError::Malformed { section: "network section" };
-    assert_eq!(changed(start, &[9]), network);
+    assert_eq!(changed(start, &[200]), network);
     // Two directions take 4·(1 + 2 + 1 + 3) bytes more; two components 4·(1 + 2 + 3 + 1).
     assert_eq!(changed(start + 1, &[2]), count(92));
     assert_eq!(changed(start + 2, &[2]), count(92));

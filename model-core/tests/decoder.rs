@@ -65,6 +65,7 @@ fn blob(seed: usize, rows: usize) -> AlignedBytes {
         projection: None,
         expansion: None,
         confidence: None,
+        fill: None,
         networks: &[even.network(), odd.network()],
         row_network: &row_network,
         metadata,

@@ -49,6 +49,7 @@ fn encoded<'b>(
         projection,
         expansion,
         confidence: None,
+        fill: None,
         networks,
         row_network: &[0, 0],
         metadata,

@@ -34,6 +34,7 @@ fn with_decoder(check: impl FnOnce(&TestDecoder<'_>)) {
         projection: None,
         expansion: None,
         confidence: None,
+        fill: None,
         networks: &[network],
         row_network: &[0; ROWS],
         metadata,

@@ -32,7 +32,6 @@ impl Effort {
     }
 
     /// Seed of the first case.
-    #[allow(dead_code)]
     #[must_use]
     pub fn seed(&self) -> u64 {
         self.seed

@@ -11,6 +11,8 @@ mod least_squares;
 pub mod rls;
 mod forward;
 
+mod sensor;
+
 mod flips;
 mod power;
 mod ram;
@@ -24,7 +26,7 @@ mod interruptions;
 
 use crate::promise::Promise;
 
-/// Every promise: numbers, device, hostile input, files.
+/// Every promise: numbers, sensor, device, hostile input, files.
 pub const PROMISES: &[Promise] = &[
     exponentials::POLYNOMIAL,
     exponentials::LIBM,
@@ -40,6 +42,10 @@ pub const PROMISES: &[Promise] = &[
     rls::FORGETTING,
     rls::WITHOUT_FORGETTING,
     forward::TOUCHING,
+    sensor::NAMED,
+    sensor::NOTICED,
+    sensor::SILENT,
+    sensor::FILLED,
     flips::ONE,
     flips::TWO,
     power::UPLOAD,

@@ -1,5 +1,7 @@
 //! Default and ranges of a configuration.
 
+use model_core::health::Limits;
+
 use crate::link::message::{ConfidenceSent, Configuration, ConfigurationField};
 use crate::readout::ScanSettings;
 
@@ -14,8 +16,8 @@ impl Configuration {
         send_readings: false,
         send_estimates: true,
         confidence: ConfidenceSent::Nothing,
-        shorted_below_ohm: 5.0,
-        open_above_ohm: 1000.0,
+        shorted_below_ohm: Limits::USUAL.shorted_below_ohm,
+        open_above_ohm: Limits::USUAL.open_above_ohm,
         contact_threshold: 0.02,
         rest_tolerance: 0.0,
     };

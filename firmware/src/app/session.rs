@@ -250,6 +250,9 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         let health = Health::of(frame, self.wires.columns, limits, &mut self.faulty_columns);
         let mut flags = if health.is_good() { 0 } else { EstimateReport::FAULTY_READING };
         if let Some(decoder) = decoder {
+            if !health.is_good() {
+                decoder.fill(frame, self.scratch);
+            }
             let captured = self.capture.is_none() && self.baseline.frames() > 0;
             let rest = cut(&mut self.rest, self.rows, self.outputs);
             let rest = Rest {

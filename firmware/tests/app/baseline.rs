@@ -47,6 +47,7 @@ fn a_frame_without_a_baseline_is_flagged_until_one_is_complete() {
         projection: None,
         expansion: None,
         confidence: None,
+        fill: None,
         networks: &networks,
         row_network: &[0; ROWS],
         metadata,

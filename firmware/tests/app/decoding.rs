@@ -2,7 +2,9 @@
 
 use firmware::app::Session;
 use firmware::link::message::{Configuration, EstimateReport, Refusal, Report, Request};
-use model_core::blob::Floats;
+use model_core::Decoder;
+use model_core::blob::{Floats, Model, ModelParts, encode_to_vec};
+use model_core::fill::Fill;
 
 use crate::requests::{bits, capture, decode, expected, statistics};
 use mock_board::*;
@@ -34,6 +36,42 @@ fn a_faulty_reading_spoils_its_row_alone_and_is_told() {
         assert!(found[..OUTPUTS].iter().all(|value| f32::from_bits(*value).is_nan()));
         assert_eq!(found[OUTPUTS..], bits(expected(&blob, &good)[1].into_iter()));
     }
+}
+
+#[test]
+fn a_model_with_a_fill_decodes_rows_with_a_faulty_reading_and_tells_of_it() {
+    let plain = blob(3, 4);
+    let model = Model::decode(&plain).unwrap();
+    let networks: Vec<_> = model.networks().collect();
+    // Readings 60 to 65 Ω that all move together.
+    let block = [[60.0, 61.0, 62.0, 63.0, 64.0, 65.0], [10.0; 6], [0.4; 6]];
+    let parts = ModelParts {
+        projection: None,
+        expansion: None,
+        confidence: None,
+        fill: Fill::new(6, 1, block.as_flattened()).ok(),
+        networks: &networks,
+        row_network: &[0; ROWS],
+        metadata: *model.metadata(),
+    };
+    let filling = encode_to_vec(&parts).unwrap();
+    let mut slots = MockSlot::pair_with(&filling);
+    let mut bench = Bench::new(quiet());
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let mut frame = frame_at_rest();
+    frame[0][2] = 2000.0;
+    let (flags, status, found) = decode(&mut session, &bench.board, &frame);
+    assert_eq!((flags, &status[..]), (EstimateReport::FAULTY_READING, &[0, 0][..]));
+    let mut filled = frame;
+    filled[0][2] = f32::NAN;
+    let decoder = Decoder::<ROWS>::load(&filling).unwrap();
+    assert_eq!(decoder.fill(filled.as_flattened_mut(), &mut [0.0; 8]), 1);
+    assert!((filled[0][2] - 62.0).abs() < 0.01, "{filled:?}");
+    assert_eq!(found, bits(expected(&plain, &filled).into_iter().flatten()));
+    // Two of six are too many.
+    frame[1][0] = 2000.0;
+    let (flags, status, _) = decode(&mut session, &bench.board, &frame);
+    assert_eq!((flags, &status[..]), (EstimateReport::FAULTY_READING, &[1, 1][..]));
 }
 
 #[test]

@@ -263,6 +263,14 @@ fn encoded_with(
     // In the files in testdata, the units have the same names as the columns.
     let (input_units, output_units) = (unnamed.input_names, unnamed.output_names);
     let metadata = Metadata { name, thickness_mm: 5.0, input_units, output_units, ..unnamed };
-    let parts = ModelParts { projection, expansion, confidence, networks, row_network, metadata };
+    let parts = ModelParts {
+        projection,
+        expansion,
+        confidence,
+        fill: None,
+        networks,
+        row_network,
+        metadata,
+    };
     encode_to_vec(&parts).unwrap()
 }

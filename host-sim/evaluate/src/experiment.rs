@@ -86,6 +86,9 @@ pub struct Training {
     /// Whether the model tells how far off its outputs may be, and how novel a frame is.
     #[serde(default)]
     pub confidence: bool,
+    /// Whether the model fills missing readings from the others of their frame.
+    #[serde(default)]
+    pub fill: bool,
 }
 
 /// Settings of the paper's Table 1.

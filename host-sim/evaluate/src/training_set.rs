@@ -7,6 +7,7 @@ use taxel_data::dataset::Dataset;
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
 use taxel_learn::confidence::{self, Density, HeldOut};
+use taxel_learn::fill;
 use taxel_learn::train::{Examples, Refinement, resolution, train, train_refined};
 use taxel_learn::{ModelBlob, Options, Origin, Trained, pack};
 use taxel_simulate::Synthesis;
@@ -24,6 +25,8 @@ pub struct TrainingSet<'s> {
     pub refine: bool,
     /// Whether the model tells how far off its outputs may be, and how novel a frame is.
     pub confidence: bool,
+    /// Whether the model fills missing readings from the others.
+    pub fill: bool,
     more: More<'s>,
 }
 
@@ -45,16 +48,17 @@ impl<'s> TrainingSet<'s> {
             origin: experiment.origin(),
             refine: t.refine,
             confidence: t.confidence,
+            fill: t.fill,
             more: More::Scene(Box::new(MoreFrames { experiment, synthesis })),
         }
     }
 
-    /// Measured `frames`, with the fold of each, numbered from 0. It neither refines nor adds a confidence unless the
-    /// fields ask for it.
+    /// Measured `frames`, with the fold of each, numbered from 0. It neither refines, nor adds a confidence, nor fills
+    /// missing readings, unless the fields ask for it.
     #[must_use]
     pub fn of_folds(frames: &'s Dataset, fold_of: &'s [usize], origin: Origin) -> Self {
         let (frames, more) = (Cow::Borrowed(frames), More::Folds(fold_of));
-        Self { frames, origin, refine: false, confidence: false, more }
+        Self { frames, origin, refine: false, confidence: false, fill: false, more }
     }
 
     /// What refinement measures the error on; `None` if it is not asked for.
@@ -79,7 +83,7 @@ impl<'s> TrainingSet<'s> {
         })
     }
 
-    /// Trains with `options` and packs the model, with a confidence if that is asked for.
+    /// Trains with `options` and packs the model, with a confidence and a fill if these are asked for.
     ///
     /// # Errors
     /// [`Error`](crate::Error) for options that cannot be used with these frames, or a model that cannot be packed.
@@ -88,7 +92,15 @@ impl<'s> TrainingSet<'s> {
             resolution::check_squares(&self.frames)?;
         }
         let blob = pack(&self.train(options, progress)?, &self.frames, &self.origin)?;
-        if self.confidence { self.with_confidence(&blob, options, progress) } else { Ok(blob) }
+        let blob =
+            if self.confidence { self.with_confidence(&blob, options, progress)? } else { blob };
+        if !self.fill {
+            return Ok(blob);
+        }
+        progress.stage("fit fill", 1);
+        let blob = fill::add(&blob, &self.frames.inputs)?;
+        progress.step();
+        Ok(blob)
     }
 
     /// Adds a confidence to the model in `blob`, calibrated on frames that it was not trained on: as many other frames

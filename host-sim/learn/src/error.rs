@@ -158,6 +158,9 @@ pub enum Error {
     /// Projection of the readings with numbers beyond f32.
     #[error("the projection of these readings is beyond f32")]
     ProjectionBeyondF32,
+    /// Model whose missing readings cannot be filled.
+    #[error("the model cannot fill missing readings: {0}")]
+    NoFill(&'static str),
     /// Model beyond what the blob's format holds.
     #[error("the model cannot be written: {0}")]
     NotPacked(EncodeError),

@@ -25,12 +25,15 @@
 pub mod error;
 pub mod decoder;
 pub mod infer;
+pub mod health;
 pub mod relative;
 pub mod outliers;
 pub mod train;
 pub mod packing;
 pub mod prepared;
 pub mod confidence;
+pub mod fill;
+pub mod faults;
 pub mod decoders;
 pub mod select;
 pub mod cost;

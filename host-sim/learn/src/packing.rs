@@ -8,6 +8,7 @@ use model_core::blob::{
 };
 use model_core::confidence::Confidence;
 use model_core::expansion::Expansion;
+use model_core::fill::Fill;
 use model_core::rbf::Network;
 use taxel_data::dataset::Dataset;
 use taxel_data::{columns, input};
@@ -88,6 +89,7 @@ pub fn pack(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<Mod
         projection,
         expansion,
         confidence: None,
+        fill: None,
         networks: &views,
         row_network: &row_network,
         metadata: Metadata {
@@ -166,6 +168,18 @@ impl ModelBlob {
     /// # Errors
     /// [`Error::NotPacked`] for a confidence of another model, or a blob that becomes too large.
     pub fn with_confidence(&self, confidence: Confidence<'_>) -> Result<Self> {
+        self.rebuilt(Some(confidence), self.parse().fill())
+    }
+
+    /// Blob of this model that fills missing readings by `fill`, instead of its own.
+    ///
+    /// # Errors
+    /// [`Error::NotPacked`] for a fill of another model, or a blob that becomes too large.
+    pub fn with_fill(&self, fill: Fill<'_>) -> Result<Self> {
+        self.rebuilt(self.parse().confidence(), Some(fill))
+    }
+
+    fn rebuilt(&self, confidence: Option<Confidence<'_>>, fill: Option<Fill<'_>>) -> Result<Self> {
         let model = self.parse();
         let networks: Vec<Network<'_>> = model.networks().collect();
         let of_row = |row| model.network_of_row(row).map(|network| network as u8);
@@ -173,7 +187,8 @@ impl ModelBlob {
         let parts = ModelParts {
             projection: model.projection(),
             expansion: model.expansion(),
-            confidence: Some(confidence),
+            confidence,
+            fill,
             networks: &networks,
             row_network: &row_network,
             metadata: *model.metadata(),

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use model_core::blob::Model;
 use model_core::rbf::Network;
 use model_core::scale::CLAMP;
+use rayon::prelude::*;
 use taxel_data::table::Table;
 
 use crate::decoder::{Estimates, FrameDecoder};
@@ -142,6 +143,54 @@ impl<'b> PreparedModel<'b> {
         let confidence = self.model.confidence()?;
         let (deviations, novelty) = assess_lines(confidence, &self.model_inputs(readings));
         Some((deviations.into_iter().map(f64::from).collect(), novelty))
+    }
+
+    /// Readings (`frames × inputs`) with missing ones filled as a device fills them, and the number of readings filled in
+    /// each frame; `None` if the model has no [fill](model_core::fill).
+    #[must_use]
+    pub fn filled(&self, readings: &[f64]) -> Option<(Vec<f64>, Vec<usize>)> {
+        let fill = self.model.fill()?;
+        let mut values = readings.to_vec();
+        let counts = values
+            .par_chunks_exact_mut(self.inputs())
+            .map_init(
+                || vec![0.0; fill.scratch_floats()],
+                |scratch, frame| {
+                    if !frame.iter().any(|reading| is_missing(*reading)) {
+                        return 0;
+                    }
+                    let mut ohm: Vec<f32> = frame.iter().map(|reading| *reading as f32).collect();
+                    let count = fill.fill(&mut ohm, scratch);
+                    let missing = frame.iter_mut().zip(ohm).filter(|(it, _)| is_missing(**it));
+                    missing.for_each(|(reading, ohm)| *reading = f64::from(ohm));
+                    count
+                },
+            )
+            .collect();
+        Some((values, counts))
+    }
+
+    /// Whether decoding clamps an input, in each frame of `readings` (`frames × inputs`). Rows that cannot be decoded do
+    /// not count.
+    ///
+    /// # Panics
+    /// If `readings` are not whole frames of the model.
+    #[must_use]
+    pub fn clamps(&self, readings: &[f64]) -> Vec<bool> {
+        let inputs = self.networks.inputs();
+        let of_networks = self.inputs_of_networks(readings);
+        let step = inputs * self.networks.networks().count();
+        let frames = of_networks.par_chunks_exact(step.max(1));
+        frames
+            .map(|frame| {
+                let rows = self.networks.networks().zip(frame.chunks_exact(inputs));
+                rows.into_iter().any(|(network, row)| {
+                    let row: Vec<f32> = row.iter().map(|input| *input as f32).collect();
+                    let decoded = row.iter().all(|input| input.is_finite());
+                    decoded && network.clamps(&row, &mut vec![0.0; inputs]) == Ok(true)
+                })
+            })
+            .collect()
     }
 
     /// Share of the inputs for `readings`, or of their features behind a projection, that inference clamps: those

@@ -26,6 +26,7 @@
 
 mod pin;
 mod network;
+mod fault;
 mod analogue;
 mod rows;
 mod converters;
@@ -39,6 +40,7 @@ mod tests;
 
 pub use analogue::Parts;
 pub use board::{Transactions, VirtualBoard};
+pub use fault::BoardFault;
 pub use handles::{VirtualAdc, VirtualDelay, VirtualPin, VirtualSpi};
 pub use pin::Pin;
 pub use scan::{all_readings, scan, untouched_readings};

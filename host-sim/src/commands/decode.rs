@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use firmware::link::message::EstimateReport;
 use host_sim::verdict::Warning;
 use host_sim::{Error, Result};
 use serde::Serialize;
@@ -14,13 +15,19 @@ use taxel_learn::{Exponential, ModelBlob, PreparedModel};
 
 use super::arguments::exponential;
 use super::data_file::DataFileArguments;
+use super::health::{Health, HealthArguments};
 use super::readings::{BaselineArgument, model_inputs, table_of};
 use super::{Common, print};
 
 /// Decode readings from a data file, one line of estimates a line.
 ///
 /// Where a reading is missing, the outputs of its row-wire are left empty. If one network decodes the whole
-/// array, all outputs of the line are. Estimates are written with the digits that tell an f32 from its neighbours.
+/// array, all outputs of the line are. A model trained with --fill tells missing readings from the others instead.
+/// Estimates are written with the digits that tell an f32 from its neighbours.
+///
+/// The last column, `status`, is the sum of a device's flags (docs/link.md): 0 for a sound frame, 2 a faulty reading,
+/// 4 overflow, 64 a reading far beyond the training range was clamped, 128 novel (with --confidence). Faulty readings are
+/// noted by wire and column on stderr.
 #[derive(Args)]
 #[command(after_help = "Examples:
   host-sim decode press.bin readings.csv -o estimate.csv
@@ -46,6 +53,8 @@ pub struct Arguments {
     confidence: bool,
     #[command(flatten)]
     baseline: BaselineArgument,
+    #[command(flatten)]
+    health: HealthArguments,
     /// Exponential of the activations.
     #[arg(long, alias = "kernel", value_parser = exponential(), default_value = "polynomial")]
     exponential: Exponential,
@@ -55,7 +64,11 @@ pub struct Arguments {
 struct Summary {
     model_crc: String,
     frames: usize,
+    /// Number of frames with a reading that is missing, and was not filled.
     frames_with_missing_readings: usize,
+    /// Number of frames with a reading that was clamped.
+    frames_clamped: usize,
+    health: Health,
     /// Number of novel frames, if confidence was asked for.
     frames_novel: Option<usize>,
     exponential: Exponential,
@@ -71,7 +84,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let model = blob.prepare(arguments.exponential);
     let model = arguments.baseline.apply(model, &arguments.model, arguments.file.fields())?;
     let file = arguments.file.read(&arguments.readings)?;
-    let readings = model_inputs(&model, &file)?;
+    let mut readings = model_inputs(&model, &file)?;
+    let health = arguments.health.apply(&model, &mut readings)?;
     remark_on_range(&model, &readings);
     let estimate = model.decode_table(&readings);
     let keep = kept(&arguments.keep, &file, &estimate)?;
@@ -84,7 +98,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         Some(assessed) => assessed,
         None => None,
     };
-    write(&arguments.output, &keep, &estimate, assessed.as_ref())?;
+    let novelty = assessed.as_ref().map(|(_, novelty)| &novelty[..]);
+    let flags = flags(&model, &readings, &estimate, &health, novelty);
+    write(&arguments.output, &keep, &estimate, assessed.as_ref(), &flags)?;
     let inputs = model.model_inputs(&readings.values);
     let frames = inputs.chunks_exact(readings.names.len());
     let incomplete = frames.filter(|frame| frame.iter().any(|v| is_missing(*v))).count();
@@ -92,6 +108,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         model_crc: format!("{:08x}", model.model().crc()),
         frames: estimate.len(),
         frames_with_missing_readings: incomplete,
+        frames_clamped: flags.iter().filter(|flags| *flags & EstimateReport::CLAMPED != 0).count(),
+        health,
         frames_novel: assessed.map(|(_, novelty)| novelty.iter().filter(|n| **n > 0.0).count()),
         exponential: arguments.exponential,
         file: arguments.output.clone(),
@@ -115,29 +133,76 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     page.print()
 }
 
-/// Writes the columns to `keep`, the estimates, and what was `assessed` of them: deviations and the novelty of each
-/// frame.
+/// What a device would flag in each frame.
+fn flags(
+    model: &PreparedModel<'_>,
+    readings: &Table,
+    estimate: &Table,
+    health: &Health,
+    novelty: Option<&[f64]>,
+) -> Vec<u8> {
+    let clamps = model.clamps(&readings.values);
+    let inputs = model.model_inputs(&readings.values);
+    let shape = model.model().shape();
+    let whole_array = model.model().projection().is_some();
+    let of_row = |count: usize, rows: usize| if whole_array { count * rows } else { count };
+    let (in_row, out_row) = (of_row(shape.inputs, shape.rows), of_row(shape.outputs, shape.rows));
+    let lines = inputs.chunks_exact(readings.names.len()).zip(estimate.lines());
+    let of_line = |(line, (inputs, outputs)): (usize, (&[f64], &[f64]))| {
+        let mut rows = inputs.chunks_exact(in_row).zip(outputs.chunks_exact(out_row));
+        let overflow = rows.any(|(inputs, outputs)| {
+            outputs[0].is_nan() && !inputs.iter().any(|input| is_missing(*input))
+        });
+        let is_novel = novelty.is_some_and(|novelty| novelty[line] > 0.0);
+        let flags = [
+            (health.is_faulty[line], EstimateReport::FAULTY_READING),
+            (overflow, EstimateReport::OVERFLOW),
+            (clamps[line], EstimateReport::CLAMPED),
+            (is_novel, EstimateReport::NOVEL),
+        ];
+        flags.into_iter().filter(|(set, _)| *set).map(|(_, flag)| flag).sum()
+    };
+    lines.enumerate().map(of_line).collect()
+}
+
+/// Name of the column of flags: `status`, or with underlines behind it if the model has an output of that name.
+fn status_name(names: &[String]) -> String {
+    let mut name = String::from("status");
+    while names.contains(&name) {
+        name.push('_');
+    }
+    name
+}
+
+/// Writes the columns to `keep`, the estimates, what was `assessed` of them (deviations and the novelty of each
+/// frame), and each frame's `flags`.
 fn write(
     path: &Path,
     keep: &Table,
     estimate: &Table,
     assessed: Option<&(Vec<f64>, Vec<f64>)>,
+    flags: &[u8],
 ) -> Result<()> {
     let outputs = estimate.names.len();
+    let status = status_name(&[&estimate.names[..], &keep.names].concat());
+    let flags = flags.iter().map(|flags| f64::from(*flags));
     let kept = keep.names.iter().map(|name| Column::f64(name));
     let estimated = estimate.names.iter().map(|name| Column::f32(name));
     let lines = (0..estimate.len()).map(|line| [keep.line(line), estimate.line(line)]);
     let Some((deviations, novelty)) = assessed else {
-        let lines = lines.map(|parts| parts.into_iter().flatten().copied());
-        return Ok(csv_file::write_columns(path, kept.chain(estimated), lines)?);
+        let lines = lines.zip(flags);
+        let lines = lines.map(|(parts, flags)| parts.into_iter().flatten().copied().chain([flags]));
+        let columns = kept.chain(estimated).chain([Column::f64(&status)]);
+        return Ok(csv_file::write_columns(path, columns, lines)?);
     };
     let names: Vec<String> =
         estimate.names.iter().map(|name| format!("{name}_deviation")).collect();
     let columns = kept.chain(estimated).chain(names.iter().map(|name| Column::f32(name)));
-    let columns = columns.chain([Column::f64("novelty_nats")]);
-    let lines = lines.zip(deviations.chunks_exact(outputs)).zip(novelty);
-    let lines = lines.map(|((parts, deviations), novelty)| {
-        parts.into_iter().flatten().chain(deviations).chain([novelty]).copied()
+    let columns = columns.chain([Column::f64("novelty_nats"), Column::f64(&status)]);
+    let lines = lines.zip(deviations.chunks_exact(outputs)).zip(novelty.iter().zip(flags));
+    let lines = lines.map(|((parts, deviations), (novelty, flags))| {
+        let values = parts.into_iter().flatten().chain(deviations).copied();
+        values.chain([*novelty, flags])
     });
     Ok(csv_file::write_columns(path, columns, lines)?)
 }

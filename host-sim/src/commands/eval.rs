@@ -19,14 +19,19 @@ use taxel_limit::Refusal;
 use super::arguments::exponential;
 use super::confidence;
 use super::data_file::DataFileArguments;
+use super::health::{Health, HealthArguments};
 use super::readings::{BaselineArgument, model_inputs, table_of};
 use super::{Common, command_line, print};
 
 /// Evaluate a model on a CSV file of readings and true outputs.
+///
+/// Readings that a device would not believe count as missing. A model trained with --fill tells them from the others;
+/// --without shows what that costs.
 #[derive(Args)]
 #[command(after_help = "Examples:
   host-sim eval press.bin test.csv --html report.html
   host-sim eval relative.bin test.csv --baseline rest.csv
+  host-sim eval array.bin test.csv --without 'r4c*_ohm'
   host-sim eval m.bin sensor.csv --join robot.csv --on c1 --tolerance 0.01 --missing -1 --last-share 0.2")]
 pub struct Arguments {
     /// Weight blob.
@@ -37,6 +42,8 @@ pub struct Arguments {
     file: DataFileArguments,
     #[command(flatten)]
     baseline: BaselineArgument,
+    #[command(flatten)]
+    health: HealthArguments,
     /// Exponential of the activations.
     #[arg(long, alias = "kernel", value_parser = exponential(), default_value = "polynomial")]
     exponential: Exponential,
@@ -60,6 +67,8 @@ struct Summary {
     /// Number of these that count: neither they nor a reading they need is missing.
     values_evaluated: usize,
     exponential: Exponential,
+    /// Faulty readings, and how many of them were filled.
+    health: Health,
     /// Errors of the model, and of always predicting the mean of these outputs.
     decoders: Vec<DecoderErrors>,
     /// Errors of the model by the depth of the contact, if that is an output.
@@ -83,7 +92,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let model = blob.prepare(arguments.exponential);
     let model = arguments.baseline.apply(model, &arguments.model, arguments.file.fields())?;
     let file = arguments.file.read(&arguments.data)?;
-    let readings = model_inputs(&model, &file)?;
+    let mut readings = model_inputs(&model, &file)?;
+    let health = arguments.health.apply(&model, &mut readings)?;
     let metadata = model.model().metadata();
     let mut truth = table_of(&file, metadata.output_names.iter())?;
     let estimate = model.decode_table(&readings);
@@ -102,7 +112,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if errors.iter().all(|group| group.count == 0) {
         return Err(Error::Unfit {
             path: arguments.data.clone(),
-            message: "no line has both the model's readings and a true output; fill them in".into(),
+            message: "no line has both the model's readings and a true output: fill them in, or see --limits, and \
+                      train --fill"
+                .into(),
         });
     }
     let (deviations, novelty) = model.assess(&readings.values).unzip();
@@ -141,6 +153,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         values: truth.values.len(),
         values_evaluated,
         exponential: arguments.exponential,
+        health,
         by_depth: by_depth(&truth, &estimate.values, &measure),
     };
     if let Some(html) = &arguments.html {

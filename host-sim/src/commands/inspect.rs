@@ -41,6 +41,8 @@ struct Summary {
     expanded_components: usize,
     /// What tells deviations and novelty; `None` for a model without a confidence.
     confidence: Option<ConfidenceSummary>,
+    /// What fills missing readings; `None` for a model that does not.
+    fill: Option<FillSummary>,
     networks: Vec<NetworkSummary>,
     noise_kind: String,
     noise_level: f32,
@@ -58,6 +60,13 @@ struct Summary {
     frame_costs: Frames<Cost>,
     inputs: Vec<ColumnSummary>,
     outputs: Vec<ModelOutput>,
+}
+
+/// Size of what fills missing readings.
+#[derive(Serialize)]
+struct FillSummary {
+    factors: usize,
+    bytes: usize,
 }
 
 #[derive(Serialize)]
@@ -129,6 +138,9 @@ fn summarise(blob: &ModelBlob) -> Result<Summary> {
             components: it.sizes().components,
             bytes: 4 * it.block().len(),
         }),
+        fill: model
+            .fill()
+            .map(|it| FillSummary { factors: it.factors(), bytes: 4 * it.block().len() }),
         relative_inputs: metadata.relative_inputs,
         projected_features: model.projection().map_or(0, |it| it.features()),
         expanded_components: design.components.unwrap_or(0),
@@ -224,6 +236,9 @@ fn page_of(s: &Summary) -> print::Page {
             "confidence",
             format!("{components} components in {directions} directions, {bytes} bytes"),
         );
+    }
+    if let Some(FillSummary { factors, bytes }) = s.fill {
+        line("fill", format!("missing readings by {factors} factors, {bytes} bytes"));
     }
     let networks: Vec<String> = s.networks.iter().map(NetworkSummary::line).collect();
     let mut index = 0;

@@ -65,6 +65,10 @@ pub struct Arguments {
     /// because frames of one resemble each other.
     #[arg(long)]
     confidence: bool,
+    /// Let the model fill missing readings from the others of their frame, so that a broken wire costs accuracy, but no
+    /// frames (docs/reliability.md). It takes 10 kB more for 144 readings.
+    #[arg(long)]
+    fill: bool,
     #[command(flatten)]
     subject: SubjectOptions,
     /// Frames to synthesise from a scene, instead of the scene's number.
@@ -95,6 +99,8 @@ struct Summary {
     relative_inputs: bool,
     /// Whether the model tells deviations and novelty.
     confidence: bool,
+    /// Whether the model fills missing readings from the others.
+    fill: bool,
     /// Number formats of the networks, in their order.
     formats: Vec<&'static str>,
     outputs: Vec<ModelOutput>,
@@ -115,7 +121,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     print::check_output(&arguments.output, &[source, baseline, joined])?;
     let subject = load(arguments, common)?;
     let mut options = arguments.model.over(subject.options());
-    let set = subject.training_set(1);
+    let mut set = subject.training_set(1);
+    set.fill |= arguments.fill;
     if arguments.select && options.whole_array {
         return Err(Error::Usage(
             "--select chooses for one network a row: give --centres, --spread and --penalty with --whole-array".into(),
@@ -152,6 +159,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         output_rank: model.expansion().map(|expansion| expansion.components()),
         relative_inputs: set.frames.relative_inputs,
         confidence: model.confidence().is_some(),
+        fill: model.fill().is_some(),
         formats: model.networks().map(|n| n.format().name()).collect(),
         outputs: model_outputs::of(&model),
         worth: Worth::of(&subject, &set, &blob, selection.as_ref()),
@@ -223,7 +231,7 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         }
     }
     page.line(format_args!(
-        "{}: {} bytes, CRC-32 {}, {}, K = {}{}, spread = {}{}{}, affine tail: {}, {} frames{}{}",
+        "{}: {} bytes, CRC-32 {}, {}, K = {}{}, spread = {}{}{}, affine tail: {}, {} frames{}{}{}",
         summary.file.display(),
         summary.blob_bytes,
         summary.model_crc,
@@ -236,7 +244,8 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         if summary.affine_tail { "yes" } else { "no" },
         summary.training_frames,
         if summary.relative_inputs { ", inputs relative to the baseline" } else { "" },
-        if summary.confidence { ", with confidence" } else { "" }
+        if summary.confidence { ", with confidence" } else { "" },
+        if summary.fill { ", fills missing readings" } else { "" }
     ));
     if summary.centres < asked {
         page.line(format_args!(

@@ -57,6 +57,7 @@ fn with_confidence(model: &ModelBlob) -> ModelBlob {
         projection: model.projection(),
         expansion: model.expansion(),
         confidence: Some(Confidence::new(sizes, &block).unwrap()),
+        fill: None,
         networks: &networks,
         row_network: &row_network,
         metadata: *model.metadata(),

@@ -51,7 +51,7 @@ fn prepared(name: &str, schema: &Schema) -> Folder {
     let (world, _) = scene.split_once("[table1]").unwrap();
     folder.write("scene.toml", world.replace("frames = 3000", "frames = 600"));
     checked(&folder, schema, &["synth", "scene.toml", "-n", "200", "-o", "data.csv"]);
-    let train = ["train", "scene.toml", "--confidence", "-o", "m.bin"];
+    let train = ["train", "scene.toml", "--confidence", "--fill", "-o", "m.bin"];
     checked(&folder, schema, &train);
     folder
 }
@@ -66,10 +66,13 @@ fn models_and_data_are_told_by_the_schema() {
     let selected = checked(&[&select[..], &["--spread", "0.5,1", "-o", "d.bin"]].concat());
     assert!(selected["selection"]["chosen"].is_u64());
     let decoded = checked(&["decode", "m.bin", "data.csv", "--confidence", "-o", "e.csv"]);
-    let evaluated = checked(&["eval", "m.bin", "data.csv"]);
+    let evaluated = checked(&["eval", "m.bin", "data.csv", "--without", "r4c5_ohm"]);
+    assert_eq!(evaluated["health"]["frames_filled"], 200);
+    assert_eq!(evaluated["health"]["columns"][0]["column"], "r4c5_ohm");
     let inspected = checked(&["inspect", "m.bin"]);
     assert_eq!(decoded["model_crc"], inspected["model_crc"]);
     assert_eq!(evaluated["model_crc"], inspected["model_crc"]);
+    assert_eq!(inspected["fill"]["factors"], 16);
     // The width that the scene gives, not the blob's rounded one.
     assert_eq!(inspected["networks"][0]["spread"], json!([0.8]));
     folder.write("a.csv", "t_s,a\n0,1\n1,2\n2,4\n");

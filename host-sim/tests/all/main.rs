@@ -12,6 +12,7 @@ mod data_files;
 mod device;
 mod drift;
 mod gate;
+mod health;
 #[cfg(unix)]
 mod interruption;
 mod json_schema;

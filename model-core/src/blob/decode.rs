@@ -7,12 +7,13 @@ use super::format::{
 };
 use super::metadata::{Columns, Floats, Metadata, ModelShape};
 use super::sections::{
-    check_count, take, take_block, take_confidence, take_expansion, take_projection,
+    check_count, cut_fill, take, take_block, take_confidence, take_expansion, take_projection,
     take_relative_inputs,
 };
 use crate::checksum::CRC_32;
 use crate::confidence::{Confidence, Sizes};
 use crate::expansion::Expansion;
+use crate::fill::Fill;
 use crate::projection::Projection;
 use crate::rbf::{
     Cut, Format, Layout, Network, NetworkError, Packed, Shape, direct, expanded, fixed16,
@@ -33,7 +34,8 @@ pub struct Model<'a> {
     /// Directions and components of the confidence.
     confidence_sizes: [u16; 2],
     networks: u8,
-    network_sections: &'a [u8],
+    /// The fill's section, if there is one, and those of the networks: nothing else is kept of the fill, to save RAM.
+    last_sections: &'a [u8],
 }
 
 impl<'a> Model<'a> {
@@ -72,7 +74,16 @@ impl<'a> Model<'a> {
             Some(_) => take_expansion(rest, shape)?,
             None => (None, rest),
         };
-        let (confidence, network_sections) = take_confidence(rest, shape)?;
+        let (confidence, rest) = take_confidence(rest, shape)?;
+        let last_sections = rest;
+        let (fill, network_sections) = cut_fill(last_sections, shape)?;
+        if let Some(fill) = fill {
+            if relative_inputs {
+                return Err(DecodeError::Malformed { section: "fill of relative inputs" });
+            }
+            Fill::new(fill.readings(), fill.factors(), fill.block())
+                .map_err(|cause| DecodeError::Fill { cause })?;
+        }
 
         let model = Self {
             shape,
@@ -87,7 +98,7 @@ impl<'a> Model<'a> {
             confidence_sizes: confidence
                 .map_or([0; 2], |it| [it.sizes().directions as u16, it.sizes().components as u16]),
             networks,
-            network_sections,
+            last_sections,
         };
         let mut rest = network_sections;
         for index in 0..networks {
@@ -188,6 +199,17 @@ impl<'a> Model<'a> {
         self.confidence.map(|block| Confidence::of_checked(sizes, block))
     }
 
+    /// What fills missing readings from the others; `None` if a missing reading stays missing.
+    #[must_use]
+    pub fn fill(&self) -> Option<Fill<'a>> {
+        self.cut_fill().0
+    }
+
+    /// The fill, and the sections of the networks.
+    fn cut_fill(&self) -> (Option<Fill<'a>>, &'a [u8]) {
+        cut_fill(self.last_sections, self.shape).unwrap_or_default()
+    }
+
     /// Inputs and outputs of each network; behind a projection, its features and the outputs of all rows, or the
     /// components that are expanded to these.
     pub(crate) fn network_shape(&self) -> ModelShape {
@@ -202,7 +224,7 @@ impl<'a> Model<'a> {
 
     /// The networks, in the order of the blob.
     pub fn networks(&self) -> impl Iterator<Item = Network<'a>> {
-        let (shape, mut rest) = (self.network_shape(), self.network_sections);
+        let (shape, mut rest) = (self.network_shape(), self.cut_fill().1);
         (0..self.networks).map_while(move |index| {
             let (network, after) = take_network(rest, shape, index).ok()?;
             rest = after;
@@ -212,7 +234,7 @@ impl<'a> Model<'a> {
 
     /// The section of the network that serves `row` (from 0).
     pub(crate) fn section_of_row(&self, row: usize) -> Option<NetworkSection<'a>> {
-        let mut rest = self.network_sections;
+        let mut rest = self.cut_fill().1;
         for index in 0..self.network_of_row(row)? {
             (_, rest) = NetworkSection::take(rest, self.network_shape(), index as u8).ok()?;
         }

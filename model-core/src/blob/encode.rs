@@ -7,14 +7,15 @@ use super::aligned::AlignedBytes;
 use super::decode::Model;
 use super::error::EncodeError;
 use super::format::{
-    CRC_BYTES, ConfidenceHeader, ExpansionHeader, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC,
-    MetadataSection, Prefix, ProjectionHeader, RbfHeader, ShapeField, TAG_CONFIDENCE,
-    TAG_EXPANSION, TAG_METADATA, TAG_PROJECTION, TAG_PROJECTION_TO, TAG_RELATIVE_INPUTS,
+    CRC_BYTES, ConfidenceHeader, ExpansionHeader, FLOAT_ALIGNMENT, FORMAT_VERSION, FillHeader,
+    MAGIC, MetadataSection, Prefix, ProjectionHeader, RbfHeader, ShapeField, TAG_CONFIDENCE,
+    TAG_EXPANSION, TAG_FILL, TAG_METADATA, TAG_PROJECTION, TAG_PROJECTION_TO, TAG_RELATIVE_INPUTS,
 };
 use super::metadata::Metadata;
 use crate::checksum::CRC_32;
 use crate::confidence::Confidence;
 use crate::expansion::Expansion;
+use crate::fill::Fill;
 use crate::projection::Projection;
 use crate::rbf::Network;
 
@@ -27,6 +28,8 @@ pub struct ModelParts<'a> {
     pub expansion: Option<Expansion<'a>>,
     /// Confidence in the outputs.
     pub confidence: Option<Confidence<'a>>,
+    /// What fills missing readings from the others; only for readings as they are.
+    pub fill: Option<Fill<'a>>,
     /// The networks; all have the same number of inputs and of outputs.
     pub networks: &'a [Network<'a>],
     /// Index into `networks` for each row.
@@ -52,7 +55,8 @@ pub fn encoded_length_bound(parts: &ModelParts<'_>) -> usize {
     let projection = parts.projection.map_or(0, |it| SECTION_FIELDS + it.block().len() * 4);
     let expansion = parts.expansion.map_or(0, |it| SECTION_FIELDS + it.block().len() * 4);
     let confidence = parts.confidence.map_or(0, |it| SECTION_FIELDS + it.block().len() * 4);
-    FIXED_FIELDS + text + numbers + projection + expansion + confidence + weights
+    let fill = parts.fill.map_or(0, |it| SECTION_FIELDS + it.block().len() * 4);
+    FIXED_FIELDS + text + numbers + projection + expansion + confidence + fill + weights
 }
 
 fn block_bytes(network: &Network<'_>) -> usize {
@@ -144,6 +148,11 @@ pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u
         let components = fit("number of components", sizes.components, u16::MAX)?;
         writer.put(&ConfidenceHeader { tag: TAG_CONFIDENCE, directions, components })?;
         writer.put_block(&[bytemuck::cast_slice(confidence.block())])?;
+    }
+    if let Some(fill) = parts.fill {
+        let factors = fit("number of factors", fill.factors(), u16::MAX)?;
+        writer.put(&FillHeader { tag: TAG_FILL, factors })?;
+        writer.put_block(&[bytemuck::cast_slice(fill.block())])?;
     }
     for (index, network) in parts.networks.iter().enumerate() {
         writer.put_network(fit("network index", index, u8::MAX)?, network)?;

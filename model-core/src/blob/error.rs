@@ -107,6 +107,12 @@ pub enum DecodeError {
         /// What is wrong with the confidence.
         cause: NetworkError,
     },
+    /// The fill's parameters are not valid.
+    #[error("fill: {cause}")]
+    Fill {
+        /// What is wrong with the fill.
+        cause: NetworkError,
+    },
     /// The parameters of a network are not valid.
     #[error("network {index}: {cause}")]
     Network {

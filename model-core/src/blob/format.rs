@@ -28,6 +28,7 @@ pub(super) const TAG_EXPANSION: u8 = 6;
 pub(super) const TAG_CONFIDENCE: u8 = 7;
 /// Tag of a projection to another number of features than a row has readings.
 pub(super) const TAG_PROJECTION_TO: u8 = 8;
+pub(super) const TAG_FILL: u8 = 9;
 
 /// Bytes 0..9, at fixed places, so that a blob's length is known before anything else is read.
 #[derive(Serialize, Deserialize)]
@@ -124,6 +125,14 @@ pub(super) struct ConfidenceHeader {
     pub components: u16,
 }
 
+/// Header of the fill's section; padding and its floats follow.
+#[derive(Serialize, Deserialize)]
+pub(super) struct FillHeader {
+    pub tag: u8,
+    /// Number of factors.
+    pub factors: u16,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -131,7 +140,7 @@ mod tests {
     #[test]
     fn no_format_of_networks_has_the_tag_of_another_section() {
         let others = [TAG_METADATA, TAG_PROJECTION, TAG_RELATIVE_INPUTS, TAG_EXPANSION];
-        for tag in others.into_iter().chain([TAG_CONFIDENCE, TAG_PROJECTION_TO]) {
+        for tag in others.into_iter().chain([TAG_CONFIDENCE, TAG_PROJECTION_TO, TAG_FILL]) {
             assert_eq!(Format::from_tag(tag), None);
         }
     }

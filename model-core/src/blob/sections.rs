@@ -2,12 +2,14 @@
 
 use super::error::DecodeError;
 use super::format::{
-    ConfidenceHeader, ExpansionHeader, FLOAT_ALIGNMENT, ProjectionHeader, TAG_CONFIDENCE,
-    TAG_EXPANSION, TAG_PROJECTION, TAG_PROJECTION_TO, TAG_RELATIVE_INPUTS,
+    ConfidenceHeader, ExpansionHeader, FLOAT_ALIGNMENT, FillHeader, ProjectionHeader,
+    TAG_CONFIDENCE, TAG_EXPANSION, TAG_FILL, TAG_PROJECTION, TAG_PROJECTION_TO,
+    TAG_RELATIVE_INPUTS,
 };
 use super::metadata::ModelShape;
 use crate::confidence::{Confidence, Sizes};
 use crate::expansion::Expansion;
+use crate::fill::{self, Fill};
 use crate::projection::{self, Projection};
 
 /// Takes the postcard fields `T` of a `section` from the front of `bytes`.
@@ -120,4 +122,23 @@ pub(super) fn take_confidence(
     let confidence =
         Confidence::new(sizes, block).map_err(|cause| DecodeError::Confidence { cause })?;
     Ok((Some(confidence), rest))
+}
+
+/// Cuts the fill from the front of `bytes` if there is one; checks its length, but no values.
+pub(super) fn cut_fill(
+    bytes: &[u8],
+    shape: ModelShape,
+) -> Result<(Option<Fill<'_>>, &[u8]), DecodeError> {
+    const SECTION: &str = "fill section";
+    if bytes.first() != Some(&TAG_FILL) {
+        return Ok((None, bytes));
+    }
+    let (header, rest) = take::<FillHeader>(bytes, SECTION)?;
+    let (block, rest) = take_block(rest, SECTION)?;
+    let (readings, factors) = (shape.rows.saturating_mul(shape.inputs), header.factors.into());
+    let floats = fill::block_floats(readings, factors);
+    check_count("bytes of fill", floats.saturating_mul(4), block.len())?;
+    let block = bytemuck::try_cast_slice::<u8, f32>(block)
+        .map_err(|_| DecodeError::Malformed { section: "padding" })?;
+    Ok((Some(Fill::of_checked(readings, factors, block)), rest))
 }

@@ -43,6 +43,7 @@ fn blob(row_network: &[u8], errors: [f32; ALL]) -> AlignedBytes {
         projection: None,
         expansion: None,
         confidence: None,
+        fill: None,
         networks: &networks[..count],
         row_network,
         metadata,

@@ -96,6 +96,7 @@ fn of_first_network(model: &Model<'_>, affine: bool) -> Outcome<Vec<u8>> {
         projection: model.projection(),
         expansion: model.expansion(),
         confidence: None,
+        fill: None,
         networks: &[of_words(&first, affine, &words)?],
         row_network: &vec![0; model.shape().rows],
         metadata: *model.metadata(),

@@ -54,6 +54,7 @@ pub fn blob_with(design: &Design, confidence: Option<Confidence<'_>>) -> Outcome
         projection: design.projection.then_some(projection),
         expansion: design.components.map(|_| expansion),
         confidence,
+        fill: None,
         networks: &networks,
         row_network: &row_network,
         metadata,

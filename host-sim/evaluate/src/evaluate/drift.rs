@@ -84,6 +84,7 @@ pub fn measure(experiment: &Experiment, gain: f64, progress: &dyn Progress) -> R
         let synthesis = Synthesis::of(&own.world);
         let mut training = TrainingSet::of_scene(&own, synthesis.clone());
         training.confidence = false;
+        training.fill = false;
         let blob = training.blob(&own.options(), progress)?;
         let network = blob.prepare(Exponential::default()).of_inputs();
         let tests = [None, drift]

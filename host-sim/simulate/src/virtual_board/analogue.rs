@@ -3,6 +3,7 @@
 use firmware::circuit::{Divider, ZeroPotential};
 use taxel_data::random::{Purpose, Random, Stream};
 
+use super::fault::BoardFault;
 use super::network::{Tie, potentials_v};
 use super::{COLUMNS, ROWS};
 use crate::readout::{Circuit, Readout};
@@ -32,6 +33,7 @@ pub(super) struct Analogue {
     line_ohm: f64,
     offset_v: [f64; COLUMNS],
     conductance_s: Vec<f64>,
+    faults: Vec<BoardFault>,
     /// Outputs in V by active row, then for none active; computed when first asked for.
     outputs_v: [Option<[f64; COLUMNS]>; ROWS + 1],
 }
@@ -60,6 +62,7 @@ impl Analogue {
             line_ohm,
             offset_v,
             conductance_s: vec![0.0; ROWS * COLUMNS],
+            faults: vec![],
             outputs_v: [None; ROWS + 1],
         }
     }
@@ -72,6 +75,22 @@ impl Analogue {
             *siemens = (1.0 / ohm).min(MOST_CONDUCTANCE_S);
         }
         self.outputs_v = [None; ROWS + 1];
+    }
+
+    pub(super) fn set_faults(&mut self, faults: &[BoardFault]) {
+        self.faults = faults.to_vec();
+        self.outputs_v = [None; ROWS + 1];
+    }
+
+    pub(super) fn faults(&self) -> &[BoardFault] {
+        &self.faults
+    }
+
+    /// Potentials in V of all wires with these ties, after the faults have changed them.
+    fn potentials_v(&self, mut rows: [Tie; ROWS], mut columns: [Tie; COLUMNS]) -> Vec<f64> {
+        self.faults.iter().for_each(|fault| fault.change(reference_v(), &mut rows, &mut columns));
+        let links: Vec<_> = self.faults.iter().filter_map(|fault| fault.link()).collect();
+        potentials_v(&self.conductance_s, &rows, &columns, &links)
     }
 
     pub(super) fn set_parts(&mut self, parts: Parts) {
@@ -116,7 +135,7 @@ impl Analogue {
         let to_ground_ohm = reference_ohm + self.line_ohm;
         let columns = [Tie::Held { volt: 0.0, through_ohm: to_ground_ohm }; COLUMNS];
         let rows = self.row_ties(active, reference_v(), None);
-        let potentials = potentials_v(&self.conductance_s, &rows, &columns);
+        let potentials = self.potentials_v(rows, columns);
         std::array::from_fn(|k| potentials[ROWS + k] * reference_ohm / to_ground_ohm)
     }
 
@@ -131,12 +150,23 @@ impl Analogue {
         let columns = self
             .offset_v
             .map(|offset| Tie::Held { volt: rest_v + offset, through_ohm: self.line_ohm });
-        let potentials = potentials_v(&self.conductance_s, &rows, &columns);
+        let potentials = self.potentials_v(rows, columns);
+        let links: Vec<_> = self.faults.iter().filter_map(|fault| fault.link()).collect();
         std::array::from_fn(|k| {
+            let stuck = self.faults.iter().find_map(|fault| fault.op_amp_v(k, reference_v()));
+            if let Some(volt) = stuck {
+                return volt;
+            }
             let current = |m: usize| {
                 (potentials[ROWS + k] - potentials[m]) * self.conductance_s[m * COLUMNS + k]
             };
-            let current_a: f64 = (0..ROWS).map(current).sum();
+            let touching = |([a, b], siemens): &([usize; 2], f64)| {
+                let other = if *a == ROWS + k { *b } else { *a };
+                let touches = [*a, *b].contains(&(ROWS + k));
+                if touches { (potentials[ROWS + k] - potentials[other]) * siemens } else { 0.0 }
+            };
+            let nodes_a: f64 = (0..ROWS).map(current).sum();
+            let current_a = nodes_a + links.iter().map(touching).sum::<f64>();
             rest_v + self.offset_v[k] + self.parts.feedback_ohm[k] * current_a
         })
     }

@@ -11,6 +11,7 @@ use taxel_data::random::{Purpose, Random, Stream};
 
 use super::analogue::{Analogue, Parts, reference_v};
 use super::converters::{ColumnSelector, mcp3208_answer, mcp3208_column};
+use super::fault::BoardFault;
 use super::pin::Pin;
 use super::rows::RowSelector;
 use super::{COLUMNS, ROWS};
@@ -151,6 +152,11 @@ impl VirtualBoard {
     /// Replaces the parts of the zero-potential circuit, which are typical and alike otherwise.
     pub fn set_parts(&self, parts: Parts) {
         self.board.borrow_mut().analogue.set_parts(parts);
+    }
+
+    /// Gives the board these faults, and no others.
+    pub fn set_faults(&self, faults: &[BoardFault]) {
+        self.board.borrow_mut().analogue.set_faults(faults);
     }
 
     /// Scan settings of the readout, with its own wait or the one that its time constant needs.
@@ -346,8 +352,11 @@ impl Board {
                  settling takes {needed_us} µs"
             ));
         }
-        let volt = self.voltages()[column];
         let full = f64::from(1_u32 << CONVERTER_BITS);
+        if let Some(is_high) = self.analogue.faults().iter().find_map(|it| it.stuck_high(column)) {
+            return Ok(if is_high { (full - 1.0) as u16 } else { 0 });
+        }
+        let volt = self.voltages()[column];
         let mut counts = volt / reference_v() * full;
         if self.adc_noise_counts > 0.0 {
             counts += self.adc_noise_counts * self.noise.normal();

@@ -319,3 +319,59 @@ fn a_smaller_sensor_and_some_of_its_rows_are_read_alone() {
     let refused = VirtualBoard::new(&World { sensor: wide, ..World::press() }).unwrap_err();
     assert!(refused.to_string().contains("parts for 8 and 18"), "{refused}");
 }
+
+#[test]
+fn faults_of_wires_and_converters_show_as_their_circuit_says() {
+    let leads = Readout {
+        row_switch_ohm: Some(0.26),
+        line_ohm: Some(0.1),
+        cross_talk: Some(true),
+        ..Readout::default()
+    };
+    let read = |fault: BoardFault| {
+        let board = board(leads.clone());
+        board.set_faults(&[fault]);
+        let (readings, _) = scan(&board, &ohm(), board.scan_settings());
+        board.check().unwrap();
+        readings
+    };
+    let of_row = |readings: &[f64], row: usize| readings[row * 18..][..18].to_vec();
+    let of_column =
+        |readings: &[f64], k: usize| readings.iter().skip(k).step_by(18).copied().collect();
+    let near = |readings: &[f64], but: &dyn Fn(usize) -> bool| {
+        let others = (0..144).filter(|at| !but(*at));
+        others.map(|at| (readings[at] / ohm()[at] - 1.0).abs()).fold(0.0, f64::max)
+    };
+    let all = |values: Vec<f64>, value: f64| values.iter().all(|one| *one == value);
+
+    let open = read(BoardFault::RowOpen(3));
+    assert!(all(of_row(&open, 3), f64::INFINITY) && near(&open, &|at| at / 18 == 3) < 1e-3);
+    for (fault, value) in [
+        (BoardFault::ColumnOpen(4), f64::INFINITY),
+        (BoardFault::ColumnAtSupply(4), f64::INFINITY),
+        (BoardFault::ColumnAtGround(4), 0.0),
+        (BoardFault::Stuck { first: 4, last: 4, is_high: true }, 0.0),
+        (BoardFault::Stuck { first: 4, last: 4, is_high: false }, f64::INFINITY),
+    ] {
+        let readings = read(fault);
+        assert!(all(of_column(&readings, 4), value), "{fault:?}");
+        // 3 V drive so much current through the leads of all rows that other columns saturate too.
+        let is_near = near(&readings, &|at| at % 18 == 4) < 1e-2;
+        assert_eq!(is_near, fault != BoardFault::ColumnAtSupply(4), "{fault:?}");
+    }
+    // A row at ground is always driven; the others come on top, and saturate.
+    let ground = read(BoardFault::RowAtGround(3));
+    assert!(all(of_row(&ground, 3), f64::INFINITY));
+    assert!(ground.iter().filter(|ohm| **ohm == 0.0).count() > 60);
+    // A row at the supply saturates all columns.
+    assert!(all(read(BoardFault::RowAtSupply(3)), f64::INFINITY));
+    // Neighbours that touch read alike, and the others as ever.
+    let rows = read(BoardFault::RowsTouch(3));
+    let (a, b) = (of_row(&rows, 3), of_row(&rows, 4));
+    assert!(a.iter().zip(&b).all(|(a, b)| (a / b - 1.0).abs() < 2e-3), "{a:?} {b:?}");
+    assert!(near(&rows, &|at| [3, 4].contains(&(at / 18))) < 1e-2);
+    let columns = read(BoardFault::ColumnsTouch(8));
+    let (a, b): (Vec<f64>, Vec<f64>) = (of_column(&columns, 8), of_column(&columns, 9));
+    assert!(a.iter().zip(&b).all(|(a, b)| (a / b - 1.0).abs() < 2e-2), "{a:?} {b:?}");
+    assert!(near(&columns, &|at| [8, 9].contains(&(at % 18))) < 1e-2);
+}

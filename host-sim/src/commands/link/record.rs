@@ -7,9 +7,11 @@ use firmware::link::message::{Configuration, Report, Request, Setting};
 use host_sim::{Error, Result};
 use serde::Serialize;
 use taxel_data::csv_file;
+use taxel_data::table::Table;
 use taxel_learn::ModelBlob;
 use taxel_rig::device::{Device, DeviceIdentity, Wire};
 
+use super::super::health::note_faults;
 use super::super::{Common, print};
 use super::frames::{hear_frames, missing};
 use super::scan::{
@@ -87,6 +89,10 @@ pub fn record<W: Wire>(
         hear_frames(device, action.scan.frames.into(), patience, wanted, names.len())
     })?;
     let missing = missing(frames.iter().flat_map(|frame| &frame.values[..values]), wanted)?;
+    if wanted == Wanted::Readings {
+        let values = frames.iter().flat_map(|frame| frame.values.iter().copied()).collect();
+        note_faults(&Table { names: names.clone(), values });
+    }
     let lines = frames.iter().map(|frame| frame.values.iter().copied());
     csv_file::write(&action.output, names.iter().map(String::as_str), lines)?;
     let ends = frames.last().zip(frames.first());

@@ -40,6 +40,7 @@ pub fn model() -> AlignedBytes {
         projection: None,
         expansion: None,
         confidence: None,
+        fill: None,
         networks: &[network(&[0.5, -0.5]), network(&[1.0, 2.0])],
         row_network: &[0, 1],
         metadata: Metadata { training_rmse: Floats::of(&errors), ..Metadata::unnamed(shape) },

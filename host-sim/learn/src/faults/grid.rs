@@ -1,0 +1,105 @@
+//! Grid of wires whose readings are the columns of a table.
+
+use super::Place;
+
+/// Numbers of the row-wires and column-wires that a table has readings of, row after row.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Grid {
+    rows: Vec<usize>,
+    columns: Vec<usize>,
+}
+
+impl Grid {
+    /// Grid of columns called `r1c1_ohm` and so on: every reading of two rows or more and two columns or more, row after
+    /// row. `None` for other columns.
+    #[must_use]
+    pub fn of(names: &[String]) -> Option<Self> {
+        let wires: Option<Vec<(usize, usize)>> =
+            names.iter().map(|name| Self::wires_of_name(name)).collect();
+        let wires = wires?;
+        let first = wires.first()?.0;
+        let columns: Vec<usize> =
+            wires.iter().take_while(|(row, _)| *row == first).map(|(_, column)| *column).collect();
+        let rows: Vec<usize> = wires.iter().step_by(columns.len()).map(|(row, _)| *row).collect();
+        let all = rows.iter().flat_map(|row| columns.iter().map(move |column| (*row, *column)));
+        let whole = rows.len() > 1 && columns.len() > 1 && all.eq(wires.iter().copied());
+        whole.then_some(Self { rows, columns })
+    }
+
+    /// Wires of the reading at index `at`.
+    fn wires(&self, at: usize) -> (usize, usize) {
+        (self.rows[at / self.columns.len()], self.columns[at % self.columns.len()])
+    }
+
+    /// Whether the reading at index `at` belongs to `place`.
+    #[must_use]
+    pub fn is_in(&self, place: Place, at: usize) -> bool {
+        let (row, column) = self.wires(at);
+        place.holds(row, column)
+    }
+
+    /// Pairs of neighbouring wires.
+    pub(super) fn neighbours(&self) -> impl Iterator<Item = Place> {
+        let rows = self.rows.windows(2).filter(|pair| pair[1] == pair[0] + 1);
+        let columns = self.columns.windows(2).filter(|pair| pair[1] == pair[0] + 1);
+        let rows = rows.map(|pair| Place::Rows(pair[0], pair[1]));
+        rows.chain(columns.map(|pair| Place::Columns(pair[0], pair[1])))
+    }
+
+    /// Indices of the readings of two neighbours, in pairs of those that would be alike if the two touched.
+    pub(super) fn pairs(&self, place: Place) -> Vec<[usize; 2]> {
+        let width = self.columns.len();
+        let index = |wires: &[usize], wire| wires.iter().position(|known| *known == wire);
+        match place {
+            Place::Rows(a, b) => {
+                let rows = index(&self.rows, a).zip(index(&self.rows, b));
+                let pairs =
+                    rows.map(|(a, b)| (0..width).map(move |k| [a * width + k, b * width + k]));
+                pairs.into_iter().flatten().collect()
+            }
+            Place::Columns(a, b) => {
+                let columns = index(&self.columns, a).zip(index(&self.columns, b));
+                let of = |(a, b)| (0..self.rows.len()).map(move |m| [m * width + a, m * width + b]);
+                columns.into_iter().flat_map(of).collect()
+            }
+            _ => vec![],
+        }
+    }
+
+    /// Fewest places that hold these `readings` and hardly any other: wires of which all are among them, and single
+    /// readings. All wires, if all are.
+    #[must_use]
+    pub fn wires_of(&self, readings: &[usize]) -> Vec<Place> {
+        let (height, width) = (self.rows.len(), self.columns.len());
+        if readings.len() == height * width {
+            return vec![Place::All];
+        }
+        let mut left = vec![false; height * width];
+        readings.iter().for_each(|at| left[*at] = true);
+        let whole = left.clone();
+        let mut places = Vec::new();
+        for (m, row) in self.rows.iter().enumerate() {
+            if whole[m * width..][..width].iter().all(|one| *one) {
+                places.push(Place::Row(*row));
+                left[m * width..][..width].fill(false);
+            }
+        }
+        for (k, column) in self.columns.iter().enumerate() {
+            let of_column = || (0..height).map(|m| m * width + k);
+            if of_column().all(|at| whole[at]) {
+                places.push(Place::Column(*column));
+                of_column().for_each(|at| left[at] = false);
+            }
+        }
+        let single = (0..left.len()).filter(|at| left[*at]).map(|at| self.wires(at));
+        places.extend(single.map(|(row, column)| Place::Reading(row, column)));
+        places
+    }
+
+    /// Wires of a column called `r4c5_ohm`.
+    #[must_use]
+    pub fn wires_of_name(name: &str) -> Option<(usize, usize)> {
+        let (row, column) = name.strip_prefix('r')?.strip_suffix("_ohm")?.split_once('c')?;
+        Some((row.parse().ok()?, column.parse().ok()?))
+    }
+}

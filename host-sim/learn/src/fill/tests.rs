@@ -1,0 +1,60 @@
+use taxel_data::progress::Silent;
+use taxel_data::random::Stream;
+use taxel_simulate::{World, synthesise};
+
+use super::*;
+use crate::infer::Exponential;
+use crate::train::train;
+use crate::{Options, Origin, pack};
+
+/// Model of two rows that fills missing readings, and frames that it was not trained on.
+fn model() -> (ModelBlob, Table) {
+    let world = World { read_rows: vec![3, 4], ..World::press() };
+    let frames = synthesise(&world, Stream::Training, 1500);
+    let options = Options { centres: 8, ..Options::default() };
+    let trained = train(&frames, &options, &Silent).unwrap();
+    let blob = pack(&trained, &frames, &Origin::of_data("rows", 0, 1, &frames)).unwrap();
+    let blob = add(&blob, &frames.inputs).unwrap();
+    (blob, synthesise(&world, Stream::Test, 300).inputs)
+}
+
+#[test]
+fn filled_readings_are_as_near_as_noise_lets_them_be() {
+    let (blob, fresh) = model();
+    let model = blob.prepare(Exponential::default());
+    let deviations = fresh.deviations();
+    for missing in [vec![4], (0..36).step_by(18).map(|row| row + 9).collect::<Vec<_>>()] {
+        let mut faulty = fresh.clone();
+        for line in faulty.values.chunks_exact_mut(36) {
+            missing.iter().for_each(|at| line[*at] = f64::NAN);
+        }
+        let (filled, counts) = model.filled(&faulty.values).unwrap();
+        assert!(counts.iter().all(|count| *count == missing.len()));
+        let errors = filled.iter().zip(&fresh.values).enumerate();
+        for at in &missing {
+            let of = errors.clone().skip(*at).step_by(36).map(|(_, (a, b))| (a - b).powi(2));
+            let error = (of.sum::<f64>() / 300.0).sqrt();
+            // The noise alone is 0.5 % of 57 Ω, which is 0.29 Ω; the mean would be off by the deviation.
+            assert!((0.2..0.4).contains(&error), "{at}: {error} Ω");
+            assert!(error < 0.7 * deviations[*at], "{at}: {error} Ω of {}", deviations[*at]);
+        }
+        let untouched = filled.iter().zip(&faulty.values).filter(|(_, b)| !b.is_nan());
+        untouched.for_each(|(a, b)| assert_eq!(a.to_bits(), b.to_bits()));
+    }
+    // A row is half of the readings: too much.
+    let mut faulty = fresh.clone();
+    faulty.values.chunks_exact_mut(36).for_each(|line| line[..18].fill(f64::NAN));
+    let (_, counts) = model.filled(&faulty.values).unwrap();
+    assert!(counts.iter().all(|count| *count == 0));
+}
+
+#[test]
+fn models_that_cannot_fill_are_refused() {
+    let (blob, fresh) = model();
+    assert!(blob.parse().fill().is_some());
+    let few = Table { names: vec!["a".into()], values: vec![1.0, 2.0] };
+    assert!(matches!(add(&blob, &few), Err(Error::NoFill(_))));
+    let mut bad = fresh;
+    bad.values[0] = f64::INFINITY;
+    assert!(matches!(add(&blob, &bad), Err(Error::NoFill(_))));
+}

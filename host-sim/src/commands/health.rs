@@ -1,0 +1,210 @@
+//! Faulty readings of data files: what is believed, what is filled, and notes on both.
+
+use clap::Args;
+use host_sim::{Error, Result};
+use model_core::health::Limits;
+use serde::Serialize;
+use taxel_data::columns;
+use taxel_data::table::Table;
+use taxel_learn::PreparedModel;
+use taxel_learn::faults::{Found, Grid, diagnose};
+use taxel_learn::health::{ColumnHealth, judge};
+
+/// Most columns, and most wires, that are named.
+const MOST_NAMED: usize = 5;
+
+/// Readings that are believed.
+#[derive(Args)]
+pub struct HealthArguments {
+    /// Readings in Ω outside of these limits count as missing (shorted or open), as on a device. `none` believes all.
+    /// Columns whose names do not end with _ohm have no limits.
+    #[arg(long, value_name = "LOW,HIGH", value_parser = limits, default_value = "5,1000", allow_negative_numbers = true)]
+    limits: Believed,
+    /// Columns whose readings are taken for missing in every line.
+    #[arg(long, value_name = "GLOB,…")]
+    without: Option<String>,
+    /// Leave missing readings missing, also if the model can fill them from the others (train --fill).
+    #[arg(long)]
+    no_fill: bool,
+}
+
+/// Readings that are believed: all of them, or those within limits.
+#[derive(Debug, Clone, Copy)]
+struct Believed(Option<Limits>);
+
+fn limits(text: &str) -> std::result::Result<Believed, String> {
+    if text.trim() == "none" {
+        return Ok(Believed(None));
+    }
+    let numbers = text.split_once(',').and_then(|(low, high)| {
+        Some([low.trim().parse::<f32>().ok()?, high.trim().parse::<f32>().ok()?])
+    });
+    match numbers {
+        Some([shorted_below_ohm, open_above_ohm]) if shorted_below_ohm < open_above_ohm => {
+            Ok(Believed(Some(Limits { shorted_below_ohm, open_above_ohm })))
+        }
+        _ => Err("give the lowest and the highest in Ω, such as 5,1000; or none".into()),
+    }
+}
+
+/// Health of the readings in a data file.
+#[derive(Debug, Serialize)]
+pub struct Health {
+    readings_missing: usize,
+    readings_shorted: usize,
+    readings_open: usize,
+    /// Readings that the model filled from the others.
+    readings_filled: usize,
+    frames_filled: usize,
+    /// Columns with a faulty reading.
+    columns: Vec<ColumnHealth>,
+    /// Faults of wires.
+    faults: Vec<Found>,
+    /// Whether each frame has a faulty reading.
+    #[serde(skip)]
+    pub is_faulty: Vec<bool>,
+}
+
+impl HealthArguments {
+    /// Makes faulty ones of the `readings` in the data file missing, notes them on stderr, and lets the `model` fill them.
+    pub fn apply(&self, model: &PreparedModel<'_>, readings: &mut Table) -> Result<Health> {
+        let lines = readings.len();
+        let faults = match self.limits.0 {
+            Some(limits) => diagnose(readings, limits, model.model().fill()),
+            None => vec![],
+        };
+        self.leave_out(readings)?;
+        let columns = judge(readings, self.limits.0);
+        let without = self.without.is_some();
+        notes(&columns, &faults, lines).iter().filter(|_| !without).for_each(|n| eprintln!("{n}"));
+        let is_faulty =
+            readings.lines().map(|line| line.iter().any(|reading| reading.is_nan())).collect();
+        let filled = if self.no_fill { None } else { model.filled(&readings.values) };
+        let counts = filled.map_or(vec![], |(values, counts)| {
+            readings.values = values;
+            counts
+        });
+        let sum = |of: fn(&ColumnHealth) -> usize| columns.iter().map(of).sum();
+        let health = Health {
+            readings_missing: sum(|column| column.missing),
+            readings_shorted: sum(|column| column.shorted),
+            readings_open: sum(|column| column.open),
+            readings_filled: counts.iter().sum(),
+            frames_filled: counts.iter().filter(|count| **count > 0).count(),
+            columns,
+            faults,
+            is_faulty,
+        };
+        if health.frames_filled > 0 {
+            eprintln!(
+                "note: missing readings of {} were filled from the others (docs/reliability.md tells what that costs)",
+                of_lines(health.frames_filled, lines)
+            );
+        }
+        Ok(health)
+    }
+
+    /// Makes the readings of the columns that are left out missing.
+    fn leave_out(&self, readings: &mut Table) -> Result<()> {
+        let Some(pattern) = &self.without else { return Ok(()) };
+        if let Some(part) = columns::unmatched(&readings.names, pattern) {
+            return Err(Error::Usage(format!(
+                "--without {part}: the model has no such reading; it has {}",
+                columns::some_names(&readings.names)
+            )));
+        }
+        let chosen = columns::select(&readings.names, pattern);
+        let width = readings.names.len();
+        for line in readings.values.chunks_exact_mut(width) {
+            chosen.iter().for_each(|column| line[*column] = f64::NAN);
+        }
+        Ok(())
+    }
+}
+
+/// Notes on stderr which wires of a device are open or shorted, by the `readings` that it scanned.
+pub fn note_faults(readings: &Table) {
+    let faults = diagnose(readings, Limits::USUAL, None);
+    notes(&[], &faults, readings.len()).iter().for_each(|note| eprintln!("{note}"));
+}
+
+/// Notes on wires with a fault, and on the worst of the other faulty `columns`, in so many `lines`.
+fn notes(columns: &[ColumnHealth], faults: &[Found], lines: usize) -> Vec<String> {
+    let mut worst: Vec<&Found> = faults.iter().collect();
+    worst.sort_by_key(|found| std::cmp::Reverse(found.frames)); // stable
+    let note =
+        |found: &&Found| format!("note: {} in {}", found.fault, of_lines(found.frames, lines));
+    let mut notes: Vec<String> = worst.iter().take(MOST_NAMED).map(note).collect();
+    if let Some(more @ 1..) = worst.len().checked_sub(MOST_NAMED) {
+        notes.push(format!("note: and {more} more faults of wires"));
+    }
+    let named = |column: &&ColumnHealth| {
+        let wires = Grid::wires_of_name(&column.column);
+        wires.is_some_and(|(m, k)| faults.iter().any(|found| found.fault.place.holds(m, k)))
+    };
+    let mut worst: Vec<&ColumnHealth> = columns.iter().filter(|column| !named(column)).collect();
+    worst.sort_by_key(|column| std::cmp::Reverse(column.faulty()));
+    notes.extend(worst.iter().take(MOST_NAMED).map(|column| of_column(column, lines)));
+    if let Some(more @ 1..) = worst.len().checked_sub(MOST_NAMED) {
+        notes.push(format!("note: and {more} more columns with faulty readings"));
+    }
+    notes
+}
+
+/// What is wrong with a column: `r4c5_ohm: shorted in 100 % of lines`.
+fn of_column(column: &ColumnHealth, lines: usize) -> String {
+    let kinds = [(column.missing, "missing"), (column.shorted, "shorted"), (column.open, "open")];
+    let parts = kinds.into_iter().filter(|(count, _)| *count > 0);
+    let parts = parts.map(|(count, kind)| format!("{kind} in {}", of_lines(count, lines)));
+    format!("note: {}: {}", column.column, parts.collect::<Vec<_>>().join(", "))
+}
+
+/// So many of all `lines`; never 0 % of some, or 100 % of fewer than all.
+fn of_lines(count: usize, lines: usize) -> String {
+    let percent = 100.0 * count as f64 / lines as f64;
+    match (percent, count) {
+        (..0.1, 1) => "1 line".into(),
+        (..0.1, _) => format!("{count} lines"),
+        (99.9..100.0, _) => format!("{percent:.2} % of lines"),
+        _ => format!("{} % of lines", (percent * 10.0).round() / 10.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use taxel_learn::faults::{Kind, Place, WireFault};
+
+    use super::*;
+
+    fn column(column: &str, [missing, shorted, open]: [usize; 3]) -> ColumnHealth {
+        ColumnHealth { column: column.into(), missing, shorted, open }
+    }
+
+    #[test]
+    fn notes_name_wires_and_the_worst_of_the_other_columns() {
+        let faulty = [column("a", [1, 0, 0]), column("r4c5_ohm", [0, 10_000, 0])];
+        let of_columns =
+            ["note: r4c5_ohm: shorted in 100 % of lines", "note: a: missing in 1 line"];
+        assert_eq!(notes(&faulty, &[], 10_000), of_columns);
+        let fault = WireFault { place: Place::Row(4), kind: Kind::Shorted };
+        let found = notes(&faulty, &[Found { fault, frames: 9995 }], 10_000);
+        assert_eq!(found, ["note: row-wire 4 shorted in 99.95 % of lines", of_columns[1]]);
+        let mixed = of_column(&column("b", [0, 9999, 1]), 10_000);
+        assert_eq!(mixed, "note: b: shorted in 99.99 % of lines, open in 1 line");
+        let many: Vec<ColumnHealth> = (0..9).map(|i| column("c", [0, 0, 1 + i])).collect();
+        let found = notes(&many, &[], 20);
+        assert_eq!((found.len(), found[0].as_str()), (6, "note: c: open in 45 % of lines"));
+        assert_eq!(found[5], "note: and 4 more columns with faulty readings");
+        assert!(notes(&[], &[], 5).is_empty());
+    }
+
+    #[test]
+    fn limits_are_two_numbers_or_none() {
+        let both = limits(" 5, 1e3").unwrap().0.unwrap();
+        assert_eq!((both.shorted_below_ohm, both.open_above_ohm), (5.0, 1000.0));
+        assert!(limits("none").unwrap().0.is_none());
+        for bad in ["5", "5,", "1000,5", "nan,5", "a,b", "5,5", ""] {
+            assert!(limits(bad).is_err(), "{bad}");
+        }
+    }
+}

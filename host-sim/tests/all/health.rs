@@ -1,0 +1,116 @@
+//! Faulty readings in data files: judged as by a device, noted, flagged and filled.
+
+use serde_json::Value;
+
+use crate::common::Folder;
+
+/// Folder with a model of the whole array that fills missing readings, one that does not, and frames.
+fn prepared(name: &str) -> Folder {
+    let folder = Folder::new(name);
+    let train = |file: &'static str, fill: &[&'static str]| {
+        let train = ["train", "press", "-n", "1500", "--centres", "16", "--no-refine"];
+        folder.succeed(&[&train[..], &["--whole-array", "-o", file], fill].concat());
+    };
+    train("fills.bin", &["--fill"]);
+    train("plain.bin", &[]);
+    folder.succeed(&["synth", "press", "-n", "200", "--seed", "5", "-o", "sound.csv"]);
+    folder
+}
+
+/// Writes the sound frames with another value of the readings that `change` names.
+fn changed(folder: &Folder, file: &str, change: impl Fn(&str, usize) -> Option<&'static str>) {
+    let text = std::fs::read_to_string(folder.path("sound.csv")).unwrap();
+    let mut lines = text.lines();
+    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let mut out = vec![header.join(",")];
+    for (number, line) in lines.enumerate() {
+        let fields = line.split(',').zip(&header);
+        let fields: Vec<&str> =
+            fields.map(|(value, name)| change(name, number).unwrap_or(value)).collect();
+        out.push(fields.join(","));
+    }
+    folder.write(file, out.join("\n") + "\n");
+}
+
+/// Values of a column of a CSV file.
+fn column(folder: &Folder, file: &str, name: &str) -> Vec<String> {
+    let text = std::fs::read_to_string(folder.path(file)).unwrap();
+    let mut lines = text.lines();
+    let at = lines.next().unwrap().split(',').position(|one| one == name).unwrap();
+    lines.map(|line| line.split(',').nth(at).unwrap().to_owned()).collect()
+}
+
+/// What a command says on stderr, which must succeed.
+fn notes(folder: &Folder, arguments: &[&str]) -> String {
+    let output = folder.run(arguments);
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{arguments:?}: {stderr}");
+    stderr
+}
+
+#[test]
+fn readings_that_a_device_refuses_are_noted_flagged_and_filled() {
+    let folder = prepared("health");
+    let rmse = |model: &str, data: &str, more: &[&str]| {
+        let text = folder.succeed(&[&["eval", model, data, "--json"], more].concat());
+        let result: Value = serde_json::from_str(&text).unwrap();
+        let groups = result["decoders"][0]["errors"].as_array().unwrap().clone();
+        let z = groups.iter().find(|group| group["group"] == "dz_mm").unwrap();
+        z["rmse"].as_f64().unwrap()
+    };
+    let sound = rmse("fills.bin", "sound.csv", &[]);
+    assert_eq!(sound.to_bits(), rmse("plain.bin", "sound.csv", &[]).to_bits());
+    for (value, kind) in [("0.02", "shorted"), ("1e6", "open"), ("-5", "shorted"), ("", "missing")]
+    {
+        changed(&folder, "faulty.csv", |name, _| (name == "r4c5_ohm").then_some(value));
+        let said = notes(&folder, &["decode", "fills.bin", "faulty.csv", "-o", "e.csv"]);
+        assert!(said.contains(&format!("note: r4c5 {kind} in 100 % of lines")), "{said}");
+        assert!(said.contains("missing readings of 100 % of lines were filled"), "{said}");
+        assert!(column(&folder, "e.csv", "status").iter().all(|flags| flags == "2"));
+        assert!(column(&folder, "e.csv", "r4e1_dz_mm").iter().all(|value| !value.is_empty()));
+        // Believed, such a reading multiplies the error.
+        assert!(rmse("fills.bin", "faulty.csv", &[]) < 1.1 * sound);
+        if !value.is_empty() {
+            assert!(rmse("fills.bin", "faulty.csv", &["--limits", "none"]) > 3.0 * sound);
+        }
+        let said = notes(&folder, &["decode", "plain.bin", "faulty.csv", "-o", "e.csv"]);
+        assert!(said.contains("r4c5") && !said.contains("filled"), "{said}");
+        assert!(column(&folder, "e.csv", "r4e1_dz_mm").iter().all(String::is_empty));
+        let refused = folder.fail(&["eval", "plain.bin", "faulty.csv"], 2);
+        assert!(refused.contains("no line has") && refused.contains("--fill"), "{refused}");
+    }
+    let whole = notes(&folder, &["decode", "fills.bin", "sound.csv", "-o", "e.csv"]);
+    assert_eq!(whole, "");
+    assert!(column(&folder, "e.csv", "status").iter().all(|flags| flags == "0"));
+}
+
+#[test]
+fn wires_are_named_and_columns_can_be_left_out() {
+    let folder = prepared("health_wires");
+    changed(&folder, "open.csv", |name, _| name.starts_with("r4c").then_some("1e9"));
+    let said = notes(&folder, &["decode", "fills.bin", "open.csv", "-o", "e.csv"]);
+    assert!(said.contains("note: row-wire 4 open in 100 % of lines"), "{said}");
+    assert!(!said.contains("r4c1_ohm"), "{said}");
+    let eval = ["eval", "fills.bin", "sound.csv", "--json", "--without"];
+    let text = folder.succeed(&[&eval[..], &["r4c*_ohm"]].concat());
+    let result: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(result["health"]["readings_filled"], 18 * 200);
+    assert_eq!(result["values_evaluated"], 144 * 200);
+    let refused = folder.fail(&[&eval[..], &["r9c*_ohm"]].concat(), 2);
+    assert!(refused.contains("--without r9c*_ohm"), "{refused}");
+    let refused =
+        folder.fail(&["decode", "fills.bin", "sound.csv", "--limits", "9", "-o", "e.csv"], 2);
+    assert!(refused.contains("such as 5,1000"), "{refused}");
+}
+
+#[test]
+fn readings_far_beyond_the_training_range_are_flagged() {
+    let folder = prepared("health_clamped");
+    changed(&folder, "far.csv", |name, line| {
+        (name.ends_with("_ohm") && line % 2 == 1).then_some("30")
+    });
+    let said = notes(&folder, &["decode", "plain.bin", "far.csv", "-o", "e.csv"]);
+    assert!(said.contains("readings-out-of-range"), "{said}");
+    let status = column(&folder, "e.csv", "status");
+    assert!(status.iter().enumerate().all(|(line, it)| *it == ["0", "64"][line % 2]), "{status:?}");
+}

@@ -1,0 +1,97 @@
+//! Fill of missing readings, in a blob and behind a decoder.
+
+mod common;
+
+use common::{seal, worked_bytes};
+use model_core::blob::{DecodeError, Metadata, Model, ModelParts, ModelShape, encode_to_vec};
+use model_core::fill::Fill;
+use model_core::rbf::{NetworkError, Shape, direct};
+use model_core::{AlignedBytes, Decoder, RowStatus};
+
+const SHAPE: ModelShape = ModelShape { rows: 2, inputs: 2, outputs: 1 };
+
+/// m, s and V of four readings that move together.
+const BLOCK: [[f32; 4]; 3] = [[60.0, 61.0, 62.0, 63.0], [10.0; 4], [0.49; 4]];
+
+fn blob(fill: Option<Fill<'_>>, relative_inputs: bool) -> Result<AlignedBytes, DecodeError> {
+    let network = direct::Network::try_new(
+        Shape { inputs: 2, centres: 1, outputs: 1 },
+        direct::Parameters {
+            input_minimum: &[50.0, 50.0],
+            input_per_span: &[0.05, 0.05],
+            centres: &[0.5, 0.5],
+            decay: &[2.0],
+            output_weights: &[0.5],
+            bias: &[0.25],
+            affine: &[],
+        },
+    );
+    let parts = ModelParts {
+        projection: None,
+        expansion: None,
+        confidence: None,
+        fill,
+        networks: &[network.unwrap().into()],
+        row_network: &[0, 0],
+        metadata: Metadata { relative_inputs, ..Metadata::unnamed(SHAPE) },
+    };
+    encode_to_vec(&parts).map_err(|error| match error {
+        model_core::blob::EncodeError::Refused(cause) => cause,
+        other => panic!("{other}"),
+    })
+}
+
+fn fill() -> Fill<'static> {
+    Fill::new(4, 1, BLOCK.as_flattened()).unwrap()
+}
+
+#[test]
+fn a_blob_keeps_its_fill_and_a_model_without_has_none() {
+    let filled = blob(Some(fill()), false).unwrap();
+    let model = Model::decode(&filled).unwrap();
+    assert_eq!(model.fill(), Some(fill()));
+    let plain = blob(None, false).unwrap();
+    assert_eq!(Model::decode(&plain).unwrap().fill(), None);
+    // The specification's bytes, whose offsets count from a multiple of four.
+    let worked = worked_bytes("worked fill");
+    let at = (0..filled.len()).find(|at| filled[*at..].starts_with(&[9, 1])).unwrap();
+    let floats = at + 4 + usize::from(filled[at + 2]);
+    assert_eq!(filled[floats..][..48], worked[worked.len() - 48..]);
+    assert_eq!((worked[..2].to_vec(), worked[worked.len() - 49]), (vec![9, 1], 48));
+}
+
+#[test]
+fn a_decoder_fills_what_is_missing_and_then_decodes_it() {
+    let bytes = blob(Some(fill()), false).unwrap();
+    let decoder = Decoder::<2>::load(&bytes).unwrap();
+    let whole = [61.0, 62.0, 63.0, 64.0];
+    let mut frame = [61.0, f32::NAN, 63.0, 64.0];
+    let status = decoder.decode(&frame[..]).unwrap().status;
+    assert_eq!(status, [RowStatus::MissingReading, RowStatus::Decoded]);
+    let mut scratch = vec![0.0; decoder.scratch_floats()];
+    assert_eq!(decoder.fill(&mut frame, &mut scratch), 1);
+    assert!((frame[1] - whole[1]).abs() < 0.1, "{frame:?}");
+    let (found, expected) =
+        (decoder.decode(&frame[..]).unwrap(), decoder.decode(&whole[..]).unwrap());
+    assert_eq!(found.status, [RowStatus::Decoded; 2]);
+    assert!((found.outputs[0] - expected.outputs[0]).abs() < 0.01);
+    assert_eq!(found.outputs[1].to_bits(), expected.outputs[1].to_bits());
+    let plain = blob(None, false).unwrap();
+    let mut frame = [61.0, f32::NAN, 63.0, 64.0];
+    assert_eq!(Decoder::<2>::load(&plain).unwrap().fill(&mut frame, &mut scratch), 0);
+}
+
+#[test]
+fn unsound_fills_are_refused() {
+    let relative = DecodeError::Malformed { section: "fill of relative inputs" };
+    assert_eq!(blob(Some(fill()), true), Err(relative));
+    let other = Fill::new(3, 1, &[0.5; 9]).unwrap();
+    let count = DecodeError::CountMismatch { what: "bytes of fill", expected: 48, found: 36 };
+    assert_eq!(blob(Some(other), false), Err(count));
+    let mut bytes = blob(Some(fill()), false).unwrap();
+    let at = (0..bytes.len() - 4).rev().find(|at| bytes[*at..][..4] == 0.49_f32.to_le_bytes());
+    bytes[at.unwrap()..][..4].copy_from_slice(&1.5_f32.to_le_bytes());
+    seal(&mut bytes);
+    let cause = NetworkError::NotPositive { what: "fill" };
+    assert_eq!(Model::decode(&bytes).map(drop), Err(DecodeError::Fill { cause }));
+}
