@@ -194,7 +194,7 @@ fn training_that_takes_more_memory_than_is_allowed_is_refused_before_it_is_taken
     let options = Options { centres: 10, ..Options::default() };
     let refused = train(&wide, &options, &Silent).unwrap_err().to_string();
     assert!(
-        refused.starts_with("memory = about 12.8 GB: training may take at most 8.0 GB"),
+        refused.starts_with("memory = about 12.9 GB: training may take at most 8.0 GB"),
         "{refused}"
     );
     // More may be allowed; and without an affine tail only the linear baseline is as wide.
