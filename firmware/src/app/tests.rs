@@ -15,6 +15,7 @@ struct Board {
     now_us: u32,
     sent: Vec<u8>,
     nothing: Nothing,
+    key: Blank,
 }
 
 #[derive(Default)]
@@ -48,6 +49,7 @@ impl Port for Board {
 
 impl Platform for Board {
     type Settings = Nothing;
+    type KeyArea = Blank;
 
     const BOARD: &'static str = "test";
 
@@ -59,6 +61,10 @@ impl Platform for Board {
 
     fn settings(&mut self) -> &mut Nothing {
         &mut self.nothing
+    }
+
+    fn key_area(&mut self) -> &mut Blank {
+        &mut self.key
     }
 }
 
@@ -80,6 +86,7 @@ impl FrameSource for Sensor {
     }
 }
 
+#[derive(Default)]
 struct Blank;
 
 impl Slot for Blank {

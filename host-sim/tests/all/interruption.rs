@@ -254,7 +254,8 @@ fn with_a_key_a_device_takes_models_that_are_sealed_with_it_and_no_older_ones() 
     let rig = Rig::new("sealed", old.bytes());
     rig.folder.write("old.bin", old.bytes());
     rig.folder.write("new.bin", new.bytes());
-    let digits = |first: u8| (0..32).map(|i| format!("{:02x}", first + i)).collect::<String>();
+    let digits =
+        |first: u8| (0..32).map(|i| format!("{:02x}", first + i)).collect::<Vec<_>>().concat();
     rig.folder.write("device.key", digits(3));
     rig.folder.write("other.key", digits(7));
     rig.folder.write("short.key", "0123");

@@ -154,7 +154,6 @@ fn settings() -> Vec<Vec<u8>> {
     for request in [configure(other), Request::Keep(Setting::Configuration)] {
         ask(&mut session, &board, &request, |_| ());
     }
-    drop(session);
     let bytes = kept.read_owned(Setting::Configuration).unwrap_or_default();
     seeds.push([&[1], &bytes[..]].concat());
     let [page, _] = kept.bytes();

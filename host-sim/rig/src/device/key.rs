@@ -99,7 +99,7 @@ mod tests {
     #[test]
     fn a_key_is_bytes_or_digits() {
         let bytes: Vec<u8> = (0..32).collect();
-        let digits: String = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
+        let digits = bytes.iter().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().concat();
         let key = Sealing::key(&bytes).unwrap();
         assert_eq!(key.to_vec(), bytes);
         assert_eq!(Sealing::key(format!("{digits}\n").as_bytes()).unwrap(), key);
