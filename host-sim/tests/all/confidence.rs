@@ -70,10 +70,14 @@ fn deviations_and_novelty_are_written_beside_the_outputs() {
     let read = |name: &str| std::fs::read_to_string(folder.path(name)).unwrap();
     let (plain, with) = (read("plain.csv"), read("with.csv"));
     let header: Vec<&str> = with.lines().next().unwrap().split(',').collect();
-    assert_eq!(header.len(), 36 + 36 + 1);
-    assert_eq!((header[36], header[72]), ("r4e1_dx_mm_deviation", "novelty_nats"));
+    assert_eq!(header.len(), 36 + 36 + 1 + 1);
+    assert_eq!(
+        (header[36], header[72], header[73]),
+        ("r4e1_dx_mm_deviation", "novelty_nats", "status")
+    );
     for (plain, with) in plain.lines().zip(with.lines()) {
-        assert!(with.starts_with(plain));
+        let (outputs, status) = plain.rsplit_once(',').unwrap();
+        assert!(with.starts_with(&format!("{outputs},")) && with.ends_with(&format!(",{status}")));
         let last = with.split(',').skip(36);
         assert!(with == header.join(",") || last.clone().all(|value| value.parse::<f64>().is_ok()));
     }

@@ -196,5 +196,6 @@ fn a_user_trains_on_a_csv_file_and_decodes_a_drifted_sensor_with_its_own_baselin
     assert!(page.contains("1500 of them miss a reading"), "{page}");
     let estimate = std::fs::read_to_string(folder.path("e.csv")).unwrap();
     let empty = estimate.lines().nth(1).unwrap().split(',').map(str::is_empty);
-    assert_eq!(empty.collect::<Vec<_>>(), [[true; 18], [false; 18]].concat());
+    let [first_row, second_row] = [vec![true; 18], vec![false; 18]];
+    assert_eq!(empty.collect::<Vec<_>>(), [first_row, second_row, vec![false]].concat()); // and the status
 }

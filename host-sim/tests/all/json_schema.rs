@@ -149,7 +149,11 @@ fn damaged_documents_are_refused() {
     let schema = schema();
     let sound = json!({
         "version": "0.1.0", "command": "decode", "seconds": 0.5, "model_crc": "0123abcd", "frames": 3,
-        "frames_with_missing_readings": 0, "frames_novel": null, "exponential": "libm", "file": "e.csv"
+        "frames_with_missing_readings": 0, "frames_novel": null, "exponential": "libm", "file": "e.csv", "frames_clamped": 0,
+        "health": {
+            "readings_missing": 0, "readings_shorted": 0, "readings_open": 0, "readings_filled": 0, "frames_filled": 0,
+            "columns": [], "faults": []
+        }
     });
     assert_eq!(schema.faults(&sound), [""; 0]);
     for (key, value) in [

@@ -85,7 +85,7 @@ fn columns_with_any_names_train_one_network() {
     assert!(chosen["outputs"][0]["training_rmse"].as_f64().unwrap() < 0.01, "{chosen}");
     folder.succeed(&["decode", "m.bin", "d.csv", "-o", "e.csv"]);
     let estimate = std::fs::read_to_string(folder.path("e.csv")).unwrap();
-    assert!(estimate.starts_with("load_n\n"));
+    assert!(estimate.starts_with("load_n,status\n"));
 }
 
 #[test]
@@ -109,7 +109,7 @@ fn missing_readings_leave_their_rows_outputs_empty_and_no_line_out() {
     assert_eq!(lines.len(), 4);
     assert!(lines[1].iter().all(|empty| !empty));
     for holed in &lines[2..] {
-        let (row_4, row_5) = holed.split_at(18);
+        let (row_4, row_5) = (&holed[..18], &holed[18..36]); // and the status
         assert!(row_4.iter().all(|empty| !empty) && row_5.iter().all(|empty| *empty));
     }
 }
