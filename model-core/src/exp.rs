@@ -7,8 +7,8 @@
 /// An exponential of non-positive numbers.
 ///
 /// The activation's argument −‖x − c‖²/(2σ²) is never positive, so no other argument is needed. The results for
-/// positive numbers and for NaN are not defined, but none panics ([`Decoder`](crate::Decoder) marks rows with NaN
-/// readings instead).
+/// positive numbers and for NaN are not defined ([`Decoder`](crate::Decoder) marks rows with NaN readings instead).
+/// None panics there, but for an assertion of micromath's own above 88 in debug builds.
 pub trait ExpKernel: Copy + Default {
     /// Name of the exponential, as users choose it.
     const NAME: &'static str;
@@ -157,9 +157,9 @@ mod tests {
     }
 
     #[test]
-    fn no_argument_panics() {
+    fn libm_and_the_polynomials_panic_for_no_argument() {
         for x in [f32::NAN, f32::INFINITY, f32::MAX, 1e10, 89.0] {
-            let results = [Libm::exp(x), Micromath::exp(x), Polynomial::exp(x), exp2(x)];
+            let results = [Libm::exp(x), Polynomial::exp(x), exp2(x)];
             assert!(results[0].is_nan() || results[0].is_infinite() || x < 90.0, "{results:?}");
         }
     }

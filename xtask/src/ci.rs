@@ -68,7 +68,14 @@ fn last(this: &Path) -> Vec<Step> {
     let mut mutants = Command::new(this);
     mutants.args(["board", "--mutants"]).args(MUTANTS).current_dir(root());
     let mutants = Step { name: "mutants", command: mutants };
-    vec![own("emulate", this), own("board", this), mutants]
+    let torture = |name, options: &[&str]| {
+        let mut command = Command::new(this);
+        command.arg("torture").args(options).current_dir(root());
+        Step { name, command }
+    };
+    let kept = torture("torture", &["--short"]);
+    let planted = torture("self-test", &["--self-test"]);
+    vec![own("emulate", this), own("board", this), mutants, kept, planted]
 }
 
 /// A step that is a command of this program, of which `this` is a copy.

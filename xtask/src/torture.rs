@@ -14,6 +14,6 @@ pub fn run(options: &[&str]) -> Outcome {
         qemu::present()?;
         build_image(&Toolchain::find()?, QEMU)?;
     }
-    torture.arg("--images").arg(elf("").parent().unwrap_or(&target_dir()));
+    torture.arg("--images").arg(elf(""));
     run_command(&mut torture)
 }

@@ -44,7 +44,7 @@ pub const MONOTONE: Promise = Promise {
 
 pub const ANY_NUMBER: Promise = Promise {
     name: "exp-any-number",
-    text: "no f32 makes an exponential panic, none up to 0 gives NaN",
+    text: "no f32 makes an exponential panic; up to 0 none gives NaN",
     share: 1,
     check: any_number,
 };
@@ -143,7 +143,8 @@ fn any_number(effort: &Effort, _: &Tools) -> Result<Found, String> {
     Ok(sweep(effort, FEWER, (0.0, "faults"), &[[0, u32::MAX]], |x| {
         // Planted: a product that is 0·∞ for large numbers.
         let polynomial = Polynomial::exp(x) + if planted { x * x * 0.0 } else { 0.0 };
-        let results = [polynomial, Libm::exp(x), Micromath::exp(x)];
+        // micromath asserts, in debug builds, that its argument is no larger than it is for.
+        let results = [polynomial, Libm::exp(x), Micromath::exp(x.min(0.0))];
         std::hint::black_box(exp2(x));
         if x <= 0.0 {
             let bad = results.into_iter().find(|y| !(0.0..=1.0).contains(y));

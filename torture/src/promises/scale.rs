@@ -135,7 +135,8 @@ pub fn run(
     }
     let decoded = command(program, folder, &["decode", "m.bin", "d.csv", "-o", "e.csv"])?;
     let estimates = fs::read_to_string(folder.join("e.csv")).unwrap_or_default();
-    let numbers = estimates.lines().skip(1).filter_map(|line| line.parse::<f64>().ok());
+    let first = |line: &str| line.split(',').next().and_then(|value| value.parse::<f64>().ok());
+    let numbers = estimates.lines().skip(1).filter_map(first);
     if !decoded.status.success() || numbers.filter(|y| y.is_finite()).count() != LINES {
         return Err("decode gives no number for every line".into());
     }
