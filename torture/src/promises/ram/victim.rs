@@ -24,6 +24,8 @@ pub enum Harm {
     Fault,
     /// The device stands still, and its watchdog is not fed.
     Watchdog,
+    /// Estimates are wrong until the check in the background finds the damage, and mends it.
+    Mended,
     /// Estimates are wrong, and nothing tells.
     Silent,
     /// The device answers no more, although its watchdog is fed.
@@ -32,8 +34,15 @@ pub enum Harm {
 
 impl Harm {
     /// Every kind.
-    pub const ALL: [Self; 6] =
-        [Self::None, Self::Told, Self::Fault, Self::Watchdog, Self::Silent, Self::ForGood];
+    pub const ALL: [Self; 7] = [
+        Self::None,
+        Self::Told,
+        Self::Fault,
+        Self::Watchdog,
+        Self::Mended,
+        Self::Silent,
+        Self::ForGood,
+    ];
 }
 
 /// Bytes of a slot of the emulator's image.
@@ -44,6 +53,8 @@ const ROWS: usize = 8;
 const FRAMES: usize = 24;
 /// Longest time that an answer takes.
 const ANSWER: Duration = Duration::from_millis(200);
+/// Longest time that the check in the background takes for two passes.
+const TWO_PASSES: Duration = Duration::from_secs(2);
 /// Register with the count of the watchdog, which falls until it is fed.
 const WATCHDOG: u32 = 0x4000_8004;
 
@@ -130,7 +141,7 @@ impl Victim {
             running.gdb.run().map_err(|cause| failed(&cause))?;
         }
         let harm = self.look(&mut running, planted);
-        if matches!(harm, Harm::None | Harm::Silent | Harm::Told) {
+        if matches!(harm, Harm::None | Harm::Mended | Harm::Silent | Harm::Told) {
             self.running = Some(running); // else QEMU may have ended, or stand still
         }
         Ok(harm)
@@ -189,6 +200,9 @@ impl Victim {
                 }
             }
         }
+        if worst == Harm::Silent && self.is_mended(running) {
+            worst = Harm::Mended;
+        }
         match running.device.identify() {
             Ok(identity) if identity.has_in_force(self.crc_32) => worst,
             Ok(_) => Harm::Told,
@@ -196,6 +210,22 @@ impl Victim {
             Err(_) if is_fed(&mut running.gdb) => Harm::ForGood,
             Err(_) => Harm::Watchdog,
         }
+    }
+
+    /// Whether the check in the background finds damage within two passes, and all estimates are right again.
+    fn is_mended(&self, running: &mut Running) -> bool {
+        let Ok(before) = running.device.statistics() else { return false };
+        let start = Instant::now();
+        loop {
+            match running.device.statistics() {
+                Ok(now) if now.model_damages > 0 => break,
+                Ok(now)
+                    if now.model_checks < before.model_checks.saturating_add(2)
+                        && start.elapsed() < TWO_PASSES => {}
+                _ => return false,
+            }
+        }
+        self.cases.iter().all(|case| decoded(&mut running.device, case) == Ok(Harm::None))
     }
 }
 
