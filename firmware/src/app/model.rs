@@ -19,16 +19,19 @@ pub struct InForce<'a, const ROWS: usize> {
 impl<'a, const ROWS: usize> InForce<'a, ROWS> {
     pub const NONE: Self = Self { decoder: None, identity: None, blob: &[] };
 
-    /// The model in `bytes`, which start with its blob; `None` if it is not sound, or there is no room for it.
+    /// Puts the model in `bytes` in force, which start with its blob; `None` if it is not sound, or there is no room
+    /// for it.
+    // In place: a model that is returned is on the stack several times.
     pub fn load(
+        &mut self,
         capacity: Capacity,
         bytes: &'a [u8],
         Candidate { slot, generation, on_trial }: Candidate,
         in_ram: bool,
-    ) -> Option<Self> {
+    ) -> Option<()> {
         let blob = blob_in_slot(bytes);
         let model = check(capacity, blob).ok()?;
-        let decoder = Decoder::of(model).ok()?;
+        let decoder = self.decoder.insert(Decoder::of(model).ok()?);
         let (shape, metadata) = (decoder.shape(), decoder.metadata());
         let identity = ModelIdentity {
             crc_32: decoder.model_crc(),
@@ -44,7 +47,8 @@ impl<'a, const ROWS: usize> InForce<'a, ROWS> {
             on_trial,
             version: None,
         };
-        Some(Self { decoder: Some(decoder), identity: Some(identity), blob })
+        (self.identity, self.blob) = (Some(identity), blob);
+        Some(())
     }
 
     /// Name of the model's scene or data set, cut after [`MOST_NAME_BYTES`].

@@ -52,15 +52,17 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
         let bytes = best.and_then(|best| slots.get(best.slot)).map_or(&[][..], S::bytes);
         let (room, left) =
             if app.core.begins.is_some() { (None, weights) } else { cut_room(weights, bytes) };
-        let copied =
-            best.and_then(|best| InForce::load(capacity, copy_to(room?, bytes)?, best, true));
+        let mut model = InForce::NONE;
+        let copied = best.and_then(|best| model.load(capacity, copy_to(room?, bytes)?, best, true));
         let chosen = if copied.is_some() { best } else { choose(capacity, slots, candidates) };
         app.core.end_trial_unless(chosen.is_some_and(|chosen| chosen.on_trial));
         let slot = chosen.map(|chosen| chosen.slot);
         let [first, second] = slots;
         let (active, spare) = if slot == Some(1) { (&*second, first) } else { (&*first, second) };
-        let in_place = |chosen| InForce::load(capacity, active.bytes(), chosen, false);
-        let mut model = copied.or_else(|| chosen.and_then(in_place)).unwrap_or(InForce::NONE);
+        if let (None, Some(chosen)) = (copied, chosen) {
+            // Without a model if that fails.
+            let _ = model.load(capacity, active.bytes(), chosen, false);
+        }
         if let Some(identity) = &mut model.identity {
             let seal = app.core.guard.seal_of(identity.slot.into());
             identity.version = seal.map(|seal| seal.version);

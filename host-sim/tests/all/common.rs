@@ -8,6 +8,25 @@ use host_sim::experiment::Experiment;
 /// Folder that is removed after the test.
 pub struct Folder(PathBuf);
 
+/// Path of the program.
+const PROGRAM: &str = env!("CARGO_BIN_EXE_host-sim");
+
+/// The program as a terminal starts it: signals end it, even if whoever runs the tests ignores some, as behind a
+/// script's `&`.
+pub fn program() -> Command {
+    // Bits of SIGHUP, SIGINT and SIGTERM, by Linux's description of the file.
+    const ENDING: u64 = 1 | 1 << 1 | 1 << 14;
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let ignored = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    if ignored.unwrap_or(0) & ENDING == 0 {
+        return Command::new(PROGRAM);
+    }
+    let mut command = Command::new("env");
+    command.args(["--default-signal=HUP,INT,TERM", PROGRAM]);
+    command
+}
+
 impl Folder {
     pub fn new(name: &str) -> Self {
         let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
@@ -41,7 +60,7 @@ impl Folder {
     }
 
     pub fn run_with_threads(&self, arguments: &[&str], threads: usize) -> Output {
-        Command::new(env!("CARGO_BIN_EXE_host-sim"))
+        Command::new(PROGRAM)
             .args(arguments)
             .current_dir(&self.0)
             .env("RAYON_NUM_THREADS", threads.to_string())

@@ -4,7 +4,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use crate::common::{Folder, shell_status};
+use crate::common::{Folder, program, shell_status};
 use crate::device::{frames, model};
 use crate::virtual_device;
 use firmware::link::message::{Configuration, Identity, KeyState, Memory, Report, Request};
@@ -116,7 +116,7 @@ impl Rig {
         let lease = format!("--lease-ms={}", self.lease.as_millis());
         {
             let mut trap = self.trap.lock().unwrap();
-            let host = Command::new(env!("CARGO_BIN_EXE_host-sim"))
+            let host = program()
                 .args(["link", &lease, &self.port])
                 .args(arguments)
                 .current_dir(self.folder.path("."))

@@ -6,11 +6,11 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::common::{Folder, shell_status, small_scene};
+use crate::common::{Folder, program, shell_status, small_scene};
 
 /// The program, with the folder of its work.
 fn host(folder: &Folder, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_host-sim"));
+    let mut command = program();
     command
         .args(arguments)
         .current_dir(folder.path("."))

@@ -86,7 +86,10 @@ pub const MUTANTS: &[Mutant] = &[
     mutant(
         "not-fed-before-erase",
         "firmware/src/app/answer.rs",
-        Instead("platform.feed_watchdog();", "_ = platform;"),
+        Instead(
+            "feed_watchdog();\n                    *erases",
+            "now_us();\n                    *erases",
+        ),
         ["slow-erase-bare", "resets by: watchdog"],
     ),
     mutant(
