@@ -8,51 +8,17 @@ use firmware::link::message::{
 use firmware::seal::{Key, Seal};
 use firmware::store::{MOST_RECORDS, Slot};
 use mock_board::*;
-use model_core::blob::{Floats, Metadata, ModelParts, ModelShape, encode_to_vec};
+use model_core::blob::Floats;
 use model_core::checksum::CRC_32;
-use model_core::rbf::Shape;
-use model_core::rbf::direct::{Network, Parameters};
 use model_core::recalibration::Recalibration;
 use model_core::{AlignedBytes, Decoder};
 
 const ALL: usize = ROWS * OUTPUTS;
-/// Training error of every output.
-const ERROR: f32 = 0.02;
 /// How far the sensor's readings have moved since training, in Ω.
 const SHIFTS: TestFrame = [[4.0, -3.0, 5.0], [-6.0, 2.0, 3.0]];
 
-/// A model of readings from 50 Ω to 70 Ω, with a network for each row.
 fn trained() -> AlignedBytes {
-    let number = |i: usize| ((i * 37) % 101) as f32 / 50.0 - 1.0;
-    let list = |from: usize, count: usize| (from..from + count).map(number).collect::<Vec<_>>();
-    let [centres, weights, affine] = [list(60, 12), list(20, 8), list(40, 6)];
-    let network = |bias: &'static [f32; OUTPUTS]| {
-        let parameters = Parameters {
-            input_minimum: &[50.0; COLS],
-            input_per_span: &[0.05; COLS],
-            centres: &centres,
-            decay: &[0.5],
-            output_weights: &weights,
-            bias,
-            affine: &affine,
-        };
-        let shape = Shape { inputs: COLS, centres: 4, outputs: OUTPUTS };
-        Network::try_new(shape, parameters).unwrap().into()
-    };
-    let shape = ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS };
-    let errors = [ERROR; ALL];
-    let metadata = Metadata { training_rmse: Floats::of(&errors), ..Metadata::unnamed(shape) };
-    let networks = &[network(&[0.5, -0.5]), network(&[1.0, 2.0])];
-    encode_to_vec(&ModelParts {
-        projection: None,
-        expansion: None,
-        confidence: None,
-        fill: None,
-        networks,
-        row_network: &[0, 1],
-        metadata,
-    })
-    .unwrap()
+    blob_to_recalibrate(4)
 }
 
 /// What the sensor read in training for press number `i`.
@@ -218,7 +184,7 @@ fn presses_bring_a_changed_sensor_back_and_the_previous_model_can_be_had_again()
     let board = bench.board.clone();
     let crc_32 = {
         let mut session = Session::start(&mut bench.app, &mut slots, &mut memory);
-        assert!(largest_error(&mut session, &board) > 10.0 * ERROR);
+        assert!(largest_error(&mut session, &board) > 10.0 * TRAINING_ERROR);
         add_presses(&mut session, &board, 100);
         let progress = step(&mut session, &board, RecalibrationStep::Status).0.unwrap();
         assert_eq!((progress.networks, progress.excited), (2, 2));
@@ -232,7 +198,7 @@ fn presses_bring_a_changed_sensor_back_and_the_previous_model_can_be_had_again()
     };
     let mut session = Session::start(&mut bench.app, &mut slots, &mut memory);
     assert_eq!(model_crc(&mut session, &board), Some(crc_32));
-    assert!(largest_error(&mut session, &board) < ERROR);
+    assert!(largest_error(&mut session, &board) < TRAINING_ERROR);
     // The answer to the commit was lost: the same again changes nothing.
     let (again, leave) = step(&mut session, &board, RecalibrationStep::Commit);
     assert_eq!(again.unwrap().state, RecalibrationState::InForce { crc_32 });

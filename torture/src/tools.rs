@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 /// Programs built by `cargo xtask torture`.
-#[allow(dead_code)]
 #[derive(Debug)]
 pub struct Tools {
     /// Program of host-sim.
@@ -17,7 +16,6 @@ impl Tools {
     ///
     /// # Errors
     /// It was not given.
-    #[allow(dead_code)]
     pub fn program(&self) -> Result<&Path, String> {
         self.program.as_deref().ok_or_else(|| missing("host-sim"))
     }

@@ -155,7 +155,7 @@ impl Emulator {
     /// Starts QEMU with further `arguments`, and connects to the image's serial lines.
     ///
     /// # Errors
-    /// Those of [`start`](Self::start).
+    /// The same errors as [`start`](Self::start).
     pub fn start_with(options: &Options, arguments: &[&str]) -> Result<(Self, Lines)> {
         options.check()?;
         let failed = |cause| Error::NoStart { qemu: options.qemu.clone(), cause };

@@ -1,51 +1,21 @@
 //! A model that can be recalibrated, and presses to do so.
 
 use firmware::link::message::{RecalibrationStep, Report, Request};
-use mock_board::{Board, COLS, OUTPUTS, ROWS, ask};
-use model_core::blob::{Floats, Metadata, ModelParts, ModelShape, encode_to_vec};
-use model_core::rbf::Shape;
-use model_core::rbf::direct::{Network, Parameters};
+use mock_board::{Board, COLS, ROWS, ask, blob_to_recalibrate};
+use model_core::blob::Floats;
 use model_core::{AlignedBytes, Decoder};
 
 use super::device::{Device, Outcome, Running, recalibration_step};
 
 const READINGS: usize = ROWS * COLS;
-const ALL: usize = ROWS * OUTPUTS;
 /// Number of presses of a recalibration.
 const PRESSES: usize = 12;
 /// How far readings have moved since training, in Ω.
 const SHIFTS: [f32; READINGS] = [4.0, -3.0, 5.0, -6.0, 2.0, 3.0];
 
-/// A model with a network for each row, whose training errors are known.
+/// A model that can be recalibrated.
 pub fn model() -> AlignedBytes {
-    let number = |i: usize| ((i * 37) % 101) as f32 / 50.0 - 1.0;
-    let list = |from: usize, count: usize| (from..from + count).map(number).collect::<Vec<_>>();
-    let [centres, weights, affine] = [list(60, 2 * COLS), list(20, 2 * OUTPUTS), list(40, 6)];
-    let shape = Shape { inputs: COLS, centres: 2, outputs: OUTPUTS };
-    let network = |bias: &'static [f32; OUTPUTS]| {
-        let parameters = Parameters {
-            input_minimum: &[50.0; COLS],
-            input_per_span: &[0.05; COLS],
-            centres: &centres,
-            decay: &[0.5],
-            output_weights: &weights,
-            bias,
-            affine: &affine,
-        };
-        Network::try_new(shape, parameters).expect("a network").into()
-    };
-    let errors = [0.02; ALL];
-    let shape = ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS };
-    encode_to_vec(&ModelParts {
-        projection: None,
-        expansion: None,
-        confidence: None,
-        fill: None,
-        networks: &[network(&[0.5, -0.5]), network(&[1.0, 2.0])],
-        row_network: &[0, 1],
-        metadata: Metadata { training_rmse: Floats::of(&errors), ..Metadata::unnamed(shape) },
-    })
-    .expect("a blob")
+    blob_to_recalibrate(2)
 }
 
 /// What the sensor read in training for press number `i`, in Ω.
