@@ -24,6 +24,7 @@ mod leave;
 mod model;
 mod kept;
 mod guard;
+mod settle;
 mod recalibrate;
 mod recheck;
 mod trial;

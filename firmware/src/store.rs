@@ -7,7 +7,7 @@
 //! With a key on the device, a seal stands behind the blob ([`DeviceKey`], [`Seal`]).
 //!
 //! To put the previous model in force again, another record with a higher generation is written before those of its
-//! slot ([`reinstate`]).
+//! slot ([`reinstate`]). Every start makes firm which model is in force ([`unsettled`]).
 
 use model_core::blob::Model;
 use model_core::checksum::CRC_32;
@@ -15,9 +15,11 @@ use model_core::checksum::CRC_32;
 use crate::seal::Seal;
 
 mod key;
+mod settle;
 mod upload;
 
 pub use key::DeviceKey;
+pub use settle::unsettled;
 pub use upload::Upload;
 
 /// Error of a flash that could not be erased or written.
@@ -115,9 +117,9 @@ fn record(generation: u32, blob_crc: u32) -> [u8; RECORD_BYTES] {
     record
 }
 
-/// Number of records that a slot has room for behind its blob, at most: the first, and one for each time that its model
-/// comes into force again.
-pub const MOST_RECORDS: usize = 8;
+/// Number of records that a slot has room for behind its blob, at most: two for each time that its model comes into
+/// force.
+pub const MOST_RECORDS: usize = 16;
 
 /// Places of the records in a slot, if its blob leaves room for them: the first is at the end.
 fn record_places(slot: &[u8]) -> impl Iterator<Item = usize> {

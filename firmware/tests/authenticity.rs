@@ -206,6 +206,9 @@ fn a_model_whose_seal_decays_or_is_written_by_a_debugger_is_not_in_force() {
 #[test]
 fn a_cut_at_any_word_of_a_sealed_upload_leaves_the_old_or_the_new_model() {
     let second = blob(2, 4);
+    // Erase, blob, mark and rest of the record, seal; then the second record.
+    let words = MockSlot::BYTES / 4 + second.len().div_ceil(4) + 4 + 10;
+    let [old, new] = [(crc_of(&blob(1, 3)), 5), (crc_of(&second), 6)];
     let mut cuts = 0;
     for operations in 0.. {
         let mut device = Device::new();
@@ -213,14 +216,15 @@ fn a_cut_at_any_word_of_a_sealed_upload_leaves_the_old_or_the_new_model() {
         let outcome = device.install(&second, Some(Seal::of(&KEY, 6, &second)));
         let cut = device.slots[0].power_on();
         let (model, _, highest) = device.identity();
+        let is_new = operations >= words;
+        let (crc_32, version) = if is_new { new } else { old };
+        let expected = if is_new { Ok(confirmed(&second)) } else { Err(Refusal::Flash) };
+        assert_eq!(outcome, expected, "{operations}");
+        assert_eq!((model, highest), (Some((crc_32, Some(version))), Some(version)));
         if !cut {
-            assert_eq!((model, highest), (Some((crc_of(&second), Some(6))), Some(6)));
             break;
         }
-        assert_eq!(outcome, Err(Refusal::Flash), "{operations}");
-        assert_eq!((model, highest), (Some((crc_of(&blob(1, 3)), Some(5))), Some(5)));
         cuts += 1;
     }
-    // Erase, blob, mark and rest of the record, seal.
-    assert_eq!(cuts, MockSlot::BYTES / 4 + second.len().div_ceil(4) + 4 + 10);
+    assert_eq!(cuts, words + 4);
 }

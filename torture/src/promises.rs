@@ -15,7 +15,7 @@ mod sensor;
 
 mod flips;
 mod power;
-mod ram;
+mod emulated;
 mod authenticity;
 mod load;
 
@@ -36,6 +36,7 @@ pub const PROMISES: &[Promise] = &[
     exponentials::ANY_NUMBER,
     inference::F32,
     inference::FIXED16,
+    emulated::EXTREMES,
     training::EXTREMES,
     scale::SCALE,
     least_squares::RESIDUAL,
@@ -54,7 +55,7 @@ pub const PROMISES: &[Promise] = &[
     power::SETTINGS,
     power::DECAY,
     power::WORN,
-    ram::RAM,
+    emulated::RAM,
     authenticity::FORGED,
     load::FRAMES,
     load::LINK,

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use model_core::AlignedBytes;
+
 /// Programs built by `cargo xtask torture`.
 #[derive(Debug)]
 pub struct Tools {
@@ -28,6 +30,16 @@ impl Tools {
         let images = self.images.as_ref().ok_or_else(|| missing(name))?;
         Ok(images.join(name))
     }
+}
+
+/// The model `name` in the folder `testdata`.
+///
+/// # Errors
+/// It cannot be read.
+pub fn tested_model(name: &str) -> Result<AlignedBytes, String> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../testdata").join(name);
+    let blob = std::fs::read(&path).map_err(|cause| format!("{}: {cause}", path.display()))?;
+    Ok(AlignedBytes::copy_of(&blob))
 }
 
 fn missing(name: &str) -> String {

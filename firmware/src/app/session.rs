@@ -42,9 +42,10 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
         weights: &'a mut [u32],
     ) -> Self {
         app.core.confirm(slots);
+        app.core.guard.see(slots);
+        app.core.settle(slots);
         let capacity = app.core.capacity;
-        let guard = &mut app.core.guard;
-        guard.see(slots);
+        let guard = &app.core.guard;
         let candidates = candidates(slots, app.core.trial.slot())
             .map(|candidate| candidate.filter(|found| guard.trusts(found.slot)));
         let best = candidates.into_iter().flatten().next();

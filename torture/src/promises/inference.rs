@@ -100,7 +100,7 @@ fn frame(blob: &ModelBlob, random: &mut Random, planted: bool) -> Result<f64, St
 }
 
 /// A reading as no sensor gives it, now and then one as it does.
-fn extreme([low, high]: [f32; 2], random: &mut Random) -> f32 {
+pub fn extreme([low, high]: [f32; 2], random: &mut Random) -> f32 {
     let span = high - low;
     match random.below(1000) {
         0 => f32::NAN,

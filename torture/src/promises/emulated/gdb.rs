@@ -11,6 +11,9 @@ const PATIENCE: Duration = Duration::from_secs(5);
 /// Time without an answer after which none is expected any more.
 const QUIET: Duration = Duration::from_millis(100);
 
+/// Number of a register: 26 are those of the processor, and 16 of numbers.
+const FPSCR: u32 = 26 + 16;
+
 /// Connection to the stub.
 pub struct Gdb(UnixStream);
 
@@ -31,6 +34,8 @@ impl Gdb {
         // The stub may tell twice that the processor stands still.
         while gdb.answer().is_ok() {}
         gdb.0.set_read_timeout(Some(PATIENCE))?;
+        // The stub gives registers by their numbers to those who can know them.
+        gdb.ask("qXfer:features:read:target.xml:0,ffb")?;
         Ok(gdb)
     }
 
@@ -56,6 +61,20 @@ impl Gdb {
     /// The word at `address`.
     pub fn word(&mut self, address: u32) -> io::Result<u32> {
         let word = self.ask(&format!("m{address:x},4"))?;
+        u32::from_str_radix(&word, 16).map(u32::swap_bytes).map_err(|_| unexpected(&word))
+    }
+
+    /// Sets status and control of the floating-point unit; `change` gets what they are.
+    pub fn change_fpscr(&mut self, change: impl FnOnce(u32) -> u32) -> io::Result<()> {
+        let before = self.fpscr()?;
+        let wanted = change(before);
+        let written = self.ask(&format!("P{FPSCR:x}={:08x}", wanted.swap_bytes()))?;
+        if written == "OK" && self.fpscr()? == wanted { Ok(()) } else { Err(unexpected(&written)) }
+    }
+
+    /// Status and control of the floating-point unit.
+    pub fn fpscr(&mut self) -> io::Result<u32> {
+        let word = self.ask(&format!("p{FPSCR:x}"))?;
         u32::from_str_radix(&word, 16).map(u32::swap_bytes).map_err(|_| unexpected(&word))
     }
 

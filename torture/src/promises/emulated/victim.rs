@@ -1,6 +1,6 @@
 //! A device in QEMU whose memory is damaged while it decodes.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use firmware::link::message::{EstimateReport, Report, Request};
@@ -9,9 +9,10 @@ use model_core::{AlignedBytes, Decoder};
 use rand_core::Rng;
 use taxel_rig::Error;
 use taxel_rig::device::Device;
-use taxel_rig::emulator::{Emulator, Link, Options};
+use taxel_rig::emulator::Link;
 
 use super::gdb::Gdb;
+use super::running::{ROWS, Running, Setup};
 
 /// What a flipped bit does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,10 +46,6 @@ impl Harm {
     ];
 }
 
-/// Bytes of a slot of the emulator's image.
-const SLOT_BYTES: usize = 128 * 1024;
-/// Rows of the emulator's image.
-const ROWS: usize = 8;
 /// Frames that are decoded behind a flip.
 const FRAMES: usize = 24;
 /// Longest time that an answer takes.
@@ -66,45 +63,15 @@ struct Case {
 
 /// A device, in an emulator that may have to be started anew.
 pub struct Victim {
-    options: Options,
-    socket: PathBuf,
+    setup: Setup,
     cases: Vec<Case>,
     crc_32: u32,
     running: Option<Running>,
 }
 
-struct Running {
-    // Dropped first, so that QEMU ends.
-    _emulator: Emulator,
-    gdb: Gdb,
-    device: Device<Link>,
-}
-
-impl Drop for Victim {
-    fn drop(&mut self) {
-        // The emulator removes the mailbox's file. Files that are gone already are no loss.
-        self.options.model.iter().chain([&self.socket]).for_each(|file| {
-            let _ = std::fs::remove_file(file);
-        });
-    }
-}
-
 impl Victim {
     /// A device with the emulator's `image` and the model `blob`.
     pub fn new(image: &Path, blob: &AlignedBytes) -> Result<Self, String> {
-        let place = std::env::temp_dir().join(format!("taxel-torture-{}", std::process::id()));
-        let slot = place.with_extension("slot");
-        let mut bytes = blob.to_vec();
-        bytes.resize(SLOT_BYTES, 0xFF);
-        std::fs::write(&slot, bytes).map_err(|cause| format!("{}: {cause}", slot.display()))?;
-        let options = Options {
-            qemu: "qemu-system-arm".into(),
-            image: image.to_owned(),
-            model: Some(slot),
-            log: None,
-            mailbox: Some(place.with_extension("mailbox")),
-            readout: false,
-        };
         let decoder = Decoder::<ROWS>::load(blob).map_err(|cause| cause.to_string())?;
         let inputs = decoder.shape().inputs * decoder.shape().rows;
         let case = |number: usize| {
@@ -114,8 +81,8 @@ impl Victim {
             Ok(Case { readings_ohm, outputs: estimate.outputs })
         };
         let cases = (0..FRAMES).map(case).collect::<Result<_, String>>()?;
-        let socket = place.with_extension("gdb");
-        Ok(Self { options, socket, cases, crc_32: decoder.model_crc(), running: None })
+        let setup = Setup::new(image, blob)?;
+        Ok(Self { setup, cases, crc_32: decoder.model_crc(), running: None })
     }
 
     /// Flips a bit while the device decodes, and looks what becomes of it. The device is as new before.
@@ -156,33 +123,16 @@ impl Victim {
         {
             return Ok(running);
         }
-        let mut running = self.start()?;
+        let mut running = Running::start(&self.setup)?;
         if self.is_sound(&mut running) {
             return Ok(running);
         }
         Err("the device in the emulator does not decode as the host does".to_owned())
     }
 
-    fn start(&self) -> Result<Running, String> {
-        let _ = std::fs::remove_file(&self.socket); // of an emulator before this one
-        let stub = format!("unix:{},server=on,wait=off", self.socket.display());
-        let started = Emulator::start_with(&self.options, &["-gdb", &stub]);
-        let (emulator, lines) = started.map_err(|cause| cause.to_string())?;
-        let mut gdb =
-            Gdb::connect(&self.socket).map_err(|cause| format!("QEMU's debugger stub: {cause}"))?;
-        gdb.run().map_err(|cause| cause.to_string())?;
-        let device = Device::new(lines.link).map_err(|cause| cause.to_string())?;
-        Ok(Running { _emulator: emulator, gdb, device })
-    }
-
     fn is_sound(&self, running: &mut Running) -> bool {
-        let start = Instant::now();
-        while running.device.identify().is_err() {
-            if start.elapsed() > Duration::from_secs(5) {
-                return false;
-            }
-        }
-        self.cases.iter().take(2).all(|case| decoded(&mut running.device, case) == Ok(Harm::None))
+        let mut cases = self.cases.iter().take(2);
+        running.answers() && cases.all(|case| decoded(&mut running.device, case) == Ok(Harm::None))
     }
 
     /// Looks at estimates, and where none come at the watchdog.

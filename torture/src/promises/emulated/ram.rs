@@ -1,19 +1,13 @@
 //! Flipped bits of the RAM of a device in QEMU, while it decodes.
 
-mod gdb;
-mod victim;
-
-use std::path::Path;
-
-use model_core::AlignedBytes;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use super::victim::{Harm, Victim};
 use crate::effort::Effort;
 use crate::found::Found;
 use crate::promise::Promise;
-use crate::tools::Tools;
-use victim::{Harm, Victim};
+use crate::tools::{Tools, tested_model};
 
 pub const RAM: Promise = Promise {
     name: "ram-flip",
@@ -37,13 +31,12 @@ const VARIABLES: (u32, u32) = (0x2000_2000, 8_500);
 const COPY: u32 = 0x2000_8000;
 
 fn check(effort: &Effort, tools: &Tools) -> Result<Found, String> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../testdata").join(MODEL);
-    let blob = std::fs::read(&path).map_err(|cause| format!("{}: {cause}", path.display()))?;
+    let blob = tested_model(MODEL)?;
     let regions =
         [("stack", STACK), ("variables", VARIABLES), ("model", (COPY, blob.len() as u32))];
     let bytes: u32 = regions.iter().map(|(_, (_, length))| length).sum();
     let mut random = Xoshiro256PlusPlus::seed_from_u64(effort.seed());
-    let mut victim = Victim::new(&tools.image("qemu-app")?, &AlignedBytes::copy_of(&blob))?;
+    let mut victim = Victim::new(&tools.image("qemu-app")?, &blob)?;
     let mut counts = [0_u64; Harm::ALL.len()];
     let mut flips = 0;
     let mut for_good = String::new();
