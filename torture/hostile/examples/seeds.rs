@@ -19,7 +19,7 @@ use taxel_data::progress::Silent;
 use taxel_data::random::Stream;
 use taxel_evaluate::experiment::EMBEDDED;
 use taxel_learn::train::train;
-use taxel_learn::{Options, Origin, pack, relative};
+use taxel_learn::{Options, Origin, fill, pack, relative};
 use taxel_simulate::outputs::{ElectrodeOutputs, Quantity};
 use taxel_simulate::sensor::Axis;
 use taxel_simulate::{World, synthesise};
@@ -87,7 +87,11 @@ fn blobs() -> Outcome<Vec<Vec<u8>>> {
         ] {
             let trained = train(data, &options, &Silent)?;
             let origin = Origin::of_data("m", 0, 1, data);
-            blobs.push(pack(&trained, data, &origin)?.bytes().to_vec());
+            let blob = pack(&trained, data, &origin)?;
+            blobs.push(blob.bytes().to_vec());
+            if options.whole_array && options.output_rank.is_none() {
+                blobs.push(fill::add(&blob, &data.inputs)?.bytes().to_vec());
+            }
         }
     }
     Ok(blobs)

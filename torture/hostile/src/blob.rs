@@ -72,6 +72,7 @@ pub fn check(body: &[u8], is_planted: bool) -> bool {
         with_exponential::<Libm>(&decoder, frame);
         with_exponential::<Micromath>(&decoder, frame);
         assess(&decoder, frame, outputs);
+        fill(&decoder, frame);
     }
     let blob = ModelBlob::of_bytes(&bytes).expect("a model, as the device says");
     let host = blob.prepare(Exponential::Polynomial).with_baseline(&baseline);
@@ -152,6 +153,22 @@ fn assess(decoder: &Decoder<'_, ROWS>, frame: Frame<'_>, outputs: usize) {
     if novelty.is_some_and(f32::is_finite) {
         assert!(!deviation.iter().any(|deviation| *deviation < 0.0), "{deviation:?}");
     }
+}
+
+/// Filling leaves the readings that are there, and counts those that were not.
+fn fill(decoder: &Decoder<'_, ROWS>, frame: Frame<'_>) {
+    let before = frame.readings_ohm;
+    let (mut filled, mut scratch) = (before.to_vec(), vec![0.0; decoder.scratch_floats()]);
+    let count = decoder.fill(&mut filled, &mut scratch);
+    let missing = before.iter().filter(|reading| !reading.is_finite()).count();
+    assert!(count == 0 || count == missing, "{count} of {missing} filled");
+    for (before, after) in before.iter().zip(&filled) {
+        let same = before.to_bits() == after.to_bits();
+        assert!(same || (count > 0 && !before.is_finite()), "{before} became {after}");
+    }
+    let estimate = decoder.decode(Frame { readings_ohm: &filled, ..frame });
+    let mut estimate = estimate.expect("a frame of the model's shape");
+    check_estimate(decoder.model(), &filled, &estimate.borrowed());
 }
 
 #[cfg(test)]
