@@ -24,7 +24,7 @@ mod leave;
 mod model;
 mod kept;
 mod guard;
-mod settle;
+mod firm;
 mod recalibrate;
 mod recheck;
 mod trial;
@@ -95,8 +95,9 @@ struct Core<'m, P, F, const ROWS: usize> {
     pressing: Pressing<'m>,
     /// CRC-32 of the model that the last recalibration committed, if none has begun since.
     recalibrated: Option<u32>,
-    /// Number of the request to begin a recalibration for which the next session is to leave the model in its slot.
-    begins: Option<u16>,
+    /// Number of the request to begin a recalibration for which the next session is to leave the model in its slot, and
+    /// that model's CRC-32.
+    begins: Option<(u16, u32)>,
 }
 
 /// A baseline that is being captured.

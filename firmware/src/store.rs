@@ -7,7 +7,9 @@
 //! With a key on the device, a seal stands behind the blob ([`DeviceKey`], [`Seal`]).
 //!
 //! To put the previous model in force again, another record with a higher generation is written before those of its
-//! slot ([`reinstate`]). Every start makes firm which model is in force ([`unsettled`]).
+//! slot ([`reinstate`]). Every start makes firm which model is in force ([`missing_records`]).
+
+use core::iter;
 
 use model_core::blob::Model;
 use model_core::checksum::CRC_32;
@@ -15,11 +17,11 @@ use model_core::checksum::CRC_32;
 use crate::seal::Seal;
 
 mod key;
-mod settle;
+mod firm;
 mod upload;
 
+pub use firm::missing_records;
 pub use key::DeviceKey;
-pub use settle::unsettled;
 pub use upload::Upload;
 
 /// Error of a flash that could not be erased or written.
@@ -117,7 +119,7 @@ fn record(generation: u32, blob_crc: u32) -> [u8; RECORD_BYTES] {
     record
 }
 
-/// Number of records that a slot has room for behind its blob, at most: two for each time that its model comes into
+/// Number of records that a slot has room for behind its blob, at most: a pair for each time that its model comes into
 /// force.
 pub const MOST_RECORDS: usize = 16;
 
@@ -129,23 +131,34 @@ fn record_places(slot: &[u8]) -> impl Iterator<Item = usize> {
     places.map_while(move |place| place.filter(|place| *place >= content))
 }
 
+/// Places of the pairs of records in a slot: the first record of a pair stands behind the second one.
+fn record_pairs(slot: &[u8]) -> impl Iterator<Item = [usize; 2]> {
+    let mut places = record_places(slot);
+    iter::from_fn(move || Some([places.next()?, places.next()?]))
+}
+
 fn record_at(slot: &[u8], place: usize) -> Option<&[u8; RECORD_BYTES]> {
     slot.get(place..)?.first_chunk()
 }
 
-/// Writes another record for the model in `slot`, which must have been found sound: it comes into force again as
-/// `generation`. Power that fails meanwhile leaves the other slot's model in force.
+/// Writes another pair of records for the model in `slot`, which must have been found sound: it comes into force again
+/// as `generation`. Power that fails in the first record leaves the other slot's model in force.
 ///
 /// # Errors
-/// `None` if no place for a record is left; [`FlashError`] if writing fails.
+/// `None` if no place for a pair is left; [`FlashError`] if writing the first record fails.
 pub fn reinstate<S: Slot>(slot: &mut S, generation: u32) -> Option<Result<(), FlashError>> {
     let bytes = slot.bytes();
     let is_empty = |place: &usize| record_at(bytes, *place) == Some(&[0xFF; RECORD_BYTES]);
     // The first record's place is erased in a slot that was flashed with the firmware, and stays so.
-    let place = record_places(bytes).skip(1).find(is_empty)?;
+    let [first, second] = record_pairs(bytes).skip(1).find(|pair| pair.iter().all(is_empty))?;
     let (_, blob_crc) = blob_in_slot(bytes).split_last_chunk::<4>()?;
     let record = record(generation, u32::from_le_bytes(*blob_crc));
-    Some(slot.write(place, &record))
+    let written = slot.write(first, &record);
+    if written.is_ok() {
+        // The first one counts without it: the next start writes another pair.
+        let _ = slot.write(second, &record);
+    }
+    Some(written)
 }
 
 /// Generation of the model in `slot` number `index`: the larger, the more recent; `None` without a valid model.

@@ -223,7 +223,7 @@ fn presses_bring_a_changed_sensor_back_and_the_previous_model_can_be_had_again()
         in_force.reverse();
         undos += 1;
     }
-    assert_eq!(undos, MOST_RECORDS - 3, "two records for each, and one for the last");
+    assert_eq!(undos, MOST_RECORDS - 4, "a pair for each");
     assert_eq!(undo(&mut slots, in_force[0]), nothing);
     assert_eq!(after_restart(&mut slots), Some(in_force[0]));
     // Uploads make room: one in each slot.
@@ -251,6 +251,8 @@ fn behind_the_largest_generation_no_recalibration_and_no_undo_comes_into_force()
 #[test]
 fn a_power_cut_at_any_word_of_a_recalibration_leaves_the_old_or_the_new_model() {
     let old = trained();
+    // The erase, the blob and the first record.
+    let words = MockSlot::BYTES / 4 + old.len().div_ceil(4) + 4;
     let mut cuts = 0;
     let mut new = None;
     for operations in 0.. {
@@ -259,18 +261,20 @@ fn a_power_cut_at_any_word_of_a_recalibration_leaves_the_old_or_the_new_model() 
         let outcome = recalibrate(&mut slots);
         let cut = slots[0].power_on();
         let found = after_restart(&mut slots);
-        if !cut {
-            assert_eq!(found, outcome.ok());
+        if operations >= words {
+            assert_eq!(found, outcome.ok(), "cut after {operations} words");
             new = found;
+        } else {
+            assert_eq!(outcome, Err(Refusal::Flash), "cut after {operations} words");
+            assert_eq!(found, Some(crc_of(&old)), "cut after {operations} words");
+        }
+        if !cut {
             break;
         }
-        assert_eq!(outcome, Err(Refusal::Flash), "cut after {operations} words");
-        assert_eq!(found, Some(crc_of(&old)), "cut after {operations} words");
         cuts += 1;
     }
     assert!(new.is_some_and(|new| new != crc_of(&old)));
-    // The power was cut at every word of the erase, the blob and the record.
-    assert_eq!(cuts, MockSlot::BYTES / 4 + old.len().div_ceil(4) + 4);
+    assert_eq!(cuts, words + 4, "the second record is cut, too");
 }
 
 #[test]
@@ -280,22 +284,72 @@ fn a_power_cut_at_any_word_of_an_undo_leaves_the_old_or_the_new_model() {
     for operations in 0.. {
         let mut slots = MockSlot::pair_with(&trained());
         let new = recalibrate(&mut slots).unwrap();
-        assert_eq!(after_restart(&mut slots), Some(new));
         slots[0].cut_power_after(operations);
         let outcome = undo(&mut slots, new);
         let cut = slots[0].power_on();
         let found = after_restart(&mut slots);
+        if operations >= 4 {
+            assert_eq!((outcome, found), (Ok(old), Some(old)), "{operations}");
+        } else {
+            assert_eq!((outcome, found), (Err(Refusal::Flash), Some(new)), "{operations}");
+            // It can be done again: there is place for other records.
+            assert_eq!(undo(&mut slots, new), Ok(old));
+            assert_eq!(after_restart(&mut slots), Some(old));
+        }
         if !cut {
-            assert_eq!((outcome, found), (Ok(old), Some(old)));
             break;
         }
-        assert_eq!((outcome, found), (Err(Refusal::Flash), Some(new)), "{operations}");
-        // It can be done again: there is place for other records.
-        assert_eq!(undo(&mut slots, new), Ok(old));
-        assert_eq!(after_restart(&mut slots), Some(old));
         cuts += 1;
     }
-    assert_eq!(cuts, 4, "words of a record");
+    assert_eq!(cuts, 8, "words of a pair of records");
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_model_that_decays_is_not_recalibrated() {
+    let old = trained();
+    for place in (0..old.len() - 4).step_by(7) {
+        for in_ram in [true, false] {
+            let (mut slots, mut bench) = (MockSlot::pair_with(&old), Bench::new(quiet()));
+            let board = bench.board.clone();
+            let mut memory = memory();
+            let words = memory.len() - usize::from(!in_ram);
+            let start =
+                if in_ram { memory.as_ptr().addr() } else { slots[0].bytes().as_ptr().addr() };
+            let mut session = Session::start(&mut bench.app, &mut slots, &mut memory[..words]);
+            if !in_ram {
+                let begin = Request::Recalibrate(RecalibrationStep::Begin);
+                board.pins.borrow_mut().to_device.extend(request_bytes(9, &begin));
+                assert_eq!(settle(&mut session, &board), Some(Leave::MakeRoom));
+                let _ = session;
+                session = Session::start(&mut bench.app, &mut slots, &mut memory[..words]);
+            }
+            add_presses(&mut session, &board, 20);
+            flip_bit(start + place);
+            let (answer, _) = step(&mut session, &board, RecalibrationStep::Commit);
+            assert!(answer.is_err(), "{place}, in RAM: {in_ram}: {answer:?}");
+        }
+    }
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_copy_in_ram_is_kept_if_its_slot_has_decayed() {
+    let old = trained();
+    let mut slots = MockSlot::pair_with(&blob(5, 2));
+    upload(&mut slots, &old);
+    let mut bench = Bench::new(Configuration { frame_period_us: 100, ..quiet() });
+    let board = bench.board.clone();
+    let mut memory = memory();
+    let words = memory.len() - 1;
+    let slot = slots[1].bytes().as_ptr().addr();
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut memory[..words]);
+    flip_bit(slot + 40);
+    assert!((0..100).all(|_| session.step().is_none()), "decoded from its copy");
+    let (answer, leave) = step(&mut session, &board, RecalibrationStep::Begin);
+    let no_room = |fault| matches!(fault, RecalibrationFault::NoRoom { .. });
+    assert!(matches!(answer, Err(Refusal::Recalibration(fault)) if no_room(fault)), "{answer:?}");
+    assert_eq!((leave, model_crc(&mut session, &board)), (None, Some(crc_of(&old))));
 }
 
 #[test]

@@ -3,27 +3,16 @@
 //! Bits of memory that a session has borrowed are flipped from outside, through the kernel, as radiation does.
 #![cfg(target_os = "linux")]
 
-use std::fs::OpenOptions;
-use std::os::unix::fs::FileExt;
-
 use firmware::app::{Leave, Session};
 use firmware::link::message::{
-    Configuration, EstimateReport, ModelIdentity, Report, Request, Statistics, UploadState,
-    UploadStep,
+    Configuration, EstimateReport, ModelFault, ModelIdentity, Refusal, Report, Request, Statistics,
+    UploadState, UploadStep,
 };
 use firmware::store::Slot;
 use mock_board::*;
 
 /// Place of the damage in a blob.
 const PLACE: usize = 41;
-
-/// Flips a bit of this process's memory.
-fn flip(address: usize) {
-    let memory = OpenOptions::new().read(true).write(true).open("/proc/self/mem").unwrap();
-    let mut byte = [0];
-    memory.read_exact_at(&mut byte, address as u64).unwrap();
-    memory.write_all_at(&[byte[0] ^ 8], address as u64).unwrap();
-}
 
 fn identity(session: &mut TestSession<'_>, board: &Board) -> Option<ModelIdentity> {
     let read = |report: Report<'_>| match report {
@@ -78,7 +67,7 @@ impl Rig {
         let board = bench.board.clone();
         let mut session = Session::start(&mut bench.app, slots, weights);
         assert_eq!(run(&mut session), None, "sound");
-        addresses.iter().for_each(|address| flip(*address));
+        addresses.iter().for_each(|address| flip_bit(*address));
         let leave = run(&mut session);
         if leave.is_some() {
             let _ = session;
@@ -175,16 +164,40 @@ fn damage_ends_an_upload_and_a_trial_outlasts_damage_in_ram_alone() {
     let steps = upload_steps(&next, 60);
     upload(bench, slots, weights, &steps[..3]).unwrap();
     let mut session = Session::start(&mut bench.app, slots, weights);
-    flip(copy);
+    flip_bit(copy);
     assert_eq!(run(&mut session), Some(Leave::Damaged));
     let _ = session;
     assert!(upload(bench, slots, weights, &steps[3..]).is_err());
 
     upload(bench, slots, weights, &steps).unwrap();
     let mut session = Session::start(&mut bench.app, slots, weights);
-    flip(copy);
+    flip_bit(copy);
     assert_eq!(run(&mut session), Some(Leave::Damaged));
     let _ = session;
     let state = upload(bench, slots, weights, &[UploadStep::Confirm]);
     assert_eq!(state, Ok(UploadState::Confirmed { crc_32: crc_of(&next) }));
+}
+
+#[test]
+fn a_model_that_decays_in_its_slot_while_on_trial_is_not_confirmed() {
+    let (old, new, next) = (blob(1, 3), blob(2, 5), blob(3, 4));
+    let mut rig = Rig::new(&old, &new, 512);
+    let [_, slot, _] = rig.addresses();
+    let Rig { slots, weights, bench } = &mut rig;
+    upload(bench, slots, weights, &upload_steps(&next, 60)).unwrap();
+    let board = bench.board.clone();
+    let mut session = Session::start(&mut bench.app, slots, weights);
+    flip_bit(slot);
+    assert_eq!(run(&mut session), None);
+    assert_eq!(statistics(&mut session, &board).slot_damages, 1);
+    board.pins.borrow_mut().to_host.clear();
+    let confirm = request_bytes(7, &Request::Upload(UploadStep::Confirm));
+    board.pins.borrow_mut().to_device.extend(confirm);
+    assert_eq!(settle(&mut session, &board), Some(Leave::Confirm));
+    let _ = session;
+    let mut session = Session::start(&mut bench.app, slots, weights);
+    let answers = reports(&board.pins.borrow().to_host);
+    let refused = Report::Refused(Refusal::BadModel(ModelFault::Corrupt));
+    assert_eq!(answers, [(7, format!("{refused:?}"))]);
+    assert_eq!(model_crc(&mut session, &board), Some(crc_of(&new)));
 }

@@ -18,6 +18,8 @@
 mod shape;
 mod power;
 mod slot;
+#[cfg(target_os = "linux")]
+mod decay;
 mod pages;
 mod key_area;
 mod board;
@@ -28,6 +30,8 @@ mod host;
 
 pub use bench::{Bench, Memory, TestApp, TestSession, quiet};
 pub use board::{AnyKeeper, Board, Pins};
+#[cfg(target_os = "linux")]
+pub use decay::flip_bit;
 pub use host::{
     ask, begin, configure, install, model_crc, reports, request_bytes, settle, upload, upload_steps,
 };

@@ -137,6 +137,27 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         leave
     }
 
+    /// Prepares `spare` for a blob of `length` bytes. The watchdog is fed just before and after an erase, which may take
+    /// half of its period.
+    pub(super) fn begin_upload<S: Slot>(
+        &mut self,
+        spare: &mut S,
+        length: usize,
+    ) -> Result<(), Refusal> {
+        let now_us = self.now_us();
+        let mut is_erased = false;
+        let platform = self.line.platform();
+        let begun = self.upload.begin(spare, length, now_us, || {
+            platform.feed_watchdog();
+            is_erased = true;
+        });
+        if is_erased {
+            let erases = &mut self.statistics.slot_erases;
+            *erases = erases.saturating_add(1);
+        }
+        begun
+    }
+
     /// Sets the device's key. Models without a seal are left at once, and not only at the next restart.
     fn provision(
         &mut self,
@@ -346,17 +367,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                     return Err(Refusal::TooLarge { slot_bytes: most as u32 });
                 }
                 info!("upload of {=usize} bytes begins", length);
-                let now_us = self.now_us();
-                let (platform, erases) = (self.line.platform(), &mut self.statistics.slot_erases);
-                let begun = self.upload.begin(spare, length, now_us, || {
-                    platform.feed_watchdog();
-                    *erases = erases.saturating_add(1);
-                });
-                // Erasing may have taken half of the watchdog's period; reports and a scan come before the next feed.
-                if begun.is_ok() {
-                    self.line.platform().feed_watchdog();
-                }
-                begun
+                self.begin_upload(spare, length)
             }
             UploadStep::Chunk { offset, bytes } => self.upload.chunk(spare, offset, bytes),
             UploadStep::Abort => {

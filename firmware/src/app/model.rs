@@ -14,10 +14,12 @@ pub struct InForce<'a, const ROWS: usize> {
     pub identity: Option<ModelIdentity>,
     /// Its blob, which the decoder borrows.
     pub blob: &'a [u8],
+    /// The blob in its slot, while that is sound, if `blob` is a copy.
+    pub stored: Option<&'a [u8]>,
 }
 
 impl<'a, const ROWS: usize> InForce<'a, ROWS> {
-    pub const NONE: Self = Self { decoder: None, identity: None, blob: &[] };
+    pub const NONE: Self = Self { decoder: None, identity: None, blob: &[], stored: None };
 
     /// Puts the model in `bytes` in force, which start with its blob; `None` if it is not sound, or there is no room
     /// for it.

@@ -15,7 +15,8 @@ use super::buffers::cut;
 use super::leave::Leave;
 use super::model::{self, InForce};
 use crate::link::message::{
-    RecalibrationFault, RecalibrationReport, RecalibrationState, RecalibrationStep, Refusal, Report,
+    ModelFault, RecalibrationFault, RecalibrationReport, RecalibrationState, RecalibrationStep,
+    Refusal, Report,
 };
 use crate::log::{info, warning};
 use crate::platform::Platform;
@@ -98,10 +99,13 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         let report = match step {
             RecalibrationStep::Begin => {
                 self.give_up_press();
-                let in_ram = in_force.identity.is_some_and(|identity| identity.in_ram);
+                // Without a sound slot, the copy is all that there is.
+                let may_leave_copy = in_force.stored.is_some();
                 match self.begin_recalibration(decoder, recalibrating) {
-                    Err(Refusal::Recalibration(RecalibrationFault::NoRoom { .. })) if in_ram => {
-                        self.begins = Some(number);
+                    Err(Refusal::Recalibration(RecalibrationFault::NoRoom { .. }))
+                        if may_leave_copy =>
+                    {
+                        self.begins = Some((number, crc_32));
                         *leave = Some(Leave::MakeRoom);
                         return Ok(None);
                     }
@@ -159,8 +163,11 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         decoder: Option<&Decoder<'_, ROWS>>,
         recalibrating: &mut Recalibrating<'_>,
     ) {
-        let (Some(number), Some(decoder)) = (self.begins.take(), decoder) else { return };
-        let begun = self.begin_recalibration(decoder, recalibrating);
+        let Some((number, crc_32)) = self.begins.take() else { return };
+        let begun = match decoder.filter(|decoder| decoder.model_crc() == crc_32) {
+            Some(decoder) => self.begin_recalibration(decoder, recalibrating),
+            None => Err(Refusal::BadModel(ModelFault::Corrupt)), // lost since it was asked for
+        };
         let report = begun.map_or_else(Report::Refused, Report::Recalibration);
         self.line.send(number, &report, &mut self.statistics);
     }
@@ -279,16 +286,9 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         let floats = recalibrating.memory.len();
         let (mut recalibration, _) = recalibrating.resume(model).ok_or(NOT_BEGUN)?;
         recalibration.finish(model).map_err(|error| refusal(error, floats))?;
-        let now_us = self.now_us();
-        let (platform, erases) = (self.line.platform(), &mut self.statistics.slot_erases);
-        self.upload.begin(spare, blob.len(), now_us, || {
-            platform.feed_watchdog();
-            *erases = erases.saturating_add(1);
-        })?;
-        // Erasing may have taken half of the watchdog's period.
-        self.line.platform().feed_watchdog();
+        self.begin_upload(spare, blob.len())?;
         let covered = blob.len().saturating_sub(4);
-        let mut digest = CRC_32.digest();
+        let (mut digest, mut source) = (CRC_32.digest(), CRC_32.digest());
         let mut piece = [0; PIECE];
         for (index, bytes) in blob.chunks(PIECE).enumerate() {
             let offset = index * PIECE;
@@ -297,12 +297,19 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             recalibration.patch(model, blob, offset, piece);
             let covered = covered.saturating_sub(offset).min(piece.len());
             digest.update(piece.get(..covered).unwrap_or_default());
+            source.update(bytes.get(..covered).unwrap_or_default());
             let crc = digest.clone().finalize().to_le_bytes();
             let first = (offset + covered).saturating_sub(blob.len().saturating_sub(4));
             for (place, byte) in piece.iter_mut().skip(covered).zip(crc.iter().skip(first)) {
                 *place = *byte;
             }
             self.upload.chunk(spare, offset as u32, piece)?;
+            self.line.platform().feed_watchdog(); // a slow flash takes seconds for all pieces
+        }
+        if source.finalize() != model.crc() {
+            warning!("the model in force is damaged: it is not recalibrated");
+            self.upload.abort();
+            return Err(Refusal::BadModel(ModelFault::Corrupt));
         }
         let new = self.upload.complete(spare)?;
         let slot = in_force.identity.map_or(0, |identity| identity.slot.into());

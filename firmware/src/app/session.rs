@@ -26,8 +26,6 @@ pub struct Session<'a, 'm, P, F, S, const ROWS: usize> {
     pub(super) spare: &'a mut S,
     pub(super) recalibrating: Recalibrating<'a>,
     recheck: Recheck,
-    /// The model's blob in its slot, while that is sound, if it is decoded from a copy.
-    stored: Option<&'a [u8]>,
 }
 
 impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
@@ -43,7 +41,7 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
     ) -> Self {
         app.core.confirm(slots);
         app.core.guard.see(slots);
-        app.core.settle(slots);
+        app.core.make_firm(slots);
         let capacity = app.core.capacity;
         let guard = &app.core.guard;
         let candidates = candidates(slots, app.core.trial.slot())
@@ -87,8 +85,8 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
         let mut recalibrating = Recalibrating::new(left);
         app.core.begin_in_place(model.decoder.as_ref(), &mut recalibrating);
         let is_copy = model.identity.is_some_and(|identity| identity.in_ram);
-        let stored = active.bytes().get(..model.blob.len()).filter(|_| is_copy);
-        Self { app, model, spare, recalibrating, recheck: Recheck::new(), stored }
+        model.stored = active.bytes().get(..model.blob.len()).filter(|_| is_copy);
+        Self { app, model, spare, recalibrating, recheck: Recheck::new() }
     }
 
     /// Runs one turn of the loop: answers at most one request, and scans a frame if one is due.
@@ -119,9 +117,9 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
     /// Checks another piece of the model in force. A copy in RAM is decoded from even if the slot is damaged.
     fn recheck(&mut self) -> Option<Leave> {
         let model = self.model.identity?;
-        let (blob, stored) = (self.model.blob, self.stored.unwrap_or_default());
-        let copies = [blob, stored];
-        let copies = if self.stored.is_some() { &copies[..] } else { copies.get(..1)? };
+        let stored = self.model.stored;
+        let copies = [self.model.blob, stored.unwrap_or_default()];
+        let copies = if stored.is_some() { &copies[..] } else { copies.get(..1)? };
         let core = &mut self.app.core;
         let s = &mut core.statistics;
         match self.recheck.step(copies, model.crc_32) {
@@ -144,7 +142,7 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
                     model.slot
                 );
                 s.slot_damages = s.slot_damages.saturating_add(1);
-                self.stored = None;
+                self.model.stored = None;
                 None
             }
         }

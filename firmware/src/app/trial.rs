@@ -2,12 +2,12 @@
 //! or the power caused it.
 
 use super::Core;
-use super::model::candidates;
-use crate::link::message::{Refusal, Report, UploadState};
+use super::model::{self, candidates};
+use crate::link::message::{ModelFault, Refusal, Report, UploadState};
 use crate::log::{info, warning};
 use crate::platform::Platform;
 use crate::readout::FrameSource;
-use crate::store::Slot;
+use crate::store::{Slot, blob_in_slot};
 
 /// Whether a model is on trial.
 #[derive(Debug, Clone, Copy, Default)]
@@ -76,6 +76,11 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             return Err(Refusal::NoUpload);
         };
         let slot = slots.get_mut(tried.slot).ok_or(Refusal::NoUpload)?;
+        // The slot may be damaged while a copy is decoded from.
+        let found = model::check(self.capacity, blob_in_slot(slot.bytes()));
+        if found.map_err(Refusal::BadModel)?.crc() != crc_32 {
+            return Err(Refusal::BadModel(ModelFault::Corrupt));
+        }
         self.upload.commit(slot, tried.generation, crc_32)?;
         info!("model {=u32:08x} confirmed", crc_32);
         Ok(())

@@ -2,7 +2,7 @@
 
 use super::{
     ERASES_AT_ONCE, FlashError, RECORD_MAGIC, SEAL_BYTES, SEAL_MARK, Slot, capacity, record,
-    seal_place,
+    record_pairs, seal_place,
 };
 use crate::link::message::{Refusal, UploadState};
 use crate::seal::Seal;
@@ -47,7 +47,7 @@ impl Upload {
     /// Prepares `spare` for a blob of `length` bytes at the time `now_us` since the start. The slot is erased, and
     /// marked as one with an upload, unless it still is from the last begin.
     ///
-    /// Calls `prepare` just before the erase: it must feed the watchdog, since the processor may stand still.
+    /// Calls `feed` just before and after an erase: it must feed the watchdog, since the processor may stand still.
     ///
     /// # Errors
     /// [`Refusal::TooLarge`] if the blob does not fit, [`Refusal::TooSoon`] after too many erases,
@@ -57,7 +57,7 @@ impl Upload {
         spare: &mut S,
         length: usize,
         now_us: u64,
-        prepare: impl FnOnce(),
+        mut feed: impl FnMut(),
     ) -> Result<(), Refusal> {
         let capacity = capacity(spare.bytes());
         if length > capacity {
@@ -65,8 +65,9 @@ impl Upload {
         }
         if !self.is_empty {
             self.wear(now_us, S::ERASE_INTERVAL_S)?;
-            prepare();
+            feed();
             let marked = spare.erase().and_then(|()| spare.write(capacity, &RECORD_MAGIC));
+            feed();
             self.flash(marked)?;
         }
         self.is_empty = true;
@@ -156,11 +157,11 @@ impl Upload {
         self.state = UploadState::OnTrial { crc_32 };
     }
 
-    /// Commits the blob in `slot`, which must have been found sound: writes the record that makes it the most
+    /// Commits the blob in `slot`, which must have been found sound: writes the pair of records that makes it the most
     /// recent.
     ///
     /// # Errors
-    /// [`Refusal::Flash`] if writing fails.
+    /// [`Refusal::Flash`] if writing the first one fails.
     pub fn commit<S: Slot>(
         &mut self,
         slot: &mut S,
@@ -171,6 +172,11 @@ impl Upload {
         let record = record(generation, crc_32);
         let rest = record.get(RECORD_MAGIC.len()..).unwrap_or_default();
         self.flash(slot.write(place, rest))?;
+        let second = record_pairs(slot.bytes()).next().map(|[_, second]| second);
+        if let Some(second) = second {
+            // The first one counts without it: the next start writes another pair.
+            let _ = slot.write(second, &record);
+        }
         self.state = UploadState::Confirmed { crc_32 };
         Ok(())
     }

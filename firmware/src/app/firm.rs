@@ -1,0 +1,31 @@
+//! Makes firm at every start which model is in force ([`missing_records`]).
+
+use super::Core;
+use super::model::{candidates, choose};
+use crate::log::{info, warning};
+use crate::platform::Platform;
+use crate::readout::FrameSource;
+use crate::store::{Slot, missing_records, reinstate};
+
+impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
+    /// Writes the records that the choice of a model still needs. A trial is no choice yet.
+    // Apart from its caller, whose stack is deep.
+    #[inline(never)]
+    pub(super) fn make_firm<S: Slot>(&mut self, slots: &mut [S; 2]) {
+        let is_firm = (0..slots.len()).all(|slot| missing_records(slots, slot).is_none());
+        if is_firm || self.trial.is_going_on() {
+            return;
+        }
+        let trusted = |slot| self.guard.trusts(slot);
+        let candidates =
+            candidates(slots, None).map(|candidate| candidate.filter(|it| trusted(it.slot)));
+        let Some(chosen) = choose(self.capacity, slots, candidates) else { return };
+        let Some(generation) = missing_records(slots, chosen.slot) else { return };
+        let written = slots.get_mut(chosen.slot).and_then(|slot| reinstate(slot, generation));
+        if written == Some(Ok(())) {
+            info!("records of the model in force, generation {=u32}", generation);
+        } else {
+            warning!("no further records of the model in force: no place, or flash failed");
+        }
+    }
+}
