@@ -3,7 +3,7 @@
 
 mod flash;
 mod device;
-mod presses;
+pub mod presses;
 
 mod cuts;
 mod decay;

@@ -4,11 +4,13 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use firmware::app::Session;
-use firmware::link::message::{ConfidenceSent, Configuration, Request, UploadStep};
+use firmware::link::message::{
+    ConfidenceSent, Configuration, RecalibrationStep, Request, UploadStep,
+};
 use firmware::store::{FlashError, Slot};
 use mock_board::{
-    Bench, Memory, Pins, SharedSettings, blob, blob_with_confidence, quiet, request_bytes,
-    upload_steps,
+    Bench, Memory, Pins, SharedSettings, blob, blob_to_recalibrate, blob_with_confidence, quiet,
+    request_bytes, upload_steps,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -16,6 +18,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use crate::effort::Effort;
 use crate::found::Found;
 use crate::promise::Promise;
+use crate::promises::power::presses;
 use crate::tools::Tools;
 
 pub const WATCHDOG: Promise = Promise {
@@ -32,11 +35,23 @@ const FASTEST_S: f64 = 5.4;
 const ERASE_US: u32 = 2_000_000;
 /// Longest time in µs of writing a word.
 const WORD_US: u32 = 100;
-/// Words of a slot.
-const WORDS: usize = 512;
+/// Words of a slot, as on the board.
+const WORDS: usize = 32 * 1024;
+/// Centres of a model that fills most of a slot.
+const MANY_CENTRES: usize = 3000;
+/// Words of memory for a recalibration.
+const MEMORY: usize = 4096;
 
 /// Bytes of a chunk of an upload.
 const CHUNK: usize = 100;
+/// Configuration with the most reports.
+const BUSY: Configuration = Configuration {
+    frame_period_us: 10_000,
+    send_readings: true,
+    send_estimates: true,
+    confidence: ConfidenceSent::Deviations,
+    ..Configuration::DEFAULT
+};
 
 fn check(effort: &Effort, _: &Tools) -> Result<Found, String> {
     let planted = effort.is_planted();
@@ -47,6 +62,8 @@ fn check(effort: &Effort, _: &Tools) -> Result<Found, String> {
 struct SlowSlot {
     words: Vec<u32>,
     pins: Rc<RefCell<Pins>>,
+    /// Whether erases fail at their end.
+    is_worn: bool,
 }
 
 impl SlowSlot {
@@ -66,7 +83,7 @@ impl Slot for SlowSlot {
     fn erase(&mut self) -> Result<(), FlashError> {
         self.wait(ERASE_US);
         self.words.fill(u32::MAX);
-        Ok(())
+        if self.is_worn { Err(FlashError) } else { Ok(()) }
     }
 
     fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), FlashError> {
@@ -77,43 +94,46 @@ impl Slot for SlowSlot {
     }
 }
 
-/// Longest time in s between feeds of the watchdog, while a host asks, uploads and takes bytes slowly.
+/// Longest time in s between feeds of the watchdog.
 fn longest_unfed_s(seed: u64, planted: bool) -> f64 {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let gaps_us = [0, 1_000, 10_000, 49_000, 1_000_000, 5];
     let (gap_us, is_bursts) = (gaps_us[(seed % 6) as usize], seed % 6 == 5);
     let scan_us = [6_400, 100_000, 1_660_000][(seed / 6 % 3) as usize];
-    let configuration = Configuration {
-        frame_period_us: 10_000,
-        send_readings: true,
-        confidence: ConfidenceSent::Deviations,
-        ..quiet()
-    };
+    let [is_recalibrated, is_worn] = [seed / 18 % 2 == 1, seed / 36 % 2 == 1];
     let mut memory = Box::new(Memory::new());
-    let mut bench = Bench::within(&mut memory, configuration, &SharedSettings::default());
+    let mut bench = Bench::within(&mut memory, quiet(), &SharedSettings::default());
     let board = bench.board.clone();
     board.pins.borrow_mut().scan_us = scan_us;
     bench.frame.borrow_mut()[0][0] = f32::NAN; // so that all kinds of reports are sent
-    let mut slots =
-        [0, 1].map(|_| SlowSlot { words: vec![u32::MAX; WORDS], pins: board.pins.clone() });
-    let model = blob_with_confidence(false);
+    let slot = || SlowSlot { words: vec![u32::MAX; WORDS], pins: board.pins.clone(), is_worn };
+    let mut slots = [slot(), slot()];
+    let model = if is_recalibrated {
+        blob_to_recalibrate(MANY_CENTRES)
+    } else {
+        blob_with_confidence(false)
+    };
     bytemuck::cast_slice_mut(&mut slots[0].words)[..model.len()].copy_from_slice(&model);
-    board.pins.borrow_mut().gap_us = gap_us;
-    board.pins.borrow_mut().look_us = 100;
+    let mut room = vec![0; MEMORY];
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut room);
     let new = blob(2, 4);
     let steps = upload_steps(&new, CHUNK);
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    let mut next = 0;
+    let mut uploads = steps[..steps.len() - 1].iter().cycle().copied().map(Request::Upload);
+    if is_recalibrated {
+        presses::add(&mut session, &board, &model);
+    }
+    let configure = Request::Configure { configuration: BUSY, lease_ms: 0 };
+    board.pins.borrow_mut().to_device.extend(request_bytes(4, &configure));
+    board.pins.borrow_mut().gap_us = gap_us;
+    board.pins.borrow_mut().look_us = 100;
     for _ in 0..30 {
-        let step = steps[next % (steps.len() - 1)];
         let request = match random.next_u32() % 4 {
             0 => Request::Identify,
             1 => Request::Statistics,
+            2 if is_recalibrated => Request::Recalibrate(RecalibrationStep::Commit),
             2 => Request::Upload(UploadStep::Abort),
-            _ => {
-                next += 1;
-                Request::Upload(step)
-            }
+            _ if is_recalibrated => Request::Configuration,
+            _ => uploads.next().expect("a step"),
         };
         board.pins.borrow_mut().to_device.extend(request_bytes(5, &request));
         if is_bursts {

@@ -20,8 +20,8 @@ pub const SLOT_WORDS: usize = 192;
 /// Bytes of a chunk of an upload.
 const CHUNK: usize = 100;
 
-/// A session of this device.
-pub type Running<'a, 'm> = Session<'a, 'm, Board, Source, Flash, ROWS>;
+/// A session of a device with slots of this kind.
+pub type Running<'a, 'm, S> = Session<'a, 'm, Board, Source, S, ROWS>;
 
 /// What becomes of a request to change the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -75,7 +75,7 @@ impl Device {
     pub fn session<T>(
         &mut self,
         cut_after: Option<u64>,
-        work: impl FnOnce(&mut Running<'_, '_>, &Board) -> T,
+        work: impl FnOnce(&mut Running<'_, '_, Flash>, &Board) -> T,
     ) -> T {
         self.slots.iter_mut().for_each(Flash::settle);
         self.supply.borrow_mut().on(cut_after);
@@ -112,7 +112,7 @@ impl Device {
         &mut self,
         blob: &[u8],
         steps: usize,
-        work: impl FnOnce(&mut Running<'_, '_>, &Board),
+        work: impl FnOnce(&mut Running<'_, '_, Flash>, &Board),
     ) {
         self.session(None, |session, board| {
             for step in upload_steps(blob, CHUNK).into_iter().take(steps) {
@@ -149,7 +149,11 @@ impl Device {
 }
 
 /// Carries out one step of an upload that ends no session.
-pub fn upload_step(session: &mut Running<'_, '_>, board: &Board, step: UploadStep<'_>) -> Outcome {
+pub fn upload_step<S: Slot>(
+    session: &mut Running<'_, '_, S>,
+    board: &Board,
+    step: UploadStep<'_>,
+) -> Outcome {
     ask(session, board, &Request::Upload(step), |report| match report {
         Report::Upload(_) => Outcome::GoingOn,
         Report::Refused(refusal) => Outcome::Refused(refusal),
@@ -159,8 +163,8 @@ pub fn upload_step(session: &mut Running<'_, '_>, board: &Board, step: UploadSte
 }
 
 /// Carries out one step of a recalibration.
-pub fn recalibration_step(
-    session: &mut Running<'_, '_>,
+pub fn recalibration_step<S: Slot>(
+    session: &mut Running<'_, '_, S>,
     board: &Board,
     step: RecalibrationStep<'_>,
 ) -> Outcome {

@@ -1,6 +1,7 @@
 //! A model that can be recalibrated, and presses to do so.
 
 use firmware::link::message::{RecalibrationStep, Report, Request};
+use firmware::store::Slot;
 use mock_board::{Board, COLS, ROWS, ask, blob_to_recalibrate};
 use model_core::blob::Floats;
 use model_core::{AlignedBytes, Decoder};
@@ -28,14 +29,15 @@ fn press(i: usize) -> [f32; READINGS] {
 pub fn recalibrate(device: &mut Device, cut_after: Option<u64>) -> Outcome {
     let supply = device.supply.clone();
     device.session(cut_after, |session, board| {
-        let outcome = in_session(session, board);
+        add(session, board, &model());
+        let outcome = recalibration_step(session, board, RecalibrationStep::Commit);
         if supply.borrow().gone { Outcome::Cut } else { outcome }
     })
 }
 
-fn in_session(session: &mut Running<'_, '_>, board: &Board) -> Outcome {
-    let trained = model();
-    let decoder = Decoder::<ROWS>::load(&trained).expect("a model");
+/// Begins a recalibration of the model `trained`, which is in force, and adds all presses. The device must not scan.
+pub fn add<S: Slot>(session: &mut Running<'_, '_, S>, board: &Board, trained: &AlignedBytes) {
+    let decoder = Decoder::<ROWS>::load(trained).expect("a model");
     recalibration_step(session, board, RecalibrationStep::Begin);
     for i in 0..PRESSES {
         let before = press(i);
@@ -48,5 +50,4 @@ fn in_session(session: &mut Running<'_, '_>, board: &Board) -> Outcome {
         let step = RecalibrationStep::Press { before: i as u16, frames: 0, outputs };
         recalibration_step(session, board, step);
     }
-    recalibration_step(session, board, RecalibrationStep::Commit)
 }
