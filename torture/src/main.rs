@@ -31,7 +31,7 @@ use tools::Tools;
 // One flag of the command line each.
 #[allow(clippy::struct_excessive_bools)]
 #[derive(Debug, Parser)]
-#[command(name = "cargo xtask torture")]
+#[command(name = "torture", bin_name = "cargo xtask torture")]
 struct Arguments {
     /// Promises to test, by the start of their names [default: all]
     #[arg(value_name = "PROMISE")]

@@ -185,8 +185,10 @@ impl Definition {
             Self::FullScalePercent => "%FS = mean|e|/full scale, %",
             Self::PositionalPercent => "positional = mean|e|/(H − Δz), %",
             Self::RSquared => "R² = 1 − Σe²/Σ(Δ − mean Δ)²",
-            Self::MeanRelativePercent => "mean(|e|/|Δ|) where |Δ| > 10 % of full scale, %",
-            Self::RatioToLimit => "ratio = RMSE/least possible RMSE, on a part of the frames",
+            Self::MeanRelativePercent => {
+                "mean relative = mean(|e|/|Δ|) where |Δ| > 10 % of full scale, %"
+            }
+            Self::RatioToLimit => "× limit = RMSE/least possible RMSE, on the frames of the limit",
         }
     }
 

@@ -1,6 +1,8 @@
 //! Parsers of options: names of formats and exponentials, and errors that name an option.
 
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use std::path::PathBuf;
+
+use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
 use host_sim::Error;
 use model_core::rbf::Format;
 use taxel_data::BadValue;
@@ -28,6 +30,20 @@ pub fn precision() -> impl TypedValueParser<Value = Precision> {
     ])
 }
 
+/// Parser for the path of a folder that receives several files: not `-`, which stands for stdout elsewhere.
+pub fn folder() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(|path| {
+        let is_stdout = path.as_os_str() == "-";
+        if is_stdout { Err("a folder is needed; a folder called - is ./-") } else { Ok(path) }
+    })
+}
+
+/// Parser for a number of GB, in bytes.
+pub fn gigabytes(text: &str) -> Result<u64, &'static str> {
+    let gb = text.parse::<f64>().ok().filter(|gb| (1e-3..1e6).contains(gb));
+    gb.map(|gb| (gb * 1e9) as u64).ok_or("give a number of GB from 0.001 on, such as 16")
+}
+
 fn one_of<T: Copy + Send + Sync + 'static, const N: usize>(
     values: [(PossibleValue, T); N],
 ) -> impl TypedValueParser<Value = T> {
@@ -44,5 +60,31 @@ pub fn of_option(bad: BadValue, options: &[(&str, &str)]) -> Error {
     match options.iter().find(|(field, _)| *field == bad.field) {
         Some((_, option)) => Error::Usage(format!("{option} {}: {}", bad.value, bad.rule)),
         None => bad.into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::{Arg, Command};
+
+    #[test]
+    fn memory_is_a_number_of_gigabytes_above_none() {
+        assert_eq!(gigabytes("16"), Ok(16_000_000_000));
+        assert_eq!(gigabytes("0.5"), Ok(500_000_000));
+        for bad in ["0", "-1", "1e-9", "nan", "inf", "abc", ""] {
+            assert!(gigabytes(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn stdout_is_no_folder() {
+        let parse = |path| {
+            let argument = Arg::new("folder").value_parser(folder());
+            Command::new("run").arg(argument).try_get_matches_from(["run", path])
+        };
+        assert!(parse("-").unwrap_err().to_string().contains("./-"));
+        let given = parse("./-").unwrap().get_one::<PathBuf>("folder").cloned();
+        assert_eq!(given, Some("./-".into()));
     }
 }

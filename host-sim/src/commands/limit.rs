@@ -12,7 +12,7 @@ use taxel_limit::identify::Observability;
 
 use super::progress::Terminal;
 use super::scene_argument::SceneArgument;
-use super::{Common, print};
+use super::{Common, arguments, print};
 
 /// All files that `-o` writes.
 const FILES: FileSet =
@@ -48,7 +48,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE,…", value_delimiter = ',')]
     model: Vec<PathBuf>,
     /// Folder that receives limit.json, a page limit.html with pictures, and two pictures by themselves.
-    #[arg(short, long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR", value_parser = arguments::folder())]
     output: Option<PathBuf>,
 }
 

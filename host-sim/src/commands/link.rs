@@ -6,6 +6,7 @@ use std::time::Duration;
 use clap::{Args, Subcommand, value_parser};
 use firmware::seal::Key;
 use host_sim::{Error, Result};
+use taxel_data::input;
 use taxel_learn::ModelBlob;
 use taxel_rig::device::check::check;
 use taxel_rig::device::{Device, DeviceIdentity, LEASE, Sealing, serial, upload};
@@ -52,9 +53,9 @@ enum Action {
     Upload(UploadArguments),
     /// Give the device its key, once: from then on it takes models only that are sealed with it.
     ///
-    /// The key is 32 random bytes, as bytes or as 64 hexadecimal digits: `openssl rand -hex 32`. Keep it secret. A model
-    /// that is on the device already has no seal, and is left: upload it with --key. Only erasing the flash with a
-    /// debugger removes a key (docs/reliability.md).
+    /// The key is 32 random bytes, as bytes or as 64 hexadecimal digits: `(umask 077; openssl rand -hex 32 >
+    /// device.key)`. Keep it secret. A model that is on the device already has no seal, and is left: upload it with --key.
+    /// Only erasing the flash with a debugger removes a key (docs/reliability.md).
     #[command(after_help = "Example: host-sim link /dev/ttyACM0 provision --key device.key")]
     Provision(ProvisionArguments),
     /// Confirm the model that `upload --trial` left on trial: it stays active over restarts.
@@ -139,11 +140,27 @@ struct ProvisionArguments {
     key: PathBuf,
 }
 
+/// Largest file with a key, in bytes.
+const MOST_KEY_BYTES: u64 = 4096;
+
 /// Reads a device's key.
 fn read_key(path: &Path) -> Result<Key> {
-    let content = std::fs::read(path).map_err(|cause| taxel_data::Error::read(path, cause))?;
+    let content = input::read(path, MOST_KEY_BYTES)?;
+    note_readers(path);
     Sealing::key(&content)
         .map_err(|bad| Error::Unfit { path: path.to_owned(), message: bad.to_string() })
+}
+
+/// Notes that others may read the secret at `path`.
+fn note_readers(path: &Path) {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        let mode = std::fs::metadata(path).map_or(0, |metadata| metadata.permissions().mode());
+        if mode & 0o077 != 0 {
+            eprintln!("note: others may read {0}: chmod 600 {0}", path.display());
+        }
+    }
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {

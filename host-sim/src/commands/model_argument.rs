@@ -5,7 +5,7 @@ use model_core::rbf::Format;
 use taxel_learn::Options;
 use taxel_learn::train::WHOLE_ARRAY_SPREAD;
 
-use super::arguments::format;
+use super::arguments::{format, gigabytes};
 
 /// What a model computes, and how its numbers are held.
 #[derive(Args, Default)]
@@ -29,8 +29,8 @@ pub struct ModelArguments {
     #[arg(long, value_name = "FORMAT", value_parser = format())]
     format: Option<Format>,
     /// Memory in GB that training may take; where it would take more, it is refused at once [default: 8].
-    #[arg(long, value_name = "GB")]
-    most_memory: Option<u32>,
+    #[arg(long, value_name = "GB", value_parser = gigabytes)]
+    most_memory: Option<u64>,
 }
 
 impl ModelArguments {
@@ -43,9 +43,7 @@ impl ModelArguments {
         }
         options.features = self.features.or(options.features);
         options.output_rank = self.output_rank.or(options.output_rank);
-        if let Some(most_gb) = self.most_memory {
-            options.most_memory_bytes = u64::from(most_gb) * 1_000_000_000;
-        }
+        options.most_memory_bytes = self.most_memory.unwrap_or(options.most_memory_bytes);
         options.format = self.format.unwrap_or(options.format);
         options
     }

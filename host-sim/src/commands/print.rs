@@ -211,7 +211,8 @@ fn number(value: f64) -> String {
 pub fn errors_legend(page: &mut Page) {
     page.line(
         "rel. L2 = ‖e‖/‖Δ‖; %FS = mean|e|/full scale; position = mean|e|/(H − Δz);\n\
-         mean rel = mean(|e|/|Δ|) where |Δ| > 10 % FS; × limit = RMSE/least possible RMSE, on the same frames;\n\
+         mean rel = mean(|e|/|Δ|) where |Δ| > 10 % FS;\n\
+         × limit = RMSE/least possible RMSE, on the frames of the limit;\n\
          full scale (FS): the largest deformation that the scene allows, or a measured column's range",
     );
 }

@@ -14,7 +14,7 @@ use taxel_learn::{ModelBlob, Options};
 
 use super::model_argument::ModelArguments;
 use super::subject_argument::SubjectArgument;
-use super::{Common, command_line, print};
+use super::{Common, arguments, command_line, print};
 
 const DEFAULT_OUTPUT: &str = "out";
 /// All files that a run may write.
@@ -46,7 +46,7 @@ pub struct Arguments {
     #[command(flatten)]
     model: ModelArguments,
     /// Folder that receives a folder named after the scene.
-    #[arg(short, long, value_name = "DIR", default_value = DEFAULT_OUTPUT)]
+    #[arg(short, long, value_name = "DIR", value_parser = arguments::folder(), default_value = DEFAULT_OUTPUT)]
     output: PathBuf,
 }
 

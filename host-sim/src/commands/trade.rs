@@ -12,7 +12,7 @@ use host_sim::subject::Subject;
 use host_sim::{Error, Result};
 use taxel_data::columns;
 
-use super::arguments::of_option;
+use super::arguments::{self, of_option};
 use super::progress::Terminal;
 use super::subject_argument::SubjectArgument;
 use super::{Common, print};
@@ -42,7 +42,7 @@ pub struct Arguments {
     #[command(flatten)]
     subject: SubjectArgument,
     /// Folder that receives a folder named after the scene or the CSV file.
-    #[arg(short, long, value_name = "DIR", default_value = "out")]
+    #[arg(short, long, value_name = "DIR", value_parser = arguments::folder(), default_value = "out")]
     output: PathBuf,
     /// Centres K to try [default: 16,32,64,128,256, of a CSV file those that are fewer than its training frames].
     #[arg(long, value_name = "K", value_delimiter = ',')]
@@ -130,6 +130,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let computed = trade::compute(&subject, &plan, group, &bounds, &Terminal::new());
     let mut trade = computed.map_err(|error| match error {
         Error::Setting(bad) => of_option(bad, &OPTIONS),
+        Error::Learn(taxel_learn::Error::Setting(bad)) if bad.field == "memory" => {
+            let fix = "give fewer --centres or --inputs";
+            Error::Usage(format!("training takes {}, more than 8 GB: {fix}", bad.value))
+        }
         Error::NoPoint(cause) => Error::Usage(cause.text(option)),
         other => other,
     })?;

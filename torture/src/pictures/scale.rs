@@ -34,40 +34,60 @@ pub fn by_offset(tools: &Tools) -> Result<String, String> {
     Ok(chart.draw())
 }
 
-/// Lines of f32 and fixed16, for changes of an input and of the output.
+/// Formats of the pictures: name of an input's line, an output's, and of both where they are alike.
+const PLOTTED: [(&str, [&str; 3], bool); 2] = [
+    (FORMATS[0], ["f32, an input", "f32, an output", "f32, input or output"], false),
+    (FORMATS[2], ["fixed16, an input", "fixed16, an output", "fixed16, input or output"], true),
+];
+
+/// Lines of f32 and fixed16, for changes of an input and of the output; one where these are alike.
 fn lines(tools: &Tools, values: &[f64], change: fn(f64) -> Change) -> Result<Vec<Line>, String> {
     let program = &path_of(tools)?;
     let folder = folder(0)?;
     let mut lines = Vec::new();
-    for (name, colour, dashed, format, is_output) in [
-        ("f32, an input", 1, false, FORMATS[0], false),
-        ("f32, an output", 3, false, FORMATS[0], true),
-        ("fixed16, an input", 2, true, FORMATS[2], false),
-        ("fixed16, an output", 4, true, FORMATS[2], true),
-    ] {
-        let (mut points, mut crosses) = (Vec::new(), Vec::new());
-        let mut was_refused = false;
-        for value in values {
-            let changed = change(*value);
-            let changes = if is_output { [Change::NONE, changed] } else { [changed, Change::NONE] };
-            let here = match run(program, &folder, format, changes, false)? {
-                Outcome::Accepted(r_squared) => Some([*value, 1.0 - r_squared]),
-                Outcome::Refused | Outcome::Noted => None,
-            };
-            match here {
-                Some(point) => {
-                    if was_refused && points.is_empty() {
-                        crosses.push(point);
+    for (index, (format, [input_name, output_name, both], dashed)) in
+        PLOTTED.into_iter().enumerate()
+    {
+        let line = |name, colour: u8, is_output| -> Result<Line, String> {
+            let (mut points, mut crosses) = (Vec::new(), Vec::new());
+            let mut was_refused = false;
+            for value in values {
+                let changed = change(*value);
+                let changes =
+                    if is_output { [Change::NONE, changed] } else { [changed, Change::NONE] };
+                let here = match run(program, &folder, format, changes, false)? {
+                    Outcome::Accepted(r_squared) => Some([*value, 1.0 - r_squared]),
+                    Outcome::Refused | Outcome::Noted => None,
+                };
+                match here {
+                    Some(point) => {
+                        if was_refused && points.is_empty() {
+                            crosses.push(point);
+                        }
+                        points.push(point);
                     }
-                    points.push(point);
+                    None if !was_refused => crosses.extend(points.last().copied()),
+                    None => {}
                 }
-                None if !was_refused => crosses.extend(points.last().copied()),
-                None => {}
+                was_refused = here.is_none();
             }
-            was_refused = here.is_none();
+            Ok(Line { name, colour, dashed, points, crosses })
+        };
+        let colour = index as u8 + 1;
+        let [input, output] =
+            [line(input_name, colour, false)?, line(output_name, colour + 2, true)?];
+        if are_alike(&input, &output) {
+            lines.push(Line { name: both, ..input });
+        } else {
+            lines.extend([input, output]);
         }
-        lines.push(Line { name, colour, dashed, points, crosses });
     }
     let _ = std::fs::remove_dir_all(&folder);
     Ok(lines)
+}
+
+/// Whether two lines cannot be told apart in a picture.
+fn are_alike(a: &Line, b: &Line) -> bool {
+    let is_near = |(a, b): (&[f64; 2], &[f64; 2])| a[0] == b[0] && (a[1] / b[1]).ln().abs() < 0.1;
+    a.points.len() == b.points.len() && a.points.iter().zip(&b.points).all(is_near)
 }

@@ -28,13 +28,13 @@ impl Sealing {
     /// # Errors
     /// [`BadValue`] for anything else, and for a key whose bytes are all alike.
     pub fn key(content: &[u8]) -> std::result::Result<Key, BadValue> {
-        let bad = |rule: &str| BadValue::new("key", format!("of {} bytes", content.len()), rule);
+        let bad = |rule: &str| BadValue::new("key", format!("{} bytes", content.len()), rule);
         let key = Key::try_from(content).ok().or_else(|| of_digits(content));
         let key = key.ok_or_else(|| {
-            bad("must be 32 bytes or 64 hexadecimal digits; `openssl rand -hex 32` makes one")
+            bad("give 32 bytes or 64 hexadecimal digits; `openssl rand -hex 32` makes them")
         })?;
         if key.iter().all(|byte| *byte == key[0]) {
-            return Err(bad("must not be one byte again and again"));
+            return Err(bad("give other bytes than the same one again and again"));
         }
         Ok(key)
     }

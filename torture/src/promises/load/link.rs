@@ -31,10 +31,11 @@ const TURNS: u64 = 3000;
 
 fn check(effort: &Effort, _: &Tools) -> Result<Found, String> {
     let planted = effort.is_planted();
-    let counts = Tally::new(["produced", "arrived", "counted as lost"]);
+    let counts = Tally::new(["produced", "arrived", "counted as lost", "of them both"]);
     let mut found = effort.worst((LEAST, 1 << 40), (0.0, "reports"), |seed| {
         let [produced, arrived, lost] = run(seed, planted)?;
-        [produced, arrived, lost].iter().enumerate().for_each(|(i, n)| counts.add(i, *n));
+        let both = (arrived + lost).saturating_sub(produced);
+        [produced, arrived, lost, both].iter().enumerate().for_each(|(i, n)| counts.add(i, *n));
         // A report that was given up before its very last byte arrives after all, with the byte that ends it.
         Ok(produced.saturating_sub(arrived + lost) as f64)
     });
