@@ -8,6 +8,7 @@ mod command_line;
 mod model_outputs;
 mod scene_argument;
 mod data_notes;
+mod refused_readings;
 mod data_file;
 mod readings;
 mod health;

@@ -14,7 +14,7 @@ use taxel_learn::{ModelBlob, Options};
 
 use super::model_argument::ModelArguments;
 use super::subject_argument::SubjectArgument;
-use super::{Common, command_line, print};
+use super::{Common, command_line, print, refused_readings};
 
 const DEFAULT_OUTPUT: &str = "out";
 /// All files that a run may write.
@@ -72,6 +72,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     options.check(subject.training_frames())?;
     let folder = arguments.output.join(subject.name());
     FILES.check(&folder, &arguments.subject.paths())?;
+    refused_readings::note_scene(&subject);
     run_into(&folder, &subject, &options, common)
 }
 

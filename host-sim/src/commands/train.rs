@@ -19,7 +19,7 @@ use super::data_argument::JudgedBy;
 use super::model_argument::ModelArguments;
 use super::model_outputs::{self, ModelOutput};
 use super::subject_argument::SubjectOptions;
-use super::{Common, print};
+use super::{Common, print, refused_readings};
 
 mod choice;
 
@@ -120,6 +120,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let joined = arguments.subject.data.file.join().unwrap_or(source);
     print::check_output(&arguments.output, &[source, baseline, joined])?;
     let subject = load(arguments, common)?;
+    refused_readings::note_scene(&subject);
     let mut options = arguments.model.over(subject.options());
     let mut set = subject.training_set(1);
     set.fill |= arguments.fill;
