@@ -57,6 +57,7 @@ pub fn advice(error: &Error) -> &'static str {
     use taxel_data::error::Problem;
     match error {
         Error::Learn(taxel_learn::Error::OneRow { .. }) => " (--whole-array)",
+        Error::Learn(taxel_learn::Error::NoFill(_)) => " (leave --fill or training.fill out)",
         Error::Setting(bad) | Error::Learn(taxel_learn::Error::Setting(bad))
             if bad.field == "folds" =>
         {

@@ -64,7 +64,7 @@ impl Default for Arguments {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let subject = arguments.subject.load(common)?;
+    let subject = arguments.subject.load_with(common, arguments.centres)?;
     let mut options = arguments.model.over(subject.options());
     options.centres = arguments.centres.unwrap_or(options.centres);
     options.spread = arguments.spread.unwrap_or(options.spread);
