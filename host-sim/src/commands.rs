@@ -8,6 +8,7 @@ mod command_line;
 mod model_outputs;
 mod scene_argument;
 mod data_notes;
+mod refused_readings;
 mod data_file;
 mod readings;
 mod health;
@@ -56,6 +57,7 @@ pub fn advice(error: &Error) -> &'static str {
     use taxel_data::error::Problem;
     match error {
         Error::Learn(taxel_learn::Error::OneRow { .. }) => " (--whole-array)",
+        Error::Learn(taxel_learn::Error::NoFill(_)) => " (leave --fill or training.fill out)",
         Error::Setting(bad) | Error::Learn(taxel_learn::Error::Setting(bad))
             if bad.field == "folds" =>
         {

@@ -1,5 +1,7 @@
 //! Column names of data files: their units, row-wires and groups.
 
+use crate::error::cut;
+
 /// Endings of column names that state a unit, each with the unit as it is written.
 const UNITS: [(&str, &str); 7] = [
     ("_ohm", "Ω"),
@@ -108,7 +110,7 @@ pub fn unmatched<'p>(header: &[String], pattern: &'p str) -> Option<&'p str> {
 #[must_use]
 pub fn some_names(header: &[String]) -> String {
     const SHOWN: usize = 8;
-    let shown = header.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join(", ");
+    let shown = header.iter().take(SHOWN).map(|name| cut(name)).collect::<Vec<_>>().join(", ");
     if header.len() > SHOWN { format!("{shown}, … ({} columns)", header.len()) } else { shown }
 }
 

@@ -2,6 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+mod text;
+
+use text::short;
+pub use text::{cut, in_words, number, quoted};
+
 /// Result of the functions of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
@@ -34,16 +39,6 @@ impl BadValue {
     #[must_use]
     pub fn named(self, field: impl Into<String>) -> Self {
         Self { field: field.into(), ..self }
-    }
-}
-
-/// Value as text; a number of many digits as one with a power of ten.
-fn short(value: String) -> String {
-    /// Length from which a number is hard to read.
-    const LONG: usize = 24;
-    match value.parse::<f64>() {
-        Ok(number) if value.len() > LONG => format!("{number:e}"),
-        _ => value,
     }
 }
 
@@ -117,17 +112,6 @@ impl Error {
     }
 }
 
-/// Number of bytes in the unit that people use for it.
-#[must_use]
-pub fn in_words(bytes: u64) -> String {
-    match bytes {
-        0..1_000 => format!("{bytes} bytes"),
-        1_000..1_000_000 => format!("{} kB", bytes / 1_000),
-        1_000_000..1_000_000_000 => format!("{} MB", bytes / 1_000_000),
-        _ => format!("{:.1} GB", bytes as f64 / 1e9),
-    }
-}
-
 /// Role of the columns that a pattern selects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
@@ -184,7 +168,7 @@ pub enum Problem {
         line: usize,
     },
     /// Column name that is empty or holds a control character.
-    #[error("line 1: column {column} has no usable name {name:?}")]
+    #[error("line 1: column {column} has no usable name {}", quoted(name))]
     UnusableName {
         /// Number of the column.
         column: usize,
@@ -192,7 +176,7 @@ pub enum Problem {
         name: String,
     },
     /// Name that two columns share.
-    #[error("line 1: column {name:?} stands twice; rename one")]
+    #[error("line 1: column {} stands twice; rename one", quoted(name))]
     RepeatedName {
         /// Name of the columns.
         name: String,
@@ -227,7 +211,9 @@ pub enum Problem {
     },
     /// Field that is not a number.
     #[error(
-        "line {line}, column {column:?}: {field:?} is not a number; leave the field empty if the value is missing"
+        "line {line}, column {}: {} is not a number; leave the field empty if the value is missing",
+        quoted(column),
+        quoted(field)
     )]
     NotANumber {
         /// Number of the line.
@@ -238,7 +224,10 @@ pub enum Problem {
         field: String,
     },
     /// Value of an array that is infinite.
-    #[error("line {line}, column {column:?}: the value is infinite; write NaN if it is missing")]
+    #[error(
+        "line {line}, column {}: the value is infinite; write NaN if it is missing",
+        quoted(column)
+    )]
     Infinite {
         /// Number of the line.
         line: u64,
@@ -252,7 +241,7 @@ pub enum Problem {
         cause: String,
     },
     /// Column that is needed and missing.
-    #[error("column {name:?} is missing; the file has: {known}")]
+    #[error("column {} is missing; the file has: {known}", quoted(name))]
     MissingColumn {
         /// Name of the missing column.
         name: String,
@@ -282,14 +271,16 @@ pub enum Problem {
         known: String,
     },
     /// Column that both patterns select, as input and as output.
-    #[error("column {name:?} is chosen as an input and as an output")]
+    #[error("column {} is chosen as an input and as an output", quoted(name))]
     InputAndOutput {
         /// Name of the column.
         name: String,
     },
     /// Value too large to train on.
     #[error(
-        "line {line}, column {column:?}: {value:?} is beyond {bound:e}, the largest number that a decoder in f32 is trained on; give the column another unit"
+        "line {line}, column {}: {value:?} is beyond {bound:e}, the largest number that a decoder in f32 is trained on; \
+         give the column another unit",
+        quoted(column)
     )]
     TooLarge {
         /// Number of the line.
@@ -306,7 +297,8 @@ pub enum Problem {
     NoCompleteLine,
     /// Value beyond a physical bound.
     #[error(
-        "line {line}, column {column:?}: {value:?} {unit} is beyond {bound_of} ({bound:?} {unit})"
+        "line {line}, column {}: {value:?} {unit} is beyond {bound_of} ({bound:?} {unit})",
+        quoted(column)
     )]
     OutOfBound {
         /// Number of the line.
@@ -332,8 +324,9 @@ pub enum Problem {
     },
     /// Time stamp before that of the line before.
     #[error(
-        "line {line}, column {column:?}: {value} is earlier than {before} before it; sort the lines by time, or split \
-         the file where the clock was set back"
+        "line {line}, column {}: {} is earlier than {} before it; sort the lines by time, or split the file where the \
+         clock was set back",
+        quoted(column), number(*value), number(*before)
     )]
     ClockSetBack {
         /// Number of the line.
@@ -347,8 +340,9 @@ pub enum Problem {
     },
     /// Log of which no line has a partner in another one.
     #[error(
-        "no time stamp is within tolerance = {tolerance} of one in {other}: the nearest are {distance} apart; raise the \
-         tolerance, set the lag between the clocks, or check which columns hold the time"
+        "no time stamp is within tolerance = {} of one in {other}: the nearest are {} apart; raise the tolerance, set \
+         the lag between the clocks, or check which columns hold the time",
+        number(*tolerance), number(*distance)
     )]
     NoPartner {
         /// Path of the other log.

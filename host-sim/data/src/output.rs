@@ -96,7 +96,11 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
 /// [`Error::Write`] if `path` cannot be written, or [`Error::WrittenOverInput`] if it is an input.
 pub fn check_writable(path: &Path, inputs: &[&Path]) -> Result<()> {
     let error = |cause| Error::write(path, cause);
-    let Place::File { real, .. } = Place::of(path).map_err(error)? else { return Ok(()) };
+    let real = match Place::of(path).map_err(error)? {
+        Place::File { real, .. } => real,
+        Place::Stdout => return check_not_behind(Path::new("/dev/stdout"), path, inputs),
+        Place::Stream { path: stream, .. } => return check_not_behind(&stream, path, inputs),
+    };
     check_no_input(path, inputs)?;
     temporary::remove_leftovers(&System, &real);
     Temporary::beside(&System, &real).map(drop).map_err(error)
@@ -118,6 +122,28 @@ fn check_no_input(output: &Path, inputs: &[&Path]) -> Result<()> {
         }
         None => Ok(()),
     }
+}
+
+/// Checks that the `stream` which `output` leads to is no regular file among the `inputs`, under whatever name.
+#[cfg(unix)]
+fn check_not_behind(stream: &Path, output: &Path, inputs: &[&Path]) -> Result<()> {
+    use std::os::unix::fs::MetadataExt;
+    let file = |path: &Path| {
+        let found = fs::metadata(path).ok().filter(fs::Metadata::is_file);
+        found.map(|found| (found.dev(), found.ino()))
+    };
+    let Some(behind) = file(stream) else { return Ok(()) };
+    match inputs.iter().find(|input| file(input) == Some(behind)) {
+        Some(input) => {
+            Err(Error::WrittenOverInput { output: output.into(), input: (*input).into() })
+        }
+        None => Ok(()),
+    }
+}
+
+#[cfg(not(unix))]
+fn check_not_behind(_: &Path, _: &Path, _: &[&Path]) -> Result<()> {
+    Ok(())
 }
 
 #[cfg(test)]

@@ -126,8 +126,19 @@ impl Experiment {
     /// [`Error::Data`] for a file that cannot be read, [`Error::Syntax`] or [`Error::Scene`] for its
     /// content.
     pub fn load(name_or_path: &str) -> Result<Self> {
+        let scene = Self::load_open(name_or_path)?;
+        scene.check_sizes().map_err(|cause| Error::Scene { scene: name_or_path.into(), cause })?;
+        Ok(scene)
+    }
+
+    /// Reads a scene as [`load`](Self::load) does, but for its numbers of frames and of centres to train with: options
+    /// may replace them. [`check_sizes`](Self::check_sizes) checks what is in force then.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load).
+    pub fn load_open(name_or_path: &str) -> Result<Self> {
         if let Some((_, text)) = EMBEDDED.iter().find(|(name, _)| *name == name_or_path) {
-            return Self::parse(name_or_path, text);
+            return Self::parse_open(name_or_path, text);
         }
         let path = Path::new(name_or_path);
         let text = input::read_text(path).map_err(|error| match error {
@@ -139,7 +150,7 @@ impl Experiment {
             }
             other => other,
         })?;
-        Self::parse(name_or_path, &text)
+        Self::parse_open(name_or_path, &text)
     }
 
     /// Reads a scene from its text; `origin` names it in messages.
@@ -147,6 +158,13 @@ impl Experiment {
     /// # Errors
     /// [`Error::Syntax`] for text that is no scene, [`Error::Scene`] for a setting that cannot be used.
     pub fn parse(origin: &str, text: &str) -> Result<Self> {
+        let scene = Self::parse_open(origin, text)?;
+        scene.check_sizes().map_err(|cause| Error::Scene { scene: origin.into(), cause })?;
+        Ok(scene)
+    }
+
+    /// Reads a scene from its text, but does not check its sizes.
+    fn parse_open(origin: &str, text: &str) -> Result<Self> {
         let file: file::SceneFile = toml::from_str(text).map_err(|cause| Error::Syntax {
             scene: origin.into(),
             message: shortened(cause.to_string().trim_end()),
@@ -261,16 +279,23 @@ impl Experiment {
             "it names a folder; use letters, digits, - and _".into()
         })?;
         self.world.check()?;
-        check_training(&self.training)?;
+        check_spread("training.spread", self.training.spread)?;
         self.table1.as_ref().map_or(Ok(()), check_table1)?;
         self.check_outputs()?;
+        let Some(t) = &self.table1 else { return Ok(()) };
+        self.world.check_frames("table1.frames", t.frames)?;
+        self.world.check_frames("table1.test_frames", t.test_frames)
+    }
+
+    /// Checks the numbers of frames and of centres to train with, which options may have replaced.
+    ///
+    /// # Errors
+    /// [`BadValue`] for the first one that cannot be used, by its name in a scene.
+    pub fn check_sizes(&self) -> Check {
         let t = &self.training;
-        let mut counts =
-            vec![("training.frames", t.frames), ("training.test_frames", t.test_frames)];
-        if let Some(t) = &self.table1 {
-            counts.extend([("table1.frames", t.frames), ("table1.test_frames", t.test_frames)]);
-        }
-        counts.into_iter().try_for_each(|(field, frames)| self.world.check_frames(field, frames))
+        check_sizes("training", t.frames, t.test_frames, t.centres)?;
+        self.world.check_frames("training.frames", t.frames)?;
+        self.world.check_frames("training.test_frames", t.test_frames)
     }
 }
 
@@ -299,11 +324,6 @@ fn shortened(message: &str) -> String {
         None => line.to_owned(),
     };
     message.lines().map(cut).collect::<Vec<_>>().join("\n")
-}
-
-fn check_training(t: &Training) -> Check {
-    check_sizes("training", t.frames, t.test_frames, t.centres)?;
-    check_spread("training.spread", t.spread)
 }
 
 fn check_table1(t: &Table1) -> Check {

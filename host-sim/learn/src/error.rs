@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use model_core::blob::{DecodeError, EncodeError};
 use model_core::rbf::{Format, NetworkError};
 use taxel_data::BadValue;
-use taxel_data::error::Role;
+use taxel_data::error::{Role, quoted};
 
 /// Result of the functions of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
@@ -88,7 +88,7 @@ pub enum Error {
         cause: DecodeError,
     },
     /// Column of which f32 would leave too little ([`resolution`](crate::train::resolution)).
-    #[error("column {column:?} goes from {:?} to {:?}, and {}", range[0], range[1], why.words(*role, *range))]
+    #[error("column {} goes from {:?} to {:?}, and {}", quoted(column), range[0], range[1], why.words(*role, *range))]
     Column {
         /// Name of the column.
         column: String,

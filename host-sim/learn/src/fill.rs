@@ -7,6 +7,7 @@
 use model_core::fill::Fill;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
+use taxel_data::dataset::Dataset;
 use taxel_data::table::Table;
 
 use crate::error::{Error, Result};
@@ -19,8 +20,28 @@ const FACTORS: usize = 16;
 const ROUNDS: usize = 30;
 /// Least variance of a reading's own noise, relative to the reading's variance.
 const NOISE_FLOOR: f64 = 1e-6;
+/// Least number of readings of which some can be told from the others.
+const LEAST_READINGS: usize = 4;
 /// Frames whose products are summed before the sum is added to those of others.
 const FRAMES_AT_ONCE: usize = 1024;
+
+/// Checks before long work that a model which is trained on `frames` can fill missing readings.
+///
+/// # Errors
+/// [`Error::NoFill`] for readings relative to the baseline, or fewer than four.
+pub fn check(frames: &Dataset) -> Result<()> {
+    check_inputs(frames.relative_inputs, frames.inputs.names.len())
+}
+
+fn check_inputs(are_relative: bool, count: usize) -> Result<()> {
+    if are_relative {
+        return Err(Error::NoFill("its inputs are relative to the baseline"));
+    }
+    if count < LEAST_READINGS {
+        return Err(Error::NoFill("it has fewer than four readings"));
+    }
+    Ok(())
+}
 
 /// Adds to the model in `blob` a fill of missing readings, fitted to `readings`.
 ///
@@ -29,12 +50,7 @@ const FRAMES_AT_ONCE: usize = 1024;
 /// that are no numbers. [`Error::NotPacked`] for a model beyond what the format holds.
 pub fn add(blob: &ModelBlob, readings: &Table) -> Result<ModelBlob> {
     let count = readings.names.len();
-    if blob.parse().metadata().relative_inputs {
-        return Err(Error::NoFill("its inputs are relative to the baseline"));
-    }
-    if count < 4 {
-        return Err(Error::NoFill("it has fewer than four readings"));
-    }
+    check_inputs(blob.parse().metadata().relative_inputs, count)?;
     let factors = FACTORS.min(count / 2);
     let block = fit(readings, factors).ok_or(Error::NoFill("readings are no numbers"))?;
     let fill =

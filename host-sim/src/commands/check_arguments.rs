@@ -16,7 +16,7 @@ use taxel_simulate::{Synthesis, World, synthesise};
 use super::data_file::FieldArguments;
 use super::progress::Terminal;
 use super::readings::{BaselineArgument, model_inputs};
-use super::scene_argument::{DEFAULT_SCENE, SceneArgument};
+use super::scene_argument::{DEFAULT_SCENE, SceneArgument, Sizes};
 use super::{Common, arguments, print};
 
 /// Options of a check.
@@ -119,11 +119,11 @@ impl CheckArguments {
     }
 
     fn load_scene(&self, common: &Common) -> Result<Checked> {
-        let scene = SceneArgument::new(&self.source, self.precision).load(common)?;
+        let scene = SceneArgument::new(&self.source, self.precision).load_world(common)?;
         scene.world.check_frames("-n", self.frames)?;
         let model = match &self.model {
             Some(path) => ModelBlob::read(path)?,
-            None => scene.train(&Terminal::new())?,
+            None => Sizes::default().apply(scene.clone(), &self.source)?.train(&Terminal::new())?,
         };
         let parsed = model.parse();
         let metadata = parsed.metadata();

@@ -15,7 +15,7 @@ use taxel_learn::train::resolution;
 use taxel_learn::{Options, select};
 
 use super::data_file::DataFileArguments;
-use super::{data_notes, readings};
+use super::{data_notes, readings, refused_readings};
 
 /// What a CSV file's columns are.
 #[derive(Args, Default)]
@@ -206,7 +206,9 @@ impl DataArguments {
         let left_out = "training and judging (--keep-outliers keeps them)";
         data_notes::print_outliers(&outliers, &file.path, frames.frames(), left_out);
         let lines = outliers.kept.iter().map(|frame| lines[*frame]).collect();
-        Ok((frames.subset(&outliers.kept), lines, outliers))
+        let frames = frames.subset(&outliers.kept);
+        refused_readings::note(&frames.inputs, &file.path.display().to_string());
+        Ok((frames, lines, outliers))
     }
 
     /// Frames of `file`, and the indices of their lines.

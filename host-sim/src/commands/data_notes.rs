@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use taxel_data::columns;
+use taxel_data::error::{cut, number};
 use taxel_learn::outliers::{Outlier, Outliers};
 
 /// Most lines with outliers that are named.
@@ -54,13 +55,14 @@ fn name_line(outliers: &[Outlier]) -> String {
         2 => ", and 1 more column".into(),
         count => format!(", and {} more columns", count - 1),
     };
+    let (column, value) = (cut(column), number(*value));
     format!("  line {line}: {column} = {value}, where others are {low} to {high}{more}")
 }
 
 fn note_on_constant(constant: &[String], name: &str) -> Option<String> {
     let which = match constant.len() {
         0 => return None,
-        1 => format!("{} never changes", constant[0]),
+        1 => format!("{} never changes", cut(&constant[0])),
         count => format!("{count} inputs never change: {}", columns::some_names(constant)),
     };
     Some(format!(

@@ -34,7 +34,7 @@ struct Summary {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let scene = Experiment::load(&arguments.scene)?;
+    let scene = Experiment::load_open(&arguments.scene)?;
     let file = DataFile::read(&arguments.deformation)?;
     print::check_output(&arguments.output, &[&arguments.deformation, arguments.scene.as_ref()])?;
     let readings = forward(&scene.world, &file)?;

@@ -14,7 +14,7 @@ use taxel_learn::{ModelBlob, Options};
 
 use super::model_argument::ModelArguments;
 use super::subject_argument::SubjectArgument;
-use super::{Common, arguments, command_line, print};
+use super::{Common, arguments, command_line, print, refused_readings};
 
 const DEFAULT_OUTPUT: &str = "out";
 /// All files that a run may write.
@@ -64,7 +64,7 @@ impl Default for Arguments {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let subject = arguments.subject.load(common)?;
+    let subject = arguments.subject.load_with(common, arguments.centres)?;
     let mut options = arguments.model.over(subject.options());
     options.centres = arguments.centres.unwrap_or(options.centres);
     options.spread = arguments.spread.unwrap_or(options.spread);
@@ -72,6 +72,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     options.check(subject.training_frames())?;
     let folder = arguments.output.join(subject.name());
     FILES.check(&folder, &arguments.subject.paths())?;
+    refused_readings::note_scene(&subject);
     run_into(&folder, &subject, &options, common)
 }
 

@@ -39,7 +39,13 @@ impl SceneArgument {
 
     /// Loads the scene and applies the overrides.
     pub fn load(&self, common: &Common) -> Result<Experiment> {
-        let mut scene = Experiment::load(&self.scene)?;
+        let scene = self.load_world(common)?;
+        Sizes::default().apply(scene, &self.scene)
+    }
+
+    /// Loads the scene for its world, whatever it says of training, and applies the overrides.
+    pub fn load_world(&self, common: &Common) -> Result<Experiment> {
+        let mut scene = Experiment::load_open(&self.scene)?;
         let world = &mut scene.world;
         world.seed = common.seed.unwrap_or(world.seed);
         world.precision = self.precision.unwrap_or(world.precision);
@@ -49,6 +55,39 @@ impl SceneArgument {
     /// Path of the scene, as an input that must not be replaced.
     pub fn path(&self) -> &Path {
         Path::new(&self.scene)
+    }
+}
+
+/// Numbers of frames and centres to train with that options give instead of the scene's.
+#[derive(Clone, Copy, Default)]
+pub struct Sizes {
+    /// Frames (`-n`).
+    pub frames: Option<usize>,
+    /// Centres, or the fewest of several candidates (`--centres`).
+    pub centres: Option<usize>,
+}
+
+impl Sizes {
+    /// The scene from `source` with these numbers, which are checked together with those that it keeps.
+    pub fn apply(self, mut scene: Experiment, source: &str) -> Result<Experiment> {
+        let training = &mut scene.training;
+        training.frames = self.frames.unwrap_or(training.frames);
+        training.centres = self.centres.unwrap_or(training.centres);
+        let Err(mut bad) = scene.check_sizes() else { return Ok(scene) };
+        let all = [
+            ("training.frames", "-n", self.frames.is_some()),
+            ("training.centres", "--centres", self.centres.is_some()),
+        ];
+        let given = all.iter().filter(|(.., is_given)| *is_given);
+        let options: Vec<(&str, &str)> =
+            given.map(|(field, option, _)| (*field, *option)).collect();
+        for (field, option) in &options {
+            bad.rule = bad.rule.replace(field, option);
+        }
+        if options.iter().any(|(field, _)| *field == bad.field) {
+            return Err(arguments::of_option(bad, &options));
+        }
+        Err(Error::Scene { scene: source.into(), cause: bad })
     }
 }
 

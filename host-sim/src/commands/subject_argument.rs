@@ -12,7 +12,7 @@ use taxel_simulate::sensor::Precision;
 
 use super::data_argument::{DataArguments, HowToTrain, JudgedBy};
 use super::scene_argument::{
-    self, DEFAULT_SCENE, NoiseArgument, RefineArgument, RelativeInputsArgument,
+    self, DEFAULT_SCENE, NoiseArgument, RefineArgument, RelativeInputsArgument, Sizes,
 };
 use super::{Common, arguments};
 
@@ -56,9 +56,15 @@ fn names_a_scene(source: &str) -> bool {
 impl SubjectArgument {
     /// Loads the scene or the CSV file.
     pub fn load(&self, common: &Common) -> Result<Subject> {
+        self.load_with(common, None)
+    }
+
+    /// Loads the scene or the CSV file; `centres` are instead of the scene's.
+    pub fn load_with(&self, common: &Common, centres: Option<usize>) -> Result<Subject> {
         let source = self.source.as_deref().unwrap_or(DEFAULT_SCENE);
         let judged = self.test.as_deref().map_or(JudgedBy::HeldOut, JudgedBy::File);
-        let mut subject = self.options.load(source, common, judged, false)?;
+        let sizes = Sizes { frames: None, centres };
+        let mut subject = self.options.load(source, common, judged, false, sizes)?;
         match &mut subject {
             Subject::Scene(_) if self.test.is_some() => {
                 let message =
@@ -90,17 +96,20 @@ impl SubjectArgument {
 }
 
 impl SubjectOptions {
-    /// Loads the scene or CSV file called `source`. `confidence` asks for one, whatever a scene says.
+    /// Loads the scene or CSV file called `source`. `confidence` asks for one, whatever a scene says; `sizes` are instead
+    /// of the scene's.
     pub fn load(
         &self,
         source: &str,
         common: &Common,
         judged: JudgedBy<'_>,
         confidence: bool,
+        sizes: Sizes,
     ) -> Result<Subject> {
         if names_a_scene(source) {
-            let mut scene = Experiment::load(source)?;
+            let scene = Experiment::load_open(source)?;
             self.data.refuse_for_scene()?;
+            let mut scene = sizes.apply(scene, source)?;
             scene.world.seed = common.seed.unwrap_or(scene.world.seed);
             self.relative_inputs.apply(&mut scene);
             self.noise.apply(&mut scene)?;

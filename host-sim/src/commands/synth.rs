@@ -50,7 +50,7 @@ struct Summary {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let mut scene = arguments.scene.load(common)?;
+    let mut scene = arguments.scene.load_world(common)?;
     arguments.noise.apply(&mut scene)?;
     scene.world.check_frames("-n", arguments.frames)?;
     print::check_output(&arguments.output, &[arguments.scene.path()])?;

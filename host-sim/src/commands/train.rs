@@ -12,14 +12,16 @@ use host_sim::{Error, Result};
 use model_core::rbf::Format;
 use serde::Serialize;
 use taxel_data::{columns, output};
+use taxel_learn::fill;
 use taxel_learn::outliers::Outliers;
 use taxel_learn::select::Selection;
 
 use super::data_argument::JudgedBy;
 use super::model_argument::ModelArguments;
 use super::model_outputs::{self, ModelOutput};
+use super::scene_argument::Sizes;
 use super::subject_argument::SubjectOptions;
-use super::{Common, print};
+use super::{Common, print, refused_readings};
 
 mod choice;
 
@@ -120,9 +122,13 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let joined = arguments.subject.data.file.join().unwrap_or(source);
     print::check_output(&arguments.output, &[source, baseline, joined])?;
     let subject = load(arguments, common)?;
+    refused_readings::note_scene(&subject);
     let mut options = arguments.model.over(subject.options());
     let mut set = subject.training_set(1);
     set.fill |= arguments.fill;
+    if set.fill {
+        fill::check(&set.frames)?;
+    }
     if arguments.select && options.whole_array {
         return Err(Error::Usage(
             "--select chooses for one network a row: give --centres, --spread and --penalty with --whole-array".into(),
@@ -183,22 +189,19 @@ fn load(arguments: &Arguments, common: &Common) -> Result<Subject> {
         let message = "--baseline is what --relative-inputs divides by: give both, or neither";
         return Err(Error::Usage(message.into()));
     }
-    let mut subject =
-        options.load(&arguments.source, common, JudgedBy::None, arguments.confidence)?;
-    match &mut subject {
+    let centres = arguments.centres.iter().min().copied();
+    let sizes = Sizes { frames: arguments.frames, centres };
+    let (judged, confidence) = (JudgedBy::None, arguments.confidence);
+    let subject = options.load(&arguments.source, common, judged, confidence, sizes)?;
+    match &subject {
         Subject::Scene(_) if options.data.folds().is_some() && !arguments.select => {
             let message = "--folds holds out frames of a CSV file, or with --select; a scene has fresh frames: leave it out";
             return Err(Error::Usage(message.into()));
         }
-        Subject::Scene(scene) => {
-            let frames = arguments.frames.unwrap_or(scene.training.frames);
-            scene.world.check_frames("-n", frames)?;
-            scene.training.frames = frames;
-        }
         Subject::Measured(_) if arguments.frames.is_some() => {
             return Err(Error::Usage("-n sets a scene's frames; a CSV file has its own".into()));
         }
-        Subject::Measured(_) => {}
+        Subject::Scene(_) | Subject::Measured(_) => {}
     }
     Ok(subject)
 }

@@ -23,6 +23,7 @@ mod output;
 mod readout;
 mod recalibrate;
 mod refusals;
+mod refused_readings;
 mod scan;
 mod trade;
 mod workflow;

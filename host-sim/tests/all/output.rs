@@ -101,6 +101,38 @@ fn stdout_as_output_is_a_stream_and_results_go_to_stderr() {
 }
 
 #[test]
+fn an_open_file_that_is_read_is_not_written() {
+    let folder = Folder::new("read-streams");
+    let text = "t,a\n1,2\n3,4\n";
+    folder.write("a.csv", text);
+    fs::hard_link(folder.path("a.csv"), folder.path("same.csv")).unwrap();
+    folder.write("b.csv", "t,b\n1,5\n3,6\n");
+    let join = |input: &str, output: &str| {
+        format!("exec \"$0\" join {input} b.csv --on t --tolerance 0.1 -o {output}")
+    };
+    for (script, says) in [
+        (format!("{} < a.csv", join("a.csv", "/dev/stdin")), "stdin is read"),
+        (format!("{} < a.csv", join("b.csv", "/proc/self/fd/0")), "stdin is read"),
+        (format!("exec 3< a.csv; {}", join("b.csv", "/dev/fd/3")), "for reading only"),
+        (format!("exec 3>> a.csv; {}", join("a.csv", "/dev/fd/3")), "written over a.csv"),
+        (format!("exec 3<> a.csv; {}", join("same.csv", "/dev/fd/3")), "written over same.csv"),
+        (format!("{} >> a.csv", join("a.csv", "-")), "written over a.csv"),
+    ] {
+        let output = shell(&folder, &script).stderr(Stdio::piped()).output().unwrap();
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{script}: {stderr}");
+        assert!(stderr.contains(says), "{script}: {stderr}");
+        assert_eq!(fs::read_to_string(folder.path("a.csv")).unwrap(), text, "{script}");
+    }
+    let good = format!("exec 3>> log.csv; {}", join("a.csv", "/dev/fd/3"));
+    assert!(shell(&folder, &good).stderr(Stdio::null()).status().unwrap().success());
+    assert_eq!(
+        fs::read_to_string(folder.path("log.csv")).unwrap(),
+        "t,a,b.t,b\n1,2,1,5\n3,4,3,6\n"
+    );
+}
+
+#[test]
 fn read_only_files_stay_and_links_with_guessed_names_are_not_followed() {
     let folder = Folder::new("read_only");
     folder.write("scene.toml", small_scene());

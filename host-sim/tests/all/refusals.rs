@@ -17,6 +17,49 @@ fn refused(folder: &Folder, arguments: &[&str], says: &[&str]) {
 }
 
 #[test]
+fn options_replace_a_scenes_numbers_before_these_are_checked() {
+    let folder = Folder::new("replaced-sizes");
+    let good = small_scene();
+    folder.write("good.toml", &good);
+    folder.write("centres.toml", good.replacen("centres = 12", "centres = 3000", 1));
+    folder.write("frames.toml", good.replacen("frames = 3000", "frames = 100000000", 1));
+    let train = |scene: &'static str, more: &[&'static str]| {
+        [&["train", scene, "--no-refine", "-o", "m.bin"], more].concat()
+    };
+    for (arguments, says) in [
+        (train("good.toml", &["-n", "10"]), "training.centres = 12: there must be fewer"),
+        (train("good.toml", &["-n", "10"]), "lower it or raise -n"),
+        (train("good.toml", &["-n", "1"]), "-n 1: it must be at least 2"),
+        (train("good.toml", &["-n", "100000000"]), "-n 100000000: give from 1 to"),
+        (train("good.toml", &["--centres", "4000"]), "--centres 4000: there must be fewer"),
+        (train("good.toml", &["--centres", "4000"]), "raise training.frames"),
+        (train("centres.toml", &["-n", "2000"]), "training.centres = 3000"),
+        (train("frames.toml", &[]), "training.frames = 100000000"),
+    ] {
+        refused(&folder, &arguments, &[says]);
+    }
+    folder.succeed(&train("centres.toml", &["--centres", "12", "-n", "300"]));
+    folder.succeed(&train("frames.toml", &["-n", "300"]));
+    folder.succeed(&["synth", "frames.toml", "-n", "2", "-o", "two.csv"]);
+}
+
+#[test]
+fn a_fill_is_refused_before_training() {
+    let folder = Folder::new("early-fill");
+    let lines = (0..60).map(|i| format!("{i},{},{}\n", i * i % 17, 3 * i % 11));
+    folder.write("two.csv", format!("a,b,y\n{}", lines.collect::<String>()));
+    folder.write("rest.csv", "a,b\n1,2\n1,2\n");
+    let two = ["train", "two.csv", "--inputs", "a,b", "--outputs", "y", "--fill", "-o", "m.bin"];
+    let relative = ["--relative-inputs", "--baseline", "rest.csv"];
+    for (more, says) in [(&[][..], "fewer than four"), (&relative[..], "relative to the baseline")]
+    {
+        let said = folder.fail(&[&two, more].concat(), 2);
+        assert!(said.contains(says) && said.contains("leave --fill"), "{said}");
+        assert!(!said.contains("fit "), "{said}");
+    }
+}
+
+#[test]
 fn bad_scenes() {
     let folder = Folder::new("bad-scenes");
     let good = small_scene();
@@ -85,7 +128,9 @@ fn bad_scenes() {
         let scene = folder.write("scene.toml", good.replacen(from, to, 1));
         let mut says = says.to_vec();
         says.push("scene.toml");
-        refused(&folder, &["synth", scene.to_str().unwrap(), "-o", "data.csv"], &says);
+        // `synth` does not train.
+        let command = if says[0].starts_with("training.") { "train" } else { "synth" };
+        refused(&folder, &[command, scene.to_str().unwrap(), "-o", "data"], &says);
     }
     let contact = include_str!("../../../scenes/contact.toml");
     for (from, to, says) in [

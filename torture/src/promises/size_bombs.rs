@@ -1,13 +1,15 @@
 //! Small inputs that ask for much: refused with exit status 2, by name, before memory is taken.
 
 use std::fs;
-use std::io::Read;
+use std::io::{Cursor, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use taxel_evaluate::experiment::EMBEDDED;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipWriter};
 
 use crate::effort::Effort;
 use crate::found::Found;
@@ -26,7 +28,7 @@ const MOST_MB: f64 = 512.0;
 /// Longest time that a refusal may take.
 const MOST_TIME: Duration = Duration::from_secs(20);
 /// Longest message of a refusal in bytes.
-const MOST_SAID: usize = 2000;
+const MOST_SAID: usize = 700;
 /// Memory in kB beyond which the system ends a program, so that a broken promise harms nobody.
 const LAST_RESORT_KB: u64 = 6_000_000;
 
@@ -84,7 +86,11 @@ fn all(folder: &Path) -> std::io::Result<Vec<Bomb>> {
         let key = field.split(" = ").next().unwrap_or_default();
         let text = press.replace(field, &format!("{key} = {value}"));
         let scene = file(&format!("{name}.toml"), text.as_bytes())?;
-        bombs.push(bomb(&["synth", &scene, "-n", "1", "-o", &output], names));
+        bombs.push(if name == "frames" {
+            bomb(&["train", &scene, "-o", &output], names)
+        } else {
+            bomb(&["synth", &scene, "-n", "1", "-o", &output], names)
+        });
     }
     let legal = press
         .replace("\ncolumn_wires = 18", "\ncolumn_wires = 10000")
@@ -111,11 +117,41 @@ fn all(folder: &Path) -> std::io::Result<Vec<Bomb>> {
         let array = file(name, header)?;
         bombs.push(bomb(&["train", &array, "-o", &output], names));
     }
+    let packed = file("packed.npz", &zeros("(50000000, 3)", 150_000_000)?)?;
+    let train = ["train", &packed, "--inputs", "nope", "--outputs", "c3", "-o", &output];
+    bombs.push(bomb(&train, "150000000 numbers together"));
+    // Texts that a message could repeat in full.
+    let field = file("field.csv", format!("a,y\n1,{}\n", "9".repeat(5_000_000)).as_bytes())?;
+    let train = ["train", &field, "--inputs", "a", "--outputs", "y", "-o", &output];
+    bombs.push(bomb(&train, "is not a number"));
+    let name = file("name.csv", format!("{},y\n1,2\n", "n".repeat(3_000_000)).as_bytes())?;
+    let train = ["train", &name, "--inputs", "nope", "--outputs", "y", "-o", &output];
+    bombs.push(bomb(&train, "no column matches"));
+    let (first, second) =
+        (file("first.csv", b"t\n1e300\n-1e300\n")?, file("second.csv", b"t\n1\n")?);
+    let join = ["join", &first, &second, "--on", "t", "--tolerance", "1", "-o", &output];
+    bombs.push(bomb(&join, "-1e300 is earlier than 1e300"));
     // Devices and pipes without end.
     bombs.push(bomb(&["inspect", "/dev/zero"], "more than 256 MB"));
     bombs.push(bomb(&["train", "/dev/zero", "-o", &output], "more than 256 MB"));
-    bombs.push(bomb(&["run", "/dev/zero"], ""));
+    bombs.push(bomb(&["run", "/dev/zero"], "more than 256 MB"));
+    bombs.push(bomb(&["synth", "/dev/zero", "-n", "1", "-o", &output], "more than 16 MB"));
     Ok(bombs)
+}
+
+/// Archive of one array of this `shape`: bytes that are all zero, packed a thousandfold.
+fn zeros(shape: &str, count: usize) -> std::io::Result<Vec<u8>> {
+    let header = format!("{{'descr': '|i1', 'fortran_order': False, 'shape': {shape}, }}");
+    let header = format!("{header:<117}\n");
+    let mut archive = ZipWriter::new(Cursor::new(vec![]));
+    let packed = SimpleFileOptions::default().compression_method(CompressionMethod::Deflated);
+    archive.start_file("c.npy", packed)?;
+    archive.write_all(&[b"\x93NUMPY\x01\x00\x76\x00", header.as_bytes()].concat())?;
+    let zeros = vec![0; 1_000_000];
+    for _ in 0..count / zeros.len() {
+        archive.write_all(&zeros)?;
+    }
+    Ok(archive.finish()?.into_inner())
 }
 
 /// Memory in MB that the program takes at its peak to refuse a bomb, or what it does instead.

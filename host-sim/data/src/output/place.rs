@@ -28,14 +28,15 @@ impl Place {
     /// Place of `path`. A link is followed, even to where nothing is yet.
     ///
     /// # Errors
-    /// Error of the system; a folder; a file that must not be written.
+    /// Error of the system; a folder; a file that must not be written; an open file that is read.
     pub fn of(path: &Path) -> io::Result<Self> {
         let mut path = path.to_path_buf();
         for _ in 0..MOST_LINKS {
             if is_stdout(&path) {
                 return Ok(Self::Stdout);
             }
-            if is_descriptor(&path) {
+            if let Some(number) = descriptor(&path) {
+                check_descriptor(number)?;
                 return Ok(Self::Stream { path, is_fifo: false });
             }
             match fs::symlink_metadata(&path) {
@@ -65,11 +66,32 @@ fn is_stdout(path: &Path) -> bool {
     ["-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"].iter().any(|name| path == Path::new(name))
 }
 
-/// Whether `path` means an open file of this program. It must not be replaced, even if it is a regular file.
-fn is_descriptor(path: &Path) -> bool {
-    path == Path::new("/dev/stderr")
-        || path.starts_with("/dev/fd/")
-        || path.starts_with("/proc/self/fd/")
+/// Number of the open file of this program that `path` means. It must not be replaced, even if it is a regular file.
+fn descriptor(path: &Path) -> Option<&str> {
+    match path.to_str()? {
+        "/dev/stdin" => Some("0"),
+        "/dev/stderr" => Some("2"),
+        path => path.strip_prefix("/dev/fd/").or(path.strip_prefix("/proc/self/fd/")),
+    }
+}
+
+/// Checks that open file `number` is there to be written to: opening it anew would not ask how it was opened.
+///
+/// # Errors
+/// Stdin, or a file that was opened for reading only, as far as the system tells.
+fn check_descriptor(number: &str) -> io::Result<()> {
+    let refused = |why| Err(Error::new(ErrorKind::PermissionDenied, why));
+    if number == "0" {
+        return refused("stdin is read and not written");
+    }
+    let details = fs::read_to_string(format!("/proc/self/fdinfo/{number}")).unwrap_or_default();
+    let flags = details.lines().find_map(|line| line.strip_prefix("flags:"));
+    // Octal; the last two bits are 0 for reading, 1 for writing and 2 for both.
+    let flags = flags.and_then(|flags| u32::from_str_radix(flags.trim(), 8).ok());
+    match flags {
+        Some(flags) if flags % 4 == 0 => refused("it was opened for reading only"),
+        _ => Ok(()),
+    }
 }
 
 /// Checks that the file at `path` may be written to, and returns its permissions.

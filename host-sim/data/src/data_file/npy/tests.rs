@@ -1,6 +1,6 @@
 use std::io::Write;
 
-use npyz::WriterBuilder;
+use npyz::{Order, WriterBuilder};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
@@ -167,4 +167,43 @@ fn what_a_header_claims_is_checked_before_memory_is_taken_for_it() {
         let message = parse_archive(path, &packed).unwrap_err().to_string();
         assert!(message.contains(says), "{message}");
     }
+}
+
+#[test]
+fn an_archive_that_would_unpack_to_far_more_is_refused_by_its_headers() {
+    let path = Path::new("test.npz");
+    let refused = |arrays: &[(&str, Vec<u8>)]| {
+        let packed = archive(arrays, CompressionMethod::Deflated);
+        parse_archive(path, &packed).unwrap_err().to_string()
+    };
+    // The numbers themselves are not there: nobody looks for them.
+    let message = refused(&[("c", with_header("|i1", "False", "(160000000, 3)"))]);
+    assert!(message.contains("480000000 numbers together"), "{message}");
+    assert!(message.contains("may have 20000000"), "{message}");
+    let half = || with_header("|i1", "False", "(6000000, 2)");
+    let message = refused(&[("a", half()), ("b", half())]);
+    assert!(message.contains("24000000 numbers together"), "{message}");
+    let message = refused(&[("a", with_header("|u1", "False", "(1, 1000001)"))]);
+    assert!(message.contains("1000001 columns"), "{message}");
+    let wide = || with_header("|u1", "False", "(1, 600000)");
+    let message = refused(&[("a", wide()), ("b", wide())]);
+    assert!(message.contains("1200000 columns"), "{message}");
+    let name = "n".repeat(60_000);
+    let message = refused(&[(&name, with_header("|u1", "False", "(1, 1000000)"))]);
+    assert!(message.contains("1 to 200") && message.len() < 400, "{message}");
+}
+
+#[test]
+fn an_archive_is_read_to_its_end() {
+    let path = Path::new("test.npz");
+    let more = [array(&[2], Order::C, &[1.0_f64, 2.0]), vec![0]].concat();
+    let packed = archive(&[("a", more)], CompressionMethod::Stored);
+    let message = parse_archive(path, &packed).unwrap_err().to_string();
+    assert!(message.contains("more bytes than its shape"), "{message}");
+    let mut packed =
+        archive(&[("a", array(&[2], Order::C, &[1.0_f64, 2.0]))], CompressionMethod::Stored);
+    let place = packed.windows(8).position(|bytes| bytes == 2.0_f64.to_le_bytes()).unwrap();
+    packed[place] ^= 1;
+    let message = parse_archive(path, &packed).unwrap_err().to_string();
+    assert!(message.contains("cannot be read to its end"), "{message}");
 }

@@ -1,0 +1,86 @@
+//! Texts and numbers of files as messages repeat them: no longer than people read.
+
+use std::borrow::Cow;
+
+/// Most characters of a file's text that a message repeats.
+const MOST_CHARS: usize = 60;
+
+/// Text of a file as a message repeats it: what is long is cut.
+#[must_use]
+pub fn cut(text: &str) -> Cow<'_, str> {
+    match text.char_indices().nth(MOST_CHARS) {
+        Some((end, _)) => format!("{} … ({} bytes)", &text[..end], text.len()).into(),
+        None => text.into(),
+    }
+}
+
+/// Text of a file as a message repeats it: in quotes, and cut if it is long.
+#[must_use]
+pub fn quoted(text: &str) -> String {
+    match text.char_indices().nth(MOST_CHARS) {
+        Some((end, _)) => format!("{:?} … ({} bytes)", &text[..end], text.len()),
+        None => format!("{text:?}"),
+    }
+}
+
+/// Number of a file as a message repeats it: one of many digits with a power of ten.
+#[must_use]
+pub fn number(value: f64) -> String {
+    short(value.to_string())
+}
+
+/// Value as text; a number of many digits as one with a power of ten, and other text cut if it is long.
+pub(super) fn short(value: String) -> String {
+    /// Length from which a number is hard to read.
+    const LONG: usize = 24;
+    match value.parse::<f64>() {
+        Ok(number) if value.len() > LONG => format!("{number:e}"),
+        Ok(_) => value,
+        Err(_) => cut(&value).into_owned(),
+    }
+}
+
+/// Number of bytes in the unit that people use for it.
+#[must_use]
+pub fn in_words(bytes: u64) -> String {
+    match bytes {
+        0..1_000 => format!("{bytes} bytes"),
+        1_000..1_000_000 => format!("{} kB", bytes / 1_000),
+        1_000_000..1_000_000_000 => format!("{} MB", bytes / 1_000_000),
+        _ => format!("{:.1} GB", bytes as f64 / 1e9),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{BadValue, Problem};
+    use super::*;
+
+    #[test]
+    fn no_message_repeats_a_long_text_of_a_file() {
+        let long = "ä".repeat(3_000_000);
+        assert_eq!(quoted("ch1\u{1b}"), "\"ch1\\u{1b}\"");
+        assert_eq!(cut("ch1"), "ch1");
+        let (column, line) = (long.clone(), 2);
+        for problem in [
+            Problem::UnusableName { column: 1, name: long.clone() },
+            Problem::RepeatedName { name: long.clone() },
+            Problem::NotANumber { line, column: column.clone(), field: long.clone() },
+            Problem::Infinite { line, column: column.clone() },
+            Problem::MissingColumn {
+                name: long.clone(),
+                known: crate::columns::some_names(&vec![long.clone(); 9]),
+            },
+            Problem::InputAndOutput { name: long.clone() },
+            Problem::TooLarge { line, column: column.clone(), value: 1e300, bound: 1e30 },
+            Problem::ClockSetBack { line, column, value: -1e300, before: 1e300 },
+            Problem::NoPartner { other: "b.csv".into(), tolerance: 1e300, distance: 1e300 },
+        ] {
+            let message = problem.to_string();
+            assert!(message.len() < 1600, "{} bytes: {}", message.len(), cut(&message));
+        }
+        assert!(BadValue::new("name", &long, "give less").to_string().len() < 200);
+        let times = Problem::ClockSetBack { line, column: "t".into(), value: -1e300, before: 2.5 };
+        assert!(times.to_string().contains("\"t\": -1e300 is earlier than 2.5"), "{times}");
+    }
+}

@@ -1,0 +1,54 @@
+//! Notes on readings that a model is trained on, and that a device would take for missing.
+
+use crate::common::{Folder, small_scene};
+
+const NOTE: &str =
+    "lie outside of 5 to 1000 Ω: a device, `decode` and `eval` take them for missing";
+
+/// What the program says on stderr, in success.
+fn said(folder: &Folder, arguments: &[&str]) -> String {
+    let output = folder.run(arguments);
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{arguments:?}: {stderr}");
+    stderr
+}
+
+#[test]
+fn training_tells_of_readings_that_a_device_would_refuse() {
+    let folder = Folder::new("refused-readings");
+    let sound = small_scene();
+    let shorted = sound.replacen("resistance_ohm_per_mm = 100.0", "resistance_ohm_per_mm = 1.0", 1);
+    assert_ne!(shorted, sound);
+    folder.write("sound.toml", sound);
+    folder.write("shorted.toml", shorted);
+    let train = |source: &'static str, more: &[&'static str]| {
+        [&["train", source, "--centres", "8", "--no-refine", "-o", "m.bin"], more].concat()
+    };
+    let quiet = said(&folder, &train("sound.toml", &["-n", "300"]));
+    assert!(!quiet.contains("outside"), "{quiet}");
+    let noted = said(&folder, &train("shorted.toml", &["-n", "300"]));
+    assert!(noted.contains(NOTE) && noted.contains("all readings shorted in 100 %"), "{noted}");
+    let noted = said(&folder, &["run", "shorted.toml", "--centres", "8", "--no-refine"]);
+    assert!(noted.contains(NOTE) && noted.contains("scene small"), "{noted}");
+
+    folder.succeed(&["synth", "sound.toml", "-n", "300", "-o", "sound.csv"]);
+    let text = std::fs::read_to_string(folder.path("sound.csv")).unwrap();
+    let column = text.split(',').position(|name| name == "r4c5_ohm").unwrap();
+    let line = |(number, line): (usize, &str)| {
+        let mut fields: Vec<&str> = line.split(',').collect();
+        if number % 10 == 1 || number % 10 == 2 || number % 10 == 3 {
+            fields[column] = "1000000";
+        }
+        fields.join(",") + "\n"
+    };
+    let broken: String = text.lines().enumerate().map(line).collect();
+    folder.write("broken.csv", broken);
+    let quiet = said(&folder, &train("sound.csv", &[]));
+    assert!(!quiet.contains("outside"), "{quiet}");
+    let noted = said(&folder, &train("broken.csv", &["--whole-array"]));
+    assert!(noted.contains(NOTE) && noted.contains("r4c5_ohm open in 30 % of frames"), "{noted}");
+    assert!(noted.contains("--open-above-ohm") && noted.contains("--limits"), "{noted}");
+    let run = ["run", "sound.csv", "--test", "broken.csv", "--centres", "8", "--no-refine"];
+    let noted = said(&folder, &run);
+    assert!(noted.contains("readings of broken.csv lie outside"), "{noted}");
+}
