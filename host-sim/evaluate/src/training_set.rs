@@ -91,6 +91,9 @@ impl<'s> TrainingSet<'s> {
         if self.confidence {
             resolution::check_squares(&self.frames)?;
         }
+        if self.fill {
+            fill::check_frames(&self.frames.inputs)?;
+        }
         let blob = pack(&self.train(options, progress)?, &self.frames, &self.origin)?;
         let blob =
             if self.confidence { self.with_confidence(&blob, options, progress)? } else { blob };

@@ -15,6 +15,8 @@ use crate::train::principal;
 
 /// Number of factors, where there are enough readings.
 const FACTORS: usize = 16;
+/// Least number of frames for each reading. With fewer, what is fitted is chance: sound wires then look as if they touched.
+const FRAMES_A_READING: usize = 10;
 /// Rounds of the fit.
 const ROUNDS: usize = 30;
 /// Least variance of a reading's own noise, relative to the reading's variance.
@@ -26,7 +28,8 @@ const FRAMES_AT_ONCE: usize = 1024;
 ///
 /// # Errors
 /// [`Error::NoFill`] for a model that takes readings relative to the baseline, or has fewer than four; or for readings
-/// that are no numbers. [`Error::NotPacked`] for a model beyond what the format holds.
+/// that are no numbers. [`Error::FewForFill`] for too few frames. [`Error::NotPacked`] for a model beyond what the format
+/// holds.
 pub fn add(blob: &ModelBlob, readings: &Table) -> Result<ModelBlob> {
     let count = readings.names.len();
     if blob.parse().metadata().relative_inputs {
@@ -35,11 +38,22 @@ pub fn add(blob: &ModelBlob, readings: &Table) -> Result<ModelBlob> {
     if count < 4 {
         return Err(Error::NoFill("it has fewer than four readings"));
     }
+    check_frames(readings)?;
     let factors = FACTORS.min(count / 2);
     let block = fit(readings, factors).ok_or(Error::NoFill("readings are no numbers"))?;
     let fill =
         Fill::new(count, factors, &block).map_err(|_| Error::NoFill("readings are no numbers"))?;
     blob.with_fill(fill)
+}
+
+/// Checks that there are frames enough to fit a fill to these `readings`: ten for each.
+///
+/// # Errors
+/// [`Error::FewForFill`] for fewer.
+pub fn check_frames(readings: &Table) -> Result<()> {
+    let (frames, count) = (readings.len(), readings.names.len());
+    let least = FRAMES_A_READING * count;
+    if frames < least { Err(Error::FewForFill { frames, readings: count, least }) } else { Ok(()) }
 }
 
 /// Numbers of a fill, in the order of [`Fill::new`]; `None` for readings that are no numbers.
