@@ -161,6 +161,19 @@ pub enum Error {
     /// Model whose missing readings cannot be filled.
     #[error("the model cannot fill missing readings: {0}")]
     NoFill(&'static str),
+    /// Frames that are too few to tell missing readings from the others.
+    #[error(
+        "{frames} frames are too few to learn how to fill {readings} missing readings (fill): give {least} or more, or \
+         leave the fill out"
+    )]
+    FewForFill {
+        /// Number of frames.
+        frames: usize,
+        /// Number of readings of a frame.
+        readings: usize,
+        /// Least number of frames.
+        least: usize,
+    },
     /// Model beyond what the blob's format holds.
     #[error("the model cannot be written: {0}")]
     NotPacked(EncodeError),

@@ -2,163 +2,96 @@
 //!
 //! Three kinds of evidence count, each over a window of frames:
 //!
-//! - **Health**: readings that are missing, shorted or open. A wire is named if all of its readings are so.
+//! - **Health**: readings that are missing, shorted or open, in all frames or now and then. A wire is named if all of its
+//!   readings are so.
 //! - **What the others say**: a model with a [fill](model_core::fill) tells each reading from the others. One that is far
 //!   off them, again and again, is noisy.
 //! - **Likeness**: two neighbours that touch read alike, where the other wires say that they should differ.
 
-use std::collections::BTreeMap;
-use std::fmt;
+use std::collections::BTreeSet;
+use std::ops::Range;
 
 use model_core::fill::{Fill, MOST_MISSING};
-use model_core::health::{Fault, Limits};
+use model_core::health::Limits;
 use rayon::prelude::*;
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 use taxel_data::table::Table;
 
-use crate::health::fault;
-
-mod expected;
+mod wire_fault;
 mod grid;
+mod health;
+mod expected;
 mod likeness;
 
 use expected::Expected;
 pub use grid::Grid;
+pub use wire_fault::{Kind, Place, WireFault};
 
-/// Number of frames that are judged together.
+/// Number of frames that are judged together; the last window has up to twice as many.
 pub const WINDOW: usize = 200;
-/// Least number of frames that can be judged.
+/// Least number of frames whose health tells a fault of a wire.
 const FEWEST: usize = 5;
-/// Share of a window's frames in which a reading is faulty, if its wire is broken.
-const MOST: f64 = 0.9;
-/// Share of a window's frames with a fault from which on a reading comes and goes.
-const FLICKERS: f64 = 0.1;
-/// Least share of saturated readings of the other rows, if one row is at ground.
-const SATURATED: f64 = 0.2;
-
-/// Wires of a fault, numbered as their names are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Place {
-    /// All wires.
-    All,
-    /// A row-wire.
-    Row(usize),
-    /// Two neighbouring row-wires.
-    Rows(usize, usize),
-    /// A column-wire.
-    Column(usize),
-    /// Two neighbouring column-wires.
-    Columns(usize, usize),
-    /// The reading of a row-wire and a column-wire.
-    Reading(usize, usize),
-}
-
-impl Place {
-    /// Whether the reading of `row` and `column` belongs to the place.
-    #[must_use]
-    pub fn holds(self, row: usize, column: usize) -> bool {
-        match self {
-            Self::All => true,
-            Self::Row(wire) => wire == row,
-            Self::Rows(a, b) => [a, b].contains(&row),
-            Self::Column(wire) => wire == column,
-            Self::Columns(a, b) => [a, b].contains(&column),
-            Self::Reading(of_row, of_column) => (of_row, of_column) == (row, column),
-        }
-    }
-}
-
-/// What is wrong with wires.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Kind {
-    /// No reading could be taken.
-    Missing,
-    /// No current flows: broken or not connected; or the converter is stuck at its lower end.
-    Open,
-    /// The circuit is saturated: connected to ground, or the converter is stuck at its upper end.
-    Shorted,
-    /// Connected to ground, which a row-wire shows by saturating all others.
-    AtGround,
-    /// Connected with each other.
-    Touching,
-    /// Far off what the other readings tell, or coming and going.
-    Noisy,
-}
-
-/// What is wrong, and where.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub struct WireFault {
-    /// Wires that it strikes.
-    pub place: Place,
-    /// What is wrong with them.
-    pub kind: Kind,
-}
-
-impl fmt::Display for WireFault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.place {
-            Place::All => write!(f, "all readings"),
-            Place::Row(wire) => write!(f, "row-wire {wire}"),
-            Place::Rows(a, b) => write!(f, "row-wires {a} and {b}"),
-            Place::Column(wire) => write!(f, "column-wire {wire}"),
-            Place::Columns(a, b) => write!(f, "column-wires {a} and {b}"),
-            Place::Reading(row, column) => write!(f, "r{row}c{column}"),
-        }?;
-        f.write_str(match self.kind {
-            Kind::Missing => " missing",
-            Kind::Open => " open",
-            Kind::Shorted => " shorted",
-            Kind::AtGround => " shorted to ground",
-            Kind::Touching => " shorted together",
-            Kind::Noisy => " noisy",
-        })
-    }
-}
-
-impl Serialize for WireFault {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
-    }
-}
-
+/// Least number of frames that tell noise, or wires that touch: among fewer, chance alone is far off.
+pub const FEWEST_FOR_NOISE: usize = 50;
 /// A fault, and in how many frames it was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Found {
     /// The fault.
     pub fault: WireFault,
-    /// Number of frames of the windows in which it was found.
+    /// Number of frames in which at least half of the readings are missing, shorted or open, as the fault says; or of
+    /// the windows in which readings were noisy or wires touched.
     pub frames: usize,
 }
 
-/// Faults in `readings` as they were scanned (Ω), by windows of [`WINDOW`] frames. A model's `fill` tells noise and wires
-/// that touch; without one, health alone counts. None are told of columns that are no [`Grid`] of wires.
+/// Faults in `readings` as they were scanned (Ω), by [`windows`]. A model's `fill` tells noise and wires that touch;
+/// without one, health alone counts. None are told of columns that are no [`Grid`] of wires.
 #[must_use]
 pub fn diagnose(readings: &Table, limits: Limits, fill: Option<Fill<'_>>) -> Vec<Found> {
     let Some(grid) = Grid::of(&readings.names) else { return vec![] };
-    let expected = fill.filter(|fill| fill.readings() == readings.names.len()).map(Expected::of);
-    let windows = readings.values.par_chunks(WINDOW * readings.names.len());
-    let found: Vec<(usize, Vec<WireFault>)> = windows
+    let count = readings.names.len();
+    let expected = fill.filter(|fill| fill.readings() == count).map(Expected::of);
+    let found: Vec<(usize, Vec<WireFault>)> = windows(readings.len())
+        .into_par_iter()
         .map(|window| {
-            let frames = window.len() / readings.names.len();
-            (frames, of_window(&grid, &readings.names, window, limits, expected.as_ref()))
+            let values = &readings.values[window.start * count..window.end * count];
+            (window.len(), of_window(&grid, count, values, limits, expected.as_ref()))
         })
         .collect();
-    let mut counts: BTreeMap<WireFault, usize> = BTreeMap::new();
-    for (frames, faults) in found {
-        faults.into_iter().for_each(|fault| *counts.entry(fault).or_default() += frames);
-    }
-    counts.into_iter().map(|(fault, frames)| Found { fault, frames }).collect()
+    let all: BTreeSet<WireFault> = found.iter().flat_map(|(_, faults)| faults).copied().collect();
+    let of_windows = |fault: WireFault| {
+        let windows = found.iter().filter(|(_, faults)| faults.contains(&fault));
+        windows.map(|(frames, _)| frames).sum()
+    };
+    let frames = |fault: WireFault| match fault.kind.of_readings() {
+        Some(kind) => health::frames_with(&grid, &readings.values, limits, fault.place, kind),
+        None => of_windows(fault),
+    };
+    // What comes and goes before it lasts, or breaks within a window, is one fault.
+    let lasts = |fault: &WireFault| {
+        let lasting = fault.kind.of_readings().map(Kind::lasting);
+        lasting
+            .is_some_and(|kind| kind != fault.kind && all.contains(&WireFault { kind, ..*fault }))
+    };
+    let told = all.iter().copied().filter(|fault| !lasts(fault));
+    told.map(|fault| Found { fault, frames: frames(fault) }).collect()
 }
 
-/// Faults in one window of readings.
+/// Frames that are judged together, of so many: [`WINDOW`] each, and the last with the rest, so that none is short.
+#[must_use]
+pub fn windows(frames: usize) -> Vec<Range<usize>> {
+    let count = (frames / WINDOW).max(1);
+    let end = |window: usize| if window + 1 == count { frames } else { (window + 1) * WINDOW };
+    (0..count).map(|window| window * WINDOW..end(window)).collect()
+}
+
+/// Faults in one window of `count` readings a frame.
 fn of_window(
     grid: &Grid,
-    names: &[String],
+    count: usize,
     window: &[f64],
     limits: Limits,
     expected: Option<&Expected>,
 ) -> Vec<WireFault> {
-    let count = names.len();
     let frames = window.len() / count;
     if frames < FEWEST {
         return vec![];
@@ -166,73 +99,45 @@ fn of_window(
     let mut faulty = vec![[0_usize; 3]; count];
     let mut sound = window.to_vec();
     for (at, reading) in sound.iter_mut().enumerate() {
-        if let Some(fault) = fault(&names[at % count], *reading, Some(limits)) {
+        if let Some(fault) = limits.fault(*reading as f32) {
             faulty[at % count][fault as usize] += 1;
             *reading = f64::NAN;
         }
     }
-    let mut faults = of_health(grid, &faulty, frames);
+    let mut faults = health::lasting(grid, &faulty, frames);
     if faults.iter().any(|fault| matches!(fault.kind, Kind::AtGround) || fault.place == Place::All)
     {
         return faults; // all else follows from it
     }
-    let mut struck: Vec<bool> =
-        (0..count).map(|at| faults.iter().any(|fault| grid.is_in(fault.place, at))).collect();
-    let flickers = |at: &usize| faulty[*at].iter().sum::<usize>() as f64 > FLICKERS * frames as f64;
-    let mut noisy: Vec<usize> = (0..count).filter(|at| !struck[*at]).filter(flickers).collect();
-    noisy.iter().for_each(|at| struck[*at] = true);
+    let is_in =
+        |faults: &[WireFault], at: usize| faults.iter().any(|fault| grid.is_in(fault.place, at));
+    let mut struck: Vec<bool> = (0..count).map(|at| is_in(&faults, at)).collect();
+    let intermittent = health::intermittent(grid, &faulty, window, limits, &struck);
     // With more missing than a fill fills, too little is left to tell of the rest.
-    let few = struck.iter().filter(|struck| **struck).count() * MOST_MISSING <= count;
-    if let Some(expected) = expected.filter(|_| few) {
-        let scaled = expected.standardised(&sound);
-        let mut far_off = expected.far_off(&scaled, &struck);
-        let left_out = |at: usize| struck[at] || far_off.contains(&at);
-        let pairs = likeness::touching(grid, expected, &scaled, &left_out);
-        if !pairs.is_empty() {
-            // What touches leads the others astray.
-            let of_pairs = |at: usize| pairs.iter().any(|place| grid.is_in(*place, at));
-            (0..count).filter(|at| of_pairs(*at)).for_each(|at| struck[at] = true);
-            far_off = expected.far_off(&scaled, &struck);
-        }
-        noisy.extend(far_off);
-        faults.extend(pairs.into_iter().map(|place| WireFault { place, kind: Kind::Touching }));
-    }
-    let places = grid.wires_of(&noisy);
-    faults.extend(places.into_iter().map(|place| WireFault { place, kind: Kind::Noisy }));
-    faults
-}
-
-/// Faults that the health of readings alone tells: `faulty` counts those of each reading by kind.
-fn of_health(grid: &Grid, faulty: &[[usize; 3]], frames: usize) -> Vec<WireFault> {
-    let of_kind = |kind: Fault| -> Vec<usize> {
-        let most = |at: &usize| faulty[*at][kind as usize] as f64 >= MOST * frames as f64;
-        (0..faulty.len()).filter(most).collect()
+    let flickers = |at: &usize| struck[*at] || health::flickers(faulty[*at], frames);
+    let few = (0..count).filter(flickers).count() * MOST_MISSING <= count;
+    let Some(expected) = expected.filter(|_| few && frames >= FEWEST_FOR_NOISE) else {
+        faults.extend(intermittent);
+        return faults;
     };
-    let open = of_kind(Fault::Open);
-    let rows_open = grid.wires_of(&open).into_iter().filter_map(|place| match place {
-        Place::Row(row) => Some(row),
-        _ => None,
-    });
-    if let [row] = rows_open.collect::<Vec<_>>()[..] {
-        let others: Vec<usize> =
-            (0..faulty.len()).filter(|at| !grid.is_in(Place::Row(row), *at)).collect();
-        let shorted: usize = others.iter().map(|at| faulty[*at][Fault::Shorted as usize]).sum();
-        if shorted as f64 > SATURATED * (frames * others.len()) as f64
-            && grid.wires_of(&of_kind(Fault::Shorted)).len() > 2
-        {
-            return vec![WireFault { place: Place::Row(row), kind: Kind::AtGround }];
-        }
+    let scaled = expected.standardised(&sound);
+    let mut noisy = expected.far_off(&scaled, &struck);
+    let left_out = |at: usize| struck[at] || noisy.contains(&at);
+    let touching = likeness::touching(grid, expected, &scaled, &left_out);
+    if !touching.is_empty() {
+        // What touches leads the others astray.
+        let touch = |at: usize| touching.iter().any(|place| grid.is_in(*place, at));
+        (0..count).filter(|at| touch(*at)).for_each(|at| struck[at] = true);
+        noisy = expected.far_off(&scaled, &struck);
     }
-    let kinds = [
-        (Fault::Missing, Kind::Missing),
-        (Fault::Shorted, Kind::Shorted),
-        (Fault::Open, Kind::Open),
-    ];
-    let faults = kinds.into_iter().flat_map(|(fault, kind)| {
-        let places = grid.wires_of(&of_kind(fault));
-        places.into_iter().map(move |place| WireFault { place, kind })
-    });
-    faults.collect()
+    // Noise alone takes readings beyond the limits now and then.
+    let is_noise =
+        |place| (0..count).filter(|at| grid.is_in(place, *at)).all(|at| noisy.contains(&at));
+    faults.extend(intermittent.into_iter().filter(|fault| !is_noise(fault.place)));
+    let noisy = grid.wires_of(&noisy).into_iter().map(|place| (place, Kind::Noisy));
+    let touching = touching.into_iter().map(|place| (place, Kind::Touching));
+    faults.extend(touching.chain(noisy).map(|(place, kind)| WireFault { place, kind }));
+    faults
 }
 
 #[cfg(test)]

@@ -16,6 +16,8 @@ use crate::train::principal;
 
 /// Number of factors, where there are enough readings.
 const FACTORS: usize = 16;
+/// Least number of frames for each reading. With fewer, what is fitted is chance: sound wires then look as if they touched.
+const FRAMES_A_READING: usize = 10;
 /// Rounds of the fit.
 const ROUNDS: usize = 30;
 /// Least variance of a reading's own noise, relative to the reading's variance.
@@ -28,29 +30,33 @@ const FRAMES_AT_ONCE: usize = 1024;
 /// Checks before long work that a model which is trained on `frames` can fill missing readings.
 ///
 /// # Errors
-/// [`Error::NoFill`] for readings relative to the baseline, or fewer than four.
+/// [`Error::NoFill`] for readings relative to the baseline, or fewer than four; [`Error::FewForFill`] for fewer than ten
+/// frames a reading.
 pub fn check(frames: &Dataset) -> Result<()> {
-    check_inputs(frames.relative_inputs, frames.inputs.names.len())
+    check_readings(frames.relative_inputs, &frames.inputs)
 }
 
-fn check_inputs(are_relative: bool, count: usize) -> Result<()> {
+fn check_readings(are_relative: bool, readings: &Table) -> Result<()> {
+    let (frames, count) = (readings.len(), readings.names.len());
     if are_relative {
         return Err(Error::NoFill("its inputs are relative to the baseline"));
     }
     if count < LEAST_READINGS {
         return Err(Error::NoFill("it has fewer than four readings"));
     }
-    Ok(())
+    let least = FRAMES_A_READING * count;
+    if frames < least { Err(Error::FewForFill { frames, readings: count, least }) } else { Ok(()) }
 }
 
 /// Adds to the model in `blob` a fill of missing readings, fitted to `readings`.
 ///
 /// # Errors
 /// [`Error::NoFill`] for a model that takes readings relative to the baseline, or has fewer than four; or for readings
-/// that are no numbers. [`Error::NotPacked`] for a model beyond what the format holds.
+/// that are no numbers. [`Error::FewForFill`] for too few frames. [`Error::NotPacked`] for a model beyond what the format
+/// holds.
 pub fn add(blob: &ModelBlob, readings: &Table) -> Result<ModelBlob> {
     let count = readings.names.len();
-    check_inputs(blob.parse().metadata().relative_inputs, count)?;
+    check_readings(blob.parse().metadata().relative_inputs, readings)?;
     let factors = FACTORS.min(count / 2);
     let block = fit(readings, factors).ok_or(Error::NoFill("readings are no numbers"))?;
     let fill =

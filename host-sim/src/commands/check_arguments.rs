@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use firmware::link::message::Memory;
 use host_sim::{Error, Result};
+use model_core::blob::Metadata;
 use taxel_data::data_file::DataFile;
 use taxel_data::random::Stream;
 use taxel_learn::{Exponential, ModelBlob};
@@ -112,10 +113,14 @@ impl CheckArguments {
         let model = ModelBlob::read(path)?;
         let file = DataFile::read(Path::new(&self.source))?;
         let readings = model_inputs(&model.prepare(Exponential::default()), &file)?;
-        let baseline_ohm =
-            self.baseline.values(model.parse().metadata(), path, &FieldArguments::default())?;
+        let baseline_ohm = self.baseline_ohm(model.parse().metadata(), path)?;
         let frames = Frames { readings: readings.cycled(self.frames.max(1)), baseline_ohm };
         Ok(Checked { frames, model, world: None })
+    }
+
+    /// Baseline of which all readings are believed: the device is given the same one.
+    fn baseline_ohm(&self, metadata: &Metadata<'_>, path: &Path) -> Result<Option<Vec<f64>>> {
+        self.baseline.values(metadata, path, &FieldArguments::default(), None)
     }
 
     fn load_scene(&self, common: &Common) -> Result<Checked> {
@@ -148,7 +153,7 @@ impl CheckArguments {
             let session = Synthesis::of(&scene.world).drift(None);
             Some(session.baselines(Stream::Test, 1, BASELINE_FRAMES).values)
         } else {
-            self.baseline.values(metadata, path, &FieldArguments::default())?
+            self.baseline_ohm(metadata, path)?
         };
         let readings = synthesise(&scene.world, Stream::Test, self.frames.max(1)).inputs;
         let frames = Frames { readings, baseline_ohm };

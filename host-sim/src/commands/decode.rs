@@ -82,7 +82,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     print::check_output(&arguments.output, &read)?;
     let blob = ModelBlob::read(&arguments.model)?;
     let model = blob.prepare(arguments.exponential);
-    let model = arguments.baseline.apply(model, &arguments.model, arguments.file.fields())?;
+    let (fields, limits) = (arguments.file.fields(), arguments.health.limits());
+    let model = arguments.baseline.apply(model, &arguments.model, fields, limits)?;
     let file = arguments.file.read(&arguments.readings)?;
     let mut readings = model_inputs(&model, &file)?;
     let health = arguments.health.apply(&model, &mut readings)?;

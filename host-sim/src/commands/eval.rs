@@ -90,7 +90,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     }
     let blob = ModelBlob::read(&arguments.model)?;
     let model = blob.prepare(arguments.exponential);
-    let model = arguments.baseline.apply(model, &arguments.model, arguments.file.fields())?;
+    let (fields, limits) = (arguments.file.fields(), arguments.health.limits());
+    let model = arguments.baseline.apply(model, &arguments.model, fields, limits)?;
     let file = arguments.file.read(&arguments.data)?;
     let mut readings = model_inputs(&model, &file)?;
     let health = arguments.health.apply(&model, &mut readings)?;
@@ -157,8 +158,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         by_depth: by_depth(&truth, &estimate.values, &measure),
     };
     if let Some(html) = &arguments.html {
-        let fields = arguments.file.fields();
-        let at_rest = arguments.baseline.values(metadata, &arguments.model, fields)?;
+        let at_rest = arguments.baseline.values(metadata, &arguments.model, fields, limits)?;
         let reference = at_rest.as_deref().map_or(Reference::Median, Reference::Rest);
         let distribution = Distribution::of(&truth, &estimate, &readings, reference);
         let page = page_of(arguments, &blob, &summary, &distribution)?;

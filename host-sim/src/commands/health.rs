@@ -16,8 +16,8 @@ const MOST_NAMED: usize = 5;
 /// Readings that are believed.
 #[derive(Args)]
 pub struct HealthArguments {
-    /// Readings in Ω outside of these limits count as missing (shorted or open), as on a device. `none` believes all.
-    /// Columns whose names do not end with _ohm have no limits.
+    /// Readings in Ω outside of these limits count as missing (shorted or open), as on a device, and those of --baseline
+    /// too. `none` believes all. Columns whose names do not end with _ohm have no limits.
     #[arg(long, value_name = "LOW,HIGH", value_parser = limits, default_value = "5,1000", allow_negative_numbers = true)]
     limits: Believed,
     /// Columns whose readings are taken for missing in every line.
@@ -66,6 +66,11 @@ pub struct Health {
 }
 
 impl HealthArguments {
+    /// Limits of readings that are believed; `None` believes all.
+    pub fn limits(&self) -> Option<Limits> {
+        self.limits.0
+    }
+
     /// Makes faulty ones of the `readings` in the data file missing, notes them on stderr, and lets the `model` fill them.
     pub fn apply(&self, model: &PreparedModel<'_>, readings: &mut Table) -> Result<Health> {
         let lines = readings.len();
@@ -73,10 +78,10 @@ impl HealthArguments {
             Some(limits) => diagnose(readings, limits, model.model().fill()),
             None => vec![],
         };
-        self.leave_out(readings)?;
+        let left_out = self.leave_out(readings)?;
         let columns = judge(readings, self.limits.0);
-        let without = self.without.is_some();
-        notes(&columns, &faults, lines).iter().filter(|_| !without).for_each(|n| eprintln!("{n}"));
+        let told = told(&columns, &faults, &readings.names, &left_out);
+        notes(&told.0, &told.1, lines).iter().for_each(|note| eprintln!("{note}"));
         let is_faulty =
             readings.lines().map(|line| line.iter().any(|reading| reading.is_nan())).collect();
         let filled = if self.no_fill { None } else { model.filled(&readings.values) };
@@ -104,9 +109,9 @@ impl HealthArguments {
         Ok(health)
     }
 
-    /// Makes the readings of the columns that are left out missing.
-    fn leave_out(&self, readings: &mut Table) -> Result<()> {
-        let Some(pattern) = &self.without else { return Ok(()) };
+    /// Makes the readings of the columns that are left out missing. Returns the columns' indices.
+    fn leave_out(&self, readings: &mut Table) -> Result<Vec<usize>> {
+        let Some(pattern) = &self.without else { return Ok(vec![]) };
         if let Some(part) = columns::unmatched(&readings.names, pattern) {
             return Err(Error::Usage(format!(
                 "--without {part}: the model has no such reading; it has {}",
@@ -118,7 +123,7 @@ impl HealthArguments {
         for line in readings.values.chunks_exact_mut(width) {
             chosen.iter().for_each(|column| line[*column] = f64::NAN);
         }
-        Ok(())
+        Ok(chosen)
     }
 }
 
@@ -126,6 +131,23 @@ impl HealthArguments {
 pub fn note_faults(readings: &Table) {
     let faults = diagnose(readings, Limits::USUAL, None);
     notes(&[], &faults, readings.len()).iter().for_each(|note| eprintln!("{note}"));
+}
+
+/// Faulty `columns` and `faults` that are worth a note: all but those of columns `left_out` of the ones called `names`.
+fn told(
+    columns: &[ColumnHealth],
+    faults: &[Found],
+    names: &[String],
+    left_out: &[usize],
+) -> (Vec<ColumnHealth>, Vec<Found>) {
+    let is_left_out = |name: &String| left_out.iter().any(|at| names[*at] == *name);
+    let holds = |fault: &Found, name: &String| {
+        Grid::wires_of_name(name).is_some_and(|(m, k)| fault.fault.place.holds(m, k))
+    };
+    let remains =
+        |fault: &&Found| names.iter().any(|name| holds(fault, name) && !is_left_out(name));
+    let of_columns = columns.iter().filter(|column| !is_left_out(&column.column)).cloned();
+    (of_columns.collect(), faults.iter().filter(remains).copied().collect())
 }
 
 /// Notes on wires with a fault, and on the worst of the other faulty `columns`, in so many `lines`.
@@ -140,7 +162,9 @@ fn notes(columns: &[ColumnHealth], faults: &[Found], lines: usize) -> Vec<String
     }
     let named = |column: &&ColumnHealth| {
         let wires = Grid::wires_of_name(&column.column);
-        wires.is_some_and(|(m, k)| faults.iter().any(|found| found.fault.place.holds(m, k)))
+        // Noise does not tell how often a reading is missing.
+        let mut faults = faults.iter().filter(|found| found.fault.kind.of_readings().is_some());
+        wires.is_some_and(|(m, k)| faults.any(|found| found.fault.place.holds(m, k)))
     };
     let mut worst: Vec<&ColumnHealth> = columns.iter().filter(|column| !named(column)).collect();
     worst.sort_by_key(|column| std::cmp::Reverse(column.faulty()));
@@ -196,6 +220,31 @@ mod tests {
         assert_eq!((found.len(), found[0].as_str()), (6, "note: c: open in 45 % of lines"));
         assert_eq!(found[5], "note: and 4 more columns with faulty readings");
         assert!(notes(&[], &[], 5).is_empty());
+        let fault = WireFault { place: Place::Reading(4, 5), kind: Kind::Noisy };
+        let found = notes(&faulty[1..], &[Found { fault, frames: 200 }], 10_000);
+        assert_eq!(found, ["note: r4c5 noisy in 2 % of lines", of_columns[0]]);
+    }
+
+    #[test]
+    fn only_notes_on_columns_that_are_left_out_are_dropped() {
+        let names = ["r1c1_ohm", "r1c2_ohm", "r2c1_ohm", "r2c2_ohm"].map(String::from);
+        let faulty = names.each_ref().map(|name| column(name, [0, 0, 7]));
+        let places = [Place::Reading(1, 2), Place::Row(1), Place::Column(2), Place::All];
+        let faults = places.map(|place| {
+            let fault = WireFault { place, kind: Kind::Open };
+            Found { fault, frames: 7 }
+        });
+        let told = |left_out: &[usize]| {
+            let (columns, faults) = told(&faulty, &faults, &names, left_out);
+            let columns: Vec<String> = columns.into_iter().map(|it| it.column).collect();
+            (columns, faults.into_iter().map(|it| it.fault.place).collect::<Vec<_>>())
+        };
+        assert_eq!(told(&[]), (names.to_vec(), places.to_vec()));
+        assert_eq!(
+            told(&[1]),
+            (vec![0, 2, 3].into_iter().map(|i| names[i].clone()).collect(), places[1..].to_vec())
+        );
+        assert_eq!(told(&[0, 1]).1, [Place::Column(2), Place::All]);
     }
 
     #[test]

@@ -5,10 +5,12 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use host_sim::{Error, Result};
 use model_core::blob::Metadata;
+use model_core::health::Limits;
 use taxel_data::columns;
 use taxel_data::data_file::DataFile;
 use taxel_data::dataset::Dataset;
 use taxel_data::table::Table;
+use taxel_learn::health::judge;
 use taxel_learn::{PreparedModel, outliers, relative};
 
 use super::data_notes;
@@ -25,26 +27,29 @@ pub struct BaselineArgument {
 }
 
 impl BaselineArgument {
-    /// Gives the baseline to `model`, which was read from `path`. `fields` says how the baseline's file is read.
+    /// Gives the baseline to `model`, which was read from `path`. `fields` says how the baseline's file is read, and
+    /// readings outside the `limits` count as missing.
     pub fn apply<'b>(
         &self,
         model: PreparedModel<'b>,
         path: &Path,
         fields: &FieldArguments,
+        limits: Option<Limits>,
     ) -> Result<PreparedModel<'b>> {
-        Ok(match self.values(model.model().metadata(), path, fields)? {
+        Ok(match self.values(model.model().metadata(), path, fields, limits)? {
             Some(baseline) => model.with_baseline(&baseline),
             None => model,
         })
     }
 
     /// Baseline in the readings' units, for the model with this `metadata`, which was read from `path`; `None` for a
-    /// model that needs none. `fields` says how its file is read.
+    /// model that needs none. `fields` says how its file is read, and readings outside the `limits` count as missing.
     pub fn values(
         &self,
         metadata: &Metadata<'_>,
         path: &Path,
         fields: &FieldArguments,
+        limits: Option<Limits>,
     ) -> Result<Option<Vec<f64>>> {
         let unfit =
             |message: &str| Err(Error::Unfit { path: path.into(), message: message.into() });
@@ -58,12 +63,13 @@ impl BaselineArgument {
                 "its inputs are readings as they are: leave --baseline out, or train with --relative-inputs",
             ),
             (Some(file), true) => {
-                let baseline = baseline(&fields.read(file)?, metadata.input_names.iter())?;
+                let names = metadata.input_names.iter();
+                let baseline = baseline(&fields.read(file)?, names, limits)?;
                 let missing = unusable(&baseline);
                 if !missing.is_empty() {
                     eprintln!(
-                        "note: {} has no baseline for {}: a mean that is missing or zero; these readings count \
-                         as missing",
+                        "note: {} has no baseline for {}: a mean that is missing or zero, or no reading within the \
+                         limits; these readings count as missing",
                         file.display(),
                         columns::some_names(&missing)
                     );
@@ -89,9 +95,14 @@ pub fn at_rest(file: &DataFile, inputs: &Table) -> Result<Table> {
     Err(Error::Unfit { path: file.path.clone(), message })
 }
 
-/// One line: the mean of each of the columns called `names` in `file`.
-fn baseline<'n>(file: &DataFile, names: impl Iterator<Item = &'n str>) -> Result<Table> {
-    let frames = usual_lines(file, names)?;
+/// One line: the mean of each of the columns called `names` in `file`, of readings within the `limits`.
+fn baseline<'n>(
+    file: &DataFile,
+    names: impl Iterator<Item = &'n str>,
+    limits: Option<Limits>,
+) -> Result<Table> {
+    let mut frames = usual_lines(file, names)?;
+    judge(&mut frames, limits);
     Ok(Table { values: frames.means(), names: frames.names })
 }
 

@@ -68,7 +68,7 @@ pub struct Arguments {
     #[arg(long)]
     confidence: bool,
     /// Let the model fill missing readings from the others of their frame, so that a broken wire costs accuracy, but no
-    /// frames (docs/reliability.md). It takes 10 kB more for 144 readings.
+    /// frames (docs/reliability.md). It takes 10 kB more for 144 readings, and ten frames of training for each reading.
     #[arg(long)]
     fill: bool,
     #[command(flatten)]

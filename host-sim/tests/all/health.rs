@@ -104,6 +104,42 @@ fn wires_are_named_and_columns_can_be_left_out() {
 }
 
 #[test]
+fn a_reading_that_comes_and_goes_is_no_noise() {
+    let folder = prepared("health_intermittent");
+    changed(&folder, "loose.csv", |name, line| {
+        (name == "r4c5_ohm" && line % 8 == 0).then_some("1e6")
+    });
+    for model in ["fills.bin", "plain.bin"] {
+        let said = notes(&folder, &["decode", model, "loose.csv", "-o", "e.csv"]);
+        assert!(said.contains("note: r4c5 intermittently open in 12.5 % of lines"), "{said}");
+        assert!(!said.contains("noisy") && !said.contains("r4c5_ohm"), "{said}");
+    }
+}
+
+#[test]
+fn columns_that_are_left_out_hide_no_other_fault() {
+    let folder = prepared("health_without");
+    changed(&folder, "two.csv", |name, _| {
+        (name == "r4c5_ohm" || name.ends_with("c9_ohm")).then_some("0.02")
+    });
+    let without = ["--without", "r4c5_ohm"];
+    let decode = ["decode", "fills.bin", "two.csv", "-o", "e.csv"];
+    let said = notes(&folder, &[&decode[..], &without].concat());
+    assert!(said.contains("note: column-wire 9 shorted in 100 % of lines"), "{said}");
+    assert!(!said.contains("r4c5"), "{said}");
+    let refused = folder.fail(&[&["eval", "plain.bin", "two.csv"][..], &without].concat(), 2);
+    assert!(refused.contains("column-wire 9 shorted"), "{refused}");
+}
+
+#[test]
+fn a_fill_needs_ten_frames_a_reading() {
+    let folder = Folder::new("health_few");
+    let train = ["train", "press", "-n", "1439", "--whole-array", "--fill", "-o", "m.bin"];
+    let refused = folder.fail(&train, 2);
+    assert!(refused.contains("1439 frames") && refused.contains("give 1440"), "{refused}");
+}
+
+#[test]
 fn readings_far_beyond_the_training_range_are_flagged() {
     let folder = prepared("health_clamped");
     changed(&folder, "far.csv", |name, line| {

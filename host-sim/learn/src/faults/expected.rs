@@ -3,6 +3,8 @@
 use model_core::fill::Fill;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
+use super::FEWEST_FOR_NOISE;
+
 /// Median of the square of a standard normal number.
 const MEDIAN_SQUARE: f64 = 0.4549;
 /// Squares of errors, in those of noise, from which on a reading is far off the others.
@@ -112,7 +114,8 @@ impl Expected {
         (0..self.readings()).map(of).collect()
     }
 
-    /// Median squares of what each reading differs from what is expected, in units of the present noise in training.
+    /// Median squares of what each reading differs from what is expected, in units of the noise in training. 0 for a
+    /// reading that is there in too few frames to tell.
     fn squares(&self, scaled: &[f64], struck: &[bool], variance: f64) -> Vec<f64> {
         let mut squares = vec![Vec::new(); self.readings()];
         self.each(scaled, &|at| struck[at], variance, |frame, expected, left| {
@@ -123,6 +126,7 @@ impl Expected {
                 }
             }
         });
+        squares.iter_mut().filter(|it| it.len() < FEWEST_FOR_NOISE).for_each(Vec::clear);
         squares.into_iter().map(|mut squares| median(&mut squares) / MEDIAN_SQUARE).collect()
     }
 

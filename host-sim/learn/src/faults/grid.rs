@@ -31,6 +31,17 @@ impl Grid {
         (self.rows[at / self.columns.len()], self.columns[at % self.columns.len()])
     }
 
+    /// Number of readings.
+    pub(super) fn readings(&self) -> usize {
+        self.rows.len() * self.columns.len()
+    }
+
+    /// Place of the reading at index `at`.
+    pub(super) fn place(&self, at: usize) -> Place {
+        let (row, column) = self.wires(at);
+        Place::Reading(row, column)
+    }
+
     /// Whether the reading at index `at` belongs to `place`.
     #[must_use]
     pub fn is_in(&self, place: Place, at: usize) -> bool {
@@ -91,8 +102,7 @@ impl Grid {
                 of_column().for_each(|at| left[at] = false);
             }
         }
-        let single = (0..left.len()).filter(|at| left[*at]).map(|at| self.wires(at));
-        places.extend(single.map(|(row, column)| Place::Reading(row, column)));
+        places.extend((0..left.len()).filter(|at| left[*at]).map(|at| self.place(at)));
         places
     }
 

@@ -1,12 +1,13 @@
 //! Neighbouring wires that touch: they read alike where the other wires say that they should differ.
 
 use super::expected::Expected;
-use super::{Grid, Place};
+use super::{FEWEST_FOR_NOISE, Grid, Place};
 
 /// Least sum of squared differences that are expected, in those of noise: fewer do not tell.
 const EVIDENCE: f64 = 60.0;
-/// Largest slope of differences over what is expected of them: 1 for sound wires, 0 for such that touch.
-const SLOPE: f64 = 0.5;
+/// Least by which the logarithm of the likelihood that the wires touch is above that of sound wires. With so much evidence
+/// sound wires have −30 ± 8, and such that touch 30 ± 8.
+const MORE_LIKELY: f64 = 10.0;
 /// Largest mean square of differences, in that of noise: 1 for wires that touch.
 const ALIKE: f64 = 3.0;
 /// Largest mean square of what the other readings of a frame differ from what is expected, in that of noise: a frame that
@@ -36,6 +37,7 @@ fn touch(
 ) -> bool {
     let pairs = grid.pairs(place);
     let (mut of_expected, mut of_both, mut of_found, mut count) = (0.0, 0.0, 0.0, 0.0);
+    let mut frames = 0;
     let out = |at: usize| struck[at] || grid.is_in(place, at);
     expected.each(scaled, &out, variance, |frame, z, left| {
         let others = (0..frame.len()).filter(|at| !out(*at) && !frame[*at].is_nan());
@@ -44,6 +46,7 @@ fn touch(
         if sum > FITS * variance * readings {
             return;
         }
+        frames += 1;
         for [a, b] in &pairs {
             let found = expected.difference([*a, *b], [frame[*a], frame[*b]]);
             let wanted = expected.difference([*a, *b], [z[*a], z[*b]]);
@@ -55,7 +58,8 @@ fn touch(
             }
         }
     });
-    of_expected > EVIDENCE * variance
-        && of_both < SLOPE * of_expected
+    frames >= FEWEST_FOR_NOISE
+        && of_expected > EVIDENCE * variance
+        && 0.5 * of_expected - of_both > MORE_LIKELY * variance
         && of_found < ALIKE * variance * count
 }

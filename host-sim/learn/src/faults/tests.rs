@@ -12,10 +12,16 @@ fn sensor() -> (Table, Vec<f32>) {
 }
 
 fn named(readings: &Table, block: &[f32]) -> Vec<String> {
-    let fill = Fill::new(144, 16, block).unwrap();
-    let found = diagnose(readings, Limits::USUAL, Some(fill));
-    assert!(found.iter().all(|found| found.frames % WINDOW == 0));
-    found.iter().map(|found| found.fault.to_string()).collect()
+    let found = told(readings, Some(block));
+    assert!(found.iter().all(|(_, frames)| frames % WINDOW == 0));
+    found.into_iter().map(|(fault, _)| fault).collect()
+}
+
+/// Names of faults, and in how many frames they are.
+fn told(readings: &Table, block: Option<&[f32]>) -> Vec<(String, usize)> {
+    let fill = block.map(|block| Fill::new(144, 16, block).unwrap());
+    let found = diagnose(readings, Limits::USUAL, fill);
+    found.iter().map(|found| (found.fault.to_string(), found.frames)).collect()
 }
 
 fn with(readings: &Table, change: impl Fn(usize, &mut [f64])) -> Table {
@@ -53,6 +59,84 @@ fn every_kind_of_fault_is_named_and_sound_frames_have_none() {
     let draws: Vec<f64> = (0..200).map(|_| draw.normal()).collect();
     let noisy = with(&sound, |line, frame| frame[100] *= 1.0 + 0.5 * draws[line]);
     assert_eq!(named(&noisy, &block), ["r6c11 noisy"]);
+}
+
+#[test]
+fn few_frames_of_a_sound_sensor_have_no_faults() {
+    let (_, block) = sensor();
+    for frames in [5, 6, 9, 12, 49, 50, 205, 207, 399, 405] {
+        for seed in 0..6 {
+            let world = World { seed: 30 + seed, ..World::press() };
+            let sound = synthesise(&world, Stream::Test, frames).inputs;
+            assert_eq!(told(&sound, Some(&block)), [], "{frames} frames of seed {seed}");
+        }
+    }
+}
+
+#[test]
+fn every_window_has_frames_enough_and_all_frames_are_in_one() {
+    let ends = |frames| -> Vec<[usize; 2]> {
+        windows(frames).into_iter().map(|window| [window.start, window.end]).collect()
+    };
+    assert_eq!(ends(0), [[0, 0]]);
+    assert_eq!(ends(5), [[0, 5]]);
+    assert_eq!(ends(399), [[0, 399]]);
+    assert_eq!(ends(605), [[0, 200], [200, 400], [400, 605]]);
+}
+
+#[test]
+fn what_comes_and_goes_is_named_and_counted_in_the_frames_that_it_strikes() {
+    let (sound, block) = sensor();
+    let (block, none) = (Some(&block[..]), None);
+    let told = |readings: &Table, block: Option<&[f32]>, expected: &[(&str, usize)]| {
+        let found = told(readings, block);
+        let found: Vec<_> = found.iter().map(|(name, frames)| (name.as_str(), *frames)).collect();
+        assert_eq!(found, expected);
+    };
+    for fill in [block, none] {
+        let single = |ohm| {
+            with(&sound, move |line, frame| {
+                if line % 8 == 0 {
+                    frame[3 * 18 + 4] = ohm;
+                }
+            })
+        };
+        told(&single(1e6), fill, &[("r4c5 intermittently open", 25)]);
+        told(&single(0.02), fill, &[("r4c5 intermittently shorted", 25)]);
+        told(&single(f64::NAN), fill, &[("r4c5 intermittently missing", 25)]);
+        let row = with(&sound, |line, frame| {
+            if line % 5 == 0 {
+                frame[3 * 18..][..18].fill(f64::INFINITY);
+            }
+        });
+        told(&row, fill, &[("row-wire 4 intermittently open", 40)]);
+        // It breaks for good, and lasts in most of the frames.
+        let breaks = with(&sound, |line, frame| {
+            if line >= 8 {
+                frame[3 * 18 + 4] = 1e6;
+            }
+        });
+        told(&breaks, fill, &[("r4c5 open", 192)]);
+    }
+    // All readings of a column are open in an eighth of the frames, but never together.
+    let apart = with(&sound, |line, frame| frame[line % 8 * 18] = 1e6);
+    let each: Vec<String> = (1..=8).map(|row| format!("r{row}c1 intermittently open")).collect();
+    let each: Vec<(&str, usize)> = each.iter().map(|name| (name.as_str(), 25)).collect();
+    told(&apart, block, &each);
+    let twice = Table { values: [&sound.values[..], &sound.values].concat(), ..sound.clone() };
+    let breaks = with(&twice, |line, frame| {
+        if line >= 150 {
+            frame[3 * 18 + 4] = 1e6;
+        }
+    });
+    told(&breaks, block, &[("r4c5 open", 250)]);
+    let mut draw = Random::new(1, Stream::Test, Purpose::Noise, 0, 0);
+    let draws: Vec<f64> = (0..200).map(|_| draw.normal()).collect();
+    let noisy = with(&sound, |line, frame| frame[100] *= (1.0 + draws[line]).max(0.0));
+    told(&noisy, block, &[("r6c11 noisy", 200)]);
+    let shorted = noisy.lines().filter(|frame| frame[100] < 5.0).count();
+    assert!(shorted > 20);
+    told(&noisy, none, &[("r6c11 intermittently shorted", shorted)]);
 }
 
 #[test]

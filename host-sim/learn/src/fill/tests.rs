@@ -15,7 +15,7 @@ fn model() -> (ModelBlob, Table) {
     let trained = train(&frames, &options, &Silent).unwrap();
     let blob = pack(&trained, &frames, &Origin::of_data("rows", 0, 1, &frames)).unwrap();
     let blob = add(&blob, &frames.inputs).unwrap();
-    (blob, synthesise(&world, Stream::Test, 300).inputs)
+    (blob, synthesise(&world, Stream::Test, 400).inputs)
 }
 
 #[test]
@@ -33,7 +33,7 @@ fn filled_readings_are_as_near_as_noise_lets_them_be() {
         let errors = filled.iter().zip(&fresh.values).enumerate();
         for at in &missing {
             let of = errors.clone().skip(*at).step_by(36).map(|(_, (a, b))| (a - b).powi(2));
-            let error = (of.sum::<f64>() / 300.0).sqrt();
+            let error = (of.sum::<f64>() / fresh.len() as f64).sqrt();
             // The noise alone is 0.5 % of 57 Ω, which is 0.29 Ω; the mean would be off by the deviation.
             assert!((0.2..0.4).contains(&error), "{at}: {error} Ω");
             assert!(error < 0.7 * deviations[*at], "{at}: {error} Ω of {}", deviations[*at]);
@@ -57,4 +57,19 @@ fn models_that_cannot_fill_are_refused() {
     let mut bad = fresh;
     bad.values[0] = f64::INFINITY;
     assert!(matches!(add(&blob, &bad), Err(Error::NoFill(_))));
+}
+
+#[test]
+fn too_few_frames_are_refused_with_the_number_that_is_enough() {
+    let (blob, _) = model();
+    let world = World { read_rows: vec![3, 4], ..World::press() };
+    let readings = |frames| synthesise(&world, Stream::Test, frames).inputs;
+    let refused = add(&blob, &readings(300)).unwrap_err();
+    assert!(matches!(refused, Error::FewForFill { frames: 300, readings: 36, least: 360 }));
+    let message = refused.to_string();
+    assert!(
+        message.contains("300 frames are too few") && message.contains("give 360"),
+        "{message}"
+    );
+    assert!(add(&blob, &readings(359)).is_err() && add(&blob, &readings(360)).is_ok());
 }

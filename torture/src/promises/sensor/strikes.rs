@@ -7,6 +7,8 @@ use super::{COLUMNS, ROWS, draws};
 
 /// Noise of a struck reading: a hundred times the usual one.
 const NOISE: f64 = 0.5;
+/// A loose lead is open in one of so many frames.
+const LOOSE_ONE_IN: usize = 5;
 /// Columns of one converter.
 const CHANNELS: usize = 8;
 
@@ -15,6 +17,8 @@ const CHANNELS: usize = 8;
 pub enum Strike {
     /// One of the board's wires or converters.
     Board([BoardFault; 1], Vec<String>),
+    /// A lead of the board that is open in every fifth frame.
+    Loose([BoardFault; 1], String),
     /// A reading with a hundred times the noise; wires count from 0.
     Noisy { row: usize, column: usize },
 }
@@ -27,15 +31,21 @@ impl Strike {
     /// Faults of the board.
     pub fn faults(&self) -> &[BoardFault] {
         match self {
-            Self::Board(fault, _) => fault,
+            Self::Board(fault, _) | Self::Loose(fault, _) => fault,
             Self::Noisy { .. } => &[],
         }
+    }
+
+    /// Number of frames of which one is struck.
+    pub fn one_in(&self) -> usize {
+        if matches!(self, Self::Loose(..)) { LOOSE_ONE_IN } else { 1 }
     }
 
     /// Names that the diagnosis should give.
     pub fn names(&self) -> Vec<String> {
         match self {
             Self::Board(_, names) => names.clone(),
+            Self::Loose(_, name) => vec![name.clone()],
             Self::Noisy { row, column } => vec![format!("r{}c{} noisy", row + 1, column + 1)],
         }
     }
@@ -54,10 +64,14 @@ impl Strike {
 /// Every fault of one wire, two neighbours, one converter or one reading that readings can tell.
 pub fn all() -> Vec<Strike> {
     let one = |fault, name: String| Strike::Board([fault], vec![name]);
+    let loose = |fault, wire: &str, number| {
+        Strike::Loose([fault], format!("{wire} {number} intermittently open"))
+    };
     let mut strikes = Vec::new();
     for row in 0..ROWS {
         let wire = row + 1;
         strikes.push(one(BoardFault::RowOpen(row), format!("row-wire {wire} open")));
+        strikes.push(loose(BoardFault::RowOpen(row), "row-wire", wire));
         strikes
             .push(one(BoardFault::RowAtGround(row), format!("row-wire {wire} shorted to ground")));
         if wire < ROWS {
@@ -68,6 +82,7 @@ pub fn all() -> Vec<Strike> {
     for column in 0..COLUMNS {
         let wire = column + 1;
         strikes.push(one(BoardFault::ColumnOpen(column), format!("column-wire {wire} open")));
+        strikes.push(loose(BoardFault::ColumnOpen(column), "column-wire", wire));
         let name = format!("column-wire {wire} shorted");
         strikes.push(one(BoardFault::ColumnAtGround(column), name));
         if wire < COLUMNS {
