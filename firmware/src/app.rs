@@ -134,7 +134,7 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
         } = buffers;
         let capacity = Buffers::<ROWS, COLUMNS, OUTPUTS, BYTES>::CAPACITY;
         let now_us = platform.now_us();
-        let guard = Guard::new(platform.key_area().bytes());
+        let guard = Guard::new(platform.key_area());
         let mut core = Core {
             line: Line::new(platform, message),
             source,

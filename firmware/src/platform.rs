@@ -22,7 +22,8 @@ pub trait Platform: Port {
     /// Memory that keeps settings over restarts.
     type Settings: Keeper;
 
-    /// Flash that holds the device's key, and nothing else. It is not erased once a key is set.
+    /// Flash that holds the device's key, and nothing else. It is not erased once a key is set. Zeros can be written over
+    /// whatever it holds.
     type KeyArea: Slot;
 
     /// Name of the board, as the link reports it.

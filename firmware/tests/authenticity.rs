@@ -12,6 +12,8 @@ use mock_board::*;
 
 const CHUNK: usize = 60;
 const KEY: Key = [0x42; 32];
+/// Bytes of a copy of the key.
+const COPY: usize = 48;
 
 /// A device with a key, and its flash.
 struct Device {
@@ -43,13 +45,28 @@ impl Device {
     fn identity(&mut self) -> (Option<Versioned>, KeyState, Option<u32>) {
         let mut bench = Bench::with_key(quiet(), &self.key);
         let mut session = Session::start(&mut bench.app, &mut self.slots, &mut []);
-        ask(&mut session, &bench.board, &Request::Identify, |report| match report {
+        let identity = ask(&mut session, &bench.board, &Request::Identify, |report| match report {
             Report::Identity(Identity { model, key, highest_version, .. }) => {
                 (model.map(|model| (model.crc_32, model.version)), key, highest_version)
             }
             other => panic!("{other:?}"),
-        })
-        .0
+        });
+        self.key = bench.app.platform().key_area().clone();
+        identity.0
+    }
+
+    /// Starts it anew, and sets `key`.
+    fn provision(&mut self, key: Key) -> Result<(), Refusal> {
+        let mut bench = Bench::with_key(quiet(), &self.key);
+        let mut session = Session::start(&mut bench.app, &mut self.slots, &mut []);
+        let done =
+            ask(&mut session, &bench.board, &Request::Provision { key }, |report| match report {
+                Report::Provisioned => Ok(()),
+                Report::Refused(refusal) => Err(refusal),
+                other => panic!("{other:?}"),
+            });
+        self.key = bench.app.platform().key_area().clone();
+        done.0
     }
 
     fn undo(&mut self, left: u32) -> Result<(), Refusal> {
@@ -183,12 +200,34 @@ fn without_a_key_a_seal_is_refused_and_with_a_decayed_one_every_model() {
 
     let mut device = Device::new();
     device.key.decay(7, 1);
+    device.key.decay(7 + COPY, 1);
     let damaged = fault(SealFault::KeyDamaged);
     assert_eq!(
         (device.install(&next, Some(seal)), device.install(&next, None)),
         (damaged, damaged)
     );
     assert_eq!(device.identity(), (None, KeyState::Damaged, None));
+    // Only whoever has the key can set it again.
+    assert_eq!(device.provision([0x43; 32]), Err(Refusal::Seal(SealFault::KeyDamaged)));
+    assert_eq!(device.provision(KEY), Ok(()));
+    assert_eq!(device.identity().1, KeyState::Set);
+    assert_eq!(device.install(&next, Some(seal)), Ok(confirmed(&next)));
+}
+
+#[test]
+fn any_flipped_bit_of_the_key_leaves_the_model_in_force_and_the_next_start_makes_it_good() {
+    let mut device = Device::new();
+    let before = device.identity();
+    assert_eq!(before.1, KeyState::Set);
+    for bit in 0..8 * COPY {
+        device.key.decay(bit / 8, 1 << (bit % 8));
+        assert_eq!(device.identity(), before, "{bit}");
+        let again = if bit % 2 == 0 { Ok(()) } else { device.provision(KEY) };
+        assert_eq!(again, Ok(()), "{bit}");
+        device.key.decay(COPY + bit / 8, 1 << (bit % 8));
+        assert_eq!(device.identity(), before, "{bit}, in both copies");
+        device.key = KeyArea::with(&KEY);
+    }
 }
 
 #[test]

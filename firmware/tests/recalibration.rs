@@ -1,12 +1,14 @@
 //! Recalibration over the link: what is learned comes into force whole or not at all, and can be undone.
 
+use std::array;
+
 use firmware::app::{Leave, Session};
 use firmware::link::message::{
     Configuration, RecalibrationFault, RecalibrationReport, RecalibrationState, RecalibrationStep,
-    Refusal, Report, Request, UploadStep,
+    Refusal, Report, Request, SealFault, UploadState, UploadStep,
 };
 use firmware::seal::{Key, Seal};
-use firmware::store::{MOST_RECORDS, Slot};
+use firmware::store::{MOST_RECORDS, Slot, blob_in_slot, seal_in_slot};
 use mock_board::*;
 use model_core::blob::Floats;
 use model_core::checksum::CRC_32;
@@ -76,10 +78,20 @@ fn show(session: &mut TestSession<'_>, board: &Board, frame: &TestFrame) -> [f32
 
 /// Begins, and adds so many presses that the device does not scan but is shown.
 fn add_presses(session: &mut TestSession<'_>, board: &Board, presses: usize) {
+    add_presses_as(session, board, presses, today);
+}
+
+/// As [`add_presses`], where the sensor reads frames as this tells.
+fn add_presses_as(
+    session: &mut TestSession<'_>,
+    board: &Board,
+    presses: usize,
+    read: impl Fn(&TestFrame) -> TestFrame,
+) {
     let blob = trained();
     step(session, board, RecalibrationStep::Begin).0.unwrap();
     for i in 0..presses {
-        show(session, board, &today(&press(i)));
+        show(session, board, &read(&press(i)));
         let stated = outputs(&blob, &press(i));
         let outputs = Floats::of(&stated);
         let added = RecalibrationStep::Press { before: i as u16, frames: 0, outputs };
@@ -382,6 +394,57 @@ fn with_a_key_the_device_seals_the_model_that_it_makes_and_can_return_to_the_one
     assert_eq!((new.generation, new.version), (2, Some(5)));
     assert!(undone.is_ok() && new.crc_32 != crc_of(&old));
     assert_eq!(in_force(&mut slots).0.crc_32, crc_of(&old));
+}
+
+/// Whoever is at the line can recalibrate twice: the original is erased then, and must be had again.
+#[test]
+fn behind_two_recalibrations_the_owner_s_original_is_taken_again_and_nothing_else_of_its_version() {
+    const KEY: Key = [9; 32];
+    let (old, other, key) = (trained(), blob(5, 1), KeyArea::with(&KEY));
+    let mut slots = MockSlot::pair();
+    let install = |slots: &mut [MockSlot; 2], blob: &[u8], seal, last| {
+        let mut steps = upload_steps(blob, 60);
+        steps.pop();
+        steps.extend([UploadStep::Try { seal: Some(seal) }, last]);
+        mock_board::upload(&mut Bench::with_key(quiet(), &key), slots, &mut [], &steps)
+    };
+    let seal = Seal::of(&KEY, 5, &old);
+    let rejected = Seal::of(&KEY, 5, &other);
+    // A model of the same version that its owner has tried, and not confirmed.
+    install(&mut slots, &other, rejected, UploadStep::Abort).unwrap();
+    install(&mut slots, &old, seal, UploadStep::Confirm).unwrap();
+    let mut own = Vec::new();
+    for shifts in [1.0, -1.0] {
+        let (mut bench, mut memory) = (Bench::with_key(quiet(), &key), memory());
+        let board = bench.board.clone();
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut memory);
+        let read = |frame: &TestFrame| {
+            array::from_fn(|m| array::from_fn(|k| frame[m][k] + shifts * SHIFTS[m][k]))
+        };
+        add_presses_as(&mut session, &board, 60, read);
+        step(&mut session, &board, RecalibrationStep::Commit).0.unwrap();
+        let _ = session;
+        let slot = own.len() % 2; // the original is in slot 1
+        own.push((
+            blob_in_slot(slots[slot].bytes()).to_vec(),
+            seal_in_slot(slots[slot].bytes()).unwrap(),
+        ));
+    }
+    assert!(slots.iter().all(|slot| !slot.bytes().starts_with(&old)), "the original is erased");
+    let outdated = Err(Refusal::Seal(SealFault::Outdated { highest: 5 }));
+    let older = Seal::of(&KEY, 4, &old);
+    assert_eq!(install(&mut slots, &other, rejected, UploadStep::Confirm), outdated);
+    assert_eq!(install(&mut slots, &old, older, UploadStep::Confirm), outdated);
+    // What the device has sealed is for itself: nobody can upload it.
+    let (recalibrated, own_seal) = &own[0];
+    assert_eq!(own_seal.version, 5);
+    let forged = Err(Refusal::Seal(SealFault::Forged));
+    assert_eq!(install(&mut slots, recalibrated, *own_seal, UploadStep::Confirm), forged);
+    let confirmed = UploadState::Confirmed { crc_32: crc_of(&old) };
+    assert_eq!(install(&mut slots, &old, seal, UploadStep::Confirm), Ok(confirmed));
+    let mut bench = Bench::with_key(quiet(), &key);
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&old)));
 }
 
 #[test]

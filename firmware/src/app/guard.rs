@@ -1,7 +1,8 @@
 //! Which models the device's key lets come into force.
 
 use crate::link::message::{KeyState, Refusal, SealFault};
-use crate::seal::{Key, Seal};
+use crate::log::{info, warning};
+use crate::seal::{Key, Seal, is_same};
 use crate::store::{DeviceKey, SEAL_BYTES, Slot, blob_in_slot, capacity, generation, seal_in_slot};
 
 /// The device's key, and the seals that it has made or found good.
@@ -14,9 +15,15 @@ pub struct Guard {
 }
 
 impl Guard {
-    /// A guard with the key in this `area` of flash.
-    pub fn new(area: &[u8]) -> Self {
-        Self { key: DeviceKey::find(area), seals: [None; 2], highest: None }
+    /// A guard with the key in this `area` of flash, where what is found is made firm.
+    pub fn new<S: Slot>(area: &mut S) -> Self {
+        let key = DeviceKey::find(area.bytes());
+        match key.settle(area) {
+            Ok(false) => {}
+            Ok(true) => info!("key: a damaged or unfinished copy was found and made good"),
+            Err(_) => warning!("key: not two sound copies, no place or the flash failed"),
+        }
+        Self { key, seals: [None; 2], highest: None }
     }
 
     /// Looks at the seals in both slots.
@@ -24,7 +31,10 @@ impl Guard {
         let DeviceKey::Set(key) = &self.key else { return };
         for ((index, slot), seal) in slots.iter().enumerate().zip(&mut self.seals) {
             let bytes = slot.bytes();
-            *seal = seal_in_slot(bytes).filter(|seal| seal.fits(key, blob_in_slot(bytes)));
+            *seal = seal_in_slot(bytes).filter(|seal| {
+                let blob = blob_in_slot(bytes);
+                seal.fits(key, blob) || seal.fits_own(key, blob)
+            });
             if generation(index, bytes).is_some() {
                 self.highest = self.highest.max(seal.map(|seal| seal.version));
             }
@@ -88,9 +98,11 @@ impl Guard {
         }
     }
 
-    /// Whether `seal` has the version `highest`, and is not the one that was confirmed.
+    /// Whether `seal` has the version `highest`, and is neither the one that was confirmed nor that of the model from
+    /// which the device made its own: the same origin tells both.
     fn is_another_of(&self, seal: Seal, highest: u32) -> bool {
-        seal.version == highest && !self.seals.contains(&Some(seal))
+        let is_same = |known: &Seal| known.version == highest && known.origin() == seal.origin();
+        seal.version == highest && !self.seals.iter().flatten().any(is_same)
     }
 
     /// Checks that going back to the model in `slot` is no step to a lower version.
@@ -106,23 +118,28 @@ impl Guard {
     /// A seal for `blob`, which the device has made of the model in `slot`.
     pub fn seal(&self, blob: &[u8], slot: usize) -> Option<Seal> {
         let DeviceKey::Set(key) = &self.key else { return None };
-        Some(Seal::of(key, self.seal_of(slot)?.version, blob))
+        Some(Seal::own(key, &self.seal_of(slot)?, blob))
     }
 
-    /// Sets the key for good. The same key again does no harm.
+    /// Sets the key for good. The same key again makes copies good that have decayed.
     pub fn provision<S: Slot>(&mut self, area: &mut S, key: &Key) -> Result<(), Refusal> {
         match &self.key {
             DeviceKey::None => {
-                DeviceKey::set(area, key).map_err(|_| Refusal::Flash)?;
-                self.key = DeviceKey::find(area.bytes());
-                if matches!(self.key, DeviceKey::Set(_)) { Ok(()) } else { Err(Refusal::Flash) }
+                // The key may be set although the flash failed: in its second copy.
+                let _ = DeviceKey::set(area, key);
             }
-            // No early exit: the time tells nothing of the key.
-            DeviceKey::Set(old) if old.iter().zip(key).fold(0, |d, (a, b)| d | (a ^ b)) == 0 => {
-                Ok(())
+            DeviceKey::Set(old) if is_same(old, key) => {
+                let _ = self.key.settle(area);
+                return Ok(());
             }
-            DeviceKey::Set(_) => Err(Refusal::Seal(SealFault::KeyIsSet)),
-            DeviceKey::Damaged => Err(Refusal::Seal(SealFault::KeyDamaged)),
+            DeviceKey::Set(_) => return Err(Refusal::Seal(SealFault::KeyIsSet)),
+            DeviceKey::Damaged => {
+                if DeviceKey::mend(area, key) == Ok(false) {
+                    return Err(Refusal::Seal(SealFault::KeyDamaged));
+                }
+            }
         }
+        self.key = DeviceKey::find(area.bytes());
+        if matches!(self.key, DeviceKey::Set(_)) { Ok(()) } else { Err(Refusal::Flash) }
     }
 }

@@ -94,7 +94,10 @@ pub enum Error {
     #[error("the device has no key, and takes any model: `provision` it first, or leave --key out")]
     HasNoKey,
     /// Device whose key has decayed.
-    #[error("the device's key has decayed, so it takes no model: erase its flash with a debugger")]
+    #[error(
+        "the device's key has decayed, so it takes no model: provision the same key again, \
+         or erase its flash with a debugger"
+    )]
     KeyDamaged,
     /// Device that does not decode with a model on trial.
     #[error("the device is back at its previous model: {0}")]
