@@ -53,6 +53,7 @@ pub const PROMISES: &[Promise] = &[
     power::UNDO,
     power::RECALIBRATION,
     power::SETTINGS,
+    power::PROVISION,
     power::DECAY,
     power::WORN,
     emulated::RAM,

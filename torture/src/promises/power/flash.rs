@@ -119,6 +119,7 @@ pub struct Cells {
 }
 
 /// A slot of flash.
+#[derive(Clone)]
 pub struct Flash {
     cells: Cells,
     supply: Rc<RefCell<Supply>>,
@@ -127,13 +128,22 @@ pub struct Flash {
     pub worn: Vec<Worn>,
     /// Whether a write reads back what it wrote.
     pub reads_back: bool,
+    /// Whether all weak bits of a word read alike at every other start: the word is the old or the new one.
+    pub swings: bool,
 }
 
 impl Flash {
     /// An erased slot of so many `words`.
     pub fn erased(words: usize, supply: &Rc<RefCell<Supply>>, torn: Torn) -> Self {
         let cells = Cells { words: vec![u32::MAX; words], weak: vec![0; words], has_weak: false };
-        Self { cells, supply: supply.clone(), torn, worn: Vec::new(), reads_back: true }
+        Self {
+            cells,
+            supply: supply.clone(),
+            torn,
+            worn: Vec::new(),
+            reads_back: true,
+            swings: false,
+        }
     }
 
     /// What the slot holds, to be put back by [`Flash::restore`].
@@ -167,7 +177,13 @@ impl Flash {
         if self.cells.has_weak {
             let mut supply = self.supply.borrow_mut();
             for (word, weak) in self.cells.words.iter_mut().zip(&self.cells.weak) {
-                *word = (*word & !weak) | (supply.random.next_u32() & weak);
+                let any = supply.random.next_u32();
+                let bits = match any % 4 {
+                    0 if self.swings => 0,
+                    1 if self.swings => u32::MAX,
+                    _ => any,
+                };
+                *word = (*word & !weak) | (bits & weak);
             }
         }
     }
