@@ -169,7 +169,9 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         }
         let had_none = self.guard.key_state() == KeyState::None;
         let platform = self.line.platform();
-        platform.feed_watchdog(); // it may erase flash
+        if had_none {
+            platform.feed_watchdog(); // it may erase flash
+        }
         self.guard.provision(platform.key_area(), key)?;
         if had_none {
             info!("the device has a key from now on");
