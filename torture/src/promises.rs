@@ -15,6 +15,7 @@ mod sensor;
 
 mod flips;
 mod power;
+mod recheck;
 mod emulated;
 mod authenticity;
 mod load;
@@ -55,6 +56,7 @@ pub const PROMISES: &[Promise] = &[
     power::SETTINGS,
     power::DECAY,
     power::WORN,
+    recheck::RECHECK,
     emulated::RAM,
     authenticity::FORGED,
     load::FRAMES,
