@@ -1,7 +1,8 @@
 //! How much a test does: from which seed on, for how long, and whether with a planted fault.
 
 use std::any::Any;
-use std::panic::{self, AssertUnwindSafe};
+use std::cell::RefCell;
+use std::panic::{self, AssertUnwindSafe, PanicHookInfo};
 use std::time::{Duration, Instant};
 
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
@@ -50,7 +51,8 @@ impl Effort {
     }
 
     /// Runs `case` for one seed after another, on all cores: for the first `least`, and for more up to `most` while
-    /// there is time. A case gives its value, the larger the worse, or says what failed. A panic is a failure.
+    /// there is time. A case gives its value, the larger the worse, or says what failed. A panic is a failure, and told
+    /// by the note alone.
     ///
     /// The caller compares the worst value with `bound`, both in `unit`.
     pub fn worst(
@@ -59,6 +61,7 @@ impl Effort {
         (bound, unit): (f64, &'static str),
         case: impl Fn(u64) -> Result<f64, String> + Sync,
     ) -> Found {
+        let _quiet = Quiet::begin();
         let mut worst = Worst { value: f64::NEG_INFINITY, seed: self.seed, note: String::new() };
         let mut cases = 0;
         while cases < least || (cases < most && !self.is_over()) {
@@ -77,7 +80,12 @@ impl Effort {
 
 fn tested(seed: u64, case: impl Fn(u64) -> Result<f64, String>) -> Worst {
     let outcome = panic::catch_unwind(AssertUnwindSafe(|| case(seed)));
-    match outcome.unwrap_or_else(|cause| Err(format!("panic: {}", said(&*cause)))) {
+    let told = |cause: Box<dyn Any + Send>| {
+        let place = PLACE.take();
+        let place = if place.is_empty() { place } else { format!(" at {place}") };
+        Err(format!("panic{place}: {}", said(&*cause)))
+    };
+    match outcome.unwrap_or_else(told) {
         // NaN is worse than any number.
         Ok(value) if value.is_nan() => Worst { value: f64::INFINITY, seed, note: "NaN".to_owned() },
         Ok(value) => Worst { value, seed, note: String::new() },
@@ -94,4 +102,63 @@ fn worse(one: Worst, other: Worst) -> Worst {
 fn said(cause: &(dyn Any + Send)) -> &str {
     let text = cause.downcast_ref::<String>().map(String::as_str);
     text.or_else(|| cause.downcast_ref::<&str>().copied()).unwrap_or("without a message")
+}
+
+thread_local! {
+    /// Where this thread panicked last.
+    static PLACE: RefCell<String> = const { RefCell::new(String::new()) };
+}
+
+type Hook = Box<dyn Fn(&PanicHookInfo<'_>) + Send + Sync>;
+
+/// A time in which panics are not printed: thousands of them, each with a backtrace, would bury the table.
+struct Quiet(Option<Hook>);
+
+impl Quiet {
+    fn begin() -> Self {
+        let before = panic::take_hook();
+        panic::set_hook(Box::new(|info| {
+            PLACE.set(info.location().map(ToString::to_string).unwrap_or_default());
+        }));
+        Self(Some(before))
+    }
+}
+
+impl Drop for Quiet {
+    fn drop(&mut self) {
+        if let Some(before) = self.0.take() {
+            panic::set_hook(before);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicU64, Ordering};
+
+    use super::*;
+
+    /// Number of panics that were printed.
+    static PRINTED: AtomicU64 = AtomicU64::new(0);
+
+    #[test]
+    fn a_panic_is_told_by_the_note_alone() {
+        let before = panic::take_hook();
+        panic::set_hook(Box::new(|_| {
+            PRINTED.fetch_add(1, Ordering::Relaxed);
+        }));
+        let effort = Effort::new(1, Duration::ZERO, false);
+        let found = effort.worst((3, 3), (0.0, "broken"), |seed| {
+            assert_ne!(seed, 2, "the second case breaks");
+            Ok(0.0)
+        });
+        let meanwhile = PRINTED.load(Ordering::Relaxed);
+        let _ = panic::catch_unwind(|| panic!("afterwards"));
+        let afterwards = PRINTED.load(Ordering::Relaxed);
+        panic::set_hook(before);
+        assert_eq!((found.seed, found.keeps()), (2, false));
+        let note = &found.note;
+        assert!(note.contains("effort.rs") && note.contains("the second case breaks"), "{note}");
+        assert_eq!((meanwhile, afterwards), (0, 1));
+    }
 }

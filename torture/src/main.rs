@@ -112,9 +112,18 @@ fn run(arguments: &Arguments) -> Result<bool, Box<dyn Error>> {
     if arguments.json {
         println!("{}", table::json(&entries, arguments.self_test)?);
     } else {
-        print!("{}", table::text(&entries, arguments.self_test));
+        print!("{}", table::text(&entries, arguments.self_test, &deciding(arguments)));
     }
     Ok(entries.iter().all(|entry| entry.is_as_it_should_be(arguments.self_test)))
+}
+
+/// Options that decide what a case does: some do more in a run that has time.
+fn deciding(arguments: &Arguments) -> String {
+    match arguments {
+        Arguments { self_test: true, .. } => "--self-test".to_owned(),
+        Arguments { short: true, .. } => "--short".to_owned(),
+        Arguments { minutes, .. } => format!("--minutes {minutes}"),
+    }
 }
 
 /// The promises whose names start with one of `names`, or all.
@@ -125,4 +134,19 @@ fn choose(names: &[String]) -> Result<Vec<&'static Promise>, String> {
     }
     let chosen = PROMISES.iter();
     Ok(chosen.filter(|one| names.is_empty() || names.iter().any(|name| has(one, name))).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_with_time_is_repeated_with_time() {
+        let of =
+            |options: &[&str]| deciding(&Arguments::parse_from([&["torture"], options].concat()));
+        assert_eq!(of(&["--minutes", "2.5", "rls"]), "--minutes 2.5");
+        assert_eq!(of(&[]), "--minutes 20");
+        assert_eq!(of(&["--short"]), "--short");
+        assert_eq!(of(&["--self-test", "--short"]), "--self-test");
+    }
 }

@@ -15,6 +15,7 @@ mod sensor;
 
 mod flips;
 mod power;
+mod recheck;
 mod emulated;
 mod authenticity;
 mod load;
@@ -56,6 +57,7 @@ pub const PROMISES: &[Promise] = &[
     power::PROVISION,
     power::DECAY,
     power::WORN,
+    recheck::RECHECK,
     emulated::RAM,
     authenticity::FORGED,
     load::FRAMES,

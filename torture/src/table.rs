@@ -10,9 +10,14 @@ use crate::promise::Tested;
 /// The head of the table, in the columns of [`row`].
 const HEAD: [&str; 7] = ["promise", "cases", "worst", "bound", "verdict", "seed", "name"];
 
-/// The table in at most 120 columns, notes, and a line that sums it up.
+/// Width of a promise's text, and the longest name: a row has at most 120 columns.
+#[cfg(test)]
+pub const WIDTHS: [usize; 2] = [54, 18];
+
+/// The table in at most 120 columns, notes, a line that sums it up, and for each promise that is not as it should be the
+/// command that repeats its worst case. `options` are those of this run that decide what a case does.
 #[must_use]
-pub fn text(entries: &[Tested], self_test: bool) -> String {
+pub fn text(entries: &[Tested], self_test: bool, options: &str) -> String {
     let mut table = row(&HEAD.map(str::to_owned));
     for entry in entries {
         table.push_str(&row(&cells(entry, self_test)));
@@ -33,15 +38,14 @@ pub fn text(entries: &[Tested], self_test: bool) -> String {
     let _ = write!(table, "\n{good} of {} {what}", entries.len());
     for (entry, found) in bad().filter_map(|entry| Some((entry, entry.outcome.as_ref().ok()?))) {
         let (name, seed) = (entry.promise.name, found.seed);
-        let plant = if self_test { " --self-test" } else { "" };
-        let _ = write!(table, "\nagain: cargo xtask torture --short{plant} --seed {seed} {name}");
+        let _ = write!(table, "\nagain: cargo xtask torture {options} --seed {seed} {name}");
     }
     table.push('\n');
     table
 }
 
 fn row([promise, cases, worst, bound, verdict, seed, name]: &[String; 7]) -> String {
-    format!("{promise:<54}{cases:>9} {worst:>12} {bound:>10} {verdict:<8} {seed:>6}  {name}\n")
+    format!("{promise:<54}{cases:>8} {worst:>13} {bound:>8} {verdict:<8}{seed:>6} {name}\n")
 }
 
 fn cells(entry: &Tested, self_test: bool) -> [String; 7] {
@@ -104,5 +108,60 @@ fn verdict(entry: &Tested, self_test: bool) -> &'static str {
         (Ok(false), false) => "FAIL",
         (Ok(false), true) => "found",
         (Ok(true), true) => "MISSED",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+    use crate::promise::Promise;
+    use crate::promises::PROMISES;
+
+    fn entry(promise: &'static Promise, worst: f64) -> Tested {
+        let found = Found {
+            cases: 123_456_789,
+            worst,
+            bound: 1.25e-12,
+            unit: "noise",
+            seed: 123_456,
+            note: String::new(),
+        };
+        Tested { promise, outcome: Ok(found), time: Duration::ZERO }
+    }
+
+    #[test]
+    fn rows_of_all_promises_are_at_most_120_columns_wide_and_their_columns_in_line() {
+        let entries: Vec<Tested> = PROMISES.iter().map(|it| entry(it, 1.234e-4)).collect();
+        let table = text(&entries, false, "--short");
+        let rows = || table.lines().take(1 + PROMISES.len());
+        let at = |row: &str| row.chars().skip(WIDTHS[0] + 40).collect::<String>();
+        for (row, promise) in rows().skip(1).zip(PROMISES) {
+            assert!(row.chars().count() <= 120, "{row}");
+            assert_eq!(at(row), format!("123456 {}", promise.name), "{row}");
+        }
+    }
+
+    #[test]
+    fn every_promise_has_a_text_and_a_name_of_its_own_that_fit() {
+        for (number, promise) in PROMISES.iter().enumerate() {
+            let lengths = [promise.text, promise.name].map(|it| it.chars().count());
+            assert!(lengths[0] <= WIDTHS[0] && lengths[1] <= WIDTHS[1], "{promise:?}: {lengths:?}");
+            assert!(!promise.text.starts_with(char::is_uppercase), "{promise:?}");
+            let before = &PROMISES[..number];
+            let same = |it: &&Promise| it.text == promise.text || it.name == promise.name;
+            assert!(before.iter().find(same).is_none(), "{promise:?}");
+        }
+    }
+
+    #[test]
+    fn a_broken_promise_is_repeated_by_the_options_of_its_run() {
+        for options in ["--short", "--minutes 20", "--self-test"] {
+            let table = text(&[entry(&PROMISES[0], 1.0)], false, options);
+            let name = PROMISES[0].name;
+            let again = format!("\nagain: cargo xtask torture {options} --seed 123456 {name}\n");
+            assert!(table.ends_with(&again), "{table}");
+        }
     }
 }

@@ -44,6 +44,8 @@ fn rows(this: &Path) -> [Vec<Step>; 2] {
     let mut docs = cargo(&["doc", "--workspace", "--no-deps"]);
     docs.env("RUSTDOCFLAGS", "-D warnings");
     let clippy = ["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"];
+    // With the packages of `cargo xtask torture`, so that little is built twice.
+    let torture = ["test", "--package", "host-sim", "--package", "torture", "--bin", "torture"];
     [
         vec![
             of_cargo("format", &["fmt", "--all", "--check"]),
@@ -51,12 +53,22 @@ fn rows(this: &Path) -> [Vec<Step>; 2] {
             // Plain `cargo test`, as users run it, for the default crates.
             of_cargo("tests", &["test"]),
             of_cargo("xtask-tests", &["test", "--package", "xtask"]),
+            of_cargo("torture-unit", &torture),
             // Docs need what clippy has checked.
             of_cargo("clippy", &clippy),
+            step("fuzz", fuzz()),
             step("docs", docs),
         ],
         vec![own("firmware"), own("cores"), own("size"), own("cycles")],
     ]
+}
+
+/// Type-checks the fuzz targets, which are a workspace of their own. That needs no nightly toolchain. As if somebody had
+/// built libFuzzer before, it needs no compiler of C++ either: nothing is linked.
+fn fuzz() -> Command {
+    let mut command = cargo(&["check", "--manifest-path", "fuzz/Cargo.toml", "--locked"]);
+    command.arg("--target-dir").arg(target_dir()).env("CUSTOM_LIBFUZZER_PATH", "./libfuzzer.a");
+    command
 }
 
 /// Mutants of the board's image that CI builds: one for each of its files that matter most. All take some minutes.

@@ -28,10 +28,10 @@ use emulate::Differences;
 const HELP: &str = "\
 Usage: cargo xtask COMMAND
 
-  ci                          runs everything that CI runs: format, structure, tests, clippy and docs, and at the
-                              same time firmware, cores, size and cycles; then emulate, board, some of its mutants,
-                              and torture. Goes on after a failure. Ends with a summary, which shows each step's time
-                              beside that in xtask/times.txt
+  ci                          runs everything that CI runs: format, structure, tests, clippy, fuzz targets and docs, and
+                              at the same time firmware, cores, size and cycles; then emulate, board, some of its
+                              mutants, and torture. Goes on after a failure. Ends with a summary, which shows each
+                              step's time beside that in xtask/times.txt
   structure                   checks the rules in ARCHITECTURE.md: which module and crate may import which, where
                               `unsafe` may stand, and how large a part of all lines each crate may hold
   firmware                    builds and lints all code for a device (thumbv7em-none-eabihf), and proves by

@@ -9,7 +9,7 @@ use crate::tools::Tools;
 
 pub const POLYNOMIAL: Promise = Promise {
     name: "exp-polynomial",
-    text: "e^x within 2 ulp from -87 to 0, 0 below, never subnormal",
+    text: "e^x within 2 ulp from -87 to 0, 0 below, no subnormal",
     share: 1,
     check: polynomial,
 };
@@ -44,7 +44,7 @@ pub const MONOTONE: Promise = Promise {
 
 pub const ANY_NUMBER: Promise = Promise {
     name: "exp-any-number",
-    text: "no f32 makes an exponential panic; up to 0 none gives NaN",
+    text: "no f32 makes e^x panic; up to 0 none gives NaN",
     share: 1,
     check: any_number,
 };

@@ -18,7 +18,7 @@ use crate::tools::Tools;
 
 pub const FAULTS: Promise = Promise {
     name: "file-faults",
-    text: "A call that fails leaves old files whole, or new ones",
+    text: "a call that fails leaves old files whole, or new ones",
     share: 4,
     check: faults,
 };

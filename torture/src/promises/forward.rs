@@ -11,7 +11,7 @@ use crate::tools::Tools;
 
 pub const TOUCHING: Promise = Promise {
     name: "forward-touching",
-    text: "electrodes that may touch are refused; else all falls in z",
+    text: "electrodes that may touch: refused; else R falls in z",
     share: 1,
     check: touching,
 };

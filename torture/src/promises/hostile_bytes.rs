@@ -29,13 +29,20 @@ pub const RESIGNED_BLOBS: Promise = Promise {
 /// Longest mutant in bytes.
 const MOST_BYTES: usize = 16_384;
 
-/// Files of a target's corpus, in the order of their names.
+/// A target's corpus.
 fn corpus(target: Target) -> Result<Vec<Vec<u8>>, String> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus").join(target.name);
+    files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus").join(target.name))
+}
+
+/// Files of a folder, at least one, in the order of their names.
+fn files(folder: &Path) -> Result<Vec<Vec<u8>>, String> {
     let told = |cause| format!("{}: {cause}", folder.display());
-    let entries = fs::read_dir(&folder).map_err(told)?;
+    let entries = fs::read_dir(folder).map_err(told)?;
     let paths: Result<Vec<PathBuf>, _> = entries.map(|entry| entry.map(|it| it.path())).collect();
     let mut paths = paths.map_err(told)?;
+    if paths.is_empty() {
+        return Err(format!("{}: no file is there to make mutants of", folder.display()));
+    }
     paths.sort();
     paths.iter().map(|path| fs::read(path).map_err(told)).collect()
 }
@@ -64,9 +71,7 @@ fn all_ways_in(effort: &Effort, _: &Tools) -> Result<Found, String> {
     let corpora: Vec<Vec<Vec<u8>>> =
         TARGETS.iter().map(|target| corpus(*target)).collect::<Result<_, _>>()?;
     let (ways, accepted) = (TARGETS.len() as u64, AtomicU64::new(0));
-    // Every panic of a self-test takes time to be told.
-    let least = if effort.is_planted() { ways } else { ways * 3000 };
-    let found = effort.worst((least, ways * 2_000_000), (0.0, "broken"), |seed| {
+    let found = effort.worst((ways * 3000, ways * 2_000_000), (0.0, "broken"), |seed| {
         let way = (seed % ways) as usize;
         let is_sound = check(TARGETS[way], &corpora[way], seed / ways, effort.is_planted());
         accepted.fetch_add(u64::from(is_sound), Ordering::Relaxed);
@@ -78,11 +83,25 @@ fn all_ways_in(effort: &Effort, _: &Tools) -> Result<Found, String> {
 fn blobs(effort: &Effort, _: &Tools) -> Result<Found, String> {
     let (blob, accepted) = (target("blob"), AtomicU64::new(0));
     let corpus = corpus(blob)?;
-    let least = if effort.is_planted() { 16 } else { 40_000 };
-    let found = effort.worst((least, 10_000_000), (0.0, "broken"), |seed| {
+    let found = effort.worst((40_000, 10_000_000), (0.0, "broken"), |seed| {
         let is_sound = check(blob, &corpus, seed, effort.is_planted());
         accepted.fetch_add(u64::from(is_sound), Ordering::Relaxed);
         Ok(0.0)
     });
     Ok(with_accepted(found, &accepted))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scratch::Folder;
+
+    #[test]
+    fn a_folder_without_files_is_an_error_that_names_it() {
+        let folder = Folder::new().unwrap();
+        let cause = files(folder.path()).unwrap_err();
+        assert!(cause.contains(&folder.path().display().to_string()), "{cause}");
+        fs::write(folder.path().join("seed"), "x").unwrap();
+        assert_eq!(files(folder.path()), Ok(vec![b"x".to_vec()]));
+    }
 }

@@ -17,14 +17,14 @@ use crate::promise::Promise;
 
 pub const F32: Promise = Promise {
     name: "inference-f32",
-    text: "for any reading within a tenth of the training RMSE of f64",
+    text: "f32, any reading: f64 within 0.1 of the training RMSE",
     share: 1,
     check: |effort, _| inference(effort, &[Format::F32, Format::F32Direct], 0.1),
 };
 
 pub const FIXED16: Promise = Promise {
     name: "inference-fixed16",
-    text: "for any reading within a tenth of the training RMSE of f64",
+    text: "fixed16, any reading: f64 within 0.1 of training RMSE",
     share: 1,
     check: |effort, _| inference(effort, &[Format::Fixed16], 0.1),
 };

@@ -13,7 +13,7 @@ use crate::tools::Tools;
 
 pub const JOBS: Promise = Promise {
     name: "file-jobs",
-    text: "A job that is ended leaves old files whole, or new ones",
+    text: "an ended job leaves old files whole, or new ones",
     share: 8,
     check: jobs,
 };

@@ -10,14 +10,14 @@ use crate::tools::Tools;
 
 pub const FORGETTING: Promise = Promise {
     name: "rls-forgetting",
-    text: "in f32 as in f64, however long: rich, rest, burst, NaN, 1e20",
+    text: "λ < 1: f32 as f64 for ever; at rest: where it rests",
     share: 4,
     check: forgetting,
 };
 
 pub const WITHOUT_FORGETTING: Promise = Promise {
     name: "rls-lambda-1",
-    text: "f32 within twice the target's noise of f64, up to 1e7 updates",
+    text: "λ = 1: f32 within 2 σ of f64, for up to 1e7 updates",
     share: 1,
     check: without_forgetting,
 };

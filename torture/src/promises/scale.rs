@@ -1,6 +1,7 @@
 //! Columns of any scale and offset, through train, blob, decode and eval of the program.
 
 use std::fs;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::thread::sleep;
@@ -12,11 +13,12 @@ use taxel_data::random::{Purpose, Random, Stream};
 use crate::effort::Effort;
 use crate::found::Found;
 use crate::promise::Promise;
+use crate::tally::Tally;
 use crate::tools::Tools;
 
 pub const SCALE: Promise = Promise {
     name: "scale-sweep",
-    text: "1e-300 to 1e300: R² as at scale 1, or named and refused",
+    text: "1e-300 to 1e300: R² as at scale 1, or refused by name",
     share: 2,
     check: sweep,
 };
@@ -24,6 +26,10 @@ pub const SCALE: Promise = Promise {
 /// Time after which a command hangs.
 const PATIENCE: Duration = Duration::from_mins(1);
 const LINES: usize = 150;
+/// Factors by which a column must be accepted: its range is about 1 before.
+const ACCEPTED_FACTORS: RangeInclusive<f64> = 1e-27..=1e29;
+/// The largest offset with which a column must be accepted. Far larger ones leave a format too few digits.
+const ACCEPTED_OFFSET: f64 = 100.0;
 
 /// What becomes of a column: its values times a factor, plus an offset.
 #[derive(Debug, Clone, Copy)]
@@ -46,9 +52,15 @@ impl Change {
     fn of(self, value: f64) -> f64 {
         value * self.factor + self.offset
     }
+
+    /// Whether a column must be accepted with this change.
+    fn is_moderate(self) -> bool {
+        ACCEPTED_FACTORS.contains(&self.factor) && self.offset.abs() <= ACCEPTED_OFFSET
+    }
 }
 
 /// How a command ended.
+#[derive(Debug, Clone, Copy)]
 pub enum Outcome {
     /// R² of the model on its training lines.
     Accepted(f64),
@@ -70,7 +82,8 @@ fn sweep(effort: &Effort, tools: &Tools) -> Result<Found, String> {
         })
         .collect();
     let base = base?;
-    let found = effort.worst((48, 20_000), (0.02, "R² lost"), |seed| {
+    let outcomes = Tally::new(["accepted", "refused", "noted"]);
+    let mut found = effort.worst((48, 20_000), (0.02, "of R²"), |seed| {
         let mut random = Random::new(seed, Stream::Test, Purpose::Noise, 0, 0);
         let format = random.below(FORMATS.len());
         let size = 10_f64.powf(random.between([-300.0, 300.0]));
@@ -86,14 +99,32 @@ fn sweep(effort: &Effort, tools: &Tools) -> Result<Found, String> {
         let case = folder.join(seed.to_string());
         let outcome = run(program, &case, FORMATS[format], changes, planted);
         let _ = fs::remove_dir_all(&case);
-        match outcome {
-            Ok(Outcome::Accepted(r_squared)) => Ok(base[format] - r_squared),
-            Ok(Outcome::Refused | Outcome::Noted) => Ok(0.0),
-            Err(why) => Err(format!("{}, {changes:?}: {why}", FORMATS[format])),
-        }
+        let lost = outcome.and_then(|outcome| {
+            let index = match outcome {
+                Outcome::Accepted(_) => 0,
+                Outcome::Refused => 1,
+                Outcome::Noted => 2,
+            };
+            outcomes.add(index, 1);
+            lost(change, outcome, base[format])
+        });
+        lost.map_err(|why| format!("{}, {changes:?}: {why}", FORMATS[format]))
     });
     let _ = fs::remove_dir_all(&folder);
+    if found.note.is_empty() {
+        found.note = outcomes.text();
+    }
     Ok(found)
+}
+
+/// R² that a changed column costs, of `base`. What is moderate must not be refused.
+fn lost(change: Change, outcome: Outcome, base: f64) -> Result<f64, String> {
+    match outcome {
+        Outcome::Accepted(r_squared) => Ok(base - r_squared),
+        Outcome::Refused if change.is_moderate() => Err("refused, but moderate".into()),
+        Outcome::Noted if change.is_moderate() => Err("is said not to change".into()),
+        Outcome::Refused | Outcome::Noted => Ok(0.0),
+    }
 }
 
 pub const FORMATS: [&str; 3] = ["f32", "f32-direct", "fixed16"];
@@ -186,4 +217,24 @@ fn command(program: &Path, folder: &Path, arguments: &[&str]) -> Result<Output, 
         sleep(Duration::from_millis(2));
     }
     child.wait_with_output().map_err(|cause| cause.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_is_extreme_may_be_refused() {
+        let moderate = [1e-27, 1e-9, 1.0, 1e29].map(Change::times);
+        let moderate = [&moderate[..], &[Change::plus(1.0), Change::plus(100.0)]].concat();
+        for change in moderate {
+            for outcome in [Outcome::Refused, Outcome::Noted] {
+                assert!(lost(change, outcome, 1.0).is_err(), "{change:?}, {outcome:?}");
+            }
+            assert_eq!(lost(change, Outcome::Accepted(0.75), 1.0), Ok(0.25));
+        }
+        for change in [1e-29, 1e31].map(Change::times).into_iter().chain([Change::plus(1e9)]) {
+            assert_eq!(lost(change, Outcome::Refused, 1.0), Ok(0.0), "{change:?}");
+        }
+    }
 }

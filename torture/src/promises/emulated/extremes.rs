@@ -18,7 +18,7 @@ use crate::tools::{Tools, tested_model};
 
 pub const EXTREMES: Promise = Promise {
     name: "inference-emulator",
-    text: "any reading: a Cortex-M4's bits, subnormals kept or not",
+    text: "any reading: a Cortex-M4's bits, subnormals or not",
     share: 1,
     check,
 };

@@ -54,8 +54,7 @@ impl Gdb {
     pub fn flip(&mut self, address: u32, bit: u32) -> io::Result<()> {
         let byte = self.ask(&format!("m{address:x},1"))?;
         let byte = u8::from_str_radix(&byte, 16).map_err(|_| unexpected(&byte))?;
-        let written = self.ask(&format!("M{address:x},1:{:02x}", byte ^ (1 << bit)))?;
-        if written == "OK" { Ok(()) } else { Err(unexpected(&written)) }
+        self.order(&format!("M{address:x},1:{:02x}", byte ^ (1 << bit)))
     }
 
     /// The word at `address`.
@@ -64,12 +63,23 @@ impl Gdb {
         u32::from_str_radix(&word, 16).map(u32::swap_bytes).map_err(|_| unexpected(&word))
     }
 
+    /// Writes a word to `address`.
+    pub fn write(&mut self, address: u32, word: u32) -> io::Result<()> {
+        self.order(&format!("M{address:x},4:{:08x}", word.swap_bytes()))
+    }
+
+    /// Sets a register of the processor; 15 is the program counter.
+    pub fn set_register(&mut self, number: u32, value: u32) -> io::Result<()> {
+        self.order(&format!("P{number:x}={:08x}", value.swap_bytes()))
+    }
+
     /// Sets status and control of the floating-point unit; `change` gets what they are.
     pub fn change_fpscr(&mut self, change: impl FnOnce(u32) -> u32) -> io::Result<()> {
         let before = self.fpscr()?;
         let wanted = change(before);
-        let written = self.ask(&format!("P{FPSCR:x}={:08x}", wanted.swap_bytes()))?;
-        if written == "OK" && self.fpscr()? == wanted { Ok(()) } else { Err(unexpected(&written)) }
+        self.set_register(FPSCR, wanted)?;
+        let found = self.fpscr()?;
+        if found == wanted { Ok(()) } else { Err(unexpected(&format!("{found:08x}"))) }
     }
 
     /// Status and control of the floating-point unit.
@@ -84,6 +94,11 @@ impl Gdb {
         while answer.starts_with('O') && answer != "OK" {
             answer = self.answer()?; // what the command prints
         }
+        if answer == "OK" { Ok(()) } else { Err(unexpected(&answer)) }
+    }
+
+    fn order(&mut self, command: &str) -> io::Result<()> {
+        let answer = self.ask(command)?;
         if answer == "OK" { Ok(()) } else { Err(unexpected(&answer)) }
     }
 

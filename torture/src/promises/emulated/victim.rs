@@ -19,7 +19,7 @@ use super::running::{ROWS, Running, Setup};
 pub enum Harm {
     /// All estimates are right.
     None,
-    /// The device tells: by a flag, a refusal, or a model that is not in force any more.
+    /// The device tells: by a flag, a refusal, no answer to one kind of request, or a model that is not in force any more.
     Told,
     /// The processor faults, and the device restarts.
     Fault,
@@ -52,8 +52,12 @@ const FRAMES: usize = 24;
 const ANSWER: Duration = Duration::from_millis(200);
 /// Longest time that the check in the background takes for two passes.
 const TWO_PASSES: Duration = Duration::from_secs(2);
-/// Register with the count of the watchdog, which falls until it is fed.
-const WATCHDOG: u32 = 0x4000_8004;
+/// Registers of the watchdog: its count, which falls until it is fed, and what feeds it.
+const WATCHDOG_COUNT: u32 = 0x4000_8004;
+const WATCHDOG_CLEAR: u32 = 0x4000_800C;
+
+/// Address of the copy of the model in the emulator's image.
+pub const COPY: u32 = 0x2000_8000;
 
 /// A frame, and what must be decoded of it.
 struct Case {
@@ -87,7 +91,7 @@ impl Victim {
 
     /// Flips a bit while the device decodes, and looks what becomes of it. The device is as new before.
     ///
-    /// With `planted`, the processor stands still behind it, and no watchdog is there.
+    /// With `planted`, the processor runs away behind it: it feeds the watchdog for ever, and does nothing else.
     pub fn flip(
         &mut self,
         address: u32,
@@ -104,10 +108,11 @@ impl Victim {
         while start.elapsed() < wait {}
         running.gdb.stop().map_err(|cause| failed(&cause))?;
         running.gdb.flip(address, bit).map_err(|cause| failed(&cause))?;
-        if !planted {
-            running.gdb.run().map_err(|cause| failed(&cause))?;
+        if planted {
+            run_away(&mut running.gdb).map_err(|cause| failed(&cause))?;
         }
-        let harm = self.look(&mut running, planted);
+        running.gdb.run().map_err(|cause| failed(&cause))?;
+        let harm = self.look(&mut running);
         if matches!(harm, Harm::None | Harm::Mended | Harm::Silent | Harm::Told) {
             self.running = Some(running); // else QEMU may have ended, or stand still
         }
@@ -136,7 +141,7 @@ impl Victim {
     }
 
     /// Looks at estimates, and where none come at the watchdog.
-    fn look(&self, running: &mut Running, stands: bool) -> Harm {
+    fn look(&self, running: &mut Running) -> Harm {
         let mut worst = Harm::None;
         for case in &self.cases {
             match decoded(&mut running.device, case) {
@@ -144,7 +149,6 @@ impl Victim {
                 Ok(Harm::Silent) => worst = Harm::Silent,
                 Ok(_) => {}
                 Err(is_closed) if is_closed => return Harm::Fault,
-                Err(_) if stands => return Harm::ForGood,
                 Err(_) => {
                     return if is_fed(&mut running.gdb) { Harm::ForGood } else { Harm::Watchdog };
                 }
@@ -157,6 +161,8 @@ impl Victim {
             Ok(identity) if identity.has_in_force(self.crc_32) => worst,
             Ok(_) => Harm::Told,
             Err(Error::Closed) => Harm::Fault,
+            // It cannot say which model it has, but it decodes.
+            Err(_) if decoded(&mut running.device, &self.cases[0]).is_ok() => Harm::Told,
             Err(_) if is_fed(&mut running.gdb) => Harm::ForGood,
             Err(_) => Harm::Watchdog,
         }
@@ -179,15 +185,24 @@ impl Victim {
     }
 }
 
+/// Lets the processor go on in a loop that feeds the watchdog. It takes the place of the model's copy, which is needed
+/// no more.
+fn run_away(gdb: &mut Gdb) -> std::io::Result<()> {
+    gdb.write(COPY, 0xE7FD_6001)?; // str r1, [r0]; and a jump back to it
+    let registers = [(0, WATCHDOG_CLEAR), (1, 1), (15, COPY)];
+    registers.into_iter().try_for_each(|(number, value)| gdb.set_register(number, value))
+}
+
 /// Whether the watchdog is fed within a second, in which its count would fall otherwise.
 fn is_fed(gdb: &mut Gdb) -> bool {
     let mut last = u32::MAX;
     for _ in 0..20 {
-        let Ok(count) = gdb.stop().and_then(|()| gdb.word(WATCHDOG)) else { return false };
+        let Ok(count) = gdb.stop().and_then(|()| gdb.word(WATCHDOG_COUNT)) else { return false };
         if gdb.run().is_err() {
             return false;
         }
-        if count > last {
+        // One that is fed all the time shows the same count again.
+        if count >= last {
             return true;
         }
         last = count;
