@@ -85,11 +85,8 @@ pub const MUTANTS: &[Mutant] = &[
     ),
     mutant(
         "not-fed-before-erase",
-        "firmware/src/app/answer.rs",
-        Instead(
-            "feed_watchdog();\n                    *erases",
-            "now_us();\n                    *erases",
-        ),
+        "firmware/src/store/upload.rs",
+        Instead("            feed();\n            let marked", "            let marked"),
         ["slow-erase-bare", "resets by: watchdog"],
     ),
     mutant(
