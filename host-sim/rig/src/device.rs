@@ -82,8 +82,11 @@ pub struct Device<W> {
     pub stop: Option<Arc<AtomicBool>>,
     /// Longest time that an answer may take.
     pub patience: Duration,
-    /// Number of frames of bytes that arrived damaged.
+    /// Number of frames of bytes that arrived damaged. The first one does not count: it may have begun before anybody
+    /// listened.
     pub damaged: u64,
+    /// Whether the end of a frame has been heard.
+    is_in_step: bool,
     /// Number of requests that had to be sent again.
     pub repeated: u64,
 }
@@ -108,6 +111,7 @@ impl<W: Wire> Device<W> {
             stop: None,
             patience: ANSWER,
             damaged: 0,
+            is_in_step: false,
             repeated: 0,
         })
     }
@@ -179,6 +183,7 @@ impl<W: Wire> Device<W> {
                 };
                 match report {
                     Ok(report) => {
+                        self.is_in_step = true;
                         if let Some(kept) = &mut self.kept {
                             kept.waiting = kept.waiting.filter(|number| *number != report.number);
                         }
@@ -186,8 +191,9 @@ impl<W: Wire> Device<W> {
                             return Ok(Some(answer));
                         }
                     }
-                    Err(_) => self.damaged += 1,
+                    Err(_) => self.damaged += u64::from(self.is_in_step),
                 }
+                self.is_in_step = true;
             }
             if is_last_look {
                 return Ok(None);
@@ -321,4 +327,46 @@ pub fn request_bytes(number: u16, request: &Request<'_>) -> Result<Vec<u8>> {
 
 fn is_timeout(cause: &std::io::Error) -> bool {
     matches!(cause.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Cursor;
+
+    use firmware::link::cobs;
+
+    use super::*;
+
+    impl Wire for Cursor<Vec<u8>> {
+        fn set_read_timeout(&mut self, _: Duration) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+
+    /// A report as bytes on the line.
+    fn framed() -> Vec<u8> {
+        let mut buffer = [0; 64];
+        let packet = packet::encode(0, &Report::Provisioned, &mut buffer).expect("room");
+        let mut line = Vec::new();
+        cobs::encode(packet, |byte| {
+            line.push(byte);
+            true
+        });
+        line
+    }
+
+    #[test]
+    fn a_report_that_began_before_anybody_listened_is_not_damaged() {
+        let whole = framed();
+        let mut cut = whole.clone();
+        cut.remove(2);
+        for (first, second, damaged) in
+            [(&whole[3..], &whole[..], 0), (&whole, &cut, 1), (&cut, &cut, 1)]
+        {
+            let mut device = Device::new(Cursor::new([first, second].concat())).unwrap();
+            let heard = device.hear(Instant::now() + Duration::from_secs(1), |_, _| None::<()>);
+            assert!(matches!(heard, Err(Error::Closed)));
+            assert_eq!(device.damaged, damaged);
+        }
+    }
 }
