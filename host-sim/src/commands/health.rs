@@ -2,6 +2,7 @@
 
 use clap::Args;
 use host_sim::{Error, Result};
+use model_core::fill::MOST_MISSING;
 use model_core::health::Limits;
 use serde::Serialize;
 use taxel_data::columns;
@@ -105,6 +106,16 @@ impl HealthArguments {
                 "note: missing readings of {} were filled from the others (docs/reliability.md tells what that costs)",
                 of_lines(health.frames_filled, lines)
             );
+        }
+        let faulty = health.is_faulty.iter().filter(|is_faulty| **is_faulty).count();
+        if faulty > health.frames_filled && model.model().fill().is_some() {
+            let why = if self.no_fill {
+                "by --no-fill".to_owned()
+            } else {
+                format!("more than 1 in {MOST_MISSING} of a frame")
+            };
+            let count = of_lines(faulty - health.frames_filled, lines);
+            eprintln!("note: missing readings of {count} were not filled: {why}");
         }
         Ok(health)
     }

@@ -69,6 +69,7 @@ pub struct Arguments {
     confidence: bool,
     /// Let the model fill missing readings from the others of their frame, so that a broken wire costs accuracy, but no
     /// frames (docs/reliability.md). It takes 10 kB more for 144 readings, and ten frames of training for each reading.
+    /// Where more than a quarter of a frame is missing, nothing is filled.
     #[arg(long)]
     fill: bool,
     #[command(flatten)]

@@ -96,6 +96,11 @@ fn wires_are_named_and_columns_can_be_left_out() {
     let result: Value = serde_json::from_str(&text).unwrap();
     assert_eq!(result["health"]["readings_filled"], 18 * 200);
     assert_eq!(result["values_evaluated"], 144 * 200);
+    let decode = ["decode", "fills.bin", "sound.csv", "-o", "e.csv", "--without"];
+    let said = notes(&folder, &[&decode[..], &["r1c*_ohm,r2c*_ohm,r3c1_ohm"]].concat());
+    assert!(said.contains("100 % of lines were not filled: more than 1 in 4 of a frame"), "{said}");
+    let said = notes(&folder, &[&decode[..], &["r4c5_ohm", "--no-fill"]].concat());
+    assert!(said.contains("100 % of lines were not filled: by --no-fill"), "{said}");
     let refused = folder.fail(&[&eval[..], &["r9c*_ohm"]].concat(), 2);
     assert!(refused.contains("--without r9c*_ohm"), "{refused}");
     let refused =
