@@ -158,17 +158,24 @@ fn complete<S: Slot>(area: &mut S, key: &Key) -> Result<bool, FlashError> {
 
 /// Overwrites unfinished copies with zeros, so that none counts at another start; returns whether there were any.
 ///
-/// The mark goes first. As long as the copy is sound this is done again, so the mark is zeros for good when it is not.
+/// The mark goes first, and each start does it again until the key is gone: the mark is zeros for good then. A copy that
+/// seems unsound may have a weak CRC-32.
 fn drop_unfinished<S: Slot>(area: &mut S) -> Result<bool, FlashError> {
     let mut any = false;
     for number in 0..places(area.bytes()).len() {
-        let copy = places(area.bytes()).get(number).and_then(read);
-        if copy.is_some_and(|(copy, _)| copy == Copy::Unfinished) {
+        let place = places(area.bytes()).get(number);
+        if place.is_some_and(has_key) {
             write(area, number, &[(FIRST_MARK, &[0; 4]), (KEY, &[0; FIRST_MARK - KEY])])?;
             any = true;
         }
     }
     Ok(any)
+}
+
+/// Whether a place was begun, and has anything of a key or its CRC-32.
+fn has_key(place: &[u8; PLACE]) -> bool {
+    let key = place.get(KEY..FIRST_MARK).unwrap_or_default();
+    place.starts_with(&[0; KEY]) && key.iter().any(|byte| *byte != 0)
 }
 
 /// Writes some parts of a place, each from its offset on, one after the other.
