@@ -141,6 +141,26 @@ fn record_at(slot: &[u8], place: usize) -> Option<&[u8; RECORD_BYTES]> {
     slot.get(place..)?.first_chunk()
 }
 
+/// A record that is whole but for its last word at most.
+struct Record {
+    generation: u32,
+    /// Whether its last word fits at this start.
+    is_sound: bool,
+}
+
+impl Record {
+    /// The record of the blob in `slot` at this place.
+    fn of(slot: &[u8], place: usize) -> Option<Self> {
+        let found = record_at(slot, place)?;
+        let [_, generation, ..] = found.as_chunks::<4>().0 else { return None };
+        let generation = u32::from_le_bytes(*generation);
+        let blob_crc = blob_in_slot(slot).last_chunk::<4>()?;
+        let right = record(generation, u32::from_le_bytes(*blob_crc));
+        let is_whole = found.get(..RECORD_BYTES - 4) == right.get(..RECORD_BYTES - 4);
+        is_whole.then_some(Self { generation, is_sound: *found == right })
+    }
+}
+
 /// Writes another pair of records for the model in `slot`, which must have been found sound: it comes into force again
 /// as `generation`. Power that fails in the first record leaves the other slot's model in force.
 ///
@@ -167,15 +187,8 @@ pub fn reinstate<S: Slot>(slot: &mut S, generation: u32) -> Option<Result<(), Fl
 /// firmware: its generation is 0. Slot 1 holds only uploaded models.
 #[must_use]
 pub fn generation(index: usize, slot: &[u8]) -> Option<u32> {
-    let (_, blob_crc) = blob_in_slot(slot).split_last_chunk::<4>()?;
-    let blob_crc = u32::from_le_bytes(*blob_crc);
-    let valid = |found: &[u8; RECORD_BYTES]| {
-        let [_, generation, ..] = found.as_chunks::<4>().0 else { return None };
-        let generation = u32::from_le_bytes(*generation);
-        (*found == record(generation, blob_crc)).then_some(generation)
-    };
-    let places = record_places(slot).filter_map(|place| record_at(slot, place));
-    let newest = places.filter_map(valid).max();
+    let records = record_places(slot).filter_map(|place| Record::of(slot, place));
+    let newest = records.filter(|found| found.is_sound).map(|found| found.generation).max();
     let flashed = || {
         let (_, first) = slot.split_last_chunk::<RECORD_BYTES>()?;
         (index == 0 && *first == [0xFF; RECORD_BYTES]).then_some(0)

@@ -7,9 +7,7 @@
 //!   good. The model in force has such a pair of its generation.
 //! - Where the other slot has a record that is whole but for its last word, the model in force has a higher generation.
 
-use super::{
-    RECORD_BYTES, Slot, blob_in_slot, generation, record, record_at, record_pairs, record_places,
-};
+use super::{RECORD_BYTES, Record, Slot, generation, record_at, record_pairs, record_places};
 
 /// Generation of the records that the model in slot number `in_force` still needs, to be written by
 /// [`reinstate`](super::reinstate); `None` if its choice is firm.
@@ -31,24 +29,4 @@ pub fn missing_records<S: Slot>(slots: &[S; 2], in_force: usize) -> Option<u32> 
     });
     // A model that was flashed with the firmware has no record.
     (!is_firm && generation > 0).then_some(generation)
-}
-
-/// A record that is whole but for its last word at most.
-struct Record {
-    generation: u32,
-    /// Whether its last word fits at this start.
-    is_sound: bool,
-}
-
-impl Record {
-    /// The record of the blob in `slot` at this place.
-    fn of(slot: &[u8], place: usize) -> Option<Self> {
-        let found = record_at(slot, place)?;
-        let [_, generation, ..] = found.as_chunks::<4>().0 else { return None };
-        let generation = u32::from_le_bytes(*generation);
-        let blob_crc = blob_in_slot(slot).last_chunk::<4>()?;
-        let right = record(generation, u32::from_le_bytes(*blob_crc));
-        let is_whole = found.get(..RECORD_BYTES - 4) == right.get(..RECORD_BYTES - 4);
-        is_whole.then_some(Self { generation, is_sound: *found == right })
-    }
 }

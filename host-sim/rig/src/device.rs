@@ -7,6 +7,7 @@
 use std::collections::VecDeque;
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::io::{ErrorKind, Read, Write};
+use std::mem;
 use std::net::TcpStream;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -181,9 +182,9 @@ impl<W: Wire> Device<W> {
                     Some(_) => Err(packet::PacketError::Damaged),
                     None => continue,
                 };
+                let was_in_step = mem::replace(&mut self.is_in_step, true);
                 match report {
                     Ok(report) => {
-                        self.is_in_step = true;
                         if let Some(kept) = &mut self.kept {
                             kept.waiting = kept.waiting.filter(|number| *number != report.number);
                         }
@@ -191,9 +192,8 @@ impl<W: Wire> Device<W> {
                             return Ok(Some(answer));
                         }
                     }
-                    Err(_) => self.damaged += u64::from(self.is_in_step),
+                    Err(_) => self.damaged += u64::from(was_in_step),
                 }
-                self.is_in_step = true;
             }
             if is_last_look {
                 return Ok(None);
