@@ -19,9 +19,16 @@ pub enum KeepError {
 
 /// Memory that keeps settings while the power is off.
 ///
-/// Each function is given a buffer. It must have room for the longest setting, and for eight bytes more.
+/// It may be cut off from power at any moment: then the setting that is being kept is the old or the new one.
 pub trait Keeper {
-    /// Reads the bytes that are kept for `setting` into `buffer`; `None` if there are none that can be read.
+    /// Makes firm what a cut of the power has left: every later start reads what this one reads. Must be called at each
+    /// start, before anything is read. Writes nothing if there was no cut. May take a second.
+    ///
+    /// # Errors
+    /// [`KeepError::Failed`]; what is kept can still be read.
+    fn make_firm(&mut self) -> Result<(), KeepError>;
+
+    /// Reads the bytes that are kept for `setting` into `buffer`; `None` if there are none, or more than it has room for.
     fn read<'b>(&mut self, setting: Setting, buffer: &'b mut [u8]) -> Option<&'b [u8]>;
 
     /// Keeps `parts`, joined, for `setting`; no parts at all forget it. Nothing is written if these bytes are kept
@@ -29,10 +36,5 @@ pub trait Keeper {
     ///
     /// # Errors
     /// Every variant of [`KeepError`]; what was kept before is still kept.
-    fn keep(
-        &mut self,
-        setting: Setting,
-        parts: &[&[u8]],
-        buffer: &mut [u8],
-    ) -> Result<bool, KeepError>;
+    fn keep(&mut self, setting: Setting, parts: &[&[u8]]) -> Result<bool, KeepError>;
 }

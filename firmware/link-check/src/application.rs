@@ -3,35 +3,15 @@
 use firmware::app::{App, Buffers};
 use firmware::capacity::Capacity;
 use firmware::circuit::{Circuit, Constants, ConstantsFault, ZeroPotential};
-use firmware::link::message::{Configuration, Memory, Setting};
+use firmware::link::message::{Configuration, Memory};
 use firmware::platform::{Platform, Port};
 use firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
-use firmware::settings::{KeepError, Keeper};
+use firmware::settings::SettingPages;
 use firmware::store::{FlashError, Slot};
 
 use crate::opaque::{opaque, slot};
 
-struct Board(Settings, Flash);
-
-/// A memory that may hold anything. It stands for the images' `SettingPages`: that calls a library whose panics the
-/// compiler cannot rule out.
-struct Settings;
-
-impl Keeper for Settings {
-    fn read<'b>(&mut self, setting: Setting, buffer: &'b mut [u8]) -> Option<&'b [u8]> {
-        opaque(setting);
-        buffer.fill(opaque(0));
-        buffer.get(..opaque(0))
-    }
-
-    fn keep(&mut self, setting: Setting, parts: &[&[u8]], _: &mut [u8]) -> Result<bool, KeepError> {
-        opaque(setting);
-        for part in parts {
-            opaque(part.len());
-        }
-        opaque(Ok(true))
-    }
-}
+struct Board(SettingPages<Flash>, Flash);
 
 impl Port for Board {
     fn now_us(&mut self) -> u32 {
@@ -49,7 +29,7 @@ impl Port for Board {
 }
 
 impl Platform for Board {
-    type Settings = Settings;
+    type Settings = SettingPages<Flash>;
     type KeyArea = Flash;
 
     const BOARD: &'static str = "link-check";
@@ -62,7 +42,7 @@ impl Platform for Board {
         opaque(Memory::default())
     }
 
-    fn settings(&mut self) -> &mut Settings {
+    fn settings(&mut self) -> &mut SettingPages<Flash> {
         &mut self.0
     }
 
@@ -115,7 +95,12 @@ pub fn exercise() {
     let mut buffers = Buffers::<8, 18, 18, { Capacity::PAPER.message_bytes() }>::new();
     let configuration = opaque(Configuration::DEFAULT);
     let sensor = Sensor(opaque(ZeroPotential::TYPICAL));
-    let mut app = App::new(Board(Settings, Flash), sensor, configuration, &mut buffers);
+    let mut app = App::new(
+        Board(SettingPages::new([Flash, Flash]), Flash),
+        sensor,
+        configuration,
+        &mut buffers,
+    );
     let mut weights = [0; 1024];
     app.run(&mut [Flash, Flash], &mut weights);
     opaque(weights);

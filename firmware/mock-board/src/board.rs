@@ -50,17 +50,16 @@ impl<S: Slot + 'static> From<&SharedSettings<S>> for AnyKeeper {
 }
 
 impl Keeper for AnyKeeper {
+    fn make_firm(&mut self) -> Result<(), KeepError> {
+        self.0.borrow_mut().make_firm()
+    }
+
     fn read<'b>(&mut self, setting: Setting, buffer: &'b mut [u8]) -> Option<&'b [u8]> {
         self.0.borrow_mut().read(setting, buffer)
     }
 
-    fn keep(
-        &mut self,
-        setting: Setting,
-        parts: &[&[u8]],
-        buffer: &mut [u8],
-    ) -> Result<bool, KeepError> {
-        self.0.borrow_mut().keep(setting, parts, buffer)
+    fn keep(&mut self, setting: Setting, parts: &[&[u8]]) -> Result<bool, KeepError> {
+        self.0.borrow_mut().keep(setting, parts)
     }
 }
 

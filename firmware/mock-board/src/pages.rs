@@ -115,7 +115,7 @@ impl<S: Slot> SharedSettings<S> {
     /// # Errors
     /// Every variant of [`KeepError`].
     pub fn keep_bytes(&mut self, setting: Setting, bytes: &[u8]) -> Result<bool, KeepError> {
-        self.keep(setting, &[bytes], &mut [0; 1024])
+        self.keep(setting, &[bytes])
     }
 }
 
@@ -167,16 +167,15 @@ impl SharedSettings {
 }
 
 impl<S: Slot> Keeper for SharedSettings<S> {
+    fn make_firm(&mut self) -> Result<(), KeepError> {
+        self.0.borrow_mut().make_firm()
+    }
+
     fn read<'b>(&mut self, setting: Setting, buffer: &'b mut [u8]) -> Option<&'b [u8]> {
         self.0.borrow_mut().read(setting, buffer)
     }
 
-    fn keep(
-        &mut self,
-        setting: Setting,
-        parts: &[&[u8]],
-        buffer: &mut [u8],
-    ) -> Result<bool, KeepError> {
-        self.0.borrow_mut().keep(setting, parts, buffer)
+    fn keep(&mut self, setting: Setting, parts: &[&[u8]]) -> Result<bool, KeepError> {
+        self.0.borrow_mut().keep(setting, parts)
     }
 }

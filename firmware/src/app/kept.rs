@@ -41,6 +41,9 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
     /// Puts the configuration and the constants that are kept in force.
     pub(super) fn load_settings(&mut self) {
         let (keeper, buffer) = self.line.settings();
+        if keeper.make_firm().is_err() {
+            warning!("the memory of settings failed");
+        }
         if let Some(configuration) =
             keeper.read(Setting::Configuration, buffer).and_then(configuration)
         {
@@ -96,7 +99,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             return Err(Refusal::Keep(KeepFault::TooOften));
         }
         let constants_crc = self.constants_crc();
-        let (keeper, buffer) = self.line.settings();
+        let keeper = self.line.platform().settings();
         let version = version(setting);
         let written = match setting {
             Setting::Configuration => {
@@ -105,7 +108,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                 let mut bytes = [0; CONFIGURATION_BYTES];
                 let fields = postcard::to_slice(&self.configuration, &mut bytes);
                 let fields = fields.map_err(|_| Refusal::Keep(KeepFault::TooLarge))?;
-                keeper.keep(setting, &[&[version], fields], buffer)
+                keeper.keep(setting, &[&[version], fields])
             }
             Setting::Constants => {
                 let Some(c) = self.source.constants() else { return Err(NOTHING) };
@@ -118,7 +121,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                     c.feedback_ohm.0,
                     c.series_ohm.0,
                 ];
-                keeper.keep(setting, &parts, buffer)
+                keeper.keep(setting, &parts)
             }
             Setting::Baseline => {
                 let frames = self.baseline.frames();
@@ -128,7 +131,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                 let [low, high] = frames.to_le_bytes();
                 let head = [version, self.wires.rows as u8, self.wires.columns as u8, low, high];
                 let readings = Floats::of(self.baseline.mean()).0;
-                keeper.keep(setting, &[&head, &constants_crc.to_le_bytes(), readings], buffer)
+                keeper.keep(setting, &[&head, &constants_crc.to_le_bytes(), readings])
             }
         };
         self.count_write(written)
@@ -150,8 +153,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         if self.writes_left == 0 {
             return Err(Refusal::Keep(KeepFault::TooOften));
         }
-        let (keeper, buffer) = self.line.settings();
-        let written = keeper.keep(setting, &[], buffer);
+        let written = self.line.platform().settings().keep(setting, &[]);
         self.count_write(written)
     }
 

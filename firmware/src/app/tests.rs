@@ -22,11 +22,15 @@ struct Board {
 struct Nothing;
 
 impl Keeper for Nothing {
+    fn make_firm(&mut self) -> Result<(), KeepError> {
+        Ok(())
+    }
+
     fn read<'b>(&mut self, _: Setting, _: &'b mut [u8]) -> Option<&'b [u8]> {
         None
     }
 
-    fn keep(&mut self, _: Setting, _: &[&[u8]], _: &mut [u8]) -> Result<bool, KeepError> {
+    fn keep(&mut self, _: Setting, _: &[&[u8]]) -> Result<bool, KeepError> {
         Err(KeepError::Failed)
     }
 }

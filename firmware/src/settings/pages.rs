@@ -1,33 +1,51 @@
 //! Settings in two pages of flash.
 //!
-//! The pages are a map of `sequential-storage`: an item is added behind the last one, and the newest one counts.
-//! When a page is full, the newest items move to the other page, and the full one is erased. Every item has a
-//! CRC-32, so power that fails in the middle of any word leaves the old item or the new one. Pages that hold
-//! something else, such as a part of an older program, count as empty.
+//! One page is in use. Items are added behind the last one, and the newest item of a setting counts. When the page is
+//! full, the newest items are written to the other page, and the full one is erased.
 //!
-//! `sequential-storage` has functions that can panic: the compiler cannot prove that none of them does. So the link
-//! check leaves this file out, and `tests/settings.rs` shows that whatever the pages hold does no harm.
+//! An item begins at a multiple of [`CELL`] bytes. Its words, in the order in which they are written: a mark, what it
+//! is and its length, the content, a CRC-32, and a word of zeros. They tell what a cut of the power has left, however
+//! often a weak bit changes its mind:
+//!
+//! - An item counts if its CRC-32 is right.
+//! - The word of zeros is begun only when the item is whole. Without it, a last item may be weak, so that it counts at
+//!   one start and not at the next.
+//! - A page is in use from its start item on, which is written behind the items that were moved. The start item with the
+//!   highest number wins.
+//! - So a start [makes firm](Keeper::make_firm) what it finds: behind a last item that is not firm, what counts moves to
+//!   the other page. Nothing is ever added behind it.
 
-use core::future::Future;
-use core::pin::pin;
-use core::task::{Context, Poll, Waker};
-
-use embedded_storage_async::nor_flash::{
-    ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
-};
 use model_core::checksum::CRC_32;
-use sequential_storage::Error;
-use sequential_storage::cache::{Cache, Uncached};
-use sequential_storage::map::{MapConfig, MapStorage, SerializationError, Value};
 
 use super::{KeepError, Keeper};
 use crate::link::message::Setting;
 use crate::store::{FlashError, Slot};
 
-/// Bytes of a page that are used, from its start. The time that moving the items takes grows with their square.
+/// Bytes of a page that are used, from its start.
 pub const PAGE_BYTES: usize = 8 * 1024;
 
-/// Number of times that an item is written, each time at another place, until it is given up.
+/// Items begin at multiples of so many bytes.
+const CELL: usize = 16;
+
+/// First word of an item.
+const MARK: [u8; 4] = *b"ITEM";
+
+/// Last word of an item.
+const FIRM: [u8; 4] = [0; 4];
+
+/// Bytes of an item besides its content: mark, kind and length, CRC-32, and the word of zeros.
+const FRAME_BYTES: usize = 16;
+
+/// Kind of a start item, whose content is its page's number. Other kinds are those of [`Setting`].
+const START: u8 = 0xFF;
+
+/// Second word of a start item: its kind and length.
+const START_HEAD: [u8; 4] = [START, 0, 4, 0];
+
+/// Number of start items of a page: one may decay.
+const STARTS: usize = 2;
+
+/// Number of times that an item is written, each time behind the last, until it is given up.
 const ATTEMPTS: usize = 4;
 
 /// Settings in two pages of flash, each of which is erased as a whole.
@@ -35,8 +53,168 @@ const ATTEMPTS: usize = 4;
 /// A page has at least [`PAGE_BYTES`]; if it is shorter, nothing can be kept.
 pub struct SettingPages<S>([S; 2]);
 
-/// The map in its pages.
-type Map<'s, S> = MapStorage<u8, Pages<'s, S>, Cache<Uncached, Uncached, Uncached, u8>>;
+/// An item that counts.
+struct Item<'p> {
+    kind: u8,
+    content: &'p [u8],
+    /// Whether it was whole before its word of zeros was begun.
+    is_firm: bool,
+    /// Place of the next item.
+    end: usize,
+}
+
+impl<'p> Item<'p> {
+    /// The item at `place` in a page.
+    fn at(page: &'p [u8], place: usize) -> Option<Self> {
+        let rest = page.get(place..)?.strip_prefix(&MARK)?;
+        let (head, rest) = rest.split_first_chunk::<4>()?;
+        let [kind, _, low, high] = *head;
+        let length = usize::from(u16::from_le_bytes([low, high]));
+        let content = rest.get(..length)?;
+        let (crc, rest) = rest.get(padded(length)..)?.split_first_chunk::<4>()?;
+        let (last, _) = rest.split_first_chunk::<4>()?;
+        let mut digest = CRC_32.digest();
+        digest.update(head);
+        digest.update(content);
+        let is_right = digest.finalize().to_le_bytes() == *crc;
+        let end = place + item_bytes(length);
+        is_right.then_some(Self { kind, content, is_firm: *last != [0xFF; 4], end })
+    }
+}
+
+/// `length` in whole words.
+const fn padded(length: usize) -> usize {
+    length.next_multiple_of(4)
+}
+
+/// Bytes that an item takes of a page, for content of this `length`.
+const fn item_bytes(length: usize) -> usize {
+    (FRAME_BYTES + padded(length)).next_multiple_of(CELL)
+}
+
+/// What a page holds.
+#[derive(Clone, Copy)]
+struct Contents<'p> {
+    /// Number of the page, if it is or was in use: each has a higher one than the page before it.
+    number: Option<u32>,
+    /// Whether a start item is firm.
+    is_started: bool,
+    /// Newest content of each setting.
+    settings: [Option<&'p [u8]>; Setting::ALL.len()],
+    /// First place behind everything that is not erased.
+    end: usize,
+    /// Whether a firm item is the last.
+    is_firm: bool,
+}
+
+impl<'p> Contents<'p> {
+    /// Reads the page of these `bytes`; a page that is too short counts as empty.
+    fn of(bytes: &'p [u8]) -> Self {
+        let page = bytes.get(..PAGE_BYTES).unwrap_or_default();
+        let mut contents =
+            Self { number: None, is_started: false, settings: [None; _], end: 0, is_firm: false };
+        let (mut place, mut end_of_items) = (0, 0);
+        while place < page.len() {
+            let Some(item) = Item::at(page, place) else {
+                place += CELL;
+                continue;
+            };
+            if item.kind == START {
+                contents.number = item.content.first_chunk().map(|n| u32::from_le_bytes(*n));
+                contents.is_started |= item.is_firm;
+            } else if let Some(newest) = contents.settings.get_mut(usize::from(item.kind)) {
+                *newest = Some(item.content);
+            }
+            contents.is_firm = item.is_firm;
+            (place, end_of_items) = (item.end, item.end);
+        }
+        contents.end = used(page);
+        contents.is_firm &= end_of_items >= contents.end;
+        contents
+    }
+
+    /// Newest content of `setting`.
+    fn content(&self, setting: Setting) -> &'p [u8] {
+        self.settings.get(setting as usize).copied().flatten().unwrap_or_default()
+    }
+}
+
+/// First place of a `page` behind everything that is not erased.
+fn used(page: &[u8]) -> usize {
+    let last = page.iter().take(PAGE_BYTES).rposition(|byte| *byte != 0xFF);
+    last.map_or(0, |last| (last + 1).next_multiple_of(CELL))
+}
+
+/// Number of the page in use, and what it holds.
+fn in_use<S: Slot>(pages: &[S; 2]) -> Option<(usize, Contents<'_>)> {
+    let [first, second] = pages.each_ref().map(|page| Contents::of(page.bytes()));
+    match (first.number, second.number) {
+        (Some(one), Some(other)) if other.wrapping_sub(one).cast_signed() > 0 => Some((1, second)),
+        (Some(_), _) => Some((0, first)),
+        (None, Some(_)) => Some((1, second)),
+        (None, None) => None,
+    }
+}
+
+/// Adds an item of `parts`, joined, to a page.
+fn append<S: Slot>(page: &mut S, kind: u8, parts: &[&[u8]]) -> Result<(), KeepError> {
+    for _ in 0..ATTEMPTS {
+        let place = used(page.bytes());
+        let length: usize = parts.iter().map(|part| part.len()).sum();
+        if place + item_bytes(length) > PAGE_BYTES {
+            break;
+        }
+        if write(page, place, kind, length, parts).is_ok() {
+            return Ok(());
+        }
+    }
+    Err(KeepError::Failed)
+}
+
+/// Writes an item of `length` bytes to `place`.
+fn write<S: Slot>(
+    page: &mut S,
+    place: usize,
+    kind: u8,
+    length: usize,
+    parts: &[&[u8]],
+) -> Result<(), FlashError> {
+    let [low, high, ..] = length.to_le_bytes();
+    let head = [kind, 0, low, high];
+    let mut digest = CRC_32.digest();
+    digest.update(&head);
+    parts.iter().for_each(|part| digest.update(part));
+    page.write(place, &MARK)?;
+    page.write(place + 4, &head)?;
+    let mut bytes = parts.iter().copied().flatten();
+    let mut place = place + 8;
+    for _ in 0..padded(length) / 4 {
+        let mut word = [0xFF; 4];
+        word.iter_mut().zip(bytes.by_ref()).for_each(|(to, from)| *to = *from);
+        page.write(place, &word)?;
+        place += 4;
+    }
+    page.write(place, &digest.finalize().to_le_bytes())?;
+    page.write(place + 4, &FIRM)
+}
+
+/// Erases a page that is not blank.
+///
+/// Its start items are overwritten before: one of them may be weak. It must not count again if the erase is cut, when
+/// other items are damaged.
+fn blank<S: Slot>(page: &mut S) -> Result<(), KeepError> {
+    let bytes = page.bytes().get(..PAGE_BYTES).ok_or(KeepError::Failed)?;
+    if used(bytes) == 0 {
+        return Ok(());
+    }
+    for place in (0..PAGE_BYTES).step_by(CELL) {
+        let rest = page.bytes().get(place..).unwrap_or_default();
+        if rest.strip_prefix(&MARK).is_some_and(|rest| rest.starts_with(&START_HEAD)) {
+            let _ = page.write(place, &[0; 4]); // where that fails, the erase may not
+        }
+    }
+    page.erase().map_err(|FlashError| KeepError::Failed)
+}
 
 impl<S: Slot> SettingPages<S> {
     /// Makes a keeper of these pages, whatever they hold.
@@ -49,209 +227,75 @@ impl<S: Slot> SettingPages<S> {
         &mut self.0
     }
 
-    /// The map, which takes the page number `hidden` for blank, if there is one.
-    fn map(&mut self, hidden: Option<usize>) -> Map<'_, S> {
-        let config = const { MapConfig::new(0..2 * PAGE_BYTES as u32) };
-        MapStorage::new(Pages { slots: &mut self.0, hidden }, config, Cache::new_uncached())
-    }
-
-    /// Number of the page that was being erased at the end of an exchange when the power was cut, if it still counts as
-    /// in use.
-    ///
-    /// Such a page may have any bits set. The map would take it for the one that is written to, or would move its items,
-    /// damaged as they are, once more. Until an erase begins, no item of the new page differs from the old page's.
-    fn left_over(&mut self, buffer: &mut [u8]) -> Option<usize> {
-        let marks = self.0.each_ref().map(|page| {
-            let bytes = page.bytes().get(..PAGE_BYTES).unwrap_or_default();
-            (is_marked(bytes.first()), is_marked(bytes.last()))
-        });
-        if marks.iter().any(|(start, _)| !start) {
-            return None;
-        }
-        let mut alone = |hidden| {
-            Setting::ALL.map(|setting| {
-                self.fetch(setting, Some(hidden), buffer).map(|bytes| CRC_32.checksum(bytes))
-            })
-        };
-        let [first, second] = [alone(1), alone(0)];
-        let differs = |old: &[Option<u32>; 3], new: &[Option<u32>; 3]| {
-            old.iter().zip(new).any(|(old, new)| new.is_some() && old != new)
-        };
-        match marks {
-            [_, (_, false)] if differs(&first, &second) => Some(0),
-            [(_, false), _] if differs(&second, &first) => Some(1),
-            _ => None,
-        }
-    }
-
-    fn fetch<'b>(
-        &mut self,
-        setting: Setting,
-        hidden: Option<usize>,
-        buffer: &'b mut [u8],
-    ) -> Option<&'b [u8]> {
-        let mut map = self.map(hidden);
-        let fetched = at_once(map.fetch_item::<&[u8]>(buffer, &(setting as u8)));
-        fetched?.ok()?
-    }
-
-    fn store(
-        &mut self,
-        setting: Setting,
-        parts: &[&[u8]],
-        buffer: &mut [u8],
-    ) -> Result<(), KeepError> {
-        match at_once(self.map(None).store_item(buffer, &(setting as u8), &Parts(parts))) {
-            Some(Ok(())) => Ok(()),
-            Some(Err(Error::SerializationError(_) | Error::ItemTooBig | Error::FullStorage)) => {
-                Err(KeepError::TooLarge)
-            }
-            _ => Err(KeepError::Failed),
-        }
-    }
-
-    /// Erases pages that count as free without being blank, and one that is left over: something else left them, or an
-    /// erase that was cut.
-    fn blank_free_pages(&mut self, buffer: &mut [u8]) -> Result<(), KeepError> {
-        let left_over = self.left_over(buffer);
-        for (number, page) in self.0.iter_mut().enumerate() {
-            let bytes = page.bytes().get(..PAGE_BYTES).ok_or(KeepError::Failed)?;
-            let in_use = is_marked(bytes.first()) && left_over != Some(number);
-            if !in_use && bytes.iter().any(|byte| *byte != 0xFF) {
-                page.erase().map_err(|FlashError| KeepError::Failed)?;
+    /// Moves what counts to the page that is not in use, with `parts` instead of what `changed` holds.
+    fn exchange(&mut self, changed: Option<Setting>, parts: &[&[u8]]) -> Result<(), KeepError> {
+        let is_second = matches!(in_use(&self.0), Some((1, _)));
+        let [first, second] = &mut self.0;
+        let (old, new) = if is_second { (second, first) } else { (first, second) };
+        blank(new)?;
+        let contents = Contents::of(old.bytes());
+        for setting in Setting::ALL {
+            let content = contents.content(setting);
+            if Some(setting) == changed {
+                append(new, setting as u8, parts)?;
+            } else if !content.is_empty() {
+                append(new, setting as u8, &[content])?;
             }
         }
-        Ok(())
+        let number = contents.number.unwrap_or_default().wrapping_add(1).to_le_bytes();
+        for _ in 0..STARTS {
+            append(new, START, &[&number])?;
+        }
+        blank(old)
     }
 }
 
 impl<S: Slot> Keeper for SettingPages<S> {
-    fn read<'b>(&mut self, setting: Setting, buffer: &'b mut [u8]) -> Option<&'b [u8]> {
-        let left_over = self.left_over(buffer);
-        self.fetch(setting, left_over, buffer).filter(|bytes| !bytes.is_empty())
+    fn make_firm(&mut self) -> Result<(), KeepError> {
+        let Some((number, contents)) = in_use(&self.0) else {
+            return self.0.iter_mut().try_for_each(blank);
+        };
+        let (is_started, is_firm) = (contents.is_started, contents.is_firm);
+        let start = contents.number.unwrap_or_default().to_le_bytes();
+        let [first, second] = &mut self.0;
+        let (active, other) = if number == 0 { (first, second) } else { (second, first) };
+        if !is_started {
+            // The other page may be the one that counts at the next start. So it stays until this one is firm.
+            append(active, START, &[&start])?;
+        } else if !is_firm {
+            return self.exchange(None, &[]);
+        }
+        blank(other)
     }
 
-    fn keep(
-        &mut self,
-        setting: Setting,
-        parts: &[&[u8]],
-        buffer: &mut [u8],
-    ) -> Result<bool, KeepError> {
-        let kept = self.read(setting, buffer).unwrap_or_default();
-        if kept.iter().eq(parts.iter().copied().flatten()) {
+    fn read<'b>(&mut self, setting: Setting, buffer: &'b mut [u8]) -> Option<&'b [u8]> {
+        let (_, contents) = in_use(&self.0)?;
+        let content = contents.content(setting);
+        let place = buffer.get_mut(..content.len())?;
+        place.copy_from_slice(content);
+        (!content.is_empty()).then_some(place)
+    }
+
+    fn keep(&mut self, setting: Setting, parts: &[&[u8]]) -> Result<bool, KeepError> {
+        self.make_firm()?;
+        let found = in_use(&self.0);
+        let contents = found.as_ref().map(|(_, contents)| contents);
+        let kept = |setting| contents.map_or(&[][..], |contents| contents.content(setting));
+        if kept(setting).iter().eq(parts.iter().copied().flatten()) {
             return Ok(false);
         }
-        self.blank_free_pages(buffer)?;
-        let mut stored = Err(KeepError::Failed);
-        for _ in 0..ATTEMPTS {
-            if stored == Err(KeepError::Failed) {
-                stored = self.store(setting, parts, buffer); // behind an item that could not be written
-            }
+        let others = Setting::ALL.iter().filter(|other| **other != setting);
+        let mut bytes: usize = others.map(|other| item_bytes(kept(*other).len())).sum();
+        bytes += item_bytes(parts.iter().map(|part| part.len()).sum());
+        if bytes + STARTS * item_bytes(4) > PAGE_BYTES {
+            return Err(KeepError::TooLarge);
         }
-        if stored == Err(KeepError::Failed)
-            && Setting::ALL.iter().all(|setting| self.read(*setting, buffer).is_none())
+        let number = found.map(|(number, _)| number);
+        if let Some(page) = number.and_then(|number| self.0.get_mut(number))
+            && append(page, setting as u8, parts).is_ok()
         {
-            // Nothing can be lost.
-            at_once(self.map(None).erase_all()).and_then(Result::ok).ok_or(KeepError::Failed)?;
-            stored = self.store(setting, parts, buffer);
+            return Ok(true);
         }
-        stored.map(|()| true)
+        self.exchange(Some(setting), parts).map(|()| true)
     }
-}
-
-/// Whether the byte of a mark counts as marked: half of its bits are programmed. `sequential-storage` says so.
-fn is_marked(byte: Option<&u8>) -> bool {
-    byte.is_some_and(|mark| mark.count_zeros() >= 4)
-}
-
-/// The output of `future`, which waits for nothing.
-fn at_once<T>(future: impl Future<Output = T>) -> Option<T> {
-    match pin!(future).poll(&mut Context::from_waker(Waker::noop())) {
-        Poll::Ready(output) => Some(output),
-        Poll::Pending => None,
-    }
-}
-
-/// Parts of a setting, which are kept one after the other.
-struct Parts<'a>(&'a [&'a [u8]]);
-
-impl<'a> Value<'a> for Parts<'a> {
-    fn serialize_into(&self, buffer: &mut [u8]) -> Result<usize, SerializationError> {
-        let mut rest = &mut *buffer;
-        let mut length = 0_usize;
-        for part in self.0 {
-            let (place, behind) = core::mem::take(&mut rest)
-                .split_at_mut_checked(part.len())
-                .ok_or(SerializationError::BufferTooSmall)?;
-            place.copy_from_slice(part);
-            rest = behind;
-            length += part.len();
-        }
-        Ok(length)
-    }
-
-    fn deserialize_from(_: &'a [u8]) -> Result<(Self, usize), SerializationError> {
-        Err(SerializationError::InvalidData) // settings are read as bytes
-    }
-}
-
-/// Two pages, one behind the other, as flash for `sequential-storage`.
-struct Pages<'s, S> {
-    slots: &'s mut [S; 2],
-    /// Number of a page that reads as blank.
-    hidden: Option<usize>,
-}
-
-impl NorFlashError for FlashError {
-    fn kind(&self) -> NorFlashErrorKind {
-        NorFlashErrorKind::Other
-    }
-}
-
-impl<S> ErrorType for Pages<'_, S> {
-    type Error = FlashError;
-}
-
-impl<S: Slot> ReadNorFlash for Pages<'_, S> {
-    const READ_SIZE: usize = 1;
-
-    async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
-        let (number, place) = place(offset);
-        if self.hidden == Some(number) {
-            bytes.fill(0xFF);
-            return Ok(());
-        }
-        let page = self.slots.get(number).ok_or(FlashError)?;
-        let source = page.bytes().get(place..).and_then(|rest| rest.get(..bytes.len()));
-        source.map(|source| bytes.copy_from_slice(source)).ok_or(FlashError)
-    }
-
-    fn capacity(&self) -> usize {
-        2 * PAGE_BYTES
-    }
-}
-
-impl<S: Slot> NorFlash for Pages<'_, S> {
-    const WRITE_SIZE: usize = 4;
-    const ERASE_SIZE: usize = PAGE_BYTES;
-
-    async fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
-        for (page, start) in self.slots.iter_mut().zip((0..).step_by(PAGE_BYTES)) {
-            if (from..to).contains(&start) {
-                page.erase()?;
-            }
-        }
-        Ok(())
-    }
-
-    async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
-        let (page, place) = place(offset);
-        self.slots.get_mut(page).ok_or(FlashError)?.write(place, bytes)
-    }
-}
-
-/// Number of the page at `offset`, and the place in it.
-fn place(offset: u32) -> (usize, usize) {
-    let offset = offset as usize;
-    (offset / PAGE_BYTES, offset % PAGE_BYTES)
 }

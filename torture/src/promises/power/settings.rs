@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use firmware::link::message::Setting;
-use firmware::settings::PAGE_BYTES;
+use firmware::settings::{Keeper, PAGE_BYTES};
 use mock_board::SharedSettings;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -97,6 +97,7 @@ impl Case {
 
     fn run(mut self, cuts: &Tally<5>) -> Result<(), String> {
         let setting = self.setting();
+        let old = self.old[setting as usize].clone();
         let new = self.content(setting, 200);
         let before = self.cells();
         self.keep(setting, &new, None);
@@ -107,8 +108,8 @@ impl Case {
         let kind = (self.seed % 5) as usize;
         cuts.add(kind, 1);
         let place = format!("{setting:?}, operation {first} of {operations}");
-        self.expect(setting, &[&new], &place)?;
         let after = self.cells();
+        self.expect(setting, &[old.as_ref(), Some(&new)], &place)?;
         let next = self.content(setting, 201);
         let mut second = self.below(STRIDE);
         loop {
@@ -117,13 +118,15 @@ impl Case {
                 return Ok(());
             }
             cuts.add(kind, 1);
-            let place = format!("{place}, then operation {second}");
-            self.expect(setting, &[&new, &next], &place)?;
-            self.keep(setting, &next, None);
-            if self.read(setting).as_ref() != Some(&next) {
-                return Err(format!("{place}: it cannot be kept any more"));
+            let mut place = format!("{place}, then operation {second}");
+            if self.below(2) == 0 {
+                let third = self.below(operations);
+                cuts.add(kind, u64::from(self.keep(setting, &next, Some(third))));
+                place = format!("{place}, then operation {third}");
             }
-            self.expect(setting, &[&next], &format!("{place}, mended"))?;
+            self.expect(setting, &[old.as_ref(), Some(&new), Some(&next)], &place)?;
+            self.keep(setting, &next, None);
+            self.expect(setting, &[Some(&next)], &format!("{place}, mended"))?;
             second += 1 + self.below(STRIDE);
         }
     }
@@ -152,16 +155,30 @@ impl Case {
         self.settings.read_owned(setting)
     }
 
-    /// At each start `setting` must hold what it held before the cut or one of `new`, the others what they held.
-    fn expect(&mut self, setting: Setting, new: &[&Vec<u8>], place: &str) -> Result<(), String> {
-        for _ in 0..3 {
+    /// At three starts `setting` must hold the same of `allowed`, and the other settings what they held.
+    fn expect(
+        &mut self,
+        setting: Setting,
+        allowed: &[Option<&Vec<u8>>],
+        place: &str,
+    ) -> Result<(), String> {
+        let mut first = None;
+        for start in 1..=3 {
             self.settle();
+            self.settings.make_firm().map_err(|error| format!("{place}, start: {error:?}"))?;
             for other in Setting::ALL {
                 let found = self.read(other);
-                let is_new = other == setting && found.as_ref().is_some_and(|b| new.contains(&b));
-                if found != self.old[other as usize] && !is_new {
-                    let length = found.map(|bytes| bytes.len());
-                    return Err(format!("{place}: {other:?} holds other bytes: {length:?}"));
+                let is_right = if other == setting {
+                    let first = first.get_or_insert_with(|| found.clone());
+                    allowed.contains(&found.as_ref()) && *first == found
+                } else {
+                    found == self.old[other as usize]
+                };
+                if !is_right {
+                    let length = found.map_or(0, |bytes| bytes.len());
+                    return Err(format!(
+                        "{place}: {other:?} holds other {length} B at start {start}"
+                    ));
                 }
             }
         }
