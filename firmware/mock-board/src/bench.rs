@@ -84,7 +84,9 @@ impl<'m> Bench<'m> {
         Self::on(board, memory, configuration)
     }
 
-    fn on(board: Board, memory: &'m mut Memory, configuration: Configuration) -> Self {
+    /// As [`Bench::within`], on this board.
+    #[must_use]
+    pub fn on(board: Board, memory: &'m mut Memory, configuration: Configuration) -> Self {
         *memory = Memory::new();
         let frame = Rc::new(RefCell::new(frame_at_rest()));
         let source = Source::new(&frame, &board, SCAN_US);

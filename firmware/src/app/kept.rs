@@ -159,6 +159,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
 
     fn count_write(&mut self, written: Result<bool, KeepError>) -> Result<(), Refusal> {
         if written != Ok(false) {
+            self.line.platform().feed_watchdog(); // an erase may have taken half a second
             self.writes_left = self.writes_left.saturating_sub(1);
         }
         match written {

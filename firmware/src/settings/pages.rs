@@ -246,7 +246,8 @@ impl<S: Slot> SettingPages<S> {
         for _ in 0..STARTS {
             append(new, START, &[&number])?;
         }
-        blank(old)
+        let _ = blank(old); // where that fails, it is done before the next setting is kept
+        Ok(())
     }
 }
 

@@ -5,12 +5,13 @@ use std::rc::Rc;
 
 use firmware::app::Session;
 use firmware::link::message::{
-    ConfidenceSent, Configuration, RecalibrationStep, Request, UploadStep,
+    ConfidenceSent, Configuration, RecalibrationStep, Request, Setting, UploadStep,
 };
+use firmware::settings::PAGE_BYTES;
 use firmware::store::{FlashError, Slot};
 use mock_board::{
-    Bench, Memory, Pins, SharedSettings, blob, blob_to_recalibrate, blob_with_confidence, quiet,
-    request_bytes, upload_steps,
+    Bench, Board, Memory, Pins, SharedSettings, blob, blob_to_recalibrate, blob_with_confidence,
+    quiet, request_bytes, upload_steps,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -33,6 +34,8 @@ const LEAST: u64 = 240;
 const FASTEST_S: f64 = 5.4;
 /// Longest time in µs that the erase of a slot takes, with writes of 32 bits.
 const ERASE_US: u32 = 2_000_000;
+/// Longest time in µs that the erase of a page of settings takes.
+const ERASE_PAGE_US: u32 = 500_000;
 /// Longest time in µs of writing a word.
 const WORD_US: u32 = 100;
 /// Words of a slot, as on the board.
@@ -62,6 +65,7 @@ fn check(effort: &Effort, _: &Tools) -> Result<Found, String> {
 struct SlowSlot {
     words: Vec<u32>,
     pins: Rc<RefCell<Pins>>,
+    erase_us: u32,
     /// Whether erases fail at their end.
     is_worn: bool,
 }
@@ -81,7 +85,7 @@ impl Slot for SlowSlot {
     }
 
     fn erase(&mut self) -> Result<(), FlashError> {
-        self.wait(ERASE_US);
+        self.wait(self.erase_us);
         self.words.fill(u32::MAX);
         if self.is_worn { Err(FlashError) } else { Ok(()) }
     }
@@ -94,6 +98,16 @@ impl Slot for SlowSlot {
     }
 }
 
+/// Settings in these pages, one of which is full: they are exchanged at the next write.
+fn nearly_full(pages: [SlowSlot; 2]) -> SharedSettings<SlowSlot> {
+    let mut settings = SharedSettings::in_pages(pages);
+    for number in 0..PAGE_BYTES / 64 - 1 {
+        let kept = settings.keep_bytes(Setting::Configuration, &[number as u8; 40]);
+        assert_eq!(kept, Ok(true), "write {number}");
+    }
+    settings
+}
+
 /// Longest time in s between feeds of the watchdog.
 fn longest_unfed_s(seed: u64, planted: bool) -> f64 {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
@@ -102,12 +116,21 @@ fn longest_unfed_s(seed: u64, planted: bool) -> f64 {
     let scan_us = [6_400, 100_000, 1_660_000][(seed / 6 % 3) as usize];
     let [is_recalibrated, is_worn] = [seed / 18 % 2 == 1, seed / 36 % 2 == 1];
     let mut memory = Box::new(Memory::new());
-    let mut bench = Bench::within(&mut memory, quiet(), &SharedSettings::default());
-    let board = bench.board.clone();
+    let pins = Rc::new(RefCell::new(Pins::default()));
+    let slot = |words, erase_us| SlowSlot {
+        words: vec![u32::MAX; words],
+        pins: pins.clone(),
+        erase_us,
+        is_worn,
+    };
+    let mut board =
+        Board::with_settings(&nearly_full([0, 1].map(|_| slot(PAGE_BYTES / 4, ERASE_PAGE_US))));
+    *pins.borrow_mut() = Pins::default();
+    board.pins = pins.clone();
+    let mut bench = Bench::on(board.clone(), &mut memory, quiet());
     board.pins.borrow_mut().scan_us = scan_us;
     bench.frame.borrow_mut()[0][0] = f32::NAN; // so that all kinds of reports are sent
-    let slot = || SlowSlot { words: vec![u32::MAX; WORDS], pins: board.pins.clone(), is_worn };
-    let mut slots = [slot(), slot()];
+    let mut slots = [0, 1].map(|_| slot(WORDS, ERASE_US));
     let model = if is_recalibrated {
         blob_to_recalibrate(MANY_CENTRES)
     } else {
@@ -127,11 +150,13 @@ fn longest_unfed_s(seed: u64, planted: bool) -> f64 {
     board.pins.borrow_mut().gap_us = gap_us;
     board.pins.borrow_mut().look_us = 100;
     for _ in 0..30 {
-        let request = match random.next_u32() % 4 {
+        let request = match random.next_u32() % 6 {
             0 => Request::Identify,
             1 => Request::Statistics,
             2 if is_recalibrated => Request::Recalibrate(RecalibrationStep::Commit),
             2 => Request::Upload(UploadStep::Abort),
+            3 => Request::Keep(Setting::Configuration),
+            4 => Request::Forget(Setting::Configuration),
             _ if is_recalibrated => Request::Configuration,
             _ => uploads.next().expect("a step"),
         };
