@@ -337,7 +337,7 @@ fn a_model_that_decays_is_not_recalibrated() {
                 session = Session::start(&mut bench.app, &mut slots, &mut memory[..words]);
             }
             add_presses(&mut session, &board, 20);
-            flip_bit(start + place);
+            flip_bit(start + place, 3);
             let (answer, _) = step(&mut session, &board, RecalibrationStep::Commit);
             assert!(answer.is_err(), "{place}, in RAM: {in_ram}: {answer:?}");
         }
@@ -356,7 +356,7 @@ fn a_copy_in_ram_is_kept_if_its_slot_has_decayed() {
     let words = memory.len() - 1;
     let slot = slots[1].bytes().as_ptr().addr();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut memory[..words]);
-    flip_bit(slot + 40);
+    flip_bit(slot + 40, 3);
     assert!((0..100).all(|_| session.step().is_none()), "decoded from its copy");
     let (answer, leave) = step(&mut session, &board, RecalibrationStep::Begin);
     let no_room = |fault| matches!(fault, RecalibrationFault::NoRoom { .. });

@@ -67,7 +67,7 @@ impl Rig {
         let board = bench.board.clone();
         let mut session = Session::start(&mut bench.app, slots, weights);
         assert_eq!(run(&mut session), None, "sound");
-        addresses.iter().for_each(|address| flip_bit(*address));
+        addresses.iter().for_each(|address| flip_bit(*address, 3));
         let leave = run(&mut session);
         if leave.is_some() {
             let _ = session;
@@ -164,14 +164,14 @@ fn damage_ends_an_upload_and_a_trial_outlasts_damage_in_ram_alone() {
     let steps = upload_steps(&next, 60);
     upload(bench, slots, weights, &steps[..3]).unwrap();
     let mut session = Session::start(&mut bench.app, slots, weights);
-    flip_bit(copy);
+    flip_bit(copy, 3);
     assert_eq!(run(&mut session), Some(Leave::Damaged));
     let _ = session;
     assert!(upload(bench, slots, weights, &steps[3..]).is_err());
 
     upload(bench, slots, weights, &steps).unwrap();
     let mut session = Session::start(&mut bench.app, slots, weights);
-    flip_bit(copy);
+    flip_bit(copy, 3);
     assert_eq!(run(&mut session), Some(Leave::Damaged));
     let _ = session;
     let state = upload(bench, slots, weights, &[UploadStep::Confirm]);
@@ -187,7 +187,7 @@ fn a_model_that_decays_in_its_slot_while_on_trial_is_not_confirmed() {
     upload(bench, slots, weights, &upload_steps(&next, 60)).unwrap();
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, slots, weights);
-    flip_bit(slot);
+    flip_bit(slot, 3);
     assert_eq!(run(&mut session), None);
     assert_eq!(statistics(&mut session, &board).slot_damages, 1);
     board.pins.borrow_mut().to_host.clear();

@@ -3,13 +3,13 @@
 use std::fs::OpenOptions;
 use std::os::unix::fs::FileExt;
 
-/// Flips bit 3 of the byte at `address` of this process's memory, through the kernel.
+/// Flips bit number `bit` from `address` on of this process's memory, through the kernel.
 ///
 /// # Panics
 /// The memory cannot be written.
-pub fn flip_bit(address: usize) {
+pub fn flip_bit(address: usize, bit: usize) {
     let memory = OpenOptions::new().read(true).write(true).open("/proc/self/mem").unwrap();
-    let mut byte = [0];
-    memory.read_exact_at(&mut byte, address as u64).unwrap();
-    memory.write_all_at(&[byte[0] ^ 8], address as u64).unwrap();
+    let (place, mut byte) = ((address + bit / 8) as u64, [0]);
+    memory.read_exact_at(&mut byte, place).unwrap();
+    memory.write_all_at(&[byte[0] ^ 1 << (bit % 8)], place).unwrap();
 }

@@ -82,7 +82,7 @@ impl DeviceKey {
         }
     }
 
-    /// Sets `key` again in an `area` in which it has decayed. It must be the same but for 8 bits: whoever
+    /// Sets `key` again in an `area` in which it has decayed. It must be the same but for `DECAYED_BITS` bits: whoever
     /// does not have it cannot come that near. Returns whether it is.
     ///
     /// # Errors

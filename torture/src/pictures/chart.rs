@@ -2,15 +2,18 @@
 
 use std::fmt::Write as _;
 
-/// Line through points [x, y]; it ends with a cross if what lies beyond is refused.
+/// Points [x, y].
+pub type Points = Vec<[f64; 2]>;
+
+/// Line through points; it ends with a cross if what lies beyond is refused.
 pub struct Line {
     pub name: &'static str,
     /// Colour, from 1 to 4, or 0 for grey.
     pub colour: u8,
     pub dashed: bool,
-    pub points: Vec<[f64; 2]>,
+    pub points: Points,
     /// Ends that are marked by a cross.
-    pub crosses: Vec<[f64; 2]>,
+    pub crosses: Points,
 }
 
 /// Chart with the range of its axes.

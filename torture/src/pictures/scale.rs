@@ -1,6 +1,6 @@
 //! Error of a model against the scale and the offset of a column, through the program.
 
-use super::chart::{Chart, Line};
+use super::chart::{Chart, Line, Points};
 use crate::promises::scale::{Change, FORMATS, Outcome, folder, path_of, run};
 use crate::tools::Tools;
 
@@ -49,28 +49,16 @@ fn lines(tools: &Tools, values: &[f64], change: fn(f64) -> Change) -> Result<Vec
         PLOTTED.into_iter().enumerate()
     {
         let line = |name, colour: u8, is_output| -> Result<Line, String> {
-            let (mut points, mut crosses) = (Vec::new(), Vec::new());
-            let mut was_refused = false;
-            for value in values {
-                let changed = change(*value);
+            let unexplained = |value| {
+                let changed = change(value);
                 let changes =
                     if is_output { [Change::NONE, changed] } else { [changed, Change::NONE] };
-                let here = match run(program, &folder, format, changes, false)? {
-                    Outcome::Accepted(r_squared) => Some([*value, 1.0 - r_squared]),
+                Ok(match run(program, &folder, format, changes, false)? {
+                    Outcome::Accepted(r_squared) => Some(1.0 - r_squared),
                     Outcome::Refused | Outcome::Noted => None,
-                };
-                match here {
-                    Some(point) => {
-                        if was_refused && points.is_empty() {
-                            crosses.push(point);
-                        }
-                        points.push(point);
-                    }
-                    None if !was_refused => crosses.extend(points.last().copied()),
-                    None => {}
-                }
-                was_refused = here.is_none();
-            }
+                })
+            };
+            let (points, crosses) = accepted(values, unexplained)?;
             Ok(Line { name, colour, dashed, points, crosses })
         };
         let colour = index as u8 + 1;
@@ -84,6 +72,30 @@ fn lines(tools: &Tools, values: &[f64], change: fn(f64) -> Change) -> Result<Vec
     }
     let _ = std::fs::remove_dir_all(&folder);
     Ok(lines)
+}
+
+/// Points of the values that have an `error`, and those of them beside values that have none.
+fn accepted(
+    values: &[f64],
+    mut error: impl FnMut(f64) -> Result<Option<f64>, String>,
+) -> Result<(Points, Points), String> {
+    let (mut points, mut crosses) = (Vec::new(), Vec::new());
+    let mut was_refused = false;
+    for value in values {
+        let here = error(*value)?.map(|error| [*value, error]);
+        match here {
+            Some(point) => {
+                if was_refused && points.is_empty() {
+                    crosses.push(point);
+                }
+                points.push(point);
+            }
+            None if !was_refused => crosses.extend(points.last().copied()),
+            None => {}
+        }
+        was_refused = here.is_none();
+    }
+    Ok((points, crosses))
 }
 
 /// Whether two lines cannot be told apart in a picture.

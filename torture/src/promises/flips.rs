@@ -3,8 +3,6 @@
 //! The CRC-32 of a blob has a Hamming distance of 3 up to 2^32 − 1 bits, and of 4 up to 91 607 bits (11 KiB). So it
 //! finds one and two flipped bits in every blob, and three in small ones.
 
-use std::path::Path;
-
 use mock_board::{blob, blob_of_components, blob_with_confidence};
 use model_core::AlignedBytes;
 use model_core::blob::Model;
@@ -15,7 +13,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use crate::effort::Effort;
 use crate::found::Found;
 use crate::promise::Promise;
-use crate::tools::Tools;
+use crate::tools::{Tools, tested_model};
 
 pub const ONE: Promise = Promise {
     name: "flip-one",
@@ -50,12 +48,8 @@ const FILES: [&str; 6] = [
 fn subjects() -> Result<Vec<AlignedBytes>, String> {
     let small = [blob(1, 1), blob(2, 5), blob_of_components(1), blob_with_confidence(true)];
     let mut all = small.to_vec();
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../testdata");
     for file in FILES {
-        let path = folder.join(file);
-        let bytes = std::fs::read(&path);
-        let bytes = bytes.map_err(|cause| format!("{}: {cause}", path.display()))?;
-        all.push(AlignedBytes::copy_of(&bytes));
+        all.push(tested_model(file)?);
     }
     all.sort_by_key(|blob| blob.len());
     match all.iter().find(|blob| Model::decode(blob).is_err()) {

@@ -4,15 +4,13 @@
 //! Bits of memory that a session has borrowed are flipped from outside, through the kernel, as radiation does.
 
 use std::fmt::Debug;
-use std::fs::{File, OpenOptions};
-use std::os::unix::fs::FileExt;
 
 use firmware::app::{Leave, Session};
 use firmware::link::message::{Configuration, EstimateReport, Report, Request, Statistics};
 use firmware::store::Slot;
 use mock_board::{
-    Bench, Board, COLS, Memory, MockSlot, ROWS, SharedSettings, Source, ask, blob, crc_of, install,
-    model_crc,
+    Bench, Board, COLS, Memory, MockSlot, ROWS, SharedSettings, Source, ask, blob, crc_of,
+    flip_bit, install, model_crc,
 };
 use model_core::blob::Floats;
 use model_core::{AlignedBytes, Decoder};
@@ -67,13 +65,10 @@ const OUTCOMES: [&str; 4] = ["copied again", "noted", "the other slot's", "none 
 type Running<'a, 'm> = Session<'a, 'm, Board, Source, MockSlot, ROWS>;
 
 fn check(effort: &Effort, _: &Tools) -> Result<Found, String> {
-    let path = "/proc/self/mem";
-    let memory = OpenOptions::new().read(true).write(true).open(path);
-    let memory = memory.map_err(|cause| format!("{path}: {cause}"))?;
     let outcomes = Tally::new(OUTCOMES);
     let mut found = effort.worst((LEAST, MOST), (0.0, "silent"), |seed| {
         let case = CASES[(seed % CASES.len() as u64) as usize];
-        let outcome = run(case, seed, &memory, effort.is_planted());
+        let outcome = run(case, seed, effort.is_planted());
         outcomes.add(outcome.map_err(|why| format!("{case:?}: {why}"))?, 1);
         Ok(0.0)
     });
@@ -84,7 +79,7 @@ fn check(effort: &Effort, _: &Tools) -> Result<Found, String> {
 }
 
 /// Lets bits flip while a device works, and judges what it does about it. Returns the number of the outcome.
-fn run(case: Case, seed: u64, memory: &File, is_planted: bool) -> Result<usize, String> {
+fn run(case: Case, seed: u64, is_planted: bool) -> Result<usize, String> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut below = |end: usize| (random.next_u64() % end as u64) as usize;
     let [old, new] = [1, 2].map(|one| blob(one, 1 + below(60)));
@@ -108,7 +103,8 @@ fn run(case: Case, seed: u64, memory: &File, is_planted: bool) -> Result<usize, 
             // Planted: damage that no CRC-32 sees, as if nothing were checked.
             let (bits, room) = if is_planted { (POLYNOMIAL, 33 + 32) } else { (1, 1) };
             let first = below(8 * blob.len() + 1 - room);
-            flip(memory, *address, first, bits).map_err(|cause| format!("flip: {cause}"))?;
+            let hit = (0..64).filter(|bit| bits >> bit & 1 == 1);
+            hit.for_each(|bit| flip_bit(*address, first + bit));
         }
     }
     let leave = turns(&mut session, 2 * pass);
@@ -132,16 +128,6 @@ fn run(case: Case, seed: u64, memory: &File, is_planted: bool) -> Result<usize, 
     expect(turns(&mut session, 2 * pass), None, "afterwards")?;
     judge(&mut session, &board, if outcome == 1 { Some(&old) } else { in_force })?;
     Ok(outcome)
-}
-
-/// Flips `bits` from bit number `first` behind `address` on.
-fn flip(memory: &File, address: usize, first: usize, bits: u64) -> std::io::Result<()> {
-    for bit in (0..64).filter(|bit| bits >> bit & 1 == 1).map(|bit| first + bit) {
-        let (at, mut byte) = ((address + bit / 8) as u64, [0]);
-        memory.read_exact_at(&mut byte, at)?;
-        memory.write_all_at(&[byte[0] ^ 1 << (bit % 8)], at)?;
-    }
-    Ok(())
 }
 
 /// Runs so many turns of the loop, or until the session ends.

@@ -59,8 +59,7 @@ impl Gdb {
 
     /// The word at `address`.
     pub fn word(&mut self, address: u32) -> io::Result<u32> {
-        let word = self.ask(&format!("m{address:x},4"))?;
-        u32::from_str_radix(&word, 16).map(u32::swap_bytes).map_err(|_| unexpected(&word))
+        self.ask_word(&format!("m{address:x},4"))
     }
 
     /// Writes a word to `address`.
@@ -84,8 +83,7 @@ impl Gdb {
 
     /// Status and control of the floating-point unit.
     pub fn fpscr(&mut self) -> io::Result<u32> {
-        let word = self.ask(&format!("p{FPSCR:x}"))?;
-        u32::from_str_radix(&word, 16).map(u32::swap_bytes).map_err(|_| unexpected(&word))
+        self.ask_word(&format!("p{FPSCR:x}"))
     }
 
     /// Resets the machine, as the reset button does.
@@ -95,6 +93,12 @@ impl Gdb {
             answer = self.answer()?; // what the command prints
         }
         if answer == "OK" { Ok(()) } else { Err(unexpected(&answer)) }
+    }
+
+    /// The word that answers a command.
+    fn ask_word(&mut self, command: &str) -> io::Result<u32> {
+        let word = self.ask(command)?;
+        u32::from_str_radix(&word, 16).map(u32::swap_bytes).map_err(|_| unexpected(&word))
     }
 
     fn order(&mut self, command: &str) -> io::Result<()> {
