@@ -35,6 +35,6 @@ pub trait Keeper {
     /// already. Returns whether something was written. May take a second.
     ///
     /// # Errors
-    /// Every variant of [`KeepError`]; what was kept before is still kept.
+    /// Every variant of [`KeepError`]; what was kept before is still kept, or `parts` are.
     fn keep(&mut self, setting: Setting, parts: &[&[u8]]) -> Result<bool, KeepError>;
 }

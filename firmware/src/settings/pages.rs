@@ -1,7 +1,7 @@
 //! Settings in two pages of flash.
 //!
 //! One page is in use. Items are added behind the last one, and the newest item of a setting counts. When the page is
-//! full, the newest items are written to the other page, and the full one is erased.
+//! full, the other page is erased, and the newest items are written there.
 //!
 //! An item begins at a multiple of [`CELL`] bytes. Its words, in the order in which they are written: a mark, what it
 //! is and its length, the content, a CRC-32, and a word of zeros. They tell what a cut of the power has left, however
@@ -12,8 +12,10 @@
 //!   one start and not at the next.
 //! - A page is in use from its start item on, which is written behind the items that were moved. The start item with the
 //!   highest number wins.
-//! - So a start [makes firm](Keeper::make_firm) what it finds: behind a last item that is not firm, what counts moves to
-//!   the other page. Nothing is ever added behind it.
+//! - A page is written only behind an erase that was not cut: weak bits may read as erased.
+//! - So a start [makes firm](Keeper::make_firm) what it finds. A start item that is not firm gets another one. What counts
+//!   moves to the other page if the last item is not firm: nothing but a start item is ever added behind one. A page with
+//!   a start item that does not count, but may do so at another start, is erased.
 
 use model_core::checksum::CRC_32;
 
@@ -24,8 +26,9 @@ use crate::store::{FlashError, Slot};
 /// Bytes of a page that are used, from its start.
 pub const PAGE_BYTES: usize = 8 * 1024;
 
-/// Items begin at multiples of so many bytes.
-const CELL: usize = 16;
+/// Items begin at multiples of so many bytes. A start item must fit in: then what is added behind a weak one touches none
+/// of its words.
+const CELL: usize = 32;
 
 /// First word of an item.
 const MARK: [u8; 4] = *b"ITEM";
@@ -42,8 +45,8 @@ const START: u8 = 0xFF;
 /// Second word of a start item: its kind and length.
 const START_HEAD: [u8; 4] = [START, 0, 4, 0];
 
-/// Number of start items of a page: one may decay.
-const STARTS: usize = 2;
+/// Bytes of a page that are left for start items. It has two, since one may decay, and more behind cuts.
+const ROOM_FOR_STARTS: usize = 4 * CELL;
 
 /// Number of times that an item is written, each time behind the last, until it is given up.
 const ATTEMPTS: usize = 4;
@@ -79,6 +82,11 @@ impl<'p> Item<'p> {
         let is_right = digest.finalize().to_le_bytes() == *crc;
         let end = place + item_bytes(length);
         is_right.then_some(Self { kind, content, is_firm: *last != [0xFF; 4], end })
+    }
+
+    /// The page's number in a start item.
+    fn number(&self) -> Option<u32> {
+        self.content.first_chunk().map(|number| u32::from_le_bytes(*number))
     }
 }
 
@@ -120,7 +128,7 @@ impl<'p> Contents<'p> {
                 continue;
             };
             if item.kind == START {
-                contents.number = item.content.first_chunk().map(|n| u32::from_le_bytes(*n));
+                contents.number = item.number();
                 contents.is_started |= item.is_firm;
             } else if let Some(newest) = contents.settings.get_mut(usize::from(item.kind)) {
                 *newest = Some(item.content);
@@ -198,18 +206,27 @@ fn write<S: Slot>(
     page.write(place + 4, &FIRM)
 }
 
-/// Erases a page that is not blank.
+/// Whether a start item may be at `place`, even if it does not count now. Its head is whole if its CRC-32 is begun, but its
+/// mark may be weak: it is overwritten before an erase.
+fn may_start(page: &[u8], place: usize) -> bool {
+    page.get(place + 4..).is_some_and(|rest| rest.starts_with(&START_HEAD))
+}
+
+/// Whether a page can never win against the one with this `number`.
+fn is_older(page: &[u8], number: u32) -> bool {
+    let mut starts = (0..PAGE_BYTES).step_by(CELL).filter(|place| may_start(page, *place));
+    starts.all(|place| {
+        let other = Item::at(page, place).and_then(|item| item.number());
+        other.is_some_and(|other| number.wrapping_sub(other).cast_signed() > 0)
+    })
+}
+
+/// Erases a page.
 ///
-/// Its start items are overwritten before: one of them may be weak. It must not count again if the erase is cut, when
-/// other items are damaged.
-fn blank<S: Slot>(page: &mut S) -> Result<(), KeepError> {
-    let bytes = page.bytes().get(..PAGE_BYTES).ok_or(KeepError::Failed)?;
-    if used(bytes) == 0 {
-        return Ok(());
-    }
+/// Its start items are overwritten before. They must not count again if the erase is cut, when other items are damaged.
+fn erase<S: Slot>(page: &mut S) -> Result<(), KeepError> {
     for place in (0..PAGE_BYTES).step_by(CELL) {
-        let rest = page.bytes().get(place..).unwrap_or_default();
-        if rest.strip_prefix(&MARK).is_some_and(|rest| rest.starts_with(&START_HEAD)) {
+        if may_start(page.bytes(), place) {
             let _ = page.write(place, &[0; 4]); // where that fails, the erase may not
         }
     }
@@ -232,7 +249,7 @@ impl<S: Slot> SettingPages<S> {
         let is_second = matches!(in_use(&self.0), Some((1, _)));
         let [first, second] = &mut self.0;
         let (old, new) = if is_second { (second, first) } else { (first, second) };
-        blank(new)?;
+        erase(new)?;
         let contents = Contents::of(old.bytes());
         for setting in Setting::ALL {
             let content = contents.content(setting);
@@ -243,30 +260,32 @@ impl<S: Slot> SettingPages<S> {
             }
         }
         let number = contents.number.unwrap_or_default().wrapping_add(1).to_le_bytes();
-        for _ in 0..STARTS {
-            append(new, START, &[&number])?;
-        }
-        let _ = blank(old); // where that fails, it is done before the next setting is kept
+        append(new, START, &[&number])?;
+        let _ = append(new, START, &[&number]); // in case that the first one decays
         Ok(())
     }
 }
 
 impl<S: Slot> Keeper for SettingPages<S> {
     fn make_firm(&mut self) -> Result<(), KeepError> {
-        let Some((number, contents)) = in_use(&self.0) else {
-            return self.0.iter_mut().try_for_each(blank);
+        let Some((place, contents)) = in_use(&self.0) else {
+            let mut written = self.0.iter_mut().filter(|page| used(page.bytes()) > 0);
+            return written.try_for_each(erase);
         };
         let (is_started, is_firm) = (contents.is_started, contents.is_firm);
-        let start = contents.number.unwrap_or_default().to_le_bytes();
+        let number = contents.number.unwrap_or_default();
         let [first, second] = &mut self.0;
-        let (active, other) = if number == 0 { (first, second) } else { (second, first) };
+        let (active, other) = if place == 0 { (first, second) } else { (second, first) };
         if !is_started {
             // The other page may be the one that counts at the next start. So it stays until this one is firm.
-            append(active, START, &[&start])?;
+            append(active, START, &[&number.to_le_bytes()])
         } else if !is_firm {
-            return self.exchange(None, &[]);
+            self.exchange(None, &[])
+        } else if is_older(other.bytes(), number) {
+            Ok(())
+        } else {
+            erase(other)
         }
-        blank(other)
     }
 
     fn read<'b>(&mut self, setting: Setting, buffer: &'b mut [u8]) -> Option<&'b [u8]> {
@@ -288,7 +307,7 @@ impl<S: Slot> Keeper for SettingPages<S> {
         let others = Setting::ALL.iter().filter(|other| **other != setting);
         let mut bytes: usize = others.map(|other| item_bytes(kept(*other).len())).sum();
         bytes += item_bytes(parts.iter().map(|part| part.len()).sum());
-        if bytes + STARTS * item_bytes(4) > PAGE_BYTES {
+        if bytes + ROOM_FOR_STARTS > PAGE_BYTES {
             return Err(KeepError::TooLarge);
         }
         let number = found.map(|(number, _)| number);

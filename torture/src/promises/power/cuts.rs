@@ -76,12 +76,12 @@ struct Case {
 
 impl Case {
     fn new(job: Job, seed: u64, planted: bool) -> Self {
-        let torn = Torn::ALL[(seed % 5) as usize];
+        let torn = Torn::of(seed);
         let device = Device::new(seed, torn);
         Self { job, seed, torn, device, planted, new: blob(2, 2), next: blob(7, 1) }
     }
 
-    fn run(mut self, cuts: &Tally<5>) -> Result<(), String> {
+    fn run(mut self, cuts: &Tally<{ Torn::COUNT }>) -> Result<(), String> {
         let old = self.prepare()?;
         let before = self.device.cells();
         let outcome = self.attempt(None);
@@ -90,7 +90,7 @@ impl Case {
             return Err(format!("without a cut: {outcome:?}"));
         };
         self.expect(&[Some(new)], "without a cut")?;
-        let first = (self.seed / 20).wrapping_mul(17) % operations;
+        let first = (self.seed / 24).wrapping_mul(17) % operations;
         self.device.restore(&before);
         self.attempt(Some(first));
         self.slip();
@@ -129,7 +129,7 @@ impl Case {
         &mut self,
         allowed: &[Option<u32>],
         place: &str,
-        cuts: &Tally<5>,
+        cuts: &Tally<{ Torn::COUNT }>,
     ) -> Result<(), String> {
         let before = self.device.cells();
         for operation in 0.. {
@@ -147,14 +147,14 @@ impl Case {
     }
 
     fn kind(&self) -> usize {
-        (self.seed % 5) as usize
+        self.torn as usize
     }
 
     /// Brings the old model into force; returns its CRC-32.
     fn prepare(&mut self) -> Result<u32, String> {
         let old = if self.job == Job::Recalibration { presses::model() } else { blob(1, 2) };
         let earlier = blob(5, 1);
-        let uploads = match (self.job, self.seed / 5 % 4) {
+        let uploads = match (self.job, self.seed / Torn::COUNT as u64 % 4) {
             (Job::Undo, 0 | 1) | (_, 1) => 1,
             (Job::Undo, _) | (_, 2) => 2,
             (_, 3) => 3,

@@ -21,12 +21,23 @@ pub enum Torn {
     NearlyAll,
     /// Bits that read as 0 or 1 anew after each start. So do bits of torn words.
     Weak,
+    /// Any of these at each cut. Weak bits may be few, in a slot that else reads as erased or as before; at a start they
+    /// may all read alike.
+    Mixed,
 }
 
 impl Torn {
+    /// Number of kinds.
+    pub const COUNT: usize = 6;
+
     /// Every kind.
-    pub const ALL: [Self; 5] =
-        [Self::AnyBits, Self::ZerosFirst, Self::FewBits, Self::NearlyAll, Self::Weak];
+    pub const ALL: [Self; Self::COUNT] =
+        [Self::AnyBits, Self::ZerosFirst, Self::FewBits, Self::NearlyAll, Self::Weak, Self::Mixed];
+
+    /// The kind of case number `seed`: they take turns.
+    pub fn of(seed: u64) -> Self {
+        Self::ALL[(seed % Self::COUNT as u64) as usize]
+    }
 
     /// Its name in the table.
     pub fn name(self) -> &'static str {
@@ -36,6 +47,7 @@ impl Torn {
             Self::FewBits => "few bits",
             Self::NearlyAll => "nearly all",
             Self::Weak => "weak bits",
+            Self::Mixed => "mixed",
         }
     }
 }
@@ -48,6 +60,8 @@ pub struct Supply {
     pub gone: bool,
     /// Number of operations since [`Supply::on`].
     pub operations: u64,
+    /// Number of erases since [`Supply::on`].
+    pub erases: u64,
     random: Xoshiro256PlusPlus,
 }
 
@@ -62,12 +76,13 @@ impl Supply {
     /// Power whose cuts draw from `seed`.
     pub fn new(seed: u64) -> Rc<RefCell<Self>> {
         let random = Xoshiro256PlusPlus::seed_from_u64(seed);
-        Rc::new(RefCell::new(Self { left: None, gone: false, operations: 0, random }))
+        Rc::new(RefCell::new(Self { left: None, gone: false, operations: 0, erases: 0, random }))
     }
 
     /// Switches the power on; it will be cut in the operation after so many, if given.
     pub fn on(&mut self, cut_after: Option<u64>) {
-        (self.left, self.gone, self.operations) = (cut_after, false, 0);
+        (self.left, self.gone) = (cut_after, false);
+        (self.operations, self.erases) = (0, 0);
     }
 
     fn operate(&mut self) -> Course {
@@ -94,7 +109,16 @@ impl Supply {
 
     /// Bits of which one in a hundred is set.
     fn few(&mut self) -> u32 {
-        (0..7).fold(u32::MAX, |bits, _| bits & self.random.next_u32())
+        self.sparse(7)
+    }
+
+    /// Bits of which one in 2 to the power of `halvings` is set.
+    fn sparse(&mut self, halvings: u32) -> u32 {
+        (0..halvings).fold(u32::MAX, |bits, _| bits & self.random.next_u32())
+    }
+
+    fn below(&mut self, end: u32) -> u32 {
+        self.random.next_u32() % end
     }
 }
 
@@ -176,11 +200,15 @@ impl Flash {
     pub fn settle(&mut self) {
         if self.cells.has_weak {
             let mut supply = self.supply.borrow_mut();
+            let at_once = if self.torn == Torn::Mixed { supply.below(4) } else { 0 };
             for (word, weak) in self.cells.words.iter_mut().zip(&self.cells.weak) {
                 let any = supply.random.next_u32();
-                let bits = match any % 4 {
-                    0 if self.swings => 0,
-                    1 if self.swings => u32::MAX,
+                let bits = match (at_once, any % 4) {
+                    (1, _) => 0,
+                    (2, _) => u32::MAX,
+                    (3, _) => *word,
+                    (_, 0) if self.swings => 0,
+                    (_, 1) if self.swings => u32::MAX,
                     _ => any,
                 };
                 *word = (*word & !weak) | (bits & weak);
@@ -191,16 +219,26 @@ impl Flash {
     fn tear(&mut self, supply: &mut Supply) {
         let Cells { words, weak, has_weak } = &mut self.cells;
         let is_early = supply.random.next_u32().is_multiple_of(2);
+        let sparse = [1, 5, 9, 14][supply.below(4) as usize];
+        let torn = match self.torn {
+            Torn::Mixed => Torn::of(supply.random.next_u64()),
+            torn => torn,
+        };
         for (word, weak) in words.iter_mut().zip(weak) {
             let any = supply.random.next_u32();
-            match self.torn {
+            match torn {
                 Torn::AnyBits => *word |= any,
                 Torn::ZerosFirst if is_early => *word &= any,
                 Torn::ZerosFirst => *word = any,
                 Torn::FewBits => *word |= supply.few(),
                 Torn::NearlyAll => *word |= !supply.few(),
                 Torn::Weak => {
-                    *weak = any & !*word;
+                    *weak = (*weak | !*word) & any;
+                    *has_weak = true;
+                }
+                Torn::Mixed => {
+                    *weak = (*weak | !*word) & supply.sparse(sparse);
+                    *word |= if is_early { 0 } else { u32::MAX };
                     *has_weak = true;
                 }
             }
@@ -218,6 +256,7 @@ impl Slot for Flash {
     fn erase(&mut self) -> Result<(), FlashError> {
         let supply = self.supply.clone();
         let mut supply = supply.borrow_mut();
+        supply.erases += 1;
         match supply.operate() {
             Course::Nowhere => return Err(FlashError),
             Course::Torn => {
@@ -245,7 +284,10 @@ impl Slot for Flash {
             let (word, weak) = (&mut words[place], &mut weak[place]);
             match supply.operate() {
                 Course::Nowhere => return Err(FlashError),
-                Course::Torn if self.torn == Torn::Weak => {
+                Course::Torn
+                    if self.torn == Torn::Weak
+                        || self.torn == Torn::Mixed && supply.below(2) == 0 =>
+                {
                     // All bits that change, half of them, or one: the others are as they should be.
                     let change = *word & !wanted;
                     let one = 1 << (supply.random.next_u32() % 32);

@@ -76,9 +76,9 @@ struct Case {
 impl Case {
     fn new(seed: u64, planted: bool) -> Self {
         let supply = Supply::new(seed);
-        let mut flash = Flash::erased(WORDS, &supply, Torn::ALL[(seed % 5) as usize]);
+        let mut flash = Flash::erased(WORDS, &supply, Torn::of(seed));
         flash.swings = true;
-        if (seed / 5).is_multiple_of(3) {
+        if (seed / Torn::COUNT as u64).is_multiple_of(3) {
             // An older program's code, which must be erased.
             let mut word = seed as u32;
             let code = (0..WORDS).map(|_| {
@@ -91,15 +91,15 @@ impl Case {
         Self { seed, supply, flash, slots, memory: Box::new(Memory::new()), planted }
     }
 
-    fn run(mut self, cuts: &Tally<5>) -> Result<(), String> {
-        let kind = (self.seed % 5) as usize;
+    fn run(mut self, cuts: &Tally<{ Torn::COUNT }>) -> Result<(), String> {
+        let kind = Torn::of(self.seed) as usize;
         let before = self.flash.clone();
         let whole = self.provision(KEY, None);
         let operations = self.supply.borrow().operations;
         if whole != Outcome::Set || self.expect(&[Some(KEY)], "without a cut")? != Some(KEY) {
             return Err(format!("without a cut: {whole:?}"));
         }
-        let first = self.seed / 15 % operations;
+        let first = self.seed / 18 % operations;
         self.flash = before;
         self.provision(KEY, Some(first));
         cuts.add(kind, 1);

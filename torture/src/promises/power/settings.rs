@@ -27,6 +27,9 @@ pub const SETTINGS: Promise = Promise {
 const LEAST: u64 = 160;
 const MOST: u64 = 1 << 40;
 
+/// Behind one in so many cuts, settings are kept for long, up to the next exchanges.
+const LATER: u64 = 64;
+
 /// Longest distance between second cuts that are tried.
 const STRIDE: u64 = 16;
 
@@ -58,24 +61,49 @@ struct Case {
 }
 
 impl Case {
-    /// Pages after some settings were kept, up to several exchanges of the pages.
+    /// Pages after some settings were kept, up to several exchanges of the pages. In half of the cases the next one leads
+    /// to an exchange.
     fn new(seed: u64, planted: bool) -> Result<Self, String> {
         let supply = Supply::new(seed);
-        let torn = Torn::ALL[(seed % 5) as usize];
+        let torn = Torn::of(seed);
         let page = || Flash::erased(PAGE_BYTES / 4, &supply, torn);
         let settings = SharedSettings::in_pages([page(), page()]);
         let random = Xoshiro256PlusPlus::seed_from_u64(seed);
         let mut case = Self { seed, random, supply, settings, old: [None, None, None], planted };
-        for number in 0..case.below(60) {
-            let setting = case.setting();
-            let bytes = case.content(setting, number);
-            let kept = case.settings.keep_bytes(setting, &bytes);
-            if kept.is_err() {
-                return Err(format!("write {number} before the cut: {kept:?}"));
-            }
-            case.old[setting as usize] = Some(bytes);
+        let times = case.below(60);
+        case.keep_some(times)?;
+        if seed / Torn::COUNT as u64 % 2 == 1 {
+            case.fill_page()?;
         }
         Ok(case)
+    }
+
+    /// Keeps settings `times` times, each of them at every start from then on.
+    fn keep_some(&mut self, times: u64) -> Result<(), String> {
+        for number in 0..times {
+            let setting = self.setting();
+            let bytes = self.content(setting, number);
+            self.keep(setting, &bytes, None);
+            let place = format!("write {number} without a cut");
+            self.expect(setting, &[Some(&bytes)], &place)?;
+            self.old[setting as usize] = Some(bytes);
+        }
+        Ok(())
+    }
+
+    /// Keeps configurations until the next setting, whichever it is, leads to an exchange.
+    fn fill_page(&mut self) -> Result<(), String> {
+        for number in 0.. {
+            let before = self.cells();
+            let bytes = self.content(Setting::Configuration, number);
+            self.keep(Setting::Configuration, &bytes, None);
+            if self.supply.borrow().erases > 0 && number > 0 {
+                self.restore(&before);
+                break;
+            }
+            self.old[Setting::Configuration as usize] = Some(bytes);
+        }
+        Ok(())
     }
 
     fn below(&mut self, end: u64) -> u64 {
@@ -95,17 +123,23 @@ impl Case {
         bytes
     }
 
-    fn run(mut self, cuts: &Tally<5>) -> Result<(), String> {
+    fn run(mut self, cuts: &Tally<{ Torn::COUNT }>) -> Result<(), String> {
         let setting = self.setting();
         let old = self.old[setting as usize].clone();
         let new = self.content(setting, 200);
         let before = self.cells();
         self.keep(setting, &new, None);
         let operations = self.supply.borrow().operations;
-        let first = self.below(operations);
+        // The last operations of an exchange decide which page is in use.
+        let last = operations.min(16);
+        let first = if self.below(2) == 0 {
+            operations - last + self.below(last)
+        } else {
+            self.below(operations)
+        };
         self.restore(&before);
         self.keep(setting, &new, Some(first));
-        let kind = (self.seed % 5) as usize;
+        let kind = Torn::of(self.seed) as usize;
         cuts.add(kind, 1);
         let place = format!("{setting:?}, operation {first} of {operations}");
         let after = self.cells();
@@ -120,13 +154,20 @@ impl Case {
             cuts.add(kind, 1);
             let mut place = format!("{place}, then operation {second}");
             if self.below(2) == 0 {
-                let third = self.below(operations);
+                let end = if self.below(2) == 0 { operations } else { 20 };
+                let third = self.below(end);
                 cuts.add(kind, u64::from(self.keep(setting, &next, Some(third))));
                 place = format!("{place}, then operation {third}");
             }
             self.expect(setting, &[old.as_ref(), Some(&new), Some(&next)], &place)?;
             self.keep(setting, &next, None);
             self.expect(setting, &[Some(&next)], &format!("{place}, mended"))?;
+            if self.below(LATER) == 0 {
+                let old = self.old.clone();
+                self.old[setting as usize] = Some(next.clone());
+                self.keep_some(40).map_err(|why| format!("{place}, later: {why}"))?;
+                self.old = old;
+            }
             second += 1 + self.below(STRIDE);
         }
     }
