@@ -98,13 +98,14 @@ impl Slot for SlowSlot {
     }
 }
 
-/// Settings in these pages, one of which is full: they are exchanged at the next write.
-fn nearly_full(pages: [SlowSlot; 2]) -> SharedSettings<SlowSlot> {
+/// Settings in these pages, one of which is full: they are exchanged at the next write. From then on the pages may be worn.
+fn nearly_full(pages: [SlowSlot; 2], is_worn: bool) -> SharedSettings<SlowSlot> {
     let mut settings = SharedSettings::in_pages(pages);
     for number in 0..PAGE_BYTES / 64 - 1 {
         let kept = settings.keep_bytes(Setting::Configuration, &[number as u8; 40]);
         assert_eq!(kept, Ok(true), "write {number}");
     }
+    settings.0.borrow_mut().pages().iter_mut().for_each(|page| page.is_worn = is_worn);
     settings
 }
 
@@ -117,20 +118,22 @@ fn longest_unfed_s(seed: u64, planted: bool) -> f64 {
     let [is_recalibrated, is_worn] = [seed / 18 % 2 == 1, seed / 36 % 2 == 1];
     let mut memory = Box::new(Memory::new());
     let pins = Rc::new(RefCell::new(Pins::default()));
-    let slot = |words, erase_us| SlowSlot {
+    let slot = |words, erase_us, is_worn| SlowSlot {
         words: vec![u32::MAX; words],
         pins: pins.clone(),
         erase_us,
         is_worn,
     };
-    let mut board =
-        Board::with_settings(&nearly_full([0, 1].map(|_| slot(PAGE_BYTES / 4, ERASE_PAGE_US))));
+    let mut board = Board::with_settings(&nearly_full(
+        [0, 1].map(|_| slot(PAGE_BYTES / 4, ERASE_PAGE_US, false)),
+        is_worn,
+    ));
     *pins.borrow_mut() = Pins::default();
     board.pins = pins.clone();
     let mut bench = Bench::on(board.clone(), &mut memory, quiet());
     board.pins.borrow_mut().scan_us = scan_us;
     bench.frame.borrow_mut()[0][0] = f32::NAN; // so that all kinds of reports are sent
-    let mut slots = [0, 1].map(|_| slot(WORDS, ERASE_US));
+    let mut slots = [0, 1].map(|_| slot(WORDS, ERASE_US, is_worn));
     let model = if is_recalibrated {
         blob_to_recalibrate(MANY_CENTRES)
     } else {
