@@ -8,7 +8,7 @@ use crate::toolchain::{Toolchain, elf};
 /// Builds host-sim, the emulator's images and the torture, and runs the torture with `options`. Without an emulator,
 /// what needs one is not tested.
 pub fn run(options: &[&str]) -> Outcome {
-    let mut torture = cargo(&["run", "--quiet", "--package", "torture", "--"]);
+    let mut torture = cargo(&["run", "--package", "torture", "--"]);
     torture.args(options);
     if options.iter().any(|option| ["--help", "-h", "--list"].contains(option)) {
         return run_command(&mut torture);

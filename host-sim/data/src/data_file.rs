@@ -20,6 +20,8 @@ pub struct DataFile {
     pub header: Vec<String>,
     /// Whether the file names its columns.
     pub names_columns: bool,
+    /// Whether it is a CSV file without an end of its last line, which may be cut off in a number.
+    pub lacks_last_line_end: bool,
     /// CRC-64/XZ of the file's bytes.
     pub digest: u64,
     pub(crate) values: Vec<f64>,

@@ -93,6 +93,7 @@ impl Join {
             path: format!("{} joined with {}", first.path.display(), second.path.display()).into(),
             header,
             names_columns: first.names_columns && second.names_columns,
+            lacks_last_line_end: false,
             digest: digest::digest(&[both, how].concat().concat()),
             values,
             line_numbers,

@@ -273,10 +273,13 @@ impl Experiment {
     }
 
     fn check(&self) -> Check {
-        let name_ok = !self.name.is_empty()
+        const LONGEST_NAME: usize = 100;
+        let name_ok = (1..=LONGEST_NAME).contains(&self.name.len())
             && self.name.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_');
         require(name_ok, "name", format!("{:?}", self.name), || {
-            "it names a folder; use letters, digits, - and _".into()
+            format!(
+                "it names a folder; use letters, digits, - and _, at most {LONGEST_NAME} of them"
+            )
         })?;
         self.world.check()?;
         check_spread("training.spread", self.training.spread)?;
@@ -323,7 +326,10 @@ fn shortened(message: &str) -> String {
         Some((end, _)) => format!("{} …", &line[..end]),
         None => line.to_owned(),
     };
-    message.lines().map(cut).collect::<Vec<_>>().join("\n")
+    let plain = message
+        .replace("expected usize", "expected a whole number from 0 on")
+        .replace("expected u64", "expected a whole number from 0 on");
+    plain.lines().map(cut).collect::<Vec<_>>().join("\n")
 }
 
 fn check_table1(t: &Table1) -> Check {

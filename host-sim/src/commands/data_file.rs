@@ -155,6 +155,12 @@ impl FieldArguments {
                 file.header.len()
             );
         }
+        if file.lacks_last_line_end {
+            let last = file.line_number(file.lines() - 1);
+            eprintln!(
+                "note: {name} ends without a line end: if it is not whole, the last number of line {last} may be wrong"
+            );
+        }
         for code in &self.missing {
             let marked = file.mark_missing(*code);
             eprintln!("note: {marked} values of {name} are {code}, and count as missing");

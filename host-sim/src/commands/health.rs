@@ -83,6 +83,16 @@ impl HealthArguments {
         let columns = judge(readings, self.limits.0);
         let told = told(&columns, &faults, &readings.names, &left_out);
         notes(&told.0, &told.1, lines).iter().for_each(|note| eprintln!("{note}"));
+        if let Some(limits) = self.limits.0
+            && columns.len() == readings.names.len()
+            && columns.iter().all(|column| column.shorted + column.open == lines)
+        {
+            let Limits { shorted_below_ohm, open_above_ohm } = limits;
+            eprintln!(
+                "note: no reading lies within {shorted_below_ohm} to {open_above_ohm} Ω; are they in Ω? --limits gives \
+                 other limits"
+            );
+        }
         let is_faulty =
             readings.lines().map(|line| line.iter().any(|reading| reading.is_nan())).collect();
         let filled = if self.no_fill { None } else { model.filled(&readings.values) };
@@ -123,13 +133,22 @@ impl HealthArguments {
     /// Makes the readings of the columns that are left out missing. Returns the columns' indices.
     fn leave_out(&self, readings: &mut Table) -> Result<Vec<usize>> {
         let Some(pattern) = &self.without else { return Ok(vec![]) };
-        if let Some(part) = columns::unmatched(&readings.names, pattern) {
+        // Notes on faults call a reading r4c5.
+        let bare = |name: &String| name.strip_suffix("_ohm").unwrap_or(name).to_owned();
+        let bare: Vec<String> = readings.names.iter().map(bare).collect();
+        let matching = |pattern: &str| {
+            [&readings.names, &bare].map(|names| columns::select(names, pattern)).concat()
+        };
+        if let Some(part) = pattern.split(',').map(str::trim).find(|part| matching(part).is_empty())
+        {
             return Err(Error::Usage(format!(
                 "--without {part}: the model has no such reading; it has {}",
                 columns::some_names(&readings.names)
             )));
         }
-        let chosen = columns::select(&readings.names, pattern);
+        let mut chosen = matching(pattern);
+        chosen.sort_unstable();
+        chosen.dedup();
         let width = readings.names.len();
         for line in readings.values.chunks_exact_mut(width) {
             chosen.iter().for_each(|column| line[*column] = f64::NAN);

@@ -109,6 +109,26 @@ fn wires_are_named_and_columns_can_be_left_out() {
 }
 
 #[test]
+fn a_file_that_may_be_cut_off_or_has_other_units_is_noted() {
+    let folder = prepared("health_cut_off");
+    let text = std::fs::read_to_string(folder.path("sound.csv")).unwrap();
+    folder.write("cut.csv", &text[..text.len() - 8]);
+    let decode = |file| notes(&folder, &["decode", "fills.bin", file, "-o", "e.csv"]);
+    let said = decode("cut.csv");
+    assert!(said.contains("the last number of line 201 may be wrong"), "{said}");
+    changed(&folder, "kilohm.csv", |name, _| name.ends_with("_ohm").then_some("0.06"));
+    let said = decode("kilohm.csv");
+    assert!(said.contains("no reading lies within 5 to 1000 Ω; are they in Ω?"), "{said}");
+}
+
+#[test]
+fn a_reading_can_be_left_out_by_the_name_that_notes_give_it() {
+    let folder = prepared("health_names");
+    let eval = |without| folder.succeed(&["eval", "fills.bin", "sound.csv", "--without", without]);
+    assert_eq!(eval("r4c5,r2c1"), eval("r4c5_ohm,r2c1_ohm"));
+}
+
+#[test]
 fn a_reading_that_comes_and_goes_is_no_noise() {
     let folder = prepared("health_intermittent");
     changed(&folder, "loose.csv", |name, line| {

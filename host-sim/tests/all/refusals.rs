@@ -95,6 +95,12 @@ fn bad_scenes() {
         ("dent_radius_mm = [2.0, 5.0]", "dent_radius_mm = [0.0, 5.0]", &["dent_radius_mm"]),
         ("kind = \"press\"", "kind = \"hit\"", &["unknown variant `hit`", "press"]),
         ("kind = \"relative\"", "kind = \"pink\"", &["unknown variant `pink`", "span"]),
+        ("seed = 1", "seed = -1", &["seed = -1", "expected a whole number from 0 on"]),
+        (
+            "row_wires = 8",
+            "row_wires = -8",
+            &["row_wires = -8", "expected a whole number from 0 on"],
+        ),
         ("seed = 1", "precision = \"f16\"", &["unknown variant `f16`", "f64"]),
         ("level = 0.005", "level = 5.0", &["noise.level = 5", "0.005 is 0.5 %"]),
         ("[noise]", "[drift]\ngain = 1.0\n\n[noise]", &["drift.gain = 1", "0.02 is ±2 %"]),
@@ -132,6 +138,11 @@ fn bad_scenes() {
         let command = if says[0].starts_with("training.") { "train" } else { "synth" };
         refused(&folder, &[command, scene.to_str().unwrap(), "-o", "data"], &says);
     }
+}
+
+#[test]
+fn bad_scenes_of_a_contact() {
+    let folder = Folder::new("bad-contact");
     let contact = include_str!("../../../scenes/contact.toml");
     for (from, to, says) in [
         ("\"depth\", \"force\"", "\"force\", \"depth\"", &["outputs.contact", "in this order"][..]),
@@ -179,6 +190,7 @@ fn bad_csv_files() {
         (b"ch1,f_n\n1,\n,2\n", &["no line has a value in every chosen column"]),
         (b"ch1,f\x07n\n1,2\n", &["column 2 has no usable name"]),
         (b"ch1\n1\n\n2\n", &["line 3 is blank", "NaN"]),
+        (b"ch\xff,f_n\n1,2\n", &["line 1: it is no UTF-8 text", "save as UTF-8"]),
         (b"ch1,f_n\n1,2\n-1e31,4\n", &["line 3", "\"ch1\"", "beyond 1e30"]),
     ] {
         folder.write("data.csv", content);

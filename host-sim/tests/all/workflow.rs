@@ -355,7 +355,7 @@ fn readings_of_another_sensor_are_remarked_upon() {
         String::from_utf8(output.stderr).unwrap()
     };
     assert_eq!(remark("scene.toml"), "");
-    assert!(remark("thicker.toml").contains("outside the range that the model was trained on"));
+    assert!(remark("thicker.toml").contains("outside the range that it was trained on"));
 }
 
 #[test]

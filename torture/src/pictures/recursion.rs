@@ -19,7 +19,7 @@ pub fn draw() -> String {
     };
     let chart = Chart {
         title: "Error of recursive least squares against updates: work, and rest from 2000 on",
-        x_label: "updates; beyond a cross there is NaN alone, and errors above 1e6 are drawn at 1e6",
+        x_label: "updates; f64 is dashed; beyond a cross there is NaN; errors above 1e6 are drawn at 1e6",
         y_label: "error of what is predicted over all places; the function is within ±1",
         x: [100.0, UPDATES as f64],
         y: [1e-3, 1e6],

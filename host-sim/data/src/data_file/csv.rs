@@ -17,7 +17,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8], has_header: bool) -> Result<DataF
     let error = |problem| Error::file(path, problem);
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes); // a byte order mark
     let mut reader = reader(text, true);
-    let header = reader.headers().map_err(|e| error(Problem::Header { cause: e.to_string() }))?;
+    let header = reader.headers().map_err(|e| error(Problem::Header { cause: cause_of(&e) }))?;
     let header: Vec<String> = header.iter().map(|name| name.trim().to_owned()).collect();
     if header.is_empty() {
         return Err(error(Problem::Empty));
@@ -52,11 +52,21 @@ pub(super) fn parse(path: &Path, bytes: &[u8], has_header: bool) -> Result<DataF
         }
         _ => read_carefully(path, text, &mut reader, &header)?,
     };
-    Ok(DataFile { path: path.into(), header, names_columns, digest, values, line_numbers })
+    let lacks_last_line_end = !matches!(text, [.., b'\n' | b'\r']);
+    let path = path.into();
+    Ok(DataFile { path, header, names_columns, lacks_last_line_end, digest, values, line_numbers })
 }
 
 fn reader(text: &[u8], has_header: bool) -> csv::Reader<&[u8]> {
     csv::ReaderBuilder::new().flexible(true).has_headers(has_header).from_reader(text)
+}
+
+/// What is wrong, in short.
+fn cause_of(error: &::csv::Error) -> String {
+    match error.kind() {
+        ::csv::ErrorKind::Utf8 { .. } => "it is no UTF-8 text".into(),
+        _ => error.to_string(),
+    }
 }
 
 /// Whether the fields of a first line are numbers, or empty, with a number among them: no header.
@@ -92,7 +102,7 @@ fn read_carefully(
     let mut line_numbers = Vec::new();
     let mut lines = LineCount { bytes, at: 0, line: 1 };
     let mut record = csv::ByteRecord::new();
-    let read_error = |e: csv::Error| error(Problem::Line { cause: e.to_string() });
+    let read_error = |e: csv::Error| error(Problem::Line { cause: cause_of(&e) });
     while reader.read_byte_record(&mut record).map_err(read_error)? {
         let line = lines.of_record_at(record.position().map_or(0, csv::Position::byte));
         if record.len() != header.len() {

@@ -148,7 +148,9 @@ fn data_file(
     }
     let line_numbers = (1..).take(values.len() / header.len()).collect();
     let digest = crate::digest::digest(bytes);
-    Ok(DataFile { path: path.into(), header, names_columns, digest, values, line_numbers })
+    let path = path.into();
+    let lacks_last_line_end = false;
+    Ok(DataFile { path, header, names_columns, lacks_last_line_end, digest, values, line_numbers })
 }
 
 #[cfg(test)]

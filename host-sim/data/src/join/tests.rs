@@ -7,6 +7,7 @@ fn log(path: &str, header: &[&str], lines: &[&[f64]]) -> DataFile {
         path: Path::new(path).into(),
         header: header.iter().map(|name| (*name).to_owned()).collect(),
         names_columns: true,
+        lacks_last_line_end: false,
         digest: 1,
         values: lines.concat(),
         line_numbers: (2..).take(lines.len()).collect(),

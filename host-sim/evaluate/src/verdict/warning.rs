@@ -104,13 +104,14 @@ impl Warning {
         })
     }
 
-    /// More than [`OUT_OF_RANGE`] of the readings outside the range that a model was trained on.
+    /// More than [`OUT_OF_RANGE`] of a network's inputs outside the range that it was trained on: readings, or what a
+    /// projection makes of them.
     #[must_use]
     pub fn out_of_range(share: f64) -> Option<Self> {
         Self::when(share > OUT_OF_RANGE, "readings-out-of-range", || {
             format!(
-                "{:.1} % of the readings lie outside the range that the model was trained on, and are clamped; is it \
-                 the right model for this sensor?",
+                "{:.1} % of the network's inputs lie outside the range that it was trained on, and are clamped; is it \
+                 the right model for this sensor, and is every reading sound?",
                 100.0 * share
             )
         })
