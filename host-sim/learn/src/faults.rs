@@ -116,7 +116,8 @@ fn of_window(
     // With more missing than a fill fills, too little is left to tell of the rest.
     let flickers = |at: &usize| struck[*at] || health::flickers(faulty[*at], frames);
     let few = (0..count).filter(flickers).count() * MOST_MISSING <= count;
-    let Some(expected) = expected.filter(|_| few && frames >= FEWEST_FOR_NOISE) else {
+    let tells = few && frames >= FEWEST_FOR_NOISE && !stand_still(window, count);
+    let Some(expected) = expected.filter(|_| tells) else {
         faults.extend(intermittent);
         return faults;
     };
@@ -138,6 +139,16 @@ fn of_window(
     let touching = touching.into_iter().map(|place| (place, Kind::Touching));
     faults.extend(touching.chain(noisy).map(|(place, kind)| WireFault { place, kind }));
     faults
+}
+
+/// Whether all frames of `count` readings in a window are the same, to the bit: then they tell of no noise, and of one place
+/// alone. Readings that are missing are the same.
+#[must_use]
+pub fn stand_still(window: &[f64], count: usize) -> bool {
+    let bits = |frame: &[f64]| frame.iter().map(|reading| reading.to_bits()).collect::<Vec<_>>();
+    let mut frames = window.chunks_exact(count);
+    let first = frames.next().map(bits);
+    frames.all(|frame| first.as_ref() == Some(&bits(frame)))
 }
 
 #[cfg(test)]

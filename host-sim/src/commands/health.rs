@@ -8,7 +8,7 @@ use serde::Serialize;
 use taxel_data::columns;
 use taxel_data::table::Table;
 use taxel_learn::PreparedModel;
-use taxel_learn::faults::{Found, Grid, diagnose};
+use taxel_learn::faults::{FEWEST_FOR_NOISE, Found, Grid, diagnose, stand_still};
 use taxel_learn::health::{ColumnHealth, judge};
 
 /// Most columns, and most wires, that are named.
@@ -79,6 +79,9 @@ impl HealthArguments {
             Some(limits) => diagnose(readings, limits, model.model().fill()),
             None => vec![],
         };
+        if lines >= FEWEST_FOR_NOISE && stand_still(&readings.values, readings.names.len()) {
+            eprintln!("note: all {lines} lines are the same: do the readings stand still?");
+        }
         let left_out = self.leave_out(readings)?;
         let columns = judge(readings, self.limits.0);
         let told = told(&columns, &faults, &readings.names, &left_out);
