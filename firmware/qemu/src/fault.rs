@@ -37,15 +37,22 @@ fn panicked() -> ! {
     exit::failure()
 }
 
-/// Denies all access to the 256 MB below the RAM, so that a stack overflow faults at once. This machine, unlike a
-/// microcontroller, would let every read there give zero. Runs before anything else.
+/// Denies all access to the 256 MB below the RAM, so that a stack overflow faults at once, and to what lies behind the
+/// 128 KB that a board has, up to the PSRAM. This machine, unlike a microcontroller, would let every read there give zero.
+/// Runs before anything else.
 #[unsafe(no_mangle)]
 #[unsafe(naked)]
 extern "C" fn __pre_init() {
     core::arch::naked_asm!(
-        "ldr r0, =0xE000ED9C", // MPU_RBAR, MPU_RASR: region 0, and what holds in it
-        "ldr r1, =0x10000010",
+        "ldr r0, =0xE000ED9C", // MPU_RBAR, MPU_RASR: a region, and what holds in it
+        "ldr r1, =0x10000010", // region 0: no access to 256 MB
         "ldr r2, =0x10000037",
+        "stm r0, {{r1, r2}}",
+        "ldr r1, =0x20000011", // region 1: no access to 16 MB
+        "ldr r2, =0x1000002F",
+        "stm r0, {{r1, r2}}",
+        "ldr r1, =0x20000012", // region 2, which wins: all access to 128 KB
+        "ldr r2, =0x03030021",
         "stm r0, {{r1, r2}}",
         "ldr r0, =0xE000ED94", // MPU_CTRL: on, with the default map everywhere else
         "movs r1, #5",

@@ -11,7 +11,7 @@ use crate::tools::{Tools, tested_model};
 
 pub const RAM: Promise = Promise {
     name: "ram-flip",
-    text: "a flipped bit of RAM: no device stops, models mended",
+    text: "a flipped bit of RAM: 99 % seen, and all of the model",
     share: 12,
     check,
 };
@@ -19,6 +19,10 @@ pub const RAM: Promise = Promise {
 /// Flips of the short form, and the most.
 const LEAST: u64 = 24;
 const MOST: u64 = 20_000;
+/// Flips of a device with a planted fault.
+const PLANTED: u64 = 2;
+/// Most flips in per cent that no check sees.
+const MOST_UNSEEN_PERCENT: f64 = 1.0;
 
 /// The model that is decoded.
 const MODEL: &str = "kernels-fixed16.bin";
@@ -37,8 +41,7 @@ fn check(effort: &Effort, tools: &Tools) -> Result<Found, String> {
     let mut victim = Victim::new(&tools.image("qemu-app")?, &blob)?;
     let mut counts = [0_u64; Harm::ALL.len()];
     let mut flips = 0;
-    let mut first_broken = None;
-    let mut broken = 0_u32;
+    let mut first_of_model = None;
     while flips < LEAST || (flips < MOST && !effort.is_over()) {
         let seed = effort.seed().wrapping_add(flips);
         let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
@@ -52,29 +55,33 @@ fn check(effort: &Effort, tools: &Tools) -> Result<Found, String> {
         let harm = victim.flip(address, random.next_u32() % 8, &mut random, effort.is_planted())?;
         counts[harm as usize] += 1;
         flips += 1;
-        let is_of_model = regions[region].1.0 == COPY;
-        if harm == Harm::ForGood || (harm == Harm::Silent && is_of_model) {
-            broken += 1;
-            let place = format!("{harm:?}: at {address:#010x} ({})", regions[region].0);
-            first_broken.get_or_insert((seed, place));
-            if effort.is_planted() {
-                break;
-            }
+        if harm == Harm::Silent && regions[region].1.0 == COPY {
+            first_of_model.get_or_insert((
+                seed,
+                format!("a flip of the model at {address:#010x} is not seen"),
+            ));
+        }
+        if effort.is_planted() && flips == PLANTED {
+            break;
         }
     }
     let of = |harm: Harm| counts[harm as usize];
-    let (share, [low, high]) = share_percent(of(Harm::Silent), flips);
+    let unseen = of(Harm::Silent) + of(Harm::ForGood);
+    let (share, [low, high]) = share_percent(unseen, flips);
     let note = format!(
-        "{} unharmed, {} told, {} faults, {} watchdog, {} mended, {} silent: {share:.1} % ({low:.1}–{high:.1})",
+        "{} unharmed, {} told, {} faults, {} watchdog, {} mended, {} silent, {} deaf: {share:.2} % ({low:.2}–{high:.2})",
         of(Harm::None),
         of(Harm::Told),
         of(Harm::Fault),
         of(Harm::Watchdog),
         of(Harm::Mended),
         of(Harm::Silent),
+        of(Harm::ForGood),
     );
-    let (seed, note) = first_broken.unwrap_or((effort.seed(), note));
-    Ok(Found { cases: flips, worst: f64::from(broken), bound: 0.0, unit: "devices", seed, note })
+    // A few flips tell no share: it is too large if the whole interval of 95 % is beyond the bound.
+    let worst = if first_of_model.is_some() { 100.0 } else { low };
+    let (seed, note) = first_of_model.unwrap_or((effort.seed(), note));
+    Ok(Found { cases: flips, worst, bound: MOST_UNSEEN_PERCENT, unit: "% unseen", seed, note })
 }
 
 /// Share in per cent, with Wilson's interval of 95 %.
