@@ -4,7 +4,9 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 export PATH="${CARGO_HOME:-$HOME/.cargo}/bin:$PATH"
 
-target=thumbv7em-none-eabihf
+# The firmware's target, and the cores that `cargo xtask cores` builds for as well.
+targets=(thumbv7em-none-eabihf thumbv6m-none-eabi thumbv7m-none-eabi thumbv8m.main-none-eabihf
+    riscv32imac-unknown-none-elf wasm32-unknown-unknown)
 debian_toolchain=(rustc-web cargo-web rust-web-src rust-web-clippy)
 
 apt_install() {
@@ -21,10 +23,14 @@ cargo fmt --version >/dev/null 2>&1 || rustup component add rustfmt
 cargo clippy --version >/dev/null 2>&1 || rustup component add clippy
 command -v qemu-system-arm >/dev/null || apt_install qemu-system-arm
 
-# The firmware's target: whatever is there already, then rustup's, then Debian's packages.
-if ! [ -d "$(rustc --print target-libdir --target "$target")" ] &&
+# The targets: whatever is there already, then rustup's, then Debian's packages.
+missing=()
+for target in "${targets[@]}"; do
+    [ -d "$(rustc --print target-libdir --target "$target")" ] || missing+=("$target")
+done
+if [ "${#missing[@]}" -gt 0 ] &&
     ! dpkg --status "${debian_toolchain[@]}" >/dev/null 2>&1 &&
-    ! timeout 300 rustup --quiet target add "$target"; then
+    ! timeout 300 rustup --quiet target add "${missing[@]}"; then
     apt_install "${debian_toolchain[@]}"
 fi
 
