@@ -4,7 +4,7 @@ use crate::firmware::PROFILE;
 use crate::process::{Outcome, run as run_command};
 use crate::toolchain::{TARGET, Toolchain};
 
-/// Targets, and the packages that are built for each.
+/// Targets, and the packages that are built for each. `firmware/setup.sh` installs them.
 const CORES: [(&str, &[&str]); 6] = [
     ("thumbv6m-none-eabi", &DEVICE),
     ("thumbv7m-none-eabi", &DEVICE),

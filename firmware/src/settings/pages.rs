@@ -153,7 +153,7 @@ fn used(page: &[u8]) -> usize {
     last.map_or(0, |last| (last + 1).next_multiple_of(CELL))
 }
 
-/// Number of the page in use, and what it holds.
+/// Index of the page in use, and what it holds.
 fn in_use<S: Slot>(pages: &[S; 2]) -> Option<(usize, Contents<'_>)> {
     let [first, second] = pages.each_ref().map(|page| Contents::of(page.bytes()));
     match (first.number, second.number) {
@@ -244,11 +244,16 @@ impl<S: Slot> SettingPages<S> {
         &mut self.0
     }
 
-    /// Moves what counts to the page that is not in use, with `parts` instead of what `changed` holds.
-    fn exchange(&mut self, changed: Option<Setting>, parts: &[&[u8]]) -> Result<(), KeepError> {
+    /// The page in use, or the first if none is; and the other one.
+    fn in_turn(&mut self) -> [&mut S; 2] {
         let is_second = matches!(in_use(&self.0), Some((1, _)));
         let [first, second] = &mut self.0;
-        let (old, new) = if is_second { (second, first) } else { (first, second) };
+        if is_second { [second, first] } else { [first, second] }
+    }
+
+    /// Moves what counts to the page that is not in use, with `parts` instead of what `changed` holds.
+    fn exchange(&mut self, changed: Option<Setting>, parts: &[&[u8]]) -> Result<(), KeepError> {
+        let [old, new] = self.in_turn();
         erase(new)?;
         let contents = Contents::of(old.bytes());
         for setting in Setting::ALL {
@@ -268,14 +273,13 @@ impl<S: Slot> SettingPages<S> {
 
 impl<S: Slot> Keeper for SettingPages<S> {
     fn make_firm(&mut self) -> Result<(), KeepError> {
-        let Some((place, contents)) = in_use(&self.0) else {
+        let Some((_, contents)) = in_use(&self.0) else {
             let mut written = self.0.iter_mut().filter(|page| used(page.bytes()) > 0);
             return written.try_for_each(erase);
         };
         let (is_started, is_firm) = (contents.is_started, contents.is_firm);
         let number = contents.number.unwrap_or_default();
-        let [first, second] = &mut self.0;
-        let (active, other) = if place == 0 { (first, second) } else { (second, first) };
+        let [active, other] = self.in_turn();
         if !is_started {
             // The other page may be the one that counts at the next start. So it stays until this one is firm.
             append(active, START, &[&number.to_le_bytes()])
@@ -310,10 +314,9 @@ impl<S: Slot> Keeper for SettingPages<S> {
         if bytes + ROOM_FOR_STARTS > PAGE_BYTES {
             return Err(KeepError::TooLarge);
         }
-        let number = found.map(|(number, _)| number);
-        if let Some(page) = number.and_then(|number| self.0.get_mut(number))
-            && append(page, setting as u8, parts).is_ok()
-        {
+        let is_in_use = found.is_some();
+        let [active, _] = self.in_turn();
+        if is_in_use && append(active, setting as u8, parts).is_ok() {
             return Ok(true);
         }
         self.exchange(Some(setting), parts).map(|()| true)

@@ -90,7 +90,7 @@ impl Case {
             return Err(format!("without a cut: {outcome:?}"));
         };
         self.expect(&[Some(new)], "without a cut")?;
-        let first = (self.seed / 24).wrapping_mul(17) % operations;
+        let first = (self.seed / (4 * Torn::COUNT as u64)).wrapping_mul(17) % operations;
         self.device.restore(&before);
         self.attempt(Some(first));
         self.slip();

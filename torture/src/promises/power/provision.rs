@@ -99,7 +99,7 @@ impl Case {
         if whole != Outcome::Set || self.expect(&[Some(KEY)], "without a cut")? != Some(KEY) {
             return Err(format!("without a cut: {whole:?}"));
         }
-        let first = self.seed / 18 % operations;
+        let first = self.seed / (3 * Torn::COUNT as u64) % operations;
         self.flash = before;
         self.provision(KEY, Some(first));
         cuts.add(kind, 1);
