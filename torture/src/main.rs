@@ -79,13 +79,13 @@ fn main() -> ExitCode {
 /// Whether everything is as it should be.
 fn run(arguments: &Arguments) -> Result<bool, Box<dyn Error>> {
     let chosen = choose(&arguments.names)?;
-    if arguments.list {
-        chosen.iter().for_each(|promise| println!("{:<24}{}", promise.name, promise.text));
-        return Ok(true);
-    }
     if !(0.0..=1e6).contains(&arguments.minutes) {
         let given = arguments.minutes;
         return Err(format!("--minutes is {given}, but must be from 0 to a million").into());
+    }
+    if arguments.list {
+        chosen.iter().for_each(|promise| println!("{:<24}{}", promise.name, promise.text));
+        return Ok(true);
     }
     let tools = Tools { program: arguments.program.clone(), images: arguments.images.clone() };
     if let Some(folder) = &arguments.pictures {
@@ -148,5 +148,14 @@ mod tests {
         assert_eq!(of(&[]), "--minutes 20");
         assert_eq!(of(&["--short"]), "--short");
         assert_eq!(of(&["--self-test", "--short"]), "--self-test");
+    }
+
+    #[test]
+    fn wrong_options_are_refused_before_a_list() {
+        let list = |option| run(&Arguments::parse_from(["torture", "--list", option]));
+        let refused = |option| list(option).unwrap_err().to_string();
+        assert_eq!(refused("exp-nosuch"), "no promise is called `exp-nosuch`; --list shows all");
+        assert_eq!(refused("--minutes=-3"), "--minutes is -3, but must be from 0 to a million");
+        assert!(list("exp-libm").unwrap());
     }
 }

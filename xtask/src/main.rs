@@ -90,7 +90,10 @@ fn main() -> ExitCode {
     let arguments: Vec<String> = env::args().skip(1).collect();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let outcome = match arguments[..] {
-        ["torture", ref options @ ..] => torture::run(options),
+        ["torture", ref options @ ..] => match torture::run(options) {
+            Ok(code) => return code,
+            Err(cause) => Err(cause),
+        },
         ["help" | "--help" | "-h"] | [_, "--help" | "-h"] => {
             print!("{HELP}");
             Ok(())

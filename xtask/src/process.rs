@@ -28,9 +28,14 @@ pub fn cargo(arguments: &[&str]) -> Command {
 
 /// Prints and runs `command`; its output is passed through.
 pub fn run(command: &mut Command) -> Outcome {
-    show(command);
-    let status = command.status().map_err(|cause| not_started(command, &cause))?;
+    let status = status(command)?;
     ended_well(command, status)
+}
+
+/// Prints and runs `command`, and returns how it ended; its output is passed through.
+pub fn status(command: &mut Command) -> Outcome<ExitStatus> {
+    show(command);
+    command.status().map_err(|cause| not_started(command, &cause))
 }
 
 /// Output and outcome of a piece of work that is done.

@@ -1,17 +1,27 @@
 //! Builds what the torture needs, and runs it.
 
+use std::process::{ExitCode, ExitStatus, Stdio};
+
 use crate::emulate::qemu;
 use crate::firmware::{QEMU, build_image};
-use crate::process::{Outcome, cargo, run as run_command, target_dir};
+use crate::process::{Outcome, cargo, run as run_command, status, target_dir};
 use crate::toolchain::{Toolchain, elf};
 
 /// Builds host-sim, the emulator's images and the torture, and runs the torture with `options`. Without an emulator,
 /// what needs one is not tested.
-pub fn run(options: &[&str]) -> Outcome {
+///
+/// Returns the exit status of the torture, which says itself what is wrong: 2 for options or names that it does not
+/// know. These are refused before the rest is built.
+pub fn run(options: &[&str]) -> Outcome<ExitCode> {
     let mut torture = cargo(&["run", "--package", "torture", "--"]);
     torture.args(options);
     if options.iter().any(|option| ["--help", "-h", "--list"].contains(option)) {
-        return run_command(&mut torture);
+        return status(&mut torture).map(code);
+    }
+    let mut check = cargo(&["run", "--package", "torture", "--", "--list"]);
+    let checked = status(check.args(options).stdout(Stdio::null()))?;
+    if !checked.success() {
+        return Ok(code(checked));
     }
     run_command(&mut cargo(&["build", "--package", "host-sim", "--package", "torture"]))?;
     torture.arg("--program").arg(target_dir().join("debug/host-sim"));
@@ -19,5 +29,10 @@ pub fn run(options: &[&str]) -> Outcome {
         Ok(()) => drop(torture.arg("--images").arg(elf(""))),
         Err(cause) => eprintln!("note: promises of a device in QEMU stay untested: {cause}"),
     }
-    run_command(&mut torture)
+    status(&mut torture).map(code)
+}
+
+/// Exit code of a program that ended with this `status`; 1 if a signal ended it.
+fn code(status: ExitStatus) -> ExitCode {
+    ExitCode::from(status.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(1))
 }

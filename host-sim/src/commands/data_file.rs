@@ -151,7 +151,7 @@ impl FieldArguments {
         let name = path.display();
         if !file.names_columns {
             eprintln!(
-                "note: {name} names no columns: they are called c1 to c{} (--inputs c2..c5 takes four)",
+                "note: {name} names no columns: they are called c1 to c{} (c2..c5 stands for four of them)",
                 file.header.len()
             );
         }
