@@ -379,7 +379,7 @@ const START_BYTES: usize = 32;
 /// Place of its CRC-32, behind which its last word is.
 const START_CRC: usize = 12;
 
-/// Pages just after an exchange, and the places of both start items.
+/// Pages just before and after exchanges, the number of the new one, and the places of its start items.
 fn with_starts() -> Vec<(Pages, Pages, usize, [usize; 2])> {
     let with_starts = |(before, after, new): (Pages, Pages, usize)| {
         let last = after[new].iter().rposition(|byte| *byte != 0xFF).unwrap();
@@ -465,12 +465,12 @@ fn a_page_that_reads_as_erased_is_erased_before_it_is_written() {
         let mut pages = before.clone();
         pages[new].fill(0xFF);
         let settings = SharedSettings::holding([&pages[0], &pages[1]]);
-        let changed = Setting::ALL
-            .into_iter()
-            .find(|setting| all(&before)[*setting as usize] != all(&after)[*setting as usize]);
-        let content = all(&after)[changed.unwrap() as usize].clone().unwrap();
-        settings.clone().keep_bytes(changed.unwrap(), &content).unwrap();
-        assert_eq!((settings.erases(), all(&settings.bytes())), (1, all(&after)));
+        let (old, expected) = (all(&before), all(&after));
+        let is_changed = |setting: &Setting| old[*setting as usize] != expected[*setting as usize];
+        let changed = Setting::ALL.into_iter().find(is_changed).unwrap();
+        let content = expected[changed as usize].as_ref().unwrap();
+        settings.clone().keep_bytes(changed, content).unwrap();
+        assert_eq!((settings.erases(), all(&settings.bytes())), (1, expected));
     }
 }
 

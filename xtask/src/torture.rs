@@ -7,19 +7,21 @@ use crate::firmware::{QEMU, build_image};
 use crate::process::{Outcome, cargo, run as run_command, status, target_dir};
 use crate::toolchain::{Toolchain, elf};
 
+/// Cargo's arguments before those of the torture.
+const RUN: [&str; 4] = ["run", "--package", "torture", "--"];
+
 /// Builds host-sim, the emulator's images and the torture, and runs the torture with `options`. Without an emulator,
 /// what needs one is not tested.
 ///
 /// Returns the exit status of the torture, which says itself what is wrong: 2 for options or names that it does not
 /// know. These are refused before the rest is built.
 pub fn run(options: &[&str]) -> Outcome<ExitCode> {
-    let mut torture = cargo(&["run", "--package", "torture", "--"]);
+    let mut torture = cargo(&RUN);
     torture.args(options);
     if options.iter().any(|option| ["--help", "-h", "--list"].contains(option)) {
         return status(&mut torture).map(code);
     }
-    let mut check = cargo(&["run", "--package", "torture", "--", "--list"]);
-    let checked = status(check.args(options).stdout(Stdio::null()))?;
+    let checked = status(cargo(&RUN).arg("--list").args(options).stdout(Stdio::null()))?;
     if !checked.success() {
         return Ok(code(checked));
     }

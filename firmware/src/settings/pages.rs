@@ -244,16 +244,20 @@ impl<S: Slot> SettingPages<S> {
         &mut self.0
     }
 
-    /// The page in use, or the first if none is; and the other one.
-    fn in_turn(&mut self) -> [&mut S; 2] {
-        let is_second = matches!(in_use(&self.0), Some((1, _)));
+    /// The page of this `index`, and the other one.
+    fn page_and_other(&mut self, index: usize) -> [&mut S; 2] {
         let [first, second] = &mut self.0;
-        if is_second { [second, first] } else { [first, second] }
+        if index == 0 { [first, second] } else { [second, first] }
     }
 
-    /// Moves what counts to the page that is not in use, with `parts` instead of what `changed` holds.
-    fn exchange(&mut self, changed: Option<Setting>, parts: &[&[u8]]) -> Result<(), KeepError> {
-        let [old, new] = self.in_turn();
+    /// Moves what counts from the page of this `index` to the other one, with `parts` instead of what `changed` holds.
+    fn exchange(
+        &mut self,
+        index: usize,
+        changed: Option<Setting>,
+        parts: &[&[u8]],
+    ) -> Result<(), KeepError> {
+        let [old, new] = self.page_and_other(index);
         erase(new)?;
         let contents = Contents::of(old.bytes());
         for setting in Setting::ALL {
@@ -273,18 +277,18 @@ impl<S: Slot> SettingPages<S> {
 
 impl<S: Slot> Keeper for SettingPages<S> {
     fn make_firm(&mut self) -> Result<(), KeepError> {
-        let Some((_, contents)) = in_use(&self.0) else {
+        let Some((index, contents)) = in_use(&self.0) else {
             let mut written = self.0.iter_mut().filter(|page| used(page.bytes()) > 0);
             return written.try_for_each(erase);
         };
         let (is_started, is_firm) = (contents.is_started, contents.is_firm);
         let number = contents.number.unwrap_or_default();
-        let [active, other] = self.in_turn();
+        let [active, other] = self.page_and_other(index);
         if !is_started {
             // The other page may be the one that counts at the next start. So it stays until this one is firm.
             append(active, START, &[&number.to_le_bytes()])
         } else if !is_firm {
-            self.exchange(None, &[])
+            self.exchange(index, None, &[])
         } else if is_older(other.bytes(), number) {
             Ok(())
         } else {
@@ -314,11 +318,12 @@ impl<S: Slot> Keeper for SettingPages<S> {
         if bytes + ROOM_FOR_STARTS > PAGE_BYTES {
             return Err(KeepError::TooLarge);
         }
-        let is_in_use = found.is_some();
-        let [active, _] = self.in_turn();
-        if is_in_use && append(active, setting as u8, parts).is_ok() {
+        let index = found.map(|(index, _)| index);
+        if let Some(index) = index
+            && append(self.page_and_other(index)[0], setting as u8, parts).is_ok()
+        {
             return Ok(true);
         }
-        self.exchange(Some(setting), parts).map(|()| true)
+        self.exchange(index.unwrap_or_default(), Some(setting), parts).map(|()| true)
     }
 }

@@ -145,10 +145,8 @@ fn of_window(
 /// alone. Readings that are missing are the same.
 #[must_use]
 pub fn stand_still(window: &[f64], count: usize) -> bool {
-    let bits = |frame: &[f64]| frame.iter().map(|reading| reading.to_bits()).collect::<Vec<_>>();
-    let mut frames = window.chunks_exact(count);
-    let first = frames.next().map(bits);
-    frames.all(|frame| first.as_ref() == Some(&bits(frame)))
+    let next_frames = window.iter().skip(count);
+    window.iter().zip(next_frames).all(|(reading, next)| reading.to_bits() == next.to_bits())
 }
 
 #[cfg(test)]

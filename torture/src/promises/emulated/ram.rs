@@ -42,7 +42,8 @@ fn check(effort: &Effort, tools: &Tools) -> Result<Found, String> {
     let mut counts = [0_u64; Harm::ALL.len()];
     let mut flips = 0;
     let mut first_of_model = None;
-    while flips < LEAST || (flips < MOST && !effort.is_over()) {
+    let least = if effort.is_planted() { PLANTED } else { LEAST };
+    while flips < least || (flips < MOST && !effort.is_over()) {
         let seed = effort.seed().wrapping_add(flips);
         let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
         let mut offset = random.next_u32() % bytes;
@@ -60,9 +61,6 @@ fn check(effort: &Effort, tools: &Tools) -> Result<Found, String> {
                 seed,
                 format!("a flip of the model at {address:#010x} is not seen"),
             ));
-        }
-        if effort.is_planted() && flips == PLANTED {
-            break;
         }
     }
     let of = |harm: Harm| counts[harm as usize];
