@@ -4,6 +4,7 @@
 //! one page serves light and dark.
 
 use taxel_evaluate::evaluate::limit::LimitResult;
+use taxel_evaluate::evaluate::printed::Cells;
 use taxel_evaluate::evaluate::trade::Trade;
 use taxel_evaluate::run::RunResult;
 
@@ -25,6 +26,7 @@ mod sketch;
 mod tables;
 mod sweep;
 mod html;
+mod printed;
 mod trade;
 mod limit;
 
@@ -70,6 +72,13 @@ pub fn directions_svg(limit: &LimitResult) -> String {
 #[must_use]
 pub fn known_svg(limit: &LimitResult) -> String {
     limit::known_svg(limit)
+}
+
+/// Picture of tables, each with its name, beside the paper's printed Table 1; a file of its own, light or dark like the
+/// viewer.
+#[must_use]
+pub fn printed_svg(tables: &[(&str, Cells)]) -> String {
+    printed::svg(tables)
 }
 
 #[cfg(test)]

@@ -45,6 +45,8 @@ pub enum Purpose {
     Mixture = 12,
     /// What is wrong with a frame that a model should find novel.
     Anomaly = 13,
+    /// Set-ups of a search.
+    Setup = 14,
 }
 
 /// Set of frames that draws are for. Training and test frames are independent.

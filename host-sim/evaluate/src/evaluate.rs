@@ -8,5 +8,7 @@ pub mod readout;
 pub mod worth;
 pub mod limit;
 pub mod confidence;
+pub mod printed;
+pub mod reconstruct;
 pub mod table1;
 pub mod trade;

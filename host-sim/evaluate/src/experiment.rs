@@ -14,6 +14,7 @@ use taxel_data::error::require;
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
 use taxel_data::{BadValue, input};
+use taxel_learn::decoders::textbook::{Scaling, SpreadMeaning};
 use taxel_learn::train::{FreshFrames, check_spread};
 use taxel_learn::{Options, Origin, relative};
 use taxel_limit::Reference;
@@ -31,8 +32,9 @@ mod file;
 type Check = std::result::Result<(), BadValue>;
 
 /// Names and texts of the scenes that are part of the program.
-pub const EMBEDDED: [(&str, &str); 3] = [
+pub const EMBEDDED: [(&str, &str); 4] = [
     ("paper", include_str!("../../../scenes/paper.toml")),
+    ("paper-as-printed", include_str!("../../../scenes/paper-as-printed.toml")),
     ("press", include_str!("../../../scenes/press.toml")),
     ("contact", include_str!("../../../scenes/contact.toml")),
 ];
@@ -109,6 +111,34 @@ pub struct Table1 {
     pub affine_tail: bool,
     /// Number of frames, and of centres, of the standard network (K = N).
     pub standard_frames: usize,
+    /// What the paper leaves open, where it is chosen otherwise than for a device.
+    pub open: Option<OpenChoices>,
+}
+
+/// Choices for Table 1 that the paper leaves open. Networks are then computed in f64, as no device has them.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OpenChoices {
+    /// What inputs are scaled by.
+    pub inputs_scaled: Scaling,
+    /// What *spread* means.
+    pub spread_is: SpreadMeaning,
+    /// Whether networks have a bias.
+    pub bias: bool,
+    /// Initial covariance δ of the recursive least squares: the penalty on squared weights is 1/δ.
+    pub initial_covariance: f64,
+    /// Samples that cells are judged on.
+    pub judged_on: JudgedOn,
+}
+
+/// Samples that the cells of Table 1 are judged on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum JudgedOn {
+    /// Frames that training did not see.
+    Fresh,
+    /// Frames of training.
+    Training,
 }
 
 fn yes() -> bool {
@@ -343,6 +373,16 @@ fn check_table1(t: &Table1) -> Check {
     }
     for level in &t.noise_levels {
         check_noise_level("table1.noise_levels", *level)?;
+    }
+    if let Some(open) = &t.open {
+        let delta = open.initial_covariance;
+        let field = "table1.open.initial_covariance";
+        require((1e-12..=1e12).contains(&delta), field, format!("{delta:?}"), || {
+            "give a number from 1e-12 to 1e12; the penalty on squared weights is one over it".into()
+        })?;
+        require(!t.affine_tail, "table1.affine_tail", true, || {
+            "networks with [table1.open] have none; set it to false".into()
+        })?;
     }
     let holds = (2..=2000).contains(&t.standard_frames) && t.standard_frames <= t.frames;
     require(holds, "table1.standard_frames", t.standard_frames, || {

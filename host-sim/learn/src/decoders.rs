@@ -10,6 +10,7 @@ use crate::train::FittedNetwork;
 pub mod linear;
 pub mod mean;
 pub mod standard;
+pub mod textbook;
 
 /// Decoder that every network is compared with.
 #[derive(Debug, Clone, Copy)]

@@ -4,11 +4,13 @@ use std::path::PathBuf;
 
 use super::progress::Terminal;
 use clap::Args;
-use host_sim::evaluate::table1::{self, Entry, NETWORK, PAPER_PRINTED_PERCENT, Printed, Table1};
+use host_sim::evaluate::printed::{CELLS, Nearness};
+use host_sim::evaluate::reconstruct;
+use host_sim::evaluate::table1::{self, Comparison, Entry, NETWORK, Table1};
 use host_sim::metrics::{Definition, Errors};
+use host_sim::report;
 use host_sim::{Error, Result};
 use serde::Serialize;
-use taxel_data::data_file::DataFile;
 use taxel_data::{columns, output};
 use taxel_learn::decoders::{mean, standard};
 use taxel_simulate::sensor::Precision;
@@ -16,12 +18,21 @@ use taxel_simulate::sensor::Precision;
 use super::scene_argument::{RelativeInputsArgument, SceneArgument};
 use super::{Common, arguments, print};
 
+mod comparison;
+mod search;
+
 /// Compute the paper's Table 1: errors by spread and noise.
 ///
 /// Every definition of error is given. The K-centre network is compared with the training mean, the best
-/// linear decoder and the paper's standard network (K = N).
+/// linear decoder, the paper's standard network (K = N), and the 40 cells that the paper prints.
+///
+/// `--reconstruct` searches what the paper leaves open for set-ups whose table comes near the printed one. It takes
+/// some minutes, saves what it has tried, and goes on from there (docs/paper.md).
 #[derive(Args)]
-#[command(after_help = "Example: host-sim table1 paper -o table1.csv")]
+#[command(after_help = "Examples:
+  host-sim table1 paper -o table1.csv --svg table1.svg
+  host-sim table1 paper-as-printed
+  host-sim table1 --reconstruct --svg reconstruct.svg")]
 pub struct Arguments {
     /// A built-in scene (paper, press) or the path of a scene file.
     #[arg(default_value = "paper")]
@@ -31,13 +42,19 @@ pub struct Arguments {
     precision: Option<Precision>,
     #[command(flatten)]
     relative_inputs: RelativeInputsArgument,
-    /// CSV file to write, with all axes, decoders and definitions.
+    /// CSV file to write, with all axes, decoders and definitions; with --reconstruct, the file that a search is saved
+    /// to [default: out/reconstruct.json].
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// CSV file of the paper's printed cells, to be listed and stored with the computed ones (columns
-    /// spread, noise_level as a fraction, percent).
+    /// Picture to write: the table beside the printed one.
     #[arg(long, value_name = "FILE")]
-    printed: Option<PathBuf>,
+    svg: Option<PathBuf>,
+    /// Search for set-ups that give the printed table, instead of computing that of a scene.
+    #[arg(long, conflicts_with_all = ["scene", "precision", "group", "relative_inputs"])]
+    reconstruct: bool,
+    /// Set-ups to try.
+    #[arg(long, value_name = "N", requires = "reconstruct", default_value_t = reconstruct::USUAL_SETUPS)]
+    setups: usize,
     /// Outputs to print, such as dz_mm or dx_mm.
     #[arg(long, value_name = "GROUP", default_value = "dz_mm")]
     group: String,
@@ -52,6 +69,11 @@ struct Summary {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+    if arguments.reconstruct {
+        let usual = PathBuf::from("out/reconstruct.json");
+        let saved_to = arguments.output.as_ref().unwrap_or(&usual);
+        return search::execute(arguments.setups, saved_to, arguments.svg.as_deref(), common);
+    }
     let argument = SceneArgument::new(&arguments.scene, arguments.precision);
     let mut scene = argument.load(common)?;
     arguments.relative_inputs.apply(&mut scene);
@@ -61,18 +83,21 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         let message = format!("--group {}: the scene has {}", arguments.group, groups.join(", "));
         return Err(Error::Usage(message));
     }
-    if let Some(path) = &arguments.output {
-        let printed = arguments.printed.as_deref().unwrap_or(argument.path());
-        print::check_output(path, &[argument.path(), printed])?;
+    for path in [&arguments.output, &arguments.svg].into_iter().flatten() {
+        print::check_output(path, &[argument.path()])?;
     }
-    let printed = match &arguments.printed {
-        Some(path) => Printed::from_file(&DataFile::read(path)?)?,
-        None => Vec::new(),
-    };
-    let mut table = table1::compute(&scene, &Terminal::new())?;
-    table.printed = printed;
+    let table = table1::compute(&scene, &Terminal::new())?;
     if let Some(path) = &arguments.output {
         output::write_bytes(path, table.to_csv().as_bytes())?;
+    }
+    if let Some(path) = &arguments.svg {
+        let Some(nearest) = table.nearest_formula() else {
+            let message =
+                "--svg: the table has other spreads or noise levels than the printed one, or no z";
+            return Err(Error::Usage(message.into()));
+        };
+        let picture = report::printed_svg(&[("computed", nearest.cells)]);
+        output::write_bytes(path, picture.as_bytes())?;
     }
     if common.json {
         return print::json(&Summary { subject: scene.name, seed: scene.world.seed, table });
@@ -124,18 +149,9 @@ fn page_of(table: &Table1, group: &str) -> print::Page {
     for column in &table.columns {
         page.line(format_args!("noise {}: {}", percent(column.noise_level), column.limit.note()));
     }
-    if !table.printed.is_empty() {
-        page.line("\nas the paper prints it, for z, %");
-        for Printed { spread, noise_level, percent: printed } in &table.printed {
-            let noise = percent(*noise_level);
-            page.line(format_args!("spread {spread:<9} noise {noise:<8} {printed}"));
-        }
+    if let Some(nearest) = table.nearest_formula() {
+        compare(&mut page, &table.comparison, nearest);
     }
-    let [low, high] = PAPER_PRINTED_PERCENT;
-    page.line(format_args!(
-        "\nThe paper prints {low} to {high} % for z and \
-         does not state its definition; docs/paper.md compares."
-    ));
     for group in table.groups() {
         if let Some(ratio) = table.worst_ratio_to_mean(group) {
             page.line(format_args!(
@@ -144,6 +160,24 @@ fn page_of(table: &Table1, group: &str) -> print::Page {
         }
     }
     page
+}
+
+/// Adds the printed cells beside the computed ones, by the formula that is `nearest`, and how near every formula comes.
+fn compare(page: &mut print::Page, by_formula: &[Comparison], nearest: &Comparison) {
+    page.line(format_args!(
+        "\nAs the paper prints it, for z. It does not state its formula; nearest is {}, computed / printed, %:",
+        nearest.formula
+    ));
+    comparison::cells(page, &nearest.cells);
+    let mean = nearest.mean_percent.map(|it| format!("{it:>18.2}"));
+    page.line(format_args!("{:<10}{}", "mean", mean.concat()));
+    page.line(format_args!("\n{}", comparison::header("formula (points)")));
+    page.line(comparison::line("printed", &Nearness::new(&CELLS)));
+    page.line(comparison::line("a constant", &Nearness::of_a_constant()));
+    for it in by_formula {
+        page.line(comparison::line(&it.formula, &it.nearness));
+    }
+    page.line("with noise, with spread: rise from the least to the largest. docs/paper.md says what is open.\n");
 }
 
 fn percent(level: f64) -> String {

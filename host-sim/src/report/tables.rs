@@ -9,7 +9,7 @@ use super::svg::escape;
 use super::ticks;
 use super::view::View;
 use taxel_evaluate::by_depth::DepthErrors;
-use taxel_evaluate::evaluate::table1::{Column, NETWORK, PAPER_PRINTED_PERCENT, Table1};
+use taxel_evaluate::evaluate::table1::{Column, NETWORK, Table1};
 use taxel_evaluate::metrics::{DecoderErrors, Definition, Errors};
 
 /// Errors of one group, if it is among `errors`.
@@ -236,11 +236,10 @@ pub fn printed_definition(table: &Table1, group: &str) -> Definition {
 /// Caption of [`table1`].
 pub fn table1_caption(table: &Table1, group: &str) -> String {
     let definition = printed_definition(table, group);
-    let [low, high] = PAPER_PRINTED_PERCENT;
     format!(
         "Error of {} by spread and noise level, arranged as Table 1 of the paper: {}. Network with \
-         K = {}. The paper prints {low}–{high} % and does not state its definition. Cells marked † \
-         are no better than always predicting the training mean.",
+         K = {}. Below each cell, where there is one, is the paper's; it does not state its definition. Cells \
+         marked † are no better than always predicting the training mean.",
         escape(&symbol(group)),
         escape(definition.formula()),
         table.centres

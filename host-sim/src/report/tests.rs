@@ -8,7 +8,8 @@ use taxel_data::table::Table as Values;
 use super::{Made, View};
 use taxel_evaluate::evaluate::device_cost::DeviceCost;
 use taxel_evaluate::evaluate::distribution::{Distribution, Reference};
-use taxel_evaluate::evaluate::table1::{Column, Entry, NETWORK, Printed, Table1};
+use taxel_evaluate::evaluate::printed::Printed;
+use taxel_evaluate::evaluate::table1::{Column, Entry, NETWORK, Table1};
 use taxel_evaluate::metrics::{DecoderErrors, Errors, LimitSummary};
 use taxel_evaluate::run::{
     ModelSummary, RowErrors, RowWire, RunResult, SceneSummary, SensorSketch,
@@ -177,6 +178,7 @@ fn result(groups: &[&str]) -> RunResult {
             standard_frames: 50,
             columns: vec![column(0.0), column(0.01), column(0.1)],
             printed: vec![Printed { spread: 0.5, noise_level: 0.01, percent: 6.75 }],
+            comparison: vec![],
         }),
     }
 }

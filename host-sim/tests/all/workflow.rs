@@ -330,15 +330,49 @@ fn every_command_has_help_with_an_example() {
 }
 
 #[test]
-fn table1_shows_printed_values_beside_and_keeps_them() {
+fn table1_shows_the_papers_cells_beside_its_own() {
     let folder = Folder::new("printed");
-    folder.write("scene.toml", small_scene());
-    folder.write("p.csv", "spread,noise_level,percent\n0.5,0.01,7.25\n");
-    let table = ["table1", "scene.toml", "--printed", "p.csv", "-o", "t.csv"];
-    let page = folder.succeed(&table);
-    assert!(page.contains("positional") && page.contains("7.25"), "{page}");
+    let scene = small_scene();
+    folder.write("scene.toml", &scene);
+    let page = folder.succeed(&["table1", "scene.toml"]);
+    assert!(!page.contains("As the paper prints it"), "the scene has other noise levels: {page}");
+    let settings = "spreads = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]\n\
+                    noise_levels = [0.005, 0.01, 0.05, 0.1]";
+    let (world, _) = scene.split_once("[table1]").unwrap();
+    let table = format!(
+        "{world}[table1]\n{settings}\nframes = 60\ntest_frames = 50\ncentres = 6\naffine_tail = false\n\
+         standard_frames = 20\n"
+    );
+    folder.write("paper.toml", &table);
+    let page = folder.succeed(&["table1", "paper.toml", "-o", "t.csv", "--svg", "t.svg"]);
+    assert!(page.contains(" / 10.23") && page.contains("a constant"), "{page}");
     let csv = std::fs::read_to_string(folder.path("t.csv")).unwrap();
-    assert!(csv.ends_with("\n0.01,paper,0.5,dz_mm,as_printed,7.25\n"));
+    assert!(csv.ends_with("\n0.1,paper,1,dz_mm,as_printed,11.39\n"));
+    let picture = std::fs::read_to_string(folder.path("t.svg")).unwrap();
+    assert!(
+        picture.contains("printed") && picture.contains("computed") && !picture.contains("NaN")
+    );
+    // Networks in f64 that are judged on their own samples: as many centres as frames leave no error.
+    let open = "[table1.open]\ninputs_scaled = \"range\"\nspread_is = \"sigma\"\nbias = false\n\
+                initial_covariance = 1e9\njudged_on = \"training\"\n";
+    folder.write("open.toml", table.replace("centres = 6", "centres = 59") + open);
+    let result = json(&folder.succeed(&["table1", "open.toml", "--json"]));
+    let cells = &result["comparison"][3]["cells"][0];
+    assert!(cells[3].as_f64().unwrap() < 1.0, "{cells}");
+    assert_eq!(result["test_frames"], 60);
+}
+
+#[test]
+fn a_search_for_the_papers_set_up_goes_on_from_where_it_was_ended() {
+    let folder = Folder::new("reconstruct");
+    let search = ["table1", "--reconstruct", "--setups", "2", "-o", "s.json"];
+    let first = folder.succeed(&search);
+    assert!(first.contains("nearest 1") && first.contains("a constant"), "{first}");
+    assert_eq!(folder.succeed(&search), first);
+    let refused = folder.fail(&[&search[..], &["--seed", "2"]].concat(), 2);
+    assert!(refused.contains("s.json") && refused.contains("--seed 1"), "{refused}");
+    folder.write("s.json", "{}");
+    assert!(folder.fail(&search, 2).contains("it is no saved search"));
 }
 
 #[test]

@@ -1,27 +1,26 @@
 //! Table 1 of the paper: errors by spread and noise, by every definition.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 use serde::Serialize;
-use taxel_data::data_file::DataFile;
-use taxel_data::dataset::Dataset;
-use taxel_data::error::Problem;
+use taxel_data::columns;
+use taxel_data::dataset::{Dataset, RowTable};
 use taxel_data::progress::Progress;
-use taxel_data::random::Stream;
+use taxel_data::random::{Purpose, Random, Stream};
 use taxel_learn::decoders::standard::{self, StandardNetwork};
-use taxel_learn::decoders::{BASELINES, Rows, mean};
+use taxel_learn::decoders::textbook::{Textbook, TextbookNetwork};
+use taxel_learn::decoders::{BASELINES, RowDecoder, Rows, mean};
 use taxel_learn::train::{FittedNetwork, Samples};
 use taxel_learn::{Decoder, Options};
 use taxel_simulate::Synthesis;
 
 use crate::error::{Error, Result};
-use crate::experiment::{Experiment, Table1 as Settings};
+use crate::experiment::{Experiment, JudgedOn, OpenChoices, Table1 as Settings};
 use crate::metrics::{self, Definition, Errors, LimitSummary, Measure};
 
+use super::printed::{self, Cells, NOISE_LEVELS, Nearness, Printed, SPREADS};
 pub use crate::metrics::NETWORK;
-
-/// Lowest and highest cell of the paper's printed Table 1, in per cent. The paper does not state its
-/// definition of the error.
-pub const PAPER_PRINTED_PERCENT: [f64; 2] = [6.5, 11.4];
 
 /// Table 1 of a scene: errors of every decoder at every noise level.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -38,41 +37,23 @@ pub struct Table1 {
     pub standard_frames: usize,
     /// Columns of the table, one a noise level.
     pub columns: Vec<Column>,
-    /// Cells as the paper prints them, where the reader supplied them.
+    /// Cells as the paper prints them; empty if the table has other spreads or noise levels, or no Δz.
     pub printed: Vec<Printed>,
+    /// The table by every formula that could be the paper's, beside the printed cells; empty where these are.
+    pub comparison: Vec<Comparison>,
 }
 
-/// Cell as the paper prints it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Printed {
-    /// Spread of its line.
-    pub spread: f64,
-    /// Noise level of its column, as a fraction.
-    pub noise_level: f64,
-    /// Error in per cent.
-    pub percent: f64,
-}
-
-impl Printed {
-    /// Reads printed cells from a file with the columns `spread`, `noise_level` and `percent`.
-    ///
-    /// # Errors
-    /// [`Error`] for a file that cannot be read, or a column or value that is missing.
-    pub fn from_file(file: &DataFile) -> taxel_data::Result<Vec<Self>> {
-        let columns = file.columns(["spread", "noise_level", "percent"])?;
-        let cell = |line: usize| {
-            let value = |column: usize| file.value(line, columns[column]);
-            let cell = Self { spread: value(0), noise_level: value(1), percent: value(2) };
-            if [cell.spread, cell.noise_level, cell.percent].iter().any(|v| v.is_nan()) {
-                let (line, rule) =
-                    (file.line_number(line), "every cell needs three numbers".into());
-                let problem = Problem::MissingValue { line, rule };
-                return Err(taxel_data::Error::file(&file.path, problem));
-            }
-            Ok(cell)
-        };
-        (0..file.lines()).map(cell).collect()
-    }
+/// Table 1 by one formula of the error beside the printed one, along z.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Comparison {
+    /// Formula of the error, in per cent.
+    pub formula: String,
+    /// Errors of the network in per cent, by spread and noise level.
+    pub cells: Cells,
+    /// Errors of always predicting the mean in per cent, by noise level.
+    pub mean_percent: [f64; 4],
+    /// Nearness to the printed cells.
+    pub nearness: Nearness,
 }
 
 /// Errors of all decoders at one noise level.
@@ -119,12 +100,6 @@ impl Column {
     }
 }
 
-/// Networks of one row-wire, one a spread.
-struct RowNetworks {
-    networks: Vec<FittedNetwork>,
-    standard: Vec<Option<StandardNetwork>>,
-}
-
 /// Computes Table 1 as the scene asks for.
 ///
 /// # Errors
@@ -134,27 +109,72 @@ pub fn compute(experiment: &Experiment, progress: &dyn Progress) -> Result<Table
         scene: experiment.name.clone(),
         message: "it has no [table1]: add one, or use a scene that has (paper, press)".into(),
     })?;
+    let on_training = settings.open.is_some_and(|open| open.judged_on == JudgedOn::Training);
     let columns = settings.noise_levels.iter().map(|&level| {
         let frames = Synthesis::of(&experiment.world).noise_level(level);
         let training = experiment.dataset(&frames, Stream::Training, settings.frames);
-        let test = experiment.dataset(&frames, Stream::Test, settings.test_frames);
-        let (measure, limit) =
-            experiment.measure_beside_limit(level, settings.test_frames, progress);
+        let (test, (measure, limit)) = if on_training {
+            (training.clone(), (experiment.measure(), no_limit_on_training()))
+        } else {
+            let test = experiment.dataset(&frames, Stream::Test, settings.test_frames);
+            (test, experiment.measure_beside_limit(level, settings.test_frames, progress))
+        };
         progress.stage(&format!("table 1, noise {level}"), experiment.world.read_rows.len());
         let decoders = decoders(settings, experiment.world.seed, &training, progress)?;
         let judged = |(spread, decoder): &Spread| entry(decoder.as_ref(), *spread, &test, &measure);
         let decoders = decoders.iter().map(judged).collect();
         Ok(Column { noise_level: level, limit, decoders })
     });
+    let columns = columns.collect::<Result<Vec<_>>>()?;
+    let comparison = compare(&columns, experiment.world.sensor.size_mm[2]);
     Ok(Table1 {
         centres: settings.centres,
         affine_tail: settings.affine_tail,
         training_frames: settings.frames,
-        test_frames: settings.test_frames,
+        test_frames: if on_training { settings.frames } else { settings.test_frames },
         standard_frames: settings.standard_frames,
-        columns: columns.collect::<Result<_>>()?,
-        printed: Vec::new(),
+        columns,
+        printed: if comparison.is_empty() { Vec::new() } else { printed::cells().collect() },
+        comparison,
     })
+}
+
+fn no_limit_on_training() -> LimitSummary {
+    let refused = "cells are judged on the samples that were trained on, and these are no test";
+    LimitSummary { frames: 0, groups: Vec::new(), refused: Some(refused.into()) }
+}
+
+/// The table along z by every formula that could be the paper's, beside the printed cells; empty if it has other
+/// spreads, other noise levels, or no Δz.
+fn compare(columns: &[Column], thickness_mm: f64) -> Vec<Comparison> {
+    type Formula = (&'static str, fn(&Errors, f64) -> Option<f64>);
+    const FORMULAS: [Formula; 4] = [
+        ("mean|e|/(H − Δz)", |errors, _| errors.positional_percent),
+        ("mean|e|/full scale", |errors, _| errors.full_scale_percent),
+        ("‖e‖/‖Δz‖", |errors, _| errors.relative_l2_percent),
+        ("RMSE/H", |errors, thickness_mm| Some(100.0 * errors.rmse / thickness_mm)),
+    ];
+    let levels = columns.iter().map(|column| column.noise_level);
+    let spreads = columns.first().into_iter().flat_map(Column::spreads);
+    if !levels.eq(NOISE_LEVELS) || !spreads.eq(SPREADS) {
+        return Vec::new();
+    }
+    let by = |(formula, of): &Formula| {
+        let z = |errors: &[Errors]| {
+            of(errors.iter().find(|it| columns::is_compression(&it.group))?, thickness_mm)
+        };
+        let mut cells = [[f64::NAN; 4]; 10];
+        let mut mean_percent = [f64::NAN; 4];
+        for (j, column) in columns.iter().enumerate() {
+            mean_percent[j] = z(column.errors(mean::NAME, None))?;
+            for (line, spread) in cells.iter_mut().zip(SPREADS) {
+                line[j] = z(column.errors(NETWORK, Some(spread)))?;
+            }
+        }
+        let nearness = Nearness::new(&cells);
+        Some(Comparison { formula: (*formula).into(), cells, mean_percent, nearness })
+    };
+    FORMULAS.iter().filter_map(by).collect()
 }
 
 /// Decoder, with its spread if it has one.
@@ -165,6 +185,12 @@ fn entry(decoder: &dyn Decoder, spread: Option<f64>, test: &Dataset, measure: &M
     Entry { decoder: judged.decoder, spread, errors: judged.errors }
 }
 
+/// Networks of one row-wire, one a spread; a standard network is none where its interpolation matrix is singular.
+struct RowNetworks<N, S> {
+    networks: Vec<N>,
+    standard: Vec<Option<S>>,
+}
+
 /// Fits every decoder of the table at one noise level to `training`.
 fn decoders(
     settings: &Settings,
@@ -172,10 +198,31 @@ fn decoders(
     training: &Dataset,
     progress: &dyn Progress,
 ) -> Result<Vec<Spread>> {
+    match &settings.open {
+        None => fit_rows(settings, training, progress, |row| {
+            row_networks(settings, seed, row, training)
+        }),
+        Some(open) => fit_rows(settings, training, progress, |row| {
+            Ok(textbook_networks(settings, open, seed, row, training))
+        }),
+    }
+}
+
+/// Decoders of all rows, whose networks `fit` makes.
+fn fit_rows<N, S>(
+    settings: &Settings,
+    training: &Dataset,
+    progress: &dyn Progress,
+    fit: impl Fn(usize) -> Result<RowNetworks<N, S>> + Sync,
+) -> Result<Vec<Spread>>
+where
+    N: RowDecoder + Clone + Send + 'static,
+    S: RowDecoder + Clone + Send + 'static,
+{
     let rows = (0..training.rows).into_par_iter();
-    let rows: Vec<RowNetworks> = rows
+    let rows: Vec<RowNetworks<N, S>> = rows
         .map(|row| {
-            let networks = row_networks(settings, seed, row, training);
+            let networks = fit(row);
             progress.step();
             networks
         })
@@ -185,8 +232,7 @@ fn decoders(
     for (place, &spread) in settings.spreads.iter().enumerate() {
         let networks = rows.iter().map(|row| row.networks[place].clone()).collect();
         decoders.push((Some(spread), Box::new(Rows::of(NETWORK, training, networks))));
-        let standard: Option<Vec<StandardNetwork>> =
-            rows.iter().map(|row| row.standard[place].clone()).collect();
+        let standard: Option<Vec<S>> = rows.iter().map(|row| row.standard[place].clone()).collect();
         if let Some(standard) = standard {
             let standard = Rows::of(standard::NAME, training, standard);
             decoders.push((Some(spread), Box::new(standard)));
@@ -200,7 +246,7 @@ fn row_networks(
     seed: u64,
     row: usize,
     training: &Dataset,
-) -> Result<RowNetworks> {
+) -> Result<RowNetworks<FittedNetwork, StandardNetwork>> {
     let table = training.row_table(row);
     let samples = Samples::new(&table);
     let options = |spread| {
@@ -219,6 +265,33 @@ fn row_networks(
     });
     let (networks, standard) = each.collect::<Result<Vec<_>>>()?.into_iter().unzip();
     Ok(RowNetworks { networks, standard })
+}
+
+/// Networks of one row-wire with the choices that the paper leaves `open`.
+fn textbook_networks(
+    settings: &Settings,
+    open: &OpenChoices,
+    seed: u64,
+    row: usize,
+    training: &Dataset,
+) -> RowNetworks<TextbookNetwork, TextbookNetwork> {
+    let table = training.row_table(row);
+    let few = table.first(settings.standard_frames);
+    let hidden = |table: &RowTable, centres| {
+        let mut random = Random::new(seed, Stream::Training, Purpose::Centres, 0, row as u64);
+        Arc::new(Textbook::new(table, open.inputs_scaled, centres, &mut random))
+    };
+    let (network, standard) =
+        (hidden(&table, settings.centres), hidden(&few, settings.standard_frames));
+    let each = settings.spreads.par_iter().map(|&spread| {
+        let fit = |hidden: &Arc<Textbook>, table| {
+            let decay = open.spread_is.decay(spread);
+            hidden.fit(table, decay, open.bias, &[open.initial_covariance]).swap_remove(0)
+        };
+        (fit(&network, &table), Some(fit(&standard, &few)))
+    });
+    let (networks, standard) = each.collect::<Vec<_>>().into_iter().unzip();
+    RowNetworks { networks, standard }
 }
 
 impl Table1 {
@@ -250,6 +323,13 @@ impl Table1 {
             let _ = writeln!(csv, "{noise_level},paper,{spread},dz_mm,as_printed,{percent}");
         }
         csv
+    }
+
+    /// Formula by which the table is nearest to the printed one, on the cells that set-ups are fitted to.
+    #[must_use]
+    pub fn nearest_formula(&self) -> Option<&Comparison> {
+        let gap = |it: &Comparison| it.nearness.gap_fitted;
+        self.comparison.iter().min_by(|a, b| gap(a).total_cmp(&gap(b)))
     }
 
     /// Groups of outputs that the table covers.

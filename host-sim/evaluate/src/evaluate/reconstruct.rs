@@ -1,0 +1,424 @@
+//! Search for the set-up that gives the paper's printed Table 1.
+//!
+//! The paper leaves much open ([`AXES`], the penalty, the formula of the error). The search draws set-ups, then varies
+//! the best. It chooses by one half of the cells; the other half judges. What it finds says which choices *could* have
+//! been made, not which were.
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use taxel_data::progress::Progress;
+use taxel_data::random::{Purpose, Random, Stream};
+
+use super::printed::{self, CELLS, Cells, NOISE_LEVELS, Nearness, SPREADS};
+
+pub mod setup;
+pub mod cells;
+
+use cells::{FORMULAS, INITIAL_COVARIANCES};
+use setup::{AXES, JUDGED, JudgedOn, Setup};
+
+/// Number of set-ups that are tried unless a user says otherwise.
+pub const USUAL_SETUPS: usize = 1920;
+/// Set-ups that are tried before the best are looked at again, and results are saved.
+pub const BATCH: usize = 48;
+/// Set-ups that are drawn before any is varied; later every fourth is drawn.
+const DRAWN_FIRST: usize = 240;
+/// Gap between the tables of two set-ups, in points, below which they count as one.
+const ALIKE: f64 = 0.1;
+/// Best set-ups, of which variations are tried.
+const PARENTS: usize = 16;
+/// Best set-ups that are judged by more draws.
+const FINALISTS: usize = 8;
+/// Draws of samples and noise by which finalists are judged.
+const DRAWS: u64 = 4;
+/// Largest number of samples that a table is judged on.
+const ALL: usize = usize::MAX;
+
+/// Set-up that was tried, with the penalty and the formula that suit it best.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Tried {
+    /// Set-up.
+    pub setup: Setup,
+    /// Index of the initial covariance among [`INITIAL_COVARIANCES`].
+    pub covariance: usize,
+    /// Index of the formula of the error among [`FORMULAS`].
+    pub formula: usize,
+    /// Its table, in per cent.
+    pub cells: Cells,
+}
+
+impl Tried {
+    /// Tries `setup` on one draw. A set-up whose tables are not finite has a table of zeros, which is far from any.
+    fn new(setup: Setup, draw: u64) -> Self {
+        let mut best = Self { setup, covariance: 0, formula: 0, cells: [[0.0; 4]; 10] };
+        for (covariance, tables) in cells::compute(&setup, draw, ALL).into_iter().enumerate() {
+            for (formula, cells) in tables.into_iter().enumerate() {
+                let finite = cells.as_flattened().iter().all(|cell| cell.is_finite());
+                let tried = Self { setup, covariance, formula, cells };
+                if finite && tried.gap_fitted() < best.gap_fitted() {
+                    best = tried;
+                }
+            }
+        }
+        best
+    }
+
+    fn gap_fitted(&self) -> f64 {
+        Nearness::new(&self.cells).gap_fitted
+    }
+
+    fn is_within_words(&self) -> bool {
+        self.setup.judged_on() != JudgedOn::Training
+    }
+
+    /// Whether every index is one of its list, so that a saved result can be used.
+    #[must_use]
+    pub fn is_valid(&self) -> bool {
+        self.setup.is_valid()
+            && self.covariance < INITIAL_COVARIANCES.len()
+            && self.formula < FORMULAS.len()
+    }
+}
+
+/// Search and what it found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Reconstruction {
+    /// Seed of the search and of all draws.
+    pub seed: u64,
+    /// Number of set-ups tried.
+    pub setups: usize,
+    /// Number of tables compared: each set-up with every penalty and every formula.
+    pub tables: usize,
+    /// A table whose cells are all the mean of the printed ones.
+    pub constant: Nearness,
+    /// Scatter of the printed cells about a smooth table, in points.
+    pub roughness: f64,
+    /// Rise of the printed cells with noise and with spread, in points.
+    pub printed_rises: [f64; 2],
+    /// Set-ups nearest to the printed cells: the nearest first, as chosen by the fitted half over several draws.
+    pub nearest: Vec<Candidate>,
+    /// Set-ups that keep to the paper's words: judged on other samples than those of training. The nearest first.
+    pub within_words: Vec<Candidate>,
+    /// What distinguishes set-ups: every value of every axis.
+    pub values: Vec<AxisValue>,
+    /// Scatter of the nearest table within the paper's words, if few samples judge it.
+    pub scatter: Vec<Scatter>,
+    /// Printed cells that the nearest set-ups miss by most.
+    pub unexplained: Vec<Unexplained>,
+}
+
+/// Set-up with its table by several draws.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Candidate {
+    /// Values of the axes by name, the penalty and the formula last.
+    pub choices: Vec<(String, String)>,
+    /// Number N of samples, and K of centres.
+    pub samples_and_centres: [usize; 2],
+    /// Table in per cent, mean of the draws, by spread and noise level.
+    pub cells: Cells,
+    /// Nearness of that mean.
+    pub nearness: Nearness,
+    /// Gap on the cells held out: mean over single draws, and their standard deviation.
+    pub gap_held_out_of_a_draw: [f64; 2],
+}
+
+/// One value of one axis, over all set-ups that have it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AxisValue {
+    /// Name of the axis.
+    pub axis: String,
+    /// The value.
+    pub value: String,
+    /// Number of set-ups tried that have it.
+    pub setups: usize,
+    /// Least gap on the fitted cells of any of them; none if none was tried.
+    pub least_gap_fitted: Option<f64>,
+    /// Gap of that set-up on the cells held out.
+    pub its_gap_held_out: Option<f64>,
+}
+
+/// Scatter of cells that few samples judge.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Scatter {
+    /// Number of samples that judge a cell.
+    pub samples: usize,
+    /// Standard deviation of a cell between draws, in points.
+    pub points: f64,
+}
+
+/// Printed cell that near set-ups miss.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Unexplained {
+    /// Spread of the cell.
+    pub spread: f64,
+    /// Noise level of the cell.
+    pub noise_level: f64,
+    /// Error that the paper prints, in per cent.
+    pub printed_percent: f64,
+    /// Mean of the nearest set-ups, in per cent.
+    pub nearest_percent: f64,
+}
+
+/// Searches `setups` set-ups, going on from those that were `tried` before with the same `seed`. `save` is given all
+/// that were tried after every [`BATCH`].
+///
+/// The result depends on `seed` and `setups` alone: not on the number of threads, nor on where a search was ended.
+///
+/// # Errors
+/// An error of `save`.
+pub fn search<E>(
+    seed: u64,
+    setups: usize,
+    mut tried: Vec<Tried>,
+    mut save: impl FnMut(&[Tried]) -> Result<(), E>,
+    progress: &dyn Progress,
+) -> Result<Reconstruction, E> {
+    tried.truncate(setups);
+    tried.truncate(tried.len() / BATCH * BATCH);
+    progress.stage("try set-ups", setups - tried.len());
+    while tried.len() < setups {
+        let next = next_batch(seed, setups, &tried);
+        let found: Vec<Tried> = next
+            .into_par_iter()
+            .map(|setup| {
+                let found = Tried::new(setup, seed);
+                progress.step();
+                found
+            })
+            .collect();
+        tried.extend(found);
+        save(&tried)?;
+    }
+    Ok(judge(seed, &tried, progress))
+}
+
+/// Set-ups of the next batch: drawn, or variations of the best so far, by turns of all and of those within the
+/// paper's words.
+fn next_batch(seed: u64, setups: usize, tried: &[Tried]) -> Vec<Setup> {
+    let all = best(tried, PARENTS, |_| true);
+    let within = best(tried, PARENTS, Tried::is_within_words);
+    let mut next: Vec<Setup> = Vec::new();
+    for number in tried.len()..setups.min(tried.len() + BATCH) {
+        let mut random = Random::new(seed, Stream::Training, Purpose::Setup, number as u64, 0);
+        let mut draw = || {
+            if number < DRAWN_FIRST || number % 4 == 0 || all.is_empty() || within.is_empty() {
+                return Setup::random(&mut random);
+            }
+            let (parents, kept) =
+                if number % 2 == 1 { (&all, None) } else { (&within, Some(JUDGED)) };
+            parents[random.below(parents.len())].setup.mutated(kept, &mut random)
+        };
+        let mut setup = draw();
+        for _ in 0..20 {
+            if !next.contains(&setup) && tried.iter().all(|other| other.setup != setup) {
+                break;
+            }
+            setup = draw();
+        }
+        next.push(setup);
+    }
+    next
+}
+
+/// The `most` set-ups nearest on the fitted cells, among those that are `wanted`; of those with tables alike, the nearest.
+fn best(tried: &[Tried], most: usize, wanted: impl Fn(&Tried) -> bool) -> Vec<Tried> {
+    let mut wanted: Vec<(f64, Tried)> =
+        tried.iter().filter(|it| wanted(it)).map(|it| (it.gap_fitted(), *it)).collect();
+    wanted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut best: Vec<Tried> = Vec::new();
+    for (_, it) in wanted {
+        if best.len() == most {
+            break;
+        }
+        if best.iter().all(|other| printed::gap(&other.cells, &it.cells) > ALIKE) {
+            best.push(it);
+        }
+    }
+    best
+}
+
+/// Judges the best set-ups by more draws, and sums up the search.
+fn judge(seed: u64, tried: &[Tried], progress: &dyn Progress) -> Reconstruction {
+    let all = best(tried, FINALISTS, |_| true);
+    let within = best(tried, FINALISTS, Tried::is_within_words);
+    progress.stage("judge the nearest by more draws", all.len() + within.len() + 1);
+    let candidates = |finalists: &[Tried]| {
+        let mut found: Vec<(Candidate, Tried)> = finalists
+            .par_iter()
+            .map(|it| {
+                let candidate = candidate(it, seed);
+                progress.step();
+                (candidate, *it)
+            })
+            .collect();
+        found.sort_by(|(a, _), (b, _)| a.nearness.gap_fitted.total_cmp(&b.nearness.gap_fitted));
+        found
+    };
+    let (nearest, within) = (candidates(&all), candidates(&within));
+    let scatter = within.first().map_or_else(Vec::new, |(_, it)| scatter(it, seed));
+    progress.step();
+    let strip = |found: Vec<(Candidate, Tried)>| -> Vec<Candidate> {
+        found.into_iter().map(|(candidate, _)| candidate).collect()
+    };
+    let nearest = strip(nearest);
+    Reconstruction {
+        seed,
+        setups: tried.len(),
+        tables: tried.len() * INITIAL_COVARIANCES.len() * FORMULAS.len(),
+        constant: Nearness::of_a_constant(),
+        roughness: printed::roughness(),
+        printed_rises: printed::rises(&CELLS),
+        unexplained: unexplained(&nearest),
+        nearest,
+        within_words: strip(within),
+        values: values(tried),
+        scatter,
+    }
+}
+
+/// Table of a set-up by one more draw, judged on at most `most` samples.
+fn table(it: &Tried, seed: u64, draw: u64, most: usize) -> Cells {
+    cells::compute(&it.setup, seed + 1000 + draw, most)[it.covariance][it.formula]
+}
+
+fn candidate(it: &Tried, seed: u64) -> Candidate {
+    let tables: Vec<Cells> =
+        (0..DRAWS).into_par_iter().map(|draw| table(it, seed, draw, ALL)).collect();
+    let held_out: Vec<f64> = tables.iter().map(|cells| Nearness::new(cells).gap_held_out).collect();
+    let cells = mean(&tables);
+    let penalty = penalty(INITIAL_COVARIANCES[it.covariance]);
+    let named = it.setup.named().chain([("error", FORMULAS[it.formula])]);
+    let mut choices: Vec<(String, String)> =
+        named.map(|(axis, value)| (axis.to_owned(), value.to_owned())).collect();
+    choices.push(("penalty 1/δ".into(), penalty));
+    Candidate {
+        choices,
+        samples_and_centres: [it.setup.frames(), it.setup.centres()],
+        nearness: Nearness::new(&cells),
+        cells,
+        gap_held_out_of_a_draw: mean_and_deviation(&held_out),
+    }
+}
+
+fn penalty(initial_covariance: f64) -> String {
+    format!("{}", (1e8 / initial_covariance).round() / 1e8)
+}
+
+fn mean(tables: &[Cells]) -> Cells {
+    let mut mean = [[0.0; 4]; 10];
+    for table in tables {
+        let pairs = mean.as_flattened_mut().iter_mut().zip(table.as_flattened());
+        pairs.for_each(|(mean, cell)| *mean += cell / tables.len() as f64);
+    }
+    mean
+}
+
+fn mean_and_deviation(values: &[f64]) -> [f64; 2] {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let squares: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
+    [mean, (squares / (count - 1.0).max(1.0)).sqrt()]
+}
+
+/// Scatter of a set-up's cells between draws, if so many samples judge them.
+fn scatter(it: &Tried, seed: u64) -> Vec<Scatter> {
+    let of_samples = |samples: usize| {
+        let tables: Vec<Cells> =
+            (0..2 * DRAWS).into_par_iter().map(|draw| table(it, seed, draw, samples)).collect();
+        let of_cell = |k: usize| {
+            let values: Vec<f64> = tables.iter().map(|table| table.as_flattened()[k]).collect();
+            mean_and_deviation(&values)[1].powi(2)
+        };
+        Scatter { samples, points: ((0..40).map(of_cell).sum::<f64>() / 40.0).sqrt() }
+    };
+    [10, 20, 50, 200].map(of_samples).to_vec()
+}
+
+/// What set-ups with each value of each axis reach.
+fn values(tried: &[Tried]) -> Vec<AxisValue> {
+    let of = |axis: &str, value: &str, has: &dyn Fn(&Tried) -> bool| {
+        let nearest = best(tried, 1, has);
+        let nearness = nearest.first().map(|it| Nearness::new(&it.cells));
+        AxisValue {
+            axis: axis.into(),
+            value: value.into(),
+            setups: tried.iter().filter(|it| has(it)).count(),
+            least_gap_fitted: nearness.map(|it| it.gap_fitted),
+            its_gap_held_out: nearness.map(|it| it.gap_held_out),
+        }
+    };
+    let mut all = Vec::new();
+    for (index, axis) in AXES.iter().enumerate() {
+        for (value, name) in axis.values.iter().enumerate() {
+            all.push(of(axis.name, name, &|it| it.setup.0[index] == value));
+        }
+    }
+    for (index, covariance) in INITIAL_COVARIANCES.iter().enumerate() {
+        all.push(of("penalty 1/δ", &penalty(*covariance), &|it| it.covariance == index));
+    }
+    for (index, name) in FORMULAS.iter().enumerate() {
+        all.push(of("error", name, &|it| it.formula == index));
+    }
+    all
+}
+
+/// The three printed cells that are farthest from the mean of the nearest set-ups.
+fn unexplained(nearest: &[Candidate]) -> Vec<Unexplained> {
+    let tables: Vec<Cells> = nearest.iter().map(|candidate| candidate.cells).collect();
+    let mean = mean(&tables);
+    let mut all: Vec<Unexplained> = Vec::new();
+    for (i, spread) in SPREADS.into_iter().enumerate() {
+        for (j, noise_level) in NOISE_LEVELS.into_iter().enumerate() {
+            let (printed_percent, nearest_percent) = (CELLS[i][j], mean[i][j]);
+            all.push(Unexplained { spread, noise_level, printed_percent, nearest_percent });
+        }
+    }
+    let miss = |it: &Unexplained| (it.printed_percent - it.nearest_percent).abs();
+    all.sort_by(|a, b| miss(b).total_cmp(&miss(a)));
+    all.truncate(3);
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use std::convert::Infallible;
+
+    use taxel_data::progress::Silent;
+
+    use super::*;
+
+    #[test]
+    fn a_search_that_was_ended_goes_on_to_the_same_result() {
+        // All set-ups small, so that the test is quick: what is saved is what is drawn.
+        let small =
+            |number: usize| Tried::new(Setup([1, 0, 0, number % 3, 0, 2, 0, number % 2, 0]), 7);
+        let first: Vec<Tried> = (0..4).map(small).collect();
+        let mut saved = Vec::new();
+        let keep = |tried: &[Tried]| -> Result<(), Infallible> {
+            saved = tried.to_vec();
+            Ok(())
+        };
+        let Ok(found) = search(7, 4, Vec::new(), keep, &Silent);
+        assert_eq!((found.setups, saved.len()), (4, 4));
+        let Ok(again) = search(7, 4, saved, |_| Ok::<_, Infallible>(()), &Silent);
+        assert_eq!(found, again);
+    }
+
+    #[test]
+    fn the_best_come_first_and_each_set_up_once() {
+        let with = |first: usize, offset: f64| {
+            let cells = CELLS.map(|line| line.map(|cell| cell + offset));
+            Tried {
+                setup: Setup([first, 0, 0, 0, 0, 0, 0, 0, 0]),
+                covariance: 0,
+                formula: 0,
+                cells,
+            }
+        };
+        let tried = [with(0, 2.0), with(1, 0.5), with(1, 0.25), with(2, 1.0)];
+        let best: Vec<usize> = best(&tried, 2, |_| true).iter().map(|it| it.setup.0[0]).collect();
+        assert_eq!(best, [1, 2]);
+        let values = values(&tried);
+        assert_eq!((values[1].setups, values[1].least_gap_fitted), (2, Some(0.25)));
+    }
+}

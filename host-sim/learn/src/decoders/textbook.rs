@@ -1,0 +1,283 @@
+//! The paper's network in f64, with every choice that the paper leaves open: what inputs are scaled by, what *spread*
+//! means, whether there is a bias, and how strong the penalty is. It is not meant for a device.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use taxel_data::dataset::RowTable;
+use taxel_data::random::Random;
+use taxel_data::table::Table;
+
+use super::RowDecoder;
+use crate::train::kmeans;
+use crate::train::least_squares::{Decomposed, Design, Regressors};
+
+/// What each input is scaled by. All are idioms of the toolboxes of the paper's time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Scaling {
+    /// Its minimum and maximum become 0 and 1.
+    Range,
+    /// Its minimum and maximum become −1 and 1.
+    Symmetric,
+    /// It is divided by its maximum.
+    Maximum,
+    /// Minimum and maximum of all inputs become 0 and 1.
+    CommonRange,
+    /// Its mean becomes 0, its standard deviation 1.
+    Standard,
+}
+
+/// What a Gaussian's *spread* is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SpreadMeaning {
+    /// σ in exp(−d²/2σ²).
+    Sigma,
+    /// Distance at which the Gaussian has half its height: exp(−(0.8326·d/spread)²).
+    HalfHeight,
+}
+
+impl SpreadMeaning {
+    /// Decay a of exp(−a·d²) for this `spread`.
+    #[must_use]
+    pub fn decay(self, spread: f64) -> f64 {
+        match self {
+            Self::Sigma => 0.5 / (spread * spread),
+            Self::HalfHeight => std::f64::consts::LN_2 / (spread * spread),
+        }
+    }
+}
+
+/// Gaussians of a row's network on scaled inputs, before widths and weights are chosen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Textbook {
+    /// Offset and factor that scale each input.
+    scale: Vec<[f64; 2]>,
+    /// Centres on scaled inputs, `centres × inputs`.
+    centres: Vec<f64>,
+}
+
+impl Textbook {
+    /// Scales the inputs of `table` and places `centres` centres by K-means; with as many centres as lines, every line
+    /// is one.
+    #[must_use]
+    pub fn new(table: &RowTable, scaling: Scaling, centres: usize, random: &mut Random) -> Self {
+        let scale = scale(&table.inputs, scaling);
+        let mut this = Self { scale, centres: Vec::new() };
+        let scaled = this.scaled(&table.inputs.values);
+        this.centres = if centres < table.inputs.len() {
+            let search = kmeans::Search { restarts: 1, ..kmeans::Search::default() };
+            kmeans::fit(&scaled, this.inputs(), centres, &search, random).centres
+        } else {
+            scaled
+        };
+        this
+    }
+
+    fn inputs(&self) -> usize {
+        self.scale.len()
+    }
+
+    fn scaled(&self, readings: &[f64]) -> Vec<f64> {
+        let of_line = |line: &[f64]| -> Vec<f64> {
+            line.iter()
+                .zip(&self.scale)
+                .map(|(r, [offset, factor])| (r - offset) * factor)
+                .collect()
+        };
+        readings.chunks_exact(self.inputs()).flat_map(of_line).collect()
+    }
+
+    /// Fits the weights of networks with this `decay` to `table`, one network for each of the `initial_covariances` δ:
+    /// the penalty on squared weights is 1/δ.
+    #[must_use]
+    pub fn fit(
+        self: &Arc<Self>,
+        table: &RowTable,
+        decay: f64,
+        bias: bool,
+        initial_covariances: &[f64],
+    ) -> Vec<TextbookNetwork> {
+        let (scaled, outputs) = (self.scaled(&table.inputs.values), table.outputs.names.len());
+        let regressors = self.regressors(decay);
+        let gaussians = regressors.of(&scaled);
+        let decomposed = if bias {
+            Decomposed::new(&gaussians, &table.outputs.values, outputs)
+        } else {
+            Decomposed::new(&WithoutBias(&gaussians), &table.outputs.values, outputs)
+        };
+        let network = |covariance: &f64| TextbookNetwork {
+            hidden: Arc::clone(self),
+            decay,
+            bias,
+            weights: decomposed.factor(*covariance).weights(),
+            outputs,
+        };
+        initial_covariances.iter().map(network).collect()
+    }
+
+    fn regressors(&self, decay: f64) -> Regressors<'_> {
+        Regressors { centres: &self.centres, inputs: self.inputs(), decay, affine_tail: false }
+    }
+}
+
+/// Offset and factor for each input of `inputs`; an input that never changes becomes 0.
+fn scale(inputs: &Table, scaling: Scaling) -> Vec<[f64; 2]> {
+    let per = |span: f64| if span == 0.0 { 0.0 } else { 1.0 / span };
+    let ranges = inputs.ranges();
+    let ranges = ranges.iter();
+    match scaling {
+        Scaling::Range => ranges.map(|[low, high]| [*low, per(high - low)]).collect(),
+        Scaling::Symmetric => {
+            ranges.map(|[low, high]| [0.5 * (low + high), 2.0 * per(high - low)]).collect()
+        }
+        Scaling::Maximum => ranges.map(|[_, high]| [0.0, per(*high)]).collect(),
+        Scaling::CommonRange => {
+            let (low, high) = ranges.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), range| {
+                (l.min(range[0]), h.max(range[1]))
+            });
+            vec![[low, per(high - low)]; inputs.names.len()]
+        }
+        Scaling::Standard => {
+            let moments = inputs.means().into_iter().zip(inputs.deviations());
+            moments.map(|(mean, deviation)| [mean, per(deviation)]).collect()
+        }
+    }
+}
+
+/// Regressors without their last, the bias.
+struct WithoutBias<'d, D>(&'d D);
+
+impl<D: Design> Design for WithoutBias<'_, D> {
+    fn regressors(&self) -> usize {
+        self.0.regressors() - 1
+    }
+
+    fn fill(&self, samples: std::ops::Range<usize>, values: &mut [f64]) {
+        let n = self.regressors();
+        let mut all = vec![0.0; samples.len() * (n + 1)];
+        self.0.fill(samples, &mut all);
+        let lines = values.chunks_exact_mut(n).zip(all.chunks_exact(n + 1));
+        lines.for_each(|(line, all)| line.copy_from_slice(&all[..n]));
+    }
+}
+
+/// Network of a row-wire in f64.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TextbookNetwork {
+    hidden: Arc<Textbook>,
+    decay: f64,
+    bias: bool,
+    /// Weights, `regressors × outputs`; the bias last, if there is one.
+    weights: Vec<f64>,
+    outputs: usize,
+}
+
+/// Predictions (`lines × outputs`) of each of the `networks`, which differ in their weights alone.
+#[must_use]
+pub fn predict_each(networks: &[TextbookNetwork], readings: &[f64]) -> Vec<Vec<f64>> {
+    /// Lines whose activations stay in the first cache.
+    const LINES: usize = 16;
+    let Some(first) = networks.first() else { return Vec::new() };
+    let scaled = first.hidden.scaled(readings);
+    let regressors = first.hidden.regressors(first.decay);
+    let design = regressors.of(&scaled);
+    let (lines, n) = (readings.len() / first.hidden.inputs(), design.regressors());
+    let mut predicted = vec![Vec::with_capacity(lines * first.outputs); networks.len()];
+    let mut activations = vec![0.0; LINES * n];
+    for start in (0..lines).step_by(LINES) {
+        let run = start..lines.min(start + LINES);
+        let activations = &mut activations[..run.len() * n];
+        design.fill(run, activations);
+        for (network, predicted) in networks.iter().zip(&mut predicted) {
+            for line in activations.chunks_exact(n) {
+                let from = predicted.len();
+                predicted.resize(from + network.outputs, 0.0);
+                let used = &line[..if network.bias { n } else { n - 1 }];
+                for (activation, weights) in
+                    used.iter().zip(network.weights.chunks_exact(network.outputs))
+                {
+                    predicted[from..]
+                        .iter_mut()
+                        .zip(weights)
+                        .for_each(|(y, w)| *y += activation * w);
+                }
+            }
+        }
+    }
+    predicted
+}
+
+impl RowDecoder for TextbookNetwork {
+    fn predict(&self, readings: &[f64]) -> Vec<f64> {
+        predict_each(std::slice::from_ref(self), readings).swap_remove(0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use taxel_data::random::{Purpose, Stream};
+
+    use super::*;
+
+    fn table() -> RowTable {
+        let values =
+            |of: fn(f64) -> [f64; 2]| (0..40).flat_map(|i| of(f64::from(i) / 40.0)).collect();
+        let named =
+            |names: [&str; 2], values| Table { names: names.map(String::from).to_vec(), values };
+        RowTable {
+            inputs: named(["a", "b"], values(|t| [50.0 + 10.0 * t, 80.0 - 20.0 * t * t])),
+            outputs: named(["y", "z"], values(|t| [t.sin(), 1.0 - t])),
+            common_span: false,
+        }
+    }
+
+    #[test]
+    fn every_scaling_does_what_its_name_says() {
+        let (table, random) = (table(), Random::new(1, Stream::Training, Purpose::Centres, 0, 0));
+        let ranges = |scaling| {
+            let scaled = Textbook::new(&table, scaling, 40, &mut random.clone()).centres;
+            Table { names: table.inputs.names.clone(), values: scaled }
+        };
+        let range = ranges(Scaling::Range).ranges();
+        let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
+        assert!(range.iter().all(|[low, high]| near(*low, 0.0) && near(*high, 1.0)), "{range:?}");
+        let symmetric = ranges(Scaling::Symmetric).ranges();
+        assert!(
+            symmetric.as_flattened().iter().all(|v| (v.abs() - 1.0).abs() < 1e-12),
+            "{symmetric:?}"
+        );
+        assert!(
+            ranges(Scaling::Maximum).ranges().iter().all(|[low, high]| *low > 0.7 && *high == 1.0)
+        );
+        let common = ranges(Scaling::CommonRange).ranges();
+        assert!(near(common[0][0], 0.0) && near(common[1][1], 1.0), "{common:?}");
+        let standard = ranges(Scaling::Standard);
+        assert!(standard.means().iter().all(|mean| mean.abs() < 1e-12));
+        assert!(standard.deviations().iter().all(|deviation| (deviation - 1.0).abs() < 1e-12));
+    }
+
+    #[test]
+    fn half_its_height_is_at_the_spread() {
+        assert!(((-SpreadMeaning::HalfHeight.decay(0.3) * 0.09).exp() - 0.5).abs() < 1e-12);
+        assert!(((-SpreadMeaning::Sigma.decay(0.3) * 0.09).exp() - (-0.5_f64).exp()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn as_many_centres_as_lines_interpolate_and_a_large_penalty_predicts_nothing() {
+        let table = table();
+        let mut random = Random::new(1, Stream::Training, Purpose::Centres, 0, 0);
+        let hidden = Arc::new(Textbook::new(&table, Scaling::Range, 40, &mut random));
+        let networks = hidden.fit(&table, 5000.0, false, &[1e12, 1e-12]);
+        let [exact, nothing] = &predict_each(&networks, &table.inputs.values)[..] else { panic!() };
+        let far = |predicted: &[f64]| {
+            let pairs = predicted.iter().zip(&table.outputs.values);
+            pairs.map(|(p, y)| (p - y).abs()).fold(0.0, f64::max)
+        };
+        assert!(far(exact) < 1e-6, "{}", far(exact));
+        assert!(nothing.iter().all(|p| p.abs() < 1e-9));
+        let with_bias = hidden.fit(&table, 5000.0, true, &[1e12]);
+        assert!(far(&with_bias[0].predict(&table.inputs.values)) < 1e-6);
+    }
+}
