@@ -16,7 +16,7 @@ use taxel_data::random::Stream;
 use taxel_data::{BadValue, input};
 use taxel_learn::train::{FreshFrames, check_spread};
 use taxel_learn::{Options, Origin, relative};
-use taxel_limit::Reference;
+use taxel_limit::{Reference, Refusal};
 use taxel_simulate::noise::NoiseKind;
 use taxel_simulate::outputs::Outputs;
 use taxel_simulate::synth::BASELINE_FRAMES;
@@ -52,6 +52,17 @@ pub struct Experiment {
     pub table1: Option<Table1>,
 }
 
+/// Direction of a network.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Direction {
+    /// From readings to deformations: it decodes.
+    #[default]
+    Inverse,
+    /// From the deformation of a row to its noisy readings, as at the end of the paper's §3.
+    Forward,
+}
+
 /// Settings of a model's training.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -70,6 +81,9 @@ pub struct Training {
     /// Number format of the weights.
     #[serde(default = "default_format", deserialize_with = "file::format::deserialize")]
     pub format: Format,
+    /// Whether the model decodes readings, or predicts them.
+    #[serde(default)]
+    pub direction: Direction,
     /// Whether one network serves all rows, behind a projection of all readings, instead of one a row.
     #[serde(default)]
     pub whole_array: bool,
@@ -206,15 +220,54 @@ impl Experiment {
             noise: (kind, noise.level),
             seed: self.world.seed,
             thickness_mm: Some(self.world.sensor.size_mm[2]),
-            full_scale: self.world.full_scales(),
+            full_scale: self.full_scales(),
         }
+    }
+
+    /// Whether its models predict readings from deformations.
+    #[must_use]
+    pub fn is_forward(&self) -> bool {
+        self.training.direction == Direction::Forward
+    }
+
+    /// Names of the model's inputs.
+    #[must_use]
+    pub fn input_names(&self) -> Vec<String> {
+        if self.is_forward() { self.world.output_names() } else { self.world.reading_names() }
+    }
+
+    /// Names of the model's outputs.
+    #[must_use]
+    pub fn output_names(&self) -> Vec<String> {
+        if self.is_forward() { self.world.reading_names() } else { self.world.output_names() }
+    }
+
+    /// Full scale of each of the model's outputs: of a reading, its span over the scene.
+    fn full_scales(&self) -> Vec<f64> {
+        const SPAN_FRAMES: usize = 4096;
+        if !self.is_forward() {
+            return self.world.full_scales();
+        }
+        let readings = Synthesis::of(&self.world).ideal().frames(Stream::Span, SPAN_FRAMES).inputs;
+        readings.ranges().into_iter().map(|[low, high]| high - low).collect()
+    }
+
+    /// Refuses a scene whose models predict readings, for a `command` that is about decoding.
+    ///
+    /// # Errors
+    /// [`Error::Scene`] for a scene with `direction = "forward"`.
+    pub fn require_inverse(&self, command: &str) -> Result<()> {
+        let rule =
+            || format!("{command} is about models that decode readings: leave the field out");
+        require(!self.is_forward(), "training.direction", "forward", rule)
+            .map_err(|cause| Error::Scene { scene: self.name.clone(), cause })
     }
 
     /// Measure for errors of the scene's outputs.
     #[must_use]
     pub fn measure(&self) -> Measure {
         Measure {
-            full_scale: self.world.full_scales(),
+            full_scale: self.full_scales(),
             thickness_mm: Some(self.world.sensor.size_mm[2]),
             limit: None,
         }
@@ -233,6 +286,10 @@ impl Experiment {
     ) -> (Measure, LimitSummary) {
         let mut world = self.world.clone();
         world.noise.level = noise_level;
+        if self.is_forward() {
+            let noise_ohm = noise_ohm(&world, test_frames);
+            return (self.measure(), LimitSummary::of(&Err(Refusal::OwnNoise { noise_ohm })));
+        }
         let frames = Reference::few_frames(&world).min(test_frames);
         let limit = Reference::of(&world, frames, progress);
         let summary = LimitSummary::of(&limit);
@@ -241,7 +298,7 @@ impl Experiment {
 
     /// Data set of so many `frames` of `stream`, for training and for decoders that see what it saw.
     ///
-    /// Its inputs are readings, or readings relative to the baseline of each session: the mean of
+    /// Its inputs are deformations and its outputs readings if the scene's models predict readings. Otherwise its inputs are readings, or readings relative to the baseline of each session: the mean of
     /// [`BASELINE_FRAMES`] frames of the untouched sensor. `synthesis` is one of the experiment's world.
     #[must_use]
     pub fn dataset(&self, synthesis: &Synthesis<'_>, stream: Stream, frames: usize) -> Dataset {
@@ -256,12 +313,37 @@ impl Experiment {
         first: usize,
         frames: usize,
     ) -> Dataset {
-        let readings = synthesis.frames_from(stream, first, frames);
+        let mut readings = synthesis.frames_from(stream, first, frames);
+        if self.is_forward() {
+            std::mem::swap(&mut readings.inputs, &mut readings.outputs);
+        }
         if !self.training.relative_inputs {
             return readings;
         }
         let baselines = synthesis.baselines_from(stream, first, frames, BASELINE_FRAMES);
         relative::dataset(readings, &baselines)
+    }
+
+    /// Checks what models that predict readings ask of the scene, whatever options have changed in it.
+    ///
+    /// # Errors
+    /// [`BadValue`] for a setting that they cannot have.
+    pub fn check_direction(&self) -> Check {
+        if !self.is_forward() {
+            return Ok(());
+        }
+        let all = self.world.outputs == Outputs::all_deformations();
+        require(all, "training.direction", "forward", || {
+            "a row's readings follow from all its deformations: ask for outputs.quantity = \"deformation\" and \
+             outputs.axes = [\"x\", \"y\", \"z\"]"
+                .into()
+        })?;
+        require(!self.training.relative_inputs, "training.relative_inputs", true, || {
+            "inputs are deformations with direction = \"forward\": leave one of the two out".into()
+        })?;
+        require(self.table1.is_none(), "table1", "[table1]", || {
+            "the table is for models that decode; leave it out with direction = \"forward\"".into()
+        })
     }
 
     /// Checks what outputs of the contact, which belong to no row-wire, ask of training and of Table 1.
@@ -285,6 +367,7 @@ impl Experiment {
         check_spread("training.spread", self.training.spread)?;
         self.table1.as_ref().map_or(Ok(()), check_table1)?;
         self.check_outputs()?;
+        self.check_direction()?;
         let Some(t) = &self.table1 else { return Ok(()) };
         self.world.check_frames("table1.frames", t.frames)?;
         self.world.check_frames("table1.test_frames", t.test_frames)
@@ -300,6 +383,14 @@ impl Experiment {
         self.world.check_frames("training.frames", t.frames)?;
         self.world.check_frames("training.test_frames", t.test_frames)
     }
+}
+
+/// Root mean square in Ω of the noise on the readings of so many test `frames`.
+fn noise_ohm(world: &World, frames: usize) -> f64 {
+    let of = |synthesis: Synthesis<'_>| synthesis.frames(Stream::Test, frames).inputs;
+    let (noisy, ideal) = (of(Synthesis::of(world)), of(Synthesis::of(world).ideal()));
+    let squares: f64 = noisy.squared_errors(&ideal.values).iter().sum();
+    (squares / noisy.values.len() as f64).sqrt()
 }
 
 /// Frames of an experiment that only refinement sees.

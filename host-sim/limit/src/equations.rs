@@ -23,12 +23,47 @@ pub const EXACT_RESIDUAL: f64 = 1e-12;
 /// Largest magnitude of unknowns in standard deviations of the prior.
 const MOST_DEVIATIONS: f64 = 4.0;
 
-/// Decoder that solves the sensor's equations for the deformation of every row that a world reads.
+/// Model of readings: those of a row for its deformation.
+pub trait RowModel: Sync {
+    /// Writes the logarithms of the readings in Ω of the row that is read as number `place` (from 0), and their
+    /// derivatives by each entry of `deformation_mm` in 1/mm, one line a reading. NaN where there is no logarithm.
+    fn log_readings(
+        &self,
+        place: usize,
+        deformation_mm: &[f64],
+        logs: &mut [f64],
+        slopes: &mut DMatrix<f64>,
+    );
+}
+
+/// The sensor's own equations.
+impl RowModel for World {
+    fn log_readings(
+        &self,
+        place: usize,
+        deformation_mm: &[f64],
+        logs: &mut [f64],
+        slopes: &mut DMatrix<f64>,
+    ) {
+        let (moved, _): (&[Vector3], _) = deformation_mm.as_chunks();
+        self.sensor.row_column_resistance_ohm(self.read_rows[place], moved, logs);
+        logs.iter_mut().for_each(|reading| *reading = reading.ln());
+        let derivatives = self.sensor.log_resistance_derivatives(self.read_rows[place], moved);
+        for (k, line) in derivatives.iter().enumerate() {
+            line.iter().enumerate().for_each(|(i, slope)| slopes[(k, i)] = *slope);
+        }
+    }
+}
+
+/// Decoder that solves equations for the deformation of every row that a world reads: the sensor's, or those of another
+/// [`RowModel`].
 ///
 /// Its outputs are all deformations, in the order of [`deformation_names`](taxel_simulate::sensor::Sensor::deformation_names).
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Equations<'w> {
+    name: &'static str,
     world: &'w World,
+    model: &'w dyn RowModel,
     damping: Option<Damping>,
 }
 
@@ -46,7 +81,7 @@ impl<'w> Equations<'w> {
     /// Decoder that solves the equations exactly.
     #[must_use]
     pub fn exact(world: &'w World) -> Self {
-        Self { world, damping: None }
+        Self { name: EXACT, world, model: world, damping: None }
     }
 
     /// Decoder that minimises the squared residuals over their noise and the squared distance from the mean over the
@@ -60,7 +95,13 @@ impl<'w> Equations<'w> {
             spans_ohm: Synthesis::of(world).noise_span_ohm(),
             rows: rows.collect(),
         };
-        Self { world, damping: Some(damping) }
+        Self { name: DAMPED, world, model: world, damping: Some(damping) }
+    }
+
+    /// Replaces the sensor's equations by those of `model`; the decoder is called `name`.
+    #[must_use]
+    pub fn of_model(self, name: &'static str, model: &'w dyn RowModel) -> Self {
+        Self { name, model, ..self }
     }
 
     /// Solves the equations of the row that is read as number `place` (from 0), for its readings in Ω. An exact search
@@ -137,13 +178,8 @@ impl<'w> Equations<'w> {
         residuals: &mut [f64],
         slopes: &mut DMatrix<f64>,
     ) {
-        let (sensor, row) = (&self.world.sensor, self.world.read_rows[place]);
-        let (moved, _): (&[Vector3], _) = deformation_mm.as_chunks();
-        sensor.row_column_resistance_ohm(row, moved, residuals);
-        residuals.iter_mut().zip(logs).for_each(|(reading, log)| *reading = reading.ln() - log);
-        for (k, line) in sensor.log_resistance_derivatives(row, moved).iter().enumerate() {
-            line.iter().enumerate().for_each(|(i, slope)| slopes[(k, i)] = *slope);
-        }
+        self.model.log_readings(place, deformation_mm, residuals, slopes);
+        residuals.iter_mut().zip(logs).for_each(|(predicted, log)| *predicted -= log);
     }
 
     /// Solves the equations of all rows of all frames, one after the other.
@@ -162,7 +198,7 @@ impl FrameDecoder for Equations<'_> {
     type State = ();
 
     fn name(&self) -> &str {
-        if self.damping.is_some() { DAMPED } else { EXACT }
+        self.name
     }
 
     fn inputs(&self) -> usize {
