@@ -1,6 +1,7 @@
 //! Main job: synthesise or read frames, train, write the blob, read it back, decode, evaluate.
 
 use serde::Serialize;
+use taxel_data::columns::READINGS;
 use taxel_data::dataset::Dataset;
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
@@ -132,6 +133,15 @@ pub struct RowErrors {
     pub row_wire: usize,
     /// Errors by group.
     pub errors: Vec<Errors>,
+}
+
+impl RunResult {
+    /// Whether the model predicts readings from deformations.
+    #[must_use]
+    pub fn predicts_readings(&self) -> bool {
+        let mut errors = self.decoders.iter().flat_map(|decoder| &decoder.errors);
+        !self.decoders.is_empty() && errors.all(|errors| errors.group == READINGS)
+    }
 }
 
 /// Trains on `subject` with `options`, judges the model and returns its results and the blob.

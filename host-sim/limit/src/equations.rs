@@ -20,8 +20,6 @@ pub const EXACT: &str = "equations";
 pub const DAMPED: &str = "damped";
 /// Largest residual of ln R at a solution: rounding is a thousandth of it.
 pub const EXACT_RESIDUAL: f64 = 1e-12;
-/// Largest magnitude of unknowns in standard deviations of the prior.
-const MOST_DEVIATIONS: f64 = 4.0;
 
 /// Model of readings: those of a row for its deformation.
 pub trait RowModel: Sync {
@@ -86,12 +84,14 @@ impl<'w> Equations<'w> {
 
     /// Decoder that minimises the squared residuals over their noise and the squared distance from the mean over the
     /// covariance of the scene's deformations: the most probable deformation, were the scene's normal.
+    ///
+    /// `noise_level` is the relative deviation of readings from the equations; with noise relative to the span, in spans.
     #[must_use]
-    pub fn damped(world: &'w World) -> Self {
+    pub fn damped(world: &'w World, noise_level: f64) -> Self {
         let (prior, of_row) = (Prior::of(world), 3 * world.sensor.electrodes_per_row_wire);
         let rows = (0..world.read_rows.len()).map(|place| prior.of_row(place, of_row));
         let damping = Damping {
-            noise_level: world.noise.level,
+            noise_level,
             spans_ohm: Synthesis::of(world).noise_span_ohm(),
             rows: rows.collect(),
         };
@@ -133,7 +133,7 @@ impl<'w> Equations<'w> {
             mean.iter().zip(&moved).map(|(mean, moved)| mean + moved).collect()
         };
         let (start, mut of_mm) = (vec![0.0; mean.len()], DMatrix::zeros(columns, mean.len()));
-        let unknowns = Unknowns { start: &start, deviation: 1.0, largest: MOST_DEVIATIONS };
+        let unknowns = Unknowns { start: &start, deviation: 1.0, largest: f64::INFINITY };
         let least = damping.noise_level.powi(2);
         let exact = (least, EXACT_RESIDUAL);
         let mut found = solve(&unknowns, columns, exact, |at, residuals, slopes| {
@@ -289,7 +289,8 @@ mod tests {
             let z: f64 = squares.iter().skip(2).step_by(3).sum();
             (z / (6.0 * 60.0)).sqrt()
         };
-        let (exact, damped) = (rmse(&Equations::exact(&world)), rmse(&Equations::damped(&world)));
+        let (exact, damped) =
+            (rmse(&Equations::exact(&world)), rmse(&Equations::damped(&world, 0.005)));
         assert!(exact > 0.3 && damped < 0.07, "{exact} {damped}");
     }
 }

@@ -15,9 +15,11 @@ const LAST_DAMPING: f64 = 1e-24;
 /// Largest change of an unknown in one step, in its deviations.
 const LARGEST_STEP: f64 = 1.0;
 /// Most steps at the least damping.
-const LAST_STEPS: usize = 20;
-/// Largest last step of a solution, in deviations.
-const SMALLEST_STEP: f64 = 1e-9;
+const LAST_STEPS: usize = 100;
+/// Largest last step, in deviations.
+const SMALLEST_STEP: f64 = 1e-6;
+/// Rise of a damped sum, relative to it, that rounding explains.
+const SMALLEST_RISE: f64 = 1e-13;
 
 /// Unknowns: where the search starts, and where it may go.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,6 +30,15 @@ pub struct Unknowns<'u> {
     pub deviation: f64,
     /// Largest magnitude of every unknown. The search may leave this box by half of it; a solution may not.
     pub largest: f64,
+}
+
+impl Unknowns<'_> {
+    /// Sum of squares that a step at this damping makes smaller.
+    fn damped_sum(&self, place: &[f64], residuals: &[f64], damping: f64) -> f64 {
+        let off = place.iter().zip(self.start).map(|(x, start)| (x - start) / self.deviation);
+        residuals.iter().map(|residual| residual * residual).sum::<f64>()
+            + damping * off.map(|off| off * off).sum::<f64>()
+    }
 }
 
 /// End of a search.
@@ -62,20 +73,36 @@ pub fn solve(
     let mut derivatives = DMatrix::zeros(count, n);
     let (mut damping, mut last_steps) = (FIRST_DAMPING.max(least_damping), 0);
     let (mut steps, mut settled) = (0, false);
+    // Last place from which the damped sum fell at the least damping, with that sum.
+    let mut lowest: Option<(f64, Vec<f64>)> = None;
     while last_steps < LAST_STEPS && !settled {
         equations(&place, &mut residuals, &mut derivatives);
         steps += 1;
+        let is_last = damping <= least_damping;
+        if is_last && damping > 0.0 {
+            last_steps += 1;
+            let sum = unknowns.damped_sum(&place, &residuals, damping);
+            match &lowest {
+                // Beyond the minimum along the step: half of it.
+                Some((least, from)) if sum > *least => {
+                    settled = sum - least <= SMALLEST_RISE * least;
+                    place.iter_mut().zip(from).for_each(|(x, from)| *x = f64::midpoint(*x, *from));
+                    continue;
+                }
+                _ => lowest = Some((sum, place.clone())),
+            }
+        }
         let Some(step) = step(unknowns, &place, &residuals, &derivatives, damping) else { break };
         let largest = step.amax();
         let share = (LARGEST_STEP / largest).min(1.0) * unknowns.deviation;
         let bound = 1.5 * unknowns.largest;
         place.iter_mut().zip(&step).for_each(|(x, d)| *x = (*x + share * d).clamp(-bound, bound));
-        if damping > least_damping {
+        if is_last {
+            last_steps += usize::from(damping == 0.0);
+            settled = largest < SMALLEST_STEP;
+        } else {
             damping = (damping * FALL).max(least_damping);
             damping = if damping < LAST_DAMPING { 0.0 } else { damping };
-        } else {
-            last_steps += 1;
-            settled = largest < SMALLEST_STEP;
         }
     }
     let in_box = place.iter().all(|x| x.abs() <= unknowns.largest * (1.0 + 1e-9));

@@ -61,8 +61,9 @@ fn limit_of(limit: &LimitSummary, place: usize) -> Option<f64> {
     limit.groups.get(place).map(|group| group.limit)
 }
 
-/// Adds the reasons why there is no limit.
+/// Adds what the limit is of, and the reasons why there is none.
 fn refusals<'l>(page: &mut Page, limits: impl Iterator<Item = (f64, &'l LimitSummary)>) {
+    page.line("limit: of a decoder that sees all readings of a frame, on the first test frames, at most 40.");
     for (level, limit) in limits {
         if let Some(refused) = &limit.refused {
             print::wrapped(page, &format!("no limit at noise {}: {refused}", percent(level)));

@@ -8,6 +8,7 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
+use taxel_data::table::Table;
 use taxel_learn::Exponential;
 use taxel_learn::decoders::BASELINES;
 use taxel_limit::Equations;
@@ -125,6 +126,8 @@ fn of_level(level: NoiseLevel, progress: &dyn Progress) -> Result<Level> {
         |squares: Vec<f64>| (squares.iter().sum::<f64>() / test.outputs.values.len() as f64).sqrt();
     let predicted = model.decode_table(&test.inputs).values;
 
+    // Readings deviate from the network by their noise and its own error.
+    let deviation = relative_rmse(&set.frames.outputs, &model.decode_table(&set.frames.inputs));
     let networks = Networks::of(&blob.parse());
     let world = &level.scene.world;
     let mut inversions = Vec::new();
@@ -132,7 +135,7 @@ fn of_level(level: NoiseLevel, progress: &dyn Progress) -> Result<Level> {
     progress.stage("invert networks", 2);
     for equations in [
         Equations::exact(world).of_model(INVERTED, &networks),
-        Equations::damped(world).of_model(INVERTED_DAMPED, &networks),
+        Equations::damped(world, deviation).of_model(INVERTED_DAMPED, &networks),
     ] {
         let started = Instant::now();
         let solved = equations.solve_all(&level.test.inputs.values);
@@ -157,6 +160,13 @@ fn of_level(level: NoiseLevel, progress: &dyn Progress) -> Result<Level> {
         decoders,
         limit: level.limit,
     })
+}
+
+/// Root mean square of (predicted − reading)/reading.
+fn relative_rmse(readings: &Table, predicted: &Table) -> f64 {
+    let pairs = readings.values.iter().zip(&predicted.values);
+    let squares: f64 = pairs.map(|(reading, predicted)| (predicted / reading - 1.0).powi(2)).sum();
+    (squares / readings.values.len() as f64).sqrt()
 }
 
 /// Networks that predict the readings of each row, in f64 and without the clamp on their inputs.

@@ -81,6 +81,8 @@ pub struct RowWire {
     pub percent_other: f64,
     /// Share of the rows without a solution.
     pub percent_unsolved: f64,
+    /// Share of the rows for which this search or another one from elsewhere came to the true deformation.
+    pub percent_reached: f64,
     /// Share of the rows whose z is off by less than 1e-6 mm at every electrode.
     pub percent_z_exact: f64,
     /// Share of the rows with more than one deformation within the scene's ranges that gives their readings.
@@ -111,6 +113,7 @@ impl EquationsResult {
             percent_true: mean(&|row| row.percent_true),
             percent_other: mean(&|row| row.percent_other),
             percent_unsolved: mean(&|row| row.percent_unsolved),
+            percent_reached: mean(&|row| row.percent_reached),
             percent_z_exact: mean(&|row| row.percent_z_exact),
             percent_ambiguous: mean(&|row| row.percent_ambiguous),
             most_alike: rows.iter().map(|row| row.most_alike).max()?,
@@ -139,8 +142,10 @@ pub fn study(
         let exact = Equations::exact(world);
         let solved = exact.solve_all(readings);
         let found = solved.iter().filter(|solution| solution.converged).count();
-        let mut decoders =
-            vec![level.judge(&Solved(&exact, &solved)), level.judge(&Equations::damped(world))];
+        let mut decoders = vec![
+            level.judge(&Solved(&exact, &solved)),
+            level.judge(&Equations::damped(world, noise_level)),
+        ];
         progress.step();
         if noise_level == 0.0 {
             without_noise = by_row_wire(&level, &exact, &solved, plan.searches, progress);
@@ -190,10 +195,16 @@ fn largest_difference(a: &[f64], b: &[f64], first: usize, step: usize) -> f64 {
     pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
+/// Whether two deformations are not the same one.
+fn is_other(a: &[f64], b: &[f64]) -> bool {
+    largest_difference(a, b, 0, 1) > SAME_MM
+}
+
 /// What is found of one row of one frame.
 struct OfRow {
     is_true: bool,
     is_other: bool,
+    is_reached: bool,
     z_is_exact: bool,
     alike: usize,
     /// Probability of the most probable one of the deformations that read alike.
@@ -226,9 +237,11 @@ fn by_row_wire(
             let start = ranges.iter().map(|range| random.between(*range));
             equations.solve_row(place, readings, &start.collect::<Vec<_>>())
         });
+        let mut is_reached = false;
         for other in std::iter::once(solved[n].clone()).chain(others) {
             let inside = other.place.iter().zip(ranges).all(|(x, r)| (r[0]..=r[1]).contains(x));
-            let is_new = |known: &Vec<f64>| largest_difference(known, &other.place, 0, 1) > SAME_MM;
+            is_reached |= other.converged && !is_other(truth, &other.place);
+            let is_new = |known: &Vec<f64>| is_other(known, &other.place);
             if other.converged && inside && alike.iter().all(is_new) {
                 alike.push(other.place);
             }
@@ -240,10 +253,11 @@ fn by_row_wire(
         let largest = densities.clone().fold(0.0, f64::max);
         let at_rest = equations.determinant(place, &vec![0.0; unknowns]);
         let found = &solved[n];
-        let is_true = found.converged && largest_difference(&found.place, truth, 0, 1) <= SAME_MM;
+        let is_true = found.converged && !is_other(truth, &found.place);
         OfRow {
             is_true,
             is_other: found.converged && !is_true,
+            is_reached,
             z_is_exact: largest_difference(&found.place, truth, 2, 3) < NONE_MM,
             alike: alike.len(),
             probability: largest / densities.sum::<f64>(),
@@ -263,6 +277,7 @@ fn by_row_wire(
             percent_true,
             percent_other,
             percent_unsolved: share(&|it| !it.is_true && !it.is_other),
+            percent_reached: share(&|it| it.is_reached),
             percent_z_exact: share(&|it| it.z_is_exact),
             percent_ambiguous: share(&|it| it.alike > 1),
             most_alike: found().map(|it| it.alike).max().unwrap_or(0),

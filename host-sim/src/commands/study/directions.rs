@@ -88,12 +88,14 @@ fn page_of(result: &DirectionsResult) -> print::Page {
         let inversion = |level: &Level| level.inversions[place].clone();
         page.line(format_args!("\n{name:<18}{columns}"));
         page.line(line("rows converged, %", &|level| Some(inversion(level).percent_converged)));
-        page.line(line("µs a frame", &|level| Some(inversion(level).frame_us)));
+        let times = result.levels.iter().map(|it| format!("{:>10.0}", inversion(it).frame_us));
+        page.line(format_args!("{:<18}{}", "µs a frame", times.collect::<String>()));
     }
     page.line(
         "\nAll rows count: one that did not converge has the last place of the search, in the box of 20 % of H.\n\
          network, under readings: from deformations to readings; under deformations: decodes directly.\n\
-         to ideal: against readings without noise. The time is that of all cores of this machine.",
+         to ideal: against readings without noise. The time is that of all cores of this machine.\n\
+         damped: within noise and the network's own error, which the training frames tell.",
     );
     super::refusals(&mut page, result.levels.iter().map(|it| (it.noise_level, &it.limit)));
     page

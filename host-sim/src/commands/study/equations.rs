@@ -75,11 +75,12 @@ fn page_of(result: &EquationsResult) -> print::Page {
         result.searches
     ));
     page.line(format_args!(
-        "{:>8} {:>8} {:>8} {:>9} {:>9} {:>10} {:>6} {:>12} {:>8}",
+        "{:>8} {:>8} {:>8} {:>9} {:>9} {:>9} {:>10} {:>6} {:>12} {:>8}",
         "row",
         "truth",
         "another",
         "unsolved",
+        "reached",
         "z < 1e-6",
         "ambiguous",
         "most",
@@ -93,9 +94,10 @@ fn page_of(result: &EquationsResult) -> print::Page {
         page.line(line_of("all", &all));
     }
     page.line(
-        "truth: solved to the true deformation; another: to one that reads alike; z < 1e-6: off by less, in mm, at every\n\
-         electrode; ambiguous: several deformations within the scene's ranges read alike, `most` of one row;\n\
-         any decoder: rows that the best choice among these gets right; turned: det ∂ln R/∂Δ has not the sign of rest.",
+        "truth: solved to the true deformation; another: to one that reads alike; reached: to the truth by any search;\n\
+         z < 1e-6: off by less, in mm, at every electrode; ambiguous: several deformations within the scene's ranges\n\
+         read alike, `most` of one row; any decoder: rows that the best choice among these gets right;\n\
+         turned: the determinant of ∂ln R/∂Δ has not the sign that it has at rest.",
     );
     page
 }
@@ -107,10 +109,11 @@ fn columns(levels: &[Level]) -> String {
 fn line_of(name: &str, row: &RowWire) -> String {
     let optional = |value: Option<f64>| value.map_or("-".into(), |value| format!("{value:.1}"));
     format!(
-        "{name:>8} {:>8.1} {:>8.1} {:>9.1} {:>9.1} {:>10.1} {:>6} {:>12} {:>8}",
+        "{name:>8} {:>8.1} {:>8.1} {:>9.1} {:>9.1} {:>9.1} {:>10.1} {:>6} {:>12} {:>8}",
         row.percent_true,
         row.percent_other,
         row.percent_unsolved,
+        row.percent_reached,
         row.percent_z_exact,
         row.percent_ambiguous,
         row.most_alike,
