@@ -14,10 +14,10 @@ const FALL: f64 = 0.316_227_766_016_837_94;
 const LAST_DAMPING: f64 = 1e-24;
 /// Largest change of an unknown in one step, in its deviations.
 const LARGEST_STEP: f64 = 1.0;
-/// Most steps at the least damping.
-const LAST_STEPS: usize = 100;
-/// Largest last step, in deviations.
-const SMALLEST_STEP: f64 = 1e-6;
+/// Most steps without damping, and the largest last one in deviations: rounding may move the place further.
+const EXACT_END: (usize, f64) = (20, 1e-9);
+/// Most steps at a least damping that stays, and the largest last one: these steps converge slowly.
+const DAMPED_END: (usize, f64) = (100, 1e-6);
 /// Rise of a damped sum, relative to it, that rounding explains.
 const SMALLEST_RISE: f64 = 1e-13;
 
@@ -75,7 +75,8 @@ pub fn solve(
     let (mut steps, mut settled) = (0, false);
     // Last place from which the damped sum fell at the least damping, with that sum.
     let mut lowest: Option<(f64, Vec<f64>)> = None;
-    while last_steps < LAST_STEPS && !settled {
+    let (most, smallest) = if least_damping > 0.0 { DAMPED_END } else { EXACT_END };
+    while last_steps < most && !settled {
         equations(&place, &mut residuals, &mut derivatives);
         steps += 1;
         let is_last = damping <= least_damping;
@@ -99,7 +100,7 @@ pub fn solve(
         place.iter_mut().zip(&step).for_each(|(x, d)| *x = (*x + share * d).clamp(-bound, bound));
         if is_last {
             last_steps += usize::from(damping == 0.0);
-            settled = largest < SMALLEST_STEP;
+            settled = largest < smallest;
         } else {
             damping = (damping * FALL).max(least_damping);
             damping = if damping < LAST_DAMPING { 0.0 } else { damping };

@@ -43,7 +43,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 
 /// Headings of columns, one a noise level.
 fn noise_columns(levels: impl Iterator<Item = f64>) -> String {
-    levels.map(|level| format!("{:>10}", percent(level))).collect()
+    let columns: Vec<String> = levels.map(|level| format!("{:>10}", percent(level))).collect();
+    columns.concat()
 }
 
 /// Line of a table of errors.

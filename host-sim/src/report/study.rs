@@ -17,8 +17,8 @@ const GROUP: &str = "dz_mm";
 const SIZE: [f64; 2] = [920.0, 420.0];
 
 /// Results at one noise level.
-struct Level<'l> {
-    noise_level: f64,
+struct AtNoise<'l> {
+    level: f64,
     decoders: &'l [DecoderErrors],
     limit: &'l LimitSummary,
 }
@@ -27,12 +27,12 @@ struct Level<'l> {
 type Line = (&'static str, &'static str, &'static str, Mark);
 
 /// Picture of the RMSE of z against the noise. A level without noise has no place on its axis.
-fn by_noise(title: &str, levels: &[Level<'_>], lines: &[Line]) -> String {
-    let points = |of: &dyn Fn(&Level<'_>) -> Option<f64>| -> Vec<[f64; 2]> {
-        let noisy = levels.iter().filter(|level| level.noise_level > 0.0);
-        noisy.map(|level| [level.noise_level, of(level).unwrap_or(f64::NAN)]).collect()
+fn by_noise(title: &str, levels: &[AtNoise<'_>], lines: &[Line]) -> String {
+    let points = |of: &dyn Fn(&AtNoise<'_>) -> Option<f64>| -> Vec<[f64; 2]> {
+        let noisy = levels.iter().filter(|level| level.level > 0.0);
+        noisy.map(|level| [level.level, of(level).unwrap_or(f64::NAN)]).collect()
     };
-    let rmse = |level: &Level<'_>, decoder: &str| {
+    let rmse = |level: &AtNoise<'_>, decoder: &str| {
         let errors = of_decoder(level.decoders, decoder);
         errors.iter().find(|errors| errors.group == GROUP).map(|errors| errors.rmse)
     };
@@ -41,7 +41,7 @@ fn by_noise(title: &str, levels: &[Level<'_>], lines: &[Line]) -> String {
         let points = points(&|level| rmse(level, decoder));
         series.push(Series::new(name, class, mark.clone(), points));
     }
-    let limit = |level: &Level<'_>| {
+    let limit = |level: &AtNoise<'_>| {
         level.limit.groups.iter().find(|it| it.group == GROUP).map(|group| group.limit)
     };
     series.push(Series::new("limit", "c3", Mark::LineAnd(Shape::Triangle), points(&limit)));
@@ -67,10 +67,10 @@ fn by_noise(title: &str, levels: &[Level<'_>], lines: &[Line]) -> String {
 
 /// Picture of the sensor's equations as a decoder.
 pub fn equations_svg(result: &EquationsResult) -> String {
-    let levels: Vec<Level<'_>> = result
+    let levels: Vec<AtNoise<'_>> = result
         .levels
         .iter()
-        .map(|it| Level { noise_level: it.noise_level, decoders: &it.decoders, limit: &it.limit })
+        .map(|it| AtNoise { level: it.noise_level, decoders: &it.decoders, limit: &it.limit })
         .collect();
     by_noise(
         "Error of the sensor's equations as a decoder, against the noise",
@@ -87,10 +87,10 @@ pub fn equations_svg(result: &EquationsResult) -> String {
 
 /// Picture of decoding in both directions.
 pub fn decoding_svg(result: &DirectionsResult) -> String {
-    let levels: Vec<Level<'_>> = result
+    let levels: Vec<AtNoise<'_>> = result
         .levels
         .iter()
-        .map(|it| Level { noise_level: it.noise_level, decoders: &it.decoders, limit: &it.limit })
+        .map(|it| AtNoise { level: it.noise_level, decoders: &it.decoders, limit: &it.limit })
         .collect();
     by_noise(
         "Error of decoding in both directions, against the noise",

@@ -29,7 +29,7 @@ fn a_forward_scene_trains_and_its_blob_predicts_readings_from_deformations() {
     assert!(rmse(0) < 0.8 * rmse(1), "{evaluated}");
 
     let run = folder.succeed(&["run", "scene.toml"]);
-    assert!(run.contains("own noise: 0.2") && run.contains("18 deformations -> K"), "{run}");
+    assert!(run.contains("0.253 Ω RMS") && run.contains("18 deformations -> K"), "{run}");
     assert!(folder.path("out/small/report.html").exists());
 }
 

@@ -202,8 +202,8 @@ fn is_other(a: &[f64], b: &[f64]) -> bool {
 
 /// What is found of one row of one frame.
 struct OfRow {
-    is_true: bool,
-    is_other: bool,
+    /// Whether the row was solved, and if so to the truth.
+    is_true: Option<bool>,
     is_reached: bool,
     z_is_exact: bool,
     alike: usize,
@@ -253,10 +253,9 @@ fn by_row_wire(
         let largest = densities.clone().fold(0.0, f64::max);
         let at_rest = equations.determinant(place, &vec![0.0; unknowns]);
         let found = &solved[n];
-        let is_true = found.converged && !is_other(truth, &found.place);
+        let is_true = found.converged.then(|| !is_other(truth, &found.place));
         OfRow {
             is_true,
-            is_other: found.converged && !is_true,
             is_reached,
             z_is_exact: largest_difference(&found.place, truth, 2, 3) < NONE_MM,
             alike: alike.len(),
@@ -270,13 +269,14 @@ fn by_row_wire(
         let count = found().count();
         let share =
             |has: &dyn Fn(&OfRow) -> bool| percent(found().filter(|it| has(it)).count(), count);
-        let (percent_true, percent_other) = (share(&|it| it.is_true), share(&|it| it.is_other));
+        let (percent_true, percent_other) =
+            (share(&|it| it.is_true == Some(true)), share(&|it| it.is_true == Some(false)));
         let probability: f64 = found().map(|it| it.probability).sum();
         RowWire {
             row_wire: row + 1,
             percent_true,
             percent_other,
-            percent_unsolved: share(&|it| !it.is_true && !it.is_other),
+            percent_unsolved: share(&|it| it.is_true.is_none()),
             percent_reached: share(&|it| it.is_reached),
             percent_z_exact: share(&|it| it.z_is_exact),
             percent_ambiguous: share(&|it| it.alike > 1),

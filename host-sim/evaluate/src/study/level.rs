@@ -79,7 +79,7 @@ impl NoiseLevel {
             no_limit.clone_from(&limit.refused);
         }
         let test = scene.dataset(&Synthesis::of(&scene.world), Stream::Test, frames);
-        Self { test, measure, limit, scene }
+        Self { scene, test, measure, limit }
     }
 
     /// Errors of `decoder` on the test frames.
