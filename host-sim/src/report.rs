@@ -7,6 +7,8 @@ use taxel_evaluate::evaluate::limit::LimitResult;
 use taxel_evaluate::evaluate::printed::Cells;
 use taxel_evaluate::evaluate::trade::Trade;
 use taxel_evaluate::run::RunResult;
+use taxel_evaluate::study::directions::DirectionsResult;
+use taxel_evaluate::study::equations::EquationsResult;
 
 mod format;
 mod ticks;
@@ -29,6 +31,7 @@ mod html;
 mod printed;
 mod trade;
 mod limit;
+mod study;
 
 pub use view::{Made, View};
 
@@ -79,6 +82,18 @@ pub fn known_svg(limit: &LimitResult) -> String {
 #[must_use]
 pub fn printed_svg(tables: &[(&str, Cells)]) -> String {
     printed::svg(tables)
+}
+
+/// Picture of the sensor's equations as a decoder: RMSE of z against the noise, as a file of its own.
+#[must_use]
+pub fn equations_svg(result: &EquationsResult) -> String {
+    study::equations_svg(result)
+}
+
+/// Picture of decoding in both directions: RMSE of z against the noise, as a file of its own.
+#[must_use]
+pub fn decoding_svg(result: &DirectionsResult) -> String {
+    study::decoding_svg(result)
 }
 
 #[cfg(test)]

@@ -29,11 +29,15 @@ pub fn row_of(name: &str) -> Option<usize> {
     place.starts_with(|c: char| c.is_ascii_digit()).then(|| row.parse().ok())?
 }
 
+/// Group of readings where they are outputs, of models that predict them.
+pub const READINGS: &str = "reading_ohm";
+
 /// Group under which errors of an output are reported: the axis of an electrode's deformation or force
-/// (`dz_mm` for `r4e2_dz_mm`). Any other column is a group of its own.
+/// (`dz_mm` for `r4e2_dz_mm`), or [`READINGS`]. Any other column is a group of its own.
 #[must_use]
 pub fn group_of(name: &str) -> &str {
     match (row_of(name), name.split_once('_')) {
+        (Some(_), Some((_, "ohm"))) => READINGS,
         (Some(_), Some((_, component))) => component,
         _ => name,
     }
@@ -142,6 +146,7 @@ mod tests {
         }
         assert_eq!(group_of("r4e2_dz_mm"), "dz_mm");
         assert_eq!(group_of("fx_n"), "fx_n");
+        assert_eq!((group_of("r4c17_ohm"), unit_of(READINGS)), (READINGS, "Ω"));
         assert_eq!(unit_of("r12c3_ohm"), "Ω");
         assert_eq!(unit_of("fx_n"), "N");
         assert_eq!(unit_of("ch1"), "");

@@ -17,7 +17,7 @@ use taxel_data::{BadValue, input};
 use taxel_learn::decoders::textbook::{Scaling, SpreadMeaning};
 use taxel_learn::train::{FreshFrames, check_spread};
 use taxel_learn::{Options, Origin, relative};
-use taxel_limit::Reference;
+use taxel_limit::{Reference, Refusal};
 use taxel_simulate::noise::NoiseKind;
 use taxel_simulate::outputs::Outputs;
 use taxel_simulate::synth::BASELINE_FRAMES;
@@ -27,7 +27,11 @@ use taxel_simulate::{Synthesis, World};
 use crate::error::{Error, Result};
 use crate::metrics::{LimitSummary, Measure};
 
+mod direction;
 mod file;
+
+pub use direction::Direction;
+use direction::noise_ohm;
 
 type Check = std::result::Result<(), BadValue>;
 
@@ -72,6 +76,9 @@ pub struct Training {
     /// Number format of the weights.
     #[serde(default = "default_format", deserialize_with = "file::format::deserialize")]
     pub format: Format,
+    /// Whether the model decodes readings, or predicts them.
+    #[serde(default)]
+    pub direction: Direction,
     /// Whether one network serves all rows, behind a projection of all readings, instead of one a row.
     #[serde(default)]
     pub whole_array: bool,
@@ -236,7 +243,7 @@ impl Experiment {
             noise: (kind, noise.level),
             seed: self.world.seed,
             thickness_mm: Some(self.world.sensor.size_mm[2]),
-            full_scale: self.world.full_scales(),
+            full_scale: self.full_scales(),
         }
     }
 
@@ -244,7 +251,7 @@ impl Experiment {
     #[must_use]
     pub fn measure(&self) -> Measure {
         Measure {
-            full_scale: self.world.full_scales(),
+            full_scale: self.full_scales(),
             thickness_mm: Some(self.world.sensor.size_mm[2]),
             limit: None,
         }
@@ -263,6 +270,10 @@ impl Experiment {
     ) -> (Measure, LimitSummary) {
         let mut world = self.world.clone();
         world.noise.level = noise_level;
+        if self.is_forward() {
+            let noise_ohm = noise_ohm(&world, test_frames);
+            return (self.measure(), LimitSummary::of(&Err(Refusal::OwnNoise { noise_ohm })));
+        }
         let frames = Reference::few_frames(&world).min(test_frames);
         let limit = Reference::of(&world, frames, progress);
         let summary = LimitSummary::of(&limit);
@@ -271,7 +282,7 @@ impl Experiment {
 
     /// Data set of so many `frames` of `stream`, for training and for decoders that see what it saw.
     ///
-    /// Its inputs are readings, or readings relative to the baseline of each session: the mean of
+    /// Its inputs are deformations and its outputs readings if the scene's models predict readings. Otherwise its inputs are readings, or readings relative to the baseline of each session: the mean of
     /// [`BASELINE_FRAMES`] frames of the untouched sensor. `synthesis` is one of the experiment's world.
     #[must_use]
     pub fn dataset(&self, synthesis: &Synthesis<'_>, stream: Stream, frames: usize) -> Dataset {
@@ -286,7 +297,10 @@ impl Experiment {
         first: usize,
         frames: usize,
     ) -> Dataset {
-        let readings = synthesis.frames_from(stream, first, frames);
+        let mut readings = synthesis.frames_from(stream, first, frames);
+        if self.is_forward() {
+            std::mem::swap(&mut readings.inputs, &mut readings.outputs);
+        }
         if !self.training.relative_inputs {
             return readings;
         }
@@ -315,6 +329,7 @@ impl Experiment {
         check_spread("training.spread", self.training.spread)?;
         self.table1.as_ref().map_or(Ok(()), check_table1)?;
         self.check_outputs()?;
+        self.check_direction()?;
         let Some(t) = &self.table1 else { return Ok(()) };
         self.world.check_frames("table1.frames", t.frames)?;
         self.world.check_frames("table1.test_frames", t.test_frames)

@@ -1,6 +1,7 @@
 //! Main job: synthesise or read frames, train, write the blob, read it back, decode, evaluate.
 
 use serde::Serialize;
+use taxel_data::columns::READINGS;
 use taxel_data::dataset::Dataset;
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
@@ -16,6 +17,7 @@ use crate::error::Result;
 use crate::evaluate::device_cost::DeviceCost;
 use crate::evaluate::distribution::{Distribution, Reference};
 use crate::evaluate::table1::{self, Table1};
+use crate::experiment::Experiment;
 use crate::metrics::{self, DecoderErrors, Errors, LimitSummary, Measure};
 use crate::subject::Subject;
 use crate::training_set::TrainingSet;
@@ -133,6 +135,15 @@ pub struct RowErrors {
     pub errors: Vec<Errors>,
 }
 
+impl RunResult {
+    /// Whether the model predicts readings from deformations.
+    #[must_use]
+    pub fn predicts_readings(&self) -> bool {
+        let mut errors = self.decoders.iter().flat_map(|decoder| &decoder.errors);
+        !self.decoders.is_empty() && errors.all(|errors| errors.group == READINGS)
+    }
+}
+
 /// Trains on `subject` with `options`, judges the model and returns its results and the blob.
 ///
 /// # Errors
@@ -173,7 +184,7 @@ pub fn run(
         .of_blob(&blob, training.frames.frames())
         .of_frames(subject.measurements().map(|data| &data.outliers), test.frames())
         .with(Warning::out_of_range(network.share_out_of_range(&test.inputs.values)))
-        .with(subject.scene().and_then(|_| Warning::not_positive(&test.inputs)));
+        .with(decoding(subject).and_then(|_| Warning::not_positive(&test.inputs)));
     let mut result = RunResult {
         verdict,
         subject: subject.name().into(),
@@ -192,7 +203,7 @@ pub fn run(
     };
     match subject {
         Subject::Scene(scene) => {
-            result.scene = Some(scene_summary(&scene.world, &result.distribution));
+            result.scene = Some(scene_summary(scene, &result.distribution));
             if scene.table1.is_some() {
                 result.table1 = Some(table1::compute(scene, progress)?);
             }
@@ -209,10 +220,16 @@ pub fn run(
     Ok((result, blob))
 }
 
-/// Readings of the untouched sensor, as far as they are known: those of a scene without noise and drift, or the mean of
+/// Scene whose models decode readings, if it is one.
+fn decoding(subject: &Subject) -> Option<&Experiment> {
+    subject.scene().filter(|scene| !scene.is_forward())
+}
+
+/// Inputs of the untouched sensor, as far as they are known and not zero: those of a scene without noise and drift, or the mean of
 /// measured frames at rest.
 fn readings_at_rest(subject: &Subject) -> Option<Vec<f64>> {
     match subject {
+        Subject::Scene(scene) if scene.is_forward() => None,
         Subject::Scene(scene) => {
             let at_rest = Synthesis::of(&scene.world).ideal().drift(None).untouched();
             Some(at_rest.readings_of(Stream::Test, 0))
@@ -234,7 +251,8 @@ fn ideal_changes(world: &World, shown: &Distribution) -> Vec<Vec<f64>> {
     shown.frames.iter().map(|frame| of_frame(frame.frame)).collect()
 }
 
-fn scene_summary(world: &World, shown: &Distribution) -> SceneSummary {
+fn scene_summary(scene: &Experiment, shown: &Distribution) -> SceneSummary {
+    let world = &scene.world;
     SceneSummary {
         noise_kind: world.noise.kind.name().into(),
         noise_level: world.noise.level,
@@ -242,7 +260,7 @@ fn scene_summary(world: &World, shown: &Distribution) -> SceneSummary {
         size_mm: world.sensor.size_mm,
         row_wires: world.sensor.row_wires,
         sensor: SensorSketch::of(world),
-        ideal_changes: ideal_changes(world, shown),
+        ideal_changes: if scene.is_forward() { vec![] } else { ideal_changes(world, shown) },
     }
 }
 

@@ -11,6 +11,7 @@ use taxel_limit::Refusal;
 use taxel_simulate::Synthesis;
 use taxel_simulate::outputs::Outputs;
 
+use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::measurements::Measurements;
 use crate::metrics::{LimitSummary, Measure};
@@ -53,6 +54,14 @@ impl Subject {
         }
     }
 
+    /// Refuses a scene whose models predict readings, for a `command` that is about decoding.
+    ///
+    /// # Errors
+    /// [`Error`](crate::Error) for a scene with `direction = "forward"`.
+    pub fn require_inverse(&self, command: &str) -> Result<()> {
+        self.scene().map_or(Ok(()), |scene| scene.require_inverse(command))
+    }
+
     /// Options for training its model.
     #[must_use]
     pub fn options(&self) -> Options {
@@ -75,7 +84,7 @@ impl Subject {
     #[must_use]
     pub fn output_names(&self) -> Vec<String> {
         match self {
-            Self::Scene(scene) => scene.world.output_names(),
+            Self::Scene(scene) => scene.output_names(),
             Self::Measured(data) => data.training.outputs.names.clone(),
         }
     }

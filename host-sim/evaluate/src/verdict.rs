@@ -2,6 +2,7 @@
 
 use model_core::rbf::{Format, Shape, expanded, fixed16};
 use serde::Serialize;
+use taxel_data::columns::READINGS;
 use taxel_learn::ModelBlob;
 use taxel_learn::decoders::{linear, mean};
 use taxel_learn::outliers::Outliers;
@@ -50,8 +51,10 @@ impl Verdict {
             .partition(|group| others.of_mean(group).is_none_or(|share| share <= HARDLY));
         let mut sentences = Vec::new();
         if !decoded.is_empty() {
+            let predicts = decoded.iter().all(|group| group.group == READINGS);
             sentences.push(format!(
-                "The model decodes {}{}.",
+                "The model {} {}{}.",
+                if predicts { "predicts" } else { "decodes" },
                 listed(&decoded.iter().map(|group| with_error(group)).collect::<Vec<_>>()),
                 others.gains(&decoded)
             ));

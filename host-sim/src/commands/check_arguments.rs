@@ -125,6 +125,7 @@ impl CheckArguments {
 
     fn load_scene(&self, common: &Common) -> Result<Checked> {
         let scene = SceneArgument::new(&self.source, self.precision).load_world(common)?;
+        scene.require_inverse("a check of a device")?;
         scene.world.check_frames("-n", self.frames)?;
         let model = match &self.model {
             Some(path) => ModelBlob::read(path)?,

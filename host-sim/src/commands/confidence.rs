@@ -48,6 +48,7 @@ struct Summary {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let mut scene = arguments.scene.load(common)?;
+    scene.require_inverse("confidence")?;
     arguments.noise.apply(&mut scene)?;
     scene.world.check_frames("--frames", arguments.frames)?;
     scene.training.confidence = true;

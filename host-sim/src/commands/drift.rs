@@ -31,6 +31,7 @@ pub struct Arguments {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let mut scene = arguments.scene.load(common)?;
+    scene.require_inverse("drift")?;
     arguments.noise.apply(&mut scene)?;
     let of_scene = scene.world.drift.map_or(TYPICAL_GAIN, |drift| drift.gain);
     let gain = arguments.gain.unwrap_or(of_scene);

@@ -58,6 +58,7 @@ pub struct Arguments {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let subject = arguments.subject.load(common)?;
+    subject.require_inverse("gate")?;
     let frames = arguments.frames.unwrap_or(FRAMES);
     let baseline_frames = arguments.baseline_frames.unwrap_or(BASELINE_FRAMES);
     check(arguments, &subject, [frames, baseline_frames])?;

@@ -34,6 +34,7 @@ pub struct Arguments {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let scene = arguments.scene.load(common)?;
+    scene.require_inverse("readout")?;
     scene.world.check_frames("--frames", arguments.frames)?;
     VirtualBoard::new(&scene.world)?;
     let model = scene_argument::model(arguments.model.as_deref(), &scene, &Terminal::new())?;

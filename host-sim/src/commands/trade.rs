@@ -94,6 +94,7 @@ pub struct Arguments {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let subject = arguments.subject.load(common)?;
+    subject.require_inverse("trade")?;
     let names = subject.output_names();
     let groups: Vec<&str> = columns::groups(&names).into_iter().map(|(group, _)| group).collect();
     let group = match &arguments.group {

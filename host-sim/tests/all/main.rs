@@ -10,6 +10,7 @@ mod calibrate;
 mod contact;
 mod data_files;
 mod device;
+mod directions;
 mod drift;
 mod gate;
 mod health;

@@ -80,7 +80,12 @@ impl Worth {
         let verdict = Verdict::of(&decoders, &no_limit)
             .of_blob(blob, set.frames.frames())
             .of_frames(subject.measurements().map(|data| &data.outliers), set.frames.frames())
-            .with(subject.scene().and_then(|_| Warning::not_positive(&set.frames.inputs)));
+            .with(
+                subject
+                    .scene()
+                    .filter(|scene| !scene.is_forward())
+                    .and_then(|_| Warning::not_positive(&set.frames.inputs)),
+            );
         Self { judged_on, decoders, verdict }
     }
 }

@@ -1,0 +1,5 @@
+//! Studies of one question each: what the command `study` computes.
+
+mod level;
+pub mod equations;
+pub mod directions;
