@@ -391,7 +391,7 @@ mod tests {
     fn a_search_that_was_ended_goes_on_to_the_same_result() {
         // All set-ups small, so that the test is quick: what is saved is what is drawn.
         let small =
-            |number: usize| Tried::new(Setup([1, 0, 0, number % 3, 0, 2, 0, number % 2, 0]), 7);
+            |number: usize| Tried::new(Setup([1, 0, 0, number % 3, 0, 2, 0, number % 2, 0, 0]), 7);
         let first: Vec<Tried> = (0..4).map(small).collect();
         let mut saved = Vec::new();
         let keep = |tried: &[Tried]| -> Result<(), Infallible> {
@@ -409,7 +409,7 @@ mod tests {
         let with = |first: usize, offset: f64| {
             let cells = CELLS.map(|line| line.map(|cell| cell + offset));
             Tried {
-                setup: Setup([first, 0, 0, 0, 0, 0, 0, 0, 0]),
+                setup: Setup([first, 0, 0, 0, 0, 0, 0, 0, 0, 0]),
                 covariance: 0,
                 formula: 0,
                 cells,

@@ -174,6 +174,38 @@ pub struct TextbookNetwork {
     outputs: usize,
 }
 
+impl TextbookNetwork {
+    /// Predicts the outputs for one line of `inputs`, and writes their slopes by each input (`outputs × inputs`).
+    ///
+    /// # Panics
+    /// If a slice has another length.
+    pub fn predict_with_slopes(&self, inputs: &[f64], predicted: &mut [f64], slopes: &mut [f64]) {
+        let (scaled, count) = (self.hidden.scaled(inputs), inputs.len());
+        let mut activations = vec![0.0; self.hidden.centres.len() / count + 1];
+        self.hidden.regressors(self.decay).evaluate(&scaled, &mut activations);
+        predicted.fill(0.0);
+        slopes.fill(0.0);
+        let centres = self.hidden.centres.chunks_exact(count);
+        let weights = self.weights.chunks_exact(self.outputs);
+        for ((centre, activation), weights) in centres.zip(&activations).zip(weights) {
+            for ((y, slopes), w) in
+                predicted.iter_mut().zip(slopes.chunks_exact_mut(count)).zip(weights)
+            {
+                *y += activation * w;
+                let steep = -2.0 * self.decay * activation * w;
+                let offsets = scaled.iter().zip(centre).zip(&self.hidden.scale);
+                for (slope, ((x, c), [_, factor])) in slopes.iter_mut().zip(offsets) {
+                    *slope += steep * (x - c) * factor;
+                }
+            }
+        }
+        if self.bias {
+            let bias = &self.weights[self.weights.len() - self.outputs..];
+            predicted.iter_mut().zip(bias).for_each(|(y, b)| *y += b);
+        }
+    }
+}
+
 /// Predictions (`lines × outputs`) of each of the `networks`, which differ in their weights alone.
 #[must_use]
 pub fn predict_each(networks: &[TextbookNetwork], readings: &[f64]) -> Vec<Vec<f64>> {
@@ -262,6 +294,23 @@ mod tests {
     fn half_its_height_is_at_the_spread() {
         assert!(((-SpreadMeaning::HalfHeight.decay(0.3) * 0.09).exp() - 0.5).abs() < 1e-12);
         assert!(((-SpreadMeaning::Sigma.decay(0.3) * 0.09).exp() - (-0.5_f64).exp()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn slopes_are_those_of_the_predictions() {
+        let table = table();
+        let mut random = Random::new(1, Stream::Training, Purpose::Centres, 0, 0);
+        let hidden = Arc::new(Textbook::new(&table, Scaling::Maximum, 7, &mut random));
+        let network = hidden.fit(&table, 40.0, true, &[1e4]).swap_remove(0);
+        let (mut predicted, mut slopes) = ([0.0; 2], [0.0; 4]);
+        network.predict_with_slopes(&[55.0, 70.0], &mut predicted, &mut slopes);
+        let at = |a, b| network.predict(&[a, b]);
+        assert!(predicted.iter().zip(at(55.0, 70.0)).all(|(a, b)| (a - b).abs() < 1e-12));
+        for o in 0..2 {
+            let by_a = (at(55.001, 70.0)[o] - at(54.999, 70.0)[o]) / 0.002;
+            let by_b = (at(55.0, 70.001)[o] - at(55.0, 69.999)[o]) / 0.002;
+            assert!((slopes[2 * o] - by_a).abs() < 1e-6 && (slopes[2 * o + 1] - by_b).abs() < 1e-6);
+        }
     }
 
     #[test]

@@ -6,7 +6,8 @@ use taxel_data::dataset::RowTable;
 use taxel_data::random::{Purpose, Random, Stream};
 use taxel_data::table::Table;
 use taxel_learn::decoders::textbook::{Textbook, predict_each};
-use taxel_simulate::outputs::{ElectrodeOutputs, Outputs, Quantity};
+use taxel_limit::solve::{Unknowns, solve};
+use taxel_simulate::outputs::{ElectrodeOutputs, Quantity};
 use taxel_simulate::sensor::Axis;
 use taxel_simulate::{Synthesis, World};
 
@@ -29,36 +30,51 @@ pub const FORMULAS: [&str; 7] = [
 
 /// Row-wire (from 0) whose table is computed: one of the middle.
 const ROW: usize = 3;
-/// Fresh samples that a table is judged on.
-const TEST_FRAMES: usize = 400;
+/// Most samples that a table is judged on; training has up to 600.
+const TEST_FRAMES: usize = 600;
+/// Most samples for which networks are inverted: each takes a millisecond.
+const INVERTED_FRAMES: usize = 24;
+/// Electrodes of a row-wire.
+const ELECTRODES: usize = 6;
+/// Standard deviation of a deformation that is uniform on ±1 mm.
+const DEVIATION_MM: f64 = 0.577_350_269_189_625_8;
 
 /// Tables of a set-up, by initial covariance, then by formula.
 pub type Tables = Vec<[Cells; FORMULAS.len()]>;
 
+/// Samples at one noise level: what networks are trained on, and what they are judged on.
+struct Level {
+    training: RowTable,
+    judged: RowTable,
+    random: Random,
+}
+
 /// Computes the tables of `setup` for one `draw` of samples and noise; judged on at most `most` samples.
 #[must_use]
 pub fn compute(setup: &Setup, draw: u64, most: usize) -> Tables {
-    let z_alone = ElectrodeOutputs { quantity: Quantity::Deformation, axes: vec![Axis::Z] };
+    let every_axis = setup.is_forward() && !setup.moves_z_alone();
+    let axes = if every_axis { vec![Axis::X, Axis::Y, Axis::Z] } else { vec![Axis::Z] };
     let world = World {
         seed: draw,
         motion: setup.motion(),
         read_rows: vec![ROW],
-        outputs: Outputs::Electrodes(z_alone),
+        outputs: ElectrodeOutputs { quantity: Quantity::Deformation, axes }.into(),
         ..World::paper()
     };
     let thickness_mm = world.sensor.size_mm[2];
     let synthesis = Synthesis::of(&world).ideal();
     let ideal = synthesis.frames(Stream::Training, setup.frames()).row_table(0);
+    let most = if setup.is_forward() { most.min(INVERTED_FRAMES) } else { most.min(TEST_FRAMES) };
     let test = match setup.judged_on() {
-        JudgedOn::Fresh => synthesis.frames(Stream::Test, TEST_FRAMES.min(most)).row_table(0),
+        JudgedOn::Fresh => synthesis.frames(Stream::Test, most).row_table(0),
         JudgedOn::SameDeformations | JudgedOn::Training => ideal.first(setup.frames().min(most)),
     };
     let mut tables = vec![[[[f64::NAN; 4]; 10]; FORMULAS.len()]; INITIAL_COVARIANCES.len()];
-    for (j, level) in NOISE_LEVELS.into_iter().enumerate() {
+    for (j, noise_level) in NOISE_LEVELS.into_iter().enumerate() {
         let noisy = |table: &RowTable, stream| {
             let mut random = Random::new(draw, stream, Purpose::Noise, j as u64, ROW as u64);
-            let inputs =
-                with_noise(&table.inputs, &ideal.inputs, setup.noise(), level, &mut random);
+            let noise = (setup.noise(), noise_level);
+            let inputs = with_noise(&table.inputs, &ideal.inputs, noise, &mut random);
             RowTable { inputs, ..table.clone() }
         };
         let training = noisy(&ideal, Stream::Training);
@@ -66,16 +82,13 @@ pub fn compute(setup: &Setup, draw: u64, most: usize) -> Tables {
             JudgedOn::Training => training.first(test.inputs.len()),
             JudgedOn::Fresh | JudgedOn::SameDeformations => noisy(&test, Stream::Test),
         };
-        let mut random =
-            Random::new(draw, Stream::Training, Purpose::Centres, j as u64, ROW as u64);
-        let hidden =
-            Arc::new(Textbook::new(&training, setup.scaling(), setup.centres(), &mut random));
-        for (i, spread) in SPREADS.into_iter().enumerate() {
-            let decay = setup.spread().decay(spread);
-            let networks = hidden.fit(&training, decay, setup.bias(), &INITIAL_COVARIANCES);
-            let predicted = predict_each(&networks, &judged.inputs.values);
-            for (tables, predicted) in tables.iter_mut().zip(predicted) {
-                let errors = errors(&judged.outputs, &predicted, thickness_mm, setup.range_mm());
+        let random = Random::new(draw, Stream::Training, Purpose::Centres, j as u64, ROW as u64);
+        let level = Level { training, judged, random };
+        let predicted =
+            if setup.is_forward() { inverted(setup, level) } else { direct(setup, level) };
+        for (i, each) in predicted.into_iter().enumerate() {
+            for (tables, (truth, predicted)) in tables.iter_mut().zip(each) {
+                let errors = errors(&truth, &predicted, thickness_mm, setup.range_mm());
                 tables.iter_mut().zip(errors).for_each(|(table, error)| table[i][j] = error);
             }
         }
@@ -83,12 +96,68 @@ pub fn compute(setup: &Setup, draw: u64, most: usize) -> Tables {
     tables
 }
 
+/// True Δz of a table, and their predictions, by spread, then by initial covariance.
+type Predicted = Vec<Vec<(Table, Vec<f64>)>>;
+
+/// Predictions of networks from readings to deformations.
+fn direct(setup: &Setup, mut level: Level) -> Predicted {
+    let hidden =
+        Textbook::new(&level.training, setup.scaling(), setup.centres(), &mut level.random);
+    let hidden = Arc::new(hidden);
+    let of_spread = |spread| {
+        let decay = setup.spread().decay(spread);
+        let networks = hidden.fit(&level.training, decay, setup.bias(), &INITIAL_COVARIANCES);
+        let predicted = predict_each(&networks, &level.judged.inputs.values);
+        predicted.into_iter().map(|predicted| (level.judged.outputs.clone(), predicted)).collect()
+    };
+    SPREADS.into_iter().map(of_spread).collect()
+}
+
+/// Predictions by inverting networks from deformations to readings, from rest; for the largest initial covariance alone.
+fn inverted(setup: &Setup, mut level: Level) -> Predicted {
+    let RowTable { inputs: readings, outputs: deformations, .. } = level.training;
+    let training = RowTable { inputs: deformations, outputs: readings, common_span: false };
+    let hidden = Textbook::new(&training, setup.scaling(), setup.centres(), &mut level.random);
+    let hidden = Arc::new(hidden);
+    let (readings, truth) = (&level.judged.inputs, &level.judged.outputs);
+    let (count, unknowns) = (readings.names.len(), truth.names.len());
+    let along_z: Vec<usize> =
+        (0..unknowns).filter(|i| unknowns == ELECTRODES || i % 3 == 2).collect();
+    let z_of = |line: &[f64]| -> Vec<f64> { along_z.iter().map(|i| line[*i]).collect() };
+    let z = Table {
+        names: along_z.iter().map(|i| truth.names[*i].clone()).collect(),
+        values: truth.lines().flat_map(z_of).collect(),
+    };
+    let rest = vec![0.0; unknowns];
+    let start = Unknowns { start: &rest, deviation: DEVIATION_MM, largest: 1.0 };
+    let mut slopes = vec![0.0; count * unknowns];
+    let mut of_spread = |spread| {
+        let decay = setup.spread().decay(spread);
+        let covariances = &INITIAL_COVARIANCES[..1];
+        let network = hidden.fit(&training, decay, setup.bias(), covariances).swap_remove(0);
+        let mut predicted = Vec::new();
+        for reading in readings.lines() {
+            let found = solve(&start, count, (0.0, 0.0), |place, residuals, derivatives| {
+                network.predict_with_slopes(place, residuals, &mut slopes);
+                for (k, (residual, reading)) in residuals.iter_mut().zip(reading).enumerate() {
+                    *residual = *residual / reading - 1.0;
+                    for i in 0..unknowns {
+                        derivatives[(k, i)] = slopes[k * unknowns + i] / reading;
+                    }
+                }
+            });
+            predicted.extend(z_of(&found.place));
+        }
+        vec![(z.clone(), predicted)]
+    };
+    SPREADS.into_iter().map(&mut of_spread).collect()
+}
+
 /// Readings of `table` with noise of this `level`, whose meaning refers to the `ideal` readings of training.
 fn with_noise(
     table: &Table,
     ideal: &Table,
-    noise: NoiseOf,
-    level: f64,
+    (noise, level): (NoiseOf, f64),
     random: &mut Random,
 ) -> Table {
     let deviations: Vec<f64> = match noise {
@@ -169,11 +238,20 @@ mod tests {
     fn a_standard_network_judged_on_its_own_samples_has_no_error_and_one_judged_afresh_has() {
         // x, y and z; ±1 mm; N = K = 50; noise of the reading; [0, 1]; σ; no bias.
         let [own, fresh] = [2, 0].map(|judged| {
-            let tables = compute(&Setup([0, 1, 0, 5, 0, 0, 0, 0, judged]), 1, 400);
+            let tables = compute(&Setup([0, 1, 0, 5, 0, 0, 0, 0, judged, 0]), 1, 400);
             tables[0][5] // δ = 1e6, RMSE/H
         });
         assert!(own[0].iter().all(|error| *error < 0.1), "{own:?}");
         // Always predicting the mean has 100·(1/√3)/5 = 11.5 %.
         assert!(fresh.as_flattened().iter().all(|error| *error > 8.0), "{fresh:?}");
+    }
+
+    #[test]
+    fn a_network_of_readings_inverted_decodes_where_z_alone_moves() {
+        // z alone; 0 … 1 mm; N = 50, K = N; noise of the reading; [0, 1]; σ; with bias; fresh samples.
+        let tables = compute(&Setup([1, 0, 0, 5, 0, 0, 0, 1, 0, 1]), 1, 8);
+        let rmse = tables[0][5]; // δ = 1e6, RMSE/H; always predicting the mean has 5.8 %
+        assert!(rmse[9][0] < 4.0 && rmse[9][0] < rmse[9][3], "{rmse:?}");
+        assert!(tables[1][5].as_flattened().iter().all(|cell| cell.is_nan()), "one covariance");
     }
 }

@@ -16,7 +16,7 @@ pub struct Axis {
 }
 
 /// Every axis, in the order of a [`Setup`]'s values.
-pub const AXES: [Axis; 9] = [
+pub const AXES: [Axis; 10] = [
     Axis { name: "what moves", values: &["x, y and z", "z alone", "one contact"] },
     Axis { name: "range of Δz", values: &["0 … 1 mm", "±1 mm"] },
     Axis { name: "samples N", values: &["50", "100", "200", "400", "600"] },
@@ -38,6 +38,7 @@ pub const AXES: [Axis; 9] = [
         name: "judged on",
         values: &["fresh samples", "training deformations, fresh noise", "the training samples"],
     },
+    Axis { name: "network", values: &["readings to Δ", "Δ to readings, inverted"] },
 ];
 
 const FRAMES: [usize; 5] = [50, 100, 200, 400, 600];
@@ -75,6 +76,9 @@ pub enum JudgedOn {
 pub const JUDGED: usize = 8;
 /// Index of one contact on the axis of what moves.
 const CONTACT: usize = 2;
+const DIRECTION: usize = 9;
+/// One set-up in so many that are drawn inverts a network, which takes seconds.
+const FORWARD_IN: usize = 8;
 const SAMPLES: usize = 2;
 const CENTRES: usize = 3;
 
@@ -86,7 +90,9 @@ impl Setup {
     /// Draws a set-up.
     #[must_use]
     pub fn random(random: &mut Random) -> Self {
-        Self(AXES.map(|axis| random.below(axis.values.len()))).held()
+        let mut setup = Self(AXES.map(|axis| random.below(axis.values.len())));
+        setup.0[DIRECTION] = usize::from(random.below(FORWARD_IN) == 0);
+        setup.held()
     }
 
     /// Set-up that differs in one or two values, drawn at random; never in the axis `kept`.
@@ -180,6 +186,18 @@ impl Setup {
     #[must_use]
     pub fn judged_on(&self) -> JudgedOn {
         [JudgedOn::Fresh, JudgedOn::SameDeformations, JudgedOn::Training][self.0[JUDGED]]
+    }
+
+    /// Whether networks predict readings from deformations, as the end of the paper's §3 says, and are inverted.
+    #[must_use]
+    pub fn is_forward(&self) -> bool {
+        self.0[DIRECTION] == 1
+    }
+
+    /// Whether electrodes move along z alone.
+    #[must_use]
+    pub fn moves_z_alone(&self) -> bool {
+        self.0[0] == 1
     }
 
     /// Values of the set-up by the names of their axes.
