@@ -11,6 +11,7 @@ mod contact;
 mod data_files;
 mod device;
 mod drift;
+mod export;
 mod gate;
 mod health;
 #[cfg(unix)]
