@@ -100,7 +100,7 @@ impl<const INPUTS: usize, const CENTRES: usize, const OUTPUTS: usize>
         if parameters.scale(readings, &mut scaled) && !all_finite(readings) {
             return outputs;
         }
-        parameters.add_up(&scaled, &mut outputs, Polynomial::exp);
+        parameters.infer_scaled(&scaled, &mut outputs, Polynomial::exp);
         if all_finite(&outputs) { outputs } else { [NONE; OUTPUTS] }
     }
 

@@ -19,12 +19,12 @@ mod example;
 struct Register(*mut u32);
 
 impl Register {
-    fn write(&mut self, value: u32) {
+    fn set(&mut self, value: u32) {
         // SAFETY: a write to the machine's peripherals, which nothing else uses.
         unsafe { ptr::write_volatile(self.0, value) }
     }
 
-    fn read(&self) -> u32 {
+    fn get(&self) -> u32 {
         // SAFETY: as for a write.
         unsafe { ptr::read_volatile(self.0) }
     }
@@ -36,12 +36,12 @@ impl digital::ErrorType for Register {
 
 impl OutputPin for Register {
     fn set_low(&mut self) -> Result<(), Infallible> {
-        self.write(0);
+        self.set(0);
         Ok(())
     }
 
     fn set_high(&mut self) -> Result<(), Infallible> {
-        self.write(1);
+        self.set(1);
         Ok(())
     }
 }
@@ -57,8 +57,8 @@ impl SpiDevice for Register {
                 return Err(spi::ErrorKind::Other);
             };
             for byte in bytes.iter_mut() {
-                self.write(u32::from(*byte));
-                *byte = self.read() as u8;
+                self.set(u32::from(*byte));
+                *byte = self.get() as u8;
             }
         }
         Ok(())
@@ -67,8 +67,8 @@ impl SpiDevice for Register {
 
 impl DelayNs for Register {
     fn delay_ns(&mut self, ns: u32) {
-        self.write(ns);
-        while self.read() > 0 {}
+        self.set(ns);
+        while self.get() > 0 {}
     }
 }
 
@@ -83,7 +83,7 @@ fn main() -> ! {
     let mut outputs = [7, 8, 9, 10, 11, 12].map(register);
     loop {
         let estimate = sensor.estimate_dz_mm();
-        outputs.iter_mut().zip(estimate).for_each(|(output, mm)| output.write(mm.to_bits()));
+        outputs.iter_mut().zip(estimate).for_each(|(output, mm)| output.set(mm.to_bits()));
     }
 }
 

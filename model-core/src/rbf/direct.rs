@@ -51,9 +51,28 @@ impl Parameters<'_> {
     }
 
     /// Infers `output` from `scaled` inputs with the exponential `exp`. Lengths must be those of one shape.
+    ///
+    /// Not inlined on a device, so that other formats need not save the registers it uses. Not generic, so that it is
+    /// compiled with this crate, for speed.
+    #[cfg_attr(cortex_m4f, inline(never))]
+    #[cfg_attr(
+        not(cortex_m4f),
+        inline(always),
+        expect(clippy::inline_always, reason = "so that the compiler knows the exponential")
+    )]
+    pub(crate) fn infer_scaled(&self, scaled: &[f32], output: &mut [f32], exp: fn(f32) -> f32) {
+        let usual: (Result<&[f32; INPUTS], _>, Result<&mut [f32; OUTPUTS], _>) =
+            (scaled.try_into(), (&mut *output).try_into());
+        if let (Ok(scaled), Ok(output)) = usual {
+            self.add_up(scaled, output, exp);
+        } else {
+            self.add_up(scaled, output, exp);
+        }
+    }
+
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
-    pub(crate) fn add_up(&self, scaled: &[f32], output: &mut [f32], exp: fn(f32) -> f32) {
+    fn add_up(&self, scaled: &[f32], output: &mut [f32], exp: fn(f32) -> f32) {
         output.fill(0.0);
         // `max(1)`: a checked network has no empty dimension; this tells the compiler.
         let inputs = scaled.len().max(1);
@@ -237,23 +256,11 @@ impl<'a> Network<'a> {
         self.parameters.scale(reading, scaled)
     }
 
-    /// Infers `output` from `scaled` inputs with the exponential `exp`. Not inlined on a device, so that other
-    /// formats need not save the registers it uses. Not generic, so that it is compiled with this crate, for
-    /// speed.
-    #[cfg_attr(cortex_m4f, inline(never))]
-    #[cfg_attr(
-        not(cortex_m4f),
-        inline(always),
-        expect(clippy::inline_always, reason = "so that the compiler knows the exponential")
-    )]
+    /// Infers `output` from `scaled` inputs as [`Parameters::infer_scaled`] does.
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "a call")]
     pub(crate) fn infer_scaled(&self, scaled: &[f32], output: &mut [f32], exp: fn(f32) -> f32) {
-        let usual: (Result<&[f32; INPUTS], _>, Result<&mut [f32; OUTPUTS], _>) =
-            (scaled.try_into(), (&mut *output).try_into());
-        if let (Ok(scaled), Ok(output)) = usual {
-            self.parameters.add_up(scaled, output, exp);
-        } else {
-            self.parameters.add_up(scaled, output, exp);
-        }
+        self.parameters.infer_scaled(scaled, output, exp);
     }
 }
 
