@@ -94,14 +94,13 @@ impl<const INPUTS: usize, const CENTRES: usize, const OUTPUTS: usize>
     #[must_use]
     pub fn infer(&self, readings: &[f32; INPUTS]) -> [f32; OUTPUTS] {
         const { assert!(INPUTS > 0 && CENTRES > 0 && OUTPUTS > 0, "a dimension is zero") };
-        const NONE: f32 = f32::NAN;
         let parameters = self.parameters();
-        let (mut scaled, mut outputs) = ([0.0; INPUTS], [NONE; OUTPUTS]);
+        let (mut scaled, mut outputs) = ([0.0; INPUTS], [f32::NAN; OUTPUTS]);
         if parameters.scale(readings, &mut scaled) && !all_finite(readings) {
             return outputs;
         }
         parameters.infer_scaled(&scaled, &mut outputs, Polynomial::exp);
-        if all_finite(&outputs) { outputs } else { [NONE; OUTPUTS] }
+        if all_finite(&outputs) { outputs } else { [f32::NAN; OUTPUTS] }
     }
 
     /// The parameters as slices, as [`direct::Network::try_new`] takes them.

@@ -61,7 +61,7 @@ fn different(fixed: &Small, parameters: Parameters<'_>, numbers: &mut Numbers) -
         [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, f32::MIN, -0.0, 1e-45];
     let frames = (0..1000).map(|frame: usize| {
         let mut readings = numbers.array(60.0, [5.0, 9.0, 1e3, 3e38][frame % 4]);
-        if frame % 5 == 0 {
+        if frame.is_multiple_of(5) {
             readings[frame / 5 % 7] = odd[frame / 5 % odd.len()];
         }
         let of_blob = decoder.decode(&readings[..]).unwrap();
