@@ -87,7 +87,7 @@ fn header(model: &Model<'_>) -> String {
             "" => format!("//     {}\n", name.escape_debug()),
             unit => format!("//     {}, {}\n", name.escape_debug(), unit.escape_debug()),
         };
-        names.iter().zip(units.iter()).map(pair).collect::<String>()
+        names.iter().zip(units.iter()).map(pair).collect::<Vec<_>>().concat()
     };
     format!(
         "// Model {:?} in arrays of fixed size, as `host-sim export` wrote it; CRC-32 of its blob: {:08x}.\n\
@@ -146,7 +146,8 @@ fn write_static(source: &mut String, rows: &[usize], network: &direct::Network<'
 
 /// Arrays of `length` numbers, one a line.
 fn lines(values: &[f32], length: usize) -> String {
-    values.chunks_exact(length).map(|line| format!("        {line:?},\n")).collect()
+    let lines = values.chunks_exact(length).map(|line| format!("        {line:?},\n"));
+    lines.collect::<Vec<_>>().concat()
 }
 
 fn write_decode(source: &mut String, model: &Model<'_>) {
