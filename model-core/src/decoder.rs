@@ -564,7 +564,7 @@ fn is_missing(inputs: &[f32], outputs: &mut [f32], status: &mut RowStatus) -> bo
 
 /// Whether all `values` are finite, by the carry out of the exponent, without a branch for each.
 #[inline(never)]
-pub(crate) fn all_finite(values: &[f32]) -> bool {
+fn all_finite(values: &[f32]) -> bool {
     const EXPONENT: u32 = 0x7F80_0000;
     const LAST_PLACE: u32 = 0x0080_0000;
     let add = |carry, value: &f32| carry | ((value.to_bits() & EXPONENT) + LAST_PLACE);

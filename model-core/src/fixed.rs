@@ -1,8 +1,7 @@
 //! A network in arrays of fixed size, for a program that never changes its model.
 
-use crate::decoder::all_finite;
 use crate::exp::{ExpKernel, Polynomial};
-use crate::rbf::direct;
+use crate::rbf::{Shape, direct};
 
 /// Network of `INPUTS` readings, `CENTRES` Gaussians and `OUTPUTS` outputs, whose parameters are arrays of its own.
 ///
@@ -94,13 +93,14 @@ impl<const INPUTS: usize, const CENTRES: usize, const OUTPUTS: usize>
     #[must_use]
     pub fn infer(&self, readings: &[f32; INPUTS]) -> [f32; OUTPUTS] {
         const { assert!(INPUTS > 0 && CENTRES > 0 && OUTPUTS > 0, "a dimension is zero") };
-        let parameters = self.parameters();
+        let shape = Shape { inputs: INPUTS, centres: CENTRES, outputs: OUTPUTS };
+        let network = direct::Network::of_arrays(shape, self.parameters());
         let (mut scaled, mut outputs) = ([0.0; INPUTS], [f32::NAN; OUTPUTS]);
-        if parameters.scale(readings, &mut scaled) && !all_finite(readings) {
+        if network.scale(readings, &mut scaled) && !all(readings, Rule::Finite) {
             return outputs;
         }
-        parameters.infer_scaled(&scaled, &mut outputs, Polynomial::exp);
-        if all_finite(&outputs) { outputs } else { [f32::NAN; OUTPUTS] }
+        network.infer_scaled(&scaled, &mut outputs, Polynomial::exp);
+        if all(&outputs, Rule::Finite) { outputs } else { [f32::NAN; OUTPUTS] }
     }
 
     /// The parameters as slices, as [`direct::Network::try_new`] takes them.

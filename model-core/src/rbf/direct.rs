@@ -35,63 +35,6 @@ impl Parameters<'_> {
         let after = self.decay.iter().chain(self.output_weights).chain(self.bias);
         before.chain(after).chain(self.affine).map(|value| value.to_bits())
     }
-
-    /// Scales readings to [0, 1], and clamps them. Returns whether one was clamped, NaN or infinite.
-    #[inline(always)]
-    #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
-    pub(crate) fn scale(&self, reading: &[f32], scaled: &mut [f32]) -> bool {
-        let limits = self.input_minimum.iter().zip(self.input_per_span);
-        let mut any_clamped = false;
-        for ((x, &r), (&minimum, &per_span)) in scaled.iter_mut().zip(reading).zip(limits) {
-            let (scaled, clamped) = scale_and_tell(r, minimum, per_span);
-            *x = scaled;
-            any_clamped |= clamped;
-        }
-        any_clamped
-    }
-
-    /// Infers `output` from `scaled` inputs with the exponential `exp`. Lengths must be those of one shape.
-    ///
-    /// Not inlined on a device, so that other formats need not save the registers it uses. Not generic, so that it is
-    /// compiled with this crate, for speed.
-    #[cfg_attr(cortex_m4f, inline(never))]
-    #[cfg_attr(
-        not(cortex_m4f),
-        inline(always),
-        expect(clippy::inline_always, reason = "so that the compiler knows the exponential")
-    )]
-    pub(crate) fn infer_scaled(&self, scaled: &[f32], output: &mut [f32], exp: fn(f32) -> f32) {
-        let usual: (Result<&[f32; INPUTS], _>, Result<&mut [f32; OUTPUTS], _>) =
-            (scaled.try_into(), (&mut *output).try_into());
-        if let (Ok(scaled), Ok(output)) = usual {
-            self.add_up(scaled, output, exp);
-        } else {
-            self.add_up(scaled, output, exp);
-        }
-    }
-
-    #[inline(always)]
-    #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
-    fn add_up(&self, scaled: &[f32], output: &mut [f32], exp: fn(f32) -> f32) {
-        output.fill(0.0);
-        // `max(1)`: a checked network has no empty dimension; this tells the compiler.
-        let inputs = scaled.len().max(1);
-        let outputs = output.len().max(1);
-        for (&x, row) in scaled.iter().zip(self.affine.chunks_exact(outputs)) {
-            accumulate(output, x, row);
-        }
-        let common = self.decay.first().copied().unwrap_or(0.0);
-        let centres =
-            self.centres.chunks_exact(inputs).zip(self.output_weights.chunks_exact(outputs));
-        for (k, (centre, weights)) in centres.enumerate() {
-            let decay = self.decay.get(k).copied().unwrap_or(common);
-            let activation = exp(-decay * squared_distance(scaled, centre));
-            accumulate(output, activation, weights);
-        }
-        for (y, &b) in output.iter_mut().zip(self.bias) {
-            *y += b;
-        }
-    }
 }
 
 /// A network whose parameters have been checked against its shape.
@@ -153,6 +96,11 @@ impl<'a> Network<'a> {
             check_length("affine", p.affine, inputs * outputs)?;
         }
         Ok(Self { shape, parameters })
+    }
+
+    /// Makes a network of parameters whose lengths their types ensure; no value is checked.
+    pub(crate) const fn of_arrays(shape: Shape, parameters: Parameters<'a>) -> Self {
+        Self { shape, parameters }
     }
 
     pub(crate) fn check_values(&self) -> Result<(), NetworkError> {
@@ -249,18 +197,61 @@ impl<'a> Network<'a> {
         [lowest, if per_span > 0.0 { lowest + 1.0 / per_span } else { lowest }]
     }
 
-    /// Scales readings as [`Parameters::scale`] does.
+    /// Scales readings to [0, 1], and clamps them. Returns whether one was clamped, NaN or infinite.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
     pub(crate) fn scale(&self, reading: &[f32], scaled: &mut [f32]) -> bool {
-        self.parameters.scale(reading, scaled)
+        let p = &self.parameters;
+        let limits = p.input_minimum.iter().zip(p.input_per_span);
+        let mut any_clamped = false;
+        for ((x, &r), (&minimum, &per_span)) in scaled.iter_mut().zip(reading).zip(limits) {
+            let (scaled, clamped) = scale_and_tell(r, minimum, per_span);
+            *x = scaled;
+            any_clamped |= clamped;
+        }
+        any_clamped
     }
 
-    /// Infers `output` from `scaled` inputs as [`Parameters::infer_scaled`] does.
-    #[inline(always)]
-    #[expect(clippy::inline_always, reason = "a call")]
+    /// Infers `output` from `scaled` inputs with the exponential `exp`. Not inlined on a device, so that other
+    /// formats need not save the registers it uses. Not generic, so that it is compiled with this crate, for
+    /// speed.
+    #[cfg_attr(cortex_m4f, inline(never))]
+    #[cfg_attr(
+        not(cortex_m4f),
+        inline(always),
+        expect(clippy::inline_always, reason = "so that the compiler knows the exponential")
+    )]
     pub(crate) fn infer_scaled(&self, scaled: &[f32], output: &mut [f32], exp: fn(f32) -> f32) {
-        self.parameters.infer_scaled(scaled, output, exp);
+        let usual: (Result<&[f32; INPUTS], _>, Result<&mut [f32; OUTPUTS], _>) =
+            (scaled.try_into(), (&mut *output).try_into());
+        if let (Ok(scaled), Ok(output)) = usual {
+            self.add_up(scaled, output, exp);
+        } else {
+            self.add_up(scaled, output, exp);
+        }
+    }
+
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
+    fn add_up(&self, scaled: &[f32], output: &mut [f32], exp: fn(f32) -> f32) {
+        let p = &self.parameters;
+        output.fill(0.0);
+        // `max(1)`: a checked network has no empty dimension; this tells the compiler.
+        let inputs = scaled.len().max(1);
+        let outputs = output.len().max(1);
+        for (&x, row) in scaled.iter().zip(p.affine.chunks_exact(outputs)) {
+            accumulate(output, x, row);
+        }
+        let common = p.decay.first().copied().unwrap_or(0.0);
+        let centres = p.centres.chunks_exact(inputs).zip(p.output_weights.chunks_exact(outputs));
+        for (k, (centre, weights)) in centres.enumerate() {
+            let decay = p.decay.get(k).copied().unwrap_or(common);
+            let activation = exp(-decay * squared_distance(scaled, centre));
+            accumulate(output, activation, weights);
+        }
+        for (y, &b) in output.iter_mut().zip(p.bias) {
+            *y += b;
+        }
     }
 }
 
