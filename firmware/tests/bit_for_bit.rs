@@ -3,11 +3,14 @@
 
 use std::fs;
 
+use model_core::AlignedBytes;
 use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
 use model_core::rbf::Format;
 
 #[path = "../qemu/src/checks.rs"]
 mod checks;
+#[path = "../qemu/src/fixed.rs"]
+mod fixed;
 #[path = "bit_for_bit/models.rs"]
 mod models;
 
@@ -156,6 +159,23 @@ fn readings_that_no_sensor_gives_decode_alike_with_subnormals_and_without() {
     let of_all = [Format::F32, Format::Fixed16, Format::F32Direct].map(of_format).concat();
     let modes = ["kept", "flushed to zero"].map(|mode| format!("INFO subnormals {mode}\n{of_all}"));
     assert_eq!(modes.concat() + "exit status 0\n", expected_log("flush_to_zero"));
+}
+
+#[test]
+fn networks_of_fixed_size_decode_as_their_blobs_on_the_host_as_in_the_emulator() {
+    let line = |name: &str, compared: Option<fixed::Compared>| {
+        let fixed::Compared { crc, different } = compared.expect("the model loads");
+        assert_eq!(different, 0, "{name}");
+        let frames = fixed::FRAMES;
+        format!("INFO {name}: {frames} of {frames} frames bit-identical to the blob's: {crc:08x}\n")
+    };
+    let row4 = AlignedBytes::copy_of(&fs::read(in_testdata("row4.bin")).unwrap());
+    let of_host = [
+        line("hand-made", with_blob("hand-made.bin", fixed::hand_made)),
+        line("row4", fixed::row4(&row4)),
+        "exit status 0\n".to_owned(),
+    ];
+    assert_eq!(of_host.concat(), expected_log("fixed"));
 }
 
 #[test]

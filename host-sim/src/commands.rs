@@ -25,6 +25,7 @@ pub mod decode;
 pub mod confidence;
 pub mod eval;
 pub mod inspect;
+pub mod export;
 pub mod join;
 pub mod table1;
 pub mod trade;

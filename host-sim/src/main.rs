@@ -15,8 +15,8 @@ use host_sim::{Error, Result};
 mod commands;
 
 use commands::{
-    Common, confidence, decode, drift, emulate, eval, forward, gate, inspect, join, limit, link,
-    readout, run, study, synth, table1, trade, train,
+    Common, confidence, decode, drift, emulate, eval, export, forward, gate, inspect, join, limit,
+    link, readout, run, study, synth, table1, trade, train,
 };
 
 /// Simulate, train and evaluate resistive tactile sensors; write weight blobs for the device.
@@ -45,6 +45,7 @@ enum Command {
     Decode(decode::Arguments),
     Eval(eval::Arguments),
     Inspect(inspect::Arguments),
+    Export(export::Arguments),
     Table1(table1::Arguments),
     Trade(trade::Arguments),
     Readout(readout::Arguments),
@@ -70,6 +71,7 @@ impl Command {
             Self::Decode(_) => "decode",
             Self::Eval(_) => "eval",
             Self::Inspect(_) => "inspect",
+            Self::Export(_) => "export",
             Self::Table1(_) => "table1",
             Self::Trade(_) => "trade",
             Self::Readout(_) => "readout",
@@ -104,6 +106,7 @@ fn execute(command: Command, common: &Common) -> Result<()> {
         Command::Decode(arguments) => decode::execute(&arguments, common),
         Command::Eval(arguments) => eval::execute(&arguments, common),
         Command::Inspect(arguments) => inspect::execute(&arguments, common),
+        Command::Export(arguments) => export::execute(&arguments, common),
         Command::Table1(arguments) => table1::execute(&arguments, common),
         Command::Trade(arguments) => trade::execute(&arguments, common),
         Command::Readout(arguments) => readout::execute(&arguments, common),

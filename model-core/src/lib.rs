@@ -38,6 +38,7 @@ pub mod confidence;
 pub mod fill;
 pub mod blob;
 mod decoder;
+mod fixed;
 pub mod recalibration;
 
 pub use blob::Aligned;
@@ -47,6 +48,7 @@ pub use blob::AlignedBytes;
 pub use decoder::OwnedEstimate;
 pub use decoder::{Decoder, Frame, decoder_ram_bytes, scratch_floats};
 pub use estimate::{Estimate, RowStatus};
+pub use fixed::Fixed;
 pub use frame::{ColumnWire, RowWire, Wires};
 pub use gate::Gate;
 

@@ -13,6 +13,9 @@
 #[cfg(target_os = "none")]
 mod opaque;
 #[cfg(target_os = "none")]
+#[path = "../../examples/minimal.rs"]
+mod minimal;
+#[cfg(target_os = "none")]
 mod readout;
 #[cfg(target_os = "none")]
 mod application;

@@ -14,6 +14,7 @@ use firmware::readout::{
 use firmware::timing;
 use model_core::RowWire;
 
+use crate::minimal;
 use crate::opaque::opaque;
 
 /// Pin, bus, clock and converter in one, which may fail or return anything.
@@ -108,6 +109,9 @@ pub fn exercise() {
     scan_with_every_sampler(|| DirectPins { rows: [Part; 8] });
     scan_with_every_sampler(|| Multiplexer4051 { address: [Part; 3], enable: Part });
     scan_with_every_sampler(|| ShiftRegister595::<_, 8> { data: Part, clock: Part, latch: Part });
+
+    let mut sensor = minimal::Sensor::new([Part; 3], [Part; 3], Part);
+    opaque(sensor.estimate_dz_mm());
 
     let time_constant_ns = timing::time_constant_ns(opaque(560.0), opaque(1000.0));
     let plan = timing::ScanPlan {

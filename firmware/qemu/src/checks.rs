@@ -49,7 +49,7 @@ fn add(digest: &mut Digest<'_, u32, Table<0>>, values: &[f32]) {
 }
 
 /// Readings of `R` rows in Ω.
-type Frame<const R: usize> = [[f32; COLS]; R];
+pub type Frame<const R: usize> = [[f32; COLS]; R];
 
 /// What a decoder makes of a frame of `R` rows.
 #[derive(Clone, Copy)]
@@ -116,14 +116,14 @@ pub fn decoding<E: ExpKernel>(blob: &[u8]) -> Option<u32> {
 pub const MANY: usize = 10_000;
 
 /// CRC-32 with a table, for many bytes.
-const QUICK_CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
+pub const QUICK_CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
 /// Largest distances in Ω of readings from the middle of the training range, one for each frame in turn: within
 /// the range, beyond it, far beyond the clamp, below zero, and up to the largest numbers.
 const REACHES: [f32; 8] = [5.0, 5.0, 5.0, 7.0, 9.0, 30.0, 1e3, 3e38];
 
 /// Frame number `index` of many, with some readings missing or infinite.
-fn one_of_many<const R: usize>(index: usize, numbers: &mut Numbers) -> Frame<R> {
+pub fn one_of_many<const R: usize>(index: usize, numbers: &mut Numbers) -> Frame<R> {
     let mut frame = [[f32::NAN; COLS]; R];
     let readings = frame.as_flattened_mut();
     let reach = REACHES[index % REACHES.len()];

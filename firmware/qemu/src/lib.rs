@@ -18,4 +18,5 @@ pub mod exit;
 mod fault;
 pub mod slot;
 pub mod checks;
+pub mod fixed;
 pub mod shapes;

@@ -30,6 +30,7 @@ pub mod relative;
 pub mod outliers;
 pub mod train;
 pub mod packing;
+pub mod export;
 pub mod prepared;
 pub mod confidence;
 pub mod fill;

@@ -12,6 +12,7 @@ mod data_files;
 mod device;
 mod directions;
 mod drift;
+mod export;
 mod gate;
 mod health;
 #[cfg(unix)]

@@ -1,0 +1,128 @@
+//! Models as source code: what `export` writes, and the firmware's example that decodes with it.
+
+use std::fs;
+
+use model_core::AlignedBytes;
+use model_core::blob::Model;
+use model_core::rbf::Network;
+use taxel_data::random::Stream;
+use taxel_rig::device::scan::with_parts_of_image;
+use taxel_simulate::virtual_board::{Pin, VirtualBoard, all_readings};
+use taxel_simulate::{World, synthesise};
+
+use crate::common::{Folder, small_scene};
+
+#[path = "../../../firmware/examples/minimal.rs"]
+mod minimal;
+
+fn in_testdata(name: &str) -> String {
+    format!("{}/../testdata/{name}", env!("CARGO_MANIFEST_DIR"))
+}
+
+fn exported(folder: &Folder, blob: &str) -> String {
+    folder.succeed(&["export", &in_testdata(blob), "--rust", "model.rs"]);
+    fs::read_to_string(folder.path("model.rs")).unwrap()
+}
+
+#[test]
+fn sources_in_testdata_are_those_that_the_command_writes() {
+    let folder = Folder::new("export");
+    for name in ["hand-made", "row4"] {
+        let source = fs::read_to_string(in_testdata(&format!("{name}.rs"))).unwrap();
+        assert!(
+            exported(&folder, &format!("{name}.bin")) == source,
+            "changed on purpose? host-sim export testdata/{name}.bin --rust testdata/{name}.rs"
+        );
+    }
+}
+
+/// Numbers in the source of a static, in their order.
+fn numbers(source: &str) -> impl Iterator<Item = u32> {
+    let words = source.split(|c: char| c.is_whitespace() || "[],".contains(c));
+    words.filter_map(|word| word.parse::<f32>().ok()).map(f32::to_bits)
+}
+
+#[test]
+fn every_number_of_networks_of_several_sizes_is_written_to_the_bit() {
+    let source = exported(&Folder::new("export_numbers"), "kernels-f32-direct.bin");
+    let blob = AlignedBytes::copy_of(&fs::read(in_testdata("kernels-f32-direct.bin")).unwrap());
+    let model = Model::decode(&blob).unwrap();
+    let statics: Vec<&str> = source.split("pub static ").skip(1).collect();
+    assert_eq!(statics.len(), model.network_count());
+    for (network, source) in model.networks().zip(statics) {
+        let Network::F32Direct(network) = network else { panic!("another format") };
+        let (shape, p) = (network.shape(), network.parameters());
+        let head = format!("Fixed<{}, {}, {}>", shape.inputs, shape.centres, shape.outputs);
+        assert!(source.contains(&head), "{head}");
+        let (body, _) = source.split_once(".checked()").unwrap();
+        let (_, body) = body.split_once('{').unwrap();
+        let decay = vec![p.decay[0]; shape.centres];
+        let no_tail = vec![0.0; shape.inputs * shape.outputs];
+        let tail = if p.affine.is_empty() { &no_tail } else { p.affine };
+        let arrays = [p.input_minimum, p.input_per_span, p.centres, &decay];
+        let arrays = arrays.into_iter().chain([p.output_weights, p.bias, tail]);
+        assert!(numbers(body).eq(arrays.flatten().map(|value| value.to_bits())), "{head}");
+    }
+    assert!(source.contains("/// Network of rows 1, 3, 5, 7.\n"), "{source}");
+    assert!(source.contains("    [ROW_1.infer(row_1), ROW_2.infer(row_2), ROW_1.infer(row_3), "));
+}
+
+#[test]
+fn parts_that_a_fixed_has_no_room_for_are_refused_by_name_with_the_fix() {
+    let folder = Folder::new("export_refused");
+    let (world, _) = small_scene().split_once("[table1]").map(|(a, b)| (a.to_owned(), b)).unwrap();
+    folder.write("scene.toml", world.replace("frames = 3000", "frames = 400"));
+    let train = ["train", "scene.toml", "--format", "f32-direct", "-o", "m.bin"];
+    for (option, says) in [
+        ("--confidence", "has no room for a confidence: train it without --confidence"),
+        ("--fill", "has no room for a fill of missing readings: train it without --fill"),
+        (
+            "--relative-inputs",
+            "inputs relative to the baseline: train it without --relative-inputs",
+        ),
+        ("--whole-array", "a projection of the whole array: train it without --whole-array"),
+        ("--format=f32", "the number format f32: train it with --format f32-direct"),
+        ("--format=fixed16", "the number format fixed16: train it with --format f32-direct"),
+    ] {
+        let given = match option.strip_prefix("--format") {
+            Some(_) => vec!["train", "scene.toml", option, "-o", "m.bin"],
+            None => [&train[..], &[option]].concat(),
+        };
+        folder.succeed(&given);
+        let said = folder.fail(&["export", "m.bin", "--rust", "m.rs"], 2);
+        assert!(said.contains("m.bin: ") && said.contains(says), "{option}: {said}");
+        assert!(!folder.path("m.rs").exists());
+    }
+    folder.succeed(&train);
+    assert!(folder.succeed(&["export", "m.bin", "--rust", "m.rs"]).contains("2 rows, 2 networks"));
+    let said = folder.fail(&["export", "m.bin", "--rust", "m.bin"], 2);
+    assert!(said.contains("m.bin") && said.contains("(--rust)"), "{said}");
+}
+
+#[test]
+fn the_example_estimates_compression_from_pins_and_converters() {
+    const FRAMES: usize = 200;
+    let mut world = with_parts_of_image(&World::press()).unwrap();
+    world.readout.row_switch_ohm = Some(0.26); // for which the example corrects
+    let board = VirtualBoard::new(&world).unwrap();
+    let pins = [Pin::RowData, Pin::RowClock, Pin::RowLatch].map(|pin| board.pin(pin));
+    let chips = [0, 1, 2].map(|chip| board.spi(chip));
+    let mut sensor = minimal::Sensor::new(pins, chips, board.delay());
+    let truth = synthesise(&world, Stream::Test, FRAMES);
+    let names = (1..=6).map(|electrode| format!("r4e{electrode}_dz_mm"));
+    let places: Vec<usize> =
+        names.map(|name| truth.outputs.names.iter().position(|it| *it == name).unwrap()).collect();
+    let (mut squares, mut of_mean) = (0.0, 0.0);
+    for (readings, outputs) in all_readings(&world, FRAMES).lines().zip(truth.outputs.lines()) {
+        board.set_readings(readings);
+        let estimate = sensor.estimate_dz_mm();
+        for (place, estimate) in places.iter().zip(estimate) {
+            squares += (outputs[*place] - f64::from(estimate)).powi(2);
+            of_mean += outputs[*place].powi(2);
+        }
+    }
+    board.check().unwrap();
+    let rmse_mm = (squares / (FRAMES * places.len()) as f64).sqrt();
+    assert!(rmse_mm < 0.055, "{rmse_mm} mm");
+    assert!(squares < 0.15 * of_mean, "{squares} against {of_mean}");
+}
