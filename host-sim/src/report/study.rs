@@ -51,7 +51,7 @@ fn by_noise(title: &str, levels: &[AtNoise<'_>], lines: &[Line]) -> String {
     };
     let (x, y) = (
         ticks::logarithmic_percent(all(0)),
-        ticks::logarithmic(all(1), |value| significant(value, 1)),
+        ticks::logarithmic(all(1), |value| significant(value, 2)),
     );
     let chart = Chart {
         title: title.into(),
