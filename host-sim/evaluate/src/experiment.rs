@@ -38,9 +38,9 @@ type Check = std::result::Result<(), BadValue>;
 /// Names and texts of the scenes that are part of the program.
 pub const EMBEDDED: [(&str, &str); 4] = [
     ("paper", include_str!("../../../scenes/paper.toml")),
-    ("paper-as-printed", include_str!("../../../scenes/paper-as-printed.toml")),
     ("press", include_str!("../../../scenes/press.toml")),
     ("contact", include_str!("../../../scenes/contact.toml")),
+    ("paper-as-printed", include_str!("../../../scenes/paper-as-printed.toml")),
 ];
 
 /// Experiment of a scene, checked.

@@ -34,7 +34,7 @@ mod search;
   host-sim table1 paper-as-printed
   host-sim table1 --reconstruct --svg reconstruct.svg")]
 pub struct Arguments {
-    /// A built-in scene (paper, press) or the path of a scene file.
+    /// A built-in scene (paper, press, paper-as-printed) or the path of a scene file.
     #[arg(default_value = "paper")]
     scene: String,
     /// Precision of the sensor's readings, instead of the scene's.

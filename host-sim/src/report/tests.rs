@@ -97,6 +97,7 @@ fn result(groups: &[&str]) -> RunResult {
         decoder: decoder.into(),
         spread,
         errors: of_groups(groups, rmse),
+        largest_positional_percent: None,
     };
     let column = |noise_level| Column {
         limit: LimitSummary::of(&Err(Refusal::Drift)),

@@ -357,7 +357,7 @@ fn table1_shows_the_papers_cells_beside_its_own() {
                 initial_covariance = 1e9\njudged_on = \"training\"\n";
     folder.write("open.toml", table.replace("centres = 6", "centres = 59") + open);
     let result = json(&folder.succeed(&["table1", "open.toml", "--json"]));
-    let cells = &result["comparison"][3]["cells"][0];
+    let cells = &result["comparison"][4]["cells"][0];
     assert!(cells[3].as_f64().unwrap() < 1.0, "{cells}");
     assert_eq!(result["test_frames"], 60);
 }
