@@ -13,8 +13,30 @@ use crate::error::Result;
 pub struct HiddenLayer {
     /// Centres on inputs scaled to [0, 1], `centres × inputs`.
     pub centres: Vec<f64>,
-    /// Width σ of all Gaussians, on that scale.
+    /// Width σ of all Gaussians, on that scale; their mean width if each has its own.
     pub spread: f64,
+    /// Width of each centre over the spread; empty if all have the spread itself.
+    pub relative_widths: Vec<f64>,
+}
+
+impl HiddenLayer {
+    /// Widths σ: one for all centres, or one for each.
+    #[must_use]
+    pub fn widths(&self) -> Vec<f64> {
+        match self.relative_widths.as_slice() {
+            [] => vec![self.spread],
+            relative => relative.iter().map(|width| self.spread * width).collect(),
+        }
+    }
+
+    /// Hidden layer at `centres` with these `widths`: one for all, or one for each.
+    pub(super) fn with_widths(centres: Vec<f64>, widths: &[f64]) -> Self {
+        if let [spread] = *widths {
+            return Self { centres, spread, relative_widths: vec![] };
+        }
+        let spread = widths.iter().sum::<f64>() / widths.len() as f64;
+        Self { centres, spread, relative_widths: widths.iter().map(|w| w / spread).collect() }
+    }
 }
 
 /// All that stands before the output weights.
@@ -27,7 +49,7 @@ pub struct Layers {
 }
 
 impl Layers {
-    /// Layers as the paper has them: K-means centres of the frames, and one width; for the whole array behind a
+    /// Layers as the paper has them: K-means centres of the frames, and widths by a rule; for the whole array behind a
     /// projection by regression.
     ///
     /// # Errors
@@ -46,8 +68,8 @@ impl Layers {
         let seen = self.seen(dataset);
         let of_row = |row: usize| {
             let table = seen.row_table(row);
-            let centres = Samples::new(&table).centres(options, row);
-            HiddenLayer { centres, spread: options.spread }
+            let samples = Samples::new(&table);
+            samples.layer(samples.centres(options, row), options)
         };
         let hidden = (0..seen.rows).into_par_iter().map(of_row).collect();
         Self { hidden, ..self }

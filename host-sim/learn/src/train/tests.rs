@@ -51,7 +51,8 @@ fn weights_equal_batch_ridge_on_a_well_conditioned_set() {
     let samples = Samples::new(&table);
     let centres: Vec<f64> =
         (0..9).flat_map(|i| [f64::from(i % 3), f64::from(i / 3)]).map(|c| c / 2.0).collect();
-    let regressors = Regressors { centres: &centres, inputs: 2, decay: 20.0, affine_tail: false };
+    let regressors =
+        Regressors { centres: &centres, inputs: 2, decays: &[20.0], affine_tail: false };
     for initial_covariance in [1.0, 1e3, 1e6] {
         let in_groups = fit(&regressors, &samples.scaled, &table.outputs, initial_covariance);
         let batch = fit_batch(&regressors, &samples.scaled, &table.outputs, initial_covariance);
@@ -67,7 +68,8 @@ fn predictions_equal_batch_ridge_on_an_ill_conditioned_set() {
     let samples = Samples::new(&table);
     let centres: Vec<f64> = (0..32).map(|i| f64::from(i * 7 % 32) / 32.0).collect();
     // Wide Gaussians all look alike, and the affine tail repeats their information.
-    let regressors = Regressors { centres: &centres, inputs: 2, decay: 0.02, affine_tail: true };
+    let regressors =
+        Regressors { centres: &centres, inputs: 2, decays: &[0.02], affine_tail: true };
     let n = regressors.count();
     let mut h = nalgebra::DMatrix::zeros(table.inputs.len(), n);
     let mut row = vec![0.0; n];
@@ -166,7 +168,8 @@ fn penalties_that_share_a_decomposition_give_the_networks_that_each_gives_alone(
     for format in Format::ALL {
         let options = Options { centres: 12, spread: 0.4, format, ..Options::default() };
         let centres = samples.centres(&options, 0);
-        let together = samples.fit_each(&centres, &options, &penalties).unwrap();
+        let layer = samples.layer(centres.clone(), &options);
+        let together = samples.fit_each(&layer, &options, &penalties).unwrap();
         for (penalty, fitted) in penalties.iter().zip(&together) {
             let options = Options { penalty: *penalty, ..options };
             assert_eq!(*fitted, samples.fit(&centres, &options).unwrap(), "{format:?} {penalty:?}");
