@@ -6,6 +6,7 @@
 use taxel_evaluate::evaluate::limit::LimitResult;
 use taxel_evaluate::evaluate::trade::Trade;
 use taxel_evaluate::run::RunResult;
+use taxel_evaluate::study::map::MapStudy;
 
 mod format;
 mod ticks;
@@ -27,6 +28,7 @@ mod sweep;
 mod html;
 mod trade;
 mod limit;
+mod study_map;
 
 pub use view::{Made, View};
 
@@ -64,6 +66,12 @@ pub fn limit_html(limit: &LimitResult) -> String {
 #[must_use]
 pub fn directions_svg(limit: &LimitResult) -> String {
     limit::directions_svg(limit)
+}
+
+/// Picture of the study of centres, spread and samples, as a file of its own: light or dark like the viewer.
+#[must_use]
+pub fn study_map_svg(study: &MapStudy) -> String {
+    study_map::svg(study)
 }
 
 /// Picture of what is known of each electrode, as a file of its own: light or dark like the viewer.

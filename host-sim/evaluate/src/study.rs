@@ -1,0 +1,4 @@
+//! Studies: one question each, put to the test by computing.
+
+pub mod widths;
+pub mod map;
