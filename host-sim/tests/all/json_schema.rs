@@ -32,7 +32,8 @@ fn checked(folder: &Folder, schema: &Schema, arguments: &[&str]) -> Value {
     let text = folder.succeed(&[arguments, &["--json"]].concat());
     let document: Value = serde_json::from_str(&text).unwrap();
     assert_eq!(schema.faults(&document), [""; 0], "{arguments:?}");
-    assert_eq!(document["command"], arguments[0]);
+    let words = if arguments[0] == "study" { 2 } else { 1 };
+    assert_eq!(document["command"], arguments[..words].join(" "));
     assert!(document["seconds"].as_f64().unwrap() > 0.0, "{arguments:?}");
     document
 }
@@ -99,6 +100,20 @@ fn experiments_are_told_by_the_schema() {
     for document in [gate, confidence, limit, trade] {
         assert_eq!((&document["subject"], &document["seed"]), (&json!("small"), &json!(1)));
     }
+}
+
+#[test]
+fn studies_are_told_by_the_schema() {
+    let schema = &schema();
+    let folder = prepared("json_studies", schema);
+    let checked = |arguments: &[&str]| checked(&folder, schema, arguments);
+    let widths = checked(&["study", "widths", "scene.toml", "--centres", "6", "--spread", "0.8"]);
+    assert_eq!(widths["models"].as_array().unwrap().len(), 6);
+    let map = ["study", "map", "scene.toml", "--samples", "30,100", "--test-frames", "50"];
+    let map = checked(&[&map[..], &["--centres", "4,8", "-o", "map.svg"]].concat());
+    assert_eq!(map["maps"].as_array().unwrap().len(), 4);
+    let picture = std::fs::read_to_string(folder.path("map.svg")).unwrap();
+    assert!(picture.starts_with("<svg") && picture.contains("N = 100"));
 }
 
 #[test]
@@ -192,9 +207,15 @@ fn the_schema_and_its_page_know_every_command_and_key() {
         let names = commands.filter(|line| line.starts_with("  ") && !line.starts_with("   "));
         names.map(first).filter(|name| name != "help").collect()
     };
-    let of_link = listed(&["link", "--help"]).into_iter().map(|action| format!("link {action}"));
-    let others = listed(&["--help"]).into_iter().filter(|name| name != "link");
-    assert_eq!(others.chain(of_link).collect::<BTreeSet<_>>(), known);
+    let (of_groups, others): (Vec<_>, Vec<_>) = listed(&["--help"])
+        .into_iter()
+        .partition(|name| ["link", "study"].contains(&name.as_str()));
+    let of_group = |group: &String| {
+        let actions = listed(&[group, "--help"]).into_iter();
+        actions.map(|action| format!("{group} {action}")).collect::<Vec<_>>()
+    };
+    let of_groups = of_groups.iter().flat_map(of_group);
+    assert_eq!(others.into_iter().chain(of_groups).collect::<BTreeSet<_>>(), known);
     for document in schema.documents() {
         for key in document["properties"].as_object().unwrap().keys() {
             assert!(page.contains(&format!("`{key}`")), "docs/json.md says nothing of `{key}`");

@@ -86,6 +86,30 @@ fn gradient_is_the_slope(sizes: Sizes, loss: &dyn Fn(&Movable) -> Loss) {
 }
 
 #[test]
+fn a_width_for_each_centre_moves_by_itself() {
+    let world = World { read_rows: vec![3], ..World::press() };
+    let synthesis = Synthesis::of(&world);
+    let (training, test) =
+        (synthesis.frames(Stream::Training, 3000), synthesis.frames(Stream::Test, 1000));
+    let fresh = Fresh(synthesis);
+    let options =
+        Options { centres: 8, widths: crate::train::Widths::Neighbours, ..Options::default() };
+    let start = Layers::start(&training, &options).unwrap();
+    let examples = Examples::Fresh(&fresh);
+    let refined = refine(&training, &start, &options, &quick(), examples, &Silent).unwrap();
+    let ratios: Vec<f64> = (refined.hidden[0].widths().iter())
+        .zip(start.hidden[0].widths())
+        .map(|(after, before)| after / before)
+        .collect();
+    let (least, most) = ratios.iter().fold((f64::MAX, 0.0_f64), |(l, m), r| (l.min(*r), m.max(*r)));
+    assert!(most > 1.2 * least, "{ratios:?}");
+    let [before, after] = [start, refined].map(|layers| {
+        rmse(&crate::train::fit(&training, layers, &options, &Silent).unwrap(), &test)
+    });
+    assert!(after < 0.98 * before, "{after} and {before}");
+}
+
+#[test]
 fn gradients_are_slopes_of_the_loss() {
     for (sources, affine_tail, widths) in
         [(0, true, 1), (0, true, 6), (5, true, 1), (5, true, 6), (5, false, 6)]
