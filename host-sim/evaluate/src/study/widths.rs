@@ -128,6 +128,9 @@ pub fn compute(
     progress: &dyn Progress,
 ) -> Result<WidthsStudy> {
     plan.check()?;
+    for &centres in &plan.centres {
+        Options { centres, ..experiment.options() }.check(experiment.training.frames)?;
+    }
     let synthesis = Synthesis::of(&experiment.world);
     let frames = experiment.training.test_frames;
     let judging = Judging {

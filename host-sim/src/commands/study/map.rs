@@ -118,6 +118,7 @@ fn page_of(study: &MapStudy, all: bool, picture: Option<&Path>) -> print::Page {
     page.line(
         "errors: on the samples / on test frames. mean: always predicting the mean of the samples.\n",
     );
+    by_spread(&mut page, study);
     for claim in &study.claims {
         claim_lines(&mut page, claim);
     }
@@ -138,6 +139,24 @@ fn map_line(map: &Map) -> String {
     });
     let noise = percent(map.noise_level);
     format!("{noise:>7} {:>6} {:>8.4}   {best:<35} {whole}", map.samples, map.mean_rmse)
+}
+
+/// Least test error of any K by spread, with the most samples.
+fn by_spread(page: &mut print::Page, study: &MapStudy) {
+    let Some(most) = study.maps.iter().map(|map| map.samples).max() else { return };
+    let head = study.spreads.iter().map(|spread| format!(" {spread:>10}"));
+    page.line(format_args!("least test error (its K) by spread, N = {most}:"));
+    page.line(format_args!("{:>7}{}", "noise", head.collect::<String>()));
+    for map in study.maps.iter().filter(|map| map.samples == most) {
+        let least = |spread: &f64| {
+            let best = map.best(|cell| cell.spread == *spread);
+            let text = best.map(|cell| format!("{:.3} ({})", cell.test_rmse, cell.centres));
+            format!(" {:>10}", text.unwrap_or_default())
+        };
+        let cells: String = study.spreads.iter().map(least).collect();
+        page.line(format_args!("{:>7}{cells}", percent(map.noise_level)));
+    }
+    page.line("");
 }
 
 /// Table of a map, one line a spread.
