@@ -18,20 +18,20 @@ use crate::error::Result;
 
 pub mod resolution;
 pub mod kmeans;
+pub mod hidden_layer;
 pub mod least_squares;
 pub(crate) mod principal;
 pub mod format;
 pub mod projection;
 pub mod output_rank;
 pub mod memory;
-pub mod widths;
 pub mod layers;
 pub mod refine;
 
 pub use format::FittedNetwork;
-pub use layers::{HiddenLayer, Layers};
+pub use hidden_layer::{HiddenLayer, Widths};
+pub use layers::Layers;
 pub use refine::{Examples, FreshFrames, Refinement};
-pub use widths::Widths;
 
 /// Initial covariance δ of the recursive least squares where no penalty is chosen. The penalty on squared weights is
 /// 1/δ for all frames together, too small to be felt.
@@ -138,7 +138,7 @@ impl Options {
             return Err(BadValue::new("features", features, rule));
         }
         if self.widths != Widths::Common && self.format == Format::Fixed16 {
-            return Err(widths::not_held(self.format));
+            return Err(hidden_layer::not_held(self.format));
         }
         self.penalty.map_or(Ok(()), check_penalty)?;
         check_spread("spread", self.spread)

@@ -11,8 +11,9 @@ use model_core::rbf::{Format, Network, NetworkError, Shape, direct, expanded, fi
 
 use taxel_data::table::Table;
 
+use super::hidden_layer::{HiddenLayer, not_held};
 use super::least_squares::Factor;
-use super::{HiddenLayer, Options, Samples, widths};
+use super::{Options, Samples};
 use crate::error::{Error, Result};
 use crate::infer::{Exponential, infer};
 
@@ -195,7 +196,7 @@ pub(super) fn fit(
     let (centres, options) = (&layer.centres, &Options { spread: layer.spread, ..*options });
     let format = match options.format {
         Format::F32 if !common_width => Format::F32Direct,
-        Format::Fixed16 if !common_width => return Err(widths::not_held(Format::Fixed16).into()),
+        Format::Fixed16 if !common_width => return Err(not_held(Format::Fixed16).into()),
         format => format,
     };
     match format {

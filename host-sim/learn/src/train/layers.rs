@@ -5,39 +5,9 @@ use std::borrow::Cow;
 use rayon::prelude::*;
 use taxel_data::dataset::Dataset;
 
+use super::hidden_layer::HiddenLayer;
 use super::{Options, Samples, memory, projection, view};
 use crate::error::Result;
-
-/// Hidden layer of a network: its Gaussians.
-#[derive(Debug, Clone, PartialEq)]
-pub struct HiddenLayer {
-    /// Centres on inputs scaled to [0, 1], `centres × inputs`.
-    pub centres: Vec<f64>,
-    /// Width σ of all Gaussians, on that scale; their mean width if each has its own.
-    pub spread: f64,
-    /// Width of each centre over the spread; empty if all have the spread itself.
-    pub relative_widths: Vec<f64>,
-}
-
-impl HiddenLayer {
-    /// Widths σ: one for all centres, or one for each.
-    #[must_use]
-    pub fn widths(&self) -> Vec<f64> {
-        match self.relative_widths.as_slice() {
-            [] => vec![self.spread],
-            relative => relative.iter().map(|width| self.spread * width).collect(),
-        }
-    }
-
-    /// Hidden layer at `centres` with these `widths`: one for all, or one for each.
-    pub(super) fn with_widths(centres: Vec<f64>, widths: &[f64]) -> Self {
-        if let [spread] = *widths {
-            return Self { centres, spread, relative_widths: vec![] };
-        }
-        let spread = widths.iter().sum::<f64>() / widths.len() as f64;
-        Self { centres, spread, relative_widths: widths.iter().map(|w| w / spread).collect() }
-    }
-}
 
 /// All that stands before the output weights.
 #[derive(Debug, Clone, PartialEq)]

@@ -18,9 +18,10 @@ use taxel_data::dataset::RowTable;
 use taxel_data::table::Table;
 
 use super::format::{self, FittedNetwork, Targets};
+use super::hidden_layer::HiddenLayer;
 use super::least_squares::{Factor, Regressors};
 use super::principal;
-use super::{HiddenLayer, Options, Samples};
+use super::{Options, Samples};
 use crate::error::Result;
 
 /// Lines that one thread expands at a time.

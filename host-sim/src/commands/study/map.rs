@@ -144,19 +144,20 @@ fn map_line(map: &Map) -> String {
 /// Least test error of any K by spread, with the most samples.
 fn by_spread(page: &mut print::Page, study: &MapStudy) {
     let Some(most) = study.maps.iter().map(|map| map.samples).max() else { return };
-    let head = study.spreads.iter().map(|spread| format!(" {spread:>10}"));
-    page.line(format_args!("least test error (its K) by spread, N = {most}:"));
-    page.line(format_args!("{:>7}{}", "noise", head.collect::<String>()));
+    let mut line = |label: &str, values: Vec<String>| {
+        let cells: String = values.iter().map(|value| format!(" {value:>7}")).collect();
+        page.line(format_args!("{label:>7}{cells}"));
+    };
+    line("spread", study.spreads.iter().map(f64::to_string).collect());
     for map in study.maps.iter().filter(|map| map.samples == most) {
-        let least = |spread: &f64| {
-            let best = map.best(|cell| cell.spread == *spread);
-            let text = best.map(|cell| format!("{:.3} ({})", cell.test_rmse, cell.centres));
-            format!(" {:>10}", text.unwrap_or_default())
-        };
-        let cells: String = study.spreads.iter().map(least).collect();
-        page.line(format_args!("{:>7}{cells}", percent(map.noise_level)));
+        let best = study.spreads.iter().filter_map(|spread| map.best(|it| it.spread == *spread));
+        let (errors, centres) = best
+            .map(|cell| (format!("{:.4}", cell.test_rmse), format!("K={}", cell.centres)))
+            .unzip();
+        line(&percent(map.noise_level), errors);
+        line("", centres);
     }
-    page.line("");
+    page.line(format_args!("least test error at each spread, and its K, for N = {most}.\n"));
 }
 
 /// Table of a map, one line a spread.
@@ -191,7 +192,7 @@ fn claim_lines(page: &mut print::Page, claim: &Claim) {
     ));
     let figures: Vec<String> =
         claim.compared.iter().map(|it| format!("{} at {}", short(it.value), it.at)).collect();
-    page.line(format_args!("        {}: {}", claim.quantity, figures.join(", ")));
+    page.line(format_args!("        {}:\n        {}", claim.quantity, figures.join(", ")));
 }
 
 /// A figure with the digits that matter.

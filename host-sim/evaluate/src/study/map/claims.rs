@@ -168,8 +168,8 @@ fn over_fit(map: &Map, ends: Ends) -> Option<Claim> {
         (false, false) => Verdict::Fails,
         _ => Verdict::InPart,
     };
-    gaps.iter_mut().for_each(|it| it.at = format!("gap, {}", it.at));
-    growths.iter_mut().for_each(|it| it.at = format!("growth, {}", it.at));
+    gaps.iter_mut().for_each(|it| it.at = format!("{} (gap)", it.at));
+    growths.iter_mut().for_each(|it| it.at = format!("{} (growth)", it.at));
     let quantity = "K = N: gap between test and training error, over the mean's; growth of the test error from the best K";
     let compared = [gaps, growths].concat();
     Some(map.claim("narrow Gaussians with too many neurons over-fit", quantity, compared, verdict))

@@ -3,8 +3,9 @@
 use model_core::rbf::direct::Parameters;
 use model_core::rbf::{Format, Shape};
 
+use super::super::hidden_layer::HiddenLayer;
 use super::super::least_squares::{Decomposed, Regressors};
-use super::super::{HiddenLayer, Options, Samples};
+use super::super::{Options, Samples};
 use super::{FittedNetwork, Targets, Weights};
 use crate::error::Result;
 

@@ -10,7 +10,7 @@ use super::sources::Sources;
 use super::width;
 use crate::error::Result;
 use crate::train::Options;
-use crate::train::layers::HiddenLayer;
+use crate::train::hidden_layer::HiddenLayer;
 
 /// Factor on the ranges of features, which are seen on a few frames at a time and are wider on all.
 const UNSEEN_RANGE: f64 = 1.1;

@@ -9,7 +9,8 @@ use super::movable::Piece;
 use super::targets::Targets;
 use super::turn;
 use crate::error::Result;
-use crate::train::layers::{HiddenLayer, Layers};
+use crate::train::hidden_layer::HiddenLayer;
+use crate::train::layers::Layers;
 use crate::train::{InputScale, projection, view};
 
 /// Size of a reading as a source: so many times a typical part of the projection, for a reading of one standard

@@ -1,4 +1,5 @@
-//! Widths of Gaussians: one for all centres of a network, or one for each by the distance to its neighbours.
+//! Gaussians of a network: centres, and widths by a rule. One for all centres, or one for each by the distance to its
+//! neighbours.
 
 use model_core::rbf::Format;
 use rayon::prelude::*;
@@ -64,6 +65,37 @@ impl Widths {
             .into_iter()
             .map(|distance| if mean > 0.0 { (distance / mean).max(LEAST) } else { 1.0 })
             .collect()
+    }
+}
+
+/// Hidden layer of a network: its Gaussians.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HiddenLayer {
+    /// Centres on inputs scaled to [0, 1], `centres × inputs`.
+    pub centres: Vec<f64>,
+    /// Width σ of all Gaussians, on that scale; their mean width if each has its own.
+    pub spread: f64,
+    /// Width of each centre over the spread; empty if all have the spread itself.
+    pub relative_widths: Vec<f64>,
+}
+
+impl HiddenLayer {
+    /// Widths σ: one for all centres, or one for each.
+    #[must_use]
+    pub fn widths(&self) -> Vec<f64> {
+        match self.relative_widths.as_slice() {
+            [] => vec![self.spread],
+            relative => relative.iter().map(|width| self.spread * width).collect(),
+        }
+    }
+
+    /// Hidden layer at `centres` with these `widths`: one for all, or one for each.
+    pub(super) fn with_widths(centres: Vec<f64>, widths: &[f64]) -> Self {
+        if let [spread] = *widths {
+            return Self { centres, spread, relative_widths: vec![] };
+        }
+        let spread = widths.iter().sum::<f64>() / widths.len() as f64;
+        Self { centres, spread, relative_widths: widths.iter().map(|w| w / spread).collect() }
     }
 }
 
