@@ -69,8 +69,8 @@ fn training(criterion: &mut Criterion) {
     let error = rmse(&predicted, &test.outputs.values);
     leave("results", &[found.inertia, found.iterations as f64, error]);
 
-    let decay = 1.0 / (2.0 * SPREAD * SPREAD);
-    let regressors = Regressors { centres: &found.centres, inputs, decay, affine_tail: true };
+    let decays = &[1.0 / (2.0 * SPREAD * SPREAD)];
+    let regressors = Regressors { centres: &found.centres, inputs, decays, affine_tail: true };
     let outputs = table.outputs.names.len();
     let mut group = criterion.benchmark_group("training");
     group.sample_size(15);

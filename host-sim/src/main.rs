@@ -62,8 +62,8 @@ impl Command {
     /// Name of the command, as it is typed; with the action of `link` or the question of `study`.
     fn name(&self) -> String {
         let name = match self {
-            Self::Study(arguments) => return format!("study {}", arguments.study_name()),
             Self::Link(arguments) => return format!("link {}", arguments.action_name()),
+            Self::Study(arguments) => return format!("study {}", arguments.study_name()),
             Self::Run(_) => "run",
             Self::Synth(_) => "synth",
             Self::Forward(_) => "forward",

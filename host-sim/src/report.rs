@@ -9,6 +9,7 @@ use taxel_evaluate::evaluate::trade::Trade;
 use taxel_evaluate::run::RunResult;
 use taxel_evaluate::study::directions::DirectionsResult;
 use taxel_evaluate::study::equations::EquationsResult;
+use taxel_evaluate::study::map::MapStudy;
 
 mod format;
 mod ticks;
@@ -32,6 +33,7 @@ mod printed;
 mod trade;
 mod limit;
 mod study;
+mod study_map;
 
 pub use view::{Made, View};
 
@@ -69,6 +71,12 @@ pub fn limit_html(limit: &LimitResult) -> String {
 #[must_use]
 pub fn directions_svg(limit: &LimitResult) -> String {
     limit::directions_svg(limit)
+}
+
+/// Picture of the study of centres, spread and samples, as a file of its own: light or dark like the viewer.
+#[must_use]
+pub fn study_map_svg(study: &MapStudy) -> String {
+    study_map::svg(study)
 }
 
 /// Picture of what is known of each electrode, as a file of its own: light or dark like the viewer.

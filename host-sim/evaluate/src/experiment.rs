@@ -15,7 +15,7 @@ use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
 use taxel_data::{BadValue, input};
 use taxel_learn::decoders::textbook::{Scaling, SpreadMeaning};
-use taxel_learn::train::{FreshFrames, check_spread};
+use taxel_learn::train::{FreshFrames, Widths, check_spread};
 use taxel_learn::{Options, Origin, relative};
 use taxel_limit::{Reference, Refusal};
 use taxel_simulate::noise::NoiseKind;
@@ -69,8 +69,11 @@ pub struct Training {
     pub test_frames: usize,
     /// Number of centres K of each row's network.
     pub centres: usize,
-    /// Width σ on scaled inputs.
+    /// Width σ on scaled inputs; the mean width if each centre has its own.
     pub spread: f64,
+    /// Rule that gives the centres their widths.
+    #[serde(default)]
+    pub widths: Widths,
     /// Whether the networks add an affine tail A·x.
     pub affine_tail: bool,
     /// Number format of the weights.
@@ -219,6 +222,7 @@ impl Experiment {
         Options {
             centres: t.centres,
             spread: t.spread,
+            widths: t.widths,
             affine_tail: t.affine_tail,
             seed: self.world.seed,
             format: t.format,

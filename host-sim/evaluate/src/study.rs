@@ -3,3 +3,5 @@
 mod level;
 pub mod equations;
 pub mod directions;
+pub mod widths;
+pub mod map;

@@ -18,6 +18,7 @@ use crate::error::Result;
 
 pub mod resolution;
 pub mod kmeans;
+pub mod hidden_layer;
 pub mod least_squares;
 pub(crate) mod principal;
 pub mod format;
@@ -28,7 +29,8 @@ pub mod layers;
 pub mod refine;
 
 pub use format::FittedNetwork;
-pub use layers::{HiddenLayer, Layers};
+pub use hidden_layer::{HiddenLayer, Widths};
+pub use layers::Layers;
 pub use refine::{Examples, FreshFrames, Refinement};
 
 /// Initial covariance δ of the recursive least squares where no penalty is chosen. The penalty on squared weights is
@@ -46,8 +48,10 @@ pub const WHOLE_ARRAY_SPREAD: f64 = 0.5;
 pub struct Options {
     /// Number of centres, K. Fewer are used where there are fewer distinct samples.
     pub centres: usize,
-    /// Width σ of all Gaussians, on scaled inputs.
+    /// Width σ of all Gaussians, on scaled inputs; their mean width if each has its own.
     pub spread: f64,
+    /// Rule that gives the centres their widths.
+    pub widths: Widths,
     /// Whether the network adds an affine tail A·x.
     pub affine_tail: bool,
     /// Ridge penalty on squared weights, for each training frame: at 1 it is as strong as an input that is always 1,
@@ -80,6 +84,7 @@ impl Default for Options {
         Self {
             centres: 64,
             spread: 0.8,
+            widths: Widths::Common,
             affine_tail: true,
             penalty: None,
             seed: 1,
@@ -131,6 +136,9 @@ impl Options {
             let rule =
                 "only one network for the whole array has a projection to features: leave it out";
             return Err(BadValue::new("features", features, rule));
+        }
+        if self.widths != Widths::Common && self.format == Format::Fixed16 {
+            return Err(hidden_layer::not_held(self.format));
         }
         self.penalty.map_or(Ok(()), check_penalty)?;
         check_spread("spread", self.spread)
@@ -281,35 +289,51 @@ impl<'b> Samples<'b> {
         found.centres.into_iter().map(|c| f64::from(c as f32)).collect()
     }
 
+    /// Hidden layer of Gaussians at `centres` (`centres × inputs`, on scaled inputs), with the widths that `options` ask
+    /// for.
+    #[must_use]
+    pub fn layer(&self, centres: Vec<f64>, options: &Options) -> HiddenLayer {
+        let relative_widths = options.widths.relative(&centres, self.inputs());
+        HiddenLayer { centres, spread: options.spread, relative_widths }
+    }
+
     /// Fits output weights to the samples for given `centres` (`centres × inputs`, on scaled inputs), by
-    /// least squares, in the format and of the rank that `options` ask for.
+    /// least squares, with the widths, in the format and of the rank that `options` ask for.
+    ///
+    /// # Errors
+    /// [`Error`](crate::Error) if the format does not hold the network.
+    pub fn fit(&self, centres: &[f64], options: &Options) -> Result<FittedNetwork> {
+        self.fit_layer(&self.layer(centres.to_vec(), options), options)
+    }
+
+    /// Fits output weights to the samples as [`fit`](Self::fit) does, for a given `layer` with its own widths.
     ///
     /// # Errors
     /// [`Error`](crate::Error) if the format does not hold the network.
     ///
     /// # Panics
     /// Never: one penalty gives one network.
-    pub fn fit(&self, centres: &[f64], options: &Options) -> Result<FittedNetwork> {
-        let fitted = self.fit_each(centres, options, &[options.penalty])?;
+    pub fn fit_layer(&self, layer: &HiddenLayer, options: &Options) -> Result<FittedNetwork> {
+        let fitted = self.fit_each(layer, options, &[options.penalty])?;
         Ok(fitted.into_iter().next().expect("one network a penalty"))
     }
 
-    /// Fits output weights as [`fit`](Self::fit) does, with each of `penalties` instead of the options' own.
+    /// Fits output weights as [`fit_layer`](Self::fit_layer) does, with each of `penalties` instead of the options' own.
     fn fit_each(
         &self,
-        centres: &[f64],
+        layer: &HiddenLayer,
         options: &Options,
         penalties: &[Option<f64>],
     ) -> Result<Vec<FittedNetwork>> {
         let frames = self.table.inputs.len();
         let with = |penalty: &Option<f64>| Options { penalty: *penalty, ..*options };
         if let Some(rank) = options.output_rank {
-            let fit = |penalty| output_rank::fit(self, centres, rank, &with(penalty));
+            let fit = |penalty| output_rank::fit(self, layer, rank, &with(penalty));
             return penalties.iter().map(fit).collect();
         }
         let covariances: Vec<f64> =
             penalties.iter().map(|penalty| with(penalty).initial_covariance(frames)).collect();
-        format::fit(self, centres, options, &covariances)
+        format::fit(self, layer, options, &covariances)
     }
 }
 
@@ -404,8 +428,7 @@ pub(crate) fn fit_each(
         let rows = layers.hidden.par_iter().enumerate();
         let fitted = rows.map(|(row, layer)| {
             let table = seen.row_table(row);
-            let options = Options { spread: layer.spread, ..*options };
-            let fitted = Samples::new(&table).fit_each(&layer.centres, &options, penalties);
+            let fitted = Samples::new(&table).fit_each(layer, options, penalties);
             progress.step();
             fitted
         });

@@ -11,7 +11,7 @@ use taxel_learn::ModelBlob;
 use taxel_limit::identify::Observability;
 
 use super::progress::Terminal;
-use super::scene_argument::SceneArgument;
+use super::scene_argument::{SceneArgument, read_one_row};
 use super::{Common, arguments, print};
 
 /// All files that `-o` writes.
@@ -54,14 +54,8 @@ pub struct Arguments {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let mut scene = arguments.scene.load(common)?;
+    arguments.row.map_or(Ok(()), |row| read_one_row(&mut scene, row))?;
     let world = &mut scene.world;
-    if let Some(row) = arguments.row {
-        world.read_rows = vec![row.wrapping_sub(1)];
-        if !(1..=world.sensor.row_wires).contains(&row) {
-            let most = world.sensor.row_wires;
-            return Err(Error::Usage(format!("--row {row}: the scene has rows 1 to {most}")));
-        }
-    }
     let own = [world.noise.level];
     let noise_levels = if arguments.noise.is_empty() { &own[..] } else { &arguments.noise };
     for level in noise_levels {

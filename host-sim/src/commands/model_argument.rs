@@ -3,9 +3,9 @@
 use clap::Args;
 use model_core::rbf::Format;
 use taxel_learn::Options;
-use taxel_learn::train::WHOLE_ARRAY_SPREAD;
+use taxel_learn::train::{WHOLE_ARRAY_SPREAD, Widths};
 
-use super::arguments::{format, gigabytes};
+use super::arguments::{format, gigabytes, widths};
 
 /// What a model computes, and how its numbers are held.
 #[derive(Args, Default)]
@@ -28,6 +28,10 @@ pub struct ModelArguments {
     /// Number format of the weights [default: the scene's, or f32].
     #[arg(long, value_name = "FORMAT", value_parser = format())]
     format: Option<Format>,
+    /// Widths of the Gaussians: one for all centres of a network, or one for each (docs/training.md) [default: the scene's,
+    /// or common].
+    #[arg(long, value_name = "RULE", value_parser = widths())]
+    widths: Option<Widths>,
     /// Memory in GB that training may take; where it would take more, it is refused at once [default: 8].
     #[arg(long, value_name = "GB", value_parser = gigabytes)]
     most_memory: Option<u64>,
@@ -45,6 +49,7 @@ impl ModelArguments {
         options.output_rank = self.output_rank.or(options.output_rank);
         options.most_memory_bytes = self.most_memory.unwrap_or(options.most_memory_bytes);
         options.format = self.format.unwrap_or(options.format);
+        options.widths = self.widths.unwrap_or(options.widths);
         options
     }
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 use clap::Args;
 use host_sim::experiment::Experiment;
 use host_sim::{Error, Result};
+use taxel_data::columns;
 use taxel_data::progress::Progress;
 use taxel_learn::ModelBlob;
 use taxel_simulate::sensor::Precision;
@@ -56,6 +57,26 @@ impl SceneArgument {
     pub fn path(&self) -> &Path {
         Path::new(&self.scene)
     }
+}
+
+/// Makes `scene` read one row-wire, numbered from 1 (`--row`).
+pub fn read_one_row(scene: &mut Experiment, row: usize) -> Result<()> {
+    let most = scene.world.sensor.row_wires;
+    if !(1..=most).contains(&row) {
+        return Err(Error::Usage(format!("--row {row}: the scene has rows 1 to {most}")));
+    }
+    scene.world.read_rows = vec![row - 1];
+    Ok(())
+}
+
+/// Checks that `scene` has such a `group` of outputs (`--group`).
+pub fn group_of_scene(scene: &Experiment, group: &str) -> Result<()> {
+    let names = scene.world.output_names();
+    let groups: Vec<&str> = columns::groups(&names).into_iter().map(|(name, _)| name).collect();
+    if groups.contains(&group) {
+        return Ok(());
+    }
+    Err(Error::Usage(format!("--group {group}: the scene has {}", groups.join(", "))))
 }
 
 /// Numbers of frames and centres to train with that options give instead of the scene's.

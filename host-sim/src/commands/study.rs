@@ -9,6 +9,8 @@ use super::print::{self, Page};
 
 mod directions;
 mod equations;
+mod widths;
+mod map;
 
 /// Answer one question about the sensor or the paper's method, with a table and a picture.
 #[derive(Args)]
@@ -22,6 +24,8 @@ pub struct Arguments {
 enum Study {
     Equations(equations::Arguments),
     Directions(directions::Arguments),
+    Widths(widths::Arguments),
+    Map(map::Arguments),
 }
 
 impl Arguments {
@@ -30,6 +34,8 @@ impl Arguments {
         match self.study {
             Study::Equations(_) => "equations",
             Study::Directions(_) => "directions",
+            Study::Widths(_) => "widths",
+            Study::Map(_) => "map",
         }
     }
 }
@@ -38,6 +44,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     match &arguments.study {
         Study::Equations(arguments) => equations::execute(arguments, common),
         Study::Directions(arguments) => directions::execute(arguments, common),
+        Study::Widths(arguments) => widths::execute(arguments, common),
+        Study::Map(arguments) => map::execute(arguments, common),
     }
 }
 

@@ -11,11 +11,11 @@ use host_sim::metrics::{Definition, Errors};
 use host_sim::report;
 use host_sim::{Error, Result};
 use serde::Serialize;
-use taxel_data::{columns, output};
+use taxel_data::output;
 use taxel_learn::decoders::{mean, standard};
 use taxel_simulate::sensor::Precision;
 
-use super::scene_argument::{RelativeInputsArgument, SceneArgument};
+use super::scene_argument::{RelativeInputsArgument, SceneArgument, group_of_scene};
 use super::{Common, arguments, print};
 
 mod comparison;
@@ -77,11 +77,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let argument = SceneArgument::new(&arguments.scene, arguments.precision);
     let mut scene = argument.load(common)?;
     arguments.relative_inputs.apply(&mut scene);
-    let names = scene.world.output_names();
-    let groups: Vec<&str> = columns::groups(&names).into_iter().map(|(group, _)| group).collect();
-    if scene.table1.is_some() && !groups.contains(&arguments.group.as_str()) {
-        let message = format!("--group {}: the scene has {}", arguments.group, groups.join(", "));
-        return Err(Error::Usage(message));
+    if scene.table1.is_some() {
+        group_of_scene(&scene, &arguments.group)?;
     }
     for path in [&arguments.output, &arguments.svg].into_iter().flatten() {
         print::check_output(path, &[argument.path()])?;

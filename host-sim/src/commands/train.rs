@@ -15,6 +15,7 @@ use taxel_data::{columns, output};
 use taxel_learn::fill;
 use taxel_learn::outliers::Outliers;
 use taxel_learn::select::Selection;
+use taxel_learn::train::Widths;
 
 use super::data_argument::JudgedBy;
 use super::model_argument::ModelArguments;
@@ -91,6 +92,8 @@ struct Summary {
     centres: usize,
     /// Width σ on scaled inputs; after refinement the mean over the networks.
     spread: f64,
+    /// Rule that gave the centres their widths.
+    widths: Widths,
     /// Penalty on squared weights, for each frame; `None` for the usual one.
     penalty: Option<f64>,
     /// Whether centres, widths and the projection were refined after K-means.
@@ -145,11 +148,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if options.format == Format::F32
         && model.networks().any(|network| network.format() == Format::F32Direct)
     {
-        eprintln!(
-            "note: the fast formula for distances could lose accuracy in f32 with this model (little noise, many \
-             centres or a large spread), so the exact one is used, which takes a device more than twice as long; \
-             use --format fixed16, or try a smaller --spread"
-        );
+        eprintln!("note: {}", why_direct(options.widths));
     }
     let summary = Summary {
         subject: subject.name().into(),
@@ -160,6 +159,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         training_frames: set.frames.frames(),
         centres: model.networks().map(|n| n.shape().centres).max().unwrap_or(0),
         spread: if set.refine { blob.spread() } else { options.spread },
+        widths: options.widths,
         penalty: options.penalty,
         refined: set.refine,
         affine_tail: options.affine_tail,
@@ -181,6 +181,21 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         return print::json(&summary);
     }
     page_of(&summary, options.centres).print()
+}
+
+/// Reason for direct distances in a model that was to be in f32.
+fn why_direct(widths: Widths) -> &'static str {
+    match widths {
+        Widths::Common => {
+            "the fast formula for distances could lose accuracy in f32 with this model (little noise, many \
+             centres or a large spread), so the exact one is used, which takes a device more than twice as long; \
+             use --format fixed16, or try a smaller --spread"
+        }
+        Widths::Neighbours => {
+            "only the exact formula for distances (f32-direct) has a width for each centre; it takes a device more than \
+             twice as long as one width in f32 (docs/formats.md)"
+        }
+    }
 }
 
 /// Scene or CSV file that is trained on, with all frames.
@@ -243,7 +258,12 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         summary.centres,
         summary.output_rank.map_or(String::new(), |rank| format!(", rank {rank}")),
         summary.spread,
-        if summary.refined { " (refined)" } else { "" },
+        match (summary.widths, summary.refined) {
+            (Widths::Common, false) => "",
+            (Widths::Common, true) => " (refined)",
+            (Widths::Neighbours, false) => " (mean, by neighbours)",
+            (Widths::Neighbours, true) => " (mean, by neighbours, refined)",
+        },
         summary.penalty.map_or(String::new(), |p| format!(", penalty = {}", choice::short(p))),
         if summary.affine_tail { "yes" } else { "no" },
         summary.training_frames,

@@ -121,6 +121,11 @@ fn bad_scenes() {
         ("centres = 12", "centres = 0", &["training.centres = 0"]),
         ("centres = 12", "centres = 3000", &["training.centres = 3000", "fewer centres than"]),
         ("spread = 0.8", "spread = 0.0", &["training.spread = 0", "positive"]),
+        (
+            "spread = 0.8",
+            "spread = 0.8\nwidths = \"own\"",
+            &["unknown variant `own`", "`neighbours`"],
+        ),
         ("frames = 3000", "frames = 1", &["training.frames = 1"]),
         ("spreads = [0.1,", "spreads = [0.0,", &["table1.spreads = 0"]),
         ("spreads = [0.1,", "spreads = [1e300,", &["table1.spreads = 1e300", "f32"]),
@@ -168,6 +173,12 @@ fn bad_scenes_of_a_contact() {
         &folder,
         &["train", "press", "-o", "m.bin", "--features", "5"],
         &["features = 5", "leave it out"],
+    );
+    let of_fixed16 = ["--format", "fixed16", "--widths", "neighbours"];
+    refused(
+        &folder,
+        &[&["train", "press", "-o", "m.bin"][..], &of_fixed16].concat(),
+        &["widths = neighbours", "fixed16", "give the format f32-direct, or common widths"],
     );
     refused(&folder, &["table1", "contact"], &["no [table1]"]);
     refused(&folder, &["run", "no-such.toml"], &["no-such.toml", "paper, press"]);
@@ -524,4 +535,19 @@ fn an_emulator_or_an_image_that_is_not_there_is_named() {
     folder.succeed(&["train", "small.toml", "-o", "small.bin"]);
     let arguments = ["emulate", "press", "--model", "small.bin", "--image", image];
     refused(&folder, &arguments, &["--model", "press"]);
+}
+
+#[test]
+fn bad_studies() {
+    let folder = Folder::new("bad-studies");
+    let map = |more: &[&'static str]| [&["study", "map"], more].concat();
+    refused(&folder, &map(&["--row", "9"]), &["--row 9", "rows 1 to 8"]);
+    refused(&folder, &map(&["--group", "dw_mm"]), &["--group dw_mm", "dz_mm"]);
+    refused(&folder, &map(&["--samples", "2,30"]), &["--samples 2", "from 4 to 100000"]);
+    refused(&folder, &map(&["--spread", "1,0.1"]), &["--spread", "larger than the one before"]);
+    refused(&folder, &map(&["--noise", "2"]), &["--noise 2"]);
+    refused(&folder, &map(&["--delta", "-1"]), &["--delta -1", "such as 1e6"]);
+    let widths = |more: &[&'static str]| [&["study", "widths", "press"], more].concat();
+    refused(&folder, &widths(&["--spread", "-1"]), &["--spread -1", "positive"]);
+    refused(&folder, &widths(&["--centres", "0"]), &["--centres 0", "from 1 to 65535"]);
 }

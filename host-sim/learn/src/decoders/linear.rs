@@ -31,7 +31,7 @@ impl LinearRow {
     pub fn fit(table: &RowTable) -> Self {
         let samples = Samples::new(table);
         let inputs = samples.inputs();
-        let regressors = Regressors { centres: &[], inputs, decay: 1.0, affine_tail: true };
+        let regressors = Regressors { centres: &[], inputs, decays: &[1.0], affine_tail: true };
         let mut slope =
             least_squares::fit(&regressors, &samples.scaled, &table.outputs, INITIAL_COVARIANCE);
         let bias = slope.split_off(slope.len() - table.outputs.names.len());

@@ -17,7 +17,7 @@ pub struct StandardNetwork {
     scale: InputScale,
     inputs: usize,
     centres: Vec<f64>,
-    decay: f64,
+    decay: [f64; 1],
     /// Weights, `centres × outputs`.
     weights: Vec<f64>,
     outputs: usize,
@@ -33,7 +33,7 @@ impl StandardNetwork {
     pub fn fit(table: &RowTable, spread: f64) -> Option<Self> {
         let samples = Samples::new(table);
         let (count, outputs) = (table.inputs.len(), table.outputs.names.len());
-        let decay = 1.0 / (2.0 * spread * spread);
+        let decay = [1.0 / (2.0 * spread * spread)];
         let this = Self {
             inputs: samples.inputs(),
             scale: samples.scale,
@@ -62,7 +62,7 @@ impl StandardNetwork {
     }
 
     fn regressors(&self, inputs: usize) -> Regressors<'_> {
-        Regressors { centres: &self.centres, inputs, decay: self.decay, affine_tail: false }
+        Regressors { centres: &self.centres, inputs, decays: &self.decay, affine_tail: false }
     }
 }
 

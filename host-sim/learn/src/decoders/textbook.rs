@@ -100,7 +100,7 @@ impl Textbook {
         initial_covariances: &[f64],
     ) -> Vec<TextbookNetwork> {
         let (scaled, outputs) = (self.scaled(&table.inputs.values), table.outputs.names.len());
-        let regressors = self.regressors(decay);
+        let regressors = self.regressors(&decay);
         let gaussians = regressors.of(&scaled);
         let decomposed = if bias {
             Decomposed::new(&gaussians, &table.outputs.values, outputs)
@@ -117,8 +117,9 @@ impl Textbook {
         initial_covariances.iter().map(network).collect()
     }
 
-    fn regressors(&self, decay: f64) -> Regressors<'_> {
-        Regressors { centres: &self.centres, inputs: self.inputs(), decay, affine_tail: false }
+    fn regressors<'s>(&'s self, decay: &'s f64) -> Regressors<'s> {
+        let decays = std::slice::from_ref(decay);
+        Regressors { centres: &self.centres, inputs: self.inputs(), decays, affine_tail: false }
     }
 }
 
@@ -182,7 +183,7 @@ impl TextbookNetwork {
     pub fn predict_with_slopes(&self, inputs: &[f64], predicted: &mut [f64], slopes: &mut [f64]) {
         let (scaled, count) = (self.hidden.scaled(inputs), inputs.len());
         let mut activations = vec![0.0; self.hidden.centres.len() / count + 1];
-        self.hidden.regressors(self.decay).evaluate(&scaled, &mut activations);
+        self.hidden.regressors(&self.decay).evaluate(&scaled, &mut activations);
         predicted.fill(0.0);
         slopes.fill(0.0);
         let centres = self.hidden.centres.chunks_exact(count);
@@ -213,7 +214,7 @@ pub fn predict_each(networks: &[TextbookNetwork], readings: &[f64]) -> Vec<Vec<f
     const LINES: usize = 16;
     let Some(first) = networks.first() else { return Vec::new() };
     let scaled = first.hidden.scaled(readings);
-    let regressors = first.hidden.regressors(first.decay);
+    let regressors = first.hidden.regressors(&first.decay);
     let design = regressors.of(&scaled);
     let (lines, n) = (readings.len() / first.hidden.inputs(), design.regressors());
     let mut predicted = vec![Vec::with_capacity(lines * first.outputs); networks.len()];

@@ -11,6 +11,7 @@ use model_core::rbf::{Format, Network, NetworkError, Shape, direct, expanded, fi
 
 use taxel_data::table::Table;
 
+use super::hidden_layer::{HiddenLayer, not_held};
 use super::least_squares::Factor;
 use super::{Options, Samples};
 use crate::error::{Error, Result};
@@ -87,7 +88,11 @@ impl FittedNetwork {
     fn try_network(&self) -> std::result::Result<Network<'_>, NetworkError> {
         let Self { shape, format, affine, words, .. } = self;
         Ok(match format {
-            Format::F32Direct => direct::Network::of_words(*shape, true, *affine, words)?.into(),
+            Format::F32Direct => {
+                let common_width =
+                    words.len() == direct::Network::block_words(*shape, true, *affine);
+                direct::Network::of_words(*shape, common_width, *affine, words)?.into()
+            }
             Format::F32 => expanded::Network::try_new(*shape, *affine, words)?.into(),
             Format::Fixed16 => fixed16::Network::try_new(*shape, *affine, words)?.into(),
         })
@@ -173,21 +178,28 @@ impl Weights {
     }
 }
 
-/// Fits `samples` with the given `centres` (`centres × inputs`, on inputs scaled to [0, 1]): one network for each of
-/// `initial_covariances`. They share one decomposition.
+/// Fits `samples` with the Gaussians of `layer`: one network for each of `initial_covariances`. They share one
+/// decomposition. Where each centre has a width of its own, direct distances replace [`Format::F32`].
 ///
 /// # Errors
 /// [`Error`](crate::Error) if the format does not hold a network.
 pub(super) fn fit(
     samples: &Samples<'_>,
-    centres: &[f64],
+    layer: &HiddenLayer,
     options: &Options,
     initial_covariances: &[f64],
 ) -> Result<Vec<FittedNetwork>> {
     let targets = Targets::of(&samples.table.outputs);
     let covariances = initial_covariances.iter();
-    let direct = || direct_f32::Fit::new(samples, centres, options, &targets);
-    match options.format {
+    let direct = || direct_f32::Fit::new(samples, layer, options, &targets);
+    let common_width = layer.relative_widths.is_empty();
+    let (centres, options) = (&layer.centres, &Options { spread: layer.spread, ..*options });
+    let format = match options.format {
+        Format::F32 if !common_width => Format::F32Direct,
+        Format::Fixed16 if !common_width => return Err(not_held(Format::Fixed16).into()),
+        format => format,
+    };
+    match format {
         Format::F32Direct => {
             let direct = direct();
             covariances.map(|covariance| direct.network(*covariance)).collect()

@@ -5,17 +5,9 @@ use std::borrow::Cow;
 use rayon::prelude::*;
 use taxel_data::dataset::Dataset;
 
+use super::hidden_layer::HiddenLayer;
 use super::{Options, Samples, memory, projection, view};
 use crate::error::Result;
-
-/// Hidden layer of a network: its Gaussians.
-#[derive(Debug, Clone, PartialEq)]
-pub struct HiddenLayer {
-    /// Centres on inputs scaled to [0, 1], `centres × inputs`.
-    pub centres: Vec<f64>,
-    /// Width σ of all Gaussians, on that scale.
-    pub spread: f64,
-}
 
 /// All that stands before the output weights.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,7 +19,7 @@ pub struct Layers {
 }
 
 impl Layers {
-    /// Layers as the paper has them: K-means centres of the frames, and one width; for the whole array behind a
+    /// Layers as the paper has them: K-means centres of the frames, and widths by a rule; for the whole array behind a
     /// projection by regression.
     ///
     /// # Errors
@@ -46,8 +38,8 @@ impl Layers {
         let seen = self.seen(dataset);
         let of_row = |row: usize| {
             let table = seen.row_table(row);
-            let centres = Samples::new(&table).centres(options, row);
-            HiddenLayer { centres, spread: options.spread }
+            let samples = Samples::new(&table);
+            samples.layer(samples.centres(options, row), options)
         };
         let hidden = (0..seen.rows).into_par_iter().map(of_row).collect();
         Self { hidden, ..self }

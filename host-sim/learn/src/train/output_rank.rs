@@ -8,7 +8,7 @@
 //! The expansion is rounded first. The network is then fitted to components of the targets, as any network is to its
 //! targets: that gives W·V but for the rounding of its format, which the fit compensates as usual.
 //!
-//! Centres are given, wherever they come from, and are those for all outputs.
+//! Centres and widths are given, wherever they come from, and are those for all outputs.
 
 use model_core::expansion::Expansion;
 use nalgebra::DMatrix;
@@ -18,6 +18,7 @@ use taxel_data::dataset::RowTable;
 use taxel_data::table::Table;
 
 use super::format::{self, FittedNetwork, Targets};
+use super::hidden_layer::HiddenLayer;
 use super::least_squares::{Factor, Regressors};
 use super::principal;
 use super::{Options, Samples};
@@ -26,22 +27,21 @@ use crate::error::Result;
 /// Lines that one thread expands at a time.
 const LINES_AT_ONCE: usize = 256;
 
-/// Fits a network with the given `centres` (`centres × inputs`, on scaled inputs) to the samples' outputs, by way of
-/// `rank` components.
+/// Fits a network with the Gaussians of `layer` to the samples' outputs, by way of `rank` components.
 ///
 /// # Errors
 /// [`Error::Setting`](crate::Error::Setting) for a rank that is not below the number of outputs, or an
 /// [`Error`](crate::Error) if the format does not hold the network.
 pub(super) fn fit(
     samples: &Samples<'_>,
-    centres: &[f64],
+    layer: &HiddenLayer,
     rank: usize,
     options: &Options,
 ) -> Result<FittedNetwork> {
     let outputs = &samples.table.outputs;
     let count = outputs.names.len();
     check(rank, count)?;
-    let expansion = expansion(samples, centres, rank, options);
+    let expansion = expansion(samples, layer, rank, options);
     let table = RowTable {
         inputs: samples.table.inputs.clone(),
         outputs: components(&expansion, rank, outputs),
@@ -50,7 +50,7 @@ pub(super) fn fit(
     let of_components =
         Samples { scale: samples.scale.clone(), scaled: samples.scaled.clone(), table: &table };
     let covariance = options.initial_covariance(outputs.len());
-    let mut networks = format::fit(&of_components, centres, options, &[covariance])?;
+    let mut networks = format::fit(&of_components, layer, options, &[covariance])?;
     let network = networks.pop().expect("one network");
     Ok(network.expanded_by(expansion))
 }
@@ -65,12 +65,18 @@ pub(super) fn check(rank: usize, outputs: usize) -> std::result::Result<(), BadV
 }
 
 /// Means of the outputs, then their parts of each component (`rank × outputs`), rounded.
-fn expansion(samples: &Samples<'_>, centres: &[f64], rank: usize, options: &Options) -> Vec<f32> {
+fn expansion(
+    samples: &Samples<'_>,
+    layer: &HiddenLayer,
+    rank: usize,
+    options: &Options,
+) -> Vec<f32> {
     let targets = Targets::of(&samples.table.outputs);
+    let decays: Vec<f64> = layer.widths().iter().map(|width| 1.0 / (2.0 * width * width)).collect();
     let regressors = Regressors {
-        centres,
+        centres: &layer.centres,
         inputs: samples.inputs(),
-        decay: 1.0 / (2.0 * options.spread * options.spread),
+        decays: &decays,
         affine_tail: options.affine_tail,
     };
     let design = regressors.of(&samples.scaled);

@@ -51,7 +51,8 @@ fn weights_equal_batch_ridge_on_a_well_conditioned_set() {
     let samples = Samples::new(&table);
     let centres: Vec<f64> =
         (0..9).flat_map(|i| [f64::from(i % 3), f64::from(i / 3)]).map(|c| c / 2.0).collect();
-    let regressors = Regressors { centres: &centres, inputs: 2, decay: 20.0, affine_tail: false };
+    let regressors =
+        Regressors { centres: &centres, inputs: 2, decays: &[20.0], affine_tail: false };
     for initial_covariance in [1.0, 1e3, 1e6] {
         let in_groups = fit(&regressors, &samples.scaled, &table.outputs, initial_covariance);
         let batch = fit_batch(&regressors, &samples.scaled, &table.outputs, initial_covariance);
@@ -67,7 +68,8 @@ fn predictions_equal_batch_ridge_on_an_ill_conditioned_set() {
     let samples = Samples::new(&table);
     let centres: Vec<f64> = (0..32).map(|i| f64::from(i * 7 % 32) / 32.0).collect();
     // Wide Gaussians all look alike, and the affine tail repeats their information.
-    let regressors = Regressors { centres: &centres, inputs: 2, decay: 0.02, affine_tail: true };
+    let regressors =
+        Regressors { centres: &centres, inputs: 2, decays: &[0.02], affine_tail: true };
     let n = regressors.count();
     let mut h = nalgebra::DMatrix::zeros(table.inputs.len(), n);
     let mut row = vec![0.0; n];
@@ -166,12 +168,41 @@ fn penalties_that_share_a_decomposition_give_the_networks_that_each_gives_alone(
     for format in Format::ALL {
         let options = Options { centres: 12, spread: 0.4, format, ..Options::default() };
         let centres = samples.centres(&options, 0);
-        let together = samples.fit_each(&centres, &options, &penalties).unwrap();
+        let layer = samples.layer(centres.clone(), &options);
+        let together = samples.fit_each(&layer, &options, &penalties).unwrap();
         for (penalty, fitted) in penalties.iter().zip(&together) {
             let options = Options { penalty: *penalty, ..options };
             assert_eq!(*fitted, samples.fit(&centres, &options).unwrap(), "{format:?} {penalty:?}");
         }
         assert_ne!(together[0], together[3]);
+    }
+}
+
+#[test]
+fn a_width_for_each_centre_takes_direct_distances_and_is_refused_by_fixed16() {
+    let table = table(2000, 0.05);
+    let samples = Samples::new(&table);
+    let with =
+        |widths, format| Options { centres: 12, spread: 0.4, widths, format, ..Options::default() };
+    let fit = |options: &Options| samples.fit(&samples.centres(options, 0), options);
+    let own = fit(&with(Widths::Neighbours, Format::F32)).unwrap();
+    assert_eq!(own, fit(&with(Widths::Neighbours, Format::F32Direct)).unwrap());
+    assert_eq!(own.format(), Format::F32Direct);
+    let widths: Vec<f32> = own.network().widths().collect();
+    assert_eq!(widths.len(), 12);
+    assert!((widths.iter().sum::<f32>() / 12.0 - 0.4).abs() < 1e-4, "{widths:?}");
+    assert!(widths.iter().any(|width| (width - 0.4).abs() > 0.05), "{widths:?}");
+    // Of a layer that all formats share, too.
+    let fixed = with(Widths::Common, Format::Fixed16);
+    let layer = samples.layer(samples.centres(&fixed, 0), &with(Widths::Neighbours, Format::F32));
+    let options = with(Widths::Neighbours, Format::Fixed16);
+    let refusals = [
+        options.check(2000).unwrap_err().to_string(),
+        samples.fit_layer(&layer, &fixed).unwrap_err().to_string(),
+    ];
+    for refusal in refusals {
+        let says = ["widths = neighbours", "fixed16", "give the format f32-direct"];
+        assert!(says.iter().all(|part| refusal.contains(part)), "{refusal}");
     }
 }
 

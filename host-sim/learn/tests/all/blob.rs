@@ -5,7 +5,8 @@ use model_core::rbf::{Format, NetworkError};
 use model_core::{AlignedBytes, Decoder};
 use taxel_data::progress::Silent;
 use taxel_data::random::Stream;
-use taxel_learn::train::train;
+use taxel_learn::cost::Design;
+use taxel_learn::train::{Widths, train};
 use taxel_learn::{Exponential, ModelBlob, Options, Origin, pack};
 use taxel_simulate::outputs::{ElectrodeOutputs, Quantity};
 use taxel_simulate::sensor::Axis;
@@ -41,6 +42,27 @@ fn blob_of_components(format: Format) -> Vec<u8> {
     let trained = train(&dataset, &options, &Silent).unwrap();
     let origin = Origin::of_data("press", 0, 1, &dataset);
     pack(&trained, &dataset, &origin).unwrap().bytes().to_vec()
+}
+
+#[test]
+fn a_width_for_each_centre_is_decoded_and_priced_as_it_is_trained() {
+    let dataset = synthesise(&world(), Stream::Training, 400);
+    let blob = |widths| {
+        let options =
+            Options { format: Format::F32Direct, centres: 8, widths, ..Options::default() };
+        let trained = train(&dataset, &options, &Silent).unwrap();
+        pack(&trained, &dataset, &Origin::of_data("press", 0, 1, &dataset)).unwrap()
+    };
+    let [common, own] = Widths::ALL.map(blob);
+    let model = own.parse();
+    assert!(model.networks().all(|network| network.widths().count() == 8));
+    // The mean over the centres is the spread that was asked for.
+    assert_eq!([common.spread(), own.spread()], [Options::default().spread; 2]);
+    // Seven widths more in each of two networks.
+    assert_eq!(own.bytes().len(), common.bytes().len() + 2 * 7 * 4);
+    let designs = [&common, &own].map(Design::of);
+    assert_eq!(designs[1].parameter_bytes(), designs[0].parameter_bytes() + 2 * 7 * 4);
+    decodes_alike(own.bytes());
 }
 
 /// Calls `use_them` with a copy of `bytes` at an address that is a multiple of four.

@@ -32,7 +32,7 @@ fn in_f64(training: &RowTable, centres: &[f64], options: &Options, test: &RowTab
     let regressors = Regressors {
         centres,
         inputs: training.inputs.names.len(),
-        decay: 1.0 / (2.0 * options.spread * options.spread),
+        decays: &[1.0 / (2.0 * options.spread * options.spread)],
         affine_tail: options.affine_tail,
     };
     let weights = least_squares::fit(

@@ -219,9 +219,8 @@ fn fit(
         let table = seen.row_table(row);
         let samples = Samples::new(&table);
         let fit = |&(format, affine_tail, output_rank): &Variant| {
-            let spread = layer.spread;
-            let options = Options { spread, affine_tail, format, output_rank, ..*options };
-            samples.fit(&layer.centres, &options)
+            let options = Options { affine_tail, format, output_rank, ..*options };
+            samples.fit_layer(layer, &options)
         };
         let fitted = variants.par_iter().map(fit).collect();
         progress.step();

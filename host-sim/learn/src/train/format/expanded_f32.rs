@@ -88,6 +88,8 @@ struct Rounded {
     affine_tail: bool,
     scale: CentredScale,
     decay: f32,
+    /// The decay of eˣ instead of 2ˣ, for inputs scaled to [0, 1].
+    natural_decay: f64,
     /// Parameters b and a of every centre, K' of them.
     exponents: Vec<f32>,
     /// Centres that the rounded a stand for, on inputs scaled to [0, 1].
@@ -117,14 +119,15 @@ impl Rounded {
             line[0] = -(f64::from(decay) * square) as f32;
         }
         let affine_tail = options.affine_tail;
-        Self { inputs, affine_tail, scale, decay, exponents, centres: rounded }
+        let natural_decay = f64::from(decay) * core::f64::consts::LN_2 / (UNIT * UNIT);
+        Self { inputs, affine_tail, scale, decay, natural_decay, exponents, centres: rounded }
     }
 
     fn regressors(&self) -> Regressors<'_> {
         Regressors {
             centres: &self.centres,
             inputs: self.inputs,
-            decay: f64::from(self.decay) * core::f64::consts::LN_2 / (UNIT * UNIT),
+            decays: std::slice::from_ref(&self.natural_decay),
             affine_tail: self.affine_tail,
         }
     }

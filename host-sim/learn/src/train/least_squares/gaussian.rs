@@ -20,8 +20,8 @@ pub struct Regressors<'c> {
     pub centres: &'c [f64],
     /// Number of inputs.
     pub inputs: usize,
-    /// Decay 1/(2σ²) of the Gaussians, on scaled inputs.
-    pub decay: f64,
+    /// Decays 1/(2σ²) of the Gaussians, on scaled inputs: one for all centres, or one for each.
+    pub decays: &'c [f64],
     /// Whether the scaled inputs are regressors too.
     pub affine_tail: bool,
 }
@@ -38,7 +38,8 @@ impl Regressors<'_> {
         let activations = self
             .centres
             .chunks_exact(self.inputs)
-            .map(|centre| libm::exp(-self.decay * squared_distance(scaled, centre)));
+            .zip(self.decays.iter().cycle())
+            .map(|(centre, decay)| libm::exp(-decay * squared_distance(scaled, centre)));
         let tail = if self.affine_tail { scaled } else { &[] };
         let all = activations.chain(tail.iter().copied()).chain([1.0]);
         values.iter_mut().zip(all).for_each(|(place, value)| *place = value);
@@ -53,7 +54,10 @@ impl Regressors<'_> {
             let places = &mut lanes[k / LANES * self.inputs..];
             places.iter_mut().zip(centre).for_each(|(place, c)| place[k % LANES] = *c);
         }
-        Gaussians { regressors: self, scaled, lanes }
+        let mut decays = vec![[0.0; LANES]; count.div_ceil(LANES)];
+        let places = decays.as_flattened_mut().iter_mut().take(count);
+        places.zip(self.decays.iter().cycle()).for_each(|(place, decay)| *place = *decay);
+        Gaussians { regressors: self, scaled, lanes, decays }
     }
 }
 
@@ -66,6 +70,8 @@ pub struct Gaussians<'s> {
     scaled: &'s [f64],
     /// Centres in groups of [`LANES`], input after input; the last group is filled up with 0.
     lanes: Vec<[f64; LANES]>,
+    /// Decays of the centres in each group.
+    decays: Vec<[f64; LANES]>,
 }
 
 impl Design for Gaussians<'_> {
@@ -75,7 +81,7 @@ impl Design for Gaussians<'_> {
 
     fn fill(&self, samples: Range<usize>, values: &mut [f64]) {
         let (inputs, n) = (self.regressors.inputs, self.regressors.count());
-        let (lanes, decay) = (self.lanes.as_slice(), self.regressors.decay);
+        let (lanes, decays) = (self.lanes.as_slice(), self.decays.as_slice());
         let centres = self.regressors.centres.len() / inputs;
         let scaled = &self.scaled[samples.start * inputs..samples.end * inputs];
         widest(
@@ -83,10 +89,9 @@ impl Design for Gaussians<'_> {
             || {
                 for (x, row) in scaled.chunks_exact(inputs).zip(values.chunks_exact_mut(n)) {
                     let (activations, rest) = row.split_at_mut(centres);
-                    for (group, places) in
-                        lanes.chunks_exact(inputs).zip(activations.chunks_mut(LANES))
-                    {
-                        let values = exponents(x, group, decay);
+                    let groups = lanes.chunks_exact(inputs).zip(decays);
+                    for ((group, decays), places) in groups.zip(activations.chunks_mut(LANES)) {
+                        let values = exponents(x, group, decays);
                         if let Some(whole) = places.first_chunk_mut() {
                             *whole = values;
                         } else {
@@ -105,12 +110,12 @@ impl Design for Gaussians<'_> {
 
 /// Exponents −decay·‖x − c‖² of a group of centres.
 #[inline(always)]
-fn exponents(x: &[f64], group: &[[f64; LANES]], decay: f64) -> [f64; LANES] {
+fn exponents(x: &[f64], group: &[[f64; LANES]], decays: &[f64; LANES]) -> [f64; LANES] {
     let mut sum = [0.0; LANES];
     for (x, c) in x.iter().zip(group) {
         for l in 0..LANES {
             sum[l] += (x - c[l]) * (x - c[l]);
         }
     }
-    sum.map(|sum| -decay * sum)
+    std::array::from_fn(|l| -decays[l] * sum[l])
 }

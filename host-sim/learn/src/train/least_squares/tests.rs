@@ -94,8 +94,8 @@ impl Case {
         Self { centres, scaled, targets, inputs }
     }
 
-    fn regressors(&self, decay: f64, affine_tail: bool) -> Regressors<'_> {
-        Regressors { centres: &self.centres, inputs: self.inputs, decay, affine_tail }
+    fn regressors<'c>(&'c self, decays: &'c [f64], affine_tail: bool) -> Regressors<'c> {
+        Regressors { centres: &self.centres, inputs: self.inputs, decays, affine_tail }
     }
 }
 
@@ -113,7 +113,8 @@ fn groups_of_rows_give_the_weights_of_the_recursion_whatever_the_shape() {
     ];
     for (samples, centres, inputs, outputs) in shapes {
         let case = Case::new(samples, centres, inputs, outputs);
-        let regressors = case.regressors(30.0 / inputs as f64, samples % 2 == 0);
+        let decays = [30.0 / inputs as f64];
+        let regressors = case.regressors(&decays, samples % 2 == 0);
         let design = regressors.of(&case.scaled);
         let blocked = Factor::new(&design, &case.targets, outputs, 1e2);
         let recursive = recursive(&design, &case.targets, outputs, 1e2);
@@ -131,7 +132,7 @@ fn groups_of_rows_give_the_weights_of_the_recursion_whatever_the_shape() {
 #[test]
 fn groups_of_rows_predict_as_the_recursion_does_where_regressors_are_all_but_dependent() {
     let case = Case::new(3000, 48, 2, 3);
-    let regressors = case.regressors(0.05, true);
+    let regressors = case.regressors(&[0.05], true);
     let design = regressors.of(&case.scaled);
     let n = design.regressors();
     let mut h = vec![0.0; 3000 * n];
@@ -153,8 +154,9 @@ fn groups_of_rows_predict_as_the_recursion_does_where_regressors_are_all_but_dep
 #[test]
 fn groups_of_activations_are_those_of_single_samples() {
     let case = Case::new(50, 37, 7, 1);
-    for decay in [0.1, 5.0, 900.0] {
-        let regressors = case.regressors(decay, true);
+    let own: Vec<f64> = (0..37).map(|k| 0.2 * f64::from(k + 1)).collect();
+    for decays in [&[0.1][..], &[5.0], &[900.0], &own] {
+        let regressors = case.regressors(decays, true);
         let n = regressors.count();
         let mut blocked = vec![0.0; 50 * n];
         regressors.of(&case.scaled).fill(0..50, &mut blocked);
@@ -173,7 +175,7 @@ fn groups_of_activations_are_those_of_single_samples() {
 #[test]
 fn the_factor_is_the_same_on_any_number_of_threads() {
     let case = Case::new(20_000, 30, 3, 2);
-    let regressors = case.regressors(3.0, true);
+    let regressors = case.regressors(&[3.0], true);
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| Factor::new(&regressors.of(&case.scaled), &case.targets, 2, 1e6))

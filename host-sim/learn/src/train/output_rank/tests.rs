@@ -65,7 +65,7 @@ fn no_other_directions_fit_better() {
     let samples = Samples::new(&table);
     let options = options(Format::F32Direct, Some(6));
     let centres = samples.centres(&options, 0);
-    let best = expansion(&samples, &centres, 6, &options);
+    let best = expansion(&samples, &samples.layer(centres.clone(), &options), 6, &options);
     let outputs = table.outputs.names.len();
     // What is left of the targets after a projection on the network's predictions along six directions.
     let error = |block: &[f32]| {
@@ -99,7 +99,7 @@ fn directions_are_perpendicular_and_of_length_one() {
     let samples = Samples::new(&table);
     let options = Options { centres: 16, ..Options::default() };
     let centres = samples.centres(&options, 0);
-    let block = expansion(&samples, &centres, 5, &options);
+    let block = expansion(&samples, &samples.layer(centres, &options), 5, &options);
     let lines: Vec<&[f32]> = block.chunks_exact(18).skip(1).collect();
     for (i, a) in lines.iter().enumerate() {
         for (j, b) in lines.iter().enumerate() {

@@ -9,7 +9,8 @@ use super::movable::Piece;
 use super::targets::Targets;
 use super::turn;
 use crate::error::Result;
-use crate::train::layers::{HiddenLayer, Layers};
+use crate::train::hidden_layer::HiddenLayer;
+use crate::train::layers::Layers;
 use crate::train::{InputScale, projection, view};
 
 /// Size of a reading as a source: so many times a typical part of the projection, for a reading of one standard
@@ -124,7 +125,7 @@ impl Projected {
         mix
     }
 
-    /// Centres and width of `layer` among the features of the mix at the start.
+    /// Centres and widths of `layer` among the features of the mix at the start.
     pub(super) fn among_features(&self, layer: &HiddenLayer) -> HiddenLayer {
         let scaled = layer.centres.chunks_exact(self.features);
         let centres = scaled.flat_map(|centre| {
@@ -132,7 +133,7 @@ impl Projected {
             centre.iter().zip(&self.lows).map(feature)
         });
         let centres: Vec<f64> = centres.collect();
-        HiddenLayer { centres: turn::turned(&centres, &self.turn, self.features), ..*layer }
+        HiddenLayer { centres: turn::turned(&centres, &self.turn, self.features), ..layer.clone() }
     }
 
     /// Sources of all frames, line after line.
@@ -181,7 +182,8 @@ impl Projected {
         let scaled = centres
             .chunks_exact(n)
             .flat_map(|centre| centre.iter().zip(&lows).map(|(c, low)| (c - low) / span));
-        let layer = HiddenLayer { centres: scaled.collect(), spread: layer.spread / span };
+        let (centres, spread) = (scaled.collect(), layer.spread / span);
+        let layer = HiddenLayer { centres, spread, ..layer.clone() };
         Ok(Layers { projection: Some(parameters), hidden: vec![layer] })
     }
 }

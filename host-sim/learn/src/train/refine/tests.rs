@@ -69,7 +69,8 @@ fn gradient_is_the_slope(sizes: Sizes, loss: &dyn Fn(&Movable) -> Loss) {
     let mut draw = draws(5);
     let centres: Vec<f64> = (0..sizes.centres * sizes.inputs).map(|_| draw()).collect();
     let mix: Vec<f64> = (0..sizes.sources * sizes.inputs).map(|_| draw()).collect();
-    let movable = Movable::new(sizes, &centres, 0.8, &mix);
+    let widths: Vec<f64> = (0..sizes.widths).map(|_| 0.8 + 0.3 * draw()).collect();
+    let movable = Movable::new(sizes, &centres, &widths, &mix);
     let found = loss(&movable).gradient;
     assert_eq!(found.len(), movable.values.len());
     let scale = found.iter().fold(0.0_f64, |most, slope| most.max(slope.abs()));
@@ -85,9 +86,35 @@ fn gradient_is_the_slope(sizes: Sizes, loss: &dyn Fn(&Movable) -> Loss) {
 }
 
 #[test]
+fn a_width_for_each_centre_moves_by_itself() {
+    let world = World { read_rows: vec![3], ..World::press() };
+    let synthesis = Synthesis::of(&world);
+    let (training, test) =
+        (synthesis.frames(Stream::Training, 3000), synthesis.frames(Stream::Test, 1000));
+    let fresh = Fresh(synthesis);
+    let options =
+        Options { centres: 8, widths: crate::train::Widths::Neighbours, ..Options::default() };
+    let start = Layers::start(&training, &options).unwrap();
+    let examples = Examples::Fresh(&fresh);
+    let refined = refine(&training, &start, &options, &quick(), examples, &Silent).unwrap();
+    let ratios: Vec<f64> = (refined.hidden[0].widths().iter())
+        .zip(start.hidden[0].widths())
+        .map(|(after, before)| after / before)
+        .collect();
+    let (least, most) = ratios.iter().fold((f64::MAX, 0.0_f64), |(l, m), r| (l.min(*r), m.max(*r)));
+    assert!(most > 1.2 * least, "{ratios:?}");
+    let [before, after] = [start, refined].map(|layers| {
+        rmse(&crate::train::fit(&training, layers, &options, &Silent).unwrap(), &test)
+    });
+    assert!(after < 0.98 * before, "{after} and {before}");
+}
+
+#[test]
 fn gradients_are_slopes_of_the_loss() {
-    for (sources, affine_tail) in [(0, true), (5, true), (5, false)] {
-        let sizes = Sizes { inputs: 3, centres: 6, sources, affine_tail };
+    for (sources, affine_tail, widths) in
+        [(0, true, 1), (0, true, 6), (5, true, 1), (5, true, 6), (5, false, 6)]
+    {
+        let sizes = Sizes { inputs: 3, centres: 6, widths, sources, affine_tail };
         let given = if sources > 0 { sources } else { 3 };
         let (rest, held) = (pieces(given, 2, 300, 1), pieces(given, 2, 100, 2));
         let [rest, held] = [&rest, &held].map(|pieces| pieces.iter().collect::<Vec<_>>());
