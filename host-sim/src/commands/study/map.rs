@@ -145,8 +145,8 @@ fn map_line(map: &Map) -> String {
 fn by_spread(page: &mut print::Page, study: &MapStudy) {
     let Some(most) = study.maps.iter().map(|map| map.samples).max() else { return };
     let mut line = |label: &str, values: Vec<String>| {
-        let cells: String = values.iter().map(|value| format!(" {value:>7}")).collect();
-        page.line(format_args!("{label:>7}{cells}"));
+        let cells: Vec<String> = values.iter().map(|value| format!("{value:>7}")).collect();
+        page.line(format_args!("{label:>7} {}", cells.join(" ")));
     };
     line("spread", study.spreads.iter().map(f64::to_string).collect());
     for map in study.maps.iter().filter(|map| map.samples == most) {
