@@ -13,6 +13,7 @@ mod data_file;
 mod readings;
 mod health;
 mod data_argument;
+mod data_stream;
 mod subject_argument;
 mod check_arguments;
 mod interruption;
@@ -34,6 +35,7 @@ pub mod drift;
 pub mod limit;
 pub mod emulate;
 pub mod link;
+pub mod study;
 
 use host_sim::Error;
 

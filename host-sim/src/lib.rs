@@ -5,6 +5,6 @@
 pub mod report;
 
 pub use taxel_evaluate::{
-    Error, Result, by_depth, error, evaluate, experiment, measurements, metrics, run, subject,
-    training_set, verdict,
+    Error, Result, by_depth, error, evaluate, experiment, measurements, metrics, run, study,
+    subject, training_set, verdict,
 };

@@ -16,7 +16,7 @@ mod commands;
 
 use commands::{
     Common, confidence, decode, drift, emulate, eval, forward, gate, inspect, join, limit, link,
-    readout, run, synth, table1, trade, train,
+    readout, run, study, synth, table1, trade, train,
 };
 
 /// Simulate, train and evaluate resistive tactile sensors; write weight blobs for the device.
@@ -52,15 +52,17 @@ enum Command {
     Drift(drift::Arguments),
     Limit(limit::Arguments),
     Confidence(confidence::Arguments),
+    Study(study::Arguments),
     Emulate(emulate::Arguments),
     Link(link::Arguments),
 }
 
 impl Command {
-    /// Name of the command, as it is typed; with the action of `link`.
+    /// Name of the command, as it is typed; with the action of `link` or the question of `study`.
     fn name(&self) -> String {
         let name = match self {
             Self::Link(arguments) => return format!("link {}", arguments.action_name()),
+            Self::Study(arguments) => return format!("study {}", arguments.study_name()),
             Self::Run(_) => "run",
             Self::Synth(_) => "synth",
             Self::Forward(_) => "forward",
@@ -109,6 +111,7 @@ fn execute(command: Command, common: &Common) -> Result<()> {
         Command::Drift(arguments) => drift::execute(&arguments, common),
         Command::Limit(arguments) => limit::execute(&arguments, common),
         Command::Confidence(arguments) => confidence::execute(&arguments, common),
+        Command::Study(arguments) => study::execute(&arguments, common),
         Command::Emulate(arguments) => emulate::execute(&arguments, common),
         Command::Link(arguments) => link::execute(&arguments, common),
     }

@@ -3,9 +3,11 @@
 //! The figures are drawn here rather than by a chart crate because their colours are CSS classes:
 //! one page serves light and dark.
 
+use taxel_evaluate::evaluate::learning_curve::LearningCurve;
 use taxel_evaluate::evaluate::limit::LimitResult;
 use taxel_evaluate::evaluate::trade::Trade;
 use taxel_evaluate::run::RunResult;
+use taxel_evaluate::study::recursion::Study;
 
 mod format;
 mod ticks;
@@ -27,6 +29,8 @@ mod sweep;
 mod html;
 mod trade;
 mod limit;
+mod learning_curve;
+mod recursion;
 
 pub use view::{Made, View};
 
@@ -70,6 +74,18 @@ pub fn directions_svg(limit: &LimitResult) -> String {
 #[must_use]
 pub fn known_svg(limit: &LimitResult) -> String {
     limit::known_svg(limit)
+}
+
+/// Picture of a recursion's learning curve on `subject`, as a file of its own: light or dark like the viewer.
+#[must_use]
+pub fn learning_curve_svg(curve: &LearningCurve, subject: &str) -> String {
+    learning_curve::svg(curve, subject)
+}
+
+/// Picture of where recursive least squares diverges, as a file of its own: light or dark like the viewer.
+#[must_use]
+pub fn recursion_svg(study: &Study) -> String {
+    recursion::svg(study)
 }
 
 #[cfg(test)]

@@ -32,5 +32,6 @@ pub mod measurements;
 pub mod subject;
 pub mod evaluate;
 pub mod run;
+pub mod study;
 
 pub use error::{Error, Result};

@@ -1,0 +1,3 @@
+//! Studies: answers to one question each, with their figures.
+
+pub mod recursion;
