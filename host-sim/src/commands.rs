@@ -13,6 +13,7 @@ mod data_file;
 mod readings;
 mod health;
 mod data_argument;
+mod data_stream;
 mod subject_argument;
 mod check_arguments;
 mod interruption;
@@ -36,6 +37,7 @@ pub mod limit;
 pub mod study;
 pub mod emulate;
 pub mod link;
+pub mod study;
 
 use host_sim::Error;
 

@@ -3,6 +3,7 @@
 //! The figures are drawn here rather than by a chart crate because their colours are CSS classes:
 //! one page serves light and dark.
 
+use taxel_evaluate::evaluate::learning_curve::LearningCurve;
 use taxel_evaluate::evaluate::limit::LimitResult;
 use taxel_evaluate::evaluate::printed::Cells;
 use taxel_evaluate::evaluate::trade::Trade;
@@ -10,6 +11,7 @@ use taxel_evaluate::run::RunResult;
 use taxel_evaluate::study::directions::DirectionsResult;
 use taxel_evaluate::study::equations::EquationsResult;
 use taxel_evaluate::study::map::MapStudy;
+use taxel_evaluate::study::recursion::Study;
 
 mod format;
 mod ticks;
@@ -34,6 +36,8 @@ mod trade;
 mod limit;
 mod study;
 mod study_map;
+mod learning_curve;
+mod recursion;
 
 pub use view::{Made, View};
 
@@ -102,6 +106,18 @@ pub fn equations_svg(result: &EquationsResult) -> String {
 #[must_use]
 pub fn decoding_svg(result: &DirectionsResult) -> String {
     study::decoding_svg(result)
+}
+
+/// Picture of a recursion's learning curve on `subject`, as a file of its own: light or dark like the viewer.
+#[must_use]
+pub fn learning_curve_svg(curve: &LearningCurve, subject: &str) -> String {
+    learning_curve::svg(curve, subject)
+}
+
+/// Picture of where recursive least squares diverges, as a file of its own: light or dark like the viewer.
+#[must_use]
+pub fn recursion_svg(study: &Study) -> String {
+    recursion::svg(study)
 }
 
 #[cfg(test)]

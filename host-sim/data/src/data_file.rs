@@ -8,6 +8,7 @@ use crate::input;
 
 mod csv;
 mod npy;
+pub mod pieces;
 
 /// Data file that was read whole: named columns of numbers, one frame a line.
 ///
@@ -66,7 +67,7 @@ impl DataFile {
         } else if ends_in("npz") {
             npy::parse_archive(path, bytes)
         } else {
-            csv::parse(path, bytes, has_header)
+            csv::parse(path, bytes, has_header, 0)
         }
     }
 

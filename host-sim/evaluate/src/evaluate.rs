@@ -6,6 +6,7 @@ pub mod gate;
 pub mod drift;
 pub mod readout;
 pub mod worth;
+pub mod learning_curve;
 pub mod limit;
 pub mod confidence;
 pub mod printed;

@@ -15,7 +15,8 @@ use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
 use taxel_data::{BadValue, input};
 use taxel_learn::decoders::textbook::{Scaling, SpreadMeaning};
-use taxel_learn::train::{FreshFrames, Widths, check_spread};
+use taxel_learn::train::stream::Pieces;
+use taxel_learn::train::{FreshFrames, Recursive, Solver, Widths, check_spread};
 use taxel_learn::{Options, Origin, relative};
 use taxel_limit::{Reference, Refusal};
 use taxel_simulate::noise::NoiseKind;
@@ -121,6 +122,9 @@ pub struct Table1 {
     pub affine_tail: bool,
     /// Number of frames, and of centres, of the standard network (K = N).
     pub standard_frames: usize,
+    /// How output weights are computed; the paper's way is recursive least squares.
+    #[serde(default = "by_recursion", deserialize_with = "file::solver::deserialize")]
+    pub solver: Solver,
     /// What the paper leaves open, where it is chosen otherwise than for a device.
     pub open: Option<OpenChoices>,
 }
@@ -149,6 +153,10 @@ pub enum JudgedOn {
     Fresh,
     /// Frames of training.
     Training,
+}
+
+fn by_recursion() -> Solver {
+    Solver::Rls(Recursive::default())
 }
 
 fn yes() -> bool {
@@ -291,6 +299,26 @@ impl Experiment {
     #[must_use]
     pub fn dataset(&self, synthesis: &Synthesis<'_>, stream: Stream, frames: usize) -> Dataset {
         self.dataset_from(synthesis, stream, 0, frames)
+    }
+
+    /// Training frames of `synthesis` from number `first` up to `count`, piece by piece.
+    ///
+    /// # Panics
+    /// If a trajectory has several frames, which pieces could cut.
+    #[must_use]
+    pub fn pieces<'e>(
+        &'e self,
+        synthesis: Synthesis<'e>,
+        first: usize,
+        count: usize,
+    ) -> Pieces<'e> {
+        const PIECE: usize = 4096;
+        assert_eq!(synthesis.steps(), 1, "trajectories of one frame");
+        let starts = (first..count).step_by(PIECE);
+        Box::new(starts.map(move |start| {
+            let frames = PIECE.min(count - start);
+            Ok(self.dataset_from(&synthesis, Stream::Training, start, frames))
+        }))
     }
 
     /// Data set from trajectory number `first` of `stream` on.

@@ -5,3 +5,4 @@ pub mod equations;
 pub mod directions;
 pub mod widths;
 pub mod map;
+pub mod recursion;

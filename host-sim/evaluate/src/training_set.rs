@@ -8,6 +8,7 @@ use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
 use taxel_learn::confidence::{self, Density, HeldOut};
 use taxel_learn::fill;
+use taxel_learn::train::stream::{self, Frames, Learned, Pieces};
 use taxel_learn::train::{Examples, Refinement, resolution, train, train_refined};
 use taxel_learn::{ModelBlob, Options, Origin, Trained, pack};
 use taxel_simulate::Synthesis;
@@ -94,7 +95,41 @@ impl<'s> TrainingSet<'s> {
         if self.fill {
             fill::check(&self.frames)?;
         }
-        let blob = pack(&self.train(options, progress)?, &self.frames, &self.origin)?;
+        self.pack(&self.train(options, progress)?, options, progress)
+    }
+
+    /// Trains with `options` by recursion, refined if that is asked for: on these frames, which layers are taken from,
+    /// and then on the `rest`, piece by piece. `count` is the number of all frames, if it is known.
+    ///
+    /// The learning curve, which is returned too, has errors on `test`, or else on the next frames.
+    ///
+    /// # Errors
+    /// [`Error`](crate::Error) for options that cannot be used with these frames, and any error of the `rest`.
+    pub fn train_by_recursion(
+        &self,
+        rest: Pieces<'_>,
+        count: Option<usize>,
+        test: Option<&Dataset>,
+        options: &Options,
+        progress: &dyn Progress,
+    ) -> Result<(Trained, Vec<Learned>)> {
+        let frames = Frames { first: &self.frames, rest, count, test };
+        let refinement = Refinement::default();
+        let refinement = self.examples().map(|examples| (&refinement, examples));
+        Ok(stream::train(frames, options, refinement, progress)?)
+    }
+
+    /// Packs the model that was `trained` with `options`, with a confidence and a fill if these are asked for.
+    ///
+    /// # Errors
+    /// [`Error`](crate::Error) for a model that cannot be packed.
+    pub fn pack(
+        &self,
+        trained: &Trained,
+        options: &Options,
+        progress: &dyn Progress,
+    ) -> Result<ModelBlob> {
+        let blob = pack(trained, &self.frames, &self.origin)?;
         let blob =
             if self.confidence { self.with_confidence(&blob, options, progress)? } else { blob };
         if !self.fill {

@@ -17,6 +17,7 @@ use taxel_data::random::{Purpose, Random, Stream};
 use crate::error::Result;
 
 pub mod resolution;
+mod solver;
 pub mod kmeans;
 pub mod hidden_layer;
 pub mod least_squares;
@@ -27,11 +28,13 @@ pub mod output_rank;
 pub mod memory;
 pub mod layers;
 pub mod refine;
+pub mod stream;
 
 pub use format::FittedNetwork;
 pub use hidden_layer::{HiddenLayer, Widths};
 pub use layers::Layers;
 pub use refine::{Examples, FreshFrames, Refinement};
+pub use solver::{Recursive, Solver};
 
 /// Initial covariance δ of the recursive least squares where no penalty is chosen. The penalty on squared weights is
 /// 1/δ for all frames together, too small to be felt.
@@ -58,6 +61,8 @@ pub struct Options {
     /// and as strong as all activations that are fully on. `None` for the usual one: 1/[`INITIAL_COVARIANCE`] for all
     /// frames together, or [`Refinement::ridge`] if training is refined.
     pub penalty: Option<f64>,
+    /// How output weights are computed.
+    pub solver: Solver,
     /// Seed of the K-means starts.
     pub seed: u64,
     /// Effort of the search for centres.
@@ -87,6 +92,7 @@ impl Default for Options {
             widths: Widths::Common,
             affine_tail: true,
             penalty: None,
+            solver: Solver::Qr,
             seed: 1,
             search: kmeans::Search::default(),
             format: Format::F32,
@@ -107,10 +113,13 @@ impl Options {
         }
     }
 
-    /// Initial covariance δ of the recursive least squares on so many `frames`: one over the penalty on squared
-    /// weights.
+    /// Initial covariance δ of the recursive least squares on so many `frames`: that of the solver, else one over the
+    /// penalty on squared weights.
     #[must_use]
     pub fn initial_covariance(&self, frames: usize) -> f64 {
+        if let Solver::Rls(Recursive { initial_covariance: Some(covariance), .. }) = self.solver {
+            return covariance;
+        }
         self.penalty.map_or(INITIAL_COVARIANCE, |penalty| 1.0 / (penalty * frames as f64))
     }
 
@@ -141,6 +150,9 @@ impl Options {
             return Err(hidden_layer::not_held(self.format));
         }
         self.penalty.map_or(Ok(()), check_penalty)?;
+        if let Solver::Rls(settings) = self.solver {
+            settings.check()?;
+        }
         check_spread("spread", self.spread)
     }
 }
@@ -344,6 +356,8 @@ pub struct Trained {
     pub projection: Option<Vec<f32>>,
     /// Networks of the row-wires in order, or the one network behind the projection.
     pub networks: Vec<FittedNetwork>,
+    /// Number of frames that their weights were fitted to.
+    pub frames: usize,
 }
 
 /// Trains one network for each row-wire of `dataset`, or one for all of them.
@@ -410,7 +424,7 @@ pub fn fit(
 ) -> Result<Trained> {
     let mut models = fit_each(dataset, &layers, options, &[options.penalty], progress)?;
     let networks = models.pop().expect("one model a penalty");
-    Ok(Trained { projection: layers.projection, networks })
+    Ok(Trained { projection: layers.projection, networks, frames: dataset.frames() })
 }
 
 /// Fits output weights as [`fit`] does, with each of `penalties` instead of the options' own: the networks of one model

@@ -9,6 +9,7 @@ use host_sim::{Error, Result};
 use taxel_data::data_file::DataFile;
 use taxel_data::dataset::Dataset;
 use taxel_data::error::{Problem, Role};
+use taxel_data::table::Table;
 use taxel_learn::outliers::{self, Outliers};
 use taxel_learn::train::refine::LEAST_FOLDS;
 use taxel_learn::train::resolution;
@@ -104,6 +105,57 @@ impl DataArguments {
         self.baseline.as_deref()
     }
 
+    /// Patterns of the input and output columns, as they were given.
+    pub fn patterns(&self) -> [Option<&str>; 2] {
+        [self.inputs.as_deref(), self.outputs.as_deref()]
+    }
+
+    /// Whether lines with an outlier are trained on, too.
+    pub fn keeps_outliers(&self) -> bool {
+        self.keep_outliers
+    }
+
+    /// Readings of the untouched sensor in the columns of `inputs`, if a file with them was given.
+    pub fn rest(&self, inputs: &Table) -> Result<Option<Table>> {
+        let read = |path| readings::at_rest(&self.file.fields().read(path)?, inputs);
+        self.baseline.as_deref().map(read).transpose()
+    }
+
+    /// Error if an option was given that needs all lines of the file at `path` at once.
+    pub fn refuse_for_stream(&self, path: &Path, how: HowToTrain) -> Result<()> {
+        self.check_baseline(how)?;
+        let is_array = path
+            .extension()
+            .is_some_and(|end| ["npy", "npz"].iter().any(|kind| end.eq_ignore_ascii_case(kind)));
+        for (option, given) in [
+            ("--fold-column", self.fold_column.is_some()),
+            ("--join", self.file.join().is_some()),
+            ("--first-share and --last-share", self.file.takes_a_share()),
+            ("--confidence", how.confidence),
+            ("an array of numpy's", is_array),
+        ] {
+            if given {
+                let message = format!(
+                    "{option}: a recursion reads the lines of a CSV file once, and this needs all of them at once: \
+                     leave it out, or give --solver qr"
+                );
+                return Err(Error::Usage(message));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_baseline(&self, how: HowToTrain) -> Result<()> {
+        if how.relative_inputs && self.baseline.is_none() {
+            return Err(Error::Usage(
+                "--relative-inputs: a CSV file does not tell the baseline; give --baseline FILE, with frames of the \
+                 untouched sensor"
+                    .into(),
+            ));
+        }
+        Ok(())
+    }
+
     /// Folds of `frames`, as many as were asked for: of successive frames, or drawn at random.
     pub fn folds_of(&self, frames: usize, seed: u64) -> Result<Vec<usize>> {
         if let Some(folds) = self.fold_blocks {
@@ -123,13 +175,7 @@ impl DataArguments {
 
     /// Measurements in the CSV file at `path`.
     pub fn load(&self, path: &Path, how: HowToTrain, judged: JudgedBy<'_>) -> Result<Measurements> {
-        if how.relative_inputs && self.baseline.is_none() {
-            return Err(Error::Usage(
-                "--relative-inputs: a CSV file does not tell the baseline; give --baseline FILE, with frames of the \
-                 untouched sensor"
-                    .into(),
-            ));
-        }
+        self.check_baseline(how)?;
         let file = self.file.read(path)?;
         let (frames, lines, outliers) = self.usual_frames(&file)?;
         let given_folds =
@@ -158,11 +204,7 @@ impl DataArguments {
         // Readings themselves, even if the model is given their ratios to the baseline.
         resolution::check(&training)
             .map_err(|refusal| Error::Unfit { path: path.into(), message: refusal.to_string() })?;
-        let rest = self
-            .baseline
-            .as_deref()
-            .map(|path| readings::at_rest(&self.file.fields().read(path)?, &training.inputs));
-        let rest = rest.transpose()?;
+        let rest = self.rest(&training.inputs)?;
         let test_readings = split.test.inputs.clone();
         let [training, test] = [training, split.test].map(|frames| match &rest {
             Some(rest) if how.relative_inputs => relative_to(frames, rest),
@@ -254,7 +296,7 @@ impl DataArguments {
 }
 
 /// Error that names the options which choose columns.
-fn with_options(error: taxel_data::Error) -> Error {
+pub fn with_options(error: taxel_data::Error) -> Error {
     let option = |role| match role {
         Role::Inputs => "--inputs",
         Role::Outputs => "--outputs",

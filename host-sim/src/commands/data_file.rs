@@ -144,6 +144,11 @@ fn count(option: &str, share: f64, lines: usize, rounded: fn(f64) -> f64) -> Res
 }
 
 impl FieldArguments {
+    /// Whether a CSV file has a header whatever its first line holds, and the numbers that stand for a missing value.
+    pub fn settings(&self) -> (bool, &[f64]) {
+        (self.header, &self.missing)
+    }
+
     /// Reads the file at `path`, and says on stderr what it made of it.
     pub fn read(&self, path: &Path) -> Result<DataFile> {
         let mut file =

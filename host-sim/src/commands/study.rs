@@ -11,6 +11,7 @@ mod directions;
 mod equations;
 mod widths;
 mod map;
+mod recursion;
 
 /// Answer one question about the sensor or the paper's method, with a table and a picture.
 #[derive(Args)]
@@ -26,6 +27,7 @@ enum Study {
     Directions(directions::Arguments),
     Widths(widths::Arguments),
     Map(map::Arguments),
+    Recursion(recursion::Arguments),
 }
 
 impl Arguments {
@@ -36,6 +38,7 @@ impl Arguments {
             Study::Directions(_) => "directions",
             Study::Widths(_) => "widths",
             Study::Map(_) => "map",
+            Study::Recursion(_) => "recursion",
         }
     }
 }
@@ -46,6 +49,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         Study::Directions(arguments) => directions::execute(arguments, common),
         Study::Widths(arguments) => widths::execute(arguments, common),
         Study::Map(arguments) => map::execute(arguments, common),
+        Study::Recursion(arguments) => recursion::execute(arguments, common),
     }
 }
 

@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 
 use super::progress::Terminal;
 use clap::Args;
+use host_sim::evaluate::learning_curve::LearningCurve;
 use host_sim::evaluate::worth::Worth;
 use host_sim::measurements::Measurements;
 use host_sim::metrics::{self, Errors, NETWORK};
 use host_sim::subject::Subject;
-use host_sim::{Error, Result};
+use host_sim::{Error, Result, report};
 use model_core::rbf::Format;
 use serde::Serialize;
 use taxel_data::{columns, output};
@@ -25,6 +26,7 @@ use super::subject_argument::SubjectOptions;
 use super::{Common, print, refused_readings};
 
 mod choice;
+mod recursion;
 
 /// Train a model on a scene or a CSV file, and write its blob.
 ///
@@ -37,10 +39,13 @@ mod choice;
   host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --centres 200 --spread 0.5 -o m.bin
   host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --select --fold-column fold -o m.bin
   host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --relative-inputs --baseline rest.csv -o m.bin
+  host-sim train press --no-refine -n 10000000 --solver rls --curve curve.svg -o m.bin
+  zcat log.csv.gz | host-sim train - --inputs 'ch*' --outputs 'f?_n' --solver rls -o m.bin
   host-sim train sensor.csv --join robot.csv --on c1 --tolerance 0.01 --missing -1 --first-share 0.8 \\
       --inputs c2..c16 --outputs b.c5 --fold-blocks 10 -o m.bin")]
 pub struct Arguments {
-    /// A built-in scene (paper, press, contact), a scene file (.toml) or a data file (CSV, .npy, .npz).
+    /// A built-in scene (paper, press, contact), a scene file (.toml) or a data file (CSV, .npy, .npz); with --solver rls
+    /// also `-`, a CSV file on standard input.
     source: String,
     /// Blob to write.
     #[arg(short, long, value_name = "FILE")]
@@ -78,6 +83,8 @@ pub struct Arguments {
     /// Frames to synthesise from a scene, instead of the scene's number.
     #[arg(short = 'n', long, value_name = "N")]
     frames: Option<usize>,
+    #[command(flatten)]
+    recursion: recursion::RecursionArguments,
 }
 
 #[derive(Serialize)]
@@ -96,6 +103,8 @@ struct Summary {
     widths: Widths,
     /// Penalty on squared weights, for each frame; `None` for the usual one.
     penalty: Option<f64>,
+    /// How output weights were computed: `qr` or `rls`.
+    solver: &'static str,
     /// Whether centres, widths and the projection were refined after K-means.
     refined: bool,
     affine_tail: bool,
@@ -111,6 +120,8 @@ struct Summary {
     formats: Vec<&'static str>,
     outputs: Vec<ModelOutput>,
     selection: Option<Selection>,
+    /// Errors by the number of frames that the recursion had taken in; `None` without one.
+    learning_curve: Option<LearningCurve>,
     /// What the model is worth, beside the baselines.
     #[serde(flatten)]
     worth: Worth,
@@ -124,10 +135,19 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let source = Path::new(&arguments.source);
     let baseline = arguments.subject.data.baseline().unwrap_or(source);
     let joined = arguments.subject.data.file.join().unwrap_or(source);
-    print::check_output(&arguments.output, &[source, baseline, joined])?;
-    let subject = load(arguments, common)?;
+    let inputs = [source, baseline, joined];
+    print::check_output(&arguments.output, &inputs)?;
+    if let Some(path) = arguments.recursion.curve() {
+        print::check_output(path, &[&inputs[..], &[&arguments.output]].concat())?;
+    }
+    let mut recursion = arguments.recursion.plan(arguments)?;
+    let subject = match &mut recursion {
+        Some(plan) => plan.load(arguments, common)?,
+        None => load(arguments, common, arguments.frames)?,
+    };
     refused_readings::note_scene(&subject);
     let mut options = arguments.model.over(subject.options());
+    options.solver = recursion.as_ref().map_or(options.solver, recursion::Plan::solver);
     let mut set = subject.training_set(1);
     set.fill |= arguments.fill;
     if set.fill {
@@ -141,7 +161,17 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let selection = choice::choose(arguments, &subject, &set, &mut options)?;
 
     let progress = Terminal::new();
-    let blob = set.blob(&options, &progress)?;
+    let (blob, frames, learning_curve) = match &mut recursion {
+        None => (set.blob(&options, &progress)?, set.frames.frames(), None),
+        Some(plan) => {
+            let (trained, curve) = plan.train(&subject, &set, &options, &progress)?;
+            set.origin.digest = plan.digest().unwrap_or(set.origin.digest);
+            (set.pack(&trained, &options, &progress)?, trained.frames, Some(curve))
+        }
+    };
+    if let (Some(path), Some(curve)) = (arguments.recursion.curve(), &learning_curve) {
+        output::write_bytes(path, report::learning_curve_svg(curve, subject.name()).as_bytes())?;
+    }
     output::write_bytes(&arguments.output, blob.bytes())?;
 
     let model = blob.parse();
@@ -156,11 +186,12 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         file: arguments.output.clone(),
         blob_bytes: blob.bytes().len(),
         model_crc: format!("{:08x}", model.crc()),
-        training_frames: set.frames.frames(),
+        training_frames: frames,
         centres: model.networks().map(|n| n.shape().centres).max().unwrap_or(0),
         spread: if set.refine { blob.spread() } else { options.spread },
         widths: options.widths,
         penalty: options.penalty,
+        solver: options.solver.name(),
         refined: set.refine,
         affine_tail: options.affine_tail,
         output_rank: model.expansion().map(|expansion| expansion.components()),
@@ -171,7 +202,11 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         outputs: model_outputs::of(&model),
         worth: Worth::of(&subject, &set, &blob, selection.as_ref()),
         selection,
-        outliers: subject.measurements().map(|data| data.outliers.clone()),
+        learning_curve,
+        outliers: match recursion {
+            Some(plan) => plan.outliers(),
+            None => subject.measurements().map(|data| data.outliers.clone()),
+        },
         constant_inputs: subject
             .measurements()
             .map(Measurements::constant_inputs)
@@ -198,15 +233,15 @@ fn why_direct(widths: Widths) -> &'static str {
     }
 }
 
-/// Scene or CSV file that is trained on, with all frames.
-fn load(arguments: &Arguments, common: &Common) -> Result<Subject> {
+/// Scene or CSV file that is trained on: all frames of a file, or so many of a scene.
+fn load(arguments: &Arguments, common: &Common, frames: Option<usize>) -> Result<Subject> {
     let options = &arguments.subject;
     if options.data.baseline().is_some() && !options.relative_inputs.relative_inputs {
         let message = "--baseline is what --relative-inputs divides by: give both, or neither";
         return Err(Error::Usage(message.into()));
     }
     let centres = arguments.centres.iter().min().copied();
-    let sizes = Sizes { frames: arguments.frames, centres };
+    let sizes = Sizes { frames, centres };
     let (judged, confidence) = (JudgedBy::None, arguments.confidence);
     let subject = options.load(&arguments.source, common, judged, confidence, sizes)?;
     match &subject {
@@ -250,7 +285,7 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         }
     }
     page.line(format_args!(
-        "{}: {} bytes, CRC-32 {}, {}, K = {}{}, spread = {}{}{}, affine tail: {}, {} frames{}{}{}",
+        "{}: {} bytes, CRC-32 {}, {}, K = {}{}, spread = {}{}{}, affine tail: {}, {} frames{}{}{}{}",
         summary.file.display(),
         summary.blob_bytes,
         summary.model_crc,
@@ -267,6 +302,7 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         summary.penalty.map_or(String::new(), |p| format!(", penalty = {}", choice::short(p))),
         if summary.affine_tail { "yes" } else { "no" },
         summary.training_frames,
+        if summary.learning_curve.is_some() { ", weights by recursion" } else { "" },
         if summary.relative_inputs { ", inputs relative to the baseline" } else { "" },
         if summary.confidence { ", with confidence" } else { "" },
         if summary.fill { ", fills missing readings" } else { "" }
@@ -275,6 +311,15 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         page.line(format_args!(
             "  ({asked} centres were asked for; the data has fewer distinct samples)"
         ));
+    }
+    if let Some(curve) = &summary.learning_curve {
+        page.line(format_args!("\nlearning curve: RMSE on {}", curve.judged_on.words()));
+        let names: Vec<_> = curve.groups.iter().map(|group| format!(" {group:>12}")).collect();
+        page.line(format_args!("{:>10}{}", "frames", names.concat()));
+        for point in &curve.points {
+            let errors: Vec<_> = point.rmse.iter().map(|rmse| format!(" {rmse:>12.4}")).collect();
+            page.line(format_args!("{:>10}{}", point.frames, errors.concat()));
+        }
     }
     let Worth { judged_on, verdict, .. } = &summary.worth;
     print::verdict(&mut page, Some(judged_on.words()), verdict);

@@ -177,6 +177,7 @@ fn result(groups: &[&str]) -> RunResult {
             training_frames: 600,
             test_frames: 300,
             standard_frames: 50,
+            solver: "rls",
             columns: vec![column(0.0), column(0.01), column(0.1)],
             printed: vec![Printed { spread: 0.5, noise_level: 0.01, percent: 6.75 }],
             comparison: vec![],

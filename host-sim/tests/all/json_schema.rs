@@ -123,6 +123,17 @@ fn studies_are_told_by_the_schema() {
 }
 
 #[test]
+fn recursions_are_told_by_the_schema() {
+    let schema = &schema();
+    let folder = prepared("json_recursions", schema);
+    let rls = ["train", "scene.toml", "--solver", "rls", "-o", "r.bin"];
+    let trained = checked(&folder, schema, &rls);
+    assert_eq!(trained["learning_curve"]["points"][0]["frames"], 10);
+    let study = ["study", "recursion", "--centres", "3", "-n", "100"];
+    assert_eq!(checked(&folder, schema, &study)["row_wire"], 4);
+}
+
+#[test]
 fn runs_are_told_by_the_schema() {
     let schema = &schema();
     let folder = prepared("json_runs", schema);

@@ -24,6 +24,7 @@ mod measured;
 mod output;
 mod readout;
 mod recalibrate;
+mod recursion;
 mod refusals;
 mod refused_readings;
 mod scan;

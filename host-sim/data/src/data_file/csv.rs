@@ -9,11 +9,11 @@ use crate::error::{Error, Problem, Result};
 mod body;
 
 /// Parses the bytes of a CSV file; `path` names it in messages. The first line is a header even if it holds numbers
-/// alone, if it `has_header`.
+/// alone, if it `has_header`. Lines are numbered as if so many came `before`.
 ///
 /// # Errors
 /// [`Error::File`] for content that [`DataFile::read`] rejects.
-pub(super) fn parse(path: &Path, bytes: &[u8], has_header: bool) -> Result<DataFile> {
+pub(super) fn parse(path: &Path, bytes: &[u8], has_header: bool, before: u64) -> Result<DataFile> {
     let error = |problem| Error::file(path, problem);
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes); // a byte order mark
     let mut reader = reader(text, true);
@@ -30,7 +30,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8], has_header: bool) -> Result<DataF
     if header.len() == 1
         && let Some(line) = blank_line(text)
     {
-        return Err(error(Problem::BlankLine { line }));
+        return Err(error(Problem::BlankLine { line: line + before as usize }));
     }
     let names_columns = has_header || !holds_numbers(&header);
     let (header, lines) = if names_columns {
@@ -47,10 +47,10 @@ pub(super) fn parse(path: &Path, bytes: &[u8], has_header: bool) -> Result<DataF
     );
     let (values, line_numbers) = match (lines, values) {
         (Some((first, _)), Some(values)) if !values.is_empty() => {
-            let line_numbers = (first..).take(values.len() / header.len()).collect();
+            let line_numbers = (before + first..).take(values.len() / header.len()).collect();
             (values, line_numbers)
         }
-        _ => read_carefully(path, text, &mut reader, &header)?,
+        _ => read_carefully(path, text, &mut reader, &header, before)?,
     };
     let lacks_last_line_end = !matches!(text, [.., b'\n' | b'\r']);
     let path = path.into();
@@ -96,6 +96,7 @@ fn read_carefully(
     bytes: &[u8],
     reader: &mut csv::Reader<&[u8]>,
     header: &[String],
+    before: u64,
 ) -> Result<(Vec<f64>, Vec<u64>)> {
     let error = |problem| Error::file(path, problem);
     let mut values = Vec::new();
@@ -104,7 +105,7 @@ fn read_carefully(
     let mut record = csv::ByteRecord::new();
     let read_error = |e: csv::Error| error(Problem::Line { cause: cause_of(&e) });
     while reader.read_byte_record(&mut record).map_err(read_error)? {
-        let line = lines.of_record_at(record.position().map_or(0, csv::Position::byte));
+        let line = before + lines.of_record_at(record.position().map_or(0, csv::Position::byte));
         if record.len() != header.len() {
             let (fields, columns) = (record.len(), header.len());
             return Err(error(if reader.has_headers() {

@@ -35,6 +35,8 @@ pub struct Table1 {
     pub test_frames: usize,
     /// Number of frames, and of centres, of the standard networks.
     pub standard_frames: usize,
+    /// How the output weights of the networks were computed: `rls` or `qr`.
+    pub solver: &'static str,
     /// Columns of the table, one a noise level.
     pub columns: Vec<Column>,
     /// Cells as the paper prints them; empty if the table has other spreads or noise levels, or no Δz.
@@ -139,6 +141,7 @@ pub fn compute(experiment: &Experiment, progress: &dyn Progress) -> Result<Table
         training_frames: settings.frames,
         test_frames: if on_training { settings.frames } else { settings.test_frames },
         standard_frames: settings.standard_frames,
+        solver: settings.solver.name(),
         columns,
         printed: if comparison.is_empty() { Vec::new() } else { printed::cells().collect() },
         comparison,
@@ -283,7 +286,9 @@ fn row_networks(
     let samples = Samples::new(&table);
     let options = |spread| {
         let (centres, affine_tail) = (settings.centres, settings.affine_tail);
-        let mut options = Options { centres, spread, affine_tail, seed, ..Options::default() };
+        let solver = settings.solver;
+        let mut options =
+            Options { centres, spread, affine_tail, solver, seed, ..Options::default() };
         options.search.most_points = 4096;
         options.search.restarts = 1;
         options

@@ -71,6 +71,20 @@ pub(super) mod format {
     }
 }
 
+/// Solver of output weights by its name.
+pub(super) mod solver {
+    use serde::{Deserialize, Deserializer, de::Error};
+    use taxel_learn::train::{Recursive, Solver};
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Solver, D::Error> {
+        match String::deserialize(deserializer)?.as_str() {
+            "rls" => Ok(Solver::Rls(Recursive::default())),
+            "qr" => Ok(Solver::Qr),
+            name => Err(D::Error::custom(format!("unknown solver `{name}`, expected `rls`, `qr`"))),
+        }
+    }
+}
+
 impl SceneFile {
     /// The experiment, with all defaults.
     ///

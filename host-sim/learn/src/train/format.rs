@@ -4,21 +4,22 @@
 //! resulting activations. That rounding then causes no error any more; only the weights are rounded
 //! last.
 
-use std::cell::LazyCell;
+use std::cell::OnceCell;
 
 use model_core::expansion::Expansion;
 use model_core::rbf::{Format, Network, NetworkError, Shape, direct, expanded, fixed16};
 
+use taxel_data::dataset::RowTable;
 use taxel_data::table::Table;
 
 use super::hidden_layer::{HiddenLayer, not_held};
-use super::least_squares::Factor;
-use super::{Options, Samples};
+use super::least_squares::{Decomposed, Design, Factor, Recursion, predict};
+use super::{Options, Recursive, Samples, Solver};
 use crate::error::{Error, Result};
 use crate::infer::{Exponential, infer};
 
 mod direct_f32;
-mod expanded_f32;
+pub(super) mod expanded_f32;
 mod fixed_point;
 
 pub use expanded_f32::rounding_bounds;
@@ -52,29 +53,24 @@ impl FittedNetwork {
         }
     }
 
-    /// The network, if it decodes each output of `samples` as well as the solution of `factor` in f64, which it was
-    /// rounded from.
+    /// The network, if it decodes each output of `table` as well as the solution in f64 that it was rounded from, which
+    /// has so much squared error `left` of each.
     ///
     /// # Errors
     /// [`Error::OutputLost`] if R² of an output is lower by more than [`MOST_LOST`], and its squared error larger by more
     /// than [`MOST_GROWTH`].
-    fn unless_lost(
+    pub(super) fn unless_lost(
         self,
-        samples: &Samples<'_>,
+        table: &RowTable,
         targets: &Targets,
-        factor: &Factor,
+        left: &[f64],
     ) -> Result<Self> {
-        let outputs = &samples.table.outputs;
-        let predicted =
-            infer(&self.network(), Exponential::default(), &samples.table.inputs.values);
+        let outputs = &table.outputs;
+        let predicted = infer(&self.network(), Exponential::default(), &table.inputs.values);
         let found = outputs.squared_errors(&predicted);
-        for (output, (found, mean)) in found.into_iter().zip(&targets.means).enumerate() {
-            let squares = |values: &[f64]| {
-                values.iter().skip(output).step_by(targets.outputs()).map(|v| v * v).sum::<f64>()
-            };
-            let total = squares(&targets.deviations.values);
-            // What the fit leaves: the squares of the targets without those along the regressors.
-            let left = (total - squares(&factor.projection)).max(0.0);
+        let totals = column_squares(&targets.deviations.values, targets.outputs());
+        let errors = found.into_iter().zip(left).zip(totals).zip(&targets.means);
+        for (output, (((found, left), total), mean)) in errors.enumerate() {
             let lost = (found - left) / total;
             let rounding = outputs.len() as f64 * (4.0 * f64::EPSILON * mean).powi(2);
             if total > rounding && lost > MOST_LOST && found > MOST_GROWTH * left {
@@ -143,16 +139,21 @@ pub(super) struct Targets {
 
 impl Targets {
     pub fn of(outputs: &Table) -> Self {
-        let means = outputs.means();
-        let mut deviations = outputs.clone();
-        for line in deviations.values.chunks_exact_mut(means.len()) {
-            line.iter_mut().zip(&means).for_each(|(value, mean)| *value -= mean);
-        }
-        Self { deviations, means }
+        let means = Self { deviations: outputs.mean_line(), means: outputs.means() };
+        means.of_others(outputs)
     }
 
     pub fn outputs(&self) -> usize {
         self.means.len()
+    }
+
+    /// Targets of other samples, with their `outputs`: deviations from the same means.
+    pub fn of_others(&self, outputs: &Table) -> Self {
+        let (mut deviations, means) = (outputs.clone(), self.means.clone());
+        for line in deviations.values.chunks_exact_mut(means.len()) {
+            line.iter_mut().zip(&means).for_each(|(value, mean)| *value -= mean);
+        }
+        Self { deviations, means }
     }
 }
 
@@ -178,8 +179,124 @@ impl Weights {
     }
 }
 
+/// Gaussians of a network as a number format holds them: all that is rounded before weights are fitted.
+pub(super) trait Held: Send + Sync {
+    /// Regressors that a device computes for the inputs of `table`, line after line.
+    fn design<'t>(&'t self, table: &'t RowTable) -> Box<dyn Design + 't>;
+
+    /// Network with the weights of `factor`, which was fitted to the deviations of `targets`.
+    ///
+    /// # Errors
+    /// [`Error`] if the format does not hold the network.
+    fn network(&self, factor: &Factor, targets: &Targets) -> Result<FittedNetwork>;
+}
+
+/// Gaussians of `layer`, held in the `format`. Where each centre has a width of its own, direct distances replace
+/// [`Format::F32`].
+///
+/// # Errors
+/// [`Error`] if the format does not hold them.
+pub(super) fn held(
+    samples: &Samples<'_>,
+    layer: &HiddenLayer,
+    options: &Options,
+    format: Format,
+) -> Result<Box<dyn Held>> {
+    let common_width = layer.relative_widths.is_empty();
+    let (centres, of_width) = (&layer.centres, &Options { spread: layer.spread, ..*options });
+    Ok(match format {
+        Format::F32 if common_width => {
+            Box::new(expanded_f32::Expanded::new(samples, centres, of_width))
+        }
+        Format::Fixed16 if common_width => {
+            Box::new(fixed_point::Exponents::new(samples, centres, of_width)?)
+        }
+        Format::Fixed16 => return Err(not_held(format).into()),
+        Format::F32Direct | Format::F32 => {
+            Box::new(direct_f32::Direct::new(samples, layer, options))
+        }
+    })
+}
+
+/// Samples of a table that weights are fitted to.
+struct Fit<'s, H: ?Sized> {
+    table: &'s RowTable,
+    targets: &'s Targets,
+    solver: Solver,
+    held: &'s H,
+    /// Decomposition that all penalties share.
+    decomposed: OnceCell<Decomposed>,
+}
+
+impl<'s, H: Held + ?Sized> Fit<'s, H> {
+    fn new(held: &'s H, table: &'s RowTable, targets: &'s Targets, solver: Solver) -> Self {
+        Self { table, targets, solver, held, decomposed: OnceCell::new() }
+    }
+
+    /// Factor of all samples, with a penalty of 1/`initial_covariance` on squared weights.
+    fn factor(&self, initial_covariance: f64) -> Factor {
+        let (targets, outputs) = (&self.targets.deviations.values, self.targets.outputs());
+        let design = self.held.design(self.table);
+        match self.solver {
+            Solver::Qr => self
+                .decomposed
+                .get_or_init(|| Decomposed::new(&*design, targets, outputs))
+                .factor(initial_covariance),
+            Solver::Rls(settings) => {
+                let mut recursion =
+                    Recursion::new(design.regressors(), outputs, initial_covariance, &settings);
+                recursion.absorb(&*design, targets, 0..self.table.inputs.len());
+                recursion.factor()
+            }
+        }
+    }
+
+    /// Network whose weights have a penalty of 1/`initial_covariance`.
+    fn network(&self, initial_covariance: f64) -> Result<FittedNetwork> {
+        let factor = self.factor(initial_covariance);
+        let network = self.held.network(&factor, self.targets)?;
+        network.unless_lost(self.table, self.targets, &self.left(&factor))
+    }
+
+    /// Squared error of each output that the solution of `factor` leaves.
+    fn left(&self, factor: &Factor) -> Vec<f64> {
+        match self.solver {
+            Solver::Rls(Recursive { forgetting_factor, .. }) if forgetting_factor < 1.0 => {
+                left(self.held, self.table, self.targets, factor)
+            }
+            // The squares of the targets without those along the regressors.
+            _ => {
+                let squares = |values: &[f64]| column_squares(values, self.targets.outputs());
+                let all = squares(&self.targets.deviations.values).into_iter();
+                all.zip(squares(&factor.projection))
+                    .map(|(all, along)| (all - along).max(0.0))
+                    .collect()
+            }
+        }
+    }
+}
+
+/// Sum of the squares of each of so many columns.
+fn column_squares(values: &[f64], columns: usize) -> Vec<f64> {
+    let column = |column| values.iter().skip(column).step_by(columns).map(|v| v * v).sum();
+    (0..columns).map(column).collect()
+}
+
+/// Squared error of each output that the solution of `factor` leaves on `table`, wherever it was fitted.
+pub(super) fn left(
+    held: &(impl Held + ?Sized),
+    table: &RowTable,
+    targets: &Targets,
+    factor: &Factor,
+) -> Vec<f64> {
+    let (lines, outputs) = (table.inputs.len(), targets.outputs());
+    let predicted = predict(&*held.design(table), 0..lines, &factor.weights(), outputs);
+    targets.deviations.squared_errors(&predicted)
+}
+
 /// Fits `samples` with the Gaussians of `layer`: one network for each of `initial_covariances`. They share one
-/// decomposition. Where each centre has a width of its own, direct distances replace [`Format::F32`].
+/// decomposition, unless the solver is a recursion. Where each centre has a width of its own, direct distances replace
+/// [`Format::F32`].
 ///
 /// # Errors
 /// [`Error`](crate::Error) if the format does not hold a network.
@@ -191,31 +308,35 @@ pub(super) fn fit(
 ) -> Result<Vec<FittedNetwork>> {
     let targets = Targets::of(&samples.table.outputs);
     let covariances = initial_covariances.iter();
-    let direct = || direct_f32::Fit::new(samples, layer, options, &targets);
-    let common_width = layer.relative_widths.is_empty();
-    let (centres, options) = (&layer.centres, &Options { spread: layer.spread, ..*options });
-    let format = match options.format {
-        Format::F32 if !common_width => Format::F32Direct,
-        Format::Fixed16 if !common_width => return Err(not_held(Format::Fixed16).into()),
-        format => format,
-    };
-    match format {
-        Format::F32Direct => {
-            let direct = direct();
-            covariances.map(|covariance| direct.network(*covariance)).collect()
-        }
-        Format::F32 => {
-            let expanded = expanded_f32::Fit::new(samples, centres, options, &targets);
-            let direct = LazyCell::new(direct);
-            let of = |covariance: &f64| match expanded.network(*covariance) {
-                Some(fitted) => Ok(fitted),
-                None => direct.network(*covariance),
-            };
-            covariances.map(of).collect()
-        }
-        Format::Fixed16 => {
-            let fixed = fixed_point::Fit::new(samples, centres, options, &targets)?;
-            covariances.map(|covariance| fixed.network(*covariance)).collect()
-        }
+    let (table, solver) = (samples.table, options.solver);
+    if options.format != Format::F32 || !layer.relative_widths.is_empty() {
+        let held = held(samples, layer, options, options.format)?;
+        let fit = Fit::new(&*held, table, &targets, solver);
+        return covariances.map(|covariance| fit.network(*covariance)).collect();
     }
+    let of_width = Options { spread: layer.spread, ..*options };
+    let expanded = expanded_f32::Expanded::new(samples, &layer.centres, &of_width);
+    let few = expanded.few(table);
+    let few_targets = few.as_ref().map(|few| targets.of_others(&few.outputs));
+    let fit_few = few.as_ref().zip(few_targets.as_ref());
+    let fit_few = fit_few.map(|(few, targets)| Fit::new(&expanded, few, targets, solver));
+    let fit = Fit::new(&expanded, table, &targets, solver);
+    let direct = direct_f32::Direct::new(samples, layer, options);
+    let direct = Fit::new(&direct, table, &targets, solver);
+    let proved = |covariance: f64| {
+        if let Some(few) = &fit_few {
+            let network = few.held.network(&few.factor(covariance), few.targets).ok()?;
+            if expanded_f32::worst_share(&network, table) > expanded_f32::HOPELESS {
+                return None;
+            }
+        }
+        let factor = fit.factor(covariance);
+        let network = expanded.network(&factor, &targets).ok()?;
+        let is_harmless = expanded_f32::worst_share(&network, table) <= expanded_f32::HARMLESS;
+        // What this format loses, direct distances may hold.
+        is_harmless.then(|| network.unless_lost(table, &targets, &fit.left(&factor)).ok()).flatten()
+    };
+    covariances
+        .map(|&covariance| proved(covariance).map_or_else(|| direct.network(covariance), Ok))
+        .collect()
 }

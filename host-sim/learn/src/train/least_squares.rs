@@ -1,8 +1,8 @@
-//! Output weights: least squares over all samples, by a QR decomposition.
+//! Output weights: least squares over all samples, by a QR decomposition or by recursion.
 //!
-//! The weights minimise Σ_t ‖y_t − Wᵀh_t‖² + ‖W‖²/δ. Recursive least squares ([`model_core::rls`]) from
-//! covariance δ·I without forgetting arrives at the same weights sample by sample, and the device can go
-//! on from there. Taking many samples at once changes the order of rounding only.
+//! The weights minimise Σ_t ‖y_t − Wᵀh_t‖² + ‖W‖²/δ. The recursion ([`Recursion`]) from covariance δ·I without
+//! forgetting arrives at the same weights sample by sample, and the device can go on from there
+//! ([`model_core::rls`]). Taking many samples at once ([`Decomposed`]) changes the order of rounding only.
 
 use std::ops::Range;
 
@@ -14,9 +14,11 @@ use taxel_data::table::Table;
 mod exp;
 mod gaussian;
 mod triangle;
+mod recursion;
 
 pub(crate) use exp::exponentiate_non_positive;
 pub use gaussian::{Gaussians, Regressors};
+pub use recursion::Recursion;
 use triangle::{NewRows, ROWS_AT_ONCE, Triangle};
 
 /// Regressors of a set of samples: the rows of the matrix that weights are fitted through.
@@ -62,7 +64,7 @@ impl Decomposed {
     /// # Panics
     /// If `outputs` is 0.
     #[must_use]
-    pub fn new(design: &impl Design, targets: &[f64], outputs: usize) -> Self {
+    pub fn new(design: &(impl Design + ?Sized), targets: &[f64], outputs: usize) -> Self {
         let regressors = design.regressors();
         let samples = targets.len() / outputs;
         let piece = piece(samples, regressors);
@@ -102,7 +104,7 @@ impl Factor {
     /// If `initial_covariance` is not positive and finite, or `outputs` is 0.
     #[must_use]
     pub fn new(
-        design: &impl Design,
+        design: &(impl Design + ?Sized),
         targets: &[f64],
         outputs: usize,
         initial_covariance: f64,
@@ -119,6 +121,32 @@ impl Factor {
     }
 }
 
+/// Samples that are evaluated at once.
+const EVALUATED: usize = 256;
+
+/// Outputs that `weights` (`regressors × outputs`) predict for these `samples` of `design`: `samples × outputs`.
+#[must_use]
+pub fn predict(
+    design: &(impl Design + ?Sized),
+    samples: Range<usize>,
+    weights: &[f64],
+    outputs: usize,
+) -> Vec<f64> {
+    let n = design.regressors();
+    let mut predicted = vec![0.0; samples.len() * outputs];
+    let mut values = vec![0.0; EVALUATED.min(samples.len()) * n];
+    for (piece, predicted) in predicted.chunks_mut(EVALUATED * outputs).enumerate() {
+        let (first, count) = (samples.start + piece * EVALUATED, predicted.len() / outputs);
+        design.fill(first..first + count, &mut values[..count * n]);
+        for (h, sums) in values.chunks_exact(n).zip(predicted.chunks_exact_mut(outputs)) {
+            for (h, weights) in h.iter().zip(weights.chunks_exact(outputs)) {
+                sums.iter_mut().zip(weights).for_each(|(sum, weight)| *sum += h * weight);
+            }
+        }
+    }
+    predicted
+}
+
 /// Samples that a thread decomposes before its triangle is merged with others.
 fn piece(samples: usize, regressors: usize) -> usize {
     // Merging costs as much as absorbing half as many samples as there are regressors.
@@ -130,7 +158,7 @@ fn piece(samples: usize, regressors: usize) -> usize {
 const FILLED: usize = 8;
 
 fn decompose(
-    design: &impl Design,
+    design: &(impl Design + ?Sized),
     targets: &[f64],
     outputs: usize,
     samples: Range<usize>,

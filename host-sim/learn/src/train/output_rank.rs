@@ -65,7 +65,7 @@ pub(super) fn check(rank: usize, outputs: usize) -> std::result::Result<(), BadV
 }
 
 /// Means of the outputs, then their parts of each component (`rank × outputs`), rounded.
-fn expansion(
+pub(super) fn expansion(
     samples: &Samples<'_>,
     layer: &HiddenLayer,
     rank: usize,
@@ -94,7 +94,7 @@ fn expansion(
 }
 
 /// Components of `outputs` (`samples × outputs`) in the directions of the `expansion`, about its means.
-fn components(expansion: &[f32], rank: usize, outputs: &Table) -> Table {
+pub(super) fn components(expansion: &[f32], rank: usize, outputs: &Table) -> Table {
     let (means, directions) = expansion.split_at(outputs.names.len());
     let of_line = |line: &[f64]| {
         let deviations: Vec<f64> =

@@ -4,7 +4,7 @@ use super::*;
 fn carefully(bytes: &[u8]) -> Result<(Vec<f64>, Vec<u64>)> {
     let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(bytes);
     let header: Vec<String> = reader.headers().unwrap().iter().map(str::to_owned).collect();
-    read_carefully(Path::new("test.csv"), bytes, &mut reader, &header)
+    read_carefully(Path::new("test.csv"), bytes, &mut reader, &header, 0)
 }
 
 fn bits(values: &[f64]) -> Vec<u64> {
@@ -33,7 +33,7 @@ fn the_quick_reader_reads_what_the_careful_one_reads() {
         ("\u{feff}a,b\n1,2\n", true),
         ("a,b\n\u{a0}1,2\n", true),
     ] {
-        let file = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap();
+        let file = parse(Path::new("test.csv"), text.as_bytes(), false, 0).unwrap();
         let (values, line_numbers) = carefully(text.as_bytes()).unwrap();
         assert_eq!(bits(&file.values), bits(&values), "{text:?}");
         assert_eq!(file.line_numbers, line_numbers, "{text:?}");
@@ -57,7 +57,7 @@ fn lines_are_counted_as_an_editor_counts_them() {
         ("\r\n\ra,b\r\n1,2\r\n3,x\r\n", 5),
         ("\u{feff}a,b\n1,2\n3,x\n", 3),
     ] {
-        let message = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap_err();
+        let message = parse(Path::new("test.csv"), text.as_bytes(), false, 0).unwrap_err();
         assert!(message.to_string().contains(&format!("line {line}")), "{text:?}: {message}");
     }
 }
@@ -74,7 +74,7 @@ fn what_is_wrong_is_left_to_the_careful_reader() {
         "a,b\n1,2 3\n",
         "a,b\n1,\u{ff12}\n",
     ] {
-        let message = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap_err();
+        let message = parse(Path::new("test.csv"), text.as_bytes(), false, 0).unwrap_err();
         let careful = carefully(text.as_bytes()).unwrap_err();
         assert_eq!(message.to_string(), careful.to_string(), "{text:?}");
     }
@@ -89,7 +89,7 @@ fn files_of_many_pieces_are_read_whole_and_faults_in_them_found() {
         text += &[value, -value * 1e-7, f64::from(line)].map(|v| v.to_string()).join(",");
         text += "\n";
     }
-    let file = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap();
+    let file = parse(Path::new("test.csv"), text.as_bytes(), false, 0).unwrap();
     assert_eq!(file.lines(), lines as usize);
     for line in 0..lines {
         let value = f64::from(line).sqrt();
@@ -98,7 +98,7 @@ fn files_of_many_pieces_are_read_whole_and_faults_in_them_found() {
         assert_eq!(file.line_number(line as usize), line as u64 + 2);
     }
     text += "1,2,three\n";
-    let message = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap_err().to_string();
+    let message = parse(Path::new("test.csv"), text.as_bytes(), false, 0).unwrap_err().to_string();
     assert!(message.contains("line 60002, column \"c\": \"three\" is not a number"), "{message}");
 }
 
@@ -114,15 +114,15 @@ fn a_first_line_of_numbers_is_data() {
         (" 1 , NaN\n3,4\n", vec!["c1", "c2"], 2, 1),
         ("7\n8\n", vec!["c1"], 2, 1),
     ] {
-        let file = parse(path, text.as_bytes(), false).unwrap();
+        let file = parse(path, text.as_bytes(), false, 0).unwrap();
         assert_eq!(file.header, header, "{text:?}");
         assert!(!file.names_columns, "{text:?}");
         assert_eq!((file.lines(), file.line_number(0)), (lines, first_line), "{text:?}");
     }
-    let named = parse(path, b"1,2\n3,4\n", true).unwrap();
+    let named = parse(path, b"1,2\n3,4\n", true, 0).unwrap();
     assert_eq!((&*named.header, named.lines()), (&["1".into(), "2".into()][..], 1));
     for text in ["a,2\n3,4\n", "nan,inf\n1,2\n", "1,inf\n1,2\n"] {
-        assert!(parse(path, text.as_bytes(), false).unwrap().names_columns, "{text:?}");
+        assert!(parse(path, text.as_bytes(), false, 0).unwrap().names_columns, "{text:?}");
     }
 }
 
@@ -133,7 +133,8 @@ fn lines_of_a_file_without_a_header_are_counted_from_its_first() {
         ("1,2\n3,4\n5\n", "line 3 has 1 fields; the first line has 2"),
         ("1\n\n2\n", "line 2 is blank"),
     ] {
-        let message = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap_err().to_string();
+        let message =
+            parse(Path::new("test.csv"), text.as_bytes(), false, 0).unwrap_err().to_string();
         assert!(message.contains(says), "{message}");
     }
 }
@@ -141,17 +142,17 @@ fn lines_of_a_file_without_a_header_are_counted_from_its_first() {
 #[test]
 fn other_separators_are_named() {
     for (text, separator) in [("a;b\n1;2\n", ';'), ("a\tb\n1\t2\n", '\t')] {
-        let refused = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap_err();
+        let refused = parse(Path::new("test.csv"), text.as_bytes(), false, 0).unwrap_err();
         let named = matches!(&refused, Error::File { problem: Problem::Separator { separator: s }, .. } if *s == separator);
         assert!(named, "{text:?}: {refused}");
     }
-    assert!(parse(Path::new("test.csv"), b"a\n1\n", false).is_ok());
+    assert!(parse(Path::new("test.csv"), b"a\n1\n", false, 0).is_ok());
 }
 
 #[test]
 fn a_lone_cr_before_the_header_is_a_line_of_its_own() {
     for text in ["\r\ra,b\n1,2\n3,4\n", "\r\n\ra,b\r\n1,2\r\n3,4\r\n", "\n\ra,b\n1,2\n3,4\n"] {
-        let file = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap();
+        let file = parse(Path::new("test.csv"), text.as_bytes(), false, 0).unwrap();
         assert_eq!(file.line_numbers, [4, 5], "{text:?}");
     }
 }

@@ -78,7 +78,9 @@ impl<'s> Judge<'s> {
                     continue;
                 }
             };
-            let trained = Trained { projection: layers.projection.clone(), networks };
+            let frames_seen = frames.training().frames();
+            let trained =
+                Trained { projection: layers.projection.clone(), networks, frames: frames_seen };
             let origin = &frames.set.origin;
             let noise = (origin.noise.0, frames.noise_level);
             let origin = Origin { noise, ..origin.clone() };

@@ -1,72 +1,67 @@
-//! Fit of networks in f32 with direct distances.
+//! Networks in f32 with direct distances.
 
 use model_core::rbf::direct::Parameters;
 use model_core::rbf::{Format, Shape};
+use taxel_data::dataset::RowTable;
 
 use super::super::hidden_layer::HiddenLayer;
-use super::super::least_squares::{Decomposed, Regressors};
-use super::super::{Options, Samples};
-use super::{FittedNetwork, Targets, Weights};
+use super::super::least_squares::{Design, Factor, Regressors};
+use super::super::{InputScale, Options, Samples};
+use super::{FittedNetwork, Held, Targets, Weights};
 use crate::error::Result;
 
-/// Samples decomposed for this format.
-pub(super) struct Fit<'s> {
-    samples: &'s Samples<'s>,
-    targets: &'s Targets,
-    centres: &'s [f64],
-    /// Decays in f32, as the device will use them, so that weights fit the device's activations.
-    decays: Vec<f32>,
+/// Gaussians as this format holds them.
+pub(super) struct Direct {
+    scale: InputScale,
+    centres: Vec<f64>,
+    /// Decays rounded to f32, as the device will use them, so that weights fit the device's activations: one for all
+    /// centres, or one for each.
+    decays: Vec<f64>,
     affine_tail: bool,
-    decomposed: Decomposed,
 }
 
-impl<'s> Fit<'s> {
-    pub(super) fn new(
-        samples: &'s Samples<'s>,
-        layer: &'s HiddenLayer,
-        options: &Options,
-        targets: &'s Targets,
-    ) -> Self {
-        let widths = layer.widths();
-        let decays: Vec<f32> =
-            widths.iter().map(|width| (1.0 / (2.0 * width * width)) as f32).collect();
-        let regressors = Regressors {
-            centres: &layer.centres,
-            inputs: samples.inputs(),
-            decays: &decays.iter().copied().map(f64::from).collect::<Vec<_>>(),
+impl Direct {
+    pub(super) fn new(samples: &Samples<'_>, layer: &HiddenLayer, options: &Options) -> Self {
+        let decay = |width: &f64| f64::from((1.0 / (2.0 * width * width)) as f32);
+        Self {
+            scale: samples.scale.clone(),
+            centres: layer.centres.clone(),
+            decays: layer.widths().iter().map(decay).collect(),
             affine_tail: options.affine_tail,
-        };
-        let design = regressors.of(&samples.scaled);
-        let decomposed = Decomposed::new(&design, &targets.deviations.values, targets.outputs());
-        let affine_tail = options.affine_tail;
-        Self { samples, targets, centres: &layer.centres, decays, affine_tail, decomposed }
+        }
     }
 
-    /// Network whose weights have a penalty of 1/`initial_covariance`.
-    ///
-    /// # Errors
-    /// [`Error`](crate::Error) if the format does not hold the network.
-    pub(super) fn network(&self, initial_covariance: f64) -> Result<FittedNetwork> {
-        let inputs = self.samples.inputs();
+    fn regressors(&self) -> Regressors<'_> {
+        Regressors {
+            centres: &self.centres,
+            inputs: self.scale.minimum.len(),
+            decays: &self.decays,
+            affine_tail: self.affine_tail,
+        }
+    }
+}
+
+impl Held for Direct {
+    fn design<'t>(&'t self, table: &'t RowTable) -> Box<dyn Design + 't> {
+        Box::new(self.regressors().of(self.scale.apply(&table.inputs.values)))
+    }
+
+    fn network(&self, factor: &Factor, targets: &Targets) -> Result<FittedNetwork> {
+        let inputs = self.scale.minimum.len();
         let count = self.centres.len() / inputs;
-        let factor = self.decomposed.factor(initial_covariance);
-        let weights = Weights::split(factor.weights(), count, self.targets);
+        let weights = Weights::split(factor.weights(), count, targets);
         let round = |values: &[f64]| values.iter().map(|v| *v as f32).collect::<Vec<_>>();
         let parameters = Parameters {
-            input_minimum: &round(&self.samples.scale.minimum),
-            input_per_span: &round(&self.samples.scale.per_span),
-            centres: &round(self.centres),
-            decay: &self.decays,
+            input_minimum: &round(&self.scale.minimum),
+            input_per_span: &round(&self.scale.per_span),
+            centres: &round(&self.centres),
+            decay: &round(&self.decays),
             output_weights: &round(&weights.centres),
             bias: &round(&weights.bias),
             affine: &round(&weights.affine),
         };
-        let shape = Shape { inputs, centres: count, outputs: self.targets.outputs() };
+        let shape = Shape { inputs, centres: count, outputs: targets.outputs() };
         let words = parameters.words().collect();
-        FittedNetwork::try_new(shape, Format::F32Direct, self.affine_tail, words)?.unless_lost(
-            self.samples,
-            self.targets,
-            &factor,
-        )
+        FittedNetwork::try_new(shape, Format::F32Direct, self.affine_tail, words)
     }
 }

@@ -1,19 +1,20 @@
 //! Fit of networks in f32 with expanded distances, where their rounding is proved harmless.
 
-use std::cell::OnceCell;
-
 use model_core::rbf::expanded::{CENTRES_AT_ONCE, Parameters};
 use model_core::rbf::{Format, Network, Shape};
 use model_core::scale::{HALF_RANGE, UNITS};
 
-use super::super::least_squares::{Decomposed, Factor, Regressors};
-use super::super::{CentredScale, Options, Samples};
-use super::{FittedNetwork, Targets, Weights};
-use crate::infer::{Exponential, infer};
 use taxel_data::dataset::RowTable;
+use taxel_data::table::Table;
+
+use super::super::least_squares::{Design, Factor, Regressors};
+use super::super::{CentredScale, Options, Samples};
+use super::{FittedNetwork, Held, Targets, Weights};
+use crate::error::Result;
+use crate::infer::{Exponential, infer};
 
 /// Largest share of an output's training RMSE that the rounding of exponents may reach.
-const HARMLESS: f64 = 0.1;
+pub(in crate::train) const HARMLESS: f64 = 0.1;
 
 /// Step through the samples for a first, cheap fit: it sees one in so many.
 const FEW: usize = 8;
@@ -23,67 +24,13 @@ const SAMPLES_A_WEIGHT: usize = 16;
 
 /// Share of RMSE in a first fit beyond which a full fit is not tried. The two shares differ by less than
 /// a factor of two (tested), so the full one could not be below [`HARMLESS`].
-const HOPELESS: f64 = 2.0 * HARMLESS;
+pub(super) const HOPELESS: f64 = 2.0 * HARMLESS;
 
 /// One unit of inputs, in spans of the training range.
 const UNIT: f64 = HALF_RANGE as f64 / UNITS as f64;
 
-/// Samples decomposed for this format.
-pub(super) struct Fit<'s> {
-    samples: &'s Samples<'s>,
-    targets: &'s Targets,
-    rounded: Rounded,
-    scaled: Vec<f64>,
-    /// Decomposition of one in [`FEW`] samples; `None` where samples are too few for that.
-    few: Option<Decomposed>,
-    all: OnceCell<Decomposed>,
-}
-
-impl<'s> Fit<'s> {
-    pub(super) fn new(
-        samples: &'s Samples<'s>,
-        centres: &[f64],
-        options: &Options,
-        targets: &'s Targets,
-    ) -> Self {
-        let rounded = Rounded::new(samples, centres, options);
-        let scaled = rounded.scale.apply(samples.table);
-        let all = &targets.deviations;
-        // A first fit finds most unsuitable networks in an eighth of the time.
-        let first = all.len() >= FEW * SAMPLES_A_WEIGHT * rounded.regressors().count();
-        let few = first.then(|| {
-            let deviations = every(&all.values, targets.outputs());
-            rounded.decompose(&every(&scaled, samples.inputs()), &deviations, targets)
-        });
-        Self { samples, targets, rounded, scaled, few, all: OnceCell::new() }
-    }
-
-    /// Network whose weights have a penalty of 1/`initial_covariance`, or `None` if its rounding is not proved
-    /// harmless.
-    ///
-    /// That is so if an exponent could leave its range, the [bound](rounding_bounds) of an output exceeds
-    /// a tenth of its training RMSE, or an output is lost.
-    pub(super) fn network(&self, initial_covariance: f64) -> Option<FittedNetwork> {
-        let Self { samples, targets, rounded, .. } = self;
-        if let Some(few) = &self.few {
-            let few = rounded.network(&few.factor(initial_covariance), targets)?;
-            if worst_share(&few, samples.table) > HOPELESS {
-                return None;
-            }
-        }
-        let all = self
-            .all
-            .get_or_init(|| rounded.decompose(&self.scaled, &targets.deviations.values, targets));
-        let factor = all.factor(initial_covariance);
-        let fitted = rounded.network(&factor, targets)?;
-        let is_harmless = worst_share(&fitted, samples.table) <= HARMLESS;
-        // What this format loses, direct distances may hold.
-        is_harmless.then(|| fitted.unless_lost(samples, targets, &factor).ok()).flatten()
-    }
-}
-
-/// Centres and width, rounded.
-struct Rounded {
+/// Gaussians as this format holds them.
+pub(super) struct Expanded {
     inputs: usize,
     affine_tail: bool,
     scale: CentredScale,
@@ -96,8 +43,8 @@ struct Rounded {
     centres: Vec<f64>,
 }
 
-impl Rounded {
-    fn new(samples: &Samples<'_>, centres: &[f64], options: &Options) -> Self {
+impl Expanded {
+    pub(super) fn new(samples: &Samples<'_>, centres: &[f64], options: &Options) -> Self {
         let inputs = samples.inputs();
         let count = centres.len() / inputs;
         let scale = CentredScale::of(samples.table);
@@ -132,14 +79,29 @@ impl Rounded {
         }
     }
 
-    /// Decomposes samples with `scaled` inputs, whose targets are `deviations`.
-    fn decompose(&self, scaled: &[f64], deviations: &[f64], targets: &Targets) -> Decomposed {
-        let regressors = self.regressors();
-        Decomposed::new(&regressors.of(scaled), deviations, targets.outputs())
+    /// One in [`FEW`] samples of `table`, for a first fit; `None` where samples are too few for that.
+    pub(super) fn few(&self, table: &RowTable) -> Option<RowTable> {
+        // A first fit finds most unsuitable networks in an eighth of the time.
+        let first = table.outputs.len() >= FEW * SAMPLES_A_WEIGHT * self.regressors().count();
+        let every = |table: &Table| Table {
+            names: table.names.clone(),
+            values: table.lines().step_by(FEW).flatten().copied().collect(),
+        };
+        first.then(|| RowTable {
+            inputs: every(&table.inputs),
+            outputs: every(&table.outputs),
+            common_span: table.common_span,
+        })
+    }
+}
+
+impl Held for Expanded {
+    fn design<'t>(&'t self, table: &'t RowTable) -> Box<dyn Design + 't> {
+        Box::new(self.regressors().of(self.scale.apply(table)))
     }
 
-    /// Network with the weights of `factor`, or `None` if an exponent could leave its range.
-    fn network(&self, factor: &Factor, targets: &Targets) -> Option<FittedNetwork> {
+    /// Network whose rounding is not proved harmless yet. It is refused if an exponent could leave its range.
+    fn network(&self, factor: &Factor, targets: &Targets) -> Result<FittedNetwork> {
         let (inputs, outputs) = (self.inputs, targets.outputs());
         let count = self.centres.len() / inputs;
         let mut weights = Weights::split(factor.weights(), count, targets);
@@ -162,17 +124,12 @@ impl Rounded {
         };
         let shape = Shape { inputs, centres: count, outputs };
         let words = parameters.words().collect();
-        FittedNetwork::try_new(shape, Format::F32, self.affine_tail, words).ok()
+        FittedNetwork::try_new(shape, Format::F32, self.affine_tail, words)
     }
 }
 
-/// Every [`FEW`]th line of `values`, in lines of so many numbers.
-fn every(values: &[f64], length: usize) -> Vec<f64> {
-    values.chunks_exact(length).step_by(FEW).flatten().copied().collect()
-}
-
 /// Largest share of any output's RMSE on `table` that rounding may reach.
-fn worst_share(fitted: &FittedNetwork, table: &RowTable) -> f64 {
+pub(in crate::train) fn worst_share(fitted: &FittedNetwork, table: &RowTable) -> f64 {
     let predicted = infer(&fitted.network(), Exponential::default(), &table.inputs.values);
     let squares = table.outputs.squared_errors(&predicted);
     let frames = table.outputs.len() as f64;
@@ -327,18 +284,16 @@ mod tests {
             let options = Options { centres: 8, seed: world.seed, ..Options::default() };
             let centres = samples.centres(&options, 3);
             let targets = Targets::of(&table.outputs);
-            let rounded = Rounded::new(&samples, &centres, &options);
-            let regressors = rounded.regressors().count();
-            let all = &targets.deviations;
-            assert!(all.len() >= FEW * SAMPLES_A_WEIGHT * regressors);
-            let scaled = rounded.scale.apply(&table);
-            let share = |scaled: &[f64], deviations: &[f64]| {
-                let decomposed = rounded.decompose(scaled, deviations, &targets);
-                let fitted = rounded.network(&decomposed.factor(1e6), &targets).unwrap();
-                worst_share(&fitted, &table)
+            let expanded = Expanded::new(&samples, &centres, &options);
+            let share = |part: &RowTable| {
+                let part_targets = targets.of_others(&part.outputs);
+                let deviations = &part_targets.deviations.values;
+                let factor =
+                    Factor::new(&*expanded.design(part), deviations, targets.outputs(), 1e6);
+                worst_share(&expanded.network(&factor, &targets).unwrap(), &table)
             };
-            let few = share(&every(&scaled, 18), &every(&all.values, targets.outputs()));
-            let ratio = few / share(&scaled, &all.values);
+            let few = share(&expanded.few(&table).expect("samples enough"));
+            let ratio = few / share(&table);
             // Measured: 0.67, 1.36, 1.77.
             assert!((0.5..2.0).contains(&ratio), "noise {noise}: {ratio}");
         }

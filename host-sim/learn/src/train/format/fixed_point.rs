@@ -15,9 +15,11 @@ use model_core::rbf::{Format, NetworkError, Shape};
 use model_core::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP, clamp_steps};
 use taxel_data::BadValue;
 
-use super::super::least_squares::{Decomposed, Design, Factor};
+use taxel_data::dataset::RowTable;
+
+use super::super::least_squares::{Design, Factor};
 use super::super::{CentredScale, Options, Samples, squared_distance};
-use super::{FittedNetwork, Targets};
+use super::{FittedNetwork, Held, Targets};
 use crate::error::{Error, Result};
 
 /// One step of inputs, in spans of the training range.
@@ -32,8 +34,8 @@ const MOST: f64 = 32_767.0;
 /// Largest magnitude of a sum: a little below 2³¹.
 const MOST_SUM: f64 = 2_147_000_000.0;
 
-/// Centres and width, rounded.
-struct Exponents {
+/// Gaussians as this format holds them.
+pub(super) struct Exponents {
     shape: Shape,
     scale: CentredScale,
     decay: u32,
@@ -41,16 +43,14 @@ struct Exponents {
     lines: Vec<u32>,
     /// Centres that the lines stand for, in steps.
     centres: Vec<f64>,
+    affine_tail: bool,
+    /// Words of the network without weights.
+    without_weights: Vec<u32>,
 }
 
 impl Exponents {
-    fn new(
-        samples: &Samples<'_>,
-        centres: &[f64],
-        options: &Options,
-        outputs: usize,
-    ) -> Result<Self> {
-        let inputs = samples.inputs();
+    pub(super) fn new(samples: &Samples<'_>, centres: &[f64], options: &Options) -> Result<Self> {
+        let (inputs, outputs) = (samples.inputs(), samples.table.outputs.names.len());
         let refused = |why: String| {
             let rule = format!("{why}; give a larger spread, or another format (f32)");
             Error::from(BadValue::new("spread", options.spread, rule))
@@ -100,13 +100,17 @@ impl Exponents {
             lines.extend_from_slice(&fill);
         }
         let shape = Shape { inputs, centres: count, outputs };
-        let this = Self { shape, scale, decay: decay as u32, lines, centres: rounded };
+        let affine_tail = options.affine_tail;
+        let (decay, centres, without_weights) = (decay as u32, rounded, vec![]);
+        let mut this = Self { shape, scale, decay, lines, centres, affine_tail, without_weights };
+        this.without_weights = this.words(None);
         // The format itself checks whether exponents can leave their range.
-        match Network::try_new(shape, false, &this.words(None)) {
+        match Network::try_new(shape, false, &this.without_weights) {
+            Ok(_) => Ok(this),
             Err(NetworkError::ExponentOutOfRange { .. }) => Err(refused(
                 "a reading could drive an exponent beyond 64, where fixed16 ends".into(),
             )),
-            _ => Ok(this),
+            Err(cause) => Err(Error::NotHeld { format: Format::Fixed16, cause }),
         }
     }
 
@@ -232,53 +236,20 @@ impl Rounded {
     }
 }
 
-/// Samples decomposed for this format.
-pub(super) struct Fit<'s> {
-    samples: &'s Samples<'s>,
-    targets: &'s Targets,
-    exponents: Exponents,
-    affine_tail: bool,
-    decomposed: Decomposed,
-}
-
-impl<'s> Fit<'s> {
-    /// Decomposes `samples` with the given `centres`.
-    ///
-    /// # Errors
-    /// [`Error`] if the format does not hold the Gaussians.
-    pub(super) fn new(
-        samples: &'s Samples<'s>,
-        centres: &[f64],
-        options: &Options,
-        targets: &'s Targets,
-    ) -> Result<Self> {
-        let outputs = targets.outputs();
-        let exponents = Exponents::new(samples, centres, options, outputs)?;
-        let without_weights = exponents.words(None);
-        let refused = |cause| Error::NotHeld { format: Format::Fixed16, cause };
-        let design = FixedDesign {
-            network: Network::try_new(exponents.shape, false, &without_weights).map_err(refused)?,
-            steps: exponents.scale.units(samples.table).map(clamp_steps).collect(),
-            affine: options.affine_tail,
-        };
-        let decomposed = Decomposed::new(&design, &targets.deviations.values, outputs);
-        Ok(Self { samples, targets, exponents, affine_tail: options.affine_tail, decomposed })
+impl Held for Exponents {
+    fn design<'t>(&'t self, table: &'t RowTable) -> Box<dyn Design + 't> {
+        let network = Network::try_new(self.shape, false, &self.without_weights);
+        Box::new(FixedDesign {
+            network: network.expect("checked when made"),
+            steps: self.scale.units(table).map(clamp_steps).collect(),
+            affine: self.affine_tail,
+        })
     }
 
-    /// Network whose weights have a penalty of 1/`initial_covariance`.
-    ///
-    /// # Errors
-    /// [`Error`] if the format does not hold the network.
-    pub(super) fn network(&self, initial_covariance: f64) -> Result<FittedNetwork> {
-        let (exponents, affine) = (&self.exponents, self.affine_tail);
-        let factor = self.decomposed.factor(initial_covariance);
-        let rounded = round(&factor, exponents, self.targets, affine)?;
-        let words = exponents.words(Some(&rounded));
-        FittedNetwork::try_new(exponents.shape, Format::Fixed16, affine, words)?.unless_lost(
-            self.samples,
-            self.targets,
-            &factor,
-        )
+    fn network(&self, factor: &Factor, targets: &Targets) -> Result<FittedNetwork> {
+        let rounded = round(factor, self, targets, self.affine_tail)?;
+        let words = self.words(Some(&rounded));
+        FittedNetwork::try_new(self.shape, Format::Fixed16, self.affine_tail, words)
     }
 }
 

@@ -2,6 +2,7 @@
 
 #![expect(clippy::inline_always, reason = "what `simd::widest` runs must be inlined into it")]
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use super::Design;
@@ -26,7 +27,7 @@ pub struct Regressors<'c> {
     pub affine_tail: bool,
 }
 
-impl Regressors<'_> {
+impl<'c> Regressors<'c> {
     /// Number of regressors.
     #[must_use]
     pub fn count(&self) -> usize {
@@ -47,7 +48,7 @@ impl Regressors<'_> {
 
     /// Regressors of many samples, with `scaled` inputs (`samples × inputs`).
     #[must_use]
-    pub fn of<'s>(&'s self, scaled: &'s [f64]) -> Gaussians<'s> {
+    pub fn of(&self, scaled: impl Into<Cow<'c, [f64]>>) -> Gaussians<'c> {
         let count = self.centres.len() / self.inputs;
         let mut lanes = vec![[0.0; LANES]; count.div_ceil(LANES) * self.inputs];
         for (k, centre) in self.centres.chunks_exact(self.inputs).enumerate() {
@@ -57,7 +58,7 @@ impl Regressors<'_> {
         let mut decays = vec![[0.0; LANES]; count.div_ceil(LANES)];
         let places = decays.as_flattened_mut().iter_mut().take(count);
         places.zip(self.decays.iter().cycle()).for_each(|(place, decay)| *place = *decay);
-        Gaussians { regressors: self, scaled, lanes, decays }
+        Gaussians { regressors: *self, scaled: scaled.into(), lanes, decays }
     }
 }
 
@@ -66,8 +67,8 @@ impl Regressors<'_> {
 /// Values agree with [`Regressors::evaluate`] to within rounding (a few 1e-16).
 #[derive(Debug, Clone)]
 pub struct Gaussians<'s> {
-    regressors: &'s Regressors<'s>,
-    scaled: &'s [f64],
+    regressors: Regressors<'s>,
+    scaled: Cow<'s, [f64]>,
     /// Centres in groups of [`LANES`], input after input; the last group is filled up with 0.
     lanes: Vec<[f64; LANES]>,
     /// Decays of the centres in each group.

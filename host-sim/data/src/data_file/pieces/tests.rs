@@ -1,0 +1,60 @@
+use std::io::Cursor;
+use std::path::Path;
+
+use super::*;
+
+fn pieces(text: &str, at_once: usize) -> Pieces {
+    let source = Box::new(Cursor::new(text.as_bytes().to_vec()));
+    Pieces { at_once, ..Pieces::new("log.csv".into(), source, false) }
+}
+
+/// All pieces as one file.
+fn read(text: &str, at_once: usize) -> Result<DataFile> {
+    let mut pieces = pieces(text, at_once);
+    let mut whole = pieces.next_piece()?.expect("a first piece");
+    while let Some(piece) = pieces.next_piece()? {
+        assert_eq!(piece.header, whole.header);
+        whole.values.extend(piece.values);
+        whole.line_numbers.extend(piece.line_numbers);
+        whole.lacks_last_line_end = piece.lacks_last_line_end;
+    }
+    whole.digest = pieces.digest();
+    Ok(whole)
+}
+
+#[test]
+fn pieces_together_are_the_file() {
+    let numbers: String = (0..50).map(|i| format!("{i},{}.5\n", 2 * i)).collect();
+    for text in [
+        format!("a,b\n{numbers}"),
+        format!("\"a,c\",\"b\"\n{numbers}").replace('\n', "\r\n"),
+        format!("{numbers}1,2"),
+        format!("a,b\n{numbers}\"3\",4\n{numbers}"),
+    ] {
+        let whole = DataFile::parse(Path::new("log.csv"), text.as_bytes(), false).unwrap();
+        for at_once in [30, 64, 100_000] {
+            // Names of columns that a file lacks come with the later pieces.
+            let names_columns = whole.names_columns;
+            let found = read(&text, at_once).unwrap();
+            assert_eq!(DataFile { names_columns, ..found }, whole, "{at_once}: {text:?}");
+        }
+    }
+}
+
+#[test]
+fn a_fault_in_a_later_piece_is_told_with_its_line() {
+    let text = "a,b\n1,2\n3,4\n5,6\n7,8\n9,ten\n";
+    for at_once in [9, 1000] {
+        let refused = read(text, at_once).unwrap_err().to_string();
+        assert!(refused.contains("line 6") && refused.contains("ten"), "{refused}");
+    }
+    let refused = read("a,b\n1,2\n3,4\n5,6\n7,8,9\n", 9).unwrap_err().to_string();
+    assert!(refused.contains("line 5"), "{refused}");
+}
+
+#[test]
+fn a_stream_without_data_is_refused() {
+    for text in ["", "a,b\n"] {
+        assert!(read(text, 100).is_err(), "{text:?}");
+    }
+}

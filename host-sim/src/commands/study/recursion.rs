@@ -1,0 +1,106 @@
+//! Study `recursion`: where recursive least squares diverges.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use host_sim::study::recursion::{
+    self, DIVERGED, FORGETTING_FACTORS, Form, INITIAL_COVARIANCES, KINDS, Outcome, Plan, Study,
+};
+use host_sim::{Result, report};
+use taxel_data::output;
+
+use crate::commands::arguments::of_option;
+use crate::commands::progress::Terminal;
+use crate::commands::scene_argument::SceneArgument;
+use crate::commands::{Common, print};
+
+/// Study where recursive least squares diverges: by form, precision, λ, δ and condition.
+///
+/// The covariance form as textbooks print it stands beside the square-root form, in f32 and f64, on the regressors of one
+/// row-wire. Each is compared with the batch solution of the problem that it solves, in f64.
+#[derive(Args)]
+#[command(after_help = "Example: host-sim study recursion -o recursion.svg")]
+pub struct Arguments {
+    /// A built-in scene (paper, press) or the path of a scene file.
+    #[arg(default_value = "paper")]
+    scene: String,
+    /// Row-wire (from 1) whose readings are the inputs.
+    #[arg(long, value_name = "ROW", default_value_t = 4)]
+    row: usize,
+    /// Centres K.
+    #[arg(long, value_name = "K", default_value_t = 48)]
+    centres: usize,
+    /// Updates of each recursion.
+    #[arg(short = 'n', long, value_name = "N", default_value_t = 10_000)]
+    updates: usize,
+    /// SVG file of the picture.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+    let argument = SceneArgument::new(&arguments.scene, None);
+    let scene = argument.load_world(common)?;
+    let Arguments { row, centres, updates, .. } = *arguments;
+    let plan = Plan { row_wire: row, centres, updates };
+    let options = [("row", "--row"), ("centres", "--centres"), ("updates", "--updates")];
+    plan.check(scene.world.sensor.row_wires).map_err(|bad| of_option(bad, &options))?;
+    if let Some(path) = &arguments.output {
+        print::check_output(path, &[argument.path()])?;
+    }
+    let study = recursion::compute(&scene, &plan, &Terminal::new())?;
+    if let Some(path) = &arguments.output {
+        output::write_bytes(path, report::recursion_svg(&study).as_bytes())?;
+    }
+    if common.json {
+        return print::json(&study);
+    }
+    page_of(&study).print()
+}
+
+fn page_of(study: &Study) -> print::Page {
+    let mut page = print::Page::default();
+    let Plan { row_wire, centres, updates } = study.plan;
+    page.line(format_args!(
+        "{}, row {row_wire}, K = {centres}, output {}, {updates} updates\n\n\
+         difference from the batch solution in f64, in standard deviations of the output;\n\
+         #N: diverged after N updates (a number not finite, or a prediction off by {DIVERGED} standard deviations)",
+        study.subject, study.output
+    ));
+    let deltas: Vec<String> =
+        INITIAL_COVARIANCES.iter().map(|d| format!("{:>9}", format!("{d:e}"))).collect();
+    for (form, precision) in KINDS {
+        let name = match form {
+            Form::Covariance => "covariance form",
+            Form::SquareRoot => "square-root form",
+        };
+        page.line(format_args!("\n{name} in {precision}"));
+        for width in &study.widths {
+            page.line(format_args!(
+                "width {:<4} condition {:<8} δ ={}",
+                width.width,
+                format!("{:.0e}", width.condition),
+                deltas.concat()
+            ));
+            for forgetting in FORGETTING_FACTORS {
+                let cell = |delta: &f64| {
+                    study
+                        .outcome((form, precision), width.width, forgetting, *delta)
+                        .map_or(String::new(), text)
+                };
+                let cells: Vec<String> =
+                    INITIAL_COVARIANCES.iter().map(|delta| format!("{:>9}", cell(delta))).collect();
+                page.line(format_args!("{:>28} {:<6}{}", "λ =", forgetting, cells.concat()));
+            }
+        }
+    }
+    page
+}
+
+fn text(outcome: &Outcome) -> String {
+    match (outcome.diverged_after, outcome.difference) {
+        (Some(updates), _) => format!("#{updates}"),
+        (None, Some(difference)) => format!("{difference:.0e}"),
+        (None, None) => "-".into(),
+    }
+}

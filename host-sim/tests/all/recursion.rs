@@ -1,0 +1,151 @@
+//! Training by recursion, as by a user: its estimates beside those of QR, streams, and the learning curve.
+
+use std::io::Write as _;
+use std::process::Stdio;
+
+use crate::common::{Folder, program, small_scene};
+
+/// Largest difference of two files of estimates.
+fn largest_difference(folder: &Folder, files: [&str; 2]) -> f64 {
+    let numbers = files.map(|file| {
+        let text = std::fs::read_to_string(folder.path(file)).unwrap();
+        let fields = text.lines().skip(1).flat_map(|line| line.split(','));
+        fields.map(|field| field.parse::<f64>().unwrap()).collect::<Vec<_>>()
+    });
+    assert_eq!(numbers[0].len(), numbers[1].len());
+    numbers[0].iter().zip(&numbers[1]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+fn decode(folder: &Folder, models: [&str; 2]) -> f64 {
+    for model in models {
+        folder.succeed(&[
+            "decode",
+            &format!("{model}.bin"),
+            "test.csv",
+            "-o",
+            &format!("{model}.csv"),
+        ]);
+    }
+    largest_difference(
+        folder,
+        models.map(|model| format!("{model}.csv")).each_ref().map(String::as_str),
+    )
+}
+
+#[test]
+fn both_solvers_give_the_same_estimates() {
+    let folder = Folder::new("solvers");
+    folder.write("scene.toml", small_scene());
+    folder.succeed(&["synth", "scene.toml", "-n", "300", "--seed", "99", "-o", "test.csv"]);
+    for format in ["f32", "fixed16"] {
+        let train = ["train", "scene.toml", "--format", format];
+        folder.succeed(&[&train[..], &["-o", "qr.bin"]].concat());
+        folder.succeed(&[&train[..], &["--solver", "rls", "-o", "rls.bin"]].concat());
+        let difference = decode(&folder, ["qr", "rls"]);
+        assert!(difference <= 1e-5, "{format}: {difference:e} mm");
+    }
+}
+
+#[test]
+fn standard_input_trains_as_the_file_does_on_any_number_of_threads() {
+    let folder = Folder::new("stdin");
+    folder.write("scene.toml", small_scene());
+    folder.succeed(&["synth", "scene.toml", "-n", "700", "-o", "data.csv"]);
+    folder.succeed(&["synth", "scene.toml", "-n", "100", "--seed", "99", "-o", "test.csv"]);
+    let options = ["--solver", "rls", "--centres", "12", "--first-frames", "300", "--no-refine"];
+    let mut train = vec!["train", "data.csv", "-o", "file.bin"];
+    train.extend(options);
+    assert!(folder.run_with_threads(&train, 1).status.success());
+    let mut child = program()
+        .args([&["train", "-", "--json", "-o", "stdin.bin"], &options[..]].concat())
+        .current_dir(folder.path(""))
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let text = std::fs::read(folder.path("data.csv")).unwrap();
+    child.stdin.take().unwrap().write_all(&text).unwrap();
+    let output = child.wait_with_output().unwrap();
+    let summary: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&summary["training_frames"], &summary["solver"]), (&700.into(), &"rls".into()));
+    assert_eq!(summary["learning_curve"]["judged_on"], "next_frames");
+    assert_eq!(decode(&folder, ["file", "stdin"]), 0.0);
+    // Ranges and centres of all lines, as QR takes them.
+    folder.succeed(&["train", "data.csv", "--centres", "12", "--no-refine", "-o", "qr.bin"]);
+    folder.succeed(&[
+        "train",
+        "data.csv",
+        "--centres",
+        "12",
+        "--no-refine",
+        "--solver",
+        "rls",
+        "-o",
+        "rls.bin",
+    ]);
+    let difference = decode(&folder, ["qr", "rls"]);
+    assert!(difference <= 1e-5, "{difference:e} mm");
+}
+
+#[test]
+fn more_frames_than_a_data_set_may_hold_train_by_recursion() {
+    let folder = Folder::new("stream");
+    folder.write("scene.toml", small_scene().replacen("frames = 3000", "frames = 4500", 1));
+    let train =
+        ["train", "scene.toml", "--solver", "rls", "--first-frames", "200", "--curve", "c.svg"];
+    let page = folder.succeed(&[&train[..], &["-o", "m.bin"]].concat());
+    assert!(page.contains("4500 frames, weights by recursion") && page.contains("learning curve"));
+    let curve = std::fs::read_to_string(folder.path("c.svg")).unwrap();
+    assert!(
+        curve.starts_with("<svg xmlns")
+            && curve.contains("frames taken in")
+            && curve.contains("Δz")
+    );
+    assert!(folder.succeed(&["inspect", "m.bin"]).contains("4500"));
+}
+
+#[test]
+fn what_a_recursion_cannot_use_is_refused() {
+    let folder = Folder::new("recursion-refused");
+    folder.write("scene.toml", small_scene());
+    folder.succeed(&["synth", "scene.toml", "-n", "60", "-o", "data.csv"]);
+    let rls = ["--solver", "rls", "-o", "m.bin"];
+    for (source, more, says) in [
+        (
+            "scene.toml",
+            &["--forgetting-factor", "1.1"][..],
+            "--forgetting-factor 1.1: give a number from 0.5 to 1",
+        ),
+        ("scene.toml", &["--initial-covariance", "-1"], "--initial-covariance -1.0: give"),
+        ("scene.toml", &["--first-frames", "1"], "--first-frames 1: give at least 2"),
+        ("scene.toml", &["--first-frames", "5"], "training.centres = 12: there must be fewer"),
+        ("scene.toml", &["--select"], "--select looks at all frames"),
+        ("data.csv", &["--confidence"], "--confidence: a recursion reads"),
+        ("data.csv", &["--join", "b.csv", "--on", "t", "--tolerance", "1"], "--join: a recursion"),
+        ("data.csv", &["--first-share", "0.5"], "--first-share and --last-share: a recursion"),
+        ("data.csv", &["-n", "5"], "-n sets a scene's frames"),
+        ("none.csv", &[], "none.csv"),
+    ] {
+        let said = folder.fail(&[&["train", source], &rls[..], more].concat(), 2);
+        assert!(said.contains(says), "{says:?} is not in {said:?}");
+    }
+    for (more, says) in [
+        (&["--curve", "c.svg"][..], "--curve is for a recursion: add --solver rls"),
+        (&["--forgetting-factor", "0.9"], "--forgetting-factor is for a recursion"),
+    ] {
+        let said = folder.fail(&[&["train", "scene.toml", "-o", "m.bin"], more].concat(), 2);
+        assert!(said.contains(says), "{says:?} is not in {said:?}");
+    }
+    let said = folder.fail(&["train", "-", "-o", "m.bin"], 2);
+    assert!(said.contains("add --solver rls"), "{said}");
+    let study = ["study", "recursion"];
+    for (more, says) in [
+        (["--row", "9"], "--row 9: the scene has rows 1 to 8"),
+        (["--centres", "0"], "--centres 0: give from 1 to 128"),
+        (["-n", "10"], "--updates 10: give from"),
+    ] {
+        let said = folder.fail(&[&study[..], &more].concat(), 2);
+        assert!(said.contains(says), "{says:?} is not in {said:?}");
+    }
+    assert_eq!(folder.names(), ["data.csv", "scene.toml"]);
+}
