@@ -34,7 +34,6 @@ pub mod readout;
 pub mod gate;
 pub mod drift;
 pub mod limit;
-pub mod study;
 pub mod emulate;
 pub mod link;
 pub mod study;
