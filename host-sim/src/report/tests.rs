@@ -208,7 +208,7 @@ fn the_page_is_whole_self_contained_and_always_the_same() {
         "12\u{202f}345 bytes",
         "deadbeef",
         "number 9 (from 0)",
-        "6.5–11.4 %",
+        "<small>paper 6.75\u{a0}%</small>",
         "It is a &lt;good&gt; model of Δz.",
         "<li>Few frames for Δz.</li>",
         "200 <span>µs</span>",

@@ -307,8 +307,8 @@ fn run_writes_a_whole_folder_and_its_blob_is_the_one_that_train_writes() {
     let metrics = json(&std::fs::read_to_string(out.join("metrics.json")).unwrap());
     assert_eq!(metrics, printed);
     let table = std::fs::read_to_string(out.join("table1.csv")).unwrap();
-    // 4 noise levels × (2 baselines + 10 spreads × 2 networks) × 3 axes × 7 definitions.
-    assert_eq!(table.lines().count(), 1 + 4 * (2 + 20) * 3 * 7);
+    // 4 noise levels × (2 baselines + 10 spreads × 2 networks) × 3 axes × 7 definitions, and the paper's cells.
+    assert_eq!(table.lines().count(), 1 + 4 * (2 + 20) * 3 * 7 + 40);
     let page = std::fs::read_to_string(out.join("report.html")).unwrap();
     assert!(page.contains("<code>host-sim run scene.toml --seed ") && page.contains("table1.csv"));
     let before = folder.names();
@@ -333,9 +333,6 @@ fn every_command_has_help_with_an_example() {
 fn table1_shows_the_papers_cells_beside_its_own() {
     let folder = Folder::new("printed");
     let scene = small_scene();
-    folder.write("scene.toml", &scene);
-    let page = folder.succeed(&["table1", "scene.toml"]);
-    assert!(!page.contains("As the paper prints it"), "the scene has other noise levels: {page}");
     let settings = "spreads = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]\n\
                     noise_levels = [0.005, 0.01, 0.05, 0.1]";
     let (world, _) = scene.split_once("[table1]").unwrap();
@@ -344,6 +341,10 @@ fn table1_shows_the_papers_cells_beside_its_own() {
          standard_frames = 20\n"
     );
     folder.write("paper.toml", &table);
+    folder.write("other.toml", table.replace("0.05, 0.1]", "0.06, 0.1]"));
+    let page = folder.succeed(&["table1", "other.toml"]);
+    assert!(!page.contains("As the paper prints it"), "{page}");
+    assert!(folder.fail(&["table1", "other.toml", "--svg", "t.svg"], 2).contains("--svg"));
     let page = folder.succeed(&["table1", "paper.toml", "-o", "t.csv", "--svg", "t.svg"]);
     assert!(page.contains(" / 10.23") && page.contains("a constant"), "{page}");
     let csv = std::fs::read_to_string(folder.path("t.csv")).unwrap();

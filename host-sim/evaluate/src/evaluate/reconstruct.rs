@@ -387,35 +387,45 @@ mod tests {
 
     use super::*;
 
+    /// Set-up with a table that is `offset` off the printed one.
+    fn tried(setup: Setup, offset: f64) -> Tried {
+        let cells = CELLS.map(|line| line.map(|cell| cell + offset));
+        Tried { setup, covariance: 0, formula: 0, cells }
+    }
+
     #[test]
-    fn a_search_that_was_ended_goes_on_to_the_same_result() {
-        // All set-ups small, so that the test is quick: what is saved is what is drawn.
-        let small =
-            |number: usize| Tried::new(Setup([1, 0, 0, number % 3, 0, 2, 0, number % 2, 0, 0]), 7);
-        let first: Vec<Tried> = (0..4).map(small).collect();
+    fn what_is_tried_next_depends_on_the_seed_and_what_was_tried_alone() {
+        let drawn = |number: u64| {
+            let mut random = Random::new(3, Stream::Test, Purpose::Setup, number, 0);
+            tried(Setup::random(&mut random), 1.0 + number as f64)
+        };
+        let before: Vec<Tried> = (0..300).map(drawn).collect();
+        let (few, many) = (next_batch(7, 310, &before), next_batch(7, 1000, &before));
+        assert_eq!((few.len(), many.len()), (10, BATCH));
+        assert_eq!(few[..], many[..10]);
+        assert_ne!(next_batch(8, 310, &before), few);
+        let is_new = |setup: &Setup| before.iter().all(|it| it.setup != *setup);
+        assert!(many.iter().all(is_new));
+    }
+
+    #[test]
+    fn a_search_is_saved_and_goes_on_to_the_same_result() {
         let mut saved = Vec::new();
         let keep = |tried: &[Tried]| -> Result<(), Infallible> {
             saved = tried.to_vec();
             Ok(())
         };
-        let Ok(found) = search(7, 4, Vec::new(), keep, &Silent);
-        assert_eq!((found.setups, saved.len()), (4, 4));
-        let Ok(again) = search(7, 4, saved, |_| Ok::<_, Infallible>(()), &Silent);
+        let Ok(found) = search(7, 2, Vec::new(), keep, &Silent);
+        assert_eq!((found.setups, saved.len()), (2, 2));
+        let Ok(again) = search(7, 2, saved, |_| Ok::<_, Infallible>(()), &Silent);
         assert_eq!(found, again);
     }
 
     #[test]
-    fn the_best_come_first_and_each_set_up_once() {
-        let with = |first: usize, offset: f64| {
-            let cells = CELLS.map(|line| line.map(|cell| cell + offset));
-            Tried {
-                setup: Setup([first, 0, 0, 0, 0, 0, 0, 0, 0, 0]),
-                covariance: 0,
-                formula: 0,
-                cells,
-            }
-        };
-        let tried = [with(0, 2.0), with(1, 0.5), with(1, 0.25), with(2, 1.0)];
+    fn the_best_come_first_and_tables_that_are_alike_once() {
+        let with =
+            |first: usize, offset: f64| tried(Setup([first, 0, 0, 0, 0, 0, 0, 0, 0, 0]), offset);
+        let tried = [with(0, 2.0), with(1, 0.3), with(1, 0.25), with(2, 1.0)];
         let best: Vec<usize> = best(&tried, 2, |_| true).iter().map(|it| it.setup.0[0]).collect();
         assert_eq!(best, [1, 2]);
         let values = values(&tried);

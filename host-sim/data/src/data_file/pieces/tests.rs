@@ -24,7 +24,7 @@ fn read(text: &str, at_once: usize) -> Result<DataFile> {
 
 #[test]
 fn pieces_together_are_the_file() {
-    let numbers: String = (0..50).map(|i| format!("{i},{}.5\n", 2 * i)).collect();
+    let numbers = (0..50).map(|i| format!("{i},{}.5\n", 2 * i)).collect::<Vec<_>>().concat();
     for text in [
         format!("a,b\n{numbers}"),
         format!("\"a,c\",\"b\"\n{numbers}").replace('\n', "\r\n"),
