@@ -129,7 +129,8 @@ pub struct Table1 {
     pub open: Option<OpenChoices>,
 }
 
-/// Choices for Table 1 that the paper leaves open. Networks are then computed in f64, as no device has them.
+/// Choices for Table 1 that the paper leaves open. Networks are then computed in f64, as no device has them, by QR: with
+/// the same penalty it gives the weights of the recursion.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OpenChoices {

@@ -4,14 +4,15 @@ use std::path::PathBuf;
 
 use super::progress::Terminal;
 use clap::Args;
-use host_sim::evaluate::printed::{CELLS, Nearness};
+use host_sim::evaluate::printed::{CELLS, NOISE_LEVELS, Nearness, SPREADS};
 use host_sim::evaluate::reconstruct;
 use host_sim::evaluate::table1::{self, Comparison, Entry, NETWORK, Table1};
+use host_sim::experiment;
 use host_sim::metrics::{Definition, Errors};
 use host_sim::report;
 use host_sim::{Error, Result};
 use serde::Serialize;
-use taxel_data::output;
+use taxel_data::{columns, output};
 use taxel_learn::decoders::{mean, standard};
 use taxel_simulate::sensor::Precision;
 
@@ -27,7 +28,7 @@ mod search;
 /// linear decoder, the paper's standard network (K = N), and the 40 cells that the paper prints.
 ///
 /// `--reconstruct` searches what the paper leaves open for set-ups whose table comes near the printed one. It takes
-/// some minutes, saves what it has tried, and goes on from there (docs/paper.md).
+/// some minutes, saves what it has tried (`--saved`), and goes on from there (docs/paper.md).
 #[derive(Args)]
 #[command(after_help = "Examples:
   host-sim table1 paper -o table1.csv --svg table1.svg
@@ -42,16 +43,23 @@ pub struct Arguments {
     precision: Option<Precision>,
     #[command(flatten)]
     relative_inputs: RelativeInputsArgument,
-    /// CSV file to write, with all axes, decoders and definitions; with --reconstruct, the file that a search is saved
-    /// to [default: out/reconstruct.json].
+    /// CSV file to write, with all axes, decoders and definitions.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Picture to write: the table beside the printed one.
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
     /// Search for set-ups that give the printed table, instead of computing that of a scene.
-    #[arg(long, conflicts_with_all = ["scene", "precision", "group", "relative_inputs"])]
+    #[arg(long, conflicts_with_all = ["scene", "precision", "group", "relative_inputs", "output"])]
     reconstruct: bool,
+    /// File that the search is saved to, and goes on from.
+    #[arg(
+        long,
+        value_name = "FILE",
+        requires = "reconstruct",
+        default_value = "out/reconstruct.json"
+    )]
+    saved: PathBuf,
     /// Set-ups to try.
     #[arg(long, value_name = "N", requires = "reconstruct", default_value_t = reconstruct::USUAL_SETUPS)]
     setups: usize,
@@ -70,9 +78,8 @@ struct Summary {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if arguments.reconstruct {
-        let usual = PathBuf::from("out/reconstruct.json");
-        let saved_to = arguments.output.as_ref().unwrap_or(&usual);
-        return search::execute(arguments.setups, saved_to, arguments.svg.as_deref(), common);
+        let svg = arguments.svg.as_deref();
+        return search::execute(arguments.setups, &arguments.saved, svg, common);
     }
     let argument = SceneArgument::new(&arguments.scene, arguments.precision);
     let mut scene = argument.load(common)?;
@@ -80,19 +87,31 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if scene.table1.is_some() {
         group_of_scene(&scene, &arguments.group)?;
     }
-    for path in [&arguments.output, &arguments.svg].into_iter().flatten() {
+    if let Some(path) = &arguments.output {
         print::check_output(path, &[argument.path()])?;
+    }
+    if let Some(path) = &arguments.svg {
+        let other = arguments.output.as_deref().unwrap_or(argument.path());
+        if other == path {
+            return Err(Error::Usage("--svg and -o: give each a file of its own".into()));
+        }
+        print::check_output(path, &[argument.path()])?;
+        let comparable = |table: &experiment::Table1| {
+            table.spreads == SPREADS && table.noise_levels == NOISE_LEVELS
+        };
+        let has_z = columns::groups(&scene.world.output_names())
+            .iter()
+            .any(|(group, _)| columns::is_compression(group));
+        if !(has_z && scene.table1.as_ref().is_none_or(comparable)) {
+            let message = "--svg: the table has other spreads or noise levels than the printed one, or no z; leave it out";
+            return Err(Error::Usage(message.into()));
+        }
     }
     let table = table1::compute(&scene, &Terminal::new())?;
     if let Some(path) = &arguments.output {
         output::write_bytes(path, table.to_csv().as_bytes())?;
     }
-    if let Some(path) = &arguments.svg {
-        let Some(nearest) = table.nearest_formula() else {
-            let message =
-                "--svg: the table has other spreads or noise levels than the printed one, or no z";
-            return Err(Error::Usage(message.into()));
-        };
+    if let (Some(path), Some(nearest)) = (&arguments.svg, table.nearest_formula()) {
         let picture = report::printed_svg(&[("computed", nearest.cells)]);
         output::write_bytes(path, picture.as_bytes())?;
     }

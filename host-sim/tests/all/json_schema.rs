@@ -144,7 +144,7 @@ fn runs_are_told_by_the_schema() {
     check_file(&folder, schema, "out/small/metrics.json");
     let table1 = checked(&folder, schema, &["table1", "table1.toml"]);
     assert_eq!(run["table1"]["columns"], table1["columns"]);
-    let search = ["table1", "--reconstruct", "--setups", "2", "-o", "search.json"];
+    let search = ["table1", "--reconstruct", "--setups", "2", "--saved", "search.json"];
     checked(&folder, schema, &search);
 }
 

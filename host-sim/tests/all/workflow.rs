@@ -345,6 +345,8 @@ fn table1_shows_the_papers_cells_beside_its_own() {
     let page = folder.succeed(&["table1", "other.toml"]);
     assert!(!page.contains("As the paper prints it"), "{page}");
     assert!(folder.fail(&["table1", "other.toml", "--svg", "t.svg"], 2).contains("--svg"));
+    let same = folder.fail(&["table1", "paper.toml", "-o", "t.svg", "--svg", "t.svg"], 2);
+    assert!(same.contains("a file of its own"), "{same}");
     let page = folder.succeed(&["table1", "paper.toml", "-o", "t.csv", "--svg", "t.svg"]);
     assert!(page.contains(" / 10.23") && page.contains("a constant"), "{page}");
     let csv = std::fs::read_to_string(folder.path("t.csv")).unwrap();
@@ -361,12 +363,13 @@ fn table1_shows_the_papers_cells_beside_its_own() {
     let cells = &result["comparison"][4]["cells"][0];
     assert!(cells[3].as_f64().unwrap() < 1.0, "{cells}");
     assert_eq!(result["test_frames"], 60);
+    assert_eq!(result["solver"], "qr");
 }
 
 #[test]
 fn a_search_for_the_papers_set_up_goes_on_from_where_it_was_ended() {
     let folder = Folder::new("reconstruct");
-    let search = ["table1", "--reconstruct", "--setups", "2", "-o", "s.json"];
+    let search = ["table1", "--reconstruct", "--setups", "2", "--saved", "s.json"];
     let first = folder.succeed(&search);
     assert!(first.contains("nearest 1") && first.contains("a constant"), "{first}");
     assert_eq!(folder.succeed(&search), first);

@@ -35,7 +35,7 @@ const DRAWS: u64 = 4;
 const ALL: usize = usize::MAX;
 
 /// Set-up that was tried, with the penalty and the formula that suit it best.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Tried {
     /// Set-up.
     pub setup: Setup,
@@ -45,18 +45,27 @@ pub struct Tried {
     pub formula: usize,
     /// Its table, in per cent.
     pub cells: Cells,
+    /// Every penalty and formula whose table is finite: their indices, and the gaps on the fitted cells and on those
+    /// held out.
+    pub gaps: Vec<(usize, usize, [f64; 2])>,
 }
 
 impl Tried {
     /// Tries `setup` on one draw. A set-up whose tables are not finite has a table of zeros, which is far from any.
     fn new(setup: Setup, draw: u64) -> Self {
-        let mut best = Self { setup, covariance: 0, formula: 0, cells: [[0.0; 4]; 10] };
+        let mut best =
+            Self { setup, covariance: 0, formula: 0, cells: [[0.0; 4]; 10], gaps: Vec::new() };
+        let mut least = f64::INFINITY;
         for (covariance, tables) in cells::compute(&setup, draw, ALL).into_iter().enumerate() {
             for (formula, cells) in tables.into_iter().enumerate() {
-                let finite = cells.as_flattened().iter().all(|cell| cell.is_finite());
-                let tried = Self { setup, covariance, formula, cells };
-                if finite && tried.gap_fitted() < best.gap_fitted() {
-                    best = tried;
+                let Nearness { gap_fitted, gap_held_out, .. } = Nearness::new(&cells);
+                if !cells.as_flattened().iter().all(|cell| cell.is_finite()) {
+                    continue;
+                }
+                best.gaps.push((covariance, formula, [gap_fitted, gap_held_out]));
+                if gap_fitted < least {
+                    least = gap_fitted;
+                    (best.covariance, best.formula, best.cells) = (covariance, formula, cells);
                 }
             }
         }
@@ -77,6 +86,9 @@ impl Tried {
         self.setup.is_valid()
             && self.covariance < INITIAL_COVARIANCES.len()
             && self.formula < FORMULAS.len()
+            && self.gaps.iter().all(|(covariance, formula, _)| {
+                *covariance < INITIAL_COVARIANCES.len() && *formula < FORMULAS.len()
+            })
     }
 }
 
@@ -87,7 +99,7 @@ pub struct Reconstruction {
     pub seed: u64,
     /// Number of set-ups tried.
     pub setups: usize,
-    /// Number of tables compared: each set-up with every penalty and every formula.
+    /// Number of tables compared: each set-up with every penalty and formula that gave one.
     pub tables: usize,
     /// A table whose cells are all the mean of the printed ones.
     pub constant: Nearness,
@@ -131,10 +143,14 @@ pub struct AxisValue {
     pub value: String,
     /// Number of set-ups tried that have it.
     pub setups: usize,
-    /// Least gap on the fitted cells of any of them; none if none was tried.
+    /// Least gap on the fitted cells of any of them; none if none was tried. The search crowds about the best set-ups, so
+    /// that values are not tried equally often.
     pub least_gap_fitted: Option<f64>,
     /// Gap of that set-up on the cells held out.
     pub its_gap_held_out: Option<f64>,
+    /// Least gap on the fitted cells if this value alone is changed in the nearest set-up, and in the nearest within the
+    /// paper's words; with any penalty and formula, where these are not what is changed.
+    pub changed_alone: [Option<f64>; 2],
 }
 
 /// Scatter of cells that few samples judge.
@@ -162,22 +178,36 @@ pub struct Unexplained {
 /// Searches `setups` set-ups, going on from those that were `tried` before with the same `seed`. `save` is given all
 /// that were tried after every [`BATCH`].
 ///
-/// The result depends on `seed` and `setups` alone: not on the number of threads, nor on where a search was ended.
+/// The result depends on `seed` and `setups` alone: not on the number of threads, nor on where a search was ended. Set-ups
+/// that were tried beyond `setups` are left alone.
 ///
 /// # Errors
 /// An error of `save`.
 pub fn search<E>(
     seed: u64,
     setups: usize,
+    tried: Vec<Tried>,
+    save: impl FnMut(&[Tried]) -> Result<(), E>,
+    progress: &dyn Progress,
+) -> Result<Reconstruction, E> {
+    let tried = try_in_batches((seed, BATCH), setups, tried, save, progress)?;
+    Ok(judge(seed, &tried[..setups], progress))
+}
+
+fn try_in_batches<E>(
+    (seed, batch): (u64, usize),
+    setups: usize,
     mut tried: Vec<Tried>,
     mut save: impl FnMut(&[Tried]) -> Result<(), E>,
     progress: &dyn Progress,
-) -> Result<Reconstruction, E> {
-    tried.truncate(setups);
-    tried.truncate(tried.len() / BATCH * BATCH);
-    progress.stage("try set-ups", setups - tried.len());
+) -> Result<Vec<Tried>, E> {
+    if tried.len() < setups {
+        // A batch is chosen as a whole.
+        tried.truncate(tried.len() / batch * batch);
+        progress.stage("try set-ups", setups - tried.len());
+    }
     while tried.len() < setups {
-        let next = next_batch(seed, setups, &tried);
+        let next = next_batch(seed, setups.min(tried.len() + batch), &tried);
         let found: Vec<Tried> = next
             .into_par_iter()
             .map(|setup| {
@@ -189,16 +219,16 @@ pub fn search<E>(
         tried.extend(found);
         save(&tried)?;
     }
-    Ok(judge(seed, &tried, progress))
+    Ok(tried)
 }
 
-/// Set-ups of the next batch: drawn, or variations of the best so far, by turns of all and of those within the
+/// Set-ups of the next batch, up to number `end`: drawn, or variations of the best so far, by turns of all and of those within the
 /// paper's words.
-fn next_batch(seed: u64, setups: usize, tried: &[Tried]) -> Vec<Setup> {
+fn next_batch(seed: u64, end: usize, tried: &[Tried]) -> Vec<Setup> {
     let all = best(tried, PARENTS, |_| true);
     let within = best(tried, PARENTS, Tried::is_within_words);
     let mut next: Vec<Setup> = Vec::new();
-    for number in tried.len()..setups.min(tried.len() + BATCH) {
+    for number in tried.len()..end {
         let mut random = Random::new(seed, Stream::Training, Purpose::Setup, number as u64, 0);
         let mut draw = || {
             if number < DRAWN_FIRST || number % 4 == 0 || all.is_empty() || within.is_empty() {
@@ -222,8 +252,8 @@ fn next_batch(seed: u64, setups: usize, tried: &[Tried]) -> Vec<Setup> {
 
 /// The `most` set-ups nearest on the fitted cells, among those that are `wanted`; of those with tables alike, the nearest.
 fn best(tried: &[Tried], most: usize, wanted: impl Fn(&Tried) -> bool) -> Vec<Tried> {
-    let mut wanted: Vec<(f64, Tried)> =
-        tried.iter().filter(|it| wanted(it)).map(|it| (it.gap_fitted(), *it)).collect();
+    let mut wanted: Vec<(f64, &Tried)> =
+        tried.iter().filter(|it| wanted(it)).map(|it| (it.gap_fitted(), it)).collect();
     wanted.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut best: Vec<Tried> = Vec::new();
     for (_, it) in wanted {
@@ -231,7 +261,7 @@ fn best(tried: &[Tried], most: usize, wanted: impl Fn(&Tried) -> bool) -> Vec<Tr
             break;
         }
         if best.iter().all(|other| printed::gap(&other.cells, &it.cells) > ALIKE) {
-            best.push(it);
+            best.push(it.clone());
         }
     }
     best
@@ -241,14 +271,14 @@ fn best(tried: &[Tried], most: usize, wanted: impl Fn(&Tried) -> bool) -> Vec<Tr
 fn judge(seed: u64, tried: &[Tried], progress: &dyn Progress) -> Reconstruction {
     let all = best(tried, FINALISTS, |_| true);
     let within = best(tried, FINALISTS, Tried::is_within_words);
-    progress.stage("judge the nearest by more draws", all.len() + within.len() + 1);
+    progress.stage("judge the nearest by more draws", all.len() + within.len() + 2);
     let candidates = |finalists: &[Tried]| {
         let mut found: Vec<(Candidate, Tried)> = finalists
             .par_iter()
             .map(|it| {
                 let candidate = candidate(it, seed);
                 progress.step();
-                (candidate, *it)
+                (candidate, it.clone())
             })
             .collect();
         found.sort_by(|(a, _), (b, _)| a.nearness.gap_fitted.total_cmp(&b.nearness.gap_fitted));
@@ -257,6 +287,9 @@ fn judge(seed: u64, tried: &[Tried], progress: &dyn Progress) -> Reconstruction 
     let (nearest, within) = (candidates(&all), candidates(&within));
     let scatter = within.first().map_or_else(Vec::new, |(_, it)| scatter(it, seed));
     progress.step();
+    let first = [&nearest, &within].map(|found| found.first().map(|(_, it)| it));
+    let values = values(tried, first, seed);
+    progress.step();
     let strip = |found: Vec<(Candidate, Tried)>| -> Vec<Candidate> {
         found.into_iter().map(|(candidate, _)| candidate).collect()
     };
@@ -264,21 +297,24 @@ fn judge(seed: u64, tried: &[Tried], progress: &dyn Progress) -> Reconstruction 
     Reconstruction {
         seed,
         setups: tried.len(),
-        tables: tried.len() * INITIAL_COVARIANCES.len() * FORMULAS.len(),
+        tables: tried.iter().map(|it| it.gaps.len()).sum(),
         constant: Nearness::of_a_constant(),
         roughness: printed::roughness(),
         printed_rises: printed::rises(&CELLS),
         unexplained: unexplained(&nearest),
         nearest,
         within_words: strip(within),
-        values: values(tried),
+        values,
         scatter,
     }
 }
 
 /// Table of a set-up by one more draw, judged on at most `most` samples.
 fn table(it: &Tried, seed: u64, draw: u64, most: usize) -> Cells {
-    cells::compute(&it.setup, seed + 1000 + draw, most)[it.covariance][it.formula]
+    // A seed of its own for every draw, far from those that people give.
+    let mut random = Random::new(seed, Stream::Test, Purpose::Setup, draw, 0);
+    let own_seed = (random.unit() * (1_u64 << 53) as f64) as u64;
+    cells::compute(&it.setup, own_seed, most)[it.covariance][it.formula]
 }
 
 fn candidate(it: &Tried, seed: u64) -> Candidate {
@@ -334,30 +370,53 @@ fn scatter(it: &Tried, seed: u64) -> Vec<Scatter> {
     [10, 20, 50, 200].map(of_samples).to_vec()
 }
 
-/// What set-ups with each value of each axis reach.
-fn values(tried: &[Tried]) -> Vec<AxisValue> {
-    let of = |axis: &str, value: &str, has: &dyn Fn(&Tried) -> bool| {
-        let nearest = best(tried, 1, has);
-        let nearness = nearest.first().map(|it| Nearness::new(&it.cells));
+/// What set-ups with each value of each axis reach, and what changing it alone does to the `nearest` ones.
+fn values(tried: &[Tried], nearest: [Option<&Tried>; 2], seed: u64) -> Vec<AxisValue> {
+    let of = |axis: &str, value: String, gaps: Vec<[f64; 2]>, changed_alone| {
+        let least = gaps.iter().min_by(|a, b| a[0].total_cmp(&b[0]));
         AxisValue {
             axis: axis.into(),
-            value: value.into(),
-            setups: tried.iter().filter(|it| has(it)).count(),
-            least_gap_fitted: nearness.map(|it| it.gap_fitted),
-            its_gap_held_out: nearness.map(|it| it.gap_held_out),
+            value,
+            setups: gaps.len(),
+            least_gap_fitted: least.map(|gaps| gaps[0]),
+            its_gap_held_out: least.map(|gaps| gaps[1]),
+            changed_alone,
         }
     };
-    let mut all = Vec::new();
-    for (index, axis) in AXES.iter().enumerate() {
-        for (value, name) in axis.values.iter().enumerate() {
-            all.push(of(axis.name, name, &|it| it.setup.0[index] == value));
-        }
-    }
+    let places = AXES.iter().enumerate();
+    let places: Vec<(usize, usize)> =
+        places.flat_map(|(i, axis)| (0..axis.values.len()).map(move |value| (i, value))).collect();
+    let mut all: Vec<AxisValue> = places
+        .into_par_iter()
+        .map(|(index, value)| {
+            let gaps = |it: &Tried| {
+                let Nearness { gap_fitted, gap_held_out, .. } = Nearness::new(&it.cells);
+                [gap_fitted, gap_held_out]
+            };
+            let with = tried.iter().filter(|it| it.setup.0[index] == value).map(gaps).collect();
+            let changed = |it: &Tried| {
+                let setup = it.setup.with(index, value)?;
+                Some(Tried::new(setup, seed).gap_fitted())
+            };
+            let axis = &AXES[index];
+            of(axis.name, axis.values[value].into(), with, nearest.map(|it| it.and_then(changed)))
+        })
+        .collect();
+    // Every set-up was tried with all penalties and formulas.
+    type Has<'h> = &'h dyn Fn(usize, usize) -> bool;
+    let mut of_gaps = |axis: &str, value: String, has: Has<'_>| {
+        let least = |it: &Tried| {
+            let with = it.gaps.iter().filter(|(covariance, formula, _)| has(*covariance, *formula));
+            with.map(|(_, _, gaps)| *gaps).min_by(|a, b| a[0].total_cmp(&b[0]))
+        };
+        let changed = nearest.map(|it| it.and_then(least).map(|gaps| gaps[0]));
+        all.push(of(axis, value, tried.iter().filter_map(least).collect(), changed));
+    };
     for (index, covariance) in INITIAL_COVARIANCES.iter().enumerate() {
-        all.push(of("penalty 1/δ", &penalty(*covariance), &|it| it.covariance == index));
+        of_gaps("penalty 1/δ", penalty(*covariance), &|covariance, _| covariance == index);
     }
     for (index, name) in FORMULAS.iter().enumerate() {
-        all.push(of("error", name, &|it| it.formula == index));
+        of_gaps("error", (*name).into(), &|_, formula| formula == index);
     }
     all
 }
@@ -390,7 +449,9 @@ mod tests {
     /// Set-up with a table that is `offset` off the printed one.
     fn tried(setup: Setup, offset: f64) -> Tried {
         let cells = CELLS.map(|line| line.map(|cell| cell + offset));
-        Tried { setup, covariance: 0, formula: 0, cells }
+        let Nearness { gap_fitted, gap_held_out, .. } = Nearness::new(&cells);
+        let gaps = vec![(0, 0, [gap_fitted, gap_held_out])];
+        Tried { setup, covariance: 0, formula: 0, cells, gaps }
     }
 
     #[test]
@@ -400,8 +461,8 @@ mod tests {
             tried(Setup::random(&mut random), 1.0 + number as f64)
         };
         let before: Vec<Tried> = (0..300).map(drawn).collect();
-        let (few, many) = (next_batch(7, 310, &before), next_batch(7, 1000, &before));
-        assert_eq!((few.len(), many.len()), (10, BATCH));
+        let (few, many) = (next_batch(7, 310, &before), next_batch(7, 348, &before));
+        assert_eq!((few.len(), many.len()), (10, 48));
         assert_eq!(few[..], many[..10]);
         assert_ne!(next_batch(8, 310, &before), few);
         let is_new = |setup: &Setup| before.iter().all(|it| it.setup != *setup);
@@ -409,16 +470,25 @@ mod tests {
     }
 
     #[test]
-    fn a_search_is_saved_and_goes_on_to_the_same_result() {
+    fn a_search_goes_on_to_the_same_set_ups_and_loses_none() {
         let mut saved = Vec::new();
-        let keep = |tried: &[Tried]| -> Result<(), Infallible> {
-            saved = tried.to_vec();
-            Ok(())
+        let mut run = |setups, before: Vec<Tried>| {
+            let keep = |tried: &[Tried]| -> Result<(), Infallible> {
+                saved = tried.to_vec();
+                Ok(())
+            };
+            let Ok(all) = try_in_batches((7, 2), setups, before, keep, &Silent);
+            all
         };
-        let Ok(found) = search(7, 2, Vec::new(), keep, &Silent);
-        assert_eq!((found.setups, saved.len()), (2, 2));
-        let Ok(again) = search(7, 2, saved, |_| Ok::<_, Infallible>(()), &Silent);
-        assert_eq!(found, again);
+        let at_once = run(6, Vec::new());
+        let ended = run(3, Vec::new());
+        assert_eq!(ended[..], at_once[..3]);
+        assert_eq!(run(6, ended), at_once);
+        assert_eq!(run(3, at_once.clone()), at_once, "what was tried beyond is kept");
+        assert_eq!(saved, at_once);
+        let found = judge(7, &at_once[..2], &Silent);
+        assert_eq!(found.setups, 2);
+        assert_eq!(found, judge(7, &at_once[..2], &Silent));
     }
 
     #[test]
@@ -428,7 +498,7 @@ mod tests {
         let tried = [with(0, 2.0), with(1, 0.3), with(1, 0.25), with(2, 1.0)];
         let best: Vec<usize> = best(&tried, 2, |_| true).iter().map(|it| it.setup.0[0]).collect();
         assert_eq!(best, [1, 2]);
-        let values = values(&tried);
+        let values = values(&tried, [None, None], 7);
         assert_eq!((values[1].setups, values[1].least_gap_fitted), (2, Some(0.25)));
     }
 }

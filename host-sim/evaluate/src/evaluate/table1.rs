@@ -11,7 +11,7 @@ use taxel_data::random::{Purpose, Random, Stream};
 use taxel_learn::decoders::standard::{self, StandardNetwork};
 use taxel_learn::decoders::textbook::{Textbook, TextbookNetwork};
 use taxel_learn::decoders::{BASELINES, RowDecoder, Rows, mean};
-use taxel_learn::train::{FittedNetwork, Samples};
+use taxel_learn::train::{FittedNetwork, Samples, Solver};
 use taxel_learn::{Decoder, Options};
 use taxel_simulate::Synthesis;
 
@@ -141,7 +141,7 @@ pub fn compute(experiment: &Experiment, progress: &dyn Progress) -> Result<Table
         training_frames: settings.frames,
         test_frames: if on_training { settings.frames } else { settings.test_frames },
         standard_frames: settings.standard_frames,
-        solver: settings.solver.name(),
+        solver: if settings.open.is_some() { Solver::Qr.name() } else { settings.solver.name() },
         columns,
         printed: if comparison.is_empty() { Vec::new() } else { printed::cells().collect() },
         comparison,
@@ -304,6 +304,9 @@ fn row_networks(
     Ok(RowNetworks { networks, standard })
 }
 
+/// Initial covariance of standard networks in f64: the penalty is too small to be felt.
+const INTERPOLATING: f64 = 1e12;
+
 /// Networks of one row-wire with the choices that the paper leaves `open`.
 fn textbook_networks(
     settings: &Settings,
@@ -321,11 +324,11 @@ fn textbook_networks(
     let (network, standard) =
         (hidden(&table, settings.centres), hidden(&few, settings.standard_frames));
     let each = settings.spreads.par_iter().map(|&spread| {
-        let fit = |hidden: &Arc<Textbook>, table| {
+        let fit = |hidden: &Arc<Textbook>, table, initial_covariance| {
             let decay = open.spread_is.decay(spread);
-            hidden.fit(table, decay, open.bias, &[open.initial_covariance]).swap_remove(0)
+            hidden.fit(table, decay, open.bias, &[initial_covariance]).swap_remove(0)
         };
-        (fit(&network, &table), Some(fit(&standard, &few)))
+        (fit(&network, &table, open.initial_covariance), Some(fit(&standard, &few, INTERPOLATING)))
     });
     let (networks, standard) = each.collect::<Vec<_>>().into_iter().unzip();
     RowNetworks { networks, standard }

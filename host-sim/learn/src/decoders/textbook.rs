@@ -314,6 +314,25 @@ mod tests {
     }
 
     #[test]
+    fn each_output_has_the_weights_of_a_network_for_it_alone() {
+        let both = table();
+        let random = Random::new(1, Stream::Training, Purpose::Centres, 0, 0);
+        let fit = |table: &RowTable| {
+            let hidden = Textbook::new(table, Scaling::Range, 7, &mut random.clone());
+            Arc::new(hidden).fit(table, 40.0, true, &[1e6]).swap_remove(0)
+        };
+        let together = fit(&both);
+        for output in 0..2 {
+            let alone = fit(&RowTable { outputs: both.outputs.columns(output, 1), ..both.clone() });
+            assert_eq!(alone.hidden.centres, together.hidden.centres, "outputs take no part");
+            let of_both = together.weights.iter().skip(output).step_by(2);
+            for (a, b) in alone.weights.iter().zip(of_both) {
+                assert!((a - b).abs() <= 1e-9 * b.abs().max(1.0), "{a} {b}");
+            }
+        }
+    }
+
+    #[test]
     fn as_many_centres_as_lines_interpolate_and_a_large_penalty_predicts_nothing() {
         let table = table();
         let mut random = Random::new(1, Stream::Training, Purpose::Centres, 0, 0);

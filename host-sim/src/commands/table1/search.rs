@@ -66,7 +66,7 @@ fn load(path: &Path, seed: u64) -> Result<Vec<Tried>> {
     }
     let other = |what: &str| {
         let path = path.display();
-        Error::Usage(format!("{path}: {what}; remove it, or give another file with -o"))
+        Error::Usage(format!("{path}: {what}; remove it, or give another file with --saved"))
     };
     let saved: Saved = serde_json::from_str(&input::read_text(path)?)
         .map_err(|cause| other(&format!("it is no saved search ({cause})")))?;
@@ -109,8 +109,10 @@ fn page_of(found: &Reconstruction) -> print::Page {
         comparison::cells(&mut page, &first.cells);
     }
     page.line(format_args!(
-        "\n{:<22} {:<38} {:>8} {:>11} {:>9}",
-        "what distinguishes", "value", "set-ups", "least gap", "held out"
+        "\nWhat distinguishes: the least gap of all set-ups with a value, on the fitted cells and held out; and on the\n\
+         fitted cells where this value alone is changed, in the nearest set-up and in the nearest in words.\n\
+         {:<21} {:<37} {:>7} {:>9} {:>8} {:>7} {:>8}",
+        "open", "value", "set-ups", "least gap", "held out", "nearest", "in words"
     ));
     let mut axis = "";
     for value in &found.values {
@@ -118,11 +120,13 @@ fn page_of(found: &Reconstruction) -> print::Page {
         axis = &value.axis;
         let points = |points: Option<f64>| points.map_or("-".into(), |p| format!("{p:.2}"));
         page.line(format_args!(
-            "{name:<22} {:<38} {:>8} {:>11} {:>9}",
+            "{name:<21} {:<37} {:>7} {:>9} {:>8} {:>7} {:>8}",
             value.value,
             value.setups,
             points(value.least_gap_fitted),
-            points(value.its_gap_held_out)
+            points(value.its_gap_held_out),
+            points(value.changed_alone[0]),
+            points(value.changed_alone[1])
         ));
     }
     if !found.scatter.is_empty() {
@@ -162,5 +166,27 @@ fn list(page: &mut print::Page, name: &str, candidates: &[Candidate]) {
             .map(|(axis, value)| format!("{axis}: {value}"))
             .collect();
         print::wrapped(page, &format!("N = {samples}, K = {centres}; {}.\n", choices.join("; ")));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use host_sim::evaluate::reconstruct::setup::Setup;
+
+    use taxel_data::random::{Purpose, Random, Stream};
+
+    use super::*;
+
+    #[test]
+    fn a_saved_search_is_read_back_to_the_last_bit() {
+        let mut random = Random::new(1, Stream::Test, Purpose::Setup, 0, 0);
+        for _ in 0..50 {
+            let cells = [[0.0; 4]; 10].map(|line: [f64; 4]| line.map(|_| 10.0 * random.unit()));
+            let gaps = vec![(0, 1, [random.unit(), random.unit()])];
+            let setup = Setup::random(&mut random);
+            let tried = Tried { setup, covariance: 0, formula: 1, cells, gaps };
+            let text = serde_json::to_string(&tried).unwrap();
+            assert_eq!(serde_json::from_str::<Tried>(&text).unwrap(), tried);
+        }
     }
 }

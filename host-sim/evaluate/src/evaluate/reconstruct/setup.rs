@@ -107,6 +107,13 @@ impl Setup {
         self.held()
     }
 
+    /// The set-up with one value changed; `None` if that makes no set-up.
+    #[must_use]
+    pub fn with(mut self, axis: usize, value: usize) -> Option<Self> {
+        self.0[axis] = value;
+        (self.held() == self).then_some(self)
+    }
+
     /// The set-up with no more samples than the largest number of centres allows, and with contacts that press.
     fn held(mut self) -> Self {
         if self.0[0] == CONTACT {
