@@ -10,7 +10,7 @@ use crate::rbf::{Shape, direct};
 /// this type, one for each row-wire.
 ///
 /// It infers what [`Decoder`](crate::Decoder) decodes from the blob, to the bit, for the number format
-/// [`f32-direct`](crate::rbf::Format::F32Direct). The other two formats have assembly routines that read a block of words.
+/// [`f32-direct`](crate::rbf::Format::F32Direct). The other two formats have assembly routines that read an array of words.
 ///
 /// Each reading is scaled to [0, 1] on its training range, and clamped an eighth beyond it. With x the scaled readings, the
 /// outputs are A·x + Σ_k ω_k·exp(−d_k·‖x − c_k‖²) + b.

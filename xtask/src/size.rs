@@ -106,8 +106,7 @@ fn measure(elf: &Path) -> Outcome<Size> {
         let symbol = file.symbols().find(|symbol| symbol.name() == Ok(name));
         symbol.map(|symbol| symbol.address()).ok_or(failed(format!("there is no symbol {name}")))
     };
-    let exported = |name: &str| name.contains("ROW_");
-    let weights = file.symbols().filter(|symbol| symbol.name().is_ok_and(exported));
+    let weights = file.symbols().filter(|symbol| symbol.name().is_ok_and(is_weights));
     Ok(Size {
         weights: weights.map(|symbol| symbol.size()).sum(),
         vector_table: section(".vector_table"),
@@ -118,6 +117,11 @@ fn measure(elf: &Path) -> Outcome<Size> {
         uninit: section(".uninit"),
         stack: address("_stack_start")?.saturating_sub(address("_stack_end")?),
     })
+}
+
+/// Whether a mangled name is that of a network in the module `row4`, as `host-sim export` writes it.
+fn is_weights(name: &str) -> bool {
+    name.contains("4row45ROW_")
 }
 
 #[cfg(test)]
@@ -138,6 +142,13 @@ mod tests {
     #[test]
     fn variables_with_a_value_take_flash_and_ram_and_weights_of_fixed_size_count_for_nothing() {
         assert_eq!((SIZE.flash(), SIZE.ram()), (4221, 654_000));
+    }
+
+    #[test]
+    fn weights_are_the_networks_of_the_exported_module_alone() {
+        let names = ["_ZN7minimal4row45ROW_417h5d2cE", "_RNvNtCs1_7minimal4row45ROW_4"];
+        assert!(names.into_iter().all(is_weights));
+        assert!(!is_weights("_ZN4link7message6REPORT11ROW_AT_REST17h0E"));
     }
 
     #[test]

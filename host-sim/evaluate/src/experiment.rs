@@ -295,8 +295,9 @@ impl Experiment {
 
     /// Data set of so many `frames` of `stream`, for training and for decoders that see what it saw.
     ///
-    /// Its inputs are deformations and its outputs readings if the scene's models predict readings. Otherwise its inputs are readings, or readings relative to the baseline of each session: the mean of
-    /// [`BASELINE_FRAMES`] frames of the untouched sensor. `synthesis` is one of the experiment's world.
+    /// Its inputs are deformations and its outputs readings if the scene's models predict readings. Otherwise its
+    /// inputs are readings. These may be relative to the baseline of each session: the mean of [`BASELINE_FRAMES`]
+    /// frames of the untouched sensor. `synthesis` is one of the experiment's world.
     #[must_use]
     pub fn dataset(&self, synthesis: &Synthesis<'_>, stream: Stream, frames: usize) -> Dataset {
         self.dataset_from(synthesis, stream, 0, frames)

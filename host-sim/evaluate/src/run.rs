@@ -225,8 +225,8 @@ fn decoding(subject: &Subject) -> Option<&Experiment> {
     subject.scene().filter(|scene| !scene.is_forward())
 }
 
-/// Inputs of the untouched sensor, as far as they are known and not zero: those of a scene without noise and drift, or the mean of
-/// measured frames at rest.
+/// Inputs of the untouched sensor, as far as they are known and not zero. A scene gives them without noise and drift;
+/// measurements give the mean of their frames at rest.
 fn readings_at_rest(subject: &Subject) -> Option<Vec<f64>> {
     match subject {
         Subject::Scene(scene) if scene.is_forward() => None,

@@ -106,6 +106,10 @@ pub fn solve(
             damping = if damping < LAST_DAMPING { 0.0 } else { damping };
         }
     }
+    // Out of steps: the place has not been evaluated since.
+    if let (false, Some((_, from))) = (settled, lowest) {
+        place = from;
+    }
     let in_box = place.iter().all(|x| x.abs() <= unknowns.largest * (1.0 + 1e-9));
     if least_damping == 0.0 {
         equations(&place, &mut residuals, &mut derivatives);
@@ -181,5 +185,20 @@ mod tests {
             derivatives.fill(1.0);
         });
         assert!(found.converged && (found.place[0] - 3.4).abs() < 1e-12, "{found:?}");
+    }
+
+    #[test]
+    fn a_search_that_runs_out_of_steps_ends_at_the_lowest_place_it_saw() {
+        // A slope of a seventh of the true one: each step from x leads to −6x, and half of half of it to −0.75x.
+        let unknowns = Unknowns { start: &[1e3], deviation: 1e4, largest: 1e6 };
+        let mut seen: Vec<f64> = Vec::new();
+        let found = solve(&unknowns, 1, (FIRST_DAMPING, 0.0), |at, residuals, derivatives| {
+            seen.push(at[0]);
+            residuals[0] = at[0];
+            derivatives.fill(1.0 / 7.0);
+        });
+        let lowest = seen.iter().copied().min_by(|a, b| a.abs().total_cmp(&b.abs()));
+        assert!(!found.converged && found.steps == DAMPED_END.0, "{found:?}");
+        assert_eq!(Some(found.place[0]), lowest);
     }
 }

@@ -1,6 +1,5 @@
 //! Command `export`: a model as source code.
 
-use std::fmt::Display;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -42,7 +41,8 @@ struct Summary {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    print::check_output(&arguments.rust, &[&arguments.model]).map_err(of_option)?;
+    print::check_output(&arguments.rust, &[&arguments.model])
+        .map_err(|cause| Error::Usage(format!("{cause} (--rust)")))?;
     let blob = ModelBlob::read(&arguments.model)?;
     let model = blob.parse();
     let source = export::rust(&model).map_err(|part| Error::Unfit {
@@ -52,7 +52,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             remedy(part)
         ),
     })?;
-    write_bytes(&arguments.rust, source.as_bytes()).map_err(of_option)?;
+    write_bytes(&arguments.rust, source.as_bytes())?;
     let summary = Summary {
         subject: model.metadata().name.into(),
         model_crc: format!("{:08x}", model.crc()),
@@ -76,11 +76,6 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         summary.model_crc
     ));
     page.print()
-}
-
-/// Error of the file that `--rust` names.
-fn of_option(cause: impl Display) -> Error {
-    Error::Usage(format!("{cause} (--rust)"))
 }
 
 /// How to train a model without this part.

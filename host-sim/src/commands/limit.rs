@@ -186,11 +186,11 @@ fn model_line(level: &Level, model: &DecoderErrors) -> String {
         format!(" {:>8.4} {ratio:>17}", errors.rmse)
     });
     let cells: String = cells.collect();
-    format!("{:>7} {:<8}{cells}   {}", percent(level.noise_level), "model", model.decoder)
+    format!("{:>7} {:<8}{cells}   {}", print::percent(level.noise_level), "model", model.decoder)
 }
 
 fn limit_line(level: &Level, figures: &Figures, result: &LimitResult) -> String {
-    let start = format!("{:>7} {:<8}", percent(level.noise_level), name(figures, result));
+    let start = format!("{:>7} {:<8}", print::percent(level.noise_level), name(figures, result));
     let Some(effective) = figures.effective_samples else {
         let refused = figures.refused.as_deref().unwrap_or_default();
         return format!("{start}  not given: {refused}");
@@ -211,7 +211,7 @@ fn limit_line(level: &Level, figures: &Figures, result: &LimitResult) -> String 
 fn directions(page: &mut print::Page, level: &Level) {
     page.line(format_args!(
         "\n{:<8} {:>10} {:>9}   {:^18} {:^24}   signal-to-noise ratios of the first directions",
-        percent(level.noise_level),
+        print::percent(level.noise_level),
         "observable",
         "unknowns",
         "known: dx, dy, dz",
@@ -247,7 +247,7 @@ fn line_of(name: &str, seen: &Observability) -> String {
 fn geometry(page: &mut print::Page, result: &LimitResult) {
     page.line(format_args!(
         "\nOther geometries at noise {}: what all readings would show\n{:<28} {:>8} {:>9} {:>10} {:>7}   {:^18} {:>24}",
-        percent(result.levels.first().map_or(f64::NAN, |level| level.noise_level)),
+        print::percent(result.levels.first().map_or(f64::NAN, |level| level.noise_level)),
         "sensor",
         "readings",
         "unknowns",
@@ -291,8 +291,4 @@ fn row_name(row_wires: &[usize]) -> String {
         [row] => format!("row {row}"),
         rows => format!("{} rows", rows.len()),
     }
-}
-
-fn percent(share: f64) -> String {
-    format!("{} %", (share * 1e6).round() / 1e4)
 }

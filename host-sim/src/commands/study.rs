@@ -55,7 +55,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 
 /// Headings of columns, one a noise level.
 fn noise_columns(levels: impl Iterator<Item = f64>) -> String {
-    let columns: Vec<String> = levels.map(|level| format!("{:>10}", percent(level))).collect();
+    let columns: Vec<String> =
+        levels.map(|level| format!("{:>10}", print::percent(level))).collect();
     columns.concat()
 }
 
@@ -79,11 +80,10 @@ fn refusals<'l>(page: &mut Page, limits: impl Iterator<Item = (f64, &'l LimitSum
     page.line("limit: of a decoder that sees all readings of a frame, on the first test frames, at most 40.");
     for (level, limit) in limits {
         if let Some(refused) = &limit.refused {
-            print::wrapped(page, &format!("no limit at noise {}: {refused}", percent(level)));
+            print::wrapped(
+                page,
+                &format!("no limit at noise {}: {refused}", print::percent(level)),
+            );
         }
     }
-}
-
-fn percent(level: f64) -> String {
-    format!("{} %", (level * 1e8).round() / 1e6)
 }

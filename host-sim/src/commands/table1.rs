@@ -141,7 +141,7 @@ fn page_of(table: &Table1, group: &str) -> print::Page {
             continue;
         }
         page.line(format_args!("\n{}", definition.formula()));
-        let levels = table.columns.iter().map(|c| format!("{:>20}", percent(c.noise_level)));
+        let levels = table.columns.iter().map(|c| format!("{:>20}", print::percent(c.noise_level)));
         page.line(format_args!("{:<16}{}", "noise", levels.collect::<String>()));
         for spread in table.columns[0].spreads() {
             let cells = table.columns.iter().map(|column| {
@@ -164,7 +164,11 @@ fn page_of(table: &Table1, group: &str) -> print::Page {
     }
     page.line("");
     for column in &table.columns {
-        page.line(format_args!("noise {}: {}", percent(column.noise_level), column.limit.note()));
+        page.line(format_args!(
+            "noise {}: {}",
+            print::percent(column.noise_level),
+            column.limit.note()
+        ));
     }
     if let Some(nearest) = table.nearest_formula() {
         compare(&mut page, &table.comparison, nearest);
@@ -195,10 +199,6 @@ fn compare(page: &mut print::Page, by_formula: &[Comparison], nearest: &Comparis
         page.line(comparison::line(&it.formula, &it.nearness));
     }
     page.line("with noise, with spread: rise from the least to the largest. docs/paper.md says what is open.\n");
-}
-
-fn percent(level: f64) -> String {
-    format!("{} %", (level * 1e6).round() / 1e4)
 }
 
 fn number(definition: Definition, value: Option<f64>) -> String {

@@ -237,13 +237,7 @@ pub fn known_svg(result: &LimitResult) -> String {
     let Some(level) = result.levels.first() else { return String::new() };
     let mut picture = Svg::new(3.0 * MAP[0] + 40.0, MAP[1], "What the readings tell");
     for (i, map) in known(result, &level.observability).iter().enumerate() {
-        // The drawing without its own frame.
-        let inside = map.split_once('>').map_or("", |(_, inside)| inside);
-        let inside = inside.rsplit_once("</svg>").map_or("", |(inside, _)| inside);
-        picture.add(format_args!(
-            "<g transform=\"translate({} 0)\">{inside}</g>",
-            i as f64 * (MAP[0] + 20.0)
-        ));
+        picture.place([i as f64 * (MAP[0] + 20.0), 0.0], map);
     }
     standalone(&picture.finish(), [3.0 * MAP[0] + 40.0, MAP[1]])
 }

@@ -44,12 +44,8 @@ pub fn svg(tables: &[(&str, Cells)]) -> String {
             notes: vec![],
             end_labels: true,
         };
-        let drawing = chart.draw(PANEL);
-        // The drawing without its own frame.
-        let inside = drawing.split_once('>').map_or("", |(_, inside)| inside);
-        let inside = inside.rsplit_once("</svg>").map_or("", |(inside, _)| inside);
         let [x, y] = [(j % 2) as f64 * (PANEL[0] + GAP_PX), (j / 2) as f64 * (PANEL[1] + GAP_PX)];
-        picture.add(format_args!("<g transform=\"translate({x} {y})\">{inside}</g>"));
+        picture.place([x, y], &chart.draw(PANEL));
     }
     standalone(&picture.finish(), [width, height])
 }

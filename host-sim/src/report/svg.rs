@@ -148,6 +148,13 @@ impl Svg {
         let _ = writeln!(self.body, "{element}");
     }
 
+    /// Adds a finished `drawing` without its frame, its upper left corner at a place.
+    pub fn place(&mut self, [x, y]: [f64; 2], drawing: &str) {
+        let inside = drawing.split_once('>').and_then(|(_, rest)| rest.rsplit_once("</svg>"));
+        let inside = inside.map_or("", |(inside, _)| inside);
+        self.add(format_args!("<g transform=\"translate({} {})\">{inside}</g>", Px(x), Px(y)));
+    }
+
     /// Finished SVG element.
     pub fn finish(self) -> String {
         format!(
@@ -218,6 +225,20 @@ mod tests {
              <title>a &lt; b &amp; &quot;c&quot;</title>\n\
              <text x=\"1.2\" y=\"0\" text-anchor=\"end\" class=\"tick\">&lt;script&gt;</text>\n\
              </svg>\n"
+        );
+    }
+
+    #[test]
+    fn a_drawing_is_placed_without_its_frame() {
+        let mut inner = Svg::new(10.0, 10.0, "inner");
+        inner.path("M0 0", "axis");
+        let mut svg = Svg::new(100.0, 50.0, "outer");
+        svg.place([20.0, 0.0], &inner.finish());
+        assert_eq!(
+            svg.finish(),
+            "<svg role=\"img\" viewBox=\"0 0 100 50\"><title>outer</title>\n\
+             <g transform=\"translate(20 0)\"><title>inner</title>\n\
+             <path d=\"M0 0\" class=\"axis\"/>\n</g>\n</svg>\n"
         );
     }
 }

@@ -97,6 +97,9 @@ fn parts_that_a_fixed_has_no_room_for_are_refused_by_name_with_the_fix() {
     assert!(folder.succeed(&["export", "m.bin", "--rust", "m.rs"]).contains("2 rows, 2 networks"));
     let said = folder.fail(&["export", "m.bin", "--rust", "m.bin"], 2);
     assert!(said.contains("m.bin") && said.contains("(--rust)"), "{said}");
+    // A full disk is no fault of the option.
+    let said = folder.fail(&["export", "m.bin", "--rust", "/dev/full"], 2);
+    assert!(said.contains("No space left") && !said.contains("--rust"), "{said}");
 }
 
 #[test]

@@ -544,6 +544,8 @@ fn bad_studies() {
     refused(&folder, &map(&["--row", "9"]), &["--row 9", "rows 1 to 8"]);
     refused(&folder, &map(&["--group", "dw_mm"]), &["--group dw_mm", "dz_mm"]);
     refused(&folder, &map(&["--samples", "2,30"]), &["--samples 2", "from 4 to 100000"]);
+    refused(&folder, &map(&["--samples", "30,200000"]), &["--samples 200000", "from 4 to 100000"]);
+    refused(&folder, &map(&["--centres", "0,64"]), &["--centres 0", "from 1 to 1024"]);
     refused(&folder, &map(&["--spread", "1,0.1"]), &["--spread", "larger than the one before"]);
     refused(&folder, &map(&["--noise", "2"]), &["--noise 2"]);
     refused(&folder, &map(&["--delta", "-1"]), &["--delta -1", "such as 1e6"]);

@@ -15,7 +15,7 @@ use taxel_limit::Equations;
 use taxel_limit::equations::RowModel;
 use taxel_simulate::Synthesis;
 
-use super::level::{NoiseLevel, check, train};
+use super::level::{NoiseLevel, Solved, check, train};
 use crate::error::Result;
 use crate::experiment::{Direction, Experiment};
 use crate::metrics::{self, DecoderErrors, LimitSummary, NETWORK};
@@ -127,7 +127,8 @@ fn of_level(level: NoiseLevel, progress: &dyn Progress) -> Result<Level> {
     let predicted = model.decode_table(&test.inputs).values;
 
     // Readings deviate from the network by their noise and its own error.
-    let deviation = relative_rmse(&set.frames.outputs, &model.decode_table(&set.frames.inputs));
+    let estimated = model.decode_table(&set.frames.inputs);
+    let deviation = deviation(&Synthesis::of(&forward.world), &set.frames.outputs, &estimated);
     let networks = Networks::of(&blob.parse());
     let world = &level.scene.world;
     let mut inversions = Vec::new();
@@ -141,7 +142,7 @@ fn of_level(level: NoiseLevel, progress: &dyn Progress) -> Result<Level> {
         let solved = equations.solve_all(&level.test.inputs.values);
         let seconds = started.elapsed().as_secs_f64();
         let converged = solved.iter().filter(|solution| solution.converged).count();
-        let errors = level.judge(&equations);
+        let errors = level.judge(&Solved(&equations, &solved));
         inversions.push(Inversion {
             decoder: errors.decoder.clone(),
             percent_converged: 100.0 * converged as f64 / solved.len() as f64,
@@ -162,10 +163,14 @@ fn of_level(level: NoiseLevel, progress: &dyn Progress) -> Result<Level> {
     })
 }
 
-/// Root mean square of (predicted − reading)/reading.
-fn relative_rmse(readings: &Table, predicted: &Table) -> f64 {
-    let pairs = readings.values.iter().zip(&predicted.values);
-    let squares: f64 = pairs.map(|(reading, predicted)| (predicted / reading - 1.0).powi(2)).sum();
+/// Root mean square of predicted − reading, each relative to what noise is relative to: the reading or its span.
+fn deviation(synthesis: &Synthesis<'_>, readings: &Table, predicted: &Table) -> f64 {
+    let spans_ohm = synthesis.noise_span_ohm();
+    let pairs = readings.values.iter().zip(&predicted.values).enumerate();
+    let relative = pairs.map(|(i, (reading, predicted))| {
+        (predicted - reading) / spans_ohm.get(i % readings.names.len()).unwrap_or(reading)
+    });
+    let squares: f64 = relative.map(|off| off * off).sum();
     (squares / readings.values.len() as f64).sqrt()
 }
 
@@ -237,6 +242,7 @@ impl DirectionsResult {
 mod tests {
     use super::*;
     use taxel_data::progress::Silent;
+    use taxel_simulate::noise::NoiseKind;
 
     /// Row 4 of `press`, whose network predicts its readings.
     fn forward() -> Experiment {
@@ -277,6 +283,20 @@ mod tests {
                     assert!((slopes[(k, i)] - slope).abs() < 1e-7, "reading {k}, unknown {i}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn readings_deviate_by_the_noise_level_in_the_unit_of_the_noise() {
+        let mut scene = forward();
+        scene.world.noise.level = 0.05;
+        for kind in [NoiseKind::Relative, NoiseKind::Span] {
+            scene.world.noise.kind = kind;
+            let synthesis = Synthesis::of(&scene.world);
+            let [noisy, ideal] = [&synthesis, &synthesis.clone().ideal()]
+                .map(|it| scene.dataset(it, Stream::Test, 1000).outputs);
+            let found = deviation(&synthesis, &noisy, &ideal);
+            assert!((found / 0.05 - 1.0).abs() < 0.02, "{kind:?}: {found}");
         }
     }
 

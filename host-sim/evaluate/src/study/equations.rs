@@ -4,12 +4,11 @@ use rayon::prelude::*;
 use serde::Serialize;
 use taxel_data::progress::Progress;
 use taxel_data::random::{Purpose, Random, Stream};
-use taxel_learn::{Decoder, Estimates, FrameDecoder};
 use taxel_limit::Equations;
 use taxel_limit::solve::Solution;
 use taxel_simulate::Synthesis;
 
-use super::level::{NoiseLevel, check};
+use super::level::{NoiseLevel, Solved, check};
 use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::metrics::{DecoderErrors, LimitSummary};
@@ -170,19 +169,6 @@ pub fn study(
         without_noise,
         searches: plan.searches,
     })
-}
-
-/// Solutions of the test frames as a decoder of these.
-struct Solved<'s>(&'s Equations<'s>, &'s [Solution]);
-
-impl Decoder for Solved<'_> {
-    fn name(&self) -> &str {
-        FrameDecoder::name(self.0)
-    }
-
-    fn decode_all(&self, _: &[f64], _: usize) -> Estimates {
-        Estimates::of_values(self.1.iter().flat_map(|solution| &solution.place).copied().collect())
-    }
 }
 
 fn percent(count: usize, of: usize) -> f64 {

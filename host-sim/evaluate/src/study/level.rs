@@ -6,7 +6,9 @@ use taxel_data::error::require;
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
 use taxel_learn::decoders::BASELINES;
-use taxel_learn::{Decoder, Exponential, ModelBlob};
+use taxel_learn::{Decoder, Estimates, Exponential, FrameDecoder, ModelBlob};
+use taxel_limit::Equations;
+use taxel_limit::solve::Solution;
 use taxel_simulate::Synthesis;
 use taxel_simulate::outputs::Outputs;
 
@@ -93,6 +95,19 @@ impl NoiseLevel {
         let network = blob.prepare(Exponential::default());
         let baselines = BASELINES.iter().map(|it| self.judge(it.fit(&set.frames).as_ref()));
         Ok(std::iter::once(self.judge(&network)).chain(baselines).collect())
+    }
+}
+
+/// Solutions of the test frames as a decoder of these.
+pub(super) struct Solved<'s>(pub &'s Equations<'s>, pub &'s [Solution]);
+
+impl Decoder for Solved<'_> {
+    fn name(&self) -> &str {
+        FrameDecoder::name(self.0)
+    }
+
+    fn decode_all(&self, _: &[f64], _: usize) -> Estimates {
+        Estimates::of_values(self.1.iter().flat_map(|solution| &solution.place).copied().collect())
     }
 }
 

@@ -11,7 +11,7 @@ use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
 use taxel_data::{BadValue, columns};
 use taxel_learn::Options;
-use taxel_learn::train::least_squares::{Design, Factor, Regressors};
+use taxel_learn::train::least_squares::{Factor, Regressors, predict};
 use taxel_learn::train::{INITIAL_COVARIANCE, InputScale, Samples, check_spread};
 use taxel_simulate::Synthesis;
 use taxel_simulate::world::check_noise_level;
@@ -29,8 +29,6 @@ pub const MOST_INTERPOLATED: usize = 1000;
 const SAMPLES_IN_ALL: usize = 1000;
 /// Most training sets of a map.
 const MOST_SETS: usize = 10;
-/// Samples whose regressors are computed at once.
-const SAMPLES_AT_ONCE: usize = 64;
 
 /// Settings of the study.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,14 +77,16 @@ impl Plan {
                 "list at least one value, each larger than the one before".into()
             })?;
         }
-        let [fewest, most] = [self.samples[0], self.samples[self.samples.len() - 1]];
-        require(fewest >= 4 && most <= 100_000, "samples", fewest, || {
-            "give numbers from 4 to 100000".into()
-        })?;
-        let (least, largest) = (self.centres[0], self.centres[self.centres.len() - 1]);
-        require(least >= 1 && largest <= 1024, "centres", largest, || {
-            "give numbers from 1 to 1024: the work grows with their square".into()
-        })?;
+        for &samples in &self.samples {
+            require((4..=100_000).contains(&samples), "samples", samples, || {
+                "give numbers from 4 to 100000".into()
+            })?;
+        }
+        for &centres in &self.centres {
+            require((1..=1024).contains(&centres), "centres", centres, || {
+                "give numbers from 1 to 1024: the work grows with their square".into()
+            })?;
+        }
         require(self.test_frames > 0, "test_frames", 0, || "give at least 1".into())?;
         let covariance = self.initial_covariance;
         require((1e-3..=1e15).contains(&covariance), "initial_covariance", covariance, || {
@@ -209,7 +209,6 @@ pub fn compute(
         .enumerate()
         .flat_map(|(case, (_, sets))| {
             let centres = plan.centres_for(sets[0].samples.inputs.len());
-            // The largest first, so that no thread is left with them at the end.
             let of_set = move |set| centres.clone().into_iter().map(move |k| (case, set, k));
             (0..sets.len()).flat_map(of_set).collect::<Vec<_>>()
         })
@@ -366,29 +365,14 @@ impl Wanted<'_> {
             let [seen, unseen] = [&set.scaled, &set.test_scaled].map(|x| regressors.of(x));
             let covariance = self.plan.initial_covariance;
             let weights = Factor::new(&seen, &set.targets, outputs, covariance).weights();
-            [(seen, &set.targets), (unseen, &set.test_targets)]
-                .map(|(design, targets)| mean_square(&errors(&design, &weights, targets, outputs)))
+            [(seen, &set.targets), (unseen, &set.test_targets)].map(|(design, targets)| {
+                let mut errors = predict(&design, 0..targets.len() / outputs, &weights, outputs);
+                errors.iter_mut().zip(targets).for_each(|(error, target)| *error -= target);
+                mean_square(&errors)
+            })
         };
         self.plan.spreads.iter().map(of_spread).collect()
     }
-}
-
-/// Errors of what `weights` (`regressors × outputs`) predict for the samples of `design`.
-fn errors(design: &impl Design, weights: &[f64], targets: &[f64], outputs: usize) -> Vec<f64> {
-    let n = design.regressors();
-    let mut errors: Vec<f64> = targets.iter().map(|target| -target).collect();
-    let mut regressors = vec![0.0; SAMPLES_AT_ONCE * n];
-    for (piece, errors) in errors.chunks_mut(SAMPLES_AT_ONCE * outputs).enumerate() {
-        let (first, count) = (piece * SAMPLES_AT_ONCE, errors.len() / outputs);
-        let values = &mut regressors[..count * n];
-        design.fill(first..first + count, values);
-        for (values, errors) in values.chunks_exact(n).zip(errors.chunks_exact_mut(outputs)) {
-            for (value, weights) in values.iter().zip(weights.chunks_exact(outputs)) {
-                errors.iter_mut().zip(weights).for_each(|(error, w)| *error += value * w);
-            }
-        }
-    }
-    errors
 }
 
 #[cfg(test)]

@@ -94,6 +94,8 @@ pub struct Model {
     pub spread: f64,
     /// Least and largest width in the model.
     pub width_range: [f64; 2],
+    /// RMSE on the frames that choose.
+    pub choice_rmse: f64,
     /// RMSE on the test frames.
     pub rmse: f64,
     /// Its ratio to the limit, if there is one.
@@ -104,7 +106,8 @@ pub struct Model {
     pub cycles: u64,
 }
 
-/// Comparison of a model with widths by neighbours with those of one common width.
+/// Comparison of a model with widths by neighbours with the best one of one common width, as other frames than those
+/// that models are judged on choose it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Gain {
     /// Number of centres K.
@@ -113,7 +116,7 @@ pub struct Gain {
     pub refined: bool,
     /// RMSE over that of one common width, with as many centres.
     pub at_equal_centres: f64,
-    /// RMSE over the least of one common width within the same bytes and cycles; `None` if there is no such model.
+    /// RMSE over that of one common width within the same bytes and cycles; `None` if there is no such model.
     pub at_equal_cost: Option<f64>,
 }
 
@@ -186,7 +189,7 @@ fn of_group(errors: &[Errors], group: &str) -> Option<Errors> {
 
 /// What models are judged by.
 struct Judging<'g> {
-    /// Frames that choose the spread.
+    /// Frames that choose the spread, and the format of one common width.
     choice: Dataset,
     test: Dataset,
     group: &'g str,
@@ -210,8 +213,7 @@ impl Judging<'_> {
         for &spread in spreads {
             match set.blob(&Options { spread, ..*options }, &Silent) {
                 Ok(blob) => {
-                    let errors = self.errors(&blob, &self.choice, measure);
-                    let rmse = errors.map_or(f64::NAN, |errors| errors.rmse);
+                    let rmse = self.choice_rmse(&blob, measure);
                     if rmse < least {
                         (least, best) = (rmse, Ok((spread, blob)));
                     }
@@ -221,6 +223,10 @@ impl Judging<'_> {
             }
         }
         best
+    }
+
+    fn choice_rmse(&self, blob: &ModelBlob, measure: &Measure) -> f64 {
+        self.errors(blob, &self.choice, measure).map_or(f64::NAN, |errors| errors.rmse)
     }
 
     fn errors(&self, blob: &ModelBlob, frames: &Dataset, measure: &Measure) -> Option<Errors> {
@@ -248,6 +254,7 @@ impl Judging<'_> {
             format: model.networks().next().map_or("", |network| network.format().name()),
             spread,
             width_range: widths.fold([f64::INFINITY, 0.0], wider),
+            choice_rmse: self.choice_rmse(blob, measure),
             rmse: errors.as_ref().map_or(f64::NAN, |errors| errors.rmse),
             ratio_to_limit: errors.and_then(|errors| errors.ratio_to_limit),
             blob_bytes: blob.bytes().len(),
@@ -260,20 +267,19 @@ impl Judging<'_> {
 fn gains(models: &[Model]) -> Vec<Gain> {
     let own = models.iter().filter(|model| model.widths == Widths::Neighbours);
     let gain = |own: &Model| {
-        let common = || {
-            let like = models.iter().filter(|model| model.refined == own.refined);
-            like.filter(|model| model.widths == Widths::Common)
+        let over_best = |like: &dyn Fn(&Model) -> bool| {
+            let common = models.iter().filter(|model| model.refined == own.refined);
+            let common = common.filter(|model| model.widths == Widths::Common && like(model));
+            let best = common.min_by(|a, b| a.choice_rmse.total_cmp(&b.choice_rmse));
+            best.map(|best| own.rmse / best.rmse)
         };
-        let over_least = |least: f64| (least < f64::INFINITY).then_some(own.rmse / least);
-        let equal = common().filter(|model| model.centres == own.centres).map(|model| model.rmse);
-        let as_cheap = common()
-            .filter(|model| model.blob_bytes <= own.blob_bytes && model.cycles <= own.cycles)
-            .map(|model| model.rmse);
         Gain {
             centres: own.centres,
             refined: own.refined,
-            at_equal_centres: own.rmse / equal.fold(f64::INFINITY, f64::min),
-            at_equal_cost: over_least(as_cheap.fold(f64::INFINITY, f64::min)),
+            at_equal_centres: over_best(&|model| model.centres == own.centres).unwrap_or(f64::NAN),
+            at_equal_cost: over_best(&|model| {
+                model.blob_bytes <= own.blob_bytes && model.cycles <= own.cycles
+            }),
         }
     };
     own.map(gain).collect()
@@ -285,26 +291,28 @@ mod tests {
 
     #[test]
     fn gains_compare_with_common_widths_of_as_many_centres_and_of_no_more_cost() {
-        let model = |centres, widths, rmse, blob_bytes, cycles| Model {
+        let model = |centres, widths, [choice_rmse, rmse]: [f64; 2], blob_bytes, cycles| Model {
             centres,
             refined: false,
             widths,
             format: "",
             spread: 0.8,
             width_range: [0.8; 2],
+            choice_rmse,
             rmse,
             ratio_to_limit: None,
             blob_bytes,
             cycles,
         };
         let models = [
-            model(16, Widths::Common, 0.05, 400, 40),
-            model(16, Widths::Neighbours, 0.045, 900, 90),
-            model(64, Widths::Common, 0.04, 900, 80),
-            model(64, Widths::Neighbours, 0.03, 3000, 30),
+            model(16, Widths::Common, [0.051, 0.05], 400, 40),
+            model(16, Widths::Common, [0.052, 0.04], 400, 40), // better by chance
+            model(16, Widths::Neighbours, [0.05, 0.045], 900, 90),
+            model(64, Widths::Common, [0.04, 0.041], 900, 80),
+            model(64, Widths::Neighbours, [0.03, 0.03], 3000, 30),
         ];
         let [few, many] = gains(&models).try_into().unwrap();
-        assert_eq!((few.at_equal_centres, few.at_equal_cost), (0.045 / 0.05, Some(0.045 / 0.04)));
-        assert_eq!((many.at_equal_centres, many.at_equal_cost), (0.03 / 0.04, None));
+        assert_eq!((few.at_equal_centres, few.at_equal_cost), (0.045 / 0.05, Some(0.045 / 0.041)));
+        assert_eq!((many.at_equal_centres, many.at_equal_cost), (0.03 / 0.041, None));
     }
 }

@@ -11,9 +11,9 @@ use host_sim::{Result, report};
 use taxel_data::output;
 use taxel_learn::decoders::{linear, mean};
 
-use super::super::progress::Terminal;
-use super::super::scene_argument::SceneArgument;
-use super::super::{Common, print};
+use crate::commands::progress::Terminal;
+use crate::commands::scene_argument::SceneArgument;
+use crate::commands::{Common, print};
 
 /// Compare both directions of the paper's network: deformations to readings, inverted, and readings to deformations.
 ///

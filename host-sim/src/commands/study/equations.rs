@@ -10,9 +10,9 @@ use taxel_data::output;
 use taxel_learn::decoders::{linear, mean};
 use taxel_limit::equations::{DAMPED, EXACT};
 
-use super::super::progress::Terminal;
-use super::super::scene_argument::SceneArgument;
-use super::super::{Common, print};
+use crate::commands::progress::Terminal;
+use crate::commands::scene_argument::SceneArgument;
+use crate::commands::{Common, print};
 
 /// Solve the sensor's equations for each row's deformation, without training, by noise.
 ///

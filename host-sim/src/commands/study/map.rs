@@ -137,7 +137,7 @@ fn map_line(map: &Map) -> String {
     let whole = map.best(|cell| cell.centres == map.samples).map_or("–".into(), |cell| {
         format!("{:<4} {}", cell.spread, errors(cell.training_rmse, cell.test_rmse))
     });
-    let noise = percent(map.noise_level);
+    let noise = print::percent(map.noise_level);
     format!("{noise:>7} {:>6} {:>8.4}   {best:<35} {whole}", map.samples, map.mean_rmse)
 }
 
@@ -154,7 +154,7 @@ fn by_spread(page: &mut print::Page, study: &MapStudy) {
         let (errors, centres) = best
             .map(|cell| (format!("{:.4}", cell.test_rmse), format!("K={}", cell.centres)))
             .unzip();
-        line(&percent(map.noise_level), errors);
+        line(&print::percent(map.noise_level), errors);
         line("", centres);
     }
     page.line(format_args!("least test error at each spread, and its K, for N = {most}.\n"));
@@ -164,7 +164,7 @@ fn by_spread(page: &mut print::Page, study: &MapStudy) {
 fn cells(page: &mut print::Page, map: &Map, study: &MapStudy) {
     page.line(format_args!(
         "{} noise, N = {}: errors on the samples / on test frames; always predicting the mean: {:.3}",
-        percent(map.noise_level),
+        print::percent(map.noise_level),
         map.samples,
         map.mean_rmse
     ));
@@ -182,8 +182,9 @@ fn cells(page: &mut print::Page, map: &Map, study: &MapStudy) {
 }
 
 fn claim_lines(page: &mut print::Page, claim: &Claim) {
-    let level =
-        claim.noise_level.map_or(String::new(), |level| format!(", {} noise", percent(level)));
+    let level = claim
+        .noise_level
+        .map_or(String::new(), |level| format!(", {} noise", print::percent(level)));
     page.line(format_args!(
         "{:<7} {}{level}, N = {}",
         claim.verdict.words(),
@@ -198,8 +199,4 @@ fn claim_lines(page: &mut print::Page, claim: &Claim) {
 /// A figure with the digits that matter.
 fn short(value: f64) -> String {
     if value.fract() == 0.0 { format!("{value}") } else { format!("{value:.4}") }
-}
-
-fn percent(level: f64) -> String {
-    format!("{} %", (level * 1e6).round() / 1e4)
 }

@@ -56,9 +56,9 @@ fn page_of(study: &WidthsStudy) -> print::Page {
     let mut page = print::Page::default();
     let rows: Vec<String> = study.row_wires.iter().map(usize::to_string).collect();
     page.line(format_args!(
-        "{}: {} % noise, row {}, seed {}, {} training and {} test frames\n",
+        "{}: {} noise, row {}, seed {}, {} training and {} test frames\n",
         study.subject,
-        (study.noise_level * 1e6).round() / 1e4,
+        print::percent(study.noise_level),
         rows.join(", "),
         study.seed,
         study.training_frames,

@@ -2,7 +2,7 @@
 
 use host_sim::evaluate::printed::{CELLS, Cells, NOISE_LEVELS, Nearness, SPREADS};
 
-use super::super::print::Page;
+use super::super::print::{Page, percent};
 
 /// Header of [`line`]s.
 pub fn header(what: &str) -> String {
@@ -27,7 +27,7 @@ pub fn line(name: &str, nearness: &Nearness) -> String {
 
 /// Adds computed and printed cells side by side.
 pub fn cells(page: &mut Page, cells: &Cells) {
-    let levels = NOISE_LEVELS.map(|level| format!("{:>18}", super::percent(level)));
+    let levels = NOISE_LEVELS.map(|level| format!("{:>18}", percent(level)));
     page.line(format_args!("{:<10}{}", "noise", levels.concat()));
     for ((spread, line), printed) in SPREADS.iter().zip(cells).zip(&CELLS) {
         let pairs =

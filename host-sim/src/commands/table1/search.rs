@@ -142,7 +142,7 @@ fn page_of(found: &Reconstruction) -> print::Page {
         page.line(format_args!(
             "spread {:?}, noise {}: printed {:.2} %, nearest {:.2} %",
             it.spread,
-            super::percent(it.noise_level),
+            print::percent(it.noise_level),
             it.printed_percent,
             it.nearest_percent
         ));
