@@ -403,8 +403,7 @@ fn values(tried: &[Tried], nearest: [Option<&Tried>; 2], seed: u64) -> Vec<AxisV
         })
         .collect();
     // Every set-up was tried with all penalties and formulas.
-    type Has<'h> = &'h dyn Fn(usize, usize) -> bool;
-    let mut of_gaps = |axis: &str, value: String, has: Has<'_>| {
+    let mut of_gaps = |axis: &str, value: String, has: &dyn Fn(usize, usize) -> bool| {
         let least = |it: &Tried| {
             let with = it.gaps.iter().filter(|(covariance, formula, _)| has(*covariance, *formula));
             with.map(|(_, _, gaps)| *gaps).min_by(|a, b| a[0].total_cmp(&b[0]))
