@@ -1,4 +1,5 @@
-//! Training of one network: 100,000 samples, 18 inputs and outputs, 256 centres.
+//! Training of one network: 100,000 samples, 18 inputs and outputs, 256 centres; and output weights by QR beside the
+//! recursion, of 20,000 samples with fewer centres, on one thread.
 //!
 //! Data and results are written to cargo's folder for temporary files, for `compare/training.py`.
 
@@ -6,13 +7,13 @@ use std::fs;
 use std::hint::black_box;
 use std::path::PathBuf;
 
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use taxel_data::dataset::RowTable;
 use taxel_data::random::{Purpose, Random, Stream};
 use taxel_learn::infer::infer;
 use taxel_learn::train::kmeans::{self, Search};
-use taxel_learn::train::least_squares::{Factor, Regressors};
-use taxel_learn::train::{FittedNetwork, INITIAL_COVARIANCE, InputScale, Samples};
+use taxel_learn::train::least_squares::{Design, Factor, Recursion, Regressors};
+use taxel_learn::train::{FittedNetwork, INITIAL_COVARIANCE, InputScale, Recursive, Samples};
 use taxel_learn::{Exponential, Options};
 use taxel_simulate::{World, synthesise};
 
@@ -90,5 +91,35 @@ fn training(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, training);
+/// Time of a sample in both solvers of output weights.
+fn solvers(criterion: &mut Criterion) {
+    const SAMPLES: usize = 20_000;
+    let table = samples(Stream::Training, SAMPLES);
+    let (inputs, outputs) = (table.inputs.names.len(), table.outputs.names.len());
+    let scaled = InputScale::of(&table).apply(&table.inputs.values);
+    let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+    let mut group = criterion.benchmark_group("solvers");
+    group.sample_size(10).throughput(Throughput::Elements(SAMPLES as u64));
+    for count in [48, 64, 200] {
+        let centres = &kmeans::plus_plus(&scaled, inputs, count, &mut random());
+        let decays = &[1.0 / (2.0 * SPREAD * SPREAD)];
+        let design = Regressors { centres, inputs, decays, affine_tail: false }.of(&scaled);
+        let targets = &table.outputs.values;
+        group.bench_function(BenchmarkId::new("qr", count), |bencher| {
+            let factor = || Factor::new(&design, black_box(targets), outputs, INITIAL_COVARIANCE);
+            bencher.iter(|| one_thread.install(factor));
+        });
+        group.bench_function(BenchmarkId::new("rls", count), |bencher| {
+            bencher.iter(|| {
+                let (n, settings) = (design.regressors(), Recursive::default());
+                let mut recursion = Recursion::new(n, outputs, INITIAL_COVARIANCE, &settings);
+                recursion.absorb(&design, black_box(targets), 0..SAMPLES);
+                recursion
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, training, solvers);
 criterion_main!(benches);

@@ -161,6 +161,14 @@ pub enum Problem {
         /// Largest size that is read, in bytes.
         most_bytes: u64,
     },
+    /// Line longer than any that is read.
+    #[error("no line of data ends within {} after line {after}; check the line ends", in_words(*most_bytes))]
+    LineTooLong {
+        /// Number of the last line before it; 0 for the first line.
+        after: u64,
+        /// Longest line that is read, in bytes.
+        most_bytes: u64,
+    },
     /// Blank line in a file of one column, where it could be a missing value.
     #[error("line {line} is blank; in a file of one column write NaN for a missing value")]
     BlankLine {

@@ -80,6 +80,16 @@ pub fn of_decoder<'d>(decoders: &'d [DecoderErrors], name: &str) -> &'d [Errors]
     decoders.iter().find(|it| it.decoder == name).map_or(&[], |it| &it.errors)
 }
 
+/// RMSE of each of the `groups` of outputs from the RMSE of their members: the root of the mean square.
+#[must_use]
+pub fn pooled(groups: &[(&str, Vec<usize>)], rmse: &[f64]) -> Vec<f64> {
+    let of_group = |members: &Vec<usize>| {
+        let squares: f64 = members.iter().map(|column| rmse[*column].powi(2)).sum();
+        (squares / members.len() as f64).sqrt()
+    };
+    groups.iter().map(|(_, members)| of_group(members)).collect()
+}
+
 /// Limit of a scene that results are given beside.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LimitSummary {

@@ -170,6 +170,11 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         }
     };
     if let (Some(path), Some(curve)) = (arguments.recursion.curve(), &learning_curve) {
+        if curve.points.is_empty() {
+            return Err(Error::Usage(format!(
+                "--curve: its first error is measured on the frames after the tenth, and there are {frames}: leave it out"
+            )));
+        }
         output::write_bytes(path, report::learning_curve_svg(curve, subject.name()).as_bytes())?;
     }
     output::write_bytes(&arguments.output, blob.bytes())?;
@@ -266,11 +271,8 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         page.line(format_args!("cross-validated RMSE of {}:", names.join(", ")));
         page.line("(score: mean over the outputs of RMSE/standard deviation; 1 is the mean's)");
         let pooled = |rmse: &[f64]| {
-            let of_group = |members: &[usize]| {
-                let squares: f64 = members.iter().map(|column| rmse[*column].powi(2)).sum();
-                format!("{:.4}", (squares / members.len() as f64).sqrt())
-            };
-            groups.iter().map(|(_, members)| of_group(members)).collect::<Vec<_>>().join(" ")
+            let errors = metrics::pooled(&groups, rmse);
+            errors.iter().map(|error| format!("{error:.4}")).collect::<Vec<_>>().join(" ")
         };
         let settings = selection.scored.iter().map(choice::settings).collect::<Vec<_>>();
         let width = settings.iter().map(String::len).max().unwrap_or(0);
@@ -313,13 +315,7 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         ));
     }
     if let Some(curve) = &summary.learning_curve {
-        page.line(format_args!("\nlearning curve: RMSE on {}", curve.judged_on.words()));
-        let names: Vec<_> = curve.groups.iter().map(|group| format!(" {group:>12}")).collect();
-        page.line(format_args!("{:>10}{}", "frames", names.concat()));
-        for point in &curve.points {
-            let errors: Vec<_> = point.rmse.iter().map(|rmse| format!(" {rmse:>12.4}")).collect();
-            page.line(format_args!("{:>10}{}", point.frames, errors.concat()));
-        }
+        learning_curve_into(&mut page, curve);
     }
     let Worth { judged_on, verdict, .. } = &summary.worth;
     print::verdict(&mut page, Some(judged_on.words()), verdict);
@@ -328,4 +324,21 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
     let r_squared: Vec<String> = network.iter().map(of).collect();
     print::wrapped(&mut page, &format!("R² there: {}", r_squared.join(", ")));
     page
+}
+
+/// Learning curve as lines of `page`.
+fn learning_curve_into(page: &mut print::Page, curve: &LearningCurve) {
+    if curve.points.is_empty() {
+        page.line(format_args!(
+            "\nno learning curve: its first error is measured on the frames after the tenth"
+        ));
+        return;
+    }
+    page.line(format_args!("\nlearning curve: RMSE on {}", curve.judged_on.words()));
+    let names: Vec<_> = curve.groups.iter().map(|group| format!(" {group:>12}")).collect();
+    page.line(format_args!("{:>10}{}", "frames", names.concat()));
+    for point in &curve.points {
+        let errors: Vec<_> = point.rmse.iter().map(|rmse| format!(" {rmse:>12.4}")).collect();
+        page.line(format_args!("{:>10}{}", point.frames, errors.concat()));
+    }
 }

@@ -88,7 +88,7 @@ fn standard_input_trains_as_the_file_does_on_any_number_of_threads() {
 }
 
 #[test]
-fn more_frames_than_a_data_set_may_hold_train_by_recursion() {
+fn a_scene_trains_by_recursion_in_pieces_and_draws_its_learning_curve() {
     let folder = Folder::new("stream");
     folder.write("scene.toml", small_scene().replacen("frames = 3000", "frames = 4500", 1));
     let train =
@@ -102,6 +102,21 @@ fn more_frames_than_a_data_set_may_hold_train_by_recursion() {
             && curve.contains("Δz")
     );
     assert!(folder.succeed(&["inspect", "m.bin"]).contains("4500"));
+}
+
+#[test]
+fn too_few_frames_for_a_learning_curve_are_told() {
+    let folder = Folder::new("short-curve");
+    folder.write("scene.toml", small_scene());
+    folder.succeed(&["synth", "scene.toml", "-n", "10", "-o", "data.csv"]);
+    let train =
+        ["train", "data.csv", "--solver", "rls", "--no-refine", "--centres", "2", "-o", "m.bin"];
+    let page = folder.succeed(&train);
+    assert!(page.contains("no learning curve: its first error is measured on"), "{page}");
+    std::fs::remove_file(folder.path("m.bin")).unwrap();
+    let said = folder.fail(&[&train[..], &["--curve", "c.svg"]].concat(), 2);
+    assert!(said.contains("after the tenth, and there are 10: leave it out"), "{said}");
+    assert_eq!(folder.names(), ["data.csv", "scene.toml"]);
 }
 
 #[test]

@@ -9,7 +9,7 @@ use crate::error::{Error, Problem, Result};
 
 /// Bytes that are read at a time, and then to the end of a line.
 const PIECE: usize = 4_000_000;
-/// Longest line in bytes.
+/// Longest line in bytes, with the blank lines before it.
 const LONGEST_LINE: usize = 64_000_000;
 
 /// CSV file that is read piece by piece. Each piece has whole lines, and is the same however its bytes arrive.
@@ -67,27 +67,27 @@ impl Pieces {
     /// # Errors
     /// [`Error::Read`] if they cannot be read, [`Error::File`] for content that [`DataFile::read`] rejects.
     pub fn next_piece(&mut self) -> Result<Option<DataFile>> {
-        let mut searched = 0;
         let end = loop {
             let had = self.bytes.len();
             let mut source = self.source.by_ref().take(self.at_once as u64);
             let read = source.read_to_end(&mut self.bytes);
             let read = read.map_err(|cause| Error::read(&self.path, cause))?;
             self.digest.write(&self.bytes[had..]);
-            let line_end = memchr::memrchr(b'\n', &self.bytes[searched..]);
-            match line_end {
-                _ if read < self.at_once => break self.bytes.len(),
-                Some(at) => break searched + at + 1,
-                None => searched = self.bytes.len(),
+            if read < self.at_once {
+                break self.bytes.len();
             }
-            if searched > LONGEST_LINE {
-                let problem = Problem::FileTooLarge { most_bytes: LONGEST_LINE as u64 };
+            let lines = memchr::memrchr(b'\n', &self.bytes).unwrap_or(0);
+            let text = self.bytes[..lines].iter().rposition(|byte| !byte.is_ascii_whitespace());
+            // Blank lines go with the text after them, without which they would look like the end of the file.
+            if let Some(text) = text {
+                break memchr::memchr(b'\n', &self.bytes[text..]).map_or(lines, |at| text + at) + 1;
+            }
+            if self.bytes.len() > LONGEST_LINE {
+                let problem =
+                    Problem::LineTooLong { after: self.lines, most_bytes: LONGEST_LINE as u64 };
                 return Err(Error::file(&self.path, problem));
             }
         };
-        if end == 0 && self.lines > 0 {
-            return Ok(None);
-        }
         let rest = self.bytes.split_off(end);
         let body = std::mem::replace(&mut self.bytes, rest);
         let is_first = self.lines == 0;

@@ -4,6 +4,8 @@ use serde::Serialize;
 use taxel_data::columns;
 use taxel_learn::train::stream::Learned;
 
+use crate::metrics::pooled;
+
 /// Frames that the errors of a learning curve were measured on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -61,22 +63,15 @@ impl LearningCurve {
         deviations: &[f64],
     ) -> Self {
         let groups = columns::groups(names);
-        let pooled = |values: &[f64]| -> Vec<f64> {
-            let of_group = |members: &Vec<usize>| {
-                let squares: f64 = members.iter().map(|column| values[*column].powi(2)).sum();
-                (squares / members.len() as f64).sqrt()
-            };
-            groups.iter().map(|(_, members)| of_group(members)).collect()
-        };
         let points = learned.iter().map(|point| Point {
             frames: point.frames,
             judged_frames: point.judged_frames,
-            rmse: pooled(&point.rmse),
+            rmse: pooled(&groups, &point.rmse),
         });
         Self {
             judged_on,
             points: points.collect(),
-            mean_rmse: pooled(deviations),
+            mean_rmse: pooled(&groups, deviations),
             units: groups.iter().map(|(group, _)| columns::unit_of(group).into()).collect(),
             groups: groups.iter().map(|(group, _)| (*group).into()).collect(),
         }

@@ -2,14 +2,15 @@
 //!
 //! Both take in the same regressors of one row-wire, in f32 and in f64, with every forgetting factor λ, initial
 //! covariance δ and width of the Gaussians. Each is compared with the batch solution of the very problem that it solves,
-//! by QR decomposition in f64: so what is seen is rounding alone.
+//! by QR decomposition in f64. So rounding is told from covariance wind-up: with λ < 1 and no leakage, the exact solution
+//! itself forgets what is not excited, and is wild when that is excited again.
 
 use rayon::prelude::*;
 use serde::Serialize;
-use taxel_data::BadValue;
 use taxel_data::error::require;
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
+use taxel_data::{BadValue, columns};
 use taxel_learn::Options;
 use taxel_learn::train::least_squares::Regressors;
 use taxel_learn::train::{InputScale, Samples, check_spread};
@@ -61,8 +62,6 @@ pub const KINDS: [(Form, &str); 4] = [
 /// What is studied.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Plan {
-    /// Row-wire (from 1) whose readings are the inputs.
-    pub row_wire: usize,
     /// Number of centres K.
     pub centres: usize,
     /// Number of updates.
@@ -70,21 +69,24 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Checks the plan against a scene's number of row-wires.
+    /// Checks the plan.
     ///
     /// # Errors
     /// [`BadValue`] for the first number that cannot be used.
-    pub fn check(&self, row_wires: usize) -> std::result::Result<(), BadValue> {
-        require((1..=row_wires).contains(&self.row_wire), "row", self.row_wire, || {
-            format!("the scene has rows 1 to {row_wires}")
-        })?;
+    pub fn check(&self) -> std::result::Result<(), BadValue> {
         require((1..=128).contains(&self.centres), "centres", self.centres, || {
             "give from 1 to 128".into()
         })?;
-        let least = 2 * SETTLED * (self.centres + 1);
+        let least = 2 * self.settled_updates();
         require((least..=1_000_000).contains(&self.updates), "updates", self.updates, || {
             format!("give from {least}, 20 for each weight, to 1000000")
         })
+    }
+
+    /// Number of updates after which large errors count as divergence: ten for each weight.
+    #[must_use]
+    pub fn settled_updates(&self) -> usize {
+        SETTLED * (self.centres + 1)
     }
 }
 
@@ -101,9 +103,12 @@ pub struct Outcome {
     pub forgetting_factor: f64,
     /// Initial covariance δ.
     pub initial_covariance: f64,
-    /// Number of updates after which it had diverged: a number was not finite, or a prediction off by
-    /// [`DIVERGED`] standard deviations. `None` if it did not.
+    /// Number of updates after which it had diverged: a number was not finite, or the next sample's prediction off by
+    /// [`DIVERGED`] standard deviations, after more than ten updates for each weight. `None` if it did not.
     pub diverged_after: Option<usize>,
+    /// Whether the exact solution's prediction of that sample was as far off: covariance wind-up, which no precision
+    /// mends. Else it is rounding.
+    pub wound_up: bool,
     /// Root mean square difference of its predictions from the batch solution's on the last samples, in standard
     /// deviations of the output; `None` if it diverged.
     pub difference: Option<f64>,
@@ -125,6 +130,8 @@ pub struct Study {
     pub subject: String,
     /// Seed of every random draw.
     pub seed: u64,
+    /// Row-wire (from 1) whose readings are the inputs.
+    pub row_wire: usize,
     /// What was studied.
     #[serde(flatten)]
     pub plan: Plan,
@@ -154,26 +161,34 @@ impl Study {
     }
 }
 
-/// Computes the study on readings of the `experiment`.
+/// Computes the study on readings of the `experiment`, whose scene reads one row-wire.
 ///
 /// # Errors
-/// [`BadValue`] for a plan that cannot be used, by the names of its fields.
+/// [`BadValue`] for a plan that cannot be used, by the names of its fields, and for an output that does not move.
+///
+/// # Panics
+/// If the scene reads several row-wires.
 pub fn compute(experiment: &Experiment, plan: &Plan, progress: &dyn Progress) -> Result<Study> {
-    plan.check(experiment.world.sensor.row_wires)?;
+    plan.check()?;
     WIDTHS.iter().try_for_each(|width| check_spread("width", *width))?;
-    let mut world = experiment.world.clone();
-    world.read_rows = vec![plan.row_wire - 1];
-    let frames = Synthesis::of(&world).frames(Stream::Training, plan.updates);
-    let table = frames.row_table(0);
+    let world = &experiment.world;
+    assert_eq!(world.read_rows.len(), 1, "one row-wire");
+    let table = Synthesis::of(world).frames(Stream::Training, plan.updates).row_table(0);
     let samples = Samples::new(&table);
     let options = Options { centres: plan.centres, seed: world.seed, ..Options::default() };
     let centres = samples.centres(&options, 0);
+    let names = &table.outputs.names;
     // The last axis of an electrode in the middle: what a press moves most.
-    let outputs = table.outputs.names.len();
-    let output = (outputs / 2).next_multiple_of(3).min(outputs) - 1;
-    let (means, deviations) = (table.outputs.means(), table.outputs.deviations());
+    let groups = columns::groups(names);
+    let members = groups.last().map_or(&[][..], |(_, members)| members);
+    let output = members[(members.len() - 1) / 2];
+    let (mean, deviation) = (table.outputs.means()[output], table.outputs.deviations()[output]);
+    require(deviation > 0.0, "output", &names[output], || {
+        "it does not move, or is missing, in these frames: choose a row or a scene that moves it"
+            .into()
+    })?;
     let targets: Vec<f64> =
-        table.outputs.lines().map(|l| (l[output] - means[output]) / deviations[output]).collect();
+        table.outputs.lines().map(|line| (line[output] - mean) / deviation).collect();
     let scaled = InputScale::of(&table).apply(&table.inputs.values);
     progress
         .stage("recursions", WIDTHS.len() * FORGETTING_FACTORS.len() * INITIAL_COVARIANCES.len());
@@ -195,8 +210,9 @@ pub fn compute(experiment: &Experiment, plan: &Plan, progress: &dyn Progress) ->
     Ok(Study {
         subject: experiment.name.clone(),
         seed: world.seed,
+        row_wire: world.read_rows[0] + 1,
         plan: plan.clone(),
-        output: table.outputs.names[output].clone(),
+        output: names[output].clone(),
         widths,
         outcomes: outcomes.into_iter().flatten().collect(),
     })

@@ -27,9 +27,10 @@ impl Solver {
 /// Settings of recursive least squares.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Recursive {
-    /// Forgetting factor λ: what a sample's weight is multiplied by at each sample after it; 1 forgets nothing.
+    /// Forgetting factor λ. A sample's weight is multiplied by it at each sample after it, so that 1 forgets nothing.
     pub forgetting_factor: f64,
-    /// Initial covariance δ; `None` for the one that a penalty asks for ([`Options::initial_covariance`](super::Options::initial_covariance)).
+    /// Initial covariance δ. `None` is the one that a penalty asks for, by
+    /// [`Options::initial_covariance`](super::Options::initial_covariance).
     pub initial_covariance: Option<f64>,
 }
 

@@ -13,6 +13,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use taxel_data::BadValue;
 use taxel_data::dataset::{Dataset, RowTable};
+use taxel_data::error::require;
 use taxel_data::progress::Progress;
 
 use super::format::{self, FittedNetwork, Held, Targets, expanded_f32};
@@ -64,11 +65,8 @@ pub struct Learned {
 /// all frames if their number is known, else over the first ones.
 ///
 /// # Errors
-/// As [`train`](super::train) and [`train_refined`](super::train_refined) for the first frames, and any error of the
-/// pieces after them.
-///
-/// # Panics
-/// If a piece has other columns than the first frames.
+/// As [`train`](super::train) and [`train_refined`](super::train_refined) for the first frames, any error of the pieces
+/// after them, and [`BadValue`] for a piece with other columns.
 pub fn train(
     frames: Frames<'_>,
     options: &Options,
@@ -119,6 +117,7 @@ fn fit(
         let (next, ()) = rayon::join(|| frames.rest.next(), absorb);
         count += current.frames();
         piece = next.transpose()?.map(Cow::Owned);
+        piece.as_deref().map_or(Ok(()), |next| same_columns(first, next))?;
         progress.step();
     }
     rows.iter_mut().for_each(|row| row.end(count));
@@ -126,6 +125,15 @@ fn fit(
     let networks = rows.into_par_iter().map(|row| row.network(format));
     let networks = networks.collect::<Result<_>>()?;
     Ok((Trained { projection: layers.projection, networks, frames: count }, curve))
+}
+
+/// Checks that the frames of `next` have the columns of the `first` ones.
+fn same_columns(first: &Dataset, next: &Dataset) -> std::result::Result<(), BadValue> {
+    let names = |set: &Dataset| [&set.inputs, &set.outputs].map(|table| table.names.join(", "));
+    let (first, next) = (names(first), names(next));
+    require(first == next, "columns", next.join(" and "), || {
+        format!("give each piece those of the first frames, {}", first.join(" and "))
+    })
 }
 
 /// Errors of all rows together.

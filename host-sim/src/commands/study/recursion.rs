@@ -11,7 +11,7 @@ use taxel_data::output;
 
 use crate::commands::arguments::of_option;
 use crate::commands::progress::Terminal;
-use crate::commands::scene_argument::SceneArgument;
+use crate::commands::scene_argument::{SceneArgument, read_one_row};
 use crate::commands::{Common, print};
 
 /// Study where recursive least squares diverges: by form, precision, λ, δ and condition.
@@ -40,11 +40,11 @@ pub struct Arguments {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let argument = SceneArgument::new(&arguments.scene, None);
-    let scene = argument.load_world(common)?;
-    let Arguments { row, centres, updates, .. } = *arguments;
-    let plan = Plan { row_wire: row, centres, updates };
-    let options = [("row", "--row"), ("centres", "--centres"), ("updates", "--updates")];
-    plan.check(scene.world.sensor.row_wires).map_err(|bad| of_option(bad, &options))?;
+    let mut scene = argument.load_world(common)?;
+    read_one_row(&mut scene, arguments.row)?;
+    let plan = Plan { centres: arguments.centres, updates: arguments.updates };
+    plan.check()
+        .map_err(|bad| of_option(bad, &[("centres", "--centres"), ("updates", "--updates")]))?;
     if let Some(path) = &arguments.output {
         print::check_output(path, &[argument.path()])?;
     }
@@ -60,12 +60,16 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 
 fn page_of(study: &Study) -> print::Page {
     let mut page = print::Page::default();
-    let Plan { row_wire, centres, updates } = study.plan;
+    let Plan { centres, updates } = study.plan;
     page.line(format_args!(
-        "{}, row {row_wire}, K = {centres}, output {}, {updates} updates\n\n\
+        "{}, row {}, K = {centres}, output {}, {updates} updates\n\n\
          difference from the batch solution in f64, in standard deviations of the output;\n\
-         #N: diverged after N updates (a number not finite, or a prediction off by {DIVERGED} standard deviations)",
-        study.subject, study.output
+         #N: diverged after N updates (a number not finite, or the next sample's prediction off by {DIVERGED} standard\n    \
+         deviations, which is looked at after {} updates); ~N: so has the exact solution (covariance wind-up)",
+        study.subject,
+        study.row_wire,
+        study.output,
+        study.plan.settled_updates()
     ));
     let deltas: Vec<String> =
         INITIAL_COVARIANCES.iter().map(|d| format!("{:>9}", format!("{d:e}"))).collect();
@@ -99,6 +103,7 @@ fn page_of(study: &Study) -> print::Page {
 
 fn text(outcome: &Outcome) -> String {
     match (outcome.diverged_after, outcome.difference) {
+        (Some(updates), _) if outcome.wound_up => format!("~{updates}"),
         (Some(updates), _) => format!("#{updates}"),
         (None, Some(difference)) => format!("{difference:.0e}"),
         (None, None) => "-".into(),

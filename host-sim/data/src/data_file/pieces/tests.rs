@@ -58,3 +58,27 @@ fn a_stream_without_data_is_refused() {
         assert!(read(text, 100).is_err(), "{text:?}");
     }
 }
+
+#[test]
+fn blank_lines_of_any_number_do_not_end_the_file() {
+    let blank = "\n".repeat(100);
+    let text = format!("{blank}a,b\n1,2\n{blank}3,4\n{blank}");
+    let whole = DataFile::parse(Path::new("log.csv"), text.as_bytes(), false).unwrap();
+    assert_eq!(whole.values, [1.0, 2.0, 3.0, 4.0]);
+    let text_of_one = format!("a\n1\n{blank}3\n");
+    for at_once in [30, 1000] {
+        let found = read(&text, at_once).unwrap();
+        assert_eq!(DataFile { names_columns: whole.names_columns, ..found }, whole, "{at_once}");
+        let refused = read(&text_of_one, at_once).unwrap_err().to_string();
+        assert!(refused.contains("line 3 is blank"), "{at_once}: {refused}");
+    }
+}
+
+#[test]
+fn a_line_without_an_end_is_told_as_such() {
+    let endless = Cursor::new("a,b\n1,2\n").chain(std::io::repeat(b'1'));
+    let mut pieces = Pieces::new("log.csv".into(), Box::new(endless), false);
+    assert_eq!(pieces.next_piece().unwrap().unwrap().values, [1.0, 2.0]);
+    let refused = pieces.next_piece().unwrap_err().to_string();
+    assert!(refused.contains("after line 2; check the line ends"), "{refused}");
+}

@@ -81,7 +81,9 @@ impl<'t> Regressed<'t> {
         initial_covariance: f64,
     ) -> Vec<Outcome> {
         let setting = (initial_covariance, forgetting_factor);
-        let batch = [Form::Covariance, Form::SquareRoot].map(|form| self.batch(form, setting));
+        let samples = self.targets.len();
+        let batch =
+            [Form::Covariance, Form::SquareRoot].map(|form| self.batch(form, setting, samples));
         let outcome = |(form, precision): (Form, &'static str)| {
             let found = match (form, precision) {
                 (Form::Covariance, "f32") => self.by_covariance::<f32>(setting),
@@ -99,24 +101,35 @@ impl<'t> Regressed<'t> {
                 width,
                 forgetting_factor,
                 initial_covariance,
-                diverged_after: found.err().or(late.then_some(self.targets.len())),
+                diverged_after: found.as_ref().err().copied().or(late.then_some(samples)),
+                wound_up: found.is_err_and(|after| self.is_exactly_wild(form, setting, after)),
                 difference: difference.filter(|_| !late),
             }
         };
         KINDS.map(outcome).to_vec()
     }
 
-    /// Weights in f64 by QR decomposition of all weighted samples, for the problem that a form solves exactly.
+    /// Whether the exact solution of all samples before number `after` (from 1) is as far off at that one as a recursion
+    /// that has diverged.
+    fn is_exactly_wild(&self, form: Form, setting: (f64, f64), after: usize) -> bool {
+        let (n, last) = (self.regressors, after - 1);
+        let weights = self.batch(form, setting, last);
+        let design = Rows { regressors: n, rows: &self.rows };
+        let predicted = predict(&design, last..after, &weights, 1)[0];
+        last >= SETTLED * n && (predicted - self.targets[last]).abs() > DIVERGED
+    }
+
+    /// Weights in f64 by QR decomposition of so many weighted samples, for the problem that a form solves exactly.
     ///
     /// The covariance form forgets its start, 1/δ. The square-root form gives back what it forgets of it, one direction
     /// at a time.
-    fn batch(&self, form: Form, (covariance, forgetting): (f64, f64)) -> Vec<f64> {
-        let (n, samples) = (self.regressors, self.targets.len());
+    fn batch(&self, form: Form, (covariance, forgetting): (f64, f64), samples: usize) -> Vec<f64> {
+        let n = self.regressors;
         let weight = |t: usize| forgetting.powf((samples - 1 - t) as f64 / 2.0);
         let (mut rows, mut targets) = (Vec::new(), Vec::new());
         let left = (0..n).fold(1.0, |left, _| left * forgetting);
         let share = ((1.0 - left) / covariance).sqrt();
-        for (t, (h, y)) in self.rows.chunks_exact(n).zip(self.targets).enumerate() {
+        for (t, (h, y)) in self.rows.chunks_exact(n).zip(self.targets).enumerate().take(samples) {
             rows.extend(h.iter().map(|h| h * weight(t)));
             targets.push(y * weight(t));
             if form == Form::SquareRoot && forgetting < 1.0 {
@@ -229,3 +242,6 @@ impl Number for f64 {
         self
     }
 }
+
+#[cfg(test)]
+mod tests;

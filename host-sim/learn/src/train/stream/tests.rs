@@ -85,3 +85,14 @@ fn an_error_of_the_stream_ends_the_training() {
     let refused = train(frames, &options(), None, &Silent).unwrap_err().to_string();
     assert!(refused.starts_with("log.csv: "), "{refused}");
 }
+
+#[test]
+fn a_piece_with_other_columns_is_refused() {
+    let first = Synthesis::of(&world()).frames(Stream::Training, 50);
+    let mut other = first.clone();
+    other.outputs.names.swap(0, 1);
+    let rest = Box::new([Ok(other)].into_iter());
+    let frames = Frames { first: &first, rest, count: None, test: None };
+    let refused = train(frames, &options(), None, &Silent).unwrap_err().to_string();
+    assert!(refused.starts_with("columns = "), "{refused}");
+}
