@@ -548,7 +548,11 @@ fn bad_studies() {
     refused(&folder, &map(&["--centres", "0,64"]), &["--centres 0", "from 1 to 1024"]);
     refused(&folder, &map(&["--spread", "1,0.1"]), &["--spread", "larger than the one before"]);
     refused(&folder, &map(&["--noise", "2"]), &["--noise 2"]);
-    refused(&folder, &map(&["--delta", "-1"]), &["--delta -1", "such as 1e6"]);
+    refused(
+        &folder,
+        &map(&["--initial-covariance", "-1"]),
+        &["--initial-covariance -1", "such as 1e6"],
+    );
     let widths = |more: &[&'static str]| [&["study", "widths", "press"], more].concat();
     refused(&folder, &widths(&["--spread", "-1"]), &["--spread -1", "positive"]);
     refused(&folder, &widths(&["--centres", "0"]), &["--centres 0", "from 1 to 65535"]);

@@ -20,7 +20,7 @@ const OPTIONS: [(&str, &str); 6] = [
     ("spreads", "--spread"),
     ("noise_levels", "--noise"),
     ("test_frames", "--test-frames"),
-    ("initial_covariance", "--delta"),
+    ("initial_covariance", "--initial-covariance"),
 ];
 
 /// Map training and test error over centres K, spread and number of samples N.
@@ -56,7 +56,7 @@ pub struct Arguments {
     test_frames: usize,
     /// Initial covariance δ: output weights have a penalty of 1/δ on their squares.
     #[arg(long, value_name = "DELTA", default_value_t = Plan::default().initial_covariance, allow_negative_numbers = true)]
-    delta: f64,
+    initial_covariance: f64,
     /// Outputs whose error is mapped, such as dz_mm or dx_mm.
     #[arg(long, value_name = "GROUP", default_value = "dz_mm")]
     group: String,
@@ -82,7 +82,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         spreads: arguments.spread.clone(),
         noise_levels: arguments.noise.clone(),
         test_frames: arguments.test_frames,
-        initial_covariance: arguments.delta,
+        initial_covariance: arguments.initial_covariance,
     };
     plan.check().map_err(|bad| of_option(bad, &OPTIONS))?;
     let study = map::compute(&scene, &arguments.group, &plan, &Terminal::new())?;
