@@ -63,7 +63,7 @@ impl Experiment {
     /// Checks what models that predict readings ask of the scene, whatever options have changed in it.
     ///
     /// # Errors
-    /// [`BadValue`] for a setting that they cannot have.
+    /// [`BadValue`](taxel_data::BadValue) for a setting that they cannot have.
     pub fn check_direction(&self) -> Check {
         if !self.is_forward() {
             return Ok(());
