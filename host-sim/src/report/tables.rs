@@ -277,7 +277,7 @@ pub fn table1(table: &Table1, group: &str) -> String {
                 same(printed.spread, spread) && same(printed.noise_level, column.noise_level)
             });
             if let Some(printed) = printed {
-                let _ = write!(html, "<small>paper {}\u{a0}%</small>", printed.percent);
+                let _ = write!(html, "<small>paper {:.2}\u{a0}%</small>", printed.percent);
             }
             html += "</td>";
         }
