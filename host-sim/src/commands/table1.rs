@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::progress::Terminal;
 use clap::Args;
-use host_sim::evaluate::printed::{CELLS, NOISE_LEVELS, Nearness, SPREADS};
+use host_sim::evaluate::printed::{self, CELLS, Nearness};
 use host_sim::evaluate::reconstruct;
 use host_sim::evaluate::table1::{self, Comparison, Entry, NETWORK, Table1};
 use host_sim::experiment;
@@ -96,9 +96,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             return Err(Error::Usage("--svg and -o: give each a file of its own".into()));
         }
         print::check_output(path, &[argument.path()])?;
-        let comparable = |table: &experiment::Table1| {
-            table.spreads == SPREADS && table.noise_levels == NOISE_LEVELS
-        };
+        let comparable =
+            |table: &experiment::Table1| printed::is_layout(&table.spreads, &table.noise_levels);
         let has_z = columns::groups(&scene.world.output_names())
             .iter()
             .any(|(group, _)| columns::is_compression(group));

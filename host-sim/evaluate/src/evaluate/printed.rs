@@ -11,6 +11,12 @@ pub const NOISE_LEVELS: [f64; 4] = [0.005, 0.01, 0.05, 0.1];
 /// noise level.
 pub type Cells = [[f64; 4]; 10];
 
+/// Whether a table with these spreads and noise levels is laid out as the printed one.
+#[must_use]
+pub fn is_layout(spreads: &[f64], noise_levels: &[f64]) -> bool {
+    spreads == SPREADS && noise_levels == NOISE_LEVELS
+}
+
 /// Cells of Table 1 in Wang et al., Sensors & Transducers 2014. The paper does not state the formula of the error.
 pub const CELLS: Cells = [
     [6.47, 7.89, 9.12, 9.55],

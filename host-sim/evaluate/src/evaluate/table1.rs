@@ -19,7 +19,7 @@ use crate::error::{Error, Result};
 use crate::experiment::{Experiment, JudgedOn, OpenChoices, Table1 as Settings};
 use crate::metrics::{self, Definition, Errors, LimitSummary, Measure};
 
-use super::printed::{self, Cells, NOISE_LEVELS, Nearness, Printed, SPREADS};
+use super::printed::{self, Cells, Nearness, Printed, SPREADS};
 pub use crate::metrics::NETWORK;
 
 /// Table 1 of a scene: errors of every decoder at every noise level.
@@ -164,9 +164,9 @@ fn compare(columns: &[Column], thickness_mm: f64) -> Vec<Comparison> {
         ("‖e‖/‖Δz‖", |_, errors, _| errors.relative_l2_percent),
         ("RMSE/H", |_, errors, thickness_mm| Some(100.0 * errors.rmse / thickness_mm)),
     ];
-    let levels = columns.iter().map(|column| column.noise_level);
-    let spreads = columns.first().into_iter().flat_map(Column::spreads);
-    if !levels.eq(NOISE_LEVELS) || !spreads.eq(SPREADS) {
+    let levels: Vec<f64> = columns.iter().map(|column| column.noise_level).collect();
+    let spreads: Vec<f64> = columns.first().into_iter().flat_map(Column::spreads).collect();
+    if !printed::is_layout(&spreads, &levels) {
         return Vec::new();
     }
     let by = |(formula, of): &Formula| {
