@@ -35,7 +35,7 @@ if [ "${#missing[@]}" -gt 0 ] &&
 fi
 
 # The emulated board: Python with Unicorn, in a folder of its own.
-emulator=firmware/board-emulator
+emulator=proof/board-emulator
 command -v python3 >/dev/null && python3 -m venv --help >/dev/null 2>&1 && python3 -c 'import ensurepip' 2>/dev/null ||
     apt_install python3 python3-venv
 [ -x "$emulator/.venv/bin/python" ] || python3 -m venv "$emulator/.venv"

@@ -1,4 +1,4 @@
-//! The board's image on an emulated board: `firmware/board-emulator`. Scenarios, and mutants of the image that must
+//! The board's image on an emulated board: `proof/board-emulator`. Scenarios, and mutants of the image that must
 //! fail them.
 
 mod options;

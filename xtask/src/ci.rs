@@ -10,7 +10,7 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 use std::{env, fs, thread};
 
-use crate::process::{Outcome, cargo, root, target_dir};
+use crate::process::{Outcome, PROOF, cargo, root, target_dir};
 use step::{Ended, Step};
 use times::Times;
 
@@ -44,8 +44,8 @@ fn rows(this: &Path) -> [Vec<Step>; 2] {
     let mut docs = cargo(&["doc", "--workspace", "--no-deps"]);
     docs.env("RUSTDOCFLAGS", "-D warnings");
     let clippy = ["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"];
-    // With the packages of `cargo xtask torture`, so that little is built twice.
-    let torture = ["test", "--package", "host-sim", "--package", "torture", "--bin", "torture"];
+    // What `cargo xtask torture` runs is built with its tests.
+    let proof = ["test", "--manifest-path", PROOF];
     [
         vec![
             of_cargo("format", &["fmt", "--all", "--check"]),
@@ -53,21 +53,29 @@ fn rows(this: &Path) -> [Vec<Step>; 2] {
             // Plain `cargo test`, as users run it, for the default crates.
             of_cargo("tests", &["test"]),
             of_cargo("xtask-tests", &["test", "--package", "xtask"]),
-            of_cargo("torture-unit", &torture),
+            of_cargo("proof-tests", &proof),
             // Docs need what clippy has checked.
             of_cargo("clippy", &clippy),
-            step("fuzz", fuzz()),
+            step("proof-clippy", proof_clippy()),
             step("docs", docs),
         ],
         vec![own("firmware"), own("cores"), own("size"), own("cycles")],
     ]
 }
 
-/// Type-checks the fuzz targets, which are a workspace of their own. That needs no nightly toolchain. As if somebody had
-/// built libFuzzer before, it needs no compiler of C++ either: nothing is linked.
-fn fuzz() -> Command {
-    let mut command = cargo(&["check", "--manifest-path", "fuzz/Cargo.toml", "--locked"]);
-    command.arg("--target-dir").arg(target_dir()).env("CUSTOM_LIBFUZZER_PATH", "./libfuzzer.a");
+/// Clippy of the proof. As if somebody had built libFuzzer before, it needs no compiler of C++: nothing is linked.
+fn proof_clippy() -> Command {
+    let mut command = cargo(&[
+        "clippy",
+        "--manifest-path",
+        PROOF,
+        "--workspace",
+        "--all-targets",
+        "--",
+        "-D",
+        "warnings",
+    ]);
+    command.env("CUSTOM_LIBFUZZER_PATH", "./libfuzzer.a");
     command
 }
 

@@ -43,7 +43,7 @@ Usage: cargo xtask COMMAND
                               Prints the logs of programs that are named. The name `application`, or no name,
                               also compares the application with the host, in less than a minute
       --accept                writes the .out files instead
-  board [OPTION…] [NAME…]     runs the board's image on an emulated STM32F446 (firmware/board-emulator): the scenarios
+  board [OPTION…] [NAME…]     runs the board's image on an emulated STM32F446 (proof/board-emulator): the scenarios
                               of these names, or all. The name `serve` lets the board run until Ctrl-C, at a serial
                               port that it names. Needs Python with Unicorn, which firmware/setup.sh installs
       --frames N              lets `check` decode N frames (30)

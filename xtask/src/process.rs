@@ -14,6 +14,9 @@ pub fn root() -> &'static Path {
     here.parent().unwrap_or(here)
 }
 
+/// Manifest of the workspace of what proves the product.
+pub const PROOF: &str = "proof/Cargo.toml";
+
 /// Folder for cargo's builds for the host.
 pub fn target_dir() -> PathBuf {
     root().join(env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into()))

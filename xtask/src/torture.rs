@@ -4,11 +4,11 @@ use std::process::{ExitCode, ExitStatus, Stdio};
 
 use crate::emulate::qemu;
 use crate::firmware::{QEMU, build_image};
-use crate::process::{Outcome, cargo, run as run_command, status, target_dir};
+use crate::process::{Outcome, PROOF, cargo, run as run_command, status, target_dir};
 use crate::toolchain::{Toolchain, elf};
 
 /// Cargo's arguments before those of the torture.
-const RUN: [&str; 4] = ["run", "--package", "torture", "--"];
+const RUN: [&str; 6] = ["run", "--manifest-path", PROOF, "--package", "torture", "--"];
 
 /// Builds host-sim, the emulator's images and the torture, and runs the torture with `options`. Without an emulator,
 /// what needs one is not tested.
@@ -25,7 +25,7 @@ pub fn run(options: &[&str]) -> Outcome<ExitCode> {
     if !checked.success() {
         return Ok(code(checked));
     }
-    run_command(&mut cargo(&["build", "--package", "host-sim", "--package", "torture"]))?;
+    run_command(&mut cargo(&["build", "--package", "host-sim"]))?;
     torture.arg("--program").arg(target_dir().join("debug/host-sim"));
     match qemu::present().and_then(|()| build_image(&Toolchain::find()?, QEMU)) {
         Ok(()) => drop(torture.arg("--images").arg(elf(""))),

@@ -9,10 +9,10 @@ use super::copy;
 use super::options::Options;
 use crate::process::{Outcome, Said, capture, cargo, first_line, root, run, target_dir};
 
-const FOLDER: &str = "firmware/board-emulator";
+const FOLDER: &str = "proof/board-emulator";
 
 /// Python as `firmware/setup.sh` installs it.
-const OWN_PYTHON: &str = "firmware/board-emulator/.venv/bin/python";
+const OWN_PYTHON: &str = "proof/board-emulator/.venv/bin/python";
 
 /// A Python program that fails if a package is missing, and prints a line otherwise.
 const NEEDS: &str = "import elftools, unicorn; print(unicorn.__version__)";

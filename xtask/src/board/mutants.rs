@@ -410,7 +410,7 @@ mod tests {
 
     #[test]
     fn every_rule_has_a_mutant_that_breaks_it() {
-        let rules = read("firmware/board-emulator/rules.txt");
+        let rules = read("proof/board-emulator/rules.txt");
         let rules = rules.lines().filter(|line| !line.is_empty() && !line.starts_with('#'));
         let rules: BTreeSet<_> = rules.map(|line| line.split('|').next().unwrap().trim()).collect();
         let broken = MUTANTS.iter().filter_map(|mutant| mutant.shown_by.strip_prefix("BREACH "));

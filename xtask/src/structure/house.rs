@@ -28,10 +28,7 @@ pub const CRATES: &[(&str, Side)] = &[
     ("taxel-rig", Side::Host),
     ("taxel-evaluate", Side::Host),
     ("host-sim", Side::Host),
-    ("hostile", Side::Host),
-    ("torture", Side::Host),
     ("xtask", Side::Host),
-    ("benchmarks", Side::Host),
 ];
 
 /// Files in which `unsafe` may stand, and folders in whose files it may.

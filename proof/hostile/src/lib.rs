@@ -1,7 +1,7 @@
 //! What must hold for any bytes that reach Taxel, whoever sends them: one target a way in.
 //!
 //! A target takes bytes, gives them to the subject as an attacker would, and panics where the subject breaks a
-//! promise. libFuzzer runs targets on bytes that it finds by coverage (`fuzz/README.md`), and `cargo xtask torture` on
+//! promise. libFuzzer runs targets on bytes that it finds by coverage (`proof/fuzz/README.md`), and `cargo xtask torture` on
 //! the committed corpus and on [mutants](mutate::mutate) of it.
 
 // From the ground up: a module imports only what is declared before it.
@@ -56,7 +56,7 @@ mod tests {
 
     #[test]
     fn every_target_holds_on_its_corpus_and_finds_what_is_planted() {
-        let corpora = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus");
+        let corpora = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus");
         for target in TARGETS {
             let seeds: Vec<Vec<u8>> = std::fs::read_dir(corpora.join(target.name))
                 .unwrap()

@@ -52,7 +52,7 @@ fn main() -> Outcome {
 }
 
 fn write(target: &str, index: usize, bytes: &[u8]) -> Outcome {
-    let folder = Path::new("fuzz/corpus").join(target);
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus").join(target);
     fs::create_dir_all(&folder)?;
     Ok(fs::write(folder.join(format!("seed-{index:02}")), bytes)?)
 }

@@ -37,7 +37,7 @@ impl Tools {
 /// # Errors
 /// It cannot be read.
 pub fn tested_model(name: &str) -> Result<AlignedBytes, String> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../testdata").join(name);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata").join(name);
     let blob = std::fs::read(&path).map_err(|cause| format!("{}: {cause}", path.display()))?;
     Ok(AlignedBytes::copy_of(&blob))
 }

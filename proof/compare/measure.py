@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 from typing import Callable, NamedTuple
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 
 
 class Seconds(NamedTuple):
@@ -50,7 +50,7 @@ def fastest_of(taken: dict[int, Seconds]) -> tuple[int, Seconds]:
 
 def bench(name: str) -> None:
     """Runs one of the benches of the package `benchmarks`; its log goes to stderr."""
-    command = ["cargo", "bench", "--quiet", "--package", "benchmarks", "--bench", name]
+    command = ["cargo", "bench", "--quiet", "--manifest-path", "proof/Cargo.toml", "--package", "benchmarks", "--bench", name]
     subprocess.run(command, cwd=ROOT, check=True, stdout=2)
 
 

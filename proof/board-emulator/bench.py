@@ -13,7 +13,7 @@ IDENTIFY, CONFIGURATION, CONFIGURE = b"\x00", b"\x02", b"\x03"
 CONFIGURED = b"\x02"
 RESTART = b"\x07"
 #: Where the version of the link's protocol stands.
-PACKET = pathlib.Path(__file__).resolve().parents[1] / "src/link/packet.rs"
+PACKET = pathlib.Path(__file__).resolve().parents[2] / "firmware/src/link/packet.rs"
 #: Longest time in s of the board within which it answers most requests, and one that erases flash.
 PATIENCE_S, ERASE_PATIENCE_S = 0.5, 6.0
 #: Error of `host-sim` if the board answered too slowly, and nothing else is wrong.
