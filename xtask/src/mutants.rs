@@ -1,0 +1,233 @@
+//! `cargo xtask mutants`: plants faults in a copy of the product, and tells which tests see them
+//! (`proof/mutants/README.md`).
+
+mod list;
+mod copy;
+mod programs;
+mod score;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::io::Write;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+
+use crate::process::Outcome;
+use copy::{Copy, folder};
+use list::Fault;
+use programs::{Switch, Test, batches, full_name, red, trace};
+use score::Found;
+
+/// Tests that run at the same time.
+const WORKERS: usize = 2;
+
+/// Runs `mutants` with these arguments.
+///
+/// # Errors
+/// The lists are wrong, the copy does not build, or a fault is missed that was found before.
+pub fn run(arguments: &[&str]) -> Outcome {
+    let faults = list::load()?;
+    let accepted = score::accepted();
+    let (options, names): (Vec<&str>, Vec<&str>) =
+        arguments.iter().partition(|argument| argument.starts_with("--"));
+    if let Some(unknown) = names.iter().find(|name| !faults.iter().any(|it| it.name == **name)) {
+        return Err(format!("mutants: no fault is called `{unknown}`"));
+    }
+    match options[..] {
+        ["--check-list"] => {
+            println!("{} faults", faults.len());
+            let verdict = |fault: &Fault| accepted.get(&fault.name).map_or("", String::as_str);
+            print!("{}", score::by_crate(faults.iter().map(|fault| (fault, verdict(fault)))));
+            return Ok(());
+        }
+        [] | ["--accept" | "--all"] => {}
+        _ => return Err(format!("mutants: unknown options {options:?}")),
+    }
+    if options == ["--accept"] && !names.is_empty() {
+        return Err("mutants: --accept writes the score of all faults".to_owned());
+    }
+    let copy = copy::build(&faults)?;
+    let tests = traced(&copy, &faults)?;
+    let numbers: Vec<usize> = (1..=faults.len())
+        .filter(|number| names.is_empty() || names.contains(&&*faults[number - 1].name))
+        .collect();
+    let scored = measure(&copy, &faults, &numbers, &tests, options == ["--all"])?;
+    for (fault, found) in &scored {
+        println!("{:<24}{}", found.verdict(fault), fault.name);
+        println!("{:<24}unit: {}", "", found.unit.join("; "));
+        println!("{:<24}torture: {}", "", found.torture.join(" "));
+        if found.verdict(fault) == "missed" {
+            println!("{:<24}{}: {}", "", fault.file, fault.why);
+        }
+    }
+    print!(
+        "{}",
+        score::by_crate(scored.iter().map(|(fault, found)| (*fault, found.verdict(fault))))
+    );
+    if options == ["--accept"] {
+        return score::accept(&scored);
+    }
+    let worse = |(fault, found): &&(&Fault, Found)| {
+        let before = accepted.get(&fault.name).map(String::as_str);
+        before.is_some_and(|before| before == "found" && found.verdict(fault) != "found")
+            || found.verdict(fault).starts_with("found though")
+    };
+    let worse: Vec<&str> = scored.iter().filter(worse).map(|(fault, _)| &*fault.name).collect();
+    if worse.is_empty() {
+        Ok(())
+    } else {
+        Err(format!("found before and not now, or found though equivalent: {}", worse.join(", ")))
+    }
+}
+
+/// Runs `work` for each of so many places with [`WORKERS`], and returns the results in order.
+fn shared<T: Send>(count: usize, work: impl Fn(usize, usize) -> T + Sync) -> Vec<T> {
+    let next = AtomicUsize::new(0);
+    let done = Mutex::new(BTreeMap::new());
+    thread::scope(|scope| {
+        for worker in 0..WORKERS {
+            let (next, done, work) = (&next, &done, &work);
+            scope.spawn(move || {
+                loop {
+                    let place = next.fetch_add(1, Ordering::Relaxed);
+                    if place >= count {
+                        break;
+                    }
+                    let result = work(place, worker);
+                    if let Ok(mut done) = done.lock() {
+                        done.insert(place, result);
+                    }
+                }
+            });
+        }
+    });
+    done.into_inner().unwrap_or_default().into_values().collect()
+}
+
+/// All tests that pass without a fault, with the faults that each reaches. A file keeps them, until the copy differs.
+fn traced(copy: &Copy, faults: &[Fault]) -> Outcome<Vec<Test>> {
+    let mut state = DefaultHasher::new();
+    (copy.digest, faults.iter().map(Fault::key).collect::<Vec<_>>()).hash(&mut state);
+    let file = folder().join(format!("trace-{:016x}.csv", state.finish()));
+    let tests = programs::all(copy)?;
+    let known = fs::read_to_string(&file).unwrap_or_default();
+    let known: BTreeMap<String, (u64, BTreeSet<usize>)> = known
+        .lines()
+        .filter_map(|line| {
+            let mut fields = line.split(',');
+            let (name, ms) = (fields.next()?.to_owned(), fields.next()?.parse().ok()?);
+            Some((name, (ms, fields.filter_map(|number| number.parse().ok()).collect())))
+        })
+        .collect();
+    let failed = |cause: std::io::Error| format!("{}: {cause}", file.display());
+    let log = fs::File::options().append(true).create(true).open(&file).map_err(failed)?;
+    let log = Mutex::new(log);
+    eprintln!("tracing {} of {} tests", tests.len().saturating_sub(known.len()), tests.len());
+    let outcomes = shared(tests.len(), |place, worker| {
+        let (test, name) = (&tests[place], full_name(copy, &tests[place]));
+        if let Some((ms, reaches)) = known.get(&name) {
+            return Ok::<_, String>(Test { ms: *ms, reaches: reaches.clone(), ..test.clone() });
+        }
+        let traced = trace(copy, test, worker).map_err(|cause| format!("left out: {cause}"))?;
+        let numbers: String = traced.reaches.iter().map(|number| format!(",{number}")).collect();
+        if let Ok(mut log) = log.lock() {
+            writeln!(log, "{name},{}{numbers}", traced.ms).map_err(failed)?;
+        }
+        Ok(traced)
+    });
+    let mut passing = Vec::new();
+    for outcome in outcomes {
+        match outcome {
+            Ok(test) => passing.push(test),
+            Err(cause) => eprintln!("{cause}"),
+        }
+    }
+    let seconds: u64 = passing.iter().map(|test| test.ms).sum::<u64>() / 1000;
+    eprintln!("{} tests, {seconds} s one after the other", passing.len());
+    Ok(passing)
+}
+
+/// Runs the faults of these numbers with the tests that reach them. A file keeps what was found, until the product
+/// or its tests differ.
+fn measure<'f>(
+    copy: &Copy,
+    faults: &'f [Fault],
+    numbers: &[usize],
+    tests: &[Test],
+    all: bool,
+) -> Outcome<Vec<(&'f Fault, Found)>> {
+    let file =
+        folder().join(format!("found-{:016x}{}.csv", copy.digest, if all { "-all" } else { "" }));
+    let known = fs::read_to_string(&file).unwrap_or_default();
+    let known: BTreeMap<&str, &str> =
+        known.lines().filter_map(|line| line.split_once('\t')).collect();
+    let failed = |cause: std::io::Error| format!("{}: {cause}", file.display());
+    let log = fs::File::options().append(true).create(true).open(&file).map_err(failed)?;
+    let log = Mutex::new(log);
+    let read = |line: &str| {
+        let names = |text: &str, end| {
+            text.split(end).filter(|name| !name.is_empty()).map(str::to_owned).collect()
+        };
+        let mut fields = line.split('\t');
+        Some(Found {
+            is_reached: fields.next()? == "true",
+            unit: names(fields.next()?, ';'),
+            torture: names(fields.next()?, ' '),
+        })
+    };
+    let outcomes = shared(numbers.len(), |place, worker| {
+        let (number, fault) = (numbers[place], &faults[numbers[place] - 1]);
+        let key = fault.key().replace(['\n', '\t'], " ");
+        if let Some(found) = known.get(&*key).and_then(|line| read(line)) {
+            return Ok((fault, found));
+        }
+        let found = look(copy, fault, number, tests, all, worker)?;
+        let (unit, torture) = (found.unit.join(";"), found.torture.join(" "));
+        eprintln!("{}: {}: {unit} | {torture}", fault.name, found.verdict(fault));
+        if let Ok(mut log) = log.lock() {
+            writeln!(log, "{key}\t{}\t{unit}\t{torture}", found.is_reached).map_err(failed)?;
+        }
+        Ok((fault, found))
+    });
+    outcomes.into_iter().collect()
+}
+
+/// Runs one fault.
+fn look(
+    copy: &Copy,
+    fault: &Fault,
+    number: usize,
+    tests: &[Test],
+    all: bool,
+    worker: usize,
+) -> Outcome<Found> {
+    let reaching: Vec<&Test> = tests.iter().filter(|test| test.reaches.contains(&number)).collect();
+    let mut found = Found { is_reached: !reaching.is_empty(), ..Found::default() };
+    let on = Switch::On(number);
+    for batch in batches(copy, &reaching, &fault.crate_folder) {
+        let is_unit = batch[0].program.is_some();
+        if is_unit && !all && !found.unit.is_empty() {
+            continue;
+        }
+        let batch =
+            if is_unit { vec![batch] } else { batch.into_iter().map(|one| vec![one]).collect() };
+        for batch in batch {
+            let names = red(copy, &batch, &on, worker)?;
+            for test in batch.into_iter().filter(|test| names.contains(&test.name)) {
+                // Twice, so that a test that fails by chance does not count.
+                if red(copy, &[test], &on, worker)?.is_empty() {
+                    eprintln!("{}: {} failed once only", fault.name, full_name(copy, test));
+                    continue;
+                }
+                let place = if is_unit { &mut found.unit } else { &mut found.torture };
+                place.push(full_name(copy, test));
+                if is_unit && !all {
+                    break;
+                }
+            }
+        }
+    }
+    Ok(found)
+}
