@@ -32,6 +32,9 @@ pub fn run(arguments: &[&str]) -> Outcome {
     let accepted = score::accepted();
     let (options, names): (Vec<&str>, Vec<&str>) =
         arguments.iter().partition(|argument| argument.starts_with("--"));
+    let (crates, options): (Vec<&str>, Vec<&str>) =
+        options.into_iter().partition(|option| option.starts_with("--package="));
+    let crates: Vec<&str> = crates.iter().filter_map(|it| it.strip_prefix("--package=")).collect();
     if let Some(unknown) = names.iter().find(|name| !faults.iter().any(|it| it.name == **name)) {
         return Err(format!("mutants: no fault is called `{unknown}`"));
     }
@@ -48,7 +51,7 @@ pub fn run(arguments: &[&str]) -> Outcome {
     if options == ["--accept"] && !names.is_empty() {
         return Err("mutants: --accept writes the score of all faults".to_owned());
     }
-    let copy = copy::build(&faults)?;
+    let copy = copy::build(&faults, &crates)?;
     let tests = traced(&copy, &faults)?;
     let numbers: Vec<usize> = (1..=faults.len())
         .filter(|number| names.is_empty() || names.contains(&&*faults[number - 1].name))
@@ -149,6 +152,9 @@ fn traced(copy: &Copy, faults: &[Fault]) -> Outcome<Vec<Test>> {
     Ok(passing)
 }
 
+/// What was found before, by the fault's key and the kind of test.
+type Known<'k> = BTreeMap<(&'k str, &'k str), Vec<String>>;
+
 /// Runs the faults of these numbers with the tests that reach them. A file keeps what was found, until the product
 /// or its tests differ.
 fn measure<'f>(
@@ -158,76 +164,77 @@ fn measure<'f>(
     tests: &[Test],
     all: bool,
 ) -> Outcome<Vec<(&'f Fault, Found)>> {
-    let file =
-        folder().join(format!("found-{:016x}{}.csv", copy.digest, if all { "-all" } else { "" }));
-    let known = fs::read_to_string(&file).unwrap_or_default();
-    let known: BTreeMap<&str, &str> =
-        known.lines().filter_map(|line| line.split_once('\t')).collect();
+    let name = format!("found-{:016x}{}.tsv", copy.digest, if all { "-all" } else { "" });
+    let file = folder().join(name);
+    let text = fs::read_to_string(&file).unwrap_or_default();
+    let known: Known = text
+        .lines()
+        .filter_map(|line| {
+            let mut fields = line.split('\t');
+            let (key, kind) = (fields.next()?, fields.next()?);
+            Some(((key, kind), fields.map(str::to_owned).collect()))
+        })
+        .collect();
     let failed = |cause: std::io::Error| format!("{}: {cause}", file.display());
     let log = fs::File::options().append(true).create(true).open(&file).map_err(failed)?;
     let log = Mutex::new(log);
-    let read = |line: &str| {
-        let names = |text: &str, end| {
-            text.split(end).filter(|name| !name.is_empty()).map(str::to_owned).collect()
-        };
-        let mut fields = line.split('\t');
-        Some(Found {
-            is_reached: fields.next()? == "true",
-            unit: names(fields.next()?, ';'),
-            torture: names(fields.next()?, ' '),
-        })
-    };
     let outcomes = shared(numbers.len(), |place, worker| {
         let (number, fault) = (numbers[place], &faults[numbers[place] - 1]);
+        let reaching: Vec<&Test> =
+            tests.iter().filter(|test| test.reaches.contains(&number)).collect();
+        let mut found = Found { is_reached: !reaching.is_empty(), ..Found::default() };
         let key = fault.key().replace(['\n', '\t'], " ");
-        if let Some(found) = known.get(&*key).and_then(|line| read(line)) {
-            return Ok((fault, found));
-        }
-        let found = look(copy, fault, number, tests, all, worker)?;
-        let (unit, torture) = (found.unit.join(";"), found.torture.join(" "));
-        eprintln!("{}: {}: {unit} | {torture}", fault.name, found.verdict(fault));
-        if let Ok(mut log) = log.lock() {
-            writeln!(log, "{key}\t{}\t{unit}\t{torture}", found.is_reached).map_err(failed)?;
+        for kind in ["unit", "torture"] {
+            let is_unit = kind == "unit";
+            let (names, is_whole) = if let Some(names) = known.get(&(&*key, kind)) {
+                (names.clone(), true)
+            } else {
+                let of_kind: Vec<&Test> = reaching
+                    .iter()
+                    .copied()
+                    .filter(|test| test.program.is_some() == is_unit)
+                    .collect();
+                let names = look(copy, (fault, number), &of_kind, all || !is_unit, worker)?;
+                // Tests of some crates only say nothing if none of them fails.
+                let is_whole = copy.is_whole || is_unit && !names.is_empty();
+                if let (true, Ok(mut log)) = (is_whole, log.lock()) {
+                    let names: String = names.iter().map(|name| format!("\t{name}")).collect();
+                    writeln!(log, "{key}\t{kind}{names}").map_err(failed)?;
+                }
+                eprintln!("{}: {kind}: {}", fault.name, names.join("; "));
+                (names, is_whole)
+            };
+            found.is_open |= !is_whole;
+            *(if is_unit { &mut found.unit } else { &mut found.torture }) = names;
         }
         Ok((fault, found))
     });
     outcomes.into_iter().collect()
 }
 
-/// Runs one fault.
+/// Names of the tests that fail with a fault: all of them, or the first one.
 fn look(
     copy: &Copy,
-    fault: &Fault,
-    number: usize,
-    tests: &[Test],
+    (fault, number): (&Fault, usize),
+    tests: &[&Test],
     all: bool,
     worker: usize,
-) -> Outcome<Found> {
-    let reaching: Vec<&Test> = tests.iter().filter(|test| test.reaches.contains(&number)).collect();
-    let mut found = Found { is_reached: !reaching.is_empty(), ..Found::default() };
+) -> Outcome<Vec<String>> {
+    let mut failing = Vec::new();
     let on = Switch::On(number);
-    for batch in batches(copy, &reaching, &fault.crate_folder) {
-        let is_unit = batch[0].program.is_some();
-        if is_unit && !all && !found.unit.is_empty() {
-            continue;
-        }
-        let batch =
-            if is_unit { vec![batch] } else { batch.into_iter().map(|one| vec![one]).collect() };
-        for batch in batch {
-            let names = red(copy, &batch, &on, worker)?;
-            for test in batch.into_iter().filter(|test| names.contains(&test.name)) {
-                // Twice, so that a test that fails by chance does not count.
-                if red(copy, &[test], &on, worker)?.is_empty() {
-                    eprintln!("{}: {} failed once only", fault.name, full_name(copy, test));
-                    continue;
-                }
-                let place = if is_unit { &mut found.unit } else { &mut found.torture };
-                place.push(full_name(copy, test));
-                if is_unit && !all {
-                    break;
-                }
+    for batch in batches(copy, tests, &fault.crate_folder) {
+        let names = red(copy, &batch, &on, worker)?;
+        for test in batch.into_iter().filter(|test| names.contains(&test.name)) {
+            // Twice, so that a test that fails by chance does not count.
+            if red(copy, &[test], &on, worker)?.is_empty() {
+                eprintln!("{}: {} failed once only", fault.name, full_name(copy, test));
+                continue;
+            }
+            failing.push(full_name(copy, test));
+            if !all {
+                return Ok(failing);
             }
         }
     }
-    Ok(found)
+    Ok(failing)
 }

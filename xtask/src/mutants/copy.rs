@@ -14,6 +14,8 @@ use crate::process::{Outcome, cargo, root, target_dir};
 pub struct Copy {
     /// Test programs: the folder of the crate, and the path.
     pub programs: Vec<(String, PathBuf)>,
+    /// Whether these are all tests: those of the default crates, and torture.
+    pub is_whole: bool,
     pub torture: PathBuf,
     pub host_sim: PathBuf,
     /// Stands for all files but the faults.
@@ -29,11 +31,16 @@ fn source() -> PathBuf {
     folder().join("source")
 }
 
-/// Makes the copy, or brings it up to date, and builds it.
-pub fn build(faults: &[Fault]) -> Outcome<Copy> {
-    let digest = make(faults)?;
+/// Makes the copy, or brings it up to date, and builds it; of tests those of these `crates` alone, if there are any.
+///
+/// # Errors
+/// A fault does not compile.
+pub fn build(faults: &[Fault], crates: &[&str]) -> Outcome<Copy> {
+    let (digest, is_whole) = (make(faults)?, crates.is_empty());
     let mut programs = Vec::new();
-    for line in messages(&["test", "--no-run"])? {
+    let packages = crates.iter().flat_map(|name| ["--package", name]);
+    let arguments: Vec<&str> = ["test", "--no-run"].into_iter().chain(packages).collect();
+    for line in messages(&arguments)? {
         let crate_folder = Path::new(line["manifest_path"].as_str().unwrap_or_default()).parent();
         let crate_folder = crate_folder.and_then(|folder| folder.strip_prefix(source()).ok());
         let program = line["executable"].as_str().filter(|_| line["profile"]["test"] == true);
@@ -41,9 +48,17 @@ pub fn build(faults: &[Fault]) -> Outcome<Copy> {
             programs.push((folder.to_string_lossy().into_owned(), PathBuf::from(program)));
         }
     }
-    messages(&["build", "--package", "host-sim", "--package", "torture"])?;
+    if is_whole {
+        messages(&["build", "--package", "host-sim", "--package", "torture"])?;
+    }
     let built = folder().join("build/debug");
-    Ok(Copy { programs, torture: built.join("torture"), host_sim: built.join("host-sim"), digest })
+    Ok(Copy {
+        programs,
+        is_whole,
+        torture: built.join("torture"),
+        host_sim: built.join("host-sim"),
+        digest,
+    })
 }
 
 /// Writes the copy, and returns the digest of all tracked files outside of this command's own folder.

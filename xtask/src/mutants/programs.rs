@@ -51,8 +51,10 @@ pub fn all(copy: &Copy) -> Outcome<Vec<Test>> {
             tests.extend(line.strip_suffix(": test").map(|name| test(Some(place), name)));
         }
     }
-    for line in said(Command::new(&copy.torture).arg("--list"))?.lines() {
-        tests.extend(line.split_whitespace().next().map(|name| test(None, name)));
+    if copy.is_whole {
+        for line in said(Command::new(&copy.torture).arg("--list"))?.lines() {
+            tests.extend(line.split_whitespace().next().map(|name| test(None, name)));
+        }
     }
     Ok(tests)
 }
@@ -69,7 +71,11 @@ pub fn batches<'t>(copy: &Copy, tests: &[&'t Test], own: &str) -> Vec<Vec<&'t Te
     tests.sort_by_key(|test| (test.program, test.ms));
     for test in tests {
         match batches.last_mut() {
-            Some(batch) if batch[0].program == test.program && time(batch) + test.ms < BATCH_MS => {
+            Some(batch)
+                if test.program.is_some()
+                    && batch[0].program == test.program
+                    && time(batch) + test.ms < BATCH_MS =>
+            {
                 batch.push(test);
             }
             _ => batches.push(vec![test]),

@@ -13,6 +13,8 @@ const HEADER: &str = "fault,list,crate,verdict,unit test,torture\n";
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Found {
     pub is_reached: bool,
+    /// Whether not all tests were run.
+    pub is_open: bool,
     /// Unit tests that fail, or only the first one.
     pub unit: Vec<String>,
     /// Every line of torture that fails.
@@ -24,6 +26,7 @@ impl Found {
         match (self.unit.is_empty() && self.torture.is_empty(), &fault.equivalent) {
             (false, None) => "found",
             (false, Some(_)) => "found though equivalent",
+            (true, None) if self.is_open => "open",
             (true, Some(_)) => "equivalent",
             (true, None) if !self.is_reached => "unreached",
             (true, None) => "missed",
