@@ -61,7 +61,7 @@ pub fn build(faults: &[Fault], crates: &[&str]) -> Outcome<Copy> {
     })
 }
 
-/// Writes the copy, and returns the digest of all tracked files outside of this command's own folder.
+/// Writes the copy, and returns the digest of all tracked files but pages, and those of this command.
 fn make(faults: &[Fault]) -> Outcome<u64> {
     let listed = Command::new("git").args(["ls-files", "-z"]).current_dir(root()).output();
     let listed = listed.map_err(|cause| format!("git: {cause}"))?;
@@ -71,7 +71,7 @@ fn make(faults: &[Fault]) -> Outcome<u64> {
     let text = String::from_utf8_lossy(&listed.stdout);
     for file in text.split('\0').filter(|file| !file.is_empty()) {
         let Ok(bytes) = fs::read(root().join(file)) else { continue };
-        if !file.starts_with(FOLDER) && !file.starts_with("xtask") {
+        if !file.starts_with(FOLDER) && !file.starts_with("xtask") && !file.ends_with(".md") {
             digest.write(file.as_bytes());
             digest.write(&bytes);
         }
