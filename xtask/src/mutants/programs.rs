@@ -16,6 +16,8 @@ use crate::process::{Outcome, root};
 /// Longest that tests of one program run in one process, by their own times: the next ones need not run if one of
 /// them fails.
 const BATCH_MS: u64 = 5000;
+/// Longest that a test whose time is not known yet may take.
+const TRACE_LIMIT_MS: u64 = 900_000;
 /// Memory that a test may take, in KiB: a fault may be a bound that is gone.
 const MOST_KIB: u64 = 12_000_000;
 
@@ -124,21 +126,22 @@ pub fn red(copy: &Copy, batch: &[&Test], switch: &Switch, worker: usize) -> Outc
     command.env("CARGO_MANIFEST_DIR", &place).current_dir(&place).env("TMPDIR", &temporary);
     command.process_group(0).stdin(Stdio::null()).stdout(out).stderr(Stdio::null());
     let mut child = command.spawn().map_err(|cause| format!("{command:?}: {cause}"))?;
-    let limit = Duration::from_millis(20_000 + 10 * time(batch));
+    let limit_ms = if first.ms == 0 { TRACE_LIMIT_MS } else { 20_000 + 10 * time(batch) };
+    let limit = Duration::from_millis(limit_ms);
     let start = Instant::now();
     let ended_well = loop {
         match child.try_wait().map_err(failed)? {
             Some(status) => break status.success(),
-            None if start.elapsed() > limit || first.ms == 0 && start.elapsed().as_secs() > 300 => {
-                break false;
-            }
+            None if start.elapsed() > limit => break false,
             None => sleep(Duration::from_millis(5)),
         }
     };
     // The group of this child: programs that it started, too.
-    let group = format!("-{}", child.id());
-    let _ = Command::new("kill").args(["-KILL", "--", &group]).stderr(Stdio::null()).status();
-    let _ = child.wait();
+    if !ended_well {
+        let group = format!("-{}", child.id());
+        let _ = Command::new("kill").args(["-KILL", "--", &group]).stderr(Stdio::null()).status();
+        let _ = child.wait();
+    }
     let text = String::from_utf8_lossy(&fs::read(&log).map_err(failed)?).into_owned();
     if first.program.is_none() {
         return torture_verdict(first, &text);
