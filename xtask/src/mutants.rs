@@ -135,9 +135,9 @@ fn traced(copy: &Copy, faults: &[Fault]) -> Outcome<Vec<Test>> {
             return Ok::<_, String>(Test { ms: *ms, reaches: reaches.clone(), ..test.clone() });
         }
         let traced = trace(copy, test, worker).map_err(|cause| format!("left out: {cause}"))?;
-        let numbers: String = traced.reaches.iter().map(|number| format!(",{number}")).collect();
+        let numbers: Vec<String> = traced.reaches.iter().map(usize::to_string).collect();
         if let Ok(mut log) = log.lock() {
-            writeln!(log, "{name},{}{numbers}", traced.ms).map_err(failed)?;
+            writeln!(log, "{name},{},{}", traced.ms, numbers.join(",")).map_err(failed)?;
         }
         Ok(traced)
     });
@@ -199,8 +199,8 @@ fn measure<'f>(
                 // Tests of some crates only say nothing if none of them fails.
                 let is_whole = copy.is_whole || is_unit && !names.is_empty();
                 if let (true, Ok(mut log)) = (is_whole, log.lock()) {
-                    let names: String = names.iter().map(|name| format!("\t{name}")).collect();
-                    writeln!(log, "{key}\t{kind}{names}").map_err(failed)?;
+                    let names = [&[key.clone(), kind.to_owned()], &names[..]].concat().join("\t");
+                    writeln!(log, "{names}").map_err(failed)?;
                 }
                 eprintln!("{}: {kind}: {}", fault.name, names.join("; "));
                 (names, is_whole)
