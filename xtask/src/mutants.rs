@@ -197,7 +197,11 @@ fn measure<'f>(
                     .collect();
                 let names = look(copy, (fault, number), &of_kind, all || !is_unit, worker)?;
                 // Tests of some crates only say nothing if none of them fails.
-                let is_whole = copy.is_whole || is_unit && !names.is_empty();
+                let is_whole = if is_unit {
+                    copy.has_all_units || !names.is_empty()
+                } else {
+                    copy.has_torture
+                };
                 if let (true, Ok(mut log)) = (is_whole, log.lock()) {
                     let names = [&[key.clone(), kind.to_owned()], &names[..]].concat().join("\t");
                     writeln!(log, "{names}").map_err(failed)?;

@@ -14,13 +14,18 @@ use crate::process::{Outcome, cargo, root, target_dir};
 pub struct Copy {
     /// Test programs: the folder of the crate, and the path.
     pub programs: Vec<(String, PathBuf)>,
-    /// Whether these are all tests: those of the default crates, and torture.
-    pub is_whole: bool,
+    /// Whether these are all unit tests: those of the default crates.
+    pub has_all_units: bool,
+    /// Whether lines of torture can be run.
+    pub has_torture: bool,
     pub torture: PathBuf,
     pub host_sim: PathBuf,
     /// Stands for all files but the faults.
     pub digest: u64,
 }
+
+/// Package of the lines of torture.
+const TORTURE: &str = "torture";
 
 /// Folder of everything that this command writes.
 pub fn folder() -> PathBuf {
@@ -36,11 +41,17 @@ fn source() -> PathBuf {
 /// # Errors
 /// A fault does not compile.
 pub fn build(faults: &[Fault], crates: &[&str]) -> Outcome<Copy> {
-    let (digest, is_whole) = (make(faults)?, crates.is_empty());
+    let (digest, has_all_units) = (make(faults)?, crates.is_empty());
+    let has_torture = has_all_units || crates.contains(&TORTURE);
     let mut programs = Vec::new();
-    let packages = crates.iter().flat_map(|name| ["--package", name]);
-    let arguments: Vec<&str> = ["test", "--no-run"].into_iter().chain(packages).collect();
-    for line in messages(&arguments)? {
+    let packages = crates.iter().filter(|name| **name != TORTURE);
+    let packages: Vec<&str> = packages.flat_map(|name| ["--package", name]).collect();
+    let built = if has_all_units || !packages.is_empty() {
+        messages(&[&["test", "--no-run"], &packages[..]].concat())?
+    } else {
+        Vec::new()
+    };
+    for line in built {
         let crate_folder = Path::new(line["manifest_path"].as_str().unwrap_or_default()).parent();
         let crate_folder = crate_folder.and_then(|folder| folder.strip_prefix(source()).ok());
         let program = line["executable"].as_str().filter(|_| line["profile"]["test"] == true);
@@ -48,13 +59,14 @@ pub fn build(faults: &[Fault], crates: &[&str]) -> Outcome<Copy> {
             programs.push((folder.to_string_lossy().into_owned(), PathBuf::from(program)));
         }
     }
-    if is_whole {
-        messages(&["build", "--package", "host-sim", "--package", "torture"])?;
+    if has_torture {
+        messages(&["build", "--package", "host-sim", "--package", TORTURE])?;
     }
     let built = folder().join("build/debug");
     Ok(Copy {
         programs,
-        is_whole,
+        has_all_units,
+        has_torture,
         torture: built.join("torture"),
         host_sim: built.join("host-sim"),
         digest,
@@ -71,7 +83,10 @@ fn make(faults: &[Fault]) -> Outcome<u64> {
     let text = String::from_utf8_lossy(&listed.stdout);
     for file in text.split('\0').filter(|file| !file.is_empty()) {
         let Ok(bytes) = fs::read(root().join(file)) else { continue };
-        if !file.starts_with(FOLDER) && !file.starts_with("xtask") && !file.ends_with(".md") {
+        if !file.starts_with(FOLDER)
+            && !file.starts_with("xtask")
+            && Path::new(file).extension().is_none_or(|it| it != "md")
+        {
             digest.write(file.as_bytes());
             digest.write(&bytes);
         }

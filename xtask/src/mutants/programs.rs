@@ -53,7 +53,7 @@ pub fn all(copy: &Copy) -> Outcome<Vec<Test>> {
             tests.extend(line.strip_suffix(": test").map(|name| test(Some(place), name)));
         }
     }
-    if copy.is_whole {
+    if copy.has_torture {
         for line in said(Command::new(&copy.torture).arg("--list"))?.lines() {
             tests.extend(line.split_whitespace().next().map(|name| test(None, name)));
         }

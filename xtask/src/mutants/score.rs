@@ -64,25 +64,25 @@ pub fn accept(scored: &[(&Fault, Found)]) -> Outcome {
 
 /// Number of faults by list and crate and verdict, as a table.
 pub fn by_crate<'f>(verdicts: impl Iterator<Item = (&'f Fault, &'f str)>) -> String {
-    let mut counts: BTreeMap<(&str, &str), [usize; 4]> = BTreeMap::new();
+    let mut counts: BTreeMap<(&str, &str), [usize; 5]> = BTreeMap::new();
     for (fault, verdict) in verdicts {
-        let columns = ["found", "missed", "unreached"];
-        let column = columns.iter().position(|column| *column == verdict).unwrap_or(3);
+        let columns = ["found", "missed", "unreached", "open"];
+        let column = columns.iter().position(|column| *column == verdict).unwrap_or(4);
         for crate_folder in [&*fault.crate_folder, "in all"] {
             let of_crate = counts.entry((&fault.list, crate_folder)).or_default();
             of_crate[column] += 1;
         }
     }
     let mut text = format!(
-        "{:<34}{:>8}{:>8}{:>11}{:>12}{:>9}\n",
-        "list and crate", "found", "missed", "unreached", "equivalent", "found %"
+        "{:<34}{:>8}{:>8}{:>11}{:>6}{:>12}{:>9}\n",
+        "list and crate", "found", "missed", "unreached", "open", "equivalent", "found %"
     );
-    for ((list, crate_folder), [found, missed, unreached, equivalent]) in counts {
-        let share = 100.0 * found as f64 / (found + missed + unreached).max(1) as f64;
+    for ((list, crate_folder), [found, missed, unreached, open, equivalent]) in counts {
+        let share = 100.0 * found as f64 / (found + missed + unreached + open).max(1) as f64;
         let name = format!("{list}: {crate_folder}");
         let _ = writeln!(
             text,
-            "{name:<34}{found:>8}{missed:>8}{unreached:>11}{equivalent:>12}{share:>9.0}"
+            "{name:<34}{found:>8}{missed:>8}{unreached:>11}{open:>6}{equivalent:>12}{share:>9.0}"
         );
     }
     text
