@@ -128,13 +128,16 @@ fn traced(copy: &Copy, faults: &[Fault]) -> Outcome<Vec<Test>> {
     let failed = |cause: std::io::Error| format!("{}: {cause}", file.display());
     let log = fs::File::options().append(true).create(true).open(&file).map_err(failed)?;
     let log = Mutex::new(log);
-    eprintln!("tracing {} of {} tests", tests.len().saturating_sub(known.len()), tests.len());
+    let is_new = |test: &&Test| !known.contains_key(&full_name(copy, test));
+    eprintln!("tracing {} of {} tests", tests.iter().filter(is_new).count(), tests.len());
     let outcomes = shared(tests.len(), |place, worker| {
         let (test, name) = (&tests[place], full_name(copy, &tests[place]));
         if let Some((ms, reaches)) = known.get(&name) {
             return Ok::<_, String>(Test { ms: *ms, reaches: reaches.clone(), ..test.clone() });
         }
-        let traced = trace(copy, test, worker).map_err(|cause| format!("left out: {cause}"))?;
+        // Twice, as one that fails with a fault.
+        let traced = trace(copy, test, worker).or_else(|_| trace(copy, test, worker));
+        let traced = traced.map_err(|cause| format!("left out: {cause}"))?;
         let numbers: Vec<String> = traced.reaches.iter().map(usize::to_string).collect();
         if let Ok(mut log) = log.lock() {
             writeln!(log, "{name},{},{}", traced.ms, numbers.join(",")).map_err(failed)?;
