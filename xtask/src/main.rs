@@ -86,6 +86,8 @@ Usage: cargo xtask COMMAND
                               proof/mutants/score.csv has as found. An hour; what was found is kept in target/mutants
       --accept                writes proof/mutants/score.csv instead of comparing
       --all                   tells every unit test that fails, not the first one only
+      --package=NAME          runs only the unit tests of this crate, or with `torture` the lines of torture
+      --no-torture            runs only unit tests
       --check-list            checks only that each fault's text stands once in its file, and shows the accepted score
   help                        prints this text
 

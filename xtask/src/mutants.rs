@@ -32,8 +32,11 @@ pub fn run(arguments: &[&str]) -> Outcome {
     let accepted = score::accepted();
     let (options, names): (Vec<&str>, Vec<&str>) =
         arguments.iter().partition(|argument| argument.starts_with("--"));
-    let (crates, options): (Vec<&str>, Vec<&str>) =
-        options.into_iter().partition(|option| option.starts_with("--package="));
+    let with_torture = !options.contains(&"--no-torture");
+    let (crates, options): (Vec<&str>, Vec<&str>) = options
+        .into_iter()
+        .filter(|option| *option != "--no-torture")
+        .partition(|option| option.starts_with("--package="));
     let crates: Vec<&str> = crates.iter().filter_map(|it| it.strip_prefix("--package=")).collect();
     if let Some(unknown) = names.iter().find(|name| !faults.iter().any(|it| it.name == **name)) {
         return Err(format!("mutants: no fault is called `{unknown}`"));
@@ -51,7 +54,7 @@ pub fn run(arguments: &[&str]) -> Outcome {
     if options == ["--accept"] && !names.is_empty() {
         return Err("mutants: --accept writes the score of all faults".to_owned());
     }
-    let copy = copy::build(&faults, &crates)?;
+    let copy = copy::build(&faults, &crates, with_torture)?;
     let tests = traced(&copy, &faults)?;
     let numbers: Vec<usize> = (1..=faults.len())
         .filter(|number| names.is_empty() || names.contains(&&*faults[number - 1].name))

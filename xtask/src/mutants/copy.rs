@@ -36,13 +36,14 @@ fn source() -> PathBuf {
     folder().join("source")
 }
 
-/// Makes the copy, or brings it up to date, and builds it; of tests those of these `crates` alone, if there are any.
+/// Makes the copy, or brings it up to date, and builds it; of tests those of these `crates` alone, if there
+/// are any, and lines of torture only if they are wanted.
 ///
 /// # Errors
 /// A fault does not compile.
-pub fn build(faults: &[Fault], crates: &[&str]) -> Outcome<Copy> {
+pub fn build(faults: &[Fault], crates: &[&str], has_torture: bool) -> Outcome<Copy> {
     let (digest, has_all_units) = (make(faults)?, crates.is_empty());
-    let has_torture = has_all_units || crates.contains(&TORTURE);
+    let has_torture = has_torture && has_all_units || crates.contains(&TORTURE);
     let mut programs = Vec::new();
     let packages = crates.iter().filter(|name| **name != TORTURE);
     let packages: Vec<&str> = packages.flat_map(|name| ["--package", name]).collect();

@@ -149,6 +149,17 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_fault_stands_behind_the_switch_where_its_line_is() {
+        let fault = "name = 'less'\nfile = 'a.rs'\nline = 'if a <= b'\nfind = 'a <= b'\nreplace = 'a < b'\nwhy = 'w'";
+        let fault: Fault = toml::from_str(fault).unwrap();
+        assert_eq!(fault.place("a <= b; if a <= b {").unwrap(), 11);
+        assert_eq!(fault.switched(7), "(if fault_switch::on(7) { a < b } else { a <= b })");
+        for text in ["a <= b", "if a <= b; if a <= b"] {
+            assert!(fault.place(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
     fn every_fault_stands_once_in_its_file_and_names_what_a_user_would_suffer() {
         let faults = load().unwrap();
         assert!(faults.len() >= 100, "{}", faults.len());
