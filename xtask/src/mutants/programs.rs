@@ -5,6 +5,7 @@ use std::fs::{self, File};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::Mutex;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -92,12 +93,38 @@ fn time(batch: &[&Test]) -> u64 {
     batch.iter().map(|test| test.ms).sum()
 }
 
-/// Runs tests of one program in one process, and returns the names of those that fail. A test in which the process
-/// dies or hangs has failed.
+/// Tests that are running. Many write to a folder that bears their name, so that none may run twice at once.
+static RUNNING: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+
+/// Waits until none of these tests is running, and takes them.
+fn take(batch: &[&Test]) {
+    loop {
+        if let Ok(mut running) = RUNNING.lock()
+            && !batch.iter().any(|test| running.contains(&test.name))
+        {
+            running.extend(batch.iter().map(|test| test.name.clone()));
+            return;
+        }
+        sleep(Duration::from_millis(20));
+    }
+}
+
+/// Runs tests as [`run`] does, while no other worker runs one of them.
 ///
 /// # Errors
 /// A line of torture could not be tested here.
 pub fn red(copy: &Copy, batch: &[&Test], switch: &Switch, worker: usize) -> Outcome<Vec<String>> {
+    take(batch);
+    let outcome = run(copy, batch, switch, worker);
+    if let Ok(mut running) = RUNNING.lock() {
+        batch.iter().for_each(|test| drop(running.remove(&test.name)));
+    }
+    outcome
+}
+
+/// Runs tests of one program in one process, and returns the names of those that fail. A test in which the process
+/// dies or hangs has failed.
+fn run(copy: &Copy, batch: &[&Test], switch: &Switch, worker: usize) -> Outcome<Vec<String>> {
     let Some(first) = batch.first() else { return Ok(Vec::new()) };
     let scratch = folder().join(format!("scratch-{worker}"));
     let (log, temporary) = (scratch.join("log"), scratch.join("tmp"));
