@@ -117,7 +117,9 @@ pub fn red(copy: &Copy, batch: &[&Test], switch: &Switch, worker: usize) -> Outc
     take(batch);
     let outcome = run(copy, batch, switch, worker);
     if let Ok(mut running) = RUNNING.lock() {
-        batch.iter().for_each(|test| drop(running.remove(&test.name)));
+        for test in batch {
+            running.remove(&test.name);
+        }
     }
     outcome
 }
