@@ -18,6 +18,8 @@ mod sensors;
 
 mod torture;
 
+mod mutants;
+
 mod ci;
 
 use std::env;
@@ -79,6 +81,14 @@ Usage: cargo xtask COMMAND
       --short                 tests the least number of cases, in at most two minutes
       --seed S                starts from this seed: that of the table repeats the worst case of a promise
       --self-test             plants a fault under every promise instead, and fails if one is not found
+  mutants [OPTION…] [NAME…]   plants faults in a copy of the product, those of these names or all of proof/mutants, and
+                              tells which test and which line of torture sees each. Fails if one is missed that
+                              proof/mutants/score.csv has as found. An hour; what was found is kept in target/mutants
+      --accept                writes proof/mutants/score.csv instead of comparing
+      --all                   tells every unit test that fails, not the first one only
+      --package=NAME          runs only the unit tests of this crate, or with `torture` the lines of torture
+      --no-torture            runs only unit tests
+      --check-list            checks only that each fault's text stands once in its file, and shows the accepted score
   help                        prints this text
 
 `bash firmware/setup.sh` installs the tools for these commands on Debian.
@@ -99,6 +109,7 @@ fn main() -> ExitCode {
             Ok(())
         }
         ["ci"] => ci::run(),
+        ["mutants", ref arguments @ ..] => mutants::run(arguments),
         ["firmware"] => firmware::run(),
         ["emulate", "--accept", ref names @ ..] if are_names(names) => {
             emulate::run(names, Differences::Accept)

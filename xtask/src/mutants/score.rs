@@ -1,0 +1,89 @@
+//! What was found: a line for each fault, and sums by crate.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::fs;
+
+use super::list::{FOLDER, Fault};
+use crate::process::{Outcome, root};
+
+const HEADER: &str = "fault,list,crate,verdict,unit test,torture\n";
+
+/// What was found out about a fault.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Found {
+    pub is_reached: bool,
+    /// Whether not all tests were run.
+    pub is_open: bool,
+    /// Unit tests that fail, or only the first one.
+    pub unit: Vec<String>,
+    /// Every line of torture that fails.
+    pub torture: Vec<String>,
+}
+
+impl Found {
+    pub fn verdict(&self, fault: &Fault) -> &'static str {
+        match (self.unit.is_empty() && self.torture.is_empty(), &fault.equivalent) {
+            (false, None) => "found",
+            (false, Some(_)) => "found though equivalent",
+            (true, None) if self.is_open => "open",
+            (true, Some(_)) => "equivalent",
+            (true, None) if !self.is_reached => "unreached",
+            (true, None) => "missed",
+        }
+    }
+}
+
+/// The score of faults, as a CSV file.
+pub fn csv(scored: &[(&Fault, Found)]) -> String {
+    let mut text = HEADER.to_owned();
+    for (fault, found) in scored {
+        let (verdict, unit) = (found.verdict(fault), found.unit.join("; "));
+        let (list, crate_folder, torture) =
+            (&fault.list, &fault.crate_folder, found.torture.join(" "));
+        let _ = writeln!(text, "{},{list},{crate_folder},{verdict},{unit},{torture}", fault.name);
+    }
+    text
+}
+
+/// Reads the accepted score: verdict of each fault.
+pub fn accepted() -> BTreeMap<String, String> {
+    let text = fs::read_to_string(root().join(FOLDER).join("score.csv")).unwrap_or_default();
+    let fields = |line: &str| {
+        let mut fields = line.split(',');
+        Some((fields.next()?.to_owned(), fields.nth(2)?.to_owned()))
+    };
+    text.lines().skip(1).filter_map(fields).collect()
+}
+
+/// Writes the score.
+pub fn accept(scored: &[(&Fault, Found)]) -> Outcome {
+    let file = root().join(FOLDER).join("score.csv");
+    fs::write(&file, csv(scored)).map_err(|cause| format!("{}: {cause}", file.display()))
+}
+
+/// Number of faults by list and crate and verdict, as a table.
+pub fn by_crate<'f>(verdicts: impl Iterator<Item = (&'f Fault, &'f str)>) -> String {
+    let mut counts: BTreeMap<(&str, &str), [usize; 5]> = BTreeMap::new();
+    for (fault, verdict) in verdicts {
+        let columns = ["found", "missed", "unreached", "open"];
+        let column = columns.iter().position(|column| *column == verdict).unwrap_or(4);
+        for crate_folder in [&*fault.crate_folder, "in all"] {
+            let of_crate = counts.entry((&fault.list, crate_folder)).or_default();
+            of_crate[column] += 1;
+        }
+    }
+    let mut text = format!(
+        "{:<34}{:>8}{:>8}{:>11}{:>6}{:>12}{:>9}\n",
+        "list and crate", "found", "missed", "unreached", "open", "equivalent", "found %"
+    );
+    for ((list, crate_folder), [found, missed, unreached, open, equivalent]) in counts {
+        let share = 100.0 * found as f64 / (found + missed + unreached + open).max(1) as f64;
+        let name = format!("{list}: {crate_folder}");
+        let _ = writeln!(
+            text,
+            "{name:<34}{found:>8}{missed:>8}{unreached:>11}{open:>6}{equivalent:>12}{share:>9.0}"
+        );
+    }
+    text
+}
