@@ -8,15 +8,11 @@ use taxel_evaluate::evaluate::limit::LimitResult;
 use taxel_evaluate::evaluate::printed::Cells;
 use taxel_evaluate::evaluate::trade::Trade;
 use taxel_evaluate::run::RunResult;
-use taxel_evaluate::study::directions::DirectionsResult;
-use taxel_evaluate::study::equations::EquationsResult;
-use taxel_evaluate::study::map::MapStudy;
-use taxel_evaluate::study::recursion::Study;
 
-mod format;
-mod ticks;
-mod svg;
-mod chart;
+pub mod format;
+pub mod ticks;
+pub mod svg;
+pub mod chart;
 mod heat_map;
 mod colour;
 mod voronoi;
@@ -34,10 +30,7 @@ mod html;
 mod printed;
 mod trade;
 mod limit;
-mod study;
-mod study_map;
 mod learning_curve;
-mod recursion;
 
 pub use view::{Made, View};
 
@@ -77,12 +70,6 @@ pub fn directions_svg(limit: &LimitResult) -> String {
     limit::directions_svg(limit)
 }
 
-/// Picture of the study of centres, spread and samples, as a file of its own: light or dark like the viewer.
-#[must_use]
-pub fn study_map_svg(study: &MapStudy) -> String {
-    study_map::svg(study)
-}
-
 /// Picture of what is known of each electrode, as a file of its own: light or dark like the viewer.
 #[must_use]
 pub fn known_svg(limit: &LimitResult) -> String {
@@ -96,28 +83,10 @@ pub fn printed_svg(tables: &[(&str, Cells)]) -> String {
     printed::svg(tables)
 }
 
-/// Picture of the sensor's equations as a decoder: RMSE of z against the noise, as a file of its own.
-#[must_use]
-pub fn equations_svg(result: &EquationsResult) -> String {
-    study::equations_svg(result)
-}
-
-/// Picture of decoding in both directions: RMSE of z against the noise, as a file of its own.
-#[must_use]
-pub fn decoding_svg(result: &DirectionsResult) -> String {
-    study::decoding_svg(result)
-}
-
 /// Picture of a recursion's learning curve on `subject`, as a file of its own: light or dark like the viewer.
 #[must_use]
 pub fn learning_curve_svg(curve: &LearningCurve, subject: &str) -> String {
     learning_curve::svg(curve, subject)
-}
-
-/// Picture of where recursive least squares diverges, as a file of its own: light or dark like the viewer.
-#[must_use]
-pub fn recursion_svg(study: &Study) -> String {
-    recursion::svg(study)
 }
 
 #[cfg(test)]

@@ -24,6 +24,7 @@ use std::env;
 use std::process::ExitCode;
 
 use emulate::Differences;
+use process::{Outcome, PROOF, cargo, status};
 
 const HELP: &str = "\
 Usage: cargo xtask COMMAND
@@ -73,6 +74,7 @@ Usage: cargo xtask COMMAND
                               file and more), compares 1000 frames on the device with the host's, and prints what each
                               model takes. Two minutes
       --accept                writes the table into docs/sensors.md
+  study QUESTION [OPTION…]    answers a question about the sensor, the paper's method or a part of Taxel: `study --help`
   torture [OPTION…] [NAME…]   puts every promise of reliability to the test, or those of these names, and prints a
                               table: promise, cases, worst found, bound, verdict, seed. `torture --help` has all options
       --minutes N             takes so long (20); some promises take longer
@@ -91,6 +93,10 @@ fn main() -> ExitCode {
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let outcome = match arguments[..] {
         ["torture", ref options @ ..] => match torture::run(options) {
+            Ok(code) => return code,
+            Err(cause) => Err(cause),
+        },
+        ["study", ref options @ ..] => match study(options) {
             Ok(code) => return code,
             Err(cause) => Err(cause),
         },
@@ -128,6 +134,12 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// Runs a study of `proof/studies`, which says itself what is wrong with `options`.
+fn study(options: &[&str]) -> Outcome<ExitCode> {
+    let run = ["run", "--release", "--manifest-path", PROOF, "--package", "studies", "--"];
+    status(cargo(&run).args(options)).map(torture::code)
 }
 
 fn are_names(arguments: &[&str]) -> bool {

@@ -32,6 +32,5 @@ pub mod measurements;
 pub mod subject;
 pub mod evaluate;
 pub mod run;
-pub mod study;
 
 pub use error::{Error, Result};

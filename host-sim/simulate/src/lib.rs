@@ -26,7 +26,6 @@ pub mod outputs;
 pub mod readout;
 pub mod world;
 pub mod synth;
-pub mod anomaly;
 pub mod forward;
 pub mod virtual_board;
 

@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::evaluate::limit::{self, Candidate, Figures, Level, LimitResult, Plan};
+use crate::metrics::DecoderErrors;
+use crate::{Error, Result, report};
 use clap::Args;
-use host_sim::evaluate::limit::{self, Candidate, Figures, Level, LimitResult, Plan};
-use host_sim::metrics::DecoderErrors;
-use host_sim::{Error, Result, report};
 use taxel_data::output::FileSet;
 use taxel_learn::ModelBlob;
 use taxel_limit::identify::Observability;

@@ -7,10 +7,10 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use host_sim::by_depth::DepthErrors;
-use host_sim::metrics::{Definition, Errors};
-use host_sim::verdict::Verdict;
-use host_sim::{Error, Result};
+use crate::by_depth::DepthErrors;
+use crate::metrics::{Definition, Errors};
+use crate::verdict::Verdict;
+use crate::{Error, Result};
 use serde::Serialize;
 use taxel_data::output;
 

@@ -54,21 +54,3 @@ fn what_is_about_decoding_refuses_a_forward_scene_by_name() {
         assert!(said.contains(says), "{said}");
     }
 }
-
-#[test]
-fn the_study_of_equations_refuses_what_they_do_not_decode_and_draws_a_picture() {
-    let folder = Folder::new("study-equations");
-    folder.write("z.toml", small_scene().replace("[\"x\", \"y\", \"z\"]", "[\"z\"]"));
-    let said = folder.fail(&["study", "equations", "z.toml"], 2);
-    assert!(said.contains("equations give all deformations"), "{said}");
-    assert!(folder.fail(&["study", "equations", "press", "-n", "0"], 2).contains("frames = 0"));
-
-    folder.write("scene.toml", small_scene());
-    let study = ["study", "equations", "scene.toml", "-n", "4", "-o", "e.svg"];
-    let page = folder.succeed(&study);
-    let solved = page.lines().find(|line| line.starts_with("solved exactly")).unwrap();
-    let shares: Vec<&str> = solved.split_whitespace().skip(3).collect();
-    assert_eq!(shares, ["100.0", "0.0", "0.0", "0.0", "0.0", "0.0", "0.0", "0.0"], "{page}");
-    let picture = std::fs::read_to_string(folder.path("e.svg")).unwrap();
-    assert!(picture.starts_with("<svg") && picture.contains("equations, damped"));
-}

@@ -32,8 +32,7 @@ fn checked(folder: &Folder, schema: &Schema, arguments: &[&str]) -> Value {
     let text = folder.succeed(&[arguments, &["--json"]].concat());
     let document: Value = serde_json::from_str(&text).unwrap();
     assert_eq!(schema.faults(&document), [""; 0], "{arguments:?}");
-    let words = if arguments[0] == "study" { 2 } else { 1 };
-    assert_eq!(document["command"], arguments[..words].join(" "));
+    assert_eq!(document["command"], arguments[0]);
     assert!(document["seconds"].as_f64().unwrap() > 0.0, "{arguments:?}");
     document
 }
@@ -90,36 +89,15 @@ fn experiments_are_told_by_the_schema() {
     let folder = prepared("json_experiments", schema);
     let checked = |arguments: &[&str]| checked(&folder, schema, arguments);
     let gate = checked(&["gate", "scene.toml", "-n", "100", "--model", "m.bin"]);
-    checked(&["readout", "scene.toml", "--frames", "3"]);
-    checked(&["drift", "scene.toml"]);
-    for study in ["equations", "directions"] {
-        let study = checked(&["study", study, "scene.toml", "-n", "3"]);
-        assert_eq!((&study["subject"], &study["rows"]), (&json!("small"), &json!(6)));
-    }
-    let confidence = checked(&["confidence", "scene.toml", "-n", "100", "--model", "m.bin"]);
     let limit = ["limit", "scene.toml", "-n", "4", "--model", "m.bin", "-o", "limit"];
     let limit = checked(&[&limit[..], &["--geometry"]].concat());
     check_file(&folder, schema, "limit/limit.json");
     let trade = ["trade", "scene.toml", "--centres", "6", "--output-rank", "none"];
     let trade = checked(&[&trade[..], &["--max-error", "1"]].concat());
     check_file(&folder, schema, "out/small/trade.json");
-    for document in [gate, confidence, limit, trade] {
+    for document in [gate, limit, trade] {
         assert_eq!((&document["subject"], &document["seed"]), (&json!("small"), &json!(1)));
     }
-}
-
-#[test]
-fn studies_are_told_by_the_schema() {
-    let schema = &schema();
-    let folder = prepared("json_studies", schema);
-    let checked = |arguments: &[&str]| checked(&folder, schema, arguments);
-    let widths = checked(&["study", "widths", "scene.toml", "--centres", "6", "--spread", "0.8"]);
-    assert_eq!(widths["models"].as_array().unwrap().len(), 6);
-    let map = ["study", "map", "scene.toml", "--samples", "30,100", "--test-frames", "50"];
-    let map = checked(&[&map[..], &["--centres", "4,8", "-o", "map.svg"]].concat());
-    assert_eq!(map["maps"].as_array().unwrap().len(), 4);
-    let picture = std::fs::read_to_string(folder.path("map.svg")).unwrap();
-    assert!(picture.starts_with("<svg") && picture.contains("N = 100"));
 }
 
 #[test]
@@ -129,8 +107,6 @@ fn recursions_are_told_by_the_schema() {
     let rls = ["train", "scene.toml", "--solver", "rls", "-o", "r.bin"];
     let trained = checked(&folder, schema, &rls);
     assert_eq!(trained["learning_curve"]["points"][0]["frames"], 10);
-    let study = ["study", "recursion", "--centres", "3", "-n", "100"];
-    assert_eq!(checked(&folder, schema, &study)["row_wire"], 4);
 }
 
 #[test]

@@ -3,7 +3,6 @@
 
 use crate::common::{Folder, small_scene, unrefined};
 use crate::quantisation::{output_bounds, reading_bound_ohm};
-use host_sim::evaluate::readout::{self, ReadoutResult, Stage};
 use host_sim::experiment::Experiment;
 use model_core::rbf::Format;
 use taxel_data::progress::Silent;
@@ -91,82 +90,6 @@ fn every_output_stays_within_the_bound_of_quantisation_and_coarser_converters_do
     }
 }
 
-fn z_rmse_mm(result: &ReadoutResult, circuit: Circuit, stage: Stage) -> f64 {
-    let errors = &result.line(circuit, stage).unwrap().errors;
-    errors.iter().find(|errors| errors.group == "dz_mm").unwrap().rmse
-}
-
-#[test]
-fn cross_talk_ruins_the_divider_and_spares_zero_potential() {
-    let (scene, blob) = press();
-    let model = blob.prepare(Exponential::default());
-    let result = readout::measure(&scene, &model, 100).unwrap();
-    let rms = |circuit, stage| result.line(circuit, stage).unwrap().readings.rms_percent;
-    let z = |circuit, stage| z_rmse_mm(&result, circuit, stage);
-    let of_z = |errors: &[host_sim::metrics::Errors]| {
-        errors.iter().find(|errors| errors.group == "dz_mm").unwrap().rmse
-    };
-    let (ideal_mm, mean_mm) = (of_z(result.ideal_errors()), of_z(result.mean_errors()));
-    let (divider, zero_potential) = (Circuit::Divider, Circuit::ZeroPotential);
-
-    // Measured: 6.5 % against 0.014 %, and 0.022 % once all series resistance is known.
-    assert!((5.0..8.0).contains(&rms(divider, Stage::CrossTalk)));
-    assert!(rms(divider, Stage::Quantised) < 0.1);
-    assert!(rms(zero_potential, Stage::CrossTalk) < 0.02);
-    assert!(rms(divider, Stage::CrossTalk) > 100.0 * rms(zero_potential, Stage::CrossTalk));
-    // Switches and leads cost 13 %, which correction recovers.
-    assert!((10.0..17.0).contains(&rms(zero_potential, Stage::Series)));
-    assert!(rms(zero_potential, Stage::Corrected) < 0.04);
-    assert!(rms(zero_potential, Stage::Everything) < 0.06);
-    assert!(rms(divider, Stage::Corrected) > 5.0);
-    // A correction that is a tenth wrong leaves more error than all other faults.
-    assert!((0.5..2.5).contains(&rms(zero_potential, Stage::Miscalibrated)));
-
-    assert!(z(divider, Stage::Everything) > 3.0 * mean_mm);
-    assert!(z(zero_potential, Stage::Everything) < 1.05 * ideal_mm);
-    assert!(ideal_mm < 0.3 * mean_mm);
-    assert!(z(zero_potential, Stage::Miscalibrated) > 1.5 * ideal_mm);
-    assert!(result.lines.iter().all(|line| line.readings.missing == 0));
-}
-
-#[test]
-fn users_see_every_circuit_and_stage() {
-    let folder = Folder::new("readout");
-    folder.write("scene.toml", small_scene());
-    folder.succeed(&["train", "scene.toml", "-o", "m.bin"]);
-    let arguments = ["readout", "scene.toml", "--model", "m.bin", "--frames", "20"];
-    let page = folder.succeed(&arguments);
-    for says in ["ideal readings", "predicting the mean", "divider", "zero-potential", "dz_mm RMSE"]
-    {
-        assert!(page.contains(says), "{says:?} is not in {page}");
-    }
-    let result = folder.succeed(&[&arguments[..], &["--json"]].concat());
-    let result: serde_json::Value = serde_json::from_str(&result).unwrap();
-    let lines = result["lines"].as_array().unwrap();
-    assert_eq!(lines.len(), 2 * Stage::ALL.len());
-    assert_eq!(lines[6]["circuit"], "zero-potential");
-    assert_eq!(result["frames"], 20);
-    // Without --model the same model is trained, and the same seed draws the same frames.
-    let trained = folder.succeed(&["readout", "scene.toml", "--frames", "20"]);
-    assert_eq!(trained, page);
-    assert_ne!(folder.succeed(&[&arguments[..], &["--seed", "7"]].concat()), page);
-}
-
-#[test]
-fn a_scenes_own_values_replace_the_typical_ones() {
-    let folder = Folder::new("readout-own");
-    let own = "[readout]\ncross_talk = true\nrow_switch_ohm = 5.0\nline_ohm = 0.0\n\
-               sampler = \"on-chip\"\nrow_drive = \"shift-register\"";
-    folder.write("scene.toml", small_scene().replace("[readout]", own));
-    let json = folder.succeed(&["readout", "scene.toml", "--frames", "5", "--json"]);
-    let result: serde_json::Value = serde_json::from_str(&json).unwrap();
-    let uncorrected = &result["lines"][6 + 2];
-    assert_eq!(uncorrected["stage"], "series");
-    // A series resistance of 5 Ω lies before the 3.1 Ω of a row.
-    let rms_percent = uncorrected["readings"]["rms_percent"].as_f64().unwrap();
-    assert!((140.0..190.0).contains(&rms_percent), "{rms_percent}");
-}
-
 #[test]
 fn a_readout_that_cannot_be_is_refused() {
     let folder = Folder::new("readout-refusals");
@@ -196,7 +119,10 @@ fn a_readout_that_cannot_be_is_refused() {
             "scene.toml",
             small_scene().replace("[readout]", &format!("[readout]\n{field}")),
         );
-        refused(&["readout", "scene.toml"], &[says, &["scene.toml"]].concat());
+        refused(
+            &["synth", "scene.toml", "-n", "1", "-o", "f.csv"],
+            &[says, &["scene.toml"]].concat(),
+        );
     }
     folder.write("scene.toml", small_scene());
     folder.succeed(&["train", "scene.toml", "-n", "100", "-o", "m.bin"]);

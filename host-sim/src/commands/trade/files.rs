@@ -3,9 +3,9 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use host_sim::evaluate::trade::Trade;
-use host_sim::metrics::Errors;
-use host_sim::{Result, report};
+use crate::evaluate::trade::Trade;
+use crate::metrics::Errors;
+use crate::{Result, report};
 use taxel_data::output::FileSet;
 
 use super::super::print;
