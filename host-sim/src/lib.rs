@@ -1,7 +1,7 @@
 //! Library of the program: what [`taxel_evaluate`] computes, its pages, and the commands.
 
 // What a command's options mean is said where users read it: `--help`.
-#![allow(missing_docs, clippy::missing_errors_doc, clippy::must_use_candidate)]
+#![allow(missing_docs, clippy::missing_errors_doc, clippy::new_without_default)]
 
 /// Prints to stderr as the standard macro does, but never panics: a log on a full disk must not end the work.
 macro_rules! eprintln {
