@@ -31,6 +31,7 @@ pub mod refine;
 pub mod stream;
 
 pub use format::FittedNetwork;
+use format::Ridge;
 pub use hidden_layer::{HiddenLayer, Widths};
 pub use layers::Layers;
 pub use refine::{Examples, FreshFrames, Refinement};
@@ -39,6 +40,11 @@ pub use solver::{Recursive, Solver};
 /// Initial covariance δ of the recursive least squares where no penalty is chosen. The penalty on squared weights is
 /// 1/δ for all frames together, too small to be felt.
 pub const INITIAL_COVARIANCE: f64 = 1e6;
+
+/// Frames for each regressor below which they are few.
+const FEW_FRAMES: usize = 50;
+/// Least error of a reading over its range, whatever few frames say.
+const LEAST_ERROR: f64 = 1e-3;
 
 /// Factor on the spread for networks of a whole array, relative to those of a row.
 ///
@@ -337,15 +343,31 @@ impl<'b> Samples<'b> {
         options: &Options,
         penalties: &[Option<f64>],
     ) -> Result<Vec<FittedNetwork>> {
-        let frames = self.table.inputs.len();
         let with = |penalty: &Option<f64>| Options { penalty: *penalty, ..*options };
         if let Some(rank) = options.output_rank {
             let fit = |penalty| output_rank::fit(self, layer, rank, &with(penalty));
             return penalties.iter().map(fit).collect();
         }
-        let covariances: Vec<f64> =
-            penalties.iter().map(|penalty| with(penalty).initial_covariance(frames)).collect();
-        format::fit(self, layer, options, &covariances)
+        let ridge = |penalty| self.ridge(layer, &with(penalty));
+        let ridges: Vec<Ridge> = penalties.iter().map(ridge).collect();
+        format::fit(self, layer, options, &ridges)
+    }
+
+    /// Penalties on squared weights that `options` ask for.
+    ///
+    /// Where none is chosen and frames are few, the affine tail is fitted as if every reading had an error of a
+    /// [thousandth of its range](LEAST_ERROR). Readings of neighbouring wires hardly differ in some directions; a few
+    /// frames without noise are fitted best by large weights there, which ruin all others. With many frames, or noise,
+    /// it makes no difference.
+    fn ridge(&self, layer: &HiddenLayer, options: &Options) -> Ridge {
+        let (frames, inputs) = (self.table.inputs.len(), self.inputs());
+        let regressors = layer.centres.len() / inputs + inputs + 1;
+        let is_few = frames < FEW_FRAMES * regressors;
+        let is_usual = options.affine_tail && options.penalty.is_none();
+        Ridge {
+            initial_covariance: options.initial_covariance(frames),
+            of_tail: if is_few && is_usual { frames as f64 * LEAST_ERROR.powi(2) } else { 0.0 },
+        }
     }
 }
 

@@ -87,9 +87,15 @@ impl Decomposed {
             initial_covariance > 0.0 && initial_covariance.is_finite(),
             "the initial covariance must be positive and finite"
         );
+        self.factor_with(|_| 1.0 / initial_covariance.sqrt())
+    }
+
+    /// Factor of all samples, with a penalty of its own on the squared weights of each regressor, of which `root` gives
+    /// the root.
+    pub(super) fn factor_with(&self, root: impl Fn(usize) -> f64) -> Factor {
         let (regressors, outputs) = (self.regressors, self.outputs);
         let mut whole = Triangle::new(regressors, outputs);
-        whole.set_diagonal(1.0 / initial_covariance.sqrt());
+        whole.set_diagonal(root);
         self.pieces.iter().for_each(|piece| whole.merge(piece));
         let (root, projection) = whole.into_root_and_projection();
         Factor { root, projection, regressors, outputs }

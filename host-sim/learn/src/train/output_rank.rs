@@ -49,8 +49,8 @@ pub(super) fn fit(
     };
     let of_components =
         Samples { scale: samples.scale.clone(), scaled: samples.scaled.clone(), table: &table };
-    let covariance = options.initial_covariance(outputs.len());
-    let mut networks = format::fit(&of_components, layer, options, &[covariance])?;
+    let ridge = of_components.ridge(layer, options);
+    let mut networks = format::fit(&of_components, layer, options, &[ridge])?;
     let network = networks.pop().expect("one network");
     Ok(network.expanded_by(expansion))
 }
