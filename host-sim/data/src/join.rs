@@ -60,7 +60,9 @@ impl Join {
         for (line, time) in &times {
             let Some((partner, distance)) = nearest(&others, *time, self.lag) else { continue };
             nearest_distance = nearest_distance.min(distance);
-            if distance > self.tolerance {
+            // Decimal time stamps are rounded: one that is exactly as far must not be left out for that.
+            let rounding = 2.0 * f64::EPSILON * (time.abs() + self.lag.abs() + self.tolerance);
+            if distance > self.tolerance + rounding {
                 continue;
             }
             largest_distance = largest_distance.max(distance);

@@ -111,6 +111,7 @@ impl Verdict {
         let stored = model.networks().map(|network| stored_centres(network.format(), used)).max();
         self.with(Warning::few_frames(frames, used, inputs))
             .with(Warning::padded_centres(used, stored.unwrap_or(used)))
+            .with(Warning::few_frames_for_confidence(frames, model.confidence().is_some()))
             .with(Warning::larger_than_slot(blob.bytes().len()))
     }
 

@@ -140,3 +140,14 @@ fn a_model_without_a_confidence_is_refused_where_it_is_asked_for() {
     }
     assert!(!folder.names().contains(&"out.csv".into()));
 }
+
+#[test]
+fn too_few_frames_for_a_confidence_are_refused_and_few_are_warned_of() {
+    let folder = Folder::new("confidence-few");
+    folder.write("scene.toml", small_scene());
+    let train = |frames| ["train", "scene.toml", "--confidence", "-n", frames, "-o", "m.bin"];
+    let refused = folder.fail(&train("40"), 2);
+    assert!(refused.contains("frames = 40") && refused.contains("at least 110"), "{refused}");
+    assert_eq!(folder.names(), ["scene.toml"]);
+    assert!(folder.succeed(&train("200")).contains("(few-frames-for-confidence)"));
+}

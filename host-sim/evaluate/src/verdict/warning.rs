@@ -13,6 +13,9 @@ pub const FRAMES_A_WEIGHT: usize = 10;
 /// Number of frames to judge by below which a warning is due.
 pub const FEW_TEST_FRAMES: usize = 30;
 
+/// Number of training frames below which a confidence covers noticeably more or fewer errors than it says.
+pub const FRAMES_FOR_CONFIDENCE: usize = 300;
+
 /// Share of readings outside the training range above which a warning is due.
 pub const OUT_OF_RANGE: f64 = 0.01;
 
@@ -100,6 +103,17 @@ impl Warning {
                 "{frames} training frames are few for {weights} weights an output (K = {centres}): give {needed} or \
                  more{}",
                 if centres > 4 { ", or lower --centres" } else { "" }
+            )
+        })
+    }
+
+    /// Confidence of fewer than [`FRAMES_FOR_CONFIDENCE`] training `frames`.
+    pub fn few_frames_for_confidence(frames: usize, has_confidence: bool) -> Option<Self> {
+        let due = has_confidence && frames < FRAMES_FOR_CONFIDENCE;
+        Self::when(due, "few-frames-for-confidence", || {
+            format!(
+                "{frames} training frames are few for a confidence, whose intervals may cover far more or fewer errors \
+                 than they say: give {FRAMES_FOR_CONFIDENCE} or more"
             )
         })
     }
