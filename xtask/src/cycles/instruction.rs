@@ -173,7 +173,7 @@ fn of_name(name: &str, operands: &str) -> Option<Instruction> {
         _ if is(DATA) => computes(first),
         _ if (1..name.len().min(3)).any(|at| in_parallel(name.split_at(at))) => computes(first),
         _ if is(LONG) => computes(first | second),
-        "cmp" | "cmn" | "tst" | "teq" => other(1),
+        "cmp" | "cmn" | "tst" | "teq" | "vmsr" => other(1),
         // By their operands, 2 to 12.
         "sdiv" | "udiv" => Instruction { cycles: 12, ..computes(first) },
         "b" | "bx" | "cbz" | "cbnz" => Instruction { may_branch: true, ..other(1) },
@@ -227,7 +227,6 @@ fn of_name(name: &str, operands: &str) -> Option<Instruction> {
         }
         "vmov" => Instruction { result: first, source: second, ..other(1) },
         "vmrs" => Instruction { result: first, ..other(1) },
-        "vmsr" => other(1),
         "vldr" | "vldmia" | "vpop" | "vstr" | "vstmia" | "vstmdb" | "vldmdb" | "vpush" => {
             let values = all & !CORE;
             let address = if all & CORE == 0 { SP } else { all & CORE & !PC };
@@ -235,7 +234,7 @@ fn of_name(name: &str, operands: &str) -> Option<Instruction> {
             let loads = name.starts_with("vl") || name == "vpop";
             let [result, source] = if loads { [values, 0] } else { [0, values] };
             let literal = literal(words);
-            Instruction { result, source, address, literal, ..other(1 + u64::from(words)) }
+            Instruction { result, address, source, literal, ..other(1 + u64::from(words)) }
         }
         _ => return None,
     })

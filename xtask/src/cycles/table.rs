@@ -60,8 +60,11 @@ fn flash_microseconds(count: Count) -> String {
     format!("{:.0}", count.flash_cycles as f64 / FLASH_CLOCK_MHZ)
 }
 
+/// A cell of a table: whether of a model with an affine tail, the scope, and what is shown of its count.
+type Cell<'c> = (bool, &'c str, fn(Count) -> String);
+
 /// A line of a table: kernel, K, and these cells; those that were not measured are empty.
-fn line(group: Group<'_>, cells: &[(bool, &str, fn(Count) -> String)]) -> String {
+fn line(group: Group<'_>, cells: &[Cell<'_>]) -> String {
     let cells = cells.iter().map(|(affine, scope, shown)| {
         let shown = count(group, *affine, scope).map(shown).unwrap_or_default();
         format!(" {shown} |")

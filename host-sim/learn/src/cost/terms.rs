@@ -115,17 +115,13 @@ fn project(readings: usize, features: usize, sum: &mut Sum) {
 fn sums(lines: usize, outputs: usize, sum: &mut Sum) {
     let pairs = lines / 2;
     for width in groups(outputs) {
-        match width {
-            EIGHTEEN if outputs == EIGHTEEN => {
-                sum.add("two lines", [("18 outputs, no others", pairs)])
-            }
-            EIGHTEEN => sum.add("two lines", [("18 outputs", pairs)]),
-            6 => sum.add("two lines", [("6 outputs", pairs)]),
-            few => sum.add(
-                "two lines",
-                [("fewer outputs", pairs), ("one of fewer outputs", pairs * few)],
-            ),
-        }
+        let (name, beyond) = match width {
+            EIGHTEEN if outputs == EIGHTEEN => ("18 outputs, no others", 0),
+            EIGHTEEN => ("18 outputs", 0),
+            6 => ("6 outputs", 0),
+            few => ("fewer outputs", pairs * few),
+        };
+        sum.add("two lines", [(name, pairs), ("one of fewer outputs", beyond)]);
     }
     if lines % 2 == 1 {
         sum.add("odd line", [("group", groups(outputs).count()), ("output", outputs)]);
