@@ -176,7 +176,7 @@ fn measure(image: &Image, directory: &Path, kernel: Option<&str>) -> Outcome<Vec
 /// weights in RAM.
 ///
 /// # Errors
-/// The run fails.
+/// The run fails, or the prediction is off by more than a few per cent.
 pub fn frame_of(design: &Design, path: &Path) -> Outcome<[Counted; 2]> {
     let frames = fit::frames(design, &Image::read(elf(IMAGE))?.run(path)?);
     let predicted = fit::predicted(&frames)?;
@@ -184,7 +184,15 @@ pub fn frame_of(design: &Design, path: &Path) -> Outcome<[Counted; 2]> {
         frames.first().zip(predicted.first()).ok_or("no frame was measured")?;
     let (instructions, cycles) = (predicted.instructions, predicted.cycles);
     let predicted = Counted { instructions, cycles, flash_cycles: predicted.flash_cycles };
-    Ok([predicted, frame.count])
+    let counted = frame.count;
+    let off = predicted.cycles.abs_diff(counted.cycles) as f64 / counted.cycles as f64;
+    if 100.0 * off > fit::MOST_PERCENT[1] {
+        return Err(format!(
+            "{}: {predicted:?} was predicted, {counted:?} counted",
+            path.display()
+        ));
+    }
+    Ok([predicted, counted])
 }
 
 /// The `document` with the tables of `accepted` figures at its end.

@@ -27,7 +27,7 @@ const TO_JUDGE: usize = 40;
 
 /// Largest error in per cent of instructions, of cycles, and of cycles from flash, of all but one in twenty frames. How
 /// long code waits for flash depends on what was executed before it.
-const MOST_PERCENT: [f64; 3] = [5.0, 5.0, 10.0];
+pub const MOST_PERCENT: [f64; 3] = [5.0, 5.0, 10.0];
 
 /// How many singular values below the largest one tell nothing about a price.
 const LEAST_SINGULAR: f64 = 1e-9;
