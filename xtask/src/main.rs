@@ -60,16 +60,15 @@ Usage: cargo xtask COMMAND
                               flash, for K = 16 to 256 and every kernel: a number format with an exponential, or
                               its portable Rust version. Fails if a figure exceeds its budget or differs from
                               firmware/cycles.csv. With another compiler than named there, up to 2 % more cycles
-                              are allowed, and 16 % from flash. Then checks firmware/prices.csv with 40 random models
+                              are allowed, and 16 % from flash. Then judges what firmware/prices.csv predicts by 40
+                              random models
       --json                  prints a list of objects to stdout, and nothing else
-      --accept                writes firmware/cycles.csv and the tables of docs/cycles.md instead of comparing, and
-                              the price list firmware/prices.csv, from which `host-sim` tells any model's cost
-      --shapes                measures one inference of networks of other shapes instead (12 → 5 and others, K = 64)
-      --ranks                 measures a frame of networks of few components instead (16 to 32, K = 64 and 256)
-      --confidence            measures deviations and novelty of a frame instead (16 and 32 Gaussians)
+      --accept                writes firmware/cycles.csv and the tables of docs/cycles.md instead of comparing
+      --fit                   fits firmware/prices.csv anew, from which `host-sim` predicts any model's cost, to 750
+                              random models. Two minutes
       --kernel NAME           shows this kernel only, and compares it with its budget only
       --model FILE            measures frames of this model, of any shape, such as the chosen.bin of `host-sim trade`,
-                              beside what firmware/prices.csv tells of it. Fails if they differ
+                              and prints what is predicted beside
   sensors [--accept]          trains models of other sensors than the paper's (z only, one row, 4 × 4, 16 × 32, a CSV
                               file and more), compares 1000 frames on the device with the host's, and prints what each
                               model takes. Two minutes
