@@ -6,7 +6,6 @@ mod effort;
 mod tally;
 mod tools;
 mod scratch;
-mod jobs;
 
 mod promise;
 mod promises;
