@@ -13,55 +13,45 @@ const NOT_PRODUCT: [&str; 4] =
     ["firmware/qemu", "firmware/link-check", "firmware/mock-board", "firmware/remote-readout"];
 
 /// All lines; of these the lines of code (no comment, not blank) in the source, and in tests, benches and examples.
-#[derive(Default, Clone, Copy)]
-struct Lines([usize; 3]);
+type Lines = [usize; 3];
 
 /// Prints the table.
 pub fn run() -> Outcome {
-    let listed =
-        capture(Command::new("git").args(["ls-files", "*.rs", "*Cargo.toml"]).current_dir(root()));
+    let mut git = Command::new("git");
+    let listed = capture(git.args(["ls-files", "*.rs", "*Cargo.toml"]).current_dir(root()));
     listed.outcome.map_err(|cause| listed.err + &cause)?;
+    let (manifests, sources): (Vec<&str>, _) =
+        listed.out.lines().partition(|file| file.ends_with("Cargo.toml"));
     let folders: Vec<&str> =
-        listed.out.lines().filter_map(|file| file.strip_suffix("/Cargo.toml")).collect();
-    let is_rust = |file: &str| Path::new(file).extension().is_some_and(|end| end == "rs");
-    let mut crates: BTreeMap<&str, Lines> = BTreeMap::new();
-    for file in listed.out.lines().filter(|file| is_rust(file)) {
-        let text =
-            fs::read_to_string(root().join(file)).map_err(|cause| format!("{file}: {cause}"))?;
+        manifests.iter().filter_map(|it| it.strip_suffix("/Cargo.toml")).collect();
+    let (mut crates, mut sums) = (BTreeMap::new(), [("in all", [0; 3]), ("product", [0; 3])]);
+    for file in sources {
+        let text = fs::read_to_string(root().join(file)).map_err(|it| format!("{file}: {it}"))?;
         let around = folders.iter().filter(|folder| Path::new(file).starts_with(folder));
-        let owner = around.max_by_key(|folder| folder.len()).unwrap_or(&"(no crate)");
-        let sum = crates.entry(owner).or_default();
-        *sum = plus(*sum, &count(file, &text));
-    }
-    let is_product = |name: &str| {
-        PRODUCT.iter().any(|folder| Path::new(name).starts_with(folder))
-            && !NOT_PRODUCT.contains(&name)
-    };
-    println!("{:26} {:>7} {:>7} {:>7}", "lines of Rust", "all", "source", "tests");
-    let mut sums = [("in all", Lines::default()), ("the product", Lines::default())];
-    for (name, lines) in &crates {
-        show(name, lines);
-        sums[0].1 = plus(sums[0].1, lines);
-        if is_product(name) {
-            sums[1].1 = plus(sums[1].1, lines);
+        let owner = *around.max_by_key(|folder| folder.len()).unwrap_or(&"(no crate)");
+        let is_product = PRODUCT.iter().any(|folder| Path::new(owner).starts_with(folder));
+        let counted = count(file, &text);
+        add(crates.entry(owner).or_default(), counted);
+        add(&mut sums[0].1, counted);
+        if is_product && !NOT_PRODUCT.contains(&owner) {
+            add(&mut sums[1].1, counted);
         }
     }
-    sums.iter().for_each(|(name, lines)| show(name, lines));
+    println!("{:26} {:>7} {:>7} {:>7}", "lines of Rust", "all", "source", "tests");
+    for (name, [all, source, tests]) in crates.into_iter().chain(sums) {
+        println!("{name:26} {all:7} {source:7} {tests:7}");
+    }
     Ok(())
 }
 
-fn show(name: &str, Lines([all, source, tests]): &Lines) {
-    println!("{name:26} {all:7} {source:7} {tests:7}");
-}
-
-fn plus(one: Lines, other: &Lines) -> Lines {
-    Lines([0, 1, 2].map(|at| one.0[at] + other.0[at]))
+fn add(sum: &mut Lines, counted: Lines) {
+    sum.iter_mut().zip(counted).for_each(|(sum, lines)| *sum += lines);
 }
 
 fn count(file: &str, text: &str) -> Lines {
     let of_tests = ["tests", "tests.rs", "examples", "benches"];
     let is_test = file.split('/').any(|part| of_tests.contains(&part) || part.starts_with("test_"));
-    let mut lines = Lines::default();
+    let mut lines = [0; 3];
     let mut rest = text.lines();
     // Last line of the item for tests that this line is in.
     let mut item_end: Option<String> = None;
@@ -75,8 +65,8 @@ fn count(file: &str, text: &str) -> Lines {
         }
         let is_code = !code.is_empty() && !code.starts_with("//");
         let kind = if is_test || item_end.is_some() { 2 } else { 1 };
-        lines.0[0] += 1;
-        lines.0[kind] += usize::from(is_code);
+        lines[0] += 1;
+        lines[kind] += usize::from(is_code);
         if item_end.as_deref().is_some_and(|end| line == end || line.trim_end_matches(';') == end) {
             item_end = None;
         }
@@ -91,8 +81,8 @@ mod tests {
     #[test]
     fn comments_and_blank_lines_are_no_code_and_a_module_of_tests_is_none_of_the_source() {
         let text = "//! A.\n\nfn f() {\n}\n#[cfg(test)]\n#[cfg(unix)]\nmod tests {\n    // b\n    fn g() {\n    }\n}\nfn h() {}\n";
-        assert_eq!(count("a/src/lib.rs", text).0, [12, 3, 6]);
-        assert_eq!(count("a/tests/all.rs", text).0, [12, 0, 9]);
-        assert_eq!(count("a/src/b.rs", "#[cfg(test)]\nmod tests;\nmod a;\n").0, [3, 1, 2]);
+        assert_eq!(count("a/src/lib.rs", text), [12, 3, 6]);
+        assert_eq!(count("a/tests/all.rs", text), [12, 0, 9]);
+        assert_eq!(count("a/src/b.rs", "#[cfg(test)]\nmod tests;\nmod a;\n"), [3, 1, 2]);
     }
 }
