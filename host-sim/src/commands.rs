@@ -1,5 +1,6 @@
 //! Subcommands, one small file each: arguments in, library calls, results out.
 
+mod stdout;
 pub mod print;
 pub mod progress;
 pub mod arguments;

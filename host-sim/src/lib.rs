@@ -3,10 +3,13 @@
 // What a command's options mean is said where users read it: `--help`.
 #![allow(missing_docs, clippy::missing_errors_doc, clippy::new_without_default)]
 
-/// Prints to stderr as the standard macro does, but never panics: a log on a full disk must not end the work.
+/// Prints to stderr as the standard macro does, with control characters escaped. It never panics: a log on a full disk
+/// must not end the work.
 macro_rules! eprintln {
     ($($text:tt)*) => {{
-        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("{}\n", format_args!($($text)*)));
+        let text = format!("{}\n", format_args!($($text)*));
+        let text = taxel_data::error::printable(&text);
+        let _ = std::io::Write::write_all(&mut std::io::stderr(), text.as_bytes());
     }};
 }
 

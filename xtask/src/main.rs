@@ -2,6 +2,7 @@
 
 mod process;
 mod structure;
+mod lines;
 mod toolchain;
 
 mod firmware;
@@ -32,9 +33,10 @@ Usage: cargo xtask COMMAND
   ci                          runs everything that CI runs: format, structure, tests, clippy, fuzz targets and docs, and
                               at the same time firmware, cores, size and cycles; then emulate, board, some of its
                               mutants, and torture. Goes on after a failure. Ends with a summary, which shows each
-                              step's time beside that in xtask/times.txt
-  structure                   checks the rules in ARCHITECTURE.md: which module and crate may import which, where
-                              `unsafe` may stand, and how large a part of all lines each crate may hold
+                              step's time and the number of tests that passed
+  structure                   checks that no crate depends on one above it, and none for a device on one for a desk
+  lines                       prints the lines of Rust of each crate: all, source code (no comments, blank lines and
+                              tests), test code; and the sums, in all and of the product
   firmware                    builds and lints all code for a device (thumbv7em-none-eabihf), and proves by
                               linking that it cannot panic
   cores                       builds model-core and firmware for other cores as well: thumbv6m, thumbv7m,
@@ -120,6 +122,7 @@ fn main() -> ExitCode {
         ["sensors"] => sensors::run(false),
         ["sensors", "--accept"] => sensors::run(true),
         ["structure"] => structure::run(),
+        ["lines"] => lines::run(),
         ["cycles", ref options @ ..] => match cycles::Options::parse(options) {
             Ok(options) => cycles::run(&options),
             Err(cause) => return wrong_usage(&format!("cycles: {cause}")),
@@ -147,8 +150,8 @@ fn are_names(arguments: &[&str]) -> bool {
 
 /// Says why no command has these `arguments`.
 fn misunderstood(arguments: &[&str]) -> String {
-    const COMMANDS: [&str; 8] =
-        ["ci", "structure", "firmware", "cores", "emulate", "log", "size", "sensors"];
+    const COMMANDS: [&str; 9] =
+        ["ci", "structure", "lines", "firmware", "cores", "emulate", "log", "size", "sensors"];
     match arguments {
         [] => "cargo xtask needs a command".to_owned(),
         ["log"] => "log: needs a file behind it".to_owned(),

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 mod text;
 
 use text::short;
-pub use text::{cut, in_words, number, quoted};
+pub use text::{cut, in_words, number, printable, quoted};
 
 /// Result of the functions of this crate.
 pub type Result<T> = std::result::Result<T, Error>;

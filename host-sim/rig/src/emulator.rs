@@ -41,6 +41,10 @@ impl Options {
     /// [`Error::NoImage`] for an image that cannot be read, [`Error::NotElf`] for a file that is no
     /// program.
     pub fn check(&self) -> Result<()> {
+        // A named pipe would be waited for.
+        if self.image.exists() && !self.image.is_file() {
+            return Err(Error::NotElf { image: self.image.clone() });
+        }
         let mut magic = [0; 4];
         let opened = File::open(&self.image).and_then(|mut file| file.read_exact(&mut magic));
         match opened {

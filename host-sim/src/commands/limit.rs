@@ -16,7 +16,7 @@ use super::{Common, arguments, print};
 
 /// All files that `-o` writes.
 const FILES: FileSet =
-    FileSet { name: "limit", files: &["limit.json", "limit.html", "directions.svg", "known.svg"] };
+    FileSet { files: &["limit.json", "limit.html", "directions.svg", "known.svg"] };
 /// Singular values that are printed of each row.
 const PRINTED_VALUES: usize = 6;
 

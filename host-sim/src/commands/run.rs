@@ -19,7 +19,7 @@ use super::{Common, arguments, command_line, print, refused_readings};
 const DEFAULT_OUTPUT: &str = "out";
 /// All files that a run may write.
 const FILES: FileSet =
-    FileSet { name: "run", files: &["model.bin", "metrics.json", "table1.csv", "report.html"] };
+    FileSet { files: &["model.bin", "metrics.json", "table1.csv", "report.html"] };
 
 /// Do the whole job for a scene or a CSV file: train, write the blob, evaluate, report.
 ///

@@ -1,11 +1,11 @@
 //! CSV files of any length, read once and piece by piece: also what never was a file, such as standard input.
 
-use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::{DataFile, csv};
 use crate::error::{Error, Problem, Result};
+use crate::input;
 
 /// Bytes that are read at a time, and then to the end of a line.
 const PIECE: usize = 4_000_000;
@@ -38,7 +38,7 @@ impl Pieces {
         let (path, source): (PathBuf, Box<dyn Read + Send>) = if path.as_os_str() == "-" {
             ("standard input".into(), Box::new(std::io::stdin()))
         } else {
-            (path.into(), Box::new(File::open(path).map_err(|cause| Error::read(path, cause))?))
+            (path.into(), Box::new(input::open(path)?))
         };
         Ok(Self::new(path, source, has_header))
     }

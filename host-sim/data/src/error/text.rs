@@ -23,6 +23,25 @@ pub fn quoted(text: &str) -> String {
     }
 }
 
+/// Text for a terminal: control characters other than the ends of lines are escaped, since names of files and devices
+/// may hold any.
+pub fn printable(text: &str) -> Cow<'_, str> {
+    let is_control = |c: char| c.is_control() && c != '\n';
+    if !text.contains(is_control) {
+        return text.into();
+    }
+    text.chars()
+        .fold(String::new(), |mut printable, c| {
+            if is_control(c) {
+                printable.extend(c.escape_default());
+            } else {
+                printable.push(c);
+            }
+            printable
+        })
+        .into()
+}
+
 /// Number of a file as a message repeats it: one of many digits with a power of ten.
 #[must_use]
 pub fn number(value: f64) -> String {
@@ -55,6 +74,12 @@ pub fn in_words(bytes: u64) -> String {
 mod tests {
     use super::super::{BadValue, Problem};
     use super::*;
+
+    #[test]
+    fn control_characters_are_escaped_and_other_text_stays() {
+        assert_eq!(printable("a\u{1b}[2J\u{9b}b\r.csv\nµ"), "a\\u{1b}[2J\\u{9b}b\\r.csv\nµ");
+        assert!(matches!(printable("x.csv → é\n"), Cow::Borrowed(_)));
+    }
 
     #[test]
     fn no_message_repeats_a_long_text_of_a_file() {
