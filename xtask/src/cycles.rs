@@ -200,9 +200,6 @@ fn measure_model(
 
 /// Predicted and counted cost of a frame of the model at `path`, which has this `design`, without a gate and with all
 /// weights in RAM.
-///
-/// # Errors
-/// The run fails, or the model costs something else than predicted.
 pub fn frame_of(design: &Design, path: &Path) -> Outcome<[Counted; 2]> {
     let image = elf(IMAGE);
     let code = Code::read(&image)?;

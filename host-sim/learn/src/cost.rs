@@ -51,7 +51,6 @@ pub struct FramePieces {
 
 impl FramePieces {
     /// The pieces of one frame of a model of this `design`.
-    #[must_use]
     pub fn of(design: &Design, exponential: Exponential, gating: Gating) -> Self {
         Self {
             assembly: routines::of_frame(design, gating),
@@ -97,7 +96,6 @@ impl Prices {
 
 impl Design {
     /// Least waiting in cycles for the weights that one frame reads: 0 if they are in RAM.
-    #[must_use]
     pub fn least_waiting_for_weights(&self) -> u64 {
         if self.weights_in_ram {
             return 0;
@@ -109,13 +107,11 @@ impl Design {
 
 /// Least waiting in cycles for weights in flash of which so many `bytes` are read, once and in order: for every line, the
 /// wait states of one read. Weights are too many for the cache of data, and nothing prefetches data.
-#[must_use]
 pub fn least_waiting_for_weights(bytes: usize) -> u64 {
     bytes.div_ceil(FLASH_LINE_BYTES) as u64 * WAIT_STATES
 }
 
 /// Name of a number format with an exponential, as `cargo xtask cycles` spells it.
-#[must_use]
 pub fn kernel_name(format: Format, exponential: Exponential) -> String {
     match (format, exponential) {
         (Format::F32Direct, Exponential::Libm | Exponential::Micromath) => {

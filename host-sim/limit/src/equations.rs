@@ -77,7 +77,6 @@ struct Damping {
 
 impl<'w> Equations<'w> {
     /// Decoder that solves the equations exactly.
-    #[must_use]
     pub fn exact(world: &'w World) -> Self {
         Self { name: EXACT, world, model: world, damping: None }
     }
@@ -86,7 +85,6 @@ impl<'w> Equations<'w> {
     /// covariance of the scene's deformations: the most probable deformation, were the scene's normal.
     ///
     /// `noise_level` is the relative deviation of readings from the equations; with noise relative to the span, in spans.
-    #[must_use]
     pub fn damped(world: &'w World, noise_level: f64) -> Self {
         let (prior, of_row) = (Prior::of(world), 3 * world.sensor.electrodes_per_row_wire);
         let rows = (0..world.read_rows.len()).map(|place| prior.of_row(place, of_row));
@@ -109,7 +107,6 @@ impl<'w> Equations<'w> {
     ///
     /// # Panics
     /// If the world reads no such row, or the row has other numbers of readings and unknowns.
-    #[must_use]
     pub fn solve_row(&self, place: usize, readings_ohm: &[f64], start: &[f64]) -> Solution {
         let columns = self.world.sensor.column_wires;
         assert_eq!(readings_ohm.len(), columns, "one reading a column-wire");
@@ -154,7 +151,6 @@ impl<'w> Equations<'w> {
     ///
     /// # Panics
     /// If the world reads no such row, or the row has another number of unknowns.
-    #[must_use]
     pub fn determinant(&self, place: usize, deformation_mm: &[f64]) -> Option<f64> {
         let columns = self.world.sensor.column_wires;
         let mut slopes = DMatrix::zeros(columns, deformation_mm.len());
@@ -186,7 +182,6 @@ impl<'w> Equations<'w> {
     ///
     /// # Panics
     /// If `readings_ohm` are no whole frames.
-    #[must_use]
     pub fn solve_all(&self, readings_ohm: &[f64]) -> Vec<Solution> {
         let rest = vec![0.0; 3 * self.world.sensor.electrodes_per_row_wire];
         let rows = readings_ohm.par_chunks_exact(self.world.sensor.column_wires).enumerate();

@@ -45,7 +45,6 @@ impl Anomaly {
     ];
 
     /// Description in a few words.
-    #[must_use]
     pub fn description(self) -> &'static str {
         match self {
             Self::None => "usual frames",
@@ -68,7 +67,6 @@ pub struct AnomalousFrames {
 }
 
 /// Draws `frames` of `world` with an `anomaly`; `None` if its sensor or motion has none of that kind.
-#[must_use]
 pub fn frames(world: &World, anomaly: Anomaly, frames: usize) -> Option<AnomalousFrames> {
     let sensor = &world.sensor;
     let neighbours = world.read_rows.windows(2).any(|rows| rows[1] == rows[0] + 1);

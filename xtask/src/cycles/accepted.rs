@@ -48,9 +48,6 @@ pub struct Reference<'a> {
 
 impl Accepted {
     /// Parses the file of accepted figures.
-    ///
-    /// # Errors
-    /// The number of a line that cannot be parsed.
     pub fn parse(data: &str) -> Outcome<Self> {
         let mut lines = data.lines();
         if lines.next() != Some(HEAD) {
@@ -101,9 +98,6 @@ impl Accepted {
     }
 
     /// The `document` with the tables of these figures at its end.
-    ///
-    /// # Errors
-    /// The document does not have the heading of the tables.
     pub fn in_document(&self, document: &str) -> Outcome<String> {
         let start = document.find(HEADING).ok_or(format!("it lacks {}", HEADING.trim()))?;
         let tables = self

@@ -78,9 +78,6 @@ impl Code {
     }
 
     /// The instruction at `address`.
-    ///
-    /// # Errors
-    /// Address and bytes, if there is no code, or none that the decoder knows.
     pub fn instruction(&self, address: u32) -> Outcome<Instruction> {
         let first = self
             .halfword(address)

@@ -34,9 +34,6 @@ pub struct Measured {
 }
 
 /// Measures a frame of every size.
-///
-/// # Errors
-/// A run fails, or counts something else.
 pub fn measure(image: &Path, code: &Code, directory: &Path) -> Outcome<Vec<Measured>> {
     fs::create_dir_all(directory).map_err(|cause| cause.to_string())?;
     let one = |&(directions, components): &(usize, usize)| {
@@ -109,9 +106,6 @@ pub fn markdown(measured: &[Measured]) -> String {
 }
 
 /// Checks that the frame of the budget takes no more than that.
-///
-/// # Errors
-/// It does, or was not measured.
 pub fn held(measured: &[Measured]) -> Outcome {
     let (directions, components, most) = BUDGET;
     let is_meant =

@@ -50,9 +50,6 @@ impl<'f> Equations<'f> {
     }
 
     /// The prices with the least squares of errors, for each kind of `costs`.
-    ///
-    /// # Errors
-    /// The frames do not tell the prices of some pieces apart.
     pub fn least_squares<const N: usize>(
         &self,
         costs: &[[f64; N]],

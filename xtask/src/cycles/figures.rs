@@ -85,7 +85,6 @@ impl Scope {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Figure {
     pub kernel: String,
-    /// Number of centres K.
     pub centres: u64,
     /// Whether the model has an affine tail.
     pub affine: bool,
@@ -134,9 +133,6 @@ pub struct Measured {
 }
 
 /// Joins the `counts` of a run's regions with the names in its `log`. The call at the end of each is taken off.
-///
-/// # Errors
-/// Counts and names do not fit each other, or a region of known cost was counted otherwise.
 pub fn measured(log: &str, counts: &[Region]) -> Outcome<Vec<Measured>> {
     let names: Vec<&str> = named(log, "region ").collect();
     if names.len() != counts.len() {
@@ -169,9 +165,6 @@ pub fn measured(log: &str, counts: &[Region]) -> Outcome<Vec<Measured>> {
 
 /// Figures of a run. The run's model has an affine tail if `affine`; only models without one give figures for
 /// [`Scope::Inference`] and [`Scope::Exponential`].
-///
-/// # Errors
-/// As [`measured`], or the log names no number of centres.
 pub fn of_run(log: &str, counts: &[Region], affine: bool) -> Outcome<Vec<Figure>> {
     let centres = named(log, "centres ").next().and_then(|centres| centres.parse().ok());
     let centres = centres.ok_or_else(|| format!("the image names no centres:\n{log}"))?;

@@ -16,10 +16,6 @@ const MEAN_DIGITS: i32 = 3;
 ///
 /// Assembly executes exactly its pieces, so that its prices are whole instructions and cycles. Those of compiled code
 /// are means. What a piece waits for flash depends on what was executed before it, and is a mean as well.
-///
-/// # Errors
-/// The frames do not tell the prices of two pieces apart, or a routine in assembly executes other instructions than
-/// its pieces say.
 pub fn prices(frames: &[Frame]) -> Outcome<Vec<(String, Price)>> {
     let in_assembly = || frames.iter().filter(|frame| frame.assembly.instructions > 0);
     let equations = in_assembly().map(|frame| (vec![&frame.pieces.assembly], 1.0));

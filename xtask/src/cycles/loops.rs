@@ -25,9 +25,6 @@ impl Loop {
 }
 
 /// The largest of `loops` in every function in assembly, as lines: name and bytes.
-///
-/// # Errors
-/// Every loop that does not fit the cache, or a function of which no loop was executed.
 pub fn largest(code: &Code, loops: &[Loop]) -> Outcome<String> {
     let mut lines = Vec::new();
     let mut wrong = Vec::new();

@@ -35,14 +35,10 @@ pub struct Run {
     pub counts: Vec<Region>,
     /// Loops that ran in the regions.
     pub loops: Vec<Loop>,
-    /// Log of the program.
     pub log: String,
 }
 
 /// Runs the image in `elf`, whose code is `code`, with the blob `model` in its first slot.
-///
-/// # Errors
-/// The image does not run to its end, an instruction has no known cost, or the image fails; then its log.
 pub fn run(elf: &Path, code: &Code, model: &Path) -> Outcome<Run> {
     let [start, end] = SLOT.map(|symbol| code.symbol(symbol));
     let (start, room) = (start?, end? - code.symbol(SLOT[0])?);

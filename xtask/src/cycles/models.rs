@@ -19,7 +19,6 @@ const SLOT_BYTES: usize = 131_072;
 #[derive(Debug, PartialEq, Eq)]
 pub struct Blob {
     pub path: PathBuf,
-    /// Whether it has an affine tail.
     pub affine: bool,
 }
 
@@ -30,9 +29,6 @@ pub struct Blob {
 /// fit is left out.
 ///
 /// With a `kernel`, only its number format is trained; with one that no format has, all are.
-///
-/// # Errors
-/// Training fails, or makes another model than requested.
 pub fn train(directory: &Path, kernel: Option<&str>) -> Outcome<Vec<Blob>> {
     fs::create_dir_all(directory).map_err(|cause| failed(directory, &cause))?;
     let only = kernel.and_then(format_of);

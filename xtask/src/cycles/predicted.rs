@@ -26,9 +26,6 @@ pub struct Frame {
 }
 
 /// Measures frames of every design, and the loops in them, with blobs that are written into `directory` meanwhile.
-///
-/// # Errors
-/// A run fails, or measures something else.
 pub fn measure_designs(
     designs: &[Design],
     image: &Path,
@@ -52,9 +49,6 @@ pub fn measure_designs(
 }
 
 /// Measures frames of the blob at `path`, and the loops in them, whose model has this `design`.
-///
-/// # Errors
-/// The run fails, or measures something else.
 pub fn measure(
     design: &Design,
     path: &Path,
@@ -99,9 +93,6 @@ impl Frame {
     }
 
     /// What `prices` tell of the assembly, and of all.
-    ///
-    /// # Errors
-    /// The list lacks a piece.
     pub fn predicted(&self, prices: &Prices) -> Outcome<[Price; 2]> {
         let sum = |pieces| prices.sum(pieces).map_err(|cause| cause.to_string());
         let [assembly, compiled] = [sum(&self.pieces.assembly)?, sum(&self.pieces.compiled)?];

@@ -30,9 +30,6 @@ const BRANCHING_PERCENT: f64 = 10.0;
 const OTHER_COMPILERS_PERCENT: f64 = 4.0;
 
 /// Measures many designs, and writes the price list that fits them best. A list of another compiler stays.
-///
-/// # Errors
-/// A run fails, or no list fits.
 pub fn accept(image: &Path, code: &Code, directory: &Path, compiler: &str) -> Outcome {
     if let Some(other) = prices().ok().map(|list| list.compiler).filter(|it| it != compiler) {
         eprintln!("{FILE} stays that of {other}: remove it to make one of {compiler}");
@@ -48,9 +45,6 @@ pub fn accept(image: &Path, code: &Code, directory: &Path, compiler: &str) -> Ou
 /// Measures other designs than those that the list was made from, and says how well it predicts their costs; also
 /// returns the loops in them. With another `compiler` than the list's, code in assembly must be predicted exactly, and
 /// nothing may take more cycles than predicted by more than a margin.
-///
-/// # Errors
-/// A run fails, or the list tells wrong costs.
 pub fn check(
     image: &Path,
     code: &Code,
@@ -81,9 +75,6 @@ pub fn check(
 }
 
 /// Prints what the list tells of a model's `frames` beside what was counted: a table, or a list of JSON objects.
-///
-/// # Errors
-/// The list tells wrong costs.
 pub fn compare_model(frames: &[Frame], compiler: &str, json: bool) -> Outcome {
     let prices = prices()?;
     let compared = compare(frames, &prices)?;
@@ -92,9 +83,6 @@ pub fn compare_model(frames: &[Frame], compiler: &str, json: bool) -> Outcome {
 }
 
 /// What the list predicts of each of `frames`, with all weights in RAM.
-///
-/// # Errors
-/// The frames that cost something else than predicted.
 pub fn predicted(frames: &[Frame], compiler: &str) -> Outcome<Vec<Count>> {
     let prices = prices()?;
     let compared = compare(frames, &prices)?;

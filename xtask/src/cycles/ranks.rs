@@ -41,9 +41,6 @@ pub struct Measured {
 
 /// Measures a frame of every K and number of components in both formats that have assembly routines, with an affine
 /// tail. A model that does not fit a slot is left out.
-///
-/// # Errors
-/// A run fails, or counts something else.
 pub fn measure(image: &Path, code: &Code, directory: &Path) -> Outcome<Vec<Measured>> {
     fs::create_dir_all(directory).map_err(|cause| cause.to_string())?;
     let wanted: Vec<_> = [Format::F32, Format::Fixed16]
@@ -104,9 +101,6 @@ pub fn markdown(measured: &[Measured]) -> String {
 }
 
 /// Checks that no frame takes more than its budget.
-///
-/// # Errors
-/// Every budget that is exceeded, or that nothing was measured for.
 pub fn held(measured: &[Measured]) -> Outcome {
     let over = |&(format, centres, rank, most): &(Format, usize, usize, u64)| {
         let what = format!("{}, K = {centres}, {rank} components", format.name());

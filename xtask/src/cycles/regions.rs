@@ -51,7 +51,6 @@ pub struct Region {
     pub whole: Count,
     /// Count of the loop of exponentials, as [`Watched::exponential`] has it.
     pub exponential: Count,
-    /// Count of all routines in assembly.
     pub assembly: Count,
 }
 
@@ -59,7 +58,6 @@ pub struct Region {
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Watched {
     pub exponential: Range<u32>,
-    /// Functions in assembly.
     pub assembly: Vec<Range<u32>>,
 }
 
@@ -125,10 +123,6 @@ impl<'c> Regions<'c> {
 
     /// Counts a block of code that was executed, given by its instructions' addresses. All of them were executed,
     /// and only the last one may branch.
-    ///
-    /// # Errors
-    /// An instruction inside a region has no known cost, was not followed by the next one, or leads to code that
-    /// is not traced.
     pub fn execute(&mut self, block: &[u32]) -> Outcome {
         let Some((last, before)) = block.split_last() else { return Ok(()) };
         for address in before {
@@ -158,9 +152,6 @@ impl<'c> Regions<'c> {
     }
 
     /// Ends counting, and returns the regions' counts in their order.
-    ///
-    /// # Errors
-    /// The program ended within a region.
     pub fn finish(self) -> Outcome<Vec<Region>> {
         if self.place == Place::Outside {
             Ok(self.counted)

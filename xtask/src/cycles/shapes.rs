@@ -55,9 +55,6 @@ impl Measured {
 }
 
 /// Measures one inference of every shape in both formats that have assembly routines.
-///
-/// # Errors
-/// A run fails, or counts something else.
 pub fn measure(image: &Path, code: &Code, directory: &Path) -> Outcome<Vec<Measured>> {
     fs::create_dir_all(directory).map_err(|cause| cause.to_string())?;
     let wanted: Vec<_> = [Format::F32, Format::Fixed16]
@@ -109,9 +106,6 @@ pub fn markdown(measured: &[Measured]) -> String {
 }
 
 /// Checks that no shape takes more than it may for each multiplication.
-///
-/// # Errors
-/// Every shape that does.
 pub fn held(measured: &[Measured]) -> Outcome {
     let over = |it: &Measured| {
         let relative = it.relative(measured);

@@ -15,17 +15,11 @@ use crate::process::Outcome;
 const MIDDLE: f32 = 60.0;
 
 /// A blob of this `design`.
-///
-/// # Errors
-/// The design is beyond what a format or the blob holds.
 pub fn blob(design: &Design) -> Outcome<Vec<u8>> {
     blob_with(design, None)
 }
 
 /// A blob of this `design`, with a `confidence`.
-///
-/// # Errors
-/// The design is beyond what a format or the blob holds, or the confidence is not for such a model.
 pub fn blob_with(design: &Design, confidence: Option<Confidence<'_>>) -> Outcome<Vec<u8>> {
     let words: Vec<Vec<u32>> = design.networks.iter().map(words).collect();
     let networks = design.networks.iter().zip(&words);

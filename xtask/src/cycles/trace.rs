@@ -38,10 +38,6 @@ struct Blocks {
 
 impl Blocks {
     /// Completes the block that was listed.
-    ///
-    /// # Errors
-    /// A block at the same address was listed with another length: the trace does not say which of them is
-    /// executed.
     fn close(&mut self) -> Outcome {
         let listed = std::mem::take(&mut self.listed);
         let Some(first) = listed.first().copied() else { return Ok(()) };
@@ -65,9 +61,6 @@ impl Blocks {
 }
 
 /// Passes the blocks in `trace` to `regions`, and returns the lines that belong to no trace.
-///
-/// # Errors
-/// Errors of [`Regions::execute`], or of reading the trace.
 pub fn follow(mut trace: impl BufRead, regions: &mut Regions<'_>) -> Outcome<String> {
     let mut others = String::new();
     let mut blocks = Blocks::default();

@@ -25,7 +25,6 @@ const SPREAD_OF_ARRAY: f64 = 0.4;
 #[derive(Debug, Clone, Copy)]
 pub struct Wanted {
     pub format: Format,
-    /// Number of centres K.
     pub centres: usize,
     /// Whether the model has one network for the whole array, instead of one a row.
     pub whole_array: bool,
@@ -33,9 +32,6 @@ pub struct Wanted {
 
 /// Trains the models `wanted`, and returns their blobs in the same order. Their networks are those of
 /// `host-sim train press -n 500 --noise 0.05` with the options for each.
-///
-/// # Errors
-/// A model cannot be trained.
 pub fn train(wanted: &[Wanted]) -> Outcome<Vec<ModelBlob>> {
     let world = World::press();
     let dataset = Synthesis::of(&world).noise_level(NOISE).frames(Stream::Training, FRAMES);

@@ -16,9 +16,7 @@ use crate::experiment::Experiment;
 pub struct Coverage {
     /// Name of the group: `dz_mm`, or a column's name.
     pub group: String,
-    /// Unit of the outputs.
     pub unit: String,
-    /// All errors.
     pub all: Covered,
     /// The quarter of the errors with the least deviations.
     pub surest_quarter: Covered,
@@ -29,7 +27,6 @@ pub struct Coverage {
 /// Errors, and how many of them the intervals cover.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Covered {
-    /// Number of errors.
     pub count: usize,
     /// Root mean square of the errors, in their unit.
     pub rmse: f64,
@@ -68,7 +65,6 @@ impl Covered {
 ///
 /// # Panics
 /// If there are not as many estimates and deviations as truths, or ratios as columns.
-#[must_use]
 pub fn coverage(
     truth: &Table,
     estimates: &[f64],
@@ -107,7 +103,6 @@ pub fn coverage(
 pub struct Detection {
     /// What is wrong with the frames.
     pub anomaly: String,
-    /// Number of frames.
     pub frames: usize,
     /// Share of them that are novel.
     pub percent_novel: f64,
@@ -119,7 +114,6 @@ const CONDITIONS: [[f64; 2]; 5] = [[0.0, 0.0], [0.2, 0.0], [0.2, 0.4], [0.2, 0.5
 /// Judges which of the scene's frames `model` finds novel: usual ones, and so many `frames` of every anomaly.
 ///
 /// A `model` without a confidence finds none.
-#[must_use]
 pub fn detections(scene: &Experiment, model: &PreparedModel<'_>, frames: usize) -> Vec<Detection> {
     let world = &scene.world;
     let rest =

@@ -44,7 +44,6 @@ impl Stage {
     ];
 
     /// Name of the fault that the stage adds, for tables.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Quantised => "quantised",
@@ -57,7 +56,6 @@ impl Stage {
     }
 
     /// Readout of this stage.
-    #[must_use]
     pub fn readout(self, circuit: Circuit, of_scene: &Readout) -> Readout {
         let from = |stage: Self, given: Option<f64>, typical: f64| {
             (self as usize >= stage as usize).then(|| given.unwrap_or(typical))
@@ -89,11 +87,8 @@ pub struct ReadingErrors {
 /// Result of one circuit with the faults of one stage.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Line {
-    /// Circuit of the readout.
     pub circuit: Circuit,
-    /// Stage of the faults.
     pub stage: Stage,
-    /// Errors of the scanned readings.
     pub readings: ReadingErrors,
     /// Errors of the outputs decoded from them, by group.
     pub errors: Vec<Errors>,
@@ -102,7 +97,6 @@ pub struct Line {
 /// Results of all circuits and stages on the same frames.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReadoutResult {
-    /// Name of the scene.
     pub subject: String,
     /// Seed of every random draw.
     pub seed: u64,
@@ -118,19 +112,16 @@ pub struct ReadoutResult {
 
 impl ReadoutResult {
     /// Errors of the network on ideal readings.
-    #[must_use]
     pub fn ideal_errors(&self) -> &[Errors] {
         metrics::of_decoder(&self.decoders, NETWORK)
     }
 
     /// Errors of always predicting the mean.
-    #[must_use]
     pub fn mean_errors(&self) -> &[Errors] {
         metrics::of_decoder(&self.decoders, mean::NAME)
     }
 
     /// Result of a circuit at a stage.
-    #[must_use]
     pub fn line(&self, circuit: Circuit, stage: Stage) -> Option<&Line> {
         self.lines.iter().find(|line| line.circuit == circuit && line.stage == stage)
     }
@@ -139,9 +130,6 @@ impl ReadoutResult {
 /// Scans `frames` of the scene with every circuit and stage and decodes them with `model`.
 ///
 /// The model's columns must be the scene's. If its inputs are relative, each board captures a baseline of its own.
-///
-/// # Errors
-/// [`Error`](crate::Error) for a sensor that the virtual board does not have, or a transaction that its parts refuse.
 pub fn measure(
     experiment: &Experiment,
     model: &PreparedModel<'_>,

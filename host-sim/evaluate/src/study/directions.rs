@@ -32,17 +32,13 @@ pub const INVERTED_DAMPED: &str = "inverted, damped";
 /// Results of a scene.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DirectionsResult {
-    /// Name of the scene.
     pub subject: String,
     /// Seed of every random draw.
     pub seed: u64,
-    /// Number of test frames.
     pub frames: usize,
     /// Number of rows that were inverted at each level.
     pub rows: usize,
-    /// Number of frames that networks were trained on.
     pub training_frames: usize,
-    /// Number of centres of each network.
     pub centres: usize,
     /// Results by noise, without noise first.
     pub levels: Vec<Level>,
@@ -70,7 +66,6 @@ pub struct Level {
 /// Effort of inverting the network.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Inversion {
-    /// Name of the decoder.
     pub decoder: String,
     /// Share of the rows that converged: to an exact solution in the box, or where it is damped to a minimum.
     pub percent_converged: f64,
@@ -79,9 +74,6 @@ pub struct Inversion {
 }
 
 /// Trains networks in both directions at every level of noise, and inverts those that predict readings.
-///
-/// # Errors
-/// [`Error`](crate::Error) for a scene that single rows cannot decode, or networks that cannot be trained.
 pub fn study(
     experiment: &Experiment,
     frames: usize,
@@ -232,7 +224,6 @@ impl RowModel for Networks<'_> {
 
 impl DirectionsResult {
     /// Errors of predicting readings at `level`, by the network.
-    #[must_use]
     pub fn reading_rmse_ohm(level: &Level) -> f64 {
         metrics::of_decoder(&level.readings, NETWORK).first().map_or(f64::NAN, |it| it.rmse)
     }

@@ -23,7 +23,6 @@ const NONE_MM: f64 = 1e-6;
 /// Frames and searches of the study.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plan {
-    /// Number of test frames.
     pub frames: usize,
     /// Number of searches for other deformations that read alike, for each row of a frame.
     pub searches: usize,
@@ -38,15 +37,12 @@ impl Default for Plan {
 /// Results of a scene.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EquationsResult {
-    /// Name of the scene.
     pub subject: String,
     /// Seed of every random draw.
     pub seed: u64,
-    /// Number of test frames.
     pub frames: usize,
     /// Number of rows that were solved at each level: those of all test frames.
     pub rows: usize,
-    /// Number of frames that networks were trained on.
     pub training_frames: usize,
     /// Errors by noise, without noise first.
     pub levels: Vec<Level>,
@@ -97,7 +93,6 @@ pub struct RowWire {
 
 impl EquationsResult {
     /// Shares over all row-wires, of which each has as many rows. Its row-wire is 0.
-    #[must_use]
     pub fn all_rows(&self) -> Option<RowWire> {
         let rows = &self.without_noise;
         let mean = |of: &dyn Fn(&RowWire) -> f64| {
@@ -123,9 +118,6 @@ impl EquationsResult {
 }
 
 /// Solves the equations of the scene's test frames at every level of noise, and judges that beside trained decoders.
-///
-/// # Errors
-/// [`Error`](crate::Error) for a scene that equations of single rows cannot decode, or a network that cannot be trained.
 pub fn study(
     experiment: &Experiment,
     plan: Plan,

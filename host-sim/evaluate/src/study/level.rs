@@ -26,18 +26,13 @@ const MOST_LIMIT_FRAMES: usize = 40;
 pub(super) struct NoiseLevel {
     /// Scene at this level, whose networks decode and are trained as the paper's: K-means, then output weights.
     pub scene: Experiment,
-    /// Test frames.
     pub test: Dataset,
-    /// Measure for errors on them.
     pub measure: Measure,
     /// Limit on the first of them, or why there is none.
     pub limit: LimitSummary,
 }
 
 /// Checks that equations for single rows can decode the scene, and that so many `frames` can be tested.
-///
-/// # Errors
-/// [`BadValue`] for the setting that prevents it.
 pub(super) fn check(experiment: &Experiment, frames: usize) -> std::result::Result<(), BadValue> {
     let world = &experiment.world;
     let all = world.outputs == Outputs::all_deformations();

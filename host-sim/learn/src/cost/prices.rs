@@ -48,7 +48,6 @@ impl Prices {
     }
 
     /// The price list of these pieces and prices, of code by `compiler`, as text.
-    #[must_use]
     pub fn text(compiler: &str, prices: &[(String, Price)]) -> String {
         let line = |(name, [instructions, cycles, flash]): &(String, Price)| {
             format!("\"{name}\",{instructions},{cycles},{flash}\n")

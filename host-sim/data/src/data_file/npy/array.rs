@@ -64,9 +64,6 @@ pub struct Array<R> {
 
 impl<R: Read> Array<Chain<Cursor<Vec<u8>>, R>> {
     /// Reads the header that `file` begins with.
-    ///
-    /// # Errors
-    /// What it is instead, in words.
     pub fn open(mut file: R) -> Result<Self, String> {
         let mut head = vec![];
         let most = PREFIX_BYTES + MOST_HEADER_BYTES as u64;
