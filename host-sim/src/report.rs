@@ -35,56 +35,47 @@ mod learning_curve;
 pub use view::{Made, View};
 
 /// Page for `result`: no script, no file beside it, the same bytes for the same result.
-#[must_use]
 pub fn html(result: &RunResult, made: &Made) -> String {
     html::page(&View::of_run(result, made))
 }
 
 /// Page for a model, whatever its result is from: as [`html`].
-#[must_use]
 pub fn view_html(view: &View<'_>) -> String {
     html::page(view)
 }
 
 /// Page for a trade between speed and accuracy, with the `command` that computed it.
-#[must_use]
 pub fn trade_html(trade: &Trade, command: &str) -> String {
     trade::html(trade, command)
 }
 
 /// Picture of a trade, as a file of its own: light or dark like the viewer.
-#[must_use]
 pub fn trade_svg(trade: &Trade) -> String {
     trade::svg(trade)
 }
 
 /// Page for a limit: what the sensor can know, with pictures.
-#[must_use]
 pub fn limit_html(limit: &LimitResult) -> String {
     limit::html(limit)
 }
 
 /// Picture of the directions that a sensor shows, as a file of its own: light or dark like the viewer.
-#[must_use]
 pub fn directions_svg(limit: &LimitResult) -> String {
     limit::directions_svg(limit)
 }
 
 /// Picture of what is known of each electrode, as a file of its own: light or dark like the viewer.
-#[must_use]
 pub fn known_svg(limit: &LimitResult) -> String {
     limit::known_svg(limit)
 }
 
 /// Picture of tables, each with its name, beside the paper's printed Table 1; a file of its own, light or dark like the
 /// viewer.
-#[must_use]
 pub fn printed_svg(tables: &[(&str, Cells)]) -> String {
     printed::svg(tables)
 }
 
 /// Picture of a recursion's learning curve on `subject`, as a file of its own: light or dark like the viewer.
-#[must_use]
 pub fn learning_curve_svg(curve: &LearningCurve, subject: &str) -> String {
     learning_curve::svg(curve, subject)
 }

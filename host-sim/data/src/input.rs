@@ -83,9 +83,6 @@ pub fn read(path: &Path, most_bytes: u64) -> Result<Vec<u8>> {
 }
 
 /// Reads the text file at `path` whole, if it has at most [`MOST_TEXT_BYTES`].
-///
-/// # Errors
-/// As [`read`]; and [`Error::Read`] for bytes that are not UTF-8.
 pub fn read_text(path: &Path) -> Result<String> {
     String::from_utf8(read(path, MOST_TEXT_BYTES)?).map_err(|cause| {
         Error::read(path, io::Error::new(ErrorKind::InvalidData, cause.utf8_error()))

@@ -31,9 +31,6 @@ pub struct Joined {
 
 impl Join {
     /// Checks tolerance and lag.
-    ///
-    /// # Errors
-    /// The field `tolerance` or `lag` with a value that cannot be used.
     pub fn check(&self) -> std::result::Result<(), BadValue> {
         let is_tolerance = self.tolerance.is_finite() && self.tolerance >= 0.0;
         let rule = || "give a time from 0, in the unit of the time stamps".into();

@@ -45,9 +45,6 @@ pub fn write_whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()>
 }
 
 /// Writes `bytes` to `path`, whole or not at all, like [`write_whole`].
-///
-/// # Errors
-/// [`Error::Write`] if the file cannot be written.
 pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
     write_whole(path, |file| file.write_all(bytes).map_err(|cause| Error::write(path, cause)))
 }
@@ -116,9 +113,6 @@ impl FileSet {
 
     /// Writes files, by name and content, to `folder`, which is made if it is not there. Other files of the set
     /// are removed: they are from an earlier run.
-    ///
-    /// # Errors
-    /// [`Error::Write`] if a file cannot be written.
     pub fn write(&self, folder: &Path, contents: &[(&str, &[u8])]) -> Result<()> {
         fs::create_dir_all(folder).map_err(|cause| Error::write(folder, cause))?;
         let written = contents.iter().map(|(name, bytes)| {

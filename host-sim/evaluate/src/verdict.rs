@@ -36,7 +36,6 @@ impl Verdict {
     /// and the `limit`. It warns of outputs without a gain over these.
     ///
     /// Without the mean among `decoders` there is nothing to compare with, and the sentence tells errors alone.
-    #[must_use]
     pub fn of(decoders: &[DecoderErrors], limit: &LimitSummary) -> Self {
         let Some(model) = decoders.first() else {
             return Self { sentence: String::new(), warnings: vec![] };

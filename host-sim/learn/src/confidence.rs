@@ -66,7 +66,6 @@ pub struct Density {
 
 impl Density {
     /// Fits the density of the inputs of `dataset`, which has frames.
-    #[must_use]
     pub fn fit(dataset: &Dataset, settings: &Settings) -> Self {
         let readings = dataset.inputs.names.len();
         let features = Features::of(&dataset.inputs, settings.directions.clamp(1, readings));

@@ -82,7 +82,6 @@ struct Column {
 }
 
 /// Finds the outliers of `dataset`; a missing value (NaN) is none. `line_number` gives the number of a frame's line, for messages.
-#[must_use]
 pub fn find(dataset: &Dataset, line_number: impl Fn(usize) -> u64) -> Outliers {
     let frames = dataset.frames();
     let tables = [&dataset.inputs, &dataset.outputs];

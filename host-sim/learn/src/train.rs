@@ -121,7 +121,6 @@ impl Options {
 
     /// Initial covariance δ of the recursive least squares on so many `frames`: that of the solver, else one over the
     /// penalty on squared weights.
-    #[must_use]
     pub fn initial_covariance(&self, frames: usize) -> f64 {
         if let Solver::Rls(Recursive { initial_covariance: Some(covariance), .. }) = self.solver {
             return covariance;
@@ -196,7 +195,6 @@ pub struct InputScale {
 
 impl InputScale {
     /// Scale of a table's inputs, rounded to the numbers that the blob holds.
-    #[must_use]
     pub fn of(table: &RowTable) -> Self {
         // Ranges of the readings in f32, as the device has them.
         let ranges: Vec<[f32; 2]> =
@@ -217,7 +215,6 @@ impl InputScale {
     }
 
     /// Scales `readings` (`samples × inputs`) to [0, 1], and clamps them like the device does.
-    #[must_use]
     pub fn apply(&self, readings: &[f64]) -> Vec<f64> {
         let ranges = || self.minimum.iter().zip(&self.per_span);
         let [low, high] = CLAMP.map(f64::from);
@@ -284,7 +281,6 @@ pub struct Samples<'b> {
 
 impl<'b> Samples<'b> {
     /// Scales the inputs of `table` to [0, 1].
-    #[must_use]
     pub fn new(table: &'b RowTable) -> Self {
         let scale = InputScale::of(table);
         Self { scaled: scale.apply(&table.inputs.values), scale, table }
@@ -298,7 +294,6 @@ impl<'b> Samples<'b> {
     /// holds.
     ///
     /// `part` numbers the network, so that each draws its own starting points.
-    #[must_use]
     pub fn centres(&self, options: &Options, part: usize) -> Vec<f64> {
         let mut random =
             Random::new(options.seed, Stream::Training, Purpose::Centres, 0, part as u64);
@@ -309,7 +304,6 @@ impl<'b> Samples<'b> {
 
     /// Hidden layer of Gaussians at `centres` (`centres × inputs`, on scaled inputs), with the widths that `options` ask
     /// for.
-    #[must_use]
     pub fn layer(&self, centres: Vec<f64>, options: &Options) -> HiddenLayer {
         let relative_widths = options.widths.relative(&centres, self.inputs());
         HiddenLayer { centres, spread: options.spread, relative_widths }
@@ -424,7 +418,6 @@ fn check(dataset: &Dataset, options: &Options) -> Result<()> {
 ///
 /// # Panics
 /// If `parameters` are not as many as [`projection::fit`] makes for this data set.
-#[must_use]
 pub fn view<'b>(parameters: &'b [f32], dataset: &Dataset) -> Projection<'b> {
     let readings = dataset.inputs.names.len();
     Projection::new(readings, parameters.len() / (readings + 1), parameters)

@@ -73,7 +73,6 @@ pub struct Prior {
 
 impl Prior {
     /// Moments of the deformations that `world` draws.
-    #[must_use]
     pub fn of(world: &World) -> Self {
         let synthesis = Synthesis::of(world).ideal().drift(None);
         let frames = synthesis.outputs(Outputs::all_deformations());

@@ -56,9 +56,6 @@ const GLANCE: Duration = Duration::from_millis(5);
 /// Line of bytes to a device.
 pub trait Wire: Read + Write {
     /// Lets reads end after `timeout` if nothing has come.
-    ///
-    /// # Errors
-    /// Error of the system if the timeout cannot be set.
     fn set_read_timeout(&mut self, timeout: Duration) -> std::io::Result<()>;
 }
 
@@ -94,9 +91,6 @@ pub struct Device<W> {
 
 impl<W: Wire> Device<W> {
     /// Device on `wire`; nothing is sent yet.
-    ///
-    /// # Errors
-    /// [`Error::Line`] if the wire takes no timeout.
     pub fn new(mut wire: W) -> Result<Self> {
         wire.set_read_timeout(GLANCE)?;
         let receiver = Receiver::new(vec![0; MOST_REPORT_BYTES]);
@@ -137,9 +131,6 @@ impl<W: Wire> Device<W> {
     }
 
     /// Sends a request with a new number, and returns the number.
-    ///
-    /// # Errors
-    /// [`Error::RequestTooLong`], or [`Error::Line`] if the line fails.
     pub fn send(&mut self, request: &Request<'_>) -> Result<u16> {
         self.number = self.number.checked_add(1).unwrap_or(packet::UNASKED + 1);
         self.send_raw(&request_bytes(self.number, request)?)?;
@@ -165,9 +156,6 @@ impl<W: Wire> Device<W> {
 
     /// Passes reports with their numbers to `read` until it returns a value; `None` once `deadline` has
     /// passed.
-    ///
-    /// # Errors
-    /// [`Error::Line`] or [`Error::Closed`] if the line fails; [`Error::Interrupted`].
     pub fn hear<T>(
         &mut self,
         deadline: Instant,
@@ -245,9 +233,6 @@ impl<W: Wire> Device<W> {
     }
 
     /// Sends a `request` that no device of this protocol refuses, until the device answers.
-    ///
-    /// # Errors
-    /// [`Error::Refused`] if it does refuse, or the errors of [`ask`](Self::ask).
     pub fn ask_plainly<T>(
         &mut self,
         request: &Request<'_>,
@@ -257,9 +242,6 @@ impl<W: Wire> Device<W> {
     }
 
     /// Asks the device for its identity.
-    ///
-    /// # Errors
-    /// Errors of [`ask`](Self::ask), such as [`Error::NoAnswer`].
     pub fn identify(&mut self) -> Result<DeviceIdentity> {
         self.ask_plainly(&Request::Identify, |report| match report {
             Report::Identity(identity) => Some(identity.into()),
@@ -268,9 +250,6 @@ impl<W: Wire> Device<W> {
     }
 
     /// Asks for the device's counters.
-    ///
-    /// # Errors
-    /// Errors of [`ask`](Self::ask), such as [`Error::NoAnswer`].
     pub fn statistics(&mut self) -> Result<firmware::link::message::Statistics> {
         self.ask_plainly(&Request::Statistics, |report| match report {
             Report::Statistics(statistics) => Some(*statistics),
@@ -279,18 +258,12 @@ impl<W: Wire> Device<W> {
     }
 
     /// Gives the device a baseline in Ω, one number a reading of its model.
-    ///
-    /// # Errors
-    /// [`Error::Refused`] if their number is another, or the errors of [`ask`](Self::ask).
     pub fn set_baseline(&mut self, baseline_ohm: &[f32]) -> Result<()> {
         let request = Request::SetBaseline { readings_ohm: Floats::of(baseline_ohm) };
         self.ask_plainly(&request, |report| matches!(report, Report::Baseline { .. }).then_some(()))
     }
 
     /// Restarts the device and waits until it answers again.
-    ///
-    /// # Errors
-    /// [`Error::NoAnswer`] if the device does not answer in time.
     pub fn restart(&mut self) -> Result<DeviceIdentity> {
         self.ask_plainly(&Request::Restart, |report| {
             matches!(report, Report::Restarting).then_some(())
@@ -310,9 +283,6 @@ impl<W: Wire> Device<W> {
 }
 
 /// Bytes of a request, framed for the line.
-///
-/// # Errors
-/// [`Error::RequestTooLong`] for a request of more than 4096 bytes.
 pub fn request_bytes(number: u16, request: &Request<'_>) -> Result<Vec<u8>> {
     let mut buffer = [0; MOST_REQUEST_BYTES];
     let packet = packet::encode(number, request, &mut buffer)

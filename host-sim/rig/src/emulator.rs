@@ -58,7 +58,6 @@ impl Options {
 /// Serial lines of the image.
 #[derive(Debug)]
 pub struct Lines {
-    /// Line of the link.
     pub link: Link,
     /// Second UART, of the readout, if it was wanted.
     pub readout: Option<TcpStream>,
@@ -157,9 +156,6 @@ impl Emulator {
     }
 
     /// Starts QEMU with further `arguments`, and connects to the image's serial lines.
-    ///
-    /// # Errors
-    /// The same errors as [`start`](Self::start).
     pub fn start_with(options: &Options, arguments: &[&str]) -> Result<(Self, Lines)> {
         options.check()?;
         let failed = |cause| Error::NoStart { qemu: options.qemu.clone(), cause };

@@ -23,9 +23,7 @@ pub enum Error {
     /// Serial port that cannot be opened.
     #[error("{port}: {cause}; {known} (on Linux you may have to join the group dialout)")]
     Port {
-        /// Name of the port.
         port: String,
-        /// Reason.
         cause: serialport::Error,
         /// Ports that this computer has.
         known: String,
@@ -41,11 +39,9 @@ pub enum Error {
         "frame {frame} has {found} values instead of {expected}; was the model exchanged meanwhile?"
     )]
     ReportLength {
-        /// Number of the frame.
         frame: u32,
         /// Number of values that it should have.
         expected: usize,
-        /// Number of values that it has.
         found: usize,
     },
     /// Request longer than any device takes.
@@ -67,12 +63,7 @@ pub enum Error {
     Silent(String),
     /// Answer that does not belong to the request.
     #[error("the device answers {request} with {answer}")]
-    Unexpected {
-        /// Request that was sent.
-        request: String,
-        /// Answer that came.
-        answer: String,
-    },
+    Unexpected { request: String, answer: String },
     /// Request that the device refused.
     #[error("the device refused: {}", why(*.0))]
     Refused(Refusal),
@@ -112,7 +103,6 @@ pub enum Error {
     NoRoom {
         /// What the device has room for.
         capacity: Capacity,
-        /// Shape of the model.
         shape: ModelShape,
     },
     /// Exponential of the device that the host does not know.
@@ -121,47 +111,25 @@ pub enum Error {
     /// World with another readout than the image has.
     #[error("the image's readout.{field} is {only:?}; set it to that, or remove it")]
     OtherReadout {
-        /// Name of the part.
         field: &'static str,
         /// Part that the image has.
         only: &'static str,
     },
     /// Emulator whose program is missing.
     #[error("{}: there is no such program; on Debian: apt-get install qemu-system-arm", qemu.display())]
-    NoQemu {
-        /// Program, by name or path.
-        qemu: PathBuf,
-    },
+    NoQemu { qemu: PathBuf },
     /// Emulator that does not start.
     #[error("{}: the emulator does not start: {cause}", qemu.display())]
-    NoStart {
-        /// Program, by name or path.
-        qemu: PathBuf,
-        /// Reason.
-        cause: std::io::Error,
-    },
+    NoStart { qemu: PathBuf, cause: std::io::Error },
     /// File of a mailbox that cannot be made.
     #[error("cannot make the mailbox {}: {cause}", path.display())]
-    Mailbox {
-        /// Path of the file.
-        path: PathBuf,
-        /// Reason.
-        cause: std::io::Error,
-    },
+    Mailbox { path: PathBuf, cause: std::io::Error },
     /// Image that cannot be read.
     #[error("{}: {cause}; `cargo xtask firmware` builds it, below CARGO_TARGET_DIR if that is set", image.display())]
-    NoImage {
-        /// Path of the image.
-        image: PathBuf,
-        /// Reason.
-        cause: std::io::Error,
-    },
+    NoImage { image: PathBuf, cause: std::io::Error },
     /// Image that is no program.
     #[error("{}: it is no ELF file; the application's is `qemu-app`", image.display())]
-    NotElf {
-        /// Path of the image.
-        image: PathBuf,
-    },
+    NotElf { image: PathBuf },
     /// Failure of the virtual board at the end of the readout's line.
     #[error(transparent)]
     Board(#[from] taxel_simulate::Error),
@@ -275,7 +243,6 @@ fn why_not_recalibrated(fault: RecalibrationFault) -> String {
 }
 
 /// What image a model of this `shape` needs, if those of this `capacity` have no room for it.
-#[must_use]
 pub fn image_for(capacity: Capacity, shape: ModelShape) -> String {
     match capacity.enlarged_for(shape) {
         Some(Capacity { rows, columns, outputs }) => {

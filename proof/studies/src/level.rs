@@ -26,9 +26,7 @@ const MOST_LIMIT_FRAMES: usize = 40;
 pub(super) struct NoiseLevel {
     /// Scene at this level, whose networks decode and are trained as the paper's: K-means, then output weights.
     pub scene: Experiment,
-    /// Test frames.
     pub test: Dataset,
-    /// Measure for errors on them.
     pub measure: Measure,
     /// Limit on the first of them, or why there is none.
     pub limit: LimitSummary,

@@ -6,7 +6,6 @@ use std::borrow::Cow;
 const MOST_CHARS: usize = 60;
 
 /// Text of a file as a message repeats it: what is long is cut.
-#[must_use]
 pub fn cut(text: &str) -> Cow<'_, str> {
     match text.char_indices().nth(MOST_CHARS) {
         Some((end, _)) => format!("{} … ({} bytes)", &text[..end], text.len()).into(),
@@ -15,7 +14,6 @@ pub fn cut(text: &str) -> Cow<'_, str> {
 }
 
 /// Text of a file as a message repeats it: in quotes, and cut if it is long.
-#[must_use]
 pub fn quoted(text: &str) -> String {
     match text.char_indices().nth(MOST_CHARS) {
         Some((end, _)) => format!("{:?} … ({} bytes)", &text[..end], text.len()),
@@ -43,7 +41,6 @@ pub fn printable(text: &str) -> Cow<'_, str> {
 }
 
 /// Number of a file as a message repeats it: one of many digits with a power of ten.
-#[must_use]
 pub fn number(value: f64) -> String {
     short(value.to_string())
 }
@@ -60,7 +57,6 @@ pub(super) fn short(value: String) -> String {
 }
 
 /// Number of bytes in the unit that people use for it.
-#[must_use]
 pub fn in_words(bytes: u64) -> String {
     match bytes {
         0..1_000 => format!("{bytes} bytes"),

@@ -28,15 +28,11 @@ pub struct Target {
     pub named: PathBuf,
     /// Path behind all links.
     pub real: PathBuf,
-    /// Permissions of the file that is there.
     pub permissions: Option<Permissions>,
 }
 
 impl Place {
     /// Place of `path`. A link is followed, even to where nothing is yet.
-    ///
-    /// # Errors
-    /// Error of the system; a folder; a file that must not be written; stdin.
     pub fn of(path: &Path) -> io::Result<Self> {
         let refused = |why| Err(io::Error::new(ErrorKind::PermissionDenied, why));
         let mut real = path.to_path_buf();
@@ -78,9 +74,6 @@ impl Place {
 }
 
 /// File that `path` leads to.
-///
-/// # Errors
-/// [`Error::Write`] if it leads elsewhere, or to a file that cannot be written.
 pub fn file(path: &Path) -> Result<Target> {
     match Place::of(path) {
         Ok(Place::File(target)) => Ok(target),
@@ -90,9 +83,6 @@ pub fn file(path: &Path) -> Result<Target> {
 }
 
 /// Opens a stream. What it holds already stays.
-///
-/// # Errors
-/// Error of the system; a named pipe that nobody reads.
 pub fn open_stream(path: &Path) -> io::Result<File> {
     // A file that the caller has open already, as in `3>> log`, is written at its end.
     input::open_in_time(path, OpenOptions::new().append(true), "nobody reads this pipe")

@@ -133,9 +133,6 @@ pub struct Scratch(TempDir);
 
 impl Scratch {
     /// Makes a folder.
-    ///
-    /// # Errors
-    /// Error of the system.
     pub fn new() -> io::Result<Self> {
         let mut pending = pending();
         let folder = Builder::new().prefix(".taxel.").suffix(".tmp").tempdir()?;

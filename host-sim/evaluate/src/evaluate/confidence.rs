@@ -61,7 +61,6 @@ impl Covered {
 ///
 /// # Panics
 /// If there are not as many estimates and deviations as truths, or ratios as columns.
-#[must_use]
 pub fn coverage(
     truth: &Table,
     estimates: &[f64],

@@ -103,7 +103,6 @@ impl FittedNetwork {
     ///
     /// # Panics
     /// Never: an expansion was made for the network's number of outputs.
-    #[must_use]
     pub fn expansion(&self) -> Option<Expansion<'_>> {
         let components = self.shape.outputs;
         self.expansion.as_ref().map(|block| {
@@ -113,7 +112,6 @@ impl FittedNetwork {
     }
 
     /// Number format of the network.
-    #[must_use]
     pub fn format(&self) -> Format {
         self.format
     }
@@ -122,7 +120,6 @@ impl FittedNetwork {
     ///
     /// # Panics
     /// Never: the parameters were checked when they were fitted.
-    #[must_use]
     pub fn network(&self) -> Network<'_> {
         self.try_network().expect("checked when fitted")
     }

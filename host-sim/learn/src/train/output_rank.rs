@@ -112,7 +112,6 @@ pub(super) fn components(expansion: &[f32], rank: usize, outputs: &Table) -> Tab
 
 /// Expands every line of `components` as the device does: `lines × outputs`. A line with a missing component has no
 /// output either.
-#[must_use]
 pub fn expand(expansion: Expansion<'_>, components: &[f64]) -> Vec<f64> {
     let (width, outputs) = (expansion.components(), expansion.outputs());
     if width == 0 || outputs == 0 {

@@ -20,7 +20,6 @@ pub const TYPICAL_GAIN: f64 = 0.02;
 /// Errors of one decoder on the same test frames without and with drift.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Line {
-    /// Name of the decoder.
     pub decoder: String,
     /// Whether its inputs are readings relative to the baseline.
     pub relative_inputs: bool,
@@ -35,15 +34,12 @@ pub struct Line {
 /// Results of a scene, by decoder.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DriftResult {
-    /// Name of the scene.
     pub subject: String,
     /// Seed of every random draw.
     pub seed: u64,
     /// Largest relative change of the gain.
     pub gain: f64,
-    /// Number of frames trained on.
     pub training_frames: usize,
-    /// Number of frames evaluated on.
     pub test_frames: usize,
     /// Errors by decoder: all that take readings, those trained with drift, those with relative inputs. The mean
     /// stands once.

@@ -23,7 +23,6 @@ const NONE_MM: f64 = 1e-6;
 /// Frames and searches of the study.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plan {
-    /// Number of test frames.
     pub frames: usize,
     /// Number of searches for other deformations that read alike, for each row of a frame.
     pub searches: usize,
@@ -38,15 +37,12 @@ impl Default for Plan {
 /// Results of a scene.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EquationsResult {
-    /// Name of the scene.
     pub subject: String,
     /// Seed of every random draw.
     pub seed: u64,
-    /// Number of test frames.
     pub frames: usize,
     /// Number of rows that were solved at each level: those of all test frames.
     pub rows: usize,
-    /// Number of frames that networks were trained on.
     pub training_frames: usize,
     /// Errors by noise, without noise first.
     pub levels: Vec<Level>,

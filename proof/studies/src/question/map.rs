@@ -37,11 +37,9 @@ pub struct Plan {
     pub samples: Vec<usize>,
     /// Numbers of centres K, ascending. Those below N are tried, and N itself up to [`MOST_INTERPOLATED`].
     pub centres: Vec<usize>,
-    /// Spreads, ascending.
     pub spreads: Vec<f64>,
     /// Noise levels as fractions, ascending.
     pub noise_levels: Vec<f64>,
-    /// Number of test frames.
     pub test_frames: usize,
     /// Initial covariance δ: the penalty on squared weights is 1/δ for all samples together.
     pub initial_covariance: f64,
@@ -62,9 +60,6 @@ impl Default for Plan {
 
 impl Plan {
     /// Checks every setting.
-    ///
-    /// # Errors
-    /// [`BadValue`] for the first one that cannot be used, by its name here.
     pub fn check(&self) -> std::result::Result<(), BadValue> {
         let lists = [
             ("samples", self.samples.len(), self.samples.is_sorted_by(|a, b| a < b)),
@@ -106,23 +101,18 @@ impl Plan {
 /// Results of the study.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MapStudy {
-    /// Name of the scene.
     pub subject: String,
     /// Seed of every random draw.
     pub seed: u64,
     /// Row-wire that is read, from 1.
     pub row_wire: usize,
-    /// Group of outputs.
     pub group: String,
-    /// Unit of the errors.
     pub unit: String,
-    /// Number of test frames.
     pub test_frames: usize,
     /// Initial covariance δ.
     pub initial_covariance: f64,
     /// Numbers of centres K that were tried; besides these N itself.
     pub centres: Vec<usize>,
-    /// Spreads that were tried.
     pub spreads: Vec<f64>,
     /// Maps, by noise level and then by number of samples.
     pub maps: Vec<Map>,
@@ -135,7 +125,6 @@ pub struct MapStudy {
 pub struct Map {
     /// Noise level of training and test frames, as a fraction.
     pub noise_level: f64,
-    /// Number of samples N.
     pub samples: usize,
     /// Number of training sets whose squared errors are averaged.
     pub training_sets: usize,
@@ -150,9 +139,7 @@ pub struct Map {
 /// Errors of networks with a number of centres and a spread.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Cell {
-    /// Number of centres K.
     pub centres: usize,
-    /// Spread.
     pub spread: f64,
     /// RMSE on the samples themselves.
     pub training_rmse: f64,
@@ -291,7 +278,6 @@ fn mean_square(values: &[f64]) -> f64 {
 
 /// Samples to train on, and test frames as they are scaled by these.
 struct TrainingSet {
-    /// Number of the set.
     number: usize,
     samples: RowTable,
     /// Scaled inputs of the samples and of the test frames.

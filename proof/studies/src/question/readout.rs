@@ -87,11 +87,8 @@ pub struct ReadingErrors {
 /// Result of one circuit with the faults of one stage.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Line {
-    /// Circuit of the readout.
     pub circuit: Circuit,
-    /// Stage of the faults.
     pub stage: Stage,
-    /// Errors of the scanned readings.
     pub readings: ReadingErrors,
     /// Errors of the outputs decoded from them, by group.
     pub errors: Vec<Errors>,
@@ -100,7 +97,6 @@ pub struct Line {
 /// Results of all circuits and stages on the same frames.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReadoutResult {
-    /// Name of the scene.
     pub subject: String,
     /// Seed of every random draw.
     pub seed: u64,

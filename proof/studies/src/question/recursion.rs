@@ -62,17 +62,12 @@ pub const KINDS: [(Form, &str); 4] = [
 /// What is studied.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Plan {
-    /// Number of centres K.
     pub centres: usize,
-    /// Number of updates.
     pub updates: usize,
 }
 
 impl Plan {
     /// Checks the plan.
-    ///
-    /// # Errors
-    /// [`BadValue`] for the first number that cannot be used.
     pub fn check(&self) -> std::result::Result<(), BadValue> {
         require((1..=128).contains(&self.centres), "centres", self.centres, || {
             "give from 1 to 128".into()
@@ -92,9 +87,7 @@ impl Plan {
 /// Result of one recursion.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Outcome {
-    /// Form of the recursion.
     pub form: Form,
-    /// Precision of its numbers.
     pub precision: &'static str,
     /// Width σ of the Gaussians.
     pub width: f64,
@@ -134,11 +127,9 @@ pub struct Study {
     /// What was studied.
     #[serde(flatten)]
     pub plan: Plan,
-    /// Output that is fitted.
     pub output: String,
     /// Widths, with the condition that they give.
     pub widths: Vec<Width>,
-    /// Outcomes of all recursions.
     pub outcomes: Vec<Outcome>,
 }
 

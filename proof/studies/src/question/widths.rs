@@ -28,7 +28,6 @@ const VARIANTS: [(Widths, Format); 3] = [
 /// Settings of the study.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
-    /// Numbers of centres K.
     pub centres: Vec<usize>,
     /// Spreads to choose among, by other frames than those that models are judged on.
     pub spreads: Vec<f64>,
@@ -53,7 +52,6 @@ impl Plan {
 /// Results of the study.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct WidthsStudy {
-    /// Name of the scene.
     pub subject: String,
     /// Seed of every random draw.
     pub seed: u64,
@@ -61,11 +59,8 @@ pub struct WidthsStudy {
     pub noise_level: f64,
     /// Row-wires that are read, from 1.
     pub row_wires: Vec<usize>,
-    /// Group of outputs.
     pub group: String,
-    /// Unit of the errors.
     pub unit: String,
-    /// Number of frames trained on.
     pub training_frames: usize,
     /// Number of frames that models are judged on.
     pub test_frames: usize,
@@ -82,11 +77,9 @@ pub struct WidthsStudy {
 /// Model with the best of the spreads.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Model {
-    /// Number of centres K.
     pub centres: usize,
     /// Whether centres and widths were refined after K-means.
     pub refined: bool,
-    /// Rule for the widths.
     pub widths: Widths,
     /// Number format that the networks have.
     pub format: &'static str,
@@ -98,9 +91,7 @@ pub struct Model {
     pub choice_rmse: f64,
     /// RMSE on the test frames.
     pub rmse: f64,
-    /// Its ratio to the limit, if there is one.
     pub ratio_to_limit: Option<f64>,
-    /// Size of the blob.
     pub blob_bytes: usize,
     /// Cycles of a frame on a Cortex-M4F, at zero wait.
     pub cycles: u64,
@@ -110,9 +101,7 @@ pub struct Model {
 /// that models are judged on choose it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Gain {
-    /// Number of centres K.
     pub centres: usize,
-    /// Whether the models are refined.
     pub refined: bool,
     /// RMSE over that of one common width, with as many centres.
     pub at_equal_centres: f64,

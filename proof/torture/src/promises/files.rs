@@ -91,7 +91,6 @@ struct Disk {
     /// Forgets even that: a self-test.
     forgets_always: bool,
     steps: usize,
-    /// Whether a file was renamed.
     renames: bool,
     /// Files with bytes that are not safe.
     unsafe_files: BTreeSet<PathBuf>,

@@ -15,11 +15,9 @@ const DETERMINED: f64 = 0.1;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// It is.
     Holds,
     /// Half of what it says is.
     InPart,
-    /// It is not.
     Fails,
 }
 
@@ -43,7 +41,6 @@ impl Verdict {
 pub struct Compared {
     /// Where in the maps it stands.
     pub at: String,
-    /// Its value.
     pub value: f64,
 }
 
@@ -54,11 +51,8 @@ pub struct Claim {
     pub claim: &'static str,
     /// Noise level that it is judged at, as a fraction; `None` for a claim on noise.
     pub noise_level: Option<f64>,
-    /// Number of samples.
     pub samples: usize,
-    /// Quantity that is compared.
     pub quantity: &'static str,
-    /// The figures.
     pub compared: Vec<Compared>,
     /// Whether it is borne out.
     pub verdict: Verdict,
