@@ -10,11 +10,11 @@ use taxel_data::progress::Silent;
 use taxel_rig::device::check::{Plan, check};
 use taxel_rig::device::upload;
 
-use crate::common::{Folder, small_scene};
+use crate::common::{Folder, small_scene, small_scene_with_table1};
 use crate::device;
 use validator::Schema;
 
-fn schema() -> Schema {
+pub fn schema() -> Schema {
     Schema::parse(include_str!("../../../docs/json.schema.json"))
 }
 
@@ -28,7 +28,7 @@ fn known_commands(schema: &Schema) -> BTreeSet<String> {
 }
 
 /// Runs a command with `--json`, and holds what it prints to the schema.
-fn checked(folder: &Folder, schema: &Schema, arguments: &[&str]) -> Value {
+pub fn checked(folder: &Folder, schema: &Schema, arguments: &[&str]) -> Value {
     let text = folder.succeed(&[arguments, &["--json"]].concat());
     let document: Value = serde_json::from_str(&text).unwrap();
     assert_eq!(schema.faults(&document), [""; 0], "{arguments:?}");
@@ -48,9 +48,7 @@ fn check_file(folder: &Folder, schema: &Schema, file: &str) {
 /// Folder with a scene, frames of it, and a model with a confidence.
 fn prepared(name: &str, schema: &Schema) -> Folder {
     let folder = Folder::new(name);
-    let scene = small_scene();
-    let (world, _) = scene.split_once("[table1]").unwrap();
-    folder.write("scene.toml", world.replace("frames = 3000", "frames = 600"));
+    folder.write("scene.toml", small_scene().replace("frames = 3000", "frames = 600"));
     checked(&folder, schema, &["synth", "scene.toml", "-n", "200", "-o", "data.csv"]);
     let train = ["train", "scene.toml", "--confidence", "--fill", "-o", "m.bin"];
     checked(&folder, schema, &train);
@@ -97,8 +95,7 @@ fn experiments_are_told_by_the_schema() {
         assert_eq!((&study["subject"], &study["rows"]), (&json!("small"), &json!(6)));
     }
     let confidence = checked(&["confidence", "scene.toml", "-n", "100", "--model", "m.bin"]);
-    let limit = ["limit", "scene.toml", "-n", "4", "--model", "m.bin", "-o", "limit"];
-    let limit = checked(&[&limit[..], &["--geometry"]].concat());
+    let limit = checked(&["limit", "scene.toml", "-n", "4", "--model", "m.bin", "-o", "limit"]);
     check_file(&folder, schema, "limit/limit.json");
     let trade = ["trade", "scene.toml", "--centres", "6", "--output-rank", "none"];
     let trade = checked(&[&trade[..], &["--max-error", "1"]].concat());
@@ -113,7 +110,9 @@ fn studies_are_told_by_the_schema() {
     let schema = &schema();
     let folder = prepared("json_studies", schema);
     let checked = |arguments: &[&str]| checked(&folder, schema, arguments);
-    let widths = checked(&["study", "widths", "scene.toml", "--centres", "6", "--spread", "0.8"]);
+    let one_row = small_scene().replace("row_wires = [4, 5]", "row_wires = [4]");
+    folder.write("row.toml", one_row.replace("frames = 3000", "frames = 300"));
+    let widths = checked(&["study", "widths", "row.toml", "--centres", "3", "--spread", "0.8"]);
     assert_eq!(widths["models"].as_array().unwrap().len(), 6);
     let map = ["study", "map", "scene.toml", "--samples", "30,100", "--test-frames", "50"];
     let map = checked(&[&map[..], &["--centres", "4,8", "-o", "map.svg"]].concat());
@@ -138,14 +137,11 @@ fn runs_are_told_by_the_schema() {
     let schema = &schema();
     let folder = prepared("json_runs", schema);
     checked(&folder, schema, &["run", "data.csv", "--no-refine"]);
-    let scene = small_scene().replace("frames = 3000", "frames = 600");
-    folder.write("table1.toml", scene.replace("frames = 1500", "frames = 300"));
+    folder.write("table1.toml", small_scene_with_table1().replace("frames = 1500", "frames = 300"));
     let run = checked(&folder, schema, &["run", "table1.toml"]);
     check_file(&folder, schema, "out/small/metrics.json");
     let table1 = checked(&folder, schema, &["table1", "table1.toml"]);
     assert_eq!(run["table1"]["columns"], table1["columns"]);
-    let search = ["table1", "--reconstruct", "--setups", "2", "--saved", "search.json"];
-    checked(&folder, schema, &search);
 }
 
 /// What a command would print of `result`.
