@@ -112,7 +112,7 @@ fn studies_are_told_by_the_schema() {
     let checked = |arguments: &[&str]| checked(&folder, schema, arguments);
     let one_row = small_scene().replace("row_wires = [4, 5]", "row_wires = [4]");
     folder.write("row.toml", one_row.replace("frames = 3000", "frames = 300"));
-    let widths = checked(&["study", "widths", "row.toml", "--centres", "3", "--spread", "0.8"]);
+    let widths = checked(&["study", "widths", "row.toml", "--centres", "2", "--spread", "0.8"]);
     assert_eq!(widths["models"].as_array().unwrap().len(), 6);
     let map = ["study", "map", "scene.toml", "--samples", "30,100", "--test-frames", "50"];
     let map = checked(&[&map[..], &["--centres", "4,8", "-o", "map.svg"]].concat());

@@ -17,7 +17,7 @@ use taxel_simulate::Synthesis;
 
 fn press() -> Experiment {
     let mut scene = unrefined("press");
-    (scene.training.frames, scene.training.test_frames) = (1500, 500);
+    (scene.training.frames, scene.training.test_frames) = (1500, 200);
     scene
 }
 
@@ -143,7 +143,7 @@ fn the_chosen_blob_is_what_the_table_says() {
 #[test]
 fn behind_a_gate_points_have_the_errors_of_the_gates_rows_and_cost_their_share() {
     let mut scene = press();
-    scene.training.test_frames = 150;
+    scene.training.test_frames = 100;
     let plan = Plan {
         centres: vec![16],
         output_ranks: vec![],
