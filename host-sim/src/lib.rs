@@ -13,8 +13,6 @@ macro_rules! eprintln {
     }};
 }
 
-#![allow(missing_docs, clippy::missing_errors_doc)] // a name that says all needs no more
-
 pub mod report;
 pub mod commands;
 

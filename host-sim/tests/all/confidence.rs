@@ -112,33 +112,6 @@ fn measured_data_is_held_out_fold_by_fold() {
         String::from_utf8_lossy(&alone.stderr)
             .contains("holds out one fold after the other; give at least 2")
     );
-
-    let one = train(&["--confidence", "--folds", "1"]);
-    assert_eq!(one.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&one.stderr).contains("--folds 1: give from 2"));
-}
-
-#[test]
-fn a_model_without_a_confidence_is_refused_where_it_is_asked_for() {
-    let folder = Folder::new("confidence-refused");
-    folder.write("scene.toml", small_scene());
-    folder.succeed(&["train", "scene.toml", "-o", "without.bin"]);
-    folder.succeed(&["synth", "scene.toml", "-n", "5", "-o", "test.csv"]);
-    let cases: [(&[&str], &str); 3] = [
-        (
-            &["decode", "without.bin", "test.csv", "--confidence", "-o", "out.csv"],
-            "it has no confidence: train it with --confidence",
-        ),
-        (&["confidence", "scene.toml", "--model", "without.bin"], "this model has no confidence"),
-        (&["confidence", "scene.toml", "-n", "0"], "--frames = 0: give from 1"),
-    ];
-    for (arguments, message) in cases {
-        let output = folder.run(arguments);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
-        let error = String::from_utf8_lossy(&output.stderr);
-        assert!(error.contains(message), "{arguments:?}: {error}");
-    }
-    assert!(!folder.names().contains(&"out.csv".into()));
 }
 
 #[test]

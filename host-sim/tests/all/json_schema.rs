@@ -10,11 +10,11 @@ use taxel_data::progress::Silent;
 use taxel_rig::device::check::{Plan, check};
 use taxel_rig::device::upload;
 
-use crate::common::{Folder, small_scene};
+use crate::common::{Folder, small_scene, small_scene_with_table1};
 use crate::device;
 use validator::Schema;
 
-fn schema() -> Schema {
+pub fn schema() -> Schema {
     Schema::parse(include_str!("../../../docs/json.schema.json"))
 }
 
@@ -28,7 +28,7 @@ fn known_commands(schema: &Schema) -> BTreeSet<String> {
 }
 
 /// Runs a command with `--json`, and holds what it prints to the schema.
-fn checked(folder: &Folder, schema: &Schema, arguments: &[&str]) -> Value {
+pub fn checked(folder: &Folder, schema: &Schema, arguments: &[&str]) -> Value {
     let text = folder.succeed(&[arguments, &["--json"]].concat());
     let document: Value = serde_json::from_str(&text).unwrap();
     assert_eq!(schema.faults(&document), [""; 0], "{arguments:?}");
@@ -47,9 +47,7 @@ fn check_file(folder: &Folder, schema: &Schema, file: &str) {
 /// Folder with a scene, frames of it, and a model with a confidence.
 fn prepared(name: &str, schema: &Schema) -> Folder {
     let folder = Folder::new(name);
-    let scene = small_scene();
-    let (world, _) = scene.split_once("[table1]").unwrap();
-    folder.write("scene.toml", world.replace("frames = 3000", "frames = 600"));
+    folder.write("scene.toml", small_scene().replace("frames = 3000", "frames = 600"));
     checked(&folder, schema, &["synth", "scene.toml", "-n", "200", "-o", "data.csv"]);
     let train = ["train", "scene.toml", "--confidence", "--fill", "-o", "m.bin"];
     checked(&folder, schema, &train);
@@ -114,14 +112,11 @@ fn runs_are_told_by_the_schema() {
     let schema = &schema();
     let folder = prepared("json_runs", schema);
     checked(&folder, schema, &["run", "data.csv", "--no-refine"]);
-    let scene = small_scene().replace("frames = 3000", "frames = 600");
-    folder.write("table1.toml", scene.replace("frames = 1500", "frames = 300"));
+    folder.write("table1.toml", small_scene_with_table1().replace("frames = 1500", "frames = 300"));
     let run = checked(&folder, schema, &["run", "table1.toml"]);
     check_file(&folder, schema, "out/small/metrics.json");
     let table1 = checked(&folder, schema, &["table1", "table1.toml"]);
     assert_eq!(run["table1"]["columns"], table1["columns"]);
-    let search = ["table1", "--reconstruct", "--setups", "2", "--saved", "search.json"];
-    checked(&folder, schema, &search);
 }
 
 /// What a command would print of `result`.

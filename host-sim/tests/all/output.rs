@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::common::{Folder, program, shell_status, small_scene};
+use crate::common::{Folder, program, shell_status, small_scene, small_scene_with_table1};
 
 /// The program, with the folder of its work.
 fn host(folder: &Folder, arguments: &[&str]) -> Command {
@@ -239,7 +239,7 @@ fn an_interrupted_run_leaves_no_folder_and_an_emulator_no_file() {
 #[test]
 fn a_folder_has_the_files_of_one_run_also_when_the_disk_is_full() {
     let folder = Folder::new("one_run");
-    let scene = small_scene();
+    let scene = small_scene_with_table1();
     let (before, table) = scene.split_at(scene.find("[table1]").unwrap());
     folder.write("with.toml", format!("{before}{table}"));
     folder.write("without.toml", before);

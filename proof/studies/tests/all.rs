@@ -123,3 +123,49 @@ fn a_confidence_covers_errors_and_finds_faults_novel() {
     assert!(novel(0) < 1.5, "{}", detections[0]);
     assert!((1..5).all(|at| novel(at) > 95.0), "{detections:?}");
 }
+
+#[test]
+fn a_wait_shorter_than_the_time_constant_needs_fails() {
+    let hasty = "[readout]\ntime_constant_us = 5.0\nsettling_us = 10";
+    let folder = folder("studies-hasty", ["[readout]", hasty]);
+    let output = run(&folder, &["readout", "scene.toml"]);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("settling takes 46 µs"), "{said}");
+}
+
+#[test]
+fn what_cannot_be_studied_is_refused_by_name() {
+    let small = folder("studies-refused", AS_IT_IS);
+    let wide = folder("studies-wide", ["column_wires = 18", "column_wires = 19"]);
+    let forward = ["[training]", "[training]\ndirection = \"forward\""];
+    let forward = folder("studies-forward", forward);
+    for (folder, command, says) in [
+        (&small, "map --row 9", "--row 9: the scene has rows 1 to 8"),
+        (&small, "map --group dw_mm", "--group dw_mm"),
+        (&small, "map --samples 2,30", "--samples 2: give from 4 to 100000"),
+        (&small, "map --centres 0,64", "--centres 0: give from 1 to 1024"),
+        (&small, "map --spread 1,0.1", "--spread"),
+        (&small, "map --noise 2", "--noise 2"),
+        (&small, "map --initial-covariance -1", "--initial-covariance -1"),
+        (&small, "widths press --spread -1", "--spread -1"),
+        (&small, "widths press --centres 0", "--centres 0: give from 1 to 65535"),
+        (&small, "recursion --row 9", "--row 9: the scene has rows 1 to 8"),
+        (&small, "recursion --centres 0", "--centres 0: give from 1 to 128"),
+        (&small, "recursion -n 10", "--updates 10: give from"),
+        (&small, "drift press --gain 1", "--gain 1"),
+        (&small, "confidence scene.toml -n 0", "--frames = 0: give from 1"),
+        (&small, "readout scene.toml --frames 0", "--frames = 0"),
+        (&wide, "readout scene.toml", "19 column-wires"),
+        (&forward, "drift scene.toml", "direction = forward: drift is about models that decode"),
+        (
+            &forward,
+            "readout scene.toml",
+            "direction = forward: readout is about models that decode",
+        ),
+        (&forward, "confidence scene.toml", "forward: confidence is about models that decode"),
+    ] {
+        let said = fail(folder, &command.split(' ').collect::<Vec<_>>());
+        assert!(said.contains(says), "{command}: {said}");
+    }
+}

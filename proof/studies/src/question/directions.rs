@@ -230,8 +230,8 @@ impl RowModel for Networks<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use taxel_evaluate::metrics::NETWORK;
     use taxel_data::progress::Silent;
+    use taxel_evaluate::metrics::NETWORK;
     use taxel_simulate::noise::NoiseKind;
 
     /// Row 4 of `press`, whose network predicts its readings.

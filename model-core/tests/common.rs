@@ -1,11 +1,9 @@
 //! What several tests of the blob share.
 
-#![allow(dead_code, reason = "each program of tests uses a part")]
-
 use model_core::checksum::CRC_32;
 
 /// The blob's specification.
-const SPECIFICATION: &str = include_str!("../../../docs/blob.md");
+const SPECIFICATION: &str = include_str!("../../docs/blob.md");
 
 /// Hexadecimal bytes of the specification's table between two comments `<!-- MARK -->`: lines like `| 0 | 54 41 … | … |`.
 pub fn worked_bytes(mark: &str) -> Vec<u8> {
