@@ -15,10 +15,6 @@ fn z(errors: &[Errors]) -> f64 {
     errors.iter().find(|errors| errors.group == "dz_mm").unwrap().rmse
 }
 
-fn small() -> Experiment {
-    Experiment::parse("small", &small_scene()).unwrap()
-}
-
 #[test]
 fn a_gate_and_a_trade_see_readings_and_baselines_of_the_same_session() {
     let measured = |scene: &Experiment| -> GateResult {

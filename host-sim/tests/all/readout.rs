@@ -1,7 +1,7 @@
 //! The firmware's readout on the virtual board: the errors that it adds, and the difference between
 //! circuits.
 
-use crate::common::{Folder, small_scene, unrefined};
+use crate::common::unrefined;
 use crate::quantisation::{output_bounds, reading_bound_ohm};
 use host_sim::experiment::Experiment;
 use model_core::rbf::Format;
