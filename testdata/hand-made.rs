@@ -413,6 +413,7 @@ pub static ROW_2: Fixed<18, 12, 18> = Fixed {
 
 /// Outputs of a frame from its readings, row after row. A row with a reading that is not finite has NaN.
 #[rustfmt::skip]
+#[must_use]
 pub fn decode(readings: &[[f32; 18]; 8]) -> [[f32; 18]; 8] {
     let [row_1, row_2, row_3, row_4, row_5, row_6, row_7, row_8] = readings;
     [ROW_1.infer(row_1), ROW_2.infer(row_2), ROW_1.infer(row_3), ROW_2.infer(row_4), ROW_1.infer(row_5), ROW_2.infer(row_6), ROW_1.infer(row_7), ROW_2.infer(row_8)]

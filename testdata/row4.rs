@@ -98,6 +98,7 @@ pub static ROW_1: Fixed<18, 16, 6> = Fixed {
 
 /// Outputs of a frame from its readings, row after row. A row with a reading that is not finite has NaN.
 #[rustfmt::skip]
+#[must_use]
 pub fn decode(readings: &[[f32; 18]; 1]) -> [[f32; 6]; 1] {
     let [row_1] = readings;
     [ROW_1.infer(row_1)]

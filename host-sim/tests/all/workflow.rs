@@ -315,8 +315,8 @@ fn run_writes_a_whole_folder_and_its_blob_is_the_one_that_train_writes() {
 fn every_command_has_help_with_an_example() {
     let folder = Folder::new("help");
     for command in [
-        "run", "synth", "forward", "train", "decode", "eval", "inspect", "table1", "readout",
-        "emulate", "link",
+        "run", "synth", "forward", "train", "decode", "eval", "inspect", "table1", "emulate",
+        "link",
     ] {
         let help = folder.succeed(&[command, "--help"]);
         assert!(help.contains(&format!("host-sim {command} ")), "{help}");
