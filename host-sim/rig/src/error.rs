@@ -6,10 +6,47 @@ use std::time::Duration;
 use firmware::capacity::Capacity;
 use firmware::circuit::ConstantsFault;
 use firmware::link::message::{KeepFault, ModelFault, RecalibrationFault, Refusal, SealFault};
+use firmware::link::packet::PROTOCOL_VERSION;
 use model_core::blob::ModelShape;
 
 /// Result of the functions of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
+
+/// What a device sends instead of an answer, and what to do about it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Heard {
+    /// Nothing at all.
+    #[default]
+    Nothing,
+    /// Bytes that are no packets.
+    Noise,
+    /// Packets of another version of the link.
+    OtherVersion(u8),
+    /// Packets of this version, with messages that this program does not know.
+    UnknownMessage,
+}
+
+impl std::fmt::Display for Heard {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Nothing => f.write_str(
+                "nothing comes from it: check that it runs this project's firmware, and the speed of its line",
+            ),
+            Self::Noise => f.write_str(
+                "bytes come from it that are no packets: check the speed of its line (--baud), and that it runs this \
+                 project's firmware",
+            ),
+            Self::OtherVersion(version) => write!(
+                f,
+                "it speaks version {version} of the link, and this program version {PROTOCOL_VERSION}: flash the \
+                 firmware that belongs to this program"
+            ),
+            Self::UnknownMessage => f.write_str(
+                "it sends messages that this program does not know: flash the firmware that belongs to this program",
+            ),
+        }
+    }
+}
 
 /// Failure to reach a device, to make it do something, or to start an emulator.
 #[derive(Debug, thiserror::Error)]
@@ -51,12 +88,14 @@ pub enum Error {
         most_bytes: usize,
     },
     /// Device that does not answer.
-    #[error("the device does not answer ({attempts} attempts, {} ms each); check that it runs this project's firmware, and the speed of its line", timeout.as_millis())]
+    #[error("the device does not answer ({attempts} attempts, {} ms each); {heard}", timeout.as_millis())]
     NoAnswer {
         /// Number of times that it was asked.
         attempts: u32,
         /// Longest time that an answer was waited for.
         timeout: Duration,
+        /// What came instead.
+        heard: Heard,
     },
     /// Device that stops answering or reporting in the middle of its work.
     #[error("{0}")]
