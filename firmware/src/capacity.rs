@@ -38,7 +38,6 @@ impl Capacity {
     /// const WIDE: Capacity = Capacity::parse("16x32x18");
     /// assert_eq!(WIDE, Capacity { rows: 16, columns: 32, outputs: 18 });
     /// ```
-    #[must_use]
     pub const fn parse(text: &str) -> Self {
         let bytes = text.as_bytes();
         let mut numbers = [0_usize; 3];
@@ -61,27 +60,23 @@ impl Capacity {
     }
 
     /// All wires.
-    #[must_use]
     pub const fn wires(self) -> Wires {
         Wires { rows: self.rows, columns: self.columns }
     }
 
     /// Number of outputs of all rows.
-    #[must_use]
     pub const fn all_outputs(self) -> usize {
         self.rows * self.outputs
     }
 
     /// Number of floats of working space for decoding: more than the readings of a frame and of two rows. What these
     /// leave is room for the components of an [`Expansion`](model_core::expansion::Expansion).
-    #[must_use]
     pub const fn scratch_floats(self) -> usize {
         2 * self.rows * self.columns
     }
 
     /// Bytes of the longest message: a report of all readings, or of all outputs and their deviations, the circuit's
     /// constants, or an identity.
-    #[must_use]
     pub const fn message_bytes(self) -> usize {
         let readings = 4 * self.rows * self.columns + 40;
         let estimate = 4 * 2 * self.all_outputs() + self.rows + 48;
@@ -131,7 +126,6 @@ impl Capacity {
     /// assert_eq!(wires(1, 144, 6), Some(Wires { rows: 8, columns: 18 }));
     /// assert_eq!(wires(16, 18, 18), None);
     /// ```
-    #[must_use]
     pub fn wires_for(self, shape: ModelShape) -> Option<Wires> {
         let ModelShape { rows, inputs, outputs } = shape;
         let wires = if inputs <= self.columns {

@@ -80,7 +80,6 @@ impl ScanSettings {
     /// assert!(ScanSettings::try_new(46, 2).is_some());
     /// assert!(ScanSettings::try_new(46, 0).is_none());
     /// ```
-    #[must_use]
     pub fn try_new(settling_us: u32, oversampling: u16) -> Option<Self> {
         let settings = Self { settling_us, oversampling };
         (settings == settings.clamped()).then_some(settings)

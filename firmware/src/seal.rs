@@ -34,19 +34,16 @@ pub struct Seal {
 
 impl Seal {
     /// Seals `blob` as `version`.
-    #[must_use]
     pub fn of(key: &Key, version: u32, blob: &[u8]) -> Self {
         Self { version, tag: tag(PURPOSE, key, version, &[], blob) }
     }
 
     /// Whether this is the seal of `blob`, found in a time that does not depend on the tag.
-    #[must_use]
     pub fn fits(&self, key: &Key, blob: &[u8]) -> bool {
         is_same(&self.tag, &Self::of(key, self.version, blob).tag)
     }
 
     /// Seals `blob`, which the device has made of a model whose seal is `origin`.
-    #[must_use]
     pub(crate) fn own(key: &Key, origin: &Self, blob: &[u8]) -> Self {
         let tag = tag(OWN_PURPOSE, key, origin.version, origin.origin(), blob);
         let mut seal = *origin;
@@ -56,7 +53,6 @@ impl Seal {
     }
 
     /// Whether this is the seal of a `blob` that the device has made, found in a time that does not depend on the tag.
-    #[must_use]
     pub(crate) fn fits_own(&self, key: &Key, blob: &[u8]) -> bool {
         is_same(&self.tag, &Self::own(key, self, blob).tag)
     }

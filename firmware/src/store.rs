@@ -69,7 +69,6 @@ pub trait Slot {
 /// assert_eq!(blob_in_slot(&slot).len(), 40);
 /// assert_eq!(blob_in_slot(&[0xFF; 64]).len(), 64); // erased: nothing to find
 /// ```
-#[must_use]
 pub fn blob_in_slot(slot: &[u8]) -> &[u8] {
     Model::declared_length(slot).and_then(|length| slot.get(..length)).unwrap_or(slot)
 }
@@ -90,7 +89,6 @@ pub const SEAL_BYTES: usize = 40;
 const SEAL_MARK: [u8; 4] = *b"SEAL";
 
 /// Largest blob that a slot holds, in bytes; with a seal, [`SEAL_BYTES`] less. The first record stands behind it.
-#[must_use]
 pub fn capacity(slot: &[u8]) -> usize {
     slot.len().saturating_sub(RECORD_BYTES)
 }
@@ -101,7 +99,6 @@ fn seal_place(slot: &[u8]) -> usize {
 }
 
 /// The seal behind the blob in `slot`, right or wrong.
-#[must_use]
 pub fn seal_in_slot(slot: &[u8]) -> Option<Seal> {
     let rest = slot.get(seal_place(slot)..)?.strip_prefix(&SEAL_MARK)?;
     let (version, rest) = rest.split_first_chunk()?;
@@ -185,7 +182,6 @@ pub fn reinstate<S: Slot>(slot: &mut S, generation: u32) -> Option<Result<(), Fl
 ///
 /// Uploaded models count from 1. Slot 0 may also hold a model whose record is erased, flashed together with the
 /// firmware: its generation is 0. Slot 1 holds only uploaded models.
-#[must_use]
 pub fn generation(index: usize, slot: &[u8]) -> Option<u32> {
     let records = record_places(slot).filter_map(|place| Record::of(slot, place));
     let newest = records.filter(|found| found.is_sound).map(|found| found.generation).max();

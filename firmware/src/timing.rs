@@ -16,7 +16,6 @@ const MCP3208_BYTES: u32 = 3;
 /// ```
 /// assert_eq!(firmware::timing::time_constant_ns(560.0, 1000.0), 560.0); // 560 Ω and 1 nF
 /// ```
-#[must_use]
 pub fn time_constant_ns(resistance_ohm: f32, capacitance_pf: f32) -> f32 {
     resistance_ohm * capacitance_pf / 1000.0
 }
@@ -27,7 +26,6 @@ pub fn time_constant_ns(resistance_ohm: f32, capacitance_pf: f32) -> f32 {
 /// use firmware::timing::settling_us;
 /// assert_eq!(settling_us(5_000.0, 12), 46); // τ = 5 µs, 12 bits: nine time constants
 /// ```
-#[must_use]
 pub fn settling_us(time_constant_ns: f32, bits: u8) -> u32 {
     let us = time_constant_ns * 1e-3 * ((f32::from(bits) + 1.0) * core::f32::consts::LN_2);
     let whole = us as u32; // saturates; NaN and negative times become 0
@@ -39,7 +37,6 @@ pub fn settling_us(time_constant_ns: f32, bits: u8) -> u32 {
 /// ```
 /// assert_eq!(firmware::timing::spi_transfer_ns(3, 1_000_000), 24_000);
 /// ```
-#[must_use]
 pub fn spi_transfer_ns(bytes: u32, clock_hz: u32) -> u32 {
     if clock_hz == 0 {
         return u32::MAX;
@@ -71,7 +68,6 @@ impl ScanPlan {
     /// ```
     /// assert_eq!(firmware::timing::ScanPlan::of_nucleo(8, 18, 1).scan_us(), 6_430);
     /// ```
-    #[must_use]
     pub fn of_nucleo(rows: u16, columns: u16, oversampling: u16) -> Self {
         Self {
             rows,
@@ -97,7 +93,6 @@ impl ScanPlan {
     /// };
     /// assert_eq!(plan.scan_us(), 8_190); // fits the 10 ms of 100 Hz
     /// ```
-    #[must_use]
     pub fn scan_us(&self) -> u32 {
         let steps = u64::from(self.rows) + u64::from(self.idle_samples);
         let samples_of_a_step = u64::from(self.columns) * u64::from(self.oversampling.max(1));
@@ -117,7 +112,6 @@ impl ScanPlan {
     /// assert_eq!(plan.most_oversampling(10_000), Some(2));
     /// assert_eq!(plan.most_oversampling(1_000), None);
     /// ```
-    #[must_use]
     pub fn most_oversampling(&self, period_us: u32) -> Option<u16> {
         let fits = |oversampling| Self { oversampling, ..*self }.scan_us() <= period_us;
         if !fits(1) {

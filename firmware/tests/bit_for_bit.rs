@@ -7,13 +7,9 @@ use model_core::AlignedBytes;
 use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
 use model_core::rbf::Format;
 
-#[path = "../qemu/src/checks.rs"]
-mod checks;
-#[path = "../qemu/src/fixed.rs"]
-mod fixed;
-#[path = "bit_for_bit/models.rs"]
 mod models;
 
+use crate::{checks, fixed};
 use models::{FILES, with_blob};
 
 fn in_testdata(name: &str) -> String {
@@ -95,7 +91,7 @@ fn the_models_in_testdata_are_those_made_here() {
     for (name, blob) in FILES {
         assert!(
             fs::read(in_testdata(name)).ok().as_deref() == Some(&*blob()),
-            "{name}: changed on purpose? cargo test --package firmware --test bit_for_bit -- --ignored"
+            "{name}: changed on purpose? cargo test --package firmware --test all bit_for_bit -- --ignored"
         );
     }
 }

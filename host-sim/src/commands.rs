@@ -1,12 +1,14 @@
 //! Subcommands, one small file each: arguments in, library calls, results out.
 
-mod print;
-mod progress;
-mod arguments;
+mod stdout;
+pub mod print;
+pub mod progress;
+pub mod arguments;
 mod model_argument;
 mod command_line;
 mod model_outputs;
-mod scene_argument;
+pub mod scene_argument;
+pub mod coverage_page;
 mod data_notes;
 mod refused_readings;
 mod data_file;
@@ -23,25 +25,20 @@ pub mod synth;
 pub mod forward;
 pub mod train;
 pub mod decode;
-pub mod confidence;
 pub mod eval;
 pub mod inspect;
 pub mod export;
 pub mod join;
 pub mod table1;
 pub mod trade;
-pub mod readout;
 pub mod gate;
-pub mod drift;
 pub mod limit;
 pub mod emulate;
 pub mod link;
-pub mod study;
 
-use host_sim::Error;
+use std::process::ExitCode;
 
-pub use interruption::{end as end_interrupted, watch as watch_signals};
-pub use print::begin;
+use crate::{Error, Result};
 
 /// Options of every command.
 #[derive(clap::Args)]
@@ -54,8 +51,22 @@ pub struct Common {
     pub json: bool,
 }
 
+/// Runs the `work` of the command of this `name`, prints its error, and returns the program's exit status.
+pub fn run_to_end(name: &str, work: impl FnOnce() -> Result<()>) -> ExitCode {
+    print::begin(name);
+    let outcome = interruption::watch()
+        .map_err(|cause| Error::Failed(format!("cannot watch for Ctrl-C: {cause}")))
+        .and_then(|()| work());
+    let Err(error) = outcome else { return ExitCode::SUCCESS };
+    eprintln!("error: {error}{}", advice(&error));
+    if matches!(error, Error::Rig(taxel_rig::Error::Interrupted)) {
+        interruption::end();
+    }
+    ExitCode::from(exit_status(&error))
+}
+
 /// Advice on options for an error that a library reported without knowing them.
-pub fn advice(error: &Error) -> &'static str {
+fn advice(error: &Error) -> &'static str {
     use taxel_data::Error as Data;
     use taxel_data::error::Problem;
     match error {
@@ -88,5 +99,31 @@ pub fn advice(error: &Error) -> &'static str {
         }
         Error::Rig(taxel_rig::Error::Port { .. }) => " (PORT)",
         _ => "",
+    }
+}
+
+/// Exit status of an error: 1 for work that failed, 2 for bad usage or input.
+fn exit_status(error: &Error) -> u8 {
+    use taxel_learn::Error as Learn;
+    use taxel_rig::Error as Rig;
+    match error {
+        Error::Failed(_)
+        | Error::Learn(Learn::NoRegression | Learn::ProjectionBeyondF32 | Learn::NotPacked(_)) => 1,
+        Error::Simulate(cause) => match cause {
+            taxel_simulate::Error::Setting(_) | taxel_simulate::Error::Data(_) => 2,
+            _ => 1,
+        },
+        Error::Rig(cause) => match cause {
+            Rig::Port { .. }
+            | Rig::NoRoom { .. }
+            | Rig::OtherReadout { .. }
+            | Rig::NoQemu { .. }
+            | Rig::NoImage { .. }
+            | Rig::NotElf { .. }
+            | Rig::Setting(_)
+            | Rig::File(_) => 2,
+            _ => 1,
+        },
+        _ => 2,
     }
 }

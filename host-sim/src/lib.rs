@@ -1,10 +1,22 @@
-//! Library of the program: what [`taxel_evaluate`] computes, and its pages.
-//!
-//! The `host-sim` binary is a thin shell over both.
+//! Library of the program: what [`taxel_evaluate`] computes, its pages, and the commands.
+
+// What a command's options mean is said where users read it: `--help`.
+#![allow(missing_docs, clippy::missing_errors_doc, clippy::new_without_default)]
+
+/// Prints to stderr as the standard macro does, with control characters escaped. It never panics: a log on a full disk
+/// must not end the work.
+macro_rules! eprintln {
+    ($($text:tt)*) => {{
+        let text = format!("{}\n", format_args!($($text)*));
+        let text = taxel_data::error::printable(&text);
+        let _ = std::io::Write::write_all(&mut std::io::stderr(), text.as_bytes());
+    }};
+}
 
 pub mod report;
+pub mod commands;
 
 pub use taxel_evaluate::{
-    Error, Result, by_depth, error, evaluate, experiment, measurements, metrics, run, study,
-    subject, training_set, verdict,
+    Error, Result, by_depth, error, evaluate, experiment, measurements, metrics, run, subject,
+    training_set, verdict,
 };

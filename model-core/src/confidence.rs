@@ -42,7 +42,6 @@ pub struct Sizes {
 
 impl Sizes {
     /// Number of features: the directions, and what they leave out.
-    #[must_use]
     pub const fn features(self) -> usize {
         self.directions.saturating_add(1)
     }
@@ -52,13 +51,11 @@ impl Sizes {
     }
 
     /// Number of floats of working space that [`Confidence::assess`] needs.
-    #[must_use]
     pub const fn scratch_floats(self) -> usize {
         self.readings.saturating_add(self.features()).saturating_add(self.components)
     }
 
     /// Number of floats in the block.
-    #[must_use]
     pub const fn block_floats(self) -> usize {
         let scale = self.readings.saturating_mul(2);
         let projection = projection::block_floats(self.readings, self.directions);
@@ -165,19 +162,16 @@ impl<'a> Confidence<'a> {
     }
 
     /// The confidence's sizes.
-    #[must_use]
     pub fn sizes(&self) -> Sizes {
         self.sizes
     }
 
     /// The confidence's numbers, as [`new`](Self::new) takes them.
-    #[must_use]
     pub fn block(&self) -> &'a [f32] {
         self.block
     }
 
     /// Half of each output's 95 % interval, in deviations. Half of its 68 % interval is one deviation.
-    #[must_use]
     pub fn ratios_95(&self) -> &'a [f32] {
         self.arrays().ratios_95
     }

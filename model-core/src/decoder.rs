@@ -12,7 +12,6 @@ use crate::relative::relative;
 
 /// RAM in bytes that a [`Decoder`] for at most so many `rows` takes on a 32-bit target, for any K: slices into the
 /// blob. The firmware's link check compares it with the compiler's own figure.
-#[must_use]
 pub const fn decoder_ram_bytes(rows: usize) -> usize {
     160 + 28 * rows
 }
@@ -148,31 +147,26 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
     }
 
     /// The model that the decoder was made of.
-    #[must_use]
     pub fn model(&self) -> &Model<'a> {
         &self.model
     }
 
     /// The model's number of rows, and of inputs and outputs a row.
-    #[must_use]
     pub fn shape(&self) -> ModelShape {
         self.model.shape()
     }
 
     /// Metadata of the model: names, units, and how it was trained.
-    #[must_use]
     pub fn metadata(&self) -> &Metadata<'a> {
         self.model.metadata()
     }
 
     /// CRC-32 of the blob: a fingerprint that identifies the model.
-    #[must_use]
     pub fn model_crc(&self) -> u32 {
         self.model.crc()
     }
 
     /// Number of floats of working space that decoding and assessing need.
-    #[must_use]
     pub fn scratch_floats(&self) -> usize {
         scratch_floats(&self.model)
     }
@@ -392,7 +386,6 @@ fn divide(readings: &[f32], reciprocals: &[f32], ratios: &mut [f32]) {
 }
 
 /// Number of floats of working space that decoding with `model` needs, assessing its outputs, and filling its readings.
-#[must_use]
 pub fn scratch_floats(model: &Model<'_>) -> usize {
     let assessing = model.confidence().map_or(0, |it| it.sizes().scratch_floats());
     let filling = model.fill().map_or(0, |it| it.scratch_floats());

@@ -96,7 +96,6 @@ impl ExpKernel for Polynomial {
 /// together; the power of two goes straight into the exponent bits. Base 2 needs no reduction by ln 2, so that
 /// 13 operations suffice.
 #[inline]
-#[must_use]
 pub fn exp2(u: f32) -> f32 {
     let [c5, c4, c3, c2, c1, c0] = EXP2_COEFFICIENTS;
 

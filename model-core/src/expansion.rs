@@ -53,19 +53,16 @@ impl<'a> Expansion<'a> {
     }
 
     /// Number of components.
-    #[must_use]
     pub fn components(&self) -> usize {
         self.components
     }
 
     /// Number of outputs of all rows.
-    #[must_use]
     pub fn outputs(&self) -> usize {
         self.outputs
     }
 
     /// The expansion's numbers: o₀, then for each component its part in each output.
-    #[must_use]
     pub fn block(&self) -> &'a [f32] {
         self.block
     }

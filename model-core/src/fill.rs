@@ -27,7 +27,6 @@ pub struct Fill<'a> {
 }
 
 /// Number of floats in the block of a [`Fill`].
-#[must_use]
 pub(crate) const fn block_floats(readings: usize, factors: usize) -> usize {
     factors.saturating_add(2).saturating_mul(readings)
 }
@@ -70,25 +69,21 @@ impl<'a> Fill<'a> {
     }
 
     /// Number of readings in a frame.
-    #[must_use]
     pub fn readings(&self) -> usize {
         self.readings
     }
 
     /// Number of factors.
-    #[must_use]
     pub fn factors(&self) -> usize {
         self.factors
     }
 
     /// The fill's numbers, as [`new`](Self::new) takes them.
-    #[must_use]
     pub fn block(&self) -> &'a [f32] {
         self.block
     }
 
     /// Number of floats of working space that [`fill`](Self::fill) needs.
-    #[must_use]
     pub fn scratch_floats(&self) -> usize {
         triangle(self.factors).saturating_add(self.factors)
     }

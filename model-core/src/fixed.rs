@@ -90,7 +90,6 @@ impl<const INPUTS: usize, const CENTRES: usize, const OUTPUTS: usize>
 
     /// Infers the outputs, in their units, from one `reading` an input, in its unit. All outputs are NaN if a reading is
     /// not finite, or if an output would not be.
-    #[must_use]
     pub fn infer(&self, readings: &[f32; INPUTS]) -> [f32; OUTPUTS] {
         const { assert!(INPUTS > 0 && CENTRES > 0 && OUTPUTS > 0, "a dimension is zero") };
         let shape = Shape { inputs: INPUTS, centres: CENTRES, outputs: OUTPUTS };
@@ -104,7 +103,6 @@ impl<const INPUTS: usize, const CENTRES: usize, const OUTPUTS: usize>
     }
 
     /// The parameters as slices, as [`direct::Network::try_new`] takes them.
-    #[must_use]
     pub const fn parameters(&self) -> direct::Parameters<'_> {
         direct::Parameters {
             input_minimum: &self.input_minimum,

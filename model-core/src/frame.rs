@@ -33,13 +33,11 @@ pub struct Wires {
 
 impl Wires {
     /// Number of readings in a frame.
-    #[must_use]
     pub const fn readings(self) -> usize {
         self.rows.saturating_mul(self.columns)
     }
 
     /// Index in a frame of the reading between two wires; `None` for a wire outside the sensor.
-    #[must_use]
     pub fn place(self, row: RowWire, column: ColumnWire) -> Option<usize> {
         let inside = row.0 < self.rows && column.0 < self.columns;
         inside.then(|| row.0.saturating_mul(self.columns).saturating_add(column.0))

@@ -60,7 +60,6 @@ impl<'a> Gate<'a> {
     /// not above 0 and below 1.
     ///
     /// A row whose status in `rest` is not decoded is never at rest: its baseline is not known.
-    #[must_use]
     pub fn new(rest: Rest<'a>, tolerance: f32) -> Option<Self> {
         (tolerance > 0.0 && tolerance < 1.0).then_some(Self { rest, tolerance })
     }
@@ -155,7 +154,6 @@ impl<'a> Gate<'a> {
 ///
 /// A row with a reading that is NaN or infinite is not at rest, nor one with a baseline that is NaN or negative.
 /// Readings beyond the shorter of the two lists are ignored.
-#[must_use]
 pub fn is_at_rest(readings: &[f32], baseline: &[f32], tolerance: f32) -> bool {
     let (mut change, mut most_change) = (0.0, 0.0);
     for (reading, rest) in readings.iter().zip(baseline) {

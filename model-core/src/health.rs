@@ -20,7 +20,6 @@ impl Limits {
     /// assert_eq!(Limits::USUAL.fault(60.0), None);
     /// assert_eq!(Limits::USUAL.fault(f32::INFINITY), Some(Fault::Open));
     /// ```
-    #[must_use]
     pub fn fault(self, reading: f32) -> Option<Fault> {
         if reading.is_nan() {
             Some(Fault::Missing)
@@ -76,7 +75,6 @@ impl Health {
     /// assert_eq!((health.missing, health.shorted, health.open), (0, 1, 1));
     /// assert!(frame[1].is_nan());
     /// ```
-    #[must_use]
     pub fn of(
         frame: &mut [f32],
         columns: usize,
@@ -113,7 +111,6 @@ impl Health {
     }
 
     /// Whether no reading is faulty.
-    #[must_use]
     pub fn is_good(&self) -> bool {
         *self == Self::default()
     }

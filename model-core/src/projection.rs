@@ -43,19 +43,16 @@ impl<'a> Projection<'a> {
     }
 
     /// The projection's numbers: f₀, then for each reading its part in each feature.
-    #[must_use]
     pub fn block(&self) -> &'a [f32] {
         self.block
     }
 
     /// Number of features.
-    #[must_use]
     pub fn features(&self) -> usize {
         self.features
     }
 
     /// Number of readings.
-    #[must_use]
     pub fn readings(&self) -> usize {
         self.block.len().checked_div(self.features).unwrap_or(0).saturating_sub(1)
     }

@@ -56,7 +56,6 @@ macro_rules! each {
 
 impl<'a> Network<'a> {
     /// The network's format.
-    #[must_use]
     pub fn format(&self) -> Format {
         match self {
             Self::F32Direct(_) => Format::F32Direct,
@@ -66,13 +65,11 @@ impl<'a> Network<'a> {
     }
 
     /// The network's numbers of inputs, centres and outputs.
-    #[must_use]
     pub fn shape(&self) -> Shape {
         each!(self, inner => inner.shape())
     }
 
     /// Whether the network has an affine tail.
-    #[must_use]
     pub fn has_affine_tail(&self) -> bool {
         match self {
             Self::F32Direct(inner) => !inner.parameters().affine.is_empty(),
@@ -113,7 +110,6 @@ impl<'a> Network<'a> {
     /// Lowest and highest reading of `input` in training, in its unit, as precisely as f32 can hold.
     ///
     /// Both are the same if the reading never changed, and NaN if there is no such input.
-    #[must_use]
     pub fn training_range(&self, input: usize) -> [f32; 2] {
         each!(self, inner => inner.training_range(input))
     }

@@ -17,7 +17,6 @@
 /// assert!([f32::NAN, 0.0, f32::INFINITY, 1e-45].into_iter().all(|baseline| reciprocal(baseline).is_nan()));
 /// ```
 #[inline]
-#[must_use]
 pub fn reciprocal(baseline: f32) -> f32 {
     let reciprocal = 1.0 / baseline;
     if baseline.is_finite() && reciprocal.is_finite() { reciprocal } else { f32::NAN }
@@ -37,7 +36,6 @@ pub fn reciprocal(baseline: f32) -> f32 {
 /// assert!(relative(48.0, reciprocal(0.0)).is_nan() && relative(f32::NAN, per_baseline).is_nan());
 /// ```
 #[inline]
-#[must_use]
 pub fn relative(reading: f32, reciprocal: f32) -> f32 {
     reading * reciprocal
 }

@@ -95,7 +95,6 @@ pub enum RlsError {
 }
 
 /// Number of values in the upper triangle of R for `n` regressors.
-#[must_use]
 pub const fn triangle_values(n: usize) -> usize {
     n.saturating_mul(n.saturating_add(1)) / 2
 }
@@ -125,7 +124,6 @@ pub fn forget<T: Real>(triangle: &mut [T], projection: &mut [T], root_forgetting
 }
 
 /// Whether every value of a sample is finite, and not so large that its square would not be.
-#[must_use]
 pub fn is_usable<T: Real>(sample: &[T]) -> bool {
     sample.iter().all(|&value| value <= T::LARGEST && T::ZERO - value <= T::LARGEST)
 }
@@ -247,7 +245,6 @@ pub struct Rls<'m, T> {
 
 impl<'m, T: Real> Rls<'m, T> {
     /// Number of values of memory for so many `regressors` and `outputs`.
-    #[must_use]
     pub const fn values(regressors: usize, outputs: usize) -> usize {
         triangle_values(regressors)
             .saturating_add(regressors.saturating_mul(outputs))
@@ -326,7 +323,6 @@ impl<'m, T: Real> Rls<'m, T> {
 
     /// Whether the samples so far say at least `times` as much about every weight as the initial 1/δ does, if the
     /// weights after it were known. Where they do not, weights are the starting point, not knowledge.
-    #[must_use]
     pub fn is_excited(&self, times: T) -> bool {
         is_excited(
             self.triangle,
@@ -338,7 +334,6 @@ impl<'m, T: Real> Rls<'m, T> {
 }
 
 /// Whether every diagonal of R, squared, is at least `times` that of the start, `diagonal`².
-#[must_use]
 pub fn is_excited<T: Real>(triangle: &[T], n: usize, diagonal: T, times: T) -> bool {
     let least = diagonal * times.sqrt();
     let mut rest = triangle;

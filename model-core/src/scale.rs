@@ -21,7 +21,6 @@ pub const CLAMP: [f32; 2] = [-0.125, 1.125];
 /// assert_eq!(scale(1000.0, 50.0, 0.05), 1.125);
 /// ```
 #[inline]
-#[must_use]
 pub fn scale(reading: f32, minimum: f32, per_span: f32) -> f32 {
     scale_and_tell(reading, minimum, per_span).0
 }
@@ -29,7 +28,6 @@ pub fn scale(reading: f32, minimum: f32, per_span: f32) -> f32 {
 /// Scales one `reading` as [`scale`] does, and tells whether it was clamped: whether it lies below the lower end of
 /// [`CLAMP`], or at the upper end or beyond. True for NaN.
 #[inline]
-#[must_use]
 pub(crate) fn scale_and_tell(reading: f32, minimum: f32, per_span: f32) -> (f32, bool) {
     let scaled = (reading - minimum) * per_span;
     (scaled.clamp(CLAMP[0], CLAMP[1]), !(CLAMP[0]..CLAMP[1]).contains(&scaled))
@@ -53,21 +51,18 @@ pub const UNITS_PER_STEP: f32 = 65_536.0;
 ///
 /// A Cortex-M4F tells at no cost: such a conversion leaves the flag of an invalid operation behind.
 #[inline]
-#[must_use]
 pub fn saturates(scaled: f32) -> bool {
     !(-UNITS..UNITS).contains(&scaled)
 }
 
 /// Clamps a scaled reading in [`UNITS`] and drops fractions of a unit; NaN becomes 0.
 #[inline]
-#[must_use]
 pub fn clamp_units(scaled: f32) -> f32 {
     (scaled as i32) as f32
 }
 
 /// Clamps a scaled reading in [`UNITS`] and rounds it down to a step; NaN becomes 0.
 #[inline]
-#[must_use]
 pub fn clamp_steps(scaled: f32) -> i32 {
     (scaled as i32) >> 16
 }

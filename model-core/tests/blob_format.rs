@@ -1,8 +1,6 @@
 //! The blob format, compared with its specification in `docs/blob.md`.
 
-mod common;
-
-use common::worked_bytes;
+use crate::common::worked_bytes;
 use model_core::blob::{
     Columns, DecodeError, EncodeError, Floats, Metadata, Model, ModelParts, NoiseKind, encode,
     encoded_length_bound,

@@ -1,8 +1,6 @@
 //! Confidence of a model: its section of the blob, and how a decoder assesses frames with it.
 
-mod common;
-
-use common::{seal, worked_bytes};
+use crate::common::{seal, worked_bytes};
 use model_core::blob::{DecodeError, EncodeError, Metadata, Model, ModelParts, ModelShape, encode};
 use model_core::confidence::{Confidence, Sizes};
 use model_core::rbf::direct::{self, Parameters};

@@ -1,9 +1,7 @@
 //! Expansion of a network's few components to the outputs of all rows: its section of the blob, and how a decoder
 //! decodes with it.
 
-mod common;
-
-use common::{seal, worked_bytes};
+use crate::common::{seal, worked_bytes};
 use model_core::blob::{
     DecodeError, EncodeError, Metadata, Model, ModelParts, ModelShape, encode, encoded_length_bound,
 };

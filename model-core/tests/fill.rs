@@ -1,8 +1,6 @@
 //! Fill of missing readings, in a blob and behind a decoder.
 
-mod common;
-
-use common::{seal, worked_bytes};
+use crate::common::{seal, worked_bytes};
 use model_core::blob::{DecodeError, Metadata, Model, ModelParts, ModelShape, encode_to_vec};
 use model_core::fill::Fill;
 use model_core::rbf::{NetworkError, Shape, direct};

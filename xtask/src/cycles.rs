@@ -4,70 +4,91 @@
 //! exponential than the default if its name ends with one, or its compiled twin (portable Rust instead of
 //! assembly) if it ends with `-portable`. `docs/cycles.md` explains all this, and has the accepted figures.
 
-mod options;
-
-mod training;
-
-mod models;
-mod synthetic;
-
 mod designs;
+mod models;
 
-mod thumb;
-
-mod code;
-mod cost;
 mod flash;
-mod untraced;
-
-mod loops;
-
-mod regions;
-
-mod figures;
+mod instruction;
 mod trace;
 
-mod budget;
-mod machine;
-mod table;
+mod figures;
+mod image;
 
-mod shapes;
-mod ranks;
-mod confidence;
-mod equations;
-mod predicted;
 mod fit;
-
-mod accepted;
-
-mod prices;
+mod table;
 
 use std::fs;
 use std::path::Path;
 
 use rayon::prelude::*;
-use taxel_learn::ModelBlob;
 use taxel_learn::cost::Design;
 
 use crate::emulate::qemu;
 use crate::firmware::{BENCH, build_image};
 use crate::process::{Outcome, root, target_dir};
 use crate::toolchain::{Toolchain, elf};
-use accepted::{Accepted, Excess, Reference};
-use code::Code;
-use figures::{Figure, Scope};
-use loops::Loop;
-use models::Blob;
-pub use options::Options;
-use options::Table;
-pub use regions::Count as Counted;
+use figures::{Accepted, Figure};
+use image::Image;
+pub use trace::Count as Counted;
 
 /// Name of the image that is measured.
 const IMAGE: &str = "qemu-bench";
 
-/// Files of the accepted figures, and of the tables that are made from them.
+/// Files of the accepted figures, and of the tables that are made from them behind a heading.
 const DATA: &str = "firmware/cycles.csv";
 const DOCUMENT: &str = "docs/cycles.md";
+const HEADING: &str = "## Figures\n";
+
+/// Options from the command line.
+#[derive(Debug, PartialEq, Eq, Default)]
+pub struct Options<'a> {
+    /// Whether to print JSON, and nothing else, to stdout.
+    pub json: bool,
+    /// Whether to write the accepted figures instead of comparing with them.
+    pub accept: bool,
+    /// Whether to fit the prices of `host-sim`'s predictions instead.
+    pub fit: bool,
+    /// Blob to measure, and to show beside what is predicted of it.
+    pub model: Option<&'a str>,
+    /// The only kernel to show, which is compared with its budget only.
+    pub kernel: Option<&'a str>,
+}
+
+impl<'a> Options<'a> {
+    /// Parses the options of the command line.
+    ///
+    /// # Errors
+    /// The option that is unknown or lacks its value, or options that exclude each other.
+    pub fn parse(arguments: &[&'a str]) -> Result<Self, String> {
+        let mut options = Self::default();
+        let mut arguments = arguments.iter().copied();
+        while let Some(argument) = arguments.next() {
+            let mut value = |what: &str| {
+                arguments.next().ok_or_else(|| format!("`{argument}` needs {what} behind it"))
+            };
+            match argument {
+                "--json" => options.json = true,
+                "--accept" => options.accept = true,
+                "--fit" => options.fit = true,
+                "--model" => options.model = Some(value("a file")?),
+                "--kernel" => options.kernel = Some(value("a name")?),
+                _ => return Err(format!("unknown option `{argument}`")),
+            }
+        }
+        let chosen = [
+            ("--accept", options.accept),
+            ("--fit", options.fit),
+            ("--model", options.model.is_some()),
+            ("--kernel", options.kernel.is_some()),
+        ];
+        let chosen: Vec<&str> =
+            chosen.into_iter().filter(|(_, given)| *given).map(|(name, _)| name).collect();
+        match chosen[..] {
+            [one, other, ..] => Err(format!("`{one}` and `{other}` exclude each other")),
+            _ => Ok(options),
+        }
+    }
+}
 
 /// Measures, prints, and compares with budgets and accepted figures.
 pub fn run(options: &Options<'_>) -> Outcome {
@@ -77,193 +98,141 @@ pub fn run(options: &Options<'_>) -> Outcome {
     qemu::present()?;
     let toolchain = Toolchain::find()?;
     build_image(&toolchain, BENCH)?;
-    let image = elf(IMAGE);
-    let code = Code::read(&image)?;
-    let directory = target_dir().join("cycles");
-    match options.table {
-        Some(Table::Shapes) => {
-            let measured = shapes::measure(&image, &code, &directory)?;
-            print!("{}", shapes::markdown(&measured));
-            return shapes::held(&measured);
-        }
-        Some(Table::Ranks) => {
-            let measured = ranks::measure(&image, &code, &directory)?;
-            print!("{}", ranks::markdown(&measured));
-            return ranks::held(&measured);
-        }
-        Some(Table::Confidence) => {
-            let measured = confidence::measure(&image, &code, &directory)?;
-            print!("{}", confidence::markdown(&measured));
-            return confidence::held(&measured);
-        }
-        None => (),
+    let image = Image::read(elf(IMAGE))?;
+    let (directory, compiler) = (target_dir().join("cycles"), toolchain.compiler()?);
+    if options.fit {
+        fit::fit(&image, &directory, &compiler)?;
+        eprintln!("{}", fit::judge(&image, &directory, &compiler)?);
+        return Ok(());
     }
     if let Some(model) = options.model {
-        return measure_model(Path::new(model), &image, &code, &toolchain.compiler()?, options);
+        return fit::compare(Path::new(model), &image, options.json);
     }
-    let blobs = models::train(&directory, options.kernel)?;
-    // Images are measured on all cores at once, since QEMU runs an image on one.
-    let measured: Vec<(Vec<Figure>, Vec<Loop>)> =
-        blobs.par_iter().map(|blob| measure(&image, &code, blob)).collect::<Outcome<_>>()?;
-    let (measured, loops): (Vec<_>, Vec<_>) = measured.into_iter().unzip();
-    let (measured, loops) = (chosen(in_order(measured.concat()), options)?, loops.concat());
-    if options.json {
-        print!("{}", table::json(&measured));
-    } else {
-        print!("{}", table::aligned(&measured));
-    }
-    let over_budget = budget::exceeded(&measured);
+    let measured = measure(&image, &directory, options.kernel)?;
+    print!("{}", if options.json { table::json(&measured) } else { table::markdown(&measured) });
+    let over_budget = figures::over_budget(&measured);
     if !over_budget.is_empty() {
         return Err(over_budget.join("; "));
     }
     if options.kernel.is_some() {
         return Ok(());
     }
-    shapes::held(&shapes::measure(&image, &code, &directory)?)?;
-    ranks::held(&ranks::measure(&image, &code, &directory)?)?;
-    confidence::held(&confidence::measure(&image, &code, &directory)?)?;
-    let compiler = toolchain.compiler()?;
     if options.accept {
-        prices::accept(&image, &code, &directory, &compiler)?;
+        let accepted = Accepted { compiler, figures: measured };
+        let document = in_document(&read(DOCUMENT)?, &accepted)?;
+        for (file, text) in [(DATA, accepted.data()), (DOCUMENT, document)] {
+            fs::write(root().join(file), text).map_err(|cause| format!("{file}: {cause}"))?;
+        }
+        return Ok(());
     }
-    hold_to_accepted(&measured, &compiler, options)?;
-    let (checked, others) = prices::check(&image, &code, &directory, &compiler)?;
+    let accepted = Accepted::parse(&read(DATA)?).map_err(|cause| format!("{DATA}: {cause}"))?;
+    if accepted.compiler != compiler {
+        eprintln!(
+            "{DATA} is exact for {} alone; the compiler in use is {compiler}",
+            accepted.compiler
+        );
+    }
+    let differences = accepted.differences(&compiler, &measured);
+    if !differences.is_empty() {
+        let differences = differences.join("\n  ");
+        return Err(format!(
+            "other than accepted in {DATA}:\n  {differences}\nif this is meant, cargo xtask cycles --accept"
+        ));
+    }
+    eprintln!("as accepted in {DATA}");
+    let judged = fit::judge(&image, &directory, &compiler);
+    let advice =
+        |said| format!("{said}\nif the code was changed on purpose, cargo xtask cycles --fit");
     // With --json, stdout has the objects only.
-    eprintln!("{checked}");
-    eprint!("{}", loops::largest(&code, &[loops, others].concat())?);
+    eprintln!("{}", judged.map_err(advice)?);
     Ok(())
 }
 
-fn measure(image: &Path, code: &Code, blob: &Blob) -> Outcome<(Vec<Figure>, Vec<Loop>)> {
-    let path = &blob.path;
-    eprintln!("measuring {}", path.display());
-    let (figures, loops) = machine::run(image, code, path)
-        .and_then(|run| Ok((figures::of_run(&run.log, &run.counts, blob.affine)?, run.loops)))
-        .map_err(|cause| format!("{}: {cause}", path.display()))?;
-    if figures.is_empty() {
-        return Err(format!("{}: no kernel of the image decodes it", path.display()));
-    }
-    Ok((figures, loops))
-}
-
-/// Sorts figures by kernel, in the order of their first appearance, and then by K.
-fn in_order(mut figures: Vec<Figure>) -> Vec<Figure> {
-    let mut order: Vec<String> = Vec::new();
-    for figure in &figures {
-        if !order.contains(&figure.kernel) {
-            order.push(figure.kernel.clone());
+/// Measures the models whose cost is accepted: those of a `kernel`, or all. Figures come sorted by kernel, in the order
+/// of their first appearance, and then by K.
+fn measure(image: &Image, directory: &Path, kernel: Option<&str>) -> Outcome<Vec<Figure>> {
+    let models = models::train(directory)?;
+    // Images are measured on all cores at once, since QEMU runs an image on one.
+    let figures = models.par_iter().map(|model| {
+        let measured = image.run(&model.path)?;
+        Ok(Figure::of_run(measured, model.centres as u64, model.affine))
+    });
+    let mut figures = figures.collect::<Outcome<Vec<_>>>()?.concat();
+    let mut kernels: Vec<String> = figures.iter().map(|figure| figure.kernel.clone()).collect();
+    let mut seen = std::collections::HashSet::new();
+    kernels.retain(|kernel| seen.insert(kernel.clone()));
+    if let Some(kernel) = kernel {
+        figures.retain(|figure| figure.kernel == kernel);
+        if figures.is_empty() {
+            return Err(format!("--kernel {kernel}: measured were {}", kernels.join(", ")));
         }
     }
-    let place = |figure: &Figure| order.iter().position(|kernel| *kernel == figure.kernel);
+    let place = |figure: &Figure| kernels.iter().position(|kernel| *kernel == figure.kernel);
     figures.sort_by_key(|figure| (place(figure), figure.centres));
-    figures
-}
-
-/// The figures of the kernel that was asked for, or all.
-fn chosen(figures: Vec<Figure>, options: &Options<'_>) -> Outcome<Vec<Figure>> {
-    let Some(kernel) = options.kernel else { return Ok(figures) };
-    let (chosen, others): (Vec<_>, Vec<_>) =
-        figures.into_iter().partition(|figure| figure.kernel == kernel);
-    if chosen.is_empty() {
-        let mut others: Vec<_> = others.into_iter().map(|figure| figure.kernel).collect();
-        others.dedup();
-        return Err(format!("--kernel {kernel}: measured were {}", others.join(", ")));
-    }
-    Ok(chosen)
-}
-
-/// Measures frames of a user's own model, and prints what they cost beside what is predicted of them.
-fn measure_model(
-    path: &Path,
-    image: &Path,
-    code: &Code,
-    compiler: &str,
-    options: &Options<'_>,
-) -> Outcome {
-    let blob = ModelBlob::read(path).map_err(|cause| cause.to_string())?;
-    let design = Design::of(&blob);
-    let (mut frames, _) = predicted::measure(&design, path, image, code)?;
-    if frames.iter().all(|frame| matches!(frame.scope, Scope::Frame | Scope::ArrayFrame)) {
-        eprintln!(
-            "note: no frame behind a gate was measured: a gate compares relative to readings at rest, and needs a \
-             training range that reaches above 0 in every input"
-        );
-    }
-    if let Some(kernel) = options.kernel {
-        frames.retain(|frame| frame.kernel == kernel);
-        if frames.is_empty() {
-            return Err(format!("--kernel {kernel}: the model is not made for it"));
-        }
-    }
-    prices::compare_model(&frames, compiler, options.json)
+    Ok(figures)
 }
 
 /// Predicted and counted cost of a frame of the model at `path`, which has this `design`, without a gate and with all
 /// weights in RAM.
 ///
 /// # Errors
-/// The run fails, or the model costs something else than predicted.
+/// The run fails, or the prediction is off by more than a few per cent.
 pub fn frame_of(design: &Design, path: &Path) -> Outcome<[Counted; 2]> {
-    let image = elf(IMAGE);
-    let code = Code::read(&image)?;
-    let (frames, _) = predicted::measure(design, path, &image, &code)?;
-    let predicted = prices::predicted(&frames, &Toolchain::find()?.compiler()?)?;
-    let first = predicted.first().zip(frames.first()).ok_or("no frame was measured")?;
-    Ok([*first.0, first.1.whole])
+    let frames = fit::frames(design, &Image::read(elf(IMAGE))?.run(path)?);
+    let predicted = fit::predicted(&frames)?;
+    let (frame, predicted) =
+        frames.first().zip(predicted.first()).ok_or("no frame was measured")?;
+    let (instructions, cycles) = (predicted.instructions, predicted.cycles);
+    let predicted = Counted { instructions, cycles, flash_cycles: predicted.flash_cycles };
+    let counted = frame.count;
+    let off = predicted.cycles.abs_diff(counted.cycles) as f64 / counted.cycles as f64;
+    if 100.0 * off > fit::MOST_PERCENT[1] {
+        return Err(format!(
+            "{}: {predicted:?} was predicted, {counted:?} counted",
+            path.display()
+        ));
+    }
+    Ok([predicted, counted])
 }
 
-/// Compares figures with the accepted ones, or writes them as accepted.
-fn hold_to_accepted(measured: &[Figure], compiler: &str, options: &Options<'_>) -> Outcome {
-    let of = |file: &str, cause: String| format!("{file}: {cause}");
-    let mut accepted = Accepted::parse(&read(DATA)?).map_err(|cause| of(DATA, cause))?;
-    if options.accept {
-        accepted.replace(compiler, measured);
-        let document = read(DOCUMENT)?;
-        let document = accepted.in_document(&document).map_err(|cause| of(DOCUMENT, cause))?;
-        for (file, text) in [(DATA, accepted.data()), (DOCUMENT, document)] {
-            fs::write(root().join(file), text).map_err(|cause| of(file, cause.to_string()))?;
-        }
-        return Ok(());
-    }
-    let Some(reference) = accepted.reference(compiler) else {
-        eprintln!(
-            "{DATA} has no figures: held to the budgets alone. To accept these, cargo xtask cycles \
-             --accept"
-        );
-        return Ok(());
-    };
-    say_if_others(&reference, compiler, measured);
-    let differences = accepted::differences(&reference, measured);
-    if differences.is_empty() {
-        let exactly = if reference.is_own { "as accepted" } else { "within what was accepted" };
-        eprintln!("{exactly} in {DATA} for {}", reference.compiler);
-        Ok(())
-    } else {
-        Err(format!(
-            "other than accepted in {DATA} for {}:\n  {}\nif this is meant, cargo xtask \
-             cycles --accept",
-            reference.compiler,
-            differences.join("\n  ")
-        ))
-    }
-}
-
-/// Prints how figures are compared for a compiler that has no accepted ones.
-fn say_if_others(reference: &Reference<'_>, compiler: &str, measured: &[Figure]) {
-    if reference.is_own {
-        return;
-    }
-    let others = &reference.compiler;
-    eprintln!("{DATA} is exact for {others} alone; the compiler in use is {compiler}");
-    for excess in [accepted::EXCESS, accepted::FLASH_EXCESS] {
-        let [least, most] = accepted::range_percent(reference, measured, &excess);
-        let Excess { what, percent, .. } = excess;
-        eprintln!(
-            "its {what} differ by {least:+.1} % to {most:+.1} %, at most +{percent} % is allowed"
-        );
-    }
+/// The `document` with the tables of `accepted` figures at its end.
+fn in_document(document: &str, accepted: &Accepted) -> Outcome<String> {
+    let start = document.find(HEADING).ok_or(format!("{DOCUMENT} lacks {}", HEADING.trim()))?;
+    let head = &document[..start + HEADING.len()];
+    Ok(format!("{head}\n### {}\n\n{}", accepted.compiler, table::markdown(&accepted.figures)))
 }
 
 fn read(file: &str) -> Outcome<String> {
     fs::read_to_string(root().join(file)).map_err(|cause| format!("{file}: {cause}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_come_in_any_order_and_what_makes_no_sense_is_named() {
+        let model = Options { json: true, model: Some("a.bin"), ..Options::default() };
+        assert_eq!(Options::parse(&["--model", "a.bin", "--json"]), Ok(model));
+        for (arguments, named) in [
+            (&["--json", "--jsn"][..], "`--jsn`"),
+            (&["a.bin"], "`a.bin`"),
+            (&["--model"], "`--model`"),
+            (&["--kernel", "f32", "--accept"], "`--accept` and `--kernel`"),
+        ] {
+            let message = Options::parse(arguments).unwrap_err();
+            assert!(message.contains(named), "{message}");
+        }
+    }
+
+    #[test]
+    fn the_tables_of_the_document_are_those_of_the_data() {
+        let [data, document] = [DATA, DOCUMENT].map(|file| read(file).unwrap());
+        let accepted = Accepted::parse(&data).unwrap();
+        assert_eq!(accepted.data(), data);
+        assert!(
+            in_document(&document, &accepted).unwrap() == document,
+            "{DOCUMENT} has other figures than {DATA}: cargo xtask cycles --accept"
+        );
+    }
 }

@@ -2,6 +2,7 @@
 
 mod process;
 mod structure;
+mod lines;
 mod toolchain;
 
 mod firmware;
@@ -26,6 +27,7 @@ use std::env;
 use std::process::ExitCode;
 
 use emulate::Differences;
+use process::{Outcome, PROOF, cargo, status};
 
 const HELP: &str = "\
 Usage: cargo xtask COMMAND
@@ -33,9 +35,10 @@ Usage: cargo xtask COMMAND
   ci                          runs everything that CI runs: format, structure, tests, clippy, fuzz targets and docs, and
                               at the same time firmware, cores, size and cycles; then emulate, board, some of its
                               mutants, and torture. Goes on after a failure. Ends with a summary, which shows each
-                              step's time beside that in xtask/times.txt
-  structure                   checks the rules in ARCHITECTURE.md: which module and crate may import which, where
-                              `unsafe` may stand, and how large a part of all lines each crate may hold
+                              step's time and the number of tests that passed
+  structure                   checks that no crate depends on one above it, and none for a device on one for a desk
+  lines                       prints the lines of Rust of each crate: all, source code (no comments, blank lines and
+                              tests), test code; and the sums, in all and of the product
   firmware                    builds and lints all code for a device (thumbv7em-none-eabihf), and proves by
                               linking that it cannot panic
   cores                       builds model-core and firmware for other cores as well: thumbv6m, thumbv7m,
@@ -61,20 +64,20 @@ Usage: cargo xtask COMMAND
                               flash, for K = 16 to 256 and every kernel: a number format with an exponential, or
                               its portable Rust version. Fails if a figure exceeds its budget or differs from
                               firmware/cycles.csv. With another compiler than named there, up to 2 % more cycles
-                              are allowed, and 16 % from flash. Then checks firmware/prices.csv with 40 random models
+                              are allowed, and 16 % from flash. Then judges what firmware/prices.csv predicts by 40
+                              random models
       --json                  prints a list of objects to stdout, and nothing else
-      --accept                writes firmware/cycles.csv and the tables of docs/cycles.md instead of comparing, and
-                              the price list firmware/prices.csv, from which `host-sim` tells any model's cost
-      --shapes                measures one inference of networks of other shapes instead (12 → 5 and others, K = 64)
-      --ranks                 measures a frame of networks of few components instead (16 to 32, K = 64 and 256)
-      --confidence            measures deviations and novelty of a frame instead (16 and 32 Gaussians)
+      --accept                writes firmware/cycles.csv and the tables of docs/cycles.md instead of comparing
+      --fit                   fits firmware/prices.csv anew, from which `host-sim` predicts any model's cost, to 750
+                              random models. Two minutes
       --kernel NAME           shows this kernel only, and compares it with its budget only
       --model FILE            measures frames of this model, of any shape, such as the chosen.bin of `host-sim trade`,
-                              beside what firmware/prices.csv tells of it. Fails if they differ
+                              and prints what is predicted beside
   sensors [--accept]          trains models of other sensors than the paper's (z only, one row, 4 × 4, 16 × 32, a CSV
                               file and more), compares 1000 frames on the device with the host's, and prints what each
                               model takes. Two minutes
       --accept                writes the table into docs/sensors.md
+  study QUESTION [OPTION…]    answers a question about the sensor, the paper's method or a part of Taxel: `study --help`
   torture [OPTION…] [NAME…]   puts every promise of reliability to the test, or those of these names, and prints a
                               table: promise, cases, worst found, bound, verdict, seed. `torture --help` has all options
       --minutes N             takes so long (20); some promises take longer
@@ -104,6 +107,10 @@ fn main() -> ExitCode {
             Ok(code) => return code,
             Err(cause) => Err(cause),
         },
+        ["study", ref options @ ..] => match study(options) {
+            Ok(code) => return code,
+            Err(cause) => Err(cause),
+        },
         ["help" | "--help" | "-h"] | [_, "--help" | "-h"] => {
             print!("{HELP}");
             Ok(())
@@ -126,6 +133,7 @@ fn main() -> ExitCode {
         ["sensors"] => sensors::run(false),
         ["sensors", "--accept"] => sensors::run(true),
         ["structure"] => structure::run(),
+        ["lines"] => lines::run(),
         ["cycles", ref options @ ..] => match cycles::Options::parse(options) {
             Ok(options) => cycles::run(&options),
             Err(cause) => return wrong_usage(&format!("cycles: {cause}")),
@@ -141,14 +149,20 @@ fn main() -> ExitCode {
     }
 }
 
+/// Runs a study of `proof/studies`, which says itself what is wrong with `options`.
+fn study(options: &[&str]) -> Outcome<ExitCode> {
+    let run = ["run", "--release", "--manifest-path", PROOF, "--package", "studies", "--"];
+    status(cargo(&run).args(options)).map(torture::code)
+}
+
 fn are_names(arguments: &[&str]) -> bool {
     !arguments.iter().any(|argument| argument.starts_with('-'))
 }
 
 /// Says why no command has these `arguments`.
 fn misunderstood(arguments: &[&str]) -> String {
-    const COMMANDS: [&str; 8] =
-        ["ci", "structure", "firmware", "cores", "emulate", "log", "size", "sensors"];
+    const COMMANDS: [&str; 9] =
+        ["ci", "structure", "lines", "firmware", "cores", "emulate", "log", "size", "sensors"];
     match arguments {
         [] => "cargo xtask needs a command".to_owned(),
         ["log"] => "log: needs a file behind it".to_owned(),

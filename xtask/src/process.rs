@@ -43,9 +43,7 @@ pub fn status(command: &mut Command) -> Outcome<ExitStatus> {
 
 /// Output and outcome of a piece of work that is done.
 pub struct Said {
-    /// Text for stdout.
     pub out: String,
-    /// Text for stderr.
     pub err: String,
     pub outcome: Outcome,
 }

@@ -45,9 +45,6 @@ struct Figure {
 
 /// Trains, decodes and measures every sensor in both formats, and prints a table. With `accept`, also writes it into
 /// the document.
-///
-/// # Errors
-/// A frame that the device decodes to other bits than the host, or costs that differ from those predicted.
 pub fn run(accept: bool) -> Outcome {
     qemu::present()?;
     let toolchain = Toolchain::find()?;
@@ -145,9 +142,6 @@ fn figure(sensor: &'static Sensor, format: &'static str, model: &Path) -> Outcom
 }
 
 /// Checks that every sensor that leaves something of the paper's out takes less than it.
-///
-/// # Errors
-/// A figure that is not smaller.
 fn shrinks(figures: &[Figure]) -> Outcome {
     for format in FORMATS {
         let of_format = || figures.iter().filter(|it| it.format == format);

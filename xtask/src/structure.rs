@@ -1,81 +1,101 @@
-//! Checks of the code against the rules in ARCHITECTURE.md: which module and which crate may import which, where
-//! `unsafe` may stand, and how large a crate may be. The module `house` declares the rules' values.
+//! Check of the workspace's structure: which crate may depend on which. Here a new crate is declared.
 
-mod house;
-mod workspace;
+use serde_json::Value;
 
-mod crates;
-mod shares;
+use crate::process::{Outcome, capture, cargo};
 
-mod test_code;
+/// The workspace's crates from the ground up, floor by floor: none depends on one above it.
+const DEVICE: &[&str] = &[
+    "model-core",
+    "firmware",
+    "remote-readout",
+    "board-common",
+    "link-check",
+    "qemu-image",
+    "nucleo-f446re",
+];
+/// Crates that stand in for a device in its tests, and in proofs.
+const MOCKS: &[&str] = &["mock-board"];
+const DESK: &[&str] = &[
+    "taxel-data",
+    "taxel-simulate",
+    "taxel-learn",
+    "taxel-limit",
+    "taxel-rig",
+    "taxel-evaluate",
+    "host-sim",
+    "xtask",
+];
 
-mod imports;
-mod modules;
-mod order;
-mod unsafe_code;
-
-use std::fs;
-use std::path::Path;
-
-use crate::process::{Outcome, root};
-use modules::Module;
-use workspace::Package;
-
-/// Checks every rule, prints the results, and fails if a rule is broken.
+/// Fails if a crate depends on one above it, or is not declared.
 pub fn run() -> Outcome {
-    let packages = workspace::packages()?;
-    let mut broken = crates::broken(&packages, house::CRATES);
-    let absent = crates::absent(&packages, house::CRATES);
-    if !absent.is_empty() {
-        println!("declared, but not there: {}", absent.join(", "));
-    }
-    broken.extend(module_order(&packages)?);
-    let sources = workspace::sources()?;
-    let mut lines = Vec::new();
-    for source in &sources {
-        let text = text_of(source)?;
-        broken.extend(unsafe_code::broken(source, &text, house::UNSAFE)?);
-        lines.push((source.as_path(), text.lines().count()));
-    }
-    let shares = shares::of(&packages, &lines);
-    print!("{}", shares::table(&shares));
-    let too_large = shares::too_large(&shares, house::LARGEST_SHARE_PERCENT);
-    if house::SHARES_MUST_HOLD {
-        broken.extend(too_large);
-    } else {
-        too_large.iter().for_each(|message| println!("not yet held to: {message}"));
-    }
-    if broken.is_empty() {
-        println!("{} crates and {} files stand as declared", packages.len(), sources.len());
-        return Ok(());
-    }
-    broken.iter().for_each(|message| println!("{message}"));
-    Err(format!("{} breaches of the rules in ARCHITECTURE.md", broken.len()))
+    let metadata = capture(&mut cargo(&["metadata", "--no-deps", "--format-version", "1"]));
+    metadata.outcome.map_err(|cause| metadata.err + &cause)?;
+    let metadata: Value = serde_json::from_str(&metadata.out).map_err(|cause| cause.to_string())?;
+    let broken = broken(&metadata);
+    if broken.is_empty() { Ok(()) } else { Err(broken.join("\n")) }
 }
 
-/// Breaches of the order of modules. For crates that are not in order yet, only their number is printed.
-fn module_order(packages: &[Package]) -> Outcome<Vec<String>> {
+/// Breaches of the order. Crates of the desk may be tested with any others, crates of the device with mocks besides
+/// their own kind.
+fn broken(metadata: &Value) -> Vec<String> {
+    let place = |name: &Value| {
+        let mut all = DEVICE.iter().chain(MOCKS).chain(DESK);
+        all.position(|declared| name == declared)
+    };
     let mut broken = Vec::new();
-    for package in packages {
-        let (mut breaches, mut advice) = (Vec::new(), Vec::new());
-        for file in &package.roots {
-            let found = order::broken(&Module::read(file, &text_of)?);
-            breaches.extend(found.breaches);
-            advice.extend(found.advice);
-        }
-        if house::NOT_YET_IN_ORDER.contains(&package.name.as_str()) {
-            match breaches.len() {
-                0 => println!("{}: in order; take it off NOT_YET_IN_ORDER", package.name),
-                count => println!("{}: not yet in order, {count} breaches", package.name),
+    for package in metadata["packages"].as_array().into_iter().flatten() {
+        let name = &package["name"];
+        let Some(own) = place(name) else {
+            broken.push(format!("{name} is not declared in xtask/src/structure.rs"));
+            continue;
+        };
+        for dependency in package["dependencies"].as_array().into_iter().flatten() {
+            let Some(other) = place(&dependency["name"]) else { continue };
+            let allowed = match dependency["kind"].as_str() {
+                Some("dev") if own < DEVICE.len() => DEVICE.len() + MOCKS.len(),
+                Some("dev") => usize::MAX,
+                _ => own,
+            };
+            if other >= allowed {
+                broken.push(format!(
+                    "{name} depends on {}, which stands above it",
+                    dependency["name"]
+                ));
             }
-        } else {
-            broken.extend(breaches);
-            advice.iter().for_each(|advice| println!("{advice}"));
         }
     }
-    Ok(broken)
+    broken
 }
 
-fn text_of(file: &Path) -> Outcome<String> {
-    fs::read_to_string(root().join(file)).map_err(|cause| format!("{}: {cause}", file.display()))
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn a_crate_depends_on_what_stands_below_it() {
+        let broken = |name: &str, on: &str, kind: Option<&str>| {
+            let dependencies = json!([{"name": on, "kind": kind}, {"name": "serde", "kind": null}]);
+            !broken(&json!({"packages": [{"name": name, "dependencies": dependencies}]})).is_empty()
+        };
+        for (name, on, kind) in [
+            ("model-core", "firmware", None),
+            ("model-core", "taxel-data", Some("dev")),
+            ("firmware", "mock-board", None),
+            ("firmware", "taxel-learn", Some("build")),
+            ("taxel-data", "taxel-simulate", None),
+            ("unknown", "serde", None),
+        ] {
+            assert!(broken(name, on, kind), "{name} on {on}");
+        }
+        for (name, on, kind) in [
+            ("firmware", "model-core", None),
+            ("firmware", "mock-board", Some("dev")),
+            ("taxel-data", "host-sim", Some("dev")),
+            ("taxel-simulate", "firmware", None),
+        ] {
+            assert!(!broken(name, on, kind), "{name} on {on}");
+        }
+    }
 }

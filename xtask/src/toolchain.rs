@@ -54,17 +54,11 @@ impl fmt::Display for Toolchain {
 
 impl Toolchain {
     /// Finds a toolchain for the images' target.
-    ///
-    /// # Errors
-    /// As [`of`](Self::of).
     pub fn find() -> Outcome<Self> {
         Self::of(TARGET)
     }
 
     /// Finds the active toolchain if it has `target`, else Debian's.
-    ///
-    /// # Errors
-    /// Neither can build for the target; the message says how to get either.
     pub fn of(target: &'static str) -> Outcome<Self> {
         let library = first_line("rustc", &["--print", "target-libdir", "--target", target]);
         if library.is_some_and(|path| Path::new(&path).is_dir()) {
@@ -81,9 +75,6 @@ impl Toolchain {
     }
 
     /// Version of the compiler, as it prints it.
-    ///
-    /// # Errors
-    /// The compiler prints nothing.
     pub fn compiler(&self) -> Outcome<String> {
         let rustc = match self.source {
             Source::Active => "rustc",
@@ -98,9 +89,6 @@ impl Toolchain {
     }
 
     /// Command `cargo clippy` for the target, with a separate target directory.
-    ///
-    /// # Errors
-    /// Debian's clippy is not installed; the message says how to get it.
     pub fn clippy(&self) -> Outcome<Command> {
         if matches!(self.source, Source::Debian { .. }) && !Path::new(DEBIAN_CLIPPY).is_file() {
             return Err(format!(

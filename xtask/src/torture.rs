@@ -35,6 +35,6 @@ pub fn run(options: &[&str]) -> Outcome<ExitCode> {
 }
 
 /// Exit code of a program that ended with this `status`; 1 if a signal ended it.
-fn code(status: ExitStatus) -> ExitCode {
+pub fn code(status: ExitStatus) -> ExitCode {
     ExitCode::from(status.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(1))
 }

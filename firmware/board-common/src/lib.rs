@@ -56,7 +56,6 @@ unsafe impl Sync for Place {}
 /// Takes the application's buffers; `None` after the first call. They are zero at first, so that they need neither
 /// flash nor stack.
 #[cfg(target_os = "none")]
-#[must_use]
 pub fn buffers() -> Option<&'static mut BoardBuffers> {
     static BUFFERS: Place = Place(UnsafeCell::new(BoardBuffers::new()));
     static TAKEN: AtomicBool = AtomicBool::new(false);

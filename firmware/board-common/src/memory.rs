@@ -49,7 +49,6 @@ pub struct Sections {
 
 impl Sections {
     /// Sizes of the sections as the linker placed them.
-    #[must_use]
     pub fn linked() -> Self {
         Self {
             vector_table: bytes!(__vector_table.._vector_table_end),
@@ -62,27 +61,23 @@ impl Sections {
     }
 
     /// Bytes of flash that the sections take.
-    #[must_use]
     pub fn flash(&self) -> usize {
         self.vector_table + self.text + self.rodata + self.data
     }
 
     /// Bytes of RAM that the sections take, without the stack.
-    #[must_use]
     pub fn ram(&self) -> usize {
         self.data + self.bss + self.uninit
     }
 }
 
 /// Bytes reserved for the stack.
-#[must_use]
 pub fn stack_bytes() -> usize {
     bytes!(_stack_end.._stack_start)
 }
 
 /// Largest number of bytes of stack in use at any time since the start: all bytes except those that are
 /// still painted.
-#[must_use]
 pub fn stack_high_water_bytes() -> usize {
     let words = stack_bytes() / size_of::<u32>();
     // The symbol is a single word, and the stack is not: exposed, its address stands for all of it.
@@ -94,7 +89,6 @@ pub fn stack_high_water_bytes() -> usize {
 }
 
 /// Sizes of sections and stack, as the link reports them.
-#[must_use]
 pub fn taken() -> Memory {
     let sections = Sections::linked();
     Memory {

@@ -20,7 +20,6 @@ unsafe extern "C" {
 ///
 /// # Safety
 /// The caller must ensure that this is called only once: no two values may be the same memory.
-#[must_use]
 pub unsafe fn take_weights() -> &'static mut [u32] {
     let (start, end) = (&raw mut _weights_start, &raw mut _weights_end);
     let words = (end.addr() - start.addr()) / size_of::<u32>();
@@ -49,7 +48,6 @@ impl Region {
     ///
     /// # Safety
     /// The caller must ensure that this is called only once: no two values may be the same region.
-    #[must_use]
     pub unsafe fn take() -> Regions {
         let region = |start: *const u8, end: *const u8| Self {
             start: start.expose_provenance(),
@@ -66,19 +64,16 @@ impl Region {
     }
 
     /// Address of the region's first byte.
-    #[must_use]
     pub fn start(&self) -> usize {
         self.start
     }
 
     /// Length of the region in bytes.
-    #[must_use]
     pub fn length(&self) -> usize {
         self.length
     }
 
     /// All bytes of the region.
-    #[must_use]
     pub fn bytes(&self) -> &[u8] {
         // SAFETY: the linker places nothing else in the slot, and only the owner of `self` writes to it.
         unsafe { slice::from_raw_parts(ptr::with_exposed_provenance(self.start), self.length) }
@@ -88,7 +83,6 @@ impl Region {
     ///
     /// # Safety
     /// The caller must ensure that the slot lies in memory that a program may write to.
-    #[must_use]
     pub unsafe fn bytes_mut(&mut self) -> &mut [u8] {
         let start = ptr::with_exposed_provenance_mut(self.start);
         // SAFETY: as in `bytes`; `self` is borrowed mutably, and the caller ensures that the memory can be

@@ -26,7 +26,6 @@ pub type TestSession<'a, S = MockSlot> = Session<'a, 'static, Board, Source, S, 
 const SCAN_US: u32 = 10;
 
 /// A configuration that scans only on request.
-#[must_use]
 pub fn quiet() -> Configuration {
     Configuration { frame_period_us: 0, ..Configuration::DEFAULT }
 }
@@ -35,7 +34,6 @@ pub fn quiet() -> Configuration {
 pub struct Bench<'m> {
     /// The application. A session borrows it.
     pub app: TestApp<'m>,
-    /// Its board.
     pub board: Board,
     /// The frame that its sensor shows, in Ω.
     pub frame: Rc<RefCell<TestFrame>>,
@@ -44,7 +42,6 @@ pub struct Bench<'m> {
 impl Bench<'static> {
     /// An application on a new board. Its memory, half a kilobyte, is never freed: whoever makes many uses
     /// [`Bench::within`].
-    #[must_use]
     pub fn new(configuration: Configuration) -> Self {
         Self::with_settings(configuration, &SharedSettings::default())
     }
@@ -55,7 +52,6 @@ impl Bench<'static> {
     }
 
     /// As [`Bench::new`], on a board whose flash for the key is `key`.
-    #[must_use]
     pub fn with_key(configuration: Configuration, key: &KeyArea) -> Self {
         Self::within_with_key(Box::leak(Box::new(Memory::new())), configuration, key)
     }
@@ -73,7 +69,6 @@ impl<'m> Bench<'m> {
     }
 
     /// As [`Bench::within`], on a board without settings whose flash for the key is `key`.
-    #[must_use]
     pub fn within_with_key(
         memory: &'m mut Memory,
         configuration: Configuration,
@@ -85,7 +80,6 @@ impl<'m> Bench<'m> {
     }
 
     /// As [`Bench::within`], on this board.
-    #[must_use]
     pub fn on(board: Board, memory: &'m mut Memory, configuration: Configuration) -> Self {
         *memory = Memory::new();
         let frame = Rc::new(RefCell::new(frame_at_rest()));
@@ -95,7 +89,6 @@ impl<'m> Bench<'m> {
 
     /// Restarts the application with another `configuration` and `scan_us` µs a scan, on the same board, in memory that
     /// is never freed.
-    #[must_use]
     pub fn restarted(self, configuration: Configuration, scan_us: u32) -> Bench<'static> {
         let Self { board, frame, .. } = self;
         let source = Source::new(&frame, &board, scan_us);

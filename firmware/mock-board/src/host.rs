@@ -16,7 +16,6 @@ use crate::source::Source;
 const ASKED: u16 = 77;
 
 /// A request for a configuration of the device's own.
-#[must_use]
 pub fn configure(configuration: Configuration) -> Request<'static> {
     Request::Configure { configuration, lease_ms: 0 }
 }
@@ -25,7 +24,6 @@ pub fn configure(configuration: Configuration) -> Request<'static> {
 ///
 /// # Panics
 /// The request is longer than 1 KiB.
-#[must_use]
 pub fn request_bytes(number: u16, request: &Request<'_>) -> Vec<u8> {
     let mut buffer = [0; 1024];
     let packet = packet::encode(number, request, &mut buffer).unwrap();
@@ -41,7 +39,6 @@ pub fn request_bytes(number: u16, request: &Request<'_>) -> Vec<u8> {
 ///
 /// # Panics
 /// A report is not whole.
-#[must_use]
 pub fn reports(bytes: &[u8]) -> Vec<(u16, String)> {
     let mut receiver = Receiver::new([0; 1024]);
     let mut reports = Vec::new();
@@ -116,7 +113,6 @@ pub fn model_crc<S: Slot>(
 ///
 /// # Panics
 /// The blob is shorter than its head.
-#[must_use]
 pub fn begin(blob: &[u8]) -> UploadStep<'_> {
     UploadStep::Begin { head: &blob[..Model::HEAD_BYTES] }
 }
@@ -126,7 +122,6 @@ pub fn begin(blob: &[u8]) -> UploadStep<'_> {
 ///
 /// # Panics
 /// The blob is shorter than its head, or `chunk` is 0.
-#[must_use]
 pub fn upload_steps(blob: &[u8], chunk: usize) -> Vec<UploadStep<'_>> {
     let mut steps = vec![begin(blob)];
     steps.extend(
@@ -140,9 +135,6 @@ pub fn upload_steps(blob: &[u8], chunk: usize) -> Vec<UploadStep<'_>> {
 
 /// Carries out steps of an upload in one session after the other, until the device refuses one; returns the last
 /// answer.
-///
-/// # Errors
-/// What the device refused.
 ///
 /// # Panics
 /// The device does not answer, or a session ends for another reason than the upload.
@@ -196,9 +188,6 @@ fn answer(board: &Board) -> Result<UploadState, Refusal> {
 }
 
 /// Uploads `blob` in chunks of `chunk` bytes and confirms it.
-///
-/// # Errors
-/// What the device refused.
 ///
 /// # Panics
 /// As [`upload`].

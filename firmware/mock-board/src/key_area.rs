@@ -43,19 +43,16 @@ impl KeyArea {
     pub const BYTES: usize = 256;
 
     /// Flash as it comes from the factory.
-    #[must_use]
     pub fn erased() -> Self {
         Self::of(Sound(vec![0xFF; Self::BYTES]))
     }
 
     /// This flash.
-    #[must_use]
     pub fn of(flash: impl Slot + Clone + 'static) -> Self {
         Self(Box::new(flash))
     }
 
     /// The flash that [`KeyArea::of`] was given, if it was of this type.
-    #[must_use]
     pub fn flash<S: 'static>(&self) -> Option<&S> {
         (&*self.0 as &dyn Any).downcast_ref()
     }
@@ -64,7 +61,6 @@ impl KeyArea {
     ///
     /// # Panics
     /// Never: there is room.
-    #[must_use]
     pub fn with(key: &Key) -> Self {
         let mut area = Self::erased();
         DeviceKey::set(&mut area, key).expect("there is room");

@@ -14,6 +14,8 @@
 //! assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&model)));
 //! ```
 
+#![allow(missing_docs, clippy::missing_errors_doc)] // a name that says all needs no more
+
 // From the ground up: a module imports only what is declared before it.
 mod shape;
 mod power;

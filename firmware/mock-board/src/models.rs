@@ -17,7 +17,6 @@ pub const TRAINING_ERROR: f32 = 0.02;
 ///
 /// # Panics
 /// There are no centres, or more than a blob can hold.
-#[must_use]
 pub fn blob(seed: usize, centres: usize) -> AlignedBytes {
     let number = |i: usize| ((i * 37 + seed * 11) % 101) as f32 / 50.0 - 1.0;
     let list = |from: usize, count: usize| (from..from + count).map(number).collect::<Vec<_>>();
@@ -44,7 +43,6 @@ pub fn blob(seed: usize, centres: usize) -> AlignedBytes {
 ///
 /// # Panics
 /// There are no centres, or more than a blob can hold.
-#[must_use]
 pub fn blob_to_recalibrate(centres: usize) -> AlignedBytes {
     let number = |i: usize| ((i * 37) % 101) as f32 / 50.0 - 1.0;
     let list = |from: usize, count: usize| (from..from + count).map(number).collect::<Vec<_>>();
@@ -81,7 +79,6 @@ pub fn blob_to_recalibrate(centres: usize) -> AlignedBytes {
 ///
 /// # Panics
 /// The network is of another shape than a blob can hold.
-#[must_use]
 pub fn blob_of(network: Network<'_>) -> AlignedBytes {
     blob_with(network, None, false)
 }
@@ -91,7 +88,6 @@ pub fn blob_of(network: Network<'_>) -> AlignedBytes {
 ///
 /// # Panics
 /// Never, as long as the block below fits its sizes.
-#[must_use]
 pub fn blob_with_confidence(relative_inputs: bool) -> AlignedBytes {
     let (readings, outputs) = (ROWS * COLS, ROWS * OUTPUTS);
     let [middle, scale] = if relative_inputs { [1.0, 20.0] } else { [62.0, 0.5] };
@@ -137,7 +133,6 @@ fn blob_with(
 ///
 /// # Panics
 /// There are no components, or more than a blob can hold.
-#[must_use]
 pub fn blob_of_components(components: usize) -> AlignedBytes {
     let (readings, outputs) = (ROWS * COLS, ROWS * OUTPUTS);
     let (weights, bias) = (vec![0.5; components], vec![0.25; components]);
@@ -176,7 +171,6 @@ pub fn blob_of_components(components: usize) -> AlignedBytes {
 ///
 /// # Panics
 /// The blob is shorter than four bytes.
-#[must_use]
 pub fn crc_of(blob: &[u8]) -> u32 {
     u32::from_le_bytes(*blob.last_chunk().unwrap())
 }

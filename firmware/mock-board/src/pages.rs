@@ -16,7 +16,6 @@ pub struct MockPage {
     power: Rc<RefCell<Power>>,
     /// Bits of a word that are left as they were when the power is cut while it is programmed or erased.
     untouched: u32,
-    /// Number of erases that were begun.
     pub erases: usize,
     /// Number of words whose programming was begun.
     pub words_written: usize,
@@ -35,7 +34,6 @@ impl MockPage {
     }
 
     /// All bytes of the page, to be changed without regard to what flash can do.
-    #[must_use]
     pub fn bytes_mut(&mut self) -> &mut [u8] {
         bytemuck::cast_slice_mut(&mut self.words)
     }
@@ -99,21 +97,16 @@ impl Default for SharedSettings {
 
 impl<S: Slot> SharedSettings<S> {
     /// Settings in these pages.
-    #[must_use]
     pub fn in_pages(pages: [S; 2]) -> Self {
         Self(Rc::new(RefCell::new(SettingPages::new(pages))))
     }
 
     /// The bytes that are kept for `setting`.
-    #[must_use]
     pub fn read_owned(&mut self, setting: Setting) -> Option<Vec<u8>> {
         self.read(setting, &mut [0; 1024]).map(<[u8]>::to_vec)
     }
 
     /// Keeps `bytes` for `setting`; returns whether something was written.
-    ///
-    /// # Errors
-    /// Every variant of [`KeepError`].
     pub fn keep_bytes(&mut self, setting: Setting, bytes: &[u8]) -> Result<bool, KeepError> {
         self.keep(setting, &[bytes])
     }
@@ -124,7 +117,6 @@ impl SharedSettings {
     ///
     /// # Panics
     /// The bytes are not as many as a page has.
-    #[must_use]
     pub fn holding(pages: [&[u8]; 2]) -> Self {
         let settings = Self::default();
         for (page, bytes) in settings.0.borrow_mut().pages().iter_mut().zip(pages) {
@@ -134,7 +126,6 @@ impl SharedSettings {
     }
 
     /// What both pages hold.
-    #[must_use]
     pub fn bytes(&self) -> [Vec<u8>; 2] {
         self.0.borrow_mut().pages().each_ref().map(|page| page.bytes().to_vec())
     }
@@ -148,19 +139,16 @@ impl SharedSettings {
     }
 
     /// Switches the power on; returns whether it had been cut.
-    #[must_use]
     pub fn power_on(&self) -> bool {
         self.0.borrow_mut().pages()[0].power.borrow_mut().on()
     }
 
     /// Number of erases of both pages.
-    #[must_use]
     pub fn erases(&self) -> usize {
         self.0.borrow_mut().pages().iter().map(|page| page.erases).sum()
     }
 
     /// Number of words of both pages whose programming was begun.
-    #[must_use]
     pub fn words_written(&self) -> usize {
         self.0.borrow_mut().pages().iter().map(|page| page.words_written).sum()
     }

@@ -13,7 +13,6 @@ pub const MESSAGE_BYTES: usize = 256;
 pub type TestFrame = [[f32; COLS]; ROWS];
 
 /// Readings of the untouched sensor in Ω.
-#[must_use]
 pub fn frame_at_rest() -> TestFrame {
     [[60.0, 61.0, 62.0], [63.0, 64.0, 65.0]]
 }

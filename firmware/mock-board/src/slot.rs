@@ -13,7 +13,6 @@ pub struct MockSlot {
     words: Vec<u32>,
     /// Power of both slots.
     power: Rc<RefCell<Power>>,
-    /// Number of erases that were begun.
     pub erases: usize,
     /// Number of writes that were begun, of any number of words.
     pub writes: usize,
@@ -24,7 +23,6 @@ impl MockSlot {
     pub const BYTES: usize = 2048;
 
     /// A pair of erased slots, with one power supply.
-    #[must_use]
     pub fn pair() -> [Self; 2] {
         let power = Rc::new(RefCell::new(Power::default()));
         [0, 1].map(|_| Self {
@@ -39,7 +37,6 @@ impl MockSlot {
     ///
     /// # Panics
     /// The blob is longer than a slot.
-    #[must_use]
     pub fn pair_with(blob: &[u8]) -> [Self; 2] {
         let mut slots = Self::pair();
         bytemuck::cast_slice_mut(&mut slots[0].words)[..blob.len()].copy_from_slice(blob);
@@ -52,7 +49,6 @@ impl MockSlot {
     }
 
     /// Switches the power on; returns whether it had been cut.
-    #[must_use]
     pub fn power_on(&self) -> bool {
         self.power.borrow_mut().on()
     }

@@ -20,7 +20,6 @@ pub struct Source {
 
 impl Source {
     /// A sensor with this `frame`, whose scan takes `scan_us` µs of the board's clock.
-    #[must_use]
     pub fn new(frame: &Rc<RefCell<TestFrame>>, board: &Board, scan_us: u32) -> Self {
         Self {
             circuit: ZeroPotential::TYPICAL,

@@ -76,7 +76,6 @@ impl Board {
     /// Sets up all parts: 180 MHz, from the ST-LINK's 8 MHz if they are there; all chip selects and row signals idle.
     ///
     /// `None` if it was called before.
-    #[must_use]
     pub fn take() -> Option<Self> {
         let parts = Peripherals::take()?;
         let mut core = cortex_m::Peripherals::take()?;

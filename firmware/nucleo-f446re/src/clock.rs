@@ -20,13 +20,11 @@ impl Clock {
     }
 
     /// Microseconds since the start; it restarts from 0 every 71 minutes.
-    #[must_use]
     pub fn now_us(&self) -> u32 {
         self.0.now().ticks()
     }
 
     /// Cycles of the processor since the start; it restarts from 0 every 24 s.
-    #[must_use]
     pub fn cycles(&self) -> u32 {
         DWT::cycle_count()
     }

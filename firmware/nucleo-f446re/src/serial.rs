@@ -95,7 +95,6 @@ impl Serial {
     }
 
     /// Whether all queued bytes have been sent, to the last bit.
-    #[must_use]
     pub fn has_sent_all(&self) -> bool {
         let mut all = self.to_send.is_empty();
         with_wires(|wires| all &= wires.tx.flush().is_ok());

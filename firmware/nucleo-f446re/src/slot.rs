@@ -31,7 +31,6 @@ impl Slot {
     }
 
     /// All bytes of the slot.
-    #[must_use]
     pub fn bytes(&self) -> &[u8] {
         self.0.bytes()
     }

@@ -31,7 +31,6 @@ pub struct Numbers(u64);
 
 impl Numbers {
     /// Starts a generator with this `seed`.
-    #[must_use]
     pub fn new(seed: u64) -> Self {
         Self(seed)
     }
@@ -92,7 +91,6 @@ impl<const R: usize> Decoded<R> {
 
 /// CRC-32 of all bits that the model in `blob` decodes some frames to, one with a missing reading. `None` if the
 /// blob does not load.
-#[must_use]
 pub fn decoding<E: ExpKernel>(blob: &[u8]) -> Option<u32> {
     let decoder = Decoder::<ROWS>::load(blob).ok()?;
     let crc = CRC;
@@ -137,7 +135,6 @@ pub fn one_of_many<const R: usize>(index: usize, numbers: &mut Numbers) -> Frame
 
 /// CRC-32 of all bits that the model in `blob` decodes [`MANY`] frames to, and of whether an input was clamped. `None`
 /// if the blob does not load.
-#[must_use]
 pub fn decoding_many<E: ExpKernel, const R: usize>(blob: &[u8]) -> Option<u32> {
     decoding_all::<E, R>(blob, MANY, one_of_many)
 }
@@ -157,7 +154,6 @@ fn one_of_extremes<const R: usize>(index: usize, numbers: &mut Numbers) -> Frame
 }
 
 /// CRC-32 as of [`decoding_many`], of a tenth as many frames with readings that no sensor gives.
-#[must_use]
 pub fn decoding_extremes<const R: usize>(blob: &[u8]) -> Option<u32> {
     decoding_all::<Polynomial, R>(blob, MANY / 10, one_of_extremes)
 }
@@ -198,7 +194,6 @@ fn infer_by_twin(network: &Network<'_>, inputs: &[f32; COLS], outputs: &mut [f32
 
 /// Number of rows of [`MANY`] frames that the model in `blob` decodes, and how many of them the compiled twin
 /// decodes to other bits. `None` if the blob does not load, or its number format has no twin.
-#[must_use]
 pub fn twins(blob: &[u8]) -> Option<[usize; 2]> {
     let decoder = Decoder::<ROWS>::load(blob).ok()?;
     let model = Model::decode(blob).ok()?;
@@ -225,7 +220,6 @@ pub fn twins(blob: &[u8]) -> Option<[usize; 2]> {
 /// Number of frames with one reading within four steps of f32 of an end of the clamp, how many of them are said to be
 /// clamped, and how many otherwise than by portable arithmetic. `None` if the blob does not load, or its number format
 /// clamps before it infers.
-#[must_use]
 pub fn clamping(blob: &[u8]) -> Option<[usize; 3]> {
     let decoder = Decoder::<ROWS>::load(blob).ok()?;
     let model = Model::decode(blob).ok()?;
@@ -267,7 +261,6 @@ pub fn clamping(blob: &[u8]) -> Option<[usize; 3]> {
 /// Number of the [`MANY`] frames that the model in `blob` decodes behind a projection, and how many of them the
 /// compiled twins of projection, network and expansion decode to other bits. `None` if the blob does not load, or its number
 /// format has no twin.
-#[must_use]
 pub fn array_twins(blob: &[u8]) -> Option<[usize; 2]> {
     let decoder = Decoder::<ARRAY_ROWS>::load(blob).ok()?;
     let model = Model::decode(blob).ok()?;
@@ -356,7 +349,6 @@ impl Assessed {
 }
 
 /// What [`MANY`] frames are by the confidence of the model in `blob`. `None` if the blob does not load, or has none.
-#[must_use]
 pub fn assessing_many(blob: &[u8]) -> Option<Assessed> {
     let decoder = Decoder::<ARRAY_ROWS>::load(blob).ok()?;
     let crc = QUICK_CRC;
@@ -384,7 +376,6 @@ const fn few_outputs(directions: usize) -> Sizes {
 }
 
 /// What frames of one row are by confidences of 1 to 12 directions. `None` if one is unsound.
-#[must_use]
 pub fn assessing_sizes() -> Option<Assessed> {
     let crc = QUICK_CRC;
     let (mut digest, mut assessed) = (crc.digest(), Assessed::NONE);
@@ -433,7 +424,6 @@ fn nearly_at_rest(
 
 /// Number of rows in [`MANY`] frames near the baseline, how many of them are at rest, and how many the gate treats
 /// wrongly: otherwise than [`is_at_rest`] says, or with other outputs. `None` if the blob does not load.
-#[must_use]
 pub fn gating(blob: &[u8]) -> Option<[usize; 3]> {
     let decoder = Decoder::<ROWS>::load(blob).ok()?;
     let mut numbers = Numbers::new(5);
@@ -474,7 +464,6 @@ pub fn gating(blob: &[u8]) -> Option<[usize; 3]> {
 }
 
 /// CRC-32 of all bits of the weights that recursive least squares has after each of 200 samples.
-#[must_use]
 pub fn recalibration() -> Option<u32> {
     let mut memory = [0.0; Rls::<f32>::values(9, 3)];
     let mut rls = Rls::try_new(&mut memory, [9, 3], 1e4, 0.99).ok()?;

@@ -19,7 +19,6 @@ pub struct Clock {
 
 impl Clock {
     /// Starts the timer.
-    #[must_use]
     pub fn start() -> Self {
         // SAFETY: timer 0 lies at this address.
         let timer = unsafe { Registers::at(0x4000_0000) };

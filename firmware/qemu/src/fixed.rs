@@ -25,13 +25,11 @@ pub struct Compared {
 
 /// Compares the statics of `testdata/hand-made.rs`, with a width for each centre, with their `blob`. `None` if it does
 /// not load.
-#[must_use]
 pub fn hand_made(blob: &[u8]) -> Option<Compared> {
     compare::<ROWS, OUTPUTS>(blob, hand_made::decode)
 }
 
 /// Compares the static of `testdata/row4.rs`, which `minimal` decodes with, with its `blob`. `None` if it does not load.
-#[must_use]
 pub fn row4(blob: &[u8]) -> Option<Compared> {
     compare::<1, 6>(blob, row4::decode)
 }

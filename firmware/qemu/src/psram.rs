@@ -17,7 +17,6 @@ impl Psram {
     ///
     /// # Safety
     /// The caller must ensure that this is called only once, because only one value may write to the memory.
-    #[must_use]
     pub const unsafe fn take() -> Self {
         Self(())
     }

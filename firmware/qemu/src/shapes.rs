@@ -60,7 +60,6 @@ impl Memory {
     ///
     /// # Safety
     /// The caller must ensure that this is called only once, and that nothing else uses the PSRAM or the MPU.
-    #[must_use]
     pub unsafe fn take(mpu: &MPU) -> Self {
         const SIZE_64_KIB_NO_ACCESS: u32 = 15 << 1 | 1;
         const ENABLE_WITH_DEFAULT_MAP: u32 = 1 << 2 | 1;
@@ -213,7 +212,6 @@ fn is_as_its_twin(
 }
 
 /// Compares networks of every shape in `format`, with an affine tail and without. `None` if a network is unsound.
-#[must_use]
 #[inline(never)] // frees the stack that this needs
 pub fn networks(memory: &mut Memory, format: Format) -> Option<Comparison> {
     let mut numbers = Numbers::new(6);
@@ -237,7 +235,6 @@ pub fn networks(memory: &mut Memory, format: Format) -> Option<Comparison> {
 }
 
 /// Compares projections of 1 to 40 readings to 1 to 40 features, and of 144 readings. `None` if one is unsound.
-#[must_use]
 #[inline(never)]
 pub fn projections(memory: &mut Memory) -> Option<Comparison> {
     let mut numbers = Numbers::new(7);
@@ -348,7 +345,6 @@ fn until_awake<const OUTPUTS: usize>(
 }
 
 /// Compares gates of rows of many sizes.
-#[must_use]
 pub fn gates() -> Comparison {
     let (mut comparison, mut numbers) = (Comparison::default(), Numbers::new(8));
     let (c, n) = (&mut comparison, &mut numbers);

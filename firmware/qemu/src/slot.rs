@@ -24,7 +24,6 @@ impl Slot {
     ///
     /// # Safety
     /// The caller must ensure that this is called only once: no two values may be the same slot.
-    #[must_use]
     pub unsafe fn take() -> ([Self; 2], [Self; 2], Self) {
         // SAFETY: the caller ensures that this is called only once.
         let (slots, pages, key) = unsafe { Region::take() };
@@ -32,7 +31,6 @@ impl Slot {
     }
 
     /// All bytes of the slot.
-    #[must_use]
     pub fn bytes(&self) -> &[u8] {
         self.0.bytes()
     }

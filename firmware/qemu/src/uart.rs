@@ -17,14 +17,12 @@ pub struct Uart(Registers);
 
 impl Uart {
     /// Starts the UART of the first `-serial` on QEMU's command line.
-    #[must_use]
     pub fn first() -> Self {
         // SAFETY: UART0 lies at this address.
         Self::start(unsafe { Registers::at(0x4000_4000) })
     }
 
     /// Starts the UART of the second `-serial` on QEMU's command line.
-    #[must_use]
     pub fn second() -> Self {
         // SAFETY: UART1 lies at this address.
         Self::start(unsafe { Registers::at(0x4000_5000) })

@@ -18,7 +18,6 @@ pub struct Watchdog(Registers);
 impl Watchdog {
     /// Starts the watchdog. A program that does not feed it for `timeout_ms` (at most 171 s) is stopped by a
     /// non-maskable interrupt, and restarted after as long again.
-    #[must_use]
     pub fn start(timeout_ms: u32) -> Self {
         // SAFETY: the watchdog lies at this address.
         let registers = unsafe { Registers::at(0x4000_8000) };

@@ -209,7 +209,9 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         self.statistics.bad_packets = self.statistics.bad_packets.saturating_add(1);
         let (number, refusal) = match error {
             PacketError::Damaged => return,
-            PacketError::OtherVersion { number } => (number, Refusal::Version(PROTOCOL_VERSION)),
+            PacketError::OtherVersion { number, .. } => {
+                (number, Refusal::Version(PROTOCOL_VERSION))
+            }
             PacketError::NotAMessage { number } => (number, Refusal::Unknown),
         };
         self.line.send(number, &Report::Refused(refusal), &mut self.statistics);

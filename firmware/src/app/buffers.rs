@@ -55,7 +55,6 @@ impl<const ROWS: usize, const COLUMNS: usize, const OUTPUTS: usize, const BYTES:
     Buffers<ROWS, COLUMNS, OUTPUTS, BYTES>
 {
     /// Makes empty buffers.
-    #[must_use]
     pub const fn new() -> Self {
         const {
             let capacity = Self::CAPACITY;

@@ -61,7 +61,6 @@ impl Default for Decoder {
 
 impl Decoder {
     /// Makes a decoder at the start of a frame.
-    #[must_use]
     pub const fn new() -> Self {
         Self { left: 0, zero_follows: false, started: false }
     }
@@ -85,7 +84,6 @@ impl Decoder {
     }
 
     /// Whether no byte came since the last end.
-    #[must_use]
     pub fn is_idle(&self) -> bool {
         !self.started
     }

@@ -82,7 +82,6 @@ pub enum Request<'a> {
 
 impl Request<'_> {
     /// Whether the request changes nothing, and so prolongs no lease.
-    #[must_use]
     pub fn only_asks(&self) -> bool {
         matches!(
             self,
@@ -314,14 +313,12 @@ pub struct Memory {
 
 impl Memory {
     /// Bytes of flash that the firmware takes, without models.
-    #[must_use]
     pub fn flash_bytes(&self) -> u32 {
         let parts = [self.vector_table, self.text, self.rodata, self.data];
         parts.into_iter().fold(0, u32::saturating_add)
     }
 
     /// Bytes of RAM that the firmware takes, with the stack at its deepest so far.
-    #[must_use]
     pub fn ram_bytes(&self) -> u32 {
         let parts = [self.data, self.bss, self.uninit, self.stack_high_water];
         parts.into_iter().fold(0, u32::saturating_add)

@@ -29,6 +29,8 @@ pub enum PacketError {
     OtherVersion {
         /// The number of the packet.
         number: u16,
+        /// The version of the protocol.
+        version: u8,
     },
     /// The packet is whole, but has no message of this protocol.
     NotAMessage {
@@ -58,7 +60,7 @@ pub fn decode<'b, T: Deserialize<'b>>(bytes: &'b [u8]) -> Result<Packet<T>, Pack
     let ((version, number), rest) =
         postcard::take_from_bytes::<(u8, u16)>(covered).map_err(|_| PacketError::Damaged)?;
     if version != PROTOCOL_VERSION {
-        return Err(PacketError::OtherVersion { number });
+        return Err(PacketError::OtherVersion { number, version });
     }
     match postcard::take_from_bytes(rest) {
         Ok((body, [])) => Ok(Packet { number, body }),
@@ -89,7 +91,10 @@ mod tests {
     fn another_version_and_bytes_left_over_are_told_apart_from_damage() {
         let whole = |covered: &[u8]| [covered, &CRC_32.checksum(covered).to_le_bytes()].concat();
         let other = whole(&[PROTOCOL_VERSION + 1, 9, 1]);
-        assert_eq!(decode::<u8>(&other), Err(PacketError::OtherVersion { number: 9 }));
+        assert_eq!(
+            decode::<u8>(&other),
+            Err(PacketError::OtherVersion { number: 9, version: PROTOCOL_VERSION + 1 })
+        );
         let left_over = whole(&[PROTOCOL_VERSION, 9, 1, 1]);
         assert_eq!(decode::<u8>(&left_over), Err(PacketError::NotAMessage { number: 9 }));
     }

@@ -27,7 +27,6 @@ pub struct Receiver<B> {
 
 impl<B: AsMut<[u8]>> Receiver<B> {
     /// Makes a receiver that has received nothing, with `memory` for one message.
-    #[must_use]
     pub const fn new(memory: B) -> Self {
         Self { cobs: Decoder::new(), memory, length: 0, ended: false, too_long: false }
     }

@@ -26,7 +26,6 @@ pub struct Baseline<'m> {
 
 impl<'m> Baseline<'m> {
     /// Makes a baseline of no frames, with `memory` for the longest one.
-    #[must_use]
     pub const fn new(memory: &'m mut [f32]) -> Self {
         Self { memory, readings: 0, frames: 0 }
     }
@@ -61,19 +60,16 @@ impl<'m> Baseline<'m> {
     }
 
     /// Number of frames added so far.
-    #[must_use]
     pub fn frames(&self) -> u16 {
         self.frames
     }
 
     /// The mean of the frames in Ω; NaN where a reading is not known, and 0 before the first frame.
-    #[must_use]
     pub fn mean(&self) -> &[f32] {
         self.memory.get(..self.readings).unwrap_or_default()
     }
 
     /// The largest |R/R_rest − 1| of `frame`, or `None` if no reading is known in both.
-    #[must_use]
     pub fn largest_relative_deviation(&self, frame: &[f32]) -> Option<f32> {
         let pairs = self.mean().iter().zip(frame);
         pairs

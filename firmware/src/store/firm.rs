@@ -11,7 +11,6 @@ use super::{RECORD_BYTES, Record, Slot, generation, record_at, record_pairs, rec
 
 /// Generation of the records that the model in slot number `in_force` still needs, to be written by
 /// [`reinstate`](super::reinstate); `None` if its choice is firm.
-#[must_use]
 pub fn missing_records<S: Slot>(slots: &[S; 2], in_force: usize) -> Option<u32> {
     let [first, second] = slots;
     let (chosen, other) = if in_force == 0 { (first, second) } else { (second, first) };

@@ -56,7 +56,6 @@ enum Copy {
 
 impl DeviceKey {
     /// Finds the key in its `area` of flash.
-    #[must_use]
     pub fn find(area: &[u8]) -> Self {
         let first = |wanted| {
             let mut copies = places(area).iter().filter_map(read);

@@ -27,19 +27,16 @@ impl Default for Upload {
 
 impl Upload {
     /// Makes a state in which no upload is going on.
-    #[must_use]
     pub const fn new() -> Self {
         Self { state: UploadState::Idle, length: 0, is_empty: false, worn_until_us: 0 }
     }
 
     /// Progress of the upload.
-    #[must_use]
     pub fn state(&self) -> UploadState {
         self.state
     }
 
     /// Whether chunks are expected.
-    #[must_use]
     pub fn is_receiving(&self) -> bool {
         matches!(self.state, UploadState::Receiving { .. })
     }

@@ -4,7 +4,7 @@ use firmware::app::Session;
 use firmware::link::message::{Configuration, EstimateReport, Refusal, Report, Request};
 use model_core::blob::{Floats, Metadata, Model, ModelParts, encode_to_vec};
 
-use crate::requests::{capture, decode};
+use super::requests::{capture, decode};
 use mock_board::*;
 
 #[test]

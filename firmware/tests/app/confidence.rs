@@ -8,7 +8,7 @@ use model_core::blob::Floats;
 use model_core::relative::reciprocal;
 use model_core::{Decoder, Frame};
 
-use crate::requests::{bits, statistics};
+use super::requests::{bits, statistics};
 use mock_board::*;
 
 /// What an estimate has of a confidence, as bits, and whether it is flagged as novel.

@@ -8,7 +8,7 @@ use model_core::rbf::Shape;
 use model_core::rbf::direct::{self, Parameters};
 use model_core::{AlignedBytes, Decoder};
 
-use crate::requests::{bits, capture, decode, expected};
+use super::requests::{bits, capture, decode, expected};
 use mock_board::*;
 
 #[test]

@@ -5,7 +5,7 @@ use firmware::link::message::{Configuration, EstimateReport, Report, Request};
 use firmware::link::packet;
 use firmware::link::receive::{Received, Receiver};
 
-use crate::requests::statistics;
+use super::requests::statistics;
 use mock_board::*;
 
 #[test]

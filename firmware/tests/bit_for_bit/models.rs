@@ -12,7 +12,7 @@ use model_core::rbf::fixed16::{
 use model_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
 use model_core::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP};
 
-use super::checks::{
+use crate::checks::{
     ARRAY_COMPONENTS, ARRAY_CONFIDENCE, ARRAY_ROWS, COLS, Numbers, OUTPUTS, write_confidence,
 };
 

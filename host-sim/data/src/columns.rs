@@ -14,13 +14,11 @@ const UNITS: [(&str, &str); 7] = [
 ];
 
 /// Unit that a column's name states (`Ω` for `r4c17_ohm`), or "".
-#[must_use]
 pub fn unit_of(name: &str) -> &'static str {
     UNITS.iter().find(|(suffix, _)| name.ends_with(suffix)).map_or("", |(_, unit)| unit)
 }
 
 /// Row-wire (from 1) that a name like `r4c17_ohm` or `r4e2_dz_mm` begins with.
-#[must_use]
 pub fn row_of(name: &str) -> Option<usize> {
     let rest = name.strip_prefix('r')?;
     let digits = rest.find(|c: char| !c.is_ascii_digit())?;
@@ -34,7 +32,6 @@ pub const READINGS: &str = "reading_ohm";
 
 /// Group under which errors of an output are reported: the axis of an electrode's deformation or force
 /// (`dz_mm` for `r4e2_dz_mm`), or [`READINGS`]. Any other column is a group of its own.
-#[must_use]
 pub fn group_of(name: &str) -> &str {
     match (row_of(name), name.split_once('_')) {
         (Some(_), Some((_, "ohm"))) => READINGS,
@@ -44,7 +41,6 @@ pub fn group_of(name: &str) -> &str {
 }
 
 /// Groups of `names` in the order in which they first appear, each with the indices of its columns.
-#[must_use]
 pub fn groups(names: &[String]) -> Vec<(&str, Vec<usize>)> {
     let mut groups: Vec<(&str, Vec<usize>)> = Vec::new();
     for (column, name) in names.iter().enumerate() {
@@ -60,7 +56,6 @@ pub fn groups(names: &[String]) -> Vec<(&str, Vec<usize>)> {
 /// Quantity that an output measures: outputs of one quantity are compared as they are, those of different ones by
 /// their spread. It is the unit, but that the contact's place, depth and shear are three quantities in mm. "" for a
 /// name that states none.
-#[must_use]
 pub fn quantity_of(name: &str) -> &str {
     match name {
         "contact_x_mm" | "contact_y_mm" => "contact_centre",
@@ -71,7 +66,6 @@ pub fn quantity_of(name: &str) -> &str {
 }
 
 /// Whether `group` is compression in mm, the only one with a positional error.
-#[must_use]
 pub fn is_compression(group: &str) -> bool {
     group == "dz_mm"
 }
@@ -79,7 +73,6 @@ pub fn is_compression(group: &str) -> bool {
 /// Indices of the columns of `header` that match `pattern`, in the header's order. A pattern is a
 /// comma-separated list of names in which `*` stands for any characters and `?` for one, and of ranges: `c2..c16`
 /// stands for all columns from `c2` to `c16`.
-#[must_use]
 pub fn select(header: &[String], pattern: &str) -> Vec<usize> {
     let mut selected: Vec<usize> =
         pattern.split(',').flat_map(|part| part_of(header, part)).collect();
@@ -105,13 +98,11 @@ fn part_of(header: &[String], part: &str) -> Vec<usize> {
 }
 
 /// First part of a comma-separated `pattern` that no column of `header` matches.
-#[must_use]
 pub fn unmatched<'p>(header: &[String], pattern: &'p str) -> Option<&'p str> {
     pattern.split(',').map(str::trim).find(|part| part_of(header, part).is_empty())
 }
 
 /// First names of a header, as a list for messages.
-#[must_use]
 pub fn some_names(header: &[String]) -> String {
     const SHOWN: usize = 8;
     let shown = header.iter().take(SHOWN).map(|name| cut(name)).collect::<Vec<_>>().join(", ");

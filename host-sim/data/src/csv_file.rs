@@ -23,13 +23,11 @@ pub struct Column<'n> {
 
 impl<'n> Column<'n> {
     /// Column called `name`, whose numbers read back as the same f64.
-    #[must_use]
     pub fn f64(name: &'n str) -> Self {
         Self { name, is_f32: false }
     }
 
     /// Column called `name` whose numbers were computed in f32: they get the digits that read back as the same f32.
-    #[must_use]
     pub fn f32(name: &'n str) -> Self {
         Self { name, is_f32: true }
     }
@@ -37,9 +35,6 @@ impl<'n> Column<'n> {
 
 /// Writes a CSV file: a header of `names`, then `lines`. Every number reads back as the same f64; NaN
 /// becomes an empty field.
-///
-/// # Errors
-/// [`Error::Write`] if the file cannot be written; whatever stood at `path` then stays.
 pub fn write<'n, L: IntoIterator<Item = f64>>(
     path: &Path,
     names: impl IntoIterator<Item = &'n str>,
@@ -49,9 +44,6 @@ pub fn write<'n, L: IntoIterator<Item = f64>>(
 }
 
 /// Writes a CSV file as [`write()`] does, but with fewer digits where a column needs no more.
-///
-/// # Errors
-/// [`Error::Write`] if the file cannot be written; whatever stood at `path` then stays.
 pub fn write_columns<'n, L: IntoIterator<Item = f64>>(
     path: &Path,
     columns: impl IntoIterator<Item = Column<'n>>,

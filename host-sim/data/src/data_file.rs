@@ -19,7 +19,6 @@ pub struct DataFile {
     pub path: PathBuf,
     /// Column names: the file's own, or `c1`, `c2`, … for a file that names none.
     pub header: Vec<String>,
-    /// Whether the file names its columns.
     pub names_columns: bool,
     /// Whether it is a CSV file without an end of its last line, which may be cut off in a number.
     pub lacks_last_line_end: bool,
@@ -47,18 +46,12 @@ impl DataFile {
 
     /// Reads the file at `path` as [`read`](Self::read) does, but for the first line of a CSV file: it is a header even
     /// if it holds numbers alone.
-    ///
-    /// # Errors
-    /// As [`read`](Self::read).
     pub fn read_with_header(path: &Path) -> Result<Self> {
         Self::parse(path, &input::read(path, input::MOST_DATA_BYTES)?, true)
     }
 
     /// Parses `bytes` as [`read`](Self::read) does those of the file at `path`, whose extension tells what they are. The
     /// first line of a CSV file is a header even if it holds numbers alone, if it `has_header`.
-    ///
-    /// # Errors
-    /// [`Error::File`] as [`read`](Self::read).
     pub fn parse(path: &Path, bytes: &[u8], has_header: bool) -> Result<Self> {
         let ends_in =
             |kind: &str| path.extension().is_some_and(|end| end.eq_ignore_ascii_case(kind));
@@ -100,14 +93,12 @@ impl DataFile {
     ///
     /// # Panics
     /// If the file has no such line.
-    #[must_use]
     pub fn row(&self, line: usize) -> &[f64] {
         let columns = self.header.len();
         &self.values[line * columns..(line + 1) * columns]
     }
 
     /// Number of lines of data.
-    #[must_use]
     pub fn lines(&self) -> usize {
         self.values.len() / self.header.len()
     }
@@ -116,21 +107,16 @@ impl DataFile {
     ///
     /// # Panics
     /// If the file has no such line.
-    #[must_use]
     pub fn value(&self, line: usize, column: usize) -> f64 {
         self.values[line * self.header.len() + column]
     }
 
     /// Number in the file (from 1, header included) of the line of data `line` (from 0), for messages.
-    #[must_use]
     pub fn line_number(&self, line: usize) -> u64 {
         self.line_numbers[line]
     }
 
     /// Index (from 0) of the column called `name`.
-    ///
-    /// # Errors
-    /// [`Error::File`] if there is no such column.
     pub fn column(&self, name: &str) -> Result<usize> {
         self.header.iter().position(|n| n == name).ok_or_else(|| {
             let known = columns::some_names(&self.header);
@@ -139,9 +125,6 @@ impl DataFile {
     }
 
     /// Indices (from 0) of the columns called `names`.
-    ///
-    /// # Errors
-    /// [`Error::File`] for the first name without a column.
     pub fn columns<'n>(&self, names: impl IntoIterator<Item = &'n str>) -> Result<Vec<usize>> {
         names.into_iter().map(|name| self.column(name)).collect()
     }

@@ -31,7 +31,6 @@ pub struct Dataset {
 
 impl Dataset {
     /// Data set of `frames` lines of zeros, with the given columns in `rows` row tables.
-    #[must_use]
     pub fn empty(
         input_names: Vec<String>,
         output_names: Vec<String>,
@@ -44,7 +43,6 @@ impl Dataset {
     }
 
     /// Number of frames in the set.
-    #[must_use]
     pub fn frames(&self) -> usize {
         self.inputs.len()
     }
@@ -53,7 +51,6 @@ impl Dataset {
     ///
     /// # Panics
     /// If the set has no such row table.
-    #[must_use]
     pub fn row_table(&self, row: usize) -> RowTable {
         let cut = |table: &Table| {
             let count = table.names.len() / self.rows;
@@ -150,7 +147,6 @@ pub struct RowTable {
 
 impl RowTable {
     /// Range `[low, high]` by which each input is scaled, in the input's unit.
-    #[must_use]
     pub fn input_ranges(&self) -> Vec<[f64; 2]> {
         let mut ranges = self.inputs.ranges();
         if self.common_span {

@@ -1,7 +1,6 @@
 //! Digest of files: ties a model to the scene or data that it was trained on.
 
 /// CRC-64/XZ of `bytes`: tells versions of a file apart, but does not protect against forgery.
-#[must_use]
 pub fn digest(bytes: &[u8]) -> u64 {
     let mut digest = crc64fast::Digest::new();
     digest.write(bytes);

@@ -17,7 +17,6 @@ const LEAST_EXPONENT: f64 = -708.0;
 
 /// Natural logarithm of a normal positive number, within 1 ulp.
 #[inline(always)]
-#[must_use]
 pub fn ln(x: f64) -> f64 {
     const LG: [f64; 7] = [
         6.666_666_666_666_735e-1,
@@ -49,7 +48,6 @@ pub fn ln(x: f64) -> f64 {
 ///
 /// π/2 is taken off as a sum of two numbers, good for 2⁻⁸⁵ of a turn.
 #[inline(always)]
-#[must_use]
 pub fn sin_cos(x: f64) -> (f64, f64) {
     const PIO2_1: f64 = 1.570_796_326_734_125_6;
     const PIO2_1T: f64 = 6.077_100_506_506_192e-11;
@@ -99,7 +97,6 @@ pub fn sin_cos(x: f64) -> (f64, f64) {
 
 /// Exponential of a number ≤ 0, within 1 ulp down to −708; 0 below that.
 #[inline(always)]
-#[must_use]
 pub fn exp(x: f64) -> f64 {
     const INV_LN2: f64 = std::f64::consts::LOG2_E;
     const P: [f64; 5] = [
@@ -134,7 +131,6 @@ pub fn exp(x: f64) -> f64 {
 ///
 /// The rational approximation is that of Hart (1968), in the form of West (2005).
 #[inline(always)]
-#[must_use]
 pub fn normal_share_below(x: f64) -> f64 {
     const P: [f64; 7] = [
         220.206_867_912_376,

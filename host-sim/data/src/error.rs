@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 mod text;
 
 use text::short;
-pub use text::{cut, in_words, number, quoted};
+pub use text::{cut, in_words, number, printable, quoted};
 
 /// Result of the functions of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
@@ -20,9 +20,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{field} = {value}: {rule}")]
 pub struct BadValue {
-    /// Name of the setting.
     pub field: String,
-    /// Value that was given.
     pub value: String,
     /// Rule for values that can be used.
     pub rule: String,
@@ -43,9 +41,6 @@ impl BadValue {
 }
 
 /// Checks that a setting `holds`; its `value` and the `rule` for it are told if not.
-///
-/// # Errors
-/// The setting, if it does not hold.
 pub fn require(
     holds: bool,
     field: impl Into<String>,
@@ -60,53 +55,30 @@ pub fn require(
 pub enum Error {
     /// File that cannot be read.
     #[error("cannot read {}: {cause}; check the path and its permissions", path.display())]
-    Read {
-        /// Path of the file.
-        path: PathBuf,
-        /// Error of the system.
-        cause: std::io::Error,
-    },
+    Read { path: PathBuf, cause: std::io::Error },
     /// File that cannot be written.
     #[error("cannot write {}: {cause}; choose another place", path.display())]
-    Write {
-        /// Path of the file.
-        path: PathBuf,
-        /// Error of the system.
-        cause: std::io::Error,
-    },
+    Write { path: PathBuf, cause: std::io::Error },
     /// Output file that would replace one of the inputs.
     #[error("{} would be written over {}, which is read; choose another output", output.display(), input.display())]
-    WrittenOverInput {
-        /// Path of the output.
-        output: PathBuf,
-        /// Path of the input.
-        input: PathBuf,
-    },
+    WrittenOverInput { output: PathBuf, input: PathBuf },
     /// Data file that cannot be used.
     #[error("{}: {problem}", path.display())]
-    File {
-        /// Path of the file.
-        path: PathBuf,
-        /// Problem with the file, and its place.
-        problem: Problem,
-    },
+    File { path: PathBuf, problem: Problem },
 }
 
 impl Error {
     /// Error for a `problem` with the file at `path`.
-    #[must_use]
     pub fn file(path: &Path, problem: Problem) -> Self {
         Self::File { path: path.into(), problem }
     }
 
     /// Error for a file at `path` that cannot be read.
-    #[must_use]
     pub fn read(path: &Path, cause: std::io::Error) -> Self {
         Self::Read { path: path.into(), cause }
     }
 
     /// Error for a file at `path` that cannot be written.
-    #[must_use]
     pub fn write(path: &Path, cause: std::io::Error) -> Self {
         Self::Write { path: path.into(), cause }
     }
@@ -123,7 +95,6 @@ pub enum Role {
 
 impl Role {
     /// Name of the role in messages.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Inputs => "inputs",
@@ -139,16 +110,10 @@ pub enum Problem {
     #[error(
         "line 1: fields seem to be separated by {separator:?}; save the file with commas, and points in numbers"
     )]
-    Separator {
-        /// Separator that was found.
-        separator: char,
-    },
+    Separator { separator: char },
     /// Header that cannot be read.
     #[error("line 1: {cause}; save as UTF-8")]
-    Header {
-        /// Reason.
-        cause: String,
-    },
+    Header { cause: String },
     /// File without content.
     #[error("the file is empty: write numbers into it, with names of the columns on line 1")]
     Empty,
@@ -171,24 +136,13 @@ pub enum Problem {
     },
     /// Blank line in a file of one column, where it could be a missing value.
     #[error("line {line} is blank; in a file of one column write NaN for a missing value")]
-    BlankLine {
-        /// Number of the line.
-        line: usize,
-    },
+    BlankLine { line: usize },
     /// Column name that is empty or holds a control character.
     #[error("line 1: column {column} has no usable name {}", quoted(name))]
-    UnusableName {
-        /// Number of the column.
-        column: usize,
-        /// Name of the column.
-        name: String,
-    },
+    UnusableName { column: usize, name: String },
     /// Name that two columns share.
     #[error("line 1: column {} stands twice; rename one", quoted(name))]
-    RepeatedName {
-        /// Name of the columns.
-        name: String,
-    },
+    RepeatedName { name: String },
     /// Line that cannot be split into fields.
     #[error("{cause}; check quotes and line ends")]
     Line {
@@ -197,22 +151,13 @@ pub enum Problem {
     },
     /// Line with more or fewer fields than the header.
     #[error("line {line} has {fields} fields; the header names {columns}; mend or remove the line")]
-    FieldCount {
-        /// Number of the line.
-        line: u64,
-        /// Fields in the line.
-        fields: usize,
-        /// Columns in the header.
-        columns: usize,
-    },
+    FieldCount { line: u64, fields: usize, columns: usize },
     /// Line with more or fewer fields than the first one, in a file without a header.
     #[error(
         "line {line} has {fields} fields; the first line has {columns}; mend or remove the line"
     )]
     UnevenLine {
-        /// Number of the line.
         line: u64,
-        /// Fields in the line.
         fields: usize,
         /// Fields in the first line.
         columns: usize,
@@ -223,67 +168,43 @@ pub enum Problem {
         quoted(column),
         quoted(field)
     )]
-    NotANumber {
-        /// Number of the line.
-        line: u64,
-        /// Name of the column.
-        column: String,
-        /// Text of the field.
-        field: String,
-    },
+    NotANumber { line: u64, column: String, field: String },
     /// Value of an array that is infinite.
     #[error(
         "line {line}, column {}: the value is infinite; write NaN if it is missing",
         quoted(column)
     )]
-    Infinite {
-        /// Number of the line.
-        line: u64,
-        /// Name of the column.
-        column: String,
-    },
+    Infinite { line: u64, column: String },
     /// File of arrays that is no table of numbers.
     #[error("{cause}; save arrays of numbers, lines × columns, by numpy.save or numpy.savez")]
-    Array {
-        /// Reason.
-        cause: String,
-    },
+    Array { cause: String },
     /// Column that is needed and missing.
     #[error("column {} is missing; the file has: {known}", quoted(name))]
     MissingColumn {
         /// Name of the missing column.
         name: String,
-        /// First columns of the file.
         known: String,
     },
     /// Part of a pattern that matches no column.
     #[error("no column matches {glob:?} of the {} {pattern:?}; the file has: {known}", role.name())]
     NoMatch {
-        /// Role of the columns.
         role: Role,
         /// Part that matches nothing.
         glob: String,
-        /// Whole pattern.
         pattern: String,
-        /// First columns of the file.
         known: String,
     },
     /// File without any column of the project's own names, and no pattern given.
     #[error("no column is named like {pattern}; choose the {}; the file has: {known}", role.name())]
     NoUsualNames {
-        /// Role of the columns.
         role: Role,
         /// Pattern of the project's own names.
         pattern: String,
-        /// First columns of the file.
         known: String,
     },
     /// Column that both patterns select, as input and as output.
     #[error("column {} is chosen as an input and as an output", quoted(name))]
-    InputAndOutput {
-        /// Name of the column.
-        name: String,
-    },
+    InputAndOutput { name: String },
     /// Value too large to train on.
     #[error(
         "line {line}, column {}: {value:?} is beyond {bound:e}, the largest number that a decoder in f32 is trained on; \
@@ -291,11 +212,8 @@ pub enum Problem {
         quoted(column)
     )]
     TooLarge {
-        /// Number of the line.
         line: u64,
-        /// Name of the column.
         column: String,
-        /// Value of the field.
         value: f64,
         /// Largest magnitude that is accepted.
         bound: f64,
@@ -309,23 +227,18 @@ pub enum Problem {
         quoted(column)
     )]
     OutOfBound {
-        /// Number of the line.
         line: u64,
-        /// Name of the column.
         column: String,
-        /// Value of the field.
         value: f64,
         /// Largest magnitude that is accepted.
         bound: f64,
         /// Meaning of the bound, for the message.
         bound_of: &'static str,
-        /// Unit of the value and the bound.
         unit: &'static str,
     },
     /// Missing value in a column where every line needs one.
     #[error("line {line}: {rule}")]
     MissingValue {
-        /// Number of the line.
         line: u64,
         /// Values that every line needs, for the message.
         rule: String,
@@ -337,9 +250,7 @@ pub enum Problem {
         quoted(column), number(*value), number(*before)
     )]
     ClockSetBack {
-        /// Number of the line.
         line: u64,
-        /// Name of the column.
         column: String,
         /// Time stamp of the line.
         value: f64,
@@ -353,7 +264,6 @@ pub enum Problem {
         number(*tolerance), number(*distance)
     )]
     NoPartner {
-        /// Path of the other log.
         other: String,
         /// Largest distance that was allowed.
         tolerance: f64,
@@ -364,10 +274,7 @@ pub enum Problem {
     #[error(
         "this file or {other} has no time stamp: the column is empty; check which columns hold the time"
     )]
-    NoTimeStamp {
-        /// Path of the other log.
-        other: String,
-    },
+    NoTimeStamp { other: String },
 }
 
 #[cfg(test)]

@@ -1,8 +1,11 @@
 //! Input files, read whole up to a size that is told when it is exceeded: not every path names a file that ends.
 
-use std::fs::File;
-use std::io::Read;
+use std::fs::{File, OpenOptions};
+use std::io::{self, ErrorKind, Read};
 use std::path::Path;
+use std::sync::mpsc;
+use std::thread;
+use std::time::Duration;
 
 use crate::error::{Error, Problem, Result};
 
@@ -15,13 +18,56 @@ pub const MOST_VALUES: usize = 500_000_000;
 /// Largest text file with settings in bytes, such as a scene's: 16 MB.
 pub const MOST_TEXT_BYTES: u64 = 16_000_000;
 
+/// Time for another program to open a named pipe.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// Opens the file at `path` for reading.
+///
+/// # Errors
+/// [`Error::Read`] if it cannot be read, or is a named pipe that nobody writes to.
+pub fn open(path: &Path) -> Result<File> {
+    let opened = open_in_time(path, OpenOptions::new().read(true), "nobody writes to this pipe");
+    opened.map_err(|cause| Error::read(path, cause))
+}
+
+/// Opens a file. The system opens a named pipe once there is somebody at its other end; if that takes too long, it is
+/// an error that tells `who_is_missing`.
+pub(crate) fn open_in_time(
+    path: &Path,
+    options: &OpenOptions,
+    who_is_missing: &str,
+) -> io::Result<File> {
+    if !is_pipe(path) {
+        return options.open(path);
+    }
+    let (opened, result) = mpsc::channel();
+    let (path, options) = (path.to_path_buf(), options.clone());
+    // If nobody comes, this thread waits until the program ends.
+    thread::spawn(move || opened.send(options.open(path)));
+    result.recv_timeout(PATIENCE).unwrap_or_else(|_| {
+        let message = format!("{who_is_missing}; waited for {} s", PATIENCE.as_secs());
+        Err(io::Error::new(ErrorKind::TimedOut, message))
+    })
+}
+
+#[cfg(unix)]
+fn is_pipe(path: &Path) -> bool {
+    use std::os::unix::fs::FileTypeExt;
+    std::fs::metadata(path).is_ok_and(|found| found.file_type().is_fifo())
+}
+
+#[cfg(not(unix))]
+fn is_pipe(_: &Path) -> bool {
+    false
+}
+
 /// Reads the file at `path` whole, if it has at most `most_bytes`.
 ///
 /// # Errors
 /// [`Error::Read`] if the file cannot be read, [`Error::File`] if it is larger.
 pub fn read(path: &Path, most_bytes: u64) -> Result<Vec<u8>> {
     let error = |cause| Error::read(path, cause);
-    let file = File::open(path).map_err(error)?;
+    let file = open(path)?;
     let metadata = file.metadata().map_err(error)?;
     let most_bytes =
         if metadata.is_file() { most_bytes } else { most_bytes.min(MOST_STREAM_BYTES) };
@@ -37,12 +83,9 @@ pub fn read(path: &Path, most_bytes: u64) -> Result<Vec<u8>> {
 }
 
 /// Reads the text file at `path` whole, if it has at most [`MOST_TEXT_BYTES`].
-///
-/// # Errors
-/// As [`read`]; and [`Error::Read`] for bytes that are not UTF-8.
 pub fn read_text(path: &Path) -> Result<String> {
     String::from_utf8(read(path, MOST_TEXT_BYTES)?).map_err(|cause| {
-        Error::read(path, std::io::Error::new(std::io::ErrorKind::InvalidData, cause.utf8_error()))
+        Error::read(path, io::Error::new(ErrorKind::InvalidData, cause.utf8_error()))
     })
 }
 

@@ -31,9 +31,6 @@ pub struct Joined {
 
 impl Join {
     /// Checks tolerance and lag.
-    ///
-    /// # Errors
-    /// The field `tolerance` or `lag` with a value that cannot be used.
     pub fn check(&self) -> std::result::Result<(), BadValue> {
         let is_tolerance = self.tolerance.is_finite() && self.tolerance >= 0.0;
         let rule = || "give a time from 0, in the unit of the time stamps".into();
@@ -60,7 +57,9 @@ impl Join {
         for (line, time) in &times {
             let Some((partner, distance)) = nearest(&others, *time, self.lag) else { continue };
             nearest_distance = nearest_distance.min(distance);
-            if distance > self.tolerance {
+            // Decimal time stamps are rounded: one that is exactly as far must not be left out for that.
+            let rounding = 2.0 * f64::EPSILON * (time.abs() + self.lag.abs() + self.tolerance);
+            if distance > self.tolerance + rounding {
                 continue;
             }
             largest_distance = largest_distance.max(distance);

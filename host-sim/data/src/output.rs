@@ -1,26 +1,22 @@
 //! Output files that appear whole or not at all.
 //!
-//! Whatever ends the work, an error, a full disk or a signal, leaves the old file as it was and no temporary file. Only
-//! a program that is killed outright leaves one, `.<name>.<digits>.tmp`; the next run with the same output removes it.
+//! A file is written to `.<name>.<16 characters>.tmp` beside it, made safe from loss of power, and renamed. An error or
+//! a signal leaves the old file as it was and no temporary one. Only a program that is killed outright leaves its
+//! temporary files, which are hidden and never read again.
 
 use std::fs;
 use std::io::{BufWriter, ErrorKind, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 
-mod disk;
-mod pending;
+mod step;
 mod place;
 mod temporary;
-mod set;
 
-pub use disk::{Disk, System};
-pub use pending::abandon;
-pub use set::FileSet;
-pub use temporary::Scratch;
+pub use step::{Step, watched};
+pub use temporary::{Scratch, abandon};
 
-use disk::Sink;
 use place::Place;
 use temporary::Temporary;
 
@@ -33,58 +29,22 @@ use temporary::Temporary;
 /// # Errors
 /// [`Error::Write`] if the file cannot be written, or whatever error `write` returns.
 pub fn write_whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
-    write_whole_on(&System, path, write)
-}
-
-/// Writes `path` as [`write_whole`] does, by the calls of a `disk`.
-///
-/// # Errors
-/// [`Error::Write`] if the file cannot be written, or whatever error `write` returns.
-pub fn write_whole_on(
-    disk: &dyn Disk,
-    path: &Path,
-    write: impl FnOnce(&mut dyn Write) -> Result<()>,
-) -> Result<()> {
     let error = |cause| Error::write(path, cause);
-    match Place::of(path).map_err(error)? {
-        Place::Stdout => stream(path, place::stdout(), write),
-        Place::Stream { path: real, is_fifo } => {
-            stream(path, place::open(&real, is_fifo).map_err(error)?, write)
+    let stream: Box<dyn Write> = match Place::of(path).map_err(error)? {
+        Place::File(file) => {
+            return temporary::put_in_place(vec![Temporary::written(file, write)?], &[]);
         }
-        Place::File { real, permissions } => {
-            temporary::remove_leftovers(disk, &real);
-            let temporary = Temporary::beside(disk, &real).map_err(error)?;
-            if let Some(permissions) = permissions {
-                disk.set_permissions(temporary.file(), permissions).map_err(error)?;
-            }
-            let mut writer = BufWriter::new(Sink::new(disk, temporary.file()));
-            write(&mut writer)?;
-            writer.flush().map_err(error)?;
-            drop(writer);
-            disk.sync(temporary.file()).map_err(error)?;
-            temporary.rename(&real).map_err(error)
-        }
-    }
-}
-
-/// Writes to a stream, as long as somebody reads it.
-fn stream(
-    path: &Path,
-    mut stream: Box<dyn Write>,
-    write: impl FnOnce(&mut dyn Write) -> Result<()>,
-) -> Result<()> {
-    let written = write(&mut stream);
-    let written = written.and_then(|()| stream.flush().map_err(|cause| Error::write(path, cause)));
-    match written {
+        Place::Stdout => Box::new(std::io::stdout().lock()),
+        Place::Stream(stream) => Box::new(place::open_stream(&stream).map_err(error)?),
+    };
+    let mut stream = BufWriter::new(stream);
+    match write(&mut stream).and_then(|()| stream.flush().map_err(error)) {
         Err(Error::Write { cause, .. }) if cause.kind() == ErrorKind::BrokenPipe => Ok(()),
         other => other,
     }
 }
 
 /// Writes `bytes` to `path`, whole or not at all, like [`write_whole`].
-///
-/// # Errors
-/// [`Error::Write`] if the file cannot be written.
 pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
     write_whole(path, |file| file.write_all(bytes).map_err(|cause| Error::write(path, cause)))
 }
@@ -95,55 +55,78 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
 /// # Errors
 /// [`Error::Write`] if `path` cannot be written, or [`Error::WrittenOverInput`] if it is an input.
 pub fn check_writable(path: &Path, inputs: &[&Path]) -> Result<()> {
-    let error = |cause| Error::write(path, cause);
-    let real = match Place::of(path).map_err(error)? {
-        Place::File { real, .. } => real,
-        Place::Stdout => return check_not_behind(Path::new("/dev/stdout"), path, inputs),
-        Place::Stream { path: stream, .. } => return check_not_behind(&stream, path, inputs),
+    let place = Place::of(path).map_err(|cause| Error::write(path, cause))?;
+    let real = match &place {
+        Place::File(file) => &file.real,
+        Place::Stdout => Path::new("/dev/stdout"),
+        Place::Stream(stream) => stream,
     };
-    check_no_input(path, inputs)?;
-    temporary::remove_leftovers(&System, &real);
-    Temporary::beside(&System, &real).map(drop).map_err(error)
+    if let Some(own) = place::identity(real)
+        && let Some(input) =
+            inputs.iter().find(|input| place::identity(input).as_ref() == Some(&own))
+    {
+        return Err(Error::WrittenOverInput { output: path.into(), input: (*input).into() });
+    }
+    match place {
+        Place::File(file) => Temporary::beside(file).map(drop),
+        Place::Stdout | Place::Stream(_) => Ok(()),
+    }
 }
 
 /// Whether [`write_whole`] writes to the program's own stdout: `-`, `/dev/stdout`, or a link to it.
-#[must_use]
 pub fn is_stdout(path: &Path) -> bool {
     matches!(Place::of(path), Ok(Place::Stdout))
 }
 
-/// Checks that the file `output` is none of the `inputs`.
-fn check_no_input(output: &Path, inputs: &[&Path]) -> Result<()> {
-    let Ok(real) = fs::canonicalize(output) else { return Ok(()) };
-    let same = |input: &&&Path| fs::canonicalize(input).is_ok_and(|input| input == real);
-    match inputs.iter().find(same) {
-        Some(input) => {
-            Err(Error::WrittenOverInput { output: output.into(), input: (*input).into() })
-        }
-        None => Ok(()),
-    }
+/// Files of a folder that belong together: those of one run.
+///
+/// All are written before the first one is renamed, so an error of writing leaves the old ones, and a signal waits until
+/// all are renamed. A kill, a loss of power or an error between two renames leaves files that are whole: the first ones
+/// of this run, the others of the one before.
+#[derive(Debug, Clone, Copy)]
+pub struct FileSet {
+    /// Names of all files that there may be.
+    pub files: &'static [&'static str],
 }
 
-/// Checks that the `stream` which `output` leads to is no regular file among the `inputs`, under whatever name.
-#[cfg(unix)]
-fn check_not_behind(stream: &Path, output: &Path, inputs: &[&Path]) -> Result<()> {
-    use std::os::unix::fs::MetadataExt;
-    let file = |path: &Path| {
-        let found = fs::metadata(path).ok().filter(fs::Metadata::is_file);
-        found.map(|found| (found.dev(), found.ino()))
-    };
-    let Some(behind) = file(stream) else { return Ok(()) };
-    match inputs.iter().find(|input| file(input) == Some(behind)) {
-        Some(input) => {
-            Err(Error::WrittenOverInput { output: output.into(), input: (*input).into() })
+impl FileSet {
+    /// Checks before long work that [`write`](Self::write) can write to `folder` and would not replace one of the
+    /// command's own `inputs`. Nothing is changed.
+    ///
+    /// # Errors
+    /// [`Error::Write`] if a file cannot be written, or [`Error::WrittenOverInput`] if it is an input.
+    pub fn check(&self, folder: &Path, inputs: &[&Path]) -> Result<()> {
+        // A folder that is not there is made at the end: what is stopped before then leaves none.
+        let there = folder.ancestors().find(|path| path.exists()).unwrap_or(Path::new("."));
+        if there != folder {
+            return check_writable(&there.join("new"), &[]).map_err(|error| match error {
+                Error::Write { cause, .. } => Error::write(folder, cause),
+                other => other,
+            });
         }
-        None => Ok(()),
+        for path in self.files.iter().map(|name| folder.join(name)) {
+            place::file(&path)?;
+            check_writable(&path, inputs)?;
+        }
+        Ok(())
     }
-}
 
-#[cfg(not(unix))]
-fn check_not_behind(_: &Path, _: &Path, _: &[&Path]) -> Result<()> {
-    Ok(())
+    /// Writes files, by name and content, to `folder`, which is made if it is not there. Other files of the set
+    /// are removed: they are from an earlier run.
+    pub fn write(&self, folder: &Path, contents: &[(&str, &[u8])]) -> Result<()> {
+        fs::create_dir_all(folder).map_err(|cause| Error::write(folder, cause))?;
+        let written = contents.iter().map(|(name, bytes)| {
+            let path = folder.join(name);
+            Temporary::written(place::file(&path)?, |file| {
+                file.write_all(bytes).map_err(|cause| Error::write(&path, cause))
+            })
+        });
+        let written = written.collect::<Result<Vec<Temporary>>>()?;
+        let is_earlier = |name: &&&str| contents.iter().all(|(new, _)| new != *name);
+        let earlier: Vec<PathBuf> =
+            self.files.iter().filter(is_earlier).map(|name| folder.join(name)).collect();
+        temporary::put_in_place(written, &earlier)
+    }
 }
 
 #[cfg(test)]

@@ -75,7 +75,6 @@ pub struct Random {
 
 impl Random {
     /// Source for `purpose` number `index` (say a frame) and `part` (say a row) of `stream`.
-    #[must_use]
     pub fn new(seed: u64, stream: Stream, purpose: Purpose, index: u64, part: u64) -> Self {
         let words = [stream as u64, purpose as u64, index, part];
         let mixed = words.iter().fold(seed, |state, word| split_mix(state ^ split_mix(*word)));

@@ -3,7 +3,6 @@
 /// Table of numbers with named columns, one frame a line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
-    /// Column names.
     pub names: Vec<String>,
     /// Values, `lines × columns`, line after line; NaN is missing.
     pub values: Vec<f64>,
@@ -11,13 +10,11 @@ pub struct Table {
 
 impl Table {
     /// Number of lines.
-    #[must_use]
     pub fn len(&self) -> usize {
         if self.names.is_empty() { 0 } else { self.values.len() / self.names.len() }
     }
 
     /// Whether the table has no line.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -26,7 +23,6 @@ impl Table {
     ///
     /// # Panics
     /// If the table has columns, and no such line.
-    #[must_use]
     pub fn line(&self, line: usize) -> &[f64] {
         &self.values[line * self.names.len()..(line + 1) * self.names.len()]
     }
@@ -37,7 +33,6 @@ impl Table {
     }
 
     /// Smallest and largest value of each column, `[low, high]`; NaN is skipped.
-    #[must_use]
     pub fn ranges(&self) -> Vec<[f64; 2]> {
         let mut ranges = vec![[f64::INFINITY, f64::NEG_INFINITY]; self.names.len()];
         for line in self.lines() {
@@ -50,7 +45,6 @@ impl Table {
 
     /// Mean of each column; NaN is skipped. Rounding moves it out of no column's range, so that the mean of equal values
     /// is that value.
-    #[must_use]
     pub fn means(&self) -> Vec<f64> {
         let mut sums = vec![(0.0, 0.0); self.names.len()];
         for line in self.lines() {
@@ -72,7 +66,6 @@ impl Table {
 
     /// Standard deviation of each column; NaN is skipped. 0 for a column that does not change as far as f32 can tell,
     /// or holds NaN alone.
-    #[must_use]
     pub fn deviations(&self) -> Vec<f64> {
         let means = self.means();
         let mut sums = vec![(0.0, 0.0); means.len()];
@@ -93,7 +86,6 @@ impl Table {
     }
 
     /// Sum Σ(estimate − value)² of each column, for `estimates` of the same shape, `lines × columns`.
-    #[must_use]
     pub fn squared_errors(&self, estimates: &[f64]) -> Vec<f64> {
         let mut sums = vec![0.0; self.names.len()];
         for (line, estimates) in self.lines().zip(estimates.chunks_exact(sums.len().max(1))) {

@@ -25,7 +25,6 @@ pub struct DepthErrors {
     pub from_mm: f64,
     /// Depth in mm that is not reached; `None` for no bound.
     pub to_mm: Option<f64>,
-    /// Number of frames.
     pub frames: usize,
     /// Errors by group of outputs.
     pub errors: Vec<Errors>,
@@ -33,7 +32,6 @@ pub struct DepthErrors {
 
 impl DepthErrors {
     /// Range of depth in words.
-    #[must_use]
     pub fn range(&self) -> String {
         match self.to_mm {
             Some(to_mm) => format!("{} to {to_mm} mm", self.from_mm),
@@ -49,7 +47,6 @@ impl DepthErrors {
 ///
 /// # Panics
 /// If `estimate` is not as long as `truth`, or `measure` does not have one full scale a column.
-#[must_use]
 pub fn by_depth(truth: &Table, estimate: &[f64], measure: &Measure) -> Vec<DepthErrors> {
     let width = truth.names.len();
     let Some(column) = truth.names.iter().position(|name| name == DEPTH) else { return vec![] };

@@ -13,7 +13,6 @@ pub type Result<T> = std::result::Result<T, Error>;
 pub enum Bounded {
     /// RMSE of the chosen group.
     Error,
-    /// Cycles of a frame.
     Cycles,
     /// Bytes of the blob.
     Flash,
@@ -25,7 +24,6 @@ pub enum Bounded {
 
 impl Bounded {
     /// Name of the quantity in messages.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Error => "max-error",
@@ -37,13 +35,11 @@ impl Bounded {
     }
 
     /// Whether `value` is within `bound`.
-    #[must_use]
     pub fn allows(self, value: f64, bound: f64) -> bool {
         if self == Self::FrameRate { value >= bound } else { value <= bound }
     }
 
     /// The one of two values that is nearer to being within a bound.
-    #[must_use]
     pub fn nearer(self, a: f64, b: f64) -> f64 {
         if self == Self::FrameRate { a.max(b) } else { a.min(b) }
     }
@@ -57,7 +53,6 @@ impl Bounded {
 /// Bound of a trade, and the nearest value that points come to it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unmet {
-    /// Bounded quantity.
     pub bounded: Bounded,
     /// Most, or least, that the user allows.
     pub bound: f64,
@@ -179,7 +174,6 @@ pub enum Error {
     /// Scene file that cannot be parsed.
     #[error("scene {scene}: {message}")]
     Syntax {
-        /// Path or name of the scene.
         scene: String,
         /// Place in the file, and what was expected there.
         message: String,
@@ -187,7 +181,6 @@ pub enum Error {
     /// Scene with a setting that cannot be used.
     #[error("scene {scene}: {cause}")]
     Scene {
-        /// Path or name of the scene.
         scene: String,
         /// Setting, and which values can be used.
         cause: BadValue,
@@ -213,7 +206,6 @@ pub enum Error {
     /// File that is not what a command needs.
     #[error("{}: {message}", path.display())]
     Unfit {
-        /// Path of the file.
         path: PathBuf,
         /// Reason, and a remedy.
         message: String,

@@ -3,8 +3,6 @@
 pub mod distribution;
 pub mod device_cost;
 pub mod gate;
-pub mod drift;
-pub mod readout;
 pub mod worth;
 pub mod learning_curve;
 pub mod limit;

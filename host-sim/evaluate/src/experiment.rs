@@ -51,9 +51,7 @@ pub struct Experiment {
     pub name: String,
     /// CRC-64/XZ of the scene's text.
     pub digest: u64,
-    /// World to simulate.
     pub world: World,
-    /// Settings of training.
     pub training: Training,
     /// Settings of Table 1, if it is wanted.
     pub table1: Option<Table1>,
@@ -64,9 +62,7 @@ pub struct Experiment {
 #[serde(deny_unknown_fields)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a field of a scene's file")]
 pub struct Training {
-    /// Number of frames to train on.
     pub frames: usize,
-    /// Number of frames to evaluate on.
     pub test_frames: usize,
     /// Number of centres K of each row's network.
     pub centres: usize,
@@ -134,11 +130,8 @@ pub struct Table1 {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OpenChoices {
-    /// What inputs are scaled by.
     pub inputs_scaled: Scaling,
-    /// What *spread* means.
     pub spread_is: SpreadMeaning,
-    /// Whether networks have a bias.
     pub bias: bool,
     /// Initial covariance δ of the recursive least squares: the penalty on squared weights is 1/δ.
     pub initial_covariance: f64,
@@ -152,7 +145,6 @@ pub struct OpenChoices {
 pub enum JudgedOn {
     /// Frames that training did not see.
     Fresh,
-    /// Frames of training.
     Training,
 }
 
@@ -182,9 +174,6 @@ impl Experiment {
 
     /// Reads a scene as [`load`](Self::load) does, but for its numbers of frames and of centres to train with: options
     /// may replace them. [`check_sizes`](Self::check_sizes) checks what is in force then.
-    ///
-    /// # Errors
-    /// As [`load`](Self::load).
     pub fn load_open(name_or_path: &str) -> Result<Self> {
         if let Some((_, text)) = EMBEDDED.iter().find(|(name, _)| *name == name_or_path) {
             return Self::parse_open(name_or_path, text);
@@ -225,7 +214,6 @@ impl Experiment {
     }
 
     /// Options for training the scene's model.
-    #[must_use]
     pub fn options(&self) -> Options {
         let t = &self.training;
         Options {
@@ -243,7 +231,6 @@ impl Experiment {
     }
 
     /// Origin of the training data, for the model's metadata.
-    #[must_use]
     pub fn origin(&self) -> Origin {
         let noise = &self.world.noise;
         let kind = match noise.kind {
@@ -261,7 +248,6 @@ impl Experiment {
     }
 
     /// Measure for errors of the scene's outputs.
-    #[must_use]
     pub fn measure(&self) -> Measure {
         Measure {
             full_scale: self.full_scales(),
@@ -274,7 +260,6 @@ impl Experiment {
     /// readings of a frame. Ratios are formed on the first of so many `test_frames`.
     ///
     /// Where the limit is refused, its summary says why and there are no ratios.
-    #[must_use]
     pub fn measure_beside_limit(
         &self,
         noise_level: f64,
@@ -298,7 +283,6 @@ impl Experiment {
     /// Its inputs are deformations and its outputs readings if the scene's models predict readings. Otherwise its
     /// inputs are readings. These may be relative to the baseline of each session: the mean of [`BASELINE_FRAMES`]
     /// frames of the untouched sensor. `synthesis` is one of the experiment's world.
-    #[must_use]
     pub fn dataset(&self, synthesis: &Synthesis<'_>, stream: Stream, frames: usize) -> Dataset {
         self.dataset_from(synthesis, stream, 0, frames)
     }
@@ -307,7 +291,6 @@ impl Experiment {
     ///
     /// # Panics
     /// If a trajectory has several frames, which pieces could cut.
-    #[must_use]
     pub fn pieces<'e>(
         &'e self,
         synthesis: Synthesis<'e>,
@@ -370,9 +353,6 @@ impl Experiment {
     }
 
     /// Checks the numbers of frames and of centres to train with, which options may have replaced.
-    ///
-    /// # Errors
-    /// [`BadValue`] for the first one that cannot be used, by its name in a scene.
     pub fn check_sizes(&self) -> Check {
         let t = &self.training;
         check_sizes("training", t.frames, t.test_frames, t.centres)?;

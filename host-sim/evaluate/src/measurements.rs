@@ -14,7 +14,6 @@ pub struct Measurements {
     pub name: String,
     /// CRC-64/XZ of the file.
     pub digest: u64,
-    /// Frames to train on.
     pub training: Dataset,
     /// Fold of each training frame, numbered from 0.
     pub fold_of: Vec<usize>,
@@ -29,7 +28,6 @@ pub struct Measurements {
     pub outliers: Outliers,
     /// Readings of the untouched sensor, in the readings' columns, if they are known.
     pub rest: Option<Table>,
-    /// Options of training.
     pub options: Options,
     /// Whether centres, widths and the projection are refined after K-means.
     pub refine: bool,
@@ -71,7 +69,6 @@ pub struct Split {
 impl Split {
     /// Splits `frames` into those to train on and those to judge by. `fold_of` gives the fold of each frame, if its
     /// user told it.
-    #[must_use]
     pub fn of(frames: &Dataset, fold_of: Option<&[usize]>, judged: Judged) -> Self {
         let all = 0..frames.frames();
         let last_fold = fold_of.and_then(|folds| folds.iter().max());
@@ -97,13 +94,11 @@ impl Split {
 
 impl Measurements {
     /// Origin of the frames, for the model's metadata.
-    #[must_use]
     pub fn origin(&self) -> Origin {
         Origin::of_data(&self.name, self.digest, self.options.seed, &self.training)
     }
 
     /// Names of the inputs that never change in the training frames.
-    #[must_use]
     pub fn constant_inputs(&self) -> Vec<String> {
         let inputs = &self.training.inputs;
         let columns = inputs.names.iter().zip(inputs.deviations());
@@ -112,7 +107,6 @@ impl Measurements {
 
     /// Relative noise of a reading at rest, as a fraction: the root of the mean over columns of (standard
     /// deviation/mean)². `None` if the sensor at rest is not known, or a column's mean is zero.
-    #[must_use]
     pub fn noise_level(&self) -> Option<f64> {
         let rest = self.rest.as_ref()?;
         let columns = rest.names.len();
@@ -122,20 +116,17 @@ impl Measurements {
     }
 
     /// Mean of the readings at rest on one line, if they are known.
-    #[must_use]
     pub fn baseline(&self) -> Option<Table> {
         self.rest.as_ref().map(Table::mean_line)
     }
 
     /// Measure for errors on the test frames.
-    #[must_use]
     pub fn measure(&self) -> Measure {
         Measure { full_scale: self.origin().full_scale, thickness_mm: None, limit: None }
     }
 }
 
 /// Makes the inputs of `frames` relative to the mean of `rest`, the readings of the untouched sensor.
-#[must_use]
 pub fn relative_to(frames: Dataset, rest: &Table) -> Dataset {
     relative::dataset(frames, &rest.mean_line())
 }

@@ -31,7 +31,6 @@ pub struct Measure {
 pub struct Errors {
     /// Name of the group: `dz_mm`, or a column's name.
     pub group: String,
-    /// Unit of `rmse`.
     pub unit: String,
     /// Number of pairs of truth and estimate that count.
     pub count: usize,
@@ -50,7 +49,6 @@ pub struct Errors {
     pub mean_relative_percent: Option<f64>,
     /// Ratio of the RMSE to the limit, formed on the frames of the [`Reference`]; scenes only.
     pub ratio_to_limit: Option<f64>,
-    /// Standard error of that ratio.
     pub ratio_standard_error: Option<f64>,
 }
 
@@ -62,26 +60,22 @@ pub const NETWORK: &str = "network";
 pub struct DecoderErrors {
     /// Name of the decoder, such as `network`, `linear` or `mean`.
     pub decoder: String,
-    /// Errors by group.
     pub errors: Vec<Errors>,
 }
 
 impl DecoderErrors {
     /// Errors of the decoder of that name.
-    #[must_use]
     pub fn new(decoder: &str, errors: Vec<Errors>) -> Self {
         Self { decoder: decoder.into(), errors }
     }
 }
 
 /// Errors of one of the `decoders`, by its name; empty if it is not among them.
-#[must_use]
 pub fn of_decoder<'d>(decoders: &'d [DecoderErrors], name: &str) -> &'d [Errors] {
     decoders.iter().find(|it| it.decoder == name).map_or(&[], |it| &it.errors)
 }
 
 /// RMSE of each of the `groups` of outputs from the RMSE of their members: the root of the mean square.
-#[must_use]
 pub fn pooled(groups: &[(&str, Vec<usize>)], rmse: &[f64]) -> Vec<f64> {
     let of_group = |members: &Vec<usize>| {
         let squares: f64 = members.iter().map(|column| rmse[*column].powi(2)).sum();
@@ -103,7 +97,6 @@ pub struct LimitSummary {
 
 impl LimitSummary {
     /// Summary of `limit`, or of the reason why there is none.
-    #[must_use]
     pub fn of(limit: &Result<Reference, Refusal>) -> Self {
         match limit {
             Ok(limit) => Self { frames: limit.frames(), groups: limit.limits(), refused: None },
@@ -114,7 +107,6 @@ impl LimitSummary {
     }
 
     /// Summary in one line, for below a table of errors.
-    #[must_use]
     pub fn note(&self) -> String {
         if let Some(refusal) = &self.refused {
             return format!("No ratio to the least possible error: {refusal}.");
@@ -133,7 +125,6 @@ impl LimitSummary {
 }
 
 /// Errors of `decoder` on the frames of `test`.
-#[must_use]
 pub fn judge(decoder: &dyn Decoder, test: &Dataset, measure: &Measure) -> DecoderErrors {
     let estimates = decoder.decode_all(&test.inputs.values, 1);
     let errors = by_group(&test.outputs, &estimates.values, measure);
@@ -173,7 +164,6 @@ impl Definition {
     ];
 
     /// Name of the definition in CSV and JSON.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Rmse => "rmse",
@@ -187,7 +177,6 @@ impl Definition {
     }
 
     /// Formula of the definition, for captions.
-    #[must_use]
     pub fn formula(self) -> &'static str {
         match self {
             Self::Rmse => "RMSE = √mean(e²), in the output's unit",
@@ -203,7 +192,6 @@ impl Definition {
     }
 
     /// Error by this definition, where it is defined.
-    #[must_use]
     pub fn of(self, errors: &Errors) -> Option<f64> {
         match self {
             Self::Rmse => Some(errors.rmse),
@@ -224,7 +212,6 @@ impl Definition {
 ///
 /// # Panics
 /// If `estimate` is not as long as `truth`, or `measure` does not have one full scale a column.
-#[must_use]
 pub fn by_group(truth: &Table, estimate: &[f64], measure: &Measure) -> Vec<Errors> {
     columns::groups(&truth.names)
         .iter()

@@ -42,7 +42,6 @@ pub struct RunResult {
     pub scene: Option<SceneSummary>,
     /// What only measurements have; `None` for a scene.
     pub data: Option<DataSummary>,
-    /// Model that was trained.
     pub model: ModelSummary,
     /// What the model asks of a device.
     pub device_cost: DeviceCost,
@@ -94,11 +93,8 @@ pub struct SceneSummary {
 /// Summary of the model that was trained.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModelSummary {
-    /// Number of frames trained on.
     pub training_frames: usize,
-    /// Number of frames evaluated on.
     pub test_frames: usize,
-    /// Number of networks in the blob.
     pub networks: usize,
     /// Number of inputs of each network: its row's readings, or features of all readings.
     pub inputs_per_network: usize,
@@ -118,7 +114,6 @@ pub struct ModelSummary {
     pub refined: bool,
     /// Whether the networks add an affine tail A·x.
     pub affine_tail: bool,
-    /// Size of the blob.
     pub blob_bytes: usize,
     /// CRC-32 of the blob, in hexadecimal.
     pub model_crc: String,
@@ -131,13 +126,11 @@ pub struct ModelSummary {
 pub struct RowErrors {
     /// Row-wire, from 1.
     pub row_wire: usize,
-    /// Errors by group.
     pub errors: Vec<Errors>,
 }
 
 impl RunResult {
     /// Whether the model predicts readings from deformations.
-    #[must_use]
     pub fn predicts_readings(&self) -> bool {
         let mut errors = self.decoders.iter().flat_map(|decoder| &decoder.errors);
         !self.decoders.is_empty() && errors.all(|errors| errors.group == READINGS)
@@ -145,9 +138,6 @@ impl RunResult {
 }
 
 /// Trains on `subject` with `options`, judges the model and returns its results and the blob.
-///
-/// # Errors
-/// [`Error`](crate::Error) for a subject whose model cannot be trained or packed.
 pub fn run(
     subject: &Subject,
     options: &Options,

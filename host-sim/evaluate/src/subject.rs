@@ -22,13 +22,11 @@ use crate::training_set::TrainingSet;
 pub enum Subject {
     /// Scene, whose frames are synthesised.
     Scene(Box<Experiment>),
-    /// Measured frames.
     Measured(Box<Measurements>),
 }
 
 impl Subject {
     /// Name, which names the output folder and the model.
-    #[must_use]
     pub fn name(&self) -> &str {
         match self {
             Self::Scene(scene) => &scene.name,
@@ -37,7 +35,6 @@ impl Subject {
     }
 
     /// Scene, if it is one.
-    #[must_use]
     pub fn scene(&self) -> Option<&Experiment> {
         match self {
             Self::Scene(scene) => Some(scene),
@@ -46,7 +43,6 @@ impl Subject {
     }
 
     /// Measurements, if it is not a scene.
-    #[must_use]
     pub fn measurements(&self) -> Option<&Measurements> {
         match self {
             Self::Scene(_) => None,
@@ -55,15 +51,11 @@ impl Subject {
     }
 
     /// Refuses a scene whose models predict readings, for a `command` that is about decoding.
-    ///
-    /// # Errors
-    /// [`Error`](crate::Error) for a scene with `direction = "forward"`.
     pub fn require_inverse(&self, command: &str) -> Result<()> {
         self.scene().map_or(Ok(()), |scene| scene.require_inverse(command))
     }
 
     /// Options for training its model.
-    #[must_use]
     pub fn options(&self) -> Options {
         match self {
             Self::Scene(scene) => scene.options(),
@@ -72,7 +64,6 @@ impl Subject {
     }
 
     /// Origin of its frames, for the model's metadata.
-    #[must_use]
     pub fn origin(&self) -> Origin {
         match self {
             Self::Scene(scene) => scene.origin(),
@@ -81,7 +72,6 @@ impl Subject {
     }
 
     /// Names of the outputs, in the model's order.
-    #[must_use]
     pub fn output_names(&self) -> Vec<String> {
         match self {
             Self::Scene(scene) => scene.output_names(),
@@ -90,7 +80,6 @@ impl Subject {
     }
 
     /// Number of frames to train on.
-    #[must_use]
     pub fn training_frames(&self) -> usize {
         match self {
             Self::Scene(scene) => scene.training.frames,
@@ -99,7 +88,6 @@ impl Subject {
     }
 
     /// Number of frames to judge by.
-    #[must_use]
     pub fn test_frames(&self) -> usize {
         match self {
             Self::Scene(scene) => scene.training.test_frames,
@@ -108,7 +96,6 @@ impl Subject {
     }
 
     /// Number of row tables, each with a network of its own unless one serves the whole array.
-    #[must_use]
     pub fn rows(&self) -> usize {
         match self {
             Self::Scene(scene) => scene.world.outputs.row_tables(scene.world.read_rows.len()),
@@ -117,7 +104,6 @@ impl Subject {
     }
 
     /// Row-wire (from 1) of each row table, where outputs belong to row-wires.
-    #[must_use]
     pub fn row_wires(&self) -> Vec<usize> {
         match self {
             Self::Scene(scene) => match scene.world.outputs {
@@ -143,7 +129,6 @@ impl Subject {
     }
 
     /// Frames to train on, whose readings are means of so many samples. Measurements are as they are.
-    #[must_use]
     pub fn training_set(&self, samples_averaged: usize) -> TrainingSet<'_> {
         match self {
             Self::Scene(scene) => {
@@ -158,7 +143,6 @@ impl Subject {
     }
 
     /// Frames to judge by, whose readings are means of so many samples. Measurements are as they are.
-    #[must_use]
     pub fn test_set(&self, samples_averaged: usize) -> Cow<'_, Dataset> {
         match self {
             Self::Scene(scene) => {
@@ -172,7 +156,6 @@ impl Subject {
 
     /// Measure for errors on the test frames, with the limit at so many samples a reading where it is known, and a
     /// summary of that limit or the reason why there is none.
-    #[must_use]
     pub fn measure(
         &self,
         samples_averaged: usize,

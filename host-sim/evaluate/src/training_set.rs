@@ -18,7 +18,6 @@ use crate::experiment::{Experiment, MoreFrames};
 
 /// Frames to train on, and what refinement measures the error on.
 pub struct TrainingSet<'s> {
-    /// Frames to train on.
     pub frames: Cow<'s, Dataset>,
     /// Origin of the frames, for the model's metadata.
     pub origin: Origin,
@@ -41,7 +40,6 @@ enum More<'s> {
 
 impl<'s> TrainingSet<'s> {
     /// Training frames of a scene, from `synthesis` of its world.
-    #[must_use]
     pub fn of_scene(experiment: &'s Experiment, synthesis: Synthesis<'s>) -> Self {
         let t = &experiment.training;
         Self {
@@ -56,14 +54,12 @@ impl<'s> TrainingSet<'s> {
 
     /// Measured `frames`, with the fold of each, numbered from 0. It neither refines, nor adds a confidence, nor fills
     /// missing readings, unless the fields ask for it.
-    #[must_use]
     pub fn of_folds(frames: &'s Dataset, fold_of: &'s [usize], origin: Origin) -> Self {
         let (frames, more) = (Cow::Borrowed(frames), More::Folds(fold_of));
         Self { frames, origin, refine: false, confidence: false, fill: false, more }
     }
 
     /// What refinement measures the error on; `None` if it is not asked for.
-    #[must_use]
     pub fn examples(&self) -> Option<Examples<'_>> {
         self.refine.then(|| match &self.more {
             More::Scene(more) => Examples::Fresh(more.as_ref()),
@@ -72,9 +68,6 @@ impl<'s> TrainingSet<'s> {
     }
 
     /// Trains with `options`, refined if that is asked for.
-    ///
-    /// # Errors
-    /// [`Error`](crate::Error) for options that cannot be used with these frames.
     pub fn train(&self, options: &Options, progress: &dyn Progress) -> Result<Trained> {
         Ok(match self.examples() {
             None => train(&self.frames, options, progress)?,
@@ -85,12 +78,10 @@ impl<'s> TrainingSet<'s> {
     }
 
     /// Trains with `options` and packs the model, with a confidence and a fill if these are asked for.
-    ///
-    /// # Errors
-    /// [`Error`](crate::Error) for options that cannot be used with these frames, or a model that cannot be packed.
     pub fn blob(&self, options: &Options, progress: &dyn Progress) -> Result<ModelBlob> {
         if self.confidence {
             resolution::check_squares(&self.frames)?;
+            confidence::check(self.frames.frames(), self.frames.inputs.names.len())?;
         }
         if self.fill {
             fill::check(&self.frames)?;
@@ -102,9 +93,6 @@ impl<'s> TrainingSet<'s> {
     /// and then on the `rest`, piece by piece. `count` is the number of all frames, if it is known.
     ///
     /// The learning curve, which is returned too, has errors on `test`, or else on the next frames.
-    ///
-    /// # Errors
-    /// [`Error`](crate::Error) for options that cannot be used with these frames, and any error of the `rest`.
     pub fn train_by_recursion(
         &self,
         rest: Pieces<'_>,
@@ -120,9 +108,6 @@ impl<'s> TrainingSet<'s> {
     }
 
     /// Packs the model that was `trained` with `options`, with a confidence and a fill if these are asked for.
-    ///
-    /// # Errors
-    /// [`Error`](crate::Error) for a model that cannot be packed.
     pub fn pack(
         &self,
         trained: &Trained,
@@ -200,9 +185,6 @@ impl<'s> TrainingSet<'s> {
 
 impl Experiment {
     /// Trains the model that the scene describes, like the command `train`.
-    ///
-    /// # Errors
-    /// [`Error`](crate::Error) for training options that cannot be used, or a model that cannot be packed.
     pub fn train(&self, progress: &dyn Progress) -> Result<ModelBlob> {
         TrainingSet::of_scene(self, Synthesis::of(&self.world)).blob(&self.options(), progress)
     }

@@ -36,7 +36,6 @@ impl Verdict {
     /// and the `limit`. It warns of outputs without a gain over these.
     ///
     /// Without the mean among `decoders` there is nothing to compare with, and the sentence tells errors alone.
-    #[must_use]
     pub fn of(decoders: &[DecoderErrors], limit: &LimitSummary) -> Self {
         let Some(model) = decoders.first() else {
             return Self { sentence: String::new(), warnings: vec![] };
@@ -111,6 +110,7 @@ impl Verdict {
         let stored = model.networks().map(|network| stored_centres(network.format(), used)).max();
         self.with(Warning::few_frames(frames, used, inputs))
             .with(Warning::padded_centres(used, stored.unwrap_or(used)))
+            .with(Warning::few_frames_for_confidence(frames, model.confidence().is_some()))
             .with(Warning::larger_than_slot(blob.bytes().len()))
     }
 

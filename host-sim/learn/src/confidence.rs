@@ -6,6 +6,7 @@
 use model_core::confidence::{Confidence, Sizes};
 use rayon::prelude::*;
 use taxel_data::dataset::Dataset;
+use taxel_data::error::require;
 
 use crate::error::{Error, Result};
 use crate::infer::{Exponential, assess_lines};
@@ -41,6 +42,21 @@ impl Default for Settings {
     }
 }
 
+/// Checks before long work that a confidence can be fitted to so many `frames` of so many `readings`.
+///
+/// # Errors
+/// [`Error::Setting`] for fewer than ten frames for each feature: intervals would cover anything.
+pub fn check(frames: usize, readings: usize) -> Result<()> {
+    let features = Settings::default().directions.clamp(1, readings.max(1)) + 1;
+    let least = FRAMES_A_FEATURE * features;
+    let rule = || {
+        format!(
+            "a confidence takes at least {least}, ten for each of its {features} features: give more, or leave it out"
+        )
+    };
+    Ok(require(frames >= least, "frames", frames, rule)?)
+}
+
 /// Density of a data set's inputs: a mixture of Gaussians over a few features of theirs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Density {
@@ -50,7 +66,6 @@ pub struct Density {
 
 impl Density {
     /// Fits the density of the inputs of `dataset`, which has frames.
-    #[must_use]
     pub fn fit(dataset: &Dataset, settings: &Settings) -> Self {
         let readings = dataset.inputs.names.len();
         let features = Features::of(&dataset.inputs, settings.directions.clamp(1, readings));

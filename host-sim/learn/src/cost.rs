@@ -1,29 +1,31 @@
 //! What decoding costs on a Cortex-M4F, predicted from a model's [`Design`]: instructions, cycles, flash and RAM.
 //!
-//! Code is cut into *pieces*: the start of a routine, sixteen centres, one output of them, and so on. A design tells
-//! how often each is executed, a price list what one execution costs. `cargo xtask cycles --accept` finds the prices:
-//! it counts frames of many designs in QEMU, and solves for them. `docs/cycles.md` says how, and how exact they are.
+//! The cost of a frame is a linear formula: a design tells how often each of its [`terms`] counts, and a price list what
+//! one of it costs. `cargo xtask cycles --fit` finds the prices, by least squares over frames that it counts in QEMU.
+//! `docs/cycles.md` says how, and how exact they are.
 
-mod pieces;
 mod design;
 mod memory;
 mod frames;
-mod prices;
-mod routines;
-mod compiled;
+mod terms;
+
+use std::collections::HashMap;
 
 pub use design::{Design, NetworkDesign};
 pub use frames::{Cost, Frames};
 pub use memory::DecoderRam;
 use model_core::rbf::Format;
-pub use pieces::Pieces;
-pub use prices::{Price, Prices};
+pub use terms::{Terms, terms};
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::infer::Exponential;
 
 /// The price list in the repository.
-const ACCEPTED: &str = include_str!("../../../firmware/prices.csv");
+const FITTED: &str = include_str!("../../../firmware/prices.csv");
+
+/// What the first line of a price list starts with; the compiler follows. The second line.
+const COMPILER: &str = "# code of ";
+const HEAD: &str = "term,instructions,cycles,flash cycles";
 
 /// Bytes of a line of an STM32F446's flash, and the cycles that reading one waits at 180 MHz.
 const FLASH_LINE_BYTES: usize = 16;
@@ -40,48 +42,74 @@ pub enum Gating {
     Awake,
 }
 
-/// How often pieces of code are executed for one frame.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct FramePieces {
-    /// Pieces of routines in assembly.
-    pub assembly: Pieces,
-    /// Pieces of compiled code.
-    pub compiled: Pieces,
-}
+/// What one of a term costs: instructions, cycles at zero wait, and cycles from flash.
+pub type Price = [f64; 3];
 
-impl FramePieces {
-    /// The pieces of one frame of a model of this `design`.
-    #[must_use]
-    pub fn of(design: &Design, exponential: Exponential, gating: Gating) -> Self {
-        Self {
-            assembly: routines::of_frame(design, gating),
-            compiled: compiled::of_frame(design, exponential, gating),
-        }
-    }
+/// A price list.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Prices {
+    /// Name and version of the compiler.
+    pub compiler: String,
+    by_term: HashMap<String, Price>,
 }
 
 impl Prices {
     /// The price list in the repository, `firmware/prices.csv`.
     ///
     /// # Errors
-    /// [`Error::Prices`](crate::Error::Prices) if it is not sound.
+    /// [`Error::Prices`] if it is not sound.
     pub fn accepted() -> Result<Self> {
-        Self::parse(ACCEPTED)
+        Self::parse(FITTED)
+    }
+
+    /// Parses a price list.
+    ///
+    /// # Errors
+    /// [`Error::Prices`] names the line that is not understood.
+    pub fn parse(text: &str) -> Result<Self> {
+        let mut lines = text.lines();
+        let compiler = lines.next().and_then(|line| line.strip_prefix(COMPILER));
+        let (Some(compiler), Some(HEAD)) = (compiler, lines.next()) else {
+            return Err(Error::Prices(format!(
+                "the first lines are not {COMPILER:?} and {HEAD:?}"
+            )));
+        };
+        let price = |line: &str| {
+            let (name, numbers) = line.strip_prefix('"')?.split_once("\",")?;
+            let numbers: Vec<f64> =
+                numbers.split(',').map(|number| number.parse().ok()).collect::<Option<_>>()?;
+            Some((name.to_owned(), numbers.try_into().ok()?))
+        };
+        let by_term = lines
+            .map(|line| price(line).ok_or_else(|| Error::Prices(format!("not understood: {line}"))))
+            .collect::<Result<_>>()?;
+        Ok(Self { compiler: compiler.to_owned(), by_term })
+    }
+
+    /// The text of a price list, in the order of `prices`.
+    #[must_use]
+    pub fn text(compiler: &str, prices: &[(String, Price)]) -> String {
+        let line = |(name, [instructions, cycles, flash]): &(String, Price)| {
+            format!("\"{name}\",{instructions:.3},{cycles:.3},{flash:.3}\n")
+        };
+        format!("{COMPILER}{compiler}\n{HEAD}\n{}", prices.iter().map(line).collect::<String>())
     }
 
     /// What one frame costs a model of this `design`, with the `exponential` of networks in `f32-direct`.
     ///
     /// # Errors
-    /// [`Error::Prices`](crate::Error::Prices) names a piece that the list lacks.
+    /// [`Error::Prices`] names a term that the list lacks.
     pub fn frame(&self, design: &Design, exponential: Exponential, gating: Gating) -> Result<Cost> {
-        let FramePieces { assembly, compiled } = FramePieces::of(design, exponential, gating);
-        let (exact, mean) = (self.sum(&assembly)?, self.sum(&compiled)?);
-        let [instructions, cycles, flash_cycles] =
-            [0, 1, 2].map(|cost| (exact[cost] + mean[cost]).round() as u64);
+        let mut sum = [0.0; 3];
+        for (name, times) in terms(design, exponential, gating) {
+            let unknown = || Error::Prices(format!("no price for {name:?}"));
+            let price = self.by_term.get(&name).ok_or_else(unknown)?;
+            sum.iter_mut().zip(price).for_each(|(sum, price)| *sum += price * times as f64);
+        }
+        let [instructions, cycles, flash_cycles] = sum.map(|cost| cost.round() as u64);
         let waiting = if gating == Gating::AtRest { 0 } else { design.least_waiting_for_weights() };
         Ok(Cost { instructions, cycles, flash_cycles: flash_cycles + waiting })
     }
-
     /// What a frame costs a model of this `design` without a gate, and behind gates.
     ///
     /// # Errors
@@ -127,10 +155,30 @@ pub fn kernel_name(format: Format, exponential: Exponential) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::least_waiting_for_weights;
+    use model_core::blob::ModelShape;
+
+    use super::*;
 
     #[test]
     fn each_line_of_flash_is_waited_for_once() {
         assert_eq!([0, 1, 16, 17, 160].map(least_waiting_for_weights), [0, 5, 5, 10, 50]);
+    }
+    #[test]
+    fn a_list_that_lacks_something_is_refused() {
+        for (text, named) in [
+            (format!("{HEAD}\n"), "first line"),
+            (format!("{COMPILER}rustc\nterm\n"), "first line"),
+            (format!("{COMPILER}rustc\n{HEAD}\na,1,2,3\n"), "not understood: a,1,2,3"),
+            (format!("{COMPILER}rustc\n{HEAD}\n\"a\",1,2\n"), "not understood"),
+        ] {
+            let error = Prices::parse(&text).unwrap_err().to_string();
+            assert!(error.contains(named) && error.contains("firmware/prices.csv"), "{error}");
+        }
+        let prices =
+            Prices::parse(&Prices::text("rustc", &[("rows".to_owned(), [1.0; 3])])).unwrap();
+        let shape = ModelShape { rows: 1, inputs: 2, outputs: 3 };
+        let design = Design::of_rows(shape, Format::F32, 4, false);
+        let error = prices.frame(&design, Exponential::default(), Gating::Ungated).unwrap_err();
+        assert!(error.to_string().contains("no price for \"f32"), "{error}");
     }
 }

@@ -20,7 +20,6 @@ pub struct Estimates {
 
 impl Estimates {
     /// Estimates without standard deviations and novelty.
-    #[must_use]
     pub fn of_values(values: Vec<f64>) -> Self {
         Self { values, deviation: None, novelty: None }
     }

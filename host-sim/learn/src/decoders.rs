@@ -22,7 +22,6 @@ pub struct Baseline {
 
 impl Baseline {
     /// Fits the decoder to `training`.
-    #[must_use]
     pub fn fit(&self, training: &Dataset) -> Box<dyn Decoder> {
         (self.fit)(training)
     }
@@ -67,7 +66,6 @@ impl<D: RowDecoder + Send> Rows<D> {
     }
 
     /// Joins decoders that were already fitted to the rows of `training`, in their order.
-    #[must_use]
     pub fn of(name: &'static str, training: &Dataset, decoders: Vec<D>) -> Self {
         Self { name, inputs: training.inputs.names.len() / training.rows.max(1), decoders }
     }

@@ -179,7 +179,7 @@ pub enum Error {
     NotPacked(EncodeError),
     /// Price list of code that cannot be used.
     #[error(
-        "prices of code (firmware/prices.csv): {0}; `cargo xtask cycles --accept` writes them anew"
+        "prices of code (firmware/prices.csv): {0}; `cargo xtask cycles --fit` writes them anew"
     )]
     Prices(String),
 }

@@ -45,7 +45,6 @@ pub struct Found {
 
 /// Faults in `readings` as they were scanned (Ω), by [`windows`]. A model's `fill` tells noise and wires that touch;
 /// without one, health alone counts. None are told of columns that are no [`Grid`] of wires.
-#[must_use]
 pub fn diagnose(readings: &Table, limits: Limits, fill: Option<Fill<'_>>) -> Vec<Found> {
     let Some(grid) = Grid::of(&readings.names) else { return vec![] };
     let count = readings.names.len();
@@ -77,7 +76,6 @@ pub fn diagnose(readings: &Table, limits: Limits, fill: Option<Fill<'_>>) -> Vec
 }
 
 /// Frames that are judged together, of so many: [`WINDOW`] each, and the last with the rest, so that none is short.
-#[must_use]
 pub fn windows(frames: usize) -> Vec<Range<usize>> {
     let count = (frames / WINDOW).max(1);
     let end = |window: usize| if window + 1 == count { frames } else { (window + 1) * WINDOW };
@@ -143,7 +141,6 @@ fn of_window(
 
 /// Whether all frames of `count` readings in a window are the same, to the bit: then they tell of no noise, and of one place
 /// alone. Readings that are missing are the same.
-#[must_use]
 pub fn stand_still(window: &[f64], count: usize) -> bool {
     let next_frames = window.iter().skip(count);
     window.iter().zip(next_frames).all(|(reading, next)| reading.to_bits() == next.to_bits())

@@ -23,7 +23,6 @@ pub struct ColumnHealth {
 
 impl ColumnHealth {
     /// Number of lines with a faulty reading.
-    #[must_use]
     pub fn faulty(&self) -> usize {
         self.missing + self.shorted + self.open
     }
@@ -31,7 +30,6 @@ impl ColumnHealth {
 
 /// Fault of a `reading` in a column of this `name`; `None` if it is sound. Only readings in Ω have limits: those of a
 /// column whose name says so.
-#[must_use]
 pub fn fault(name: &str, reading: f64, limits: Option<Limits>) -> Option<Fault> {
     match limits.filter(|_| columns::unit_of(name) == "Ω") {
         Some(limits) => limits.fault(reading as f32), // as a device holds it

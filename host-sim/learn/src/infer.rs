@@ -31,7 +31,6 @@ impl Exponential {
     pub const ALL: [Self; 3] = [Self::Polynomial, Self::Libm, Self::Micromath];
 
     /// Name that users choose it by and a device reports.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Polynomial => Polynomial::NAME,
@@ -41,7 +40,6 @@ impl Exponential {
     }
 
     /// Accuracy in one line, for help texts and tables.
-    #[must_use]
     pub fn description(self) -> &'static str {
         match self {
             Self::Polynomial => "Within 2 ulp and fast: the device's default",
@@ -51,7 +49,6 @@ impl Exponential {
     }
 
     /// Exponential called `name`.
-    #[must_use]
     pub fn by_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|exponential| exponential.name() == name)
     }
@@ -60,7 +57,6 @@ impl Exponential {
 /// Infers the outputs of `network` for every line of `readings` (`lines × inputs`): `lines × outputs`.
 ///
 /// All outputs of a line are NaN if a reading is missing.
-#[must_use]
 pub fn infer(network: &Network<'_>, exponential: Exponential, readings: &[f64]) -> Vec<f64> {
     Prepared::new(&[*network], exponential).infer(readings)
 }
@@ -124,7 +120,6 @@ impl<'n> Prepared<'n> {
 }
 
 /// Whether the device would take `reading` for missing: NaN, or beyond f32.
-#[must_use]
 pub fn is_missing(reading: f64) -> bool {
     !(reading as f32).is_finite()
 }

@@ -14,7 +14,8 @@
 //! - The line is no rare press. A log may be at rest for 99 % of its lines, where every press stands far out. What tells
 //!   a press is that readings and outputs leave their rest together: in such a line, a column of the other kind is far
 //!   from its own bulk too, as it is in some other lines. A value that is far out even among presses is an outlier.
-//!
+//! - The line is no rarer press that another one confirms: in two lines or more, readings and outputs are far from all
+//!   others together, and about as much further in the one as in the other. One such line has nothing that confirms it.
 //! - It is no rare event of an output that is else constant, such as a slip: without it there would be nothing to learn.
 //!
 //! If more lines than one of 200 have such a value, in different columns, they are left in and only reported: that is how a sensor with
@@ -36,6 +37,10 @@ const GAP: f64 = 3.0;
 const HUGE_GAP: f64 = 30.0;
 /// Number of lines by which [`GAP`] grows for fewer lines: its product with the number of lines is at least so large.
 const GAP_LINES: f64 = 1000.0;
+/// Least number of rare presses that confirm one another.
+const CONFIRMED: usize = 2;
+/// Largest factor between the ratios of readings to outputs, by their distances, of presses that confirm one another.
+const ALIKE: f64 = 3.0;
 /// Distance from a column's bulk, in widths of the bulk, from which a value has left its rest.
 const AWAY: f64 = 3.0;
 /// One of so many values, at either end, is not of a column's bulk.
@@ -82,7 +87,6 @@ struct Column {
 }
 
 /// Finds the outliers of `dataset`; a missing value (NaN) is none. `line_number` gives the number of a frame's line, for messages.
-#[must_use]
 pub fn find(dataset: &Dataset, line_number: impl Fn(usize) -> u64) -> Outliers {
     let frames = dataset.frames();
     let tables = [&dataset.inputs, &dataset.outputs];
@@ -95,6 +99,7 @@ pub fn find(dataset: &Dataset, line_number: impl Fn(usize) -> u64) -> Outliers {
     }
     let pressed =
         [0, 1].map(|t| Pressed::of(tables[t], &columns[t], tables[1 - t], &columns[1 - t]));
+    let confirmed = confirmed(tables, &columns);
     let mut found = Vec::new();
     let (mut kept, mut lines) = (Vec::with_capacity(frames), 0);
     for frame in 0..frames {
@@ -102,7 +107,8 @@ pub fn find(dataset: &Dataset, line_number: impl Fn(usize) -> u64) -> Outliers {
             let named = tables[t].names.iter().zip(line(tables[t], frame)).zip(&columns[t]);
             named.filter(|((_, value), column)| is_outside(**value, column.usual))
         };
-        let of_line = (0..2).filter(|t| !pressed[*t].explains(frame)).flat_map(far);
+        let is_explained = |t: usize| pressed[t].explains(frame) || confirmed.contains(&frame);
+        let of_line = (0..2).filter(|t| !is_explained(*t)).flat_map(far);
         let before = found.len();
         found.extend(of_line.map(|((name, value), column)| Outlier {
             line: line_number(frame),
@@ -117,6 +123,30 @@ pub fn find(dataset: &Dataset, line_number: impl Fn(usize) -> u64) -> Outliers {
         kept = (0..frames).collect();
     }
     Outliers { found, lines, left_out: left_out && lines > 0, kept }
+}
+
+/// Lines of rare presses that confirm one another.
+fn confirmed(tables: [&Table; 2], columns: &[Vec<Column>; 2]) -> Vec<usize> {
+    // How far out the furthest value of a line is, in usual ranges of its column.
+    let distance = |t: usize, frame: usize| {
+        let values = line(tables[t], frame).iter().zip(&columns[t]);
+        let outside = values.filter(|(value, column)| is_outside(**value, column.usual));
+        let distances = outside.map(|(value, column)| {
+            let range = column.usual[1] - column.usual[0];
+            (value - column.median).abs() / range.max(resolution(column.median))
+        });
+        distances.fold(0.0, f64::max)
+    };
+    let ratio = |frame: usize| {
+        let [inputs, outputs] = [0, 1].map(|t| distance(t, frame));
+        (inputs > 0.0 && outputs > 0.0).then(|| (frame, inputs / outputs))
+    };
+    let ratios: Vec<(usize, f64)> = (0..tables[0].len()).filter_map(ratio).collect();
+    let is_alike = |a: f64, b: f64| (a / b).max(b / a) <= ALIKE;
+    let confirm = |(_, ratio): &&(usize, f64)| {
+        ratios.iter().filter(|(_, other)| is_alike(*ratio, *other)).count() >= CONFIRMED
+    };
+    ratios.iter().filter(confirm).map(|(frame, _)| *frame).collect()
 }
 
 /// Most lines that can hold outliers.

@@ -39,7 +39,6 @@ pub struct Origin {
 
 impl Origin {
     /// Origin of measured data, without noise: full scale is each output's range.
-    #[must_use]
     pub fn of_data(name: &str, digest: u64, seed: u64, dataset: &Dataset) -> Self {
         let full_scale = dataset.outputs.ranges().into_iter().map(|[low, high]| high - low);
         Self {
@@ -159,7 +158,6 @@ impl ModelBlob {
     }
 
     /// Bytes of the blob.
-    #[must_use]
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
@@ -198,7 +196,6 @@ impl ModelBlob {
     }
 
     /// Mean width σ of all Gaussians, on inputs scaled to [0, 1], to four digits.
-    #[must_use]
     pub fn spread(&self) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0);
         for network in self.parse().networks() {
@@ -213,7 +210,6 @@ impl ModelBlob {
     ///
     /// # Panics
     /// Never: the bytes were checked when they were read and have not changed since.
-    #[must_use]
     pub fn parse(&self) -> Model<'_> {
         Model::decode(self.bytes()).expect("checked when read")
     }

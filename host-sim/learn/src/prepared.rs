@@ -35,7 +35,6 @@ impl ModelBlob {
     ///
     /// # Panics
     /// Never: every row of a model that was checked has a network.
-    #[must_use]
     pub fn prepare(&self, exponential: Exponential) -> PreparedModel<'_> {
         let model = self.parse();
         let networks: Vec<Network<'_>> = model.networks().collect();
@@ -57,7 +56,6 @@ impl ModelBlob {
 
 impl<'b> PreparedModel<'b> {
     /// Parsed model: its shape, networks and metadata.
-    #[must_use]
     pub fn model(&self) -> &Model<'b> {
         &self.model
     }
@@ -87,7 +85,6 @@ impl<'b> PreparedModel<'b> {
     }
 
     /// Inputs of the model for `readings` (`frames × inputs`): the readings, or their ratios to the baseline.
-    #[must_use]
     pub fn model_inputs<'r>(&self, readings: &'r [f64]) -> Cow<'r, [f64]> {
         match &self.reciprocals {
             Some(reciprocals) => {
@@ -106,14 +103,12 @@ impl<'b> PreparedModel<'b> {
     ///
     /// # Panics
     /// If the number of columns differs from the model's number of readings.
-    #[must_use]
     pub fn decode_table(&self, readings: &Table) -> Table {
         assert_eq!(readings.names.len(), self.inputs(), "the model's inputs");
         Table { names: self.output_names.clone(), values: self.decode_lines(&readings.values) }
     }
 
     /// Decodes `readings` (`frames × inputs`) to outputs (`frames × outputs`), line after line.
-    #[must_use]
     pub fn decode_lines(&self, readings: &[f64]) -> Vec<f64> {
         let inferred = self.networks.infer(&self.inputs_of_networks(readings));
         match self.model.expansion() {
@@ -138,7 +133,6 @@ impl<'b> PreparedModel<'b> {
     /// novelty of each frame in nats, above 0 for a novel one; `None` if the model has no confidence.
     ///
     /// A missing reading makes all of its frame's NaN.
-    #[must_use]
     pub fn assess(&self, readings: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
         let confidence = self.model.confidence()?;
         let (deviations, novelty) = assess_lines(confidence, &self.model_inputs(readings));
@@ -147,7 +141,6 @@ impl<'b> PreparedModel<'b> {
 
     /// Readings (`frames × inputs`) with missing ones filled as a device fills them, and the number of readings filled in
     /// each frame; `None` if the model has no [fill](model_core::fill).
-    #[must_use]
     pub fn filled(&self, readings: &[f64]) -> Option<(Vec<f64>, Vec<usize>)> {
         let fill = self.model.fill()?;
         let mut values = readings.to_vec();
@@ -175,7 +168,6 @@ impl<'b> PreparedModel<'b> {
     ///
     /// # Panics
     /// If `readings` are not whole frames of the model.
-    #[must_use]
     pub fn clamps(&self, readings: &[f64]) -> Vec<bool> {
         let inputs = self.networks.inputs();
         let of_networks = self.inputs_of_networks(readings);
@@ -198,7 +190,6 @@ impl<'b> PreparedModel<'b> {
     ///
     /// # Panics
     /// If `readings` are not whole frames of the model.
-    #[must_use]
     pub fn share_out_of_range(&self, readings: &[f64]) -> f64 {
         let inputs = self.networks.inputs();
         let readings = self.inputs_of_networks(readings);

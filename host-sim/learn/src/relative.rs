@@ -34,7 +34,6 @@ pub(crate) fn ratios<'l>(
 /// let baseline = Table { names, values: vec![60.0, 16.0] };
 /// assert_eq!(taxel_learn::relative::inputs(&readings, &baseline).values, [0.5, 0.5, 0.25, 0.25]);
 /// ```
-#[must_use]
 pub fn inputs(readings: &Table, baselines: &Table) -> Table {
     assert_eq!(readings.names.len(), baselines.names.len(), "a baseline for every column");
     let lines = readings.lines();
@@ -56,7 +55,6 @@ pub fn inputs(readings: &Table, baselines: &Table) -> Table {
 ///
 /// # Panics
 /// As [`inputs`] does, and if the inputs are relative already.
-#[must_use]
 pub fn dataset(dataset: Dataset, baselines: &Table) -> Dataset {
     assert!(!dataset.relative_inputs, "the inputs are readings");
     Dataset { inputs: inputs(&dataset.inputs, baselines), relative_inputs: true, ..dataset }

@@ -60,7 +60,6 @@ pub struct BaselineScore {
 
 impl Selection {
     /// Candidate with the lowest score.
-    #[must_use]
     pub fn best(&self) -> &Scored {
         &self.scored[self.chosen]
     }

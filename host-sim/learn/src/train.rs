@@ -31,6 +31,7 @@ pub mod refine;
 pub mod stream;
 
 pub use format::FittedNetwork;
+use format::Ridge;
 pub use hidden_layer::{HiddenLayer, Widths};
 pub use layers::Layers;
 pub use refine::{Examples, FreshFrames, Refinement};
@@ -39,6 +40,11 @@ pub use solver::{Recursive, Solver};
 /// Initial covariance δ of the recursive least squares where no penalty is chosen. The penalty on squared weights is
 /// 1/δ for all frames together, too small to be felt.
 pub const INITIAL_COVARIANCE: f64 = 1e6;
+
+/// Frames for each regressor below which they are few.
+const FEW_FRAMES: usize = 50;
+/// Least error of a reading over its range, whatever few frames say.
+const LEAST_ERROR: f64 = 1e-3;
 
 /// Factor on the spread for networks of a whole array, relative to those of a row.
 ///
@@ -115,7 +121,6 @@ impl Options {
 
     /// Initial covariance δ of the recursive least squares on so many `frames`: that of the solver, else one over the
     /// penalty on squared weights.
-    #[must_use]
     pub fn initial_covariance(&self, frames: usize) -> f64 {
         if let Solver::Rls(Recursive { initial_covariance: Some(covariance), .. }) = self.solver {
             return covariance;
@@ -190,7 +195,6 @@ pub struct InputScale {
 
 impl InputScale {
     /// Scale of a table's inputs, rounded to the numbers that the blob holds.
-    #[must_use]
     pub fn of(table: &RowTable) -> Self {
         // Ranges of the readings in f32, as the device has them.
         let ranges: Vec<[f32; 2]> =
@@ -211,7 +215,6 @@ impl InputScale {
     }
 
     /// Scales `readings` (`samples × inputs`) to [0, 1], and clamps them like the device does.
-    #[must_use]
     pub fn apply(&self, readings: &[f64]) -> Vec<f64> {
         let ranges = || self.minimum.iter().zip(&self.per_span);
         let [low, high] = CLAMP.map(f64::from);
@@ -278,7 +281,6 @@ pub struct Samples<'b> {
 
 impl<'b> Samples<'b> {
     /// Scales the inputs of `table` to [0, 1].
-    #[must_use]
     pub fn new(table: &'b RowTable) -> Self {
         let scale = InputScale::of(table);
         Self { scaled: scale.apply(&table.inputs.values), scale, table }
@@ -292,7 +294,6 @@ impl<'b> Samples<'b> {
     /// holds.
     ///
     /// `part` numbers the network, so that each draws its own starting points.
-    #[must_use]
     pub fn centres(&self, options: &Options, part: usize) -> Vec<f64> {
         let mut random =
             Random::new(options.seed, Stream::Training, Purpose::Centres, 0, part as u64);
@@ -303,7 +304,6 @@ impl<'b> Samples<'b> {
 
     /// Hidden layer of Gaussians at `centres` (`centres × inputs`, on scaled inputs), with the widths that `options` ask
     /// for.
-    #[must_use]
     pub fn layer(&self, centres: Vec<f64>, options: &Options) -> HiddenLayer {
         let relative_widths = options.widths.relative(&centres, self.inputs());
         HiddenLayer { centres, spread: options.spread, relative_widths }
@@ -337,15 +337,31 @@ impl<'b> Samples<'b> {
         options: &Options,
         penalties: &[Option<f64>],
     ) -> Result<Vec<FittedNetwork>> {
-        let frames = self.table.inputs.len();
         let with = |penalty: &Option<f64>| Options { penalty: *penalty, ..*options };
         if let Some(rank) = options.output_rank {
             let fit = |penalty| output_rank::fit(self, layer, rank, &with(penalty));
             return penalties.iter().map(fit).collect();
         }
-        let covariances: Vec<f64> =
-            penalties.iter().map(|penalty| with(penalty).initial_covariance(frames)).collect();
-        format::fit(self, layer, options, &covariances)
+        let ridge = |penalty| self.ridge(layer, &with(penalty));
+        let ridges: Vec<Ridge> = penalties.iter().map(ridge).collect();
+        format::fit(self, layer, options, &ridges)
+    }
+
+    /// Penalties on squared weights that `options` ask for.
+    ///
+    /// Where none is chosen and frames are few, the affine tail is fitted as if every reading had an error of a
+    /// [thousandth of its range](LEAST_ERROR). Readings of neighbouring wires hardly differ in some directions; a few
+    /// frames without noise are fitted best by large weights there, which ruin all others. With many frames, or noise,
+    /// it makes no difference.
+    fn ridge(&self, layer: &HiddenLayer, options: &Options) -> Ridge {
+        let (frames, inputs) = (self.table.inputs.len(), self.inputs());
+        let regressors = layer.centres.len() / inputs + inputs + 1;
+        let is_few = frames < FEW_FRAMES * regressors;
+        let is_usual = options.affine_tail && options.penalty.is_none();
+        Ridge {
+            initial_covariance: options.initial_covariance(frames),
+            of_tail: if is_few && is_usual { frames as f64 * LEAST_ERROR.powi(2) } else { 0.0 },
+        }
     }
 }
 
@@ -402,7 +418,6 @@ fn check(dataset: &Dataset, options: &Options) -> Result<()> {
 ///
 /// # Panics
 /// If `parameters` are not as many as [`projection::fit`] makes for this data set.
-#[must_use]
 pub fn view<'b>(parameters: &'b [f32], dataset: &Dataset) -> Projection<'b> {
     let readings = dataset.inputs.names.len();
     Projection::new(readings, parameters.len() / (readings + 1), parameters)

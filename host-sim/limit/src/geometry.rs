@@ -31,7 +31,6 @@ const COUNTS: [f64; 2] = [0.5, 2.0];
 /// The sensor of `world` as it is, and with another pitch, height, or number of wires.
 ///
 /// Numbers of wires and electrodes are varied only if electrodes lie at the centres of equal cells.
-#[must_use]
 pub fn sweep(world: &World) -> Vec<Variant> {
     let own = &world.sensor;
     let mut sensors = vec![("as it is".to_owned(), own.clone())];

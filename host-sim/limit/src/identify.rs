@@ -73,7 +73,6 @@ pub struct Prior {
 
 impl Prior {
     /// Moments of the deformations that `world` draws.
-    #[must_use]
     pub fn of(world: &World) -> Self {
         let synthesis = Synthesis::of(world).ideal().drift(None);
         let frames = synthesis.outputs(Outputs::all_deformations());
@@ -91,7 +90,7 @@ impl Prior {
     }
 
     /// Mean of the row that is read as number `place`, with so many unknowns, and a factor L of its covariance L·Lᵀ.
-    pub(crate) fn of_row(&self, place: usize, unknowns: usize) -> (Vec<f64>, DMatrix<f64>) {
+    pub fn of_row(&self, place: usize, unknowns: usize) -> (Vec<f64>, DMatrix<f64>) {
         let from = place * unknowns;
         let covariance = self.covariance_mm2.view((from, from), (unknowns, unknowns)).into_owned();
         (self.mean_mm[from..from + unknowns].to_vec(), factor(&covariance))

@@ -29,9 +29,7 @@ pub mod reference;
 pub mod identify;
 pub mod geometry;
 pub mod solve;
-pub mod equations;
 
-pub use equations::Equations;
 pub use error::Refusal;
 pub use limit::Limit;
 pub use reference::{Ratio, Reference};

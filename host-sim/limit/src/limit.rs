@@ -99,7 +99,6 @@ impl Limit {
     }
 
     /// World whose limit it is.
-    #[must_use]
     pub fn world(&self) -> &World {
         &self.world
     }
@@ -107,7 +106,6 @@ impl Limit {
     /// Samples the posterior of every frame of `readings_ohm`, frame after frame.
     ///
     /// Draws depend on the world's seed and the frame's readings, not on its place or the number of threads.
-    #[must_use]
     pub fn posteriors(&self, readings_ohm: &[f64], progress: &dyn Progress) -> Vec<Posterior> {
         let rows: Vec<Rows<'_>> = self.groups.iter().map(|group| self.rows(group)).collect();
         let width = FrameDecoder::inputs(self);

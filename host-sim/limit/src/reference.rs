@@ -81,7 +81,6 @@ impl Reference {
     ///
     /// Rows that move independently are posteriors of their own, with three unknowns an electrode. They take longer
     /// and differ less, so there are fewer.
-    #[must_use]
     pub fn few_frames(world: &World) -> usize {
         if world.motion.has_independent_rows() {
             40_usize.div_ceil(world.read_rows.len())
@@ -108,7 +107,6 @@ impl Reference {
     }
 
     /// Number of frames.
-    #[must_use]
     pub fn frames(&self) -> usize {
         self.posteriors.len()
     }
@@ -134,7 +132,6 @@ impl Reference {
     }
 
     /// Limit of every group of outputs, in the order in which groups first appear.
-    #[must_use]
     pub fn limits(&self) -> Vec<GroupLimit> {
         let groups = columns::groups(&self.truth.names);
         groups.iter().map(|(group, members)| self.limit(group, members)).collect()
@@ -176,7 +173,6 @@ impl Reference {
     /// The posterior mean m is uncorrelated with what any decoder d of the same readings makes of them beyond it, so
     /// E(d − Δ)² = E(d − m)² + E(m − Δ)². The ratio is formed from these two parts: both are known much more exactly
     /// than the error of a few hundred frames. The Monte Carlo error of m is subtracted.
-    #[must_use]
     pub fn ratio(&self, truth: &Table, estimates: &[f64], members: &[usize]) -> Option<Ratio> {
         let width = self.truth.names.len();
         let known = self.truth.values.len();
@@ -204,7 +200,6 @@ impl Reference {
     }
 
     /// Effective sample sizes of the posteriors.
-    #[must_use]
     pub fn effective(&self) -> EffectiveSamples {
         let sorted = self.sorted_effective();
         let at = |share: usize| sorted.get(sorted.len() * share / 100).copied().unwrap_or(0.0);

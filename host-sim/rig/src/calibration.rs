@@ -55,7 +55,6 @@ impl From<&Constants<'_>> for CircuitConstants {
 
 impl CircuitConstants {
     /// The constants as the link carries them.
-    #[must_use]
     pub fn for_link(&self) -> Constants<'_> {
         Constants {
             reference_v: self.reference_v,
@@ -81,7 +80,6 @@ pub struct Arrangement {
 pub struct Differences {
     /// Root of the mean square.
     pub rms: f64,
-    /// Largest magnitude.
     pub largest: f64,
 }
 

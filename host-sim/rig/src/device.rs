@@ -14,11 +14,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use firmware::link::message::{Refusal, Report, Request};
+use firmware::link::packet::PacketError;
 use firmware::link::receive::{Received, Receiver};
 use firmware::link::{cobs, packet};
 use model_core::blob::Floats;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Heard, Result};
 
 mod identity;
 mod configuration;
@@ -56,9 +57,6 @@ const GLANCE: Duration = Duration::from_millis(5);
 /// Line of bytes to a device.
 pub trait Wire: Read + Write {
     /// Lets reads end after `timeout` if nothing has come.
-    ///
-    /// # Errors
-    /// Error of the system if the timeout cannot be set.
     fn set_read_timeout(&mut self, timeout: Duration) -> std::io::Result<()>;
 }
 
@@ -86,6 +84,8 @@ pub struct Device<W> {
     /// Number of frames of bytes that arrived damaged. The first one does not count: it may have begun before anybody
     /// listened.
     pub damaged: u64,
+    /// What came last that is no report, since a request was sent.
+    heard: Heard,
     /// Whether the end of a frame has been heard.
     is_in_step: bool,
     /// Number of requests that had to be sent again.
@@ -94,9 +94,6 @@ pub struct Device<W> {
 
 impl<W: Wire> Device<W> {
     /// Device on `wire`; nothing is sent yet.
-    ///
-    /// # Errors
-    /// [`Error::Line`] if the wire takes no timeout.
     pub fn new(mut wire: W) -> Result<Self> {
         wire.set_read_timeout(GLANCE)?;
         let receiver = Receiver::new(vec![0; MOST_REPORT_BYTES]);
@@ -112,6 +109,7 @@ impl<W: Wire> Device<W> {
             stop: None,
             patience: ANSWER,
             damaged: 0,
+            heard: Heard::Nothing,
             is_in_step: false,
             repeated: 0,
         })
@@ -137,9 +135,6 @@ impl<W: Wire> Device<W> {
     }
 
     /// Sends a request with a new number, and returns the number.
-    ///
-    /// # Errors
-    /// [`Error::RequestTooLong`], or [`Error::Line`] if the line fails.
     pub fn send(&mut self, request: &Request<'_>) -> Result<u16> {
         self.number = self.number.checked_add(1).unwrap_or(packet::UNASKED + 1);
         self.send_raw(&request_bytes(self.number, request)?)?;
@@ -165,9 +160,6 @@ impl<W: Wire> Device<W> {
 
     /// Passes reports with their numbers to `read` until it returns a value; `None` once `deadline` has
     /// passed.
-    ///
-    /// # Errors
-    /// [`Error::Line`] or [`Error::Closed`] if the line fails; [`Error::Interrupted`].
     pub fn hear<T>(
         &mut self,
         deadline: Instant,
@@ -179,7 +171,7 @@ impl<W: Wire> Device<W> {
             while let Some(byte) = self.pending.pop_front() {
                 let report = match self.receiver.push(byte) {
                     Some(Received::Frame(bytes)) => packet::decode::<Report<'_>>(bytes),
-                    Some(_) => Err(packet::PacketError::Damaged),
+                    Some(_) => Err(PacketError::Damaged),
                     None => continue,
                 };
                 let was_in_step = mem::replace(&mut self.is_in_step, true);
@@ -192,7 +184,16 @@ impl<W: Wire> Device<W> {
                             return Ok(Some(answer));
                         }
                     }
-                    Err(_) => self.damaged += u64::from(was_in_step),
+                    Err(cause) => {
+                        self.heard = match cause {
+                            PacketError::OtherVersion { version, .. } => {
+                                Heard::OtherVersion(version)
+                            }
+                            PacketError::NotAMessage { .. } => Heard::UnknownMessage,
+                            PacketError::Damaged => Heard::Noise,
+                        };
+                        self.damaged += u64::from(was_in_step);
+                    }
                 }
             }
             if is_last_look {
@@ -202,7 +203,12 @@ impl<W: Wire> Device<W> {
             self.prolong()?;
             match self.wire.read(&mut bytes) {
                 Ok(0) => return Err(Error::Closed),
-                Ok(count) => self.pending.extend(&bytes[..count]),
+                Ok(count) => {
+                    self.pending.extend(&bytes[..count]);
+                    if self.heard == Heard::Nothing {
+                        self.heard = Heard::Noise;
+                    }
+                }
                 Err(cause) if is_timeout(&cause) => {}
                 Err(cause) => return Err(cause.into()),
             }
@@ -224,6 +230,7 @@ impl<W: Wire> Device<W> {
         timeout: Duration,
         read: impl Fn(&Report<'_>) -> Option<T>,
     ) -> Result<std::result::Result<T, Refusal>> {
+        self.heard = Heard::Nothing;
         for attempt in 0..ATTEMPTS {
             self.repeated += u64::from(attempt > 0);
             let number = self.send(request)?;
@@ -241,13 +248,10 @@ impl<W: Wire> Device<W> {
                 None => {}
             }
         }
-        Err(Error::NoAnswer { attempts: ATTEMPTS, timeout })
+        Err(Error::NoAnswer { attempts: ATTEMPTS, timeout, heard: self.heard })
     }
 
     /// Sends a `request` that no device of this protocol refuses, until the device answers.
-    ///
-    /// # Errors
-    /// [`Error::Refused`] if it does refuse, or the errors of [`ask`](Self::ask).
     pub fn ask_plainly<T>(
         &mut self,
         request: &Request<'_>,
@@ -257,9 +261,6 @@ impl<W: Wire> Device<W> {
     }
 
     /// Asks the device for its identity.
-    ///
-    /// # Errors
-    /// Errors of [`ask`](Self::ask), such as [`Error::NoAnswer`].
     pub fn identify(&mut self) -> Result<DeviceIdentity> {
         self.ask_plainly(&Request::Identify, |report| match report {
             Report::Identity(identity) => Some(identity.into()),
@@ -268,9 +269,6 @@ impl<W: Wire> Device<W> {
     }
 
     /// Asks for the device's counters.
-    ///
-    /// # Errors
-    /// Errors of [`ask`](Self::ask), such as [`Error::NoAnswer`].
     pub fn statistics(&mut self) -> Result<firmware::link::message::Statistics> {
         self.ask_plainly(&Request::Statistics, |report| match report {
             Report::Statistics(statistics) => Some(*statistics),
@@ -279,18 +277,12 @@ impl<W: Wire> Device<W> {
     }
 
     /// Gives the device a baseline in Ω, one number a reading of its model.
-    ///
-    /// # Errors
-    /// [`Error::Refused`] if their number is another, or the errors of [`ask`](Self::ask).
     pub fn set_baseline(&mut self, baseline_ohm: &[f32]) -> Result<()> {
         let request = Request::SetBaseline { readings_ohm: Floats::of(baseline_ohm) };
         self.ask_plainly(&request, |report| matches!(report, Report::Baseline { .. }).then_some(()))
     }
 
     /// Restarts the device and waits until it answers again.
-    ///
-    /// # Errors
-    /// [`Error::NoAnswer`] if the device does not answer in time.
     pub fn restart(&mut self) -> Result<DeviceIdentity> {
         self.ask_plainly(&Request::Restart, |report| {
             matches!(report, Report::Restarting).then_some(())
@@ -310,9 +302,6 @@ impl<W: Wire> Device<W> {
 }
 
 /// Bytes of a request, framed for the line.
-///
-/// # Errors
-/// [`Error::RequestTooLong`] for a request of more than 4096 bytes.
 pub fn request_bytes(number: u16, request: &Request<'_>) -> Result<Vec<u8>> {
     let mut buffer = [0; MOST_REQUEST_BYTES];
     let packet = packet::encode(number, request, &mut buffer)
@@ -334,6 +323,7 @@ mod tests {
     use std::io::Cursor;
 
     use firmware::link::cobs;
+    use model_core::checksum::CRC_32;
 
     use super::*;
 
@@ -367,6 +357,61 @@ mod tests {
             let heard = device.hear(Instant::now() + Duration::from_secs(1), |_, _| None::<()>);
             assert!(matches!(heard, Err(Error::Closed)));
             assert_eq!(device.damaged, damaged);
+        }
+    }
+
+    /// Line that answers every request with the same bytes.
+    struct Deaf(Vec<u8>);
+
+    impl Read for Deaf {
+        fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
+            let count = self.0.len();
+            bytes[..count].copy_from_slice(&self.0);
+            if count == 0 { Err(ErrorKind::TimedOut.into()) } else { Ok(count) }
+        }
+    }
+
+    impl Write for Deaf {
+        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+            Ok(bytes.len())
+        }
+
+        fn flush(&mut self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+
+    impl Wire for Deaf {
+        fn set_read_timeout(&mut self, _: Duration) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_device_that_does_not_answer_is_told_by_what_comes_instead() {
+        let packet = |start: &[u8]| {
+            let packet = [start, &CRC_32.checksum(start).to_le_bytes()].concat();
+            let mut line = Vec::new();
+            cobs::encode(&packet, |byte| {
+                line.push(byte);
+                true
+            });
+            line
+        };
+        let version = packet::PROTOCOL_VERSION;
+        for (bytes, says) in [
+            (vec![], "nothing comes from it"),
+            (vec![0x55; 40], "bytes come from it that are no packets: check the speed"),
+            (
+                packet(&[version + 1, 0, 3]),
+                "it speaks version 7 of the link, and this program version 6",
+            ),
+            (packet(&[version, 0, 120]), "messages that this program does not know"),
+        ] {
+            let mut device = Device::new(Deaf(bytes)).unwrap();
+            device.patience = Duration::from_millis(2);
+            let message = device.identify().unwrap_err().to_string();
+            assert!(message.contains(says), "{message}");
         }
     }
 }

@@ -41,6 +41,10 @@ impl Options {
     /// [`Error::NoImage`] for an image that cannot be read, [`Error::NotElf`] for a file that is no
     /// program.
     pub fn check(&self) -> Result<()> {
+        // A named pipe would be waited for.
+        if self.image.exists() && !self.image.is_file() {
+            return Err(Error::NotElf { image: self.image.clone() });
+        }
         let mut magic = [0; 4];
         let opened = File::open(&self.image).and_then(|mut file| file.read_exact(&mut magic));
         match opened {
@@ -54,7 +58,6 @@ impl Options {
 /// Serial lines of the image.
 #[derive(Debug)]
 pub struct Lines {
-    /// Line of the link.
     pub link: Link,
     /// Second UART, of the readout, if it was wanted.
     pub readout: Option<TcpStream>,
@@ -153,9 +156,6 @@ impl Emulator {
     }
 
     /// Starts QEMU with further `arguments`, and connects to the image's serial lines.
-    ///
-    /// # Errors
-    /// The same errors as [`start`](Self::start).
     pub fn start_with(options: &Options, arguments: &[&str]) -> Result<(Self, Lines)> {
         options.check()?;
         let failed = |cause| Error::NoStart { qemu: options.qemu.clone(), cause };

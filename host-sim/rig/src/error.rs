@@ -6,10 +6,47 @@ use std::time::Duration;
 use firmware::capacity::Capacity;
 use firmware::circuit::ConstantsFault;
 use firmware::link::message::{KeepFault, ModelFault, RecalibrationFault, Refusal, SealFault};
+use firmware::link::packet::PROTOCOL_VERSION;
 use model_core::blob::ModelShape;
 
 /// Result of the functions of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
+
+/// What a device sends instead of an answer, and what to do about it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Heard {
+    /// Nothing at all.
+    #[default]
+    Nothing,
+    /// Bytes that are no packets.
+    Noise,
+    /// Packets of another version of the link.
+    OtherVersion(u8),
+    /// Packets of this version, with messages that this program does not know.
+    UnknownMessage,
+}
+
+impl std::fmt::Display for Heard {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Nothing => f.write_str(
+                "nothing comes from it: check that it runs this project's firmware, and the speed of its line",
+            ),
+            Self::Noise => f.write_str(
+                "bytes come from it that are no packets: check the speed of its line (--baud), and that it runs this \
+                 project's firmware",
+            ),
+            Self::OtherVersion(version) => write!(
+                f,
+                "it speaks version {version} of the link, and this program version {PROTOCOL_VERSION}: flash the \
+                 firmware that belongs to this program"
+            ),
+            Self::UnknownMessage => f.write_str(
+                "it sends messages that this program does not know: flash the firmware that belongs to this program",
+            ),
+        }
+    }
+}
 
 /// Failure to reach a device, to make it do something, or to start an emulator.
 #[derive(Debug, thiserror::Error)]
@@ -23,9 +60,7 @@ pub enum Error {
     /// Serial port that cannot be opened.
     #[error("{port}: {cause}; {known} (on Linux you may have to join the group dialout)")]
     Port {
-        /// Name of the port.
         port: String,
-        /// Reason.
         cause: serialport::Error,
         /// Ports that this computer has.
         known: String,
@@ -41,11 +76,9 @@ pub enum Error {
         "frame {frame} has {found} values instead of {expected}; was the model exchanged meanwhile?"
     )]
     ReportLength {
-        /// Number of the frame.
         frame: u32,
         /// Number of values that it should have.
         expected: usize,
-        /// Number of values that it has.
         found: usize,
     },
     /// Request longer than any device takes.
@@ -55,24 +88,21 @@ pub enum Error {
         most_bytes: usize,
     },
     /// Device that does not answer.
-    #[error("the device does not answer ({attempts} attempts, {} ms each); check that it runs this project's firmware, and the speed of its line", timeout.as_millis())]
+    #[error("the device does not answer ({attempts} attempts, {} ms each); {heard}", timeout.as_millis())]
     NoAnswer {
         /// Number of times that it was asked.
         attempts: u32,
         /// Longest time that an answer was waited for.
         timeout: Duration,
+        /// What came instead.
+        heard: Heard,
     },
     /// Device that stops answering or reporting in the middle of its work.
     #[error("{0}")]
     Silent(String),
     /// Answer that does not belong to the request.
     #[error("the device answers {request} with {answer}")]
-    Unexpected {
-        /// Request that was sent.
-        request: String,
-        /// Answer that came.
-        answer: String,
-    },
+    Unexpected { request: String, answer: String },
     /// Request that the device refused.
     #[error("the device refused: {}", why(*.0))]
     Refused(Refusal),
@@ -112,7 +142,6 @@ pub enum Error {
     NoRoom {
         /// What the device has room for.
         capacity: Capacity,
-        /// Shape of the model.
         shape: ModelShape,
     },
     /// Exponential of the device that the host does not know.
@@ -121,47 +150,25 @@ pub enum Error {
     /// World with another readout than the image has.
     #[error("the image's readout.{field} is {only:?}; set it to that, or remove it")]
     OtherReadout {
-        /// Name of the part.
         field: &'static str,
         /// Part that the image has.
         only: &'static str,
     },
     /// Emulator whose program is missing.
     #[error("{}: there is no such program; on Debian: apt-get install qemu-system-arm", qemu.display())]
-    NoQemu {
-        /// Program, by name or path.
-        qemu: PathBuf,
-    },
+    NoQemu { qemu: PathBuf },
     /// Emulator that does not start.
     #[error("{}: the emulator does not start: {cause}", qemu.display())]
-    NoStart {
-        /// Program, by name or path.
-        qemu: PathBuf,
-        /// Reason.
-        cause: std::io::Error,
-    },
+    NoStart { qemu: PathBuf, cause: std::io::Error },
     /// File of a mailbox that cannot be made.
     #[error("cannot make the mailbox {}: {cause}", path.display())]
-    Mailbox {
-        /// Path of the file.
-        path: PathBuf,
-        /// Reason.
-        cause: std::io::Error,
-    },
+    Mailbox { path: PathBuf, cause: std::io::Error },
     /// Image that cannot be read.
     #[error("{}: {cause}; `cargo xtask firmware` builds it, below CARGO_TARGET_DIR if that is set", image.display())]
-    NoImage {
-        /// Path of the image.
-        image: PathBuf,
-        /// Reason.
-        cause: std::io::Error,
-    },
+    NoImage { image: PathBuf, cause: std::io::Error },
     /// Image that is no program.
     #[error("{}: it is no ELF file; the application's is `qemu-app`", image.display())]
-    NotElf {
-        /// Path of the image.
-        image: PathBuf,
-    },
+    NotElf { image: PathBuf },
     /// Failure of the virtual board at the end of the readout's line.
     #[error(transparent)]
     Board(#[from] taxel_simulate::Error),
@@ -275,7 +282,6 @@ fn why_not_recalibrated(fault: RecalibrationFault) -> String {
 }
 
 /// What image a model of this `shape` needs, if those of this `capacity` have no room for it.
-#[must_use]
 pub fn image_for(capacity: Capacity, shape: ModelShape) -> String {
     match capacity.enlarged_for(shape) {
         Some(Capacity { rows, columns, outputs }) => {

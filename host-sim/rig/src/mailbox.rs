@@ -51,15 +51,9 @@ const TO_HOST: Ring = Ring { written: 0xC0, read: 0x100, bytes: 0x5000 };
 /// Bytes of memory that another program reads and writes at the same time.
 pub trait SharedBytes {
     /// Fills `bytes` with the memory from offset `place` on.
-    ///
-    /// # Errors
-    /// Error of the system.
     fn read_at(&mut self, bytes: &mut [u8], place: u64) -> io::Result<()>;
 
     /// Writes `bytes` to the memory from offset `place` on.
-    ///
-    /// # Errors
-    /// Error of the system.
     fn write_at(&mut self, bytes: &[u8], place: u64) -> io::Result<()>;
 }
 
@@ -100,9 +94,6 @@ impl Mailbox {
 
 impl<S: SharedBytes> Mailbox<S> {
     /// Lays out a mailbox in `shared`, which holds zeros.
-    ///
-    /// # Errors
-    /// Error of the system.
     pub fn new(mut shared: S) -> io::Result<Self> {
         shared.write_at(&MAGIC, 0)?;
         Ok(Self { shared, written: 0, read: 0, timeout: Duration::ZERO })

@@ -49,7 +49,6 @@ impl Contact {
     }
 
     /// Shear at the centre: Δx and Δy in mm.
-    #[must_use]
     pub fn shear_mm(&self) -> [Lanes; 2] {
         let mut shear_mm = self.shear;
         for along in &mut shear_mm {
@@ -62,7 +61,6 @@ impl Contact {
 
     /// Normal force in N on the face of `sensor`: the integral of k·Δz over the face. What of the dent lies beyond the
     /// face does not count.
-    #[must_use]
     pub fn force_n(&self, sensor: &Sensor) -> Lanes {
         let stiffness_n_per_mm3 = sensor.foundation_n_per_mm3();
         let mut force_n = [0.0; LANES];

@@ -34,12 +34,7 @@ pub enum Error {
     Data(#[from] taxel_data::Error),
     /// Virtual board whose parts were used as real ones must not be.
     #[error("the virtual board refused {times} times, first: {first}")]
-    Board {
-        /// Number of violations.
-        times: usize,
-        /// First violation.
-        first: Violation,
-    },
+    Board { times: usize, first: Violation },
     /// Failure of the line that drives a virtual board.
     #[error("the readout's line failed: {0}")]
     Line(#[from] std::io::Error),

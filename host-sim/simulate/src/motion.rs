@@ -25,9 +25,6 @@ pub trait Motion: Debug + Send + Sync {
     fn range_mm(&self) -> [[f64; 2]; 3];
 
     /// Checks the motion's settings.
-    ///
-    /// # Errors
-    /// [`BadValue`] for the first setting that cannot be used.
     fn check(&self) -> Result<(), BadValue>;
 
     /// Number of frames in a trajectory.
@@ -112,7 +109,6 @@ pub struct Draws {
 
 impl Draws {
     /// Sources of `stream` for the trajectories from number `first` on.
-    #[must_use]
     pub fn new(seed: u64, stream: Stream, first: usize) -> Self {
         Self { seed, stream, lanes: RandomLanes::new(first) }
     }

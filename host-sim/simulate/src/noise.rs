@@ -24,7 +24,6 @@ pub enum NoiseKind {
 
 impl NoiseKind {
     /// Name of the kind in scenes and results.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Relative => "relative",

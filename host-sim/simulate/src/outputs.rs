@@ -89,14 +89,12 @@ impl From<ElectrodeOutputs> for Outputs {
 
 impl Outputs {
     /// Deformation in mm along all three axes.
-    #[must_use]
     pub fn all_deformations() -> Self {
         let axes = vec![Axis::X, Axis::Y, Axis::Z];
         ElectrodeOutputs { quantity: Quantity::Deformation, axes }.into()
     }
 
     /// Number of outputs of a frame of so many `rows` of `sensor`.
-    #[must_use]
     pub fn count(&self, sensor: &Sensor, rows: usize) -> usize {
         match self {
             Self::Electrodes(outputs) => rows * sensor.electrodes_per_row_wire * outputs.axes.len(),
@@ -106,7 +104,6 @@ impl Outputs {
 
     /// Number of row tables in a data set of so many `rows`: outputs of electrodes belong to their row-wires, those
     /// of the contact to the array.
-    #[must_use]
     pub fn row_tables(&self, rows: usize) -> usize {
         match self {
             Self::Electrodes(_) => rows,
@@ -115,7 +112,6 @@ impl Outputs {
     }
 
     /// Names of the outputs: of `rows` (from 0) of `sensor`, row after row, or of the contact.
-    #[must_use]
     pub fn names(&self, sensor: &Sensor, rows: &[usize]) -> Vec<String> {
         match self {
             Self::Electrodes(outputs) => outputs.names(sensor, rows),
@@ -129,7 +125,6 @@ impl Outputs {
 
 impl ElectrodeOutputs {
     /// Output of an electrode of `sensor` for a deformation of 1 mm along `axis`, in mm or N.
-    #[must_use]
     pub fn per_mm(&self, sensor: &Sensor, axis: Axis) -> f64 {
         match self.quantity {
             Quantity::Deformation => 1.0,
@@ -151,7 +146,6 @@ impl ElectrodeOutputs {
     }
 
     /// Names of the outputs of `rows` (from 0) of `sensor`, row after row.
-    #[must_use]
     pub fn names(&self, sensor: &Sensor, rows: &[usize]) -> Vec<String> {
         let (symbol, unit) = match self.quantity {
             Quantity::Deformation => ('d', "mm"),
@@ -175,7 +169,6 @@ impl ContactOutput {
     pub const ALL: [Self; 4] = [Self::Centre, Self::Depth, Self::Shear, Self::Force];
 
     /// Names of the quantity's columns.
-    #[must_use]
     pub fn names(self) -> &'static [&'static str] {
         match self {
             Self::Centre => &["contact_x_mm", "contact_y_mm"],
@@ -187,7 +180,6 @@ impl ContactOutput {
 
     /// Values of the quantity's columns for `contact`, pressed into `sensor`; without a contact, where there is
     /// nothing to measure, the centre is NaN and everything else 0.
-    #[must_use]
     pub fn of(self, contact: Option<&Contact>, sensor: &Sensor) -> Vec<Lanes> {
         let Some(contact) = contact else {
             let nothing = if self == Self::Centre { f64::NAN } else { 0.0 };
@@ -203,7 +195,6 @@ impl ContactOutput {
 
     /// Full scale of the quantity's columns: the extent of the face for the centre, else what the `largest` contact
     /// has.
-    #[must_use]
     pub fn full_scales(self, largest: &Contact, sensor: &Sensor) -> Vec<f64> {
         match self {
             Self::Centre => sensor.size_mm[..2].to_vec(),

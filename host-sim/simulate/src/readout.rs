@@ -51,7 +51,6 @@ impl Circuit {
     pub const ALL: [Self; 2] = [Self::Divider, Self::ZeroPotential];
 
     /// Name of the circuit in scenes and tables.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Divider => "divider",

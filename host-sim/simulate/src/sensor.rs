@@ -25,13 +25,11 @@ pub enum Axis {
 
 impl Axis {
     /// Index of the axis in a [`Vector3`].
-    #[must_use]
     pub fn index(self) -> usize {
         self as usize
     }
 
     /// Letter of the axis in column names.
-    #[must_use]
     pub fn letter(self) -> char {
         ['x', 'y', 'z'][self.index()]
     }
@@ -67,7 +65,6 @@ pub struct Sensor {
 pub const TYPICAL_STIFFNESS_N_PER_MM: Vector3 = [1.0, 1.0, 2.0];
 
 /// Default upper electrodes: centres of equal cells on the top face, row-wires along x.
-#[must_use]
 pub fn default_upper_electrodes_mm(rows: usize, per_row: usize, size_mm: Vector3) -> Vec<Vector3> {
     let [x_mm, y_mm, z_mm] = size_mm;
     (0..rows)
@@ -78,7 +75,6 @@ pub fn default_upper_electrodes_mm(rows: usize, per_row: usize, size_mm: Vector3
 }
 
 /// Default lower electrodes: centres of equal cells on the bottom face, column-wires along y.
-#[must_use]
 pub fn default_lower_electrodes_mm(
     columns: usize,
     per_column: usize,
@@ -101,7 +97,6 @@ impl Sensor {
     ///
     /// The paper gives no coordinates, so electrodes lie at the centres of equal cells. Stiffness is
     /// that of a soft silicone.
-    #[must_use]
     pub fn paper() -> Self {
         let size_mm = [20.0, 18.0, 5.0];
         Self {
@@ -119,14 +114,12 @@ impl Sensor {
 
     /// Stiffness along z of the rubber as an elastic foundation, in N/mm³: force per area and compression. Every upper
     /// electrode stands for an equal part of the face.
-    #[must_use]
     pub fn foundation_n_per_mm3(&self) -> f64 {
         let [x_mm, y_mm, _] = self.size_mm;
         self.stiffness_n_per_mm[2] * self.upper_electrodes_mm.len() as f64 / (x_mm * y_mm)
     }
 
     /// Upper electrodes of row-wire `row` (from 0), at rest, in mm.
-    #[must_use]
     pub fn row_electrodes_mm(&self, row: usize) -> &[Vector3] {
         let n = self.electrodes_per_row_wire;
         &self.upper_electrodes_mm[row * n..(row + 1) * n]
@@ -168,7 +161,6 @@ impl Sensor {
     ///
     /// # Panics
     /// If `deformation_mm` has not one entry an electrode.
-    #[must_use]
     pub fn log_resistance_derivatives(
         &self,
         row: usize,
@@ -198,7 +190,6 @@ impl Sensor {
     }
 
     /// Names `r{m}c{k}_ohm` of the readings of `rows` (from 0), row after row.
-    #[must_use]
     pub fn reading_names(&self, rows: &[usize]) -> Vec<String> {
         let columns = 1..=self.column_wires;
         let rows = rows.iter().map(|row| row + 1);
@@ -207,7 +198,6 @@ impl Sensor {
 
     /// Names `r{m}e{i}_d{x|y|z}_mm` of the full deformation of one `row` (from 0), electrode after
     /// electrode.
-    #[must_use]
     pub fn deformation_names(&self, row: usize) -> Vec<String> {
         let electrodes = 1..=self.electrodes_per_row_wire;
         electrodes
@@ -216,19 +206,16 @@ impl Sensor {
     }
 
     /// Largest deformation along any axis for which the model holds: 20 % of the thickness.
-    #[must_use]
     pub fn largest_deformation_mm(&self) -> f64 {
         0.2 * self.size_mm[2]
     }
 
     /// Whether the model holds for a deformation along any axis; rounding errors beyond it are accepted.
-    #[must_use]
     pub fn holds_for(&self, deformation_mm: f64) -> bool {
         deformation_mm.abs() <= self.largest_deformation_mm() * (1.0 + 1e-12)
     }
 
     /// Force in N on an electrode for its deformation in mm: F = diag(kx, ky, kz)·Δ.
-    #[must_use]
     pub fn force_n(&self, deformation_mm: Vector3) -> Vector3 {
         [0, 1, 2].map(|axis| self.stiffness_n_per_mm[axis] * deformation_mm[axis])
     }

@@ -38,14 +38,12 @@ pub struct Synthesis<'w> {
 
 /// Synthesises `frames` of `stream`: noisy readings in Ω and true outputs, of the rows and axes that
 /// `world` asks for.
-#[must_use]
 pub fn synthesise(world: &World, stream: Stream, frames: usize) -> Dataset {
     Synthesis::of(world).frames(stream, frames)
 }
 
 impl<'w> Synthesis<'w> {
     /// Synthesis with all settings of `world`.
-    #[must_use]
     pub fn of(world: &'w World) -> Self {
         Self {
             world,
@@ -59,7 +57,6 @@ impl<'w> Synthesis<'w> {
     }
 
     /// World whose frames are synthesised.
-    #[must_use]
     pub fn world(&self) -> &'w World {
         self.world
     }
@@ -106,7 +103,6 @@ impl<'w> Synthesis<'w> {
     }
 
     /// Number of frames of a trajectory.
-    #[must_use]
     pub fn steps(&self) -> usize {
         self.motion.steps()
     }
@@ -115,13 +111,11 @@ impl<'w> Synthesis<'w> {
     ///
     /// Frame n is the same however many frames are asked for. It is step n mod S of trajectory n div S,
     /// where S is the motion's number of steps.
-    #[must_use]
     pub fn frames(&self, stream: Stream, frames: usize) -> Dataset {
         self.frames_from(stream, 0, frames)
     }
 
     /// Synthesises `frames` of `stream` from trajectory number `first` on, as [`frames`](Self::frames) does.
-    #[must_use]
     pub fn frames_from(&self, stream: Stream, first: usize, frames: usize) -> Dataset {
         let sensor = &self.world.sensor;
         let mut dataset = Dataset::empty(
@@ -150,14 +144,12 @@ impl<'w> Synthesis<'w> {
     /// A baseline is what a user captures before the session: the mean of so many `averaged` frames of the untouched
     /// sensor. It has the session's drift, and what averaging leaves of the white noise: the noise level over the
     /// square root of that number, with draws of its own.
-    #[must_use]
     pub fn baselines(&self, stream: Stream, frames: usize, averaged: usize) -> Table {
         self.baselines_from(stream, 0, frames, averaged)
     }
 
     /// Synthesises the baselines of `frames` of `stream` from trajectory number `first` on, as
     /// [`baselines`](Self::baselines) does.
-    #[must_use]
     pub fn baselines_from(
         &self,
         stream: Stream,
@@ -180,7 +172,6 @@ impl<'w> Synthesis<'w> {
 
     /// Synthesises the readings in Ω of one `frame` of `stream`, for motions whose trajectories have one
     /// step.
-    #[must_use]
     pub fn readings_of(&self, stream: Stream, frame: usize) -> Vec<f64> {
         let sensor = &self.world.sensor;
         let mut readings = vec![0.0; self.read_rows.len() * sensor.column_wires];
@@ -191,7 +182,6 @@ impl<'w> Synthesis<'w> {
     }
 
     /// Span in Ω of every channel over the world, if its noise is relative to the span; otherwise empty.
-    #[must_use]
     pub fn noise_span_ohm(&self) -> Vec<f64> {
         if self.noise.kind == NoiseKind::Relative || self.noise.level == 0.0 {
             return Vec::new();

@@ -27,11 +27,9 @@ pub struct World {
     pub precision: Precision,
     /// Geometry and material of the sensor.
     pub sensor: Sensor,
-    /// Motion of the electrodes.
     pub motion: motion::Kind,
     /// Rubber, and how it follows the motion.
     pub rubber: rubber::Kind,
-    /// Noise on the readings.
     pub noise: Noise,
     /// Drift of the gain between sessions, if any.
     pub drift: Option<Drift>,
@@ -39,14 +37,12 @@ pub struct World {
     pub read_rows: Vec<usize>,
     /// Circuit and parts of the readout.
     pub readout: Readout,
-    /// Outputs that are wanted.
     pub outputs: Outputs,
 }
 
 impl World {
     /// World with the paper's sensor, 0.5 % relative noise, all rows read, all deformations wanted,
     /// moved by `motion`.
-    #[must_use]
     pub fn of_motion(motion: impl Into<motion::Kind>) -> Self {
         let sensor = Sensor::paper();
         Self {
@@ -64,7 +60,6 @@ impl World {
     }
 
     /// World of the scene `press`: one contact.
-    #[must_use]
     pub fn press() -> Self {
         Self::of_motion(Press {
             dent_radius_mm: [2.0, 5.0],
@@ -74,27 +69,23 @@ impl World {
     }
 
     /// World of the scene `contact`: that of `press`, whose outputs are the contact's centre, depth and force.
-    #[must_use]
     pub fn contact() -> Self {
         let wanted = vec![ContactOutput::Centre, ContactOutput::Depth, ContactOutput::Force];
         Self { outputs: Outputs::Contact(wanted), ..Self::press() }
     }
 
     /// World of the scene `paper`: every electrode moves independently.
-    #[must_use]
     pub fn paper() -> Self {
         let (dx_mm, dy_mm, dz_mm) = ([-1.0, 1.0], [-1.0, 1.0], [0.0, 1.0]);
         Self::of_motion(Independent { dx_mm, dy_mm, dz_mm })
     }
 
     /// Names of the readings that are wanted, row after row.
-    #[must_use]
     pub fn reading_names(&self) -> Vec<String> {
         self.sensor.reading_names(&self.read_rows)
     }
 
     /// Names of the outputs that are wanted, row after row, or of the contact.
-    #[must_use]
     pub fn output_names(&self) -> Vec<String> {
         self.outputs.names(&self.sensor, &self.read_rows)
     }
@@ -104,7 +95,6 @@ impl World {
     /// Of an electrode it is the largest deformation magnitude of any axis, as in the paper (1 mm in both
     /// reference scenes), times the stiffness for forces. Of the contact it is the extent of the face, or what the
     /// [largest contact](motion::Motion::largest_contact) has.
-    #[must_use]
     pub fn full_scales(&self) -> Vec<f64> {
         match &self.outputs {
             Outputs::Electrodes(outputs) => {
@@ -126,9 +116,6 @@ impl World {
     }
 
     /// Changes the noise level, a fraction (0.005 is 0.5 %).
-    ///
-    /// # Errors
-    /// [`BadValue`] for a level outside 0 to 1.
     pub fn set_noise_level(&mut self, level: f64) -> Check {
         check_noise_level("noise level", level)?;
         self.noise.level = level;
@@ -136,9 +123,6 @@ impl World {
     }
 
     /// Checks every setting; a world that passes can be used without further checks.
-    ///
-    /// # Errors
-    /// [`BadValue`] for the first setting that cannot be used.
     pub fn check(&self) -> Check {
         sensor(&self.sensor)?;
         motion(self)?;
@@ -153,9 +137,6 @@ impl World {
     }
 
     /// Checks that so many `frames` fit in memory; `field` names them in the message.
-    ///
-    /// # Errors
-    /// [`BadValue`] for too many frames, or none.
     pub fn check_frames(&self, field: &str, frames: usize) -> Check {
         let rows = self.read_rows.len();
         let of_a_frame = rows * self.sensor.column_wires + self.outputs.count(&self.sensor, rows);
@@ -179,9 +160,6 @@ impl World {
 }
 
 /// Checks a noise level (a fraction); `field` names it in the message.
-///
-/// # Errors
-/// [`BadValue`] for a level outside 0 to 1.
 pub fn check_noise_level(field: &str, level: f64) -> Check {
     require((0.0..=1.0).contains(&level), field, level, || {
         "it is a fraction from 0 to 1 (0.005 is 0.5 %)".into()
@@ -189,9 +167,6 @@ pub fn check_noise_level(field: &str, level: f64) -> Check {
 }
 
 /// Checks the largest relative change of a drifting gain; `field` names it in the message.
-///
-/// # Errors
-/// [`BadValue`] for a change that is not from 0 to below 1.
 pub fn check_gain(field: &str, gain: f64) -> Check {
     require((0.0..1.0).contains(&gain), field, gain, || {
         "it is a fraction from 0 to below 1 (0.02 is ±2 %)".into()

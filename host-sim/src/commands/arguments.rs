@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
+use crate::Error;
 use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
-use host_sim::Error;
 use model_core::rbf::Format;
 use taxel_data::BadValue;
 use taxel_learn::Exponential;

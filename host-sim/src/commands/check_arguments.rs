@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::{Error, Result};
 use clap::Args;
 use firmware::link::message::Memory;
-use host_sim::{Error, Result};
 use model_core::blob::Metadata;
 use taxel_data::data_file::DataFile;
 use taxel_data::random::Stream;

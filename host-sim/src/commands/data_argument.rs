@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::measurements::{Judged, Measurements, Split, relative_to};
+use crate::verdict::Warning;
+use crate::{Error, Result};
 use clap::Args;
-use host_sim::measurements::{Judged, Measurements, Split, relative_to};
-use host_sim::verdict::Warning;
-use host_sim::{Error, Result};
 use taxel_data::data_file::DataFile;
 use taxel_data::dataset::Dataset;
 use taxel_data::error::{Problem, Role};

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::{Error, Result};
 use clap::Args;
-use host_sim::{Error, Result};
 use taxel_data::columns;
 use taxel_data::data_file::DataFile;
 use taxel_data::join::Join;

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use host_sim::measurements::{Measurements, relative_to};
-use host_sim::verdict::Warning;
-use host_sim::{Error, Result};
+use crate::measurements::{Measurements, relative_to};
+use crate::verdict::Warning;
+use crate::{Error, Result};
 use taxel_data::data_file::pieces::Pieces;
 use taxel_data::dataset::Dataset;
 use taxel_data::error::Problem;

@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::verdict::Warning;
+use crate::{Error, Result};
 use clap::Args;
 use firmware::link::message::EstimateReport;
-use host_sim::verdict::Warning;
-use host_sim::{Error, Result};
 use serde::Serialize;
 use taxel_data::csv_file::{self, Column};
 use taxel_data::data_file::DataFile;

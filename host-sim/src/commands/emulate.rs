@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use crate::{Error, Result};
 use clap::{Args, ValueEnum};
-use host_sim::{Error, Result};
 use taxel_data::output;
 use taxel_rig::device::Device;
 use taxel_rig::device::check::{Findings, check};

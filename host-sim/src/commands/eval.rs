@@ -2,22 +2,22 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::by_depth::{DepthErrors, by_depth};
+use crate::evaluate::confidence::{Coverage, coverage};
+use crate::evaluate::device_cost::DeviceCost;
+use crate::evaluate::distribution::{Distribution, Reference};
+use crate::metrics::{self, DecoderErrors, Errors, LimitSummary, Measure};
+use crate::report::{self, Made, View};
+use crate::verdict::{Verdict, Warning};
+use crate::{Error, Result};
 use clap::Args;
-use host_sim::by_depth::{DepthErrors, by_depth};
-use host_sim::evaluate::confidence::{Coverage, coverage};
-use host_sim::evaluate::device_cost::DeviceCost;
-use host_sim::evaluate::distribution::{Distribution, Reference};
-use host_sim::metrics::{self, DecoderErrors, Errors, LimitSummary, Measure};
-use host_sim::report::{self, Made, View};
-use host_sim::verdict::{Verdict, Warning};
-use host_sim::{Error, Result};
 use serde::Serialize;
 use taxel_data::output;
 use taxel_learn::{Exponential, ModelBlob};
 use taxel_limit::Refusal;
 
 use super::arguments::exponential;
-use super::confidence;
+use super::coverage_page;
 use super::data_file::DataFileArguments;
 use super::health::{Health, HealthArguments};
 use super::readings::{BaselineArgument, model_inputs, table_of};
@@ -189,7 +189,7 @@ fn text_of(summary: &Summary) -> print::Page {
     if let Some(percent) = summary.percent_novel {
         page.line("");
         page.line("Errors that the model's intervals of 68.3 % and 95 % cover:");
-        confidence::page(&mut page, &summary.coverage);
+        coverage_page::add(&mut page, &summary.coverage);
         page.line(format_args!("{percent:.2} % of the frames are novel: unlike those of training"));
     }
     print::verdict(&mut page, None, &summary.verdict);

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
+use crate::{Error, Result};
 use clap::Args;
-use host_sim::{Error, Result};
 use serde::Serialize;
 use taxel_data::output::write_bytes;
 use taxel_learn::ModelBlob;

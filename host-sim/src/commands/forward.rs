@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
+use crate::Result;
+use crate::experiment::Experiment;
 use clap::Args;
-use host_sim::Result;
-use host_sim::experiment::Experiment;
 use serde::Serialize;
 use taxel_data::csv_file;
 use taxel_data::data_file::DataFile;

@@ -3,14 +3,14 @@
 use std::path::PathBuf;
 
 use super::progress::Terminal;
-use clap::Args;
-use host_sim::evaluate::gate::{
+use crate::evaluate::gate::{
     self, BASELINE_FRAMES, GateResult, Line, MISSED_OVER_MM, RECOMMENDED_K, Settings,
 };
-use host_sim::metrics::Errors;
-use host_sim::subject::Subject;
-use host_sim::verdict::{Verdict, Warning};
-use host_sim::{Error, Result};
+use crate::metrics::Errors;
+use crate::subject::Subject;
+use crate::verdict::{Verdict, Warning};
+use crate::{Error, Result};
+use clap::Args;
 use serde::Serialize;
 use taxel_learn::cost::{Design, Frames, Prices};
 use taxel_learn::{Exponential, PreparedModel};

@@ -1,7 +1,7 @@
 //! Faulty readings of data files: what is believed, what is filled, and notes on both.
 
+use crate::{Error, Result};
 use clap::Args;
-use host_sim::{Error, Result};
 use model_core::fill::MOST_MISSING;
 use model_core::health::Limits;
 use serde::Serialize;

@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
+use crate::Result;
+use crate::evaluate::trade::SLOT_BYTES;
 use clap::Args;
 use firmware::capacity::{Capacity, WEIGHT_RAM_BYTES};
-use host_sim::Result;
-use host_sim::evaluate::trade::SLOT_BYTES;
 use model_core::blob::Model;
 use model_core::scratch_floats;
 use serde::Serialize;

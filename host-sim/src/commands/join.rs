@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
+use crate::Result;
 use clap::Args;
-use host_sim::Result;
 use serde::Serialize;
 use taxel_data::csv_file;
 

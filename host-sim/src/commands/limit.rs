@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::evaluate::limit::{self, Candidate, Figures, Level, LimitResult, Plan};
+use crate::metrics::DecoderErrors;
+use crate::{Error, Result, report};
 use clap::Args;
-use host_sim::evaluate::limit::{self, Candidate, Figures, Level, LimitResult, Plan};
-use host_sim::metrics::DecoderErrors;
-use host_sim::{Error, Result, report};
 use taxel_data::output::FileSet;
 use taxel_learn::ModelBlob;
 use taxel_limit::identify::Observability;
@@ -16,7 +16,7 @@ use super::{Common, arguments, print};
 
 /// All files that `-o` writes.
 const FILES: FileSet =
-    FileSet { name: "limit", files: &["limit.json", "limit.html", "directions.svg", "known.svg"] };
+    FileSet { files: &["limit.json", "limit.html", "directions.svg", "known.svg"] };
 /// Singular values that are printed of each row.
 const PRINTED_VALUES: usize = 6;
 

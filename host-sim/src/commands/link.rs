@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use crate::{Error, Result};
 use clap::{Args, Subcommand, value_parser};
 use firmware::seal::Key;
-use host_sim::{Error, Result};
 use taxel_data::input;
 use taxel_learn::ModelBlob;
 use taxel_rig::device::check::check;

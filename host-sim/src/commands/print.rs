@@ -1,18 +1,21 @@
 //! Printing of results on stdout: aligned tables for people, JSON for programs.
 
 use std::fmt::{Display, Write as _};
-use std::io::{ErrorKind, Write as _};
+use std::io::{self, ErrorKind, Write as _};
 use std::path::Path;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use host_sim::by_depth::DepthErrors;
-use host_sim::metrics::{Definition, Errors};
-use host_sim::verdict::Verdict;
-use host_sim::{Error, Result};
+use crate::by_depth::DepthErrors;
+use crate::metrics::{Definition, Errors};
+use crate::verdict::Verdict;
+use crate::{Error, Result};
 use serde::Serialize;
+use taxel_data::error::printable;
 use taxel_data::output;
+
+use super::stdout;
 
 /// Page of text for people, printed as a whole.
 #[derive(Default)]
@@ -27,7 +30,7 @@ impl Page {
 
     /// Prints the page.
     pub fn print(self) -> Result<()> {
-        show(&self.0)
+        show(&printable(&self.0))
     }
 }
 
@@ -38,6 +41,9 @@ static STDOUT_IS_TAKEN: AtomicBool = AtomicBool::new(false);
 /// stdout, results go to stderr from now on.
 pub fn check_output(path: &Path, inputs: &[&Path]) -> Result<()> {
     if output::is_stdout(path) {
+        if stdout::was_closed() {
+            return Err(taxel_data::Error::write(path, io::Error::other("stdout is closed")).into());
+        }
         STDOUT_IS_TAKEN.store(true, Ordering::Relaxed);
     }
     Ok(output::check_writable(path, inputs)?)
@@ -46,9 +52,9 @@ pub fn check_output(path: &Path, inputs: &[&Path]) -> Result<()> {
 /// Shows a result; a reader who has seen enough (`| head`) is no failure.
 fn show(text: &str) -> Result<()> {
     let (place, written) = if STDOUT_IS_TAKEN.load(Ordering::Relaxed) {
-        ("stderr", std::io::stderr().write_all(text.as_bytes()))
+        ("stderr", io::stderr().write_all(text.as_bytes()))
     } else {
-        ("stdout", std::io::stdout().write_all(text.as_bytes()))
+        ("stdout", io::stdout().write_all(text.as_bytes()))
     };
     match written {
         Err(cause) if cause.kind() != ErrorKind::BrokenPipe => {

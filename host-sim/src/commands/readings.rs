@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::{Error, Result};
 use clap::Args;
-use host_sim::{Error, Result};
 use model_core::blob::Metadata;
 use model_core::health::Limits;
 use taxel_data::columns;

@@ -1,6 +1,6 @@
 //! Note on readings that a model is trained on, and that a device would take for missing.
 
-use host_sim::subject::Subject;
+use crate::subject::Subject;
 use model_core::health::{Fault, Limits};
 use taxel_data::columns;
 use taxel_data::error::cut;

@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use super::progress::Terminal;
+use crate::Result;
+use crate::evaluate::table1::Table1;
+use crate::report::{self, Made};
+use crate::run::{self, RunResult};
+use crate::subject::Subject;
 use clap::Args;
-use host_sim::Result;
-use host_sim::evaluate::table1::Table1;
-use host_sim::report::{self, Made};
-use host_sim::run::{self, RunResult};
-use host_sim::subject::Subject;
 use taxel_data::output::FileSet;
 use taxel_learn::{ModelBlob, Options};
 
@@ -19,7 +19,7 @@ use super::{Common, arguments, command_line, print, refused_readings};
 const DEFAULT_OUTPUT: &str = "out";
 /// All files that a run may write.
 const FILES: FileSet =
-    FileSet { name: "run", files: &["model.bin", "metrics.json", "table1.csv", "report.html"] };
+    FileSet { files: &["model.bin", "metrics.json", "table1.csv", "report.html"] };
 
 /// Do the whole job for a scene or a CSV file: train, write the blob, evaluate, report.
 ///

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
+use crate::experiment::Experiment;
+use crate::{Error, Result};
 use clap::Args;
-use host_sim::experiment::Experiment;
-use host_sim::{Error, Result};
 use taxel_data::columns;
 use taxel_data::progress::Progress;
 use taxel_learn::ModelBlob;

@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::experiment::{EMBEDDED, Experiment};
+use crate::subject::Subject;
+use crate::{Error, Result};
 use clap::Args;
-use host_sim::experiment::{EMBEDDED, Experiment};
-use host_sim::subject::Subject;
-use host_sim::{Error, Result};
 use taxel_data::progress::Progress;
 use taxel_learn::ModelBlob;
 use taxel_simulate::sensor::Precision;

@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
+use crate::verdict::Warning;
+use crate::{Error, Result};
 use clap::Args;
-use host_sim::verdict::Warning;
-use host_sim::{Error, Result};
 use serde::Serialize;
 use taxel_data::csv_file;
 use taxel_data::random::Stream;

@@ -3,14 +3,14 @@
 use std::path::PathBuf;
 
 use super::progress::Terminal;
+use crate::evaluate::printed::{self, CELLS, Nearness};
+use crate::evaluate::reconstruct;
+use crate::evaluate::table1::{self, Comparison, Entry, NETWORK, Table1};
+use crate::experiment;
+use crate::metrics::{Definition, Errors};
+use crate::report;
+use crate::{Error, Result};
 use clap::Args;
-use host_sim::evaluate::printed::{self, CELLS, Nearness};
-use host_sim::evaluate::reconstruct;
-use host_sim::evaluate::table1::{self, Comparison, Entry, NETWORK, Table1};
-use host_sim::experiment;
-use host_sim::metrics::{Definition, Errors};
-use host_sim::report;
-use host_sim::{Error, Result};
 use serde::Serialize;
 use taxel_data::{columns, output};
 use taxel_learn::decoders::{mean, standard};

@@ -4,12 +4,12 @@ use std::cmp::Ordering;
 use std::path::PathBuf;
 use std::str::FromStr;
 
+use crate::error::Bounded;
+use crate::evaluate::gate::{self, RECOMMENDED_K};
+use crate::evaluate::trade::{self, BOARD_CLOCK_MHZ, Bounds, Device, Memory, Plan};
+use crate::subject::Subject;
+use crate::{Error, Result};
 use clap::{Args, ValueEnum};
-use host_sim::error::Bounded;
-use host_sim::evaluate::gate::{self, RECOMMENDED_K};
-use host_sim::evaluate::trade::{self, BOARD_CLOCK_MHZ, Bounds, Device, Memory, Plan};
-use host_sim::subject::Subject;
-use host_sim::{Error, Result};
 use taxel_data::columns;
 
 use super::arguments::{self, of_option};

@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use super::progress::Terminal;
+use crate::evaluate::learning_curve::LearningCurve;
+use crate::evaluate::worth::Worth;
+use crate::measurements::Measurements;
+use crate::metrics::{self, Errors, NETWORK};
+use crate::subject::Subject;
+use crate::{Error, Result, report};
 use clap::Args;
-use host_sim::evaluate::learning_curve::LearningCurve;
-use host_sim::evaluate::worth::Worth;
-use host_sim::measurements::Measurements;
-use host_sim::metrics::{self, Errors, NETWORK};
-use host_sim::subject::Subject;
-use host_sim::{Error, Result, report};
 use model_core::rbf::Format;
 use serde::Serialize;
 use taxel_data::{columns, output};

@@ -11,9 +11,7 @@ use super::ticks::Ticks;
 pub enum Mark {
     /// Line through the points with a shape at every one; a missing value is a gap.
     LineAnd(Shape),
-    /// Dashed line.
     Dashed,
-    /// Dotted line.
     Dotted,
     /// Bars from zero, this wide on the x axis.
     Bars(f64),
@@ -28,7 +26,6 @@ pub struct Series {
     pub class: &'static str,
     /// Opacity, for series that are graded.
     pub opacity: f64,
-    /// Mark of the series.
     pub mark: Mark,
     /// Points [x, y]; a y that is not finite is missing.
     pub points: Vec<[f64; 2]>,
@@ -46,9 +43,7 @@ impl Series {
 pub struct Axis {
     /// Quantity on the axis, with its unit.
     pub label: String,
-    /// Range and ticks.
     pub ticks: Ticks,
-    /// Whether it is logarithmic.
     pub logarithmic: bool,
 }
 

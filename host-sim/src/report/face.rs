@@ -13,7 +13,6 @@ pub struct Cell {
     pub name: String,
     /// Middle, where its number stands.
     pub middle: [f64; 2],
-    /// Outline.
     pub outline: Polygon,
 }
 
@@ -34,7 +33,6 @@ pub struct Face {
     pub row_wires: Vec<(usize, f64)>,
     /// Height of a map over its width.
     pub height_over_width: f64,
-    /// Places of values.
     pub cells: Vec<Cell>,
     /// Row-wire and electrode (or column-wire) of each place, from 1.
     pub wires: Vec<[usize; 2]>,

@@ -31,7 +31,6 @@ pub struct Map<'f> {
 pub struct Values<'v> {
     /// Value of each cell; one that is not finite leaves its cell empty.
     pub of_cells: &'v [f64],
-    /// Colours.
     pub scale: &'v ColourScale,
     /// Quantity with its unit, for the bar below the map.
     pub label: &'v str,

@@ -11,7 +11,6 @@ const PANEL: [f64; 2] = [440.0, 300.0];
 const GAP_PX: f64 = 28.0;
 
 /// Picture of `tables`, each with its name, beside the printed cells; a file of its own, light or dark like the viewer.
-#[must_use]
 pub fn svg(tables: &[(&str, Cells)]) -> String {
     let all = tables.iter().flat_map(|(_, cells)| cells.as_flattened()).chain(CELLS.as_flattened());
     // Cells that would leave no room for the others are off the scale; marks at the edge say so.

@@ -170,9 +170,7 @@ impl Svg {
 /// Shapes that distinguish series without colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shape {
-    /// Disc.
     Circle,
-    /// Square.
     Square,
     /// Triangle that points up.
     Triangle,

@@ -13,7 +13,6 @@ use super::format::{grouped, percent};
 /// How a page was made, so that it can be made again.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Made {
-    /// Command line.
     pub command: String,
     /// Files beside the page that belong to it.
     pub files: Vec<String>,
@@ -48,13 +47,11 @@ pub struct View<'a> {
     pub noise: Option<String>,
     /// Errors by noise and spread.
     pub table1: Option<&'a Table1>,
-    /// How the page was made.
     pub made: &'a Made,
 }
 
 impl<'a> View<'a> {
     /// View of a run.
-    #[must_use]
     pub fn of_run(result: &'a RunResult, made: &'a Made) -> Self {
         let scene = result.scene.as_ref();
         let noise =

@@ -60,7 +60,11 @@ fn without_noise_no_axis_is_behind_the_best_linear_decoder() {
 
 #[test]
 fn no_cell_of_the_papers_table_is_worse_than_the_mean_by_more_than_two_per_cent() {
-    let table = table1::compute(&Experiment::load("paper").unwrap(), &Silent).unwrap();
+    let mut paper = Experiment::load("paper").unwrap();
+    // The least and the greatest of the table's widths and noise levels, and a width between.
+    let cells = paper.table1.as_mut().unwrap();
+    (cells.spreads, cells.noise_levels) = (vec![0.1, 0.5, 1.0], vec![0.005, 0.1]);
+    let table = table1::compute(&paper, &Silent).unwrap();
     let (mut worst, mut cells) = (0.0_f64, 0);
     for column in &table.columns {
         for spread in column.spreads() {
@@ -78,6 +82,19 @@ fn no_cell_of_the_papers_table_is_worse_than_the_mean_by_more_than_two_per_cent(
         }
     }
     println!("{cells} cells; the worst is {worst:.4} × the mean's error");
-    assert_eq!(cells, 10 * 4 * (4 + 4 + 5));
+    assert_eq!(cells, 3 * 2 * (4 + 4 + 5));
     assert!(worst <= 1.02, "{worst}");
+}
+
+#[test]
+fn a_few_frames_without_noise_train_a_network_for_others_too() {
+    let mut scene = unrefined("press");
+    scene.world.set_noise_level(0.0).unwrap();
+    (scene.training.frames, scene.training.centres) = (300, 8);
+    let test = synthesise(&scene.world, Stream::Test, 2000);
+    let blob = scene.train(&Silent).unwrap();
+    let errors = metrics::judge(&blob.prepare(Exponential::default()), &test, &scene.measure());
+    let z = errors.errors.iter().find(|errors| errors.group == "dz_mm").unwrap();
+    // 0.127 mm if nothing holds the affine tail; 0.029 mm as measured.
+    assert!(z.rmse < 0.06, "{} mm", z.rmse);
 }

@@ -1,12 +1,10 @@
-//! Networks from deformations to readings, and what is refused for them.
+//! Networks from deformations to readings, and equations solved for deformations.
 
 use crate::common::{Folder, small_scene};
 
 /// Small scene whose networks predict readings.
 fn forward_scene() -> String {
-    let scene = small_scene();
-    let (scene, _) = scene.split_once("[table1]").unwrap();
-    scene.replace("[training]", "[training]\ndirection = \"forward\"")
+    small_scene().replace("[training]", "[training]\ndirection = \"forward\"")
 }
 
 #[test]
@@ -31,44 +29,4 @@ fn a_forward_scene_trains_and_its_blob_predicts_readings_from_deformations() {
     let run = folder.succeed(&["run", "scene.toml"]);
     assert!(run.contains("0.253 Ω RMS") && run.contains("18 deformations -> K"), "{run}");
     assert!(folder.path("out/small/report.html").exists());
-}
-
-#[test]
-fn what_is_about_decoding_refuses_a_forward_scene_by_name() {
-    let folder = Folder::new("forward-refused");
-    folder.write("scene.toml", forward_scene());
-    for command in ["gate", "trade", "drift", "confidence", "readout"] {
-        let said = folder.fail(&[command, "scene.toml"], 2);
-        let says = format!("training.direction = forward: {command} is about models that decode");
-        assert!(said.contains(&says), "{said}");
-    }
-    let relative = ["train", "scene.toml", "--relative-inputs", "-o", "m.bin"];
-    let said = folder.fail(&relative, 2);
-    assert!(said.contains("relative_inputs = true: inputs are deformations"), "{said}");
-    for (from, to, says) in [
-        ("[\"x\", \"y\", \"z\"]", "[\"z\"]", "ask for outputs.quantity = \"deformation\""),
-        ("\"forward\"", "\"sideways\"", "unknown variant `sideways`"),
-    ] {
-        folder.write("bad.toml", forward_scene().replace(from, to));
-        let said = folder.fail(&["train", "bad.toml", "-o", "m.bin"], 2);
-        assert!(said.contains(says), "{said}");
-    }
-}
-
-#[test]
-fn the_study_of_equations_refuses_what_they_do_not_decode_and_draws_a_picture() {
-    let folder = Folder::new("study-equations");
-    folder.write("z.toml", small_scene().replace("[\"x\", \"y\", \"z\"]", "[\"z\"]"));
-    let said = folder.fail(&["study", "equations", "z.toml"], 2);
-    assert!(said.contains("equations give all deformations"), "{said}");
-    assert!(folder.fail(&["study", "equations", "press", "-n", "0"], 2).contains("frames = 0"));
-
-    folder.write("scene.toml", small_scene());
-    let study = ["study", "equations", "scene.toml", "-n", "4", "-o", "e.svg"];
-    let page = folder.succeed(&study);
-    let solved = page.lines().find(|line| line.starts_with("solved exactly")).unwrap();
-    let shares: Vec<&str> = solved.split_whitespace().skip(3).collect();
-    assert_eq!(shares, ["100.0", "0.0", "0.0", "0.0", "0.0", "0.0", "0.0", "0.0"], "{page}");
-    let picture = std::fs::read_to_string(folder.path("e.svg")).unwrap();
-    assert!(picture.starts_with("<svg") && picture.contains("equations, damped"));
 }

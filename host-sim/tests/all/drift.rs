@@ -1,9 +1,7 @@
 //! A gain that drifts: what it costs models of readings, and that it costs relative inputs nothing.
 
-use crate::common::{Folder, small_scene, unrefined};
-use host_sim::evaluate::drift::{self, Line};
+use crate::common::{Folder, small_scene, small_scene_with_table1, unrefined};
 use host_sim::evaluate::gate::{self, GateResult, Settings};
-use host_sim::evaluate::readout::{self, Stage};
 use host_sim::evaluate::trade::{self, Bounds, Device, Plan};
 use host_sim::experiment::Experiment;
 use host_sim::metrics::Errors;
@@ -11,45 +9,10 @@ use host_sim::subject::Subject;
 use taxel_data::progress::Silent;
 use taxel_learn::Exponential;
 use taxel_learn::cost::Frames;
-use taxel_learn::decoders::linear;
 use taxel_simulate::drift::Drift;
-use taxel_simulate::readout::Circuit;
-
-const NETWORK: &str = "network";
 
 fn z(errors: &[Errors]) -> f64 {
     errors.iter().find(|errors| errors.group == "dz_mm").unwrap().rmse
-}
-
-fn small() -> Experiment {
-    Experiment::parse("small", &small_scene()).unwrap()
-}
-
-#[test]
-fn two_per_cent_of_drift_cost_readings_a_factor_and_relative_inputs_nothing() {
-    let mut scene = unrefined("press");
-    scene.world.read_rows = vec![3];
-    (scene.training.frames, scene.training.test_frames) = (8000, 8000);
-    let result = drift::measure(&scene, 0.02, &Silent).unwrap();
-    let line = |decoder, relative, with_drift| result.line(decoder, relative, with_drift).unwrap();
-    let ratio = |line: &Line| z(&line.drifted) / z(&line.undrifted);
-    for decoder in [NETWORK, linear::NAME] {
-        let (readings, relative) = (line(decoder, false, false), line(decoder, true, false));
-        let trained = line(decoder, false, true);
-        println!(
-            "{decoder}: {:.4} → {:.4} mm, trained with drift {:.4} mm, relative {:.4} → {:.4} mm",
-            z(&readings.undrifted),
-            z(&readings.drifted),
-            z(&trained.drifted),
-            z(&relative.undrifted),
-            z(&relative.drifted)
-        );
-        assert!(ratio(readings) > 2.0 && z(&trained.drifted) > 1.2 * z(&relative.drifted));
-        assert!((ratio(relative) - 1.0).abs() < 0.001);
-        // The noise of the baseline is a tenth of a reading's.
-        assert!((z(&relative.drifted) / z(&readings.undrifted) - 1.0).abs() < 0.05);
-    }
-    assert_eq!(result.lines.iter().filter(|line| line.decoder == "mean").count(), 1);
 }
 
 #[test]
@@ -86,6 +49,7 @@ fn a_gate_and_a_trade_see_readings_and_baselines_of_the_same_session() {
     assert!(z(readings.ungated_errors()) > 1.3 * z(drifting.ungated_errors()));
 
     let mut scene = unrefined("press");
+    scene.world.read_rows = vec![3, 4];
     (scene.training.frames, scene.training.test_frames) = (1000, 300);
     scene.training.relative_inputs = true;
     let plan = Plan {
@@ -110,26 +74,8 @@ fn a_gate_and_a_trade_see_readings_and_baselines_of_the_same_session() {
 }
 
 #[test]
-fn a_baseline_that_was_scanned_with_the_same_series_resistance_cancels_it() {
-    let at = |relative_inputs: bool| {
-        let mut scene = small();
-        scene.training.relative_inputs = relative_inputs;
-        // The readout does not drift.
-        scene.world.drift = Some(Drift { gain: if relative_inputs { 0.05 } else { 0.0 } });
-        let blob = scene.train(&Silent).unwrap();
-        let result = readout::measure(&scene, &blob.prepare(Exponential::default()), 20).unwrap();
-        let line = result.line(Circuit::ZeroPotential, Stage::Series).unwrap();
-        assert!(line.readings.rms_percent > 10.0);
-        z(&line.errors) / z(result.ideal_errors())
-    };
-    let (readings, relative) = (at(false), at(true));
-    println!("z RMSE relative to ideal readings: {readings:.2} and {relative:.2}");
-    assert!(readings > 3.0 && (0.8..1.25).contains(&relative));
-}
-
-#[test]
 fn a_run_with_relative_inputs_says_so_and_shows_changes_from_rest() {
-    let mut scene = small();
+    let mut scene = Experiment::parse("small", &small_scene_with_table1()).unwrap();
     scene.training.relative_inputs = true;
     scene.world.drift = Some(Drift { gain: 0.02 });
     let (result, blob) =
@@ -164,10 +110,10 @@ fn a_user_trains_on_a_csv_file_and_decodes_a_drifted_sensor_with_its_own_baselin
     };
     synth("1", "1", "train.csv", "rest.csv");
     synth("2", "1.02", "drifted.csv", "drifted_rest.csv");
-    folder.succeed(&["train", "train.csv", "--centres", "24", "-o", "readings.bin"]);
+    let train = ["train", "train.csv", "--centres", "24", "--no-refine"];
+    folder.succeed(&[&train[..], &["-o", "readings.bin"]].concat());
     let relative = ["--relative-inputs", "--baseline", "rest.csv", "-o", "relative.bin", "--json"];
-    let trained =
-        folder.succeed(&[&["train", "train.csv", "--centres", "24"], &relative[..]].concat());
+    let trained = folder.succeed(&[&train[..], &relative[..]].concat());
     assert!(trained.contains("\"relative_inputs\": true"), "{trained}");
     let inspected = folder.succeed(&["inspect", "relative.bin"]);
     assert!(inspected.contains("relative to the baseline"), "{inspected}");

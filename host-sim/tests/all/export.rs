@@ -70,8 +70,7 @@ fn every_number_of_networks_of_several_sizes_is_written_to_the_bit() {
 #[test]
 fn parts_that_a_fixed_has_no_room_for_are_refused_by_name_with_the_fix() {
     let folder = Folder::new("export_refused");
-    let (world, _) = small_scene().split_once("[table1]").map(|(a, b)| (a.to_owned(), b)).unwrap();
-    folder.write("scene.toml", world.replace("frames = 3000", "frames = 400"));
+    folder.write("scene.toml", small_scene().replace("frames = 3000", "frames = 400"));
     let train = ["train", "scene.toml", "--format", "f32-direct", "-o", "m.bin"];
     for (option, says) in [
         ("--confidence", "has no room for a confidence: train it without --confidence"),

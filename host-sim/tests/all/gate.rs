@@ -114,33 +114,6 @@ fn the_command_prints_tables_and_json() {
 }
 
 #[test]
-fn what_makes_no_gate_is_refused() {
-    let folder = Folder::new("gate-refusals");
-    folder.write("small.toml", small_scene());
-    folder.write("span.toml", small_scene().replace("\"relative\"", "\"span\""));
-    for (arguments, says) in [
-        (&["small.toml", "--k", "0"][..], &["--k 0", "positive"][..]),
-        (&["small.toml", "--k", "3,NaN"], &["--k NaN", "3.5"]),
-        (&["small.toml", "--k", "250"], &["--k 250", "below 1"]),
-        (&["small.toml", "--noise", "0"], &["noise level = 0", "0.005"]),
-        (&["span.toml"], &["noise.kind = \"span\"", "relative"]),
-        (&["small.toml", "--baseline-frames", "0"], &["--baseline-frames = 0"]),
-        (&["small.toml", "--cycles", "1,2"], &["--cycles [1, 2]", "three"]),
-        (&["small.toml", "--cycles", "1,0,3"], &["--cycles [1, 0, 3]", "positive"]),
-        (&["small.toml", "--cycles", "3,2,1"], &["--cycles [3, 2, 1]", "REST below AWAKE"]),
-        (&["small.toml", "--cycles", "1,2,-3"], &["'-3'", "--cycles"]),
-    ] {
-        let output = folder.run(&[&["gate"], arguments].concat());
-        let stderr = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {stderr}");
-        for part in says {
-            assert!(stderr.contains(part), "{arguments:?}: {part:?} is not in {stderr:?}");
-        }
-        assert!(output.stdout.is_empty());
-    }
-}
-
-#[test]
 fn a_csv_file_with_frames_at_rest_has_a_gate() {
     let folder = Folder::new("gate-csv");
     let mut random = Random::new(5, Stream::Test, Purpose::Noise, 0, 0);

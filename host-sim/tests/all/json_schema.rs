@@ -10,11 +10,11 @@ use taxel_data::progress::Silent;
 use taxel_rig::device::check::{Plan, check};
 use taxel_rig::device::upload;
 
-use crate::common::{Folder, small_scene};
+use crate::common::{Folder, small_scene, small_scene_with_table1};
 use crate::device;
 use validator::Schema;
 
-fn schema() -> Schema {
+pub fn schema() -> Schema {
     Schema::parse(include_str!("../../../docs/json.schema.json"))
 }
 
@@ -28,12 +28,11 @@ fn known_commands(schema: &Schema) -> BTreeSet<String> {
 }
 
 /// Runs a command with `--json`, and holds what it prints to the schema.
-fn checked(folder: &Folder, schema: &Schema, arguments: &[&str]) -> Value {
+pub fn checked(folder: &Folder, schema: &Schema, arguments: &[&str]) -> Value {
     let text = folder.succeed(&[arguments, &["--json"]].concat());
     let document: Value = serde_json::from_str(&text).unwrap();
     assert_eq!(schema.faults(&document), [""; 0], "{arguments:?}");
-    let words = if arguments[0] == "study" { 2 } else { 1 };
-    assert_eq!(document["command"], arguments[..words].join(" "));
+    assert_eq!(document["command"], arguments[0]);
     assert!(document["seconds"].as_f64().unwrap() > 0.0, "{arguments:?}");
     document
 }
@@ -48,9 +47,7 @@ fn check_file(folder: &Folder, schema: &Schema, file: &str) {
 /// Folder with a scene, frames of it, and a model with a confidence.
 fn prepared(name: &str, schema: &Schema) -> Folder {
     let folder = Folder::new(name);
-    let scene = small_scene();
-    let (world, _) = scene.split_once("[table1]").unwrap();
-    folder.write("scene.toml", world.replace("frames = 3000", "frames = 600"));
+    folder.write("scene.toml", small_scene().replace("frames = 3000", "frames = 600"));
     checked(&folder, schema, &["synth", "scene.toml", "-n", "200", "-o", "data.csv"]);
     let train = ["train", "scene.toml", "--confidence", "--fill", "-o", "m.bin"];
     checked(&folder, schema, &train);
@@ -90,36 +87,15 @@ fn experiments_are_told_by_the_schema() {
     let folder = prepared("json_experiments", schema);
     let checked = |arguments: &[&str]| checked(&folder, schema, arguments);
     let gate = checked(&["gate", "scene.toml", "-n", "100", "--model", "m.bin"]);
-    checked(&["readout", "scene.toml", "--frames", "3"]);
-    checked(&["drift", "scene.toml"]);
-    for study in ["equations", "directions"] {
-        let study = checked(&["study", study, "scene.toml", "-n", "3"]);
-        assert_eq!((&study["subject"], &study["rows"]), (&json!("small"), &json!(6)));
-    }
-    let confidence = checked(&["confidence", "scene.toml", "-n", "100", "--model", "m.bin"]);
     let limit = ["limit", "scene.toml", "-n", "4", "--model", "m.bin", "-o", "limit"];
     let limit = checked(&[&limit[..], &["--geometry"]].concat());
     check_file(&folder, schema, "limit/limit.json");
     let trade = ["trade", "scene.toml", "--centres", "6", "--output-rank", "none"];
     let trade = checked(&[&trade[..], &["--max-error", "1"]].concat());
     check_file(&folder, schema, "out/small/trade.json");
-    for document in [gate, confidence, limit, trade] {
+    for document in [gate, limit, trade] {
         assert_eq!((&document["subject"], &document["seed"]), (&json!("small"), &json!(1)));
     }
-}
-
-#[test]
-fn studies_are_told_by_the_schema() {
-    let schema = &schema();
-    let folder = prepared("json_studies", schema);
-    let checked = |arguments: &[&str]| checked(&folder, schema, arguments);
-    let widths = checked(&["study", "widths", "scene.toml", "--centres", "6", "--spread", "0.8"]);
-    assert_eq!(widths["models"].as_array().unwrap().len(), 6);
-    let map = ["study", "map", "scene.toml", "--samples", "30,100", "--test-frames", "50"];
-    let map = checked(&[&map[..], &["--centres", "4,8", "-o", "map.svg"]].concat());
-    assert_eq!(map["maps"].as_array().unwrap().len(), 4);
-    let picture = std::fs::read_to_string(folder.path("map.svg")).unwrap();
-    assert!(picture.starts_with("<svg") && picture.contains("N = 100"));
 }
 
 #[test]
@@ -129,8 +105,6 @@ fn recursions_are_told_by_the_schema() {
     let rls = ["train", "scene.toml", "--solver", "rls", "-o", "r.bin"];
     let trained = checked(&folder, schema, &rls);
     assert_eq!(trained["learning_curve"]["points"][0]["frames"], 10);
-    let study = ["study", "recursion", "--centres", "3", "-n", "100"];
-    assert_eq!(checked(&folder, schema, &study)["row_wire"], 4);
 }
 
 #[test]
@@ -138,14 +112,11 @@ fn runs_are_told_by_the_schema() {
     let schema = &schema();
     let folder = prepared("json_runs", schema);
     checked(&folder, schema, &["run", "data.csv", "--no-refine"]);
-    let scene = small_scene().replace("frames = 3000", "frames = 600");
-    folder.write("table1.toml", scene.replace("frames = 1500", "frames = 300"));
+    folder.write("table1.toml", small_scene_with_table1().replace("frames = 1500", "frames = 300"));
     let run = checked(&folder, schema, &["run", "table1.toml"]);
     check_file(&folder, schema, "out/small/metrics.json");
     let table1 = checked(&folder, schema, &["table1", "table1.toml"]);
     assert_eq!(run["table1"]["columns"], table1["columns"]);
-    let search = ["table1", "--reconstruct", "--setups", "2", "--saved", "search.json"];
-    checked(&folder, schema, &search);
 }
 
 /// What a command would print of `result`.
@@ -226,12 +197,9 @@ fn the_schema_and_its_page_know_every_command_and_key() {
         let names = commands.filter(|line| line.starts_with("  ") && !line.starts_with("   "));
         names.map(first).filter(|name| name != "help").collect()
     };
-    let groups = ["link", "study"];
-    let of_groups = groups.iter().flat_map(|group| {
-        listed(&[group, "--help"]).into_iter().map(move |name| format!("{group} {name}"))
-    });
-    let others = listed(&["--help"]).into_iter().filter(|name| !groups.contains(&name.as_str()));
-    assert_eq!(others.chain(of_groups).collect::<BTreeSet<_>>(), known);
+    let of_link = listed(&["link", "--help"]).into_iter().map(|name| format!("link {name}"));
+    let others = listed(&["--help"]).into_iter().filter(|name| name != "link");
+    assert_eq!(others.chain(of_link).collect::<BTreeSet<_>>(), known);
     for document in schema.documents() {
         for key in document["properties"].as_object().unwrap().keys() {
             assert!(page.contains(&format!("`{key}`")), "docs/json.md says nothing of `{key}`");

@@ -48,21 +48,18 @@ fn the_command_prints_the_same_bytes_on_any_number_of_threads_and_writes_its_fil
 }
 
 #[test]
-fn what_cannot_be_computed_is_refused() {
+fn what_cannot_be_computed_fails() {
     let folder = Folder::new("limit-refused");
     folder.write("drift.toml", format!("{}\n[drift]\ngain = 0.02\n", small_scene()));
-    let cases: [(&[&str], i32, &str); 5] = [
-        (&["limit", "drift.toml", "-n", "5"], 1, "a drift of the gain is not modelled"),
-        (&["limit", "press", "--row", "9"], 2, "--row 9: the scene has rows 1 to 8"),
-        (&["limit", "press", "--noise", "0"], 2, "--noise 0: without noise"),
-        (&["limit", "press", "-n", "1"], 2, "--frames 1: give at least 2"),
+    let cases: [(&[&str], &str); 2] = [
+        (&["limit", "drift.toml", "-n", "5"], "a drift of the gain is not modelled"),
         // So little noise that no sample reaches the posterior.
-        (&["limit", "press", "--row", "4", "--noise", "1e-7", "-n", "4"], 1, "does not carry"),
+        (&["limit", "press", "--row", "4", "--noise", "1e-7", "-n", "4"], "does not carry"),
     ];
-    for (arguments, status, message) in cases {
+    for (arguments, message) in cases {
         let output = folder.run(arguments);
         let error = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(status), "{arguments:?}: {error}");
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {error}");
         assert!(error.contains(message), "{arguments:?}: {error}");
     }
 }
@@ -92,11 +89,6 @@ fn models_are_judged_on_the_frames_of_the_limit() {
     assert!(page.contains(" ×   m.bin") && page.contains(" ×   relative.bin"), "{page}");
     let page = std::fs::read_to_string(folder.path("out/limit.html")).unwrap();
     assert!(page.contains("model m.bin") && page.contains("model relative.bin"));
-
-    let output = folder.run(&["limit", "press", "-n", "2", "--model", "m.bin"]);
-    let error = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{error}");
-    assert!(error.contains("m.bin") && error.contains("other readings than the scene"), "{error}");
 }
 
 #[test]

@@ -107,12 +107,6 @@ fn selection_prints_penalties_and_names_the_edge() {
     assert!(notes.contains("the best centres, 8, is the largest that was tried"), "{notes}");
     let (_, notes) = select(&["--centres", "8", "--spread", "0.5", "--penalty", "1e-7"]);
     assert!(!notes.contains("that was tried"), "{notes}");
-    let refused = folder.run(&["train", "press", "--fold-blocks", "3", "-o", "m.bin"]);
-    assert_eq!(refused.status.code(), Some(2));
-    assert!(
-        String::from_utf8_lossy(&refused.stderr)
-            .contains("--fold-blocks picks lines of a CSV file")
-    );
 }
 
 #[test]

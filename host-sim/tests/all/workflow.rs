@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 
-use crate::common::{Folder, small_scene, untimed};
+use crate::common::{Folder, small_scene, small_scene_with_table1, untimed};
+use crate::json_schema;
 
 fn json(text: &str) -> serde_json::Value {
     serde_json::from_str(text).unwrap()
@@ -12,9 +13,9 @@ fn json(text: &str) -> serde_json::Value {
 fn a_csv_file_trains_decodes_and_evaluates() {
     let folder = Folder::new("csv-workflow");
     folder.write("scene.toml", small_scene());
-    folder.succeed(&["synth", "scene.toml", "-n", "3000", "-o", "train.csv"]);
+    folder.succeed(&["synth", "scene.toml", "-n", "1500", "-o", "train.csv"]);
     folder.succeed(&["synth", "scene.toml", "-n", "500", "--seed", "2", "-o", "test.csv"]);
-    folder.succeed(&["train", "train.csv", "--centres", "24", "-o", "m.bin"]);
+    folder.succeed(&["train", "train.csv", "--centres", "12", "-o", "m.bin"]);
     folder.succeed(&["decode", "m.bin", "test.csv", "-o", "estimate.csv"]);
 
     let estimate = std::fs::read_to_string(folder.path("estimate.csv")).unwrap();
@@ -23,7 +24,7 @@ fn a_csv_file_trains_decodes_and_evaluates() {
 
     let inspected = json(&folder.succeed(&["inspect", "m.bin", "--json"]));
     assert_eq!(inspected["rows"], 2); // the names tell the row-wires: a network each
-    assert_eq!(inspected["networks"][1]["centres"], 24);
+    assert_eq!(inspected["networks"][1]["centres"], 12);
     assert_eq!(inspected["outputs"][0]["unit"], "mm");
 
     let command = ["eval", "m.bin", "test.csv", "--html", "page.html"];
@@ -71,6 +72,7 @@ fn columns_with_any_names_train_one_network() {
         "0.3,0.6",
         "--penalty",
         "1e-7",
+        "--no-refine",
         "-o",
         "m.bin",
         "--json",
@@ -153,16 +155,6 @@ fn a_network_of_few_components_takes_less_flash_and_says_so() {
     }
     let decoded = |model: &str| std::fs::read(folder.path(model)).unwrap();
     assert_eq!(decoded("few.csv"), decoded("scene.csv"));
-
-    let refused = |arguments: &[&str], named: &str| {
-        let output = folder.run(arguments);
-        let said = String::from_utf8(output.stderr).unwrap();
-        assert!(output.status.code() == Some(2) && said.contains(named), "{said}");
-    };
-    for (rank, named) in [("0", "1 to 35"), ("36", "1 to 35")] {
-        refused(&[&train[..], &["--output-rank", rank, "-o", "x.bin"]].concat(), named);
-    }
-    refused(&["train", "scene.toml", "--output-rank", "5", "-o", "x.bin"], "whole array");
 }
 
 #[test]
@@ -248,12 +240,16 @@ fn forward_follows_the_equations() {
 #[test]
 fn same_seed_same_bytes_on_one_thread_and_on_two() {
     let folder = Folder::new("determinism");
-    folder.write("scene.toml", small_scene().replace("kind = \"relative\"", "kind = \"span\""));
+    folder.write(
+        "scene.toml",
+        small_scene_with_table1()
+            .replace("kind = \"relative\"", "kind = \"span\"")
+            .replace("frames = 1500", "frames = 400"),
+    );
     let all = |threads: usize| -> Vec<Vec<u8>> {
         let name = |what: &str| format!("{what}.{threads}");
-        let (csv, scene_blob, csv_blob, table, out) =
-            (name("d"), name("s"), name("m"), name("t"), name("out"));
-        let runs: [&[&str]; 5] = [
+        let (csv, scene_blob, csv_blob, out) = (name("d"), name("s"), name("m"), name("out"));
+        let runs: [&[&str]; 4] = [
             &["synth", "scene.toml", "-n", "3000", "-o", &csv],
             &["train", "scene.toml", "-o", &scene_blob],
             &[
@@ -268,7 +264,6 @@ fn same_seed_same_bytes_on_one_thread_and_on_two() {
                 "-o",
                 &csv_blob,
             ],
-            &["table1", "scene.toml", "-o", &table],
             &["run", "scene.toml", "-o", &out],
         ];
         for arguments in runs {
@@ -278,7 +273,7 @@ fn same_seed_same_bytes_on_one_thread_and_on_two() {
         let small = folder.path(&out).join("small");
         let mut written: Vec<_> = std::fs::read_dir(&small).unwrap().map(|e| e.unwrap()).collect();
         written.sort_by_key(std::fs::DirEntry::file_name);
-        let files = [csv, scene_blob, csv_blob, table].into_iter().map(|f| folder.path(&f));
+        let files = [csv, scene_blob, csv_blob].into_iter().map(|f| folder.path(&f));
         files
             .chain(written.iter().map(std::fs::DirEntry::path))
             .map(|f| std::fs::read(f).unwrap())
@@ -296,7 +291,7 @@ fn same_seed_same_bytes_on_one_thread_and_on_two() {
 #[test]
 fn run_writes_a_whole_folder_and_its_blob_is_the_one_that_train_writes() {
     let folder = Folder::new("run");
-    folder.write("scene.toml", small_scene());
+    folder.write("scene.toml", small_scene_with_table1());
     let printed = json(&untimed(&folder.succeed(&["run", "scene.toml", "--json"])));
     folder.succeed(&["train", "scene.toml", "-o", "m.bin"]);
     let out = folder.path("out/small");
@@ -307,8 +302,8 @@ fn run_writes_a_whole_folder_and_its_blob_is_the_one_that_train_writes() {
     let metrics = json(&std::fs::read_to_string(out.join("metrics.json")).unwrap());
     assert_eq!(metrics, printed);
     let table = std::fs::read_to_string(out.join("table1.csv")).unwrap();
-    // 4 noise levels × (2 baselines + 10 spreads × 2 networks) × 3 axes × 7 definitions, and the paper's cells.
-    assert_eq!(table.lines().count(), 1 + 4 * (2 + 20) * 3 * 7 + 40);
+    // (2 baselines + 10 spreads × 2 networks) × 3 axes × 7 definitions.
+    assert_eq!(table.lines().count(), 1 + (2 + 20) * 3 * 7);
     let page = std::fs::read_to_string(out.join("report.html")).unwrap();
     assert!(page.contains("<code>host-sim run scene.toml --seed ") && page.contains("table1.csv"));
     let before = folder.names();
@@ -320,8 +315,8 @@ fn run_writes_a_whole_folder_and_its_blob_is_the_one_that_train_writes() {
 fn every_command_has_help_with_an_example() {
     let folder = Folder::new("help");
     for command in [
-        "run", "synth", "forward", "train", "decode", "eval", "inspect", "table1", "readout",
-        "emulate", "link",
+        "run", "synth", "forward", "train", "decode", "eval", "inspect", "table1", "emulate",
+        "link",
     ] {
         let help = folder.succeed(&[command, "--help"]);
         assert!(help.contains(&format!("host-sim {command} ")), "{help}");
@@ -332,7 +327,7 @@ fn every_command_has_help_with_an_example() {
 #[test]
 fn table1_shows_the_papers_cells_beside_its_own() {
     let folder = Folder::new("printed");
-    let scene = small_scene();
+    let scene = small_scene_with_table1();
     let settings = "spreads = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]\n\
                     noise_levels = [0.005, 0.01, 0.05, 0.1]";
     let (world, _) = scene.split_once("[table1]").unwrap();
@@ -369,10 +364,12 @@ fn table1_shows_the_papers_cells_beside_its_own() {
 #[test]
 fn a_search_for_the_papers_set_up_goes_on_from_where_it_was_ended() {
     let folder = Folder::new("reconstruct");
-    let search = ["table1", "--reconstruct", "--setups", "2", "--saved", "s.json"];
-    let first = folder.succeed(&search);
-    assert!(first.contains("nearest 1") && first.contains("a constant"), "{first}");
-    assert_eq!(folder.succeed(&search), first);
+    let search = ["table1", "--reconstruct", "--setups", "1", "--saved", "s.json"];
+    json_schema::checked(&folder, &json_schema::schema(), &search);
+    let saved = std::fs::read(folder.path("s.json")).unwrap();
+    let page = folder.succeed(&search);
+    assert!(page.contains("nearest 1") && page.contains("a constant"), "{page}");
+    assert!(std::fs::read(folder.path("s.json")).unwrap() == saved);
     let refused = folder.fail(&[&search[..], &["--seed", "2"]].concat(), 2);
     assert!(refused.contains("s.json") && refused.contains("--seed 1"), "{refused}");
     folder.write("s.json", "{}");
@@ -418,7 +415,7 @@ fn inspect_says_what_image_a_model_needs() {
     ] {
         folder.write("data.csv", csv(readings));
         let train = ["train", "data.csv", "--inputs", "ch*", "--outputs", "f_n", "--centres", "8"];
-        folder.succeed(&[&train[..], &["-o", "m.bin"]].concat());
+        folder.succeed(&[&train[..], &["--no-refine", "-o", "m.bin"]].concat());
         let printed = folder.succeed(&["inspect", "m.bin"]);
         assert!(printed.contains("gated, at rest") && printed.contains("from flash"), "{printed}");
         match says {

@@ -36,13 +36,11 @@ pub struct AlignedBytes {
 #[cfg(feature = "std")]
 impl AlignedBytes {
     /// A buffer of `length` bytes, all 0.
-    #[must_use]
     pub fn zeroed(length: usize) -> Self {
         Self { words: std::vec![0; length.div_ceil(4)], length }
     }
 
     /// A copy of `bytes`, which may lie anywhere.
-    #[must_use]
     pub fn copy_of(bytes: &[u8]) -> Self {
         let mut copy = Self::zeroed(bytes.len());
         copy.copy_from_slice(bytes);

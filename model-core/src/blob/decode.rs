@@ -120,7 +120,6 @@ impl<'a> Model<'a> {
     /// Length in bytes that the blob at the start of `slot` declares; the slot may be larger.
     ///
     /// `None` if `slot` does not start with a blob of this version. Nothing else is checked.
-    #[must_use]
     pub fn declared_length(slot: &[u8]) -> Option<usize> {
         let prefix = checked_prefix(slot).ok()?;
         Some(u32::from_le_bytes(prefix.length) as usize)
@@ -130,7 +129,6 @@ impl<'a> Model<'a> {
     /// enough.
     ///
     /// `None` if `head` is no start of a blob of this version, or too short. Nothing else is checked.
-    #[must_use]
     pub fn declared(head: &[u8]) -> Option<(usize, ModelShape)> {
         let length = Self::declared_length(head)?;
         let fields = take::<(u8, u16, u16)>(head.get(PREFIX_BYTES..)?, "shape");
@@ -144,25 +142,21 @@ impl<'a> Model<'a> {
     pub const HEAD_BYTES: usize = PREFIX_BYTES + 1 + 3 + 3;
 
     /// The model's number of rows, and of inputs and outputs a row.
-    #[must_use]
     pub fn shape(&self) -> ModelShape {
         self.shape
     }
 
     /// The blob's CRC-32: a short fingerprint of the whole model.
-    #[must_use]
     pub fn crc(&self) -> u32 {
         self.crc
     }
 
     /// Metadata of the model: names, units, and how it was trained.
-    #[must_use]
     pub fn metadata(&self) -> &Metadata<'a> {
         &self.metadata
     }
 
     /// Number of networks in the blob; rows may share them.
-    #[must_use]
     pub fn network_count(&self) -> usize {
         self.networks.into()
     }
@@ -170,27 +164,23 @@ impl<'a> Model<'a> {
     /// The projection from a whole frame to the network's inputs; `None` if each row's readings are its network's
     /// inputs. Behind a projection there is one network, and its outputs are those of all rows, or are
     /// [expanded](Self::expansion) to these.
-    #[must_use]
     pub fn projection(&self) -> Option<Projection<'a>> {
         self.projection
     }
 
     /// The expansion of the one network's outputs to those of all rows; `None` if a network's outputs are those of its
     /// rows. It stands behind a projection alone.
-    #[must_use]
     pub fn expansion(&self) -> Option<Expansion<'a>> {
         let outputs = self.shape.rows.wrapping_mul(self.shape.outputs);
         self.expansion.map(|block| Expansion::of_checked(self.components(), outputs, block))
     }
 
     /// Number of components that are [expanded](Self::expansion) to the outputs; 0 without an expansion.
-    #[must_use]
     pub fn components(&self) -> usize {
         self.components.into()
     }
 
     /// The model's confidence in its outputs; `None` if it has none.
-    #[must_use]
     pub fn confidence(&self) -> Option<Confidence<'a>> {
         let ModelShape { rows, inputs, outputs } = self.shape;
         let [directions, components] = self.confidence_sizes.map(usize::from);
@@ -200,7 +190,6 @@ impl<'a> Model<'a> {
     }
 
     /// What fills missing readings from the others; `None` if a missing reading stays missing.
-    #[must_use]
     pub fn fill(&self) -> Option<Fill<'a>> {
         self.cut_fill().0
     }
@@ -244,7 +233,6 @@ impl<'a> Model<'a> {
     }
 
     /// Index of the network that serves `row` (from 0), or `None` for a row outside the sensor.
-    #[must_use]
     pub fn network_of_row(&self, row: usize) -> Option<usize> {
         self.row_network.get(row).copied().map(usize::from)
     }

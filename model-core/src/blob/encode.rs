@@ -39,7 +39,6 @@ pub struct ModelParts<'a> {
 }
 
 /// Bytes that a buffer needs at most to hold the blob of `parts`.
-#[must_use]
 pub fn encoded_length_bound(parts: &ModelParts<'_>) -> usize {
     // Fixed fields, and the longest varint of every field that is one.
     const FIXED_FIELDS: usize = 128;

@@ -33,7 +33,6 @@ impl<'a> Columns<'a> {
     /// assert_eq!(names.position("r1e1_dz_mm"), Some(2));
     /// assert_eq!(names.position("r1e1"), None);
     /// ```
-    #[must_use]
     pub fn position(self, name: &str) -> Option<usize> {
         self.iter().position(|column| column == name)
     }
@@ -45,7 +44,6 @@ pub struct Floats<'a>(#[serde(borrow)] pub &'a [u8]);
 
 impl<'a> Floats<'a> {
     /// The bytes of `numbers`, where they lie.
-    #[must_use]
     pub fn of(numbers: &'a [f32]) -> Self {
         Self(bytemuck::cast_slice(numbers))
     }
@@ -134,7 +132,6 @@ impl Metadata<'static> {
     /// assert_eq!(metadata.input_names.0, "x\nx\nx\nx");
     /// assert_eq!(metadata.output_units.iter().count(), 2);
     /// ```
-    #[must_use]
     pub fn unnamed(shape: ModelShape) -> Self {
         let columns = |bytes: &'static [u8], length: usize| {
             Columns(core::str::from_utf8(&bytes[..length.saturating_sub(1)]).unwrap_or_default())

@@ -120,19 +120,16 @@ impl<'a> Network<'a> {
     }
 
     /// The network's numbers of inputs, centres and outputs.
-    #[must_use]
     pub fn shape(&self) -> Shape {
         self.shape
     }
 
     /// The network's parameters.
-    #[must_use]
     pub fn parameters(&self) -> &Parameters<'a> {
         &self.parameters
     }
 
     /// Number of words in the block of a network of this shape, with one width for all centres or one for each.
-    #[must_use]
     pub fn block_words(shape: Shape, common_width: bool, affine: bool) -> usize {
         let Shape { inputs, centres, outputs } = shape;
         let decay = if common_width { 1 } else { centres };

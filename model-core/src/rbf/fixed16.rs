@@ -250,7 +250,6 @@ impl<'a> Network<'a> {
 
 /// Number of words that a group of sixteen centres takes in [`Parameters::centres`].
 #[inline]
-#[must_use]
 pub fn words_at_once(shape: Shape) -> usize {
     CENTRES_AT_ONCE
         .saturating_mul(1 + shape.inputs.div_ceil(2))
@@ -283,7 +282,6 @@ fn add_products(sum: i32, pairs: &[u32], values: &[i32]) -> i32 {
 /// Up to 63 inputs it is 4. What the bits are worth in an exponent stays below 5 units, less than
 /// [`EXPONENT_MARGIN`]: with more inputs, exponents below 64 allow only a smaller decay.
 #[inline]
-#[must_use]
 pub fn square_shift(inputs: usize) -> u32 {
     inputs.checked_ilog2().unwrap_or(0).saturating_sub(1).max(4)
 }

@@ -49,19 +49,16 @@ impl Format {
     }
 
     /// The format's name, as users choose it.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         self.declaration().name
     }
 
     /// The tag of a network's section in a blob (`docs/blob.md`).
-    #[must_use]
     pub const fn tag(self) -> u8 {
         self.declaration().tag
     }
 
     /// Description of the format in one line.
-    #[must_use]
     pub const fn description(self) -> &'static str {
         self.declaration().description
     }
@@ -73,13 +70,11 @@ impl Format {
     /// assert_eq!(Format::from_name("fixed16"), Some(Format::Fixed16));
     /// assert_eq!(Format::from_name("f64"), None);
     /// ```
-    #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|format| format.name() == name)
     }
 
     /// The format whose [tag](Self::tag) is `tag`, if there is one.
-    #[must_use]
     pub fn from_tag(tag: u8) -> Option<Self> {
         Self::ALL.into_iter().find(|format| format.tag() == tag)
     }

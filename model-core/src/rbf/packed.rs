@@ -111,27 +111,23 @@ impl<'a, L: Layout> Network<'a, L> {
     }
 
     /// Number of words in the block of a network of this shape, with an affine tail or without.
-    #[must_use]
     #[inline]
     pub fn block_words(shape: Shape, affine: bool) -> usize {
         L::block_words(shape, affine)
     }
 
     /// The network's numbers of inputs, centres and outputs.
-    #[must_use]
     pub fn shape(&self) -> Shape {
         let Block { inputs, centres, outputs, .. } = self.block;
         Shape { inputs, centres, outputs }
     }
 
     /// Whether the network has an affine tail.
-    #[must_use]
     pub fn has_affine_tail(&self) -> bool {
         self.block.affine()
     }
 
     /// All words of the network.
-    #[must_use]
     pub fn block(&self) -> &'a [u32] {
         self.block.words
     }
@@ -145,13 +141,11 @@ impl<'a, L: Layout> Network<'a, L> {
     }
 
     /// The network's parameters, cut from its block.
-    #[must_use]
     pub fn parameters(&self) -> L::Parameters<'a> {
         L::parameters(self)
     }
 
     /// Width σ of all centres on inputs scaled to [0, 1].
-    #[must_use]
     pub fn width(&self) -> f32 {
         L::width(&self.parameters())
     }

@@ -9,7 +9,6 @@ use taxel_simulate::{World, synthesise};
 ///
 /// # Panics
 /// If there is no scene of that name.
-#[must_use]
 pub fn world(name: &str) -> World {
     match name {
         "paper" => World::paper(),
@@ -19,7 +18,6 @@ pub fn world(name: &str) -> World {
 }
 
 /// Synthesises `frames` noisy training frames of a built-in scene, in Ω and mm.
-#[must_use]
 pub fn frames_of(scene_name: &str, frames: usize) -> Dataset {
     synthesise(&world(scene_name), Stream::Training, frames)
 }
@@ -28,7 +26,6 @@ pub fn frames_of(scene_name: &str, frames: usize) -> Dataset {
 ///
 /// # Panics
 /// If the folder for temporary files cannot be written to.
-#[must_use]
 pub fn csv_of(scene_name: &str, frames: usize) -> Vec<u8> {
     let path = std::env::temp_dir().join(format!("taxel-bench-{}.csv", std::process::id()));
     let dataset = frames_of(scene_name, frames);

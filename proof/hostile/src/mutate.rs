@@ -27,7 +27,6 @@ const WORDS: [u32; 20] = [
 ];
 
 /// A mutant of `bytes` that depends on `seed` alone; parts of `other` may be spliced in. It has at most `most` bytes.
-#[must_use]
 pub fn mutate(bytes: &[u8], other: &[u8], seed: u64, most: usize) -> Vec<u8> {
     let mut draws = Draws::new(seed);
     let mut mutant = bytes.to_vec();

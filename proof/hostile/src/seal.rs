@@ -8,7 +8,6 @@ use model_core::checksum::CRC_32;
 pub const PREFIX_BYTES: usize = 9;
 
 /// A blob with this `body`, and the prefix and CRC that belong to it.
-#[must_use]
 pub fn blob(body: &[u8]) -> AlignedBytes {
     let length = PREFIX_BYTES + body.len() + 4;
     let mut bytes = Vec::with_capacity(length);
@@ -21,13 +20,11 @@ pub fn blob(body: &[u8]) -> AlignedBytes {
 }
 
 /// The body of a blob.
-#[must_use]
 pub fn body(blob: &[u8]) -> &[u8] {
     &blob[PREFIX_BYTES..blob.len() - 4]
 }
 
 /// A packet with these bytes before its CRC.
-#[must_use]
 pub fn packet(covered: &[u8]) -> Vec<u8> {
     let crc = CRC_32.checksum(covered).to_le_bytes();
     [covered, &crc].concat()

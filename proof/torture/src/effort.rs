@@ -27,25 +27,21 @@ struct Worst {
 
 impl Effort {
     /// Effort from `seed` on, for `time` from now.
-    #[must_use]
     pub fn new(seed: u64, time: Duration, planted: bool) -> Self {
         Self { seed, end: Instant::now() + time, planted }
     }
 
     /// Seed of the first case.
-    #[must_use]
     pub fn seed(&self) -> u64 {
         self.seed
     }
 
     /// Whether the test must plant a fault, and find it.
-    #[must_use]
     pub fn is_planted(&self) -> bool {
         self.planted
     }
 
     /// Whether the time for further cases is over.
-    #[must_use]
     pub fn is_over(&self) -> bool {
         Instant::now() >= self.end
     }

@@ -3,7 +3,6 @@
 /// What a test found.
 #[derive(Debug, Clone)]
 pub struct Found {
-    /// Number of cases tested.
     pub cases: u64,
     /// The worst of them, in `unit`. Infinite for a case that failed outright.
     pub worst: f64,
@@ -19,7 +18,6 @@ pub struct Found {
 
 impl Found {
     /// Whether the promise was kept. NaN keeps none.
-    #[must_use]
     pub fn keeps(&self) -> bool {
         self.cases > 0 && self.worst <= self.bound
     }

@@ -6,11 +6,9 @@ mod effort;
 mod tally;
 mod tools;
 mod scratch;
-mod jobs;
 
 mod promise;
 mod promises;
-mod pictures;
 
 mod table;
 
@@ -54,9 +52,6 @@ struct Arguments {
     /// List the promises
     #[arg(long)]
     list: bool,
-    /// Draw pictures of numbers at the extremes into a folder, instead of testing
-    #[arg(long, value_name = "FOLDER")]
-    pictures: Option<PathBuf>,
     /// Program of host-sim
     #[arg(long, value_name = "FILE", hide = true)]
     program: Option<PathBuf>,
@@ -88,10 +83,6 @@ fn run(arguments: &Arguments) -> Result<bool, Box<dyn Error>> {
         return Ok(true);
     }
     let tools = Tools { program: arguments.program.clone(), images: arguments.images.clone() };
-    if let Some(folder) = &arguments.pictures {
-        pictures::write(folder, &tools)?;
-        return Ok(true);
-    }
     let shares: f64 = chosen.iter().map(|promise| f64::from(promise.share)).sum::<f64>().max(1.0);
     let given_s =
         if arguments.short || arguments.self_test { 0.0 } else { arguments.minutes * 60.0 };

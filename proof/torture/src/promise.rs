@@ -11,14 +11,10 @@ use crate::tools::Tools;
 pub struct Promise {
     /// Name in the table and on the command line.
     pub name: &'static str,
-    /// What is promised.
     pub text: &'static str,
     /// Share of the time for tests of more than the least number of cases. 0 for a test that is always whole.
     pub share: u16,
     /// Tests the promise. With a planted fault it must be found broken.
-    ///
-    /// # Errors
-    /// The test could not be run.
     pub check: fn(&Effort, &Tools) -> Result<Found, String>,
 }
 
@@ -32,7 +28,6 @@ pub struct Tested {
 
 impl Tested {
     /// Whether the promise was kept; or, in a self-test, whether the planted fault was found.
-    #[must_use]
     pub fn is_as_it_should_be(&self, self_test: bool) -> bool {
         self.outcome.as_ref().is_ok_and(|found| found.keeps() != self_test)
     }

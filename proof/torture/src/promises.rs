@@ -6,9 +6,9 @@
 mod exponentials;
 mod inference;
 mod training;
-pub mod scale;
+mod scale;
 mod least_squares;
-pub mod rls;
+mod rls;
 mod forward;
 
 mod sensor;

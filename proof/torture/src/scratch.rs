@@ -15,24 +15,17 @@ pub struct Folder(Scratch);
 
 impl Folder {
     /// Makes a folder.
-    ///
-    /// # Errors
-    /// Error of the system, in words.
     pub fn new() -> Result<Self, String> {
         Scratch::new().map(Self).map_err(|cause| format!("no temporary folder: {cause}"))
     }
 
     /// Path of the folder.
-    #[must_use]
     pub fn path(&self) -> &Path {
         self.0.path()
     }
 }
 
 /// Everything in a folder; a folder in it is named with a slash at the end.
-///
-/// # Errors
-/// Error of the system, in words.
 pub fn files_of(folder: &Path) -> Result<Files, String> {
     let told = |cause| format!("{}: {cause}", folder.display());
     let mut files = Files::new();

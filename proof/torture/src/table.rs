@@ -16,7 +16,6 @@ pub const WIDTHS: [usize; 2] = [54, 18];
 
 /// The table in at most 120 columns, notes, a line that sums it up, and for each promise that is not as it should be the
 /// command that repeats its worst case. `options` are those of this run that decide what a case does.
-#[must_use]
 pub fn text(entries: &[Tested], self_test: bool, options: &str) -> String {
     let mut table = row(&HEAD.map(str::to_owned));
     for entry in entries {
@@ -72,9 +71,6 @@ fn short(number: f64) -> String {
 }
 
 /// The table as JSON.
-///
-/// # Errors
-/// None that can be met: numbers and texts can be written.
 pub fn json(entries: &[Tested], self_test: bool) -> serde_json::Result<String> {
     let lines: Vec<Value> = entries.iter().map(|entry| line(entry, self_test)).collect();
     serde_json::to_string_pretty(&lines)

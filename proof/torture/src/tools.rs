@@ -15,17 +15,11 @@ pub struct Tools {
 
 impl Tools {
     /// The program of host-sim.
-    ///
-    /// # Errors
-    /// It was not given.
     pub fn program(&self) -> Result<&Path, String> {
         self.program.as_deref().ok_or_else(|| missing("host-sim"))
     }
 
     /// The emulator's image of this name.
-    ///
-    /// # Errors
-    /// The folder of images was not given.
     pub fn image(&self, name: &str) -> Result<PathBuf, String> {
         let images = self.images.as_ref().ok_or_else(|| missing(name))?;
         Ok(images.join(name))
@@ -33,9 +27,6 @@ impl Tools {
 }
 
 /// The model `name` in the folder `testdata`.
-///
-/// # Errors
-/// It cannot be read.
 pub fn tested_model(name: &str) -> Result<AlignedBytes, String> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata").join(name);
     let blob = std::fs::read(&path).map_err(|cause| format!("{}: {cause}", path.display()))?;

@@ -50,9 +50,6 @@ impl Copy {
     }
 
     /// Builds the image of `mutant`, and returns its path.
-    ///
-    /// # Errors
-    /// It does not build.
     pub fn build_mutant(&self, toolchain: &Toolchain, mutant: &Mutant) -> Outcome<PathBuf> {
         let file = self.folder.join(mutant.file);
         let sound = read(&file)?;
@@ -68,9 +65,6 @@ impl Copy {
     }
 
     /// Builds the image with room for [`WIDE`], as [`image`].
-    ///
-    /// # Errors
-    /// It does not build.
     pub fn build_wide(&self, toolchain: &Toolchain) -> Outcome {
         run(self.command(toolchain).env("TAXEL_CAPACITY", WIDE))
     }

@@ -29,9 +29,6 @@ pub struct Emulator {
 
 impl Emulator {
     /// Finds Python and its packages, builds host-sim, and trains the model.
-    ///
-    /// # Errors
-    /// Something is missing; the message says how to get it.
     pub fn prepare(options: &Options<'_>) -> Outcome<Self> {
         let python = python()?;
         let folder = folder();

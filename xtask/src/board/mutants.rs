@@ -25,9 +25,6 @@ pub struct Mutant {
 
 impl Mutant {
     /// `text` of the file with the fault.
-    ///
-    /// # Errors
-    /// The text that is to be changed is not there, or is there more than once.
     pub fn apply(&self, text: &str) -> Outcome<String> {
         let (Instead(sound, _) | Before(sound, _)) = self.fault;
         let count = text.matches(sound).count();

@@ -15,9 +15,6 @@ pub struct Options<'a> {
 
 impl<'a> Options<'a> {
     /// Parses the options of the command line.
-    ///
-    /// # Errors
-    /// The option that is unknown, or that lacks its value.
     pub fn parse(arguments: &[&'a str]) -> Result<Self, String> {
         let mut options = Self::default();
         let mut arguments = arguments.iter().copied();

@@ -1,114 +1,193 @@
-//! Designs of models to be measured: many for the prices of code, and others to check these.
+//! Blobs of random designs, with numbers that make no difference to their cost.
 
-use model_core::blob::ModelShape;
-use model_core::rbf::Format;
+use std::ops::RangeInclusive;
+
+use model_core::blob::{Metadata, ModelParts, ModelShape, encode_to_vec};
+use model_core::expansion::Expansion;
+use model_core::projection::Projection;
+use model_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
+use model_core::scale::UNITS;
 use taxel_data::random::{Purpose, Random, Stream};
-use taxel_learn::cost::Design;
+use taxel_learn::cost::{Design, NetworkDesign};
 
-/// Most bytes of parameters: the image's slot holds 131,072, with names and headers, and a second network of half as
-/// many centres.
+use crate::process::Outcome;
+
+/// Most bytes of parameters: the image's slot holds 131,072, with names and headers.
 const MOST_BYTES: usize = 80_000;
 
 /// Most readings, and most outputs, of a frame that the image has room for.
 const MOST_OF_FRAME: usize = 2000;
 
-/// Ranges of a design's sizes, each with its weight.
-type Ranges<'r> = &'r [(usize, [usize; 2])];
+/// Middle of every input's training range.
+const MIDDLE: f32 = 60.0;
 
-/// Numbers of designs by format: enough for every piece of its code.
-const FOR_PRICES: [(Format, usize); 3] =
-    [(Format::F32, 360), (Format::Fixed16, 260), (Format::F32Direct, 180)];
+/// Sizes of a design: each is drawn from one of these ranges.
+type Ranges = &'static [RangeInclusive<usize>];
 
-/// Number of designs that check the prices.
-const TO_CHECK: usize = 40;
+/// Ranges of rows, inputs, outputs and centres.
+pub type Sizes = [Ranges; 4];
 
-/// Designs that bring out every branch of the code: sizes at which it changes are frequent.
-pub fn for_prices() -> Vec<Design> {
-    const ROWS: Ranges<'_> = &[(2, [1, 1]), (2, [2, 8])];
-    const INPUTS: Ranges<'_> =
-        &[(5, [1, 17]), (3, [18, 18]), (4, [19, 40]), (1, [60, 70]), (1, [100, 150])];
-    const OUTPUTS: Ranges<'_> =
-        &[(5, [1, 6]), (3, [7, 17]), (3, [18, 18]), (3, [19, 40]), (1, [41, 72])];
-    const CENTRES: Ranges<'_> = &[(6, [1, 48]), (2, [120, 140]), (2, [250, 264]), (1, [500, 530])];
-    // `f32-direct` has code of its own for 18 inputs and outputs.
-    const MOSTLY_18: Ranges<'_> = &[(2, [18, 18]), (2, [1, 20]), (1, [21, 60])];
-    let drawn = FOR_PRICES.iter().zip(0..).flat_map(|(&(format, count), part)| {
-        let [inputs, outputs] =
-            if format == Format::F32Direct { [MOSTLY_18; 2] } else { [INPUTS, OUTPUTS] };
-        let mut random = Random::new(1, Stream::Training, Purpose::Centres, 0, part);
-        let ranges = [ROWS, inputs, outputs, CENTRES];
-        (0..count).map(move |_| draw(format, ranges, &mut random))
-    });
-    // Projections to every group of features, of odd and even numbers of readings.
-    let features = (1..=24).flat_map(|inputs| [1, 2].map(|rows| (rows, inputs)));
-    let arrays = features.map(|(rows, inputs)| {
-        let shape = ModelShape { rows, inputs, outputs: 4 };
-        Design::of_array(shape, Format::Fixed16, 16, false)
-    });
-    // Expansions, to outputs that are taken in groups of every size.
-    let expanded = (1..=24).flat_map(|outputs| [1, 2, 3].map(|rows| (rows, outputs)));
-    let expansions = expanded.map(|(rows, outputs)| {
-        let shape = ModelShape { rows, inputs: 18, outputs };
-        let format = Format::ALL[rows % Format::ALL.len()];
-        Design::of_array(shape, format, 16, false).with_components(1 + outputs % 5)
-    });
-    drawn.chain(arrays).chain(expansions).collect()
+/// Designs as users have them.
+pub const USUAL: Sizes = [&[1..=16], &[1..=64], &[1..=48], &[4..=256]];
+
+/// Designs that bring out every branch of the code: sizes at which it changes are frequent. Of `f32-direct`, those of 18
+/// inputs and outputs are.
+pub const TELLING: Sizes = [
+    &[1..=1, 2..=8],
+    &[1..=17, 1..=17, 18..=18, 18..=18, 19..=40, 100..=150],
+    &[1..=6, 7..=17, 18..=18, 18..=18, 19..=72],
+    &[1..=48, 1..=48, 120..=140, 250..=264, 500..=530],
+];
+
+/// So many random designs that fit the image, of all formats in turn, whose rows share one network. `part` names those of
+/// one purpose.
+pub fn random(count: usize, sizes: Sizes, part: u64) -> Vec<Design> {
+    let mut random = Random::new(1, Stream::Test, Purpose::Centres, part, 0);
+    let mut fitting = std::iter::repeat_with(|| draw(sizes, &mut random)).flatten();
+    let formats = Format::ALL.into_iter().cycle().take(count);
+    formats
+        .filter_map(|format| fitting.find(|design| design.networks[0].format == format))
+        .collect()
 }
 
-/// Designs as users have them, of all formats in turn. In every third, rows have two networks by turns.
-pub fn to_check() -> Vec<Design> {
-    const SIZES: [Ranges<'_>; 4] =
-        [&[(1, [1, 16])], &[(1, [1, 64])], &[(1, [1, 48])], &[(1, [4, 256])]];
-    let mut random = Random::new(2, Stream::Test, Purpose::Centres, 0, 0);
-    let design = |i: usize| {
-        let mut design = draw(Format::ALL[i % Format::ALL.len()], SIZES, &mut random);
-        if i.is_multiple_of(3) && !design.projection {
-            let mut other = design.networks[0];
-            other.format = Format::ALL[(i / 3) % Format::ALL.len()];
-            other.shape.centres = other.shape.centres.div_ceil(2);
-            (other.affine_tail, other.common_width) = (!other.affine_tail, true);
-            design.networks.push(other);
-            design.row_network = (0..design.shape.rows).map(|row| row % 2).collect();
-        }
-        design.in_ram_if_it_fits()
+fn draw(sizes: Sizes, random: &mut Random) -> Option<Design> {
+    let format = Format::ALL[random.below(Format::ALL.len())];
+    let [rows, inputs, outputs, centres] = sizes.map(|ranges| {
+        let range = &ranges[random.below(ranges.len())];
+        range.start() + random.below(range.end() - range.start() + 1)
+    });
+    let [tail, array, relative, other] = [0.5, 0.3, 0.3, 0.3].map(|part| random.unit() < part);
+    let shape = ModelShape { rows, inputs, outputs };
+    let design = if array { Design::of_array } else { Design::of_rows };
+    let mut design = design(shape, format, centres, tail);
+    design.networks.truncate(1);
+    design.row_network.fill(0);
+    design.relative_inputs = relative;
+    if array && other {
+        design = design.with_components(1 + centres % (rows * outputs));
+    }
+    design.networks[0].common_width = format != Format::F32Direct || !other || centres == 1;
+    let fits = design.parameter_bytes() <= MOST_BYTES;
+    let fits = fits && rows * inputs <= MOST_OF_FRAME && rows * outputs <= MOST_OF_FRAME;
+    fits.then(|| design.in_ram_if_it_fits())
+}
+
+/// A blob of this `design`, whose rows share one network.
+///
+/// # Errors
+/// The design is beyond what a format or the blob holds.
+pub fn blob(design: &Design) -> Outcome<Vec<u8>> {
+    let failed = |cause: &dyn ToString| format!("{design:?}: {}", cause.to_string());
+    let first = design.networks.first().ok_or("no network")?;
+    let words = words(first);
+    let network = network(first, &words).map_err(|cause| failed(&cause))?;
+    let ModelShape { rows, inputs, outputs } = design.shape;
+    let (readings, outputs) = (rows * inputs, rows * outputs);
+    let features = if design.projection { design.features() } else { inputs };
+    // Feature i is reading i of the first row.
+    let mut block = vec![0.0; features * (1 + readings)];
+    (0..features).for_each(|i| block[features * (1 + i) + i] = 1.0);
+    let projection = Projection::new(readings, features, &block).map_err(|it| failed(&it))?;
+    let components = design.components.unwrap_or(1);
+    let parts_of_components = vec![0.25; outputs * (1 + components)];
+    let expansion = Expansion::new(components, outputs, &parts_of_components);
+    let parts = ModelParts {
+        projection: design.projection.then_some(projection),
+        expansion: design.components.map(|_| expansion.map_err(|it| failed(&it))).transpose()?,
+        confidence: None,
+        fill: None,
+        networks: &[network],
+        row_network: &vec![0; rows],
+        metadata: Metadata {
+            relative_inputs: design.relative_inputs,
+            ..Metadata::unnamed(design.shape)
+        },
     };
-    (0..TO_CHECK).map(design).collect()
+    encode_to_vec(&parts).map(|bytes| bytes.to_vec()).map_err(|cause| failed(&cause))
 }
 
-/// A design of this `format`, with rows, inputs, outputs and centres from `ranges`, that fits the image. Its rows share
-/// one network.
-fn draw(format: Format, ranges: [Ranges<'_>; 4], random: &mut Random) -> Design {
-    loop {
-        let [rows, inputs, outputs, centres] = ranges.map(|ranges| size(ranges, random));
-        let [tail, array, relative, widths] = [0.5, 0.3, 0.3, 0.3].map(|part| random.unit() < part);
-        let shape = ModelShape { rows, inputs, outputs };
-        let design = if array { Design::of_array } else { Design::of_rows };
-        let mut design = design(shape, format, centres, tail);
-        design.networks.truncate(1);
-        design.row_network.fill(0);
-        design.relative_inputs = relative;
-        if array && widths {
-            design = design.with_components(1 + centres % (rows * outputs));
+/// The block of a network.
+fn words(design: &NetworkDesign) -> Vec<u32> {
+    let Shape { inputs, centres, outputs } = design.shape;
+    let (middle, per_unit) = (vec![MIDDLE; inputs], vec![1e8; inputs]);
+    let bias = vec![0.5; outputs];
+    let tail = if design.affine_tail { inputs * outputs } else { 0 };
+    match design.format {
+        Format::F32Direct => {
+            // Exponentials branch by their arguments: these are spread as a trained network's are.
+            let mut random = Random::new(1, Stream::Training, Purpose::Centres, 0, 0);
+            let mut centre = |_| {
+                let spread = random.between([0.0, 3.0]);
+                (0..inputs).map(|_| (0.5 + spread * (random.unit() - 0.5)) as f32).collect()
+            };
+            let places: Vec<Vec<f32>> = (0..centres).map(&mut centre).collect();
+            let parameters = direct::Parameters {
+                input_minimum: &vec![MIDDLE - 10.0; inputs],
+                input_per_span: &vec![0.05; inputs],
+                centres: &places.concat(),
+                decay: &vec![12.0 / inputs as f32; if design.common_width { 1 } else { centres }],
+                output_weights: &vec![0.5; centres * outputs],
+                bias: &bias,
+                affine: &vec![0.25; tail],
+            };
+            parameters.words().collect()
         }
-        if format == Format::F32Direct && widths && centres > 1 {
-            design.networks[0].common_width = false;
+        Format::F32 => {
+            let stored = centres.next_multiple_of(expanded::CENTRES_AT_ONCE);
+            let parameters = expanded::Parameters {
+                input_midpoint: &middle,
+                input_per_unit: &per_unit,
+                decay: 1.0 / inputs as f32 / UNITS / UNITS,
+                bias: &bias,
+                affine: &vec![0.0; tail],
+                exponents: &vec![0.0; stored * (1 + inputs)],
+                output_weights: &vec![0.25; stored * outputs],
+            };
+            parameters.words().collect()
         }
-        let fits = design.parameter_bytes() <= MOST_BYTES;
-        if fits && rows * inputs <= MOST_OF_FRAME && rows * outputs <= MOST_OF_FRAME {
-            return design.in_ram_if_it_fits();
+        Format::Fixed16 => {
+            let mut group = vec![0; fixed16::words_at_once(design.shape)];
+            let lines = group.chunks_exact_mut(1 + inputs.div_ceil(2));
+            lines.take(fixed16::CENTRES_AT_ONCE).for_each(|line| line[0] = 1 << 26);
+            let tail = if design.affine_tail { inputs.div_ceil(2) * outputs } else { 0 };
+            let parameters = fixed16::Parameters {
+                input_midpoint: &middle,
+                input_per_unit: &per_unit,
+                decay: 1 << 20,
+                bias: &vec![1; outputs],
+                output_scale: &vec![1e-6; outputs],
+                affine: &vec![0; tail],
+                centres: &group.repeat(centres.div_ceil(fixed16::CENTRES_AT_ONCE)),
+            };
+            parameters.words().collect()
         }
     }
 }
 
-/// A size from one of `ranges`, both ends included.
-fn size(ranges: Ranges<'_>, random: &mut Random) -> usize {
-    let total: usize = ranges.iter().map(|(weight, _)| weight).sum();
-    let mut at = random.below(total);
-    for &(weight, [least, most]) in ranges {
-        if at < weight {
-            return least + random.below(most - least + 1);
+fn network<'w>(design: &NetworkDesign, words: &'w [u32]) -> Outcome<Network<'w>> {
+    let NetworkDesign { format, shape, affine_tail, common_width } = *design;
+    let network = match format {
+        Format::F32Direct => {
+            direct::Network::of_words(shape, common_width, affine_tail, words).map(Network::from)
         }
-        at -= weight;
+        Format::F32 => expanded::Network::try_new(shape, affine_tail, words).map(Network::from),
+        Format::Fixed16 => fixed16::Network::try_new(shape, affine_tail, words).map(Network::from),
+    };
+    network.map_err(|cause| cause.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use taxel_learn::ModelBlob;
+
+    use super::*;
+
+    #[test]
+    fn a_blob_has_the_design_that_was_drawn() {
+        for design in [random(30, USUAL, 1), random(30, TELLING, 2)].concat() {
+            let blob = ModelBlob::of_bytes(&blob(&design).unwrap()).unwrap();
+            let found = Design { weights_in_ram: design.weights_in_ram, ..Design::of(&blob) };
+            assert_eq!(found, design);
+        }
     }
-    1
 }

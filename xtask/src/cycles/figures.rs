@@ -1,84 +1,86 @@
-//! Measured figures, made from the counts of regions and their names in the image's log.
+//! Measured figures: made from counted regions, kept in `firmware/cycles.csv`, and held to what was accepted there and
+//! to budgets.
 
-use super::flash::WAIT_STATES;
-use super::regions::{Count, Region};
+use super::trace::{Count, Region};
 use crate::process::Outcome;
 
-/// Regions whose cost is known, in the order in which the image runs them.
-const CALIBRATION: [&str; 2] = ["calibration empty", "calibration loop"];
+/// The first line of the accepted figures.
+const HEAD: &str = "compiler,kernel,centres,affine,scope,instructions,cycles,flash_cycles";
 
 /// Cost of an empty region: the call at its end, a branch taken.
 const EMPTY: Count = Count { instructions: 1, cycles: 3, flash_cycles: 3 };
 
-/// Instructions of `mov r0, #1000`, then 1000 times `subs` and `bne`, and cycles: 1 + 1000 + 999·(1 + 2) + 1.
+/// Instructions of `mov r0, #1000`, then 1000 times `subs` and `bne`, and cycles: 1 + 1000 + 999·(1 + 2) + 1. They stand
+/// in one or two lines of flash, and how often they wait depends on where.
 const LOOP: [u64; 2] = [2001, 3999];
 
-/// Whether `count` is that of the known loop. From flash it waits at least for its first line, and how often for
-/// another depends on where it stands.
-fn is_loop(count: Count) -> bool {
-    let Count { instructions, cycles, flash_cycles } = count;
-    [instructions, cycles] == LOOP && flash_cycles >= cycles + WAIT_STATES
+/// Most per cent by which instructions, cycles, and cycles from flash may differ from those accepted for the same
+/// compiler. The model of the processor may be improved; instructions may not change.
+const SAME_COMPILER_PERCENT: [u64; 3] = [0, 1, 1];
+
+/// Most per cent by which they may exceed those accepted for another compiler, which makes other code. Less is no fault.
+/// Those from flash also depend on where code stands: moved by 2 to 14 bytes, the accepted code takes up to 13.5 % more.
+const OTHER_COMPILER_PERCENT: [u64; 3] = [u64::MAX / 2, 2, 16];
+
+/// Budgets for any compiler: kernel, K, scope, and the most cycles of a model without an affine tail.
+const BUDGETS: [(&str, u64, &str, u64); 7] = [
+    // Loops that fit 1 KiB hand exponents over in memory, which takes 30 cycles for sixteen centres.
+    ("fixed16", 16, "inference", 1250),
+    ("fixed16", 64, "inference", 4000),
+    ("fixed16", 256, "inference", 15_000),
+    ("f32", 16, "inference", 2600),
+    ("f32", 64, "inference", 9300),
+    ("f32", 256, "inference", 36_500),
+    // This is 0.2 ms at 168 MHz.
+    ("fixed16", 64, "frame", 33_600),
+];
+
+/// Budget in cycles of one power of two, and of a frame whose rows are all at rest: a tenth of that of a frame.
+const EXPONENTIAL: u64 = 32;
+const RESTING_FRAME: u64 = 3360;
+
+/// Budgets of an inference with K = 64 from flash, with weights in RAM: kernel, and per cent of its cycles at zero
+/// wait. The loops of `fixed16` fit the flash's instruction cache. In `f32`, most of the allowance is for the reading
+/// of the manual by which prefetched lines are not kept: instructions are long, and prefetching cannot keep up.
+const FROM_FLASH_PERCENT: [(&str, u64); 2] = [("fixed16", 115), ("f32", 145)];
+
+/// A region of a run.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Measured {
+    pub kernel: String,
+    pub scope: String,
+    pub region: Region,
 }
 
-/// Part of decoding whose cost a figure is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Scope {
-    /// One row's outputs from scaled inputs.
-    Inference,
-    /// Powers of two of all centres in an inference, where they are a separate loop.
-    Exponential,
-    /// One row's outputs from readings in Ω.
-    Row,
-    /// All rows' outputs from a frame.
-    Frame,
-    /// All rows' outputs behind a gate that finds all rows at rest.
-    RestingFrame,
-    /// All rows' outputs behind a gate that finds all rows awake (not at rest), each by its last reading.
-    AwakeFrame,
-    /// All rows' outputs by one network for the whole array.
-    ArrayFrame,
-    /// All rows' outputs by one network, behind a gate that finds the array at rest.
-    ArrayRestingFrame,
-    /// All rows' outputs by one network, behind a gate that finds the array awake by its last reading.
-    ArrayAwakeFrame,
-    /// Deviations of all outputs and the novelty of a frame, without decoding it.
-    Confidence,
-}
-
-impl Scope {
-    const ALL: [Self; 10] = [
-        Self::Inference,
-        Self::Exponential,
-        Self::Row,
-        Self::Frame,
-        Self::RestingFrame,
-        Self::AwakeFrame,
-        Self::ArrayFrame,
-        Self::ArrayRestingFrame,
-        Self::ArrayAwakeFrame,
-        Self::Confidence,
-    ];
-
-    /// Name of the scope in the image's log and in the accepted figures.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Inference => "inference",
-            Self::Exponential => "exponential",
-            Self::Row => "row",
-            Self::Frame => "frame",
-            Self::RestingFrame => "resting-frame",
-            Self::AwakeFrame => "awake-frame",
-            Self::ArrayFrame => "array-frame",
-            Self::ArrayRestingFrame => "array-resting-frame",
-            Self::ArrayAwakeFrame => "array-awake-frame",
-            Self::Confidence => "confidence",
-        }
+/// Joins the `counts` of a run's regions with the names in its `log`. The call at the end of each is taken off.
+///
+/// # Errors
+/// Counts and names do not fit each other, or a region of known cost was counted otherwise.
+pub fn measured(log: &str, counts: &[Region]) -> Outcome<Vec<Measured>> {
+    let less = |count: Count| Count {
+        instructions: count.instructions.saturating_sub(EMPTY.instructions),
+        cycles: count.cycles.saturating_sub(EMPTY.cycles),
+        flash_cycles: count.flash_cycles.saturating_sub(EMPTY.flash_cycles),
+    };
+    let names = log.lines().filter_map(|line| line.strip_prefix("INFO region ")?.split_once(' '));
+    let regions: Vec<Measured> = names
+        .zip(counts)
+        .map(|((kernel, scope), region)| Measured {
+            kernel: kernel.to_owned(),
+            scope: scope.to_owned(),
+            region: Region { whole: less(region.whole), ..*region },
+        })
+        .collect();
+    let is = |at: usize, scope: &str, known: [u64; 2]| {
+        regions.get(at).is_some_and(|it: &Measured| {
+            let Count { instructions, cycles, .. } = it.region.whole;
+            it.kernel == "calibration" && it.scope == scope && [instructions, cycles] == known
+        })
+    };
+    if regions.len() != counts.len() || !is(0, "empty", [0, 0]) || !is(1, "loop", LOOP) {
+        return Err(format!("{} regions were counted wrong: {regions:?}\n{log}", counts.len()));
     }
-
-    /// The scope of this name.
-    pub fn named(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|scope| scope.name() == name)
-    }
+    Ok(regions[2..].to_vec())
 }
 
 /// Cost of one kernel in one scope with one model.
@@ -89,216 +91,228 @@ pub struct Figure {
     pub centres: u64,
     /// Whether the model has an affine tail.
     pub affine: bool,
-    pub scope: Scope,
+    /// What is measured: `inference`, `frame`, and others in `docs/cycles.md`.
+    pub scope: String,
     pub count: Count,
 }
 
 impl Figure {
-    /// Whether both figures have the same kernel, K, tail and scope.
-    pub fn is_of(&self, other: &Self) -> bool {
-        let of = |figure: &Self| (figure.centres, figure.affine, figure.scope);
-        self.kernel == other.kernel && of(self) == of(other)
-    }
-}
-
-/// All figures of one kernel and K.
-#[derive(Clone, Copy)]
-pub struct Group<'f>(&'f [Figure]);
-
-impl<'f> Group<'f> {
-    /// The groups in `figures`, which must be sorted by kernel and K.
-    pub fn of(figures: &'f [Figure]) -> impl Iterator<Item = Self> {
-        figures.chunk_by(|a, b| (&a.kernel, a.centres) == (&b.kernel, b.centres)).map(Self)
-    }
-
-    pub fn kernel(self) -> &'f str {
-        self.0.first().map_or("", |figure| &figure.kernel)
+    /// Figures of a run with a model of so many `centres`, with an affine tail or without. Only one without has figures
+    /// for an inference and its exponentials.
+    pub fn of_run(measured: Vec<Measured>, centres: u64, affine: bool) -> Vec<Self> {
+        let figures = measured.into_iter().flat_map(|Measured { kernel, scope, region }| {
+            let exponential = Self {
+                kernel: kernel.clone(),
+                centres,
+                affine,
+                scope: "exponential".to_owned(),
+                count: region.exponential,
+            };
+            let has_exponential = scope == "inference" && exponential.count != Count::default();
+            let whole = Self { kernel, centres, affine, scope, count: region.whole };
+            [Some(whole), Some(exponential).filter(|_| has_exponential)].into_iter().flatten()
+        });
+        let with_tail = |it: &Self| affine && ["inference", "exponential"].contains(&&*it.scope);
+        figures.filter(|it| !with_tail(it)).collect()
     }
 
-    pub fn centres(self) -> u64 {
-        self.0.first().map_or(0, |figure| figure.centres)
+    /// What this is a figure of.
+    fn key(&self) -> (&str, u64, bool, &str) {
+        (&self.kernel, self.centres, self.affine, &self.scope)
     }
 
-    pub fn count(self, affine: bool, scope: Scope) -> Option<Count> {
-        let wanted = |figure: &&Figure| (figure.affine, figure.scope) == (affine, scope);
-        self.0.iter().find(wanted).map(|figure| figure.count)
+    fn name(&self) -> String {
+        let Self { kernel, centres, scope, affine, .. } = self;
+        let tail = if *affine { " with affine tail" } else { "" };
+        format!("{kernel}, K = {centres}, {scope}{tail}")
     }
-}
 
-/// A region of a run, with the names of its kernel and scope.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Measured {
-    pub kernel: String,
-    pub scope: Scope,
-    pub counts: Region,
-}
-
-/// Joins the `counts` of a run's regions with the names in its `log`. The call at the end of each is taken off.
-///
-/// # Errors
-/// Counts and names do not fit each other, or a region of known cost was counted otherwise.
-pub fn measured(log: &str, counts: &[Region]) -> Outcome<Vec<Measured>> {
-    let names: Vec<&str> = named(log, "region ").collect();
-    if names.len() != counts.len() {
-        return Err(format!(
-            "{} regions were counted, {} named in the log:\n{log}",
-            counts.len(),
-            names.len()
-        ));
-    }
-    let (Some((known, names)), Some(([empty, loops], counts))) =
-        (names.split_first_chunk(), counts.split_first_chunk())
-    else {
-        return Err(format!("the image did not calibrate; it logged\n{log}"));
-    };
-    let (empty, loops) = (empty.whole, loops.whole - EMPTY);
-    if *known != CALIBRATION || empty != EMPTY || !is_loop(loops) {
-        return Err(format!(
-            "the count is wrong: of an empty region {empty:?}, expected {EMPTY:?}; of a known loop \
-             {loops:?}, expected {LOOP:?}"
-        ));
-    }
-    let region = |(name, counts): (&&str, &Region)| {
-        let (kernel, scope) = name.split_once(' ')?;
-        let counts = Region { whole: counts.whole - EMPTY, ..*counts };
-        Some(Measured { kernel: kernel.to_owned(), scope: Scope::named(scope)?, counts })
-    };
-    let regions = names.iter().zip(counts).map(region).collect::<Option<_>>();
-    regions.ok_or_else(|| format!("not understood: {}", names.join(", ")))
-}
-
-/// Figures of a run. The run's model has an affine tail if `affine`; only models without one give figures for
-/// [`Scope::Inference`] and [`Scope::Exponential`].
-///
-/// # Errors
-/// As [`measured`], or the log names no number of centres.
-pub fn of_run(log: &str, counts: &[Region], affine: bool) -> Outcome<Vec<Figure>> {
-    let centres = named(log, "centres ").next().and_then(|centres| centres.parse().ok());
-    let centres = centres.ok_or_else(|| format!("the image names no centres:\n{log}"))?;
-    let mut figures = Vec::new();
-    for Measured { kernel, scope, counts } in measured(log, counts)? {
-        let mut add = |scope, count| {
-            figures.push(Figure { kernel: kernel.clone(), centres, affine, scope, count });
+    fn parse(line: &str) -> Option<(&str, Self)> {
+        let [compiler, kernel, centres, affine, scope, instructions, cycles, flash_cycles] =
+            line.split(',').collect::<Vec<_>>()[..]
+        else {
+            return None;
         };
-        match scope {
-            Scope::Inference if affine => (),
-            Scope::Inference if counts.exponential != Count::default() => {
-                add(scope, counts.whole);
-                add(Scope::Exponential, counts.exponential);
-            }
-            _ => add(scope, counts.whole),
-        }
+        let count = Count {
+            instructions: instructions.parse().ok()?,
+            cycles: cycles.parse().ok()?,
+            flash_cycles: flash_cycles.parse().ok()?,
+        };
+        let (kernel, scope, centres) = (kernel.to_owned(), scope.to_owned(), centres.parse().ok()?);
+        let affine = ["no", "yes"].iter().position(|it| *it == affine)? == 1;
+        Some((compiler, Self { kernel, centres, affine, scope, count }))
     }
-    Ok(figures)
 }
 
-/// What stands behind `what` in the lines of the log that start with it.
-fn named<'l>(log: &'l str, what: &'static str) -> impl Iterator<Item = &'l str> {
-    log.lines().filter_map(move |line| line.strip_prefix("INFO ")?.strip_prefix(what))
+/// The accepted figures and their compiler.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Accepted {
+    pub compiler: String,
+    pub figures: Vec<Figure>,
+}
+
+impl Accepted {
+    /// Parses `firmware/cycles.csv`.
+    ///
+    /// # Errors
+    /// The line that is not understood.
+    pub fn parse(data: &str) -> Outcome<Self> {
+        let lines = data.strip_prefix(HEAD).ok_or(format!("the first line is not {HEAD}"))?.lines();
+        let lines: Vec<(&str, Figure)> = lines
+            .skip(1)
+            .map(|line| Figure::parse(line).ok_or(format!("not understood: {line}")))
+            .collect::<Outcome<_>>()?;
+        let compiler = lines.first().map_or("", |(compiler, _)| compiler).replace(';', ",");
+        Ok(Self { compiler, figures: lines.into_iter().map(|(_, figure)| figure).collect() })
+    }
+
+    /// The contents of `firmware/cycles.csv`.
+    pub fn data(&self) -> String {
+        // No comma may stand in a field.
+        let compiler = self.compiler.replace(',', ";");
+        let lines = self.figures.iter().map(|Figure { kernel, centres, affine, scope, count }| {
+            let [instructions, cycles, flash] = count.all();
+            let affine = if *affine { "yes" } else { "no" };
+            format!(
+                "{compiler},{kernel},{centres},{affine},{scope},{instructions},{cycles},{flash}\n"
+            )
+        });
+        format!("{HEAD}\n{}", lines.collect::<String>())
+    }
+
+    /// Descriptions of all `measured` figures of `compiler` that differ from these by more than they may.
+    pub fn differences(&self, compiler: &str, measured: &[Figure]) -> Vec<String> {
+        let is_own = compiler == self.compiler;
+        let percent = if is_own { SAME_COMPILER_PERCENT } else { OTHER_COMPILER_PERCENT };
+        let of_one = |now: &Figure| {
+            let Some(then) = self.figures.iter().find(|then| then.key() == now.key()) else {
+                return Some(format!("{}: not accepted yet", now.name()));
+            };
+            let whats = ["instructions", "cycles", "cycles from flash"];
+            let counts = now.count.all().into_iter().zip(then.count.all()).zip(percent).zip(whats);
+            let is_off = |&(((now, then), percent), _): &(((u64, u64), u64), &str)| {
+                let apart = if is_own { now.abs_diff(then) } else { now.saturating_sub(then) };
+                u128::from(apart) * 100 > u128::from(percent) * u128::from(then)
+            };
+            let (((number, accepted), _), what) = counts.into_iter().find(is_off)?;
+            Some(format!("{}: {number} {what}, accepted are {accepted}", now.name()))
+        };
+        let gone =
+            self.figures.iter().filter(|it| !measured.iter().any(|now| now.key() == it.key()));
+        let gone = gone.map(|it| format!("{}: accepted, but not measured", it.name()));
+        measured.iter().filter_map(of_one).chain(gone).collect()
+    }
+}
+
+/// Descriptions of all figures that exceed their budgets.
+pub fn over_budget(figures: &[Figure]) -> Vec<String> {
+    let over = |figure: &Figure| {
+        let Count { cycles, flash_cycles, .. } = figure.count;
+        let (kernel, centres, affine, scope) = figure.key();
+        if affine {
+            return None;
+        }
+        let own = BUDGETS
+            .iter()
+            .find(|(of, k, of_scope, _)| (*of, *k, *of_scope) == (kernel, centres, scope));
+        let most = match scope {
+            "exponential" => EXPONENTIAL * centres,
+            "resting-frame" | "array-resting-frame" => RESTING_FRAME,
+            _ => own.map_or(u64::MAX, |(.., most)| *most),
+        };
+        let percent = FROM_FLASH_PERCENT
+            .iter()
+            .find(|(of, _)| (*of, 64, "inference") == (kernel, centres, scope));
+        let most_from_flash = percent.map_or(u64::MAX, |(_, percent)| cycles * percent / 100);
+        if cycles > most {
+            Some(format!("{}: {cycles} cycles, {most} allowed", figure.name()))
+        } else if flash_cycles > most_from_flash {
+            Some(format!("{}: {flash_cycles} from flash, {most_from_flash} allowed", figure.name()))
+        } else {
+            None
+        }
+    };
+    figures.iter().filter_map(over).collect()
 }
 
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use super::*;
 
-    const LOG: &str = "INFO region calibration empty\nINFO region calibration loop\n\
-        INFO centres 16\nINFO region a inference\nINFO region a row\nINFO region a frame\n";
-
-    fn counts(pairs: &[(u64, u64)]) -> Vec<Region> {
-        // From flash, all but the call at the end takes twice as long.
-        let count = |&(instructions, cycles)| Count {
-            instructions,
-            cycles,
-            flash_cycles: 2 * cycles - EMPTY.cycles,
-        };
-        pairs.iter().map(|pair| Region { whole: count(pair), ..Region::default() }).collect()
-    }
-
-    /// Count of `n` instructions.
-    fn of(n: u64) -> Count {
-        Count { instructions: n, cycles: 2 * n, flash_cycles: 4 * n }
+    pub fn figure(kernel: &str, scope: &str, affine: bool, cycles: u64) -> Figure {
+        let count = Count { instructions: 100, cycles, flash_cycles: cycles + 100 };
+        Figure { kernel: kernel.into(), centres: 64, affine, scope: scope.into(), count }
     }
 
     #[test]
-    fn what_an_empty_region_costs_is_taken_off() {
-        let mut counts = counts(&[(1, 3), (2002, 4002), (11, 23), (21, 43), (31, 63)]);
-        let figure = |affine, scope, n| Figure {
-            kernel: "a".into(),
-            centres: 16,
-            affine,
-            scope,
-            count: of(n),
-        };
-        let [inference, row, frame] =
-            [(Scope::Inference, 10), (Scope::Row, 20), (Scope::Frame, 30)]
-                .map(|(scope, n)| figure(false, scope, n));
-        let expected = vec![inference.clone(), row.clone(), frame.clone()];
-        assert_eq!(of_run(LOG, &counts, false), Ok(expected));
-
-        counts[2].exponential = of(5);
-        let expected = vec![inference, figure(false, Scope::Exponential, 5), row, frame];
-        assert_eq!(of_run(LOG, &counts, false), Ok(expected));
-
-        let expected = vec![figure(true, Scope::Row, 20), figure(true, Scope::Frame, 30)];
-        assert_eq!(of_run(LOG, &counts, true), Ok(expected));
-    }
-
-    #[test]
-    fn regions_come_in_any_order_and_of_several_kernels() {
-        let log = format!("{LOG}INFO region b resting-frame\nINFO region a awake-frame\n");
-        let known = [(1, 3), (2002, 4002), (1, 3), (1, 3), (1, 3)];
-        let mut all = counts(&[&known[..], &[(41, 83), (51, 103)]].concat());
-        all[6].assembly = of(7);
-        let found = measured(&log, &all).unwrap();
-        let region = |kernel: &str, scope, n, assembly| Measured {
-            kernel: kernel.into(),
-            scope,
-            counts: Region { whole: of(n), assembly, ..Region::default() },
-        };
-        let expected = [
-            region("b", Scope::RestingFrame, 40, Count::default()),
-            region("a", Scope::AwakeFrame, 50, all[6].assembly),
-        ];
-        assert_eq!(found[3..], expected);
-    }
-
-    #[test]
-    fn the_array_has_scopes_of_its_own() {
+    fn regions_are_named_and_the_call_at_their_end_is_taken_off() {
         let log = "INFO region calibration empty\nINFO region calibration loop\nINFO centres 16\n\
-            INFO region a array-frame\nINFO region a array-resting-frame\n\
-            INFO region b array-frame\n";
-        let counts = counts(&[(1, 3), (2002, 4002), (11, 23), (21, 43), (31, 63)]);
-        let figure = |kernel: &str, scope, n| Figure {
-            kernel: kernel.into(),
-            centres: 16,
-            affine: true,
-            scope,
-            count: of(n),
+            INFO region a inference\nINFO region a row\n";
+        let region = |instructions, cycles| {
+            let whole = Count { instructions, cycles, flash_cycles: 2 * cycles };
+            Region { whole, exponential: Count { instructions: 5, ..Count::default() } }
         };
-        let expected = vec![
-            figure("a", Scope::ArrayFrame, 10),
-            figure("a", Scope::ArrayRestingFrame, 20),
-            figure("b", Scope::ArrayFrame, 30),
-        ];
-        assert_eq!(of_run(log, &counts, true), Ok(expected));
-        let error = of_run(&log.replace("b array-frame", "b else"), &counts, true).unwrap_err();
-        assert!(error.starts_with("not understood: "), "{error}");
-    }
-
-    #[test]
-    fn a_wrong_count_of_what_is_known_is_refused() {
-        for (empty, loops) in
-            [((2, 3), (2002, 4002)), ((1, 3), (2002, 4001)), ((1, 2), (2002, 4002))]
-        {
-            let counts = counts(&[empty, loops, (1, 3), (1, 3), (1, 3)]);
-            let error = of_run(LOG, &counts, false).unwrap_err();
-            assert!(error.starts_with("the count is wrong: "), "{error}");
+        let counts = [region(1, 3), region(2002, 4002), region(11, 23), region(21, 43)];
+        let found = |affine| {
+            let figures = Figure::of_run(measured(log, &counts).unwrap(), 16, affine).into_iter();
+            figures.map(|it| (it.scope, it.count.instructions)).collect::<Vec<_>>()
+        };
+        let scopes = [("inference", 10), ("exponential", 5), ("row", 20)];
+        assert_eq!(found(false), scopes.map(|(scope, count)| (scope.to_owned(), count)));
+        assert_eq!(found(true), [("row".to_owned(), 20)]);
+        let wrong = [[region(2, 3), counts[1]], [counts[0], region(2002, 4001)]].concat();
+        for calibration in wrong.chunks(2) {
+            assert!(measured(log, &[calibration, &counts[2..]].concat()).is_err());
         }
+        assert!(measured(&log.replace("INFO region a row\n", ""), &counts).is_err());
     }
 
     #[test]
-    fn regions_without_a_name_are_refused() {
-        let error = of_run(LOG, &counts(&[(1, 3), (2002, 4002)]), false).unwrap_err();
-        assert!(error.starts_with("2 regions were counted, 5 named"), "{error}");
+    fn figures_are_compared_exactly_with_their_compilers_and_by_their_excess_with_others() {
+        let accepted =
+            Accepted { compiler: "a, b".into(), figures: vec![figure("f32", "row", false, 1000)] };
+        assert_eq!(Accepted::parse(&accepted.data()).as_ref(), Ok(&accepted));
+        let said = |compiler: &str, instructions, cycles, flash_cycles| {
+            let count = Count { instructions, cycles, flash_cycles };
+            let now = Figure { count, ..figure("f32", "row", false, 0) };
+            accepted.differences(compiler, &[now]).concat()
+        };
+        assert_eq!(said("a, b", 100, 1010, 1089), "");
+        assert_eq!(
+            said("a, b", 99, 1000, 1100),
+            "f32, K = 64, row: 99 instructions, accepted are 100"
+        );
+        assert_eq!(said("a, b", 100, 989, 1100), "f32, K = 64, row: 989 cycles, accepted are 1000");
+        assert!(said("a, b", 100, 1000, 1112).ends_with("cycles from flash, accepted are 1100"));
+        assert_eq!(said("c", 900, 1020, 1276), "");
+        assert_eq!(said("c", 1, 1, 1), "");
+        assert!(said("c", 100, 1021, 1100).contains("1021 cycles"));
+        assert!(said("c", 100, 1000, 1277).contains("1277 cycles from flash"));
+        let other = accepted.differences("c", &[figure("f32", "frame", true, 1)]);
+        assert!(other[0].ends_with("not accepted yet") && other[1].ends_with("not measured"));
+    }
+
+    #[test]
+    fn a_budget_may_be_used_up_but_not_exceeded() {
+        let within = [
+            figure("fixed16", "inference", false, 4000),
+            figure("fixed16", "frame", false, 33_600),
+            figure("fixed16", "inference", true, 4001),
+            figure("f32", "exponential", false, 64 * 32),
+            figure("f32-direct", "array-resting-frame", false, 3360),
+        ];
+        assert_eq!(over_budget(&within), [""; 0]);
+        let more = |it: &Figure| {
+            over_budget(&[figure(&it.kernel, &it.scope, it.affine, it.count.cycles + 1)])
+        };
+        assert_eq!(within.iter().flat_map(more).count(), 4);
+        let mut figure = figure("f32", "inference", false, 1000);
+        figure.count.flash_cycles = 1450;
+        assert_eq!(over_budget(std::slice::from_ref(&figure)), [""; 0]);
+        figure.count.flash_cycles = 1451;
+        assert_eq!(
+            over_budget(&[figure]),
+            ["f32, K = 64, inference: 1451 from flash, 1450 allowed"]
+        );
     }
 }

@@ -62,7 +62,6 @@ const HOST_SIM: &[&str] = &["run", "--quiet", "--package=host-sim", "--"];
 /// One run of the application.
 pub struct Check {
     pub name: &'static str,
-    /// Arguments for cargo.
     arguments: Vec<OsString>,
     /// Text that the output must contain.
     says: &'static str,

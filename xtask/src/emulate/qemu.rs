@@ -19,9 +19,6 @@ pub const QEMU: &str = "qemu-system-arm";
 const LIMIT: Duration = Duration::from_mins(5);
 
 /// Checks that QEMU is installed.
-///
-/// # Errors
-/// QEMU is not installed; the message says how to get it.
 pub fn present() -> Outcome {
     first_line(QEMU, &["--version"]).map(drop).ok_or(format!(
         "{QEMU} is not there. On Debian,\n  apt-get install qemu-system-arm\nor, for all that the \

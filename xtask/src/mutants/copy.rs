@@ -8,7 +8,7 @@ use std::{fs, hash::DefaultHasher, hash::Hasher};
 use serde_json::Value;
 
 use super::list::{FOLDER, Fault, splice};
-use crate::process::{Outcome, cargo, root, target_dir};
+use crate::process::{Outcome, PROOF, cargo, root, target_dir};
 
 /// What the copy's build made.
 pub struct Copy {
@@ -52,7 +52,12 @@ pub fn build(faults: &[Fault], crates: &[&str], has_torture: bool) -> Outcome<Co
     } else {
         Vec::new()
     };
-    for line in built {
+    let of_proof = if has_all_units {
+        messages(&["test", "--no-run", "--manifest-path", PROOF])?
+    } else {
+        Vec::new()
+    };
+    for line in built.into_iter().chain(of_proof) {
         let crate_folder = Path::new(line["manifest_path"].as_str().unwrap_or_default()).parent();
         let crate_folder = crate_folder.and_then(|folder| folder.strip_prefix(source()).ok());
         let program = line["executable"].as_str().filter(|_| line["profile"]["test"] == true);
@@ -61,7 +66,8 @@ pub fn build(faults: &[Fault], crates: &[&str], has_torture: bool) -> Outcome<Co
         }
     }
     if has_torture {
-        messages(&["build", "--package", "host-sim", "--package", TORTURE])?;
+        messages(&["build", "--package", "host-sim"])?;
+        messages(&["build", "--manifest-path", PROOF, "--package", TORTURE])?;
     }
     let built = folder().join("build/debug");
     Ok(Copy {

@@ -75,9 +75,6 @@ pub const SENSORS: &[Sensor] = &[
 
 impl Sensor {
     /// Writes the sensor's scene or CSV file into `directory`, and returns its path.
-    ///
-    /// # Errors
-    /// The scene lacks a text that is to be replaced, or the file cannot be written.
     pub fn write(&self, directory: &Path) -> Outcome<PathBuf> {
         let (file, text) = if self.name == CSV {
             (format!("{}.csv", self.name), csv())

@@ -10,9 +10,6 @@ mod body;
 
 /// Parses the bytes of a CSV file; `path` names it in messages. The first line is a header even if it holds numbers
 /// alone, if it `has_header`. Lines are numbered as if so many came `before`.
-///
-/// # Errors
-/// [`Error::File`] for content that [`DataFile::read`] rejects.
 pub(super) fn parse(path: &Path, bytes: &[u8], has_header: bool, before: u64) -> Result<DataFile> {
     let error = |problem| Error::file(path, problem);
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes); // a byte order mark

@@ -23,9 +23,6 @@ const MOST_VALUES_A_BYTE: usize = 16;
 const MOST_NAME_BYTES: usize = 200;
 
 /// Parses one array, `lines × columns` or `lines`, whose columns are called `c1`, `c2`, …
-///
-/// # Errors
-/// [`Error::File`] for bytes that are no such array.
 pub(super) fn parse_array(path: &Path, bytes: &[u8]) -> Result<DataFile> {
     let array = Array::open(bytes).map_err(|cause| unusable(path, cause))?;
     let (count, columns) = (array.count(), array.columns);
@@ -43,9 +40,6 @@ pub(super) fn parse_array(path: &Path, bytes: &[u8]) -> Result<DataFile> {
 /// array of one dimension is the column `NAME`.
 ///
 /// All headers are read before any number, so that too many of these are refused before they are unpacked.
-///
-/// # Errors
-/// [`Error::File`] for bytes that are no such arrays, and for a column name that two arrays lead to.
 pub(super) fn parse_archive(path: &Path, bytes: &[u8]) -> Result<DataFile> {
     let mut archive = ZipArchive::new(Cursor::new(bytes))
         .map_err(|cause| unusable(path, format!("not a .npz file: {cause}")))?;
@@ -67,10 +61,8 @@ pub(super) fn parse_archive(path: &Path, bytes: &[u8]) -> Result<DataFile> {
 
 /// What an archive holds, as its arrays' headers tell.
 struct Outline {
-    /// Names of the arrays.
     arrays: Vec<String>,
     lines: usize,
-    /// Names of the columns.
     header: Vec<String>,
 }
 

@@ -1,11 +1,11 @@
 //! CSV files of any length, read once and piece by piece: also what never was a file, such as standard input.
 
-use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::{DataFile, csv};
 use crate::error::{Error, Problem, Result};
+use crate::input;
 
 /// Bytes that are read at a time, and then to the end of a line.
 const PIECE: usize = 4_000_000;
@@ -31,33 +31,27 @@ pub struct Pieces {
 impl Pieces {
     /// Opens the file at `path`; `-` is standard input. Its first line is a header even if it holds numbers alone, if
     /// it `has_header`.
-    ///
-    /// # Errors
-    /// [`Error::Read`] if it cannot be read.
     pub fn open(path: &Path, has_header: bool) -> Result<Self> {
         let (path, source): (PathBuf, Box<dyn Read + Send>) = if path.as_os_str() == "-" {
             ("standard input".into(), Box::new(std::io::stdin()))
         } else {
-            (path.into(), Box::new(File::open(path).map_err(|cause| Error::read(path, cause))?))
+            (path.into(), Box::new(input::open(path)?))
         };
         Ok(Self::new(path, source, has_header))
     }
 
     /// Reads from `source`; `path` names it in messages.
-    #[must_use]
     pub fn new(path: PathBuf, source: Box<dyn Read + Send>, has_header: bool) -> Self {
         let (header, bytes, digest) = (vec![], vec![], crc64fast::Digest::new());
         Self { path, source, has_header, header, bytes, lines: 0, digest, at_once: PIECE }
     }
 
     /// Path of the file, for messages.
-    #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
     /// CRC-64/XZ of all bytes that were read.
-    #[must_use]
     pub fn digest(&self) -> u64 {
         self.digest.sum64()
     }

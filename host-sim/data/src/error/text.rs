@@ -6,7 +6,6 @@ use std::borrow::Cow;
 const MOST_CHARS: usize = 60;
 
 /// Text of a file as a message repeats it: what is long is cut.
-#[must_use]
 pub fn cut(text: &str) -> Cow<'_, str> {
     match text.char_indices().nth(MOST_CHARS) {
         Some((end, _)) => format!("{} … ({} bytes)", &text[..end], text.len()).into(),
@@ -15,7 +14,6 @@ pub fn cut(text: &str) -> Cow<'_, str> {
 }
 
 /// Text of a file as a message repeats it: in quotes, and cut if it is long.
-#[must_use]
 pub fn quoted(text: &str) -> String {
     match text.char_indices().nth(MOST_CHARS) {
         Some((end, _)) => format!("{:?} … ({} bytes)", &text[..end], text.len()),
@@ -23,8 +21,26 @@ pub fn quoted(text: &str) -> String {
     }
 }
 
+/// Text for a terminal: control characters other than the ends of lines are escaped, since names of files and devices
+/// may hold any.
+pub fn printable(text: &str) -> Cow<'_, str> {
+    let is_control = |c: char| c.is_control() && c != '\n';
+    if !text.contains(is_control) {
+        return text.into();
+    }
+    text.chars()
+        .fold(String::new(), |mut printable, c| {
+            if is_control(c) {
+                printable.extend(c.escape_default());
+            } else {
+                printable.push(c);
+            }
+            printable
+        })
+        .into()
+}
+
 /// Number of a file as a message repeats it: one of many digits with a power of ten.
-#[must_use]
 pub fn number(value: f64) -> String {
     short(value.to_string())
 }
@@ -41,7 +57,6 @@ pub(super) fn short(value: String) -> String {
 }
 
 /// Number of bytes in the unit that people use for it.
-#[must_use]
 pub fn in_words(bytes: u64) -> String {
     match bytes {
         0..1_000 => format!("{bytes} bytes"),
@@ -55,6 +70,12 @@ pub fn in_words(bytes: u64) -> String {
 mod tests {
     use super::super::{BadValue, Problem};
     use super::*;
+
+    #[test]
+    fn control_characters_are_escaped_and_other_text_stays() {
+        assert_eq!(printable("a\u{1b}[2J\u{9b}b\r.csv\nµ"), "a\\u{1b}[2J\\u{9b}b\\r.csv\nµ");
+        assert!(matches!(printable("x.csv → é\n"), Cow::Borrowed(_)));
+    }
 
     #[test]
     fn no_message_repeats_a_long_text_of_a_file() {

@@ -105,3 +105,20 @@ fn tolerances_and_lags_that_are_no_times_are_refused() {
     }
     assert_eq!(on_time(0.0, -2.5).check(), Ok(()));
 }
+
+#[test]
+fn a_tolerance_that_is_met_exactly_joins() {
+    // 1.05 − 1.0 and half of the others are a little more than 0.05 in f64.
+    let line = |time: usize, more: f64| [time as f64 / 10.0 + more, 0.0];
+    let of = |more: f64| -> Vec<[f64; 2]> { (0..50).map(|time| line(time, more)).collect() };
+    let lines = [of(0.0), of(0.05)];
+    let [first, second] = lines.each_ref().map(|lines| {
+        let lines: Vec<&[f64]> = lines.iter().map(<[f64; 2]>::as_slice).collect();
+        log("a.csv", &["t", "x"], &lines)
+    });
+    assert_eq!(on_time(0.05, 0.0).join(&first, &second).unwrap().left_out, 0);
+    assert_eq!(
+        on_time(0.04999, 0.0).join(&first, &second).map(|joined| joined.left_out).ok(),
+        None
+    );
+}

@@ -1,160 +1,147 @@
-//! Temporary files and folders. Nobody can guess their names, and they go if the work fails or is interrupted.
+//! Temporary files and folders, which go if the work fails or is interrupted.
 
-use std::ffi::{OsStr, OsString};
-use std::fs::{self, File, TryLockError};
-use std::hash::{BuildHasher, RandomState};
-use std::io::{self, ErrorKind};
+use std::ffi::OsString;
+use std::fs::{self, File};
+use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use super::disk::Disk;
-use super::pending;
+use tempfile::{Builder, NamedTempFile, TempDir};
 
-/// End of the names of temporaries.
-const END: &str = ".tmp";
+use super::place::Target;
+use super::step::{Step, step};
+use crate::error::{Error, Result};
 
-/// Digits in the names of temporaries.
-const DIGITS: usize = 16;
+/// What goes if the program is interrupted. While one thread has the list, an interruption waits. What has gone already
+/// may stay in it: nobody will have the same name.
+static PENDING: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// Names that are tried until one is free.
-const ATTEMPTS: usize = 16;
-
-/// Temporary file beside an output, locked as long as this process is at work on it.
-pub struct Temporary<'d> {
-    disk: &'d dyn Disk,
-    path: PathBuf,
-    file: File,
+fn pending() -> MutexGuard<'static, Vec<PathBuf>> {
+    PENDING.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-impl<'d> Temporary<'d> {
-    /// Creates a file beside `output`.
-    ///
-    /// # Errors
-    /// Error of the system.
-    pub fn beside(disk: &'d dyn Disk, output: &Path) -> io::Result<Self> {
-        for _ in 0..ATTEMPTS {
-            let path = output.with_file_name(unguessable(output.file_name(), END));
-            let mut pending = pending::lock();
-            let file = match disk.create(&path) {
-                Err(cause) if cause.kind() == ErrorKind::AlreadyExists => continue,
-                other => other?,
-            };
-            pending.add_file(&path);
-            drop(pending);
-            let temporary = Self { disk, path, file };
-            // Before it was locked, another process may have taken it for a leftover.
-            let is_taken = matches!(temporary.file.try_lock(), Err(TryLockError::WouldBlock));
-            if !is_taken && temporary.path.exists() {
-                return Ok(temporary);
-            }
-        }
-        Err(ErrorKind::AlreadyExists.into())
+/// Removes all temporary files and folders, for a program that ends at once. From now on no output is begun or
+/// completed: threads that try to will wait for ever.
+pub fn abandon() {
+    let mut pending = pending();
+    for path in pending.drain(..) {
+        // There is nobody left to tell of a failure.
+        let _ = fs::remove_file(&path).or_else(|_| fs::remove_dir_all(&path));
     }
-
-    /// The file.
-    pub fn file(&self) -> &File {
-        &self.file
-    }
-
-    /// Puts the file in the place of `output`.
-    ///
-    /// # Errors
-    /// Error of the system; `output` is then as it was.
-    pub fn rename(self, output: &Path) -> io::Result<()> {
-        let mut pending = pending::lock();
-        let outcome = self.disk.rename(&self.path, output);
-        if outcome.is_ok() {
-            pending.forget(&self.path);
-        }
-        drop(pending);
-        outcome
-    }
+    std::mem::forget(pending);
 }
 
-impl Drop for Temporary<'_> {
-    fn drop(&mut self) {
-        // After it was renamed there is nothing to remove.
-        let _ = self.disk.remove(&self.path);
-        pending::lock().forget(&self.path);
-    }
+/// Temporary file beside an output.
+pub struct Temporary {
+    file: NamedTempFile,
+    target: Target,
 }
 
-/// Removes temporary files beside `output` that a killed process has left: those that nobody has locked.
-pub fn remove_leftovers(disk: &dyn Disk, output: &Path) {
-    let Some(name) = output.file_name() else { return };
-    for entry in entries(&folder_of(output)) {
-        let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
-        if is_file && digits_between(&entry.file_name(), name, END) {
-            let path = entry.path();
-            let is_free = |file: File| file.try_lock().is_ok();
-            if File::open(&path).is_ok_and(is_free) {
-                // Another process may be faster, and what cannot be removed is no reason to fail.
-                let _ = disk.remove(&path);
-            }
-        }
-    }
-}
-
-/// Folder that goes with all that is in it.
-#[derive(Debug)]
-pub struct Scratch(PathBuf);
-
-impl Scratch {
-    /// Makes a folder for one's own use among the system's temporary files.
-    ///
-    /// # Errors
-    /// Error of the system.
-    pub fn new() -> io::Result<Self> {
-        let path = std::env::temp_dir().join(unguessable(Some(OsStr::new("taxel")), END));
-        let mut builder = fs::DirBuilder::new();
+impl Temporary {
+    /// Creates an empty file beside `target`, with its permissions.
+    pub fn beside(target: Target) -> Result<Self> {
+        let error = |cause| Error::write(&target.named, cause);
+        let mut prefix = OsString::from(".");
+        prefix.push(target.real.file_name().unwrap_or_default());
+        prefix.push(".");
+        let mut builder = Builder::new();
+        builder.prefix(&prefix).suffix(".tmp").rand_bytes(16);
         #[cfg(unix)]
-        std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
-        let mut pending = pending::lock();
-        builder.create(&path)?;
-        pending.add_tree(&path);
-        Ok(Self(path))
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666)); // less the umask
+        step(Step::Create(&target.real)).map_err(error)?;
+        let mut pending = pending();
+        let file = builder.tempfile_in(folder_of(&target.real)).map_err(error)?;
+        pending.push(file.path().into());
+        drop(pending);
+        if let Some(permissions) = target.permissions.clone() {
+            file.as_file().set_permissions(permissions).map_err(error)?;
+        }
+        Ok(Self { file, target })
     }
 
-    /// Path of the folder.
-    #[must_use]
-    pub fn path(&self) -> &Path {
-        &self.0
+    /// Creates a file beside `target`, and writes it whole.
+    pub fn written(
+        target: Target,
+        write: impl FnOnce(&mut dyn Write) -> Result<()>,
+    ) -> Result<Self> {
+        let mut temporary = Self::beside(target)?;
+        let mut writer = BufWriter::new(&mut temporary);
+        write(&mut writer)?;
+        let flushed = writer.flush();
+        drop(writer);
+        let synced = flushed.and_then(|()| sync(temporary.file.as_file(), temporary.file.path()));
+        synced.map_err(|cause| Error::write(&temporary.target.named, cause))?;
+        Ok(temporary)
     }
 }
 
-impl Drop for Scratch {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
-        pending::lock().forget(&self.0);
+impl Write for Temporary {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        step(Step::Write(self.file.path()))?;
+        self.file.as_file().write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
     }
 }
 
-/// Folder that `path` is in.
-pub fn folder_of(path: &Path) -> PathBuf {
+/// Renames files to those that they were made for, one after the other; then removes files of an `earlier` run.
+pub fn put_in_place(written: Vec<Temporary>, earlier: &[PathBuf]) -> Result<()> {
+    // An interruption waits until all is done.
+    let mut pending = pending();
+    let folders: Vec<PathBuf> = written.iter().map(|it| folder_of(&it.target.real)).collect();
+    for Temporary { file, target } in written {
+        let error = |cause| Error::write(&target.named, cause);
+        step(Step::Rename(file.path(), &target.real)).map_err(error)?;
+        let path = file.path().to_path_buf();
+        file.persist(&target.real).map_err(|failed| error(failed.error))?;
+        pending.retain(|other| *other != path);
+    }
+    for path in earlier {
+        let removed = step(Step::Remove(path)).and_then(|()| fs::remove_file(path));
+        match removed {
+            Err(cause) if cause.kind() != ErrorKind::NotFound => {
+                return Err(Error::write(path, cause));
+            }
+            _ => {}
+        }
+    }
+    for folder in folders {
+        // The files are there; not every system can tell when a folder is safe.
+        let _ = File::open(&folder).and_then(|opened| sync(&opened, &folder));
+    }
+    Ok(())
+}
+
+/// Waits until a file or folder is safe from loss of power.
+fn sync(file: &File, path: &Path) -> io::Result<()> {
+    step(Step::Sync(path))?;
+    file.sync_all()
+}
+
+fn folder_of(path: &Path) -> PathBuf {
     match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent.into(),
         _ => ".".into(),
     }
 }
 
-/// What is in a folder, as far as that can be told.
-pub fn entries(folder: &Path) -> impl Iterator<Item = fs::DirEntry> {
-    fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok)
-}
+/// Folder for one's own use among the system's temporary files. It goes with all that is in it.
+#[derive(Debug)]
+pub struct Scratch(TempDir);
 
-/// Hidden name made of `name`, digits and `end`.
-pub fn unguessable(name: Option<&OsStr>, end: &str) -> OsString {
-    // Every state of the hash has keys of its own, drawn by the system.
-    let random = RandomState::new().hash_one(0);
-    let mut hidden = OsString::from(".");
-    hidden.push(name.unwrap_or_default());
-    hidden.push(format!(".{random:0DIGITS$x}{end}"));
-    hidden
-}
+impl Scratch {
+    /// Makes a folder.
+    pub fn new() -> io::Result<Self> {
+        let mut pending = pending();
+        let folder = Builder::new().prefix(".taxel.").suffix(".tmp").tempdir()?;
+        pending.push(folder.path().into());
+        Ok(Self(folder))
+    }
 
-/// Whether `found` is a name that [`unguessable`] makes of `name` and `end`.
-pub fn digits_between(found: &OsStr, name: &OsStr, end: &str) -> bool {
-    let (found, name) = (found.as_encoded_bytes(), name.as_encoded_bytes());
-    let rest = found.strip_prefix(b".").and_then(|rest| rest.strip_prefix(name));
-    let rest = rest.and_then(|rest| rest.strip_prefix(b".")?.strip_suffix(end.as_bytes()));
-    rest.is_some_and(|it| it.len() == DIGITS && it.iter().all(u8::is_ascii_hexdigit))
+    /// Path of the folder.
+    pub fn path(&self) -> &Path {
+        self.0.path()
+    }
 }

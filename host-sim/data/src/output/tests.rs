@@ -1,211 +1,148 @@
-use std::cell::Cell;
-use std::fs::{self, File, Permissions};
-use std::io;
+use std::cell::RefCell;
+use std::fs::{self, Permissions};
 use std::path::PathBuf;
+use std::rc::Rc;
+
+use tempfile::TempDir;
 
 use super::*;
 
-const SET: FileSet = FileSet { name: "run", files: &["model", "metrics", "table", "page"] };
-const OLD: &[(&str, &[u8])] =
-    &[("model", b"old"), ("metrics", b"old"), ("table", b"old"), ("page", b"old")];
-const NEW: &[(&str, &[u8])] = &[("model", b"new"), ("metrics", b"new"), ("page", b"new")];
+const SET: FileSet = FileSet { files: &["model", "metrics", "table"] };
 
-/// Folder that is removed after the test.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("taxel-{name}-{}", std::process::id()));
-        let _ = fs::remove_dir_all(&path);
-        fs::create_dir_all(&path).unwrap();
-        Self(path)
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.join(name)
-    }
-
-    /// Names and contents of everything in it.
-    fn contents(&self) -> Vec<(String, String)> {
-        let mut contents: Vec<(String, String)> = fs::read_dir(&self.0)
-            .unwrap()
-            .map(|entry| entry.unwrap().path())
-            .map(|path| {
-                let name = path.file_name().unwrap().to_string_lossy().into_owned();
-                (name, fs::read_to_string(path).unwrap_or_default())
-            })
-            .collect();
-        contents.sort();
-        contents
-    }
+/// Names and contents of everything in a folder.
+fn contents(folder: &TempDir) -> Vec<(String, String)> {
+    let entries = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path());
+    let mut contents: Vec<(String, String)> = entries
+        .map(|path| {
+            let name = path.file_name().unwrap().to_string_lossy().into_owned();
+            (name, fs::read_to_string(path).unwrap_or_default())
+        })
+        .collect();
+    contents.sort();
+    contents
 }
 
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
-    }
-}
-
-/// Disk of which one call fails; that and all later ones, if the program is killed there.
-struct Failing {
-    calls_left: Cell<usize>,
-    is_killed: bool,
-}
-
-impl Failing {
-    fn at(call: usize, is_killed: bool) -> Self {
-        Self { calls_left: Cell::new(call), is_killed }
-    }
-
-    fn call<T>(&self, call: impl FnOnce() -> io::Result<T>) -> io::Result<T> {
-        let left = self.calls_left.get();
-        let fails = left == 1 || (left == 0 && self.is_killed);
-        self.calls_left.set(left.saturating_sub(1));
-        if fails { Err(ErrorKind::StorageFull.into()) } else { call() }
-    }
-}
-
-impl Disk for Failing {
-    fn create(&self, path: &Path) -> io::Result<File> {
-        self.call(|| System.create(path))
-    }
-    fn write(&self, file: &File, bytes: &[u8]) -> io::Result<usize> {
-        self.call(|| System.write(file, bytes))
-    }
-    fn set_permissions(&self, file: &File, permissions: Permissions) -> io::Result<()> {
-        self.call(|| System.set_permissions(file, permissions))
-    }
-    fn sync(&self, _: &File) -> io::Result<()> {
-        // Power is not lost here, and waiting takes time.
-        self.call(|| Ok(()))
-    }
-    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
-        self.call(|| System.rename(from, to))
-    }
-    fn remove(&self, path: &Path) -> io::Result<()> {
-        self.call(|| System.remove(path))
-    }
-    fn make_folder(&self, path: &Path) -> io::Result<()> {
-        self.call(|| System.make_folder(path))
-    }
-    fn remove_folder(&self, path: &Path) -> io::Result<()> {
-        self.call(|| System.remove_folder(path))
-    }
+/// Does `work`, of which step number `failing` fails; returns the steps.
+fn steps_of(failing: usize, work: impl FnOnce() -> Result<()>) -> (Vec<String>, Result<()>) {
+    let steps = Rc::new(RefCell::new(Vec::new()));
+    let seen = steps.clone();
+    let watcher = move |step: Step<'_>| {
+        let name = |path: &Path| match path.extension() {
+            Some(end) if end == "tmp" => "temporary".to_owned(),
+            _ => path.file_name().unwrap().to_string_lossy().into_owned(),
+        };
+        seen.borrow_mut().push(match step {
+            Step::Create(path) => format!("create beside {}", name(path)),
+            Step::Write(path) => format!("write {}", name(path)),
+            Step::Sync(path) if path.is_dir() => "sync folder".to_owned(),
+            Step::Sync(path) => format!("sync {}", name(path)),
+            Step::Rename(from, to) => format!("rename {} to {}", name(from), name(to)),
+            Step::Remove(path) => format!("remove {}", name(path)),
+        });
+        let fails = seen.borrow().len() == failing;
+        if fails { Err(ErrorKind::StorageFull.into()) } else { Ok(()) }
+    };
+    let outcome = watched(watcher, work);
+    (steps.take(), outcome)
 }
 
 #[test]
-fn whichever_call_fails_a_file_is_the_old_or_the_new_one_and_no_temporary_stays() {
-    let folder = Folder::new("file-fault");
-    let path = folder.path("x.csv");
-    for call in 1.. {
-        fs::write(&path, "old").unwrap();
-        let outcome = write_whole_on(&Failing::at(call, false), &path, |file| {
-            file.write_all(b"new").map_err(|cause| Error::write(&path, cause))
-        });
-        let found = if outcome.is_ok() { "new" } else { "old" };
-        let mut contents = folder.contents();
-        // Only if its own removal failed, after all was renamed, is there anything to remove.
-        contents.retain(|(name, _)| name == "x.csv" || outcome.is_err());
-        assert_eq!(contents, [("x.csv".to_owned(), found.to_owned())], "call {call}");
-        if outcome.is_ok() {
-            assert!(call > 5, "only {call} calls");
+fn files_are_safe_before_the_first_one_is_renamed() {
+    let folder = tempfile::tempdir().unwrap();
+    let (steps, outcome) = steps_of(0, || write_bytes(&folder.path().join("x"), b"new"));
+    outcome.unwrap();
+    let expected =
+        ["create beside x", "write temporary", "sync temporary", "rename temporary to x"];
+    assert_eq!(steps[..4], expected);
+    assert_eq!(steps[4..], ["sync folder"]);
+
+    let files: [(&str, &[u8]); 2] = [("model", b"new"), ("table", b"new")];
+    let (steps, outcome) = steps_of(0, || SET.write(folder.path(), &files));
+    outcome.unwrap();
+    let renames = steps.iter().position(|step| step.starts_with("rename")).unwrap();
+    let synced = steps[..renames].iter().filter(|step| *step == "sync temporary").count();
+    assert_eq!((synced, &*steps[renames - 1]), (2, "sync temporary"));
+    assert_eq!(
+        steps[renames..renames + 3],
+        ["rename temporary to model", "rename temporary to table", "remove metrics"]
+    );
+    assert_eq!(steps.last().unwrap(), "sync folder");
+}
+
+#[test]
+fn whichever_step_fails_files_are_whole_and_no_temporary_stays() {
+    for failing in 1.. {
+        let folder = tempfile::tempdir().unwrap();
+        let all = |text: &'static [u8]| [("model", text), ("metrics", text), ("table", text)];
+        SET.write(folder.path(), &all(b"old")).unwrap();
+        fs::write(folder.path().join("notes"), "old").unwrap();
+        let (steps, outcome) = steps_of(failing, || SET.write(folder.path(), &all(b"new")[..2]));
+        let step = steps[failing - 1].as_str();
+        let text: Vec<String> = contents(&folder).into_iter().map(|(n, c)| n + " " + &c).collect();
+        if step == "sync folder" {
+            // The files are there.
+            outcome.unwrap();
+            assert_eq!(text, ["metrics new", "model new", "notes old"]);
             return;
         }
-        assert!(outcome.unwrap_err().to_string().contains("x.csv"));
+        assert!(outcome.unwrap_err().to_string().contains("cannot write"));
+        let [metrics, model] = match step {
+            "rename temporary to metrics" => ["metrics old", "model new"],
+            "remove table" => ["metrics new", "model new"],
+            _ => ["metrics old", "model old"],
+        };
+        assert_eq!(text, [metrics, model, "notes old", "table old"], "{step}");
     }
-}
-
-#[test]
-fn whichever_call_fails_a_folder_holds_the_files_of_one_run() {
-    let folder = Folder::new("set-fault");
-    for is_killed in [false, true] {
-        for call in 1.. {
-            assert!(call < 100);
-            SET.write_on(&Failing::at(0, false), &folder.0, OLD).unwrap();
-            let disk = Failing::at(call, is_killed);
-            let outcome = SET.write_on(&disk, &folder.0, NEW);
-            let (hidden, seen): (Vec<_>, Vec<_>) =
-                folder.contents().into_iter().partition(|(name, _)| name.starts_with('.'));
-            let of = |text: &str| seen.iter().filter(|(_, content)| content == text).count();
-            assert!(of("old") == 0 || of("new") == 0, "call {call}: {seen:?}");
-            if !is_killed {
-                let whole = if outcome.is_ok() { of("new") == 3 } else { of("old") == 4 };
-                assert!(whole && hidden.is_empty(), "call {call}: {seen:?} {hidden:?}");
-            }
-            // Who comes next completes what was begun, or removes it.
-            SET.check(&folder.0, &[]).unwrap();
-            let names: Vec<String> = folder.contents().into_iter().map(|it| it.0).collect();
-            let whole = [&["metrics", "model", "page", "table"][..], &["metrics", "model", "page"]];
-            assert!(whole.contains(&&names.iter().map(String::as_str).collect::<Vec<_>>()[..]));
-            if disk.calls_left.get() > 0 {
-                assert!(call > 15, "only {call} calls");
-                break;
-            }
-        }
-    }
-}
-
-#[test]
-fn files_of_an_earlier_run_go_and_those_of_others_stay() {
-    let folder = Folder::new("set-stale");
-    fs::write(folder.path("notes.txt"), "mine").unwrap();
-    SET.write(&folder.0, OLD).unwrap();
-    SET.write(&folder.0, NEW).unwrap();
-    let names: Vec<String> = folder.contents().into_iter().map(|it| it.0).collect();
-    assert_eq!(names, ["metrics", "model", "notes.txt", "page"]);
 }
 
 #[test]
 fn a_check_leaves_no_folder_and_no_file() {
-    let folder = Folder::new("set-check");
-    SET.check(&folder.path("a/b"), &[]).unwrap();
-    check_writable(&folder.path("x.csv"), &[]).unwrap();
-    assert!(folder.contents().is_empty());
-    let made = folder.path("a/b");
-    assert!(SET.write_on(&Failing::at(5, false), &made, NEW).is_err());
-    assert!(folder.contents().is_empty());
-}
-
-#[test]
-fn leftovers_go_with_the_next_run_unless_somebody_is_at_work_on_them() {
-    let folder = Folder::new("leftovers");
-    let path = folder.path("x.csv");
-    let others = [".x.csv.12345.tmp", ".y.csv.0123456789abcdef.tmp", ".x.csv.0123456789abcdef"];
-    others.iter().for_each(|name| fs::write(folder.path(name), "").unwrap());
-    fs::write(folder.path(".x.csv.0123456789abcdef.tmp"), "half a fi").unwrap();
-    let at_work = Temporary::beside(&System, &path).unwrap();
-    write_bytes(&path, b"new").unwrap();
-    at_work.rename(&folder.path("at work")).unwrap();
-    let mut names: Vec<String> = folder.contents().into_iter().map(|it| it.0).collect();
-    names.retain(|name| !others.contains(&&**name));
-    assert_eq!(names, ["at work", "x.csv"]);
-    assert_eq!(folder.contents().len(), 5);
+    let folder = tempfile::tempdir().unwrap();
+    SET.check(&folder.path().join("a/b"), &[]).unwrap();
+    SET.check(folder.path(), &[]).unwrap();
+    check_writable(&folder.path().join("x.csv"), &[]).unwrap();
+    assert!(contents(&folder).is_empty());
+    fs::write(folder.path().join("x.csv"), "old").unwrap();
+    let input = folder.path().join("./x.csv");
+    let refused = check_writable(&folder.path().join("x.csv"), &[&input]).unwrap_err().to_string();
+    assert!(refused.contains("which is read"), "{refused}");
+    let refused = SET.check(&folder.path().join("x.csv/out"), &[]).unwrap_err().to_string();
+    assert!(refused.contains("cannot write") && refused.contains("out"), "{refused}");
 }
 
 #[cfg(unix)]
 #[test]
-fn links_are_followed_even_to_nothing_and_read_only_files_are_refused() {
+fn links_are_followed_permissions_are_kept_and_read_only_files_are_refused() {
     use std::os::unix::fs::{PermissionsExt, symlink};
-    let folder = Folder::new("links");
-    symlink("real.csv", folder.path("link.csv")).unwrap();
-    write_bytes(&folder.path("link.csv"), b"new").unwrap();
-    assert!(folder.path("link.csv").is_symlink());
-    assert_eq!(fs::read(folder.path("real.csv")).unwrap(), b"new");
-    symlink("ring", folder.path("ring")).unwrap();
-    let refused = check_writable(&folder.path("ring"), &[]).unwrap_err().to_string();
-    assert!(refused.contains("too many links"), "{refused}");
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| -> PathBuf { folder.path().join(name) };
+    let mode = |name| fs::metadata(path(name)).unwrap().permissions().mode() & 0o777;
+    symlink("model", path("link")).unwrap();
+    fs::write(path("ordinary"), "").unwrap();
+    write_bytes(&path("link"), b"new").unwrap();
+    assert!(path("link").is_symlink());
+    assert_eq!(fs::read(path("model")).unwrap(), b"new");
+    assert_eq!(mode("model"), mode("ordinary"));
+    fs::set_permissions(path("model"), Permissions::from_mode(0o604)).unwrap();
+    SET.write(folder.path(), &[("model", b"newer")]).unwrap();
+    assert_eq!(mode("model"), 0o604);
 
-    fs::set_permissions(folder.path("real.csv"), Permissions::from_mode(0o444)).unwrap();
-    for path in ["real.csv", "link.csv"] {
-        let refused = check_writable(&folder.path(path), &[]).unwrap_err().to_string();
-        assert!(refused.contains("read-only") && refused.contains(path), "{refused}");
-        assert!(write_bytes(&folder.path(path), b"other").is_err());
+    symlink("ring", path("ring")).unwrap();
+    let refused = check_writable(&path("ring"), &[]).unwrap_err().to_string();
+    assert!(refused.contains("too many links"), "{refused}");
+    fs::set_permissions(path("model"), Permissions::from_mode(0o444)).unwrap();
+    for refused in [
+        check_writable(&path("link"), &[]),
+        write_bytes(&path("link"), b"other"),
+        SET.check(folder.path(), &[]),
+        SET.write(folder.path(), &[("model", b"other")]),
+    ] {
+        let message = refused.unwrap_err().to_string();
+        assert!(message.contains("read-only"), "{message}");
     }
-    fs::rename(folder.path("real.csv"), folder.path("model")).unwrap();
-    let refused = SET.check(&folder.0, &[]).unwrap_err().to_string();
-    assert!(refused.contains("read-only") && refused.contains("model"), "{refused}");
-    fs::remove_file(folder.path("model")).unwrap();
-    symlink("elsewhere", folder.path("page")).unwrap();
-    let refused = SET.check(&folder.0, &[]).unwrap_err().to_string();
-    assert!(refused.contains("link") && refused.contains("page"), "{refused}");
+    assert_eq!(fs::read(path("model")).unwrap(), b"newer");
+    fs::remove_file(path("model")).unwrap();
+    symlink("/dev/null", path("metrics")).unwrap();
+    let refused = SET.check(folder.path(), &[]).unwrap_err().to_string();
+    assert!(refused.contains("it is no file"), "{refused}");
 }

@@ -20,7 +20,6 @@ pub struct RandomLanes {
 impl RandomLanes {
     /// Sources for the frames from number `first` on; call [`start`](Self::start) before drawing.
     #[inline(always)]
-    #[must_use]
     pub fn new(first: usize) -> Self {
         Self::every(first, 1)
     }
@@ -28,7 +27,6 @@ impl RandomLanes {
     /// Sources for every `step`th frame from number `first` on; call [`start`](Self::start) before
     /// drawing.
     #[inline(always)]
-    #[must_use]
     pub fn every(first: usize, step: usize) -> Self {
         let mut mixed_frames = [0; LANES];
         for (lane, mixed) in mixed_frames.iter_mut().enumerate() {

@@ -23,7 +23,6 @@ pub struct DeviceCost {
     pub ram_bytes: usize,
     /// Whether the images copy the weights to RAM, which takes as many bytes more as the blob has.
     pub weights_in_ram: bool,
-    /// Size of the blob in bytes.
     pub blob_bytes: usize,
     /// Size of a slot for models in flash, in bytes.
     pub slot_bytes: usize,
@@ -33,9 +32,6 @@ pub struct DeviceCost {
 
 impl DeviceCost {
     /// Cost of the model in `blob`, by the price list in the repository.
-    ///
-    /// # Errors
-    /// [`Error`](crate::Error) for a price list that lacks a piece.
     pub fn of(blob: &ModelBlob) -> Result<Self> {
         let design = Design::of(blob);
         let frame = Prices::accepted()?.frames(&design, Exponential::default())?.ungated;

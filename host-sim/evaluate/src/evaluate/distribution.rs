@@ -33,7 +33,6 @@ pub struct Distribution {
 pub struct GroupDistribution {
     /// Name of the group: `dz_mm`, or a column's name.
     pub group: String,
-    /// Unit of the errors.
     pub unit: String,
     /// Number of pairs of truth and estimate that count.
     pub count: usize,
@@ -52,11 +51,8 @@ pub struct GroupDistribution {
 /// Error of one output.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OutputError {
-    /// Name of its column.
     pub name: String,
-    /// Name of its group.
     pub group: String,
-    /// Unit of the error.
     pub unit: String,
     /// Row-wire and electrode (from 1) that it belongs to, if its name tells.
     pub electrode: Option<[usize; 2]>,
@@ -72,7 +68,6 @@ impl Distribution {
     ///
     /// # Panics
     /// If the tables differ in their number of lines, or the first two in that of columns.
-    #[must_use]
     pub fn of(truth: &Table, estimate: &Table, readings: &Table, reference: Reference<'_>) -> Self {
         assert_eq!(truth.values.len(), estimate.values.len(), "an estimate for every truth");
         assert_eq!(truth.len(), readings.len(), "readings for every truth");
@@ -92,7 +87,6 @@ impl Distribution {
     }
 
     /// Group that maps and headlines show: z if there is one, else the last.
-    #[must_use]
     pub fn main_group(&self) -> Option<&GroupDistribution> {
         let z = |group: &&GroupDistribution| matches!(group.group.as_str(), "dz_mm" | "fz_n");
         self.groups.iter().find(z).or(self.groups.last())

@@ -44,9 +44,6 @@ pub struct Settings {
 }
 
 /// Checks that these tolerances `k` and `baseline_frames` make gates for `world`.
-///
-/// # Errors
-/// [`BadValue`] for the first setting that does not.
 pub fn check_settings(world: &World, k: &[f64], baseline_frames: usize) -> Result<(), BadValue> {
     check(world, k)?;
     if baseline_frames == 0 {
@@ -59,9 +56,6 @@ pub fn check_settings(world: &World, k: &[f64], baseline_frames: usize) -> Resul
 }
 
 /// Checks that `world` has noise that a gate's tolerance can be derived from.
-///
-/// # Errors
-/// [`BadValue`] for noise that is not relative, or zero.
 pub fn check_noise(world: &World) -> Result<(), BadValue> {
     if world.noise.kind != NoiseKind::Relative {
         let rule = "the gate's tolerance is relative to each reading; use a scene with noise.kind = \"relative\"";
@@ -75,9 +69,6 @@ pub fn check_noise(world: &World) -> Result<(), BadValue> {
 }
 
 /// Checks that tolerances `k`, in standard deviations of a reading's noise, make gates for `world`.
-///
-/// # Errors
-/// [`BadValue`] for the first tolerance that does not.
 pub fn check(world: &World, k: &[f64]) -> Result<(), BadValue> {
     check_noise(world)?;
     check_tolerances(world.noise.level, k)
@@ -109,7 +100,6 @@ pub struct Missed {
 
 impl Missed {
     /// Share of such rows that is missed; `None` if there are none.
-    #[must_use]
     pub fn share(&self) -> Option<f64> {
         (self.rows > 0).then(|| self.missed as f64 / self.rows as f64)
     }
@@ -153,7 +143,6 @@ pub struct GateResult {
     pub frames: usize,
     /// Number of frames of the untouched sensor.
     pub untouched_frames: usize,
-    /// Number of rows in a frame.
     pub rows: usize,
     /// Number of frames whose mean is the baseline.
     pub baseline_frames: usize,
@@ -173,13 +162,11 @@ pub struct GateResult {
 
 impl GateResult {
     /// Errors of the network without a gate.
-    #[must_use]
     pub fn ungated_errors(&self) -> &[Errors] {
         metrics::of_decoder(&self.decoders, NETWORK)
     }
 
     /// Errors of always predicting the mean.
-    #[must_use]
     pub fn mean_errors(&self) -> &[Errors] {
         metrics::of_decoder(&self.decoders, mean::NAME)
     }
@@ -190,7 +177,6 @@ impl GateResult {
 ///
 /// It holds for the readings and their sum (Šidák's inequality), with Q the upper tail of the normal
 /// distribution. k' = k/√(1 + 1/B) accounts for the noise that is left in a baseline of B frames.
-#[must_use]
 pub fn woken_by_theory(k: f64, readings: usize, baseline_frames: usize) -> f64 {
     let k = k / (1.0 + 1.0 / baseline_frames as f64).sqrt();
     let beyond = libm::erfc(k / std::f64::consts::SQRT_2); // 2Q(k)
@@ -201,9 +187,6 @@ pub fn woken_by_theory(k: f64, readings: usize, baseline_frames: usize) -> f64 {
 /// gates for `settings`.
 ///
 /// Rows that are not skipped are decoded with `model`, whose columns must be the scene's.
-///
-/// # Errors
-/// [`Error`](crate::Error) for a setting, or a noise, that makes no gate.
 pub fn measure(
     experiment: &Experiment,
     model: &PreparedModel<'_>,
@@ -215,9 +198,6 @@ pub fn measure(
 
 /// Puts every row of measured test frames, and of frames at rest, through gates for `settings`, which number neither of
 /// them.
-///
-/// # Errors
-/// [`BadValue`] for a tolerance that makes no gate, or a sensor that is not known at rest.
 pub fn measure_data(
     data: &Measurements,
     model: &PreparedModel<'_>,
@@ -310,7 +290,6 @@ pub(super) fn has_sessions(world: &World, relative_inputs: bool) -> bool {
 pub(super) struct Gate {
     /// Baseline: the readings of all rows in Ω, on one line, or on one for each test frame.
     pub baseline: Table,
-    /// Number of readings in a row.
     readings: usize,
     /// Whether rows are skipped all together or not at all, as behind a projection.
     whole_array: bool,

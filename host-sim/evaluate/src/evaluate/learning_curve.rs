@@ -18,7 +18,6 @@ pub enum LearnedOn {
 
 impl LearnedOn {
     /// Frames in words.
-    #[must_use]
     pub fn words(self) -> &'static str {
         match self {
             Self::FreshFrames => "fresh frames",
@@ -32,9 +31,7 @@ impl LearnedOn {
 pub struct LearningCurve {
     /// Frames that errors were measured on.
     pub judged_on: LearnedOn,
-    /// Groups of outputs.
     pub groups: Vec<String>,
-    /// Unit of each group.
     pub units: Vec<String>,
     /// RMSE of always predicting the mean of the first frames, on these frames, for each group.
     pub mean_rmse: Vec<f64>,
@@ -45,7 +42,6 @@ pub struct LearningCurve {
 /// Errors after so many frames.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Point {
-    /// Number of frames taken in.
     pub frames: usize,
     /// Number of frames that the errors were measured on.
     pub judged_frames: usize,
@@ -55,7 +51,6 @@ pub struct Point {
 
 impl LearningCurve {
     /// Curve of `learned` errors of outputs with these `names`, whose standard deviations are `deviations`.
-    #[must_use]
     pub fn of(
         judged_on: LearnedOn,
         learned: &[Learned],

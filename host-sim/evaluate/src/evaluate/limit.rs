@@ -22,7 +22,6 @@ use crate::metrics::{self, DecoderErrors, Measure};
 pub struct Plan<'p> {
     /// Noise levels, as fractions.
     pub noise_levels: &'p [f64],
-    /// Number of test frames.
     pub frames: usize,
     /// Whether other geometries are tried.
     pub geometry: bool,
@@ -35,15 +34,11 @@ pub struct Plan<'p> {
 pub struct Candidate {
     /// File that it was read from.
     pub file: PathBuf,
-    /// The model.
     pub blob: ModelBlob,
 }
 
 impl Candidate {
     /// Checks that it decodes the readings of `world` to its outputs.
-    ///
-    /// # Errors
-    /// [`Error::Unfit`] names the file.
     pub fn check(&self, world: &World) -> Result<()> {
         let model = self.blob.parse();
         let metadata = model.metadata();
@@ -61,7 +56,6 @@ impl Candidate {
 }
 
 /// Number of test frames, unless a user says otherwise: as many posteriors of rows where rows move independently.
-#[must_use]
 pub fn usual_frames(world: &World) -> usize {
     if world.motion.has_independent_rows() { 400 / world.read_rows.len().min(400) } else { 400 }
 }
@@ -69,13 +63,11 @@ pub fn usual_frames(world: &World) -> usize {
 /// Limit of a scene.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LimitResult {
-    /// Name of the scene.
     pub subject: String,
     /// Seed of every random draw.
     pub seed: u64,
     /// Kind of noise: `relative` or `span`.
     pub noise_kind: String,
-    /// Number of test frames.
     pub frames: usize,
     /// Extent of the sensor in mm.
     pub size_mm: [f64; 3],

@@ -12,7 +12,6 @@ pub const NOISE_LEVELS: [f64; 4] = [0.005, 0.01, 0.05, 0.1];
 pub type Cells = [[f64; 4]; 10];
 
 /// Whether a table with these spreads and noise levels is laid out as the printed one.
-#[must_use]
 pub fn is_layout(spreads: &[f64], noise_levels: &[f64]) -> bool {
     spreads == SPREADS && noise_levels == NOISE_LEVELS
 }
@@ -34,7 +33,6 @@ pub const CELLS: Cells = [
 /// Cell as the paper prints it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Printed {
-    /// Spread of its line.
     pub spread: f64,
     /// Noise level of its column, as a fraction.
     pub noise_level: f64,
@@ -70,7 +68,6 @@ pub struct Nearness {
 
 impl Nearness {
     /// Nearness of `cells` to the printed ones.
-    #[must_use]
     pub fn new(cells: &Cells) -> Self {
         let [noise, spread] = rises(cells);
         Self {
@@ -84,14 +81,12 @@ impl Nearness {
     }
 
     /// Nearness of a table whose cells are all the mean of the printed ones.
-    #[must_use]
     pub fn of_a_constant() -> Self {
         Self::new(&[[mean(&CELLS); 4]; 10])
     }
 }
 
 /// Root mean square gap between two tables, in points.
-#[must_use]
 pub fn gap(cells: &Cells, others: &Cells) -> f64 {
     let pairs = cells.as_flattened().iter().zip(others.as_flattened());
     f64::sqrt(pairs.map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / 40.0)
@@ -126,7 +121,6 @@ fn correlation(cells: &Cells) -> Option<f64> {
 }
 
 /// Mean rise with noise over the spreads, and with spread over the noise levels, in points.
-#[must_use]
 pub fn rises(cells: &Cells) -> [f64; 2] {
     let noise = cells.iter().map(|line| line[3] - line[0]).sum::<f64>() / 10.0;
     let spread = cells[9].iter().zip(cells[0]).map(|(last, first)| last - first).sum::<f64>() / 4.0;
@@ -135,7 +129,6 @@ pub fn rises(cells: &Cells) -> [f64; 2] {
 
 /// Scatter of the printed cells about the nearest sum of a function of the spread and one of the noise, in points:
 /// what no table that is smooth in this sense explains.
-#[must_use]
 pub fn roughness() -> f64 {
     let whole = mean(&CELLS);
     let column = |j: usize| CELLS.iter().map(|line| line[j]).sum::<f64>() / 10.0;

@@ -27,9 +27,7 @@ pub use crate::metrics::NETWORK;
 pub struct Table1 {
     /// Number of centres of each row-wire's network.
     pub centres: usize,
-    /// Whether the networks have an affine tail.
     pub affine_tail: bool,
-    /// Number of frames on which each cell was trained.
     pub training_frames: usize,
     /// Number of frames on which each cell was evaluated.
     pub test_frames: usize,
@@ -73,11 +71,9 @@ pub struct Column {
 /// Errors of one decoder at one noise level.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Entry {
-    /// Name of the decoder.
     pub decoder: String,
     /// Width σ on scaled inputs, for decoders that have one.
     pub spread: Option<f64>,
-    /// Errors by group.
     pub errors: Vec<Errors>,
     /// Largest |e|/(H − Δz) of a row's electrodes, mean over rows and frames, in per cent; for compressions alone.
     #[serde(skip)]
@@ -87,7 +83,6 @@ pub struct Entry {
 impl Column {
     /// Errors of the decoder called `decoder`, with that spread if it has one; empty if there is no such
     /// decoder.
-    #[must_use]
     pub fn errors(&self, decoder: &str, spread: Option<f64>) -> &[Errors] {
         self.entry(decoder, spread).map_or(&[], |entry| &entry.errors)
     }
@@ -337,7 +332,6 @@ fn textbook_networks(
 impl Table1 {
     /// Table as CSV: one line a noise level, decoder, spread, group and definition. Undefined values are
     /// empty.
-    #[must_use]
     pub fn to_csv(&self) -> String {
         use std::fmt::Write as _;
         let mut csv = String::from("noise_level,decoder,spread,group,definition,value\n");
@@ -366,14 +360,12 @@ impl Table1 {
     }
 
     /// Formula by which the table is nearest to the printed one, on the cells that set-ups are fitted to.
-    #[must_use]
     pub fn nearest_formula(&self) -> Option<&Comparison> {
         let gap = |it: &Comparison| it.nearness.gap_fitted;
         self.comparison.iter().min_by(|a, b| gap(a).total_cmp(&gap(b)))
     }
 
     /// Groups of outputs that the table covers.
-    #[must_use]
     pub fn groups(&self) -> Vec<&str> {
         let first = self.columns.first().and_then(|column| column.decoders.first());
         first
@@ -385,7 +377,6 @@ impl Table1 {
 
     /// Largest ratio of the network's RMSE to the RMSE of always predicting the mean, over all cells of
     /// `group`.
-    #[must_use]
     pub fn worst_ratio_to_mean(&self, group: &str) -> Option<f64> {
         let rmse = |errors: &[Errors]| errors.iter().find(|e| e.group == group).map(|e| e.rmse);
         let ratios = self.columns.iter().flat_map(|column| {

@@ -54,7 +54,6 @@ pub struct Plan {
     /// Tolerances of gates, in standard deviations of the averaged readings' noise. There are always
     /// points without a gate as well.
     pub gate_k: Vec<f64>,
-    /// Device whose times are given.
     pub device: Device,
 }
 
@@ -67,9 +66,7 @@ pub struct Trade {
     pub seed: u64,
     /// Noise level of one sample, as a fraction; 0 for measured data, which has its own.
     pub noise_level: f64,
-    /// Number of frames to train on.
     pub training_frames: usize,
-    /// Number of test frames.
     pub test_frames: usize,
     /// How test frames were chosen among measured ones, in words.
     pub test_choice: Option<String>,
@@ -77,13 +74,11 @@ pub struct Trade {
     pub outliers: Option<Outliers>,
     /// Compiler of the code whose costs are given.
     pub compiler: String,
-    /// Device whose times are given.
     pub device: Device,
     /// Wires that a scan reads; `None` if the readings are not those of wires.
     pub wires: Option<Wires>,
     /// Group of outputs by which front and choice are determined.
     pub group: String,
-    /// Unit of that group.
     pub unit: String,
     /// Least possible errors with the first number of samples a reading, of a decoder that sees all readings of a frame.
     /// Ratios to the limit are to that of the point's own number of samples.
@@ -109,9 +104,6 @@ pub struct Trade {
 
 impl Trade {
     /// Picks the point within `bounds`, if any are given.
-    ///
-    /// # Errors
-    /// [`NoPoint`] if no point is within them.
     pub fn choose(&mut self, bounds: &Bounds) -> std::result::Result<(), NoPoint> {
         let offers: Vec<Offer> = self.points.iter().map(|p| p.offer(&self.group)).collect();
         self.bounds = *bounds;
@@ -121,7 +113,6 @@ impl Trade {
     }
 
     /// Points of the front from fast to slow.
-    #[must_use]
     pub fn front(&self) -> Vec<usize> {
         let mut front: Vec<usize> =
             (0..self.points.len()).filter(|i| self.points[*i].on_front).collect();
@@ -134,7 +125,6 @@ impl Trade {
     }
 
     /// Fastest point with the smallest error, or one so near to it that it counts as equal.
-    #[must_use]
     pub fn most_accurate(&self) -> Option<usize> {
         let rmse = |i: &usize| self.points[*i].rmse(&self.group);
         let front = self.front();
@@ -146,7 +136,6 @@ impl Trade {
     ///
     /// # Panics
     /// If there is no such point.
-    #[must_use]
     pub fn verdict_on(&self, point: usize) -> Verdict {
         let of_group = |errors: &[Errors]| -> Vec<Errors> {
             errors.iter().filter(|errors| errors.group == self.group).cloned().collect()
@@ -173,7 +162,6 @@ impl Trade {
     }
 
     /// Limit of the chosen group with the first number of samples a reading.
-    #[must_use]
     pub fn limit_rmse(&self) -> Option<f64> {
         least_error(self.limit.as_ref()?, &self.group).map(|[limit, _]| limit)
     }
@@ -185,13 +173,11 @@ impl Trade {
     }
 
     /// Blob of a point.
-    #[must_use]
     pub fn blob(&self, point: usize) -> &[u8] {
         &self.distinct_blobs[self.blobs[point]]
     }
 
     /// Tolerance for the configuration of a device, relative to each reading, for a point behind a gate.
-    #[must_use]
     pub fn rest_tolerance(&self, point: usize) -> Option<f64> {
         let point = &self.points[point];
         point.gate_k.map(|k| k * self.noise_level / (point.samples_averaged as f64).sqrt())

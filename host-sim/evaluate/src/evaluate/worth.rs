@@ -32,7 +32,6 @@ pub enum JudgedOn {
 
 impl JudgedOn {
     /// Frames in words.
-    #[must_use]
     pub fn words(self) -> &'static str {
         match self {
             Self::FreshFrames => "On fresh frames",
@@ -51,14 +50,12 @@ pub struct Worth {
     pub judged_on: JudgedOn,
     /// Errors of the network, then of the baselines, by group.
     pub decoders: Vec<DecoderErrors>,
-    /// What they mean.
     pub verdict: Verdict,
 }
 
 impl Worth {
     /// Worth of the model in `blob`, trained on `set` of `subject`. A `selection` of
     /// its options has errors on held-out folds.
-    #[must_use]
     pub fn of(
         subject: &Subject,
         set: &TrainingSet<'_>,

@@ -22,19 +22,16 @@ pub enum Direction {
 
 impl Experiment {
     /// Whether its models predict readings from deformations.
-    #[must_use]
     pub fn is_forward(&self) -> bool {
         self.training.direction == Direction::Forward
     }
 
     /// Names of the model's inputs.
-    #[must_use]
     pub fn input_names(&self) -> Vec<String> {
         if self.is_forward() { self.world.output_names() } else { self.world.reading_names() }
     }
 
     /// Names of the model's outputs.
-    #[must_use]
     pub fn output_names(&self) -> Vec<String> {
         if self.is_forward() { self.world.reading_names() } else { self.world.output_names() }
     }
@@ -61,9 +58,6 @@ impl Experiment {
     }
 
     /// Checks what models that predict readings ask of the scene, whatever options have changed in it.
-    ///
-    /// # Errors
-    /// [`BadValue`](taxel_data::BadValue) for a setting that they cannot have.
     pub fn check_direction(&self) -> Check {
         if !self.is_forward() {
             return Ok(());

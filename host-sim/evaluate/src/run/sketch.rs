@@ -20,7 +20,6 @@ pub struct SensorSketch {
 /// Row-wire of a sensor.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RowWire {
-    /// Whether it is read.
     pub read: bool,
     /// Electrodes on it: x and y in mm.
     pub electrodes_mm: Vec<[f64; 2]>,
@@ -28,7 +27,6 @@ pub struct RowWire {
 
 impl SensorSketch {
     /// Sketch of the sensor of `world`; `None` for one with too many electrodes to draw.
-    #[must_use]
     pub fn of(world: &World) -> Option<Self> {
         let sensor = &world.sensor;
         let count = sensor.upper_electrodes_mm.len() + sensor.lower_electrodes_mm.len();

@@ -13,6 +13,9 @@ pub const FRAMES_A_WEIGHT: usize = 10;
 /// Number of frames to judge by below which a warning is due.
 pub const FEW_TEST_FRAMES: usize = 30;
 
+/// Number of training frames below which a confidence covers noticeably more or fewer errors than it says.
+pub const FRAMES_FOR_CONFIDENCE: usize = 300;
+
 /// Share of readings outside the training range above which a warning is due.
 pub const OUT_OF_RANGE: f64 = 0.01;
 
@@ -40,7 +43,6 @@ impl Warning {
     }
 
     /// Groups of outputs that are decoded no better than by always predicting the mean.
-    #[must_use]
     pub fn no_gain_over_mean(groups: &[&str]) -> Option<Self> {
         Self::when(!groups.is_empty(), "no-gain-over-mean", || {
             let groups = groups.join(", ");
@@ -51,7 +53,6 @@ impl Warning {
     }
 
     /// Groups of outputs that a linear decoder decodes as well.
-    #[must_use]
     pub fn no_gain_over_linear(groups: &[&str]) -> Option<Self> {
         Self::when(!groups.is_empty(), "no-gain-over-linear", || {
             let groups = groups.join(", ");
@@ -63,14 +64,12 @@ impl Warning {
 
     /// Most centres for which so many training `frames` of `inputs` raise no [warning](Self::few_frames): a multiple of
     /// four, which f32 does not pad; four at least.
-    #[must_use]
     pub fn enough_frames_for(frames: usize, inputs: usize) -> usize {
         let centres = (frames / FRAMES_A_WEIGHT).saturating_sub(inputs + 1);
         (centres / 4 * 4).max(4).min(frames.saturating_sub(1).max(1))
     }
 
     /// Fewer than [`FEW_TEST_FRAMES`] frames to judge by.
-    #[must_use]
     pub fn few_test_frames(frames: usize) -> Option<Self> {
         Self::when(frames < FEW_TEST_FRAMES, "few-test-frames", || {
             let plural = if frames == 1 { " is" } else { "s are" };
@@ -82,7 +81,6 @@ impl Warning {
     }
 
     /// Model that is judged by the file that it was trained on.
-    #[must_use]
     pub fn trained_on(same_file: bool) -> Option<Self> {
         Self::when(same_file, "judged-by-training-data", || {
             "the model was trained on this file, which flatters it: judge it by other frames".into()
@@ -91,7 +89,6 @@ impl Warning {
 
     /// Fewer than [`FRAMES_A_WEIGHT`] training `frames` for each of the weights that an output of a network has: one
     /// for each of its `centres`, one for each of its `inputs` behind the affine tail, and the bias.
-    #[must_use]
     pub fn few_frames(frames: usize, centres: usize, inputs: usize) -> Option<Self> {
         let weights = centres + inputs + 1;
         let needed = FRAMES_A_WEIGHT * weights;
@@ -104,9 +101,19 @@ impl Warning {
         })
     }
 
+    /// Confidence of fewer than [`FRAMES_FOR_CONFIDENCE`] training `frames`.
+    pub fn few_frames_for_confidence(frames: usize, has_confidence: bool) -> Option<Self> {
+        let due = has_confidence && frames < FRAMES_FOR_CONFIDENCE;
+        Self::when(due, "few-frames-for-confidence", || {
+            format!(
+                "{frames} training frames are few for a confidence, whose intervals may cover far more or fewer errors \
+                 than they say: give {FRAMES_FOR_CONFIDENCE} or more"
+            )
+        })
+    }
+
     /// More than [`OUT_OF_RANGE`] of a network's inputs outside the range that it was trained on: readings, or what a
     /// projection makes of them.
-    #[must_use]
     pub fn out_of_range(share: f64) -> Option<Self> {
         Self::when(share > OUT_OF_RANGE, "readings-out-of-range", || {
             format!(
@@ -118,7 +125,6 @@ impl Warning {
     }
 
     /// Simulated resistances that noise made zero or negative, which no sensor reads.
-    #[must_use]
     pub fn not_positive(readings: &Table) -> Option<Self> {
         let count = readings.values.iter().filter(|reading| **reading <= 0.0).count();
         let share = count as f64 / readings.values.len().max(1) as f64;
@@ -131,7 +137,6 @@ impl Warning {
     }
 
     /// Lines of the data with values far from all others.
-    #[must_use]
     pub fn outliers(outliers: &Outliers) -> Option<Self> {
         Self::when(outliers.lines > 0, "outliers", || {
             let done = if outliers.left_out { "left out of training" } else { "kept" };
@@ -145,7 +150,6 @@ impl Warning {
     }
 
     /// Blob of more `bytes` than a slot holds.
-    #[must_use]
     pub fn larger_than_slot(bytes: usize) -> Option<Self> {
         Self::when(bytes > SLOT_BYTES, "larger-than-slot", || {
             format!(
@@ -156,7 +160,6 @@ impl Warning {
     }
 
     /// Number of `centres` that was asked for, and the larger one that the number format `stored`.
-    #[must_use]
     pub fn padded_centres(centres: usize, stored: usize) -> Option<Self> {
         Self::when(stored > centres, "padded-centres", || {
             format!("K = {centres} is stored as {stored}: K = {stored} costs a device no more")
@@ -164,7 +167,6 @@ impl Warning {
     }
 
     /// Gate whose mean cycles of a frame, `gated`, are no fewer than those `ungated`.
-    #[must_use]
     pub fn costly_gate(gated: f64, ungated: f64) -> Option<Self> {
         Self::when(gated >= ungated, "gate-costs-more", || {
             format!(

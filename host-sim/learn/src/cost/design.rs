@@ -40,7 +40,6 @@ pub struct NetworkDesign {
 
 impl Design {
     /// The design of the model in `blob`.
-    #[must_use]
     pub fn of(blob: &ModelBlob) -> Self {
         let model = blob.parse();
         let (shape, projection) = (model.shape(), model.projection().is_some());
@@ -58,7 +57,6 @@ impl Design {
 
     /// The design of a model with a network of its own for each row, which are all alike. `shape` is that of the
     /// model.
-    #[must_use]
     pub fn of_rows(shape: ModelShape, format: Format, centres: usize, affine_tail: bool) -> Self {
         let ModelShape { rows, inputs, outputs } = shape;
         let shape_of_row = Shape { inputs, centres, outputs };
@@ -78,7 +76,6 @@ impl Design {
 
     /// The design of a model with one network for all rows, behind a projection to as many features as a row has
     /// inputs. `shape` is that of the model.
-    #[must_use]
     pub fn of_array(shape: ModelShape, format: Format, centres: usize, affine_tail: bool) -> Self {
         let outputs = shape.rows * shape.outputs;
         let one = ModelShape { rows: 1, outputs, ..shape };
@@ -101,7 +98,6 @@ impl Design {
     }
 
     /// Bytes of all parameters in a blob: networks, projection and expansion, without names and headers.
-    #[must_use]
     pub fn parameter_bytes(&self) -> usize {
         let networks: usize = self.networks.iter().map(NetworkDesign::bytes).sum();
         networks + self.projection_bytes() + self.expansion_bytes()
@@ -113,21 +109,18 @@ impl Design {
     }
 
     /// Bytes of the projection's parameters in a blob; 0 without one.
-    #[must_use]
     pub fn projection_bytes(&self) -> usize {
         let readings = self.shape.rows * self.shape.inputs;
         self.features() * (1 + readings) * size_of::<f32>()
     }
 
     /// Number of features that the readings are projected to; 0 without a projection.
-    #[must_use]
     pub fn features(&self) -> usize {
         let inputs = self.networks.first().map_or(0, |network| network.shape.inputs);
         if self.projection { inputs } else { 0 }
     }
 
     /// Bytes of the expansion's parameters in a blob; 0 without one.
-    #[must_use]
     pub fn expansion_bytes(&self) -> usize {
         let outputs = self.shape.rows * self.shape.outputs;
         self.components.map_or(0, |components| outputs * (1 + components) * size_of::<f32>())
@@ -136,7 +129,6 @@ impl Design {
 
 impl NetworkDesign {
     /// The design of `network`.
-    #[must_use]
     pub fn of(network: &Network<'_>) -> Self {
         Self {
             format: network.format(),
@@ -147,7 +139,6 @@ impl NetworkDesign {
     }
 
     /// Bytes of the network's parameters in a blob.
-    #[must_use]
     pub fn bytes(&self) -> usize {
         let Self { format, shape, affine_tail, common_width } = *self;
         let words = match format {

@@ -35,14 +35,12 @@ impl<T> Frames<T> {
 impl Frames<u64> {
     /// Mean cost of frames behind a gate, with this share of untouched rows. It lies between the
     /// costs of frames with all rows untouched and all touched.
-    #[must_use]
     pub fn mean(&self, share_at_rest: f64) -> f64 {
         let [awake, at_rest] = [self.awake, self.at_rest].map(|cost| cost as f64);
         awake + share_at_rest * (at_rest - awake)
     }
 
     /// Mean cost of frames behind a gate, relative to a frame without a gate.
-    #[must_use]
     pub fn relative(&self, share_at_rest: f64) -> f64 {
         self.mean(share_at_rest) / self.ungated as f64
     }
@@ -50,7 +48,6 @@ impl Frames<u64> {
 
 impl Frames<Cost> {
     /// Mean cost of frames behind a gate, rounded.
-    #[must_use]
     pub fn mean_cost(&self, share_at_rest: f64) -> Cost {
         let mean = |of: fn(Cost) -> u64| self.map(of).mean(share_at_rest).round() as u64;
         Cost {

@@ -28,7 +28,6 @@ pub struct DecoderRam {
 
 impl DecoderRam {
     /// RAM for decoding with a model of this `design`.
-    #[must_use]
     pub fn of(design: &Design) -> Self {
         let shape = design.shape;
         let float = size_of::<f32>();
@@ -57,7 +56,6 @@ impl DecoderRam {
     }
 
     /// Total in bytes.
-    #[must_use]
     pub fn bytes(&self) -> usize {
         let Self {
             decoder,
@@ -74,7 +72,6 @@ impl DecoderRam {
     }
 
     /// Total in bytes behind a gate, which holds the baseline (a frame) and its estimate.
-    #[must_use]
     pub fn gated_bytes(&self) -> usize {
         self.bytes() + self.frame + self.estimate
     }

@@ -20,14 +20,12 @@ pub struct LinearRow {
 }
 
 /// Fits the best linear decoder of every row of `training`.
-#[must_use]
 pub fn fit(training: &Dataset) -> Rows<LinearRow> {
     Rows::fit(NAME, training, LinearRow::fit)
 }
 
 impl LinearRow {
     /// Fits the best linear decoder of `table` in the sense of least squares.
-    #[must_use]
     pub fn fit(table: &RowTable) -> Self {
         let samples = Samples::new(table);
         let inputs = samples.inputs();

@@ -16,7 +16,6 @@ pub struct Mean {
 
 impl Mean {
     /// Computes the mean of each output of `training`.
-    #[must_use]
     pub fn fit(training: &Dataset) -> Self {
         Self { inputs: training.inputs.names.len(), outputs: training.outputs.means() }
     }

@@ -29,7 +29,6 @@ impl StandardNetwork {
     /// Returns `None` where the interpolation matrix is singular (duplicates), or so nearly singular
     /// that the solution misses the samples by more than a thousandth (a spread far above the
     /// distances).
-    #[must_use]
     pub fn fit(table: &RowTable, spread: f64) -> Option<Self> {
         let samples = Samples::new(table);
         let (count, outputs) = (table.inputs.len(), table.outputs.names.len());

@@ -40,7 +40,6 @@ pub enum SpreadMeaning {
 
 impl SpreadMeaning {
     /// Decay a of exp(−a·d²) for this `spread`.
-    #[must_use]
     pub fn decay(self, spread: f64) -> f64 {
         match self {
             Self::Sigma => 0.5 / (spread * spread),
@@ -61,7 +60,6 @@ pub struct Textbook {
 impl Textbook {
     /// Scales the inputs of `table` and places `centres` centres by K-means; with as many centres as lines, every line
     /// is one.
-    #[must_use]
     pub fn new(table: &RowTable, scaling: Scaling, centres: usize, random: &mut Random) -> Self {
         let scale = scale(&table.inputs, scaling);
         let mut this = Self { scale, centres: Vec::new() };
@@ -91,7 +89,6 @@ impl Textbook {
 
     /// Fits the weights of networks with this `decay` to `table`, one network for each of the `initial_covariances` δ:
     /// the penalty on squared weights is 1/δ.
-    #[must_use]
     pub fn fit(
         self: &Arc<Self>,
         table: &RowTable,
@@ -208,7 +205,6 @@ impl TextbookNetwork {
 }
 
 /// Predictions (`lines × outputs`) of each of the `networks`, which differ in their weights alone.
-#[must_use]
 pub fn predict_each(networks: &[TextbookNetwork], readings: &[f64]) -> Vec<Vec<f64>> {
     /// Lines whose activations stay in the first cache.
     const LINES: usize = 16;

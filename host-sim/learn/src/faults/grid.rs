@@ -12,7 +12,6 @@ pub struct Grid {
 impl Grid {
     /// Grid of columns called `r1c1_ohm` and so on: every reading of two rows or more and two columns or more, row after
     /// row. `None` for other columns.
-    #[must_use]
     pub fn of(names: &[String]) -> Option<Self> {
         let wires: Option<Vec<(usize, usize)>> =
             names.iter().map(|name| Self::wires_of_name(name)).collect();
@@ -43,7 +42,6 @@ impl Grid {
     }
 
     /// Whether the reading at index `at` belongs to `place`.
-    #[must_use]
     pub fn is_in(&self, place: Place, at: usize) -> bool {
         let (row, column) = self.wires(at);
         place.holds(row, column)
@@ -79,7 +77,6 @@ impl Grid {
 
     /// Fewest places that hold these `readings` and hardly any other: wires of which all are among them, and single
     /// readings. All wires, if all are.
-    #[must_use]
     pub fn wires_of(&self, readings: &[usize]) -> Vec<Place> {
         let (height, width) = (self.rows.len(), self.columns.len());
         if readings.len() == height * width {
@@ -107,7 +104,6 @@ impl Grid {
     }
 
     /// Wires of a column called `r4c5_ohm`.
-    #[must_use]
     pub fn wires_of_name(name: &str) -> Option<(usize, usize)> {
         let (row, column) = name.strip_prefix('r')?.strip_suffix("_ohm")?.split_once('c')?;
         Some((row.parse().ok()?, column.parse().ok()?))

@@ -24,7 +24,6 @@ pub enum Place {
 
 impl Place {
     /// Whether the reading of `row` and `column` belongs to the place.
-    #[must_use]
     pub fn holds(self, row: usize, column: usize) -> bool {
         match self {
             Self::All => true,
@@ -62,7 +61,6 @@ pub enum Kind {
 
 impl Kind {
     /// Fault that the health of the place's readings has; `None` if they are within the limits.
-    #[must_use]
     pub fn of_readings(self) -> Option<Fault> {
         match self {
             Self::Missing | Self::IntermittentlyMissing => Some(Fault::Missing),

@@ -93,6 +93,23 @@ fn rare_presses_of_a_log_at_rest_are_no_outliers() {
 }
 
 #[test]
+fn two_impacts_that_confirm_one_another_are_no_outliers() {
+    let mut data = log(4000, |_| false);
+    for (line, force) in [(900, 8.0), (3100, 12.0)] {
+        data.outputs.values[line] = force;
+        data.inputs.values[4 * line + 1] = 100.0 + 50.0 * force;
+    }
+    assert_none(&data);
+    // What one line has alone may be garbled, and a reading that no force goes with is an outlier.
+    data.outputs.values[3100] = 0.0;
+    let lines: Vec<u64> = outliers(&data).found.iter().map(|outlier| outlier.line).collect();
+    assert_eq!(lines, [902, 902, 3102]);
+    // Nor do a small force with a wild reading and a large force confirm one another.
+    data.outputs.values[3100] = 0.05;
+    assert!(outliers(&data).found.len() >= 3);
+}
+
+#[test]
 fn a_broken_wire_is_found_in_a_log_at_rest() {
     let mut data = log(3000, |line| line % 100 == 0);
     data.inputs.values[4 * 77 + 2] = 1000.0;

@@ -3,7 +3,6 @@
 use taxel_data::random::{Purpose, Random, Stream};
 
 /// Assigns `frames` to `folds` at random, in equal numbers: the fold of each frame, from 0.
-#[must_use]
 pub fn random_folds(frames: usize, folds: usize, seed: u64) -> Vec<usize> {
     let mut assigned: Vec<usize> = (0..frames).map(|i| i % folds).collect();
     let mut random = Random::new(seed, Stream::Training, Purpose::Folds, 0, 0);
@@ -17,14 +16,12 @@ pub fn random_folds(frames: usize, folds: usize, seed: u64) -> Vec<usize> {
 ///
 /// Neighbours of a log resemble each other. With random folds each held-out frame has neighbours in training, so that
 /// errors look smaller than they are on a new log; with blocks only the ends of a block have any.
-#[must_use]
 pub fn block_folds(frames: usize, folds: usize) -> Vec<usize> {
     (0..frames).map(|frame| frame * folds / frames).collect()
 }
 
 /// Folds by `values`: frames with equal values share a fold; folds are numbered from 0 by ascending
 /// value.
-#[must_use]
 pub fn number_folds(values: &[f64]) -> Vec<usize> {
     let mut distinct = values.to_vec();
     distinct.sort_by(f64::total_cmp);
@@ -38,7 +35,6 @@ fn training_part(fold_of: &[usize], fold: usize) -> usize {
 }
 
 /// Number of training frames left by the largest fold.
-#[must_use]
 pub fn smallest_training_part(fold_of: &[usize]) -> usize {
     let folds = fold_of.iter().max().map_or(0, |last| last + 1);
     (0..folds).map(|fold| training_part(fold_of, fold)).min().unwrap_or(0)

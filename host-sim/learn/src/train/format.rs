@@ -103,7 +103,6 @@ impl FittedNetwork {
     ///
     /// # Panics
     /// Never: an expansion was made for the network's number of outputs.
-    #[must_use]
     pub fn expansion(&self) -> Option<Expansion<'_>> {
         let components = self.shape.outputs;
         self.expansion.as_ref().map(|block| {
@@ -113,7 +112,6 @@ impl FittedNetwork {
     }
 
     /// Number format of the network.
-    #[must_use]
     pub fn format(&self) -> Format {
         self.format
     }
@@ -122,7 +120,6 @@ impl FittedNetwork {
     ///
     /// # Panics
     /// Never: the parameters were checked when they were fitted.
-    #[must_use]
     pub fn network(&self) -> Network<'_> {
         self.try_network().expect("checked when fitted")
     }
@@ -218,6 +215,15 @@ pub(super) fn held(
     })
 }
 
+/// Penalties on the squared weights of a network.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Ridge {
+    /// One over the penalty on every weight: the initial covariance δ of a recursion.
+    pub initial_covariance: f64,
+    /// What is added to the penalty on the weights of the affine tail. A recursion has none.
+    pub of_tail: f64,
+}
+
 /// Samples of a table that weights are fitted to.
 struct Fit<'s, H: ?Sized> {
     table: &'s RowTable,
@@ -233,15 +239,23 @@ impl<'s, H: Held + ?Sized> Fit<'s, H> {
         Self { table, targets, solver, held, decomposed: OnceCell::new() }
     }
 
-    /// Factor of all samples, with a penalty of 1/`initial_covariance` on squared weights.
-    fn factor(&self, initial_covariance: f64) -> Factor {
+    /// Factor of all samples, with these penalties on squared weights.
+    fn factor(&self, ridge: Ridge) -> Factor {
+        let Ridge { initial_covariance, of_tail } = ridge;
         let (targets, outputs) = (&self.targets.deviations.values, self.targets.outputs());
         let design = self.held.design(self.table);
         match self.solver {
             Solver::Qr => self
                 .decomposed
                 .get_or_init(|| Decomposed::new(&*design, targets, outputs))
-                .factor(initial_covariance),
+                .factor_with(|regressor| {
+                    // Activations come first, then the inputs of the tail, then 1.
+                    let last = design.regressors() - 1;
+                    let is_tail = (last.saturating_sub(self.table.inputs.names.len())..last)
+                        .contains(&regressor);
+                    let root = 1.0 / initial_covariance.sqrt();
+                    if is_tail && of_tail > 0.0 { root.hypot(of_tail.sqrt()) } else { root }
+                }),
             Solver::Rls(settings) => {
                 let mut recursion =
                     Recursion::new(design.regressors(), outputs, initial_covariance, &settings);
@@ -251,9 +265,9 @@ impl<'s, H: Held + ?Sized> Fit<'s, H> {
         }
     }
 
-    /// Network whose weights have a penalty of 1/`initial_covariance`.
-    fn network(&self, initial_covariance: f64) -> Result<FittedNetwork> {
-        let factor = self.factor(initial_covariance);
+    /// Network whose weights have these penalties.
+    fn network(&self, ridge: Ridge) -> Result<FittedNetwork> {
+        let factor = self.factor(ridge);
         let network = self.held.network(&factor, self.targets)?;
         network.unless_lost(self.table, self.targets, &self.left(&factor))
     }
@@ -294,7 +308,7 @@ pub(super) fn left(
     targets.deviations.squared_errors(&predicted)
 }
 
-/// Fits `samples` with the Gaussians of `layer`: one network for each of `initial_covariances`. They share one
+/// Fits `samples` with the Gaussians of `layer`: one network for each of `ridges`. They share one
 /// decomposition, unless the solver is a recursion. Where each centre has a width of its own, direct distances replace
 /// [`Format::F32`].
 ///
@@ -304,15 +318,14 @@ pub(super) fn fit(
     samples: &Samples<'_>,
     layer: &HiddenLayer,
     options: &Options,
-    initial_covariances: &[f64],
+    ridges: &[Ridge],
 ) -> Result<Vec<FittedNetwork>> {
     let targets = Targets::of(&samples.table.outputs);
-    let covariances = initial_covariances.iter();
     let (table, solver) = (samples.table, options.solver);
     if options.format != Format::F32 || !layer.relative_widths.is_empty() {
         let held = held(samples, layer, options, options.format)?;
         let fit = Fit::new(&*held, table, &targets, solver);
-        return covariances.map(|covariance| fit.network(*covariance)).collect();
+        return ridges.iter().map(|ridge| fit.network(*ridge)).collect();
     }
     let of_width = Options { spread: layer.spread, ..*options };
     let expanded = expanded_f32::Expanded::new(samples, &layer.centres, &of_width);
@@ -323,20 +336,18 @@ pub(super) fn fit(
     let fit = Fit::new(&expanded, table, &targets, solver);
     let direct = direct_f32::Direct::new(samples, layer, options);
     let direct = Fit::new(&direct, table, &targets, solver);
-    let proved = |covariance: f64| {
+    let proved = |ridge: Ridge| {
         if let Some(few) = &fit_few {
-            let network = few.held.network(&few.factor(covariance), few.targets).ok()?;
+            let network = few.held.network(&few.factor(ridge), few.targets).ok()?;
             if expanded_f32::worst_share(&network, table) > expanded_f32::HOPELESS {
                 return None;
             }
         }
-        let factor = fit.factor(covariance);
+        let factor = fit.factor(ridge);
         let network = expanded.network(&factor, &targets).ok()?;
         let is_harmless = expanded_f32::worst_share(&network, table) <= expanded_f32::HARMLESS;
         // What this format loses, direct distances may hold.
         is_harmless.then(|| network.unless_lost(table, &targets, &fit.left(&factor)).ok()).flatten()
     };
-    covariances
-        .map(|&covariance| proved(covariance).map_or_else(|| direct.network(covariance), Ok))
-        .collect()
+    ridges.iter().map(|ridge| proved(*ridge).map_or_else(|| direct.network(*ridge), Ok)).collect()
 }

@@ -31,7 +31,6 @@ impl Widths {
     pub const ALL: [Self; 2] = [Self::Common, Self::Neighbours];
 
     /// Name of the rule, in options and scenes.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Common => "common",
@@ -40,7 +39,6 @@ impl Widths {
     }
 
     /// What the rule does, in a few words.
-    #[must_use]
     pub fn description(self) -> &'static str {
         match self {
             Self::Common => "The spread is the width of all centres",
@@ -81,7 +79,6 @@ pub struct HiddenLayer {
 
 impl HiddenLayer {
     /// Widths σ: one for all centres, or one for each.
-    #[must_use]
     pub fn widths(&self) -> Vec<f64> {
         match self.relative_widths.as_slice() {
             [] => vec![self.spread],

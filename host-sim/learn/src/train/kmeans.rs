@@ -82,7 +82,6 @@ fn piece(count: usize) -> usize {
 ///
 /// # Panics
 /// If `dimensions` or `centres` is 0 or there is no point.
-#[must_use]
 pub fn fit(
     points: &[f64],
     dimensions: usize,
@@ -116,7 +115,6 @@ pub fn fit(
 ///
 /// # Panics
 /// If `dimensions` or `centres` is 0 or there is no point.
-#[must_use]
 pub fn plus_plus(
     points: &[f64],
     dimensions: usize,
@@ -132,7 +130,6 @@ pub fn plus_plus(
 ///
 /// # Panics
 /// If `dimensions` is 0, or there is no point or no centre.
-#[must_use]
 pub fn refine(points: &[f64], dimensions: usize, centres: &[f64], search: &Search) -> Found {
     assert!(dimensions > 0 && points.len() >= dimensions && !centres.is_empty(), "nothing to do");
     let points = Points::new(points, dimensions);

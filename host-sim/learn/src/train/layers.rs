@@ -49,7 +49,6 @@ impl Layers {
     ///
     /// # Panics
     /// If the projection is one of other readings.
-    #[must_use]
     pub fn seen<'d>(&self, dataset: &'d Dataset) -> Cow<'d, Dataset> {
         match &self.projection {
             Some(parameters) => Cow::Owned(projection::apply(view(parameters, dataset), dataset)),

@@ -63,7 +63,6 @@ impl Decomposed {
     ///
     /// # Panics
     /// If `outputs` is 0.
-    #[must_use]
     pub fn new(design: &(impl Design + ?Sized), targets: &[f64], outputs: usize) -> Self {
         let regressors = design.regressors();
         let samples = targets.len() / outputs;
@@ -81,15 +80,20 @@ impl Decomposed {
     ///
     /// # Panics
     /// If `initial_covariance` is not positive and finite.
-    #[must_use]
     pub fn factor(&self, initial_covariance: f64) -> Factor {
         assert!(
             initial_covariance > 0.0 && initial_covariance.is_finite(),
             "the initial covariance must be positive and finite"
         );
+        self.factor_with(|_| 1.0 / initial_covariance.sqrt())
+    }
+
+    /// Factor of all samples, with a penalty of its own on the squared weights of each regressor, of which `root` gives
+    /// the root.
+    pub(super) fn factor_with(&self, root: impl Fn(usize) -> f64) -> Factor {
         let (regressors, outputs) = (self.regressors, self.outputs);
         let mut whole = Triangle::new(regressors, outputs);
-        whole.set_diagonal(1.0 / initial_covariance.sqrt());
+        whole.set_diagonal(root);
         self.pieces.iter().for_each(|piece| whole.merge(piece));
         let (root, projection) = whole.into_root_and_projection();
         Factor { root, projection, regressors, outputs }
@@ -102,7 +106,6 @@ impl Factor {
     ///
     /// # Panics
     /// If `initial_covariance` is not positive and finite, or `outputs` is 0.
-    #[must_use]
     pub fn new(
         design: &(impl Design + ?Sized),
         targets: &[f64],
@@ -113,7 +116,6 @@ impl Factor {
     }
 
     /// Weights, `regressors × outputs`, by back substitution.
-    #[must_use]
     pub fn weights(&self) -> Vec<f64> {
         let mut weights = vec![0.0; self.regressors * self.outputs];
         rls::solve(&self.root, &self.projection, self.regressors, &mut weights);
@@ -125,7 +127,6 @@ impl Factor {
 const EVALUATED: usize = 256;
 
 /// Outputs that `weights` (`regressors × outputs`) predict for these `samples` of `design`: `samples × outputs`.
-#[must_use]
 pub fn predict(
     design: &(impl Design + ?Sized),
     samples: Range<usize>,
@@ -187,7 +188,6 @@ fn decompose(
 ///
 /// # Panics
 /// If `initial_covariance` is not positive and finite, or there is no output.
-#[must_use]
 pub fn fit(
     regressors: &Regressors<'_>,
     scaled: &[f64],

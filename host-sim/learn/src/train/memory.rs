@@ -19,7 +19,6 @@ const F64: f64 = 8.0;
 
 /// Bytes that training on `dataset` with `options` takes at its peak, about. Refinement holds its samples in so many
 /// `pieces`, each with the square of all weights.
-#[must_use]
 pub fn peak_bytes(dataset: &Dataset, options: &Options, pieces: Option<usize>) -> u64 {
     let [frames, readings, all_outputs, rows] =
         [dataset.frames(), dataset.inputs.names.len(), dataset.outputs.names.len(), dataset.rows]

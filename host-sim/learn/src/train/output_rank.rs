@@ -49,8 +49,8 @@ pub(super) fn fit(
     };
     let of_components =
         Samples { scale: samples.scale.clone(), scaled: samples.scaled.clone(), table: &table };
-    let covariance = options.initial_covariance(outputs.len());
-    let mut networks = format::fit(&of_components, layer, options, &[covariance])?;
+    let ridge = of_components.ridge(layer, options);
+    let mut networks = format::fit(&of_components, layer, options, &[ridge])?;
     let network = networks.pop().expect("one network");
     Ok(network.expanded_by(expansion))
 }
@@ -112,7 +112,6 @@ pub(super) fn components(expansion: &[f32], rank: usize, outputs: &Table) -> Tab
 
 /// Expands every line of `components` as the device does: `lines × outputs`. A line with a missing component has no
 /// output either.
-#[must_use]
 pub fn expand(expansion: Expansion<'_>, components: &[f64]) -> Vec<f64> {
     let (width, outputs) = (expansion.components(), expansion.outputs());
     if width == 0 || outputs == 0 {

@@ -102,7 +102,6 @@ pub(super) fn about_means(parts: &[f64], means: &[f64]) -> Result<Vec<f32>> {
 
 /// Data set that the network behind the projection is trained on: one row, with the features as inputs,
 /// all scaled by the largest span of any.
-#[must_use]
 pub fn apply(projection: Projection<'_>, dataset: &Dataset) -> Dataset {
     let (width, count) = (dataset.inputs.names.len(), projection.features());
     let names = (1..=count).map(|feature| format!("feature{feature}")).collect();
@@ -119,7 +118,6 @@ pub fn apply(projection: Projection<'_>, dataset: &Dataset) -> Dataset {
 /// Projects every line of `readings` as the device does: `lines × features`, in the outputs' unit.
 ///
 /// A line has `width` readings and gets so many `features`.
-#[must_use]
 pub fn features(
     projection: Projection<'_>,
     features: usize,

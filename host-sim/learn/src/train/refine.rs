@@ -83,7 +83,6 @@ impl Default for Refinement {
 
 impl Refinement {
     /// Options for fitting weights to refined layers: with this penalty, if `options` give none.
-    #[must_use]
     pub fn options(&self, options: &Options) -> Options {
         Options { penalty: Some(options.penalty.unwrap_or(self.ridge)), ..*options }
     }
@@ -196,7 +195,6 @@ pub fn refine(
 }
 
 /// Most steps of progress that refinement of so many `networks` takes on folds. Descents that end sooner take fewer.
-#[must_use]
 pub fn fold_steps(steps: usize, networks: usize) -> usize {
     folds::PASSES * steps * networks
 }

@@ -15,7 +15,6 @@ pub enum Solver {
 
 impl Solver {
     /// Name, as options and scenes have it.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Qr => "qr",

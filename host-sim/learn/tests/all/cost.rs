@@ -14,7 +14,7 @@ fn frames(prices: &Prices, design: &Design) -> Frames<Cost> {
 #[test]
 fn every_shape_has_a_price_and_a_gate_saves_and_costs_something() {
     let prices = Prices::accepted().unwrap();
-    let sizes = || (1..=24).chain([36, 37, 64, 65, 144]);
+    let sizes = || [1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 24, 37, 64, 144].into_iter();
     let shapes = [1, 2, 3, 8].into_iter().flat_map(|rows| {
         let shapes = sizes().flat_map(|inputs| sizes().map(move |outputs| (inputs, outputs)));
         shapes.map(move |(inputs, outputs)| ModelShape { rows, inputs, outputs })
@@ -100,7 +100,7 @@ fn the_accepted_figures_of_trained_models_are_told() {
         };
         let errors =
             [percent(predicted.instructions, instructions), percent(predicted.cycles, cycles)];
-        assert!(errors.iter().all(|error| error.abs() < 2.0), "{line}: {errors:?} %");
+        assert!(errors.iter().all(|error| error.abs() < 1.0), "{line}: {errors:?} %");
         // The image that counts has all weights in RAM.
         let waiting = if scope == "resting-frame" { 0 } else { design.least_waiting_for_weights() };
         let error = percent(predicted.flash_cycles - waiting, flash);

@@ -18,7 +18,6 @@ pub struct Reading {
     pub frames: u16,
     /// Time from one scan to the next, in µs.
     pub period_us: u32,
-    /// Settings of each scan.
     pub scan: ScanSettings,
     /// Longest time in which all frames must have come.
     pub patience: Duration,

@@ -70,7 +70,6 @@ pub struct Findings {
 impl Findings {
     /// Whether every finding is good. A request that had to be sent again, or a damaged report, is a
     /// fault of the line, and counts as bad.
-    #[must_use]
     pub fn all_good(&self) -> bool {
         let frames = self.frames.bit_identical == self.frames.frames;
         let scans = self.scans.as_ref().is_none_or(ScanFindings::all_good);
@@ -90,7 +89,6 @@ impl Findings {
 /// Findings about decoding.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FrameFindings {
-    /// Number of frames sent.
     pub frames: usize,
     /// Number of frames in which every output has the bits that the host computes, and so have novelty and deviations.
     pub bit_identical: usize,

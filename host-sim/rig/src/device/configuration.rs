@@ -14,7 +14,6 @@ pub const LEASE: Duration = Duration::from_secs(10);
 /// Configuration that is active, and for how long.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ActiveConfiguration {
-    /// Configuration.
     pub configuration: Configuration,
     /// Time in ms after which the device returns to its own configuration if no request comes; 0 if this is its own.
     pub lease_left_ms: u32,
@@ -32,9 +31,6 @@ pub(super) struct Kept {
 
 impl<W: Wire> Device<W> {
     /// Asks for the active configuration.
-    ///
-    /// # Errors
-    /// Errors of [`ask`](Self::ask), such as [`Error::NoAnswer`].
     pub fn configuration(&mut self) -> Result<ActiveConfiguration> {
         self.ask_for_configuration(&Request::Configuration)
     }
@@ -42,9 +38,6 @@ impl<W: Wire> Device<W> {
     /// Makes `configuration` the active one for as long as this host is there: until [`resume`](Self::resume), or
     /// until the device has heard no request for [`lease`](Self::lease). While the device scans, listening to it
     /// prolongs the lease.
-    ///
-    /// # Errors
-    /// [`Error::Refused`] if the device refuses it, or the errors of [`ask`](Self::ask).
     pub fn configure(&mut self, configuration: Configuration) -> Result<()> {
         self.kept = None;
         self.ask_for_configuration(&self.leased(configuration))?;
@@ -55,9 +48,6 @@ impl<W: Wire> Device<W> {
     }
 
     /// Makes `configuration` the device's own one, which it returns to, until its next restart.
-    ///
-    /// # Errors
-    /// [`Error::Refused`] if the device refuses it, or the errors of [`ask`](Self::ask).
     pub fn configure_until_restart(&mut self, configuration: Configuration) -> Result<()> {
         self.kept = None;
         self.ask_for_configuration(&Request::Configure { configuration, lease_ms: 0 })?;
@@ -65,9 +55,6 @@ impl<W: Wire> Device<W> {
     }
 
     /// Makes the device's own configuration the active one again.
-    ///
-    /// # Errors
-    /// Errors of [`ask`](Self::ask), such as [`Error::NoAnswer`].
     pub fn resume(&mut self) -> Result<ActiveConfiguration> {
         self.kept = None;
         self.ask_for_configuration(&Request::Resume)
@@ -85,9 +72,6 @@ impl<W: Wire> Device<W> {
 
     /// Runs `work` while the device does not scan, so that no reports come unasked. Afterwards the device returns to
     /// its own configuration, even if the work failed or was interrupted.
-    ///
-    /// # Errors
-    /// Errors of [`ask`](Self::ask), or whatever error `work` returns.
     pub fn while_paused<T, E: From<Error>>(
         &mut self,
         work: impl FnOnce(&mut Self) -> std::result::Result<T, E>,

@@ -10,7 +10,6 @@ use serde::{Serialize, Serializer};
 /// Identity that a device reports.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DeviceIdentity {
-    /// Name of the board.
     pub board: String,
     /// Version of its firmware.
     pub firmware: String,
@@ -90,13 +89,11 @@ fn model_with_text<S: Serializer>(
 
 impl DeviceIdentity {
     /// Sensor and model that the device has room for.
-    #[must_use]
     pub fn capacity(&self) -> Capacity {
         Capacity { rows: self.rows, columns: self.columns, outputs: self.outputs }
     }
 
     /// Wires that the device scans: those of its model, or all without one.
-    #[must_use]
     pub fn wires(&self) -> Wires {
         let capacity = self.capacity();
         let shape = self.model.map(|model| ModelShape {
@@ -109,7 +106,6 @@ impl DeviceIdentity {
 
     /// Whether the active model has the columns of `model` and was trained on the same: it is that model, or one that the
     /// device made of it by recalibration.
-    #[must_use]
     pub fn is_made_of(&self, model: &Model<'_>) -> bool {
         let metadata = model.metadata();
         let crc = |names: Columns<'_>, units: Columns<'_>| {
@@ -125,7 +121,6 @@ impl DeviceIdentity {
     }
 
     /// Whether the model with that CRC-32 is active.
-    #[must_use]
     pub fn has_in_force(&self, crc_32: u32) -> bool {
         self.model.is_some_and(|found| found.crc_32 == crc_32)
     }

@@ -16,7 +16,6 @@ const SETTING: Duration = Duration::from_secs(5);
 /// What a model is sealed with.
 #[derive(Clone, Copy)]
 pub struct Sealing {
-    /// Key of the device.
     pub key: Key,
     /// Version of the model; if not given, the next one of the device.
     pub version: Option<u32>,
@@ -80,9 +79,6 @@ pub(super) fn seal_for(
 
 impl<W: Wire> Device<W> {
     /// Sets the device's key, once and for all.
-    ///
-    /// # Errors
-    /// [`Error::Refused`] if it has another one, or the errors of [`ask`](Self::ask).
     pub fn provision(&mut self, key: &Key) -> Result<()> {
         let request = Request::Provision { key: *key };
         let timeout = SETTING.max(self.patience);

@@ -28,9 +28,6 @@ pub struct Outcome {
 
 impl<W: Wire> Device<W> {
     /// Sends one step of a recalibration. Its frames, if it has some, take at most `patience` besides.
-    ///
-    /// # Errors
-    /// [`Error::NoAnswer`] if the device does not answer; its refusal is an answer.
     pub fn recalibration_step(
         &mut self,
         step: RecalibrationStep<'_>,
@@ -56,9 +53,6 @@ impl<W: Wire> Device<W> {
     }
 
     /// Puts the model before the active one in its place again; returns its CRC-32.
-    ///
-    /// # Errors
-    /// [`Error::Refused`] if there is none, or the errors of [`ask`](Self::ask).
     pub fn undo(&mut self) -> Result<u32> {
         let nothing = Refusal::Recalibration(RecalibrationFault::NoModel);
         let active = self.identify()?.model.ok_or(Error::Refused(nothing))?;
@@ -110,9 +104,6 @@ pub fn recalibrate<W: Wire, E: From<Error>>(
 }
 
 /// Lets the device learn from presses whose readings in Ω are known, while it does not scan.
-///
-/// # Errors
-/// As [`recalibrate`].
 pub fn recalibrate_from_readings<W: Wire>(
     device: &mut Device<W>,
     readings: &Table,

@@ -40,7 +40,6 @@ pub struct ScanFindings {
 
 impl ScanFindings {
     /// Whether every scan was as expected and no sample failed.
-    #[must_use]
     pub fn all_good(&self) -> bool {
         self.bit_identical_readings == self.scans
             && self.bit_identical_estimates == self.scans
@@ -49,9 +48,6 @@ impl ScanFindings {
 }
 
 /// World with the parts of the images' readout wherever `world` does not set them.
-///
-/// # Errors
-/// [`Error`] for a world with other parts, or other wires.
 pub fn with_parts_of_image(world: &World) -> Result<World> {
     let wanted = &world.readout;
     if wanted.circuit.is_some_and(|circuit| circuit != Circuit::ZeroPotential) {

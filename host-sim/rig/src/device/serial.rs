@@ -14,9 +14,6 @@ impl Wire for Box<dyn SerialPort> {
 }
 
 /// Opens `port` with 8 data bits, no parity, 1 stop bit.
-///
-/// # Errors
-/// [`Error::Port`], with the ports that this computer has.
 pub fn open(port: &str, baud: u32) -> Result<Box<dyn SerialPort>> {
     serialport::new(port, baud).open().map_err(|cause| {
         let ports = serialport::available_ports().unwrap_or_default();

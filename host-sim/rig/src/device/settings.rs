@@ -13,41 +13,26 @@ const WRITING: Duration = Duration::from_secs(5);
 
 impl<W: Wire> Device<W> {
     /// Asks for the active constants of the circuit.
-    ///
-    /// # Errors
-    /// [`Error::Refused`] if there are none, or the errors of [`ask`](Self::ask).
     pub fn constants(&mut self) -> Result<CircuitConstants> {
         self.ask_plainly(&Request::Constants, constants)
     }
 
     /// Activates `constants` until the next restart.
-    ///
-    /// # Errors
-    /// [`Error::Refused`] if the device refuses them, or the errors of [`ask`](Self::ask).
     pub fn set_constants(&mut self, new: &CircuitConstants) -> Result<()> {
         self.ask_plainly(&Request::SetConstants(new.for_link()), constants).map(|_| ())
     }
 
     /// Asks which settings are kept over restarts.
-    ///
-    /// # Errors
-    /// Errors of [`ask`](Self::ask), such as [`Error::NoAnswer`].
     pub fn kept(&mut self) -> Result<Kept> {
         self.ask_plainly(&Request::Kept, kept)
     }
 
     /// Keeps an active setting over restarts.
-    ///
-    /// # Errors
-    /// [`Error::Refused`] if the device cannot keep it, or the errors of [`ask`](Self::ask).
     pub fn keep(&mut self, setting: Setting) -> Result<Kept> {
         self.write(&Request::Keep(setting))
     }
 
     /// Lets the device forget a setting: the next restart activates the image's.
-    ///
-    /// # Errors
-    /// [`Error::Refused`] if the device cannot forget it, or the errors of [`ask`](Self::ask).
     pub fn forget(&mut self, setting: Setting) -> Result<Kept> {
         self.write(&Request::Forget(setting))
     }

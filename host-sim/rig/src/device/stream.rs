@@ -24,9 +24,6 @@ struct Outstanding {
 ///
 /// Up to `window` frames are on their way at a time. A window above 1 is for lines that hold bytes back
 /// while the device is busy, such as an emulator's; a real board may lose them.
-///
-/// # Errors
-/// [`Error`] if a frame is not answered, or is refused.
 pub fn decode_frames<W: Wire>(
     device: &mut Device<W>,
     readings_ohm: &[f32],

@@ -20,9 +20,6 @@ const SLOWEST_SCANS: Duration = Duration::from_secs(5);
 const ANY_OHM: f32 = 60.0;
 
 /// Sends one step of an upload and returns the device's answer.
-///
-/// # Errors
-/// [`Error::NoAnswer`] if there is none.
 pub fn step<W: Wire>(
     device: &mut Device<W>,
     step: UploadStep<'_>,
@@ -39,7 +36,6 @@ pub fn step<W: Wire>(
 }
 
 /// First step of the upload of `blob`.
-#[must_use]
 pub fn begin(blob: &[u8]) -> UploadStep<'_> {
     UploadStep::Begin { head: &blob[..blob.len().min(Model::HEAD_BYTES)] }
 }
@@ -166,9 +162,6 @@ pub fn see_frames<W: Wire>(device: &mut Device<W>) -> Result<()> {
 }
 
 /// Confirms the model on trial, so that it stays active over restarts.
-///
-/// # Errors
-/// [`Error::Refused`] if there is none, or the errors of [`ask`](Device::ask).
 pub fn confirm<W: Wire>(device: &mut Device<W>) -> Result<DeviceIdentity> {
     match step(device, UploadStep::Confirm)?.map_err(Error::Refused)? {
         UploadState::Confirmed { crc_32 } => {
@@ -185,9 +178,6 @@ pub fn confirm<W: Wire>(device: &mut Device<W>) -> Result<DeviceIdentity> {
 }
 
 /// Uploads `blob` without a seal, makes it the active model, checks that the device decodes with it, and confirms it.
-///
-/// # Errors
-/// As [`start_trial`] and [`confirm`].
 pub fn replace<W: Wire>(
     device: &mut Device<W>,
     blob: &[u8],

@@ -67,7 +67,6 @@ struct Squares {
 
 impl<'s> LaneModel<'s> {
     /// Prepares `sensor`.
-    #[must_use]
     pub fn new(sensor: &'s Sensor) -> Self {
         let (mut x, mut yz, mut places) = (Distinct::default(), Distinct::default(), Vec::new());
         for electrode in &sensor.lower_electrodes_mm {

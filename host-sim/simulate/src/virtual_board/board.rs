@@ -32,11 +32,8 @@ const POLL_NS: u64 = 500;
 pub struct Transactions {
     /// Pins that were set, to either level.
     pub pins_set: usize,
-    /// Transfers over SPI.
     pub transfers: usize,
-    /// Conversions on the microcontroller.
     pub conversions: usize,
-    /// Waits.
     pub waits: usize,
 }
 
@@ -74,17 +71,11 @@ struct Board {
 
 impl VirtualBoard {
     /// Board for `world`'s sensor, seed and readout, with nothing connected: all nodes open.
-    ///
-    /// # Errors
-    /// [`BadValue`] for a sensor of more than 8 × 18 wires.
     pub fn new(world: &World) -> Result<Self, BadValue> {
         Self::with_readout(world, &world.readout)
     }
 
     /// Board like [`new`](Self::new)'s, with another `readout` than the world's.
-    ///
-    /// # Errors
-    /// [`BadValue`] for a sensor of more than 8 × 18 wires.
     pub fn with_readout(world: &World, readout: &Readout) -> Result<Self, BadValue> {
         let sensor = &world.sensor;
         if sensor.row_wires > ROWS || sensor.column_wires > COLUMNS {
@@ -126,7 +117,6 @@ impl VirtualBoard {
     }
 
     /// Wires that a scan reads: the world's rows, and all columns of its sensor.
-    #[must_use]
     pub fn wires(&self) -> Selection<'_> {
         Selection { rows: &self.rows, columns: self.columns }
     }
@@ -160,7 +150,6 @@ impl VirtualBoard {
     }
 
     /// Scan settings of the readout, with its own wait or the one that its time constant needs.
-    #[must_use]
     pub fn scan_settings(&self) -> ScanSettings {
         let board = self.board.borrow();
         let settling_us = self.readout.settling_us.unwrap_or(board.needed_settling_us());
@@ -199,31 +188,21 @@ impl VirtualBoard {
     }
 
     /// Starts a conversion of the column that the multiplexers select.
-    ///
-    /// # Errors
-    /// [`Violation`], which is recorded as well.
     pub fn start_conversion(&self) -> Result<(), Violation> {
         self.board.borrow_mut().start_conversion()
     }
 
     /// Counts of the conversion, or `None` while it is not ready.
-    ///
-    /// # Errors
-    /// [`Violation`] if no conversion was started, which is recorded as well.
     pub fn poll_conversion(&self) -> Result<Option<u16>, Violation> {
         self.board.borrow_mut().poll_conversion()
     }
 
     /// Requests that the real parts would not have accepted, in order.
-    #[must_use]
     pub fn violations(&self) -> Vec<Violation> {
         self.board.borrow().violations.clone()
     }
 
     /// Checks that there were no violations.
-    ///
-    /// # Errors
-    /// [`Error::Board`], with the first violation.
     pub fn check(&self) -> Result<(), Error> {
         let board = self.board.borrow();
         board.violations.first().map_or(Ok(()), |first| {
@@ -232,19 +211,16 @@ impl VirtualBoard {
     }
 
     /// Number of uses of each kind of part so far.
-    #[must_use]
     pub fn transactions(&self) -> Transactions {
         self.board.borrow().transactions
     }
 
     /// Time on the board's clock.
-    #[must_use]
     pub fn elapsed_ns(&self) -> u64 {
         self.board.borrow().now_ns
     }
 
     /// Row (from 0) that is active, if any.
-    #[must_use]
     pub fn active_row(&self) -> Option<usize> {
         self.board.borrow().rows.active()
     }

@@ -11,25 +11,21 @@ use crate::error::Violation;
 
 impl VirtualBoard {
     /// Handle to a pin.
-    #[must_use]
     pub fn pin(&self, pin: Pin) -> VirtualPin {
         VirtualPin { board: self.clone(), pin }
     }
 
     /// Handle to MCP3208 number `chip` as an SPI device.
-    #[must_use]
     pub fn spi(&self, chip: usize) -> VirtualSpi {
         VirtualSpi::new(self.clone(), chip)
     }
 
     /// Handle to the microcontroller's own converter.
-    #[must_use]
     pub fn adc(&self) -> VirtualAdc {
         VirtualAdc::new(self.clone())
     }
 
     /// Delay that advances the board's clock.
-    #[must_use]
     pub fn delay(&self) -> VirtualDelay {
         VirtualDelay::new(self.clone())
     }

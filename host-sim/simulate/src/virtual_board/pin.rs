@@ -48,7 +48,6 @@ impl Pin {
     ];
 
     /// Pin of a number, for callers that send numbers.
-    #[must_use]
     pub fn from_number(number: u8) -> Option<Self> {
         Self::ALL.get(usize::from(number)).copied()
     }

@@ -11,13 +11,11 @@ use crate::world::World;
 
 /// Ideal readings in Ω of all row-wires of the sensor, whichever the world reads, without noise and drift: the input
 /// of a board.
-#[must_use]
 pub fn all_readings(world: &World, frames: usize) -> Table {
     ideal(world).frames(Stream::Test, frames).inputs
 }
 
 /// Ideal readings in Ω of all row-wires of the untouched sensor, so many times.
-#[must_use]
 pub fn untouched_readings(world: &World, frames: usize) -> Table {
     ideal(world).untouched().frames(Stream::Test, frames).inputs
 }
@@ -29,9 +27,6 @@ fn ideal(world: &World) -> Synthesis<'_> {
 /// Scans every line of `readings` (Ω, all row-wires) by the firmware's scanner on `board`.
 ///
 /// Returns the readings in Ω of the rows that the board's world reads, as the scanner computes them, one line a scan.
-///
-/// # Errors
-/// [`Error::Board`](crate::Error::Board) if the board refused a transaction.
 pub fn scan(board: &VirtualBoard, series: SeriesResistance, readings: &Table) -> Result<Table> {
     let mut scanner = board.scanner(series);
     let (settings, wires) = (board.scan_settings(), board.wires());

@@ -38,7 +38,6 @@ impl SeriesResistance {
 
 impl VirtualBoard {
     /// Actual series resistances of this board: a perfect calibration.
-    #[must_use]
     pub fn series_resistance(&self) -> SeriesResistance {
         let line_ohm = self.readout().line_ohm.unwrap_or(0.0);
         let row_source_ohm = self.readout().row_switch_ohm.unwrap_or(0.0) + line_ohm;
@@ -46,7 +45,6 @@ impl VirtualBoard {
     }
 
     /// Scanner of the firmware for this board's parts, calibrated with `series`.
-    #[must_use]
     pub fn scanner(&self, series: SeriesResistance) -> FrameScanner {
         let row_source_ohm: [f32; ROWS] = [series.row_source_ohm; ROWS];
         let series_ohm: [f32; COLUMNS] = [series.column_ohm; COLUMNS];

@@ -3,10 +3,10 @@
 use std::io::{BufRead, Write as _};
 use std::path::{Path, PathBuf};
 
+use crate::{Error, Result};
 use clap::Args;
 use firmware::link::message::Setting;
 use firmware::readout::ScanSettings;
-use host_sim::{Error, Result};
 use model_core::Wires;
 use serde::{Deserialize, Serialize};
 use taxel_data::data_file::DataFile;

@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant};
 
+use crate::{Error, Result};
 use firmware::link::message::{EstimateReport, Report};
-use host_sim::{Error, Result};
 use taxel_data::progress::Progress;
 use taxel_rig::device::{Device, Wire};
 

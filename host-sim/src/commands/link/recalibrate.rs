@@ -3,8 +3,8 @@
 use std::io::{BufRead, Write as _};
 use std::path::PathBuf;
 
+use crate::{Error, Result};
 use clap::Args;
-use host_sim::{Error, Result};
 use serde::Serialize;
 use taxel_data::data_file::DataFile;
 use taxel_data::table::Table;

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::{Error, Result};
 use clap::Args;
 use firmware::link::message::{Configuration, Report, Request, Setting};
-use host_sim::{Error, Result};
 use serde::Serialize;
 use taxel_data::csv_file;
 use taxel_data::table::Table;

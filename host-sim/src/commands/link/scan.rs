@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
+use crate::Result;
 use clap::{Args, ValueEnum, value_parser};
 use firmware::link::message::{ConfidenceSent, Configuration};
 use firmware::timing::ScanPlan;
-use host_sim::Result;
 use model_core::Wires;
 use taxel_rig::device::{Device, DeviceIdentity, Wire};
 

@@ -1,8 +1,8 @@
 //! Actions `configure` and `settings`: what a device keeps over restarts.
 
+use crate::Result;
 use clap::{Args, ValueEnum, value_parser};
 use firmware::link::message::{ConfidenceSent, Configuration, Kept, Setting};
-use host_sim::Result;
 use serde::Serialize;
 use taxel_rig::calibration::CircuitConstants;
 use taxel_rig::device::{Device, Wire};

@@ -1,7 +1,7 @@
 //! `identify`: what a device is and does.
 
+use crate::Result;
 use firmware::link::message::{KeyState, Statistics};
-use host_sim::Result;
 use serde::Serialize;
 use taxel_rig::device::{ActiveConfiguration, Device, DeviceIdentity, Wire};
 

@@ -1,6 +1,6 @@
 //! Text of tables beside the paper's printed Table 1.
 
-use host_sim::evaluate::printed::{CELLS, Cells, NOISE_LEVELS, Nearness, SPREADS};
+use crate::evaluate::printed::{CELLS, Cells, NOISE_LEVELS, Nearness, SPREADS};
 
 use super::super::print::{Page, percent};
 

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use host_sim::evaluate::printed::{CELLS, Nearness};
-use host_sim::evaluate::reconstruct::cells::{FORMULAS, INITIAL_COVARIANCES};
-use host_sim::evaluate::reconstruct::setup::AXES;
-use host_sim::evaluate::reconstruct::{self, Candidate, Reconstruction, Tried};
-use host_sim::report;
-use host_sim::{Error, Result};
+use crate::evaluate::printed::{CELLS, Nearness};
+use crate::evaluate::reconstruct::cells::{FORMULAS, INITIAL_COVARIANCES};
+use crate::evaluate::reconstruct::setup::AXES;
+use crate::evaluate::reconstruct::{self, Candidate, Reconstruction, Tried};
+use crate::report;
+use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use taxel_data::digest::digest;
 use taxel_data::{input, output};
@@ -171,7 +171,7 @@ fn list(page: &mut print::Page, name: &str, candidates: &[Candidate]) {
 
 #[cfg(test)]
 mod tests {
-    use host_sim::evaluate::reconstruct::setup::Setup;
+    use crate::evaluate::reconstruct::setup::Setup;
 
     use taxel_data::random::{Purpose, Random, Stream};
 

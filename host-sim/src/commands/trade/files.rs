@@ -3,18 +3,16 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use host_sim::evaluate::trade::Trade;
-use host_sim::metrics::Errors;
-use host_sim::{Result, report};
+use crate::evaluate::trade::Trade;
+use crate::metrics::Errors;
+use crate::{Result, report};
 use taxel_data::output::FileSet;
 
 use super::super::print;
 
 /// All files that the command may write.
-pub const FILES: FileSet = FileSet {
-    name: "trade",
-    files: &["trade.csv", "trade.json", "trade.svg", "trade.html", "chosen.bin"],
-};
+pub const FILES: FileSet =
+    FileSet { files: &["trade.csv", "trade.json", "trade.svg", "trade.html", "chosen.bin"] };
 
 /// Writes them to `folder`; `command` is what the user typed.
 pub fn write(folder: &Path, trade: &Trade, command: &str) -> Result<()> {

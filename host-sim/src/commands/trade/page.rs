@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use host_sim::evaluate::trade::{Memory, Point, Trade};
+use crate::evaluate::trade::{Memory, Point, Trade};
 
 use crate::commands::print::{Page, wrapped};
 

@@ -1,8 +1,8 @@
 //! Centres, spread and penalty: as given, or chosen among candidates by cross-validation.
 
-use host_sim::subject::Subject;
-use host_sim::training_set::TrainingSet;
-use host_sim::{Error, Result};
+use crate::subject::Subject;
+use crate::training_set::TrainingSet;
+use crate::{Error, Result};
 use taxel_learn::Options;
 use taxel_learn::select::{self, Candidates, Edge, Scored, Selection};
 use taxel_learn::train::Refinement;

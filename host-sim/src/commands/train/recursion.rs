@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::evaluate::learning_curve::{LearnedOn, LearningCurve};
+use crate::experiment::Experiment;
+use crate::subject::Subject;
+use crate::training_set::TrainingSet;
+use crate::{Error, Result};
 use clap::{Args, ValueEnum};
-use host_sim::evaluate::learning_curve::{LearnedOn, LearningCurve};
-use host_sim::experiment::Experiment;
-use host_sim::subject::Subject;
-use host_sim::training_set::TrainingSet;
-use host_sim::{Error, Result};
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
 use taxel_learn::outliers::Outliers;

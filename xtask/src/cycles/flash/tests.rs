@@ -29,13 +29,6 @@ fn prefetching_hides_a_part_from_code_of_long_instructions() {
 }
 
 #[test]
-fn an_instruction_across_two_lines_waits_for_both() {
-    // Line 0 comes after 5 cycles. Line 1 is read from cycle 6 on, and comes after 11.
-    let mut flash = Flash::cold(Keeps::Executed);
-    assert_eq!(flash.execute(&(14..18), &NO_LITERAL, 1), 11 + 1);
-}
-
-#[test]
 fn a_branch_waits_until_the_prefetch_that_it_made_useless_is_over() {
     let mut flash = Flash::cold(Keeps::Executed);
     // Done in cycle 8; line 1 is read in cycles 6 to 11. Line 10 comes after 12 + 5.
@@ -59,18 +52,6 @@ fn a_loop_waits_in_every_pass_if_prefetched_lines_are_not_kept() {
     assert_eq!(straight(&mut flash, 0..64, 4), 16 + 5 + 3 * 2);
     // Cycle 27: line 4 is still read until 29. Then come line 1 after 30 + 5, and lines 2 and 3 after 6 more each.
     assert_eq!(straight(&mut flash, 0..64, 4), (47 + 4) - 27);
-}
-
-#[test]
-fn a_loop_larger_than_the_cache_waits_in_every_pass() {
-    // Each of 65 lines has left the cache when it is wanted again: its place was the oldest.
-    let mut flash = Flash::cold(Keeps::Executed);
-    let first = straight(&mut flash, 0..1040, 4);
-    assert_eq!(first, 260 + 5 + 64 * 2);
-    for _ in 0..3 {
-        // Line 65 was begun 3 cycles before the end, so line 0 waits for the port as well: 3 more.
-        assert_eq!(straight(&mut flash, 0..1040, 4), 260 + (3 + 5) + 64 * 2);
-    }
 }
 
 #[test]

@@ -1,18 +1,49 @@
 use std::io::Write;
 
-use npyz::{Order, WriterBuilder};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
 use super::*;
 
-/// Bytes of a `.npy` file of this shape.
-fn array<T: npyz::AutoSerialize + Copy>(shape: &[u64], order: Order, elements: &[T]) -> Vec<u8> {
-    let mut bytes = vec![];
-    let options = npyz::WriteOptions::new().default_dtype().shape(shape).order(order);
-    let mut writer = options.writer(&mut bytes).begin_nd().unwrap();
-    writer.extend(elements.iter().copied()).unwrap();
-    writer.finish().unwrap();
+/// Order in which an array's elements are stored.
+#[derive(Clone, Copy)]
+enum Order {
+    C,
+    Fortran,
+}
+
+/// Element of an array: numpy's name of its type, and its bytes.
+trait Element {
+    const KIND: &str;
+    fn bytes(&self) -> Vec<u8>;
+}
+
+macro_rules! elements {
+    ($($kind:literal $name:ty),*) => {$(
+        impl Element for $name {
+            const KIND: &str = $kind;
+            fn bytes(&self) -> Vec<u8> {
+                self.to_le_bytes().to_vec()
+            }
+        }
+    )*};
+}
+
+elements!("<f8" f64, "<f4" f32, "<i8" i64, "<i4" i32, "<i2" i16, "<u4" u32, "|u1" u8);
+
+impl Element for bool {
+    const KIND: &str = "|b1";
+    fn bytes(&self) -> Vec<u8> {
+        vec![u8::from(*self)]
+    }
+}
+
+/// Bytes of a `.npy` file of this shape, as numpy 2 writes it.
+fn array<T: Element>(shape: &[u64], order: Order, elements: &[T]) -> Vec<u8> {
+    let sizes: String = shape.iter().map(|size| format!("{size}, ")).collect();
+    let order = if matches!(order, Order::C) { "False" } else { "True" };
+    let mut bytes = header(T::KIND, order, &format!("({})", sizes.trim_end()));
+    bytes.extend(elements.iter().flat_map(Element::bytes));
     bytes
 }
 
@@ -54,6 +85,9 @@ fn arrays_of_either_order_and_of_any_number_are_read_line_by_line() {
     assert_eq!(column.header, ["c1"]);
     assert_eq!(column.value(0, 0).to_bits(), time[0].to_bits());
     assert!(column.value(1, 0).is_nan());
+    // Bytes in the order of another machine.
+    let swapped = [header(">f8", "False", "(1,)"), 2.5_f64.to_be_bytes().to_vec()].concat();
+    assert_eq!(lines(&parse_array(path, &swapped).unwrap()), [[2.5]]);
     let flags = parse_array(path, &array(&[2], Order::C, &[true, false])).unwrap();
     assert_eq!(lines(&flags), [[1.0], [0.0]]);
 }
@@ -105,12 +139,17 @@ fn what_is_no_table_of_numbers_is_refused() {
     }
 }
 
-/// Bytes of a `.npy` file whose header says this, followed by one f64.
-fn with_header(descr: &str, order: &str, shape: &str) -> Vec<u8> {
+/// Header of a `.npy` file that says this.
+fn header(descr: &str, order: &str, shape: &str) -> Vec<u8> {
     let text = format!("{{'descr': '{descr}', 'fortran_order': {order}, 'shape': {shape}, }}");
     let text = format!("{text:<117}\n");
     let length = u16::try_from(text.len()).unwrap().to_le_bytes();
-    [b"\x93NUMPY\x01\x00", &length[..], text.as_bytes(), &1.0_f64.to_le_bytes()].concat()
+    [b"\x93NUMPY\x01\x00", &length[..], text.as_bytes()].concat()
+}
+
+/// Bytes of a `.npy` file whose header says this, followed by one f64.
+fn with_header(descr: &str, order: &str, shape: &str) -> Vec<u8> {
+    [header(descr, order, shape), 1.0_f64.to_le_bytes().to_vec()].concat()
 }
 
 #[test]
@@ -154,9 +193,12 @@ fn what_a_header_claims_is_checked_before_memory_is_taken_for_it() {
     let path = Path::new("test.npy");
     for (bytes, says) in [
         (claiming(u32::MAX, b"{"), "claims 4294967295 bytes"),
-        (claiming(9_000, &[b'['; 9_000]), "9000 brackets"),
-        (claiming(9_000, &[b'9'; 9_000]), "more elements than any memory"),
-        (with_header("<f8", "False", "[4294967296, 4294967296]"), "more elements than any memory"),
+        (claiming(9_000, &[b'['; 9_000]), "not a .npy file"),
+        (
+            with_header("<f8", "False", &format!("({}, 1)", "9".repeat(8_000))),
+            "more elements than any memory",
+        ),
+        (with_header("<f8", "False", "[4294967296, 4294967296]"), "not a .npy file"),
         (with_header("<f8", "False", "(0xffffffffffffffff, 2)"), "plain decimal"),
         (with_header("<f8", "False", "(9223372036854775807 + 1, 2)"), "plain decimal"),
         (with_header("|u1", "False", "(1, 500000001)"), "500000001 numbers and not at most"),

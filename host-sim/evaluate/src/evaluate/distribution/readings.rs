@@ -33,9 +33,7 @@ pub enum RelativeTo {
 /// Readings of the shown frames.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ShownReadings {
-    /// What they are relative to.
     pub relative_to: RelativeTo,
-    /// Name of each reading.
     pub names: Vec<String>,
     /// Row-wire and column-wire (from 1) of each reading; empty if names do not tell.
     pub wires: Vec<[usize; 2]>,

@@ -22,7 +22,6 @@ pub(super) struct GateFrames {
     pub noise_level: f64,
     /// Number of frames whose mean is the baseline.
     pub baseline_frames: usize,
-    /// Number of rows in a frame.
     pub rows: usize,
     pub gate: Gate,
     /// Readings and outputs while the sensor is touched.

@@ -50,7 +50,6 @@ struct Level {
 }
 
 /// Computes the tables of `setup` for one `draw` of samples and noise; judged on at most `most` samples.
-#[must_use]
 pub fn compute(setup: &Setup, draw: u64, most: usize) -> Tables {
     let every_axis = setup.is_forward() && !setup.moves_z_alone();
     let axes = if every_axis { vec![Axis::X, Axis::Y, Axis::Z] } else { vec![Axis::Z] };

@@ -49,7 +49,6 @@ const MOST_CENTRES: usize = 200;
 /// What the noise level is a share of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NoiseOf {
-    /// Each reading.
     Reading,
     /// A channel's span over the training samples.
     Span,
@@ -57,7 +56,6 @@ pub enum NoiseOf {
     Deviation,
     /// A channel's variance: the level is a ratio of powers.
     Power,
-    /// The mean of all readings.
     Mean,
 }
 
@@ -88,7 +86,6 @@ pub struct Setup(pub [usize; AXES.len()]);
 
 impl Setup {
     /// Draws a set-up.
-    #[must_use]
     pub fn random(random: &mut Random) -> Self {
         let mut setup = Self(AXES.map(|axis| random.below(axis.values.len())));
         setup.0[DIRECTION] = usize::from(random.below(FORWARD_IN) == 0);
@@ -126,26 +123,22 @@ impl Setup {
     }
 
     /// Whether every value is one of its axis.
-    #[must_use]
     pub fn is_valid(&self) -> bool {
         self.0.iter().zip(AXES).all(|(value, axis)| *value < axis.values.len())
             && self.held() == *self
     }
 
     /// Number N of training samples.
-    #[must_use]
     pub fn frames(&self) -> usize {
         FRAMES[self.0[SAMPLES]]
     }
 
     /// Number K of centres.
-    #[must_use]
     pub fn centres(&self) -> usize {
         (self.frames() * CENTRES_PERCENT[self.0[CENTRES]] / 100).max(2)
     }
 
     /// Motion of the electrodes.
-    #[must_use]
     pub fn motion(&self) -> motion::Kind {
         const ALL_MM: [f64; 2] = [-1.0, 1.0];
         let dz_mm = [[0.0, 1.0], ALL_MM][self.0[1]];
@@ -158,51 +151,43 @@ impl Setup {
     }
 
     /// Largest minus smallest Δz, in mm.
-    #[must_use]
     pub fn range_mm(&self) -> f64 {
         [1.0, 2.0][self.0[1]]
     }
 
     /// Meaning of the noise level.
-    #[must_use]
     pub fn noise(&self) -> NoiseOf {
         use NoiseOf::{Deviation, Mean, Power, Reading, Span};
         [Reading, Span, Deviation, Power, Mean][self.0[4]]
     }
 
     /// Scaling of the inputs.
-    #[must_use]
     pub fn scaling(&self) -> Scaling {
         use Scaling::{CommonRange, Maximum, Range, Standard, Symmetric};
         [Range, Symmetric, Maximum, CommonRange, Standard][self.0[5]]
     }
 
     /// Meaning of the spread.
-    #[must_use]
     pub fn spread(&self) -> SpreadMeaning {
         [SpreadMeaning::Sigma, SpreadMeaning::HalfHeight][self.0[6]]
     }
 
     /// Whether networks have a bias.
-    #[must_use]
     pub fn bias(&self) -> bool {
         self.0[7] == 1
     }
 
     /// Samples that the table is judged on.
-    #[must_use]
     pub fn judged_on(&self) -> JudgedOn {
         [JudgedOn::Fresh, JudgedOn::SameDeformations, JudgedOn::Training][self.0[JUDGED]]
     }
 
     /// Whether networks predict readings from deformations, as the end of the paper's §3 says, and are inverted.
-    #[must_use]
     pub fn is_forward(&self) -> bool {
         self.0[DIRECTION] == 1
     }
 
     /// Whether electrodes move along z alone.
-    #[must_use]
     pub fn moves_z_alone(&self) -> bool {
         self.0[0] == 1
     }

@@ -36,9 +36,6 @@ pub(super) struct Offer {
 
 impl Bounds {
     /// Checks that the bounds can be met at all.
-    ///
-    /// # Errors
-    /// [`BadValue`] for a bound that is not a positive number.
     pub fn check(&self) -> Result<(), BadValue> {
         for Unmet { bounded, bound, .. } in self.each() {
             if !(bound.is_finite() && bound > 0.0) {
@@ -49,7 +46,6 @@ impl Bounds {
     }
 
     /// Whether any bound is given.
-    #[must_use]
     pub fn any(&self) -> bool {
         *self != Self::default()
     }
@@ -86,9 +82,6 @@ impl Bounds {
 
     /// Checks that the bounds can be met by any of the `offers` that are known before anything is trained: the least that
     /// each way to decode can come down to.
-    ///
-    /// # Errors
-    /// [`NoPoint`] if none is within the bounds.
     pub(super) fn check_possible(&self, offers: &[Offer], unit: &str) -> Result<(), NoPoint> {
         let bounds = if self.any() { self.each() } else { vec![] };
         if offers.is_empty() || offers.iter().any(|offer| within(&bounds, offer, None)) {

@@ -24,7 +24,6 @@ pub enum Memory {
 /// Device whose times are given.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Device {
-    /// Clock of the processor.
     pub clock_mhz: f64,
     /// Memory that its code runs from.
     pub memory: Memory,
@@ -42,15 +41,12 @@ impl Default for Device {
 /// Wires that a scan reads: rows, one after the other, and columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Wires {
-    /// Number of row-wires.
     pub rows: usize,
-    /// Number of column-wires.
     pub columns: usize,
 }
 
 impl Wires {
     /// Wires that readings are named after, such as `r4c17_ohm`; `None` if any has another name.
-    #[must_use]
     pub fn named(readings: &[String]) -> Option<Self> {
         let wires = readings.iter().map(|name| {
             let (row, column) = name.strip_suffix("_ohm")?.strip_prefix('r')?.split_once('c')?;
@@ -79,9 +75,6 @@ pub struct Times {
 
 impl Device {
     /// Checks that the numbers are positive.
-    ///
-    /// # Errors
-    /// [`BadValue`] for the first that is not.
     pub fn check(&self) -> Result<(), BadValue> {
         let numbers = [("clock-mhz", Some(self.clock_mhz)), ("scan-ms", self.scan_ms)];
         for (name, number) in numbers {
@@ -95,7 +88,6 @@ impl Device {
     /// Time of a scan of `wires` with so many `samples` a reading in ms; `None` if nothing tells it.
     ///
     /// A time that the user gives is taken once for every sample.
-    #[must_use]
     pub fn scan_ms(&self, wires: Option<Wires>, samples: usize) -> Option<f64> {
         let short = |number: usize| u16::try_from(number).unwrap_or(u16::MAX);
         let of_board = |Wires { rows, columns }| {
@@ -106,7 +98,6 @@ impl Device {
     }
 
     /// Cycles of a frame with this `cost` in the device's memory.
-    #[must_use]
     pub fn cycles(&self, cost: &Cost) -> u64 {
         match self.memory {
             Memory::Flash => cost.flash_cycles,
@@ -115,7 +106,6 @@ impl Device {
     }
 
     /// Times of a frame whose decoding has this `cost`.
-    #[must_use]
     pub fn times(&self, scan_ms: Option<f64>, cost: &Cost) -> Times {
         let decode_ms = self.cycles(cost) as f64 / (self.clock_mhz * 1000.0);
         let frame_ms = scan_ms.unwrap_or(0.0) + decode_ms;

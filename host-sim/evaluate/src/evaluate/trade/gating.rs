@@ -41,9 +41,6 @@ impl Gates {
     }
 
     /// Gates of measured test frames with these tolerances `k`.
-    ///
-    /// # Errors
-    /// [`BadValue`] for a sensor that is not known at rest.
     pub fn measured(data: &Measurements, k: &[f64], whole_array: bool) -> Result<Self, BadValue> {
         let rest = Rest::of(data, k)?;
         let gate = Gate::at(rest.baseline, data.test.rows, whole_array);

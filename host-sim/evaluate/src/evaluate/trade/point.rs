@@ -12,9 +12,7 @@ use crate::metrics::Errors;
 /// Number format and exponential with which networks are decoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Arithmetic {
-    /// Number format.
     pub format: Format,
-    /// Exponential.
     pub exponential: Exponential,
 }
 
@@ -33,7 +31,6 @@ impl Arithmetic {
     }
 
     /// Name of the arithmetic, as `cargo xtask cycles` spells it.
-    #[must_use]
     pub fn name(self) -> String {
         kernel_name(self.format, self.exponential)
     }
@@ -61,7 +58,6 @@ pub struct Point {
     pub output_rank: Option<usize>,
     /// Width σ on scaled inputs.
     pub spread: f64,
-    /// Whether the networks have an affine tail.
     pub affine_tail: bool,
     /// Number of samples averaged for each reading.
     pub samples_averaged: usize,
@@ -77,7 +73,6 @@ pub struct Point {
     /// Times of one frame on the plan's device.
     #[serde(flatten)]
     pub times: Times,
-    /// Size of the blob.
     pub blob_bytes: usize,
     /// Size of decoder, frame, estimate and working memory; for a gate also the baseline and its
     /// estimate.
@@ -89,25 +84,21 @@ pub struct Point {
 
 impl Point {
     /// RMSE of a group, in its unit.
-    #[must_use]
     pub fn rmse(&self, group: &str) -> f64 {
         self.errors.iter().find(|e| e.group == group).map_or(f64::NAN, |e| e.rmse)
     }
 
     /// Ratio of the RMSE of a group to the limit, where that is known.
-    #[must_use]
     pub fn ratio_to_limit(&self, group: &str) -> Option<f64> {
         self.errors.iter().find(|e| e.group == group)?.ratio_to_limit
     }
 
     /// Arithmetic of the point, and whether it decodes the whole array at once.
-    #[must_use]
     pub fn way(&self) -> String {
         format!("{}{}", self.arithmetic.name(), if self.whole_array { " array" } else { "" })
     }
 
     /// Settings of the point in a few words.
-    #[must_use]
     pub fn name(&self) -> String {
         let tail = if self.affine_tail { " + tail" } else { "" };
         let average = match self.samples_averaged {

@@ -149,7 +149,6 @@ pub(in crate::train) fn worst_share(fitted: &FittedNetwork, table: &RowTable) ->
 /// what ‖x‖ ≤ c + t leaves: the sum is at most |b| + 2gc(c + t) + g(c + t)², while the activation itself is
 /// 2^−gt². Their product has its largest value at a moderate t; an output is off by the sum of these over
 /// |ω|.
-#[must_use]
 pub fn rounding_bounds(network: &Network<'_>) -> Vec<f64> {
     let Network::F32(network) = network else { return Vec::new() };
     let (p, Shape { inputs, outputs, .. }) = (network.parameters(), network.shape());

@@ -29,7 +29,6 @@ pub struct Regressors<'c> {
 
 impl<'c> Regressors<'c> {
     /// Number of regressors.
-    #[must_use]
     pub fn count(&self) -> usize {
         self.centres.len() / self.inputs + if self.affine_tail { self.inputs } else { 0 } + 1
     }
@@ -47,7 +46,6 @@ impl<'c> Regressors<'c> {
     }
 
     /// Regressors of many samples, with `scaled` inputs (`samples × inputs`).
-    #[must_use]
     pub fn of(&self, scaled: impl Into<Cow<'c, [f64]>>) -> Gaussians<'c> {
         let count = self.centres.len() / self.inputs;
         let mut lanes = vec![[0.0; LANES]; count.div_ceil(LANES) * self.inputs];

@@ -44,7 +44,6 @@ impl Recursion {
     ///
     /// # Panics
     /// If a setting or δ is beyond what [`Recursive::check`] allows.
-    #[must_use]
     pub fn new(
         regressors: usize,
         outputs: usize,
@@ -112,7 +111,6 @@ impl Recursion {
     }
 
     /// Factor of all samples so far.
-    #[must_use]
     pub fn factor(&self) -> Factor {
         let (n, outputs) = (self.regressors, self.outputs);
         let cut = |from: usize, to: usize| {

@@ -118,11 +118,11 @@ impl Triangle {
         Self { columns, tiles: vec![BLANK; columns.tiles() * rows] }
     }
 
-    /// Sets R to `diagonal`·I: the rows of a prior.
-    pub(super) fn set_diagonal(&mut self, diagonal: f64) {
+    /// Sets R to this `diagonal`: the rows of a prior.
+    pub(super) fn set_diagonal(&mut self, diagonal: impl Fn(usize) -> f64) {
         let rows = self.rows();
         for i in 0..self.columns.regressors {
-            self.tiles[i / LANES * rows + i].0[i % LANES] = diagonal;
+            self.tiles[i / LANES * rows + i].0[i % LANES] = diagonal(i);
         }
     }
 

@@ -38,9 +38,7 @@ pub enum Outcome {
 
 /// A device.
 pub struct Device {
-    /// Its slots.
     pub slots: [Flash; 2],
-    /// Its power.
     pub supply: Rc<RefCell<Supply>>,
     memory: Box<Memory>,
     /// Memory for a copy of the weights, and for a recalibration.

@@ -56,7 +56,6 @@ impl Torn {
 pub struct Supply {
     /// Number of operations until it is cut; `None` if it is not.
     left: Option<u64>,
-    /// Whether it is cut.
     pub gone: bool,
     /// Number of operations since [`Supply::on`].
     pub operations: u64,
@@ -125,7 +124,6 @@ impl Supply {
 /// A word that has worn out.
 #[derive(Debug, Clone, Copy)]
 pub struct Worn {
-    /// Which word.
     pub place: usize,
     /// Bits that no erase sets.
     pub zeros: u32,

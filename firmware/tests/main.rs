@@ -1,0 +1,18 @@
+//! Every integration test in one program: it is linked once.
+
+#[path = "../qemu/src/checks.rs"]
+mod checks;
+#[path = "../qemu/src/fixed.rs"]
+mod fixed;
+
+mod app;
+mod authenticity;
+mod bit_for_bit;
+mod link_format;
+mod link_fuzz;
+mod recalibration;
+mod recheck;
+mod settings;
+mod store;
+mod trial;
+mod upload;

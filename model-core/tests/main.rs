@@ -1,0 +1,13 @@
+//! Every integration test in one program: it is linked once.
+
+mod common;
+
+mod blob_format;
+mod clamp;
+mod confidence;
+mod decoder;
+mod expansion;
+mod fill;
+mod fixed;
+mod gate;
+mod projection;

@@ -1,0 +1,171 @@
+//! The program as a user runs it.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+/// Folder of a test's own with a scene that runs in a moment: rows 4 and 5 of `press`, without refinement.
+fn folder(name: &str, change: [&str; 2]) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    std::fs::create_dir_all(&folder).unwrap();
+    let mut scene = include_str!("../../../scenes/press.toml").to_owned();
+    for [from, to] in [
+        ["[training]", "[training]\nrefine = false"],
+        ["[outputs]", "[readout]\nrow_wires = [4, 5]\n\n[outputs]"],
+        ["frames = 20000", "frames = 1000"],
+        ["centres = 64", "centres = 12"],
+        change,
+    ] {
+        assert!(scene.contains(from), "{from}");
+        scene = scene.replacen(from, to, 1);
+    }
+    std::fs::write(folder.join("scene.toml"), scene).unwrap();
+    folder
+}
+
+fn run(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_study")).args(arguments).current_dir(folder).output().unwrap()
+}
+
+fn succeed(folder: &Path, arguments: &[&str]) -> String {
+    let output = run(folder, arguments);
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments:?}: {stderr}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn fail(folder: &Path, arguments: &[&str]) -> String {
+    let output = run(folder, arguments);
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+    String::from_utf8(output.stderr).unwrap()
+}
+
+fn json(folder: &Path, arguments: &[&str]) -> Value {
+    serde_json::from_str(&succeed(folder, &[arguments, &["--json"]].concat())).unwrap()
+}
+
+const AS_IT_IS: [&str; 2] = ["[noise]", "[noise]"];
+
+#[test]
+fn every_study_answers_in_words_and_in_json() {
+    let folder = folder("studies", AS_IT_IS);
+    for (arguments, field) in [
+        (&["equations", "scene.toml", "-n", "3"][..], "rows"),
+        (&["directions", "scene.toml", "-n", "3"], "rows"),
+        (&["widths", "scene.toml", "--centres", "6", "--spread", "0.8"], "models"),
+        (
+            &[
+                "map",
+                "scene.toml",
+                "--samples",
+                "30,100",
+                "--test-frames",
+                "50",
+                "--centres",
+                "4,8",
+            ],
+            "maps",
+        ),
+        (&["recursion", "--centres", "3", "-n", "100"], "row_wire"),
+        (&["drift", "scene.toml"], "lines"),
+        (&["readout", "scene.toml", "--frames", "3"], "lines"),
+        (&["confidence", "scene.toml", "-n", "100"], "coverage"),
+    ] {
+        let document = json(&folder, arguments);
+        assert!(document["command"].as_str().unwrap().ends_with(arguments[0]), "{arguments:?}");
+        assert!(!document[field].is_null(), "{arguments:?}: {document}");
+        assert!(succeed(&folder, arguments).lines().count() > 3, "{arguments:?}");
+    }
+}
+
+#[test]
+fn equations_refuse_what_they_do_not_decode_and_draw_a_picture() {
+    let of_z = folder("studies-z", ["[\"x\", \"y\", \"z\"]", "[\"z\"]"]);
+    let said = fail(&of_z, &["equations", "scene.toml"]);
+    assert!(said.contains("equations give all deformations"), "{said}");
+    assert!(fail(&of_z, &["equations", "press", "-n", "0"]).contains("frames = 0"));
+
+    let folder = folder("studies-equations", AS_IT_IS);
+    let page = succeed(&folder, &["equations", "scene.toml", "-n", "4", "-o", "e.svg"]);
+    let solved = page.lines().find(|line| line.starts_with("solved exactly")).unwrap();
+    let shares: Vec<&str> = solved.split_whitespace().skip(3).collect();
+    assert_eq!(shares, ["100.0", "0.0", "0.0", "0.0", "0.0", "0.0", "0.0", "0.0"], "{page}");
+    let picture = std::fs::read_to_string(folder.join("e.svg")).unwrap();
+    assert!(picture.starts_with("<svg") && picture.contains("equations, damped"));
+}
+
+#[test]
+fn a_scenes_own_readout_replaces_the_typical_values() {
+    let own = "[readout]\ncross_talk = true\nrow_switch_ohm = 5.0\nline_ohm = 0.0\n\
+               sampler = \"on-chip\"\nrow_drive = \"shift-register\"";
+    let folder = folder("studies-readout", ["[readout]", own]);
+    let result = json(&folder, &["readout", "scene.toml", "--frames", "5"]);
+    let uncorrected = &result["lines"][6 + 2];
+    assert_eq!(uncorrected["stage"], "series");
+    // A series resistance of 5 Ω lies before the 3.1 Ω of a row.
+    let rms_percent = uncorrected["readings"]["rms_percent"].as_f64().unwrap();
+    assert!((140.0..190.0).contains(&rms_percent), "{rms_percent}");
+}
+
+#[test]
+fn a_confidence_covers_errors_and_finds_faults_novel() {
+    let folder = folder("studies-confidence", ["frames = 1000", "frames = 3000"]);
+    let result = json(&folder, &["confidence", "scene.toml", "-n", "2000"]);
+    for group in result["coverage"].as_array().unwrap() {
+        let of = |field: &str| group["all"][field].as_f64().unwrap();
+        assert!((of("percent_within_68") - 68.3).abs() < 3.0, "{group}");
+        assert!((of("percent_within_95") - 95.0).abs() < 2.0, "{group}");
+    }
+    let detections = result["detections"].as_array().unwrap();
+    assert_eq!(detections.len(), 10);
+    let novel = |at: usize| detections[at]["percent_novel"].as_f64().unwrap();
+    assert!(novel(0) < 1.5, "{}", detections[0]);
+    assert!((1..5).all(|at| novel(at) > 95.0), "{detections:?}");
+}
+
+#[test]
+fn a_wait_shorter_than_the_time_constant_needs_fails() {
+    let hasty = "[readout]\ntime_constant_us = 5.0\nsettling_us = 10";
+    let folder = folder("studies-hasty", ["[readout]", hasty]);
+    let output = run(&folder, &["readout", "scene.toml"]);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("settling takes 46 µs"), "{said}");
+}
+
+#[test]
+fn what_cannot_be_studied_is_refused_by_name() {
+    let small = folder("studies-refused", AS_IT_IS);
+    let wide = folder("studies-wide", ["column_wires = 18", "column_wires = 19"]);
+    let forward = ["[training]", "[training]\ndirection = \"forward\""];
+    let forward = folder("studies-forward", forward);
+    for (folder, command, says) in [
+        (&small, "map --row 9", "--row 9: the scene has rows 1 to 8"),
+        (&small, "map --group dw_mm", "--group dw_mm"),
+        (&small, "map --samples 2,30", "--samples 2: give from 4 to 100000"),
+        (&small, "map --centres 0,64", "--centres 0: give from 1 to 1024"),
+        (&small, "map --spread 1,0.1", "--spread"),
+        (&small, "map --noise 2", "--noise 2"),
+        (&small, "map --initial-covariance -1", "--initial-covariance -1"),
+        (&small, "widths press --spread -1", "--spread -1"),
+        (&small, "widths press --centres 0", "--centres 0: give from 1 to 65535"),
+        (&small, "recursion --row 9", "--row 9: the scene has rows 1 to 8"),
+        (&small, "recursion --centres 0", "--centres 0: give from 1 to 128"),
+        (&small, "recursion -n 10", "--updates 10: give from"),
+        (&small, "drift press --gain 1", "--gain 1"),
+        (&small, "confidence scene.toml -n 0", "--frames = 0: give from 1"),
+        (&small, "readout scene.toml --frames 0", "--frames = 0"),
+        (&wide, "readout scene.toml", "19 column-wires"),
+        (&forward, "drift scene.toml", "direction = forward: drift is about models that decode"),
+        (
+            &forward,
+            "readout scene.toml",
+            "direction = forward: readout is about models that decode",
+        ),
+        (&forward, "confidence scene.toml", "forward: confidence is about models that decode"),
+    ] {
+        let said = fail(folder, &command.split(' ').collect::<Vec<_>>());
+        assert!(said.contains(says), "{command}: {said}");
+    }
+}
