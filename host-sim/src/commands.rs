@@ -90,7 +90,6 @@ fn advice(error: &Error) -> &'static str {
             problem: Problem::ClockSetBack { .. } | Problem::NoTimeStamp { .. },
             ..
         }) => " (--on)",
-        Error::Rig(taxel_rig::Error::OtherReadout { .. }) => " (--scans)",
         Error::Rig(taxel_rig::Error::NoQemu { .. } | taxel_rig::Error::NoStart { .. }) => {
             " (--qemu)"
         }
@@ -116,7 +115,6 @@ fn exit_status(error: &Error) -> u8 {
         Error::Rig(cause) => match cause {
             Rig::Port { .. }
             | Rig::NoRoom { .. }
-            | Rig::OtherReadout { .. }
             | Rig::NoQemu { .. }
             | Rig::NoImage { .. }
             | Rig::NotElf { .. }
