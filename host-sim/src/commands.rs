@@ -110,7 +110,7 @@ fn exit_status(error: &Error) -> u8 {
         | Error::Learn(Learn::NoRegression | Learn::ProjectionBeyondF32 | Learn::NotPacked(_)) => 1,
         Error::Simulate(cause) => match cause {
             taxel_simulate::Error::Setting(_) | taxel_simulate::Error::Data(_) => 2,
-            _ => 1,
+            taxel_simulate::Error::Board { .. } => 1,
         },
         Error::Rig(cause) => match cause {
             Rig::Port { .. }
