@@ -34,13 +34,6 @@ fn decoding_many<E: ExpKernel>(format: Format) -> String {
     format!("INFO {format}, {}: {:08x}\n", E::NAME, crc.expect("the model loads"))
 }
 
-fn twins(format: Format) -> String {
-    let format = format.name();
-    let counts = with_blob(&format!("kernels-{format}.bin"), checks::twins);
-    let [decoded, different] = counts.expect("a model with a twin");
-    format!("INFO {format}: {different} of {decoded} rows differ from the twin's\n")
-}
-
 fn clamping(format: Format) -> String {
     let format = format.name();
     let counts = with_blob(&format!("kernels-{format}.bin"), checks::clamping);
@@ -60,14 +53,7 @@ fn array(format: Format, kind: &str) -> String {
     let file = &format!("array-{}{suffix}.bin", format.name());
     let crc = with_blob(file, checks::decoding_many::<Polynomial, { checks::ARRAY_ROWS }>);
     let crc = crc.expect("the model loads");
-    let line = format!("INFO array, {}{kind}: {crc:08x}\n", format.name());
-    match with_blob(file, checks::array_twins) {
-        Some([compared, different]) => {
-            assert!(compared > checks::MANY / 2, "{compared} frames compared");
-            line + &format!("INFO {different} of {compared} frames differ from the twins'\n")
-        }
-        None => line,
-    }
+    format!("INFO array, {}{kind}: {crc:08x}\n", format.name())
 }
 
 fn gating() -> String {
@@ -84,6 +70,17 @@ fn assessing(what: &str, assessed: Option<checks::Assessed>) -> String {
     format!(
         "INFO confidence, {what}: {crc:08x}, {novel} frames novel, {far} of them far, {missing} missing\n"
     )
+}
+
+/// Readings that no sensor gives decode alike whatever a processor does with subnormals.
+fn extremes(mode: &str) -> String {
+    let of_format = |format: Format| {
+        let name = format!("kernels-{}.bin", format.name());
+        let crc = with_blob(&name, checks::decoding_extremes::<{ checks::ROWS }>);
+        format!("INFO {}: {:08x}\n", format.name(), crc.expect("the model loads"))
+    };
+    let formats = [Format::F32, Format::Fixed16, Format::F32Direct];
+    format!("INFO subnormals {mode}\n{}", formats.map(of_format).concat())
 }
 
 #[test]
@@ -121,8 +118,6 @@ fn every_kernel_decodes_many_frames_on_the_host_as_in_the_emulator() {
         decoding_many::<Polynomial>(Format::F32Direct),
         decoding_many::<Libm>(Format::F32Direct),
         decoding_many::<Micromath>(Format::F32Direct),
-        twins(Format::F32),
-        twins(Format::Fixed16),
         clamping(Format::F32),
         clamping(Format::Fixed16),
         gating(),
@@ -136,25 +131,14 @@ fn every_kernel_decodes_many_frames_on_the_host_as_in_the_emulator() {
         array(Format::F32Direct, " of components"),
         assessing("assess_into", with_blob("array-fixed16-confidence.bin", checks::assessing_many)),
         assessing("1 to 12 directions", checks::assessing_sizes()),
+        extremes("kept"),
+        extremes("flushed to zero"),
         "exit status 0\n".to_owned(),
     ];
-    assert!(of_host.iter().all(|line| !line.contains("differ") || line.contains(" 0 of ")));
     assert!(
         of_host.iter().all(|line| !line.contains("otherwise") || line.contains(", 0 otherwise"))
     );
     assert_eq!(of_host.concat(), expected_log("kernels"));
-}
-
-#[test]
-fn readings_that_no_sensor_gives_decode_alike_with_subnormals_and_without() {
-    let of_format = |format: Format| {
-        let name = format!("kernels-{}.bin", format.name());
-        let crc = with_blob(&name, checks::decoding_extremes::<{ checks::ROWS }>);
-        format!("INFO {}: {:08x}\n", format.name(), crc.expect("the model loads"))
-    };
-    let of_all = [Format::F32, Format::Fixed16, Format::F32Direct].map(of_format).concat();
-    let modes = ["kept", "flushed to zero"].map(|mode| format!("INFO subnormals {mode}\n{of_all}"));
-    assert_eq!(modes.concat() + "exit status 0\n", expected_log("flush_to_zero"));
 }
 
 #[test]

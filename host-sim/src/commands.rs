@@ -90,7 +90,6 @@ fn advice(error: &Error) -> &'static str {
             problem: Problem::ClockSetBack { .. } | Problem::NoTimeStamp { .. },
             ..
         }) => " (--on)",
-        Error::Rig(taxel_rig::Error::OtherReadout { .. }) => " (--scans)",
         Error::Rig(taxel_rig::Error::NoQemu { .. } | taxel_rig::Error::NoStart { .. }) => {
             " (--qemu)"
         }
@@ -111,12 +110,11 @@ fn exit_status(error: &Error) -> u8 {
         | Error::Learn(Learn::NoRegression | Learn::ProjectionBeyondF32 | Learn::NotPacked(_)) => 1,
         Error::Simulate(cause) => match cause {
             taxel_simulate::Error::Setting(_) | taxel_simulate::Error::Data(_) => 2,
-            _ => 1,
+            taxel_simulate::Error::Board { .. } => 1,
         },
         Error::Rig(cause) => match cause {
             Rig::Port { .. }
             | Rig::NoRoom { .. }
-            | Rig::OtherReadout { .. }
             | Rig::NoQemu { .. }
             | Rig::NoImage { .. }
             | Rig::NotElf { .. }

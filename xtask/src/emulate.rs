@@ -2,7 +2,6 @@
 //! Two run at a time; results are printed in order.
 
 mod application;
-mod cable;
 mod expected;
 pub mod qemu;
 mod queue;

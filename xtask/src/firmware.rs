@@ -28,16 +28,8 @@ pub const APP: Packages =
 pub const NUCLEO: Packages = &["--package", "nucleo-f446re"];
 
 /// Libraries of the images, and the link check.
-const LIBRARIES: Packages = &[
-    "--package",
-    "model-core",
-    "--package",
-    "firmware",
-    "--package",
-    "remote-readout",
-    "--package",
-    "link-check",
-];
+const LIBRARIES: Packages =
+    &["--package", "model-core", "--package", "firmware", "--package", "link-check"];
 
 /// Builds and lints everything that runs on a device. Links the link check, and once more with a panic in it,
 /// which must fail.

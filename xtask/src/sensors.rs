@@ -116,7 +116,7 @@ fn train(sensor: &Sensor, data: &Path, format: &str, model: &Path) -> Outcome {
 /// Decodes frames on host and device, and fails if one differs.
 fn decode(data: &Path, model: &Path, image: &Path) -> Outcome {
     let frames = FRAMES.to_string();
-    let arguments = ["emulate", "-n", &frames, "--scans=0"];
+    let arguments = ["emulate", "-n", &frames];
     let out = host_sim(&arguments, &[("--model", model), ("--image", image)], data)?;
     let says = format!("{FRAMES} of {FRAMES} bit-identical");
     if out.contains(&says) { Ok(()) } else { Err(format!("it does not say {says:?}:\n{out}")) }

@@ -5,15 +5,8 @@ use serde_json::Value;
 use crate::process::{Outcome, capture, cargo};
 
 /// The workspace's crates from the ground up, floor by floor: none depends on one above it.
-const DEVICE: &[&str] = &[
-    "model-core",
-    "firmware",
-    "remote-readout",
-    "board-common",
-    "link-check",
-    "qemu-image",
-    "nucleo-f446re",
-];
+const DEVICE: &[&str] =
+    &["model-core", "firmware", "board-common", "link-check", "qemu-image", "nucleo-f446re"];
 /// Crates that stand in for a device in its tests, and in proofs.
 const MOCKS: &[&str] = &["mock-board"];
 const DESK: &[&str] = &[

@@ -180,43 +180,6 @@ fn decoding_all<E: ExpKernel, const R: usize>(
     Some(digest.finalize())
 }
 
-/// Infers a network's outputs by the compiled twin of its assembly routine; `None` if the format has none.
-fn infer_by_twin(network: &Network<'_>, inputs: &[f32; COLS], outputs: &mut [f32]) -> Option<()> {
-    let mut scaled = [0.0; COLS];
-    network.scale(inputs, &mut scaled).ok()?;
-    match network {
-        Network::F32Direct(_) => return None,
-        Network::F32(network) => network.infer_scaled_portably(&mut scaled, outputs),
-        Network::Fixed16(network) => network.infer_scaled_portably(&mut scaled, outputs),
-    }
-    Some(())
-}
-
-/// Number of rows of [`MANY`] frames that the model in `blob` decodes, and how many of them the compiled twin
-/// decodes to other bits. `None` if the blob does not load, or its number format has no twin.
-pub fn twins(blob: &[u8]) -> Option<[usize; 2]> {
-    let decoder = Decoder::<ROWS>::load(blob).ok()?;
-    let model = Model::decode(blob).ok()?;
-    let mut numbers = Numbers::new(4);
-    let [mut compared, mut different] = [0; 2];
-    for index in 0..MANY {
-        let frame = one_of_many::<ROWS>(index, &mut numbers);
-        let Decoded { outputs, status, .. } = Decoded::of(&decoder, &frame)?;
-        let rows = frame.iter().zip(&outputs).zip(status).enumerate();
-        for (row, ((readings, outputs), status)) in rows {
-            if status != RowStatus::Decoded {
-                continue;
-            }
-            let network = model.networks().nth(model.network_of_row(row)?)?;
-            let mut of_twin = [0.0; OUTPUTS];
-            infer_by_twin(&network, readings, &mut of_twin)?;
-            compared += 1;
-            different += usize::from(outputs.map(f32::to_bits) != of_twin.map(f32::to_bits));
-        }
-    }
-    Some([compared, different])
-}
-
 /// Number of frames with one reading within four steps of f32 of an end of the clamp, how many of them are said to be
 /// clamped, and how many otherwise than by portable arithmetic. `None` if the blob does not load, or its number format
 /// clamps before it infers.
@@ -256,39 +219,6 @@ pub fn clamping(blob: &[u8]) -> Option<[usize; 3]> {
         }
     }
     Some([frames, clamped, otherwise])
-}
-
-/// Number of the [`MANY`] frames that the model in `blob` decodes behind a projection, and how many of them the
-/// compiled twins of projection, network and expansion decode to other bits. `None` if the blob does not load, or its number
-/// format has no twin.
-pub fn array_twins(blob: &[u8]) -> Option<[usize; 2]> {
-    let decoder = Decoder::<ARRAY_ROWS>::load(blob).ok()?;
-    let model = Model::decode(blob).ok()?;
-    let (projection, network) = (model.projection()?, model.networks().next()?);
-    let mut numbers = Numbers::new(4);
-    let [mut compared, mut different] = [0; 2];
-    for index in 0..MANY {
-        let frame = one_of_many::<ARRAY_ROWS>(index, &mut numbers);
-        let Decoded { outputs, status, .. } = Decoded::of(&decoder, &frame)?;
-        if status != [RowStatus::Decoded; ARRAY_ROWS] {
-            continue;
-        }
-        let mut features = [0.0; COLS];
-        let mut of_twin = [[0.0; OUTPUTS]; ARRAY_ROWS];
-        projection.project_portably(frame.as_flattened(), &mut features);
-        match model.expansion() {
-            Some(expansion) => {
-                let mut components = [0.0; ARRAY_COMPONENTS];
-                infer_by_twin(&network, &features, &mut components)?;
-                expansion.expand_portably(&components, of_twin.as_flattened_mut());
-            }
-            None => infer_by_twin(&network, &features, of_twin.as_flattened_mut())?,
-        }
-        let bits = |outputs: [[f32; OUTPUTS]; ARRAY_ROWS]| outputs.map(|row| row.map(f32::to_bits));
-        compared += 1;
-        different += usize::from(bits(outputs) != bits(of_twin));
-    }
-    Some([compared, different])
 }
 
 /// Sizes of the confidence of a model of the small sensor.

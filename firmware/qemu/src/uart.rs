@@ -19,16 +19,7 @@ impl Uart {
     /// Starts the UART of the first `-serial` on QEMU's command line.
     pub fn first() -> Self {
         // SAFETY: UART0 lies at this address.
-        Self::start(unsafe { Registers::at(0x4000_4000) })
-    }
-
-    /// Starts the UART of the second `-serial` on QEMU's command line.
-    pub fn second() -> Self {
-        // SAFETY: UART1 lies at this address.
-        Self::start(unsafe { Registers::at(0x4000_5000) })
-    }
-
-    fn start(registers: Registers) -> Self {
+        let registers = unsafe { Registers::at(0x4000_4000) };
         registers.write(BAUD_DIVIDER, 25_000_000 / 921_600);
         registers.write(CTRL, BOTH_ENABLED);
         Self(registers)

@@ -1,8 +1,8 @@
 //! A device at the other end of a serial line, real or emulated.
 //!
 //! [`Device`] sends requests and receives reports; [`upload`] replaces its model, and [`recalibrate`] lets it mend its
-//! own; [`calibrate`] finds the constants of its circuit; [`stream`] lets it decode frames; [`check`] and [`scan`] compare it with the host. `docs/link.md`
-//! specifies the protocol.
+//! own; [`calibrate`] finds the constants of its circuit; [`stream`] lets it decode frames; [`check`] compares it with the host.
+//! `docs/link.md` specifies the protocol.
 
 use std::collections::VecDeque;
 use std::hash::{BuildHasher, Hasher, RandomState};
@@ -31,7 +31,6 @@ mod key;
 pub mod upload;
 pub mod recalibrate;
 mod expected;
-pub mod scan;
 pub mod check;
 
 use configuration::Kept;

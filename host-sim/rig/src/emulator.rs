@@ -1,4 +1,4 @@
-//! Emulated device: the firmware's image in QEMU's mps2-an386, a Cortex-M4F, with its serial lines
+//! Emulated device: the firmware's image in QEMU's mps2-an386, a Cortex-M4F, with its link
 //! connected.
 
 use std::fs::File;
@@ -30,8 +30,6 @@ pub struct Options {
     pub log: Option<PathBuf>,
     /// Path for the file of a mailbox while the emulator runs; without it the link is on the first UART.
     pub mailbox: Option<PathBuf>,
-    /// Whether the readout's line is wanted.
-    pub readout: bool,
 }
 
 impl Options {
@@ -53,14 +51,6 @@ impl Options {
             Err(cause) => Err(Error::NoImage { image: self.image.clone(), cause }),
         }
     }
-}
-
-/// Serial lines of the image.
-#[derive(Debug)]
-pub struct Lines {
-    pub link: Link,
-    /// Second UART, of the readout, if it was wanted.
-    pub readout: Option<TcpStream>,
 }
 
 /// Line that carries the link.
@@ -146,37 +136,28 @@ impl Drop for SharedFile {
 }
 
 impl Emulator {
-    /// Starts QEMU and connects to the image's serial lines.
+    /// Starts QEMU and connects to the image's link.
     ///
     /// # Errors
     /// [`Error::NoQemu`], [`Error::NoImage`] or [`Error::NotElf`] if a file is missing or wrong,
     /// [`Error::Mailbox`] if its file cannot be made, or [`Error::NoStart`].
-    pub fn start(options: &Options) -> Result<(Self, Lines)> {
+    pub fn start(options: &Options) -> Result<(Self, Link)> {
         Self::start_with(options, &[])
     }
 
-    /// Starts QEMU with further `arguments`, and connects to the image's serial lines.
-    pub fn start_with(options: &Options, arguments: &[&str]) -> Result<(Self, Lines)> {
+    /// Starts QEMU with further `arguments`, and connects to the image's link.
+    pub fn start_with(options: &Options, arguments: &[&str]) -> Result<(Self, Link)> {
         options.check()?;
         let failed = |cause| Error::NoStart { qemu: options.qemu.clone(), cause };
-        let listen = || {
-            let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
-            let port = listener.local_addr()?.port();
-            Ok((listener, format!("tcp:127.0.0.1:{port},nodelay=on")))
-        };
-        let listen = || listen().map_err(failed);
-        let (uart, uart_serial) = listen()?;
-        let readout = options.readout.then(listen).transpose()?;
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).map_err(failed)?;
+        let port = listener.local_addr().map_err(failed)?.port();
         let mut command = Command::new(&options.qemu);
         let mailbox = options.mailbox.as_deref().map(create_mailbox).transpose()?;
         let shared = options.mailbox.clone().map(SharedFile);
         command.args(machine(options.mailbox.as_deref()));
         command.args(["-cpu", "cortex-m4", "-display", "none"]);
         command.args(["-monitor", "none", "-semihosting-config", "enable=on,target=native"]);
-        command.args(["-serial", &uart_serial]).args(arguments);
-        if let Some((_, readout_serial)) = &readout {
-            command.args(["-serial", readout_serial]);
-        }
+        command.args(["-serial", &format!("tcp:127.0.0.1:{port},nodelay=on")]).args(arguments);
         if let Some(model) = &options.model {
             let path = escaped(model);
             let place = format!("loader,file={path},addr={SLOT_ADDRESS:#x},force-raw=on");
@@ -198,9 +179,7 @@ impl Emulator {
             failed(cause)
         })?;
         let mut emulator = Self { child, _shared: shared };
-        let mut connect = |to: &TcpListener| accept(to, &mut emulator.child).map_err(failed);
-        let uart = connect(&uart)?;
-        let readout = readout.map(|(listener, _)| connect(&listener)).transpose()?;
+        let uart = accept(&listener, &mut emulator.child).map_err(failed)?;
         let link = match mailbox {
             Some(mailbox) => {
                 uart.set_nonblocking(true).map_err(failed)?;
@@ -208,7 +187,7 @@ impl Emulator {
             }
             None => Link::Uart(uart),
         };
-        Ok((emulator, Lines { link, readout }))
+        Ok((emulator, link))
     }
 }
 

@@ -147,13 +147,6 @@ pub enum Error {
     /// Exponential of the device that the host does not know.
     #[error("the device decodes with {0:?}, which this host does not know")]
     UnknownExponential(String),
-    /// World with another readout than the image has.
-    #[error("the image's readout.{field} is {only:?}; set it to that, or remove it")]
-    OtherReadout {
-        field: &'static str,
-        /// Part that the image has.
-        only: &'static str,
-    },
     /// Emulator whose program is missing.
     #[error("{}: there is no such program; on Debian: apt-get install qemu-system-arm", qemu.display())]
     NoQemu { qemu: PathBuf },

@@ -35,10 +35,4 @@ pub enum Error {
     /// Virtual board whose parts were used as real ones must not be.
     #[error("the virtual board refused {times} times, first: {first}")]
     Board { times: usize, first: Violation },
-    /// Failure of the line that drives a virtual board.
-    #[error("the readout's line failed: {0}")]
-    Line(#[from] std::io::Error),
-    /// Request for a part of the virtual board that does not exist.
-    #[error("the readout's line asks for {0}, which does not exist")]
-    UnknownRequest(String),
 }

@@ -33,7 +33,6 @@ mod converters;
 mod board;
 mod handles;
 mod scanner;
-mod remote;
 mod scan;
 #[cfg(test)]
 mod tests;

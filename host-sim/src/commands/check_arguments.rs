@@ -12,7 +12,7 @@ use taxel_learn::{Exponential, ModelBlob};
 use taxel_rig::device::check::{Findings, Frames, Plan};
 use taxel_simulate::sensor::Precision;
 use taxel_simulate::synth::BASELINE_FRAMES;
-use taxel_simulate::{Synthesis, World, synthesise};
+use taxel_simulate::{Synthesis, synthesise};
 
 use super::data_file::FieldArguments;
 use super::progress::Terminal;
@@ -62,8 +62,6 @@ pub struct Checked {
     pub frames: Frames,
     /// Model of the device.
     pub model: ModelBlob,
-    /// World of the readings; `None` for those of a CSV file.
-    pub world: Option<World>,
 }
 
 /// Bounds on the memory of the firmware, without its models.
@@ -115,7 +113,7 @@ impl CheckArguments {
         let readings = model_inputs(&model.prepare(Exponential::default()), &file)?;
         let baseline_ohm = self.baseline_ohm(model.parse().metadata(), path)?;
         let frames = Frames { readings: readings.cycled(self.frames.max(1)), baseline_ohm };
-        Ok(Checked { frames, model, world: None })
+        Ok(Checked { frames, model })
     }
 
     /// Baseline of which all readings are believed: the device is given the same one.
@@ -158,7 +156,7 @@ impl CheckArguments {
         };
         let readings = synthesise(&scene.world, Stream::Test, self.frames.max(1)).inputs;
         let frames = Frames { readings, baseline_ohm };
-        Ok(Checked { frames, model, world: Some(scene.world) })
+        Ok(Checked { frames, model })
     }
 
     /// Plan of the check, with `window` frames on their way at a time.
@@ -223,20 +221,6 @@ fn page_of(f: &Findings) -> print::Page {
             f.frames.bit_identical, f.frames.frames, f.frames.frames_per_s
         ),
     );
-    if let Some(s) = &f.scans {
-        line(
-            "scans",
-            format!(
-                "{} of {} readings and {} of {} estimates bit-identical, {} samples failed, {:.1} a second",
-                s.bit_identical_readings,
-                s.scans,
-                s.bit_identical_estimates,
-                s.scans,
-                s.failed_samples,
-                s.scans_per_s
-            ),
-        );
-    }
     if let Some(u) = &f.uploads {
         let good = if u.good_came_into_force { "activated" } else { "NOT ACTIVATED" };
         line("good uploads", format!("{good} ({} bytes and more)", u.blob_bytes));

@@ -3,12 +3,11 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use crate::{Error, Result};
+use crate::Result;
 use clap::{Args, ValueEnum};
 use taxel_data::output;
 use taxel_rig::device::Device;
-use taxel_rig::device::check::{Findings, check};
-use taxel_rig::device::scan;
+use taxel_rig::device::check::check;
 use taxel_rig::emulator::{self, Emulator};
 
 use super::check_arguments::{CheckArguments, Checked, conclude};
@@ -36,17 +35,11 @@ enum Line {
 /// asked for is passed.
 #[derive(Args)]
 #[command(
-    after_help = "Example: cargo xtask firmware && host-sim emulate press -n 10000 --scans 100\n\nNeeds qemu-system-arm and the image; docs/emulator.md tells how to get both."
+    after_help = "Example: cargo xtask firmware && host-sim emulate press -n 10000\n\nNeeds qemu-system-arm and the image; docs/emulator.md tells how to get both."
 )]
 pub struct Arguments {
     #[command(flatten)]
     check: CheckArguments,
-    /// Scans of a virtual board at the image's second serial line, to be compared with the host's.
-    ///
-    /// Faults of the scene's [readout] are simulated; its parts are the image's: zero potential, 74HC595,
-    /// MCP3208.
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    scans: usize,
     /// Line that carries the link.
     #[arg(long, value_enum, value_name = "LINE", default_value_t)]
     line: Line,
@@ -78,20 +71,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         model: None,
         log: arguments.log.is_some().then(|| scratch.path().join("log.defmt")),
         mailbox: (arguments.line == Line::Mailbox).then(|| scratch.path().join("mailbox.ram")),
-        readout: arguments.scans > 0,
     };
     options.check()?;
-    let Checked { frames, model, world } = arguments.check.load(common)?;
-    let scanned_world = match &world {
-        _ if arguments.scans == 0 => None,
-        None => {
-            return Err(Error::Usage("--scans needs a scene, whose sensor is simulated".into()));
-        }
-        Some(world) => {
-            world.check_frames("--scans", arguments.scans)?;
-            Some(scan::with_parts_of_image(world)?)
-        }
-    };
+    let Checked { frames, model } = arguments.check.load(common)?;
 
     // QEMU puts the blob at the place where a board has it in flash.
     let blob = scratch.path().join("model.bin");
@@ -99,18 +81,11 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     written.map_err(|cause| taxel_data::Error::write(&blob, cause))?;
     let log = options.log.clone();
     let started = Emulator::start(&emulator::Options { model: Some(blob.clone()), ..options });
-    let outcome = started.and_then(|(_emulator, lines)| {
-        let mut device = Device::new(lines.link)?;
+    let outcome = started.and_then(|(_emulator, link)| {
+        let mut device = Device::new(link)?;
         device.patience = PATIENCE;
-        let progress = Terminal::new();
-        let scanned = lines.readout.zip(scanned_world).map(|(line, world)| {
-            let baseline_ohm = frames.baseline_ohm.as_deref();
-            let scans = arguments.scans;
-            scan::check(&mut device, &world, &model, baseline_ohm, line, scans, &progress)
-        });
-        let scans = scanned.transpose()?;
         let plan = arguments.check.plan(WINDOW, common);
-        Ok(Findings { scans, ..check(&mut device, &frames, &model, &plan, &progress)? })
+        check(&mut device, &frames, &model, &plan, &Terminal::new())
     });
     if let Some((temporary, wanted)) = log.zip(arguments.log.as_ref()) {
         let logged = std::fs::read(&temporary).unwrap_or_default();

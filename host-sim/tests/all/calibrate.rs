@@ -15,11 +15,11 @@ use taxel_data::progress::Silent;
 use taxel_data::random::Stream;
 use taxel_rig::Error;
 use taxel_rig::calibration::{CircuitConstants, Fit};
+use taxel_rig::device::Device;
 use taxel_rig::device::calibrate::{Reading, calibrate};
-use taxel_rig::device::{Device, scan};
 use taxel_rig::emulator::{self, Emulator};
 use taxel_rig::mailbox::Mailbox;
-use taxel_simulate::readout::Readout;
+use taxel_simulate::readout::{Drive, Readout};
 use taxel_simulate::virtual_board::{Parts, Pin, VirtualBoard};
 use taxel_simulate::{World, synthesise};
 
@@ -40,16 +40,17 @@ fn parts() -> Parts {
 
 fn world() -> World {
     let readout = Readout {
+        row_drive: Some(Drive::ShiftRegister),
         cross_talk: Some(true),
         op_amp_offset_v: Some(5e-4),
         adc_noise_counts: Some(0.5),
         time_constant_us: Some(5.0),
         ..Readout::default()
     };
-    scan::with_parts_of_image(&World { readout, ..World::press() }).unwrap()
+    World { readout, ..World::press() }
 }
 
-/// The image's readout on a virtual board, in whatever thread scans it, with constants that can be set.
+/// The board's readout on a virtual board, in whatever thread scans it, with constants that can be set.
 #[derive(Clone)]
 struct Bench {
     circuit: ZeroPotential<8, 18>,
@@ -245,10 +246,9 @@ fn the_image_keeps_settings_over_restarts() {
         model: None,
         log: None,
         mailbox: Some(folder.path("mailbox.ram")),
-        readout: false,
     };
-    let (_emulator, lines) = Emulator::start(&options).unwrap();
-    let mut device = Device::new(lines.link).unwrap();
+    let (_emulator, link) = Emulator::start(&options).unwrap();
+    let mut device = Device::new(link).unwrap();
     device.patience = Duration::from_mins(1);
     assert_eq!(device.kept().unwrap().configuration, None);
     let quiet = device.configuration().unwrap().configuration;

@@ -220,10 +220,9 @@ fn the_image_answers_alike_on_both_lines() {
             model: Some(blob.clone()),
             log: None,
             mailbox,
-            readout: false,
         };
-        let (_emulator, lines) = Emulator::start(&options).unwrap();
-        answers(lines.link, &requests)
+        let (_emulator, link) = Emulator::start(&options).unwrap();
+        answers(link, &requests)
     });
     assert!(answers[0] == answers[1], "other bytes through the mailbox");
     assert_eq!(folder.names(), ["old.bin"], "the mailbox goes with the emulator");

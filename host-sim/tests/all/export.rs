@@ -6,7 +6,7 @@ use model_core::AlignedBytes;
 use model_core::blob::Model;
 use model_core::rbf::Network;
 use taxel_data::random::Stream;
-use taxel_rig::device::scan::with_parts_of_image;
+use taxel_simulate::readout::Drive;
 use taxel_simulate::virtual_board::{Pin, VirtualBoard, all_readings};
 use taxel_simulate::{World, synthesise};
 
@@ -104,7 +104,8 @@ fn parts_that_a_fixed_has_no_room_for_are_refused_by_name_with_the_fix() {
 #[test]
 fn the_example_estimates_compression_from_pins_and_converters() {
     const FRAMES: usize = 200;
-    let mut world = with_parts_of_image(&World::press()).unwrap();
+    let mut world = World::press();
+    world.readout.row_drive = Some(Drive::ShiftRegister);
     world.readout.row_switch_ohm = Some(0.26); // for which the example corrects
     let board = VirtualBoard::new(&world).unwrap();
     let pins = [Pin::RowData, Pin::RowClock, Pin::RowLatch].map(|pin| board.pin(pin));

@@ -27,6 +27,5 @@ mod recalibrate;
 mod recursion;
 mod refusals;
 mod refused_readings;
-mod scan;
 mod trade;
 mod workflow;

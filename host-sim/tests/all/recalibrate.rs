@@ -168,10 +168,9 @@ fn two_hundred_presses_mend_the_model_of_a_drifted_sensor_in_the_emulator() {
             model: None,
             log: None,
             mailbox: Some(folder.path("mailbox.ram")),
-            readout: false,
         };
-        let (_emulator, lines) = Emulator::start(&options).unwrap();
-        let mut device = Device::new(lines.link).unwrap();
+        let (_emulator, link) = Emulator::start(&options).unwrap();
+        let mut device = Device::new(link).unwrap();
         device.patience = Duration::from_mins(1);
         let [before, after, fresh] = drifted.mend(&mut device);
         assert!(before > 3.0 * fresh, "the drift must hurt: {before} for {fresh}");

@@ -37,7 +37,6 @@ pub const PROMISES: &[Promise] = &[
     exponentials::ANY_NUMBER,
     inference::F32,
     inference::FIXED16,
-    emulated::EXTREMES,
     training::EXTREMES,
     scale::SCALE,
     least_squares::RESIDUAL,

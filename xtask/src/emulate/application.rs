@@ -15,21 +15,15 @@ const LIMITS: [&str; 2] = ["--flash-limit=112640", "--ram-limit=14336"];
 
 /// Options of the check with a network a row.
 const OF_ROWS: &[&str] =
-    &["-n10000", "--scans=20", "--damaged-uploads=1000", "--interruptions", "--garbage=100000"];
+    &["-n10000", "--damaged-uploads=1000", "--interruptions", "--garbage=100000"];
 
 /// Options of the check on the UART, where every byte takes a turn of QEMU's main loop. They are enough to show
 /// that the driver loses nothing, and that the link finds its messages again after damage.
-const ON_UART: &[&str] = &[
-    "--line=uart",
-    "-n200",
-    "--scans=5",
-    "--damaged-uploads=7",
-    "--interruptions",
-    "--garbage=20000",
-];
+const ON_UART: &[&str] =
+    &["--line=uart", "-n200", "--damaged-uploads=7", "--interruptions", "--garbage=20000"];
 
 /// Options of the check with one network for the whole array. Only decoding differs; it takes more stack.
-const OF_ARRAY: &[&str] = &["-n1000", "--scans=20"];
+const OF_ARRAY: &[&str] = &["-n1000"];
 
 /// Training options of the network for the whole array: the number format and K that are the fastest on a device.
 const ARRAY: &[&str] = &["--whole-array", "--format=fixed16", "--centres=64"];

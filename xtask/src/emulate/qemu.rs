@@ -9,7 +9,6 @@ use std::time::{Duration, Instant};
 
 use defmt_decoder::{DecodeError, Table};
 
-use super::cable;
 use crate::process::{Outcome, first_line};
 
 /// Name of the emulator's program.
@@ -52,8 +51,10 @@ pub struct Ended {
 pub fn run(elf: &Path) -> Outcome<Ended> {
     let table = table(elf)?;
 
-    let mut child =
-        command(elf)?.spawn().map_err(|cause| format!("cannot start {QEMU}: {cause}"))?;
+    let mut command = machine(elf);
+    // Time is counted by instructions, 32 ns each, so that a program runs alike on a busy computer.
+    command.args(["-icount", "shift=5"]);
+    let mut child = command.spawn().map_err(|cause| format!("cannot start {QEMU}: {cause}"))?;
     // Both pipes must be read, because a full pipe makes its writer wait.
     let logged = reader(child.stdout.take());
     let complaints = reader(child.stderr.take());
@@ -82,19 +83,6 @@ pub fn machine(elf: &Path) -> Command {
     command.arg("-kernel").arg(elf);
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     command
-}
-
-/// Command that runs the program in `elf` in QEMU, with its first two UARTs connected to each other.
-fn command(elf: &Path) -> Outcome<Command> {
-    let ports = cable::lay().map_err(|cause| format!("cannot connect the UARTs: {cause}"))?;
-    let mut command = machine(elf);
-    // Time is counted by instructions, 32 ns each, so that a program runs alike on a busy computer.
-    command.args(["-icount", "shift=5"]);
-    for port in ports {
-        command.args(["-chardev", &format!("socket,id=uart{port},host=127.0.0.1,port={port}")]);
-        command.args(["-serial", &format!("chardev:uart{port}")]);
-    }
-    Ok(command)
 }
 
 /// Reads `stream` to its end, in a thread.

@@ -1,11 +1,14 @@
 //! Decodes 10,000 frames with every number format and exponential, with readings within and far beyond the
-//! training range, gates as many, and tells their novelty and deviations. `firmware/tests/bit_for_bit.rs` checks that the host gives the same bits.
-//! Assembly routines and their compiled twins agree here.
+//! training range, gates as many, and tells their novelty and deviations. At last decodes readings that no sensor gives,
+//! with subnormals kept and with them flushed to zero. `firmware/tests/bit_for_bit.rs` checks that the host gives the same
+//! bits: it runs the compiled twins of the assembly routines.
 #![no_std]
 #![no_main]
 
+use core::hint::black_box;
+
 use cortex_m_rt::entry;
-use defmt::{info, unwrap};
+use defmt::{assert_eq, info, unwrap};
 use model_core::Aligned;
 use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
 use model_core::rbf::Format;
@@ -26,12 +29,6 @@ fn decode<E: ExpKernel>(format: Format, blob: &[u8]) {
     info!("{=str}, {=str}: {=u32:08x}", format.name(), E::NAME, crc);
 }
 
-fn compare(format: Format, blob: &[u8]) {
-    let [compared, different] = unwrap!(checks::twins(blob));
-    let format = format.name();
-    info!("{=str}: {=usize} of {=usize} rows differ from the twin's", format, different, compared);
-}
-
 fn clamp(format: Format, blob: &[u8]) {
     let [frames, clamped, otherwise] = unwrap!(checks::clamping(blob));
     info!(
@@ -47,9 +44,6 @@ fn clamp(format: Format, blob: &[u8]) {
 fn array(format: Format, kind: &str, blob: &[u8]) {
     let crc = unwrap!(checks::decoding_many::<Polynomial, { checks::ARRAY_ROWS }>(blob));
     info!("array, {=str}{=str}: {=u32:08x}", format.name(), kind, crc);
-    if let Some([compared, different]) = checks::array_twins(blob) {
-        info!("{=usize} of {=usize} frames differ from the twins'", different, compared);
-    }
 }
 
 fn gate(blob: &[u8]) {
@@ -69,8 +63,36 @@ fn assess(what: &str, assessed: Option<Assessed>) {
     );
 }
 
+/// Bit of FPSCR that flushes subnormals to zero.
+const FLUSH_TO_ZERO: u32 = 1 << 24;
+/// Bits of FPSCR: alternative half precision, default NaN, flush to zero, rounding mode.
+const MODES: u32 = 1 << 26 | 1 << 25 | FLUSH_TO_ZERO | 3 << 22;
+
+/// The modes of the floating-point unit.
+fn modes() -> u32 {
+    let fpscr: u32;
+    // SAFETY: reading the status has no effect.
+    unsafe { core::arch::asm!("vmrs {}, fpscr", out(reg) fpscr) };
+    fpscr & MODES
+}
+
+/// Decodes readings that no sensor gives, in these modes of the floating-point unit.
+fn extremes(mode: &str, bits: u32, models: [(Format, &[u8]); 3]) {
+    // SAFETY: the mode changes results of floating-point instructions alone, which is what is tested.
+    unsafe { core::arch::asm!("vmsr fpscr, {}", in(reg) bits) };
+    let half = black_box(f32::MIN_POSITIVE) * black_box(0.5);
+    assert_eq!(half.to_bits() == 0, bits == FLUSH_TO_ZERO);
+    info!("subnormals {=str}", mode);
+    for (format, blob) in models {
+        let crc = unwrap!(checks::decoding_extremes::<{ checks::ROWS }>(blob));
+        info!("{=str}: {=u32:08x}", format.name(), crc);
+    }
+    assert_eq!(modes(), bits);
+}
+
 #[entry]
 fn main() -> ! {
+    assert_eq!(modes(), 0);
     let (f32, fixed16) = (model!("kernels-f32.bin"), model!("kernels-fixed16.bin"));
     let f32_direct = model!("kernels-f32-direct.bin");
     decode::<Polynomial>(Format::F32, f32);
@@ -78,8 +100,6 @@ fn main() -> ! {
     decode::<Polynomial>(Format::F32Direct, f32_direct);
     decode::<Libm>(Format::F32Direct, f32_direct);
     decode::<Micromath>(Format::F32Direct, f32_direct);
-    compare(Format::F32, f32);
-    compare(Format::Fixed16, fixed16);
     clamp(Format::F32, f32);
     clamp(Format::Fixed16, fixed16);
     gate(fixed16);
@@ -93,5 +113,9 @@ fn main() -> ! {
     array(Format::F32Direct, " of components", model!("array-f32-direct-components.bin"));
     assess("assess_into", checks::assessing_many(model!("array-fixed16-confidence.bin")));
     assess("1 to 12 directions", checks::assessing_sizes());
+    let models: [(Format, &[u8]); 3] =
+        [(Format::F32, f32), (Format::Fixed16, fixed16), (Format::F32Direct, f32_direct)];
+    extremes("kept", 0, models);
+    extremes("flushed to zero", FLUSH_TO_ZERO, models);
     exit::success()
 }

@@ -10,7 +10,6 @@ use taxel_data::table::Table;
 use taxel_learn::ModelBlob;
 
 use super::expected::{Expected, prepare};
-use super::scan::ScanFindings;
 use super::{Device, DeviceIdentity, Wire};
 use crate::error::{Error, Result};
 
@@ -55,8 +54,6 @@ pub struct Findings {
     pub statistics: Statistics,
     /// Findings about decoding.
     pub frames: FrameFindings,
-    /// Findings about scans, if [they were checked](super::scan::check) as well.
-    pub scans: Option<ScanFindings>,
     /// Findings about uploads, if any were asked for.
     pub uploads: Option<UploadFindings>,
     /// Findings about garbage, if any was asked for.
@@ -72,7 +69,6 @@ impl Findings {
     /// fault of the line, and counts as bad.
     pub fn all_good(&self) -> bool {
         let frames = self.frames.bit_identical == self.frames.frames;
-        let scans = self.scans.as_ref().is_none_or(ScanFindings::all_good);
         let uploads = self.uploads.as_ref().is_none_or(|u| {
             u.good_came_into_force
                 && u.damaged_refused == u.damaged
@@ -82,7 +78,7 @@ impl Findings {
             .garbage
             .as_ref()
             .is_none_or(|g| g.decodes_as_before && g.requests_until_answer <= 2);
-        frames && scans && uploads && garbage && self.repeated == 0 && self.damaged == 0
+        frames && uploads && garbage && self.repeated == 0 && self.damaged == 0
     }
 }
 
@@ -159,7 +155,6 @@ fn check_paused<W: Wire>(
         device: identity,
         statistics: device.statistics()?,
         frames,
-        scans: None,
         uploads,
         garbage,
         repeated: device.repeated,

@@ -74,11 +74,6 @@ impl Expected {
         &self.readings_ohm[..frames * self.per_frame[0]]
     }
 
-    /// Whether these are the readings of frame number `frame`.
-    pub(super) fn was_read(&self, frame: u32, readings: impl Iterator<Item = f32>) -> bool {
-        Self::is_line(&self.readings_ohm, frame, self.per_frame[0], readings)
-    }
-
     /// Whether the `estimate` has the outputs of frame number `frame`, and its novelty and deviations.
     pub(super) fn is_same(&self, frame: u32, estimate: &EstimateReport<'_>) -> bool {
         let confidence = self.confidence.get(frame as usize);

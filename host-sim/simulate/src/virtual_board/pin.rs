@@ -20,35 +20,3 @@ pub enum Pin {
     /// E̅ of one of the columns' 74HC4051s.
     ColumnEnable(u8),
 }
-
-impl Pin {
-    /// Every pin; its index is its number.
-    pub const ALL: [Self; 21] = [
-        Self::Row(0),
-        Self::Row(1),
-        Self::Row(2),
-        Self::Row(3),
-        Self::Row(4),
-        Self::Row(5),
-        Self::Row(6),
-        Self::Row(7),
-        Self::RowAddress(0),
-        Self::RowAddress(1),
-        Self::RowAddress(2),
-        Self::RowEnable,
-        Self::RowData,
-        Self::RowClock,
-        Self::RowLatch,
-        Self::ColumnAddress(0),
-        Self::ColumnAddress(1),
-        Self::ColumnAddress(2),
-        Self::ColumnEnable(0),
-        Self::ColumnEnable(1),
-        Self::ColumnEnable(2),
-    ];
-
-    /// Pin of a number, for callers that send numbers.
-    pub fn from_number(number: u8) -> Option<Self> {
-        Self::ALL.get(usize::from(number)).copied()
-    }
-}

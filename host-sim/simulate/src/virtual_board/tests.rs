@@ -290,14 +290,6 @@ fn a_conversion_is_the_same_however_its_bytes_are_clocked() {
 }
 
 #[test]
-fn pins_have_numbers() {
-    for (number, pin) in Pin::ALL.into_iter().enumerate() {
-        assert_eq!(Pin::from_number(number as u8), Some(pin));
-    }
-    assert_eq!(Pin::from_number(Pin::ALL.len() as u8), None);
-}
-
-#[test]
 fn a_smaller_sensor_and_some_of_its_rows_are_read_alone() {
     let world = World {
         sensor: Sensor { row_wires: 4, column_wires: 5, ..World::press().sensor },

@@ -3,9 +3,7 @@
 mod gdb;
 mod running;
 
-mod extremes;
 mod victim;
 mod ram;
 
-pub use extremes::EXTREMES;
 pub use ram::RAM;

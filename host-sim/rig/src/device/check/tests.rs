@@ -31,7 +31,6 @@ fn good() -> Findings {
         device,
         statistics: Statistics::default(),
         frames: FrameFindings { frames: 5, bit_identical: 5, frames_per_s: 1.0 },
-        scans: None,
         uploads: Some(uploads),
         garbage: Some(garbage),
         repeated: 0,

@@ -11,9 +11,6 @@ const PATIENCE: Duration = Duration::from_secs(5);
 /// Time without an answer after which none is expected any more.
 const QUIET: Duration = Duration::from_millis(100);
 
-/// Number of a register: 26 are those of the processor, and 16 of numbers.
-const FPSCR: u32 = 26 + 16;
-
 /// Connection to the stub.
 pub struct Gdb(UnixStream);
 
@@ -70,20 +67,6 @@ impl Gdb {
     /// Sets a register of the processor; 15 is the program counter.
     pub fn set_register(&mut self, number: u32, value: u32) -> io::Result<()> {
         self.order(&format!("P{number:x}={:08x}", value.swap_bytes()))
-    }
-
-    /// Sets status and control of the floating-point unit; `change` gets what they are.
-    pub fn change_fpscr(&mut self, change: impl FnOnce(u32) -> u32) -> io::Result<()> {
-        let before = self.fpscr()?;
-        let wanted = change(before);
-        self.set_register(FPSCR, wanted)?;
-        let found = self.fpscr()?;
-        if found == wanted { Ok(()) } else { Err(unexpected(&format!("{found:08x}"))) }
-    }
-
-    /// Status and control of the floating-point unit.
-    pub fn fpscr(&mut self) -> io::Result<u32> {
-        self.ask_word(&format!("p{FPSCR:x}"))
     }
 
     /// Resets the machine, as the reset button does.

@@ -35,7 +35,6 @@ impl Setup {
             model: Some(slot),
             log: None,
             mailbox: Some(place.with_extension("mailbox")),
-            readout: false,
         };
         Ok(Self { options, socket: place.with_extension("gdb") })
     }
@@ -64,11 +63,11 @@ impl Running {
         let _ = std::fs::remove_file(&setup.socket); // of an emulator before this one
         let stub = format!("unix:{},server=on,wait=off", setup.socket.display());
         let started = Emulator::start_with(&setup.options, &["-gdb", &stub]);
-        let (emulator, lines) = started.map_err(|cause| cause.to_string())?;
+        let (emulator, link) = started.map_err(|cause| cause.to_string())?;
         let mut gdb = Gdb::connect(&setup.socket)
             .map_err(|cause| format!("QEMU's debugger stub: {cause}"))?;
         gdb.run().map_err(|cause| cause.to_string())?;
-        let device = Device::new(lines.link).map_err(|cause| cause.to_string())?;
+        let device = Device::new(link).map_err(|cause| cause.to_string())?;
         Ok(Self { _emulator: emulator, gdb, device })
     }
 
