@@ -86,10 +86,11 @@ impl Piece {
             let mut reach = points.screen.reach(nearest.squared_distance, half_square);
             for group in 0..rounded.groups() {
                 let least = rounded.at_least(group, x);
-                if !least.iter().fold(false, |any, least| any | (*least <= reach)) {
+                let hits = least.iter().fold(0, |hits, least| hits | u32::from(*least <= reach));
+                if hits == 0 {
                     continue;
                 }
-                for (centre, least) in rounded.numbers(group).zip(least) {
+                for (centre, least) in Centres::numbers(group).zip(least) {
                     if least <= reach {
                         let squared_distance = squared_distance_of(centre);
                         let found = Nearest { centre, squared_distance };

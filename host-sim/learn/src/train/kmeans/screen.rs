@@ -95,14 +95,14 @@ impl Centres {
 
     /// Numbers of a group's centres.
     #[inline(always)]
-    pub(super) fn numbers(&self, group: usize) -> std::ops::RangeFrom<u32> {
+    pub(super) fn numbers(group: usize) -> std::ops::RangeFrom<u32> {
         (group * LANES) as u32..
     }
 
     /// Lower bounds on ‖c‖²/2 − x·c for the centres c of a group, of a rounded point x; NaN where there is no centre.
     #[inline(always)]
     pub(super) fn at_least(&self, group: usize, x: &[f32]) -> [f32; LANES] {
-        let group = &self.lanes[group * (1 + self.dimensions)..][..1 + self.dimensions];
+        let group = &self.lanes[group * (1 + self.dimensions)..][..=self.dimensions];
         let mut least = group[0];
         for (x, c) in x.iter().zip(&group[1..]) {
             for l in 0..LANES {
