@@ -5,10 +5,7 @@ use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
 use model_core::rbf::{Network, Shape};
 use rayon::prelude::*;
 use serde::Serialize;
-
-use self::batch::Batch;
-
-mod batch;
+use taxel_data::simd::widest;
 
 /// Lines that one thread takes at a time.
 const LINES_AT_ONCE: usize = 256;
@@ -58,65 +55,30 @@ impl Exponential {
 ///
 /// All outputs of a line are NaN if a reading is missing.
 pub fn infer(network: &Network<'_>, exponential: Exponential, readings: &[f64]) -> Vec<f64> {
-    Prepared::new(&[*network], exponential).infer(readings)
+    infer_in_turn(&[*network], exponential, readings)
 }
 
-/// Networks of one shape, laid out for many lines. Each line holds the inputs of every network in turn.
-#[derive(Debug)]
-pub(crate) struct Prepared<'n> {
-    shape: Shape,
+/// Infers the outputs of `networks`, which have the same numbers of inputs and outputs, for every line of `readings`:
+/// each line holds the inputs of every network in turn. NaN for a network that misses a reading.
+pub(crate) fn infer_in_turn(
+    networks: &[Network<'_>],
     exponential: Exponential,
-    networks: Vec<(Network<'n>, Option<Batch<'n>>)>,
-}
-
-impl<'n> Prepared<'n> {
-    /// Lays out `networks`, which have the same numbers of inputs and outputs.
-    pub(crate) fn new(networks: &[Network<'n>], exponential: Exponential) -> Self {
-        let none = Shape { inputs: 0, centres: 0, outputs: 0 };
-        let shape = networks.first().map_or(none, Network::shape);
-        let of = |network: &Network<'n>| (*network, Batch::of(network, exponential));
-        Self { shape, exponential, networks: networks.iter().map(of).collect() }
-    }
-
-    /// Networks in turn.
-    pub(crate) fn networks(&self) -> impl Iterator<Item = &Network<'n>> {
-        self.networks.iter().map(|(network, _)| network)
-    }
-
-    /// Number of inputs of each network.
-    pub(crate) fn inputs(&self) -> usize {
-        self.shape.inputs
-    }
-
-    /// Infers the outputs for every line of `readings`; NaN for a network that misses a reading.
-    pub(crate) fn infer(&self, readings: &[f64]) -> Vec<f64> {
-        let Shape { inputs, outputs, .. } = self.shape;
-        let (readings_step, outputs_step) =
-            (self.networks.len() * inputs, self.networks.len() * outputs);
-        if readings_step == 0 {
-            return Vec::new();
-        }
-        let mut values = vec![0.0; readings.len() / readings_step * outputs_step];
-        let pieces = readings.par_chunks(LINES_AT_ONCE * readings_step);
-        values.par_chunks_mut(LINES_AT_ONCE * outputs_step).zip(pieces).for_each(
-            |(values, readings)| {
-                for (row, (network, batch)) in self.networks.iter().enumerate() {
-                    let readings = &readings[row * inputs..];
-                    let values = &mut values[row * outputs..];
-                    if let Some(batch) = batch {
-                        batch.infer(readings, readings_step, values, outputs_step);
-                    } else {
-                        let lines = readings.chunks(readings_step);
-                        for (readings, values) in lines.zip(values.chunks_mut(outputs_step)) {
-                            let (readings, values) = (&readings[..inputs], &mut values[..outputs]);
-                            infer_line(network, self.exponential, readings, values);
-                        }
-                    }
-                }
-            },
-        );
-        values
-    }
+    readings: &[f64],
+) -> Vec<f64> {
+    let Some(Shape { inputs, outputs, .. }) = networks.first().map(Network::shape) else {
+        return Vec::new();
+    };
+    let [of_lines, to_lines] =
+        [inputs, outputs].map(|count| LINES_AT_ONCE * networks.len() * count);
+    let mut values = vec![0.0; readings.len() / inputs * outputs];
+    values.par_chunks_mut(to_lines).zip(readings.par_chunks(of_lines)).for_each(
+        |(values, readings)| match exponential {
+            Exponential::Polynomial => infer_lines::<Polynomial>(networks, readings, values),
+            Exponential::Libm => infer_lines::<Libm>(networks, readings, values),
+            Exponential::Micromath => infer_lines::<Micromath>(networks, readings, values),
+        },
+    );
+    values
 }
 
 /// Whether the device would take `reading` for missing: NaN, or beyond f32.
@@ -124,32 +86,30 @@ pub fn is_missing(reading: f64) -> bool {
     !(reading as f32).is_finite()
 }
 
-/// Infers the outputs for one line of readings; all NaN if a reading is missing.
-fn infer_line(
-    network: &Network<'_>,
-    exponential: Exponential,
-    readings: &[f64],
-    outputs: &mut [f64],
-) {
-    if readings.iter().any(|reading| is_missing(*reading)) {
-        outputs.fill(f64::NAN);
-        return;
-    }
-    match exponential {
-        Exponential::Polynomial => infer_with::<Polynomial>(network, readings, outputs),
-        Exponential::Libm => infer_with::<Libm>(network, readings, outputs),
-        Exponential::Micromath => infer_with::<Micromath>(network, readings, outputs),
-    }
-}
-
-fn infer_with<E: ExpKernel>(network: &Network<'_>, readings: &[f64], outputs: &mut [f64]) {
-    let readings: Vec<f32> = readings.iter().map(|reading| *reading as f32).collect();
-    let mut scaled = vec![0.0; readings.len()];
-    let mut inferred = vec![0.0; outputs.len()];
-    network.infer_with::<E>(&readings, &mut scaled, &mut inferred).expect("lengths of the network");
-    let overflow = inferred.iter().any(|value| !value.is_finite());
-    let values = inferred.into_iter().map(|value| if overflow { f32::NAN } else { value });
-    outputs.iter_mut().zip(values).for_each(|(place, value)| *place = f64::from(value));
+/// Infers the outputs of the networks in turn for lines of readings; all NaN for a network that misses a reading, or
+/// whose outputs overflow.
+fn infer_lines<E: ExpKernel>(networks: &[Network<'_>], readings: &[f64], values: &mut [f64]) {
+    let Shape { inputs, outputs, .. } = networks[0].shape();
+    let (mut line, mut scaled) = (vec![0.0; inputs], vec![0.0; inputs]);
+    let mut inferred = vec![0.0; outputs];
+    widest(
+        #[inline(always)]
+        || {
+            let lines = readings.chunks_exact(inputs).zip(values.chunks_exact_mut(outputs));
+            for ((readings, values), network) in lines.zip(networks.iter().cycle()) {
+                line.iter_mut().zip(readings).for_each(|(place, r)| *place = *r as f32);
+                if line.iter().all(|reading| reading.is_finite()) {
+                    let done = network.infer_with::<E>(&line, &mut scaled, &mut inferred);
+                    done.expect("lengths of the network");
+                } else {
+                    inferred.fill(f32::NAN);
+                }
+                let sound = inferred.iter().all(|value| value.is_finite());
+                let value = |value: &f32| if sound { f64::from(*value) } else { f64::NAN };
+                values.iter_mut().zip(&inferred).for_each(|(place, y)| *place = value(y));
+            }
+        },
+    );
 }
 
 /// Deviations (`lines × outputs`) and novelty of every line of `inputs`, as a device computes them.
@@ -169,4 +129,67 @@ pub(crate) fn assess_lines(confidence: Confidence<'_>, inputs: &[f64]) -> (Vec<f
         )
         .collect();
     (deviations, novelty)
+}
+
+#[cfg(test)]
+mod tests {
+    use model_core::rbf::direct;
+
+    use super::*;
+
+    /// Networks that differ in their bias; outputs overflow where all activations are high.
+    fn parameters(bias: &[f32; 2]) -> direct::Parameters<'_> {
+        direct::Parameters {
+            input_minimum: &[40.0; 2],
+            input_per_span: &[0.025; 2],
+            centres: &[0.5, 0.4, 0.5, 0.6, 0.6, 0.5],
+            decay: &[5.0],
+            output_weights: &[3e38, 1.0, 3e38, 2.0, -1e38, 3.0],
+            bias,
+            affine: &[],
+        }
+    }
+
+    #[test]
+    fn lines_of_networks_in_turn_are_those_of_each_network_bit_for_bit() {
+        let shape = Shape { inputs: 2, centres: 3, outputs: 2 };
+        let networks: Vec<Network<'_>> = [&[0.5, 1.0], &[1.5, -2.0], &[3.0, 4.0]]
+            .map(|bias| direct::Network::try_new(shape, parameters(bias)).unwrap().into())
+            .into();
+        let reading = |i: usize| match i % 101 {
+            0 => f64::NAN,
+            1 => 1e300, // beyond f32
+            2 => -3e38,
+            _ => 35.0 + (i * 37 % 1009) as f64 * 0.07,
+        };
+        let readings: Vec<f64> = (0..3 * LINES_AT_ONCE * 6 + 6).map(reading).collect();
+        for exponential in Exponential::ALL {
+            let values = infer_in_turn(&networks, exponential, &readings);
+            assert_eq!(values.len(), readings.len());
+            let (mut missing, mut overflowing) = (0, 0);
+            for (i, (x, y)) in readings.chunks_exact(2).zip(values.chunks_exact(2)).enumerate() {
+                let (x, mut scaled, mut own) = ([x[0] as f32, x[1] as f32], [0.0; 2], [0.0; 2]);
+                let (network, scaled) = (&networks[i % 3], &mut scaled);
+                match exponential {
+                    Exponential::Polynomial => {
+                        network.infer_with::<Polynomial>(&x, scaled, &mut own)
+                    }
+                    Exponential::Libm => network.infer_with::<Libm>(&x, scaled, &mut own),
+                    Exponential::Micromath => network.infer_with::<Micromath>(&x, scaled, &mut own),
+                }
+                .unwrap();
+                let is_missing = x.iter().any(|x| !x.is_finite());
+                let overflows = own.iter().any(|y| !y.is_finite());
+                missing += usize::from(is_missing);
+                overflowing += usize::from(overflows && !is_missing);
+                let expected = own.map(f64::from).map(f64::to_bits);
+                if is_missing || overflows {
+                    assert!(y.iter().all(|y| y.is_nan()), "{x:?} gives {y:?}");
+                } else {
+                    assert_eq!([y[0].to_bits(), y[1].to_bits()], expected, "{x:?}");
+                }
+            }
+            assert!(missing > 10 && overflowing > 10, "{missing} and {overflowing}");
+        }
+    }
 }

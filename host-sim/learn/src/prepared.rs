@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use taxel_data::table::Table;
 
 use crate::decoder::{Estimates, FrameDecoder};
-use crate::infer::{Exponential, Prepared, assess_lines, is_missing};
+use crate::infer::{Exponential, assess_lines, infer_in_turn, is_missing};
 use crate::packing::ModelBlob;
 use crate::relative::{ratios, reciprocals};
 use crate::train::{output_rank, projection};
@@ -23,7 +23,8 @@ use crate::train::{output_rank, projection};
 pub struct PreparedModel<'b> {
     model: Model<'b>,
     /// Network of each row-wire, or the one network behind a projection.
-    networks: Arc<Prepared<'b>>,
+    networks: Arc<[Network<'b>]>,
+    exponential: Exponential,
     output_names: Vec<String>,
     /// One over the baseline of each reading; `None` for a model that takes what it is given.
     reciprocals: Option<Vec<f32>>,
@@ -46,7 +47,8 @@ impl ModelBlob {
         let output_names = model.metadata().output_names.iter().map(String::from).collect();
         let readings = model.shape().rows * model.shape().inputs;
         PreparedModel {
-            networks: Arc::new(Prepared::new(&in_turn, exponential)),
+            networks: in_turn.into(),
+            exponential,
             output_names,
             reciprocals: model.metadata().relative_inputs.then(|| vec![f32::NAN; readings]),
             model,
@@ -110,7 +112,8 @@ impl<'b> PreparedModel<'b> {
 
     /// Decodes `readings` (`frames × inputs`) to outputs (`frames × outputs`), line after line.
     pub fn decode_lines(&self, readings: &[f64]) -> Vec<f64> {
-        let inferred = self.networks.infer(&self.inputs_of_networks(readings));
+        let inferred =
+            infer_in_turn(&self.networks, self.exponential, &self.inputs_of_networks(readings));
         match self.model.expansion() {
             Some(expansion) => output_rank::expand(expansion, &inferred),
             None => inferred,
@@ -169,13 +172,13 @@ impl<'b> PreparedModel<'b> {
     /// # Panics
     /// If `readings` are not whole frames of the model.
     pub fn clamps(&self, readings: &[f64]) -> Vec<bool> {
-        let inputs = self.networks.inputs();
+        let inputs = self.networks[0].shape().inputs;
         let of_networks = self.inputs_of_networks(readings);
-        let step = inputs * self.networks.networks().count();
+        let step = inputs * self.networks.len();
         let frames = of_networks.par_chunks_exact(step.max(1));
         frames
             .map(|frame| {
-                let rows = self.networks.networks().zip(frame.chunks_exact(inputs));
+                let rows = self.networks.iter().zip(frame.chunks_exact(inputs));
                 rows.into_iter().any(|(network, row)| {
                     let row: Vec<f32> = row.iter().map(|input| *input as f32).collect();
                     let decoded = row.iter().all(|input| input.is_finite());
@@ -191,12 +194,12 @@ impl<'b> PreparedModel<'b> {
     /// # Panics
     /// If `readings` are not whole frames of the model.
     pub fn share_out_of_range(&self, readings: &[f64]) -> f64 {
-        let inputs = self.networks.inputs();
+        let inputs = self.networks[0].shape().inputs;
         let readings = self.inputs_of_networks(readings);
         let range = |network: &Network<'_>, input| network.training_range(input).map(f64::from);
         let ranges: Vec<[f64; 2]> = self
             .networks
-            .networks()
+            .iter()
             .flat_map(|network| (0..inputs).map(move |input| range(network, input)))
             .collect();
         let (mut clamped, mut present) = (0_usize, 0_usize);

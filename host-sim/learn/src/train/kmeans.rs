@@ -1,8 +1,8 @@
 //! K-means: k-means++ starts, Lloyd's iterations, restarts.
 //!
 //! Every point belongs to the centre with the least squared distance, summed in f64 in the order of the
-//! features; among equals, to the first. `assign` and `screen` avoid computing most distances, which
-//! changes nothing in the result.
+//! features; among equals, to the first. `screen` avoids computing most distances in f64, which changes nothing in
+//! the result.
 
 #![expect(clippy::inline_always, reason = "what `simd::widest` runs must be inlined into it")]
 
@@ -69,10 +69,13 @@ impl Nearest {
     }
 }
 
+/// Sums that squared distances are added up in, side by side.
+const LANES: usize = 8;
+
 /// Points that a thread takes at a time. It depends on their number alone, so sums are the same on any
 /// number of threads.
 fn piece(count: usize) -> usize {
-    count.div_ceil(64).next_multiple_of(screen::LANES).max(512)
+    count.div_ceil(64).next_multiple_of(LANES).max(512)
 }
 
 /// Searches for `centres` centres of `points` (`points × dimensions`, all finite).
@@ -101,8 +104,8 @@ pub fn fit(
     let points = Points::new(&points, dimensions);
     let mut best: Option<Found> = None;
     for _ in 0..search.restarts.max(1) {
-        let (start, nearest) = start::plus_plus(&points, centres, random);
-        let found = lloyd(Assignment::new(&points, start, &nearest), search);
+        let start = start::plus_plus(&points, centres, random);
+        let found = lloyd(Assignment::new(&points, start), search);
         if best.as_ref().is_none_or(|best| found.inertia < best.inertia) {
             best = Some(found);
         }
@@ -122,7 +125,7 @@ pub fn plus_plus(
     random: &mut Random,
 ) -> Vec<f64> {
     assert!(dimensions > 0 && centres > 0 && points.len() >= dimensions, "nothing to cluster");
-    start::plus_plus(&Points::new(points, dimensions), centres, random).0
+    start::plus_plus(&Points::new(points, dimensions), centres, random)
 }
 
 /// Lloyd's iterations over all `points` from given centres on. Only [`Search::iterations`] and
@@ -133,7 +136,7 @@ pub fn plus_plus(
 pub fn refine(points: &[f64], dimensions: usize, centres: &[f64], search: &Search) -> Found {
     assert!(dimensions > 0 && points.len() >= dimensions && !centres.is_empty(), "nothing to do");
     let points = Points::new(points, dimensions);
-    lloyd(Assignment::from_scratch(&points, centres.to_vec()), search)
+    lloyd(Assignment::new(&points, centres.to_vec()), search)
 }
 
 fn lloyd(mut assignment: Assignment<'_>, search: &Search) -> Found {

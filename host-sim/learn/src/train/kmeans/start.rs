@@ -5,51 +5,40 @@
 
 use rayon::prelude::*;
 
-use super::screen::{LANES, Points, exact, rounded_distances};
-use super::{Nearest, piece};
 use taxel_data::random::Random;
 use taxel_data::simd::widest;
 
-/// Piece of the points, with their nearest centres so far.
+use super::screen::Points;
+use super::{LANES, piece};
+use crate::train::squared_distance;
+
+/// Piece of the points, with their squared distances from the nearest centres so far.
 struct Piece {
-    nearest: Vec<Nearest>,
-    /// Rounded squared distance that a new centre must be within to be nearer, for every point.
-    reach: Vec<[f32; LANES]>,
-    /// Sum of the points' squared distances from their centres.
+    squared_distances: Vec<f64>,
+    /// Sum of the squared distances.
     sum: f64,
 }
 
 /// Picks starting centres, each with a probability proportional to the squared distance from the nearest
-/// one picked before.
-///
-/// Returns the centres, and the nearest of them for every point. Stops early when every point coincides
-/// with a centre.
-pub(super) fn plus_plus(
-    points: &Points<'_>,
-    centres: usize,
-    random: &mut Random,
-) -> (Vec<f64>, Vec<Nearest>) {
+/// one picked before. Stops early when every point coincides with a centre.
+pub(super) fn plus_plus(points: &Points<'_>, centres: usize, random: &mut Random) -> Vec<f64> {
     let count = points.count();
     let size = piece(count);
-    let mut pieces: Vec<Piece> = (0..count)
-        .step_by(size)
-        .map(|first| {
-            let count = size.min(count - first);
-            let mut reach = vec![[f32::INFINITY; LANES]; count.div_ceil(LANES)];
-            reach.as_flattened_mut()[count..].fill(-1.0); // unused lanes are never approached
-            Piece { nearest: vec![Nearest::default(); count], reach, sum: 0.0 }
-        })
-        .collect();
+    let new = |first: usize| Piece {
+        squared_distances: vec![f64::INFINITY; size.min(count - first)],
+        sum: 0.0,
+    };
+    let mut pieces: Vec<Piece> = (0..count).step_by(size).map(new).collect();
     let mut picked = Vec::with_capacity(centres * points.dimensions);
     let mut next = random.below(count);
     for index in 0..centres {
         let centre = points.point(next);
         picked.extend_from_slice(centre);
-        let rounded: Vec<f32> = points.screen.round(centre).collect();
         pieces.par_iter_mut().enumerate().for_each(|(number, piece)| {
+            let points = &points.values[number * size * points.dimensions..];
             widest(
                 #[inline(always)]
-                || piece.approach(points, number * size, index as u32, centre, &rounded),
+                || piece.approach(points, centre),
             );
         });
         let sum: f64 = pieces.iter().map(|piece| piece.sum).sum();
@@ -60,43 +49,25 @@ pub(super) fn plus_plus(
             next = draw(&pieces, size, random.unit() * sum);
         }
     }
-    (picked, pieces.into_iter().flat_map(|piece| piece.nearest).collect())
+    picked
 }
 
 impl Piece {
-    /// Takes one more centre into account. `first` is the index of the piece's first point.
+    /// Takes one more centre into account. The piece's points are the first of `points`.
     #[inline(always)]
-    fn approach(
-        &mut self,
-        points: &Points<'_>,
-        first: usize,
-        index: u32,
-        centre: &[f64],
-        rounded: &[f32],
-    ) {
-        for (group, reach) in self.reach.iter_mut().enumerate() {
-            let rounded = rounded_distances(rounded, points.lanes_of(first / LANES + group));
-            if rounded.iter().zip(reach.iter()).all(|(rounded, reach)| rounded > reach) {
-                continue;
-            }
-            for lane in 0..LANES {
-                let place = group * LANES + lane;
-                if rounded[lane] <= reach[lane] {
-                    let squared_distance = exact(points.point(first + place), centre);
-                    if squared_distance < self.nearest[place].squared_distance {
-                        self.nearest[place] = Nearest { centre: index, squared_distance };
-                        reach[lane] = points.screen.reach(squared_distance);
-                    }
-                }
-            }
+    fn approach(&mut self, points: &[f64], centre: &[f64]) {
+        for (least, point) in
+            self.squared_distances.iter_mut().zip(points.chunks_exact(centre.len()))
+        {
+            let squared_distance = squared_distance(point, centre);
+            *least = if squared_distance < *least { squared_distance } else { *least };
         }
-        let (whole, rest) = self.nearest.as_chunks::<LANES>();
+        let (whole, rest) = self.squared_distances.as_chunks::<LANES>();
         let mut sums = [0.0; LANES];
-        for nearest in whole {
-            (0..LANES).for_each(|l| sums[l] += nearest[l].squared_distance);
+        for squared_distances in whole {
+            (0..LANES).for_each(|l| sums[l] += squared_distances[l]);
         }
-        let rest = rest.iter().map(|nearest| nearest.squared_distance);
-        self.sum = sums.into_iter().chain(rest).sum();
+        self.sum = sums.iter().chain(rest).sum();
     }
 }
 
@@ -109,11 +80,11 @@ fn draw(pieces: &[Piece], size: usize, mut left: f64) -> usize {
         left -= pieces[number].sum;
         number += 1;
     }
-    let nearest = &pieces[number].nearest;
-    let chosen = nearest.iter().position(|nearest| {
-        left -= nearest.squared_distance;
+    let squared_distances = &pieces[number].squared_distances;
+    let chosen = squared_distances.iter().position(|squared_distance| {
+        left -= squared_distance;
         left < 0.0
     });
-    let chosen = chosen.or_else(|| nearest.iter().rposition(|n| n.squared_distance > 0.0));
+    let chosen = chosen.or_else(|| squared_distances.iter().rposition(|d| *d > 0.0));
     number * size + chosen.expect("the piece's sum is positive")
 }
