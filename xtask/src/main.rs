@@ -88,6 +88,7 @@ Usage: cargo xtask COMMAND
                               tells which test and which line of torture sees each. Fails if one is missed that
                               proof/mutants/score.csv has as found. An hour; what was found is kept in target/mutants
       --accept                writes proof/mutants/score.csv instead of comparing
+      --second                runs the second list instead of the others
       --all                   tells every unit test that fails, not the first one only
       --package=NAME          runs only the unit tests of this crate, or with `torture` the lines of torture
       --no-torture            runs only unit tests

@@ -28,14 +28,15 @@ const WORKERS: usize = 2;
 /// # Errors
 /// The lists are wrong, the copy does not build, or a fault is missed that was found before.
 pub fn run(arguments: &[&str]) -> Outcome {
-    let faults = list::load()?;
-    let accepted = score::accepted();
+    let is_second = arguments.contains(&"--second");
+    let faults = list::load(is_second)?;
+    let accepted = score::accepted(is_second);
     let (options, names): (Vec<&str>, Vec<&str>) =
         arguments.iter().partition(|argument| argument.starts_with("--"));
     let with_torture = !options.contains(&"--no-torture");
     let (crates, options): (Vec<&str>, Vec<&str>) = options
         .into_iter()
-        .filter(|option| *option != "--no-torture")
+        .filter(|option| !["--no-torture", "--second"].contains(option))
         .partition(|option| option.starts_with("--package="));
     let crates: Vec<&str> = crates.iter().filter_map(|it| it.strip_prefix("--package=")).collect();
     if let Some(unknown) = names.iter().find(|name| !faults.iter().any(|it| it.name == **name)) {
@@ -73,7 +74,7 @@ pub fn run(arguments: &[&str]) -> Outcome {
         score::by_crate(scored.iter().map(|(fault, found)| (*fault, found.verdict(fault))))
     );
     if options == ["--accept"] {
-        return score::accept(&scored);
+        return score::accept(&scored, is_second);
     }
     let worse = |(fault, found): &&(&Fault, Found)| {
         let before = accepted.get(&fault.name).map(String::as_str);

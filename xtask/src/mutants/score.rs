@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::fs;
+use std::path::PathBuf;
 
 use super::list::{FOLDER, Fault};
 use crate::process::{Outcome, root};
@@ -46,9 +47,14 @@ pub fn csv(scored: &[(&Fault, Found)]) -> String {
     text
 }
 
+/// File of the accepted score of the second list, or of all others.
+fn file(is_second: bool) -> PathBuf {
+    root().join(FOLDER).join(if is_second { "score-second.csv" } else { "score.csv" })
+}
+
 /// Reads the accepted score: verdict of each fault.
-pub fn accepted() -> BTreeMap<String, String> {
-    let text = fs::read_to_string(root().join(FOLDER).join("score.csv")).unwrap_or_default();
+pub fn accepted(is_second: bool) -> BTreeMap<String, String> {
+    let text = fs::read_to_string(file(is_second)).unwrap_or_default();
     let fields = |line: &str| {
         let mut fields = line.split(',');
         Some((fields.next()?.to_owned(), fields.nth(2)?.to_owned()))
@@ -57,8 +63,8 @@ pub fn accepted() -> BTreeMap<String, String> {
 }
 
 /// Writes the score.
-pub fn accept(scored: &[(&Fault, Found)]) -> Outcome {
-    let file = root().join(FOLDER).join("score.csv");
+pub fn accept(scored: &[(&Fault, Found)], is_second: bool) -> Outcome {
+    let file = file(is_second);
     fs::write(&file, csv(scored)).map_err(|cause| format!("{}: {cause}", file.display()))
 }
 
