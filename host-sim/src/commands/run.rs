@@ -23,7 +23,7 @@ const FILES: FileSet =
 
 /// Do the whole job for a scene or a CSV file: train, write the blob, evaluate, report.
 ///
-/// Writes model.bin, metrics.json, table1.csv and report.html to out/<name>/, all together at the end; those of an
+/// Writes model.bin, metrics.json, table1.csv and report.html to `out/<name>/`, all together at the end; those of an
 /// earlier run go. Frames of a scene are synthesised. Of a
 /// CSV file, the last fifth is held out to judge by.
 #[derive(Args)]

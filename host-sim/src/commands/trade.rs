@@ -25,7 +25,7 @@ mod page;
 /// Trains and judges every number format, exponential, K, affine tail, number of samples averaged and gate.
 /// Marks the Pareto front of error and time of a frame, and chooses the best point within your bounds.
 ///
-/// Writes trade.csv, trade.json, trade.svg and trade.html to out/<scene>/, and with a bound chosen.bin, all together at
+/// Writes trade.csv, trade.json, trade.svg and trade.html to `out/<scene>/`, and with a bound chosen.bin, all together at
 /// the end; those of an earlier trade go.
 /// The time of a frame is that of the scan, by the plan of the board's firmware (docs/board.md), and of decoding, by
 /// the price list of the firmware's code (docs/cycles.md). Behind a gate cycles are the mean over the test frames, by the

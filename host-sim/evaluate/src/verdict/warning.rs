@@ -101,7 +101,7 @@ impl Warning {
         })
     }
 
-    /// Confidence of fewer than [`FRAMES_FOR_CONFIDENCE`] training `frames`.
+    /// Confidence of fewer than 300 training `frames`.
     pub fn few_frames_for_confidence(frames: usize, has_confidence: bool) -> Option<Self> {
         let due = has_confidence && frames < FRAMES_FOR_CONFIDENCE;
         Self::when(due, "few-frames-for-confidence", || {

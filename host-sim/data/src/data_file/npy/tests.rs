@@ -40,9 +40,9 @@ impl Element for bool {
 
 /// Bytes of a `.npy` file of this shape, as numpy 2 writes it.
 fn array<T: Element>(shape: &[u64], order: Order, elements: &[T]) -> Vec<u8> {
-    let sizes: String = shape.iter().map(|size| format!("{size}, ")).collect();
+    let sizes: Vec<String> = shape.iter().map(|size| format!("{size},")).collect();
     let order = if matches!(order, Order::C) { "False" } else { "True" };
-    let mut bytes = header(T::KIND, order, &format!("({})", sizes.trim_end()));
+    let mut bytes = header(T::KIND, order, &format!("({})", sizes.join(" ")));
     bytes.extend(elements.iter().flat_map(Element::bytes));
     bytes
 }
