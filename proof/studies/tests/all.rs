@@ -9,7 +9,8 @@ use serde_json::Value;
 fn folder(name: &str, change: [&str; 2]) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     std::fs::create_dir_all(&folder).unwrap();
-    let mut scene = include_str!("../../../scenes/press.toml").to_owned();
+    let scene = include_str!("../../../scenes/press.toml");
+    let mut scene = scene.split("[table1]").next().unwrap_or_default().to_owned();
     for [from, to] in [
         ["[training]", "[training]\nrefine = false"],
         ["[outputs]", "[readout]\nrow_wires = [4, 5]\n\n[outputs]"],
