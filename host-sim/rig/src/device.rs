@@ -83,7 +83,7 @@ pub struct Device<W> {
     /// Number of frames of bytes that arrived damaged. The first one does not count: it may have begun before anybody
     /// listened.
     pub damaged: u64,
-    /// What came last that is no report, since a request was sent.
+    /// What came last since a request was sent.
     heard: Heard,
     /// Whether the end of a frame has been heard.
     is_in_step: bool,
@@ -176,6 +176,7 @@ impl<W: Wire> Device<W> {
                 let was_in_step = mem::replace(&mut self.is_in_step, true);
                 match report {
                     Ok(report) => {
+                        self.heard = Heard::Reports;
                         if let Some(kept) = &mut self.kept {
                             kept.waiting = kept.waiting.filter(|number| *number != report.number);
                         }
@@ -405,6 +406,7 @@ mod tests {
                 packet(&[version + 1, 0, 3]),
                 "it speaks version 7 of the link, and this program version 6",
             ),
+            (framed(), "it sends reports, but no answer in time"),
             (packet(&[version, 0, 120]), "messages that this program does not know"),
         ] {
             let mut device = Device::new(Deaf(bytes)).unwrap();

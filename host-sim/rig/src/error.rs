@@ -20,6 +20,8 @@ pub enum Heard {
     Nothing,
     /// Bytes that are no packets.
     Noise,
+    /// Reports, but no answer.
+    Reports,
     /// Packets of another version of the link.
     OtherVersion(u8),
     /// Packets of this version, with messages that this program does not know.
@@ -35,6 +37,9 @@ impl std::fmt::Display for Heard {
             Self::Noise => f.write_str(
                 "bytes come from it that are no packets: check the speed of its line (--baud), and that it runs this \
                  project's firmware",
+            ),
+            Self::Reports => f.write_str(
+                "it sends reports, but no answer in time: check that no other program uses it, and the speed of its line",
             ),
             Self::OtherVersion(version) => write!(
                 f,
