@@ -37,8 +37,6 @@ const GAP: f64 = 3.0;
 const HUGE_GAP: f64 = 30.0;
 /// Number of lines by which [`GAP`] grows for fewer lines: its product with the number of lines is at least so large.
 const GAP_LINES: f64 = 1000.0;
-/// Least number of rare presses that confirm one another.
-const CONFIRMED: usize = 2;
 /// Largest factor between the ratios of readings to outputs, by their distances, of presses that confirm one another.
 const ALIKE: f64 = 3.0;
 /// Distance from a column's bulk, in widths of the bulk, from which a value has left its rest.
@@ -102,12 +100,12 @@ pub fn find(dataset: &Dataset, line_number: impl Fn(usize) -> u64) -> Outliers {
     let confirmed = confirmed(tables, &columns);
     let mut found = Vec::new();
     let (mut kept, mut lines) = (Vec::with_capacity(frames), 0);
-    for frame in 0..frames {
+    for (frame, is_confirmed) in confirmed.iter().enumerate() {
         let far = |t: usize| {
             let named = tables[t].names.iter().zip(line(tables[t], frame)).zip(&columns[t]);
             named.filter(|((_, value), column)| is_outside(**value, column.usual))
         };
-        let is_explained = |t: usize| pressed[t].explains(frame) || confirmed.contains(&frame);
+        let is_explained = |t: usize| pressed[t].explains(frame) || *is_confirmed;
         let of_line = (0..2).filter(|t| !is_explained(*t)).flat_map(far);
         let before = found.len();
         found.extend(of_line.map(|((name, value), column)| Outlier {
@@ -125,8 +123,8 @@ pub fn find(dataset: &Dataset, line_number: impl Fn(usize) -> u64) -> Outliers {
     Outliers { found, lines, left_out: left_out && lines > 0, kept }
 }
 
-/// Lines of rare presses that confirm one another.
-fn confirmed(tables: [&Table; 2], columns: &[Vec<Column>; 2]) -> Vec<usize> {
+/// Whether each line is a rare press that another one confirms.
+fn confirmed(tables: [&Table; 2], columns: &[Vec<Column>; 2]) -> Vec<bool> {
     // How far out the furthest value of a line is, in usual ranges of its column.
     let distance = |t: usize, frame: usize| {
         let values = line(tables[t], frame).iter().zip(&columns[t]);
@@ -139,14 +137,18 @@ fn confirmed(tables: [&Table; 2], columns: &[Vec<Column>; 2]) -> Vec<usize> {
     };
     let ratio = |frame: usize| {
         let [inputs, outputs] = [0, 1].map(|t| distance(t, frame));
-        (inputs > 0.0 && outputs > 0.0).then(|| (frame, inputs / outputs))
+        (inputs > 0.0 && outputs > 0.0).then(|| (inputs / outputs, frame))
     };
-    let ratios: Vec<(usize, f64)> = (0..tables[0].len()).filter_map(ratio).collect();
-    let is_alike = |a: f64, b: f64| (a / b).max(b / a) <= ALIKE;
-    let confirm = |(_, ratio): &&(usize, f64)| {
-        ratios.iter().filter(|(_, other)| is_alike(*ratio, *other)).count() >= CONFIRMED
-    };
-    ratios.iter().filter(confirm).map(|(frame, _)| *frame).collect()
+    let mut ratios: Vec<(f64, usize)> = (0..tables[0].len()).filter_map(ratio).collect();
+    ratios.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut confirmed = vec![false; tables[0].len()];
+    // Of all others, the neighbours in this order are the most alike.
+    for pair in ratios.windows(2) {
+        if pair[1].0 <= ALIKE * pair[0].0 {
+            pair.iter().for_each(|(_, frame)| confirmed[*frame] = true);
+        }
+    }
+    confirmed
 }
 
 /// Most lines that can hold outliers.
