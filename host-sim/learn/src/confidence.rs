@@ -42,12 +42,19 @@ impl Default for Settings {
     }
 }
 
+impl Settings {
+    /// Number of directions that so many readings are projected to.
+    fn directions_of(&self, readings: usize) -> usize {
+        self.directions.clamp(1, readings.max(1))
+    }
+}
+
 /// Checks before long work that a confidence can be fitted to so many `frames` of so many `readings`.
 ///
 /// # Errors
 /// [`Error::Setting`] for fewer than ten frames for each feature: intervals would cover anything.
 pub fn check(frames: usize, readings: usize) -> Result<()> {
-    let features = Settings::default().directions.clamp(1, readings.max(1)) + 1;
+    let features = Settings::default().directions_of(readings) + 1;
     let least = FRAMES_A_FEATURE * features;
     let rule = || {
         format!(
@@ -68,7 +75,7 @@ impl Density {
     /// Fits the density of the inputs of `dataset`, which has frames.
     pub fn fit(dataset: &Dataset, settings: &Settings) -> Self {
         let readings = dataset.inputs.names.len();
-        let features = Features::of(&dataset.inputs, settings.directions.clamp(1, readings));
+        let features = Features::of(&dataset.inputs, settings.directions_of(readings));
         let most = dataset.frames() / (FRAMES_A_FEATURE * features.count());
         let mixture = Mixture::fit(
             &features.apply(&dataset.inputs.values),
