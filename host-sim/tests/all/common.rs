@@ -122,7 +122,7 @@ pub fn small_scene() -> String {
     scene.split_once("[table1]").unwrap().0.to_owned()
 }
 
-/// The same with a Table 1, which takes most of its time.
+/// [`small_scene`] with a Table 1, which takes most of its time.
 pub fn small_scene_with_table1() -> String {
     let mut scene = include_str!("../../../scenes/press.toml").to_owned();
     for (from, to) in [

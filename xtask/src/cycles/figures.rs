@@ -19,7 +19,7 @@ const LOOP: [u64; 2] = [2001, 3999];
 const SAME_COMPILER_PERCENT: [u64; 3] = [0, 1, 1];
 
 /// Most per cent by which they may exceed those accepted for another compiler, which makes other code. Less is no fault.
-/// Those from flash also depend on where code stands: moved by 2 to 14 bytes, the accepted code takes up to 13.5 % more.
+/// Cycles from flash also depend on where code stands: moved by 2 to 14 bytes, the accepted code takes up to 13.5 % more.
 const OTHER_COMPILER_PERCENT: [u64; 3] = [u64::MAX / 2, 2, 16];
 
 /// Budgets for any compiler: kernel, K, scope, and the most cycles of a model without an affine tail.

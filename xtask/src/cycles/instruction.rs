@@ -20,7 +20,7 @@ const DATA: &str = "adc add addw adr and asr bfc bfi bic clrex clz eor lsl lsr m
                     smmulr smuad smuadx smulbb smulbt smultb smultt smulwb smulwt smusd smusdx ssat ssat16 sub subw \
                     sxtab sxtab16 sxtah sxtb sxtb16 sxth ubfx usad8 usada8 usat usat16 uxtab uxtab16 uxtah uxtb \
                     uxtb16 uxth yield";
-/// The same for bytes and halfwords in parallel: how they saturate, and what they compute.
+/// Prefixes of instructions on bytes and halfwords in parallel: how they saturate, and what they compute.
 const PARALLEL: [&str; 2] = ["s q sh u uq uh", "add16 asx sax sub16 add8 sub8"];
 /// Multiplications that compute their first two registers.
 const LONG: &str =
