@@ -223,7 +223,7 @@ fn a_smooth_network_has_the_outputs_of_decoding_and_the_slopes_of_its_outputs() 
         (Format::Fixed16, true, 4e-3), // inputs, activations and weights have 16 bits
         (Format::Fixed16, false, 4e-3),
     ] {
-        let (blob, frames) = small(Options { format, affine_tail, ..Options::default() });
+        let (blob, frames) = small(Options { affine_tail, format, ..Options::default() });
         let model = blob.prepare(Exponential::default());
         let decoded = model.decode_table(&frames.inputs);
         let size = decoded.values.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
@@ -316,7 +316,7 @@ fn what_cannot_be_recalibrated_is_refused_by_name() {
     let shared = model.model().networks().next().unwrap();
     let parts = |networks: &[Network<'_>], row_network: &[u8], rmse: f32| {
         let parsed = model.model();
-        let rmse = vec![rmse; 36].iter().flat_map(|rmse| rmse.to_le_bytes()).collect::<Vec<u8>>();
+        let rmse = [rmse; 36].iter().flat_map(|rmse| rmse.to_le_bytes()).collect::<Vec<u8>>();
         let parts = ModelParts {
             projection: None,
             expansion: None,
