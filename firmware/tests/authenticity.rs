@@ -2,8 +2,7 @@
 
 use firmware::app::{Leave, Session};
 use firmware::link::message::{
-    Identity, KeyState, RecalibrationFault, RecalibrationStep, Refusal, Report, Request, SealFault,
-    UploadState, UploadStep,
+    Identity, KeyState, Refusal, Report, Request, SealFault, UploadState, UploadStep,
 };
 use firmware::platform::Platform;
 use firmware::seal::{Key, Seal};
@@ -72,9 +71,9 @@ impl Device {
     fn undo(&mut self, left: u32) -> Result<(), Refusal> {
         let mut bench = Bench::with_key(quiet(), &self.key);
         let mut session = Session::start(&mut bench.app, &mut self.slots, &mut []);
-        let step = Request::Recalibrate(RecalibrationStep::Undo { crc_32: left });
-        ask(&mut session, &bench.board, &step, |report| match report {
-            Report::Recalibration(_) => Ok(()),
+        let request = Request::Undo { crc_32: left };
+        ask(&mut session, &bench.board, &request, |report| match report {
+            Report::Upload(_) => Ok(()),
             Report::Refused(refusal) => Err(refusal),
             other => panic!("{other:?}"),
         })
@@ -138,8 +137,7 @@ fn no_older_model_comes_back() {
     assert_eq!(device.install(&first, Some(Seal::of(&KEY, 5, &first))), outdated, "replayed");
     assert_eq!(device.install(&third, Some(Seal::of(&KEY, 6, &third))), outdated, "same version");
     // The refused uploads have erased the other slot.
-    let nothing = Refusal::Recalibration(RecalibrationFault::NothingToUndo);
-    assert_eq!(device.undo(crc_of(&second)), Err(nothing));
+    assert_eq!(device.undo(crc_of(&second)), Err(Refusal::NothingToUndo));
     // The same once more is no step back.
     assert_eq!(device.install(&second, Some(Seal::of(&KEY, 6, &second))), Ok(confirmed(&second)));
     let third_seal = Seal::of(&KEY, 7, &third);

@@ -3,14 +3,13 @@
 
 mod flash;
 mod device;
-pub mod presses;
 
 mod cuts;
 mod decay;
 mod provision;
 mod settings;
 
-pub use cuts::{RECALIBRATION, UNDO, UPLOAD};
+pub use cuts::{UNDO, UPLOAD};
 pub use decay::{DECAY, WORN};
 pub use provision::PROVISION;
 pub use settings::SETTINGS;

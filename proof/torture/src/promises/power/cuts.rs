@@ -1,11 +1,10 @@
-//! Cuts while a model is uploaded, recalibrated or left for the one before it.
+//! Cuts while a model is uploaded, or left for the one before it.
 
 use mock_board::{blob, crc_of};
 use model_core::AlignedBytes;
 
 use super::device::{Device, Outcome};
 use super::flash::Torn;
-use super::presses;
 use crate::effort::Effort;
 use crate::found::Found;
 use crate::promise::Promise;
@@ -26,19 +25,11 @@ pub const UNDO: Promise = Promise {
     check: |effort, tools| check(Job::Undo, effort, tools),
 };
 
-pub const RECALIBRATION: Promise = Promise {
-    name: "cut-recalibration",
-    text: "power cut in a recalibration: the old or the new model",
-    share: 6,
-    check: |effort, tools| check(Job::Recalibration, effort, tools),
-};
-
 /// What changes the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Job {
     Upload,
     Undo,
-    Recalibration,
 }
 
 /// Least and most cases; a case is one first cut, and all second cuts behind it.
@@ -51,7 +42,7 @@ const STARTS: usize = 3;
 fn check(job: Job, effort: &Effort, _: &Tools) -> Result<Found, String> {
     let cuts = Tally::new(Torn::ALL.map(Torn::name));
     let planted = effort.is_planted();
-    let least = if planted || job == Job::Recalibration { LEAST / 4 } else { LEAST };
+    let least = if planted { LEAST / 4 } else { LEAST };
     let mut found = effort.worst((least, MOST), (0.0, "losses"), |seed| {
         Case::new(job, seed, planted).run(&cuts).map(|()| 0.0)
     });
@@ -152,8 +143,7 @@ impl Case {
 
     /// Brings the old model into force; returns its CRC-32.
     fn prepare(&mut self) -> Result<u32, String> {
-        let old = if self.job == Job::Recalibration { presses::model() } else { blob(1, 2) };
-        let earlier = blob(5, 1);
+        let (old, earlier) = (blob(1, 2), blob(5, 1));
         let uploads = match (self.job, self.seed / Torn::COUNT as u64 % 4) {
             (Job::Undo, 0 | 1) | (_, 1) => 1,
             (Job::Undo, _) | (_, 2) => 2,
@@ -181,7 +171,6 @@ impl Case {
         match self.job {
             Job::Upload => self.device.upload(&self.new, usize::MAX, cut_after),
             Job::Undo => self.device.undo(crc_of(&blob(1, 2)), cut_after),
-            Job::Recalibration => presses::recalibrate(&mut self.device, cut_after),
         }
     }
 

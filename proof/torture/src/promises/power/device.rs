@@ -4,10 +4,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use firmware::app::Session;
-use firmware::link::message::{
-    RecalibrationReport, RecalibrationState, RecalibrationStep, Refusal, Report, Request,
-    UploadState, UploadStep,
-};
+use firmware::link::message::{Refusal, Report, Request, UploadState, UploadStep};
 use firmware::store::Slot;
 use mock_board::{
     Bench, Board, Memory, ROWS, SharedSettings, Source, ask, model_crc, quiet, upload_steps,
@@ -41,7 +38,7 @@ pub struct Device {
     pub slots: [Flash; 2],
     pub supply: Rc<RefCell<Supply>>,
     memory: Box<Memory>,
-    /// Memory for a copy of the weights, and for a recalibration.
+    /// Memory for a copy of the weights.
     weights: Vec<u32>,
     settings: SharedSettings,
 }
@@ -139,8 +136,12 @@ impl Device {
     pub fn undo(&mut self, left: u32, cut_after: Option<u64>) -> Outcome {
         let supply = self.supply.clone();
         self.session(cut_after, |session, board| {
-            let step = RecalibrationStep::Undo { crc_32: left };
-            let outcome = recalibration_step(session, board, step);
+            let undo = Request::Undo { crc_32: left };
+            let (outcome, _) = ask(session, board, &undo, |report| match report {
+                Report::Upload(UploadState::Confirmed { crc_32 }) => Outcome::InForce(crc_32),
+                Report::Refused(refusal) => Outcome::Refused(refusal),
+                other => panic!("{other:?}"),
+            });
             if supply.borrow().gone { Outcome::Cut } else { outcome }
         })
     }
@@ -154,24 +155,6 @@ pub fn upload_step<S: Slot>(
 ) -> Outcome {
     ask(session, board, &Request::Upload(step), |report| match report {
         Report::Upload(_) => Outcome::GoingOn,
-        Report::Refused(refusal) => Outcome::Refused(refusal),
-        other => panic!("{other:?}"),
-    })
-    .0
-}
-
-/// Carries out one step of a recalibration.
-pub fn recalibration_step<S: Slot>(
-    session: &mut Running<'_, '_, S>,
-    board: &Board,
-    step: RecalibrationStep<'_>,
-) -> Outcome {
-    ask(session, board, &Request::Recalibrate(step), |report| match report {
-        Report::Recalibration(RecalibrationReport {
-            state: RecalibrationState::InForce { crc_32 },
-            ..
-        }) => Outcome::InForce(crc_32),
-        Report::Recalibration(_) => Outcome::GoingOn,
         Report::Refused(refusal) => Outcome::Refused(refusal),
         other => panic!("{other:?}"),
     })
