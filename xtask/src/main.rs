@@ -42,7 +42,7 @@ enum Command {
     /// Run everything that CI runs, and go on after a failure. A summary at the end has each step's time and the number
     /// of tests that passed.
     Ci,
-    /// Check that no crate depends on one above it, and none for a device on one for a desk.
+    /// Check that no crate depends on one above it or on one that it does not use, and none for a device on one for a desk.
     Structure,
     /// Print the lines of Rust of each crate: all, source code (no comments, blank lines and tests), test code.
     Lines,
