@@ -4,9 +4,13 @@ use std::fmt::Write as _;
 
 use taxel_limit::identify::Observability;
 
-use super::chart::{Axis, Chart, Mark, Series};
+use super::axes::Axis;
+use super::chart::{Chart, Mark, Series};
+use super::colour::ColourScale;
+use super::errors::BAR_PX;
+use super::face::Face;
+use super::face_map::{Map, Values};
 use super::format::{percent, significant, symbol, with_unit};
-use super::heat_map::{ColourScale, HeatMap};
 use super::html::document;
 use super::svg::{Shape, Svg, escape, standalone};
 use super::ticks;
@@ -50,10 +54,8 @@ fn directions(level: &Level) -> Chart {
     Chart {
         title: "Signal-to-noise ratio of every direction of the deformation".into(),
         x: Axis::linear("direction, the best visible one first", x),
-        y: Axis { label: "signal-to-noise ratio".into(), ticks: y, logarithmic: true },
+        y: Axis::logarithmic("signal-to-noise ratio", y),
         series,
-        bands: vec![],
-        notes: vec![],
         end_labels: false,
     }
 }
@@ -198,42 +200,34 @@ fn by_noise(result: &LimitResult) -> Chart {
     );
     Chart {
         title: "Least possible RMSE against the noise".into(),
-        x: Axis { label: "noise".into(), ticks: x, logarithmic: true },
-        y: Axis { label: "least possible RMSE (mm)".into(), ticks: y, logarithmic: true },
+        x: Axis::logarithmic("noise", x),
+        y: Axis::logarithmic("least possible RMSE (mm)", y),
         series,
-        bands: vec![],
-        notes: vec![],
         end_labels: true,
     }
-}
-
-/// Colour scale of shares.
-fn share_scale() -> ColourScale {
-    ColourScale::new([0.0, 1.0])
 }
 
 /// Maps of what is known of each electrode, one an axis.
 fn known(result: &LimitResult, seen: &Observability) -> [String; 3] {
     let per_row = seen.electrodes.len() / seen.row_wires.len().max(1);
-    let rows = seen.row_wires.iter().zip(seen.electrodes.chunks(per_row.max(1)));
     let [x_mm, y_mm, _] = result.size_mm;
-    [0, 1, 2].map(|axis| {
-        let letter = ['x', 'y', 'z'][axis];
-        let map = HeatMap {
-            title: format!("Map over the face of what the readings tell about Δ{letter}"),
-            heading: format!("Δ{letter}: share known"),
-            face_mm: [x_mm, y_mm],
-            cell_mm: [x_mm / per_row.max(1) as f64, y_mm / result.row_wires.max(1) as f64],
-            cells: seen.electrodes.iter().map(|e| (e.position_mm, e.known[axis])).collect(),
-            row_wires: rows.clone().map(|(row, e)| (*row, e[0].position_mm[1])).collect(),
-        };
-        map.draw(&share_scale())
+    let size_mm = [x_mm / per_row.max(1) as f64, y_mm / result.row_wires.max(1) as f64];
+    let places: Vec<[f64; 2]> = seen.electrodes.iter().map(|e| e.position_mm).collect();
+    let face = Face::of_rectangles([x_mm, y_mm], size_mm, &places, &seen.row_wires);
+    ['x', 'y', 'z'].map(|letter| {
+        let axis = usize::from(letter as u8 - b'x');
+        let of_cells: Vec<f64> = seen.electrodes.iter().map(|e| e.known[axis]).collect();
+        let title = format!("Map over the face of what the readings tell about Δ{letter}");
+        let label = "share of the prior's variance";
+        let values =
+            Values { of_cells: &of_cells, scale: &ColourScale::of_shares(), label, unit: "" };
+        Map::new(&face, &title, &format!("Δ{letter}: share known"), BAR_PX).values(&values)
     })
 }
 
 /// Picture of what is known of each electrode at the first noise level, as a file of its own.
 pub fn known_svg(result: &LimitResult) -> String {
-    const MAP: [f64; 2] = [310.0, 320.0];
+    const MAP: [f64; 2] = [310.0, 376.0];
     let Some(level) = result.levels.first() else { return String::new() };
     let mut picture = Svg::new(3.0 * MAP[0] + 40.0, MAP[1], "What the readings tell");
     for (i, map) in known(result, &level.observability).iter().enumerate() {
@@ -245,11 +239,10 @@ pub fn known_svg(result: &LimitResult) -> String {
 /// Figure of what is known of each electrode, by axis.
 fn maps(result: &LimitResult, seen: &Observability) -> String {
     format!(
-        "<figure>\n<div class=\"panels\">\n{}</div>\n<div class=\"scale\">\n{}</div>\n<figcaption>Share of the \
-         prior's variance of each electrode's Δx, Δy and Δz that all readings take away, for a sensor linearised at the \
-         mean deformation: 0 is invisible, 1 is known.</figcaption>\n</figure>\n",
-        known(result, seen).concat(),
-        share_scale().draw_bar("Colour scale of the share known", "share of the prior's variance")
+        "<figure>\n<div class=\"panels\">\n{}</div>\n<figcaption>Share of the prior's variance of each electrode's Δx, \
+         Δy and Δz that all readings take away, for a sensor linearised at the mean deformation: 0 is invisible, 1 is \
+         known.</figcaption>\n</figure>\n",
+        known(result, seen).concat()
     )
 }
 
