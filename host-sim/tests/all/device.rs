@@ -327,6 +327,7 @@ fn over_a_line_that_spoils_bytes_everything_still_arrives() {
     // One byte in some 3000 is lost, changed or turned into the end of a frame: this spoils a fifth of
     // the frames.
     let mut device = device(Line { one_in: Some(3000) }, &old);
+    device.patience = Duration::from_millis(100);
     let new = model(16);
     let identity = upload::replace(&mut device, new.bytes(), &Silent).unwrap();
     assert_eq!(identity.model.unwrap().crc_32, new.parse().crc());
@@ -471,7 +472,7 @@ pub mod serial_port {
         (near.name().unwrap(), near, Quick(far))
     }
 
-    /// Port that answers a read without bytes like a socket does.
+    /// Port that answers a read without bytes like a socket does. Bytes that nobody reads are lost, as on a serial line.
     pub struct Quick(TTYPort);
 
     impl std::io::Read for Quick {
@@ -486,7 +487,7 @@ pub mod serial_port {
 
     impl std::io::Write for Quick {
         fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-            self.0.write(bytes)
+            Ok(self.0.write(bytes).unwrap_or(bytes.len()))
         }
 
         fn flush(&mut self) -> std::io::Result<()> {
