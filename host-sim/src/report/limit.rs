@@ -13,6 +13,7 @@ use super::face_map::{Map, Values};
 use super::format::{percent, significant, symbol, with_unit};
 use super::html::document;
 use super::svg::{Shape, Svg, escape, standalone};
+use super::tables::numbers;
 use super::ticks;
 use taxel_evaluate::evaluate::limit::{Figures, Level, LimitResult};
 use taxel_evaluate::metrics::DecoderErrors;
@@ -107,12 +108,12 @@ pub fn html(result: &LimitResult) -> String {
 /// Line of the table for a model: its errors, and their ratios to the limit.
 fn model_row(level: &Level, model: &DecoderErrors) -> String {
     let noise = percent(level.noise_level);
-    let mut html = format!("<tr><td>{noise}</td><td>model {}</td>", escape(&model.decoder));
-    for errors in &model.errors {
+    let cells = model.errors.iter().map(|errors| {
         let ratio = errors.ratio_to_limit.map_or(String::new(), |r| format!(" ({r:.3} ×)"));
-        let _ = write!(html, "<td class=\"number\">{:.4}{ratio}</td>", errors.rmse);
-    }
-    html + "<td></td></tr>\n"
+        format!("{:.4}{ratio}", errors.rmse)
+    });
+    let (name, cells) = (escape(&model.decoder), numbers("td", cells));
+    format!("<tr><td>{noise}</td><td>model {name}</td>{cells}<td></td></tr>\n")
 }
 
 /// Table of the limits.
@@ -126,11 +127,10 @@ fn limits(result: &LimitResult) -> String {
     let groups =
         result.levels.iter().flat_map(|level| &level.limits).map(|figures| &figures.groups);
     let groups = groups.max_by_key(|groups| groups.len());
-    for group in groups.into_iter().flatten() {
-        let name = escape(&with_unit(&symbol(&group.group), &group.unit));
-        let _ = write!(html, "<th class=\"number\">{name}</th>");
-    }
-    html += "<th class=\"number\">ESS</th></tr></thead>\n<tbody>\n";
+    let groups = groups.into_iter().flatten();
+    let heads = groups.map(|group| escape(&with_unit(&symbol(&group.group), &group.unit)));
+    html += &numbers("th", heads.chain(["ESS".into()]));
+    html += "</tr></thead>\n<tbody>\n";
     for level in &result.levels {
         for figures in &level.limits {
             let noise = percent(level.noise_level);
@@ -142,17 +142,11 @@ fn limits(result: &LimitResult) -> String {
                     escape(refused)
                 );
             }
-            for g in &figures.groups {
-                let _ = write!(
-                    html,
-                    "<td class=\"number\">{:.4} ± {:.4}</td>",
-                    g.limit, g.limit_standard_error
-                );
-            }
-            if let Some(e) = figures.effective_samples {
-                let _ = write!(html, "<td class=\"number\">{:.0}, {:.0}</td>", e.least, e.median);
-            }
-            html += "</tr>\n";
+            let limits = figures.groups.iter();
+            let limits = limits.map(|g| format!("{:.4} ± {:.4}", g.limit, g.limit_standard_error));
+            let samples = figures.effective_samples;
+            let samples = samples.map(|e| format!("{:.0}, {:.0}", e.least, e.median));
+            html += &(numbers("td", limits.chain(samples)) + "</tr>\n");
         }
         for model in &level.decoders {
             html += &model_row(level, model);
@@ -254,19 +248,13 @@ fn geometry(result: &LimitResult) -> String {
     let mut html = String::from(
         "<h2>Other geometries</h2>\n<figure class=\"table\">\n<figcaption>Observable directions of other sensors in the \
          same scene, and the RMSE that would be left if all were linear and normal.</figcaption>\n<div class=\"scroll\" \
-         tabindex=\"0\" role=\"region\" aria-label=\"Other geometries\">\n<table>\n<thead><tr><th>sensor</th>\
-         <th class=\"number\">readings</th><th class=\"number\">unknowns</th><th class=\"number\">observable</th>\
-         <th class=\"number\">Δx, mm</th><th class=\"number\">Δy, mm</th><th class=\"number\">Δz, mm</th></tr></thead>\n\
-         <tbody>\n",
+         tabindex=\"0\" role=\"region\" aria-label=\"Other geometries\">\n<table>\n<thead><tr><th>sensor</th>",
     );
+    let heads = ["readings", "unknowns", "observable", "Δx, mm", "Δy, mm", "Δz, mm"];
+    html += &(numbers("th", heads.map(String::from)) + "</tr></thead>\n<tbody>\n");
     for variant in &result.geometry {
-        let _ = write!(
-            html,
-            "<tr><td>{}</td><td class=\"number\">{}</td><td class=\"number\">{}</td>",
-            escape(&variant.change),
-            variant.readings,
-            variant.unknowns
-        );
+        let counts = numbers("td", [variant.readings, variant.unknowns].map(|it| it.to_string()));
+        let _ = write!(html, "<tr><td>{}</td>{counts}", escape(&variant.change));
         if let Some(refused) = &variant.refused {
             let _ = write!(
                 html,
@@ -275,10 +263,8 @@ fn geometry(result: &LimitResult) -> String {
             );
         }
         if let Some(seen) = &variant.observability {
-            let _ = write!(html, "<td class=\"number\">{}</td>", seen.observable);
-            for axis in &seen.axes {
-                let _ = write!(html, "<td class=\"number\">{:.4}</td>", axis.rmse_mm);
-            }
+            let axes = seen.axes.iter().map(|axis| format!("{:.4}", axis.rmse_mm));
+            html += &numbers("td", [seen.observable.to_string()].into_iter().chain(axes));
         }
         html += "</tr>\n";
     }
