@@ -64,7 +64,6 @@ fn signal(host: &Child, name: &str) {
 /// Device on a pseudo-terminal that scans all the time.
 struct Rig {
     port: String,
-    lease: Duration,
     trap: Arc<Mutex<Trap>>,
     folder: Folder,
 }
@@ -79,13 +78,13 @@ impl Rig {
         virtual_device::run_scanning(far, model, frames(), OWN, move || {
             counter.lock().unwrap().count();
         });
-        Self { port, lease: LEASE, trap, folder: Folder::new(name) }
+        Self { port, trap, folder: Folder::new(name) }
     }
 
     /// Runs a command of `link`, and ends it at request number `requests`. Returns its status, and whether it was
     /// ended.
     fn end_at(&self, arguments: &[&str], requests: usize, end: End) -> (ExitStatus, bool) {
-        let lease = format!("--lease-ms={}", self.lease.as_millis());
+        let lease = format!("--lease-ms={}", LEASE.as_millis());
         {
             let mut trap = self.trap.lock().unwrap();
             let host = program()
@@ -116,13 +115,13 @@ impl Rig {
         let mut looks = 0;
         while device.configuration().unwrap().lease_left_ms > 0 {
             looks += 1;
-            assert!(start.elapsed() < self.lease + LATE, "the lease does not end");
+            assert!(start.elapsed() < LEASE + LATE, "the lease does not end");
             std::thread::sleep(Duration::from_millis(5));
         }
         assert_eq!(device.configuration().unwrap().configuration, OWN);
         let before = device.statistics().unwrap().frames_scanned;
         while device.statistics().unwrap().frames_scanned == before {
-            assert!(start.elapsed() < self.lease + LATE, "the device does not scan");
+            assert!(start.elapsed() < LEASE + LATE, "the device does not scan");
         }
         looks == 0
     }
@@ -256,25 +255,6 @@ fn with_a_key_a_device_takes_models_that_are_sealed_with_it_and_no_older_ones() 
     link(&["undo"], 1, "the device refused");
     assert_eq!(rig.device().restart().unwrap().model.unwrap().crc_32, new.parse().crc());
     link(&version("9"), 0, "this one is version 9");
-}
-
-#[test]
-#[ignore = "takes half a minute"]
-fn after_the_usual_lease_a_device_whose_host_was_killed_scans_on() {
-    let (old, new) = (model(3), model(4));
-    let rig = Rig { lease: taxel_rig::device::LEASE, ..Rig::new("usual", old.bytes()) };
-    rig.folder.write("new.bin", new.bytes());
-    for end in [End::Kill, End::Interrupt, End::Kill] {
-        // Request 9 is a chunk.
-        let (status, _) = rig.end_at(&["upload", "new.bin"], 9, end);
-        let start = Instant::now();
-        rig.wait_for_own_scans();
-        let took_s = start.elapsed().as_secs_f64();
-        println!("{end:?}: {status}; its own scans again after {took_s:.2} s");
-        let expected_s = if end == End::Kill { 9.5..10.5 } else { 0.0..0.5 };
-        assert!(expected_s.contains(&took_s), "{took_s}");
-        assert_eq!(rig.model(), old.parse().crc());
-    }
 }
 
 #[test]
