@@ -69,65 +69,47 @@ pub fn run_to_end(name: &str, work: impl FnOnce() -> Result<()>) -> ExitCode {
 fn advice(error: &Error) -> &'static str {
     use taxel_data::Error as Data;
     use taxel_data::error::Problem;
+    use taxel_rig::Error as Rig;
+    let of_field = |field: &str| match field {
+        "whole_array" => " (--whole-array)",
+        "fill" => " (leave --fill or training.fill out)",
+        "folds" => " (--folds or --fold-column, --no-refine)",
+        "memory" => " (--centres, --no-affine, --most-memory)",
+        _ => "",
+    };
     match error {
-        Error::Learn(taxel_learn::Error::OneRow { .. }) => " (--whole-array)",
-        Error::Learn(taxel_learn::Error::NoFill(_)) => " (leave --fill or training.fill out)",
-        Error::Setting(bad) | Error::Learn(taxel_learn::Error::Setting(bad))
-            if bad.field == "folds" =>
-        {
-            " (--folds or --fold-column, --no-refine)"
-        }
-        Error::Setting(bad) | Error::Learn(taxel_learn::Error::Setting(bad))
-            if bad.field == "memory" =>
-        {
-            " (--centres, --no-affine, --most-memory)"
-        }
+        Error::Setting(bad) | Error::Data(Data::Setting(bad)) => of_field(&bad.field),
+        Error::Data(Data::Unfit { field, .. }) => of_field(field),
         Error::Data(Data::Write { .. } | Data::WrittenOverInput { .. }) => " (-o)",
-        Error::Data(Data::File { problem: Problem::NoPartner { .. }, .. }) => {
-            " (--tolerance, --lag, --on)"
-        }
-        Error::Data(Data::File {
-            problem: Problem::ClockSetBack { .. } | Problem::NoTimeStamp { .. },
-            ..
-        }) => " (--on)",
-        Error::Rig(taxel_rig::Error::NoQemu { .. } | taxel_rig::Error::NoStart { .. }) => {
-            " (--qemu)"
-        }
-        Error::Rig(taxel_rig::Error::NoImage { .. } | taxel_rig::Error::NotElf { .. }) => {
-            " (--image)"
-        }
-        Error::Rig(taxel_rig::Error::Port { .. }) => " (PORT)",
+        Error::Data(Data::File { problem, .. }) => match problem {
+            Problem::NoPartner { .. } => " (--tolerance, --lag, --on)",
+            Problem::ClockSetBack { .. } | Problem::NoTimeStamp { .. } => " (--on)",
+            _ => "",
+        },
+        Error::Rig(Rig::NoQemu { .. } | Rig::NoStart { .. }) => " (--qemu)",
+        Error::Rig(Rig::NoImage { .. } | Rig::NotElf { .. }) => " (--image)",
+        Error::Rig(Rig::Port { .. }) => " (PORT)",
         _ => "",
     }
 }
 
 /// Exit status of an error: 1 for work that failed, 2 for bad usage or input.
 fn exit_status(error: &Error) -> u8 {
-    use taxel_learn::Error as Learn;
+    use taxel_data::Error as Data;
     use taxel_rig::Error as Rig;
     match error {
         Error::Failed(_)
-        | Error::Learn(
-            Learn::NoRegression
-            | Learn::ProjectionBeyondF32
-            | Learn::NotExcited { .. }
-            | Learn::NotBetter
-            | Learn::NotPacked(_),
-        ) => 1,
-        Error::Simulate(cause) => match cause {
-            taxel_simulate::Error::Setting(_) | taxel_simulate::Error::Data(_) => 2,
-            taxel_simulate::Error::Board { .. } => 1,
-        },
-        Error::Rig(cause) => match cause {
+        | Error::Data(Data::Failed(_))
+        | Error::Rig(Rig::Data(Data::Failed(_))) => 1,
+        Error::Rig(
             Rig::Port { .. }
             | Rig::NoRoom { .. }
             | Rig::NoQemu { .. }
             | Rig::NoImage { .. }
             | Rig::NotElf { .. }
-            | Rig::Setting(_)
-            | Rig::File(_) => 2,
-            _ => 1,
-        },
+            | Rig::Data(_),
+        ) => 2,
+        Error::Rig(_) => 1,
         _ => 2,
     }
 }

@@ -228,3 +228,14 @@ fn by_rows(
     };
     (ordered(inputs, &input_rows), ordered(outputs, &output_rows), rows.len())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn outputs_of_other_rows_make_one_row_of_all() {
+        let header = ["r1c1_ohm", "r2c1_ohm", "r3e1_dz_mm", "r4e1_dz_mm"].map(String::from);
+        assert_eq!(by_rows(&header, vec![0, 1], vec![2, 3]), (vec![0, 1], vec![2, 3], 1));
+    }
+}

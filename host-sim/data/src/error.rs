@@ -50,9 +50,19 @@ pub fn require(
     if holds { Ok(()) } else { Err(BadValue::new(field, value, rule())) }
 }
 
-/// Failure to read, write or use a data file.
+/// Refusal or failure of the crates that compute.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
+    /// Setting that cannot be used, by itself or with this data.
+    #[error(transparent)]
+    Setting(#[from] BadValue),
+    /// Data or model that cannot be used for what was asked. The `field` is the setting that asks for it; empty if
+    /// none does.
+    #[error("{reason}")]
+    Unfit { field: &'static str, reason: String },
+    /// Work that failed.
+    #[error("{0}")]
+    Failed(String),
     /// File that cannot be read.
     #[error("cannot read {}: {cause}; check the path and its permissions", path.display())]
     Read { path: PathBuf, cause: std::io::Error },
@@ -68,6 +78,21 @@ pub enum Error {
 }
 
 impl Error {
+    /// Error for data or a model that cannot be used, and the `reason`.
+    pub fn unfit(reason: impl Into<String>) -> Self {
+        Self::unfit_for("", reason)
+    }
+
+    /// Error for data or a model that does not allow the setting `field`, and the `reason`.
+    pub fn unfit_for(field: &'static str, reason: impl Into<String>) -> Self {
+        Self::Unfit { field, reason: reason.into() }
+    }
+
+    /// Error for work that failed, and the `reason`.
+    pub fn failed(reason: impl Into<String>) -> Self {
+        Self::Failed(reason.into())
+    }
+
     /// Error for a `problem` with the file at `path`.
     pub fn file(path: &Path, problem: Problem) -> Self {
         Self::File { path: path.into(), problem }

@@ -125,6 +125,8 @@ mod tests {
         // Three times 0.1 is more than 0.3.
         let table = Table { names: vec!["a".into()], values: vec![0.1; 3] };
         assert_eq!((table.means(), table.deviations()), (vec![0.1], vec![0.0]));
+        let rounded = Table { names: vec!["a".into()], values: vec![100.0, 100.0 + 1e-9] };
+        assert_eq!(rounded.deviations(), [0.0]);
     }
 
     #[test]

@@ -188,15 +188,9 @@ pub enum Error {
     /// Setting that cannot be used.
     #[error(transparent)]
     Setting(#[from] BadValue),
-    /// Data that cannot be read, written or used.
+    /// Refusal or failure of the crates that compute.
     #[error(transparent)]
     Data(#[from] taxel_data::Error),
-    /// Simulation that failed.
-    #[error(transparent)]
-    Simulate(#[from] taxel_simulate::Error),
-    /// Training or packing that failed, or a blob that was rejected.
-    #[error(transparent)]
-    Learn(#[from] taxel_learn::Error),
     /// Device or emulator that failed.
     #[error(transparent)]
     Rig(#[from] taxel_rig::Error),

@@ -326,6 +326,27 @@ mod tests {
     }
 
     #[test]
+    fn errors_of_both_signs_count_and_small_truths_have_no_relative_error() {
+        let truth = Table { names: vec!["dz_mm".into()], values: vec![1.0, 2.0, 0.05] };
+        let measure = Measure { full_scale: vec![1.0], thickness_mm: Some(5.0), limit: None };
+        let errors = &by_group(&truth, &[1.5, 1.5, 0.55], &measure)[0];
+        let found =
+            [errors.full_scale_percent, errors.positional_percent, errors.mean_relative_percent];
+        let positional = 50.0 * (1.0 / 4.0 + 1.0 / 3.0 + 1.0 / 4.95) / 3.0;
+        let expected = [50.0, positional, 50.0 * (1.0 + 0.5) / 2.0];
+        for (definition, (found, expected)) in found.iter().zip(expected).enumerate() {
+            let off = (found.unwrap() - expected).abs();
+            assert!(off < 1e-12, "definition {definition}: {found:?}, not {expected}");
+        }
+    }
+
+    #[test]
+    fn errors_of_a_group_are_pooled_by_the_mean_square() {
+        let pooled = pooled(&[("dz_mm", vec![0, 2]), ("dx_mm", vec![1])], &[3.0, 5.0, 4.0]);
+        assert_eq!(pooled, [12.5_f64.sqrt(), 5.0]);
+    }
+
+    #[test]
     fn there_is_no_r_squared_of_values_that_only_rounding_tells_apart() {
         for values in [vec![0.1; 300], vec![0.1, 0.1_f64.next_up(), 0.1]] {
             let estimate: Vec<f64> = values.iter().map(|value| value + 0.01).collect();

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use taxel_data::dataset::Dataset;
 use taxel_data::error::require;
 
-use crate::error::{Error, Result};
+use crate::error::{Result, no_regression};
 use crate::infer::{Exponential, assess_lines};
 use crate::packing::ModelBlob;
 
@@ -52,7 +52,7 @@ impl Settings {
 /// Checks before long work that a confidence can be fitted to so many `frames` of so many `readings`.
 ///
 /// # Errors
-/// [`Error::Setting`] for fewer than ten frames for each feature: intervals would cover anything.
+/// [`Error::Setting`](crate::Error::Setting) for fewer than ten frames for each feature: intervals would cover anything.
 pub fn check(frames: usize, readings: usize) -> Result<()> {
     let features = Settings::default().directions_of(readings) + 1;
     let least = FRAMES_A_FEATURE * features;
@@ -126,7 +126,7 @@ impl HeldOut {
 /// were `held_out`.
 ///
 /// # Errors
-/// [`Error::NoRegression`] for inputs whose density is beyond f32; [`Error::NotPacked`] for a model beyond what the
+/// [`Error`](crate::Error) for inputs whose density is beyond f32, or for a model beyond what the
 /// format holds.
 ///
 /// # Panics
@@ -140,7 +140,7 @@ pub fn add(blob: &ModelBlob, density: &Density, held_out: &HeldOut) -> Result<Mo
     let (directions, components) = (features.directions(), mixture.components.len());
     let sizes = Sizes { readings, directions, components, outputs };
     let uncalibrated = block(features, mixture, &variances, &vec![1.0; outputs], 0.0);
-    let confidence = Confidence::new(sizes, &uncalibrated).map_err(|_| Error::NoRegression)?;
+    let confidence = Confidence::new(sizes, &uncalibrated).map_err(|_| no_regression())?;
     let (deviations, _) = assess_lines(confidence, &held_out.inputs);
     let ratios = ratios(&deviations, &held_out.errors, outputs);
     let calibrated: Vec<f64> = variances
@@ -151,7 +151,7 @@ pub fn add(blob: &ModelBlob, density: &Density, held_out: &HeldOut) -> Result<Mo
     let ratios_95: Vec<f64> = ratios.iter().map(|[one, most]| most / one).collect();
     let threshold = quantile(&mut held_out.surprises.clone(), 1.0 - FALSE_ALARMS);
     let block = block(features, mixture, &calibrated, &ratios_95, threshold);
-    let confidence = Confidence::new(sizes, &block).map_err(|_| Error::NoRegression)?;
+    let confidence = Confidence::new(sizes, &block).map_err(|_| no_regression())?;
     blob.with_confidence(confidence)
 }
 
@@ -213,7 +213,7 @@ fn ratios(deviations: &[f32], errors: &[f64], outputs: usize) -> Vec<[f64; 2]> {
     (0..outputs).into_par_iter().map(of_output).collect()
 }
 
-/// Quantile of `values`, which are sorted; 0 of none.
+/// Quantile of `values`, which are sorted: the least that this share does not exceed; 0 of none.
 fn quantile(values: &mut [f64], share: f64) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
     let place = (values.len() as f64 * share).ceil() as usize;

@@ -53,11 +53,17 @@ pub struct Prices {
     by_term: HashMap<String, Price>,
 }
 
+fn bad_prices(why: &str) -> Error {
+    Error::unfit(format!(
+        "prices of code (firmware/prices.csv): {why}; `cargo xtask cycles --fit` writes them anew"
+    ))
+}
+
 impl Prices {
     /// The price list in the repository, `firmware/prices.csv`.
     ///
     /// # Errors
-    /// [`Error::Prices`] if it is not sound.
+    /// [`Error`] if it is not sound.
     pub fn accepted() -> Result<Self> {
         Self::parse(FITTED)
     }
@@ -65,14 +71,12 @@ impl Prices {
     /// Parses a price list.
     ///
     /// # Errors
-    /// [`Error::Prices`] names the line that is not understood.
+    /// [`Error`] names the line that is not understood.
     pub fn parse(text: &str) -> Result<Self> {
         let mut lines = text.lines();
         let compiler = lines.next().and_then(|line| line.strip_prefix(COMPILER));
         let (Some(compiler), Some(HEAD)) = (compiler, lines.next()) else {
-            return Err(Error::Prices(format!(
-                "the first lines are not {COMPILER:?} and {HEAD:?}"
-            )));
+            return Err(bad_prices(&format!("the first lines are not {COMPILER:?} and {HEAD:?}")));
         };
         let price = |line: &str| {
             let (name, numbers) = line.strip_prefix('"')?.split_once("\",")?;
@@ -81,7 +85,7 @@ impl Prices {
             Some((name.to_owned(), numbers.try_into().ok()?))
         };
         let by_term = lines
-            .map(|line| price(line).ok_or_else(|| Error::Prices(format!("not understood: {line}"))))
+            .map(|line| price(line).ok_or_else(|| bad_prices(&format!("not understood: {line}"))))
             .collect::<Result<_>>()?;
         Ok(Self { compiler: compiler.to_owned(), by_term })
     }
@@ -98,11 +102,11 @@ impl Prices {
     /// What one frame costs a model of this `design`, with the `exponential` of networks in `f32-direct`.
     ///
     /// # Errors
-    /// [`Error::Prices`] names a term that the list lacks.
+    /// [`Error`] names a term that the list lacks.
     pub fn frame(&self, design: &Design, exponential: Exponential, gating: Gating) -> Result<Cost> {
         let mut sum = [0.0; 3];
         for (name, times) in terms(design, exponential, gating) {
-            let unknown = || Error::Prices(format!("no price for {name:?}"));
+            let unknown = || bad_prices(&format!("no price for {name:?}"));
             let price = self.by_term.get(&name).ok_or_else(unknown)?;
             sum.iter_mut().zip(price).for_each(|(sum, price)| *sum += price * times as f64);
         }

@@ -30,8 +30,7 @@ const FRAMES_AT_ONCE: usize = 1024;
 /// Checks before long work that a model which is trained on `frames` can fill missing readings.
 ///
 /// # Errors
-/// [`Error::NoFill`] for readings relative to the baseline, or fewer than four; [`Error::FewForFill`] for fewer than ten
-/// frames a reading.
+/// [`Error`] for readings relative to the baseline, or fewer than four; or for fewer than ten frames a reading.
 pub fn check(frames: &Dataset) -> Result<()> {
     check_readings(frames.relative_inputs, &frames.inputs)
 }
@@ -39,28 +38,37 @@ pub fn check(frames: &Dataset) -> Result<()> {
 fn check_readings(are_relative: bool, readings: &Table) -> Result<()> {
     let (frames, count) = (readings.len(), readings.names.len());
     if are_relative {
-        return Err(Error::NoFill("its inputs are relative to the baseline"));
+        return Err(no_fill("its inputs are relative to the baseline"));
     }
     if count < LEAST_READINGS {
-        return Err(Error::NoFill("it has fewer than four readings"));
+        return Err(no_fill("it has fewer than four readings"));
     }
     let least = FRAMES_A_READING * count;
-    if frames < least { Err(Error::FewForFill { frames, readings: count, least }) } else { Ok(()) }
+    if frames >= least {
+        return Ok(());
+    }
+    Err(Error::unfit(format!(
+        "{frames} frames are too few to learn how to fill {count} missing readings (fill): give {least} or more, or leave \
+         the fill out"
+    )))
+}
+
+fn no_fill(why: &str) -> Error {
+    Error::unfit_for("fill", format!("the model cannot fill missing readings: {why}"))
 }
 
 /// Adds to the model in `blob` a fill of missing readings, fitted to `readings`.
 ///
 /// # Errors
-/// [`Error::NoFill`] for a model that takes readings relative to the baseline, or has fewer than four; or for readings
-/// that are no numbers. [`Error::FewForFill`] for too few frames. [`Error::NotPacked`] for a model beyond what the format
-/// holds.
+/// [`Error`] for a model that takes readings relative to the baseline, or has fewer than four; for readings that are no
+/// numbers, or too few frames; and for a model beyond what the format holds.
 pub fn add(blob: &ModelBlob, readings: &Table) -> Result<ModelBlob> {
     let count = readings.names.len();
     check_readings(blob.parse().metadata().relative_inputs, readings)?;
     let factors = FACTORS.min(count / 2);
-    let block = fit(readings, factors).ok_or(Error::NoFill("readings are no numbers"))?;
-    let fill =
-        Fill::new(count, factors, &block).map_err(|_| Error::NoFill("readings are no numbers"))?;
+    let no_numbers = || no_fill("readings are no numbers");
+    let block = fit(readings, factors).ok_or_else(no_numbers)?;
+    let fill = Fill::new(count, factors, &block).map_err(|_| no_numbers())?;
     blob.with_fill(fill)
 }
 

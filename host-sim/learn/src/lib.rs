@@ -41,8 +41,8 @@ pub mod select;
 pub mod cost;
 
 pub use decoder::{Decoder, Estimates, FrameDecoder};
-pub use error::{Error, Result};
 pub use infer::Exponential;
 pub use packing::{ModelBlob, Origin, pack};
 pub use prepared::PreparedModel;
+pub use taxel_data::error::{Error, Result};
 pub use train::{Options, Trained};

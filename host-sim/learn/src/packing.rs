@@ -13,7 +13,7 @@ use model_core::rbf::Network;
 use taxel_data::dataset::Dataset;
 use taxel_data::{columns, input};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, not_packed};
 use crate::infer::{Exponential, infer};
 use crate::train::{self, FittedNetwork, Trained};
 
@@ -56,7 +56,7 @@ impl Origin {
 /// that data set; the weights may have been fitted to more frames.
 ///
 /// # Errors
-/// [`Error::NotPacked`] for a model beyond what the format holds.
+/// [`Error`] for a model beyond what the format holds.
 pub fn pack(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<ModelBlob> {
     let views: Vec<Network<'_>> = trained.networks.iter().map(FittedNetwork::network).collect();
     let projection = trained.projection.as_ref().map(|parameters| train::view(parameters, dataset));
@@ -109,7 +109,7 @@ pub fn pack(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<Mod
             full_scale: Floats(&full_scale),
         },
     };
-    Ok(ModelBlob { bytes: blob::encode_to_vec(&parts).map_err(Error::NotPacked)? })
+    Ok(ModelBlob { bytes: blob::encode_to_vec(&parts).map_err(not_packed)? })
 }
 
 fn training_rmse(
@@ -141,10 +141,10 @@ impl ModelBlob {
     /// Reads and checks the blob at `path`.
     ///
     /// # Errors
-    /// [`Error::Data`] for a file that cannot be read or is larger than [`MOST_BLOB_BYTES`], [`Error::Blob`] for a blob that is rejected.
+    /// [`Error`] for a file that cannot be read or is larger than [`MOST_BLOB_BYTES`], or a blob that is rejected.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = input::read(path, MOST_BLOB_BYTES)?;
-        Self::of_bytes(&bytes).map_err(|cause| Error::Blob { path: path.into(), cause })
+        Self::of_bytes(&bytes).map_err(|cause| Error::unfit(format!("{}: {cause}", path.display())))
     }
 
     /// Checks and copies the `bytes` of a blob.
@@ -165,7 +165,7 @@ impl ModelBlob {
     /// Blob of this model with the given confidence, or another one instead of its own.
     ///
     /// # Errors
-    /// [`Error::NotPacked`] for a confidence of another model, or a blob that becomes too large.
+    /// [`Error`] for a confidence of another model, or a blob that becomes too large.
     pub fn with_confidence(&self, confidence: Confidence<'_>) -> Result<Self> {
         let model = self.parse();
         let networks: Vec<Network<'_>> = model.networks().collect();
@@ -175,7 +175,7 @@ impl ModelBlob {
     /// Blob of this model that fills missing readings by `fill`, instead of its own.
     ///
     /// # Errors
-    /// [`Error::NotPacked`] for a fill of another model, or a blob that becomes too large.
+    /// [`Error`] for a fill of another model, or a blob that becomes too large.
     pub fn with_fill(&self, fill: Fill<'_>) -> Result<Self> {
         let model = self.parse();
         let networks: Vec<Network<'_>> = model.networks().collect();
@@ -205,7 +205,7 @@ impl ModelBlob {
 /// Blob of `model` with these `networks`, confidence and fill instead of its own.
 ///
 /// # Errors
-/// [`Error::NotPacked`] for parts that do not belong together, or a blob that becomes too large.
+/// [`Error`] for parts that do not belong together, or a blob that becomes too large.
 pub(crate) fn rebuild(
     model: &Model<'_>,
     networks: &[Network<'_>],
@@ -223,5 +223,5 @@ pub(crate) fn rebuild(
         row_network: &row_network,
         metadata: *model.metadata(),
     };
-    Ok(ModelBlob { bytes: blob::encode_to_vec(&parts).map_err(Error::NotPacked)? })
+    Ok(ModelBlob { bytes: blob::encode_to_vec(&parts).map_err(not_packed)? })
 }

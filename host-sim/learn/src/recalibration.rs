@@ -77,7 +77,7 @@ pub struct Recalibrated {
 /// Checks that a `model` can be recalibrated.
 ///
 /// # Errors
-/// [`Error::NotRecalibrable`] with what stands against it.
+/// [`Error::Unfit`] with what stands against it.
 pub fn check(model: &Model<'_>) -> Result<()> {
     let network = |row| model.network_of_row(row);
     let shares = |row: usize| (0..row).any(|before| network(before) == network(row));
@@ -107,7 +107,7 @@ pub fn check(model: &Model<'_>) -> Result<()> {
         ),
     ];
     match faults.into_iter().find(|(is_there, _)| *is_there) {
-        Some((_, fault)) => Err(Error::NotRecalibrable(fault)),
+        Some((_, fault)) => Err(Error::unfit(format!("the model cannot be recalibrated: {fault}"))),
         None => Ok(()),
     }
 }
@@ -116,8 +116,8 @@ pub fn check(model: &Model<'_>) -> Result<()> {
 /// the `outputs` truly were, each a line a press in the model's columns.
 ///
 /// # Errors
-/// [`Error::NotRecalibrable`]; [`Error::NotExcited`] if a network has seen too few presses, or presses that are too
-/// alike; [`Error::NotBetter`] if no network would be better.
+/// [`Error::Unfit`] for a model that presses cannot recalibrate; [`Error::Failed`] if a network has seen too few presses, or
+/// presses that are too alike, and if no network would be better.
 ///
 /// # Panics
 /// If the tables have other numbers of columns than the model, or of lines than each other.
@@ -138,11 +138,16 @@ pub fn recalibrate(
         .collect();
     if let Some(network) = units.iter().position(|unit| !unit.is_excited()) {
         let row = (networks.len() > 1).then_some(network + 1);
-        return Err(Error::NotExcited { row });
+        let row = row.map_or(String::new(), |row| format!("row {row} has seen "));
+        return Err(Error::failed(format!(
+            "{row}too few presses, or presses that are too alike; press other places"
+        )));
     }
     let fits: Vec<Fit> = units.par_iter().map(Unit::recalibrate).collect();
     if !fits.iter().any(|fit| fit.is_better) {
-        return Err(Error::NotBetter);
+        let reason =
+            "no better model came of the presses; the model is as good, or the presses are wrong";
+        return Err(Error::failed(reason));
     }
     let shifted: Result<Vec<(usize, FittedNetwork)>> = units
         .iter()

@@ -383,7 +383,7 @@ pub struct Trained {
 ///
 /// # Errors
 /// [`Error::Setting`](crate::Error::Setting) for options that do not fit the data,
-/// [`Error::Column`](crate::Error::Column) for a column that f32 does not hold, and other
+/// [`Error::Unfit`](crate::Error::Unfit) for a column that f32 does not hold, and other
 /// [`Error`](crate::Error)s for data that does not fit the format.
 pub fn train(dataset: &Dataset, options: &Options, progress: &dyn Progress) -> Result<Trained> {
     check(dataset, options)?;

@@ -167,18 +167,9 @@ pub enum Error {
     /// Image that is no program.
     #[error("{}: it is no ELF file; the application's is `qemu-app`", image.display())]
     NotElf { image: PathBuf },
-    /// Failure of the virtual board at the end of the readout's line.
+    /// Refusal or failure of the crates that compute.
     #[error(transparent)]
-    Board(#[from] taxel_simulate::Error),
-    /// Failure to train a model for the check.
-    #[error(transparent)]
-    Model(#[from] taxel_learn::Error),
-    /// Setting that cannot be used.
-    #[error(transparent)]
-    Setting(#[from] taxel_data::BadValue),
-    /// File that cannot be written.
-    #[error(transparent)]
-    File(#[from] taxel_data::Error),
+    Data(#[from] taxel_data::Error),
 }
 
 impl Error {

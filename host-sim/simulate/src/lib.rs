@@ -31,6 +31,6 @@ pub mod synth;
 pub mod forward;
 pub mod virtual_board;
 
-pub use error::{Error, Result};
 pub use synth::{Synthesis, synthesise};
+pub use taxel_data::error::{Error, Result};
 pub use world::World;

@@ -248,6 +248,13 @@ mod tests {
     }
 
     #[test]
+    fn a_deformation_at_the_bound_is_not_refused_for_rounding() {
+        let sensor = Sensor::paper();
+        assert!(sensor.holds_for(sensor.largest_deformation_mm().next_up()));
+        assert!(!sensor.holds_for(1.001 * sensor.largest_deformation_mm()));
+    }
+
+    #[test]
     fn readings_agree_with_values_computed_to_forty_digits() {
         // Expected values come from 40-digit decimal arithmetic on the equations (row, deformation rule,
         // column, Ω).

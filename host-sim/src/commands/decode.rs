@@ -114,7 +114,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         frames_with_missing_readings: incomplete,
         frames_clamped: flags.iter().filter(|flags| *flags & EstimateReport::CLAMPED != 0).count(),
         health,
-        frames_novel: assessed.map(|(_, novelty)| novelty.iter().filter(|n| **n > 0.0).count()),
+        frames_novel: assessed.map(|(_, frames)| novel(&frames)),
         exponential: arguments.exponential,
         file: arguments.output.clone(),
     };
@@ -137,6 +137,16 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     page.print()
 }
 
+/// Whether a row's outputs are no numbers though no reading is missing.
+fn overflows(inputs: &[f64], outputs: &[f64]) -> bool {
+    outputs[0].is_nan() && !inputs.iter().any(|input| is_missing(*input))
+}
+
+/// Number of frames that are unlike those of training; one that misses a reading cannot be told, and is NaN.
+fn novel(novelty: &[f64]) -> usize {
+    novelty.iter().filter(|n| **n > 0.0).count()
+}
+
 /// What a device would flag in each frame.
 fn flags(
     model: &PreparedModel<'_>,
@@ -154,9 +164,7 @@ fn flags(
     let lines = inputs.chunks_exact(readings.names.len()).zip(estimate.lines());
     let of_line = |(line, (inputs, outputs)): (usize, (&[f64], &[f64]))| {
         let mut rows = inputs.chunks_exact(in_row).zip(outputs.chunks_exact(out_row));
-        let overflow = rows.any(|(inputs, outputs)| {
-            outputs[0].is_nan() && !inputs.iter().any(|input| is_missing(*input))
-        });
+        let overflow = rows.any(|(inputs, outputs)| overflows(inputs, outputs));
         let is_novel = novelty.is_some_and(|novelty| novelty[line] > 0.0);
         let flags = [
             (health.is_faulty[line], EstimateReport::FAULTY_READING),
@@ -241,5 +249,18 @@ fn kept<'k>(
 fn remark_on_range(model: &PreparedModel<'_>, readings: &Table) {
     if let Some(warning) = Warning::out_of_range(model.share_out_of_range(&readings.values)) {
         eprintln!("{warning}");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_missing_reading_is_no_overflow_and_makes_no_frame_novel() {
+        let nan = f64::NAN;
+        assert!(overflows(&[50.0, 51.0], &[nan]) && !overflows(&[50.0, nan], &[nan]));
+        assert!(!overflows(&[50.0, 51.0], &[0.1]));
+        assert_eq!(novel(&[nan, 0.5, -0.5, 0.0]), 1);
     }
 }

@@ -2,15 +2,17 @@
 
 use std::fmt::Write as _;
 
+use super::axes::{Axis, BELOW_PX, Panel, Upright, label_width};
 use super::format::significant;
 use super::svg::{Anchor, Px, Shape, Svg, TEXT_PX, text_width};
-use super::ticks::Ticks;
 
 /// Mark of a series.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Mark {
     /// Line through the points with a shape at every one; a missing value is a gap.
     LineAnd(Shape),
+    /// Shapes without a line.
+    Points(Shape),
     Dashed,
     Dotted,
     /// Bars from zero, this wide on the x axis.
@@ -38,32 +40,6 @@ impl Series {
     }
 }
 
-/// Axis of a chart.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Axis {
-    /// Quantity on the axis, with its unit.
-    pub label: String,
-    pub ticks: Ticks,
-    pub logarithmic: bool,
-}
-
-impl Axis {
-    /// Linear axis.
-    pub fn linear(label: impl Into<String>, ticks: Ticks) -> Self {
-        Self { label: label.into(), ticks, logarithmic: false }
-    }
-
-    /// Place of `value` along the axis: 0 at its low end, 1 at its high end.
-    fn place(&self, value: f64) -> f64 {
-        let Ticks { low, high, .. } = self.ticks;
-        if self.logarithmic {
-            (value / low).ln() / (high / low).ln()
-        } else {
-            (value - low) / (high - low)
-        }
-    }
-}
-
 /// Chart with two axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart {
@@ -75,26 +51,20 @@ pub struct Chart {
     pub y: Axis,
     /// Series, in the order in which they are drawn.
     pub series: Vec<Series>,
-    /// Ranges of x that are shaded, to separate neighbours.
-    pub bands: Vec<[f64; 2]>,
-    /// Words below points, as far as there is room.
-    pub notes: Vec<([f64; 2], String)>,
     /// Whether names stand at the right end of the lines instead of in a legend.
     pub end_labels: bool,
 }
 
-/// Layout of a chart, in px.
+/// Layout of a chart.
 struct Frame<'c> {
     chart: &'c Chart,
-    left: f64,
-    right: f64,
-    top: f64,
-    bottom: f64,
+    panel: Panel,
     /// Size of marks, which shrink where they would cover each other.
     mark_size: f64,
 }
 
-const LINE_PX: f64 = TEXT_PX + 7.0;
+/// Distance of lines of text in px.
+pub const LINE_PX: f64 = TEXT_PX + 7.0;
 const SWATCH_PX: f64 = 24.0;
 /// Room between the end of a line and its name, in px.
 const LEADER_PX: f64 = 26.0;
@@ -105,44 +75,27 @@ impl Chart {
     /// Draws the chart in this size.
     pub fn draw(&self, [width, height]: [f64; 2]) -> String {
         let mut svg = Svg::new(width, height, &self.title);
-        let tick_width =
-            |ticks: &Ticks| ticks.at.iter().map(|(_, label)| text_width(label)).fold(0.0, f64::max);
         let named = self.series.iter().filter(|series| !series.name.is_empty());
         let end_width = named.map(|s| text_width(&s.name)).fold(0.0, f64::max) + LEADER_PX;
-        // Charts that stand above each other are aligned unless a label is long.
-        let left = tick_width(&self.y.ticks).max(5.0 * text_width("0")) + 10.0;
-        let mut frame = Frame {
-            chart: self,
-            left,
-            right: width - if self.end_labels { end_width } else { 10.0 },
-            top: LINE_PX + 6.0,
-            bottom: height - 2.0 * LINE_PX - 4.0,
-            mark_size: 1.0,
-        };
-        let most = self.series.iter().map(|series| series.points.len()).max().unwrap_or(0);
-        let spacing = (frame.right - frame.left) / most.max(1) as f64;
-        frame.mark_size = (spacing / 9.0).clamp(0.6, 1.0);
         svg.text(0.0, TEXT_PX, Anchor::Start, "label", &self.y.label);
-        if !self.end_labels {
-            frame.top = legend(&mut svg, &self.series, width, text_width(&self.y.label)) + 12.0;
-        }
-        frame.draw_axes(&mut svg, height);
+        let top = if self.end_labels {
+            LINE_PX + 6.0
+        } else {
+            legend(&mut svg, &self.series, width, text_width(&self.y.label)) + 12.0
+        };
+        // Charts that stand above each other are aligned unless a label is long.
+        let left = label_width(&self.y.ticks).max(5.0 * text_width("0")) + 10.0;
+        let right = width - if self.end_labels { end_width } else { 10.0 };
+        let (x, y) = (self.x.clone(), self.y.clone());
+        let panel = Panel { x, y, left, right, top, bottom: height - BELOW_PX };
+        panel.draw_axes(&mut svg, Upright::Grid);
+        let most = self.series.iter().map(|series| series.points.len()).max().unwrap_or(0);
+        let spacing = (right - left) / most.max(1) as f64;
+        let frame = Frame { chart: self, panel, mark_size: (spacing / 9.0).clamp(0.6, 1.0) };
         for series in &self.series {
             svg.open(&opacity(series));
             frame.draw_series(&mut svg, series);
             svg.close();
-        }
-        let mut noted: Vec<[f64; 2]> = Vec::new();
-        for ([x, y], note) in &self.notes {
-            let [middle, below] = [frame.x(*x), frame.y(*y) + TEXT_PX + 5.0];
-            let beside = |[x, y]: &[f64; 2]| {
-                (middle - x).abs() > text_width(note) + 4.0 || (below - y).abs() > TEXT_PX
-            };
-            // Words without room are omitted.
-            if noted.iter().all(beside) {
-                svg.text(middle, below, Anchor::Middle, "note-in-chart", note);
-                noted.push([middle, below]);
-            }
         }
         if self.end_labels {
             frame.draw_end_labels(&mut svg);
@@ -170,7 +123,7 @@ fn opacity(series: &Series) -> String {
 
 /// Draws names and marks: beside the label of the y axis where there is room, otherwise below it.
 /// Returns the y coordinate at which the legend ends.
-fn legend(svg: &mut Svg, series: &[Series], width: f64, label_width: f64) -> f64 {
+pub fn legend(svg: &mut Svg, series: &[Series], width: f64, label_width: f64) -> f64 {
     let named: Vec<_> = series.iter().filter(|series| !series.name.is_empty()).collect();
     let entry = |series: &Series| SWATCH_PX + text_width(&series.name) + 14.0;
     let total: f64 = named.iter().map(|series| entry(series)).sum();
@@ -205,6 +158,9 @@ fn swatch(svg: &mut Svg, series: &Series, [x, y]: [f64; 2]) {
             line(svg, "line");
             svg.path(&shape.path(middle, 1.0), &format!("{} mark", series.class));
         }
+        Mark::Points(shape) => {
+            svg.path(&shape.path(middle, 1.0), &format!("{} mark", series.class));
+        }
         Mark::Bars(_) => {
             let class = format!("{} mark", series.class);
             svg.rect([x + 3.0, y - 5.0], [11.0, 10.0], &class, "");
@@ -213,47 +169,6 @@ fn swatch(svg: &mut Svg, series: &Series, [x, y]: [f64; 2]) {
 }
 
 impl Frame<'_> {
-    fn x(&self, value: f64) -> f64 {
-        self.left + self.chart.x.place(value) * (self.right - self.left)
-    }
-
-    fn y(&self, value: f64) -> f64 {
-        self.bottom - self.chart.y.place(value) * (self.bottom - self.top)
-    }
-
-    fn draw_axes(&self, svg: &mut Svg, height: f64) {
-        let Self { left, right, top, bottom, chart, .. } = *self;
-        for [from, to] in &chart.bands {
-            let x = self.x(*from);
-            svg.rect([x, top], [self.x(*to) - x, bottom - top], "band", "");
-        }
-        for (value, label) in &chart.y.ticks.at {
-            let y = self.y(*value);
-            let zero = if *value == 0.0 { "axis" } else { "grid" };
-            svg.line([left, y], [right, y], zero);
-            svg.text(left - 7.0, y + TEXT_PX * 0.35, Anchor::End, "tick", label);
-        }
-        svg.line([left, bottom], [right, bottom], "axis");
-        // Where labels are dense, only some are written; all ticks stay.
-        let ticks = &chart.x.ticks.at;
-        let fits = |every: &usize| {
-            let written: Vec<_> = ticks.iter().step_by(*every).collect();
-            written.windows(2).all(|pair| {
-                let room = f64::midpoint(text_width(&pair[0].1), text_width(&pair[1].1)) + 4.0;
-                self.x(pair[1].0) - self.x(pair[0].0) >= room
-            })
-        };
-        let every = (1..=ticks.len()).find(fits).unwrap_or(1);
-        for (i, (value, label)) in ticks.iter().enumerate() {
-            let x = self.x(*value);
-            svg.line([x, bottom], [x, bottom + 4.0], "axis");
-            if i % every == 0 {
-                svg.text(x, bottom + LINE_PX, Anchor::Middle, "tick", label);
-            }
-        }
-        svg.text(f64::midpoint(left, right), height - 4.0, Anchor::Middle, "label", &chart.x.label);
-    }
-
     fn draw_series(&self, svg: &mut Svg, series: &Series) {
         let class = |style: &str| format!("{} {style}", series.class);
         let present = |[_, y]: &&[f64; 2]| y.is_finite();
@@ -264,11 +179,12 @@ impl Frame<'_> {
                 self.draw_line(svg, series, &class("line"));
                 self.draw_points(svg, series, *shape, &class("mark"));
             }
+            Mark::Points(shape) => self.draw_points(svg, series, *shape, &class("mark")),
             Mark::Bars(width) => {
                 for [x, y] in series.points.iter().filter(present) {
-                    let px = (self.x(width / 2.0) - self.x(-width / 2.0)).min(BAR_PX);
-                    let (a, b) = (self.y(*y), self.y(0.0));
-                    let corner = [self.x(*x) - px / 2.0, a.min(b)];
+                    let px = (self.panel.x(width / 2.0) - self.panel.x(-width / 2.0)).min(BAR_PX);
+                    let (a, b) = (self.panel.y(*y), self.panel.y(0.0));
+                    let corner = [self.panel.x(*x) - px / 2.0, a.min(b)];
                     svg.rect(corner, [px, (a - b).abs()], &class("mark"), "");
                 }
             }
@@ -280,9 +196,9 @@ impl Frame<'_> {
         let mut d = String::new();
         let mut pen = 'M';
         for [x, y] in &series.points {
-            if self.is_drawn(*y) {
+            if self.panel.y.holds(*y) {
                 // Writing to a string cannot fail.
-                let _ = write!(d, "{pen}{} {}", Px(self.x(*x)), Px(self.y(*y)));
+                let _ = write!(d, "{pen}{} {}", Px(self.panel.x(*x)), Px(self.panel.y(*y)));
                 pen = 'L';
             } else {
                 pen = 'M';
@@ -295,21 +211,17 @@ impl Frame<'_> {
 
     fn draw_points(&self, svg: &mut Svg, series: &Series, shape: Shape, class: &str) {
         for [x, y] in &series.points {
-            let place = [self.x(*x), self.y(*y)];
-            if self.is_drawn(*y) {
+            let place = [self.panel.x(*x), self.panel.y(*y)];
+            if self.panel.y.holds(*y) {
                 svg.path(&shape.path(place, self.mark_size), class);
-            } else if *y > self.chart.y.ticks.high {
+            } else if *y > self.panel.y.ticks.high {
                 // A value off the scale is an arrow at the edge, with the value beside it.
                 let x = place[0];
-                svg.path(&Shape::Triangle.path([x, self.top + 5.0], 1.0), class);
+                svg.path(&Shape::Triangle.path([x, self.panel.top + 5.0], 1.0), class);
                 let label = significant(*y, 2);
-                svg.text(x + 8.0, self.top + 11.0, Anchor::Start, "tick", &label);
+                svg.text(x + 8.0, self.panel.top + 11.0, Anchor::Start, "tick", &label);
             }
         }
-    }
-
-    fn is_drawn(&self, y: f64) -> bool {
-        (self.chart.y.ticks.low..=self.chart.y.ticks.high).contains(&y)
     }
 
     /// Writes names at the last points of their lines, moved apart where they would overlap.
@@ -320,23 +232,23 @@ impl Frame<'_> {
         let mut labels: Vec<([f64; 2], f64, &Series)> = named
             .filter_map(|series| {
                 let [x, y] = series.points.iter().rev().find(|[_, y]| y.is_finite())?;
-                let y = self.y(y.min(self.chart.y.ticks.high));
-                Some(([self.x(*x), y], y, series))
+                let y = self.panel.y(y.min(self.panel.y.ticks.high));
+                Some(([self.panel.x(*x), y], y, series))
             })
             .collect();
         labels.sort_by(|a, b| a.1.total_cmp(&b.1));
         let heights: Vec<f64> = labels.iter().map(|label| label.1).collect();
-        let heights = apart(&heights, GAP, [self.top, self.bottom]);
+        let heights = apart(&heights, GAP, [self.panel.top, self.panel.bottom]);
         for (label, height) in labels.iter_mut().zip(heights) {
             label.1 = height;
         }
         for ([x, end], y, series) in labels {
             // A thin line leads from the end of the line to its name.
             let from = [x + 6.0, end];
-            let to = [self.right + LEADER_PX - 4.0, y];
+            let to = [self.panel.right + LEADER_PX - 4.0, y];
             svg.line(from, to, &format!("{} thin", series.class.replace(" broken", "")));
             let class = format!("{} name", series.class);
-            let x = self.right + LEADER_PX;
+            let x = self.panel.right + LEADER_PX;
             svg.text(x, y + TEXT_PX * 0.35, Anchor::Start, &class, &series.name);
         }
     }
@@ -373,8 +285,6 @@ mod tests {
             x: Axis::linear("x", ticks::linear([0.0, 4.0], 4)),
             y: Axis::linear("y", ticks::linear([-1.0, 1.0], 4)),
             series: vec![Series::new("", "c1", mark, points)],
-            bands: vec![],
-            notes: vec![],
             end_labels: false,
         }
     }

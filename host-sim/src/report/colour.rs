@@ -1,7 +1,8 @@
 //! Colour scales: what colour a value has, and the bar that explains it.
 
-use super::svg::{Anchor, Svg, text_width};
-use super::ticks::{self, Ticks};
+use super::axes::draw_level_ticks;
+use super::svg::{Anchor, Svg};
+use super::ticks;
 
 /// Colour scale in one or two hues, ever fuller towards its ends.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,6 +29,11 @@ impl ColourScale {
         let (low, high) = ticks::extent(values).unwrap_or((0.0, 1.0));
         let (low, high) = if high > low { (low, high) } else { (low - 0.5, low + 0.5) };
         Self { low, high, diverging: false }
+    }
+
+    /// Scale of shares, from 0 to 1.
+    pub fn of_shares() -> Self {
+        Self { low: 0.0, high: 1.0, diverging: true }
     }
 
     /// CSS class and opacity for `value`.
@@ -63,20 +69,12 @@ impl ColourScale {
             svg.rect(corner, [width, height], &format!("{class} strip"), &fill);
         }
         svg.rect([left, top], [right - left, height], "outline", "");
-        let Ticks { mut at, .. } = ticks::linear([self.low, self.high], 4);
-        let slack = 1e-9 * (self.high - self.low);
-        at.retain(|(value, _)| (self.low - slack..=self.high + slack).contains(value));
+        let ticks = ticks::within(self.low, self.high, 4);
         let place =
             |value: f64| left + (value - self.low) / (self.high - self.low) * (right - left);
-        let places: Vec<f64> = at.iter().map(|(value, _)| place(*value)).collect();
-        let half = |i: usize| text_width(&at[i].1) / 2.0;
-        let step = ticks::written(&places, |a, b| half(a) + half(b) + 3.0);
-        for (i, ((_, tick), x)) in at.iter().zip(&places).enumerate() {
-            svg.line([*x, top + height], [*x, top + height + 4.0], "axis");
-            if i % step == 0 {
-                svg.text(*x, top + height + 17.0, Anchor::Middle, "tick", tick);
-            }
-        }
+        let at: Vec<_> =
+            ticks.at.iter().map(|(value, text)| (place(*value), text.as_str())).collect();
+        draw_level_ticks(svg, &at, top + height, 1.0);
         svg.text(f64::midpoint(left, right), top + height + 36.0, Anchor::Middle, "tick", label);
     }
 }

@@ -3,7 +3,8 @@
 use taxel_evaluate::evaluate::distribution::{Distribution, ShownReadings};
 use taxel_evaluate::run::SensorSketch;
 
-use super::ticks;
+use super::axes::Axis;
+use super::ticks::{self, Ticks};
 use super::voronoi::{self, Polygon};
 
 /// Place of one value.
@@ -19,16 +20,10 @@ pub struct Cell {
 /// Places of values in maps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Face {
-    /// Least x and y that are drawn.
-    pub low: [f64; 2],
-    /// Greatest x and y that are drawn.
-    pub high: [f64; 2],
+    /// Axes x and y: all that is drawn lies within them.
+    pub axes: [Axis; 2],
     /// Extent of the sensor from [0, 0], if it is drawn.
     pub outline: Option<[f64; 2]>,
-    /// Quantities along x and y, with units.
-    pub labels: [&'static str; 2],
-    /// Ticks along x and y.
-    pub ticks: [Vec<(f64, String)>; 2],
     /// Number of each row-wire, and the y at which it stands beside the map.
     pub row_wires: Vec<(usize, f64)>,
     /// Height of a map over its width.
@@ -49,7 +44,6 @@ impl Face {
                 wires.push(electrode);
             }
         }
-        let name = |[row, electrode]: [usize; 2]| format!("row-wire {row}, electrode {electrode}");
         let known = sensor.filter(|sensor| {
             let has = |[row, electrode]: &[usize; 2]| {
                 sensor.row_wires.get(row - 1).is_some_and(|it| *electrode <= it.electrodes_mm.len())
@@ -57,8 +51,8 @@ impl Face {
             wires.iter().all(has)
         });
         match known {
-            Some(sensor) => Some(Self::of_sensor(sensor, wires, name)),
-            None => (!wires.is_empty()).then(|| Self::of_grid(wires, "electrode", name)),
+            Some(sensor) => Some(Self::of_sensor(sensor, wires)),
+            None => (!wires.is_empty()).then(|| Self::of_grid(wires, "electrode", electrode_name)),
         }
     }
 
@@ -72,11 +66,8 @@ impl Face {
     /// Face without places of values, in mm, for marks that lie anywhere.
     pub fn blank(low: [f64; 2], high: [f64; 2], outline: Option<[f64; 2]>) -> Self {
         Self {
-            low,
-            high,
+            axes: axes_mm(low, high),
             outline,
-            labels: ["x (mm)", "y (mm)"],
-            ticks: [0, 1].map(|axis| inside(low[axis], high[axis])),
             row_wires: vec![],
             height_over_width: ((high[1] - low[1]) / (high[0] - low[0])).clamp(0.25, 2.0),
             cells: vec![],
@@ -84,11 +75,39 @@ impl Face {
         }
     }
 
-    fn of_sensor(
-        sensor: &SensorSketch,
-        wires: Vec<[usize; 2]>,
-        name: impl Fn([usize; 2]) -> String,
+    /// Face with a rectangle of `size_mm` around each of these places, which are electrodes of `row_wires`, row after row.
+    pub fn of_rectangles(
+        face_mm: [f64; 2],
+        size_mm: [f64; 2],
+        places: &[[f64; 2]],
+        row_wires: &[usize],
     ) -> Self {
+        let per_row = (places.len() / row_wires.len().max(1)).max(1);
+        let number = |i: usize| [row_wires[i / per_row], i % per_row + 1];
+        let cell = |(i, middle): (usize, &[f64; 2])| {
+            let [row, electrode] = number(i);
+            let corner = |x: f64, y: f64| [middle[0] + x * size_mm[0], middle[1] + y * size_mm[1]];
+            let outline =
+                vec![corner(-0.5, -0.5), corner(0.5, -0.5), corner(0.5, 0.5), corner(-0.5, 0.5)];
+            Cell { name: electrode_name([row, electrode]), middle: *middle, outline }
+        };
+        let cells: Vec<Cell> = places.iter().enumerate().map(cell).collect();
+        // Electrodes may be listed outside the face.
+        let extent = |axis: usize| {
+            let corners = cells.iter().flat_map(|cell| cell.outline.iter().map(|at| at[axis]));
+            ticks::extent(corners.chain([0.0, face_mm[axis]])).unwrap_or((0.0, 1.0))
+        };
+        let ((left, right), (bottom, top)) = (extent(0), extent(1));
+        let heights = row_wires.iter().zip(places.chunks(per_row));
+        Self {
+            row_wires: heights.map(|(row, places)| (*row, places[0][1])).collect(),
+            cells,
+            wires: (0..places.len()).map(number).collect(),
+            ..Self::blank([left, bottom], [right, top], Some(face_mm))
+        }
+    }
+
+    fn of_sensor(sensor: &SensorSketch, wires: Vec<[usize; 2]>) -> Self {
         let (low, high) = extent(sensor);
         let sites: Vec<[f64; 2]> =
             sensor.row_wires.iter().flat_map(|row| row.electrodes_mm.iter().copied()).collect();
@@ -103,18 +122,17 @@ impl Face {
         let outlines = voronoi::cells(&sites, low, high);
         let cell = |wires: &[usize; 2]| {
             let site = first[wires[0] - 1] + wires[1] - 1;
-            Cell { name: name(*wires), middle: sites[site], outline: outlines[site].clone() }
+            Cell {
+                name: electrode_name(*wires),
+                middle: sites[site],
+                outline: outlines[site].clone(),
+            }
         };
         Self {
-            low,
-            high,
-            outline: Some(sensor.face_mm),
-            labels: ["x (mm)", "y (mm)"],
-            ticks: [0, 1].map(|axis| inside(low[axis], high[axis])),
             row_wires: row_wires(sensor),
-            height_over_width: (high[1] - low[1]) / (high[0] - low[0]),
             cells: wires.iter().map(cell).collect(),
             wires,
+            ..Self::blank(low, high, Some(sensor.face_mm))
         }
     }
 
@@ -141,18 +159,17 @@ impl Face {
                 vec![corner(-0.5, -0.5), corner(0.5, -0.5), corner(0.5, 0.5), corner(-0.5, 0.5)];
             Cell { name: name(*wires), middle, outline }
         };
-        let labelled = |numbers: &[usize]| {
-            numbers.iter().map(|number| (place(numbers, *number), number.to_string())).collect()
+        let axis = |label: &str, numbers: &[usize]| {
+            let at = numbers.iter().map(|number| (place(numbers, *number), number.to_string()));
+            let ticks = Ticks { low: 0.0, high: numbers.len() as f64, at: at.collect() };
+            Axis::linear(label, ticks)
         };
-        let high = [columns.len() as f64, rows.len() as f64];
+        let share = rows.len() as f64 / columns.len() as f64;
         Self {
-            low: [0.0, 0.0],
-            high,
+            axes: [axis(along_x, &columns), axis("row-wire", &rows)],
             outline: None,
-            labels: [along_x, "row-wire"],
-            ticks: [labelled(&columns), labelled(&rows)],
             row_wires: vec![],
-            height_over_width: (high[1] / high[0]).clamp(0.25, 0.8),
+            height_over_width: share.clamp(0.25, 0.8),
             cells: wires.iter().map(cell).collect(),
             wires,
         }
@@ -170,9 +187,14 @@ impl Face {
 
     /// Distance between neighbours that is typical: the root of a cell's share of the face.
     pub fn spacing(&self) -> f64 {
-        let area = (self.high[0] - self.low[0]) * (self.high[1] - self.low[1]);
+        let [x, y] = self.axes.each_ref().map(|axis| axis.ticks.high - axis.ticks.low);
+        let area = x * y;
         (area / self.cells.len().max(1) as f64).sqrt()
     }
+}
+
+fn electrode_name([row, electrode]: [usize; 2]) -> String {
+    format!("row-wire {row}, electrode {electrode}")
 }
 
 /// Least and greatest x and y of a sensor: its face, and electrodes that lie beside it, with some room around them.
@@ -193,12 +215,10 @@ pub fn extent(sensor: &SensorSketch) -> ([f64; 2], [f64; 2]) {
     (low, high)
 }
 
-/// Round ticks from `low` to `high`.
-pub fn inside(low: f64, high: f64) -> Vec<(f64, String)> {
-    let mut ticks = ticks::linear([low, high], 4).at;
-    let slack = 1e-9 * (high - low);
-    ticks.retain(|(value, _)| (low - slack..=high + slack).contains(value));
-    ticks
+/// Axes of places in mm.
+pub fn axes_mm(low: [f64; 2], high: [f64; 2]) -> [Axis; 2] {
+    [("x (mm)", 0), ("y (mm)", 1)]
+        .map(|(label, axis)| Axis::linear(label, ticks::within(low[axis], high[axis], 4)))
 }
 
 /// Row-wires that are read, each at the y of its electrode farthest to the right. None if they do not lie one above

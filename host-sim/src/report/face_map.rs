@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use super::axes::{Panel, Upright};
 use super::colour::ColourScale;
 use super::face::Face;
 use super::format::{fixed, significant};
@@ -20,10 +21,7 @@ const SMALL: f64 = 11.0 / TEXT_PX;
 pub struct Map<'f> {
     face: &'f Face,
     svg: Svg,
-    left: f64,
-    right: f64,
-    top: f64,
-    bottom: f64,
+    panel: Panel,
 }
 
 /// Values over a face.
@@ -45,8 +43,9 @@ impl<'f> Map<'f> {
         let bottom = top + (right - left) * face.height_over_width;
         let mut svg = Svg::new(WIDTH, bottom + 46.0 + below, title);
         svg.text(left, TEXT_PX, Anchor::Start, "label", heading);
-        svg.text(0.0, top - 9.0, Anchor::Start, "tick", face.labels[1]);
-        let mut map = Self { face, svg, left, right, top, bottom };
+        svg.text(0.0, top - 9.0, Anchor::Start, "tick", &face.axes[1].label);
+        let [x, y] = face.axes.clone();
+        let mut map = Self { face, svg, panel: Panel { x, y, left, right, top, bottom } };
         if let Some([x, y]) = face.outline {
             let (corner, end) = (map.place([0.0, y]), map.place([x, 0.0]));
             map.svg.rect(corner, [end[0] - corner[0], end[1] - corner[1]], "face", "");
@@ -55,10 +54,8 @@ impl<'f> Map<'f> {
     }
 
     /// Place of a point in px.
-    pub fn place(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        let Face { low, high, .. } = self.face;
-        let [x, y] = [(x - low[0]) / (high[0] - low[0]), (y - low[1]) / (high[1] - low[1])];
-        [self.left + x * (self.right - self.left), self.bottom - y * (self.bottom - self.top)]
+    pub fn place(&self, point: [f64; 2]) -> [f64; 2] {
+        self.panel.at(point)
     }
 
     /// Drawing to which marks are added.
@@ -100,7 +97,7 @@ impl<'f> Map<'f> {
             self.number(&outline, middle, &fixed(*value, decimals), opacity);
         }
         self.axes();
-        let (left, right, top) = (self.left, self.right, self.bottom + 50.0);
+        let (left, right, top) = (self.panel.left, self.panel.right, self.panel.bottom + 50.0);
         values.scale.draw_bar(&mut self.svg, [left, right], top, values.label);
         self.svg.finish()
     }
@@ -126,7 +123,7 @@ impl<'f> Map<'f> {
         longest: f64,
         unit: &str,
     ) -> String {
-        let px_per_mm = (self.right - self.left) / (self.face.high[0] - self.face.low[0]);
+        let px_per_mm = self.panel.x(1.0) - self.panel.x(0.0);
         let scale = 0.95 * self.face.spacing() * px_per_mm / longest;
         let scale = scale * self.room([truth, estimate], scale);
         let hover = self.face.cells.len() <= MOST_HOVERS;
@@ -151,8 +148,8 @@ impl<'f> Map<'f> {
             }
         }
         self.axes();
-        let y = self.bottom + 60.0;
-        let mut x = self.left;
+        let y = self.panel.bottom + 60.0;
+        let mut x = self.panel.left;
         for (name, class) in [("true", "truth"), ("decoded", "c1")] {
             self.arrow([x, y], [20.0, 0.0], class);
             self.svg.text(x + 25.0, y + TEXT_PX * 0.35, Anchor::Start, "tick", name);
@@ -160,11 +157,11 @@ impl<'f> Map<'f> {
         }
         let length = format!("{} {unit}", significant(longest, 2));
         let full = scale * longest;
-        let start = self.right + 20.0 - text_width(&length) - full - 4.0;
+        let start = self.panel.right + 20.0 - text_width(&length) - full - 4.0;
         self.svg.line([start, y - 4.0], [start, y + 4.0], "axis");
         self.svg.line([start, y], [start + full, y], "axis");
         self.svg.line([start + full, y - 4.0], [start + full, y + 4.0], "axis");
-        self.svg.text(self.right + 20.0, y + TEXT_PX * 0.35, Anchor::End, "tick", &length);
+        self.svg.text(self.panel.right + 20.0, y + TEXT_PX * 0.35, Anchor::End, "tick", &length);
         self.svg.finish()
     }
 
@@ -174,7 +171,10 @@ impl<'f> Map<'f> {
         let mut room: f64 = 1.0;
         for (i, cell) in self.face.cells.iter().enumerate() {
             let [x, y] = self.place(cell.middle);
-            let sides = [(x - self.left).min(self.right - x), (y - self.top).min(self.bottom - y)];
+            let sides = [
+                (x - self.panel.left).min(self.panel.right - x),
+                (y - self.panel.top).min(self.panel.bottom - y),
+            ];
             for vector in &vectors {
                 for (component, side) in vector.iter().zip(sides) {
                     let half = 0.5 * scale * component[i].abs();
@@ -221,46 +221,22 @@ impl<'f> Map<'f> {
 
     /// Draws the outline, ticks and labels.
     pub fn axes(&mut self) {
-        let Face { low, high, outline, labels, ticks, row_wires, .. } = self.face;
+        let Face { outline, row_wires, .. } = self.face;
+        let Panel { left, right, top, bottom, .. } = self.panel;
         let (corner, end) = match outline {
             Some([x, y]) => (self.place([0.0, *y]), self.place([*x, 0.0])),
-            None => (self.place([low[0], high[1]]), self.place([high[0], low[1]])),
+            None => ([left, top], [right, bottom]),
         };
         self.svg.rect(corner, [end[0] - corner[0], end[1] - corner[1]], "outline", "");
-        let (left, right, bottom) = (self.left, self.right, self.bottom);
-        let places: Vec<f64> =
-            ticks[0].iter().map(|(at, _)| self.place([*at, low[1]])[0]).collect();
-        let half = |i: usize| text_width(&ticks[0][i].1) / 2.0;
-        let step = ticks::written(&places, |a, b| half(a) + half(b) + 3.0);
-        for (i, ((_, label), x)) in ticks[0].iter().zip(places).enumerate() {
-            self.svg.line([x, bottom], [x, bottom + 4.0], "axis");
-            if i % step == 0 {
-                self.svg.text(x, bottom + 18.0, Anchor::Middle, "tick", label);
-            }
-        }
-        let places: Vec<f64> =
-            ticks[1].iter().map(|(at, _)| self.place([low[0], *at])[1]).collect();
-        let step = ticks::written(&places, |_, _| 0.8 * TEXT_PX);
-        for (i, ((_, label), y)) in ticks[1].iter().zip(places).enumerate() {
-            self.svg.line([left - 4.0, y], [left, y], "axis");
-            if i % step == 0 {
-                self.svg.text(left - 7.0, y + TEXT_PX * 0.35, Anchor::End, "tick", label);
-            }
-        }
+        self.panel.draw_axes(&mut self.svg, Upright::Marks);
         if !row_wires.is_empty() {
-            self.svg.text(WIDTH, self.top - 9.0, Anchor::End, "tick", "row-wire");
+            self.svg.text(WIDTH, self.panel.top - 9.0, Anchor::End, "tick", "row-wire");
         }
-        let mut free = f64::INFINITY;
-        for (number, at) in row_wires {
-            let y = self.place([low[0], *at])[1];
-            if y + TEXT_PX * 0.5 < free {
-                let number = number.to_string();
-                self.svg.text(right + 8.0, y + TEXT_PX * 0.35, Anchor::Start, "tick", &number);
-                free = y - TEXT_PX * 0.5;
-            }
+        let places = row_wires.iter().map(|(number, at)| (self.panel.y(*at), *number)).collect();
+        for (y, number) in ticks::spread_out(places, TEXT_PX) {
+            let (x, y) = (right + 8.0, y + TEXT_PX * 0.35);
+            self.svg.text(x, y, Anchor::Start, "tick", &number.to_string());
         }
-        let middle = f64::midpoint(left, right);
-        self.svg.text(middle, bottom + 36.0, Anchor::Middle, "tick", labels[0]);
     }
 
     /// Finishes a map whose marks were added by hand.

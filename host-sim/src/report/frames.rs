@@ -86,7 +86,8 @@ pub fn readings(view: &View<'_>) -> Option<Figure> {
 
 /// Figure of readings whose names tell no wires: bars in the order of the columns.
 fn channels(view: &View<'_>, label: &str, words: &str) -> Option<Figure> {
-    use super::chart::{Axis, Chart, Mark, Series};
+    use super::axes::Axis;
+    use super::chart::{Chart, Mark, Series};
     let shown = &view.distribution.readings;
     let count = shown.names.len();
     let frames = &view.distribution.frames;
@@ -110,8 +111,6 @@ fn channels(view: &View<'_>, label: &str, words: &str) -> Option<Figure> {
                 ticks::linear(all().chain([0.0]), 4),
             ),
             series: vec![Series::new("", "c1", Mark::Bars(0.7), points)],
-            bands: vec![],
-            notes: vec![],
             end_labels: false,
         }
         .draw([310.0, 230.0])
@@ -215,7 +214,8 @@ pub fn places(view: &View<'_>) -> Option<Figure> {
         }
         // A place that is decoded beside the face is drawn at its edge.
         let clamped = |[x, y]: [f64; 2]| {
-            [x.clamp(face.low[0], face.high[0]), y.clamp(face.low[1], face.high[1])]
+            let ticks = face.axes.each_ref().map(|axis| &axis.ticks);
+            [x.clamp(ticks[0].low, ticks[0].high), y.clamp(ticks[1].low, ticks[1].high)]
         };
         let of_line = |line: &[f64]| [line[x], line[y]];
         let (truth, estimate) = (of_line(&frame.truth), of_line(&frame.estimate));
@@ -254,7 +254,7 @@ fn mark(map: &mut Map<'_>, [x, y]: [f64; 2], class: &str, radius: f64, hover: &s
 }
 
 fn legend(map: &mut Map<'_>, face: &Face, depth_mm: Option<[f64; 2]>) {
-    let [x, y] = map.place(face.low);
+    let [x, y] = map.place(face.axes.each_ref().map(|axis| axis.ticks.low));
     if let Some([truth, estimate]) = depth_mm {
         let depth = format!("depth {} mm, decoded {} mm", fixed(truth, 2), fixed(estimate, 2));
         map.svg().text(x, y + 82.0, Anchor::Start, "tick", &depth);

@@ -2,7 +2,8 @@
 
 use taxel_evaluate::evaluate::learning_curve::LearningCurve;
 
-use super::chart::{Axis, Chart, Mark, Series};
+use super::axes::Axis;
+use super::chart::{Chart, Mark, Series};
 use super::format::{grouped, significant, symbol};
 use super::svg::{Shape, standalone};
 use super::ticks;
@@ -43,15 +44,13 @@ fn chart(curve: &LearningCurve, subject: &str) -> Chart {
         title: format!(
             "Error on {on} by the number of frames that the recursion had taken in, {subject}"
         ),
-        x: Axis { label: "frames taken in".into(), ticks: x, logarithmic: true },
+        x: Axis::logarithmic("frames taken in", x),
         y: Axis {
             label: format!("{subject}: RMSE on {on}, ÷ that of always predicting the mean"),
             ticks: y,
             logarithmic: true,
         },
         series,
-        bands: vec![],
-        notes: vec![],
         end_labels: true,
     }
 }

@@ -4,11 +4,16 @@ use std::fmt::Write as _;
 
 use taxel_limit::identify::Observability;
 
-use super::chart::{Axis, Chart, Mark, Series};
+use super::axes::Axis;
+use super::chart::{Chart, Mark, Series};
+use super::colour::ColourScale;
+use super::errors::BAR_PX;
+use super::face::Face;
+use super::face_map::{Map, Values};
 use super::format::{percent, significant, symbol, with_unit};
-use super::heat_map::{ColourScale, HeatMap};
 use super::html::document;
 use super::svg::{Shape, Svg, escape, standalone};
+use super::tables::numbers;
 use super::ticks;
 use taxel_evaluate::evaluate::limit::{Figures, Level, LimitResult};
 use taxel_evaluate::metrics::DecoderErrors;
@@ -50,10 +55,8 @@ fn directions(level: &Level) -> Chart {
     Chart {
         title: "Signal-to-noise ratio of every direction of the deformation".into(),
         x: Axis::linear("direction, the best visible one first", x),
-        y: Axis { label: "signal-to-noise ratio".into(), ticks: y, logarithmic: true },
+        y: Axis::logarithmic("signal-to-noise ratio", y),
         series,
-        bands: vec![],
-        notes: vec![],
         end_labels: false,
     }
 }
@@ -105,12 +108,12 @@ pub fn html(result: &LimitResult) -> String {
 /// Line of the table for a model: its errors, and their ratios to the limit.
 fn model_row(level: &Level, model: &DecoderErrors) -> String {
     let noise = percent(level.noise_level);
-    let mut html = format!("<tr><td>{noise}</td><td>model {}</td>", escape(&model.decoder));
-    for errors in &model.errors {
+    let cells = model.errors.iter().map(|errors| {
         let ratio = errors.ratio_to_limit.map_or(String::new(), |r| format!(" ({r:.3} ×)"));
-        let _ = write!(html, "<td class=\"number\">{:.4}{ratio}</td>", errors.rmse);
-    }
-    html + "<td></td></tr>\n"
+        format!("{:.4}{ratio}", errors.rmse)
+    });
+    let (name, cells) = (escape(&model.decoder), numbers("td", cells));
+    format!("<tr><td>{noise}</td><td>model {name}</td>{cells}<td></td></tr>\n")
 }
 
 /// Table of the limits.
@@ -124,11 +127,10 @@ fn limits(result: &LimitResult) -> String {
     let groups =
         result.levels.iter().flat_map(|level| &level.limits).map(|figures| &figures.groups);
     let groups = groups.max_by_key(|groups| groups.len());
-    for group in groups.into_iter().flatten() {
-        let name = escape(&with_unit(&symbol(&group.group), &group.unit));
-        let _ = write!(html, "<th class=\"number\">{name}</th>");
-    }
-    html += "<th class=\"number\">ESS</th></tr></thead>\n<tbody>\n";
+    let groups = groups.into_iter().flatten();
+    let heads = groups.map(|group| escape(&with_unit(&symbol(&group.group), &group.unit)));
+    html += &numbers("th", heads.chain(["ESS".into()]));
+    html += "</tr></thead>\n<tbody>\n";
     for level in &result.levels {
         for figures in &level.limits {
             let noise = percent(level.noise_level);
@@ -140,17 +142,11 @@ fn limits(result: &LimitResult) -> String {
                     escape(refused)
                 );
             }
-            for g in &figures.groups {
-                let _ = write!(
-                    html,
-                    "<td class=\"number\">{:.4} ± {:.4}</td>",
-                    g.limit, g.limit_standard_error
-                );
-            }
-            if let Some(e) = figures.effective_samples {
-                let _ = write!(html, "<td class=\"number\">{:.0}, {:.0}</td>", e.least, e.median);
-            }
-            html += "</tr>\n";
+            let limits = figures.groups.iter();
+            let limits = limits.map(|g| format!("{:.4} ± {:.4}", g.limit, g.limit_standard_error));
+            let samples = figures.effective_samples;
+            let samples = samples.map(|e| format!("{:.0}, {:.0}", e.least, e.median));
+            html += &(numbers("td", limits.chain(samples)) + "</tr>\n");
         }
         for model in &level.decoders {
             html += &model_row(level, model);
@@ -198,42 +194,34 @@ fn by_noise(result: &LimitResult) -> Chart {
     );
     Chart {
         title: "Least possible RMSE against the noise".into(),
-        x: Axis { label: "noise".into(), ticks: x, logarithmic: true },
-        y: Axis { label: "least possible RMSE (mm)".into(), ticks: y, logarithmic: true },
+        x: Axis::logarithmic("noise", x),
+        y: Axis::logarithmic("least possible RMSE (mm)", y),
         series,
-        bands: vec![],
-        notes: vec![],
         end_labels: true,
     }
-}
-
-/// Colour scale of shares.
-fn share_scale() -> ColourScale {
-    ColourScale::new([0.0, 1.0])
 }
 
 /// Maps of what is known of each electrode, one an axis.
 fn known(result: &LimitResult, seen: &Observability) -> [String; 3] {
     let per_row = seen.electrodes.len() / seen.row_wires.len().max(1);
-    let rows = seen.row_wires.iter().zip(seen.electrodes.chunks(per_row.max(1)));
     let [x_mm, y_mm, _] = result.size_mm;
-    [0, 1, 2].map(|axis| {
-        let letter = ['x', 'y', 'z'][axis];
-        let map = HeatMap {
-            title: format!("Map over the face of what the readings tell about Δ{letter}"),
-            heading: format!("Δ{letter}: share known"),
-            face_mm: [x_mm, y_mm],
-            cell_mm: [x_mm / per_row.max(1) as f64, y_mm / result.row_wires.max(1) as f64],
-            cells: seen.electrodes.iter().map(|e| (e.position_mm, e.known[axis])).collect(),
-            row_wires: rows.clone().map(|(row, e)| (*row, e[0].position_mm[1])).collect(),
-        };
-        map.draw(&share_scale())
+    let size_mm = [x_mm / per_row.max(1) as f64, y_mm / result.row_wires.max(1) as f64];
+    let places: Vec<[f64; 2]> = seen.electrodes.iter().map(|e| e.position_mm).collect();
+    let face = Face::of_rectangles([x_mm, y_mm], size_mm, &places, &seen.row_wires);
+    ['x', 'y', 'z'].map(|letter| {
+        let axis = usize::from(letter as u8 - b'x');
+        let of_cells: Vec<f64> = seen.electrodes.iter().map(|e| e.known[axis]).collect();
+        let title = format!("Map over the face of what the readings tell about Δ{letter}");
+        let label = "share of the prior's variance";
+        let values =
+            Values { of_cells: &of_cells, scale: &ColourScale::of_shares(), label, unit: "" };
+        Map::new(&face, &title, &format!("Δ{letter}: share known"), BAR_PX).values(&values)
     })
 }
 
 /// Picture of what is known of each electrode at the first noise level, as a file of its own.
 pub fn known_svg(result: &LimitResult) -> String {
-    const MAP: [f64; 2] = [310.0, 320.0];
+    const MAP: [f64; 2] = [310.0, 376.0];
     let Some(level) = result.levels.first() else { return String::new() };
     let mut picture = Svg::new(3.0 * MAP[0] + 40.0, MAP[1], "What the readings tell");
     for (i, map) in known(result, &level.observability).iter().enumerate() {
@@ -245,11 +233,10 @@ pub fn known_svg(result: &LimitResult) -> String {
 /// Figure of what is known of each electrode, by axis.
 fn maps(result: &LimitResult, seen: &Observability) -> String {
     format!(
-        "<figure>\n<div class=\"panels\">\n{}</div>\n<div class=\"scale\">\n{}</div>\n<figcaption>Share of the \
-         prior's variance of each electrode's Δx, Δy and Δz that all readings take away, for a sensor linearised at the \
-         mean deformation: 0 is invisible, 1 is known.</figcaption>\n</figure>\n",
-        known(result, seen).concat(),
-        share_scale().draw_bar("Colour scale of the share known", "share of the prior's variance")
+        "<figure>\n<div class=\"panels\">\n{}</div>\n<figcaption>Share of the prior's variance of each electrode's Δx, \
+         Δy and Δz that all readings take away, for a sensor linearised at the mean deformation: 0 is invisible, 1 is \
+         known.</figcaption>\n</figure>\n",
+        known(result, seen).concat()
     )
 }
 
@@ -261,19 +248,13 @@ fn geometry(result: &LimitResult) -> String {
     let mut html = String::from(
         "<h2>Other geometries</h2>\n<figure class=\"table\">\n<figcaption>Observable directions of other sensors in the \
          same scene, and the RMSE that would be left if all were linear and normal.</figcaption>\n<div class=\"scroll\" \
-         tabindex=\"0\" role=\"region\" aria-label=\"Other geometries\">\n<table>\n<thead><tr><th>sensor</th>\
-         <th class=\"number\">readings</th><th class=\"number\">unknowns</th><th class=\"number\">observable</th>\
-         <th class=\"number\">Δx, mm</th><th class=\"number\">Δy, mm</th><th class=\"number\">Δz, mm</th></tr></thead>\n\
-         <tbody>\n",
+         tabindex=\"0\" role=\"region\" aria-label=\"Other geometries\">\n<table>\n<thead><tr><th>sensor</th>",
     );
+    let heads = ["readings", "unknowns", "observable", "Δx, mm", "Δy, mm", "Δz, mm"];
+    html += &(numbers("th", heads.map(String::from)) + "</tr></thead>\n<tbody>\n");
     for variant in &result.geometry {
-        let _ = write!(
-            html,
-            "<tr><td>{}</td><td class=\"number\">{}</td><td class=\"number\">{}</td>",
-            escape(&variant.change),
-            variant.readings,
-            variant.unknowns
-        );
+        let counts = numbers("td", [variant.readings, variant.unknowns].map(|it| it.to_string()));
+        let _ = write!(html, "<tr><td>{}</td>{counts}", escape(&variant.change));
         if let Some(refused) = &variant.refused {
             let _ = write!(
                 html,
@@ -282,10 +263,8 @@ fn geometry(result: &LimitResult) -> String {
             );
         }
         if let Some(seen) = &variant.observability {
-            let _ = write!(html, "<td class=\"number\">{}</td>", seen.observable);
-            for axis in &seen.axes {
-                let _ = write!(html, "<td class=\"number\">{:.4}</td>", axis.rmse_mm);
-            }
+            let axes = seen.axes.iter().map(|axis| format!("{:.4}", axis.rmse_mm));
+            html += &numbers("td", [seen.observable.to_string()].into_iter().chain(axes));
         }
         html += "</tr>\n";
     }

@@ -2,7 +2,8 @@
 
 use taxel_evaluate::evaluate::printed::{CELLS, Cells, NOISE_LEVELS, SPREADS};
 
-use super::chart::{Axis, Chart, Mark, Series};
+use super::axes::Axis;
+use super::chart::{Chart, Mark, Series};
 use super::format::percent;
 use super::svg::{Shape, Svg, standalone};
 use super::ticks;
@@ -39,8 +40,6 @@ pub fn svg(tables: &[(&str, Cells)]) -> String {
                 ticks::linear(heights.iter().copied(), 5),
             ),
             series,
-            bands: vec![],
-            notes: vec![],
             end_labels: true,
         };
         let [x, y] = [(j % 2) as f64 * (PANEL[0] + GAP_PX), (j / 2) as f64 * (PANEL[1] + GAP_PX)];

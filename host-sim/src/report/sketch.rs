@@ -2,9 +2,11 @@
 
 use std::fmt::Write as _;
 
+use super::axes::{BELOW_PX, Panel, Upright};
 use super::face;
 use super::figures::Figure;
 use super::svg::{Anchor, Px, Svg, TEXT_PX, text_width};
+use super::ticks;
 use taxel_evaluate::run::SensorSketch;
 
 /// Draws the sensor in this width, in px.
@@ -14,9 +16,10 @@ fn draw(sensor: &SensorSketch, width: f64) -> String {
     let px_per_mm = ((right - left) / (high[0] - low[0])).min(460.0 / (high[1] - low[1]));
     let right = left + px_per_mm * (high[0] - low[0]);
     let bottom = top + px_per_mm * (high[1] - low[1]);
-    let place =
-        |[x, y]: [f64; 2]| [left + px_per_mm * (x - low[0]), bottom - px_per_mm * (y - low[1])];
-    let mut svg = Svg::new(width, bottom + 46.0, "Row-wires, column-wires and electrodes");
+    let [x, y] = face::axes_mm(low, high);
+    let panel = Panel { x, y, left, right, top, bottom };
+    let place = |point: [f64; 2]| panel.at(point);
+    let mut svg = Svg::new(width, bottom + BELOW_PX, "Row-wires, column-wires and electrodes");
     let [x_mm, y_mm] = sensor.face_mm;
     let corner = place([0.0, y_mm]);
     svg.rect(corner, [px_per_mm * x_mm, px_per_mm * y_mm], "face", "");
@@ -55,7 +58,7 @@ fn draw(sensor: &SensorSketch, width: f64) -> String {
         let last = row.electrodes_mm.iter().max_by(|a, b| a[0].total_cmp(&b[0]));
         rows.extend(last.map(|last| (place(*last)[1], m + 1)));
     }
-    let numbers = spread_out(rows, TEXT_PX);
+    let numbers = ticks::spread_out(rows, TEXT_PX);
     for (y, m) in numbers {
         svg.text(right + 8.0, y + TEXT_PX * 0.35, Anchor::Start, "c1 name", &m.to_string());
     }
@@ -64,22 +67,12 @@ fn draw(sensor: &SensorSketch, width: f64) -> String {
         let last = column.iter().max_by(|a, b| a[1].total_cmp(&b[1]));
         columns.extend(last.map(|last| (place(*last)[0], k + 1)));
     }
-    for (x, k) in spread_out(columns, text_width("00") + 3.0) {
+    for (x, k) in ticks::spread_out(columns, text_width("00") + 3.0) {
         svg.text(x, top - 7.0, Anchor::Middle, "c2 name", &k.to_string());
     }
     svg.rect(corner, [px_per_mm * x_mm, px_per_mm * y_mm], "outline", "");
-    for (value, label) in face::inside(0.0, x_mm) {
-        let x = place([value, 0.0])[0];
-        svg.line([x, bottom], [x, bottom + 4.0], "axis");
-        svg.text(x, bottom + 18.0, Anchor::Middle, "tick", &label);
-    }
-    for (value, label) in face::inside(0.0, y_mm) {
-        let y = place([0.0, value])[1];
-        svg.line([left - 4.0, y], [left, y], "axis");
-        svg.text(left - 7.0, y + TEXT_PX * 0.35, Anchor::End, "tick", &label);
-    }
-    svg.text(f64::midpoint(left, right), bottom + 38.0, Anchor::Middle, "tick", "x (mm)");
-    svg.text(0.0, top - 22.0, Anchor::Start, "tick", "y (mm)");
+    panel.draw_axes(&mut svg, Upright::Marks);
+    svg.text(0.0, top - 22.0, Anchor::Start, "tick", &panel.y.label);
     svg.finish()
 }
 
@@ -90,20 +83,6 @@ fn wire(svg: &mut Svg, points: &[[f64; 2]], class: &str) {
         let _ = write!(d, "{}{} {}", if i == 0 { 'M' } else { 'L' }, Px(*x), Px(*y));
     }
     svg.path(&d, class);
-}
-
-/// Numbers at places that are at least `apart`: those for which there is no room are left out.
-fn spread_out(mut numbers: Vec<(f64, usize)>, apart: f64) -> Vec<(f64, usize)> {
-    numbers.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let mut free = f64::NEG_INFINITY;
-    numbers.retain(|(at, _)| {
-        let fits = *at >= free;
-        if fits {
-            free = at + apart;
-        }
-        fits
-    });
-    numbers
 }
 
 fn legend(svg: &mut Svg, unread: bool) {
@@ -147,16 +126,5 @@ pub fn figure(sensor: &SensorSketch) -> Figure {
             sensor.column_wires_mm.len()
         ),
         drawing: format!("<div class=\"sketch\">\n{}</div>\n", draw(sensor, 480.0)),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_that_would_overlap_are_left_out() {
-        let numbers = vec![(30.0, 3), (0.0, 1), (8.0, 2), (30.0, 4)];
-        assert_eq!(spread_out(numbers, 10.0), [(0.0, 1), (30.0, 3)]);
     }
 }

@@ -3,7 +3,8 @@
 use taxel_learn::decoders::{linear, mean, standard};
 use taxel_limit::limit;
 
-use super::chart::{Axis, Chart, Mark, Series};
+use super::axes::Axis;
+use super::chart::{Chart, Mark, Series};
 use super::figures::Figure;
 use super::format::{percent, symbol, with_unit};
 use super::svg::Shape;
@@ -96,11 +97,9 @@ pub fn error_by_noise(table: &Table1, group: &str, unit: &str) -> Figure {
     let series = series.collect();
     let chart = Chart {
         title: format!("RMSE of {name} against noise level, by decoder"),
-        x: Axis { label: "noise level p".into(), ticks: noise, logarithmic: true },
+        x: Axis::logarithmic("noise level p", noise),
         y: Axis::linear(with_unit(&format!("RMSE of {name}"), unit), y),
         series,
-        bands: vec![],
-        notes: vec![],
         end_labels: true,
     };
     let tail = if table.affine_tail { " and an affine tail" } else { "" };
@@ -152,8 +151,6 @@ pub fn error_by_spread(table: &Table1, group: &str, unit: &str) -> Figure {
         y: Axis::linear(with_unit(&format!("RMSE of {name}"), unit), ticks::linear(heights, 5)),
         x: Axis::linear("spread σ on scaled inputs", x),
         series,
-        bands: vec![],
-        notes: vec![],
         end_labels: true,
     };
     Figure {

@@ -83,35 +83,42 @@ fn rmse_decimals(decoders: &[DecoderErrors], group: &str) -> usize {
     ticks::extent(all).map_or(0, |(least, _)| decimals(least, 3))
 }
 
+/// Cells of numbers, as HTML: `th` in the head of a table, `td` in a line.
+pub fn numbers(tag: &str, cells: impl IntoIterator<Item = String>) -> String {
+    let cell = |cell| format!("<{tag} class=\"number\">{cell}</{tag}>");
+    cells.into_iter().map(cell).collect()
+}
+
+/// Line of a table: its head, and numbers.
+fn line(head: &str, cells: impl IntoIterator<Item = String>) -> String {
+    format!("<tr><th scope=\"row\">{head}</th>{}</tr>\n", numbers("td", cells))
+}
+
+/// Name of a group with its unit, as HTML.
+fn name(group: &Errors) -> String {
+    escape(&with_unit(&symbol(&group.group), &group.unit))
+}
+
 /// Small table of RMSE by group and decoder, beside the least possible one.
 pub fn headline(view: &View<'_>) -> String {
-    let mut html = String::from("<table class=\"headline\">\n<thead><tr><th>RMSE</th>");
-    for decoder in view.decoders {
-        let _ = write!(html, "<th class=\"number\">{}</th>", escape(short_name(decoder)));
-    }
-    let limits = &view.limit.groups;
-    if !limits.is_empty() {
-        html += "<th class=\"number\">Least possible</th><th class=\"number\">×\u{a0}limit</th>";
-    }
-    html += "</tr></thead>\n<tbody>\n";
-    for group in groups(view.decoders) {
-        let name = escape(&with_unit(&symbol(&group.group), &group.unit));
-        let _ = write!(html, "<tr><th scope=\"row\">{name}</th>");
-        let decimals = rmse_decimals(view.decoders, &group.group);
-        for decoder in view.decoders {
-            let text = fixed(rmse(&decoder.errors, &group.group), decimals);
-            let _ = write!(html, "<td class=\"number\">{text}</td>");
-        }
-        if !limits.is_empty() {
-            let limit = limits.iter().find(|limit| limit.group == group.group);
-            let limit = limit.map_or(UNDEFINED.into(), |limit| fixed(limit.limit, decimals));
-            let ratio = group.ratio_to_limit.map_or(UNDEFINED.into(), |ratio| fixed(ratio, 2));
-            let _ =
-                write!(html, "<td class=\"number\">{limit}</td><td class=\"number\">{ratio}</td>");
-        }
-        html += "</tr>\n";
-    }
-    html + "</tbody>\n</table>\n"
+    let (decoders, limits) = (view.decoders, &view.limit.groups);
+    // Columns of the limit, where there is one.
+    let known = |cells: [String; 2]| cells.into_iter().filter(|_| !limits.is_empty());
+    let heads = decoders.iter().map(|decoder| escape(short_name(decoder)));
+    let heads = heads.chain(known(["Least possible", "×\u{a0}limit"].map(String::from)));
+    let lines = groups(decoders).iter().map(|group| {
+        let decimals = rmse_decimals(decoders, &group.group);
+        let cells = decoders.iter().map(|it| fixed(rmse(&it.errors, &group.group), decimals));
+        let limit = limits.iter().find(|limit| limit.group == group.group);
+        let limit = limit.map_or(UNDEFINED.into(), |limit| fixed(limit.limit, decimals));
+        let ratio = group.ratio_to_limit.map_or(UNDEFINED.into(), |ratio| fixed(ratio, 2));
+        line(&name(group), cells.chain(known([limit, ratio])))
+    });
+    format!(
+        "<table class=\"headline\">\n<thead><tr><th>RMSE</th>{}</tr></thead>\n<tbody>\n{}</tbody>\n</table>\n",
+        numbers("th", heads),
+        lines.collect::<String>()
+    )
 }
 
 /// Definitions that have a column: those by which any error is defined.
@@ -123,14 +130,11 @@ fn defined(decoders: &[DecoderErrors]) -> Vec<Definition> {
 /// Table of errors by axis, decoder and definition.
 pub fn errors(decoders: &[DecoderErrors]) -> String {
     let shown = defined(decoders);
-    let mut html = String::from("<table>\n<thead><tr><th>Decoder</th>");
-    for definition in &shown {
-        let _ = write!(html, "<th class=\"number\">{}</th>", heading(*definition));
-    }
-    html += "</tr></thead>\n";
+    let heads = shown.iter().map(|definition| heading(*definition).into());
+    let mut html =
+        format!("<table>\n<thead><tr><th>Decoder</th>{}</tr></thead>\n", numbers("th", heads));
     for group in groups(decoders) {
-        let name = escape(&with_unit(&symbol(&group.group), &group.unit));
-        let columns = shown.len() + 1;
+        let (name, columns) = (name(group), shown.len() + 1);
         let _ = writeln!(
             html,
             "<tbody>\n<tr><th class=\"group\" scope=\"rowgroup\" colspan=\"{columns}\">{name}</th></tr>"
@@ -138,12 +142,9 @@ pub fn errors(decoders: &[DecoderErrors]) -> String {
         let decimals = rmse_decimals(decoders, &group.group);
         for decoder in decoders {
             let Some(errors) = of_group(&decoder.errors, &group.group) else { continue };
-            let _ = write!(html, "<tr><td>{}</td>", escape(short_name(decoder)));
-            for definition in &shown {
-                let value = value(*definition, errors, decimals);
-                let _ = write!(html, "<td class=\"number\">{value}</td>");
-            }
-            html += "</tr>\n";
+            let cells = shown.iter().map(|definition| value(*definition, errors, decimals));
+            let name = escape(short_name(decoder));
+            let _ = writeln!(html, "<tr><td>{name}</td>{}</tr>", numbers("td", cells));
         }
         html += "</tbody>\n";
     }
@@ -169,14 +170,9 @@ pub fn frames(view: &View<'_>) -> String {
     html += "</tr></thead>\n<tbody>\n";
     for (column, output) in shown.outputs.iter().enumerate().take(MOST_OUTPUTS) {
         let name = escape(&with_unit(&symbol(&output.name), &output.unit));
-        let _ = write!(html, "<tr><th scope=\"row\">{name}</th>");
         let places = decimals(output.rmse, 2);
-        for frame in &shown.frames {
-            for line in [&frame.truth, &frame.estimate] {
-                let _ = write!(html, "<td class=\"number\">{}</td>", fixed(line[column], places));
-            }
-        }
-        html += "</tr>\n";
+        let lines = shown.frames.iter().flat_map(|frame| [&frame.truth, &frame.estimate]);
+        html += &line(&name, lines.map(|line| fixed(line[column], places)));
     }
     html += "</tbody>\n</table>\n";
     match shown.outputs.len().saturating_sub(MOST_OUTPUTS) {
@@ -187,23 +183,17 @@ pub fn frames(view: &View<'_>) -> String {
 
 /// Table of the network's RMSE by depth of the contact (lines) and output (columns).
 pub fn by_depth(ranges: &[DepthErrors]) -> String {
-    let mut html =
-        String::from("<table>\n<thead><tr><th>Depth</th><th class=\"number\">Frames</th>");
-    for errors in ranges.first().map_or(&[][..], |range| &range.errors) {
-        let name = escape(&with_unit(&symbol(&errors.group), &errors.unit));
-        let _ = write!(html, "<th class=\"number\">{name}</th>");
-    }
-    html += "</tr></thead>\n<tbody>\n";
-    for range in ranges {
-        let (depth, frames) = (escape(&range.range()), grouped(range.frames));
-        let _ =
-            write!(html, "<tr><th scope=\"row\">{depth}</th><td class=\"number\">{frames}</td>");
-        for errors in &range.errors {
-            let _ = write!(html, "<td class=\"number\">{}</td>", significant(errors.rmse, 3));
-        }
-        html += "</tr>\n";
-    }
-    html + "</tbody>\n</table>\n"
+    let groups = ranges.first().map_or(&[][..], |range| &range.errors);
+    let heads = std::iter::once("Frames".into()).chain(groups.iter().map(name));
+    let lines = ranges.iter().map(|range| {
+        let errors = range.errors.iter().map(|errors| significant(errors.rmse, 3));
+        line(&escape(&range.range()), std::iter::once(grouped(range.frames)).chain(errors))
+    });
+    format!(
+        "<table>\n<thead><tr><th>Depth</th>{}</tr></thead>\n<tbody>\n{}</tbody>\n</table>\n",
+        numbers("th", heads),
+        lines.collect::<String>()
+    )
 }
 
 /// List of the formulas of the definitions that have a column.
@@ -258,9 +248,7 @@ pub fn table1(table: &Table1, group: &str) -> String {
          <th class=\"span\" colspan=\"{}\">Noise level</th></tr>\n<tr>",
         table.columns.len()
     );
-    for column in &table.columns {
-        let _ = write!(html, "<th class=\"number\">{}</th>", percent(column.noise_level));
-    }
+    html += &numbers("th", table.columns.iter().map(|column| percent(column.noise_level)));
     html += "</tr></thead>\n<tbody>\n";
     for spread in table.columns.first().into_iter().flat_map(Column::spreads) {
         let _ = write!(html, "<tr><th scope=\"row\">{spread:?}</th>");
@@ -285,13 +273,8 @@ pub fn table1(table: &Table1, group: &str) -> String {
     }
     html += "</tbody>\n<tbody class=\"reference\">\n";
     for baseline in table.columns.first().into_iter().flat_map(Column::baselines) {
-        let name = capitalised(&baseline.decoder);
-        let _ = write!(html, "<tr><th scope=\"row\">{}</th>", escape(&name));
-        for column in &table.columns {
-            let text = cell(of(column.errors(&baseline.decoder, None)));
-            let _ = write!(html, "<td class=\"number\">{text}</td>");
-        }
-        html += "</tr>\n";
+        let cells = table.columns.iter().map(|it| cell(of(it.errors(&baseline.decoder, None))));
+        html += &line(&escape(&capitalised(&baseline.decoder)), cells);
     }
     html + "</tbody>\n</table>\n"
 }

@@ -44,6 +44,14 @@ pub fn linear(values: impl IntoIterator<Item = f64>, wanted: usize) -> Ticks {
     Ticks { low: tick(first), high: tick(last), at: at.collect() }
 }
 
+/// Range with exact ends, and about `wanted` intervals between round ticks.
+pub fn within(low: f64, high: f64, wanted: usize) -> Ticks {
+    let mut ticks = linear([low, high], wanted);
+    let slack = 1e-9 * (high - low);
+    ticks.at.retain(|(value, _)| (low - slack..=high + slack).contains(value));
+    Ticks { low, high, ..ticks }
+}
+
 /// Ticks of a [`logarithmic`] axis of noise levels, labelled in per cent.
 pub fn logarithmic_percent(values: impl IntoIterator<Item = f64>) -> Ticks {
     logarithmic(values, super::format::percent)
@@ -75,6 +83,20 @@ pub fn written(places: &[f64], apart: impl Fn(usize, usize) -> f64) -> usize {
         pairs.into_iter().all(|p| (places[p[1]] - places[p[0]]).abs() >= apart(p[0], p[1]))
     };
     (1..=places.len()).find(fits).unwrap_or(1)
+}
+
+/// Entries at places that are at least `apart`, in ascending order: those for which there is no room are left out.
+pub fn spread_out<T>(mut entries: Vec<(f64, T)>, apart: f64) -> Vec<(f64, T)> {
+    entries.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut free = f64::NEG_INFINITY;
+    entries.retain(|(at, _)| {
+        let fits = *at >= free;
+        if fits {
+            free = at + apart;
+        }
+        fits
+    });
+    entries
 }
 
 /// Least and greatest of all finite values.
@@ -118,6 +140,12 @@ mod tests {
         assert_eq!(written(&places, |_, _| 11.0), 2);
         assert_eq!(written(&places, |_, _| 1000.0), 5, "one is always written");
         assert_eq!(written(&[], |_, _| 1.0), 1);
+    }
+
+    #[test]
+    fn numbers_that_would_overlap_are_left_out() {
+        let numbers = vec![(30.0, 3), (0.0, 1), (8.0, 2), (30.0, 4)];
+        assert_eq!(spread_out(numbers, 10.0), [(0.0, 1), (30.0, 3)]);
     }
 
     #[test]

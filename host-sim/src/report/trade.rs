@@ -8,7 +8,7 @@ use super::svg::{escape, standalone};
 use taxel_evaluate::evaluate::trade::{Memory, Trade};
 use taxel_evaluate::metrics::LimitSummary;
 
-mod axes;
+mod scales;
 mod labels;
 mod words;
 mod plot;

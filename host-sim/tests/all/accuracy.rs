@@ -34,13 +34,11 @@ fn network_and_linear(scene: &str, noise_level: f64) -> (Vec<Errors>, Vec<Errors
 
 #[test]
 fn one_row_of_press_is_decoded_close_to_the_limit() {
-    // The least possible error of any decoder is 0.046 and 0.064 mm.
-    for (noise_level, most_mm) in [(0.005, 0.050), (0.01, 0.069)] {
-        let (network, _) = network_and_linear("press", noise_level);
-        let z = network.iter().find(|e| e.group == "dz_mm").unwrap();
-        println!("press, row 4, noise {noise_level}: z RMSE {:.4} mm", z.rmse);
-        assert!(z.rmse <= most_mm, "noise {noise_level}: {} mm", z.rmse);
-    }
+    // The least possible error of any decoder is 0.046 mm.
+    let (network, _) = network_and_linear("press", 0.005);
+    let z = network.iter().find(|e| e.group == "dz_mm").unwrap();
+    println!("press, row 4: z RMSE {:.4} mm", z.rmse);
+    assert!(z.rmse <= 0.050, "{} mm", z.rmse);
 }
 
 #[test]
@@ -61,9 +59,9 @@ fn without_noise_no_axis_is_behind_the_best_linear_decoder() {
 #[test]
 fn no_cell_of_the_papers_table_is_worse_than_the_mean_by_more_than_two_per_cent() {
     let mut paper = Experiment::load("paper").unwrap();
-    // The least and the greatest of the table's widths and noise levels, and a width between.
+    // The least and the greatest of the table's widths and noise levels.
     let cells = paper.table1.as_mut().unwrap();
-    (cells.spreads, cells.noise_levels) = (vec![0.1, 0.5, 1.0], vec![0.005, 0.1]);
+    (cells.spreads, cells.noise_levels) = (vec![0.1, 1.0], vec![0.005, 0.1]);
     let table = table1::compute(&paper, &Silent).unwrap();
     let (mut worst, mut cells) = (0.0_f64, 0);
     for column in &table.columns {
@@ -82,7 +80,7 @@ fn no_cell_of_the_papers_table_is_worse_than_the_mean_by_more_than_two_per_cent(
         }
     }
     println!("{cells} cells; the worst is {worst:.4} × the mean's error");
-    assert_eq!(cells, 3 * 2 * (4 + 4 + 5));
+    assert_eq!(cells, 2 * 2 * (4 + 4 + 5));
     assert!(worst <= 1.02, "{worst}");
 }
 

@@ -14,7 +14,7 @@ use model_core::confidence::{Confidence, Sizes};
 use taxel_data::progress::Silent;
 use taxel_data::random::Stream;
 use taxel_data::table::Table;
-use taxel_learn::{Exponential, ModelBlob};
+use taxel_learn::ModelBlob;
 use taxel_rig::Error;
 use taxel_rig::device::check::{Frames, Plan, check};
 use taxel_rig::device::{Device, Wire, request_bytes, upload};
@@ -305,28 +305,12 @@ fn a_device_tells_novelty_and_deviations_as_the_host_does() {
 }
 
 #[test]
-fn a_wrong_answer_is_found() {
-    // The device decodes with the model that it has, while the host expects another one's answers.
-    let (right, wrong) = (model(3), model(4));
-    let mut device = device(SOUND, &right);
-    let inputs = synthesise(&press(), Stream::Test, 1).inputs;
-    let expected = wrong.prepare(Exponential::default()).decode_table(&inputs);
-    let readings: Vec<f32> =
-        synthesise(&press(), Stream::Test, 1).inputs.values.iter().map(|v| *v as f32).collect();
-    let mut same = None;
-    taxel_rig::device::stream::decode_frames(&mut device, &readings, 144, 1, |_, estimate| {
-        same = Some(estimate.outputs.iter().eq(expected.values.iter().map(|v| *v as f32)));
-    })
-    .unwrap();
-    assert_eq!(same, Some(false));
-}
-
-#[test]
 fn over_a_line_that_spoils_bytes_everything_still_arrives() {
     let old = model(3);
     // One byte in some 3000 is lost, changed or turned into the end of a frame: this spoils a fifth of
     // the frames.
     let mut device = device(Line { one_in: Some(3000) }, &old);
+    device.patience = Duration::from_millis(100);
     let new = model(16);
     let identity = upload::replace(&mut device, new.bytes(), &Silent).unwrap();
     assert_eq!(identity.model.unwrap().crc_32, new.parse().crc());
@@ -471,7 +455,7 @@ pub mod serial_port {
         (near.name().unwrap(), near, Quick(far))
     }
 
-    /// Port that answers a read without bytes like a socket does.
+    /// Port that answers a read without bytes like a socket does. Bytes that nobody reads are lost, as on a serial line.
     pub struct Quick(TTYPort);
 
     impl std::io::Read for Quick {
@@ -486,7 +470,7 @@ pub mod serial_port {
 
     impl std::io::Write for Quick {
         fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-            self.0.write(bytes)
+            Ok(self.0.write(bytes).unwrap_or(bytes.len()))
         }
 
         fn flush(&mut self) -> std::io::Result<()> {

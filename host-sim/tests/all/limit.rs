@@ -133,7 +133,7 @@ fn a_drifting_scene_is_run_without_a_limit_and_says_why() {
 #[test]
 fn the_page_tells_of_other_geometries() {
     let mut experiment = Experiment::load("paper").unwrap();
-    experiment.world.read_rows = vec![0, 3];
+    experiment.world.read_rows = vec![3];
     let plan = Plan { noise_levels: &[0.05], frames: 3, geometry: true, models: &[] };
     let result = compute(&experiment, &plan, &Silent).unwrap();
     assert!(result.geometry.len() > 10);

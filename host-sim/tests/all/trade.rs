@@ -17,7 +17,7 @@ use taxel_simulate::Synthesis;
 
 fn press() -> Experiment {
     let mut scene = unrefined("press");
-    (scene.training.frames, scene.training.test_frames) = (1500, 200);
+    (scene.training.frames, scene.training.test_frames) = (1500, 80);
     scene
 }
 
@@ -115,22 +115,21 @@ fn every_knob_has_its_points_and_the_front_is_the_pareto_front() {
 }
 
 #[test]
-fn the_chosen_blob_is_what_the_table_says() {
-    let scene = press();
-    let bounds = Bounds { error: Some(0.055), ..Bounds::default() };
-    let plan = Plan { gate_k: vec![], ..plan() };
-    let trade = compute_plan(&scene, &plan, bounds).unwrap();
-    let chosen = trade.chosen.unwrap();
-    let point = &trade.points[chosen];
-    assert!(point.rmse("dz_mm") <= 0.055);
+fn the_chosen_point_is_the_cheapest_and_its_blob_is_what_the_table_says() {
+    let (scene, mut trade) = (press(), traded().clone());
+    trade.choose(&Bounds { error: Some(0.055), ..Bounds::default() }).unwrap();
+    let chosen = &trade.points[trade.chosen.unwrap()];
+    assert!(chosen.rmse("dz_mm") <= 0.055);
     for other in &trade.points {
-        let cheaper = other.frame.cycles < point.frame.cycles && other.rmse("dz_mm") <= 0.055;
+        let cheaper = other.times.frame_ms < chosen.times.frame_ms && other.rmse("dz_mm") <= 0.055;
         assert!(!cheaper, "{} is cheaper", other.name());
     }
-    let model = ModelBlob::of_bytes(trade.blob(chosen)).unwrap();
+    let ungated = |point: &trade::Point| point.gate_k.is_none() && point.samples_averaged == 16;
+    let place = trade.points.iter().position(ungated).unwrap();
+    let point = &trade.points[place];
+    let model = ModelBlob::of_bytes(trade.blob(place)).unwrap();
     assert_eq!(model.bytes().len(), point.blob_bytes);
-    let level = scene.world.noise.level / (point.samples_averaged as f64).sqrt();
-    let frames = Synthesis::of(&scene.world).noise_level(level);
+    let frames = Synthesis::of(&scene.world).noise_level(scene.world.noise.level / 4.0);
     let test = frames.frames(Stream::Test, scene.training.test_frames);
     let estimate = model.prepare(Exponential::Polynomial).decode_table(&test.inputs);
     let errors = test.outputs.squared_errors(&estimate.values);
@@ -142,25 +141,14 @@ fn the_chosen_blob_is_what_the_table_says() {
 
 #[test]
 fn behind_a_gate_points_have_the_errors_of_the_gates_rows_and_cost_their_share() {
-    let mut scene = press();
-    scene.training.test_frames = 100;
-    let plan = Plan {
-        centres: vec![16],
-        output_ranks: vec![],
-        samples_averaged: vec![4],
-        gate_k: vec![3.5],
-        device: Device::default(),
-    };
-    let bounds = Bounds { cycles: Some(10_000), ..Bounds::default() };
-    let trade = compute_plan(&scene, &plan, bounds).unwrap();
+    let (scene, mut trade) = (press(), traded().clone());
     let prices = Prices::accepted().unwrap();
     // The same gate by other means: the model by itself, and the same test frames.
-    scene.world.noise.level /= 2.0;
     let mut gated = 0;
     for (i, point) in trade.points.iter().enumerate() {
         let Some(k) = point.gate_k else { continue };
         // The gate knows nothing of the tail.
-        if !point.affine_tail {
+        if !point.affine_tail || point.centres != 16 || point.samples_averaged != 1 {
             continue;
         }
         let without = &trade.points[i - 1];
@@ -187,11 +175,12 @@ fn behind_a_gate_points_have_the_errors_of_the_gates_rows_and_cost_their_share()
         assert!(point.whole_array || point.frame.instructions < without.frame.instructions);
         // RAM of the baseline and of its estimate.
         assert_eq!(point.ram_bytes - without.ram_bytes, 576 + 584);
-        assert_eq!(trade.rest_tolerance(i), Some(3.5 * 0.0025));
+        assert_eq!(trade.rest_tolerance(i), Some(3.5 * 0.005));
         gated += 1;
     }
     assert!(gated >= 4, "{gated}");
     // A frame costs so little only behind a gate.
+    trade.choose(&Bounds { cycles: Some(10_000), ..Bounds::default() }).unwrap();
     let chosen = trade.chosen.unwrap();
     assert!(trade.points[chosen].gate_k.is_some() && trade.points[chosen].on_front);
 }
@@ -272,49 +261,10 @@ fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
 }
 
 #[test]
-fn bounds_that_no_point_meets_and_plans_that_make_no_gate_are_refused() {
-    let scene = press();
-    let all = traded();
-    let chosen = |bounds: &Bounds| {
-        let mut trade = all.clone();
-        trade.choose(bounds).map(|()| trade.chosen.unwrap()).map_err(|cause| cause.to_string())
-    };
-    let least_error = |within: &dyn Fn(&trade::Point) -> bool| {
-        let within = all.points.iter().filter(|point| within(point));
-        let least = within.map(|point| point.rmse("dz_mm")).fold(f64::MAX, f64::min);
-        (least * 1e4).ceil() / 1e4
-    };
-    let error = least_error(&|_| true);
-    let bounds = Bounds { error: Some(0.01), cycles: Some(20_000), ..Bounds::default() };
-    let told = format!(
-        "no point is within max-error 0.01 (the smallest error is {error:.4} mm (dz_mm)): raise the bound"
-    );
-    assert_eq!(chosen(&bounds).unwrap_err(), told);
-    // The error in the message can be asked for.
-    chosen(&Bounds { error: Some(error), ..Bounds::default() }).unwrap();
-    // Each bound can be met, but not both.
+fn what_nothing_can_meet_and_plans_that_make_no_gate_are_refused_before_training() {
+    let (scene, all) = (press(), traded());
     let cycles = all.points.iter().map(|point| point.frame.cycles).min().unwrap();
-    let bounds = Bounds { error: Some(error), cycles: Some(cycles), ..Bounds::default() };
-    let message = chosen(&bounds).unwrap_err();
-    let near = least_error(&|point| point.frame.cycles <= cycles);
-    for told in [
-        format!("max-error {error}, max-cycles {cycles}, a slot's 131056 bytes at once"),
-        format!("without max-error {error}, the smallest error is {near:.4} mm (dz_mm)"),
-        format!("without max-cycles {cycles}, the fewest cycles are "),
-    ] {
-        assert!(message.contains(&told), "{message}");
-    }
-    // Sixteen samples a reading have less error, but a scan of them takes 89 ms.
-    let rate = Bounds { frame_rate_hz: Some(100.0), ..Bounds::default() };
-    let best = |bounds: &Bounds| all.points[chosen(bounds).unwrap()].samples_averaged;
-    assert_eq!(
-        (best(&Bounds { blob_bytes: Some(131_056), ..Bounds::default() }), best(&rate)),
-        (16, 1)
-    );
-    let slowest = all.points.iter().map(|p| p.times.frames_per_s).fold(f64::MAX, f64::min);
-    assert!(slowest < 12.0);
-
-    // What nothing can meet is known before anything is trained: costs, and errors below the limit.
+    // Costs, and errors below the limit.
     let refused = |scene: &Experiment, bounds: Bounds| {
         let message = compute(scene, bounds).unwrap_err().to_string();
         assert!(message.ends_with("; nothing was trained"), "{message}");

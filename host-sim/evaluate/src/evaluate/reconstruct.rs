@@ -469,15 +469,13 @@ mod tests {
             let Ok(all) = try_in_batches((7, 2), setups, before, keep, &Silent);
             all
         };
-        let at_once = run(3, Vec::new());
+        let at_once = run(2, Vec::new());
         let ended = run(1, Vec::new());
         assert_eq!(ended[..], at_once[..1]);
-        assert_eq!(run(3, ended), at_once);
+        assert_eq!(run(2, ended), at_once);
         assert_eq!(run(1, at_once.clone()), at_once, "what was tried beyond is kept");
         assert_eq!(saved, at_once);
-        let found = judge(7, &at_once[..1], &Silent);
-        assert_eq!(found.setups, 1);
-        assert_eq!(found, judge(7, &at_once[..1], &Silent));
+        assert_eq!(judge(7, &at_once[..1], &Silent).setups, 1);
     }
 
     #[test]

@@ -127,7 +127,7 @@ fn electrodes_and_frames_whose_computing_takes_hours_are_refused() {
     let one = huge.replace("\nrow_wires = 8", "\nrow_wires = 1");
     let refused = Experiment::parse("test", &one).unwrap_err().to_string();
     assert!(refused.contains("training.frames") && refused.contains("take hours"), "{refused}");
-    let large = one.replace(&wires(1000), &wires(100));
+    let large = one.replace(&wires(1000), &wires(20));
     let scene = Experiment::parse("test", &large).unwrap();
     // Laid out in linear time: a second where a look at all pairs takes many.
     let frames = Synthesis::of(&scene.world).frames(Stream::Test, 1);

@@ -133,3 +133,10 @@ fn novelty_holds_where_directions_leave_out_nothing_but_rounding() {
     // Four sums, without noise, in all readings.
     check(12, &|frame, i| 1e4 + normal(frame, i % 4) + 0.5 * normal(frame, (i + 1) % 4));
 }
+
+#[test]
+fn a_quantile_of_few_values_covers_its_share() {
+    let of = |share| super::quantile(&mut [3.0, 1.0, 2.0], share);
+    assert_eq!([of(0.1), of(0.34), of(0.5), of(0.67), of(1.0)], [1.0, 2.0, 2.0, 3.0, 3.0]);
+    assert_eq!(super::quantile(&mut [], 0.5), 0.0);
+}

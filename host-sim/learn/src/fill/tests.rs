@@ -53,10 +53,10 @@ fn models_that_cannot_fill_are_refused() {
     let (blob, fresh) = model();
     assert!(blob.parse().fill().is_some());
     let few = Table { names: vec!["a".into()], values: vec![1.0, 2.0] };
-    assert!(matches!(add(&blob, &few), Err(Error::NoFill(_))));
+    assert!(add(&blob, &few).unwrap_err().to_string().contains("fewer than four readings"));
     let mut bad = fresh;
     bad.values[0] = f64::INFINITY;
-    assert!(matches!(add(&blob, &bad), Err(Error::NoFill(_))));
+    assert!(add(&blob, &bad).unwrap_err().to_string().contains("are no numbers"));
 }
 
 #[test]
@@ -64,9 +64,7 @@ fn too_few_frames_are_refused_with_the_number_that_is_enough() {
     let (blob, _) = model();
     let world = World { read_rows: vec![3, 4], ..World::press() };
     let readings = |frames| synthesise(&world, Stream::Test, frames).inputs;
-    let refused = add(&blob, &readings(300)).unwrap_err();
-    assert!(matches!(refused, Error::FewForFill { frames: 300, readings: 36, least: 360 }));
-    let message = refused.to_string();
+    let message = add(&blob, &readings(300)).unwrap_err().to_string();
     assert!(
         message.contains("300 frames are too few") && message.contains("give 360"),
         "{message}"

@@ -232,3 +232,12 @@ fn a_rare_event_of_an_output_that_is_else_constant_stays() {
     }
     assert_none(&slips);
 }
+
+#[test]
+fn values_that_spread_as_far_as_their_gap_are_no_outliers() {
+    let bulk = || (0..1000).map(|i| f64::from(i) / 1000.0);
+    let far = |values: [f64; 2]| far_above(&bulk().chain(values).collect::<Vec<_>>(), 0.0);
+    assert_eq!(far([6.0, 6.5]), 2);
+    assert_eq!(far([6.0, 12.0]), 0, "honest touches reach any depth");
+    assert_eq!(far([40.0, 90.0]), 2, "too far for that");
+}

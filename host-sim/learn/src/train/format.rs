@@ -15,7 +15,7 @@ use taxel_data::table::Table;
 use super::hidden_layer::{HiddenLayer, not_held};
 use super::least_squares::{Decomposed, Design, Factor, Recursion, predict};
 use super::{Options, Recursive, Samples, Solver};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, parameter_not_held};
 use crate::infer::{Exponential, infer};
 
 mod direct_f32;
@@ -44,7 +44,7 @@ impl FittedNetwork {
     /// Checks and holds the network in `words`.
     ///
     /// # Errors
-    /// [`Error::NotHeld`] if a parameter does not fit the format.
+    /// [`Error`] if a parameter does not fit the format.
     pub(crate) fn try_new(
         shape: Shape,
         format: Format,
@@ -54,7 +54,7 @@ impl FittedNetwork {
         let fitted = Self { shape, format, affine, words, expansion: None };
         match fitted.try_network() {
             Ok(_) => Ok(fitted),
-            Err(cause) => Err(Error::NotHeld { format, cause }),
+            Err(cause) => Err(parameter_not_held(format, cause)),
         }
     }
 
@@ -62,7 +62,7 @@ impl FittedNetwork {
     /// has so much squared error `left` of each.
     ///
     /// # Errors
-    /// [`Error::OutputLost`] if R² of an output is lower by more than [`MOST_LOST`], and its squared error larger by more
+    /// [`Error`] if R² of an output is lower by more than [`MOST_LOST`], and its squared error larger by more
     /// than [`MOST_GROWTH`].
     pub(super) fn unless_lost(
         self,
@@ -79,8 +79,12 @@ impl FittedNetwork {
             let lost = (found - left) / total;
             let rounding = outputs.len() as f64 * (4.0 * f64::EPSILON * mean).powi(2);
             if total > rounding && lost > MOST_LOST && found > MOST_GROWTH * left {
-                let (format, output) = (self.format, outputs.names[output].clone());
-                return Err(Error::OutputLost { format, output, lost, mean: *mean });
+                let (format, output) = (self.format.name(), &outputs.names[output]);
+                return Err(Error::unfit(format!(
+                    "the format {format} loses the output {output:?}: R² on the training frames would be {lost:.3} lower \
+                     than with the same centres in f64. Subtract {mean:?}, its mean, from the output; or choose another \
+                     format (f32) or a smaller spread"
+                )));
             }
         }
         Ok(self)

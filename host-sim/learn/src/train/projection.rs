@@ -22,7 +22,7 @@ use taxel_data::simd;
 use taxel_data::table::Table;
 
 use super::principal;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, no_regression};
 
 /// Frames whose products are summed before the sum is added to those of others.
 const FRAMES_AT_ONCE: usize = 1024;
@@ -55,7 +55,13 @@ pub fn fit(dataset: &Dataset, features: Option<usize>) -> Result<Vec<f32>> {
         }
         None if dataset.rows > 1 => readings / dataset.rows,
         None if readings > USUAL_FEATURES => USUAL_FEATURES,
-        None => return Err(Error::OneRow { readings, least: USUAL_FEATURES }),
+        None => {
+            let reason = format!(
+                "whole-array input needs the readings of two row-wires or more, or more than {USUAL_FEATURES} readings; \
+                 the data has {readings} of one: leave it out"
+            );
+            return Err(Error::unfit_for("whole_array", reason));
+        }
     };
     let targets = targets(&dataset.outputs, features);
     let features = features.min(targets.names.len());
@@ -81,7 +87,7 @@ pub(super) fn features_of(dataset: &Dataset, features: Option<usize>) -> usize {
 /// of the readings.
 ///
 /// # Errors
-/// [`Error::ProjectionBeyondF32`].
+/// [`Error`] for numbers beyond f32.
 pub(super) fn about_means(parts: &[f64], means: &[f64]) -> Result<Vec<f32>> {
     let features = parts.len() / means.len();
     // f₀ makes up for the means after rounding.
@@ -96,7 +102,7 @@ pub(super) fn about_means(parts: &[f64], means: &[f64]) -> Result<Vec<f32>> {
     if parameters.iter().all(|value| value.is_finite()) {
         Ok(parameters)
     } else {
-        Err(Error::ProjectionBeyondF32)
+        Err(Error::failed("the projection of these readings is beyond f32"))
     }
 }
 
@@ -198,7 +204,7 @@ fn directions(
     }
     let with_outputs =
         DMatrix::from_fn(readings, width - readings, |i, o| products[i * width + readings + o]);
-    let regression = of_readings.cholesky().ok_or(Error::NoRegression)?.solve(&with_outputs);
+    let regression = of_readings.cholesky().ok_or_else(no_regression)?.solve(&with_outputs);
     let predicted = with_outputs.tr_mul(&regression);
     let predicted = (&predicted + predicted.transpose()) * 0.5;
     let mut parts = DMatrix::zeros(readings, features);

@@ -129,8 +129,7 @@ impl Refinement {
 ///
 /// # Errors
 /// [`Error::Setting`](crate::Error::Setting) for settings that cannot be used, or more memory than is allowed;
-/// [`Error::NoRegression`](crate::Error::NoRegression) for samples without a regression;
-/// [`Error::ProjectionBeyondF32`](crate::Error::ProjectionBeyondF32).
+/// [`Error`](crate::Error) for samples without a regression, or a projection beyond f32.
 ///
 /// # Panics
 /// If folds are not given for every frame, or fresh frames have other columns than the data set.

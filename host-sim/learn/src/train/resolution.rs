@@ -3,10 +3,10 @@
 //! A column is refused by its name where little would be left of it, so that no input or output is lost in silence.
 
 use taxel_data::dataset::Dataset;
-use taxel_data::error::Role;
+use taxel_data::error::{Role, quoted};
 use taxel_data::table::Table;
 
-use crate::error::{Error, Result, Unresolved};
+use crate::error::{Error, Result};
 
 /// Largest root mean square of what rounding to f32 adds to a column, as a share of the column's standard deviation.
 pub const MOST_ROUNDING: f64 = 0.05;
@@ -23,14 +23,14 @@ const CONSTANT: f64 = 4.0 * f64::EPSILON;
 /// Checks that f32 holds every column of `dataset` that changes.
 ///
 /// # Errors
-/// [`Error::Column`] for the first column that it does not hold.
+/// [`Error`] for the first column that it does not hold.
 pub fn check(dataset: &Dataset) -> Result<()> {
     for (role, table) in [(Role::Inputs, &dataset.inputs), (Role::Outputs, &dataset.outputs)] {
         let rounding = rounding(table);
         let columns = table.names.iter().zip(table.ranges()).zip(rounding);
         for ((name, range), rounding) in columns {
-            if let Some(why) = refused(range, rounding) {
-                return Err(Error::Column { column: name.clone(), role, range, why });
+            if let Some(why) = refused(range, rounding, role) {
+                return Err(column(name, range, &why));
             }
         }
     }
@@ -40,36 +40,64 @@ pub fn check(dataset: &Dataset) -> Result<()> {
 /// Checks that f32 holds the squares of all outputs of `dataset` that change, as a confidence needs them.
 ///
 /// # Errors
-/// [`Error::Column`] for the first output whose squares it does not hold.
+/// [`Error`] for the first output whose squares it does not hold.
 pub fn check_squares(dataset: &Dataset) -> Result<()> {
     let [least, most] = RANGE_OF_SQUARES;
     let outputs = dataset.outputs.names.iter().zip(dataset.outputs.ranges());
     for (name, range) in outputs {
         let span = range[1] - range[0];
         if span > 0.0 && !(least..=most).contains(&span) {
-            let (column, role) = (name.clone(), Role::Outputs);
-            let why = Unresolved::SquareLost { least, most };
-            return Err(Error::Column { column, role, range, why });
+            let why = format!(
+                "a confidence, which holds squares in f32, needs a range from {least:e} to {most:e}: multiply it by {}, \
+                 or leave the confidence out",
+                factor(span)
+            );
+            return Err(column(name, range, &why));
         }
     }
     Ok(())
 }
 
-/// Why a column cannot be used, from its `range` and what `rounding` adds to it.
-fn refused([low, high]: [f64; 2], rounding: f64) -> Option<Unresolved> {
+fn column(name: &str, [low, high]: [f64; 2], why: &str) -> Error {
+    Error::unfit(format!("column {} goes from {low:?} to {high:?}, and {why}", quoted(name)))
+}
+
+/// Power of ten that brings this `size` to about 1, as text.
+fn factor(size: f64) -> String {
+    format!("1e{}", -size.log10().floor())
+}
+
+/// Why a column cannot be used and what to do, from its `range` and what `rounding` adds to it.
+fn refused([low, high]: [f64; 2], rounding: f64, role: Role) -> Option<String> {
     let (span, largest) = (high - low, low.abs().max(high.abs()));
+    let leave = match role {
+        Role::Inputs => ", or leave it out of the inputs",
+        Role::Outputs => "",
+    };
     if largest > LARGEST {
-        return Some(Unresolved::TooLarge { bound: LARGEST });
+        return Some(format!(
+            "values beyond {LARGEST:e} are too large for f32, which devices compute in: multiply it by {}{leave}",
+            factor(largest)
+        ));
     }
     // A column without a value has a negative span.
     if span <= CONSTANT * largest {
         return None;
     }
     if span < LEAST_RANGE {
-        return Some(Unresolved::TooNarrow { bound: LEAST_RANGE });
+        return Some(format!(
+            "a range below {LEAST_RANGE:e} is lost in f32, which devices compute in: multiply it by {}{leave}",
+            factor(span)
+        ));
     }
     let step = f64::from((largest as f32).next_up()) - f64::from(largest as f32);
-    (rounding > MOST_ROUNDING).then_some(Unresolved::TooFarFromZero { step })
+    let unit = 10_f64.powf(span.log10().floor());
+    (rounding > MOST_ROUNDING).then(|| {
+        format!(
+            "numbers in f32, which devices compute in, are {step:?} apart there: subtract {} from it{leave}",
+            (low / unit).floor() * unit
+        )
+    })
 }
 
 /// Root mean square of what rounding to f32 adds to each column, as a share of its standard deviation.

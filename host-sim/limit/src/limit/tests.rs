@@ -126,3 +126,15 @@ fn latents_have_the_distribution_that_frames_are_drawn_from() {
         }
     }
 }
+
+#[test]
+fn noise_of_a_span_is_that_of_each_row() {
+    let mut world = World::paper();
+    world.noise.kind = NoiseKind::Span;
+    let limit = Limit::of(&world).unwrap();
+    let spans_ohm = Synthesis::of(&world).noise_span_ohm();
+    let expected: Vec<f64> = spans_ohm.iter().map(|span| world.noise.level * span).collect();
+    let found: Vec<f64> = limit.groups.iter().flat_map(|it| it.deviation_ohm.clone()).collect();
+    assert!(limit.groups.len() > 1);
+    assert_eq!(found, expected);
+}

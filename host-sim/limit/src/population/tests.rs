@@ -129,3 +129,19 @@ fn a_population_that_does_not_arrive_says_so() {
     let found = posterior(&target, &Effort { rounds: 2, ..Effort::of(3) }, 0);
     assert!(found.effective < 2.0, "{}", found.effective);
 }
+
+#[test]
+fn the_variance_of_few_samples_is_unbiased() {
+    let target = Linear { slope: DMatrix::zeros(1, 1), data: DVector::zeros(1), deviation: 1.0 };
+    let samples = Samples {
+        latents: 1,
+        places: (0..LANES).map(|i| i as f64).collect(),
+        log_prior: vec![0.0; LANES],
+        log_likelihood: vec![0.0; LANES],
+    };
+    let found = moments(&target, &samples, &mut ());
+    // Of 0, 1, … n − 1: n(n + 1)/12.
+    let n = LANES as f64;
+    assert!((found.effective - n).abs() < 1e-9 && (found.mean[0] - (n - 1.0) / 2.0).abs() < 1e-9);
+    assert!((found.variance[0] - n * (n + 1.0) / 12.0).abs() < 1e-9, "{found:?}");
+}

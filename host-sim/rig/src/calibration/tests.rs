@@ -85,6 +85,7 @@ fn resistors_that_do_not_tell_the_constants_are_refused_with_what_to_add() {
     };
     assert!(refused(&[full()]).contains("such as a single resistor at r1c1"));
     assert!(refused(&[full(), full()]).contains("no place is read both with few"));
+    assert!(refused(&[full(), only(&[0, 1, 2, 4, 5, 6])]).contains("no place is read both"));
     // Another place on the row does not tell, because its column is not known.
     assert!(refused(&[only(&[0, 1, 2]), only(&[3])]).contains("no place is read both"));
     let apart = [only(&[0, 1, 8 + 2, 8 + 3]), only(&[0])];

@@ -207,3 +207,6 @@ pub fn replace<W: Wire>(
 fn unexpected(request: &str, answer: UploadState) -> Error {
     Error::Unexpected { request: request.into(), answer: format!("{answer:?}") }
 }
+
+#[cfg(test)]
+mod tests;

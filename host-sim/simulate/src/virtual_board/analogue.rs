@@ -171,3 +171,17 @@ impl Analogue {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fault_shows_in_the_next_sample() {
+        let mut analogue = Analogue::new(&Readout::default(), 1);
+        analogue.set_readings(&[50.0; ROWS * COLUMNS]);
+        let sound = analogue.outputs_v(Some(3));
+        analogue.set_faults(&[BoardFault::RowOpen(3)]);
+        assert_ne!(analogue.outputs_v(Some(3)), sound);
+    }
+}

@@ -15,7 +15,8 @@ use super::fault::BoardFault;
 use super::pin::Pin;
 use super::rows::RowSelector;
 use super::{COLUMNS, ROWS};
-use crate::error::{Error, Violation};
+use crate::Error;
+use crate::error::Violation;
 use crate::readout::{Readout, Sampler};
 use crate::world::World;
 
@@ -206,7 +207,8 @@ impl VirtualBoard {
     pub fn check(&self) -> Result<(), Error> {
         let board = self.board.borrow();
         board.violations.first().map_or(Ok(()), |first| {
-            Err(Error::Board { times: board.violations.len(), first: first.clone() })
+            let times = board.violations.len();
+            Err(Error::failed(format!("the virtual board refused {times} times, first: {first}")))
         })
     }
 

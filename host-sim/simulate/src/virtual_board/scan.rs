@@ -5,7 +5,7 @@ use taxel_data::table::Table;
 
 use super::board::VirtualBoard;
 use super::scanner::SeriesResistance;
-use crate::error::Result;
+use crate::Result;
 use crate::synth::Synthesis;
 use crate::world::World;
 

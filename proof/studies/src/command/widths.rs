@@ -46,7 +46,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let study = widths::compute(&scene, &arguments.group, &plan, &Terminal::new());
     let study = study.map_err(|error| match error {
         Error::Setting(bad) => of_option(bad, &[("spreads", "--spread"), ("centres", "--centres")]),
-        Error::Learn(taxel_learn::Error::Setting(bad)) => {
+        Error::Data(taxel_data::Error::Setting(bad)) => {
             of_option(bad, &[("spread", "--spread"), ("centres", "--centres")])
         }
         other => other,

@@ -6,7 +6,8 @@ use crate::question::equations::EquationsResult;
 use taxel_evaluate::metrics::{DecoderErrors, LimitSummary, NETWORK, of_decoder};
 use taxel_learn::decoders::{linear, mean};
 
-use host_sim::report::chart::{Axis, Chart, Mark, Series};
+use host_sim::report::axes::Axis;
+use host_sim::report::chart::{Chart, Mark, Series};
 use host_sim::report::format::significant;
 use host_sim::report::svg::{Shape, standalone};
 use host_sim::report::ticks;
@@ -55,11 +56,9 @@ fn by_noise(title: &str, levels: &[AtNoise<'_>], lines: &[Line]) -> String {
     );
     let chart = Chart {
         title: title.into(),
-        x: Axis { label: "noise".into(), ticks: x, logarithmic: true },
-        y: Axis { label: "RMSE of Δz (mm)".into(), ticks: y, logarithmic: true },
+        x: Axis::logarithmic("noise", x),
+        y: Axis::logarithmic("RMSE of Δz (mm)", y),
         series,
-        bands: vec![],
-        notes: vec![],
         end_labels: true,
     };
     standalone(&chart.draw(SIZE), SIZE)

@@ -179,6 +179,17 @@ mod tests {
     }
 
     #[test]
+    fn what_no_slot_holds_is_not_chosen_unless_a_bound_allows_it() {
+        let large = Offer { blob_bytes: SLOT_BYTES + 1, ..offer(0.03, 6.0, 9000) };
+        let offers = [large, offer(0.04, 6.0, 36_000)];
+        let chosen = |blob_bytes| {
+            let bounds = Bounds { error: Some(0.05), blob_bytes, ..Bounds::default() };
+            bounds.choose(&offers, "mm").unwrap()
+        };
+        assert_eq!((chosen(None), chosen(Some(SLOT_BYTES + 1))), (Some(1), Some(0)));
+    }
+
+    #[test]
     fn nobody_pays_for_an_error_that_is_smaller_by_next_to_nothing() {
         let offers =
             [offer(0.0404, 6.0, 9000), offer(0.0401, 6.0, 36_000), offer(0.04, 6.0, 90_000)];

@@ -20,7 +20,7 @@ use taxel_data::dataset::RowTable;
 use super::super::least_squares::{Design, Factor};
 use super::super::{CentredScale, Options, Samples, squared_distance};
 use super::{FittedNetwork, Held, Targets};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, parameter_not_held};
 
 /// One step of inputs, in spans of the training range.
 const STEP: f64 = HALF_RANGE as f64 / UNITS as f64 * UNITS_PER_STEP as f64;
@@ -56,8 +56,9 @@ impl Exponents {
             Error::from(BadValue::new("spread", options.spread, rule))
         };
         if inputs > MOST_INPUTS {
-            let format = Format::Fixed16;
-            return Err(Error::TooManyInputs { format, inputs, most: MOST_INPUTS });
+            return Err(Error::unfit(format!(
+                "{inputs} inputs a row: the format fixed16 holds at most {MOST_INPUTS}; give another format (f32)"
+            )));
         }
         let exponent_per_step = LOG2_E / (2.0 * options.spread.powi(2)) * STEP * STEP;
         let bits = EXPONENT_FRACTION_BITS + DECAY_FRACTION_BITS;
@@ -110,7 +111,7 @@ impl Exponents {
             Err(NetworkError::ExponentOutOfRange { .. }) => Err(refused(
                 "a reading could drive an exponent beyond 64, where fixed16 ends".into(),
             )),
-            Err(cause) => Err(Error::NotHeld { format: Format::Fixed16, cause }),
+            Err(cause) => Err(parameter_not_held(Format::Fixed16, cause)),
         }
     }
 
@@ -291,7 +292,10 @@ fn round(
             }
         }
     }
-    Err(Error::WeightsGrow { format: Format::Fixed16 })
+    Err(Error::unfit(
+        "the format fixed16 does not hold this model: its weights grow without end as they are rounded; give a larger \
+         spread, fewer centres, or another format (f32)",
+    ))
 }
 
 /// Solves for the weights from the last to the first, rounding each at once: `regressors × outputs`. The

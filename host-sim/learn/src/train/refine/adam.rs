@@ -35,3 +35,21 @@ impl Adam {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rate_falls_along_half_a_cosine() {
+        let (mut adam, mut values) = (Adam::new(0.1, 4, 1), [0.0]);
+        let moved = [0, 1, 2, 3].map(|_| {
+            let before = values[0];
+            adam.descend(&mut values, &[1.0]);
+            before - values[0]
+        });
+        for (moved, share) in moved.iter().zip([1.0, 0.853_553, 0.5, 0.146_447]) {
+            assert!((moved - 0.1 * share).abs() < 1e-6, "{moved} {share}");
+        }
+    }
+}

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::movable::{Activated, Movable, Piece};
 use super::products::{Line, SIDE, add_combinations, add_products, add_squares, transposed};
-use crate::error::{Error, Result};
+use crate::error::{Result, no_regression};
 
 /// Mean squared error of one set of samples, and its gradient by what moves.
 #[derive(Debug, Clone)]
@@ -53,7 +53,7 @@ impl Solved {
         // Columns of a symmetric matrix are its rows: the upper triangle stands where nalgebra reads the lower.
         let mut normal = DMatrix::from_column_slice(n, n, &squares);
         (0..n).for_each(|i| normal[(i, i)] += penalty);
-        let normal = Cholesky::new(normal).ok_or(Error::NoRegression)?;
+        let normal = Cholesky::new(normal).ok_or_else(no_regression)?;
         let weights = solve(&normal, &products, outputs);
         Ok(Self { activated, normal, weights })
     }

@@ -154,7 +154,7 @@ impl Projected {
     /// mixed features.
     ///
     /// # Errors
-    /// [`Error::ProjectionBeyondF32`](crate::Error::ProjectionBeyondF32).
+    /// [`Error`](crate::Error) for a projection beyond f32.
     pub(super) fn layers(
         &self,
         dataset: &Dataset,

@@ -1,0 +1,164 @@
+//! Uploads to a device that answers by a script.
+
+use std::collections::VecDeque;
+use std::io::{ErrorKind, Read, Write};
+
+use firmware::link::message::{
+    Configuration, Identity, KeyState, Memory, ModelIdentity, Statistics,
+};
+use firmware::link::receive::{Received, Receiver};
+use firmware::link::{cobs, packet};
+use taxel_data::progress::Silent;
+
+use super::*;
+
+/// Line whose other end answers each request by `script`.
+struct Scripted<S> {
+    script: S,
+    receiver: Receiver<Vec<u8>>,
+    answers: VecDeque<u8>,
+}
+
+impl<S: FnMut(&Request<'_>) -> Report<'static>> Write for Scripted<S> {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        for byte in bytes {
+            let Some(Received::Frame(frame)) = self.receiver.push(*byte) else { continue };
+            let request = packet::decode::<Request<'_>>(frame).expect("a request");
+            let mut buffer = [0; 512];
+            let report = (self.script)(&request.body);
+            let answer = packet::encode(request.number, &report, &mut buffer).expect("room");
+            cobs::encode(answer, |byte| {
+                self.answers.push_back(byte);
+                true
+            });
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+impl<S> Read for Scripted<S> {
+    fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
+        match self.answers.read(bytes)? {
+            0 => Err(ErrorKind::TimedOut.into()),
+            count => Ok(count),
+        }
+    }
+}
+
+impl<S: FnMut(&Request<'_>) -> Report<'static>> Wire for Scripted<S> {
+    fn set_read_timeout(&mut self, _: Duration) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+fn device<S: FnMut(&Request<'_>) -> Report<'static>>(script: S) -> Device<Scripted<S>> {
+    let receiver = Receiver::new(vec![0; 4096]);
+    Device::new(Scripted { script, receiver, answers: VecDeque::new() }).unwrap()
+}
+
+/// Device of one reading whose model has the CRC-32 7.
+fn identity(on_trial: bool) -> Report<'static> {
+    let model = ModelIdentity {
+        crc_32: 7,
+        slot: 0,
+        generation: 1,
+        rows: 1,
+        inputs: 1,
+        outputs: 1,
+        in_ram: true,
+        scene_digest: 0,
+        inputs_crc_32: 0,
+        outputs_crc_32: 0,
+        on_trial,
+        version: None,
+    };
+    Report::Identity(Identity {
+        board: "scripted",
+        firmware: "0",
+        rows: 1,
+        columns: 1,
+        outputs: 1,
+        kernel: "polynomial",
+        model: Some(model),
+        model_name: "",
+        slot_bytes: 4096,
+        chunk_bytes: 4,
+        memory: Memory::default(),
+        key: KeyState::None,
+        highest_version: None,
+    })
+}
+
+#[test]
+fn a_model_that_decodes_no_frame_is_given_up() {
+    for (flags, is_seen) in [(0, true), (EstimateReport::NO_MODEL, false)] {
+        let mut device = device(|request| match request {
+            Request::Identify => identity(true),
+            _ => Report::Estimate(EstimateReport {
+                frame: 0,
+                start_us: 0,
+                flags,
+                row_status: &[],
+                outputs: Floats::of(&[]),
+                novelty: None,
+                deviation: Floats::of(&[]),
+            }),
+        });
+        assert_eq!(see_estimate(&mut device, 7).is_ok(), is_seen);
+    }
+}
+
+#[test]
+fn a_model_that_is_still_on_trial_is_not_told_as_confirmed() {
+    for on_trial in [false, true] {
+        let mut device = device(|request| match request {
+            Request::Identify => identity(on_trial),
+            _ => Report::Upload(UploadState::Confirmed { crc_32: 7 }),
+        });
+        assert_eq!(confirm(&mut device).is_err(), on_trial);
+    }
+}
+
+#[test]
+fn two_frames_are_waited_for_since_the_first_may_be_the_previous_models() {
+    let configuration = Configuration { frame_period_us: 1000, ..Configuration::DEFAULT };
+    let mut asked = 0;
+    let mut device = device(|request| {
+        if *request == Request::Configuration {
+            return Report::Configuration { configuration, lease_left_ms: 0 };
+        }
+        asked += 1;
+        Report::Statistics(Statistics { frames_decoded: asked, ..Statistics::default() })
+    });
+    see_frames(&mut device).unwrap();
+    drop(device);
+    assert_eq!(asked, 3);
+}
+
+#[test]
+fn a_trial_that_nobody_ended_does_not_block_an_upload() {
+    let (mut on_trial, mut received) = (true, 0);
+    let mut device = device(|request| match request {
+        Request::Upload(UploadStep::Begin { .. }) if on_trial => Report::Refused(Refusal::OnTrial),
+        Request::Upload(UploadStep::Abort) => {
+            on_trial = false;
+            Report::Upload(UploadState::Idle)
+        }
+        Request::Upload(UploadStep::Chunk { bytes, .. }) => {
+            received += bytes.len() as u32;
+            Report::Upload(UploadState::Receiving { received })
+        }
+        Request::Upload(UploadStep::Try { .. }) => {
+            Report::Upload(UploadState::OnTrial { crc_32: 7 })
+        }
+        _ => Report::Upload(UploadState::Receiving { received: 0 }),
+    });
+    let outcome = send(&mut device, (&[1; 8], None), 4, &Silent).unwrap();
+    assert_eq!(outcome, Ok(UploadState::OnTrial { crc_32: 7 }));
+    drop(device);
+    assert_eq!(received, 8);
+}

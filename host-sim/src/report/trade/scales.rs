@@ -1,0 +1,164 @@
+//! Axes of the picture: time of a frame against error, both logarithmic.
+
+use taxel_learn::decoders::{linear, mean};
+
+use crate::report::axes::Axis;
+use crate::report::format::{grouped, significant, symbol};
+use crate::report::tables;
+use crate::report::ticks::{self, Ticks, extent};
+use taxel_evaluate::evaluate::trade::{Point, Times, Trade};
+
+/// Factor by which what is no point of the front may lie beyond it and still be shown.
+const BEYOND: f64 = 4.0;
+
+/// Logarithmic range from `low` to `high`, with some room.
+fn around(low: f64, high: f64, label: impl Fn(f64) -> String) -> Ticks {
+    let room = (high / low).powf(0.06).max(1.03);
+    let (low, high) = (low / room, high * room);
+    Ticks { low, high, at: ticks_between(low, high, 5, label) }
+}
+
+/// Ticks of a logarithmic range: linear ones if it is short.
+fn ticks_between(
+    low: f64,
+    high: f64,
+    wanted: usize,
+    label: impl Fn(f64) -> String,
+) -> Vec<(f64, String)> {
+    let ticks = if high / low < 5.0 {
+        ticks::linear([low, high], wanted)
+    } else {
+        ticks::logarithmic([low, high], label)
+    };
+    ticks.at.into_iter().filter(|(value, _)| (low..=high).contains(value)).collect()
+}
+
+/// What the level axis shows: decoding in µs if all scans take the same time, else scan and decoding in ms.
+pub struct AxisOfTimes {
+    /// Time of all scans, if it is the same for all points.
+    scan_ms: Option<f64>,
+    is_decoding: bool,
+}
+
+/// Both axes.
+pub struct Axes {
+    pub times: AxisOfTimes,
+    pub x: Axis,
+    pub y: Axis,
+}
+
+impl Axes {
+    /// Axes that show the front, the chosen point, and what is not far from them.
+    pub fn new(trade: &Trade) -> Self {
+        let scan_ms = trade.points.first().and_then(|point| point.times.scan_ms);
+        let is_decoding = trade.points.iter().all(|point| point.times.scan_ms == scan_ms);
+        let times = AxisOfTimes { scan_ms, is_decoding };
+        let shown = || {
+            let chosen = |i: usize| trade.chosen == Some(i);
+            let points = trade.points.iter().enumerate();
+            points.filter(move |(i, p)| p.on_front || chosen(*i)).map(|(_, point)| point)
+        };
+        let [least_x, most_x] = range(shown().map(|point| times.of_point(&point.times)));
+        let all_x = trade.points.iter().map(|point| times.of_point(&point.times));
+        let most_x = all_x.filter(|x| *x <= BEYOND * most_x).fold(most_x, f64::max);
+        let error_of = |point: &Point| point.rmse(&trade.group);
+        let [least, most] = range(shown().map(error_of));
+        // Lines that lie near are shown as well.
+        let lines = trade.decoders.iter().map(|it| tables::rmse(&it.errors, &trade.group));
+        let lines = lines.chain(trade.bounds.error).chain(trade.limit_rmse());
+        let near = lines.filter(|y| *y > least / 2.0 && *y < most * 1.6);
+        let [least, most] = range(near.chain([least, most]));
+        let errors = trade.points.iter().map(error_of).filter(|error| *error < 1.15 * most);
+        let most = errors.fold(most, f64::max);
+        let label =
+            |x: f64| if x < 1000.0 { significant(x, 2) } else { grouped(x.round() as usize) };
+        let x = Axis::logarithmic(times.label(), around(least_x, most_x, label));
+        let unit = if trade.unit.is_empty() { String::new() } else { format!(", {}", trade.unit) };
+        let y = around(least, most, |error| significant(error, 2));
+        let y = Axis::logarithmic(format!("RMSE of {}{unit}", symbol(&trade.group)), y);
+        Self { times, x, y }
+    }
+}
+
+impl AxisOfTimes {
+    /// Level coordinate of a point.
+    pub fn of_point(&self, times: &Times) -> f64 {
+        if self.is_decoding { 1000.0 * times.decode_ms } else { times.frame_ms }
+    }
+
+    /// Level coordinate of a time of a frame in ms.
+    fn of_frame(&self, frame_ms: f64) -> f64 {
+        if self.is_decoding {
+            1000.0 * (frame_ms - self.scan_ms.unwrap_or(0.0)).max(0.0)
+        } else {
+            frame_ms
+        }
+    }
+
+    fn label(&self) -> String {
+        match (self.is_decoding, self.scan_ms) {
+            (false, _) => "time of a frame, scan and decoding, ms".into(),
+            (true, Some(ms)) => {
+                format!("time of decoding a frame, µs; each scan takes {ms} ms before")
+            }
+            (true, None) => "time of decoding a frame, µs; the scan’s is unknown".into(),
+        }
+    }
+
+    pub fn rate_label(&self) -> &'static str {
+        if self.scan_ms.is_some() || !self.is_decoding {
+            "frames a second"
+        } else {
+            "frames a second, by decoding alone"
+        }
+    }
+
+    /// Frames a second along the x axis: level coordinates and labels.
+    pub fn rates(&self, x: &Axis) -> Vec<(f64, String)> {
+        let scan_ms = if self.is_decoding { self.scan_ms.unwrap_or(0.0) } else { 0.0 };
+        let unit = if self.is_decoding { 1000.0 } else { 1.0 };
+        let rate = |x: f64| 1000.0 / (scan_ms + x / unit);
+        let (most, least) = (rate(x.ticks.low), rate(x.ticks.high));
+        let ticks = ticks_between(least, most, 24, |rate| grouped(rate.round() as usize));
+        ticks.into_iter().map(|(rate, label)| (self.of_frame(1000.0 / rate), label)).collect()
+    }
+
+    /// Bounds on time: what they are, and their level coordinate.
+    pub fn uprights(&self, trade: &Trade) -> Vec<(String, f64)> {
+        let rate = trade.bounds.frame_rate_hz;
+        let rate = rate.map(|hz| (format!("at least {hz} frames/s"), self.of_frame(1000.0 / hz)));
+        let latency = trade.bounds.latency_ms;
+        let latency = latency.map(|ms| (format!("at most {ms} ms"), self.of_frame(ms)));
+        rate.into_iter().chain(latency).collect()
+    }
+}
+
+/// Lines across the picture: what they are, and their errors.
+pub fn levels(trade: &Trade) -> Vec<(String, f64, &'static str)> {
+    let named = |name: &str, words: &str, class| {
+        let rmse = trade.decoders.iter().find(|baseline| baseline.decoder == name)?;
+        let rmse = tables::rmse(&rmse.errors, &trade.group);
+        Some((format!("{words} {}", significant(rmse, 3)), rmse, class))
+    };
+    let samples = trade.points.first().map_or(1, |point| point.samples_averaged);
+    let several = trade.points.iter().any(|point| point.samples_averaged != samples);
+    let with = match (several, samples) {
+        (false, _) => String::new(),
+        (true, 1) => " with 1 sample a reading".into(),
+        (true, samples) => format!(" with {samples} samples a reading"),
+    };
+    let words = |y| format!("least possible{with} {}", significant(y, 3));
+    let levels = [
+        named(mean::NAME, "always predicting the mean", "level"),
+        named(linear::NAME, "best linear decoder", "level"),
+        trade.limit_rmse().map(|y| (words(y), y, "level")),
+        trade.bounds.error.map(|y| (format!("at most {y}"), y, "bound")),
+    ];
+    levels.into_iter().flatten().collect()
+}
+
+/// Least and greatest of positive values.
+fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    let (low, high) = extent(values.filter(|value| *value > 0.0)).unwrap_or((1.0, 10.0));
+    [low, high]
+}
