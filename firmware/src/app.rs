@@ -30,8 +30,6 @@ mod recheck;
 mod trial;
 mod session;
 mod answer;
-#[cfg(test)]
-mod tests;
 
 pub use buffers::Buffers;
 use frame_clock::{FrameClock, LongClock};

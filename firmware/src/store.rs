@@ -35,7 +35,9 @@ pub struct FlashError;
 pub trait Slot {
     /// Mean time in s between erases that the medium endures for years; 0 if it does not wear. The first
     /// [`ERASES_AT_ONCE`] erases after the start need not wait.
-    const ERASE_INTERVAL_S: u32 = 600;
+    fn erase_interval_s(&self) -> u32 {
+        600
+    }
 
     /// All bytes of the slot, at an address that is a multiple of four.
     fn bytes(&self) -> &[u8];

@@ -112,14 +112,14 @@ fn largest_error(session: &mut TestSession<'_>, board: &Board) -> f32 {
 }
 
 /// CRC-32 of the model that is in force after a restart.
-fn after_restart(slots: &mut [MockSlot; 2]) -> Option<u32> {
+fn after_restart(slots: &mut [Flash; 2]) -> Option<u32> {
     let mut bench = Bench::new(quiet());
     let mut session = Session::start(&mut bench.app, slots, &mut []);
     model_crc(&mut session, &bench.board)
 }
 
 /// Recalibrates by 60 presses, as far as the power lasts; returns the new model's CRC-32.
-fn recalibrate(slots: &mut [MockSlot; 2]) -> Result<u32, Refusal> {
+fn recalibrate(slots: &mut [Flash; 2]) -> Result<u32, Refusal> {
     let (mut bench, mut memory) = (Bench::new(quiet()), memory());
     let mut session = Session::start(&mut bench.app, slots, &mut memory);
     add_presses(&mut session, &bench.board, 60);
@@ -137,7 +137,7 @@ fn recalibrate(slots: &mut [MockSlot; 2]) -> Result<u32, Refusal> {
 }
 
 /// Leaves the model with the CRC-32 `left`.
-fn undo(slots: &mut [MockSlot; 2], left: u32) -> Result<u32, Refusal> {
+fn undo(slots: &mut [Flash; 2], left: u32) -> Result<u32, Refusal> {
     let mut bench = Bench::new(quiet());
     let mut session = Session::start(&mut bench.app, slots, &mut []);
     let (answer, _) = step(&mut session, &bench.board, RecalibrationStep::Undo { crc_32: left });
@@ -147,14 +147,14 @@ fn undo(slots: &mut [MockSlot; 2], left: u32) -> Result<u32, Refusal> {
     })
 }
 
-fn upload(slots: &mut [MockSlot; 2], blob: &[u8]) {
+fn upload(slots: &mut [Flash; 2], blob: &[u8]) {
     install(&mut Bench::new(quiet()), slots, &mut [], (blob, 60)).unwrap();
 }
 
 #[test]
 fn a_recalibration_takes_the_memory_of_the_weights_where_it_must() {
     let blob = trained();
-    let mut slots = MockSlot::pair_with(&blob);
+    let mut slots = Flash::slots_with(&blob);
     let (mut bench, mut memory) = (Bench::new(quiet()), memory());
     let board = bench.board.clone();
     let less = memory.len() - 1;
@@ -191,7 +191,7 @@ fn a_recalibration_takes_the_memory_of_the_weights_where_it_must() {
 #[test]
 fn presses_bring_a_changed_sensor_back_and_the_previous_model_can_be_had_again() {
     let old = trained();
-    let mut slots = MockSlot::pair_with(&old);
+    let mut slots = Flash::slots_with(&old);
     let (mut bench, mut memory) = (Bench::new(quiet()), memory());
     let board = bench.board.clone();
     let crc_32 = {
@@ -248,72 +248,16 @@ fn presses_bring_a_changed_sensor_back_and_the_previous_model_can_be_had_again()
 #[test]
 fn behind_the_largest_generation_no_recalibration_and_no_undo_comes_into_force() {
     let old = trained();
-    let mut slots = MockSlot::pair_with(&old);
+    let mut slots = Flash::slots_with(&old);
     upload(&mut slots, &blob(2, 5));
     upload(&mut slots, &old);
     // Another record of the model in force, in slot 0, with the largest generation.
     let record = [&b"SLOT"[..], &[0xFF; 4], &crc_of(&old).to_le_bytes()].concat();
     let record = [&record[..], &CRC_32.checksum(&record).to_le_bytes()].concat();
-    slots[0].write(MockSlot::BYTES - 48, &record).unwrap();
+    slots[0].write(Flash::SLOT_BYTES - 48, &record).unwrap();
     assert_eq!(undo(&mut slots, crc_of(&old)), Err(Refusal::LastGeneration));
     assert_eq!(recalibrate(&mut slots), Err(Refusal::LastGeneration));
     assert_eq!(after_restart(&mut slots), Some(crc_of(&old)));
-}
-
-#[test]
-fn a_power_cut_at_any_word_of_a_recalibration_leaves_the_old_or_the_new_model() {
-    let old = trained();
-    // The erase, the blob and the first record.
-    let words = MockSlot::BYTES / 4 + old.len().div_ceil(4) + 4;
-    let mut cuts = 0;
-    let mut new = None;
-    for operations in 0.. {
-        let mut slots = MockSlot::pair_with(&old);
-        slots[0].cut_power_after(operations);
-        let outcome = recalibrate(&mut slots);
-        let cut = slots[0].power_on();
-        let found = after_restart(&mut slots);
-        if operations >= words {
-            assert_eq!(found, outcome.ok(), "cut after {operations} words");
-            new = found;
-        } else {
-            assert_eq!(outcome, Err(Refusal::Flash), "cut after {operations} words");
-            assert_eq!(found, Some(crc_of(&old)), "cut after {operations} words");
-        }
-        if !cut {
-            break;
-        }
-        cuts += 1;
-    }
-    assert!(new.is_some_and(|new| new != crc_of(&old)));
-    assert_eq!(cuts, words + 4, "the second record is cut, too");
-}
-
-#[test]
-fn a_power_cut_at_any_word_of_an_undo_leaves_the_old_or_the_new_model() {
-    let old = crc_of(&trained());
-    let mut cuts = 0;
-    for operations in 0.. {
-        let mut slots = MockSlot::pair_with(&trained());
-        let new = recalibrate(&mut slots).unwrap();
-        slots[0].cut_power_after(operations);
-        let outcome = undo(&mut slots, new);
-        let cut = slots[0].power_on();
-        let found = after_restart(&mut slots);
-        if operations >= 4 {
-            assert_eq!((outcome, found), (Ok(old), Some(old)), "{operations}");
-        } else {
-            assert_eq!((outcome, found), (Err(Refusal::Flash), Some(new)), "{operations}");
-            // It can be done again: there is place for other records.
-            assert_eq!(undo(&mut slots, new), Ok(old));
-            assert_eq!(after_restart(&mut slots), Some(old));
-        }
-        if !cut {
-            break;
-        }
-        cuts += 1;
-    }
-    assert_eq!(cuts, 8, "words of a pair of records");
 }
 
 #[test]
@@ -322,7 +266,7 @@ fn a_model_that_decays_is_not_recalibrated() {
     let old = trained();
     for place in (0..old.len() - 4).step_by(7) {
         for in_ram in [true, false] {
-            let (mut slots, mut bench) = (MockSlot::pair_with(&old), Bench::new(quiet()));
+            let (mut slots, mut bench) = (Flash::slots_with(&old), Bench::new(quiet()));
             let board = bench.board.clone();
             let mut memory = memory();
             let words = memory.len() - usize::from(!in_ram);
@@ -348,7 +292,7 @@ fn a_model_that_decays_is_not_recalibrated() {
 #[cfg(target_os = "linux")]
 fn a_copy_in_ram_is_kept_if_its_slot_has_decayed() {
     let old = trained();
-    let mut slots = MockSlot::pair_with(&blob(5, 2));
+    let mut slots = Flash::slots_with(&blob(5, 2));
     upload(&mut slots, &old);
     let mut bench = Bench::new(Configuration { frame_period_us: 100, ..quiet() });
     let board = bench.board.clone();
@@ -367,8 +311,8 @@ fn a_copy_in_ram_is_kept_if_its_slot_has_decayed() {
 #[test]
 fn with_a_key_the_device_seals_the_model_that_it_makes_and_can_return_to_the_one_before() {
     const KEY: Key = [9; 32];
-    let (old, key) = (trained(), KeyArea::with(&KEY));
-    let mut slots = MockSlot::pair();
+    let (old, key) = (trained(), Flash::with_key(&KEY));
+    let mut slots = Flash::slots();
     let mut steps = upload_steps(&old, 60);
     steps.pop();
     let seal = Some(Seal::of(&KEY, 5, &old));
@@ -380,7 +324,7 @@ fn with_a_key_the_device_seals_the_model_that_it_makes_and_can_return_to_the_one
     add_presses(&mut session, &board, 60);
     step(&mut session, &board, RecalibrationStep::Commit).0.unwrap();
     let _ = session;
-    let in_force = |slots: &mut [MockSlot; 2]| {
+    let in_force = |slots: &mut [Flash; 2]| {
         let mut bench = Bench::with_key(quiet(), &key);
         let mut session = Session::start(&mut bench.app, slots, &mut []);
         let model = ask(&mut session, &bench.board, &Request::Identify, |report| match report {
@@ -400,9 +344,9 @@ fn with_a_key_the_device_seals_the_model_that_it_makes_and_can_return_to_the_one
 #[test]
 fn behind_two_recalibrations_the_owner_s_original_is_taken_again_and_nothing_else_of_its_version() {
     const KEY: Key = [9; 32];
-    let (old, other, key) = (trained(), blob(5, 1), KeyArea::with(&KEY));
-    let mut slots = MockSlot::pair();
-    let install = |slots: &mut [MockSlot; 2], blob: &[u8], seal, last| {
+    let (old, other, key) = (trained(), blob(5, 1), Flash::with_key(&KEY));
+    let mut slots = Flash::slots();
+    let install = |slots: &mut [Flash; 2], blob: &[u8], seal, last| {
         let mut steps = upload_steps(blob, 60);
         steps.pop();
         steps.extend([UploadStep::Try { seal: Some(seal) }, last]);
@@ -450,7 +394,7 @@ fn behind_two_recalibrations_the_owner_s_original_is_taken_again_and_nothing_els
 #[test]
 fn a_press_is_the_mean_of_frames_and_counts_once_however_often_it_is_sent() {
     let blob = trained();
-    let mut slots = MockSlot::pair_with(&blob);
+    let mut slots = Flash::slots_with(&blob);
     let scanning = Configuration { frame_period_us: 1000, send_estimates: false, ..quiet() };
     let (mut bench, mut memory) = (Bench::new(scanning), memory());
     let board = bench.board.clone();
@@ -491,7 +435,7 @@ fn a_press_is_the_mean_of_frames_and_counts_once_however_often_it_is_sent() {
 #[test]
 fn another_request_that_ends_a_press_refuses_it() {
     let blob = trained();
-    let mut slots = MockSlot::pair_with(&blob);
+    let mut slots = Flash::slots_with(&blob);
     let scanning = Configuration { frame_period_us: 1000, send_estimates: false, ..quiet() };
     let (mut bench, mut memory) = (Bench::new(scanning), memory());
     let board = bench.board.clone();
@@ -513,7 +457,7 @@ fn another_request_that_ends_a_press_refuses_it() {
 #[test]
 fn what_cannot_be_done_is_refused_by_name() {
     let blob = trained();
-    let mut slots = MockSlot::pair_with(&blob);
+    let mut slots = Flash::slots_with(&blob);
     let (mut bench, mut memory) = (Bench::new(quiet()), memory());
     let board = bench.board.clone();
     let fault = |fault| Err(Refusal::Recalibration(fault));
@@ -569,12 +513,12 @@ fn what_cannot_be_done_is_refused_by_name() {
     let bytes = 4 * floats as u32;
     assert_eq!(begun, fault(RecalibrationFault::NoRoom { bytes, free_bytes: 0 }));
     let _ = session;
-    let mut shared = MockSlot::pair_with(&mock_board::blob(1, 3));
+    let mut shared = Flash::slots_with(&mock_board::blob(1, 3));
     let mut session = Session::start(&mut bench.app, &mut shared, &mut memory);
     let begun = step(&mut session, &board, RecalibrationStep::Begin).0;
     assert_eq!(begun, fault(RecalibrationFault::SharedNetworks));
     let _ = session;
-    let mut empty = MockSlot::pair();
+    let mut empty = Flash::slots();
     let mut session = Session::start(&mut bench.app, &mut empty, &mut memory);
     let begun = step(&mut session, &board, RecalibrationStep::Begin).0;
     assert_eq!(begun, fault(RecalibrationFault::NoModel));
@@ -583,7 +527,7 @@ fn what_cannot_be_done_is_refused_by_name() {
 #[test]
 fn an_undo_brings_back_the_model_before_an_upload_too() {
     let (old, new) = (trained(), blob(2, 5));
-    let mut slots = MockSlot::pair_with(&old);
+    let mut slots = Flash::slots_with(&old);
     upload(&mut slots, &new);
     assert_eq!(after_restart(&mut slots), Some(crc_of(&new)));
     assert_eq!(undo(&mut slots, crc_of(&new)), Ok(crc_of(&old)));
@@ -592,6 +536,6 @@ fn an_undo_brings_back_the_model_before_an_upload_too() {
     let nothing = Err(Refusal::Recalibration(RecalibrationFault::NothingToUndo));
     assert_eq!(undo(&mut slots, crc_of(&old)), nothing);
     // The bytes of a blob that fills its slot are no records.
-    assert!(slots[0].bytes().len() == MockSlot::BYTES);
+    assert!(slots[0].bytes().len() == Flash::SLOT_BYTES);
     assert_eq!(after_restart(&mut slots), Some(crc_of(&old)));
 }

@@ -18,7 +18,7 @@ fn identity(session: &mut TestSession<'_>, board: &Board) -> Option<ModelIdentit
 }
 
 /// The model that is in force after a restart.
-fn after_restart(slots: &mut [MockSlot; 2]) -> Option<ModelIdentity> {
+fn after_restart(slots: &mut [Flash; 2]) -> Option<ModelIdentity> {
     let mut bench = Bench::new(quiet());
     let mut session = Session::start(&mut bench.app, slots, &mut []);
     identity(&mut session, &bench.board)
@@ -38,8 +38,8 @@ fn recalibrate(
 }
 
 /// Slots with the model `old`, and what is in force while `new` is on trial.
-fn on_trial(old: &[u8], new: &[u8]) -> ([MockSlot; 2], Bench<'static>) {
-    let mut slots = MockSlot::pair_with(old);
+fn on_trial(old: &[u8], new: &[u8]) -> ([Flash; 2], Bench<'static>) {
+    let mut slots = Flash::slots_with(old);
     let mut bench = Bench::new(quiet());
     let state = upload(&mut bench, &mut slots, &mut [], &upload_steps(new, CHUNK));
     assert_eq!(state, Ok(UploadState::OnTrial { crc_32: crc_of(new) }));
@@ -111,12 +111,12 @@ fn whenever_the_power_goes_while_a_model_is_confirmed_the_old_or_the_new_one_is_
 fn an_abort_and_an_undo_end_a_trial_without_touching_the_flash() {
     let (old, new) = (blob(1, 3), blob(2, 5));
     let (mut slots, mut bench) = on_trial(&old, &new);
-    let writes = [slots[0].writes, slots[1].writes];
+    let writes = [slots[0].words_written, slots[1].words_written];
     upload(&mut bench, &mut slots, &mut [], &[UploadStep::Abort]).unwrap();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&old)));
     let _ = session;
-    assert_eq!([slots[0].writes, slots[1].writes], writes);
+    assert_eq!([slots[0].words_written, slots[1].words_written], writes);
     let refused = upload(&mut bench, &mut slots, &mut [], &[UploadStep::Confirm]);
     assert_eq!(refused, Err(Refusal::NoUpload), "nothing is on trial any more");
 
@@ -130,7 +130,7 @@ fn an_abort_and_an_undo_end_a_trial_without_touching_the_flash() {
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     assert_eq!(recalibrate(&mut session, &board, undo), (is_old, None), "the answer was lost");
     let _ = session;
-    assert_eq!([slots[0].writes, slots[1].writes], writes);
+    assert_eq!([slots[0].words_written, slots[1].words_written], writes);
     // The model that was tried never had a record: there is no way back to it.
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let undo = RecalibrationStep::Undo { crc_32: crc_of(&old) };

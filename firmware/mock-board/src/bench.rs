@@ -6,11 +6,10 @@ use std::rc::Rc;
 use firmware::app::{App, Buffers, Session};
 use firmware::link::message::Configuration;
 
-use crate::board::{AnyKeeper, Board};
-use crate::key_area::KeyArea;
+use crate::board::Board;
+use crate::flash::Flash;
 use crate::pages::SharedSettings;
 use crate::shape::{COLS, MESSAGE_BYTES, OUTPUTS, ROWS, TestFrame, frame_at_rest};
-use crate::slot::MockSlot;
 use crate::source::Source;
 
 /// Memory of an application.
@@ -19,8 +18,11 @@ pub type Memory = Buffers<ROWS, COLS, OUTPUTS, MESSAGE_BYTES>;
 /// An application on the mock board.
 pub type TestApp<'m> = App<'m, Board, Source, ROWS>;
 
-/// A session of an application whose memory is never freed, with slots of type `S`.
-pub type TestSession<'a, S = MockSlot> = Session<'a, 'static, Board, Source, S, ROWS>;
+/// A session of an application in memory of any lifetime.
+pub type Running<'a, 'm> = Session<'a, 'm, Board, Source, Flash, ROWS>;
+
+/// A session of an application whose memory is never freed.
+pub type TestSession<'a> = Running<'a, 'static>;
 
 /// Time in µs that a scan takes on a bench.
 const SCAN_US: u32 = 10;
@@ -47,12 +49,12 @@ impl Bench<'static> {
     }
 
     /// As [`Bench::new`], on a board on which these settings are kept.
-    pub fn with_settings(configuration: Configuration, settings: impl Into<AnyKeeper>) -> Self {
+    pub fn with_settings(configuration: Configuration, settings: &SharedSettings) -> Self {
         Self::within(Box::leak(Box::new(Memory::new())), configuration, settings)
     }
 
     /// As [`Bench::new`], on a board whose flash for the key is `key`.
-    pub fn with_key(configuration: Configuration, key: &KeyArea) -> Self {
+    pub fn with_key(configuration: Configuration, key: &Flash) -> Self {
         Self::within_with_key(Box::leak(Box::new(Memory::new())), configuration, key)
     }
 }
@@ -63,7 +65,7 @@ impl<'m> Bench<'m> {
     pub fn within(
         memory: &'m mut Memory,
         configuration: Configuration,
-        settings: impl Into<AnyKeeper>,
+        settings: &SharedSettings,
     ) -> Self {
         Self::on(Board::with_settings(settings), memory, configuration)
     }
@@ -72,7 +74,7 @@ impl<'m> Bench<'m> {
     pub fn within_with_key(
         memory: &'m mut Memory,
         configuration: Configuration,
-        key: &KeyArea,
+        key: &Flash,
     ) -> Self {
         let mut board = Board::with_settings(&SharedSettings::default());
         board.key = key.clone();

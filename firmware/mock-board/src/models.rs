@@ -14,9 +14,6 @@ use crate::shape::{COLS, OUTPUTS, ROWS};
 pub const TRAINING_ERROR: f32 = 0.02;
 
 /// A blob for this sensor, with `centres` centres and numbers that depend on `seed`.
-///
-/// # Panics
-/// There are no centres, or more than a blob can hold.
 pub fn blob(seed: usize, centres: usize) -> AlignedBytes {
     let number = |i: usize| ((i * 37 + seed * 11) % 101) as f32 / 50.0 - 1.0;
     let list = |from: usize, count: usize| (from..from + count).map(number).collect::<Vec<_>>();
@@ -40,9 +37,6 @@ pub fn blob(seed: usize, centres: usize) -> AlignedBytes {
 
 /// A blob that can be recalibrated: a network of `centres` centres for each row, for readings from 50 Ω to 70 Ω, and
 /// training errors.
-///
-/// # Panics
-/// There are no centres, or more than a blob can hold.
 pub fn blob_to_recalibrate(centres: usize) -> AlignedBytes {
     let number = |i: usize| ((i * 37) % 101) as f32 / 50.0 - 1.0;
     let list = |from: usize, count: usize| (from..from + count).map(number).collect::<Vec<_>>();
@@ -76,18 +70,12 @@ pub fn blob_to_recalibrate(centres: usize) -> AlignedBytes {
 }
 
 /// A blob with `network` for both rows.
-///
-/// # Panics
-/// The network is of another shape than a blob can hold.
 pub fn blob_of(network: Network<'_>) -> AlignedBytes {
     blob_with(network, None, false)
 }
 
 /// The blob of [`blob`] with a confidence, for readings relative to the baseline if `relative_inputs`. Its one component
 /// is of frames near 62 Ω, or near the baseline.
-///
-/// # Panics
-/// Never, as long as the block below fits its sizes.
 pub fn blob_with_confidence(relative_inputs: bool) -> AlignedBytes {
     let (readings, outputs) = (ROWS * COLS, ROWS * OUTPUTS);
     let [middle, scale] = if relative_inputs { [1.0, 20.0] } else { [62.0, 0.5] };
@@ -107,6 +95,27 @@ pub fn blob_with_confidence(relative_inputs: bool) -> AlignedBytes {
     let blob = blob(3, 4);
     let model = Model::decode(&blob).unwrap();
     blob_with(model.networks().next().unwrap(), Some(confidence), relative_inputs)
+}
+
+/// A blob of so many bytes, most of which are its name.
+pub fn blob_of_length(bytes: usize) -> AlignedBytes {
+    let small = blob(3, 4);
+    let model = Model::decode(&small).unwrap();
+    let networks: Vec<_> = model.networks().collect();
+    let named = |length: usize| {
+        let name = &"x".repeat(length);
+        let parts = ModelParts {
+            projection: None,
+            expansion: None,
+            confidence: None,
+            fill: None,
+            networks: &networks,
+            row_network: &[0; ROWS],
+            metadata: Metadata { name, ..*model.metadata() },
+        };
+        encode_to_vec(&parts).unwrap()
+    };
+    (0..bytes).map(named).find(|blob| blob.len() == bytes).unwrap()
 }
 
 fn blob_with(
@@ -130,9 +139,6 @@ fn blob_with(
 }
 
 /// A blob whose one network for both rows computes so many `components`, which are expanded to all outputs.
-///
-/// # Panics
-/// There are no components, or more than a blob can hold.
 pub fn blob_of_components(components: usize) -> AlignedBytes {
     let (readings, outputs) = (ROWS * COLS, ROWS * OUTPUTS);
     let (weights, bias) = (vec![0.5; components], vec![0.25; components]);
@@ -168,9 +174,6 @@ pub fn blob_of_components(components: usize) -> AlignedBytes {
 }
 
 /// The CRC-32 that closes a blob.
-///
-/// # Panics
-/// The blob is shorter than four bytes.
 pub fn crc_of(blob: &[u8]) -> u32 {
     u32::from_le_bytes(*blob.last_chunk().unwrap())
 }

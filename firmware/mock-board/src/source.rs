@@ -31,8 +31,6 @@ impl Source {
 }
 
 impl FrameSource for Source {
-    /// # Panics
-    /// No samples are asked for, or `frame` has not the length of `wires`.
     fn scan(
         &mut self,
         settings: ScanSettings,

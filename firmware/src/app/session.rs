@@ -402,10 +402,9 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         }
     }
 
-    /// Replaces the frame with the `readings` (Ω) of a request.
+    /// Replaces the frame with the `readings` (Ω) of a request, as many as are scanned.
     pub(super) fn set_frame(&mut self, readings: impl Iterator<Item = f32>) {
         let frame = self.readings();
-        frame.fill(f32::NAN);
         frame.iter_mut().zip(readings).for_each(|(place, reading)| *place = reading);
     }
 }

@@ -145,6 +145,17 @@ mod tests {
     }
 
     #[test]
+    fn a_kept_reading_that_means_nothing_is_missing() {
+        let mut memory = [0.0; 3];
+        let mut baseline = baseline(&mut memory);
+        baseline.restore(Floats::of(&[60.0, 0.0, -1.0]), 7);
+        assert_eq!(
+            baseline.mean().iter().map(|ohm| ohm.is_nan()).collect::<Vec<_>>(),
+            [false, true, true]
+        );
+    }
+
+    #[test]
     fn frames_of_another_length_start_anew() {
         let mut memory = [0.0; 3];
         let mut baseline = baseline(&mut memory);

@@ -366,6 +366,12 @@ fn a_failed_idle_sample_costs_its_column() {
     );
     let missing = frame.map(|row| row.map(f32::is_nan));
     assert_eq!(missing, [[false, true, false]; 2]);
+    // That of the scan before does not stand in for it.
+    for (failing, missing) in [(None, false), (Some(record.transfers() + 36 + 4), true)] {
+        record.0.borrow_mut().failing_transfer = failing;
+        scanner.scan(SETTINGS, WIRES, frame.as_flattened_mut());
+        assert_eq!(frame.map(|row| row.map(f32::is_nan)), [[false, missing, false]; 2]);
+    }
 }
 
 #[test]

@@ -11,7 +11,7 @@ use mock_board::*;
 #[test]
 fn frames_are_scanned_on_time_numbered_and_reported() {
     let blob = blob(3, 4);
-    let mut slots = MockSlot::pair_with(&blob);
+    let mut slots = Flash::slots_with(&blob);
     let configuration = Configuration { frame_period_us: 1000, send_readings: true, ..quiet() };
     let mut bench = Bench::new(configuration);
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
@@ -29,11 +29,12 @@ fn frames_are_scanned_on_time_numbered_and_reported() {
     let s = statistics(&mut session, &bench.board);
     assert_eq!((s.frames_scanned, s.frames_decoded, s.frames_missed), (5, 5, 0));
     assert!(s.longest_scan_us >= 10 && s.longest_scan_us < 20);
+    assert_eq!((s.shortest_decode_cycles, s.longest_decode_cycles), (1000, 1000));
 }
 
 #[test]
 fn a_scan_longer_than_the_period_is_an_overrun() {
-    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut slots = Flash::slots_with(&blob(3, 4));
     let configuration = Configuration { frame_period_us: 100, ..quiet() };
     let mut bench = Bench::new(configuration).restarted(configuration, 250);
     let board = bench.board.clone();
@@ -52,7 +53,7 @@ fn a_scan_longer_than_the_period_is_an_overrun() {
 
 #[test]
 fn the_watchdog_is_fed_by_good_loops_only() {
-    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut slots = Flash::slots_with(&blob(3, 4));
     let mut bench = Bench::new(Configuration { frame_period_us: 100, ..quiet() });
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let board = bench.board.clone();
@@ -99,7 +100,7 @@ fn the_watchdog_is_fed_by_good_loops_only() {
 /// Longest time in µs in which the watchdog is not fed, when a byte is taken every `gap_us` and each scan takes
 /// `scan_us`.
 fn longest_unfed_us(gap_us: u32, scan_us: u32) -> u32 {
-    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut slots = Flash::slots_with(&blob(3, 4));
     let scanning = Configuration { frame_period_us: 10_000, send_readings: true, ..quiet() };
     let mut bench = Bench::new(scanning).restarted(scanning, scan_us);
     let board = bench.board.clone();
@@ -132,7 +133,7 @@ fn however_slowly_bytes_are_taken_the_watchdog_is_fed() {
 
 #[test]
 fn a_host_that_takes_no_bytes_costs_a_report_but_not_the_device() {
-    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut slots = Flash::slots_with(&blob(3, 4));
     let mut bench = Bench::new(Configuration { frame_period_us: 1000, ..quiet() });
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let board = bench.board.clone();
@@ -160,7 +161,7 @@ fn a_host_that_takes_no_bytes_costs_a_report_but_not_the_device() {
 
 #[test]
 fn a_restart_is_answered_and_ends_the_session() {
-    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut slots = Flash::slots_with(&blob(3, 4));
     let mut bench = Bench::new(quiet());
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let (answer, leave) =

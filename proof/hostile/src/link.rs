@@ -12,8 +12,8 @@ use firmware::link::cobs;
 use firmware::link::message::Request;
 use firmware::link::packet::PROTOCOL_VERSION;
 use mock_board::{
-    Bench, Board, Memory, MockSlot, ROWS, SharedSettings, Source, TestFrame, blob, model_crc,
-    quiet, request_bytes, upload_steps,
+    Bench, Board, Flash, Memory, Running, SharedSettings, TestFrame, blob, model_crc, quiet,
+    request_bytes, upload_steps,
 };
 use model_core::AlignedBytes;
 
@@ -31,7 +31,7 @@ const NUMBER: u16 = 9;
 /// Steps, as bytes.
 pub fn check(bytes: &[u8], is_planted: bool) -> bool {
     let models = [blob(3, 4), blob(4, 3), blob(5, 6)];
-    let mut slots = MockSlot::pair_with(&models[0]);
+    let mut slots = Flash::slots_with(&models[0]);
     if is_planted {
         slots[0].decay(20, 1);
     }
@@ -43,7 +43,7 @@ pub fn check(bytes: &[u8], is_planted: bool) -> bool {
     for _ in 0..MOST_STARTS {
         if let Some(operations) = cut_after.take() {
             slots[0].cut_power_after(operations);
-            settings.cut_power_after(operations, 0x0F0F_0F0F);
+            settings.cut_power_after(operations);
         }
         let mut bench = Bench::within(&mut memory, quiet(), &settings);
         let mut device = Device {
@@ -57,15 +57,18 @@ pub fn check(bytes: &[u8], is_planted: bool) -> bool {
             match operation % 12 {
                 10 => break,
                 11 => {
-                    cut_after = Some(number_of(bytes) as usize % 4096);
+                    cut_after = Some(u64::from(number_of(bytes) % 1024));
                     break;
                 }
                 operation => {
                     let leave = device.step(operation, bytes, &models);
                     has_taken |= matches!(leave, Some(Leave::NewModel));
-                    if leave.is_some() {
+                    // A first request may end a frame that the bytes have begun. The next is answered.
+                    let identify = || request_bytes(NUMBER, &Request::Identify);
+                    if leave.or_else(|| device.send(identify())).is_some() {
                         break;
                     }
+                    device.answers();
                 }
             }
         }
@@ -92,7 +95,7 @@ impl<'b> Iterator for Steps<'b> {
 
 /// A device that runs.
 struct Device<'d> {
-    session: Session<'d, 'd, Board, Source, MockSlot, ROWS>,
+    session: Running<'d, 'd>,
     board: Board,
     frame: Rc<RefCell<TestFrame>>,
 }

@@ -5,29 +5,13 @@ use std::rc::Rc;
 
 use firmware::app::Session;
 use firmware::link::message::{KeyState, Refusal, Report, Request, SealFault};
-use firmware::platform::Platform;
 use firmware::seal::{KEY_BYTES, Key};
-use mock_board::{
-    Bench, Board, KeyArea, Memory, MockSlot, ROWS, Source, ask, blob, model_crc, quiet,
-};
 
-use super::flash::{Flash, Supply, Torn};
-use crate::effort::Effort;
-use crate::found::Found;
-use crate::promise::Promise;
-use crate::tally::Tally;
-use crate::tools::Tools;
-
-pub const PROVISION: Promise = Promise {
-    name: "cut-provision",
-    text: "power cut while a key is set: no key or that one",
-    share: 2,
-    check,
-};
-
-/// Least and most cases; a case is one first cut, and all second cuts behind it.
-const LEAST: u64 = 600;
-const MOST: u64 = 1 << 40;
+use crate::bench::{Bench, Memory, Running, quiet};
+use crate::board::Board;
+use crate::flash::{Flash, Supply, Torn};
+use crate::host::{ask, model_crc};
+use crate::models::blob;
 
 /// Starts after a cut, at each of which weak bits settle anew.
 const STARTS: usize = 6;
@@ -38,21 +22,16 @@ const WORDS: usize = 120;
 const KEY: Key = [0x42; KEY_BYTES];
 const OTHER: Key = [0xC7; KEY_BYTES];
 
-fn check(effort: &Effort, _: &Tools) -> Result<Found, String> {
-    let cuts = Tally::new(Torn::ALL.map(Torn::name));
-    let planted = effort.is_planted();
-    let mut found = effort.worst((LEAST, MOST), (0.0, "losses"), |seed| {
-        Case::new(seed, planted).run(&cuts).map(|()| 0.0)
-    });
-    found.cases = cuts.sum();
-    if found.note.is_empty() {
-        found.note = cuts.text();
-    }
-    Ok(found)
+/// Cuts the power at one word while a key is set, and at each word of the start and of the next key behind it. No key or
+/// that one must be set, the same at each start. Returns the number of cuts.
+///
+/// # Errors
+/// What is wrong, and where.
+pub fn cut_key(seed: u64, planted: bool) -> Result<u64, String> {
+    let mut case = Case::new(seed, planted);
+    case.run()?;
+    Ok(case.cuts)
 }
-
-/// A session of such a device.
-type Running<'a, 'm> = Session<'a, 'm, Board, Source, MockSlot, ROWS>;
 
 /// What a host is told when it sets a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -67,8 +46,9 @@ struct Case {
     seed: u64,
     supply: Rc<RefCell<Supply>>,
     flash: Flash,
-    slots: [MockSlot; 2],
+    slots: [Flash; 2],
     memory: Box<Memory>,
+    cuts: u64,
     /// Whether a fault is planted: what a start writes to make firm what it has found is lost.
     planted: bool,
 }
@@ -85,14 +65,13 @@ impl Case {
                 word = word.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
                 word
             });
-            flash.flash(bytemuck::cast_slice(&code.collect::<Vec<u32>>()));
+            flash.flash(0, bytemuck::cast_slice(&code.collect::<Vec<u32>>()));
         }
-        let slots = MockSlot::pair_with(&blob(1, 3));
-        Self { seed, supply, flash, slots, memory: Box::new(Memory::new()), planted }
+        let slots = Flash::slots_with(&blob(1, 3));
+        Self { seed, supply, flash, slots, memory: Box::new(Memory::new()), cuts: 0, planted }
     }
 
-    fn run(mut self, cuts: &Tally<{ Torn::COUNT }>) -> Result<(), String> {
-        let kind = Torn::of(self.seed) as usize;
+    fn run(&mut self) -> Result<(), String> {
         let before = self.flash.clone();
         let whole = self.provision(KEY, None);
         let operations = self.supply.borrow().operations;
@@ -102,7 +81,7 @@ impl Case {
         let first = self.seed / (3 * Torn::COUNT as u64) % operations;
         self.flash = before;
         self.provision(KEY, Some(first));
-        cuts.add(kind, 1);
+        self.cuts += 1;
         let place = format!("operation {first} of {operations}");
         let after = self.flash.clone();
         for operation in 0.. {
@@ -111,7 +90,7 @@ impl Case {
             if !self.supply.borrow().gone {
                 break;
             }
-            cuts.add(kind, 1);
+            self.cuts += 1;
             let place = format!("{place}, then operation {operation} of the start");
             let found = self.expect(&[None, Some(KEY)], &place)?;
             self.mend(found, &place)?;
@@ -125,7 +104,7 @@ impl Case {
             if self.provision(next, Some(second)) != Outcome::Cut {
                 break;
             }
-            cuts.add(kind, 1);
+            self.cuts += 1;
             let place = format!("{place}, then operation {second}");
             let found = self.expect(&[found, Some(next)], &place)?;
             self.mend(found, &place)?;
@@ -146,16 +125,14 @@ impl Case {
     ) -> T {
         self.flash.settle();
         self.supply.borrow_mut().on(cut_after);
-        let area = KeyArea::of(self.flash.clone());
-        let mut bench = Bench::within_with_key(&mut self.memory, quiet(), &area);
+        let mut bench = Bench::within_with_key(&mut self.memory, quiet(), &self.flash);
         if self.planted {
-            bench.app.platform().key = area;
+            bench.app.platform().key = self.flash.clone();
         }
         let board = bench.board.clone();
         let mut session = Session::start(&mut bench.app, &mut self.slots, &mut []);
         let done = work(&mut session, &board);
-        let area = bench.app.platform().key_area();
-        self.flash = area.flash::<Flash>().expect("the same flash").clone();
+        self.flash = bench.app.platform().key.clone();
         done
     }
 

@@ -1,65 +1,32 @@
 //! Cuts while a model is uploaded, recalibrated or left for the one before it.
 
-use mock_board::{blob, crc_of};
 use model_core::AlignedBytes;
 
 use super::device::{Device, Outcome};
-use super::flash::Torn;
 use super::presses;
-use crate::effort::Effort;
-use crate::found::Found;
-use crate::promise::Promise;
-use crate::tally::Tally;
-use crate::tools::Tools;
-
-pub const UPLOAD: Promise = Promise {
-    name: "cut-upload",
-    text: "power cut in an upload: the old or the new model",
-    share: 12,
-    check: |effort, tools| check(Job::Upload, effort, tools),
-};
-
-pub const UNDO: Promise = Promise {
-    name: "cut-undo",
-    text: "power cut in an undo: one of the two models",
-    share: 6,
-    check: |effort, tools| check(Job::Undo, effort, tools),
-};
-
-pub const RECALIBRATION: Promise = Promise {
-    name: "cut-recalibration",
-    text: "power cut in a recalibration: the old or the new model",
-    share: 6,
-    check: |effort, tools| check(Job::Recalibration, effort, tools),
-};
+use crate::flash::Torn;
+use crate::models::{blob, crc_of};
 
 /// What changes the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Job {
+pub enum Job {
     Upload,
     Undo,
     Recalibration,
 }
 
-/// Least and most cases; a case is one first cut, and all second cuts behind it.
-const LEAST: u64 = 600;
-const MOST: u64 = 1 << 40;
-
 /// Starts after a cut, at each of which weak bits settle anew.
 const STARTS: usize = 3;
 
-fn check(job: Job, effort: &Effort, _: &Tools) -> Result<Found, String> {
-    let cuts = Tally::new(Torn::ALL.map(Torn::name));
-    let planted = effort.is_planted();
-    let least = if planted || job == Job::Recalibration { LEAST / 4 } else { LEAST };
-    let mut found = effort.worst((least, MOST), (0.0, "losses"), |seed| {
-        Case::new(job, seed, planted).run(&cuts).map(|()| 0.0)
-    });
-    found.cases = cuts.sum();
-    if found.note.is_empty() {
-        found.note = cuts.text();
-    }
-    Ok(found)
+/// Cuts the power at one operation of the job, at each operation of the start behind it, and at each of what a host does
+/// next. The old or the new model must be in force, the same at each start. Returns the number of cuts.
+///
+/// # Errors
+/// What is wrong, and where.
+pub fn cut_model(job: Job, seed: u64, planted: bool) -> Result<u64, String> {
+    let mut case = Case::new(job, seed, planted);
+    case.run()?;
+    Ok(case.cuts)
 }
 
 /// One first cut, and all second cuts behind it.
@@ -72,16 +39,17 @@ struct Case {
     planted: bool,
     new: AlignedBytes,
     next: AlignedBytes,
+    cuts: u64,
 }
 
 impl Case {
     fn new(job: Job, seed: u64, planted: bool) -> Self {
         let torn = Torn::of(seed);
         let device = Device::new(seed, torn);
-        Self { job, seed, torn, device, planted, new: blob(2, 2), next: blob(7, 1) }
+        Self { job, seed, torn, device, planted, new: blob(2, 2), next: blob(7, 1), cuts: 0 }
     }
 
-    fn run(mut self, cuts: &Tally<{ Torn::COUNT }>) -> Result<(), String> {
+    fn run(&mut self) -> Result<(), String> {
         let old = self.prepare()?;
         let before = self.device.cells();
         let outcome = self.attempt(None);
@@ -94,10 +62,10 @@ impl Case {
         self.device.restore(&before);
         self.attempt(Some(first));
         self.slip();
-        cuts.add(self.kind(), 1);
+        self.cuts += 1;
         let place = format!("operation {first} of {operations}, {}", self.torn.name());
         let allowed = [Some(old), Some(new)];
-        self.cut_recovery(&allowed, &place, cuts)?;
+        self.cut_recovery(&allowed, &place)?;
         let in_force = self.expect(&allowed, &place)?;
         let after = self.device.cells();
         for second in 0.. {
@@ -114,7 +82,7 @@ impl Case {
                 break;
             }
             self.slip();
-            cuts.add(self.kind(), 1);
+            self.cuts += 1;
             let place = format!("{place}, then operation {second}");
             self.expect(&[in_force, Some(wanted)], &place)?;
             if second % 4 == self.seed % 4 {
@@ -125,12 +93,7 @@ impl Case {
     }
 
     /// Cuts the start behind the first cut at each of its own operations, and puts back what the slots held before.
-    fn cut_recovery(
-        &mut self,
-        allowed: &[Option<u32>],
-        place: &str,
-        cuts: &Tally<{ Torn::COUNT }>,
-    ) -> Result<(), String> {
+    fn cut_recovery(&mut self, allowed: &[Option<u32>], place: &str) -> Result<(), String> {
         let before = self.device.cells();
         for operation in 0.. {
             self.device.restore(&before);
@@ -139,15 +102,11 @@ impl Case {
                 break;
             }
             self.slip();
-            cuts.add(self.kind(), 1);
+            self.cuts += 1;
             self.expect(allowed, &format!("{place}, then operation {operation} of the start"))?;
         }
         self.device.restore(&before);
         Ok(())
-    }
-
-    fn kind(&self) -> usize {
-        self.torn as usize
     }
 
     /// Brings the old model into force; returns its CRC-32.
@@ -161,7 +120,7 @@ impl Case {
             _ => 0,
         };
         let first = if uploads == 0 { &old } else { &earlier };
-        self.device.slots[0].flash(first);
+        self.device.slots[0].flash(0, first);
         for upload in 1..=uploads {
             let blob = if upload == uploads { &old } else { &earlier };
             let outcome = self.device.upload(blob, usize::MAX, None);

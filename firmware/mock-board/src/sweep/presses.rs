@@ -1,12 +1,15 @@
 //! A model that can be recalibrated, and presses to do so.
 
 use firmware::link::message::{RecalibrationStep, Report, Request};
-use firmware::store::Slot;
-use mock_board::{Board, COLS, ROWS, ask, blob_to_recalibrate};
 use model_core::blob::Floats;
 use model_core::{AlignedBytes, Decoder};
 
-use super::device::{Device, Outcome, Running, recalibration_step};
+use super::device::{Device, Outcome, recalibration_step};
+use crate::bench::Running;
+use crate::board::Board;
+use crate::host::ask;
+use crate::models::blob_to_recalibrate;
+use crate::shape::{COLS, ROWS};
 
 const READINGS: usize = ROWS * COLS;
 /// Number of presses of a recalibration.
@@ -36,7 +39,7 @@ pub fn recalibrate(device: &mut Device, cut_after: Option<u64>) -> Outcome {
 }
 
 /// Begins a recalibration of the model `trained`, which is in force, and adds all presses. The device must not scan.
-pub fn add<S: Slot>(session: &mut Running<'_, '_, S>, board: &Board, trained: &AlignedBytes) {
+pub fn add(session: &mut Running<'_, '_>, board: &Board, trained: &AlignedBytes) {
     let decoder = Decoder::<ROWS>::load(trained).expect("a model");
     recalibration_step(session, board, RecalibrationStep::Begin);
     for i in 0..PRESSES {

@@ -9,19 +9,17 @@ use firmware::link::message::{
     UploadState, UploadStep,
 };
 use firmware::store::Slot;
-use mock_board::{
-    Bench, Board, Memory, ROWS, SharedSettings, Source, ask, model_crc, quiet, upload_steps,
-};
 
-use super::flash::{Cells, Flash, Supply, Torn};
+use crate::bench::{Bench, Memory, Running, quiet};
+use crate::board::Board;
+use crate::flash::{Cells, Flash, Supply, Torn};
+use crate::host::{self, ask, model_crc, upload_steps};
+use crate::pages::SharedSettings;
 
 /// Words of a slot.
 pub const SLOT_WORDS: usize = 192;
 /// Bytes of a chunk of an upload.
 const CHUNK: usize = 100;
-
-/// A session of a device with slots of this kind.
-pub type Running<'a, 'm, S> = Session<'a, 'm, Board, Source, S, ROWS>;
 
 /// What becomes of a request to change the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -73,7 +71,7 @@ impl Device {
     pub fn session<T>(
         &mut self,
         cut_after: Option<u64>,
-        work: impl FnOnce(&mut Running<'_, '_, Flash>, &Board) -> T,
+        work: impl FnOnce(&mut Running<'_, '_>, &Board) -> T,
     ) -> T {
         self.slots.iter_mut().for_each(Flash::settle);
         self.supply.borrow_mut().on(cut_after);
@@ -96,7 +94,7 @@ impl Device {
         self.slots.iter_mut().for_each(Flash::settle);
         self.supply.borrow_mut().on(cut_after);
         let mut bench = Bench::within(&mut self.memory, quiet(), &self.settings);
-        let last = mock_board::upload(&mut bench, &mut self.slots, &mut self.weights, &all);
+        let last = host::upload(&mut bench, &mut self.slots, &mut self.weights, &all);
         match last {
             _ if self.supply.borrow().gone => Outcome::Cut,
             Ok(UploadState::Confirmed { crc_32 }) => Outcome::InForce(crc_32),
@@ -110,7 +108,7 @@ impl Device {
         &mut self,
         blob: &[u8],
         steps: usize,
-        work: impl FnOnce(&mut Running<'_, '_, Flash>, &Board),
+        work: impl FnOnce(&mut Running<'_, '_>, &Board),
     ) {
         self.session(None, |session, board| {
             for step in upload_steps(blob, CHUNK).into_iter().take(steps) {
@@ -147,11 +145,7 @@ impl Device {
 }
 
 /// Carries out one step of an upload that ends no session.
-pub fn upload_step<S: Slot>(
-    session: &mut Running<'_, '_, S>,
-    board: &Board,
-    step: UploadStep<'_>,
-) -> Outcome {
+pub fn upload_step(session: &mut Running<'_, '_>, board: &Board, step: UploadStep<'_>) -> Outcome {
     ask(session, board, &Request::Upload(step), |report| match report {
         Report::Upload(_) => Outcome::GoingOn,
         Report::Refused(refusal) => Outcome::Refused(refusal),
@@ -161,8 +155,8 @@ pub fn upload_step<S: Slot>(
 }
 
 /// Carries out one step of a recalibration.
-pub fn recalibration_step<S: Slot>(
-    session: &mut Running<'_, '_, S>,
+pub fn recalibration_step(
+    session: &mut Running<'_, '_>,
     board: &Board,
     step: RecalibrationStep<'_>,
 ) -> Outcome {
