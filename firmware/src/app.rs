@@ -22,9 +22,9 @@ mod lease;
 mod line;
 mod leave;
 mod model;
-mod kept;
+mod saved_settings;
 mod guard;
-mod firm;
+mod records;
 mod recalibrate;
 mod recheck;
 mod trial;
@@ -160,7 +160,7 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
             upload: Upload::new(),
             trial: Trial::default(),
             guard,
-            writes_left: kept::MOST_WRITES,
+            writes_left: saved_settings::MOST_WRITES,
             pressing: Pressing::new(press.as_flattened_mut(), stated.as_flattened_mut()),
             recalibrated: None,
             begins: None,

@@ -111,26 +111,6 @@ fn the_watchdog_is_fed_after_an_erase_that_fails_too() {
     assert!(board.pins.borrow().feeds - before >= 2);
 }
 
-#[test]
-fn an_interruption_after_any_step_leaves_the_old_model() {
-    let (old, new) = (blob(1, 3), blob(2, 5));
-    let steps = upload_steps(&new, CHUNK);
-    let mut slots = Flash::slots_with(&old);
-    for taken in 0..steps.len() {
-        {
-            let mut bench = Bench::new(quiet());
-            let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-            let (outcome, leave) = upload(&mut session, &bench.board, &steps[..taken]);
-            assert!(outcome.is_ok() && leave.is_none(), "{taken}: {outcome:?}");
-            assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&old)), "{taken}");
-        }
-        // The old model is in force after a restart too.
-        let mut bench = Bench::new(quiet());
-        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-        assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&old)), "{taken}");
-    }
-}
-
 /// CRC-32 of the model that is in force after a restart.
 fn after_restart(slots: &mut [Flash; 2]) -> Option<u32> {
     let mut bench = Bench::new(quiet());
@@ -293,30 +273,6 @@ fn an_upload_without_requests_ends() {
     board.pins.borrow_mut().now_us += 1_000_000;
     session.step();
     assert_eq!(upload(&mut session, &board, &steps[3..4]).0, Err(Refusal::NoUpload));
-}
-
-#[test]
-fn damage_of_any_bit_leaves_the_old_model() {
-    let (old, new) = (blob(1, 3), blob(2, 4));
-    let mut slots = Flash::slots_with(&old);
-    let mut bench = Bench::new(quiet());
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    for bit in 0..8 * new.len() {
-        let mut damaged = new.clone();
-        damaged[bit / 8] ^= 1 << (bit % 8);
-        let (outcome, leave) = upload(&mut session, &bench.board, &upload_steps(&damaged, CHUNK));
-        let is_length = (5..9).contains(&(bit / 8));
-        assert!(
-            match outcome {
-                Err(Refusal::BadModel(_)) => true,
-                Err(Refusal::TooLarge { .. } | Refusal::OutOfPlace { .. }) => is_length,
-                _ => false,
-            },
-            "bit {bit}: {outcome:?}"
-        );
-        assert_eq!(leave, None);
-    }
-    assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&old)));
 }
 
 /// Working space has room for 12 numbers, of which two rows' inputs take 6.

@@ -230,6 +230,11 @@ impl Flash {
         flash
     }
 
+    /// Its power.
+    pub fn supply(&self) -> Rc<RefCell<Supply>> {
+        self.supply.clone()
+    }
+
     /// Cuts the power after so many `operations`: erases, and words that are programmed.
     pub fn cut_power_after(&self, operations: u64) {
         self.supply.borrow_mut().on(Some(operations));

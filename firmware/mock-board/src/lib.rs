@@ -27,12 +27,16 @@ mod source;
 mod models;
 mod bench;
 mod host;
+mod device;
 pub mod sweep;
 
 pub use bench::{Bench, Memory, Running, TestApp, TestSession, quiet};
 pub use board::{Board, Pins};
 #[cfg(target_os = "linux")]
 pub use decay::flip_bit;
+pub use device::{
+    Answer, Device, confirmed_steps, identity, provision, trial_steps, undo, upload_step,
+};
 pub use flash::{Cells, Flash, Supply, Torn, Worn};
 pub use host::{
     ask, begin, configure, install, model_crc, reports, request_bytes, settle, upload, upload_steps,

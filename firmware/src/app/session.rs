@@ -41,7 +41,7 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
     ) -> Self {
         app.core.confirm(slots);
         app.core.guard.see(slots);
-        app.core.make_firm(slots);
+        app.core.write_missing_records(slots);
         let capacity = app.core.capacity;
         let guard = &app.core.guard;
         let candidates = candidates(slots, app.core.trial.slot())

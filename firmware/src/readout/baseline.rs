@@ -98,6 +98,10 @@ mod tests {
     fn the_mean_of_many_frames_is_theirs_to_the_last_digits() {
         let mut memory = [0.0; 3];
         let mut baseline = baseline(&mut memory);
+        baseline.add(&[60.0, 50.0, 40.0]);
+        baseline.add(&[62.0, 50.0, 41.0]);
+        assert_eq!(baseline.mean(), [61.0, 50.0, 40.5]);
+        baseline.restart(3);
         let reading = |i: u16, k: f32| 55.0 + k + f32::from(i % 7) * 0.1;
         for i in 0..7000 {
             baseline.add(&[reading(i, 0.0), reading(i, 1.0), reading(i, 2.0)]);

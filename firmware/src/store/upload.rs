@@ -1,9 +1,7 @@
 //! Upload of a blob in chunks.
 
-use super::{
-    ERASES_AT_ONCE, FlashError, RECORD_MAGIC, SEAL_BYTES, SEAL_MARK, Slot, capacity, record,
-    record_pairs, seal_place,
-};
+use super::records::{RECORD_MAGIC, record, record_pairs};
+use super::{ERASES_AT_ONCE, FlashError, SEAL_BYTES, SEAL_MARK, Slot, capacity, seal_place};
 use crate::link::message::{Refusal, UploadState};
 use crate::seal::Seal;
 

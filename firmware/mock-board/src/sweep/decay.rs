@@ -1,12 +1,13 @@
 //! Slots that decay or wear out, after an upload that ended in any way.
 
-use firmware::link::message::UploadStep;
-use firmware::store::RECORD_BYTES;
+use firmware::link::message::{UploadState, UploadStep};
+use firmware::store::{RECORD_BYTES, Slot};
 use model_core::AlignedBytes;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::device::{Device, Outcome, SLOT_WORDS, upload_step};
+use super::{SLOT_WORDS, device};
+use crate::device::{Device, confirmed_steps, trial_steps, upload_step};
 use crate::flash::{Torn, Worn};
 use crate::models::{blob, crc_of};
 
@@ -22,14 +23,14 @@ struct Case {
 impl Case {
     fn new(seed: u64) -> Result<Self, String> {
         let torn = Torn::ALL[(seed % 4) as usize]; // all but weak bits
-        let mut device = Device::new(seed, torn);
+        let mut device = device(seed, torn);
         let uploads = seed / 4 % 4;
         let (old, earlier) = (blob(1, 2), blob(5, 1));
         device.slots[0].flash(0, if uploads == 0 { &old } else { &earlier });
         for upload in 1..=uploads {
             let blob = if upload == uploads { &old } else { &earlier };
-            let outcome = device.upload(blob, usize::MAX, None);
-            if outcome != Outcome::InForce(crc_of(blob)) {
+            let outcome = device.install(blob, None);
+            if outcome != Ok(UploadState::Confirmed { crc_32: crc_of(blob) }) {
                 return Err(format!("upload {upload}: {outcome:?}"));
             }
         }
@@ -44,36 +45,45 @@ impl Case {
     /// Ends an upload of the new model in one of many ways; returns which.
     fn end_upload(&mut self) -> &'static str {
         let new = self.new.clone();
-        let whole = Device::steps_to_trial(&new);
+        let mut whole = trial_steps(&new, None);
+        whole.pop();
         match self.below(4) {
             0 => {
-                self.device.upload(&new, whole, None);
+                let _ = self.device.upload(&whole);
                 "sent whole, then silence"
             }
             1 => {
-                self.device.upload_then(&new, whole, |session, board| {
-                    upload_step(session, board, UploadStep::Abort);
+                self.device.session(|session, board| {
+                    for step in whole.into_iter().chain([UploadStep::Abort]) {
+                        let _ = upload_step(session, board, step);
+                    }
                 });
                 "sent whole, then aborted"
             }
             2 => {
-                self.device.upload(&new, whole, None);
+                let _ = self.device.upload(&whole);
                 let cut = self.below(3);
-                self.device.upload(&blob(3, 1), 1, Some(cut));
+                let _ = self.device.cut(cut).upload(&confirmed_steps(&blob(3, 1), None)[..1]);
                 "sent whole, then cut in the next begin"
             }
             _ => {
                 let cut = self.below(60);
-                self.device.upload(&new, usize::MAX, Some(cut));
+                let _ = self.device.cut(cut).install(&new, None);
                 "cut"
             }
         }
     }
 
+    /// Number of the slot that holds this `blob`.
+    fn slot_of(&self, blob: &[u8]) -> Result<usize, String> {
+        let slot = self.device.slots.iter().position(|slot| slot.bytes().starts_with(blob));
+        slot.ok_or_else(|| "the model in force is in no slot".to_owned())
+    }
+
     /// Flips one bit of the model in slot `slot`, or of the first record behind it; returns whether of the record.
     fn decay(&mut self, slot: usize, blob: &[u8]) -> bool {
         let (bits, record) = (blob.len() as u64 * 8, SLOT_WORDS * 4 - RECORD_BYTES);
-        let is_uploaded = self.device.bytes(slot)[record..] != [0xFF; RECORD_BYTES];
+        let is_uploaded = self.device.slots[slot].bytes()[record..] != [0xFF; RECORD_BYTES];
         let all = if is_uploaded { bits + RECORD_BYTES as u64 * 8 } else { bits };
         let bit = self.below(all);
         let is_of_record = bit >= bits;
@@ -100,7 +110,7 @@ pub fn abort_and_decay(seed: u64, planted: bool) -> Result<usize, String> {
     if before != Some(crc_of(&in_force)) {
         return Err(format!("{how}: in force is {before:08x?}"));
     }
-    let slot = case.device.slot_of(&in_force).ok_or("the model in force is in no slot")?;
+    let slot = case.slot_of(&in_force)?;
     // Behind a record that decays, there may be a second one.
     let may_stay = case.decay(slot, &in_force);
     let after = case.device.restart();
@@ -114,7 +124,7 @@ pub fn abort_and_decay(seed: u64, planted: bool) -> Result<usize, String> {
         let torn = case.torn.name();
         return Err(format!("{how}, {torn}: {before:08x?}, after the decay {after:08x?}"));
     }
-    let outcome = case.device.upload(&blob(9, 1), usize::MAX, None);
+    let outcome = case.device.install(&blob(9, 1), None);
     let mended = case.device.restart();
     if mended != Some(crc_of(&blob(9, 1))) {
         return Err(format!("{how}: the next upload is {outcome:?}, in force {mended:08x?}"));
@@ -128,7 +138,7 @@ pub fn abort_and_decay(seed: u64, planted: bool) -> Result<usize, String> {
 /// What is wrong.
 pub fn upload_to_worn(seed: u64, planted: bool) -> Result<usize, String> {
     let mut case = Case::new(seed)?;
-    let spare = 1 - case.device.slot_of(&case.old).ok_or("the old model is in no slot")?;
+    let spare = 1 - case.slot_of(&case.old)?;
     // A bit or several that no erase sets, or that no programming clears; most where the upload writes.
     for _ in 0..=case.below(2) {
         let used = case.new.len() as u64 / 4 + 1;
@@ -144,13 +154,15 @@ pub fn upload_to_worn(seed: u64, planted: bool) -> Result<usize, String> {
     case.device.slots[spare].reads_back = !planted;
     let cut = (case.below(4) == 0).then(|| case.below(60));
     let new = case.new.clone();
-    let outcome = case.device.upload(&new, usize::MAX, cut);
+    case.device.cut_after = cut;
+    let outcome = case.device.install(&new, None);
+    let is_cut = case.device.is_cut();
     let found = [0, 1, 2].map(|_| case.device.restart());
     let (old, new) = (Some(crc_of(&case.old)), Some(crc_of(&case.new)));
     let (index, is_right) = match outcome {
-        Outcome::InForce(_) => (0, found == [new; 3]),
-        Outcome::Cut => (2, found == [old; 3] || found == [new; 3]),
-        _ => (1, found == [old; 3]),
+        _ if is_cut => (2, found == [old; 3] || found == [new; 3]),
+        Ok(_) => (0, found == [new; 3]),
+        Err(_) => (1, found == [old; 3]),
     };
     if is_right {
         Ok(index)

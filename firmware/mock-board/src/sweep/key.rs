@@ -1,23 +1,14 @@
 //! Cuts while a device is given its key.
 
-use std::cell::RefCell;
-use std::rc::Rc;
-
-use firmware::app::Session;
-use firmware::link::message::{KeyState, Refusal, Report, Request, SealFault};
+use firmware::link::message::{KeyState, Refusal, SealFault};
 use firmware::seal::{KEY_BYTES, Key};
 
-use crate::bench::{Bench, Memory, Running, quiet};
-use crate::board::Board;
+use crate::device::Device;
 use crate::flash::{Flash, Supply, Torn};
-use crate::host::{ask, model_crc};
 use crate::models::blob;
 
 /// Starts after a cut, at each of which weak bits settle anew.
 const STARTS: usize = 6;
-
-/// Words of the key's flash: ten places.
-const WORDS: usize = 120;
 
 const KEY: Key = [0x42; KEY_BYTES];
 const OTHER: Key = [0xC7; KEY_BYTES];
@@ -33,61 +24,49 @@ pub fn cut_key(seed: u64, planted: bool) -> Result<u64, String> {
     Ok(case.cuts)
 }
 
-/// What a host is told when it sets a key.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Outcome {
-    Set,
-    Cut,
-    Refused(Refusal),
-}
-
 /// A device without a key, with a model that has no seal.
 struct Case {
     seed: u64,
-    supply: Rc<RefCell<Supply>>,
-    flash: Flash,
-    slots: [Flash; 2],
-    memory: Box<Memory>,
+    device: Device,
     cuts: u64,
-    /// Whether a fault is planted: what a start writes to make firm what it has found is lost.
-    planted: bool,
 }
 
 impl Case {
     fn new(seed: u64, planted: bool) -> Self {
         let supply = Supply::new(seed);
-        let mut flash = Flash::erased(WORDS, &supply, Torn::of(seed));
+        let mut flash = Flash::erased(Flash::KEY_BYTES / 4, &supply, Torn::of(seed));
         flash.swings = true;
         if (seed / Torn::COUNT as u64).is_multiple_of(3) {
             // An older program's code, which must be erased.
             let mut word = seed as u32;
-            let code = (0..WORDS).map(|_| {
+            let code = (0..Flash::KEY_BYTES / 4).map(|_| {
                 word = word.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
                 word
             });
             flash.flash(0, bytemuck::cast_slice(&code.collect::<Vec<u32>>()));
         }
-        let slots = Flash::slots_with(&blob(1, 3));
-        Self { seed, supply, flash, slots, memory: Box::new(Memory::new()), cuts: 0, planted }
+        let mut device = Device::new(Flash::slots_with(&blob(1, 3)));
+        (device.key, device.supply, device.loses_key_writes) = (flash, supply, planted);
+        Self { seed, device, cuts: 0 }
     }
 
     fn run(&mut self) -> Result<(), String> {
-        let before = self.flash.clone();
-        let whole = self.provision(KEY, None);
-        let operations = self.supply.borrow().operations;
-        if whole != Outcome::Set || self.expect(&[Some(KEY)], "without a cut")? != Some(KEY) {
+        let before = self.device.key.clone();
+        let whole = self.device.provision(KEY);
+        let operations = self.device.supply.borrow().operations;
+        if whole.is_err() || self.expect(&[Some(KEY)], "without a cut")? != Some(KEY) {
             return Err(format!("without a cut: {whole:?}"));
         }
         let first = self.seed / (3 * Torn::COUNT as u64) % operations;
-        self.flash = before;
-        self.provision(KEY, Some(first));
+        self.device.key = before;
+        let _ = self.device.cut(first).provision(KEY);
         self.cuts += 1;
         let place = format!("operation {first} of {operations}");
-        let after = self.flash.clone();
+        let after = self.device.key.clone();
         for operation in 0.. {
-            self.flash = after.clone();
-            self.session(Some(operation), |_, _| ());
-            if !self.supply.borrow().gone {
+            self.device.key = after.clone();
+            self.device.cut(operation).session(|_, _| ());
+            if !self.device.is_cut() {
                 break;
             }
             self.cuts += 1;
@@ -95,13 +74,14 @@ impl Case {
             let found = self.expect(&[None, Some(KEY)], &place)?;
             self.mend(found, &place)?;
         }
-        self.flash = after;
+        self.device.key = after;
         let found = self.expect(&[None, Some(KEY)], &place)?;
-        let after = self.flash.clone();
+        let after = self.device.key.clone();
         for second in 0.. {
-            self.flash = after.clone();
+            self.device.key = after.clone();
             let next = self.next(found);
-            if self.provision(next, Some(second)) != Outcome::Cut {
+            let _ = self.device.cut(second).provision(next);
+            if !self.device.is_cut() {
                 break;
             }
             self.cuts += 1;
@@ -117,38 +97,6 @@ impl Case {
         found.unwrap_or(if self.seed.is_multiple_of(2) { OTHER } else { KEY })
     }
 
-    /// Starts the device, and does `work`. The power is cut in the operation after `cut_after`, if given.
-    fn session<T>(
-        &mut self,
-        cut_after: Option<u64>,
-        work: impl FnOnce(&mut Running<'_, '_>, &Board) -> T,
-    ) -> T {
-        self.flash.settle();
-        self.supply.borrow_mut().on(cut_after);
-        let mut bench = Bench::within_with_key(&mut self.memory, quiet(), &self.flash);
-        if self.planted {
-            bench.app.platform().key = self.flash.clone();
-        }
-        let board = bench.board.clone();
-        let mut session = Session::start(&mut bench.app, &mut self.slots, &mut []);
-        let done = work(&mut session, &board);
-        self.flash = bench.app.platform().key.clone();
-        done
-    }
-
-    /// Sets `key`, as far as the power lasts.
-    fn provision(&mut self, key: Key, cut_after: Option<u64>) -> Outcome {
-        let outcome = self.session(cut_after, |session, board| {
-            ask(session, board, &Request::Provision { key }, |report| match report {
-                Report::Provisioned => Outcome::Set,
-                Report::Refused(refusal) => Outcome::Refused(refusal),
-                other => panic!("{other:?}"),
-            })
-            .0
-        });
-        if self.supply.borrow().gone { Outcome::Cut } else { outcome }
-    }
-
     /// Checks that one of the `allowed` keys is set, and the same at each start; returns it.
     fn expect(&mut self, allowed: &[Option<Key>], place: &str) -> Result<Option<Key>, String> {
         let first = self.restart(place)?;
@@ -161,9 +109,7 @@ impl Case {
         let key = match first {
             KeyState::None => None,
             // A host's key is refused unless it is the one that is set.
-            KeyState::Set => {
-                Some(if self.provision(KEY, None) == Outcome::Set { KEY } else { OTHER })
-            }
+            KeyState::Set => Some(if self.device.provision(KEY).is_ok() { KEY } else { OTHER }),
             KeyState::Damaged => return Err(format!("{place}: the key is damaged")),
         };
         if allowed.contains(&key) {
@@ -175,30 +121,24 @@ impl Case {
 
     /// Whether a key is set after a restart. With one, the model without a seal must not be in force.
     fn restart(&mut self, place: &str) -> Result<KeyState, String> {
-        let (state, model) = self.session(None, |session, board| {
-            let state = ask(session, board, &Request::Identify, |report| match report {
-                Report::Identity(identity) => identity.key,
-                other => panic!("{other:?}"),
-            });
-            (state.0, model_crc(session, board))
-        });
+        let (model, state, _) = self.device.identity();
         if model.is_some() == (state == KeyState::None) {
             Ok(state)
         } else {
-            Err(format!("{place}: key {state:?}, model {model:08x?}"))
+            Err(format!("{place}: key {state:?}, model {model:?}"))
         }
     }
 
     /// The next host's key comes into force for good, and no other.
     fn mend(&mut self, found: Option<Key>, place: &str) -> Result<(), String> {
         let next = self.next(found);
-        let outcome = self.provision(next, None);
-        if outcome != Outcome::Set {
+        let outcome = self.device.provision(next);
+        if outcome.is_err() {
             return Err(format!("{place}: the next host's key is {outcome:?}"));
         }
         self.expect(&[Some(next)], &format!("{place}, mended"))?;
-        let third = self.provision([1; KEY_BYTES], None);
-        let is_set = Outcome::Refused(Refusal::Seal(SealFault::KeyIsSet));
+        let third = self.device.provision([1; KEY_BYTES]);
+        let is_set = Err(Refusal::Seal(SealFault::KeyIsSet));
         if third == is_set { Ok(()) } else { Err(format!("{place}: a third key is {third:?}")) }
     }
 }

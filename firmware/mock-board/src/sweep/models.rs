@@ -1,9 +1,10 @@
-//! Cuts while a model is uploaded, recalibrated or left for the one before it.
+//! Cuts while a model is uploaded, or left for the one before it.
 
+use firmware::link::message::UploadState;
 use model_core::AlignedBytes;
 
-use super::device::{Device, Outcome};
-use super::presses;
+use super::device;
+use crate::device::{Answer, Device};
 use crate::flash::Torn;
 use crate::models::{blob, crc_of};
 
@@ -12,7 +13,6 @@ use crate::models::{blob, crc_of};
 pub enum Job {
     Upload,
     Undo,
-    Recalibration,
 }
 
 /// Starts after a cut, at each of which weak bits settle anew.
@@ -45,7 +45,7 @@ struct Case {
 impl Case {
     fn new(job: Job, seed: u64, planted: bool) -> Self {
         let torn = Torn::of(seed);
-        let device = Device::new(seed, torn);
+        let device = device(seed, torn);
         Self { job, seed, torn, device, planted, new: blob(2, 2), next: blob(7, 1), cuts: 0 }
     }
 
@@ -54,13 +54,13 @@ impl Case {
         let before = self.device.cells();
         let outcome = self.attempt(None);
         let operations = self.device.supply.borrow().operations;
-        let Outcome::InForce(new) = outcome else {
+        let Ok(UploadState::Confirmed { crc_32: new }) = outcome else {
             return Err(format!("without a cut: {outcome:?}"));
         };
         self.expect(&[Some(new)], "without a cut")?;
         let first = (self.seed / (4 * Torn::COUNT as u64)).wrapping_mul(17) % operations;
         self.device.restore(&before);
-        self.attempt(Some(first));
+        let _ = self.attempt(Some(first));
         self.slip();
         self.cuts += 1;
         let place = format!("operation {first} of {operations}, {}", self.torn.name());
@@ -72,13 +72,14 @@ impl Case {
             self.device.restore(&after);
             // Half the hosts try the same again, the others something else.
             let again = self.seed.is_multiple_of(2) && in_force == Some(old);
-            let (wanted, outcome) = if again {
-                (new, self.attempt(Some(second)))
+            let wanted = if again {
+                let _ = self.attempt(Some(second));
+                new
             } else {
-                let next = self.next.clone();
-                (crc_of(&next), self.device.upload(&next, usize::MAX, Some(second)))
+                let _ = self.device.cut(second).install(&self.next, None);
+                crc_of(&self.next)
             };
-            if outcome != Outcome::Cut {
+            if !self.device.is_cut() {
                 break;
             }
             self.slip();
@@ -97,8 +98,8 @@ impl Case {
         let before = self.device.cells();
         for operation in 0.. {
             self.device.restore(&before);
-            self.device.session(Some(operation), |_, _| ());
-            if !self.device.supply.borrow().gone {
+            self.device.cut(operation).session(|_, _| ());
+            if !self.device.is_cut() {
                 break;
             }
             self.slip();
@@ -111,7 +112,7 @@ impl Case {
 
     /// Brings the old model into force; returns its CRC-32.
     fn prepare(&mut self) -> Result<u32, String> {
-        let old = if self.job == Job::Recalibration { presses::model() } else { blob(1, 2) };
+        let old = blob(1, 2);
         let earlier = blob(5, 1);
         let uploads = match (self.job, self.seed / Torn::COUNT as u64 % 4) {
             (Job::Undo, 0 | 1) | (_, 1) => 1,
@@ -123,8 +124,8 @@ impl Case {
         self.device.slots[0].flash(0, first);
         for upload in 1..=uploads {
             let blob = if upload == uploads { &old } else { &earlier };
-            let outcome = self.device.upload(blob, usize::MAX, None);
-            if outcome != Outcome::InForce(crc_of(blob)) {
+            let outcome = self.device.install(blob, None);
+            if outcome != confirmed(blob) {
                 return Err(format!("upload {upload} before the cut: {outcome:?}"));
             }
         }
@@ -136,11 +137,11 @@ impl Case {
     }
 
     /// Changes the model, as far as the power lasts.
-    fn attempt(&mut self, cut_after: Option<u64>) -> Outcome {
+    fn attempt(&mut self, cut_after: Option<u64>) -> Answer {
+        self.device.cut_after = cut_after;
         match self.job {
-            Job::Upload => self.device.upload(&self.new, usize::MAX, cut_after),
-            Job::Undo => self.device.undo(crc_of(&blob(1, 2)), cut_after),
-            Job::Recalibration => presses::recalibrate(&mut self.device, cut_after),
+            Job::Upload => self.device.install(&self.new, None),
+            Job::Undo => self.device.undo(crc_of(&blob(1, 2))),
         }
     }
 
@@ -162,8 +163,8 @@ impl Case {
     /// An upload without a cut comes into force, for good.
     fn mend(&mut self, place: &str) -> Result<(), String> {
         let mend = blob(9, 1);
-        let outcome = self.device.upload(&mend, usize::MAX, None);
-        if outcome != Outcome::InForce(crc_of(&mend)) {
+        let outcome = self.device.install(&mend, None);
+        if outcome != confirmed(&mend) {
             return Err(format!("{place}: the next upload is {outcome:?}"));
         }
         self.expect(&[Some(crc_of(&mend))], &format!("{place}, mended")).map(drop)
@@ -175,4 +176,8 @@ impl Case {
             self.device.slots.iter_mut().for_each(|slot| slot.decay(6, 1));
         }
     }
+}
+
+fn confirmed(blob: &[u8]) -> Answer {
+    Ok(UploadState::Confirmed { crc_32: crc_of(blob) })
 }

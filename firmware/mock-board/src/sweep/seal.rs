@@ -1,17 +1,13 @@
 //! Models for a device with a key: only what was sealed with it, and nothing older, comes into force.
 
-use firmware::app::Session;
-use firmware::link::message::{Refusal, SealFault, UploadState, UploadStep};
+use firmware::link::message::{Refusal, SealFault, UploadState};
 use firmware::seal::{KEY_BYTES, Key, Seal};
 use model_core::checksum::CRC_32;
 
-use crate::bench::{Bench, Memory, quiet};
+use crate::device::{Device, confirmed_steps};
 use crate::flash::Flash;
-use crate::host::{model_crc, upload, upload_steps};
 use crate::models::{blob, crc_of};
 
-/// Bytes of a chunk of an upload.
-const CHUNK: usize = 60;
 /// Version of the model in force.
 const VERSION: u32 = 1000;
 /// Kinds of attack.
@@ -84,36 +80,6 @@ fn attack(seed: u64, key: &Key) -> Attack {
     Attack { blob: genuine, seal, lost, named }
 }
 
-/// A device with a key, and what survives a restart.
-struct Device {
-    slots: [Flash; 2],
-    key: Flash,
-    memory: Box<Memory>,
-}
-
-impl Device {
-    /// Starts it, uploads `blob` without its last `lost` chunks, and confirms it.
-    fn install(
-        &mut self,
-        blob: &[u8],
-        seal: Option<Seal>,
-        lost: usize,
-    ) -> Result<UploadState, Refusal> {
-        let mut steps = upload_steps(blob, CHUNK);
-        steps.truncate(steps.len() - 1 - lost);
-        steps.extend([UploadStep::Try { seal }, UploadStep::Confirm]);
-        let mut bench = Bench::within_with_key(&mut self.memory, quiet(), &self.key);
-        upload(&mut bench, &mut self.slots, &mut [0; 512], &steps)
-    }
-
-    /// Starts it; returns the CRC-32 of the model in force.
-    fn model(&mut self) -> Option<u32> {
-        let mut bench = Bench::within_with_key(&mut self.memory, quiet(), &self.key);
-        let mut session = Session::start(&mut bench.app, &mut self.slots, &mut []);
-        model_crc(&mut session, &bench.board)
-    }
-}
-
 /// Attacks a device by a model that its key's owner has not sealed: it must be refused, and a genuine one must come into
 /// force then. With a planted fault the attacker has the key.
 ///
@@ -121,11 +87,11 @@ impl Device {
 /// What is wrong.
 pub fn forge(seed: u64, planted: bool) -> Result<f64, String> {
     let key: Key = std::array::from_fn(|i| (seed.wrapping_mul(31) >> (i % 8)) as u8 ^ i as u8);
-    let slots = Flash::slots();
-    let mut device = Device { slots, key: Flash::with_key(&key), memory: Box::new(Memory::new()) };
+    let mut device = Device::new(Flash::slots());
+    device.key = Flash::with_key(&key);
     let first = blob(1, 3);
     let genuine = |device: &mut Device, version, blob: &[u8]| {
-        let taken = device.install(blob, Some(Seal::of(&key, version, blob)), 0);
+        let taken = device.install(blob, Some(Seal::of(&key, version, blob)));
         let is_right = taken == Ok(UploadState::Confirmed { crc_32: crc_of(blob) });
         if is_right { Ok(()) } else { Err(format!("a genuine model: {taken:?}")) }
     };
@@ -134,12 +100,15 @@ pub fn forge(seed: u64, planted: bool) -> Result<f64, String> {
     if planted {
         attack.seal = Some(Seal::of(&key, VERSION + 1, &attack.blob));
     }
-    let outcome = device.install(&attack.blob, attack.seal, attack.lost);
+    let mut steps = confirmed_steps(&attack.blob, attack.seal);
+    let chunks = steps.len() - 2;
+    steps.drain(chunks - attack.lost..chunks);
+    let outcome = device.upload(&steps);
     let is_named = attack.named.is_none_or(|fault| outcome == Err(Refusal::Seal(fault)));
-    if outcome.is_ok() || !is_named || device.model() != Some(crc_of(&first)) {
+    if outcome.is_ok() || !is_named || device.restart() != Some(crc_of(&first)) {
         return Err(format!("attack {}: {outcome:?}", seed % KINDS));
     }
     let next = blob(2, 4);
     genuine(&mut device, VERSION + 1, &next)?;
-    if device.model() == Some(crc_of(&next)) { Ok(0.0) } else { Err("it is lost".to_owned()) }
+    if device.restart() == Some(crc_of(&next)) { Ok(0.0) } else { Err("it is lost".to_owned()) }
 }
