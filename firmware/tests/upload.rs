@@ -15,17 +15,13 @@ const CHUNK: usize = 60;
 
 /// Carries out an upload as far as it goes; returns the last answer, and whether the session ended.
 fn upload(
-    session: &mut TestSession<'_>,
+    session: &mut Running<'_, '_>,
     board: &Board,
     steps: &[UploadStep<'_>],
-) -> (Result<UploadState, Refusal>, Option<Leave>) {
+) -> (Answer, Option<Leave>) {
     let mut last = (Ok(UploadState::Idle), None);
     for step in steps {
-        last = ask(session, board, &Request::Upload(*step), |report| match report {
-            Report::Upload(state) => Ok(state),
-            Report::Refused(refusal) => Err(refusal),
-            other => panic!("{other:?}"),
-        });
+        last = upload_step(session, board, *step);
         if last.0.is_err() {
             break;
         }
@@ -33,48 +29,34 @@ fn upload(
     last
 }
 
-/// Uploads and confirms `blob` on a device that starts for this.
-fn installed(slots: &mut [Flash; 2], blob: &[u8]) -> Result<UploadState, Refusal> {
-    install(&mut Bench::new(quiet()), slots, &mut [], (blob, CHUNK))
+fn confirmed(blob: &[u8]) -> Answer {
+    Ok(UploadState::Confirmed { crc_32: crc_of(blob) })
 }
 
 #[test]
 fn a_good_model_comes_into_force_and_stays_through_restarts() {
-    let mut slots = Flash::slots_with(&blob(1, 3));
+    let mut device = Device::new(Flash::slots_with(&blob(1, 3)));
     for generation in 1..=5_u32 {
         let next = blob(1 + generation as usize, 2 + generation as usize);
-        let outcome = installed(&mut slots, &next);
-        assert_eq!(outcome, Ok(UploadState::Confirmed { crc_32: crc_of(&next) }));
-        let mut bench = Bench::new(quiet());
-        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-        let (identity, _) = ask(&mut session, &bench.board, &Request::Identify, |r| match r {
-            Report::Identity(identity) => identity.model.unwrap(),
-            other => panic!("{other:?}"),
-        });
-        assert_eq!(identity.crc_32, crc_of(&next));
-        assert_eq!(identity.generation, generation);
-        assert_eq!(u32::from(identity.slot), generation % 2); // in turn
+        assert_eq!(device.install(&next, None), confirmed(&next));
+        let model = device.identity().0.unwrap();
+        assert_eq!((model.crc_32, model.generation), (crc_of(&next), generation));
+        assert_eq!(u32::from(model.slot), generation % 2, "in turn");
     }
 }
 
 #[test]
 fn a_device_without_a_model_takes_one() {
-    let mut slots = Flash::slots();
-    let mut bench = Bench::new(quiet());
+    let mut device = Device::new(Flash::slots());
     let new = blob(4, 3);
-    {
-        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-        assert_eq!(model_crc(&mut session, &bench.board), None);
-        let (_, leave) = upload(&mut session, &bench.board, &upload_steps(&new, CHUNK));
+    device.session(|session, board| {
+        assert_eq!(model_crc(session, board), None);
+        let (_, leave) = upload(session, board, &trial_steps(&new, None));
         assert_eq!(leave, Some(Leave::NewModel));
-    }
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&new)));
-    let _ = session;
-    // It was on trial.
-    assert_eq!(after_restart(&mut slots), None);
-    installed(&mut slots, &new).unwrap();
-    assert_eq!(after_restart(&mut slots), Some(crc_of(&new)));
+    });
+    assert_eq!(device.restart(), None, "it was on trial");
+    assert_eq!(device.install(&new, None), confirmed(&new));
+    assert_eq!(device.restart(), Some(crc_of(&new)));
 }
 
 #[test]
@@ -111,26 +93,19 @@ fn the_watchdog_is_fed_after_an_erase_that_fails_too() {
     assert!(board.pins.borrow().feeds - before >= 2);
 }
 
-/// CRC-32 of the model that is in force after a restart.
-fn after_restart(slots: &mut [Flash; 2]) -> Option<u32> {
-    let mut bench = Bench::new(quiet());
-    let mut session = Session::start(&mut bench.app, slots, &mut []);
-    model_crc(&mut session, &bench.board)
-}
-
 #[test]
 fn a_model_flashed_with_the_firmware_is_in_force_until_the_first_upload_begins_in_its_slot() {
     let (flashed, first) = (blob(1, 3), blob(2, 4));
-    let mut slots = Flash::slots_with(&flashed);
-    installed(&mut slots, &first).unwrap();
-    assert_eq!(after_restart(&mut slots), Some(crc_of(&first)));
+    let mut device = Device::new(Flash::slots_with(&flashed));
+    device.install(&first, None).unwrap();
+    assert_eq!(device.restart(), Some(crc_of(&first)));
     // It stands in for the uploaded model that has decayed.
-    slots[1].decay(20, 4);
-    assert_eq!(after_restart(&mut slots), Some(crc_of(&flashed)));
+    device.slots[1].decay(20, 4);
+    assert_eq!(device.restart(), Some(crc_of(&flashed)));
     // In slot 1 none counts that was not uploaded.
-    let mut slots = Flash::slots();
-    slots[1].flash(0, &flashed);
-    assert_eq!(after_restart(&mut slots), None);
+    device.slots = Flash::slots();
+    device.slots[1].flash(0, &flashed);
+    assert_eq!(device.restart(), None);
 }
 
 fn slot_erases(session: &mut TestSession<'_>, board: &Board) -> u32 {
@@ -279,23 +254,13 @@ fn an_upload_without_requests_ends() {
 #[test]
 fn a_model_of_more_components_than_there_is_room_for_is_refused() {
     let old = blob(1, 3);
-    let mut slots = Flash::slots_with(&old);
-    {
-        let mut bench = Bench::new(quiet());
-        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-        let steps = |blob: &[u8]| upload_steps(blob, CHUNK).len();
-        let many = blob_of_components(7);
-        assert!(steps(&many) > 2);
-        let (outcome, _) = upload(&mut session, &bench.board, &upload_steps(&many, CHUNK));
-        assert_eq!(outcome, Err(Refusal::BadModel(ModelFault::Shape)));
-        assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&old)));
-        let few = blob_of_components(6);
-        let (outcome, leave) = upload(&mut session, &bench.board, &upload_steps(&few, CHUNK));
-        assert!(outcome.is_ok() && leave.is_some(), "{outcome:?}");
-    }
-    let few = blob_of_components(6);
-    installed(&mut slots, &few).unwrap();
-    assert_eq!(after_restart(&mut slots), Some(crc_of(&few)));
+    let mut device = Device::new(Flash::slots_with(&old));
+    let (many, few) = (blob_of_components(7), blob_of_components(6));
+    let shape = Err(Refusal::BadModel(ModelFault::Shape));
+    assert_eq!(device.install(&many, None), shape);
+    assert_eq!(device.restart(), Some(crc_of(&old)));
+    assert_eq!(device.install(&few, None), confirmed(&few));
+    assert_eq!(device.restart(), Some(crc_of(&few)));
 }
 
 #[test]
