@@ -288,7 +288,7 @@ fn no_flipped_bit_of_a_start_item_loses_a_setting() {
         let mut page = pages[1].clone();
         page[bit / 8] ^= 1 << (bit % 8);
         let mut settings = SharedSettings::holding([&pages[0], &page]);
-        assert_eq!(settings.make_firm(), Ok(()));
+        assert_eq!(settings.recover(), Ok(()));
         assert_eq!(settings.read_owned(Setting::Constants), Some(vec![7; 100]), "{bit}");
     }
 }
@@ -305,7 +305,7 @@ fn an_item_that_was_torn_at_one_start_does_not_count_at_the_next() {
     let mut torn = whole.clone();
     torn[1][crc..crc + 8].fill(0xFF);
     let mut settings = SharedSettings::holding([&torn[0], &torn[1]]);
-    assert_eq!(settings.make_firm(), Ok(()));
+    assert_eq!(settings.recover(), Ok(()));
     assert_eq!(settings.read_owned(Setting::Constants), Some(vec![1; 40]));
     let mut later = settings.bytes();
     later[1][crc..crc + 4].copy_from_slice(&whole[1][crc..crc + 4]);

@@ -74,8 +74,8 @@ impl SharedSettings {
 }
 
 impl Keeper for SharedSettings {
-    fn make_firm(&mut self) -> Result<(), KeepError> {
-        self.0.borrow_mut().make_firm()
+    fn recover(&mut self) -> Result<(), KeepError> {
+        self.0.borrow_mut().recover()
     }
 
     fn read<'b>(&mut self, setting: Setting, buffer: &'b mut [u8]) -> Option<&'b [u8]> {

@@ -108,7 +108,7 @@ pub fn generation(index: usize, slot: &[u8]) -> Option<u32> {
 }
 
 /// Generation of the records that the model in slot number `in_force` still needs, to be written by
-/// [`reinstate`](super::reinstate); `None` if its choice is firm.
+/// [`reinstate`](super::reinstate); `None` if it needs none.
 pub fn missing_records<S: Slot>(slots: &[S; 2], in_force: usize) -> Option<u32> {
     let [first, second] = slots;
     let (chosen, other) = if in_force == 0 { (first, second) } else { (second, first) };

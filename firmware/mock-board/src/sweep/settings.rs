@@ -185,7 +185,7 @@ impl Case {
         let mut first = None;
         for start in 1..=3 {
             self.settle();
-            self.settings.make_firm().map_err(|error| format!("{place}, start: {error:?}"))?;
+            self.settings.recover().map_err(|error| format!("{place}, start: {error:?}"))?;
             for other in Setting::ALL {
                 let found = self.read(other);
                 let is_right = if other == setting {
