@@ -25,9 +25,9 @@ mod model;
 mod saved_settings;
 mod guard;
 mod records;
-mod recalibrate;
 mod recheck;
 mod trial;
+mod undo;
 mod session;
 mod answer;
 
@@ -37,7 +37,6 @@ use guard::Guard;
 use lease::Lease;
 pub use leave::Leave;
 use line::Line;
-use recalibrate::Pressing;
 pub use session::Session;
 use trial::Trial;
 
@@ -89,13 +88,8 @@ struct Core<'m, P, F, const ROWS: usize> {
     guard: Guard,
     /// Number of times that settings may still be written before the next restart.
     writes_left: u16,
-    /// A reference press that is being read.
-    pressing: Pressing<'m>,
-    /// CRC-32 of the model that the last recalibration committed, if none has begun since.
-    recalibrated: Option<u32>,
-    /// Number of the request to begin a recalibration for which the next session is to leave the model in its slot, and
-    /// that model's CRC-32.
-    begins: Option<(u16, u32)>,
+    /// Standard deviations of the outputs, for a model with a confidence.
+    deviations: &'m mut [f32],
 }
 
 /// A baseline that is being captured.
@@ -127,8 +121,7 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
             scratch,
             estimate,
             rest,
-            press,
-            stated,
+            deviations,
         } = buffers;
         let capacity = Buffers::<ROWS, COLUMNS, OUTPUTS, BYTES>::CAPACITY;
         let now_us = platform.now_us();
@@ -161,9 +154,7 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
             trial: Trial::default(),
             guard,
             writes_left: saved_settings::MOST_WRITES,
-            pressing: Pressing::new(press.as_flattened_mut(), stated.as_flattened_mut()),
-            recalibrated: None,
-            begins: None,
+            deviations: deviations.as_flattened_mut(),
         };
         core.load_settings();
         Self { receiver: Receiver::new(received), core }
@@ -172,7 +163,8 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
     /// Runs until the host asks for a restart. When another model comes into force, another session begins.
     ///
     /// A model that fits into `weights` is copied there from its slot, and decoded from there: on most boards RAM is
-    /// faster than flash. It may be empty. A recalibration takes what is left, or all of it.
+    /// faster than flash.
+    /// It may be empty.
     pub fn run<S: Slot>(&mut self, slots: &mut [S; 2], weights: &mut [u32]) {
         loop {
             let mut session = Session::start(self, slots, weights);

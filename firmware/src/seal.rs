@@ -1,7 +1,7 @@
 //! Seals: who has a device's key may give it models, and nobody else.
 //!
-//! A seal is a version number and an HMAC-SHA256 over purpose, version and blob. The device makes the same to check it,
-//! and to seal a model that it has recalibrated itself.
+//! A seal is a version number and an HMAC-SHA256 over purpose, version and blob. The device makes the same to check
+//! it.
 
 use hmac::{Hmac, Mac};
 use serde::{Deserialize, Serialize};
@@ -16,50 +16,24 @@ pub type Key = [u8; KEY_BYTES];
 /// First bytes that a tag covers, so that a tag of something else is none of a model.
 const PURPOSE: &[u8; 16] = b"taxel model seal";
 
-/// First bytes that the device's tag of a model covers which it has made itself.
-const OWN_PURPOSE: &[u8; 16] = b"taxel own model ";
-
-/// Length in bytes of what a seal tells of a model's origin.
-const ORIGIN_BYTES: usize = KEY_BYTES / 2;
-
 /// What proves that a blob may come into force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Seal {
     /// Number that rises from model to model, so that no older one comes back.
     pub version: u32,
-    /// HMAC-SHA256 of purpose, version (little-endian) and blob. A model that the device has made itself has a tag of
-    /// two halves: the first half of its origin's tag, and the first half of another HMAC, which covers that as well.
+    /// HMAC-SHA256 of purpose, version (little-endian) and blob.
     pub tag: [u8; KEY_BYTES],
 }
 
 impl Seal {
     /// Seals `blob` as `version`.
     pub fn of(key: &Key, version: u32, blob: &[u8]) -> Self {
-        Self { version, tag: tag(PURPOSE, key, version, &[], blob) }
+        Self { version, tag: tag(key, version, blob) }
     }
 
     /// Whether this is the seal of `blob`, found in a time that does not depend on the tag.
     pub fn fits(&self, key: &Key, blob: &[u8]) -> bool {
         is_same(&self.tag, &Self::of(key, self.version, blob).tag)
-    }
-
-    /// Seals `blob`, which the device has made of a model whose seal is `origin`.
-    pub(crate) fn own(key: &Key, origin: &Self, blob: &[u8]) -> Self {
-        let tag = tag(OWN_PURPOSE, key, origin.version, origin.origin(), blob);
-        let mut seal = *origin;
-        let half = seal.tag.iter_mut().skip(ORIGIN_BYTES);
-        half.zip(tag).for_each(|(place, byte)| *place = byte);
-        seal
-    }
-
-    /// Whether this is the seal of a `blob` that the device has made, found in a time that does not depend on the tag.
-    pub(crate) fn fits_own(&self, key: &Key, blob: &[u8]) -> bool {
-        is_same(&self.tag, &Self::own(key, self, blob).tag)
-    }
-
-    /// What a seal shares with those of the models that the device has made of its model.
-    pub(crate) fn origin(&self) -> &[u8] {
-        self.tag.get(..ORIGIN_BYTES).unwrap_or_default()
     }
 }
 
@@ -69,14 +43,13 @@ pub(crate) fn is_same(one: &[u8; KEY_BYTES], other: &[u8; KEY_BYTES]) -> bool {
 }
 
 #[inline(never)] // so that its stack is not part of its callers'
-fn tag(purpose: &[u8; 16], key: &Key, version: u32, origin: &[u8], blob: &[u8]) -> [u8; KEY_BYTES] {
+fn tag(key: &Key, version: u32, blob: &[u8]) -> [u8; KEY_BYTES] {
     // Longer than any key, so that none has to be hashed.
     let mut block = [0; 64];
     block.iter_mut().zip(key).for_each(|(place, byte)| *place = *byte);
     let mut mac = Hmac::<Sha256>::new((&block).into());
-    mac.update(purpose);
+    mac.update(PURPOSE);
     mac.update(&version.to_le_bytes());
-    mac.update(origin);
     mac.update(blob);
     mac.finalize().into_bytes().into()
 }

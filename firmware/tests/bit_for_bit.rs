@@ -160,7 +160,7 @@ fn networks_of_fixed_size_decode_as_their_blobs_on_the_host_as_in_the_emulator()
 
 #[test]
 fn recursive_least_squares_learns_on_the_host_as_in_the_emulator() {
-    let crc = checks::recalibration().expect("sound parameters");
-    let of_host = format!("INFO recalibration: {crc:08x}\nexit status 0\n");
+    let crc = checks::recursion().expect("sound parameters");
+    let of_host = format!("INFO recursion: {crc:08x}\nexit status 0\n");
     assert_eq!(of_host, expected_log("rls"));
 }

@@ -4,9 +4,8 @@ use firmware::circuit::{Circuit, ConstantsFault, ZeroPotential};
 use firmware::link::cobs;
 use firmware::link::message::{
     Configuration, ConfigurationField, EstimateReport, HealthReport, Identity, KeepFault, Kept,
-    KeptBaseline, KeyState, Memory, ModelFault, ModelIdentity, RecalibrationFault,
-    RecalibrationReport, RecalibrationState, RecalibrationStep, Refusal, Report, Request,
-    SealFault, Setting, Statistics, UploadState, UploadStep,
+    KeptBaseline, KeyState, Memory, ModelFault, ModelIdentity, Refusal, Report, Request, SealFault,
+    Setting, Statistics, UploadState, UploadStep,
 };
 use firmware::link::packet::{self, PROTOCOL_VERSION};
 use firmware::seal::{Key, Seal};
@@ -84,6 +83,7 @@ fn requests() -> Vec<Example> {
         ("abort", upload(UploadStep::Abort)),
         ("confirm", upload(UploadStep::Confirm)),
         ("restart", request_bytes(7, &Request::Restart)),
+        ("undo", request_bytes(7, &Request::Undo { crc_32: 0x1234_5678 })),
         ("provision", request_bytes(7, &Request::Provision { key: KEY })),
         ("set baseline: 60 Ω, unknown", request_bytes(8, &Request::SetBaseline { readings_ohm })),
         ("resume", request_bytes(8, &Request::Resume)),
@@ -142,40 +142,6 @@ fn about_settings() -> [(&'static str, Vec<u8>); 9] {
         ("kept", report_bytes(9, &Report::Kept(kept))),
         ("refused: feedback", refused(Refusal::Constants(ConstantsFault::Feedback))),
         ("refused: nothing to keep", refused(Refusal::Keep(KeepFault::Nothing))),
-    ]
-}
-
-/// Messages about a recalibration.
-fn about_recalibration() -> [Example; 7] {
-    let outputs = Floats::of(&[0.25, -1.0]);
-    let step = |step| request_bytes(10, &Request::Recalibrate(step));
-    let report = RecalibrationReport {
-        state: RecalibrationState::Collecting,
-        presses: 200,
-        networks: 8,
-        excited: 7,
-        error_before: 8.0,
-        error_after: 1.25,
-    };
-    let in_force = RecalibrationState::InForce { crc_32: 0x1234_5678 };
-    let refused = |fault| report_bytes(10, &Report::Refused(Refusal::Recalibration(fault)));
-    [
-        ("recalibrate: begin", step(RecalibrationStep::Begin)),
-        (
-            "press after 3 others, 20 frames: 0.25, −1",
-            step(RecalibrationStep::Press { before: 3, frames: 20, outputs }),
-        ),
-        ("undo", step(RecalibrationStep::Undo { crc_32: 0x1234_5678 })),
-        ("recalibration", report_bytes(10, &Report::Recalibration(report))),
-        (
-            "recalibrated",
-            report_bytes(
-                10,
-                &Report::Recalibration(RecalibrationReport { state: in_force, ..report }),
-            ),
-        ),
-        ("refused: row 2 not excited", refused(RecalibrationFault::NotExcited { row: 1 })),
-        ("refused: nothing to undo", refused(RecalibrationFault::NothingToUndo)),
     ]
 }
 
@@ -238,6 +204,7 @@ fn reports() -> Vec<Example> {
             "confirmed",
             report_bytes(6, &Report::Upload(UploadState::Confirmed { crc_32: 0x1234_5678 })),
         ),
+        ("refused: nothing to undo", refused(Refusal::NothingToUndo)),
         ("provisioned", report_bytes(7, &Report::Provisioned)),
         ("restarting", report_bytes(7, &Report::Restarting)),
         ("refused: version", refused(Refusal::Version(PROTOCOL_VERSION))),
@@ -258,8 +225,7 @@ fn reports() -> Vec<Example> {
 
 #[test]
 fn messages_give_the_specifications_worked_bytes() {
-    let found =
-        [requests(), reports(), about_settings().to_vec(), about_recalibration().to_vec()].concat();
+    let found = [requests(), reports(), about_settings().to_vec()].concat();
     let found: Vec<_> = found.iter().map(|(name, bytes)| (*name, hex(bytes))).collect();
     let table: Vec<_> = found.iter().map(|(name, hex)| format!("| {name} | `{hex}` |")).collect();
     assert!(found == specified(), "docs/link.md should say\n{}", table.join("\n"));
@@ -282,7 +248,7 @@ fn every_refusal_has_the_specified_number() {
         (Refusal::Keep(KeepFault::Nothing), 11),
         (Refusal::TooSoon { wait_us: 1 }, 12),
         (Refusal::LastGeneration, 13),
-        (Refusal::Recalibration(RecalibrationFault::NoModel), 14),
+        (Refusal::NothingToUndo, 14),
         (Refusal::OnTrial, 15),
         (Refusal::Seal(SealFault::Missing), 16),
     ];

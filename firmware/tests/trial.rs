@@ -1,10 +1,7 @@
 //! A new model is on trial until it is confirmed: until then every restart brings the previous one back.
 
 use firmware::app::{Leave, Session};
-use firmware::link::message::{
-    ModelIdentity, RecalibrationFault, RecalibrationState, RecalibrationStep, Refusal, Report,
-    Request, UploadState, UploadStep,
-};
+use firmware::link::message::{ModelIdentity, Refusal, Report, Request, UploadState, UploadStep};
 use mock_board::*;
 
 const CHUNK: usize = 60;
@@ -24,14 +21,14 @@ fn after_restart(slots: &mut [Flash; 2]) -> Option<ModelIdentity> {
     identity(&mut session, &bench.board)
 }
 
-/// Carries out a step of a recalibration.
-fn recalibrate(
+/// Leaves the model with the CRC-32 `left`.
+fn undo(
     session: &mut TestSession<'_>,
     board: &Board,
-    step: RecalibrationStep<'_>,
-) -> (Result<RecalibrationState, Refusal>, Option<Leave>) {
-    ask(session, board, &Request::Recalibrate(step), |report| match report {
-        Report::Recalibration(report) => Ok(report.state),
+    left: u32,
+) -> (Result<UploadState, Refusal>, Option<Leave>) {
+    ask(session, board, &Request::Undo { crc_32: left }, |report| match report {
+        Report::Upload(state) => Ok(state),
         Report::Refused(refusal) => Err(refusal),
         other => panic!("{other:?}"),
     })
@@ -123,19 +120,16 @@ fn an_abort_and_an_undo_end_a_trial_without_touching_the_flash() {
     let (mut slots, mut bench) = on_trial(&old, &new);
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    let undo = RecalibrationStep::Undo { crc_32: crc_of(&new) };
-    let is_old = Ok(RecalibrationState::InForce { crc_32: crc_of(&old) });
-    assert_eq!(recalibrate(&mut session, &board, undo), (is_old, Some(Leave::NewModel)));
+    let is_old = Ok(UploadState::Confirmed { crc_32: crc_of(&old) });
+    assert_eq!(undo(&mut session, &board, crc_of(&new)), (is_old, Some(Leave::NewModel)));
     let _ = session;
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    assert_eq!(recalibrate(&mut session, &board, undo), (is_old, None), "the answer was lost");
+    assert_eq!(undo(&mut session, &board, crc_of(&new)), (is_old, None), "the answer was lost");
     let _ = session;
     assert_eq!([slots[0].words_written, slots[1].words_written], writes);
     // The model that was tried never had a record: there is no way back to it.
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    let undo = RecalibrationStep::Undo { crc_32: crc_of(&old) };
-    let nothing = Err(Refusal::Recalibration(RecalibrationFault::NothingToUndo));
-    assert_eq!(recalibrate(&mut session, &board, undo).0, nothing);
+    assert_eq!(undo(&mut session, &board, crc_of(&old)).0, Err(Refusal::NothingToUndo));
 }
 
 #[test]
@@ -146,9 +140,6 @@ fn on_trial_nothing_overwrites_the_previous_model() {
     assert_eq!(refused, Err(Refusal::OnTrial));
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    for step in [RecalibrationStep::Begin, RecalibrationStep::Commit] {
-        assert_eq!(recalibrate(&mut session, &board, step), (Err(Refusal::OnTrial), None));
-    }
     // Silence ends no trial.
     board.pins.borrow_mut().now_us += 20_000_000;
     session.step();

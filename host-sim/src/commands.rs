@@ -107,7 +107,13 @@ fn exit_status(error: &Error) -> u8 {
     use taxel_rig::Error as Rig;
     match error {
         Error::Failed(_)
-        | Error::Learn(Learn::NoRegression | Learn::ProjectionBeyondF32 | Learn::NotPacked(_)) => 1,
+        | Error::Learn(
+            Learn::NoRegression
+            | Learn::ProjectionBeyondF32
+            | Learn::NotExcited { .. }
+            | Learn::NotBetter
+            | Learn::NotPacked(_),
+        ) => 1,
         Error::Simulate(cause) => match cause {
             taxel_simulate::Error::Setting(_) | taxel_simulate::Error::Data(_) => 2,
             taxel_simulate::Error::Board { .. } => 1,

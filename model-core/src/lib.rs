@@ -3,7 +3,7 @@
 //! Readings travel one way: frame (Ω, a slice) → [`health`] → ([`fill`] →) [`gate`] → ([`relative`] →) ([`projection`] →)
 //! [`scale`] → [`rbf`] (and its affine tail) → [`Estimate`]. The network's weights are read where the [`blob`] lies, in flash or in a
 //! file's buffer: nothing is copied, nothing is allocated, and no release code path of [`Decoder`] panics.
-//! [`recalibration`] fits a model to a sensor that has changed, press by press, by [`rls`].
+//! [`rls`] is recursive least squares, by which the paper trains.
 //!
 //! The crate knows no pin and no file. The same code serves host, emulator and board, so that
 //! their estimates agree bit for bit where the same [exponential](exp) is chosen.
@@ -39,7 +39,6 @@ pub mod fill;
 pub mod blob;
 mod decoder;
 mod fixed;
-pub mod recalibration;
 
 pub use blob::Aligned;
 #[cfg(feature = "std")]

@@ -21,13 +21,11 @@ pub mod packed;
 pub mod direct;
 pub mod expanded;
 pub mod fixed16;
-mod smooth;
 
 pub use format::Format;
 pub(crate) use packed::{Layout, Network as Packed};
 pub(crate) use parameters::Cut;
 pub use parameters::{NetworkError, Shape};
-pub(crate) use smooth::Smooth;
 
 use self::parameters::check_length;
 use crate::exp::{ExpKernel, Polynomial};

@@ -18,7 +18,7 @@
 //!
 //! The trainer of host-sim calls [`solve`] alone, on a square R. It gets R and z from a QR decomposition of many samples
 //! at once, or from this recursion in vector lanes, with the same bits. All else keeps R's upper triangle alone, row
-//! after row, and serves the device (`recalibration.rs`).
+//! after row. Recalibration on the host rotates presses into it.
 //!
 //! Without forgetting (λ = 1) the sums outgrow f32: rounding makes the error 1.05 times that in f64 after 1e6 samples,
 //! 1.4 times after 1e7. Choose λ < 1 for recursions that never end.

@@ -5,8 +5,7 @@ use std::rc::Rc;
 
 use firmware::app::{Leave, Session};
 use firmware::link::message::{
-    Identity, KeyState, ModelIdentity, RecalibrationReport, RecalibrationState, RecalibrationStep,
-    Refusal, Report, Request, UploadState, UploadStep,
+    Identity, KeyState, ModelIdentity, Refusal, Report, Request, UploadState, UploadStep,
 };
 use firmware::seal::{Key, Seal};
 
@@ -171,17 +170,12 @@ pub fn upload_step(
 
 /// Leaves the model with the CRC-32 `left` for the one before it.
 pub fn undo(session: &mut Running<'_, '_>, board: &Board, left: u32) -> (Answer, Option<Leave>) {
-    let step = RecalibrationStep::Undo { crc_32: left };
-    ask(session, board, &Request::Recalibrate(step), answer)
+    ask(session, board, &Request::Undo { crc_32: left }, answer)
 }
 
 fn answer(report: Report<'_>) -> Answer {
     match report {
         Report::Upload(state) => Ok(state),
-        Report::Recalibration(RecalibrationReport {
-            state: RecalibrationState::InForce { crc_32 },
-            ..
-        }) => Ok(UploadState::Confirmed { crc_32 }),
         Report::Refused(refusal) => Err(refusal),
         other => panic!("{other:?}"),
     }

@@ -1,7 +1,7 @@
 //! Small models for this sensor.
 
 use model_core::AlignedBytes;
-use model_core::blob::{Floats, Metadata, Model, ModelParts, ModelShape, encode_to_vec};
+use model_core::blob::{Metadata, Model, ModelParts, ModelShape, encode_to_vec};
 use model_core::confidence::{Confidence, Sizes};
 use model_core::expansion::Expansion;
 use model_core::projection::Projection;
@@ -9,9 +9,6 @@ use model_core::rbf::direct::{self, Parameters};
 use model_core::rbf::{Network, Shape};
 
 use crate::shape::{COLS, OUTPUTS, ROWS};
-
-/// Training error of every output of a [`blob_to_recalibrate`].
-pub const TRAINING_ERROR: f32 = 0.02;
 
 /// A blob for this sensor, with `centres` centres and numbers that depend on `seed`.
 pub fn blob(seed: usize, centres: usize) -> AlignedBytes {
@@ -33,40 +30,6 @@ pub fn blob(seed: usize, centres: usize) -> AlignedBytes {
     )
     .unwrap();
     blob_of(network.into())
-}
-
-/// A blob that can be recalibrated: a network of `centres` centres for each row, for readings from 50 Ω to 70 Ω, and
-/// training errors.
-pub fn blob_to_recalibrate(centres: usize) -> AlignedBytes {
-    let number = |i: usize| ((i * 37) % 101) as f32 / 50.0 - 1.0;
-    let list = |from: usize, count: usize| (from..from + count).map(number).collect::<Vec<_>>();
-    let (centre, weights) = (list(60, centres * COLS), list(20, centres * OUTPUTS));
-    let affine = list(40, COLS * OUTPUTS);
-    let shape = Shape { inputs: COLS, centres, outputs: OUTPUTS };
-    let network = |bias: &'static [f32; OUTPUTS]| {
-        let parameters = Parameters {
-            input_minimum: &[50.0; COLS],
-            input_per_span: &[0.05; COLS],
-            centres: &centre,
-            decay: &[0.5],
-            output_weights: &weights,
-            bias,
-            affine: &affine,
-        };
-        direct::Network::try_new(shape, parameters).unwrap().into()
-    };
-    let errors = [TRAINING_ERROR; ROWS * OUTPUTS];
-    let shape = ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS };
-    let parts = ModelParts {
-        projection: None,
-        expansion: None,
-        confidence: None,
-        fill: None,
-        networks: &[network(&[0.5, -0.5]), network(&[1.0, 2.0])],
-        row_network: &[0, 1],
-        metadata: Metadata { training_rmse: Floats::of(&errors), ..Metadata::unnamed(shape) },
-    };
-    encode_to_vec(&parts).unwrap()
 }
 
 /// A blob with `network` for both rows.

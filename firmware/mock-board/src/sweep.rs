@@ -7,7 +7,6 @@ use crate::flash::{Flash, Supply, Torn};
 mod decay;
 mod key;
 mod models;
-pub mod presses;
 #[cfg(target_os = "linux")]
 mod recheck;
 mod seal;

@@ -394,7 +394,7 @@ pub fn gating(blob: &[u8]) -> Option<[usize; 3]> {
 }
 
 /// CRC-32 of all bits of the weights that recursive least squares has after each of 200 samples.
-pub fn recalibration() -> Option<u32> {
+pub fn recursion() -> Option<u32> {
     let mut memory = [0.0; Rls::<f32>::values(9, 3)];
     let mut rls = Rls::try_new(&mut memory, [9, 3], 1e4, 0.99).ok()?;
     let crc = CRC;

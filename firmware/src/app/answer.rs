@@ -5,7 +5,6 @@ use model_core::exp::{ExpKernel, Polynomial};
 
 use super::leave::Leave;
 use super::model::{self, InForce};
-use super::recalibrate::Recalibrating;
 use super::session::Session;
 use super::{Capture, Core};
 use crate::circuit::{Constants, ConstantsFault};
@@ -38,8 +37,7 @@ impl<P: Platform, F: FrameSource, S: Slot, const ROWS: usize> Session<'_, '_, P,
         for _ in 0..app.core.capacity.message_bytes() {
             let byte = app.core.line.platform().receive()?;
             if let Some(received) = app.receiver.push(byte) {
-                let recalibrating = &mut self.recalibrating;
-                return app.core.answer(received, &self.model, self.spare, recalibrating);
+                return app.core.answer(received, &self.model, self.spare);
             }
         }
         None
@@ -52,7 +50,6 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         received: Received<'_>,
         model: &InForce<'_, ROWS>,
         spare: &mut S,
-        recalibrating: &mut Recalibrating<'_>,
     ) -> Option<Leave> {
         let packet = match received {
             Received::Frame(bytes) => packet::decode::<Request<'_>>(bytes),
@@ -104,14 +101,9 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             Request::Upload(step) => self
                 .upload_step(step, model, spare, &mut leave)
                 .map(|()| Report::Upload(self.upload.state())),
-            Request::Recalibrate(step) => {
-                let step = (number, step);
-                match self.recalibrate(step, model, spare, recalibrating, &mut leave) {
-                    Ok(Some(report)) => Ok(report),
-                    Ok(None) => return leave,
-                    Err(refusal) => Err(refusal),
-                }
-            }
+            Request::Undo { crc_32 } => self
+                .undo(crc_32, model, spare, &mut leave)
+                .map(|crc_32| Report::Upload(UploadState::Confirmed { crc_32 })),
             Request::Restart => {
                 info!("restart asked for");
                 leave = Some(Leave::Restart);
@@ -139,11 +131,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
 
     /// Prepares `spare` for a blob of `length` bytes. The watchdog is fed just before and after an erase, which may take
     /// half of its period.
-    pub(super) fn begin_upload<S: Slot>(
-        &mut self,
-        spare: &mut S,
-        length: usize,
-    ) -> Result<(), Refusal> {
+    fn begin_upload<S: Slot>(&mut self, spare: &mut S, length: usize) -> Result<(), Refusal> {
         let now_us = self.now_us();
         let mut is_erased = false;
         let platform = self.line.platform();
@@ -278,7 +266,6 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         }
         self.configuration = configuration;
         self.give_up_capture();
-        self.give_up_press();
         self.sensor_answers |= configuration.frame_period_us == 0; // it is not scanned any more
         self.clock.restart(self.line.platform().now_us());
         info!("configured: a frame every {=u32} us", configuration.frame_period_us);

@@ -22,10 +22,8 @@ pub struct Buffers<
     pub(super) scratch: [[[f32; COLUMNS]; ROWS]; 2],
     pub(super) estimate: Outcome<ROWS, OUTPUTS>,
     pub(super) rest: Outcome<ROWS, OUTPUTS>,
-    /// Mean readings of a reference press, and its stated outputs. The latter's room is that of the outputs' standard
-    /// deviations too: a model that has these is not recalibrated.
-    pub(super) press: [[f32; COLUMNS]; ROWS],
-    pub(super) stated: [[f32; OUTPUTS]; ROWS],
+    /// Standard deviations of the outputs.
+    pub(super) deviations: [[f32; OUTPUTS]; ROWS],
 }
 
 /// Outputs of all rows, and their status.
@@ -71,8 +69,7 @@ impl<const ROWS: usize, const COLUMNS: usize, const OUTPUTS: usize, const BYTES:
             scratch: [[[0.0; COLUMNS]; ROWS]; 2],
             estimate: Outcome::NOTHING,
             rest: Outcome::NOTHING,
-            press: [[0.0; COLUMNS]; ROWS],
-            stated: [[0.0; OUTPUTS]; ROWS],
+            deviations: [[0.0; OUTPUTS]; ROWS],
         }
     }
 

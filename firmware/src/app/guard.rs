@@ -31,10 +31,7 @@ impl Guard {
         let DeviceKey::Set(key) = &self.key else { return };
         for ((index, slot), seal) in slots.iter().enumerate().zip(&mut self.seals) {
             let bytes = slot.bytes();
-            *seal = seal_in_slot(bytes).filter(|seal| {
-                let blob = blob_in_slot(bytes);
-                seal.fits(key, blob) || seal.fits_own(key, blob)
-            });
+            *seal = seal_in_slot(bytes).filter(|seal| seal.fits(key, blob_in_slot(bytes)));
             if generation(index, bytes).is_some() {
                 self.highest = self.highest.max(seal.map(|seal| seal.version));
             }
@@ -98,11 +95,9 @@ impl Guard {
         }
     }
 
-    /// Whether `seal` has the version `highest`, and is neither the one that was confirmed nor that of the model from
-    /// which the device made its own: the same origin tells both.
+    /// Whether `seal` has the version `highest`, and is not one that stands in a slot.
     fn is_another_of(&self, seal: Seal, highest: u32) -> bool {
-        let is_same = |known: &Seal| known.version == highest && known.origin() == seal.origin();
-        seal.version == highest && !self.seals.iter().flatten().any(is_same)
+        seal.version == highest && !self.seals.contains(&Some(seal))
     }
 
     /// Checks that going back to the model in `slot` is no step to a lower version.
@@ -113,12 +108,6 @@ impl Guard {
             (DeviceKey::Set(_), None) => Err(Refusal::Seal(SealFault::Missing)),
             (DeviceKey::Set(_), Some(seal)) => self.check_version(seal),
         }
-    }
-
-    /// A seal for `blob`, which the device has made of the model in `slot`.
-    pub fn seal(&self, blob: &[u8], slot: usize) -> Option<Seal> {
-        let DeviceKey::Set(key) = &self.key else { return None };
-        Some(Seal::own(key, &self.seal_of(slot)?, blob))
     }
 
     /// Sets the key for good. The same key again makes copies good that have decayed.

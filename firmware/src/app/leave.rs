@@ -7,8 +7,6 @@ pub enum Leave {
     NewModel,
     /// The model on trial must be confirmed, which takes its slot.
     Confirm,
-    /// The memory for weights is needed for a recalibration, or is free again.
-    MakeRoom,
     /// What is decoded from is damaged: a sound model must be put in force.
     Damaged,
     /// The host asked for a restart.

@@ -158,17 +158,6 @@ pub fn candidates<S: Slot>(slots: &[S; 2], on_trial: Option<usize>) -> [Option<C
     if tried.is_some() { [tried, newest, older] } else { [newest, older, None] }
 }
 
-/// Cuts room for a copy of the blob at the start of `bytes` from `room`, if it fits; returns it, and what is left.
-pub fn cut_room<'r>(room: &'r mut [u32], bytes: &[u8]) -> (Option<&'r mut [u32]>, &'r mut [u32]) {
-    let words = blob_in_slot(bytes).len().div_ceil(4);
-    // Whether it fits is asked first, so that the compiler sees one borrow alone.
-    if words > room.len() {
-        return (None, room);
-    }
-    let (copy, rest) = room.split_at_mut_checked(words).unwrap_or_default();
-    (Some(copy), rest)
-}
-
 /// Copies the blob at the start of `bytes` to `room`, if it fits; returns the copy.
 pub fn copy_to<'r>(room: &'r mut [u32], bytes: &[u8]) -> Option<&'r [u8]> {
     let blob = blob_in_slot(bytes);

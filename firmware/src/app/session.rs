@@ -8,8 +8,7 @@ use model_core::{Decoder, Frame, Gate, RowStatus, RowWire};
 
 use super::buffers::cut;
 use super::leave::Leave;
-use super::model::{InForce, candidates, check_head, choose, copy_to, cut_room, row_wires};
-use super::recalibrate::Recalibrating;
+use super::model::{InForce, candidates, check_head, choose, copy_to, row_wires};
 use super::recheck::{Checked, Recheck};
 use super::{App, Core};
 use crate::link::message::{ConfidenceSent, EstimateReport, HealthReport, Report};
@@ -24,7 +23,6 @@ pub struct Session<'a, 'm, P, F, S, const ROWS: usize> {
     pub(super) app: &'a mut App<'m, P, F, ROWS>,
     pub(super) model: InForce<'a, ROWS>,
     pub(super) spare: &'a mut S,
-    pub(super) recalibrating: Recalibrating<'a>,
     recheck: Recheck,
 }
 
@@ -49,10 +47,9 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
         let best = candidates.into_iter().flatten().next();
         // Only the copy is checked, so the best model is looked at once.
         let bytes = best.and_then(|best| slots.get(best.slot)).map_or(&[][..], S::bytes);
-        let (room, left) =
-            if app.core.begins.is_some() { (None, weights) } else { cut_room(weights, bytes) };
         let mut model = InForce::NONE;
-        let copied = best.and_then(|best| model.load(capacity, copy_to(room?, bytes)?, best, true));
+        let copied =
+            best.and_then(|best| model.load(capacity, copy_to(weights, bytes)?, best, true));
         let chosen = if copied.is_some() { best } else { choose(capacity, slots, candidates) };
         app.core.end_trial_unless(chosen.is_some_and(|chosen| chosen.on_trial));
         let slot = chosen.map(|chosen| chosen.slot);
@@ -82,11 +79,9 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
             info!("slot 0 holds a model that was flashed, not uploaded: it is not used");
         }
         app.core.take_shape_of(model.decoder.as_ref());
-        let mut recalibrating = Recalibrating::new(left);
-        app.core.begin_in_place(model.decoder.as_ref(), &mut recalibrating);
         let is_copy = model.identity.is_some_and(|identity| identity.in_ram);
         model.stored = active.bytes().get(..model.blob.len()).filter(|_| is_copy);
-        Self { app, model, spare, recalibrating, recheck: Recheck::new() }
+        Self { app, model, spare, recheck: Recheck::new() }
     }
 
     /// Runs one turn of the loop: answers at most one request, and scans a frame if one is due.
@@ -103,8 +98,7 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
         // A lease that has ended restarts the clock of frames.
         let now_us = core.line.platform().now_us();
         if let Some(missed) = core.clock.due(now_us, core.configuration.frame_period_us) {
-            core.sensor_answers =
-                core.scan(missed, self.model.decoder.as_ref(), &mut self.recalibrating);
+            core.sensor_answers = core.scan(missed, self.model.decoder.as_ref());
         }
         if core.sensor_answers {
             core.line.platform().feed_watchdog();
@@ -153,7 +147,6 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
     /// Makes frames and estimates as long as the model's, and decodes the baseline with it. A baseline of other
     /// wires is replaced by the one that is kept, if that fits.
     fn take_shape_of(&mut self, decoder: Option<&Decoder<'_, ROWS>>) {
-        self.give_up_press();
         let before = (self.wires, self.row_wires);
         let shape = decoder.map(Decoder::shape);
         self.wires =
@@ -185,12 +178,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
     }
 
     /// Scans a frame and reports on it; returns whether it has at least one reading.
-    fn scan(
-        &mut self,
-        missed: u32,
-        decoder: Option<&Decoder<'_, ROWS>>,
-        recalibrating: &mut Recalibrating<'_>,
-    ) -> bool {
+    fn scan(&mut self, missed: u32, decoder: Option<&Decoder<'_, ROWS>>) -> bool {
         let start_us = self.now_us();
         let frame = self.frame.get_mut(..self.wires.readings()).unwrap_or_default();
         let rows = self.row_wires.get(..self.wires.rows).unwrap_or_default();
@@ -222,7 +210,6 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             let flags = flags | overrun;
             self.send_estimate(UNASKED, frame, start_us, flags, (novelty, sent));
         }
-        self.feed_press(decoder, recalibrating);
         any
     }
 
@@ -322,7 +309,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         let readings_ohm = self.frame.get(..readings).unwrap_or_default();
         let reciprocals = self.reciprocals.get(..readings).unwrap_or_default();
         let frame = Frame { readings_ohm, reciprocals, gate: None };
-        let deviation = self.pressing.stated.get_mut(..self.outputs).unwrap_or_default();
+        let deviation = self.deviations.get_mut(..self.outputs).unwrap_or_default();
         // The model's sizes were found to fit when it came into force.
         let novelty = decoder.assess_into(frame, self.scratch, deviation).ok().flatten()?;
         let cycles = self.line.platform().cycles().wrapping_sub(start_cycles);
@@ -361,7 +348,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         let outputs = Floats::of(estimate.outputs);
         let with_deviations = novelty.is_some() && sent == ConfidenceSent::Deviations;
         let deviations = if with_deviations { self.outputs } else { 0 };
-        let deviation = Floats::of(self.pressing.stated.get(..deviations).unwrap_or_default());
+        let deviation = Floats::of(self.deviations.get(..deviations).unwrap_or_default());
         let report =
             EstimateReport { frame, start_us, flags, row_status, outputs, novelty, deviation };
         self.line.send(number, &Report::Estimate(report), &mut self.statistics);

@@ -70,8 +70,12 @@ pub enum Request<'a> {
     Forget(Setting),
     /// End a lease: put the device's own configuration in force. Answered by [`Report::Configuration`].
     Resume,
-    /// Carry out one step of a recalibration. Answered by [`Report::Recalibration`].
-    Recalibrate(#[serde(borrow)] RecalibrationStep<'a>),
+    /// Put the model that was in force before this one in force again, over restarts as well. Answered by
+    /// [`Report::Upload`] with [`UploadState::Confirmed`].
+    Undo {
+        /// CRC-32 of the model in force, which is left: a repeated request does not undo twice.
+        crc_32: u32,
+    },
     /// Set the device's key: from now on only models with a seal made by it come into force. It can be set once.
     /// Answered by [`Report::Provisioned`].
     Provision {
@@ -83,13 +87,7 @@ pub enum Request<'a> {
 impl Request<'_> {
     /// Whether the request changes nothing, and so prolongs no lease.
     pub fn only_asks(&self) -> bool {
-        matches!(
-            self,
-            Self::Identify
-                | Self::Statistics
-                | Self::Configuration
-                | Self::Recalibrate(RecalibrationStep::Status)
-        )
+        matches!(self, Self::Identify | Self::Statistics | Self::Configuration)
     }
 }
 
@@ -121,35 +119,6 @@ pub enum UploadStep<'a> {
     Abort,
     /// Confirm the model on trial: it stays in force over restarts.
     Confirm,
-}
-
-/// Steps of a recalibration ([`model_core::recalibration`]).
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub enum RecalibrationStep<'a> {
-    /// Forget all presses, and begin anew.
-    Begin,
-    /// Add a reference press: what the sensor reads now. Answered when its frames have been scanned.
-    Press {
-        /// Number of presses added before. A press with a smaller number was added already, and is not added again.
-        before: u16,
-        /// Number of frames to scan and average. With 0, which is for a device that does not scan, it is the frame of
-        /// the last [`Request::Decode`].
-        frames: u16,
-        /// What the outputs truly are: `rows × outputs` numbers in the units of the model's outputs.
-        #[serde(borrow)]
-        outputs: Floats<'a>,
-    },
-    /// Ask how far the recalibration is.
-    Status,
-    /// Write the recalibrated model into the spare slot, and put it in force. Takes up to seconds on a board.
-    Commit,
-    /// Forget all presses.
-    Abort,
-    /// Put the model that was in force before this one in force again. Survives restarts.
-    Undo {
-        /// CRC-32 of the model in force, which is left: a repeated request does not undo twice.
-        crc_32: u32,
-    },
 }
 
 /// A setting that a device can keep over restarts.
@@ -212,8 +181,6 @@ pub enum Report<'a> {
     Constants(#[serde(borrow)] Constants<'a>),
     /// The settings that are kept over restarts.
     Kept(Kept),
-    /// How far a recalibration is.
-    Recalibration(RecalibrationReport),
     /// The device has this key.
     Provisioned,
 }
@@ -528,38 +495,6 @@ pub enum UploadState {
     },
 }
 
-/// How far a recalibration is. Errors are root mean squares in training errors of each output: 1 is as good as in
-/// training. They tell of the last presses; 0 without presses.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct RecalibrationReport {
-    /// What it has led to.
-    pub state: RecalibrationState,
-    /// Number of presses added.
-    pub presses: u16,
-    /// Number of networks: one a row, or one for the whole array.
-    pub networks: u8,
-    /// Number of networks that have seen enough different presses.
-    pub excited: u8,
-    /// Error of the model in force.
-    pub error_before: f32,
-    /// Error of the recalibrated model, on each press before it was used.
-    pub error_after: f32,
-}
-
-/// What a recalibration has led to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum RecalibrationState {
-    /// No recalibration is going on.
-    Idle,
-    /// It takes presses.
-    Collecting,
-    /// The recalibrated model, or after an undo the previous one, is in force.
-    InForce {
-        /// CRC-32 of its blob.
-        crc_32: u32,
-    },
-}
-
 /// Why a request was not carried out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Refusal {
@@ -604,8 +539,8 @@ pub enum Refusal {
     },
     /// The model in force has the largest generation, so no other can be more recent.
     LastGeneration,
-    /// A step of a recalibration.
-    Recalibration(RecalibrationFault),
+    /// There is no model in force, the spare slot holds no previous one, or it has no room for another record.
+    NothingToUndo,
     /// A model is on trial: it must be confirmed or aborted first.
     OnTrial,
     /// The device's key forbids it.
@@ -630,50 +565,6 @@ pub enum SealFault {
     KeyIsSet,
     /// The device's key has decayed.
     KeyDamaged,
-}
-
-/// Why a step of a recalibration was not carried out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum RecalibrationFault {
-    /// There is no model.
-    NoModel,
-    /// Rows of the model share a network.
-    SharedNetworks,
-    /// The model has no training errors, or outputs that recalibration does not know.
-    Unsuitable,
-    /// The memory beside the model's weights is too small.
-    NoRoom {
-        /// Number of bytes needed.
-        bytes: u32,
-        /// Number of bytes there are.
-        free_bytes: u32,
-    },
-    /// None has begun, or another model came into force since.
-    NotBegun,
-    /// A press is missing before this one, or its number is the last.
-    OutOfPlace {
-        /// Number of presses added so far.
-        presses: u16,
-    },
-    /// There must be as many outputs as the model has.
-    Outputs {
-        /// Number of outputs.
-        expected: u16,
-    },
-    /// Frames are asked for while nothing is scanned, or none while frames are scanned; or another request ended the
-    /// press.
-    Frames,
-    /// In every row a reading is missing or far out of range, or a stated output is impossible.
-    UnusablePress,
-    /// A network has seen too few presses, or presses that are too alike.
-    NotExcited {
-        /// Number of its row, from 0; 0 behind a projection.
-        row: u8,
-    },
-    /// The recalibrated model is no better than the one in force.
-    NotBetter,
-    /// The spare slot holds no previous model, or has no room for another record.
-    NothingToUndo,
 }
 
 /// Why a setting cannot be kept.

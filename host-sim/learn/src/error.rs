@@ -174,6 +174,18 @@ pub enum Error {
         /// Least number of frames.
         least: usize,
     },
+    /// Model that presses cannot recalibrate.
+    #[error("the model cannot be recalibrated: {0}")]
+    NotRecalibrable(&'static str),
+    /// Network that has seen too few presses to be recalibrated, or presses that are too alike.
+    #[error("{}too few presses, or presses that are too alike; press other places", row.map_or(String::new(), |row| format!("row {row} has seen ")))]
+    NotExcited {
+        /// Number of its row, from 1; `None` for a network of the whole array.
+        row: Option<usize>,
+    },
+    /// Recalibration that makes no network better.
+    #[error("no better model came of the presses; the model is as good, or the presses are wrong")]
+    NotBetter,
     /// Model beyond what the blob's format holds.
     #[error("the model cannot be written: {0}")]
     NotPacked(EncodeError),

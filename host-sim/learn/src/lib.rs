@@ -34,6 +34,7 @@ pub mod export;
 pub mod prepared;
 pub mod confidence;
 pub mod fill;
+pub mod recalibration;
 pub mod faults;
 pub mod decoders;
 pub mod select;

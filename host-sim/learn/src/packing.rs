@@ -167,7 +167,9 @@ impl ModelBlob {
     /// # Errors
     /// [`Error::NotPacked`] for a confidence of another model, or a blob that becomes too large.
     pub fn with_confidence(&self, confidence: Confidence<'_>) -> Result<Self> {
-        self.rebuilt(Some(confidence), self.parse().fill())
+        let model = self.parse();
+        let networks: Vec<Network<'_>> = model.networks().collect();
+        rebuild(&model, &networks, Some(confidence), model.fill())
     }
 
     /// Blob of this model that fills missing readings by `fill`, instead of its own.
@@ -175,24 +177,9 @@ impl ModelBlob {
     /// # Errors
     /// [`Error::NotPacked`] for a fill of another model, or a blob that becomes too large.
     pub fn with_fill(&self, fill: Fill<'_>) -> Result<Self> {
-        self.rebuilt(self.parse().confidence(), Some(fill))
-    }
-
-    fn rebuilt(&self, confidence: Option<Confidence<'_>>, fill: Option<Fill<'_>>) -> Result<Self> {
         let model = self.parse();
         let networks: Vec<Network<'_>> = model.networks().collect();
-        let of_row = |row| model.network_of_row(row).map(|network| network as u8);
-        let row_network: Vec<u8> = (0..model.shape().rows).filter_map(of_row).collect();
-        let parts = ModelParts {
-            projection: model.projection(),
-            expansion: model.expansion(),
-            confidence,
-            fill,
-            networks: &networks,
-            row_network: &row_network,
-            metadata: *model.metadata(),
-        };
-        Ok(Self { bytes: blob::encode_to_vec(&parts).map_err(Error::NotPacked)? })
+        rebuild(&model, &networks, model.confidence(), Some(fill))
     }
 
     /// Mean width σ of all Gaussians, on inputs scaled to [0, 1], to four digits.
@@ -213,4 +200,28 @@ impl ModelBlob {
     pub fn parse(&self) -> Model<'_> {
         Model::decode(self.bytes()).expect("checked when read")
     }
+}
+
+/// Blob of `model` with these `networks`, confidence and fill instead of its own.
+///
+/// # Errors
+/// [`Error::NotPacked`] for parts that do not belong together, or a blob that becomes too large.
+pub(crate) fn rebuild(
+    model: &Model<'_>,
+    networks: &[Network<'_>],
+    confidence: Option<Confidence<'_>>,
+    fill: Option<Fill<'_>>,
+) -> Result<ModelBlob> {
+    let of_row = |row| model.network_of_row(row).map(|network| network as u8);
+    let row_network: Vec<u8> = (0..model.shape().rows).filter_map(of_row).collect();
+    let parts = ModelParts {
+        projection: model.projection(),
+        expansion: model.expansion(),
+        confidence,
+        fill,
+        networks,
+        row_network: &row_network,
+        metadata: *model.metadata(),
+    };
+    Ok(ModelBlob { bytes: blob::encode_to_vec(&parts).map_err(Error::NotPacked)? })
 }

@@ -120,8 +120,13 @@ impl<'b> PreparedModel<'b> {
         }
     }
 
+    /// Network of each row-wire, or the one network behind a projection.
+    pub(crate) fn networks(&self) -> &[Network<'b>] {
+        &self.networks
+    }
+
     /// Inputs of the networks in turn: those of the model, or features of them.
-    fn inputs_of_networks<'r>(&self, readings: &'r [f64]) -> Cow<'r, [f64]> {
+    pub(crate) fn inputs_of_networks<'r>(&self, readings: &'r [f64]) -> Cow<'r, [f64]> {
         let inputs = self.model_inputs(readings);
         match self.model.projection() {
             Some(projection) => {

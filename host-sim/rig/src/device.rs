@@ -1,7 +1,6 @@
 //! A device at the other end of a serial line, real or emulated.
 //!
-//! [`Device`] sends requests and receives reports; [`upload`] replaces its model, and [`recalibrate`] lets it mend its
-//! own; [`calibrate`] finds the constants of its circuit; [`stream`] lets it decode frames; [`check`] compares it with the host.
+//! [`Device`] sends requests and receives reports; [`upload`] replaces its model; [`calibrate`] finds the constants of its circuit; [`stream`] lets it decode frames; [`check`] compares it with the host.
 //! `docs/link.md` specifies the protocol.
 
 use std::collections::VecDeque;
@@ -29,14 +28,13 @@ pub mod calibrate;
 pub mod stream;
 mod key;
 pub mod upload;
-pub mod recalibrate;
 mod expected;
 pub mod check;
 
 use configuration::Kept;
 pub use configuration::{ActiveConfiguration, LEASE};
 pub use identity::DeviceIdentity;
-pub use key::Sealing;
+pub use key::{Sealing, check_sealing};
 
 /// Longest time that a board takes to answer a request that erases no flash.
 const ANSWER: Duration = Duration::from_millis(500);
@@ -404,7 +402,7 @@ mod tests {
             (vec![0x55; 40], "bytes come from it that are no packets: check the speed"),
             (
                 packet(&[version + 1, 0, 3]),
-                "it speaks version 7 of the link, and this program version 6",
+                "it speaks version 8 of the link, and this program version 7",
             ),
             (framed(), "it sends reports, but no answer in time"),
             (packet(&[version, 0, 120]), "messages that this program does not know"),

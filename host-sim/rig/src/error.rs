@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use firmware::capacity::Capacity;
 use firmware::circuit::ConstantsFault;
-use firmware::link::message::{KeepFault, ModelFault, RecalibrationFault, Refusal, SealFault};
+use firmware::link::message::{KeepFault, ModelFault, Refusal, SealFault};
 use firmware::link::packet::PROTOCOL_VERSION;
 use model_core::blob::ModelShape;
 
@@ -223,7 +223,9 @@ fn why(refusal: Refusal) -> String {
         Refusal::LastGeneration => {
             "the record of its model has the last number; flash a model with a debugger".into()
         }
-        Refusal::Recalibration(fault) => why_not_recalibrated(fault),
+        Refusal::NothingToUndo => {
+            "it has no previous model, or has gone back and forth too often; upload the model".into()
+        }
         Refusal::Seal(fault) => why_not_trusted(fault),
         Refusal::OnTrial => "its model is on trial; `confirm` or `undo` it first".into(),
     }
@@ -240,42 +242,6 @@ fn why_not_trusted(fault: SealFault) -> String {
         SealFault::NoKey => Error::HasNoKey.to_string(),
         SealFault::KeyIsSet => "it has another key; a debugger can erase it".into(),
         SealFault::KeyDamaged => Error::KeyDamaged.to_string(),
-    }
-}
-
-/// Reason why a step of a recalibration was refused, in words.
-fn why_not_recalibrated(fault: RecalibrationFault) -> String {
-    match fault {
-        RecalibrationFault::NoModel => "it has no model; upload one".into(),
-        RecalibrationFault::SharedNetworks => {
-            "rows of its model share a network; train a model with a network for each row".into()
-        }
-        RecalibrationFault::Unsuitable => {
-            "its model tells no training errors, or has outputs that it cannot recalibrate".into()
-        }
-        RecalibrationFault::NoRoom { bytes, free_bytes } => format!(
-            "recalibration takes {bytes} bytes of RAM beside the model's weights, and {free_bytes} are free; train with \
-             --format fixed16, or with fewer centres"
-        ),
-        RecalibrationFault::NotBegun => {
-            "no recalibration is going on; it may have restarted, or got another model".into()
-        }
-        RecalibrationFault::OutOfPlace { presses } => format!("it has {presses} presses so far"),
-        RecalibrationFault::Outputs { expected } => format!("its model has {expected} outputs"),
-        RecalibrationFault::Frames => "it did not scan, or somebody else gave it work".into(),
-        RecalibrationFault::UnusablePress => {
-            "a reading is missing or far out of range, or a stated output is impossible".into()
-        }
-        RecalibrationFault::NotExcited { row } => format!(
-            "row {} has seen too few presses, or presses that are too alike; press other places",
-            row + 1
-        ),
-        RecalibrationFault::NotBetter => {
-            "no better model came of the presses; the active one is as good, or the presses are wrong".into()
-        }
-        RecalibrationFault::NothingToUndo => {
-            "it has no previous model, or has gone back and forth too often; upload the model".into()
-        }
     }
 }
 

@@ -9,7 +9,7 @@ use firmware::seal::Key;
 use taxel_data::input;
 use taxel_learn::ModelBlob;
 use taxel_rig::device::check::check;
-use taxel_rig::device::{Device, DeviceIdentity, LEASE, Sealing, serial, upload};
+use taxel_rig::device::{Device, DeviceIdentity, LEASE, Sealing, Wire, serial, upload};
 
 use super::check_arguments::{CheckArguments, Checked, conclude};
 use super::progress::Terminal;
@@ -79,11 +79,13 @@ enum Action {
     /// Asks for one arrangement of resistors after the other. docs/readout.md says which ones tell the constants.
     #[command(after_help = "Example: host-sim link /dev/ttyACM0 calibrate known.csv --store")]
     Calibrate(calibrate::Arguments),
-    /// Let the device mend its model after the sensor has changed, from reference presses.
+    /// Mend the device's model after the sensor has changed, from reference presses, and upload it.
     ///
-    /// Each line of PRESSES tells what the outputs truly are. With columns of the readings as well, the device takes
-    /// these; otherwise it scans, and you are asked for one press after the other. docs/recalibration.md says more.
-    #[command(after_help = "Example: host-sim link /dev/ttyACM0 recalibrate press.bin presses.csv")]
+    /// Each line of PRESSES tells what the outputs truly are. With columns of the readings as well, these are taken;
+    /// otherwise the device scans, and you are asked for one press after the other. docs/recalibration.md says more.
+    #[command(
+        after_help = "Example: host-sim link /dev/ttyACM0 recalibrate press.bin presses.csv -o mended.bin"
+    )]
     Recalibrate(recalibrate::Arguments),
     /// Return to the model that was active before the last recalibration or upload, or before the trial.
     #[command(after_help = "Example: host-sim link /dev/ttyACM0 undo")]
@@ -125,12 +127,26 @@ struct UploadArguments {
     /// Leave the model on trial, until `confirm` or the next restart, which returns to the previous one.
     #[arg(long)]
     trial: bool,
+    #[command(flatten)]
+    sealing: SealingArguments,
+}
+
+#[derive(Args)]
+struct SealingArguments {
     /// File with the device's key, if it was provisioned: the model is sealed with it.
     #[arg(long, value_name = "FILE")]
     key: Option<PathBuf>,
     /// Version that the model is sealed as; a device takes no lower one again [default: the device's next one].
     #[arg(long, value_name = "N", requires = "key")]
     model_version: Option<u32>,
+}
+
+impl SealingArguments {
+    /// Reads the key, if there is one.
+    fn read(&self) -> Result<Option<Sealing>> {
+        let key = self.key.as_deref().map(read_key).transpose()?;
+        Ok(key.map(|key| Sealing { key, version: self.model_version }))
+    }
 }
 
 #[derive(Args)]
@@ -177,16 +193,11 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         }
         Action::Upload(action) => {
             let model = ModelBlob::read(&action.model)?;
-            let key = action.key.as_deref().map(read_key).transpose()?;
-            let sealing = key.map(|key| Sealing { key, version: action.model_version });
+            let sealing = action.sealing.read()?;
             let mut device = open()?;
             let before = device.identify()?;
-            let progress = Terminal::new();
-            let (bytes, sealing) = (model.bytes(), sealing.as_ref());
-            let after = device
-                .while_paused(|device| upload::start_trial(device, bytes, sealing, &progress))?;
+            let after = activate(&mut device, &model, sealing.as_ref())?;
             note_another_sensor(&before, &after);
-            upload::see_frames(&mut device)?;
             if !action.trial {
                 upload::confirm(&mut device)?;
             }
@@ -210,7 +221,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         Action::Recalibrate(action) => recalibrate::execute(&mut open()?, action, common),
         Action::Undo => {
             let mut device = open()?;
-            device.undo()?;
+            upload::undo(&mut device)?;
             status::show(&mut device, common)
         }
         Action::Settings(action) => settings::settings(&mut open()?, action, common),
@@ -223,6 +234,19 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             conclude(&findings, &action.limits, common)
         }
     }
+}
+
+/// Uploads `model`, puts it on trial, and waits until the device has decoded frames with it.
+fn activate<W: Wire>(
+    device: &mut Device<W>,
+    model: &ModelBlob,
+    sealing: Option<&Sealing>,
+) -> Result<DeviceIdentity> {
+    let progress = Terminal::new();
+    let identity = device
+        .while_paused(|device| upload::start_trial(device, model.bytes(), sealing, &progress))?;
+    upload::see_frames(device)?;
+    Ok(identity)
 }
 
 /// Notes on stderr whatever tells that the new model may be one of another sensor.

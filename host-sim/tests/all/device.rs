@@ -504,8 +504,11 @@ pub mod serial_port {
         // 5 % more of every reading, and other columns besides.
         let synth = ["synth", "press", "--seed", "5", "-n", "60", "--scale", "1.05"];
         folder.succeed(&[&synth[..], &["-o", "presses.csv"]].concat());
-        let page = folder.succeed(&["link", &port, "recalibrate", "old.bin", "presses.csv"]);
+        let recalibrate = ["link", &port, "recalibrate", "old.bin", "presses.csv", "-o", "new.bin"];
+        let page = folder.succeed(&recalibrate);
         assert!(page.contains("60 used, 0 unusable"), "{page}");
+        let said = folder.fail(&recalibrate, 2);
+        assert!(said.contains("the device has another model"), "{said}");
         let is_old = format!("CRC-32 {:08x}", old.parse().crc());
         let page = folder.succeed(&["link", &port, "identify"]);
         assert!(page.contains("slot 1") && !page.contains(&is_old), "{page}");
@@ -513,6 +516,7 @@ pub mod serial_port {
         let record = ["link", &port, "record", "old.bin", "-n", "2", "-o", "estimate.csv"];
         assert_eq!(folder.run(&record).status.code(), Some(2));
         folder.succeed(&[&record[..], &["--recalibrated"]].concat());
+        folder.succeed(&["link", &port, "record", "new.bin", "-n", "2", "-o", "estimate.csv"]);
 
         let page = folder.succeed(&["link", &port, "undo"]);
         assert!(page.contains(&is_old) && page.contains("slot 0"), "{page}");
@@ -529,6 +533,48 @@ pub mod serial_port {
         folder.write("missing.csv", b"r1e1_dx_mm\n0\n");
         let missing = folder.run(&["link", &port, "recalibrate", "old.bin", "missing.csv"]);
         assert_eq!(missing.status.code(), Some(2));
+    }
+
+    #[test]
+    fn a_device_scans_the_presses_that_it_is_recalibrated_by() {
+        let folder = Folder::new("recalibrated_by_scans");
+        let old = model(16);
+        folder.write("old.bin", old.bytes());
+        let drifted = |frame: [[f32; 18]; 8]| frame.map(|row| row.map(|ohm| 1.1 * ohm));
+        let frames: Vec<_> = frames().into_iter().map(drifted).collect();
+        // Whichever frames are scanned, so many have the same mean.
+        let count = frames.len().to_string();
+        let (port, near) = port_with(&old, frames);
+        drop(near);
+        folder.succeed(&["synth", "press", "--seed", "5", "-n", "30", "-o", "all.csv"]);
+        let text = std::fs::read_to_string(folder.path("all.csv")).unwrap();
+        let outputs = |line: &str| line.split(',').skip(144).collect::<Vec<_>>().join(",");
+        assert!(text.lines().next().unwrap().split(',').nth(144) == Some("r1e1_dx_mm"));
+        folder.write("outputs.csv", text.lines().map(outputs).collect::<Vec<_>>().join("\n"));
+        let mut command = crate::common::program();
+        let command = command.current_dir(folder.path("."));
+        let arguments =
+            ["link", &port, "recalibrate", "old.bin", "outputs.csv", "-n", &count, "--json"];
+        let mut program = command
+            .args(arguments)
+            .stdin(std::process::Stdio::piped())
+            .stdout(std::process::Stdio::piped())
+            .stderr(std::process::Stdio::piped())
+            .spawn()
+            .unwrap();
+        std::io::Write::write_all(&mut program.stdin.take().unwrap(), &[b'\n'; 30]).unwrap();
+        let output = program.wait_with_output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success() && said.contains("press 30 of 30"), "{said}");
+        let found: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let number = |key: &str| found[key].as_f64().unwrap();
+        assert_eq!(
+            [number("presses"), number("presses_unusable"), number("networks")],
+            [30.0, 0.0, 8.0]
+        );
+        assert!(number("error_after") < 0.5 * number("error_before"), "{found}");
+        let page = folder.succeed(&["link", &port, "identify"]);
+        assert!(page.contains(found["model_crc"].as_str().unwrap()), "{page}");
     }
 
     #[test]

@@ -23,7 +23,6 @@ mod measured;
 #[cfg(unix)]
 mod output;
 mod readout;
-mod recalibrate;
 mod recursion;
 mod refusals;
 mod refused_readings;

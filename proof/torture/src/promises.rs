@@ -51,7 +51,6 @@ pub const PROMISES: &[Promise] = &[
     flips::TWO,
     power::UPLOAD,
     power::UNDO,
-    power::RECALIBRATION,
     power::SETTINGS,
     power::PROVISION,
     power::DECAY,

@@ -112,8 +112,7 @@ impl Case {
 
     /// Brings the old model into force; returns its CRC-32.
     fn prepare(&mut self) -> Result<u32, String> {
-        let old = blob(1, 2);
-        let earlier = blob(5, 1);
+        let (old, earlier) = (blob(1, 2), blob(5, 1));
         let uploads = match (self.job, self.seed / Torn::COUNT as u64 % 4) {
             (Job::Undo, 0 | 1) | (_, 1) => 1,
             (Job::Undo, _) | (_, 2) => 2,

@@ -9,6 +9,6 @@ use qemu_image::{checks, exit};
 
 #[entry]
 fn main() -> ! {
-    info!("recalibration: {=u32:08x}", unwrap!(checks::recalibration()));
+    info!("recursion: {=u32:08x}", unwrap!(checks::recursion()));
     exit::success()
 }

@@ -45,7 +45,12 @@ impl FittedNetwork {
     ///
     /// # Errors
     /// [`Error::NotHeld`] if a parameter does not fit the format.
-    fn try_new(shape: Shape, format: Format, affine: bool, words: Vec<u32>) -> Result<Self> {
+    pub(crate) fn try_new(
+        shape: Shape,
+        format: Format,
+        affine: bool,
+        words: Vec<u32>,
+    ) -> Result<Self> {
         let fitted = Self { shape, format, affine, words, expansion: None };
         match fitted.try_network() {
             Ok(_) => Ok(fitted),

@@ -104,8 +104,8 @@ impl DeviceIdentity {
         shape.and_then(|shape| capacity.wires_for(shape)).unwrap_or(capacity.wires())
     }
 
-    /// Whether the active model has the columns of `model` and was trained on the same: it is that model, or one that the
-    /// device made of it by recalibration.
+    /// Whether the active model has the columns of `model` and was trained on the same: it is that model, or one that a
+    /// recalibration made of it.
     pub fn is_made_of(&self, model: &Model<'_>) -> bool {
         let metadata = model.metadata();
         let crc = |names: Columns<'_>, units: Columns<'_>| {

@@ -62,19 +62,27 @@ fn of_digits(text: &[u8]) -> Option<Key> {
     Key::try_from(bytes).ok().filter(|_| whole)
 }
 
+/// Checks that the device of this `identity` takes models with such a `sealing`.
+///
+/// # Errors
+/// [`Error::NeedsSeal`], [`Error::HasNoKey`] or [`Error::KeyDamaged`].
+pub fn check_sealing(identity: &DeviceIdentity, sealing: Option<&Sealing>) -> Result<()> {
+    match (identity.key, sealing) {
+        (KeyState::None, None) | (KeyState::Set, Some(_)) => Ok(()),
+        (KeyState::Set, None) => Err(Error::NeedsSeal),
+        (KeyState::None, Some(_)) => Err(Error::HasNoKey),
+        (KeyState::Damaged, _) => Err(Error::KeyDamaged),
+    }
+}
+
 /// The seal that the device of this `identity` needs for `blob`, if any.
 pub(super) fn seal_for(
     identity: &DeviceIdentity,
     blob: &[u8],
     sealing: Option<&Sealing>,
 ) -> Result<Option<Seal>> {
-    match (identity.key, sealing) {
-        (KeyState::None, None) => Ok(None),
-        (KeyState::Set, Some(sealing)) => Ok(Some(sealing.seal(identity, blob))),
-        (KeyState::Set, None) => Err(Error::NeedsSeal),
-        (KeyState::None, Some(_)) => Err(Error::HasNoKey),
-        (KeyState::Damaged, _) => Err(Error::KeyDamaged),
-    }
+    check_sealing(identity, sealing)?;
+    Ok(sealing.map(|sealing| sealing.seal(identity, blob)))
 }
 
 impl<W: Wire> Device<W> {

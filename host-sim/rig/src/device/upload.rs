@@ -12,7 +12,7 @@ use super::{Device, DeviceIdentity, Wire};
 use crate::error::{Error, Result};
 
 /// Longest time for erasing flash: a sector of 128 KiB takes up to 4 s on an STM32F4.
-pub(super) const ERASE: Duration = Duration::from_secs(6);
+const ERASE: Duration = Duration::from_secs(6);
 
 /// Longest time between scans that is waited for.
 const SLOWEST_SCANS: Duration = Duration::from_secs(5);
@@ -174,6 +174,23 @@ pub fn confirm<W: Wire>(device: &mut Device<W>) -> Result<DeviceIdentity> {
             }
         }
         other => Err(unexpected("a confirmation", other)),
+    }
+}
+
+/// Puts the model before the active one in its place again, over restarts as well; returns its CRC-32.
+///
+/// # Errors
+/// [`Error::Refused`] if there is none; errors of [`ask`](Device::ask).
+pub fn undo<W: Wire>(device: &mut Device<W>) -> Result<u32> {
+    let active = device.identify()?.model.ok_or(Error::Refused(Refusal::NothingToUndo))?;
+    let request = Request::Undo { crc_32: active.crc_32 };
+    let answer = device.ask(&request, device.patience, |report| match report {
+        Report::Upload(state) => Some(*state),
+        _ => None,
+    })?;
+    match answer.map_err(Error::Refused)? {
+        UploadState::Confirmed { crc_32 } => Ok(crc_32),
+        other => Err(unexpected("an undo", other)),
     }
 }
 

@@ -1,40 +1,53 @@
-//! Action `recalibrate`: the device mends its model from reference presses.
+//! Action `recalibrate`: the model is mended from reference presses, and uploaded.
 
 use std::io::{BufRead, Write as _};
 use std::path::PathBuf;
 
 use crate::{Error, Result};
 use clap::Args;
+use firmware::link::message::Refusal;
+use model_core::health::Limits;
 use serde::Serialize;
 use taxel_data::data_file::DataFile;
+use taxel_data::output;
 use taxel_data::table::Table;
-use taxel_learn::ModelBlob;
-use taxel_rig::device::recalibrate::{Outcome, recalibrate, recalibrate_from_readings};
-use taxel_rig::device::{Device, Wire};
+use taxel_learn::health::judge;
+use taxel_learn::recalibration::{self, Recalibrated};
+use taxel_learn::{Exponential, ModelBlob};
+use taxel_rig::device::{Device, DeviceIdentity, Wire, check_sealing, upload};
 
-use super::super::progress::Terminal;
-use super::super::readings::table_of;
+use super::super::data_file::FieldArguments;
+use super::super::readings::{BaselineArgument, table_of};
 use super::super::{Common, print};
-use super::scan::{Confidence, ScanArguments, Wanted, configure, patience};
+use super::frames::hear_frames;
+use super::scan::{Confidence, ScanArguments, Wanted, configure, patience, reading_names};
+use super::{SealingArguments, activate};
 
 #[derive(Args)]
 pub struct Arguments {
-    /// Weight blob that is active on the device, recalibrated or not: it names the outputs.
+    /// Weight blob that is active on the device.
     model: PathBuf,
     /// CSV file with a line for each press: columns of the model's outputs, and of its readings if they are known.
     presses: PathBuf,
+    /// Save the recalibrated model too: `record` and the next recalibration take it.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    baseline: BaselineArgument,
+    #[command(flatten)]
+    sealing: SealingArguments,
     #[command(flatten)]
     scan: ScanArguments,
 }
 
 #[derive(Serialize)]
 struct Summary {
-    presses: u16,
+    presses: usize,
     presses_unusable: usize,
-    networks: u8,
-    /// Root mean square errors on the last presses, in training errors of each output.
-    error_before: f32,
-    error_after: f32,
+    networks: usize,
+    /// Root mean square errors on presses that the fit has not seen, in training errors of each output.
+    error_before: f64,
+    error_after: f64,
     /// CRC-32 of the model that is active now, in hexadecimal.
     model_crc: String,
 }
@@ -44,12 +57,48 @@ pub fn execute<W: Wire>(
     arguments: &Arguments,
     common: &Common,
 ) -> Result<()> {
+    if let Some(path) = &arguments.output {
+        print::check_output(path, &[&arguments.model, &arguments.presses])?;
+    }
     let blob = ModelBlob::read(&arguments.model)?;
-    let model = blob.parse();
-    let metadata = model.metadata();
+    let (fields, limits) = (FieldArguments::default(), Some(Limits::USUAL));
+    let model = blob.prepare(Exponential::default());
+    let model = arguments.baseline.apply(model, &arguments.model, &fields, limits)?;
+    recalibration::check(model.model())?;
+    let metadata = model.model().metadata();
     let file = DataFile::read(&arguments.presses)?;
-    let outputs = table_of(&file, metadata.output_names.iter())?;
-    let unfit = |message: String| Error::Unfit { path: arguments.presses.clone(), message };
+    let outputs = outputs_of(&file, table_of(&file, metadata.output_names.iter())?)?;
+    let sealing = arguments.sealing.read()?;
+    let identity = device.identify()?;
+    if !identity.has_in_force(model.model().crc()) {
+        return Err(Error::Usage(
+            "MODEL: the device has another model; `upload` this one, or name that one".into(),
+        ));
+    }
+    if identity.model.is_some_and(|model| model.on_trial) {
+        return Err(taxel_rig::Error::Refused(Refusal::OnTrial).into());
+    }
+    check_sealing(&identity, sealing.as_ref())?;
+    let has_readings = metadata.input_names.iter().any(|name| file.column(name).is_ok());
+    let readings = if has_readings {
+        let mut readings = table_of(&file, metadata.input_names.iter())?;
+        judge(&mut readings, limits);
+        readings
+    } else {
+        record_presses(device, &identity, &arguments.scan, &outputs)?
+    };
+    let found = recalibration::recalibrate(&model, &readings, &outputs)?;
+    if let Some(path) = &arguments.output {
+        output::write_bytes(path, found.blob.bytes())?;
+    }
+    activate(device, &found.blob, sealing.as_ref())?;
+    upload::confirm(device)?;
+    conclude(&found, outputs.len(), common)
+}
+
+/// The `outputs` of a file's presses, of which none may be missing.
+fn outputs_of(file: &DataFile, outputs: Table) -> Result<Table> {
+    let unfit = |message: String| Error::Unfit { path: file.path.clone(), message };
     if outputs.is_empty() {
         return Err(unfit("it has no line; give one for each press".into()));
     }
@@ -61,37 +110,44 @@ pub fn execute<W: Wire>(
             outputs.names[column]
         )));
     }
-    let identity = device.identify()?;
-    if !identity.is_made_of(&model) {
-        return Err(Error::Usage(
-            "MODEL: the device has another model; `upload` this one, or name that one".into(),
-        ));
-    }
-    let has_readings = metadata.input_names.iter().any(|name| file.column(name).is_ok());
-    let outcome = if has_readings {
-        let readings = table_of(&file, metadata.input_names.iter())?;
-        recalibrate_from_readings(device, &readings, &outputs, &Terminal::new())?
-    } else {
-        let patience = patience(&arguments.scan, &identity);
-        device.while_paused(|device| -> Result<_> {
-            configure(device, &arguments.scan, Wanted::Nothing, 0.0, Confidence::Nothing)?;
-            let show = |_: &mut Device<W>, number: usize| ask_for_press(number, &outputs);
-            let frames = arguments.scan.frames;
-            recalibrate(device, &outputs, frames, patience, show, &Terminal::new())
-        })?
-    };
-    conclude(device, outcome, common)
+    Ok(outputs)
 }
 
-fn conclude<W: Wire>(device: &mut Device<W>, outcome: Outcome, common: &Common) -> Result<()> {
-    let Outcome { report, unusable } = outcome;
-    let model_crc = format!("{:08x}", device.identify()?.model.map_or(0, |model| model.crc_32));
+/// Asks for one press after the other, and lets the device scan each: mean readings, NaN where one was faulty.
+fn record_presses<W: Wire>(
+    device: &mut Device<W>,
+    identity: &DeviceIdentity,
+    scan: &ScanArguments,
+    outputs: &Table,
+) -> Result<Table> {
+    let (names, patience) = (reading_names(identity), patience(scan, identity));
+    let mut values = Vec::new();
+    for number in 0..outputs.len() {
+        ask_for_press(number, outputs)?;
+        // Paused first, so that no frame is from before the press.
+        let (frames, _) = device.while_paused(|device| -> Result<_> {
+            configure(device, scan, Wanted::Readings, 0.0, Confidence::Nothing)?;
+            hear_frames(device, scan.frames.into(), patience, Wanted::Readings, names.len())
+        })?;
+        let scanned = frames.iter().flat_map(|frame| frame.values.iter().copied()).collect();
+        let mut scanned = Table { names: names.clone(), values: scanned };
+        judge(&mut scanned, Some(Limits::USUAL));
+        let mean = |reading: usize| {
+            scanned.lines().map(|line| line[reading]).sum::<f64>() / scanned.len() as f64
+        };
+        values.extend((0..names.len()).map(mean));
+    }
+    Ok(Table { names, values })
+}
+
+fn conclude(found: &Recalibrated, given: usize, common: &Common) -> Result<()> {
+    let model_crc = format!("{:08x}", found.blob.parse().crc());
     let summary = Summary {
-        presses: report.presses,
-        presses_unusable: unusable,
-        networks: report.networks,
-        error_before: report.error_before,
-        error_after: report.error_after,
+        presses: found.presses,
+        presses_unusable: given - found.presses,
+        networks: found.networks,
+        error_before: found.error_before,
+        error_after: found.error_after,
         model_crc: model_crc.clone(),
     };
     if common.json {
@@ -99,14 +155,14 @@ fn conclude<W: Wire>(device: &mut Device<W>, outcome: Outcome, common: &Common) 
     }
     let mut page = print::Page::default();
     page.line(format_args!(
-        "The device has mended its model: {model_crc} is active, also after a restart. `undo` returns to the previous one."
+        "The model is mended: {model_crc} is active, also after a restart. `undo` returns to the previous one."
     ));
     page.line(format_args!(
-        "{:<17} {} used, {unusable} unusable (a reading missing, or far out of range)",
-        "presses", summary.presses
+        "{:<17} {} used, {} unusable (a reading missing, or far out of range)",
+        "presses", summary.presses, summary.presses_unusable
     ));
     page.line(format_args!(
-        "{:<17} {:.2} times that of training before, {:.2} times after, on the last presses",
+        "{:<17} {:.2} times that of training before, {:.2} times after, on presses that were not learned from",
         "error", summary.error_before, summary.error_after
     ));
     page.print()

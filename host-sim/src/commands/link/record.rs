@@ -22,7 +22,7 @@ use super::scan::{
 pub struct RecordArguments {
     /// Weight blob that is active on the device: its estimates are saved. Without it, readings are.
     model: Option<PathBuf>,
-    /// MODEL is the one that the device has recalibrated since: one of the same columns and scene is active.
+    /// MODEL has been recalibrated since: one of the same columns and scene is active.
     #[arg(long, requires = "model")]
     recalibrated: bool,
     #[command(flatten)]

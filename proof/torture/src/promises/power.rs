@@ -23,13 +23,6 @@ pub const UNDO: Promise = Promise {
     check: |effort, _| Ok(sweep(effort, 600, |seed, it| cut_model(Job::Undo, seed, it))),
 };
 
-pub const RECALIBRATION: Promise = Promise {
-    name: "cut-recalibration",
-    text: "power cut in a recalibration: the old or the new model",
-    share: 6,
-    check: |effort, _| Ok(sweep(effort, 150, |seed, it| cut_model(Job::Recalibration, seed, it))),
-};
-
 pub const SETTINGS: Promise = Promise {
     name: "cut-settings",
     text: "power cut while a setting is kept: the old or the new",

@@ -4,14 +4,11 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use firmware::app::Session;
-use firmware::link::message::{
-    ConfidenceSent, Configuration, RecalibrationStep, Request, Setting, UploadStep,
-};
+use firmware::link::message::{ConfidenceSent, Configuration, Request, Setting, UploadStep};
 use firmware::settings::PAGE_BYTES;
-use mock_board::sweep::presses;
 use mock_board::{
-    Bench, Board, Flash, Memory, Pins, SharedSettings, blob, blob_to_recalibrate,
-    blob_with_confidence, quiet, request_bytes, upload_steps,
+    Bench, Board, Flash, Memory, Pins, SharedSettings, blob, blob_with_confidence, quiet,
+    request_bytes, upload_steps,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -39,9 +36,7 @@ const ERASE_PAGE_US: u32 = 500_000;
 const WORD_US: u32 = 100;
 /// Bytes of a slot, as on the board.
 const SLOT_BYTES: usize = 128 * 1024;
-/// Centres of a model that fills most of a slot.
-const MANY_CENTRES: usize = 3000;
-/// Words of memory for a recalibration.
+/// Words of memory for a copy of the weights.
 const MEMORY: usize = 4096;
 
 /// Bytes of a chunk of an upload.
@@ -77,7 +72,7 @@ fn longest_unfed_s(seed: u64, planted: bool) -> f64 {
     let gaps_us = [0, 1_000, 10_000, 49_000, 1_000_000, 5];
     let (gap_us, is_bursts) = (gaps_us[(seed % 6) as usize], seed % 6 == 5);
     let scan_us = [6_400, 100_000, 1_660_000][(seed / 6 % 3) as usize];
-    let [is_recalibrated, is_worn] = [seed / 18 % 2 == 1, seed / 36 % 2 == 1];
+    let is_worn = seed / 18 % 2 == 1;
     let mut memory = Box::new(Memory::new());
     let pins = Rc::new(RefCell::new(Pins::default()));
     let slow = |bytes, erase_us, is_worn| {
@@ -101,20 +96,13 @@ fn longest_unfed_s(seed: u64, planted: bool) -> f64 {
     board.pins.borrow_mut().scan_us = scan_us;
     bench.frame.borrow_mut()[0][0] = f32::NAN; // so that all kinds of reports are sent
     let mut slots = slow(SLOT_BYTES, ERASE_US, is_worn);
-    let model = if is_recalibrated {
-        blob_to_recalibrate(MANY_CENTRES)
-    } else {
-        blob_with_confidence(false)
-    };
+    let model = blob_with_confidence(false);
     slots[0].flash(0, &model);
     let mut room = vec![0; MEMORY];
     let mut session = Session::start(&mut bench.app, &mut slots, &mut room);
     let new = blob(2, 4);
     let steps = upload_steps(&new, CHUNK);
     let mut uploads = steps[..steps.len() - 1].iter().cycle().copied().map(Request::Upload);
-    if is_recalibrated {
-        presses::add(&mut session, &board, &model);
-    }
     let configure = Request::Configure { configuration: BUSY, lease_ms: 0 };
     board.pins.borrow_mut().to_device.extend(request_bytes(4, &configure));
     board.pins.borrow_mut().gap_us = gap_us;
@@ -123,11 +111,9 @@ fn longest_unfed_s(seed: u64, planted: bool) -> f64 {
         let request = match random.next_u32() % 6 {
             0 => Request::Identify,
             1 => Request::Statistics,
-            2 if is_recalibrated => Request::Recalibrate(RecalibrationStep::Commit),
             2 => Request::Upload(UploadStep::Abort),
             3 => Request::Keep(Setting::Configuration),
             4 => Request::Forget(Setting::Configuration),
-            _ if is_recalibrated => Request::Configuration,
             _ => uploads.next().expect("a step"),
         };
         board.pins.borrow_mut().to_device.extend(request_bytes(5, &request));

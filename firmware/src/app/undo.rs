@@ -1,0 +1,49 @@
+//! Undo: the previous model comes into force again.
+
+use super::Core;
+use super::leave::Leave;
+use super::model::{self, InForce};
+use crate::link::message::Refusal;
+use crate::log::info;
+use crate::platform::Platform;
+use crate::readout::FrameSource;
+use crate::store::{Slot, blob_in_slot, generation, reinstate};
+
+impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
+    /// Puts the spare slot's model in force again, and leaves the one with the CRC-32 `left`; returns the CRC-32 of the
+    /// one in force then.
+    pub(super) fn undo<S: Slot>(
+        &mut self,
+        left: u32,
+        in_force: &InForce<'_, ROWS>,
+        spare: &mut S,
+        leave: &mut Option<Leave>,
+    ) -> Result<u32, Refusal> {
+        const NOTHING: Refusal = Refusal::NothingToUndo;
+        let identity = in_force.identity.ok_or(NOTHING)?;
+        let previous = model::check(self.capacity, blob_in_slot(spare.bytes()));
+        let previous = previous.map_err(|_| NOTHING)?.crc();
+        if identity.crc_32 != left {
+            // The answer was lost, if the model that was to be left is the spare one.
+            return if previous == left { Ok(identity.crc_32) } else { Err(NOTHING) };
+        }
+        let slot = 1 - usize::from(identity.slot.min(1));
+        generation(slot, spare.bytes()).ok_or(NOTHING)?;
+        if self.end_trial() {
+            *leave = Some(Leave::NewModel);
+            return Ok(previous);
+        }
+        self.guard.check_undo(slot)?;
+        let next = identity.generation.checked_add(1).ok_or(Refusal::LastGeneration)?;
+        match reinstate(spare, next) {
+            None => Err(NOTHING),
+            Some(Err(_)) => Err(Refusal::Flash),
+            Some(Ok(())) => {
+                info!("model {=u32:08x} in force again", previous);
+                self.upload.abort();
+                *leave = Some(Leave::NewModel);
+                Ok(previous)
+            }
+        }
+    }
+}
