@@ -1,7 +1,7 @@
 //! With a key on the device, only models sealed with it come into force, and no older ones.
 
-use firmware::app::{Leave, Session};
-use firmware::link::message::{KeyState, Refusal, SealFault, UploadState, UploadStep};
+use firmware::app::{Session, SessionEnd};
+use firmware::link::message::{KeyState, Refusal, SealFault, UploadStep};
 use firmware::seal::{Key, Seal};
 use firmware::store::Slot;
 use mock_board::*;
@@ -23,18 +23,17 @@ fn install(device: &mut Device, version: u32, blob: &[u8]) -> Answer {
     device.install(blob, Some(Seal::of(&KEY, version, blob)))
 }
 
-/// CRC-32 and version of the model in force, whether there is a key, and the highest version.
-fn identity(device: &mut Device) -> (Option<(u32, Option<u32>)>, KeyState, Option<u32>) {
+/// A model's CRC-32, and the version that it was sealed with.
+type Versioned = (u32, Option<u32>);
+
+/// The model in force, whether there is a key, and the highest version.
+fn identity(device: &mut Device) -> (Option<Versioned>, KeyState, Option<u32>) {
     let (model, key, highest) = device.identity();
     (model.map(|model| (model.crc_32, model.version)), key, highest)
 }
 
 fn fault(fault: SealFault) -> Answer {
     Err(Refusal::Seal(fault))
-}
-
-fn confirmed(blob: &[u8]) -> Answer {
-    Ok(UploadState::Confirmed { crc_32: crc_of(blob) })
 }
 
 #[test]
@@ -85,7 +84,7 @@ fn a_key_is_set_once_and_models_from_before_are_left() {
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let feeds = || board.pins.borrow().feeds;
     let fed = feeds();
-    assert_eq!(provision(&mut session, &board, KEY), (Ok(()), Some(Leave::NewModel)));
+    assert_eq!(provision(&mut session, &board, KEY), (Ok(()), Some(SessionEnd::NewModel)));
     assert_eq!(feeds() - fed, 2, "in its turn, and before flash is erased");
     let _ = session;
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);

@@ -3,7 +3,7 @@
 //! Bits of memory that a session has borrowed are flipped from outside, through the kernel, as radiation does.
 #![cfg(target_os = "linux")]
 
-use firmware::app::{Leave, Session};
+use firmware::app::{Session, SessionEnd};
 use firmware::link::message::{
     Configuration, ModelFault, Refusal, Report, Request, UploadState, UploadStep,
 };
@@ -14,7 +14,7 @@ use mock_board::*;
 const PLACE: usize = 41;
 
 /// Runs turns until the session ends, at most as many as two checks of all copies take.
-fn run(session: &mut TestSession<'_>) -> Option<Leave> {
+fn run(session: &mut TestSession<'_>) -> Option<SessionEnd> {
     (0..4 * Flash::SLOT_BYTES.div_ceil(256)).find_map(|_| session.step())
 }
 
@@ -37,14 +37,14 @@ fn damage_ends_an_upload_and_a_trial_outlasts_damage_in_ram_alone() {
     upload(bench, slots, weights, &steps[..3]).unwrap();
     let mut session = Session::start(&mut bench.app, slots, weights);
     flip_bit(copy, 3);
-    assert_eq!(run(&mut session), Some(Leave::Damaged));
+    assert_eq!(run(&mut session), Some(SessionEnd::Damaged));
     let _ = session;
     assert!(upload(bench, slots, weights, &steps[3..]).is_err());
 
     upload(bench, slots, weights, &steps).unwrap();
     let mut session = Session::start(&mut bench.app, slots, weights);
     flip_bit(copy, 3);
-    assert_eq!(run(&mut session), Some(Leave::Damaged));
+    assert_eq!(run(&mut session), Some(SessionEnd::Damaged));
     let _ = session;
     let state = upload(bench, slots, weights, &[UploadStep::Confirm]);
     assert_eq!(state, Ok(UploadState::Confirmed { crc_32: crc_of(&next) }));
@@ -64,7 +64,7 @@ fn a_model_that_decays_in_its_slot_while_on_trial_is_not_confirmed() {
     board.pins.borrow_mut().to_host.clear();
     let confirm = request_bytes(7, &Request::Upload(UploadStep::Confirm));
     board.pins.borrow_mut().to_device.extend(confirm);
-    assert_eq!(settle(&mut session, &board), Some(Leave::Confirm));
+    assert_eq!(settle(&mut session, &board), Some(SessionEnd::Confirm));
     let _ = session;
     let mut session = Session::start(&mut bench.app, slots, weights);
     let answers = reports(&board.pins.borrow().to_host);

@@ -1,6 +1,6 @@
 //! A new model is on trial until it is confirmed: until then every restart brings the previous one back.
 
-use firmware::app::{Leave, Session};
+use firmware::app::{Session, SessionEnd};
 use firmware::link::message::{ModelIdentity, Refusal, Report, Request, UploadState, UploadStep};
 use mock_board::*;
 
@@ -26,7 +26,7 @@ fn undo(
     session: &mut TestSession<'_>,
     board: &Board,
     left: u32,
-) -> (Result<UploadState, Refusal>, Option<Leave>) {
+) -> (Result<UploadState, Refusal>, Option<SessionEnd>) {
     ask(session, board, &Request::Undo { crc_32: left }, |report| match report {
         Report::Upload(state) => Ok(state),
         Report::Refused(refusal) => Err(refusal),
@@ -121,7 +121,7 @@ fn an_abort_and_an_undo_end_a_trial_without_touching_the_flash() {
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let is_old = Ok(UploadState::Confirmed { crc_32: crc_of(&old) });
-    assert_eq!(undo(&mut session, &board, crc_of(&new)), (is_old, Some(Leave::NewModel)));
+    assert_eq!(undo(&mut session, &board, crc_of(&new)), (is_old, Some(SessionEnd::NewModel)));
     let _ = session;
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     assert_eq!(undo(&mut session, &board, crc_of(&new)), (is_old, None), "the answer was lost");

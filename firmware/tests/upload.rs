@@ -1,6 +1,6 @@
 //! Uploading a model: sound models come into force, and nothing else ever does.
 
-use firmware::app::{Leave, Session};
+use firmware::app::{Session, SessionEnd};
 use firmware::link::message::{
     Configuration, ModelFault, Refusal, Report, Request, UploadState, UploadStep,
 };
@@ -18,7 +18,7 @@ fn upload(
     session: &mut Running<'_, '_>,
     board: &Board,
     steps: &[UploadStep<'_>],
-) -> (Answer, Option<Leave>) {
+) -> (Answer, Option<SessionEnd>) {
     let mut last = (Ok(UploadState::Idle), None);
     for step in steps {
         last = upload_step(session, board, *step);
@@ -27,10 +27,6 @@ fn upload(
         }
     }
     last
-}
-
-fn confirmed(blob: &[u8]) -> Answer {
-    Ok(UploadState::Confirmed { crc_32: crc_of(blob) })
 }
 
 #[test]
@@ -51,8 +47,8 @@ fn a_device_without_a_model_takes_one() {
     let new = blob(4, 3);
     device.session(|session, board| {
         assert_eq!(model_crc(session, board), None);
-        let (_, leave) = upload(session, board, &trial_steps(&new, None));
-        assert_eq!(leave, Some(Leave::NewModel));
+        let (_, end) = upload(session, board, &trial_steps(&new, None));
+        assert_eq!(end, Some(SessionEnd::NewModel));
     });
     assert_eq!(device.restart(), None, "it was on trial");
     assert_eq!(device.install(&new, None), confirmed(&new));
@@ -151,8 +147,8 @@ fn what_cannot_come_into_force_costs_no_erase_and_a_repeated_begin_costs_none_mo
         let steps = upload_steps(&good, CHUNK);
         upload(&mut session, &board, &[UploadStep::Abort, steps[0], steps[1], steps[0]]).0.unwrap();
         assert_eq!(slot_erases(&mut session, &board), 2);
-        let (outcome, leave) = upload(&mut session, &board, &steps);
-        assert!(outcome.is_ok() && leave.is_some(), "{outcome:?}");
+        let (outcome, end) = upload(&mut session, &board, &steps);
+        assert!(outcome.is_ok() && end.is_some(), "{outcome:?}");
         assert_eq!(slot_erases(&mut session, &board), 2);
     }
     assert_eq!((slots[0].erases, slots[1].erases), (0, 2));
@@ -225,8 +221,8 @@ fn behind_the_largest_generation_no_model_is_taken() {
     slots[0].write(Flash::SLOT_BYTES - 16, &record).unwrap();
     let mut bench = Bench::new(quiet());
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    let (outcome, leave) = upload(&mut session, &bench.board, &upload_steps(&blob(2, 4), CHUNK));
-    assert_eq!((outcome, leave), (Err(Refusal::LastGeneration), None));
+    let (outcome, end) = upload(&mut session, &bench.board, &upload_steps(&blob(2, 4), CHUNK));
+    assert_eq!((outcome, end), (Err(Refusal::LastGeneration), None));
     assert_eq!(slot_erases(&mut session, &bench.board), 0);
 }
 

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use firmware::app::{Leave, Session};
+use firmware::app::{Session, SessionEnd};
 use firmware::link::message::{
     Identity, KeyState, ModelIdentity, Refusal, Report, Request, UploadState, UploadStep,
 };
@@ -13,6 +13,7 @@ use crate::bench::{Bench, Memory, Running, quiet};
 use crate::board::Board;
 use crate::flash::{Cells, Flash, Supply};
 use crate::host::{self, ask, model_crc, upload_steps};
+use crate::models::crc_of;
 use crate::pages::SharedSettings;
 
 /// Bytes of a chunk of an upload.
@@ -20,6 +21,11 @@ const CHUNK: usize = 100;
 
 /// Answer to a step of an upload, or to an undo.
 pub type Answer = Result<UploadState, Refusal>;
+
+/// The answer to a confirmation of `blob`.
+pub fn confirmed(blob: &[u8]) -> Answer {
+    Ok(UploadState::Confirmed { crc_32: crc_of(blob) })
+}
 
 /// A device that scans on request alone. Each of its functions starts it anew.
 pub struct Device {
@@ -164,12 +170,16 @@ pub fn upload_step(
     session: &mut Running<'_, '_>,
     board: &Board,
     step: UploadStep<'_>,
-) -> (Answer, Option<Leave>) {
+) -> (Answer, Option<SessionEnd>) {
     ask(session, board, &Request::Upload(step), answer)
 }
 
 /// Leaves the model with the CRC-32 `left` for the one before it.
-pub fn undo(session: &mut Running<'_, '_>, board: &Board, left: u32) -> (Answer, Option<Leave>) {
+pub fn undo(
+    session: &mut Running<'_, '_>,
+    board: &Board,
+    left: u32,
+) -> (Answer, Option<SessionEnd>) {
     ask(session, board, &Request::Undo { crc_32: left }, answer)
 }
 
@@ -186,7 +196,7 @@ pub fn provision(
     session: &mut Running<'_, '_>,
     board: &Board,
     key: Key,
-) -> (Result<(), Refusal>, Option<Leave>) {
+) -> (Result<(), Refusal>, Option<SessionEnd>) {
     ask(session, board, &Request::Provision { key }, |report| match report {
         Report::Provisioned => Ok(()),
         Report::Refused(refusal) => Err(refusal),

@@ -1,6 +1,6 @@
 //! The host's side of the link.
 
-use firmware::app::{Leave, Session};
+use firmware::app::{Session, SessionEnd};
 use firmware::link::message::{Configuration, Refusal, Report, Request, UploadState, UploadStep};
 use firmware::link::receive::{Received, Receiver};
 use firmware::link::{cobs, packet};
@@ -48,10 +48,10 @@ pub fn reports(bytes: &[u8]) -> Vec<(u16, String)> {
 }
 
 /// Runs turns of the loop until the device has read all bytes sent to it, or the session ends.
-pub fn settle(session: &mut Running<'_, '_>, board: &Board) -> Option<Leave> {
+pub fn settle(session: &mut Running<'_, '_>, board: &Board) -> Option<SessionEnd> {
     while !board.pins.borrow().to_device.is_empty() {
-        if let Some(leave) = session.step() {
-            return Some(leave);
+        if let Some(end) = session.step() {
+            return Some(end);
         }
     }
     None
@@ -63,17 +63,17 @@ pub fn ask<T>(
     board: &Board,
     request: &Request<'_>,
     read: impl FnOnce(Report<'_>) -> T,
-) -> (T, Option<Leave>) {
+) -> (T, Option<SessionEnd>) {
     board.pins.borrow_mut().to_host.clear();
     board.pins.borrow_mut().to_device.extend(request_bytes(ASKED, request));
-    let leave = settle(session, board);
+    let end = settle(session, board);
     let answer = std::mem::take(&mut board.pins.borrow_mut().to_host);
     let mut receiver = Receiver::new([0; 1024]);
     for byte in &answer {
         if let Some(Received::Frame(bytes)) = receiver.push(*byte) {
             let packet = packet::decode::<Report<'_>>(bytes).expect("a whole report");
             if packet.number == ASKED {
-                return (read(packet.body), leave);
+                return (read(packet.body), end);
             }
         }
     }
@@ -122,7 +122,7 @@ pub fn upload(
     board.pins.borrow_mut().to_host.clear();
     loop {
         let mut session = Session::start(&mut bench.app, slots, weights);
-        if left == Some(Leave::Confirm) {
+        if left == Some(SessionEnd::Confirm) {
             last = answer(&board);
         }
         loop {
@@ -131,8 +131,8 @@ pub fn upload(
             board.pins.borrow_mut().to_device.extend(request_bytes(ASKED, &Request::Upload(*step)));
             left = settle(&mut session, &board);
             match left {
-                Some(Leave::Confirm) => break,
-                None | Some(Leave::NewModel) => last = answer(&board),
+                Some(SessionEnd::Confirm) => break,
+                None | Some(SessionEnd::NewModel) => last = answer(&board),
                 Some(other) => panic!("{step:?} leads to {other:?}"),
             }
             if left.is_some() {

@@ -35,7 +35,7 @@ pub use board::{Board, Pins};
 #[cfg(target_os = "linux")]
 pub use decay::flip_bit;
 pub use device::{
-    Answer, Device, confirmed_steps, identity, provision, trial_steps, undo, upload_step,
+    Answer, Device, confirmed, confirmed_steps, identity, provision, trial_steps, undo, upload_step,
 };
 pub use flash::{Cells, Flash, Supply, Torn, Worn};
 pub use host::{

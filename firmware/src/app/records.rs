@@ -16,9 +16,9 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         if is_complete || self.trial.is_going_on() {
             return;
         }
-        let trusted = |slot| self.guard.trusts(slot);
+        let allowed = |slot| self.authenticity.allows(slot);
         let candidates =
-            candidates(slots, None).map(|candidate| candidate.filter(|it| trusted(it.slot)));
+            candidates(slots, None).map(|candidate| candidate.filter(|it| allowed(it.slot)));
         let Some(chosen) = choose(self.capacity, slots, candidates) else { return };
         let Some(generation) = missing_records(slots, chosen.slot) else { return };
         let written = slots.get_mut(chosen.slot).and_then(|slot| reinstate(slot, generation));

@@ -1,6 +1,6 @@
 //! Turns of the loop: scans in time, the watchdog, and a host that takes no bytes.
 
-use firmware::app::{Leave, Session};
+use firmware::app::{Session, SessionEnd};
 use firmware::link::message::{Configuration, EstimateReport, Report, Request};
 use firmware::link::packet;
 use firmware::link::receive::{Received, Receiver};
@@ -164,7 +164,7 @@ fn a_restart_is_answered_and_ends_the_session() {
     let mut slots = Flash::slots_with(&blob(3, 4));
     let mut bench = Bench::new(quiet());
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    let (answer, leave) =
+    let (answer, end) =
         ask(&mut session, &bench.board, &Request::Restart, |r| r == Report::Restarting);
-    assert_eq!((answer, leave), (true, Some(Leave::Restart)));
+    assert_eq!((answer, end), (true, Some(SessionEnd::Restart)));
 }

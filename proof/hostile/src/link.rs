@@ -7,7 +7,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use firmware::app::{Leave, Session};
+use firmware::app::{Session, SessionEnd};
 use firmware::link::cobs;
 use firmware::link::message::Request;
 use firmware::link::packet::PROTOCOL_VERSION;
@@ -61,11 +61,11 @@ pub fn check(bytes: &[u8], is_planted: bool) -> bool {
                     break;
                 }
                 operation => {
-                    let leave = device.step(operation, bytes, &models);
-                    has_taken |= matches!(leave, Some(Leave::NewModel));
+                    let end = device.step(operation, bytes, &models);
+                    has_taken |= matches!(end, Some(SessionEnd::NewModel));
                     // A first request may end a frame that the bytes have begun. The next is answered.
                     let identify = || request_bytes(NUMBER, &Request::Identify);
-                    if leave.or_else(|| device.send(identify())).is_some() {
+                    if end.or_else(|| device.send(identify())).is_some() {
                         break;
                     }
                     device.answers();
@@ -102,7 +102,12 @@ struct Device<'d> {
 
 impl Device<'_> {
     /// Takes a step; returns why the session ended, if it did.
-    fn step(&mut self, operation: u8, bytes: &[u8], models: &[AlignedBytes; 3]) -> Option<Leave> {
+    fn step(
+        &mut self,
+        operation: u8,
+        bytes: &[u8],
+        models: &[AlignedBytes; 3],
+    ) -> Option<SessionEnd> {
         match operation {
             0 => self.send(bytes.to_vec()),
             1..=4 => {
@@ -131,9 +136,9 @@ impl Device<'_> {
             8 => {
                 // A host that takes a few bytes more, and then reads on.
                 self.board.pins.borrow_mut().room = Some(number_of(bytes) as usize % 512);
-                let leave = self.send(request_bytes(NUMBER, &Request::Statistics));
+                let end = self.send(request_bytes(NUMBER, &Request::Statistics));
                 self.board.pins.borrow_mut().room = None;
-                leave
+                end
             }
             _ => {
                 let mut frame = self.frame.borrow_mut();
@@ -148,12 +153,12 @@ impl Device<'_> {
     }
 
     /// Sends bytes, and runs until the device has read them.
-    fn send(&mut self, bytes: Vec<u8>) -> Option<Leave> {
+    fn send(&mut self, bytes: Vec<u8>) -> Option<SessionEnd> {
         self.board.pins.borrow_mut().to_device.extend(bytes);
         let mut turns = 0;
         while !self.board.pins.borrow().to_device.is_empty() {
-            if let Some(leave) = self.session.step() {
-                return Some(leave);
+            if let Some(end) = self.session.step() {
+                return Some(end);
             }
             turns += 1;
             assert!(turns < MOST_TURNS, "the device reads no more");

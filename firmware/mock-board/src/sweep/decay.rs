@@ -1,13 +1,13 @@
 //! Slots that decay or wear out, after an upload that ended in any way.
 
-use firmware::link::message::{UploadState, UploadStep};
+use firmware::link::message::UploadStep;
 use firmware::store::{RECORD_BYTES, Slot};
 use model_core::AlignedBytes;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::{SLOT_WORDS, device};
-use crate::device::{Device, confirmed_steps, trial_steps, upload_step};
+use crate::device::{Device, confirmed, confirmed_steps, trial_steps, upload_step};
 use crate::flash::{Torn, Worn};
 use crate::models::{blob, crc_of};
 
@@ -30,7 +30,7 @@ impl Case {
         for upload in 1..=uploads {
             let blob = if upload == uploads { &old } else { &earlier };
             let outcome = device.install(blob, None);
-            if outcome != Ok(UploadState::Confirmed { crc_32: crc_of(blob) }) {
+            if outcome != confirmed(blob) {
                 return Err(format!("upload {upload}: {outcome:?}"));
             }
         }

@@ -4,7 +4,7 @@ use firmware::link::message::UploadState;
 use model_core::AlignedBytes;
 
 use super::device;
-use crate::device::{Answer, Device};
+use crate::device::{Answer, Device, confirmed};
 use crate::flash::Torn;
 use crate::models::{blob, crc_of};
 
@@ -175,8 +175,4 @@ impl Case {
             self.device.slots.iter_mut().for_each(|slot| slot.decay(6, 1));
         }
     }
-}
-
-fn confirmed(blob: &[u8]) -> Answer {
-    Ok(UploadState::Confirmed { crc_32: crc_of(blob) })
 }

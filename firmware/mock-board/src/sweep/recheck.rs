@@ -3,7 +3,7 @@
 
 use std::fmt::Debug;
 
-use firmware::app::{Leave, Session};
+use firmware::app::{Session, SessionEnd};
 use firmware::link::message::{Configuration, EstimateReport, Report, Request, Statistics};
 use firmware::store::Slot;
 use model_core::blob::Floats;
@@ -84,10 +84,10 @@ fn run(case: Case, seed: u64, is_planted: bool) -> Result<usize, String> {
             hit.for_each(|bit| flip_bit(*address, first + bit));
         }
     }
-    let leave = turns(&mut session, 2 * pass);
+    let end = turns(&mut session, 2 * pass);
 
     let is_decoded_from = case.hits[0] || case.is_in_flash;
-    expect(leave, is_decoded_from.then_some(Leave::Damaged), "within two passes")?;
+    expect(end, is_decoded_from.then_some(SessionEnd::Damaged), "within two passes")?;
     let counts = statistics(&mut session, &board)?;
     expect(counts.model_damages, u32::from(is_decoded_from), "damages of the model")?;
     let (outcome, in_force) = match case.hits {
@@ -114,7 +114,7 @@ fn run(case: Case, seed: u64, is_planted: bool) -> Result<usize, String> {
 }
 
 /// Runs so many turns of the loop, or until the session ends.
-fn turns(session: &mut Running<'_, '_>, count: usize) -> Option<Leave> {
+fn turns(session: &mut Running<'_, '_>, count: usize) -> Option<SessionEnd> {
     (0..count).find_map(|_| session.step())
 }
 

@@ -1,10 +1,10 @@
 //! Models for a device with a key: only what was sealed with it, and nothing older, comes into force.
 
-use firmware::link::message::{Refusal, SealFault, UploadState};
+use firmware::link::message::{Refusal, SealFault};
 use firmware::seal::{KEY_BYTES, Key, Seal};
 use model_core::checksum::CRC_32;
 
-use crate::device::{Device, confirmed_steps};
+use crate::device::{Device, confirmed, confirmed_steps};
 use crate::flash::Flash;
 use crate::models::{blob, crc_of};
 
@@ -92,8 +92,7 @@ pub fn forge(seed: u64, planted: bool) -> Result<f64, String> {
     let first = blob(1, 3);
     let genuine = |device: &mut Device, version, blob: &[u8]| {
         let taken = device.install(blob, Some(Seal::of(&key, version, blob)));
-        let is_right = taken == Ok(UploadState::Confirmed { crc_32: crc_of(blob) });
-        if is_right { Ok(()) } else { Err(format!("a genuine model: {taken:?}")) }
+        if taken == confirmed(blob) { Ok(()) } else { Err(format!("a genuine model: {taken:?}")) }
     };
     genuine(&mut device, VERSION, &first)?;
     let mut attack = attack(seed, &key);
