@@ -4,9 +4,7 @@
 #![cfg(target_os = "linux")]
 
 use firmware::app::{Session, SessionEnd};
-use firmware::link::message::{
-    Configuration, ModelFault, Refusal, Report, Request, UploadState, UploadStep,
-};
+use firmware::link::message::{Configuration, ModelFault, Refusal, Report, Request, UploadStep};
 use firmware::store::Slot;
 use mock_board::*;
 
@@ -47,7 +45,7 @@ fn damage_ends_an_upload_and_a_trial_outlasts_damage_in_ram_alone() {
     assert_eq!(run(&mut session), Some(SessionEnd::Damaged));
     let _ = session;
     let state = upload(bench, slots, weights, &[UploadStep::Confirm]);
-    assert_eq!(state, Ok(UploadState::Confirmed { crc_32: crc_of(&next) }));
+    assert_eq!(state, confirmed(&next));
 }
 
 #[test]
