@@ -24,9 +24,6 @@ pub type Running<'a, 'm> = Session<'a, 'm, Board, Source, Flash, ROWS>;
 /// A session of an application whose memory is never freed.
 pub type TestSession<'a> = Running<'a, 'static>;
 
-/// Time in µs that a scan takes on a bench.
-const SCAN_US: u32 = 10;
-
 /// A configuration that scans only on request.
 pub fn quiet() -> Configuration {
     Configuration { frame_period_us: 0, ..Configuration::DEFAULT }
@@ -52,11 +49,6 @@ impl Bench<'static> {
     pub fn with_settings(configuration: Configuration, settings: &SharedSettings) -> Self {
         Self::within(Box::leak(Box::new(Memory::new())), configuration, settings)
     }
-
-    /// As [`Bench::new`], on a board whose flash for the key is `key`.
-    pub fn with_key(configuration: Configuration, key: &Flash) -> Self {
-        Self::within_with_key(Box::leak(Box::new(Memory::new())), configuration, key)
-    }
 }
 
 impl<'m> Bench<'m> {
@@ -70,31 +62,11 @@ impl<'m> Bench<'m> {
         Self::on(Board::with_settings(settings), memory, configuration)
     }
 
-    /// As [`Bench::within`], on a board without settings whose flash for the key is `key`.
-    pub fn within_with_key(
-        memory: &'m mut Memory,
-        configuration: Configuration,
-        key: &Flash,
-    ) -> Self {
-        let mut board = Board::with_settings(&SharedSettings::default());
-        board.key = key.clone();
-        Self::on(board, memory, configuration)
-    }
-
     /// As [`Bench::within`], on this board.
     pub fn on(board: Board, memory: &'m mut Memory, configuration: Configuration) -> Self {
         *memory = Memory::new();
         let frame = Rc::new(RefCell::new(frame_at_rest()));
-        let source = Source::new(&frame, &board, SCAN_US);
+        let source = Source::new(&frame, &board);
         Self { app: App::new(board.clone(), source, configuration, memory), board, frame }
-    }
-
-    /// Restarts the application with another `configuration` and `scan_us` µs a scan, on the same board, in memory that
-    /// is never freed.
-    pub fn restarted(self, configuration: Configuration, scan_us: u32) -> Bench<'static> {
-        let Self { board, frame, .. } = self;
-        let source = Source::new(&frame, &board, scan_us);
-        let memory = Box::leak(Box::new(Memory::new()));
-        Bench { app: App::new(board.clone(), source, configuration, memory), board, frame }
     }
 }

@@ -21,7 +21,7 @@ pub struct Pins {
     pub now_us: u32,
     /// Time in µs that each look at the clock takes besides. It makes waiting short for tests of slow lines.
     pub look_us: u32,
-    /// Time in µs that a scan takes besides that of its [`Source`](crate::Source).
+    /// Time in µs that a scan takes besides 10 µs.
     pub scan_us: u32,
     /// Number of times that the watchdog was fed.
     pub feeds: u32,

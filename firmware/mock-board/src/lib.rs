@@ -41,7 +41,9 @@ pub use flash::{Cells, Flash, Supply, Torn, Worn};
 pub use host::{
     ask, begin, configure, install, model_crc, reports, request_bytes, settle, upload, upload_steps,
 };
-pub use models::{blob, blob_of, blob_of_components, blob_of_length, blob_with_confidence, crc_of};
+pub use models::{
+    blob, blob_of, blob_of_components, blob_of_length, blob_with_confidence, crc_of, parts,
+};
 pub use pages::SharedSettings;
 pub use shape::{COLS, MESSAGE_BYTES, OUTPUTS, ROWS, TestFrame, frame_at_rest};
 pub use source::Source;

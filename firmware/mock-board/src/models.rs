@@ -67,15 +67,7 @@ pub fn blob_of_length(bytes: usize) -> AlignedBytes {
     let networks: Vec<_> = model.networks().collect();
     let named = |length: usize| {
         let name = &"x".repeat(length);
-        let parts = ModelParts {
-            projection: None,
-            expansion: None,
-            confidence: None,
-            fill: None,
-            networks: &networks,
-            row_network: &[0; ROWS],
-            metadata: Metadata { name, ..*model.metadata() },
-        };
+        let parts = parts(&networks, &[0; ROWS], Metadata { name, ..*model.metadata() });
         encode_to_vec(&parts).unwrap()
     };
     (0..bytes).map(named).find(|blob| blob.len() == bytes).unwrap()
@@ -89,15 +81,8 @@ fn blob_with(
     let shape = network.shape();
     let shape = ModelShape { rows: ROWS, inputs: shape.inputs, outputs: shape.outputs };
     let metadata = Metadata { relative_inputs, ..Metadata::unnamed(shape) };
-    let parts = ModelParts {
-        projection: None,
-        expansion: None,
-        confidence,
-        fill: None,
-        networks: &[network],
-        row_network: &[0; ROWS],
-        metadata,
-    };
+    let networks = [network];
+    let parts = ModelParts { confidence, ..parts(&networks, &[0; ROWS], metadata) };
     encode_to_vec(&parts).unwrap()
 }
 
@@ -124,16 +109,31 @@ pub fn blob_of_components(components: usize) -> AlignedBytes {
     let mut projection = vec![1.0 / readings as f32; (1 + readings) * COLS];
     projection[..COLS].fill(0.0);
     let expansion = vec![0.125; (1 + components) * outputs];
+    let networks = [network];
+    let metadata = Metadata::unnamed(ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS });
     let parts = ModelParts {
         projection: Projection::new(readings, COLS, &projection).ok(),
         expansion: Expansion::new(components, outputs, &expansion).ok(),
-        confidence: None,
-        fill: None,
-        networks: &[network],
-        row_network: &[0; ROWS],
-        metadata: Metadata::unnamed(ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS }),
+        ..parts(&networks, &[0; ROWS], metadata)
     };
     encode_to_vec(&parts).unwrap()
+}
+
+/// Parts of a blob without anything else than these.
+pub fn parts<'a>(
+    networks: &'a [Network<'a>],
+    row_network: &'a [u8],
+    metadata: Metadata<'a>,
+) -> ModelParts<'a> {
+    ModelParts {
+        projection: None,
+        expansion: None,
+        confidence: None,
+        fill: None,
+        networks,
+        row_network,
+        metadata,
+    }
 }
 
 /// The CRC-32 that closes a blob.

@@ -2,7 +2,7 @@
 
 use firmware::app::Session;
 use firmware::link::message::{Configuration, EstimateReport, Refusal, Report, Request};
-use model_core::blob::{Floats, Metadata, Model, ModelParts, encode_to_vec};
+use model_core::blob::{Floats, Metadata, Model, encode_to_vec};
 
 use super::requests::{capture, decode};
 use mock_board::*;
@@ -55,15 +55,7 @@ fn a_frame_without_a_baseline_is_flagged_until_one_is_complete() {
     let model = Model::decode(&absolute).unwrap();
     let networks: Vec<_> = model.networks().collect();
     let metadata = Metadata { relative_inputs: true, ..Metadata::unnamed(model.shape()) };
-    let parts = ModelParts {
-        projection: None,
-        expansion: None,
-        confidence: None,
-        fill: None,
-        networks: &networks,
-        row_network: &[0; ROWS],
-        metadata,
-    };
+    let parts = parts(&networks, &[0; ROWS], metadata);
     let mut slots = Flash::slots_with(&encode_to_vec(&parts).unwrap());
     let mut bench = Bench::new(quiet());
     let board = bench.board.clone();

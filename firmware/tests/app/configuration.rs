@@ -89,7 +89,8 @@ fn a_request_that_waited_during_a_long_scan_prolongs_a_lease_in_time() {
     let own = quiet();
     let slow = Configuration { frame_period_us: 1000, ..quiet() };
     let mut slots = Flash::slots_with(&blob(3, 4));
-    let mut bench = Bench::new(own).restarted(own, 700_000);
+    let mut bench = Bench::new(own);
+    bench.board.pins.borrow_mut().scan_us = 700_000;
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let leased = Request::Configure { configuration: slow, lease_ms: 500 };

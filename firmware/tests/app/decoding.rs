@@ -46,13 +46,8 @@ fn a_model_with_a_fill_decodes_rows_with_a_faulty_reading_and_tells_of_it() {
     // Readings 60 to 65 Ω that all move together.
     let block = [[60.0, 61.0, 62.0, 63.0, 64.0, 65.0], [10.0; 6], [0.4; 6]];
     let parts = ModelParts {
-        projection: None,
-        expansion: None,
-        confidence: None,
         fill: Fill::new(6, 1, block.as_flattened()).ok(),
-        networks: &networks,
-        row_network: &[0; ROWS],
-        metadata: *model.metadata(),
+        ..parts(&networks, &[0; ROWS], *model.metadata())
     };
     let filling = encode_to_vec(&parts).unwrap();
     let mut slots = Flash::slots_with(&filling);

@@ -2,7 +2,7 @@
 
 use firmware::app::Session;
 use firmware::link::message::{Configuration, EstimateReport, Report, Request};
-use model_core::blob::{Columns, Floats, Metadata, Model, ModelParts, ModelShape, encode_to_vec};
+use model_core::blob::{Columns, Floats, Metadata, Model, ModelShape, encode_to_vec};
 use model_core::checksum::CRC_32;
 use model_core::rbf::Shape;
 use model_core::rbf::direct::{self, Parameters};
@@ -17,15 +17,7 @@ fn the_identity_tells_what_the_model_was_trained_on() {
         let network = blob_of_one_row(3, 2);
         let model = Model::decode(&network).unwrap();
         let networks: Vec<_> = model.networks().collect();
-        let parts = ModelParts {
-            projection: None,
-            expansion: None,
-            confidence: None,
-            fill: None,
-            networks: &networks,
-            row_network: &[0],
-            metadata,
-        };
+        let parts = parts(&networks, &[0], metadata);
         encode_to_vec(&parts).unwrap()
     };
     let plain = Metadata::unnamed(ModelShape { rows: 1, inputs: 3, outputs: 2 });
@@ -81,16 +73,7 @@ fn blob_with(shape: ModelShape, metadata: Metadata<'_>) -> AlignedBytes {
         },
     );
     let networks = &[network.unwrap().into()];
-    encode_to_vec(&ModelParts {
-        projection: None,
-        expansion: None,
-        confidence: None,
-        fill: None,
-        networks,
-        row_network: &[0],
-        metadata,
-    })
-    .unwrap()
+    encode_to_vec(&parts(networks, &[0], metadata)).unwrap()
 }
 
 #[test]

@@ -36,7 +36,8 @@ fn frames_are_scanned_on_time_numbered_and_reported() {
 fn a_scan_longer_than_the_period_is_an_overrun() {
     let mut slots = Flash::slots_with(&blob(3, 4));
     let configuration = Configuration { frame_period_us: 100, ..quiet() };
-    let mut bench = Bench::new(configuration).restarted(configuration, 250);
+    let mut bench = Bench::new(configuration);
+    bench.board.pins.borrow_mut().scan_us = 250;
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     while board.pins.borrow().now_us < 2000 {
@@ -102,7 +103,8 @@ fn the_watchdog_is_fed_by_good_loops_only() {
 fn longest_unfed_us(gap_us: u32, scan_us: u32) -> u32 {
     let mut slots = Flash::slots_with(&blob(3, 4));
     let scanning = Configuration { frame_period_us: 10_000, send_readings: true, ..quiet() };
-    let mut bench = Bench::new(scanning).restarted(scanning, scan_us);
+    let mut bench = Bench::new(scanning);
+    bench.board.pins.borrow_mut().scan_us = scan_us;
     let board = bench.board.clone();
     // A faulty reading, so that all kinds of reports are sent.
     bench.frame.borrow_mut()[0][0] = f32::NAN;
