@@ -156,5 +156,11 @@ mod tests {
         let health = Health::of(&mut frame, 40, LIMITS, &mut faulty_columns);
         assert_eq!((health.missing, faulty_columns), (80, [u32::MAX]));
         assert!(Health::of(&mut [], 0, LIMITS, &mut []).is_good());
+        let mut frame = [60.0; 40];
+        frame[33] = 0.0;
+        // The second word is of a row that this frame lacks.
+        let mut faulty_columns = [7; 2];
+        let health = Health::of(&mut frame, 40, LIMITS, &mut faulty_columns);
+        assert_eq!((health.shorted, faulty_columns), (1, [0; 2]));
     }
 }

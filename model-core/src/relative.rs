@@ -58,4 +58,9 @@ mod tests {
         }
         assert!(differs > 1000, "the contract is the product: {differs} quotients differ from it");
     }
+    #[test]
+    fn a_baseline_that_is_none_has_no_reciprocal() {
+        let none = [f32::NAN, 0.0, -0.0, f32::INFINITY, 1e-45];
+        assert!(none.into_iter().all(|baseline| reciprocal(baseline).is_nan()));
+    }
 }

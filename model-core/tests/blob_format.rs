@@ -1,6 +1,6 @@
 //! The blob format, compared with its specification in `docs/blob.md`.
 
-use crate::common::worked_bytes;
+use crate::common::{seal, worked_bytes};
 use model_core::blob::{
     Columns, DecodeError, EncodeError, Floats, Metadata, Model, ModelParts, NoiseKind, encode,
     encoded_length_bound,
@@ -158,6 +158,18 @@ fn readings_that_overflow_are_told_from_missing_ones() {
     let estimate = decoder.decode(&frame[..]).unwrap();
     assert_eq!(estimate.status, [RowStatus::Overflow, RowStatus::Decoded]);
     assert!(estimate.outputs[0].is_nan() && estimate.outputs[1].is_finite());
+}
+
+#[test]
+fn bytes_left_over_behind_the_networks_are_refused() {
+    let mut buffer = Aligned([0; 512]);
+    let length = small_model(&mut buffer.0).len();
+    let longer = &mut buffer.0[..length + 4];
+    longer[length - 4..].fill(0);
+    let at = longer.windows(4).position(|bytes| bytes == (length as u32).to_le_bytes()).unwrap();
+    longer[at..at + 4].copy_from_slice(&(length as u32 + 4).to_le_bytes());
+    seal(longer);
+    assert_eq!(Model::decode(longer).unwrap_err(), DecodeError::LeftOver { bytes: 4 });
 }
 
 #[test]

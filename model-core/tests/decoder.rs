@@ -4,6 +4,7 @@ use model_core::blob::{DecodeError, Metadata, ModelParts, ModelShape, encode_to_
 use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
 use model_core::rbf::direct::{self, Parameters};
 use model_core::rbf::{Network, NetworkError, Shape};
+use model_core::relative::reciprocal;
 use model_core::{AlignedBytes, Decoder, Estimate, Frame, RowStatus};
 
 const ROWS: usize = 8;
@@ -189,4 +190,33 @@ fn a_slice_of_another_length_is_refused_by_name_and_nothing_is_written() {
     let expected = length("status of the estimate", ROWS, ROWS + 1);
     assert_eq!(refused(readings, COLS, outputs, ROWS + 1), expected);
     assert_eq!(refused(readings, COLS - 1, outputs, ROWS), length("scratch", COLS, COLS - 1));
+}
+
+#[test]
+fn each_row_is_divided_by_its_own_baseline() {
+    let network = Numbers::new(3);
+    let shape = ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS };
+    let blob = |relative_inputs: bool| {
+        let metadata = Metadata { relative_inputs, ..Metadata::unnamed(shape) };
+        let parts = ModelParts {
+            projection: None,
+            expansion: None,
+            confidence: None,
+            fill: None,
+            networks: &[network.network()],
+            row_network: &[0; ROWS],
+            metadata,
+        };
+        encode_to_vec(&parts).unwrap()
+    };
+    let [plain, relative] = [false, true].map(blob);
+    let [plain, relative] = [&plain, &relative].map(|blob| PaperDecoder::load(blob).unwrap());
+    let ratios = frame();
+    // Powers of two, so that nothing is rounded.
+    let baseline: Vec<f32> = (0..ROWS * COLS).map(|i| f32::from(1_u16 << (i % 11))).collect();
+    let reciprocals: Vec<f32> = baseline.iter().map(|ohm| reciprocal(*ohm)).collect();
+    let readings: Vec<f32> = ratios.iter().zip(&baseline).map(|(r, ohm)| r * ohm).collect();
+    let given = Frame { reciprocals: &reciprocals, ..readings[..].into() };
+    let [expected, found] = [plain.decode(&ratios[..]), relative.decode(given)];
+    assert_eq!(bits(&found.unwrap().outputs), bits(&expected.unwrap().outputs));
 }

@@ -1,12 +1,13 @@
 //! The board's image on an emulated board: `proof/board-emulator`. Scenarios, and mutants of the image that must
 //! fail them.
 
-mod options;
 mod mutants;
 mod copy;
 mod emulator;
 
 use std::fs;
+use std::num::NonZeroU32;
+use std::path::PathBuf;
 use std::time::Instant;
 
 use crate::emulate::qemu::decoded;
@@ -15,8 +16,23 @@ use crate::process::{Outcome, Said};
 use crate::toolchain::{Toolchain, elf};
 use copy::Copy;
 use emulator::Emulator;
-use mutants::{MUTANTS, Mutant};
-pub use options::Options;
+
+/// What to run.
+#[derive(clap::Args)]
+pub struct Options {
+    /// Build images with one fault each instead, these or all of proof/board-emulator/mutants.toml; the scenarios must fail.
+    #[arg(long)]
+    mutants: bool,
+    /// Frames that `check` decodes.
+    #[arg(long, value_name = "N", default_value = "30")]
+    frames: NonZeroU32,
+    /// Blob to upload, of the scene `press`, instead of a small one.
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// Scenarios or mutants to run; all if there are none.
+    #[arg(value_name = "NAME")]
+    names: Vec<String>,
+}
 
 /// Name of the image.
 const IMAGE: &str = "nucleo-f446re";
@@ -32,13 +48,15 @@ const LOGGED: [(&str, &str); 3] = [
 ];
 
 /// Builds what is needed, and runs the scenarios or the mutants that are named, or all.
-pub fn run(options: &Options<'_>) -> Outcome {
+pub fn run(options: &Options) -> Outcome {
     let emulator = Emulator::prepare(options)?;
     let toolchain = Toolchain::find()?;
     if options.mutants {
         return run_mutants(&emulator, &toolchain, &options.names);
     }
-    let run = |scenario: &str| options.names.is_empty() || options.names.contains(&scenario);
+    let run = |scenario: &str| {
+        options.names.is_empty() || options.names.iter().any(|name| name == scenario)
+    };
     build_image(&toolchain, NUCLEO)?;
     if run(WIDE) {
         Copy::make()?.build_wide(&toolchain)?;
@@ -54,19 +72,18 @@ pub fn run(options: &Options<'_>) -> Outcome {
     Ok(())
 }
 
-fn run_mutants(emulator: &Emulator, toolchain: &Toolchain, names: &[&str]) -> Outcome {
-    let chosen = choose(names)?;
+fn run_mutants(emulator: &Emulator, toolchain: &Toolchain, names: &[String]) -> Outcome {
     let copy = Copy::make()?;
     let mut survived = Vec::new();
-    for mutant in chosen {
+    for mutant in mutants::load(names)? {
         let start = Instant::now();
-        let image = copy.build_mutant(toolchain, mutant)?;
-        let Said { out, err, outcome } = emulator.capture(&image, mutant.scenario);
+        let image = copy.build_mutant(toolchain, &mutant)?;
+        let Said { out, err, outcome } = emulator.capture(&image, &mutant.scenario);
         fs::remove_file(&image).map_err(|cause| format!("{}: {cause}", image.display()))?;
         let seconds = start.elapsed().as_secs_f64();
-        let red = outcome.is_err() && out.contains(mutant.shown_by);
+        let red = outcome.is_err() && out.contains(&mutant.shown_by);
         if red {
-            let (name, scenario) = (mutant.name, mutant.scenario);
+            let (name, scenario) = (&mutant.name, &mutant.scenario);
             println!("red     {name:20} in {scenario}: {} ({seconds:.0} s)", mutant.shown_by);
         } else {
             print!("{err}{out}");
@@ -78,28 +95,5 @@ fn run_mutants(emulator: &Emulator, toolchain: &Toolchain, names: &[&str]) -> Ou
         Ok(())
     } else {
         Err(format!("the emulated board does not notice {}", survived.join(", ")))
-    }
-}
-
-/// The mutants of these names; all if no name is given.
-fn choose(names: &[&str]) -> Outcome<Vec<&'static Mutant>> {
-    let find = |name: &&str| {
-        MUTANTS.iter().find(|mutant| mutant.name == *name).ok_or_else(|| {
-            let all: Vec<_> = MUTANTS.iter().map(|mutant| mutant.name).collect();
-            format!("there is no mutant `{name}`, but {}", all.join(", "))
-        })
-    };
-    if names.is_empty() { Ok(MUTANTS.iter().collect()) } else { names.iter().map(find).collect() }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn mutants_are_chosen_by_name() {
-        assert_eq!(choose(&[]).unwrap().len(), MUTANTS.len());
-        assert_eq!(choose(&["sck-slow"]).unwrap()[0].name, "sck-slow");
-        assert!(choose(&["sck-slo"]).is_err_and(|error| error.contains("sck-slow")));
     }
 }

@@ -18,10 +18,9 @@ mod fit;
 mod table;
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
-use taxel_learn::cost::Design;
 
 use crate::emulate::qemu;
 use crate::firmware::{BENCH, build_image};
@@ -29,7 +28,6 @@ use crate::process::{Outcome, root, target_dir};
 use crate::toolchain::{Toolchain, elf};
 use figures::{Accepted, Figure};
 use image::Image;
-pub use trace::Count as Counted;
 
 /// Name of the image that is measured.
 const IMAGE: &str = "qemu-bench";
@@ -39,61 +37,30 @@ const DATA: &str = "firmware/cycles.csv";
 const DOCUMENT: &str = "docs/cycles.md";
 const HEADING: &str = "## Figures\n";
 
-/// Options from the command line.
-#[derive(Debug, PartialEq, Eq, Default)]
-pub struct Options<'a> {
-    /// Whether to print JSON, and nothing else, to stdout.
-    pub json: bool,
-    /// Whether to write the accepted figures instead of comparing with them.
-    pub accept: bool,
-    /// Whether to fit the prices of `host-sim`'s predictions instead.
-    pub fit: bool,
-    /// Blob to measure, and to show beside what is predicted of it.
-    pub model: Option<&'a str>,
-    /// The only kernel to show, which is compared with its budget only.
-    pub kernel: Option<&'a str>,
-}
-
-impl<'a> Options<'a> {
-    /// Parses the options of the command line.
-    ///
-    /// # Errors
-    /// The option that is unknown or lacks its value, or options that exclude each other.
-    pub fn parse(arguments: &[&'a str]) -> Result<Self, String> {
-        let mut options = Self::default();
-        let mut arguments = arguments.iter().copied();
-        while let Some(argument) = arguments.next() {
-            let mut value = |what: &str| {
-                arguments.next().ok_or_else(|| format!("`{argument}` needs {what} behind it"))
-            };
-            match argument {
-                "--json" => options.json = true,
-                "--accept" => options.accept = true,
-                "--fit" => options.fit = true,
-                "--model" => options.model = Some(value("a file")?),
-                "--kernel" => options.kernel = Some(value("a name")?),
-                _ => return Err(format!("unknown option `{argument}`")),
-            }
-        }
-        let chosen = [
-            ("--accept", options.accept),
-            ("--fit", options.fit),
-            ("--model", options.model.is_some()),
-            ("--kernel", options.kernel.is_some()),
-        ];
-        let chosen: Vec<&str> =
-            chosen.into_iter().filter(|(_, given)| *given).map(|(name, _)| name).collect();
-        match chosen[..] {
-            [one, other, ..] => Err(format!("`{one}` and `{other}` exclude each other")),
-            _ => Ok(options),
-        }
-    }
+/// What to do besides comparing with budgets and accepted figures.
+#[derive(clap::Args)]
+pub struct Options {
+    /// Print a list of objects to stdout, and nothing else.
+    #[arg(long)]
+    json: bool,
+    /// Write firmware/cycles.csv and the tables of docs/cycles.md instead of comparing.
+    #[arg(long)]
+    accept: bool,
+    /// Fit firmware/prices.csv anew, from which `host-sim` predicts any model's cost, to 750 random models.
+    #[arg(long, conflicts_with = "accept")]
+    fit: bool,
+    /// Count frames of this model, of any shape, and print what is predicted beside.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["accept", "fit"])]
+    model: Option<PathBuf>,
+    /// Show this kernel only, and compare it with its budget only.
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["accept", "fit", "model"])]
+    kernel: Option<String>,
 }
 
 /// Measures, prints, and compares with budgets and accepted figures.
-pub fn run(options: &Options<'_>) -> Outcome {
-    if let Some(model) = options.model.filter(|model| !Path::new(model).is_file()) {
-        return Err(format!("--model {model}: there is no such file"));
+pub fn run(options: &Options) -> Outcome {
+    if let Some(model) = options.model.as_ref().filter(|model| !model.is_file()) {
+        return Err(format!("--model {}: there is no such file", model.display()));
     }
     qemu::present()?;
     let toolchain = Toolchain::find()?;
@@ -105,10 +72,10 @@ pub fn run(options: &Options<'_>) -> Outcome {
         eprintln!("{}", fit::judge(&image, &directory, &compiler)?);
         return Ok(());
     }
-    if let Some(model) = options.model {
-        return fit::compare(Path::new(model), &image, options.json);
+    if let Some(model) = &options.model {
+        return fit::compare(model, &image, options.json);
     }
-    let measured = measure(&image, &directory, options.kernel)?;
+    let measured = measure(&image, &directory, options.kernel.as_deref())?;
     print!("{}", if options.json { table::json(&measured) } else { table::markdown(&measured) });
     let over_budget = figures::over_budget(&measured);
     if !over_budget.is_empty() {
@@ -172,29 +139,6 @@ fn measure(image: &Image, directory: &Path, kernel: Option<&str>) -> Outcome<Vec
     Ok(figures)
 }
 
-/// Predicted and counted cost of a frame of the model at `path`, which has this `design`, without a gate and with all
-/// weights in RAM.
-///
-/// # Errors
-/// The run fails, or the prediction is off by more than a few per cent.
-pub fn frame_of(design: &Design, path: &Path) -> Outcome<[Counted; 2]> {
-    let frames = fit::frames(design, &Image::read(elf(IMAGE))?.run(path)?);
-    let predicted = fit::predicted(&frames)?;
-    let (frame, predicted) =
-        frames.first().zip(predicted.first()).ok_or("no frame was measured")?;
-    let (instructions, cycles) = (predicted.instructions, predicted.cycles);
-    let predicted = Counted { instructions, cycles, flash_cycles: predicted.flash_cycles };
-    let counted = frame.count;
-    let off = predicted.cycles.abs_diff(counted.cycles) as f64 / counted.cycles as f64;
-    if 100.0 * off > fit::MOST_PERCENT[1] {
-        return Err(format!(
-            "{}: {predicted:?} was predicted, {counted:?} counted",
-            path.display()
-        ));
-    }
-    Ok([predicted, counted])
-}
-
 /// The `document` with the tables of `accepted` figures at its end.
 fn in_document(document: &str, accepted: &Accepted) -> Outcome<String> {
     let start = document.find(HEADING).ok_or(format!("{DOCUMENT} lacks {}", HEADING.trim()))?;
@@ -209,21 +153,6 @@ fn read(file: &str) -> Outcome<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn options_come_in_any_order_and_what_makes_no_sense_is_named() {
-        let model = Options { json: true, model: Some("a.bin"), ..Options::default() };
-        assert_eq!(Options::parse(&["--model", "a.bin", "--json"]), Ok(model));
-        for (arguments, named) in [
-            (&["--json", "--jsn"][..], "`--jsn`"),
-            (&["a.bin"], "`a.bin`"),
-            (&["--model"], "`--model`"),
-            (&["--kernel", "f32", "--accept"], "`--accept` and `--kernel`"),
-        ] {
-            let message = Options::parse(arguments).unwrap_err();
-            assert!(message.contains(named), "{message}");
-        }
-    }
 
     #[test]
     fn the_tables_of_the_document_are_those_of_the_data() {

@@ -16,20 +16,23 @@ use crate::toolchain::{Toolchain, elf};
 /// Name of the application among the programs.
 const APPLICATION: &str = "application";
 
-/// What happens if a program's output differs from the expected one.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub enum Differences {
-    Fail,
-    /// Write the output into the file beside the program.
-    Accept,
+/// What to run.
+#[derive(clap::Args)]
+pub struct Options {
+    /// Write the .out files instead of comparing.
+    #[arg(long)]
+    accept: bool,
+    /// Programs to run; all if there are none. `application` is compared with the host. Their logs are printed.
+    #[arg(value_name = "NAME")]
+    names: Vec<String>,
 }
 
 /// Runs the programs of these names, or all and the application, and compares their logs with the expected ones.
 /// Prints the logs of programs that were named.
-pub fn run(names: &[&str], differences: Differences) -> Outcome {
+pub fn run(options: &Options) -> Outcome {
     let all = programs(&root().join("firmware/qemu/src/bin"))?;
     let (application, names): (Vec<&str>, Vec<&str>) =
-        names.iter().partition(|name| **name == APPLICATION);
+        options.names.iter().map(|name| &**name).partition(|name| *name == APPLICATION);
     let everything = application.is_empty() && names.is_empty();
     let chosen = if application.is_empty() || !names.is_empty() {
         choose(&all, &names)?
@@ -49,7 +52,7 @@ pub fn run(names: &[&str], differences: Differences) -> Outcome {
     }
     jobs.extend(chosen.into_iter().map(Job::Program));
     let work = |job: &Job| match job {
-        Job::Program(program) => run_program(program, differences, !names.is_empty()),
+        Job::Program(program) => run_program(program, options.accept, !names.is_empty()),
         Job::Application(check) => check.run(),
     };
     queue::work_through(&jobs, work, |job, said: Said| {
@@ -97,10 +100,10 @@ fn conclude(name: &str, outcome: Outcome, failed: &mut Vec<String>) {
     }
 }
 
-fn run_program(program: &Path, differences: Differences, show: bool) -> Said {
+fn run_program(program: &Path, accept: bool, show: bool) -> Said {
     match qemu::run(&elf(&name(program))) {
         Ok(ended) => Said {
-            outcome: check(program, &ended.log, differences),
+            outcome: check(program, &ended.log, accept),
             out: if show { ended.log } else { String::new() },
             err: ended.complaints,
         },
@@ -119,9 +122,9 @@ pub fn print_log(log: &str, image: Option<&str>) -> Outcome {
     Ok(())
 }
 
-fn check(program: &Path, output: &str, differences: Differences) -> Outcome {
+fn check(program: &Path, output: &str, accept: bool) -> Outcome {
     let beside = program.with_extension("out");
-    if differences == Differences::Accept {
+    if accept {
         return fs::write(&beside, output)
             .map_err(|cause| format!("{}: {cause}", beside.display()));
     }

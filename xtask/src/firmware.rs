@@ -20,10 +20,6 @@ pub const QEMU: Packages = &["--package", "qemu-image", "--features", "programs"
 pub const BENCH: Packages =
     &["--package", "qemu-image", "--features", "programs", "--bin", "qemu-bench"];
 
-/// The application's image for the emulator, as `cargo xtask sensors` builds it for wide sensors.
-pub const APP: Packages =
-    &["--package", "qemu-image", "--features", "programs", "--bin", "qemu-app"];
-
 /// The board's image.
 pub const NUCLEO: Packages = &["--package", "nucleo-f446re"];
 

@@ -14,22 +14,36 @@ use crate::output;
 const PIECE: usize = 16 * 1024;
 const PIECES: usize = 64;
 
-/// Column of a CSV file that is written: its name, and whether its numbers are those of an f32.
+/// Column of a CSV file that is written: its name, and what its fields are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Column<'n> {
     name: &'n str,
-    is_f32: bool,
+    fields: Fields<'n>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Fields<'n> {
+    /// Numbers that a line has.
+    F64,
+    F32,
+    /// The fields of all lines.
+    Texts(&'n [String]),
 }
 
 impl<'n> Column<'n> {
     /// Column called `name`, whose numbers read back as the same f64.
     pub fn f64(name: &'n str) -> Self {
-        Self { name, is_f32: false }
+        Self { name, fields: Fields::F64 }
     }
 
     /// Column called `name` whose numbers were computed in f32: they get the digits that read back as the same f32.
     pub fn f32(name: &'n str) -> Self {
-        Self { name, is_f32: true }
+        Self { name, fields: Fields::F32 }
+    }
+
+    /// Column called `name` of these `texts`, one a line, which are written as they are and need no quotes.
+    pub fn texts(name: &'n str, texts: &'n [String]) -> Self {
+        Self { name, fields: Fields::Texts(texts) }
     }
 }
 
@@ -43,7 +57,8 @@ pub fn write<'n, L: IntoIterator<Item = f64>>(
     write_columns(path, names.into_iter().map(Column::f64), lines)
 }
 
-/// Writes a CSV file as [`write()`] does, but with fewer digits where a column needs no more.
+/// Writes a CSV file as [`write()`] does, but with fewer digits where a column needs no more. `lines` hold the numbers of
+/// the columns that are no texts.
 pub fn write_columns<'n, L: IntoIterator<Item = f64>>(
     path: &Path,
     columns: impl IntoIterator<Item = Column<'n>>,
@@ -59,9 +74,11 @@ pub fn write_columns<'n, L: IntoIterator<Item = f64>>(
         file.write_all(&header).map_err(error)?;
         let mut lines = lines.into_iter();
         let mut pieces = vec![Piece::default(); PIECES];
+        let mut written = 0;
         loop {
             let mut filled = 0;
-            while filled < PIECES && pieces[filled].fill(&mut lines) {
+            while filled < PIECES && pieces[filled].fill(written, &mut lines) {
+                written += pieces[filled].line_ends.len();
                 filled += 1;
             }
             pieces[..filled].par_iter_mut().for_each(|piece| piece.write_text(&columns));
@@ -78,6 +95,8 @@ pub fn write_columns<'n, L: IntoIterator<Item = f64>>(
 /// Lines to be written together, as numbers and as text.
 #[derive(Clone, Default)]
 struct Piece {
+    /// Index of the first line in the file.
+    first: usize,
     values: Vec<f64>,
     /// Index in the values at which each line ends.
     line_ends: Vec<usize>,
@@ -85,11 +104,16 @@ struct Piece {
 }
 
 impl Piece {
-    /// Takes the next lines; returns false if none are left.
-    fn fill<L: IntoIterator<Item = f64>>(&mut self, lines: &mut impl Iterator<Item = L>) -> bool {
+    /// Takes the next lines, behind so many others; returns false if none are left.
+    fn fill<L: IntoIterator<Item = f64>>(
+        &mut self,
+        first: usize,
+        lines: &mut impl Iterator<Item = L>,
+    ) -> bool {
+        self.first = first;
         self.values.clear();
         self.line_ends.clear();
-        while self.values.len() < PIECE
+        while self.values.len().max(self.line_ends.len()) < PIECE
             && let Some(line) = lines.next()
         {
             self.values.extend(line);
@@ -101,19 +125,22 @@ impl Piece {
     fn write_text(&mut self, columns: &[Column<'_>]) {
         self.text.clear();
         let mut from = 0;
-        for end in &self.line_ends {
-            let line = &self.values[from..*end];
+        for (line, end) in (self.first..).zip(&self.line_ends) {
+            let mut values = self.values[from..*end].iter();
             from = *end;
-            for (place, value) in line.iter().enumerate() {
+            let start = self.text.len();
+            for (place, column) in columns.iter().enumerate() {
                 if place > 0 {
                     self.text.push(b',');
                 }
-                let write = if columns[place].is_f32 { write_f32 } else { write_number };
-                write(&mut self.text, *value);
+                let mut value = || values.next().copied().unwrap_or(f64::NAN);
+                match column.fields {
+                    Fields::F64 => write_number(&mut self.text, value()),
+                    Fields::F32 => write_f32(&mut self.text, value()),
+                    Fields::Texts(texts) => self.text.extend_from_slice(texts[line].as_bytes()),
+                }
             }
-            if let [value] = line
-                && value.is_nan()
-            {
+            if self.text.len() == start {
                 self.text.extend_from_slice(b"NaN"); // a blank line would be no line
             }
             self.text.push(b'\n');

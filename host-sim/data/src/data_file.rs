@@ -27,6 +27,17 @@ pub struct DataFile {
     pub(crate) values: Vec<f64>,
     /// Line number in the file (from 1) of each line of data.
     pub(crate) line_numbers: Vec<u64>,
+    /// Bytes of a CSV file whose fields are wanted as they are written.
+    pub(crate) text: Option<Vec<u8>>,
+}
+
+/// How a data file is read.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Reading {
+    /// Whether the first line of a CSV file is a header even if it holds numbers alone.
+    pub has_header: bool,
+    /// Whether [`DataFile::texts`] gives the fields of a CSV file as they are written. This takes the memory of the file.
+    pub keeps_text: bool,
 }
 
 impl DataFile {
@@ -41,23 +52,24 @@ impl DataFile {
     /// repeated column name, a line with too few or too many fields, or a field that is not a number. Also for arrays
     /// of more than two dimensions, of other elements than numbers, or of different lengths.
     pub fn read(path: &Path) -> Result<Self> {
-        Self::parse(path, &input::read(path, input::MOST_DATA_BYTES)?, false)
+        Self::read_as(path, Reading::default())
     }
 
-    /// Reads the file at `path` as [`read`](Self::read) does, but for the first line of a CSV file: it is a header even
-    /// if it holds numbers alone.
-    pub fn read_with_header(path: &Path) -> Result<Self> {
-        Self::parse(path, &input::read(path, input::MOST_DATA_BYTES)?, true)
+    /// Reads the file at `path` as [`read`](Self::read) does, but for what `reading` says.
+    pub fn read_as(path: &Path, reading: Reading) -> Result<Self> {
+        let bytes = input::read(path, input::MOST_DATA_BYTES)?;
+        let mut file = Self::parse(path, &bytes, reading.has_header)?;
+        let is_array = ["npy", "npz"].into_iter().any(|kind| has_extension(path, kind));
+        file.text = Some(bytes).filter(|_| reading.keeps_text && !is_array);
+        Ok(file)
     }
 
     /// Parses `bytes` as [`read`](Self::read) does those of the file at `path`, whose extension tells what they are. The
     /// first line of a CSV file is a header even if it holds numbers alone, if it `has_header`.
     pub fn parse(path: &Path, bytes: &[u8], has_header: bool) -> Result<Self> {
-        let ends_in =
-            |kind: &str| path.extension().is_some_and(|end| end.eq_ignore_ascii_case(kind));
-        if ends_in("npy") {
+        if has_extension(path, "npy") {
             npy::parse_array(path, bytes)
-        } else if ends_in("npz") {
+        } else if has_extension(path, "npz") {
             npy::parse_archive(path, bytes)
         } else {
             csv::parse(path, bytes, has_header, 0)
@@ -111,6 +123,26 @@ impl DataFile {
         self.values[line * self.header.len() + column]
     }
 
+    /// Fields of these `columns` (from 0), each column's line after line: as they are written, without spaces around, in a
+    /// CSV file that was read with its text; otherwise the shortest digits of their numbers. A missing value is "".
+    pub fn texts(&self, columns: &[usize]) -> Vec<Vec<String>> {
+        let mut texts = vec![Vec::with_capacity(self.lines()); columns.len()];
+        let mut put = |line: usize, field: &dyn Fn(usize) -> String| {
+            for (texts, &column) in texts.iter_mut().zip(columns) {
+                let is_missing = self.value(line, column).is_nan();
+                texts.push(if is_missing { String::new() } else { field(column) });
+            }
+        };
+        match &self.text {
+            Some(text) => csv::for_each_record(self, text, |line, record| {
+                put(line, &|column| record.get(column).unwrap_or_default().trim().to_owned());
+            }),
+            None => (0..self.lines())
+                .for_each(|line| put(line, &|column| self.value(line, column).to_string())),
+        }
+        texts
+    }
+
     /// Number in the file (from 1, header included) of the line of data `line` (from 0), for messages.
     pub fn line_number(&self, line: usize) -> u64 {
         self.line_numbers[line]
@@ -128,6 +160,10 @@ impl DataFile {
     pub fn columns<'n>(&self, names: impl IntoIterator<Item = &'n str>) -> Result<Vec<usize>> {
         names.into_iter().map(|name| self.column(name)).collect()
     }
+}
+
+fn has_extension(path: &Path, kind: &str) -> bool {
+    path.extension().is_some_and(|end| end.eq_ignore_ascii_case(kind))
 }
 
 /// Names `c1`, `c2`, … of columns without names.

@@ -247,16 +247,26 @@ pub enum Problem {
     #[error(
         "line {line}, column {}: {} is earlier than {} before it; sort the lines by time, or split the file where the \
          clock was set back",
-        quoted(column), number(*value), number(*before)
+        quoted(column),
+        cut(value),
+        cut(before)
     )]
     ClockSetBack {
         line: u64,
         column: String,
         /// Time stamp of the line.
-        value: f64,
+        value: String,
         /// Latest time stamp before it.
-        before: f64,
+        before: String,
     },
+    /// Time stamps of which f64 does not hold every digit, and which are no whole numbers in text either.
+    #[error(
+        "line {line}, column {}: the time stamp {} has more digits than numbers hold (above 2^53 = 9007199254740992); \
+         give whole numbers in a CSV file, or a smaller unit's count from a later start",
+        quoted(column),
+        cut(value)
+    )]
+    InexactTime { line: u64, column: String, value: String },
     /// Log of which no line has a partner in another one.
     #[error(
         "no time stamp is within tolerance = {} of one in {other}: the nearest are {} apart; raise the tolerance, set \

@@ -1,8 +1,10 @@
 //! Two logs joined by time: each line of one with the line of the other whose time stamp is nearest.
 
 use crate::data_file::DataFile;
-use crate::digest;
 use crate::error::{BadValue, Error, Problem, Result, require};
+
+/// Largest magnitude up to which f64 holds every whole number: 2^53.
+const MOST_EXACT: f64 = 9_007_199_254_740_992.0;
 
 /// How two logs are joined.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,14 +17,13 @@ pub struct Join {
     pub lag: f64,
 }
 
-/// Two logs side by side.
+/// Which lines of two logs belong together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Joined {
-    /// Lines of the first log that found a partner, with the partner's columns after their own. A column whose name the
-    /// first log has too is called `b.NAME`. Line numbers are those of the first log.
-    pub file: DataFile,
-    /// Number of lines of the first log without a partner, which are left out.
-    pub left_out: usize,
+    /// Names of the columns: the first log's, then the second's. A name that is there already becomes `b.NAME`.
+    pub header: Vec<String>,
+    /// Index (from 0) of each line of the first log that found a partner, and the partner's in the second.
+    pub pairs: Vec<[usize; 2]>,
     /// Number of lines of the second log that repeat the time stamp of a line before, and are never a partner.
     pub repeated: usize,
     /// Largest distance of two time stamps that were joined, in their unit.
@@ -42,16 +43,39 @@ impl Join {
     /// Joins each line of `first` with the line of `second` whose time stamp, plus the lag, is nearest. Of two that are
     /// equally near it takes the earlier one. Lines without a time stamp have no partner.
     ///
+    /// Time stamps beyond ±2^53, such as nanoseconds since 1970, are compared as the whole numbers that the text of the
+    /// files has.
+    ///
     /// # Errors
-    /// [`Error::File`] for a column of time stamps that is not there, for time stamps that decrease, and if no line
-    /// finds a partner.
+    /// [`Error::File`] for a column of time stamps that is not there, for time stamps that decrease or of which not every
+    /// digit is known, and if no line finds a partner.
     pub fn join(&self, first: &DataFile, second: &DataFile) -> Result<Joined> {
-        let times = time_stamps(first, &self.on[0])?;
-        let mut others = time_stamps(second, &self.on[1])?;
+        let on = [(first, first.column(&self.on[0])?), (second, second.column(&self.on[1])?)];
+        let is_large = |(file, column): &(&DataFile, usize)| {
+            file.rows().any(|row| row[*column].abs() > MOST_EXACT)
+        };
+        let stamps = if on.iter().any(is_large) {
+            let [times, others] = on.map(|(file, column)| whole_numbers(file, column));
+            let stamps = [times?, others?];
+            // Differences of whole numbers are exact, and small.
+            let origin = stamps.iter().flatten().flatten().next().copied().unwrap_or(0);
+            stamps.map(|log| log.into_iter().map(|time| Some((time? - origin) as f64)).collect())
+        } else {
+            on.map(|(file, column)| {
+                let times = file.rows().map(|row| Some(row[column]).filter(|time| !time.is_nan()));
+                times.collect::<Vec<_>>()
+            })
+        };
+        for ((file, column), times) in on.iter().zip(&stamps) {
+            check_order(file, *column, times)?;
+        }
+        let [times, mut others] = stamps.map(|times| {
+            let times = times.into_iter().enumerate();
+            times.filter_map(|(line, time)| Some((line, time?))).collect::<Vec<_>>()
+        });
         let stamped = others.len();
         others.dedup_by_key(|(_, time)| *time); // keeps the first of equal ones
-        let mut values = vec![];
-        let mut line_numbers = vec![];
+        let mut pairs = vec![];
         let mut largest_distance = 0.0_f64;
         let mut nearest_distance = f64::INFINITY;
         for (line, time) in &times {
@@ -63,11 +87,9 @@ impl Join {
                 continue;
             }
             largest_distance = largest_distance.max(distance);
-            values.extend_from_slice(first.row(*line));
-            values.extend_from_slice(second.row(partner));
-            line_numbers.push(first.line_number(*line));
+            pairs.push([*line, partner]);
         }
-        if line_numbers.is_empty() {
+        if pairs.is_empty() {
             let other = second.path.display().to_string();
             let problem = if nearest_distance.is_finite() {
                 let (tolerance, distance) = (self.tolerance, nearest_distance);
@@ -85,42 +107,40 @@ impl Join {
             }
             header.push(name);
         }
-        let both = [first.digest.to_le_bytes(), second.digest.to_le_bytes()];
-        let how = [self.tolerance.to_le_bytes(), self.lag.to_le_bytes()];
-        let left_out = first.lines() - line_numbers.len();
-        let file = DataFile {
-            path: format!("{} joined with {}", first.path.display(), second.path.display()).into(),
-            header,
-            names_columns: first.names_columns && second.names_columns,
-            lacks_last_line_end: false,
-            digest: digest::digest(&[both, how].concat().concat()),
-            values,
-            line_numbers,
-        };
-        Ok(Joined { file, left_out, repeated: stamped - others.len(), largest_distance })
+        Ok(Joined { header, pairs, repeated: stamped - others.len(), largest_distance })
     }
 }
 
-/// Line (from 0) and time stamp of each line of `file` that has one in the column called `name`. They may repeat, but
-/// not decrease: after a clock was set back, a time stamp tells no longer which line is meant.
-fn time_stamps(file: &DataFile, name: &str) -> Result<Vec<(usize, f64)>> {
-    let column = file.column(name)?;
-    let mut times: Vec<(usize, f64)> = vec![];
-    for line in 0..file.lines() {
-        let time = file.value(line, column);
-        if time.is_nan() {
-            continue;
+/// Time stamps in the `column` of `file`, as whole numbers; `None` where one is missing.
+fn whole_numbers(file: &DataFile, column: usize) -> Result<Vec<Option<i128>>> {
+    let texts = file.texts(&[column]).remove(0).into_iter().enumerate();
+    let numbers = texts.map(|(line, text)| {
+        if text.is_empty() {
+            return Ok(None);
         }
-        if let Some(&(_, before)) = times.last()
-            && time < before
-        {
-            let (line, column) = (file.line_number(line), name.into());
-            let problem = Problem::ClockSetBack { line, column, value: time, before };
-            return Err(Error::file(&file.path, problem));
-        }
-        times.push((line, time));
-    }
-    Ok(times)
+        // An array has no text: digits of its numbers are lost already.
+        let number = text.parse().ok().filter(|_| file.text.is_some());
+        number.map(Some).ok_or_else(|| {
+            let (line, column) = (file.line_number(line), file.header[column].clone());
+            Error::file(&file.path, Problem::InexactTime { line, column, value: text })
+        })
+    });
+    numbers.collect()
+}
+
+/// Checks that `times` in the `column` of `file` do not decrease: after a clock was set back, a time stamp tells no longer
+/// which line is meant. They may repeat.
+fn check_order(file: &DataFile, column: usize, times: &[Option<f64>]) -> Result<()> {
+    let stamped = (0..times.len()).filter_map(|line| Some((line, times[line]?)));
+    let Some(((earlier, _), (line, _))) =
+        stamped.clone().zip(stamped.skip(1)).find(|((_, before), (_, time))| time < before)
+    else {
+        return Ok(());
+    };
+    let texts = file.texts(&[column]).remove(0);
+    let [before, value] = [earlier, line].map(|line| texts[line].clone());
+    let (line, column) = (file.line_number(line), file.header[column].clone());
+    Err(Error::file(&file.path, Problem::ClockSetBack { line, column, value, before }))
 }
 
 /// Line whose time stamp plus `lag` is nearest to `time`, and their distance. `times` increase.

@@ -129,7 +129,6 @@ impl DataArguments {
             .is_some_and(|end| ["npy", "npz"].iter().any(|kind| end.eq_ignore_ascii_case(kind)));
         for (option, given) in [
             ("--fold-column", self.fold_column.is_some()),
-            ("--join", self.file.join().is_some()),
             ("--first-share and --last-share", self.file.takes_a_share()),
             ("--confidence", how.confidence),
             ("an array of numpy's", is_array),
@@ -275,10 +274,6 @@ impl DataArguments {
             JudgedBy::HeldOut => return Ok(Judged::HeldOut),
             JudgedBy::File(path) => path,
         };
-        if self.file.join().is_some() {
-            let message = "--test with --join: join the test file first with `join`, and give the joined files";
-            return Err(Error::Usage(message.into()));
-        }
         let file = self.file.fields().read(path)?;
         if file.digest == digest {
             let message = "it is the file that is trained on, which would flatter the model: give other frames (--test)";

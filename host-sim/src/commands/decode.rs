@@ -16,7 +16,7 @@ use taxel_learn::{Exponential, ModelBlob, PreparedModel};
 use super::arguments::exponential;
 use super::data_file::DataFileArguments;
 use super::health::{Health, HealthArguments};
-use super::readings::{BaselineArgument, model_inputs, table_of};
+use super::readings::{BaselineArgument, model_inputs};
 use super::{Common, print};
 
 /// Decode readings from a data file, one line of estimates a line.
@@ -44,7 +44,7 @@ pub struct Arguments {
     /// CSV file to write, with the model's output columns.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Columns of the readings' file that are written too, in front of the estimates, such as the time.
+    /// Columns of the readings' file that are written too, as they stand there, in front of the estimates: the time, say.
     #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
     keep: Vec<String>,
     /// Also write a column NAME_deviation for each output NAME, and novelty_nats, of a model with a confidence: 68 % of
@@ -77,14 +77,17 @@ struct Summary {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let baseline = arguments.baseline.baseline.as_ref().unwrap_or(&arguments.readings);
-    let joined = arguments.file.join().unwrap_or(&arguments.readings);
-    let read = [&*arguments.model, &arguments.readings, baseline, joined];
+    let read = [&*arguments.model, &arguments.readings, baseline];
     print::check_output(&arguments.output, &read)?;
     let blob = ModelBlob::read(&arguments.model)?;
     let model = blob.prepare(arguments.exponential);
     let (fields, limits) = (arguments.file.fields(), arguments.health.limits());
     let model = arguments.baseline.apply(model, &arguments.model, fields, limits)?;
-    let file = arguments.file.read(&arguments.readings)?;
+    let file = if arguments.keep.is_empty() {
+        arguments.file.read(&arguments.readings)?
+    } else {
+        arguments.file.read_with_text(&arguments.readings)?
+    };
     let mut readings = model_inputs(&model, &file)?;
     let health = arguments.health.apply(&model, &mut readings)?;
     remark_on_range(&model, &readings);
@@ -167,9 +170,9 @@ fn flags(
 }
 
 /// Name of the column of flags: `status`, or with underlines behind it if the model has an output of that name.
-fn status_name(names: &[String]) -> String {
+fn status_name(names: &[&str]) -> String {
     let mut name = String::from("status");
-    while names.contains(&name) {
+    while names.contains(&&*name) {
         name.push('_');
     }
     name
@@ -179,20 +182,21 @@ fn status_name(names: &[String]) -> String {
 /// frame), and each frame's `flags`.
 fn write(
     path: &Path,
-    keep: &Table,
+    keep: &[(&str, Vec<String>)],
     estimate: &Table,
     assessed: Option<&(Vec<f64>, Vec<f64>)>,
     flags: &[u8],
 ) -> Result<()> {
     let outputs = estimate.names.len();
-    let status = status_name(&[&estimate.names[..], &keep.names].concat());
+    let names = estimate.names.iter().map(String::as_str).chain(keep.iter().map(|(name, _)| *name));
+    let status = status_name(&names.collect::<Vec<_>>());
     let flags = flags.iter().map(|flags| f64::from(*flags));
-    let kept = keep.names.iter().map(|name| Column::f64(name));
+    let kept = keep.iter().map(|(name, texts)| Column::texts(name, texts));
     let estimated = estimate.names.iter().map(|name| Column::f32(name));
-    let lines = (0..estimate.len()).map(|line| [keep.line(line), estimate.line(line)]);
+    let lines = estimate.lines();
     let Some((deviations, novelty)) = assessed else {
         let lines = lines.zip(flags);
-        let lines = lines.map(|(parts, flags)| parts.into_iter().flatten().copied().chain([flags]));
+        let lines = lines.map(|(values, flags)| values.iter().copied().chain([flags]));
         let columns = kept.chain(estimated).chain([Column::f64(&status)]);
         return Ok(csv_file::write_columns(path, columns, lines)?);
     };
@@ -201,15 +205,19 @@ fn write(
     let columns = kept.chain(estimated).chain(names.iter().map(|name| Column::f32(name)));
     let columns = columns.chain([Column::f64("novelty_nats"), Column::f64(&status)]);
     let lines = lines.zip(deviations.chunks_exact(outputs)).zip(novelty.iter().zip(flags));
-    let lines = lines.map(|((parts, deviations), (novelty, flags))| {
-        let values = parts.into_iter().flatten().chain(deviations).copied();
+    let lines = lines.map(|((values, deviations), (novelty, flags))| {
+        let values = values.iter().chain(deviations).copied();
         values.chain([*novelty, flags])
     });
     Ok(csv_file::write_columns(path, columns, lines)?)
 }
 
-/// Columns of `file` to write in front of the `outputs`.
-fn kept(keep: &[String], file: &DataFile, outputs: &Table) -> Result<Table> {
+/// Columns of `file` to write in front of the `outputs`: names, and fields as they are written.
+fn kept<'k>(
+    keep: &'k [String],
+    file: &DataFile,
+    outputs: &Table,
+) -> Result<Vec<(&'k str, Vec<String>)>> {
     let names = || keep.iter().map(|name| name.trim());
     if let Some(name) = names().find(|name| outputs.names.iter().any(|output| output == name)) {
         let message =
@@ -220,11 +228,12 @@ fn kept(keep: &[String], file: &DataFile, outputs: &Table) -> Result<Table> {
     if let Some(place) = (0..keep.len()).find(|place| repeated(*place)) {
         return Err(Error::Usage(format!("--keep {}: name each column once", keep[place])));
     }
-    match table_of(file, names()) {
-        Err(Error::Data(taxel_data::Error::File { path, problem })) => {
+    match file.columns(names()) {
+        Ok(columns) => Ok(names().zip(file.texts(&columns)).collect()),
+        Err(taxel_data::Error::File { path, problem }) => {
             Err(Error::Unfit { path, message: format!("{problem} (--keep)") })
         }
-        other => other,
+        Err(other) => Err(other.into()),
     }
 }
 

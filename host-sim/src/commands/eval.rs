@@ -32,7 +32,7 @@ use super::{Common, command_line, print};
   host-sim eval press.bin test.csv --html report.html
   host-sim eval relative.bin test.csv --baseline rest.csv
   host-sim eval array.bin test.csv --without 'r4c*_ohm'
-  host-sim eval m.bin sensor.csv --join robot.csv --on c1 --tolerance 0.01 --missing -1 --last-share 0.2")]
+  host-sim eval m.bin joined.csv --missing -1 --last-share 0.2")]
 pub struct Arguments {
     /// Weight blob.
     model: PathBuf,
@@ -81,10 +81,9 @@ struct Summary {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if let Some(html) = &arguments.html {
-        let others = [arguments.baseline.baseline.as_deref(), arguments.file.join()];
         let inputs: Vec<&Path> = [arguments.model.as_path(), arguments.data.as_path()]
             .into_iter()
-            .chain(others.into_iter().flatten())
+            .chain(arguments.baseline.baseline.as_deref())
             .collect();
         print::check_output(html, &inputs)?;
     }

@@ -1,19 +1,24 @@
 //! Command `join`: two logs as one table.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use crate::Result;
+use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
-use taxel_data::csv_file;
+use taxel_data::columns;
+use taxel_data::csv_file::{self, Column};
+use taxel_data::data_file::DataFile;
+use taxel_data::join::{Join, Joined};
 
-use super::data_file::{FieldArguments, JoinArguments};
+use super::arguments::of_option;
+use super::data_file::FieldArguments;
 use super::{Common, print};
 
 /// Join two logs by time: each line of one with the line of the other whose time stamp is nearest.
 ///
 /// Both may be CSV files, with a header or without, or numpy's .npy or .npz. Columns of the second that the first has
-/// too are called b.NAME. Time stamps may repeat, but not decrease.
+/// too are called b.NAME. Time stamps may repeat, but not decrease. Fields are written as they are; whole numbers of any
+/// length, such as nanoseconds since 1970, are compared exactly.
 #[derive(Args)]
 #[command(after_help = "Examples:
   host-sim join sensor.csv robot.csv --on time_s --tolerance 0.01 -o joined.csv
@@ -33,6 +38,20 @@ pub struct Arguments {
     output: PathBuf,
 }
 
+/// Which lines of two logs belong together.
+#[derive(Args)]
+struct JoinArguments {
+    /// Column with the time stamps of both files, or two names: of the first, and of the second.
+    #[arg(long, value_name = "NAME[,NAME]")]
+    on: String,
+    /// Largest distance of two time stamps that belong together, in their unit. Lines without a partner are left out.
+    #[arg(long, value_name = "TIME", allow_negative_numbers = true)]
+    tolerance: f64,
+    /// Time to add to the second file's time stamps.
+    #[arg(long, value_name = "TIME", default_value_t = 0.0, allow_negative_numbers = true)]
+    lag: f64,
+}
+
 #[derive(Serialize)]
 struct Summary {
     frames: usize,
@@ -44,15 +63,15 @@ struct Summary {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     print::check_output(&arguments.output, &[&arguments.first, &arguments.second])?;
-    let first = arguments.fields.read(&arguments.first)?;
-    let second = arguments.fields.read(&arguments.second)?;
+    let first = arguments.fields.read_with_text(&arguments.first)?;
+    let second = arguments.fields.read_with_text(&arguments.second)?;
     let joined = arguments.how.join(&first, &second)?;
-    let lines = joined.rows().map(|row| row.iter().copied());
-    csv_file::write(&arguments.output, joined.header.iter().map(String::as_str), lines)?;
+    write(&arguments.output, &joined, [&first, &second])?;
+    let frames = joined.pairs.len();
     let summary = Summary {
-        frames: joined.lines(),
+        frames,
         columns: joined.header.len(),
-        frames_without_partner: first.lines() - joined.lines(),
+        frames_without_partner: first.lines() - frames,
         file: arguments.output.clone(),
     };
     if common.json {
@@ -66,4 +85,69 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         summary.file.display()
     ));
     page.print()
+}
+
+/// Writes the lines of both logs that belong together, with their fields as they are written.
+fn write(path: &Path, joined: &Joined, logs: [&DataFile; 2]) -> Result<()> {
+    let texts: Vec<Vec<String>> = (0..2)
+        .flat_map(|log| {
+            let all: Vec<usize> = (0..logs[log].header.len()).collect();
+            logs[log].texts(&all).into_iter().map(move |column| (log, column))
+        })
+        .map(|(log, column)| joined.pairs.iter().map(|pair| column[pair[log]].clone()).collect())
+        .collect();
+    let columns = joined.header.iter().zip(&texts).map(|(name, texts)| Column::texts(name, texts));
+    let no_numbers = joined.pairs.iter().map(|_| []);
+    Ok(csv_file::write_columns(path, columns, no_numbers)?)
+}
+
+impl JoinArguments {
+    /// Joins each line of `first` with one of `second`, and says on stderr what came of it.
+    fn join(&self, first: &DataFile, second: &DataFile) -> Result<Joined> {
+        let names: Vec<&str> = self.on.split(',').map(str::trim).collect();
+        let on = match names[..] {
+            [name] => [name, name],
+            [of_first, of_second] => [of_first, of_second],
+            _ => {
+                let message = format!(
+                    "--on {}: give the column with the time stamps, or one for each file, as in time,stamp",
+                    self.on
+                );
+                return Err(Error::Usage(message));
+            }
+        };
+        for (file, name) in [first, second].into_iter().zip(on) {
+            if let Err(taxel_data::Error::File { path, problem }) = file.column(name) {
+                return Err(Error::Unfit { path, message: format!("{problem} (--on)") });
+            }
+        }
+        let (on, tolerance, lag) = (on.map(str::to_owned), self.tolerance, self.lag);
+        let join = Join { on, tolerance, lag };
+        let options = [("tolerance", "--tolerance"), ("lag", "--lag")];
+        join.check().map_err(|bad| of_option(bad, &options))?;
+        let joined = join.join(first, second)?;
+        let pairs = joined.pairs.len();
+        eprintln!(
+            "note: {pairs} of {} lines of {} have a partner in {}, at most {} away;\n      {} are left out; the partner's columns are {}",
+            first.lines(),
+            first.path.display(),
+            second.path.display(),
+            significant(joined.largest_distance),
+            first.lines() - pairs,
+            columns::some_names(&joined.header[first.header.len()..])
+        );
+        if joined.repeated > 0 {
+            eprintln!(
+                "note: {} lines of {} repeat the time stamp before them and are not used",
+                joined.repeated,
+                second.path.display()
+            );
+        }
+        Ok(joined)
+    }
+}
+
+/// Three digits of a positive number.
+fn significant(value: f64) -> f64 {
+    format!("{value:.2e}").parse().unwrap_or(value)
 }

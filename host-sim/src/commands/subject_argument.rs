@@ -90,7 +90,6 @@ impl SubjectArgument {
             .into_iter()
             .chain(self.test.as_deref())
             .chain(self.options.data.baseline())
-            .chain(self.options.data.file.join())
             .collect()
     }
 }

@@ -41,8 +41,7 @@ mod recursion;
   host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --relative-inputs --baseline rest.csv -o m.bin
   host-sim train press --no-refine -n 10000000 --solver rls --curve curve.svg -o m.bin
   zcat log.csv.gz | host-sim train - --inputs 'ch*' --outputs 'f?_n' --solver rls -o m.bin
-  host-sim train sensor.csv --join robot.csv --on c1 --tolerance 0.01 --missing -1 --first-share 0.8 \\
-      --inputs c2..c16 --outputs b.c5 --fold-blocks 10 -o m.bin")]
+  host-sim train joined.csv --missing -1 --first-share 0.8 --inputs c2..c16 --outputs b.c5 --fold-blocks 10 -o m.bin")]
 pub struct Arguments {
     /// A built-in scene (paper, press, contact), a scene file (.toml) or a data file (CSV, .npy, .npz); with --solver rls
     /// also `-`, a CSV file on standard input.
@@ -134,8 +133,7 @@ struct Summary {
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let source = Path::new(&arguments.source);
     let baseline = arguments.subject.data.baseline().unwrap_or(source);
-    let joined = arguments.subject.data.file.join().unwrap_or(source);
-    let inputs = [source, baseline, joined];
+    let inputs = [source, baseline];
     print::check_output(&arguments.output, &inputs)?;
     if let Some(path) = arguments.recursion.curve() {
         print::check_output(path, &[&inputs[..], &[&arguments.output]].concat())?;

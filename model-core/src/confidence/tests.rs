@@ -67,6 +67,19 @@ fn far_away_frames_are_novel_and_missing_readings_have_no_novelty() {
 }
 
 #[test]
+fn a_density_that_is_no_number_is_not_passed_over() {
+    let mut block = block();
+    // The first component's last row: ∞ − ∞ for a frame far off both ways, which the second still tells.
+    let row = block.iter().position(|value| *value == 0.25).unwrap();
+    block[row..row + 2].copy_from_slice(&[-3e38, 3e38]);
+    let confidence = Confidence::new(SIZES, &block).unwrap();
+    let (mut scratch, mut deviation) = ([0.0; 7], [0.0; 2]);
+    let readings = [1e6, 20.0, 1e6].into_iter();
+    let novelty = confidence.assess(readings, &mut scratch, &mut deviation).unwrap();
+    assert!(novelty == f32::MAX && deviation.iter().all(|it| it.is_nan()), "{novelty}");
+}
+
+#[test]
 fn the_most_probable_components_count() {
     // Six equal components, of which the last is a little less probable than four of them.
     let variances = [1.0, 2.0, 3.0, 4.0, 100.0, 200.0];

@@ -248,3 +248,14 @@ fn hopeless_settings_are_refused() {
     let refused = Rls::try_new(&mut memory[1..], [2, 1], 1.0, 1.0);
     assert_eq!(refused, Err(RlsError::Memory { expected: 8, found: 7 }));
 }
+
+#[test]
+fn knowledge_is_counted_in_squares_and_a_direction_without_any_gets_weight_0() {
+    let mut memory = [0.0; Rls::<f64>::values(1, 1)];
+    let mut rls = Rls::try_new(&mut memory, [1, 1], 1.0, 1.0).unwrap();
+    rls.update(&mut [2.0], &mut [6.0]).unwrap();
+    assert!(rls.is_excited(4.9) && !rls.is_excited(5.1)); // 1 + 2·2
+    let mut weights = [f64::NAN; 2];
+    solve(&[3.0, 1.0, 0.0, 0.0], &[6.0, 0.0], 2, &mut weights);
+    assert_eq!(weights, [2.0, 0.0]);
+}

@@ -51,7 +51,7 @@ impl Copy {
 
     /// Builds the image of `mutant`, and returns its path.
     pub fn build_mutant(&self, toolchain: &Toolchain, mutant: &Mutant) -> Outcome<PathBuf> {
-        let file = self.folder.join(mutant.file);
+        let file = self.folder.join(&mutant.file);
         let sound = read(&file)?;
         write_if_new(&file, mutant.apply(&sound)?.as_bytes())?;
         let built = watch(&mut self.command(toolchain), false);

@@ -5,8 +5,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use super::Options;
 use super::copy;
-use super::options::Options;
 use crate::process::{Outcome, Said, capture, cargo, first_line, root, run, target_dir};
 
 const FOLDER: &str = "proof/board-emulator";
@@ -29,20 +29,20 @@ pub struct Emulator {
 
 impl Emulator {
     /// Finds Python and its packages, builds host-sim, and trains the model.
-    pub fn prepare(options: &Options<'_>) -> Outcome<Self> {
+    pub fn prepare(options: &Options) -> Outcome<Self> {
         let python = python()?;
         let folder = folder();
         fs::create_dir_all(&folder).map_err(|cause| format!("{}: {cause}", folder.display()))?;
         run(&mut cargo(&["build", "--quiet", "--package", "host-sim"]))?;
         let host_sim = target_dir().join("debug").join("host-sim");
-        let model = if let Some(model) = options.model {
+        let model = if let Some(model) = &options.model {
             root().join(model)
         } else {
             let model = folder.join("model.bin");
             run(Command::new(&host_sim).args(TRAIN).arg(&model).current_dir(root()))?;
             model
         };
-        let frames = options.frames.unwrap_or(30).to_string();
+        let frames = options.frames.to_string();
         let wide = copy::image();
         let named = [
             ("--host-sim", host_sim),
@@ -59,7 +59,7 @@ impl Emulator {
     }
 
     /// Runs the scenarios of these names on `image`, or all; their output is passed through.
-    pub fn run(&self, image: &Path, scenarios: &[&str]) -> Outcome {
+    pub fn run(&self, image: &Path, scenarios: &[String]) -> Outcome {
         run(self.command(image).args(scenarios)).map_err(|_| "a scenario failed: see above".into())
     }
 

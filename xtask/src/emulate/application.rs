@@ -11,7 +11,7 @@ use crate::toolchain::elf;
 pub const IMAGE: &str = "qemu-app";
 
 /// Limits in bytes: flash without a model, and RAM with the stack at its deepest.
-const LIMITS: [&str; 2] = ["--flash-limit=112640", "--ram-limit=14336"];
+const LIMITS: [&str; 2] = ["--flash-limit=98304", "--ram-limit=14336"];
 
 /// Options of the check with a network a row.
 const OF_ROWS: &[&str] =

@@ -12,7 +12,7 @@ mod body;
 /// alone, if it `has_header`. Lines are numbered as if so many came `before`.
 pub(super) fn parse(path: &Path, bytes: &[u8], has_header: bool, before: u64) -> Result<DataFile> {
     let error = |problem| Error::file(path, problem);
-    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes); // a byte order mark
+    let text = without_mark(bytes);
     let mut reader = reader(text, true);
     let header = reader.headers().map_err(|e| error(Problem::Header { cause: cause_of(&e) }))?;
     let header: Vec<String> = header.iter().map(|name| name.trim().to_owned()).collect();
@@ -51,7 +51,42 @@ pub(super) fn parse(path: &Path, bytes: &[u8], has_header: bool, before: u64) ->
     };
     let lacks_last_line_end = !matches!(text, [.., b'\n' | b'\r']);
     let path = path.into();
-    Ok(DataFile { path, header, names_columns, lacks_last_line_end, digest, values, line_numbers })
+    Ok(DataFile {
+        path,
+        header,
+        names_columns,
+        lacks_last_line_end,
+        digest,
+        values,
+        line_numbers,
+        text: None,
+    })
+}
+
+/// `bytes` without a byte order mark.
+fn without_mark(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
+}
+
+/// Passes each line of data (from 0) of `file`, which was parsed from `bytes`, to `take`, with its fields as they are
+/// written.
+pub(super) fn for_each_record(
+    file: &DataFile,
+    bytes: &[u8],
+    mut take: impl FnMut(usize, &csv::StringRecord),
+) {
+    let bytes = without_mark(bytes);
+    let mut reader = reader(bytes, file.names_columns);
+    let (mut counted, mut record) = (LineCount { bytes, at: 0, line: 1 }, csv::StringRecord::new());
+    let mut line = 0;
+    // What was parsed has no error, and lines that were left out since then are passed over.
+    while reader.read_record(&mut record).unwrap_or(false) && line < file.lines() {
+        let position = record.position().map_or(0, csv::Position::byte);
+        if counted.of_record_at(position) == file.line_number(line) {
+            take(line, &record);
+            line += 1;
+        }
+    }
 }
 
 fn reader(text: &[u8], has_header: bool) -> csv::Reader<&[u8]> {

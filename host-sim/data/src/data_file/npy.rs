@@ -142,7 +142,16 @@ fn data_file(
     let digest = crate::digest::digest(bytes);
     let path = path.into();
     let lacks_last_line_end = false;
-    Ok(DataFile { path, header, names_columns, lacks_last_line_end, digest, values, line_numbers })
+    Ok(DataFile {
+        path,
+        header,
+        names_columns,
+        lacks_last_line_end,
+        digest,
+        values,
+        line_numbers,
+        text: None,
+    })
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 use std::path::Path;
 
 use super::*;
+use crate::data_file::Reading;
 
 fn log(path: &str, header: &[&str], lines: &[&[f64]]) -> DataFile {
     DataFile {
@@ -11,15 +12,25 @@ fn log(path: &str, header: &[&str], lines: &[&[f64]]) -> DataFile {
         digest: 1,
         values: lines.concat(),
         line_numbers: (2..).take(lines.len()).collect(),
+        text: None,
     }
+}
+
+/// A CSV file that was read with its text.
+fn read(text: &str) -> DataFile {
+    let file = tempfile::NamedTempFile::with_suffix(".csv").unwrap();
+    std::fs::write(file.path(), text).unwrap();
+    DataFile::read_as(file.path(), Reading { keeps_text: true, ..Reading::default() }).unwrap()
 }
 
 fn on_time(tolerance: f64, lag: f64) -> Join {
     Join { on: ["t".into(), "t".into()], tolerance, lag }
 }
 
-fn rows(joined: &Joined) -> Vec<&[f64]> {
-    joined.file.rows().collect()
+/// The joined lines, with the columns of both logs.
+fn rows(joined: &Joined, [first, second]: [&DataFile; 2]) -> Vec<Vec<f64>> {
+    let pairs = joined.pairs.iter();
+    pairs.map(|[line, partner]| [first.row(*line), second.row(*partner)].concat()).collect()
 }
 
 #[test]
@@ -28,12 +39,11 @@ fn each_line_finds_the_nearest_time_stamp_within_the_tolerance() {
     let second =
         log("b.csv", &["t", "y"], &[&[0.1, 10.0], &[0.9, 20.0], &[1.2, 30.0], &[2.5, 40.0]]);
     let joined = on_time(0.5, 0.0).join(&first, &second).unwrap();
-    assert_eq!(joined.file.header, ["t", "x", "b.t", "y"]);
+    assert_eq!(joined.header, ["t", "x", "b.t", "y"]);
     let expected = [[0.0, 1.0, 0.1, 10.0], [1.0, 2.0, 0.9, 20.0], [2.0, 3.0, 2.5, 40.0]];
-    assert_eq!(rows(&joined), expected);
-    assert_eq!((joined.left_out, joined.repeated, joined.largest_distance), (1, 0, 0.5));
-    assert_eq!(joined.file.line_number(2), 4);
-    assert!(joined.file.path.display().to_string().contains("a.csv joined with b.csv"));
+    assert_eq!(rows(&joined, [&first, &second]), expected);
+    assert_eq!((joined.repeated, joined.largest_distance), (0, 0.5));
+    assert_eq!(joined.pairs, [[0, 0], [1, 1], [2, 3]]);
 }
 
 #[test]
@@ -41,7 +51,7 @@ fn the_lag_is_added_to_the_second_log() {
     let first = log("a.csv", &["t"], &[&[10.0], &[11.0]]);
     let second = log("b.csv", &["t", "y"], &[&[7.0, 1.0], &[8.0, 2.0], &[9.0, 3.0]]);
     let joined = on_time(0.1, 3.0).join(&first, &second).unwrap();
-    assert_eq!(rows(&joined), [[10.0, 7.0, 1.0], [11.0, 8.0, 2.0]]);
+    assert_eq!(rows(&joined, [&first, &second]), [[10.0, 7.0, 1.0], [11.0, 8.0, 2.0]]);
     let refused = on_time(0.1, -3.5).join(&first, &second).unwrap_err().to_string();
     assert!(refused.contains("tolerance = 0.1") && refused.contains("4.5 apart"), "{refused}");
 }
@@ -51,7 +61,10 @@ fn of_equally_near_lines_the_first_is_taken() {
     let first = log("a.csv", &["t"], &[&[1.0], &[1.0], &[2.0]]);
     let second = log("b.csv", &["t", "y"], &[&[0.5, 1.0], &[0.5, 2.0], &[1.5, 3.0], &[1.5, 4.0]]);
     let joined = on_time(1.0, 0.0).join(&first, &second).unwrap();
-    assert_eq!(rows(&joined), [[1.0, 0.5, 1.0], [1.0, 0.5, 1.0], [2.0, 1.5, 3.0]]);
+    assert_eq!(
+        rows(&joined, [&first, &second]),
+        [[1.0, 0.5, 1.0], [1.0, 0.5, 1.0], [2.0, 1.5, 3.0]]
+    );
     assert_eq!(joined.repeated, 2);
 }
 
@@ -60,9 +73,9 @@ fn lines_without_a_time_stamp_are_left_out() {
     let first = log("a.csv", &["t"], &[&[0.0], &[f64::NAN], &[1.0]]);
     let second = log("b.csv", &["t", "y"], &[&[f64::NAN, 1.0], &[0.0, 2.0], &[1.0, f64::NAN]]);
     let joined = on_time(0.0, 0.0).join(&first, &second).unwrap();
-    assert_eq!(joined.left_out, 1);
-    assert_eq!(rows(&joined)[0], [0.0, 0.0, 2.0]);
-    assert!(rows(&joined)[1][2].is_nan());
+    assert_eq!(joined.pairs, [[0, 1], [2, 2]]);
+    assert_eq!(rows(&joined, [&first, &second])[0], [0.0, 0.0, 2.0]);
+    assert!(rows(&joined, [&first, &second])[1][2].is_nan());
     let empty = log("b.csv", &["t", "y"], &[&[f64::NAN, 1.0]]);
     let refused = on_time(1.0, 0.0).join(&first, &empty).unwrap_err().to_string();
     assert!(refused.contains("no time stamp"), "{refused}");
@@ -82,7 +95,7 @@ fn names_that_exist_already_get_a_prefix_as_often_as_needed() {
     let first = log("a.csv", &["c1", "b.c1"], &[&[0.0, 1.0]]);
     let second = log("b.csv", &["c1", "c2"], &[&[0.0, 2.0]]);
     let join = Join { on: ["c1".into(), "c1".into()], tolerance: 0.0, lag: 0.0 };
-    assert_eq!(join.join(&first, &second).unwrap().file.header, ["c1", "b.c1", "b.b.c1", "c2"]);
+    assert_eq!(join.join(&first, &second).unwrap().header, ["c1", "b.c1", "b.b.c1", "c2"]);
 }
 
 #[test]
@@ -91,7 +104,10 @@ fn times_of_day_keep_their_microseconds() {
     let first = log("a.csv", &["t"], &[&[start], &[start + 1e-4]]);
     let second = log("b.csv", &["t", "y"], &[&[start - 4e-5, 1.0], &[start + 6.2e-5, 2.0]]);
     let joined = on_time(1e-4, 0.0).join(&first, &second).unwrap();
-    assert_eq!(rows(&joined).iter().map(|row| row[2]).collect::<Vec<_>>(), [1.0, 2.0]);
+    assert_eq!(
+        rows(&joined, [&first, &second]).iter().map(|row| row[2]).collect::<Vec<_>>(),
+        [1.0, 2.0]
+    );
 }
 
 #[test]
@@ -116,9 +132,40 @@ fn a_tolerance_that_is_met_exactly_joins() {
         let lines: Vec<&[f64]> = lines.iter().map(<[f64; 2]>::as_slice).collect();
         log("a.csv", &["t", "x"], &lines)
     });
-    assert_eq!(on_time(0.05, 0.0).join(&first, &second).unwrap().left_out, 0);
-    assert_eq!(
-        on_time(0.04999, 0.0).join(&first, &second).map(|joined| joined.left_out).ok(),
-        None
-    );
+    assert_eq!(on_time(0.05, 0.0).join(&first, &second).unwrap().pairs.len(), 50);
+    assert!(on_time(0.04999, 0.0).join(&first, &second).is_err());
+}
+
+#[test]
+fn nanoseconds_since_1970_are_joined_to_the_last_one() {
+    // f64 steps by 256 ns here.
+    let start = 1_743_486_221_590_758_123_i64;
+    let log = |name: &str, shift: i64| {
+        let lines = (0..5).map(|line| format!("{},{line}\n", start + 10 * line + shift));
+        read(&format!("{name},value\n{}", lines.collect::<String>()))
+    };
+    let (first, second) = (log("t", 0), log("t", 3));
+    let joined = on_time(3.0, 0.0).join(&first, &second).unwrap();
+    assert_eq!(joined.pairs, [[0, 0], [1, 1], [2, 2], [3, 3], [4, 4]]);
+    assert_eq!(joined.largest_distance, 3.0);
+    assert!(on_time(2.0, 0.0).join(&first, &second).is_err());
+    assert_eq!(first.texts(&[0, 1])[0][1], (start + 10).to_string());
+    let back = read(&format!("t\n{}\n{start}\n", start + 1));
+    let refused = on_time(1.0, 0.0).join(&first, &back).unwrap_err().to_string();
+    assert!(refused.contains("1743486221590758123 is earlier than"), "{refused}");
+    for inexact in [read("t\n1743486221590758123.5\n"), DataFile { text: None, ..first.clone() }] {
+        let refused = on_time(1.0, 0.0).join(&first, &inexact).unwrap_err().to_string();
+        assert!(refused.contains("more digits than numbers hold"), "{refused}");
+    }
+}
+
+#[test]
+fn texts_are_those_of_the_lines_that_are_left_and_missing_ones_are_empty() {
+    let mut file = read("\u{feff}a,\"b\"\r\n 1.50,-1\r\n\r\n\"2e3\",7\r\n,0010\r\n");
+    file.mark_missing(-1.0);
+    assert_eq!(file.texts(&[1, 0]), [["", "7", "0010"], ["1.50", "2e3", ""]]);
+    file.keep_lines(1..2);
+    assert_eq!(file.texts(&[0]), [["2e3"]]);
+    file.text = None;
+    assert_eq!(file.texts(&[0]), [["2000"]]);
 }

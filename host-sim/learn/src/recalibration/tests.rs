@@ -1,4 +1,4 @@
-//! `cargo test -p taxel-learn recalibration -- --nocapture` prints the figures of docs/recalibration.md.
+//! `cargo test -p taxel-learn recalibration -- --include-ignored --nocapture` prints the figures of docs/recalibration.md.
 
 use model_core::blob::{Floats, Metadata, ModelParts, encode_to_vec};
 use model_core::rbf::{Format, Shape};
@@ -11,8 +11,18 @@ use super::*;
 use crate::train::train;
 use crate::{Exponential, Options, Origin, confidence, fill, pack, relative};
 
-/// Frames of training and of tests.
-const FRAMES: [usize; 2] = [10_000, 3000];
+/// How much is trained and decoded.
+#[derive(Clone, Copy)]
+struct Size {
+    /// Rows of the sensor, from its first.
+    rows: usize,
+    /// Frames of training and of tests.
+    frames: [usize; 2],
+}
+
+/// As docs/recalibration.md says, and enough to see a fault.
+const ALL: Size = Size { rows: 8, frames: [10_000, 3000] };
+const SOME: Size = Size { rows: 4, frames: [4000, 1000] };
 
 /// What happens to readings: factors, and then offsets relative to the channel's mean.
 #[derive(Clone, Copy)]
@@ -52,6 +62,11 @@ fn drifted(readings: &Table, drift: &[[f64; 2]]) -> Table {
     readings
 }
 
+/// The scene `press` with so many rows.
+fn world(size: Size) -> World {
+    World { read_rows: (0..size.rows).collect(), ..World::press() }
+}
+
 /// The scene `press`, seen by a model of these options.
 struct Bench {
     options: Options,
@@ -64,14 +79,14 @@ struct Bench {
 }
 
 impl Bench {
-    fn new(options: Options, relative_inputs: bool) -> Self {
-        let world = World::press();
+    fn new(options: Options, relative_inputs: bool, size: Size) -> Self {
+        let world = world(size);
         let rest = Synthesis::of(&world).untouched().frames(Stream::Calibration, 100).inputs;
-        let all = synthesise(&world, Stream::Test, 1000 + FRAMES[1]);
+        let all = synthesise(&world, Stream::Test, 1000 + size.frames[1]);
         Self {
             options,
             relative_inputs,
-            training: synthesise(&world, Stream::Training, FRAMES[0]),
+            training: synthesise(&world, Stream::Training, size.frames[0]),
             presses: all.subset(&(0..1000).collect::<Vec<_>>()),
             test: all.subset(&(1000..all.frames()).collect::<Vec<_>>()),
             rest: rest.mean_line(),
@@ -97,7 +112,7 @@ impl Bench {
         let decoded = self.prepare(blob).decode_table(&drifted(&self.test.inputs, drift));
         let squares = self.test.outputs.squared_errors(&decoded.values);
         let z = decoded.names.iter().zip(squares).filter(|(name, _)| name.ends_with("_dz_mm"));
-        let z: Vec<f64> = z.map(|(_, square)| square / FRAMES[1] as f64).collect();
+        let z: Vec<f64> = z.map(|(_, square)| square / self.test.frames() as f64).collect();
         (z.iter().sum::<f64>() / z.len() as f64).sqrt()
     }
 }
@@ -127,6 +142,16 @@ fn first(presses: &Dataset, count: usize) -> Dataset {
 
 #[test]
 fn two_hundred_presses_bring_every_format_within_3_percent_of_fresh_training() {
+    every_format(SOME);
+}
+
+#[test]
+#[ignore = "prints the figures of the page, in a minute"]
+fn two_hundred_presses_bring_every_format_within_3_percent_of_fresh_training_of_all_rows() {
+    every_format(ALL);
+}
+
+fn every_format(size: Size) {
     for (format, whole_array, relative_inputs) in [
         (Format::F32, false, false),
         (Format::F32Direct, false, false),
@@ -134,8 +159,11 @@ fn two_hundred_presses_bring_every_format_within_3_percent_of_fresh_training() {
         (Format::Fixed16, true, false),
         (Format::F32, false, true),
     ] {
-        let bench =
-            Bench::new(Options { format, whole_array, ..Options::default() }, relative_inputs);
+        let bench = Bench::new(
+            Options { format, whole_array, ..Options::default() },
+            relative_inputs,
+            size,
+        );
         let means = bench.training.inputs.means();
         let drift = Drift::Gains(0.1).draw(1, &means);
         let model = bench.train(&vec![STILL; means.len()]);
@@ -148,7 +176,7 @@ fn two_hundred_presses_bring_every_format_within_3_percent_of_fresh_training() {
             found.networks,
             after / fresh
         );
-        assert_eq!((found.presses, found.networks), (200, if whole_array { 1 } else { 8 }));
+        assert_eq!((found.presses, found.networks), (200, if whole_array { 1 } else { size.rows }));
         assert!(before > 3.0 * fresh, "the drift must hurt");
         assert!(after <= 1.03 * fresh, "{after} for {fresh}");
         assert!(found.error_before > 3.0 && (0.9..1.1).contains(&found.error_after), "{found:?}");
@@ -157,18 +185,28 @@ fn two_hundred_presses_bring_every_format_within_3_percent_of_fresh_training() {
 
 #[test]
 fn few_presses_other_drifts_and_wrong_outputs_cost_a_tenth_at_most() {
-    let bench = Bench::new(Options::default(), false);
+    other_presses(SOME);
+}
+
+#[test]
+#[ignore = "prints the figures of the page, in a minute"]
+fn few_presses_other_drifts_and_wrong_outputs_cost_a_tenth_at_most_of_all_rows() {
+    other_presses(ALL);
+}
+
+fn other_presses(size: Size) {
+    let bench = Bench::new(Options::default(), false, size);
     let means = bench.training.inputs.means();
     let model = bench.train(&vec![STILL; means.len()]);
     // Training sees inputs scaled to their range, so neither gains nor offsets change what it reaches.
     let fresh = bench.z_error(&model, &vec![STILL; means.len()]);
     let ten_percent = Drift::Gains(0.1);
-    let many = synthesise(&World::press(), Stream::Calibration, 6000);
+    let many = synthesise(&world(size), Stream::Calibration, 6000);
     let most_pressed = |frame: usize| {
         let z = many.outputs.line(frame).iter().skip(2).step_by(3);
         z.enumerate().max_by(|a, b| a.1.total_cmp(b.1)).map(|(electrode, _)| electrode)
     };
-    let at_one_place = |frame: &usize| most_pressed(*frame) == Some(20);
+    let at_one_place = |frame: &usize| most_pressed(*frame) == Some(size.rows * 5 / 2);
     let mut vague = first(&bench.presses, 200);
     let mut random = Random::new(1, Stream::Test, Purpose::Noise, 0, 0);
     vague.outputs.values.iter_mut().for_each(|output| *output += 0.05 * random.normal());
@@ -223,7 +261,7 @@ fn a_smooth_network_has_the_outputs_of_decoding_and_the_slopes_of_its_outputs() 
         (Format::Fixed16, true, 4e-3), // inputs, activations and weights have 16 bits
         (Format::Fixed16, false, 4e-3),
     ] {
-        let (blob, frames) = small(Options { format, affine_tail, ..Options::default() });
+        let (blob, frames) = small(Options { affine_tail, format, ..Options::default() });
         let model = blob.prepare(Exponential::default());
         let decoded = model.decode_table(&frames.inputs);
         let size = decoded.values.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
@@ -316,7 +354,7 @@ fn what_cannot_be_recalibrated_is_refused_by_name() {
     let shared = model.model().networks().next().unwrap();
     let parts = |networks: &[Network<'_>], row_network: &[u8], rmse: f32| {
         let parsed = model.model();
-        let rmse = vec![rmse; 36].iter().flat_map(|rmse| rmse.to_le_bytes()).collect::<Vec<u8>>();
+        let rmse = [rmse; 36].iter().flat_map(|rmse| rmse.to_le_bytes()).collect::<Vec<u8>>();
         let parts = ModelParts {
             projection: None,
             expansion: None,

@@ -1,9 +1,11 @@
 //! Costs of decoding, predicted by the price list in the repository.
 
+use std::fmt::Write as _;
+
 use model_core::blob::ModelShape;
 use model_core::rbf::Format;
 use taxel_learn::Exponential;
-use taxel_learn::cost::{Cost, Design, Frames, Prices, kernel_name};
+use taxel_learn::cost::{Cost, DecoderRam, Design, Frames, Prices, kernel_name};
 
 const PAPER: ModelShape = ModelShape { rows: 8, inputs: 18, outputs: 18 };
 
@@ -41,25 +43,54 @@ fn every_shape_has_a_price_and_a_gate_saves_and_costs_something() {
     }
 }
 
+/// Sensors that leave out something of the paper's, or have more of it: name, shape and centres a row.
+const SENSORS: [(&str, ModelShape, usize); 7] = [
+    ("paper", PAPER, 64),
+    ("z only", ModelShape { outputs: 6, ..PAPER }, 64),
+    ("three rows", ModelShape { rows: 3, ..PAPER }, 64),
+    ("one row", ModelShape { rows: 1, ..PAPER }, 64),
+    ("4 × 4 pad", ModelShape { rows: 4, inputs: 4, ..PAPER }, 64),
+    ("own CSV file", ModelShape { rows: 1, inputs: 12, outputs: 5 }, 64),
+    ("16 × 32", ModelShape { rows: 16, inputs: 32, ..PAPER }, 16),
+];
+
 #[test]
-fn what_is_left_out_costs_nothing() {
+fn a_sensor_that_leaves_something_out_takes_less_and_the_page_says_what_each_takes() {
     let prices = Prices::accepted().unwrap();
-    let cycles = |shape, format, centres, affine| {
-        frames(&prices, &Design::of_rows(shape, format, centres, affine)).ungated.cycles
-    };
-    // The compiled code of `f32-direct` is made for 18 inputs and outputs; others may take more.
+    let page = include_str!("../../../../docs/sensors.md");
+    let mut table = String::new();
     for format in [Format::F32, Format::Fixed16] {
-        let all = cycles(PAPER, format, 64, true);
-        let [z_only, one_row, few_columns] = [
-            ModelShape { outputs: 6, ..PAPER },
-            ModelShape { rows: 1, ..PAPER },
-            ModelShape { inputs: 8, ..PAPER },
-        ]
-        .map(|shape| cycles(shape, format, 64, true));
-        assert!(z_only < all * 9 / 10 && few_columns < all * 95 / 100, "{format:?}");
-        assert!(one_row < all / 7, "{format:?}");
-        assert!(cycles(PAPER, format, 64, false) < all && cycles(PAPER, format, 32, true) < all);
+        let takes = |(_, shape, centres): (&str, ModelShape, usize)| {
+            let design = Design::of_rows(shape, format, centres, true);
+            let cost = frames(&prices, &design).ungated;
+            let ram = DecoderRam::of(&design).bytes() as u64;
+            [
+                design.parameter_bytes() as u64,
+                ram,
+                cost.instructions,
+                cost.cycles,
+                cost.flash_cycles,
+            ]
+        };
+        let paper = takes(SENSORS[0]);
+        for sensor @ (name, shape, _) in SENSORS {
+            let figures = takes(sensor);
+            let ModelShape { rows, inputs, outputs } = shape;
+            let within_paper =
+                rows <= PAPER.rows && inputs <= PAPER.inputs && outputs <= PAPER.outputs;
+            if shape != PAPER && within_paper {
+                let less = figures.iter().zip(&paper).all(|(part, all)| part < all);
+                assert!(less, "{name} in {format:?}: {figures:?}");
+            }
+            let figures = figures.map(|figure| figure.to_string()).join(" | ");
+            let format = format.name();
+            let _ = writeln!(
+                table,
+                "| {name} | {rows} × ({inputs} → {outputs}) | {format} | {figures} |"
+            );
+        }
     }
+    assert!(page.ends_with(&table), "docs/sensors.md must end with\n{table}");
 }
 
 /// The accepted figures are counts of trained models, which the price list was not made from.

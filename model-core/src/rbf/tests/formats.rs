@@ -311,3 +311,62 @@ fn exp2_is_within_two_ulp_over_all_its_range() {
     }
     assert_eq!(exp2(0.0), 1.0);
 }
+
+/// One input, one centre and one output.
+const SMALLEST: Shape = Shape { inputs: 1, centres: 1, outputs: 1 };
+
+#[test]
+fn exponents_beyond_their_range_are_refused_by_the_decay_alone() {
+    let refused = Err(NetworkError::ExponentOutOfRange { centre: 0 });
+    let expanded = |decay: f32| {
+        let zeros = vec![0.0; 2 * expanded::CENTRES_AT_ONCE];
+        let parameters = expanded::Parameters {
+            input_midpoint: &[60.0],
+            input_per_unit: &[1.0],
+            decay,
+            bias: &[0.0],
+            affine: &[],
+            exponents: &zeros,
+            output_weights: &zeros[expanded::CENTRES_AT_ONCE..],
+        };
+        let words: Vec<u32> = parameters.words().collect();
+        expanded::Network::try_new(SMALLEST, false, &words).map(|_| ())
+    };
+    let most = -expanded::LOWEST_EXPONENT / UNITS / UNITS;
+    assert_eq!([0.99, 1.01].map(|times| expanded(times * most)), [Ok(()), refused]);
+
+    // What the input adds is 2^28 here, a step less.
+    let fixed16 = |start: u32| {
+        let mut group = vec![0; fixed16::words_at_once(SMALLEST)];
+        group[..32].chunks_exact_mut(2).for_each(|line| line[0] = start);
+        let parameters = fixed16::Parameters {
+            input_midpoint: &[60.0],
+            input_per_unit: &[1.0],
+            decay: u32::MAX,
+            bias: &[0],
+            output_scale: &[1.0],
+            affine: &[],
+            centres: &group,
+        };
+        let words: Vec<u32> = parameters.words().collect();
+        fixed16::Network::try_new(SMALLEST, false, &words).map(|_| ())
+    };
+    let most = u32::MAX - ((1 << 28) - 1);
+    assert_eq!([most, most + 1].map(fixed16), [Ok(()), refused]);
+}
+
+#[test]
+fn a_network_in_f32_direct_tells_its_training_range_and_its_largest_output() {
+    let parameters = direct::Parameters {
+        input_minimum: &[50.0],
+        input_per_span: &[0.125],
+        centres: &[0.5],
+        decay: &[2.0],
+        output_weights: &[-1.0],
+        bias: &[2.0],
+        affine: &[3.0],
+    };
+    let network = Network::from(direct::Network::try_new(SMALLEST, parameters).unwrap());
+    assert_eq!(network.training_range(0), [50.0, 58.0]);
+    assert_eq!(network.largest_output(), 2.0 * (1.0 + 2.0 * 3.0 + 2.0));
+}
