@@ -20,26 +20,24 @@ mod configuration;
 mod frame_clock;
 mod lease;
 mod line;
-mod leave;
+mod session_end;
 mod model;
-mod kept;
-mod guard;
-mod firm;
+mod saved_settings;
+mod authenticity;
+mod records;
 mod recheck;
 mod trial;
 mod undo;
 mod session;
 mod answer;
-#[cfg(test)]
-mod tests;
 
+use authenticity::Authenticity;
 pub use buffers::Buffers;
 use frame_clock::{FrameClock, LongClock};
-use guard::Guard;
 use lease::Lease;
-pub use leave::Leave;
 use line::Line;
 pub use session::Session;
+pub use session_end::SessionEnd;
 use trial::Trial;
 
 /// The application's state, except the model in force. `ROWS` is the largest number of rows.
@@ -87,7 +85,7 @@ struct Core<'m, P, F, const ROWS: usize> {
     capture: Option<Capture>,
     upload: Upload,
     trial: Trial,
-    guard: Guard,
+    authenticity: Authenticity,
     /// Number of times that settings may still be written before the next restart.
     writes_left: u16,
     /// Standard deviations of the outputs, for a model with a confidence.
@@ -127,7 +125,7 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
         } = buffers;
         let capacity = Buffers::<ROWS, COLUMNS, OUTPUTS, BYTES>::CAPACITY;
         let now_us = platform.now_us();
-        let guard = Guard::new(platform.key_area());
+        let authenticity = Authenticity::new(platform.key_area());
         let mut core = Core {
             line: Line::new(platform, message),
             source,
@@ -154,8 +152,8 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
             capture: None,
             upload: Upload::new(),
             trial: Trial::default(),
-            guard,
-            writes_left: kept::MOST_WRITES,
+            authenticity,
+            writes_left: saved_settings::MOST_WRITES,
             deviations: deviations.as_flattened_mut(),
         };
         core.load_settings();
@@ -170,12 +168,12 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
     pub fn run<S: Slot>(&mut self, slots: &mut [S; 2], weights: &mut [u32]) {
         loop {
             let mut session = Session::start(self, slots, weights);
-            let leave = loop {
-                if let Some(leave) = session.step() {
-                    break leave;
+            let end = loop {
+                if let Some(end) = session.step() {
+                    break end;
                 }
             };
-            if leave == Leave::Restart {
+            if end == SessionEnd::Restart {
                 return;
             }
             info!("another session begins");

@@ -420,7 +420,7 @@ mod tests {
     fn open_short_and_missing_have_values_of_their_own_and_spare_the_others() {
         let circuit = ZeroPotential { row_source_ohm: [0.0; 2], ..ZeroPotential::TYPICAL };
         let [mut sampled, idle] = zero_potential_counts(&circuit, &row());
-        (sampled[0], sampled[1], sampled[2]) = (f32::NAN, 4095.0, idle[2]);
+        (sampled[0], sampled[1], sampled[2]) = (f32::NAN, 4095.0, idle[2] + 3.0);
         sampled[4] = idle[4] - 3.0; // noise may go below idle
         let mut no_idle = idle;
         no_idle[3] = f32::NAN;

@@ -21,12 +21,12 @@ pub enum KeepError {
 ///
 /// It may be cut off from power at any moment: then the setting that is being kept is the old or the new one.
 pub trait Keeper {
-    /// Makes firm what a cut of the power has left: every later start reads what this one reads. Must be called at each
+    /// Recovers from a cut of the power: every later start reads what this one reads. Must be called at each
     /// start, before anything is read. Writes nothing if there was no cut. May take a second.
     ///
     /// # Errors
     /// [`KeepError::Failed`]; what is kept can still be read.
-    fn make_firm(&mut self) -> Result<(), KeepError>;
+    fn recover(&mut self) -> Result<(), KeepError>;
 
     /// Reads the bytes that are kept for `setting` into `buffer`; `None` if there are none, or more than it has room for.
     fn read<'b>(&mut self, setting: Setting, buffer: &'b mut [u8]) -> Option<&'b [u8]>;

@@ -1,6 +1,6 @@
 //! The application loop on a virtual board.
 
-mod requests;
+pub mod requests;
 
 mod baseline;
 mod confidence;

@@ -1,267 +1,147 @@
 //! With a key on the device, only models sealed with it come into force, and no older ones.
 
-use firmware::app::{Leave, Session};
-use firmware::link::message::{
-    Identity, KeyState, Refusal, Report, Request, SealFault, UploadState, UploadStep,
-};
-use firmware::platform::Platform;
+use firmware::app::{Session, SessionEnd};
+use firmware::link::message::{KeyState, Refusal, SealFault, UploadStep};
 use firmware::seal::{Key, Seal};
 use firmware::store::Slot;
 use mock_board::*;
 
-const CHUNK: usize = 60;
 const KEY: Key = [0x42; 32];
-/// Bytes of a copy of the key.
-const COPY: usize = 48;
+/// Words of a copy of the key.
+const COPY: usize = 12;
 
-/// A device with a key, and its flash.
-struct Device {
-    slots: [MockSlot; 2],
-    key: KeyArea,
+/// A device with this key, and a model of version 5 in force.
+fn with_key() -> Device {
+    let mut device = Device::new(Flash::slots());
+    device.key = Flash::with_key(&KEY);
+    install(&mut device, 5, &blob(1, 3)).unwrap();
+    device
+}
+
+/// Uploads `blob`, sealed as this version.
+fn install(device: &mut Device, version: u32, blob: &[u8]) -> Answer {
+    device.install(blob, Some(Seal::of(&KEY, version, blob)))
 }
 
 /// A model's CRC-32, and the version that it was sealed with.
 type Versioned = (u32, Option<u32>);
 
-impl Device {
-    /// A device with this key, and a model of version 5 in force.
-    fn new() -> Self {
-        let mut device = Self { slots: MockSlot::pair(), key: KeyArea::with(&KEY) };
-        let first = blob(1, 3);
-        device.install(&first, Some(Seal::of(&KEY, 5, &first))).unwrap();
-        device
-    }
-
-    /// Starts it anew, uploads `blob` and confirms it.
-    fn install(&mut self, blob: &[u8], seal: Option<Seal>) -> Result<UploadState, Refusal> {
-        let mut steps = upload_steps(blob, CHUNK);
-        steps.pop();
-        steps.extend([UploadStep::Try { seal }, UploadStep::Confirm]);
-        upload(&mut Bench::with_key(quiet(), &self.key), &mut self.slots, &mut [], &steps)
-    }
-
-    /// Starts it anew, and asks for its identity: the model's CRC-32 and version, and the highest version.
-    fn identity(&mut self) -> (Option<Versioned>, KeyState, Option<u32>) {
-        let mut bench = Bench::with_key(quiet(), &self.key);
-        let mut session = Session::start(&mut bench.app, &mut self.slots, &mut []);
-        let identity = ask(&mut session, &bench.board, &Request::Identify, |report| match report {
-            Report::Identity(Identity { model, key, highest_version, .. }) => {
-                (model.map(|model| (model.crc_32, model.version)), key, highest_version)
-            }
-            other => panic!("{other:?}"),
-        });
-        self.key = bench.app.platform().key_area().clone();
-        identity.0
-    }
-
-    /// Starts it anew, and sets `key`.
-    fn provision(&mut self, key: Key) -> Result<(), Refusal> {
-        let mut bench = Bench::with_key(quiet(), &self.key);
-        let mut session = Session::start(&mut bench.app, &mut self.slots, &mut []);
-        let done =
-            ask(&mut session, &bench.board, &Request::Provision { key }, |report| match report {
-                Report::Provisioned => Ok(()),
-                Report::Refused(refusal) => Err(refusal),
-                other => panic!("{other:?}"),
-            });
-        self.key = bench.app.platform().key_area().clone();
-        done.0
-    }
-
-    fn undo(&mut self, left: u32) -> Result<(), Refusal> {
-        let mut bench = Bench::with_key(quiet(), &self.key);
-        let mut session = Session::start(&mut bench.app, &mut self.slots, &mut []);
-        let request = Request::Undo { crc_32: left };
-        ask(&mut session, &bench.board, &request, |report| match report {
-            Report::Upload(_) => Ok(()),
-            Report::Refused(refusal) => Err(refusal),
-            other => panic!("{other:?}"),
-        })
-        .0
-    }
+/// The model in force, whether there is a key, and the highest version.
+fn identity(device: &mut Device) -> (Option<Versioned>, KeyState, Option<u32>) {
+    let (model, key, highest) = device.identity();
+    (model.map(|model| (model.crc_32, model.version)), key, highest)
 }
 
-fn fault(fault: SealFault) -> Result<UploadState, Refusal> {
+fn fault(fault: SealFault) -> Answer {
     Err(Refusal::Seal(fault))
-}
-
-fn confirmed(blob: &[u8]) -> UploadState {
-    UploadState::Confirmed { crc_32: crc_of(blob) }
 }
 
 #[test]
 fn a_sealed_model_comes_into_force_and_stays() {
-    let mut device = Device::new();
+    let mut device = with_key();
     for version in [6, 7, 4_000_000_000] {
         let next = blob(version as usize % 10, 4);
-        assert_eq!(
-            device.install(&next, Some(Seal::of(&KEY, version, &next))),
-            Ok(confirmed(&next))
-        );
+        assert_eq!(install(&mut device, version, &next), confirmed(&next));
         let expected = (Some((crc_of(&next), Some(version))), KeyState::Set, Some(version));
-        assert_eq!(device.identity(), expected);
+        assert_eq!(identity(&mut device), expected);
     }
-}
-
-#[test]
-fn whatever_is_changed_in_seal_or_blob_it_is_refused_as_forged() {
-    let mut device = Device::new();
-    let before = device.identity();
-    let next = blob(2, 4);
-    let good = Seal::of(&KEY, 6, &next);
-    for byte in 0..32 {
-        let mut forged = good;
-        forged.tag[byte] ^= 1 << (byte % 8);
-        assert_eq!(device.install(&next, Some(forged)), fault(SealFault::Forged));
-    }
-    for bit in 0..32 {
-        let forged = Seal { version: 6 ^ (1 << bit), ..good };
-        assert_eq!(device.install(&next, Some(forged)), fault(SealFault::Forged));
-    }
-    // Another sound blob, and the seal of another device or made for another purpose.
-    let other = blob(3, 4);
-    assert_eq!(device.install(&other, Some(good)), fault(SealFault::Forged));
-    let foreign = Seal::of(&[0x43; 32], 6, &next);
-    assert_eq!(device.install(&next, Some(foreign)), fault(SealFault::Forged));
-    assert_eq!(device.install(&next, None), fault(SealFault::Missing));
-    assert_eq!(device.identity(), before);
-    assert_eq!(device.install(&next, Some(good)), Ok(confirmed(&next)));
 }
 
 #[test]
 fn no_older_model_comes_back() {
-    let mut device = Device::new();
+    let mut device = with_key();
     let [first, second, third] = [blob(1, 3), blob(2, 4), blob(3, 4)];
     let outdated = fault(SealFault::Outdated { highest: 6 });
-    assert_eq!(device.install(&second, Some(Seal::of(&KEY, 6, &second))), Ok(confirmed(&second)));
-    assert_eq!(device.install(&first, Some(Seal::of(&KEY, 5, &first))), outdated, "replayed");
-    assert_eq!(device.install(&third, Some(Seal::of(&KEY, 6, &third))), outdated, "same version");
+    assert_eq!(install(&mut device, 6, &second), confirmed(&second));
+    assert_eq!(install(&mut device, 5, &first), outdated, "replayed");
+    assert_eq!(install(&mut device, 6, &third), outdated, "same version");
     // The refused uploads have erased the other slot.
     assert_eq!(device.undo(crc_of(&second)), Err(Refusal::NothingToUndo));
     // The same once more is no step back.
-    assert_eq!(device.install(&second, Some(Seal::of(&KEY, 6, &second))), Ok(confirmed(&second)));
-    let third_seal = Seal::of(&KEY, 7, &third);
-    assert_eq!(device.install(&third, Some(third_seal)), Ok(confirmed(&third)));
-    let back = device.undo(crc_of(&third));
-    assert_eq!(back, Err(Refusal::Seal(SealFault::Outdated { highest: 7 })));
-    assert_eq!(device.identity().0, Some((crc_of(&third), Some(7))));
+    assert_eq!(install(&mut device, 6, &second), confirmed(&second));
+    assert_eq!(install(&mut device, 7, &third), confirmed(&third));
+    assert_eq!(device.undo(crc_of(&third)), fault(SealFault::Outdated { highest: 7 }));
+    assert_eq!(identity(&mut device).0, Some((crc_of(&third), Some(7))));
 }
 
 #[test]
 fn a_trial_that_ends_leaves_the_version_unused() {
-    let mut device = Device::new();
+    let mut device = with_key();
     let (second, third) = (blob(2, 4), blob(3, 4));
-    let mut steps = upload_steps(&second, CHUNK);
-    steps.pop();
-    steps.extend([UploadStep::Try { seal: Some(Seal::of(&KEY, 6, &second)) }, UploadStep::Abort]);
-    let mut bench = Bench::with_key(quiet(), &device.key);
-    upload(&mut bench, &mut device.slots, &mut [], &steps).unwrap();
-    assert_eq!(device.identity().2, Some(5));
-    assert_eq!(device.install(&third, Some(Seal::of(&KEY, 6, &third))), Ok(confirmed(&third)));
+    let mut steps = trial_steps(&second, Some(Seal::of(&KEY, 6, &second)));
+    steps.push(UploadStep::Abort);
+    device.upload(&steps).unwrap();
+    assert_eq!(identity(&mut device).2, Some(5));
+    assert_eq!(install(&mut device, 6, &third), confirmed(&third));
 }
 
 #[test]
 fn a_key_is_set_once_and_models_from_before_are_left() {
     let old = blob(1, 3);
-    let mut slots = MockSlot::pair_with(&old);
+    let mut slots = Flash::slots_with(&old);
     let mut bench = Bench::new(quiet());
     let board = bench.board.clone();
-    let provision = |session: &mut TestSession<'_>, key: Key| {
-        ask(session, &board, &Request::Provision { key }, |report| match report {
-            Report::Provisioned => Ok(()),
-            Report::Refused(refusal) => Err(refusal),
-            other => panic!("{other:?}"),
-        })
-    };
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    assert_eq!(provision(&mut session, KEY), (Ok(()), Some(Leave::NewModel)));
+    let feeds = || board.pins.borrow().feeds;
+    let fed = feeds();
+    assert_eq!(provision(&mut session, &board, KEY), (Ok(()), Some(SessionEnd::NewModel)));
+    assert_eq!(feeds() - fed, 2, "in its turn, and before flash is erased");
     let _ = session;
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     assert_eq!(model_crc(&mut session, &board), None, "it has no seal");
-    assert_eq!(provision(&mut session, KEY), (Ok(()), None), "the answer was lost");
+    assert_eq!(provision(&mut session, &board, KEY), (Ok(()), None), "the answer was lost");
     let is_set = Err(Refusal::Seal(SealFault::KeyIsSet));
-    assert_eq!(provision(&mut session, [1; 32]), (is_set, None));
+    assert_eq!(provision(&mut session, &board, [1; 32]), (is_set, None));
     let _ = session;
-    let key = bench.app.platform().key_area().clone();
-    let mut device = Device { slots, key };
-    assert_eq!(device.install(&old, Some(Seal::of(&KEY, 0, &old))), Ok(confirmed(&old)));
-    assert_eq!(device.identity().0, Some((crc_of(&old), Some(0))));
+    let mut device = Device::new(slots);
+    device.key = bench.app.platform().key.clone();
+    assert_eq!(install(&mut device, 0, &old), confirmed(&old));
+    assert_eq!(identity(&mut device).0, Some((crc_of(&old), Some(0))));
+    assert_eq!(device.undo(crc_of(&old)), fault(SealFault::Missing));
 }
 
 #[test]
 fn without_a_key_a_seal_is_refused_and_with_a_decayed_one_every_model() {
     let next = blob(2, 4);
-    let seal = Seal::of(&KEY, 6, &next);
-    let mut device = Device { slots: MockSlot::pair_with(&blob(1, 3)), key: KeyArea::erased() };
-    assert_eq!(device.install(&next, Some(seal)), fault(SealFault::NoKey));
-    assert_eq!(device.identity().1, KeyState::None);
+    let mut device = Device::new(Flash::slots_with(&blob(1, 3)));
+    assert_eq!(install(&mut device, 6, &next), fault(SealFault::NoKey));
+    assert_eq!(identity(&mut device).1, KeyState::None);
 
-    let mut device = Device::new();
-    device.key.decay(7, 1);
-    device.key.decay(7 + COPY, 1);
+    let mut device = with_key();
+    device.key.decay(1, 1 << 24);
+    device.key.decay(1 + COPY, 1 << 24);
     let damaged = fault(SealFault::KeyDamaged);
-    assert_eq!(
-        (device.install(&next, Some(seal)), device.install(&next, None)),
-        (damaged, damaged)
-    );
-    assert_eq!(device.identity(), (None, KeyState::Damaged, None));
+    assert_eq!((install(&mut device, 6, &next), device.install(&next, None)), (damaged, damaged));
+    assert_eq!(identity(&mut device), (None, KeyState::Damaged, None));
     // Only whoever has the key can set it again.
     assert_eq!(device.provision([0x43; 32]), Err(Refusal::Seal(SealFault::KeyDamaged)));
     assert_eq!(device.provision(KEY), Ok(()));
-    assert_eq!(device.identity().1, KeyState::Set);
-    assert_eq!(device.install(&next, Some(seal)), Ok(confirmed(&next)));
+    assert_eq!(identity(&mut device).1, KeyState::Set);
+    assert_eq!(install(&mut device, 6, &next), confirmed(&next));
 }
 
 #[test]
-fn any_flipped_bit_of_the_key_leaves_the_model_in_force_and_the_next_start_makes_it_good() {
-    let mut device = Device::new();
-    let before = device.identity();
-    assert_eq!(before.1, KeyState::Set);
-    for bit in 0..8 * COPY {
-        device.key.decay(bit / 8, 1 << (bit % 8));
-        assert_eq!(device.identity(), before, "{bit}");
-        let again = if bit % 2 == 0 { Ok(()) } else { device.provision(KEY) };
-        assert_eq!(again, Ok(()), "{bit}");
-        device.key.decay(COPY + bit / 8, 1 << (bit % 8));
-        assert_eq!(device.identity(), before, "{bit}, in both copies");
-        device.key = KeyArea::with(&KEY);
+fn a_blob_that_leaves_room_for_its_seal_alone_is_taken_and_a_longer_one_costs_no_erase() {
+    let mut device = with_key();
+    let most = Flash::SLOT_BYTES - 16 - 40;
+    let too_large = Err(Refusal::TooLarge { slot_bytes: most as u32 });
+    for (length, erases) in [(most + 4, 0), (most, 1)] {
+        let blob = blob_of_length(length);
+        let before = device.slots[0].erases + device.slots[1].erases;
+        let expected = if erases == 0 { too_large } else { confirmed(&blob) };
+        assert_eq!(install(&mut device, 6, &blob), expected);
+        assert_eq!(device.slots[0].erases + device.slots[1].erases, before + erases);
     }
 }
 
 #[test]
 fn a_model_whose_seal_decays_or_is_written_by_a_debugger_is_not_in_force() {
-    let mut device = Device::new();
+    let mut device = with_key();
     let second = blob(2, 4);
-    device.install(&second, Some(Seal::of(&KEY, 6, &second))).unwrap();
+    install(&mut device, 6, &second).unwrap();
     let seal = second.len().div_ceil(4);
     assert_eq!(&device.slots[0].bytes()[4 * seal..4 * seal + 4], b"SEAL");
     device.slots[0].decay(seal + 3, 1 << 9);
-    let (model, _, highest) = device.identity();
+    let (model, _, highest) = identity(&mut device);
     assert_eq!((model, highest), (Some((crc_of(&blob(1, 3)), Some(5))), Some(5)));
-}
-
-#[test]
-fn a_cut_at_any_word_of_a_sealed_upload_leaves_the_old_or_the_new_model() {
-    let second = blob(2, 4);
-    // Erase, blob, mark and rest of the record, seal; then the second record.
-    let words = MockSlot::BYTES / 4 + second.len().div_ceil(4) + 4 + 10;
-    let [old, new] = [(crc_of(&blob(1, 3)), 5), (crc_of(&second), 6)];
-    let mut cuts = 0;
-    for operations in 0.. {
-        let mut device = Device::new();
-        device.slots[0].cut_power_after(operations);
-        let outcome = device.install(&second, Some(Seal::of(&KEY, 6, &second)));
-        let cut = device.slots[0].power_on();
-        let (model, _, highest) = device.identity();
-        let is_new = operations >= words;
-        let (crc_32, version) = if is_new { new } else { old };
-        let expected = if is_new { Ok(confirmed(&second)) } else { Err(Refusal::Flash) };
-        assert_eq!(outcome, expected, "{operations}");
-        assert_eq!((model, highest), (Some((crc_32, Some(version))), Some(version)));
-        if !cut {
-            break;
-        }
-        cuts += 1;
-    }
-    assert_eq!(cuts, words + 4);
 }

@@ -1,42 +1,21 @@
 //! A new model is on trial until it is confirmed: until then every restart brings the previous one back.
 
-use firmware::app::{Leave, Session};
-use firmware::link::message::{ModelIdentity, Refusal, Report, Request, UploadState, UploadStep};
+use firmware::app::{Session, SessionEnd};
+use firmware::link::message::{ModelIdentity, Refusal, UploadState, UploadStep};
 use mock_board::*;
 
 const CHUNK: usize = 60;
 
-fn identity(session: &mut TestSession<'_>, board: &Board) -> Option<ModelIdentity> {
-    let read = |report: Report<'_>| match report {
-        Report::Identity(identity) => identity.model,
-        other => panic!("{other:?}"),
-    };
-    ask(session, board, &Request::Identify, read).0
-}
-
 /// The model that is in force after a restart.
-fn after_restart(slots: &mut [MockSlot; 2]) -> Option<ModelIdentity> {
-    let mut bench = Bench::new(quiet());
-    let mut session = Session::start(&mut bench.app, slots, &mut []);
-    identity(&mut session, &bench.board)
-}
-
-/// Leaves the model with the CRC-32 `left`.
-fn undo(
-    session: &mut TestSession<'_>,
-    board: &Board,
-    left: u32,
-) -> (Result<UploadState, Refusal>, Option<Leave>) {
-    ask(session, board, &Request::Undo { crc_32: left }, |report| match report {
-        Report::Upload(state) => Ok(state),
-        Report::Refused(refusal) => Err(refusal),
-        other => panic!("{other:?}"),
-    })
+fn after_restart(slots: &[Flash; 2]) -> Option<ModelIdentity> {
+    let mut device = Device::new(slots.clone());
+    device.weights.clear();
+    device.identity().0
 }
 
 /// Slots with the model `old`, and what is in force while `new` is on trial.
-fn on_trial(old: &[u8], new: &[u8]) -> ([MockSlot; 2], Bench<'static>) {
-    let mut slots = MockSlot::pair_with(old);
+fn on_trial(old: &[u8], new: &[u8]) -> ([Flash; 2], Bench<'static>) {
+    let mut slots = Flash::slots_with(old);
     let mut bench = Bench::new(quiet());
     let state = upload(&mut bench, &mut slots, &mut [], &upload_steps(new, CHUNK));
     assert_eq!(state, Ok(UploadState::OnTrial { crc_32: crc_of(new) }));
@@ -50,11 +29,11 @@ fn a_model_on_trial_is_decoded_with_and_gone_after_a_restart() {
         let (mut slots, mut bench) = on_trial(&old, &new);
         let mut weights = vec![0; words];
         let mut session = Session::start(&mut bench.app, &mut slots, &mut weights);
-        let tried = identity(&mut session, &bench.board).unwrap();
+        let tried = identity(&mut session, &bench.board).0.unwrap();
         assert_eq!((tried.crc_32, tried.slot, tried.generation), (crc_of(&new), 1, 1));
         assert_eq!((tried.on_trial, tried.in_ram), (true, words > 0));
         let _ = session;
-        let left = after_restart(&mut slots).unwrap();
+        let left = after_restart(&slots).unwrap();
         assert_eq!((left.crc_32, left.on_trial), (crc_of(&old), false));
     }
 }
@@ -65,12 +44,12 @@ fn a_confirmed_model_stays_and_a_repeated_confirmation_does_no_harm() {
     let (mut slots, mut bench) = on_trial(&old, &new);
     let confirm = [UploadStep::Try { seal: None }, UploadStep::Confirm, UploadStep::Confirm];
     let state = upload(&mut bench, &mut slots, &mut [], &confirm);
-    assert_eq!(state, Ok(UploadState::Confirmed { crc_32: crc_of(&new) }));
+    assert_eq!(state, confirmed(&new));
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    let found = identity(&mut session, &bench.board).unwrap();
+    let found = identity(&mut session, &bench.board).0.unwrap();
     assert_eq!((found.crc_32, found.generation, found.on_trial), (crc_of(&new), 1, false));
     let _ = session;
-    assert_eq!(after_restart(&mut slots), Some(found));
+    assert_eq!(after_restart(&slots), Some(found));
 }
 
 #[test]
@@ -83,8 +62,8 @@ fn whenever_the_power_goes_while_a_model_is_confirmed_the_old_or_the_new_one_is_
         let state = upload(&mut bench, &mut slots, &mut [], &[UploadStep::Confirm]);
         let cut = slots[0].power_on();
         if operations >= 3 {
-            assert_eq!(state, Ok(UploadState::Confirmed { crc_32: crc_of(&new) }), "{operations}");
-            assert_eq!(after_restart(&mut slots).unwrap().crc_32, crc_of(&new), "{operations}");
+            assert_eq!(state, confirmed(&new), "{operations}");
+            assert_eq!(after_restart(&slots).unwrap().crc_32, crc_of(&new), "{operations}");
             if cut {
                 cuts += 1;
                 continue;
@@ -96,9 +75,9 @@ fn whenever_the_power_goes_while_a_model_is_confirmed_the_old_or_the_new_one_is_
         let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
         assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&old)), "{operations}");
         let _ = session;
-        assert_eq!(after_restart(&mut slots).unwrap().crc_32, crc_of(&old), "{operations}");
+        assert_eq!(after_restart(&slots).unwrap().crc_32, crc_of(&old), "{operations}");
         let mended = install(&mut bench, &mut slots, &mut [], (&new, CHUNK));
-        assert_eq!(mended, Ok(UploadState::Confirmed { crc_32: crc_of(&new) }));
+        assert_eq!(mended, confirmed(&new));
         cuts += 1;
     }
     assert_eq!(cuts, 3 + 4, "words of a record behind its mark, and of the second one");
@@ -108,25 +87,31 @@ fn whenever_the_power_goes_while_a_model_is_confirmed_the_old_or_the_new_one_is_
 fn an_abort_and_an_undo_end_a_trial_without_touching_the_flash() {
     let (old, new) = (blob(1, 3), blob(2, 5));
     let (mut slots, mut bench) = on_trial(&old, &new);
-    let writes = [slots[0].writes, slots[1].writes];
+    let writes = [slots[0].words_written, slots[1].words_written];
     upload(&mut bench, &mut slots, &mut [], &[UploadStep::Abort]).unwrap();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&old)));
     let _ = session;
-    assert_eq!([slots[0].writes, slots[1].writes], writes);
+    assert_eq!([slots[0].words_written, slots[1].words_written], writes);
     let refused = upload(&mut bench, &mut slots, &mut [], &[UploadStep::Confirm]);
     assert_eq!(refused, Err(Refusal::NoUpload), "nothing is on trial any more");
 
     let (mut slots, mut bench) = on_trial(&old, &new);
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    let is_old = Ok(UploadState::Confirmed { crc_32: crc_of(&old) });
-    assert_eq!(undo(&mut session, &board, crc_of(&new)), (is_old, Some(Leave::NewModel)));
+    assert_eq!(
+        undo(&mut session, &board, crc_of(&new)),
+        (confirmed(&old), Some(SessionEnd::NewModel))
+    );
     let _ = session;
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    assert_eq!(undo(&mut session, &board, crc_of(&new)), (is_old, None), "the answer was lost");
+    assert_eq!(
+        undo(&mut session, &board, crc_of(&new)),
+        (confirmed(&old), None),
+        "the answer was lost"
+    );
     let _ = session;
-    assert_eq!([slots[0].writes, slots[1].writes], writes);
+    assert_eq!([slots[0].words_written, slots[1].words_written], writes);
     // The model that was tried never had a record: there is no way back to it.
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     assert_eq!(undo(&mut session, &board, crc_of(&old)).0, Err(Refusal::NothingToUndo));
@@ -146,7 +131,7 @@ fn on_trial_nothing_overwrites_the_previous_model() {
     assert_eq!(model_crc(&mut session, &board), Some(crc_of(&new)));
     let _ = session;
     let state = upload(&mut bench, &mut slots, &mut [], &[UploadStep::Confirm]);
-    assert_eq!(state, Ok(UploadState::Confirmed { crc_32: crc_of(&new) }));
+    assert_eq!(state, confirmed(&new));
 }
 
 #[test]
@@ -157,7 +142,7 @@ fn a_model_that_decays_on_trial_is_left() {
         slots[1].decay(20, 4);
         let mut weights = vec![0; words];
         let mut session = Session::start(&mut bench.app, &mut slots, &mut weights);
-        let found = identity(&mut session, &bench.board).unwrap();
+        let found = identity(&mut session, &bench.board).0.unwrap();
         assert_eq!((found.crc_32, found.on_trial), (crc_of(&old), false));
         let _ = session;
         let refused = upload(&mut bench, &mut slots, &mut [], &[UploadStep::Confirm]);

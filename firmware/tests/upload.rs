@@ -1,10 +1,11 @@
 //! Uploading a model: sound models come into force, and nothing else ever does.
 
-use firmware::app::{Leave, Session};
+use firmware::app::{Session, SessionEnd};
 use firmware::link::message::{
     Configuration, ModelFault, Refusal, Report, Request, UploadState, UploadStep,
 };
-use firmware::store::{ERASES_AT_ONCE, FlashError, Slot, Upload};
+use firmware::seal::Seal;
+use firmware::store::{ERASES_AT_ONCE, Slot, Upload, seal_in_slot};
 use mock_board::*;
 use model_core::checksum::CRC_32;
 use model_core::rbf::Shape;
@@ -14,17 +15,13 @@ const CHUNK: usize = 60;
 
 /// Carries out an upload as far as it goes; returns the last answer, and whether the session ended.
 fn upload(
-    session: &mut TestSession<'_>,
+    session: &mut Running<'_, '_>,
     board: &Board,
     steps: &[UploadStep<'_>],
-) -> (Result<UploadState, Refusal>, Option<Leave>) {
+) -> (Answer, Option<SessionEnd>) {
     let mut last = (Ok(UploadState::Idle), None);
     for step in steps {
-        last = ask(session, board, &Request::Upload(*step), |report| match report {
-            Report::Upload(state) => Ok(state),
-            Report::Refused(refusal) => Err(refusal),
-            other => panic!("{other:?}"),
-        });
+        last = upload_step(session, board, *step);
         if last.0.is_err() {
             break;
         }
@@ -32,53 +29,35 @@ fn upload(
     last
 }
 
-/// Uploads and confirms `blob` on a device that starts for this.
-fn installed(slots: &mut [MockSlot; 2], blob: &[u8]) -> Result<UploadState, Refusal> {
-    install(&mut Bench::new(quiet()), slots, &mut [], (blob, CHUNK))
-}
-
 #[test]
 fn a_good_model_comes_into_force_and_stays_through_restarts() {
-    let mut slots = MockSlot::pair_with(&blob(1, 3));
+    let mut device = Device::new(Flash::slots_with(&blob(1, 3)));
     for generation in 1..=5_u32 {
         let next = blob(1 + generation as usize, 2 + generation as usize);
-        let outcome = installed(&mut slots, &next);
-        assert_eq!(outcome, Ok(UploadState::Confirmed { crc_32: crc_of(&next) }));
-        let mut bench = Bench::new(quiet());
-        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-        let (identity, _) = ask(&mut session, &bench.board, &Request::Identify, |r| match r {
-            Report::Identity(identity) => identity.model.unwrap(),
-            other => panic!("{other:?}"),
-        });
-        assert_eq!(identity.crc_32, crc_of(&next));
-        assert_eq!(identity.generation, generation);
-        assert_eq!(u32::from(identity.slot), generation % 2); // in turn
+        assert_eq!(device.install(&next, None), confirmed(&next));
+        let model = device.identity().0.unwrap();
+        assert_eq!((model.crc_32, model.generation), (crc_of(&next), generation));
+        assert_eq!(u32::from(model.slot), generation % 2, "in turn");
     }
 }
 
 #[test]
 fn a_device_without_a_model_takes_one() {
-    let mut slots = MockSlot::pair();
-    let mut bench = Bench::new(quiet());
+    let mut device = Device::new(Flash::slots());
     let new = blob(4, 3);
-    {
-        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-        assert_eq!(model_crc(&mut session, &bench.board), None);
-        let (_, leave) = upload(&mut session, &bench.board, &upload_steps(&new, CHUNK));
-        assert_eq!(leave, Some(Leave::NewModel));
-    }
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&new)));
-    let _ = session;
-    // It was on trial.
-    assert_eq!(after_restart(&mut slots), None);
-    installed(&mut slots, &new).unwrap();
-    assert_eq!(after_restart(&mut slots), Some(crc_of(&new)));
+    device.session(|session, board| {
+        assert_eq!(model_crc(session, board), None);
+        let (_, end) = upload(session, board, &trial_steps(&new, None));
+        assert_eq!(end, Some(SessionEnd::NewModel));
+    });
+    assert_eq!(device.restart(), None, "it was on trial");
+    assert_eq!(device.install(&new, None), confirmed(&new));
+    assert_eq!(device.restart(), Some(crc_of(&new)));
 }
 
 #[test]
 fn the_watchdog_is_fed_just_before_and_after_a_slot_is_erased_even_if_the_sensor_is_silent() {
-    let mut slots = MockSlot::pair();
+    let mut slots = Flash::slots();
     let mut bench = Bench::new(Configuration { frame_period_us: 1000, ..quiet() });
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let board = bench.board.clone();
@@ -99,8 +78,8 @@ fn the_watchdog_is_fed_just_before_and_after_a_slot_is_erased_even_if_the_sensor
 
 #[test]
 fn the_watchdog_is_fed_after_an_erase_that_fails_too() {
-    let mut slots = MockSlot::pair();
-    slots[0].cut_power_after(3);
+    let mut slots = Flash::slots();
+    slots[0].cut_power_after(0);
     let mut bench = Bench::new(quiet());
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let board = bench.board.clone();
@@ -111,167 +90,18 @@ fn the_watchdog_is_fed_after_an_erase_that_fails_too() {
 }
 
 #[test]
-fn an_interruption_after_any_step_leaves_the_old_model() {
-    let (old, new) = (blob(1, 3), blob(2, 5));
-    let steps = upload_steps(&new, CHUNK);
-    let mut slots = MockSlot::pair_with(&old);
-    for taken in 0..steps.len() {
-        {
-            let mut bench = Bench::new(quiet());
-            let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-            let (outcome, leave) = upload(&mut session, &bench.board, &steps[..taken]);
-            assert!(outcome.is_ok() && leave.is_none(), "{taken}: {outcome:?}");
-            assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&old)), "{taken}");
-        }
-        // The old model is in force after a restart too.
-        let mut bench = Bench::new(quiet());
-        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-        assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&old)), "{taken}");
-    }
-}
-
-#[test]
-fn the_power_may_go_in_the_middle_of_any_word() {
-    let (old, new) = (blob(1, 3), blob(2, 5));
-    // Words of the erase, the blob and the record.
-    let whole = MockSlot::BYTES / 4 + new.len().div_ceil(4) + 4;
-    // The old model is in slot 0 without a record, and then in slot 1 with one.
-    for old_uploaded in [false, true] {
-        let mut operations = 0;
-        let mut cuts = 0;
-        loop {
-            let mut slots = MockSlot::pair_with(if old_uploaded { &new } else { &old });
-            if old_uploaded {
-                installed(&mut slots, &old).unwrap();
-            }
-            slots[0].cut_power_after(operations);
-            let outcome = installed(&mut slots, &new);
-            assert!(matches!(outcome, Ok(UploadState::Confirmed { .. }) | Err(Refusal::Flash)));
-            let cut = slots[0].power_on();
-            let mut bench = Bench::new(quiet());
-            let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-            let found = model_crc(&mut session, &bench.board);
-            let expected = crc_of(if operations >= whole { &new } else { &old });
-            assert_eq!(found, Some(expected), "cut after {operations} words");
-            if !cut {
-                break;
-            }
-            let _ = session;
-            // The device still takes an upload.
-            let mended = install(&mut bench, &mut slots, &mut [], (&new, CHUNK));
-            assert_eq!(mended, Ok(UploadState::Confirmed { crc_32: crc_of(&new) }));
-            operations += 1;
-            cuts += 1;
-        }
-        // The second record is cut, too.
-        assert_eq!(cuts, whole + 4);
-    }
-}
-
-#[test]
-fn a_record_whose_last_word_reads_anew_at_every_start_does_not_change_the_model_in_force() {
-    let [old, new] = [blob(1, 3), blob(2, 5)];
-    let weak_word = MockSlot::BYTES / 4 - 1;
-    for reads_right_at_first in [true, false] {
-        let mut slots = MockSlot::pair_with(&old);
-        // The erase, the blob, and all but the last word of the record.
-        slots[0].cut_power_after(MockSlot::BYTES / 4 + new.len().div_ceil(4) + 3);
-        assert_eq!(installed(&mut slots, &new), Err(Refusal::Flash));
-        assert!(slots[0].power_on());
-        let record = slots[1].bytes().last_chunk::<16>().unwrap();
-        let (covered, torn) = record.split_at(12);
-        let weak_bits = CRC_32.checksum(covered) ^ u32::from_le_bytes(torn.try_into().unwrap());
-        if reads_right_at_first {
-            slots[1].decay(weak_word, weak_bits);
-        }
-        let expected = Some(crc_of(if reads_right_at_first { &new } else { &old }));
-        for start in 0..4 {
-            assert_eq!(after_restart(&mut slots), expected, "{reads_right_at_first}, {start}");
-            slots[1].decay(weak_word, weak_bits);
-        }
-    }
-}
-
-/// Slots whose model in force is `old` in slot 1, so that slot 0 is spare: the one that may hold a model flashed with
-/// the firmware.
-fn slots_with_first_spare(old: &[u8]) -> [MockSlot; 2] {
-    let mut slots = MockSlot::pair_with(&blob(9, 1));
-    installed(&mut slots, old).unwrap();
-    slots
-}
-
-/// CRC-32 of the model that is in force after a restart.
-fn after_restart(slots: &mut [MockSlot; 2]) -> Option<u32> {
-    let mut bench = Bench::new(quiet());
-    let mut session = Session::start(&mut bench.app, slots, &mut []);
-    model_crc(&mut session, &bench.board)
-}
-
-#[test]
-fn an_upload_that_was_not_committed_never_comes_into_force_even_if_the_other_slot_decays() {
-    let (old, new, next) = (blob(1, 3), blob(2, 5), blob(3, 2));
-    let steps = upload_steps(&new, CHUNK);
-    let whole = steps.len() - 1; // all but the trial
-    // The upload ends by an abort, by silence, or by a power cut at any word of what follows: another begin.
-    let ends = [Some(UploadStep::Abort), None, Some(begin(&next))];
-    for end in ends {
-        let mut operations = 0;
-        loop {
-            let mut slots = slots_with_first_spare(&old);
-            {
-                let mut bench = Bench::new(quiet());
-                let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-                upload(&mut session, &bench.board, &steps[..whole]).0.unwrap();
-            }
-            slots[0].cut_power_after(operations);
-            if let Some(end) = end {
-                // A restart in between, so that the begin erases.
-                let mut bench = Bench::new(quiet());
-                let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-                let _ = upload(&mut session, &bench.board, &[end]);
-            }
-            let cut = slots[0].power_on();
-            assert_eq!(after_restart(&mut slots), Some(crc_of(&old)), "{end:?} {operations}");
-            slots[1].decay(20, 4);
-            assert_eq!(after_restart(&mut slots), None, "{end:?} {operations}");
-            if !cut {
-                break;
-            }
-            operations += 1;
-        }
-        let expected = if end == Some(begin(&next)) { MockSlot::BYTES / 4 + 1 } else { 0 };
-        assert_eq!(operations, expected, "words of an erase, and the mark");
-    }
-}
-
-#[test]
-fn wherever_the_power_is_cut_a_decayed_slot_does_not_bring_half_an_upload_into_force() {
-    let (old, new) = (blob(1, 3), blob(2, 5));
-    let whole = MockSlot::BYTES / 4 + new.len().div_ceil(4) + 4;
-    for operations in 0.. {
-        let mut slots = slots_with_first_spare(&old);
-        slots[0].cut_power_after(operations);
-        let _ = installed(&mut slots, &new);
-        let cut = slots[0].power_on();
-        slots[1].decay(20, 4);
-        let found = after_restart(&mut slots);
-        let expected = (operations >= whole).then(|| crc_of(&new));
-        assert_eq!(found, expected, "cut after {operations} words");
-        if !cut {
-            break;
-        }
-    }
-}
-
-#[test]
 fn a_model_flashed_with_the_firmware_is_in_force_until_the_first_upload_begins_in_its_slot() {
     let (flashed, first) = (blob(1, 3), blob(2, 4));
-    let mut slots = MockSlot::pair_with(&flashed);
-    installed(&mut slots, &first).unwrap();
-    assert_eq!(after_restart(&mut slots), Some(crc_of(&first)));
+    let mut device = Device::new(Flash::slots_with(&flashed));
+    device.install(&first, None).unwrap();
+    assert_eq!(device.restart(), Some(crc_of(&first)));
     // It stands in for the uploaded model that has decayed.
-    slots[1].decay(20, 4);
-    assert_eq!(after_restart(&mut slots), Some(crc_of(&flashed)));
+    device.slots[1].decay(20, 4);
+    assert_eq!(device.restart(), Some(crc_of(&flashed)));
+    // In slot 1 none counts that was not uploaded.
+    device.slots = Flash::slots();
+    device.slots[1].flash(0, &flashed);
+    assert_eq!(device.restart(), None);
 }
 
 fn slot_erases(session: &mut TestSession<'_>, board: &Board) -> u32 {
@@ -284,7 +114,7 @@ fn slot_erases(session: &mut TestSession<'_>, board: &Board) -> u32 {
 
 #[test]
 fn what_cannot_come_into_force_costs_no_erase_and_a_repeated_begin_costs_none_more() {
-    let mut slots = MockSlot::pair_with(&blob(1, 3));
+    let mut slots = Flash::slots_with(&blob(1, 3));
     {
         let mut bench = Bench::new(quiet());
         let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
@@ -317,35 +147,18 @@ fn what_cannot_come_into_force_costs_no_erase_and_a_repeated_begin_costs_none_mo
         let steps = upload_steps(&good, CHUNK);
         upload(&mut session, &board, &[UploadStep::Abort, steps[0], steps[1], steps[0]]).0.unwrap();
         assert_eq!(slot_erases(&mut session, &board), 2);
-        let (outcome, leave) = upload(&mut session, &board, &steps);
-        assert!(outcome.is_ok() && leave.is_some(), "{outcome:?}");
+        let (outcome, end) = upload(&mut session, &board, &steps);
+        assert!(outcome.is_ok() && end.is_some(), "{outcome:?}");
         assert_eq!(slot_erases(&mut session, &board), 2);
     }
     assert_eq!((slots[0].erases, slots[1].erases), (0, 2));
 }
 
-/// A slot that wears.
-struct Flash(MockSlot);
-
-impl Slot for Flash {
-    fn bytes(&self) -> &[u8] {
-        self.0.bytes()
-    }
-
-    fn erase(&mut self) -> Result<(), FlashError> {
-        self.0.erase()
-    }
-
-    fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), FlashError> {
-        self.0.write(offset, bytes)
-    }
-}
-
 #[test]
 fn erases_are_limited_in_rate_and_the_watchdog_is_fed_around_each() {
-    const INTERVAL_US: u64 = 1_000_000 * Flash::ERASE_INTERVAL_S as u64;
-    let [slot, _] = MockSlot::pair();
-    let mut slot = Flash(slot);
+    const INTERVAL_US: u64 = 600_000_000;
+    let [mut slot, _] = Flash::slots();
+    slot.erase_interval_s = 600;
     let mut upload = Upload::new();
     let mut fed = 0;
     let mut begin_and_chunk = |now_us: u64| {
@@ -368,20 +181,48 @@ fn erases_are_limited_in_rate_and_the_watchdog_is_fed_around_each() {
     }
     assert_eq!(begin_and_chunk(late_us), wait(INTERVAL_US));
     let erases = 2 * ERASES_AT_ONCE + 1;
-    assert_eq!((slot.0.erases, fed), (erases as usize, 2 * erases), "fed before and after");
+    assert_eq!((slot.erases, fed), (erases as usize, 2 * erases), "fed before and after");
+}
+
+#[test]
+fn a_blob_may_fill_the_slot_and_an_upload_that_is_forgotten_has_worn_it_all_the_same() {
+    let [mut slot, _] = Flash::slots();
+    slot.erase_interval_s = 600;
+    let slot_bytes = Flash::SLOT_BYTES - 16;
+    let mut upload = Upload::new();
+    let mut begin = |length| {
+        let begun = upload.begin(&mut slot, length, 0, || ());
+        upload.forget();
+        begun
+    };
+    let too_large = Refusal::TooLarge { slot_bytes: slot_bytes as u32 };
+    assert_eq!(begin(slot_bytes + 1), Err(too_large));
+    for _ in 0..ERASES_AT_ONCE {
+        assert_eq!(begin(slot_bytes), Ok(()));
+    }
+    assert_eq!(begin(slot_bytes), Err(Refusal::TooSoon { wait_us: 600_000_000 }));
+}
+
+#[test]
+fn the_seal_of_a_blob_of_odd_length_stands_at_the_next_word() {
+    let [mut slot, _] = Flash::slots();
+    slot.flash(0, b"TAXL\x01\x65\0\0\0");
+    let seal = Seal { version: 7, tag: [5; 32] };
+    assert_eq!(Upload::new().seal(&mut slot, &seal), Ok(()));
+    assert_eq!((seal_in_slot(slot.bytes()), &slot.bytes()[104..108]), (Some(seal), &b"SEAL"[..]));
 }
 
 #[test]
 fn behind_the_largest_generation_no_model_is_taken() {
     let old = blob(1, 3);
-    let mut slots = MockSlot::pair_with(&old);
+    let mut slots = Flash::slots_with(&old);
     let record = [&b"SLOT"[..], &[0xFF; 4], &crc_of(&old).to_le_bytes()].concat();
     let record = [&record[..], &CRC_32.checksum(&record).to_le_bytes()].concat();
-    slots[0].write(MockSlot::BYTES - 16, &record).unwrap();
+    slots[0].write(Flash::SLOT_BYTES - 16, &record).unwrap();
     let mut bench = Bench::new(quiet());
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    let (outcome, leave) = upload(&mut session, &bench.board, &upload_steps(&blob(2, 4), CHUNK));
-    assert_eq!((outcome, leave), (Err(Refusal::LastGeneration), None));
+    let (outcome, end) = upload(&mut session, &bench.board, &upload_steps(&blob(2, 4), CHUNK));
+    assert_eq!((outcome, end), (Err(Refusal::LastGeneration), None));
     assert_eq!(slot_erases(&mut session, &bench.board), 0);
 }
 
@@ -389,7 +230,7 @@ fn behind_the_largest_generation_no_model_is_taken() {
 fn an_upload_without_requests_ends() {
     let (old, new) = (blob(1, 3), blob(2, 4));
     let steps = upload_steps(&new, CHUNK);
-    let mut slots = MockSlot::pair_with(&old);
+    let mut slots = Flash::slots_with(&old);
     let mut bench = Bench::new(quiet());
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let board = bench.board.clone();
@@ -405,57 +246,23 @@ fn an_upload_without_requests_ends() {
     assert_eq!(upload(&mut session, &board, &steps[3..4]).0, Err(Refusal::NoUpload));
 }
 
-#[test]
-fn damage_of_any_bit_leaves_the_old_model() {
-    let (old, new) = (blob(1, 3), blob(2, 4));
-    let mut slots = MockSlot::pair_with(&old);
-    let mut bench = Bench::new(quiet());
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    for bit in 0..8 * new.len() {
-        let mut damaged = new.clone();
-        damaged[bit / 8] ^= 1 << (bit % 8);
-        let (outcome, leave) = upload(&mut session, &bench.board, &upload_steps(&damaged, CHUNK));
-        let is_length = (5..9).contains(&(bit / 8));
-        assert!(
-            match outcome {
-                Err(Refusal::BadModel(_)) => true,
-                Err(Refusal::TooLarge { .. } | Refusal::OutOfPlace { .. }) => is_length,
-                _ => false,
-            },
-            "bit {bit}: {outcome:?}"
-        );
-        assert_eq!(leave, None);
-    }
-    assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&old)));
-}
-
 /// Working space has room for 12 numbers, of which two rows' inputs take 6.
 #[test]
 fn a_model_of_more_components_than_there_is_room_for_is_refused() {
     let old = blob(1, 3);
-    let mut slots = MockSlot::pair_with(&old);
-    {
-        let mut bench = Bench::new(quiet());
-        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-        let steps = |blob: &[u8]| upload_steps(blob, CHUNK).len();
-        let many = blob_of_components(7);
-        assert!(steps(&many) > 2);
-        let (outcome, _) = upload(&mut session, &bench.board, &upload_steps(&many, CHUNK));
-        assert_eq!(outcome, Err(Refusal::BadModel(ModelFault::Shape)));
-        assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&old)));
-        let few = blob_of_components(6);
-        let (outcome, leave) = upload(&mut session, &bench.board, &upload_steps(&few, CHUNK));
-        assert!(outcome.is_ok() && leave.is_some(), "{outcome:?}");
-    }
-    let few = blob_of_components(6);
-    installed(&mut slots, &few).unwrap();
-    assert_eq!(after_restart(&mut slots), Some(crc_of(&few)));
+    let mut device = Device::new(Flash::slots_with(&old));
+    let (many, few) = (blob_of_components(7), blob_of_components(6));
+    let shape = Err(Refusal::BadModel(ModelFault::Shape));
+    assert_eq!(device.install(&many, None), shape);
+    assert_eq!(device.restart(), Some(crc_of(&old)));
+    assert_eq!(device.install(&few, None), confirmed(&few));
+    assert_eq!(device.restart(), Some(crc_of(&few)));
 }
 
 #[test]
 fn each_fault_of_a_model_is_named() {
     let old = blob(1, 3);
-    let mut slots = MockSlot::pair_with(&old);
+    let mut slots = Flash::slots_with(&old);
     let mut bench = Bench::new(quiet());
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let wide = Network::try_new(
@@ -499,7 +306,7 @@ fn each_fault_of_a_model_is_named() {
 fn steps_out_of_order_are_refused_and_repeated_ones_are_not() {
     let (old, new) = (blob(1, 3), blob(2, 4));
     let steps = upload_steps(&new, CHUNK);
-    let mut slots = MockSlot::pair_with(&old);
+    let mut slots = Flash::slots_with(&old);
     let mut bench = Bench::new(quiet());
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let board = bench.board.clone();
@@ -508,7 +315,7 @@ fn steps_out_of_order_are_refused_and_repeated_ones_are_not() {
     assert_eq!(one(&steps[1]), Err(Refusal::NoUpload));
     assert_eq!(one(&UploadStep::Try { seal: None }), Err(Refusal::NoUpload));
     assert_eq!(one(&UploadStep::Confirm), Err(Refusal::NoUpload));
-    let slot_bytes = MockSlot::BYTES as u32 - 16;
+    let slot_bytes = Flash::SLOT_BYTES as u32 - 16;
     let mut too_long = new.clone();
     too_long[5..9].copy_from_slice(&(slot_bytes + 1).to_le_bytes());
     assert_eq!(one(&begin(&too_long)), Err(Refusal::TooLarge { slot_bytes }));

@@ -6,11 +6,10 @@ use std::rc::Rc;
 use firmware::app::{App, Buffers, Session};
 use firmware::link::message::Configuration;
 
-use crate::board::{AnyKeeper, Board};
-use crate::key_area::KeyArea;
+use crate::board::Board;
+use crate::flash::Flash;
 use crate::pages::SharedSettings;
 use crate::shape::{COLS, MESSAGE_BYTES, OUTPUTS, ROWS, TestFrame, frame_at_rest};
-use crate::slot::MockSlot;
 use crate::source::Source;
 
 /// Memory of an application.
@@ -19,11 +18,11 @@ pub type Memory = Buffers<ROWS, COLS, OUTPUTS, MESSAGE_BYTES>;
 /// An application on the mock board.
 pub type TestApp<'m> = App<'m, Board, Source, ROWS>;
 
-/// A session of an application whose memory is never freed, with slots of type `S`.
-pub type TestSession<'a, S = MockSlot> = Session<'a, 'static, Board, Source, S, ROWS>;
+/// A session of an application in memory of any lifetime.
+pub type Running<'a, 'm> = Session<'a, 'm, Board, Source, Flash, ROWS>;
 
-/// Time in µs that a scan takes on a bench.
-const SCAN_US: u32 = 10;
+/// A session of an application whose memory is never freed.
+pub type TestSession<'a> = Running<'a, 'static>;
 
 /// A configuration that scans only on request.
 pub fn quiet() -> Configuration {
@@ -47,13 +46,8 @@ impl Bench<'static> {
     }
 
     /// As [`Bench::new`], on a board on which these settings are kept.
-    pub fn with_settings(configuration: Configuration, settings: impl Into<AnyKeeper>) -> Self {
+    pub fn with_settings(configuration: Configuration, settings: &SharedSettings) -> Self {
         Self::within(Box::leak(Box::new(Memory::new())), configuration, settings)
-    }
-
-    /// As [`Bench::new`], on a board whose flash for the key is `key`.
-    pub fn with_key(configuration: Configuration, key: &KeyArea) -> Self {
-        Self::within_with_key(Box::leak(Box::new(Memory::new())), configuration, key)
     }
 }
 
@@ -63,36 +57,16 @@ impl<'m> Bench<'m> {
     pub fn within(
         memory: &'m mut Memory,
         configuration: Configuration,
-        settings: impl Into<AnyKeeper>,
+        settings: &SharedSettings,
     ) -> Self {
         Self::on(Board::with_settings(settings), memory, configuration)
-    }
-
-    /// As [`Bench::within`], on a board without settings whose flash for the key is `key`.
-    pub fn within_with_key(
-        memory: &'m mut Memory,
-        configuration: Configuration,
-        key: &KeyArea,
-    ) -> Self {
-        let mut board = Board::with_settings(&SharedSettings::default());
-        board.key = key.clone();
-        Self::on(board, memory, configuration)
     }
 
     /// As [`Bench::within`], on this board.
     pub fn on(board: Board, memory: &'m mut Memory, configuration: Configuration) -> Self {
         *memory = Memory::new();
         let frame = Rc::new(RefCell::new(frame_at_rest()));
-        let source = Source::new(&frame, &board, SCAN_US);
+        let source = Source::new(&frame, &board);
         Self { app: App::new(board.clone(), source, configuration, memory), board, frame }
-    }
-
-    /// Restarts the application with another `configuration` and `scan_us` µs a scan, on the same board, in memory that
-    /// is never freed.
-    pub fn restarted(self, configuration: Configuration, scan_us: u32) -> Bench<'static> {
-        let Self { board, frame, .. } = self;
-        let source = Source::new(&frame, &board, scan_us);
-        let memory = Box::leak(Box::new(Memory::new()));
-        Bench { app: App::new(board.clone(), source, configuration, memory), board, frame }
     }
 }

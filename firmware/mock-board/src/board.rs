@@ -4,12 +4,10 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
 
-use firmware::link::message::{Memory, Setting};
+use firmware::link::message::Memory;
 use firmware::platform::{Platform, Port};
-use firmware::settings::{KeepError, Keeper};
-use firmware::store::Slot;
 
-use crate::key_area::KeyArea;
+use crate::flash::Flash;
 use crate::pages::SharedSettings;
 
 /// State of the board, which a test can see while the application owns the board.
@@ -23,7 +21,7 @@ pub struct Pins {
     pub now_us: u32,
     /// Time in µs that each look at the clock takes besides. It makes waiting short for tests of slow lines.
     pub look_us: u32,
-    /// Time in µs that a scan takes besides that of its [`Source`](crate::Source).
+    /// Time in µs that a scan takes besides 10 µs.
     pub scan_us: u32,
     /// Number of times that the watchdog was fed.
     pub feeds: u32,
@@ -37,30 +35,7 @@ pub struct Pins {
     pub gap_us: u32,
     /// When it took the last byte.
     taken_us: u32,
-}
-
-/// Settings in any memory, shared with whoever restarts the board.
-#[derive(Clone)]
-pub struct AnyKeeper(Rc<RefCell<dyn Keeper>>);
-
-impl<S: Slot + 'static> From<&SharedSettings<S>> for AnyKeeper {
-    fn from(settings: &SharedSettings<S>) -> Self {
-        Self(settings.0.clone())
-    }
-}
-
-impl Keeper for AnyKeeper {
-    fn make_firm(&mut self) -> Result<(), KeepError> {
-        self.0.borrow_mut().make_firm()
-    }
-
-    fn read<'b>(&mut self, setting: Setting, buffer: &'b mut [u8]) -> Option<&'b [u8]> {
-        self.0.borrow_mut().read(setting, buffer)
-    }
-
-    fn keep(&mut self, setting: Setting, parts: &[&[u8]]) -> Result<bool, KeepError> {
-        self.0.borrow_mut().keep(setting, parts)
-    }
+    cycles: u32,
 }
 
 /// A board. Clones are the same board.
@@ -68,15 +43,15 @@ impl Keeper for AnyKeeper {
 pub struct Board {
     /// Clock, serial line and watchdog.
     pub pins: Rc<RefCell<Pins>>,
-    settings: AnyKeeper,
+    settings: SharedSettings,
     /// The flash of its key; that of a clone is another one.
-    pub key: KeyArea,
+    pub key: Flash,
 }
 
 impl Board {
     /// A board on which these settings are kept.
-    pub fn with_settings(settings: impl Into<AnyKeeper>) -> Self {
-        Self { pins: Rc::default(), settings: settings.into(), key: KeyArea::erased() }
+    pub fn with_settings(settings: &SharedSettings) -> Self {
+        Self { pins: Rc::default(), settings: settings.clone(), key: Flash::without_key() }
     }
 }
 
@@ -108,8 +83,8 @@ impl Port for Board {
 }
 
 impl Platform for Board {
-    type Settings = AnyKeeper;
-    type KeyArea = KeyArea;
+    type Settings = SharedSettings;
+    type KeyArea = Flash;
 
     const BOARD: &'static str = "test";
 
@@ -125,11 +100,18 @@ impl Platform for Board {
         Memory { stack_reserved: 1024, ..Memory::default() }
     }
 
-    fn settings(&mut self) -> &mut AnyKeeper {
+    /// Each look takes a thousand cycles.
+    fn cycles(&self) -> u32 {
+        let mut pins = self.pins.borrow_mut();
+        pins.cycles = pins.cycles.wrapping_add(1000);
+        pins.cycles
+    }
+
+    fn settings(&mut self) -> &mut SharedSettings {
         &mut self.settings
     }
 
-    fn key_area(&mut self) -> &mut KeyArea {
+    fn key_area(&mut self) -> &mut Flash {
         &mut self.key
     }
 }

@@ -4,9 +4,6 @@ use std::fs::OpenOptions;
 use std::os::unix::fs::FileExt;
 
 /// Flips bit number `bit` from `address` on of this process's memory, through the kernel.
-///
-/// # Panics
-/// The memory cannot be written.
 pub fn flip_bit(address: usize, bit: usize) {
     let memory = OpenOptions::new().read(true).write(true).open("/proc/self/mem").unwrap();
     let (place, mut byte) = ((address + bit / 8) as u64, [0]);

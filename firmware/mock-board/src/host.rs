@@ -1,16 +1,14 @@
 //! The host's side of the link.
 
-use firmware::app::{Leave, Session};
+use firmware::app::{Session, SessionEnd};
 use firmware::link::message::{Configuration, Refusal, Report, Request, UploadState, UploadStep};
 use firmware::link::receive::{Received, Receiver};
 use firmware::link::{cobs, packet};
-use firmware::store::Slot;
 use model_core::blob::Model;
 
-use crate::bench::Bench;
+use crate::bench::{Bench, Running};
 use crate::board::Board;
-use crate::shape::ROWS;
-use crate::source::Source;
+use crate::flash::Flash;
 
 /// Number of the requests of [`ask`].
 const ASKED: u16 = 77;
@@ -21,9 +19,6 @@ pub fn configure(configuration: Configuration) -> Request<'static> {
 }
 
 /// The bytes of one request.
-///
-/// # Panics
-/// The request is longer than 1 KiB.
 pub fn request_bytes(number: u16, request: &Request<'_>) -> Vec<u8> {
     let mut buffer = [0; 1024];
     let packet = packet::encode(number, request, &mut buffer).unwrap();
@@ -36,9 +31,6 @@ pub fn request_bytes(number: u16, request: &Request<'_>) -> Vec<u8> {
 }
 
 /// Reports that the host finds in a device's bytes: the number and debug text of each.
-///
-/// # Panics
-/// A report is not whole.
 pub fn reports(bytes: &[u8]) -> Vec<(u16, String)> {
     let mut receiver = Receiver::new([0; 1024]);
     let mut reports = Vec::new();
@@ -56,38 +48,32 @@ pub fn reports(bytes: &[u8]) -> Vec<(u16, String)> {
 }
 
 /// Runs turns of the loop until the device has read all bytes sent to it, or the session ends.
-pub fn settle<S: Slot>(
-    session: &mut Session<'_, '_, Board, Source, S, ROWS>,
-    board: &Board,
-) -> Option<Leave> {
+pub fn settle(session: &mut Running<'_, '_>, board: &Board) -> Option<SessionEnd> {
     while !board.pins.borrow().to_device.is_empty() {
-        if let Some(leave) = session.step() {
-            return Some(leave);
+        if let Some(end) = session.step() {
+            return Some(end);
         }
     }
     None
 }
 
 /// Sends `request` and passes the answer to `read`. All that the device has sent before is forgotten.
-///
-/// # Panics
-/// There is no answer, or a report is not whole.
-pub fn ask<T, S: Slot>(
-    session: &mut Session<'_, '_, Board, Source, S, ROWS>,
+pub fn ask<T>(
+    session: &mut Running<'_, '_>,
     board: &Board,
     request: &Request<'_>,
     read: impl FnOnce(Report<'_>) -> T,
-) -> (T, Option<Leave>) {
+) -> (T, Option<SessionEnd>) {
     board.pins.borrow_mut().to_host.clear();
     board.pins.borrow_mut().to_device.extend(request_bytes(ASKED, request));
-    let leave = settle(session, board);
+    let end = settle(session, board);
     let answer = std::mem::take(&mut board.pins.borrow_mut().to_host);
     let mut receiver = Receiver::new([0; 1024]);
     for byte in &answer {
         if let Some(Received::Frame(bytes)) = receiver.push(*byte) {
             let packet = packet::decode::<Report<'_>>(bytes).expect("a whole report");
             if packet.number == ASKED {
-                return (read(packet.body), leave);
+                return (read(packet.body), end);
             }
         }
     }
@@ -95,13 +81,7 @@ pub fn ask<T, S: Slot>(
 }
 
 /// The CRC-32 of the model in force.
-///
-/// # Panics
-/// The device does not tell its identity.
-pub fn model_crc<S: Slot>(
-    session: &mut Session<'_, '_, Board, Source, S, ROWS>,
-    board: &Board,
-) -> Option<u32> {
+pub fn model_crc(session: &mut Running<'_, '_>, board: &Board) -> Option<u32> {
     let read = |report: Report<'_>| match report {
         Report::Identity(identity) => identity.model.map(|model| model.crc_32),
         other => panic!("{other:?}"),
@@ -110,18 +90,12 @@ pub fn model_crc<S: Slot>(
 }
 
 /// The first step of an upload of `blob`.
-///
-/// # Panics
-/// The blob is shorter than its head.
 pub fn begin(blob: &[u8]) -> UploadStep<'_> {
     UploadStep::Begin { head: &blob[..Model::HEAD_BYTES] }
 }
 
 /// The steps of an upload of `blob` in chunks of `chunk` bytes, until it is on trial without a seal. [`install`] goes on
 /// to the confirmation.
-///
-/// # Panics
-/// The blob is shorter than its head, or `chunk` is 0.
 pub fn upload_steps(blob: &[u8], chunk: usize) -> Vec<UploadStep<'_>> {
     let mut steps = vec![begin(blob)];
     steps.extend(
@@ -135,12 +109,9 @@ pub fn upload_steps(blob: &[u8], chunk: usize) -> Vec<UploadStep<'_>> {
 
 /// Carries out steps of an upload in one session after the other, until the device refuses one; returns the last
 /// answer.
-///
-/// # Panics
-/// The device does not answer, or a session ends for another reason than the upload.
-pub fn upload<S: Slot>(
+pub fn upload(
     bench: &mut Bench<'_>,
-    slots: &mut [S; 2],
+    slots: &mut [Flash; 2],
     weights: &mut [u32],
     steps: &[UploadStep<'_>],
 ) -> Result<UploadState, Refusal> {
@@ -151,7 +122,7 @@ pub fn upload<S: Slot>(
     board.pins.borrow_mut().to_host.clear();
     loop {
         let mut session = Session::start(&mut bench.app, slots, weights);
-        if left == Some(Leave::Confirm) {
+        if left == Some(SessionEnd::Confirm) {
             last = answer(&board);
         }
         loop {
@@ -160,8 +131,8 @@ pub fn upload<S: Slot>(
             board.pins.borrow_mut().to_device.extend(request_bytes(ASKED, &Request::Upload(*step)));
             left = settle(&mut session, &board);
             match left {
-                Some(Leave::Confirm) => break,
-                None | Some(Leave::NewModel) => last = answer(&board),
+                Some(SessionEnd::Confirm) => break,
+                None | Some(SessionEnd::NewModel) => last = answer(&board),
                 Some(other) => panic!("{step:?} leads to {other:?}"),
             }
             if left.is_some() {
@@ -188,12 +159,9 @@ fn answer(board: &Board) -> Result<UploadState, Refusal> {
 }
 
 /// Uploads `blob` in chunks of `chunk` bytes and confirms it.
-///
-/// # Panics
-/// As [`upload`].
-pub fn install<S: Slot>(
+pub fn install(
     bench: &mut Bench<'_>,
-    slots: &mut [S; 2],
+    slots: &mut [Flash; 2],
     weights: &mut [u32],
     (blob, chunk): (&[u8], usize),
 ) -> Result<UploadState, Refusal> {

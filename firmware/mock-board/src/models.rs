@@ -11,9 +11,6 @@ use model_core::rbf::{Network, Shape};
 use crate::shape::{COLS, OUTPUTS, ROWS};
 
 /// A blob for this sensor, with `centres` centres and numbers that depend on `seed`.
-///
-/// # Panics
-/// There are no centres, or more than a blob can hold.
 pub fn blob(seed: usize, centres: usize) -> AlignedBytes {
     let number = |i: usize| ((i * 37 + seed * 11) % 101) as f32 / 50.0 - 1.0;
     let list = |from: usize, count: usize| (from..from + count).map(number).collect::<Vec<_>>();
@@ -36,18 +33,12 @@ pub fn blob(seed: usize, centres: usize) -> AlignedBytes {
 }
 
 /// A blob with `network` for both rows.
-///
-/// # Panics
-/// The network is of another shape than a blob can hold.
 pub fn blob_of(network: Network<'_>) -> AlignedBytes {
     blob_with(network, None, false)
 }
 
 /// The blob of [`blob`] with a confidence, for readings relative to the baseline if `relative_inputs`. Its one component
 /// is of frames near 62 Ω, or near the baseline.
-///
-/// # Panics
-/// Never, as long as the block below fits its sizes.
 pub fn blob_with_confidence(relative_inputs: bool) -> AlignedBytes {
     let (readings, outputs) = (ROWS * COLS, ROWS * OUTPUTS);
     let [middle, scale] = if relative_inputs { [1.0, 20.0] } else { [62.0, 0.5] };
@@ -69,6 +60,19 @@ pub fn blob_with_confidence(relative_inputs: bool) -> AlignedBytes {
     blob_with(model.networks().next().unwrap(), Some(confidence), relative_inputs)
 }
 
+/// A blob of so many bytes, most of which are its name.
+pub fn blob_of_length(bytes: usize) -> AlignedBytes {
+    let small = blob(3, 4);
+    let model = Model::decode(&small).unwrap();
+    let networks: Vec<_> = model.networks().collect();
+    let named = |length: usize| {
+        let name = &"x".repeat(length);
+        let parts = parts(&networks, &[0; ROWS], Metadata { name, ..*model.metadata() });
+        encode_to_vec(&parts).unwrap()
+    };
+    (0..bytes).map(named).find(|blob| blob.len() == bytes).unwrap()
+}
+
 fn blob_with(
     network: Network<'_>,
     confidence: Option<Confidence<'_>>,
@@ -77,22 +81,12 @@ fn blob_with(
     let shape = network.shape();
     let shape = ModelShape { rows: ROWS, inputs: shape.inputs, outputs: shape.outputs };
     let metadata = Metadata { relative_inputs, ..Metadata::unnamed(shape) };
-    let parts = ModelParts {
-        projection: None,
-        expansion: None,
-        confidence,
-        fill: None,
-        networks: &[network],
-        row_network: &[0; ROWS],
-        metadata,
-    };
+    let networks = [network];
+    let parts = ModelParts { confidence, ..parts(&networks, &[0; ROWS], metadata) };
     encode_to_vec(&parts).unwrap()
 }
 
 /// A blob whose one network for both rows computes so many `components`, which are expanded to all outputs.
-///
-/// # Panics
-/// There are no components, or more than a blob can hold.
 pub fn blob_of_components(components: usize) -> AlignedBytes {
     let (readings, outputs) = (ROWS * COLS, ROWS * OUTPUTS);
     let (weights, bias) = (vec![0.5; components], vec![0.25; components]);
@@ -115,22 +109,34 @@ pub fn blob_of_components(components: usize) -> AlignedBytes {
     let mut projection = vec![1.0 / readings as f32; (1 + readings) * COLS];
     projection[..COLS].fill(0.0);
     let expansion = vec![0.125; (1 + components) * outputs];
+    let networks = [network];
+    let metadata = Metadata::unnamed(ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS });
     let parts = ModelParts {
         projection: Projection::new(readings, COLS, &projection).ok(),
         expansion: Expansion::new(components, outputs, &expansion).ok(),
-        confidence: None,
-        fill: None,
-        networks: &[network],
-        row_network: &[0; ROWS],
-        metadata: Metadata::unnamed(ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS }),
+        ..parts(&networks, &[0; ROWS], metadata)
     };
     encode_to_vec(&parts).unwrap()
 }
 
+/// Parts of a blob without anything else than these.
+pub fn parts<'a>(
+    networks: &'a [Network<'a>],
+    row_network: &'a [u8],
+    metadata: Metadata<'a>,
+) -> ModelParts<'a> {
+    ModelParts {
+        projection: None,
+        expansion: None,
+        confidence: None,
+        fill: None,
+        networks,
+        row_network,
+        metadata,
+    }
+}
+
 /// The CRC-32 that closes a blob.
-///
-/// # Panics
-/// The blob is shorter than four bytes.
 pub fn crc_of(blob: &[u8]) -> u32 {
     u32::from_le_bytes(*blob.last_chunk().unwrap())
 }

@@ -9,30 +9,25 @@ use firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
 use crate::board::Board;
 use crate::shape::{COLS, ROWS, TestFrame};
 
+/// Least time in µs of a scan.
+const SCAN_US: u32 = 10;
+
 /// A sensor that shows the same frame until it is given another. Its circuit's constants change nothing.
 #[derive(Clone)]
 pub struct Source {
     circuit: ZeroPotential<ROWS, COLS>,
     frame: Rc<RefCell<TestFrame>>,
     board: Board,
-    scan_us: u32,
 }
 
 impl Source {
-    /// A sensor with this `frame`, whose scan takes `scan_us` µs of the board's clock.
-    pub fn new(frame: &Rc<RefCell<TestFrame>>, board: &Board, scan_us: u32) -> Self {
-        Self {
-            circuit: ZeroPotential::TYPICAL,
-            frame: frame.clone(),
-            board: board.clone(),
-            scan_us,
-        }
+    /// A sensor with this `frame`.
+    pub fn new(frame: &Rc<RefCell<TestFrame>>, board: &Board) -> Self {
+        Self { circuit: ZeroPotential::TYPICAL, frame: frame.clone(), board: board.clone() }
     }
 }
 
 impl FrameSource for Source {
-    /// # Panics
-    /// No samples are asked for, or `frame` has not the length of `wires`.
     fn scan(
         &mut self,
         settings: ScanSettings,
@@ -45,7 +40,7 @@ impl FrameSource for Source {
             to.copy_from_slice(&self.frame.borrow()[row.0][..wires.columns]);
         }
         let mut pins = self.board.pins.borrow_mut();
-        pins.now_us = pins.now_us.wrapping_add(self.scan_us).wrapping_add(pins.scan_us);
+        pins.now_us = pins.now_us.wrapping_add(SCAN_US + pins.scan_us);
         let missing = frame.iter();
         ScanReport { failed_samples: missing.filter(|reading| reading.is_nan()).count() as u16 }
     }

@@ -58,7 +58,9 @@ impl Slot {
 }
 
 impl firmware::store::Slot for Slot {
-    const ERASE_INTERVAL_S: u32 = 0; // memory does not wear
+    fn erase_interval_s(&self) -> u32 {
+        0 // memory does not wear
+    }
 
     fn bytes(&self) -> &[u8] {
         self.bytes()

@@ -3,9 +3,9 @@
 use model_core::blob::Floats;
 use model_core::exp::{ExpKernel, Polynomial};
 
-use super::leave::Leave;
 use super::model::{self, InForce};
 use super::session::Session;
+use super::session_end::SessionEnd;
 use super::{Capture, Core};
 use crate::circuit::{Constants, ConstantsFault};
 use crate::link::message::{
@@ -31,7 +31,7 @@ const fn chunk_bytes(message_bytes: usize) -> usize {
 
 impl<P: Platform, F: FrameSource, S: Slot, const ROWS: usize> Session<'_, '_, P, F, S, ROWS> {
     /// Receives bytes until a frame is complete or no more bytes are there, and answers the frame's request.
-    pub(super) fn serve_link(&mut self) -> Option<Leave> {
+    pub(super) fn serve_link(&mut self) -> Option<SessionEnd> {
         let app = &mut *self.app;
         // Bounded, so that a host that never pauses does not keep the sensor from being scanned.
         for _ in 0..app.core.capacity.message_bytes() {
@@ -50,7 +50,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         received: Received<'_>,
         model: &InForce<'_, ROWS>,
         spare: &mut S,
-    ) -> Option<Leave> {
+    ) -> Option<SessionEnd> {
         let packet = match received {
             Received::Frame(bytes) => packet::decode::<Request<'_>>(bytes),
             Received::Broken | Received::TooLong => Err(PacketError::Damaged),
@@ -66,7 +66,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         if !request.only_asks() {
             self.lease.hear(self.line.platform().now_us());
         }
-        let mut leave = None;
+        let mut end = None;
         let report = match request {
             Request::Identify => Ok(Report::Identity(self.identity(model, spare))),
             Request::Statistics => Ok(Report::Statistics(self.statistics)),
@@ -96,17 +96,17 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             }
             Request::Upload(UploadStep::Confirm) if self.trial.is_going_on() => {
                 self.trial.confirm(number);
-                return Some(Leave::Confirm);
+                return Some(SessionEnd::Confirm);
             }
             Request::Upload(step) => self
-                .upload_step(step, model, spare, &mut leave)
+                .upload_step(step, model, spare, &mut end)
                 .map(|()| Report::Upload(self.upload.state())),
             Request::Undo { crc_32 } => self
-                .undo(crc_32, model, spare, &mut leave)
+                .undo(crc_32, model, spare, &mut end)
                 .map(|crc_32| Report::Upload(UploadState::Confirmed { crc_32 })),
             Request::Restart => {
                 info!("restart asked for");
-                leave = Some(Leave::Restart);
+                end = Some(SessionEnd::Restart);
                 Ok(Report::Restarting)
             }
             Request::Constants => {
@@ -123,10 +123,10 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             Request::Kept => Ok(Report::Kept(self.kept())),
             Request::Keep(setting) => self.keep(setting).map(|()| Report::Kept(self.kept())),
             Request::Forget(setting) => self.forget(setting).map(|()| Report::Kept(self.kept())),
-            Request::Provision { key } => self.provision(&key, &mut leave),
+            Request::Provision { key } => self.provision(&key, &mut end),
         };
         self.line.send(number, &report.unwrap_or_else(Report::Refused), &mut self.statistics);
-        leave
+        end
     }
 
     /// Prepares `spare` for a blob of `length` bytes. The watchdog is fed just before and after an erase, which may take
@@ -150,21 +150,21 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
     fn provision(
         &mut self,
         key: &Key,
-        leave: &mut Option<Leave>,
+        end: &mut Option<SessionEnd>,
     ) -> Result<Report<'static>, Refusal> {
         if self.trial.is_going_on() {
             return Err(Refusal::OnTrial);
         }
-        let had_none = self.guard.key_state() == KeyState::None;
+        let had_none = self.authenticity.key_state() == KeyState::None;
         let platform = self.line.platform();
         if had_none {
             platform.feed_watchdog(); // it may erase flash
         }
-        self.guard.provision(platform.key_area(), key)?;
+        self.authenticity.provision(platform.key_area(), key)?;
         if had_none {
             info!("the device has a key from now on");
             self.upload.forget();
-            *leave = Some(Leave::NewModel);
+            *end = Some(SessionEnd::NewModel);
         }
         Ok(Report::Provisioned)
     }
@@ -215,11 +215,11 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             kernel: Polynomial::NAME,
             model: model.identity,
             model_name: model.name(),
-            slot_bytes: self.guard.capacity(spare.bytes()) as u32,
+            slot_bytes: self.authenticity.capacity(spare.bytes()) as u32,
             chunk_bytes: chunk_bytes(self.capacity.message_bytes()) as u16,
             memory: self.line.platform().memory(),
-            key: self.guard.key_state(),
-            highest_version: self.guard.highest(),
+            key: self.authenticity.key_state(),
+            highest_version: self.authenticity.highest(),
         }
     }
 
@@ -342,7 +342,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         step: UploadStep<'_>,
         model: &InForce<'_, ROWS>,
         spare: &mut S,
-        leave: &mut Option<Leave>,
+        end: &mut Option<SessionEnd>,
     ) -> Result<(), Refusal> {
         match step {
             UploadStep::Begin { head } => {
@@ -353,7 +353,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                 if model.generation() == u32::MAX {
                     return Err(Refusal::LastGeneration);
                 }
-                let most = self.guard.capacity(spare.bytes());
+                let most = self.authenticity.capacity(spare.bytes());
                 if length > most {
                     return Err(Refusal::TooLarge { slot_bytes: most as u32 });
                 }
@@ -363,7 +363,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             UploadStep::Chunk { offset, bytes } => self.upload.chunk(spare, offset, bytes),
             UploadStep::Abort => {
                 if self.end_trial() {
-                    *leave = Some(Leave::NewModel);
+                    *end = Some(SessionEnd::NewModel);
                 }
                 self.upload.abort();
                 Ok(())
@@ -375,7 +375,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                 let blob = self.upload.complete(spare)?;
                 let checked = model::check(self.capacity, blob).map_err(Refusal::BadModel);
                 let checked = checked.and_then(|model| {
-                    self.guard.check(blob, seal)?;
+                    self.authenticity.check(blob, seal)?;
                     Ok(model.crc())
                 });
                 let crc_32 = checked.inspect_err(|_| {
@@ -389,7 +389,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                 self.upload.begin_trial(crc_32);
                 // Without a model, slot 1 is the spare one.
                 self.trial.begin(model.identity.map_or(1, |model| 1 - model.slot.min(1)));
-                *leave = Some(Leave::NewModel);
+                *end = Some(SessionEnd::NewModel);
                 Ok(())
             }
             // Nothing is on trial. The answer was lost, if it was confirmed.

@@ -7,9 +7,9 @@ use model_core::relative::reciprocal;
 use model_core::{Decoder, Frame, Gate, RowStatus, RowWire};
 
 use super::buffers::cut;
-use super::leave::Leave;
 use super::model::{InForce, candidates, check_head, choose, copy_to, row_wires};
 use super::recheck::{Checked, Recheck};
+use super::session_end::SessionEnd;
 use super::{App, Core};
 use crate::link::message::{ConfidenceSent, EstimateReport, HealthReport, Report};
 use crate::link::packet::UNASKED;
@@ -38,12 +38,12 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
         weights: &'a mut [u32],
     ) -> Self {
         app.core.confirm(slots);
-        app.core.guard.see(slots);
-        app.core.make_firm(slots);
+        app.core.authenticity.read_seals(slots);
+        app.core.write_missing_records(slots);
         let capacity = app.core.capacity;
-        let guard = &app.core.guard;
+        let authenticity = &app.core.authenticity;
         let candidates = candidates(slots, app.core.trial.slot())
-            .map(|candidate| candidate.filter(|found| guard.trusts(found.slot)));
+            .map(|candidate| candidate.filter(|found| authenticity.allows(found.slot)));
         let best = candidates.into_iter().flatten().next();
         // Only the copy is checked, so the best model is looked at once.
         let bytes = best.and_then(|best| slots.get(best.slot)).map_or(&[][..], S::bytes);
@@ -60,7 +60,7 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
             let _ = model.load(capacity, active.bytes(), chosen, false);
         }
         if let Some(identity) = &mut model.identity {
-            let seal = app.core.guard.seal_of(identity.slot.into());
+            let seal = app.core.authenticity.seal_of(identity.slot.into());
             identity.version = seal.map(|seal| seal.version);
         }
         if let Some(model) = &model.identity {
@@ -88,9 +88,9 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
     ///
     /// The watchdog is fed at the end, unless the last scan gave no reading at all. A sensor that stays silent
     /// thus leads to a restart, which sets up its bus again.
-    pub fn step(&mut self) -> Option<Leave> {
+    pub fn step(&mut self) -> Option<SessionEnd> {
         self.app.core.line.begin_turn();
-        let leave = self.serve_link();
+        let end = self.serve_link();
         let core = &mut self.app.core;
         let now_us = core.line.platform().now_us();
         core.time.at(now_us);
@@ -105,11 +105,11 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
         } else {
             core.statistics.bad_loops = core.statistics.bad_loops.saturating_add(1);
         }
-        leave.or_else(|| self.recheck())
+        end.or_else(|| self.recheck())
     }
 
     /// Checks another piece of the model in force. A copy in RAM is decoded from even if the slot is damaged.
-    fn recheck(&mut self) -> Option<Leave> {
+    fn recheck(&mut self) -> Option<SessionEnd> {
         let model = self.model.identity?;
         let stored = self.model.stored;
         let copies = [self.model.blob, stored.unwrap_or_default()];
@@ -128,7 +128,7 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
                 if !core.trial.is_going_on() {
                     core.upload.forget(); // the spare slot may be the other one now
                 }
-                Some(Leave::Damaged)
+                Some(SessionEnd::Damaged)
             }
             Checked::Damaged(_) => {
                 warning!(
@@ -389,10 +389,9 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         }
     }
 
-    /// Replaces the frame with the `readings` (Ω) of a request.
+    /// Replaces the frame with the `readings` (Ω) of a request, as many as are scanned.
     pub(super) fn set_frame(&mut self, readings: impl Iterator<Item = f32>) {
         let frame = self.readings();
-        frame.fill(f32::NAN);
         frame.iter_mut().zip(readings).for_each(|(place, reading)| *place = reading);
     }
 }

@@ -46,7 +46,6 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         if ended {
             info!("the trial ends without a confirmation");
             self.trial = Trial::default();
-            self.upload.forget();
         }
         ended
     }

@@ -1,8 +1,8 @@
 //! Undo: the previous model comes into force again.
 
 use super::Core;
-use super::leave::Leave;
 use super::model::{self, InForce};
+use super::session_end::SessionEnd;
 use crate::link::message::Refusal;
 use crate::log::info;
 use crate::platform::Platform;
@@ -17,7 +17,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         left: u32,
         in_force: &InForce<'_, ROWS>,
         spare: &mut S,
-        leave: &mut Option<Leave>,
+        end: &mut Option<SessionEnd>,
     ) -> Result<u32, Refusal> {
         const NOTHING: Refusal = Refusal::NothingToUndo;
         let identity = in_force.identity.ok_or(NOTHING)?;
@@ -30,10 +30,10 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         let slot = 1 - usize::from(identity.slot.min(1));
         generation(slot, spare.bytes()).ok_or(NOTHING)?;
         if self.end_trial() {
-            *leave = Some(Leave::NewModel);
+            *end = Some(SessionEnd::NewModel);
             return Ok(previous);
         }
-        self.guard.check_undo(slot)?;
+        self.authenticity.check_undo(slot)?;
         let next = identity.generation.checked_add(1).ok_or(Refusal::LastGeneration)?;
         match reinstate(spare, next) {
             None => Err(NOTHING),
@@ -41,7 +41,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             Some(Ok(())) => {
                 info!("model {=u32:08x} in force again", previous);
                 self.upload.abort();
-                *leave = Some(Leave::NewModel);
+                *end = Some(SessionEnd::NewModel);
                 Ok(previous)
             }
         }

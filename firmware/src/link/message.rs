@@ -532,7 +532,7 @@ pub enum Refusal {
     Constants(ConstantsFault),
     /// The setting cannot be kept.
     Keep(KeepFault),
-    /// The flash was erased too often ([`ERASE_INTERVAL_S`](crate::store::Slot::ERASE_INTERVAL_S)).
+    /// The flash was erased too often ([`erase_interval_s`](crate::store::Slot::erase_interval_s)).
     TooSoon {
         /// Time in µs until it may be erased again.
         wait_us: u64,

@@ -90,11 +90,10 @@ mod tests {
     #[test]
     fn another_version_and_bytes_left_over_are_told_apart_from_damage() {
         let whole = |covered: &[u8]| [covered, &CRC_32.checksum(covered).to_le_bytes()].concat();
-        let other = whole(&[PROTOCOL_VERSION + 1, 9, 1]);
-        assert_eq!(
-            decode::<u8>(&other),
-            Err(PacketError::OtherVersion { number: 9, version: PROTOCOL_VERSION + 1 })
-        );
+        for version in [PROTOCOL_VERSION - 1, PROTOCOL_VERSION + 1] {
+            let other = Err(PacketError::OtherVersion { number: 9, version });
+            assert_eq!(decode::<u8>(&whole(&[version, 9, 1])), other);
+        }
         let left_over = whole(&[PROTOCOL_VERSION, 9, 1, 1]);
         assert_eq!(decode::<u8>(&left_over), Err(PacketError::NotAMessage { number: 9 }));
     }

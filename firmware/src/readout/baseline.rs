@@ -98,6 +98,10 @@ mod tests {
     fn the_mean_of_many_frames_is_theirs_to_the_last_digits() {
         let mut memory = [0.0; 3];
         let mut baseline = baseline(&mut memory);
+        baseline.add(&[60.0, 50.0, 40.0]);
+        baseline.add(&[62.0, 50.0, 41.0]);
+        assert_eq!(baseline.mean(), [61.0, 50.0, 40.5]);
+        baseline.restart(3);
         let reading = |i: u16, k: f32| 55.0 + k + f32::from(i % 7) * 0.1;
         for i in 0..7000 {
             baseline.add(&[reading(i, 0.0), reading(i, 1.0), reading(i, 2.0)]);
@@ -142,6 +146,17 @@ mod tests {
         let mut baseline = Baseline { memory: &mut memory, readings: 3, frames: u16::MAX };
         baseline.add(&[1.0; 3]);
         assert_eq!((baseline.mean(), baseline.frames()), (&[60.0; 3][..], u16::MAX));
+    }
+
+    #[test]
+    fn a_kept_reading_that_means_nothing_is_missing() {
+        let mut memory = [0.0; 3];
+        let mut baseline = baseline(&mut memory);
+        baseline.restore(Floats::of(&[60.0, 0.0, -1.0]), 7);
+        assert_eq!(
+            baseline.mean().iter().map(|ohm| ohm.is_nan()).collect::<Vec<_>>(),
+            [false, true, true]
+        );
     }
 
     #[test]

@@ -366,6 +366,14 @@ fn a_failed_idle_sample_costs_its_column() {
     );
     let missing = frame.map(|row| row.map(f32::is_nan));
     assert_eq!(missing, [[false, true, false]; 2]);
+    // Where rows are not released to take it, that of the scan before does not stand in for it.
+    record.0.borrow_mut().failing_transfer = None;
+    scanner.scan(SETTINGS, WIRES, frame.as_flattened_mut());
+    assert_eq!(frame.map(|row| row.map(f32::is_nan)), [[false; 3]; 2]);
+    let next = record.pin_changes();
+    record.0.borrow_mut().failing_pin_change = Some(next);
+    scanner.scan(SETTINGS, WIRES, frame.as_flattened_mut());
+    assert_eq!(frame.map(|row| row.map(f32::is_nan)), [[true; 3]; 2]);
 }
 
 #[test]

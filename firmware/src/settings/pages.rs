@@ -13,7 +13,7 @@
 //! - A page is in use from its start item on, which is written behind the items that were moved. The start item with the
 //!   highest number wins.
 //! - A page is written only behind an erase that was not cut: weak bits may read as erased.
-//! - So a start [makes firm](Keeper::make_firm) what it finds. A start item that is not firm gets another one. What counts
+//! - So a start [recovers](Keeper::recover). A start item that is not firm gets another one. What counts
 //!   moves to the other page if the last item is not firm: nothing but a start item is ever added behind one. A page with
 //!   a start item that does not count, but may do so at another start, is erased.
 
@@ -276,7 +276,7 @@ impl<S: Slot> SettingPages<S> {
 }
 
 impl<S: Slot> Keeper for SettingPages<S> {
-    fn make_firm(&mut self) -> Result<(), KeepError> {
+    fn recover(&mut self) -> Result<(), KeepError> {
         let Some((index, contents)) = in_use(&self.0) else {
             let mut written = self.0.iter_mut().filter(|page| used(page.bytes()) > 0);
             return written.try_for_each(erase);
@@ -305,7 +305,7 @@ impl<S: Slot> Keeper for SettingPages<S> {
     }
 
     fn keep(&mut self, setting: Setting, parts: &[&[u8]]) -> Result<bool, KeepError> {
-        self.make_firm()?;
+        self.recover()?;
         let found = in_use(&self.0);
         let contents = found.as_ref().map(|(_, contents)| contents);
         let kept = |setting| contents.map_or(&[][..], |contents| contents.content(setting));

@@ -1,9 +1,7 @@
 //! Upload of a blob in chunks.
 
-use super::{
-    ERASES_AT_ONCE, FlashError, RECORD_MAGIC, SEAL_BYTES, SEAL_MARK, Slot, capacity, record,
-    record_pairs, seal_place,
-};
+use super::records::{RECORD_MAGIC, record, record_pairs};
+use super::{ERASES_AT_ONCE, FlashError, SEAL_BYTES, SEAL_MARK, Slot, capacity, seal_place};
 use crate::link::message::{Refusal, UploadState};
 use crate::seal::Seal;
 
@@ -15,7 +13,7 @@ pub struct Upload {
     length: usize,
     /// Whether the spare slot was erased for an upload, and no chunk was written since.
     is_empty: bool,
-    /// Time in µs until which the erases so far last, each for [`Slot::ERASE_INTERVAL_S`].
+    /// Time in µs until which the erases so far last, each for [`Slot::erase_interval_s`].
     worn_until_us: u64,
 }
 
@@ -61,7 +59,7 @@ impl Upload {
             return Err(Refusal::TooLarge { slot_bytes: capacity as u32 });
         }
         if !self.is_empty {
-            self.wear(now_us, S::ERASE_INTERVAL_S)?;
+            self.wear(now_us, spare.erase_interval_s())?;
             feed();
             let marked = spare.erase().and_then(|()| spare.write(capacity, &RECORD_MAGIC));
             feed();
@@ -144,9 +142,9 @@ impl Upload {
             return Err(Refusal::TooLarge { slot_bytes: most.saturating_sub(SEAL_BYTES) as u32 });
         }
         let head = [SEAL_MARK, seal.version.to_le_bytes()];
-        // The mark and the version last: without them there is no seal.
-        let tag = spare.write(place + head.as_flattened().len(), &seal.tag);
-        self.flash(tag.and_then(|()| spare.write(place, head.as_flattened())))
+        let tag_place = place + head.as_flattened().len();
+        let written = spare.write(place, head.as_flattened());
+        self.flash(written.and_then(|()| spare.write(tag_place, &seal.tag)))
     }
 
     /// Notes that the blob, which must have been found sound, is on trial.
@@ -191,7 +189,6 @@ impl Upload {
     /// Converts an outcome of the flash; a failure ends the upload.
     fn flash(&mut self, outcome: Result<(), FlashError>) -> Result<(), Refusal> {
         outcome.map_err(|FlashError| {
-            self.is_empty = false;
             self.abort();
             Refusal::Flash
         })

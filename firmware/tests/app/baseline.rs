@@ -2,14 +2,14 @@
 
 use firmware::app::Session;
 use firmware::link::message::{Configuration, EstimateReport, Refusal, Report, Request};
-use model_core::blob::{Floats, Metadata, Model, ModelParts, encode_to_vec};
+use model_core::blob::{Floats, Metadata, Model, encode_to_vec};
 
 use super::requests::{capture, decode};
 use mock_board::*;
 
 #[test]
 fn a_baseline_is_captured_and_contact_is_told_against_it() {
-    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut slots = Flash::slots_with(&blob(3, 4));
     let mut bench = Bench::new(Configuration { frame_period_us: 100, ..quiet() });
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let board = bench.board.clone();
@@ -35,6 +35,18 @@ fn a_baseline_is_captured_and_contact_is_told_against_it() {
     let mut nearly = rest;
     nearly[1][0] *= 0.985;
     assert_eq!(decode(&mut session, &board, &nearly).0 & EstimateReport::CONTACT, 0);
+    // A change of the threshold itself, 48 Ω for 64 Ω, is none.
+    ask(
+        &mut session,
+        &board,
+        &configure(Configuration { contact_threshold: 0.25, ..quiet() }),
+        |_| (),
+    );
+    for (ohm, contact) in [(48.0, 0), (47.9, EstimateReport::CONTACT)] {
+        let mut frame = rest;
+        frame[1][1] = ohm;
+        assert_eq!(decode(&mut session, &board, &frame).0 & EstimateReport::CONTACT, contact);
+    }
 }
 
 #[test]
@@ -43,16 +55,8 @@ fn a_frame_without_a_baseline_is_flagged_until_one_is_complete() {
     let model = Model::decode(&absolute).unwrap();
     let networks: Vec<_> = model.networks().collect();
     let metadata = Metadata { relative_inputs: true, ..Metadata::unnamed(model.shape()) };
-    let parts = ModelParts {
-        projection: None,
-        expansion: None,
-        confidence: None,
-        fill: None,
-        networks: &networks,
-        row_network: &[0; ROWS],
-        metadata,
-    };
-    let mut slots = MockSlot::pair_with(&encode_to_vec(&parts).unwrap());
+    let parts = parts(&networks, &[0; ROWS], metadata);
+    let mut slots = Flash::slots_with(&encode_to_vec(&parts).unwrap());
     let mut bench = Bench::new(quiet());
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
@@ -99,7 +103,7 @@ fn a_frame_without_a_baseline_is_flagged_until_one_is_complete() {
 
 #[test]
 fn a_baseline_that_will_not_come_is_refused_and_one_that_comes_is_counted_once() {
-    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut slots = Flash::slots_with(&blob(3, 4));
     let mut bench = Bench::new(Configuration { frame_period_us: 100, ..quiet() });
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let board = bench.board.clone();
@@ -139,7 +143,7 @@ fn a_baseline_that_will_not_come_is_refused_and_one_that_comes_is_counted_once()
 
 #[test]
 fn a_baseline_of_another_count_under_the_same_number_starts_anew() {
-    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut slots = Flash::slots_with(&blob(3, 4));
     let mut bench = Bench::new(Configuration { frame_period_us: 100, ..quiet() });
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);

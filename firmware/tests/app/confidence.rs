@@ -88,7 +88,7 @@ fn with_last(ohm: f32) -> TestFrame {
 #[test]
 fn an_answer_has_novelty_and_deviations_as_model_core_computes_them() {
     let blob = blob_with_confidence(false);
-    let mut slots = MockSlot::pair_with(&blob);
+    let mut slots = Flash::slots_with(&blob);
     let mut bench = Bench::new(quiet());
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
@@ -101,11 +101,17 @@ fn an_answer_has_novelty_and_deviations_as_model_core_computes_them() {
     let s = statistics(&mut session, &board);
     assert_eq!((s.frames_decoded, s.frames_novel), (3, 1));
     assert!(s.longest_confidence_us > 0);
+    // However little a frame is novel, it is flagged.
+    let hardly = (65..900).map(|ohm| with_last(ohm as f32)).find(|frame| {
+        let novelty = expected(&blob, frame, f32::NAN).novelty.map(f32::from_bits);
+        novelty.is_some_and(|novelty| novelty > 0.0 && novelty < 1.0)
+    });
+    assert!(decode(&mut session, &board, &hardly.unwrap()).0.novel);
 }
 
 #[test]
 fn without_a_confidence_nothing_is_sent() {
-    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut slots = Flash::slots_with(&blob(3, 4));
     let mut bench = Bench::new(quiet());
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
@@ -120,7 +126,7 @@ fn without_a_confidence_nothing_is_sent() {
 
 #[test]
 fn without_a_model_nothing_is_sent() {
-    let mut slots = MockSlot::pair();
+    let mut slots = Flash::slots();
     let mut bench = Bench::new(quiet());
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
@@ -130,7 +136,7 @@ fn without_a_model_nothing_is_sent() {
 #[test]
 fn of_a_scan_comes_what_the_configuration_says() {
     let blob = blob_with_confidence(false);
-    let mut slots = MockSlot::pair_with(&blob);
+    let mut slots = Flash::slots_with(&blob);
     let mut bench = Bench::new(quiet());
     let board = bench.board.clone();
     let frame = with_last(900.0);
@@ -156,7 +162,7 @@ fn of_a_scan_comes_what_the_configuration_says() {
 #[test]
 fn a_frame_with_a_faulty_reading_has_no_confidence_and_is_not_novel() {
     let blob = blob_with_confidence(false);
-    let mut slots = MockSlot::pair_with(&blob);
+    let mut slots = Flash::slots_with(&blob);
     let mut bench = Bench::new(quiet());
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
@@ -172,7 +178,7 @@ fn a_frame_with_a_faulty_reading_has_no_confidence_and_is_not_novel() {
 #[test]
 fn rows_at_rest_have_deviations_all_the_same() {
     let blob = blob_with_confidence(false);
-    let mut slots = MockSlot::pair_with(&blob);
+    let mut slots = Flash::slots_with(&blob);
     let mut bench = Bench::new(Configuration { rest_tolerance: 0.02, ..quiet() });
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
@@ -188,7 +194,7 @@ fn rows_at_rest_have_deviations_all_the_same() {
 #[test]
 fn relative_inputs_need_a_baseline_for_a_confidence_too() {
     let blob = blob_with_confidence(true);
-    let mut slots = MockSlot::pair_with(&blob);
+    let mut slots = Flash::slots_with(&blob);
     let mut bench = Bench::new(quiet());
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);

@@ -8,7 +8,7 @@ use mock_board::*;
 
 #[test]
 fn configurations_are_checked_and_a_bad_one_changes_nothing() {
-    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut slots = Flash::slots_with(&blob(3, 4));
     let mut bench = Bench::new(quiet());
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let mut outcome = |configuration| {
@@ -43,7 +43,7 @@ fn in_force(session: &mut TestSession<'_>, board: &Board) -> (Configuration, u32
 #[test]
 fn a_leased_configuration_ends_with_the_hosts_silence_and_a_lasting_one_does_not() {
     let own = Configuration { frame_period_us: 10_000, ..quiet() };
-    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut slots = Flash::slots_with(&blob(3, 4));
     let mut bench = Bench::new(own);
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
@@ -88,8 +88,9 @@ fn a_leased_configuration_ends_with_the_hosts_silence_and_a_lasting_one_does_not
 fn a_request_that_waited_during_a_long_scan_prolongs_a_lease_in_time() {
     let own = quiet();
     let slow = Configuration { frame_period_us: 1000, ..quiet() };
-    let mut slots = MockSlot::pair_with(&blob(3, 4));
-    let mut bench = Bench::new(own).restarted(own, 700_000);
+    let mut slots = Flash::slots_with(&blob(3, 4));
+    let mut bench = Bench::new(own);
+    bench.board.pins.borrow_mut().scan_us = 700_000;
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let leased = Request::Configure { configuration: slow, lease_ms: 500 };
@@ -111,7 +112,7 @@ fn a_request_that_waited_during_a_long_scan_prolongs_a_lease_in_time() {
 #[test]
 fn a_lease_that_ends_gives_up_the_baseline_and_keeps_time() {
     let own = Configuration { frame_period_us: 1_000_000, ..quiet() };
-    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut slots = Flash::slots_with(&blob(3, 4));
     let mut bench = Bench::new(own);
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);

@@ -12,7 +12,7 @@ use mock_board::*;
 #[test]
 fn readings_from_the_host_are_decoded_as_model_core_does() {
     let blob = blob(3, 4);
-    let mut slots = MockSlot::pair_with(&blob);
+    let mut slots = Flash::slots_with(&blob);
     let mut bench = Bench::new(quiet());
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let frame = frame_at_rest();
@@ -24,7 +24,7 @@ fn readings_from_the_host_are_decoded_as_model_core_does() {
 #[test]
 fn a_faulty_reading_spoils_its_row_alone_and_is_told() {
     let blob = blob(3, 4);
-    let mut slots = MockSlot::pair_with(&blob);
+    let mut slots = Flash::slots_with(&blob);
     let mut bench = Bench::new(quiet());
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let good = frame_at_rest();
@@ -46,16 +46,11 @@ fn a_model_with_a_fill_decodes_rows_with_a_faulty_reading_and_tells_of_it() {
     // Readings 60 to 65 Ω that all move together.
     let block = [[60.0, 61.0, 62.0, 63.0, 64.0, 65.0], [10.0; 6], [0.4; 6]];
     let parts = ModelParts {
-        projection: None,
-        expansion: None,
-        confidence: None,
         fill: Fill::new(6, 1, block.as_flattened()).ok(),
-        networks: &networks,
-        row_network: &[0; ROWS],
-        metadata: *model.metadata(),
+        ..parts(&networks, &[0; ROWS], *model.metadata())
     };
     let filling = encode_to_vec(&parts).unwrap();
-    let mut slots = MockSlot::pair_with(&filling);
+    let mut slots = Flash::slots_with(&filling);
     let mut bench = Bench::new(quiet());
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let mut frame = frame_at_rest();
@@ -76,7 +71,7 @@ fn a_model_with_a_fill_decodes_rows_with_a_faulty_reading_and_tells_of_it() {
 
 #[test]
 fn without_a_model_the_answer_says_so() {
-    let mut slots = MockSlot::pair();
+    let mut slots = Flash::slots();
     let mut bench = Bench::new(quiet());
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let (flags, status, found) = decode(&mut session, &bench.board, &frame_at_rest());
@@ -86,7 +81,7 @@ fn without_a_model_the_answer_says_so() {
 
 #[test]
 fn a_frame_of_another_length_is_refused() {
-    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut slots = Flash::slots_with(&blob(3, 4));
     let mut bench = Bench::new(quiet());
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     for readings in [&[60.0; 5][..], &[60.0; 7], &[]] {
@@ -100,7 +95,7 @@ fn a_frame_of_another_length_is_refused() {
 
 #[test]
 fn readings_far_beyond_the_training_range_are_flagged_and_counted() {
-    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut slots = Flash::slots_with(&blob(3, 4));
     let mut bench = Bench::new(quiet());
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
@@ -123,7 +118,7 @@ fn readings_far_beyond_the_training_range_are_flagged_and_counted() {
 #[test]
 fn rows_at_rest_answer_as_the_baseline_and_the_others_as_without_a_gate() {
     let blob = blob(3, 4);
-    let mut slots = MockSlot::pair_with(&blob);
+    let mut slots = Flash::slots_with(&blob);
     let mut bench = Bench::new(Configuration { rest_tolerance: 0.02, ..quiet() });
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
@@ -160,4 +155,13 @@ fn rows_at_rest_answer_as_the_baseline_and_the_others_as_without_a_gate() {
     board.pins.borrow_mut().to_device.extend(again);
     settle(&mut session, &board);
     assert_eq!(decode(&mut session, &board, &rest).1, [0, 0]);
+    // Nor does the first frame of a thousand gate any, or tell of a contact.
+    board.pins.borrow_mut().now_us += 1_000_000;
+    session.step();
+    let mut pressed = rest;
+    pressed[1][0] = 40.0;
+    for frame in [rest, pressed] {
+        let (flags, status, _) = decode(&mut session, &board, &frame);
+        assert_eq!((flags & EstimateReport::CONTACT, &status[..]), (0, &[0, 0][..]));
+    }
 }

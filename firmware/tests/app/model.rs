@@ -1,8 +1,8 @@
 //! The model in force: its identity, its shape, and the memory that it is decoded from.
 
 use firmware::app::Session;
-use firmware::link::message::{Configuration, Report, Request};
-use model_core::blob::{Columns, Floats, Metadata, Model, ModelParts, ModelShape, encode_to_vec};
+use firmware::link::message::{Configuration, EstimateReport, Report, Request};
+use model_core::blob::{Columns, Floats, Metadata, Model, ModelShape, encode_to_vec};
 use model_core::checksum::CRC_32;
 use model_core::rbf::Shape;
 use model_core::rbf::direct::{self, Parameters};
@@ -17,20 +17,12 @@ fn the_identity_tells_what_the_model_was_trained_on() {
         let network = blob_of_one_row(3, 2);
         let model = Model::decode(&network).unwrap();
         let networks: Vec<_> = model.networks().collect();
-        let parts = ModelParts {
-            projection: None,
-            expansion: None,
-            confidence: None,
-            fill: None,
-            networks: &networks,
-            row_network: &[0],
-            metadata,
-        };
+        let parts = parts(&networks, &[0], metadata);
         encode_to_vec(&parts).unwrap()
     };
     let plain = Metadata::unnamed(ModelShape { rows: 1, inputs: 3, outputs: 2 });
     let read = |metadata: Metadata<'static>| {
-        let mut slots = MockSlot::pair_with(&network(metadata));
+        let mut slots = Flash::slots_with(&network(metadata));
         let mut bench = Bench::new(quiet());
         let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
         ask(&mut session, &bench.board, &Request::Identify, |report| match report {
@@ -81,16 +73,7 @@ fn blob_with(shape: ModelShape, metadata: Metadata<'_>) -> AlignedBytes {
         },
     );
     let networks = &[network.unwrap().into()];
-    encode_to_vec(&ModelParts {
-        projection: None,
-        expansion: None,
-        confidence: None,
-        fill: None,
-        networks,
-        row_network: &[0],
-        metadata,
-    })
-    .unwrap()
+    encode_to_vec(&parts(networks, &[0], metadata)).unwrap()
 }
 
 #[test]
@@ -99,7 +82,7 @@ fn the_model_says_what_is_scanned_and_decoded() {
     // A column and an output less; one network for all six readings; one output of one row.
     for (inputs, outputs, wires) in [(2, 1, 2), (6, 4, 6), (3, 2, 3), (1, 1, 1)] {
         let blob = blob_of_one_row(inputs, outputs);
-        let mut slots = MockSlot::pair_with(&blob);
+        let mut slots = Flash::slots_with(&blob);
         let scanning = Configuration { frame_period_us: 1000, send_readings: true, ..quiet() };
         let mut bench = Bench::new(scanning);
         let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
@@ -122,7 +105,7 @@ fn the_names_of_readings_say_which_rows_are_scanned() {
     let shape = ModelShape { rows: 1, inputs: 2, outputs: 1 };
     for (names, row) in [("r1c1_ohm\nr1c2_ohm", 0), ("r2c1_ohm\nr2c2_ohm", 1), ("a\nb", 0)] {
         let metadata = Metadata { input_names: Columns(names), ..Metadata::unnamed(shape) };
-        let mut slots = MockSlot::pair_with(&blob_with(shape, metadata));
+        let mut slots = Flash::slots_with(&blob_with(shape, metadata));
         let scanning = Configuration { frame_period_us: 1000, send_readings: true, ..quiet() };
         let mut bench = Bench::new(scanning);
         let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
@@ -137,7 +120,7 @@ fn the_names_of_readings_say_which_rows_are_scanned() {
     let names = "r2c1_ohm\nr2c2_ohm\nr2c3_ohm\nr1c1_ohm\nr1c2_ohm\nr1c3_ohm";
     let both = ModelShape { rows: 1, inputs: 6, outputs: 1 };
     let metadata = Metadata { input_names: Columns(names), ..Metadata::unnamed(both) };
-    let mut slots = MockSlot::pair_with(&blob_with(both, metadata));
+    let mut slots = Flash::slots_with(&blob_with(both, metadata));
     let mut bench =
         Bench::new(Configuration { frame_period_us: 1000, send_readings: true, ..quiet() });
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
@@ -150,16 +133,40 @@ fn the_names_of_readings_say_which_rows_are_scanned() {
     assert!(all[0].1.contains(&expected), "{all:?}");
     let metadata =
         Metadata { input_names: Columns("r3c1_ohm\nr3c2_ohm"), ..Metadata::unnamed(shape) };
-    let mut slots = MockSlot::pair_with(&blob_with(shape, metadata));
+    let mut slots = Flash::slots_with(&blob_with(shape, metadata));
     let mut bench = Bench::new(quiet());
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     assert_eq!(model_crc(&mut session, &bench.board), None, "there are two rows");
 }
 
 #[test]
+fn a_model_of_other_rows_does_not_take_the_baseline_of_the_rows_before() {
+    let shape = ModelShape { rows: 1, inputs: 2, outputs: 1 };
+    let [first, second] = ["r1c1_ohm\nr1c2_ohm", "r2c1_ohm\nr2c2_ohm"].map(|names| {
+        blob_with(shape, Metadata { input_names: Columns(names), ..Metadata::unnamed(shape) })
+    });
+    for (next, contact) in [(&first, EstimateReport::CONTACT), (&second, 0)] {
+        let mut slots = Flash::slots_with(&first);
+        let mut bench = Bench::new(quiet());
+        let board = bench.board.clone();
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        let baseline = Request::SetBaseline { readings_ohm: Floats::of(&[60.0; 2]) };
+        ask(&mut session, &board, &baseline, |_| ());
+        let _ = session;
+        upload(&mut bench, &mut slots, &mut [], &upload_steps(next, 64)).unwrap();
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        let request = Request::Decode { frame: 1, readings_ohm: Floats::of(&[30.0; 2]) };
+        ask(&mut session, &board, &request, |report| match report {
+            Report::Estimate(it) => assert_eq!(it.flags & EstimateReport::CONTACT, contact),
+            other => panic!("{other:?}"),
+        });
+    }
+}
+
+#[test]
 fn a_model_without_room_is_not_put_in_force() {
     for (inputs, outputs) in [(4, 1), (7, 1), (3, 5)] {
-        let mut slots = MockSlot::pair_with(&blob_of_one_row(inputs, outputs));
+        let mut slots = Flash::slots_with(&blob_of_one_row(inputs, outputs));
         let mut bench = Bench::new(quiet());
         let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
         assert_eq!(model_crc(&mut session, &bench.board), None, "{inputs} {outputs}");
@@ -171,7 +178,7 @@ fn a_model_is_decoded_from_ram_where_it_fits() {
     let blob = blob(3, 4);
     let words = blob.len().div_ceil(4);
     for (room, in_ram) in [(words, true), (words - 1, false)] {
-        let mut slots = MockSlot::pair_with(&blob);
+        let mut slots = Flash::slots_with(&blob);
         let mut weights = vec![0; room];
         let mut bench = Bench::new(quiet());
         let mut session = Session::start(&mut bench.app, &mut slots, &mut weights);
@@ -192,11 +199,11 @@ fn a_model_is_decoded_from_ram_where_it_fits() {
 #[test]
 fn behind_a_damaged_model_the_other_slots_is_decoded_from_there() {
     let (first, second) = (blob(3, 4), blob(5, 4));
-    let mut slots = MockSlot::pair_with(&first);
+    let mut slots = Flash::slots_with(&first);
     let mut weights = vec![0; second.len().div_ceil(4)];
     let mut bench = Bench::new(quiet());
     install(&mut bench, &mut slots, &mut weights, (&second, 64)).unwrap();
-    let mut in_force = |slots: &mut [MockSlot; 2]| {
+    let mut in_force = |slots: &mut [Flash; 2]| {
         let mut session = Session::start(&mut bench.app, slots, &mut weights);
         let frame = frame_at_rest();
         let (_, _, found) = decode(&mut session, &bench.board, &frame);
@@ -215,7 +222,7 @@ fn behind_a_damaged_model_the_other_slots_is_decoded_from_there() {
 #[test]
 fn another_model_gives_its_own_answer_for_rest() {
     let (first, second) = (blob(3, 4), blob(5, 4));
-    let mut slots = MockSlot::pair_with(&first);
+    let mut slots = Flash::slots_with(&first);
     let mut bench = Bench::new(quiet());
     let board = bench.board.clone();
     let mut nearly = frame_at_rest();

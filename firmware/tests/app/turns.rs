@@ -1,6 +1,6 @@
 //! Turns of the loop: scans in time, the watchdog, and a host that takes no bytes.
 
-use firmware::app::{Leave, Session};
+use firmware::app::{Session, SessionEnd};
 use firmware::link::message::{Configuration, EstimateReport, Report, Request};
 use firmware::link::packet;
 use firmware::link::receive::{Received, Receiver};
@@ -11,7 +11,7 @@ use mock_board::*;
 #[test]
 fn frames_are_scanned_on_time_numbered_and_reported() {
     let blob = blob(3, 4);
-    let mut slots = MockSlot::pair_with(&blob);
+    let mut slots = Flash::slots_with(&blob);
     let configuration = Configuration { frame_period_us: 1000, send_readings: true, ..quiet() };
     let mut bench = Bench::new(configuration);
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
@@ -29,13 +29,15 @@ fn frames_are_scanned_on_time_numbered_and_reported() {
     let s = statistics(&mut session, &bench.board);
     assert_eq!((s.frames_scanned, s.frames_decoded, s.frames_missed), (5, 5, 0));
     assert!(s.longest_scan_us >= 10 && s.longest_scan_us < 20);
+    assert_eq!((s.shortest_decode_cycles, s.longest_decode_cycles), (1000, 1000));
 }
 
 #[test]
 fn a_scan_longer_than_the_period_is_an_overrun() {
-    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut slots = Flash::slots_with(&blob(3, 4));
     let configuration = Configuration { frame_period_us: 100, ..quiet() };
-    let mut bench = Bench::new(configuration).restarted(configuration, 250);
+    let mut bench = Bench::new(configuration);
+    bench.board.pins.borrow_mut().scan_us = 250;
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     while board.pins.borrow().now_us < 2000 {
@@ -52,7 +54,7 @@ fn a_scan_longer_than_the_period_is_an_overrun() {
 
 #[test]
 fn the_watchdog_is_fed_by_good_loops_only() {
-    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut slots = Flash::slots_with(&blob(3, 4));
     let mut bench = Bench::new(Configuration { frame_period_us: 100, ..quiet() });
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let board = bench.board.clone();
@@ -99,9 +101,10 @@ fn the_watchdog_is_fed_by_good_loops_only() {
 /// Longest time in µs in which the watchdog is not fed, when a byte is taken every `gap_us` and each scan takes
 /// `scan_us`.
 fn longest_unfed_us(gap_us: u32, scan_us: u32) -> u32 {
-    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut slots = Flash::slots_with(&blob(3, 4));
     let scanning = Configuration { frame_period_us: 10_000, send_readings: true, ..quiet() };
-    let mut bench = Bench::new(scanning).restarted(scanning, scan_us);
+    let mut bench = Bench::new(scanning);
+    bench.board.pins.borrow_mut().scan_us = scan_us;
     let board = bench.board.clone();
     // A faulty reading, so that all kinds of reports are sent.
     bench.frame.borrow_mut()[0][0] = f32::NAN;
@@ -132,7 +135,7 @@ fn however_slowly_bytes_are_taken_the_watchdog_is_fed() {
 
 #[test]
 fn a_host_that_takes_no_bytes_costs_a_report_but_not_the_device() {
-    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut slots = Flash::slots_with(&blob(3, 4));
     let mut bench = Bench::new(Configuration { frame_period_us: 1000, ..quiet() });
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let board = bench.board.clone();
@@ -160,10 +163,10 @@ fn a_host_that_takes_no_bytes_costs_a_report_but_not_the_device() {
 
 #[test]
 fn a_restart_is_answered_and_ends_the_session() {
-    let mut slots = MockSlot::pair_with(&blob(3, 4));
+    let mut slots = Flash::slots_with(&blob(3, 4));
     let mut bench = Bench::new(quiet());
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    let (answer, leave) =
+    let (answer, end) =
         ask(&mut session, &bench.board, &Request::Restart, |r| r == Report::Restarting);
-    assert_eq!((answer, leave), (true, Some(Leave::Restart)));
+    assert_eq!((answer, end), (true, Some(SessionEnd::Restart)));
 }

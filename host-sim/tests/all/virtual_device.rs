@@ -7,8 +7,8 @@ use firmware::capacity::Capacity;
 use firmware::link::message::{Configuration, Memory};
 use firmware::platform::{Platform, Port};
 use firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
-use firmware::settings::{PAGE_BYTES, SettingPages};
-use firmware::store::{FlashError, Slot};
+use firmware::settings::SettingPages;
+use mock_board::Flash;
 use taxel_data::random::{Purpose, Random, Stream};
 
 pub mod mailbox;
@@ -22,8 +22,8 @@ pub struct Line {
 /// Board whose serial line is `W`, whose reads must not block.
 struct Board<'s, W, N> {
     wire: W,
-    settings: &'s mut SettingPages<MemorySlot>,
-    key: &'s mut MemorySlot,
+    settings: &'s mut SettingPages<Flash>,
+    key: &'s mut Flash,
     /// Called with each request's last byte, before the device sees it.
     notice: N,
     start: Instant,
@@ -106,8 +106,8 @@ impl<W: Read + Write, N: FnMut()> Port for Board<'_, W, N> {
 }
 
 impl<W: Read + Write, N: FnMut()> Platform for Board<'_, W, N> {
-    type Settings = SettingPages<MemorySlot>;
-    type KeyArea = MemorySlot;
+    type Settings = SettingPages<Flash>;
+    type KeyArea = Flash;
 
     const BOARD: &'static str = "virtual";
 
@@ -117,11 +117,11 @@ impl<W: Read + Write, N: FnMut()> Platform for Board<'_, W, N> {
         Memory { text: 20_000, bss: 3000, stack_high_water: 1000, ..Memory::default() }
     }
 
-    fn settings(&mut self) -> &mut SettingPages<MemorySlot> {
+    fn settings(&mut self) -> &mut SettingPages<Flash> {
         self.settings
     }
 
-    fn key_area(&mut self) -> &mut MemorySlot {
+    fn key_area(&mut self) -> &mut Flash {
         self.key
     }
 }
@@ -145,29 +145,6 @@ impl FrameSource for Source {
         }
         self.next += 1;
         ScanReport::default()
-    }
-}
-
-/// Slot that takes writes only where it is erased.
-struct MemorySlot(Vec<u32>);
-
-impl Slot for MemorySlot {
-    const ERASE_INTERVAL_S: u32 = 0;
-
-    fn bytes(&self) -> &[u8] {
-        bytemuck::cast_slice(&self.0)
-    }
-
-    fn erase(&mut self) -> Result<(), FlashError> {
-        self.0.fill(u32::MAX);
-        Ok(())
-    }
-
-    fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), FlashError> {
-        let place = offset / 4..(offset + bytes.len()) / 4;
-        assert!(self.0[place.clone()].iter().all(|word| *word == u32::MAX), "not erased");
-        bytemuck::cast_slice_mut(&mut self.0[place]).copy_from_slice(bytes);
-        Ok(())
     }
 }
 
@@ -216,14 +193,14 @@ fn run_on_its_own(
     own: Configuration,
     mut notice: impl FnMut() + Send + 'static,
 ) {
-    let mut slots = [0, 1].map(|_| MemorySlot(vec![u32::MAX; 128 * 1024 / 4]));
-    bytemuck::cast_slice_mut(&mut slots[0].0)[..model.len()].copy_from_slice(model);
-    let mut settings =
-        SettingPages::new([0, 1].map(|_| MemorySlot(vec![u32::MAX; PAGE_BYTES / 4])));
-    let mut key = MemorySlot(vec![u32::MAX; 1024]);
+    let model = model.to_vec();
     // Half of a large model fits: both ways are taken.
     let mut weights = vec![0; 8 * 1024];
     std::thread::spawn(move || {
+        let mut slots = Flash::pair(128 * 1024);
+        slots[0].flash(0, &model);
+        let mut settings = SettingPages::new(Flash::pages());
+        let mut key = Flash::without_key();
         for life in 0.. {
             let board = Board {
                 wire: &mut wire,

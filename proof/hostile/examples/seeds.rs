@@ -10,8 +10,8 @@ use firmware::link::message::{Configuration, Report, Request, Setting};
 use firmware::link::packet;
 use hostile::seal;
 use mock_board::{
-    Bench, MockSlot, SharedSettings, ask, blob, blob_of_components, blob_with_confidence,
-    configure, quiet, request_bytes, upload_steps,
+    Bench, Flash, SharedSettings, ask, blob, blob_of_components, blob_with_confidence, configure,
+    quiet, request_bytes, upload_steps,
 };
 use model_core::blob::Floats;
 use model_core::rbf::Format;
@@ -150,7 +150,7 @@ fn settings() -> Vec<Vec<u8>> {
     // What a device keeps by itself.
     let mut kept = SharedSettings::default();
     let model = blob(1, 3);
-    let mut slots = MockSlot::pair_with(&model);
+    let mut slots = Flash::slots_with(&model);
     let mut bench = Bench::with_settings(quiet(), &kept);
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);

@@ -7,13 +7,13 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use firmware::app::{Leave, Session};
+use firmware::app::{Session, SessionEnd};
 use firmware::link::cobs;
 use firmware::link::message::Request;
 use firmware::link::packet::PROTOCOL_VERSION;
 use mock_board::{
-    Bench, Board, Memory, MockSlot, ROWS, SharedSettings, Source, TestFrame, blob, model_crc,
-    quiet, request_bytes, upload_steps,
+    Bench, Board, Flash, Memory, Running, SharedSettings, TestFrame, blob, model_crc, quiet,
+    request_bytes, upload_steps,
 };
 use model_core::AlignedBytes;
 
@@ -31,7 +31,7 @@ const NUMBER: u16 = 9;
 /// Steps, as bytes.
 pub fn check(bytes: &[u8], is_planted: bool) -> bool {
     let models = [blob(3, 4), blob(4, 3), blob(5, 6)];
-    let mut slots = MockSlot::pair_with(&models[0]);
+    let mut slots = Flash::slots_with(&models[0]);
     if is_planted {
         slots[0].decay(20, 1);
     }
@@ -43,7 +43,7 @@ pub fn check(bytes: &[u8], is_planted: bool) -> bool {
     for _ in 0..MOST_STARTS {
         if let Some(operations) = cut_after.take() {
             slots[0].cut_power_after(operations);
-            settings.cut_power_after(operations, 0x0F0F_0F0F);
+            settings.cut_power_after(operations);
         }
         let mut bench = Bench::within(&mut memory, quiet(), &settings);
         let mut device = Device {
@@ -57,15 +57,18 @@ pub fn check(bytes: &[u8], is_planted: bool) -> bool {
             match operation % 12 {
                 10 => break,
                 11 => {
-                    cut_after = Some(number_of(bytes) as usize % 4096);
+                    cut_after = Some(u64::from(number_of(bytes) % 1024));
                     break;
                 }
                 operation => {
-                    let leave = device.step(operation, bytes, &models);
-                    has_taken |= matches!(leave, Some(Leave::NewModel));
-                    if leave.is_some() {
+                    let end = device.step(operation, bytes, &models);
+                    has_taken |= matches!(end, Some(SessionEnd::NewModel));
+                    // A first request may end a frame that the bytes have begun. The next is answered.
+                    let identify = || request_bytes(NUMBER, &Request::Identify);
+                    if end.or_else(|| device.send(identify())).is_some() {
                         break;
                     }
+                    device.answers();
                 }
             }
         }
@@ -92,14 +95,19 @@ impl<'b> Iterator for Steps<'b> {
 
 /// A device that runs.
 struct Device<'d> {
-    session: Session<'d, 'd, Board, Source, MockSlot, ROWS>,
+    session: Running<'d, 'd>,
     board: Board,
     frame: Rc<RefCell<TestFrame>>,
 }
 
 impl Device<'_> {
     /// Takes a step; returns why the session ended, if it did.
-    fn step(&mut self, operation: u8, bytes: &[u8], models: &[AlignedBytes; 3]) -> Option<Leave> {
+    fn step(
+        &mut self,
+        operation: u8,
+        bytes: &[u8],
+        models: &[AlignedBytes; 3],
+    ) -> Option<SessionEnd> {
         match operation {
             0 => self.send(bytes.to_vec()),
             1..=4 => {
@@ -128,9 +136,9 @@ impl Device<'_> {
             8 => {
                 // A host that takes a few bytes more, and then reads on.
                 self.board.pins.borrow_mut().room = Some(number_of(bytes) as usize % 512);
-                let leave = self.send(request_bytes(NUMBER, &Request::Statistics));
+                let end = self.send(request_bytes(NUMBER, &Request::Statistics));
                 self.board.pins.borrow_mut().room = None;
-                leave
+                end
             }
             _ => {
                 let mut frame = self.frame.borrow_mut();
@@ -145,12 +153,12 @@ impl Device<'_> {
     }
 
     /// Sends bytes, and runs until the device has read them.
-    fn send(&mut self, bytes: Vec<u8>) -> Option<Leave> {
+    fn send(&mut self, bytes: Vec<u8>) -> Option<SessionEnd> {
         self.board.pins.borrow_mut().to_device.extend(bytes);
         let mut turns = 0;
         while !self.board.pins.borrow().to_device.is_empty() {
-            if let Some(leave) = self.session.step() {
-                return Some(leave);
+            if let Some(end) = self.session.step() {
+                return Some(end);
             }
             turns += 1;
             assert!(turns < MOST_TURNS, "the device reads no more");

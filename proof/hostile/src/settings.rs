@@ -4,7 +4,7 @@
 use firmware::app::Session;
 use firmware::link::message::{Report, Request, Setting};
 use firmware::settings::PAGE_BYTES;
-use mock_board::{Bench, Memory, MockSlot, SharedSettings, ask, blob, crc_of, model_crc, quiet};
+use mock_board::{Bench, Flash, Memory, SharedSettings, ask, blob, crc_of, model_crc, quiet};
 
 /// Turns of the loop that the application takes on such settings.
 const TURNS: usize = 20;
@@ -17,7 +17,7 @@ pub fn check(bytes: &[u8], is_planted: bool) -> bool {
         kind => kept(bytes, kind == 2),
     };
     let model = blob(1, 3);
-    let mut slots = MockSlot::pair_with(&model);
+    let mut slots = Flash::slots_with(&model);
     let mut memory = Memory::new();
     let mut bench = Bench::within(&mut memory, quiet(), &settings);
     let board = bench.board.clone();

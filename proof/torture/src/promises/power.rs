@@ -1,15 +1,77 @@
 //! Power that is cut at every operation of the flash, and again while the device recovers: always the old or the new
 //! model is in force.
 
-mod flash;
-mod device;
+use mock_board::Torn;
+use mock_board::sweep::{Job, abort_and_decay, cut_key, cut_model, cut_settings, upload_to_worn};
 
-mod cuts;
-mod decay;
-mod provision;
-mod settings;
+use crate::effort::Effort;
+use crate::found::Found;
+use crate::promise::Promise;
+use crate::tally::{Tally, outcomes};
 
-pub use cuts::{UNDO, UPLOAD};
-pub use decay::{DECAY, WORN};
-pub use provision::PROVISION;
-pub use settings::SETTINGS;
+pub const UPLOAD: Promise = Promise {
+    name: "cut-upload",
+    text: "power cut in an upload: the old or the new model",
+    share: 12,
+    check: |effort, _| Ok(sweep(effort, 600, |seed, it| cut_model(Job::Upload, seed, it))),
+};
+
+pub const UNDO: Promise = Promise {
+    name: "cut-undo",
+    text: "power cut in an undo: one of the two models",
+    share: 6,
+    check: |effort, _| Ok(sweep(effort, 600, |seed, it| cut_model(Job::Undo, seed, it))),
+};
+
+pub const SETTINGS: Promise = Promise {
+    name: "cut-settings",
+    text: "power cut while a setting is kept: the old or the new",
+    share: 8,
+    check: |effort, _| Ok(sweep(effort, 160, cut_settings)),
+};
+
+pub const PROVISION: Promise = Promise {
+    name: "cut-provision",
+    text: "power cut while a key is set: no key or that one",
+    share: 2,
+    check: |effort, _| Ok(sweep(effort, 600, cut_key)),
+};
+
+pub const DECAY: Promise = Promise {
+    name: "abort-decay",
+    text: "the slot in force decays: no aborted upload takes over",
+    share: 2,
+    check: |effort, _| {
+        let names = ["the same model", "the one before it", "none"];
+        Ok(outcomes(effort, ("in force after the decay: ", names), "losses", abort_and_decay))
+    },
+};
+
+pub const WORN: Promise = Promise {
+    name: "worn-words",
+    text: "an upload to worn flash: in force, or refused",
+    share: 2,
+    check: |effort, _| {
+        let names = ["in force", "refused", "cut"];
+        Ok(outcomes(effort, ("uploads: ", names), "losses", upload_to_worn))
+    },
+};
+
+/// Most cases.
+const MOST: u64 = 1 << 40;
+
+/// Sweeps over at least so many cases; a self-test takes a quarter.
+fn sweep(effort: &Effort, least: u64, case: fn(u64, bool) -> Result<u64, String>) -> Found {
+    let cuts = Tally::new(Torn::ALL.map(Torn::name));
+    let planted = effort.is_planted();
+    let least = if planted { least / 4 } else { least };
+    let mut found = effort.worst((least, MOST), (0.0, "losses"), |seed| {
+        cuts.add(Torn::of(seed) as usize, case(seed, planted)?);
+        Ok(0.0)
+    });
+    found.cases = cuts.sum();
+    if found.note.is_empty() {
+        found.note = cuts.text();
+    }
+    found
+}

@@ -9,7 +9,7 @@ use firmware::link::message::{
 use firmware::link::packet;
 use firmware::link::receive::{Received, Receiver};
 use mock_board::{
-    Bench, Board, Memory, MockSlot, ROWS, SharedSettings, Source, ask, blob, blob_of_components,
+    Bench, Board, Flash, Memory, Running, SharedSettings, ask, blob, blob_of_components,
     blob_with_confidence, frame_at_rest, quiet,
 };
 use rand_core::{Rng, SeedableRng};
@@ -41,9 +41,6 @@ const SLACK_US: u64 = 200;
 const EARLY_US: u32 = 40;
 /// Frames after which the loop is in step, wherever it was.
 const SETTLING: u32 = 200;
-
-/// A running application.
-type Running<'a, 'm> = Session<'a, 'm, Board, Source, MockSlot, ROWS>;
 
 thread_local! {
     /// Memory that cases use again, so that the process grows by what the firmware or its driver loses alone.
@@ -105,8 +102,8 @@ fn run(
 ) -> Result<(), String> {
     let models = [blob(1, 1), blob_with_confidence(false), blob_of_components(2), blob(3, 5)];
     let mut slots = match seed / 4 % 5 {
-        4 => MockSlot::pair(),
-        model => MockSlot::pair_with(&models[model as usize]),
+        4 => Flash::slots(),
+        model => Flash::slots_with(&models[model as usize]),
     };
     let period_us = period_us(seed);
     let configuration = Configuration {

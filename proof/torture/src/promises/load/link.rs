@@ -5,7 +5,7 @@ use firmware::link::message::{ConfidenceSent, Configuration, Report, Request};
 use firmware::link::packet;
 use firmware::link::receive::{Received, Receiver};
 use mock_board::{
-    Bench, Memory, MockSlot, SharedSettings, blob, blob_with_confidence, configure, quiet,
+    Bench, Flash, Memory, SharedSettings, blob, blob_with_confidence, configure, quiet,
     request_bytes, settle,
 };
 use rand_core::{Rng, SeedableRng};
@@ -52,8 +52,8 @@ fn run(seed: u64, planted: bool) -> Result<[u64; 3], String> {
     let mut below = |end: u32| random.next_u32() % end;
     let models = [blob(1, 2), blob_with_confidence(false)];
     let mut slots = match seed % 3 {
-        2 => MockSlot::pair(),
-        model => MockSlot::pair_with(&models[model as usize]),
+        2 => Flash::slots(),
+        model => Flash::slots_with(&models[model as usize]),
     };
     let scanning = Configuration {
         frame_period_us: 1000,

@@ -6,10 +6,9 @@ use std::rc::Rc;
 use firmware::app::Session;
 use firmware::link::message::{ConfidenceSent, Configuration, Request, Setting, UploadStep};
 use firmware::settings::PAGE_BYTES;
-use firmware::store::{FlashError, Slot};
 use mock_board::{
-    Bench, Board, Memory, Pins, SharedSettings, blob, blob_with_confidence, quiet, request_bytes,
-    upload_steps,
+    Bench, Board, Flash, Memory, Pins, SharedSettings, blob, blob_with_confidence, quiet,
+    request_bytes, upload_steps,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -35,8 +34,8 @@ const ERASE_US: u32 = 2_000_000;
 const ERASE_PAGE_US: u32 = 500_000;
 /// Longest time in µs of writing a word.
 const WORD_US: u32 = 100;
-/// Words of a slot, as on the board.
-const WORDS: usize = 32 * 1024;
+/// Bytes of a slot, as on the board.
+const SLOT_BYTES: usize = 128 * 1024;
 /// Words of memory for a copy of the weights.
 const MEMORY: usize = 4096;
 
@@ -56,51 +55,14 @@ fn check(effort: &Effort, _: &Tools) -> Result<Found, String> {
     Ok(effort.worst((LEAST, 1 << 40), (FASTEST_S, "s"), |seed| Ok(longest_unfed_s(seed, planted))))
 }
 
-/// A slot that takes its time.
-struct SlowSlot {
-    words: Vec<u32>,
-    pins: Rc<RefCell<Pins>>,
-    erase_us: u32,
-    /// Whether erases fail at their end.
-    is_worn: bool,
-}
-
-impl SlowSlot {
-    fn wait(&self, us: u32) {
-        let mut pins = self.pins.borrow_mut();
-        pins.now_us = pins.now_us.wrapping_add(us);
-    }
-}
-
-impl Slot for SlowSlot {
-    const ERASE_INTERVAL_S: u32 = 0;
-
-    fn bytes(&self) -> &[u8] {
-        bytemuck::cast_slice(&self.words)
-    }
-
-    fn erase(&mut self) -> Result<(), FlashError> {
-        self.wait(self.erase_us);
-        self.words.fill(u32::MAX);
-        if self.is_worn { Err(FlashError) } else { Ok(()) }
-    }
-
-    fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), FlashError> {
-        self.wait(WORD_US * (bytes.len() / 4) as u32);
-        bytemuck::cast_slice_mut(&mut self.words)[offset..offset + bytes.len()]
-            .copy_from_slice(bytes);
-        Ok(())
-    }
-}
-
 /// Settings in these pages, one of which is full: they are exchanged at the next write. From then on the pages may be worn.
-fn nearly_full(pages: [SlowSlot; 2], is_worn: bool) -> SharedSettings<SlowSlot> {
+fn nearly_full(pages: [Flash; 2], is_worn: bool) -> SharedSettings {
     let mut settings = SharedSettings::in_pages(pages);
     for number in 0..PAGE_BYTES / 64 - 1 {
         let kept = settings.keep_bytes(Setting::Configuration, &[number as u8; 40]);
         assert_eq!(kept, Ok(true), "write {number}");
     }
-    settings.0.borrow_mut().pages().iter_mut().for_each(|page| page.is_worn = is_worn);
+    settings.0.borrow_mut().pages().iter_mut().for_each(|page| page.fails_to_erase = is_worn);
     settings
 }
 
@@ -113,24 +75,29 @@ fn longest_unfed_s(seed: u64, planted: bool) -> f64 {
     let is_worn = seed / 18 % 2 == 1;
     let mut memory = Box::new(Memory::new());
     let pins = Rc::new(RefCell::new(Pins::default()));
-    let slot = |words, erase_us, is_worn| SlowSlot {
-        words: vec![u32::MAX; words],
-        pins: pins.clone(),
-        erase_us,
-        is_worn,
+    let slow = |bytes, erase_us, is_worn| {
+        let clock = pins.clone();
+        let wait = Rc::new(move |us| {
+            let mut pins = clock.borrow_mut();
+            pins.now_us = pins.now_us.wrapping_add(us);
+        });
+        let mut pair = Flash::pair(bytes);
+        for flash in &mut pair {
+            flash.slow = Some((erase_us, WORD_US, wait.clone()));
+            flash.fails_to_erase = is_worn;
+        }
+        pair
     };
-    let mut board = Board::with_settings(&nearly_full(
-        [0, 1].map(|_| slot(PAGE_BYTES / 4, ERASE_PAGE_US, false)),
-        is_worn,
-    ));
+    let mut board =
+        Board::with_settings(&nearly_full(slow(PAGE_BYTES, ERASE_PAGE_US, false), is_worn));
     *pins.borrow_mut() = Pins::default();
     board.pins = pins.clone();
     let mut bench = Bench::on(board.clone(), &mut memory, quiet());
     board.pins.borrow_mut().scan_us = scan_us;
     bench.frame.borrow_mut()[0][0] = f32::NAN; // so that all kinds of reports are sent
-    let mut slots = [0, 1].map(|_| slot(WORDS, ERASE_US, is_worn));
+    let mut slots = slow(SLOT_BYTES, ERASE_US, is_worn);
     let model = blob_with_confidence(false);
-    bytemuck::cast_slice_mut(&mut slots[0].words)[..model.len()].copy_from_slice(&model);
+    slots[0].flash(0, &model);
     let mut room = vec![0; MEMORY];
     let mut session = Session::start(&mut bench.app, &mut slots, &mut room);
     let new = blob(2, 4);

@@ -5,8 +5,8 @@ use crate::log::{info, warning};
 use crate::seal::{Key, Seal, is_same};
 use crate::store::{DeviceKey, SEAL_BYTES, Slot, blob_in_slot, capacity, generation, seal_in_slot};
 
-/// The device's key, and the seals that it has made or found good.
-pub struct Guard {
+/// The device's key, and the seals that it has found good.
+pub struct Authenticity {
     key: DeviceKey,
     /// Good seals in the slots when the session began.
     seals: [Option<Seal>; 2],
@@ -14,8 +14,8 @@ pub struct Guard {
     highest: Option<u32>,
 }
 
-impl Guard {
-    /// A guard with the key in this `area` of flash, where what is found is made firm.
+impl Authenticity {
+    /// Reads the key in this `area` of flash, and makes it last.
     pub fn new<S: Slot>(area: &mut S) -> Self {
         let key = DeviceKey::find(area.bytes());
         match key.settle(area) {
@@ -27,7 +27,7 @@ impl Guard {
     }
 
     /// Looks at the seals in both slots.
-    pub fn see<S: Slot>(&mut self, slots: &[S; 2]) {
+    pub fn read_seals<S: Slot>(&mut self, slots: &[S; 2]) {
         let DeviceKey::Set(key) = &self.key else { return };
         for ((index, slot), seal) in slots.iter().enumerate().zip(&mut self.seals) {
             let bytes = slot.bytes();
@@ -39,7 +39,7 @@ impl Guard {
     }
 
     /// Whether the model in `slot` may come into force.
-    pub fn trusts(&self, slot: usize) -> bool {
+    pub fn allows(&self, slot: usize) -> bool {
         match self.key {
             DeviceKey::None => true,
             DeviceKey::Set(_) => self.seal_of(slot).is_some(),

@@ -2,7 +2,7 @@
 
 /// Why a session ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Leave {
+pub enum SessionEnd {
     /// Another model must be put in force.
     NewModel,
     /// The model on trial must be confirmed, which takes its slot.

@@ -1,10 +1,12 @@
-//! Flash that real parts resemble at their worst: erases and words that are torn, bits that stay weak, words that are
-//! worn.
+//! The one mock flash: NOR cells of which programming can only clear bits, and an erase sets all. It is as real parts
+//! are at their worst. Power may be lost in any erase and any word, bits stay weak, words wear out, and time passes.
 
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use firmware::store::{FlashError, RECORD_BYTES, Slot};
+use firmware::seal::Key;
+use firmware::settings::PAGE_BYTES;
+use firmware::store::{DeviceKey, FlashError, RECORD_BYTES, Slot};
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -131,7 +133,10 @@ pub struct Worn {
     pub ones: u32,
 }
 
-/// What the cells of a slot hold.
+/// Lets so many µs pass.
+pub type Wait = Rc<dyn Fn(u32)>;
+
+/// What the cells of a flash hold.
 #[derive(Clone)]
 pub struct Cells {
     words: Vec<u32>,
@@ -140,7 +145,8 @@ pub struct Cells {
     has_weak: bool,
 }
 
-/// A slot of flash.
+/// Flash that is erased as a whole: a model slot, a page of settings, or the key's. A clone is another chip with the same
+/// content, on the same power.
 #[derive(Clone)]
 pub struct Flash {
     cells: Cells,
@@ -152,10 +158,25 @@ pub struct Flash {
     pub reads_back: bool,
     /// Whether all weak bits of a word read alike at every other start: the word is the old or the new one.
     pub swings: bool,
+    /// Whether erases fail at their end.
+    pub fails_to_erase: bool,
+    /// Times in µs that an erase and a word take, and who lets them pass.
+    pub slow: Option<(u32, u32, Wait)>,
+    /// Mean time in s between erases that it endures; 0 for ever.
+    pub erase_interval_s: u32,
+    /// Number of erases that were begun.
+    pub erases: usize,
+    /// Number of words whose programming was begun.
+    pub words_written: usize,
 }
 
 impl Flash {
-    /// An erased slot of so many `words`.
+    /// Length in bytes of a model slot.
+    pub const SLOT_BYTES: usize = 2048;
+    /// Length in bytes of the flash for a key.
+    pub const KEY_BYTES: usize = 480;
+
+    /// Erased flash of so many `words`.
     pub fn erased(words: usize, supply: &Rc<RefCell<Supply>>, torn: Torn) -> Self {
         let cells = Cells { words: vec![u32::MAX; words], weak: vec![0; words], has_weak: false };
         Self {
@@ -165,22 +186,82 @@ impl Flash {
             worn: Vec::new(),
             reads_back: true,
             swings: false,
+            fails_to_erase: false,
+            slow: None,
+            erase_interval_s: 0,
+            erases: 0,
+            words_written: 0,
         }
     }
 
-    /// What the slot holds, to be put back by [`Flash::restore`].
+    /// A pair of erased flashes of so many `bytes`, with one power supply.
+    pub fn pair(bytes: usize) -> [Self; 2] {
+        let supply = Supply::new(bytes as u64);
+        [0, 1].map(|_| Self::erased(bytes / 4, &supply, Torn::AnyBits))
+    }
+
+    /// A pair of erased model slots.
+    pub fn slots() -> [Self; 2] {
+        Self::pair(Self::SLOT_BYTES)
+    }
+
+    /// A pair of model slots with `blob` in the first, as if flashed together with the firmware.
+    pub fn slots_with(blob: &[u8]) -> [Self; 2] {
+        let mut slots = Self::slots();
+        slots[0].flash(0, blob);
+        slots
+    }
+
+    /// A pair of erased pages of settings.
+    pub fn pages() -> [Self; 2] {
+        Self::pair(PAGE_BYTES)
+    }
+
+    /// Flash for a key, as it comes from the factory.
+    pub fn without_key() -> Self {
+        let [flash, _] = Self::pair(Self::KEY_BYTES);
+        flash
+    }
+
+    /// Flash in which this key is set.
+    pub fn with_key(key: &Key) -> Self {
+        let mut flash = Self::without_key();
+        DeviceKey::set(&mut flash, key).expect("there is room");
+        flash
+    }
+
+    /// Its power.
+    pub fn supply(&self) -> Rc<RefCell<Supply>> {
+        self.supply.clone()
+    }
+
+    /// Cuts the power after so many `operations`: erases, and words that are programmed.
+    pub fn cut_power_after(&self, operations: u64) {
+        self.supply.borrow_mut().on(Some(operations));
+    }
+
+    /// Switches the power on; returns whether it had been cut.
+    pub fn power_on(&self) -> bool {
+        let mut supply = self.supply.borrow_mut();
+        let gone = supply.gone;
+        supply.on(None);
+        gone
+    }
+
+    /// What it holds, to be put back by [`Flash::restore`].
     pub fn cells(&self) -> Cells {
         self.cells.clone()
     }
 
-    /// Puts back what the slot held.
+    /// Puts back what it held.
     pub fn restore(&mut self, cells: &Cells) {
         self.cells.clone_from(cells);
     }
 
-    /// Puts `bytes` at the start of the slot, as a programmer does.
-    pub fn flash(&mut self, bytes: &[u8]) {
-        bytemuck::cast_slice_mut(&mut self.cells.words)[..bytes.len()].copy_from_slice(bytes);
+    /// Puts `bytes` at `offset`, as a programmer does: without regard to what was there.
+    pub fn flash(&mut self, offset: usize, bytes: &[u8]) {
+        let all: &mut [u8] = bytemuck::cast_slice_mut(&mut self.cells.words);
+        all[offset..offset + bytes.len()].copy_from_slice(bytes);
     }
 
     /// Flips `bits` of word `place`, as an old cell does.
@@ -192,6 +273,12 @@ impl Flash {
     pub fn forget_record(&mut self) {
         let record = self.cells.words.len() - RECORD_BYTES / 4;
         self.cells.words[record..].fill(u32::MAX);
+    }
+
+    fn wait(&self, erases: u32, words: u32) {
+        if let Some((erase_us, word_us, wait)) = &self.slow {
+            wait(erases * erase_us + words * word_us);
+        }
     }
 
     /// Lets weak bits settle one way or the other, as they do at a start.
@@ -245,13 +332,17 @@ impl Flash {
 }
 
 impl Slot for Flash {
-    const ERASE_INTERVAL_S: u32 = 0;
+    fn erase_interval_s(&self) -> u32 {
+        self.erase_interval_s
+    }
 
     fn bytes(&self) -> &[u8] {
         bytemuck::cast_slice(&self.cells.words)
     }
 
     fn erase(&mut self) -> Result<(), FlashError> {
+        self.erases += 1;
+        self.wait(1, 0);
         let supply = self.supply.clone();
         let mut supply = supply.borrow_mut();
         supply.erases += 1;
@@ -269,17 +360,21 @@ impl Slot for Flash {
         for worn in &self.worn {
             self.cells.words[worn.place] &= !worn.zeros;
         }
-        Ok(())
+        if self.fails_to_erase { Err(FlashError) } else { Ok(()) }
     }
 
     fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), FlashError> {
         assert!(offset.is_multiple_of(4) && bytes.len().is_multiple_of(4), "whole words");
-        let supply = self.supply.clone();
+        self.wait(0, bytes.len() as u32 / 4);
         for (place, bytes) in (offset / 4..).zip(bytes.as_chunks::<4>().0) {
+            self.words_written += 1;
             let wanted = u32::from_le_bytes(*bytes);
-            let mut supply = supply.borrow_mut();
+            let mut supply = self.supply.borrow_mut();
             let Cells { words, weak, has_weak } = &mut self.cells;
             let (word, weak) = (&mut words[place], &mut weak[place]);
+            let mut worn = self.worn.iter().filter(|worn| worn.place == place).peekable();
+            let may_write = *word == u32::MAX || wanted == 0 || worn.peek().is_some();
+            assert!(may_write, "word {place} is not erased");
             match supply.operate() {
                 Course::Nowhere => return Err(FlashError),
                 Course::Torn
@@ -303,7 +398,7 @@ impl Slot for Flash {
             }
             *word &= wanted;
             *weak &= wanted;
-            for worn in self.worn.iter().filter(|worn| worn.place == place) {
+            for worn in worn {
                 *word |= worn.ones;
             }
             if *word != wanted && self.reads_back {

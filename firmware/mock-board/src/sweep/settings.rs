@@ -5,27 +5,11 @@ use std::rc::Rc;
 
 use firmware::link::message::Setting;
 use firmware::settings::{Keeper, PAGE_BYTES};
-use mock_board::SharedSettings;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::flash::{Cells, Flash, Supply, Torn};
-use crate::effort::Effort;
-use crate::found::Found;
-use crate::promise::Promise;
-use crate::tally::Tally;
-use crate::tools::Tools;
-
-pub const SETTINGS: Promise = Promise {
-    name: "cut-settings",
-    text: "power cut while a setting is kept: the old or the new",
-    share: 8,
-    check,
-};
-
-/// A case is one first cut, and some of the second cuts behind it.
-const LEAST: u64 = 160;
-const MOST: u64 = 1 << 40;
+use crate::flash::{Cells, Flash, Supply, Torn};
+use crate::pages::SharedSettings;
 
 /// Behind one in so many cuts, settings are kept for long, up to the next exchanges.
 const LATER: u64 = 64;
@@ -33,30 +17,27 @@ const LATER: u64 = 64;
 /// Longest distance between second cuts that are tried.
 const STRIDE: u64 = 16;
 
-fn check(effort: &Effort, _: &Tools) -> Result<Found, String> {
-    let cuts = Tally::new(Torn::ALL.map(Torn::name));
-    let planted = effort.is_planted();
-    let least = if planted { LEAST / 4 } else { LEAST };
-    let mut found = effort.worst((least, MOST), (0.0, "losses"), |seed| {
-        Case::new(seed, planted)?.run(&cuts).map(|()| 0.0)
-    });
-    found.cases = cuts.sum();
-    if found.note.is_empty() {
-        found.note = cuts.text();
-    }
-    Ok(found)
+/// Cuts the power at one operation while a setting is kept, and at some of the operations behind it. The setting must be
+/// the old or the new one, the same at each start, and the others as they were. Returns the number of cuts.
+///
+/// # Errors
+/// What is wrong, and where.
+pub fn cut_settings(seed: u64, planted: bool) -> Result<u64, String> {
+    let mut case = Case::new(seed, planted)?;
+    case.run()?;
+    Ok(case.cuts)
 }
 
 /// What each setting holds.
 type Contents = [Option<Vec<u8>>; 3];
 
 struct Case {
-    seed: u64,
     random: Xoshiro256PlusPlus,
     supply: Rc<RefCell<Supply>>,
-    settings: SharedSettings<Flash>,
+    settings: SharedSettings,
     /// What is kept before the cut.
     old: Contents,
+    cuts: u64,
     planted: bool,
 }
 
@@ -69,11 +50,11 @@ impl Case {
         let page = || Flash::erased(PAGE_BYTES / 4, &supply, torn);
         let settings = SharedSettings::in_pages([page(), page()]);
         let random = Xoshiro256PlusPlus::seed_from_u64(seed);
-        let mut case = Self { seed, random, supply, settings, old: [None, None, None], planted };
+        let mut case = Self { random, supply, settings, old: [None, None, None], cuts: 0, planted };
         let times = case.below(60);
         case.keep_some(times)?;
         if seed / Torn::COUNT as u64 % 2 == 1 {
-            case.fill_page()?;
+            case.fill_page();
         }
         Ok(case)
     }
@@ -92,7 +73,7 @@ impl Case {
     }
 
     /// Keeps configurations until the next setting, whichever it is, leads to an exchange.
-    fn fill_page(&mut self) -> Result<(), String> {
+    fn fill_page(&mut self) {
         for number in 0.. {
             let before = self.cells();
             let bytes = self.content(Setting::Configuration, number);
@@ -103,7 +84,6 @@ impl Case {
             }
             self.old[Setting::Configuration as usize] = Some(bytes);
         }
-        Ok(())
     }
 
     fn below(&mut self, end: u64) -> u64 {
@@ -123,7 +103,7 @@ impl Case {
         bytes
     }
 
-    fn run(mut self, cuts: &Tally<{ Torn::COUNT }>) -> Result<(), String> {
+    fn run(&mut self) -> Result<(), String> {
         let setting = self.setting();
         let old = self.old[setting as usize].clone();
         let new = self.content(setting, 200);
@@ -139,8 +119,7 @@ impl Case {
         };
         self.restore(&before);
         self.keep(setting, &new, Some(first));
-        let kind = Torn::of(self.seed) as usize;
-        cuts.add(kind, 1);
+        self.cuts += 1;
         let place = format!("{setting:?}, operation {first} of {operations}");
         let after = self.cells();
         self.expect(setting, &[old.as_ref(), Some(&new)], &place)?;
@@ -151,12 +130,12 @@ impl Case {
             if !self.keep(setting, &next, Some(second)) {
                 return Ok(());
             }
-            cuts.add(kind, 1);
+            self.cuts += 1;
             let mut place = format!("{place}, then operation {second}");
             if self.below(2) == 0 {
                 let end = if self.below(2) == 0 { operations } else { 20 };
                 let third = self.below(end);
-                cuts.add(kind, u64::from(self.keep(setting, &next, Some(third))));
+                self.cuts += u64::from(self.keep(setting, &next, Some(third)));
                 place = format!("{place}, then operation {third}");
             }
             self.expect(setting, &[old.as_ref(), Some(&new), Some(&next)], &place)?;
@@ -206,7 +185,7 @@ impl Case {
         let mut first = None;
         for start in 1..=3 {
             self.settle();
-            self.settings.make_firm().map_err(|error| format!("{place}, start: {error:?}"))?;
+            self.settings.recover().map_err(|error| format!("{place}, start: {error:?}"))?;
             for other in Setting::ALL {
                 let found = self.read(other);
                 let is_right = if other == setting {

@@ -41,7 +41,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
     /// Puts the configuration and the constants that are kept in force.
     pub(super) fn load_settings(&mut self) {
         let (keeper, buffer) = self.line.settings();
-        if keeper.make_firm().is_err() {
+        if keeper.recover().is_err() {
             warning!("the memory of settings failed");
         }
         if let Some(configuration) =

@@ -1,4 +1,4 @@
-//! Makes firm at every start which model is in force ([`missing_records`]).
+//! Writes at every start the records that the choice of a model still needs ([`missing_records`]).
 
 use super::Core;
 use super::model::{candidates, choose};
@@ -8,17 +8,17 @@ use crate::readout::FrameSource;
 use crate::store::{Slot, missing_records, reinstate};
 
 impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
-    /// Writes the records that the choice of a model still needs. A trial is no choice yet.
+    /// Writes them. A trial is no choice yet.
     // Apart from its caller, whose stack is deep.
     #[inline(never)]
-    pub(super) fn make_firm<S: Slot>(&mut self, slots: &mut [S; 2]) {
-        let is_firm = (0..slots.len()).all(|slot| missing_records(slots, slot).is_none());
-        if is_firm || self.trial.is_going_on() {
+    pub(super) fn write_missing_records<S: Slot>(&mut self, slots: &mut [S; 2]) {
+        let is_complete = (0..slots.len()).all(|slot| missing_records(slots, slot).is_none());
+        if is_complete || self.trial.is_going_on() {
             return;
         }
-        let trusted = |slot| self.guard.trusts(slot);
+        let allowed = |slot| self.authenticity.allows(slot);
         let candidates =
-            candidates(slots, None).map(|candidate| candidate.filter(|it| trusted(it.slot)));
+            candidates(slots, None).map(|candidate| candidate.filter(|it| allowed(it.slot)));
         let Some(chosen) = choose(self.capacity, slots, candidates) else { return };
         let Some(generation) = missing_records(slots, chosen.slot) else { return };
         let written = slots.get_mut(chosen.slot).and_then(|slot| reinstate(slot, generation));

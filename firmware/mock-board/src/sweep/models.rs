@@ -1,56 +1,32 @@
 //! Cuts while a model is uploaded, or left for the one before it.
 
-use mock_board::{blob, crc_of};
+use firmware::link::message::UploadState;
 use model_core::AlignedBytes;
 
-use super::device::{Device, Outcome};
-use super::flash::Torn;
-use crate::effort::Effort;
-use crate::found::Found;
-use crate::promise::Promise;
-use crate::tally::Tally;
-use crate::tools::Tools;
-
-pub const UPLOAD: Promise = Promise {
-    name: "cut-upload",
-    text: "power cut in an upload: the old or the new model",
-    share: 12,
-    check: |effort, tools| check(Job::Upload, effort, tools),
-};
-
-pub const UNDO: Promise = Promise {
-    name: "cut-undo",
-    text: "power cut in an undo: one of the two models",
-    share: 6,
-    check: |effort, tools| check(Job::Undo, effort, tools),
-};
+use super::device;
+use crate::device::{Answer, Device, confirmed};
+use crate::flash::Torn;
+use crate::models::{blob, crc_of};
 
 /// What changes the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Job {
+pub enum Job {
     Upload,
     Undo,
 }
 
-/// Least and most cases; a case is one first cut, and all second cuts behind it.
-const LEAST: u64 = 600;
-const MOST: u64 = 1 << 40;
-
 /// Starts after a cut, at each of which weak bits settle anew.
 const STARTS: usize = 3;
 
-fn check(job: Job, effort: &Effort, _: &Tools) -> Result<Found, String> {
-    let cuts = Tally::new(Torn::ALL.map(Torn::name));
-    let planted = effort.is_planted();
-    let least = if planted { LEAST / 4 } else { LEAST };
-    let mut found = effort.worst((least, MOST), (0.0, "losses"), |seed| {
-        Case::new(job, seed, planted).run(&cuts).map(|()| 0.0)
-    });
-    found.cases = cuts.sum();
-    if found.note.is_empty() {
-        found.note = cuts.text();
-    }
-    Ok(found)
+/// Cuts the power at one operation of the job, at each operation of the start behind it, and at each of what a host does
+/// next. The old or the new model must be in force, the same at each start. Returns the number of cuts.
+///
+/// # Errors
+/// What is wrong, and where.
+pub fn cut_model(job: Job, seed: u64, planted: bool) -> Result<u64, String> {
+    let mut case = Case::new(job, seed, planted);
+    case.run()?;
+    Ok(case.cuts)
 }
 
 /// One first cut, and all second cuts behind it.
@@ -63,49 +39,51 @@ struct Case {
     planted: bool,
     new: AlignedBytes,
     next: AlignedBytes,
+    cuts: u64,
 }
 
 impl Case {
     fn new(job: Job, seed: u64, planted: bool) -> Self {
         let torn = Torn::of(seed);
-        let device = Device::new(seed, torn);
-        Self { job, seed, torn, device, planted, new: blob(2, 2), next: blob(7, 1) }
+        let device = device(seed, torn);
+        Self { job, seed, torn, device, planted, new: blob(2, 2), next: blob(7, 1), cuts: 0 }
     }
 
-    fn run(mut self, cuts: &Tally<{ Torn::COUNT }>) -> Result<(), String> {
+    fn run(&mut self) -> Result<(), String> {
         let old = self.prepare()?;
         let before = self.device.cells();
         let outcome = self.attempt(None);
         let operations = self.device.supply.borrow().operations;
-        let Outcome::InForce(new) = outcome else {
+        let Ok(UploadState::Confirmed { crc_32: new }) = outcome else {
             return Err(format!("without a cut: {outcome:?}"));
         };
         self.expect(&[Some(new)], "without a cut")?;
         let first = (self.seed / (4 * Torn::COUNT as u64)).wrapping_mul(17) % operations;
         self.device.restore(&before);
-        self.attempt(Some(first));
+        let _ = self.attempt(Some(first));
         self.slip();
-        cuts.add(self.kind(), 1);
+        self.cuts += 1;
         let place = format!("operation {first} of {operations}, {}", self.torn.name());
         let allowed = [Some(old), Some(new)];
-        self.cut_recovery(&allowed, &place, cuts)?;
+        self.cut_recovery(&allowed, &place)?;
         let in_force = self.expect(&allowed, &place)?;
         let after = self.device.cells();
         for second in 0.. {
             self.device.restore(&after);
             // Half the hosts try the same again, the others something else.
             let again = self.seed.is_multiple_of(2) && in_force == Some(old);
-            let (wanted, outcome) = if again {
-                (new, self.attempt(Some(second)))
+            let wanted = if again {
+                let _ = self.attempt(Some(second));
+                new
             } else {
-                let next = self.next.clone();
-                (crc_of(&next), self.device.upload(&next, usize::MAX, Some(second)))
+                let _ = self.device.cut(second).install(&self.next, None);
+                crc_of(&self.next)
             };
-            if outcome != Outcome::Cut {
+            if !self.device.is_cut() {
                 break;
             }
             self.slip();
-            cuts.add(self.kind(), 1);
+            self.cuts += 1;
             let place = format!("{place}, then operation {second}");
             self.expect(&[in_force, Some(wanted)], &place)?;
             if second % 4 == self.seed % 4 {
@@ -116,29 +94,20 @@ impl Case {
     }
 
     /// Cuts the start behind the first cut at each of its own operations, and puts back what the slots held before.
-    fn cut_recovery(
-        &mut self,
-        allowed: &[Option<u32>],
-        place: &str,
-        cuts: &Tally<{ Torn::COUNT }>,
-    ) -> Result<(), String> {
+    fn cut_recovery(&mut self, allowed: &[Option<u32>], place: &str) -> Result<(), String> {
         let before = self.device.cells();
         for operation in 0.. {
             self.device.restore(&before);
-            self.device.session(Some(operation), |_, _| ());
-            if !self.device.supply.borrow().gone {
+            self.device.cut(operation).session(|_, _| ());
+            if !self.device.is_cut() {
                 break;
             }
             self.slip();
-            cuts.add(self.kind(), 1);
+            self.cuts += 1;
             self.expect(allowed, &format!("{place}, then operation {operation} of the start"))?;
         }
         self.device.restore(&before);
         Ok(())
-    }
-
-    fn kind(&self) -> usize {
-        self.torn as usize
     }
 
     /// Brings the old model into force; returns its CRC-32.
@@ -151,11 +120,11 @@ impl Case {
             _ => 0,
         };
         let first = if uploads == 0 { &old } else { &earlier };
-        self.device.slots[0].flash(first);
+        self.device.slots[0].flash(0, first);
         for upload in 1..=uploads {
             let blob = if upload == uploads { &old } else { &earlier };
-            let outcome = self.device.upload(blob, usize::MAX, None);
-            if outcome != Outcome::InForce(crc_of(blob)) {
+            let outcome = self.device.install(blob, None);
+            if outcome != confirmed(blob) {
                 return Err(format!("upload {upload} before the cut: {outcome:?}"));
             }
         }
@@ -167,10 +136,11 @@ impl Case {
     }
 
     /// Changes the model, as far as the power lasts.
-    fn attempt(&mut self, cut_after: Option<u64>) -> Outcome {
+    fn attempt(&mut self, cut_after: Option<u64>) -> Answer {
+        self.device.cut_after = cut_after;
         match self.job {
-            Job::Upload => self.device.upload(&self.new, usize::MAX, cut_after),
-            Job::Undo => self.device.undo(crc_of(&blob(1, 2)), cut_after),
+            Job::Upload => self.device.install(&self.new, None),
+            Job::Undo => self.device.undo(crc_of(&blob(1, 2))),
         }
     }
 
@@ -192,8 +162,8 @@ impl Case {
     /// An upload without a cut comes into force, for good.
     fn mend(&mut self, place: &str) -> Result<(), String> {
         let mend = blob(9, 1);
-        let outcome = self.device.upload(&mend, usize::MAX, None);
-        if outcome != Outcome::InForce(crc_of(&mend)) {
+        let outcome = self.device.install(&mend, None);
+        if outcome != confirmed(&mend) {
             return Err(format!("{place}: the next upload is {outcome:?}"));
         }
         self.expect(&[Some(crc_of(&mend))], &format!("{place}, mended")).map(drop)
