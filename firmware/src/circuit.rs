@@ -265,9 +265,9 @@ impl<const ROWS: usize, const COLS: usize> Circuit for ZeroPotential<ROWS, COLS>
         Some(Constants {
             reference_v: self.reference_v,
             drive_v: self.drive_v,
-            row_source_ohm: Floats::of(&self.row_source_ohm),
-            feedback_ohm: Floats::of(&self.feedback_ohm),
-            series_ohm: Floats::of(&self.series_ohm),
+            row_source_ohm: Floats::new(&self.row_source_ohm),
+            feedback_ohm: Floats::new(&self.feedback_ohm),
+            series_ohm: Floats::new(&self.series_ohm),
         })
     }
 

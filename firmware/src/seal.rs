@@ -27,13 +27,13 @@ pub struct Seal {
 
 impl Seal {
     /// Seals `blob` as `version`.
-    pub fn of(key: &Key, version: u32, blob: &[u8]) -> Self {
+    pub fn new(key: &Key, version: u32, blob: &[u8]) -> Self {
         Self { version, tag: tag(key, version, blob) }
     }
 
     /// Whether this is the seal of `blob`, found in a time that does not depend on the tag.
     pub fn fits(&self, key: &Key, blob: &[u8]) -> bool {
-        is_same(&self.tag, &Self::of(key, self.version, blob).tag)
+        is_same(&self.tag, &Self::new(key, self.version, blob).tag)
     }
 }
 
@@ -63,7 +63,7 @@ mod tests {
     #[test]
     fn a_seal_fits_its_own_blob_key_and_version_alone() {
         let blob: Vec<u8> = (0..=255).cycle().take(1000).collect();
-        let seal = Seal::of(&KEY, 5, &blob);
+        let seal = Seal::new(&KEY, 5, &blob);
         assert!(seal.fits(&KEY, &blob));
         assert!(!seal.fits(&[8; KEY_BYTES], &blob) && !seal.fits(&KEY, &blob[1..]));
         assert!(!Seal { version: 6, ..seal }.fits(&KEY, &blob));
@@ -77,7 +77,7 @@ mod tests {
     /// Made by `openssl dgst -sha256 -mac HMAC -macopt hexkey:0707…07`, of these bytes in a file.
     #[test]
     fn a_tag_is_an_ordinary_hmac() {
-        let seal = Seal::of(&KEY, 0x0102_0304, b"TAXL blob");
+        let seal = Seal::new(&KEY, 0x0102_0304, b"TAXL blob");
         let hex: Vec<String> = seal.tag.iter().map(|byte| format!("{byte:02x}")).collect();
         assert_eq!(
             hex.concat(),

@@ -20,7 +20,7 @@ fn with_key() -> Device {
 
 /// Uploads `blob`, sealed as this version.
 fn install(device: &mut Device, version: u32, blob: &[u8]) -> Answer {
-    device.install(blob, Some(Seal::of(&KEY, version, blob)))
+    device.install(blob, Some(Seal::new(&KEY, version, blob)))
 }
 
 /// A model's CRC-32, and the version that it was sealed with.
@@ -68,7 +68,7 @@ fn no_older_model_comes_back() {
 fn a_trial_that_ends_leaves_the_version_unused() {
     let mut device = with_key();
     let (second, third) = (blob(2, 4), blob(3, 4));
-    let mut steps = trial_steps(&second, Some(Seal::of(&KEY, 6, &second)));
+    let mut steps = trial_steps(&second, Some(Seal::new(&KEY, 6, &second)));
     steps.push(UploadStep::Abort);
     device.upload(&steps).unwrap();
     assert_eq!(identity(&mut device).2, Some(5));

@@ -48,7 +48,7 @@ const SEAL: Seal = Seal { version: 300, tag: [0x5A; 32] };
 const OHM: [f32; 2] = [60.0, f32::NAN];
 
 fn requests() -> Vec<Example> {
-    let readings_ohm = Floats::of(&OHM);
+    let readings_ohm = Floats::new(&OHM);
     // A blob of 1000 bytes for the paper's sensor, with one network for all rows.
     let head = *b"TAXL\x01\xe8\x03\0\0\x08\x12\x12\x01\x08\0\0";
     let configure = |configuration, lease_ms| Request::Configure { configuration, lease_ms };
@@ -146,7 +146,7 @@ fn about_settings() -> [(&'static str, Vec<u8>); 9] {
 }
 
 fn reports() -> Vec<Example> {
-    let readings_ohm = Floats::of(&OHM);
+    let readings_ohm = Floats::new(&OHM);
     let estimate = EstimateReport {
         frame: 300,
         start_us: START_US,
@@ -158,9 +158,9 @@ fn reports() -> Vec<Example> {
     };
     let novel = EstimateReport {
         flags: 128,
-        outputs: Floats::of(&[0.25, -1.0]),
+        outputs: Floats::new(&[0.25, -1.0]),
         novelty: Some(2.5),
-        deviation: Floats::of(&[0.03125, 0.5]),
+        deviation: Floats::new(&[0.03125, 0.5]),
         ..estimate
     };
     let health = HealthReport {

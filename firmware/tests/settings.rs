@@ -104,7 +104,7 @@ fn every_setting_survives_a_restart_and_can_be_forgotten() {
         let decode = |session: &mut TestSession<'_>, ohm: f32| {
             let mut frame = frame_at_rest();
             frame[1][2] = ohm;
-            let readings_ohm = Floats::of(frame.as_flattened());
+            let readings_ohm = Floats::new(frame.as_flattened());
             let request = Request::Decode { frame: 1, readings_ohm };
             ask(session, &bench.board, &request, |report| match report {
                 Report::Estimate(estimate) => estimate.flags,

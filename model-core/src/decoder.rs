@@ -107,7 +107,7 @@ impl<'a> RowNetwork<'a> {
     /// No network: whatever it is given is missing.
     const NONE: Self = Self::F32Direct(NetworkSection::EMPTY);
 
-    fn of(section: NetworkSection<'a>, shape: ModelShape) -> Result<Self, NetworkError> {
+    fn new(section: NetworkSection<'a>, shape: ModelShape) -> Result<Self, NetworkError> {
         match section.format() {
             Format::F32Direct => Ok(Self::F32Direct(section)),
             Format::F32 => section.packed(shape).map(Self::F32),
@@ -122,14 +122,14 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
     /// # Errors
     /// [`DecodeError`]: the blob is unsound, or has more rows than `ROWS`.
     pub fn load(blob: &'a [u8]) -> Result<Self, DecodeError> {
-        Self::of(Model::decode(blob)?)
+        Self::new(Model::decode(blob)?)
     }
 
     /// Makes a decoder of a model that has been parsed already.
     ///
     /// # Errors
     /// [`DecodeError::TooManyRows`]: the model has more rows than `ROWS`.
-    pub fn of(model: Model<'a>) -> Result<Self, DecodeError> {
+    pub fn new(model: Model<'a>) -> Result<Self, DecodeError> {
         let ModelShape { rows, .. } = model.shape();
         if rows > ROWS {
             return Err(DecodeError::TooManyRows { most: ROWS, found: rows });
@@ -140,7 +140,7 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
             let networks = model.network_count() as u8;
             let unknown = DecodeError::UnknownNetwork { row, network: networks, networks };
             let section = model.section_of_row(row).ok_or(unknown)?;
-            *place = RowNetwork::of(section, model.network_shape())
+            *place = RowNetwork::new(section, model.network_shape())
                 .map_err(|cause| DecodeError::Network { index: row as u8, cause })?;
         }
         Ok(Self { model, row_networks })

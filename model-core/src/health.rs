@@ -70,12 +70,12 @@ impl Health {
     /// let limits = Limits { shorted_below_ohm: 5.0, open_above_ohm: 500.0 };
     /// let mut frame = [60.0, 0.0, f32::INFINITY];
     /// let mut faulty_columns = [0];
-    /// let health = Health::of(&mut frame, 3, limits, &mut faulty_columns);
+    /// let health = Health::new(&mut frame, 3, limits, &mut faulty_columns);
     /// assert_eq!(faulty_columns, [0b110]);
     /// assert_eq!((health.missing, health.shorted, health.open), (0, 1, 1));
     /// assert!(frame[1].is_nan());
     /// ```
-    pub fn of(
+    pub fn new(
         frame: &mut [f32],
         columns: usize,
         limits: Limits,
@@ -131,7 +131,7 @@ mod tests {
         frame[2][8] = -1.0;
         let before = frame;
         let mut faulty_columns = [u32::MAX; 3];
-        let health = Health::of(frame.as_flattened_mut(), 32, LIMITS, &mut faulty_columns);
+        let health = Health::new(frame.as_flattened_mut(), 32, LIMITS, &mut faulty_columns);
         assert_eq!(faulty_columns, [1 << 31, 0, 1 | 1 << 7 | 1 << 8]);
         assert_eq!((health.missing, health.shorted, health.open), (1, 2, 1));
         assert!(!health.is_good());
@@ -146,21 +146,21 @@ mod tests {
     #[test]
     fn readings_on_the_limits_are_good() {
         let mut frame = [5.0, 500.0];
-        assert!(Health::of(&mut frame, 2, LIMITS, &mut [0]).is_good());
+        assert!(Health::new(&mut frame, 2, LIMITS, &mut [0]).is_good());
     }
 
     #[test]
     fn faults_without_a_bit_of_their_own_are_counted() {
         let mut frame = [f32::NAN; 80];
         let mut faulty_columns = [0];
-        let health = Health::of(&mut frame, 40, LIMITS, &mut faulty_columns);
+        let health = Health::new(&mut frame, 40, LIMITS, &mut faulty_columns);
         assert_eq!((health.missing, faulty_columns), (80, [u32::MAX]));
-        assert!(Health::of(&mut [], 0, LIMITS, &mut []).is_good());
+        assert!(Health::new(&mut [], 0, LIMITS, &mut []).is_good());
         let mut frame = [60.0; 40];
         frame[33] = 0.0;
         // The second word is of a row that this frame lacks.
         let mut faulty_columns = [7; 2];
-        let health = Health::of(&mut frame, 40, LIMITS, &mut faulty_columns);
+        let health = Health::new(&mut frame, 40, LIMITS, &mut faulty_columns);
         assert_eq!((health.shorted, faulty_columns), (1, [0; 2]));
     }
 }

@@ -22,7 +22,7 @@ const DECODER: [&str; 2] = ["--package", "model-core"];
 /// Builds model-core, and firmware where there are pins, for every core; prints one line each.
 pub fn run() -> Outcome {
     for (target, packages) in CORES {
-        let toolchain = Toolchain::of(target)?;
+        let toolchain = Toolchain::new(target)?;
         let mut build = toolchain.build();
         if target != TARGET {
             // Nothing runs: the compiler need not optimise `core`.

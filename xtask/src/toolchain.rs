@@ -55,11 +55,11 @@ impl fmt::Display for Toolchain {
 impl Toolchain {
     /// Finds a toolchain for the images' target.
     pub fn find() -> Outcome<Self> {
-        Self::of(TARGET)
+        Self::new(TARGET)
     }
 
     /// Finds the active toolchain if it has `target`, else Debian's.
-    pub fn of(target: &'static str) -> Outcome<Self> {
+    pub fn new(target: &'static str) -> Outcome<Self> {
         let library = first_line("rustc", &["--print", "target-libdir", "--target", target]);
         if library.is_some_and(|path| Path::new(&path).is_dir()) {
             return Ok(Self { target, source: Source::Active });

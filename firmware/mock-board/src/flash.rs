@@ -37,7 +37,7 @@ impl Torn {
         [Self::AnyBits, Self::ZerosFirst, Self::FewBits, Self::NearlyAll, Self::Weak, Self::Mixed];
 
     /// The kind of case number `seed`: they take turns.
-    pub fn of(seed: u64) -> Self {
+    pub fn new(seed: u64) -> Self {
         Self::ALL[(seed % Self::COUNT as u64) as usize]
     }
 
@@ -306,7 +306,7 @@ impl Flash {
         let is_early = supply.random.next_u32().is_multiple_of(2);
         let sparse = [1, 5, 9, 14][supply.below(4) as usize];
         let torn = match self.torn {
-            Torn::Mixed => Torn::of(supply.random.next_u64()),
+            Torn::Mixed => Torn::new(supply.random.next_u64()),
             torn => torn,
         };
         for (word, weak) in words.iter_mut().zip(weak) {

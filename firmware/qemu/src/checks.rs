@@ -82,7 +82,7 @@ impl<const R: usize> Decoded<R> {
     }
 
     /// What `decoder` makes of `frame`.
-    fn of(decoder: &Decoder<'_, R>, frame: &Frame<R>) -> Option<Self> {
+    fn new(decoder: &Decoder<'_, R>, frame: &Frame<R>) -> Option<Self> {
         let mut outcome = Self::NOTHING;
         outcome.decode::<Polynomial>(decoder, frame, None)?;
         Some(outcome)
@@ -212,7 +212,7 @@ pub fn clamping(blob: &[u8]) -> Option<[usize; 3]> {
                 f32::from_bits(reading.to_bits().wrapping_add_signed(step));
             let mut scaled = [0.0; COLS];
             network.scale(frame.get(row)?, &mut scaled).ok()?;
-            let found = Decoded::of(&decoder, &frame)?.clamped;
+            let found = Decoded::new(&decoder, &frame)?.clamped;
             frames += 1;
             clamped += usize::from(found);
             otherwise += usize::from(found != scaled.into_iter().any(saturates));
@@ -360,7 +360,7 @@ pub fn gating(blob: &[u8]) -> Option<[usize; 3]> {
     let mut baseline: Frame<ROWS> = [[f32::NAN; COLS]; ROWS];
     let readings = baseline.as_flattened_mut().iter_mut();
     readings.for_each(|ohm| *ohm = 60.0 + 5.0 * numbers.draw());
-    let rest = Decoded::of(&decoder, &baseline)?;
+    let rest = Decoded::new(&decoder, &baseline)?;
     // √18 as a number, because `core` has no square root.
     let most = [TOLERANCE, TOLERANCE / 4.242_640_7];
     let [mut at_rest, mut otherwise] = [0; 2];
@@ -370,7 +370,7 @@ pub fn gating(blob: &[u8]) -> Option<[usize; 3]> {
         rows.zip(&baseline).enumerate().for_each(|(row, (to, from))| {
             *to = nearly_at_rest(index * ROWS + row, from, most, &mut numbers);
         });
-        let ungated = Decoded::of(&decoder, &frame)?;
+        let ungated = Decoded::new(&decoder, &frame)?;
         let mut outcome = Decoded { outputs: [[f32::NAN; OUTPUTS]; ROWS], ..ungated };
         let outputs = rest.outputs.as_flattened();
         let rest_of_all =

@@ -305,7 +305,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         self.baseline.restart(self.wires.readings());
         self.baseline.add(self.frame);
         self.decode_baseline(model.decoder.as_ref());
-        let report = Report::Baseline { readings_ohm: Floats::of(self.baseline.mean()) };
+        let report = Report::Baseline { readings_ohm: Floats::new(self.baseline.mean()) };
         self.line.send(number, &report, &mut self.statistics);
         Ok(())
     }

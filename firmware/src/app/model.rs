@@ -33,7 +33,7 @@ impl<'a, const ROWS: usize> InForce<'a, ROWS> {
     ) -> Option<()> {
         let blob = blob_in_slot(bytes);
         let model = check(capacity, blob).ok()?;
-        let decoder = self.decoder.insert(Decoder::of(model).ok()?);
+        let decoder = self.decoder.insert(Decoder::new(model).ok()?);
         let (shape, metadata) = (decoder.shape(), decoder.metadata());
         let identity = ModelIdentity {
             crc_32: decoder.model_crc(),

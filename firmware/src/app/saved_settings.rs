@@ -130,7 +130,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                 }
                 let [low, high] = frames.to_le_bytes();
                 let head = [version, self.wires.rows as u8, self.wires.columns as u8, low, high];
-                let readings = Floats::of(self.baseline.mean()).0;
+                let readings = Floats::new(self.baseline.mean()).0;
                 keeper.keep(setting, &[&head, &constants_crc.to_le_bytes(), readings])
             }
         };

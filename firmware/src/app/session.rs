@@ -196,7 +196,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
 
         if self.configuration.send_readings {
             let readings = self.frame.get(..self.wires.readings()).unwrap_or_default();
-            let report = Report::Readings { frame, start_us, readings_ohm: Floats::of(readings) };
+            let report = Report::Readings { frame, start_us, readings_ohm: Floats::new(readings) };
             self.line.send(UNASKED, &report, &mut self.statistics);
         }
         let (mut flags, health) = self.decode(decoder);
@@ -235,7 +235,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             open_above_ohm: self.configuration.open_above_ohm,
         };
         let frame = self.frame.get_mut(..self.wires.readings()).unwrap_or_default();
-        let health = Health::of(frame, self.wires.columns, limits, &mut self.faulty_columns);
+        let health = Health::new(frame, self.wires.columns, limits, &mut self.faulty_columns);
         let mut flags = if health.is_good() { 0 } else { EstimateReport::FAULTY_READING };
         if let Some(decoder) = decoder {
             if !health.is_good() {
@@ -345,10 +345,10 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             };
         }
         let row_status = codes.get(..self.rows).unwrap_or_default();
-        let outputs = Floats::of(estimate.outputs);
+        let outputs = Floats::new(estimate.outputs);
         let with_deviations = novelty.is_some() && sent == ConfidenceSent::Deviations;
         let deviations = if with_deviations { self.outputs } else { 0 };
-        let deviation = Floats::of(self.deviations.get(..deviations).unwrap_or_default());
+        let deviation = Floats::new(self.deviations.get(..deviations).unwrap_or_default());
         let report =
             EstimateReport { frame, start_us, flags, row_status, outputs, novelty, deviation };
         self.line.send(number, &Report::Estimate(report), &mut self.statistics);
@@ -364,7 +364,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         if left == 0 {
             self.capture = None;
             self.decode_baseline(decoder);
-            let report = Report::Baseline { readings_ohm: Floats::of(self.baseline.mean()) };
+            let report = Report::Baseline { readings_ohm: Floats::new(self.baseline.mean()) };
             self.line.send(number, &report, &mut self.statistics);
         }
     }

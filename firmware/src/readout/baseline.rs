@@ -152,7 +152,7 @@ mod tests {
     fn a_kept_reading_that_means_nothing_is_missing() {
         let mut memory = [0.0; 3];
         let mut baseline = baseline(&mut memory);
-        baseline.restore(Floats::of(&[60.0, 0.0, -1.0]), 7);
+        baseline.restore(Floats::new(&[60.0, 0.0, -1.0]), 7);
         assert_eq!(
             baseline.mean().iter().map(|ohm| ohm.is_nan()).collect::<Vec<_>>(),
             [false, true, true]

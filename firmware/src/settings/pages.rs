@@ -117,7 +117,7 @@ struct Contents<'p> {
 
 impl<'p> Contents<'p> {
     /// Reads the page of these `bytes`; a page that is too short counts as empty.
-    fn of(bytes: &'p [u8]) -> Self {
+    fn new(bytes: &'p [u8]) -> Self {
         let page = bytes.get(..PAGE_BYTES).unwrap_or_default();
         let mut contents =
             Self { number: None, is_started: false, settings: [None; _], end: 0, is_firm: false };
@@ -155,7 +155,7 @@ fn used(page: &[u8]) -> usize {
 
 /// Index of the page in use, and what it holds.
 fn in_use<S: Slot>(pages: &[S; 2]) -> Option<(usize, Contents<'_>)> {
-    let [first, second] = pages.each_ref().map(|page| Contents::of(page.bytes()));
+    let [first, second] = pages.each_ref().map(|page| Contents::new(page.bytes()));
     match (first.number, second.number) {
         (Some(one), Some(other)) if other.wrapping_sub(one).cast_signed() > 0 => Some((1, second)),
         (Some(_), _) => Some((0, first)),
@@ -259,7 +259,7 @@ impl<S: Slot> SettingPages<S> {
     ) -> Result<(), KeepError> {
         let [old, new] = self.page_and_other(index);
         erase(new)?;
-        let contents = Contents::of(old.bytes());
+        let contents = Contents::new(old.bytes());
         for setting in Setting::ALL {
             let content = contents.content(setting);
             if Some(setting) == changed {

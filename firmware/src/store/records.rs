@@ -62,7 +62,7 @@ struct Record {
 
 impl Record {
     /// The record of the blob in `slot` at this place.
-    fn of(slot: &[u8], place: usize) -> Option<Self> {
+    fn new(slot: &[u8], place: usize) -> Option<Self> {
         let found = record_at(slot, place)?;
         let [_, generation, ..] = found.as_chunks::<4>().0 else { return None };
         let generation = u32::from_le_bytes(*generation);
@@ -98,7 +98,7 @@ pub fn reinstate<S: Slot>(slot: &mut S, generation: u32) -> Option<Result<(), Fl
 /// Uploaded models count from 1. Slot 0 may also hold a model whose record is erased, flashed together with the
 /// firmware: its generation is 0. Slot 1 holds only uploaded models.
 pub fn generation(index: usize, slot: &[u8]) -> Option<u32> {
-    let records = record_places(slot).filter_map(|place| Record::of(slot, place));
+    let records = record_places(slot).filter_map(|place| Record::new(slot, place));
     let newest = records.filter(|found| found.is_sound).map(|found| found.generation).max();
     let flashed = || {
         let (_, first) = slot.split_last_chunk::<RECORD_BYTES>()?;
@@ -114,14 +114,14 @@ pub fn missing_records<S: Slot>(slots: &[S; 2], in_force: usize) -> Option<u32> 
     let (chosen, other) = if in_force == 0 { (first, second) } else { (second, first) };
     let (chosen, other) = (chosen.bytes(), other.bytes());
     let generation = generation(in_force, chosen)?;
-    let records = record_places(other).filter_map(|place| Record::of(other, place));
+    let records = record_places(other).filter_map(|place| Record::new(other, place));
     let doubtful = records.filter(|found| !found.is_sound).map(|found| found.generation).max();
     if let Some(doubtful) = doubtful.filter(|doubtful| *doubtful >= generation) {
         return doubtful.checked_add(1);
     }
     let is_firm = record_pairs(chosen).any(|[first, second]| {
         let is_newest = |found: Record| found.is_sound && found.generation == generation;
-        Record::of(chosen, first).is_some_and(is_newest)
+        Record::new(chosen, first).is_some_and(is_newest)
             && record_at(chosen, second) != Some(&[0xFF; RECORD_BYTES])
     });
     // A model that was flashed with the firmware has no record.

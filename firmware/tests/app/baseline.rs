@@ -24,7 +24,7 @@ fn a_baseline_is_captured_and_contact_is_told_against_it() {
     }
     let all = reports(&board.pins.borrow().to_host);
     let baseline = &all.iter().find(|(number, _)| *number == 9).unwrap().1;
-    let rest = Floats::of(&[60.0, 61.0, 62.0, 63.0, 64.0, 65.0]);
+    let rest = Floats::new(&[60.0, 61.0, 62.0, 63.0, 64.0, 65.0]);
     assert_eq!(*baseline, format!("{:?}", Report::Baseline { readings_ohm: rest }));
 
     let rest = frame_at_rest();
@@ -96,7 +96,7 @@ fn a_frame_without_a_baseline_is_flagged_until_one_is_complete() {
     ask(&mut session, &board, &configure(quiet()), |_| ());
     assert_eq!(read(&mut session), decoded);
     // A baseline of no known reading is none.
-    let unknown = Request::SetBaseline { readings_ohm: Floats::of(&[f32::NAN; ROWS * COLS]) };
+    let unknown = Request::SetBaseline { readings_ohm: Floats::new(&[f32::NAN; ROWS * COLS]) };
     ask(&mut session, &board, &unknown, |_| ());
     assert_eq!(read(&mut session), without);
 }

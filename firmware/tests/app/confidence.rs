@@ -20,7 +20,7 @@ struct Sent {
 }
 
 impl Sent {
-    fn of(estimate: &EstimateReport<'_>) -> Self {
+    fn new(estimate: &EstimateReport<'_>) -> Self {
         Self {
             novel: estimate.flags & EstimateReport::NOVEL != 0,
             novelty: estimate.novelty.map(f32::to_bits),
@@ -44,10 +44,10 @@ fn expected(blob: &[u8], frame: &TestFrame, baseline_ohm: f32) -> Sent {
 
 /// Lets the device decode `frame`.
 fn decode(session: &mut TestSession<'_>, board: &Board, frame: &TestFrame) -> (Sent, u8) {
-    let readings_ohm = Floats::of(frame.as_flattened());
+    let readings_ohm = Floats::new(frame.as_flattened());
     let request = Request::Decode { frame: 5, readings_ohm };
     ask(session, board, &request, |report| match report {
-        Report::Estimate(estimate) => (Sent::of(&estimate), estimate.flags),
+        Report::Estimate(estimate) => (Sent::new(&estimate), estimate.flags),
         other => panic!("{other:?}"),
     })
     .0
@@ -67,7 +67,7 @@ fn scanned(session: &mut TestSession<'_>, board: &Board, confidence: ConfidenceS
     for byte in std::mem::take(&mut board.pins.borrow_mut().to_host) {
         if let Some(Received::Frame(bytes)) = receiver.push(byte) {
             match packet::decode::<Report<'_>>(bytes).expect("a whole report").body {
-                Report::Estimate(estimate) => found.push(Sent::of(&estimate)),
+                Report::Estimate(estimate) => found.push(Sent::new(&estimate)),
                 Report::Health(_) => {}
                 other => panic!("{other:?}"),
             }
@@ -183,7 +183,7 @@ fn rows_at_rest_have_deviations_all_the_same() {
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let rest = frame_at_rest();
-    let request = Request::SetBaseline { readings_ohm: Floats::of(rest.as_flattened()) };
+    let request = Request::SetBaseline { readings_ohm: Floats::new(rest.as_flattened()) };
     ask(&mut session, &board, &request, |_| ());
     let nearly = with_last(65.5);
     let (found, _) = decode(&mut session, &board, &nearly);
@@ -201,7 +201,7 @@ fn relative_inputs_need_a_baseline_for_a_confidence_too() {
     let (found, flags) = decode(&mut session, &board, &frame_at_rest());
     assert_eq!(flags, EstimateReport::NO_BASELINE);
     assert!(found.novelty.is_some_and(|novelty| f32::from_bits(novelty).is_nan()));
-    let request = Request::SetBaseline { readings_ohm: Floats::of(&[62.0; ROWS * COLS]) };
+    let request = Request::SetBaseline { readings_ohm: Floats::new(&[62.0; ROWS * COLS]) };
     ask(&mut session, &board, &request, |_| ());
     for (ohm, novel) in [(65.0, false), (900.0, true)] {
         let (found, _) = decode(&mut session, &board, &with_last(ohm));

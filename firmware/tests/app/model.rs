@@ -94,8 +94,8 @@ fn the_model_says_what_is_scanned_and_decoded() {
         let outputs = decoder.decode(readings).unwrap().outputs;
         let all = reports(&bench.board.pins.borrow().to_host);
         let found = |debug: String| all.iter().any(|(_, text)| text.contains(&debug));
-        assert!(found(format!("readings_ohm: {:?}", Floats::of(readings))), "{all:?}");
-        let row = format!("row_status: [0], outputs: {:?}", Floats::of(&outputs));
+        assert!(found(format!("readings_ohm: {:?}", Floats::new(readings))), "{all:?}");
+        let row = format!("row_status: [0], outputs: {:?}", Floats::new(&outputs));
         assert!(found(row), "{all:?}");
     }
 }
@@ -113,7 +113,7 @@ fn the_names_of_readings_say_which_rows_are_scanned() {
             assert_eq!(session.step(), None);
         }
         let all = reports(&bench.board.pins.borrow().to_host);
-        let expected = format!("readings_ohm: {:?}", Floats::of(&frame_at_rest()[row][..2]));
+        let expected = format!("readings_ohm: {:?}", Floats::new(&frame_at_rest()[row][..2]));
         assert!(all[0].1.contains(&expected), "{names}: {all:?}");
     }
     // One row of the model with the readings of both row-wires, in the other order.
@@ -128,7 +128,7 @@ fn the_names_of_readings_say_which_rows_are_scanned() {
         assert_eq!(session.step(), None);
     }
     let [first, second] = frame_at_rest();
-    let expected = format!("readings_ohm: {:?}", Floats::of(&[second, first].concat()));
+    let expected = format!("readings_ohm: {:?}", Floats::new(&[second, first].concat()));
     let all = reports(&bench.board.pins.borrow().to_host);
     assert!(all[0].1.contains(&expected), "{all:?}");
     let metadata =
@@ -150,12 +150,12 @@ fn a_model_of_other_rows_does_not_take_the_baseline_of_the_rows_before() {
         let mut bench = Bench::new(quiet());
         let board = bench.board.clone();
         let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-        let baseline = Request::SetBaseline { readings_ohm: Floats::of(&[60.0; 2]) };
+        let baseline = Request::SetBaseline { readings_ohm: Floats::new(&[60.0; 2]) };
         ask(&mut session, &board, &baseline, |_| ());
         let _ = session;
         upload(&mut bench, &mut slots, &mut [], &upload_steps(next, 64)).unwrap();
         let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-        let request = Request::Decode { frame: 1, readings_ohm: Floats::of(&[30.0; 2]) };
+        let request = Request::Decode { frame: 1, readings_ohm: Floats::new(&[30.0; 2]) };
         ask(&mut session, &board, &request, |report| match report {
             Report::Estimate(it) => assert_eq!(it.flags & EstimateReport::CONTACT, contact),
             other => panic!("{other:?}"),

@@ -33,7 +33,7 @@ pub fn decode(
     board: &Board,
     frame: &TestFrame,
 ) -> (u8, Vec<u8>, Vec<u32>) {
-    let readings_ohm = Floats::of(frame.as_flattened());
+    let readings_ohm = Floats::new(frame.as_flattened());
     let request = Request::Decode { frame: 5, readings_ohm };
     ask(session, board, &request, |report| match report {
         Report::Estimate(e) => {

@@ -30,7 +30,7 @@ use temporary::Temporary;
 /// [`Error::Write`] if the file cannot be written, or whatever error `write` returns.
 pub fn write_whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
     let error = |cause| Error::write(path, cause);
-    let stream: Box<dyn Write> = match Place::of(path).map_err(error)? {
+    let stream: Box<dyn Write> = match Place::new(path).map_err(error)? {
         Place::File(file) => {
             return temporary::put_in_place(vec![Temporary::written(file, write)?], &[]);
         }
@@ -55,7 +55,7 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
 /// # Errors
 /// [`Error::Write`] if `path` cannot be written, or [`Error::WrittenOverInput`] if it is an input.
 pub fn check_writable(path: &Path, inputs: &[&Path]) -> Result<()> {
-    let place = Place::of(path).map_err(|cause| Error::write(path, cause))?;
+    let place = Place::new(path).map_err(|cause| Error::write(path, cause))?;
     let real = match &place {
         Place::File(file) => &file.real,
         Place::Stdout => Path::new("/dev/stdout"),
@@ -75,7 +75,7 @@ pub fn check_writable(path: &Path, inputs: &[&Path]) -> Result<()> {
 
 /// Whether [`write_whole`] writes to the program's own stdout: `-`, `/dev/stdout`, or a link to it.
 pub fn is_stdout(path: &Path) -> bool {
-    matches!(Place::of(path), Ok(Place::Stdout))
+    matches!(Place::new(path), Ok(Place::Stdout))
 }
 
 /// Files of a folder that belong together: those of one run.

@@ -270,11 +270,11 @@ impl Experiment {
         world.noise.level = noise_level;
         if self.is_forward() {
             let noise_ohm = noise_ohm(&world, test_frames);
-            return (self.measure(), LimitSummary::of(&Err(Refusal::OwnNoise { noise_ohm })));
+            return (self.measure(), LimitSummary::new(&Err(Refusal::OwnNoise { noise_ohm })));
         }
         let frames = Reference::few_frames(&world).min(test_frames);
-        let limit = Reference::of(&world, frames, progress);
-        let summary = LimitSummary::of(&limit);
+        let limit = Reference::new(&world, frames, progress);
+        let summary = LimitSummary::new(&limit);
         (Measure { limit: limit.ok(), ..self.measure() }, summary)
     }
 

@@ -69,7 +69,7 @@ pub struct Split {
 impl Split {
     /// Splits `frames` into those to train on and those to judge by. `fold_of` gives the fold of each frame, if its
     /// user told it.
-    pub fn of(frames: &Dataset, fold_of: Option<&[usize]>, judged: Judged) -> Self {
+    pub fn new(frames: &Dataset, fold_of: Option<&[usize]>, judged: Judged) -> Self {
         let all = 0..frames.frames();
         let last_fold = fold_of.and_then(|folds| folds.iter().max());
         let (training, test): (Vec<usize>, Vec<usize>) = match (&judged, last_fold, fold_of) {
@@ -146,7 +146,7 @@ mod tests {
 
     #[test]
     fn the_last_fifth_is_held_out() {
-        let split = Split::of(&numbered(11), None, Judged::HeldOut);
+        let split = Split::new(&numbered(11), None, Judged::HeldOut);
         assert_eq!(split.training, (0..9).collect::<Vec<_>>());
         assert_eq!(
             (split.test.inputs.values, split.choice.as_str()),
@@ -156,7 +156,7 @@ mod tests {
 
     #[test]
     fn the_last_fold_is_held_out_where_folds_are_given() {
-        let split = Split::of(&numbered(5), Some(&[2, 0, 1, 2, 0]), Judged::HeldOut);
+        let split = Split::new(&numbered(5), Some(&[2, 0, 1, 2, 0]), Judged::HeldOut);
         assert_eq!(split.training, [1, 2, 4]);
         assert_eq!(
             (split.test.inputs.values, split.choice.as_str()),
@@ -167,9 +167,9 @@ mod tests {
     #[test]
     fn a_file_of_its_own_leaves_all_frames_to_train_on() {
         let judged = Judged::File { frames: numbered(3), name: "test.csv".into() };
-        let split = Split::of(&numbered(5), None, judged);
+        let split = Split::new(&numbered(5), None, judged);
         assert_eq!((split.training.len(), split.test.frames()), (5, 3));
         assert_eq!(split.choice, "all of test.csv");
-        assert_eq!(Split::of(&numbered(5), None, Judged::None).test.frames(), 0);
+        assert_eq!(Split::new(&numbered(5), None, Judged::None).test.frames(), 0);
     }
 }

@@ -97,7 +97,7 @@ pub struct LimitSummary {
 
 impl LimitSummary {
     /// Summary of `limit`, or of the reason why there is none.
-    pub fn of(limit: &Result<Reference, Refusal>) -> Self {
+    pub fn new(limit: &Result<Reference, Refusal>) -> Self {
         match limit {
             Ok(limit) => Self { frames: limit.frames(), groups: limit.limits(), refused: None },
             Err(refusal) => {

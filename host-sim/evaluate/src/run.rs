@@ -169,8 +169,8 @@ pub fn run(
         Some(at_rest) => Reference::Rest(at_rest),
         None => Reference::Median,
     };
-    let distribution = Distribution::of(&test.outputs, &estimate, &test.inputs, reference);
-    let verdict = Verdict::of(&decoders, &limit)
+    let distribution = Distribution::new(&test.outputs, &estimate, &test.inputs, reference);
+    let verdict = Verdict::new(&decoders, &limit)
         .of_blob(&blob, training.frames.frames())
         .of_frames(subject.measurements().map(|data| &data.outliers), test.frames())
         .with(Warning::out_of_range(network.share_out_of_range(&test.inputs.values)))
@@ -183,7 +183,7 @@ pub fn run(
         scene: None,
         data: None,
         model: model_summary(&training, (options, test.frames()), &network, &blob)?,
-        device_cost: DeviceCost::of(&blob)?,
+        device_cost: DeviceCost::new(&blob)?,
         decoders,
         limit,
         by_depth: by_depth(&test.outputs, &estimate.values, &measure),
@@ -221,7 +221,7 @@ fn readings_at_rest(subject: &Subject) -> Option<Vec<f64>> {
     match subject {
         Subject::Scene(scene) if scene.is_forward() => None,
         Subject::Scene(scene) => {
-            let at_rest = Synthesis::of(&scene.world).ideal().drift(None).untouched();
+            let at_rest = Synthesis::new(&scene.world).ideal().drift(None).untouched();
             Some(at_rest.readings_of(Stream::Test, 0))
         }
         Subject::Measured(data) => data.baseline().map(|baseline| baseline.values),
@@ -230,8 +230,8 @@ fn readings_at_rest(subject: &Subject) -> Option<Vec<f64>> {
 
 /// Changes of the readings of the shown frames without noise, ΔR/R₀ in per cent.
 fn ideal_changes(world: &World, shown: &Distribution) -> Vec<Vec<f64>> {
-    let ideal = Synthesis::of(world).ideal();
-    let untouched = Synthesis::of(world).ideal().untouched();
+    let ideal = Synthesis::new(world).ideal();
+    let untouched = Synthesis::new(world).ideal().untouched();
     let of_frame = |frame: usize| {
         let readings = ideal.readings_of(Stream::Test, frame);
         // The gain of the frame's session is in both, and cancels.
@@ -249,7 +249,7 @@ fn scene_summary(scene: &Experiment, shown: &Distribution) -> SceneSummary {
         gain_drift: world.drift.map_or(0.0, |drift| drift.gain),
         size_mm: world.sensor.size_mm,
         row_wires: world.sensor.row_wires,
-        sensor: SensorSketch::of(world),
+        sensor: SensorSketch::new(world),
         ideal_changes: if scene.is_forward() { vec![] } else { ideal_changes(world, shown) },
     }
 }
@@ -262,7 +262,7 @@ fn model_summary(
 ) -> Result<ModelSummary> {
     let model = prepared.model();
     let shape = model.shape();
-    let frames = Prices::accepted()?.frames(&Design::of(blob), Exponential::default())?;
+    let frames = Prices::accepted()?.frames(&Design::new(blob), Exponential::default())?;
     Ok(ModelSummary {
         training_frames: training.frames.frames(),
         test_frames,

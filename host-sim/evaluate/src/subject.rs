@@ -125,7 +125,7 @@ impl Subject {
     /// Synthesis of a scene's frames, with the noise that is left in the mean of so many samples a reading.
     fn synthesis(scene: &Experiment, samples_averaged: usize) -> Synthesis<'_> {
         let level = scene.world.noise.level / (samples_averaged as f64).sqrt();
-        Synthesis::of(&scene.world).noise_level(level)
+        Synthesis::new(&scene.world).noise_level(level)
     }
 
     /// Frames to train on, whose readings are means of so many samples. Measurements are as they are.
@@ -166,7 +166,7 @@ impl Subject {
                 let level = scene.world.noise.level / (samples_averaged as f64).sqrt();
                 scene.measure_beside_limit(level, scene.training.test_frames, progress)
             }
-            Self::Measured(data) => (data.measure(), LimitSummary::of(&Err(Refusal::Measured))),
+            Self::Measured(data) => (data.measure(), LimitSummary::new(&Err(Refusal::Measured))),
         }
     }
 }

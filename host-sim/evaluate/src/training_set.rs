@@ -186,6 +186,6 @@ impl<'s> TrainingSet<'s> {
 impl Experiment {
     /// Trains the model that the scene describes, like the command `train`.
     pub fn train(&self, progress: &dyn Progress) -> Result<ModelBlob> {
-        TrainingSet::of_scene(self, Synthesis::of(&self.world)).blob(&self.options(), progress)
+        TrainingSet::of_scene(self, Synthesis::new(&self.world)).blob(&self.options(), progress)
     }
 }

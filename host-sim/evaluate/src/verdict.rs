@@ -36,7 +36,7 @@ impl Verdict {
     /// and the `limit`. It warns of outputs without a gain over these.
     ///
     /// Without the mean among `decoders` there is nothing to compare with, and the sentence tells errors alone.
-    pub fn of(decoders: &[DecoderErrors], limit: &LimitSummary) -> Self {
+    pub fn new(decoders: &[DecoderErrors], limit: &LimitSummary) -> Self {
         let Some(model) = decoders.first() else {
             return Self { sentence: String::new(), warnings: vec![] };
         };

@@ -75,7 +75,7 @@ impl Density {
     /// Fits the density of the inputs of `dataset`, which has frames.
     pub fn fit(dataset: &Dataset, settings: &Settings) -> Self {
         let readings = dataset.inputs.names.len();
-        let features = Features::of(&dataset.inputs, settings.directions_of(readings));
+        let features = Features::new(&dataset.inputs, settings.directions_of(readings));
         let most = dataset.frames() / (FRAMES_A_FEATURE * features.count());
         let mixture = Mixture::fit(
             &features.apply(&dataset.inputs.values),

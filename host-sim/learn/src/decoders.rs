@@ -62,11 +62,11 @@ impl<D: RowDecoder + Send> Rows<D> {
     ) -> Self {
         let rows = (0..training.rows).into_par_iter();
         let decoders = rows.map(|row| fit(&training.row_table(row))).collect();
-        Self::of(name, training, decoders)
+        Self::new(name, training, decoders)
     }
 
     /// Joins decoders that were already fitted to the rows of `training`, in their order.
-    pub fn of(name: &'static str, training: &Dataset, decoders: Vec<D>) -> Self {
+    pub fn new(name: &'static str, training: &Dataset, decoders: Vec<D>) -> Self {
         Self { name, inputs: training.inputs.names.len() / training.rows.max(1), decoders }
     }
 }

@@ -46,9 +46,9 @@ pub struct Found {
 /// Faults in `readings` as they were scanned (Ω), by [`windows`]. A model's `fill` tells noise and wires that touch;
 /// without one, health alone counts. None are told of columns that are no [`Grid`] of wires.
 pub fn diagnose(readings: &Table, limits: Limits, fill: Option<Fill<'_>>) -> Vec<Found> {
-    let Some(grid) = Grid::of(&readings.names) else { return vec![] };
+    let Some(grid) = Grid::new(&readings.names) else { return vec![] };
     let count = readings.names.len();
-    let expected = fill.filter(|fill| fill.readings() == count).map(Expected::of);
+    let expected = fill.filter(|fill| fill.readings() == count).map(Expected::new);
     let found: Vec<(usize, Vec<WireFault>)> = windows(readings.len())
         .into_par_iter()
         .map(|window| {

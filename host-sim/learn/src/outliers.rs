@@ -89,14 +89,14 @@ pub fn find(dataset: &Dataset, line_number: impl Fn(usize) -> u64) -> Outliers {
     let frames = dataset.frames();
     let tables = [&dataset.inputs, &dataset.outputs];
     let mut columns = tables.map(|table| -> Vec<Column> {
-        (0..table.names.len()).map(|c| Column::of(values(table, c))).collect()
+        (0..table.names.len()).map(|c| Column::new(values(table, c))).collect()
     });
     // A rare event is all that such an output tells.
     for output in columns[1].iter_mut().filter(|it| it.usual[0].total_cmp(&it.usual[1]).is_eq()) {
         output.usual = [f64::NEG_INFINITY, f64::INFINITY];
     }
     let pressed =
-        [0, 1].map(|t| Pressed::of(tables[t], &columns[t], tables[1 - t], &columns[1 - t]));
+        [0, 1].map(|t| Pressed::new(tables[t], &columns[t], tables[1 - t], &columns[1 - t]));
     let confirmed = confirmed(tables, &columns);
     let mut found = Vec::new();
     let (mut kept, mut lines) = (Vec::with_capacity(frames), 0);
@@ -170,7 +170,7 @@ fn values(table: &Table, column: usize) -> Vec<f64> {
 
 impl Column {
     /// Column of values in ascending order.
-    fn of(mut values: Vec<f64>) -> Self {
+    fn new(mut values: Vec<f64>) -> Self {
         let count = values.len();
         if count < LEAST_LINES {
             let usual = [f64::NEG_INFINITY, f64::INFINITY];
@@ -196,7 +196,7 @@ struct Pressed {
 
 impl Pressed {
     /// Presses that `other` shows, and the distances of `table` in them.
-    fn of(table: &Table, columns: &[Column], other: &Table, of_other: &[Column]) -> Self {
+    fn new(table: &Table, columns: &[Column], other: &Table, of_other: &[Column]) -> Self {
         let moved = |frame: usize| {
             let mut values = line(other, frame).iter().zip(of_other);
             values.any(|(v, column)| column.rest.is_some_and(|rest| is_outside(*v, rest)))

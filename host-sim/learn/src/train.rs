@@ -195,7 +195,7 @@ pub struct InputScale {
 
 impl InputScale {
     /// Scale of a table's inputs, rounded to the numbers that the blob holds.
-    pub fn of(table: &RowTable) -> Self {
+    pub fn new(table: &RowTable) -> Self {
         // Ranges of the readings in f32, as the device has them.
         let ranges: Vec<[f32; 2]> =
             table.input_ranges().iter().map(|range| range.map(|v| v as f32)).collect();
@@ -238,7 +238,7 @@ struct CentredScale {
 }
 
 impl CentredScale {
-    fn of(table: &RowTable) -> Self {
+    fn new(table: &RowTable) -> Self {
         let range = |range: [f64; 2]| range.map(|v| f64::from(v as f32));
         let ranges = || table.input_ranges().into_iter().map(range);
         let per_unit = |[low, high]: [f64; 2]| {
@@ -282,7 +282,7 @@ pub struct Samples<'b> {
 impl<'b> Samples<'b> {
     /// Scales the inputs of `table` to [0, 1].
     pub fn new(table: &'b RowTable) -> Self {
-        let scale = InputScale::of(table);
+        let scale = InputScale::new(table);
         Self { scaled: scale.apply(&table.inputs.values), scale, table }
     }
 

@@ -73,7 +73,7 @@ fn variant(world: &World, change: String, sensor: Sensor) -> Variant {
     let world = World { sensor, read_rows, ..world.clone() };
     let found = match world.check() {
         Err(bad) => Err(format!("{}: {}", bad.value, bad.rule)),
-        Ok(()) => observability(&world, &Prior::of(&world), &world.read_rows)
+        Ok(()) => observability(&world, &Prior::new(&world), &world.read_rows)
             .map_err(|refusal| refusal.to_string()),
     };
     let refused = found.as_ref().err().cloned();

@@ -73,8 +73,8 @@ pub struct Prior {
 
 impl Prior {
     /// Moments of the deformations that `world` draws.
-    pub fn of(world: &World) -> Self {
-        let synthesis = Synthesis::of(world).ideal().drift(None);
+    pub fn new(world: &World) -> Self {
+        let synthesis = Synthesis::new(world).ideal().drift(None);
         let frames = synthesis.outputs(Outputs::all_deformations());
         let deformation_mm = frames.frames(Stream::Span, PRIOR_FRAMES).outputs;
         let (mean_mm, n) = (deformation_mm.means(), deformation_mm.names.len());
@@ -119,7 +119,7 @@ pub fn observability(
         .map(|row| world.read_rows.iter().position(|read| read == row).expect("a row that is read"))
         .collect();
     let n = places.len() * of_row;
-    let spans_ohm = Synthesis::of(world).noise_span_ohm();
+    let spans_ohm = Synthesis::new(world).noise_span_ohm();
     let mut slopes = DMatrix::zeros(places.len() * columns, n);
     let mut precisions = Vec::with_capacity(places.len() * columns);
     for (block, (&row, place)) in row_wires.iter().zip(&places).enumerate() {
@@ -204,7 +204,7 @@ mod tests {
     use crate::reference::Reference;
 
     fn of_rows(world: &World, rows: &[usize]) -> Observability {
-        observability(world, &Prior::of(world), rows).unwrap()
+        observability(world, &Prior::new(world), rows).unwrap()
     }
 
     #[test]
@@ -228,7 +228,7 @@ mod tests {
     fn where_the_sensor_is_nearly_linear_the_prediction_is_the_limit() {
         let mut world = World { read_rows: vec![3], ..World::paper() };
         world.noise.level = 0.02;
-        let limits = Reference::of(&world, 40, &Silent).unwrap().limits();
+        let limits = Reference::new(&world, 40, &Silent).unwrap().limits();
         for (limit, predicted) in limits.iter().zip(of_rows(&world, &[3]).axes) {
             let ratio = predicted.rmse_mm / limit.limit;
             assert!((0.9..1.1).contains(&ratio), "{limit:?} {predicted:?}");

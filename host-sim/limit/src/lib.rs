@@ -11,7 +11,7 @@
 //! use taxel_simulate::World;
 //!
 //! let world = World { read_rows: vec![3], ..World::press() }; // one row-wire
-//! let reference = Reference::of(&world, 100, &Silent)?;
+//! let reference = Reference::new(&world, 100, &Silent)?;
 //! let z = &reference.limits()[2];
 //! assert!((z.limit - 0.0456).abs() < 3.0 * z.limit_standard_error.hypot(0.0016), "{} mm", z.limit);
 //! # Ok::<(), taxel_limit::Refusal>(())

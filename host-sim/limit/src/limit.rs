@@ -64,7 +64,7 @@ impl Limit {
     ///
     /// # Errors
     /// [`Refusal`] for a world with something that is not modelled, or without noise.
-    pub fn of(world: &World) -> Result<Self, Refusal> {
+    pub fn new(world: &World) -> Result<Self, Refusal> {
         let motion = &world.motion;
         let rubber::Kind::Elastic(_) = world.rubber;
         if world.drift.is_some() {
@@ -81,7 +81,7 @@ impl Limit {
         if latents > MOST_LATENTS {
             return Err(Refusal::TooManyLatents { latents, most: MOST_LATENTS });
         }
-        let spans_ohm = Synthesis::of(world).noise_span_ohm();
+        let spans_ohm = Synthesis::new(world).noise_span_ohm();
         let deviations_ohm: Vec<f64> =
             spans_ohm.iter().map(|span| (world.noise.level * span).max(1e-12)).collect();
         let groups = world.read_rows.chunks(together).enumerate().map(|(place, rows)| {
@@ -152,7 +152,7 @@ impl Limit {
         for ideal_ohm in prior.ideal_ohm.chunks_exact(rows.readings()) {
             start.log_likelihood.extend(rows.log_likelihood(readings_ohm, ideal_ohm));
         }
-        let effort = Effort::of(rows.latents());
+        let effort = Effort::new(rows.latents());
         let samples = sample(&frame, start, &effort, &mut random, &mut memory);
         let moments = moments(&frame, &samples, &mut memory);
         posterior.effective.extend(std::iter::repeat_n(moments.effective, moments.mean.len()));

@@ -31,7 +31,7 @@ pub struct Effort {
 
 impl Effort {
     /// Effort for so many `latents`: a covariance needs several samples for each.
-    pub fn of(latents: usize) -> Self {
+    pub fn new(latents: usize) -> Self {
         let round = (25 * latents * latents).max(1024).next_multiple_of(LANES);
         let fitted = (10 * latents / 3).max(10) as f64;
         Self { round, fitted, wanted: 100.0, rounds: 40 }

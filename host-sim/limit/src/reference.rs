@@ -93,12 +93,12 @@ impl Reference {
     ///
     /// # Errors
     /// [`Refusal`] for a world that is not modelled, or if the sample does not carry the figures.
-    pub fn of(world: &World, frames: usize, progress: &dyn Progress) -> Result<Self, Refusal> {
-        let limit = Limit::of(world)?;
-        let frames = Synthesis::of(world).frames(Stream::Test, frames);
+    pub fn new(world: &World, frames: usize, progress: &dyn Progress) -> Result<Self, Refusal> {
+        let limit = Limit::new(world)?;
+        let frames = Synthesis::new(world).frames(Stream::Test, frames);
         let posteriors = limit.posteriors(&frames.inputs.values, progress);
         let apart = if world.motion.has_independent_rows() { world.read_rows.len() } else { 1 };
-        let drawn = Synthesis::of(world).ideal().frames(Stream::Span, PRIOR_FRAMES).outputs;
+        let drawn = Synthesis::new(world).ideal().frames(Stream::Span, PRIOR_FRAMES).outputs;
         let squares = drawn.squared_errors(&drawn.means().repeat(PRIOR_FRAMES));
         let prior_variance = squares.iter().map(|sum| sum / PRIOR_FRAMES as f64).collect();
         let reference = Self { truth: frames.outputs, posteriors, prior_variance, apart };

@@ -59,9 +59,9 @@ impl CircuitConstants {
         Constants {
             reference_v: self.reference_v,
             drive_v: self.drive_v,
-            row_source_ohm: Floats::of(&self.row_source_ohm),
-            feedback_ohm: Floats::of(&self.feedback_ohm),
-            series_ohm: Floats::of(&self.series_ohm),
+            row_source_ohm: Floats::new(&self.row_source_ohm),
+            feedback_ohm: Floats::new(&self.feedback_ohm),
+            series_ohm: Floats::new(&self.series_ohm),
         }
     }
 }
@@ -85,7 +85,7 @@ pub struct Differences {
 
 impl Differences {
     /// Differences of these pairs of known and read conductances.
-    fn of(pairs: impl Iterator<Item = (f64, f64)>) -> Self {
+    fn new(pairs: impl Iterator<Item = (f64, f64)>) -> Self {
         let (mut count, mut squares, mut largest) = (0, 0.0, 0.0_f64);
         for (known, read) in pairs.filter(|(known, _)| *known > 0.0) {
             let difference = known / read - 1.0;
@@ -200,7 +200,7 @@ pub fn fit(before: &CircuitConstants, wires: Wires, arrangements: &[Arrangement]
     }
 
     let read_again = arrangements.iter().map(|a| convert(before, &constants, wires, &a.read_s));
-    let after = Differences::of(
+    let after = Differences::new(
         arrangements
             .iter()
             .zip(read_again)
@@ -220,7 +220,7 @@ pub fn fit(before: &CircuitConstants, wires: Wires, arrangements: &[Arrangement]
         columns: columns.len(),
         row_source_error_ohm: largest(columns.len()..unknowns),
         feedback_error: largest(0..columns.len()),
-        before: Differences::of(pairs.map(|(known, read)| (*known, *read))),
+        before: Differences::new(pairs.map(|(known, read)| (*known, *read))),
         after,
     })
 }

@@ -276,7 +276,7 @@ impl<W: Wire> Device<W> {
 
     /// Gives the device a baseline in Ω, one number a reading of its model.
     pub fn set_baseline(&mut self, baseline_ohm: &[f32]) -> Result<()> {
-        let request = Request::SetBaseline { readings_ohm: Floats::of(baseline_ohm) };
+        let request = Request::SetBaseline { readings_ohm: Floats::new(baseline_ohm) };
         self.ask_plainly(&request, |report| matches!(report, Report::Baseline { .. }).then_some(()))
     }
 

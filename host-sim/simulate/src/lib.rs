@@ -9,7 +9,7 @@
 //! use taxel_simulate::{Synthesis, World};
 //!
 //! let world = World::press();
-//! let frames = Synthesis::of(&world).ideal().frames(Stream::Test, 3);
+//! let frames = Synthesis::new(&world).ideal().frames(Stream::Test, 3);
 //! assert_eq!((frames.inputs.names.len(), frames.frames()), (8 * 18, 3));
 //! assert_eq!(frames.outputs.names[2], "r1e1_dz_mm");
 //! ```

@@ -39,12 +39,12 @@ pub struct Synthesis<'w> {
 /// Synthesises `frames` of `stream`: noisy readings in Ω and true outputs, of the rows and axes that
 /// `world` asks for.
 pub fn synthesise(world: &World, stream: Stream, frames: usize) -> Dataset {
-    Synthesis::of(world).frames(stream, frames)
+    Synthesis::new(world).frames(stream, frames)
 }
 
 impl<'w> Synthesis<'w> {
     /// Synthesis with all settings of `world`.
-    pub fn of(world: &'w World) -> Self {
+    pub fn new(world: &'w World) -> Self {
         Self {
             world,
             noise: world.noise,

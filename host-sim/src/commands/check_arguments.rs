@@ -149,7 +149,7 @@ impl CheckArguments {
         let path = self.model.as_deref().unwrap_or(Path::new(&self.source));
         let baseline_ohm = if metadata.relative_inputs && self.baseline.baseline.is_none() {
             // All frames are of one session, which does not drift.
-            let session = Synthesis::of(&scene.world).drift(None);
+            let session = Synthesis::new(&scene.world).drift(None);
             Some(session.baselines(Stream::Test, 1, BASELINE_FRAMES).values)
         } else {
             self.baseline_ohm(metadata, path)?

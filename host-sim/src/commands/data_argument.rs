@@ -180,7 +180,7 @@ impl DataArguments {
         let given_folds =
             self.fold_column.as_ref().map(|name| folds_from(&file, name, &lines)).transpose()?;
         let split =
-            Split::of(&frames, given_folds.as_deref(), self.judged(judged, &frames, file.digest)?);
+            Split::new(&frames, given_folds.as_deref(), self.judged(judged, &frames, file.digest)?);
         if split.training.is_empty() {
             let message = "holding out frames leaves none to train on: give more, or --test FILE";
             return Err(Error::Unfit { path: path.into(), message: message.into() });

@@ -134,7 +134,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let of = |decoder: &str, errors| DecoderErrors { decoder: decoder.into(), errors };
     let mean_errors = metrics::by_group(&truth, &means, &measure);
     let decoders = vec![of("network", errors), of("mean", mean_errors)];
-    let verdict = Verdict::of(&decoders, &LimitSummary::of(&Err(Refusal::Measured)))
+    let verdict = Verdict::new(&decoders, &LimitSummary::new(&Err(Refusal::Measured)))
         .of_frames(None, frames_evaluated)
         .with(Warning::trained_on(same_file))
         .with(Warning::out_of_range(model.share_out_of_range(&readings.values)));
@@ -159,7 +159,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if let Some(html) = &arguments.html {
         let at_rest = arguments.baseline.values(metadata, &arguments.model, fields, limits)?;
         let reference = at_rest.as_deref().map_or(Reference::Median, Reference::Rest);
-        let distribution = Distribution::of(&truth, &estimate, &readings, reference);
+        let distribution = Distribution::new(&truth, &estimate, &readings, reference);
         let page = page_of(arguments, &blob, &summary, &distribution)?;
         output::write_bytes(html, page.as_bytes())?;
     }
@@ -183,7 +183,7 @@ fn text_of(summary: &Summary) -> print::Page {
         summary.decoders.iter().map(|it| (it.decoder.as_str(), it.errors.as_slice())).collect();
     print::errors(&mut page, &decoders);
     print::errors_legend(&mut page);
-    page.line(LimitSummary::of(&Err(Refusal::Measured)).note());
+    page.line(LimitSummary::new(&Err(Refusal::Measured)).note());
     print::by_depth(&mut page, &summary.by_depth);
     if let Some(percent) = summary.percent_novel {
         page.line("");
@@ -202,7 +202,7 @@ fn page_of(
     summary: &Summary,
     distribution: &Distribution,
 ) -> Result<String> {
-    let limit = LimitSummary::of(&Err(Refusal::Measured));
+    let limit = LimitSummary::new(&Err(Refusal::Measured));
     let model = blob.parse();
     let name_of = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let [model_file, data_file] = [&arguments.model, &arguments.data].map(|path| name_of(path));
@@ -226,7 +226,7 @@ fn page_of(
         title: format!("{model_file} on {data_file}"),
         facts,
         verdict: &summary.verdict,
-        device: &DeviceCost::of(blob)?,
+        device: &DeviceCost::new(blob)?,
         decoders: &summary.decoders,
         limit: &limit,
         by_depth: &summary.by_depth,

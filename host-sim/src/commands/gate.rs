@@ -71,7 +71,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let (frame_cycles, flash_frame_cycles) = if let Some(frames) = given {
         (frames, None)
     } else {
-        let frames = Prices::accepted()?.frames(&Design::of(&blob), Exponential::default())?;
+        let frames = Prices::accepted()?.frames(&Design::new(&blob), Exponential::default())?;
         (frames.map(|cost| cost.cycles), Some(frames.map(|cost| cost.flash_cycles)))
     };
     let settings = Settings {
@@ -127,7 +127,7 @@ fn check(arguments: &Arguments, subject: &Subject, numbers: [usize; 2]) -> Resul
                     return Err(Error::Usage(message));
                 }
             }
-            gate::Rest::of(data, &arguments.k).map_err(|bad| of_option(bad, &OPTIONS))?;
+            gate::Rest::new(data, &arguments.k).map_err(|bad| of_option(bad, &OPTIONS))?;
             Ok(())
         }
     }

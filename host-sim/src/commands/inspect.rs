@@ -114,7 +114,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 }
 
 fn summarise(blob: &ModelBlob) -> Result<Summary> {
-    let (model, design) = (blob.parse(), Design::of(blob));
+    let (model, design) = (blob.parse(), Design::new(blob));
     let (shape, metadata) = (model.shape(), model.metadata());
     let networks = model.networks().map(|network| NetworkSummary {
         format: network.format().name(),
@@ -124,7 +124,7 @@ fn summarise(blob: &ModelBlob) -> Result<Summary> {
     });
     let column =
         |(name, unit): (&str, &str)| ColumnSummary { name: name.into(), unit: unit.into() };
-    let ram = DecoderRam::of(&design);
+    let ram = DecoderRam::new(&design);
     Ok(Summary {
         subject: metadata.name.into(),
         format_version: model_core::blob::FORMAT_VERSION,

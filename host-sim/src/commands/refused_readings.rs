@@ -19,7 +19,7 @@ const FRAMES_OF_SCENE: usize = 200;
 pub fn note_scene(subject: &Subject) {
     if let Some(scene) = subject.scene() {
         let frames = scene.training.frames.min(FRAMES_OF_SCENE);
-        let readings = Synthesis::of(&scene.world).frames(Stream::Training, frames).inputs;
+        let readings = Synthesis::new(&scene.world).frames(Stream::Training, frames).inputs;
         note(&readings, &format!("scene {}", scene.name));
     }
 }

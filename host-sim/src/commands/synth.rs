@@ -58,7 +58,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         let message = format!("--scale {}: give a positive number, such as 1.02", arguments.scale);
         return Err(Error::Usage(message));
     }
-    let mut synthesis = Synthesis::of(&scene.world);
+    let mut synthesis = Synthesis::new(&scene.world);
     if arguments.untouched {
         synthesis = synthesis.untouched();
     }

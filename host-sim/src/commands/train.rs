@@ -203,7 +203,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         fill: model.fill().is_some(),
         formats: model.networks().map(|n| n.format().name()).collect(),
         outputs: model_outputs::of(&model),
-        worth: Worth::of(&subject, &set, &blob, selection.as_ref()),
+        worth: Worth::new(&subject, &set, &blob, selection.as_ref()),
         selection,
         learning_curve,
         outliers: match recursion {

@@ -74,7 +74,7 @@ fn tables(groups: &[&str], frames: usize) -> [Values; 3] {
 
 fn distribution(groups: &[&str]) -> Distribution {
     let [truth, estimate, readings] = tables(groups, 20);
-    Distribution::of(&truth, &estimate, &readings, Reference::Rest(&[50.0; 2 * ROW_WIRES]))
+    Distribution::new(&truth, &estimate, &readings, Reference::Rest(&[50.0; 2 * ROW_WIRES]))
 }
 
 fn sensor() -> SensorSketch {
@@ -100,7 +100,7 @@ fn result(groups: &[&str]) -> RunResult {
         largest_positional_percent: None,
     };
     let column = |noise_level| Column {
-        limit: LimitSummary::of(&Err(Refusal::Drift)),
+        limit: LimitSummary::new(&Err(Refusal::Drift)),
         noise_level,
         decoders: vec![
             entry("mean", None, 0.3),
@@ -165,7 +165,7 @@ fn result(groups: &[&str]) -> RunResult {
                 errors: of_groups(groups, rmse),
             })
             .to_vec(),
-        limit: LimitSummary::of(&Err(Refusal::Drift)),
+        limit: LimitSummary::new(&Err(Refusal::Drift)),
         by_depth: vec![],
         by_row: (0..ROW_WIRES)
             .map(|row| RowErrors { row_wire: row + 2, errors: of_groups(groups, 0.1) })
@@ -316,7 +316,7 @@ fn outputs_of_no_electrode_have_a_table_and_places_are_drawn() {
         let estimate = truth.iter().enumerate().map(|(i, truth)| truth + i as f64).collect();
         let [truth, estimate] =
             [truth, estimate].map(|values| Values { names: names.clone(), values });
-        let distribution = Distribution::of(&truth, &estimate, readings, Reference::Median);
+        let distribution = Distribution::new(&truth, &estimate, readings, Reference::Median);
         super::view_html(&view(&distribution, &result, &made()))
     };
     let page = of(&["contact_x_mm", "contact_y_mm", "contact_depth_mm"], &readings);

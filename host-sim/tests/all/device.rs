@@ -154,10 +154,10 @@ fn requests(new: &ModelBlob) -> Vec<(Vec<u8>, usize)> {
     add(&Request::Configuration);
     let readings = frames();
     for (frame, readings_ohm) in (0..).zip(readings.iter().cycle().take(40)) {
-        let readings_ohm = Floats::of(readings_ohm.as_flattened());
+        let readings_ohm = Floats::new(readings_ohm.as_flattened());
         add(&Request::Decode { frame, readings_ohm });
     }
-    add(&Request::Decode { frame: 40, readings_ohm: Floats::of(&[60.0; 7]) });
+    add(&Request::Decode { frame: 40, readings_ohm: Floats::new(&[60.0; 7]) });
     add(&Request::Upload(UploadStep::Chunk { offset: 0, bytes: &[1; 8] }));
     add(&Request::Upload(upload::begin(new.bytes())));
     for (index, bytes) in new.bytes().chunks(512).enumerate() {
@@ -165,7 +165,7 @@ fn requests(new: &ModelBlob) -> Vec<(Vec<u8>, usize)> {
     }
     add(&Request::Upload(UploadStep::Try { seal: None }));
     add(&Request::Identify);
-    let again = Floats::of(readings[0].as_flattened());
+    let again = Floats::new(readings[0].as_flattened());
     add(&Request::Decode { frame: 41, readings_ohm: again });
     // Garbage, with zeros within it and at its end.
     let garbage: Vec<u8> = (0..40_000_u32).map(|n| (n * n / 7) as u8).chain([0]).collect();
@@ -278,7 +278,7 @@ fn a_device_divides_by_its_baseline_as_the_host_does() {
             table.values.iter_mut().for_each(|ohm| *ohm *= 1.02);
             table
         };
-        let session = Synthesis::of(&scene.world);
+        let session = Synthesis::new(&scene.world);
         let baseline_ohm = Some(drifted(session.baselines(Stream::Test, 1, 100)).values);
         let frames = Frames { readings: drifted(frames_of(50).readings), baseline_ohm };
         let plan =

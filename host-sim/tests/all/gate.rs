@@ -53,7 +53,7 @@ fn press_loses_little_accuracy_and_saves_half_of_the_rows() {
     let blob = scene.train(&Silent).unwrap();
     let model = blob.prepare(Exponential::default());
     let prices = Prices::accepted().unwrap();
-    let frames = prices.frames(&Design::of(&blob), Exponential::default()).unwrap();
+    let frames = prices.frames(&Design::new(&blob), Exponential::default()).unwrap();
     let settings = Settings {
         k: vec![3.0, 3.5],
         frames: 4000,

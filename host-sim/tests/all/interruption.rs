@@ -371,7 +371,7 @@ fn liar(frames: &'static [(u32, u64, usize)]) -> String {
             send(request.number, &Report::Configuration { configuration, lease_left_ms: 1 });
             for (frame, start_us, readings) in frames.iter().take(if scans { 9 } else { 0 }) {
                 let readings = vec![60.0; *readings];
-                let readings_ohm = Floats::of(&readings);
+                let readings_ohm = Floats::new(&readings);
                 let (frame, start_us) = (*frame, *start_us);
                 send(packet::UNASKED, &Report::Readings { frame, start_us, readings_ohm });
             }

@@ -98,9 +98,9 @@ fn errors_are_given_beside_the_limit_and_its_own_ratio_is_one() {
     let world = &experiment.world;
     let (measure, summary) = experiment.measure_beside_limit(world.noise.level, 60, &Silent);
     assert_eq!((summary.frames, summary.refused.as_ref()), (60, None));
-    let test = Synthesis::of(world).frames(Stream::Test, 60);
-    let training = Synthesis::of(world).frames(Stream::Training, 2000);
-    let own = metrics::judge(&Limit::of(world).unwrap(), &test, &measure);
+    let test = Synthesis::new(world).frames(Stream::Test, 60);
+    let training = Synthesis::new(world).frames(Stream::Training, 2000);
+    let own = metrics::judge(&Limit::new(world).unwrap(), &test, &measure);
     for (errors, limit) in own.errors.iter().zip(&summary.groups) {
         assert_eq!(errors.ratio_to_limit, Some(1.0));
         let off = (errors.rmse - limit.rmse).abs();

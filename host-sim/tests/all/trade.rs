@@ -129,7 +129,7 @@ fn the_chosen_point_is_the_cheapest_and_its_blob_is_what_the_table_says() {
     let point = &trade.points[place];
     let model = ModelBlob::of_bytes(trade.blob(place)).unwrap();
     assert_eq!(model.bytes().len(), point.blob_bytes);
-    let frames = Synthesis::of(&scene.world).noise_level(scene.world.noise.level / 4.0);
+    let frames = Synthesis::new(&scene.world).noise_level(scene.world.noise.level / 4.0);
     let test = frames.frames(Stream::Test, scene.training.test_frames);
     let estimate = model.prepare(Exponential::Polynomial).decode_table(&test.inputs);
     let errors = test.outputs.squared_errors(&estimate.values);
@@ -155,7 +155,7 @@ fn behind_a_gate_points_have_the_errors_of_the_gates_rows_and_cost_their_share()
         assert_eq!(point.name(), format!("{}, gate k = 3.5", without.name()));
         let blob = ModelBlob::of_bytes(trade.blob(i)).unwrap();
         let model = blob.prepare(Exponential::default());
-        let frames = prices.frames(&Design::of(&blob), Exponential::default()).unwrap();
+        let frames = prices.frames(&Design::new(&blob), Exponential::default()).unwrap();
         let settings = Settings {
             k: vec![k],
             frames: scene.training.test_frames,

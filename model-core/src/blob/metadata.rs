@@ -44,7 +44,7 @@ pub struct Floats<'a>(#[serde(borrow)] pub &'a [u8]);
 
 impl<'a> Floats<'a> {
     /// The bytes of `numbers`, where they lie.
-    pub fn of(numbers: &'a [f32]) -> Self {
+    pub fn new(numbers: &'a [f32]) -> Self {
         Self(bytemuck::cast_slice(numbers))
     }
 

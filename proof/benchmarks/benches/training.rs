@@ -55,7 +55,7 @@ fn leave(name: &str, values: &[f64]) {
 fn training(criterion: &mut Criterion) {
     let (table, test) = (samples(Stream::Training, FRAMES), samples(Stream::Test, TEST_FRAMES));
     let inputs = table.inputs.names.len();
-    let scale = InputScale::of(&table);
+    let scale = InputScale::new(&table);
     let scaled = scale.apply(&table.inputs.values);
     let start = kmeans::plus_plus(&scaled, inputs, CENTRES, &mut random());
     let found = kmeans::refine(&scaled, inputs, &start, &SEARCH);
@@ -96,7 +96,7 @@ fn solvers(criterion: &mut Criterion) {
     const SAMPLES: usize = 20_000;
     let table = samples(Stream::Training, SAMPLES);
     let (inputs, outputs) = (table.inputs.names.len(), table.outputs.names.len());
-    let scaled = InputScale::of(&table).apply(&table.inputs.values);
+    let scaled = InputScale::new(&table).apply(&table.inputs.values);
     let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
     let mut group = criterion.benchmark_group("solvers");
     group.sample_size(10).throughput(Throughput::Elements(SAMPLES as u64));

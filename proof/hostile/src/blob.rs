@@ -47,7 +47,7 @@ pub fn check(body: &[u8], is_planted: bool) -> bool {
         return false;
     };
     look_at(&model);
-    let Ok(decoder) = Decoder::<ROWS>::of(model) else { return true };
+    let Ok(decoder) = Decoder::<ROWS>::new(model) else { return true };
     let shape = model.shape();
     let (readings, outputs) = (shape.rows * shape.inputs, shape.rows * shape.outputs);
     if readings > MOST_NUMBERS || outputs > MOST_NUMBERS {

@@ -18,7 +18,7 @@ pub fn check(bytes: &[u8], is_planted: bool) -> bool {
     if upper * lower > MOST_NODES {
         return true;
     }
-    let mut frames = Synthesis::of(world).ideal().frames(Stream::Training, 2);
+    let mut frames = Synthesis::new(world).ideal().frames(Stream::Training, 2);
     if is_planted {
         frames.inputs.values[0] = -frames.inputs.values[0];
     }

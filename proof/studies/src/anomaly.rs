@@ -84,12 +84,12 @@ pub fn frames(world: &World, anomaly: Anomaly, frames: usize) -> Option<Anomalou
         let motion::Kind::Press(press) = &world.motion else { return None };
         two_contacts(world, press, frames)
     } else {
-        let moved = Synthesis::of(world).all_rows().outputs(Outputs::all_deformations());
+        let moved = Synthesis::new(world).all_rows().outputs(Outputs::all_deformations());
         let moved = moved.drift(None).ideal().frames(Stream::Anomaly, frames);
         (moved.outputs.values, vec![])
     };
     let of_frame = sensor.upper_electrodes_mm.len() * 3;
-    let span_ohm = Synthesis::of(world).noise_span_ohm();
+    let span_ohm = Synthesis::new(world).noise_span_ohm();
     let readings_ohm = deformations_mm
         .par_chunks_exact(of_frame)
         .enumerate()
@@ -246,7 +246,7 @@ mod tests {
 
     #[test]
     fn usual_frames_are_those_of_synthesis() {
-        let synthesised = Synthesis::of(&ideal()).frames(Stream::Anomaly, 40).inputs.values;
+        let synthesised = Synthesis::new(&ideal()).frames(Stream::Anomaly, 40).inputs.values;
         for (found, of) in readings(Anomaly::None).iter().zip(synthesised) {
             assert!((found / of - 1.0).abs() < 1e-12, "{found} {of}");
         }

@@ -86,11 +86,11 @@ impl<'w> Equations<'w> {
     ///
     /// `noise_level` is the relative deviation of readings from the equations; with noise relative to the span, in spans.
     pub fn damped(world: &'w World, noise_level: f64) -> Self {
-        let (prior, of_row) = (Prior::of(world), 3 * world.sensor.electrodes_per_row_wire);
+        let (prior, of_row) = (Prior::new(world), 3 * world.sensor.electrodes_per_row_wire);
         let rows = (0..world.read_rows.len()).map(|place| prior.of_row(place, of_row));
         let damping = Damping {
             noise_level,
-            spans_ohm: Synthesis::of(world).noise_span_ohm(),
+            spans_ohm: Synthesis::new(world).noise_span_ohm(),
             rows: rows.collect(),
         };
         Self { name: DAMPED, world, model: world, damping: Some(damping) }
@@ -263,7 +263,7 @@ mod tests {
         // Row 3 lies 0.375 mm from the middle between two lower electrodes.
         let world = World { read_rows: vec![2], ..World::paper() };
         let equations = Equations::exact(&world);
-        let frames = Synthesis::of(&world).ideal().frames(Stream::Test, 200);
+        let frames = Synthesis::new(&world).ideal().frames(Stream::Test, 200);
         let rest = equations.determinant(0, &[0.0; 18]).unwrap();
         let turned = frames
             .outputs
@@ -276,7 +276,7 @@ mod tests {
     #[test]
     fn noise_ruins_the_exact_solution_and_not_the_damped_one() {
         let world = World { read_rows: vec![3], ..World::press() };
-        let frames = Synthesis::of(&world).frames(Stream::Test, 60);
+        let frames = Synthesis::new(&world).frames(Stream::Test, 60);
         let rmse = |decoder: &Equations<'_>| {
             let estimates = decoder.decode(&mut (), &frames.inputs.values).values;
             let squares = frames.outputs.squared_errors(&estimates);

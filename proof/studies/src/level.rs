@@ -52,7 +52,7 @@ pub(super) fn check(experiment: &Experiment, frames: usize) -> std::result::Resu
 impl NoiseLevel {
     /// Sets `experiment` to a noise level, with so many test `frames`. The limit is left out, for the reason in
     /// `no_limit`, where a larger level had none.
-    pub fn of(
+    pub fn new(
         experiment: &Experiment,
         noise_level: f64,
         frames: usize,
@@ -75,7 +75,7 @@ impl NoiseLevel {
         if no_limit.is_none() {
             no_limit.clone_from(&limit.refused);
         }
-        let test = scene.dataset(&Synthesis::of(&scene.world), Stream::Test, frames);
+        let test = scene.dataset(&Synthesis::new(&scene.world), Stream::Test, frames);
         Self { scene, test, measure, limit }
     }
 
@@ -111,7 +111,7 @@ pub(super) fn train<'s>(
     scene: &'s Experiment,
     progress: &dyn Progress,
 ) -> Result<(TrainingSet<'s>, ModelBlob)> {
-    let set = TrainingSet::of_scene(scene, Synthesis::of(&scene.world));
+    let set = TrainingSet::of_scene(scene, Synthesis::new(&scene.world));
     let blob = set.blob(&scene.options(), progress)?;
     Ok((set, blob))
 }

@@ -186,7 +186,7 @@ mod tests {
     fn a_blob_has_the_design_that_was_drawn() {
         for design in [random(30, USUAL, 1), random(30, TELLING, 2)].concat() {
             let blob = ModelBlob::of_bytes(&blob(&design).unwrap()).unwrap();
-            let found = Design { weights_in_ram: design.weights_in_ram, ..Design::of(&blob) };
+            let found = Design { weights_in_ram: design.weights_in_ram, ..Design::new(&blob) };
             assert_eq!(found, design);
         }
     }

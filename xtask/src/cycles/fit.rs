@@ -180,7 +180,7 @@ fn all(cost: &Cost) -> [u64; 3] {
 pub fn compare(path: &Path, image: &Image, json: bool) -> Outcome {
     let blob = ModelBlob::read(path).map_err(|cause| cause.to_string())?;
     let measured = image.run(path)?;
-    let frames = frames(&Design::of(&blob), &measured);
+    let frames = frames(&Design::new(&blob), &measured);
     let predicted = predicted(&frames)?;
     if !frames.iter().any(|frame| frame.gating == Gating::AtRest) {
         eprintln!(

@@ -50,7 +50,7 @@ pub struct Model {
 pub fn train(directory: &Path) -> Outcome<Vec<Model>> {
     fs::create_dir_all(directory).map_err(|cause| cause.to_string())?;
     let world = World::press();
-    let dataset = Synthesis::of(&world).noise_level(NOISE).frames(Stream::Training, FRAMES);
+    let dataset = Synthesis::new(&world).noise_level(NOISE).frames(Stream::Training, FRAMES);
     let origin = Origin::of_data("press", 0, world.seed, &dataset);
     let mut wanted = Vec::new();
     for format in Format::ALL {

@@ -34,7 +34,7 @@ struct Case {
 impl Case {
     fn new(seed: u64, planted: bool) -> Self {
         let supply = Supply::new(seed);
-        let mut flash = Flash::erased(Flash::KEY_BYTES / 4, &supply, Torn::of(seed));
+        let mut flash = Flash::erased(Flash::KEY_BYTES / 4, &supply, Torn::new(seed));
         flash.swings = true;
         if (seed / Torn::COUNT as u64).is_multiple_of(3) {
             // An older program's code, which must be erased.

@@ -44,7 +44,7 @@ struct Case {
 
 impl Case {
     fn new(job: Job, seed: u64, planted: bool) -> Self {
-        let torn = Torn::of(seed);
+        let torn = Torn::new(seed);
         let device = device(seed, torn);
         Self { job, seed, torn, device, planted, new: blob(2, 2), next: blob(7, 1), cuts: 0 }
     }

@@ -27,8 +27,8 @@ struct Attack {
 fn attack(seed: u64, key: &Key) -> Attack {
     let mut genuine = blob(2, 4).to_vec();
     let place = (seed / KINDS) as usize;
-    let seal = |version, blob: &[u8]| Some(Seal::of(key, version, blob));
-    let good = Seal::of(key, VERSION + 1, &genuine);
+    let seal = |version, blob: &[u8]| Some(Seal::new(key, version, blob));
+    let good = Seal::new(key, VERSION + 1, &genuine);
     let (mut lost, mut named) = (0, Some(SealFault::Forged));
     let outdated = Some(SealFault::Outdated { highest: VERSION });
     let seal = match seed % KINDS {
@@ -65,7 +65,7 @@ fn attack(seed: u64, key: &Key) -> Attack {
         6 => {
             let mut other = *key;
             other[place % KEY_BYTES] ^= 1 << (place / KEY_BYTES % 8);
-            Some(Seal::of(&other, VERSION + 1, &genuine))
+            Some(Seal::new(&other, VERSION + 1, &genuine))
         }
         7 => {
             named = Some(SealFault::Missing);
@@ -91,13 +91,13 @@ pub fn forge(seed: u64, planted: bool) -> Result<f64, String> {
     device.key = Flash::with_key(&key);
     let first = blob(1, 3);
     let genuine = |device: &mut Device, version, blob: &[u8]| {
-        let taken = device.install(blob, Some(Seal::of(&key, version, blob)));
+        let taken = device.install(blob, Some(Seal::new(&key, version, blob)));
         if taken == confirmed(blob) { Ok(()) } else { Err(format!("a genuine model: {taken:?}")) }
     };
     genuine(&mut device, VERSION, &first)?;
     let mut attack = attack(seed, &key);
     if planted {
-        attack.seal = Some(Seal::of(&key, VERSION + 1, &attack.blob));
+        attack.seal = Some(Seal::new(&key, VERSION + 1, &attack.blob));
     }
     let mut steps = confirmed_steps(&attack.blob, attack.seal);
     let chunks = steps.len() - 2;

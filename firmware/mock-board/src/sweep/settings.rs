@@ -46,7 +46,7 @@ impl Case {
     /// to an exchange.
     fn new(seed: u64, planted: bool) -> Result<Self, String> {
         let supply = Supply::new(seed);
-        let torn = Torn::of(seed);
+        let torn = Torn::new(seed);
         let page = || Flash::erased(PAGE_BYTES / 4, &supply, torn);
         let settings = SharedSettings::in_pages([page(), page()]);
         let random = Xoshiro256PlusPlus::seed_from_u64(seed);

@@ -115,7 +115,7 @@ pub fn measure(model: &Model<'_>, frame: &[f32], arena: &mut Arena) {
 #[inline(never)] // frees the stack that building the decoder needs
 fn bench<'a>(model: &Model<'a>, frame: &'a [f32], arena: &mut Arena) -> Bench<'a> {
     let shape = model.shape();
-    let decoder = unwrap!(Decoder::of(*model).ok(), "the model has too many rows");
+    let decoder = unwrap!(Decoder::new(*model).ok(), "the model has too many rows");
     let far_baseline = arena.take(frame.len());
     far_baseline.copy_from_slice(frame);
     let rows = far_baseline.chunks_exact_mut(shape.inputs).rev();

@@ -43,7 +43,7 @@ pub(super) fn parse_array(path: &Path, bytes: &[u8]) -> Result<DataFile> {
 pub(super) fn parse_archive(path: &Path, bytes: &[u8]) -> Result<DataFile> {
     let mut archive = ZipArchive::new(Cursor::new(bytes))
         .map_err(|cause| unusable(path, format!("not a .npz file: {cause}")))?;
-    let outline = Outline::of(path, &mut archive, bytes.len())?;
+    let outline = Outline::new(path, &mut archive, bytes.len())?;
     let width = outline.header.len();
     let mut values = vec![0.0; outline.lines * width];
     let mut first = 0;
@@ -68,7 +68,7 @@ struct Outline {
 
 impl Outline {
     /// Reads the headers of an archive of so many `bytes`.
-    fn of(path: &Path, archive: &mut ZipArchive<Cursor<&[u8]>>, bytes: usize) -> Result<Self> {
+    fn new(path: &Path, archive: &mut ZipArchive<Cursor<&[u8]>>, bytes: usize) -> Result<Self> {
         let most = bytes.saturating_mul(MOST_VALUES_A_BYTE).clamp(FEW_VALUES, MOST_VALUES);
         let (mut outline, mut count) = (Self { arrays: vec![], lines: 0, header: vec![] }, 0);
         let mut known = HashSet::new();

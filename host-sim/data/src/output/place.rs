@@ -33,7 +33,7 @@ pub struct Target {
 
 impl Place {
     /// Place of `path`. A link is followed, even to where nothing is yet.
-    pub fn of(path: &Path) -> io::Result<Self> {
+    pub fn new(path: &Path) -> io::Result<Self> {
         let refused = |why| Err(io::Error::new(ErrorKind::PermissionDenied, why));
         let mut real = path.to_path_buf();
         for _ in 0..MOST_LINKS {
@@ -75,7 +75,7 @@ impl Place {
 
 /// File that `path` leads to.
 pub fn file(path: &Path) -> Result<Target> {
-    match Place::of(path) {
+    match Place::new(path) {
         Ok(Place::File(target)) => Ok(target),
         Ok(_) => Err(Error::write(path, io::Error::other("it is no file"))),
         Err(cause) => Err(Error::write(path, cause)),

@@ -41,7 +41,7 @@ struct Judged {
 }
 
 impl Covered {
-    fn of(judged: &[Judged]) -> Self {
+    fn new(judged: &[Judged]) -> Self {
         let count = judged.len();
         let share = |within: &dyn Fn(&Judged) -> bool| {
             100.0 * judged.iter().filter(|one| within(one)).count() as f64 / count as f64
@@ -86,9 +86,9 @@ pub fn coverage(
         (!all.is_empty()).then(|| Coverage {
             group: (*group).into(),
             unit: columns::unit_of(&truth.names[members[0]]).into(),
-            all: Covered::of(&all),
-            surest_quarter: Covered::of(&all[..quarter]),
-            least_sure_quarter: Covered::of(&all[all.len() - quarter..]),
+            all: Covered::new(&all),
+            surest_quarter: Covered::new(&all[..quarter]),
+            least_sure_quarter: Covered::new(&all[all.len() - quarter..]),
         })
     };
     columns::groups(&truth.names).iter().filter_map(of_group).collect()

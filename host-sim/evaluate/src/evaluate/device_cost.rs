@@ -32,15 +32,15 @@ pub struct DeviceCost {
 
 impl DeviceCost {
     /// Cost of the model in `blob`, by the price list in the repository.
-    pub fn of(blob: &ModelBlob) -> Result<Self> {
-        let design = Design::of(blob);
+    pub fn new(blob: &ModelBlob) -> Result<Self> {
+        let design = Design::new(blob);
         let frame = Prices::accepted()?.frames(&design, Exponential::default())?.ungated;
         let blob_bytes = blob.bytes().len();
         Ok(Self {
             cycles: frame.cycles,
             flash_cycles: frame.flash_cycles,
             flash_us: frame.flash_cycles as f64 / CLOCK_MHZ,
-            ram_bytes: DecoderRam::of(&design).bytes(),
+            ram_bytes: DecoderRam::new(&design).bytes(),
             weights_in_ram: design.weights_in_ram,
             blob_bytes,
             slot_bytes: SLOT_BYTES,

@@ -68,7 +68,12 @@ impl Distribution {
     ///
     /// # Panics
     /// If the tables differ in their number of lines, or the first two in that of columns.
-    pub fn of(truth: &Table, estimate: &Table, readings: &Table, reference: Reference<'_>) -> Self {
+    pub fn new(
+        truth: &Table,
+        estimate: &Table,
+        readings: &Table,
+        reference: Reference<'_>,
+    ) -> Self {
         assert_eq!(truth.values.len(), estimate.values.len(), "an estimate for every truth");
         assert_eq!(truth.len(), readings.len(), "readings for every truth");
         let groups = columns::groups(&truth.names);
@@ -117,7 +122,7 @@ fn group(name: &str, columns: &[usize], truth: &Table, estimate: &Table) -> Grou
         median: at(0.5),
         percentile_95: at(0.95),
         largest: at(1.0),
-        histogram: Histogram::of(&errors, at(0.95)),
+        histogram: Histogram::new(&errors, at(0.95)),
         density: Density::of(&all),
     }
 }
@@ -175,7 +180,7 @@ mod tests {
     fn percentiles_outputs_and_frames_by_hand() {
         let [mut truth, estimate, readings] = hundred();
         truth.values[1] = f64::NAN; // one pair of frame 0 is missing
-        let found = Distribution::of(&truth, &estimate, &readings, Reference::Rest(&[50.0]));
+        let found = Distribution::new(&truth, &estimate, &readings, Reference::Rest(&[50.0]));
         let [z] = &found.groups[..] else { panic!("one group") };
         assert_eq!((z.group.as_str(), z.unit.as_str(), z.count), ("dz_mm", "mm", 199));
         let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} {b}");
@@ -198,7 +203,7 @@ mod tests {
     fn without_any_pair_there_is_nothing_to_show() {
         let [truth, mut estimate, readings] = hundred();
         estimate.values.fill(f64::NAN);
-        let found = Distribution::of(&truth, &estimate, &readings, Reference::Median);
+        let found = Distribution::new(&truth, &estimate, &readings, Reference::Median);
         assert!(found.frames.is_empty() && found.groups[0].median.is_nan());
         assert_eq!(found.groups[0].histogram.counts.iter().sum::<usize>(), 0);
     }
@@ -210,7 +215,7 @@ mod tests {
         let truth = table(&names, vec![0.0, 0.00, 10.0, 0.02, 20.0, 0.04]);
         let estimate = table(&names, vec![0.0, 0.00, 10.5, 0.02, 20.0, 0.06]);
         let readings = table(&["a", "b"], vec![1.0, -2.0, 2.0, 0.0, 3.0, 2.0]);
-        let found = Distribution::of(&truth, &estimate, &readings, Reference::Median);
+        let found = Distribution::new(&truth, &estimate, &readings, Reference::Median);
         let frames: Vec<_> = found.frames.iter().map(|f| f.frame).collect();
         assert_eq!(frames, [1, 2], "the worst is also the one at 95 %");
         assert_eq!(found.frames[1].rank, Rank::Worst);

@@ -51,7 +51,7 @@ pub struct Point {
 
 impl LearningCurve {
     /// Curve of `learned` errors of outputs with these `names`, whose standard deviations are `deviations`.
-    pub fn of(
+    pub fn new(
         judged_on: LearnedOn,
         learned: &[Learned],
         names: &[String],

@@ -108,7 +108,7 @@ pub struct Figures {
 }
 
 impl Figures {
-    fn of(row_wires: &[usize], reference: &std::result::Result<Reference, Refusal>) -> Self {
+    fn new(row_wires: &[usize], reference: &std::result::Result<Reference, Refusal>) -> Self {
         Self {
             row_wires: row_wires.iter().map(|row| row + 1).collect(),
             groups: reference.as_ref().map_or(Vec::new(), Reference::limits),
@@ -129,7 +129,7 @@ pub fn compute(
 ) -> Result<LimitResult> {
     let world = &experiment.world;
     plan.models.iter().try_for_each(|model| model.check(world))?;
-    let prior = Prior::of(world);
+    let prior = Prior::new(world);
     let levels = plan.noise_levels.iter().map(|noise_level| {
         let mut experiment = experiment.clone();
         experiment.world.set_noise_level(*noise_level)?;
@@ -168,17 +168,17 @@ fn level(
     };
     let observability = seen(&world.read_rows)?;
     let by_row = world.read_rows.iter().map(|row| seen(&[*row])).collect::<Result<_>>()?;
-    let all = Reference::of(world, frames, progress);
-    let mut limits = vec![Figures::of(&world.read_rows, &all)];
+    let all = Reference::new(world, frames, progress);
+    let mut limits = vec![Figures::new(&world.read_rows, &all)];
     let width = world.output_names().len() / world.read_rows.len();
     for (place, &row) in world.read_rows.iter().enumerate().filter(|_| world.read_rows.len() > 1) {
         // A row that moves by itself is known from its own readings alone.
         let own = if world.motion.has_independent_rows() {
             all.as_ref().map(|all| all.columns(place * width, width)).map_err(Clone::clone)
         } else {
-            Reference::of(&World { read_rows: vec![row], ..world.clone() }, frames, progress)
+            Reference::new(&World { read_rows: vec![row], ..world.clone() }, frames, progress)
         };
-        limits.push(Figures::of(&[row], &own));
+        limits.push(Figures::new(&[row], &own));
     }
     let measure = Measure { limit: all.ok(), ..experiment.measure() };
     let decoders = plan.models.iter().map(|model| judge(model, experiment, frames, &measure));
@@ -196,7 +196,7 @@ fn judge(
     let decoder = model.blob.prepare(Exponential::default()).of_inputs();
     let mut experiment = experiment.clone();
     experiment.training.relative_inputs = decoder.model().metadata().relative_inputs;
-    let test = experiment.dataset(&Synthesis::of(&experiment.world), Stream::Test, frames);
+    let test = experiment.dataset(&Synthesis::new(&experiment.world), Stream::Test, frames);
     DecoderErrors {
         decoder: model.file.display().to_string(),
         ..metrics::judge(&decoder, &test, measure)

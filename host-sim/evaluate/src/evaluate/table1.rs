@@ -114,7 +114,7 @@ pub fn compute(experiment: &Experiment, progress: &dyn Progress) -> Result<Table
     })?;
     let on_training = settings.open.is_some_and(|open| open.judged_on == JudgedOn::Training);
     let columns = settings.noise_levels.iter().map(|&level| {
-        let frames = Synthesis::of(&experiment.world).noise_level(level);
+        let frames = Synthesis::new(&experiment.world).noise_level(level);
         let training = experiment.dataset(&frames, Stream::Training, settings.frames);
         let (test, (measure, limit)) = if on_training {
             (training.clone(), (experiment.measure(), no_limit_on_training()))
@@ -261,10 +261,10 @@ where
     let mut decoders: Vec<Spread> = baselines.collect();
     for (place, &spread) in settings.spreads.iter().enumerate() {
         let networks = rows.iter().map(|row| row.networks[place].clone()).collect();
-        decoders.push((Some(spread), Box::new(Rows::of(NETWORK, training, networks))));
+        decoders.push((Some(spread), Box::new(Rows::new(NETWORK, training, networks))));
         let standard: Option<Vec<S>> = rows.iter().map(|row| row.standard[place].clone()).collect();
         if let Some(standard) = standard {
-            let standard = Rows::of(standard::NAME, training, standard);
+            let standard = Rows::new(standard::NAME, training, standard);
             decoders.push((Some(spread), Box::new(standard)));
         }
     }

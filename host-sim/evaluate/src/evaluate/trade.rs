@@ -153,7 +153,7 @@ impl Trade {
         let groups = limit.map_or(vec![], |limit| limit.groups.clone());
         let groups = groups.into_iter().filter(|limit| limit.group == self.group).collect();
         let limit = LimitSummary { frames: 0, groups, refused: None };
-        let verdict = Verdict::of(&decoders, &limit);
+        let verdict = Verdict::new(&decoders, &limit);
         match ModelBlob::of_bytes(self.blob(point)) {
             Ok(blob) => verdict.of_blob(&blob, self.training_frames),
             Err(_) => verdict,
@@ -203,7 +203,7 @@ pub fn compute(
     let arrays = kinds(subject);
     progress.stage("prepare frames", plan.samples_averaged.len());
     let synthesised = plan.samples_averaged.iter().map(|&samples| {
-        let frames = Frames::of(subject, samples, arrays, plan);
+        let frames = Frames::new(subject, samples, arrays, plan);
         progress.step();
         frames
     });
@@ -314,7 +314,7 @@ fn check(subject: &Subject, plan: &Plan) -> std::result::Result<(), BadValue> {
     let gates = match subject {
         // Averaging only lowers the noise.
         Subject::Scene(scene) => gate::check(&scene.world, &plan.gate_k),
-        Subject::Measured(data) => gate::Rest::of(data, &plan.gate_k).map(|_| ()),
+        Subject::Measured(data) => gate::Rest::new(data, &plan.gate_k).map(|_| ()),
     };
     gates.map_err(|bad| if bad.field == "k" { bad.named("gate") } else { bad })
 }

@@ -56,7 +56,7 @@ pub struct Worth {
 impl Worth {
     /// Worth of the model in `blob`, trained on `set` of `subject`. A `selection` of
     /// its options has errors on held-out folds.
-    pub fn of(
+    pub fn new(
         subject: &Subject,
         set: &TrainingSet<'_>,
         blob: &ModelBlob,
@@ -66,15 +66,15 @@ impl Worth {
             (Some(selection), _) => (JudgedOn::HeldOutFolds, on_folds(selection, set)),
             (None, Subject::Scene(scene)) => {
                 let frames = scene.training.test_frames.min(FRESH_FRAMES);
-                let test = scene.dataset(&Synthesis::of(&scene.world), Stream::Test, frames);
+                let test = scene.dataset(&Synthesis::new(&scene.world), Stream::Test, frames);
                 (JudgedOn::FreshFrames, on_frames(blob, set, &test, &scene.measure()))
             }
             (None, Subject::Measured(data)) => {
                 (JudgedOn::TrainingFrames, on_frames(blob, set, &set.frames, &data.measure()))
             }
         };
-        let no_limit = LimitSummary::of(&Err(Refusal::Measured));
-        let verdict = Verdict::of(&decoders, &no_limit)
+        let no_limit = LimitSummary::new(&Err(Refusal::Measured));
+        let verdict = Verdict::new(&decoders, &no_limit)
             .of_blob(blob, set.frames.frames())
             .of_frames(subject.measurements().map(|data| &data.outliers), set.frames.frames())
             .with(

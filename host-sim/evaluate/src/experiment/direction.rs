@@ -42,7 +42,7 @@ impl Experiment {
         if !self.is_forward() {
             return self.world.full_scales();
         }
-        let readings = Synthesis::of(&self.world).ideal().frames(Stream::Span, SPAN_FRAMES).inputs;
+        let readings = Synthesis::new(&self.world).ideal().frames(Stream::Span, SPAN_FRAMES).inputs;
         readings.ranges().into_iter().map(|[low, high]| high - low).collect()
     }
 
@@ -80,7 +80,7 @@ impl Experiment {
 /// Root mean square in Ω of the noise on the readings of so many test `frames`.
 pub(super) fn noise_ohm(world: &World, frames: usize) -> f64 {
     let of = |synthesis: Synthesis<'_>| synthesis.frames(Stream::Test, frames).inputs;
-    let (noisy, ideal) = (of(Synthesis::of(world)), of(Synthesis::of(world).ideal()));
+    let (noisy, ideal) = (of(Synthesis::new(world)), of(Synthesis::new(world).ideal()));
     let squares: f64 = noisy.squared_errors(&ideal.values).iter().sum();
     (squares / noisy.values.len() as f64).sqrt()
 }

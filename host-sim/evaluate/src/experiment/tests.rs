@@ -130,7 +130,7 @@ fn electrodes_and_frames_whose_computing_takes_hours_are_refused() {
     let large = one.replace(&wires(1000), &wires(20));
     let scene = Experiment::parse("test", &large).unwrap();
     // Laid out in linear time: a second where a look at all pairs takes many.
-    let frames = Synthesis::of(&scene.world).frames(Stream::Test, 1);
+    let frames = Synthesis::new(&scene.world).frames(Stream::Test, 1);
     assert!(frames.inputs.values.iter().all(|reading| *reading > 0.0));
 }
 

@@ -27,7 +27,7 @@ pub struct RowWire {
 
 impl SensorSketch {
     /// Sketch of the sensor of `world`; `None` for one with too many electrodes to draw.
-    pub fn of(world: &World) -> Option<Self> {
+    pub fn new(world: &World) -> Option<Self> {
         let sensor = &world.sensor;
         let count = sensor.upper_electrodes_mm.len() + sensor.lower_electrodes_mm.len();
         let plan = |electrodes: &[[f64; 3]]| electrodes.iter().map(|[x, y, _]| [*x, *y]).collect();

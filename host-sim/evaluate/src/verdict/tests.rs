@@ -31,7 +31,7 @@ fn decoders(of: &[(&str, &[(&str, f64)])]) -> Vec<DecoderErrors> {
 fn an_output_that_only_rounding_changes_has_nothing_to_decode() {
     let mut decoders = decoders(&[("network", &[("y", 1e-17)]), ("mean", &[("y", 1e-17)])]);
     decoders[1].errors[0].r_squared = None;
-    let sentence = Verdict::of(&decoders, &no_limit()).sentence;
+    let sentence = Verdict::new(&decoders, &no_limit()).sentence;
     assert!(sentence.starts_with("y does not change"), "{sentence}");
 }
 
@@ -54,7 +54,7 @@ fn a_good_model_is_told_beside_mean_and_linear() {
         ("mean", &[("dz_mm", 0.152)]),
         ("linear", &[("dz_mm", 0.060)]),
     ]);
-    let verdict = Verdict::of(&all, &no_limit());
+    let verdict = Verdict::new(&all, &no_limit());
     assert_eq!(
         verdict.sentence,
         "The model decodes dz_mm to 0.0470 mm: 69 % below always predicting the mean, and 22 % below the best linear \
@@ -78,7 +78,7 @@ fn the_limit_is_named_where_it_is_known() {
         monte_carlo_share: 0.01,
     }];
     let limit = LimitSummary { frames: 10, groups, refused: None };
-    let sentence = Verdict::of(&all, &limit).sentence;
+    let sentence = Verdict::new(&all, &limit).sentence;
     assert!(sentence.ends_with("That is 1.50 times the least possible error."), "{sentence}");
 }
 
@@ -88,7 +88,7 @@ fn outputs_that_are_hardly_decoded_are_told_apart() {
         ("network", &[("dx_mm", 0.030), ("dz_mm", 0.047)]),
         ("mean", &[("dx_mm", 0.035), ("dz_mm", 0.152)]),
     ]);
-    let verdict = Verdict::of(&all, &no_limit());
+    let verdict = Verdict::new(&all, &no_limit());
     assert!(verdict.sentence.starts_with("The model decodes dz_mm to 0.0470 mm"), "{verdict:?}");
     let hardly =
         "It tells little of dx_mm: at best 14 % below the error of always predicting the mean.";
@@ -103,14 +103,14 @@ fn a_model_that_has_learnt_nothing_is_called_that() {
         ("mean", &[("dx_mm", 0.37), ("dy_mm", 0.56)]),
         ("linear", &[("dx_mm", 0.37), ("dy_mm", 0.56)]),
     ]);
-    let verdict = Verdict::of(&all, &no_limit());
+    let verdict = Verdict::new(&all, &no_limit());
     assert_eq!(
         verdict.sentence,
         "The model has learnt next to nothing of dx_mm and dy_mm: it is no better than always predicting the mean."
     );
     assert_eq!(names(&verdict), ["no-gain-over-mean"]);
     all[0].errors.iter_mut().for_each(|group| group.ratio_to_limit = Some(1.02));
-    let sentence = Verdict::of(&all, &no_limit()).sentence;
+    let sentence = Verdict::new(&all, &no_limit()).sentence;
     assert!(sentence.ends_with("no decoder could be better by more than 2 %."), "{sentence}");
 }
 
@@ -152,7 +152,7 @@ fn a_model_that_is_as_good_as_linear_is_warned_of() {
         ("mean", &[("f_n", 1.0), ("g_n", 1.0)]),
         ("linear", &[("f_n", 0.25), ("g_n", 0.30)]),
     ]);
-    let verdict = Verdict::of(&all, &no_limit());
+    let verdict = Verdict::new(&all, &no_limit());
     assert_eq!(names(&verdict), ["no-gain-over-linear"]);
     assert!(verdict.warnings[0].text.starts_with("f_n:"), "{verdict:?}");
     let gains =
@@ -167,7 +167,7 @@ fn outputs_that_do_not_change_or_have_no_frames_are_named() {
         ("mean", &[("f_n", 0.0), ("g_n", f64::NAN), ("h_n", 1.0)]),
     ]);
     assert_eq!(
-        Verdict::of(&all, &no_limit()).sentence,
+        Verdict::new(&all, &no_limit()).sentence,
         "The model decodes h_n to 0.100 mm: 90 % below always predicting the mean. f_n does not change in these \
          frames: there is nothing to decode. g_n has no frame to judge by."
     );

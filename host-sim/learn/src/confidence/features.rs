@@ -22,7 +22,7 @@ pub(super) struct Features {
 
 impl Features {
     /// Features of these `readings`, with so many `directions`, at most as many as there are readings.
-    pub fn of(readings: &Table, directions: usize) -> Self {
+    pub fn new(readings: &Table, directions: usize) -> Self {
         let mean: Vec<f32> = readings.means().iter().map(|mean| *mean as f32).collect();
         let per_deviation = |deviation: &f64| {
             let scale = (1.0 / deviation) as f32;

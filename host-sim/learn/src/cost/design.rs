@@ -40,13 +40,13 @@ pub struct NetworkDesign {
 
 impl Design {
     /// The design of the model in `blob`.
-    pub fn of(blob: &ModelBlob) -> Self {
+    pub fn new(blob: &ModelBlob) -> Self {
         let model = blob.parse();
         let (shape, projection) = (model.shape(), model.projection().is_some());
         let rows = if projection { 1 } else { shape.rows };
         Self {
             shape,
-            networks: model.networks().map(|network| NetworkDesign::of(&network)).collect(),
+            networks: model.networks().map(|network| NetworkDesign::new(&network)).collect(),
             row_network: (0..rows).filter_map(|row| model.network_of_row(row)).collect(),
             projection,
             components: model.expansion().map(|expansion| expansion.components()),
@@ -129,7 +129,7 @@ impl Design {
 
 impl NetworkDesign {
     /// The design of `network`.
-    pub fn of(network: &Network<'_>) -> Self {
+    pub fn new(network: &Network<'_>) -> Self {
         Self {
             format: network.format(),
             shape: network.shape(),

@@ -28,7 +28,7 @@ pub struct DecoderRam {
 
 impl DecoderRam {
     /// RAM for decoding with a model of this `design`.
-    pub fn of(design: &Design) -> Self {
+    pub fn new(design: &Design) -> Self {
         let shape = design.shape;
         let float = size_of::<f32>();
         let readings = shape.inputs * float;

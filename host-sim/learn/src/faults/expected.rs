@@ -30,7 +30,7 @@ struct Solver {
 }
 
 impl Expected {
-    pub fn of(fill: Fill<'_>) -> Self {
+    pub fn new(fill: Fill<'_>) -> Self {
         let channels: Vec<_> = fill.channels().collect();
         let mut parts =
             DMatrix::from_fn(fill.readings(), fill.factors(), |i, f| f64::from(channels[i].2[f]));

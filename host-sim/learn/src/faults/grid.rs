@@ -12,7 +12,7 @@ pub struct Grid {
 impl Grid {
     /// Grid of columns called `r1c1_ohm` and so on: every reading of two rows or more and two columns or more, row after
     /// row. `None` for other columns.
-    pub fn of(names: &[String]) -> Option<Self> {
+    pub fn new(names: &[String]) -> Option<Self> {
         let wires: Option<Vec<(usize, usize)>> =
             names.iter().map(|name| Self::wires_of_name(name)).collect();
         let wires = wires?;

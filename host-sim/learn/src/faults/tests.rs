@@ -153,5 +153,5 @@ fn columns_without_wires_have_no_faults() {
     let table = Table { names: vec!["a_ohm".into(), "b_ohm".into()], values: vec![f64::NAN; 40] };
     assert!(diagnose(&table, Limits::USUAL, None).is_empty());
     let names = ["r1c1_ohm", "r1c2_ohm", "r2c1_ohm"].map(String::from);
-    assert_eq!(Grid::of(&names), None);
+    assert_eq!(Grid::new(&names), None);
 }

@@ -81,7 +81,7 @@ struct Bench {
 impl Bench {
     fn new(options: Options, relative_inputs: bool, size: Size) -> Self {
         let world = world(size);
-        let rest = Synthesis::of(&world).untouched().frames(Stream::Calibration, 100).inputs;
+        let rest = Synthesis::new(&world).untouched().frames(Stream::Calibration, 100).inputs;
         let all = synthesise(&world, Stream::Test, 1000 + size.frames[1]);
         Self {
             options,

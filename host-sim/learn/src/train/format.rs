@@ -144,7 +144,7 @@ pub(super) struct Targets {
 }
 
 impl Targets {
-    pub fn of(outputs: &Table) -> Self {
+    pub fn new(outputs: &Table) -> Self {
         let means = Self { deviations: outputs.mean_line(), means: outputs.means() };
         means.of_others(outputs)
     }
@@ -329,7 +329,7 @@ pub(super) fn fit(
     options: &Options,
     ridges: &[Ridge],
 ) -> Result<Vec<FittedNetwork>> {
-    let targets = Targets::of(&samples.table.outputs);
+    let targets = Targets::new(&samples.table.outputs);
     let (table, solver) = (samples.table, options.solver);
     if options.format != Format::F32 || !layer.relative_widths.is_empty() {
         let held = held(samples, layer, options, options.format)?;

@@ -71,7 +71,7 @@ pub(super) fn expansion(
     rank: usize,
     options: &Options,
 ) -> Vec<f32> {
-    let targets = Targets::of(&samples.table.outputs);
+    let targets = Targets::new(&samples.table.outputs);
     let decays: Vec<f64> = layer.widths().iter().map(|width| 1.0 / (2.0 * width * width)).collect();
     let regressors = Regressors {
         centres: &layer.centres,

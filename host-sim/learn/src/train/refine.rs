@@ -144,7 +144,7 @@ pub fn refine(
     settings.check(examples, dataset.frames())?;
     let pieces = settings.pieces(dataset.frames(), options.centres, examples);
     memory::check(dataset, options, Some(pieces))?;
-    let sources = Sources::of(dataset, layers);
+    let sources = Sources::new(dataset, layers);
     let start = |layer| Descent::new(&sources, layer, options, settings);
     let mut descents: Vec<Descent> = layers.hidden.iter().enumerate().map(start).collect();
     match examples {

@@ -182,7 +182,7 @@ impl Row {
         let table = given(expansion.as_deref(), Cow::Borrowed(first)).into_owned();
         let samples = Samples { table: &table, ..samples };
         let held = format::held(&samples, layer, &options, format)?;
-        let targets = Targets::of(&table.outputs);
+        let targets = Targets::new(&table.outputs);
         let settings = match options.solver {
             Solver::Rls(settings) => settings,
             Solver::Qr => Recursive::default(),

@@ -60,7 +60,7 @@ fn a_width_for_each_centre_is_decoded_and_priced_as_it_is_trained() {
     assert_eq!([common.spread(), own.spread()], [Options::default().spread; 2]);
     // Seven widths more in each of two networks.
     assert_eq!(own.bytes().len(), common.bytes().len() + 2 * 7 * 4);
-    let designs = [&common, &own].map(Design::of);
+    let designs = [&common, &own].map(Design::new);
     assert_eq!(designs[1].parameter_bytes(), designs[0].parameter_bytes() + 2 * 7 * 4);
     decodes_alike(own.bytes());
 }

@@ -63,7 +63,7 @@ fn a_sensor_that_leaves_something_out_takes_less_and_the_page_says_what_each_tak
         let takes = |(_, shape, centres): (&str, ModelShape, usize)| {
             let design = Design::of_rows(shape, format, centres, true);
             let cost = frames(&prices, &design).ungated;
-            let ram = DecoderRam::of(&design).bytes() as u64;
+            let ram = DecoderRam::new(&design).bytes() as u64;
             [
                 design.parameter_bytes() as u64,
                 ram,

@@ -28,7 +28,7 @@ fn world(name: &str, noise: f64) -> World {
 
 /// Predictions of a network in f64, with neither centres nor weights rounded.
 fn in_f64(training: &RowTable, centres: &[f64], options: &Options, test: &RowTable) -> Vec<f64> {
-    let scale = InputScale::of(training);
+    let scale = InputScale::new(training);
     let regressors = Regressors {
         centres,
         inputs: training.inputs.names.len(),
@@ -110,7 +110,7 @@ fn check(name: &str) {
 /// RMSE in mm by axis of one network for the whole array.
 fn errors_of_array(noise: f64, spread: f64, format: Format) -> Vec<f64> {
     let world = World::press();
-    let frames = Synthesis::of(&world).noise_level(noise);
+    let frames = Synthesis::new(&world).noise_level(noise);
     let training = frames.frames(Stream::Training, 20000);
     let test = frames.frames(Stream::Test, 4000);
     let options = Options { whole_array: true, format, spread, ..Options::default() };

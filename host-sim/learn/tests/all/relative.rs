@@ -17,7 +17,7 @@ fn world() -> World {
 
 fn frames(stream: Stream, frames: usize) -> Dataset {
     let world = world();
-    let synthesis = Synthesis::of(&world);
+    let synthesis = Synthesis::new(&world);
     let readings = synthesis.frames(stream, frames);
     relative::dataset(readings, &synthesis.baselines(stream, frames, 100))
 }
@@ -31,7 +31,7 @@ fn blob(options: Options) -> ModelBlob {
 /// Readings in Ω, and a baseline of them.
 fn readings_and_baseline() -> (Vec<f64>, Vec<f64>) {
     let world = world();
-    let synthesis = Synthesis::of(&world);
+    let synthesis = Synthesis::new(&world);
     let readings = synthesis.frames(Stream::Test, 70).inputs.values;
     (readings, synthesis.baselines(Stream::Test, 1, 100).values)
 }
@@ -129,7 +129,7 @@ fn a_channel_without_a_baseline_is_missing_and_no_baseline_leaves_nothing() {
 #[test]
 fn a_model_of_readings_takes_no_notice_of_a_baseline() {
     let world = world();
-    let training = Synthesis::of(&world).frames(Stream::Training, 500);
+    let training = Synthesis::new(&world).frames(Stream::Training, 500);
     let trained = train(&training, &Options { centres: 8, ..Options::default() }, &Silent).unwrap();
     let blob = pack(&trained, &training, &Origin::of_data("plain", 0, 1, &training)).unwrap();
     let model = blob.prepare(Exponential::default());

@@ -29,7 +29,7 @@ fn limits_agree_with_independent_figures_within_two_standard_errors() {
         for (level, expected, standard_error) in figures {
             let mut world = World { read_rows: read_rows.clone(), ..World::press() };
             world.noise.level = level;
-            let z = &Reference::of(&world, 150, &Silent).unwrap().limits()[2];
+            let z = &Reference::new(&world, 150, &Silent).unwrap().limits()[2];
             let allowed = 2.0 * standard_error.hypot(z.limit_standard_error);
             let off = z.limit - expected;
             assert!(off.abs() < allowed, "noise {level}, {} rows: {z:?}", read_rows.len());
@@ -42,7 +42,7 @@ fn limits_agree_with_independent_figures_within_two_standard_errors() {
 fn a_frame_is_decoded_alike_wherever_it_stands() {
     let world = World { read_rows: vec![2, 3], ..World::press() };
     let frames = synthesise(&world, Stream::Test, 6);
-    let limit = Limit::of(&world).unwrap();
+    let limit = Limit::new(&world).unwrap();
     let all = limit.decode_all(&frames.inputs.values, 1);
     let width = FrameDecoder::inputs(&limit);
     let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
@@ -56,9 +56,9 @@ fn a_frame_is_decoded_alike_wherever_it_stands() {
 fn noise_of_a_span_is_modelled() {
     // Two scenes with nearly the same noise: one relative to the reading, one to the span.
     let mut world = World { read_rows: vec![3], ..World::press() };
-    let limit = |world: &World| Reference::of(world, 100, &Silent).unwrap().limits()[2].clone();
+    let limit = |world: &World| Reference::new(world, 100, &Silent).unwrap().limits()[2].clone();
     let relative = limit(&world);
-    let frames = Synthesis::of(&world).ideal().frames(Stream::Test, 2000).inputs;
+    let frames = Synthesis::new(&world).ideal().frames(Stream::Test, 2000).inputs;
     let spans: f64 = frames.ranges().iter().map(|[low, high]| high - low).sum();
     let span_of_mean = spans / frames.means().iter().sum::<f64>();
     world.noise.kind = NoiseKind::Span;
@@ -70,7 +70,7 @@ fn noise_of_a_span_is_modelled() {
 
 #[test]
 fn what_is_not_modelled_is_refused() {
-    let refusal = |world: &World| Limit::of(world).unwrap_err();
+    let refusal = |world: &World| Limit::new(world).unwrap_err();
     let drift = Some(Drift { gain: 0.02 });
     assert_eq!(refusal(&World { drift, ..World::press() }), Refusal::Drift);
     let mut quiet = World::press();
@@ -88,7 +88,7 @@ fn latents_have_the_distribution_that_frames_are_drawn_from() {
     let mut world = World { read_rows: vec![1], ..World::of_motion(press) };
     for motion in [world.motion.clone(), World::paper().motion] {
         world.motion = motion;
-        let drawn = Synthesis::of(&world).frames(Stream::Test, 20_000).outputs;
+        let drawn = Synthesis::new(&world).frames(Stream::Test, 20_000).outputs;
         let prior = prior(&world, &[1]);
         let rows = Rows {
             world: &world,
@@ -131,8 +131,8 @@ fn latents_have_the_distribution_that_frames_are_drawn_from() {
 fn noise_of_a_span_is_that_of_each_row() {
     let mut world = World::paper();
     world.noise.kind = NoiseKind::Span;
-    let limit = Limit::of(&world).unwrap();
-    let spans_ohm = Synthesis::of(&world).noise_span_ohm();
+    let limit = Limit::new(&world).unwrap();
+    let spans_ohm = Synthesis::new(&world).noise_span_ohm();
     let expected: Vec<f64> = spans_ohm.iter().map(|span| world.noise.level * span).collect();
     let found: Vec<f64> = limit.groups.iter().flat_map(|it| it.deviation_ohm.clone()).collect();
     assert!(limit.groups.len() > 1);

@@ -90,7 +90,7 @@ fn a_linear_posterior_is_the_exact_one() {
             DMatrix::identity(4, 4) + target.slope.transpose() * &target.slope / deviation.powi(2);
         let covariance = precision.try_inverse().unwrap();
         let exact = &covariance * target.slope.transpose() * &target.data / deviation.powi(2);
-        let effort = Effort { wanted: 2000.0, ..Effort::of(4) };
+        let effort = Effort { wanted: 2000.0, ..Effort::new(4) };
         let found = posterior(&target, &effort, index as u64);
         assert!(found.effective >= 2000.0, "{}", found.effective);
         for i in 0..4 {
@@ -114,7 +114,7 @@ fn a_posterior_with_two_modes_is_that_of_a_fine_grid() {
         sum += density;
         sums += density * x.abs();
     }
-    let effort = Effort { wanted: 1000.0, ..Effort::of(1) };
+    let effort = Effort { wanted: 1000.0, ..Effort::new(1) };
     let found = posterior(&target, &effort, 0);
     for (i, exact) in [0.0, sums / sum].into_iter().enumerate() {
         let standard_error = (found.variance[i] / found.effective).sqrt();
@@ -126,7 +126,7 @@ fn a_posterior_with_two_modes_is_that_of_a_fine_grid() {
 fn a_population_that_does_not_arrive_says_so() {
     let data = DVector::from_element(3, 3.0);
     let target = Linear { slope: DMatrix::identity(3, 3), data, deviation: 1e-6 };
-    let found = posterior(&target, &Effort { rounds: 2, ..Effort::of(3) }, 0);
+    let found = posterior(&target, &Effort { rounds: 2, ..Effort::new(3) }, 0);
     assert!(found.effective < 2.0, "{}", found.effective);
 }
 

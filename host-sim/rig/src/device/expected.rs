@@ -124,7 +124,7 @@ fn confidence(
     [inputs, outputs]: [usize; 2],
     baseline_ohm: Option<&[f32]>,
 ) -> Vec<(f32, Vec<f32>)> {
-    let Ok(decoder) = Decoder::<{ u8::MAX as usize }>::of(*model) else { return Vec::new() };
+    let Ok(decoder) = Decoder::<{ u8::MAX as usize }>::new(*model) else { return Vec::new() };
     let unknown = vec![f32::NAN; inputs];
     let reciprocals: Vec<f32> =
         baseline_ohm.unwrap_or(&unknown).iter().map(|ohm| reciprocal(*ohm)).collect();
@@ -177,9 +177,9 @@ mod tests {
             start_us: 0,
             flags: 0,
             row_status: &[0],
-            outputs: Floats::of(outputs),
+            outputs: Floats::new(outputs),
             novelty,
-            deviation: Floats::of(deviation),
+            deviation: Floats::new(deviation),
         }
     }
 

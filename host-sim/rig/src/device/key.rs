@@ -47,7 +47,7 @@ impl Sealing {
         };
         let next = || identity.highest_version.map_or(1, |highest| highest.saturating_add(1));
         let version = self.version.or_else(same).unwrap_or_else(next);
-        Seal::of(&self.key, version, blob)
+        Seal::new(&self.key, version, blob)
     }
 }
 

@@ -34,7 +34,7 @@ pub fn decode_frames<W: Wire>(
     let frames = (readings_ohm.len() / per_frame) as u32;
     let request = |frame: u32| {
         let start = frame as usize * per_frame;
-        let readings_ohm = Floats::of(&readings_ohm[start..start + per_frame]);
+        let readings_ohm = Floats::new(&readings_ohm[start..start + per_frame]);
         Request::Decode { frame, readings_ohm }
     };
     let mut on_their_way: VecDeque<Outstanding> = VecDeque::new();

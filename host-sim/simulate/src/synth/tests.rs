@@ -41,9 +41,10 @@ fn noise_of_either_kind_has_the_size_it_is_asked_for() {
         world.set_noise_level(0.02).unwrap();
         let frames = 20_000;
         let noisy = synthesise(&world, Stream::Training, frames);
-        let ideal = Synthesis::of(&world).ideal().frames(Stream::Training, frames);
+        let ideal = Synthesis::new(&world).ideal().frames(Stream::Training, frames);
         assert_eq!(noisy.outputs, ideal.outputs);
-        let spans = Synthesis::of(&world).ideal().frames(Stream::Span, SPAN_FRAMES).inputs.ranges();
+        let spans =
+            Synthesis::new(&world).ideal().frames(Stream::Span, SPAN_FRAMES).inputs.ranges();
         let (mut sum, mut squares) = (0.0, 0.0);
         for (noisy, ideal) in noisy.inputs.lines().zip(ideal.inputs.lines()) {
             for (column, (noisy, ideal)) in noisy.iter().zip(ideal).enumerate() {
@@ -78,7 +79,7 @@ fn a_drifting_gain_multiplies_all_readings_of_a_session_and_its_baseline() {
     let undrifted = synthesise(&still, Stream::Test, frames);
     assert_eq!(drifted.outputs, undrifted.outputs);
     let baselines =
-        [&drifting, &still].map(|w| Synthesis::of(w).baselines(Stream::Test, frames, 100));
+        [&drifting, &still].map(|w| Synthesis::new(w).baselines(Stream::Test, frames, 100));
     let pairs = ratios(&drifted.inputs, &undrifted.inputs)
         .zip(ratios(&baselines[0], &baselines[1]))
         .map(|(readings, baseline)| [readings, baseline].concat());
@@ -109,13 +110,14 @@ fn a_baseline_is_the_untouched_sensor_with_the_noise_that_averaging_leaves() {
         let mut world = World { read_rows: vec![3, 4], ..World::press() };
         world.noise = Noise { kind, level: 0.02 };
         let (frames, averaged) = (4000, 25);
-        let untouched = Synthesis::of(&world).ideal().untouched().frames(Stream::Test, 1).inputs;
+        let untouched = Synthesis::new(&world).ideal().untouched().frames(Stream::Test, 1).inputs;
         let ideal = Sensor::paper();
         let mut row_ohm = [0.0; 18];
         ideal.row_column_resistance_ohm(4, &[[0.0; 3]; 6], &mut row_ohm);
         assert!((untouched.values[18] / row_ohm[0] - 1.0).abs() < 1e-12);
-        let spans = Synthesis::of(&world).ideal().frames(Stream::Span, SPAN_FRAMES).inputs.ranges();
-        let baselines = Synthesis::of(&world).baselines(Stream::Test, frames, averaged);
+        let spans =
+            Synthesis::new(&world).ideal().frames(Stream::Span, SPAN_FRAMES).inputs.ranges();
+        let baselines = Synthesis::new(&world).baselines(Stream::Test, frames, averaged);
         assert_eq!((baselines.len(), &baselines.names), (frames, &untouched.names));
         let mut squares = 0.0;
         for line in baselines.lines() {
@@ -128,7 +130,7 @@ fn a_baseline_is_the_untouched_sensor_with_the_noise_that_averaging_leaves() {
         let error = (squares / count - 1.0).abs();
         assert!(error < 5.0 * (2.0 / count).sqrt(), "{kind:?}: variance is off by {error}");
         // Its noise is not that of the frames.
-        let noisy = Synthesis::of(&world).untouched().frames(Stream::Test, 1).inputs;
+        let noisy = Synthesis::new(&world).untouched().frames(Stream::Test, 1).inputs;
         let [of_frame, of_baseline] =
             [noisy.values[0], baselines.values[0]].map(|ohm| ohm - untouched.values[0]);
         assert!((of_frame / of_baseline / 5.0 - 1.0).abs() > 1e-3);
@@ -187,7 +189,7 @@ fn readings_are_those_of_the_sensors_equations() {
     for name in ["paper", "press"] {
         let world = world(name);
         let frames = 150;
-        let dataset = Synthesis::of(&world).ideal().frames(Stream::Training, frames);
+        let dataset = Synthesis::new(&world).ideal().frames(Stream::Training, frames);
         let mut row_ohm = [0.0; 18];
         for (readings, outputs) in dataset.inputs.lines().zip(dataset.outputs.lines()) {
             for row in 0..8 {
@@ -199,7 +201,7 @@ fn readings_are_those_of_the_sensors_equations() {
                 }
             }
         }
-        let last = Synthesis::of(&world).ideal().readings_of(Stream::Training, frames - 1);
+        let last = Synthesis::new(&world).ideal().readings_of(Stream::Training, frames - 1);
         assert_eq!(dataset.inputs.lines().last().unwrap(), last);
     }
 }
@@ -254,14 +256,14 @@ fn a_contact_is_the_same_however_many_frames_and_rows_are_read() {
     let few = synthesise(&few, Stream::Training, 70);
     assert_eq!(few.inputs.names.len(), 36);
     assert_eq!(few.outputs.values, whole.outputs.values[..70 * 6]);
-    let later = Synthesis::of(&world_of_contact()).frames_from(Stream::Training, 64, 20);
+    let later = Synthesis::new(&world_of_contact()).frames_from(Stream::Training, 64, 20);
     assert_eq!(later.outputs.values, whole.outputs.values[64 * 6..84 * 6]);
 }
 
 #[test]
 fn nothing_touches_an_untouched_sensor() {
     let world = world_of_contact();
-    let untouched = Synthesis::of(&world).untouched().frames(Stream::Training, 3);
+    let untouched = Synthesis::new(&world).untouched().frames(Stream::Training, 3);
     for line in untouched.outputs.lines() {
         assert!(line[..2].iter().all(|centre| centre.is_nan()));
         assert_eq!(line[2..], [0.0; 4]);

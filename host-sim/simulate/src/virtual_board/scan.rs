@@ -21,7 +21,7 @@ pub fn untouched_readings(world: &World, frames: usize) -> Table {
 }
 
 fn ideal(world: &World) -> Synthesis<'_> {
-    Synthesis::of(world).ideal().drift(None).all_rows()
+    Synthesis::new(world).ideal().drift(None).all_rows()
 }
 
 /// Scans every line of `readings` (Ω, all row-wires) by the firmware's scanner on `board`.

@@ -23,7 +23,7 @@ pub struct Frame {
 }
 
 impl Frame {
-    fn of(estimate: &EstimateReport<'_>) -> Self {
+    fn new(estimate: &EstimateReport<'_>) -> Self {
         let values = estimate.outputs.iter().chain(estimate.deviation.iter());
         Self {
             number: estimate.frame,
@@ -61,7 +61,7 @@ pub fn hear_frames<W: Wire>(
             }
             Report::Estimate(estimate) if wanted == Wanted::Estimates => {
                 status = estimate.row_status;
-                Frame::of(estimate)
+                Frame::new(estimate)
             }
             _ => return None,
         };

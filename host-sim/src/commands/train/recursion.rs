@@ -182,7 +182,7 @@ impl Plan {
                 (LearnedOn::NextFrames, trained)
             }
             (Some(Source::Scene(count)), Subject::Scene(scene)) => {
-                let synthesis = Synthesis::of(&scene.world);
+                let synthesis = Synthesis::new(&scene.world);
                 let frames = scene.training.test_frames.min(TEST_FRAMES);
                 let test = scene.dataset(&synthesis, Stream::Test, frames);
                 let rest = scene.pieces(synthesis, first, *count);
@@ -193,7 +193,7 @@ impl Plan {
             _ => return Err(Error::Failed("frames were not loaded".into())),
         };
         let outputs = &set.frames.outputs;
-        let curve = LearningCurve::of(judged_on, &learned, &outputs.names, &outputs.deviations());
+        let curve = LearningCurve::new(judged_on, &learned, &outputs.names, &outputs.deviations());
         Ok((trained, curve))
     }
 

@@ -66,7 +66,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         );
     }
     scene.training.relative_inputs = model.model().metadata().relative_inputs;
-    let test = scene.dataset(&Synthesis::of(&scene.world), Stream::Test, arguments.frames);
+    let test = scene.dataset(&Synthesis::new(&scene.world), Stream::Test, arguments.frames);
     let of_inputs = model.clone().of_inputs();
     let Some((deviations, _)) = of_inputs.assess(&test.inputs.values) else {
         let path = arguments.model.clone().unwrap_or_default();

@@ -28,7 +28,7 @@ const CONDITIONS: [[f64; 2]; 5] = [[0.0, 0.0], [0.2, 0.0], [0.2, 0.4], [0.2, 0.5
 pub fn detections(scene: &Experiment, model: &PreparedModel<'_>, frames: usize) -> Vec<Detection> {
     let world = &scene.world;
     let rest =
-        Synthesis::of(world).drift(None).untouched().frames(Stream::Anomaly, BASELINE_FRAMES);
+        Synthesis::new(world).drift(None).untouched().frames(Stream::Anomaly, BASELINE_FRAMES);
     let model = model.clone().with_baseline(&rest.inputs.means());
     let mut detections = Vec::new();
     for kind in Anomaly::ALL {

@@ -87,7 +87,7 @@ pub fn study(
     check(experiment, frames)?;
     let (mut levels, mut no_limit, mut training_frames) = (Vec::new(), None, 0);
     for noise_level in NOISE_LEVELS {
-        let level = NoiseLevel::of(experiment, noise_level, frames, &mut no_limit, progress);
+        let level = NoiseLevel::new(experiment, noise_level, frames, &mut no_limit, progress);
         training_frames = level.scene.training.frames;
         levels.push(of_level(level, progress)?);
     }
@@ -110,7 +110,7 @@ fn of_level(level: NoiseLevel, progress: &dyn Progress) -> Result<Level> {
     (t.direction, t.format) = (Direction::Forward, Format::F32Direct);
     (t.whole_array, t.features, t.output_rank) = (false, None, None);
     let (set, blob) = train(&forward, progress)?;
-    let synthesis = Synthesis::of(&forward.world);
+    let synthesis = Synthesis::new(&forward.world);
     let frames = level.test.frames();
     let test = forward.dataset(&synthesis, Stream::Test, frames);
     let ideal = forward.dataset(&synthesis.ideal(), Stream::Test, frames);
@@ -125,8 +125,8 @@ fn of_level(level: NoiseLevel, progress: &dyn Progress) -> Result<Level> {
 
     // Readings deviate from the network by their noise and its own error.
     let estimated = model.decode_table(&set.frames.inputs);
-    let deviation = deviation(&Synthesis::of(&forward.world), &set.frames.outputs, &estimated);
-    let networks = Networks::of(&blob.parse());
+    let deviation = deviation(&Synthesis::new(&forward.world), &set.frames.outputs, &estimated);
+    let networks = Networks::new(&blob.parse());
     let world = &level.scene.world;
     let mut inversions = Vec::new();
     let mut decoders = Vec::new();
@@ -176,7 +176,7 @@ struct Networks<'m>(Vec<direct::Network<'m>>);
 
 impl<'m> Networks<'m> {
     /// Networks of a model with direct distances, of which each row has one.
-    fn of(model: &model_core::blob::Model<'m>) -> Self {
+    fn new(model: &model_core::blob::Model<'m>) -> Self {
         let direct = |network| match network {
             Network::F32Direct(direct) => Some(direct),
             _ => None,
@@ -249,9 +249,9 @@ mod tests {
     fn slopes_and_values_in_f64_are_those_of_the_network() {
         let (scene, progress) = (forward(), &Silent);
         let blob = scene.train(progress).unwrap();
-        let test = scene.dataset(&Synthesis::of(&scene.world), Stream::Test, 5);
+        let test = scene.dataset(&Synthesis::new(&scene.world), Stream::Test, 5);
         let predicted = blob.prepare(Exponential::default()).decode_table(&test.inputs);
-        let networks = Networks::of(&blob.parse());
+        let networks = Networks::new(&blob.parse());
         let at = |deformation_mm: &[f64]| {
             let (mut logs, mut slopes) = (vec![0.0; 18], DMatrix::zeros(18, 18));
             networks.log_readings(0, deformation_mm, &mut logs, &mut slopes);
@@ -282,7 +282,7 @@ mod tests {
         scene.world.noise.level = 0.05;
         for kind in [NoiseKind::Relative, NoiseKind::Span] {
             scene.world.noise.kind = kind;
-            let synthesis = Synthesis::of(&scene.world);
+            let synthesis = Synthesis::new(&scene.world);
             let [noisy, ideal] = [&synthesis, &synthesis.clone().ideal()]
                 .map(|it| scene.dataset(it, Stream::Test, 1000).outputs);
             let found = deviation(&synthesis, &noisy, &ideal);
@@ -293,7 +293,7 @@ mod tests {
     #[test]
     fn a_network_that_predicts_readings_beats_their_mean_and_comes_near_the_noise() {
         let scene = forward();
-        let level = NoiseLevel::of(&scene, 0.005, 100, &mut Some(String::new()), &Silent);
+        let level = NoiseLevel::new(&scene, 0.005, 100, &mut Some(String::new()), &Silent);
         let level = of_level(level, &Silent).unwrap();
         let rmse = |name| metrics::of_decoder(&level.readings, name)[0].rmse;
         assert_eq!(metrics::of_decoder(&level.readings, NETWORK)[0].unit, "Ω");

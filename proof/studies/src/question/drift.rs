@@ -74,7 +74,7 @@ pub fn measure(experiment: &Experiment, gain: f64, progress: &dyn Progress) -> R
         let mut own = experiment.clone();
         own.training.relative_inputs = relative_inputs;
         own.world.drift = if trained_with_drift { drift } else { None };
-        let synthesis = Synthesis::of(&own.world);
+        let synthesis = Synthesis::new(&own.world);
         let mut training = TrainingSet::of_scene(&own, synthesis.clone());
         training.confidence = false;
         training.fill = false;

@@ -127,7 +127,7 @@ pub fn study(
     let (mut levels, mut no_limit, mut without_noise) = (Vec::new(), None, Vec::new());
     let mut training_frames = 0;
     for noise_level in NOISE_LEVELS {
-        let level = NoiseLevel::of(experiment, noise_level, plan.frames, &mut no_limit, progress);
+        let level = NoiseLevel::new(experiment, noise_level, plan.frames, &mut no_limit, progress);
         let (world, readings) = (&level.scene.world, &level.test.inputs.values);
         progress.stage(&format!("equations, noise {noise_level}"), 1);
         let exact = Equations::exact(world);
@@ -200,7 +200,7 @@ fn by_row_wire(
     let world = &level.scene.world;
     let (rows, columns) = (world.read_rows.len(), world.sensor.column_wires);
     let unknowns = 3 * world.sensor.electrodes_per_row_wire;
-    let ranges = Synthesis::of(world).ideal().frames(Stream::Span, 4096).outputs.ranges();
+    let ranges = Synthesis::new(world).ideal().frames(Stream::Span, 4096).outputs.ranges();
     let truths = &level.test.outputs.values;
     progress.stage("deformations that read alike", solved.len());
     let of_row = |n: usize| {

@@ -175,7 +175,7 @@ pub fn compute(
     progress.stage("synthesise", plan.noise_levels.len());
     let mut cases = Vec::new();
     for &noise_level in &plan.noise_levels {
-        let synthesis = Synthesis::of(&experiment.world).noise_level(noise_level);
+        let synthesis = Synthesis::new(&experiment.world).noise_level(noise_level);
         let frames = |stream, count| experiment.dataset(&synthesis, stream, count);
         let most = plan.samples.iter().map(|samples| samples * training_sets(*samples)).max();
         let training = frames(Stream::Training, most.unwrap_or_default());
@@ -298,7 +298,7 @@ impl TrainingSet {
     ) -> Self {
         let indices: Vec<usize> = (number * samples..(number + 1) * samples).collect();
         let samples = training.subset(&indices).row_table(0);
-        let scale = InputScale::of(&samples);
+        let scale = InputScale::new(&samples);
         let means = samples.outputs.means();
         let deviations = |table: &RowTable| -> Vec<f64> {
             let of_line =

@@ -136,7 +136,7 @@ pub fn measure(
     frames: usize,
 ) -> taxel_simulate::Result<ReadoutResult> {
     let world = &experiment.world;
-    let ideal_sensor = Synthesis::of(world).ideal().drift(None);
+    let ideal_sensor = Synthesis::new(world).ideal().drift(None);
     let ideal = ideal_sensor.frames(Stream::Test, frames);
     let ideal_baseline = ideal_sensor.untouched().frames(Stream::Test, 1).inputs;
     let relative_inputs = model.model().metadata().relative_inputs;

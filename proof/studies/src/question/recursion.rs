@@ -159,7 +159,7 @@ pub fn compute(experiment: &Experiment, plan: &Plan, progress: &dyn Progress) ->
     WIDTHS.iter().try_for_each(|width| check_spread("width", *width))?;
     let world = &experiment.world;
     assert_eq!(world.read_rows.len(), 1, "one row-wire");
-    let table = Synthesis::of(world).frames(Stream::Training, plan.updates).row_table(0);
+    let table = Synthesis::new(world).frames(Stream::Training, plan.updates).row_table(0);
     let samples = Samples::new(&table);
     let options = Options { centres: plan.centres, seed: world.seed, ..Options::default() };
     let centres = samples.centres(&options, 0);
@@ -175,7 +175,7 @@ pub fn compute(experiment: &Experiment, plan: &Plan, progress: &dyn Progress) ->
     })?;
     let targets: Vec<f64> =
         table.outputs.lines().map(|line| (line[output] - mean) / deviation).collect();
-    let scaled = InputScale::of(&table).apply(&table.inputs.values);
+    let scaled = InputScale::new(&table).apply(&table.inputs.values);
     progress
         .stage("recursions", WIDTHS.len() * FORGETTING_FACTORS.len() * INITIAL_COVARIANCES.len());
     let of_width = WIDTHS.par_iter().map(|&width| {
@@ -183,7 +183,7 @@ pub fn compute(experiment: &Experiment, plan: &Plan, progress: &dyn Progress) ->
         let inputs = table.inputs.names.len();
         let regressors =
             Regressors { centres: &centres, inputs, decays: &[decay], affine_tail: false };
-        let stream = Regressed::of(&regressors.of(&scaled), &targets);
+        let stream = Regressed::new(&regressors.of(&scaled), &targets);
         let condition = stream.condition();
         let pairs = FORGETTING_FACTORS.iter().flat_map(|l| INITIAL_COVARIANCES.map(|d| (*l, d)));
         let outcomes = pairs.flat_map(|(forgetting, covariance)| {

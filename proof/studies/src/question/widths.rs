@@ -120,7 +120,7 @@ pub fn compute(
     for &centres in &plan.centres {
         Options { centres, ..experiment.options() }.check(experiment.training.frames)?;
     }
-    let synthesis = Synthesis::of(&experiment.world);
+    let synthesis = Synthesis::new(&experiment.world);
     let frames = experiment.training.test_frames;
     let judging = Judging {
         choice: experiment.dataset(&synthesis, Stream::Calibration, frames),
@@ -232,7 +232,7 @@ impl Judging<'_> {
         let of_network = |network: Network<'_>| network.widths().map(f64::from).collect::<Vec<_>>();
         let widths = model.networks().flat_map(of_network);
         let wider = |[low, high]: [f64; 2], width: f64| [low.min(width), high.max(width)];
-        let cost = self.prices.frames(&Design::of(blob), Exponential::default())?;
+        let cost = self.prices.frames(&Design::new(blob), Exponential::default())?;
         Ok(Model {
             centres: options.centres,
             refined,

@@ -34,7 +34,7 @@ fn touching(effort: &Effort, _: &Tools) -> Result<Found, String> {
                 return Ok(0.0);
             }
         }
-        let frames = Synthesis::of(&world).ideal().frames(Stream::Test, 8);
+        let frames = Synthesis::new(&world).ideal().frames(Stream::Test, 8);
         let stray = frames.inputs.values.iter().find(|r| !(r.is_finite() && **r > 0.0));
         if let Some(reading) = stray {
             return Err(format!("a reading is {reading:e} Ω"));

@@ -49,7 +49,7 @@ fn models() -> &'static [(Format, ModelBlob)] {
     static MODELS: OnceLock<Vec<(Format, ModelBlob)>> = OnceLock::new();
     MODELS.get_or_init(|| {
         let world = World { read_rows: vec![3], ..World::press() };
-        let frames = Synthesis::of(&world).noise_level(0.05).frames(Stream::Training, 800);
+        let frames = Synthesis::new(&world).noise_level(0.05).frames(Stream::Training, 800);
         let each = Format::ALL.into_iter().flat_map(|format| [(format, true), (format, false)]);
         each.map(|(format, affine_tail)| {
             let options = Options { format, affine_tail, centres: 24, ..Options::default() };
@@ -79,7 +79,7 @@ fn frame(blob: &ModelBlob, random: &mut Random, planted: bool) -> Result<f64, St
         })
         .collect();
     let (mut found, mut status) = (vec![0.0; outputs], [RowStatus::Decoded]);
-    let decoder = Decoder::<1>::of(model).map_err(|cause| cause.to_string())?;
+    let decoder = Decoder::<1>::new(model).map_err(|cause| cause.to_string())?;
     let mut scratch = vec![0.0; decoder.scratch_floats()];
     let mut estimate = Estimate { outputs: &mut found, status: &mut status };
     let decoded = decoder.decode_into(Frame::from(&given[..]), &mut scratch, &mut estimate);

@@ -66,7 +66,7 @@ fn sweep(effort: &Effort, least: u64, case: fn(u64, bool) -> Result<u64, String>
     let planted = effort.is_planted();
     let least = if planted { least / 4 } else { least };
     let mut found = effort.worst((least, MOST), (0.0, "losses"), |seed| {
-        cuts.add(Torn::of(seed) as usize, case(seed, planted)?);
+        cuts.add(Torn::new(seed) as usize, case(seed, planted)?);
         Ok(0.0)
     });
     found.cases = cuts.sum();

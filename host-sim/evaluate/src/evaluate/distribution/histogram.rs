@@ -20,7 +20,7 @@ pub struct Histogram {
 
 impl Histogram {
     /// Histogram of `errors` |e| in ascending order, of which 95 % do not exceed `percentile_95`.
-    pub(super) fn of(errors: &[f64], percentile_95: f64) -> Self {
+    pub(super) fn new(errors: &[f64], percentile_95: f64) -> Self {
         let largest = errors.last().copied().unwrap_or(0.0);
         let most = if percentile_95 > 0.0 {
             largest.min(MOST_OF_PERCENTILE_95 * percentile_95)
@@ -51,11 +51,11 @@ mod tests {
     fn few_wild_errors_do_not_squeeze_the_others() {
         let mut errors: Vec<f64> = (0..99).map(f64::from).collect();
         errors.push(1e6);
-        let histogram = Histogram::of(&errors, 95.0);
+        let histogram = Histogram::new(&errors, 95.0);
         assert_eq!((histogram.beyond, histogram.counts.iter().sum::<usize>()), (1, 99));
         assert!((histogram.bin_width - 8.0 * 95.0 / 50.0).abs() < 1e-12);
-        let even = Histogram::of(&[0.0, 1.0, 2.0, 50.0], 50.0);
+        let even = Histogram::new(&[0.0, 1.0, 2.0, 50.0], 50.0);
         assert_eq!((even.counts[0], even.counts[1], even.counts[49], even.beyond), (1, 1, 1, 0));
-        assert_eq!(Histogram::of(&[0.0; 5], 0.0).counts[0], 5);
+        assert_eq!(Histogram::new(&[0.0; 5], 0.0).counts[0], 5);
     }
 }

@@ -45,7 +45,7 @@ impl GateFrames {
     ) -> Result<Self, BadValue> {
         let world = &experiment.world;
         check_settings(world, &settings.k, settings.baseline_frames)?;
-        let frames = Synthesis::of(world);
+        let frames = Synthesis::new(world);
         let relative_inputs = model.model().metadata().relative_inputs;
         let sessions = has_sessions(world, relative_inputs).then_some(settings.frames);
         let whole_array = model.model().projection().is_some();
@@ -75,7 +75,7 @@ impl GateFrames {
         model: &PreparedModel<'_>,
         settings: &Settings,
     ) -> Result<Self, BadValue> {
-        let rest = Rest::of(data, &settings.k)?;
+        let rest = Rest::new(data, &settings.k)?;
         let rows = data.test.rows;
         Ok(Self {
             name: data.name.clone(),
@@ -89,7 +89,7 @@ impl GateFrames {
             untouched: rest.untouched,
             sizes_mm: None,
             measure: data.measure(),
-            limit: LimitSummary::of(&Err(Refusal::Measured)),
+            limit: LimitSummary::new(&Err(Refusal::Measured)),
         })
     }
 }
@@ -113,7 +113,7 @@ impl Rest {
     /// # Errors
     /// [`BadValue`] for a sensor that is not known at rest, has no noise there or readings near zero, or the first
     /// tolerance that makes no gate.
-    pub fn of(data: &Measurements, k: &[f64]) -> Result<Self, BadValue> {
+    pub fn new(data: &Measurements, k: &[f64]) -> Result<Self, BadValue> {
         let rule = "a gate compares readings with those at rest: give --baseline FILE, with two frames of the \
                     untouched sensor or more without a missing reading, and no channel that is zero at rest";
         let at_rest = data.rest.as_ref().map(complete).filter(|rest| rest.len() > 1);
@@ -150,7 +150,7 @@ fn complete(table: &Table) -> Table {
 
 /// Largest ‖Δ‖ in mm of each row of each test frame, whatever the world's outputs are.
 fn largest_deformations_mm(world: &World, frames: usize) -> Vec<f64> {
-    let synthesis = Synthesis::of(world).ideal().outputs(Outputs::all_deformations());
+    let synthesis = Synthesis::new(world).ideal().outputs(Outputs::all_deformations());
     let deformations_mm = synthesis.frames(Stream::Test, frames).outputs.values;
     let length = |delta: &[f64]| delta.iter().map(|d| d * d).sum::<f64>().sqrt();
     deformations_mm

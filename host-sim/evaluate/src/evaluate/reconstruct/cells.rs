@@ -61,7 +61,7 @@ pub fn compute(setup: &Setup, draw: u64, most: usize) -> Tables {
         ..World::paper()
     };
     let thickness_mm = world.sensor.size_mm[2];
-    let synthesis = Synthesis::of(&world).ideal();
+    let synthesis = Synthesis::new(&world).ideal();
     let ideal = synthesis.frames(Stream::Training, setup.frames()).row_table(0);
     let most = if setup.is_forward() { most.min(INVERTED_FRAMES) } else { most.min(TEST_FRAMES) };
     let test = match setup.judged_on() {

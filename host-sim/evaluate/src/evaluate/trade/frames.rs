@@ -45,7 +45,7 @@ impl Inputs {
 
 impl<'s> Frames<'s> {
     /// Frames of a subject with so many samples a reading, for networks of a row each, of the whole array, or both.
-    pub fn of(
+    pub fn new(
         subject: &'s Subject,
         samples_averaged: usize,
         arrays: &[bool],
@@ -96,7 +96,7 @@ fn gates(
     test: &Dataset,
     (whole_array, k): (bool, &[f64]),
 ) -> Gates {
-    let synthesis = Synthesis::of(&scene.world).noise_level(noise_level);
+    let synthesis = Synthesis::new(&scene.world).noise_level(noise_level);
     let t = &scene.training;
     // The gate compares readings in Ω.
     let readings_ohm = if t.relative_inputs {

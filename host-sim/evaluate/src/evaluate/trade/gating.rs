@@ -42,7 +42,7 @@ impl Gates {
 
     /// Gates of measured test frames with these tolerances `k`.
     pub fn measured(data: &Measurements, k: &[f64], whole_array: bool) -> Result<Self, BadValue> {
-        let rest = Rest::of(data, k)?;
+        let rest = Rest::new(data, k)?;
         let gate = Gate::at(rest.baseline, data.test.rows, whole_array);
         let relative_inputs = data.test.relative_inputs;
         Ok(Self::behind(gate, rest.noise_level, &data.test_readings, k, relative_inputs))

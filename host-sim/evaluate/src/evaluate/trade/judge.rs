@@ -127,8 +127,8 @@ impl<'s> Judge<'s> {
     ) -> Result<()> {
         let test = &frames.test;
         let model = blob.prepare(arithmetic.exponential).of_inputs();
-        let design = Design::of(blob);
-        let ram = DecoderRam::of(&design);
+        let design = Design::new(blob);
+        let ram = DecoderRam::new(&design);
         // Fewer than asked for where there are fewer distinct samples.
         let centres = design.networks.iter().map(|network| network.shape.centres).max();
         let centres = centres.unwrap_or_default();

@@ -47,7 +47,7 @@ impl Expanded {
     pub(super) fn new(samples: &Samples<'_>, centres: &[f64], options: &Options) -> Self {
         let inputs = samples.inputs();
         let count = centres.len() / inputs;
-        let scale = CentredScale::of(samples.table);
+        let scale = CentredScale::new(samples.table);
         let decay = core::f64::consts::LOG2_E / (2.0 * options.spread.powi(2)) * UNIT * UNIT;
         let decay = decay as f32;
         let twice = 2.0 * f64::from(decay);
@@ -204,7 +204,7 @@ mod tests {
 
     fn press(noise: f64, frames: usize) -> (World, Dataset) {
         let world = World::press();
-        let data = Synthesis::of(&world).noise_level(noise).frames(Stream::Training, frames);
+        let data = Synthesis::new(&world).noise_level(noise).frames(Stream::Training, frames);
         (world, data)
     }
 
@@ -282,7 +282,7 @@ mod tests {
             let samples = Samples::new(&table);
             let options = Options { centres: 8, seed: world.seed, ..Options::default() };
             let centres = samples.centres(&options, 3);
-            let targets = Targets::of(&table.outputs);
+            let targets = Targets::new(&table.outputs);
             let expanded = Expanded::new(&samples, &centres, &options);
             let share = |part: &RowTable| {
                 let part_targets = targets.of_others(&part.outputs);

@@ -71,7 +71,7 @@ impl Exponents {
         if decay > f64::from(u32::MAX) {
             return Err(refused("the format fixed16 does not hold so narrow a Gaussian".into()));
         }
-        let scale = CentredScale::of(samples.table);
+        let scale = CentredScale::new(samples.table);
         let per_step = decay / 2_f64.powi(DECAY_FRACTION_BITS.cast_signed());
         let count = centres.len() / inputs;
         let pairs = inputs.div_ceil(2);

@@ -28,7 +28,7 @@ pub(super) struct Points<'p> {
 
 impl<'p> Points<'p> {
     pub(super) fn new(values: &'p [f64], dimensions: usize) -> Self {
-        let screen = Screen::of(values, dimensions);
+        let screen = Screen::new(values, dimensions);
         let points = values.chunks_exact(dimensions);
         let rounded: Vec<f32> = points.flat_map(|point| screen.round(point)).collect();
         let half_squares = rounded.chunks_exact(dimensions).map(half_square).collect();
@@ -132,7 +132,7 @@ pub(super) struct Screen {
 }
 
 impl Screen {
-    fn of(values: &[f64], dimensions: usize) -> Self {
+    fn new(values: &[f64], dimensions: usize) -> Self {
         let mut ranges = vec![[f64::INFINITY, f64::NEG_INFINITY]; dimensions];
         for point in values.chunks_exact(dimensions) {
             for ([low, high], x) in ranges.iter_mut().zip(point) {

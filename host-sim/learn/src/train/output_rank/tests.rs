@@ -10,7 +10,7 @@ use crate::train;
 use crate::{Exponential, ModelBlob};
 
 fn press(stream: Stream, frames: usize) -> Dataset {
-    Synthesis::of(&World::press()).frames(stream, frames)
+    Synthesis::new(&World::press()).frames(stream, frames)
 }
 
 fn blob(data: &Dataset, options: Options) -> ModelBlob {

@@ -47,15 +47,15 @@ pub(super) struct Projected {
 }
 
 impl Sources {
-    pub(super) fn of(dataset: &Dataset, layers: &Layers) -> Self {
+    pub(super) fn new(dataset: &Dataset, layers: &Layers) -> Self {
         let inputs = if let Some(parameters) = &layers.projection {
-            Inputs::Projected(Projected::of(dataset, parameters, &layers.seen(dataset)))
+            Inputs::Projected(Projected::new(dataset, parameters, &layers.seen(dataset)))
         } else {
-            let scale = |row| InputScale::of(&dataset.row_table(row));
+            let scale = |row| InputScale::new(&dataset.row_table(row));
             Inputs::Rows((0..dataset.rows).map(scale).collect())
         };
         let networks = layers.hidden.len();
-        Self { inputs, targets: Targets::of(dataset, networks), networks }
+        Self { inputs, targets: Targets::new(dataset, networks), networks }
     }
 
     /// What the projection's refinement starts from, if there is one.
@@ -96,7 +96,7 @@ impl Sources {
 }
 
 impl Projected {
-    fn of(dataset: &Dataset, parameters: &[f32], seen: &Dataset) -> Self {
+    fn new(dataset: &Dataset, parameters: &[f32], seen: &Dataset) -> Self {
         let features = seen.inputs.names.len();
         let (lows, span) = scale_of(seen);
         let parts = &parameters[features..];

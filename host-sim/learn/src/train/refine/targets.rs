@@ -16,7 +16,7 @@ pub(super) struct Targets {
 }
 
 impl Targets {
-    pub(super) fn of(dataset: &Dataset, networks: usize) -> Self {
+    pub(super) fn new(dataset: &Dataset, networks: usize) -> Self {
         let deviations = dataset.outputs.deviations();
         let quantities: Vec<&str> =
             dataset.outputs.names.iter().map(|name| columns::quantity_of(name)).collect();

@@ -88,7 +88,7 @@ fn gradient_is_the_slope(sizes: Sizes, loss: &dyn Fn(&Movable) -> Loss) {
 #[test]
 fn a_width_for_each_centre_moves_by_itself() {
     let world = World { read_rows: vec![3], ..World::press() };
-    let synthesis = Synthesis::of(&world);
+    let synthesis = Synthesis::new(&world);
     let (training, test) =
         (synthesis.frames(Stream::Training, 3000), synthesis.frames(Stream::Test, 1000));
     let fresh = Fresh(synthesis);
@@ -154,7 +154,7 @@ fn refined_models_are_better_and_the_same_on_any_number_of_threads() {
     for (world, whole_array, format, gain) in
         [(&row, false, Format::F32, 0.97), (&whole, true, Format::Fixed16, 0.93)]
     {
-        let synthesis = Synthesis::of(world);
+        let synthesis = Synthesis::new(world);
         let (training, test) =
             (synthesis.frames(Stream::Training, 3000), synthesis.frames(Stream::Test, 1000));
         let spread = if whole_array { 0.4 } else { 0.8 };
@@ -189,9 +189,9 @@ impl FreshFrames for Counted<'_> {
 #[test]
 fn steps_look_at_more_frames_the_more_centres_there_are() {
     let world = World { read_rows: vec![3], ..World::press() };
-    let training = Synthesis::of(&world).frames(Stream::Training, 200);
+    let training = Synthesis::new(&world).frames(Stream::Training, 200);
     for (centres, frames) in [(8, 300), (40, 640)] {
-        let fresh = Counted(Fresh(Synthesis::of(&world)), AtomicUsize::new(0));
+        let fresh = Counted(Fresh(Synthesis::new(&world)), AtomicUsize::new(0));
         let options = Options { centres, ..Options::default() };
         let settings = Refinement { steps: 2, frames: 300, ..Refinement::default() };
         let examples = Examples::Fresh(&fresh);
@@ -217,7 +217,7 @@ fn refinement_on_folds_helps_with_many_frames_and_does_no_harm_with_few() {
     let world = World { read_rows: vec![3], ..World::press() };
     // Measured: 0.946 and 1.000.
     for (noise, frames, most) in [(0.005, 6000, 0.96), (0.02, 600, 1.001)] {
-        let synthesis = Synthesis::of(&world).noise_level(noise);
+        let synthesis = Synthesis::new(&world).noise_level(noise);
         let [training, test] = [(Stream::Training, frames), (Stream::Test, 2000)]
             .map(|(stream, frames)| synthesis.frames(stream, frames));
         let options = Options { centres: 12, ..Options::default() };
@@ -240,7 +240,7 @@ fn refinement_on_folds_helps_with_many_frames_and_does_no_harm_with_few() {
 #[test]
 fn the_least_width_is_just_held_by_fixed16() {
     let world = World { read_rows: vec![3], ..World::press() };
-    let training = Synthesis::of(&world).frames(Stream::Training, 500);
+    let training = Synthesis::new(&world).frames(Stream::Training, 500);
     let options = Options { centres: 12, format: Format::Fixed16, ..Options::default() };
     let start = Layers::start(&training, &options).unwrap();
     let least = width::least(Format::Fixed16, &start.hidden[0].centres, &[[0.0, 1.0]; 18]);
@@ -299,7 +299,7 @@ fn evened_features_are_rotated_and_span_less() {
 #[test]
 fn settings_that_cannot_be_used_are_refused_by_name() {
     let world = World { read_rows: vec![3], ..World::press() };
-    let training = Synthesis::of(&world).frames(Stream::Training, 50);
+    let training = Synthesis::new(&world).frames(Stream::Training, 50);
     let options = Options { centres: 4, ..Options::default() };
     let start = Layers::start(&training, &options).unwrap();
     let refused = |settings: Refinement, folds: usize, field: &str| {

@@ -24,7 +24,7 @@ fn by_recursion(
     test: Option<&Dataset>,
 ) -> (Trained, Vec<Learned>) {
     let world = world();
-    let synthesis = Synthesis::of(&world);
+    let synthesis = Synthesis::new(&world);
     let first_frames = synthesis.frames(Stream::Training, first);
     let starts = (first..frames).step_by(piece);
     let rest = starts
@@ -44,7 +44,7 @@ fn the_cut_of_the_frames_changes_nothing() {
 
 #[test]
 fn without_a_rest_the_networks_are_those_of_training_in_memory() {
-    let frames = Synthesis::of(&world()).frames(Stream::Training, 900);
+    let frames = Synthesis::new(&world()).frames(Stream::Training, 900);
     for (format, whole_array) in
         [(Format::F32, false), (Format::Fixed16, false), (Format::F32Direct, true)]
     {
@@ -58,7 +58,7 @@ fn without_a_rest_the_networks_are_those_of_training_in_memory() {
 
 #[test]
 fn the_learning_curve_falls_and_ends_with_the_last_frame() {
-    let test = Synthesis::of(&world()).frames(Stream::Test, 300);
+    let test = Synthesis::new(&world()).frames(Stream::Test, 300);
     let (_, curve) = by_recursion(1500, 400, 300, &options(), Some(&test));
     let frames: Vec<usize> = curve.iter().map(|point| point.frames).collect();
     assert_eq!(frames, [10, 20, 50, 100, 200, 500, 1000, 1500]);
@@ -77,7 +77,7 @@ fn without_test_frames_the_curve_is_measured_on_the_next_ones() {
 
 #[test]
 fn an_error_of_the_stream_ends_the_training() {
-    let first = Synthesis::of(&world()).frames(Stream::Training, 50);
+    let first = Synthesis::new(&world()).frames(Stream::Training, 50);
     let path = std::path::Path::new("log.csv");
     let problem = taxel_data::error::Problem::NoLines;
     let rest = [Err(taxel_data::Error::file(path, problem))].into_iter();
@@ -88,7 +88,7 @@ fn an_error_of_the_stream_ends_the_training() {
 
 #[test]
 fn a_piece_with_other_columns_is_refused() {
-    let first = Synthesis::of(&world()).frames(Stream::Training, 50);
+    let first = Synthesis::new(&world()).frames(Stream::Training, 50);
     let mut other = first.clone();
     other.outputs.names.swap(0, 1);
     let rest = Box::new([Ok(other)].into_iter());

@@ -103,9 +103,9 @@ fn a_model_that_decodes_no_frame_is_given_up() {
                 start_us: 0,
                 flags,
                 row_status: &[],
-                outputs: Floats::of(&[]),
+                outputs: Floats::new(&[]),
                 novelty: None,
-                deviation: Floats::of(&[]),
+                deviation: Floats::new(&[]),
             }),
         });
         assert_eq!(see_estimate(&mut device, 7).is_ok(), is_seen);

@@ -31,7 +31,7 @@ impl Verdict {
         }
     }
 
-    fn of(holds: bool) -> Self {
+    fn new(holds: bool) -> Self {
         if holds { Self::Holds } else { Self::Fails }
     }
 }
@@ -130,7 +130,7 @@ fn more_neurons(map: &Map, ends: Ends) -> Option<Claim> {
         cells.next().map(|cell| cell.centres as f64)
     };
     let compared = ends.compared(needed)?;
-    let verdict = Verdict::of(compared[1].value > compared[0].value);
+    let verdict = Verdict::new(compared[1].value > compared[0].value);
     let quantity = "fewest K within 1 % of the least test error";
     Some(map.claim("wide Gaussians need more neurons", quantity, compared, verdict))
 }
@@ -141,7 +141,7 @@ fn under_fit(map: &Map, ends: Ends) -> Option<Claim> {
         Some(few.training_rmse / map.mean_training_rmse)
     };
     let compared = ends.compared(training)?;
-    let verdict = Verdict::of(compared[1].value > compared[0].value * (1.0 + ALIKE));
+    let verdict = Verdict::new(compared[1].value > compared[0].value * (1.0 + ALIKE));
     let quantity = "training error with the fewest K, over the mean's";
     Some(map.claim("wide Gaussians under-fit", quantity, compared, verdict))
 }
@@ -171,7 +171,7 @@ fn over_fit(map: &Map, ends: Ends) -> Option<Claim> {
 fn slow(map: &Map, ends: Ends) -> Option<Claim> {
     let compared = ends.compared(|spread| map.least(spread))?;
     let growth = compared[1].value / compared[0].value;
-    let verdict = Verdict::of((1.0 - ALIKE..SLOW).contains(&growth));
+    let verdict = Verdict::new((1.0 - ALIKE..SLOW).contains(&growth));
     let quantity = "least test error of any K";
     Some(map.claim("the error grows slowly with the spread", quantity, compared, verdict))
 }
@@ -204,7 +204,7 @@ fn with_noise(maps: &[Map]) -> Option<Claim> {
         Some(Compared { at: format!("noise {}", map.noise_level), value: best.test_rmse })
     };
     let compared = vec![of(quiet)?, of(loud)?];
-    let verdict = Verdict::of(compared[1].value > compared[0].value);
+    let verdict = Verdict::new(compared[1].value > compared[0].value);
     let quantity = "least test error of any K and spread";
     let claim = loud.claim("the error grows with noise", quantity, compared, verdict);
     Some(Claim { noise_level: None, ..claim })

@@ -33,7 +33,7 @@ impl Design for Rows<'_> {
 }
 
 impl<'t> Regressed<'t> {
-    pub(super) fn of(design: &impl Design, targets: &'t [f64]) -> Self {
+    pub(super) fn new(design: &impl Design, targets: &'t [f64]) -> Self {
         let regressors = design.regressors();
         let mut rows = vec![0.0; targets.len() * regressors];
         design.fill(0..targets.len(), &mut rows);

@@ -101,7 +101,7 @@ impl Victim {
     ) -> Result<Harm, String> {
         let mut running = self.renewed()?;
         let case = &self.cases[0];
-        let request = Request::Decode { frame: 0, readings_ohm: Floats::of(&case.readings_ohm) };
+        let request = Request::Decode { frame: 0, readings_ohm: Floats::new(&case.readings_ohm) };
         let failed = |cause: &dyn std::fmt::Display| format!("the emulator: {cause}");
         running.device.send(&request).map_err(|cause| failed(&cause))?;
         let (start, wait) = (Instant::now(), Duration::from_micros(random.next_u64() % 300));
@@ -213,7 +213,7 @@ fn is_fed(gdb: &mut Gdb) -> bool {
 
 /// Lets the device decode a frame. An error tells whether the emulator has ended.
 fn decoded(device: &mut Device<Link>, case: &Case) -> Result<Harm, bool> {
-    let request = Request::Decode { frame: 0, readings_ohm: Floats::of(&case.readings_ohm) };
+    let request = Request::Decode { frame: 0, readings_ohm: Floats::new(&case.readings_ohm) };
     let answer = device.ask(&request, ANSWER, |report| match report {
         Report::Estimate(estimate) => Some(judged(estimate, case)),
         _ => None,

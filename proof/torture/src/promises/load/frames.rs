@@ -126,7 +126,7 @@ fn run(
     }
     if seed / 40 % 2 == 1 {
         let rest = frame_at_rest();
-        let readings_ohm = model_core::blob::Floats::of(rest.as_flattened());
+        let readings_ohm = model_core::blob::Floats::new(rest.as_flattened());
         ask(&mut session, &board, &Request::SetBaseline { readings_ohm }, |_| ());
     }
     // Frames fall into step with this loop, so that none is scanned together with the answer.
