@@ -83,7 +83,9 @@ Usage: cargo xtask COMMAND
       --minutes N             takes so long (20); some promises take longer
       --short                 tests the least number of cases, in at most two minutes
       --seed S                starts from this seed: that of the table repeats the worst case of a promise
-      --self-test             plants a fault under every promise instead, and fails if one is not found
+      --accept                writes proof/torture/bounds.csv instead: the worst of ten runs of each promise
+      --self-test             as the first option: builds a copy of the product with planted faults, and fails unless
+                              each line sees those that proof/mutants has it named for. Minutes, behind a build
   mutants [OPTION…] [NAME…]   plants faults in a copy of the product, those of these names or all of proof/mutants, and
                               tells which test and which line of torture sees each. Fails if one is missed that
                               proof/mutants/score.csv has as found. An hour; what was found is kept in target/mutants

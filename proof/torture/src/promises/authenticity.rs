@@ -15,7 +15,7 @@ use crate::tools::Tools;
 
 pub const FORGED: Promise = Promise {
     name: "seal-forged",
-    text: "no forged, replayed, older or cut model is confirmed",
+    text: "no forged, replayed or older model is confirmed",
     share: 1,
     check: forged,
 };
@@ -124,7 +124,6 @@ impl Device {
     }
 }
 
-/// With a planted fault the attacker has the key, and seals what he has made.
 fn forged(effort: &Effort, _: &Tools) -> Result<Found, String> {
     let case = |seed: u64| {
         let key: Key = std::array::from_fn(|i| (seed.wrapping_mul(31) >> (i % 8)) as u8 ^ i as u8);
@@ -140,10 +139,7 @@ fn forged(effort: &Effort, _: &Tools) -> Result<Found, String> {
             if is_right { Ok(()) } else { Err(format!("a genuine model: {taken:?}")) }
         };
         genuine(&mut device, VERSION, &first)?;
-        let mut attack = attack(seed, &key);
-        if effort.is_planted() {
-            attack.seal = Some(Seal::of(&key, VERSION + 1, &attack.blob));
-        }
+        let attack = attack(seed, &key);
         let outcome = device.install(&attack.blob, attack.seal, attack.lost);
         let is_named = attack.named.is_none_or(|fault| outcome == Err(Refusal::Seal(fault)));
         if outcome.is_ok() || !is_named || device.model() != Some(crc_of(&first)) {

@@ -14,7 +14,7 @@ use crate::tools::Tools;
 
 pub const UPLOAD: Promise = Promise {
     name: "cut-upload",
-    text: "power cut in an upload: the old or the new model",
+    text: "power cut in an upload: old or new model",
     share: 12,
     check: |effort, tools| check(Job::Upload, effort, tools),
 };
@@ -28,7 +28,7 @@ pub const UNDO: Promise = Promise {
 
 pub const RECALIBRATION: Promise = Promise {
     name: "cut-recalibration",
-    text: "power cut in a recalibration: the old or the new model",
+    text: "power cut in a recalibration: old or new model",
     share: 6,
     check: |effort, tools| check(Job::Recalibration, effort, tools),
 };
@@ -50,10 +50,9 @@ const STARTS: usize = 3;
 
 fn check(job: Job, effort: &Effort, _: &Tools) -> Result<Found, String> {
     let cuts = Tally::new(Torn::ALL.map(Torn::name));
-    let planted = effort.is_planted();
-    let least = if planted || job == Job::Recalibration { LEAST / 4 } else { LEAST };
+    let least = if job == Job::Recalibration { LEAST / 4 } else { LEAST };
     let mut found = effort.worst((least, MOST), (0.0, "losses"), |seed| {
-        Case::new(job, seed, planted).run(&cuts).map(|()| 0.0)
+        Case::new(job, seed).run(&cuts).map(|()| 0.0)
     });
     found.cases = cuts.sum();
     if found.note.is_empty() {
@@ -68,17 +67,15 @@ struct Case {
     seed: u64,
     torn: Torn,
     device: Device,
-    /// Whether a fault is planted at each cut.
-    planted: bool,
     new: AlignedBytes,
     next: AlignedBytes,
 }
 
 impl Case {
-    fn new(job: Job, seed: u64, planted: bool) -> Self {
+    fn new(job: Job, seed: u64) -> Self {
         let torn = Torn::of(seed);
         let device = Device::new(seed, torn);
-        Self { job, seed, torn, device, planted, new: blob(2, 2), next: blob(7, 1) }
+        Self { job, seed, torn, device, new: blob(2, 2), next: blob(7, 1) }
     }
 
     fn run(mut self, cuts: &Tally<{ Torn::COUNT }>) -> Result<(), String> {
@@ -93,7 +90,6 @@ impl Case {
         let first = (self.seed / (4 * Torn::COUNT as u64)).wrapping_mul(17) % operations;
         self.device.restore(&before);
         self.attempt(Some(first));
-        self.slip();
         cuts.add(self.kind(), 1);
         let place = format!("operation {first} of {operations}, {}", self.torn.name());
         let allowed = [Some(old), Some(new)];
@@ -113,7 +109,6 @@ impl Case {
             if outcome != Outcome::Cut {
                 break;
             }
-            self.slip();
             cuts.add(self.kind(), 1);
             let place = format!("{place}, then operation {second}");
             self.expect(&[in_force, Some(wanted)], &place)?;
@@ -138,7 +133,6 @@ impl Case {
             if !self.device.supply.borrow().gone {
                 break;
             }
-            self.slip();
             cuts.add(self.kind(), 1);
             self.expect(allowed, &format!("{place}, then operation {operation} of the start"))?;
         }
@@ -208,12 +202,5 @@ impl Case {
             return Err(format!("{place}: the next upload is {outcome:?}"));
         }
         self.expect(&[Some(crc_of(&mend))], &format!("{place}, mended")).map(drop)
-    }
-
-    /// If a fault is to be planted: the processor runs on while the voltage falls, and writes a wild word to each slot.
-    fn slip(&mut self) {
-        if self.planted {
-            self.device.slots.iter_mut().for_each(|slot| slot.decay(6, 1));
-        }
     }
 }

@@ -17,7 +17,7 @@ use crate::tools::Tools;
 
 pub const DECAY: Promise = Promise {
     name: "abort-decay",
-    text: "the slot in force decays: no aborted upload takes over",
+    text: "the slot decays: no aborted upload takes over",
     share: 2,
     check: decay,
 };
@@ -107,13 +107,9 @@ impl Case {
 
 fn decay(effort: &Effort, _: &Tools) -> Result<Found, String> {
     let starts = Tally::new(["the same model", "the one before it", "none"]);
-    let planted = effort.is_planted();
     let mut found = effort.worst((LEAST, MOST), (0.0, "losses"), |seed| {
         let mut case = Case::new(seed)?;
         let how = case.end_upload();
-        if planted {
-            case.device.slots[0].forget_record(); // so that nothing tells that an upload has begun
-        }
         let (old, new) = (crc_of(&case.old), crc_of(&case.new));
         let before = case.device.restart();
         let in_force = if before == Some(new) { case.new.clone() } else { case.old.clone() };
@@ -151,7 +147,6 @@ fn decay(effort: &Effort, _: &Tools) -> Result<Found, String> {
 
 fn worn(effort: &Effort, _: &Tools) -> Result<Found, String> {
     let outcomes = Tally::new(["in force", "refused", "cut"]);
-    let planted = effort.is_planted();
     let mut found = effort.worst((LEAST, MOST), (0.0, "losses"), |seed| {
         let mut case = Case::new(seed)?;
         let spare = 1 - case.device.slot_of(&case.old).ok_or("the old model is in no slot")?;
@@ -167,7 +162,6 @@ fn worn(effort: &Effort, _: &Tools) -> Result<Found, String> {
             let worn = Worn { place: place as usize, zeros, ones };
             case.device.slots[spare].worn.push(worn);
         }
-        case.device.slots[spare].reads_back = !planted;
         let cut = (case.below(4) == 0).then(|| case.below(60));
         let new = case.new.clone();
         let outcome = case.device.upload(&new, usize::MAX, cut);

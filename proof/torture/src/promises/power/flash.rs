@@ -4,7 +4,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use firmware::store::{FlashError, RECORD_BYTES, Slot};
+use firmware::store::{FlashError, Slot};
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -148,8 +148,6 @@ pub struct Flash {
     torn: Torn,
     /// Words that have worn out.
     pub worn: Vec<Worn>,
-    /// Whether a write reads back what it wrote.
-    pub reads_back: bool,
     /// Whether all weak bits of a word read alike at every other start: the word is the old or the new one.
     pub swings: bool,
 }
@@ -158,14 +156,7 @@ impl Flash {
     /// An erased slot of so many `words`.
     pub fn erased(words: usize, supply: &Rc<RefCell<Supply>>, torn: Torn) -> Self {
         let cells = Cells { words: vec![u32::MAX; words], weak: vec![0; words], has_weak: false };
-        Self {
-            cells,
-            supply: supply.clone(),
-            torn,
-            worn: Vec::new(),
-            reads_back: true,
-            swings: false,
-        }
+        Self { cells, supply: supply.clone(), torn, worn: Vec::new(), swings: false }
     }
 
     /// What the slot holds, to be put back by [`Flash::restore`].
@@ -186,12 +177,6 @@ impl Flash {
     /// Flips `bits` of word `place`, as an old cell does.
     pub fn decay(&mut self, place: usize, bits: u32) {
         self.cells.words[place] ^= bits;
-    }
-
-    /// Makes the first record's place look as if it was never written.
-    pub fn forget_record(&mut self) {
-        let record = self.cells.words.len() - RECORD_BYTES / 4;
-        self.cells.words[record..].fill(u32::MAX);
     }
 
     /// Lets weak bits settle one way or the other, as they do at a start.
@@ -306,7 +291,7 @@ impl Slot for Flash {
             for worn in self.worn.iter().filter(|worn| worn.place == place) {
                 *word |= worn.ones;
             }
-            if *word != wanted && self.reads_back {
+            if *word != wanted {
                 return Err(FlashError);
             }
         }

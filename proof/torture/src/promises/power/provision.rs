@@ -20,7 +20,7 @@ use crate::tools::Tools;
 
 pub const PROVISION: Promise = Promise {
     name: "cut-provision",
-    text: "power cut while a key is set: no key or that one",
+    text: "power cut while a key is set: none or that one",
     share: 2,
     check,
 };
@@ -40,10 +40,8 @@ const OTHER: Key = [0xC7; KEY_BYTES];
 
 fn check(effort: &Effort, _: &Tools) -> Result<Found, String> {
     let cuts = Tally::new(Torn::ALL.map(Torn::name));
-    let planted = effort.is_planted();
-    let mut found = effort.worst((LEAST, MOST), (0.0, "losses"), |seed| {
-        Case::new(seed, planted).run(&cuts).map(|()| 0.0)
-    });
+    let mut found = effort
+        .worst((LEAST, MOST), (0.0, "losses"), |seed| Case::new(seed).run(&cuts).map(|()| 0.0));
     found.cases = cuts.sum();
     if found.note.is_empty() {
         found.note = cuts.text();
@@ -69,12 +67,10 @@ struct Case {
     flash: Flash,
     slots: [MockSlot; 2],
     memory: Box<Memory>,
-    /// Whether a fault is planted: what a start writes to make firm what it has found is lost.
-    planted: bool,
 }
 
 impl Case {
-    fn new(seed: u64, planted: bool) -> Self {
+    fn new(seed: u64) -> Self {
         let supply = Supply::new(seed);
         let mut flash = Flash::erased(WORDS, &supply, Torn::of(seed));
         flash.swings = true;
@@ -88,7 +84,7 @@ impl Case {
             flash.flash(bytemuck::cast_slice(&code.collect::<Vec<u32>>()));
         }
         let slots = MockSlot::pair_with(&blob(1, 3));
-        Self { seed, supply, flash, slots, memory: Box::new(Memory::new()), planted }
+        Self { seed, supply, flash, slots, memory: Box::new(Memory::new()) }
     }
 
     fn run(mut self, cuts: &Tally<{ Torn::COUNT }>) -> Result<(), String> {
@@ -148,9 +144,6 @@ impl Case {
         self.supply.borrow_mut().on(cut_after);
         let area = KeyArea::of(self.flash.clone());
         let mut bench = Bench::within_with_key(&mut self.memory, quiet(), &area);
-        if self.planted {
-            bench.app.platform().key = area;
-        }
         let board = bench.board.clone();
         let mut session = Session::start(&mut bench.app, &mut self.slots, &mut []);
         let done = work(&mut session, &board);

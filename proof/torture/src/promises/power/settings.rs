@@ -18,7 +18,7 @@ use crate::tools::Tools;
 
 pub const SETTINGS: Promise = Promise {
     name: "cut-settings",
-    text: "power cut while a setting is kept: the old or the new",
+    text: "power cut while a setting is kept: old or new",
     share: 8,
     check,
 };
@@ -35,11 +35,8 @@ const STRIDE: u64 = 16;
 
 fn check(effort: &Effort, _: &Tools) -> Result<Found, String> {
     let cuts = Tally::new(Torn::ALL.map(Torn::name));
-    let planted = effort.is_planted();
-    let least = if planted { LEAST / 4 } else { LEAST };
-    let mut found = effort.worst((least, MOST), (0.0, "losses"), |seed| {
-        Case::new(seed, planted)?.run(&cuts).map(|()| 0.0)
-    });
+    let mut found = effort
+        .worst((LEAST, MOST), (0.0, "losses"), |seed| Case::new(seed)?.run(&cuts).map(|()| 0.0));
     found.cases = cuts.sum();
     if found.note.is_empty() {
         found.note = cuts.text();
@@ -57,19 +54,18 @@ struct Case {
     settings: SharedSettings<Flash>,
     /// What is kept before the cut.
     old: Contents,
-    planted: bool,
 }
 
 impl Case {
     /// Pages after some settings were kept, up to several exchanges of the pages. In half of the cases the next one leads
     /// to an exchange.
-    fn new(seed: u64, planted: bool) -> Result<Self, String> {
+    fn new(seed: u64) -> Result<Self, String> {
         let supply = Supply::new(seed);
         let torn = Torn::of(seed);
         let page = || Flash::erased(PAGE_BYTES / 4, &supply, torn);
         let settings = SharedSettings::in_pages([page(), page()]);
         let random = Xoshiro256PlusPlus::seed_from_u64(seed);
-        let mut case = Self { seed, random, supply, settings, old: [None, None, None], planted };
+        let mut case = Self { seed, random, supply, settings, old: [None, None, None] };
         let times = case.below(60);
         case.keep_some(times)?;
         if seed / Torn::COUNT as u64 % 2 == 1 {
@@ -179,10 +175,6 @@ impl Case {
         let kept = self.settings.keep_bytes(setting, bytes);
         let gone = self.supply.borrow().gone;
         assert!(kept.is_ok() || gone, "{setting:?}: {kept:?}");
-        if self.planted && gone {
-            // The processor runs on while the voltage falls, and writes a wild word to each page.
-            self.settings.0.borrow_mut().pages().iter_mut().for_each(|page| page.decay(1, 0xFFFF));
-        }
         gone
     }
 
