@@ -15,7 +15,7 @@ use taxel_learn::Exponential;
 use taxel_learn::decoders::BASELINES;
 use taxel_simulate::Synthesis;
 
-use crate::level::{NoiseLevel, Solved, check, train};
+use crate::level::{NoiseLevel, Solved, at_noise, check, train};
 use taxel_evaluate::error::Result;
 use taxel_evaluate::experiment::{Direction, Experiment};
 use taxel_evaluate::metrics::{self, DecoderErrors, LimitSummary};
@@ -66,6 +66,8 @@ pub struct Level {
     /// Least possible errors of decoding.
     pub limit: LimitSummary,
 }
+
+at_noise!(Level);
 
 /// Effort of inverting the network.
 #[derive(Debug, Clone, PartialEq, Serialize)]

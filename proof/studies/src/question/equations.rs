@@ -8,7 +8,7 @@ use taxel_data::random::{Purpose, Random, Stream};
 use taxel_limit::solve::Solution;
 use taxel_simulate::Synthesis;
 
-use crate::level::{NoiseLevel, Solved, check};
+use crate::level::{NoiseLevel, Solved, at_noise, check};
 use taxel_evaluate::error::Result;
 use taxel_evaluate::experiment::Experiment;
 use taxel_evaluate::metrics::{DecoderErrors, LimitSummary};
@@ -64,6 +64,8 @@ pub struct Level {
     /// Least possible errors.
     pub limit: LimitSummary,
 }
+
+at_noise!(Level);
 
 /// What solving the equations of one row-wire gives without noise.
 #[derive(Debug, Clone, PartialEq, Serialize)]

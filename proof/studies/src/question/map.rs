@@ -3,6 +3,7 @@
 //! Networks are the paper's: Gaussians of one width and a bias, without affine tail, in f64. Centres are those of K-means,
 //! or all samples (K = N), which interpolates.
 
+use clap::Args;
 use rayon::prelude::*;
 use serde::Serialize;
 use taxel_data::dataset::{Dataset, RowTable};
@@ -31,17 +32,25 @@ const SAMPLES_IN_ALL: usize = 1000;
 const MOST_SETS: usize = 10;
 
 /// Settings of the study.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Args)]
 pub struct Plan {
-    /// Numbers of samples N, ascending.
+    /// Numbers of samples N.
+    #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = Self::default().samples)]
     pub samples: Vec<usize>,
-    /// Numbers of centres K, ascending. Those below N are tried, and N itself up to [`MOST_INTERPOLATED`].
+    /// Centres K; those below N, and N itself up to 1000.
+    #[arg(long, value_name = "K,…", value_delimiter = ',', default_values_t = Self::default().centres)]
     pub centres: Vec<usize>,
+    /// Spreads.
+    #[arg(long = "spread", value_name = "S,…", value_delimiter = ',', default_values_t = Self::default().spreads, allow_negative_numbers = true)]
     pub spreads: Vec<f64>,
-    /// Noise levels as fractions, ascending.
+    /// Noise levels as fractions (0.01 is 1 %).
+    #[arg(long = "noise", value_name = "LEVEL,…", value_delimiter = ',', default_values_t = Self::default().noise_levels, allow_negative_numbers = true)]
     pub noise_levels: Vec<f64>,
+    /// Test frames.
+    #[arg(long, value_name = "N", default_value_t = Self::default().test_frames)]
     pub test_frames: usize,
-    /// Initial covariance δ: the penalty on squared weights is 1/δ for all samples together.
+    /// Initial covariance δ: output weights have a penalty of 1/δ on their squares.
+    #[arg(long, value_name = "DELTA", default_value_t = Self::default().initial_covariance, allow_negative_numbers = true)]
     pub initial_covariance: f64,
 }
 

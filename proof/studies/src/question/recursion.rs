@@ -5,6 +5,7 @@
 //! by QR decomposition in f64. So rounding is told from covariance wind-up: with λ < 1 and no leakage, the exact solution
 //! itself forgets what is not excited, and is wild when that is excited again.
 
+use clap::Args;
 use rayon::prelude::*;
 use serde::Serialize;
 use taxel_data::error::require;
@@ -60,9 +61,13 @@ pub const KINDS: [(Form, &str); 4] = [
 ];
 
 /// What is studied.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Args)]
 pub struct Plan {
+    /// Centres K.
+    #[arg(long, value_name = "K", default_value_t = 48)]
     pub centres: usize,
+    /// Updates of each recursion.
+    #[arg(short = 'n', long, value_name = "N", default_value_t = 10_000)]
     pub updates: usize,
 }
 

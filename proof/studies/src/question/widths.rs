@@ -1,5 +1,6 @@
 //! What a width for each centre gains over one for all, at the same K and at the same cost.
 
+use clap::Args;
 use model_core::rbf::{Format, Network};
 use serde::Serialize;
 use taxel_data::dataset::Dataset;
@@ -26,10 +27,13 @@ const VARIANTS: [(Widths, Format); 3] = [
 ];
 
 /// Settings of the study.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Args)]
 pub struct Plan {
+    /// Centres K to try.
+    #[arg(long, value_name = "K,…", value_delimiter = ',', default_values_t = Self::default().centres)]
     pub centres: Vec<usize>,
-    /// Spreads to choose among, by other frames than those that models are judged on.
+    /// Spreads to choose among.
+    #[arg(long = "spread", value_name = "S,…", value_delimiter = ',', default_values_t = Self::default().spreads, allow_negative_numbers = true)]
     pub spreads: Vec<f64>,
 }
 
