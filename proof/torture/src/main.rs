@@ -146,6 +146,8 @@ fn accept(
             *worst = worst.max(found.worst);
         }
     }
+    // A line in which nothing was off keeps what it has.
+    worst.retain(|(_, worst)| *worst > 0.0);
     Ok(bounds::accept(&worst)?)
 }
 

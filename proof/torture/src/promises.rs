@@ -40,7 +40,6 @@ pub const PROMISES: &[Promise] = &[
     forward::TOUCHING,
     sensor::NAMED,
     sensor::SILENT,
-    sensor::FILLED,
     flips::ONE,
     flips::TWO,
     power::UPLOAD,

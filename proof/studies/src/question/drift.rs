@@ -25,9 +25,7 @@ pub struct Line {
     pub relative_inputs: bool,
     /// Whether it was trained on sessions that drift as much.
     pub trained_with_drift: bool,
-    /// Errors without drift, by group.
     pub undrifted: Vec<Errors>,
-    /// Errors with drift, by group.
     pub drifted: Vec<Errors>,
 }
 
@@ -35,7 +33,6 @@ pub struct Line {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DriftResult {
     pub subject: String,
-    /// Seed of every random draw.
     pub seed: u64,
     /// Largest relative change of the gain.
     pub gain: f64,

@@ -34,11 +34,9 @@ impl Default for Plan {
     }
 }
 
-/// Results of a scene.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EquationsResult {
     pub subject: String,
-    /// Seed of every random draw.
     pub seed: u64,
     pub frames: usize,
     /// Number of rows that were solved at each level: those of all test frames.
@@ -61,7 +59,6 @@ pub struct Level {
     pub percent_solved: f64,
     /// Errors on the test frames. All rows count: one that is not solved has the last place of the search.
     pub decoders: Vec<DecoderErrors>,
-    /// Least possible errors.
     pub limit: LimitSummary,
 }
 

@@ -31,7 +31,6 @@ const SAMPLES_IN_ALL: usize = 1000;
 /// Most training sets of a map.
 const MOST_SETS: usize = 10;
 
-/// Settings of the study.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct Plan {
     /// Numbers of samples N.
@@ -68,7 +67,6 @@ impl Default for Plan {
 }
 
 impl Plan {
-    /// Checks every setting.
     pub fn check(&self) -> std::result::Result<(), BadValue> {
         let lists = [
             ("samples", self.samples.len(), self.samples.is_sorted_by(|a, b| a < b)),
@@ -107,18 +105,15 @@ impl Plan {
     }
 }
 
-/// Results of the study.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MapStudy {
     pub subject: String,
-    /// Seed of every random draw.
     pub seed: u64,
     /// Row-wire that is read, from 1.
     pub row_wire: usize,
     pub group: String,
     pub unit: String,
     pub test_frames: usize,
-    /// Initial covariance δ.
     pub initial_covariance: f64,
     /// Numbers of centres K that were tried; besides these N itself.
     pub centres: Vec<usize>,

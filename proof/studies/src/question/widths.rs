@@ -26,7 +26,6 @@ const VARIANTS: [(Widths, Format); 3] = [
     (Widths::Neighbours, Format::F32Direct),
 ];
 
-/// Settings of the study.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct Plan {
     /// Centres K to try.
@@ -53,11 +52,9 @@ impl Plan {
     }
 }
 
-/// Results of the study.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct WidthsStudy {
     pub subject: String,
-    /// Seed of every random draw.
     pub seed: u64,
     /// Noise level, as a fraction.
     pub noise_level: f64,
@@ -66,11 +63,9 @@ pub struct WidthsStudy {
     pub group: String,
     pub unit: String,
     pub training_frames: usize,
-    /// Number of frames that models are judged on.
     pub test_frames: usize,
     /// RMSE of always predicting the mean.
     pub mean_rmse: f64,
-    /// Least possible errors.
     pub limit: LimitSummary,
     /// Models, by K; first those by K-means alone, then the refined ones.
     pub models: Vec<Model>,

@@ -1,5 +1,4 @@
-//! Faults of the sensor in virtual hardware: which are named, how often a sound sensor is accused, and what is left of
-//! frames.
+//! Faults of the sensor in virtual hardware: which are named, and how often a sound sensor is accused.
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -12,7 +11,7 @@ use taxel_data::random::{Purpose, Random, Stream};
 use taxel_data::table::Table;
 use taxel_learn::faults::{FEWEST_FOR_NOISE, WINDOW, diagnose};
 use taxel_learn::train::train;
-use taxel_learn::{Exponential, ModelBlob, Options, Origin, fill, pack};
+use taxel_learn::{ModelBlob, Options, Origin, fill, pack};
 use taxel_simulate::readout::Readout;
 use taxel_simulate::virtual_board::{BoardFault, VirtualBoard, scan};
 use taxel_simulate::{World, synthesise};
@@ -38,13 +37,6 @@ pub const SILENT: Promise = Promise {
     text: "a sound sensor has no faults",
     share: 16,
     check: silent,
-};
-
-pub const FILLED: Promise = Promise {
-    name: "sensor-fill",
-    text: "z without one reading, column-wire or row-wire",
-    share: 1,
-    check: filled,
 };
 
 /// Rows and columns of the sensor.
@@ -194,45 +186,6 @@ fn silent(effort: &Effort, _: &Tools) -> Result<Found, String> {
         )
     });
     Ok(Found { cases: windows, ..found })
-}
-
-/// Columns without a reading, and the largest ratio of errors in z that this may cost.
-type Without = (&'static str, fn(usize, usize) -> bool, f64);
-
-const WITHOUT: [Without; 3] = [
-    ("a reading", |row, column| (row, column) == (3, 4), 1.01),
-    ("a column-wire", |_, column| column == 8, 1.04),
-    ("a row-wire", |row, _| row == 3, 1.10),
-];
-
-fn filled(effort: &Effort, _: &Tools) -> Result<Found, String> {
-    let prepared = model()?.prepare(Exponential::default());
-    Ok(effort.worst((3, 30), (1.0, "allowed"), |seed| {
-        let (what, is_missing, most) = WITHOUT[(seed % 3) as usize];
-        let world = World { seed, ..World::press() };
-        let frames = synthesise(&world, Stream::Test, 2000);
-        let outputs = &frames.outputs;
-        let error = |readings: &[f64]| {
-            let estimate = prepared.decode_lines(readings);
-            let squares = outputs.squared_errors(&estimate);
-            let z = outputs.names.iter().zip(squares).filter(|(name, _)| name.ends_with("dz_mm"));
-            z.map(|(_, square)| square).sum::<f64>().sqrt()
-        };
-        let mut faulty = frames.inputs.values.clone();
-        for (at, reading) in faulty.iter_mut().enumerate() {
-            let (row, column) = (at / COLUMNS % ROWS, at % COLUMNS);
-            if is_missing(row, column) {
-                *reading = f64::NAN;
-            }
-        }
-        let (filled, _) = prepared.filled(&faulty).ok_or("the model has no fill")?;
-        let ratio = error(&filled) / error(&frames.inputs.values);
-        if ratio > most {
-            Err(format!("without {what}: {ratio:.3} times the error"))
-        } else {
-            Ok(ratio / most)
-        }
-    }))
 }
 
 /// Draws for what a strike adds to readings.

@@ -29,6 +29,8 @@ const DISTANCE: f64 = 0.5;
 const REACHES: f64 = 0.1;
 /// Error over that of the mean that only rounding explains.
 const ROUNDING: f64 = 1.01;
+/// The same of fresh frames without noise: few samples stand for them.
+const OF_FRESH: f64 = 1.1;
 /// The same of fresh frames of a press: the axes that hardly show may be a little worse than the mean.
 const OF_PRESS: f64 = 1.5;
 
@@ -51,7 +53,7 @@ fn extremes(effort: &Effort, _: &Tools) -> Result<Found, String> {
         let [data, fresh] = [SAMPLES, FRESH].map(|count| law.frames(count, &mut random));
         // Gaussians that reach no other sample say nothing of fresh frames, and noise may be learnt.
         let is_bound = law.noise == 0.0 && options.spread >= REACHES;
-        let most = if is_bound { ROUNDING } else { f64::INFINITY };
+        let most = if is_bound { OF_FRESH } else { f64::INFINITY };
         let worst = judge([&data, &fresh], &options, most).map_err(|why| {
             let (format, centres) = (options.format.name(), options.centres);
             format!("{format}, K = {centres}, spread {:e}, {law:?}: {why}", options.spread)
