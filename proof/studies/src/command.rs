@@ -94,7 +94,8 @@ fn show<T: Serialize>(common: &Common, result: &T, page: impl FnOnce(&T) -> Page
 
 /// Headings of columns, one a noise level.
 fn noise_columns(levels: &[impl AtNoise]) -> String {
-    levels.iter().map(|level| format!("{:>10}", print::percent(level.noise_level()))).collect()
+    let columns = levels.iter().map(|level| format!("{:>10}", print::percent(level.noise_level())));
+    columns.collect::<Vec<_>>().concat()
 }
 
 /// Line of a table of errors.
