@@ -11,7 +11,7 @@ use crate::tools::Tools;
 
 pub const TOUCHING: Promise = Promise {
     name: "forward-touching",
-    text: "R falls in z, unless electrodes may touch",
+    text: "readings fall in z, or electrodes may touch",
     share: 1,
     check: touching,
 };

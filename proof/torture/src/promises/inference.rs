@@ -18,14 +18,14 @@ use crate::promise::Promise;
 
 pub const F32: Promise = Promise {
     name: "inference-f32",
-    text: "f32 of any reading is f64, in training RMSEs",
+    text: "f32, any reading: as f64, in training RMSEs",
     share: 1,
     check: |effort, _| inference(effort, &[Format::F32, Format::F32Direct], 0.1),
 };
 
 pub const FIXED16: Promise = Promise {
     name: "inference-fixed16",
-    text: "fixed16 of any reading is f64, in training RMSEs",
+    text: "fixed16, any reading: as f64, in training RMSEs",
     share: 1,
     check: |effort, _| inference(effort, &[Format::Fixed16], 1.0),
 };

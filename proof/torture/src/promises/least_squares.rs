@@ -15,7 +15,7 @@ use crate::tools::Tools;
 
 pub const RESIDUAL: Promise = Promise {
     name: "least-squares",
-    text: "gradient of rounding alone, up to condition 1e16",
+    text: "gradient of rounding alone, condition 1 to 1e16",
     share: 2,
     check: residual,
 };

@@ -11,7 +11,7 @@ use crate::tools::{Tools, tested_model};
 
 pub const RAM: Promise = Promise {
     name: "ram-flip",
-    text: "a flipped bit of RAM: 99 % seen, all of the model",
+    text: "flipped RAM bits: 99 % seen, all of the model",
     share: 12,
     check,
 };
