@@ -43,23 +43,6 @@ pub struct DriftResult {
     pub lines: Vec<Line>,
 }
 
-#[cfg(test)]
-impl DriftResult {
-    /// Line of `decoder` with such inputs and such training.
-    pub fn line(
-        &self,
-        decoder: &str,
-        relative_inputs: bool,
-        trained_with_drift: bool,
-    ) -> Option<&Line> {
-        let is_it = |line: &&Line| {
-            (line.decoder.as_str(), line.relative_inputs, line.trained_with_drift)
-                == (decoder, relative_inputs, trained_with_drift)
-        };
-        self.lines.iter().find(is_it)
-    }
-}
-
 /// Trains the scene's decoders on readings, on readings of sessions that drift, and on relative inputs. Judges each
 /// on the scene's test frames, without drift and with a `gain` that differs by up to so much in each session.
 pub fn measure(experiment: &Experiment, gain: f64, progress: &dyn Progress) -> Result<DriftResult> {
